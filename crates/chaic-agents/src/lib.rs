@@ -1,0 +1,46 @@
+//! All minds: the simulated people and the rule-based helpers.
+//!
+//! **What it is**: one [`mind::Mind`] joins [`perception`] (what is in the image), [`memory`]
+//! (where everything is), [`behavior`] (what the others do), [`decision`] (what to do next, by a
+//! [`decision::Policy`]) and [`execution`] (how to do it, action by action). [`partners`] are part
+//! of the benchmark's definition; [`helpers`] are what is measured. Both are the same kind of
+//! thing with different data.
+//!
+//! **What it is not**: it holds no state of a world and makes no pixels; it never depends on
+//! `chaic-world` or `chaic-render`.
+//!
+//! **Invariants**
+//! - A mind knows its briefing, its observations and what was granted; nothing else reaches it.
+//! - The same briefing and observations lead to the same actions on every machine: random numbers
+//!   come from [`chaic_protocol::rng::Stream`], there is no clock, and no hash map is iterated.
+//!
+//! ```
+//! use chaic_agents::helpers;
+//! let mut rhp = helpers::helper("rhp").expect("it is in the registry");
+//! assert!(rhp.senses().depth && helpers::helper_grants("rhp").ids);
+//! ```
+
+pub mod perception;
+
+pub mod memory;
+
+pub mod behavior;
+
+pub mod decision;
+pub mod policies;
+
+pub mod execution;
+
+pub mod mind;
+
+pub mod helpers;
+pub mod partners;
+
+mod child;
+
+#[cfg(test)]
+mod test_support;
+
+pub use helpers::{HELPERS, helper, helper_grants};
+pub use mind::Mind;
+pub use partners::{child, partner, partner_grants};

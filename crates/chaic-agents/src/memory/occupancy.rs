@@ -1,0 +1,320 @@
+//! Where one can walk: free, occupied and unknown space, from depth images.
+
+use chaic_protocol::geom::{Camera, Rect, xz};
+use chaic_protocol::{Frame, Observation, Vec2};
+
+use super::grid::{CELL_M, Grid};
+use crate::perception::{Percepts, Rays};
+
+/// Depth is trusted up to here for maps, metres (original facts 1.1).
+pub const MAP_RANGE_M: f32 = 5.0;
+/// Points below this are floor, metres. (The paper's code uses 0.05; rugs and curbs need more.)
+const FLOOR_M: f32 = 0.08;
+/// Points above this are stepped over no more, metres.
+const STEP_M: f32 = 0.12;
+/// Occupied cells with points above this are walls, metres (original facts 1.1).
+const WALL_M: f32 = 2.0;
+/// Points above this are ceiling or sky and say nothing, metres (original facts 1.4).
+const TOP_M: f32 = 4.0;
+/// How sure one is of an occupied cell after one look, and at most.
+const SURE_ONCE: u8 = 3;
+const SURE_MOST: u8 = 6;
+/// Side of the coarse squares that remember when a place was seen last, cells (1 m).
+const PLACE_CELLS: usize = 8;
+/// How long a bump is remembered, frames.
+const BUMP_FRAMES: Frame = 300;
+/// Radius of the place around a bump that is avoided, metres.
+const BUMP_RADIUS_M: f32 = 0.2;
+
+/// What is known of one cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Space {
+    /// Its floor was seen.
+    Free,
+    /// Never seen.
+    Unknown,
+    /// Something between ankle and head is there.
+    Occupied,
+    /// Something is there that reaches above two metres.
+    Wall,
+}
+
+/// Bits of what was ever seen of a cell.
+const SEEN_FREE: u8 = 1;
+const SEEN_HIGH: u8 = 2;
+/// Too near to the feet to be seen, but nothing rises from it up to the eye.
+const ASSUMED: u8 = 4;
+/// Bits of what one image shows of a cell.
+const NOW_FLOOR: u8 = 1;
+const NOW_OCCUPIED: u8 = 2;
+const NOW_HIGH: u8 = 4;
+
+/// Where somebody could not get on although the map said so.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Bump {
+    at: Vec2,
+    until: Frame,
+}
+
+/// A plan of what stands firmly: structure and furniture. People and whatever can be moved are
+/// not in it; the semantic map knows of them.
+#[derive(Clone, Debug)]
+pub struct OccupancyMap {
+    grid: Grid,
+    /// How sure one is that the cell is occupied, 0..=6.
+    sure: Vec<u8>,
+    seen: Vec<u8>,
+    now: Vec<u8>,
+    touched: Vec<u32>,
+    /// Frame in which each coarse square was seen last, plus one; 0 if never.
+    place_seen: Vec<Frame>,
+    bumps: Vec<Bump>,
+    version: u32,
+}
+
+impl OccupancyMap {
+    /// An unknown place.
+    pub fn new(bounds: &Rect) -> OccupancyMap {
+        let grid = Grid::over(bounds);
+        let n = grid.n_cells();
+        let n_places = grid.nx().div_ceil(PLACE_CELLS) * grid.nz().div_ceil(PLACE_CELLS);
+        OccupancyMap {
+            grid,
+            sure: vec![0; n],
+            seen: vec![0; n],
+            now: vec![0; n],
+            touched: Vec::new(),
+            place_seen: vec![0; n_places],
+            bumps: Vec::new(),
+            version: 0,
+        }
+    }
+
+    /// Its lattice.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// Grows whenever any cell changes.
+    pub fn version(&self) -> u32 {
+        self.version
+    }
+
+    /// What is known of a cell.
+    #[inline]
+    pub fn space(&self, cell: usize) -> Space {
+        match (self.sure[cell], self.seen[cell]) {
+            (1.., seen) if seen & SEEN_HIGH != 0 => Space::Wall,
+            (1.., _) => Space::Occupied,
+            (0, seen) if seen & SEEN_FREE != 0 => Space::Free,
+            _ => Space::Unknown,
+        }
+    }
+
+    /// Whether there is something to find out at a cell: it is unknown, and not only because it
+    /// was too near to the feet.
+    pub fn is_unexplored(&self, cell: usize) -> bool {
+        self.space(cell) == Space::Unknown && self.seen[cell] & ASSUMED == 0
+    }
+
+    /// Frame in which the metre square around a cell was seen last, if ever.
+    pub fn place_seen(&self, cell: usize) -> Option<Frame> {
+        self.place_seen[self.place_of(cell)].checked_sub(1)
+    }
+
+    fn place_of(&self, cell: usize) -> usize {
+        let (i, j) = self.grid.column_row(cell);
+        (j / PLACE_CELLS) * self.grid.nx().div_ceil(PLACE_CELLS) + i / PLACE_CELLS
+    }
+
+    /// Remembers that one could not get on at `at` (x, z).
+    pub fn bump(&mut self, at: Vec2, now: Frame) {
+        self.bumps.push(Bump { at, until: now + BUMP_FRAMES });
+        self.version += 1;
+    }
+
+    /// Cells to avoid because of bumps; one that was bumped into twice comes twice.
+    pub fn bumped_cells(&self) -> impl Iterator<Item = usize> + '_ {
+        self.bumps.iter().flat_map(|b| self.grid.disc(b.at, BUMP_RADIUS_M))
+    }
+
+    /// Takes in what one image shows. `height_m` is the height of the own body: nothing above it
+    /// is in the way.
+    pub fn integrate(&mut self, observation: &Observation, percepts: &Percepts, height_m: f32) {
+        let now = observation.frame;
+        let n_bumps = self.bumps.len();
+        self.bumps.retain(|b| b.until > now);
+        let mut changed = self.bumps.len() != n_bumps;
+        if let Some(depth) = observation.images.depth_m.as_ref() {
+            let camera = &observation.camera;
+            if depth.len() == camera.width as usize * camera.height as usize {
+                self.scan(depth, percepts, camera, height_m);
+                changed |= self.apply_scan(now);
+                changed |= self.assume_near(depth, camera);
+            }
+        }
+        // Where one stands is free.
+        let here = xz(observation.own.pose.position);
+        for cell in self.grid.disc(here, CELL_M) {
+            changed |= self.seen[cell] & SEEN_FREE == 0 || self.sure[cell] > 0;
+            self.seen[cell] |= SEEN_FREE;
+            self.sure[cell] = 0;
+        }
+        self.version += u32::from(changed);
+    }
+
+    /// Marks in `now` what the image shows of each cell.
+    fn scan(&mut self, depth: &[f32], percepts: &Percepts, camera: &Camera, height_m: f32) {
+        let stride = percepts.stride.max(1) as usize;
+        let (width, height) = (camera.width as usize, camera.height as usize);
+        let masked_width = width.div_ceil(stride);
+        let head_m = height_m + 0.05;
+        let rays = Rays::new(camera);
+        let unmasked = vec![false; masked_width];
+        self.touched.clear();
+        for (k, row) in (0..height).step_by(stride).enumerate() {
+            let loose = percepts.loose.get(k * masked_width..(k + 1) * masked_width);
+            let loose = loose.unwrap_or(&unmasked);
+            let depth = &depth[row * width..][..width];
+            for (column, loose) in (0..width).step_by(stride).zip(loose) {
+                let d = depth[column];
+                if *loose || d >= MAP_RANGE_M || d <= Camera::NEAR_M {
+                    continue;
+                }
+                let p = rays.point(column, row, d);
+                let bit = if p.y < FLOOR_M {
+                    NOW_FLOOR
+                } else if p.y > STEP_M && p.y <= head_m.min(WALL_M) {
+                    NOW_OCCUPIED
+                } else if p.y > WALL_M && p.y < TOP_M {
+                    NOW_HIGH
+                } else {
+                    continue;
+                };
+                // A surface belongs to the cell behind it: nudge the point away from the eye, so
+                // that a wall on a cell's border does not eat the free side.
+                let Some(cell) = self.grid.cell_at(xz(p)) else { continue };
+                if self.now[cell] == 0 {
+                    self.touched.push(cell as u32);
+                }
+                self.now[cell] |= bit;
+            }
+        }
+    }
+
+    /// Turns `now` into knowledge; tells whether anything changed.
+    fn apply_scan(&mut self, now: Frame) -> bool {
+        let mut changed = false;
+        let touched = std::mem::take(&mut self.touched);
+        for &cell in &touched {
+            let cell = cell as usize;
+            let before = (self.sure[cell] > 0, self.seen[cell]);
+            let bits = std::mem::take(&mut self.now[cell]);
+            if bits & NOW_OCCUPIED != 0 {
+                self.sure[cell] = (self.sure[cell] + SURE_ONCE).min(SURE_MOST);
+            } else if bits & NOW_FLOOR != 0 {
+                self.sure[cell] = self.sure[cell].saturating_sub(1);
+            }
+            if bits & NOW_FLOOR != 0 {
+                self.seen[cell] |= SEEN_FREE;
+            }
+            if bits & NOW_HIGH != 0 {
+                self.seen[cell] |= SEEN_HIGH;
+            }
+            if bits & (NOW_FLOOR | NOW_OCCUPIED) != 0 {
+                let place = self.place_of(cell);
+                self.place_seen[place] = now + 1;
+            }
+            changed |= before != (self.sure[cell] > 0, self.seen[cell]);
+        }
+        self.touched = touched;
+        changed
+    }
+
+    /// The floor before one's feet is below the image. Where the view at eye height reaches
+    /// beyond a cell, nothing large stands on it.
+    fn assume_near(&mut self, depth: &[f32], camera: &Camera) -> bool {
+        let eye = xz(camera.eye_in_world);
+        let reach_m = camera.eye_in_world.y + 0.2;
+        let level = (camera.height / 2) as usize * camera.width as usize;
+        let mut changed = false;
+        for cell in self.grid.disc(eye, reach_m) {
+            if self.seen[cell] & (SEEN_FREE | ASSUMED) != 0 || self.sure[cell] > 0 {
+                continue;
+            }
+            let center = self.grid.center(cell);
+            let point = chaic_protocol::Vec3::new(center.x, camera.eye_in_world.y, center.y);
+            let Some((px, d)) = camera.project(point) else { continue };
+            if px.x < 0.0 || px.x >= camera.width as f32 {
+                continue;
+            }
+            if depth[level + px.x as usize] > d {
+                self.seen[cell] |= ASSUMED;
+                changed = true;
+            }
+        }
+        changed
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::perception::{GroundTruthIds, Perception as _};
+    use crate::test_support::{Toy, ToyObject};
+
+    fn look(map: &mut OccupancyMap, toy: &Toy) {
+        let observation = toy.observe();
+        let percepts = GroundTruthIds.perceive(&observation);
+        map.integrate(&observation, &percepts, 1.75);
+    }
+
+    fn space(map: &OccupancyMap, x: f32, z: f32) -> Space {
+        map.space(map.grid().cell_at(Vec2::new(x, z)).expect("inside"))
+    }
+
+    #[test]
+    fn floor_is_free_furniture_occupied_walls_wall_and_the_rest_unknown() {
+        let mut toy = Toy::room(6.0, 6.0);
+        toy.add(ToyObject::new("cabinet", [1.0, 0.0, -2.0], [0.8, 1.0, 0.4]));
+        toy.add(ToyObject::new("apple", [-1.0, 0.0, -2.0], [0.3, 0.3, 0.3]));
+        toy.stand([0.0, 0.0], 0.0);
+        let mut map = OccupancyMap::new(&toy.bounds());
+        look(&mut map, &toy);
+        assert_eq!(space(&map, 0.0, -2.0), Space::Free);
+        assert_eq!(space(&map, 1.0, -1.82), Space::Occupied);
+        assert_eq!(space(&map, 0.0, -3.05), Space::Wall);
+        assert_eq!(space(&map, 0.0, 2.0), Space::Unknown, "behind the back");
+        assert_ne!(space(&map, -1.0, -1.9), Space::Occupied, "an apple does not block");
+        let near = map.grid().cell_at(Vec2::new(0.0, -1.0)).expect("inside");
+        assert!(!map.is_unexplored(near), "just before the feet");
+    }
+
+    #[test]
+    fn what_has_gone_is_free_again_after_some_looks() {
+        let mut toy = Toy::room(6.0, 6.0);
+        let cabinet = toy.add(ToyObject::new("cabinet", [0.0, 0.0, -2.2], [0.8, 0.6, 0.8]));
+        toy.stand([0.0, 0.0], 0.0);
+        let mut map = OccupancyMap::new(&toy.bounds());
+        look(&mut map, &toy);
+        assert_eq!(space(&map, 0.0, -1.85), Space::Occupied);
+        toy.remove(cabinet);
+        for _ in 0..SURE_MOST {
+            look(&mut map, &toy);
+        }
+        assert_eq!(space(&map, 0.0, -1.85), Space::Free);
+    }
+
+    #[test]
+    fn a_still_look_changes_nothing() {
+        let mut toy = Toy::room(6.0, 6.0);
+        toy.stand([0.0, 0.0], 0.3);
+        let mut map = OccupancyMap::new(&toy.bounds());
+        look(&mut map, &toy);
+        let version = map.version();
+        look(&mut map, &toy);
+        assert_eq!(map.version(), version);
+        map.bump(Vec2::ZERO, 0);
+        assert!(map.version() > version && map.bumped_cells().count() > 4);
+    }
+}

@@ -1,0 +1,282 @@
+//! What is in the image: detections, and which pixels tell nothing of the room.
+
+use chaic_protocol::{ClassId, EntityId, Observation, Role, Vec2, Vec3};
+
+/// Fewer pixels than this are no detection (original facts 1.8).
+pub const MIN_PIXELS: u32 = 5;
+/// Every how many rows and columns large surfaces are looked at.
+pub const STRIDE: u32 = 2;
+/// Points farther than this say nothing of where an object is, metres (original facts 1.1).
+const OBJECT_RANGE_M: f32 = 10.0;
+/// Points higher than this belong to no footprint: nobody bumps into them, metres.
+const FOOTPRINT_HEIGHT_M: f32 = 2.0;
+/// Spacing of footprint points, metres.
+const FOOTPRINT_M: f32 = 0.125;
+
+/// One thing seen in an image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Detection {
+    /// A track: the same thing has the same name in all images. With ground truth, its entity.
+    pub entity: EntityId,
+    /// Its class.
+    pub class: ClassId,
+    /// Mean of its visible points, metres.
+    pub position_in_world: Vec3,
+    /// Height of its lowest visible point, metres.
+    pub bottom_m: f32,
+    /// Height of its highest visible point, metres.
+    pub top_m: f32,
+    /// How many pixels show it.
+    pub n_pixels: u32,
+    /// Its visible points seen from above (x, z), at most one per 0.125 m square.
+    pub footprint: Vec<Vec2>,
+}
+
+/// What one image shows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Percepts {
+    /// The things seen, in the order of their names.
+    pub detections: Vec<Detection>,
+    /// Pixels that say nothing of what stands firmly in the room: own burden, people, and whatever
+    /// can be carried or moved. Bool, shape [height / stride, width / stride] rounded up.
+    pub loose: Vec<bool>,
+    /// Which pixels `loose` samples: every how many rows and columns.
+    pub stride: u32,
+}
+
+/// Turns images into detections.
+pub trait Perception: Send {
+    /// Looks at one observation. Images that are missing show nothing.
+    fn perceive(&mut self, observation: &Observation) -> Percepts;
+}
+
+/// Perfect segmentation, classification and association; needs [`Grants::ids`].
+///
+/// [`Grants::ids`]: chaic_protocol::observation::Grants
+#[derive(Clone, Debug, Default)]
+pub struct GroundTruthIds;
+
+#[derive(Clone, Copy, PartialEq)]
+enum Look {
+    /// Structure, or something that is not to be reported.
+    Firm,
+    /// Own burden.
+    Own,
+    /// Small: every pixel counts.
+    Small,
+    /// Large and movable, or a person.
+    Loose,
+    /// Large and fixed.
+    Fixed,
+}
+
+impl Look {
+    fn of(entity: EntityId, class: Option<ClassId>) -> Look {
+        match class.map(|c| c.info().role) {
+            _ if entity.agent().is_some() => Look::Loose,
+            Some(Role::Target | Role::Container | Role::Fragile) => Look::Small,
+            Some(Role::Obstacle | Role::HeavyTarget | Role::Vehicle | Role::Person) => Look::Loose,
+            Some(Role::Furnishing) => Look::Fixed,
+            None => Look::Firm,
+        }
+    }
+}
+
+/// Sums over the pixels of one thing.
+struct Tally {
+    n_pixels: u32,
+    n_points: u32,
+    sum: Vec3,
+    low: f32,
+    high: f32,
+    squares: Vec<[i16; 2]>,
+}
+
+impl Tally {
+    const NEW: Tally = Tally {
+        n_pixels: 0,
+        n_points: 0,
+        sum: Vec3::ZERO,
+        low: f32::INFINITY,
+        high: f32::NEG_INFINITY,
+        squares: Vec::new(),
+    };
+
+    fn add(&mut self, p: Vec3) {
+        self.n_points += 1;
+        self.sum += p;
+        self.low = self.low.min(p.y);
+        self.high = self.high.max(p.y);
+        if p.y <= FOOTPRINT_HEIGHT_M {
+            let square =
+                [(p.x / FOOTPRINT_M).round() as i16, (p.z / FOOTPRINT_M).round() as i16];
+            if self.squares.last() != Some(&square) {
+                self.squares.push(square);
+            }
+        }
+    }
+
+    fn detection(mut self, entity: EntityId, class: ClassId) -> Detection {
+        self.squares.sort_unstable();
+        self.squares.dedup();
+        Detection {
+            entity,
+            class,
+            position_in_world: self.sum / self.n_points as f32,
+            bottom_m: self.low,
+            top_m: self.high,
+            n_pixels: self.n_pixels,
+            footprint: self
+                .squares
+                .iter()
+                .map(|s| FOOTPRINT_M * Vec2::new(f32::from(s[0]), f32::from(s[1])))
+                .collect(),
+        }
+    }
+}
+
+/// Directions through pixel centers per metre of depth: the world point of a pixel is
+/// `eye + depth * (column + row)`.
+pub(crate) struct Rays {
+    pub eye: Vec3,
+    pub columns: Vec<Vec3>,
+    pub rows: Vec<Vec3>,
+}
+
+impl Rays {
+    pub(crate) fn new(camera: &chaic_protocol::geom::Camera) -> Rays {
+        let rotation = camera.rotation();
+        let f = camera.focal_px();
+        let (half_w, half_h) = (0.5 * camera.width as f32, 0.5 * camera.height as f32);
+        Rays {
+            eye: camera.eye_in_world,
+            columns: (0..camera.width)
+                .map(|c| rotation.x_axis * ((c as f32 + 0.5 - half_w) / f))
+                .collect(),
+            rows: (0..camera.height)
+                .map(|r| -rotation.y_axis * ((r as f32 + 0.5 - half_h) / f) - rotation.z_axis)
+                .collect(),
+        }
+    }
+
+    #[inline]
+    pub(crate) fn point(&self, column: usize, row: usize, depth_m: f32) -> Vec3 {
+        self.eye + depth_m * (self.columns[column] + self.rows[row])
+    }
+}
+
+impl GroundTruthIds {
+    /// How each entity is looked at, by entity number.
+    fn looks(observation: &Observation) -> Option<Vec<Look>> {
+        let classes = observation.granted.classes.as_ref()?;
+        let mut looks: Vec<Look> = classes
+            .iter()
+            .enumerate()
+            .map(|(i, class)| Look::of(EntityId(i as u16), *class))
+            .collect();
+        let own = observation.own.held().flat_map(|held| {
+            std::iter::once(held.entity).chain(held.contents.iter().map(|(e, _)| *e))
+        });
+        for entity in own {
+            if let Some(look) = looks.get_mut(usize::from(entity.0)) {
+                *look = Look::Own;
+            }
+        }
+        Some(looks)
+    }
+}
+
+impl Perception for GroundTruthIds {
+    fn perceive(&mut self, observation: &Observation) -> Percepts {
+        let (width, height) =
+            (observation.camera.width as usize, observation.camera.height as usize);
+        let images = &observation.images;
+        let (Some(ids), Some(depth)) = (images.ids.as_ref(), images.depth_m.as_ref()) else {
+            return Percepts::default();
+        };
+        let Some(looks) = GroundTruthIds::looks(observation) else {
+            return Percepts::default();
+        };
+        if ids.len() != width * height || depth.len() != width * height {
+            return Percepts::default();
+        }
+        let stride = STRIDE as usize;
+        let rays = Rays::new(&observation.camera);
+        let mut tallies: Vec<Tally> = looks.iter().map(|_| Tally::NEW).collect();
+        let mut loose = Vec::with_capacity(width.div_ceil(stride) * height.div_ceil(stride));
+        for row in 0..height {
+            let on_row = row % stride == 0;
+            let (ids, depth) = (&ids[row * width..][..width], &depth[row * width..][..width]);
+            for column in 0..width {
+                let id = usize::from(ids[column]);
+                let look = looks.get(id).copied().unwrap_or(Look::Firm);
+                let sampled = on_row && column % stride == 0;
+                if sampled {
+                    loose.push(!matches!(look, Look::Firm | Look::Fixed));
+                }
+                if matches!(look, Look::Firm | Look::Own) {
+                    continue;
+                }
+                let tally = &mut tallies[id];
+                tally.n_pixels += 1;
+                if (sampled || look == Look::Small) && depth[column] < OBJECT_RANGE_M {
+                    tally.add(rays.point(column, row, depth[column]));
+                }
+            }
+        }
+        let classes = observation.granted.classes.as_deref().map_or(&[][..], Vec::as_slice);
+        let detections = tallies
+            .into_iter()
+            .enumerate()
+            .filter(|(_, t)| t.n_pixels >= MIN_PIXELS && t.n_points > 0)
+            .filter_map(|(i, t)| {
+                let entity = EntityId(i as u16);
+                let person = || ClassId::by_name("person");
+                let class = classes[i].or_else(|| entity.agent().and_then(|_| person()))?;
+                Some(t.detection(entity, class))
+            })
+            .collect();
+        Percepts { detections, loose, stride: STRIDE }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_support::{Toy, ToyObject};
+
+    #[test]
+    fn a_detection_is_where_the_object_is_and_knows_how_high_it_is() {
+        let mut toy = Toy::room(6.0, 6.0);
+        let apple = toy.add(ToyObject::new("apple", [1.0, 0.5, -2.0], [0.2, 0.2, 0.2]));
+        toy.stand([0.0, 0.0], 0.0);
+        let percepts = GroundTruthIds.perceive(&toy.observe());
+        let seen = percepts.detections.iter().find(|d| d.entity == apple).expect("it is in view");
+        assert_eq!(seen.class.name(), "apple");
+        assert!((seen.position_in_world - Vec3::new(0.95, 0.65, -1.9)).length() < 0.12, "{seen:?}");
+        assert!((seen.top_m - 0.7).abs() < 0.03, "{}", seen.top_m);
+        assert_eq!(percepts.loose.len(), toy.pixels().div_ceil(4) as usize);
+    }
+
+    #[test]
+    fn what_is_behind_or_too_small_is_not_seen() {
+        let mut toy = Toy::room(20.0, 20.0);
+        let behind = toy.add(ToyObject::new("apple", [0.0, 0.5, 2.0], [0.2, 0.2, 0.2]));
+        let speck = toy.add(ToyObject::new("apple", [0.0, 1.6, -8.0], [0.02, 0.02, 0.02]));
+        toy.stand([0.0, 0.0], 0.0);
+        let percepts = GroundTruthIds.perceive(&toy.observe());
+        assert!(percepts.detections.iter().all(|d| d.entity != behind && d.entity != speck));
+    }
+
+    #[test]
+    fn the_own_burden_is_loose_and_no_detection() {
+        let mut toy = Toy::room(6.0, 6.0);
+        let apple = toy.add(ToyObject::new("apple", [0.0, 1.0, -0.6], [0.3, 0.3, 0.3]));
+        toy.stand([0.0, 0.0], 0.0);
+        let before = GroundTruthIds.perceive(&toy.observe());
+        assert!(before.detections.iter().any(|d| d.entity == apple));
+        toy.hold(0, apple);
+        let after = GroundTruthIds.perceive(&toy.observe());
+        assert!(after.detections.iter().all(|d| d.entity != apple));
+    }
+}

@@ -1,0 +1,132 @@
+//! Where a body of some radius can stand, on a grid of 0.1 m.
+
+use chaic_protocol::Vec2;
+use chaic_protocol::geom::Rect;
+
+use crate::solid::{Solid, rect_distance};
+
+/// Side of a cell, metres.
+pub(crate) const CELL_M: f32 = 0.1;
+
+/// Cells in plan, one bit of truth each.
+#[derive(Clone, Debug)]
+pub(crate) struct Grid {
+    min: Vec2,
+    pub(crate) nx: usize,
+    pub(crate) nz: usize,
+    /// Whether a body's middle may be at the cell's middle.
+    pub(crate) free: Vec<bool>,
+}
+
+impl Grid {
+    /// All cells of a rectangle, free.
+    pub(crate) fn new(rect: Rect) -> Grid {
+        let size = rect.size() / CELL_M;
+        let (nx, nz) = (size.x.ceil().max(1.0) as usize, size.y.ceil().max(1.0) as usize);
+        Grid { min: rect.min, nx, nz, free: vec![true; nx * nz] }
+    }
+
+    /// Where a body of `radius_m` can stand within `rect` among solids.
+    pub(crate) fn around<'a>(
+        rect: Rect,
+        radius_m: f32,
+        solids: impl IntoIterator<Item = &'a Solid>,
+    ) -> Grid {
+        let mut grid = Grid::new(rect);
+        for i in 0..grid.free.len() {
+            let p = grid.middle(i);
+            grid.free[i] = rect.grown(-radius_m).contains(p);
+        }
+        for solid in solids {
+            grid.block(solid.bounds().grown(radius_m), |p| solid.distance(p) < radius_m);
+        }
+        grid
+    }
+
+    /// Takes away the cells nearer than `radius_m` to a rectangle.
+    pub(crate) fn block_rect(&mut self, rect: &Rect, radius_m: f32) {
+        self.block(rect.grown(radius_m), |p| rect_distance(rect, p) < radius_m);
+    }
+
+    fn block(&mut self, within: Rect, is_blocked: impl Fn(Vec2) -> bool) {
+        for i in self.cells_in(within) {
+            if self.free[i] && is_blocked(self.middle(i)) {
+                self.free[i] = false;
+            }
+        }
+    }
+
+    /// The middle of a cell.
+    pub(crate) fn middle(&self, i: usize) -> Vec2 {
+        let (x, z) = (i % self.nx, i / self.nx);
+        self.min + CELL_M * Vec2::new(x as f32 + 0.5, z as f32 + 0.5)
+    }
+
+    /// The cell that holds a point.
+    pub(crate) fn cell(&self, p: Vec2) -> Option<usize> {
+        let d = (p - self.min) / CELL_M;
+        if d.x < 0.0 || d.y < 0.0 {
+            return None;
+        }
+        let (x, z) = (d.x as usize, d.y as usize);
+        (x < self.nx && z < self.nz).then_some(z * self.nx + x)
+    }
+
+    /// The cells whose middles may lie in a rectangle.
+    pub(crate) fn cells_in(&self, rect: Rect) -> impl Iterator<Item = usize> + use<> {
+        let clamp = |v: f32, n: usize| v.clamp(0.0, n as f32) as usize;
+        let (low, high) = ((rect.min - self.min) / CELL_M, (rect.max - self.min) / CELL_M);
+        let xs = clamp(low.x.floor(), self.nx)..clamp(high.x.ceil(), self.nx);
+        let zs = clamp(low.y.floor(), self.nz)..clamp(high.y.ceil(), self.nz);
+        let nx = self.nx;
+        zs.flat_map(move |z| xs.clone().map(move |x| z * nx + x))
+    }
+
+    /// The free cells that can be walked to from the cells around `start` (a body that stands
+    /// there may touch a wall by less than half a cell).
+    pub(crate) fn flood(&self, start: Vec2) -> Vec<bool> {
+        let mut seen = vec![false; self.free.len()];
+        let near = Rect { min: start, max: start }.grown(CELL_M);
+        let mut open: Vec<usize> = self.cells_in(near).filter(|i| self.free[*i]).collect();
+        open.iter().for_each(|i| seen[*i] = true);
+        while let Some(i) = open.pop() {
+            let (x, z) = (i % self.nx, i / self.nx);
+            let mut visit = |j: usize| {
+                if self.free[j] && !seen[j] {
+                    seen[j] = true;
+                    open.push(j);
+                }
+            };
+            if x > 0 {
+                visit(i - 1);
+            }
+            if x + 1 < self.nx {
+                visit(i + 1);
+            }
+            if z > 0 {
+                visit(i - self.nx);
+            }
+            if z + 1 < self.nz {
+                visit(i + self.nx);
+            }
+        }
+        seen
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wall_with_a_gap_stops_only_who_is_too_wide() {
+        let room = Rect::new([0.0, 0.0], [4.0, 2.0]);
+        for (radius, passes) in [(0.2, true), (0.35, false)] {
+            let mut grid = Grid::around(room, radius, []);
+            grid.block_rect(&Rect::new([2.0, 0.0], [2.1, 1.42]), radius);
+            let seen = grid.flood(Vec2::new(1.0, 1.0));
+            let there = grid.cell(Vec2::new(3.0, 1.0)).map(|i| seen[i]);
+            assert_eq!(there, Some(passes), "radius {radius}");
+        }
+    }
+}

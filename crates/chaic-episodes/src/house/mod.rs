@@ -1,0 +1,88 @@
+//! Houses of six to eight rooms, for the six indoor tasks.
+//!
+//! The surroundings ([`House`]) depend on the place seed alone, so that all tasks can share a
+//! house; what lies and stands in it depends on the task and the episode seed.
+
+mod plan;
+
+mod furnish;
+mod recipes;
+mod room;
+
+mod goods;
+mod slots;
+
+mod doors;
+mod populate;
+
+use chaic_protocol::TaskId;
+use chaic_protocol::geom::Rect;
+use chaic_world::{Floor, Opening, Room, Setup, Thing, Wall};
+
+use crate::generate::{GenerateError, Seeds, first_valid};
+use crate::grid::Grid;
+
+/// Version of this generator; goes up with every change of what it makes.
+pub const VERSION: u32 = 1;
+
+/// Houses that are tried for a place seed. One in two or three passes; the soak needs 12 at most.
+const HOUSE_ATTEMPTS: u64 = 200;
+/// Episodes that are tried in a house before another house is.
+const EPISODE_ATTEMPTS: u64 = 12;
+/// Houses that an episode is tried in.
+const EPISODE_HOUSES: u64 = 4;
+
+/// An empty house with its furniture.
+#[derive(Clone, Debug)]
+pub struct House {
+    pub(crate) bounds: Rect,
+    pub(crate) rooms: Vec<Room>,
+    pub(crate) walls: Vec<Wall>,
+    pub(crate) openings: Vec<Opening>,
+    /// Per opening, whether the rooms hang together without it only by a detour or not at all.
+    pub(crate) is_spanning: Vec<bool>,
+    pub(crate) floors: Vec<Floor>,
+    pub(crate) furniture: Vec<Thing>,
+    /// Where a wide body can stand.
+    pub(crate) ground: Grid,
+    /// Which of these cells hang together with the doorways.
+    pub(crate) walkable: Vec<bool>,
+}
+
+impl House {
+    /// The `nth` house of a place seed that is fit to live in.
+    ///
+    /// `None` if there are fewer among the bounded number of attempts.
+    pub fn new(place_seed: u64, nth: u64) -> Option<House> {
+        (0..HOUSE_ATTEMPTS).filter_map(|k| furnish::house(place_seed, k)).nth(nth as usize)
+    }
+
+    /// Where everything is that doesn't move, without task.
+    pub fn furniture(&self) -> &[Thing] {
+        &self.furniture
+    }
+
+    /// The rooms.
+    pub fn rooms(&self) -> &[Room] {
+        &self.rooms
+    }
+}
+
+/// An indoor episode of these seeds.
+///
+/// # Errors
+/// [`GenerateError`] if no attempt led to a valid setup.
+///
+/// # Panics
+/// If the task isn't one that happens in a house.
+pub fn generate(task: TaskId, seeds: Seeds) -> Result<Setup, GenerateError> {
+    assert_eq!(task.info().scene, chaic_protocol::task::SceneKind::House, "{task} is outdoors");
+    let mut house = None;
+    first_valid(task, seeds, EPISODE_HOUSES * EPISODE_ATTEMPTS, |attempt| {
+        if attempt % EPISODE_ATTEMPTS == 0 {
+            house = House::new(seeds.place, attempt / EPISODE_ATTEMPTS);
+        }
+        let house = house.as_ref().ok_or("no house passes")?;
+        populate::setup(house, task, seeds.episode, attempt)
+    })
+}

@@ -1,0 +1,35 @@
+//! Where worlds come from.
+//!
+//! **What it is**: generators that turn a seed into a [`Setup`](chaic_world::Setup) ([`house`],
+//! [`street`], [`yard`]), the bundled benchmark and unlimited generated episodes ([`Split`],
+//! [`episodes`]), the episode file ([`Episode`], [`json_schema`]), and the check that an episode
+//! can be played ([`validate`]).
+//!
+//! **What it is not**: it never steps a world, keeps no scores and opens no files; bytes come in
+//! and go out.
+//!
+//! **Invariants**
+//! - An [`Episode`] is valid: it comes from [`Episode::new`] or [`Episode::parse`], which check.
+//! - A generator depends on its seeds only, and gives the same bytes on every machine.
+//! - The bundled episodes are data: they stay as they are when a generator changes.
+//! - No surroundings (walls, furniture) of one split occur in another.
+
+mod format;
+mod validate;
+
+mod split;
+
+mod generate;
+pub mod house;
+pub mod street;
+pub mod yard;
+
+mod grid;
+mod solid;
+
+pub use format::{Episode, EpisodeError, GeneratorInfo, MAX_EPISODE_BYTES, json_schema};
+pub use generate::{GenerateError, Seeds, generate};
+pub use split::{
+    BUNDLED_PER_TASK, Bundled, Split, SplitError, episodes, find_episode, regenerate_bundled,
+};
+pub use validate::{Problem, validate};

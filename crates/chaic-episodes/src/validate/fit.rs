@@ -1,0 +1,120 @@
+//! Whether things and people have the room that they take up.
+
+use chaic_protocol::geom::xz;
+use chaic_protocol::Role;
+use chaic_world::{Rules, Setup, top_surfaces};
+
+use super::{Problem, TOLERANCE_M, thing_field};
+use crate::solid::{Solid, plan_bounds};
+
+/// How far from walls people start indoors, metres (paper, "Task Generation").
+const START_CLEARANCE_M: f32 = 0.5;
+
+pub(super) fn problems(setup: &Setup) -> Vec<Problem> {
+    let solids: Vec<Vec<Solid>> = setup.things.iter().map(Solid::of_thing).collect();
+    let walls = Solid::of_walls(setup);
+    let mut found = Vec::new();
+    overlaps(setup, &solids, &walls, &mut found);
+    support(setup, &mut found);
+    starts(setup, &solids, &walls, &mut found);
+    found
+}
+
+/// The deepest that any box of one list sits in any of another.
+fn deepest(a: &[Solid], b: &[Solid]) -> f32 {
+    let pairs = a.iter().flat_map(|a| b.iter().map(move |b| a.overlap(b)));
+    pairs.fold(f32::MIN, f32::max)
+}
+
+fn overlaps(setup: &Setup, solids: &[Vec<Solid>], walls: &[Solid], found: &mut Vec<Problem>) {
+    let bounds: Vec<_> = setup.things.iter().map(plan_bounds).collect();
+    for (i, thing) in setup.things.iter().enumerate() {
+        if !setup.bounds.grown(40.0).contains(xz(thing.position)) {
+            let problem = "is more than 40 m outside the bounds";
+            found.push(Problem::new(thing_field(setup, i, "position"), problem));
+        }
+        if let Some(w) = (0..walls.len()).find(|w| deepest(&solids[i], &walls[*w..=*w]) > TOLERANCE_M)
+        {
+            let depth = deepest(&solids[i], &walls[w..=w]);
+            let problem = format!("is {depth:.3} m inside walls[{w}]");
+            found.push(Problem::new(thing_field(setup, i, "position"), problem));
+        }
+        for j in 0..i {
+            if !bounds[i].overlaps(&bounds[j]) {
+                continue;
+            }
+            let depth = deepest(&solids[i], &solids[j]);
+            if depth > TOLERANCE_M {
+                let other = setup.things[j].class;
+                let problem = format!("is {depth:.3} m inside things[{j}] ({other})");
+                found.push(Problem::new(thing_field(setup, i, "position"), problem));
+            }
+        }
+        let is_out = thing.class.info().is_carriable() && !setup.bounds.contains(xz(thing.position));
+        if is_out && !thing.fixed {
+            let problem = "is outside the bounds, where nobody gets";
+            found.push(Problem::new(thing_field(setup, i, "position"), problem));
+        }
+    }
+}
+
+/// Whatever can be taken must lie on something: a world begins at rest.
+fn support(setup: &Setup, found: &mut Vec<Problem>) {
+    let surfaces: Vec<_> = setup.things.iter().flat_map(top_surfaces).collect();
+    for (i, thing) in setup.things.iter().enumerate() {
+        if thing.fixed || thing.position.y <= TOLERANCE_M {
+            continue;
+        }
+        let p = thing.position;
+        let bears = surfaces.iter().any(|s| {
+            let local = chaic_protocol::geom::rotate_yaw(p - s.center, -s.yaw_rad);
+            local.y.abs() <= TOLERANCE_M && local.x.abs() <= s.half[0] && local.z.abs() <= s.half[1]
+        });
+        if !bears {
+            let problem = format!("is {}, where nothing holds it up", p.y);
+            found.push(Problem::new(thing_field(setup, i, "position[1]"), problem));
+        }
+    }
+}
+
+fn starts(setup: &Setup, solids: &[Vec<Solid>], walls: &[Solid], found: &mut Vec<Problem>) {
+    let step_over_m = Rules::paper().step_over_m;
+    for (i, person) in setup.people.iter().enumerate() {
+        let (p, body) = (xz(person.pose.position), person.capability());
+        let field = format!("people[{i}].pose.position");
+        if !setup.bounds.grown(-body.radius_m).contains(p) {
+            found.push(Problem::new(&field, "is outside the bounds"));
+        }
+        if person.pose.position.y != 0.0 {
+            let problem = "doesn't stand on the ground, expected a height of 0";
+            found.push(Problem::new(&field, problem));
+        }
+        let stands = [step_over_m, body.height_m];
+        let walls = walls.iter().filter(|w| w.spans(stands));
+        let wall_m = walls.map(|w| w.distance(p)).fold(f32::MAX, f32::min);
+        if setup.ceiling_m.is_some() && wall_m < START_CLEARANCE_M - TOLERANCE_M {
+            let problem = format!(
+                "is {wall_m:.2} m from a wall, expected at least {START_CLEARANCE_M} m"
+            );
+            found.push(Problem::new(&field, problem));
+        }
+        for (k, thing) in setup.things.iter().enumerate() {
+            if thing.class.info().role == Role::Vehicle {
+                continue;
+            }
+            let blocks = solids[k].iter().filter(|s| s.spans(stands));
+            let near_m = blocks.map(|s| s.distance(p)).fold(f32::MAX, f32::min);
+            if near_m < body.radius_m - 0.001 {
+                let problem = format!("stands inside things[{k}] ({})", thing.class);
+                found.push(Problem::new(&field, problem));
+            }
+        }
+        for (k, other) in setup.people[..i].iter().enumerate() {
+            let apart_m = xz(other.pose.position).distance(p);
+            if apart_m < body.radius_m + other.capability().radius_m {
+                let problem = format!("is {apart_m:.2} m from people[{k}], which is inside it");
+                found.push(Problem::new(&field, problem));
+            }
+        }
+    }
+}

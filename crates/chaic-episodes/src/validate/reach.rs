@@ -1,0 +1,79 @@
+//! Whether everything that the task needs can be got at.
+
+use chaic_protocol::geom::xz;
+use chaic_protocol::{AgentId, Role, Vec2};
+use chaic_world::{Person, Rules, Setup};
+
+use super::{Problem, thing_field};
+use crate::grid::Grid;
+use crate::solid::Solid;
+
+pub(super) fn problems(setup: &Setup) -> Vec<Problem> {
+    let walls = Solid::of_walls(setup);
+    let needed = needed_things(setup);
+    let mut found = Vec::new();
+    for agent in [AgentId::PARTNER, AgentId::HELPER] {
+        let person = &setup.people[agent.index()];
+        let (grid, seen) = ground(setup, person, &walls);
+        if !seen.contains(&true) {
+            let field = format!("people[{}].pose.position", agent.index());
+            found.push(Problem::new(field, format!("leaves the {agent} no room to move")));
+            continue;
+        }
+        let see_through: Vec<Solid> = walls.iter().filter(|w| w.low_m < 1.0).copied().collect();
+        for k in &needed {
+            let thing = Solid::of_thing(&setup.things[*k]);
+            if !gets_at(&grid, &seen, &thing, &see_through) {
+                let problem = format!(
+                    "is out of reach: the {agent} finds no way to within {} m of it",
+                    Rules::paper().arm_reach_m
+                );
+                found.push(Problem::new(thing_field(setup, *k, "position"), problem));
+            }
+        }
+    }
+    found
+}
+
+/// Targets, containers, goal places and obstacles.
+fn needed_things(setup: &Setup) -> Vec<usize> {
+    let is_needed = |k: &usize| {
+        let thing = &setup.things[*k];
+        let role = thing.class.info().role;
+        let is_target = setup.goal.wanted(thing.class) > 0;
+        let is_goal = setup.goal_places.contains(&Setup::entity(*k));
+        let is_tool = matches!(role, Role::Container | Role::Obstacle);
+        is_goal || (!thing.fixed && (is_target || is_tool))
+    };
+    (0..setup.things.len()).filter(is_needed).collect()
+}
+
+/// Where a person gets to once everything that one hand can take out of the way is gone.
+fn ground(setup: &Setup, person: &Person, walls: &[Solid]) -> (Grid, Vec<bool>) {
+    let body = person.capability();
+    let stands = [Rules::paper().step_over_m, body.height_m];
+    let stays = setup.things.iter().filter(|t| {
+        let info = t.class.info();
+        t.fixed || !(info.is_carriable() || info.role == Role::Obstacle)
+    });
+    let stays = stays.filter(|t| t.class.info().role != Role::Vehicle).flat_map(Solid::of_thing);
+    let solids: Vec<Solid> =
+        stays.chain(walls.iter().copied()).filter(|s| s.spans(stands)).collect();
+    let grid = Grid::around(setup.bounds, body.radius_m, &solids);
+    let seen = grid.flood(xz(person.pose.position));
+    (grid, seen)
+}
+
+fn gets_at(grid: &Grid, seen: &[bool], thing: &[Solid], walls: &[Solid]) -> bool {
+    let arm_m = Rules::paper().arm_reach_m;
+    thing.iter().any(|part| {
+        grid.cells_in(part.bounds().grown(arm_m)).filter(|i| seen[*i]).any(|i| {
+            let from = grid.middle(i);
+            part.distance(from) <= arm_m && sees(from, part.nearest(from), walls)
+        })
+    })
+}
+
+fn sees(from: Vec2, to: Vec2, walls: &[Solid]) -> bool {
+    !walls.iter().any(|w| w.cuts(from, to))
+}

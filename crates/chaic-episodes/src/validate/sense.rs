@@ -1,0 +1,137 @@
+//! Whether the task has what it needs, whatever the places.
+
+use chaic_protocol::capability::{Gait, Persona};
+use chaic_protocol::task::SceneKind;
+use chaic_protocol::{ClassId, Role, TaskId};
+use chaic_world::{Rules, Setup, Thing};
+
+use super::{Problem, thing_field};
+
+/// Highest top of anything that a hand must reach, metres: the farthest that anybody can.
+const HIGHEST_M: f32 = 3.0;
+/// Longest episode, frames: nine hours of walking.
+const LONGEST: u32 = 1_000_000;
+
+pub(super) fn problems(setup: &Setup) -> Vec<Problem> {
+    let mut found = Vec::new();
+    if setup.horizon > LONGEST {
+        let problem = format!("is {}, expected at most {LONGEST} frames", setup.horizon);
+        found.push(Problem::new("horizon", problem));
+    }
+    things(setup, &mut found);
+    people(setup, &mut found);
+    goal(setup, &mut found);
+    task_needs(setup, &mut found);
+    found
+}
+
+fn things(setup: &Setup, found: &mut Vec<Problem>) {
+    for (i, thing) in setup.things.iter().enumerate() {
+        let top_m = thing.position.y + thing.size_m().y;
+        let limit_m = match setup.ceiling_m {
+            Some(ceiling_m) => ceiling_m.min(HIGHEST_M),
+            None if is_handled(thing) => HIGHEST_M,
+            None => f32::MAX,
+        };
+        if top_m > limit_m {
+            let problem = format!("has its top at {top_m:.2} m, expected at most {limit_m:.2} m");
+            found.push(Problem::new(thing_field(setup, i, "position[1]"), problem));
+        }
+        if thing.position.y < 0.0 {
+            let problem = format!("is {}, expected 0 (the ground) or more", thing.position.y);
+            found.push(Problem::new(thing_field(setup, i, "position[1]"), problem));
+        }
+        if !thing.fixed && !thing.class.info().is_movable() {
+            let problem = "is false, but nobody can move things of this class";
+            found.push(Problem::new(thing_field(setup, i, "fixed"), problem));
+        }
+        if thing.class.info().role == Role::Person {
+            let problem = "is a person, who belongs into `people`";
+            found.push(Problem::new(thing_field(setup, i, "class"), problem));
+        }
+    }
+}
+
+fn people(setup: &Setup, found: &mut Vec<Problem>) {
+    let info = setup.task.info();
+    let expected = if info.has_child { 3 } else { 2 };
+    if setup.people.len() != expected {
+        let n = setup.people.len();
+        let problem = format!("has {n} entries, the task {} has {expected}", setup.task);
+        found.push(Problem::new("people", problem));
+        return;
+    }
+    if info.has_child && setup.people[2].persona != Persona::Child {
+        let problem = format!("is {:?}, expected a child", setup.people[2].persona);
+        found.push(Problem::new("people[2].persona", problem));
+    }
+}
+
+fn goal(setup: &Setup, found: &mut Vec<Problem>) {
+    for (i, (class, wanted)) in setup.goal.targets.iter().enumerate() {
+        if !class.info().is_possible_target() {
+            let problem = format!("asks for {class}, which is no possible target");
+            found.push(Problem::new(format!("goal.targets[{i}]"), problem));
+        }
+        let there = setup.things.iter().filter(|t| t.class == *class && !t.fixed).count();
+        if there < *wanted as usize {
+            let problem = format!("asks for {wanted} of {class}, but only {there} can be moved");
+            found.push(Problem::new(format!("goal.targets[{i}]"), problem));
+        }
+    }
+    let places = setup.goal_places.iter().filter_map(|e| setup.thing_index(*e));
+    for (i, k) in places.enumerate() {
+        let thing = &setup.things[k];
+        let needed_m = if setup.task == TaskId::HighGoal {
+            Rules::paper().high_goal_min_top_m
+        } else {
+            0.0
+        };
+        let top_m = thing.position.y + thing.size_m().y;
+        if top_m < needed_m {
+            let (class, field) = (thing.class, format!("goal_places[{i}]"));
+            let problem = format!("is a {class} of {top_m:.2} m, expected at least {needed_m} m");
+            found.push(Problem::new(field, problem));
+        }
+        if setup.goal_places[..i].contains(&setup.goal_places[i]) {
+            let problem = format!("names {} again", setup.goal_places[i]);
+            found.push(Problem::new(format!("goal_places[{i}]"), problem));
+        }
+    }
+}
+
+fn task_needs(setup: &Setup, found: &mut Vec<Problem>) {
+    let scene = setup.task.info().scene;
+    if scene == SceneKind::House && (setup.walls.is_empty() || setup.rooms.is_empty()) {
+        found.push(Problem::new("walls", "are missing: the task happens in a house"));
+    }
+    let has = |role: Role| setup.things.iter().any(|t| t.class.info().role == role && !t.fixed);
+    match setup.task {
+        TaskId::Obstacle if !has(Role::Obstacle) => {
+            found.push(Problem::new("things", "hold no obstacle that can be removed"));
+        }
+        TaskId::HighContainer if !has(Role::Container) => {
+            found.push(Problem::new("things", "hold no container"));
+        }
+        TaskId::MovingHouse => {
+            let truck = ClassId::by_name("truck");
+            let places = setup.goal_places.iter().filter_map(|e| setup.thing(*e));
+            if places.into_iter().any(|t| Some(t.class) != truck) {
+                found.push(Problem::new("goal_places", "name something else than a truck"));
+            }
+        }
+        _ => {}
+    }
+    let riders = setup.people.iter().filter(|p| p.capability().gait == Gait::WalkBike).count();
+    let vehicles =
+        setup.things.iter().filter(|t| t.class.info().role == Role::Vehicle).count();
+    if riders > vehicles {
+        let problem = format!("hold {vehicles} bicycles for {riders} who walk one");
+        found.push(Problem::new("things", problem));
+    }
+}
+
+/// Whether a hand must get at it.
+pub(super) fn is_handled(thing: &Thing) -> bool {
+    !thing.fixed
+}

@@ -1,0 +1,36 @@
+//! What every mind is, be it a partner's, a helper's, a scripted or a learned one.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Action, Briefing, Observation, observation::Senses};
+
+/// What a mind says of itself for the record: shown in replays, never read by rules or scores.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Thought {
+    /// The plan it follows, in words, for example `go to apple #31 and pick it up`.
+    pub plan: String,
+    /// A short word for its state if it has one, for example the child's `run_away`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mood: Option<String>,
+}
+
+/// A mind: it is briefed once, then asked for an action each time its last one has ended.
+///
+/// Everything it may know comes through these three calls. The same sequence of calls must lead
+/// to the same actions: draw random numbers from a [`crate::rng::Stream`] seeded by the briefing.
+pub trait Agent: Send {
+    /// What it wants to perceive; asked once per episode, after [`Agent::reset`]. Only what is
+    /// wanted is rendered, and only what is granted is given.
+    fn senses(&self) -> Senses;
+
+    /// Begins an episode.
+    fn reset(&mut self, briefing: &Briefing);
+
+    /// Decides what to do next.
+    fn act(&mut self, observation: &Observation) -> Action;
+
+    /// What it is thinking, for the record.
+    fn thought(&self) -> Thought {
+        Thought::default()
+    }
+}

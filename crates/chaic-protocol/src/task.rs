@@ -1,0 +1,193 @@
+//! The eight tasks of the challenge (paper, table 1), and what is public about each.
+
+use std::fmt;
+use std::str::FromStr;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::capability::Persona;
+use crate::catalogue::TargetSet;
+use crate::ids::Frame;
+
+/// Names a task, everywhere and in this spelling.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum TaskId {
+    /// A partner without constraint.
+    NoConstraint,
+    /// Targets on the floor, partner in a wheelchair.
+    LowTarget,
+    /// Obstacles in doorways, partner in a wheelchair.
+    Obstacle,
+    /// Targets on cabinets and refrigerators, partner a child.
+    HighTarget,
+    /// The goal place is high, partner a child.
+    HighGoal,
+    /// Containers are high, partner a child.
+    HighContainer,
+    /// Shopping in a street with a bicycle and a child.
+    Shopping,
+    /// Furniture onto a truck with a frail partner.
+    MovingHouse,
+}
+
+/// Where a task happens.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SceneKind {
+    /// A house of six to eight rooms.
+    House,
+    /// A street with six shops.
+    Street,
+    /// The yard before a house, with a truck.
+    Yard,
+}
+
+/// What is fixed for a task.
+#[derive(Clone, Copy, Debug)]
+pub struct TaskInfo {
+    /// The task.
+    pub id: TaskId,
+    /// Name in commands, files and tables.
+    pub name: &'static str,
+    /// Column title in tables.
+    pub title: &'static str,
+    /// The original's word for it.
+    pub original_name: &'static str,
+    /// Where it happens.
+    pub scene: SceneKind,
+    /// Who the partner is.
+    pub partner: Persona,
+    /// Whether a child comes along.
+    pub has_child: bool,
+    /// Frames until the episode ends (paper section 3.3.2).
+    pub horizon: Frame,
+    /// The target sets that the goal is drawn from.
+    pub sets: &'static [TargetSet],
+}
+
+const INDOOR: &[TargetSet] =
+    &[TargetSet::Fruit, TargetSet::Bread, TargetSet::Work, TargetSet::School];
+
+const fn indoor(
+    id: TaskId,
+    name: &'static str,
+    title: &'static str,
+    original_name: &'static str,
+    partner: Persona,
+) -> TaskInfo {
+    TaskInfo {
+        id,
+        name,
+        title,
+        original_name,
+        scene: SceneKind::House,
+        partner,
+        has_child: false,
+        horizon: 3000,
+        sets: INDOOR,
+    }
+}
+
+/// The tasks in the order of the paper's result table.
+pub static TASKS: [TaskInfo; 8] = [
+    indoor(TaskId::NoConstraint, "no_constraint", "No constraint", "normal", Persona::Adult),
+    indoor(TaskId::HighTarget, "high_target", "High target", "highthing", Persona::Child),
+    indoor(
+        TaskId::HighContainer,
+        "high_container",
+        "High container",
+        "highcontainer",
+        Persona::Child,
+    ),
+    indoor(TaskId::HighGoal, "high_goal", "High goal", "highgoalplace", Persona::Child),
+    indoor(TaskId::LowTarget, "low_target", "Low target", "lowthing", Persona::Wheelchair),
+    indoor(TaskId::Obstacle, "obstacle", "Obstacle", "wheelchair", Persona::Wheelchair),
+    TaskInfo {
+        id: TaskId::Shopping,
+        name: "shopping",
+        title: "Shopping",
+        original_name: "outdoor_shopping",
+        scene: SceneKind::Street,
+        partner: Persona::Rider,
+        has_child: true,
+        horizon: 3000,
+        sets: &[TargetSet::ShopFruit, TargetSet::ShopBakery, TargetSet::ShopDrinks],
+    },
+    TaskInfo {
+        id: TaskId::MovingHouse,
+        name: "moving_house",
+        title: "Moving house",
+        original_name: "outdoor_furniture",
+        scene: SceneKind::Yard,
+        partner: Persona::Frail,
+        has_child: false,
+        horizon: 1500,
+        sets: &[TargetSet::Furniture],
+    },
+];
+
+impl TaskId {
+    /// All tasks in the order of the paper's table.
+    pub fn all() -> impl Iterator<Item = TaskId> {
+        TASKS.iter().map(|t| t.id)
+    }
+
+    /// What is fixed for this task.
+    pub fn info(self) -> &'static TaskInfo {
+        TASKS.iter().find(|t| t.id == self).expect("the table lists every task")
+    }
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        self.info().name
+    }
+}
+
+impl fmt::Display for TaskId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// No task has this name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnknownTask(pub String);
+
+impl fmt::Display for UnknownTask {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let names: Vec<&str> = TASKS.iter().map(|t| t.name).collect();
+        write!(f, "unknown task `{}`; the tasks are {}", self.0, names.join(", "))
+    }
+}
+
+impl std::error::Error for UnknownTask {}
+
+impl FromStr for TaskId {
+    type Err = UnknownTask;
+
+    fn from_str(name: &str) -> Result<TaskId, UnknownTask> {
+        TASKS
+            .iter()
+            .find(|t| t.name == name)
+            .map(|t| t.id)
+            .ok_or_else(|| UnknownTask(name.to_owned()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_in_files_and_in_the_table_agree() {
+        for task in TaskId::all() {
+            assert_eq!(serde_json::to_string(&task).unwrap(), format!("\"{}\"", task.name()));
+            assert_eq!(task.name().parse(), Ok(task));
+        }
+        assert!("normal".parse::<TaskId>().unwrap_err().to_string().contains("no_constraint"));
+    }
+}

@@ -1,0 +1,198 @@
+//! Who is seen where: culling, order and drawing of one camera's view.
+
+use chaic_protocol::{EntityId, Vec3};
+
+use crate::clip::clip;
+use crate::frame::{Frame, Instance};
+use crate::lens::{IntoCamera, Lens};
+use crate::raster::{Corner, Target, corners_of, pixel_owner};
+use crate::solids::level_for;
+
+/// Buffers that one thread uses again and again.
+#[derive(Default)]
+pub(crate) struct Scratch {
+    pub target: Target,
+    corners: Vec<Corner>,
+    order: Vec<Candidate>,
+    /// Level of detail of each instance in this view.
+    pub levels: Vec<u8>,
+}
+
+/// What is left out of a view.
+#[derive(Clone, Copy)]
+pub(crate) struct Omit {
+    pub body: Option<EntityId>,
+    pub ceiling: bool,
+}
+
+/// An instance that may be in view.
+struct Candidate {
+    distance: f32,
+    index: u32,
+    is_structure: bool,
+    outline: Outline,
+}
+
+/// Where the bounds of an instance are on the image.
+#[derive(Clone, Copy)]
+struct Outline {
+    /// Least u, least v, most u, most v, pixels.
+    rect: [f32; 4],
+    nearest: f32,
+    crosses_near: bool,
+}
+
+/// Draws all that a lens sees of a frame into the scratch's target.
+pub(crate) fn draw(frame: &Frame, lens: &Lens, omit: Omit, scratch: &mut Scratch) {
+    let Scratch { target, corners, order, levels } = scratch;
+    target.clear(lens.width, lens.height, lens.nearness(lens.far_m()).max(0.0));
+    levels.clear();
+    levels.resize(frame.instances.len(), 0);
+    order.clear();
+    for (index, instance) in frame.instances.iter().enumerate().take(0xffff) {
+        if omit.body == Some(instance.entity)
+            || (omit.ceiling && instance.entity == EntityId::CEILING)
+        {
+            continue;
+        }
+        let into = lens.from_object(&instance.rotation, instance.origin);
+        if let Some(outline) = outline(instance, lens, &into) {
+            let is_structure = instance.entity < EntityId::FIRST_PERSON;
+            let distance = instance.distance(lens.eye);
+            order.push(Candidate { distance, index: index as u32, is_structure, outline });
+        }
+    }
+    // Walls and floors first since they hide the most; each group from near to far.
+    order.sort_by(|a, b| {
+        let key = |c: &Candidate| (!c.is_structure, c.distance);
+        let ((sa, da), (sb, db)) = (key(a), key(b));
+        sa.cmp(&sb).then(da.total_cmp(&db)).then(a.index.cmp(&b.index))
+    });
+    let mut drawn = 0;
+    let mut stale = false;
+    let mut was_structure = true;
+    for candidate in order.iter() {
+        // Tiles cost as much as a few hundred triangles: bring them up to date now and then.
+        let begins_things = was_structure && !candidate.is_structure;
+        was_structure = candidate.is_structure;
+        if stale && (begins_things || [5, 12, 24, 48].contains(&drawn) || drawn % 96 == 95) {
+            target.update_tiles();
+            stale = false;
+        }
+        let Outline { rect, nearest, crosses_near } = candidate.outline;
+        if !crosses_near && target.hides(rect, lens.nearness(nearest)) {
+            continue;
+        }
+        let instance = &frame.instances[candidate.index as usize];
+        let radius_px = 0.5 * (rect[2] - rect[0]).max(rect[3] - rect[1]);
+        let level = if crosses_near { level_for(f32::MAX) } else { level_for(radius_px) };
+        levels[candidate.index as usize] = level as u8;
+        let mesh_drawing = Drawing { instance, index: candidate.index as usize, level, lens };
+        mesh_drawing.draw(crosses_near, target, corners);
+        drawn += 1;
+        stale = true;
+    }
+}
+
+/// Where the bounds are on the image; `None` if outside of it.
+fn outline(instance: &Instance, lens: &Lens, into: &IntoCamera) -> Option<Outline> {
+    let (mu, mv) = lens.middle();
+    let (near, far) = (lens.near_m(), lens.far_m());
+    let mut outside_all = 0b11_1111u32;
+    let mut crosses_near = false;
+    let mut rect = [f32::INFINITY, f32::INFINITY, f32::NEG_INFINITY, f32::NEG_INFINITY];
+    let mut nearest = f32::INFINITY;
+    for corner in instance.corners() {
+        let p = into.map(corner);
+        if !p.is_finite() {
+            return None;
+        }
+        let scale = if lens.is_plan { 1.0 } else { p.z };
+        let outside = [
+            p.x < -mu * scale,
+            p.x > mu * scale,
+            p.y < -mv * scale,
+            p.y > mv * scale,
+            p.z < near,
+            p.z > far,
+        ];
+        let bits = outside.iter().enumerate().fold(0, |bits, (k, out)| bits | u32::from(*out) << k);
+        outside_all &= bits;
+        nearest = nearest.min(p.z);
+        if p.z < near {
+            crosses_near = true;
+        } else {
+            let (u, v) = (mu + p.x / scale, mv + p.y / scale);
+            rect = [rect[0].min(u), rect[1].min(v), rect[2].max(u), rect[3].max(v)];
+        }
+    }
+    if outside_all != 0 {
+        return None;
+    }
+    // A box between two rows or columns of pixel centers covers none.
+    let between = |low: f32, high: f32| low > 0.5 && (low - 0.5) as i32 == (high - 0.5) as i32
+        && (low - 0.5) as i32 as f32 != low - 0.5;
+    if !crosses_near && (between(rect[0], rect[2]) || between(rect[1], rect[3])) {
+        return None;
+    }
+    // The plan camera stands above everything.
+    (!(crosses_near && lens.is_plan)).then_some(Outline { rect, nearest, crosses_near })
+}
+
+/// One instance being drawn.
+struct Drawing<'a> {
+    instance: &'a Instance<'a>,
+    index: usize,
+    level: usize,
+    lens: &'a Lens,
+}
+
+impl Drawing<'_> {
+    fn draw(&self, crosses_near: bool, target: &mut Target, corners: &mut Vec<Corner>) {
+        let lens = self.lens;
+        let mesh = self.instance.shape.mesh(self.level);
+        let into = lens.from_object(&self.instance.rotation, self.instance.origin);
+        let (mu, mv) = lens.middle();
+        corners.clear();
+        if lens.is_plan {
+            corners.extend(mesh.positions.iter().map(|p| {
+                let p = into.map(*p);
+                Corner { u: mu + p.x, v: mv + p.y, q: lens.nearness(p.z) }
+            }));
+        } else {
+            corners.extend(mesh.positions.iter().map(|p| {
+                let p = into.map(*p);
+                let q = 1.0 / p.z;
+                Corner { u: mu + p.x * q, v: mv + p.y * q, q }
+            }));
+        }
+        if crosses_near {
+            self.draw_clipped(&into, target, corners);
+            return;
+        }
+        for (k, triangle) in mesh.triangles.iter().enumerate() {
+            let [a, b, c] = corners_of(triangle);
+            target.draw([corners[a], corners[b], corners[c]], pixel_owner(self.index, k));
+        }
+    }
+
+    fn draw_clipped(&self, into: &IntoCamera, target: &mut Target, corners: &[Corner]) {
+        let mesh = self.instance.shape.mesh(self.level);
+        let near = self.lens.near_m();
+        let most = 1.0 / near;
+        for (k, triangle) in mesh.triangles.iter().enumerate() {
+            let at = corners_of(triangle);
+            let owner = pixel_owner(self.index, k);
+            if at.iter().all(|c| corners[*c].q > 0.0 && corners[*c].q <= most) {
+                target.draw(at.map(|c| corners[c]), owner);
+                continue;
+            }
+            let p: [Vec3; 3] = at.map(|c| into.map(mesh.positions[c]));
+            let Some(clipped) = clip(p, near, self.lens.middle()) else { continue };
+            for j in 2..clipped.n {
+                let fan = [clipped.corners[0], clipped.corners[j - 1], clipped.corners[j]];
+                target.fill(fan, &clipped.slope, owner);
+            }
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! One moment of a world, ready to be looked at by any number of cameras.
+
+use std::sync::{Arc, OnceLock};
+
+use chaic_protocol::{ClassId, EntityId, Vec3};
+use glam::Mat3;
+
+use crate::mesh::{Mesh, length};
+use crate::solids::{N_LEVELS, class_mesh, place_of};
+
+/// A class's mesh at one size, at every level of detail, each made when first needed.
+#[derive(Debug)]
+pub(crate) struct ClassMesh {
+    class: ClassId,
+    size: Vec3,
+    pub min: Vec3,
+    pub max: Vec3,
+    levels: [OnceLock<Mesh>; N_LEVELS],
+}
+
+impl ClassMesh {
+    /// The mesh of a class at these factors of the catalogue's size. Unscaled ones are shared by
+    /// all scenes of the process.
+    pub fn of(class: ClassId, scale: [f32; 3]) -> Arc<ClassMesh> {
+        static UNSCALED: [OnceLock<Arc<ClassMesh>>; 256] = [const { OnceLock::new() }; 256];
+        let make = || Arc::new(ClassMesh::new(class, scale));
+        if scale == [1.0; 3] { UNSCALED[class.index()].get_or_init(make).clone() } else { make() }
+    }
+
+    fn new(class: ClassId, scale: [f32; 3]) -> ClassMesh {
+        let size = Vec3::from(class.info().size_m) * Vec3::from(scale);
+        let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for part in class.info().parts {
+            let place = place_of(part, size);
+            let half = 0.5
+                * (place.axes.x_axis.abs() * place.extent.x
+                    + place.axes.y_axis.abs() * place.extent.y
+                    + place.axes.z_axis.abs() * place.extent.z);
+            min = min.min(place.center - half);
+            max = max.max(place.center + half);
+        }
+        if min.x > max.x {
+            (min, max) = (Vec3::ZERO, Vec3::ZERO);
+        }
+        ClassMesh { class, size, min, max, levels: [const { OnceLock::new() }; N_LEVELS] }
+    }
+
+    fn level(&self, level: usize) -> &Mesh {
+        self.levels[level].get_or_init(|| class_mesh(self.class.info(), self.size, level))
+    }
+}
+
+/// Where an instance's triangles come from.
+#[derive(Clone, Copy)]
+pub(crate) enum Shape<'a> {
+    Fixed(&'a Mesh),
+    Class(&'a ClassMesh),
+    Body(&'a crate::people::Body),
+}
+
+impl<'a> Shape<'a> {
+    pub fn mesh(&self, level: usize) -> &'a Mesh {
+        match self {
+            Shape::Fixed(mesh) => mesh,
+            Shape::Class(class) => class.level(level),
+            Shape::Body(body) => body.level(level),
+        }
+    }
+}
+
+/// A mesh somewhere in the world.
+pub(crate) struct Instance<'a> {
+    pub entity: EntityId,
+    pub shape: Shape<'a>,
+    /// Rotates from the object's frame to the world.
+    pub rotation: Mat3,
+    pub origin: Vec3,
+    /// Bounds in the object's frame.
+    pub min: Vec3,
+    pub max: Vec3,
+    /// Color in place of the tinted skins' own, linear.
+    pub tint: Option<[f32; 3]>,
+    /// The room whose lamp shines on it; structure is lit point by point.
+    pub room: Option<u8>,
+}
+
+impl Instance<'_> {
+    /// Distance from a point in the world to the bounds, metres.
+    pub fn distance(&self, p: Vec3) -> f32 {
+        let d = p - self.origin;
+        let local =
+            Vec3::new(self.rotation.x_axis.dot(d), self.rotation.y_axis.dot(d), self.rotation.z_axis.dot(d));
+        length(local - local.max(self.min).min(self.max))
+    }
+
+    /// The corners of the bounds, in the object's frame.
+    pub fn corners(&self) -> [Vec3; 8] {
+        std::array::from_fn(|k| {
+            let pick = |bit: usize, low: f32, high: f32| if k >> bit & 1 == 1 { high } else { low };
+            Vec3::new(
+                pick(0, self.min.x, self.max.x),
+                pick(1, self.min.y, self.max.y),
+                pick(2, self.min.z, self.max.z),
+            )
+        })
+    }
+}
+
+/// Everything that can be seen at one moment.
+pub(crate) struct Frame<'a> {
+    pub instances: Vec<Instance<'a>>,
+    pub light: crate::light::Light<'a>,
+}

@@ -1,0 +1,284 @@
+//! Filling triangles: for each pixel, how near the nearest surface is and whose it is.
+//!
+//! A pixel belongs to a triangle if its center does. Each edge's crossing with a row of centers is
+//! computed from its two ends in one fixed order, so that two triangles that share an edge leave
+//! neither a gap nor an overlap.
+
+use crate::mesh::Triangle;
+
+/// Nobody's pixel.
+pub(crate) const NOBODY: u32 = u32::MAX;
+/// Side of the squares in which nearness is summed up, pixels.
+pub(crate) const TILE: usize = 8;
+
+/// Names a triangle of an instance in 32 bits.
+pub(crate) fn pixel_owner(instance: usize, triangle: usize) -> u32 {
+    debug_assert!(instance < 0xffff && triangle < 0x1_0000);
+    (instance as u32) << 16 | triangle as u32
+}
+
+/// The instance and triangle of [`pixel_owner`].
+pub(crate) fn owner_parts(owner: u32) -> (usize, usize) {
+    ((owner >> 16) as usize, (owner & 0xffff) as usize)
+}
+
+/// A corner on the image: pixels from the left and the top, and nearness.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Corner {
+    pub u: f32,
+    pub v: f32,
+    pub q: f32,
+}
+
+/// Nearness over the image: `q + du * (u - u0) + dv * (v - v0)`, kept within [low, high].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Slope {
+    pub at: Corner,
+    pub du: f32,
+    pub dv: f32,
+    pub low: f32,
+    pub high: f32,
+}
+
+/// The image under way.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Target {
+    pub width: usize,
+    pub height: usize,
+    /// Nearness, shape [height, width].
+    pub nearness: Vec<f32>,
+    /// [`pixel_owner`], shape [height, width].
+    pub owner: Vec<u32>,
+    tiles_wide: usize,
+    /// The least nearness in each tile.
+    tiles: Vec<f32>,
+}
+
+impl Target {
+    /// Forgets all; what isn't nearer than `background` won't be drawn.
+    pub fn clear(&mut self, width: usize, height: usize, background: f32) {
+        (self.width, self.height) = (width, height);
+        self.nearness.clear();
+        self.nearness.resize(width * height, background);
+        self.owner.clear();
+        self.owner.resize(width * height, NOBODY);
+        self.tiles_wide = width.div_ceil(TILE);
+        self.tiles.clear();
+        self.tiles.resize(self.tiles_wide * height.div_ceil(TILE), background);
+    }
+
+    /// Brings the tiles up to date. Stale tiles are safe: nearness only grows.
+    pub fn update_tiles(&mut self) {
+        if self.width == 0 {
+            return;
+        }
+        let band = TILE * self.width;
+        for (rows, tiles) in self.nearness.chunks(band).zip(self.tiles.chunks_mut(self.tiles_wide)) {
+            for (k, tile) in tiles.iter_mut().enumerate() {
+                let from = k * TILE;
+                let to = (from + TILE).min(self.width);
+                let mut least = [f32::INFINITY; TILE];
+                for row in rows.chunks(self.width) {
+                    for (l, q) in least.iter_mut().zip(&row[from..to]) {
+                        *l = if *q < *l { *q } else { *l };
+                    }
+                }
+                *tile = least.iter().fold(f32::INFINITY, |a, b| if *b < a { *b } else { a });
+            }
+        }
+    }
+
+    /// Whether something no nearer than `q` inside the rectangle is sure to be hidden.
+    pub fn hides(&self, [u0, v0, u1, v1]: [f32; 4], q: f32) -> bool {
+        let tile = |x: f32, n: usize| (x.max(0.0) as usize / TILE).min(n.saturating_sub(1));
+        let n_high = self.height.div_ceil(TILE);
+        let (i0, i1) = (tile(u0, self.tiles_wide), tile(u1, self.tiles_wide));
+        let (j0, j1) = (tile(v0, n_high), tile(v1, n_high));
+        (j0..=j1).all(|j| {
+            let row = &self.tiles[j * self.tiles_wide..][..self.tiles_wide];
+            row[i0..=i1].iter().all(|least| *least >= q)
+        })
+    }
+
+    /// Draws a triangle whose corners are all in front of the camera, if it faces it.
+    #[inline]
+    pub fn draw(&mut self, corners: [Corner; 3], owner: u32) {
+        let [a, b, c] = corners;
+        let (bu, bv, bq) = (b.u - a.u, b.v - a.v, b.q - a.q);
+        let (cu, cv, cq) = (c.u - a.u, c.v - a.v, c.q - a.q);
+        let area = bu * cv - bv * cu;
+        // Rows run downwards, so counter-clockwise triangles have negative area here.
+        if area >= 0.0 || area.is_nan() {
+            return;
+        }
+        let inverse = 1.0 / area;
+        let least = |x: f32, y: f32| if x < y { x } else { y };
+        let most = |x: f32, y: f32| if x > y { x } else { y };
+        let slope = Slope {
+            at: a,
+            du: (bq * cv - cq * bv) * inverse,
+            dv: (cq * bu - bq * cu) * inverse,
+            low: least(least(a.q, b.q), c.q),
+            high: most(most(a.q, b.q), c.q),
+        };
+        self.fill([(a.u, a.v), (b.u, b.v), (c.u, c.v)], &slope, owner);
+    }
+
+    /// Fills the pixels whose centers lie in the triangle, whichever way it turns.
+    pub fn fill(&mut self, mut p: [(f32, f32); 3], slope: &Slope, owner: u32) {
+        let before = |a: (f32, f32), b: (f32, f32)| a.1 < b.1 || (a.1 == b.1 && a.0 < b.0);
+        if before(p[1], p[0]) {
+            p.swap(0, 1);
+        }
+        if before(p[2], p[1]) {
+            p.swap(1, 2);
+            if before(p[1], p[0]) {
+                p.swap(0, 1);
+            }
+        }
+        let [a, b, c] = p;
+        let rows = self.height as i32;
+        let (first, last) = (first_center(a.1, rows), first_center(c.1, rows));
+        if first >= last {
+            return;
+        }
+        let middle = first_center(b.1, rows);
+        let long = Edge::new(a, c);
+        let b_is_right = (b.0 - a.0) * (c.1 - a.1) > (c.0 - a.0) * (b.1 - a.1);
+        self.half(first, middle, Edge::new(a, b), long, b_is_right, slope, owner);
+        self.half(middle, last, Edge::new(b, c), long, b_is_right, slope, owner);
+    }
+
+    #[allow(clippy::too_many_arguments, reason = "a piece of one inner loop")]
+    #[inline]
+    fn half(&mut self, from: i32, to: i32, short: Edge, long: Edge, short_is_right: bool, slope: &Slope, owner: u32) {
+        let (left, right) = if short_is_right { (long, short) } else { (short, long) };
+        let columns = self.width as i32;
+        for row in from..to {
+            let v = row as f32 + 0.5;
+            let begin = first_center(left.u_at(v), columns);
+            let end = first_center(right.u_at(v), columns);
+            if begin >= end {
+                continue;
+            }
+            let base = row as usize * self.width;
+            let span = base + begin as usize..base + end as usize;
+            let q0 = slope.at.q + slope.dv * (v - slope.at.v) + slope.du * (0.5 - slope.at.u);
+            fill_span(
+                &mut self.nearness[span.clone()],
+                &mut self.owner[span],
+                q0,
+                begin,
+                slope,
+                owner,
+            );
+        }
+    }
+}
+
+#[inline]
+fn fill_span(nearness: &mut [f32], owners: &mut [u32], q0: f32, begin: i32, slope: &Slope, owner: u32) {
+    let Slope { du, low, high, .. } = *slope;
+    let owners = &mut owners[..nearness.len()];
+    for (k, (q, o)) in nearness.iter_mut().zip(owners).enumerate() {
+        let x = q0 + du * (begin + k as i32) as f32;
+        let x = if x < low { low } else { x };
+        let x = if x > high { high } else { x };
+        let wins = x > *q;
+        *q = if wins { x } else { *q };
+        *o = if wins { owner } else { *o };
+    }
+}
+
+/// The smallest whole number whose center (+ 0.5) isn't before `x`, within [0, max].
+#[inline]
+fn first_center(x: f32, max: i32) -> i32 {
+    let t = x - 0.5;
+    let t = if t > 0.0 { t } else { 0.0 };
+    let t = if t < max as f32 { t } else { max as f32 };
+    let i = t as i32;
+    i + i32::from((i as f32) < t)
+}
+
+/// A line down the image.
+#[derive(Clone, Copy)]
+struct Edge {
+    u: f32,
+    v: f32,
+    per_row: f32,
+}
+
+impl Edge {
+    #[inline]
+    fn new(top: (f32, f32), bottom: (f32, f32)) -> Edge {
+        let dv = bottom.1 - top.1;
+        let per_row = if dv > 0.0 { (bottom.0 - top.0) / dv } else { 0.0 };
+        Edge { u: top.0, v: top.1, per_row }
+    }
+
+    #[inline]
+    fn u_at(&self, v: f32) -> f32 {
+        self.u + (v - self.v) * self.per_row
+    }
+}
+
+/// The corners of a mesh's triangle.
+pub(crate) fn corners_of(t: &Triangle) -> [usize; 3] {
+    t.corners.map(usize::from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn corner(u: f32, v: f32) -> Corner {
+        Corner { u, v, q: 1.0 }
+    }
+
+    /// A fan of thin triangles around a point covers every pixel exactly once.
+    #[test]
+    fn neighbors_leave_no_gap_and_no_overlap() {
+        let n = 23;
+        let rim = |k: usize| {
+            let a = std::f32::consts::TAU * (k % n) as f32 / n as f32;
+            let (c, s) = (chaic_protocol::geom::math::cos(a), chaic_protocol::geom::math::sin(a));
+            corner(32.3 + 200.0 * c, 31.7 + 200.0 * s)
+        };
+        let mut count = vec![0; 64 * 64];
+        for k in 0..n {
+            let mut target = Target::default();
+            target.clear(64, 64, 0.0);
+            target.draw([corner(32.3, 31.7), rim(k + 1), rim(k)], k as u32);
+            for (n, o) in count.iter_mut().zip(&target.owner) {
+                *n += i32::from(*o != NOBODY);
+            }
+        }
+        assert!(count.iter().all(|n| *n == 1));
+    }
+
+    #[test]
+    fn odd_numbers_draw_nothing_and_end() {
+        let mut target = Target::default();
+        target.clear(16, 16, 0.0);
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e38] {
+            target.draw([corner(0.0, 0.0), corner(bad, 8.0), corner(3.0, bad)], 1);
+        }
+        target.draw([corner(5.0, 5.0); 3], 2);
+        assert!(target.owner.iter().all(|o| *o != 2));
+        let mut empty = Target::default();
+        empty.clear(0, 0, 0.0);
+        empty.update_tiles();
+        empty.draw([corner(0.0, 0.0), corner(0.0, 9.0), corner(9.0, 0.0)], 1);
+    }
+
+    #[test]
+    fn tiles_hide_only_what_is_behind() {
+        let mut target = Target::default();
+        target.clear(20, 20, 0.0);
+        target.draw([corner(-50.0, -50.0), corner(-50.0, 100.0), corner(100.0, -50.0)], 1);
+        assert!(!target.hides([2.0, 2.0, 9.0, 9.0], 0.5), "tiles are stale");
+        target.update_tiles();
+        assert!(target.hides([2.0, 2.0, 9.0, 9.0], 0.5));
+        assert!(!target.hides([2.0, 2.0, 9.0, 9.0], 1.5));
+    }
+}

@@ -1,0 +1,99 @@
+//! What counts as delivered, and how much is.
+
+use chaic_protocol::catalogue::Role;
+use chaic_protocol::geom::horizontal_distance;
+use chaic_protocol::{AgentId, ClassId, EntityId, TaskId};
+
+use crate::event::EventKind;
+use crate::world::World;
+
+impl World {
+    /// How near to the middle of a goal place a released thing must come to rest, metres
+    /// (facts of the original, 5.2: the margin plus half of the longer side).
+    pub fn delivery_radius_m(&self) -> f32 {
+        let size = self.thing(self.setup.goal_places[0]).0.size_m();
+        self.rules.delivery_margin_m + 0.5 * size.x.max(size.z)
+    }
+
+    /// Lowest top that counts as the goal place, metres; 0 for no condition.
+    pub fn goal_min_top_m(&self) -> f32 {
+        if self.setup.task == TaskId::HighGoal { self.rules.high_goal_min_top_m } else { 0.0 }
+    }
+
+    /// Whether somebody stands within the delivery radius of a goal place.
+    pub fn is_near_goal(&self, agent: AgentId) -> bool {
+        let p = self.person(agent).pose.position;
+        let radius = self.delivery_radius_m();
+        self.setup
+            .goal_places
+            .iter()
+            .any(|g| horizontal_distance(self.thing(*g).1.position, p) <= radius)
+    }
+
+    /// Everything delivered so far, wanted or not, in the order of ids.
+    pub fn delivered(&self) -> Vec<EntityId> {
+        self.setup.entities().filter(|e| self.thing(*e).1.delivered.is_some()).collect()
+    }
+
+    /// How many of a class are delivered.
+    pub fn n_delivered(&self, class: ClassId) -> u32 {
+        let of_class = |e: &EntityId| self.thing(*e).0.class == class;
+        self.delivered().iter().filter(|e| of_class(e)).count() as u32
+    }
+
+    /// What is done of what is wanted, and all that is wanted: objects, or kilograms when moving
+    /// house.
+    pub fn progress(&self) -> (f64, f64) {
+        let goal = &self.setup.goal.targets;
+        goal.iter().fold((0.0, 0.0), |(done, all), (class, wanted)| {
+            let worth = self.worth(*class);
+            let there = self.n_delivered(*class).min(*wanted);
+            (done + worth * f64::from(there), all + worth * f64::from(*wanted))
+        })
+    }
+
+    /// What one object of a class counts for: 1, or its mass when moving house (facts 5.4).
+    pub fn worth(&self, class: ClassId) -> f64 {
+        if self.setup.task == TaskId::MovingHouse { f64::from(class.info().mass_kg) } else { 1.0 }
+    }
+
+    pub(crate) fn is_complete(&self) -> bool {
+        self.setup.goal.targets.iter().all(|(class, wanted)| self.n_delivered(*class) >= *wanted)
+    }
+
+    /// A thing lies still: is it delivered?
+    pub(crate) fn come_to_rest(&mut self, object: EntityId) {
+        let state = self.thing(object).1;
+        let (at, released_at) = (state.position, state.released_at);
+        if state.delivered.is_some() {
+            return;
+        }
+        let radius = self.delivery_radius_m();
+        let near = |g: &EntityId| horizontal_distance(self.thing(*g).1.position, at) <= radius;
+        let by_rule = if self.rules.dropped_counts {
+            state.last_holder.is_some() && self.setup.goal_places.iter().any(near)
+        } else {
+            released_at.is_some_and(|g| near(&g))
+        };
+        let high_enough = at.y >= self.goal_min_top_m();
+        let role = self.thing(object).0.class.info().role;
+        let deliverable = role != Role::Obstacle;
+        if by_rule && high_enough && deliverable {
+            self.deliver(object);
+        }
+    }
+
+    /// Takes a thing out of play, with all that is in it.
+    fn deliver(&mut self, object: EntityId) {
+        let by = self.thing(object).1.last_holder.unwrap_or(AgentId::PARTNER);
+        let frame = self.state.frame;
+        for entity in std::iter::once(object).chain(self.contents(object)) {
+            let class = self.thing(entity).0.class;
+            let counted = self.n_delivered(class) < self.setup.goal.wanted(class);
+            let thing = self.thing_mut(entity);
+            thing.delivered = Some(frame);
+            thing.delivered_by = Some(by);
+            self.happened(EventKind::Delivered { object: entity, by, counted });
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! By which constants a world goes on. Rule sets are data: a change of rules is a change of a
+//! value here, never an `if` elsewhere. `docs/rules.md` lists every field with its source.
+
+use chaic_protocol::capability::LimitPenalty;
+use serde::{Deserialize, Serialize};
+
+/// Frames that the parts of actions take (facts of the original, section 2.2, measured on its
+/// recordings).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Durations {
+    /// A turn, be it by 15 degrees or towards a thing.
+    pub turn: u32,
+    /// From standing to the first frame of walking.
+    pub start_walking: u32,
+    /// From one step ahead to the next without stopping.
+    pub keep_walking: u32,
+    /// Moving a hand to a point.
+    pub reach: u32,
+    /// Closing a hand.
+    pub grasp: u32,
+    /// Bringing both arms back.
+    pub reset_arms: u32,
+    /// Between two parts of a composite action.
+    pub gap: u32,
+    /// A short motion of the arm out of the way.
+    pub move_away: u32,
+    /// Opening a hand.
+    pub open_hand: u32,
+    /// Most further frames in which one watches what was let go.
+    pub watch_fall: u32,
+    /// Most frames that one who stands at furniture waits for the other who is on the way to it.
+    pub await_partner: u32,
+}
+
+/// The rules of a world.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Rules {
+    /// Name of the rule set.
+    pub name: RuleSet,
+    /// Frames of the parts of actions.
+    pub durations: Durations,
+    /// A step ahead ends once it has covered more than this, metres (facts 2.2).
+    pub stride_m: f32,
+    /// One turn, radians (facts 3.1: 15 degrees).
+    pub turn_rad: f32,
+    /// A step ahead that covered less than this failed, metres: an eighth of a step.
+    pub min_progress_m: f32,
+    /// Lower things are stepped over, metres (facts 1.5: the original's probe begins at 0.12 m).
+    pub step_over_m: f32,
+    /// Farthest that one steps up to a thing, from its middle less half its longer side, metres
+    /// (facts 1.1).
+    pub approach_limit_m: f32,
+    /// How near one steps up to the nearest point of a thing, metres: the original stops 0.7 m
+    /// from the middle (facts 2.2); here bodies are solid, so it is an arm's length from the edge.
+    pub arm_reach_m: f32,
+    /// From how far one still reaches a thing that one can't step up to any nearer, metres, if no
+    /// wall is between (facts 3.5: 2 m to the middle).
+    pub reach_limit_m: f32,
+    /// Chance of picking up beyond one's range of heights (facts 1.3).
+    pub pick_penalty: LimitPenalty,
+    /// Chance of putting on beyond one's range of heights (facts 1.3).
+    pub put_penalty: LimitPenalty,
+    /// Chance of lifting beyond one's strength (facts 1.3).
+    pub lift_penalty: LimitPenalty,
+    /// Objects in one container or basket (paper section 3.3).
+    pub container_capacity: u32,
+    /// How far from the goal place's middle, less half its longer side, a released thing may come
+    /// to rest and still count, metres (facts 5.2).
+    pub delivery_margin_m: f32,
+    /// Whether a thing that was dropped by a put-on beyond one's limits counts if it lands near
+    /// enough; the original's radius rule lets it.
+    pub dropped_counts: bool,
+    /// Chance that a fragile thing within a child's reach breaks when picked up (facts 6).
+    pub break_chance_low: f32,
+    /// The same above the child's reach.
+    pub break_chance_high: f32,
+    /// The child is away beyond this distance from its guardian, metres (facts 8.4).
+    pub child_away_m: f32,
+    /// Lowest top that counts as a high goal place, metres (facts 5.1).
+    pub high_goal_min_top_m: f32,
+    /// Time of one frame for falling things, seconds (facts 2.1: one physics step of 0.01 s).
+    pub fall_step_s: f32,
+}
+
+/// Named rule sets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RuleSet {
+    /// What the paper says and means.
+    Paper,
+}
+
+impl RuleSet {
+    /// The name in commands and files.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            RuleSet::Paper => "paper",
+        }
+    }
+}
+
+impl Rules {
+    /// The paper's rules, with the original's measured numbers where the paper gives none.
+    pub const fn paper() -> Rules {
+        Rules {
+            name: RuleSet::Paper,
+            durations: Durations {
+                turn: 2,
+                start_walking: 2,
+                keep_walking: 1,
+                reach: 16,
+                grasp: 2,
+                reset_arms: 35,
+                gap: 1,
+                move_away: 4,
+                open_hand: 2,
+                watch_fall: 25,
+                await_partner: 150,
+            },
+            stride_m: 0.4,
+            turn_rad: std::f32::consts::PI / 12.0,
+            min_progress_m: 0.05,
+            step_over_m: 0.12,
+            approach_limit_m: 3.0,
+            arm_reach_m: 0.7,
+            reach_limit_m: 2.0,
+            pick_penalty: LimitPenalty { alpha: 1.0, beta: 2.0 },
+            put_penalty: LimitPenalty { alpha: 1.0, beta: 1.0 },
+            lift_penalty: LimitPenalty { alpha: 50.0, beta: 1.0 },
+            container_capacity: 3,
+            delivery_margin_m: 2.0,
+            dropped_counts: false,
+            break_chance_low: 0.25,
+            break_chance_high: 0.5,
+            child_away_m: 3.5,
+            high_goal_min_top_m: 1.5,
+            fall_step_s: 0.01,
+        }
+    }
+}
+
+impl Default for Rules {
+    fn default() -> Rules {
+        Rules::paper()
+    }
+}

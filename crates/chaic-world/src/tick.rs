@@ -1,0 +1,250 @@
+//! One frame: everybody goes on with what they do, in the order of their ids; then what falls
+//! falls, what is held follows the hands, what has come to rest at the goal is delivered, and the
+//! clock moves on.
+//!
+//! Two people who want one thing: the one whose hand closes first has it, and within one frame
+//! that is the one with the lower id; the other's action fails when it would take it. An action
+//! that is under way when the time ends is cut off and has no outcome.
+
+use chaic_protocol::action::FailureReason;
+use chaic_protocol::geom::{forward, horizontal_distance, yaw_towards};
+use chaic_protocol::{Action, AgentId, Outcome, Vec2, Vec3};
+
+use crate::event::EventKind;
+use crate::state::{Activity, Phase, Place, Step};
+use crate::world::World;
+
+/// What became of a step in this frame.
+pub(crate) enum Progress {
+    /// It goes on in the next frame.
+    Goes,
+    /// This was its last frame.
+    Done,
+    /// It takes no time: the next step begins in this frame.
+    Instant,
+    /// It failed; what remains of the action is dropped.
+    Fails(FailureReason),
+}
+
+impl World {
+    /// Runs one frame.
+    pub fn tick(&mut self) {
+        if self.state.over {
+            return;
+        }
+        for agent in self.setup.agents() {
+            self.act_for_a_frame(agent);
+        }
+        self.let_fall();
+        self.carry_along();
+        self.state.frame += 1;
+        self.watch_child();
+        self.end_if_over();
+    }
+
+    /// One frame of one person's action.
+    fn act_for_a_frame(&mut self, agent: AgentId) {
+        // The action is taken out while it runs, so that its steps can change the person.
+        let Some(mut activity) = self.person_mut(agent).activity.take() else { return };
+        loop {
+            match self.run_step(agent, &mut activity) {
+                Progress::Goes => {
+                    // A joint lift may have given this person something else to do meanwhile.
+                    self.person_mut(agent).activity.get_or_insert(activity);
+                    return;
+                }
+                Progress::Instant => match activity.queue.pop() {
+                    Some(step) => activity.step = step,
+                    None => return self.end_action(agent, activity),
+                },
+                Progress::Done => {
+                    match activity.queue.pop() {
+                        Some(step) => {
+                            activity.step = step;
+                            self.person_mut(agent).activity = Some(activity);
+                        }
+                        None => self.end_action(agent, activity),
+                    }
+                    return;
+                }
+                Progress::Fails(reason) => {
+                    activity.failing = Some(reason);
+                    return self.end_action(agent, activity);
+                }
+            }
+        }
+    }
+
+    fn end_action(&mut self, agent: AgentId, activity: Activity) {
+        let outcome = activity.failing.map_or(Outcome::Success, Outcome::Failure);
+        let (action, frame) = (activity.action, self.state.frame + 1);
+        let person = self.person_mut(agent);
+        person.activity = None;
+        person.last = Some((action, outcome));
+        if !action.is_locomotion() && !matches!(action, Action::Wait { .. }) {
+            person.last_deed = Some((frame, action, outcome));
+        }
+        person.in_stride = action == Action::MoveForward && outcome.is_success();
+        self.happened(EventKind::Ended { agent, action, outcome });
+    }
+
+    fn run_step(&mut self, agent: AgentId, activity: &mut Activity) -> Progress {
+        activity.step.elapsed += 1;
+        let (elapsed, frames) = (activity.step.elapsed, activity.step.frames);
+        let counted = if elapsed >= frames { Progress::Done } else { Progress::Goes };
+        match activity.step.phase {
+            Phase::Stand | Phase::Dock | Phase::Reach { .. } | Phase::ResetArms { .. } => counted,
+            Phase::CarryAlong => Progress::Goes,
+            Phase::Walk { .. } => self.walk(agent, &mut activity.step),
+            Phase::Approach { .. } => self.approach(agent, &mut activity.step),
+            Phase::Turn { to_yaw_rad } => {
+                self.person_mut(agent).pose.yaw_rad = to_yaw_rad;
+                counted
+            }
+            Phase::Face { to } => {
+                let to = self.thing(to).1.position;
+                self.face(agent, to);
+                counted
+            }
+            Phase::AwaitPartner { .. } => self.await_partner(agent, activity),
+            Phase::JudgeTake { hand, object } => self.judge_take(agent, activity, hand, object),
+            Phase::JudgePut { hand, place } => self.judge_put(agent, activity, hand, place),
+            Phase::JudgeAside { hand, obstacle } => self.judge_aside(agent, activity, hand, obstacle),
+            Phase::Grasp { hand, object } => match counted {
+                Progress::Done => self.grasp(agent, activity, hand, object),
+                other => other,
+            },
+            Phase::Insert { object, container } => {
+                if elapsed == self.rules.durations.open_hand {
+                    self.insert(agent, object, container);
+                }
+                counted
+            }
+            Phase::Release { object, on, at, set_down, .. } => {
+                if elapsed == self.rules.durations.open_hand {
+                    self.release(agent, object, on, at, set_down);
+                }
+                let watched = elapsed >= self.rules.durations.open_hand
+                    && !matches!(self.thing(object).1.place, Place::Falling { .. });
+                if watched { Progress::Done } else { counted }
+            }
+        }
+    }
+
+    /// One frame of a step ahead.
+    fn walk(&mut self, agent: AgentId, step: &mut Step) -> Progress {
+        let Phase::Walk { left_m, made_m } = &mut step.phase else { return Progress::Done };
+        let speed = self.capability(agent).speed_m_per_frame;
+        let ahead = forward(self.person(agent).pose.yaw_rad);
+        let moved = self.step_towards(agent, ahead, speed);
+        *left_m -= speed;
+        *made_m += moved;
+        let stuck = moved < 0.1 * speed;
+        if *left_m > 0.0 && !stuck {
+            return Progress::Goes;
+        }
+        if *made_m < self.rules.min_progress_m { Progress::Fails(FailureReason::Blocked) } else { Progress::Done }
+    }
+
+    /// One frame of walking straight up to a thing.
+    fn approach(&mut self, agent: AgentId, step: &mut Step) -> Progress {
+        /// Frames without coming nearer after which one is as near as one gets.
+        const GIVE_UP_AFTER: u32 = 4;
+        let Phase::Approach { to, stuck } = &mut step.phase else { return Progress::Done };
+        let entity = *to;
+        let before = self.distance_to(agent, entity);
+        if before <= self.rules.arm_reach_m {
+            return Progress::Done;
+        }
+        let from = self.person(agent).pose.position;
+        let target = self.nearest_point(from, entity);
+        let yaw = yaw_towards(from, target);
+        self.person_mut(agent).pose.yaw_rad = yaw;
+        let speed = self.capability(agent).approach_speed_m_per_frame;
+        self.step_towards(agent, forward(yaw), speed);
+        let nearer = before - self.distance_to(agent, entity);
+        *stuck = if nearer < 0.25 * speed { *stuck + 1 } else { 0 };
+        if *stuck >= GIVE_UP_AFTER { Progress::Done } else { Progress::Goes }
+    }
+
+    /// Moves a person by one frame, sliding along what is in the way; returns how far ahead it
+    /// came, metres.
+    fn step_towards(&mut self, agent: AgentId, direction: Vec3, speed: f32) -> f32 {
+        let from = self.person(agent).pose.position;
+        let follower = self.state.joint.filter(|j| j.leader == agent).map(|j| j.follower);
+        let to = self.slide(agent, follower, from, from + direction * speed);
+        if let Some(joint) = self.state.joint.filter(|j| j.leader == agent) {
+            // The two and the furniture move as one: where one is blocked, both are.
+            let old = self.person(agent).pose.to_world(joint.follower_in_leader);
+            let wanted = old + (to - from);
+            let got = self.slide(joint.follower, Some(agent), old, wanted);
+            if horizontal_distance(got, wanted) > 0.5 * speed {
+                return 0.0;
+            }
+        }
+        let moved = (to - from).dot(direction);
+        let person = self.person_mut(agent);
+        person.pose.position = to;
+        person.walked_m += horizontal_distance(from, to);
+        moved
+    }
+
+    fn slide(&self, agent: AgentId, except: Option<AgentId>, from: Vec3, to: Vec3) -> Vec3 {
+        let xz = |v: Vec3| Vec2::new(v.x, v.z);
+        let p = self.surroundings.slide(
+            self.body(agent),
+            xz(from),
+            xz(to),
+            &self.movable_blocks(),
+            &self.others(agent, except),
+        );
+        Vec3::new(p.x, from.y, p.y)
+    }
+
+    pub(crate) fn face(&mut self, agent: AgentId, to: Vec3) {
+        let from = self.person(agent).pose.position;
+        if horizontal_distance(from, to) > 1e-3 {
+            self.person_mut(agent).pose.yaw_rad = yaw_towards(from, to);
+        }
+    }
+
+    /// One frame of everything that falls.
+    fn let_fall(&mut self) {
+        for i in 0..self.state.things.len() {
+            let thing = &mut self.state.things[i];
+            let Place::Falling { path, on } = &mut thing.place else { continue };
+            if let Some((position, rotation)) = path.pop() {
+                thing.position = position;
+                thing.rotation = rotation;
+            }
+            if path.is_empty() {
+                thing.place = Place::Resting { on: *on };
+                self.come_to_rest(crate::Setup::entity(i));
+            }
+        }
+    }
+
+    fn watch_child(&mut self) {
+        if self.state.people.len() <= AgentId::CHILD.index() {
+            return;
+        }
+        let at = |a: AgentId| self.person(a).pose.position;
+        let distance = horizontal_distance(at(AgentId::CHILD), at(AgentId::PARTNER));
+        let away = distance > self.rules.child_away_m;
+        if away {
+            self.state.child_away_frames += 1;
+        }
+        if away != self.state.child_is_away {
+            self.state.child_is_away = away;
+            self.happened(EventKind::ChildAway { away });
+        }
+    }
+
+    fn end_if_over(&mut self) {
+        let complete = self.is_complete();
+        if complete || self.state.frame >= self.setup.horizon {
+            self.state.over = true;
+            self.happened(EventKind::Over { complete });
+        }
+    }
+}

@@ -1,0 +1,260 @@
+//! What agents are told and can see of themselves, and how bodies look to others.
+
+use std::sync::Arc;
+
+use chaic_protocol::action::Hand;
+use chaic_protocol::briefing::{Briefing, Companion, Relation};
+use chaic_protocol::capability::Gait;
+use chaic_protocol::catalogue::{CLASSES, Role};
+use chaic_protocol::geom::{Camera, rotate_yaw, yaw_rotation};
+use chaic_protocol::observation::{Granted, Grants, Held, SeenAction, SelfState};
+use chaic_protocol::rng::Stream;
+use chaic_protocol::task::SceneKind;
+use chaic_protocol::{AgentId, ClassId, EntityId, Vec3};
+
+use crate::posture::{Arm, Posture};
+use crate::state::{Phase, Place};
+use crate::world::World;
+
+impl World {
+    /// What an agent is told before the episode. Only `grants` lets anything of the goal in.
+    pub fn briefing(&self, me: AgentId, grants: Grants) -> Briefing {
+        let scene = self.setup.task.info().scene;
+        let classes = |wanted: &dyn Fn(ClassId) -> bool| ClassId::all().filter(|c| wanted(*c)).collect();
+        let relation = |other: AgentId| match (me, other) {
+            (_, AgentId::CHILD) => Relation::Child,
+            (AgentId::CHILD, AgentId::PARTNER) => Relation::Guardian,
+            _ => Relation::Partner,
+        };
+        let others = self.setup.agents().filter(|a| *a != me);
+        Briefing {
+            me,
+            capability: self.capability(me),
+            companions: others.map(|agent| Companion { agent, relation: relation(agent) }).collect(),
+            seed: mix(self.setup.seed, me),
+            horizon: self.setup.horizon,
+            bounds: self.setup.bounds,
+            possible_targets: classes(&|c| is_possible_target(c, scene)),
+            containers: classes(&|c| c.info().role == Role::Container && scene != SceneKind::Yard),
+            obstacles: classes(&|c| c.info().role == Role::Obstacle && scene == SceneKind::House),
+            goal_place: self.thing(self.setup.goal_places[0]).0.class,
+            goal_place_min_top_m: self.goal_min_top_m(),
+            delivery_radius_m: self.delivery_radius_m(),
+            container_capacity: self.rules.container_capacity,
+            grants,
+            goal: grants.goal.then(|| self.setup.goal.clone()),
+        }
+    }
+
+    /// What an agent knows of itself.
+    pub fn own_state(&self, agent: AgentId) -> SelfState {
+        let person = self.person(agent);
+        SelfState { pose: person.pose, hands: self.hands(agent), last: person.last }
+    }
+
+    /// What is granted to an agent beyond its own images and state, now. `partner_in_view` is
+    /// whether the partner is in the agent's image.
+    pub fn granted(
+        &self,
+        agent: AgentId,
+        grants: Grants,
+        classes: &Arc<Vec<Option<ClassId>>>,
+        in_view: &dyn Fn(AgentId) -> bool,
+    ) -> Granted {
+        let mut granted = Granted::default();
+        if grants.ids {
+            granted.classes = Some(Arc::clone(classes));
+        }
+        if grants.goal {
+            granted.goal = Some(self.setup.goal.clone());
+        }
+        if grants.behavior {
+            for other in self.setup.agents().filter(|a| *a != agent && in_view(*a)) {
+                granted.behavior.extend(self.seen_deed(other));
+                if other == AgentId::PARTNER {
+                    granted.partner_hands = Some(self.hands(other));
+                }
+            }
+        }
+        if grants.positions {
+            granted.poses = self.setup.agents().map(|a| (a, self.person(a).pose)).collect();
+        }
+        granted
+    }
+
+    /// The class of every entity, indexed by id; constant during an episode.
+    pub fn classes(&self) -> Arc<Vec<Option<ClassId>>> {
+        let n = usize::from(EntityId::FIRST_OBJECT.0) + self.setup.things.len();
+        let mut classes = vec![None; n];
+        let person = ClassId::named("person");
+        for agent in self.setup.agents() {
+            classes[usize::from(EntityId::of_agent(agent).0)] = Some(person);
+        }
+        for (entity, thing) in self.setup.entities().zip(&self.setup.things) {
+            classes[usize::from(entity.0)] = Some(thing.class);
+        }
+        Arc::new(classes)
+    }
+
+    fn hands(&self, agent: AgentId) -> [Option<Held>; 2] {
+        self.person(agent).hands.map(|held| {
+            held.map(|entity| Held {
+                entity,
+                class: self.thing(entity).0.class,
+                contents: self
+                    .contents(entity)
+                    .into_iter()
+                    .map(|e| (e, self.thing(e).0.class))
+                    .collect(),
+            })
+        })
+    }
+
+    fn seen_deed(&self, agent: AgentId) -> Option<SeenAction> {
+        let person = self.person(agent);
+        if let Some(activity) = person.activity.as_ref().filter(|a| a.action.subject().is_some()) {
+            let (frame, action) = (activity.since, activity.action);
+            return Some(SeenAction { agent, frame, action, outcome: None });
+        }
+        person.last_deed.map(|(frame, action, outcome)| SeenAction {
+            agent,
+            frame,
+            action,
+            outcome: Some(outcome),
+        })
+    }
+
+    /// An agent's eye: level, at eye height, looking ahead. `size` is the image's side in pixels.
+    pub fn eye(&self, agent: AgentId, size: u32) -> Camera {
+        let pose = self.person(agent).pose;
+        Camera {
+            eye_in_world: pose.position + Vec3::Y * self.capability(agent).eye_height_m,
+            world_from_camera: yaw_rotation(pose.yaw_rad),
+            vertical_fov_rad: Camera::EYE_FOV_RAD,
+            width: size,
+            height: size,
+        }
+    }
+
+    /// A point in front of a person at the height where things are held.
+    pub(crate) fn front_of(&self, agent: AgentId) -> Vec3 {
+        let h = self.capability(agent).height_m;
+        self.person(agent).pose.to_world(Vec3::new(0.0, 0.6 * h, -0.3 * h))
+    }
+
+    /// Where a hand rests, in the world, metres.
+    pub(crate) fn rest_of(&self, agent: AgentId, hand: Hand) -> Vec3 {
+        let holding = self.person(agent).hands[hand.index()].is_some();
+        self.person(agent).pose.to_world(self.rest_in_body(agent, hand, holding))
+    }
+
+    /// Where a hand rests in the body's frame: hanging, or before the body if it holds something
+    /// (facts of the original, 16.1, in proportion to the body's height).
+    fn rest_in_body(&self, agent: AgentId, hand: Hand, holding: bool) -> Vec3 {
+        let c = self.capability(agent);
+        let side = if hand == Hand::Left { -1.0 } else { 1.0 };
+        match (c.gait, holding) {
+            (Gait::Roll, true) => Vec3::new(side * 0.18, 0.82, -0.5),
+            (Gait::Roll, false) => Vec3::new(side * 0.33, 0.62, 0.0),
+            (Gait::WalkBike, _) if hand == Hand::Left => Vec3::new(-0.4, 0.98, -0.35),
+            (_, true) => Vec3::new(side * 0.2, 0.57 * c.height_m, -0.31 * c.height_m),
+            (_, false) => Vec3::new(side * 0.24, 0.43 * c.height_m, 0.0),
+        }
+    }
+
+    /// Where a hand is now, in the world, metres.
+    pub(crate) fn hand_in_world(&self, agent: AgentId, hand: Hand) -> Vec3 {
+        let pose = self.person(agent).pose;
+        let rest = self.rest_of(agent, hand);
+        let Some(step) = self.person(agent).phase() else { return rest };
+        let applies = |h: Option<Hand>| h.is_none_or(|h| h == hand);
+        let spread = |p: Vec3, h: Option<Hand>| match h {
+            Some(_) => p,
+            // Two hands hold by the two sides.
+            None => p + rotate_yaw(Vec3::X * if hand == Hand::Left { -0.22 } else { 0.22 }, pose.yaw_rad),
+        };
+        let t = step.progress();
+        match step.phase {
+            Phase::Reach { hand: h, to, vain } if applies(h) => {
+                // A vain reach goes up and comes half back.
+                let t = if vain { (1.5 * t).min(1.0) } else { t };
+                rest.lerp(spread(to, h), t * t * (3.0 - 2.0 * t))
+            }
+            Phase::Grasp { hand: h, object } if applies(h) => {
+                let (thing, state) = self.thing(object);
+                spread(state.position + state.rotation * (Vec3::Y * 0.5 * thing.size_m().y), h)
+            }
+            Phase::Release { hand: h, object, at, .. } if applies(h) => {
+                spread(at + Vec3::Y * 0.5 * self.thing(object).0.size_m().y, h)
+            }
+            Phase::ResetArms { from: Some(from), hand: h } if applies(h) => {
+                spread(from, h).lerp(rest, t)
+            }
+            _ => rest,
+        }
+    }
+
+    /// How a person's body holds itself now.
+    pub fn posture(&self, agent: AgentId) -> Posture {
+        let c = self.capability(agent);
+        let person = self.person(agent);
+        let arm = |hand: Hand| {
+            let offset = self.hand_in_world(agent, hand) - person.pose.position;
+            Arm {
+                hand_in_body: rotate_yaw(offset, -person.pose.yaw_rad),
+                grips: person.hands[hand.index()].is_some(),
+            }
+        };
+        let arms = [arm(Hand::Left), arm(Hand::Right)];
+        let phase = person.phase().map(|s| s.phase);
+        let busy = matches!(
+            phase,
+            Some(Phase::Reach { .. } | Phase::Grasp { .. } | Phase::Release { .. } | Phase::ResetArms { .. })
+        );
+        let lowest = arms[0].hand_in_body.y.min(arms[1].hand_in_body.y);
+        let highest = arms[0].hand_in_body.y.max(arms[1].hand_in_body.y);
+        let below = (0.4 * c.height_m - lowest) / (0.4 * c.height_m);
+        let above = (highest - 1.1 * c.height_m) / (0.25 * c.height_m);
+        Posture {
+            persona: self.setup.people[agent.index()].persona,
+            gait: c.gait,
+            height_m: c.height_m,
+            look: self.setup.people[agent.index()].look,
+            pose: person.pose,
+            moving: matches!(phase, Some(Phase::Walk { .. } | Phase::Approach { .. }))
+                || (person.in_stride && matches!(phase, Some(Phase::Stand)))
+                || self.is_led(agent),
+            walked_m: person.walked_m,
+            arms,
+            bend: if busy { below.clamp(0.0, 1.0) } else { 0.0 },
+            stretch: if busy { above.clamp(0.0, 1.0) } else { 0.0 },
+            failing: busy && person.activity.as_ref().is_some_and(|a| a.failing.is_some()),
+        }
+    }
+
+    fn is_led(&self, agent: AgentId) -> bool {
+        self.state.joint.is_some_and(|j| {
+            let leads = || self.person(j.leader).phase().map(|s| s.phase);
+            j.under_way && j.follower == agent && matches!(leads(), Some(Phase::Walk { .. } | Phase::Approach { .. }))
+        })
+    }
+
+    /// Whether a thing is still in the scene to be seen.
+    pub fn is_visible(&self, entity: EntityId) -> bool {
+        self.setup.thing_index(entity).is_some() && self.thing(entity).1.place != Place::Broken
+    }
+}
+
+/// Whether a class may be a target in this kind of scene.
+fn is_possible_target(class: ClassId, scene: SceneKind) -> bool {
+    let info = &CLASSES[class.index()];
+    let tasks = chaic_protocol::task::TASKS.iter().filter(|t| t.scene == scene);
+    let in_sets = tasks.flat_map(|t| t.sets).any(|s| info.sets.contains(s));
+    in_sets || (scene == SceneKind::House && info.role == Role::Fragile)
+}
+
+/// A seed of an agent's own, from which the world's seed can't be read off.
+fn mix(seed: u64, agent: AgentId) -> u64 {
+    let mut stream = Stream::new(seed, "agent", u64::from(agent.0));
+    (0..4).fold(0, |s, _| s << 16 | stream.below(1 << 16) as u64)
+}

@@ -1,0 +1,374 @@
+//! A world: setup, rules and state together, and the doors to them.
+
+use std::sync::Arc;
+
+use chaic_protocol::capability::{Capability, Gait};
+use chaic_protocol::catalogue::Role;
+use chaic_protocol::geom::{horizontal_distance, yaw_rotation};
+use chaic_protocol::rng::Stream;
+use chaic_protocol::{Action, AgentId, EntityId, Hand, Vec3};
+use serde::{Deserialize, Serialize};
+
+use crate::collide::{Body, Disc, Surroundings};
+use crate::event::{Event, EventKind};
+use crate::rules::Rules;
+use crate::setup::{Setup, SetupError, Thing};
+use crate::shape::{Block, blocks_at, wall_blocks};
+use crate::state::{PersonState, Place, State, ThingState};
+
+/// An episode under way.
+#[derive(Clone, Debug)]
+pub struct World {
+    pub(crate) setup: Arc<Setup>,
+    pub(crate) rules: Rules,
+    /// Walls and things that never move: derived from the setup.
+    pub(crate) surroundings: Arc<Surroundings>,
+    /// Things that can be moved and block bodies: derived from the setup.
+    pub(crate) movable_blockers: Arc<[usize]>,
+    pub(crate) state: State,
+    pub(crate) events: Vec<Event>,
+}
+
+/// A saved state, as bytes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Snapshot(pub Vec<u8>);
+
+/// Why a snapshot can't be restored.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SnapshotError {
+    /// The bytes are no state.
+    #[error("the snapshot can't be read: {0}")]
+    Unreadable(String),
+    /// The state belongs to another setup.
+    #[error("the snapshot has {got} and this world has {expected}")]
+    OtherSetup {
+        /// Things and people of the snapshot.
+        got: String,
+        /// Things and people of this world.
+        expected: String,
+    },
+}
+
+/// Why an action can't be submitted. An action that is merely impossible *in the world* is
+/// accepted, and fails there with a reason.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SubmitError {
+    /// There is no such agent.
+    #[error("there is no agent {0:?} in this episode")]
+    NoSuchAgent(AgentId),
+    /// The agent's last action is still under way.
+    #[error("the {0} is still busy")]
+    Busy(AgentId),
+    /// The episode has ended.
+    #[error("the episode is over")]
+    Over,
+}
+
+impl World {
+    /// The world at the beginning of an episode.
+    ///
+    /// # Errors
+    /// If the setup holds numbers or ids that no world can have; see [`Setup::check`].
+    pub fn new(setup: impl Into<Arc<Setup>>, rules: Rules) -> Result<World, SetupError> {
+        let setup = setup.into();
+        setup.check()?;
+        let fixed = setup.things.iter().enumerate().filter(|(_, t)| t.fixed);
+        let blocks = wall_blocks(&setup)
+            .chain(fixed.flat_map(|(i, t)| blocks_at(t, Setup::entity(i), t.position, t.yaw_rad)))
+            .collect();
+        let surroundings = Arc::new(Surroundings::new(blocks, setup.bounds));
+        let blocks_bodies = |t: &Thing| {
+            !t.fixed && matches!(t.class.info().role, Role::Obstacle | Role::HeavyTarget)
+        };
+        let movable_blockers = setup
+            .things
+            .iter()
+            .enumerate()
+            .filter(|(_, t)| blocks_bodies(t))
+            .map(|(i, _)| i)
+            .collect();
+        let state = initial_state(&setup);
+        let mut world = World { setup, rules, surroundings, movable_blockers, state, events: Vec::new() };
+        world.attach_vehicles();
+        world.carry_along();
+        Ok(world)
+    }
+
+    /// How the episode began.
+    pub fn setup(&self) -> &Setup {
+        &self.setup
+    }
+
+    /// The rules.
+    pub fn rules(&self) -> &Rules {
+        &self.rules
+    }
+
+    /// How it stands.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Whether the episode has ended.
+    pub fn is_over(&self) -> bool {
+        self.state.over
+    }
+
+    /// The agents that wait to be asked, in order.
+    pub fn waiting(&self) -> Vec<AgentId> {
+        if self.state.over {
+            return Vec::new();
+        }
+        self.setup.agents().filter(|a| self.person(*a).activity.is_none()).collect()
+    }
+
+    /// Takes the next action of an agent that waits.
+    ///
+    /// # Errors
+    /// If the agent doesn't exist, is busy, or the episode is over.
+    pub fn submit(&mut self, agent: AgentId, action: Action) -> Result<(), SubmitError> {
+        if agent.index() >= self.state.people.len() {
+            return Err(SubmitError::NoSuchAgent(agent));
+        }
+        if self.state.over {
+            return Err(SubmitError::Over);
+        }
+        if self.person(agent).activity.is_some() {
+            return Err(SubmitError::Busy(agent));
+        }
+        self.begin(agent, action);
+        Ok(())
+    }
+
+    /// Runs frames until some agent waits to be asked, or the episode ends.
+    pub fn advance(&mut self) {
+        while !self.state.over && self.state.people.iter().all(|p| p.activity.is_some()) {
+            self.tick();
+        }
+    }
+
+    /// What has happened since this was last called.
+    pub fn drain_events(&mut self) -> Vec<Event> {
+        std::mem::take(&mut self.events)
+    }
+
+    /// The state as bytes.
+    pub fn snapshot(&self) -> Snapshot {
+        Snapshot(postcard::to_stdvec(&self.state).expect("a state is plain data"))
+    }
+
+    /// Goes back (or on) to a saved state of the same setup. Undrained events are dropped.
+    ///
+    /// # Errors
+    /// If the bytes are no state of this setup; the world is then unchanged.
+    pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), SnapshotError> {
+        let state: State = postcard::from_bytes(&snapshot.0)
+            .map_err(|e| SnapshotError::Unreadable(e.to_string()))?;
+        let count = |things: usize, people: usize| format!("{things} things and {people} people");
+        let got = count(state.things.len(), state.people.len());
+        let expected = count(self.setup.things.len(), self.setup.people.len());
+        if got != expected {
+            return Err(SnapshotError::OtherSetup { got, expected });
+        }
+        self.state = state;
+        self.events.clear();
+        Ok(())
+    }
+
+    /// A number that differs between different states, and is the same for equal ones.
+    pub fn digest(&self) -> u64 {
+        xxhash_rust::xxh3::xxh3_64(&self.snapshot().0)
+    }
+
+    pub(crate) fn person(&self, agent: AgentId) -> &PersonState {
+        &self.state.people[agent.index()]
+    }
+
+    pub(crate) fn person_mut(&mut self, agent: AgentId) -> &mut PersonState {
+        &mut self.state.people[agent.index()]
+    }
+
+    pub(crate) fn capability(&self, agent: AgentId) -> Capability {
+        self.setup.people[agent.index()].capability()
+    }
+
+    /// Setup and state of a thing that exists.
+    pub(crate) fn thing(&self, entity: EntityId) -> (&Thing, &ThingState) {
+        let i = self.index(entity);
+        (&self.setup.things[i], &self.state.things[i])
+    }
+
+    pub(crate) fn thing_mut(&mut self, entity: EntityId) -> &mut ThingState {
+        let i = self.index(entity);
+        &mut self.state.things[i]
+    }
+
+    fn index(&self, entity: EntityId) -> usize {
+        self.setup.thing_index(entity).expect("entities inside the world name things of its setup")
+    }
+
+    pub(crate) fn happened(&mut self, kind: EventKind) {
+        self.events.push(Event { frame: self.state.frame, kind });
+    }
+
+    /// One draw of luck with the chance `p`, from the person's own stream.
+    pub(crate) fn luck(&mut self, agent: AgentId, purpose: &str, p: f32) -> bool {
+        let seed = self.setup.seed;
+        let person = self.person_mut(agent);
+        let index = u64::from(agent.0) << 32 | u64::from(person.draws);
+        person.draws += 1;
+        Stream::new(seed, purpose, index).chance(p)
+    }
+
+    /// The colliding parts of a thing as it stands now.
+    pub(crate) fn blocks_now(&self, index: usize) -> impl Iterator<Item = Block> + use<> {
+        let (thing, state) = (&self.setup.things[index], &self.state.things[index]);
+        let f = state.rotation * Vec3::NEG_Z;
+        let yaw = chaic_protocol::geom::yaw_towards(Vec3::ZERO, f);
+        blocks_at(thing, Setup::entity(index), state.position, yaw)
+    }
+
+    /// Blocks of movable things that stand in people's way right now.
+    pub(crate) fn movable_blocks(&self) -> Vec<Block> {
+        let standing = |i: &&usize| self.state.things[**i].is_resting();
+        self.movable_blockers.iter().filter(standing).flat_map(|i| self.blocks_now(*i)).collect()
+    }
+
+    /// The cylinders of the people other than `agent` and `except`.
+    pub(crate) fn others(&self, agent: AgentId, except: Option<AgentId>) -> Vec<Disc> {
+        self.setup
+            .agents()
+            .filter(|a| *a != agent && Some(*a) != except)
+            .map(|a| Disc {
+                center: chaic_protocol::geom::xz(self.person(a).pose.position),
+                radius_m: self.capability(a).radius_m,
+            })
+            .collect()
+    }
+
+    pub(crate) fn body(&self, agent: AgentId) -> Body {
+        let c = self.capability(agent);
+        Body { radius_m: c.radius_m, low_m: self.rules.step_over_m, high_m: c.height_m }
+    }
+
+    /// The bicycle or other vehicle in an agent's left hand.
+    pub(crate) fn vehicle(&self, agent: AgentId) -> Option<EntityId> {
+        self.person(agent).hands[Hand::Left.index()]
+            .filter(|e| self.thing(*e).0.class.info().role == Role::Vehicle)
+    }
+
+    /// What is directly in a container or basket, in the order of its slots.
+    pub(crate) fn contents(&self, container: EntityId) -> Vec<EntityId> {
+        let mut inside: Vec<(u8, EntityId)> = self
+            .setup
+            .entities()
+            .filter_map(|e| match self.thing(e).1.place {
+                Place::Inside { container: c, slot } if c == container => Some((slot, e)),
+                _ => None,
+            })
+            .collect();
+        inside.sort_unstable();
+        inside.into_iter().map(|(_, e)| e).collect()
+    }
+
+    /// Distance in plan from a person to the nearest point of a thing, metres.
+    pub(crate) fn distance_to(&self, agent: AgentId, entity: EntityId) -> f32 {
+        let p = self.person(agent).pose.position;
+        horizontal_distance(p, self.nearest_point(p, entity))
+    }
+
+    /// The point of a thing's outline that is nearest in plan to `p`, at `p`'s height.
+    pub(crate) fn nearest_point(&self, p: Vec3, entity: EntityId) -> Vec3 {
+        let (thing, state) = self.thing(entity);
+        let half = 0.5 * thing.size_m();
+        let facing = state.rotation * Vec3::NEG_Z;
+        let block = Block {
+            center: state.position + Vec3::Y * half.y,
+            half,
+            yaw_rad: chaic_protocol::geom::yaw_towards(Vec3::ZERO, facing),
+            entity,
+        };
+        block.nearest_in_plan(p).0
+    }
+
+    /// Height of a thing's highest point, metres.
+    pub(crate) fn top_of(&self, entity: EntityId) -> f32 {
+        let (thing, state) = self.thing(entity);
+        let half = 0.5 * thing.size_m();
+        let m = glam::Mat3::from_quat(state.rotation);
+        let middle = state.position.y + (state.rotation * (Vec3::Y * half.y)).y;
+        middle + m.x_axis.y.abs() * half.x + m.y_axis.y.abs() * half.y + m.z_axis.y.abs() * half.z
+    }
+
+    /// At the start every rider holds the nearest vehicle.
+    fn attach_vehicles(&mut self) {
+        for agent in self.setup.agents() {
+            if self.capability(agent).gait != Gait::WalkBike {
+                continue;
+            }
+            let at = self.person(agent).pose.position;
+            let free = |e: &EntityId| {
+                self.thing(*e).0.class.info().role == Role::Vehicle && self.thing(*e).1.holder().is_none()
+            };
+            let nearest = self.setup.entities().filter(free).min_by(|a, b| {
+                let d = |e: &EntityId| horizontal_distance(self.thing(*e).1.position, at);
+                d(a).total_cmp(&d(b))
+            });
+            if let Some(vehicle) = nearest {
+                self.thing_mut(vehicle).place = Place::Held { by: agent, hand: Hand::Left };
+                self.person_mut(agent).hands[Hand::Left.index()] = Some(vehicle);
+            }
+        }
+    }
+}
+
+fn initial_state(setup: &Setup) -> State {
+    let thing = |t: &Thing| ThingState {
+        position: t.position,
+        rotation: yaw_rotation(t.yaw_rad),
+        place: Place::Resting { on: None },
+        delivered: None,
+        delivered_by: None,
+        last_holder: None,
+        released_at: None,
+    };
+    let mut things: Vec<ThingState> = setup.things.iter().map(thing).collect();
+    for i in 0..things.len() {
+        things[i].place = Place::Resting { on: initial_support(setup, i) };
+    }
+    let person = |p: &crate::setup::Person| PersonState {
+        pose: p.pose,
+        hands: [None, None],
+        activity: None,
+        last: None,
+        last_deed: None,
+        in_stride: false,
+        walked_m: 0.0,
+        draws: 0,
+    };
+    State {
+        frame: 0,
+        things,
+        people: setup.people.iter().map(person).collect(),
+        joint: None,
+        child_away_frames: 0,
+        child_is_away: false,
+        over: false,
+    }
+}
+
+/// What a thing stands on at the start: the thing whose top surface is right below its bottom.
+fn initial_support(setup: &Setup, index: usize) -> Option<EntityId> {
+    /// Gap that still counts as lying on, metres.
+    const TOUCHING_M: f32 = 0.03;
+    let p = setup.things[index].position;
+    if p.y < TOUCHING_M || !setup.things[index].class.info().is_movable() {
+        return None;
+    }
+    let below = |t: &Thing| {
+        let block = crate::shape::blocks_of(t);
+        block.iter().any(|b| (b.y_range()[1] - p.y).abs() < TOUCHING_M && b.nearest_in_plan(p).1)
+    };
+    let others = setup.things.iter().enumerate().filter(|(i, _)| *i != index);
+    others.filter(|(_, t)| below(t)).map(|(i, _)| Setup::entity(i)).next()
+}

@@ -25,6 +25,7 @@ pub mod street;
 pub mod yard;
 
 mod grid;
+mod outdoors;
 mod solid;
 
 pub use format::{Episode, EpisodeError, GeneratorInfo, MAX_EPISODE_BYTES, json_schema};

@@ -55,7 +55,7 @@ pub(crate) fn draw(frame: &Frame, lens: &Lens, omit: Omit, scratch: &mut Scratch
         {
             continue;
         }
-        let into = lens.from_object(&instance.rotation, instance.origin);
+        let into = lens.into_camera(&instance.rotation, instance.origin);
         if let Some(outline) = outline(instance, lens, &into) {
             let is_structure = instance.entity < EntityId::FIRST_PERSON;
             let distance = instance.distance(lens.eye);
@@ -151,7 +151,7 @@ impl Drawing<'_> {
     fn draw(&self, crosses_near: bool, target: &mut Target, corners: &mut Vec<Corner>) {
         let lens = self.lens;
         let mesh = self.instance.shape.mesh(self.level);
-        let into = lens.from_object(&self.instance.rotation, self.instance.origin);
+        let into = lens.into_camera(&self.instance.rotation, self.instance.origin);
         let (mu, mv) = lens.middle();
         corners.clear();
         if lens.is_plan {

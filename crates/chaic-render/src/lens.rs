@@ -88,7 +88,7 @@ impl Lens {
 
     /// The way from an object's frame, given by the columns of a rotation and an origin, into
     /// this camera.
-    pub fn from_object(&self, rotation: &Mat3, origin: Vec3) -> IntoCamera {
+    pub fn into_camera(&self, rotation: &Mat3, origin: Vec3) -> IntoCamera {
         let d = origin - self.eye;
         let row = |axis: Vec3| {
             Vec3::new(axis.dot(rotation.x_axis), axis.dot(rotation.y_axis), axis.dot(rotation.z_axis))

@@ -1,1 +1,45 @@
-//! TBD.
+//! What eyes see: RGB, depth and instance ids from a world's state and a camera.
+//!
+//! **What it is**: [`Scene`] makes an episode's shapes ready once, [`Scene::render`] draws what
+//! any number of cameras ([`View`]) see at a moment, [`plan::draw`] draws a map for people,
+//! [`image_out`] and [`text`] help to write pictures.
+//!
+//! **What it is not**: it changes no state, reads no files, and uses neither GPU nor display.
+//!
+//! **Invariants**
+//! - Images are the same bits on every machine and for any number of threads: one thread draws
+//!   one view, and all arithmetic is correctly rounded or comes from
+//!   [`chaic_protocol::geom::math`].
+//! - No camera, size or posture makes it panic.
+//!
+//! How a view comes about: instances are culled by the camera's frustum and by what is already
+//! drawn ([`draw`]), drawn at a level of detail that fits their size on the image ([`solids`]) into
+//! a buffer of nearness and owners ([`raster`]); depth and ids are read off that buffer, and color
+//! is computed for each pixel's owner ([`shade`]) only if it is asked for.
+
+#![allow(rustdoc::private_intra_doc_links, reason = "the code map above is for readers of the source")]
+
+mod scene;
+mod view;
+
+mod frame;
+mod lens;
+
+mod mesh;
+mod people;
+mod solids;
+
+mod clip;
+mod draw;
+mod raster;
+
+mod light;
+mod shade;
+mod texture;
+
+pub mod image_out;
+pub mod plan;
+pub mod text;
+
+pub use scene::Scene;
+pub use view::{Channels, MAX_SIDE_PX, View};

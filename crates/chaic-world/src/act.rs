@@ -155,7 +155,7 @@ impl World {
 
     /// Whether a hand gets at a thing from where its owner stands now.
     fn check_within_reach(&self, agent: AgentId, entity: EntityId) -> Result<(), FailureReason> {
-        if self.distance_to(agent, entity) > self.rules.reach_limit_m {
+        if self.reach_distance(agent, entity) > self.rules.reach_limit_m {
             return Err(FailureReason::Blocked);
         }
         let from = self.person(agent).pose.position;
@@ -202,11 +202,17 @@ impl World {
         }
         let hands = &self.person(agent).hands;
         if thing.class.info().role == Role::HeavyTarget {
-            return if hands.iter().all(Option::is_none) { Ok(()) } else { Err(FailureReason::HandFull) };
+            return if hands.iter().all(Option::is_none) {
+                Ok(())
+            } else {
+                Err(FailureReason::HandFull)
+            };
         }
         if let Some(vehicle) = self.vehicle(agent) {
             // A basket takes goods, not other baskets.
-            if thing.class.info().role == Role::Container || thing.class.info().role == Role::Obstacle {
+            if thing.class.info().role == Role::Container
+                || thing.class.info().role == Role::Obstacle
+            {
                 return Err(FailureReason::Impossible);
             }
             let full = self.contents(vehicle).len() >= self.rules.container_capacity as usize;
@@ -219,15 +225,15 @@ impl World {
     fn check_put_in(&self, agent: AgentId) -> Result<(EntityId, EntityId, Hand), FailureReason> {
         let hands = self.person(agent).hands;
         for hand in Hand::BOTH {
-            let (Some(object), Some(container)) = (hands[hand.index()], hands[hand.other().index()])
+            let (Some(object), Some(container)) =
+                (hands[hand.index()], hands[hand.other().index()])
             else {
                 continue;
             };
             let role = |e: EntityId| self.thing(e).0.class.info().role;
             let fits = matches!(role(object), Role::Target | Role::Fragile);
             if fits && role(container) == Role::Container && object != container {
-                let full =
-                    self.contents(container).len() >= self.rules.container_capacity as usize;
+                let full = self.contents(container).len() >= self.rules.container_capacity as usize;
                 return if full { Err(FailureReason::Full) } else { Ok((object, container, hand)) };
             }
         }
@@ -277,7 +283,6 @@ impl World {
         let info = thing.class.info();
         let top = self.top_of(object);
         let height_excess = excess(top, capability.pick_range_m);
-        let joint = self.state.joint.is_some_and(|j| j.object == object);
         let mut to = state.position + state.rotation * (Vec3::Y * 0.5 * thing.size_m().y);
         if capability.breaks_fragile && info.role == Role::Fragile {
             let p = if top > capability.pick_range_m[1] {
@@ -289,7 +294,7 @@ impl World {
                 activity.failing = Some(FailureReason::Broke);
             }
         }
-        if activity.failing.is_none() && !joint {
+        if activity.failing.is_none() {
             let p = self.rules.pick_penalty.chance(height_excess)
                 * self.rules.lift_penalty.chance(info.mass_kg - capability.strength_kg);
             if !self.luck(agent, "take", p) {
@@ -326,7 +331,8 @@ impl World {
         let object = *object;
         let after_it = |a: &AgentId| {
             let other = self.person(*a).activity.as_ref();
-            *a != agent && other.is_some_and(|o| o.action.subject() == Some(object) && is_pick_up(o.action))
+            *a != agent
+                && other.is_some_and(|o| o.action.subject() == Some(object) && is_pick_up(o.action))
         };
         let other = self.setup.agents().find(after_it);
         let Some(other) = other else {
@@ -434,7 +440,11 @@ impl World {
         } else if matches!(activity.action, Action::RemoveObstacle { .. })
             && let Some(hand) = hand
         {
-            activity.queue = vec![Step::of(Phase::JudgeAside { hand, obstacle: object }, 0)];
+            let from = self.hand_in_world(agent, hand);
+            activity.queue = vec![
+                Step::of(Phase::JudgeAside { hand, obstacle: object }, 0),
+                self.reset_arms(Some(hand), from),
+            ];
         }
         self.finish_joint_lift(agent, object);
         Progress::Done
@@ -442,7 +452,8 @@ impl World {
 
     /// The leader has the furniture: from now on the follower goes along.
     fn finish_joint_lift(&mut self, agent: AgentId, object: EntityId) {
-        let Some(joint) = self.state.joint.filter(|j| j.leader == agent && j.object == object) else {
+        let Some(joint) = self.state.joint.filter(|j| j.leader == agent && j.object == object)
+        else {
             return;
         };
         let leader = self.person(agent).pose;

@@ -59,11 +59,14 @@ impl Surroundings {
             let cell = |v: f32, low: f32, n: usize| {
                 (((v - low) / CELL_M).floor().max(0.0) as usize).min(n - 1)
             };
-            let columns_touched = cell(c.x - r, bounds.min.x, columns)..=cell(c.x + r, bounds.min.x, columns);
-            let rows_touched = cell(c.y - r, bounds.min.y, rows)..=cell(c.y + r, bounds.min.y, rows);
+            let columns_touched =
+                cell(c.x - r, bounds.min.x, columns)..=cell(c.x + r, bounds.min.x, columns);
+            let rows_touched =
+                cell(c.y - r, bounds.min.y, rows)..=cell(c.y + r, bounds.min.y, rows);
             for row in rows_touched {
                 for column in columns_touched.clone() {
-                    let middle = bounds.min + Vec2::new(column as f32 + 0.5, row as f32 + 0.5) * CELL_M;
+                    let middle =
+                        bounds.min + Vec2::new(column as f32 + 0.5, row as f32 + 0.5) * CELL_M;
                     let (nearest, _) = block.nearest_in_plan(Vec3::new(middle.x, 0.0, middle.y));
                     if xz(nearest).distance(middle) <= 0.71 * CELL_M + margin {
                         lists[row * columns + column].push(i as u32);
@@ -115,7 +118,11 @@ impl Surroundings {
         }
         let left = self.push_out(body, p, movable, people).1;
         // Wedged: stay, unless staying is the tighter spot.
-        if left <= TOLERANCE_M || left < self.push_out(body, from, movable, people).1 { p } else { from }
+        if left <= TOLERANCE_M || left < self.push_out(body, from, movable, people).1 {
+            p
+        } else {
+            from
+        }
     }
 
     /// How deep a body at `p` is in what it touches, metres.
@@ -187,7 +194,7 @@ mod tests {
         let walls = vec![
             block([-2.6, 1.5, 0.0], [2.0, 1.5, 0.06]),
             block([2.6, 1.5, 0.0], [2.0, 1.5, 0.06]),
-            block([0.34, 0.28, 0.0], [0.24, 0.28, 0.24]),
+            block([0.3, 0.28, 0.0], [0.24, 0.28, 0.24]),
         ];
         Surroundings::new(walls, Rect::new([-5.0, -5.0], [5.0, 5.0]))
     }

@@ -70,7 +70,7 @@ pub(crate) fn fall(thing: Falling, obstacles: &[Obstacle], step_s: f32) -> Fall 
         world.colliders.insert(collider);
     }
     world.colliders.insert(
-        ColliderBuilder::halfspace(rapier3d::na::Unit::new_unchecked(Vector::Y).into())
+        ColliderBuilder::halfspace(rapier3d::na::Unit::new_unchecked(Vector::Y))
             .friction(FRICTION)
             .user_data(u128::from(EntityId::FLOOR.0)),
     );
@@ -85,7 +85,9 @@ pub(crate) fn fall(thing: Falling, obstacles: &[Obstacle], step_s: f32) -> Fall 
             .ccd_enabled(true),
     );
     let collider = world.colliders.insert_with_parent(
-        ColliderBuilder::cuboid(half.x, half.y, half.z).friction(FRICTION).mass(thing.mass_kg.max(0.01)),
+        ColliderBuilder::cuboid(half.x, half.y, half.z)
+            .friction(FRICTION)
+            .mass(thing.mass_kg.max(0.01)),
         body,
         &mut world.bodies,
     );
@@ -98,7 +100,8 @@ pub(crate) fn fall(thing: Falling, obstacles: &[Obstacle], step_s: f32) -> Fall 
         let rotation = *b.rotation();
         path.push((b.translation() - rotation * (Vec3::Y * half.y), rotation));
         let touches = world.contact_pairs_with(collider).any(|p| p.has_any_active_contact());
-        let slow = b.linvel().length() < STILL_M_PER_S && b.angvel().length() < 10.0 * STILL_M_PER_S;
+        let slow =
+            b.linvel().length() < STILL_M_PER_S && b.angvel().length() < 10.0 * STILL_M_PER_S;
         still = if touches && slow { still + 1 } else { 0 };
         if still >= STILL_FRAMES {
             break;
@@ -111,8 +114,11 @@ pub(crate) fn fall(thing: Falling, obstacles: &[Obstacle], step_s: f32) -> Fall 
 fn support(world: &PhysicsWorld, collider: ColliderHandle) -> Option<EntityId> {
     let mut lowest: Option<(f32, u16)> = None;
     for pair in world.contact_pairs_with(collider).filter(|p| p.has_any_active_contact()) {
-        let (other, own_is_first) =
-            if pair.collider1 == collider { (pair.collider2, true) } else { (pair.collider1, false) };
+        let (other, own_is_first) = if pair.collider1 == collider {
+            (pair.collider2, true)
+        } else {
+            (pair.collider1, false)
+        };
         let entity = world.colliders[other].user_data as u16;
         let own_pose = world.colliders[collider].position();
         for manifold in pair.manifolds() {

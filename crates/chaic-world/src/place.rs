@@ -171,11 +171,11 @@ impl World {
     }
 
     /// Whether an upright thing of this radius and height can stand on the floor at `p`, within
-    /// bounds, with no wall between it and the people around.
+    /// bounds and clear of everything and everybody.
     fn stands_free(&self, p: Vec3, radius_m: f32, height_m: f32) -> bool {
         let body = Body { radius_m, low_m: 0.0, high_m: height_m };
         self.setup.bounds.grown(-radius_m).contains(xz(p))
-            && self.surroundings.overlap(body, xz(p), &self.movable_blocks(), &[]) <= 0.0
+            && self.surroundings.overlap(body, xz(p), &self.movable_blocks(), &self.discs()) <= 0.0
     }
 
     /// Lets a thing go at `at` (its bottom).
@@ -208,8 +208,11 @@ impl World {
                 let center = state.position + state.rotation * (Vec3::Y * half.y);
                 around.push(Obstacle { center, half, rotation: state.rotation, entity });
             } else {
-                let yaw = chaic_protocol::geom::yaw_towards(Vec3::ZERO, state.rotation * Vec3::NEG_Z);
-                around.extend(blocks_at(other, entity, state.position, yaw).map(|b| Obstacle::from(&b)));
+                let yaw =
+                    chaic_protocol::geom::yaw_towards(Vec3::ZERO, state.rotation * Vec3::NEG_Z);
+                around.extend(
+                    blocks_at(other, entity, state.position, yaw).map(|b| Obstacle::from(&b)),
+                );
             }
         }
         let mut fall = fall::fall(falling, &around, self.rules.fall_step_s);

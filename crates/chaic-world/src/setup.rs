@@ -146,7 +146,14 @@ pub struct Thing {
 impl Thing {
     /// A thing of catalogue size.
     pub fn new(class: ClassId, position: Vec3, yaw_rad: f32) -> Thing {
-        Thing { class, position, yaw_rad, scale: [1.0; 3], variant: 0, fixed: !class.info().is_movable() }
+        Thing {
+            class,
+            position,
+            yaw_rad,
+            scale: [1.0; 3],
+            variant: 0,
+            fixed: !class.info().is_movable(),
+        }
     }
 
     /// Extents along its own x, y and z, metres.
@@ -256,7 +263,8 @@ impl Setup {
         };
         rect("bounds".into(), &self.bounds)?;
         if self.things.len() > Setup::MAX_THINGS {
-            let problem = format!("has {} entries, at most {}", self.things.len(), Setup::MAX_THINGS);
+            let problem =
+                format!("has {} entries, at most {}", self.things.len(), Setup::MAX_THINGS);
             return Err(SetupError::new("things", problem));
         }
         if self.walls.len() > Setup::MAX_WALLS {
@@ -335,7 +343,8 @@ impl Setup {
         }
         for (i, (class, n)) in self.goal.targets.iter().enumerate() {
             if *n == 0 || *n as usize > Setup::MAX_THINGS {
-                let problem = format!("asks for {n} of {class}, expected 1 to {}", Setup::MAX_THINGS);
+                let problem =
+                    format!("asks for {n} of {class}, expected 1 to {}", Setup::MAX_THINGS);
                 return Err(SetupError::new(format!("goal.targets[{i}]"), problem));
             }
             if self.goal.targets[..i].iter().any(|(c, _)| c == class) {

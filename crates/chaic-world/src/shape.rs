@@ -110,11 +110,7 @@ pub(crate) fn surfaces_at(thing: &Thing, position: Vec3, yaw_rad: f32) -> Vec<Su
         .map(|part| {
             let half = turned_half_extents(part, size);
             let top = Vec3::from(part.center) * size + Vec3::Y * half.y;
-            Surface {
-                center: position + rotate_yaw(top, yaw_rad),
-                half: [half.x, half.z],
-                yaw_rad,
-            }
+            Surface { center: position + rotate_yaw(top, yaw_rad), half: [half.x, half.z], yaw_rad }
         })
         .collect()
 }
@@ -132,7 +128,8 @@ fn turned_half_extents(part: &Part, size: Vec3) -> Vec3 {
 }
 
 fn axis_turn(axis: Vec3, rad: f32) -> Quat {
-    let (s, c) = (chaic_protocol::geom::math::sin(0.5 * rad), chaic_protocol::geom::math::cos(0.5 * rad));
+    let (s, c) =
+        (chaic_protocol::geom::math::sin(0.5 * rad), chaic_protocol::geom::math::cos(0.5 * rad));
     Quat::from_xyzw(axis.x * s, axis.y * s, axis.z * s, c)
 }
 

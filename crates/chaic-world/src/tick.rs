@@ -109,7 +109,9 @@ impl World {
             Phase::AwaitPartner { .. } => self.await_partner(agent, activity),
             Phase::JudgeTake { hand, object } => self.judge_take(agent, activity, hand, object),
             Phase::JudgePut { hand, place } => self.judge_put(agent, activity, hand, place),
-            Phase::JudgeAside { hand, obstacle } => self.judge_aside(agent, activity, hand, obstacle),
+            Phase::JudgeAside { hand, obstacle } => {
+                self.judge_aside(agent, activity, hand, obstacle)
+            }
             Phase::Grasp { hand, object } => match counted {
                 Progress::Done => self.grasp(agent, activity, hand, object),
                 other => other,
@@ -143,7 +145,11 @@ impl World {
         if *left_m > 0.0 && !stuck {
             return Progress::Goes;
         }
-        if *made_m < self.rules.min_progress_m { Progress::Fails(FailureReason::Blocked) } else { Progress::Done }
+        if *made_m < self.rules.min_progress_m {
+            Progress::Fails(FailureReason::Blocked)
+        } else {
+            Progress::Done
+        }
     }
 
     /// One frame of walking straight up to a thing.
@@ -152,7 +158,7 @@ impl World {
         const GIVE_UP_AFTER: u32 = 4;
         let Phase::Approach { to, stuck } = &mut step.phase else { return Progress::Done };
         let entity = *to;
-        let before = self.distance_to(agent, entity);
+        let before = self.reach_distance(agent, entity);
         if before <= self.rules.arm_reach_m {
             return Progress::Done;
         }
@@ -162,7 +168,7 @@ impl World {
         self.person_mut(agent).pose.yaw_rad = yaw;
         let speed = self.capability(agent).approach_speed_m_per_frame;
         self.step_towards(agent, forward(yaw), speed);
-        let nearer = before - self.distance_to(agent, entity);
+        let nearer = before - self.reach_distance(agent, entity);
         *stuck = if nearer < 0.25 * speed { *stuck + 1 } else { 0 };
         if *stuck >= GIVE_UP_AFTER { Progress::Done } else { Progress::Goes }
     }

@@ -20,7 +20,8 @@ impl World {
     /// What an agent is told before the episode. Only `grants` lets anything of the goal in.
     pub fn briefing(&self, me: AgentId, grants: Grants) -> Briefing {
         let scene = self.setup.task.info().scene;
-        let classes = |wanted: &dyn Fn(ClassId) -> bool| ClassId::all().filter(|c| wanted(*c)).collect();
+        let classes =
+            |wanted: &dyn Fn(ClassId) -> bool| ClassId::all().filter(|c| wanted(*c)).collect();
         let relation = |other: AgentId| match (me, other) {
             (_, AgentId::CHILD) => Relation::Child,
             (AgentId::CHILD, AgentId::PARTNER) => Relation::Guardian,
@@ -30,7 +31,9 @@ impl World {
         Briefing {
             me,
             capability: self.capability(me),
-            companions: others.map(|agent| Companion { agent, relation: relation(agent) }).collect(),
+            companions: others
+                .map(|agent| Companion { agent, relation: relation(agent) })
+                .collect(),
             seed: mix(self.setup.seed, me),
             horizon: self.setup.horizon,
             bounds: self.setup.bounds,
@@ -171,7 +174,12 @@ impl World {
         let spread = |p: Vec3, h: Option<Hand>| match h {
             Some(_) => p,
             // Two hands hold by the two sides.
-            None => p + rotate_yaw(Vec3::X * if hand == Hand::Left { -0.22 } else { 0.22 }, pose.yaw_rad),
+            None => {
+                p + rotate_yaw(
+                    Vec3::X * if hand == Hand::Left { -0.22 } else { 0.22 },
+                    pose.yaw_rad,
+                )
+            }
         };
         let t = step.progress();
         match step.phase {
@@ -209,7 +217,12 @@ impl World {
         let phase = person.phase().map(|s| s.phase);
         let busy = matches!(
             phase,
-            Some(Phase::Reach { .. } | Phase::Grasp { .. } | Phase::Release { .. } | Phase::ResetArms { .. })
+            Some(
+                Phase::Reach { .. }
+                    | Phase::Grasp { .. }
+                    | Phase::Release { .. }
+                    | Phase::ResetArms { .. }
+            )
         );
         let lowest = arms[0].hand_in_body.y.min(arms[1].hand_in_body.y);
         let highest = arms[0].hand_in_body.y.max(arms[1].hand_in_body.y);
@@ -235,7 +248,9 @@ impl World {
     fn is_led(&self, agent: AgentId) -> bool {
         self.state.joint.is_some_and(|j| {
             let leads = || self.person(j.leader).phase().map(|s| s.phase);
-            j.under_way && j.follower == agent && matches!(leads(), Some(Phase::Walk { .. } | Phase::Approach { .. }))
+            j.under_way
+                && j.follower == agent
+                && matches!(leads(), Some(Phase::Walk { .. } | Phase::Approach { .. }))
         })
     }
 

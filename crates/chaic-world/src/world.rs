@@ -88,7 +88,8 @@ impl World {
             .map(|(i, _)| i)
             .collect();
         let state = initial_state(&setup);
-        let mut world = World { setup, rules, surroundings, movable_blockers, state, events: Vec::new() };
+        let mut world =
+            World { setup, rules, surroundings, movable_blockers, state, events: Vec::new() };
         world.attach_vehicles();
         world.carry_along();
         Ok(world)
@@ -236,14 +237,20 @@ impl World {
 
     /// The cylinders of the people other than `agent` and `except`.
     pub(crate) fn others(&self, agent: AgentId, except: Option<AgentId>) -> Vec<Disc> {
-        self.setup
-            .agents()
-            .filter(|a| *a != agent && Some(*a) != except)
-            .map(|a| Disc {
-                center: chaic_protocol::geom::xz(self.person(a).pose.position),
-                radius_m: self.capability(a).radius_m,
-            })
-            .collect()
+        let others = self.setup.agents().filter(|a| *a != agent && Some(*a) != except);
+        others.map(|a| self.disc(a)).collect()
+    }
+
+    /// The cylinders of everybody.
+    pub(crate) fn discs(&self) -> Vec<Disc> {
+        self.setup.agents().map(|a| self.disc(a)).collect()
+    }
+
+    fn disc(&self, agent: AgentId) -> Disc {
+        Disc {
+            center: chaic_protocol::geom::xz(self.person(agent).pose.position),
+            radius_m: self.capability(agent).radius_m,
+        }
     }
 
     pub(crate) fn body(&self, agent: AgentId) -> Body {
@@ -277,6 +284,16 @@ impl World {
         horizontal_distance(p, self.nearest_point(p, entity))
     }
 
+    /// The same for a person with all that moves as one with it: of two who carry furniture, the
+    /// one who is nearer counts.
+    pub(crate) fn reach_distance(&self, agent: AgentId, entity: EntityId) -> f32 {
+        let own = self.distance_to(agent, entity);
+        match self.state.joint.filter(|j| j.leader == agent && j.under_way) {
+            Some(joint) => own.min(self.distance_to(joint.follower, entity)),
+            None => own,
+        }
+    }
+
     /// The point of a thing's outline that is nearest in plan to `p`, at `p`'s height.
     pub(crate) fn nearest_point(&self, p: Vec3, entity: EntityId) -> Vec3 {
         let (thing, state) = self.thing(entity);
@@ -308,7 +325,8 @@ impl World {
             }
             let at = self.person(agent).pose.position;
             let free = |e: &EntityId| {
-                self.thing(*e).0.class.info().role == Role::Vehicle && self.thing(*e).1.holder().is_none()
+                self.thing(*e).0.class.info().role == Role::Vehicle
+                    && self.thing(*e).1.holder().is_none()
             };
             let nearest = self.setup.entities().filter(free).min_by(|a, b| {
                 let d = |e: &EntityId| horizontal_distance(self.thing(*e).1.position, at);
@@ -333,8 +351,8 @@ fn initial_state(setup: &Setup) -> State {
         released_at: None,
     };
     let mut things: Vec<ThingState> = setup.things.iter().map(thing).collect();
-    for i in 0..things.len() {
-        things[i].place = Place::Resting { on: initial_support(setup, i) };
+    for (i, thing) in things.iter_mut().enumerate() {
+        thing.place = Place::Resting { on: initial_support(setup, i) };
     }
     let person = |p: &crate::setup::Person| PersonState {
         pose: p.pose,

@@ -71,8 +71,7 @@ fn delivery_needs_the_goal_and_ends_the_episode_when_complete() {
 
 #[test]
 fn impossible_actions_fail_with_a_reason() {
-    let things =
-        vec![thing("apple", at(0.0, 0.0, -0.5)), thing("orange", at(5.0, 0.0, 0.0))];
+    let things = vec![thing("apple", at(0.0, 0.0, -0.5)), thing("orange", at(5.0, 0.0, 0.0))];
     let people = vec![person(Persona::Adult, 0.0, 0.0), person(Persona::Helper, 1.2, 0.0)];
     let mut w = world(hall(things, people));
     for (action, reason) in [
@@ -150,8 +149,10 @@ fn beyond_a_limit_the_papers_chance_holds() {
     let rate = success_rate(high, pick(nth(1)));
     assert!((rate - 0.26).abs() < 0.066, "{rate}");
     let low = |seed| {
-        let mut setup =
-            hall(vec![thing("apple", at(0.0, 0.0, -0.6))], vec![person(Persona::Wheelchair, 0.0, 0.3)]);
+        let mut setup = hall(
+            vec![thing("apple", at(0.0, 0.0, -0.6))],
+            vec![person(Persona::Wheelchair, 0.0, 0.3)],
+        );
         setup.seed = seed;
         world(setup)
     };
@@ -159,8 +160,10 @@ fn beyond_a_limit_the_papers_chance_holds() {
     let rate = success_rate(low, pick(nth(0)));
     assert!((rate - 0.426).abs() < 0.075, "{rate}");
     let heavy = |seed| {
-        let mut setup =
-            hall(vec![thing("navy_chair", at(0.0, 0.0, -0.8))], vec![person(Persona::Frail, 0.0, 0.3)]);
+        let mut setup = hall(
+            vec![thing("navy_chair", at(0.0, 0.0, -0.8))],
+            vec![person(Persona::Frail, 0.0, 0.3)],
+        );
         setup.seed = seed;
         world(setup)
     };
@@ -197,15 +200,16 @@ fn a_failed_put_on_drops_the_thing_and_delivers_nothing() {
 #[test]
 fn vases_break_in_a_childs_hands_only() {
     let broken = |persona| {
-        (0..100).filter(|seed| {
-            let mut setup =
-                hall(vec![thing("vase", at(0.0, 0.0, -0.5))], vec![person(persona, 0.0, 0.0)]);
-            setup.seed = *seed;
-            let mut w = world(setup);
-            run(&mut w, A, pick(nth(0)));
-            w.state().things[1].place == Place::Broken
-        })
-        .count()
+        (0..100)
+            .filter(|seed| {
+                let mut setup =
+                    hall(vec![thing("vase", at(0.0, 0.0, -0.5))], vec![person(persona, 0.0, 0.0)]);
+                setup.seed = *seed;
+                let mut w = world(setup);
+                run(&mut w, A, pick(nth(0)));
+                w.state().things[1].place == Place::Broken
+            })
+            .count()
     };
     let by_child = broken(Persona::Child);
     assert!((12..39).contains(&by_child), "{by_child} of 100 at a chance of 0.25");
@@ -216,7 +220,7 @@ fn vases_break_in_a_childs_hands_only() {
 fn an_obstacle_in_a_doorway_stops_a_wheelchair_until_it_is_removed() {
     let setup = || {
         let mut setup = hall(
-            vec![thing("trashbin", at(0.34, 0.0, 0.0))],
+            vec![thing("trashbin", at(0.3, 0.0, 0.0))],
             vec![person(Persona::Wheelchair, -0.2, 1.5), person(Persona::Helper, 0.6, 1.2)],
         );
         setup.walls = vec![wall([-10.0, 0.0], [-0.6, 0.0]), wall([0.6, 0.0], [10.0, 0.0])];
@@ -229,7 +233,7 @@ fn an_obstacle_in_a_doorway_stops_a_wheelchair_until_it_is_removed() {
         w.state().people[agent.index()].pose.position.z < -0.5
     };
     let mut w = world(setup());
-    assert!(!cross(&mut w, A), "the gap of 0.7 m less the wheelchair's 0.7 m lets nobody through");
+    assert!(!cross(&mut w, A), "a gap of 0.66 m is too narrow for 0.7 m");
 
     let mut walker = setup();
     walker.people[0] = person(Persona::Adult, -0.2, 1.5);
@@ -239,7 +243,7 @@ fn an_obstacle_in_a_doorway_stops_a_wheelchair_until_it_is_removed() {
     let remove = Action::RemoveObstacle { obstacle: nth(0), hand: Hand::Right };
     let (outcome, frames) = run(&mut w, B, remove);
     assert_eq!(outcome, Outcome::Success);
-    assert!((130..=185).contains(&frames), "{frames} frames with the approach");
+    assert!((130..=157).contains(&frames), "{frames} frames with the approach");
     assert!(cross(&mut w, A), "the way is free");
 }
 
@@ -262,9 +266,8 @@ fn furniture_too_heavy_for_one_is_lifted_by_two() {
     assert_eq!(w.state().people[0].last.unwrap().1, Outcome::Success);
     assert!(w.state().people[1].activity.is_some(), "the helper goes along");
     assert!(happened(&mut w, |e| matches!(e.kind, EventKind::LiftedTogether { leader: A, .. })));
-    let apart = |w: &World| {
-        w.state().people[0].pose.position.distance(w.state().people[1].pose.position)
-    };
+    let apart =
+        |w: &World| w.state().people[0].pose.position.distance(w.state().people[1].pose.position);
     let before = apart(&w);
     for _ in 0..5 {
         assert_eq!(run(&mut w, A, Action::MoveForward).0, Outcome::Success);
@@ -272,4 +275,51 @@ fn furniture_too_heavy_for_one_is_lifted_by_two() {
     assert!((apart(&w) - before).abs() < 1e-3, "they stay together");
     let mut alone = world(setup(3));
     assert_eq!(run(&mut alone, A, pick(nth(0))).0, fails(FailureReason::BeyondLimits));
+}
+
+#[test]
+fn two_bring_furniture_to_the_truck() {
+    let mut setup = hall(
+        vec![thing("sofa", at(0.0, 0.0, 0.0)), thing("truck", at(0.0, 0.0, 7.0))],
+        vec![person(Persona::Frail, 1.5, -1.0), person(Persona::Helper, -1.5, 1.0)],
+    );
+    setup.goal_places = vec![nth(1)];
+    setup.task = chaic_protocol::TaskId::MovingHouse;
+    setup.goal.targets = vec![(chaic_protocol::ClassId::named("sofa"), 1)];
+    let mut w = world(setup);
+    w.submit(A, pick(nth(0))).unwrap();
+    w.submit(B, pick(nth(0))).unwrap();
+    w.advance();
+    assert_eq!(w.waiting(), vec![A], "the leader decides");
+    let (outcome, _) = run(&mut w, A, Action::PutOn { place: nth(1), hand: Hand::Right });
+    assert_eq!(outcome, Outcome::Success);
+    assert!(w.is_over(), "all that was wanted is on the truck");
+    assert_eq!(w.progress(), (900.0, 900.0), "moving house counts mass");
+    let bed = chaic_world::top_surfaces(w.setup().thing(nth(1)).unwrap())[0].center.y;
+    assert!((w.state().things[1].position.y - bed).abs() < 0.01, "it stands on the truck's bed");
+}
+
+#[test]
+fn a_rider_docks_fills_the_basket_and_empties_it_at_the_goal() {
+    let mut things =
+        vec![thing("bike", at(-0.45, 0.0, 0.0)), thing("fire_hydrant", at(0.0, 0.0, -3.0))];
+    things.extend((0..4).map(|i| thing("apple", at(0.3 * i as f32 - 0.4, 0.0, -0.6))));
+    let mut setup = hall(things, vec![person(Persona::Rider, 0.0, 0.0)]);
+    setup.goal_places = vec![nth(1)];
+    setup.goal.targets[0].1 = 3;
+    let mut w = world(setup);
+    assert_eq!(w.state().people[0].hands[0], Some(nth(0)), "the left hand holds the bicycle");
+    for i in 2..5 {
+        let (outcome, frames) = run(&mut w, A, pick(nth(i)));
+        assert_eq!(outcome, Outcome::Success);
+        assert!((100..=130).contains(&frames), "{frames} frames with docking");
+    }
+    assert_eq!(run(&mut w, A, pick(nth(5))).0, fails(FailureReason::Full));
+    let (outcome, frames) = run(&mut w, A, Action::PutOn { place: nth(1), hand: Hand::Left });
+    assert_eq!(outcome, Outcome::Success);
+    assert!((120..=220).contains(&frames), "{frames} frames for the way and three objects");
+    for _ in 0..60 {
+        w.tick();
+    }
+    assert_eq!(w.progress(), (3.0, 3.0));
 }

@@ -27,6 +27,12 @@ impl Grid {
         Grid { min: grown.min, nx: cells(size.x), nz: cells(size.y) }
     }
 
+    /// A lattice of so many cells from the origin on.
+    #[cfg(test)]
+    pub(crate) fn of_cells(nx: usize, nz: usize) -> Grid {
+        Grid { min: Vec2::ZERO, nx, nz }
+    }
+
     /// How many cells there are.
     pub fn n_cells(&self) -> usize {
         self.nx * self.nz

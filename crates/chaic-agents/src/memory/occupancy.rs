@@ -75,7 +75,25 @@ pub struct OccupancyMap {
 impl OccupancyMap {
     /// An unknown place.
     pub fn new(bounds: &Rect) -> OccupancyMap {
-        let grid = Grid::over(bounds);
+        OccupancyMap::on(Grid::over(bounds))
+    }
+
+    /// A drawn place.
+    #[cfg(test)]
+    pub(crate) fn of_spaces(grid: Grid, spaces: &[Space]) -> OccupancyMap {
+        let mut map = OccupancyMap::on(grid);
+        for (cell, space) in spaces.iter().enumerate() {
+            (map.sure[cell], map.seen[cell]) = match space {
+                Space::Free => (0, SEEN_FREE),
+                Space::Unknown => (0, 0),
+                Space::Occupied => (SURE_MOST, 0),
+                Space::Wall => (SURE_MOST, SEEN_HIGH),
+            };
+        }
+        map
+    }
+
+    fn on(grid: Grid) -> OccupancyMap {
         let n = grid.n_cells();
         let n_places = grid.nx().div_ceil(PLACE_CELLS) * grid.nz().div_ceil(PLACE_CELLS);
         OccupancyMap {
@@ -191,8 +209,6 @@ impl OccupancyMap {
                 } else {
                     continue;
                 };
-                // A surface belongs to the cell behind it: nudge the point away from the eye, so
-                // that a wall on a cell's border does not eat the free side.
                 let Some(cell) = self.grid.cell_at(xz(p)) else { continue };
                 if self.now[cell] == 0 {
                     self.touched.push(cell as u32);

@@ -106,9 +106,11 @@ impl Thing {
         !self.class.info().is_movable()
     }
 
-    fn see(&mut self, seen: &Detection, now: Frame) {
-        let moved =
-            horizontal_distance(seen.position_in_world, self.position_in_world) > MOVED_M
+    /// Takes in a sighting; whether that changes what is in the way.
+    fn see(&mut self, seen: &Detection, now: Frame) -> bool {
+        let n_points = self.footprint.len();
+        let moved = !self.is_present
+            || horizontal_distance(seen.position_in_world, self.position_in_world) > MOVED_M
                 || (seen.position_in_world.y - self.position_in_world.y).abs() > MOVED_M;
         if self.is_fixed() || (!moved && !self.class.info().is_carriable()) {
             self.merge_footprint(&seen.footprint);
@@ -122,16 +124,28 @@ impl Thing {
         self.last_seen = now;
         self.is_present = true;
         self.misses = 0;
+        !self.class.info().is_carriable() && (moved || self.footprint.len() != n_points)
     }
 
+    /// Both lists are in the order of x, then z, and stay so.
     fn merge_footprint(&mut self, points: &[Vec2]) {
-        for p in points {
-            let known = self.footprint.iter().any(|q| q.distance_squared(*p) < 1e-4);
-            if !known && self.footprint.len() < MAX_FOOTPRINT {
-                self.footprint.push(*p);
-            }
+        let key = |list: &[Vec2], i: usize| list.get(i).map(|p| (p.x, p.y));
+        let mut merged = Vec::with_capacity(self.footprint.len() + points.len());
+        let (mut i, mut j) = (0, 0);
+        while merged.len() < MAX_FOOTPRINT {
+            let (old, new) = (key(&self.footprint, i), key(points, j));
+            let Some(least) = old.into_iter().chain(new).min_by(|a, b| order(*a, *b)) else { break };
+            i += usize::from(old == Some(least));
+            j += usize::from(new == Some(least));
+            merged.push(Vec2::from(least));
         }
+        self.footprint = merged;
     }
+}
+
+/// By x, then by z.
+fn order(a: (f32, f32), b: (f32, f32)) -> std::cmp::Ordering {
+    a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
 }
 
 /// Every object seen so far.
@@ -139,6 +153,7 @@ impl Thing {
 pub struct SemanticMap {
     things: BTreeMap<EntityId, Thing>,
     news: u32,
+    layout: u32,
 }
 
 impl SemanticMap {
@@ -158,6 +173,11 @@ impl SemanticMap {
         self.news
     }
 
+    /// Grows when something large has come, gone, moved or grown.
+    pub fn layout(&self) -> u32 {
+        self.layout
+    }
+
     /// Things of one class that one may go for now.
     pub fn available(&self, class: ClassId, now: Frame) -> impl Iterator<Item = &Thing> {
         self.iter().filter(move |t| t.class == class && t.is_available(now))
@@ -171,10 +191,11 @@ impl SemanticMap {
             match self.things.get_mut(&seen.entity) {
                 Some(thing) => {
                     self.news += u32::from(!thing.is_present);
-                    thing.see(seen, now);
+                    self.layout += u32::from(thing.see(seen, now));
                 }
                 None => {
                     self.news += 1;
+                    self.layout += 1;
                     self.things.insert(seen.entity, Thing::new(seen, now));
                 }
             }
@@ -222,6 +243,7 @@ impl SemanticMap {
             if there > d + EMPTY_M {
                 thing.misses += 1;
                 thing.is_present = thing.misses < MISSES;
+                self.layout += 1;
             }
         }
     }
@@ -258,6 +280,7 @@ impl SemanticMap {
     /// It is no longer where it was seen (one has taken it oneself, say).
     pub fn mark_absent(&mut self, entity: EntityId) {
         if let Some(thing) = self.things.get_mut(&entity) {
+            self.layout += u32::from(thing.is_present);
             thing.is_present = false;
         }
     }

@@ -19,7 +19,9 @@ pub enum EpisodeError {
         limit: usize,
     },
     /// The bytes end in the middle.
-    #[error("{source_name}: ends too early, at line {line} column {column}; is the file truncated?")]
+    #[error(
+        "{source_name}: ends too early, at line {line} column {column}; is the file truncated?"
+    )]
     Truncated {
         /// What the caller called the bytes.
         source_name: String,
@@ -80,19 +82,16 @@ impl EpisodeError {
     pub(super) fn of_syntax(source_name: &str, error: &serde_json::Error) -> EpisodeError {
         let source_name = source_name.to_owned();
         match error.classify() {
-            serde_json::error::Category::Eof => EpisodeError::Truncated {
-                source_name,
-                line: error.line(),
-                column: error.column(),
-            },
+            serde_json::error::Category::Eof => {
+                EpisodeError::Truncated { source_name, line: error.line(), column: error.column() }
+            }
             _ => EpisodeError::NotJson { source_name, problem: error.to_string() },
         }
     }
 }
 
 fn listed(problems: &[Problem]) -> String {
-    let mut lines: Vec<String> =
-        problems.iter().take(MAX_LISTED).map(|p| p.to_string()).collect();
+    let mut lines: Vec<String> = problems.iter().take(MAX_LISTED).map(|p| p.to_string()).collect();
     if problems.len() > MAX_LISTED {
         lines.push(format!("and {} more", problems.len() - MAX_LISTED));
     }

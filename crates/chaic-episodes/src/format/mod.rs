@@ -112,7 +112,9 @@ impl Episode {
         setup: Setup,
     ) -> Episode {
         let (format, version) = (FORMAT.to_owned(), VERSION);
-        Episode { file: EpisodeFile { format, version, id, split, generator: Some(generator), setup } }
+        Episode {
+            file: EpisodeFile { format, version, id, split, generator: Some(generator), setup },
+        }
     }
 
     fn checked(file: EpisodeFile, source_name: &str) -> Result<Episode, EpisodeError> {
@@ -199,11 +201,13 @@ fn read(bytes: &[u8], source_name: &str) -> Result<EpisodeFile, EpisodeError> {
     let header: Header =
         serde_json::from_slice(bytes).map_err(|e| EpisodeError::of_syntax(source_name, &e))?;
     if header.format.as_ref().and_then(|f| f.as_str()) != Some(FORMAT) {
-        let found = header.format.map_or("nothing".to_owned(), |f| error::shortened(&f.to_string()));
+        let found =
+            header.format.map_or("nothing".to_owned(), |f| error::shortened(&f.to_string()));
         return Err(EpisodeError::WrongFormat { source_name: source(), found, expected: FORMAT });
     }
     if header.version.as_ref().and_then(|v| v.as_u64()) != Some(u64::from(VERSION)) {
-        let found = header.version.map_or("nothing".to_owned(), |v| error::shortened(&v.to_string()));
+        let found =
+            header.version.map_or("nothing".to_owned(), |v| error::shortened(&v.to_string()));
         return Err(EpisodeError::WrongVersion { source_name: source(), found, expected: VERSION });
     }
     let mut json = serde_json::Deserializer::from_slice(bytes);

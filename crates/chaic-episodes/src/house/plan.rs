@@ -118,7 +118,8 @@ fn divide(
         rects.push(rect);
         return (fits(size.x) && fits(size.y)).then_some(());
     }
-    let axis = if size.x > 1.15 * size.y || (size.x > 0.85 * size.y && rng.chance(0.5)) { 0 } else { 1 };
+    let axis =
+        if size.x > 1.15 * size.y || (size.x > 0.85 * size.y && rng.chance(0.5)) { 0 } else { 1 };
     let low_n = 1 + rng.below(n - 1);
     let share = (low_n as f32 / n as f32 + rng.range(-0.09, 0.09)).clamp(0.15, 0.85);
     let at = mm(rect.min[axis] + share * size[axis]);
@@ -152,7 +153,8 @@ fn with_corridor(
     let (near_row, others) = cut(rest, 1, near, cuts);
     let (corridor, far_row) = cut(others, 1, far, cuts);
     let in_rows = n - 3;
-    let in_near = if in_rows % 2 == 1 && rng.chance(0.5) { in_rows.div_ceil(2) } else { in_rows / 2 };
+    let in_near =
+        if in_rows % 2 == 1 && rng.chance(0.5) { in_rows.div_ceil(2) } else { in_rows / 2 };
     for (row, n) in [(near_row, in_near), (far_row, in_rows - in_near)] {
         let mut left = row;
         for k in 0..n - 1 {

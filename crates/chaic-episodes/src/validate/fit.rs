@@ -1,7 +1,7 @@
 //! Whether things and people have the room that they take up.
 
-use chaic_protocol::geom::xz;
 use chaic_protocol::Role;
+use chaic_protocol::geom::xz;
 use chaic_world::{Rules, Setup, top_surfaces};
 
 use super::{Problem, TOLERANCE_M, thing_field};
@@ -33,7 +33,8 @@ fn overlaps(setup: &Setup, solids: &[Vec<Solid>], walls: &[Solid], found: &mut V
             let problem = "is more than 40 m outside the bounds";
             found.push(Problem::new(thing_field(setup, i, "position"), problem));
         }
-        if let Some(w) = (0..walls.len()).find(|w| deepest(&solids[i], &walls[*w..=*w]) > TOLERANCE_M)
+        if let Some(w) =
+            (0..walls.len()).find(|w| deepest(&solids[i], &walls[*w..=*w]) > TOLERANCE_M)
         {
             let depth = deepest(&solids[i], &walls[w..=w]);
             let problem = format!("is {depth:.3} m inside walls[{w}]");
@@ -50,7 +51,8 @@ fn overlaps(setup: &Setup, solids: &[Vec<Solid>], walls: &[Solid], found: &mut V
                 found.push(Problem::new(thing_field(setup, i, "position"), problem));
             }
         }
-        let is_out = thing.class.info().is_carriable() && !setup.bounds.contains(xz(thing.position));
+        let is_out =
+            thing.class.info().is_carriable() && !setup.bounds.contains(xz(thing.position));
         if is_out && !thing.fixed {
             let problem = "is outside the bounds, where nobody gets";
             found.push(Problem::new(thing_field(setup, i, "position"), problem));
@@ -93,9 +95,8 @@ fn starts(setup: &Setup, solids: &[Vec<Solid>], walls: &[Solid], found: &mut Vec
         let walls = walls.iter().filter(|w| w.spans(stands));
         let wall_m = walls.map(|w| w.distance(p)).fold(f32::MAX, f32::min);
         if setup.ceiling_m.is_some() && wall_m < START_CLEARANCE_M - TOLERANCE_M {
-            let problem = format!(
-                "is {wall_m:.2} m from a wall, expected at least {START_CLEARANCE_M} m"
-            );
+            let problem =
+                format!("is {wall_m:.2} m from a wall, expected at least {START_CLEARANCE_M} m");
             found.push(Problem::new(&field, problem));
         }
         for (k, thing) in setup.things.iter().enumerate() {

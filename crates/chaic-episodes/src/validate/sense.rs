@@ -82,11 +82,8 @@ fn goal(setup: &Setup, found: &mut Vec<Problem>) {
     let places = setup.goal_places.iter().filter_map(|e| setup.thing_index(*e));
     for (i, k) in places.enumerate() {
         let thing = &setup.things[k];
-        let needed_m = if setup.task == TaskId::HighGoal {
-            Rules::paper().high_goal_min_top_m
-        } else {
-            0.0
-        };
+        let needed_m =
+            if setup.task == TaskId::HighGoal { Rules::paper().high_goal_min_top_m } else { 0.0 };
         let top_m = thing.position.y + thing.size_m().y;
         if top_m < needed_m {
             let (class, field) = (thing.class, format!("goal_places[{i}]"));
@@ -123,8 +120,7 @@ fn task_needs(setup: &Setup, found: &mut Vec<Problem>) {
         _ => {}
     }
     let riders = setup.people.iter().filter(|p| p.capability().gait == Gait::WalkBike).count();
-    let vehicles =
-        setup.things.iter().filter(|t| t.class.info().role == Role::Vehicle).count();
+    let vehicles = setup.things.iter().filter(|t| t.class.info().role == Role::Vehicle).count();
     if riders > vehicles {
         let problem = format!("hold {vehicles} bicycles for {riders} who walk one");
         found.push(Problem::new("things", problem));

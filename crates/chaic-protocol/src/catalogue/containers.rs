@@ -10,6 +10,9 @@ pub(super) const CLASSES: &[ClassInfo] =
 
 const CONTAINER: ClassInfo = ClassInfo { role: Role::Container, ..TARGET };
 
+const CLAY: Paint = Paint([208, 170, 122], Finish::Glossy);
+const GLAZED_RIM: Paint = Paint([150, 104, 66], Finish::Glossy);
+
 const BOWL_M: [f32; 3] = [0.42, 0.14, 0.42];
 const BOWL: ClassInfo = ClassInfo {
     name: "bowl",
@@ -23,14 +26,13 @@ const BOWL: ClassInfo = ClassInfo {
         [
             round_tub([0.0, 0.01, 0.0], [0.41, 0.13, 0.41], 0.014, 0.52, CLAY),
             cylinder([0.0, 0.0, 0.0], [0.19, 0.014, 0.19], CLAY).ghost(),
-            ring([0.0, 0.131, 0.0], 0.42, 0.018, Paint([150, 104, 66], Finish::Glossy)).ghost(),
+            ring([0.0, 0.131, 0.0], 0.42, 0.018, GLAZED_RIM).ghost(),
         ],
     ),
     palette: &[[208, 170, 122], [196, 202, 206], [96, 136, 150]],
     ..CONTAINER
 };
 
-const CLAY: Paint = Paint([208, 170, 122], Finish::Glossy);
 const CHINA: Paint = Paint([238, 238, 232], Finish::Glossy);
 const CHINA_BLUE: Paint = Paint([76, 112, 168], Finish::Glossy);
 
@@ -47,8 +49,8 @@ const PLATE: ClassInfo = ClassInfo {
         [
             cylinder([0.0, 0.0, 0.0], [0.34, 0.016, 0.34], CHINA),
             round_tub([0.0, 0.006, 0.0], [0.43, 0.034, 0.43], 0.012, 0.74, CHINA).ghost(),
-            cylinder([0.0, 0.0, 0.0], [0.29, 0.017, 0.29], CHINA_BLUE).ghost(),
-            cylinder([0.0, 0.0, 0.0], [0.275, 0.018, 0.275], CHINA).ghost(),
+            cylinder([0.0, 0.0, 0.0], [0.3, 0.0195, 0.3], CHINA_BLUE).ghost(),
+            cylinder([0.0, 0.0, 0.0], [0.28, 0.02, 0.28], CHINA).ghost(),
         ],
     ),
     ..CONTAINER
@@ -80,6 +82,17 @@ const TEA_TRAY: ClassInfo = ClassInfo {
     ..CONTAINER
 };
 
+/// Four bars around a square basket `width_m` wide, from `y` up.
+const fn hoop(y: f32, width_m: f32, height_m: f32, bar_m: f32, paint: Paint) -> [Part; 4] {
+    let middle = 0.5 * (width_m - bar_m);
+    [
+        cuboid([0.0, y, -middle], [width_m, height_m, bar_m], paint).ghost(),
+        cuboid([0.0, y, middle], [width_m, height_m, bar_m], paint).ghost(),
+        cuboid([-middle, y, 0.0], [bar_m, height_m, width_m], paint).ghost(),
+        cuboid([middle, y, 0.0], [bar_m, height_m, width_m], paint).ghost(),
+    ]
+}
+
 const HOLE: Paint = Paint([120, 126, 130], Finish::Matte);
 
 /// A hole in the front or back of the plastic lattice.
@@ -91,6 +104,8 @@ const fn hole_across(x: f32, z: f32) -> Part {
 const fn hole_along(x: f32, z: f32) -> Part {
     cuboid([x, 0.05, z], [0.02, 0.13, 0.074], HOLE).ghost()
 }
+
+const PLASTIC_RIM: [Part; 4] = hoop(0.21, 0.37, 0.03, 0.016, WHITE);
 
 const PLASTIC_BASKET_M: [f32; 3] = [0.37, 0.24, 0.37];
 const PLASTIC_BASKET: ClassInfo = ClassInfo {
@@ -104,7 +119,10 @@ const PLASTIC_BASKET: ClassInfo = ClassInfo {
         PLASTIC_BASKET_M,
         [
             tub([0.0, 0.0, 0.0], [0.366, 0.24, 0.366], 0.008, 0.94, WHITE),
-            tub([0.0, 0.21, 0.0], [0.37, 0.03, 0.37], 0.014, 1.0, WHITE).ghost(),
+            PLASTIC_RIM[0],
+            PLASTIC_RIM[1],
+            PLASTIC_RIM[2],
+            PLASTIC_RIM[3],
             hole_across(-0.1, -0.174),
             hole_across(0.0, -0.174),
             hole_across(0.1, -0.174),
@@ -125,6 +143,9 @@ const PLASTIC_BASKET: ClassInfo = ClassInfo {
 const WILLOW: Paint = Paint([166, 118, 70], Finish::Wicker);
 const DARK_WILLOW: Paint = Paint([124, 82, 46], Finish::Wicker);
 
+const WICKER_RIM: [Part; 4] = hoop(0.2, 0.37, 0.025, 0.02, DARK_WILLOW);
+const WICKER_FOOT: [Part; 4] = hoop(0.0, 0.316, 0.022, 0.02, DARK_WILLOW);
+
 const WICKER_BASKET_M: [f32; 3] = [0.37, 0.24, 0.37];
 const WICKER_BASKET: ClassInfo = ClassInfo {
     name: "wicker_basket",
@@ -137,10 +158,16 @@ const WICKER_BASKET: ClassInfo = ClassInfo {
         WICKER_BASKET_M,
         [
             tub([0.0, 0.0, 0.0], [0.36, 0.225, 0.36], 0.012, 0.84, WILLOW),
-            tub([0.0, 0.19, 0.0], [0.37, 0.03, 0.37], 0.018, 1.0, DARK_WILLOW).ghost(),
-            tub([0.0, 0.0, 0.0], [0.318, 0.022, 0.318], 0.014, 1.0, DARK_WILLOW).ghost(),
-            arc([0.0, 0.188, -0.176], 0.104, 0.016, 180.0, DARK_WILLOW).turned(ARCH),
-            arc([0.0, 0.188, 0.176], 0.104, 0.016, 180.0, DARK_WILLOW).turned(ARCH),
+            WICKER_RIM[0],
+            WICKER_RIM[1],
+            WICKER_RIM[2],
+            WICKER_RIM[3],
+            WICKER_FOOT[0],
+            WICKER_FOOT[1],
+            WICKER_FOOT[2],
+            WICKER_FOOT[3],
+            arc([0.0, 0.178, -0.174], 0.124, 0.02, 170.0, DARK_WILLOW).turned(ARCH),
+            arc([0.0, 0.178, 0.174], 0.124, 0.02, 170.0, DARK_WILLOW).turned(ARCH),
         ],
     ),
     ..CONTAINER
@@ -148,6 +175,9 @@ const WICKER_BASKET: ClassInfo = ClassInfo {
 
 const SLAT: Paint = Paint([204, 160, 104], Finish::Wood);
 const SLAT_FRAME: Paint = Paint([140, 94, 54], Finish::Wood);
+
+const LOW_SLATS: [Part; 4] = hoop(0.05, 0.362, 0.05, 0.012, SLAT_FRAME);
+const HIGH_SLATS: [Part; 4] = hoop(0.15, 0.362, 0.05, 0.012, SLAT_FRAME);
 
 const WOOD_BASKET_M: [f32; 3] = [0.37, 0.24, 0.37];
 const WOOD_BASKET: ClassInfo = ClassInfo {
@@ -161,9 +191,14 @@ const WOOD_BASKET: ClassInfo = ClassInfo {
         WOOD_BASKET_M,
         [
             tub([0.0, 0.0, 0.0], [0.35, 0.23, 0.35], 0.01, 1.0, SLAT),
-            tub([0.0, 0.035, 0.0], [0.358, 0.04, 0.358], 0.018, 1.0, SLAT_FRAME).ghost(),
-            tub([0.0, 0.105, 0.0], [0.358, 0.04, 0.358], 0.018, 1.0, SLAT_FRAME).ghost(),
-            tub([0.0, 0.175, 0.0], [0.358, 0.04, 0.358], 0.018, 1.0, SLAT_FRAME).ghost(),
+            LOW_SLATS[0],
+            LOW_SLATS[1],
+            LOW_SLATS[2],
+            LOW_SLATS[3],
+            HIGH_SLATS[0],
+            HIGH_SLATS[1],
+            HIGH_SLATS[2],
+            HIGH_SLATS[3],
             cuboid([-0.172, 0.0, -0.172], [0.026, 0.24, 0.026], SLAT).ghost(),
             cuboid([0.172, 0.0, -0.172], [0.026, 0.24, 0.026], SLAT).ghost(),
             cuboid([-0.172, 0.0, 0.172], [0.026, 0.24, 0.026], SLAT).ghost(),
@@ -191,8 +226,8 @@ const BAMBOO_BASKET: ClassInfo = ClassInfo {
             ring([0.0, 0.283, 0.0], 0.46, 0.026, BAMBOO_RIM).ghost(),
             ring([0.0, 0.15, 0.0], 0.402, 0.02, BAMBOO_RIM).ghost(),
             ring([0.0, 0.013, 0.0], 0.354, 0.024, BAMBOO_RIM).ghost(),
-            arc([0.0, 0.26, -0.215], 0.1, 0.014, 180.0, BAMBOO_RIM).turned(ARCH),
-            arc([0.0, 0.26, 0.215], 0.1, 0.014, 180.0, BAMBOO_RIM).turned(ARCH),
+            arc([0.0, 0.25, -0.215], 0.12, 0.02, 180.0, BAMBOO_RIM).turned(ARCH),
+            arc([0.0, 0.25, 0.215], 0.12, 0.02, 180.0, BAMBOO_RIM).turned(ARCH),
         ],
     ),
     ..CONTAINER

@@ -9,11 +9,11 @@ pub(super) const CLASSES: &[ClassInfo] = &[
     APPLE,
     BANANA,
     ORANGE,
+    SHOP_BANANA,
+    GRAPE,
     BREAD,
     BURGER,
     LOAF_BREAD,
-    SHOP_BANANA,
-    GRAPE,
     CROISSANT,
     PINK_DONUT,
     PEPSI_CAN,
@@ -61,10 +61,16 @@ const BANANA: ClassInfo = ClassInfo {
     parts: &in_metres(
         BANANA_M,
         [
-            ball([-0.034, 0.0, -0.034], [0.12, 0.035, 0.037], PEEL).turned([0.0, 45.0, 0.0]),
-            arc([0.0345, 0.0175, 0.0345], 0.234, 0.033, 130.0, PEEL).turned([0.0, 45.0, 0.0]),
-            ball([0.0692, 0.009, -0.0592], [0.026, 0.017, 0.017], STALK).ghost(),
-            ball([-0.0592, 0.009, 0.0692], [0.017, 0.017, 0.026], STALK).ghost(),
+            ball([-0.034, 0.0, -0.034], [0.12, 0.035, 0.036], PEEL).turned([0.0, 45.0, 0.0]),
+            arc([0.0345, 0.0175, 0.0345], 0.234, 0.033, 120.0, PEEL).turned([0.0, 45.0, 0.0]),
+            ball([0.0604, 0.002, -0.0621], [0.044, 0.031, 0.031], PEEL)
+                .turned([0.0, -15.0, 0.0])
+                .ghost(),
+            ball([-0.0621, 0.002, 0.0602], [0.043, 0.031, 0.031], PEEL)
+                .turned([0.0, -75.0, 0.0])
+                .ghost(),
+            ball([0.0735, 0.01, -0.059], [0.018, 0.015, 0.015], STALK).ghost(),
+            ball([-0.059, 0.01, 0.072], [0.015, 0.015, 0.018], STALK).ghost(),
         ],
     ),
     ..TARGET
@@ -90,6 +96,21 @@ const ORANGE: ClassInfo = ClassInfo {
     ..TARGET
 };
 
+const CROWN: Paint = Paint([138, 124, 52], Finish::Skin);
+
+/// One banana of a bunch, lying along x but for a small turn away from its neighbors.
+const fn finger(y: f32, z: f32, turn_deg: f32) -> Part {
+    // The ring's middle is 0.12 m behind the banana, so that turning it shifts the banana aside.
+    let x = 0.12 * turn_deg.to_radians() - 0.006;
+    arc([x, y, z + 0.106], 0.276, 0.036, 82.0, PEEL).turned([0.0, turn_deg, 0.0])
+}
+
+/// Its dark end.
+const fn fingertip(y: f32, z: f32, turn_deg: f32) -> Part {
+    let z = z + 0.017 + 0.08 * turn_deg.to_radians();
+    ball([-0.085, y - 0.01, z], [0.022, 0.02, 0.02], STALK).ghost()
+}
+
 const SHOP_BANANA_M: [f32; 3] = [0.195, 0.119, 0.155];
 const SHOP_BANANA: ClassInfo = ClassInfo {
     name: "shop_banana",
@@ -102,15 +123,20 @@ const SHOP_BANANA: ClassInfo = ClassInfo {
     parts: &in_metres(
         SHOP_BANANA_M,
         [
-            // Three on top of each other, fanned out from the crown that joins them.
-            ball([0.0, 0.034, -0.028], [0.13, 0.048, 0.044], PEEL),
-            arc([-0.005, 0.02, 0.016], 0.2, 0.04, 130.0, PEEL).turned([0.0, -20.0, 0.0]),
-            arc([0.0, 0.058, 0.043], 0.2, 0.04, 130.0, PEEL),
-            arc([0.016, 0.098, 0.066], 0.2, 0.04, 130.0, PEEL).turned([0.0, 20.0, 0.0]),
-            taper(0.7, [0.078, 0.0, 0.009], [0.036, 0.117, 0.036], STALK),
-            ball([-0.062, 0.01, -0.043], [0.02, 0.02, 0.02], STALK).ghost(),
-            ball([-0.075, 0.048, 0.01], [0.02, 0.02, 0.02], STALK).ghost(),
-            ball([-0.066, 0.088, 0.058], [0.02, 0.02, 0.02], STALK).ghost(),
+            ball([0.0, 0.0, -0.006], [0.14, 0.06, 0.06], PEEL),
+            taper(0.4, [0.08, 0.0, 0.012], [0.034, 0.119, 0.1], CROWN),
+            finger(0.02, -0.036, -5.0),
+            finger(0.018, 0.0, 1.5),
+            finger(0.02, 0.036, 5.0),
+            finger(0.051, -0.02, -3.0),
+            finger(0.051, 0.02, 3.0),
+            finger(0.083, 0.0, -1.5),
+            fingertip(0.02, -0.036, -5.0),
+            fingertip(0.018, 0.0, 1.5),
+            fingertip(0.02, 0.036, 5.0),
+            fingertip(0.051, -0.02, -3.0),
+            fingertip(0.051, 0.02, 3.0),
+            fingertip(0.083, 0.0, -1.5),
         ],
     ),
     ..TARGET
@@ -202,7 +228,7 @@ const BURGER: ClassInfo = ClassInfo {
             ball([0.0, 0.022, 0.0], [0.1, 0.055, 0.104], Paint([202, 128, 56], Finish::Crust)),
             cylinder([0.0, 0.0, 0.0], [0.098, 0.02, 0.102], CRUST),
             cylinder([0.0, 0.018, 0.0], [0.103, 0.018, 0.107], Paint([84, 48, 30], Finish::Crust)),
-            cuboid([0.0, 0.035, 0.0], [0.084, 0.004, 0.084], PEEL).turned([0.0, 40.0, 0.0]).ghost(),
+            cuboid([0.0, 0.035, 0.0], [0.075, 0.004, 0.075], PEEL).turned([0.0, 40.0, 0.0]).ghost(),
             cylinder(
                 [0.0, 0.039, 0.0],
                 [0.104, 0.005, 0.108],
@@ -211,7 +237,7 @@ const BURGER: ClassInfo = ClassInfo {
             .ghost(),
             ball([0.0, 0.041, 0.0], [0.107, 0.012, 0.111], Paint([112, 172, 60], Finish::Matte))
                 .ghost(),
-            sesame(0.0, 0.0745, -0.004),
+            sesame(0.0, 0.074, -0.004),
             sesame(0.022, 0.071, 0.014),
             sesame(-0.024, 0.071, 0.01),
             sesame(-0.013, 0.0705, -0.026),
@@ -234,14 +260,14 @@ const LOAF_BREAD: ClassInfo = ClassInfo {
         LOAF_BREAD_M,
         [
             ball([0.0, 0.0, 0.0], [0.085, 0.051, 0.194], CRUST),
-            cuboid([0.0, 0.0, 0.0], [0.05, 0.02, 0.13], DARK_CRUST).ghost(),
+            cylinder([0.0, 0.0, 0.0], [0.064, 0.018, 0.15], CRUST).ghost(),
             ball([0.0, 0.042, -0.056], [0.046, 0.009, 0.012], CRUMB)
                 .turned([0.0, 30.0, 0.0])
                 .ghost(),
-            ball([0.0, 0.0445, -0.019], [0.052, 0.009, 0.012], CRUMB)
+            ball([0.0, 0.044, -0.019], [0.052, 0.009, 0.012], CRUMB)
                 .turned([0.0, 30.0, 0.0])
                 .ghost(),
-            ball([0.0, 0.0445, 0.019], [0.052, 0.009, 0.012], CRUMB)
+            ball([0.0, 0.044, 0.019], [0.052, 0.009, 0.012], CRUMB)
                 .turned([0.0, 30.0, 0.0])
                 .ghost(),
             ball([0.0, 0.042, 0.056], [0.046, 0.009, 0.012], CRUMB)
@@ -312,19 +338,26 @@ const PINK_DONUT: ClassInfo = ClassInfo {
 
 // Cans.
 
+const CAN_BLUE: Paint = Paint([26, 66, 166], Finish::Glossy);
+const CAN_RED: Paint = Paint([204, 26, 34], Finish::Glossy);
+const CAN_WHITE: Paint = Paint([240, 240, 240], Finish::Glossy);
+const CAN_GREEN: Paint = Paint([28, 142, 66], Finish::Glossy);
+const CAN_YELLOW: Paint = Paint([244, 222, 60], Finish::Glossy);
+const CAN_ORANGE: Paint = Paint([240, 124, 22], Finish::Glossy);
+
 /// A can painted `main`, with a band around it and a round mark on its front.
 const fn can(size_m: [f32; 3], main: Paint, band: Paint, mark: Paint) -> [Part; 7] {
     let [w, h, _] = size_m;
     in_metres(
         size_m,
         [
-            cylinder([0.0, 0.06 * h, 0.0], [0.98 * w, 0.86 * h, 0.98 * w], main),
+            cylinder([0.0, 0.06 * h, 0.0], [0.95 * w, 0.86 * h, 0.95 * w], main),
             cylinder([0.0, 0.0, 0.0], [0.86 * w, 0.06 * h, 0.86 * w], STEEL).ghost(),
-            taper(0.84, [0.0, 0.92 * h, 0.0], [0.96 * w, 0.06 * h, 0.96 * w], STEEL).ghost(),
+            taper(0.84, [0.0, 0.92 * h, 0.0], [0.94 * w, 0.06 * h, 0.94 * w], STEEL).ghost(),
             ring([0.0, 0.975 * h, 0.0], 0.82 * w, 0.045 * w, STEEL).ghost(),
             cuboid([0.0, 0.98 * h, -0.12 * w], [0.18 * w, 0.015 * h, 0.34 * w], DARK_STEEL).ghost(),
-            cylinder([0.0, 0.22 * h, 0.0], [0.99 * w, 0.14 * h, 0.99 * w], band).ghost(),
-            ball([0.0, 0.43 * h, -0.44 * w], [0.66 * w, 0.36 * h, 0.12 * w], mark).ghost(),
+            cylinder([0.0, 0.22 * h, 0.0], [0.965 * w, 0.14 * h, 0.965 * w], band).ghost(),
+            ball([0.0, 0.4 * h, -0.34 * w], [0.56 * w, 0.44 * h, 0.32 * w], mark).ghost(),
         ],
     )
 }
@@ -380,10 +413,3 @@ const FANTA_CAN: ClassInfo = ClassInfo {
     parts: &can(FANTA_CAN_M, CAN_ORANGE, CAN_GREEN, CAN_BLUE),
     ..TARGET
 };
-
-const CAN_BLUE: Paint = Paint([26, 66, 166], Finish::Glossy);
-const CAN_RED: Paint = Paint([204, 26, 34], Finish::Glossy);
-const CAN_WHITE: Paint = Paint([240, 240, 240], Finish::Glossy);
-const CAN_GREEN: Paint = Paint([28, 142, 66], Finish::Glossy);
-const CAN_YELLOW: Paint = Paint([244, 222, 60], Finish::Glossy);
-const CAN_ORANGE: Paint = Paint([240, 124, 22], Finish::Glossy);

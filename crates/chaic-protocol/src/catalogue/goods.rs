@@ -2,8 +2,8 @@
 //! which a child may break, is one of them.
 
 use super::shape::{
-    ARCH, BLACK, BRASS, DARK_STEEL, GLASS, GLOSSY_BLACK, Paint, STEEL, TARGET, WHITE, arc, ball,
-    cuboid, cylinder, in_metres, ring, rod_x, rod_z, round_tub, taper,
+    ARCH, BLACK, BRASS, DARK_STEEL, GLOSSY_BLACK, Paint, STEEL, TARGET, WHITE, arc, ball, cuboid,
+    cylinder, in_metres, ring, rod_x, rod_z, round_tub, taper,
 };
 use super::{ClassInfo, Finish, Part, Role, Solid, TargetSet};
 
@@ -68,17 +68,16 @@ const IPOD: ClassInfo = ClassInfo {
             ),
             cuboid([0.0, 0.108, -0.0035], [0.078, 0.078, 0.002], GLOSSY_BLACK).ghost(),
             cuboid([0.0, 0.112, -0.004], [0.07, 0.07, 0.002], SCREEN).ghost(),
-            rod_z([0.0, 0.054, -0.004], 0.002, 0.07, WHITE).ghost(),
+            rod_z([0.0, 0.054, -0.0036], 0.002, 0.07, WHITE).ghost(),
             rod_z([0.0, 0.054, -0.00425], 0.0015, 0.026, Paint([238, 204, 44], Finish::Glossy))
                 .ghost(),
         ],
     ),
-    palette: &[[238, 204, 44]],
     ..TARGET
 };
 
-const LEATHER: Paint = Paint([142, 62, 48], Finish::Fabric);
-const DARK_LEATHER: Paint = Paint([104, 42, 34], Finish::Fabric);
+const LEATHER: Paint = Paint([176, 54, 84], Finish::Fabric);
+const DARK_LEATHER: Paint = Paint([112, 34, 58], Finish::Fabric);
 
 const PURSE_M: [f32; 3] = [0.254, 0.108, 0.041];
 const PURSE: ClassInfo = ClassInfo {
@@ -92,15 +91,13 @@ const PURSE: ClassInfo = ClassInfo {
     parts: &in_metres(
         PURSE_M,
         [
-            cuboid([0.0, 0.0, 0.002], [0.236, 0.074, 0.032], LEATHER),
-            rod_x([0.0, 0.072, 0.002], 0.236, 0.026, DARK_LEATHER).ghost(),
-            cuboid([0.0, 0.034, -0.0155], [0.24, 0.046, 0.004], DARK_LEATHER).ghost(),
-            ball([0.0, 0.026, -0.0175], [0.022, 0.018, 0.006], BRASS).ghost(),
-            cuboid([0.122, 0.0, 0.002], [0.01, 0.076, 0.03], DARK_LEATHER).ghost(),
-            cuboid([-0.122, 0.0, 0.002], [0.01, 0.076, 0.03], DARK_LEATHER).ghost(),
-            arc([0.0, 0.044, 0.002], 0.128, 0.009, 150.0, DARK_LEATHER).turned(ARCH),
-            ball([0.05, 0.072, 0.002], [0.014, 0.014, 0.03], BRASS).ghost(),
-            ball([-0.05, 0.072, 0.002], [0.014, 0.014, 0.03], BRASS).ghost(),
+            taper(0.76, [0.0, 0.0, 0.0], [0.254, 0.078, 0.041], LEATHER),
+            rod_x([0.0, 0.079, 0.0], 0.196, 0.013, BRASS).ghost(),
+            ball([-0.007, 0.083, -0.004], [0.014, 0.014, 0.014], BRASS).ghost(),
+            ball([0.007, 0.083, 0.004], [0.014, 0.014, 0.014], BRASS).ghost(),
+            cylinder([0.0, 0.0, 0.0], [0.254, 0.008, 0.041], DARK_LEATHER).ghost(),
+            arc([0.0, 0.043, 0.0], 0.13, 0.008, 130.0, DARK_LEATHER).turned(ARCH),
+            ball([0.0, 0.028, -0.0185], [0.06, 0.022, 0.004], DARK_LEATHER).ghost(),
         ],
     ),
     ..TARGET
@@ -152,9 +149,9 @@ const MOUSE: ClassInfo = ClassInfo {
         [
             ball([0.0, 0.0, 0.0], [0.075, 0.04, 0.132], Paint([52, 54, 60], Finish::Glossy)),
             cylinder([0.0, 0.0, 0.0], [0.064, 0.016, 0.116], BLACK).ghost(),
-            cuboid([0.0, 0.0, -0.034], [0.0025, 0.0385, 0.05], STEEL).ghost(),
-            rod_x([0.0, 0.031, -0.032], 0.009, 0.021, STEEL).ghost(),
-            ball([0.0, 0.037, 0.026], [0.014, 0.004, 0.018], STEEL).ghost(),
+            ball([0.0, 0.0005, -0.03], [0.004, 0.041, 0.07], STEEL).ghost(),
+            rod_x([0.0, 0.032, -0.032], 0.01, 0.02, STEEL).ghost(),
+            ball([0.0, 0.0365, 0.026], [0.014, 0.004, 0.018], STEEL).ghost(),
         ],
     ),
     palette: &[[52, 54, 60], [214, 214, 210], [150, 34, 40]],
@@ -174,8 +171,8 @@ const PEN: ClassInfo = ClassInfo {
         PEN_M,
         [
             rod_x([-0.02, 0.014, 0.0], 0.1, 0.024, Paint([28, 40, 104], Finish::Glossy)),
-            rod_x([0.067, 0.014, 0.0], 0.074, 0.028, Paint([22, 24, 34], Finish::Glossy)),
-            rod_x([0.031, 0.014, 0.0], 0.006, 0.0285, BRASS).ghost(),
+            rod_x([0.067, 0.014, 0.0], 0.074, 0.027, Paint([22, 24, 34], Finish::Glossy)),
+            rod_x([0.031, 0.014, 0.0], 0.006, 0.028, BRASS).ghost(),
             rod_x([0.104, 0.014, 0.0], 0.005, 0.02, BRASS).ghost(),
             taper(0.1, [-0.0875, -0.004, 0.0], [0.022, 0.036, 0.022], BRASS)
                 .turned([0.0, 0.0, 90.0])
@@ -221,7 +218,7 @@ const PENCIL_BUCKET: ClassInfo = ClassInfo {
                 0.92,
                 Paint([70, 84, 98], Finish::Metal),
             ),
-            round_tub([0.0, 0.092, 0.0], [0.1, 0.008, 0.086], 0.007, 1.0, STEEL).ghost(),
+            ring([0.0, 0.1, 0.0], 0.086, 0.006, STEEL).ghost(),
             YELLOW_PENCIL[0],
             YELLOW_PENCIL[1],
             RED_PENCIL[0],

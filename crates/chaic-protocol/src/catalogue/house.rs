@@ -1,33 +1,31 @@
-//! What furnishes a house, and the obstacles that stand in its doorways.
+//! What furnishes a house.
 
 use super::shape::{
-    BLACK, BRASS, DARK_STEEL, FURNISHING, GLASS, GLOSSY_BLACK, Paint, STEEL, WHITE, arc, ball,
-    cuboid, cylinder, in_metres, ring, rod, rod_x, rod_z, round_tub, taper,
+    BLACK, BRASS, DARK_STEEL, FURNISHING, GLASS, GLOSSY_BLACK, Paint, STEEL, ball, cuboid,
+    cylinder, in_metres, rod_x, rod_z, round_tub, taper,
 };
-use super::{ClassInfo, Finish, Part, Role};
+use super::{ClassInfo, Finish, Part};
 
 pub(super) const CLASSES: &[ClassInfo] = &[
     BED,
+    NIGHTSTAND,
+    WARDROBE,
     CABINET,
     REFRIGERATOR,
+    KITCHEN_COUNTER,
+    STOVE,
     SIDE_CHAIR,
     DINING_TABLE,
     COFFEE_TABLE,
     DESK,
-    BOOKSHELF,
-    KITCHEN_COUNTER,
-    STOVE,
-    TV_STAND,
-    NIGHTSTAND,
+    STOOL,
     ARMCHAIR,
     LONG_SOFA,
+    TV_STAND,
+    BOOKSHELF,
     POTTED_PLANT,
     FLOOR_LAMP,
     RUG,
-    WARDROBE,
-    STOOL,
-    TRASHBIN,
-    BRIGHT_FIRE_EXTINGUISHER,
 ];
 
 const OAK: Paint = Paint([192, 150, 98], Finish::Wood);
@@ -79,6 +77,8 @@ const BED: ClassInfo = ClassInfo {
     ..FURNISHING
 };
 
+const LEGS_NIGHTSTAND: [Part; 4] = legs(0.18, 0.16, 0.12, 0.035, WALNUT);
+
 const NIGHTSTAND_M: [f32; 3] = [0.45, 0.5, 0.4];
 const NIGHTSTAND: ClassInfo = ClassInfo {
     name: "nightstand",
@@ -102,7 +102,8 @@ const NIGHTSTAND: ClassInfo = ClassInfo {
     ),
     ..FURNISHING
 };
-const LEGS_NIGHTSTAND: [Part; 4] = legs(0.18, 0.16, 0.12, 0.035, WALNUT);
+
+const PANEL: Paint = Paint([138, 94, 64], Finish::Wood);
 
 const WARDROBE_M: [f32; 3] = [1.2, 1.95, 0.6];
 const WARDROBE: ClassInfo = ClassInfo {
@@ -120,16 +121,14 @@ const WARDROBE: ClassInfo = ClassInfo {
             cuboid([0.285, 0.32, -0.275], [0.54, 1.54, 0.02], PANEL).ghost(),
             cuboid([-0.285, 0.09, -0.275], [0.54, 0.2, 0.02], PANEL).ghost(),
             cuboid([0.285, 0.09, -0.275], [0.54, 0.2, 0.02], PANEL).ghost(),
-            rod([-0.05, 1.05, -0.287], 0.26, 0.022, [0.0, 0.0, 0.0], BRASS).ghost(),
-            rod([0.05, 1.05, -0.287], 0.26, 0.022, [0.0, 0.0, 0.0], BRASS).ghost(),
+            cylinder([-0.05, 0.92, -0.287], [0.022, 0.26, 0.022], BRASS).ghost(),
+            cylinder([0.05, 0.92, -0.287], [0.022, 0.26, 0.022], BRASS).ghost(),
             rod_x([-0.285, 0.2, -0.287], 0.14, 0.022, BRASS).ghost(),
             rod_x([0.285, 0.2, -0.287], 0.14, 0.022, BRASS).ghost(),
         ],
     ),
-    palette: &[[112, 74, 50]],
     ..FURNISHING
 };
-const PANEL: Paint = Paint([138, 94, 64], Finish::Wood);
 
 // Kitchen.
 
@@ -137,6 +136,7 @@ const CABINET_M: [f32; 3] = [0.9, 2.06, 0.45];
 const CABINET: ClassInfo = ClassInfo {
     name: "cabinet",
     label: "cabinet",
+    original_model: Some("cabinet_full_height_wood_beech_honey_composite"),
     detector_index: Some(48),
     size_m: CABINET_M,
     mass_kg: 70.0,
@@ -149,10 +149,10 @@ const CABINET: ClassInfo = ClassInfo {
             cuboid([0.222, 1.06, -0.2], [0.43, 0.97, 0.02], PALE_OAK).ghost(),
             cuboid([-0.222, 0.1, -0.2], [0.43, 0.93, 0.02], PALE_OAK).ghost(),
             cuboid([0.222, 0.1, -0.2], [0.43, 0.93, 0.02], PALE_OAK).ghost(),
-            rod([-0.04, 1.25, -0.216], 0.2, 0.018, [0.0, 0.0, 0.0], STEEL).ghost(),
-            rod([0.04, 1.25, -0.216], 0.2, 0.018, [0.0, 0.0, 0.0], STEEL).ghost(),
-            rod([-0.04, 0.84, -0.216], 0.2, 0.018, [0.0, 0.0, 0.0], STEEL).ghost(),
-            rod([0.04, 0.84, -0.216], 0.2, 0.018, [0.0, 0.0, 0.0], STEEL).ghost(),
+            cylinder([-0.04, 1.15, -0.216], [0.018, 0.2, 0.018], STEEL).ghost(),
+            cylinder([0.04, 1.15, -0.216], [0.018, 0.2, 0.018], STEEL).ghost(),
+            cylinder([-0.04, 0.74, -0.216], [0.018, 0.2, 0.018], STEEL).ghost(),
+            cylinder([0.04, 0.74, -0.216], [0.018, 0.2, 0.018], STEEL).ghost(),
         ],
     ),
     ..FURNISHING
@@ -174,8 +174,8 @@ const REFRIGERATOR: ClassInfo = ClassInfo {
             cuboid([0.0, 0.0, 0.06], [0.84, 0.05, 0.58], BLACK).ghost(),
             cuboid([0.0, 0.06, -0.32], [0.89, 1.1, 0.06], LACQUER).ghost(),
             cuboid([0.0, 1.18, -0.32], [0.89, 0.59, 0.06], LACQUER).ghost(),
-            rod([-0.38, 0.86, -0.36], 0.5, 0.026, [0.0, 0.0, 0.0], STEEL).ghost(),
-            rod([-0.38, 1.38, -0.36], 0.32, 0.026, [0.0, 0.0, 0.0], STEEL).ghost(),
+            cylinder([-0.38, 0.61, -0.36], [0.026, 0.5, 0.026], STEEL).ghost(),
+            cylinder([-0.38, 1.22, -0.36], [0.026, 0.32, 0.026], STEEL).ghost(),
             cuboid([0.16, 1.4, -0.3525], [0.2, 0.1, 0.01], GLASS).ghost(),
         ],
     ),
@@ -293,8 +293,6 @@ const SIDE_CHAIR: ClassInfo = ClassInfo {
             LEGS_SIDE_CHAIR[1],
             LEGS_SIDE_CHAIR[2],
             LEGS_SIDE_CHAIR[3],
-            cuboid([0.0, 0.54, 0.185], [0.3, 0.2, 0.01], Paint([246, 210, 104], Finish::Fabric))
-                .ghost(),
         ],
     ),
     ..FURNISHING
@@ -421,7 +419,7 @@ const ARMCHAIR: ClassInfo = ClassInfo {
             cuboid([0.345, 0.26, -0.08], [0.16, 0.3, 0.62], CHARCOAL),
             rod_z([-0.345, 0.55, -0.08], 0.62, 0.15, CHARCOAL).ghost(),
             rod_z([0.345, 0.55, -0.08], 0.62, 0.15, CHARCOAL).ghost(),
-            ball([0.0, 0.4, 0.17], [0.52, 0.36, 0.2], Paint([202, 168, 128], Finish::Fabric))
+            ball([0.0, 0.4, 0.17], [0.5, 0.36, 0.14], Paint([202, 168, 128], Finish::Fabric))
                 .ghost(),
             cuboid([0.0, 0.0, 0.0], [0.7, 0.08, 0.6], WALNUT).ghost(),
         ],
@@ -453,14 +451,16 @@ const LONG_SOFA: ClassInfo = ClassInfo {
             ball([-0.5, 0.38, 0.17], [0.5, 0.34, 0.2], SOFA_CUSHION).ghost(),
             ball([0.0, 0.38, 0.17], [0.5, 0.34, 0.2], SOFA_CUSHION).ghost(),
             ball([0.5, 0.38, 0.17], [0.5, 0.34, 0.2], SOFA_CUSHION).ghost(),
-            cuboid([-0.254, 0.27, -0.102], [0.012, 0.151, 0.65], SOFA_FRAME).ghost(),
-            cuboid([0.254, 0.27, -0.102], [0.012, 0.151, 0.65], SOFA_FRAME).ghost(),
+            cuboid([-0.254, 0.27, -0.1], [0.012, 0.151, 0.646], SOFA_FRAME).ghost(),
+            cuboid([0.254, 0.27, -0.1], [0.012, 0.151, 0.646], SOFA_FRAME).ghost(),
             cuboid([0.0, 0.0, 0.0], [1.7, 0.07, 0.66], WALNUT).ghost(),
         ],
     ),
     palette: &[[86, 110, 136], [160, 84, 66], [124, 138, 100], [206, 194, 172]],
     ..FURNISHING
 };
+
+const LEGS_TV_STAND: [Part; 4] = legs(0.62, 0.14, 0.1, 0.045, BLACK);
 
 const TV_STAND_M: [f32; 3] = [1.4, 0.5, 0.4];
 const TV_STAND: ClassInfo = ClassInfo {
@@ -489,7 +489,6 @@ const TV_STAND: ClassInfo = ClassInfo {
     palette: &[[112, 74, 50], [210, 206, 198], [60, 60, 64]],
     ..FURNISHING
 };
-const LEGS_TV_STAND: [Part; 4] = legs(0.62, 0.14, 0.1, 0.045, BLACK);
 
 /// A row of books on the shelf whose board has its top at `y`.
 const fn books(x: f32, y: f32, width_m: f32, height_m: f32, color: [u8; 3]) -> Part {
@@ -510,7 +509,7 @@ const BOOKSHELF: ClassInfo = ClassInfo {
     parts: &in_metres(
         BOOKSHELF_M,
         [
-            cuboid([0.0, 0.0, 0.06], [0.88, 1.4, 0.18], WALNUT),
+            cuboid([0.0, 0.0, 0.06], [0.88, 1.39, 0.178], WALNUT),
             cuboid([-0.435, 0.0, 0.0], [0.03, 1.4, 0.3], OAK),
             cuboid([0.435, 0.0, 0.0], [0.03, 1.4, 0.3], OAK),
             book_board(0.08),
@@ -536,6 +535,8 @@ const fn leaf(x: f32, y: f32, z: f32, turn_deg: [f32; 3], paint: Paint) -> Part 
     ball([x, y, z], [0.13, 0.5, 0.035], paint).turned(turn_deg).ghost()
 }
 
+const TERRACOTTA: Paint = Paint([182, 100, 66], Finish::Matte);
+
 const POTTED_PLANT_M: [f32; 3] = [0.45, 1.1, 0.45];
 const POTTED_PLANT: ClassInfo = ClassInfo {
     name: "potted_plant",
@@ -548,7 +549,7 @@ const POTTED_PLANT: ClassInfo = ClassInfo {
             round_tub([0.0, 0.0, 0.0], [0.34, 0.34, 0.34], 0.02, 0.7, TERRACOTTA),
             cylinder([0.0, 0.25, 0.0], [0.3, 0.05, 0.3], Paint([70, 50, 38], Finish::Crust))
                 .ghost(),
-            rod([0.0, 0.5, 0.0], 0.5, 0.024, [0.0, 0.0, 0.0], LEAF).ghost(),
+            cylinder([0.0, 0.25, 0.0], [0.024, 0.5, 0.024], LEAF).ghost(),
             ball([0.0, 0.6, 0.0], [0.16, 0.5, 0.06], LIGHT_LEAF).ghost(),
             leaf(0.1, 0.46, 0.0, [0.0, 0.0, -24.0], LEAF),
             leaf(-0.1, 0.46, 0.0, [0.0, 0.0, 24.0], LEAF),
@@ -563,7 +564,6 @@ const POTTED_PLANT: ClassInfo = ClassInfo {
     palette: &[[182, 100, 66], [226, 222, 212], [70, 76, 82]],
     ..FURNISHING
 };
-const TERRACOTTA: Paint = Paint([182, 100, 66], Finish::Matte);
 
 const FLOOR_LAMP_M: [f32; 3] = [0.4, 1.6, 0.4];
 const FLOOR_LAMP: ClassInfo = ClassInfo {
@@ -604,62 +604,4 @@ const RUG: ClassInfo = ClassInfo {
     ),
     palette: &[[150, 58, 52], [70, 104, 84], [176, 136, 72]],
     ..FURNISHING
-};
-
-// Obstacles.
-
-const OBSTACLE: ClassInfo = ClassInfo { role: Role::Obstacle, ..FURNISHING };
-const PAPER: Paint = Paint([238, 236, 228], Finish::Matte);
-
-const TRASHBIN_M: [f32; 3] = [0.48, 0.57, 0.48];
-const TRASHBIN: ClassInfo = ClassInfo {
-    name: "trashbin",
-    label: "trashbin",
-    original_model: Some("trashbin"),
-    detector_index: Some(51),
-    size_m: TRASHBIN_M,
-    mass_kg: 33.0,
-    parts: &in_metres(
-        TRASHBIN_M,
-        [
-            round_tub([0.0, 0.0, 0.0], [0.46, 0.55, 0.46], 0.014, 0.76, BIN_GREY),
-            ring([0.0, 0.545, 0.0], 0.48, 0.03, DARK_STEEL).ghost(),
-            ring([0.0, 0.03, 0.0], 0.376, 0.03, DARK_STEEL).ghost(),
-            cylinder([0.0, 0.02, 0.0], [0.36, 0.36, 0.36], BLACK).ghost(),
-            ball([-0.09, 0.34, -0.05], [0.17, 0.16, 0.16], PAPER).ghost(),
-            ball([0.08, 0.35, 0.06], [0.18, 0.16, 0.17], PAPER).ghost(),
-            ball([0.06, 0.34, -0.1], [0.12, 0.12, 0.12], Paint([206, 176, 120], Finish::Matte))
-                .ghost(),
-        ],
-    ),
-    ..OBSTACLE
-};
-const BIN_GREY: Paint = Paint([142, 148, 152], Finish::Metal);
-
-const EXTINGUISHER_RED: Paint = Paint([214, 28, 30], Finish::Glossy);
-
-const BRIGHT_FIRE_EXTINGUISHER_M: [f32; 3] = [0.28, 1.06, 0.43];
-const BRIGHT_FIRE_EXTINGUISHER: ClassInfo = ClassInfo {
-    name: "bright_fire_extinguisher",
-    label: "fire extinguisher",
-    original_model: Some("b05_fire_extinguisher"),
-    detector_index: Some(52),
-    size_m: BRIGHT_FIRE_EXTINGUISHER_M,
-    mass_kg: 68.0,
-    parts: &in_metres(
-        BRIGHT_FIRE_EXTINGUISHER_M,
-        [
-            cylinder([0.0, 0.03, 0.06], [0.27, 0.7, 0.27], EXTINGUISHER_RED),
-            ball([0.0, 0.6, 0.06], [0.27, 0.26, 0.27], EXTINGUISHER_RED),
-            cylinder([0.0, 0.0, 0.06], [0.28, 0.05, 0.28], BLACK),
-            cylinder([0.0, 0.83, 0.06], [0.08, 0.12, 0.08], BRASS).ghost(),
-            cuboid([0.0, 0.93, -0.02], [0.035, 0.035, 0.25], BLACK).ghost(),
-            cuboid([0.0, 1.01, -0.01], [0.035, 0.03, 0.26], BLACK).turned([10.0, 0.0, 0.0]).ghost(),
-            rod_z([0.0, 0.89, 0.0], 0.03, 0.06, WHITE).ghost(),
-            arc([0.0, 0.7, -0.06], 0.28, 0.03, 160.0, BLACK).turned([0.0, 0.0, 90.0]).ghost(),
-            taper(0.6, [0.0, 0.3, -0.17], [0.06, 0.28, 0.06], BLACK).ghost(),
-            cuboid([0.0, 0.32, -0.078], [0.16, 0.22, 0.012], WHITE).ghost(),
-        ],
-    ),
-    ..OBSTACLE
 };

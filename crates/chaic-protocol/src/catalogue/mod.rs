@@ -16,6 +16,7 @@ mod food;
 mod goods;
 mod house;
 mod moving;
+mod obstacles;
 mod shape;
 mod street;
 
@@ -243,6 +244,7 @@ const GROUPS: &[&[ClassInfo]] = &[
     moving::CLASSES,
     street::CLASSES,
     house::CLASSES,
+    obstacles::CLASSES,
     actors::CLASSES,
 ];
 
@@ -312,32 +314,20 @@ mod tests {
             }
         }
     }
-}
 
-#[cfg(test)]
-mod dump {
     #[test]
-    fn dump() {
-        let mut s = String::new();
-        for c in &super::CLASSES {
-            s += &format!("C {} {} {} {} {}\n", c.name, c.size_m[0], c.size_m[1], c.size_m[2], c.mass_kg);
-            for p in c.parts {
-                let (k, a, b) = match p.solid {
-                    super::Solid::Cuboid => (0, 0.0, 0.0),
-                    super::Solid::Ellipsoid => (1, 0.0, 0.0),
-                    super::Solid::Frustum { top } => (2, top, 0.0),
-                    super::Solid::Torus { tube } => (3, tube, 0.0),
-                    super::Solid::Arc { tube, degrees } => (4, tube, degrees),
-                    super::Solid::Tub { wall, bottom } => (5, wall, bottom),
-                    super::Solid::RoundTub { wall, bottom } => (6, wall, bottom),
-                };
-                s += &format!("P {k} {a} {b}");
-                for v in p.center.iter().chain(&p.extent).chain(&p.turn_deg) {
-                    s += &format!(" {v}");
-                }
-                s += &format!(" {} {} {} {} {}\n", p.color[0], p.color[1], p.color[2], p.collides as u8, p.supports as u8);
+    fn the_first_alternative_color_is_that_of_the_shape() {
+        for class in CLASSES.iter().filter(|c| !c.palette.is_empty()) {
+            assert_eq!(class.palette[0], class.parts[0].color, "{}", class.name);
+        }
+    }
+
+    #[test]
+    fn what_supports_things_also_stops_them_and_is_level() {
+        for class in &CLASSES {
+            for part in class.parts.iter().filter(|p| p.supports) {
+                assert!(part.collides && part.turn_deg == [0.0; 3], "{}", class.name);
             }
         }
-        std::fs::write("/tmp/catalogue_dump.txt", s).unwrap();
     }
 }

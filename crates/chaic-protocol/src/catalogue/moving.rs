@@ -5,7 +5,7 @@
 
 use super::shape::{
     ARCH, ARCH_ALONG, BACKWARD, BLACK, BRASS, DARK_STEEL, FURNISHING, GLASS, GLOSSY_BLACK, Paint,
-    STEEL, WHITE, arc, ball, cuboid, cylinder, in_metres, rod, rod_x, rod_z, taper,
+    STEEL, WHITE, arc, ball, cuboid, cylinder, in_metres, rod_x, rod_z, taper,
 };
 use super::{ClassInfo, Finish, Part, Role, TargetSet};
 
@@ -41,17 +41,17 @@ const BACKPACK: ClassInfo = ClassInfo {
     parts: &in_metres(
         BACKPACK_M,
         [
-            cylinder([0.0, 0.0, 0.03], [0.31, 0.47, 0.27], Paint([46, 84, 150], Finish::Fabric)),
-            ball([0.0, 0.34, 0.03], [0.33, 0.25, 0.29], POCKET),
-            cuboid([0.0, 0.04, -0.145], [0.23, 0.22, 0.11], POCKET),
-            cuboid([0.0, 0.2, -0.2], [0.23, 0.06, 0.016], STRAP).ghost(),
-            cuboid([-0.06, 0.14, -0.214], [0.026, 0.11, 0.02], BRASS).ghost(),
-            cuboid([0.06, 0.14, -0.214], [0.026, 0.11, 0.02], BRASS).ghost(),
-            ball([-0.15, 0.04, 0.03], [0.07, 0.18, 0.16], POCKET).ghost(),
-            ball([0.15, 0.04, 0.03], [0.07, 0.18, 0.16], POCKET).ghost(),
-            arc([0.0, 0.56, 0.03], 0.1, 0.02, 180.0, STRAP).turned(ARCH),
-            arc([-0.09, 0.27, 0.035], 0.38, 0.034, 130.0, STRAP).turned(BACKWARD),
-            arc([0.09, 0.27, 0.035], 0.38, 0.034, 130.0, STRAP).turned(BACKWARD),
+            ball([0.0, 0.0, 0.02], [0.35, 0.59, 0.3], Paint([46, 84, 150], Finish::Fabric)),
+            cylinder([0.0, 0.0, 0.02], [0.3, 0.2, 0.25], POCKET),
+            ball([0.0, 0.05, -0.125], [0.27, 0.26, 0.18], POCKET),
+            arc([0.0, 0.2, -0.092], 0.25, 0.014, 120.0, BRASS),
+            cuboid([0.045, 0.165, -0.195], [0.014, 0.04, 0.02], BRASS).ghost(),
+            ball([-0.145, 0.05, 0.03], [0.08, 0.2, 0.17], POCKET).ghost(),
+            ball([0.145, 0.05, 0.03], [0.08, 0.2, 0.17], POCKET).ghost(),
+            arc([0.0, 0.555, 0.03], 0.11, 0.024, 190.0, STRAP).turned(ARCH),
+            arc([-0.09, 0.29, 0.03], 0.388, 0.036, 150.0, STRAP).turned(BACKWARD),
+            arc([0.09, 0.29, 0.03], 0.388, 0.036, 150.0, STRAP).turned(BACKWARD),
+            arc([0.0, 0.12, -0.02], 0.3, 0.016, 150.0, STRAP).turned([60.0, 0.0, 0.0]),
         ],
     ),
     palette: &[[46, 84, 150], [150, 46, 46], [64, 110, 68]],
@@ -71,10 +71,10 @@ const KETTLE: ClassInfo = ClassInfo {
         [
             taper(0.72, [0.0, 0.0, 0.02], [0.34, 0.17, 0.34], STEEL),
             ball([0.0, 0.115, 0.02], [0.245, 0.11, 0.245], STEEL),
-            cylinder([0.0, 0.0, 0.02], [0.345, 0.014, 0.345], DARK_STEEL).ghost(),
+            cylinder([0.0, 0.0, 0.02], [0.34, 0.014, 0.34], DARK_STEEL).ghost(),
             ball([0.0, 0.212, 0.02], [0.042, 0.042, 0.042], BLACK).ghost(),
-            taper(0.55, [0.0, 0.075, -0.138], [0.062, 0.15, 0.062], STEEL)
-                .turned([-38.0, 0.0, 0.0])
+            taper(0.5, [0.0, 0.075, -0.128], [0.066, 0.16, 0.066], STEEL)
+                .turned([-36.0, 0.0, 0.0])
                 .ghost(),
             arc([0.0, 0.227, 0.02], 0.28, 0.026, 250.0, BLACK).turned(ARCH_ALONG),
         ],
@@ -170,10 +170,10 @@ const PRINTER: ClassInfo = ClassInfo {
             cuboid([0.0, 0.09, -0.135], [0.34, 0.08, 0.01], BLACK).ghost(),
             cuboid([0.0, 0.06, -0.145], [0.34, 0.02, 0.1], PRINTER_DARK).ghost(),
             cuboid([0.0, 0.08, -0.15], [0.22, 0.006, 0.09], WHITE).ghost(),
-            cuboid([0.0, 0.28, 0.165], [0.26, 0.13, 0.012], PRINTER_DARK)
+            cuboid([0.0, 0.28, 0.165], [0.26, 0.115, 0.012], PRINTER_DARK)
                 .turned([14.0, 0.0, 0.0])
                 .ghost(),
-            cuboid([0.0, 0.26, 0.148], [0.22, 0.135, 0.004], WHITE)
+            cuboid([0.0, 0.265, 0.152], [0.22, 0.125, 0.004], WHITE)
                 .turned([14.0, 0.0, 0.0])
                 .ghost(),
             cuboid([-0.17, 0.2, -0.138], [0.09, 0.04, 0.006], GLASS).ghost(),
@@ -231,7 +231,7 @@ const TELEVISION: ClassInfo = ClassInfo {
             cuboid([0.0, 0.09, 0.215], [0.44, 0.3, 0.09], BLACK),
             cuboid([0.0, 0.0, -0.02], [0.6, 0.05, 0.42], BLACK),
             cuboid([0.05, 0.075, -0.25], [0.66, 0.44, 0.015], GLOSSY_BLACK).ghost(),
-            ball([0.05, 0.095, -0.255], [0.6, 0.4, 0.016], Paint([60, 84, 98], Finish::Glass))
+            ball([0.05, 0.095, -0.252], [0.6, 0.4, 0.016], Paint([60, 84, 98], Finish::Glass))
                 .ghost(),
             cuboid([0.05, 0.105, -0.2525], [0.56, 0.38, 0.014], Paint([60, 84, 98], Finish::Glass))
                 .ghost(),
@@ -258,7 +258,7 @@ const MICROWAVE: ClassInfo = ClassInfo {
             cuboid([0.0, 0.0, 0.02], [0.68, 0.02, 0.34], BLACK).ghost(),
             cuboid([0.09, 0.045, -0.185], [0.54, 0.365, 0.02], DARK_STEEL).ghost(),
             cuboid([0.115, 0.085, -0.19], [0.42, 0.285, 0.02], GLASS).ghost(),
-            rod([-0.14, 0.2275, -0.205], 0.3, 0.028, [0.0, 0.0, 0.0], STEEL).ghost(),
+            cylinder([-0.14, 0.0775, -0.205], [0.028, 0.3, 0.028], STEEL).ghost(),
             cuboid([-0.28, 0.045, -0.185], [0.17, 0.365, 0.02], BLACK).ghost(),
             cuboid(
                 [-0.28, 0.335, -0.19],
@@ -369,10 +369,10 @@ const PIANO: ClassInfo = ClassInfo {
                 .ghost(),
             cylinder([0.12, 0.5, 0.14], [0.78, 0.105, 0.56], Paint([206, 160, 84], Finish::Wood))
                 .ghost(),
-            cuboid([0.17, 0.82, 0.15], [0.8, 0.02, 0.6], GLOSSY_BLACK)
+            cuboid([0.17, 0.815, 0.15], [0.8, 0.02, 0.6], GLOSSY_BLACK)
                 .turned([0.0, 0.0, -34.0])
                 .ghost(),
-            rod([-0.12, 0.8, 0.2], 0.4, 0.016, [0.0, 0.0, 0.0], GLOSSY_BLACK).ghost(),
+            cylinder([-0.12, 0.6, 0.2], [0.016, 0.4, 0.016], GLOSSY_BLACK).ghost(),
         ],
     ),
     ..FURNITURE
@@ -401,7 +401,7 @@ const SOFA: ClassInfo = ClassInfo {
             rod_z([0.58, 0.41, -0.07], 0.54, 0.1, OATMEAL_DARK).ghost(),
             ball([-0.245, 0.27, 0.15], [0.47, 0.2, 0.14], OATMEAL).ghost(),
             ball([0.245, 0.27, 0.15], [0.47, 0.2, 0.14], OATMEAL).ghost(),
-            cuboid([0.0, 0.18, -0.072], [0.012, 0.121, 0.54], OATMEAL_DARK).ghost(),
+            cuboid([0.0, 0.18, -0.07], [0.012, 0.121, 0.536], OATMEAL_DARK).ghost(),
             cuboid([0.0, 0.0, 0.0], [1.2, 0.03, 0.56], BLACK).ghost(),
         ],
     ),

@@ -2,8 +2,8 @@
 //! market's tents, and what makes a street look like one.
 
 use super::shape::{
-    ARCH, BLACK, BRASS, DARK_STEEL, FURNISHING, GLASS, Paint, ROLLING, STEEL, WHITE, arc, ball,
-    cuboid, cylinder, in_metres, ring, rod, rod_x, rod_z, taper, tub,
+    BLACK, BRASS, FURNISHING, GLASS, Paint, ROLLING, STEEL, WHITE, ball, cuboid, cylinder,
+    in_metres, ring, rod, rod_x, rod_z, taper, tub,
 };
 use super::{ClassInfo, Finish, Part, Role};
 
@@ -62,7 +62,6 @@ const TRUCK: ClassInfo = ClassInfo {
             cuboid([0.85, 0.62, 2.95], [0.26, 0.14, 0.06], LAMP_RED).ghost(),
         ],
     ),
-    palette: &[[240, 190, 48]],
     ..FURNISHING
 };
 
@@ -92,11 +91,11 @@ const FIRE_HYDRANT: ClassInfo = ClassInfo {
             rod_z([0.0, 0.36, -0.18], 0.04, 0.17, HYDRANT_CAP).ghost(),
         ],
     ),
-    palette: &[[202, 40, 34]],
     ..FURNISHING
 };
 
 const FRAME: Paint = Paint([58, 148, 150], Finish::Glossy);
+const BIKE_BASKET: Paint = Paint([186, 140, 86], Finish::Wicker);
 const SADDLE: Paint = Paint([112, 70, 44], Finish::Fabric);
 
 /// A tube of the bicycle's frame, leaning in the plane of the wheels.
@@ -104,7 +103,7 @@ const fn tube(y: f32, z: f32, length_m: f32, lean_deg: f32) -> Part {
     rod([0.0, y, z], length_m, 0.034, [lean_deg, 0.0, 0.0], FRAME).ghost()
 }
 
-/// A crossing pair of spokes seen as one, through the wheel at `z`.
+/// Two opposite spokes of the wheel at `z`.
 const fn spoke(z: f32, lean_deg: f32) -> Part {
     rod([0.0, 0.34, z], 0.64, 0.008, [lean_deg, 0.0, 0.0], STEEL).ghost()
 }
@@ -141,7 +140,7 @@ const BIKE: ClassInfo = ClassInfo {
             rod_x([-0.24, 1.02, -0.33], 0.12, 0.04, SADDLE).ghost(),
             rod_x([0.24, 1.02, -0.33], 0.12, 0.04, SADDLE).ghost(),
             ball([0.0, 0.84, 0.27], [0.19, 0.08, 0.28], SADDLE),
-            tub([0.0, 0.72, -0.62], [0.4, 0.25, 0.3], 0.014, 0.84, BASKET),
+            tub([0.0, 0.72, -0.62], [0.4, 0.25, 0.3], 0.014, 0.84, BIKE_BASKET),
             rod_x([0.0, 0.3, 0.08], 0.03, 0.18, STEEL).ghost(),
             cuboid([0.09, 0.19, 0.04], [0.1, 0.025, 0.07], BLACK).ghost(),
             cuboid([-0.09, 0.39, 0.12], [0.1, 0.025, 0.07], BLACK).ghost(),
@@ -150,7 +149,6 @@ const BIKE: ClassInfo = ClassInfo {
     ..FURNISHING
 };
 
-const BASKET: Paint = Paint([186, 140, 86], Finish::Wicker);
 const CANVAS_RED: Paint = Paint([200, 54, 48], Finish::Fabric);
 const CANVAS_WHITE: Paint = Paint([240, 236, 224], Finish::Fabric);
 
@@ -162,7 +160,7 @@ const fn tent_pole(x: f32, z: f32) -> Part {
 /// A strip of canvas on the front (z < 0) or back slope of the tent's roof.
 const fn canvas(x: f32, z: f32, width_m: f32, thickness_m: f32, paint: Paint) -> Part {
     let lean_deg = if z < 0.0 { 68.7 } else { -68.7 };
-    cuboid([x, 1.675, z], [width_m, 1.02, thickness_m], paint).turned([lean_deg, 0.0, 0.0]).ghost()
+    cuboid([x, 1.68, z], [width_m, 1.01, thickness_m], paint).turned([lean_deg, 0.0, 0.0]).ghost()
 }
 
 const TENT_M: [f32; 3] = [2.4, 2.4, 1.9];
@@ -197,6 +195,7 @@ const TENT: ClassInfo = ClassInfo {
 
 const TRIM: Paint = Paint([240, 238, 230], Finish::Matte);
 const ROOF: Paint = Paint([126, 62, 50], Finish::Matte);
+const CHIMNEY: Paint = Paint([168, 104, 84], Finish::Matte);
 const STONE: Paint = Paint([142, 138, 132], Finish::Matte);
 const DOOR: Paint = Paint([60, 92, 82], Finish::Wood);
 
@@ -220,9 +219,9 @@ const HOUSE_FRONT: ClassInfo = ClassInfo {
         HOUSE_FRONT_M,
         [
             cuboid([0.0, 0.0, 0.17], [7.6, 3.5, 0.66], Paint([224, 208, 172], Finish::Matte)),
-            cuboid([0.0, 3.25, 0.0], [8.0, 1.86, 0.12], ROOF).turned([30.7, 0.0, 0.0]).ghost(),
+            cuboid([0.0, 3.29, 0.0], [8.0, 1.76, 0.11], ROOF).turned([30.7, 0.0, 0.0]).ghost(),
             cuboid([0.0, 3.3, -0.47], [8.0, 0.12, 0.06], TRIM).ghost(),
-            cuboid([2.6, 3.6, 0.2], [0.7, 1.4, 0.5], ROOF).ghost(),
+            cuboid([2.6, 3.6, 0.2], [0.7, 1.4, 0.5], CHIMNEY).ghost(),
             cuboid([0.0, 0.0, -0.17], [7.62, 0.4, 0.06], STONE).ghost(),
             cuboid([0.0, 0.0, -0.33], [1.6, 0.16, 0.34], STONE),
             cuboid([0.0, 0.16, -0.19], [1.24, 2.3, 0.1], TRIM).ghost(),
@@ -301,8 +300,8 @@ const BENCH: ClassInfo = ClassInfo {
             cuboid([0.0, 0.71, 0.285], [1.6, 0.12, 0.035], PLANK),
             cuboid([-0.66, 0.0, 0.0], [0.06, 0.42, 0.5], IRON),
             cuboid([0.66, 0.0, 0.0], [0.06, 0.42, 0.5], IRON),
-            cuboid([-0.66, 0.41, 0.267], [0.05, 0.44, 0.05], IRON).turned([8.0, 0.0, 0.0]).ghost(),
-            cuboid([0.66, 0.41, 0.267], [0.05, 0.44, 0.05], IRON).turned([8.0, 0.0, 0.0]).ghost(),
+            cuboid([-0.66, 0.42, 0.258], [0.05, 0.42, 0.04], IRON).turned([8.0, 0.0, 0.0]).ghost(),
+            cuboid([0.66, 0.42, 0.258], [0.05, 0.42, 0.04], IRON).turned([8.0, 0.0, 0.0]).ghost(),
             cuboid([0.0, 0.461, -0.135], [1.6, 0.001, 0.012], IRON).ghost(),
             cuboid([0.0, 0.461, 0.015], [1.6, 0.001, 0.012], IRON).ghost(),
             cuboid([-0.74, 0.6, -0.03], [0.05, 0.04, 0.46], IRON).ghost(),

@@ -21,7 +21,12 @@ pub fn thing(class: &str, position: Vec3) -> Thing {
 }
 
 pub fn person(persona: Persona, x: f32, z: f32) -> Person {
-    Person { persona, pose: Pose { position: at(x, 0.0, z), yaw_rad: 0.0 }, look: 0, capability: None }
+    Person {
+        persona,
+        pose: Pose { position: at(x, 0.0, z), yaw_rad: 0.0 },
+        look: 0,
+        capability: None,
+    }
 }
 
 pub fn wall(a: [f32; 2], b: [f32; 2]) -> Wall {

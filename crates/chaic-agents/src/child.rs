@@ -1,0 +1,345 @@
+//! The child who comes along while shopping: follows, now and then runs away, and comes back when
+//! the helper is near (original facts 2.4).
+
+use chaic_protocol::agent::Thought;
+use chaic_protocol::briefing::Relation;
+use chaic_protocol::geom::{wrap_angle, xz, yaw_towards};
+use chaic_protocol::observation::Senses;
+use chaic_protocol::rng::Stream;
+use chaic_protocol::{Action, Agent, AgentId, Briefing, Frame, Observation, Vec2, Vec3};
+
+use crate::execution::follow::{Follow, Follower};
+use crate::execution::navigate::{Destination, Nav, Navigator};
+use crate::execution::recover::Recovery;
+use crate::memory::{Memory, Space};
+use crate::perception::{GroundTruthIds, Perception as _};
+
+/// Between two draws pass more than so many frames.
+const PLAN_FRAMES: Frame = 100;
+/// Chance to run away at each draw.
+const RUN_CHANCE: f32 = 0.20;
+/// The helper catches the child from here, metres.
+const CATCH_M: f32 = 2.5;
+/// Back with the guardian from here, metres.
+const HOME_M: f32 = 3.0;
+/// Follows to here, metres.
+const FOLLOW_M: f32 = 2.0;
+/// A point to run to is at least so far, metres.
+const RUN_MIN_M: f32 = 5.0;
+/// From here on the guardian's direction counts less, metres.
+const FAR_GUARDIAN_M: f32 = 10.0;
+/// The point lies off the guardian's direction by more than this, radians: 60 degrees, or 30 if
+/// the point is far from the guardian.
+const OFF_RAD: (f32, f32) = (std::f32::consts::FRAC_PI_3, std::f32::consts::FRAC_PI_6);
+/// Distance of the point to the border of the place, metres (6 cells of the original).
+const BORDER_M: f32 = 0.75;
+/// Nothing is known to stand so near to the point, metres.
+const FREE_M: f32 = 1.0;
+/// Points drawn and points kept at most.
+const DRAWS: (usize, usize) = (2000, 500);
+/// So near to the point it is there, metres.
+const THERE_M: f32 = 0.5;
+
+/// What the child is up to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Mood {
+    Follow,
+    /// Runs to a point (x, z).
+    RunAway(Vec2),
+    GotoGuardian,
+}
+
+/// The child's mind. It knows where everybody is.
+#[derive(Debug, Default)]
+pub struct Child {
+    episode: Option<Episode>,
+}
+
+#[derive(Debug)]
+struct Episode {
+    briefing: Briefing,
+    memory: Memory,
+    navigator: Navigator,
+    recovery: Recovery,
+    follower: Follower,
+    rng: Stream,
+    mood: Mood,
+    since: Option<Frame>,
+}
+
+impl Child {
+    /// A child that has not been briefed.
+    pub fn new() -> Child {
+        Child::default()
+    }
+}
+
+impl Episode {
+    fn new(briefing: &Briefing) -> Episode {
+        Episode {
+            briefing: briefing.clone(),
+            memory: Memory::new(briefing),
+            navigator: Navigator::default(),
+            recovery: Recovery::default(),
+            follower: Follower::default(),
+            rng: Stream::new(briefing.seed, "child", 0),
+            mood: Mood::Follow,
+            since: None,
+        }
+    }
+
+    fn position_of(&self, agent: Option<AgentId>) -> Option<Vec3> {
+        self.memory.people.get(agent?).map(|p| p.position_in_world)
+    }
+
+    fn guardian(&self) -> Option<AgentId> {
+        let relation = |r| self.briefing.companion(r);
+        relation(Relation::Guardian).or_else(|| relation(Relation::Partner))
+    }
+
+    fn helper(&self) -> Option<AgentId> {
+        let guardian = self.guardian();
+        self.briefing.companions.iter().map(|c| c.agent).find(|a| Some(*a) != guardian)
+    }
+
+    /// The state machine of the original's child.
+    fn change_mood(&mut self) {
+        let here = self.memory.pose.position;
+        let away_m = |p: Option<Vec3>| {
+            p.map_or(f32::INFINITY, |p| xz(p).distance(xz(here)))
+        };
+        let (guardian, helper) =
+            (self.position_of(self.guardian()), self.position_of(self.helper()));
+        let now = self.memory.frame;
+        let is_due = self.since.is_none_or(|since| now > since + PLAN_FRAMES);
+        let next = match self.mood {
+            Mood::RunAway(_) if away_m(helper) < CATCH_M => Mood::GotoGuardian,
+            Mood::GotoGuardian if is_due && away_m(guardian) < HOME_M => Mood::Follow,
+            Mood::Follow if is_due => {
+                let runs = self.rng.chance(RUN_CHANCE);
+                match guardian.filter(|_| runs).and_then(|g| self.far_point(g)) {
+                    Some(point) => Mood::RunAway(point),
+                    None => Mood::Follow,
+                }
+            }
+            same => same,
+        };
+        if is_due || next != self.mood {
+            self.since = Some(now);
+        }
+        if next != self.mood {
+            self.navigator.reset();
+            self.recovery.reset();
+            self.follower = Follower::default();
+            self.mood = next;
+        }
+    }
+
+    /// A point far off and away from the guardian: of all that were drawn, the one at three
+    /// quarters by distance from the guardian.
+    fn far_point(&mut self, guardian: Vec3) -> Option<Vec2> {
+        let inside = self.briefing.bounds.grown(-BORDER_M);
+        let here = self.memory.here();
+        let to_guardian = yaw_towards(self.memory.pose.position, guardian);
+        let mut kept: Vec<(f32, Vec2)> = Vec::new();
+        for _ in 0..DRAWS.0 {
+            let point = Vec2::new(
+                self.rng.range(inside.min.x, inside.max.x.max(inside.min.x + 0.01)),
+                self.rng.range(inside.min.y, inside.max.y.max(inside.min.y + 0.01)),
+            );
+            let from_guardian_m = point.distance(xz(guardian));
+            let yaw =
+                yaw_towards(self.memory.pose.position, Vec3::new(point.x, 0.0, point.y));
+            let off = wrap_angle(yaw - to_guardian).abs();
+            let enough = if from_guardian_m > FAR_GUARDIAN_M { OFF_RAD.1 } else { OFF_RAD.0 };
+            if point.distance(here) > RUN_MIN_M && off > enough && self.is_free(point) {
+                kept.push((from_guardian_m, point));
+            }
+            if kept.len() == DRAWS.1 {
+                break;
+            }
+        }
+        kept.sort_by(|a, b| a.0.total_cmp(&b.0));
+        kept.get(kept.len() * 3 / 4).map(|(_, point)| *point)
+    }
+
+    fn is_free(&self, point: Vec2) -> bool {
+        let map = &self.memory.map;
+        map.grid().disc(point, FREE_M).all(|c| map.space(c) < Space::Occupied)
+    }
+
+    fn act(&mut self, observation: &Observation) -> Action {
+        let percepts = GroundTruthIds.perceive(observation);
+        self.memory.update(&self.briefing, observation, &percepts);
+        self.change_mood();
+        if self.recovery.is_hopeless() {
+            self.recovery = Recovery::default();
+            if matches!(self.mood, Mood::RunAway(_)) {
+                // It can't get there: here is as good.
+                self.mood = Mood::RunAway(self.memory.here());
+            }
+        }
+        let last = observation.own.last;
+        if let Some(action) = self.recovery.step(&mut self.memory, last, &mut self.rng) {
+            return action;
+        }
+        match self.mood {
+            Mood::RunAway(point) => self.run_to(point),
+            Mood::Follow | Mood::GotoGuardian => {
+                let Some(guardian) = self.guardian() else { return self.fidget() };
+                let keep_m = FOLLOW_M;
+                match self.follower.step(&mut self.memory, &mut self.navigator, guardian, keep_m) {
+                    Follow::Act(action) => action,
+                    Follow::Near(action) => {
+                        self.recovery.stand();
+                        action
+                    }
+                    Follow::Lost => self.fidget(),
+                }
+            }
+        }
+    }
+
+    fn run_to(&mut self, point: Vec2) -> Action {
+        match self.navigator.step(&mut self.memory, &Destination::near(point, THERE_M)) {
+            Nav::Act(action) => action,
+            Nav::Arrived => self.fidget(),
+            Nav::Unreachable => {
+                self.mood = Mood::RunAway(self.memory.here());
+                self.fidget()
+            }
+        }
+    }
+
+    /// Stands about, looking here and there.
+    fn fidget(&mut self) -> Action {
+        self.recovery.stand();
+        match self.rng.below(4) {
+            0 => Action::TurnLeft,
+            1 => Action::TurnRight,
+            _ => Action::Wait { frames: 5 },
+        }
+    }
+}
+
+impl Agent for Child {
+    fn senses(&self) -> Senses {
+        Senses::DEPTH_AND_IDS
+    }
+
+    fn reset(&mut self, briefing: &Briefing) {
+        self.episode = Some(Episode::new(briefing));
+    }
+
+    fn act(&mut self, observation: &Observation) -> Action {
+        match self.episode.as_mut() {
+            Some(episode) => episode.act(observation),
+            None => Action::Wait { frames: 5 },
+        }
+    }
+
+    fn thought(&self) -> Thought {
+        let (mood, plan) = match self.episode.as_ref().map(|e| e.mood) {
+            Some(Mood::RunAway(_)) => ("run_away", "run away"),
+            Some(Mood::GotoGuardian) => ("goto_guardian", "go back"),
+            Some(Mood::Follow) | None => ("follow", "come along"),
+        };
+        Thought { plan: plan.to_owned(), mood: Some(mood.to_owned()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_support::Toy;
+    use chaic_protocol::briefing::Companion;
+    use chaic_protocol::geom::Pose;
+
+    fn seen_at(x: f32, z: f32) -> Pose {
+        Pose { position: Vec3::new(x, 0.0, z), yaw_rad: 0.0 }
+    }
+
+    /// A child without eyes on a bare plane, with everybody where they are put.
+    struct Stage {
+        child: Child,
+        observation: Observation,
+    }
+
+    impl Stage {
+        fn new(seed: u64) -> Stage {
+            let toy = Toy::room(28.0, 13.0);
+            let mut briefing = toy.briefing();
+            briefing.seed = seed;
+            briefing.me = AgentId::CHILD;
+            briefing.companions = vec![
+                Companion { agent: AgentId::PARTNER, relation: Relation::Guardian },
+                Companion { agent: AgentId::HELPER, relation: Relation::Partner },
+            ];
+            let mut child = Child::new();
+            child.reset(&briefing);
+            let mut observation = toy.observe();
+            observation.images = Default::default();
+            Stage { child, observation }
+        }
+
+        fn mood_at(&mut self, frame: Frame, guardian_x: f32, helper_x: f32) -> String {
+            self.observation.frame = frame;
+            self.observation.granted.poses = vec![
+                (AgentId::PARTNER, seen_at(guardian_x, 0.0)),
+                (AgentId::HELPER, seen_at(helper_x, 0.0)),
+            ];
+            self.child.act(&self.observation);
+            self.child.thought().mood.expect("a child always has a mood")
+        }
+    }
+
+    #[test]
+    fn one_draw_in_five_is_an_escape_and_draws_are_a_hundred_frames_apart() {
+        let (mut escapes, n) = (0, 600);
+        for seed in 0..n {
+            let mut stage = Stage::new(seed);
+            escapes += u32::from(stage.mood_at(0, 1.0, 9.0) == "run_away");
+        }
+        // 120 expected, standard deviation 9.8.
+        assert!((85..155).contains(&escapes), "{escapes} of {n}");
+        let mut stage = (0..50)
+            .map(Stage::new)
+            .find_map(|mut s| (s.mood_at(0, 1.0, 9.0) == "follow").then_some(s))
+            .expect("most follow at first");
+        for frame in 1..=PLAN_FRAMES {
+            assert_eq!(stage.mood_at(frame, 1.0, 9.0), "follow", "no draw before frame 101");
+        }
+    }
+
+    #[test]
+    fn it_comes_back_only_when_the_helper_is_near_and_follows_when_home() {
+        let mut stage = (0..50)
+            .map(Stage::new)
+            .find_map(|mut s| (s.mood_at(0, 1.0, 9.0) == "run_away").then_some(s))
+            .expect("some run at once");
+        for frame in (10..2000).step_by(10) {
+            assert_eq!(stage.mood_at(frame, 1.0, 2.6), "run_away");
+        }
+        assert_eq!(stage.mood_at(2000, 6.0, 2.4), "goto_guardian");
+        assert_eq!(stage.mood_at(2101, 6.0, 2.4), "goto_guardian", "still 6 m from home");
+        assert_eq!(stage.mood_at(2202, 2.9, 9.0), "follow");
+    }
+
+    #[test]
+    fn points_to_run_to_are_far_inside_and_away_from_the_guardian() {
+        for seed in 0..40 {
+            let mut stage = Stage::new(seed);
+            stage.mood_at(0, 2.0, 9.0);
+            let episode = stage.child.episode.as_mut().expect("briefed");
+            let guardian = Vec3::new(2.0, 0.0, 0.0);
+            let point = episode.far_point(guardian).expect("there is room");
+            assert!(episode.briefing.bounds.contains(point));
+            assert!(point.length() > RUN_MIN_M);
+            let off = wrap_angle(
+                yaw_towards(Vec3::ZERO, Vec3::new(point.x, 0.0, point.y))
+                    - yaw_towards(Vec3::ZERO, guardian),
+            );
+            assert!(off.abs() > OFF_RAD.1);
+        }
+    }
+}

@@ -1,0 +1,318 @@
+//! What to do next: the plans, which of them are valid, and who chooses.
+
+use std::fmt;
+
+use chaic_protocol::briefing::Relation;
+use chaic_protocol::geom::xz;
+use chaic_protocol::observation::{Held, SelfState};
+use chaic_protocol::{Briefing, ClassId, EntityId, Frame, Hand, Role};
+
+use crate::behavior::BehaviorLog;
+use crate::memory::{Memory, Thing};
+
+/// The partner stands at a piece of furniture if it is this near, metres.
+const AT_PIECE_M: f32 = 1.5;
+/// And was seen there so recently, frames.
+const AT_PIECE_FRAMES: Frame = 150;
+
+/// One object that a plan is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Subject {
+    /// Which one.
+    pub entity: EntityId,
+    /// Its class.
+    pub class: ClassId,
+}
+
+impl Subject {
+    fn of(thing: &Thing) -> Subject {
+        Subject { entity: thing.entity, class: thing.class }
+    }
+}
+
+impl fmt::Display for Subject {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.class.info().label, self.entity)
+    }
+}
+
+/// A subgoal that takes many actions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Plan {
+    /// Find out more of the place.
+    Explore,
+    /// Take a target.
+    PickUp(Subject),
+    /// Take a container.
+    PickContainer(Subject),
+    /// Put the target in one hand into the container in the other.
+    PutIn,
+    /// Bring what is carried to the goal place.
+    Deliver,
+    /// Clear an obstacle away.
+    RemoveObstacle(Subject),
+    /// Lift a piece of furniture together with the partner who is at it.
+    LiftWith(Subject),
+    /// Stay near the partner.
+    FollowPartner,
+    /// Go to the child.
+    FollowChild,
+    /// Look all around.
+    TurnAround,
+    /// Stand still for a moment.
+    Wait,
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Plan::Explore => f.write_str("explore"),
+            Plan::PickUp(it) => write!(f, "go to {it} and pick it up"),
+            Plan::PickContainer(it) => write!(f, "go to container {it} and pick it up"),
+            Plan::PutIn => f.write_str("put what one hand holds into the container in the other"),
+            Plan::Deliver => f.write_str("bring what is carried to the goal place"),
+            Plan::RemoveObstacle(it) => write!(f, "remove the obstacle {it}"),
+            Plan::LiftWith(it) => write!(f, "lift {it} together with the partner"),
+            Plan::FollowPartner => f.write_str("follow the partner"),
+            Plan::FollowChild => f.write_str("follow the child"),
+            Plan::TurnAround => f.write_str("turn around"),
+            Plan::Wait => f.write_str("wait"),
+        }
+    }
+}
+
+impl Plan {
+    /// Whether a plan under way should make room for this one, when both come from the same
+    /// policy: nothing is dropped for more of the same, nor a walk to an object for another.
+    pub fn supersedes(&self, current: &Plan) -> bool {
+        let is_pick = |p: &Plan| matches!(p, Plan::PickUp(_) | Plan::PickContainer(_));
+        let is_idle = |p: &Plan| {
+            matches!(p, Plan::Explore | Plan::FollowPartner | Plan::TurnAround | Plan::Wait)
+        };
+        let same = std::mem::discriminant(self) == std::mem::discriminant(current);
+        !same && !(is_pick(current) && (is_pick(self) || is_idle(self)))
+    }
+}
+
+/// What the hands hold, as far as decisions care.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Load {
+    /// A hand with nothing in it.
+    pub free_hand: Option<Hand>,
+    /// Whether a container is in hand.
+    pub has_container: bool,
+    /// Possible targets carried, those in containers and baskets included.
+    pub targets: Vec<(EntityId, ClassId)>,
+    /// Whether another target can be taken.
+    pub can_take_target: bool,
+    /// Whether a container can be taken.
+    pub can_take_container: bool,
+    /// Whether one hand holds a target and the other a container with room.
+    pub can_put_in: bool,
+    /// A hand that holds something to bring to the goal place.
+    pub to_deliver: Option<Hand>,
+}
+
+impl Load {
+    /// What this body carries.
+    pub fn of(own: &SelfState, briefing: &Briefing) -> Load {
+        let capacity = briefing.container_capacity as usize;
+        let is_target = |class: &ClassId| briefing.possible_targets.contains(class);
+        let role = |held: &Held| held.class.info().role;
+        let is_container = |held: &Held| role(held) == Role::Container;
+        let basket = own.held().find(|h| role(h) == Role::Vehicle);
+        let is_moving = briefing.possible_targets.iter().any(|c| c.info().role == Role::HeavyTarget);
+        let free_hand = Hand::BOTH.into_iter().find(|h| own.hands[h.index()].is_none());
+        let has_container = own.held().any(is_container);
+        let can_put_in = Hand::BOTH.into_iter().any(|hand| {
+            let [one, other] = [hand, hand.other()].map(|h| own.hands[h.index()].as_ref());
+            one.is_some_and(|h| is_container(h) && h.contents.len() < capacity)
+                && other.is_some_and(|h| is_target(&h.class) && !is_container(h))
+        });
+        let can_take_target = match basket {
+            Some(basket) => basket.contents.len() < capacity,
+            None if is_moving => own.held().next().is_none(),
+            None => free_hand.is_some(),
+        };
+        let carries = |h: &Held| {
+            is_target(&h.class) || h.contents.iter().any(|(_, class)| is_target(class))
+        };
+        Load {
+            free_hand,
+            has_container,
+            targets: own
+                .held()
+                .flat_map(|h| std::iter::once((h.entity, h.class)).chain(h.contents.iter().copied()))
+                .filter(|(_, class)| is_target(class))
+                .collect(),
+            can_take_target,
+            can_take_container: basket.is_none() && !has_container && free_hand.is_some(),
+            can_put_in,
+            to_deliver: Hand::BOTH
+                .into_iter()
+                .find(|hand| own.hands[hand.index()].as_ref().is_some_and(carries)),
+        }
+    }
+}
+
+/// All that a decision may rest on.
+#[derive(Clone, Copy, Debug)]
+pub struct Context<'a> {
+    /// What the mind was told.
+    pub briefing: &'a Briefing,
+    /// What it remembers; distances are up to date when a choice is asked for.
+    pub memory: &'a Memory,
+    /// What it knows of the others' doings.
+    pub behavior: &'a BehaviorLog,
+    /// The own body.
+    pub own: &'a SelfState,
+    /// Whether everything that can be got to has been explored.
+    pub is_explored: bool,
+}
+
+/// Chooses among valid plans.
+pub trait Policy: Send {
+    /// Begins an episode.
+    fn reset(&mut self, briefing: &Briefing);
+
+    /// The plan to follow next. `valid` is never empty, and holds the plans of one kind nearest
+    /// first.
+    fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan;
+
+    /// Whether to choose anew although `current` is not finished. `is_news` says that something
+    /// has come up since the last choice. The new choice is taken if it [supersedes] the current
+    /// plan.
+    ///
+    /// [supersedes]: Plan::supersedes
+    fn reconsiders(&mut self, _context: &Context<'_>, _current: &Plan, _is_news: bool) -> bool {
+        false
+    }
+
+    /// A short word for its state, if it has one.
+    fn mood(&self) -> Option<String> {
+        None
+    }
+}
+
+/// Every plan that can be begun now, those of one kind nearest first. Never empty.
+pub fn valid_plans(memory: &Memory, own: &SelfState, briefing: &Briefing) -> Vec<Plan> {
+    let load = Load::of(own, briefing);
+    let mut plans = vec![Plan::Explore];
+    if load.can_put_in {
+        plans.push(Plan::PutIn);
+    }
+    if load.to_deliver.is_some() && !memory.goal_places().is_empty() {
+        plans.push(Plan::Deliver);
+    }
+    if load.can_take_target {
+        plans.extend(reachable(memory, &briefing.possible_targets).map(Plan::PickUp));
+    }
+    if load.can_take_container {
+        plans.extend(reachable(memory, &briefing.containers).map(Plan::PickContainer));
+    }
+    if load.free_hand.is_some() {
+        plans.extend(reachable(memory, &briefing.obstacles).map(Plan::RemoveObstacle));
+    }
+    if own.held().next().is_none() {
+        plans.extend(pieces_at_partner(memory, briefing).map(Plan::LiftWith));
+    }
+    if memory.companion(briefing, Relation::Partner).is_some() {
+        plans.push(Plan::FollowPartner);
+    }
+    if memory.companion(briefing, Relation::Child).is_some() {
+        plans.push(Plan::FollowChild);
+    }
+    plans.push(Plan::TurnAround);
+    plans
+}
+
+/// Available things of these classes that one can get to, nearest first.
+fn reachable<'a>(memory: &'a Memory, classes: &[ClassId]) -> impl Iterator<Item = Subject> + use<'a> {
+    let mut found: Vec<(f32, &Thing)> = memory
+        .things
+        .iter()
+        .filter(|t| classes.contains(&t.class) && t.is_available(memory.frame))
+        .filter_map(|t| Some((memory.way_to(t)?, t)))
+        .collect();
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found.into_iter().map(|(_, t)| Subject::of(t))
+}
+
+/// Furniture that the partner stands at.
+fn pieces_at_partner<'a>(
+    memory: &'a Memory,
+    briefing: &Briefing,
+) -> impl Iterator<Item = Subject> + use<'a> {
+    let partner = memory
+        .companion(briefing, Relation::Partner)
+        .filter(|p| p.frame + AT_PIECE_FRAMES > memory.frame)
+        .map(|p| xz(p.position_in_world));
+    memory
+        .things
+        .iter()
+        .filter(|t| t.class.info().role == Role::HeavyTarget && t.is_present && !t.is_gone)
+        .filter(|t| memory.frame >= t.held_until)
+        .filter(move |t| partner.is_some_and(|p| t.distance_from(p) < AT_PIECE_M))
+        .map(Subject::of)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_support::held;
+
+    fn briefing() -> Briefing {
+        crate::test_support::Toy::room(4.0, 4.0).briefing()
+    }
+
+    fn own(hands: [Option<Held>; 2]) -> SelfState {
+        SelfState { pose: Default::default(), hands, last: None }
+    }
+
+    #[test]
+    fn what_hands_allow() {
+        let apple = || Some(held("apple", 30, &[]));
+        let basket = |n: usize| Some(held("wicker_basket", 31, &["apple", "apple", "apple"][..n]));
+        let bike = |n: usize| Some(held("bike", 32, &["apple", "apple", "apple"][..n]));
+        // Hands; can take a target, take a container, put in; has something to deliver.
+        for (hands, expected) in [
+            ([None, None], [true, true, false, false]),
+            ([apple(), None], [true, true, false, true]),
+            ([apple(), apple()], [false, false, false, true]),
+            ([basket(0), None], [true, false, false, false]),
+            ([basket(0), apple()], [false, false, true, true]),
+            ([apple(), basket(2)], [false, false, true, true]),
+            ([basket(3), apple()], [false, false, false, true]),
+            ([basket(3), None], [true, false, false, true]),
+            ([bike(0), None], [true, false, false, false]),
+            ([bike(2), None], [true, false, false, true]),
+            ([bike(3), None], [false, false, false, true]),
+        ] {
+            let load = Load::of(&own(hands.clone()), &briefing());
+            let got = [
+                load.can_take_target,
+                load.can_take_container,
+                load.can_put_in,
+                load.to_deliver.is_some(),
+            ];
+            assert_eq!(got, expected, "{hands:?}");
+        }
+    }
+
+    #[test]
+    fn plans_read_as_sentences() {
+        let it = Subject { entity: EntityId(31), class: ClassId::named("apple") };
+        assert_eq!(Plan::PickUp(it).to_string(), "go to apple #31 and pick it up");
+    }
+
+    #[test]
+    fn a_walk_to_an_object_is_not_dropped_for_another_but_for_an_obstacle() {
+        let it = |n| Subject { entity: EntityId(n), class: ClassId::named("apple") };
+        let current = Plan::PickUp(it(30));
+        assert!(!Plan::PickUp(it(31)).supersedes(&current));
+        assert!(!Plan::Explore.supersedes(&current));
+        assert!(Plan::RemoveObstacle(it(32)).supersedes(&current));
+        assert!(Plan::Deliver.supersedes(&current));
+        assert!(current.supersedes(&Plan::Explore));
+    }
+}

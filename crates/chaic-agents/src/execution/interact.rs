@@ -1,0 +1,221 @@
+//! Going to a thing and doing something with it.
+
+use chaic_protocol::{Action, Briefing, EntityId, FailureReason, Frame, Outcome, Role, Vec2};
+
+use super::navigate::{Destination, Nav, Navigator};
+use crate::memory::semantic::{IGNORE_FRAMES, LIFT_FAILURES, Thing};
+use crate::memory::Memory;
+
+/// How near to go before an object is picked up, metres. (The world steps up from 3 m.)
+pub const PICK_WITHIN_M: f32 = 1.4;
+/// How near to go before something is put on a goal place, metres.
+pub const PUT_WITHIN_M: f32 = 1.8;
+/// If no place to stand with a clear line is known: how near at least, metres.
+const RELAXED_M: f32 = 2.4;
+/// From how many places an object is tried before it is left alone.
+const MAX_TRIES: usize = 4;
+/// Something that can't be got to is left alone for so long, frames.
+const UNREACHABLE_FRAMES: Frame = 250;
+/// Something that can't be done at all is left alone for so long, frames.
+const IMPOSSIBLE_FRAMES: Frame = 2000;
+
+/// What an interaction says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Step {
+    /// Do this next, on the way.
+    Walk(Action),
+    /// One stands before it: do the deed.
+    There,
+    /// It can't be done now.
+    GiveUp,
+}
+
+/// The approach to one thing.
+#[derive(Clone, Debug, Default)]
+pub struct Interaction {
+    /// Where it was tried without success.
+    tried: Vec<Vec2>,
+    is_relaxed: bool,
+}
+
+impl Interaction {
+    /// Notes that the deed failed because of where one stood.
+    pub fn note_bad_place(&mut self, here: Vec2) {
+        self.tried.push(here);
+    }
+
+    /// The next step towards `entity`.
+    pub fn step(
+        &mut self,
+        memory: &mut Memory,
+        navigator: &mut Navigator,
+        entity: EntityId,
+        within_m: f32,
+    ) -> Step {
+        let Some(thing) = memory.things.get(entity) else { return Step::GiveUp };
+        if self.tried.len() >= MAX_TRIES {
+            return self.give_up(memory, entity);
+        }
+        let mut destination = destination_at(thing, within_m);
+        destination.avoid.clone_from(&self.tried);
+        if self.is_relaxed {
+            destination.within_m = RELAXED_M;
+            destination.needs_line = false;
+        }
+        match navigator.step(memory, &destination) {
+            Nav::Act(action) => Step::Walk(action),
+            Nav::Arrived => Step::There,
+            Nav::Unreachable if !self.is_relaxed => {
+                self.is_relaxed = true;
+                self.step(memory, navigator, entity, within_m)
+            }
+            Nav::Unreachable => self.give_up(memory, entity),
+        }
+    }
+
+    fn give_up(&self, memory: &mut Memory, entity: EntityId) -> Step {
+        let until = memory.frame + if self.tried.is_empty() { UNREACHABLE_FRAMES } else { IGNORE_FRAMES };
+        memory.things.ignore(entity, until);
+        Step::GiveUp
+    }
+}
+
+/// Where to stand for doing something with a thing.
+fn destination_at(thing: &Thing, within_m: f32) -> Destination {
+    let is_small = thing.class.info().is_carriable() || thing.footprint.is_empty();
+    let mean = Vec2::new(thing.position_in_world.x, thing.position_in_world.z);
+    let points = if is_small { vec![mean] } else { thing.footprint.clone() };
+    Destination { points, within_m, needs_line: true, avoid: Vec::new() }
+}
+
+/// Draws the lessons of an action that has ended, whatever the plan. `held` is what was in hand
+/// before it, contents included; `holds` what is now.
+pub fn learn(
+    memory: &mut Memory,
+    briefing: &Briefing,
+    last: (Action, Outcome),
+    held: &[EntityId],
+    holds: &[EntityId],
+    knows_delivered: bool,
+) {
+    let now = memory.frame;
+    let (action, outcome) = last;
+    let released: Vec<EntityId> = held.iter().copied().filter(|e| !holds.contains(e)).collect();
+    match (action, outcome) {
+        (Action::PickUp { object, .. }, Outcome::Success) => {
+            memory.things.forgive(object);
+            memory.things.mark_absent(object);
+        }
+        (Action::RemoveObstacle { obstacle, .. }, Outcome::Success) => {
+            // It stands elsewhere now and is nobody's business any more.
+            memory.things.mark_gone(obstacle);
+            memory.things.mark_absent(obstacle);
+        }
+        (Action::PickUp { object, .. }, Outcome::Failure(reason))
+        | (Action::RemoveObstacle { obstacle: object, .. }, Outcome::Failure(reason)) => {
+            learn_failure(memory, object, reason);
+        }
+        (Action::PutOn { place, .. }, Outcome::Success) => {
+            let is_goal = memory.things.get(place).is_some_and(|t| t.class == briefing.goal_place);
+            if is_goal && !knows_delivered {
+                memory.delivered.extend(released.iter().copied());
+            }
+            // Containers are lost on delivery.
+            for entity in released.iter().copied().filter(|_| is_goal) {
+                if memory.class_of(entity).is_none_or(|c| briefing.containers.contains(&c)) {
+                    memory.things.mark_gone(entity);
+                }
+            }
+        }
+        (Action::PutOn { .. }, Outcome::Failure(FailureReason::BeyondLimits)) => {
+            // It fell: what was not managed once is left alone for a while. The place is not.
+            for entity in released {
+                memory.things.ignore(entity, now + IGNORE_FRAMES);
+            }
+        }
+        _ => {}
+    }
+}
+
+fn learn_failure(memory: &mut Memory, object: EntityId, reason: FailureReason) {
+    let now = memory.frame;
+    match reason {
+        FailureReason::BeyondLimits => {
+            let is_heavy = memory
+                .things
+                .get(object)
+                .is_some_and(|t| t.class.info().role == Role::HeavyTarget);
+            // Furniture is tried again at once, up to a limit (original facts 2.5).
+            if !is_heavy || memory.things.count_failure(object) >= LIFT_FAILURES {
+                memory.things.ignore(object, now + IGNORE_FRAMES);
+            }
+        }
+        FailureReason::Broke | FailureReason::OutOfPlay => memory.things.mark_gone(object),
+        FailureReason::HeldByOther => memory.things.mark_held(object, now),
+        FailureReason::Impossible => memory.things.ignore(object, now + IMPOSSIBLE_FRAMES),
+        FailureReason::Blocked
+        | FailureReason::TooFar
+        | FailureReason::HandFull
+        | FailureReason::HandEmpty
+        | FailureReason::Full
+        | FailureReason::NotContainerAndTarget
+        | FailureReason::Interrupted => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::memory::Memory;
+    use crate::perception::{GroundTruthIds, Perception as _};
+    use crate::test_support::{Toy, ToyObject};
+    use chaic_protocol::{ClassId, Hand};
+
+    /// A memory of a room with one object straight ahead.
+    fn memory_of(class: &str) -> (Memory, Briefing, EntityId) {
+        let mut toy = Toy::room(8.0, 8.0);
+        let entity = toy.add(ToyObject::new(class, [0.0, 0.0, -2.5], [0.5, 0.5, 0.5]));
+        toy.stand([0.0, 0.0], 0.0);
+        let mut briefing = toy.briefing();
+        briefing.goal_place = ClassId::named(class);
+        let mut memory = Memory::new(&briefing);
+        let observation = toy.observe();
+        memory.update(&briefing, &observation, &GroundTruthIds.perceive(&observation));
+        (memory, briefing, entity)
+    }
+
+    #[test]
+    fn failures_and_what_is_learned_from_them() {
+        use FailureReason::*;
+        // After one failed attempt: available now, after 300, after 500, after 2000 frames.
+        for (reason, expected) in [
+            (BeyondLimits, [false, false, true, true]),
+            (HeldByOther, [false, true, true, true]),
+            (Impossible, [false, false, false, true]),
+            (OutOfPlay, [false, false, false, false]),
+            (Broke, [false, false, false, false]),
+            (Blocked, [true, true, true, true]),
+            (HandFull, [true, true, true, true]),
+        ] {
+            let (mut memory, briefing, apple) = memory_of("apple");
+            let action = Action::PickUp { object: apple, hand: Hand::Left };
+            learn(&mut memory, &briefing, (action, Outcome::Failure(reason)), &[], &[], false);
+            let thing = memory.things.get(apple).expect("seen");
+            let got = [0, 300, 500, 2000].map(|frame| thing.is_available(frame));
+            assert_eq!(got, expected, "{reason}");
+        }
+    }
+
+    #[test]
+    fn what_is_put_on_the_goal_place_is_delivered_and_the_place_never_forgotten() {
+        let (mut memory, briefing, place) = memory_of("bed");
+        let apple = EntityId(40);
+        let action = Action::PutOn { place, hand: Hand::Left };
+        let failed = Outcome::Failure(FailureReason::BeyondLimits);
+        learn(&mut memory, &briefing, (action, failed), &[apple], &[], false);
+        assert!(memory.things.get(place).expect("seen").is_available(0));
+        assert!(memory.delivered.is_empty());
+        learn(&mut memory, &briefing, (action, Outcome::Success), &[apple], &[], false);
+        assert!(memory.delivered.contains(&apple));
+    }
+}

@@ -1,0 +1,307 @@
+//! Carrying out plans, one action at a time.
+
+pub mod path;
+
+pub mod navigate;
+
+pub mod explore;
+pub mod follow;
+pub mod interact;
+pub mod recover;
+
+use chaic_protocol::briefing::Relation;
+use chaic_protocol::observation::SelfState;
+use chaic_protocol::rng::Stream;
+use chaic_protocol::{
+    Action, Briefing, EntityId, FailureReason, Frame, Hand, Outcome, Role,
+};
+
+use crate::decision::{Load, Plan};
+use crate::memory::Memory;
+use explore::{EXPLORE_FRAMES, Explorer, Found};
+use follow::{Follow, Follower};
+use interact::{Interaction, PICK_WITHIN_M, PUT_WITHIN_M, Step};
+use navigate::Navigator;
+use recover::Recovery;
+
+/// Picking up, putting and removing take at most so long, frames (original facts 2.1).
+pub const INTERACT_FRAMES: Frame = 1000;
+/// The partner is followed for so long, frames (original facts 2.1).
+pub const FOLLOW_FRAMES: Frame = 250;
+/// The child is followed for so long, frames (original facts 2.1).
+pub const CHILD_FRAMES: Frame = 300;
+/// How near to stay to the partner, metres.
+const PARTNER_M: f32 = 2.2;
+/// How near to get to the child, metres: it comes back from 2.5 m (original facts 2.4).
+const CHILD_M: f32 = 1.9;
+/// How long to stand beside the child, frames: it decides every 18 frames or so.
+const CHILD_STAND_FRAMES: Frame = 30;
+/// Turns of a turn-around: with a view of 90 degrees, everything is seen.
+const AROUND_TURNS: u32 = 18;
+/// A wait lasts so long, frames (original facts 2.1).
+const WAIT_FRAMES: u32 = 10;
+/// Lifts tried together before giving up.
+const LIFTS_TOGETHER: u32 = 8;
+
+/// What the executor says of the plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// Do this next.
+    Act(Action),
+    /// The plan is carried out.
+    Done,
+    /// The plan can't be carried out.
+    Failed,
+}
+
+/// What carrying out a plan needs to know.
+#[derive(Debug)]
+pub struct Situation<'a> {
+    /// What the mind remembers.
+    pub memory: &'a mut Memory,
+    /// The own body.
+    pub own: &'a SelfState,
+    /// What the mind was told.
+    pub briefing: &'a Briefing,
+}
+
+/// Carries out one plan after the other.
+#[derive(Clone, Debug)]
+pub struct Executor {
+    navigator: Navigator,
+    recovery: Recovery,
+    explorer: Explorer,
+    follower: Follower,
+    interaction: Interaction,
+    rng: Stream,
+    since: Frame,
+    n_turns: u32,
+    n_lifts: u32,
+    near_since: Option<Frame>,
+    place: Option<EntityId>,
+    /// Whether the last action was the deed that the plan is for.
+    has_acted: bool,
+}
+
+impl Executor {
+    /// Ready to carry out plans of this episode.
+    pub fn new(briefing: &Briefing) -> Executor {
+        Executor {
+            navigator: Navigator::default(),
+            recovery: Recovery::default(),
+            explorer: Explorer::new(briefing.bounds),
+            follower: Follower::default(),
+            interaction: Interaction::default(),
+            rng: Stream::new(briefing.seed, "execution", 0),
+            since: 0,
+            n_turns: 0,
+            n_lifts: 0,
+            near_since: None,
+            place: None,
+            has_acted: false,
+        }
+    }
+
+    /// Whether everything that can be got to has been explored.
+    pub fn is_explored(&self) -> bool {
+        self.explorer.is_exhausted()
+    }
+
+    /// When the present plan began.
+    pub fn since(&self) -> Frame {
+        self.since
+    }
+
+    /// Begins a plan.
+    pub fn begin(&mut self, now: Frame) {
+        self.navigator.reset();
+        self.recovery.reset();
+        self.follower = Follower::default();
+        self.interaction = Interaction::default();
+        self.since = now;
+        (self.n_turns, self.n_lifts) = (0, 0);
+        (self.near_since, self.place, self.has_acted) = (None, None, false);
+    }
+
+    /// The next action of `plan`.
+    pub fn step(&mut self, plan: &Plan, s: &mut Situation<'_>) -> Progress {
+        let elapsed = s.memory.frame.saturating_sub(self.since);
+        if elapsed > time_limit(plan) {
+            self.give_up(plan, s);
+            return Progress::Failed;
+        }
+        let is_standing = matches!(plan, Plan::PutIn | Plan::TurnAround | Plan::Wait);
+        if is_standing || self.has_acted {
+            self.recovery.stand();
+        }
+        if !is_standing {
+            if let Some(action) = self.recovery.step(s.memory, s.own.last, &mut self.rng) {
+                return Progress::Act(action);
+            }
+            if self.recovery.is_hopeless() {
+                self.recovery = Recovery::default();
+                self.give_up(plan, s);
+                return Progress::Failed;
+            }
+        }
+        match *plan {
+            Plan::Explore => match self.explorer.step(s.memory, &mut self.navigator) {
+                Found::Act(action) => Progress::Act(action),
+                Found::Resolved => Progress::Done,
+            },
+            Plan::PickUp(subject) | Plan::PickContainer(subject) => {
+                self.pick(subject.entity, s, false)
+            }
+            Plan::LiftWith(subject) => self.pick(subject.entity, s, true),
+            Plan::RemoveObstacle(subject) => self.remove(subject.entity, s),
+            Plan::PutIn => self.put_in(s),
+            Plan::Deliver => self.deliver(s),
+            Plan::FollowPartner => self.follow(Relation::Partner, PARTNER_M, s),
+            Plan::FollowChild => self.follow(Relation::Child, CHILD_M, s),
+            Plan::TurnAround => {
+                self.n_turns += 1;
+                let is_done = self.n_turns > AROUND_TURNS;
+                if is_done { Progress::Done } else { Progress::Act(Action::TurnLeft) }
+            }
+            Plan::Wait => {
+                self.n_turns += 1;
+                let action = Action::Wait { frames: WAIT_FRAMES };
+                if self.n_turns > 1 { Progress::Done } else { Progress::Act(action) }
+            }
+        }
+    }
+
+    /// After a timeout, or being stuck for good: does not try the same again at once.
+    fn give_up(&mut self, plan: &Plan, s: &mut Situation<'_>) {
+        match plan {
+            Plan::Explore => self.explorer.give_up(s.memory.frame),
+            Plan::PickUp(subject)
+            | Plan::PickContainer(subject)
+            | Plan::LiftWith(subject)
+            | Plan::RemoveObstacle(subject) => {
+                let until = s.memory.frame + crate::memory::semantic::IGNORE_FRAMES;
+                s.memory.things.ignore(subject.entity, until);
+            }
+            _ => {}
+        }
+    }
+
+    /// Whether the deed of the plan was just done, and how it ended.
+    fn deed(&mut self, s: &Situation<'_>, subject: EntityId) -> Option<Outcome> {
+        let (action, outcome) = s.own.last?;
+        let mine = std::mem::take(&mut self.has_acted) && action.subject() == Some(subject);
+        if mine
+            && let Outcome::Failure(FailureReason::Blocked | FailureReason::TooFar) = outcome
+        {
+            self.interaction.note_bad_place(s.memory.here());
+            self.navigator.reset();
+        }
+        mine.then_some(outcome)
+    }
+
+    fn pick(&mut self, entity: EntityId, s: &mut Situation<'_>, together: bool) -> Progress {
+        match self.deed(s, entity) {
+            Some(Outcome::Success) => return Progress::Done,
+            Some(Outcome::Failure(_)) => self.n_lifts += 1,
+            None => {}
+        }
+        if s.own.held().any(|h| h.entity == entity) {
+            return Progress::Done;
+        }
+        let load = Load::of(s.own, s.briefing);
+        let now = s.memory.frame;
+        let Some(thing) = s.memory.things.get(entity) else { return Progress::Failed };
+        let is_heavy = thing.class.info().role == Role::HeavyTarget;
+        let ignored = !together && now < thing.ignore_until;
+        if !thing.is_present || thing.is_gone || now < thing.held_until || ignored {
+            return Progress::Failed;
+        }
+        let Some(hand) = load.free_hand else { return Progress::Failed };
+        if together && self.n_lifts >= LIFTS_TOGETHER {
+            return Progress::Failed;
+        }
+        let hand = if is_heavy { Hand::Left } else { hand };
+        let act = Action::PickUp { object: entity, hand };
+        self.approach(entity, PICK_WITHIN_M, act, s)
+    }
+
+    fn remove(&mut self, entity: EntityId, s: &mut Situation<'_>) -> Progress {
+        match self.deed(s, entity) {
+            Some(Outcome::Success) => return Progress::Done,
+            Some(Outcome::Failure(_)) | None => {}
+        }
+        let now = s.memory.frame;
+        let there = s.memory.things.get(entity).is_some_and(|t| t.is_available(now));
+        let (true, Some(hand)) = (there, Load::of(s.own, s.briefing).free_hand) else {
+            return Progress::Failed;
+        };
+        self.approach(entity, PICK_WITHIN_M, Action::RemoveObstacle { obstacle: entity, hand }, s)
+    }
+
+    fn approach(
+        &mut self,
+        entity: EntityId,
+        within_m: f32,
+        act: Action,
+        s: &mut Situation<'_>,
+    ) -> Progress {
+        match self.interaction.step(s.memory, &mut self.navigator, entity, within_m) {
+            Step::Walk(action) => Progress::Act(action),
+            Step::There => {
+                self.has_acted = true;
+                Progress::Act(act)
+            }
+            Step::GiveUp => Progress::Failed,
+        }
+    }
+
+    fn put_in(&mut self, s: &mut Situation<'_>) -> Progress {
+        if std::mem::replace(&mut self.has_acted, true) {
+            let is_done = matches!(s.own.last, Some((Action::PutIn, o)) if o.is_success());
+            return if is_done { Progress::Done } else { Progress::Failed };
+        }
+        let can = Load::of(s.own, s.briefing).can_put_in;
+        if can { Progress::Act(Action::PutIn) } else { Progress::Failed }
+    }
+
+    fn deliver(&mut self, s: &mut Situation<'_>) -> Progress {
+        let Some(hand) = Load::of(s.own, s.briefing).to_deliver else { return Progress::Done };
+        if let Some(place) = self.place
+            && let Some(Outcome::Failure(FailureReason::Impossible)) = self.deed(s, place)
+        {
+            return Progress::Failed;
+        }
+        if self.place.is_none_or(|p| s.memory.things.get(p).is_none_or(|t| !t.is_present)) {
+            s.memory.refresh();
+            self.place = s.memory.goal_places().first().map(|(t, _)| t.entity);
+        }
+        let Some(place) = self.place else { return Progress::Failed };
+        self.approach(place, PUT_WITHIN_M, Action::PutOn { place, hand }, s)
+    }
+
+    fn follow(&mut self, relation: Relation, keep_m: f32, s: &mut Situation<'_>) -> Progress {
+        let Some(agent) = s.briefing.companion(relation) else { return Progress::Failed };
+        match self.follower.step(s.memory, &mut self.navigator, agent, keep_m) {
+            Follow::Act(action) => Progress::Act(action),
+            Follow::Near(action) => {
+                self.recovery.stand();
+                let since = *self.near_since.get_or_insert(s.memory.frame);
+                let stood = s.memory.frame.saturating_sub(since);
+                if relation == Relation::Child && stood > CHILD_STAND_FRAMES {
+                    return Progress::Done;
+                }
+                Progress::Act(action)
+            }
+            Follow::Lost => Progress::Failed,
+        }
+    }
+}
+
+fn time_limit(plan: &Plan) -> Frame {
+    match plan {
+        Plan::Explore => EXPLORE_FRAMES,
+        Plan::FollowPartner => FOLLOW_FRAMES,
+        Plan::FollowChild => CHILD_FRAMES,
+        _ => INTERACT_FRAMES,
+    }
+}

@@ -1,0 +1,267 @@
+//! Ways through the map: A* to a goal, and the cost of getting anywhere.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use chaic_protocol::Vec2;
+
+use crate::memory::costs::{CostMap, FREE, OCCUPIED};
+use crate::memory::grid::{CELL_M, Grid};
+
+/// Costs are multiplied by this for a straight step, so that a diagonal one is a whole number.
+const STRAIGHT: u32 = 10;
+const DIAGONAL: u32 = 14;
+/// Cost of a metre of free floor.
+const COST_PER_M: f32 = (FREE * STRAIGHT) as f32 / CELL_M;
+
+/// Working space of searches, kept so that a search allocates nothing.
+#[derive(Clone, Debug)]
+pub struct Search {
+    best: Vec<u32>,
+    from: Vec<u32>,
+    epoch_of: Vec<u32>,
+    epoch: u32,
+    queue: BinaryHeap<Reverse<(u32, u32)>>,
+}
+
+/// A way from cell to cell.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Path {
+    /// The cells, start and end included.
+    pub cells: Vec<usize>,
+    /// Its cost; see [`Reach::metres`].
+    pub cost: u32,
+}
+
+/// Where A* is to end.
+pub trait Goal {
+    /// Whether this cell will do.
+    fn is_goal(&self, cell: usize) -> bool;
+
+    /// A distance in metres that is certainly still to go from this cell.
+    fn at_least_m(&self, cell: usize) -> f32;
+}
+
+/// What a step into `cell` costs; `None` if it cuts an occupied corner.
+fn step_cost(costs: &[u32], grid: &Grid, from: usize, cell: usize, diagonal: bool) -> Option<u32> {
+    if !diagonal {
+        return Some(costs[cell].saturating_mul(STRAIGHT));
+    }
+    let ((i0, j0), (i1, j1)) = (grid.column_row(from), grid.column_row(cell));
+    let corners = [j0 * grid.nx() + i1, j1 * grid.nx() + i0];
+    let cuts = corners.iter().any(|c| costs[*c] >= OCCUPIED);
+    (!cuts).then(|| costs[cell].saturating_mul(DIAGONAL))
+}
+
+impl Search {
+    /// Working space for maps of this many cells.
+    pub fn new(n_cells: usize) -> Search {
+        Search {
+            best: vec![0; n_cells],
+            from: vec![0; n_cells],
+            epoch_of: vec![0; n_cells],
+            epoch: 0,
+            queue: BinaryHeap::new(),
+        }
+    }
+
+    fn begin(&mut self, start: usize) {
+        self.epoch += 1;
+        self.queue.clear();
+        self.improve(start, start, 0, 0);
+    }
+
+    fn improve(&mut self, cell: usize, from: usize, cost: u32, still: u32) {
+        if self.epoch_of[cell] != self.epoch || cost < self.best[cell] {
+            self.epoch_of[cell] = self.epoch;
+            self.best[cell] = cost;
+            self.from[cell] = from as u32;
+            self.queue.push(Reverse((cost.saturating_add(still), cell as u32)));
+        }
+    }
+
+    /// The cheapest way from `start` to any goal cell, 8-connected, if it costs at most `limit`.
+    /// Nothing is impassable, but occupied cells and walls cost more than any detour.
+    pub fn a_star(
+        &mut self,
+        grid: &Grid,
+        costs: &[u32],
+        start: usize,
+        goal: &impl Goal,
+        limit: u32,
+    ) -> Option<Path> {
+        self.begin(start);
+        // Rounded down, so that it never exceeds the true cost.
+        let still = |cell: usize| (goal.at_least_m(cell).max(0.0) * COST_PER_M) as u32;
+        while let Some(Reverse((estimate, cell))) = self.queue.pop() {
+            let cell = cell as usize;
+            let cost = self.best[cell];
+            if cost > limit {
+                return None;
+            }
+            if estimate > cost.saturating_add(still(cell)) {
+                continue;
+            }
+            if goal.is_goal(cell) {
+                return Some(Path { cells: self.trace(start, cell), cost });
+            }
+            for (next, diagonal) in grid.neighbors(cell) {
+                if let Some(step) = step_cost(costs, grid, cell, next, diagonal) {
+                    let total = cost.saturating_add(step);
+                    if self.epoch_of[next] != self.epoch || total < self.best[next] {
+                        self.improve(next, cell, total, still(next));
+                    }
+                }
+            }
+        }
+        None
+    }
+
+    fn trace(&self, start: usize, end: usize) -> Vec<usize> {
+        let mut cells = vec![end];
+        let mut cell = end;
+        while cell != start {
+            cell = self.from[cell] as usize;
+            cells.push(cell);
+        }
+        cells.reverse();
+        cells
+    }
+}
+
+/// The cost of getting from one place to every cell without passing occupied ones.
+#[derive(Clone, Debug)]
+pub struct Reach {
+    cost: Vec<u32>,
+}
+
+impl Reach {
+    /// Dijkstra's algorithm from `here` over everything that is not occupied.
+    pub fn from(costs: &CostMap, here: Vec2, search: &mut Search) -> Reach {
+        let mut reach = Reach { cost: vec![u32::MAX; costs.grid().n_cells()] };
+        let Some(start) = costs.grid().cell_at(here) else { return reach };
+        search.begin(start);
+        while let Some(Reverse((cost, cell))) = search.queue.pop() {
+            let cell = cell as usize;
+            if cost > search.best[cell] {
+                continue;
+            }
+            reach.cost[cell] = cost;
+            for (next, diagonal) in costs.grid().neighbors(cell) {
+                if costs.is_blocked(next) {
+                    continue;
+                }
+                if let Some(step) = step_cost(costs.costs(), costs.grid(), cell, next, diagonal) {
+                    search.improve(next, cell, cost.saturating_add(step), 0);
+                }
+            }
+        }
+        reach
+    }
+
+    /// The cost of getting to a cell, if one can.
+    pub fn cost(&self, cell: usize) -> Option<u32> {
+        self.cost.get(cell).copied().filter(|c| *c < u32::MAX)
+    }
+
+    /// The length of free floor that costs as much, metres.
+    pub fn metres(cost: u32) -> f32 {
+        cost as f32 / COST_PER_M
+    }
+}
+
+/// A goal that is one cell.
+#[derive(Clone, Copy, Debug)]
+pub struct ToCell {
+    /// The lattice.
+    pub grid: Grid,
+    /// The cell.
+    pub cell: usize,
+}
+
+impl Goal for ToCell {
+    fn is_goal(&self, cell: usize) -> bool {
+        cell == self.cell
+    }
+
+    fn at_least_m(&self, cell: usize) -> f32 {
+        self.grid.center(cell).distance(self.grid.center(self.cell))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chaic_protocol::geom::Rect;
+    use chaic_protocol::rng::Stream;
+
+    /// The same problem for the `pathfinding` crate.
+    fn oracle(grid: &Grid, costs: &[u32], start: usize, end: usize) -> u32 {
+        pathfinding::prelude::dijkstra(
+            &start,
+            |cell| {
+                let from = *cell;
+                grid.neighbors(from)
+                    .filter_map(|(n, d)| Some((n, step_cost(costs, grid, from, n, d)?)))
+                    .collect::<Vec<_>>()
+            },
+            |cell| *cell == end,
+        )
+        .map_or(u32::MAX, |(_, cost)| cost)
+    }
+
+    #[test]
+    fn a_star_is_as_good_as_the_oracle_on_random_maps() {
+        let grid = Grid::over(&Rect::new([0.0, 0.0], [2.0, 1.0]));
+        let n = grid.n_cells();
+        let mut search = Search::new(n);
+        for seed in 0..60 {
+            let mut rng = Stream::new(seed, "a star", 0);
+            let costs: Vec<u32> = (0..n)
+                .map(|_| match rng.below(10) {
+                    0..5 => FREE,
+                    5..7 => 35,
+                    7 => 610,
+                    _ => OCCUPIED,
+                })
+                .collect();
+            let (start, end) = (rng.below(n), rng.below(n));
+            let expected = oracle(&grid, &costs, start, end);
+            match search.a_star(&grid, &costs, start, &ToCell { grid, cell: end }, u32::MAX) {
+                Some(path) => {
+                    assert_eq!(path.cost, expected, "seed {seed}");
+                    assert_eq!((path.cells[0], *path.cells.last().unwrap()), (start, end));
+                    let walked: u32 = path
+                        .cells
+                        .windows(2)
+                        .map(|w| {
+                            let (_, d) = grid.neighbors(w[0]).find(|(c, _)| *c == w[1]).unwrap();
+                            step_cost(&costs, &grid, w[0], w[1], d).unwrap()
+                        })
+                        .sum();
+                    assert_eq!(walked, path.cost);
+                }
+                None => assert_eq!(expected, u32::MAX, "seed {seed}"),
+            }
+        }
+    }
+
+    #[test]
+    fn reach_agrees_with_a_star_and_stops_at_walls() {
+        let plan = crate::test_support::Plan2d::parse(
+            "..........#.....
+             ..........#.....
+             ....#.....#.....
+             ....#.....#.....
+             ....#.....#.....",
+        );
+        let costs = plan.costs(0.05);
+        let grid = *costs.grid();
+        let mut search = Search::new(grid.n_cells());
+        let reach = Reach::from(&costs, grid.center(64), &mut search);
+        let to = 64 + 9;
+        let path = search.a_star(&grid, costs.costs(), 64, &ToCell { grid, cell: to }, u32::MAX).unwrap();
+        assert_eq!(reach.cost(to), Some(path.cost));
+        assert_eq!(reach.cost(64 + 15), None);
+    }
+}

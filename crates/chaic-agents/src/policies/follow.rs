@@ -1,0 +1,33 @@
+//! Always beside the partner: for collecting videos of what people do.
+
+use chaic_protocol::Briefing;
+
+use crate::decision::{Context, Plan, Policy};
+
+/// Follows the partner, and looks for it when it is lost.
+#[derive(Clone, Debug, Default)]
+pub struct Follow {
+    was_around: bool,
+}
+
+impl Policy for Follow {
+    fn reset(&mut self, _: &Briefing) {
+        self.was_around = false;
+    }
+
+    fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
+        // A sighting that led nowhere is 60 frames old by then.
+        let is_fresh = context.memory.people.iter().any(|p| p.frame + 60 > context.memory.frame);
+        if valid.contains(&Plan::FollowPartner) && is_fresh {
+            self.was_around = false;
+            return Plan::FollowPartner;
+        }
+        if std::mem::replace(&mut self.was_around, true) { Plan::Explore } else { Plan::TurnAround }
+    }
+
+    fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, _: bool) -> bool {
+        let partner = chaic_protocol::briefing::Relation::Partner;
+        let person = context.memory.companion(context.briefing, partner);
+        *current != Plan::FollowPartner && person.is_some_and(|p| p.is_in_view)
+    }
+}

@@ -1,0 +1,373 @@
+//! The handwritten rules of the paper (section 5.1.1), for partners and helpers alike.
+
+use chaic_protocol::briefing::{Goal, Relation};
+use chaic_protocol::geom::horizontal_distance;
+use chaic_protocol::{Briefing, ClassId, EntityId, FailureReason, Frame, Outcome, Role};
+
+use crate::decision::{Context, Load, Plan, Policy, Subject};
+use crate::memory::Person;
+
+/// A plan under way is looked at again after so long, frames.
+const RECONSIDER_FRAMES: Frame = 40;
+/// What the partner held counts for so long after it was seen, frames.
+const HOLDINGS_FRAMES: Frame = 300;
+/// Time to look out for, beyond the walk to the goal place, frames.
+const SPARE_FRAMES: f32 = 120.0;
+/// Walking as it is, turns included, takes longer than the way at full speed by this factor.
+const WALK_FACTOR: f32 = 1.5;
+/// Ways not walked yet are longer than straight by this factor.
+const DETOUR_FACTOR: f32 = 1.4;
+/// A container for fewer wanted objects than this makes no sense: two hands will do.
+const MIN_FOR_CONTAINER: u32 = 3;
+/// Child and guardian this far apart, both in view, is an emergency, metres (original facts 2.1).
+const APART_SEEN_M: f32 = 3.5;
+/// The same for sightings of the last 50 frames, metres.
+const APART_REMEMBERED_M: f32 = 5.5;
+/// Sightings older than this are not compared, frames.
+const FRESH_FRAMES: Frame = 50;
+/// Child or guardian unseen for so long is looked for, frames (original facts 2.4: 200).
+const UNSEEN_FRAMES: Frame = 300;
+/// After standing beside the child, it may come back by itself for so long, frames.
+const TRUST_CHILD_FRAMES: Frame = 250;
+/// A failed lift of the partner calls for help for so long, frames.
+const CALL_FRAMES: Frame = 300;
+
+/// Which objects one goes for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wanted {
+    /// What the goal asks for and is neither delivered nor in hand.
+    ByGoal,
+    /// Whatever may be a target.
+    AnyPossible,
+}
+
+/// Which of several wanted objects comes first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TargetOrder {
+    /// The nearest.
+    Nearest,
+    /// The heaviest that one can lift alone; then the nearest.
+    HeaviestLiftable,
+}
+
+/// What distinguishes one rule-based mind from another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RuleProfile {
+    /// Which objects it goes for.
+    pub wanted: Wanted,
+    /// In which order.
+    pub order: TargetOrder,
+    /// Whether it clears obstacles away.
+    pub removes_obstacles: bool,
+    /// Whether it looks after the child.
+    pub minds_child: bool,
+    /// Whether it helps the partner lift what is too heavy for one.
+    pub lifts_together: bool,
+    /// With more than this part of the time left, a container comes first.
+    pub container_above: f32,
+    /// With less than this part of the time left, what is carried is delivered at once.
+    pub deliver_below: f32,
+    /// The same while no goal place is known.
+    pub deliver_below_unknown: f32,
+}
+
+impl RuleProfile {
+    /// The constrained partner (paper section 5.1.1).
+    pub const PARTNER: RuleProfile = RuleProfile {
+        wanted: Wanted::ByGoal,
+        order: TargetOrder::Nearest,
+        removes_obstacles: false,
+        minds_child: false,
+        lifts_together: false,
+        container_above: 0.5,
+        deliver_below: 0.25,
+        deliver_below_unknown: 0.375,
+    };
+    /// The rider: delivers in the last 1000 of 3000 frames, 1500 with the goal place unknown
+    /// (original facts 2.4).
+    pub const RIDER: RuleProfile = RuleProfile {
+        deliver_below: 1.0 / 3.0,
+        deliver_below_unknown: 0.5,
+        ..RuleProfile::PARTNER
+    };
+    /// The rule-based helper (paper, "Detailed Rules for RHP").
+    pub const RHP: RuleProfile = RuleProfile {
+        wanted: Wanted::AnyPossible,
+        removes_obstacles: true,
+        minds_child: true,
+        ..RuleProfile::PARTNER
+    };
+    /// The oracle: knows the goal and what is done.
+    pub const ORACLE: RuleProfile = RuleProfile {
+        wanted: Wanted::ByGoal,
+        order: TargetOrder::HeaviestLiftable,
+        lifts_together: true,
+        ..RuleProfile::RHP
+    };
+}
+
+/// Chooses by the paper's rules.
+#[derive(Clone, Debug)]
+pub struct Rules {
+    profile: RuleProfile,
+    has_looked_around: bool,
+    last_around: Frame,
+    last_choice: Frame,
+    beside_child: Option<Frame>,
+}
+
+impl Rules {
+    /// Rules of this profile.
+    pub fn new(profile: RuleProfile) -> Rules {
+        Rules {
+            profile,
+            has_looked_around: false,
+            last_around: 0,
+            last_choice: 0,
+            beside_child: None,
+        }
+    }
+
+    /// The child's rules (original facts 2.4), before all others.
+    fn mind_child(&mut self, context: &Context<'_>) -> Option<Plan> {
+        let (memory, now) = (context.memory, context.memory.frame);
+        let child = context.briefing.companion(Relation::Child)?;
+        if !self.profile.minds_child {
+            return None;
+        }
+        let guardian = memory.companion(context.briefing, Relation::Partner);
+        let child = memory.people.get(child);
+        let beside = |c: &Person| c.is_in_view && horizontal_distance(memory.pose.position, c.position_in_world) < 2.3;
+        if child.is_some_and(beside) {
+            self.beside_child.get_or_insert(now);
+        }
+        // The child turns back at its next decision; from then on it needs no company.
+        let trusted = self
+            .beside_child
+            .is_some_and(|since| now > since + 30 && now < since + TRUST_CHILD_FRAMES);
+        if self.beside_child.is_some_and(|since| now >= since + TRUST_CHILD_FRAMES) {
+            self.beside_child = None;
+        }
+        if let (Some(g), Some(c)) = (guardian, child) {
+            let apart = horizontal_distance(g.position_in_world, c.position_in_world);
+            let both_in_view = g.is_in_view && c.is_in_view;
+            let both_fresh = g.frame.min(c.frame) + FRESH_FRAMES > now;
+            let away = (both_in_view && apart > APART_SEEN_M)
+                || (both_fresh && apart > APART_REMEMBERED_M);
+            if away && !trusted {
+                return Some(Plan::FollowChild);
+            }
+        }
+        let unseen = |p: Option<&Person>| p.map_or(0, |p| p.frame) + UNSEEN_FRAMES < now;
+        let is_lost = unseen(guardian) || unseen(child);
+        (is_lost && self.last_around + UNSEEN_FRAMES < now).then(|| {
+            self.last_around = now;
+            Plan::TurnAround
+        })
+    }
+
+    /// Targets among the valid plans that are wanted and for which there is time, best first.
+    fn targets(&self, context: &Context<'_>, valid: &[Plan], need: &Need<'_>) -> Vec<Subject> {
+        let mut found: Vec<Subject> = valid
+            .iter()
+            .filter_map(|plan| match plan {
+                Plan::PickUp(subject) => Some(*subject),
+                _ => None,
+            })
+            .filter(|s| need.wants(s.class) && there_is_time(context, s.entity))
+            .collect();
+        if self.profile.order == TargetOrder::HeaviestLiftable {
+            let strength_kg = context.briefing.capability.strength_kg;
+            let rank = |s: &Subject| {
+                let info = s.class.info();
+                match info.role {
+                    Role::HeavyTarget if info.mass_kg <= strength_kg => -info.mass_kg,
+                    _ => 0.0,
+                }
+            };
+            found.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
+        }
+        found
+    }
+
+    /// The piece that the partner can't manage and one should lift with it.
+    fn to_lift_together(&self, context: &Context<'_>, valid: &[Plan]) -> Option<Plan> {
+        if !self.profile.lifts_together {
+            return None;
+        }
+        let now = context.memory.frame;
+        let tried = context.behavior.last_pick().filter(|(seen, _)| {
+            let failed = Outcome::Failure(FailureReason::BeyondLimits);
+            seen.frame + CALL_FRAMES > now && seen.outcome.is_none_or(|o| o == failed)
+        });
+        let strength_kg = context.briefing.capability.strength_kg;
+        valid.iter().copied().find(|plan| match plan {
+            Plan::LiftWith(it) => {
+                it.class.info().mass_kg > strength_kg
+                    || tried.is_some_and(|(seen, object)| {
+                        object == it.entity && seen.outcome.is_some()
+                    })
+            }
+            _ => false,
+        })
+    }
+}
+
+impl Policy for Rules {
+    fn reset(&mut self, _: &Briefing) {
+        *self = Rules::new(self.profile);
+    }
+
+    fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
+        self.last_choice = context.memory.frame;
+        if !std::mem::replace(&mut self.has_looked_around, true) {
+            return Plan::TurnAround;
+        }
+        let load = Load::of(context.own, context.briefing);
+        let need = Need::of(context, &load, self.profile.wanted);
+        let is_valid = |plan: Plan| valid.contains(&plan).then_some(plan);
+        // Delivering needs a goal place: without one, look for it.
+        let deliver = is_valid(Plan::Deliver).unwrap_or(Plan::Explore);
+        let carries = load.to_deliver.is_some();
+        if let Some(plan) = self.mind_child(context) {
+            return plan;
+        }
+        if let Some(plan) = is_valid(Plan::PutIn) {
+            return plan;
+        }
+        if carries && (!load.can_take_target || must_go(context, &self.profile)) {
+            return deliver;
+        }
+        if self.profile.removes_obstacles
+            && let Some(plan) = valid.iter().find(|p| matches!(p, Plan::RemoveObstacle(_)))
+        {
+            return *plan;
+        }
+        let left = part_left(context);
+        if left > self.profile.container_above
+            && need.n_left() >= MIN_FOR_CONTAINER
+            && let Some(plan) = valid.iter().find(|p| matches!(p, Plan::PickContainer(_)))
+        {
+            return *plan;
+        }
+        if let Some(plan) = self.to_lift_together(context, valid) {
+            return plan;
+        }
+        if let Some(subject) = self.targets(context, valid, &need).first() {
+            return Plan::PickUp(*subject);
+        }
+        if carries && (need.is_nothing_left() || context.is_explored) {
+            return deliver;
+        }
+        Plan::Explore
+    }
+
+    fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, is_news: bool) -> bool {
+        if matches!(current, Plan::Deliver | Plan::PutIn | Plan::LiftWith(_)) {
+            // What is under way for good is only left for the child.
+            return !matches!(current, Plan::PutIn) && self.child_calls(context);
+        }
+        if matches!(current, Plan::FollowChild) {
+            return false;
+        }
+        is_news
+            || self.child_calls(context)
+            || context.memory.frame >= self.last_choice + RECONSIDER_FRAMES
+    }
+}
+
+impl Rules {
+    /// Whether the child's rules would interrupt now. A copy is asked, so that nothing is noted.
+    fn child_calls(&self, context: &Context<'_>) -> bool {
+        self.has_looked_around && self.clone().mind_child(context) == Some(Plan::FollowChild)
+    }
+}
+
+/// What is still wanted.
+struct Need<'a> {
+    goal: Option<&'a Goal>,
+    /// Delivered or held, by class.
+    done: Vec<ClassId>,
+}
+
+impl<'a> Need<'a> {
+    fn of(context: &Context<'a>, load: &Load, wanted: Wanted) -> Need<'a> {
+        let goal = match wanted {
+            Wanted::ByGoal => context.briefing.goal.as_ref(),
+            Wanted::AnyPossible => None,
+        };
+        let memory = context.memory;
+        let mut done: Vec<ClassId> =
+            memory.delivered.iter().filter_map(|e| memory.class_of(*e)).collect();
+        done.extend(load.targets.iter().map(|(_, class)| *class));
+        let behavior = context.behavior;
+        if behavior.partner_holds_frame.is_some_and(|f| f + HOLDINGS_FRAMES > memory.frame) {
+            let still = behavior.partner_holds.iter().filter(|(e, _)| !memory.delivered.contains(e));
+            done.extend(still.map(|(_, class)| *class));
+        }
+        Need { goal, done }
+    }
+
+    fn missing(&self, class: ClassId, wanted: u32) -> u32 {
+        let done = self.done.iter().filter(|c| **c == class).count();
+        wanted.saturating_sub(done as u32)
+    }
+
+    fn wants(&self, class: ClassId) -> bool {
+        self.goal.is_none_or(|goal| self.missing(class, goal.wanted(class)) > 0)
+    }
+
+    /// How many objects are wanted yet; many if nobody knows.
+    fn n_left(&self) -> u32 {
+        self.goal.map_or(u32::MAX, |goal| {
+            goal.targets.iter().map(|(class, n)| self.missing(*class, *n)).sum()
+        })
+    }
+
+    fn is_nothing_left(&self) -> bool {
+        self.n_left() == 0
+    }
+}
+
+fn part_left(context: &Context<'_>) -> f32 {
+    let horizon = context.briefing.horizon.max(1);
+    horizon.saturating_sub(context.memory.frame) as f32 / horizon as f32
+}
+
+fn frames_left(context: &Context<'_>) -> f32 {
+    context.briefing.horizon.saturating_sub(context.memory.frame) as f32
+}
+
+/// Frames to walk so far.
+fn frames_for(context: &Context<'_>, way_m: f32) -> f32 {
+    WALK_FACTOR * way_m / context.briefing.capability.speed_m_per_frame.max(1e-3)
+}
+
+/// Whether what is carried must be brought now: by the paper's rule, or because the way is long.
+fn must_go(context: &Context<'_>, profile: &RuleProfile) -> bool {
+    let place = context.memory.goal_places().first().map(|(_, way_m)| *way_m);
+    let below = match place {
+        Some(_) => profile.deliver_below,
+        None => profile.deliver_below_unknown,
+    };
+    let is_far =
+        place.is_some_and(|m| frames_left(context) < frames_for(context, m) + 2.0 * SPARE_FRAMES);
+    part_left(context) < below || is_far
+}
+
+/// Whether there is time to fetch an object and bring it to a known goal place.
+fn there_is_time(context: &Context<'_>, entity: EntityId) -> bool {
+    let memory = context.memory;
+    let Some(thing) = memory.things.get(entity) else { return false };
+    let at = chaic_protocol::geom::xz(thing.position_in_world);
+    let places = memory.goal_places();
+    let onward_m = places.iter().map(|(place, _)| place.distance_from(at)).min_by(f32::total_cmp);
+    let (Some(onward_m), Some(way_m)) = (onward_m, memory.way_to(thing)) else { return true };
+    // The way may be made long by narrow places: never take it for more than twice the straight.
+    let way_m = way_m.min(2.0 * thing.distance_from(memory.here()) + 2.0);
+    let needed = frames_for(context, way_m + DETOUR_FACTOR * onward_m) + SPARE_FRAMES;
+    frames_left(context) > needed
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,423 @@
+//! A toy world for tests: boxes in a room, a tiny ray caster, and one body that walks, picks up
+//! and puts down without ever failing by chance.
+
+use std::sync::Arc;
+
+use chaic_protocol::briefing::{Companion, Goal, Relation};
+use chaic_protocol::capability::Persona;
+use chaic_protocol::geom::{Camera, Pose, Rect, forward, wrap_angle, xz, yaw_rotation};
+use chaic_protocol::observation::{Grants, Granted, Held, Images, SelfState};
+use chaic_protocol::{
+    Action, Agent, AgentId, Briefing, ClassId, EntityId, FailureReason, Frame, Hand, Observation,
+    Outcome, Role, Vec2, Vec3,
+};
+
+use crate::memory::costs::CostMap;
+use crate::memory::grid::Grid;
+use crate::memory::occupancy::{OccupancyMap, Space};
+use crate::memory::{Memory, People, SemanticMap};
+use crate::perception::{GroundTruthIds, Perception as _};
+
+/// A thing of the toy world: an upright box of a class.
+pub struct ToyObject {
+    class: ClassId,
+    low: Vec3,
+    high: Vec3,
+}
+
+impl ToyObject {
+    /// `at` is the middle of its bottom; `size` its extents.
+    pub fn new(class: &str, at: [f32; 3], size: [f32; 3]) -> ToyObject {
+        let (at, half) = (Vec3::from(at), 0.5 * Vec3::new(size[0], 0.0, size[2]));
+        ToyObject {
+            class: ClassId::named(class),
+            low: at - half,
+            high: at + half + Vec3::new(0.0, size[1], 0.0),
+        }
+    }
+}
+
+struct Solid {
+    entity: EntityId,
+    low: Vec3,
+    high: Vec3,
+}
+
+impl Solid {
+    /// Depth at which the ray enters it.
+    fn hit(&self, eye: Vec3, direction: Vec3) -> Option<f32> {
+        let inverse = direction.recip();
+        let (a, b) = ((self.low - eye) * inverse, (self.high - eye) * inverse);
+        let enter = a.min(b).max_element();
+        let leave = a.max(b).min_element();
+        (enter <= leave && enter > 0.0).then_some(enter)
+    }
+
+    fn distance_from(&self, p: Vec2) -> f32 {
+        p.distance(p.clamp(xz(self.low), xz(self.high)))
+    }
+}
+
+/// A room with things in it and one body.
+pub struct Toy {
+    room: Rect,
+    solids: Vec<Solid>,
+    classes: Vec<Option<ClassId>>,
+    pose: Pose,
+    pub frame: Frame,
+    hands: [Option<Held>; 2],
+    pub delivered: Vec<EntityId>,
+    last: Option<(Action, Outcome)>,
+    size: u32,
+    radius_m: f32,
+    pub n_blocked: u32,
+}
+
+impl Toy {
+    /// An empty room around the origin, `width` along x, `depth` along z.
+    pub fn room(width: f32, depth: f32) -> Toy {
+        let (w, d) = (0.5 * width, 0.5 * depth);
+        let room = Rect::new([-w, -d], [w, d]);
+        let mut toy = Toy {
+            room,
+            solids: Vec::new(),
+            classes: vec![None; 16],
+            pose: Pose::default(),
+            frame: 0,
+            hands: [None, None],
+            delivered: Vec::new(),
+            last: None,
+            size: 128,
+            radius_m: 0.2,
+            n_blocked: 0,
+        };
+        toy.classes[8] = ClassId::by_name("person");
+        toy.classes[9] = ClassId::by_name("person");
+        toy.add_wall([-w - 0.1, -d - 0.1], [w + 0.1, -d]);
+        toy.add_wall([-w - 0.1, d], [w + 0.1, d + 0.1]);
+        toy.add_wall([-w - 0.1, -d], [-w, d]);
+        toy.add_wall([w, -d], [w + 0.1, d]);
+        toy
+    }
+
+    pub fn bounds(&self) -> Rect {
+        self.room
+    }
+
+    pub fn pixels(&self) -> u32 {
+        self.size * self.size
+    }
+
+    pub fn add_wall(&mut self, low: [f32; 2], high: [f32; 2]) {
+        self.solids.push(Solid {
+            entity: EntityId::WALL,
+            low: Vec3::new(low[0], 0.0, low[1]),
+            high: Vec3::new(high[0], 2.8, high[1]),
+        });
+    }
+
+    pub fn add(&mut self, object: ToyObject) -> EntityId {
+        let entity = EntityId(self.classes.len() as u16);
+        self.classes.push(Some(object.class));
+        self.solids.push(Solid { entity, low: object.low, high: object.high });
+        entity
+    }
+
+    pub fn remove(&mut self, entity: EntityId) {
+        self.solids.retain(|s| s.entity != entity);
+    }
+
+    pub fn stand(&mut self, at: [f32; 2], yaw_rad: f32) {
+        self.pose = Pose { position: Vec3::new(at[0], 0.0, at[1]), yaw_rad };
+    }
+
+    pub fn here(&self) -> Vec2 {
+        xz(self.pose.position)
+    }
+
+    pub fn class(&self, entity: EntityId) -> ClassId {
+        self.classes[usize::from(entity.0)].expect("an object has a class")
+    }
+
+    /// Puts something into a hand, without taking it out of the picture.
+    pub fn hold(&mut self, hand: usize, entity: EntityId) {
+        let class = self.class(entity);
+        self.hands[hand] = Some(Held { entity, class, contents: Vec::new() });
+    }
+
+    pub fn briefing(&self) -> Briefing {
+        let classes = |names: &[&str]| names.iter().map(|n| ClassId::named(n)).collect();
+        Briefing {
+            me: AgentId::HELPER,
+            capability: Persona::Helper.capability(),
+            companions: vec![Companion { agent: AgentId::PARTNER, relation: Relation::Partner }],
+            seed: 1,
+            horizon: 3000,
+            bounds: self.room,
+            possible_targets: classes(&["apple", "banana", "orange"]),
+            containers: classes(&["wicker_basket"]),
+            obstacles: classes(&["trashbin"]),
+            goal_place: ClassId::named("bed"),
+            goal_place_min_top_m: 0.0,
+            delivery_radius_m: 2.0,
+            container_capacity: 3,
+            grants: Grants::IDS,
+            goal: None,
+        }
+    }
+
+    pub fn goal(wanted: &[(&str, u32)]) -> Option<Goal> {
+        Some(Goal { targets: wanted.iter().map(|(c, n)| (ClassId::named(c), *n)).collect() })
+    }
+
+    pub fn observe(&self) -> Observation {
+        let camera = Camera {
+            eye_in_world: self.pose.position + Vec3::new(0.0, 1.65, 0.0),
+            world_from_camera: yaw_rotation(self.pose.yaw_rad),
+            vertical_fov_rad: Camera::EYE_FOV_RAD,
+            width: self.size,
+            height: self.size,
+        };
+        let n = self.pixels() as usize;
+        let (mut depth, mut ids) = (Vec::with_capacity(n), Vec::with_capacity(n));
+        for row in 0..self.size {
+            for column in 0..self.size {
+                let direction = camera.unproject(column, row, 1.0) - camera.eye_in_world;
+                let (d, id) = self.cast(camera.eye_in_world, direction);
+                depth.push(d);
+                ids.push(id.0);
+            }
+        }
+        let sees_goal = self.solids.iter().any(|s| {
+            s.entity.is_object()
+                && self.class(s.entity).name() == "bed"
+                && ids.contains(&s.entity.0)
+        });
+        Observation {
+            frame: self.frame,
+            own: SelfState { pose: self.pose, hands: self.hands.clone(), last: self.last },
+            camera,
+            images: Images { rgb: None, depth_m: Some(depth), ids: Some(ids) },
+            delivered: sees_goal.then(|| self.delivered.clone()),
+            granted: Granted {
+                classes: Some(Arc::new(self.classes.clone())),
+                ..Granted::default()
+            },
+        }
+    }
+
+    fn cast(&self, eye: Vec3, direction: Vec3) -> (f32, EntityId) {
+        let mut best = (Camera::FAR_M, EntityId::NOTHING);
+        if direction.y < 0.0 {
+            best = (-eye.y / direction.y, EntityId::FLOOR);
+        }
+        for solid in &self.solids {
+            if let Some(d) = solid.hit(eye, direction)
+                && d < best.0
+            {
+                best = (d, solid.entity);
+            }
+        }
+        best
+    }
+
+    fn is_free(&self, p: Vec2) -> bool {
+        self.solids.iter().all(|s| {
+            let is_small = s.entity.is_object() && self.class(s.entity).info().is_carriable();
+            is_small || s.high.y < 0.12 || s.distance_from(p) >= self.radius_m
+        })
+    }
+
+    /// Walks `way`, sliding along what is in the way; how far it got.
+    fn walk(&mut self, way: Vec2) -> f32 {
+        let start = self.here();
+        for _ in 0..10 {
+            let (here, step) = (self.here(), 0.1 * way);
+            let slides = [step, Vec2::new(step.x, 0.0), Vec2::new(0.0, step.y)];
+            if let Some(s) = slides.iter().find(|s| self.is_free(here + **s)) {
+                self.pose.position += Vec3::new(s.x, 0.0, s.y);
+            }
+        }
+        self.here().distance(start)
+    }
+
+    /// Steps up to a thing; whether the arm reaches it.
+    fn step_up(&mut self, entity: EntityId) -> Result<(), FailureReason> {
+        let solid = |t: &Toy| t.solids.iter().position(|s| s.entity == entity);
+        let i = solid(self).ok_or(FailureReason::Impossible)?;
+        let target = 0.5 * (xz(self.solids[i].low) + xz(self.solids[i].high));
+        let half = 0.5 * xz(self.solids[i].high - self.solids[i].low).max_element();
+        if self.here().distance(target) > 3.0 + half {
+            return Err(FailureReason::TooFar);
+        }
+        for _ in 0..60 {
+            if self.solids[i].distance_from(self.here()) <= 0.7 {
+                return Ok(());
+            }
+            let ahead = (target - self.here()).normalize_or_zero();
+            if !self.is_free(self.here() + 0.05 * ahead) {
+                return Err(FailureReason::Blocked);
+            }
+            self.pose.position += 0.05 * Vec3::new(ahead.x, 0.0, ahead.y);
+        }
+        Err(FailureReason::Blocked)
+    }
+
+    pub fn apply(&mut self, action: Action) -> Outcome {
+        let (frames, result) = match action {
+            Action::TurnLeft => (2, Ok(self.turn(1.0))),
+            Action::TurnRight => (2, Ok(self.turn(-1.0))),
+            Action::Wait { frames } => (frames.max(1), Ok(())),
+            Action::MoveForward => {
+                let got = self.walk(0.42 * xz(forward(self.pose.yaw_rad)));
+                self.n_blocked += u32::from(got < 0.1);
+                (10, if got < 0.1 { Err(FailureReason::Blocked) } else { Ok(()) })
+            }
+            Action::PickUp { object, hand } => (40, self.pick_up(object, hand)),
+            Action::RemoveObstacle { obstacle, .. } => {
+                let result = self.step_up(obstacle);
+                if result.is_ok() {
+                    self.remove(obstacle);
+                }
+                (60, result)
+            }
+            Action::PutIn => (20, self.put_in()),
+            Action::PutOn { place, hand } => (40, self.put_on(place, hand)),
+        };
+        self.frame += frames;
+        let outcome = result.map_or_else(Outcome::Failure, |()| Outcome::Success);
+        self.last = Some((action, outcome));
+        outcome
+    }
+
+    fn turn(&mut self, sign: f32) {
+        let turn = std::f32::consts::PI / 12.0;
+        self.pose.yaw_rad = wrap_angle(self.pose.yaw_rad + sign * turn);
+    }
+
+    fn pick_up(&mut self, object: EntityId, hand: Hand) -> Result<(), FailureReason> {
+        if self.hands[hand.index()].is_some() {
+            return Err(FailureReason::HandFull);
+        }
+        self.step_up(object)?;
+        self.remove(object);
+        self.hold(hand.index(), object);
+        Ok(())
+    }
+
+    fn put_in(&mut self) -> Result<(), FailureReason> {
+        let container = |h: &Option<Held>| {
+            h.as_ref().is_some_and(|h| h.class.info().role == Role::Container && h.contents.len() < 3)
+        };
+        let i = self.hands.iter().position(container);
+        let i = i.ok_or(FailureReason::NotContainerAndTarget)?;
+        let held = self.hands[1 - i].take().ok_or(FailureReason::NotContainerAndTarget)?;
+        let container = self.hands[i].as_mut().expect("just found");
+        container.contents.push((held.entity, held.class));
+        Ok(())
+    }
+
+    fn put_on(&mut self, place: EntityId, hand: Hand) -> Result<(), FailureReason> {
+        if self.hands[hand.index()].is_none() {
+            return Err(FailureReason::HandEmpty);
+        }
+        self.step_up(place)?;
+        let held = self.hands[hand.index()].take().expect("just looked");
+        self.delivered.push(held.entity);
+        self.delivered.extend(held.contents.iter().map(|(e, _)| *e));
+        Ok(())
+    }
+
+    /// Lets a mind live in this world until `horizon`; its plans, each once per change.
+    pub fn live(&mut self, mind: &mut dyn Agent, briefing: &Briefing) -> Vec<String> {
+        mind.reset(briefing);
+        let mut plans = Vec::new();
+        while self.frame < briefing.horizon {
+            let action = mind.act(&self.observe());
+            let plan = mind.thought().plan;
+            if plans.last() != Some(&plan) {
+                plans.push(plan);
+            }
+            self.apply(action);
+            if let Some(goal) = &briefing.goal
+                && self.delivered.iter().filter(|e| goal.wanted(self.class(**e)) > 0).count()
+                    >= goal.total() as usize
+            {
+                break;
+            }
+        }
+        plans
+    }
+}
+
+/// A toy world and a memory of it, for tests of single parts.
+pub struct ToyRun {
+    pub toy: Toy,
+    briefing: Briefing,
+    memory: Option<Memory>,
+}
+
+impl ToyRun {
+    pub fn new(toy: Toy) -> ToyRun {
+        let briefing = toy.briefing();
+        ToyRun { toy, memory: Some(Memory::new(&briefing)), briefing }
+    }
+
+    /// The memory after another look.
+    pub fn look(&mut self) -> Memory {
+        let observation = self.toy.observe();
+        let percepts = GroundTruthIds.perceive(&observation);
+        let mut memory = self.memory.take().expect("given back after each look");
+        memory.update(&self.briefing, &observation, &percepts);
+        memory
+    }
+
+    pub fn keep(&mut self, memory: Memory) {
+        self.memory = Some(memory);
+    }
+
+    pub fn act(&mut self, action: Action, memory: Memory) {
+        self.keep(memory);
+        self.toy.apply(action);
+    }
+}
+
+/// Something in a hand, with contents numbered from 90.
+pub fn held(class: &str, entity: u16, contents: &[&str]) -> Held {
+    let contents = contents.iter().zip(90..);
+    Held {
+        entity: EntityId(entity),
+        class: ClassId::named(class),
+        contents: contents.map(|(c, e)| (EntityId(e), ClassId::named(c))).collect(),
+    }
+}
+
+/// A drawn plan: `.` free, `#` wall, `?` unknown.
+pub struct Plan2d {
+    grid: Grid,
+    spaces: Vec<Space>,
+}
+
+impl Plan2d {
+    pub fn parse(text: &str) -> Plan2d {
+        let rows: Vec<&str> = text.lines().map(str::trim).collect();
+        let spaces: Vec<Space> = rows
+            .iter()
+            .flat_map(|row| row.chars())
+            .map(|c| match c {
+                '.' => Space::Free,
+                '#' => Space::Wall,
+                _ => Space::Unknown,
+            })
+            .collect();
+        Plan2d { grid: Grid::of_cells(rows[0].len(), rows.len()), spaces }
+    }
+
+    pub fn costs(&self, radius_m: f32) -> CostMap {
+        let map = OccupancyMap::of_spaces(self.grid, &self.spaces);
+        let mut costs = CostMap::new(self.grid, radius_m);
+        let far = Vec2::splat(1e6);
+        costs.rebuild(&map, &SemanticMap::default(), &People::default(), far, 0);
+        costs
+    }
+}

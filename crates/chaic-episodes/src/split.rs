@@ -1,0 +1,199 @@
+//! The bundled benchmark, and episodes without end.
+//!
+//! The 192 bundled episodes are data, a line each in `data/train.jsonl` and `data/test.jsonl`, in
+//! the order of the paper's tasks. `cargo run --release -p chaic-episodes --example bundle` writes
+//! them anew; a test says whether that would change anything.
+
+use std::fmt;
+use std::ops::Range;
+use std::str::FromStr;
+
+use chaic_protocol::TaskId;
+use chaic_protocol::task::TASKS;
+
+use crate::format::{Episode, EpisodeError};
+use crate::generate::{FIRST_BUNDLED_SEED, GenerateError, Seeds, generate, generator_info};
+
+/// Episodes of each task in each of the bundled splits (paper, "Dataset Construction").
+pub const BUNDLED_PER_TASK: usize = 12;
+/// Different surroundings of a task within a bundled split; each is used twice.
+const PLACES_PER_SPLIT: u64 = 6;
+
+static TRAIN: &str = include_str!("../data/train.jsonl");
+static TEST: &str = include_str!("../data/test.jsonl");
+
+/// A set of episodes: `train`, `test` or `gen:A..B`.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum Split {
+    /// The bundled episodes to learn from.
+    Train,
+    /// The bundled episodes to be compared on.
+    Test,
+    /// Generated episodes of these seeds; a seed is the number of its episode.
+    Generated(Range<u64>),
+}
+
+/// Why there is no such episode.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SplitError {
+    /// The text names no split.
+    #[error("no split `{text}`; write train, test or gen:A..B with A < B <= {FIRST_BUNDLED_SEED}")]
+    Syntax {
+        /// What was written.
+        text: String,
+    },
+    /// The text names no episode.
+    #[error("no episode `{id}`; write for example obstacle/test/07 or obstacle/gen/123")]
+    NoSuchEpisode {
+        /// What was written.
+        id: String,
+    },
+    /// The generator failed.
+    #[error(transparent)]
+    Generate(#[from] GenerateError),
+    /// A bundled episode can't be read: the build is broken.
+    #[error(transparent)]
+    Episode(#[from] EpisodeError),
+}
+
+impl fmt::Display for Split {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Split::Train => f.pad("train"),
+            Split::Test => f.pad("test"),
+            Split::Generated(seeds) => f.pad(&format!("gen:{}..{}", seeds.start, seeds.end)),
+        }
+    }
+}
+
+impl FromStr for Split {
+    type Err = SplitError;
+
+    fn from_str(text: &str) -> Result<Split, SplitError> {
+        let seeds = || {
+            let (a, b) = text.strip_prefix("gen:")?.split_once("..")?;
+            let (a, b) = (a.parse().ok()?, b.parse().ok()?);
+            (a < b && b <= FIRST_BUNDLED_SEED).then_some(a..b)
+        };
+        match text {
+            "train" => Ok(Split::Train),
+            "test" => Ok(Split::Test),
+            _ => seeds()
+                .map(Split::Generated)
+                .ok_or_else(|| SplitError::Syntax { text: text.to_owned() }),
+        }
+    }
+}
+
+impl Split {
+    /// How many episodes it has of each task.
+    pub fn len_per_task(&self) -> usize {
+        match self {
+            Split::Train | Split::Test => BUNDLED_PER_TASK,
+            Split::Generated(seeds) => seeds.end.saturating_sub(seeds.start) as usize,
+        }
+    }
+
+    /// Its first seed, if it is bundled.
+    fn base_seed(&self) -> Option<u64> {
+        match self {
+            Split::Train => Some(FIRST_BUNDLED_SEED),
+            Split::Test => Some(2 * FIRST_BUNDLED_SEED),
+            Split::Generated(_) => None,
+        }
+    }
+}
+
+/// The episodes of a task in a split, in order. Bundled ones are read, others generated one at a
+/// time as they are asked for.
+pub fn episodes(
+    split: &Split,
+    task: TaskId,
+) -> impl Iterator<Item = Result<Episode, SplitError>> + Send + use<> {
+    let split = split.clone();
+    (0..split.len_per_task() as u64).map(move |k| match &split {
+        Split::Train => bundled(TRAIN, "train", task, k),
+        Split::Test => bundled(TEST, "test", task, k),
+        Split::Generated(seeds) => generated(task, seeds.start + k),
+    })
+}
+
+/// The episode of this name: `TASK/train/NN`, `TASK/test/NN` or `TASK/gen/SEED`.
+///
+/// # Errors
+/// [`SplitError::NoSuchEpisode`] if the name is none.
+pub fn find_episode(id: &str) -> Result<Episode, SplitError> {
+    let no_such = || SplitError::NoSuchEpisode { id: id.to_owned() };
+    let parts: Vec<&str> = id.split('/').collect();
+    let [task, split, number] = parts[..] else { return Err(no_such()) };
+    let task: TaskId = task.parse().map_err(|_| no_such())?;
+    let number: u64 = number.parse().map_err(|_| no_such())?;
+    match split {
+        "train" if number < BUNDLED_PER_TASK as u64 => bundled(TRAIN, split, task, number),
+        "test" if number < BUNDLED_PER_TASK as u64 => bundled(TEST, split, task, number),
+        "gen" if number < FIRST_BUNDLED_SEED => generated(task, number),
+        _ => Err(no_such()),
+    }
+}
+
+fn bundled(text: &str, split: &str, task: TaskId, k: u64) -> Result<Episode, SplitError> {
+    let id = format!("{task}/{split}/{k:02}");
+    let line = text.lines().nth(task_index(task) * BUNDLED_PER_TASK + k as usize);
+    let line = line.ok_or_else(|| SplitError::NoSuchEpisode { id: id.clone() })?;
+    Ok(Episode::parse_trusted(line, &id)?)
+}
+
+fn task_index(task: TaskId) -> usize {
+    TASKS.iter().position(|t| t.id == task).expect("the table lists every task")
+}
+
+fn generated(task: TaskId, seed: u64) -> Result<Episode, SplitError> {
+    let seeds = Seeds { place: seed, episode: seed };
+    let setup = generate(task, seeds)?;
+    let id = format!("{task}/gen/{seed}");
+    Ok(Episode::trusted(id, "generated".to_owned(), generator_info(task, seeds), setup))
+}
+
+/// The text of the two bundled files.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Bundled {
+    /// `data/train.jsonl`.
+    pub train: String,
+    /// `data/test.jsonl`.
+    pub test: String,
+}
+
+impl Bundled {
+    /// The files as they were built in.
+    pub fn built_in() -> Bundled {
+        Bundled { train: TRAIN.to_owned(), test: TEST.to_owned() }
+    }
+}
+
+/// What the generators of today would bundle.
+///
+/// # Errors
+/// [`GenerateError`] if a seed of the bundle has no episode.
+pub fn regenerate_bundled() -> Result<Bundled, GenerateError> {
+    Ok(Bundled { train: regenerate(&Split::Train)?, test: regenerate(&Split::Test)? })
+}
+
+fn regenerate(split: &Split) -> Result<String, GenerateError> {
+    let base = split.base_seed().expect("only bundled splits are regenerated");
+    let mut text = String::new();
+    for (t, info) in TASKS.iter().enumerate() {
+        for k in 0..BUNDLED_PER_TASK as u64 {
+            let seeds = Seeds {
+                // All indoor tasks share the houses of a split, so that they can be compared.
+                place: base + k % PLACES_PER_SPLIT,
+                episode: base + (t * BUNDLED_PER_TASK) as u64 + k,
+            };
+            let setup = generate(info.id, seeds)?;
+            let id = format!("{}/{split}/{k:02}", info.name);
+            let generator = generator_info(info.id, seeds);
+            text += &Episode::trusted(id, split.to_string(), generator, setup).to_json_line();
+            text.push('\n');
+        }
+    }
+    Ok(text)
+}

@@ -1,0 +1,205 @@
+//! Flesh and clothes around the joints.
+
+use chaic_protocol::Vec3;
+use chaic_protocol::catalogue::Finish;
+use glam::Mat3;
+
+use super::build::Build;
+use super::dress::{Dress, Headwear};
+use super::skeleton::Skeleton;
+use crate::mesh::{Mesh, Place, Section, Skin, unit};
+use crate::solids::{Detail, ellipsoid};
+
+/// Adds a whole person.
+pub(super) fn add(mesh: &mut Mesh, s: &Skeleton, b: &Build, dress: &Dress, detail: Detail) {
+    trunk(mesh, s, b, dress, detail);
+    for k in 0..2 {
+        leg(mesh, s, b, dress, k, detail);
+        arm(mesh, s, b, dress, k, detail);
+    }
+    head(mesh, s, b, dress, detail);
+}
+
+fn cloth(color: [u8; 3]) -> Skin {
+    Skin::new(color, Finish::Fabric)
+}
+
+fn bare(color: [u8; 3]) -> Skin {
+    Skin { gloss: crate::mesh::Gloss::Satin, ..Skin::new(color, Finish::Matte) }
+}
+
+fn corners(detail: Detail, radius_m: f32) -> usize {
+    detail.corners(radius_m).min(14)
+}
+
+fn trunk(mesh: &mut Mesh, s: &Skeleton, b: &Build, dress: &Dress, detail: Detail) {
+    let (w, d) = (b.shoulder_x, 0.105 * b.girth);
+    let long = b.shoulder_y - b.hip_y;
+    let n = corners(detail, 1.3 * w).max(6);
+    let section = |up: f32, width: f32, depth: f32, back: f32| Section {
+        center: s.hips + s.trunk.y_axis * (up * long) + s.trunk.z_axis * back,
+        a: s.trunk.x_axis * width,
+        b: s.trunk.z_axis * depth,
+    };
+    mesh.skin(cloth(dress.trousers));
+    mesh.tube(
+        &[
+            section(-0.19, 0.45 * w, 0.6 * d, 0.0),
+            section(-0.10, 0.82 * w, 1.0 * d, 0.01),
+            section(0.06, 0.88 * w, 1.06 * d, 0.01),
+            section(0.16, 0.80 * w, 0.9 * d, 0.0),
+        ],
+        n,
+    );
+    let body = |grow: f32| {
+        [
+            section(0.02, 0.84 * w * grow, 0.98 * d * grow, 0.004),
+            section(0.30, 0.76 * w * grow, 0.92 * d * grow, 0.0),
+            section(0.62, 0.98 * w * grow, 1.14 * d * grow, 0.0),
+            section(0.86, 1.12 * w * grow, 1.02 * d * grow, 0.005),
+            section(0.97, 0.98 * w * grow, 0.72 * d * grow, 0.008),
+            section(1.04, 0.5 * w * grow, 0.5 * d * grow, 0.008),
+        ]
+    };
+    mesh.skin(cloth(dress.shirt));
+    mesh.tube(&body(1.0), n);
+    if let Some(vest) = dress.vest {
+        mesh.skin(cloth(vest));
+        mesh.tube(&body(1.07)[..5], n);
+        // A bright stripe around the chest.
+        mesh.skin(bare([236, 240, 190]));
+        mesh.tube(&[section(0.40, 0.92 * w, 1.12 * d, 0.0), section(0.48, 0.97 * w, 1.18 * d, 0.0)], n);
+    }
+    mesh.skin(bare(dress.skin));
+    let neck = 0.052 * b.girth.max(0.8);
+    mesh.limb(s.chest, s.head - s.head_axes.y_axis * (0.25 * b.head), neck, neck, corners(detail, neck));
+}
+
+fn leg(mesh: &mut Mesh, s: &Skeleton, b: &Build, dress: &Dress, k: usize, detail: Detail) {
+    let g = b.girth;
+    let n = corners(detail, 0.08 * g);
+    let (hip, knee, ankle) = (s.hip_joints[k], s.knees[k], s.ankles[k]);
+    mesh.skin(cloth(dress.trousers));
+    if dress.short_trousers {
+        mesh.limb(hip, hip.lerp(knee, 0.72), 0.086 * g, 0.074 * g, n);
+        mesh.skin(bare(dress.skin));
+        mesh.limb(hip.lerp(knee, 0.6), knee, 0.058 * g, 0.05 * g, n);
+        mesh.limb(knee, ankle, 0.050 * g, 0.036 * g, n);
+    } else {
+        mesh.limb(hip, knee, 0.083 * g, 0.060 * g, n);
+        mesh.limb(knee, ankle, 0.060 * g, 0.046 * g, n);
+    }
+    mesh.skin(Skin::new(dress.shoes, Finish::Glossy));
+    let (sp, cp) = {
+        use chaic_protocol::geom::math;
+        (math::sin(s.foot_pitch[k]), math::cos(s.foot_pitch[k]))
+    };
+    // The foot turns about the ball when the heel rises.
+    let (up, back) = (Vec3::new(0.0, cp, -sp), Vec3::new(0.0, sp, cp));
+    let axes = Mat3::from_cols(Vec3::X, up, back);
+    let long = 0.148 * b.top_y;
+    let center = ankle - back * (0.27 * long) - up * (0.45 * b.ankle_y);
+    let extent = Vec3::new(0.092 * g, 1.05 * b.ankle_y, long);
+    ellipsoid(mesh, &Place { center, axes, extent }, corners(detail, 0.5 * long));
+}
+
+fn arm(mesh: &mut Mesh, s: &Skeleton, b: &Build, dress: &Dress, k: usize, detail: Detail) {
+    let g = b.girth;
+    let n = corners(detail, 0.055 * g);
+    let (shoulder, elbow, hand) = (s.shoulders[k], s.elbows[k], s.hands[k]);
+    let along = unit(hand - elbow);
+    let wrist = hand - along * (0.045 * g);
+    mesh.skin(cloth(dress.shirt));
+    if dress.long_sleeves {
+        mesh.limb(shoulder, elbow, 0.056 * g, 0.044 * g, n);
+        mesh.limb(elbow, wrist, 0.044 * g, 0.036 * g, n);
+        mesh.skin(bare(dress.skin));
+    } else {
+        mesh.limb(shoulder, shoulder.lerp(elbow, 0.62), 0.058 * g, 0.054 * g, n);
+        mesh.skin(bare(dress.skin));
+        mesh.limb(shoulder.lerp(elbow, 0.5), elbow, 0.043 * g, 0.038 * g, n);
+        mesh.limb(elbow, wrist, 0.039 * g, 0.029 * g, n);
+    }
+    let side = unit(along.cross(Vec3::Y) + Vec3::Z * 1e-3);
+    let axes = Mat3::from_cols(side, along, side.cross(along));
+    let (wide, long, thick) = if s.grips[k] { (0.085, 0.095, 0.07) } else { (0.078, 0.15, 0.038) };
+    let place = Place { center: hand, axes, extent: Vec3::new(wide, long, thick) * g };
+    ellipsoid(mesh, &place, n);
+}
+
+fn head(mesh: &mut Mesh, s: &Skeleton, b: &Build, dress: &Dress, detail: Detail) {
+    let (tall, wide) = (b.head, b.head_width);
+    let deep = 0.5 * (tall + wide);
+    // A point of the head: 1 is its surface along right, up and back.
+    let at = |x: f32, y: f32, z: f32| s.head + s.head_axes * (0.5 * Vec3::new(x * wide, y * tall, z * deep));
+    let n = corners(detail, 0.5 * deep).max(6);
+    let blob = |mesh: &mut Mesh, c: Vec3, e: Vec3, n: usize| {
+        ellipsoid(mesh, &Place { center: c, axes: s.head_axes, extent: e }, n);
+    };
+    let size = Vec3::new(wide, tall, deep);
+    mesh.skin(bare(dress.skin));
+    blob(mesh, at(0.0, 0.12, 0.02), size * Vec3::new(1.0, 0.88, 0.98), n);
+    blob(mesh, at(0.0, -0.42, -0.12), size * Vec3::new(0.76, 0.58, 0.78), n);
+    let small = detail.corners(0.12 * wide);
+    for x in [-1.0, 1.0] {
+        blob(mesh, at(x, -0.08, 0.1), size * Vec3::new(0.10, 0.24, 0.16), small);
+    }
+    blob(mesh, at(0.0, -0.16, -1.0), size * Vec3::new(0.14, 0.20, 0.18), small);
+    if detail.px_per_m * wide > 5.0 {
+        face(mesh, &at, &blob, size, dress, small);
+    }
+    mesh.skin(Skin::new(dress.hair, Finish::Fabric));
+    if dress.headwear == Headwear::None {
+        blob(mesh, at(0.0, 0.40, 0.14), size * Vec3::new(1.08, 0.72, 1.02), n);
+    }
+    blob(mesh, at(0.0, 0.02, 0.36), size * Vec3::new(1.05, 0.86, 0.76), n);
+    if dress.long_hair {
+        blob(mesh, at(0.0, -0.55, 0.60), size * Vec3::new(0.98, 0.98, 0.46), n);
+    }
+    match dress.headwear {
+        Headwear::None => {}
+        Headwear::Cap => {
+            mesh.skin(cloth(dress.headwear_color));
+            blob(mesh, at(0.0, 0.50, 0.08), size * Vec3::new(1.12, 0.64, 1.10), n);
+            blob(mesh, at(0.0, 0.46, -1.05), size * Vec3::new(0.86, 0.09, 0.72), n);
+        }
+        Headwear::Helmet => {
+            mesh.skin(Skin::new(dress.headwear_color, Finish::Glossy));
+            blob(mesh, at(0.0, 0.52, 0.06), size * Vec3::new(1.24, 0.84, 1.30), n);
+            mesh.skin(Skin::new([245, 245, 240], Finish::Glossy));
+            blob(mesh, at(0.0, 0.56, 0.06), size * Vec3::new(0.30, 0.84, 1.32), n);
+        }
+    }
+}
+
+fn face(
+    mesh: &mut Mesh,
+    at: &dyn Fn(f32, f32, f32) -> Vec3,
+    blob: &dyn Fn(&mut Mesh, Vec3, Vec3, usize),
+    size: Vec3,
+    dress: &Dress,
+    n: usize,
+) {
+    mesh.skin(Skin::new([246, 246, 242], Finish::Glossy));
+    for x in [-0.36, 0.36] {
+        blob(mesh, at(x, 0.06, -0.86), size * Vec3::new(0.25, 0.13, 0.14), n);
+    }
+    mesh.skin(Skin::new([36, 28, 24], Finish::Glossy));
+    for x in [-0.36, 0.36] {
+        blob(mesh, at(x, 0.06, -0.945), size * Vec3::new(0.12, 0.115, 0.09), n);
+    }
+    mesh.skin(Skin::new(dress.hair, Finish::Fabric));
+    for x in [-0.37, 0.37] {
+        blob(mesh, at(x, 0.25, -0.88), size * Vec3::new(0.30, 0.045, 0.12), n);
+    }
+    mesh.skin(Skin::new([164, 76, 70], Finish::Matte));
+    blob(mesh, at(0.0, -0.52, -0.80), size * Vec3::new(0.34, 0.06, 0.14), n);
+    if dress.glasses {
+        mesh.skin(Skin::new([60, 56, 60], Finish::Metal));
+        for x in [-0.40, 0.40] {
+            for (dx, dy, w, h) in [(0.0, 0.12, 0.38, 0.025), (0.0, -0.12, 0.38, 0.025), (-0.18, 0.0, 0.03, 0.24), (0.18, 0.0, 0.03, 0.24)] {
+                blob(mesh, at(x + dx * 2.0, 0.06 + dy * 2.0, -0.99), size * Vec3::new(w, h, 0.04), n);
+            }
+        }
+    }
+}

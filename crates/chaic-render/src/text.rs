@@ -1,0 +1,92 @@
+//! Text on pictures.
+
+use std::sync::LazyLock;
+
+use ab_glyph::{Font as _, FontRef, Glyph, PxScale, ScaleFont as _, point};
+use image::RgbImage;
+
+static FONT: LazyLock<FontRef<'static>> = LazyLock::new(|| {
+    FontRef::try_from_slice(epaint_default_fonts::HACK_REGULAR).expect("the bundled font is valid")
+});
+
+/// Where a text stands on the point it is drawn at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Align {
+    /// It begins there.
+    Left,
+    /// Its middle is there.
+    Center,
+    /// It ends there.
+    Right,
+}
+
+/// Glyphs of one line from x = 0 with their baseline at y = 0, and the line's width.
+fn lay_out(text: &str, size_px: f32) -> (Vec<Glyph>, f32) {
+    let font = FONT.as_scaled(PxScale::from(size_px.clamp(4.0, 400.0)));
+    let (mut x, mut last, mut glyphs) = (0.0, None, Vec::new());
+    for c in text.chars().take(10_000) {
+        let id = font.glyph_id(c);
+        if let Some(last) = last {
+            x += font.kern(last, id);
+        }
+        glyphs.push(id.with_scale_and_position(font.scale(), point(x, 0.0)));
+        x += font.h_advance(id);
+        last = Some(id);
+    }
+    (glyphs, x)
+}
+
+/// Width of a line of text, pixels.
+pub fn width(text: &str, size_px: f32) -> f32 {
+    lay_out(text, size_px).1
+}
+
+/// Draws one line of text whose top is at `y`, pixels; what falls outside of the image is cut off.
+pub fn draw(image: &mut RgbImage, (x, y): (f32, f32), size_px: f32, color: [u8; 3], align: Align, text: &str) {
+    let (glyphs, wide) = lay_out(text, size_px);
+    let x = match align {
+        Align::Left => x,
+        Align::Center => x - 0.5 * wide,
+        Align::Right => x - wide,
+    };
+    let ascent = FONT.as_scaled(PxScale::from(size_px.clamp(4.0, 400.0))).ascent();
+    // Whole pixels keep stems sharp.
+    let (x, y) = ((x + 0.5).floor(), (y + ascent + 0.5).floor());
+    for mut glyph in glyphs {
+        glyph.position.x += x;
+        glyph.position.y += y;
+        let Some(outline) = FONT.outline_glyph(glyph) else { continue };
+        let bounds = outline.px_bounds();
+        outline.draw(|dx, dy, coverage| {
+            let (px, py) = (bounds.min.x as i64 + i64::from(dx), bounds.min.y as i64 + i64::from(dy));
+            let inside = px >= 0 && py >= 0 && px < i64::from(image.width()) && py < i64::from(image.height());
+            if inside {
+                let pixel = image.get_pixel_mut(px as u32, py as u32);
+                blend(&mut pixel.0, color, coverage);
+            }
+        });
+    }
+}
+
+/// Mixes `color` into a pixel.
+pub(crate) fn blend(pixel: &mut [u8; 3], color: [u8; 3], amount: f32) {
+    let amount = amount.clamp(0.0, 1.0);
+    for (p, c) in pixel.iter_mut().zip(color) {
+        *p = (f32::from(*p) + (f32::from(c) - f32::from(*p)) * amount + 0.5) as u8;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_leaves_ink_and_may_leave_the_image() {
+        let mut image = RgbImage::from_pixel(80, 30, image::Rgb([255; 3]));
+        draw(&mut image, (40.0, 4.0), 20.0, [0; 3], Align::Center, "chaic");
+        let ink = image.pixels().filter(|p| p.0[0] < 100).count();
+        assert!((60..800).contains(&ink), "{ink}");
+        draw(&mut image, (-30.0, -8.0), 50.0, [0; 3], Align::Left, "far outside");
+        assert!(width("ww", 20.0) > width("w", 20.0));
+    }
+}

@@ -1,0 +1,122 @@
+//! Cameras and what they ask for.
+
+use std::cell::RefCell;
+
+use chaic_protocol::geom::Camera;
+use chaic_protocol::observation::{Images, Senses};
+use chaic_protocol::{AgentId, EntityId};
+
+use crate::draw::{Omit, Scratch, draw};
+use crate::frame::Frame;
+use crate::lens::Lens;
+use crate::raster::{NOBODY, owner_parts};
+use crate::shade::shade;
+
+/// Longest side of an image, pixels: bounds the memory that one view can ask for to 1.5 GB.
+pub const MAX_SIDE_PX: u32 = 8192;
+
+/// Which images a view is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Channels {
+    /// Color.
+    pub rgb: bool,
+    /// Depth along the camera's axis.
+    pub depth: bool,
+    /// Instance ids.
+    pub ids: bool,
+}
+
+impl Channels {
+    /// All three.
+    pub const ALL: Channels = Channels { rgb: true, depth: true, ids: true };
+    /// Color only.
+    pub const RGB: Channels = Channels { rgb: true, depth: false, ids: false };
+    /// All but color, which costs the most.
+    pub const DEPTH_AND_IDS: Channels = Channels { rgb: false, depth: true, ids: true };
+}
+
+impl From<Senses> for Channels {
+    fn from(senses: Senses) -> Channels {
+        Channels { rgb: senses.rgb, depth: senses.depth, ids: senses.ids }
+    }
+}
+
+/// A camera, and what is wanted of it.
+///
+/// A camera whose numbers make no picture (not finite, no angle of view) sees nothing at all: sky,
+/// far, no ids. One with a side over [`MAX_SIDE_PX`] gets no images.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// The camera.
+    pub camera: Camera,
+    /// Which images.
+    pub channels: Channels,
+    /// Whose body is left out: an eye doesn't see its own head from inside.
+    pub hide: Option<AgentId>,
+    /// Whether ceilings are left out, to look into a house from above.
+    pub hide_ceiling: bool,
+}
+
+impl View {
+    /// What the agent whose eye this is sees.
+    pub fn of_eye(agent: AgentId, camera: Camera, channels: Channels) -> View {
+        View { camera, channels, hide: Some(agent), hide_ceiling: false }
+    }
+}
+
+thread_local! {
+    static SCRATCH: RefCell<Scratch> = RefCell::default();
+}
+
+/// Runs `work` with this thread's buffers.
+pub(crate) fn with_scratch<T>(work: impl FnOnce(&mut Scratch) -> T) -> T {
+    SCRATCH.with(|scratch| match scratch.try_borrow_mut() {
+        Ok(mut scratch) => work(&mut scratch),
+        Err(_) => work(&mut Scratch::default()),
+    })
+}
+
+/// Draws one view.
+pub(crate) fn look(frame: &Frame, view: &View) -> Images {
+    let Camera { width, height, .. } = view.camera;
+    if width > MAX_SIDE_PX || height > MAX_SIDE_PX {
+        return Images::default();
+    }
+    let n = width as usize * height as usize;
+    let Channels { rgb, depth, ids } = view.channels;
+    let lens = Lens::of(&view.camera).filter(|_| n > 0);
+    let Some(lens) = lens else {
+        return Images {
+            rgb: rgb.then(|| vec![0; 3 * n]),
+            depth_m: depth.then(|| vec![Camera::FAR_M; n]),
+            ids: ids.then(|| vec![EntityId::NOTHING.0; n]),
+        };
+    };
+    with_scratch(|scratch| {
+        let omit = Omit { body: view.hide.map(EntityId::of_agent), ceiling: view.hide_ceiling };
+        draw(frame, &lens, omit, scratch);
+        Images {
+            rgb: rgb.then(|| {
+                let mut out = Vec::new();
+                shade(frame, &lens, &scratch.levels, &scratch.target, &mut out);
+                out
+            }),
+            depth_m: depth.then(|| depths(scratch)),
+            ids: ids.then(|| entities(frame, scratch)),
+        }
+    })
+}
+
+fn depths(scratch: &Scratch) -> Vec<f32> {
+    let far = 1.0 / Camera::FAR_M;
+    let depth = |q: &f32| if *q > far { 1.0 / *q } else { Camera::FAR_M };
+    scratch.target.nearness.iter().map(depth).collect()
+}
+
+pub(crate) fn entities(frame: &Frame, scratch: &Scratch) -> Vec<u16> {
+    let entity = |owner: &u32| match *owner {
+        NOBODY => EntityId::NOTHING.0,
+        owner => frame.instances[owner_parts(owner).0].entity.0,
+    };
+    scratch.target.owner.iter().map(entity).collect()
+}

@@ -1,0 +1,58 @@
+//! Promise: no crate reaches past the arrows of ARCHITECTURE.md; agents above all can't see
+//! the world or its pictures.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+/// Each crate with the crates of this workspace that it may depend on, tests included.
+const ALLOWED: &[(&str, &[&str])] = &[
+    ("chaic-protocol", &[]),
+    ("chaic-world", &["chaic-protocol"]),
+    ("chaic-episodes", &["chaic-protocol", "chaic-world"]),
+    ("chaic-render", &["chaic-protocol", "chaic-world"]),
+    ("chaic-agents", &["chaic-protocol"]),
+    (
+        "chaic-eval",
+        &["chaic-protocol", "chaic-world", "chaic-episodes", "chaic-render", "chaic-agents"],
+    ),
+    (
+        "chaic",
+        &[
+            "chaic-protocol",
+            "chaic-world",
+            "chaic-episodes",
+            "chaic-render",
+            "chaic-agents",
+            "chaic-eval",
+        ],
+    ),
+];
+
+#[test]
+fn every_dependency_follows_an_arrow() {
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("crates/");
+    let mut found = BTreeSet::new();
+    for entry in fs::read_dir(crates).expect("crates/ can be listed") {
+        let manifest = entry.expect("an entry").path().join("Cargo.toml");
+        let Ok(text) = fs::read_to_string(&manifest) else { continue };
+        let name = text
+            .lines()
+            .find_map(|l| l.strip_prefix("name = "))
+            .map(|n| n.trim_matches('"').to_owned())
+            .expect("a manifest names its package");
+        let (_, allowed) = ALLOWED
+            .iter()
+            .find(|(n, _)| *n == name)
+            .unwrap_or_else(|| panic!("{name} isn't on the map: add it to ARCHITECTURE.md and here"));
+        for line in text.lines().filter(|l| l.starts_with("chaic")) {
+            let dependency = line.split(['.', ' ', '=']).next().expect("a word");
+            assert!(
+                dependency == name || allowed.contains(&dependency),
+                "{name} may not depend on {dependency}"
+            );
+        }
+        found.insert(name);
+    }
+    assert_eq!(found.len(), ALLOWED.len(), "the map lists crates that are gone: {found:?}");
+}

@@ -69,7 +69,9 @@ impl BehaviorModel for GroundTruthBehavior {
             log.partner_holds = hands
                 .iter()
                 .flatten()
-                .flat_map(|h| std::iter::once((h.entity, h.class)).chain(h.contents.iter().copied()))
+                .flat_map(|h| {
+                    std::iter::once((h.entity, h.class)).chain(h.contents.iter().copied())
+                })
                 .collect();
             // Furniture is held by both hands and appears twice.
             log.partner_holds.sort_unstable();

@@ -105,9 +105,7 @@ impl Episode {
     /// The state machine of the original's child.
     fn change_mood(&mut self) {
         let here = self.memory.pose.position;
-        let away_m = |p: Option<Vec3>| {
-            p.map_or(f32::INFINITY, |p| xz(p).distance(xz(here)))
-        };
+        let away_m = |p: Option<Vec3>| p.map_or(f32::INFINITY, |p| xz(p).distance(xz(here)));
         let (guardian, helper) =
             (self.position_of(self.guardian()), self.position_of(self.helper()));
         let now = self.memory.frame;
@@ -148,8 +146,7 @@ impl Episode {
                 self.rng.range(inside.min.y, inside.max.y.max(inside.min.y + 0.01)),
             );
             let from_guardian_m = point.distance(xz(guardian));
-            let yaw =
-                yaw_towards(self.memory.pose.position, Vec3::new(point.x, 0.0, point.y));
+            let yaw = yaw_towards(self.memory.pose.position, Vec3::new(point.x, 0.0, point.y));
             let off = wrap_angle(yaw - to_guardian).abs();
             let enough = if from_guardian_m > FAR_GUARDIAN_M { OFF_RAD.1 } else { OFF_RAD.0 };
             if point.distance(here) > RUN_MIN_M && off > enough && self.is_free(point) {

@@ -83,14 +83,13 @@ impl fmt::Display for Plan {
 
 impl Plan {
     /// Whether a plan under way should make room for this one, when both come from the same
-    /// policy: nothing is dropped for more of the same, nor a walk to an object for another.
+    /// policy: nothing is dropped for more of the same, a walk to an object for another, or
+    /// anything for having nothing to do.
     pub fn supersedes(&self, current: &Plan) -> bool {
         let is_pick = |p: &Plan| matches!(p, Plan::PickUp(_) | Plan::PickContainer(_));
-        let is_idle = |p: &Plan| {
-            matches!(p, Plan::Explore | Plan::FollowPartner | Plan::TurnAround | Plan::Wait)
-        };
+        let is_idle = matches!(self, Plan::Explore | Plan::FollowPartner | Plan::Wait);
         let same = std::mem::discriminant(self) == std::mem::discriminant(current);
-        !same && !(is_pick(current) && (is_pick(self) || is_idle(self)))
+        !(same || is_idle || is_pick(current) && is_pick(self))
     }
 }
 
@@ -121,7 +120,8 @@ impl Load {
         let role = |held: &Held| held.class.info().role;
         let is_container = |held: &Held| role(held) == Role::Container;
         let basket = own.held().find(|h| role(h) == Role::Vehicle);
-        let is_moving = briefing.possible_targets.iter().any(|c| c.info().role == Role::HeavyTarget);
+        let is_moving =
+            briefing.possible_targets.iter().any(|c| c.info().role == Role::HeavyTarget);
         let free_hand = Hand::BOTH.into_iter().find(|h| own.hands[h.index()].is_none());
         let has_container = own.held().any(is_container);
         let can_put_in = Hand::BOTH.into_iter().any(|hand| {
@@ -134,15 +134,16 @@ impl Load {
             None if is_moving => own.held().next().is_none(),
             None => free_hand.is_some(),
         };
-        let carries = |h: &Held| {
-            is_target(&h.class) || h.contents.iter().any(|(_, class)| is_target(class))
-        };
+        let carries =
+            |h: &Held| is_target(&h.class) || h.contents.iter().any(|(_, class)| is_target(class));
         Load {
             free_hand,
             has_container,
             targets: own
                 .held()
-                .flat_map(|h| std::iter::once((h.entity, h.class)).chain(h.contents.iter().copied()))
+                .flat_map(|h| {
+                    std::iter::once((h.entity, h.class)).chain(h.contents.iter().copied())
+                })
                 .filter(|(_, class)| is_target(class))
                 .collect(),
             can_take_target,
@@ -227,7 +228,10 @@ pub fn valid_plans(memory: &Memory, own: &SelfState, briefing: &Briefing) -> Vec
 }
 
 /// Available things of these classes that one can get to, nearest first.
-fn reachable<'a>(memory: &'a Memory, classes: &[ClassId]) -> impl Iterator<Item = Subject> + use<'a> {
+fn reachable<'a>(
+    memory: &'a Memory,
+    classes: &[ClassId],
+) -> impl Iterator<Item = Subject> + use<'a> {
     let mut found: Vec<(f32, &Thing)> = memory
         .things
         .iter()
@@ -250,8 +254,7 @@ fn pieces_at_partner<'a>(
     memory
         .things
         .iter()
-        .filter(|t| t.class.info().role == Role::HeavyTarget && t.is_present && !t.is_gone)
-        .filter(|t| memory.frame >= t.held_until)
+        .filter(|t| t.class.info().role == Role::HeavyTarget && t.is_available(memory.frame))
         .filter(move |t| partner.is_some_and(|p| t.distance_from(p) < AT_PIECE_M))
         .map(Subject::of)
 }

@@ -108,8 +108,7 @@ impl Tally {
         self.low = self.low.min(p.y);
         self.high = self.high.max(p.y);
         if p.y <= FOOTPRINT_HEIGHT_M {
-            let square =
-                [(p.x / FOOTPRINT_M).round() as i16, (p.z / FOOTPRINT_M).round() as i16];
+            let square = [(p.x / FOOTPRINT_M).round() as i16, (p.z / FOOTPRINT_M).round() as i16];
             if self.squares.last() != Some(&square) {
                 self.squares.push(square);
             }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use chaic_protocol::briefing::{Companion, Goal, Relation};
 use chaic_protocol::capability::Persona;
 use chaic_protocol::geom::{Camera, Pose, Rect, forward, wrap_angle, xz, yaw_rotation};
-use chaic_protocol::observation::{Grants, Granted, Held, Images, SelfState};
+use chaic_protocol::observation::{Granted, Grants, Held, Images, SelfState};
 use chaic_protocol::{
     Action, Agent, AgentId, Briefing, ClassId, EntityId, FailureReason, Frame, Hand, Observation,
     Outcome, Role, Vec2, Vec3,
@@ -68,8 +68,8 @@ pub struct Toy {
     hands: [Option<Held>; 2],
     pub delivered: Vec<EntityId>,
     last: Option<(Action, Outcome)>,
-    size: u32,
-    radius_m: f32,
+    pub size: u32,
+    pub radius_m: f32,
     pub n_blocked: u32,
 }
 
@@ -190,7 +190,7 @@ impl Toy {
         }
         let sees_goal = self.solids.iter().any(|s| {
             s.entity.is_object()
-                && self.class(s.entity).name() == "bed"
+                && ["bed", "truck"].contains(&self.class(s.entity).name())
                 && ids.contains(&s.entity.0)
         });
         Observation {
@@ -265,8 +265,8 @@ impl Toy {
 
     pub fn apply(&mut self, action: Action) -> Outcome {
         let (frames, result) = match action {
-            Action::TurnLeft => (2, Ok(self.turn(1.0))),
-            Action::TurnRight => (2, Ok(self.turn(-1.0))),
+            Action::TurnLeft => (2, self.turn(1.0)),
+            Action::TurnRight => (2, self.turn(-1.0)),
             Action::Wait { frames } => (frames.max(1), Ok(())),
             Action::MoveForward => {
                 let got = self.walk(0.42 * xz(forward(self.pose.yaw_rad)));
@@ -290,24 +290,38 @@ impl Toy {
         outcome
     }
 
-    fn turn(&mut self, sign: f32) {
+    fn turn(&mut self, sign: f32) -> Result<(), FailureReason> {
         let turn = std::f32::consts::PI / 12.0;
         self.pose.yaw_rad = wrap_angle(self.pose.yaw_rad + sign * turn);
+        Ok(())
     }
 
     fn pick_up(&mut self, object: EntityId, hand: Hand) -> Result<(), FailureReason> {
-        if self.hands[hand.index()].is_some() {
+        let class = self.class(object);
+        if let Some(bike) = self.hands[0].as_ref().filter(|h| h.class.name() == "bike") {
+            if bike.contents.len() >= 3 {
+                return Err(FailureReason::Full);
+            }
+        } else if self.hands[hand.index()].is_some() {
             return Err(FailureReason::HandFull);
         }
         self.step_up(object)?;
         self.remove(object);
-        self.hold(hand.index(), object);
+        match self.hands[0].as_mut().filter(|h| h.class.name() == "bike") {
+            Some(bike) => bike.contents.push((object, class)),
+            None if class.info().role == Role::HeavyTarget => {
+                self.hold(0, object);
+                self.hold(1, object);
+            }
+            None => self.hold(hand.index(), object),
+        }
         Ok(())
     }
 
     fn put_in(&mut self) -> Result<(), FailureReason> {
         let container = |h: &Option<Held>| {
-            h.as_ref().is_some_and(|h| h.class.info().role == Role::Container && h.contents.len() < 3)
+            h.as_ref()
+                .is_some_and(|h| h.class.info().role == Role::Container && h.contents.len() < 3)
         };
         let i = self.hands.iter().position(container);
         let i = i.ok_or(FailureReason::NotContainerAndTarget)?;
@@ -322,7 +336,14 @@ impl Toy {
             return Err(FailureReason::HandEmpty);
         }
         self.step_up(place)?;
+        if let Some(bike) = self.hands[0].as_mut().filter(|h| h.class.name() == "bike") {
+            self.delivered.extend(bike.contents.drain(..).map(|(e, _)| e));
+            return Ok(());
+        }
         let held = self.hands[hand.index()].take().expect("just looked");
+        if held.class.info().role == Role::HeavyTarget {
+            self.hands = [None, None];
+        }
         self.delivered.push(held.entity);
         self.delivered.extend(held.contents.iter().map(|(e, _)| *e));
         Ok(())

@@ -6,13 +6,35 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
+use chaic_episodes::house::House;
 use chaic_episodes::{Episode, Split, episodes};
 use chaic_protocol::{Role, TaskId};
 use chaic_world::RoomKind;
 
+/// How houses come out, and what they are refused for.
+fn houses(n: u64) {
+    let mut results: BTreeMap<&str, u32> = BTreeMap::new();
+    let mut places: BTreeMap<usize, u32> = BTreeMap::new();
+    let mut most = 0;
+    for seed in 0..n {
+        for attempt in 0..u64::MAX {
+            let house = House::attempt(seed, attempt);
+            *results.entry(house.as_ref().map_or_else(|why| *why, |_| "fit")).or_default() += 1;
+            if let Ok(house) = house {
+                *places.entry(house.count_low_places() / 10 * 10).or_default() += 1;
+                most = most.max(attempt + 1);
+                break;
+            }
+        }
+    }
+    println!("attempts at houses, at most {most} for one: {results:?}");
+    println!("houses by low places: {places:?}");
+}
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let n: u64 = std::env::args().nth(1).map_or(Ok(100), |n| n.parse())?;
     let mut failures = 0;
+    houses(n);
     let mut rooms: BTreeMap<usize, u32> = BTreeMap::new();
     let mut hosts: BTreeMap<&str, u32> = BTreeMap::new();
     for task in TaskId::all() {

@@ -11,6 +11,8 @@ use crate::solid::{mm, mm3, plan_bounds, rect_distance};
 
 /// How far the ground goes beyond the bounds, metres: nobody sees its edge from eye height.
 const GROUND_M: f32 = 40.0;
+/// Around a trunk, metres: crowns may touch.
+const TREE_CLEAR_M: f32 = 1.7;
 /// Places that are tried for one piece of scenery.
 const TRIES: usize = 24;
 
@@ -62,7 +64,7 @@ impl Scenery {
             for _ in 0..TRIES {
                 let at = [rng.range(strip.min.x, strip.max.x), rng.range(strip.min.y, strip.max.y)];
                 let (yaw_rad, variant) = (rng.range(-PI, PI), rng.below(8));
-                if self.put_if_free("tree", at, yaw_rad, variant, 1.1) {
+                if self.put_if_free("tree", at, yaw_rad, variant, TREE_CLEAR_M) {
                     break;
                 }
             }
@@ -80,7 +82,7 @@ impl Scenery {
         }
     }
 
-    /// Houses along x whose fronts look along `front` (the sign of z), beyond the bounds.
+    /// Houses along x beyond the bounds, at least as far out as `z`.
     pub(crate) fn houses(&mut self, rng: &mut Stream, x: [f32; 2], z: f32, yaw_rad: f32) {
         let mut at = x[0] + 4.0 + rng.range(0.0, 3.0);
         while at + 4.0 <= x[1] {

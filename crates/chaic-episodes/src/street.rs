@@ -16,7 +16,9 @@ use crate::solid::{mm, mm3};
 /// Version of this generator; goes up with every change of what it makes.
 pub const VERSION: u32 = 1;
 
-const ATTEMPTS: u64 = 200;
+const ATTEMPTS: u64 = 400;
+/// Attempts in one place before another is tried.
+const PLACE_ATTEMPTS: u64 = 100;
 /// The strip that the original's maps cover.
 const BOUNDS: Rect = Rect { min: Vec2::new(-3.0, -7.5), max: Vec2::new(25.0, 6.0) };
 const ROAD_Z: [f32; 2] = [-2.7, 1.2];
@@ -68,15 +70,16 @@ pub fn generate(seeds: Seeds) -> Result<Setup, GenerateError> {
 }
 
 fn setup(seeds: Seeds, attempt: u64) -> Result<Setup, &'static str> {
-    let scenery_rng = &mut Stream::new(seeds.place, "street/scenery", attempt);
+    let stream = |purpose: &str| Stream::new(seeds.episode, purpose, attempt);
+    let people = people(&mut stream("shopping/people"))?;
+    // The place stays the same for many attempts, so that episodes share it.
+    let scenery_rng = &mut Stream::new(seeds.place, "street/scenery", attempt / PLACE_ATTEMPTS);
     let floors = ground(BOUNDS, ROAD_Z, PAVEMENT_Z, scenery_rng);
     let mut scenery = Scenery::new(vec![Rect::new([8.0, ROAD_Z[0]], [22.0, ROAD_Z[1]])]);
     let hydrant = scenery.put("fire_hydrant", HYDRANT, PI, 0);
     let shelves = shops(&mut scenery, scenery_rng);
     surroundings(&mut scenery, scenery_rng);
 
-    let stream = |purpose: &str| Stream::new(seeds.episode, purpose, attempt);
-    let people = people(&mut stream("shopping/people"))?;
     let mut things = scenery.things;
     things.push(bicycle(&people[0]));
     stock(&mut things, &shelves, &mut stream("shopping/stock"));
@@ -135,7 +138,7 @@ fn surroundings(scenery: &mut Scenery, rng: &mut Stream) {
         scenery.put_if_free("bench", [far, -5.7], PI, rng.below(8), 0.6);
     }
     scenery.put_if_free("mailbox", [rng.range(4.5, 7.5), -3.7], PI, rng.below(8), 0.5);
-    scenery.trees(rng, Rect::new([-2.5, 4.4], [24.5, 5.3]), 6);
+    scenery.trees(rng, Rect::new([-2.5, 4.9], [24.5, 5.4]), 6);
     scenery.trees(rng, Rect::new([7.0, -6.9], [24.5, -6.4]), 5);
     scenery.trees(rng, Rect::new([-14.0, -16.0], [36.0, -11.5]), 8);
     scenery.trees(rng, Rect::new([-14.0, 10.5], [36.0, 16.0]), 8);

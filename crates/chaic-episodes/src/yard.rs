@@ -19,6 +19,8 @@ use crate::solid::{mm, plan_bounds};
 pub const VERSION: u32 = 1;
 
 const ATTEMPTS: u64 = 400;
+/// Attempts in one place before another is tried.
+const PLACE_ATTEMPTS: u64 = 100;
 /// The part of the street that the original's maps cover.
 const BOUNDS: Rect = Rect { min: Vec2::new(-5.0, -7.5), max: Vec2::new(19.0, 6.0) };
 const ROAD_Z: [f32; 2] = [-3.2, 2.2];
@@ -73,7 +75,11 @@ fn line_up(seed: u64) -> Vec<ClassId> {
 }
 
 fn setup(seeds: Seeds, line_up: &[ClassId], attempt: u64) -> Result<Setup, &'static str> {
-    let scenery_rng = &mut Stream::new(seeds.place, "yard/scenery", attempt);
+    let stream = |purpose: &str| Stream::new(seeds.episode, purpose, attempt);
+    let pieces = pieces(line_up, &mut stream("moving_house/pieces"))?;
+    let people = people(&pieces, &mut stream("moving_house/people"))?;
+    // The place stays the same for many attempts, so that episodes share it.
+    let scenery_rng = &mut Stream::new(seeds.place, "yard/scenery", attempt / PLACE_ATTEMPTS);
     let floors = ground(BOUNDS, ROAD_Z, PAVEMENT_Z, scenery_rng);
     let keep_clear = Rect::new([-4.0, ROAD_Z[0]], [18.0, ROAD_Z[1]]);
     let mut scenery = Scenery::new(vec![keep_clear]);
@@ -81,9 +87,6 @@ fn setup(seeds: Seeds, line_up: &[ClassId], attempt: u64) -> Result<Setup, &'sta
     let truck = scenery.put("truck", TRUCK, -FRAC_PI_2, 0);
     surroundings(&mut scenery, scenery_rng);
 
-    let stream = |purpose: &str| Stream::new(seeds.episode, purpose, attempt);
-    let pieces = pieces(line_up, &mut stream("moving_house/pieces"))?;
-    let people = people(&pieces, &mut stream("moving_house/people"))?;
     let mut things = scenery.things;
     things.extend(pieces);
     let mut targets: Vec<(ClassId, u32)> = Vec::new();

@@ -1,2 +1,48 @@
-//! TBD
-fn main() {}
+//! Time to draw one view, on one thread: `cargo bench -p chaic-render`.
+
+#[path = "../tests/scenes/mod.rs"]
+mod scenes;
+
+use std::hint::black_box;
+
+use chaic_render::{Channels, Scene, View};
+use criterion::{Criterion, criterion_group, criterion_main};
+use scenes::camera;
+
+fn render(c: &mut Criterion) {
+    let house = scenes::world(scenes::house());
+    let street = scenes::world(scenes::street());
+    // Through two doors; a crowded table close by; the whole street.
+    for (name, world, eye, yaw) in [
+        ("house_long", &house, [0.6, 1.65, 2.2], -1.57),
+        ("house_kitchen", &house, [0.7, 1.65, 4.2], -0.7),
+        ("street", &street, [9.0, 1.65, 0.0], 1.3),
+    ] {
+        let scene = Scene::new(world.setup());
+        for (what, channels) in [("depth_ids", Channels::DEPTH_AND_IDS), ("rgb", Channels::RGB)] {
+            let view = View {
+                camera: camera(eye, yaw, 0.0, 512, 512),
+                channels,
+                hide: None,
+                hide_ceiling: false,
+            };
+            c.bench_function(&format!("{name}/512/{what}"), |b| {
+                b.iter(|| black_box(scene.render(world, &[view])));
+            });
+        }
+    }
+    let scene = Scene::new(house.setup());
+    let views: Vec<View> = (0..16)
+        .map(|k| {
+            let camera = camera([5.0, 1.6, 4.0], 0.4 * k as f32, 0.0, 128, 128);
+            View { camera, channels: Channels::DEPTH_AND_IDS, hide: None, hide_ceiling: false }
+        })
+        .collect();
+    c.bench_function("house/16x128/depth_ids", |b| {
+        b.iter(|| black_box(scene.render(&house, &views)))
+    });
+    c.bench_function("scene_new", |b| b.iter(|| black_box(Scene::new(house.setup()))));
+}
+
+criterion_group!(benches, render);
+criterion_main!(benches);

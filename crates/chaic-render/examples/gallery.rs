@@ -49,7 +49,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-fn views(folder: &Path, name: &str, world: &World, cameras: &[chaic_protocol::geom::Camera]) -> image::ImageResult<()> {
+fn views(
+    folder: &Path,
+    name: &str,
+    world: &World,
+    cameras: &[chaic_protocol::geom::Camera],
+) -> image::ImageResult<()> {
     let scene = Scene::new(world.setup());
     let view = |camera| View { camera, channels: Channels::ALL, hide: None, hide_ceiling: false };
     let views: Vec<View> = cameras.iter().map(|c| view(*c)).collect();
@@ -80,7 +85,8 @@ fn classes(folder: &Path) -> image::ImageResult<()> {
 
 fn portrait(class: ClassId) -> RgbImage {
     let mut setup = scenes::empty();
-    setup.floors = vec![scenes::floor([-30.0; 2], [30.0; 2], FloorMaterial::Carpet, [214, 212, 208])];
+    setup.floors =
+        vec![scenes::floor([-30.0; 2], [30.0; 2], FloorMaterial::Carpet, [214, 212, 208])];
     setup.bounds = chaic_protocol::geom::Rect::new([-30.0; 2], [30.0; 2]);
     setup.things.truncate(1);
     setup.things[0].position = Vec3::new(25.0, 0.0, 25.0);
@@ -114,10 +120,12 @@ fn people(folder: &Path) -> image::ImageResult<()> {
                 p.look = k as u8;
                 let h = p.height_m;
                 let camera = camera([0.0, 0.62 * h, 0.80 * h], 0.0, -0.12, 360, 440);
-                let view = View { camera, channels: Channels::RGB, hide: None, hide_ceiling: false };
+                let view =
+                    View { camera, channels: Channels::RGB, hide: None, hide_ceiling: false };
                 let images = scene.render_state(&state, &[p], &[view]);
                 let rgb = images.into_iter().next().and_then(|i| i.rgb).unwrap_or_default();
-                let mut picture = image_out::rgb(&rgb, 360, 440).unwrap_or_else(|| RgbImage::new(360, 440));
+                let mut picture =
+                    image_out::rgb(&rgb, 360, 440).unwrap_or_else(|| RgbImage::new(360, 440));
                 let label = format!("{persona:?} {name} {side}");
                 text::draw(&mut picture, (6.0, 4.0), 16.0, [20; 3], Align::Left, &label);
                 pictures.push(picture);

@@ -16,6 +16,7 @@ pub(crate) struct Scratch {
     order: Vec<Candidate>,
     /// Level of detail of each instance in this view.
     pub levels: Vec<u8>,
+    pub row: crate::shade::Row,
 }
 
 /// What is left out of a view.
@@ -44,7 +45,7 @@ struct Outline {
 
 /// Draws all that a lens sees of a frame into the scratch's target.
 pub(crate) fn draw(frame: &Frame, lens: &Lens, omit: Omit, scratch: &mut Scratch) {
-    let Scratch { target, corners, order, levels } = scratch;
+    let Scratch { target, corners, order, levels, .. } = scratch;
     target.clear(lens.width, lens.height, lens.nearness(lens.far_m()).max(0.0));
     levels.clear();
     levels.resize(frame.instances.len(), 0);
@@ -52,10 +53,12 @@ pub(crate) fn draw(frame: &Frame, lens: &Lens, omit: Omit, scratch: &mut Scratch
     for (index, instance) in frame.instances.iter().enumerate().take(0xffff) {
         if omit.body == Some(instance.entity)
             || (omit.ceiling && instance.entity == EntityId::CEILING)
+            // A map shows doors, not what is above them.
+            || (lens.is_plan && instance.entity == EntityId::WALL && instance.min.y > 1.0)
         {
             continue;
         }
-        let into = lens.into_camera(&instance.rotation, instance.origin);
+        let into = lens.camera_from(&instance.rotation, instance.origin);
         if let Some(outline) = outline(instance, lens, &into) {
             let is_structure = instance.entity < EntityId::FIRST_PERSON;
             let distance = instance.distance(lens.eye);
@@ -130,8 +133,11 @@ fn outline(instance: &Instance, lens: &Lens, into: &IntoCamera) -> Option<Outlin
         return None;
     }
     // A box between two rows or columns of pixel centers covers none.
-    let between = |low: f32, high: f32| low > 0.5 && (low - 0.5) as i32 == (high - 0.5) as i32
-        && (low - 0.5) as i32 as f32 != low - 0.5;
+    let between = |low: f32, high: f32| {
+        low > 0.5
+            && (low - 0.5) as i32 == (high - 0.5) as i32
+            && (low - 0.5) as i32 as f32 != low - 0.5
+    };
     if !crosses_near && (between(rect[0], rect[2]) || between(rect[1], rect[3])) {
         return None;
     }
@@ -151,7 +157,7 @@ impl Drawing<'_> {
     fn draw(&self, crosses_near: bool, target: &mut Target, corners: &mut Vec<Corner>) {
         let lens = self.lens;
         let mesh = self.instance.shape.mesh(self.level);
-        let into = lens.into_camera(&self.instance.rotation, self.instance.origin);
+        let into = lens.camera_from(&self.instance.rotation, self.instance.origin);
         let (mu, mv) = lens.middle();
         corners.clear();
         if lens.is_plan {

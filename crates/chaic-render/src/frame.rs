@@ -88,8 +88,11 @@ impl Instance<'_> {
     /// Distance from a point in the world to the bounds, metres.
     pub fn distance(&self, p: Vec3) -> f32 {
         let d = p - self.origin;
-        let local =
-            Vec3::new(self.rotation.x_axis.dot(d), self.rotation.y_axis.dot(d), self.rotation.z_axis.dot(d));
+        let local = Vec3::new(
+            self.rotation.x_axis.dot(d),
+            self.rotation.y_axis.dot(d),
+            self.rotation.z_axis.dot(d),
+        );
         length(local - local.max(self.min).min(self.max))
     }
 

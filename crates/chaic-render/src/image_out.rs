@@ -19,7 +19,8 @@ pub fn depth_mm(depth_m: &[f32], width: u32, height: u32) -> Option<Gray16Image>
 
 /// Depth to look at: near is bright; black where nothing is seen.
 pub fn depth_view(depth_m: &[f32], width: u32, height: u32) -> Option<GrayImage> {
-    let shade = |d: &f32| if *d >= Camera::FAR_M { 0 } else { (255.0 / (1.0 + 0.22 * d.max(0.0))) as u8 };
+    let shade =
+        |d: &f32| if *d >= Camera::FAR_M { 0 } else { (255.0 / (1.0 + 0.22 * d.max(0.0))) as u8 };
     GrayImage::from_raw(width, height, depth_m.iter().map(shade).collect())
 }
 

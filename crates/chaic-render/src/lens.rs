@@ -88,16 +88,24 @@ impl Lens {
 
     /// The way from an object's frame, given by the columns of a rotation and an origin, into
     /// this camera.
-    pub fn into_camera(&self, rotation: &Mat3, origin: Vec3) -> IntoCamera {
+    pub fn camera_from(&self, rotation: &Mat3, origin: Vec3) -> IntoCamera {
         let d = origin - self.eye;
         let row = |axis: Vec3| {
-            Vec3::new(axis.dot(rotation.x_axis), axis.dot(rotation.y_axis), axis.dot(rotation.z_axis))
+            Vec3::new(
+                axis.dot(rotation.x_axis),
+                axis.dot(rotation.y_axis),
+                axis.dot(rotation.z_axis),
+            )
         };
         IntoCamera {
             x: row(self.right) * self.focal,
             y: row(-self.up) * self.focal,
             w: row(self.ahead),
-            at: Vec3::new(self.right.dot(d) * self.focal, -self.up.dot(d) * self.focal, self.ahead.dot(d)),
+            at: Vec3::new(
+                self.right.dot(d) * self.focal,
+                -self.up.dot(d) * self.focal,
+                self.ahead.dot(d),
+            ),
         }
     }
 }

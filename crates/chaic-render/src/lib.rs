@@ -17,7 +17,10 @@
 //! a buffer of nearness and owners ([`raster`]); depth and ids are read off that buffer, and color
 //! is computed for each pixel's owner ([`shade`]) only if it is asked for.
 
-#![allow(rustdoc::private_intra_doc_links, reason = "the code map above is for readers of the source")]
+#![allow(
+    rustdoc::private_intra_doc_links,
+    reason = "the code map above is for readers of the source"
+)]
 
 mod scene;
 mod view;
@@ -35,6 +38,7 @@ mod raster;
 
 mod light;
 mod shade;
+mod surface;
 mod texture;
 
 pub mod image_out;

@@ -4,6 +4,8 @@ use chaic_protocol::geom::Rect;
 use chaic_protocol::{Vec2, Vec3};
 use chaic_world::{RoomKind, Setup};
 
+use crate::texture::split;
+
 /// No room.
 pub(crate) const NO_ROOM: u8 = u8::MAX;
 /// How far the darkness at the foot of things reaches, metres.
@@ -52,7 +54,8 @@ pub(crate) struct Foot {
 impl Ground {
     pub fn new(setup: &Setup) -> Ground {
         let floors = setup.floors.iter().map(|f| f.rect);
-        let all = floors.fold(setup.bounds, |a, b| Rect { min: a.min.min(b.min), max: a.max.max(b.max) });
+        let all =
+            floors.fold(setup.bounds, |a, b| Rect { min: a.min.min(b.min), max: a.max.max(b.max) });
         let all = all.grown(0.5);
         let size = all.size();
         let cells_per_m = (MAX_CELLS / size.x.max(size.y)).clamp(0.2, 25.0);
@@ -98,7 +101,8 @@ impl Ground {
 
     fn cell(&self, p: Vec2) -> (usize, usize) {
         let at = (p - self.min) * self.cells_per_m;
-        ((at.x.max(0.0) as usize).min(self.nx - 1), (at.y.max(0.0) as usize).min(self.nz - 1))
+        let whole = |x: f32, n: usize| (x as i32).clamp(0, n as i32 - 1) as usize;
+        (whole(at.x, self.nx), whole(at.y, self.nz))
     }
 
     /// The room at a point, or [`NO_ROOM`].
@@ -113,7 +117,9 @@ impl Ground {
     }
 
     fn darken(&self, dark: &mut [u8], foot: &Foot) {
-        let reach_m = CONTACT_M.max(1.5 / self.cells_per_m);
+        // Small things darken less around them.
+        let size = foot.half.x.max(foot.half.y);
+        let reach_m = CONTACT_M.min(0.02 + 0.6 * size).max(1.2 / self.cells_per_m);
         let spread = Vec2::new(
             foot.axis.x.abs() * foot.half.x + foot.axis.y.abs() * foot.half.y,
             foot.axis.y.abs() * foot.half.x + foot.axis.x.abs() * foot.half.y,
@@ -168,11 +174,11 @@ impl<'a> Light<'a> {
         let g = self.ground;
         let u = ((x - g.min.x) * g.cells_per_m - 0.5).max(0.0);
         let v = ((z - g.min.y) * g.cells_per_m - 0.5).max(0.0);
-        let (i, j) = (u as usize, v as usize);
+        let ((i, fu), (j, fv)) = (split(u), split(v));
+        let (i, j) = (i.max(0) as usize, j.max(0) as usize);
         if i + 1 >= g.nx || j + 1 >= g.nz {
             return 1.0;
         }
-        let (fu, fv) = (u - i as f32, v - j as f32);
         let at = |k: usize| f32::from(self.dark[k]);
         let (a, b) = (j * g.nx + i, (j + 1) * g.nx + i);
         let low = at(a) + (at(a + 1) - at(a)) * fu;

@@ -232,7 +232,8 @@ impl Mesh {
     /// A round limb from `from` to `to` with rounded ends.
     pub fn limb(&mut self, from: Vec3, to: Vec3, radius_from: f32, radius_to: f32, n: usize) {
         let along = unit(to - from);
-        let side = unit(if along.x.abs() < 0.7 { along.cross(Vec3::X) } else { along.cross(Vec3::Z) });
+        let side =
+            unit(if along.x.abs() < 0.7 { along.cross(Vec3::X) } else { along.cross(Vec3::Z) });
         let other = side.cross(along);
         let section = |center: Vec3, r: f32| Section { center, a: side * r, b: other * r };
         self.tube(

@@ -5,7 +5,7 @@ use chaic_protocol::{AgentId, EntityId, Role, Vec2, Vec3};
 use chaic_world::{Place, RoomKind, World};
 use image::{Rgb, RgbImage};
 
-use crate::draw::{Omit, draw as draw_scene};
+use crate::draw::{Omit, Scratch, draw as draw_scene};
 use crate::lens::Lens;
 use crate::people::Body;
 use crate::scene::Scene;
@@ -82,7 +82,8 @@ fn base(scene: &Scene, world: &World, map: &Map, width: u32, height: u32) -> Rgb
     let mut rgb = Vec::new();
     with_scratch(|scratch| {
         draw_scene(&frame, &lens, Omit { body: None, ceiling: true }, scratch);
-        shade(&frame, &lens, &scratch.levels, &scratch.target, &mut rgb);
+        let Scratch { levels, target, row, .. } = &mut *scratch;
+        shade(&frame, &lens, levels, target, row, &mut rgb);
     });
     RgbImage::from_raw(width, height, rgb).unwrap_or_else(|| RgbImage::new(width, height))
 }
@@ -118,9 +119,10 @@ fn tint_rooms(image: &mut RgbImage, world: &World, map: &Map) {
         }
         let (a, b) = (map.flat(room.rect.min), map.flat(room.rect.max));
         for_pixels(image, a, b, |_, pixel| {
-            // Walls stay dark.
+            // Walls stay dark; all else is lighter than in a room, for what is drawn on it.
             if pixel.iter().any(|c| *c > 70) {
-                blend(pixel, room_color(room.kind), 0.22);
+                blend(pixel, [255; 3], 0.16);
+                blend(pixel, room_color(room.kind), 0.2);
             }
         });
     }
@@ -179,9 +181,16 @@ fn mark_things(image: &mut RgbImage, world: &World, map: &Map) {
     for (k, entity) in setup.entities().enumerate() {
         let Some(color) = mark_of(world, entity) else { continue };
         let size = setup.things[k].size_m();
-        let radius = (0.6 * size.x.max(size.z) * map.px_per_m).clamp(2.5 * thick, 0.08 * image.width() as f32);
+        let radius = (0.6 * size.x.max(size.z) * map.px_per_m)
+            .clamp(2.5 * thick, 0.08 * image.width() as f32);
         let done = world.state().things[k].delivered.is_some();
-        circle(image, map.px(world.state().things[k].position), radius, thick, if done { GOAL } else { color });
+        circle(
+            image,
+            map.px(world.state().things[k].position),
+            radius,
+            thick,
+            if done { GOAL } else { color },
+        );
     }
 }
 
@@ -216,10 +225,13 @@ fn with_legend(map: &RgbImage, world: &World) -> RgbImage {
         .map(|agent| (person_color(agent), agent.word().to_owned(), true))
         .collect();
     let targets = &world.setup().goal.targets;
-    let wanted: Vec<String> = targets.iter().map(|(c, n)| format!("{n} {}", c.info().label)).collect();
+    let wanted: Vec<String> =
+        targets.iter().map(|(c, n)| format!("{n} {}", c.info().label)).collect();
     entries.push((TARGET, format!("wanted: {}", wanted.join(", ")), false));
     entries.push((GOAL, "goal place, delivered".to_owned(), false));
-    for (color, word, role) in [(CONTAINER, "container", Role::Container), (OBSTACLE, "obstacle", Role::Obstacle)] {
+    for (color, word, role) in
+        [(CONTAINER, "container", Role::Container), (OBSTACLE, "obstacle", Role::Obstacle)]
+    {
         if world.setup().things.iter().any(|t| t.class.info().role == role) {
             entries.push((color, word.to_owned(), false));
         }
@@ -291,7 +303,8 @@ fn triangle(image: &mut RgbImage, [a, b, c]: [Vec2; 3], color: [u8; 3]) {
     let side = |p: Vec2, q: Vec2, r: Vec2| (q - p).perp_dot(r - p);
     let turn = side(a, b, c);
     for_pixels(image, a.min(b).min(c), a.max(b).max(c), |p, pixel| {
-        if side(a, b, p) * turn >= 0.0 && side(b, c, p) * turn >= 0.0 && side(c, a, p) * turn >= 0.0 {
+        if side(a, b, p) * turn >= 0.0 && side(b, c, p) * turn >= 0.0 && side(c, a, p) * turn >= 0.0
+        {
             *pixel = color;
         }
     });

@@ -73,17 +73,16 @@ impl Target {
             return;
         }
         let band = TILE * self.width;
-        for (rows, tiles) in self.nearness.chunks(band).zip(self.tiles.chunks_mut(self.tiles_wide)) {
-            for (k, tile) in tiles.iter_mut().enumerate() {
-                let from = k * TILE;
-                let to = (from + TILE).min(self.width);
-                let mut least = [f32::INFINITY; TILE];
-                for row in rows.chunks(self.width) {
-                    for (l, q) in least.iter_mut().zip(&row[from..to]) {
-                        *l = if *q < *l { *q } else { *l };
-                    }
+        for (rows, tiles) in self.nearness.chunks(band).zip(self.tiles.chunks_mut(self.tiles_wide))
+        {
+            tiles.fill(f32::INFINITY);
+            for row in rows.chunks(self.width) {
+                for (tile, pixels) in tiles.iter_mut().zip(row.chunks(TILE)) {
+                    *tile = match <&[f32; TILE]>::try_from(pixels) {
+                        Ok(eight) => least(*tile, least_of(eight)),
+                        Err(_) => pixels.iter().fold(*tile, |a, b| least(a, *b)),
+                    };
                 }
-                *tile = least.iter().fold(f32::INFINITY, |a, b| if *b < a { *b } else { a });
             }
         }
     }
@@ -112,8 +111,6 @@ impl Target {
             return;
         }
         let inverse = 1.0 / area;
-        let least = |x: f32, y: f32| if x < y { x } else { y };
-        let most = |x: f32, y: f32| if x > y { x } else { y };
         let slope = Slope {
             at: a,
             du: (bq * cv - cq * bv) * inverse,
@@ -151,7 +148,16 @@ impl Target {
 
     #[allow(clippy::too_many_arguments, reason = "a piece of one inner loop")]
     #[inline]
-    fn half(&mut self, from: i32, to: i32, short: Edge, long: Edge, short_is_right: bool, slope: &Slope, owner: u32) {
+    fn half(
+        &mut self,
+        from: i32,
+        to: i32,
+        short: Edge,
+        long: Edge,
+        short_is_right: bool,
+        slope: &Slope,
+        owner: u32,
+    ) {
         let (left, right) = if short_is_right { (long, short) } else { (short, long) };
         let columns = self.width as i32;
         for row in from..to {
@@ -177,7 +183,30 @@ impl Target {
 }
 
 #[inline]
-fn fill_span(nearness: &mut [f32], owners: &mut [u32], q0: f32, begin: i32, slope: &Slope, owner: u32) {
+fn least(x: f32, y: f32) -> f32 {
+    if x < y { x } else { y }
+}
+
+#[inline]
+fn most(x: f32, y: f32) -> f32 {
+    if x > y { x } else { y }
+}
+
+#[inline]
+fn least_of(x: &[f32; TILE]) -> f32 {
+    let four: [f32; 4] = std::array::from_fn(|k| least(x[k], x[k + 4]));
+    least(least(four[0], four[2]), least(four[1], four[3]))
+}
+
+#[inline]
+fn fill_span(
+    nearness: &mut [f32],
+    owners: &mut [u32],
+    q0: f32,
+    begin: i32,
+    slope: &Slope,
+    owner: u32,
+) {
     let Slope { du, low, high, .. } = *slope;
     let owners = &mut owners[..nearness.len()];
     for (k, (q, o)) in nearness.iter_mut().zip(owners).enumerate() {

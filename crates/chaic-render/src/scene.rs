@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use chaic_protocol::catalogue::Finish;
 use chaic_protocol::geom::Rect;
+use chaic_protocol::observation::Images;
 use chaic_protocol::{EntityId, Vec2, Vec3};
 use chaic_world::{FloorMaterial, Place, Posture, RoomKind, Setup, State, Wall, World};
 use glam::Mat3;
@@ -16,7 +17,6 @@ use crate::people::Body;
 use crate::solids::cuboid;
 use crate::texture::{Texture, linear_from_srgb};
 use crate::view::{View, look};
-use chaic_protocol::observation::Images;
 
 /// Everything of an episode that is drawn and never changes: floors, walls, ceilings, and the
 /// shapes of things. Cheap to make; cameras share it.
@@ -76,9 +76,15 @@ impl Scene {
         views.par_iter().map(|view| look(&frame, view)).collect()
     }
 
-    pub(crate) fn frame<'a>(&'a self, state: &State, bodies: &'a [Body], wants_color: bool) -> Frame<'a> {
+    pub(crate) fn frame<'a>(
+        &'a self,
+        state: &State,
+        bodies: &'a [Body],
+        wants_color: bool,
+    ) -> Frame<'a> {
         let mut light = Light::new(&self.ground, wants_color);
-        let mut instances = Vec::with_capacity(self.structure.len() + self.things.len() + bodies.len());
+        let mut instances =
+            Vec::with_capacity(self.structure.len() + self.things.len() + bodies.len());
         for (entity, mesh) in &self.structure {
             instances.push(Instance {
                 entity: *entity,

@@ -1,289 +1,370 @@
-//! Color of pixels whose surface is known.
+//! Color of pixels whose surface is known, one row of the image at a time.
+//!
+//! A row is an array per quantity, and each step is a plain loop over such arrays, so that the
+//! compiler computes several pixels at once: the order of operations for a pixel stays the same.
 
-use chaic_protocol::{EntityId, Vec3};
+use chaic_protocol::Vec3;
 
-use crate::frame::{Frame, Instance};
+use crate::frame::Frame;
 use crate::lens::Lens;
-use crate::light::NO_ROOM;
-use crate::mesh::{Gloss, Mesh, Skin, length, unit};
+use crate::mesh::Gloss;
 use crate::raster::{NOBODY, Target, owner_parts};
-use crate::texture::{SRGB, Tile, srgb_from_linear};
+use crate::surface::Surface;
+use crate::texture::{SRGB, srgb_from_linear};
 
 const SUN: Vec3 = Vec3::new(0.42, 0.80, 0.43);
 const SUN_COLOR: Vec3 = Vec3::new(0.92, 0.86, 0.74);
 const LAMP_COLOR: Vec3 = Vec3::new(0.66, 0.62, 0.55);
 /// Light from above and from below, out of doors.
 const OUTDOORS: [Vec3; 2] = [Vec3::new(0.36, 0.41, 0.48), Vec3::new(0.24, 0.23, 0.20)];
-/// The same in a room.
+/// The same in a room. Ceilings get more: all that is below them shines up.
 const INDOORS: [Vec3; 2] = [Vec3::new(0.40, 0.40, 0.40), Vec3::new(0.34, 0.32, 0.30)];
-/// Height of the skirting board, metres.
-const SKIRTING_M: f32 = 0.075;
+
+/// The pixels of one row; every array has one number per pixel.
+#[derive(Default)]
+pub(crate) struct Row {
+    /// Depth, metres.
+    pub depth: Vec<f32>,
+    /// The point seen, in the world, metres.
+    pub x: Vec<f32>,
+    pub y: Vec<f32>,
+    pub z: Vec<f32>,
+    /// Its unit normal.
+    pub nx: Vec<f32>,
+    pub ny: Vec<f32>,
+    pub nz: Vec<f32>,
+    /// Side of the patch that the pixel covers, metres.
+    pub covers_m: Vec<f32>,
+    /// First the surface's color, then the light that comes from it, linear.
+    pub r: Vec<f32>,
+    pub g: Vec<f32>,
+    pub b: Vec<f32>,
+    /// Factor for what is hidden from light; 2 on ceilings, which see the whole lit room.
+    pub shade: Vec<f32>,
+    /// First the lamp, in the world, metres; then the unit vector to the light.
+    pub lx: Vec<f32>,
+    pub ly: Vec<f32>,
+    pub lz: Vec<f32>,
+    /// 1 if a lamp shines, 0 if the sun does.
+    pub indoors: Vec<f32>,
+    /// Strength of the direct light.
+    pub direct: Vec<f32>,
+    runs: Vec<(usize, usize, u32)>,
+}
+
+impl Row {
+    #[inline]
+    pub fn point(&self, k: usize) -> Vec3 {
+        Vec3::new(self.x[k], self.y[k], self.z[k])
+    }
+
+    fn resize(&mut self, n: usize) {
+        for array in [
+            &mut self.depth,
+            &mut self.x,
+            &mut self.y,
+            &mut self.z,
+            &mut self.nx,
+            &mut self.ny,
+            &mut self.nz,
+            &mut self.covers_m,
+            &mut self.r,
+            &mut self.g,
+            &mut self.b,
+            &mut self.shade,
+            &mut self.lx,
+            &mut self.ly,
+            &mut self.lz,
+            &mut self.indoors,
+            &mut self.direct,
+        ] {
+            array.clear();
+            array.resize(n, 0.0);
+        }
+    }
+}
+
+/// What the pixels of one row look along: pixel k along `left + k * step`, per metre of depth (in
+/// a plan view: offset by it, all straight down).
+#[derive(Clone, Copy)]
+struct Rays {
+    left: Vec3,
+    step: Vec3,
+}
 
 /// Writes RGB, u8, shape [height, width, 3].
-pub(crate) fn shade(frame: &Frame, lens: &Lens, levels: &[u8], target: &Target, rgb: &mut Vec<u8>) {
+pub(crate) fn shade(
+    frame: &Frame,
+    lens: &Lens,
+    levels: &[u8],
+    target: &Target,
+    row: &mut Row,
+    rgb: &mut Vec<u8>,
+) {
     rgb.clear();
     rgb.resize(lens.width * lens.height * 3, 0);
     if lens.width == 0 {
         return;
     }
-    let shader = Shader { frame, lens, table: &SRGB };
+    row.resize(lens.width);
+    let table: &[u8; 4096] = &SRGB;
     let (mu, mv) = lens.middle();
     let per_px = 1.0 / lens.focal;
-    for row in 0..lens.height {
-        let line = row * lens.width..(row + 1) * lens.width;
-        let owners = &target.owner[line.clone()];
-        let nearness = &target.nearness[line.clone()];
-        let out = &mut rgb[3 * line.start..3 * line.end];
-        let y = -(row as f32 + 0.5 - mv) * per_px;
-        // A pixel sees along `left + column * step`, per metre of depth (per image in a plan).
-        let left = lens.up * y + lens.right * ((0.5 - mu) * per_px);
-        let step = lens.right * per_px;
-        let mut begin = 0;
-        while begin < owners.len() {
-            let owner = owners[begin];
-            let n = owners[begin..].iter().take_while(|o| **o == owner).count();
-            let run = Run { begin, left, step };
-            let pixels = &mut out[3 * begin..3 * (begin + n)];
+    for (j, out) in rgb.chunks_exact_mut(3 * lens.width).enumerate() {
+        let line = j * lens.width..(j + 1) * lens.width;
+        let y = -(j as f32 + 0.5 - mv) * per_px;
+        let mut left = lens.up * y + lens.right * ((0.5 - mu) * per_px);
+        if !lens.is_plan {
+            left += lens.ahead;
+        }
+        let rays = Rays { left, step: lens.right * per_px };
+        find_points(lens, &rays, &target.nearness[line.clone()], row);
+        find_runs(&target.owner[line], &mut row.runs);
+        let runs = std::mem::take(&mut row.runs);
+        let surface = |owner: u32| {
+            let (index, triangle) = owner_parts(owner);
+            let instance = &frame.instances[index];
+            Surface::of(instance, instance.shape.mesh(usize::from(levels[index])), triangle)
+        };
+        let mut any_surface = false;
+        for (from, to, owner) in runs.iter().copied().filter(|r| r.2 != NOBODY) {
+            any_surface = true;
+            let surface = surface(owner);
+            surface.normals(row, from, to);
+            find_covers(lens, &rays, row, from, to);
+            surface.paint(frame, row, from, to, lens.is_plan);
+        }
+        if any_surface {
+            light(row);
+        }
+        for (from, to, owner) in runs.iter().copied() {
             if owner == NOBODY {
-                shader.sky(&run, pixels);
+                sky(lens, &rays, row, from, to);
             } else {
-                let (index, triangle) = owner_parts(owner);
-                let instance = &frame.instances[index];
-                let mesh = instance.shape.mesh(usize::from(levels[index]));
-                let surface = Surface::of(instance, mesh, triangle);
-                shader.surface(&surface, &run, &nearness[begin..begin + n], pixels);
+                gloss(surface_gloss(frame, levels, owner), lens, row, from, to);
             }
-            begin += n;
+        }
+        row.runs = runs;
+        let colors = row.r.iter().zip(&row.g).zip(&row.b);
+        for (pixel, ((r, g), b)) in out.chunks_exact_mut(3).zip(colors) {
+            pixel[0] = srgb_from_linear(table, *r);
+            pixel[1] = srgb_from_linear(table, *g);
+            pixel[2] = srgb_from_linear(table, *b);
         }
     }
 }
 
-/// Neighboring pixels of one row.
-struct Run {
-    begin: usize,
-    left: Vec3,
-    step: Vec3,
+fn surface_gloss(frame: &Frame, levels: &[u8], owner: u32) -> Gloss {
+    let (index, triangle) = owner_parts(owner);
+    let mesh = frame.instances[index].shape.mesh(usize::from(levels[index]));
+    mesh.skins[usize::from(mesh.triangles[triangle].skin)].gloss
 }
 
-/// A triangle, ready to be shaded: its quantities are affine functions of the point in the world.
-struct Surface<'a> {
-    entity: EntityId,
-    skin: &'a Skin,
-    color: Vec3,
-    /// Normal at `at`, and its changes along the triangle's two edges if it is smooth.
-    at: Vec3,
-    normal: Vec3,
-    change: [Vec3; 2],
-    weights: [Vec3; 2],
-    smooth: bool,
-    tile: Option<&'static Tile>,
-    origin: Vec3,
-    /// Directions of the texture, in the world.
-    u: Vec3,
-    v: Vec3,
-    room: Option<u8>,
-}
-
-impl<'a> Surface<'a> {
-    fn of(instance: &'a Instance, mesh: &'a Mesh, triangle: usize) -> Surface<'a> {
-        let t = &mesh.triangles[triangle];
-        let skin = &mesh.skins[usize::from(t.skin)];
-        let corner = t.corners.map(usize::from);
-        let [a, b, c] = corner.map(|k| mesh.positions[k]);
-        let flat = (b - a).cross(c - a);
-        let area2 = flat.dot(flat).max(1e-30);
-        let face = unit(flat);
-        let turn = |v: Vec3| instance.rotation * v;
-        let (mut normal, mut change, mut weights) = (turn(face), [Vec3::ZERO; 2], [Vec3::ZERO; 2]);
-        if t.smooth {
-            let [na, nb, nc] = corner.map(|k| mesh.normals[k]);
-            normal = turn(na);
-            change = [turn(nb - na), turn(nc - na)];
-            weights = [turn((c - a).cross(flat)) / area2, turn(flat.cross(b - a)) / area2];
-        }
-        let tile = skin.texture.tile();
-        let (mut u, mut v) = (Vec3::ZERO, Vec3::ZERO);
-        if tile.is_some() {
-            let axes = &skin.axes;
-            let facing = [axes.x_axis, axes.y_axis, axes.z_axis].map(|x| x.dot(face).abs());
-            // Look along the axis that the face is most square to; the longest axis left is u.
-            (u, v) = if facing[0] > facing[1] && facing[0] > facing[2] {
-                (turn(axes.y_axis), turn(axes.z_axis))
-            } else if facing[1] > facing[2] {
-                (turn(axes.x_axis), turn(axes.z_axis))
-            } else {
-                (turn(axes.x_axis), turn(axes.y_axis))
-            };
-        }
-        let color = match instance.tint {
-            Some(tint) if skin.tinted => tint,
-            _ => skin.color,
-        };
-        Surface {
-            entity: instance.entity,
-            skin,
-            color: Vec3::from(color),
-            at: turn(a) + instance.origin,
-            normal,
-            change,
-            weights,
-            smooth: t.smooth,
-            tile,
-            origin: instance.origin,
-            u,
-            v,
-            room: instance.room,
-        }
-    }
-
-    #[inline]
-    fn normal_at(&self, p: Vec3) -> Vec3 {
-        if !self.smooth {
-            return self.normal;
-        }
-        let d = p - self.at;
-        let (s, t) = (self.weights[0].dot(d).clamp(0.0, 1.0), self.weights[1].dot(d).clamp(0.0, 1.0));
-        unit(self.normal + self.change[0] * s + self.change[1] * t)
-    }
-}
-
-struct Shader<'a> {
-    frame: &'a Frame<'a>,
-    lens: &'a Lens,
-    table: &'a [u8; 4096],
-}
-
-impl Shader<'_> {
-    fn put(&self, out: &mut [u8], color: Vec3) {
-        out[0] = srgb_from_linear(self.table, color.x);
-        out[1] = srgb_from_linear(self.table, color.y);
-        out[2] = srgb_from_linear(self.table, color.z);
-    }
-
-    fn sky(&self, run: &Run, pixels: &mut [u8]) {
-        for (k, out) in pixels.chunks_exact_mut(3).enumerate() {
-            let ray = self.lens.ahead + run.left + run.step * (run.begin + k) as f32;
-            let color = if self.lens.is_plan { Vec3::splat(0.86) } else { sky_color(ray) };
-            self.put(out, color);
-        }
-    }
-
-    fn surface(&self, surface: &Surface, run: &Run, nearness: &[f32], pixels: &mut [u8]) {
-        let lens = self.lens;
-        let mut last_room = (NO_ROOM, None);
-        for (k, (out, q)) in pixels.chunks_exact_mut(3).zip(nearness).enumerate() {
-            let depth = lens.depth(*q);
-            let across = run.left + run.step * (run.begin + k) as f32;
-            let (p, to_eye) = if lens.is_plan {
-                (lens.eye + across + lens.ahead * depth, -lens.ahead)
-            } else {
-                let ray = lens.ahead + across;
-                (lens.eye + ray * depth, -ray)
-            };
-            let n = surface.normal_at(p);
-            let room = surface.room.unwrap_or_else(|| self.frame.light.ground.room_at(p + n * 0.1));
-            if room != last_room.0 {
-                last_room = (room, self.frame.light.ground.lamp(room));
-            }
-            let color = self.pixel(surface, p, n, to_eye, depth, last_room.1);
-            self.put(out, color);
-        }
-    }
-
-    #[inline]
-    fn pixel(&self, s: &Surface, p: Vec3, n: Vec3, to_eye: Vec3, depth: f32, lamp: Option<Vec3>) -> Vec3 {
-        let mut albedo = s.color;
-        if let Some(tile) = s.tile {
-            let scale = if self.lens.is_plan { 1.0 } else { depth } / self.lens.focal;
-            // Seen at a slant a pixel covers more; the root keeps it from blurring too early.
-            let slant = (n.dot(to_eye).abs()).max(0.05);
-            let at = p - s.origin;
-            albedo *= tile.sample(s.u.dot(at), s.v.dot(at), scale / slant.sqrt());
-        }
-        let mut shade = 1.0;
-        match s.entity {
-            EntityId::FLOOR => shade = self.frame.light.ground_brightness(p.x, p.z),
-            EntityId::WALL => {
-                if self.lens.is_plan && n.y > 0.5 {
-                    return Vec3::splat(0.035);
-                }
-                let low = (1.0 - p.y * 2.2).max(0.0);
-                shade = 1.0 - 0.22 * low * low;
-                if let Some(ceiling) = self.frame.light.ground.ceiling_m {
-                    let high = (1.0 - (ceiling - p.y) * 2.2).max(0.0);
-                    shade -= 0.16 * high * high;
-                    if p.y < SKIRTING_M && n.y < 0.5 {
-                        albedo = Vec3::splat(0.62);
-                        shade *= if p.y > SKIRTING_M - 0.012 { 0.72 } else { 1.0 };
-                    }
-                }
-            }
-            EntityId::CEILING => {}
-            _ => shade = 0.76 + 0.24 * ((p.y - s.origin.y) * 7.0).clamp(0.0, 1.0),
-        }
-        let (to_light, light, ambient) = match lamp {
-            Some(lamp) => {
-                let d = lamp - p;
-                let d2 = d.dot(d) + 0.3;
-                let l = d * (1.0 / d2.sqrt());
-                let wrapped = (l.dot(n) + 0.35).max(0.0) * (1.0 / 1.35);
-                let fade = 1.35 / (1.0 + 0.085 * d2);
-                (l, LAMP_COLOR * (wrapped * fade), INDOORS)
-            }
-            None => (SUN, SUN_COLOR * SUN.dot(n).max(0.0), OUTDOORS),
-        };
-        let up = 0.5 * n.y + 0.5;
-        let mut hemisphere = ambient[1] + (ambient[0] - ambient[1]) * up;
-        // Walls at right angles must differ even where no lamp is near.
-        hemisphere *= 1.0 + 0.07 * n.x - 0.05 * n.z;
-        if s.entity == EntityId::CEILING {
-            hemisphere = Vec3::splat(0.62);
-        } else if n.y < -0.5 {
-            hemisphere *= 0.7;
-        }
-        let color = albedo * (hemisphere + light) * shade;
-        self.gloss(s.skin.gloss, color, albedo, n, to_eye, to_light, light)
-    }
-
-    #[allow(clippy::too_many_arguments, reason = "a piece of one inner loop")]
-    #[inline]
-    fn gloss(&self, gloss: Gloss, color: Vec3, albedo: Vec3, n: Vec3, to_eye: Vec3, to_light: Vec3, light: Vec3) -> Vec3 {
-        if gloss == Gloss::Dull {
-            return color;
-        }
-        let v = to_eye * (1.0 / length(to_eye).max(1e-6));
-        let h = unit(v + to_light);
-        let c = n.dot(h).max(0.0);
-        let (c2, c4) = (c * c, c * c * c * c);
-        let (c8, c16) = (c4 * c4, c4 * c4 * c4 * c4);
-        let facing = n.dot(v).clamp(0.0, 1.0);
-        let edge = (1.0 - facing) * (1.0 - facing);
-        match gloss {
-            Gloss::Dull => color,
-            Gloss::Satin => color + light * (0.07 * c8) + Vec3::splat(0.02 * edge),
-            Gloss::Shiny => color + light * (0.45 * c16 * c16) + Vec3::splat(0.07 * edge * edge),
-            Gloss::Metal => {
-                let mirror = 0.5 + 0.5 * (n * (2.0 * n.dot(v)) - v).y;
-                color * 0.55 + albedo * (0.12 + 0.5 * mirror * mirror) + light * (0.5 * c8 * c2)
-            }
-            Gloss::Glass => {
-                let mirror = 0.5 + 0.5 * (n * (2.0 * n.dot(v)) - v).y;
-                let reflects = 0.10 + 0.6 * edge * edge;
-                color * 0.6 + Vec3::new(0.62, 0.72, 0.80) * (reflects * mirror) + light * (0.6 * c16)
-            }
+/// Neighboring pixels of one owner: first, one past the last, owner.
+fn find_runs(owners: &[u32], runs: &mut Vec<(usize, usize, u32)>) {
+    runs.clear();
+    let mut begin = 0;
+    for k in 1..=owners.len() {
+        if k == owners.len() || owners[k] != owners[begin] {
+            runs.push((begin, k, owners[begin]));
+            begin = k;
         }
     }
 }
 
-fn sky_color(ray: Vec3) -> Vec3 {
-    let y = ray.y / length(ray).max(1e-6);
+fn find_points(lens: &Lens, rays: &Rays, nearness: &[f32], row: &mut Row) {
+    let n = nearness.len();
+    let (eye, ahead, Rays { left, step }) = (lens.eye, lens.ahead, *rays);
+    let depth = &mut row.depth[..n];
+    for (d, q) in depth.iter_mut().zip(nearness) {
+        *d = lens.depth(*q);
+    }
+    let (x, y, z) = (&mut row.x[..n], &mut row.y[..n], &mut row.z[..n]);
+    if lens.is_plan {
+        for k in 0..n {
+            let t = k as f32;
+            x[k] = eye.x + left.x + step.x * t + ahead.x * depth[k];
+            y[k] = eye.y + left.y + step.y * t + ahead.y * depth[k];
+            z[k] = eye.z + left.z + step.z * t + ahead.z * depth[k];
+        }
+        return;
+    }
+    for k in 0..n {
+        let t = k as f32;
+        x[k] = eye.x + (left.x + step.x * t) * depth[k];
+        y[k] = eye.y + (left.y + step.y * t) * depth[k];
+        z[k] = eye.z + (left.z + step.z * t) * depth[k];
+    }
+}
+
+/// How much each pixel covers. Seen at a slant it covers more; the root keeps textures from
+/// blurring too early.
+fn find_covers(lens: &Lens, rays: &Rays, row: &mut Row, from: usize, to: usize) {
+    let per_px = 1.0 / lens.focal;
+    if lens.is_plan {
+        row.covers_m[from..to].fill(per_px);
+        return;
+    }
+    let n = to - from;
+    let Rays { left, step } = *rays;
+    let covers = &mut row.covers_m[from..to];
+    let depth = &row.depth[from..to];
+    let (nx, ny, nz) = (&row.nx[from..to], &row.ny[from..to], &row.nz[from..to]);
+    for k in 0..n {
+        let t = (from + k) as f32;
+        let slant = (nx[k] * (left.x + step.x * t)
+            + ny[k] * (left.y + step.y * t)
+            + nz[k] * (left.z + step.z * t))
+            .abs();
+        covers[k] = depth[k] * per_px / most(slant, 0.05).sqrt();
+    }
+}
+
+#[inline]
+fn most(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+#[inline]
+fn pick(yes: bool, a: f32, b: f32) -> f32 {
+    if yes { a } else { b }
+}
+
+/// Turns colors of surfaces into light.
+fn light(row: &mut Row) {
+    let n = row.depth.len();
+    let (x, y, z) = (&row.x[..n], &row.y[..n], &row.z[..n]);
+    let (nx, ny, nz) = (&row.nx[..n], &row.ny[..n], &row.nz[..n]);
+    let (lx, ly, lz) = (&mut row.lx[..n], &mut row.ly[..n], &mut row.lz[..n]);
+    let (indoors, direct) = (&row.indoors[..n], &mut row.direct[..n]);
+    for k in 0..n {
+        let (dx, dy, dz) = (lx[k] - x[k], ly[k] - y[k], lz[k] - z[k]);
+        let d2 = dx * dx + dy * dy + dz * dz + 0.3;
+        let inverse = 1.0 / d2.sqrt();
+        let inside = indoors[k] > 0.5;
+        lx[k] = pick(inside, dx * inverse, SUN.x);
+        ly[k] = pick(inside, dy * inverse, SUN.y);
+        lz[k] = pick(inside, dz * inverse, SUN.z);
+        let facing = lx[k] * nx[k] + ly[k] * ny[k] + lz[k] * nz[k];
+        let lamp = most(facing + 0.35, 0.0) / (1.0 + 0.085 * d2);
+        direct[k] = pick(inside, lamp, most(facing, 0.0));
+    }
+    let (shade, indoors, direct) = (&row.shade[..n], &row.indoors[..n], &row.direct[..n]);
+    for (channel, array) in [&mut row.r, &mut row.g, &mut row.b].into_iter().enumerate() {
+        let array = &mut array[..n];
+        let (sun, lamp) = (SUN_COLOR[channel], LAMP_COLOR[channel]);
+        let [out_high, out_low] = OUTDOORS.map(|c| c[channel]);
+        let [in_high, in_low] = INDOORS.map(|c| c[channel]);
+        for k in 0..n {
+            let inside = indoors[k] > 0.5;
+            let up = 0.5 * ny[k] + 0.5;
+            let around =
+                pick(inside, in_low + (in_high - in_low) * up, out_low + (out_high - out_low) * up);
+            // Walls at right angles must differ even where no lamp is near, and what faces down
+            // sees little but its own shadow (a ceiling sees the whole room).
+            let around = around * (1.0 + 0.07 * nx[k] - 0.05 * nz[k]);
+            let around = around * pick(ny[k] < -0.5, pick(shade[k] > 1.5, 1.85, 0.7), 1.0);
+            array[k] *= (around + pick(inside, lamp, sun) * direct[k])
+                * pick(shade[k] < 1.0, shade[k], 1.0);
+        }
+    }
+}
+
+/// Adds highlights and reflections.
+fn gloss(gloss: Gloss, lens: &Lens, row: &mut Row, from: usize, to: usize) {
+    match gloss {
+        Gloss::Dull => {}
+        Gloss::Satin => highlight(lens, row, from, to, |s| Shine {
+            keep: 1.0,
+            light: 0.07 * s.c8,
+            sky: 0.02 * s.edge,
+        }),
+        Gloss::Shiny => highlight(lens, row, from, to, |s| {
+            let c32 = s.c8 * s.c8 * s.c8 * s.c8;
+            Shine { keep: 1.0, light: 0.45 * c32, sky: 0.07 * s.edge * s.edge }
+        }),
+        Gloss::Metal => highlight(lens, row, from, to, |s| {
+            let keep = 0.62 + 0.75 * s.mirror * s.mirror;
+            Shine { keep, light: 0.4 * s.c8 * s.c8, sky: 0.05 * s.edge }
+        }),
+        Gloss::Glass => highlight(lens, row, from, to, |s| {
+            let reflects = 0.10 + 0.6 * s.edge * s.edge;
+            Shine { keep: 0.6, light: 0.6 * s.c8 * s.c8, sky: 0.75 * reflects * s.mirror }
+        }),
+    }
+}
+
+/// How a point is seen and lit.
+struct Seen {
+    /// Cosine between the normal and the half-way vector, to the eighth.
+    c8: f32,
+    /// 0 looking straight at it, 1 along it.
+    edge: f32,
+    /// How far up the mirrored view looks: 0 down, 1 up.
+    mirror: f32,
+}
+
+/// What becomes of a point's light.
+struct Shine {
+    keep: f32,
+    light: f32,
+    sky: f32,
+}
+
+#[inline]
+fn highlight(lens: &Lens, row: &mut Row, from: usize, to: usize, shine: impl Fn(Seen) -> Shine) {
+    let n = to - from;
+    let (x, y, z) = (&row.x[from..to], &row.y[from..to], &row.z[from..to]);
+    let (nx, ny, nz) = (&row.nx[from..to], &row.ny[from..to], &row.nz[from..to]);
+    let (lx, ly, lz) = (&row.lx[from..to], &row.ly[from..to], &row.lz[from..to]);
+    let (direct, indoors) = (&row.direct[from..to], &row.indoors[from..to]);
+    let (r, g, b) = (&mut row.r[from..to], &mut row.g[from..to], &mut row.b[from..to]);
+    let (eye, up) = (lens.eye, -lens.ahead);
+    let flat = lens.is_plan;
+    for k in 0..n {
+        let (vx, vy, vz) = (eye.x - x[k], eye.y - y[k], eye.z - z[k]);
+        let (vx, vy, vz) = (pick(flat, up.x, vx), pick(flat, up.y, vy), pick(flat, up.z, vz));
+        let inverse = 1.0 / most(vx * vx + vy * vy + vz * vz, 1e-12).sqrt();
+        let (vx, vy, vz) = (vx * inverse, vy * inverse, vz * inverse);
+        let (hx, hy, hz) = (vx + lx[k], vy + ly[k], vz + lz[k]);
+        let inverse = 1.0 / most(hx * hx + hy * hy + hz * hz, 1e-12).sqrt();
+        let c = most((nx[k] * hx + ny[k] * hy + nz[k] * hz) * inverse, 0.0);
+        let (c2, facing) = (c * c, nx[k] * vx + ny[k] * vy + nz[k] * vz);
+        let c4 = c2 * c2;
+        let away = 1.0 - most(facing, 0.0);
+        let mirror = 0.5 + 0.5 * (2.0 * facing * ny[k] - vy);
+        let s = shine(Seen { c8: c4 * c4, edge: away * away, mirror: most(mirror, 0.0) });
+        let inside = indoors[k] > 0.5;
+        let light = s.light * direct[k];
+        r[k] = r[k] * s.keep + light * pick(inside, LAMP_COLOR.x, SUN_COLOR.x) + 0.85 * s.sky;
+        g[k] = g[k] * s.keep + light * pick(inside, LAMP_COLOR.y, SUN_COLOR.y) + 0.95 * s.sky;
+        b[k] = b[k] * s.keep + light * pick(inside, LAMP_COLOR.z, SUN_COLOR.z) + 1.05 * s.sky;
+    }
+}
+
+fn sky(lens: &Lens, rays: &Rays, row: &mut Row, from: usize, to: usize) {
+    if lens.is_plan {
+        for array in [&mut row.r, &mut row.g, &mut row.b] {
+            array[from..to].fill(0.86);
+        }
+        return;
+    }
     let (horizon, zenith) = (Vec3::new(0.74, 0.82, 0.88), Vec3::new(0.19, 0.40, 0.74));
     let ground = Vec3::new(0.36, 0.38, 0.34);
-    if y >= 0.0 {
-        let t = (1.0 - y) * (1.0 - y);
-        zenith + (horizon - zenith) * (t * (0.4 + 0.6 * t))
-    } else {
-        let t = (-y * 6.0).min(1.0);
-        horizon + (ground - horizon) * t
+    let Rays { left, step } = *rays;
+    let (r, g, b) = (&mut row.r[from..to], &mut row.g[from..to], &mut row.b[from..to]);
+    for k in 0..to - from {
+        let t = (from + k) as f32;
+        let ray = [left.x + step.x * t, left.y + step.y * t, left.z + step.z * t];
+        let l2 = ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2];
+        let y = ray[1] / most(l2, 1e-12).sqrt();
+        let up = (1.0 - y) * (1.0 - y);
+        let up = 1.0 - up * (0.4 + 0.6 * up);
+        let down = -most(-1.0, y * 6.0);
+        let above = y >= 0.0;
+        let t = pick(above, up, down);
+        r[k] = horizon.x + pick(above, zenith.x - horizon.x, ground.x - horizon.x) * t;
+        g[k] = horizon.y + pick(above, zenith.y - horizon.y, ground.y - horizon.y) * t;
+        b[k] = horizon.z + pick(above, zenith.z - horizon.z, ground.z - horizon.z) * t;
     }
 }

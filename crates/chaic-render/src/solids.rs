@@ -147,7 +147,14 @@ pub(crate) fn ellipsoid(mesh: &mut Mesh, place: &Place, n: usize) {
 
 /// A ring of corners of a lathed form: radius `r` (0.5 fills the box) at height `y`, normal with
 /// slope `ny` against radial `nr`.
-fn ring(mesh: &mut Mesh, place: &Place, (rx, rz): (f32, f32), y: f32, (nr, ny): (f32, f32), n: usize) -> usize {
+fn ring(
+    mesh: &mut Mesh,
+    place: &Place,
+    (rx, rz): (f32, f32),
+    y: f32,
+    (nr, ny): (f32, f32),
+    n: usize,
+) -> usize {
     let base = mesh.positions.len();
     for k in 0..n {
         let (c, s) = circle(k, n);
@@ -198,11 +205,11 @@ fn ring_of_tubes(mesh: &mut Mesh, place: &Place, tube: f32, degrees: f32, n: usi
         }
     }
     for j in 0..spans {
-        mesh.band(base + j * m, base + (j + 1) % n * m, m, true);
+        mesh.band(base + (j + 1) % n * m, base + j * m, m, true);
     }
     if !full {
-        mesh.lid(base, m, true);
-        mesh.lid(base + (n - 1) * m, m, false);
+        mesh.lid(base, m, false);
+        mesh.lid(base + (n - 1) * m, m, true);
     }
 }
 

@@ -42,7 +42,14 @@ pub fn width(text: &str, size_px: f32) -> f32 {
 }
 
 /// Draws one line of text whose top is at `y`, pixels; what falls outside of the image is cut off.
-pub fn draw(image: &mut RgbImage, (x, y): (f32, f32), size_px: f32, color: [u8; 3], align: Align, text: &str) {
+pub fn draw(
+    image: &mut RgbImage,
+    (x, y): (f32, f32),
+    size_px: f32,
+    color: [u8; 3],
+    align: Align,
+    text: &str,
+) {
     let (glyphs, wide) = lay_out(text, size_px);
     let x = match align {
         Align::Left => x,
@@ -58,8 +65,12 @@ pub fn draw(image: &mut RgbImage, (x, y): (f32, f32), size_px: f32, color: [u8; 
         let Some(outline) = FONT.outline_glyph(glyph) else { continue };
         let bounds = outline.px_bounds();
         outline.draw(|dx, dy, coverage| {
-            let (px, py) = (bounds.min.x as i64 + i64::from(dx), bounds.min.y as i64 + i64::from(dy));
-            let inside = px >= 0 && py >= 0 && px < i64::from(image.width()) && py < i64::from(image.height());
+            let (px, py) =
+                (bounds.min.x as i64 + i64::from(dx), bounds.min.y as i64 + i64::from(dy));
+            let inside = px >= 0
+                && py >= 0
+                && px < i64::from(image.width())
+                && py < i64::from(image.height());
             if inside {
                 let pixel = image.get_pixel_mut(px as u32, py as u32);
                 blend(&mut pixel.0, color, coverage);

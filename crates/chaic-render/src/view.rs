@@ -98,7 +98,8 @@ pub(crate) fn look(frame: &Frame, view: &View) -> Images {
         Images {
             rgb: rgb.then(|| {
                 let mut out = Vec::new();
-                shade(frame, &lens, &scratch.levels, &scratch.target, &mut out);
+                let Scratch { levels, target, row, .. } = &mut *scratch;
+                shade(frame, &lens, levels, target, row, &mut out);
                 out
             }),
             depth_m: depth.then(|| depths(scratch)),

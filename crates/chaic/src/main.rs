@@ -1,1 +1,44 @@
-fn main() {}
+//! The command `chaic`: a door to the crates, without logic of its own.
+
+mod arguments;
+mod commands;
+mod interrupt;
+mod output;
+
+use std::process::ExitCode;
+
+use clap::Parser as _;
+
+use crate::arguments::{Arguments, Command};
+
+/// How a command ended without an error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Ended {
+    /// As intended.
+    Well,
+    /// It found something wrong, and has said what.
+    WithFindings,
+    /// By Ctrl-C.
+    Interrupted,
+}
+
+fn main() -> ExitCode {
+    let Arguments { command } = Arguments::parse();
+    let ended = match command {
+        Command::Eval(arguments) => commands::eval::run(&arguments),
+        Command::Report(arguments) => commands::report::run(&arguments),
+        Command::Verify(arguments) => commands::verify::run(&arguments),
+        Command::Replay(arguments) => commands::replay::run(&arguments),
+        Command::Render(arguments) => commands::render::run(&arguments),
+        Command::Episodes(command) => commands::episodes::run(&command),
+    };
+    match ended {
+        Ok(Ended::Well) => ExitCode::SUCCESS,
+        Ok(Ended::WithFindings) => ExitCode::FAILURE,
+        Ok(Ended::Interrupted) => ExitCode::from(130),
+        Err(error) => {
+            output::complain(&format!("error: {error:#}"));
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -41,10 +41,9 @@ fn every_dependency_follows_an_arrow() {
             .find_map(|l| l.strip_prefix("name = "))
             .map(|n| n.trim_matches('"').to_owned())
             .expect("a manifest names its package");
-        let (_, allowed) = ALLOWED
-            .iter()
-            .find(|(n, _)| *n == name)
-            .unwrap_or_else(|| panic!("{name} isn't on the map: add it to ARCHITECTURE.md and here"));
+        let (_, allowed) = ALLOWED.iter().find(|(n, _)| *n == name).unwrap_or_else(|| {
+            panic!("{name} isn't on the map: add it to ARCHITECTURE.md and here")
+        });
         for line in text.lines().filter(|l| l.starts_with("chaic")) {
             let dependency = line.split(['.', ' ', '=']).next().expect("a word");
             assert!(

@@ -135,7 +135,9 @@ impl Explorer {
     /// A free cell, where the body fits, beside something unknown.
     fn is_frontier(&self, memory: &Memory, cell: usize) -> bool {
         let (map, costs) = (&memory.map, memory.costs());
-        map.space(cell) == Space::Free && !costs.is_tight(cell) && self.unknown_side(memory, cell).is_some()
+        map.space(cell) == Space::Free
+            && !costs.is_tight(cell)
+            && self.unknown_side(memory, cell).is_some()
     }
 
     fn unknown_side(&self, memory: &Memory, cell: usize) -> Option<usize> {
@@ -212,7 +214,9 @@ impl Explorer {
     fn longest_unseen(&self, memory: &Memory, reach: &Reach) -> Option<Target> {
         let grid = memory.map.grid();
         let mut best: Option<(f32, Vec2)> = None;
-        for (i, j) in (0..grid.nz()).step_by(4).flat_map(|j| (0..grid.nx()).step_by(4).map(move |i| (i, j))) {
+        for (i, j) in
+            (0..grid.nz()).step_by(4).flat_map(|j| (0..grid.nx()).step_by(4).map(move |i| (i, j)))
+        {
             let cell = j * grid.nx() + i;
             let (at, Some(cost)) = (grid.center(cell), reach.cost(cell)) else { continue };
             let usable = memory.map.space(cell) == Space::Free

@@ -3,17 +3,22 @@
 use chaic_protocol::{Action, Briefing, EntityId, FailureReason, Frame, Outcome, Role, Vec2};
 
 use super::navigate::{Destination, Nav, Navigator};
-use crate::memory::semantic::{IGNORE_FRAMES, LIFT_FAILURES, Thing};
 use crate::memory::Memory;
+use crate::memory::semantic::{IGNORE_FRAMES, LIFT_FAILURES, Thing};
 
 /// How near to go before an object is picked up, metres. (The world steps up from 3 m.)
 pub const PICK_WITHIN_M: f32 = 1.4;
 /// How near to go before something is put on a goal place, metres.
 pub const PUT_WITHIN_M: f32 = 1.8;
-/// If no place to stand with a clear line is known: how near at least, metres.
+/// The arm reaches so far over what an object lies on, metres: less than the world allows to be
+/// on the safe side, and, if no place to stand is found with it, more, as the map is coarse.
+const ARMS_M: [f32; 3] = [0.62, 0.75, 0.95];
+/// If there is no such place either: how near at least, metres.
 const RELAXED_M: f32 = 2.4;
 /// From how many places an object is tried before it is left alone.
 const MAX_TRIES: usize = 4;
+/// Steps close to an object, on the way to a place to stand, before any place will do.
+const MAX_STEPS: u32 = 14;
 /// Something that can't be got to is left alone for so long, frames.
 const UNREACHABLE_FRAMES: Frame = 250;
 /// Something that can't be done at all is left alone for so long, frames.
@@ -33,15 +38,26 @@ pub enum Step {
 /// The approach to one thing.
 #[derive(Clone, Debug, Default)]
 pub struct Interaction {
-    /// Where it was tried without success.
+    /// From where it was tried without success, in earlier plans too.
     tried: Vec<Vec2>,
-    is_relaxed: bool,
+    /// How often it was tried in this plan.
+    n_tries: usize,
+    /// How often the demands on a place to stand were lowered.
+    n_relaxed: usize,
+    /// Steps taken close by since then.
+    n_steps: u32,
 }
 
 impl Interaction {
     /// Notes that the deed failed because of where one stood.
     pub fn note_bad_place(&mut self, here: Vec2) {
         self.tried.push(here);
+        self.n_tries += 1;
+    }
+
+    /// An approach that knows from where it did not work before.
+    pub fn knowing(tried: Vec<Vec2>) -> Interaction {
+        Interaction { tried, ..Interaction::default() }
     }
 
     /// The next step towards `entity`.
@@ -53,28 +69,39 @@ impl Interaction {
         within_m: f32,
     ) -> Step {
         let Some(thing) = memory.things.get(entity) else { return Step::GiveUp };
-        if self.tried.len() >= MAX_TRIES {
+        if self.n_tries >= MAX_TRIES {
             return self.give_up(memory, entity);
         }
+        let is_near = thing.distance_from(memory.here()) < within_m + 0.5;
         let mut destination = destination_at(thing, within_m);
         destination.avoid.clone_from(&self.tried);
-        if self.is_relaxed {
-            destination.within_m = RELAXED_M;
-            destination.needs_line = false;
-        }
-        match navigator.step(memory, &destination) {
-            Nav::Act(action) => Step::Walk(action),
-            Nav::Arrived => Step::There,
-            Nav::Unreachable if !self.is_relaxed => {
-                self.is_relaxed = true;
-                self.step(memory, navigator, entity, within_m)
+        loop {
+            destination.arm_m = ARMS_M.get(self.n_relaxed).copied();
+            if destination.arm_m.is_none() {
+                destination.within_m = RELAXED_M;
             }
-            Nav::Unreachable => self.give_up(memory, entity),
+            match navigator.step(memory, &destination) {
+                Nav::Act(action) => {
+                    self.n_steps += u32::from(is_near && action == Action::MoveForward);
+                    if self.n_steps <= MAX_STEPS {
+                        return Step::Walk(action);
+                    }
+                    // One does not get where one wants to: something like it must do.
+                    (self.n_steps, self.n_relaxed) = (0, self.n_relaxed + 1);
+                    if self.n_relaxed > ARMS_M.len() {
+                        return Step::There;
+                    }
+                }
+                Nav::Arrived => return Step::There,
+                Nav::Unreachable if destination.arm_m.is_some() => self.n_relaxed += 1,
+                Nav::Unreachable => return self.give_up(memory, entity),
+            }
         }
     }
 
     fn give_up(&self, memory: &mut Memory, entity: EntityId) -> Step {
-        let until = memory.frame + if self.tried.is_empty() { UNREACHABLE_FRAMES } else { IGNORE_FRAMES };
+        let until =
+            memory.frame + if self.n_tries == 0 { UNREACHABLE_FRAMES } else { IGNORE_FRAMES };
         memory.things.ignore(entity, until);
         Step::GiveUp
     }
@@ -85,7 +112,7 @@ fn destination_at(thing: &Thing, within_m: f32) -> Destination {
     let is_small = thing.class.info().is_carriable() || thing.footprint.is_empty();
     let mean = Vec2::new(thing.position_in_world.x, thing.position_in_world.z);
     let points = if is_small { vec![mean] } else { thing.footprint.clone() };
-    Destination { points, within_m, needs_line: true, avoid: Vec::new() }
+    Destination { points, within_m, arm_m: None, same_room: !is_small, avoid: Vec::new() }
 }
 
 /// Draws the lessons of an action that has ended, whatever the plan. `held` is what was in hand
@@ -141,10 +168,8 @@ fn learn_failure(memory: &mut Memory, object: EntityId, reason: FailureReason) {
     let now = memory.frame;
     match reason {
         FailureReason::BeyondLimits => {
-            let is_heavy = memory
-                .things
-                .get(object)
-                .is_some_and(|t| t.class.info().role == Role::HeavyTarget);
+            let is_heavy =
+                memory.things.get(object).is_some_and(|t| t.class.info().role == Role::HeavyTarget);
             // Furniture is tried again at once, up to a limit (original facts 2.5).
             if !is_heavy || memory.things.count_failure(object) >= LIFT_FAILURES {
                 memory.things.ignore(object, now + IGNORE_FRAMES);

@@ -12,9 +12,7 @@ pub mod recover;
 use chaic_protocol::briefing::Relation;
 use chaic_protocol::observation::SelfState;
 use chaic_protocol::rng::Stream;
-use chaic_protocol::{
-    Action, Briefing, EntityId, FailureReason, Frame, Hand, Outcome, Role,
-};
+use chaic_protocol::{Action, Briefing, EntityId, FailureReason, Frame, Hand, Outcome, Role, Vec2};
 
 use crate::decision::{Load, Plan};
 use crate::memory::Memory;
@@ -40,6 +38,8 @@ const CHILD_STAND_FRAMES: Frame = 30;
 const AROUND_TURNS: u32 = 18;
 /// A wait lasts so long, frames (original facts 2.1).
 const WAIT_FRAMES: u32 = 10;
+/// A place from where something could not be done is remembered so long, frames.
+const BAD_PLACE_FRAMES: Frame = 800;
 /// Lifts tried together before giving up.
 const LIFTS_TOGETHER: u32 = 8;
 
@@ -72,7 +72,9 @@ pub struct Executor {
     recovery: Recovery,
     explorer: Explorer,
     follower: Follower,
-    interaction: Interaction,
+    interaction: Option<Interaction>,
+    /// What could not be done from where, and when.
+    bad_places: Vec<(EntityId, Vec2, Frame)>,
     rng: Stream,
     since: Frame,
     n_turns: u32,
@@ -91,7 +93,8 @@ impl Executor {
             recovery: Recovery::default(),
             explorer: Explorer::new(briefing.bounds),
             follower: Follower::default(),
-            interaction: Interaction::default(),
+            interaction: None,
+            bad_places: Vec::new(),
             rng: Stream::new(briefing.seed, "execution", 0),
             since: 0,
             n_turns: 0,
@@ -117,7 +120,8 @@ impl Executor {
         self.navigator.reset();
         self.recovery.reset();
         self.follower = Follower::default();
-        self.interaction = Interaction::default();
+        self.interaction = None;
+        self.bad_places.retain(|(_, _, since)| since + BAD_PLACE_FRAMES > now);
         self.since = now;
         (self.n_turns, self.n_lifts) = (0, 0);
         (self.near_since, self.place, self.has_acted) = (None, None, false);
@@ -190,10 +194,12 @@ impl Executor {
     fn deed(&mut self, s: &Situation<'_>, subject: EntityId) -> Option<Outcome> {
         let (action, outcome) = s.own.last?;
         let mine = std::mem::take(&mut self.has_acted) && action.subject() == Some(subject);
-        if mine
-            && let Outcome::Failure(FailureReason::Blocked | FailureReason::TooFar) = outcome
-        {
-            self.interaction.note_bad_place(s.memory.here());
+        if mine && let Outcome::Failure(FailureReason::Blocked | FailureReason::TooFar) = outcome {
+            let here = s.memory.here();
+            self.bad_places.push((subject, here, s.memory.frame));
+            if let Some(interaction) = &mut self.interaction {
+                interaction.note_bad_place(here);
+            }
             self.navigator.reset();
         }
         mine.then_some(outcome)
@@ -245,7 +251,10 @@ impl Executor {
         act: Action,
         s: &mut Situation<'_>,
     ) -> Progress {
-        match self.interaction.step(s.memory, &mut self.navigator, entity, within_m) {
+        let tried = || self.bad_places.iter().filter(|(e, ..)| *e == entity).map(|(_, p, _)| *p);
+        let interaction =
+            self.interaction.get_or_insert_with(|| Interaction::knowing(tried().collect()));
+        match interaction.step(s.memory, &mut self.navigator, entity, within_m) {
             Step::Walk(action) => Progress::Act(action),
             Step::There => {
                 self.has_acted = true;

@@ -11,6 +11,9 @@ use crate::memory::costs::{CostMap, OCCUPIED};
 
 /// One turn, radians.
 pub const TURN_RAD: f32 = PI / 12.0;
+/// Whoever heads for the target this well walks on, radians (9 degrees). Half a turn is 7.5, so
+/// that one does not turn to and fro.
+const WALK_RAD: f32 = 0.157;
 /// One step, metres.
 pub const STEP_M: f32 = 0.42;
 /// A way that costs more than this passes something occupied.
@@ -23,13 +26,15 @@ const CHECK_AHEAD: usize = 24;
 const REPLAN_EVERY: u32 = 10;
 /// A body farther from its way than this needs a new one, metres.
 const OFF_WAY_M: f32 = 0.6;
-/// The body need not fit in the last part of the straight line to an object: the arm reaches
-/// over what it lies on, metres.
-const ARM_M: f32 = 0.95;
 /// The body is where it is, so the beginning of a straight line is not tested, metres.
 const OWN_M: f32 = 0.22;
-/// Places where an attempt failed are avoided within this radius, metres.
-const AVOID_M: f32 = 0.35;
+/// The side of a thing from which an attempt failed is avoided: directions with a greater cosine
+/// (40 degrees either way) at points of the thing nearer to each other than this, metres.
+const AVOID_COS: f32 = 0.77;
+const AVOID_POINTS_M: f32 = 0.4;
+
+/// One step is longer than a place to stand beside furniture is wide, metres.
+const ARRIVAL_M: f32 = 0.12;
 
 /// Where to go.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,16 +43,26 @@ pub struct Destination {
     pub points: Vec<Vec2>,
     /// How near to one of them, metres.
     pub within_m: f32,
-    /// Whether the straight line from there to the point must be clear, up to an arm's length.
-    pub needs_line: bool,
-    /// Places to stand elsewhere than.
+    /// If the straight line from there to the point must be clear: except for its last part of
+    /// this length, metres, where the arm reaches over what the object lies on.
+    pub arm_m: Option<f32>,
+    /// Whether it is to be on the same side of every wall as the point: for large things, which
+    /// stand against walls and are longer than an arm.
+    pub same_room: bool,
+    /// Places from which it did not work; it is to be another side.
     pub avoid: Vec<Vec2>,
 }
 
 impl Destination {
     /// Near one point.
     pub fn near(point: Vec2, within_m: f32) -> Destination {
-        Destination { points: vec![point], within_m, needs_line: false, avoid: Vec::new() }
+        Destination {
+            points: vec![point],
+            within_m,
+            arm_m: None,
+            same_room: false,
+            avoid: Vec::new(),
+        }
     }
 
     fn nearest(&self, from: Vec2) -> Vec2 {
@@ -67,23 +82,46 @@ impl Destination {
         (center, radius)
     }
 
-    /// Whether somebody at `here` has arrived.
+    /// Whether somebody at `here` has arrived. A little less is asked for than when the way is
+    /// planned, or one would step to and fro over the place to stand.
     pub fn is_reached(&self, costs: &CostMap, here: Vec2) -> bool {
+        self.will_do(costs, here, ARRIVAL_M)
+    }
+
+    fn will_do(&self, costs: &CostMap, here: Vec2, tolerance_m: f32) -> bool {
         let point = self.nearest(here);
         point.distance(here) <= self.within_m
-            && self.avoid.iter().all(|a| a.distance(here) > AVOID_M)
-            && (!self.needs_line || is_line_clear(costs, here, point))
+            && self.avoid.iter().all(|tried| self.is_other_side(*tried, here, point))
+            && self.arm_m.is_none_or(|arm_m| is_line_clear(costs, here, point, arm_m + tolerance_m))
+            && !(self.same_room && is_wall_between(costs, here, point))
+    }
+}
+
+impl Destination {
+    fn is_other_side(&self, tried: Vec2, here: Vec2, point: Vec2) -> bool {
+        let tried_point = self.nearest(tried);
+        let (a, b) = (tried - tried_point, here - point);
+        tried_point.distance(point) > AVOID_POINTS_M
+            || a.normalize_or_zero().dot(b.normalize_or_zero()) < AVOID_COS
     }
 }
 
 /// Whether the body can walk from `from` to within an arm's length of `to`.
-fn is_line_clear(costs: &CostMap, from: Vec2, to: Vec2) -> bool {
+fn is_line_clear(costs: &CostMap, from: Vec2, to: Vec2, arm_m: f32) -> bool {
     let length = from.distance(to);
-    if length <= OWN_M + ARM_M {
+    if length <= OWN_M + arm_m {
         return true;
     }
     let at = |m: f32| from.lerp(to, m / length);
-    costs.is_straight_clear(at(OWN_M), at(length - ARM_M))
+    costs.is_straight_clear(at(OWN_M), at(length - arm_m))
+}
+
+/// Whether a wall is between somebody at `from` and the point, which may itself be at a wall.
+fn is_wall_between(costs: &CostMap, from: Vec2, to: Vec2) -> bool {
+    /// One and a half cells: the point's own cell may be taken for the wall it touches, metres.
+    const AT_WALL_M: f32 = 0.19;
+    let length = from.distance(to);
+    length > AT_WALL_M && costs.crosses_wall(from, to.lerp(from, AT_WALL_M / length))
 }
 
 struct Search<'a> {
@@ -97,7 +135,7 @@ impl Goal for Search<'_> {
     fn is_goal(&self, cell: usize) -> bool {
         self.at_least_m(cell) <= 0.0
             && !self.costs.is_tight(cell)
-            && self.destination.is_reached(self.costs, self.costs.grid().center(cell))
+            && self.destination.will_do(self.costs, self.costs.grid().center(cell), 0.0)
     }
 
     fn at_least_m(&self, cell: usize) -> f32 {
@@ -222,6 +260,9 @@ fn steer(costs: &CostMap, here: Vec2, yaw: f32, target: Vec2) -> Action {
         let (from, to) = (here + OWN_M * ahead, here + (STEP_M + 0.05) * ahead);
         costs.is_straight_clear(from, to)
     };
+    if wrap_angle(bearing - yaw).abs() < WALK_RAD && is_free(yaw) {
+        return Action::MoveForward;
+    }
     let mut best: Option<(f32, i32)> = None;
     let mut nearest = (f32::INFINITY, 0);
     // Small turns first, so that of two equally good headings the nearer one is taken.
@@ -254,8 +295,11 @@ fn yaw_to(from: Vec2, to: Vec2) -> f32 {
 /// The turn that faces `target` better, or `None` if one faces it within `tolerance_rad`.
 pub fn face(here: Vec2, yaw: f32, target: Vec2, tolerance_rad: f32) -> Option<Action> {
     let error = wrap_angle(yaw_to(here, target) - yaw);
-    (error.abs() > tolerance_rad.max(0.5 * TURN_RAD + 1e-3))
-        .then(|| if error > 0.0 { Action::TurnLeft } else { Action::TurnRight })
+    (error.abs() > tolerance_rad.max(0.5 * TURN_RAD + 1e-3)).then_some(if error > 0.0 {
+        Action::TurnLeft
+    } else {
+        Action::TurnRight
+    })
 }
 
 #[cfg(test)]

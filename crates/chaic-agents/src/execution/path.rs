@@ -260,7 +260,8 @@ mod tests {
         let mut search = Search::new(grid.n_cells());
         let reach = Reach::from(&costs, grid.center(64), &mut search);
         let to = 64 + 9;
-        let path = search.a_star(&grid, costs.costs(), 64, &ToCell { grid, cell: to }, u32::MAX).unwrap();
+        let path =
+            search.a_star(&grid, costs.costs(), 64, &ToCell { grid, cell: to }, u32::MAX).unwrap();
         assert_eq!(reach.cost(to), Some(path.cost));
         assert_eq!(reach.cost(64 + 15), None);
     }

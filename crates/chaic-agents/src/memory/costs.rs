@@ -3,10 +3,10 @@
 use chaic_protocol::geom::xz;
 use chaic_protocol::{Frame, Vec2};
 
+use super::grid::{CELL_M, Grid};
 use super::occupancy::{OccupancyMap, Space};
 use super::people::People;
 use super::semantic::SemanticMap;
-use super::grid::{CELL_M, Grid};
 
 /// Cost of entering a free cell with nothing near. Costs rise in the paper's order: free,
 /// unknown, near something, occupied, wall.
@@ -107,6 +107,11 @@ impl CostMap {
     /// Whether the body can go straight from one point to another without touching what is known.
     pub fn is_straight_clear(&self, from: Vec2, to: Vec2) -> bool {
         self.grid.line(from, to).all(|cell| !self.is_tight(cell))
+    }
+
+    /// Whether a known wall lies on the straight line.
+    pub fn crosses_wall(&self, from: Vec2, to: Vec2) -> bool {
+        self.grid.line(from, to).any(|cell| self.cost[cell] >= WALL)
     }
 
     /// Computes all costs anew.
@@ -234,7 +239,10 @@ mod tests {
         let costs = plan.costs(0.2);
         let at = |i: usize, j: usize| costs.cost(j * 16 + i);
         let (free, unknown, near, tight, wall) = (at(8, 4), at(8, 1), at(8, 7), at(8, 8), at(8, 9));
-        assert!(free < unknown && unknown < tight && tight < wall, "{free} {unknown} {tight} {wall}");
+        assert!(
+            free < unknown && unknown < tight && tight < wall,
+            "{free} {unknown} {tight} {wall}"
+        );
         assert!(free < near && near < tight);
     }
 

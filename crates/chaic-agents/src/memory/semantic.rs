@@ -15,14 +15,18 @@ pub const LIFT_FAILURES: u32 = 5;
 const HELD_FRAMES: Frame = 300;
 /// Something that moved by less has not been moved, metres.
 const MOVED_M: f32 = 0.5;
-/// An empty place must be this much deeper than what was there, metres.
-const EMPTY_M: f32 = 0.3;
+/// A place is in clear view if nothing is seen before it by more than this, metres. (That
+/// something deeper is seen there can't be asked for: behind a thing on the floor, seen from above,
+/// the floor is hardly farther away.)
+const CLEAR_M: f32 = 0.05;
+/// A place proves nothing if the thing would show in fewer pixels than this.
+const MISS_PIXELS: f32 = 12.0;
 /// Farther away than this a missing object proves nothing, metres.
 const MISS_RANGE_M: f32 = 4.0;
 /// Part of the image's width that is too near to the border to prove anything.
 const MISS_MARGIN: f32 = 0.08;
 /// Looks at an empty place before the object is forgotten.
-const MISSES: u8 = 2;
+const MISSES: u8 = 3;
 /// Most footprint points kept for one thing: a truck's outline and more.
 const MAX_FOOTPRINT: usize = 512;
 
@@ -111,7 +115,7 @@ impl Thing {
         let n_points = self.footprint.len();
         let moved = !self.is_present
             || horizontal_distance(seen.position_in_world, self.position_in_world) > MOVED_M
-                || (seen.position_in_world.y - self.position_in_world.y).abs() > MOVED_M;
+            || (seen.position_in_world.y - self.position_in_world.y).abs() > MOVED_M;
         if self.is_fixed() || (!moved && !self.class.info().is_carriable()) {
             self.merge_footprint(&seen.footprint);
             self.bottom_m = self.bottom_m.min(seen.bottom_m);
@@ -134,7 +138,9 @@ impl Thing {
         let (mut i, mut j) = (0, 0);
         while merged.len() < MAX_FOOTPRINT {
             let (old, new) = (key(&self.footprint, i), key(points, j));
-            let Some(least) = old.into_iter().chain(new).min_by(|a, b| order(*a, *b)) else { break };
+            let Some(least) = old.into_iter().chain(new).min_by(|a, b| order(*a, *b)) else {
+                break;
+            };
             i += usize::from(old == Some(least));
             j += usize::from(new == Some(least));
             merged.push(Vec2::from(least));
@@ -240,7 +246,9 @@ impl SemanticMap {
                 continue;
             }
             let there = depth[px.y as usize * camera.width as usize + px.x as usize];
-            if there > d + EMPTY_M {
+            if there > d - CLEAR_M
+                && expected_pixels(thing.class, d, camera.focal_px()) > MISS_PIXELS
+            {
                 thing.misses += 1;
                 thing.is_present = thing.misses < MISSES;
                 self.layout += 1;
@@ -293,16 +301,25 @@ impl SemanticMap {
     }
 }
 
+/// How many pixels a thing of this class covers at least, from its two smallest extents.
+fn expected_pixels(class: ClassId, depth_m: f32, focal_px: f32) -> f32 {
+    let mut size = class.info().size_m;
+    size.sort_by(f32::total_cmp);
+    size[0] * size[1] * (focal_px / depth_m) * (focal_px / depth_m)
+}
+
 /// Whether something is in the hands of one of the people in the image.
 fn looks_held(seen: &Detection, before: Option<&Thing>, people: &[Vec3]) -> bool {
     let near = |m: f32| people.iter().any(|p| horizontal_distance(*p, seen.position_in_world) < m);
     match seen.class.info().role {
         Role::Target | Role::Container | Role::Fragile => {
             // Hands hold things at 1 m (a child at 0.4 m), about 0.55 m ahead of the body.
-            seen.bottom_m > 0.3 && near(0.6) && before.is_none_or(|t| {
-                // Lying untouched where it was seen before anybody came near, it is not held.
-                !t.is_present || t.position_in_world.distance(seen.position_in_world) > 0.15
-            })
+            seen.bottom_m > 0.3
+                && near(0.6)
+                && before.is_none_or(|t| {
+                    // Lying untouched where it was seen before anybody came near, it is not held.
+                    !t.is_present || t.position_in_world.distance(seen.position_in_world) > 0.15
+                })
         }
         Role::HeavyTarget => {
             near(1.5)
@@ -331,16 +348,17 @@ mod tests {
     fn an_object_is_forgotten_when_its_place_is_seen_empty_but_not_when_hidden() {
         for hidden in [false, true] {
             let mut toy = Toy::room(8.0, 8.0);
-            let apple = toy.add(ToyObject::new("apple", [0.0, 0.0, -2.5], [0.2, 0.2, 0.2]));
+            toy.size = 256;
+            let apple = toy.add(ToyObject::new("apple", [0.0, 0.0, -1.9], [0.2, 0.2, 0.2]));
             toy.stand([0.0, 0.0], 0.0);
             let mut map = SemanticMap::default();
             look(&mut map, &toy, &[]);
             assert!(map.get(apple).expect("seen").is_available(toy.frame));
             toy.remove(apple);
             if hidden {
-                toy.add(ToyObject::new("cabinet", [0.0, 0.0, -2.0], [1.0, 1.0, 0.3]));
+                toy.add(ToyObject::new("cabinet", [0.0, 0.0, -1.5], [1.0, 1.0, 0.3]));
             }
-            for _ in 0..3 {
+            for _ in 0..MISSES {
                 toy.frame += 1;
                 look(&mut map, &toy, &[]);
             }

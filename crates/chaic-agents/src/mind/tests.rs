@@ -1,5 +1,7 @@
 //! Whole minds in a toy house: they get things delivered, and never get stuck.
 
+use chaic_protocol::ClassId;
+
 use super::*;
 use crate::test_support::{Toy, ToyObject};
 use crate::{helpers, partners};
@@ -36,7 +38,12 @@ fn the_partner_delivers_all_that_is_wanted_with_time_to_spare() {
     briefing.goal = Toy::goal(&[("apple", 3), ("banana", 2)]);
     let plans = toy.live(&mut partners::constrained(), &briefing);
     let story = plans.join("; ");
-    assert!(toy.delivered.len() >= n, "{} delivered by {}: {story}", toy.delivered.len(), toy.frame);
+    assert!(
+        toy.delivered.len() >= n,
+        "{} delivered by {}: {story}",
+        toy.delivered.len(),
+        toy.frame
+    );
     assert!(toy.frame < 2400, "{}: {story}", toy.frame);
     assert!(story.contains("container"), "{story}");
     assert!(toy.n_blocked <= 6, "bumped {} times", toy.n_blocked);
@@ -107,4 +114,101 @@ fn an_unbriefed_or_blind_mind_does_not_panic() {
         observation.frame = frame;
         mind.act(&observation);
     }
+}
+
+/// A house of 3 by 2 rooms with doors in random places, furniture and fruit.
+fn random_house(seed: u64, door_m: f32) -> Toy {
+    let mut rng = chaic_protocol::rng::Stream::new(seed, "toy house", 0);
+    let (w, d) = (15.0, 9.0);
+    let mut toy = Toy::room(w, d);
+    let half = 0.5 * door_m;
+    for x in [-2.5f32, 2.5] {
+        for (low, high) in [(-4.5f32, 0.0f32), (0.0, 4.5)] {
+            let gap = rng.range(low + 1.0, high - 1.0);
+            toy.add_wall([x - 0.05, low], [x + 0.05, gap - half]);
+            toy.add_wall([x - 0.05, gap + half], [x + 0.05, high]);
+        }
+    }
+    for low in [-7.5f32, -2.5, 2.5] {
+        let gap = rng.range(low + 1.0, low + 4.0);
+        toy.add_wall([low, -0.05], [gap - half, 0.05]);
+        toy.add_wall([gap + half, -0.05], [low + 5.0, 0.05]);
+    }
+    let mut n = 0;
+    for (i, x) in [-5.0f32, 0.0, 5.0].into_iter().enumerate() {
+        for z in [-2.25f32, 2.25] {
+            // A table off the middle of each room with fruit on it, something at its outer wall,
+            // fruit on the floor.
+            let (tx, tz) = (x + rng.range(-0.7, 0.7), z + rng.range(-0.5, 0.5));
+            toy.add(ToyObject::new("dining_table", [tx, 0.0, tz], [1.2, 0.75, 0.8]));
+            let side = z.signum();
+            let class = if i == 0 && z > 0.0 { "bed" } else { "cabinet" };
+            toy.add(ToyObject::new(
+                class,
+                [x + rng.range(-1.0, 1.0), 0.0, z + 1.9 * side],
+                [1.4, 0.6, 0.6],
+            ));
+            let class = ["apple", "banana", "orange"][n % 3];
+            n += 1;
+            toy.add(ToyObject::new(
+                class,
+                [tx + rng.range(-0.4, 0.4), 0.75, tz + rng.range(-0.25, 0.25)],
+                [0.1, 0.1, 0.1],
+            ));
+            toy.add(ToyObject::new("orange", [x + 1.9, 0.0, z - 1.2 * side], [0.1, 0.1, 0.1]));
+        }
+    }
+    toy.add(ToyObject::new("wicker_basket", [-6.9, 0.0, -1.0], [0.4, 0.3, 0.4]));
+    toy.stand([rng.range(-1.5, 1.5), 0.6], 0.3);
+    toy.size = 128;
+    toy
+}
+
+#[test]
+fn nobody_gets_stuck_in_a_house_with_narrow_doors_and_tables() {
+    for (radius_m, door_m) in [(0.2, 1.2), (0.2, 0.9), (0.35, 1.2)] {
+        let mut toy = random_house(1, door_m);
+        toy.radius_m = radius_m;
+        let mut briefing = toy.briefing();
+        briefing.capability.radius_m = radius_m;
+        let plans = toy.live(&mut helpers::rhp(), &briefing).join("; ");
+        let n = toy.delivered.len();
+        assert!(n >= 6, "{radius_m} m through {door_m} m: only {n} delivered: {plans}");
+        assert!(toy.n_blocked <= 10, "bumped {} times: {plans}", toy.n_blocked);
+    }
+}
+
+#[test]
+fn the_frail_person_brings_furniture_to_the_truck() {
+    let mut toy = Toy::room(14.0, 10.0);
+    toy.add(ToyObject::new("truck", [4.5, 0.0, 0.0], [2.4, 1.2, 6.0]));
+    for at in [[-4.0, 0.0, -3.0], [-5.0, 0.0, 2.0]] {
+        toy.add(ToyObject::new("drawer", at, [0.9, 1.0, 0.5]));
+    }
+    toy.stand([0.0, 0.0], 0.0);
+    let mut briefing = toy.briefing();
+    briefing.horizon = 1500;
+    briefing.possible_targets = vec![ClassId::named("drawer"), ClassId::named("sofa")];
+    briefing.containers.clear();
+    briefing.goal_place = ClassId::named("truck");
+    briefing.goal = Toy::goal(&[("drawer", 2)]);
+    let plans = toy.live(&mut partners::frail(), &briefing);
+    assert_eq!(toy.delivered.len(), 2, "{plans:?}");
+}
+
+#[test]
+fn the_rider_fills_the_basket_before_delivering_it() {
+    let mut toy = Toy::room(16.0, 6.0);
+    toy.add(ToyObject::new("bed", [6.5, 0.0, 0.0], [1.6, 0.5, 2.0]));
+    for x in [-6.0, -5.0, -4.0, -3.0] {
+        toy.add(ToyObject::new("apple", [x, 0.0, 2.0], [0.16, 0.12, 0.16]));
+    }
+    let bike = toy.add(ToyObject::new("bike", [0.0, -9.0, 0.0], [0.1, 0.1, 0.1]));
+    toy.hold(0, bike);
+    toy.stand([-5.0, 0.0], 0.0);
+    let mut briefing = toy.briefing();
+    briefing.goal = Toy::goal(&[("apple", 4)]);
+    let plans = toy.live(&mut partners::rider(), &briefing);
+    assert_eq!(toy.delivered.len(), 4, "{plans:?}");
+    assert_eq!(plans.iter().filter(|p| p.starts_with("bring")).count(), 2, "{plans:?}");
 }

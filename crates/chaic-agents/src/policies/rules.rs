@@ -95,13 +95,13 @@ impl RuleProfile {
         wanted: Wanted::AnyPossible,
         removes_obstacles: true,
         minds_child: true,
+        lifts_together: true,
         ..RuleProfile::PARTNER
     };
     /// The oracle: knows the goal and what is done.
     pub const ORACLE: RuleProfile = RuleProfile {
         wanted: Wanted::ByGoal,
         order: TargetOrder::HeaviestLiftable,
-        lifts_together: true,
         ..RuleProfile::RHP
     };
 }
@@ -137,7 +137,9 @@ impl Rules {
         }
         let guardian = memory.companion(context.briefing, Relation::Partner);
         let child = memory.people.get(child);
-        let beside = |c: &Person| c.is_in_view && horizontal_distance(memory.pose.position, c.position_in_world) < 2.3;
+        let beside = |c: &Person| {
+            c.is_in_view && horizontal_distance(memory.pose.position, c.position_in_world) < 2.3
+        };
         if child.is_some_and(beside) {
             self.beside_child.get_or_insert(now);
         }
@@ -204,9 +206,8 @@ impl Rules {
         valid.iter().copied().find(|plan| match plan {
             Plan::LiftWith(it) => {
                 it.class.info().mass_kg > strength_kg
-                    || tried.is_some_and(|(seen, object)| {
-                        object == it.entity && seen.outcome.is_some()
-                    })
+                    || tried
+                        .is_some_and(|(seen, object)| object == it.entity && seen.outcome.is_some())
             }
             _ => false,
         })
@@ -263,8 +264,8 @@ impl Policy for Rules {
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, is_news: bool) -> bool {
-        if matches!(current, Plan::Deliver | Plan::PutIn | Plan::LiftWith(_)) {
-            // What is under way for good is only left for the child.
+        if matches!(current, Plan::Deliver | Plan::PutIn | Plan::LiftWith(_) | Plan::TurnAround) {
+            // These are only left for the child.
             return !matches!(current, Plan::PutIn) && self.child_calls(context);
         }
         if matches!(current, Plan::FollowChild) {
@@ -302,7 +303,8 @@ impl<'a> Need<'a> {
         done.extend(load.targets.iter().map(|(_, class)| *class));
         let behavior = context.behavior;
         if behavior.partner_holds_frame.is_some_and(|f| f + HOLDINGS_FRAMES > memory.frame) {
-            let still = behavior.partner_holds.iter().filter(|(e, _)| !memory.delivered.contains(e));
+            let still =
+                behavior.partner_holds.iter().filter(|(e, _)| !memory.delivered.contains(e));
             done.extend(still.map(|(_, class)| *class));
         }
         Need { goal, done }
@@ -358,7 +360,7 @@ fn must_go(context: &Context<'_>, profile: &RuleProfile) -> bool {
 /// Whether there is time to fetch an object and bring it to a known goal place.
 fn there_is_time(context: &Context<'_>, entity: EntityId) -> bool {
     let memory = context.memory;
-    let Some(thing) = memory.things.get(entity) else { return false };
+    let Some(thing) = memory.things.get(entity) else { return true };
     let at = chaic_protocol::geom::xz(thing.position_in_world);
     let places = memory.goal_places();
     let onward_m = places.iter().map(|(place, _)| place.distance_from(at)).min_by(f32::total_cmp);

@@ -10,8 +10,8 @@ use super::{House, recipes, slots};
 use crate::grid::Grid;
 use crate::solid::Solid;
 
-/// Fewest places for small objects on low furniture: 33 objects and 6 containers with choice.
-const LEAST_LOW_SLOTS: usize = 50;
+/// Fewest places for small objects on low furniture: 32 objects and 6 containers, with a choice.
+const LEAST_LOW_SLOTS: usize = 46;
 
 const WALL_COLORS: [[u8; 3]; 8] = [
     [236, 231, 220],
@@ -31,7 +31,10 @@ const CARPETS: [[u8; 3]; 5] =
 
 /// The house of a place seed at this attempt, if it came out well.
 pub(super) fn house(place_seed: u64, attempt: u64) -> Result<House, &'static str> {
-    let plan = plan(&mut Stream::new(place_seed, "house/plan", attempt)).ok_or("no floor plan")?;
+    // Drawn once for all attempts, or the sizes that come out easily would crowd out the others.
+    let n_rooms = 6 + Stream::new(place_seed, "house/size", 0).below(3);
+    let mut rng = Stream::new(place_seed, "house/plan", attempt);
+    let plan = plan(&mut rng, n_rooms).ok_or("no floor plan")?;
     let mut rooms = furnished(&plan, place_seed, attempt)?;
     let mut colors = Stream::new(place_seed, "house/colors", attempt);
     let mut color = |of: &[[u8; 3]]| of[colors.below(of.len())];
@@ -64,11 +67,7 @@ pub(super) fn house(place_seed: u64, attempt: u64) -> Result<House, &'static str
 }
 
 /// Furniture for every room of a plan.
-fn furnished(
-    plan: &Plan,
-    place_seed: u64,
-    attempt: u64,
-) -> Result<Vec<RoomPlan>, &'static str> {
+fn furnished(plan: &Plan, place_seed: u64, attempt: u64) -> Result<Vec<RoomPlan>, &'static str> {
     let stream =
         |purpose: &str, room: usize| Stream::new(place_seed, purpose, attempt * 64 + room as u64);
     let mut living = 0;
@@ -78,7 +77,9 @@ fn furnished(
         let rng = &mut stream("house/furniture", i);
         match kind {
             RoomKind::Bedroom => recipes::bedroom(&mut room, rng).ok_or("no room for the bed")?,
-            RoomKind::Kitchen => recipes::kitchen(&mut room, rng).ok_or("no room for the kitchen")?,
+            RoomKind::Kitchen => {
+                recipes::kitchen(&mut room, rng).ok_or("no room for the kitchen")?
+            }
             RoomKind::Office => recipes::office(&mut room, rng).ok_or("no room for the office")?,
             RoomKind::LivingRoom => {
                 recipes::living_room(&mut room, rng, living).ok_or("no room to live in")?;
@@ -103,6 +104,15 @@ fn furnished(
         let eats = |k: RoomKind| matches!(k, RoomKind::Kitchen | RoomKind::LivingRoom);
         let mut places = order.iter().filter(|i| eats(plan.rooms[**i].0));
         places.any(|i| recipes::add(&mut rooms[*i], rng, "refrigerator"));
+    }
+    for (i, room) in rooms.iter_mut().enumerate() {
+        let fillers: &[&str] = match plan.rooms[i].0 {
+            RoomKind::LivingRoom => &recipes::LIVING_FILLERS,
+            RoomKind::Kitchen => &recipes::KITCHEN_FILLERS,
+            RoomKind::Corridor => continue,
+            _ => &recipes::QUIET_FILLERS,
+        };
+        recipes::fill(room, &mut stream("house/fillers", i), fillers);
     }
     if cabinets == 0 { Ok(rooms) } else { Err("no room for the cabinets") }
 }

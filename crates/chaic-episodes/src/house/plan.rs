@@ -3,33 +3,33 @@
 use chaic_protocol::Vec2;
 use chaic_protocol::geom::Rect;
 use chaic_protocol::rng::Stream;
-use chaic_world::{Opening, RoomKind, Wall};
+use chaic_world::{Opening, RoomKind};
 
 use crate::solid::mm;
 
 /// Thickness of all walls, metres.
 pub(super) const WALL_M: f32 = 0.12;
-/// Height of rooms, metres.
-pub(super) const CEILING_M: f32 = 2.9;
 /// Width of doorways, metres.
 pub(super) const DOOR_M: f32 = 1.2;
-/// Height of doorways, metres.
-const LINTEL_M: f32 = 2.1;
 /// From a doorway to the middle of the nearest crossing wall, at least, metres.
 const CORNER_M: f32 = 0.5;
 /// Sides of rooms, metres.
-const SIDE_M: [f32; 2] = [3.5, 7.0];
+const SIDE_M: [f32; 2] = [3.5, 7.2];
+/// Cuts that are tried for one rectangle.
+const TRIES_PER_CUT: usize = 10;
+/// Cuts that are tried for one house.
+const CUT_BUDGET: usize = 2000;
 /// Most doorways of a room that isn't a corridor: each takes away a metre of wall.
 const MAX_DOORS: usize = 4;
 
 /// A straight cut through a rectangle.
 #[derive(Clone, Copy, Debug)]
-struct Cut {
+pub(super) struct Cut {
     /// 0: the wall stands at one x and runs along z; 1: the other way round.
-    axis: usize,
-    at: f32,
-    from: f32,
-    to: f32,
+    pub axis: usize,
+    pub at: f32,
+    pub from: f32,
+    pub to: f32,
 }
 
 /// A doorway.
@@ -75,19 +75,28 @@ pub(super) struct Plan {
     /// Between the middles of their walls.
     pub rooms: Vec<(RoomKind, Rect)>,
     pub doors: Vec<Door>,
-    cuts: Vec<Cut>,
+    pub cuts: Vec<Cut>,
 }
 
-/// A random floor plan, unless this draw leads to none.
-pub(super) fn plan(rng: &mut Stream) -> Option<Plan> {
-    let half = Vec2::new(mm(0.5 * rng.range(20.0, 26.0)), mm(0.5 * rng.range(10.0, 12.0)));
-    let outer = Rect { min: -half, max: half };
+/// A random floor plan of so many rooms, unless this draw leads to none.
+pub(super) fn plan(rng: &mut Stream, n_rooms: usize) -> Option<Plan> {
+    let has_corridor = n_rooms >= 7 && rng.chance(0.6);
+    // More rooms need more house, and two rooms beside a corridor are soon too long.
+    let width_m = match n_rooms {
+        _ if has_corridor => [18.2, 20.8],
+        6 => [19.0, 21.0],
+        7 => [20.0, 22.5],
+        _ => [20.5, 26.0],
+    };
+    let depth_m = if has_corridor { [10.4, 12.2] } else { [9.8, 12.0] };
+    let half_x = mm(0.5 * rng.range(width_m[0], width_m[1]));
+    let half_z = mm(0.5 * rng.range(depth_m[0], depth_m[1]));
+    let outer = Rect::new([-half_x, -half_z], [half_x, half_z]);
     let (mut rects, mut cuts) = (Vec::new(), Vec::new());
-    let n_rooms = 6 + rng.below(3);
-    let corridor = if n_rooms >= 7 && rng.chance(0.45) {
+    let corridor = if has_corridor {
         Some(with_corridor(rng, outer, n_rooms, &mut rects, &mut cuts)?)
     } else {
-        divide(rng, outer, n_rooms, &mut rects, &mut cuts)?;
+        divide(rng, outer, n_rooms, &mut rects, &mut cuts, &mut { CUT_BUDGET })?;
         None
     };
     let doors = doors(rng, &rects, corridor)?;
@@ -104,31 +113,45 @@ fn cut(rect: Rect, axis: usize, at: f32, cuts: &mut Vec<Cut>) -> (Rect, Rect) {
     (low, high)
 }
 
-/// Divides `rect` into `n` rooms of good sizes.
+/// Divides `rect` into `n` rooms of good sizes. Tries several cuts at every level; `budget` bounds
+/// how many in all.
 fn divide(
     rng: &mut Stream,
     rect: Rect,
     n: usize,
     rects: &mut Vec<Rect>,
     cuts: &mut Vec<Cut>,
+    budget: &mut usize,
 ) -> Option<()> {
     let size = rect.size();
-    let fits = |s: f32| (SIDE_M[0]..=SIDE_M[1]).contains(&s);
     if n == 1 {
         rects.push(rect);
         return (fits(size.x) && fits(size.y)).then_some(());
     }
-    let axis =
-        if size.x > 1.15 * size.y || (size.x > 0.85 * size.y && rng.chance(0.5)) { 0 } else { 1 };
-    let low_n = 1 + rng.below(n - 1);
-    let share = (low_n as f32 / n as f32 + rng.range(-0.09, 0.09)).clamp(0.15, 0.85);
-    let at = mm(rect.min[axis] + share * size[axis]);
-    if at - rect.min[axis] < SIDE_M[0] || rect.max[axis] - at < SIDE_M[0] {
-        return None;
+    for _ in 0..TRIES_PER_CUT {
+        *budget = budget.checked_sub(1)?;
+        let axis = if rng.chance(size.x / (size.x + size.y)) { 0 } else { 1 };
+        let low_n = 1 + rng.below(n - 1);
+        let share = low_n as f32 / n as f32 + rng.range(-0.09, 0.09);
+        let at = mm(rect.min[axis] + share * size[axis]);
+        if at - rect.min[axis] < SIDE_M[0] || rect.max[axis] - at < SIDE_M[0] {
+            continue;
+        }
+        let before = (rects.len(), cuts.len());
+        let (low, high) = cut(rect, axis, at, cuts);
+        let done = divide(rng, low, low_n, rects, cuts, budget)
+            .and_then(|()| divide(rng, high, n - low_n, rects, cuts, budget));
+        if done.is_some() {
+            return done;
+        }
+        rects.truncate(before.0);
+        cuts.truncate(before.1);
     }
-    let (low, high) = cut(rect, axis, at, cuts);
-    divide(rng, low, low_n, rects, cuts)?;
-    divide(rng, high, n - low_n, rects, cuts)
+    None
+}
+
+fn fits(side_m: f32) -> bool {
+    (SIDE_M[0]..=SIDE_M[1]).contains(&side_m)
 }
 
 /// Divides `rect` into a full-depth end of two rooms and two rows along a corridor. Returns which
@@ -140,12 +163,12 @@ fn with_corridor(
     rects: &mut Vec<Rect>,
     cuts: &mut Vec<Cut>,
 ) -> Option<usize> {
-    let end_m = rng.range(4.5, 6.6);
+    let end_m = rng.range(5.0, 7.0);
     let at_low_end = rng.chance(0.5);
     let at = mm(if at_low_end { rect.min.x + end_m } else { rect.max.x - end_m });
     let (low, high) = cut(rect, 0, at, cuts);
     let (end, rest) = if at_low_end { (low, high) } else { (high, low) };
-    divide(rng, end, 2, rects, cuts)?;
+    divide(rng, end, 2, rects, cuts, &mut 50)?;
 
     let width_m = rng.range(1.8, 2.1);
     let near = mm(rect.min.y + (rect.size().y - width_m) * rng.range(0.44, 0.56));
@@ -159,14 +182,13 @@ fn with_corridor(
         let mut left = row;
         for k in 0..n - 1 {
             let even = left.size().x / (n - k) as f32;
-            let at = mm(left.min.x + even + rng.range(-0.8, 0.8));
+            let at = mm(left.min.x + even + rng.range(-0.6, 0.6));
             let (done, more) = cut(left, 0, at, cuts);
             rects.push(done);
             left = more;
         }
         rects.push(left);
     }
-    let fits = |s: f32| (SIDE_M[0]..=SIDE_M[1]).contains(&s);
     let all_fit = rects.iter().all(|r| fits(r.size().x) && fits(r.size().y));
     rects.push(corridor);
     all_fit.then_some(rects.len() - 1)
@@ -265,52 +287,4 @@ fn kinds(rng: &mut Stream, rects: &[Rect], corridor: Option<usize>) -> Option<Ve
         kinds[c] = RoomKind::Corridor;
     }
     Some(kinds)
-}
-
-impl Plan {
-    /// All walls, cut at doorways, with lintels. Ends are drawn in by half the thickness, which a
-    /// wall's box adds again, so that no two boxes share a volume and doorways keep their width.
-    pub fn walls(&self, outer_color: [u8; 3], inner_color: [u8; 3]) -> Vec<Wall> {
-        let (o, t) = (self.outer, 0.5 * WALL_M);
-        let mut walls = Vec::new();
-        for (axis, at, from, to) in [
-            (1, o.min.y, o.min.x - t, o.max.x + t),
-            (1, o.max.y, o.min.x - t, o.max.x + t),
-            (0, o.min.x, o.min.y + t, o.max.y - t),
-            (0, o.max.x, o.min.y + t, o.max.y - t),
-        ] {
-            walls.push(wall(axis, at, [from, to], [0.0, CEILING_M], outer_color));
-        }
-        for c in &self.cuts {
-            let on_it = |d: &&Door| {
-                d.axis == c.axis && d.at == c.at && d.middle > c.from && d.middle < c.to
-            };
-            let mut middles: Vec<f32> = self.doors.iter().filter(on_it).map(|d| d.middle).collect();
-            middles.sort_by(f32::total_cmp);
-            let mut from = c.from + t;
-            for middle in middles {
-                let (a, b) = (middle - 0.5 * DOOR_M, middle + 0.5 * DOOR_M);
-                walls.push(wall(c.axis, c.at, [from, a], [0.0, CEILING_M], inner_color));
-                walls.push(wall(c.axis, c.at, [a, b], [LINTEL_M, CEILING_M], inner_color));
-                from = b;
-            }
-            walls.push(wall(c.axis, c.at, [from, c.to - t], [0.0, CEILING_M], inner_color));
-        }
-        walls
-    }
-}
-
-fn wall(axis: usize, at: f32, span: [f32; 2], height_m: [f32; 2], color: [u8; 3]) -> Wall {
-    let end = |v: f32| {
-        let v = mm(v);
-        if axis == 0 { Vec2::new(at, v) } else { Vec2::new(v, at) }
-    };
-    Wall {
-        a: end(span[0] + 0.5 * WALL_M),
-        b: end(span[1] - 0.5 * WALL_M),
-        thickness_m: WALL_M,
-        bottom_m: height_m[0],
-        top_m: height_m[1],
-        color,
-    }
 }

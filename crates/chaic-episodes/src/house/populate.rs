@@ -7,8 +7,8 @@ use chaic_protocol::{ClassId, EntityId, TaskId, Vec2, Vec3};
 use chaic_world::{Person, Setup, Thing};
 
 use super::goods::{Goods, VASES, containers, goods};
-use super::plan::CEILING_M;
 use super::slots::{HighTop, Slot};
+use super::walls::CEILING_M;
 use super::{House, doors, slots};
 use crate::solid::mm;
 

@@ -7,6 +7,10 @@ use super::room::{Piece, RoomPlan, Side, Spot};
 
 /// What one stands before to open it, metres.
 const OPEN_M: f32 = 0.75;
+/// Share of a room's floor under furniture from which it no longer looks empty.
+const ENOUGH_FURNITURE: f32 = 0.17;
+/// Most pieces that are added to a room so that it doesn't look empty.
+const MOST_FILLERS: usize = 5;
 /// Between a sofa and its coffee table, metres: a wheelchair passes.
 const LOUNGE_GAP_M: f32 = 0.82;
 
@@ -48,20 +52,14 @@ fn bed(stands: [bool; 2], variant: usize) -> Vec<Piece> {
     pieces
 }
 
-/// A table with chairs on its long sides, and at its ends if there are more than four.
+/// A table with up to four chairs on its long sides; its ends stay free, so that what lies on it
+/// can be got at.
 fn dining(chairs: usize, variant: usize) -> Vec<Piece> {
     let ([w, _, d], [_, _, chair_d]) = (size("dining_table"), size("side_chair"));
     let out = 0.5 * d + 0.5 * chair_d + 0.03;
-    let end = 0.5 * w + 0.5 * chair_d + 0.03;
     // A chair at turn 0 looks into the room (-z); this one stands nearer to the wall.
-    let places = [
-        (-0.25 * w, -out, 0),
-        (0.25 * w, out, 2),
-        (0.25 * w, -out, 0),
-        (-0.25 * w, out, 2),
-        (-end, 0.0, 3),
-        (end, 0.0, 1),
-    ];
+    let places =
+        [(-0.25 * w, -out, 0), (0.25 * w, out, 2), (0.25 * w, -out, 0), (-0.25 * w, out, 2)];
     let mut pieces = vec![at("dining_table", 0.0, 0.0, 0, 0.0, variant)];
     for (x, d, turns) in places.into_iter().take(chairs) {
         pieces.push(at("side_chair", x, d, turns, 0.0, 0));
@@ -113,10 +111,19 @@ fn first_of(
     groups.iter().find_map(|g| room.place(rng, g, spot))
 }
 
+/// How many pieces of a class a room has at most, however empty it is.
+fn most_of(class: &str) -> usize {
+    match class {
+        "tv_stand" => 1,
+        "stool" | "floor_lamp" | "long_sofa" | "potted_plant" => 2,
+        _ => 3,
+    }
+}
+
 /// Small things that fill corners and walls, as many as find a place.
 fn extras(room: &mut RoomPlan, rng: &mut Stream, classes: &[(&str, f32)]) {
     for (class, chance) in classes {
-        if rng.chance(*chance) {
+        if rng.chance(*chance) && room.count(class) < most_of(class) {
             let variant = rng.below(8);
             let (access_m, spot) = match *class {
                 "potted_plant" | "floor_lamp" | "stool" => (0.0, Spot::Corner),
@@ -124,7 +131,9 @@ fn extras(room: &mut RoomPlan, rng: &mut Stream, classes: &[(&str, f32)]) {
                 "long_sofa" => (0.5, Spot::Wall),
                 _ => (OPEN_M, Spot::Wall),
             };
-            room.place(rng, &single(class, access_m, variant), spot);
+            let group =
+                if *class == "desk" { desk(variant) } else { single(class, access_m, variant) };
+            room.place(rng, &group, spot);
         }
     }
 }
@@ -203,7 +212,7 @@ pub(super) fn living_room(room: &mut RoomPlan, rng: &mut Stream, nth: usize) -> 
     let v = rng.below(8);
     match nth % 4 {
         1 => {
-            let tables = [dining(6, v % 3), dining(4, v % 3), dining(2, v % 3)];
+            let tables = [dining(4, v % 3), dining(2, v % 3)];
             first_of(room, rng, &tables, Spot::Free)?;
             extras(room, rng, &[("long_sofa", 0.7), ("tv_stand", 0.5), ("bookshelf", 0.4)]);
         }
@@ -236,6 +245,26 @@ pub(super) fn living_room(room: &mut RoomPlan, rng: &mut Stream, nth: usize) -> 
     );
     Some(())
 }
+
+/// Adds pieces to a room that would look empty: large rooms hold more.
+pub(super) fn fill(room: &mut RoomPlan, rng: &mut Stream, classes: &[&str]) {
+    for _ in 0..MOST_FILLERS {
+        if room.furnished_share() > ENOUGH_FURNITURE {
+            break;
+        }
+        let class = classes[rng.below(classes.len())];
+        extras(room, rng, &[(class, 1.0)]);
+    }
+}
+
+/// Pieces with which the living rooms of a house are filled.
+pub(super) const LIVING_FILLERS: [&str; 6] =
+    ["bookshelf", "armchair", "long_sofa", "potted_plant", "tv_stand", "desk"];
+/// The same for offices and bedrooms.
+pub(super) const QUIET_FILLERS: [&str; 5] =
+    ["bookshelf", "armchair", "potted_plant", "floor_lamp", "desk"];
+/// The same for kitchens.
+pub(super) const KITCHEN_FILLERS: [&str; 3] = ["kitchen_counter", "stool", "potted_plant"];
 
 /// Furnishes a corridor, which has little room.
 pub(super) fn corridor(room: &mut RoomPlan, rng: &mut Stream) {

@@ -211,6 +211,17 @@ impl RoomPlan {
         false
     }
 
+    /// How many pieces of a class it has.
+    pub fn count(&self, class: &str) -> usize {
+        self.things.iter().filter(|t| t.class.name() == class).count()
+    }
+
+    /// How much of the floor is under furniture.
+    pub fn furnished_share(&self) -> f32 {
+        let area = |r: &Rect| r.size().x * r.size().y;
+        self.feet.iter().map(area).sum::<f32>() / area(&self.inner)
+    }
+
     fn has_room_for(&self, foot: &Rect) -> bool {
         let apart = foot.grown(GAP_M);
         contains(&self.inner, foot)

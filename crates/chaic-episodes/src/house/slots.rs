@@ -27,8 +27,8 @@ pub(super) const HIGH_HOSTS: [&str; 2] = ["cabinet", "refrigerator"];
 /// Below this surfaces are low, metres (paper: "tables, chairs, sofas").
 const LOW_M: f32 = 1.2;
 /// From the middle of a place to where a wide body can stand, metres; an arm reaches 0.7 from
-/// there to the nearest point.
-const REACH_M: f32 = 0.64;
+/// there to the nearest point, and a wheelchair stands 0.05 nearer.
+const REACH_M: f32 = 0.70;
 /// Between things on one surface, metres.
 const APART_M: f32 = 0.015;
 /// Around a thing on the floor, metres from furniture, walls and doorways (facts 11.2: 0.65).
@@ -118,7 +118,7 @@ pub(super) fn low(house: &House) -> Vec<Slot> {
         }
         let Some(room) = room_of(house, thing) else { continue };
         for surface in top_surfaces(thing).into_iter().filter(|s| s.center.y < LOW_M) {
-            for slot in spread(host, surface) {
+            for slot in spread(host, thing.class, surface) {
                 if within_reach(house, room, xz(slot.point()), REACH_M) {
                     slots.push(slot);
                 }
@@ -129,22 +129,22 @@ pub(super) fn low(house: &House) -> Vec<Slot> {
 }
 
 /// Places on one surface, as many as it has room for.
-fn spread(host: usize, surface: Surface) -> Vec<Slot> {
+fn spread(host: usize, class: ClassId, surface: Surface) -> Vec<Slot> {
     let [hx, hz] = surface.half;
     let area_m2 = 4.0 * hx * hz;
-    let uvs: &[[f32; 2]] = if area_m2 < 0.16 {
+    // The front (-z) first: the back is mostly to a wall, and farther than an arm.
+    // Chairs stand with their front at a table.
+    let uvs: &[[f32; 2]] = if class.name() == "side_chair" {
+        &[[-0.45, 0.15], [0.45, 0.15]]
+    } else if area_m2 < 0.16 {
         &[[0.0, 0.0]]
     } else if hx.max(hz) < 0.35 {
-        &[[-0.45, -0.2], [0.45, 0.2]]
-    } else if hz < 0.34 || hx < 0.34 {
-        // Long and narrow: a row of places.
-        if hx >= hz {
-            &[[-0.65, 0.0], [0.0, 0.0], [0.65, 0.0]]
-        } else {
-            &[[0.0, -0.6], [0.0, 0.0], [0.0, 0.6]]
-        }
+        &[[-0.45, -0.4], [0.45, -0.3]]
+    } else if hz < 0.34 {
+        &[[-0.65, -0.35], [0.0, -0.35], [0.65, -0.35]]
     } else {
-        &[[-0.6, -0.55], [0.6, -0.55], [-0.6, 0.55], [0.6, 0.55]]
+        // Towards the ends, which no chair keeps people from.
+        &[[-0.78, -0.45], [0.78, -0.45], [-0.78, 0.45], [0.78, 0.45]]
     };
     uvs.iter().map(|uv| Slot { host, surface, uv: Vec2::from(*uv) }).collect()
 }
@@ -160,10 +160,11 @@ pub(super) fn high(house: &House) -> Vec<HighTop> {
         let highest =
             top_surfaces(thing).into_iter().max_by(|a, b| a.center.y.total_cmp(&b.center.y));
         let Some(surface) = highest else { continue };
-        if !within_reach(house, room, xz(surface.center), REACH_M) {
+        // Towards the front, where an arm gets to.
+        let slot = |u: f32| Slot { host, surface, uv: Vec2::new(u, -0.45) };
+        if !within_reach(house, room, xz(slot(0.0).point()), REACH_M) {
             continue;
         }
-        let slot = |u: f32| Slot { host, surface, uv: Vec2::new(u, 0.0) };
         // Every other top takes three things, so that ten to fifteen go up in a house.
         let us: &[f32] = if tops.len() % 2 == 0 { &[-0.66, 0.0, 0.66] } else { &[-0.45, 0.45] };
         let slots = us.iter().map(|u| slot(*u)).collect();

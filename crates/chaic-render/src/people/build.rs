@@ -37,10 +37,10 @@ impl Build {
         };
         let adult = Build {
             hip_y: 0.515 * h,
-            shoulder_y: 0.815 * h,
+            shoulder_y: 0.828 * h,
             top_y: h,
-            head: 0.138 * h,
-            head_width: 0.098 * h,
+            head: 0.145 * h,
+            head_width: 0.100 * h,
             shoulder_x: 0.108 * h,
             hip_x: 0.052 * h,
             upper_arm: 0.175 * h,
@@ -54,9 +54,9 @@ impl Build {
         match posture.persona {
             Persona::Child => Build {
                 hip_y: 0.47 * h,
-                shoulder_y: 0.765 * h,
-                head: 0.19 * h,
-                head_width: 0.150 * h,
+                shoulder_y: 0.775 * h,
+                head: 0.20 * h,
+                head_width: 0.155 * h,
                 shoulder_x: 0.112 * h,
                 hip_x: 0.055 * h,
                 upper_arm: 0.165 * h,

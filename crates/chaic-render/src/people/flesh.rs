@@ -53,26 +53,36 @@ fn trunk(mesh: &mut Mesh, s: &Skeleton, b: &Build, dress: &Dress, detail: Detail
     );
     let body = |grow: f32| {
         [
-            section(0.02, 0.84 * w * grow, 0.98 * d * grow, 0.004),
+            section(-0.03, 1.0 * w * grow, 1.22 * d * grow, 0.008),
+            section(0.12, 0.90 * w * grow, 1.10 * d * grow, 0.008),
             section(0.30, 0.76 * w * grow, 0.92 * d * grow, 0.0),
             section(0.62, 0.98 * w * grow, 1.14 * d * grow, 0.0),
             section(0.86, 1.12 * w * grow, 1.02 * d * grow, 0.005),
             section(0.97, 0.98 * w * grow, 0.72 * d * grow, 0.008),
-            section(1.04, 0.5 * w * grow, 0.5 * d * grow, 0.008),
+            section(1.07, 0.42 * w * grow, 0.5 * d * grow, 0.008),
         ]
     };
     mesh.skin(cloth(dress.shirt));
     mesh.tube(&body(1.0), n);
     if let Some(vest) = dress.vest {
         mesh.skin(cloth(vest));
-        mesh.tube(&body(1.07)[..5], n);
+        mesh.tube(&body(1.07)[..6], n);
         // A bright stripe around the chest.
         mesh.skin(bare([236, 240, 190]));
-        mesh.tube(&[section(0.40, 0.92 * w, 1.12 * d, 0.0), section(0.48, 0.97 * w, 1.18 * d, 0.0)], n);
+        mesh.tube(
+            &[section(0.40, 0.92 * w, 1.12 * d, 0.0), section(0.48, 0.97 * w, 1.18 * d, 0.0)],
+            n,
+        );
     }
     mesh.skin(bare(dress.skin));
     let neck = 0.052 * b.girth.max(0.8);
-    mesh.limb(s.chest, s.head - s.head_axes.y_axis * (0.25 * b.head), neck, neck, corners(detail, neck));
+    mesh.limb(
+        s.chest,
+        s.head - s.head_axes.y_axis * (0.25 * b.head),
+        neck,
+        neck,
+        corners(detail, neck),
+    );
 }
 
 fn leg(mesh: &mut Mesh, s: &Skeleton, b: &Build, dress: &Dress, k: usize, detail: Detail) {
@@ -81,12 +91,12 @@ fn leg(mesh: &mut Mesh, s: &Skeleton, b: &Build, dress: &Dress, k: usize, detail
     let (hip, knee, ankle) = (s.hip_joints[k], s.knees[k], s.ankles[k]);
     mesh.skin(cloth(dress.trousers));
     if dress.short_trousers {
-        mesh.limb(hip, hip.lerp(knee, 0.72), 0.086 * g, 0.074 * g, n);
+        mesh.limb(hip.lerp(knee, 0.18), hip.lerp(knee, 0.72), 0.078 * g, 0.074 * g, n);
         mesh.skin(bare(dress.skin));
         mesh.limb(hip.lerp(knee, 0.6), knee, 0.058 * g, 0.05 * g, n);
         mesh.limb(knee, ankle, 0.050 * g, 0.036 * g, n);
     } else {
-        mesh.limb(hip, knee, 0.083 * g, 0.060 * g, n);
+        mesh.limb(hip.lerp(knee, 0.1), knee, 0.080 * g, 0.060 * g, n);
         mesh.limb(knee, ankle, 0.060 * g, 0.046 * g, n);
     }
     mesh.skin(Skin::new(dress.shoes, Finish::Glossy));
@@ -131,15 +141,32 @@ fn head(mesh: &mut Mesh, s: &Skeleton, b: &Build, dress: &Dress, detail: Detail)
     let (tall, wide) = (b.head, b.head_width);
     let deep = 0.5 * (tall + wide);
     // A point of the head: 1 is its surface along right, up and back.
-    let at = |x: f32, y: f32, z: f32| s.head + s.head_axes * (0.5 * Vec3::new(x * wide, y * tall, z * deep));
+    let at = |x: f32, y: f32, z: f32| {
+        s.head + s.head_axes * (0.5 * Vec3::new(x * wide, y * tall, z * deep))
+    };
     let n = corners(detail, 0.5 * deep).max(6);
     let blob = |mesh: &mut Mesh, c: Vec3, e: Vec3, n: usize| {
         ellipsoid(mesh, &Place { center: c, axes: s.head_axes, extent: e }, n);
     };
     let size = Vec3::new(wide, tall, deep);
     mesh.skin(bare(dress.skin));
-    blob(mesh, at(0.0, 0.12, 0.02), size * Vec3::new(1.0, 0.88, 0.98), n);
-    blob(mesh, at(0.0, -0.42, -0.12), size * Vec3::new(0.76, 0.58, 0.78), n);
+    // Chin to crown: height, width, depth and shift backwards, all 1 at the head's surface.
+    let slices: [[f32; 4]; 8] = [
+        [-1.00, 0.26, 0.26, -0.36],
+        [-0.90, 0.50, 0.50, -0.26],
+        [-0.62, 0.72, 0.78, -0.10],
+        [-0.25, 0.88, 0.94, -0.02],
+        [0.15, 0.97, 1.00, 0.0],
+        [0.50, 0.93, 0.96, 0.03],
+        [0.82, 0.66, 0.70, 0.05],
+        [0.97, 0.28, 0.30, 0.06],
+    ];
+    let slices = slices.map(|[y, w, d, back]| Section {
+        center: at(0.0, y, back),
+        a: s.head_axes.x_axis * (0.5 * w * wide),
+        b: s.head_axes.z_axis * (0.5 * d * deep),
+    });
+    mesh.tube(&slices, n);
     let small = detail.corners(0.12 * wide);
     for x in [-1.0, 1.0] {
         blob(mesh, at(x, -0.08, 0.1), size * Vec3::new(0.10, 0.24, 0.16), small);
@@ -150,7 +177,7 @@ fn head(mesh: &mut Mesh, s: &Skeleton, b: &Build, dress: &Dress, detail: Detail)
     }
     mesh.skin(Skin::new(dress.hair, Finish::Fabric));
     if dress.headwear == Headwear::None {
-        blob(mesh, at(0.0, 0.40, 0.14), size * Vec3::new(1.08, 0.72, 1.02), n);
+        blob(mesh, at(0.0, 0.54, 0.12), size * Vec3::new(1.09, 0.62, 1.07), n);
     }
     blob(mesh, at(0.0, 0.02, 0.36), size * Vec3::new(1.05, 0.86, 0.76), n);
     if dress.long_hair {
@@ -165,9 +192,9 @@ fn head(mesh: &mut Mesh, s: &Skeleton, b: &Build, dress: &Dress, detail: Detail)
         }
         Headwear::Helmet => {
             mesh.skin(Skin::new(dress.headwear_color, Finish::Glossy));
-            blob(mesh, at(0.0, 0.52, 0.06), size * Vec3::new(1.24, 0.84, 1.30), n);
+            blob(mesh, at(0.0, 0.70, 0.14), size * Vec3::new(1.24, 0.84, 1.24), n);
             mesh.skin(Skin::new([245, 245, 240], Finish::Glossy));
-            blob(mesh, at(0.0, 0.56, 0.06), size * Vec3::new(0.30, 0.84, 1.32), n);
+            blob(mesh, at(0.0, 0.74, 0.14), size * Vec3::new(0.30, 0.84, 1.26), n);
         }
     }
 }
@@ -197,8 +224,18 @@ fn face(
     if dress.glasses {
         mesh.skin(Skin::new([60, 56, 60], Finish::Metal));
         for x in [-0.40, 0.40] {
-            for (dx, dy, w, h) in [(0.0, 0.12, 0.38, 0.025), (0.0, -0.12, 0.38, 0.025), (-0.18, 0.0, 0.03, 0.24), (0.18, 0.0, 0.03, 0.24)] {
-                blob(mesh, at(x + dx * 2.0, 0.06 + dy * 2.0, -0.99), size * Vec3::new(w, h, 0.04), n);
+            for (dx, dy, w, h) in [
+                (0.0, 0.12, 0.38, 0.025),
+                (0.0, -0.12, 0.38, 0.025),
+                (-0.18, 0.0, 0.03, 0.24),
+                (0.18, 0.0, 0.03, 0.24),
+            ] {
+                blob(
+                    mesh,
+                    at(x + dx * 2.0, 0.06 + dy * 2.0, -0.99),
+                    size * Vec3::new(w, h, 0.04),
+                    n,
+                );
             }
         }
     }

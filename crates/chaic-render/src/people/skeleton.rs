@@ -70,7 +70,8 @@ impl Skeleton {
     pub fn of(posture: &Posture, build: &Build, rolls: bool, frame: u32) -> Skeleton {
         let (bend, stretch) = (posture.bend, posture.stretch);
         let h = build.top_y;
-        let tremble = if posture.failing { 0.02 * math::sin(2.1 * (frame % 10_000) as f32) } else { 0.0 };
+        let tremble =
+            if posture.failing { 0.02 * math::sin(2.1 * (frame % 10_000) as f32) } else { 0.0 };
         let phase = std::f32::consts::TAU * posture.walked_m / (STRIDE_M * h / 1.75);
         let walks = posture.moving && !rolls;
         let (mut hips, pitch) = if rolls {
@@ -84,7 +85,8 @@ impl Skeleton {
         let trunk = leaning(pitch, 0.0);
         let chest = hips + trunk.y_axis * (build.shoulder_y - build.hip_y);
         let tilt = if posture.failing { 0.28 + 2.0 * tremble } else { 0.0 };
-        let head_axes = leaning(0.45 * pitch - 0.35 * stretch + if posture.failing { 0.3 } else { 0.0 }, tilt);
+        let head_axes =
+            leaning(0.45 * pitch - 0.35 * stretch + if posture.failing { 0.3 } else { 0.0 }, tilt);
         let neck = build.top_y - build.shoulder_y - 0.5 * build.head;
         let head = chest + (0.5 * (trunk.y_axis + head_axes.y_axis)) * neck;
 
@@ -111,7 +113,15 @@ impl Skeleton {
         s
     }
 
-    fn place_leg(&mut self, k: usize, side: f32, b: &Build, rolls: bool, cycle: Option<f32>, posture: &Posture) {
+    fn place_leg(
+        &mut self,
+        k: usize,
+        side: f32,
+        b: &Build,
+        rolls: bool,
+        cycle: Option<f32>,
+        posture: &Posture,
+    ) {
         self.hip_joints[k] = self.hips + Vec3::X * (side * b.hip_x);
         if rolls {
             let x = side * (b.hip_x + 0.035);
@@ -135,20 +145,38 @@ impl Skeleton {
             ankle.y += 0.075 * b.top_y * cs.max(0.0) * (1.0 - 0.4 * sn);
             self.foot_pitch[k] += 0.55 * (cs - 0.35 * sn).max(0.0) - 0.25 * sn.max(0.0);
         }
-        (self.knees[k], self.ankles[k]) =
-            two_bones(self.hip_joints[k], ankle, [b.thigh, b.shin], Vec3::new(0.08 * side, 0.0, -1.0));
+        (self.knees[k], self.ankles[k]) = two_bones(
+            self.hip_joints[k],
+            ankle,
+            [b.thigh, b.shin],
+            Vec3::new(0.08 * side, 0.0, -1.0),
+        );
     }
 
     #[allow(clippy::too_many_arguments, reason = "one call, one posture taken apart")]
-    fn place_arm(&mut self, k: usize, side: f32, b: &Build, rolls: bool, cycle: f32, posture: &Posture, tremble: f32) {
-        let shoulder = self.chest + self.trunk.x_axis * (side * b.shoulder_x) - self.trunk.y_axis * (0.022 * b.top_y)
+    fn place_arm(
+        &mut self,
+        k: usize,
+        side: f32,
+        b: &Build,
+        rolls: bool,
+        cycle: f32,
+        posture: &Posture,
+        tremble: f32,
+    ) {
+        let shoulder = self.chest + self.trunk.x_axis * (side * b.shoulder_x)
+            - self.trunk.y_axis * (0.022 * b.top_y)
             + Vec3::Y * (0.015 * b.top_y * posture.stretch);
         self.shoulders[k] = shoulder;
         let mut target = posture.arms[k].hand_in_body;
         let hangs = !posture.arms[k].grips && target.y < b.hip_y + 0.12 && posture.bend < 0.3;
         if rolls && !posture.arms[k].grips && (posture.moving || hangs) {
             // Hands follow the rims forward and come back above them.
-            let push = if posture.moving { math::sin(posture.walked_m / (2.0 * WHEEL_RADIUS_M) * 3.0) } else { 0.2 };
+            let push = if posture.moving {
+                math::sin(posture.walked_m / (2.0 * WHEEL_RADIUS_M) * 3.0)
+            } else {
+                0.2
+            };
             let a = 0.55 * push;
             target = Vec3::new(
                 side * (WHEEL_X_M + 0.01),
@@ -165,7 +193,8 @@ impl Skeleton {
             target += Vec3::new(tremble, 0.7 * tremble, 0.0);
         }
         let pole = Vec3::new(0.55 * side, -0.6, 0.7);
-        (self.elbows[k], self.hands[k]) = two_bones(shoulder, target, [b.upper_arm, b.forearm + 0.03], pole);
+        (self.elbows[k], self.hands[k]) =
+            two_bones(shoulder, target, [b.upper_arm, b.forearm + 0.03], pole);
     }
 }
 

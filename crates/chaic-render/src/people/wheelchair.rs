@@ -73,12 +73,18 @@ fn wheel(mesh: &mut Mesh, side: f32, walked_m: f32, detail: Detail) {
     let tyre = Place { center, axes, extent: Vec3::new(d, 0.035, d) };
     solid(mesh, Solid::Torus { tube: 0.06 }, &tyre, detail);
     mesh.skin(Skin::new(FRAME, Finish::Metal));
-    let rim = Place { center: center + Vec3::X * (side * 0.03), axes, extent: Vec3::new(0.9 * d, 0.018, 0.9 * d) };
+    let rim = Place {
+        center: center + Vec3::X * (side * 0.03),
+        axes,
+        extent: Vec3::new(0.9 * d, 0.018, 0.9 * d),
+    };
     solid(mesh, Solid::Torus { tube: 0.035 }, &rim, detail);
     let hub = Place { center, axes, extent: Vec3::new(0.06, 0.06, 0.06) };
     frustum(mesh, &hub, 1.0, detail.corners(0.03));
     for k in 0..5 {
-        let axes = wheel_axes(-(walked_m / WHEEL_RADIUS_M) % std::f32::consts::TAU + 0.628_318_5 * k as f32);
+        let axes = wheel_axes(
+            -(walked_m / WHEEL_RADIUS_M) % std::f32::consts::TAU + 0.628_318_5 * k as f32,
+        );
         cuboid(mesh, &Place { center, axes, extent: Vec3::new(0.95 * d, 0.006, 0.008) });
     }
 }
@@ -87,5 +93,10 @@ fn caster(mesh: &mut Mesh, side: f32, walked_m: f32, detail: Detail) {
     mesh.skin(Skin::new(TYRE, Finish::Matte));
     let center = Vec3::new(side * 0.215, 0.08, -0.27);
     let axes = wheel_axes(-(walked_m / 0.08) % std::f32::consts::TAU);
-    frustum(mesh, &Place { center, axes, extent: Vec3::new(0.16, 0.03, 0.16) }, 1.0, detail.corners(0.08));
+    frustum(
+        mesh,
+        &Place { center, axes, extent: Vec3::new(0.16, 0.03, 0.16) },
+        1.0,
+        detail.corners(0.08),
+    );
 }

@@ -123,7 +123,9 @@ pub fn house() -> Setup {
 
 fn walls_of_house(setup: &mut Setup) {
     let (w, d) = (4.0 * SIDE, 2.0 * SIDE);
-    for (a, b) in [([0.0, 0.0], [w, 0.0]), ([w, 0.0], [w, d]), ([w, d], [0.0, d]), ([0.0, d], [0.0, 0.0])] {
+    for (a, b) in
+        [([0.0, 0.0], [w, 0.0]), ([w, 0.0], [w, d]), ([w, d], [0.0, d]), ([0.0, d], [0.0, 0.0])]
+    {
         setup.walls.push(wall(a, b));
     }
     let mut with_door = |a: [f32; 2], b: [f32; 2], rooms: [u32; 2]| {
@@ -151,14 +153,28 @@ fn furnish(setup: &mut Setup, kind: RoomKind, x: f32, z: f32) {
         t.variant = (dx * 10.0) as u8;
         setup.things.push(t);
     };
-    let small = ["apple", "banana", "orange", "bread", "burger", "loaf_bread", "iphone", "purse", "mouse", "pen", "calculator", "pencil_bucket"];
+    let small = [
+        "apple",
+        "banana",
+        "orange",
+        "bread",
+        "burger",
+        "loaf_bread",
+        "iphone",
+        "purse",
+        "mouse",
+        "pen",
+        "calculator",
+        "pencil_bucket",
+    ];
     match kind {
         Kitchen => {
             put("kitchen_counter", 1.3, 0.0, 0.45, PI);
             put("stove", 2.9, 0.0, 0.45, PI);
             put("refrigerator", 3.9, 0.0, 0.5, PI);
             put("dining_table", 2.2, 0.0, 2.6, 0.0);
-            for (dx, dz, yaw) in [(1.6, 3.4, 0.0), (2.8, 3.4, 0.0), (1.6, 1.8, PI), (2.8, 1.8, PI)] {
+            for (dx, dz, yaw) in [(1.6, 3.4, 0.0), (2.8, 3.4, 0.0), (1.6, 1.8, PI), (2.8, 1.8, PI)]
+            {
                 put("side_chair", dx, 0.0, dz, yaw);
             }
             put("microwave", 1.0, 0.95, 0.45, PI);

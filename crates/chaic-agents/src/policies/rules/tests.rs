@@ -41,7 +41,8 @@ fn choose(profile: RuleProfile, case: &Case, log: &BehaviorLog) -> Plan {
 #[test]
 fn the_partner_does_what_the_paper_says() {
     use Plan::*;
-    let (apple, orange, banana) = (subject("apple", 20), subject("orange", 21), subject("banana", 22));
+    let (apple, orange, banana) =
+        (subject("apple", 20), subject("orange", 21), subject("banana", 22));
     let basket = subject("wicker_basket", 23);
     let hold = |class, n: u16| Some(held(class, n, &[]));
     let fruit = ["apple"; 3];

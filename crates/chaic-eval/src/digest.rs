@@ -1,0 +1,45 @@
+//! Digests of states and setups, as they are written.
+
+use std::fmt;
+
+use chaic_world::Setup;
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+
+/// A 64-bit digest, written as 16 hexadecimal digits.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Digest(pub u64);
+
+impl Digest {
+    /// The digest of how an episode begins.
+    pub fn of_setup(setup: &Setup) -> Digest {
+        let bytes = serde_json::to_vec(setup).expect("a setup has no maps and no failing parts");
+        Digest(xxhash_rust::xxh3::xxh3_64(&bytes))
+    }
+}
+
+impl fmt::Display for Digest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:016x}", self.0)
+    }
+}
+
+impl fmt::Debug for Digest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+impl Serialize for Digest {
+    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl<'de> Deserialize<'de> for Digest {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Digest, D::Error> {
+        let text = <std::borrow::Cow<'de, str>>::deserialize(deserializer)?;
+        let value = (text.len() == 16).then(|| u64::from_str_radix(&text, 16).ok()).flatten();
+        let expected = || de::Error::custom(format!("`{text}` is no digest of 16 hex digits"));
+        value.map(Digest).ok_or_else(expected)
+    }
+}

@@ -1,0 +1,154 @@
+//! What can go wrong, with what it went wrong with, and what to do.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use chaic_episodes::{EpisodeError, SplitError};
+use chaic_world::SetupError;
+
+/// The result of anything in this crate.
+pub type Result<T> = std::result::Result<T, EvalError>;
+
+/// What can go wrong.
+#[derive(Debug, thiserror::Error)]
+pub enum EvalError {
+    /// The operating system refused something.
+    #[error("can't {what} {path}: {source}", path = path.display())]
+    Io {
+        /// What was tried, for example `write`.
+        what: &'static str,
+        /// With which file or folder.
+        path: PathBuf,
+        /// The refusal.
+        source: io::Error,
+    },
+    /// A folder isn't a run.
+    #[error(
+        "{path} is no run: it has no run.json; give the folder that `chaic eval --out` wrote",
+        path = path.display()
+    )]
+    NotARun {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A file is of another version or format.
+    #[error(
+        "{path} is of {found}, this program (chaic {chaic}) reads {expected}; use the chaic that \
+         wrote it",
+        path = path.display(), chaic = crate::CHAIC_VERSION
+    )]
+    OtherVersion {
+        /// The file.
+        path: PathBuf,
+        /// What it says it is.
+        found: String,
+        /// What was expected.
+        expected: String,
+    },
+    /// A file can't be understood.
+    #[error("{path}: line {line}: {problem}", path = path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong.
+        problem: String,
+    },
+    /// Another process writes to the run.
+    #[error(
+        "{path} is in use by another `chaic eval`; wait for it or choose another --out",
+        path = path.display()
+    )]
+    Locked {
+        /// The run's folder.
+        path: PathBuf,
+    },
+    /// The folder for a new run has something in it.
+    #[error(
+        "{path} exists and isn't empty; choose another --out, or go on with a run there by --resume",
+        path = path.display()
+    )]
+    NotEmpty {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A run can't be resumed with other options.
+    #[error(
+        "{path} was begun with {option} {recorded}, not {given}; leave {option} away to go on, or \
+         choose another --out",
+        path = path.display()
+    )]
+    OptionDiffers {
+        /// The run's folder.
+        path: PathBuf,
+        /// The option.
+        option: &'static str,
+        /// Its value in the run.
+        recorded: String,
+        /// Its value now.
+        given: String,
+    },
+    /// Options make no run.
+    #[error("{0}")]
+    Options(String),
+    /// No helper has this name.
+    #[error("unknown helper `{name}`; the helpers are {known}", known = known.join(", "))]
+    UnknownHelper {
+        /// The name.
+        name: String,
+        /// All names.
+        known: Vec<String>,
+    },
+    /// A run or trace names an episode that isn't what it was.
+    #[error(
+        "the episode {id} has digest {found}, the trace was played on {expected}; it needs the \
+         chaic that wrote it"
+    )]
+    OtherEpisode {
+        /// The episode.
+        id: String,
+        /// Digest of the episode as it is.
+        found: String,
+        /// Digest of the episode that was played.
+        expected: String,
+    },
+    /// There is no such trace in a run.
+    #[error("{path} has no trace of {wanted}; it has {known}", path = path.display())]
+    NoTrace {
+        /// The run's folder.
+        path: PathBuf,
+        /// What was asked for.
+        wanted: String,
+        /// What there is instead.
+        known: String,
+    },
+    /// There is no such episode.
+    #[error(transparent)]
+    Split(#[from] SplitError),
+    /// An episode file is wrong.
+    #[error(transparent)]
+    Episode(#[from] EpisodeError),
+    /// A setup can't become a world.
+    #[error("the setup of {id} makes no world: {source}")]
+    Setup {
+        /// The episode.
+        id: String,
+        /// Why.
+        source: SetupError,
+    },
+    /// A trace's actions don't lead where the trace says.
+    #[error("{0}")]
+    Difference(String),
+    /// A picture or video can't be made.
+    #[error("{0}")]
+    Picture(String),
+}
+
+impl EvalError {
+    /// For `map_err` on what the operating system may refuse.
+    pub fn io(what: &'static str, path: &Path) -> impl FnOnce(io::Error) -> EvalError + use<> {
+        let path = path.to_owned();
+        move |source| EvalError::Io { what, path, source }
+    }
+}

@@ -1,0 +1,359 @@
+//! Figures of results, as SVG or PNG.
+//!
+//! A figure takes plain labels and numbers, not scores, so that the numbers of the paper and
+//! those of a run can stand side by side.
+
+use std::error::Error;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use image::{ImageFormat, RgbImage, imageops};
+use plotters::coord::Shift;
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::*;
+use plotters::style::FontStyle;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+/// File name extensions that a figure can have.
+pub const EXTENSIONS: &[&str] = &["svg", "png"];
+
+/// Width and height of a figure.
+pub const SIZE_PX: (u32, u32) = (1400, 600);
+
+/// Most helpers in one figure: eight colors and a light shade of each.
+pub const MAX_HELPERS: usize = 2 * PALETTE.len();
+
+/// Most tasks in one figure; more would not leave a bar three pixels.
+pub const MAX_TASKS: usize = 24;
+
+/// Colors that stay apart for color-blind readers (Okabe and Ito 2008), darkest pair first
+/// and black last because a black bar draws the eye.
+const PALETTE: [RGBColor; 8] = [
+    RGBColor(0, 114, 178),
+    RGBColor(230, 159, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(213, 94, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(204, 121, 167),
+    RGBColor(240, 228, 66),
+    RGBColor(40, 40, 40),
+];
+
+const INK: RGBColor = RGBColor(30, 30, 30);
+const FAINT_INK: RGBColor = RGBColor(110, 110, 110);
+const GRID: RGBColor = RGBColor(222, 222, 222);
+
+/// In SVG the reader's own; in PNG, and to measure text, the font registered below.
+const FONT: &str = "sans-serif";
+const TEXT_PX: i32 = 19;
+const NOTE_PX: i32 = 16;
+
+/// PNG is drawn this much larger and shrunk: glyphs stand at whole pixels, and at their final
+/// size some would touch.
+const PNG_OVERSAMPLING: u32 = 3;
+
+/// From the left and right edge of the figure to the plot, and from the bottom.
+const LEFT_PX: i32 = 84;
+const RIGHT_PX: i32 = 20;
+const BOTTOM_PX: i32 = 44;
+/// From the left edge of the figure to the name of the axis.
+const AXIS_NAME_PX: i32 = 12;
+const LEGEND_ROW_PX: i32 = 30;
+/// Room between legend and plot, for whiskers that pass 1.
+const HEADROOM_PX: i32 = 26;
+/// Part of a task's width that its bars take.
+const GROUP_WIDTH: f64 = 0.82;
+
+/// A mean with its standard error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bar {
+    /// Height of the bar, 0 to 1.
+    pub mean: f64,
+    /// Half the length of the whisker.
+    pub se: f64,
+}
+
+/// The bars of one helper.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HelperBars {
+    /// Name in the legend.
+    pub helper: String,
+    /// One entry a task; without a value the place stays empty.
+    pub values: Vec<Option<Bar>>,
+}
+
+/// Results by task and helper.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bars {
+    /// Titles of the tasks, from left to right.
+    pub tasks: Vec<String>,
+    /// The helpers, from left to right within each task.
+    pub helpers: Vec<HelperBars>,
+}
+
+/// Why a figure could not be drawn.
+#[derive(Debug, thiserror::Error)]
+pub enum FigureError {
+    /// The extension names no format.
+    #[error("cannot draw a figure of this kind, use one of {}: {path:?}", EXTENSIONS.join(", "))]
+    UnsupportedExtension {
+        /// The file asked for.
+        path: PathBuf,
+    },
+    /// There is nothing to draw, or too much for one figure.
+    #[error(
+        "cannot draw {n_tasks} tasks and {n_helpers} helpers, \
+         choose 1 to {MAX_TASKS} tasks and 1 to {MAX_HELPERS} helpers"
+    )]
+    Count {
+        /// Tasks given.
+        n_tasks: usize,
+        /// Helpers given.
+        n_helpers: usize,
+    },
+    /// A helper has not one entry for each task.
+    #[error("expected {expected} values, one for each task, got {got} from helper `{helper}`")]
+    Shape {
+        /// Whose values.
+        helper: String,
+        /// Number of tasks.
+        expected: usize,
+        /// Number of values.
+        got: usize,
+    },
+    /// A mean outside 0 to 1, or a standard error that is negative or not a number.
+    #[error("cannot draw {bar:?} of helper `{helper}` in task `{task}`, a rate is 0 to 1")]
+    Value {
+        /// Whose value.
+        helper: String,
+        /// In which task.
+        task: String,
+        /// The value.
+        bar: Bar,
+    },
+    /// The file could not be written.
+    #[error("cannot write the figure: {source}: {path:?}")]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the library said.
+        source: Box<dyn Error + Send + Sync>,
+    },
+}
+
+/// Draws the transport rate of each helper in each task as grouped bars with whiskers of one
+/// standard error; the extension of `out` picks SVG or PNG.
+pub fn transport_rate(bars: &Bars, out: &Path) -> Result<(), FigureError> {
+    bars.check()?;
+    let extension = out.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    let written = match extension.as_deref() {
+        Some("svg") => write_svg(bars, out),
+        Some("png") => write_png(bars, out),
+        _ => return Err(FigureError::UnsupportedExtension { path: out.to_owned() }),
+    };
+    written.map_err(|source| FigureError::Write { path: out.to_owned(), source })
+}
+
+impl Bars {
+    fn check(&self) -> Result<(), FigureError> {
+        let (n_tasks, n_helpers) = (self.tasks.len(), self.helpers.len());
+        if !(1..=MAX_TASKS).contains(&n_tasks) || !(1..=MAX_HELPERS).contains(&n_helpers) {
+            return Err(FigureError::Count { n_tasks, n_helpers });
+        }
+        for HelperBars { helper, values } in &self.helpers {
+            if values.len() != n_tasks {
+                let (expected, got) = (n_tasks, values.len());
+                return Err(FigureError::Shape { helper: helper.clone(), expected, got });
+            }
+            for (task, bar) in self.tasks.iter().zip(values) {
+                let Some(bar) = *bar else { continue };
+                let drawable = (0.0..=1.0).contains(&bar.mean) && (0.0..=1.0).contains(&bar.se);
+                if !drawable {
+                    let (helper, task) = (helper.clone(), task.clone());
+                    return Err(FigureError::Value { helper, task, bar });
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+type DynError = Box<dyn Error + Send + Sync>;
+type DrawError<DB> = DrawingAreaErrorKind<<DB as DrawingBackend>::ErrorType>;
+type Chart<'a, DB> = ChartContext<'a, DB, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+
+fn write_svg(bars: &Bars, out: &Path) -> Result<(), DynError> {
+    let mut text = String::new();
+    let root = SVGBackend::with_string(&mut text, SIZE_PX).into_drawing_area();
+    Canvas { root, scale: 1 }.draw(bars)?;
+    Ok(std::fs::write(out, text)?)
+}
+
+fn write_png(bars: &Bars, out: &Path) -> Result<(), DynError> {
+    let scale = PNG_OVERSAMPLING;
+    let size = (SIZE_PX.0 * scale, SIZE_PX.1 * scale);
+    let mut large = RgbImage::new(size.0, size.1);
+    let root = BitMapBackend::with_buffer(&mut large, size).into_drawing_area();
+    Canvas { root, scale: scale as i32 }.draw(bars)?;
+    let image = imageops::thumbnail(&large, SIZE_PX.0, SIZE_PX.1);
+    Ok(image.save_with_format(out, ImageFormat::Png)?)
+}
+
+/// Without a system font library the fonts that may be drawn have to be announced.
+static FONT_IS_REGISTERED: LazyLock<()> = LazyLock::new(|| {
+    plotters::style::register_font(FONT, FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT)
+        .unwrap_or_else(|_| unreachable!("the font is part of the program"));
+});
+
+/// Where a figure is drawn; all constants are in pixels of a scale of 1.
+struct Canvas<DB: DrawingBackend> {
+    root: DrawingArea<DB, Shift>,
+    scale: i32,
+}
+
+impl<DB: DrawingBackend> Canvas<DB> {
+    fn draw(&self, bars: &Bars) -> Result<(), DrawError<DB>> {
+        LazyLock::force(&FONT_IS_REGISTERED);
+        self.root.fill(&WHITE)?;
+        let legend_px = self.legend(bars)?;
+        let mut chart = ChartBuilder::on(&self.root)
+            .margin_top((legend_px + HEADROOM_PX) * self.scale)
+            .margin_right(RIGHT_PX * self.scale)
+            .margin_left(AXIS_NAME_PX * self.scale)
+            .x_label_area_size(BOTTOM_PX * self.scale)
+            .y_label_area_size((LEFT_PX - AXIS_NAME_PX) * self.scale)
+            .build_cartesian_2d(0.0..bars.tasks.len() as f64, 0.0..1.0)?;
+        self.axes(&bars.tasks, &mut chart)?;
+        self.groups(bars, &chart)?;
+        self.root.present()
+    }
+
+    /// Draws the helpers' names in rows at the top; returns the height.
+    fn legend(&self, bars: &Bars) -> Result<i32, DrawError<DB>> {
+        const SWATCH_PX: i32 = 18;
+        const GAP_PX: i32 = 8;
+        const ENTRY_GAP_PX: i32 = 22;
+        let right = SIZE_PX.0 as i32 - RIGHT_PX;
+        let (mut x, mut y) = (LEFT_PX, LEGEND_ROW_PX);
+        for (index, HelperBars { helper, .. }) in bars.helpers.iter().enumerate() {
+            let style = self.text_style(TEXT_PX, INK, HPos::Left, VPos::Center);
+            // The reader's font may be a tenth wider than the one measured.
+            let text_px = self.text_width_px(helper, &style)? * 11 / 10;
+            let width = SWATCH_PX + GAP_PX + text_px;
+            if x > LEFT_PX && x + width > right {
+                (x, y) = (LEFT_PX, y + LEGEND_ROW_PX);
+            }
+            let corners = [(x, y - SWATCH_PX / 2), (x + SWATCH_PX, y + SWATCH_PX / 2)];
+            let swatch = Rectangle::new(corners.map(|c| self.at(c)), color(index).filled());
+            self.root.draw(&swatch)?;
+            let at = self.at((x + SWATCH_PX + GAP_PX, y));
+            self.root.draw(&Text::new(helper.clone(), at, style))?;
+            x += width + ENTRY_GAP_PX;
+        }
+        let note = "whiskers: one standard error";
+        let style = self.text_style(NOTE_PX, FAINT_INK, HPos::Right, VPos::Center);
+        if x + self.text_width_px(note, &style)? > right {
+            y += LEGEND_ROW_PX;
+        }
+        self.root.draw(&Text::new(note, self.at((right, y)), style))?;
+        Ok(y + LEGEND_ROW_PX / 2)
+    }
+
+    fn axes(&self, tasks: &[String], chart: &mut Chart<'_, DB>) -> Result<(), DrawError<DB>> {
+        let text = |size_px| self.text_style(size_px, INK, HPos::Left, VPos::Top);
+        chart
+            .configure_mesh()
+            .disable_x_mesh()
+            .x_labels(0)
+            .y_labels(6)
+            .y_label_formatter(&|y| format!("{y:.1}"))
+            .y_desc("transport rate")
+            .axis_desc_style(text(TEXT_PX + 2))
+            .y_label_style(text(TEXT_PX))
+            .bold_line_style(self.stroke(GRID))
+            .light_line_style(TRANSPARENT)
+            .axis_style(self.stroke(INK))
+            .set_all_tick_mark_size(5 * self.scale)
+            .draw()?;
+        let style = self.text_style(TEXT_PX, INK, HPos::Center, VPos::Top);
+        for (index, task) in tasks.iter().enumerate() {
+            let (x, y) = chart.backend_coord(&(index as f64 + 0.5, 0.0));
+            let label = Text::new(task.clone(), (x, y + 12 * self.scale), style.clone());
+            self.root.draw(&label)?;
+        }
+        Ok(())
+    }
+
+    fn groups(&self, bars: &Bars, chart: &Chart<'_, DB>) -> Result<(), DrawError<DB>> {
+        let width = GROUP_WIDTH / bars.helpers.len() as f64;
+        for (index, HelperBars { values, .. }) in bars.helpers.iter().enumerate() {
+            for (task, bar) in values.iter().enumerate() {
+                let Some(bar) = bar else { continue };
+                let left = task as f64 + (1.0 - GROUP_WIDTH) / 2.0 + index as f64 * width;
+                self.bar(*bar, left..left + width, color(index), chart)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn bar(
+        &self,
+        bar: Bar,
+        x: Range<f64>,
+        color: RGBColor,
+        chart: &Chart<'_, DB>,
+    ) -> Result<(), DrawError<DB>> {
+        let (left, bottom) = chart.backend_coord(&(x.start, 0.0));
+        let (right, top) = chart.backend_coord(&(x.end, bar.mean));
+        // One pixel between neighbors, and two of height, so that zero differs from no value.
+        let right = (right - self.scale).max(left + 1);
+        let corners = [(left, top.min(bottom - 2 * self.scale)), (right, bottom)];
+        self.root.draw(&Rectangle::new(corners, color.filled()))?;
+        if bar.se == 0.0 {
+            return Ok(());
+        }
+        let middle = (left + right) / 2;
+        let cap = ((right - left) / 5).clamp(self.scale, 5 * self.scale);
+        let y_of = |rate: f64| chart.backend_coord(&(x.start, rate)).1;
+        let low = y_of((bar.mean - bar.se).max(0.0));
+        // What passes 1 by far, as with very few episodes, ends below the legend.
+        let high = y_of(bar.mean + bar.se).max(y_of(1.0) - (HEADROOM_PX - 4) * self.scale);
+        for line in [
+            [(middle, low), (middle, high)],
+            [(middle - cap, low), (middle + cap, low)],
+            [(middle - cap, high), (middle + cap, high)],
+        ] {
+            self.root.draw(&PathElement::new(line, self.stroke(INK)))?;
+        }
+        Ok(())
+    }
+
+    fn at(&self, (x, y): (i32, i32)) -> (i32, i32) {
+        (x * self.scale, y * self.scale)
+    }
+
+    fn stroke(&self, color: RGBColor) -> ShapeStyle {
+        color.stroke_width(self.scale as u32)
+    }
+
+    fn text_style(&self, size_px: i32, color: RGBColor, h: HPos, v: VPos) -> TextStyle<'static> {
+        (FONT, size_px * self.scale).into_font().color(&color).pos(Pos::new(h, v))
+    }
+
+    fn text_width_px(&self, text: &str, style: &TextStyle<'_>) -> Result<i32, DrawError<DB>> {
+        Ok(self.root.estimate_text_size(text, style)?.0 as i32 / self.scale)
+    }
+}
+
+fn color(helper: usize) -> RGBColor {
+    let full = PALETTE[helper % PALETTE.len()];
+    if helper < PALETTE.len() {
+        return full;
+    }
+    let light = |channel: u8| channel / 2 + 127;
+    RGBColor(light(full.0), light(full.1), light(full.2))
+}
+
+#[cfg(test)]
+mod tests;

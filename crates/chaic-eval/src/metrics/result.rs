@@ -1,0 +1,122 @@
+//! What is kept of one episode run: a line of `results.jsonl`, and all that scores are made of.
+
+use chaic_protocol::{AgentId, ClassId, EntityId, Frame, Role, TaskId};
+use serde::{Deserialize, Serialize};
+
+use crate::digest::Digest;
+
+/// Names one episode run within a run. Their order is that of reports.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct RunKey {
+    /// The task.
+    pub task: TaskId,
+    /// The helper.
+    pub helper: String,
+    /// The episode's id.
+    pub episode: String,
+    /// Which of the run's seeds.
+    pub seed: u32,
+}
+
+/// What became of one episode run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunResult {
+    /// Which.
+    #[serde(flatten)]
+    pub key: RunKey,
+    /// How it ended.
+    #[serde(flatten)]
+    pub ending: Ending,
+}
+
+/// How an episode run ended.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "status", rename_all = "snake_case")]
+pub enum Ending {
+    /// It was played to its end.
+    Done(Summary),
+    /// An agent broke down; nothing is scored.
+    Error {
+        /// What it said.
+        message: String,
+    },
+}
+
+/// What scores need to know of an episode run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    /// Frames that passed.
+    pub frames: Frame,
+    /// What is done of what was wanted: objects, or kilograms when moving house.
+    pub done: f64,
+    /// All that was wanted.
+    pub total: f64,
+    /// Frames in which the child was away; absent without child.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub away_frames: Option<u32>,
+    /// Everything that was delivered, in order.
+    pub deliveries: Vec<Delivery>,
+    /// Digest of the world's last state.
+    pub digest: Digest,
+}
+
+/// One thing that was delivered.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Delivery {
+    /// When.
+    pub frame: Frame,
+    /// The thing.
+    pub object: EntityId,
+    /// Its class.
+    pub class: ClassId,
+    /// Who let it go there.
+    pub by: AgentId,
+    /// Whether it was wanted and not yet there often enough.
+    pub counted: bool,
+    /// Whether partner and helper carried it together.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub together: bool,
+    /// Whether the helper had taken it before, whoever delivered it.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub handed: bool,
+}
+
+// `skip_serializing_if` hands over a reference.
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_false(b: &bool) -> bool {
+    !b
+}
+
+impl RunResult {
+    /// The summary of a run that was played to its end.
+    pub fn summary(&self) -> Option<&Summary> {
+        match &self.ending {
+            Ending::Done(summary) => Some(summary),
+            Ending::Error { .. } => None,
+        }
+    }
+}
+
+impl Summary {
+    /// The transport rate: what is done of what was wanted.
+    pub fn rate(&self) -> f64 {
+        if self.total > 0.0 { self.done / self.total } else { 0.0 }
+    }
+}
+
+impl Delivery {
+    /// Whether it is the helper's: let go by the helper, or carried with its hands too.
+    pub fn is_helpers(&self) -> bool {
+        self.by == AgentId::HELPER || self.together
+    }
+
+    /// Whether it could be a target at all; containers and vehicles are only means.
+    pub fn is_goods(&self) -> bool {
+        matches!(self.class.info().role, Role::Target | Role::Fragile | Role::HeavyTarget)
+    }
+
+    /// What it counts for: 1, or its mass in kilograms when moving house.
+    pub fn worth(&self, task: TaskId) -> f64 {
+        if task == TaskId::MovingHouse { f64::from(self.class.info().mass_kg) } else { 1.0 }
+    }
+}

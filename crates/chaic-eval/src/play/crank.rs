@@ -1,0 +1,76 @@
+//! The loop that every episode runs through, be it played or played again.
+
+use chaic_protocol::agent::Thought;
+use chaic_protocol::{Action, AgentId};
+use chaic_world::World;
+
+use crate::digest::Digest;
+use crate::error::Result;
+use crate::trace::{Decision, End, Record, TraceEvent, is_recorded};
+
+/// What somebody chose to do.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Choice {
+    /// Who.
+    pub agent: AgentId,
+    /// What.
+    pub action: Action,
+    /// What it thought, if that changed.
+    pub thought: Option<Thought>,
+}
+
+/// Chooses for those who wait; `None` to stop.
+pub type Decide<'a> = dyn FnMut(&World, &[AgentId]) -> Result<Option<Vec<Choice>>> + 'a;
+
+/// Why the loop returned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flow {
+    /// The episode ended.
+    Ended,
+    /// `decide` had no more choices.
+    Stopped,
+}
+
+/// Asks `decide` whenever somebody waits, submits the choices in their order, lets frames pass,
+/// and hands `sink` all that is worth recording, until the episode ends or `decide` returns `None`.
+///
+/// All who wait in one frame choose before any of them acts.
+///
+/// # Errors
+/// Those of `decide` and `sink`.
+pub fn crank(
+    world: &mut World,
+    decide: &mut Decide<'_>,
+    sink: &mut dyn FnMut(&Record) -> Result<()>,
+) -> Result<Flow> {
+    while !world.is_over() {
+        let waiting = world.waiting();
+        if !waiting.is_empty() {
+            let Some(choices) = decide(world, &waiting)? else { return Ok(Flow::Stopped) };
+            for choice in choices {
+                submit(world, choice, sink)?;
+            }
+        }
+        world.advance();
+        for event in world.drain_events().into_iter().filter(is_recorded) {
+            sink(&Record::Event(TraceEvent::new(event, world)))?;
+        }
+    }
+    sink(&Record::End(End::of(world)))?;
+    Ok(Flow::Ended)
+}
+
+fn submit(
+    world: &mut World,
+    Choice { agent, action, thought }: Choice,
+    sink: &mut dyn FnMut(&Record) -> Result<()>,
+) -> Result<()> {
+    // Another's choice of this frame may have given this agent something to do already.
+    if !world.waiting().contains(&agent) {
+        return Ok(());
+    }
+    let (frame, digest) = (world.state().frame, Digest(world.digest()));
+    sink(&Record::Decision(Decision { frame, agent, action, digest, thought }))?;
+    world.submit(agent, action).expect("the agent waits");
+    Ok(())
+}

@@ -1,0 +1,279 @@
+//! Replays: a trace played again frame by frame, drawn for people.
+
+mod panel;
+
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+
+use chaic_episodes::Episode;
+use chaic_protocol::agent::Thought;
+use chaic_protocol::{Action, AgentId, EntityId, Frame, Outcome, TaskId};
+use chaic_render::{Channels, Scene, View, plan};
+use chaic_world::{EventKind, World};
+use image::RgbImage;
+
+use crate::error::{EvalError, Result};
+use crate::play::world_of;
+use crate::run::{RunFolder, slug};
+use crate::trace::{Decision, Header, Trace};
+use crate::video::VideoWriter;
+
+pub use panel::{HEIGHT_PX, WIDTH_PX};
+
+/// What a replay looks like.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ReplayOptions {
+    /// Pictures a second.
+    pub fps: u32,
+    /// Every how many frames of the episode a picture is drawn.
+    pub every: u32,
+}
+
+/// What one agent is doing, in words.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Caption {
+    /// Who.
+    pub who: String,
+    /// What it does.
+    pub action: String,
+    /// What it plans.
+    pub plan: String,
+}
+
+/// Which helper's trace is taken if none is named; one that isn't listed comes first.
+const FAVORITES: [&str; 5] = ["rhp", "oracle", "random", "follow", "none"];
+
+/// Finds the trace of an episode in a run: its id, or the id without its task. Helper and seed may
+/// be left away; then the lowest seed of the helper with the most to see.
+///
+/// # Errors
+/// If there is none; the message says which there are.
+pub fn find_trace(
+    folder: &RunFolder,
+    episode: &str,
+    helper: Option<&str>,
+    seed: Option<u32>,
+) -> Result<PathBuf> {
+    let traces = folder.traces()?;
+    let mut fitting: Vec<(usize, &PathBuf)> = Vec::new();
+    for path in &traces {
+        // traces/TASK/HELPER/EPISODE-sSEED.jsonl
+        let part = |up: usize| path.iter().rev().nth(up).and_then(|p| p.to_str()).unwrap_or("");
+        let stem = part(0).trim_end_matches(".jsonl");
+        let Some((its_name, its_seed)) = stem.rsplit_once("-s") else { continue };
+        let Ok(task) = part(2).parse::<TaskId>() else { continue };
+        let fits = its_name == slug(task, episode)
+            && helper.is_none_or(|h| h == part(1))
+            && seed.is_none_or(|s| its_seed == s.to_string());
+        if fits {
+            let rank = FAVORITES.iter().position(|f| *f == part(1));
+            fitting.push((rank.unwrap_or(0), path));
+        }
+    }
+    fitting.sort();
+    fitting.first().map(|(_, p)| (*p).clone()).ok_or_else(|| {
+        let some: Vec<String> = traces
+            .iter()
+            .take(3)
+            .filter_map(|p| Some(p.strip_prefix(folder.path()).ok()?.display().to_string()))
+            .collect();
+        let known = match traces.len() {
+            0 => "no traces at all".to_owned(),
+            n => format!("{n} traces, for example {}", some.join(", ")),
+        };
+        let mut wanted = episode.to_owned();
+        wanted += &helper.map_or(String::new(), |h| format!(" with helper {h}"));
+        wanted += &seed.map_or(String::new(), |s| format!(" and seed {s}"));
+        EvalError::NoTrace { path: folder.path().to_owned(), wanted, known }
+    })
+}
+
+/// Draws a trace as a video. `progress` hears of every frame of the episode. Returns how many
+/// pictures it has.
+///
+/// # Errors
+/// If the episode isn't the one that was played, the trace doesn't fit it, or the video can't be
+/// written.
+pub fn write(
+    trace: &Trace,
+    episode: &Episode,
+    options: ReplayOptions,
+    out: &Path,
+    progress: &mut dyn FnMut(Frame),
+) -> Result<u32> {
+    let bad = |e: crate::video::VideoError| EvalError::Picture(e.to_string());
+    let mut replay = Replay::new(trace, episode)?;
+    let mut video = VideoWriter::create(out, WIDTH_PX, HEIGHT_PX, options.fps).map_err(bad)?;
+    let every = options.every.max(1);
+    loop {
+        let frame = replay.world.state().frame;
+        progress(frame);
+        let is_last = !replay.step()?;
+        if frame.is_multiple_of(every) || is_last {
+            video.push(&replay.picture()).map_err(bad)?;
+        }
+        if is_last {
+            break;
+        }
+    }
+    let n = video.n_frames();
+    video.finish().map_err(bad)?;
+    Ok(n)
+}
+
+/// A trace that is being played again.
+pub struct Replay<'a> {
+    header: &'a Header,
+    scene: Scene,
+    world: World,
+    /// Those to come, first one first.
+    decisions: VecDeque<&'a Decision>,
+    thoughts: Vec<Thought>,
+    /// What happened last, newest last.
+    news: Vec<String>,
+    /// The last frame that the trace knows of.
+    last: Frame,
+}
+
+impl<'a> Replay<'a> {
+    /// At the beginning of the trace.
+    ///
+    /// # Errors
+    /// If the episode isn't the one that was played.
+    pub fn new(trace: &'a Trace, episode: &Episode) -> Result<Replay<'a>> {
+        let world = world_of(&trace.header, episode)?;
+        let scene = Scene::new(world.setup());
+        let n = world.setup().people.len();
+        let last = trace.end().map(|e| e.frame);
+        let last = last.or_else(|| trace.decisions().last().map(|d| d.frame)).unwrap_or(0);
+        Ok(Replay {
+            header: &trace.header,
+            scene,
+            world,
+            decisions: trace.decisions().collect(),
+            thoughts: vec![Thought::default(); n],
+            news: Vec::new(),
+            last,
+        })
+    }
+
+    /// The world as it stands.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// Lets those who wait do what they did, and one frame pass; false once there is no more.
+    ///
+    /// # Errors
+    /// If the trace doesn't fit the world.
+    pub fn step(&mut self) -> Result<bool> {
+        let frame = self.world.state().frame;
+        if self.world.is_over() || frame >= self.last {
+            return Ok(false);
+        }
+        while let Some(d) = self.decisions.pop_front_if(|d| d.frame == frame) {
+            if let (Some(thought), Some(slot)) =
+                (&d.thought, self.thoughts.get_mut(d.agent.index()))
+            {
+                slot.clone_from(thought);
+            }
+            self.world.submit(d.agent, d.action).map_err(|e| {
+                let text = format!(
+                    "{} at frame {frame}: {e}; `chaic verify` says more",
+                    self.header.episode
+                );
+                EvalError::Difference(text)
+            })?;
+        }
+        self.world.tick();
+        for event in self.world.drain_events() {
+            self.tell(&event.kind);
+        }
+        Ok(true)
+    }
+
+    /// The picture of this moment.
+    pub fn picture(&self) -> RgbImage {
+        let eyes = [AgentId::PARTNER, AgentId::HELPER];
+        let present = eyes.iter().filter(|a| a.index() < self.thoughts.len());
+        let view = |agent: &AgentId| {
+            View::of_eye(*agent, self.world.eye(*agent, panel::EYE_PX), Channels::RGB)
+        };
+        let views: Vec<View> = present.map(view).collect();
+        let (images, map) = rayon::join(
+            || self.scene.render(&self.world, &views),
+            || plan::draw_scene_plan(&self.scene, &self.world, panel::MAP_PX),
+        );
+        let captions: Vec<Caption> = self.world.setup().agents().map(|a| self.caption(a)).collect();
+        panel::compose(&panel::Contents {
+            header: self.header,
+            world: &self.world,
+            eyes: &images,
+            map: &map,
+            captions: &captions,
+            news: &self.news,
+        })
+    }
+
+    fn caption(&self, agent: AgentId) -> Caption {
+        let person = &self.world.state().people[agent.index()];
+        let action = match (&person.activity, &person.last) {
+            (Some(activity), _) => self.words(&activity.action),
+            (None, Some((action, outcome))) => match outcome {
+                Outcome::Success => self.words(action),
+                Outcome::Failure(reason) => format!("{} failed: {reason}", self.words(action)),
+            },
+            (None, None) => "about to begin".to_owned(),
+        };
+        let thought = &self.thoughts[agent.index()];
+        let mood = thought.mood.as_ref().map_or(String::new(), |m| format!(" ({m})"));
+        let who = match agent {
+            AgentId::HELPER => format!("{agent} ({})", self.header.helper),
+            _ => agent.to_string(),
+        };
+        Caption { who, action, plan: format!("{}{mood}", thought.plan) }
+    }
+
+    fn words(&self, action: &Action) -> String {
+        match *action {
+            Action::MoveForward => "walks ahead".to_owned(),
+            Action::TurnLeft => "turns left".to_owned(),
+            Action::TurnRight => "turns right".to_owned(),
+            Action::PickUp { object, .. } => format!("picks up {}", self.name(object)),
+            Action::PutIn => "puts it into the container".to_owned(),
+            Action::PutOn { place, .. } => format!("puts it on {}", self.name(place)),
+            Action::RemoveObstacle { obstacle, .. } => format!("removes {}", self.name(obstacle)),
+            Action::Wait { .. } => "waits".to_owned(),
+        }
+    }
+
+    fn name(&self, entity: EntityId) -> String {
+        let class = self.world.setup().thing(entity).map(|t| t.class);
+        class.map_or(entity.to_string(), |c| format!("{} {entity}", c.info().label))
+    }
+
+    fn tell(&mut self, kind: &EventKind) {
+        let news = match *kind {
+            EventKind::Delivered { object, by, counted } => {
+                let wanted = if counted { "" } else { ", which isn't wanted" };
+                format!("{by} delivered {}{wanted}", self.name(object))
+            }
+            EventKind::Broke { agent, object } => format!("{agent} broke {}", self.name(object)),
+            EventKind::Ended { agent, action, outcome: Outcome::Failure(reason) }
+                if action.subject().is_some() =>
+            {
+                format!("{agent}: {} failed, {reason}", self.words(&action))
+            }
+            EventKind::LiftedTogether { object, .. } => format!("both lift {}", self.name(object)),
+            EventKind::ChildAway { away: true } => "the child is away".to_owned(),
+            EventKind::ChildAway { away: false } => "the child is back".to_owned(),
+            EventKind::Over { complete: true } => "all is done".to_owned(),
+            EventKind::Over { complete: false } => "time is up".to_owned(),
+            _ => return,
+        };
+        if self.news.len() == panel::MAX_NEWS {
+            self.news.remove(0);
+        }
+        self.news.push(format!("{:>5}  {news}", self.world.state().frame));
+    }
+}

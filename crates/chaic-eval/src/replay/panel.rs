@@ -1,0 +1,148 @@
+//! One picture of a replay: what both see, the map, and what is done and planned.
+
+use chaic_protocol::observation::Images;
+use chaic_render::text::{self, Align};
+use chaic_world::World;
+use image::{Rgb, RgbImage, imageops};
+
+use crate::replay::Caption;
+use crate::trace::Header;
+
+/// Width of a picture, pixels.
+pub const WIDTH_PX: u32 = 1440;
+/// Height of a picture, pixels.
+pub const HEIGHT_PX: u32 = 720;
+/// Side of what an eye sees, pixels.
+pub const EYE_PX: u32 = 460;
+/// Width of the map before it is fitted, pixels.
+pub const MAP_PX: u32 = 472;
+
+const MARGIN_PX: u32 = 12;
+const HEAD_PX: u32 = 44;
+const PAPER: [u8; 3] = [250, 250, 248];
+const INK: [u8; 3] = [30, 32, 38];
+const FAINT: [u8; 3] = [110, 114, 122];
+const BAR: [u8; 3] = [20, 150, 70];
+const TROUGH: [u8; 3] = [222, 224, 226];
+const LINE_PX: f32 = 17.0;
+const NEWS_LINE_PX: u32 = 19;
+/// News that are kept: as many as fit where there is no map at all.
+pub(super) const MAX_NEWS: usize = 30;
+
+/// What a picture shows.
+pub(super) struct Contents<'a> {
+    pub header: &'a Header,
+    pub world: &'a World,
+    /// What partner and helper see.
+    pub eyes: &'a [Images],
+    pub map: &'a RgbImage,
+    pub captions: &'a [Caption],
+    /// What happened last, newest last.
+    pub news: &'a [String],
+}
+
+pub(super) fn compose(contents: &Contents<'_>) -> RgbImage {
+    let mut image = RgbImage::from_pixel(WIDTH_PX, HEIGHT_PX, Rgb(PAPER));
+    head(&mut image, contents);
+    for (k, eye) in contents.eyes.iter().enumerate() {
+        let x = MARGIN_PX + k as u32 * (EYE_PX + MARGIN_PX);
+        let picture = eye.rgb.clone().and_then(|b| RgbImage::from_raw(EYE_PX, EYE_PX, b));
+        if let Some(picture) = picture {
+            imageops::replace(&mut image, &picture, i64::from(x), i64::from(HEAD_PX));
+        }
+    }
+    let below = map(&mut image, contents.map);
+    captions(&mut image, contents);
+    news(&mut image, below, contents.news);
+    image
+}
+
+fn head(image: &mut RgbImage, Contents { header, world, .. }: &Contents<'_>) {
+    let title = format!("{}, helper {}, seed {}", header.episode, header.helper, header.seed);
+    let left = MARGIN_PX as f32;
+    text::draw(image, (left, 10.0), 20.0, INK, Align::Left, &title);
+    let (done, total) = world.progress();
+    let unit = if world.setup().task == chaic_protocol::TaskId::MovingHouse { " kg" } else { "" };
+    let (frame, horizon) = (world.state().frame, world.setup().horizon);
+    let words = format!("done {done:.0} of {total:.0}{unit}    frame {frame} of {horizon}");
+    let right = (WIDTH_PX - MARGIN_PX) as f32;
+    text::draw(image, (right, 6.0), LINE_PX, INK, Align::Right, &words);
+    // Two bars: what is done, and what of the time has passed.
+    let share = if total > 0.0 { done / total } else { 0.0 };
+    let passed = f64::from(frame) / f64::from(horizon);
+    for (k, (share, color)) in [(share, BAR), (passed, FAINT)].into_iter().enumerate() {
+        let (x0, x1) = (WIDTH_PX - MARGIN_PX - EYE_PX, WIDTH_PX - MARGIN_PX);
+        let y0 = 27 + 7 * k as u32;
+        let filled = x0 + (share.clamp(0.0, 1.0) * f64::from(x1 - x0)) as u32;
+        fill(image, [x0, y0, x1, y0 + 5], TROUGH);
+        fill(image, [x0, y0, filled, y0 + 5], color);
+    }
+}
+
+/// Fits the map into what is left to the right of the eyes; returns where it ends.
+fn map(image: &mut RgbImage, map: &RgbImage) -> u32 {
+    let x = 3 * MARGIN_PX + 2 * EYE_PX;
+    let (width, height) = (WIDTH_PX - MARGIN_PX - x, HEIGHT_PX - HEAD_PX - MARGIN_PX);
+    let (w, h) = map.dimensions();
+    let scale = (f64::from(width) / f64::from(w)).min(f64::from(height) / f64::from(h)).min(1.0);
+    let y = i64::from(HEAD_PX);
+    if scale < 1.0 {
+        let (w, h) = ((f64::from(w) * scale) as u32, (f64::from(h) * scale) as u32);
+        let fitted = imageops::resize(map, w.max(1), h.max(1), imageops::FilterType::Triangle);
+        imageops::replace(image, &fitted, i64::from(x), y);
+        return HEAD_PX + fitted.height();
+    }
+    imageops::replace(image, map, i64::from(x), y);
+    HEAD_PX + h
+}
+
+/// The latest news, as many as fit below the map.
+fn news(image: &mut RgbImage, top: u32, news: &[String]) {
+    let x = (3 * MARGIN_PX + 2 * EYE_PX) as f32;
+    let room = HEIGHT_PX.saturating_sub(top + 2 * MARGIN_PX) / NEWS_LINE_PX;
+    let skipped = news.len().saturating_sub(room as usize);
+    for (k, line) in news.iter().skip(skipped).enumerate() {
+        let y = (top + MARGIN_PX + k as u32 * NEWS_LINE_PX) as f32;
+        text::draw(image, (x, y), 14.0, INK, Align::Left, line);
+    }
+}
+
+fn captions(image: &mut RgbImage, Contents { captions, .. }: &Contents<'_>) {
+    let top = (HEAD_PX + EYE_PX + 10) as f32;
+    for (k, caption) in captions.iter().enumerate().take(2) {
+        let x = (MARGIN_PX + k as u32 * (EYE_PX + MARGIN_PX)) as f32;
+        text::draw(image, (x, top), LINE_PX, INK, Align::Left, &caption.who);
+        lines(image, x, top + 24.0, &caption.action, INK);
+        lines(image, x, top + 70.0, &caption.plan, FAINT);
+    }
+    let left = MARGIN_PX as f32;
+    if let Some(child) = captions.get(2) {
+        let words = format!("{}: {}, {}", child.who, child.action, child.plan);
+        text::draw(image, (left, top + 122.0), LINE_PX, INK, Align::Left, &words);
+    }
+}
+
+/// At most two lines, broken between words, no wider than an eye's picture.
+fn lines(image: &mut RgbImage, x: f32, y: f32, words: &str, color: [u8; 3]) {
+    let mut rows = vec![String::new()];
+    for word in words.split_whitespace() {
+        let row = rows.last_mut().expect("there is a first row");
+        let longer = if row.is_empty() { word.to_owned() } else { format!("{row} {word}") };
+        if !row.is_empty() && text::width(&longer, LINE_PX) > EYE_PX as f32 {
+            rows.push(word.to_owned());
+        } else {
+            *row = longer;
+        }
+    }
+    for (k, row) in rows.iter().take(2).enumerate() {
+        text::draw(image, (x, y + 21.0 * k as f32), LINE_PX, color, Align::Left, row);
+    }
+}
+
+fn fill(image: &mut RgbImage, [x0, y0, x1, y1]: [u32; 4], color: [u8; 3]) {
+    for y in y0..y1.min(HEIGHT_PX) {
+        for x in x0..x1.min(WIDTH_PX) {
+            image.put_pixel(x, y, Rgb(color));
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! Scores as people and programs read them.
+
+mod figure;
+mod grid;
+mod tables;
+mod write;
+
+pub use figure::write_figure;
+pub use tables::{additional, main_result, pairs};
+pub use write::{Report, write_files};
+
+use std::fmt;
+use std::str::FromStr;
+
+/// How a report is printed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Tables for a terminal.
+    Table,
+    /// Markdown.
+    Markdown,
+    /// A line per task and helper.
+    Csv,
+    /// What `scores.json` has.
+    Json,
+}
+
+impl Format {
+    /// All names.
+    pub const NAMES: [&str; 4] = ["table", "md", "csv", "json"];
+}
+
+impl FromStr for Format {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Format, String> {
+        match text {
+            "table" => Ok(Format::Table),
+            "md" => Ok(Format::Markdown),
+            "csv" => Ok(Format::Csv),
+            "json" => Ok(Format::Json),
+            _ => Err(format!("unknown format `{text}`; they are {}", Format::NAMES.join(", "))),
+        }
+    }
+}
+
+impl fmt::Display for Format {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(Format::NAMES[*self as usize])
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,86 @@
+//! Reports say what the scores say, in every format.
+
+use chaic_protocol::TaskId;
+use chaic_world::RuleSet;
+
+use super::*;
+use crate::digest::Digest;
+use crate::metrics::{Ending, FormulaSet, RunKey, RunResult, Summary};
+use crate::run::RunOptions;
+
+fn results() -> Vec<RunResult> {
+    let mut results = Vec::new();
+    for task in TaskId::all() {
+        for (helper, done) in [("oracle", 3.0), ("none", 1.0), ("rhp", 2.0)] {
+            for k in 0..2 {
+                let episode = format!("{task}/test/0{k}");
+                let away_frames = (task == TaskId::Shopping && helper != "none").then_some(250);
+                results.push(RunResult {
+                    key: RunKey { task, helper: helper.to_owned(), episode, seed: 0 },
+                    ending: Ending::Done(Summary {
+                        frames: 1000,
+                        done: done + f64::from(k),
+                        total: 10.0,
+                        away_frames,
+                        deliveries: Vec::new(),
+                        digest: Digest(0),
+                    }),
+                });
+            }
+        }
+    }
+    results
+}
+
+fn options() -> RunOptions {
+    RunOptions {
+        tasks: TaskId::all().collect(),
+        helpers: vec!["none".into(), "rhp".into(), "oracle".into()],
+        split: "test".into(),
+        episodes: Some(2),
+        seeds: 1,
+        size: None,
+        rules: RuleSet::Paper,
+    }
+}
+
+fn text(results: &[RunResult], format: Format) -> String {
+    Report { options: &options(), results, formulas: FormulaSet::Paper }.text(format)
+}
+
+#[test]
+fn the_table_has_the_papers_layout() {
+    let table = text(&results(), Format::Table);
+    let lines: Vec<&str> = table.lines().collect();
+    let row = |name: &str| *lines.iter().find(|l| l.contains(name)).unwrap();
+    assert!(row("High container").contains("No constraint"), "{table}");
+    // Alone 1 and 2 of 10, with RHP 2 and 3: EI is the mean of 1/2 and 1/3.
+    assert!(row("RHP").contains("0.25(0.42)") && row("w/o").contains("0.15 "), "{table}");
+    let shopping = *lines.iter().filter(|l| l.contains("Oracle")).nth(1).unwrap();
+    assert!(shopping.contains("0.25"), "the emergency rate is there: {table}");
+    assert!(lines.iter().all(|l| l.chars().count() <= 120), "{table}");
+}
+
+#[test]
+fn every_format_has_every_task_and_helper() {
+    let results = results();
+    let csv = text(&results, Format::Csv);
+    assert_eq!(csv.lines().count(), 1 + 8 * 3);
+    assert!(csv.contains("\nshopping,rhp,0.250000,0.050000,0.416667,,,0.250000,2\n"), "{csv}");
+    let json: serde_json::Value = serde_json::from_str(&text(&results, Format::Json)).unwrap();
+    assert_eq!(json["tasks"].as_object().unwrap().len(), 8);
+    assert_eq!(json["tasks"]["obstacle"]["none"]["ei"], serde_json::Value::Null);
+    let md = text(&results, Format::Markdown);
+    assert!(md.contains("| RHP - w/o | 0.10 [0.10, 0.10] |"), "{md}");
+}
+
+#[test]
+fn what_broke_down_is_named() {
+    let mut results = results();
+    let message = "the episode broke down: boom".to_owned();
+    results[0].ending = Ending::Error { message };
+    for format in [Format::Table, Format::Markdown] {
+        let text = text(&results, format);
+        assert!(text.contains("no_constraint/test/00 with oracle (seed 0): the episode"), "{text}");
+    }
+}

@@ -1,0 +1,135 @@
+//! The whole report, as text and as files.
+
+use std::fmt::Write as _;
+
+use crate::CHAIC_VERSION;
+use crate::error::Result;
+use crate::metrics::{Ending, FormulaSet, RunResult, Scores, differences};
+use crate::report::Format;
+use crate::report::grid::Grid;
+use crate::report::tables::{additional, main_result, pairs};
+use crate::run::{RunFolder, RunOptions};
+
+/// All that a report is made from.
+#[derive(Clone, Copy, Debug)]
+pub struct Report<'a> {
+    /// What was played.
+    pub options: &'a RunOptions,
+    /// What came out.
+    pub results: &'a [RunResult],
+    /// By which formulas it is scored.
+    pub formulas: FormulaSet,
+}
+
+impl Report<'_> {
+    /// The scores.
+    pub fn scores(&self) -> Scores {
+        Scores::of(self.results, &self.formulas.formulas())
+    }
+
+    /// The report as text that ends with a line break.
+    pub fn text(&self, format: Format) -> String {
+        match format {
+            Format::Table => self.terminal(),
+            Format::Markdown => self.markdown(),
+            Format::Csv => self.csv(),
+            Format::Json => json(&self.scores()),
+        }
+    }
+
+    fn grids(&self) -> Vec<Grid> {
+        let scores = self.scores();
+        let mut grids = main_result(&scores);
+        grids.extend(additional(&scores));
+        grids
+    }
+
+    fn terminal(&self) -> String {
+        let mut text: String = self.grids().iter().map(|g| g.to_terminal() + "\n").collect();
+        text += &self.legend();
+        text += &self.errors();
+        text
+    }
+
+    fn markdown(&self) -> String {
+        let RunOptions { split, episodes, seeds, size, rules, .. } = self.options;
+        let episodes = episodes.map_or("all".to_owned(), |n| format!("first {n}"));
+        let size = size.map_or("as each mind asks for".to_owned(), |px| format!("{px} pixels"));
+        let mut text = format!(
+            "# chaic run\n\nchaic {CHAIC_VERSION}, rules `{}`, formulas `{}`. Split `{split}`, \
+             {episodes} episodes of each task, seeds per episode: {seeds}. Images: {size}.\n\n",
+            rules.as_str(),
+            self.formulas,
+        );
+        for grid in self.grids() {
+            text += &grid.to_markdown();
+            text.push('\n');
+        }
+        let scores = self.scores();
+        let differences = differences(self.results, &scores.helpers());
+        if !differences.is_empty() {
+            text += &pairs(&differences, &scores.tasks()).to_markdown();
+            text.push('\n');
+        }
+        text += &self.legend();
+        text += &self.errors();
+        text
+    }
+
+    fn csv(&self) -> String {
+        let scores = self.scores();
+        let mut text = String::from("task,helper,tr,tr_se,ei,ia,cr,er,episodes\n");
+        for task in scores.tasks() {
+            for helper in scores.helpers() {
+                let Some(s) = scores.get(task, &helper) else { continue };
+                let cell = |v: Option<f64>| v.map_or(String::new(), |v| format!("{v:.6}"));
+                let cells = [Some(s.tr), s.tr_se, s.ei, s.ia, s.cr, s.er].map(cell).join(",");
+                let _ = writeln!(text, "{task},{helper},{cells},{}", s.episodes);
+            }
+        }
+        text
+    }
+
+    fn legend(&self) -> String {
+        let spread = match self.formulas {
+            FormulaSet::Paper => "SE standard error of TR over episodes",
+            FormulaSet::Original => {
+                "SE (original) standard deviation of TR over episodes and seeds"
+            }
+        };
+        let n = self.results.iter().filter(|r| r.summary().is_some()).count();
+        format!(
+            "TR transport rate, EI efficiency improvement over no helper (w/o), IA goal inference \
+             accuracy,\nER emergency rate, CR completion ratio of the helper, {spread}.\n\
+             {n} episode runs.\n"
+        )
+    }
+
+    fn errors(&self) -> String {
+        let mut text = String::new();
+        for result in self.results {
+            if let Ending::Error { message } = &result.ending {
+                let k = &result.key;
+                let _ = writeln!(
+                    text,
+                    "Not scored: {} with {} (seed {}): {message}",
+                    k.episode, k.helper, k.seed
+                );
+            }
+        }
+        text
+    }
+}
+
+fn json(scores: &Scores) -> String {
+    serde_json::to_string_pretty(scores).expect("scores have string keys") + "\n"
+}
+
+/// Writes `scores.json` and `report.md` into the run's folder.
+///
+/// # Errors
+/// If the file system refuses.
+pub fn write_files(folder: &RunFolder, report: &Report<'_>) -> Result<()> {
+    folder.write("scores.json", json(&report.scores()).as_bytes())?;
+    folder.write("report.md", report.markdown().as_bytes())
+}

@@ -1,0 +1,138 @@
+//! The episode runs that a run consists of.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::Read as _;
+use std::path::Path;
+
+use chaic_episodes::{Episode, MAX_EPISODE_BYTES, Split};
+use chaic_protocol::{Frame, TaskId};
+
+use crate::error::{EvalError, Result};
+use crate::metrics::RunKey;
+use crate::run::folder::{RunFolder, write_whole};
+use crate::run::options::{FILES, RunOptions};
+
+/// One episode run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Item {
+    /// Which.
+    pub key: RunKey,
+    /// How long it may take.
+    pub horizon: Frame,
+}
+
+/// A name for files that belong to an episode: its id without the task, `/` and `:` as `-`.
+///
+/// ```
+/// use chaic_protocol::TaskId;
+/// assert_eq!(chaic_eval::run::slug(TaskId::Obstacle, "obstacle/test/07"), "test-07");
+/// ```
+pub fn slug(task: TaskId, id: &str) -> String {
+    let rest = id.strip_prefix(task.name()).and_then(|r| r.strip_prefix('/')).unwrap_or(id);
+    let safe = |c: char| if c.is_ascii_alphanumeric() || "._-".contains(c) { c } else { '-' };
+    // No name becomes hidden, or one of the two special ones.
+    rest.trim_start_matches('.').chars().map(safe).collect()
+}
+
+/// All episode runs, episode by episode, so that a run that is cut short can be compared.
+pub(super) fn items(options: &RunOptions, folder: &RunFolder) -> Result<Vec<Item>> {
+    let mut items = Vec::new();
+    for task in &options.tasks {
+        let episodes = episodes(options, folder, *task)?;
+        if episodes.is_empty() {
+            let text = format!("there is no episode of {task} to play");
+            return Err(EvalError::Options(text));
+        }
+        for (episode, horizon) in episodes {
+            for seed in 0..options.seeds {
+                for helper in &options.helpers {
+                    let (task, helper, episode) = (*task, helper.clone(), episode.clone());
+                    items.push(Item { key: RunKey { task, helper, episode, seed }, horizon });
+                }
+            }
+        }
+    }
+    Ok(items)
+}
+
+/// Ids and horizons of a task's episodes. Episodes themselves are made when they are played:
+/// there may be more than memory holds.
+fn episodes(
+    options: &RunOptions,
+    folder: &RunFolder,
+    task: TaskId,
+) -> Result<Vec<(String, Frame)>> {
+    let limit = options.episodes.map_or(usize::MAX, |n| n as usize);
+    if options.split == FILES {
+        let mut own: Vec<_> = read_files(&folder.episode_files())?
+            .into_iter()
+            .filter(|e| e.task() == task)
+            .map(|e| (e.id().to_owned(), e.setup().horizon))
+            .collect();
+        own.truncate(limit);
+        return Ok(own);
+    }
+    let split: Split = options.split.parse()?;
+    let name = |k: usize| match &split {
+        Split::Generated(seeds) => format!("{task}/gen/{}", seeds.start + k as u64),
+        bundled => format!("{task}/{bundled}/{k:02}"),
+    };
+    let horizon = task.info().horizon;
+    Ok((0..split.len_per_task().min(limit)).map(|k| (name(k), horizon)).collect())
+}
+
+/// The episodes in a folder's `.json` files, in the order of their ids.
+fn read_files(folder: &Path) -> Result<Vec<Episode>> {
+    let list = fs::read_dir(folder).map_err(EvalError::io("list", folder))?;
+    let mut episodes = Vec::new();
+    for entry in list {
+        let path = entry.map_err(EvalError::io("list", folder))?.path();
+        if path.extension().is_some_and(|e| e == "json") {
+            let bytes = read_bounded(&path)?;
+            episodes.push(Episode::parse(&bytes, &path.display().to_string())?);
+        }
+    }
+    episodes.sort_by(|a, b| a.id().cmp(b.id()));
+    Ok(episodes)
+}
+
+/// The bytes of an episode file; of a file that is too long so many that its reader says so.
+pub(super) fn read_bounded(path: &Path) -> Result<Vec<u8>> {
+    let file = fs::File::open(path).map_err(EvalError::io("open", path))?;
+    let mut bytes = Vec::new();
+    let read = file.take(MAX_EPISODE_BYTES as u64 + 1).read_to_end(&mut bytes);
+    read.map_err(EvalError::io("read", path))?;
+    Ok(bytes)
+}
+
+/// The tasks of the episodes in a folder, in the paper's order.
+pub(super) fn tasks_of_files(folder: &Path) -> Result<Vec<TaskId>> {
+    let present: BTreeSet<TaskId> = read_files(folder)?.iter().map(Episode::task).collect();
+    if present.is_empty() {
+        let text = format!("{} holds no episode file (*.json)", folder.display());
+        return Err(EvalError::Options(text));
+    }
+    Ok(TaskId::all().filter(|t| present.contains(t)).collect())
+}
+
+/// Copies the episodes of `source` into the run, which then needs nothing from elsewhere.
+pub(super) fn copy_episode_files(
+    source: &Path,
+    tasks: &[TaskId],
+    folder: &RunFolder,
+) -> Result<()> {
+    let to = folder.episode_files();
+    fs::create_dir_all(&to).map_err(EvalError::io("make the folder", &to))?;
+    let mut names = BTreeSet::new();
+    for episode in read_files(source)?.iter().filter(|e| tasks.contains(&e.task())) {
+        let copy = folder.episode_copy(episode.task(), episode.id());
+        if !names.insert(copy.clone()) {
+            let (id, source) = (episode.id(), source.display());
+            let text = format!("{source} holds two episodes that are named like {id}; rename one");
+            return Err(EvalError::Options(text));
+        }
+        write_whole(&copy, episode.to_json().as_bytes())?;
+    }
+    Ok(())
+}

@@ -1,0 +1,144 @@
+//! Whole benchmarks: what is played, in which folder, by how many workers.
+//!
+//! A run folder holds `run.json` (what is played), `results.jsonl` (a line for each finished
+//! episode run), `traces/`, copies of episode files in `episodes/`, and, once finished, the
+//! report. `docs/trace.md` describes them.
+
+mod estimate;
+mod folder;
+mod items;
+mod journal;
+mod options;
+mod worker;
+
+pub use folder::{Access, RunFolder};
+pub use items::{Item, slug};
+pub use journal::{Journal, read_results};
+pub use options::{Given, RunOptions};
+pub use worker::{Finished, Progress};
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use crate::error::Result;
+use crate::helpers::{self, Helpers, NONE};
+use crate::metrics::{Ending, RunKey, RunResult};
+use crate::trace::Warning;
+
+/// A run with its folder, which nobody else writes to as long as this exists.
+#[derive(Debug)]
+pub struct Run {
+    folder: RunFolder,
+    options: RunOptions,
+    journal: Journal,
+    items: Vec<Item>,
+    results: Vec<RunResult>,
+}
+
+/// How far a run has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Extent {
+    /// Episode runs in all.
+    pub total: usize,
+    /// Of these, finished ones.
+    pub finished: usize,
+    /// Of the finished ones, those that broke down.
+    pub errors: usize,
+}
+
+impl Run {
+    /// Begins a run in an empty or new folder, or goes on with the one that is there.
+    ///
+    /// # Errors
+    /// If the folder is in use, isn't empty (`resume` not given), or holds a run with other
+    /// options; if options name unknown helpers or no episodes.
+    pub fn open(
+        path: &Path,
+        access: Access,
+        given: &Given,
+        helpers: &dyn Helpers,
+    ) -> Result<(Run, Vec<Warning>)> {
+        // Nothing is left behind by options that make no run.
+        if access == Access::Begin {
+            check(&given.begin()?, helpers)?;
+        }
+        let (folder, recorded) = RunFolder::lock(path, access)?;
+        let options = match &recorded {
+            Some(recorded) => given.resume(recorded, path)?,
+            None => given.begin()?,
+        };
+        check(&options, helpers)?;
+        if let (None, Some(source)) = (&recorded, &given.episodes_dir) {
+            items::copy_episode_files(source, &options.tasks, &folder)?;
+        }
+        let items = items::items(&options, &folder)?;
+        if recorded.is_none() {
+            folder.write_options(&options)?;
+        }
+        let (journal, results, warnings) = Journal::open(&folder.results())?;
+        Ok((Run { folder, options, journal, items, results }, warnings))
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &RunFolder {
+        &self.folder
+    }
+
+    /// What is played.
+    pub fn options(&self) -> &RunOptions {
+        &self.options
+    }
+
+    /// The results so far.
+    pub fn results(&self) -> &[RunResult] {
+        &self.results
+    }
+
+    /// How far it has come.
+    pub fn extent(&self) -> Extent {
+        let errors =
+            self.results.iter().filter(|r| matches!(r.ending, Ending::Error { .. })).count();
+        Extent { total: self.items.len(), finished: self.results.len(), errors }
+    }
+
+    /// Plays what is missing, and again what broke down, on `jobs` threads. `progress` hears of
+    /// everything in the calling thread.
+    ///
+    /// Returns whether all has been played; otherwise `stop` was raised.
+    ///
+    /// # Errors
+    /// If a file can't be read or written. What was finished before is kept.
+    pub fn play(
+        &mut self,
+        jobs: usize,
+        helpers: &dyn Helpers,
+        stop: &AtomicBool,
+        progress: &mut dyn FnMut(&Progress),
+    ) -> Result<bool> {
+        let is_done = |r: &&RunResult| r.summary().is_some();
+        let done: BTreeSet<&RunKey> = self.results.iter().filter(is_done).map(|r| &r.key).collect();
+        let missing: Vec<Item> =
+            self.items.iter().filter(|i| !done.contains(&i.key)).cloned().collect();
+        let (journal, results) = (&mut self.journal, &mut self.results);
+        let crew = worker::Crew { folder: &self.folder, options: &self.options, helpers, stop };
+        crew.play(&missing, jobs.max(1), progress, &mut |result| {
+            journal.append(result)?;
+            results.retain(|r| r.key != result.key);
+            results.push(result.clone());
+            Ok(())
+        })
+    }
+}
+
+fn check(options: &RunOptions, helpers: &dyn Helpers) -> Result<()> {
+    options.helpers.iter().try_for_each(|name| helpers::find(helpers, name).map(|_| ()))
+}
+
+/// The names that may stand behind `--helper`.
+pub fn helper_names(helpers: &dyn Helpers) -> Vec<String> {
+    std::iter::once(NONE.to_owned()).chain(helpers.names()).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,158 @@
+//! What a run plays. Everything here moves scores, so a run is resumed with the same only.
+
+use std::path::{Path, PathBuf};
+
+use chaic_episodes::Split;
+use chaic_protocol::TaskId;
+use chaic_world::{RuleSet, Rules};
+use serde::{Deserialize, Serialize};
+
+use crate::error::{EvalError, Result};
+
+/// Largest side of an image that agents may be given, pixels: 16 times the benchmark's area.
+pub const MAX_IMAGE_SIZE: u32 = 2048;
+/// Smallest one: fewer pixels show nothing.
+pub const MIN_IMAGE_SIZE: u32 = 16;
+
+/// What a run plays, as `run.json` records it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunOptions {
+    /// The tasks.
+    pub tasks: Vec<TaskId>,
+    /// The helpers.
+    pub helpers: Vec<String>,
+    /// The split; `files` if the episodes are files.
+    pub split: String,
+    /// How many episodes of each task, from the first; absent for all.
+    pub episodes: Option<u32>,
+    /// How many seeds each episode is played with.
+    pub seeds: u32,
+    /// Side of everybody's images, pixels; absent for what each mind asks for.
+    pub size: Option<u32>,
+    /// The rules.
+    pub rules: RuleSet,
+}
+
+/// What the caller says of a run. What isn't said is as recorded, or as usual for a new run.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Given {
+    /// `--task`.
+    pub tasks: Option<Vec<TaskId>>,
+    /// `--helper`.
+    pub helpers: Option<Vec<String>>,
+    /// `--split`.
+    pub split: Option<Split>,
+    /// `--episodes`.
+    pub episodes: Option<u32>,
+    /// `--seeds`.
+    pub seeds: Option<u32>,
+    /// `--size`.
+    pub size: Option<u32>,
+    /// `--episodes-dir`: a folder with episode files, in place of a split.
+    pub episodes_dir: Option<PathBuf>,
+}
+
+/// What `split` says where the episodes are files.
+pub const FILES: &str = "files";
+
+impl RunOptions {
+    /// The rules' constants.
+    pub fn rules(&self) -> Rules {
+        match self.rules {
+            RuleSet::Paper => Rules::paper(),
+        }
+    }
+}
+
+impl Given {
+    /// The options of a new run.
+    ///
+    /// # Errors
+    /// If they contradict each other, or are out of bounds.
+    pub fn begin(&self) -> Result<RunOptions> {
+        let wrong = |text: String| Err(EvalError::Options(text));
+        let (seeds, size) = (self.seeds.unwrap_or(1), self.size);
+        if seeds == 0 || self.episodes == Some(0) {
+            return wrong("--seeds and --episodes are at least 1".to_owned());
+        }
+        if let Some(px) = size.filter(|s| !(MIN_IMAGE_SIZE..=MAX_IMAGE_SIZE).contains(s)) {
+            let range = format!("{MIN_IMAGE_SIZE} to {MAX_IMAGE_SIZE}");
+            return wrong(format!("--size is {px}, expected {range} pixels"));
+        }
+        if self.split.is_some() && self.episodes_dir.is_some() {
+            return wrong("give --split or --episodes-dir, not both".to_owned());
+        }
+        let split = match &self.episodes_dir {
+            Some(_) => FILES.to_owned(),
+            None => self.split.clone().unwrap_or(Split::Test).to_string(),
+        };
+        let helpers =
+            self.helpers.clone().unwrap_or_else(|| DEFAULT_HELPERS.map(str::to_owned).to_vec());
+        let tasks = match (&self.tasks, &self.episodes_dir) {
+            (Some(tasks), _) => tasks.clone(),
+            (None, Some(folder)) => super::items::tasks_of_files(folder)?,
+            (None, None) => TaskId::all().collect(),
+        };
+        let (tasks, helpers) = (without_repeats(tasks), without_repeats(helpers));
+        if tasks.is_empty() || helpers.is_empty() {
+            return wrong("a run needs at least one task and one helper".to_owned());
+        }
+        let episodes = self.episodes;
+        Ok(RunOptions { tasks, helpers, split, episodes, seeds, size, rules: RuleSet::Paper })
+    }
+
+    /// The options of a run that is gone on with.
+    ///
+    /// # Errors
+    /// [`EvalError::OptionDiffers`] if something else is said than what is recorded.
+    pub fn resume(&self, recorded: &RunOptions, path: &Path) -> Result<RunOptions> {
+        let list = |tasks: &[TaskId]| tasks.iter().map(|t| t.name()).collect::<Vec<_>>().join(",");
+        let number = |n: Option<u32>| n.map_or("not given".to_owned(), |n| n.to_string());
+        let said = [
+            (
+                "--task",
+                self.tasks.as_ref().map(|t| list(&without_repeats(t.clone()))),
+                list(&recorded.tasks),
+            ),
+            (
+                "--helper",
+                self.helpers.as_ref().map(|h| without_repeats(h.clone()).join(",")),
+                recorded.helpers.join(","),
+            ),
+            ("--split", self.split.as_ref().map(Split::to_string), recorded.split.clone()),
+            (
+                "--episodes-dir",
+                // The run has its own copies of the files; the folder itself may be gone.
+                self.episodes_dir.as_ref().map(|_| FILES.to_owned()),
+                recorded.split.clone(),
+            ),
+            ("--episodes", self.episodes.map(|n| n.to_string()), number(recorded.episodes)),
+            ("--seeds", self.seeds.map(|n| n.to_string()), recorded.seeds.to_string()),
+            ("--size", self.size.map(|n| n.to_string()), number(recorded.size)),
+        ];
+        for (option, given, recorded) in said {
+            if let Some(given) = given.filter(|g| *g != recorded) {
+                return Err(EvalError::OptionDiffers {
+                    path: path.to_owned(),
+                    option,
+                    recorded,
+                    given,
+                });
+            }
+        }
+        Ok(recorded.clone())
+    }
+}
+
+/// The helpers of a run that names none.
+pub const DEFAULT_HELPERS: [&str; 4] = ["none", "random", "rhp", "oracle"];
+
+fn without_repeats<T: PartialEq>(items: Vec<T>) -> Vec<T> {
+    items.into_iter().fold(Vec::new(), |mut kept, item| {
+        if !kept.contains(&item) {
+            kept.push(item);
+        }
+        kept
+    })
+}

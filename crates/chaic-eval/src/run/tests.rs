@@ -1,0 +1,316 @@
+//! A run survives whatever happens to it, and is the same however it was played.
+
+use std::fs;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use chaic_episodes::Episode;
+use chaic_protocol::observation::{Grants, Senses};
+use chaic_protocol::{Action, Agent, Briefing, Observation, TaskId};
+
+use super::*;
+use crate::digest::Digest;
+use crate::error::EvalError;
+use crate::helpers::Helper;
+use crate::metrics::Summary;
+
+/// Frames of a test's episodes: enough for a few decisions of everybody.
+const HORIZON: u32 = 90;
+/// Side of a test's images, pixels.
+const SIZE: u32 = 32;
+
+/// Turns round, and does something impossible now and then; panics in the episodes of `bad_task`.
+struct Turner {
+    turns: u32,
+}
+
+impl Agent for Turner {
+    fn senses(&self) -> Senses {
+        Senses::DEPTH_AND_IDS
+    }
+
+    fn reset(&mut self, _: &Briefing) {}
+
+    fn act(&mut self, _: &Observation) -> Action {
+        self.turns += 1;
+        match self.turns % 3 {
+            0 => Action::PutIn,
+            1 => Action::TurnLeft,
+            _ => Action::PickUp {
+                object: chaic_protocol::EntityId(9999),
+                hand: chaic_protocol::Hand::Left,
+            },
+        }
+    }
+}
+
+struct Breaker;
+
+impl Agent for Breaker {
+    fn senses(&self) -> Senses {
+        Senses::NONE
+    }
+
+    fn reset(&mut self, _: &Briefing) {}
+
+    fn act(&mut self, observation: &Observation) -> Action {
+        assert!(observation.frame < 30, "out of ideas");
+        Action::Wait { frames: 10 }
+    }
+}
+
+/// Helpers of these tests; the stop flag is raised when so many have been made.
+struct TestHelpers {
+    made: AtomicUsize,
+    stop_after: usize,
+    stop: AtomicBool,
+    breaks: bool,
+}
+
+impl TestHelpers {
+    fn new() -> TestHelpers {
+        let (made, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
+        TestHelpers { made, stop_after: usize::MAX, stop, breaks: true }
+    }
+}
+
+impl Helpers for TestHelpers {
+    fn names(&self) -> Vec<String> {
+        vec!["turner".to_owned(), "breaker".to_owned()]
+    }
+
+    fn make(&self, name: &str) -> Option<Helper> {
+        if self.made.fetch_add(1, Ordering::SeqCst) + 1 >= self.stop_after {
+            self.stop.store(true, Ordering::SeqCst);
+        }
+        let mind: Box<dyn Agent> = match name {
+            "breaker" if self.breaks => Box::new(Breaker),
+            "turner" | "breaker" => Box::new(Turner { turns: 0 }),
+            _ => return None,
+        };
+        Some(Helper { mind, grants: Grants::NONE })
+    }
+}
+
+/// A folder with short episodes of these tasks.
+fn episode_files(tasks: &[TaskId], per_task: usize) -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    for task in tasks {
+        for k in 0..per_task {
+            let full = chaic_episodes::find_episode(&format!("{task}/test/{k:02}")).unwrap();
+            let mut setup = full.into_setup();
+            setup.horizon = HORIZON;
+            let short = Episode::new(format!("{task}/short/{k}"), "short", None, setup).unwrap();
+            fs::write(dir.path().join(format!("{task}-{k}.json")), short.to_json()).unwrap();
+        }
+    }
+    dir
+}
+
+fn given(files: &tempfile::TempDir, helpers: &[&str]) -> Given {
+    Given {
+        helpers: Some(helpers.iter().map(|h| (*h).to_owned()).collect()),
+        seeds: Some(2),
+        size: Some(SIZE),
+        episodes_dir: Some(files.path().to_owned()),
+        ..Given::default()
+    }
+}
+
+fn play(run: &mut Run, jobs: usize, helpers: &TestHelpers) -> bool {
+    run.play(jobs, helpers, &helpers.stop, &mut |_| ()).unwrap()
+}
+
+fn sorted(results: &[RunResult]) -> Vec<RunResult> {
+    let mut results = results.to_vec();
+    results.sort_by(|a, b| a.key.cmp(&b.key));
+    results
+}
+
+#[test]
+fn the_number_of_workers_and_an_interruption_change_nothing() {
+    let files = episode_files(&[TaskId::NoConstraint, TaskId::Shopping], 1);
+    let given = given(&files, &["none", "turner"]);
+    let dir = tempfile::tempdir().unwrap();
+    let mut all = Vec::new();
+    for jobs in [1, 2, 4] {
+        let helpers = TestHelpers::new();
+        let path = dir.path().join(jobs.to_string());
+        let (mut run, _) = Run::open(&path, Access::Begin, &given, &helpers).unwrap();
+        assert_eq!(run.extent(), Extent { total: 8, finished: 0, errors: 0 });
+        assert!(play(&mut run, jobs, &helpers));
+        all.push(sorted(run.results()));
+    }
+    assert_eq!(all[0], all[1]);
+    assert_eq!(all[0], all[2]);
+    assert!(all[0].iter().all(|r| r.summary().is_some_and(|s| s.frames == HORIZON)));
+    let digests: BTreeSet<Digest> =
+        all[0].iter().filter_map(|r| r.summary().map(|s| s.digest)).collect();
+    assert!(digests.len() >= 4, "tasks and helpers lead to different episodes");
+
+    // The same, stopped in the middle of the third episode and gone on with by another process.
+    let path = dir.path().join("interrupted");
+    // Options are checked twice, with a helper made for each.
+    let hasty = TestHelpers { stop_after: 4, ..TestHelpers::new() };
+    let (mut run, _) = Run::open(&path, Access::Begin, &given, &hasty).unwrap();
+    assert!(!play(&mut run, 1, &hasty));
+    let so_far = run.results().len();
+    assert!((1..8).contains(&so_far), "{so_far}");
+    drop(run);
+    drop(files);
+    let helpers = TestHelpers::new();
+    let (mut run, _) = Run::open(&path, Access::Resume, &Given::default(), &helpers).unwrap();
+    assert_eq!(run.extent().finished, so_far);
+    assert!(play(&mut run, 2, &helpers));
+    assert_eq!(sorted(run.results()), all[0]);
+    // The journal says the same as memory, and the traces say the same as the journal.
+    assert_eq!(read_results(&run.folder().results()).unwrap(), (all[0].clone(), vec![]));
+    let traces = run.folder().traces().unwrap();
+    assert_eq!(traces.len(), 8);
+    let tallied = traces.iter().map(|p| crate::metrics::tally(&crate::trace::read(p).unwrap().0));
+    assert_eq!(sorted(&tallied.map(Option::unwrap).collect::<Vec<_>>()), all[0]);
+    let verdict = crate::verify::verify_run(run.folder(), 2, &|_| ()).unwrap();
+    assert_eq!((verdict.agreeing, verdict.mismatches), (8, vec![]));
+}
+
+#[test]
+fn a_helper_that_breaks_down_costs_its_episode_only() {
+    let files = episode_files(&[TaskId::MovingHouse], 1);
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("run");
+    let helpers = TestHelpers::new();
+    let given = given(&files, &["breaker", "none"]);
+    let (mut run, _) = Run::open(&path, Access::Begin, &given, &helpers).unwrap();
+    assert!(play(&mut run, 1, &helpers));
+    assert_eq!(run.extent(), Extent { total: 4, finished: 4, errors: 2 });
+    let is_broken = |r: &&RunResult| matches!(&r.ending, Ending::Error { .. });
+    for broken in run.results().iter().filter(is_broken) {
+        assert_eq!(broken.key.helper, "breaker");
+        let Ending::Error { message } = &broken.ending else { unreachable!() };
+        assert_eq!(message, "the episode broke down: out of ideas");
+        assert!(!run.folder().trace(&broken.key).exists());
+    }
+    drop(run);
+    // A repaired helper gets its episodes again.
+    let repaired = TestHelpers { breaks: false, ..TestHelpers::new() };
+    let (mut run, _) = Run::open(&path, Access::Resume, &Given::default(), &repaired).unwrap();
+    assert!(play(&mut run, 1, &repaired));
+    assert_eq!(run.extent(), Extent { total: 4, finished: 4, errors: 0 });
+}
+
+#[test]
+fn verify_finds_what_was_changed() {
+    let files = episode_files(&[TaskId::LowTarget], 1);
+    let dir = tempfile::tempdir().unwrap();
+    let helpers = TestHelpers::new();
+    let given = Given { seeds: None, ..given(&files, &["turner"]) };
+    let (mut run, _) = Run::open(dir.path(), Access::Begin, &given, &helpers).unwrap();
+    assert!(play(&mut run, 1, &helpers));
+    let path = run.folder().traces().unwrap().remove(0);
+    let text = fs::read_to_string(&path).unwrap();
+    let verdict = || crate::verify::verify_run(run.folder(), 1, &|_| ()).unwrap();
+    assert_eq!(verdict().mismatches, []);
+    let changes: [(&str, &str, &str); 4] = [
+        // The second decision of the helper: the next digest differs.
+        ("1,\"turn_left\"", "1,\"turn_right\"", "digest"),
+        ("\"impossible\"", "\"blocked\"", "played again it is"),
+        ("\"complete\":false", "\"complete\":true", "played again it is"),
+        ("\"seed\":0", "\"seed\":1", "results.jsonl has this run"),
+    ];
+    for (from, to, said) in changes {
+        let changed = text.replacen(from, to, 1);
+        assert_ne!(changed, text, "{from} is there");
+        if said.contains("results.jsonl") {
+            fs::remove_file(&path).unwrap();
+        } else {
+            fs::write(&path, changed).unwrap();
+        }
+        let mismatches = verdict().mismatches;
+        assert_eq!(mismatches.len(), 1, "{from}");
+        let said_so = mismatches[0].to_string();
+        assert!(said_so.contains(said) && said_so.contains("short-0-s0.jsonl"), "{said_so}");
+        fs::write(&path, &text).unwrap();
+    }
+    assert_eq!(verdict().mismatches, []);
+}
+
+#[test]
+fn folders_are_guarded() {
+    let files = episode_files(&[TaskId::LowTarget], 1);
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("run");
+    let helpers = TestHelpers::new();
+    let mine = given(&files, &["turner"]);
+    let open = |access, given: &Given| Run::open(&path, access, given, &helpers).map(|_| ());
+    let (held, _) = Run::open(&path, Access::Begin, &mine, &helpers).unwrap();
+    for access in [Access::Begin, Access::Resume] {
+        assert!(matches!(open(access, &mine), Err(EvalError::Locked { .. })));
+    }
+    drop(held);
+    assert!(matches!(open(Access::Begin, &mine), Err(EvalError::NotEmpty { .. })));
+    assert!(open(Access::Resume, &mine).is_ok());
+    let other = Given { seeds: Some(3), ..mine.clone() };
+    let error = open(Access::Resume, &other).unwrap_err().to_string();
+    assert!(error.contains("--seeds 2, not 3"), "{error}");
+    let other = Given { helpers: Some(vec!["none".into(), "turner".into()]), ..mine.clone() };
+    let error = open(Access::Resume, &other).unwrap_err().to_string();
+    assert!(error.contains("--helper turner, not none,turner"), "{error}");
+    let unknown = Given { helpers: Some(vec!["nobody".into()]), ..mine.clone() };
+    let elsewhere = dir.path().join("elsewhere");
+    let error = Run::open(&elsewhere, Access::Begin, &unknown, &helpers).unwrap_err().to_string();
+    assert!(error.contains("`nobody`") && error.contains("none, turner, breaker"), "{error}");
+
+    // A folder of another version, and one that is something else.
+    let run_file = path.join("run.json");
+    let text = fs::read_to_string(&run_file).unwrap();
+    fs::write(&run_file, text.replace("\"version\": 1", "\"version\": 9")).unwrap();
+    let error = open(Access::Resume, &mine).unwrap_err().to_string();
+    assert!(error.contains("version 9") && error.contains("version 1"), "{error}");
+    fs::write(&run_file, text.replace(crate::CHAIC_VERSION, "7.7.7")).unwrap();
+    let error = open(Access::Resume, &mine).unwrap_err().to_string();
+    assert!(error.contains("7.7.7") && error.contains(crate::CHAIC_VERSION), "{error}");
+    let foreign = dir.path().join("foreign");
+    fs::create_dir(&foreign).unwrap();
+    fs::write(foreign.join("letter.txt"), "dear").unwrap();
+    let error = Run::open(&foreign, Access::Resume, &mine, &helpers).unwrap_err();
+    assert!(matches!(error, EvalError::NotARun { .. }), "{error}");
+    assert!(!foreign.join(".lock").exists());
+}
+
+#[test]
+fn a_journal_cut_at_any_byte_loses_one_record_at_most() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("results.jsonl");
+    let result = |seed| RunResult {
+        key: RunKey { task: TaskId::Obstacle, helper: "rhp".into(), episode: "e".into(), seed },
+        ending: Ending::Done(Summary {
+            frames: 3000,
+            done: 1.0,
+            total: 10.0,
+            away_frames: None,
+            deliveries: Vec::new(),
+            digest: Digest(3),
+        }),
+    };
+    let (mut journal, _, _) = Journal::open(&path).unwrap();
+    journal.append(&result(0)).unwrap();
+    let first = fs::read(&path).unwrap().len();
+    journal.append(&result(1)).unwrap();
+    let bytes = fs::read(&path).unwrap();
+    for cut in first..bytes.len() {
+        fs::write(&path, &bytes[..cut]).unwrap();
+        let (read, warnings) = read_results(&path).unwrap();
+        assert_eq!(read, [result(0)]);
+        assert_eq!(warnings.len(), usize::from(cut > first), "{cut}");
+        // What is appended next doesn't stick to the torn record.
+        let (mut journal, results, _) = Journal::open(&path).unwrap();
+        assert_eq!(results, [result(0)]);
+        journal.append(&result(1)).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), bytes, "{cut}");
+    }
+    // A damaged record with others after it is no crash: nothing is thrown away.
+    let mut damaged = bytes.clone();
+    damaged[0] = b'!';
+    fs::write(&path, &damaged).unwrap();
+    assert!(matches!(Journal::open(&path), Err(EvalError::Unreadable { line: 1, .. })));
+    assert_eq!(fs::read(&path).unwrap(), damaged);
+}

@@ -1,0 +1,224 @@
+//! Playing many episodes on several threads.
+
+use std::any::Any;
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{Sender, channel};
+use std::time::{Duration, Instant};
+
+use chaic_protocol::Frame;
+
+use crate::error::Result;
+use crate::helpers::{self, Helpers};
+use crate::metrics::{Ending, RunKey, RunResult, Tally};
+use crate::play::{Play, Staging};
+use crate::run::estimate::Estimate;
+use crate::run::folder::RunFolder;
+use crate::run::items::Item;
+use crate::run::options::RunOptions;
+use crate::trace::{Record, Writer};
+
+/// A worker tells of its frames every so many decisions.
+const NEWS_EVERY: u32 = 32;
+
+/// What happens during a run.
+#[derive(Clone, Debug)]
+pub enum Progress {
+    /// A worker begins an episode run.
+    Began {
+        /// The worker, from 0.
+        worker: usize,
+        /// Which run.
+        key: RunKey,
+        /// How many frames it may take.
+        horizon: Frame,
+    },
+    /// A worker has come to a frame.
+    At {
+        /// The worker.
+        worker: usize,
+        /// The frame.
+        frame: Frame,
+    },
+    /// An episode run is finished and in the journal.
+    Finished(Finished),
+}
+
+/// An episode run is finished.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// The worker that played it.
+    pub worker: usize,
+    /// Its result.
+    pub result: RunResult,
+    /// What is left of the whole run, as far as one can tell from the episodes so far.
+    pub left: Option<Duration>,
+}
+
+/// What all workers share.
+pub(super) struct Crew<'a> {
+    pub folder: &'a RunFolder,
+    pub options: &'a RunOptions,
+    pub helpers: &'a dyn Helpers,
+    pub stop: &'a AtomicBool,
+}
+
+/// What a worker says to the thread that keeps the journal.
+enum News {
+    Progress(Progress),
+    Finished { worker: usize, result: RunResult, time: Duration },
+    Failed(crate::EvalError),
+}
+
+impl Crew<'_> {
+    /// Plays all items; `keep` makes each result last. Returns whether nothing was left out.
+    pub fn play(
+        &self,
+        items: &[Item],
+        jobs: usize,
+        progress: &mut dyn FnMut(&Progress),
+        keep: &mut dyn FnMut(&RunResult) -> Result<()>,
+    ) -> Result<bool> {
+        let jobs = jobs.min(items.len()).max(1);
+        let next = AtomicUsize::new(0);
+        // Raised by a failure as well as by the caller's `stop`.
+        let failed = AtomicBool::new(false);
+        let mut outcome = Ok(());
+        let mut to_go: BTreeMap<&RunKey, ()> = items.iter().map(|i| (&i.key, ())).collect();
+        let mut estimate = Estimate::default();
+        std::thread::scope(|scope| {
+            let (sender, receiver) = channel();
+            for worker in 0..jobs {
+                let (sender, next, failed) = (sender.clone(), &next, &failed);
+                let work = move || self.work(worker, items, next, failed, &sender);
+                let name = format!("chaic-worker-{worker}");
+                let spawned = std::thread::Builder::new().name(name).spawn_scoped(scope, work);
+                spawned.expect("the system has a thread for each job");
+            }
+            drop(sender);
+            for news in receiver {
+                let told = match news {
+                    News::Progress(news) => {
+                        progress(&news);
+                        Ok(())
+                    }
+                    News::Finished { worker, result, time } => keep(&result).map(|()| {
+                        estimate.add(&result.key, time);
+                        to_go.remove(&result.key);
+                        let left = estimate.left(to_go.keys().copied(), jobs);
+                        progress(&Progress::Finished(Finished { worker, result, left }));
+                    }),
+                    News::Failed(error) => Err(error),
+                };
+                if let Err(error) = told {
+                    failed.store(true, Ordering::Relaxed);
+                    if outcome.is_ok() {
+                        outcome = Err(error);
+                    }
+                }
+            }
+        });
+        outcome.map(|()| to_go.is_empty())
+    }
+
+    fn work(
+        &self,
+        worker: usize,
+        items: &[Item],
+        next: &AtomicUsize,
+        failed: &AtomicBool,
+        sender: &Sender<News>,
+    ) {
+        loop {
+            if self.stop.load(Ordering::Relaxed) || failed.load(Ordering::Relaxed) {
+                return;
+            }
+            let Some(item) = items.get(next.fetch_add(1, Ordering::Relaxed)) else { return };
+            let began = Instant::now();
+            // The receiver lives as long as any worker does.
+            let tell = |news| drop(sender.send(news));
+            let (key, horizon) = (item.key.clone(), item.horizon);
+            tell(News::Progress(Progress::Began { worker, key, horizon }));
+            let mut at = |frame| tell(News::Progress(Progress::At { worker, frame }));
+            match self.play_one(&item.key, &mut at) {
+                Ok(None) => return,
+                Ok(Some(result)) => {
+                    tell(News::Finished { worker, result, time: began.elapsed() });
+                }
+                Err(error) => {
+                    tell(News::Failed(error));
+                    return;
+                }
+            }
+        }
+    }
+
+    /// Plays one item; `None` if it was stopped.
+    fn play_one(&self, key: &RunKey, at: &mut dyn FnMut(Frame)) -> Result<Option<RunResult>> {
+        let mut writer = None;
+        let played = catch_unwind(AssertUnwindSafe(|| self.play_to_end(key, &mut writer, at)));
+        let result = match played {
+            Ok(result) => result?,
+            Err(panic) => {
+                let message = format!("the episode broke down: {}", text_of(panic.as_ref()));
+                let ending = Ending::Error { message };
+                if let Some(writer) = writer.take() {
+                    writer.discard();
+                }
+                return Ok(Some(RunResult { key: key.clone(), ending }));
+            }
+        };
+        match (result, writer) {
+            (Some(result), Some(writer)) => {
+                writer.finish()?;
+                Ok(Some(result))
+            }
+            (_, writer) => {
+                if let Some(writer) = writer {
+                    writer.discard();
+                }
+                Ok(None)
+            }
+        }
+    }
+
+    fn play_to_end(
+        &self,
+        key: &RunKey,
+        writer: &mut Option<Writer>,
+        at: &mut dyn FnMut(Frame),
+    ) -> Result<Option<RunResult>> {
+        let episode = self.folder.episode(key)?;
+        let helper = helpers::find(self.helpers, &key.helper)?;
+        let staging = Staging {
+            episode: &episode,
+            seed: key.seed,
+            rules: self.options.rules(),
+            helper: &key.helper,
+            image_size: self.options.size,
+        };
+        let mut play = Play::new(staging, helper)?;
+        let writer = writer.insert(Writer::create(&self.folder.trace(key), play.header())?);
+        let mut tally = Tally::new(play.header());
+        let (mut result, mut decisions) = (None, 0);
+        play.run(self.stop, None, &mut |record| {
+            writer.write(record)?;
+            result = tally.record(record).or(result.take());
+            if let Record::Decision(decision) = record {
+                decisions += 1;
+                if decisions % NEWS_EVERY == 0 {
+                    at(decision.frame);
+                }
+            }
+            Ok(())
+        })?;
+        Ok(result)
+    }
+}
+
+/// What a panic said.
+fn text_of(panic: &(dyn Any + Send)) -> &str {
+    let text = panic.downcast_ref::<&str>().copied();
+    text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message")
+}

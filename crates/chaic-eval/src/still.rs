@@ -1,0 +1,103 @@
+//! Pictures of one moment: what an agent sees, as files for people and programs.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use chaic_episodes::Episode;
+use chaic_protocol::{AgentId, ClassId, EntityId, Frame};
+use chaic_render::{Channels, Scene, View, image_out, plan};
+use chaic_world::{Rules, World};
+use image::DynamicImage;
+
+use crate::error::{EvalError, Result};
+use crate::helpers::{self, Helpers};
+use crate::play::{Play, Staging};
+
+/// Which moment of which episode, and whose eyes.
+#[derive(Clone, Copy, Debug)]
+pub struct Still<'a> {
+    /// The episode.
+    pub episode: &'a Episode,
+    /// Name of the helper that takes part.
+    pub helper: &'a str,
+    /// Which seed.
+    pub seed: u32,
+    /// Whose eyes.
+    pub agent: AgentId,
+    /// The moment; if nobody decides in this frame, the first one after it in which somebody does.
+    pub frame: Frame,
+    /// Side of the images, pixels.
+    pub size: u32,
+}
+
+/// Plays an episode up to a moment and writes `rgb.png`, `depth.png` (16 bit, millimetres),
+/// `ids.png` (16 bit) and `ids.json` (id to class) into `out`. Returns the frame that is shown.
+///
+/// # Errors
+/// If there is no such agent or helper, or the file system refuses.
+pub fn write(still: &Still<'_>, helpers: &dyn Helpers, out: &Path) -> Result<Frame> {
+    let Still { episode, helper, seed, agent, frame, size } = *still;
+    let staging = Staging { episode, seed, rules: Rules::paper(), helper, image_size: None };
+    let mut play = Play::new(staging, helpers::find(helpers, helper)?)?;
+    if agent.index() >= play.world().setup().people.len() {
+        let text = format!("{} has no {agent} when the helper is {helper}", episode.id());
+        return Err(EvalError::Options(text));
+    }
+    play.run(&AtomicBool::new(false), Some(frame), &mut |_| Ok(()))?;
+    let world = play.world();
+    let view = View::of_eye(agent, world.eye(agent, size), Channels::ALL);
+    let images = play.eyes().scene().render(world, &[view]).pop().unwrap_or_default();
+    std::fs::create_dir_all(out).map_err(EvalError::io("make the folder", out))?;
+    let no_picture = || EvalError::Picture(format!("{size} is no size of a picture"));
+    let rgb = images.rgb.as_deref().and_then(|b| image_out::rgb(b, size, size));
+    save(rgb.ok_or_else(no_picture)?.into(), &out.join("rgb.png"))?;
+    let depth = images.depth_m.as_deref().and_then(|b| image_out::depth_mm(b, size, size));
+    save(depth.ok_or_else(no_picture)?.into(), &out.join("depth.png"))?;
+    let ids = images.ids.unwrap_or_default();
+    let present: std::collections::BTreeSet<u16> = ids.iter().copied().collect();
+    let picture = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(size, size, ids);
+    save(picture.ok_or_else(no_picture)?.into(), &out.join("ids.png"))?;
+    let classes = world.classes();
+    let names: BTreeMap<u16, &str> =
+        present.into_iter().map(|id| (id, name_of(EntityId(id), &classes))).collect();
+    let json = serde_json::to_string_pretty(&names).expect("numbers and names") + "\n";
+    let path = out.join("ids.json");
+    std::fs::write(&path, json).map_err(EvalError::io("write", &path))?;
+    Ok(world.state().frame)
+}
+
+fn name_of(entity: EntityId, classes: &[Option<ClassId>]) -> &'static str {
+    match entity {
+        EntityId::NOTHING => "nothing",
+        EntityId::FLOOR => "floor",
+        EntityId::WALL => "wall",
+        EntityId::CEILING => "ceiling",
+        other => {
+            let class = classes.get(usize::from(other.0)).copied().flatten();
+            class.map_or("unknown", |c| c.name())
+        }
+    }
+}
+
+/// Draws the map of how an episode begins.
+///
+/// # Errors
+/// If the setup makes no world, or the file system refuses.
+pub fn write_plan(episode: &Episode, width_px: u32, path: &Path) -> Result<()> {
+    let refused = |source| EvalError::Setup { id: episode.id().to_owned(), source };
+    let world = World::new(episode.setup().clone(), Rules::paper()).map_err(refused)?;
+    let scene = Scene::new(episode.setup());
+    save(plan::draw_scene_plan(&scene, &world, width_px).into(), path)
+}
+
+/// The pictures that `write` leaves in a folder.
+pub fn files(out: &Path) -> Vec<PathBuf> {
+    ["rgb.png", "depth.png", "ids.png", "ids.json"].map(|n| out.join(n)).to_vec()
+}
+
+fn save(picture: DynamicImage, path: &Path) -> Result<()> {
+    let refused =
+        |e: image::ImageError| EvalError::Picture(format!("can't write {}: {e}", path.display()));
+    picture.save(path).map_err(refused)
+}

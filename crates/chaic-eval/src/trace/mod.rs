@@ -1,0 +1,110 @@
+//! What happened in one episode, as a file that is only ever appended to.
+//!
+//! A trace is JSON lines: a [`Header`], then [`Record`]s in the order in which they happened, the
+//! last of which is an [`End`]. `docs/trace.md` describes the format for other programs.
+
+mod read;
+mod record;
+mod write;
+
+pub use read::{MAX_TRACE_BYTES, Warning, parse, read};
+pub use record::{Decision, End, Record, TraceEvent, is_recorded};
+pub use write::Writer;
+
+use chaic_protocol::capability::Persona;
+use chaic_protocol::observation::{Grants, Senses};
+use chaic_protocol::{AgentId, TaskId};
+use chaic_world::Rules;
+use serde::{Deserialize, Serialize};
+
+use crate::digest::Digest;
+use crate::metrics::RunKey;
+
+/// What the field `format` of a header says.
+pub const FORMAT: &str = "chaic-trace";
+/// The version of the format.
+pub const VERSION: u32 = 1;
+
+/// What was played, under which rules, and what everybody was told.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    /// Always [`FORMAT`].
+    pub format: String,
+    /// Always [`VERSION`].
+    pub version: u32,
+    /// The version of the program that played.
+    pub chaic: String,
+    /// The task.
+    pub task: TaskId,
+    /// The episode's id.
+    pub episode: String,
+    /// Digest of the episode's setup as it stands in its file.
+    pub setup: Digest,
+    /// Which of the run's seeds; 0 is the episode's own.
+    pub seed: u32,
+    /// The seed that the world was played with.
+    pub world_seed: u64,
+    /// The rules.
+    pub rules: Rules,
+    /// The helper's name; `none` where the partner is alone.
+    pub helper: String,
+    /// Who took part, by agent.
+    pub people: Vec<Participant>,
+    /// What made the images; only `cpu` gives the same on every machine.
+    pub renderer: String,
+}
+
+impl Header {
+    /// The episode run that this is the trace of.
+    pub fn key(&self) -> RunKey {
+        RunKey {
+            task: self.task,
+            helper: self.helper.clone(),
+            episode: self.episode.clone(),
+            seed: self.seed,
+        }
+    }
+}
+
+/// Somebody who takes part in an episode.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Participant {
+    /// Who.
+    pub agent: AgentId,
+    /// What kind of person.
+    pub persona: Persona,
+    /// What it is granted beyond own images and state.
+    pub grants: Grants,
+    /// Which images it looks at.
+    pub senses: Senses,
+}
+
+/// A whole trace in memory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trace {
+    /// What was played.
+    pub header: Header,
+    /// What happened.
+    pub records: Vec<Record>,
+}
+
+impl Trace {
+    /// How it ended, if the trace goes so far.
+    pub fn end(&self) -> Option<&End> {
+        match self.records.last() {
+            Some(Record::End(end)) => Some(end),
+            _ => None,
+        }
+    }
+
+    /// The decisions in order.
+    pub fn decisions(&self) -> impl Iterator<Item = &Decision> {
+        self.records.iter().filter_map(|r| match r {
+            Record::Decision(d) => Some(d),
+            _ => None,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;

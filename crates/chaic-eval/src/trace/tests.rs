@@ -1,0 +1,113 @@
+//! A trace reads back as it was written, up to wherever it was cut.
+
+use std::path::Path;
+
+use chaic_protocol::agent::Thought;
+use chaic_protocol::{Action, AgentId, ClassId, EntityId, FailureReason, Hand, Outcome};
+use chaic_world::{Event, EventKind};
+
+use super::*;
+use crate::error::EvalError;
+
+fn header() -> Header {
+    Header {
+        format: FORMAT.to_owned(),
+        version: VERSION,
+        chaic: "0.1.0".to_owned(),
+        task: TaskId::Obstacle,
+        episode: "obstacle/test/07".to_owned(),
+        setup: Digest(7),
+        seed: 0,
+        world_seed: u64::MAX,
+        rules: Rules::paper(),
+        helper: "rhp".to_owned(),
+        people: vec![Participant {
+            agent: AgentId::PARTNER,
+            persona: Persona::Wheelchair,
+            grants: Grants::PARTNER,
+            senses: Senses::DEPTH_AND_IDS,
+        }],
+        renderer: "cpu".to_owned(),
+    }
+}
+
+fn records() -> Vec<Record> {
+    let pick = Action::PickUp { object: EntityId(31), hand: Hand::Left };
+    let event =
+        |frame, kind, class| Record::Event(TraceEvent { event: Event { frame, kind }, class });
+    let decision = |frame, action, thought| {
+        let (agent, digest) = (AgentId::HELPER, Digest(0xdead_beef));
+        Record::Decision(Decision { frame, agent, action, digest, thought })
+    };
+    let thought = Thought { plan: "go to \"apple\" #31\n".to_owned(), mood: Some("x".to_owned()) };
+    let failed = Outcome::Failure(FailureReason::TooFar);
+    vec![
+        decision(0, pick, Some(thought)),
+        event(9, EventKind::Ended { agent: AgentId::HELPER, action: pick, outcome: failed }, None),
+        decision(9, Action::MoveForward, None),
+        event(
+            20,
+            EventKind::Delivered { object: EntityId(31), by: AgentId::HELPER, counted: true },
+            Some(ClassId::named("apple")),
+        ),
+        event(30, EventKind::ChildAway { away: true }, None),
+        Record::End(End {
+            frame: 30,
+            done: 1.0,
+            total: 3.0,
+            complete: false,
+            away_frames: 4,
+            digest: Digest(1),
+        }),
+    ]
+}
+
+fn written(dir: &Path) -> std::path::PathBuf {
+    let path = dir.join("a/b/t.jsonl");
+    let mut writer = Writer::create(&path, &header()).unwrap();
+    for record in records() {
+        writer.write(&record).unwrap();
+    }
+    assert!(!path.exists(), "a trace has its name only when it is whole");
+    writer.finish().unwrap();
+    path
+}
+
+#[test]
+fn reads_back_what_was_written() {
+    let dir = tempfile::tempdir().unwrap();
+    let (trace, warnings) = read(&written(dir.path())).unwrap();
+    assert_eq!(trace, Trace { header: header(), records: records() });
+    assert_eq!(warnings, []);
+    assert_eq!(trace.decisions().count(), 2);
+}
+
+#[test]
+fn a_cut_at_any_byte_leaves_all_whole_records() {
+    let dir = tempfile::tempdir().unwrap();
+    let bytes = std::fs::read(written(dir.path())).unwrap();
+    let header_len = bytes.iter().position(|b| *b == b'\n').unwrap() + 1;
+    for cut in 0..bytes.len() {
+        let parsed = parse(&bytes[..cut], Path::new("t.jsonl"));
+        if cut < header_len {
+            assert!(matches!(parsed, Err(EvalError::Unreadable { line: 1, .. })), "{cut}");
+            continue;
+        }
+        let (trace, warnings) = parsed.unwrap();
+        let whole = bytes[header_len..cut].iter().filter(|b| **b == b'\n').count();
+        assert_eq!(trace.records, records()[..whole], "{cut}");
+        assert!(warnings.contains(&Warning::NoEnd { path: "t.jsonl".into(), records: whole }));
+        let torn = bytes[cut - 1] != b'\n';
+        assert_eq!(warnings.len(), 1 + usize::from(torn), "{cut}");
+    }
+}
+
+#[test]
+fn another_version_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(written(dir.path())).unwrap();
+    let other = text.replacen("\"version\":1", "\"version\":2", 1);
+    let error = parse(other.as_bytes(), Path::new("t.jsonl")).unwrap_err().to_string();
+    assert!(error.contains("version 2") && error.contains("version 1"), "{error}");
+    assert!(error.contains("chaic 0.1.0"), "{error}");
+}

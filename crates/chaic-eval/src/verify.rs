@@ -1,0 +1,227 @@
+//! Playing a trace's actions again, to see whether they lead where the trace says.
+
+use std::collections::VecDeque;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use chaic_protocol::{AgentId, Frame};
+use chaic_world::World;
+
+use crate::error::{EvalError, Result};
+use crate::metrics::{RunResult, tally};
+use crate::play::{Choice, Flow, crank, world_of};
+use crate::run::{RunFolder, read_results};
+use crate::trace::{self, Decision, Record, Trace, Warning};
+
+/// The first place where a trace and its re-simulation differ.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mismatch {
+    /// The trace.
+    pub path: PathBuf,
+    /// When.
+    pub frame: Frame,
+    /// Whose decision, if it is one.
+    pub agent: Option<AgentId>,
+    /// What the trace says, and what comes out.
+    pub problem: String,
+}
+
+impl fmt::Display for Mismatch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: frame {}", self.path.display(), self.frame)?;
+        if let Some(agent) = self.agent {
+            write!(f, ", {agent}")?;
+        }
+        write!(f, ": {}", self.problem)
+    }
+}
+
+/// What verifying a run found.
+#[derive(Clone, Debug, Default)]
+pub struct Verdict {
+    /// How many traces agree.
+    pub agreeing: usize,
+    /// How many decisions they hold.
+    pub decisions: usize,
+    /// The first difference of each trace that doesn't, by path.
+    pub mismatches: Vec<Mismatch>,
+    /// Files that could only be read in part.
+    pub warnings: Vec<Warning>,
+}
+
+/// Re-simulates every trace of a run on `jobs` threads, and compares all that is recorded:
+/// digests at each decision, events, the end, and the line of `results.jsonl`.
+///
+/// # Errors
+/// If a file can't be read, or a trace's episode isn't the one that was played.
+pub fn verify_run(
+    folder: &RunFolder,
+    jobs: usize,
+    progress: &(dyn Fn(usize) + Sync),
+) -> Result<Verdict> {
+    let paths = folder.traces()?;
+    let (results, warnings) = read_results(&folder.results())?;
+    let next = AtomicUsize::new(0);
+    let verdict = Mutex::new(Ok(Verdict { warnings, ..Verdict::default() }));
+    let done = AtomicUsize::new(0);
+    std::thread::scope(|scope| {
+        for _ in 0..jobs.clamp(1, paths.len().max(1)) {
+            scope.spawn(|| {
+                while let Some(path) = paths.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let one = verify_file(folder, path, &results);
+                    let mut verdict = verdict.lock().unwrap_or_else(|e| e.into_inner());
+                    match (one, verdict.as_mut()) {
+                        (Ok(one), Ok(all)) => all.add(one),
+                        (Err(error), Ok(_)) => *verdict = Err(error),
+                        (_, Err(_)) => return,
+                    }
+                    drop(verdict);
+                    progress(done.fetch_add(1, Ordering::Relaxed) + 1);
+                }
+            });
+        }
+    });
+    let mut verdict = verdict.into_inner().unwrap_or_else(|e| e.into_inner())?;
+    verdict.add_missing(folder, &results);
+    verdict.mismatches.sort_by(|a, b| a.path.cmp(&b.path));
+    Ok(verdict)
+}
+
+/// What verifying one trace found.
+struct One {
+    decisions: usize,
+    mismatch: Option<Mismatch>,
+    warnings: Vec<Warning>,
+}
+
+impl Verdict {
+    fn add(&mut self, one: One) {
+        self.decisions += one.decisions;
+        self.agreeing += usize::from(one.mismatch.is_none());
+        self.mismatches.extend(one.mismatch);
+        self.warnings.extend(one.warnings);
+    }
+
+    /// A result without its trace can't be checked, which is no agreement.
+    fn add_missing(&mut self, folder: &RunFolder, results: &[RunResult]) {
+        for result in results.iter().filter(|r| r.summary().is_some()) {
+            let path = folder.trace(&result.key);
+            if !path.exists() {
+                let problem = "results.jsonl has this run, but its trace is missing".to_owned();
+                self.mismatches.push(Mismatch { path, frame: 0, agent: None, problem });
+            }
+        }
+    }
+}
+
+fn verify_file(folder: &RunFolder, path: &Path, results: &[RunResult]) -> Result<One> {
+    let (trace, warnings) = trace::read(path)?;
+    let key = trace.header.key();
+    let episode = folder.episode(&key)?;
+    let mut world = world_of(&trace.header, &episode)?;
+    let mut mismatch = verify(&trace, &mut world, path)?;
+    if mismatch.is_none() {
+        let recorded = results.iter().find(|r| r.key == key).filter(|r| r.summary().is_some());
+        let frame = trace.end().map_or(0, |e| e.frame);
+        if recorded.is_some_and(|r| Some(r) != tally(&trace).as_ref()) {
+            let problem = "results.jsonl says something else of this run".to_owned();
+            mismatch = Some(Mismatch { path: path.to_owned(), frame, agent: None, problem });
+        }
+    }
+    Ok(One { decisions: trace.decisions().count(), mismatch, warnings })
+}
+
+/// Plays the actions of a trace in its world, and finds the first record that comes out different.
+///
+/// # Errors
+/// None of its own; those of a broken world.
+pub fn verify(trace: &Trace, world: &mut World, path: &Path) -> Result<Option<Mismatch>> {
+    let mut decisions: VecDeque<&Decision> = trace.decisions().collect();
+    let mut recorded = trace.records.iter();
+    let mut found = None;
+    let mut last: Option<Decision> = None;
+    let mut decide = |world: &World, waiting: &[AgentId]| {
+        let mut choices = Vec::new();
+        let frame = world.state().frame;
+        while let Some(d) = decisions.front() {
+            let is_now = d.frame == frame
+                && waiting.contains(&d.agent)
+                && !choices.iter().any(|c: &Choice| c.agent == d.agent);
+            if !is_now {
+                break;
+            }
+            let Decision { agent, action, ref thought, .. } = **d;
+            choices.push(Choice { agent, action, thought: thought.clone() });
+            decisions.pop_front();
+        }
+        // Everybody who waited in this frame has decided, if the trace goes so far.
+        Ok((!choices.is_empty()).then_some(choices))
+    };
+    let flow = crank(world, &mut decide, &mut |record| {
+        let said = recorded.next();
+        if said == Some(record) {
+            if let Record::Decision(decision) = record {
+                last = Some(decision.clone());
+            }
+            return Ok(());
+        }
+        found = Some(mismatch(path, said, record, last.as_ref()));
+        Err(EvalError::Difference(String::new()))
+    });
+    match flow {
+        Err(EvalError::Difference(_)) => Ok(found),
+        Err(error) => Err(error),
+        Ok(flow) => Ok(leftover(path, flow, recorded.next(), world)),
+    }
+}
+
+/// What the trace says that never came out.
+fn leftover(path: &Path, flow: Flow, next: Option<&Record>, world: &World) -> Option<Mismatch> {
+    let frame = world.state().frame;
+    let (agent, problem) = match (flow, next) {
+        (_, Some(Record::Decision(d))) => {
+            let waits =
+                if flow == Flow::Ended { "the episode is over" } else { "somebody else waits" };
+            (Some(d.agent), format!("the trace has a decision at frame {}, but {waits}", d.frame))
+        }
+        (_, Some(other)) => (None, format!("the trace goes on with {}", other.to_line())),
+        // The trace stops early: a warning says so already, and all that it says is true.
+        (_, None) => return None,
+    };
+    Some(Mismatch { path: path.to_owned(), frame, agent, problem })
+}
+
+fn mismatch(
+    path: &Path,
+    said: Option<&Record>,
+    comes: &Record,
+    last: Option<&Decision>,
+) -> Mismatch {
+    let place = |record: &Record| match record {
+        Record::Decision(d) => (d.frame, Some(d.agent)),
+        Record::Event(e) => (e.event.frame, None),
+        Record::End(e) => (e.frame, None),
+    };
+    let (frame, agent) = place(comes);
+    let problem = match (said, comes) {
+        (Some(Record::Decision(a)), Record::Decision(b)) if a.digest != b.digest => {
+            format!(
+                "the state's digest is {} in the trace, {} when played again",
+                a.digest, b.digest
+            )
+        }
+        (Some(said), comes) => {
+            format!("the trace says {}, played again it is {}", said.to_line(), comes.to_line())
+        }
+        (None, comes) => format!("the trace ends, played again there is {}", comes.to_line()),
+    };
+    // A changed action shows in the state that it leads to.
+    let before = last.map_or(String::new(), |d| {
+        let action = serde_json::to_string(&d.action).expect("an action has string keys");
+        format!("; the decision before it is the {}'s {action} at frame {}", d.agent, d.frame)
+    });
+    let problem = problem + &before;
+    Mismatch { path: path.to_owned(), frame, agent, problem }
+}

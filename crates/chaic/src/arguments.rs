@@ -1,0 +1,231 @@
+//! What can be said on the command line.
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+use chaic_episodes::Split;
+use chaic_eval::metrics::FormulaSet;
+use chaic_eval::report::Format;
+use chaic_protocol::{AgentId, TaskId};
+use clap::{Args, Parser, Subcommand};
+
+/// Simulator and benchmark for constrained human-AI cooperation.
+#[derive(Debug, Parser)]
+#[command(name = "chaic", version, arg_required_else_help = true)]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Play a benchmark; without options a small, complete one of about two minutes.
+    Eval(EvalArguments),
+    /// Print the scores of a run, computed anew from its results or traces.
+    Report(ReportArguments),
+    /// Play the recorded actions of a run again and compare; exit code 1 on any difference.
+    Verify(VerifyArguments),
+    /// Make a video of a recorded episode.
+    Replay(ReplayArguments),
+    /// Make pictures of what somebody sees at some frame: RGB, depth, instance ids.
+    Render(RenderArguments),
+    /// List, show, make and check episodes.
+    #[command(subcommand)]
+    Episodes(EpisodesCommand),
+}
+
+/// A comma-separated list, or `all`.
+#[derive(Clone, Debug)]
+pub struct Tasks(pub Vec<TaskId>);
+
+fn tasks(text: &str) -> Result<Tasks, String> {
+    if text == "all" {
+        return Ok(Tasks(TaskId::all().collect()));
+    }
+    let parsed: Result<Vec<TaskId>, _> = text.split(',').map(str::parse).collect();
+    parsed.map(Tasks).map_err(|e| e.to_string())
+}
+
+fn agent(text: &str) -> Result<AgentId, String> {
+    let all = [AgentId::PARTNER, AgentId::HELPER, AgentId::CHILD];
+    let found = all.into_iter().find(|a| a.word() == text);
+    found.ok_or_else(|| format!("no agent `{text}`; write partner, helper or child"))
+}
+
+fn seed_range(text: &str) -> Result<Range<u64>, String> {
+    let parsed = text.split_once("..").and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
+    let range = parsed.map(|(a, b): (u64, u64)| a..b).filter(|r| !r.is_empty());
+    range.ok_or_else(|| format!("no range `{text}`; write A..B with A < B, for example 0..10"))
+}
+
+/// `chaic eval`.
+#[derive(Args, Debug)]
+pub struct EvalArguments {
+    /// Tasks, separated by commas, or `all`.
+    #[arg(long, value_name = "NAMES", value_parser = tasks)]
+    pub task: Option<Tasks>,
+    /// Helpers, separated by commas: none, random, rhp, oracle, follow.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub helper: Option<Vec<String>>,
+    /// Episodes: test, train or gen:A..B.
+    #[arg(long)]
+    pub split: Option<Split>,
+    /// Play the episode files (*.json) of this folder instead of a split.
+    #[arg(long, value_name = "DIR")]
+    pub episodes_dir: Option<PathBuf>,
+    /// Only the first N episodes of each task.
+    #[arg(long, value_name = "N")]
+    pub episodes: Option<u32>,
+    /// Play each episode with N seeds; the first is the episode's own.
+    #[arg(long, value_name = "N")]
+    pub seeds: Option<u32>,
+    /// Side of all images in pixels, instead of what each agent asks for (512).
+    #[arg(long, value_name = "PIXELS")]
+    pub size: Option<u32>,
+    /// Episodes at a time; changes no result. Usual: one for each core.
+    #[arg(long, value_name = "N")]
+    pub jobs: Option<usize>,
+    /// The run's folder. Usual: the next free `runs/NAME`.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Go on with the run in --out; what it plays is recorded there.
+    #[arg(long, requires = "out")]
+    pub resume: bool,
+}
+
+/// `chaic report`.
+#[derive(Args, Debug)]
+pub struct ReportArguments {
+    /// The run's folder.
+    pub run: PathBuf,
+    /// table, md, csv or json.
+    #[arg(long, default_value = "table")]
+    pub format: Format,
+    /// paper, or original for the formulas of the original's scripts.
+    #[arg(long, default_value = "paper")]
+    pub formulas: FormulaSet,
+    /// Score the traces themselves, not the results noted while playing.
+    #[arg(long)]
+    pub from_traces: bool,
+    /// Write the figure with error bars to this .svg or .png file instead of printing.
+    #[arg(long, value_name = "FILE")]
+    pub figure: Option<PathBuf>,
+}
+
+/// `chaic verify`.
+#[derive(Args, Debug)]
+pub struct VerifyArguments {
+    /// The run's folder.
+    pub run: PathBuf,
+    /// Traces at a time. Usual: one for each core.
+    #[arg(long, value_name = "N")]
+    pub jobs: Option<usize>,
+}
+
+/// `chaic replay`.
+#[derive(Args, Debug)]
+pub struct ReplayArguments {
+    /// The run's folder.
+    pub run: PathBuf,
+    /// The episode's id, for example obstacle/test/00.
+    pub episode: String,
+    /// The video: .mp4, or .gif.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// With which helper. Usual: rhp if the run has it.
+    #[arg(long, value_name = "NAME")]
+    pub helper: Option<String>,
+    /// With which of the run's seeds. Usual: the lowest.
+    #[arg(long, value_name = "K")]
+    pub seed: Option<u32>,
+    /// Pictures a second.
+    #[arg(long, default_value_t = 30)]
+    pub fps: u32,
+    /// Draw every N-th frame; 30 frames are a second of walking.
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
+    pub every: u32,
+}
+
+/// `chaic render`.
+#[derive(Args, Debug)]
+pub struct RenderArguments {
+    /// The episode's id, for example obstacle/test/00, or an episode file.
+    pub episode: String,
+    /// Whose eyes: partner, helper or child.
+    #[arg(long, default_value = "helper", value_parser = agent)]
+    pub agent: AgentId,
+    /// The frame; the first one from it on in which somebody decides is shown.
+    #[arg(long, default_value_t = 0)]
+    pub frame: u32,
+    /// Folder for rgb.png, depth.png (16 bit, millimetres), ids.png (16 bit) and ids.json.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Side of the images, pixels.
+    #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(16..=4096))]
+    pub size: u32,
+    /// The helper that takes part.
+    #[arg(long, default_value = "rhp")]
+    pub helper: String,
+    /// The seed.
+    #[arg(long, default_value_t = 0)]
+    pub seed: u32,
+}
+
+/// `chaic episodes`.
+#[derive(Debug, Subcommand)]
+pub enum EpisodesCommand {
+    /// List the episodes of a split.
+    List {
+        /// test, train or gen:A..B.
+        #[arg(long, default_value = "test")]
+        split: Split,
+        /// Tasks, separated by commas, or `all`.
+        #[arg(long, value_name = "NAMES", value_parser = tasks, default_value = "all")]
+        task: Tasks,
+        /// Print JSON.
+        #[arg(long, default_value = "table")]
+        format: ListFormat,
+    },
+    /// Draw the map of an episode's beginning.
+    Show {
+        /// The episode's id, for example obstacle/test/00, or an episode file.
+        episode: String,
+        /// The picture, .png.
+        #[arg(long, value_name = "FILE")]
+        out: PathBuf,
+        /// Its width, pixels.
+        #[arg(long, default_value_t = 1200, value_parser = clap::value_parser!(u32).range(64..=8192))]
+        width: u32,
+    },
+    /// Make episodes and write them as files.
+    Generate {
+        /// The task.
+        #[arg(long)]
+        task: TaskId,
+        /// Their seeds, A..B.
+        #[arg(long, value_name = "A..B", value_parser = seed_range)]
+        seeds: Range<u64>,
+        /// The folder for the files.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
+    /// Check episode files; exit code 1 if one can't be played.
+    Validate {
+        /// The files.
+        #[arg(required = true)]
+        files: Vec<PathBuf>,
+    },
+    /// Print the JSON schema of an episode file.
+    Schema,
+}
+
+/// How a list is printed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum ListFormat {
+    /// A table.
+    Table,
+    /// JSON.
+    Json,
+}

@@ -1,0 +1,103 @@
+//! Progress bars. Where the standard error is no terminal, nothing is drawn.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use chaic_eval::metrics::{Ending, RunKey};
+use chaic_eval::run::{Extent, Finished, Progress};
+use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressStyle};
+
+use crate::output::complain;
+
+/// A bar that counts something.
+pub fn plain(total: u64, what: &str) -> ProgressBar {
+    let style = ProgressStyle::with_template(&format!("{{bar:40}} {{pos}}/{{len}} {what} {{eta}}"));
+    ProgressBar::new(total).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
+
+/// The bars of a run: one for the whole, one for each worker.
+pub struct RunBars {
+    all: MultiProgress,
+    total: ProgressBar,
+    workers: BTreeMap<usize, (ProgressBar, RunKey)>,
+}
+
+impl RunBars {
+    /// For a run that has come so far.
+    pub fn new(extent: Extent) -> RunBars {
+        let all = MultiProgress::new();
+        let total = ProgressBar::new(extent.total as u64);
+        let style = ProgressStyle::with_template("{bar:40} {pos}/{len} episodes  {elapsed}  {msg}");
+        total.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        let total = all.add(total);
+        total.set_position((extent.finished - extent.errors) as u64);
+        total.set_message("time left: known after the first episode");
+        total.enable_steady_tick(Duration::from_millis(500));
+        RunBars { all, total, workers: BTreeMap::new() }
+    }
+
+    /// Shows what has happened.
+    pub fn show(&mut self, progress: &Progress) {
+        match progress {
+            Progress::Began { worker, key, horizon } => {
+                let bar = ProgressBar::new(u64::from(*horizon));
+                let style = ProgressStyle::with_template("{bar:20} {pos:>4}/{len} frames  {msg}");
+                bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+                let bar = self.all.insert_before(&self.total, bar);
+                bar.set_message(format!("{} with {}", key.episode, key.helper));
+                if let Some((old, _)) = self.workers.insert(*worker, (bar, key.clone())) {
+                    old.finish_and_clear();
+                }
+            }
+            Progress::At { worker, frame } => {
+                if let Some((bar, _)) = self.workers.get(worker) {
+                    bar.set_position(u64::from(*frame));
+                }
+            }
+            Progress::Finished(finished) => {
+                if let Some((bar, _)) = self.workers.remove(&finished.worker) {
+                    bar.finish_and_clear();
+                }
+                if let Ending::Error { message } = &finished.result.ending {
+                    let key = &finished.result.key;
+                    let line = format!("{} with {}: {message}", key.episode, key.helper);
+                    self.all.suspend(|| complain(&line));
+                }
+                self.total.inc(1);
+                self.log(finished);
+                if let Some(left) = finished.left {
+                    // Whole seconds: the estimate isn't any better.
+                    let left = HumanDuration(Duration::from_secs(left.as_secs()));
+                    self.total.set_message(format!("about {left} left"));
+                }
+            }
+        }
+    }
+
+    /// Where there are no bars to see, in a log for example, a line now and then.
+    fn log(&self, finished: &Finished) {
+        /// So many lines at most, about.
+        const LINES: u64 = 100;
+        let (done, total) = (self.total.position(), self.total.length().unwrap_or(0));
+        if !self.total.is_hidden() || (!done.is_multiple_of(total / LINES + 1) && done != total) {
+            return;
+        }
+        let key = &finished.result.key;
+        let rate = finished
+            .result
+            .summary()
+            .map_or("broke down".to_owned(), |s| format!("{:.2}", s.rate()));
+        let left = finished.left.map_or(String::new(), |left| {
+            format!(", about {} left", HumanDuration(Duration::from_secs(left.as_secs())))
+        });
+        complain(&format!("{done}/{total} {} with {}: {rate}{left}", key.episode, key.helper));
+    }
+
+    /// Takes the bars away.
+    pub fn clear(&self) {
+        for (bar, _) in self.workers.values() {
+            bar.finish_and_clear();
+        }
+        self.total.finish_and_clear();
+    }
+}

@@ -1,0 +1,124 @@
+//! `chaic episodes`.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result};
+use chaic_episodes::{Episode, EpisodeError, Split, episodes, find_episode, json_schema};
+use chaic_eval::still;
+use chaic_protocol::TaskId;
+use comfy_table::{ContentArrangement, Table, presets};
+use serde_json::json;
+
+use crate::Ended;
+use crate::arguments::{EpisodesCommand, ListFormat};
+use crate::output::{complain, say};
+
+/// Lists, shows, makes or checks episodes.
+pub fn run(command: &EpisodesCommand) -> Result<Ended> {
+    match command {
+        EpisodesCommand::List { split, task, format } => list(split, &task.0, *format),
+        EpisodesCommand::Show { episode, out, width } => show(episode, out, *width),
+        EpisodesCommand::Generate { task, seeds, out } => generate(*task, seeds.clone(), out),
+        EpisodesCommand::Validate { files } => validate(files),
+        EpisodesCommand::Schema => {
+            say(&(serde_json::to_string_pretty(&json_schema())? + "\n"))?;
+            Ok(Ended::Well)
+        }
+    }
+}
+
+fn list(split: &Split, tasks: &[TaskId], format: ListFormat) -> Result<Ended> {
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_FULL_CONDENSED);
+    table.set_content_arrangement(ContentArrangement::Disabled);
+    table.set_header(["Episode", "Partner", "Goal", "Things", "Frames", "Seed"]);
+    let mut rows = Vec::new();
+    for task in tasks {
+        for episode in episodes(split, *task) {
+            let episode = episode?;
+            let setup = episode.setup();
+            let partner = setup.people[0].persona;
+            let goal: Vec<String> =
+                setup.goal.targets.iter().map(|(c, n)| format!("{n} {c}")).collect();
+            table.add_row([
+                episode.id().to_owned(),
+                format!("{partner:?}").to_lowercase(),
+                goal.join(", "),
+                setup.things.len().to_string(),
+                setup.horizon.to_string(),
+                episode.seed().to_string(),
+            ]);
+            rows.push(json!({
+                "id": episode.id(),
+                "task": task,
+                "split": episode.split(),
+                "partner": partner,
+                "goal": setup.goal,
+                "things": setup.things.len(),
+                "horizon": setup.horizon,
+                "seed": episode.seed(),
+                "generator": episode.generator(),
+            }));
+        }
+    }
+    match format {
+        ListFormat::Table => say(&(table.trim_fmt() + "\n"))?,
+        ListFormat::Json => say(&(serde_json::to_string_pretty(&rows)? + "\n"))?,
+    }
+    Ok(Ended::Well)
+}
+
+fn show(argument: &str, out: &Path, width_px: u32) -> Result<Ended> {
+    let episode = super::episode(argument)?;
+    still::write_plan(&episode, width_px, out)?;
+    say(&format!("{}: the map of {}\n", out.display(), episode.id()))?;
+    Ok(Ended::Well)
+}
+
+fn generate(task: TaskId, seeds: Range<u64>, out: &Path) -> Result<Ended> {
+    std::fs::create_dir_all(out)
+        .with_context(|| format!("can't make the folder {}", out.display()))?;
+    let n = seeds.end - seeds.start;
+    for seed in seeds {
+        let episode = find_episode(&format!("{task}/gen/{seed}"))?;
+        let path = out.join(format!("{task}-{seed}.json"));
+        let written = std::fs::write(&path, episode.to_json());
+        written.with_context(|| format!("can't write {}", path.display()))?;
+    }
+    say(&format!("{}: {n} episodes of {task}\n", out.display()))?;
+    Ok(Ended::Well)
+}
+
+fn validate(files: &[PathBuf]) -> Result<Ended> {
+    let mut n_bad = 0;
+    for path in files {
+        let name = path.display().to_string();
+        let parsed = match super::read_episode_file(path) {
+            Ok(bytes) => Episode::parse(&bytes, &name).map_err(|e| lines_of(&e)),
+            Err(error) => Err(vec![format!("{error:#}")]),
+        };
+        match parsed {
+            Ok(episode) => say(&format!("{name}: fine ({})\n", episode.id()))?,
+            Err(lines) => {
+                n_bad += 1;
+                lines.iter().for_each(|line| complain(line));
+            }
+        }
+    }
+    if n_bad > 0 {
+        complain(&format!("{n_bad} of {} files can't be played", files.len()));
+        return Ok(Ended::WithFindings);
+    }
+    Ok(Ended::Well)
+}
+
+/// A line for each problem: file, field, what is wrong and what was expected.
+fn lines_of(error: &EpisodeError) -> Vec<String> {
+    match error {
+        EpisodeError::Invalid { source_name, problems } => {
+            problems.iter().map(|p| format!("{source_name}: {p}")).collect()
+        }
+        other => vec![other.to_string()],
+    }
+}

@@ -1,0 +1,127 @@
+//! `chaic eval`.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{Context as _, Result};
+use chaic_eval::helpers::BuiltIn;
+use chaic_eval::metrics::FormulaSet;
+use chaic_eval::report::{Format, Report, write_figure, write_files};
+use chaic_eval::run::{Access, Given, Run};
+
+use super::{bars::RunBars, jobs};
+use crate::Ended;
+use crate::arguments::EvalArguments;
+use crate::interrupt;
+use crate::output::{complain, say};
+
+/// Episodes of each task in the small benchmark: with all helpers about two minutes on two cores.
+const QUICK_EPISODES: u32 = 2;
+
+/// Plays a benchmark.
+pub fn run(arguments: &EvalArguments) -> Result<Ended> {
+    let (given, name) = given(arguments);
+    let path = arguments.out.clone().map_or_else(|| free_folder(name), Ok)?;
+    let access = if arguments.resume { Access::Resume } else { Access::Begin };
+    let (mut run, warnings) = Run::open(&path, access, &given, &BuiltIn)?;
+    for warning in warnings {
+        complain(&format!("warning: {warning}; that episode is played again"));
+    }
+    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
+    keep_workers_quiet();
+    let extent = run.extent();
+    let (tasks, helpers) = (run.options().tasks.len(), run.options().helpers.join(", "));
+    complain(&format!(
+        "{}: {} episode runs, {tasks} tasks, helpers {helpers}{}",
+        path.display(),
+        extent.total,
+        match extent.finished - extent.errors {
+            0 => String::new(),
+            n => format!("; {n} are finished already"),
+        }
+    ));
+    let jobs = jobs(arguments.jobs);
+    // Images of one moment are drawn in parallel too; more threads than jobs would only wait.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build_global();
+    pool.context("can't start threads")?;
+    let began = Instant::now();
+    let mut bars = RunBars::new(extent);
+    let played = run.play(jobs, &BuiltIn, stop, &mut |progress| bars.show(progress));
+    bars.clear();
+    let is_whole = played.with_context(|| how_to_resume(&path))?;
+    if !is_whole {
+        let extent = run.extent();
+        let done = extent.finished - extent.errors;
+        complain(&format!("stopped after {done} of {} episode runs", extent.total));
+        complain(&how_to_resume(&path));
+        return Ok(Ended::Interrupted);
+    }
+    finish(&run, began)
+}
+
+fn finish(run: &Run, began: Instant) -> Result<Ended> {
+    let (folder, options) = (run.folder(), run.options());
+    let report = Report { options, results: run.results(), formulas: FormulaSet::Paper };
+    write_files(folder, &report)?;
+    let scores = report.scores();
+    for name in ["figure.svg", "figure.png"] {
+        write_figure(&scores, &folder.join(name))?;
+    }
+    let path = folder.path().display();
+    let secs = began.elapsed().as_secs();
+    let some = run.results().iter().find(|r| r.key.helper == "rhp").or(run.results().first());
+    let mut text = report.text(Format::Table);
+    text += &format!("\nPlayed in {} min {:02} s.\n", secs / 60, secs % 60);
+    text += &format!("Report:  {path}/report.md, {path}/figure.svg\n");
+    if let Some(some) = some {
+        let (episode, helper) = (&some.key.episode, &some.key.helper);
+        text +=
+            &format!("Replay:  chaic replay {path} {episode} --helper {helper} --out replay.mp4\n");
+    }
+    text += &format!("Verify:  chaic verify {path}\n");
+    say(&text)?;
+    Ok(if run.extent().errors > 0 { Ended::WithFindings } else { Ended::Well })
+}
+
+/// What is asked for, and the name of a folder for it. Nothing said at all is the small benchmark.
+fn given(arguments: &EvalArguments) -> (Given, &'static str) {
+    let EvalArguments { task, helper, split, episodes_dir, episodes, seeds, size, .. } = arguments;
+    let given = Given {
+        tasks: task.as_ref().map(|t| t.0.clone()),
+        helpers: helper.clone(),
+        split: split.clone(),
+        episodes: *episodes,
+        seeds: *seeds,
+        size: *size,
+        episodes_dir: episodes_dir.clone(),
+    };
+    if given == Given::default() && !arguments.resume {
+        return (Given { episodes: Some(QUICK_EPISODES), ..given }, "quick");
+    }
+    (given, "eval")
+}
+
+/// The first of `runs/NAME`, `runs/NAME-2`, ... that isn't there.
+fn free_folder(name: &str) -> Result<PathBuf> {
+    /// Whoever has more should tidy up.
+    const MAX_RUNS: u32 = 10_000;
+    let numbered = |k: u32| if k == 1 { name.to_owned() } else { format!("{name}-{k}") };
+    let mut candidates = (1..MAX_RUNS).map(|k| Path::new("runs").join(numbered(k)));
+    candidates.find(|p| !p.exists()).context("every runs/... folder is taken; give one with --out")
+}
+
+fn how_to_resume(path: &Path) -> String {
+    format!("go on with: chaic eval --resume --out {}", path.display())
+}
+
+/// What an agent says when it breaks down is shown and noted by the run; the usual message would
+/// come in between the bars.
+fn keep_workers_quiet() {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        let is_worker = |name: &str| name.starts_with("chaic-worker");
+        if !std::thread::current().name().is_some_and(is_worker) {
+            usual(info);
+        }
+    }));
+}

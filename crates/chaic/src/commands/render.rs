@@ -1,0 +1,21 @@
+//! `chaic render`.
+
+use anyhow::Result;
+use chaic_eval::helpers::BuiltIn;
+use chaic_eval::still::{self, Still};
+
+use crate::Ended;
+use crate::arguments::RenderArguments;
+use crate::output::say;
+
+/// Makes pictures of one moment.
+pub fn run(arguments: &RenderArguments) -> Result<Ended> {
+    let RenderArguments { episode, agent, frame, out, size, helper, seed } = arguments;
+    let episode = super::episode(episode)?;
+    let (agent, frame, size, seed) = (*agent, *frame, *size, *seed);
+    let still = Still { episode: &episode, helper, seed, agent, frame, size };
+    let shown = still::write(&still, &BuiltIn, out)?;
+    let id = episode.id();
+    say(&format!("{}: what the {agent} sees of {id} at frame {shown}\n", out.display()))?;
+    Ok(Ended::Well)
+}

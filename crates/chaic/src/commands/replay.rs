@@ -1,0 +1,37 @@
+//! `chaic replay`.
+
+use anyhow::Result;
+use chaic_eval::replay::{self, ReplayOptions};
+use chaic_eval::run::RunFolder;
+use chaic_eval::trace;
+
+use super::bars;
+use crate::Ended;
+use crate::arguments::ReplayArguments;
+use crate::output::{complain, say};
+
+/// Makes a video of a recorded episode.
+pub fn run(arguments: &ReplayArguments) -> Result<Ended> {
+    let ReplayArguments { run, episode, out, helper, seed, fps, every } = arguments;
+    let (folder, _) = RunFolder::read(run)?;
+    let path = replay::find_trace(&folder, episode, helper.as_deref(), *seed)?;
+    let (trace, warnings) = trace::read(&path)?;
+    for warning in warnings {
+        complain(&format!("warning: {warning}"));
+    }
+    let key = trace.header.key();
+    let episode = folder.episode(&key)?;
+    let bar = bars::plain(trace.end().map_or(0, |e| u64::from(e.frame)), "frames");
+    let options = ReplayOptions { fps: *fps, every: *every };
+    let mut progress = |frame| bar.set_position(u64::from(frame));
+    let pictures = replay::write(&trace, &episode, options, out, &mut progress);
+    bar.finish_and_clear();
+    let pictures = pictures?;
+    say(&format!(
+        "{}: {pictures} pictures of {} with {}\n",
+        out.display(),
+        key.episode,
+        key.helper
+    ))?;
+    Ok(Ended::Well)
+}

@@ -1,0 +1,37 @@
+//! `chaic verify`.
+
+use anyhow::Result;
+use chaic_eval::run::RunFolder;
+use chaic_eval::verify::verify_run;
+
+use super::{bars, jobs};
+use crate::Ended;
+use crate::arguments::VerifyArguments;
+use crate::output::{complain, say};
+
+/// Plays the traces of a run again and compares.
+pub fn run(arguments: &VerifyArguments) -> Result<Ended> {
+    let (folder, _) = RunFolder::read(&arguments.run)?;
+    let bar = bars::plain(folder.traces()?.len() as u64, "traces");
+    let progress = |done: usize| bar.set_position(done as u64);
+    let verdict = verify_run(&folder, jobs(arguments.jobs), &progress);
+    bar.finish_and_clear();
+    let verdict = verdict?;
+    for warning in &verdict.warnings {
+        complain(&format!("warning: {warning}"));
+    }
+    for mismatch in &verdict.mismatches {
+        say(&format!("DIFFERS {mismatch}\n"))?;
+    }
+    let (traces, decisions) = (verdict.agreeing, verdict.decisions);
+    if !verdict.mismatches.is_empty() {
+        let n = verdict.mismatches.len();
+        say(&format!("{n} of {} traces differ\n", n + traces))?;
+        return Ok(Ended::WithFindings);
+    }
+    if traces == 0 {
+        anyhow::bail!("{} has no trace to verify", arguments.run.display());
+    }
+    say(&format!("{traces} traces with {decisions} decisions agree in every digest\n"))?;
+    Ok(Ended::Well)
+}

@@ -1,0 +1,20 @@
+//! Writing to the terminal. Whoever reads may have gone (`chaic ... | head`): that's no error.
+
+use std::io::{self, Write as _};
+
+/// Writes text to the standard output.
+///
+/// # Errors
+/// If it can't be written, unless nobody reads any more.
+pub fn say(text: &str) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        other => other,
+    }
+}
+
+/// Writes a line to the standard error; where nobody hears it, nothing can be done.
+pub fn complain(line: &str) {
+    let _ = writeln!(io::stderr().lock(), "{line}");
+}

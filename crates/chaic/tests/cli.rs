@@ -1,0 +1,263 @@
+//! The command from outside: what the documentation promises works, errors are one clear line, and
+//! nothing panics.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use assert_cmd::cargo::cargo_bin;
+
+/// Frames of the episodes of these tests.
+const FRAMES: u32 = 80;
+
+fn chaic(dir: &Path, arguments: &[&str]) -> Output {
+    let out = command(dir, arguments).output().expect("the command starts");
+    let stderr = String::from_utf8_lossy(&out.stderr).into_owned();
+    assert!(!stderr.contains("panicked"), "{arguments:?}: {stderr}");
+    out
+}
+
+fn command(dir: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(cargo_bin!("chaic"));
+    command.current_dir(dir).args(arguments).stdin(Stdio::null());
+    command
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).expect("text is UTF-8")
+}
+
+/// What a command that must succeed prints.
+fn well(dir: &Path, arguments: &[&str]) -> String {
+    let out = chaic(dir, arguments);
+    assert!(out.status.success(), "{arguments:?}: {}", text(&out.stderr));
+    text(&out.stdout)
+}
+
+/// What a command that must fail complains of.
+fn ill(dir: &Path, arguments: &[&str]) -> String {
+    let out = chaic(dir, arguments);
+    assert!(!out.status.success(), "{arguments:?} went well");
+    text(&out.stderr) + &text(&out.stdout)
+}
+
+/// A folder with short episodes in `short/`.
+fn workshop() -> tempfile::TempDir {
+    let dir = tempfile::tempdir().expect("there is room");
+    for task in ["no_constraint", "moving_house"] {
+        well(
+            dir.path(),
+            &["episodes", "generate", "--task", task, "--seeds", "0..1", "--out", "short"],
+        );
+    }
+    for entry in fs::read_dir(dir.path().join("short")).expect("it is there") {
+        let path = entry.expect("it is there").path();
+        let json = fs::read_to_string(&path).expect("it is text");
+        let begin = json.find("\"horizon\": ").expect("an episode has one") + 11;
+        let end = begin + json[begin..].find(',').expect("more follows");
+        let short = format!("{}{FRAMES}{}", &json[..begin], &json[end..]);
+        fs::write(&path, short).expect("there is room");
+    }
+    dir
+}
+
+const EVAL: [&str; 9] =
+    ["eval", "--episodes-dir", "short", "--helper", "none,rhp", "--size", "48", "--out", "run"];
+
+#[test]
+fn a_run_from_end_to_end() {
+    let dir = workshop();
+    let at = dir.path();
+    let printed = well(at, &EVAL);
+    for word in ["TR(EI)", "RHP", "Moving house", "chaic replay run", "run/report.md"] {
+        assert!(printed.contains(word), "{word}: {printed}");
+    }
+    for file in
+        ["run.json", "results.jsonl", "scores.json", "report.md", "figure.svg", "figure.png"]
+    {
+        assert!(at.join("run").join(file).exists(), "{file}");
+    }
+
+    let scores = fs::read_to_string(at.join("run/scores.json")).expect("it is text");
+    assert_eq!(well(at, &["report", "run", "--format", "json"]), scores);
+    assert_eq!(well(at, &["report", "run", "--format", "json", "--from-traces"]), scores);
+    let csv = well(at, &["report", "run", "--format", "csv", "--formulas", "original"]);
+    assert_eq!(csv.lines().count(), 5, "{csv}");
+    assert!(well(at, &["report", "run", "--format", "md"]).starts_with("# chaic run"));
+    well(at, &["report", "run", "--figure", "f.svg"]);
+    assert!(at.join("f.svg").exists());
+
+    // Another run on the folder is refused, the same one has nothing to do.
+    assert!(ill(at, &EVAL).contains("isn't empty"));
+    let again = well(at, &["eval", "--resume", "--out", "run"]);
+    assert!(again.contains("4 episode runs"), "{again}");
+    assert_eq!(fs::read_to_string(at.join("run/scores.json")).expect("it is text"), scores);
+    let other = ill(at, &["eval", "--resume", "--out", "run", "--helper", "rhp"]);
+    assert!(other.contains("--helper none,rhp, not rhp"), "{other}");
+
+    assert!(well(at, &["verify", "run", "--jobs", "2"]).contains("4 traces"));
+    let trace = at.join("run/traces/no_constraint/rhp/gen-0-s0.jsonl");
+    let whole = fs::read_to_string(&trace).expect("it is text");
+    fs::write(&trace, whole.replacen("\"turn_left\"", "\"turn_right\"", 1)).expect("there is room");
+    let out = chaic(at, &["verify", "run"]);
+    assert_eq!(out.status.code(), Some(1));
+    let found = text(&out.stdout);
+    assert!(
+        found.contains("gen-0-s0.jsonl: frame 0, helper") && found.contains("partner's"),
+        "{found}"
+    );
+    fs::write(&trace, &whole[..whole.len() - 5]).expect("there is room");
+    let out = chaic(at, &["verify", "run"]);
+    assert!(text(&out.stderr).contains("is cut off"), "{}", text(&out.stderr));
+    fs::write(&trace, whole).expect("there is room");
+
+    let replay = ["replay", "run", "no_constraint/gen/0", "--out", "r.gif", "--every", "40"];
+    assert!(well(at, &replay).contains("3 pictures of no_constraint/gen/0 with rhp"));
+    let unknown = ill(at, &["replay", "run", "obstacle/test/00", "--out", "r.gif"]);
+    assert!(unknown.contains("no trace of obstacle/test/00") && unknown.contains("for example"));
+}
+
+#[test]
+fn pictures_and_episodes() {
+    let dir = workshop();
+    let at = dir.path();
+    let file = "short/no_constraint-0.json";
+    let printed = well(
+        at,
+        &["render", file, "--agent", "partner", "--frame", "20", "--out", "p", "--size", "64"],
+    );
+    assert!(printed.contains("partner"), "{printed}");
+    for name in ["rgb.png", "depth.png", "ids.png", "ids.json"] {
+        assert!(at.join("p").join(name).exists(), "{name}");
+    }
+    let ids = fs::read_to_string(at.join("p/ids.json")).expect("it is text");
+    assert!(ids.contains("\"floor\""), "{ids}");
+    let child = ill(at, &["render", file, "--agent", "child", "--out", "c"]);
+    assert!(child.contains("has no child"), "{child}");
+
+    well(at, &["episodes", "show", "obstacle/test/00", "--out", "plan.png", "--width", "200"]);
+    assert!(at.join("plan.png").exists());
+    let list = well(at, &["episodes", "list", "--task", "obstacle"]);
+    assert!(list.contains("obstacle/test/11"), "{list}");
+    let json = well(at, &["episodes", "list", "--task", "obstacle,shopping", "--format", "json"]);
+    let json: serde_json::Value = serde_json::from_str(&json).expect("it is JSON");
+    assert_eq!(json.as_array().map(Vec::len), Some(24));
+    assert!(well(at, &["episodes", "schema"]).contains("chaic-episode"));
+
+    assert!(well(at, &["episodes", "validate", file]).contains("fine"));
+    let good = fs::read_to_string(at.join(file)).expect("it is text");
+    fs::write(
+        at.join("bad.json"),
+        good.replacen(&format!("\"horizon\": {FRAMES}"), "\"horizon\": 0", 1),
+    )
+    .expect("there is room");
+    fs::write(at.join("torn.json"), &good[..good.len() / 2]).expect("there is room");
+    let found = ill(at, &["episodes", "validate", file, "bad.json", "torn.json", "missing.json"]);
+    for words in ["bad.json: setup.horizon", "torn.json: ends too early", "missing.json", "3 of 4"]
+    {
+        assert!(found.contains(words), "{words}: {found}");
+    }
+}
+
+#[test]
+fn errors_are_clear() {
+    let dir = tempfile::tempdir().expect("there is room");
+    let at = dir.path();
+    for (arguments, words) in [
+        (&["eval", "--task", "lunch", "--out", "r"][..], "unknown task `lunch`"),
+        (&["eval", "--helper", "nobody", "--out", "r"], "unknown helper `nobody`"),
+        (&["eval", "--split", "gen:5..5", "--out", "r"], "no split `gen:5..5`"),
+        (&["eval", "--size", "5", "--out", "r"], "--size is 5"),
+        (&["eval", "--seeds", "0", "--out", "r"], "at least 1"),
+        (&["eval", "--episodes-dir", "nowhere", "--out", "r"], "nowhere"),
+        (&["report", "nowhere"], "no run.json"),
+        (&["verify", "nowhere"], "no run.json"),
+        (&["replay", "nowhere", "obstacle/test/00", "--out", "x.mp4"], "no run.json"),
+        (&["render", "obstacle/test/99", "--out", "x"], "obstacle/test/99"),
+        (&["episodes", "show", "nowhere.json", "--out", "x.png"], "nowhere.json"),
+        (&["episodes", "generate", "--task", "obstacle", "--seeds", "3..3", "--out", "x"], "A..B"),
+    ] {
+        let said = ill(at, arguments);
+        assert!(said.contains(words), "{arguments:?}: {said}");
+        assert!(said.lines().count() <= 8, "{said}");
+    }
+    assert_eq!(
+        fs::read_dir(at)
+            .expect("it is there")
+            .filter(|e| {
+                // A run that never began leaves at most its empty folder.
+                e.as_ref().is_ok_and(|e| e.path().join("run.json").exists())
+            })
+            .count(),
+        0
+    );
+}
+
+#[test]
+fn a_reader_that_leaves_is_no_error() {
+    let dir = tempfile::tempdir().expect("there is room");
+    let mut child = command(dir.path(), &["episodes", "schema"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the command starts");
+    drop(child.stdout.take());
+    let out = child.wait_with_output().expect("it ends");
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    assert_eq!(text(&out.stderr), "");
+}
+
+/// Waits until the run in `path` has something under way.
+#[cfg(unix)]
+fn until_under_way(path: &Path) {
+    use std::time::{Duration, Instant};
+    let began = Instant::now();
+    let is_under_way = || files(&path.join("traces")).iter().any(|p| p.ends_with(".partial"));
+    while !is_under_way() {
+        assert!(began.elapsed() < Duration::from_secs(60), "nothing begins");
+        std::thread::yield_now();
+    }
+}
+
+#[cfg(unix)]
+fn files(folder: &Path) -> Vec<String> {
+    let entries: Vec<PathBuf> =
+        fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.path()).collect();
+    entries
+        .into_iter()
+        .flat_map(|p| if p.is_dir() { files(&p) } else { vec![p.display().to_string()] })
+        .collect()
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_goes_on() {
+    let dir = workshop();
+    let at = dir.path();
+    // Longer than the moment between beginning and signal.
+    let long = ["eval", "--task", "no_constraint", "--episodes", "1", "--helper", "none,rhp"];
+    for (signal, code) in [("-INT", Some(130)), ("-KILL", None)] {
+        let out = format!("run{signal}");
+        let mut arguments = long.to_vec();
+        arguments.extend(["--jobs", "1", "--out", &out]);
+        let child = command(at, &arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the command starts");
+        until_under_way(&at.join(&out));
+        // While it runs, nobody else may.
+        let second = ill(at, &["eval", "--resume", "--out", &out]);
+        assert!(second.contains("in use by another"), "{second}");
+        let id = child.id().to_string();
+        let sent = Command::new("kill").args([signal, &id]).status().expect("there is a kill");
+        assert!(sent.success());
+        let ended = child.wait_with_output().expect("it ends");
+        assert_eq!(ended.status.code(), code);
+        if code.is_some() {
+            let said = text(&ended.stderr);
+            assert!(said.contains(&format!("chaic eval --resume --out {out}")), "{said}");
+        }
+        assert!(ill(at, &["report", &out]).contains("no finished episode"));
+    }
+}

@@ -2,10 +2,11 @@
 
 use std::f32::consts::PI;
 
+use chaic_protocol::briefing::Goal;
 use chaic_protocol::geom::Rect;
 use chaic_protocol::rng::Stream;
-use chaic_protocol::{ClassId, Vec2, Vec3};
-use chaic_world::{Floor, FloorMaterial, Thing};
+use chaic_protocol::{ClassId, TaskId, Vec2, Vec3};
+use chaic_world::{Floor, FloorMaterial, Person, Room, RoomKind, Setup, Thing};
 
 use crate::solid::{mm, mm3, plan_bounds, rect_distance};
 
@@ -15,6 +16,35 @@ const GROUND_M: f32 = 40.0;
 const TREE_CLEAR_M: f32 = 1.7;
 /// Places that are tried for one piece of scenery.
 const TRIES: usize = 24;
+
+/// What makes one outdoor episode differ from another.
+pub(crate) struct OutdoorParts {
+    pub(crate) floors: Vec<Floor>,
+    pub(crate) things: Vec<Thing>,
+    pub(crate) people: Vec<Person>,
+    pub(crate) goal: Goal,
+    /// Index of the goal place among the things.
+    pub(crate) goal_place: usize,
+}
+
+/// An episode under the open sky: one room without walls.
+pub(crate) fn setup(task: TaskId, seed: u64, bounds: Rect, parts: OutdoorParts) -> Setup {
+    Setup {
+        task,
+        seed,
+        horizon: task.info().horizon,
+        bounds,
+        ceiling_m: None,
+        rooms: vec![Room { kind: RoomKind::Outdoors, rect: bounds }],
+        walls: Vec::new(),
+        openings: Vec::new(),
+        floors: parts.floors,
+        things: parts.things,
+        people: parts.people,
+        goal: parts.goal,
+        goal_places: vec![Setup::entity(parts.goal_place)],
+    }
+}
 
 /// Things of an outdoor scene while they are being placed.
 pub(crate) struct Scenery {

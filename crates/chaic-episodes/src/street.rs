@@ -7,10 +7,10 @@ use chaic_protocol::capability::Persona;
 use chaic_protocol::geom::{Pose, Rect, xz};
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{ClassId, TaskId, Vec2, Vec3};
-use chaic_world::{Person, Room, RoomKind, Setup, Thing, top_surfaces};
+use chaic_world::{Person, Setup, Thing, top_surfaces};
 
 use crate::generate::{GenerateError, Seeds, first_valid};
-use crate::outdoors::{Scenery, ground};
+use crate::outdoors::{self, OutdoorParts, Scenery, ground};
 use crate::solid::{mm, mm3};
 
 /// Version of this generator; goes up with every change of what it makes.
@@ -83,21 +83,9 @@ fn setup(seeds: Seeds, attempt: u64) -> Result<Setup, &'static str> {
     let mut things = scenery.things;
     things.push(bicycle(&people[0]));
     stock(&mut things, &shelves, &mut stream("shopping/stock"));
-    Ok(Setup {
-        task: TaskId::Shopping,
-        seed: seeds.episode,
-        horizon: TaskId::Shopping.info().horizon,
-        bounds: BOUNDS,
-        ceiling_m: None,
-        rooms: vec![Room { kind: RoomKind::Outdoors, rect: BOUNDS }],
-        walls: Vec::new(),
-        openings: Vec::new(),
-        floors,
-        things,
-        people,
-        goal: goal(seeds.episode, &mut stream("shopping/goal")),
-        goal_places: vec![Setup::entity(hydrant)],
-    })
+    let goal = goal(seeds.episode, &mut stream("shopping/goal"));
+    let parts = OutdoorParts { floors, things, people, goal, goal_place: hydrant };
+    Ok(outdoors::setup(TaskId::Shopping, seeds.episode, BOUNDS, parts))
 }
 
 /// Tents with two shelves each; returns per shop which things its shelves are.

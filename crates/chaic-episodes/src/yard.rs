@@ -9,10 +9,10 @@ use chaic_protocol::catalogue::TargetSet;
 use chaic_protocol::geom::{Pose, Rect, xz};
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{ClassId, TaskId, Vec2, Vec3};
-use chaic_world::{Person, Room, RoomKind, Setup, Thing};
+use chaic_world::{Person, Setup, Thing};
 
 use crate::generate::{FIRST_BUNDLED_SEED, GenerateError, Seeds, first_valid};
-use crate::outdoors::{Scenery, ground, heading, is_clear};
+use crate::outdoors::{self, OutdoorParts, Scenery, ground, heading, is_clear};
 use crate::solid::{mm, plan_bounds};
 
 /// Version of this generator; goes up with every change of what it makes.
@@ -97,21 +97,9 @@ fn setup(seeds: Seeds, line_up: &[ClassId], attempt: u64) -> Result<Setup, &'sta
         }
     }
     targets.sort();
-    Ok(Setup {
-        task: TaskId::MovingHouse,
-        seed: seeds.episode,
-        horizon: TaskId::MovingHouse.info().horizon,
-        bounds: BOUNDS,
-        ceiling_m: None,
-        rooms: vec![Room { kind: RoomKind::Outdoors, rect: BOUNDS }],
-        walls: Vec::new(),
-        openings: Vec::new(),
-        floors,
-        things,
-        people,
-        goal: Goal { targets },
-        goal_places: vec![Setup::entity(truck)],
-    })
+    let goal = Goal { targets };
+    let parts = OutdoorParts { floors, things, people, goal, goal_place: truck };
+    Ok(outdoors::setup(TaskId::MovingHouse, seeds.episode, BOUNDS, parts))
 }
 
 /// The house, its neighbors and what grows around them.

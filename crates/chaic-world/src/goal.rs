@@ -57,7 +57,8 @@ impl World {
         if self.setup.task == TaskId::MovingHouse { f64::from(class.info().mass_kg) } else { 1.0 }
     }
 
-    pub(crate) fn is_complete(&self) -> bool {
+    /// Whether everything the goal asks for has been delivered.
+    pub fn is_complete(&self) -> bool {
         self.setup.goal.targets.iter().all(|(class, wanted)| self.n_delivered(*class) >= *wanted)
     }
 

@@ -2,7 +2,7 @@
 
 use chaic_protocol::briefing::Goal;
 use chaic_protocol::capability::{Capability, Persona};
-use chaic_protocol::geom::{Pose, Rect};
+use chaic_protocol::geom::{Pose, Rect, xz};
 use chaic_protocol::{AgentId, ClassId, EntityId, Frame, TaskId, Vec2, Vec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -372,5 +372,19 @@ impl Setup {
             }
         }
         Ok(())
+    }
+
+    /// Distance in plan from a point to the nearest opening, metres.
+    pub(crate) fn distance_to_opening(&self, p: Vec3) -> f32 {
+        let to_segment = |a: Vec2, b: Vec2| {
+            let (p, ab) = (xz(p), b - a);
+            let t = if ab.length_squared() > 0.0 {
+                ((p - a).dot(ab) / ab.length_squared()).clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
+            p.distance(a + ab * t)
+        };
+        self.openings.iter().map(|o| to_segment(o.a, o.b)).fold(f32::INFINITY, f32::min)
     }
 }

@@ -21,6 +21,8 @@ const MAX_TRIES: usize = 4;
 const MAX_STEPS: u32 = 14;
 /// Something that can't be got to is left alone for so long, frames.
 const UNREACHABLE_FRAMES: Frame = 250;
+/// Something that somebody else had in hand is left alone for so long, frames.
+const HELD_FOR_SURE_FRAMES: Frame = 60;
 /// Something that can't be done at all is left alone for so long, frames.
 const IMPOSSIBLE_FRAMES: Frame = 2000;
 
@@ -176,7 +178,11 @@ fn learn_failure(memory: &mut Memory, object: EntityId, reason: FailureReason) {
             }
         }
         FailureReason::Broke | FailureReason::OutOfPlay => memory.things.mark_gone(object),
-        FailureReason::HeldByOther => memory.things.mark_held(object, now),
+        FailureReason::HeldByOther => {
+            memory.things.mark_held(object, now);
+            // Whatever it looks like: the one who tried knows.
+            memory.things.ignore(object, now + HELD_FOR_SURE_FRAMES);
+        }
         FailureReason::Impossible => memory.things.ignore(object, now + IMPOSSIBLE_FRAMES),
         FailureReason::Blocked
         | FailureReason::TooFar

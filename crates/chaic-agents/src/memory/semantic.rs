@@ -193,7 +193,7 @@ impl SemanticMap {
     /// between their hands is held.
     pub fn see(&mut self, detections: &[Detection], people: &[Vec3], now: Frame) {
         for seen in detections.iter().filter(|d| d.entity.is_object()) {
-            let held = looks_held(seen, self.things.get(&seen.entity), people);
+            let held = looks_held(seen, self.things.get(&seen.entity), people, now);
             match self.things.get_mut(&seen.entity) {
                 Some(thing) => {
                     self.news += u32::from(!thing.is_present);
@@ -309,7 +309,7 @@ fn expected_pixels(class: ClassId, depth_m: f32, focal_px: f32) -> f32 {
 }
 
 /// Whether something is in the hands of one of the people in the image.
-fn looks_held(seen: &Detection, before: Option<&Thing>, people: &[Vec3]) -> bool {
+fn looks_held(seen: &Detection, before: Option<&Thing>, people: &[Vec3], now: Frame) -> bool {
     let near = |m: f32| people.iter().any(|p| horizontal_distance(*p, seen.position_in_world) < m);
     match seen.class.info().role {
         Role::Target | Role::Container | Role::Fragile => {
@@ -317,8 +317,11 @@ fn looks_held(seen: &Detection, before: Option<&Thing>, people: &[Vec3]) -> bool
             seen.bottom_m > 0.3
                 && near(0.6)
                 && before.is_none_or(|t| {
-                    // Lying untouched where it was seen before anybody came near, it is not held.
-                    !t.is_present || t.position_in_world.distance(seen.position_in_world) > 0.15
+                    // Lying untouched where it was seen before anybody came near, it is not held;
+                    // in the hand of somebody who stands still, it is.
+                    now < t.held_until
+                        || !t.is_present
+                        || t.position_in_world.distance(seen.position_in_world) > 0.15
                 })
         }
         Role::HeavyTarget => {
@@ -374,6 +377,9 @@ mod tests {
         let mut map = SemanticMap::default();
         look(&mut map, &toy, &[Vec3::new(0.0, 0.9, -2.9)]);
         assert!(!map.get(apple).expect("seen").is_available(toy.frame));
+        toy.frame += 1;
+        look(&mut map, &toy, &[Vec3::new(0.0, 0.9, -2.9)]);
+        assert!(!map.get(apple).expect("seen").is_available(toy.frame), "still in hand");
         toy.frame += 1;
         look(&mut map, &toy, &[Vec3::new(2.0, 0.9, -2.9)]);
         assert!(map.get(apple).expect("seen").is_available(toy.frame), "put down again");

@@ -98,7 +98,7 @@ impl End {
             frame: world.state().frame,
             done,
             total,
-            complete: done >= total,
+            complete: world.is_complete(),
             away_frames: world.state().child_away_frames,
             digest: Digest(world.digest()),
         }

@@ -1,0 +1,188 @@
+//! How each action is made of steps, and where luck and limits come in.
+//!
+//! There is one implementation of each action for everybody; who may be blocked, who is too
+//! short and who is too weak is in [`Capability`](chaic_protocol::capability::Capability).
+
+mod put;
+mod take;
+mod together;
+
+use chaic_protocol::action::{FailureReason, Hand};
+use chaic_protocol::catalogue::Role;
+use chaic_protocol::geom::{horizontal_distance, wrap_angle, xz};
+use chaic_protocol::{Action, AgentId, EntityId, Vec3};
+
+use crate::event::EventKind;
+use crate::state::{Activity, Phase, Place, Step};
+use crate::world::World;
+
+impl World {
+    /// Begins an action: checks what can be known at once and lays out the steps.
+    pub(crate) fn begin(&mut self, agent: AgentId, action: Action) {
+        let (queue, failing) = match self.steps_of(agent, action) {
+            Ok(queue) => (queue, None),
+            Err(reason) => (vec![Step::of(Phase::Stand, 1)], Some(reason)),
+        };
+        let mut queue = queue;
+        let step = queue.pop().expect("every action has at least one step");
+        self.person_mut(agent).in_stride &= action == Action::MoveForward;
+        let since = self.state.frame;
+        self.happened(EventKind::Began { agent, action });
+        self.person_mut(agent).activity = Some(Activity { action, since, step, queue, failing });
+    }
+
+    /// The first steps of an action, next one last; later ones are added by the judging steps.
+    fn steps_of(&self, agent: AgentId, action: Action) -> Result<Vec<Step>, FailureReason> {
+        let d = &self.rules.durations;
+        let person = self.person(agent);
+        match action {
+            Action::MoveForward => {
+                let latency = if person.in_stride { d.keep_walking } else { d.start_walking };
+                let walk = Phase::Walk { left_m: self.rules.stride_m, made_m: 0.0 };
+                Ok(vec![Step::of(walk, 0), Step::of(Phase::Stand, latency)])
+            }
+            Action::TurnLeft | Action::TurnRight => {
+                let sign = if action == Action::TurnLeft { 1.0 } else { -1.0 };
+                let to_yaw_rad = wrap_angle(person.pose.yaw_rad + sign * self.rules.turn_rad);
+                Ok(vec![Step::of(Phase::Turn { to_yaw_rad }, d.turn)])
+            }
+            Action::Wait { frames } => {
+                Ok(vec![Step::of(Phase::Stand, frames.clamp(1, self.setup.horizon))])
+            }
+            Action::PickUp { object, hand } => {
+                self.check_takeable(agent, object, hand)?;
+                let role = self.thing(object).0.class.info().role;
+                let heavy = role == Role::HeavyTarget;
+                if !heavy {
+                    self.check_near(agent, object)?;
+                }
+                let hand = if heavy {
+                    None
+                } else if self.vehicle(agent).is_some() {
+                    Some(Hand::Right)
+                } else {
+                    Some(hand)
+                };
+                let mut steps = vec![Step::of(Phase::JudgeTake { hand, object }, 0)];
+                if heavy {
+                    steps.push(Step::of(Phase::AwaitPartner { object, absent: 0 }, 0));
+                }
+                let docking = self.capability(agent).docking_frames;
+                if docking > 0 && self.vehicle(agent).is_some() {
+                    steps.push(Step::of(Phase::Dock, docking));
+                }
+                self.push_approach(agent, object, &mut steps);
+                Ok(steps)
+            }
+            Action::RemoveObstacle { obstacle, hand } => {
+                self.check_takeable(agent, obstacle, hand)?;
+                if self.thing(obstacle).0.class.info().role != Role::Obstacle {
+                    return Err(FailureReason::Impossible);
+                }
+                self.check_near(agent, obstacle)?;
+                let judge = Phase::JudgeTake { hand: Some(hand), object: obstacle };
+                let mut steps = vec![Step::of(judge, 0)];
+                self.push_approach(agent, obstacle, &mut steps);
+                Ok(steps)
+            }
+            Action::PutOn { place, hand } => {
+                if self.setup.thing_index(place).is_none() {
+                    return Err(FailureReason::Impossible);
+                }
+                if self.to_put_down(agent, hand).is_empty() {
+                    return Err(FailureReason::HandEmpty);
+                }
+                if person.hands.contains(&Some(place)) || self.root(place) != place {
+                    return Err(FailureReason::Impossible);
+                }
+                let heavy = self.holds_furniture(agent).is_some();
+                if !heavy {
+                    self.check_near(agent, place)?;
+                }
+                let whole = heavy || self.vehicle(agent).is_some();
+                let hand = if whole { None } else { Some(hand) };
+                let mut steps = vec![Step::of(Phase::JudgePut { hand, place }, 0)];
+                self.push_approach(agent, place, &mut steps);
+                Ok(steps)
+            }
+            Action::PutIn => {
+                let (object, container, hand) = self.check_put_in(agent)?;
+                let to = self.front_of(agent);
+                Ok(vec![
+                    Step::of(Phase::ResetArms { from: Some(to), hand: Some(hand) }, d.reset_arms),
+                    Step::of(Phase::Insert { object, container }, d.open_hand + d.gap),
+                    self.reach(Some(hand), to + Vec3::Y * 0.15),
+                    Step::of(Phase::Stand, d.gap),
+                    self.reach(Some(hand.other()), to),
+                    Step::of(Phase::Stand, d.gap + d.move_away),
+                ])
+            }
+        }
+    }
+
+    /// Steps for walking up to a thing, if it isn't within reach.
+    fn push_approach(&self, agent: AgentId, to: EntityId, steps: &mut Vec<Step>) {
+        if self.distance_to(agent, to) <= self.rules.arm_reach_m {
+            steps.push(Step::of(Phase::Stand, 1));
+        } else {
+            steps.push(Step::of(Phase::Approach { to, stuck: 0 }, 0));
+            steps.push(Step::of(Phase::Stand, self.rules.durations.start_walking));
+        }
+    }
+
+    fn reach(&self, hand: Option<Hand>, to: Vec3) -> Step {
+        Step::of(Phase::Reach { hand, to, vain: false }, self.rules.durations.reach)
+    }
+
+    fn reset_arms(&self, hand: Option<Hand>, from: Vec3) -> Step {
+        Step::of(Phase::ResetArms { from: Some(from), hand }, self.rules.durations.reset_arms)
+    }
+
+    fn gap(&self) -> Step {
+        Step::of(Phase::Stand, self.rules.durations.gap)
+    }
+
+    /// Whether a thing may be stepped up to from here (facts of the original, 3.4).
+    fn check_near(&self, agent: AgentId, entity: EntityId) -> Result<(), FailureReason> {
+        let (thing, state) = self.thing(entity);
+        let size = thing.size_m();
+        let limit = self.rules.approach_limit_m + 0.5 * size.x.max(size.z);
+        let distance = horizontal_distance(self.person(agent).pose.position, state.position);
+        if distance > limit { Err(FailureReason::TooFar) } else { Ok(()) }
+    }
+
+    /// Whether a hand gets at a thing from where its owner stands now.
+    fn check_within_reach(&self, agent: AgentId, entity: EntityId) -> Result<(), FailureReason> {
+        if self.reach_distance(agent, entity) > self.rules.reach_limit_m {
+            return Err(FailureReason::Blocked);
+        }
+        let from = self.person(agent).pose.position;
+        let to = self.nearest_point(from, entity);
+        if self.wall_between(from, to) { Err(FailureReason::Blocked) } else { Ok(()) }
+    }
+
+    /// Whether a wall that stands on the floor crosses the line between two points in plan.
+    fn wall_between(&self, from: Vec3, to: Vec3) -> bool {
+        /// Spacing of the points looked at; walls are at least twice as thick in practice.
+        const SPACING_M: f32 = 0.04;
+        let n = (horizontal_distance(from, to) / SPACING_M).ceil() as u32;
+        (1..n).any(|i| {
+            let p = from.lerp(to, i as f32 / n as f32);
+            let mut walls = self.surroundings.near(xz(p)).filter(|b| b.entity == EntityId::WALL);
+            walls.any(|b| b.y_range()[0] < self.rules.step_over_m && b.nearest_in_plan(p).1)
+        })
+    }
+
+    /// The thing that carries this one: itself, or the container it is in.
+    pub(crate) fn root(&self, entity: EntityId) -> EntityId {
+        match self.thing(entity).1.place {
+            Place::Inside { container, .. } => container,
+            _ => entity,
+        }
+    }
+
+    pub(crate) fn holds_furniture(&self, agent: AgentId) -> Option<EntityId> {
+        let [left, right] = self.person(agent).hands;
+        if left == right { left } else { None }
+    }
+}

@@ -1,0 +1,207 @@
+//! Putting things into, onto and aside.
+
+use chaic_protocol::action::{FailureReason, Hand};
+use chaic_protocol::capability::excess;
+use chaic_protocol::catalogue::Role;
+use chaic_protocol::{AgentId, EntityId, Vec3};
+
+use crate::event::EventKind;
+use crate::state::{Activity, Phase, Place, Step};
+use crate::tick::Progress;
+use crate::world::World;
+
+/// Height above its place at which a thing is let go, metres (facts of the original, 3.7).
+const RELEASE_ABOVE_M: f32 = 0.2;
+
+impl World {
+    /// The object, the container and the object's hand of a put-in.
+    pub(super) fn check_put_in(
+        &self,
+        agent: AgentId,
+    ) -> Result<(EntityId, EntityId, Hand), FailureReason> {
+        let hands = self.person(agent).hands;
+        for hand in Hand::BOTH {
+            let (Some(object), Some(container)) =
+                (hands[hand.index()], hands[hand.other().index()])
+            else {
+                continue;
+            };
+            let role = |e: EntityId| self.thing(e).0.class.info().role;
+            let fits = matches!(role(object), Role::Target | Role::Fragile);
+            if fits && role(container) == Role::Container && object != container {
+                let full = self.contents(container).len() >= self.rules.container_capacity as usize;
+                return if full { Err(FailureReason::Full) } else { Ok((object, container, hand)) };
+            }
+        }
+        Err(FailureReason::NotContainerAndTarget)
+    }
+
+    /// Puts a held object into a container or basket.
+    pub(crate) fn insert(&mut self, agent: AgentId, object: EntityId, container: EntityId) {
+        let slot = self.contents(container).len() as u8;
+        let hands = &mut self.person_mut(agent).hands;
+        for hand in hands.iter_mut().filter(|h| **h == Some(object)) {
+            *hand = None;
+        }
+        let rotation = self.thing(container).1.rotation;
+        let thing = self.thing_mut(object);
+        thing.place = Place::Inside { container, slot };
+        thing.rotation = rotation;
+        self.happened(EventKind::Stowed { agent, object, container });
+    }
+
+    /// What a put-on with this hand would put down.
+    pub(super) fn to_put_down(&self, agent: AgentId, hand: Hand) -> Vec<EntityId> {
+        if let Some(vehicle) = self.vehicle(agent) {
+            return self.contents(vehicle);
+        }
+        if let Some(furniture) = self.holds_furniture(agent) {
+            return vec![furniture];
+        }
+        self.person(agent).hands[hand.index()].into_iter().collect()
+    }
+
+    /// Decides whether putting down succeeds, and lays out the steps.
+    pub(crate) fn judge_put(
+        &mut self,
+        agent: AgentId,
+        activity: &mut Activity,
+        hand: Option<Hand>,
+        place: EntityId,
+    ) -> Progress {
+        if let Err(reason) = self.check_within_reach(agent, place) {
+            return Progress::Fails(reason);
+        }
+        let objects = self.to_put_down(agent, hand.unwrap_or(Hand::Right));
+        let Some(first) = objects.first().copied() else {
+            return Progress::Fails(FailureReason::HandEmpty);
+        };
+        let d = self.rules.durations;
+        let from = self.person(agent).pose.position;
+        if self.holds_furniture(agent).is_some() {
+            let at = self.free_spot_on(place, first, from);
+            let release =
+                Phase::Release { hand: None, object: first, on: Some(place), at, set_down: true };
+            activity.queue = vec![
+                self.reset_arms(None, at),
+                Step::of(release, d.open_hand),
+                self.reach(None, at + Vec3::Y),
+                Step::of(Phase::Face { to: place }, d.turn),
+            ];
+            return Progress::Instant;
+        }
+        if self.vehicle(agent).is_some() {
+            // One after the other out of the basket (facts of the original, 8.2).
+            let mut steps = vec![self.reach(Some(Hand::Right), self.rest_of(agent, Hand::Right))];
+            for object in objects.into_iter().rev() {
+                let at = self.free_spot_on(place, object, from) + Vec3::Y * RELEASE_ABOVE_M;
+                let release = Phase::Release {
+                    hand: Some(Hand::Right),
+                    object,
+                    on: Some(place),
+                    at,
+                    set_down: false,
+                };
+                steps.extend([
+                    Step::of(release, d.open_hand),
+                    self.reach(Some(Hand::Right), at),
+                    Step::of(Phase::Stand, d.grasp + d.gap),
+                    self.reach(Some(Hand::Right), self.basket_of(agent)),
+                ]);
+            }
+            steps.push(Step::of(Phase::Face { to: place }, d.turn));
+            activity.queue = steps;
+            return Progress::Instant;
+        }
+        let spot = self.free_spot_on(place, first, from);
+        // Facts of the original, 3.7: the height that counts is that of the place's top.
+        let height_excess = excess(self.top_of(place), self.capability(agent).put_range_m);
+        let p = self.rules.put_penalty.chance(height_excess);
+        if self.luck(agent, "put", p) {
+            let at = spot + Vec3::Y * RELEASE_ABOVE_M;
+            let release =
+                Phase::Release { hand, object: first, on: Some(place), at, set_down: false };
+            activity.queue = vec![
+                self.reset_arms(hand, at),
+                Step::of(release, d.open_hand + d.watch_fall),
+                self.reach(hand, at),
+                self.gap(),
+                self.reach(hand, spot),
+                Step::of(Phase::Face { to: place }, d.turn),
+            ];
+        } else {
+            // Facts 1.4: after a vain attempt it drops to the floor beside the person.
+            activity.failing = Some(FailureReason::BeyondLimits);
+            let mut vain_to = spot;
+            let [low, high] = self.capability(agent).put_range_m;
+            vain_to.y = vain_to.y.clamp(low, high);
+            let at = self.floor_spot_beside(agent, first) + Vec3::Y * 0.3;
+            let release = Phase::Release { hand, object: first, on: None, at, set_down: false };
+            activity.queue = vec![
+                self.reset_arms(hand, at),
+                Step::of(release, d.open_hand + d.watch_fall),
+                self.reach(hand, at),
+                self.gap(),
+                Step::of(Phase::Reach { hand, to: vain_to, vain: true }, d.reach),
+                Step::of(Phase::Face { to: place }, d.turn),
+            ];
+        }
+        Progress::Instant
+    }
+
+    /// Finds where to put a removed obstacle, and lays out the steps.
+    pub(crate) fn judge_aside(
+        &mut self,
+        agent: AgentId,
+        activity: &mut Activity,
+        hand: Hand,
+        obstacle: EntityId,
+    ) -> Progress {
+        let at = self.spot_aside(agent, obstacle);
+        let d = self.rules.durations;
+        let release =
+            Phase::Release { hand: Some(hand), object: obstacle, on: None, at, set_down: true };
+        activity.queue = vec![
+            self.reset_arms(Some(hand), at),
+            Step::of(release, d.open_hand),
+            self.reach(Some(hand), at),
+            self.gap(),
+            self.reach(Some(hand), at + Vec3::Y * 0.5),
+            Step::of(Phase::Stand, d.turn),
+        ];
+        Progress::Instant
+    }
+
+    /// Opens the hand: the thing falls, or stands where it is set down.
+    pub(crate) fn release(
+        &mut self,
+        agent: AgentId,
+        object: EntityId,
+        on: Option<EntityId>,
+        at: Vec3,
+        set_down: bool,
+    ) {
+        for hand in self.person_mut(agent).hands.iter_mut().filter(|h| **h == Some(object)) {
+            *hand = None;
+        }
+        self.happened(EventKind::Released { agent, object, on });
+        let carried_jointly = self.state.joint.is_some_and(|j| j.object == object);
+        let is_goal = on.filter(|place| self.setup.goal_places.contains(place));
+        let thing = self.thing_mut(object);
+        thing.released_at = is_goal;
+        thing.last_holder = Some(agent);
+        if set_down {
+            thing.position = at;
+            thing.place = Place::Resting { on };
+            self.come_to_rest(object);
+            if on.is_none() {
+                self.happened(EventKind::ObstacleRemoved { agent, object });
+            }
+        } else {
+            self.start_fall(object, at);
+        }
+        if carried_jointly {
+            self.end_joint_carry();
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! Taking things: who may, who can, and what comes down with them.
+
+use chaic_protocol::action::{FailureReason, Hand};
+use chaic_protocol::capability::excess;
+use chaic_protocol::catalogue::Role;
+use chaic_protocol::{Action, AgentId, EntityId, Vec3};
+
+use crate::event::EventKind;
+use crate::state::{Activity, Phase, Place, Step};
+use crate::tick::Progress;
+use crate::world::World;
+
+impl World {
+    /// Whether this hand could take this thing, as far as can be said before trying.
+    pub(super) fn check_takeable(
+        &self,
+        agent: AgentId,
+        object: EntityId,
+        hand: Hand,
+    ) -> Result<(), FailureReason> {
+        let Some(index) = self.setup.thing_index(object) else {
+            return Err(FailureReason::Impossible);
+        };
+        let (thing, state) = (&self.setup.things[index], &self.state.things[index]);
+        if thing.fixed || !thing.class.info().is_movable() {
+            return Err(FailureReason::Impossible);
+        }
+        if state.delivered.is_some() || state.place == Place::Broken {
+            return Err(FailureReason::OutOfPlay);
+        }
+        let root = self.root(object);
+        match self.thing(root).1.holder() {
+            Some(by) if by != agent => return Err(FailureReason::HeldByOther),
+            Some(_) if root == object || self.vehicle(agent) == Some(root) => {
+                return Err(FailureReason::Impossible);
+            }
+            _ => {}
+        }
+        let hands = &self.person(agent).hands;
+        if thing.class.info().role == Role::HeavyTarget {
+            return if hands.iter().all(Option::is_none) {
+                Ok(())
+            } else {
+                Err(FailureReason::HandFull)
+            };
+        }
+        if let Some(vehicle) = self.vehicle(agent) {
+            // A basket takes goods, not other baskets.
+            if thing.class.info().role == Role::Container
+                || thing.class.info().role == Role::Obstacle
+            {
+                return Err(FailureReason::Impossible);
+            }
+            let full = self.contents(vehicle).len() >= self.rules.container_capacity as usize;
+            return if full { Err(FailureReason::Full) } else { Ok(()) };
+        }
+        if hands[hand.index()].is_some() { Err(FailureReason::HandFull) } else { Ok(()) }
+    }
+
+    /// Decides whether a taking can succeed, and lays out the reach, the grasp and the way back.
+    pub(crate) fn judge_take(
+        &mut self,
+        agent: AgentId,
+        activity: &mut Activity,
+        hand: Option<Hand>,
+        object: EntityId,
+    ) -> Progress {
+        let checks = self
+            .check_takeable(agent, object, hand.unwrap_or(Hand::Right))
+            .and_then(|()| self.check_within_reach(agent, object));
+        if let Err(reason) = checks {
+            return Progress::Fails(reason);
+        }
+        let capability = self.capability(agent);
+        let (thing, state) = self.thing(object);
+        let info = thing.class.info();
+        let top = self.top_of(object);
+        let height_excess = excess(top, capability.pick_range_m);
+        let mut to = state.position + state.rotation * (Vec3::Y * 0.5 * thing.size_m().y);
+        if capability.breaks_fragile && info.role == Role::Fragile {
+            let p = if top > capability.pick_range_m[1] {
+                self.rules.break_chance_high
+            } else {
+                self.rules.break_chance_low
+            };
+            if self.luck(agent, "break", p) {
+                activity.failing = Some(FailureReason::Broke);
+            }
+        }
+        if activity.failing.is_none() {
+            let p = self.rules.pick_penalty.chance(height_excess)
+                * self.rules.lift_penalty.chance(info.mass_kg - capability.strength_kg);
+            if !self.luck(agent, "take", p) {
+                activity.failing = Some(FailureReason::BeyondLimits);
+                // The hand comes as far as it can.
+                to.y = to.y.clamp(capability.pick_range_m[0], capability.pick_range_m[1]);
+            }
+        }
+        let breaks = activity.failing == Some(FailureReason::Broke);
+        let vain = activity.failing.is_some();
+        let d = self.rules.durations;
+        // Next one last.
+        activity.queue = vec![self.reset_arms(hand, to)];
+        if !vain || breaks {
+            activity.queue.extend([Step::of(Phase::Grasp { hand, object }, d.grasp), self.gap()]);
+        }
+        activity.queue.extend([
+            Step::of(Phase::Reach { hand, to, vain }, d.reach),
+            self.gap(),
+            Step::of(Phase::Face { to: object }, d.turn),
+        ]);
+        Progress::Instant
+    }
+
+    /// The hand has closed: the thing is taken, or breaks.
+    pub(crate) fn grasp(
+        &mut self,
+        agent: AgentId,
+        activity: &mut Activity,
+        hand: Option<Hand>,
+        object: EntityId,
+    ) -> Progress {
+        if activity.failing == Some(FailureReason::Broke) {
+            self.thing_mut(object).place = Place::Broken;
+            self.happened(EventKind::Broke { agent, object });
+            return Progress::Done;
+        }
+        if let Err(reason) = self.check_takeable(agent, object, hand.unwrap_or(Hand::Right)) {
+            activity.failing = Some(reason);
+            self.abandon_joint(reason);
+            return Progress::Done;
+        }
+        let taken = self.thing_mut(object);
+        taken.place = Place::Held { by: agent, hand: hand.unwrap_or(Hand::Right) };
+        taken.last_holder = Some(agent);
+        taken.released_at = None;
+        self.happened(EventKind::Taken { agent, object });
+        match hand {
+            Some(hand) => self.person_mut(agent).hands[hand.index()] = Some(object),
+            None => self.person_mut(agent).hands = [Some(object); 2],
+        }
+        for inside in self.contents(object) {
+            self.thing_mut(inside).last_holder = Some(agent);
+        }
+        self.drop_dependents(object);
+        if let Some(vehicle) = self.vehicle(agent).filter(|_| hand.is_some()) {
+            let d = self.rules.durations;
+            let basket = self.basket_in_world(vehicle);
+            activity.queue = vec![
+                self.reach(Some(Hand::Right), self.rest_of(agent, Hand::Right)),
+                Step::of(Phase::Insert { object, container: vehicle }, d.open_hand),
+                self.reach(Some(Hand::Right), basket + Vec3::Y * 0.2),
+            ];
+        } else if matches!(activity.action, Action::RemoveObstacle { .. })
+            && let Some(hand) = hand
+        {
+            let from = self.hand_in_world(agent, hand);
+            activity.queue = vec![
+                Step::of(Phase::JudgeAside { hand, obstacle: object }, 0),
+                self.reset_arms(Some(hand), from),
+            ];
+        }
+        self.finish_joint_lift(agent, object);
+        Progress::Done
+    }
+
+    /// What lay on a thing that was taken falls.
+    fn drop_dependents(&mut self, taken: EntityId) {
+        let on_it = |e: &EntityId| self.thing(*e).1.place == Place::Resting { on: Some(taken) };
+        let dependents: Vec<EntityId> = self.setup.entities().filter(on_it).collect();
+        for object in dependents {
+            let delivered = self.thing(object).1.delivered.is_some();
+            if !delivered && self.thing(object).0.class.info().is_movable() {
+                let at = self.thing(object).1.position;
+                self.happened(EventKind::LostSupport { object });
+                self.start_fall(object, at);
+            }
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! Lifting furniture by two.
+
+use chaic_protocol::action::FailureReason;
+use chaic_protocol::{Action, AgentId, EntityId, Vec3};
+
+use crate::event::EventKind;
+use crate::state::{Activity, JointCarry, Phase, Step};
+use crate::tick::Progress;
+use crate::world::World;
+
+impl World {
+    /// Waits at furniture for somebody else who is after the same piece, and starts a joint lift
+    /// when both stand at it.
+    pub(crate) fn await_partner(&mut self, agent: AgentId, activity: &mut Activity) -> Progress {
+        /// Between two attempts the other is asked again; that must not count as giving up.
+        const GRACE_FRAMES: u32 = 3;
+        let elapsed = activity.step.elapsed;
+        let Phase::AwaitPartner { object, absent } = &mut activity.step.phase else {
+            return Progress::Done;
+        };
+        let object = *object;
+        let after_it = |a: &AgentId| {
+            let other = self.person(*a).activity.as_ref();
+            *a != agent
+                && other.is_some_and(|o| o.action.subject() == Some(object) && is_pick_up(o.action))
+        };
+        let other = self.setup.agents().find(after_it);
+        let Some(other) = other else {
+            *absent += 1;
+            return if *absent >= GRACE_FRAMES { Progress::Done } else { Progress::Goes };
+        };
+        *absent = 0;
+        let ready = matches!(
+            self.person(other).activity.as_ref().map(|a| a.step.phase),
+            Some(Phase::AwaitPartner { .. })
+        );
+        if !ready {
+            let patience = self.rules.durations.await_partner;
+            return if elapsed >= patience { Progress::Done } else { Progress::Goes };
+        }
+        if self.check_within_reach(agent, object).is_err()
+            || self.check_within_reach(other, object).is_err()
+        {
+            return Progress::Fails(FailureReason::Blocked);
+        }
+        self.begin_joint_lift(agent, other, activity, object);
+        Progress::Instant
+    }
+
+    /// Lays out the steps of both: the one with the lower id leads.
+    fn begin_joint_lift(
+        &mut self,
+        agent: AgentId,
+        other: AgentId,
+        activity: &mut Activity,
+        object: EntityId,
+    ) {
+        let (leader, follower) = if agent < other { (agent, other) } else { (other, agent) };
+        let d = self.rules.durations;
+        let (thing, state) = self.thing(object);
+        let to = state.position + Vec3::Y * 0.5 * thing.size_m().y;
+        let lead = vec![
+            self.reset_arms(None, to),
+            Step::of(Phase::Grasp { hand: None, object }, d.grasp),
+            self.gap(),
+            self.reach(None, to),
+            self.gap(),
+            Step::of(Phase::Face { to: object }, d.turn),
+        ];
+        let follow = vec![
+            Step::of(Phase::CarryAlong, 0),
+            self.reach(None, to),
+            self.gap(),
+            Step::of(Phase::Face { to: object }, d.turn),
+        ];
+        self.state.joint = Some(JointCarry {
+            object,
+            leader,
+            follower,
+            follower_in_leader: Vec3::ZERO,
+            under_way: false,
+        });
+        let (own, others) = if agent == leader { (lead, follow) } else { (follow, lead) };
+        activity.queue = own;
+        if let Some(theirs) = self.person_mut(other).activity.as_mut() {
+            theirs.queue = others;
+            theirs.step = theirs.queue.pop().expect("both have steps");
+        }
+    }
+
+    /// The leader has the furniture: from now on the follower goes along.
+    pub(super) fn finish_joint_lift(&mut self, agent: AgentId, object: EntityId) {
+        let Some(joint) = self.state.joint.filter(|j| j.leader == agent && j.object == object)
+        else {
+            return;
+        };
+        let leader = self.person(agent).pose;
+        let follower = self.person(joint.follower).pose.position;
+        let offset = follower - leader.position;
+        let follower_in_leader = chaic_protocol::geom::rotate_yaw(offset, -leader.yaw_rad);
+        self.state.joint = Some(JointCarry { follower_in_leader, under_way: true, ..joint });
+        let follower = joint.follower;
+        self.happened(EventKind::LiftedTogether { leader: agent, follower, object });
+    }
+
+    /// A joint lift that can't be: the follower is free again.
+    pub(super) fn abandon_joint(&mut self, reason: FailureReason) {
+        if let Some(joint) = self.state.joint.take()
+            && let Some(activity) = self.person_mut(joint.follower).activity.as_mut()
+        {
+            activity.failing = Some(reason);
+            activity.queue.clear();
+            activity.step = Step::of(Phase::Stand, 1);
+        }
+    }
+
+    /// The furniture is down: the follower's own pick-up ends well.
+    pub(super) fn end_joint_carry(&mut self) {
+        let Some(joint) = self.state.joint.take() else { return };
+        let gap = self.gap();
+        if let Some(activity) = self.person_mut(joint.follower).activity.as_mut() {
+            activity.queue.clear();
+            activity.step = gap;
+        }
+    }
+}
+
+fn is_pick_up(action: Action) -> bool {
+    matches!(action, Action::PickUp { .. })
+}

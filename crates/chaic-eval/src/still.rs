@@ -14,6 +14,9 @@ use crate::error::{EvalError, Result};
 use crate::helpers::{self, Helpers};
 use crate::play::{Play, Staging};
 
+/// A plan smaller than this can't be read, pixels.
+const PLAN_MIN_PX: u32 = 960;
+
 /// Which moment of which episode, and whose eyes.
 #[derive(Clone, Copy, Debug)]
 pub struct Still<'a> {
@@ -32,7 +35,8 @@ pub struct Still<'a> {
 }
 
 /// Plays an episode up to a moment and writes `rgb.png`, `depth.png` (16 bit, millimetres),
-/// `ids.png` (16 bit) and `ids.json` (id to class) into `out`. Returns the frame that is shown.
+/// `ids.png` (16 bit), `ids.json` (id to class) and `plan.png` (everything from above) into `out`.
+/// Returns the frame that is shown.
 ///
 /// # Errors
 /// If there is no such agent or helper, or the file system refuses.
@@ -64,6 +68,8 @@ pub fn write(still: &Still<'_>, helpers: &dyn Helpers, out: &Path) -> Result<Fra
     let json = serde_json::to_string_pretty(&names).expect("numbers and names") + "\n";
     let path = out.join("ids.json");
     std::fs::write(&path, json).map_err(EvalError::io("write", &path))?;
+    let from_above = plan::draw_scene_plan(play.eyes().scene(), world, size.max(PLAN_MIN_PX));
+    save(from_above.into(), &out.join("plan.png"))?;
     Ok(world.state().frame)
 }
 
@@ -93,7 +99,7 @@ pub fn write_plan(episode: &Episode, width_px: u32, path: &Path) -> Result<()> {
 
 /// The pictures that `write` leaves in a folder.
 pub fn files(out: &Path) -> Vec<PathBuf> {
-    ["rgb.png", "depth.png", "ids.png", "ids.json"].map(|n| out.join(n)).to_vec()
+    ["rgb.png", "depth.png", "ids.png", "ids.json", "plan.png"].map(|n| out.join(n)).to_vec()
 }
 
 fn save(picture: DynamicImage, path: &Path) -> Result<()> {

@@ -127,7 +127,7 @@ fn pictures_and_episodes() {
         &["render", file, "--agent", "partner", "--frame", "20", "--out", "p", "--size", "64"],
     );
     assert!(printed.contains("partner"), "{printed}");
-    for name in ["rgb.png", "depth.png", "ids.png", "ids.json"] {
+    for name in ["rgb.png", "depth.png", "ids.png", "ids.json", "plan.png"] {
         assert!(at.join("p").join(name).exists(), "{name}");
     }
     let ids = fs::read_to_string(at.join("p/ids.json")).expect("it is text");

@@ -114,7 +114,8 @@ fn destination_at(thing: &Thing, within_m: f32) -> Destination {
     let is_small = thing.class.info().is_carriable() || thing.footprint.is_empty();
     let mean = Vec2::new(thing.position_in_world.x, thing.position_in_world.z);
     let points = if is_small { vec![mean] } else { thing.footprint.clone() };
-    Destination { points, within_m, arm_m: None, same_room: !is_small, avoid: Vec::new() }
+    let middle = points.iter().copied().sum::<Vec2>() / points.len() as f32;
+    Destination { points, same_room_as: Some(middle), ..Destination::near(mean, within_m) }
 }
 
 /// Draws the lessons of an action that has ended, whatever the plan. `held` is what was in hand

@@ -46,9 +46,9 @@ pub struct Destination {
     /// If the straight line from there to the point must be clear: except for its last part of
     /// this length, metres, where the arm reaches over what the object lies on.
     pub arm_m: Option<f32>,
-    /// Whether it is to be on the same side of every wall as the point: for large things, which
-    /// stand against walls and are longer than an arm.
-    pub same_room: bool,
+    /// It is to be on the same side of every wall as this point: the middle of a thing, which may
+    /// itself be at the wall that one is behind.
+    pub same_room_as: Option<Vec2>,
     /// Places from which it did not work; it is to be another side.
     pub avoid: Vec<Vec2>,
 }
@@ -60,7 +60,7 @@ impl Destination {
             points: vec![point],
             within_m,
             arm_m: None,
-            same_room: false,
+            same_room_as: None,
             avoid: Vec::new(),
         }
     }
@@ -93,7 +93,7 @@ impl Destination {
         point.distance(here) <= self.within_m
             && self.avoid.iter().all(|tried| self.is_other_side(*tried, here, point))
             && self.arm_m.is_none_or(|arm_m| is_line_clear(costs, here, point, arm_m + tolerance_m))
-            && !(self.same_room && is_wall_between(costs, here, point))
+            && !self.same_room_as.is_some_and(|middle| is_wall_between(costs, here, middle))
     }
 }
 
@@ -116,9 +116,9 @@ fn is_line_clear(costs: &CostMap, from: Vec2, to: Vec2, arm_m: f32) -> bool {
     costs.is_straight_clear(at(OWN_M), at(length - arm_m))
 }
 
-/// Whether a wall is between somebody at `from` and the point, which may itself be at a wall.
+/// Whether a wall is between somebody at `from` and the middle of a thing.
 fn is_wall_between(costs: &CostMap, from: Vec2, to: Vec2) -> bool {
-    /// One and a half cells: the point's own cell may be taken for the wall it touches, metres.
+    /// One and a half cells: the cell of a small thing may be that of the wall it touches, metres.
     const AT_WALL_M: f32 = 0.19;
     let length = from.distance(to);
     length > AT_WALL_M && costs.crosses_wall(from, to.lerp(from, AT_WALL_M / length))

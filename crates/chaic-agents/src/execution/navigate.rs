@@ -32,6 +32,8 @@ const OWN_M: f32 = 0.22;
 /// (40 degrees either way) at points of the thing nearer to each other than this, metres.
 const AVOID_COS: f32 = 0.77;
 const AVOID_POINTS_M: f32 = 0.4;
+/// The same for large things, seen from their middle: 70 degrees either way.
+const AVOID_COS_LARGE: f32 = 0.34;
 
 /// One step is longer than a place to stand beside furniture is wide, metres.
 const ARRIVAL_M: f32 = 0.12;
@@ -46,8 +48,8 @@ pub struct Destination {
     /// If the straight line from there to the point must be clear: except for its last part of
     /// this length, metres, where the arm reaches over what the object lies on.
     pub arm_m: Option<f32>,
-    /// It is to be on the same side of every wall as this point: the middle of a thing, which may
-    /// itself be at the wall that one is behind.
+    /// It is to be on the same side of every wall as the thing with this middle, which may stand
+    /// against the wall that one is behind.
     pub same_room_as: Option<Vec2>,
     /// Places from which it did not work; it is to be another side.
     pub avoid: Vec<Vec2>,
@@ -93,12 +95,17 @@ impl Destination {
         point.distance(here) <= self.within_m
             && self.avoid.iter().all(|tried| self.is_other_side(*tried, here, point))
             && self.arm_m.is_none_or(|arm_m| is_line_clear(costs, here, point, arm_m + tolerance_m))
-            && !self.same_room_as.is_some_and(|middle| is_wall_between(costs, here, middle))
+            && !self.same_room_as.is_some_and(|middle| is_wall_before(costs, here, point, middle))
     }
 }
 
 impl Destination {
     fn is_other_side(&self, tried: Vec2, here: Vec2, point: Vec2) -> bool {
+        if let Some(middle) = self.same_room_as {
+            // What failed before a large thing that is near failed for a wall: not on that side.
+            let (a, b) = (tried - middle, here - middle);
+            return a.normalize_or_zero().dot(b.normalize_or_zero()) < AVOID_COS_LARGE;
+        }
         let tried_point = self.nearest(tried);
         let (a, b) = (tried - tried_point, here - point);
         tried_point.distance(point) > AVOID_POINTS_M
@@ -116,12 +123,13 @@ fn is_line_clear(costs: &CostMap, from: Vec2, to: Vec2, arm_m: f32) -> bool {
     costs.is_straight_clear(at(OWN_M), at(length - arm_m))
 }
 
-/// Whether a wall is between somebody at `from` and the middle of a thing.
-fn is_wall_between(costs: &CostMap, from: Vec2, to: Vec2) -> bool {
-    /// One and a half cells: the cell of a small thing may be that of the wall it touches, metres.
-    const AT_WALL_M: f32 = 0.19;
-    let length = from.distance(to);
-    length > AT_WALL_M && costs.crosses_wall(from, to.lerp(from, AT_WALL_M / length))
+/// Whether a wall is between somebody at `from` and a thing with this nearest point and middle.
+fn is_wall_before(costs: &CostMap, from: Vec2, nearest: Vec2, middle: Vec2) -> bool {
+    /// So far inside the thing the line ends, metres: the wall that a thing touches shares cells
+    /// with its outline.
+    const INSIDE_M: f32 = 0.35;
+    let inwards = (middle - nearest).clamp_length_max(INSIDE_M);
+    costs.crosses_wall(from, nearest + inwards)
 }
 
 struct Search<'a> {

@@ -13,9 +13,10 @@ const FLOOR_M: f32 = 0.08;
 /// Points above this are stepped over no more, metres.
 const STEP_M: f32 = 0.12;
 /// Occupied cells with points above this are walls, metres (original facts 1.1).
-const WALL_M: f32 = 2.0;
-/// Points above this are ceiling or sky and say nothing, metres (original facts 1.4).
-const TOP_M: f32 = 4.0;
+pub const WALL_M: f32 = 2.0;
+/// Points above this may be a ceiling and say nothing, metres: the lowest that is usual in homes.
+/// (The original looks up to 4 m, in houses without ceilings; facts 1.4.)
+const TOP_M: f32 = 2.4;
 /// How sure one is of an occupied cell after one look, and at most.
 const SURE_ONCE: u8 = 3;
 const SURE_MOST: u8 = 6;
@@ -306,6 +307,19 @@ mod tests {
         assert_ne!(space(&map, -1.0, -1.9), Space::Occupied, "an apple does not block");
         let near = map.grid().cell_at(Vec2::new(0.0, -1.0)).expect("inside");
         assert!(!map.is_unexplored(near), "just before the feet");
+    }
+
+    #[test]
+    fn furniture_under_a_ceiling_is_no_wall() {
+        let mut toy = Toy::room(6.0, 6.0);
+        toy.add(ToyObject::new("cabinet", [1.0, 0.0, -2.0], [0.8, 1.0, 0.4]));
+        toy.add(ToyObject::new("bed", [0.0, 2.6, 0.0], [6.0, 0.1, 6.0]));
+        toy.stand([0.0, 0.0], 0.0);
+        let mut map = OccupancyMap::new(&toy.bounds());
+        look(&mut map, &toy);
+        assert_eq!(space(&map, 1.0, -1.82), Space::Occupied);
+        let face = space(&map, 0.0, -3.01).max(space(&map, 0.0, -2.99));
+        assert_eq!(face, Space::Wall);
     }
 
     #[test]

@@ -4,7 +4,6 @@ use chaic_protocol::{Action, Briefing, EntityId, FailureReason, Frame, Outcome, 
 
 use super::navigate::{Destination, Nav, Navigator};
 use crate::memory::Memory;
-use crate::memory::occupancy::WALL_M;
 use crate::memory::semantic::{IGNORE_FRAMES, LIFT_FAILURES, Thing};
 
 /// How near to go before an object is picked up, metres. (The world steps up from 3 m.)
@@ -116,9 +115,11 @@ fn destination_at(thing: &Thing, within_m: f32) -> Destination {
     let mean = Vec2::new(thing.position_in_world.x, thing.position_in_world.z);
     let points = if is_small { vec![mean] } else { thing.footprint.clone() };
     let middle = points.iter().copied().sum::<Vec2>() / points.len() as f32;
-    // The map takes what is as high as a wall for a wall.
-    let same_room_as = (!is_small && thing.top_m < WALL_M).then_some(middle);
-    Destination { points, same_room_as, ..Destination::near(mean, within_m) }
+    Destination {
+        points,
+        same_room_as: (!is_small).then_some(middle),
+        ..Destination::near(mean, within_m)
+    }
 }
 
 /// Draws the lessons of an action that has ended, whatever the plan. `held` is what was in hand

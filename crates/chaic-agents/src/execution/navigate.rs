@@ -95,11 +95,23 @@ impl Destination {
         point.distance(here) <= self.within_m
             && self.avoid.iter().all(|tried| self.is_other_side(*tried, here, point))
             && self.arm_m.is_none_or(|arm_m| is_line_clear(costs, here, point, arm_m + tolerance_m))
-            && !self.same_room_as.is_some_and(|middle| is_wall_before(costs, here, point, middle))
+            && !self.same_room_as.is_some_and(|middle| self.is_behind_wall(costs, here, middle))
     }
 }
 
 impl Destination {
+    /// Whether a wall is between somebody at `here` and a large thing with this middle. What is as
+    /// high as a wall is one on the map: the thing's own outline does not count.
+    fn is_behind_wall(&self, costs: &CostMap, here: Vec2, middle: Vec2) -> bool {
+        /// So far inside the thing the line ends, metres: the wall may be all that it touches.
+        const INSIDE_M: f32 = 0.35;
+        let nearest = self.nearest(here);
+        let end = nearest + (middle - nearest).clamp_length_max(INSIDE_M);
+        let grid = costs.grid();
+        let mut walls = grid.line(here, end).filter(|cell| costs.is_wall(*cell));
+        walls.any(|cell| !self.points.iter().any(|p| grid.cell_at(*p) == Some(cell)))
+    }
+
     fn is_other_side(&self, tried: Vec2, here: Vec2, point: Vec2) -> bool {
         if let Some(middle) = self.same_room_as {
             // What failed before a large thing that is near failed for a wall: not on that side.
@@ -121,15 +133,6 @@ fn is_line_clear(costs: &CostMap, from: Vec2, to: Vec2, arm_m: f32) -> bool {
     }
     let at = |m: f32| from.lerp(to, m / length);
     costs.is_straight_clear(at(OWN_M), at(length - arm_m))
-}
-
-/// Whether a wall is between somebody at `from` and a thing with this nearest point and middle.
-fn is_wall_before(costs: &CostMap, from: Vec2, nearest: Vec2, middle: Vec2) -> bool {
-    /// So far inside the thing the line ends, metres: the wall that a thing touches shares cells
-    /// with its outline.
-    const INSIDE_M: f32 = 0.35;
-    let inwards = (middle - nearest).clamp_length_max(INSIDE_M);
-    costs.crosses_wall(from, nearest + inwards)
 }
 
 struct Search<'a> {

@@ -109,9 +109,10 @@ impl CostMap {
         self.grid.line(from, to).all(|cell| !self.is_tight(cell))
     }
 
-    /// Whether a known wall lies on the straight line.
-    pub fn crosses_wall(&self, from: Vec2, to: Vec2) -> bool {
-        self.grid.line(from, to).any(|cell| self.cost[cell] >= WALL)
+    /// Whether there is a wall in the cell.
+    #[inline]
+    pub fn is_wall(&self, cell: usize) -> bool {
+        self.cost[cell] >= WALL
     }
 
     /// Computes all costs anew.

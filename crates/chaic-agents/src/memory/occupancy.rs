@@ -13,7 +13,7 @@ const FLOOR_M: f32 = 0.08;
 /// Points above this are stepped over no more, metres.
 const STEP_M: f32 = 0.12;
 /// Occupied cells with points above this are walls, metres (original facts 1.1).
-pub const WALL_M: f32 = 2.0;
+const WALL_M: f32 = 2.0;
 /// Points above this may be a ceiling and say nothing, metres: the lowest that is usual in homes.
 /// (The original looks up to 4 m, in houses without ceilings; facts 1.4.)
 const TOP_M: f32 = 2.4;

@@ -67,6 +67,10 @@ fn what_is_no_episode_is_refused_first() {
     assert_eq!((found.as_str(), expected), ("2", 1));
     let long = vec![b' '; MAX_EPISODE_BYTES + 1];
     assert!(matches!(error_of(&long), EpisodeError::TooLong { .. }));
+    let not_a_number = br#"{"format": "chaic-episode", "version": 1, "id": NaN}"#;
+    assert!(error_of(not_a_number).to_string().contains(": id: isn't JSON"));
+    let two = br#"{"format": "chaic-episode", "version": 1} {}"#;
+    assert!(matches!(error_of(two), EpisodeError::NotJson { .. }));
     let deep = "[".repeat(100_000);
     assert!(matches!(error_of(deep.as_bytes()), EpisodeError::NotJson { .. }));
 }

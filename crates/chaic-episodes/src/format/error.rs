@@ -31,10 +31,12 @@ pub enum EpisodeError {
         column: usize,
     },
     /// The bytes aren't JSON.
-    #[error("{source_name}: isn't JSON: {problem}")]
+    #[error("{source_name}: {field}: isn't JSON: {problem}")]
     NotJson {
         /// What the caller called the bytes.
         source_name: String,
+        /// Path of the field that is read there, `.` outside all fields.
+        field: String,
         /// What the JSON reader says, with line and column.
         problem: String,
     },
@@ -79,13 +81,21 @@ pub enum EpisodeError {
 }
 
 impl EpisodeError {
-    pub(super) fn of_syntax(source_name: &str, error: &serde_json::Error) -> EpisodeError {
+    /// What the JSON reader says; `field_of` finds the field that it was about to read.
+    pub(super) fn of_syntax(
+        source_name: &str,
+        error: &serde_json::Error,
+        field_of: impl Fn() -> String,
+    ) -> EpisodeError {
         let source_name = source_name.to_owned();
         match error.classify() {
             serde_json::error::Category::Eof => {
                 EpisodeError::Truncated { source_name, line: error.line(), column: error.column() }
             }
-            _ => EpisodeError::NotJson { source_name, problem: error.to_string() },
+            _ => {
+                let (field, problem) = (field_of(), error.to_string());
+                EpisodeError::NotJson { source_name, field, problem }
+            }
         }
     }
 }

@@ -197,9 +197,14 @@ fn read(bytes: &[u8], source_name: &str) -> Result<EpisodeFile, EpisodeError> {
         let (bytes, limit) = (bytes.len(), MAX_EPISODE_BYTES);
         return Err(EpisodeError::TooLong { source_name: source(), bytes, limit });
     }
+    let whole = || -> Result<EpisodeFile, serde_path_to_error::Error<serde_json::Error>> {
+        let mut json = serde_json::Deserializer::from_slice(bytes);
+        serde_path_to_error::deserialize(&mut json)
+    };
+    let field_of = || whole().err().map_or(".".to_owned(), |e| e.path().to_string());
+    let syntax = |e: serde_json::Error| EpisodeError::of_syntax(source_name, &e, field_of);
     // The first pass sees syntax only, so that a torn file isn't taken for a wrong one.
-    let header: Header =
-        serde_json::from_slice(bytes).map_err(|e| EpisodeError::of_syntax(source_name, &e))?;
+    let header: Header = serde_json::from_slice(bytes).map_err(syntax)?;
     if header.format.as_ref().and_then(|f| f.as_str()) != Some(FORMAT) {
         let found =
             header.format.map_or("nothing".to_owned(), |f| error::shortened(&f.to_string()));
@@ -210,13 +215,10 @@ fn read(bytes: &[u8], source_name: &str) -> Result<EpisodeFile, EpisodeError> {
             header.version.map_or("nothing".to_owned(), |v| error::shortened(&v.to_string()));
         return Err(EpisodeError::WrongVersion { source_name: source(), found, expected: VERSION });
     }
-    let mut json = serde_json::Deserializer::from_slice(bytes);
-    let file: EpisodeFile = serde_path_to_error::deserialize(&mut json).map_err(|e| {
+    whole().map_err(|e| {
         let field = e.path().to_string();
         EpisodeError::Field { source_name: source(), field, problem: e.into_inner().to_string() }
-    })?;
-    json.end().map_err(|e| EpisodeError::of_syntax(source_name, &e))?;
-    Ok(file)
+    })
 }
 
 /// The JSON schema of an episode file, for editors and for other programs.

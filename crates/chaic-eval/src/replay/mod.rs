@@ -262,7 +262,7 @@ impl<'a> Replay<'a> {
             EventKind::Ended { agent, action, outcome: Outcome::Failure(reason) }
                 if action.subject().is_some() =>
             {
-                format!("{agent}: {} failed, {reason}", self.words(&action))
+                format!("{agent} {} in vain: {reason}", self.words(&action))
             }
             EventKind::LiftedTogether { object, .. } => format!("both lift {}", self.name(object)),
             EventKind::ChildAway { away: true } => "the child is away".to_owned(),

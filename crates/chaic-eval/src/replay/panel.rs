@@ -26,6 +26,9 @@ const BAR: [u8; 3] = [20, 150, 70];
 const TROUGH: [u8; 3] = [222, 224, 226];
 const LINE_PX: f32 = 17.0;
 const NEWS_LINE_PX: u32 = 19;
+const NEWS_PX: f32 = 14.0;
+/// As wide as the frame number before a piece of news.
+const NEWS_INDENT: &str = "       ";
 /// News that are kept: as many as fit where there is no map at all.
 pub(super) const MAX_NEWS: usize = 30;
 
@@ -99,11 +102,14 @@ fn map(image: &mut RgbImage, map: &RgbImage) -> u32 {
 /// The latest news, as many as fit below the map.
 fn news(image: &mut RgbImage, top: u32, news: &[String]) {
     let x = (3 * MARGIN_PX + 2 * EYE_PX) as f32;
+    let width = WIDTH_PX as f32 - MARGIN_PX as f32 - x;
     let room = HEIGHT_PX.saturating_sub(top + 2 * MARGIN_PX) / NEWS_LINE_PX;
-    let skipped = news.len().saturating_sub(room as usize);
-    for (k, line) in news.iter().skip(skipped).enumerate() {
+    let rows: Vec<String> =
+        news.iter().flat_map(|n| wrapped(n, NEWS_PX, width, NEWS_INDENT)).collect();
+    let skipped = rows.len().saturating_sub(room as usize);
+    for (k, row) in rows.iter().skip(skipped).enumerate() {
         let y = (top + MARGIN_PX + k as u32 * NEWS_LINE_PX) as f32;
-        text::draw(image, (x, y), 14.0, INK, Align::Left, line);
+        text::draw(image, (x, y), NEWS_PX, INK, Align::Left, row);
     }
 }
 
@@ -122,21 +128,28 @@ fn captions(image: &mut RgbImage, Contents { captions, .. }: &Contents<'_>) {
     }
 }
 
-/// At most two lines, broken between words, no wider than an eye's picture.
+/// At most two lines, no wider than an eye's picture.
 fn lines(image: &mut RgbImage, x: f32, y: f32, words: &str, color: [u8; 3]) {
-    let mut rows = vec![String::new()];
-    for word in words.split_whitespace() {
-        let row = rows.last_mut().expect("there is a first row");
-        let longer = if row.is_empty() { word.to_owned() } else { format!("{row} {word}") };
-        if !row.is_empty() && text::width(&longer, LINE_PX) > EYE_PX as f32 {
-            rows.push(word.to_owned());
-        } else {
-            *row = longer;
-        }
-    }
-    for (k, row) in rows.iter().take(2).enumerate() {
+    for (k, row) in wrapped(words, LINE_PX, EYE_PX as f32, "").iter().take(2).enumerate() {
         text::draw(image, (x, y + 21.0 * k as f32), LINE_PX, color, Align::Left, row);
     }
+}
+
+/// Breaks a text between words into rows no wider than `width_px`; rows after the first begin
+/// with `indent`.
+fn wrapped(words: &str, size_px: f32, width_px: f32, indent: &str) -> Vec<String> {
+    let mut rows = Vec::new();
+    let mut row = String::new();
+    for word in words.split_inclusive(' ') {
+        let longer = format!("{row}{word}");
+        if !row.trim().is_empty() && text::width(longer.trim_end(), size_px) > width_px {
+            rows.push(std::mem::replace(&mut row, format!("{indent}{word}")));
+        } else {
+            row = longer;
+        }
+    }
+    rows.push(row);
+    rows
 }
 
 fn fill(image: &mut RgbImage, [x0, y0, x1, y1]: [u32; 4], color: [u8; 3]) {

@@ -7,6 +7,9 @@ use chaic_protocol::{AgentId, ClassId, EntityId, TaskId};
 use crate::event::EventKind;
 use crate::world::World;
 
+/// What lies on something may have sunk into it by this, metres: the solver's slack, and more.
+const SUNK_M: f32 = 0.02;
+
 impl World {
     /// How near to the middle of a goal place a released thing must come to rest, metres
     /// (facts of the original, 5.2: the margin plus half of the longer side).
@@ -76,7 +79,8 @@ impl World {
         } else {
             released_at.is_some_and(|g| near(&g))
         };
-        let high_enough = at.y >= self.goal_min_top_m();
+        let min_top_m = self.goal_min_top_m();
+        let high_enough = min_top_m <= 0.0 || at.y >= min_top_m - SUNK_M;
         let role = self.thing(object).0.class.info().role;
         let deliverable = role != Role::Obstacle;
         if by_rule && high_enough && deliverable {

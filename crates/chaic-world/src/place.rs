@@ -100,7 +100,16 @@ impl World {
 
     /// The points of a place where something could be put, best first, and the best free one:
     /// on its highest top, else on the ground beside it. Returns where the bottom goes.
-    pub(crate) fn free_spot_on(&self, place: EntityId, object: EntityId, from: Vec3) -> Vec3 {
+    /// `taken` are spots, with radii, that are about to be.
+    pub(crate) fn free_spot_on(
+        &self,
+        place: EntityId,
+        object: EntityId,
+        from: Vec3,
+        taken: &[(Vec3, f32)],
+    ) -> Vec3 {
+        /// A top carries what is wider than itself, if this part of its radius lies on it.
+        const ON_TOP: f32 = 0.6;
         let (thing, state) = self.thing(place);
         let yaw = chaic_protocol::geom::yaw_towards(Vec3::ZERO, state.rotation * Vec3::NEG_Z);
         let size = self.thing(object).0.size_m();
@@ -116,7 +125,7 @@ impl World {
                 }
             }
         }
-        let too_small = surfaces.iter().all(|s| s.half[0].min(s.half[1]) < radius);
+        let too_small = surfaces.iter().all(|s| s.half[0].min(s.half[1]) < ON_TOP * radius);
         if too_small {
             let reach = 0.5 * thing.size_m().x.max(thing.size_m().z) + radius + 0.1;
             spots = ring(state.position, reach, 4).collect();
@@ -124,7 +133,10 @@ impl World {
         spots.sort_by(|a, b| {
             horizontal_distance(*a, from).total_cmp(&horizontal_distance(*b, from))
         });
-        let free = |spot: &&Vec3| self.is_free_for(object, **spot, radius);
+        let apart = |spot: &Vec3| {
+            taken.iter().all(|(t, r)| horizontal_distance(*t, *spot) > radius + r + CLEARANCE_M)
+        };
+        let free = |spot: &&Vec3| apart(spot) && self.is_free_for(object, **spot, radius);
         spots.iter().find(free).or(spots.first()).copied().unwrap_or(state.position)
     }
 

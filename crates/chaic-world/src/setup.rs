@@ -203,6 +203,8 @@ impl SetupError {
 impl Setup {
     /// Most things in one episode: ids must fit 16 bits with room to spare, and memory is bounded.
     pub const MAX_THINGS: usize = 4096;
+    /// Longest side of the bounds, metres: maps are made of all that is in them.
+    pub const MAX_LENGTH_M: f32 = 200.0;
     /// Most walls in one episode.
     pub const MAX_WALLS: usize = 4096;
     /// Farthest coordinate, metres: f32 keeps millimetres there.
@@ -262,6 +264,10 @@ impl Setup {
             }
         };
         rect("bounds".into(), &self.bounds)?;
+        let extent = self.bounds.max - self.bounds.min;
+        for (axis, length) in [("x", extent.x), ("z", extent.y)] {
+            number(format!("bounds (its length along {axis})"), length, 0.1, Setup::MAX_LENGTH_M)?;
+        }
         if self.things.len() > Setup::MAX_THINGS {
             let problem =
                 format!("has {} entries, at most {}", self.things.len(), Setup::MAX_THINGS);
@@ -324,8 +330,14 @@ impl Setup {
             number(format!("people[{i}].pose.yaw_rad"), p.pose.yaw_rad, -100.0, 100.0)?;
             let c = p.capability();
             for (name, x, low, high) in [
-                ("speed_m_per_frame", c.speed_m_per_frame, 0.001, 0.2),
-                ("approach_speed_m_per_frame", c.approach_speed_m_per_frame, 0.001, 0.2),
+                // A step longer than the body could pass through a wall.
+                ("speed_m_per_frame", c.speed_m_per_frame, 0.001, c.radius_m.min(0.2)),
+                (
+                    "approach_speed_m_per_frame",
+                    c.approach_speed_m_per_frame,
+                    0.001,
+                    c.radius_m.min(0.2),
+                ),
                 ("radius_m", c.radius_m, 0.05, 1.0),
                 ("height_m", c.height_m, 0.3, 3.0),
                 ("eye_height_m", c.eye_height_m, 0.1, c.height_m),

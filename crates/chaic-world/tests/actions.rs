@@ -5,7 +5,7 @@ mod common;
 
 use chaic_protocol::action::{Action, FailureReason, Hand, Outcome};
 use chaic_protocol::capability::Persona;
-use chaic_protocol::{AgentId, EntityId};
+use chaic_protocol::{AgentId, EntityId, TaskId};
 use chaic_world::{EventKind, Place, World};
 use common::*;
 
@@ -297,6 +297,40 @@ fn two_bring_furniture_to_the_truck() {
     assert_eq!(w.progress(), (900.0, 900.0), "moving house counts mass");
     let bed = chaic_world::top_surfaces(w.setup().thing(nth(1)).unwrap())[0].center.y;
     assert!((w.state().things[1].position.y - bed).abs() < 0.01, "it stands on the truck's bed");
+}
+
+#[test]
+fn what_lies_flat_on_the_ground_at_the_goal_is_delivered() {
+    for class in ["wicker_basket", "cocacola_can", "apple", "plate"] {
+        let things =
+            vec![thing("fire_hydrant", at(0.0, 0.0, -3.0)), thing(class, at(0.2, 0.0, -0.6))];
+        let mut setup = hall(things, vec![person(Persona::Adult, 0.0, 0.0)]);
+        setup.goal_places = vec![nth(0)];
+        let mut w = world(setup);
+        assert_eq!(run(&mut w, A, pick(nth(1))).0, Outcome::Success);
+        let put = Action::PutOn { place: nth(0), hand: Hand::Right };
+        assert_eq!(run(&mut w, A, put).0, Outcome::Success);
+        for _ in 0..260 {
+            w.tick();
+        }
+        assert!(w.state().things[2].delivered.is_some(), "{class}");
+    }
+}
+
+#[test]
+fn a_plate_wider_than_a_cabinet_is_deep_lies_on_its_top() {
+    let things = vec![thing("cabinet", at(0.0, 0.0, -2.0)), thing("plate", at(0.2, 0.0, -0.6))];
+    let mut setup = hall(things, vec![person(Persona::Adult, 0.0, 0.0)]);
+    setup.goal_places = vec![nth(0)];
+    setup.task = TaskId::HighGoal;
+    let mut w = world(setup);
+    assert_eq!(run(&mut w, A, pick(nth(1))).0, Outcome::Success);
+    let put = Action::PutOn { place: nth(0), hand: Hand::Right };
+    assert_eq!(run(&mut w, A, put).0, Outcome::Success);
+    for _ in 0..260 {
+        w.tick();
+    }
+    assert!(w.state().things[2].delivered.is_some());
 }
 
 #[test]

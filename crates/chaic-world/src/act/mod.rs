@@ -92,7 +92,7 @@ impl World {
                 if self.to_put_down(agent, hand).is_empty() {
                     return Err(FailureReason::HandEmpty);
                 }
-                if person.hands.contains(&Some(place)) || self.root(place) != place {
+                if !self.thing(place).1.is_resting() || self.root(place) != place {
                     return Err(FailureReason::Impossible);
                 }
                 let heavy = self.holds_furniture(agent).is_some();

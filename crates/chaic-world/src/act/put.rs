@@ -38,7 +38,12 @@ impl World {
 
     /// Puts a held object into a container or basket.
     pub(crate) fn insert(&mut self, agent: AgentId, object: EntityId, container: EntityId) {
-        let slot = self.contents(container).len() as u8;
+        let is_taken = |slot: u8| {
+            self.contents(container).iter().any(
+                |e| matches!(self.thing(*e).1.place, Place::Inside { slot: s, .. } if s == slot),
+            )
+        };
+        let slot = (0..u8::MAX).find(|slot| !is_taken(*slot)).unwrap_or(u8::MAX);
         let hands = &mut self.person_mut(agent).hands;
         for hand in hands.iter_mut().filter(|h| **h == Some(object)) {
             *hand = None;
@@ -79,7 +84,7 @@ impl World {
         let d = self.rules.durations;
         let from = self.person(agent).pose.position;
         if self.holds_furniture(agent).is_some() {
-            let at = self.free_spot_on(place, first, from);
+            let at = self.free_spot_on(place, first, from, &[]);
             let release =
                 Phase::Release { hand: None, object: first, on: Some(place), at, set_down: true };
             activity.queue = vec![
@@ -93,8 +98,12 @@ impl World {
         if self.vehicle(agent).is_some() {
             // One after the other out of the basket (facts of the original, 8.2).
             let mut steps = vec![self.reach(Some(Hand::Right), self.rest_of(agent, Hand::Right))];
+            let mut taken = Vec::new();
             for object in objects.into_iter().rev() {
-                let at = self.free_spot_on(place, object, from) + Vec3::Y * RELEASE_ABOVE_M;
+                let spot = self.free_spot_on(place, object, from, &taken);
+                let size = self.thing(object).0.size_m();
+                taken.push((spot, 0.5 * size.x.max(size.z)));
+                let at = spot + Vec3::Y * RELEASE_ABOVE_M;
                 let release = Phase::Release {
                     hand: Some(Hand::Right),
                     object,
@@ -113,7 +122,7 @@ impl World {
             activity.queue = steps;
             return Progress::Instant;
         }
-        let spot = self.free_spot_on(place, first, from);
+        let spot = self.free_spot_on(place, first, from, &[]);
         // Facts of the original, 3.7: the height that counts is that of the place's top.
         let height_excess = excess(self.top_of(place), self.capability(agent).put_range_m);
         let p = self.rules.put_penalty.chance(height_excess);

@@ -120,14 +120,14 @@ impl World {
         hand: Option<Hand>,
         object: EntityId,
     ) -> Progress {
+        if let Err(reason) = self.check_takeable(agent, object, hand.unwrap_or(Hand::Right)) {
+            activity.failing = Some(reason);
+            self.abandon_joint(agent, reason);
+            return Progress::Done;
+        }
         if activity.failing == Some(FailureReason::Broke) {
             self.thing_mut(object).place = Place::Broken;
             self.happened(EventKind::Broke { agent, object });
-            return Progress::Done;
-        }
-        if let Err(reason) = self.check_takeable(agent, object, hand.unwrap_or(Hand::Right)) {
-            activity.failing = Some(reason);
-            self.abandon_joint(reason);
             return Progress::Done;
         }
         let taken = self.thing_mut(object);
@@ -174,6 +174,7 @@ impl World {
                 let at = self.thing(object).1.position;
                 self.happened(EventKind::LostSupport { object });
                 self.start_fall(object, at);
+                self.drop_dependents(object);
             }
         }
     }

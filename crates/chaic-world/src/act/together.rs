@@ -30,18 +30,16 @@ impl World {
             return if *absent >= GRACE_FRAMES { Progress::Done } else { Progress::Goes };
         };
         *absent = 0;
+        if self.check_within_reach(agent, object).is_err() {
+            return Progress::Fails(FailureReason::Blocked);
+        }
         let ready = matches!(
             self.person(other).activity.as_ref().map(|a| a.step.phase),
             Some(Phase::AwaitPartner { .. })
-        );
+        ) && self.check_within_reach(other, object).is_ok();
         if !ready {
             let patience = self.rules.durations.await_partner;
             return if elapsed >= patience { Progress::Done } else { Progress::Goes };
-        }
-        if self.check_within_reach(agent, object).is_err()
-            || self.check_within_reach(other, object).is_err()
-        {
-            return Progress::Fails(FailureReason::Blocked);
         }
         self.begin_joint_lift(agent, other, activity, object);
         Progress::Instant
@@ -104,8 +102,8 @@ impl World {
     }
 
     /// A joint lift that can't be: the follower is free again.
-    pub(super) fn abandon_joint(&mut self, reason: FailureReason) {
-        if let Some(joint) = self.state.joint.take()
+    pub(super) fn abandon_joint(&mut self, leader: AgentId, reason: FailureReason) {
+        if let Some(joint) = self.state.joint.take_if(|j| j.leader == leader)
             && let Some(activity) = self.person_mut(joint.follower).activity.as_mut()
         {
             activity.failing = Some(reason);

@@ -1,7 +1,7 @@
 //! What the others do: a log of their actions and holdings, as far as it is known.
 
 use chaic_protocol::observation::SeenAction;
-use chaic_protocol::{Action, ClassId, EntityId, Frame, Observation};
+use chaic_protocol::{Action, AgentId, ClassId, EntityId, Frame, Observation};
 
 use crate::memory::Memory;
 
@@ -20,9 +20,10 @@ pub struct BehaviorLog {
 }
 
 impl BehaviorLog {
-    /// The last known attempt of anybody to pick something up.
-    pub fn last_pick(&self) -> Option<(&SeenAction, EntityId)> {
-        self.actions.iter().rev().find_map(|seen| match seen.action {
+    /// The last known attempt of this person to pick something up that has ended.
+    pub fn last_pick_of(&self, agent: AgentId) -> Option<(&SeenAction, EntityId)> {
+        let has_ended = |seen: &&SeenAction| seen.agent == agent && seen.outcome.is_some();
+        self.actions.iter().rev().filter(has_ended).find_map(|seen| match seen.action {
             Action::PickUp { object, .. } => Some((seen, object)),
             _ => None,
         })
@@ -95,7 +96,7 @@ mod tests {
     use super::*;
     use crate::test_support::Toy;
     use chaic_protocol::observation::Held;
-    use chaic_protocol::{AgentId, Hand, Outcome};
+    use chaic_protocol::{Hand, Outcome};
 
     #[test]
     fn an_action_under_way_is_replaced_by_its_end_and_holdings_are_collected() {
@@ -112,6 +113,7 @@ mod tests {
         let mut observation = toy.observe();
         observation.granted.behavior = vec![seen];
         model.watch(&observation, &memory);
+        assert_eq!(model.log().last_pick_of(AgentId::PARTNER), None, "it is under way");
         (seen.frame, seen.outcome) = (40, Some(Outcome::Success));
         observation.granted.behavior = vec![seen];
         let held = Held { entity: apple.0, class: apple.1, contents: vec![] };
@@ -120,6 +122,8 @@ mod tests {
         model.watch(&observation, &memory);
         assert_eq!(model.log().actions, vec![seen]);
         assert_eq!(model.log().partner_took, vec![apple]);
-        assert_eq!(model.log().last_pick().map(|(_, object)| object), Some(apple.0));
+        let last = model.log().last_pick_of(AgentId::PARTNER);
+        assert_eq!(last.map(|(_, object)| object), Some(apple.0));
+        assert_eq!(model.log().last_pick_of(AgentId::CHILD), None);
     }
 }

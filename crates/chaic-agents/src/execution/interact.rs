@@ -23,6 +23,8 @@ const MAX_STEPS: u32 = 14;
 const UNREACHABLE_FRAMES: Frame = 250;
 /// Something that somebody else had in hand is left alone for so long, frames.
 const HELD_FOR_SURE_FRAMES: Frame = 60;
+/// What was put on the goal place lies still after so long at the latest, frames.
+const SETTLE_FRAMES: Frame = 240;
 /// Something that can't be done at all is left alone for so long, frames.
 const IMPOSSIBLE_FRAMES: Frame = 2000;
 
@@ -154,9 +156,12 @@ pub fn learn(
             if is_goal && !knows_delivered {
                 memory.delivered.extend(released.iter().copied());
             }
-            // Containers are lost on delivery.
             for entity in released.iter().copied().filter(|_| is_goal) {
-                if memory.class_of(entity).is_none_or(|c| briefing.containers.contains(&c)) {
+                if knows_delivered {
+                    // Whether it counts is known as soon as it lies still.
+                    memory.things.ignore(entity, now + SETTLE_FRAMES);
+                } else if memory.class_of(entity).is_none_or(|c| briefing.containers.contains(&c)) {
+                    // Containers are lost on delivery.
                     memory.things.mark_gone(entity);
                 }
             }

@@ -10,6 +10,7 @@ pub mod interact;
 pub mod recover;
 
 use chaic_protocol::briefing::Relation;
+use chaic_protocol::geom::xz;
 use chaic_protocol::observation::SelfState;
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{Action, Briefing, EntityId, FailureReason, Frame, Hand, Outcome, Role, Vec2};
@@ -40,6 +41,8 @@ const AROUND_TURNS: u32 = 18;
 const WAIT_FRAMES: u32 = 10;
 /// A place from where something could not be done is remembered so long, frames.
 const BAD_PLACE_FRAMES: Frame = 800;
+/// A partner seen this far from a piece won't lift it now, metres.
+const LEFT_PIECE_M: f32 = 3.0;
 /// Lifts tried together before giving up.
 const LIFTS_TOGETHER: u32 = 8;
 
@@ -134,6 +137,12 @@ impl Executor {
             self.give_up(plan, s);
             return Progress::Failed;
         }
+        if *plan == Plan::FollowChild
+            && s.memory.companion(s.briefing, Relation::Child).is_some_and(|c| c.is_in_view)
+        {
+            // The time runs only while it is lost.
+            self.since = s.memory.frame;
+        }
         let is_standing = matches!(plan, Plan::PutIn | Plan::TurnAround | Plan::Wait);
         if is_standing || self.has_acted {
             self.recovery.stand();
@@ -223,7 +232,11 @@ impl Executor {
             return Progress::Failed;
         }
         let Some(hand) = load.free_hand else { return Progress::Failed };
-        if together && self.n_lifts >= LIFTS_TOGETHER {
+        let partner = s.memory.companion(s.briefing, Relation::Partner);
+        let partner_left = partner.is_some_and(|p| {
+            p.is_in_view && thing.distance_from(xz(p.position_in_world)) > LEFT_PIECE_M
+        });
+        if together && (partner_left || self.n_lifts >= LIFTS_TOGETHER) {
             return Progress::Failed;
         }
         let hand = if is_heavy { Hand::Left } else { hand };

@@ -201,7 +201,8 @@ impl Memory {
         Some(Reach::metres(cost).max(straight_m))
     }
 
-    /// The known goal places that one can get to, nearest first, with the way to each in metres.
+    /// The known goal places that one can get to, nearest first, with the way to each in metres;
+    /// those that were given up lately come last.
     pub fn goal_places(&self) -> Vec<(&Thing, f32)> {
         let mut places: Vec<_> = self
             .things
@@ -210,7 +211,8 @@ impl Memory {
             .filter(|t| t.top_m + TOP_TOLERANCE_M >= self.goal_place_min_top_m)
             .filter_map(|t| Some((t, self.way_to(t)?)))
             .collect();
-        places.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let is_given_up = |t: &Thing| self.frame < t.ignore_until;
+        places.sort_by(|a, b| is_given_up(a.0).cmp(&is_given_up(b.0)).then(a.1.total_cmp(&b.1)));
         places
     }
 

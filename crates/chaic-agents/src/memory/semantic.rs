@@ -313,9 +313,10 @@ fn looks_held(seen: &Detection, before: Option<&Thing>, people: &[Vec3], now: Fr
     let near = |m: f32| people.iter().any(|p| horizontal_distance(*p, seen.position_in_world) < m);
     match seen.class.info().role {
         Role::Target | Role::Container | Role::Fragile => {
-            // Hands hold things at 1 m (a child at 0.4 m), about 0.55 m ahead of the body.
+            // Hands hold things at 1 m (a child at 0.4 m), about 0.55 m ahead of the body; the
+            // basket of a bicycle is 0.86 m from its rider.
             seen.bottom_m > 0.3
-                && near(0.6)
+                && near(0.9)
                 && before.is_none_or(|t| {
                     // Lying untouched where it was seen before anybody came near, it is not held;
                     // in the hand of somebody who stands still, it is.
@@ -327,7 +328,8 @@ fn looks_held(seen: &Detection, before: Option<&Thing>, people: &[Vec3], now: Fr
         Role::HeavyTarget => {
             near(1.5)
                 && before.is_some_and(|t| {
-                    horizontal_distance(t.position_in_world, seen.position_in_world) > 0.6
+                    now < t.held_until
+                        || horizontal_distance(t.position_in_world, seen.position_in_world) > 0.6
                 })
         }
         _ => false,

@@ -1,6 +1,7 @@
 //! Always beside the partner: for collecting videos of what people do.
 
 use chaic_protocol::Briefing;
+use chaic_protocol::briefing::Relation;
 
 use crate::decision::{Context, Plan, Policy};
 
@@ -17,7 +18,8 @@ impl Policy for Follow {
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
         // A sighting that led nowhere is 60 frames old by then.
-        let is_fresh = context.memory.people.iter().any(|p| p.frame + 60 > context.memory.frame);
+        let partner = context.memory.companion(context.briefing, Relation::Partner);
+        let is_fresh = partner.is_some_and(|p| p.frame + 60 > context.memory.frame);
         if valid.contains(&Plan::FollowPartner) && is_fresh {
             self.was_around = false;
             return Plan::FollowPartner;
@@ -26,8 +28,7 @@ impl Policy for Follow {
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, _: bool) -> bool {
-        let partner = chaic_protocol::briefing::Relation::Partner;
-        let person = context.memory.companion(context.briefing, partner);
+        let person = context.memory.companion(context.briefing, Relation::Partner);
         *current != Plan::FollowPartner && person.is_some_and(|p| p.is_in_view)
     }
 }

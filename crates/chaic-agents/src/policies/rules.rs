@@ -15,8 +15,8 @@ const HOLDINGS_FRAMES: Frame = 300;
 const SPARE_FRAMES: f32 = 120.0;
 /// Walking as it is, turns included, takes longer than the way at full speed by this factor.
 const WALK_FACTOR: f32 = 1.5;
-/// Ways not walked yet are longer than straight by this factor.
-const DETOUR_FACTOR: f32 = 1.4;
+/// A pick-up and a put-on take at least so long together, frames.
+const DEED_FRAMES: f32 = 130.0;
 /// A container for fewer wanted objects than this makes no sense: two hands will do.
 const MIN_FOR_CONTAINER: u32 = 3;
 /// Child and guardian this far apart, both in view, is an emergency, metres (original facts 2.1).
@@ -26,7 +26,7 @@ const APART_REMEMBERED_M: f32 = 5.5;
 /// Sightings older than this are not compared, frames.
 const FRESH_FRAMES: Frame = 50;
 /// Child or guardian unseen for so long is looked for, frames (original facts 2.4: 200).
-const UNSEEN_FRAMES: Frame = 300;
+const UNSEEN_FRAMES: Frame = 200;
 /// After standing beside the child, it may come back by itself for so long, frames.
 const TRUST_CHILD_FRAMES: Frame = 250;
 /// A failed lift of the partner calls for help for so long, frames.
@@ -140,9 +140,6 @@ impl Rules {
         let beside = |c: &Person| {
             c.is_in_view && horizontal_distance(memory.pose.position, c.position_in_world) < 2.3
         };
-        if child.is_some_and(beside) {
-            self.beside_child.get_or_insert(now);
-        }
         // The child turns back at its next decision; from then on it needs no company.
         let trusted = self
             .beside_child
@@ -156,6 +153,9 @@ impl Rules {
             let both_fresh = g.frame.min(c.frame) + FRESH_FRAMES > now;
             let away = (both_in_view && apart > APART_SEEN_M)
                 || (both_fresh && apart > APART_REMEMBERED_M);
+            if away && beside(c) {
+                self.beside_child.get_or_insert(now);
+            }
             if away && !trusted {
                 return Some(Plan::FollowChild);
             }
@@ -198,16 +198,16 @@ impl Rules {
             return None;
         }
         let now = context.memory.frame;
-        let tried = context.behavior.last_pick().filter(|(seen, _)| {
-            let failed = Outcome::Failure(FailureReason::BeyondLimits);
-            seen.frame + CALL_FRAMES > now && seen.outcome.is_none_or(|o| o == failed)
-        });
+        let failed = Outcome::Failure(FailureReason::BeyondLimits);
+        let partner = context.briefing.companion(Relation::Partner);
+        let in_vain = partner
+            .and_then(|p| context.behavior.last_pick_of(p))
+            .filter(|(seen, _)| seen.frame + CALL_FRAMES > now && seen.outcome == Some(failed))
+            .map(|(_, object)| object);
         let strength_kg = context.briefing.capability.strength_kg;
         valid.iter().copied().find(|plan| match plan {
             Plan::LiftWith(it) => {
-                it.class.info().mass_kg > strength_kg
-                    || tried
-                        .is_some_and(|(seen, object)| object == it.entity && seen.outcome.is_some())
+                it.class.info().mass_kg > strength_kg || in_vain == Some(it.entity)
             }
             _ => false,
         })
@@ -357,18 +357,18 @@ fn must_go(context: &Context<'_>, profile: &RuleProfile) -> bool {
     part_left(context) < below || is_far
 }
 
-/// Whether there is time to fetch an object and bring it to a known goal place.
+/// Whether there may be time to fetch an object and bring it to a known goal place: on the
+/// straightest way, at full speed.
 fn there_is_time(context: &Context<'_>, entity: EntityId) -> bool {
     let memory = context.memory;
     let Some(thing) = memory.things.get(entity) else { return true };
     let at = chaic_protocol::geom::xz(thing.position_in_world);
     let places = memory.goal_places();
     let onward_m = places.iter().map(|(place, _)| place.distance_from(at)).min_by(f32::total_cmp);
-    let (Some(onward_m), Some(way_m)) = (onward_m, memory.way_to(thing)) else { return true };
-    // The way may be made long by narrow places: never take it for more than twice the straight.
-    let way_m = way_m.min(2.0 * thing.distance_from(memory.here()) + 2.0);
-    let needed = frames_for(context, way_m + DETOUR_FACTOR * onward_m) + SPARE_FRAMES;
-    frames_left(context) > needed
+    let Some(onward_m) = onward_m else { return true };
+    let way_m = thing.distance_from(memory.here()) + onward_m;
+    let speed = context.briefing.capability.speed_m_per_frame.max(1e-3);
+    frames_left(context) > way_m / speed + DEED_FRAMES
 }
 
 #[cfg(test)]

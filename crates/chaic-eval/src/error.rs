@@ -13,14 +13,14 @@ pub type Result<T> = std::result::Result<T, EvalError>;
 #[derive(Debug, thiserror::Error)]
 pub enum EvalError {
     /// The operating system refused something.
-    #[error("can't {what} {path}: {source}", path = path.display())]
+    #[error("can't {what} {path}: {refusal}", path = path.display())]
     Io {
         /// What was tried, for example `write`.
         what: &'static str,
         /// With which file or folder.
         path: PathBuf,
         /// The refusal.
-        source: io::Error,
+        refusal: io::Error,
     },
     /// A folder isn't a run.
     #[error(
@@ -130,12 +130,12 @@ pub enum EvalError {
     #[error(transparent)]
     Episode(#[from] EpisodeError),
     /// A setup can't become a world.
-    #[error("the setup of {id} makes no world: {source}")]
+    #[error("the setup of {id} makes no world: {problem}")]
     Setup {
         /// The episode.
         id: String,
         /// Why.
-        source: SetupError,
+        problem: SetupError,
     },
     /// A trace's actions don't lead where the trace says.
     #[error("{0}")]
@@ -149,6 +149,6 @@ impl EvalError {
     /// For `map_err` on what the operating system may refuse.
     pub fn io(what: &'static str, path: &Path) -> impl FnOnce(io::Error) -> EvalError + use<> {
         let path = path.to_owned();
-        move |source| EvalError::Io { what, path, source }
+        move |refusal| EvalError::Io { what, path, refusal }
     }
 }

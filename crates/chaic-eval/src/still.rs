@@ -91,7 +91,7 @@ fn name_of(entity: EntityId, classes: &[Option<ClassId>]) -> &'static str {
 /// # Errors
 /// If the setup makes no world, or the file system refuses.
 pub fn write_plan(episode: &Episode, width_px: u32, path: &Path) -> Result<()> {
-    let refused = |source| EvalError::Setup { id: episode.id().to_owned(), source };
+    let refused = |problem| EvalError::Setup { id: episode.id().to_owned(), problem };
     let world = World::new(episode.setup().clone(), Rules::paper()).map_err(refused)?;
     let scene = Scene::new(episode.setup());
     save(plan::draw_scene_plan(&scene, &world, width_px).into(), path)

@@ -147,7 +147,7 @@ fn setup_of(staging: &Staging<'_>, has_helper: bool) -> Arc<Setup> {
 }
 
 fn new_world(setup: &Arc<Setup>, rules: Rules, id: &str) -> Result<World> {
-    let refused = |source| EvalError::Setup { id: id.to_owned(), source };
+    let refused = |problem| EvalError::Setup { id: id.to_owned(), problem };
     World::new(Arc::clone(setup), rules).map_err(refused)
 }
 

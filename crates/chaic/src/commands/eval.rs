@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, anyhow, bail};
 use chaic_eval::helpers::BuiltIn;
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::{Format, Report, write_figure, write_files};
@@ -23,6 +23,9 @@ pub fn run(arguments: &EvalArguments) -> Result<Ended> {
     let (given, name) = given(arguments);
     let path = arguments.out.clone().map_or_else(|| free_folder(name), Ok)?;
     let access = if arguments.resume { Access::Resume } else { Access::Begin };
+    if arguments.resume && !path.join("run.json").exists() {
+        bail!("{} is no run that one could go on with: it has no run.json", path.display());
+    }
     let (mut run, warnings) = Run::open(&path, access, &given, &BuiltIn)?;
     for warning in warnings {
         complain(&format!("warning: {warning}; that episode is played again"));
@@ -48,7 +51,7 @@ pub fn run(arguments: &EvalArguments) -> Result<Ended> {
     let mut bars = RunBars::new(extent);
     let played = run.play(jobs, &BuiltIn, stop, &mut |progress| bars.show(progress));
     bars.clear();
-    let is_whole = played.with_context(|| how_to_resume(&path))?;
+    let is_whole = played.map_err(|e| anyhow!("{e:#}\n{}", how_to_resume(&path)))?;
     if !is_whole {
         let extent = run.extent();
         let done = extent.finished - extent.errors;

@@ -43,10 +43,14 @@ impl Solid {
         Solid::new(center, half, math::atan2(-along.y, along.x))
     }
 
+    /// A box of the world.
+    pub fn of_block(b: &Block) -> Solid {
+        Solid::new(b.center, b.half, b.yaw_rad)
+    }
+
     /// The colliding boxes of a thing.
     pub fn of_thing(thing: &Thing) -> Vec<Solid> {
-        let solid = |b: Block| Solid::new(b.center, b.half, b.yaw_rad);
-        blocks_of(thing).into_iter().map(solid).collect()
+        blocks_of(thing).iter().map(Solid::of_block).collect()
     }
 
     /// All walls of a setup.

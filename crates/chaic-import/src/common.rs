@@ -65,7 +65,7 @@ pub(crate) fn people(
         let apart = |p: &Person| (xz(p.pose.position), p.capability().radius_m + radius_m);
         let apart: Vec<(Vec2, f32)> = people.iter().map(apart).collect();
         // Bodies keep a centimetre apart, so that nobody starts in touch with anything.
-        let free = around.free_place(xz(recorded), radius_m + 0.01, setup.bounds, &apart);
+        let free = around.free_place(xz(recorded), radius_m + 0.01, &apart);
         let p = free.unwrap_or(xz(recorded));
         let pose = Pose {
             position: mm3(Vec3::new(p.x, 0.0, p.y)),

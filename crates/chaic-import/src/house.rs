@@ -90,8 +90,12 @@ fn shell(source: &Source, plan: &Floorplan, variant: &str, names: &[String]) -> 
     };
     // Rooms end at the faces of walls: each floor goes on to the middle of the wall, and the first
     // one under all covers bays and doorways.
-    let under =
-        Floor { rect: bounds.grown(0.3), material: FloorMaterial::Wood, color: colors.floors[0] };
+    let walls: Vec<Wall> =
+        plan.walls.iter().map(|w| wall(*w, plan.height_m, colors.wall)).collect();
+    let covered = walls
+        .iter()
+        .fold(bounds, |r, w| Rect { min: r.min.min(w.a).min(w.b), max: r.max.max(w.a).max(w.b) });
+    let under = Floor { rect: covered, material: FloorMaterial::Wood, color: colors.floors[0] };
     let floors = rooms.iter().zip(&colors.floors).map(|(room, color)| Floor {
         rect: room.rect.grown(0.5 * plan.thickness_m + 0.04),
         material: material(room.kind),
@@ -105,7 +109,7 @@ fn shell(source: &Source, plan: &Floorplan, variant: &str, names: &[String]) -> 
         ceiling_m: Some(plan.height_m),
         floors: std::iter::once(under).chain(floors).collect(),
         rooms,
-        walls: plan.walls.iter().map(|w| wall(*w, plan.height_m, colors.wall)).collect(),
+        walls,
         openings: plan
             .openings
             .iter()

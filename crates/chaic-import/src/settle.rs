@@ -6,8 +6,8 @@
 
 use chaic_episodes::Solid;
 use chaic_protocol::geom::{Rect, math, rotate_yaw, xz};
-use chaic_protocol::{Vec2, Vec3};
-use chaic_world::{Rules, Setup, Surface, Thing, blocks_of};
+use chaic_protocol::{Role, Vec2, Vec3};
+use chaic_world::{Rules, Setup, Surface, Thing, blocks_of, ghosts_of};
 
 /// At most this deep two things touch, metres.
 const TOUCH_M: f32 = 0.01;
@@ -36,10 +36,14 @@ pub(crate) struct Rest<'a> {
 }
 
 /// All that stands and lies around.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Surroundings {
+    /// Nothing comes to rest outside of these.
+    bounds: Rect,
     surfaces: Vec<Surface>,
     solids: Vec<(Rect, Solid)>,
+    /// What can't be seen into, but isn't in anybody's way.
+    hidden: Vec<(Rect, Solid)>,
     /// Furniture seen from above.
     shadows: Vec<Solid>,
 }
@@ -47,12 +51,22 @@ pub(crate) struct Surroundings {
 impl Surroundings {
     /// The walls of a setup and the things in it.
     pub fn of(setup: &Setup) -> Surroundings {
-        let mut all = Surroundings::default();
+        let mut all = Surroundings {
+            bounds: setup.bounds,
+            surfaces: Vec::new(),
+            solids: Vec::new(),
+            hidden: Vec::new(),
+            shadows: Vec::new(),
+        };
         all.add_solids(Solid::of_walls(setup));
-        for thing in &setup.things {
+        // A bicycle is in nobody's way, least of all its rider's.
+        let stays = |t: &&Thing| t.class.info().role != Role::Vehicle;
+        for thing in setup.things.iter().filter(stays) {
             all.surfaces.extend(tops(thing));
             all.shadows.extend(Solid::of_thing(thing));
             all.add_solids(Solid::of_thing(thing));
+            // Nobody finds what is inside a cushion.
+            all.hidden.extend(ghosts_of(thing).iter().map(Solid::of_block).map(with_bounds));
         }
         all
     }
@@ -63,7 +77,7 @@ impl Surroundings {
     }
 
     fn add_solids(&mut self, solids: Vec<Solid>) {
-        self.solids.extend(solids.into_iter().map(|s| (s.bounds(), s)));
+        self.solids.extend(solids.into_iter().map(with_bounds));
     }
 
     /// The thing on furniture near where it was put; `None` if there is no room for it.
@@ -80,6 +94,7 @@ impl Surroundings {
                 on_top.or_else(|| self.laid(thing, rest, slid_m, leaning))
             })
             .or_else(|| self.laid(thing, rest, ANYWHERE_M, Some))
+            .or_else(|| self.fallen(thing, rest))
     }
 
     /// The thing on the nearest surface within `reach_m` that has room for it at the height that
@@ -111,7 +126,7 @@ impl Surroundings {
 
     /// The thing on the floor where it was put, or as near as it has room.
     pub fn laid_on_floor(&self, thing: &Thing, rest: &Rest) -> Option<Thing> {
-        around(SLID_M[1], 0.05)
+        around(FALLEN_M, 0.05)
             .map(|offset| moved(thing, xz(thing.position) + offset, 0.0))
             .find(|t| self.fits(t, rest))
     }
@@ -129,33 +144,33 @@ impl Surroundings {
     }
 
     /// The place nearest to where somebody was put that has room for a body of this radius.
-    pub fn free_place(
-        &self,
-        p: Vec2,
-        radius_m: f32,
-        within: Rect,
-        apart: &[(Vec2, f32)],
-    ) -> Option<Vec2> {
+    pub fn free_place(&self, p: Vec2, radius_m: f32, apart: &[(Vec2, f32)]) -> Option<Vec2> {
         let stands = [Rules::paper().step_over_m, 2.0];
         let blocks: Vec<&Solid> =
             self.solids.iter().map(|(_, s)| s).filter(|s| s.spans(stands)).collect();
         around(FALLEN_M, 0.02).map(|offset| p + offset).find(|p| {
-            within.grown(-radius_m).contains(*p)
+            self.bounds.grown(-radius_m).contains(*p)
                 && blocks.iter().all(|s| s.distance(*p) >= radius_m)
                 && apart.iter().all(|(other, apart_m)| other.distance(*p) >= *apart_m)
         })
     }
 
     fn fits(&self, thing: &Thing, rest: &Rest) -> bool {
-        let in_room =
-            rest.rooms.is_empty() || rest.rooms.iter().any(|r| r.contains(xz(thing.position)));
+        let p = xz(thing.position);
+        let in_room = rest.rooms.is_empty() || rest.rooms.iter().any(|r| r.contains(p));
         in_room
+            && self.bounds.contains(p)
             && Solid::of_thing(thing).iter().all(|own| {
                 let bounds = own.bounds();
-                let near = self.solids.iter().filter(|(b, _)| b.overlaps(&bounds));
+                let all = self.solids.iter().chain(&self.hidden);
+                let near = all.filter(|(b, _)| b.overlaps(&bounds));
                 near.into_iter().all(|(_, s)| s.overlap(own) <= TOUCH_M)
             })
     }
+}
+
+fn with_bounds(solid: Solid) -> (Rect, Solid) {
+    (solid.bounds(), solid)
 }
 
 /// The tops of all parts: things may lie on an arm or a back as well.

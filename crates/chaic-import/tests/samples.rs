@@ -188,6 +188,57 @@ fn another_layout_of_the_folders_will_do() {
     assert_eq!(imported.episodes.len(), 1);
 }
 
+#[test]
+fn a_street_worked_by_hand() {
+    let sample = Sample::new();
+    sample.edit(RECORDS, |v| {
+        v["records"]["b06_dump"] = record("truck", [3.5, 3.68, 10.6]);
+        v["records"]["arflex_strips_sofa"] = record("sofa", [1.92, 0.665, 0.975]);
+    });
+    sample.json(
+        "train_dataset/outdoor_furniture/test_env.json",
+        &json!([{
+        "scene": "2a", "layout": "0_0", "seed": 77, "task": {
+            "goal_position_names": "truck", "goal_task": [["arflex_strips_sofa", 1]],
+            "container_names": [], "task_kind": "outdoor_furniture", "constraint_type": "weight",
+        }}]),
+    );
+    let add = |id: u64, name: &str, position: [f64; 3], yaw_deg: f64| {
+        json!({"$type": "add_object", "id": id, "name": name, "position": xyz(position),
+               "rotation": xyz([0.0, yaw_deg, 0.0]), "scale_factor": 1.0})
+    };
+    let scale =
+        |id: u64, f: [f64; 3]| json!({"$type": "scale_object", "id": id, "scale_factor": xyz(f)});
+    sample.json(
+        "train_dataset/outdoor_furniture/2a_0_0.json",
+        &json!([
+            add(1, "arflex_strips_sofa", [3.75, 0.32, 2.5], 180.0),
+            scale(1, [0.7; 3]),
+            add(2, "b06_dump", [14.0, 0.0, 0.0], 90.0),
+            scale(2, [0.9, 0.5, 1.0]),
+        ]),
+    );
+    sample.json(
+        "train_dataset/outdoor_furniture/2a_0_0_metadata.json",
+        &json!({
+            "agent": {"0": [-0.25, 0.1, 2.25], "1": [2.0, 0.1, -1.25]}, "mass_map": {"1": 900},
+        }),
+    );
+    let imported = sample.going_on();
+    let episode = imported.episodes.last().expect("the second task");
+    assert_eq!((episode.id(), episode.seed()), ("moving_house/original-train/00", 77));
+    let setup = episode.setup();
+    let [truck] = of(setup, "truck")[..] else { panic!("one truck") };
+    assert!((forward(truck.yaw_rad) - Vec3::X).length() < 1e-3, "it looks along +x");
+    assert!((truck.size_m() - Vec3::new(3.15, 1.84, 10.6)).abs().max_element() < 2e-3);
+    let bed = chaic_world::top_surfaces(truck)[0].center.y;
+    assert!((bed - 0.95).abs() < 1e-3, "the bed is where it was measured: {bed}");
+    let [sofa] = of(setup, "sofa")[..] else { panic!("one sofa") };
+    assert_eq!(sofa.position, Vec3::new(3.75, 0.0, -2.5));
+    assert!((forward(sofa.yaw_rad) - Vec3::Z).length() < 1e-3 && !sofa.fixed);
+    assert_eq!(setup.people[0].pose.position, Vec3::new(-0.25, 0.0, -2.25));
+}
+
 /// Checks that a spoilt sample is refused with a message that holds all these words.
 fn refused(spoil: impl FnOnce(&Sample), words: &[&str]) {
     let sample = Sample::new();

@@ -139,21 +139,32 @@ pub(crate) fn blocks_at(
     position: Vec3,
     yaw_rad: f32,
 ) -> impl Iterator<Item = Block> + use<> {
+    let thing = *thing;
+    let parts = thing.parts().filter(|p| p.collides);
+    parts.map(move |part| block(&thing, &part, entity, position, yaw_rad))
+}
+
+/// The box around a part of a thing standing upright at `position` with `yaw_rad`.
+fn block(thing: &Thing, part: &Part, entity: EntityId, position: Vec3, yaw_rad: f32) -> Block {
     let size = thing.size_m();
-    thing.parts().filter(|p| p.collides).map(move |part| {
-        let half = turned_half_extents(&part, size);
-        Block {
-            center: position + rotate_yaw(Vec3::from(part.center) * size, yaw_rad),
-            half,
-            yaw_rad,
-            entity,
-        }
-    })
+    Block {
+        center: position + rotate_yaw(Vec3::from(part.center) * size, yaw_rad),
+        half: turned_half_extents(part, size),
+        yaw_rad,
+        entity,
+    }
 }
 
 /// The collision boxes of a thing where the setup puts it.
 pub fn blocks_of(thing: &Thing) -> Vec<Block> {
     blocks_at(thing, EntityId::NOTHING, thing.position, thing.yaw_rad).collect()
+}
+
+/// Boxes around those parts of a thing that are only to be looked at, where the setup puts it:
+/// what lies inside one can't be seen.
+pub fn ghosts_of(thing: &Thing) -> Vec<Block> {
+    let ghosts = thing.parts().filter(|p| !p.collides);
+    ghosts.map(|p| block(thing, &p, EntityId::NOTHING, thing.position, thing.yaw_rad)).collect()
 }
 
 /// The tops of a thing on which others may be put, where the setup puts it.

@@ -92,6 +92,12 @@ fn every_episode_is_there() {
         let one = import(&Sources { half: Some(half), ..sources.clone() }, OnError::Stop);
         let Ok(one) = one else { continue };
         assert_eq!(one.episodes.len(), 96, "{name}");
+        let again = import(&Sources { half: Some(half), ..sources.clone() }, OnError::Stop);
+        assert_eq!(
+            again.expect("as before").episodes,
+            one.episodes,
+            "the same sources, the same bits"
+        );
         for task in TaskId::all() {
             for k in 0..12 {
                 assert!(ids.contains(&format!("{task}/original-{name}/{k:02}")), "{task} {k}");
@@ -134,7 +140,7 @@ fn people_start_free_and_near_their_recorded_places() {
             let recorded =
                 glam::Vec3::new(coordinate("x", 0) as f32, 0.0, -coordinate("z", 2) as f32);
             let off_m = horizontal_distance(person.pose.position, recorded);
-            assert!(off_m < 0.35, "{}: agent {k} is moved by {off_m} m", episode.id());
+            assert!(off_m < 0.25, "{}: agent {k} is moved by {off_m} m", episode.id());
         }
         let world = World::new(setup.clone(), Rules::paper()).expect("a world begins");
         assert!(world.waiting().len() >= 2, "{}", episode.id());

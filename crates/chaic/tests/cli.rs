@@ -170,16 +170,16 @@ fn errors_are_clear() {
         (&["eval", "--size", "5", "--out", "r"], "--size is 5"),
         (&["eval", "--seeds", "0", "--out", "r"], "at least 1"),
         (&["eval", "--episodes-dir", "nowhere", "--out", "r"], "nowhere"),
-        (
-            &["import", "original", "--dataset", "nowhere", "--tdw", "nowhere", "--out", "x"],
-            "holds no tdw package",
-        ),
         (&["report", "nowhere"], "no run.json"),
         (&["verify", "nowhere"], "no run.json"),
         (&["replay", "nowhere", "obstacle/test/00", "--out", "x.mp4"], "no run.json"),
         (&["render", "obstacle/test/99", "--out", "x"], "obstacle/test/99"),
         (&["episodes", "show", "nowhere.json", "--out", "x.png"], "nowhere.json"),
         (&["episodes", "generate", "--task", "obstacle", "--seeds", "3..3", "--out", "x"], "A..B"),
+        (
+            &["import", "original", "--dataset", "nowhere", "--tdw", "nowhere", "--out", "x"],
+            "holds no tdw package",
+        ),
     ] {
         let said = ill(at, arguments);
         assert!(said.contains(words), "{arguments:?}: {said}");

@@ -79,16 +79,20 @@ fn support(setup: &Setup, demand: Demand, found: &mut Vec<Problem>) {
         Demand::Fair => TOLERANCE_M,
         Demand::Playable => LEANING_M,
     };
-    let tops: Vec<Surface> = match demand {
-        Demand::Fair => setup.things.iter().flat_map(top_surfaces).collect(),
-        Demand::Playable => setup.things.iter().flat_map(all_tops).collect(),
+    let tops_of = |thing: &Thing| match demand {
+        Demand::Fair => top_surfaces(thing),
+        Demand::Playable => all_tops(thing),
     };
+    let tops: Vec<(usize, Surface)> = (setup.things.iter().enumerate())
+        .flat_map(|(k, thing)| tops_of(thing).into_iter().map(move |top| (k, top)))
+        .collect();
     for (i, thing) in setup.things.iter().enumerate() {
         if thing.fixed || thing.position.y <= slack_m {
             continue;
         }
         let p = thing.position;
-        let bears = tops.iter().any(|s| {
+        let others = tops.iter().filter(|(k, _)| *k != i);
+        let bears = others.into_iter().any(|(_, s)| {
             let local = chaic_protocol::geom::rotate_yaw(p - s.center, -s.yaw_rad);
             (-TOLERANCE_M..=slack_m).contains(&local.y)
                 && local.x.abs() <= s.half[0]

@@ -3,7 +3,7 @@
 //! **What it is**: generators that turn a seed into a [`Setup`](chaic_world::Setup) ([`house`],
 //! [`street`], [`yard`]), the bundled benchmark and unlimited generated episodes ([`Split`],
 //! [`episodes`]), the episode file ([`Episode`], [`json_schema`]), and the check that an episode
-//! can be played ([`validate`]).
+//! can be played ([`playable`], [`validate`]).
 //!
 //! **What it is not**: it never steps a world, keeps no scores and opens no files; bytes come in
 //! and go out.
@@ -30,7 +30,8 @@ mod solid;
 
 pub use format::{Episode, EpisodeError, GeneratorInfo, MAX_EPISODE_BYTES, json_schema};
 pub use generate::{GenerateError, Seeds, generate};
+pub use solid::{Solid, mm, mm3};
 pub use split::{
     BUNDLED_PER_TASK, Bundled, Split, SplitError, episodes, find_episode, regenerate_bundled,
 };
-pub use validate::{Problem, validate};
+pub use validate::{Problem, playable, validate};

@@ -7,7 +7,7 @@ use glam::Vec3Swizzles as _;
 
 /// A box with an upright axis, ready for tests in plan.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Solid {
+pub struct Solid {
     pub(crate) middle: Vec2,
     /// Unit vector of its own x axis, in plan.
     axis_x: Vec2,
@@ -43,14 +43,18 @@ impl Solid {
         Solid::new(center, half, math::atan2(-along.y, along.x))
     }
 
+    /// A box of the world.
+    pub fn of_block(b: &Block) -> Solid {
+        Solid::new(b.center, b.half, b.yaw_rad)
+    }
+
     /// The colliding boxes of a thing.
-    pub(crate) fn of_thing(thing: &Thing) -> Vec<Solid> {
-        let solid = |b: Block| Solid::new(b.center, b.half, b.yaw_rad);
-        blocks_of(thing).into_iter().map(solid).collect()
+    pub fn of_thing(thing: &Thing) -> Vec<Solid> {
+        blocks_of(thing).iter().map(Solid::of_block).collect()
     }
 
     /// All walls of a setup.
-    pub(crate) fn of_walls(setup: &Setup) -> Vec<Solid> {
+    pub fn of_walls(setup: &Setup) -> Vec<Solid> {
         setup.walls.iter().map(Solid::of_wall).collect()
     }
 
@@ -60,7 +64,7 @@ impl Solid {
     }
 
     /// Distance in plan from a point; 0 inside.
-    pub(crate) fn distance(&self, p: Vec2) -> f32 {
+    pub fn distance(&self, p: Vec2) -> f32 {
         (self.local(p).abs() - self.half).max(Vec2::ZERO).length()
     }
 
@@ -71,18 +75,18 @@ impl Solid {
     }
 
     /// The smallest axis-aligned rectangle around it.
-    pub(crate) fn bounds(&self) -> Rect {
+    pub fn bounds(&self) -> Rect {
         let reach = self.axis_x.abs() * self.half.x + self.axis_z.abs() * self.half.y;
         Rect { min: self.middle - reach, max: self.middle + reach }
     }
 
     /// Whether it takes up any height between `low_m` and `high_m`.
-    pub(crate) fn spans(&self, [low_m, high_m]: [f32; 2]) -> bool {
+    pub fn spans(&self, [low_m, high_m]: [f32; 2]) -> bool {
         self.low_m < high_m && self.high_m > low_m
     }
 
     /// How deep two boxes sit in each other, metres; 0 or less if they are apart.
-    pub(crate) fn overlap(&self, other: &Solid) -> f32 {
+    pub fn overlap(&self, other: &Solid) -> f32 {
         let mut depth = (self.high_m.min(other.high_m)) - (self.low_m.max(other.low_m));
         let d = other.middle - self.middle;
         for axis in [self.axis_x, self.axis_z, other.axis_x, other.axis_z] {
@@ -133,13 +137,13 @@ pub(crate) fn rect_distance(r: &Rect, p: Vec2) -> f32 {
 }
 
 /// To the millimetre, so that the text of a file names the very number.
-pub(crate) fn mm(x: f32) -> f32 {
+pub fn mm(x: f32) -> f32 {
     // Adding zero turns -0 into 0.
     (x * 1000.0).round() / 1000.0 + 0.0
 }
 
 /// A point to the millimetre.
-pub(crate) fn mm3(p: Vec3) -> Vec3 {
+pub fn mm3(p: Vec3) -> Vec3 {
     Vec3::new(mm(p.x), mm(p.y), mm(p.z))
 }
 

@@ -160,6 +160,28 @@ fn goals_must_be_within_reach() {
 }
 
 #[test]
+fn episodes_from_elsewhere_may_ask_too_much_but_must_be_playable() {
+    let passes = |file: &Value| Episode::parse(file.to_string().as_bytes(), "x").is_ok();
+    let mut file = good();
+    file["setup"]["goal"]["targets"][0][1] = json!(99);
+    check_file(&file, &["goal.targets[0]", "99"]);
+    file["generator"] = Value::Null;
+    assert!(passes(&file), "as the original's own episodes do");
+    file["setup"]["goal"]["targets"] = json!([["lighter", 1]]);
+    check_file(&file, &["nothing that the goal asks for"]);
+
+    // What leans has its bottom above what bears it; what hangs in the air can't be played.
+    let mut file = good();
+    file["generator"] = Value::Null;
+    let k = thing_index(&file, "plate");
+    let height_m = file["setup"]["things"][k]["position"][1].as_f64().expect("a number");
+    file["setup"]["things"][k]["position"][1] = json!(height_m + 0.1);
+    assert!(passes(&file), "it may lean");
+    file["setup"]["things"][k]["position"][1] = json!(2.5);
+    check_file(&file, &["nothing holds it up"]);
+}
+
+#[test]
 fn the_schema_describes_the_file() {
     let schema = json_schema();
     let properties = schema["properties"].as_object().expect("an object has properties");

@@ -2,36 +2,36 @@
 
 use std::sync::{Arc, OnceLock};
 
-use chaic_protocol::{ClassId, EntityId, Vec3};
+use chaic_protocol::{EntityId, Vec3};
+use chaic_world::Thing;
 use glam::Mat3;
 
 use crate::mesh::{Mesh, length};
-use crate::solids::{N_LEVELS, class_mesh, place_of};
+use crate::solids::{N_LEVELS, place_of, thing_mesh};
 
-/// A class's mesh at one size, at every level of detail, each made when first needed.
+/// The mesh of a thing's shape, at every level of detail, each made when first needed.
 #[derive(Debug)]
 pub(crate) struct ClassMesh {
-    class: ClassId,
-    size: Vec3,
+    thing: Thing,
     pub min: Vec3,
     pub max: Vec3,
     levels: [OnceLock<Mesh>; N_LEVELS],
 }
 
 impl ClassMesh {
-    /// The mesh of a class at these factors of the catalogue's size. Unscaled ones are shared by
-    /// all scenes of the process.
-    pub fn of(class: ClassId, scale: [f32; 3]) -> Arc<ClassMesh> {
+    /// The mesh of a thing wherever it is. Those of catalogue size are shared by all scenes of the
+    /// process.
+    pub fn of(thing: &Thing) -> Arc<ClassMesh> {
         static UNSCALED: [OnceLock<Arc<ClassMesh>>; 256] = [const { OnceLock::new() }; 256];
-        let make = || Arc::new(ClassMesh::new(class, scale));
-        if scale == [1.0; 3] { UNSCALED[class.index()].get_or_init(make).clone() } else { make() }
+        let make = || Arc::new(ClassMesh::new(thing));
+        let is_usual = thing.scale == [1.0; 3] && thing.seat_m.is_none();
+        if is_usual { UNSCALED[thing.class.index()].get_or_init(make).clone() } else { make() }
     }
 
-    fn new(class: ClassId, scale: [f32; 3]) -> ClassMesh {
-        let size = Vec3::from(class.info().size_m) * Vec3::from(scale);
+    fn new(thing: &Thing) -> ClassMesh {
         let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        for part in class.info().parts {
-            let place = place_of(part, size);
+        for part in thing.parts() {
+            let place = place_of(&part, thing.size_m());
             let half = 0.5
                 * (place.axes.x_axis.abs() * place.extent.x
                     + place.axes.y_axis.abs() * place.extent.y
@@ -42,11 +42,11 @@ impl ClassMesh {
         if min.x > max.x {
             (min, max) = (Vec3::ZERO, Vec3::ZERO);
         }
-        ClassMesh { class, size, min, max, levels: [const { OnceLock::new() }; N_LEVELS] }
+        ClassMesh { thing: *thing, min, max, levels: [const { OnceLock::new() }; N_LEVELS] }
     }
 
     fn level(&self, level: usize) -> &Mesh {
-        self.levels[level].get_or_init(|| class_mesh(self.class.info(), self.size, level))
+        self.levels[level].get_or_init(|| thing_mesh(&self.thing, level))
     }
 }
 

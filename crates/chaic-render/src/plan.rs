@@ -2,7 +2,7 @@
 
 use chaic_protocol::geom::Rect;
 use chaic_protocol::{AgentId, EntityId, Role, Vec2, Vec3};
-use chaic_world::{Place, RoomKind, World};
+use chaic_world::{Place, RoomKind, Wall, World};
 use image::{Rgb, RgbImage};
 
 use crate::draw::{Omit, Scratch, draw as draw_scene};
@@ -61,6 +61,11 @@ impl Map {
     fn flat(&self, p: Vec2) -> Vec2 {
         (p - self.area.min) * self.px_per_m
     }
+
+    /// The point (x, z) that a pixel shows.
+    fn plan(&self, px: Vec2) -> Vec2 {
+        self.area.min + px / self.px_per_m
+    }
 }
 
 fn seen_area(world: &World) -> Rect {
@@ -118,14 +123,28 @@ fn tint_rooms(image: &mut RgbImage, world: &World, map: &Map) {
             continue;
         }
         let (a, b) = (map.flat(room.rect.min), map.flat(room.rect.max));
-        for_pixels(image, a, b, |_, pixel| {
+        let walls: Vec<&Wall> =
+            world.setup().walls.iter().filter(|w| touches(w, &room.rect)).collect();
+        for_pixels(image, a, b, |at, pixel| {
             // Walls stay dark; all else is lighter than in a room, for what is drawn on it.
-            if pixel.iter().any(|c| *c > 70) {
+            if !walls.iter().any(|w| covers(w, map.plan(at))) {
                 blend(pixel, [255; 3], 0.16);
                 blend(pixel, room_color(room.kind), 0.2);
             }
         });
     }
+}
+
+fn touches(wall: &Wall, rect: &Rect) -> bool {
+    let around = Rect { min: wall.a.min(wall.b), max: wall.a.max(wall.b) };
+    around.grown(wall.thickness_m).overlaps(rect)
+}
+
+/// Whether a wall stands on a point.
+fn covers(wall: &Wall, p: Vec2) -> bool {
+    let along = wall.b - wall.a;
+    let t = ((p - wall.a).dot(along) / along.length_squared().max(1e-6)).clamp(0.0, 1.0);
+    p.distance(wall.a + along * t) <= 0.5 * wall.thickness_m
 }
 
 fn name_rooms(image: &mut RgbImage, world: &World, map: &Map) {

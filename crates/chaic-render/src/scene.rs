@@ -51,7 +51,7 @@ impl Scene {
             let palette = thing.class.info().palette;
             let tint = (!palette.is_empty())
                 .then(|| linear_from_srgb(palette[usize::from(thing.variant) % palette.len()]));
-            (ClassMesh::of(thing.class, thing.scale), tint)
+            (ClassMesh::of(thing), tint)
         });
         Scene { structure, things: things.collect(), ground: Ground::new(setup) }
     }

@@ -1,8 +1,9 @@
 //! The catalogue's solids as meshes.
 
 use chaic_protocol::Vec3;
-use chaic_protocol::catalogue::{ClassInfo, Part, Solid};
+use chaic_protocol::catalogue::{Part, Solid};
 use chaic_protocol::geom::math;
+use chaic_world::Thing;
 use glam::Mat3;
 
 use crate::mesh::{Mesh, Place, Skin, circle, length};
@@ -40,12 +41,13 @@ impl Detail {
     }
 }
 
-/// The mesh of a class at a size and level, in the object's frame, metres.
-pub(crate) fn class_mesh(class: &ClassInfo, size: Vec3, level: usize) -> Mesh {
+/// The mesh of a thing at a level, in its own frame, metres.
+pub(crate) fn thing_mesh(thing: &Thing, level: usize) -> Mesh {
+    let (class, size) = (thing.class.info(), thing.size_m());
     let detail = Detail::of_level(level, 0.5 * length(size));
     let mut mesh = Mesh::default();
-    for part in class.parts {
-        let place = place_of(part, size);
+    for part in thing.parts() {
+        let place = place_of(&part, size);
         let mut skin = Skin::new(part.color, part.finish).with_axes(place.grain());
         skin.tinted = !class.palette.is_empty() && part.color == class.parts[0].color;
         mesh.skin(skin);

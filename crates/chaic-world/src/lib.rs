@@ -37,6 +37,6 @@ pub use rules::{Durations, RuleSet, Rules};
 pub use setup::{
     Floor, FloorMaterial, Opening, Person, Room, RoomKind, Setup, SetupError, Thing, Wall,
 };
-pub use shape::{Block, Surface, blocks_of, top_surfaces};
+pub use shape::{Block, Surface, blocks_of, ghosts_of, top_surfaces};
 pub use state::{Activity, JointCarry, PersonState, Phase, Place, State, Step, ThingState};
 pub use world::{Snapshot, SnapshotError, SubmitError, World};

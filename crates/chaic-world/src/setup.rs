@@ -137,6 +137,10 @@ pub struct Thing {
     pub yaw_rad: f32,
     /// Factors on the catalogue's width, height and depth.
     pub scale: [f32; 3],
+    /// Height of its lowest top that bears things (a seat, a mattress, a truck's bed) above its
+    /// bottom, metres, where that isn't in proportion to the whole; see [`Thing::parts`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seat_m: Option<f32>,
     /// Which of the class's colors, modulo their number.
     pub variant: u8,
     /// Whether it stays where it is, whatever its class allows.
@@ -151,6 +155,7 @@ impl Thing {
             position,
             yaw_rad,
             scale: [1.0; 3],
+            seat_m: None,
             variant: 0,
             fixed: !class.info().is_movable(),
         }
@@ -317,6 +322,9 @@ impl Setup {
             number(format!("things[{i}].yaw_rad"), t.yaw_rad, -100.0, 100.0)?;
             for (axis, s) in t.scale.into_iter().enumerate() {
                 number(format!("things[{i}].scale[{axis}]"), s, 0.01, 100.0)?;
+            }
+            if let Some(seat_m) = t.seat_m {
+                number(format!("things[{i}].seat_m"), seat_m, 0.001, t.size_m().y)?;
             }
         }
         if self.people.is_empty() || self.people.len() > 8 {

@@ -56,6 +56,65 @@ impl Block {
     }
 }
 
+impl Thing {
+    /// The parts of its shape, in its unit box.
+    ///
+    /// They are the catalogue's, unless [`Thing::seat_m`] puts the seat at another height: then
+    /// everything up to the seat is stretched to that height, and everything above it to the rest.
+    pub fn parts(&self) -> impl Iterator<Item = Part> + use<> {
+        let parts = self.class.info().parts;
+        let seat = self.seat_m.map(|seat_m| seat_m / self.size_m().y);
+        let stretch = seat.zip(lowest_top(parts));
+        let scale = Vec3::from(self.scale);
+        parts.iter().map(move |part| {
+            let part = match stretch {
+                Some((to, from)) => stretched(part, from, to),
+                None => *part,
+            };
+            if scale == Vec3::splat(scale.x) { part } else { in_proportion(part, scale) }
+        })
+    }
+}
+
+/// A part whose own axes, if it is turned, grow as the directions do in which they point: a wheel
+/// of a wider truck isn't a higher wheel.
+fn in_proportion(mut part: Part, scale: Vec3) -> Part {
+    if part.turn_deg != [0.0; 3] {
+        let axes = turn_of(&part);
+        for (k, axis) in [axes.x_axis, axes.y_axis, axes.z_axis].into_iter().enumerate() {
+            part.extent[k] *= (axis * scale).length() / scale[k];
+        }
+    }
+    part
+}
+
+/// Height of the lowest supporting top in the unit box.
+fn lowest_top(parts: &[Part]) -> Option<f32> {
+    let tops = parts.iter().filter(|p| p.supports).map(|p| p.center[1] + 0.5 * p.extent[1]);
+    tops.min_by(f32::total_cmp)
+}
+
+/// A part where heights `0..from` become `0..to`, and `from..1` become `to..1`.
+fn stretched(part: &Part, from: f32, to: f32) -> Part {
+    let height = |y: f32| {
+        if y <= from || from >= 1.0 {
+            y * to / from
+        } else {
+            to + (y - from) * (1.0 - to) / (1.0 - from)
+        }
+    };
+    let mut part = *part;
+    if part.turn_deg == [0.0; 3] {
+        let [low, high] = [-0.5, 0.5].map(|h| height(part.center[1] + h * part.extent[1]));
+        part.center[1] = 0.5 * (low + high);
+        part.extent[1] = high - low;
+    } else {
+        // What leans or lies keeps its thickness.
+        part.center[1] = height(part.center[1]);
+    }
+    part
+}
+
 /// The box of a wall.
 pub(crate) fn wall_block(wall: &Wall) -> Block {
     let along = wall.b - wall.a;
@@ -80,22 +139,32 @@ pub(crate) fn blocks_at(
     position: Vec3,
     yaw_rad: f32,
 ) -> impl Iterator<Item = Block> + use<> {
+    let thing = *thing;
+    let parts = thing.parts().filter(|p| p.collides);
+    parts.map(move |part| block(&thing, &part, entity, position, yaw_rad))
+}
+
+/// The box around a part of a thing standing upright at `position` with `yaw_rad`.
+fn block(thing: &Thing, part: &Part, entity: EntityId, position: Vec3, yaw_rad: f32) -> Block {
     let size = thing.size_m();
-    let parts: &'static [Part] = thing.class.info().parts;
-    parts.iter().filter(|p| p.collides).map(move |part| {
-        let half = turned_half_extents(part, size);
-        Block {
-            center: position + rotate_yaw(Vec3::from(part.center) * size, yaw_rad),
-            half,
-            yaw_rad,
-            entity,
-        }
-    })
+    Block {
+        center: position + rotate_yaw(Vec3::from(part.center) * size, yaw_rad),
+        half: turned_half_extents(part, size),
+        yaw_rad,
+        entity,
+    }
 }
 
 /// The collision boxes of a thing where the setup puts it.
 pub fn blocks_of(thing: &Thing) -> Vec<Block> {
     blocks_at(thing, EntityId::NOTHING, thing.position, thing.yaw_rad).collect()
+}
+
+/// Boxes around those parts of a thing that are only to be looked at, where the setup puts it:
+/// what lies inside one can't be seen.
+pub fn ghosts_of(thing: &Thing) -> Vec<Block> {
+    let ghosts = thing.parts().filter(|p| !p.collides);
+    ghosts.map(|p| block(thing, &p, EntityId::NOTHING, thing.position, thing.yaw_rad)).collect()
 }
 
 /// The tops of a thing on which others may be put, where the setup puts it.
@@ -105,10 +174,10 @@ pub fn top_surfaces(thing: &Thing) -> Vec<Surface> {
 
 pub(crate) fn surfaces_at(thing: &Thing, position: Vec3, yaw_rad: f32) -> Vec<Surface> {
     let size = thing.size_m();
-    let parts = thing.class.info().parts.iter().filter(|p| p.supports);
+    let parts = thing.parts().filter(|p| p.supports);
     parts
         .map(|part| {
-            let half = turned_half_extents(part, size);
+            let half = turned_half_extents(&part, size);
             let top = Vec3::from(part.center) * size + Vec3::Y * half.y;
             Surface { center: position + rotate_yaw(top, yaw_rad), half: [half.x, half.z], yaw_rad }
         })
@@ -121,10 +190,14 @@ fn turned_half_extents(part: &Part, size: Vec3) -> Vec3 {
     if part.turn_deg == [0.0; 3] {
         return half;
     }
-    let [x, y, z] = part.turn_deg.map(f32::to_radians);
-    let turn = yaw_rotation(y) * axis_turn(Vec3::X, x) * axis_turn(Vec3::Z, z);
-    let m = glam::Mat3::from_quat(turn);
+    let m = turn_of(part);
     m.x_axis.abs() * half.x + m.y_axis.abs() * half.y + m.z_axis.abs() * half.z
+}
+
+/// Where a part's own axes point in the thing's frame.
+fn turn_of(part: &Part) -> glam::Mat3 {
+    let [x, y, z] = part.turn_deg.map(f32::to_radians);
+    glam::Mat3::from_quat(yaw_rotation(y) * axis_turn(Vec3::X, x) * axis_turn(Vec3::Z, z))
 }
 
 fn axis_turn(axis: Vec3, rad: f32) -> Quat {
@@ -172,6 +245,33 @@ mod tests {
         assert!(block.nearest_in_plan(Vec3::new(3.0, 0.0, 4.0)).1, "its end is inside");
         assert!(!block.nearest_in_plan(Vec3::new(3.0, 0.0, 0.0)).1);
         assert_eq!(block.y_range(), [0.0, 3.0]);
+    }
+
+    #[test]
+    fn a_seat_of_its_own_moves_what_is_below_and_above_it() {
+        let mut chair = Thing::new(ClassId::named("side_chair"), Vec3::ZERO, 0.0);
+        let tops = |t: &Thing| top_surfaces(t).iter().map(|s| s.center.y).collect::<Vec<_>>();
+        let highest = |t: &Thing| blocks_of(t).iter().map(|b| b.y_range()[1]).fold(0.0, f32::max);
+        let (usual_m, high_m) = (tops(&chair)[0], highest(&chair));
+        assert!((usual_m - 0.45).abs() < 1e-4, "{usual_m}");
+        chair.seat_m = Some(0.6);
+        assert!((tops(&chair)[0] - 0.6).abs() < 1e-4);
+        assert!((highest(&chair) - high_m).abs() < 1e-4, "the back ends where it did");
+        assert!(blocks_of(&chair).iter().all(|b| b.y_range()[0] >= -1e-4 && b.half.y > 0.0));
+    }
+
+    #[test]
+    fn a_lying_part_grows_with_the_direction_it_lies_in() {
+        let mut truck = Thing::new(ClassId::named("truck"), Vec3::ZERO, 0.0);
+        let lying = |t: &Thing| {
+            let part = t.parts().find(|p| p.turn_deg == [0.0, 0.0, 90.0]).expect("a wheel");
+            Vec3::from(part.extent) * t.size_m()
+        };
+        let usual = lying(&truck);
+        truck.scale = [2.0, 0.5, 3.0];
+        // A wheel's axle is its own y and lies along the truck's x.
+        let expected = usual * Vec3::new(0.5, 2.0, 3.0);
+        assert!((lying(&truck) - expected).abs().max_element() < 1e-4, "{}", lying(&truck));
     }
 
     #[test]

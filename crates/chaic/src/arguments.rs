@@ -34,6 +34,9 @@ pub enum Command {
     /// List, show, make and check episodes.
     #[command(subcommand)]
     Episodes(EpisodesCommand),
+    /// Turn episodes from elsewhere into episode files.
+    #[command(subcommand)]
+    Import(ImportCommand),
 }
 
 /// A comma-separated list, or `all`.
@@ -219,6 +222,42 @@ pub enum EpisodesCommand {
     },
     /// Print the JSON schema of an episode file.
     Schema,
+}
+
+/// `chaic import`.
+#[derive(Debug, Subcommand)]
+pub enum ImportCommand {
+    /// Import the original CHAIC data set, which is public; docs/import.md says how to get it.
+    Original(OriginalArguments),
+}
+
+/// `chaic import original`.
+#[derive(Args, Debug)]
+pub struct OriginalArguments {
+    /// The data set folder of the CHAIC repository: holds train_dataset and test_dataset.
+    #[arg(long, value_name = "DIR")]
+    pub dataset: PathBuf,
+    /// The unpacked tdw Python package, version 1.12.27.x, or the folder that holds it.
+    #[arg(long, value_name = "DIR")]
+    pub tdw: PathBuf,
+    /// The folder for the episode files.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Only one half: train or test. Usual: every half that is there.
+    #[arg(long, value_name = "HALF")]
+    pub split: Option<ImportHalf>,
+    /// Import what can be imported and list the rest; exit code 1 if anything was left out.
+    #[arg(long)]
+    pub keep_going: bool,
+}
+
+/// A half of the original data set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum ImportHalf {
+    /// Floor plans 1 and 4.
+    Train,
+    /// Floor plans 2 and 5.
+    Test,
 }
 
 /// How a list is printed.

@@ -31,6 +31,7 @@ fn main() -> ExitCode {
         Command::Replay(arguments) => commands::replay::run(&arguments),
         Command::Render(arguments) => commands::render::run(&arguments),
         Command::Episodes(command) => commands::episodes::run(&command),
+        Command::Import(command) => commands::import::run(&command),
     };
     match ended {
         Ok(Ended::Well) => ExitCode::SUCCESS,

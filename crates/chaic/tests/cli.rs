@@ -176,6 +176,10 @@ fn errors_are_clear() {
         (&["render", "obstacle/test/99", "--out", "x"], "obstacle/test/99"),
         (&["episodes", "show", "nowhere.json", "--out", "x.png"], "nowhere.json"),
         (&["episodes", "generate", "--task", "obstacle", "--seeds", "3..3", "--out", "x"], "A..B"),
+        (
+            &["import", "original", "--dataset", "nowhere", "--tdw", "nowhere", "--out", "x"],
+            "holds no tdw package",
+        ),
     ] {
         let said = ill(at, arguments);
         assert!(said.contains(words), "{arguments:?}: {said}");

@@ -16,6 +16,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "chaic-eval",
         &["chaic-protocol", "chaic-world", "chaic-episodes", "chaic-render", "chaic-agents"],
     ),
+    ("chaic-import", &["chaic-protocol", "chaic-world", "chaic-episodes"]),
     (
         "chaic",
         &[
@@ -25,6 +26,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "chaic-render",
             "chaic-agents",
             "chaic-eval",
+            "chaic-import",
         ],
     ),
     // What a user writes: a helper, and the one call that evaluates it.

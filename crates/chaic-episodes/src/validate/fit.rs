@@ -1,22 +1,25 @@
 //! Whether things and people have the room that they take up.
 
-use chaic_protocol::Role;
 use chaic_protocol::geom::xz;
-use chaic_world::{Rules, Setup, top_surfaces};
+use chaic_protocol::{Role, Vec3};
+use chaic_world::{Block, Rules, Setup, Surface, Thing, blocks_of, top_surfaces};
 
-use super::{Problem, TOLERANCE_M, thing_field};
+use super::{Demand, Problem, TOLERANCE_M, thing_field};
 use crate::solid::{Solid, plan_bounds};
 
 /// How far from walls people start indoors, metres (paper, "Task Generation").
 const START_CLEARANCE_M: f32 = 0.5;
 
-pub(super) fn problems(setup: &Setup) -> Vec<Problem> {
+/// What leans or lies on its neighbors has its bottom this far above what bears it at most, metres.
+const LEANING_M: f32 = 0.3;
+
+pub(super) fn problems(setup: &Setup, demand: Demand) -> Vec<Problem> {
     let solids: Vec<Vec<Solid>> = setup.things.iter().map(Solid::of_thing).collect();
     let walls = Solid::of_walls(setup);
     let mut found = Vec::new();
-    overlaps(setup, &solids, &walls, &mut found);
-    support(setup, &mut found);
-    starts(setup, &solids, &walls, &mut found);
+    overlaps(setup, demand, &solids, &walls, &mut found);
+    support(setup, demand, &mut found);
+    starts(setup, demand, &solids, &walls, &mut found);
     found
 }
 
@@ -26,22 +29,32 @@ fn deepest(a: &[Solid], b: &[Solid]) -> f32 {
     pairs.fold(f32::MIN, f32::max)
 }
 
-fn overlaps(setup: &Setup, solids: &[Vec<Solid>], walls: &[Solid], found: &mut Vec<Problem>) {
+fn overlaps(
+    setup: &Setup,
+    demand: Demand,
+    solids: &[Vec<Solid>],
+    walls: &[Solid],
+    found: &mut Vec<Problem>,
+) {
     let bounds: Vec<_> = setup.things.iter().map(plan_bounds).collect();
     for (i, thing) in setup.things.iter().enumerate() {
         if !setup.bounds.grown(40.0).contains(xz(thing.position)) {
             let problem = "is more than 40 m outside the bounds";
             found.push(Problem::new(thing_field(setup, i, "position"), problem));
         }
-        if let Some(w) =
-            (0..walls.len()).find(|w| deepest(&solids[i], &walls[*w..=*w]) > TOLERANCE_M)
+        // What nobody moves only has to look right where it cuts into something.
+        let may_cut = |thing: &Thing| demand == Demand::Playable && thing.fixed;
+        if !may_cut(thing)
+            && let Some(w) =
+                (0..walls.len()).find(|w| deepest(&solids[i], &walls[*w..=*w]) > TOLERANCE_M)
         {
             let depth = deepest(&solids[i], &walls[w..=w]);
             let problem = format!("is {depth:.3} m inside walls[{w}]");
             found.push(Problem::new(thing_field(setup, i, "position"), problem));
         }
         for j in 0..i {
-            if !bounds[i].overlaps(&bounds[j]) {
+            let both_may = may_cut(thing) && may_cut(&setup.things[j]);
+            if both_may || !bounds[i].overlaps(&bounds[j]) {
                 continue;
             }
             let depth = deepest(&solids[i], &solids[j]);
@@ -61,16 +74,29 @@ fn overlaps(setup: &Setup, solids: &[Vec<Solid>], walls: &[Solid], found: &mut V
 }
 
 /// Whatever can be taken must lie on something: a world begins at rest.
-fn support(setup: &Setup, found: &mut Vec<Problem>) {
-    let surfaces: Vec<_> = setup.things.iter().flat_map(top_surfaces).collect();
+fn support(setup: &Setup, demand: Demand, found: &mut Vec<Problem>) {
+    let slack_m = match demand {
+        Demand::Fair => TOLERANCE_M,
+        Demand::Playable => LEANING_M,
+    };
+    let tops_of = |thing: &Thing| match demand {
+        Demand::Fair => top_surfaces(thing),
+        Demand::Playable => all_tops(thing),
+    };
+    let tops: Vec<(usize, Surface)> = (setup.things.iter().enumerate())
+        .flat_map(|(k, thing)| tops_of(thing).into_iter().map(move |top| (k, top)))
+        .collect();
     for (i, thing) in setup.things.iter().enumerate() {
-        if thing.fixed || thing.position.y <= TOLERANCE_M {
+        if thing.fixed || thing.position.y <= slack_m {
             continue;
         }
         let p = thing.position;
-        let bears = surfaces.iter().any(|s| {
+        let others = tops.iter().filter(|(k, _)| *k != i);
+        let bears = others.into_iter().any(|(_, s)| {
             let local = chaic_protocol::geom::rotate_yaw(p - s.center, -s.yaw_rad);
-            local.y.abs() <= TOLERANCE_M && local.x.abs() <= s.half[0] && local.z.abs() <= s.half[1]
+            (-TOLERANCE_M..=slack_m).contains(&local.y)
+                && local.x.abs() <= s.half[0]
+                && local.z.abs() <= s.half[1]
         });
         if !bears {
             let problem = format!("is {}, where nothing holds it up", p.y);
@@ -79,7 +105,23 @@ fn support(setup: &Setup, found: &mut Vec<Problem>) {
     }
 }
 
-fn starts(setup: &Setup, solids: &[Vec<Solid>], walls: &[Solid], found: &mut Vec<Problem>) {
+/// The tops of all its parts: things from elsewhere may lie on arms and backs.
+fn all_tops(thing: &Thing) -> Vec<Surface> {
+    let top = |b: Block| Surface {
+        center: b.center + b.half.y * Vec3::Y,
+        half: [b.half.x, b.half.z],
+        yaw_rad: b.yaw_rad,
+    };
+    blocks_of(thing).into_iter().map(top).collect()
+}
+
+fn starts(
+    setup: &Setup,
+    demand: Demand,
+    solids: &[Vec<Solid>],
+    walls: &[Solid],
+    found: &mut Vec<Problem>,
+) {
     let step_over_m = Rules::paper().step_over_m;
     for (i, person) in setup.people.iter().enumerate() {
         let (p, body) = (xz(person.pose.position), person.capability());
@@ -92,11 +134,15 @@ fn starts(setup: &Setup, solids: &[Vec<Solid>], walls: &[Solid], found: &mut Vec
             found.push(Problem::new(&field, problem));
         }
         let stands = [step_over_m, body.height_m];
+        let clearance_m = match demand {
+            Demand::Fair => START_CLEARANCE_M,
+            Demand::Playable => body.radius_m,
+        };
         let walls = walls.iter().filter(|w| w.spans(stands));
         let wall_m = walls.map(|w| w.distance(p)).fold(f32::MAX, f32::min);
-        if setup.ceiling_m.is_some() && wall_m < START_CLEARANCE_M - TOLERANCE_M {
+        if setup.ceiling_m.is_some() && wall_m < clearance_m - TOLERANCE_M {
             let problem =
-                format!("is {wall_m:.2} m from a wall, expected at least {START_CLEARANCE_M} m");
+                format!("is {wall_m:.2} m from a wall, expected at least {clearance_m} m");
             found.push(Problem::new(&field, problem));
         }
         for (k, thing) in setup.things.iter().enumerate() {

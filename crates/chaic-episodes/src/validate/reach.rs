@@ -4,15 +4,20 @@ use chaic_protocol::geom::xz;
 use chaic_protocol::{AgentId, Role, Vec2};
 use chaic_world::{Person, Rules, Setup};
 
-use super::{Problem, thing_field};
+use super::{Demand, Problem, thing_field};
 use crate::grid::Grid;
 use crate::solid::Solid;
 
-pub(super) fn problems(setup: &Setup) -> Vec<Problem> {
+pub(super) fn problems(setup: &Setup, demand: Demand) -> Vec<Problem> {
     let walls = Solid::of_walls(setup);
     let needed = needed_things(setup);
     let mut found = Vec::new();
-    for agent in [AgentId::PARTNER, AgentId::HELPER] {
+    let agents: &[AgentId] = match demand {
+        Demand::Fair => &[AgentId::PARTNER, AgentId::HELPER],
+        // A wheelchair may be too wide for a house; then the helper does what there is to do.
+        Demand::Playable => &[AgentId::HELPER],
+    };
+    for agent in agents.iter().copied() {
         let person = &setup.people[agent.index()];
         let (grid, seen) = ground(setup, person, &walls);
         if !seen.contains(&true) {
@@ -21,15 +26,25 @@ pub(super) fn problems(setup: &Setup) -> Vec<Problem> {
             continue;
         }
         let see_through: Vec<Solid> = walls.iter().filter(|w| w.low_m < 1.0).copied().collect();
+        // Something to bring and somewhere to bring it; which of it is enough to play.
+        let mut got_at = [false; 2];
+        let mut missed = Vec::new();
         for k in &needed {
             let thing = Solid::of_thing(&setup.things[*k]);
-            if !gets_at(&grid, &seen, &thing, &see_through) {
+            if gets_at(&grid, &seen, &thing, &see_through) {
+                let is_goal = setup.goal_places.contains(&Setup::entity(*k));
+                let is_target = setup.goal.wanted(setup.things[*k].class) > 0;
+                got_at = [got_at[0] || is_target, got_at[1] || is_goal];
+            } else {
                 let problem = format!(
                     "is out of reach: the {agent} finds no way to within {} m of it",
                     Rules::paper().arm_reach_m
                 );
-                found.push(Problem::new(thing_field(setup, *k, "position"), problem));
+                missed.push(Problem::new(thing_field(setup, *k, "position"), problem));
             }
+        }
+        if demand == Demand::Fair || got_at != [true; 2] {
+            found.extend(missed);
         }
     }
     found

@@ -5,14 +5,14 @@ use chaic_protocol::task::SceneKind;
 use chaic_protocol::{ClassId, Role, TaskId};
 use chaic_world::{Rules, Setup, Thing};
 
-use super::{Problem, thing_field};
+use super::{Demand, Problem, thing_field};
 
 /// Highest top of anything that a hand must reach, metres: the farthest that anybody can.
 const HIGHEST_M: f32 = 3.0;
 /// Longest episode, frames: nine hours of walking.
 const LONGEST: u32 = 1_000_000;
 
-pub(super) fn problems(setup: &Setup) -> Vec<Problem> {
+pub(super) fn problems(setup: &Setup, demand: Demand) -> Vec<Problem> {
     let mut found = Vec::new();
     if setup.horizon > LONGEST {
         let problem = format!("is {}, expected at most {LONGEST} frames", setup.horizon);
@@ -20,7 +20,7 @@ pub(super) fn problems(setup: &Setup) -> Vec<Problem> {
     }
     things(setup, &mut found);
     people(setup, &mut found);
-    goal(setup, &mut found);
+    goal(setup, demand, &mut found);
     task_needs(setup, &mut found);
     found
 }
@@ -67,17 +67,22 @@ fn people(setup: &Setup, found: &mut Vec<Problem>) {
     }
 }
 
-fn goal(setup: &Setup, found: &mut Vec<Problem>) {
+fn goal(setup: &Setup, demand: Demand, found: &mut Vec<Problem>) {
+    let mut n_there = 0;
     for (i, (class, wanted)) in setup.goal.targets.iter().enumerate() {
         if !class.info().is_possible_target() {
             let problem = format!("asks for {class}, which is no possible target");
             found.push(Problem::new(format!("goal.targets[{i}]"), problem));
         }
         let there = setup.things.iter().filter(|t| t.class == *class && !t.fixed).count();
-        if there < *wanted as usize {
+        n_there += there;
+        if demand == Demand::Fair && there < *wanted as usize {
             let problem = format!("asks for {wanted} of {class}, but only {there} can be moved");
             found.push(Problem::new(format!("goal.targets[{i}]"), problem));
         }
+    }
+    if n_there == 0 && found.is_empty() {
+        found.push(Problem::new("things", "hold nothing that the goal asks for"));
     }
     let places = setup.goal_places.iter().filter_map(|e| setup.thing_index(*e));
     for (i, k) in places.enumerate() {

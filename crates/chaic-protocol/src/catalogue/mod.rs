@@ -12,6 +12,7 @@ use serde::Serialize;
 
 mod actors;
 mod containers;
+mod decor;
 mod food;
 mod goods;
 mod house;
@@ -246,6 +247,7 @@ const GROUPS: &[&[ClassInfo]] = &[
     house::CLASSES,
     obstacles::CLASSES,
     actors::CLASSES,
+    decor::CLASSES,
 ];
 
 const COUNT: usize = {

@@ -2,6 +2,7 @@
 
 pub mod episodes;
 pub mod eval;
+pub mod import;
 pub mod render;
 pub mod replay;
 pub mod report;

@@ -1,0 +1,48 @@
+//! Files of JSON from elsewhere.
+
+use std::fs;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+use serde::de::DeserializeOwned;
+
+use crate::ImportError;
+
+/// Longest file that is read, bytes: four times the package's longest.
+const MAX_BYTES: u64 = 64 << 20;
+
+/// The value in a file of JSON, as Python writes it: numbers that aren't are read as `null`.
+pub(crate) fn read<T: DeserializeOwned>(path: &Path) -> Result<T, ImportError> {
+    let text = text(path)?.replace(": NaN", ": null").replace(": Infinity", ": null");
+    let mut json = serde_json::Deserializer::from_str(&text);
+    let value = serde_path_to_error::deserialize(&mut json).map_err(|e| {
+        let field = e.path().to_string();
+        ImportError::field(path, field, e.into_inner().to_string())
+    })?;
+    json.end().map_err(|e| ImportError::field(path, ".", e.to_string()))?;
+    Ok(value)
+}
+
+/// The text of a file.
+pub(crate) fn text(path: &Path) -> Result<String, ImportError> {
+    let fail = |e: std::io::Error| ImportError::unreadable(path, format!("can't be read: {e}"));
+    let mut text = String::new();
+    let file = fs::File::open(path).map_err(fail)?;
+    let n = file.take(MAX_BYTES + 1).read_to_string(&mut text).map_err(fail)?;
+    if n as u64 > MAX_BYTES {
+        let problem = format!("has more than {MAX_BYTES} bytes");
+        return Err(ImportError::unreadable(path, problem));
+    }
+    Ok(text)
+}
+
+/// The first of some folders that is there.
+pub(crate) fn first_folder(candidates: impl IntoIterator<Item = PathBuf>) -> Option<PathBuf> {
+    candidates.into_iter().find(|p| p.is_dir())
+}
+
+/// Whether a word from a file can be part of a file's name without leading elsewhere.
+pub(crate) fn is_plain(word: &str) -> bool {
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    !word.is_empty() && word.len() <= 64 && word.chars().all(plain)
+}

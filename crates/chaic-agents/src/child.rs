@@ -13,6 +13,7 @@ use crate::execution::navigate::{Destination, Nav, Navigator};
 use crate::execution::recover::Recovery;
 use crate::memory::{Memory, Space};
 use crate::perception::{GroundTruthIds, Perception as _};
+use crate::rules::PlannerRules;
 
 /// Between two draws pass more than so many frames.
 const PLAN_FRAMES: Frame = 100;
@@ -50,8 +51,9 @@ enum Mood {
 }
 
 /// The child's mind. It knows where everybody is.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Child {
+    rules: PlannerRules,
     episode: Option<Episode>,
 }
 
@@ -69,16 +71,16 @@ struct Episode {
 
 impl Child {
     /// A child that has not been briefed.
-    pub fn new() -> Child {
-        Child::default()
+    pub fn new(rules: PlannerRules) -> Child {
+        Child { rules, episode: None }
     }
 }
 
 impl Episode {
-    fn new(briefing: &Briefing) -> Episode {
+    fn new(briefing: &Briefing, rules: PlannerRules) -> Episode {
         Episode {
             briefing: briefing.clone(),
-            memory: Memory::new(briefing),
+            memory: Memory::new(briefing, rules),
             navigator: Navigator::default(),
             recovery: Recovery::default(),
             follower: Follower::default(),
@@ -225,7 +227,7 @@ impl Agent for Child {
     }
 
     fn reset(&mut self, briefing: &Briefing) {
-        self.episode = Some(Episode::new(briefing));
+        self.episode = Some(Episode::new(briefing, self.rules));
     }
 
     fn act(&mut self, observation: &Observation) -> Action {
@@ -272,7 +274,7 @@ mod tests {
                 Companion { agent: AgentId::PARTNER, relation: Relation::Guardian },
                 Companion { agent: AgentId::HELPER, relation: Relation::Partner },
             ];
-            let mut child = Child::new();
+            let mut child = Child::new(PlannerRules::paper());
             child.reset(&briefing);
             let mut observation = toy.observe();
             observation.images = Default::default();

@@ -152,6 +152,8 @@ pub struct Observation {
     /// Everything delivered so far, wanted or not, if the goal place is in view or near (or
     /// progress is granted); otherwise `None`.
     pub delivered: Option<Vec<EntityId>>,
+    /// The obstacles that have been removed, where the rules tell everybody of them.
+    pub removed: Vec<EntityId>,
     /// What was granted beyond that.
     pub granted: Granted,
 }

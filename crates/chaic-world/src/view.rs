@@ -37,7 +37,10 @@ impl World {
             seed: mix(self.setup.seed, me),
             horizon: self.setup.horizon,
             bounds: self.setup.bounds,
-            possible_targets: classes(&|c| is_possible_target(c, scene)),
+            possible_targets: classes(&|c| {
+                let fragile = c.info().role == Role::Fragile;
+                is_possible_target(c, scene) && (self.rules.fragile_targets || !fragile)
+            }),
             containers: classes(&|c| c.info().role == Role::Container && scene != SceneKind::Yard),
             obstacles: classes(&|c| c.info().role == Role::Obstacle && scene == SceneKind::House),
             goal_place: self.thing(self.setup.goal_places[0]).0.class,

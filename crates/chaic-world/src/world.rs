@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::collide::{Body, Disc, Surroundings};
 use crate::event::{Event, EventKind};
-use crate::rules::Rules;
+use crate::rules::{ReachTo, Rules};
 use crate::setup::{Setup, SetupError, Thing};
 use crate::shape::{Block, blocks_at, wall_blocks};
 use crate::state::{PersonState, Place, State, ThingState};
@@ -281,7 +281,11 @@ impl World {
     /// Distance in plan from a person to the nearest point of a thing, metres.
     pub(crate) fn distance_to(&self, agent: AgentId, entity: EntityId) -> f32 {
         let p = self.person(agent).pose.position;
-        horizontal_distance(p, self.nearest_point(p, entity))
+        let to = match self.rules.reach_to {
+            ReachTo::NearestPoint => self.nearest_point(p, entity),
+            ReachTo::Middle => self.thing(entity).1.position,
+        };
+        horizontal_distance(p, to)
     }
 
     /// The same for a person with all that moves as one with it: of two who carry furniture, the

@@ -183,7 +183,7 @@ fn learn_failure(memory: &mut Memory, object: EntityId, reason: FailureReason) {
         }
         FailureReason::Broke | FailureReason::OutOfPlay => memory.things.mark_gone(object),
         FailureReason::HeldByOther => {
-            memory.things.mark_held(object, now);
+            memory.things.mark_held(object, now + memory.rules.held_frames);
             // Whatever it looks like: the one who tried knows.
             memory.things.ignore(object, now + HELD_FOR_SURE_FRAMES);
         }
@@ -213,7 +213,7 @@ mod tests {
         toy.stand([0.0, 0.0], 0.0);
         let mut briefing = toy.briefing();
         briefing.goal_place = ClassId::named(class);
-        let mut memory = Memory::new(&briefing);
+        let mut memory = Memory::new(&briefing, crate::PlannerRules::paper());
         let observation = toy.observe();
         memory.update(&briefing, &observation, &GroundTruthIds.perceive(&observation));
         (memory, briefing, entity)

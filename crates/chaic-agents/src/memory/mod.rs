@@ -23,6 +23,7 @@ pub use semantic::{SemanticMap, Thing};
 
 use crate::execution::path::{Reach, Search};
 use crate::perception::Percepts;
+use crate::rules::PlannerRules;
 use costs::CostMap;
 
 /// A top may look this much lower than it is, metres.
@@ -44,6 +45,8 @@ pub struct Done {
 /// All that one mind remembers of its episode.
 #[derive(Clone, Debug)]
 pub struct Memory {
+    /// By which rules its owner plans.
+    pub rules: PlannerRules,
     /// When it was updated last.
     pub frame: Frame,
     /// Where the own body is.
@@ -71,10 +74,11 @@ pub struct Memory {
 
 impl Memory {
     /// Nothing remembered yet.
-    pub fn new(briefing: &Briefing) -> Memory {
+    pub fn new(briefing: &Briefing, rules: PlannerRules) -> Memory {
         let map = OccupancyMap::new(&briefing.bounds);
         let costs = CostMap::new(*map.grid(), briefing.capability.radius_m);
         Memory {
+            rules,
             frame: 0,
             pose: Pose::default(),
             things: SemanticMap::default(),
@@ -102,12 +106,16 @@ impl Memory {
         }
         self.frame = observation.frame;
         self.pose = observation.own.pose;
-        self.people.see(briefing, observation, &percepts.detections);
+        let seen = if self.rules.sees_people(briefing) { &percepts.detections[..] } else { &[] };
+        self.people.see(briefing, observation, seen);
         self.people_moved = self.people.iter().any(|p| p.frame + 60 > self.frame);
         let in_view: Vec<Vec3> =
             self.people.iter().filter(|p| p.is_in_view).map(|p| p.position_in_world).collect();
-        self.things.see(&percepts.detections, &in_view, self.frame);
-        self.things.forget_missing(observation);
+        let hands_at = if self.rules.sees_holding { &in_view[..] } else { &[] };
+        self.things.see(&percepts.detections, hands_at, self.frame);
+        if self.rules.forgets_missing {
+            self.things.forget_missing(observation);
+        }
         self.things.expire(before, self.frame);
         for held in observation.own.held() {
             self.things.mark_absent(held.entity);
@@ -117,11 +125,14 @@ impl Memory {
         }
         for hands in observation.granted.partner_hands.iter() {
             for held in hands.iter().flatten() {
-                self.things.mark_held(held.entity, self.frame);
+                self.things.mark_held(held.entity, self.frame + self.rules.held_frames);
                 for (entity, _) in &held.contents {
-                    self.things.mark_held(*entity, self.frame);
+                    self.things.mark_held(*entity, self.frame + self.rules.held_frames);
                 }
             }
+        }
+        for obstacle in &observation.removed {
+            self.things.mark_gone(*obstacle);
         }
         if let Some(delivered) = &observation.delivered {
             for entity in delivered {
@@ -138,7 +149,8 @@ impl Memory {
         {
             self.history.push(Done { frame: self.frame, action, outcome });
         }
-        self.map.integrate(observation, percepts, self.height_m);
+        let known_m = self.rules.known_range_m(briefing);
+        self.map.integrate(observation, percepts, self.height_m, known_m);
         self.reach = None;
     }
 

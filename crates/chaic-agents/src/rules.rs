@@ -87,8 +87,6 @@ pub struct PlannerRules {
     pub delivers_when_done: bool,
     /// A container is fetched for at least so many objects still wanted.
     pub min_for_container: u32,
-    /// Whether containers are of use where a wheelchair takes part.
-    pub containers_with_wheelchair: bool,
     /// How one keeps track of what is still wanted.
     pub bookkeeping: Bookkeeping,
     /// Which of several goal places one goes to.
@@ -117,6 +115,8 @@ pub struct PlannerRules {
     pub random_draw: RandomDraw,
     /// Turns of looking all around.
     pub around_turns: u32,
+    /// Whether looking around ends as soon as partner and child have both been seen.
+    pub stops_turning_when_found: bool,
     /// Child or guardian unseen for so long is looked for, frames.
     pub child_unseen_frames: Frame,
     /// Whether a helper stays with the child only until it turns back, rather than until the time
@@ -137,7 +137,6 @@ impl PlannerRules {
             weighs_time: true,
             delivers_when_done: true,
             min_for_container: 3,
-            containers_with_wheelchair: true,
             bookkeeping: Bookkeeping::Exact,
             place_choice: PlaceChoice::Nearest,
             any_failure_counts: false,
@@ -151,6 +150,7 @@ impl PlannerRules {
             lifts_together: true,
             random_draw: RandomDraw::Plans,
             around_turns: 18,
+            stops_turning_when_found: false,
             child_unseen_frames: 300,
             trusts_child: true,
             child_draws: ChildDraws::Seeded,
@@ -167,7 +167,6 @@ impl PlannerRules {
             weighs_time: false,
             delivers_when_done: false,
             min_for_container: 0,
-            containers_with_wheelchair: false,
             bookkeeping: Bookkeeping::FirstPick,
             place_choice: PlaceChoice::Random,
             any_failure_counts: true,
@@ -181,6 +180,7 @@ impl PlannerRules {
             lifts_together: false,
             random_draw: RandomDraw::KindsFirst,
             around_turns: 24,
+            stops_turning_when_found: true,
             child_unseen_frames: 200,
             trusts_child: false,
             child_draws: ChildDraws::Constant,

@@ -119,6 +119,9 @@ pub struct Rules {
     /// Whether a put-on that succeeded anywhere delivers all that its agent has let go so far:
     /// the original's second rule (facts 5.3), taken for a mistake and off in both rule sets.
     pub delivered_anywhere: bool,
+    /// Whether containers are offered where a wheelchair takes part; the original's minds never
+    /// take note of one there (facts 13, number 12).
+    pub containers_with_wheelchair: bool,
     /// Whether fragile things may be targets; in the original's data nobody can go for them, but
     /// they count in the total (facts 6).
     pub fragile_targets: bool,
@@ -172,6 +175,7 @@ impl Rules {
             delivery_margin_m: 2.0,
             dropped_counts: false,
             delivered_anywhere: false,
+            containers_with_wheelchair: true,
             fragile_targets: true,
             break_chance_low: 0.25,
             break_chance_high: 0.5,
@@ -201,6 +205,7 @@ impl Rules {
             joint_lift: JointLift::LastChoice,
             tells_removed: true,
             dropped_counts: true,
+            containers_with_wheelchair: false,
             fragile_targets: false,
             break_chance_low: 0.0,
             break_chance_high: 0.0,

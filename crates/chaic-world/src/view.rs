@@ -28,6 +28,7 @@ impl World {
             _ => Relation::Partner,
         };
         let others = self.setup.agents().filter(|a| *a != me);
+        let has_wheelchair = self.setup.people.iter().any(|p| p.capability().gait == Gait::Roll);
         Briefing {
             me,
             capability: self.capability(me),
@@ -41,7 +42,10 @@ impl World {
                 let fragile = c.info().role == Role::Fragile;
                 is_possible_target(c, scene) && (self.rules.fragile_targets || !fragile)
             }),
-            containers: classes(&|c| c.info().role == Role::Container && scene != SceneKind::Yard),
+            containers: classes(&|c| {
+                let offered = self.rules.containers_with_wheelchair || !has_wheelchair;
+                offered && c.info().role == Role::Container && scene != SceneKind::Yard
+            }),
             obstacles: classes(&|c| c.info().role == Role::Obstacle && scene == SceneKind::House),
             goal_place: self.thing(self.setup.goal_places[0]).0.class,
             goal_place_min_top_m: self.goal_min_top_m(),

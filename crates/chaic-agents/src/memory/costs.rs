@@ -4,6 +4,7 @@ use chaic_protocol::geom::xz;
 use chaic_protocol::{Frame, Vec2};
 
 use super::grid::{CELL_M, Grid};
+use super::lattice_costs;
 use super::occupancy::{OccupancyMap, Space};
 use super::people::People;
 use super::semantic::SemanticMap;
@@ -153,6 +154,16 @@ impl CostMap {
                 self.cost[cell] += PERSON_EXTRA;
             }
         }
+    }
+
+    /// Computes all costs anew by the original's reckoning.
+    pub fn rebuild_lattice(&mut self, seen: &lattice_costs::Seen<'_>) {
+        self.version += 1;
+        let occupied = lattice_costs::lattice_costs(&self.grid, seen, &mut self.cost);
+        for (clearance, occupied) in self.clearance.iter_mut().zip(occupied) {
+            *clearance = if occupied { 0 } else { FARTHEST };
+        }
+        self.measure_clearance();
     }
 
     /// Two-pass chamfer distance transform from the occupied cells.

@@ -6,14 +6,16 @@ pub mod people;
 pub mod semantic;
 
 pub mod costs;
+pub mod lattice_costs;
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use chaic_protocol::briefing::Relation;
+use chaic_protocol::capability::Gait;
 use chaic_protocol::geom::{Pose, xz};
 use chaic_protocol::{
-    Action, Briefing, ClassId, EntityId, Frame, Observation, Outcome, Vec2, Vec3,
+    Action, AgentId, Briefing, ClassId, EntityId, Frame, Observation, Outcome, Vec2, Vec3,
 };
 
 pub use grid::{CELL_M, Grid};
@@ -23,7 +25,7 @@ pub use semantic::{SemanticMap, Thing};
 
 use crate::execution::path::{Reach, Search};
 use crate::perception::Percepts;
-use crate::rules::PlannerRules;
+use crate::rules::{Exploration, PlannerRules, Walking};
 use costs::CostMap;
 
 /// A top may look this much lower than it is, metres.
@@ -68,6 +70,10 @@ pub struct Memory {
     costs: CostMap,
     costs_of: Option<(u32, u32)>,
     people_moved: bool,
+    /// Whether anything was taken in since costs were computed last.
+    is_stale: bool,
+    is_partner: bool,
+    gait: Gait,
     reach: Option<Reach>,
     search: Search,
 }
@@ -94,6 +100,9 @@ impl Memory {
             costs,
             costs_of: None,
             people_moved: true,
+            is_stale: true,
+            is_partner: briefing.me == AgentId::PARTNER,
+            gait: briefing.capability.gait,
             reach: None,
         }
     }
@@ -152,17 +161,35 @@ impl Memory {
         let known_m = self.rules.known_range_m(briefing);
         self.map.integrate(observation, percepts, self.height_m, known_m);
         self.reach = None;
+        self.is_stale = true;
+    }
+
+    /// Whether its owner waits before obstacles until somebody has cleared them away (original
+    /// facts 1.6).
+    pub fn waits_for_obstacles(&self) -> bool {
+        self.is_partner && self.gait == Gait::Roll
     }
 
     /// Brings costs and distances up to date. Cheap if nothing changed.
     pub fn refresh(&mut self) {
         self.refresh_costs();
-        if self.reach.is_none() {
+        let needs_reach = self.rules.walking == Walking::Careful
+            || self.rules.exploration == Exploration::Frontier;
+        if needs_reach && self.reach.is_none() {
             self.reach = Some(Reach::from(&self.costs, self.here(), &mut self.search));
         }
     }
 
     fn refresh_costs(&mut self) {
+        if self.rules.walking == Walking::Lattice {
+            let Memory { map, things, people, .. } = self;
+            let (heeds_obstacles, now) = (self.is_partner, self.frame);
+            let seen = lattice_costs::Seen { map, things, people, heeds_obstacles, now };
+            if std::mem::take(&mut self.is_stale) {
+                self.costs.rebuild_lattice(&seen);
+            }
+            return;
+        }
         let of = (self.map.version(), self.things.layout());
         if self.costs_of != Some(of) || self.people_moved {
             let here = self.here();
@@ -204,7 +231,8 @@ impl Memory {
     /// no way is known. Straight distance before the first [`Memory::refresh`].
     pub fn way_to(&self, thing: &Thing) -> Option<f32> {
         let straight_m = thing.distance_from(self.here());
-        let Some(reach) = &self.reach else { return Some(straight_m) };
+        let reach = self.reach.as_ref().filter(|_| self.rules.walking == Walking::Careful);
+        let Some(reach) = reach else { return Some(straight_m) };
         let grid = self.map.grid();
         let near = |p: Vec2| grid.disc(p, NEAR_THING_M).filter_map(|c| reach.cost(c)).min();
         let at = near(thing.nearest_point(self.here()));
@@ -219,6 +247,7 @@ impl Memory {
             .things
             .iter()
             .filter(|t| t.class == self.goal_place && t.is_present)
+            .filter(|t| self.rules.goal_blackout_frames == 0 || self.frame >= t.ignore_until)
             .filter(|t| t.top_m + TOP_TOLERANCE_M >= self.goal_place_min_top_m)
             .filter_map(|t| Some((t, self.way_to(t)?)))
             .collect();

@@ -48,6 +48,7 @@ pub struct CostMap {
     cost: Vec<u32>,
     clearance: Vec<u16>,
     version: u32,
+    belief: lattice_costs::Belief,
 }
 
 impl CostMap {
@@ -59,6 +60,7 @@ impl CostMap {
             cost: vec![FREE + UNKNOWN_EXTRA; grid.n_cells()],
             clearance: vec![FARTHEST; grid.n_cells()],
             version: 0,
+            belief: lattice_costs::Belief::default(),
         }
     }
 
@@ -159,9 +161,9 @@ impl CostMap {
     /// Computes all costs anew by the original's reckoning.
     pub fn rebuild_lattice(&mut self, seen: &lattice_costs::Seen<'_>) {
         self.version += 1;
-        let occupied = lattice_costs::lattice_costs(&self.grid, seen, &mut self.cost);
-        for (clearance, occupied) in self.clearance.iter_mut().zip(occupied) {
-            *clearance = if occupied { 0 } else { FARTHEST };
+        lattice_costs::lattice_costs(&self.grid, seen, &mut self.belief, &mut self.cost);
+        for (cell, clearance) in self.clearance.iter_mut().enumerate() {
+            *clearance = if self.belief.is_occupied(cell) { 0 } else { FARTHEST };
         }
         self.measure_clearance();
     }

@@ -28,7 +28,12 @@ const OBSTACLE_CELLS: [i32; 2] = [5, 6];
 pub const BLOCKED: u32 = 500_000 * FREE;
 /// A way that costs more than this is not worth exploring (facts 1.10).
 pub const FARTHEST: u32 = 10_000 * FREE;
-/// People in view are as wide as this, metres: half the width of the original's probe.
+/// Where something was seen counts as occupied until, every so many updates, what has been found
+/// free since is believed (facts 1.1: 10).
+const BELIEVE_EVERY: u32 = 10;
+/// Where a person was seen counts as occupied for so long, frames.
+const PERSON_FRAMES: Frame = 200;
+/// People are as wide as this, metres: half the width of the original's probe.
 const PERSON_RADIUS_M: f32 = 0.32;
 
 /// What is looked at.
@@ -45,8 +50,32 @@ pub struct Seen<'a> {
     pub now: Frame,
 }
 
-/// Costs of all cells, and which of them have something in them.
-pub fn lattice_costs(grid: &Grid, seen: &Seen<'_>, cost: &mut [u32]) -> Vec<bool> {
+/// Which cells count as occupied. What is seen counts at once, what is gone only after a while.
+#[derive(Clone, Debug, Default)]
+pub struct Belief {
+    occupied: Vec<bool>,
+    n_updates: u32,
+}
+
+impl Belief {
+    /// Takes in which cells are occupied by the latest account.
+    fn update(&mut self, now: Vec<bool>) {
+        if self.n_updates % BELIEVE_EVERY == 0 {
+            self.occupied = now;
+        } else {
+            self.occupied.iter_mut().zip(now).for_each(|(old, new)| *old |= new);
+        }
+        self.n_updates += 1;
+    }
+
+    /// Whether a cell counts as occupied.
+    pub fn is_occupied(&self, cell: usize) -> bool {
+        self.occupied.get(cell).copied().unwrap_or(false)
+    }
+}
+
+/// Takes in what is seen, and computes the costs of all cells.
+pub fn lattice_costs(grid: &Grid, seen: &Seen<'_>, belief: &mut Belief, cost: &mut [u32]) {
     let is_wall = |cell| seen.map.space(cell) == Space::Wall;
     let mut occupied: Vec<bool> =
         (0..grid.n_cells()).map(|c| seen.map.space(c) >= Space::Occupied).collect();
@@ -57,13 +86,14 @@ pub fn lattice_costs(grid: &Grid, seen: &Seen<'_>, cost: &mut [u32]) -> Vec<bool
     for cell in standing.iter().flat_map(|t| &t.footprint).filter_map(|p| grid.cell_at(*p)) {
         occupied[cell] = true;
     }
-    for person in seen.people.iter().filter(|p| p.is_in_view) {
+    for person in seen.people.iter().filter(|p| p.frame + PERSON_FRAMES > seen.now) {
         for cell in grid.disc(xz(person.position_in_world), PERSON_RADIUS_M) {
             occupied[cell] = true;
         }
     }
+    belief.update(occupied);
     cost.fill(FREE);
-    for cell in (0..grid.n_cells()).filter(|c| occupied[*c]) {
+    for cell in (0..grid.n_cells()).filter(|c| belief.is_occupied(*c)) {
         for (reach, near) in [2, 1].into_iter().zip(NEAR) {
             for c in around(grid, cell, [reach, reach]) {
                 cost[c] = cost[c].max(near);
@@ -72,7 +102,7 @@ pub fn lattice_costs(grid: &Grid, seen: &Seen<'_>, cost: &mut [u32]) -> Vec<bool
     }
     let in_it = if seen.now < FIRST_FRAMES { OCCUPIED_AT_FIRST } else { OCCUPIED };
     for (cell, cost) in cost.iter_mut().enumerate() {
-        if occupied[cell] {
+        if belief.is_occupied(cell) {
             *cost = in_it;
         }
         if !seen.map.is_known(cell) {
@@ -92,7 +122,6 @@ pub fn lattice_costs(grid: &Grid, seen: &Seen<'_>, cost: &mut [u32]) -> Vec<bool
             *cost += OBSTACLE_EXTRA;
         }
     }
-    occupied
 }
 
 /// The cells of a square, so many down and up from its middle along each axis.

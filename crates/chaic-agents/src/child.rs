@@ -44,6 +44,9 @@ const DRAWS: (usize, usize) = (2000, 500);
 /// So near to the point it is there, metres.
 const THERE_M: f32 = 0.5;
 
+/// The child's mood while it runs away, as its thoughts name it.
+pub const RUN_AWAY: &str = "run_away";
+
 /// What the child is up to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Mood {
@@ -254,7 +257,7 @@ impl Agent for Child {
 
     fn thought(&self) -> Thought {
         let (mood, plan) = match self.episode.as_ref().map(|e| e.mood) {
-            Some(Mood::RunAway(_)) => ("run_away", "run away"),
+            Some(Mood::RunAway(_)) => (RUN_AWAY, "run away"),
             Some(Mood::GotoGuardian) => ("goto_guardian", "go back"),
             Some(Mood::Follow) | None => ("follow", "come along"),
         };

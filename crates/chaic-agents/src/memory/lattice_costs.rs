@@ -60,7 +60,7 @@ pub struct Belief {
 impl Belief {
     /// Takes in which cells are occupied by the latest account.
     fn update(&mut self, now: Vec<bool>) {
-        if self.n_updates % BELIEVE_EVERY == 0 {
+        if self.n_updates.is_multiple_of(BELIEVE_EVERY) {
             self.occupied = now;
         } else {
             self.occupied.iter_mut().zip(now).for_each(|(old, new)| *old |= new);

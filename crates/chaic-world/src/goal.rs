@@ -7,6 +7,10 @@ use chaic_protocol::{AgentId, ClassId, EntityId, TaskId};
 use crate::event::EventKind;
 use crate::world::World;
 
+/// What has come to rest may have sunk in by so much, metres: on the floor, whose height is 0, it
+/// must not miss a condition that asks for no height.
+const SUNK_M: f32 = 1e-3;
+
 impl World {
     /// How near to the middle of a goal place a released thing must come to rest, metres
     /// (facts of the original, 5.2: the margin plus half of the longer side).
@@ -86,7 +90,7 @@ impl World {
         } else {
             released_at.is_some_and(|g| near(&g))
         };
-        let high_enough = at.y >= self.goal_min_top_m();
+        let high_enough = at.y >= self.goal_min_top_m() - SUNK_M;
         let role = self.thing(object).0.class.info().role;
         let deliverable = role != Role::Obstacle;
         if by_rule && high_enough && deliverable {

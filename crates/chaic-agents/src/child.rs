@@ -329,6 +329,18 @@ mod tests {
     }
 
     #[test]
+    fn the_constant_draws_let_it_run_at_the_sixth_in_every_episode() {
+        for seed in 0..5 {
+            let mut stage = Stage::new(seed);
+            stage.child.rules.child_draws = ChildDraws::Constant;
+            stage.child.episode.as_mut().expect("briefed").memory.rules = stage.child.rules;
+            // A draw at once, and then one every 101 frames.
+            let first = (0..2000).find(|frame| stage.mood_at(*frame, 1.0, 9.0) == RUN_AWAY);
+            assert_eq!(first, Some(5 * (PLAN_FRAMES + 1)), "seed {seed}");
+        }
+    }
+
+    #[test]
     fn it_comes_back_only_when_the_helper_is_near_and_follows_when_home() {
         let mut stage = (0..50)
             .map(Stage::new)

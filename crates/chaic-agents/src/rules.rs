@@ -209,3 +209,6 @@ impl Default for PlannerRules {
         PlannerRules::paper()
     }
 }
+
+#[cfg(test)]
+mod tests;

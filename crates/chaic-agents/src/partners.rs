@@ -40,8 +40,8 @@ pub fn partner(persona: Persona, scene: SceneKind, rules: PlannerRules) -> Box<d
 }
 
 /// What the mind of a task's partner is granted.
-pub fn partner_grants() -> Grants {
-    PARTNER_GRANTS
+pub fn partner_grants(rules: PlannerRules) -> Grants {
+    Grants { behavior: rules.knows_holding, ..PARTNER_GRANTS }
 }
 
 /// The mind of the child who comes along while shopping; it is granted [`Grants::CHILD`].

@@ -101,7 +101,7 @@ pub struct PlannerRules {
     pub forgets_missing: bool,
     /// Whether one sees that something is in another's hands.
     pub sees_holding: bool,
-    /// Whether rule-based helpers are told what the partner holds while it is in view.
+    /// Whether partner and rule-based helpers are told what the other holds while it is in view.
     pub knows_holding: bool,
     /// Whether rule-based helpers perceive people at all: the original's detector has no class for
     /// them, and its result replaces what the environment would tell (facts 5).

@@ -174,7 +174,7 @@ impl World {
             return Progress::Done;
         }
         let from = self.person(agent).pose.position;
-        let target = self.nearest_point(from, entity);
+        let target = self.point_to_reach(from, entity);
         let yaw = yaw_towards(from, target);
         self.person_mut(agent).pose.yaw_rad = yaw;
         let speed = self.capability(agent).approach_speed_m_per_frame;

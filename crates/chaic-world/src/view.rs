@@ -78,10 +78,11 @@ impl World {
         if grants.goal {
             granted.goal = Some(self.setup.goal.clone());
         }
+        let mate = if agent == AgentId::PARTNER { AgentId::HELPER } else { AgentId::PARTNER };
         if grants.behavior {
             for other in self.setup.agents().filter(|a| *a != agent && in_view(*a)) {
                 granted.behavior.extend(self.seen_deed(other));
-                if other == AgentId::PARTNER {
+                if other == mate {
                     granted.partner_hands = Some(self.hands(other));
                 }
             }

@@ -212,3 +212,18 @@ fn removed_obstacles_are_told_to_everybody() {
     assert!(told(false).is_empty());
     assert_eq!(told(true), vec![nth(0)]);
 }
+
+#[test]
+fn furniture_is_brought_to_the_truck_not_into_it() {
+    let things = vec![thing("backpack", at(0.0, 0.0, -1.5)), thing("truck", at(0.0, 0.0, -9.0))];
+    let mut setup = hall(things, vec![person(Persona::Frail, 0.0, 0.0)]);
+    setup.goal_places = vec![nth(1)];
+    setup.task = TaskId::MovingHouse;
+    setup.goal.targets = vec![(ClassId::named("backpack"), 1)];
+    let mut w = with(Rules::compat(), setup);
+    assert_eq!(run(&mut w, A, pick(nth(0))).0, Outcome::Success);
+    // The longer half of the truck is some 3 m; 6 m to walk are about 130 frames.
+    assert_eq!(run(&mut w, A, put(nth(1))).0, Outcome::Success);
+    assert!(w.is_over() && w.state().frame < 350, "{}", w.state().frame);
+    assert!(z(&w) > -8.5, "before the truck, at {}", z(&w));
+}

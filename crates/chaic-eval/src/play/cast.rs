@@ -44,7 +44,7 @@ pub fn cast(setup: &Setup, helper: Option<Helper>, rules: PlannerRules) -> Cast 
     let info = setup.task.info();
     let persona = setup.people.first().map_or(info.partner, |p| p.persona);
     let partner =
-        Actor::new(partners::partner(persona, info.scene, rules), partners::partner_grants());
+        Actor::new(partners::partner(persona, info.scene, rules), partners::partner_grants(rules));
     let mut actors = vec![partner];
     if let Some(Helper { mind, grants }) = helper {
         actors.push(Actor::new(mind, grants));

@@ -4,8 +4,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-use chaic_agents::PlannerRules;
-use chaic_world::Rules;
+pub use chaic_agents::PlannerRules;
+pub use chaic_world::Rules;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 

@@ -101,7 +101,7 @@ mod tests {
     #[test]
     fn an_action_under_way_is_replaced_by_its_end_and_holdings_are_collected() {
         let toy = Toy::room(4.0, 4.0);
-        let memory = Memory::new(&toy.briefing());
+        let memory = Memory::new(&toy.briefing(), crate::PlannerRules::paper());
         let mut model = GroundTruthBehavior::default();
         let apple = (EntityId(20), ClassId::named("apple"));
         let mut seen = SeenAction {

@@ -13,11 +13,15 @@ use crate::execution::navigate::{Destination, Nav, Navigator};
 use crate::execution::recover::Recovery;
 use crate::memory::{Memory, Space};
 use crate::perception::{GroundTruthIds, Perception as _};
+use crate::rules::{ChildDraws, PlannerRules, Walking};
 
 /// Between two draws pass more than so many frames.
 const PLAN_FRAMES: Frame = 100;
 /// Chance to run away at each draw.
 const RUN_CHANCE: f32 = 0.20;
+/// The draws that are escapes if they are the same in every episode: those of the original's first
+/// forty that are at most 20 of 100. In 3000 frames there are 30 draws at most.
+const ESCAPES: [u32; 6] = [6, 14, 26, 38, 39, 40];
 /// The helper catches the child from here, metres.
 const CATCH_M: f32 = 2.5;
 /// Back with the guardian from here, metres.
@@ -40,6 +44,9 @@ const DRAWS: (usize, usize) = (2000, 500);
 /// So near to the point it is there, metres.
 const THERE_M: f32 = 0.5;
 
+/// The child's mood while it runs away, as its thoughts name it.
+pub const RUN_AWAY: &str = "run_away";
+
 /// What the child is up to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Mood {
@@ -50,8 +57,9 @@ enum Mood {
 }
 
 /// The child's mind. It knows where everybody is.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Child {
+    rules: PlannerRules,
     episode: Option<Episode>,
 }
 
@@ -63,26 +71,28 @@ struct Episode {
     recovery: Recovery,
     follower: Follower,
     rng: Stream,
+    n_draws: u32,
     mood: Mood,
     since: Option<Frame>,
 }
 
 impl Child {
     /// A child that has not been briefed.
-    pub fn new() -> Child {
-        Child::default()
+    pub fn new(rules: PlannerRules) -> Child {
+        Child { rules, episode: None }
     }
 }
 
 impl Episode {
-    fn new(briefing: &Briefing) -> Episode {
+    fn new(briefing: &Briefing, rules: PlannerRules) -> Episode {
         Episode {
             briefing: briefing.clone(),
-            memory: Memory::new(briefing),
+            memory: Memory::new(briefing, rules),
             navigator: Navigator::default(),
             recovery: Recovery::default(),
             follower: Follower::default(),
             rng: Stream::new(briefing.seed, "child", 0),
+            n_draws: 0,
             mood: Mood::Follow,
             since: None,
         }
@@ -114,7 +124,7 @@ impl Episode {
             Mood::RunAway(_) if away_m(helper) < CATCH_M => Mood::GotoGuardian,
             Mood::GotoGuardian if is_due && away_m(guardian) < HOME_M => Mood::Follow,
             Mood::Follow if is_due => {
-                let runs = self.rng.chance(RUN_CHANCE);
+                let runs = self.draws_escape();
                 match guardian.filter(|_| runs).and_then(|g| self.far_point(g)) {
                     Some(point) => Mood::RunAway(point),
                     None => Mood::Follow,
@@ -130,6 +140,14 @@ impl Episode {
             self.recovery.reset();
             self.follower = Follower::default();
             self.mood = next;
+        }
+    }
+
+    fn draws_escape(&mut self) -> bool {
+        self.n_draws += 1;
+        match self.memory.rules.child_draws {
+            ChildDraws::Seeded => self.rng.chance(RUN_CHANCE),
+            ChildDraws::Constant => ESCAPES.contains(&self.n_draws),
         }
     }
 
@@ -177,7 +195,9 @@ impl Episode {
             }
         }
         let last = observation.own.last;
-        if let Some(action) = self.recovery.step(&mut self.memory, last, &mut self.rng) {
+        if self.memory.rules.walking == Walking::Careful
+            && let Some(action) = self.recovery.step(&mut self.memory, last, &mut self.rng)
+        {
             return action;
         }
         match self.mood {
@@ -225,7 +245,7 @@ impl Agent for Child {
     }
 
     fn reset(&mut self, briefing: &Briefing) {
-        self.episode = Some(Episode::new(briefing));
+        self.episode = Some(Episode::new(briefing, self.rules));
     }
 
     fn act(&mut self, observation: &Observation) -> Action {
@@ -237,7 +257,7 @@ impl Agent for Child {
 
     fn thought(&self) -> Thought {
         let (mood, plan) = match self.episode.as_ref().map(|e| e.mood) {
-            Some(Mood::RunAway(_)) => ("run_away", "run away"),
+            Some(Mood::RunAway(_)) => (RUN_AWAY, "run away"),
             Some(Mood::GotoGuardian) => ("goto_guardian", "go back"),
             Some(Mood::Follow) | None => ("follow", "come along"),
         };
@@ -272,7 +292,7 @@ mod tests {
                 Companion { agent: AgentId::PARTNER, relation: Relation::Guardian },
                 Companion { agent: AgentId::HELPER, relation: Relation::Partner },
             ];
-            let mut child = Child::new();
+            let mut child = Child::new(PlannerRules::paper());
             child.reset(&briefing);
             let mut observation = toy.observe();
             observation.images = Default::default();
@@ -305,6 +325,18 @@ mod tests {
             .expect("most follow at first");
         for frame in 1..=PLAN_FRAMES {
             assert_eq!(stage.mood_at(frame, 1.0, 9.0), "follow", "no draw before frame 101");
+        }
+    }
+
+    #[test]
+    fn the_constant_draws_let_it_run_at_the_sixth_in_every_episode() {
+        for seed in 0..5 {
+            let mut stage = Stage::new(seed);
+            stage.child.rules.child_draws = ChildDraws::Constant;
+            stage.child.episode.as_mut().expect("briefed").memory.rules = stage.child.rules;
+            // A draw at once, and then one every 101 frames.
+            let first = (0..2000).find(|frame| stage.mood_at(*frame, 1.0, 9.0) == RUN_AWAY);
+            assert_eq!(first, Some(5 * (PLAN_FRAMES + 1)), "seed {seed}");
         }
     }
 

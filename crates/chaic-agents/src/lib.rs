@@ -15,12 +15,13 @@
 //!   come from [`chaic_protocol::rng::Stream`], there is no clock, and no hash map is iterated.
 //!
 //! ```
-//! use chaic_agents::helpers;
-//! let mut rhp = helpers::helper("rhp").expect("it is in the registry");
-//! assert!(rhp.senses().depth && helpers::helper_grants("rhp").ids);
+//! use chaic_agents::{PlannerRules, helpers};
+//! let mut rhp = helpers::helper("rhp", PlannerRules::paper()).expect("it is in the registry");
+//! assert!(rhp.senses().depth && helpers::helper_grants("rhp", PlannerRules::paper()).ids);
 //! ```
 
 pub mod perception;
+pub mod rules;
 
 pub mod memory;
 
@@ -44,3 +45,4 @@ mod test_support;
 pub use helpers::{HELPERS, helper, helper_grants};
 pub use mind::Mind;
 pub use partners::{child, partner, partner_grants};
+pub use rules::PlannerRules;

@@ -10,6 +10,7 @@ use crate::execution::interact::learn;
 use crate::execution::{Executor, Progress, Situation};
 use crate::memory::Memory;
 use crate::perception::{GroundTruthIds, Perception};
+use crate::rules::PlannerRules;
 
 /// So many plans may end without an action within one decision; then one waits for a moment.
 const MAX_PLANS: usize = 6;
@@ -22,6 +23,7 @@ pub struct Mind<P: Policy> {
     behavior: Box<dyn BehaviorModel>,
     policy: P,
     senses: Senses,
+    rules: PlannerRules,
     episode: Option<Episode>,
 }
 
@@ -37,9 +39,9 @@ struct Episode {
 
 impl<P: Policy> Mind<P> {
     /// A mind with perfect segmentation that knows of the others' doings what it is granted.
-    pub fn new(policy: P) -> Mind<P> {
+    pub fn new(policy: P, rules: PlannerRules) -> Mind<P> {
         let behavior = Box::new(GroundTruthBehavior::default());
-        Mind::with(policy, Box::new(GroundTruthIds), behavior)
+        Mind::with(policy, Box::new(GroundTruthIds), behavior, rules)
     }
 
     /// A mind made of the given parts.
@@ -47,8 +49,10 @@ impl<P: Policy> Mind<P> {
         policy: P,
         perception: Box<dyn Perception>,
         behavior: Box<dyn BehaviorModel>,
+        rules: PlannerRules,
     ) -> Mind<P> {
-        Mind { perception, behavior, policy, senses: Senses::DEPTH_AND_IDS, episode: None }
+        let senses = Senses::DEPTH_AND_IDS;
+        Mind { perception, behavior, policy, senses, rules, episode: None }
     }
 
     /// The same mind with other senses: smaller images, or color for a learned perception.
@@ -74,10 +78,10 @@ impl<P: Policy> Mind<P> {
 }
 
 impl Episode {
-    fn new(briefing: &Briefing) -> Episode {
+    fn new(briefing: &Briefing, rules: PlannerRules) -> Episode {
         Episode {
             briefing: briefing.clone(),
-            memory: Memory::new(briefing),
+            memory: Memory::new(briefing, rules),
             executor: Executor::new(briefing),
             plan: None,
             news: 0,
@@ -152,7 +156,7 @@ impl<P: Policy> Agent for Mind<P> {
     fn reset(&mut self, briefing: &Briefing) {
         self.policy.reset(briefing);
         self.behavior.reset();
-        self.episode = Some(Episode::new(briefing));
+        self.episode = Some(Episode::new(briefing, self.rules));
     }
 
     fn act(&mut self, observation: &Observation) -> Action {

@@ -5,45 +5,46 @@ use chaic_protocol::capability::Persona;
 use chaic_protocol::observation::Grants;
 use chaic_protocol::task::SceneKind;
 
-pub use crate::child::Child;
+pub use crate::child::{Child, RUN_AWAY};
 use crate::mind::Mind;
 use crate::policies::{RuleProfile, Rules};
+use crate::rules::PlannerRules;
 
 /// What a partner is granted: perfect segmentation and its own goal.
 pub const PARTNER_GRANTS: Grants = Grants::PARTNER;
 
 /// The constrained person indoors: adult, child or in a wheelchair. Obstacles are left to others
 /// (paper section 5.1.1).
-pub fn constrained() -> Mind<Rules> {
-    Mind::new(Rules::new(RuleProfile::PARTNER))
+pub fn constrained(rules: PlannerRules) -> Mind<Rules> {
+    Mind::new(Rules::new(RuleProfile::PARTNER), rules)
 }
 
 /// The person with the bicycle: fills the basket, then delivers it.
-pub fn rider() -> Mind<Rules> {
-    Mind::new(Rules::new(RuleProfile::RIDER))
+pub fn rider(rules: PlannerRules) -> Mind<Rules> {
+    Mind::new(Rules::new(RuleProfile::RIDER), rules)
 }
 
 /// The frail person who moves house: takes the nearest furniture, and tries again when it is too
 /// heavy. With furniture the rules of time come to "carry what you hold to the truck".
-pub fn frail() -> Mind<Rules> {
-    Mind::new(Rules::new(RuleProfile::PARTNER))
+pub fn frail(rules: PlannerRules) -> Mind<Rules> {
+    Mind::new(Rules::new(RuleProfile::PARTNER), rules)
 }
 
 /// The mind of a task's partner.
-pub fn partner(persona: Persona, scene: SceneKind) -> Box<dyn Agent> {
+pub fn partner(persona: Persona, scene: SceneKind, rules: PlannerRules) -> Box<dyn Agent> {
     match (persona, scene) {
-        (Persona::Rider, _) | (_, SceneKind::Street) => Box::new(rider()),
-        (Persona::Frail, _) | (_, SceneKind::Yard) => Box::new(frail()),
-        _ => Box::new(constrained()),
+        (Persona::Rider, _) | (_, SceneKind::Street) => Box::new(rider(rules)),
+        (Persona::Frail, _) | (_, SceneKind::Yard) => Box::new(frail(rules)),
+        _ => Box::new(constrained(rules)),
     }
 }
 
 /// What the mind of a task's partner is granted.
-pub fn partner_grants() -> Grants {
-    PARTNER_GRANTS
+pub fn partner_grants(rules: PlannerRules) -> Grants {
+    Grants { behavior: rules.knows_holding, ..PARTNER_GRANTS }
 }
 
 /// The mind of the child who comes along while shopping; it is granted [`Grants::CHILD`].
-pub fn child() -> Box<dyn Agent> {
-    Box::new(Child::new())
+pub fn child(rules: PlannerRules) -> Box<dyn Agent> {
+    Box::new(Child::new(rules))
 }

@@ -199,6 +199,7 @@ impl Toy {
             camera,
             images: Images { rgb: None, depth_m: Some(depth), ids: Some(ids) },
             delivered: sees_goal.then(|| self.delivered.clone()),
+            removed: Vec::new(),
             granted: Granted {
                 classes: Some(Arc::new(self.classes.clone())),
                 ..Granted::default()
@@ -381,7 +382,7 @@ pub struct ToyRun {
 impl ToyRun {
     pub fn new(toy: Toy) -> ToyRun {
         let briefing = toy.briefing();
-        ToyRun { toy, memory: Some(Memory::new(&briefing)), briefing }
+        ToyRun { toy, memory: Some(Memory::new(&briefing, crate::PlannerRules::paper())), briefing }
     }
 
     /// The memory after another look.

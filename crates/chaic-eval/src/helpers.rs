@@ -1,6 +1,6 @@
 //! Who can be the helper of a run.
 
-use chaic_agents::{HELPERS, helper, helper_grants};
+use chaic_agents::{HELPERS, PlannerRules, helper, helper_grants};
 use chaic_protocol::Agent;
 use chaic_protocol::observation::Grants;
 
@@ -21,15 +21,16 @@ pub struct Helper {
 ///
 /// ```
 /// use chaic_eval::helpers::{BuiltIn, Helpers as _};
-/// assert!(BuiltIn.make("rhp").is_some());
-/// assert!(BuiltIn.make("nobody").is_none());
+/// use chaic_agents::PlannerRules;
+/// assert!(BuiltIn.make("rhp", PlannerRules::paper()).is_some());
+/// assert!(BuiltIn.make("nobody", PlannerRules::paper()).is_none());
 /// ```
 pub trait Helpers: Sync {
     /// The names, without [`NONE`].
     fn names(&self) -> Vec<String>;
 
-    /// A fresh helper of this name.
-    fn make(&self, name: &str) -> Option<Helper>;
+    /// A fresh helper of this name that plans by these rules, as far as they concern it.
+    fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper>;
 }
 
 /// The helpers of `chaic-agents`.
@@ -41,8 +42,8 @@ impl Helpers for BuiltIn {
         HELPERS.iter().map(|n| (*n).to_owned()).collect()
     }
 
-    fn make(&self, name: &str) -> Option<Helper> {
-        Some(Helper { mind: helper(name)?, grants: helper_grants(name) })
+    fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper> {
+        Some(Helper { mind: helper(name, rules)?, grants: helper_grants(name, rules) })
     }
 }
 
@@ -50,7 +51,7 @@ impl Helpers for BuiltIn {
 ///
 /// # Errors
 /// [`EvalError::UnknownHelper`] with all names.
-pub fn find(helpers: &dyn Helpers, name: &str) -> Result<Option<Helper>> {
+pub fn find(helpers: &dyn Helpers, name: &str, rules: PlannerRules) -> Result<Option<Helper>> {
     if name == NONE {
         return Ok(None);
     }
@@ -58,5 +59,5 @@ pub fn find(helpers: &dyn Helpers, name: &str) -> Result<Option<Helper>> {
         let known = std::iter::once(NONE.to_owned()).chain(helpers.names()).collect();
         EvalError::UnknownHelper { name: name.to_owned(), known }
     };
-    helpers.make(name).map(Some).ok_or_else(unknown)
+    helpers.make(name, rules).map(Some).ok_or_else(unknown)
 }

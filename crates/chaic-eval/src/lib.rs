@@ -22,6 +22,7 @@ mod error;
 mod digest;
 pub mod helpers;
 pub mod play;
+pub mod rules;
 
 pub mod trace;
 

@@ -13,6 +13,7 @@ use image::DynamicImage;
 use crate::error::{EvalError, Result};
 use crate::helpers::{self, Helpers};
 use crate::play::{Play, Staging};
+use crate::rules::RuleSet;
 
 /// A plan smaller than this can't be read, pixels.
 const PLAN_MIN_PX: u32 = 960;
@@ -26,6 +27,8 @@ pub struct Still<'a> {
     pub helper: &'a str,
     /// Which seed.
     pub seed: u32,
+    /// By which rules it is played.
+    pub rules: RuleSet,
     /// Whose eyes.
     pub agent: AgentId,
     /// The moment; if nobody decides in this frame, the first one after it in which somebody does.
@@ -41,9 +44,9 @@ pub struct Still<'a> {
 /// # Errors
 /// If there is no such agent or helper, or the file system refuses.
 pub fn write(still: &Still<'_>, helpers: &dyn Helpers, out: &Path) -> Result<Frame> {
-    let Still { episode, helper, seed, agent, frame, size } = *still;
-    let staging = Staging { episode, seed, rules: Rules::paper(), helper, image_size: None };
-    let mut play = Play::new(staging, helpers::find(helpers, helper)?)?;
+    let Still { episode, helper, seed, rules, agent, frame, size } = *still;
+    let staging = Staging { episode, seed, rules, helper, image_size: None };
+    let mut play = Play::new(staging, helpers::find(helpers, helper, rules.planner)?)?;
     if agent.index() >= play.world().setup().people.len() {
         let text = format!("{} has no {agent} when the helper is {helper}", episode.id());
         return Err(EvalError::Options(text));

@@ -5,14 +5,16 @@
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
+use chaic_agents::PlannerRules;
 use chaic_episodes::{Episode, find_episode};
 use chaic_eval::helpers::{BuiltIn, Helpers as _};
 use chaic_eval::play::{Actor, Cast, Play, Staging};
+use chaic_eval::rules::RuleSet;
 use chaic_protocol::briefing::Goal;
 use chaic_protocol::capability::Capability;
 use chaic_protocol::observation::{Grants, Senses};
 use chaic_protocol::{Action, Agent, Briefing, ClassId, Observation};
-use chaic_world::{Rules, Setup};
+use chaic_world::Setup;
 
 /// Long enough to explore, to pick up and to deliver.
 const FRAMES: u32 = 1200;
@@ -71,14 +73,14 @@ fn seen_in(id: &str, helper: &str, grants: Option<Grants>, change: &dyn Fn(&mut 
     change(&mut setup);
     let episode = Episode::new(id, "hidden", None, setup).unwrap();
     let seen = Arc::new(Mutex::new(Seen::default()));
-    let built_in = BuiltIn.make(helper).unwrap();
+    let built_in = BuiltIn.make(helper, PlannerRules::paper()).unwrap();
     let spy = Spy { mind: built_in.mind, seen: Arc::clone(&seen) };
     let mut actors = vec![Actor::new(Box::new(Waiter), Grants::PARTNER)];
     actors.push(Actor::new(Box::new(spy), grants.unwrap_or(built_in.grants)));
     for _ in 2..episode.setup().people.len() {
         actors.push(Actor::new(Box::new(Waiter), Grants::NONE));
     }
-    let rules = Rules::paper();
+    let rules = RuleSet::PAPER;
     let staging = Staging { episode: &episode, seed: 0, rules, helper, image_size: Some(48) };
     let mut play = Play::with_cast(staging, Cast { actors }).unwrap();
     assert!(play.run(&AtomicBool::new(false), None, &mut |_| Ok(())).unwrap());

@@ -132,7 +132,7 @@ pub struct Granted {
     pub goal: Option<Goal>,
     /// `behavior`: what the others did last other than moving about, if they are in the image.
     pub behavior: Vec<SeenAction>,
-    /// `behavior`: what the partner holds, if in the image.
+    /// `behavior`: what the partner (for the partner: the helper) holds, if in the image.
     pub partner_hands: Option<[Option<Held>; 2]>,
     /// `positions`: where everybody is, by agent.
     pub poses: Vec<(AgentId, Pose)>,
@@ -152,6 +152,8 @@ pub struct Observation {
     /// Everything delivered so far, wanted or not, if the goal place is in view or near (or
     /// progress is granted); otherwise `None`.
     pub delivered: Option<Vec<EntityId>>,
+    /// The obstacles that have been removed, where the rules tell everybody of them.
+    pub removed: Vec<EntityId>,
     /// What was granted beyond that.
     pub granted: Granted,
 }

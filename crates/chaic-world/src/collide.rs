@@ -38,6 +38,17 @@ pub(crate) struct Body {
     pub high_m: f32,
 }
 
+impl Body {
+    /// Whether this body, standing at `p`, touches a box.
+    pub fn touches(&self, block: &Block, p: Vec2) -> bool {
+        let [low, high] = block.y_range();
+        let (nearest, inside) = block.nearest_in_plan(Vec3::new(p.x, 0.0, p.y));
+        high > self.low_m
+            && low < self.high_m
+            && (inside || p.distance(xz(nearest)) < self.radius_m)
+    }
+}
+
 /// Side of a grid cell, metres: a body and its step touch at most four.
 const CELL_M: f32 = 1.0;
 /// How often overlaps are pushed apart; corners need two, slits a few more.

@@ -38,6 +38,16 @@ impl World {
         self.setup.entities().filter(|e| self.thing(*e).1.delivered.is_some()).collect()
     }
 
+    /// The obstacles that somebody has taken away, if the rules tell everybody of them.
+    pub fn told_removed(&self) -> Vec<EntityId> {
+        let is_removed = |e: &EntityId| {
+            let (thing, state) = self.thing(*e);
+            thing.class.info().role == Role::Obstacle && state.last_holder.is_some()
+        };
+        let all = self.setup.entities().filter(|_| self.rules.tells_removed);
+        all.filter(is_removed).collect()
+    }
+
     /// How many of a class are delivered.
     pub fn n_delivered(&self, class: ClassId) -> u32 {
         let of_class = |e: &EntityId| self.thing(*e).0.class == class;
@@ -84,6 +94,22 @@ impl World {
         let role = self.thing(object).0.class.info().role;
         let deliverable = role != Role::Obstacle;
         if by_rule && high_enough && deliverable {
+            self.deliver(object);
+        }
+    }
+
+    /// Delivers all that somebody has taken and let go so far, wherever it lies: the original's
+    /// second rule (facts 5.3).
+    pub(crate) fn deliver_all_let_go(&mut self, agent: AgentId) {
+        let is_let_go = |e: &EntityId| {
+            let (thing, state) = self.thing(*e);
+            state.last_holder == Some(agent)
+                && state.is_resting()
+                && state.delivered.is_none()
+                && thing.class.info().role != Role::Obstacle
+        };
+        let let_go: Vec<EntityId> = self.setup.entities().filter(is_let_go).collect();
+        for object in let_go {
             self.deliver(object);
         }
     }

@@ -23,6 +23,7 @@ mod shape;
 
 mod collide;
 mod fall;
+mod probe;
 
 mod act;
 mod goal;
@@ -33,7 +34,7 @@ mod world;
 
 pub use event::{Event, EventKind};
 pub use posture::{Arm, Posture};
-pub use rules::{Durations, RuleSet, Rules};
+pub use rules::{Blocking, Durations, JointLift, ReachTo, Rules};
 pub use setup::{
     Floor, FloorMaterial, Opening, Person, Room, RoomKind, Setup, SetupError, Thing, Wall,
 };

@@ -30,13 +30,49 @@ pub struct Durations {
     pub watch_fall: u32,
     /// Most frames that one who stands at furniture waits for the other who is on the way to it.
     pub await_partner: u32,
+    /// Raising furniture once it is in hand.
+    pub raise_furniture: u32,
+    /// A pick-up that is refused at once: the thing is too far off, held or out of play.
+    pub refused_pick: u32,
+}
+
+/// What becomes of somebody who walks against something.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Blocking {
+    /// Bodies are solid: it stops, or slides along.
+    Stops,
+    /// Nothing stops it for good: a step that meets something ends after one frame, well, and the
+    /// next one goes on through. Targets, and in the street tents, shelves, bicycle and goal place
+    /// are not even met (facts 3.3).
+    Creeps,
+}
+
+/// From where one reaches a thing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ReachTo {
+    /// Its nearest point counts, and no wall may be between.
+    NearestPoint,
+    /// Its middle counts, walls don't, and putting something somewhere asks for no distance at
+    /// all (facts 3.5 and 3.7).
+    Middle,
+}
+
+/// When two lift furniture together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum JointLift {
+    /// When both have chosen to, and stand at it.
+    BothAtIt,
+    /// When one chooses to and the other's last choice was the same piece, however long ago and
+    /// however it ended: both drop what they do and go there (facts 9.4).
+    LastChoice,
 }
 
 /// The rules of a world.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rules {
-    /// Name of the rule set.
-    pub name: RuleSet,
     /// Frames of the parts of actions.
     pub durations: Durations,
     /// A step ahead ends once it has covered more than this, metres (facts 2.2).
@@ -45,6 +81,8 @@ pub struct Rules {
     pub turn_rad: f32,
     /// A step ahead that covered less than this failed, metres: an eighth of a step.
     pub min_progress_m: f32,
+    /// What becomes of somebody who walks against something.
+    pub blocking: Blocking,
     /// Lower things are stepped over, metres (facts 1.5: the original's probe begins at 0.12 m).
     pub step_over_m: f32,
     /// Farthest that one steps up to a thing, from its middle less half its longer side, metres
@@ -56,6 +94,14 @@ pub struct Rules {
     /// From how far one still reaches a thing that one can't step up to any nearer, metres, if no
     /// wall is between (facts 3.5: 2 m to the middle).
     pub reach_limit_m: f32,
+    /// The same for furniture that is being moved (facts 9.3: 3 m).
+    pub furniture_reach_limit_m: f32,
+    /// From where reaching is measured.
+    pub reach_to: ReachTo,
+    /// When two lift furniture together.
+    pub joint_lift: JointLift,
+    /// Whether everybody is told at once which obstacles have been removed (facts 5.5).
+    pub tells_removed: bool,
     /// Chance of picking up beyond one's range of heights (facts 1.3).
     pub pick_penalty: LimitPenalty,
     /// Chance of putting on beyond one's range of heights (facts 1.3).
@@ -70,6 +116,15 @@ pub struct Rules {
     /// Whether a thing that was dropped by a put-on beyond one's limits counts if it lands near
     /// enough; the original's radius rule lets it.
     pub dropped_counts: bool,
+    /// Whether a put-on that succeeded anywhere delivers all that its agent has let go so far:
+    /// the original's second rule (facts 5.3), taken for a mistake and off in both rule sets.
+    pub delivered_anywhere: bool,
+    /// Whether containers are offered where a wheelchair takes part; the original's minds never
+    /// take note of one there (facts 13, number 12).
+    pub containers_with_wheelchair: bool,
+    /// Whether fragile things may be targets; in the original's data nobody can go for them, but
+    /// they count in the total (facts 6).
+    pub fragile_targets: bool,
     /// Chance that a fragile thing within a child's reach breaks when picked up (facts 6).
     pub break_chance_low: f32,
     /// The same above the child's reach.
@@ -82,28 +137,10 @@ pub struct Rules {
     pub fall_step_s: f32,
 }
 
-/// Named rule sets.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum RuleSet {
-    /// What the paper says and means.
-    Paper,
-}
-
-impl RuleSet {
-    /// The name in commands and files.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            RuleSet::Paper => "paper",
-        }
-    }
-}
-
 impl Rules {
     /// The paper's rules, with the original's measured numbers where the paper gives none.
     pub const fn paper() -> Rules {
         Rules {
-            name: RuleSet::Paper,
             durations: Durations {
                 turn: 2,
                 start_walking: 2,
@@ -116,25 +153,63 @@ impl Rules {
                 open_hand: 2,
                 watch_fall: 25,
                 await_partner: 150,
+                raise_furniture: 35,
+                refused_pick: 1,
             },
             stride_m: 0.4,
             turn_rad: std::f32::consts::PI / 12.0,
             min_progress_m: 0.05,
+            blocking: Blocking::Stops,
             step_over_m: 0.12,
             approach_limit_m: 3.0,
             arm_reach_m: 0.7,
             reach_limit_m: 2.0,
+            furniture_reach_limit_m: 2.0,
+            reach_to: ReachTo::NearestPoint,
+            joint_lift: JointLift::BothAtIt,
+            tells_removed: false,
             pick_penalty: LimitPenalty { alpha: 1.0, beta: 2.0 },
             put_penalty: LimitPenalty { alpha: 1.0, beta: 1.0 },
             lift_penalty: LimitPenalty { alpha: 50.0, beta: 1.0 },
             container_capacity: 3,
             delivery_margin_m: 2.0,
             dropped_counts: false,
+            delivered_anywhere: false,
+            containers_with_wheelchair: true,
+            fragile_targets: true,
             break_chance_low: 0.25,
             break_chance_high: 0.5,
             child_away_m: 3.5,
             high_goal_min_top_m: 1.5,
             fall_step_s: 0.01,
+        }
+    }
+
+    /// What the original's released code does, where that moves a score: see `docs/rules.md` for
+    /// the reason of each difference.
+    pub const fn compat() -> Rules {
+        let paper = Rules::paper();
+        Rules {
+            durations: Durations {
+                // Whoever is called to lift comes, from wherever (facts 9.4).
+                await_partner: 3000,
+                // Facts 9.3: raised by one reach, without bringing the arms back.
+                raise_furniture: 17,
+                // Facts 2.2: one frame, then both arms are brought back.
+                refused_pick: 37,
+                ..paper.durations
+            },
+            blocking: Blocking::Creeps,
+            furniture_reach_limit_m: 3.0,
+            reach_to: ReachTo::Middle,
+            joint_lift: JointLift::LastChoice,
+            tells_removed: true,
+            dropped_counts: true,
+            containers_with_wheelchair: false,
+            fragile_targets: false,
+            break_chance_low: 0.0,
+            break_chance_high: 0.0,
+            ..paper
         }
     }
 }

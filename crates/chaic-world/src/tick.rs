@@ -11,6 +11,7 @@ use chaic_protocol::geom::{forward, horizontal_distance, yaw_towards};
 use chaic_protocol::{Action, AgentId, Outcome, Vec2, Vec3};
 
 use crate::event::EventKind;
+use crate::rules::Blocking;
 use crate::state::{Activity, Phase, Place, Step};
 use crate::world::World;
 
@@ -86,6 +87,12 @@ impl World {
         }
         person.in_stride = action == Action::MoveForward && outcome.is_success();
         self.happened(EventKind::Ended { agent, action, outcome });
+        if self.rules.delivered_anywhere
+            && outcome.is_success()
+            && matches!(action, Action::PutOn { .. })
+        {
+            self.deliver_all_let_go(agent);
+        }
     }
 
     fn run_step(&mut self, agent: AgentId, activity: &mut Activity) -> Progress {
@@ -141,6 +148,10 @@ impl World {
         let moved = self.step_towards(agent, ahead, speed);
         *left_m -= speed;
         *made_m += moved;
+        if self.rules.blocking == Blocking::Creeps {
+            let is_done = *left_m <= 0.0 || self.meets_something(agent);
+            return if is_done { Progress::Done } else { Progress::Goes };
+        }
         let stuck = moved < 0.1 * speed;
         if *left_m > 0.0 && !stuck {
             return Progress::Goes;
@@ -163,11 +174,14 @@ impl World {
             return Progress::Done;
         }
         let from = self.person(agent).pose.position;
-        let target = self.nearest_point(from, entity);
+        let target = self.point_to_reach(from, entity);
         let yaw = yaw_towards(from, target);
         self.person_mut(agent).pose.yaw_rad = yaw;
         let speed = self.capability(agent).approach_speed_m_per_frame;
         self.step_towards(agent, forward(yaw), speed);
+        if self.rules.blocking == Blocking::Creeps && self.meets_something(agent) {
+            return Progress::Done;
+        }
         let nearer = before - self.reach_distance(agent, entity);
         *stuck = if nearer < 0.25 * speed { *stuck + 1 } else { 0 };
         if *stuck >= GIVE_UP_AFTER { Progress::Done } else { Progress::Goes }
@@ -197,6 +211,10 @@ impl World {
 
     fn slide(&self, agent: AgentId, except: Option<AgentId>, from: Vec3, to: Vec3) -> Vec3 {
         let xz = |v: Vec3| Vec2::new(v.x, v.z);
+        if self.rules.blocking == Blocking::Creeps {
+            let p = xz(to).clamp(self.setup.bounds.min, self.setup.bounds.max);
+            return Vec3::new(p.x, from.y, p.y);
+        }
         let p = self.surroundings.slide(
             self.body(agent),
             xz(from),

@@ -28,6 +28,7 @@ impl World {
             _ => Relation::Partner,
         };
         let others = self.setup.agents().filter(|a| *a != me);
+        let has_wheelchair = self.setup.people.iter().any(|p| p.capability().gait == Gait::Roll);
         Briefing {
             me,
             capability: self.capability(me),
@@ -37,8 +38,14 @@ impl World {
             seed: mix(self.setup.seed, me),
             horizon: self.setup.horizon,
             bounds: self.setup.bounds,
-            possible_targets: classes(&|c| is_possible_target(c, scene)),
-            containers: classes(&|c| c.info().role == Role::Container && scene != SceneKind::Yard),
+            possible_targets: classes(&|c| {
+                let fragile = c.info().role == Role::Fragile;
+                is_possible_target(c, scene) && (self.rules.fragile_targets || !fragile)
+            }),
+            containers: classes(&|c| {
+                let offered = self.rules.containers_with_wheelchair || !has_wheelchair;
+                offered && c.info().role == Role::Container && scene != SceneKind::Yard
+            }),
             obstacles: classes(&|c| c.info().role == Role::Obstacle && scene == SceneKind::House),
             goal_place: self.thing(self.setup.goal_places[0]).0.class,
             goal_place_min_top_m: self.goal_min_top_m(),
@@ -71,10 +78,11 @@ impl World {
         if grants.goal {
             granted.goal = Some(self.setup.goal.clone());
         }
+        let mate = if agent == AgentId::PARTNER { AgentId::HELPER } else { AgentId::PARTNER };
         if grants.behavior {
             for other in self.setup.agents().filter(|a| *a != agent && in_view(*a)) {
                 granted.behavior.extend(self.seen_deed(other));
-                if other == AgentId::PARTNER {
+                if other == mate {
                     granted.partner_hands = Some(self.hands(other));
                 }
             }

@@ -6,12 +6,12 @@ use chaic_protocol::capability::{Capability, Gait};
 use chaic_protocol::catalogue::Role;
 use chaic_protocol::geom::{horizontal_distance, yaw_rotation};
 use chaic_protocol::rng::Stream;
-use chaic_protocol::{Action, AgentId, EntityId, Hand, Vec3};
+use chaic_protocol::{Action, AgentId, EntityId, Hand, TaskId, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::collide::{Body, Disc, Surroundings};
 use crate::event::{Event, EventKind};
-use crate::rules::Rules;
+use crate::rules::{ReachTo, Rules};
 use crate::setup::{Setup, SetupError, Thing};
 use crate::shape::{Block, blocks_at, wall_blocks};
 use crate::state::{PersonState, Place, State, ThingState};
@@ -281,7 +281,18 @@ impl World {
     /// Distance in plan from a person to the nearest point of a thing, metres.
     pub(crate) fn distance_to(&self, agent: AgentId, entity: EntityId) -> f32 {
         let p = self.person(agent).pose.position;
-        horizontal_distance(p, self.nearest_point(p, entity))
+        horizontal_distance(p, self.point_to_reach(p, entity))
+    }
+
+    /// The point of a thing that one goes to from `p`. Nobody walks into the middle of the truck:
+    /// the original has furniture brought to a point before it (facts 9.4).
+    pub(crate) fn point_to_reach(&self, p: Vec3, entity: EntityId) -> Vec3 {
+        let is_truck =
+            self.setup.task == TaskId::MovingHouse && self.setup.goal_places.contains(&entity);
+        match self.rules.reach_to {
+            ReachTo::Middle if !is_truck => self.thing(entity).1.position,
+            ReachTo::Middle | ReachTo::NearestPoint => self.nearest_point(p, entity),
+        }
     }
 
     /// The same for a person with all that moves as one with it: of two who carry furniture, the

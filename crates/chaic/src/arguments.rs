@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use chaic_episodes::Split;
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::Format;
+use chaic_eval::rules::RuleSetName;
 use chaic_protocol::{AgentId, TaskId};
 use clap::{Args, Parser, Subcommand};
 
@@ -77,10 +78,16 @@ pub struct EvalArguments {
     pub split: Option<Split>,
     /// Play the episode files (*.json) of this folder instead of a split.
     #[arg(long, value_name = "DIR")]
-    pub episodes_dir: Option<PathBuf>,
+    pub episodes: Option<PathBuf>,
     /// Only the first N episodes of each task.
     #[arg(long, value_name = "N")]
-    pub episodes: Option<u32>,
+    pub first: Option<u32>,
+    /// paper (usual), or compat for what the original's code does.
+    #[arg(long, value_name = "NAME")]
+    pub rules: Option<RuleSetName>,
+    /// Set one rule otherwise; may be given often. VALUE may be paper or compat.
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub set: Vec<String>,
     /// Play each episode with N seeds; the first is the episode's own.
     #[arg(long, value_name = "N")]
     pub seeds: Option<u32>,
@@ -174,6 +181,9 @@ pub struct RenderArguments {
     /// The seed.
     #[arg(long, default_value_t = 0)]
     pub seed: u32,
+    /// paper, or compat for what the original's code does.
+    #[arg(long, value_name = "NAME", default_value = "paper")]
+    pub rules: RuleSetName,
 }
 
 /// `chaic episodes`.

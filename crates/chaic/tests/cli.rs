@@ -62,7 +62,7 @@ fn workshop() -> tempfile::TempDir {
 }
 
 const EVAL: [&str; 9] =
-    ["eval", "--episodes-dir", "short", "--helper", "none,rhp", "--size", "48", "--out", "run"];
+    ["eval", "--episodes", "short", "--helper", "none,rhp", "--size", "48", "--out", "run"];
 
 #[test]
 fn a_run_from_end_to_end() {
@@ -169,7 +169,9 @@ fn errors_are_clear() {
         (&["eval", "--split", "gen:5..5", "--out", "r"], "no split `gen:5..5`"),
         (&["eval", "--size", "5", "--out", "r"], "--size is 5"),
         (&["eval", "--seeds", "0", "--out", "r"], "at least 1"),
-        (&["eval", "--episodes-dir", "nowhere", "--out", "r"], "nowhere"),
+        (&["eval", "--rules", "mine", "--out", "r"], "they are paper and compat"),
+        (&["eval", "--set", "world.gravity=1", "--out", "r"], "world.dropped_counts"),
+        (&["eval", "--episodes", "nowhere", "--out", "r"], "nowhere"),
         (&["report", "nowhere"], "no run.json"),
         (&["verify", "nowhere"], "no run.json"),
         (&["replay", "nowhere", "obstacle/test/00", "--out", "x.mp4"], "no run.json"),
@@ -239,7 +241,7 @@ fn an_interrupted_run_goes_on() {
     let dir = workshop();
     let at = dir.path();
     // Longer than the moment between beginning and signal.
-    let long = ["eval", "--task", "no_constraint", "--episodes", "1", "--helper", "none,rhp"];
+    let long = ["eval", "--task", "no_constraint", "--first", "1", "--helper", "none,rhp"];
     for (signal, code) in [("-INT", Some(130)), ("-KILL", None)] {
         let out = format!("run{signal}");
         let mut arguments = long.to_vec();

@@ -11,6 +11,7 @@ use anyhow::Result;
 use chaic_eval::helpers::{Helper, Helpers};
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::{Format, Report};
+use chaic_eval::rules::PlannerRules;
 use chaic_eval::run::{Access, Given, Run};
 use chaic_protocol::geom::{horizontal_distance, wrap_angle, yaw_towards};
 use chaic_protocol::observation::{Grants, Senses};
@@ -133,7 +134,7 @@ impl Helpers for Mine {
         vec!["minimal".to_owned()]
     }
 
-    fn make(&self, name: &str) -> Option<Helper> {
+    fn make(&self, name: &str, _: PlannerRules) -> Option<Helper> {
         (name == "minimal")
             .then(|| Helper { mind: Box::new(Minimal::default()), grants: Grants::IDS })
     }
@@ -144,7 +145,7 @@ fn main() -> Result<()> {
     let given = Given {
         tasks: Some(vec![TaskId::NoConstraint, TaskId::LowTarget, TaskId::Shopping]),
         helpers: Some(vec!["none".to_owned(), "minimal".to_owned()]),
-        episodes: Some(4),
+        first: Some(4),
         ..Given::default()
     };
     let (mut run, _) = Run::open(Path::new(&out), Access::Resume, &given, &Mine)?;

@@ -5,6 +5,7 @@ use chaic_protocol::{Action, Briefing, EntityId, FailureReason, Frame, Outcome, 
 use super::navigate::{Destination, Nav, Navigator};
 use crate::memory::Memory;
 use crate::memory::semantic::{IGNORE_FRAMES, LIFT_FAILURES, Thing};
+use crate::rules::Walking;
 
 /// How near to go before an object is picked up, metres. (The world steps up from 3 m.)
 pub const PICK_WITHIN_M: f32 = 1.4;
@@ -15,6 +16,8 @@ pub const PUT_WITHIN_M: f32 = 1.8;
 const ARMS_M: [f32; 3] = [0.62, 0.75, 0.95];
 /// If there is no such place either: how near at least, metres.
 const RELAXED_M: f32 = 2.4;
+/// Things longer than this are walked up to at their nearest part, metres.
+const LONG_M: f32 = 4.0;
 /// From how many places an object is tried before it is left alone.
 const MAX_TRIES: usize = 4;
 /// Steps close to an object, on the way to a place to stand, before any place will do.
@@ -76,6 +79,9 @@ impl Interaction {
         if self.n_tries >= MAX_TRIES {
             return self.give_up(memory, entity);
         }
+        if memory.rules.walking == Walking::Lattice {
+            return self.step_on_lattice(memory, navigator, entity, within_m);
+        }
         let is_near = thing.distance_from(memory.here()) < within_m + 0.5;
         let mut destination = destination_at(thing, within_m);
         destination.avoid.clone_from(&self.tried);
@@ -100,6 +106,29 @@ impl Interaction {
                 Nav::Unreachable if destination.arm_m.is_some() => self.n_relaxed += 1,
                 Nav::Unreachable => return self.give_up(memory, entity),
             }
+        }
+    }
+
+    /// The same where near enough is near enough as the crow flies.
+    fn step_on_lattice(
+        &self,
+        memory: &mut Memory,
+        navigator: &mut Navigator,
+        entity: EntityId,
+        within_m: f32,
+    ) -> Step {
+        let Some(thing) = memory.things.get(entity) else { return Step::GiveUp };
+        let info = thing.class.info();
+        let here = memory.here();
+        // The original walks to a fixed point before the truck: its nearest part.
+        let is_long = info.size_m[0].max(info.size_m[2]) > LONG_M;
+        let mean = Vec2::new(thing.position_in_world.x, thing.position_in_world.z);
+        let at = if is_long { thing.nearest_point(here) } else { mean };
+        let destination = Destination { arm_m: Some(0.0), ..Destination::near(at, within_m) };
+        match navigator.step(memory, &destination) {
+            Nav::Act(action) => Step::Walk(action),
+            Nav::Arrived => Step::There,
+            Nav::Unreachable => self.give_up(memory, entity),
         }
     }
 
@@ -166,8 +195,10 @@ pub fn learn(
                 }
             }
         }
-        (Action::PutOn { .. }, Outcome::Failure(FailureReason::BeyondLimits)) => {
-            // It fell: what was not managed once is left alone for a while. The place is not.
+        (Action::PutOn { place, .. }, Outcome::Failure(FailureReason::BeyondLimits)) => {
+            // It fell: what was not managed once is left alone for a while. The place is not, in
+            // the paper's rules.
+            memory.things.ignore(place, now + memory.rules.goal_blackout_frames);
             for entity in released {
                 memory.things.ignore(entity, now + IGNORE_FRAMES);
             }
@@ -178,6 +209,11 @@ pub fn learn(
 
 fn learn_failure(memory: &mut Memory, object: EntityId, reason: FailureReason) {
     let now = memory.frame;
+    let reason = match reason {
+        FailureReason::Broke | FailureReason::OutOfPlay => reason,
+        _ if memory.rules.any_failure_counts => FailureReason::BeyondLimits,
+        _ => reason,
+    };
     match reason {
         FailureReason::BeyondLimits => {
             let is_heavy =
@@ -189,7 +225,7 @@ fn learn_failure(memory: &mut Memory, object: EntityId, reason: FailureReason) {
         }
         FailureReason::Broke | FailureReason::OutOfPlay => memory.things.mark_gone(object),
         FailureReason::HeldByOther => {
-            memory.things.mark_held(object, now);
+            memory.things.mark_held(object, now + memory.rules.held_frames);
             // Whatever it looks like: the one who tried knows.
             memory.things.ignore(object, now + HELD_FOR_SURE_FRAMES);
         }
@@ -219,7 +255,7 @@ mod tests {
         toy.stand([0.0, 0.0], 0.0);
         let mut briefing = toy.briefing();
         briefing.goal_place = ClassId::named(class);
-        let mut memory = Memory::new(&briefing);
+        let mut memory = Memory::new(&briefing, crate::PlannerRules::paper());
         let observation = toy.observe();
         memory.update(&briefing, &observation, &GroundTruthIds.perceive(&observation));
         (memory, briefing, entity)

@@ -7,7 +7,9 @@ pub mod navigate;
 pub mod explore;
 pub mod follow;
 pub mod interact;
+pub mod lattice;
 pub mod recover;
+pub mod sample;
 
 use chaic_protocol::briefing::Relation;
 use chaic_protocol::geom::xz;
@@ -17,11 +19,13 @@ use chaic_protocol::{Action, Briefing, EntityId, FailureReason, Frame, Hand, Out
 
 use crate::decision::{Load, Plan};
 use crate::memory::Memory;
+use crate::rules::{Exploration, PlaceChoice, Walking};
 use explore::{EXPLORE_FRAMES, Explorer, Found};
 use follow::{Follow, Follower};
 use interact::{Interaction, PICK_WITHIN_M, PUT_WITHIN_M, Step};
 use navigate::Navigator;
 use recover::Recovery;
+use sample::Sampler;
 
 /// Picking up, putting and removing take at most so long, frames (original facts 2.1).
 pub const INTERACT_FRAMES: Frame = 1000;
@@ -35,8 +39,6 @@ const PARTNER_M: f32 = 2.2;
 const CHILD_M: f32 = 1.9;
 /// How long to stand beside the child, frames: it decides every 18 frames or so.
 const CHILD_STAND_FRAMES: Frame = 30;
-/// Turns of a turn-around: with a view of 90 degrees, everything is seen.
-const AROUND_TURNS: u32 = 18;
 /// A wait lasts so long, frames (original facts 2.1).
 const WAIT_FRAMES: u32 = 10;
 /// A place from where something could not be done is remembered so long, frames.
@@ -74,6 +76,7 @@ pub struct Executor {
     navigator: Navigator,
     recovery: Recovery,
     explorer: Explorer,
+    sampler: Sampler,
     follower: Follower,
     interaction: Option<Interaction>,
     /// What could not be done from where, and when.
@@ -95,6 +98,7 @@ impl Executor {
             navigator: Navigator::default(),
             recovery: Recovery::default(),
             explorer: Explorer::new(briefing.bounds),
+            sampler: Sampler::new(briefing),
             follower: Follower::default(),
             interaction: None,
             bad_places: Vec::new(),
@@ -123,6 +127,7 @@ impl Executor {
         self.navigator.reset();
         self.recovery.reset();
         self.follower = Follower::default();
+        self.sampler.begin();
         self.interaction = None;
         self.bad_places.retain(|(_, _, since)| since + BAD_PLACE_FRAMES > now);
         self.since = now;
@@ -147,7 +152,7 @@ impl Executor {
         if is_standing || self.has_acted {
             self.recovery.stand();
         }
-        if !is_standing {
+        if !is_standing && s.memory.rules.walking == Walking::Careful {
             if let Some(action) = self.recovery.step(s.memory, s.own.last, &mut self.rng) {
                 return Progress::Act(action);
             }
@@ -158,10 +163,16 @@ impl Executor {
             }
         }
         match *plan {
-            Plan::Explore => match self.explorer.step(s.memory, &mut self.navigator) {
-                Found::Act(action) => Progress::Act(action),
-                Found::Resolved => Progress::Done,
-            },
+            Plan::Explore => {
+                let found = match s.memory.rules.exploration {
+                    Exploration::Frontier => self.explorer.step(s.memory, &mut self.navigator),
+                    Exploration::Sampled => self.sampler.step(s.memory, &mut self.navigator),
+                };
+                match found {
+                    Found::Act(action) => Progress::Act(action),
+                    Found::Resolved => Progress::Done,
+                }
+            }
             Plan::PickUp(subject) | Plan::PickContainer(subject) => {
                 self.pick(subject.entity, s, false)
             }
@@ -173,7 +184,8 @@ impl Executor {
             Plan::FollowChild => self.follow(Relation::Child, CHILD_M, s),
             Plan::TurnAround => {
                 self.n_turns += 1;
-                let is_done = self.n_turns > AROUND_TURNS;
+                let has_found = s.memory.rules.stops_turning_when_found && has_found_both(s);
+                let is_done = self.n_turns > s.memory.rules.around_turns || has_found;
                 if is_done { Progress::Done } else { Progress::Act(Action::TurnLeft) }
             }
             Plan::Wait => {
@@ -295,7 +307,12 @@ impl Executor {
         }
         if self.place.is_none_or(|p| s.memory.things.get(p).is_none_or(|t| !t.is_present)) {
             s.memory.refresh();
-            self.place = s.memory.goal_places().first().map(|(t, _)| t.entity);
+            let places = s.memory.goal_places();
+            let chosen = match s.memory.rules.place_choice {
+                PlaceChoice::Nearest => places.first(),
+                PlaceChoice::Random => self.rng.choose(&places),
+            };
+            self.place = chosen.map(|(t, _)| t.entity);
         }
         let Some(place) = self.place else { return Progress::Failed };
         self.approach(place, PUT_WITHIN_M, Action::PutOn { place, hand }, s)
@@ -309,7 +326,8 @@ impl Executor {
                 self.recovery.stand();
                 let since = *self.near_since.get_or_insert(s.memory.frame);
                 let stood = s.memory.frame.saturating_sub(since);
-                if relation == Relation::Child && stood > CHILD_STAND_FRAMES {
+                let trusts = s.memory.rules.trusts_child;
+                if relation == Relation::Child && trusts && stood > CHILD_STAND_FRAMES {
                     return Progress::Done;
                 }
                 Progress::Act(action)
@@ -317,6 +335,15 @@ impl Executor {
             Follow::Lost => Progress::Failed,
         }
     }
+}
+
+/// Whether partner and child were both seen a moment ago (original facts 2.1).
+fn has_found_both(s: &Situation<'_>) -> bool {
+    const MOMENT_FRAMES: Frame = 50;
+    [Relation::Partner, Relation::Child].into_iter().all(|relation| {
+        let person = s.memory.companion(s.briefing, relation);
+        person.is_some_and(|p| p.frame + MOMENT_FRAMES > s.memory.frame)
+    })
 }
 
 fn time_limit(plan: &Plan) -> Frame {

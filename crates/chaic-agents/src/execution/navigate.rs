@@ -8,6 +8,7 @@ use chaic_protocol::{Action, Vec2, Vec3};
 use super::path::Goal;
 use crate::memory::Memory;
 use crate::memory::costs::{CostMap, OCCUPIED};
+use crate::rules::Walking;
 
 /// One turn, radians.
 pub const TURN_RAD: f32 = PI / 12.0;
@@ -67,7 +68,7 @@ impl Destination {
         }
     }
 
-    fn nearest(&self, from: Vec2) -> Vec2 {
+    pub(super) fn nearest(&self, from: Vec2) -> Vec2 {
         let mut best = (f32::INFINITY, from);
         for p in &self.points {
             let d = p.distance_squared(from);
@@ -184,6 +185,9 @@ impl Navigator {
 
     /// The next action on the way to `destination`.
     pub fn step(&mut self, memory: &mut Memory, destination: &Destination) -> Nav {
+        if memory.rules.walking == Walking::Lattice {
+            return super::lattice::step(memory, destination);
+        }
         let (here, yaw) = (memory.here(), memory.pose.yaw_rad);
         let (costs, _) = memory.costs_and_search();
         if destination.is_reached(costs, here) {

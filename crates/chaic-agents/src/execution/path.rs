@@ -117,6 +117,33 @@ impl Search {
         None
     }
 
+    /// The cheapest way from `start` to `end` over straight neighbors only, whatever it costs.
+    pub fn straight_way(
+        &mut self,
+        grid: &Grid,
+        costs: &[u32],
+        start: usize,
+        end: usize,
+    ) -> Option<Path> {
+        let (end_i, end_j) = grid.column_row(end);
+        let still = |cell: usize| {
+            let (i, j) = grid.column_row(cell);
+            (i.abs_diff(end_i) + j.abs_diff(end_j)) as u32 * FREE
+        };
+        self.begin(start);
+        while let Some(Reverse((_, cell))) = self.queue.pop() {
+            let cell = cell as usize;
+            if cell == end {
+                return Some(Path { cells: self.trace(start, end), cost: self.best[end] });
+            }
+            for (next, _) in grid.neighbors(cell).filter(|(_, diagonal)| !diagonal) {
+                let total = self.best[cell].saturating_add(costs[next]);
+                self.improve(next, cell, total, still(next));
+            }
+        }
+        None
+    }
+
     fn trace(&self, start: usize, end: usize) -> Vec<usize> {
         let mut cells = vec![end];
         let mut cell = end;
@@ -167,6 +194,44 @@ impl Reach {
     /// The length of free floor that costs as much, metres.
     pub fn metres(cost: u32) -> f32 {
         cost as f32 / COST_PER_M
+    }
+}
+
+/// How far every cell is over straight neighbors, by the same costs as [`Search::straight_way`].
+#[derive(Clone, Debug)]
+pub struct StraightReach {
+    cost_and_steps: Vec<Option<(u32, u32)>>,
+}
+
+impl StraightReach {
+    /// Everything that costs at most `limit` to get to.
+    pub fn from(
+        grid: &Grid,
+        costs: &[u32],
+        start: usize,
+        limit: u32,
+        search: &mut Search,
+    ) -> StraightReach {
+        let mut cost_and_steps: Vec<Option<(u32, u32)>> = vec![None; grid.n_cells()];
+        search.begin(start);
+        while let Some(Reverse((cost, cell))) = search.queue.pop() {
+            let cell = cell as usize;
+            if cost > search.best[cell] || cost > limit || cost_and_steps[cell].is_some() {
+                continue;
+            }
+            let before = cost_and_steps[search.from[cell] as usize].map_or(0, |(_, steps)| steps);
+            cost_and_steps[cell] = Some((cost, before + u32::from(cell != start)));
+            for (next, _) in grid.neighbors(cell).filter(|(_, diagonal)| !diagonal) {
+                search.improve(next, cell, cost.saturating_add(costs[next]), 0);
+            }
+        }
+        StraightReach { cost_and_steps }
+    }
+
+    /// Twice the cells of the way and its cost, in costs of a free cell times [`FREE`]; `None` if
+    /// it is too far.
+    pub fn score(&self, cell: usize) -> Option<u32> {
+        self.cost_and_steps[cell].map(|(cost, steps)| cost + 2 * FREE * steps)
     }
 }
 

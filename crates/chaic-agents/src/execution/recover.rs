@@ -144,7 +144,7 @@ mod tests {
     #[test]
     fn a_bump_leads_to_a_turn_and_a_step_and_many_to_giving_up() {
         let toy = Toy::room(6.0, 6.0);
-        let mut memory = Memory::new(&toy.briefing());
+        let mut memory = Memory::new(&toy.briefing(), crate::PlannerRules::paper());
         memory.refresh();
         let (mut recovery, mut rng) = (Recovery::default(), Stream::new(1, "test", 0));
         let first = recovery.step(&mut memory, BLOCKED, &mut rng).expect("it reacts");
@@ -164,7 +164,7 @@ mod tests {
     #[test]
     fn getting_nowhere_for_long_is_noticed() {
         let toy = Toy::room(6.0, 6.0);
-        let mut memory = Memory::new(&toy.briefing());
+        let mut memory = Memory::new(&toy.briefing(), crate::PlannerRules::paper());
         memory.refresh();
         let (mut recovery, mut rng) = (Recovery::default(), Stream::new(1, "test", 0));
         let n = (0..200)

@@ -4,6 +4,7 @@ use chaic_protocol::geom::xz;
 use chaic_protocol::{Frame, Vec2};
 
 use super::grid::{CELL_M, Grid};
+use super::lattice_costs;
 use super::occupancy::{OccupancyMap, Space};
 use super::people::People;
 use super::semantic::SemanticMap;
@@ -47,6 +48,7 @@ pub struct CostMap {
     cost: Vec<u32>,
     clearance: Vec<u16>,
     version: u32,
+    belief: lattice_costs::Belief,
 }
 
 impl CostMap {
@@ -58,6 +60,7 @@ impl CostMap {
             cost: vec![FREE + UNKNOWN_EXTRA; grid.n_cells()],
             clearance: vec![FARTHEST; grid.n_cells()],
             version: 0,
+            belief: lattice_costs::Belief::default(),
         }
     }
 
@@ -154,6 +157,16 @@ impl CostMap {
                 self.cost[cell] += PERSON_EXTRA;
             }
         }
+    }
+
+    /// Computes all costs anew by the original's reckoning.
+    pub fn rebuild_lattice(&mut self, seen: &lattice_costs::Seen<'_>) {
+        self.version += 1;
+        lattice_costs::lattice_costs(&self.grid, seen, &mut self.belief, &mut self.cost);
+        for (cell, clearance) in self.clearance.iter_mut().enumerate() {
+            *clearance = if self.belief.is_occupied(cell) { 0 } else { FARTHEST };
+        }
+        self.measure_clearance();
     }
 
     /// Two-pass chamfer distance transform from the occupied cells.

@@ -6,14 +6,16 @@ pub mod people;
 pub mod semantic;
 
 pub mod costs;
+pub mod lattice_costs;
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use chaic_protocol::briefing::Relation;
+use chaic_protocol::capability::Gait;
 use chaic_protocol::geom::{Pose, xz};
 use chaic_protocol::{
-    Action, Briefing, ClassId, EntityId, Frame, Observation, Outcome, Vec2, Vec3,
+    Action, AgentId, Briefing, ClassId, EntityId, Frame, Observation, Outcome, Vec2, Vec3,
 };
 
 pub use grid::{CELL_M, Grid};
@@ -23,6 +25,7 @@ pub use semantic::{SemanticMap, Thing};
 
 use crate::execution::path::{Reach, Search};
 use crate::perception::Percepts;
+use crate::rules::{Exploration, PlannerRules, Walking};
 use costs::CostMap;
 
 /// A top may look this much lower than it is, metres.
@@ -44,6 +47,8 @@ pub struct Done {
 /// All that one mind remembers of its episode.
 #[derive(Clone, Debug)]
 pub struct Memory {
+    /// By which rules its owner plans.
+    pub rules: PlannerRules,
     /// When it was updated last.
     pub frame: Frame,
     /// Where the own body is.
@@ -65,16 +70,21 @@ pub struct Memory {
     costs: CostMap,
     costs_of: Option<(u32, u32)>,
     people_moved: bool,
+    /// Whether anything was taken in since costs were computed last.
+    is_stale: bool,
+    is_partner: bool,
+    gait: Gait,
     reach: Option<Reach>,
     search: Search,
 }
 
 impl Memory {
     /// Nothing remembered yet.
-    pub fn new(briefing: &Briefing) -> Memory {
+    pub fn new(briefing: &Briefing, rules: PlannerRules) -> Memory {
         let map = OccupancyMap::new(&briefing.bounds);
         let costs = CostMap::new(*map.grid(), briefing.capability.radius_m);
         Memory {
+            rules,
             frame: 0,
             pose: Pose::default(),
             things: SemanticMap::default(),
@@ -90,6 +100,9 @@ impl Memory {
             costs,
             costs_of: None,
             people_moved: true,
+            is_stale: true,
+            is_partner: briefing.me == AgentId::PARTNER,
+            gait: briefing.capability.gait,
             reach: None,
         }
     }
@@ -102,12 +115,16 @@ impl Memory {
         }
         self.frame = observation.frame;
         self.pose = observation.own.pose;
-        self.people.see(briefing, observation, &percepts.detections);
+        let seen = if self.rules.sees_people(briefing) { &percepts.detections[..] } else { &[] };
+        self.people.see(briefing, observation, seen);
         self.people_moved = self.people.iter().any(|p| p.frame + 60 > self.frame);
         let in_view: Vec<Vec3> =
             self.people.iter().filter(|p| p.is_in_view).map(|p| p.position_in_world).collect();
-        self.things.see(&percepts.detections, &in_view, self.frame);
-        self.things.forget_missing(observation);
+        let hands_at = if self.rules.sees_holding { &in_view[..] } else { &[] };
+        self.things.see(&percepts.detections, hands_at, self.frame);
+        if self.rules.forgets_missing {
+            self.things.forget_missing(observation);
+        }
         self.things.expire(before, self.frame);
         for held in observation.own.held() {
             self.things.mark_absent(held.entity);
@@ -117,11 +134,14 @@ impl Memory {
         }
         for hands in observation.granted.partner_hands.iter() {
             for held in hands.iter().flatten() {
-                self.things.mark_held(held.entity, self.frame);
+                self.things.mark_held(held.entity, self.frame + self.rules.held_frames);
                 for (entity, _) in &held.contents {
-                    self.things.mark_held(*entity, self.frame);
+                    self.things.mark_held(*entity, self.frame + self.rules.held_frames);
                 }
             }
+        }
+        for obstacle in &observation.removed {
+            self.things.mark_gone(*obstacle);
         }
         if let Some(delivered) = &observation.delivered {
             for entity in delivered {
@@ -138,19 +158,38 @@ impl Memory {
         {
             self.history.push(Done { frame: self.frame, action, outcome });
         }
-        self.map.integrate(observation, percepts, self.height_m);
+        let known_m = self.rules.known_range_m(briefing);
+        self.map.integrate(observation, percepts, self.height_m, known_m);
         self.reach = None;
+        self.is_stale = true;
+    }
+
+    /// Whether its owner waits before obstacles until somebody has cleared them away (original
+    /// facts 1.6).
+    pub fn waits_for_obstacles(&self) -> bool {
+        self.is_partner && self.gait == Gait::Roll
     }
 
     /// Brings costs and distances up to date. Cheap if nothing changed.
     pub fn refresh(&mut self) {
         self.refresh_costs();
-        if self.reach.is_none() {
+        let needs_reach = self.rules.walking == Walking::Careful
+            || self.rules.exploration == Exploration::Frontier;
+        if needs_reach && self.reach.is_none() {
             self.reach = Some(Reach::from(&self.costs, self.here(), &mut self.search));
         }
     }
 
     fn refresh_costs(&mut self) {
+        if self.rules.walking == Walking::Lattice {
+            let Memory { map, things, people, .. } = self;
+            let (heeds_obstacles, now) = (self.is_partner, self.frame);
+            let seen = lattice_costs::Seen { map, things, people, heeds_obstacles, now };
+            if std::mem::take(&mut self.is_stale) {
+                self.costs.rebuild_lattice(&seen);
+            }
+            return;
+        }
         let of = (self.map.version(), self.things.layout());
         if self.costs_of != Some(of) || self.people_moved {
             let here = self.here();
@@ -192,7 +231,8 @@ impl Memory {
     /// no way is known. Straight distance before the first [`Memory::refresh`].
     pub fn way_to(&self, thing: &Thing) -> Option<f32> {
         let straight_m = thing.distance_from(self.here());
-        let Some(reach) = &self.reach else { return Some(straight_m) };
+        let reach = self.reach.as_ref().filter(|_| self.rules.walking == Walking::Careful);
+        let Some(reach) = reach else { return Some(straight_m) };
         let grid = self.map.grid();
         let near = |p: Vec2| grid.disc(p, NEAR_THING_M).filter_map(|c| reach.cost(c)).min();
         let at = near(thing.nearest_point(self.here()));
@@ -208,6 +248,7 @@ impl Memory {
             .things
             .iter()
             .filter(|t| t.class == self.goal_place && t.is_present)
+            .filter(|t| self.rules.goal_blackout_frames == 0 || self.frame >= t.ignore_until)
             .filter(|t| t.top_m + TOP_TOLERANCE_M >= self.goal_place_min_top_m)
             .filter_map(|t| Some((t, self.way_to(t)?)))
             .collect();

@@ -45,10 +45,13 @@ const SEEN_FREE: u8 = 1;
 const SEEN_HIGH: u8 = 2;
 /// Too near to the feet to be seen, but nothing rises from it up to the eye.
 const ASSUMED: u8 = 4;
+/// Something of it was seen from near enough to count as known.
+const SEEN_NEAR: u8 = 8;
 /// Bits of what one image shows of a cell.
 const NOW_FLOOR: u8 = 1;
 const NOW_OCCUPIED: u8 = 2;
 const NOW_HIGH: u8 = 4;
+const NOW_NEAR: u8 = 8;
 
 /// Where somebody could not get on although the map said so.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -136,6 +139,11 @@ impl OccupancyMap {
         self.space(cell) == Space::Unknown && self.seen[cell] & ASSUMED == 0
     }
 
+    /// Whether anything of a cell was ever seen within the known range.
+    pub fn is_known(&self, cell: usize) -> bool {
+        self.seen[cell] & SEEN_NEAR != 0
+    }
+
     /// Frame in which the metre square around a cell was seen last, if ever.
     pub fn place_seen(&self, cell: usize) -> Option<Frame> {
         self.place_seen[self.place_of(cell)].checked_sub(1)
@@ -158,8 +166,14 @@ impl OccupancyMap {
     }
 
     /// Takes in what one image shows. `height_m` is the height of the own body: nothing above it
-    /// is in the way.
-    pub fn integrate(&mut self, observation: &Observation, percepts: &Percepts, height_m: f32) {
+    /// is in the way. What is seen within `known_m` counts as known.
+    pub fn integrate(
+        &mut self,
+        observation: &Observation,
+        percepts: &Percepts,
+        height_m: f32,
+        known_m: f32,
+    ) {
         let now = observation.frame;
         let n_bumps = self.bumps.len();
         self.bumps.retain(|b| b.until > now);
@@ -167,7 +181,7 @@ impl OccupancyMap {
         if let Some(depth) = observation.images.depth_m.as_ref() {
             let camera = &observation.camera;
             if depth.len() == camera.width as usize * camera.height as usize {
-                self.scan(depth, percepts, camera, height_m);
+                self.scan(depth, percepts, camera, [height_m, known_m]);
                 changed |= self.apply_scan(now);
                 changed |= self.assume_near(depth, camera);
             }
@@ -183,7 +197,13 @@ impl OccupancyMap {
     }
 
     /// Marks in `now` what the image shows of each cell.
-    fn scan(&mut self, depth: &[f32], percepts: &Percepts, camera: &Camera, height_m: f32) {
+    fn scan(
+        &mut self,
+        depth: &[f32],
+        percepts: &Percepts,
+        camera: &Camera,
+        [height_m, known_m]: [f32; 2],
+    ) {
         let stride = percepts.stride.max(1) as usize;
         let (width, height) = (camera.width as usize, camera.height as usize);
         let masked_width = width.div_ceil(stride);
@@ -214,7 +234,7 @@ impl OccupancyMap {
                 if self.now[cell] == 0 {
                     self.touched.push(cell as u32);
                 }
-                self.now[cell] |= bit;
+                self.now[cell] |= bit | if d < known_m { NOW_NEAR } else { 0 };
             }
         }
     }
@@ -225,7 +245,7 @@ impl OccupancyMap {
         let touched = std::mem::take(&mut self.touched);
         for &cell in &touched {
             let cell = cell as usize;
-            let before = (self.sure[cell] > 0, self.seen[cell]);
+            let before = (self.sure[cell] > 0, self.seen[cell] & !SEEN_NEAR);
             let bits = std::mem::take(&mut self.now[cell]);
             if bits & NOW_OCCUPIED != 0 {
                 self.sure[cell] = (self.sure[cell] + SURE_ONCE).min(SURE_MOST);
@@ -242,7 +262,10 @@ impl OccupancyMap {
                 let place = self.place_of(cell);
                 self.place_seen[place] = now + 1;
             }
-            changed |= before != (self.sure[cell] > 0, self.seen[cell]);
+            changed |= before != (self.sure[cell] > 0, self.seen[cell] & !SEEN_NEAR);
+            if bits & NOW_NEAR != 0 {
+                self.seen[cell] |= SEEN_NEAR;
+            }
         }
         self.touched = touched;
         changed
@@ -283,7 +306,7 @@ mod tests {
     fn look(map: &mut OccupancyMap, toy: &Toy) {
         let observation = toy.observe();
         let percepts = GroundTruthIds.perceive(&observation);
-        map.integrate(&observation, &percepts, 1.75);
+        map.integrate(&observation, &percepts, 1.75, MAP_RANGE_M);
     }
 
     fn space(map: &OccupancyMap, x: f32, z: f32) -> Space {

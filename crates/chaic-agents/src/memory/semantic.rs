@@ -278,10 +278,10 @@ impl SemanticMap {
         }
     }
 
-    /// Somebody else has it.
-    pub fn mark_held(&mut self, entity: EntityId, now: Frame) {
+    /// Somebody else has it, and will have it until then as far as one can tell.
+    pub fn mark_held(&mut self, entity: EntityId, until: Frame) {
         if let Some(thing) = self.things.get_mut(&entity) {
-            thing.held_until = now + HELD_FRAMES;
+            thing.held_until = until;
         }
     }
 

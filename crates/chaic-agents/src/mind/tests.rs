@@ -36,7 +36,7 @@ fn the_partner_delivers_all_that_is_wanted_with_time_to_spare() {
     let (mut toy, n) = house();
     let mut briefing = toy.briefing();
     briefing.goal = Toy::goal(&[("apple", 3), ("banana", 2)]);
-    let plans = toy.live(&mut partners::constrained(), &briefing);
+    let plans = toy.live(&mut partners::constrained(crate::PlannerRules::paper()), &briefing);
     let story = plans.join("; ");
     assert!(
         toy.delivered.len() >= n,
@@ -60,7 +60,7 @@ fn rhp_clears_the_doorway_and_delivers_what_is_behind() {
     toy.stand([-2.5, 1.0], 0.0);
     let mut briefing = toy.briefing();
     briefing.horizon = 1500;
-    let plans = toy.live(&mut helpers::rhp(), &briefing);
+    let plans = toy.live(&mut helpers::rhp(crate::PlannerRules::paper()), &briefing);
     assert!(plans.iter().any(|p| p.contains("obstacle")), "{plans:?}");
     assert!(toy.delivered.contains(&apple), "{plans:?}");
     assert!(!toy.delivered.contains(&bin));
@@ -71,7 +71,7 @@ fn the_same_episode_is_lived_the_same_way_twice() {
     let [a, b] = [0, 1].map(|_| {
         let (mut toy, _) = house();
         let briefing = Briefing { horizon: 800, ..toy.briefing() };
-        let plans = toy.live(&mut helpers::random(), &briefing);
+        let plans = toy.live(&mut helpers::random(crate::PlannerRules::paper()), &briefing);
         (plans, toy.here(), toy.frame)
     });
     assert_eq!(a, b);
@@ -82,7 +82,7 @@ fn the_random_helper_chooses_all_valid_plans_equally_often() {
     use crate::policies::Random;
     let toy = Toy::room(4.0, 4.0);
     let (briefing, observation) = (toy.briefing(), toy.observe());
-    let memory = Memory::new(&briefing);
+    let memory = Memory::new(&briefing, crate::PlannerRules::paper());
     let behavior = GroundTruthBehavior::default();
     let context = Context {
         briefing: &briefing,
@@ -106,7 +106,7 @@ fn the_random_helper_chooses_all_valid_plans_equally_often() {
 fn an_unbriefed_or_blind_mind_does_not_panic() {
     let (toy, _) = house();
     let mut observation = toy.observe();
-    let mut mind = helpers::rhp();
+    let mut mind = helpers::rhp(crate::PlannerRules::paper());
     assert_eq!(mind.act(&observation), Action::Wait { frames: PAUSE_FRAMES });
     mind.reset(&toy.briefing());
     observation.images = Default::default();
@@ -171,7 +171,7 @@ fn nobody_gets_stuck_in_a_house_with_narrow_doors_and_tables() {
         toy.radius_m = radius_m;
         let mut briefing = toy.briefing();
         briefing.capability.radius_m = radius_m;
-        let plans = toy.live(&mut helpers::rhp(), &briefing).join("; ");
+        let plans = toy.live(&mut helpers::rhp(crate::PlannerRules::paper()), &briefing).join("; ");
         let n = toy.delivered.len();
         assert!(n >= 6, "{radius_m} m through {door_m} m: only {n} delivered: {plans}");
         assert!(toy.n_blocked <= 10, "bumped {} times: {plans}", toy.n_blocked);
@@ -192,7 +192,7 @@ fn the_frail_person_brings_furniture_to_the_truck() {
     briefing.containers.clear();
     briefing.goal_place = ClassId::named("truck");
     briefing.goal = Toy::goal(&[("drawer", 2)]);
-    let plans = toy.live(&mut partners::frail(), &briefing);
+    let plans = toy.live(&mut partners::frail(crate::PlannerRules::paper()), &briefing);
     assert_eq!(toy.delivered.len(), 2, "{plans:?}");
 }
 
@@ -208,7 +208,7 @@ fn the_rider_fills_the_basket_before_delivering_it() {
     toy.stand([-5.0, 0.0], 0.0);
     let mut briefing = toy.briefing();
     briefing.goal = Toy::goal(&[("apple", 4)]);
-    let plans = toy.live(&mut partners::rider(), &briefing);
+    let plans = toy.live(&mut partners::rider(crate::PlannerRules::paper()), &briefing);
     assert_eq!(toy.delivered.len(), 4, "{plans:?}");
     assert_eq!(plans.iter().filter(|p| p.starts_with("bring")).count(), 2, "{plans:?}");
 }

@@ -2,10 +2,11 @@
 
 use chaic_protocol::briefing::{Goal, Relation};
 use chaic_protocol::geom::horizontal_distance;
-use chaic_protocol::{Briefing, ClassId, EntityId, FailureReason, Frame, Outcome, Role};
+use chaic_protocol::{Action, Briefing, ClassId, EntityId, FailureReason, Frame, Outcome, Role};
 
 use crate::decision::{Context, Load, Plan, Policy, Subject};
-use crate::memory::Person;
+use crate::memory::{Memory, Person};
+use crate::rules::Bookkeeping;
 
 /// A plan under way is looked at again after so long, frames.
 const RECONSIDER_FRAMES: Frame = 40;
@@ -17,16 +18,12 @@ const SPARE_FRAMES: f32 = 120.0;
 const WALK_FACTOR: f32 = 1.5;
 /// A pick-up and a put-on take at least so long together, frames.
 const DEED_FRAMES: f32 = 130.0;
-/// A container for fewer wanted objects than this makes no sense: two hands will do.
-const MIN_FOR_CONTAINER: u32 = 3;
 /// Child and guardian this far apart, both in view, is an emergency, metres (original facts 2.1).
 const APART_SEEN_M: f32 = 3.5;
 /// The same for sightings of the last 50 frames, metres.
 const APART_REMEMBERED_M: f32 = 5.5;
 /// Sightings older than this are not compared, frames.
 const FRESH_FRAMES: Frame = 50;
-/// Child or guardian unseen for so long is looked for, frames (original facts 2.4: 200).
-const UNSEEN_FRAMES: Frame = 200;
 /// After standing beside the child, it may come back by itself for so long, frames.
 const TRUST_CHILD_FRAMES: Frame = 250;
 /// A failed lift of the partner calls for help for so long, frames.
@@ -63,6 +60,8 @@ pub struct RuleProfile {
     pub minds_child: bool,
     /// Whether it helps the partner lift what is too heavy for one.
     pub lifts_together: bool,
+    /// Whether it counts what it takes itself, where bookkeeping is the original's.
+    pub counts_picks: bool,
     /// With more than this part of the time left, a container comes first.
     pub container_above: f32,
     /// With less than this part of the time left, what is carried is delivered at once.
@@ -79,6 +78,7 @@ impl RuleProfile {
         removes_obstacles: false,
         minds_child: false,
         lifts_together: false,
+        counts_picks: true,
         container_above: 0.5,
         deliver_below: 0.25,
         deliver_below_unknown: 0.375,
@@ -96,6 +96,7 @@ impl RuleProfile {
         removes_obstacles: true,
         minds_child: true,
         lifts_together: true,
+        counts_picks: false,
         ..RuleProfile::PARTNER
     };
     /// The oracle: knows the goal and what is done.
@@ -141,9 +142,10 @@ impl Rules {
             c.is_in_view && horizontal_distance(memory.pose.position, c.position_in_world) < 2.3
         };
         // The child turns back at its next decision; from then on it needs no company.
-        let trusted = self
-            .beside_child
-            .is_some_and(|since| now > since + 30 && now < since + TRUST_CHILD_FRAMES);
+        let trusted = memory.rules.trusts_child
+            && self
+                .beside_child
+                .is_some_and(|since| now > since + 30 && now < since + TRUST_CHILD_FRAMES);
         if self.beside_child.is_some_and(|since| now >= since + TRUST_CHILD_FRAMES) {
             self.beside_child = None;
         }
@@ -160,9 +162,10 @@ impl Rules {
                 return Some(Plan::FollowChild);
             }
         }
-        let unseen = |p: Option<&Person>| p.map_or(0, |p| p.frame) + UNSEEN_FRAMES < now;
+        let patience = memory.rules.child_unseen_frames;
+        let unseen = |p: Option<&Person>| p.map_or(0, |p| p.frame) + patience < now;
         let is_lost = unseen(guardian) || unseen(child);
-        (is_lost && self.last_around + UNSEEN_FRAMES < now).then(|| {
+        (is_lost && self.last_around + patience < now).then(|| {
             self.last_around = now;
             Plan::TurnAround
         })
@@ -194,7 +197,7 @@ impl Rules {
 
     /// The piece that the partner can't manage and one should lift with it.
     fn to_lift_together(&self, context: &Context<'_>, valid: &[Plan]) -> Option<Plan> {
-        if !self.profile.lifts_together {
+        if !self.profile.lifts_together || !context.memory.rules.lifts_together {
             return None;
         }
         let now = context.memory.frame;
@@ -221,11 +224,12 @@ impl Policy for Rules {
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
         self.last_choice = context.memory.frame;
-        if !std::mem::replace(&mut self.has_looked_around, true) {
+        let rules = context.memory.rules;
+        if !std::mem::replace(&mut self.has_looked_around, true) && rules.looks_around_first {
             return Plan::TurnAround;
         }
         let load = Load::of(context.own, context.briefing);
-        let need = Need::of(context, &load, self.profile.wanted);
+        let need = Need::of(context, &load, &self.profile);
         let is_valid = |plan: Plan| valid.contains(&plan).then_some(plan);
         // Delivering needs a goal place: without one, look for it.
         let deliver = is_valid(Plan::Deliver).unwrap_or(Plan::Explore);
@@ -246,7 +250,7 @@ impl Policy for Rules {
         }
         let left = part_left(context);
         if left > self.profile.container_above
-            && need.n_left() >= MIN_FOR_CONTAINER
+            && need.n_left() >= rules.min_for_container
             && let Some(plan) = valid.iter().find(|p| matches!(p, Plan::PickContainer(_)))
         {
             return *plan;
@@ -257,13 +261,16 @@ impl Policy for Rules {
         if let Some(subject) = self.targets(context, valid, &need).first() {
             return Plan::PickUp(*subject);
         }
-        if carries && (need.is_nothing_left() || context.is_explored) {
+        if carries && rules.delivers_when_done && (need.is_nothing_left() || context.is_explored) {
             return deliver;
         }
         Plan::Explore
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, is_news: bool) -> bool {
+        if !context.memory.rules.reconsiders {
+            return self.is_interrupted(context, current);
+        }
         if matches!(current, Plan::Deliver | Plan::PutIn | Plan::LiftWith(_) | Plan::TurnAround) {
             // These are only left for the child.
             return !matches!(current, Plan::PutIn) && self.child_calls(context);
@@ -278,6 +285,18 @@ impl Policy for Rules {
 }
 
 impl Rules {
+    /// Whether the child's rules, which are all that interrupts a plan of the original, do so now
+    /// (original facts 2.4).
+    fn is_interrupted(&mut self, context: &Context<'_>, current: &Plan) -> bool {
+        match current {
+            // The time since looking around begins when that has ended.
+            Plan::TurnAround => self.last_around = context.memory.frame,
+            Plan::FollowChild => {}
+            _ => return self.clone().mind_child(context).is_some(),
+        }
+        false
+    }
+
     /// Whether the child's rules would interrupt now. A copy is asked, so that nothing is noted.
     fn child_calls(&self, context: &Context<'_>) -> bool {
         self.has_looked_around && self.clone().mind_child(context) == Some(Plan::FollowChild)
@@ -287,17 +306,22 @@ impl Rules {
 /// What is still wanted.
 struct Need<'a> {
     goal: Option<&'a Goal>,
-    /// Delivered or held, by class.
+    /// Delivered or held, by class; or, by the original's bookkeeping, the classes of which the
+    /// reader has ever taken one.
     done: Vec<ClassId>,
 }
 
 impl<'a> Need<'a> {
-    fn of(context: &Context<'a>, load: &Load, wanted: Wanted) -> Need<'a> {
-        let goal = match wanted {
+    fn of(context: &Context<'a>, load: &Load, profile: &RuleProfile) -> Need<'a> {
+        let goal = match profile.wanted {
             Wanted::ByGoal => context.briefing.goal.as_ref(),
             Wanted::AnyPossible => None,
         };
         let memory = context.memory;
+        if memory.rules.bookkeeping == Bookkeeping::FirstPick {
+            let done = if profile.counts_picks { first_picks(memory) } else { Vec::new() };
+            return Need { goal, done };
+        }
         let mut done: Vec<ClassId> =
             memory.delivered.iter().filter_map(|e| memory.class_of(*e)).collect();
         done.extend(load.targets.iter().map(|(_, class)| *class));
@@ -331,6 +355,16 @@ impl<'a> Need<'a> {
     }
 }
 
+/// The classes of which one has taken something, each once.
+fn first_picks(memory: &Memory) -> Vec<ClassId> {
+    let taken = memory.history.iter().filter_map(|done| match done.action {
+        Action::PickUp { object, .. } if done.outcome.is_success() => memory.class_of(object),
+        _ => None,
+    });
+    let classes: std::collections::BTreeSet<ClassId> = taken.collect();
+    classes.into_iter().collect()
+}
+
 fn part_left(context: &Context<'_>) -> f32 {
     let horizon = context.briefing.horizon.max(1);
     horizon.saturating_sub(context.memory.frame) as f32 / horizon as f32
@@ -352,8 +386,9 @@ fn must_go(context: &Context<'_>, profile: &RuleProfile) -> bool {
         Some(_) => profile.deliver_below,
         None => profile.deliver_below_unknown,
     };
-    let is_far =
-        place.is_some_and(|m| frames_left(context) < frames_for(context, m) + 2.0 * SPARE_FRAMES);
+    let is_far = context.memory.rules.weighs_time
+        && place
+            .is_some_and(|m| frames_left(context) < frames_for(context, m) + 2.0 * SPARE_FRAMES);
     part_left(context) < below || is_far
 }
 
@@ -361,7 +396,9 @@ fn must_go(context: &Context<'_>, profile: &RuleProfile) -> bool {
 /// straightest way, at full speed.
 fn there_is_time(context: &Context<'_>, entity: EntityId) -> bool {
     let memory = context.memory;
-    let Some(thing) = memory.things.get(entity) else { return true };
+    let Some(thing) = memory.things.get(entity).filter(|_| memory.rules.weighs_time) else {
+        return true;
+    };
     let at = chaic_protocol::geom::xz(thing.position_in_world);
     let places = memory.goal_places();
     let onward_m = places.iter().map(|(place, _)| place.distance_from(at)).min_by(f32::total_cmp);

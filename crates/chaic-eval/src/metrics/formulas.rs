@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use crate::metrics::Summary;
+
 /// Names a set of formulas.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FormulaSet {
@@ -33,6 +35,8 @@ pub struct Formulas {
     pub spread: Spread,
     /// Whether CR credits the helper with what it once took and the partner delivered.
     pub credits_handing_over: bool,
+    /// Whether ER counts frames only while the child's mood was to run away, by its decisions.
+    pub er_by_mood: bool,
 }
 
 impl Formulas {
@@ -42,6 +46,7 @@ impl Formulas {
         ei_floor: 1e-9,
         spread: Spread::StandardError,
         credits_handing_over: false,
+        er_by_mood: false,
     };
     /// The original scripts'.
     pub const ORIGINAL: Formulas = Formulas {
@@ -49,7 +54,15 @@ impl Formulas {
         ei_floor: 1.0,
         spread: Spread::PopulationDeviation,
         credits_handing_over: true,
+        er_by_mood: true,
     };
+}
+
+impl Formulas {
+    /// The frames of an episode run that ER counts; `None` without child.
+    pub fn away_frames(&self, summary: &Summary) -> Option<u32> {
+        if self.er_by_mood { summary.escape_frames } else { summary.away_frames }
+    }
 }
 
 impl FormulaSet {

@@ -140,7 +140,7 @@ impl Group<'_> {
         }
         let child: Vec<(f64, f64)> = runs
             .iter()
-            .filter_map(|s| Some((f64::from(s.away_frames?), f64::from(s.frames))))
+            .filter_map(|s| Some((f64::from(formulas.away_frames(s)?), f64::from(s.frames))))
             .collect();
         let (away, frames) = child.iter().fold((0.0, 0.0), |(a, f), c| (a + c.0, f + c.1));
         Score {

@@ -2,11 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use chaic_protocol::{AgentId, ClassId, EntityId};
+use chaic_agents::partners::RUN_AWAY;
+use chaic_protocol::{AgentId, ClassId, EntityId, Frame};
 use chaic_world::EventKind;
 
 use crate::metrics::{Delivery, Ending, RunKey, RunResult, Summary};
-use crate::trace::{End, Header, Record, Trace};
+use crate::trace::{Decision, End, Header, Record, Trace};
 
 /// Reads records one by one.
 #[derive(Clone, Debug)]
@@ -18,6 +19,37 @@ pub struct Tally {
     /// Things that the helper has taken at some time.
     taken_by_helper: BTreeSet<EntityId>,
     deliveries: Vec<Delivery>,
+    escape: Escape,
+}
+
+/// The child's escapes as the original counts them (facts 8.4): by the child's decisions.
+#[derive(Clone, Copy, Debug, Default)]
+struct Escape {
+    /// Whether its mood is to run away, as of its last decision.
+    is_running: bool,
+    /// Whether it is far from its guardian now.
+    is_away: bool,
+    /// When it decided last.
+    decided: Frame,
+    /// Frames counted so far.
+    frames: u32,
+}
+
+impl Escape {
+    fn decides(&mut self, decision: &Decision) {
+        if self.is_running && self.is_away {
+            self.frames += decision.frame - self.decided;
+        }
+        self.decided = decision.frame;
+        if let Some(thought) = &decision.thought {
+            self.is_running = thought.mood.as_deref() == Some(RUN_AWAY);
+        }
+    }
+
+    /// All frames counted, with those left when the episode ends, wherever the child is then.
+    fn total(&self, end: Frame) -> u32 {
+        self.frames + if self.is_running { end - self.decided } else { 0 }
+    }
 }
 
 impl Tally {
@@ -29,13 +61,19 @@ impl Tally {
             together: BTreeSet::new(),
             taken_by_helper: BTreeSet::new(),
             deliveries: Vec::new(),
+            escape: Escape::default(),
         }
     }
 
     /// Takes in a record; the last one of an episode gives the result.
     pub fn record(&mut self, record: &Record) -> Option<RunResult> {
         match record {
-            Record::Decision(_) => None,
+            Record::Decision(decision) => {
+                if decision.agent == AgentId::CHILD {
+                    self.escape.decides(decision);
+                }
+                None
+            }
             Record::Event(event) => {
                 self.event(&event.event.kind, event.event.frame, event.class);
                 None
@@ -58,6 +96,7 @@ impl Tally {
                 self.together.insert(object);
                 self.taken_by_helper.insert(object);
             }
+            EventKind::ChildAway { away } => self.escape.is_away = away,
             EventKind::Delivered { object, by, counted } => {
                 // A trace of this version always names the class.
                 let Some(class) = class else { return };
@@ -78,6 +117,7 @@ impl Tally {
                 done: end.done,
                 total: end.total,
                 away_frames: self.has_child.then_some(end.away_frames),
+                escape_frames: self.has_child.then(|| self.escape.total(end.frame)),
                 deliveries: self.deliveries.clone(),
                 digest: end.digest,
             }),
@@ -89,4 +129,32 @@ impl Tally {
 pub fn tally(trace: &Trace) -> Option<RunResult> {
     let mut tally = Tally::new(&trace.header);
     trace.records.iter().fold(None, |last, record| tally.record(record).or(last))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::digest::Digest;
+    use chaic_protocol::Action;
+    use chaic_protocol::agent::Thought;
+
+    #[test]
+    fn escapes_are_counted_by_the_childs_decisions_and_to_the_end() {
+        let mut escape = Escape::default();
+        let mut decides = |frame, mood: Option<&str>, is_away| {
+            let mood = mood.map(str::to_owned);
+            let thought = mood.map(|m| Thought { plan: String::new(), mood: Some(m) });
+            let (agent, action, digest) = (AgentId::CHILD, Action::TurnLeft, Digest(0));
+            escape.is_away = is_away;
+            escape.decides(&Decision { frame, agent, action, digest, thought });
+            (escape.frames, escape.total(200))
+        };
+        // Frames so far, and those counted if the episode ended at frame 200.
+        assert_eq!(decides(0, Some("follow"), true), (0, 0), "away, but not on the run");
+        assert_eq!(decides(50, Some(RUN_AWAY), false), (0, 150));
+        assert_eq!(decides(70, None, false), (0, 130), "on the run, but still near");
+        assert_eq!(decides(90, None, true), (20, 130));
+        assert_eq!(decides(120, Some("goto_guardian"), true), (50, 50));
+        assert_eq!(decides(150, None, true), (50, 50), "on the way back");
+    }
 }

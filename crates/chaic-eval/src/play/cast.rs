@@ -1,6 +1,6 @@
 //! Who takes part in an episode.
 
-use chaic_agents::partners;
+use chaic_agents::{PlannerRules, partners};
 use chaic_protocol::observation::{Grants, Senses};
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{Action, Agent, AgentId, Briefing, Observation};
@@ -40,16 +40,17 @@ impl Actor {
 }
 
 /// Partner, helper and child of a setup; nobody but the partner if `helper` is `None`.
-pub fn cast(setup: &Setup, helper: Option<Helper>) -> Cast {
+pub fn cast(setup: &Setup, helper: Option<Helper>, rules: PlannerRules) -> Cast {
     let info = setup.task.info();
     let persona = setup.people.first().map_or(info.partner, |p| p.persona);
-    let partner = Actor::new(partners::partner(persona, info.scene), partners::partner_grants());
+    let partner =
+        Actor::new(partners::partner(persona, info.scene, rules), partners::partner_grants(rules));
     let mut actors = vec![partner];
     if let Some(Helper { mind, grants }) = helper {
         actors.push(Actor::new(mind, grants));
     }
     if setup.people.len() > AgentId::CHILD.index() {
-        actors.push(Actor::new(partners::child(), Grants::CHILD));
+        actors.push(Actor::new(partners::child(rules), Grants::CHILD));
     }
     // The world's rules allow more people than the tasks have; anybody further only stands there.
     while actors.len() < setup.people.len() {

@@ -80,6 +80,7 @@ impl Eyes {
             camera: world.eye(agent, senses.image_size),
             images,
             delivered: knows_progress.then(|| world.delivered()),
+            removed: world.told_removed(),
             granted: world.granted(agent, *grants, &self.classes, &in_view),
         }
     }

@@ -21,6 +21,7 @@ use crate::CHAIC_VERSION;
 use crate::digest::Digest;
 use crate::error::{EvalError, Result};
 use crate::helpers::Helper;
+use crate::rules::RuleSet;
 use crate::trace::{FORMAT, Header, Participant, Record, VERSION};
 
 /// What is played, apart from the minds.
@@ -31,7 +32,7 @@ pub struct Staging<'a> {
     /// Which of the run's seeds.
     pub seed: u32,
     /// The rules.
-    pub rules: Rules,
+    pub rules: RuleSet,
     /// Name of the helper, for the record.
     pub helper: &'a str,
     /// Side of everybody's images, pixels; `None` for what each mind asks for.
@@ -53,7 +54,7 @@ impl Play {
     /// If the setup can't become a world.
     pub fn new(staging: Staging<'_>, helper: Option<Helper>) -> Result<Play> {
         let setup = setup_of(&staging, helper.is_some());
-        let cast = cast(&setup, helper);
+        let cast = cast(&setup, helper, staging.rules.planner);
         Play::stage(staging, setup, cast)
     }
 
@@ -72,7 +73,7 @@ impl Play {
     }
 
     fn stage(staging: Staging<'_>, setup: Arc<Setup>, mut cast: Cast) -> Result<Play> {
-        let world = new_world(&setup, staging.rules, staging.episode.id())?;
+        let world = new_world(&setup, staging.rules.world, staging.episode.id())?;
         for (agent, actor) in setup.agents().zip(&mut cast.actors) {
             actor.begin(agent, &world, staging.image_size);
         }
@@ -167,7 +168,7 @@ pub fn world_of(header: &Header, episode: &Episode) -> Result<World> {
     let mut setup = episode.setup().clone();
     setup.seed = header.world_seed;
     setup.people.truncate(header.people.len().max(1));
-    new_world(&Arc::new(setup), header.rules, episode.id())
+    new_world(&Arc::new(setup), header.rules.world, episode.id())
 }
 
 fn header(staging: &Staging<'_>, setup: &Setup, cast: &Cast) -> Header {

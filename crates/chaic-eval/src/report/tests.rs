@@ -1,7 +1,7 @@
 //! Reports say what the scores say, in every format.
 
+use crate::rules::RuleSetName;
 use chaic_protocol::TaskId;
-use chaic_world::RuleSet;
 
 use super::*;
 use crate::digest::Digest;
@@ -22,6 +22,7 @@ fn results() -> Vec<RunResult> {
                         done: done + f64::from(k),
                         total: 10.0,
                         away_frames,
+                        escape_frames: away_frames,
                         deliveries: Vec::new(),
                         digest: Digest(0),
                     }),
@@ -37,10 +38,11 @@ fn options() -> RunOptions {
         tasks: TaskId::all().collect(),
         helpers: vec!["none".into(), "rhp".into(), "oracle".into()],
         split: "test".into(),
-        episodes: Some(2),
+        first: Some(2),
         seeds: 1,
         size: None,
-        rules: RuleSet::Paper,
+        rules: RuleSetName::Paper,
+        set: vec![],
     }
 }
 

@@ -52,13 +52,16 @@ impl Report<'_> {
     }
 
     fn markdown(&self) -> String {
-        let RunOptions { split, episodes, seeds, size, rules, .. } = self.options;
-        let episodes = episodes.map_or("all".to_owned(), |n| format!("first {n}"));
+        let RunOptions { split, first, seeds, size, rules, set, .. } = self.options;
+        let episodes = first.map_or("all".to_owned(), |n| format!("first {n}"));
         let size = size.map_or("as each mind asks for".to_owned(), |px| format!("{px} pixels"));
+        let played_by = match set[..] {
+            [] => rules.to_string(),
+            _ => format!("{rules} with {}", set.join(", ")),
+        };
         let mut text = format!(
-            "# chaic run\n\nchaic {CHAIC_VERSION}, rules `{}`, formulas `{}`. Split `{split}`, \
+            "# chaic run\n\nchaic {CHAIC_VERSION}, rules `{played_by}`, formulas `{}`. Split `{split}`, \
              {episodes} episodes of each task, seeds per episode: {seeds}. Images: {size}.\n\n",
-            rules.as_str(),
             self.formulas,
         );
         for grid in self.grids() {

@@ -63,7 +63,7 @@ fn episodes(
     folder: &RunFolder,
     task: TaskId,
 ) -> Result<Vec<(String, Frame)>> {
-    let limit = options.episodes.map_or(usize::MAX, |n| n as usize);
+    let limit = options.first.map_or(usize::MAX, |n| n as usize);
     if options.split == FILES {
         let mut own: Vec<_> = read_files(&folder.episode_files())?
             .into_iter()

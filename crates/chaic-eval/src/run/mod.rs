@@ -69,7 +69,7 @@ impl Run {
             None => given.begin()?,
         };
         check(&options, helpers)?;
-        if let (None, Some(source)) = (&recorded, &given.episodes_dir) {
+        if let (None, Some(source)) = (&recorded, &given.episodes) {
             items::copy_episode_files(source, &options.tasks, &folder)?;
         }
         let items = items::items(&options, &folder)?;
@@ -132,7 +132,8 @@ impl Run {
 }
 
 fn check(options: &RunOptions, helpers: &dyn Helpers) -> Result<()> {
-    options.helpers.iter().try_for_each(|name| helpers::find(helpers, name).map(|_| ()))
+    let rules = options.rules()?.planner;
+    options.helpers.iter().try_for_each(|name| helpers::find(helpers, name, rules).map(|_| ()))
 }
 
 /// The names that may stand behind `--helper`.

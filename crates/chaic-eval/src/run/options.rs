@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use chaic_episodes::Split;
 use chaic_protocol::TaskId;
-use chaic_world::{RuleSet, Rules};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{EvalError, Result};
+use crate::rules::{RuleSet, RuleSetName};
 
 /// Largest side of an image that agents may be given, pixels: 16 times the benchmark's area.
 pub const MAX_IMAGE_SIZE: u32 = 2048;
@@ -25,13 +25,16 @@ pub struct RunOptions {
     /// The split; `files` if the episodes are files.
     pub split: String,
     /// How many episodes of each task, from the first; absent for all.
-    pub episodes: Option<u32>,
+    pub first: Option<u32>,
     /// How many seeds each episode is played with.
     pub seeds: u32,
     /// Side of everybody's images, pixels; absent for what each mind asks for.
     pub size: Option<u32>,
     /// The rules.
-    pub rules: RuleSet,
+    pub rules: RuleSetName,
+    /// Single rules that are set otherwise, as `NAME=VALUE`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub set: Vec<String>,
 }
 
 /// What the caller says of a run. What isn't said is as recorded, or as usual for a new run.
@@ -43,25 +46,31 @@ pub struct Given {
     pub helpers: Option<Vec<String>>,
     /// `--split`.
     pub split: Option<Split>,
-    /// `--episodes`.
-    pub episodes: Option<u32>,
+    /// `--first`.
+    pub first: Option<u32>,
     /// `--seeds`.
     pub seeds: Option<u32>,
     /// `--size`.
     pub size: Option<u32>,
-    /// `--episodes-dir`: a folder with episode files, in place of a split.
-    pub episodes_dir: Option<PathBuf>,
+    /// `--episodes`: a folder with episode files, in place of a split.
+    pub episodes: Option<PathBuf>,
+    /// `--rules`.
+    pub rules: Option<RuleSetName>,
+    /// `--set`, once for each.
+    pub set: Vec<String>,
 }
 
 /// What `split` says where the episodes are files.
 pub const FILES: &str = "files";
 
 impl RunOptions {
-    /// The rules' constants.
-    pub fn rules(&self) -> Rules {
-        match self.rules {
-            RuleSet::Paper => Rules::paper(),
-        }
+    /// The rules.
+    ///
+    /// # Errors
+    /// If a single rule is set that isn't there, or to what it can't be.
+    pub fn rules(&self) -> Result<RuleSet> {
+        let named = RuleSet::named(self.rules);
+        self.set.iter().try_fold(named, |rules, setting| rules.with(setting))
     }
 }
 
@@ -73,23 +82,23 @@ impl Given {
     pub fn begin(&self) -> Result<RunOptions> {
         let wrong = |text: String| Err(EvalError::Options(text));
         let (seeds, size) = (self.seeds.unwrap_or(1), self.size);
-        if seeds == 0 || self.episodes == Some(0) {
-            return wrong("--seeds and --episodes are at least 1".to_owned());
+        if seeds == 0 || self.first == Some(0) {
+            return wrong("--seeds and --first are at least 1".to_owned());
         }
         if let Some(px) = size.filter(|s| !(MIN_IMAGE_SIZE..=MAX_IMAGE_SIZE).contains(s)) {
             let range = format!("{MIN_IMAGE_SIZE} to {MAX_IMAGE_SIZE}");
             return wrong(format!("--size is {px}, expected {range} pixels"));
         }
-        if self.split.is_some() && self.episodes_dir.is_some() {
-            return wrong("give --split or --episodes-dir, not both".to_owned());
+        if self.split.is_some() && self.episodes.is_some() {
+            return wrong("give --split or --episodes, not both".to_owned());
         }
-        let split = match &self.episodes_dir {
+        let split = match &self.episodes {
             Some(_) => FILES.to_owned(),
             None => self.split.clone().unwrap_or(Split::Test).to_string(),
         };
         let helpers =
             self.helpers.clone().unwrap_or_else(|| DEFAULT_HELPERS.map(str::to_owned).to_vec());
-        let tasks = match (&self.tasks, &self.episodes_dir) {
+        let tasks = match (&self.tasks, &self.episodes) {
             (Some(tasks), _) => tasks.clone(),
             (None, Some(folder)) => super::items::tasks_of_files(folder)?,
             (None, None) => TaskId::all().collect(),
@@ -98,8 +107,11 @@ impl Given {
         if tasks.is_empty() || helpers.is_empty() {
             return wrong("a run needs at least one task and one helper".to_owned());
         }
-        let episodes = self.episodes;
-        Ok(RunOptions { tasks, helpers, split, episodes, seeds, size, rules: RuleSet::Paper })
+        let (first, rules) = (self.first, self.rules.unwrap_or(RuleSetName::Paper));
+        let set = self.set.clone();
+        let options = RunOptions { tasks, helpers, split, first, seeds, size, rules, set };
+        options.rules()?;
+        Ok(options)
     }
 
     /// The options of a run that is gone on with.
@@ -122,13 +134,19 @@ impl Given {
             ),
             ("--split", self.split.as_ref().map(Split::to_string), recorded.split.clone()),
             (
-                "--episodes-dir",
+                "--episodes",
                 // The run has its own copies of the files; the folder itself may be gone.
-                self.episodes_dir.as_ref().map(|_| FILES.to_owned()),
+                self.episodes.as_ref().map(|_| FILES.to_owned()),
                 recorded.split.clone(),
             ),
-            ("--episodes", self.episodes.map(|n| n.to_string()), number(recorded.episodes)),
+            ("--first", self.first.map(|n| n.to_string()), number(recorded.first)),
             ("--seeds", self.seeds.map(|n| n.to_string()), recorded.seeds.to_string()),
+            ("--rules", self.rules.map(|r| r.to_string()), recorded.rules.to_string()),
+            (
+                "--set",
+                (!self.set.is_empty()).then(|| self.set.join(" ")),
+                if recorded.set.is_empty() { number(None) } else { recorded.set.join(" ") },
+            ),
             ("--size", self.size.map(|n| n.to_string()), number(recorded.size)),
         ];
         for (option, given, recorded) in said {

@@ -3,6 +3,7 @@
 use std::fs;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
+use chaic_agents::PlannerRules;
 use chaic_episodes::Episode;
 use chaic_protocol::observation::{Grants, Senses};
 use chaic_protocol::{Action, Agent, Briefing, Observation, TaskId};
@@ -78,7 +79,7 @@ impl Helpers for TestHelpers {
         vec!["turner".to_owned(), "breaker".to_owned()]
     }
 
-    fn make(&self, name: &str) -> Option<Helper> {
+    fn make(&self, name: &str, _: PlannerRules) -> Option<Helper> {
         if self.made.fetch_add(1, Ordering::SeqCst) + 1 >= self.stop_after {
             self.stop.store(true, Ordering::SeqCst);
         }
@@ -111,7 +112,7 @@ fn given(files: &tempfile::TempDir, helpers: &[&str]) -> Given {
         helpers: Some(helpers.iter().map(|h| (*h).to_owned()).collect()),
         seeds: Some(2),
         size: Some(SIZE),
-        episodes_dir: Some(files.path().to_owned()),
+        episodes: Some(files.path().to_owned()),
         ..Given::default()
     }
 }
@@ -287,6 +288,7 @@ fn a_journal_cut_at_any_byte_loses_one_record_at_most() {
             done: 1.0,
             total: 10.0,
             away_frames: None,
+            escape_frames: None,
             deliveries: Vec::new(),
             digest: Digest(3),
         }),

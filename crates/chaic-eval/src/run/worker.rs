@@ -190,11 +190,12 @@ impl Crew<'_> {
         at: &mut dyn FnMut(Frame),
     ) -> Result<Option<RunResult>> {
         let episode = self.folder.episode(key)?;
-        let helper = helpers::find(self.helpers, &key.helper)?;
+        let rules = self.options.rules()?;
+        let helper = helpers::find(self.helpers, &key.helper, rules.planner)?;
         let staging = Staging {
             episode: &episode,
             seed: key.seed,
-            rules: self.options.rules(),
+            rules,
             helper: &key.helper,
             image_size: self.options.size,
         };

@@ -14,11 +14,11 @@ pub use write::Writer;
 use chaic_protocol::capability::Persona;
 use chaic_protocol::observation::{Grants, Senses};
 use chaic_protocol::{AgentId, TaskId};
-use chaic_world::Rules;
 use serde::{Deserialize, Serialize};
 
 use crate::digest::Digest;
 use crate::metrics::RunKey;
+use crate::rules::RuleSet;
 
 /// What the field `format` of a header says.
 pub const FORMAT: &str = "chaic-trace";
@@ -45,7 +45,7 @@ pub struct Header {
     /// The seed that the world was played with.
     pub world_seed: u64,
     /// The rules.
-    pub rules: Rules,
+    pub rules: RuleSet,
     /// The helper's name; `none` where the partner is alone.
     pub helper: String,
     /// Who took part, by agent.

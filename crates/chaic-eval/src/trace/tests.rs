@@ -19,7 +19,7 @@ fn header() -> Header {
         setup: Digest(7),
         seed: 0,
         world_seed: u64::MAX,
-        rules: Rules::paper(),
+        rules: RuleSet::PAPER,
         helper: "rhp".to_owned(),
         people: vec![Participant {
             agent: AgentId::PARTNER,

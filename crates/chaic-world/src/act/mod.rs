@@ -13,6 +13,7 @@ use chaic_protocol::geom::{horizontal_distance, wrap_angle, xz};
 use chaic_protocol::{Action, AgentId, EntityId, Vec3};
 
 use crate::event::EventKind;
+use crate::rules::{JointLift, ReachTo};
 use crate::state::{Activity, Phase, Place, Step};
 use crate::world::World;
 
@@ -21,7 +22,12 @@ impl World {
     pub(crate) fn begin(&mut self, agent: AgentId, action: Action) {
         let (queue, failing) = match self.steps_of(agent, action) {
             Ok(queue) => (queue, None),
-            Err(reason) => (vec![Step::of(Phase::Stand, 1)], Some(reason)),
+            Err(reason) => {
+                let is_taking =
+                    matches!(action, Action::PickUp { .. } | Action::RemoveObstacle { .. });
+                let frames = if is_taking { self.rules.durations.refused_pick } else { 1 };
+                (vec![Step::of(Phase::Stand, frames)], Some(reason))
+            }
         };
         let mut queue = queue;
         let step = queue.pop().expect("every action has at least one step");
@@ -29,6 +35,9 @@ impl World {
         let since = self.state.frame;
         self.happened(EventKind::Began { agent, action });
         self.person_mut(agent).activity = Some(Activity { action, since, step, queue, failing });
+        if self.rules.joint_lift == JointLift::LastChoice && failing.is_none() {
+            self.call_to_lift(agent, action);
+        }
     }
 
     /// The first steps of an action, next one last; later ones are added by the judging steps.
@@ -138,6 +147,12 @@ impl World {
         Step::of(Phase::ResetArms { from: Some(from), hand }, self.rules.durations.reset_arms)
     }
 
+    /// Lifting what both hands have closed around.
+    fn raise_furniture(&self, from: Vec3) -> Step {
+        let arms = Phase::ResetArms { from: Some(from), hand: None };
+        Step::of(arms, self.rules.durations.raise_furniture)
+    }
+
     fn gap(&self) -> Step {
         Step::of(Phase::Stand, self.rules.durations.gap)
     }
@@ -153,8 +168,14 @@ impl World {
 
     /// Whether a hand gets at a thing from where its owner stands now.
     fn check_within_reach(&self, agent: AgentId, entity: EntityId) -> Result<(), FailureReason> {
-        if self.reach_distance(agent, entity) > self.rules.reach_limit_m {
+        let is_heavy = self.thing(entity).0.class.info().role == Role::HeavyTarget;
+        let limit_m =
+            if is_heavy { self.rules.furniture_reach_limit_m } else { self.rules.reach_limit_m };
+        if self.reach_distance(agent, entity) > limit_m {
             return Err(FailureReason::Blocked);
+        }
+        if self.rules.reach_to == ReachTo::Middle {
+            return Ok(());
         }
         let from = self.person(agent).pose.position;
         let to = self.nearest_point(from, entity);

@@ -6,6 +6,7 @@ use chaic_protocol::catalogue::Role;
 use chaic_protocol::{AgentId, EntityId, Vec3};
 
 use crate::event::EventKind;
+use crate::rules::ReachTo;
 use crate::state::{Activity, Phase, Place, Step};
 use crate::tick::Progress;
 use crate::world::World;
@@ -74,7 +75,9 @@ impl World {
         hand: Option<Hand>,
         place: EntityId,
     ) -> Progress {
-        if let Err(reason) = self.check_within_reach(agent, place) {
+        if self.rules.reach_to == ReachTo::NearestPoint
+            && let Err(reason) = self.check_within_reach(agent, place)
+        {
             return Progress::Fails(reason);
         }
         let objects = self.to_put_down(agent, hand.unwrap_or(Hand::Right));

@@ -100,7 +100,10 @@ impl World {
         let vain = activity.failing.is_some();
         let d = self.rules.durations;
         // Next one last.
-        activity.queue = vec![self.reset_arms(hand, to)];
+        activity.queue = vec![match hand {
+            Some(_) => self.reset_arms(hand, to),
+            None => self.raise_furniture(to),
+        }];
         if !vain || breaks {
             activity.queue.extend([Step::of(Phase::Grasp { hand, object }, d.grasp), self.gap()]);
         }

@@ -1,6 +1,7 @@
 //! Lifting furniture by two.
 
 use chaic_protocol::action::FailureReason;
+use chaic_protocol::catalogue::Role;
 use chaic_protocol::{Action, AgentId, EntityId, Vec3};
 
 use crate::event::EventKind;
@@ -45,6 +46,34 @@ impl World {
         Progress::Instant
     }
 
+    /// Somebody chooses a piece of furniture: whoever chose the same piece last drops what it does
+    /// and goes there too ([`JointLift::LastChoice`](crate::JointLift)).
+    pub(super) fn call_to_lift(&mut self, agent: AgentId, action: Action) {
+        let Action::PickUp { object, .. } = action else { return };
+        if self.thing(object).0.class.info().role != Role::HeavyTarget {
+            return;
+        }
+        let chose_it = |a: &AgentId| {
+            let person = self.person(*a);
+            let last = person.activity.as_ref().map(|o| o.action).or(person.last.map(|l| l.0));
+            *a != agent && last.is_some_and(|o| is_pick_up(o) && o.subject() == Some(object))
+        };
+        let Some(other) = self.setup.agents().find(chose_it) else { return };
+        let Ok(mut queue) = self.steps_of(other, action) else { return };
+        let Some(step) = queue.pop() else { return };
+        let theirs = Activity { action, since: self.state.frame, step, queue, failing: None };
+        self.person_mut(other).activity = Some(theirs);
+        self.happened(EventKind::Began { agent: other, action });
+        // Both bring their arms back first.
+        let frames = self.rules.durations.reset_arms;
+        let arms = Step::of(Phase::ResetArms { from: None, hand: None }, frames);
+        for both in [agent, other] {
+            if let Some(activity) = self.person_mut(both).activity.as_mut() {
+                activity.queue.push(std::mem::replace(&mut activity.step, arms));
+            }
+        }
+    }
+
     /// Lays out the steps of both: the one with the lower id leads.
     fn begin_joint_lift(
         &mut self,
@@ -58,7 +87,7 @@ impl World {
         let (thing, state) = self.thing(object);
         let to = state.position + Vec3::Y * 0.5 * thing.size_m().y;
         let lead = vec![
-            self.reset_arms(None, to),
+            self.raise_furniture(to),
             Step::of(Phase::Grasp { hand: None, object }, d.grasp),
             self.gap(),
             self.reach(None, to),

@@ -88,18 +88,21 @@ fn finish(run: &Run, began: Instant) -> Result<Ended> {
 
 /// What is asked for, and the name of a folder for it. Nothing said at all is the small benchmark.
 fn given(arguments: &EvalArguments) -> (Given, &'static str) {
-    let EvalArguments { task, helper, split, episodes_dir, episodes, seeds, size, .. } = arguments;
+    let EvalArguments { task, helper, split, episodes, first, rules, set, seeds, size, .. } =
+        arguments;
     let given = Given {
         tasks: task.as_ref().map(|t| t.0.clone()),
         helpers: helper.clone(),
         split: split.clone(),
-        episodes: *episodes,
+        first: *first,
         seeds: *seeds,
         size: *size,
-        episodes_dir: episodes_dir.clone(),
+        episodes: episodes.clone(),
+        rules: *rules,
+        set: set.clone(),
     };
     if given == Given::default() && !arguments.resume {
-        return (Given { episodes: Some(QUICK_EPISODES), ..given }, "quick");
+        return (Given { first: Some(QUICK_EPISODES), ..given }, "quick");
     }
     (given, "eval")
 }

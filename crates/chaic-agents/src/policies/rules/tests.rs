@@ -23,7 +23,7 @@ struct Case {
 fn choose(profile: RuleProfile, case: &Case, log: &BehaviorLog) -> Plan {
     let mut briefing = Toy::room(4.0, 4.0).briefing();
     briefing.goal = Toy::goal(&[("apple", 3), ("banana", 2)]);
-    let mut memory = Memory::new(&briefing);
+    let mut memory = Memory::new(&briefing, crate::PlannerRules::paper());
     memory.frame = case.frame;
     let own = SelfState { pose: Default::default(), hands: case.hands.clone(), last: None };
     let context = Context {

@@ -1,0 +1,134 @@
+//! What it costs to enter each cell by the original's reckoning (facts 1.5): soft rings, nothing
+//! quite impassable, and for the partner a wide berth around obstacles.
+
+use chaic_protocol::geom::xz;
+use chaic_protocol::{Frame, Role, Vec2};
+
+use super::costs::{FREE, UNKNOWN_EXTRA};
+use super::grid::{CELL_M, Grid};
+use super::occupancy::{OccupancyMap, Space};
+use super::people::People;
+use super::semantic::SemanticMap;
+
+/// A cell with something within two cells, or next to it.
+const NEAR: [u32; 2] = [5 * FREE, 10 * FREE];
+/// A cell with something in it.
+const OCCUPIED: u32 = 1_000 * FREE;
+/// The same in the first frames of an episode.
+const OCCUPIED_AT_FIRST: u32 = 500_000 * FREE;
+/// How long these last, frames.
+pub const FIRST_FRAMES: Frame = 200;
+/// Added for a wall.
+const WALL_EXTRA: u32 = 500_000 * FREE;
+/// Added around obstacles, for whoever heeds them.
+const OBSTACLE_EXTRA: u32 = 200_000 * FREE;
+/// From an obstacle's middle that is so many cells down and up along each axis.
+const OBSTACLE_CELLS: [i32; 2] = [5, 6];
+/// A way that costs more than this leads past an obstacle or through a wall (facts 1.6).
+pub const BLOCKED: u32 = 500_000 * FREE;
+/// A way that costs more than this is not worth exploring (facts 1.10).
+pub const FARTHEST: u32 = 10_000 * FREE;
+/// Where something was seen counts as occupied until, every so many updates, what has been found
+/// free since is believed (facts 1.1: 10).
+const BELIEVE_EVERY: u32 = 10;
+/// Where a person was seen counts as occupied for so long, frames.
+const PERSON_FRAMES: Frame = 200;
+/// People are as wide as this, metres: half the width of the original's probe.
+const PERSON_RADIUS_M: f32 = 0.32;
+
+/// What is looked at.
+pub struct Seen<'a> {
+    /// What stands firmly.
+    pub map: &'a OccupancyMap,
+    /// What is where.
+    pub things: &'a SemanticMap,
+    /// Who was where.
+    pub people: &'a People,
+    /// Whether obstacles are given a wide berth.
+    pub heeds_obstacles: bool,
+    /// The present frame.
+    pub now: Frame,
+}
+
+/// Which cells count as occupied. What is seen counts at once, what is gone only after a while.
+#[derive(Clone, Debug, Default)]
+pub struct Belief {
+    occupied: Vec<bool>,
+    n_updates: u32,
+}
+
+impl Belief {
+    /// Takes in which cells are occupied by the latest account.
+    fn update(&mut self, now: Vec<bool>) {
+        if self.n_updates.is_multiple_of(BELIEVE_EVERY) {
+            self.occupied = now;
+        } else {
+            self.occupied.iter_mut().zip(now).for_each(|(old, new)| *old |= new);
+        }
+        self.n_updates += 1;
+    }
+
+    /// Whether a cell counts as occupied.
+    pub fn is_occupied(&self, cell: usize) -> bool {
+        self.occupied.get(cell).copied().unwrap_or(false)
+    }
+}
+
+/// Takes in what is seen, and computes the costs of all cells.
+pub fn lattice_costs(grid: &Grid, seen: &Seen<'_>, belief: &mut Belief, cost: &mut [u32]) {
+    let is_wall = |cell| seen.map.space(cell) == Space::Wall;
+    let mut occupied: Vec<bool> =
+        (0..grid.n_cells()).map(|c| seen.map.space(c) >= Space::Occupied).collect();
+    let firm = |role| matches!(role, Role::Obstacle | Role::HeavyTarget);
+    let standing =
+        seen.things.iter().filter(|t| t.is_present && !t.is_gone && seen.now >= t.held_until);
+    let standing: Vec<_> = standing.filter(|t| firm(t.class.info().role)).collect();
+    for cell in standing.iter().flat_map(|t| &t.footprint).filter_map(|p| grid.cell_at(*p)) {
+        occupied[cell] = true;
+    }
+    for person in seen.people.iter().filter(|p| p.frame + PERSON_FRAMES > seen.now) {
+        for cell in grid.disc(xz(person.position_in_world), PERSON_RADIUS_M) {
+            occupied[cell] = true;
+        }
+    }
+    belief.update(occupied);
+    cost.fill(FREE);
+    for cell in (0..grid.n_cells()).filter(|c| belief.is_occupied(*c)) {
+        for (reach, near) in [2, 1].into_iter().zip(NEAR) {
+            for c in around(grid, cell, [reach, reach]) {
+                cost[c] = cost[c].max(near);
+            }
+        }
+    }
+    let in_it = if seen.now < FIRST_FRAMES { OCCUPIED_AT_FIRST } else { OCCUPIED };
+    for (cell, cost) in cost.iter_mut().enumerate() {
+        if belief.is_occupied(cell) {
+            *cost = in_it;
+        }
+        if !seen.map.is_known(cell) {
+            *cost += UNKNOWN_EXTRA;
+        }
+        if is_wall(cell) {
+            *cost += WALL_EXTRA;
+        }
+    }
+    if seen.heeds_obstacles {
+        let obstacles = standing.iter().filter(|t| t.class.info().role == Role::Obstacle);
+        let mut heeded = vec![false; grid.n_cells()];
+        for cell in obstacles.filter_map(|t| grid.cell_at(xz(t.position_in_world))) {
+            around(grid, cell, OBSTACLE_CELLS).for_each(|c| heeded[c] = true);
+        }
+        for (cost, _) in cost.iter_mut().zip(heeded).filter(|(_, heeded)| *heeded) {
+            *cost += OBSTACLE_EXTRA;
+        }
+    }
+}
+
+/// The cells of a square, so many down and up from its middle along each axis.
+fn around(grid: &Grid, cell: usize, [down, up]: [i32; 2]) -> impl Iterator<Item = usize> + use<> {
+    let (grid, middle) = (*grid, grid.center(cell));
+    (-down..=up).flat_map(move |j| {
+        (-down..=up)
+            .filter_map(move |i| grid.cell_at(middle + CELL_M * Vec2::new(i as f32, j as f32)))
+    })
+}

@@ -1,0 +1,190 @@
+//! The rules that a run is played by: the world's and the planners' together, by name, with single
+//! rules set otherwise for experiments.
+
+use std::fmt;
+use std::str::FromStr;
+
+pub use chaic_agents::PlannerRules;
+pub use chaic_world::Rules;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::error::{EvalError, Result};
+
+/// Names a rule set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RuleSetName {
+    /// What the paper says and means.
+    Paper,
+    /// What the original's released code does.
+    Compat,
+}
+
+/// All rules of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RuleSet {
+    /// Which set it is, or began as.
+    pub name: RuleSetName,
+    /// By which the world goes on.
+    pub world: Rules,
+    /// By which minds plan.
+    pub planner: PlannerRules,
+}
+
+impl RuleSet {
+    /// The paper's.
+    pub const PAPER: RuleSet =
+        RuleSet { name: RuleSetName::Paper, world: Rules::paper(), planner: PlannerRules::paper() };
+
+    /// The original code's.
+    pub const COMPAT: RuleSet = RuleSet {
+        name: RuleSetName::Compat,
+        world: Rules::compat(),
+        planner: PlannerRules::compat(),
+    };
+
+    /// The set of this name.
+    pub const fn named(name: RuleSetName) -> RuleSet {
+        match name {
+            RuleSetName::Paper => RuleSet::PAPER,
+            RuleSetName::Compat => RuleSet::COMPAT,
+        }
+    }
+
+    /// The same with one rule set otherwise by `NAME=VALUE`, for example
+    /// `world.dropped_counts=true`; a VALUE of `paper` or `compat` takes that set's.
+    ///
+    /// # Errors
+    /// [`EvalError::Options`] that lists all names, or says what is wrong with the value.
+    ///
+    /// ```
+    /// use chaic_eval::rules::RuleSet;
+    /// let rules = RuleSet::PAPER.with("planner.exploration=sampled")?;
+    /// assert_eq!(RuleSet::COMPAT.planner.exploration, rules.planner.exploration);
+    /// assert!(RuleSet::PAPER.with("world.gravity=0").is_err());
+    /// # Ok::<(), chaic_eval::EvalError>(())
+    /// ```
+    pub fn with(self, setting: &str) -> Result<RuleSet> {
+        let wrong = |problem: String| EvalError::Options(format!("--set {setting}: {problem}"));
+        let (name, text) =
+            setting.split_once('=').ok_or_else(|| wrong("expected NAME=VALUE".to_owned()))?;
+        let pointer = format!("/{}", name.replace('.', "/"));
+        let mut all = self.to_value();
+        let old = all.pointer(&pointer).filter(|_| name != "name");
+        let old = old.ok_or_else(|| {
+            wrong(format!("no rule `{name}`; the rules are {}", rule_names().join(", ")))
+        })?;
+        let of_set = text.parse().ok().map(|set| RuleSet::named(set).to_value());
+        let new = match of_set.as_ref().and_then(|set| set.pointer(&pointer)) {
+            Some(value) => value.clone(),
+            None if old.is_string() => Value::String(text.to_owned()),
+            None => serde_json::from_str(text).map_err(|_| wrong(expected(old)))?,
+        };
+        let hint = expected(old);
+        if let Some(place) = all.pointer_mut(&pointer) {
+            *place = new;
+        }
+        serde_json::from_value(all).map_err(|e| wrong(format!("{hint}: {e}")))
+    }
+
+    fn to_value(self) -> Value {
+        serde_json::to_value(self).expect("rules have string keys and finite numbers")
+    }
+}
+
+fn expected(old: &Value) -> String {
+    format!("expected paper, compat or a value like {old}")
+}
+
+/// The names of all single rules, as `--set` takes them.
+pub fn rule_names() -> Vec<String> {
+    fn collect(prefix: &str, value: &Value, names: &mut Vec<String>) {
+        match value {
+            Value::Object(fields) => {
+                for (field, value) in fields {
+                    collect(&format!("{prefix}.{field}"), value, names);
+                }
+            }
+            _ => names.push(prefix.to_owned()),
+        }
+    }
+    let all = RuleSet::PAPER.to_value();
+    let mut names = Vec::new();
+    for part in ["world", "planner"] {
+        collect(part, &all[part], &mut names);
+    }
+    names
+}
+
+impl RuleSetName {
+    /// The name in commands.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            RuleSetName::Paper => "paper",
+            RuleSetName::Compat => "compat",
+        }
+    }
+}
+
+impl fmt::Display for RuleSetName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.as_str())
+    }
+}
+
+impl FromStr for RuleSetName {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<RuleSetName, String> {
+        match text {
+            "paper" => Ok(RuleSetName::Paper),
+            "compat" => Ok(RuleSetName::Compat),
+            _ => Err(format!("unknown rules `{text}`; they are paper and compat")),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn single_rules_are_set_by_value_and_by_set() -> Result<()> {
+        let rules = RuleSet::COMPAT
+            .with("world.durations.refused_pick=5")?
+            .with("world.blocking=paper")?
+            .with("planner.goal_blackout_frames=0")?;
+        assert_eq!(rules.world.durations.refused_pick, 5);
+        assert_eq!(rules.world.blocking, Rules::paper().blocking);
+        assert_eq!(rules.planner.goal_blackout_frames, 0);
+        assert_eq!(rules.name, RuleSetName::Compat);
+        assert_eq!(rules.planner.walking, PlannerRules::compat().walking);
+        Ok(())
+    }
+
+    #[test]
+    fn a_wrong_setting_is_refused_with_what_would_be_right() {
+        for (setting, expected) in [
+            ("world.gravity=9", "planner.exploration"),
+            ("name=paper", "no rule `name`"),
+            ("world.stride_m", "NAME=VALUE"),
+            ("world.stride_m=far", "0.4"),
+            ("planner.exploration=nowhere", "frontier"),
+            ("world.dropped_counts=1", "false"),
+        ] {
+            let error = RuleSet::PAPER.with(setting).expect_err(setting).to_string();
+            assert!(error.contains(setting) && error.contains(expected), "{error}");
+        }
+    }
+
+    #[test]
+    fn every_set_can_be_made_of_the_other_rule_by_rule() -> Result<()> {
+        let made = rule_names()
+            .iter()
+            .try_fold(RuleSet::PAPER, |rules, name| rules.with(&format!("{name}=compat")))?;
+        assert_eq!(RuleSet { name: RuleSetName::Compat, ..made }, RuleSet::COMPAT);
+        Ok(())
+    }
+}

@@ -10,10 +10,12 @@ use chaic_protocol::{AgentId, Frame};
 use chaic_world::World;
 
 use crate::error::{EvalError, Result};
+use crate::helpers::{self, BuiltIn, Helpers};
 use crate::metrics::{RunResult, tally};
-use crate::play::{Choice, Flow, crank, world_of};
-use crate::run::{RunFolder, read_results};
-use crate::trace::{self, Decision, Record, Trace, Warning};
+use crate::play::{Choice, Flow, Staging, crank, header_of, world_of};
+use crate::rules::RuleSet;
+use crate::run::{RunFolder, RunOptions, read_results};
+use crate::trace::{self, Decision, Header, Record, Trace, Warning};
 
 /// The first place where a trace and its re-simulation differ.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,39 +53,41 @@ pub struct Verdict {
     pub warnings: Vec<Warning>,
 }
 
-/// Re-simulates every trace of a run on `jobs` threads, and compares all that is recorded:
-/// digests at each decision, events, the end, and the line of `results.jsonl`.
+/// Re-simulates every trace of a run on `jobs` threads, and compares all that is recorded: who
+/// took part by which rules, digests at each decision, events, the end, and the line of
+/// `results.jsonl`. A trace that can't be checked counts as one that differs.
+///
+/// `options` are the run's, `helpers` those that played; what a helper asked for isn't checked
+/// if its name is unknown.
 ///
 /// # Errors
-/// If a file can't be read, or a trace's episode isn't the one that was played.
+/// If the run's own files can't be read.
 pub fn verify_run(
     folder: &RunFolder,
+    options: &RunOptions,
+    helpers: &dyn Helpers,
     jobs: usize,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<Verdict> {
     let paths = folder.traces()?;
     let (results, warnings) = read_results(&folder.results())?;
     let next = AtomicUsize::new(0);
-    let verdict = Mutex::new(Ok(Verdict { warnings, ..Verdict::default() }));
+    let rules = options.rules()?;
+    let check = Check { folder, options, rules, helpers, results: &results };
+    let verdict = Mutex::new(Verdict { warnings, ..Verdict::default() });
     let done = AtomicUsize::new(0);
     std::thread::scope(|scope| {
         for _ in 0..jobs.clamp(1, paths.len().max(1)) {
             scope.spawn(|| {
                 while let Some(path) = paths.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let one = verify_file(folder, path, &results);
-                    let mut verdict = verdict.lock().unwrap_or_else(|e| e.into_inner());
-                    match (one, verdict.as_mut()) {
-                        (Ok(one), Ok(all)) => all.add(one),
-                        (Err(error), Ok(_)) => *verdict = Err(error),
-                        (_, Err(_)) => return,
-                    }
-                    drop(verdict);
+                    let one = check.file(path).unwrap_or_else(|e| One::unreadable(path, &e));
+                    verdict.lock().unwrap_or_else(|e| e.into_inner()).add(one);
                     progress(done.fetch_add(1, Ordering::Relaxed) + 1);
                 }
             });
         }
     });
-    let mut verdict = verdict.into_inner().unwrap_or_else(|e| e.into_inner())?;
+    let mut verdict = verdict.into_inner().unwrap_or_else(|e| e.into_inner());
     verdict.add_missing(folder, &results);
     verdict.mismatches.sort_by(|a, b| a.path.cmp(&b.path));
     Ok(verdict)
@@ -116,21 +120,86 @@ impl Verdict {
     }
 }
 
-fn verify_file(folder: &RunFolder, path: &Path, results: &[RunResult]) -> Result<One> {
-    let (trace, warnings) = trace::read(path)?;
-    let key = trace.header.key();
-    let episode = folder.episode(&key)?;
-    let mut world = world_of(&trace.header, &episode)?;
-    let mut mismatch = verify(&trace, &mut world, path)?;
-    if mismatch.is_none() {
-        let recorded = results.iter().find(|r| r.key == key).filter(|r| r.summary().is_some());
-        let frame = trace.end().map_or(0, |e| e.frame);
-        if recorded.is_some_and(|r| Some(r) != tally(&trace).as_ref()) {
-            let problem = "results.jsonl says something else of this run".to_owned();
-            mismatch = Some(Mismatch { path: path.to_owned(), frame, agent: None, problem });
-        }
+impl One {
+    fn unreadable(path: &Path, error: &EvalError) -> One {
+        let problem = format!("can't be checked: {error}");
+        let mismatch = Mismatch { path: path.to_owned(), frame: 0, agent: None, problem };
+        One { decisions: 0, mismatch: Some(mismatch), warnings: Vec::new() }
     }
-    Ok(One { decisions: trace.decisions().count(), mismatch, warnings })
+}
+
+/// What a trace is held against.
+struct Check<'a> {
+    folder: &'a RunFolder,
+    options: &'a RunOptions,
+    rules: RuleSet,
+    helpers: &'a dyn Helpers,
+    results: &'a [RunResult],
+}
+
+impl Check<'_> {
+    fn file(&self, path: &Path) -> Result<One> {
+        let (trace, warnings) = trace::read(path)?;
+        let differs = |frame: Frame, problem: String| {
+            Some(Mismatch { path: path.to_owned(), frame, agent: None, problem })
+        };
+        let key = trace.header.key();
+        let mut mismatch = match self.header_problem(&trace.header, path)? {
+            Some(problem) => differs(0, problem),
+            None => {
+                let mut world = world_of(&trace.header, &self.folder.episode(&key)?)?;
+                verify(&trace, &mut world, path)?
+            }
+        };
+        if mismatch.is_none() {
+            let mut recorded = self.results.iter().filter(|r| r.summary().is_some());
+            let recorded = recorded.find(|r| r.key == key);
+            if recorded.is_some_and(|r| Some(r) != tally(&trace).as_ref()) {
+                let frame = trace.end().map_or(0, |e| e.frame);
+                mismatch =
+                    differs(frame, "results.jsonl says something else of this run".to_owned());
+            }
+        }
+        Ok(One { decisions: trace.decisions().count(), mismatch, warnings })
+    }
+
+    /// What the first line of a trace says that isn't so.
+    fn header_problem(&self, header: &Header, path: &Path) -> Result<Option<String>> {
+        let key = header.key();
+        if self.folder.trace(&key) != path {
+            return Ok(Some("the first line is that of another episode run".to_owned()));
+        }
+        let episode = self.folder.episode(&key)?;
+        let helper = helpers::find(self.helpers, &key.helper, self.rules.planner).ok();
+        let staging = Staging {
+            episode: &episode,
+            seed: header.seed,
+            rules: self.rules,
+            helper: &key.helper,
+            image_size: self.options.size,
+        };
+        let expected = match helper {
+            Some(helper) => header_of(staging, helper)?,
+            // A helper that only its author has: what it asked for is its own affair.
+            None => {
+                let stand_in = helpers::find(&BuiltIn, "random", self.rules.planner)?;
+                let mut expected = header_of(staging, stand_in)?;
+                let helpers = expected.people.iter_mut().zip(&header.people);
+                for (expected, said) in helpers.filter(|(p, _)| p.agent == AgentId::HELPER) {
+                    (expected.grants, expected.senses) = (said.grants, said.senses);
+                }
+                expected
+            }
+        };
+        let expected = Header { chaic: header.chaic.clone(), ..expected };
+        let said = serde_json::to_value(header).expect("a header is plain data");
+        let comes = serde_json::to_value(&expected).expect("a header is plain data");
+        let names = said.as_object().into_iter().flat_map(|fields| fields.keys());
+        let wrong: Vec<&str> =
+            names.filter(|name| said[*name] != comes[*name]).map(String::as_str).collect();
+        let problem = || format!("the first line is not what this run has: {}", wrong.join(", "));
+        Ok((!wrong.is_empty()).then(problem))
+    }
 }
 
 /// Plays the actions of a trace in its world, and finds the first record that comes out different.

@@ -95,8 +95,8 @@ pub struct EvalArguments {
     #[arg(long, value_name = "PIXELS")]
     pub size: Option<u32>,
     /// Episodes at a time; changes no result. Usual: one for each core.
-    #[arg(long, value_name = "N")]
-    pub jobs: Option<usize>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
     /// The run's folder. Usual: the next free `runs/NAME`.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -130,8 +130,8 @@ pub struct VerifyArguments {
     /// The run's folder.
     pub run: PathBuf,
     /// Traces at a time. Usual: one for each core.
-    #[arg(long, value_name = "N")]
-    pub jobs: Option<usize>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
 }
 
 /// `chaic replay`.

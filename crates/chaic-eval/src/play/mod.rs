@@ -73,10 +73,7 @@ impl Play {
     }
 
     fn stage(staging: Staging<'_>, setup: Arc<Setup>, mut cast: Cast) -> Result<Play> {
-        let world = new_world(&setup, staging.rules.world, staging.episode.id())?;
-        for (agent, actor) in setup.agents().zip(&mut cast.actors) {
-            actor.begin(agent, &world, staging.image_size);
-        }
+        let world = brief(&staging, &setup, &mut cast)?;
         let header = header(&staging, &setup, &cast);
         let eyes = Eyes::new(Arc::new(Scene::new(&setup)), &world);
         Ok(Play { world, cast, eyes, header })
@@ -145,6 +142,26 @@ fn setup_of(staging: &Staging<'_>, has_helper: bool) -> Arc<Setup> {
         setup.people.truncate(1);
     }
     Arc::new(setup)
+}
+
+/// The world at its beginning, with everybody briefed.
+fn brief(staging: &Staging<'_>, setup: &Arc<Setup>, cast: &mut Cast) -> Result<World> {
+    let world = new_world(setup, staging.rules.world, staging.episode.id())?;
+    for (agent, actor) in setup.agents().zip(&mut cast.actors) {
+        actor.begin(agent, &world, staging.image_size);
+    }
+    Ok(world)
+}
+
+/// What stands at the head of the trace, without playing.
+///
+/// # Errors
+/// If the setup can't become a world.
+pub fn header_of(staging: Staging<'_>, helper: Option<Helper>) -> Result<Header> {
+    let setup = setup_of(&staging, helper.is_some());
+    let mut cast = cast(&setup, helper, staging.rules.planner);
+    brief(&staging, &setup, &mut cast)?;
+    Ok(header(&staging, &setup, &cast))
 }
 
 fn new_world(setup: &Arc<Setup>, rules: Rules, id: &str) -> Result<World> {

@@ -37,9 +37,13 @@ pub fn slug(task: TaskId, id: &str) -> String {
 
 /// All episode runs, episode by episode, so that a run that is cut short can be compared.
 pub(super) fn items(options: &RunOptions, folder: &RunFolder) -> Result<Vec<Item>> {
+    /// A longer list is no benchmark but a mistake, and fills the memory.
+    const MAX_ITEMS: usize = 1_000_000;
+    let n_each = options.helpers.len().saturating_mul(options.seeds as usize);
     let mut items = Vec::new();
     for task in &options.tasks {
-        let episodes = episodes(options, folder, *task)?;
+        let limit = (MAX_ITEMS - items.len()) / n_each.max(1);
+        let episodes = episodes(options, folder, *task, limit)?;
         if episodes.is_empty() {
             let text = format!("there is no episode of {task} to play");
             return Err(EvalError::Options(text));
@@ -56,12 +60,13 @@ pub(super) fn items(options: &RunOptions, folder: &RunFolder) -> Result<Vec<Item
     Ok(items)
 }
 
-/// Ids and horizons of a task's episodes. Episodes themselves are made when they are played:
+/// Ids and horizons of a task's episodes, `at_most` so many generated ones. Episodes themselves are made when they are played:
 /// there may be more than memory holds.
 fn episodes(
     options: &RunOptions,
     folder: &RunFolder,
     task: TaskId,
+    at_most: usize,
 ) -> Result<Vec<(String, Frame)>> {
     let limit = options.first.map_or(usize::MAX, |n| n as usize);
     if options.split == FILES {
@@ -79,7 +84,13 @@ fn episodes(
         bundled => format!("{task}/{bundled}/{k:02}"),
     };
     let horizon = task.info().horizon;
-    Ok((0..split.len_per_task().min(limit)).map(|k| (name(k), horizon)).collect())
+    let n = split.len_per_task().min(limit);
+    if n > at_most {
+        let text =
+            format!("{n} episodes of {task} are too many for one run; give --first or fewer seeds");
+        return Err(EvalError::Options(text));
+    }
+    Ok((0..n).map(|k| (name(k), horizon)).collect())
 }
 
 /// The episodes in a folder's `.json` files, in the order of their ids.

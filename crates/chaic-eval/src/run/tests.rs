@@ -169,7 +169,8 @@ fn the_number_of_workers_and_an_interruption_change_nothing() {
     assert_eq!(traces.len(), 8);
     let tallied = traces.iter().map(|p| crate::metrics::tally(&crate::trace::read(p).unwrap().0));
     assert_eq!(sorted(&tallied.map(Option::unwrap).collect::<Vec<_>>()), all[0]);
-    let verdict = crate::verify::verify_run(run.folder(), 2, &|_| ()).unwrap();
+    let verdict =
+        crate::verify::verify_run(run.folder(), run.options(), &helpers, 2, &|_| ()).unwrap();
     assert_eq!((verdict.agreeing, verdict.mismatches), (8, vec![]));
 }
 
@@ -208,14 +209,21 @@ fn verify_finds_what_was_changed() {
     assert!(play(&mut run, 1, &helpers));
     let path = run.folder().traces().unwrap().remove(0);
     let text = fs::read_to_string(&path).unwrap();
-    let verdict = || crate::verify::verify_run(run.folder(), 1, &|_| ()).unwrap();
+    let verify = || crate::verify::verify_run(run.folder(), run.options(), &helpers, 1, &|_| ());
+    let verdict = || verify().unwrap();
     assert_eq!(verdict().mismatches, []);
-    let changes: [(&str, &str, &str); 4] = [
+    let changes = [
         // The second decision of the helper: the next digest differs.
         ("1,\"turn_left\"", "1,\"turn_right\"", "digest"),
         ("\"impossible\"", "\"blocked\"", "played again it is"),
         ("\"complete\":false", "\"complete\":true", "played again it is"),
-        ("\"seed\":0", "\"seed\":1", "results.jsonl has this run"),
+        ("\"seed\":0", "", "results.jsonl has this run"),
+        // The first line: who was told what, by which rules, in which world.
+        ("\"seed\":0", "\"seed\":1", "another episode run"),
+        ("\"goal\":false", "\"goal\":true", "not what this run has: people"),
+        ("\"container_capacity\":3", "\"container_capacity\":4", "not what this run has: rules"),
+        ("\"world_seed\":", "\"world_seed\":9", "not what this run has: world_seed"),
+        ("\"setup\":\"", "\"setup\":\"0", "can't be checked"),
     ];
     for (from, to, said) in changes {
         let changed = text.replacen(from, to, 1);

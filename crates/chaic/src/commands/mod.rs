@@ -42,9 +42,9 @@ fn read_episode_file(path: &Path) -> Result<Vec<u8>> {
 }
 
 /// So many threads as the machine has cores, unless the user says otherwise.
-fn jobs(given: Option<usize>) -> usize {
+fn jobs(given: Option<u16>) -> usize {
     /// More threads than any machine has use for.
     const MAX_JOBS: usize = 1024;
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-    given.unwrap_or_else(cores).clamp(1, MAX_JOBS)
+    given.map_or_else(cores, usize::from).min(MAX_JOBS)
 }

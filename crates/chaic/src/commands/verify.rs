@@ -1,6 +1,7 @@
 //! `chaic verify`.
 
 use anyhow::Result;
+use chaic_eval::helpers::BuiltIn;
 use chaic_eval::run::RunFolder;
 use chaic_eval::verify::verify_run;
 
@@ -11,10 +12,10 @@ use crate::output::{complain, say};
 
 /// Plays the traces of a run again and compares.
 pub fn run(arguments: &VerifyArguments) -> Result<Ended> {
-    let (folder, _) = RunFolder::read(&arguments.run)?;
+    let (folder, options) = RunFolder::read(&arguments.run)?;
     let bar = bars::plain(folder.traces()?.len() as u64, "traces");
     let progress = |done: usize| bar.set_position(done as u64);
-    let verdict = verify_run(&folder, jobs(arguments.jobs), &progress);
+    let verdict = verify_run(&folder, &options, &BuiltIn, jobs(arguments.jobs), &progress);
     bar.finish_and_clear();
     let verdict = verdict?;
     for warning in &verdict.warnings {

@@ -16,6 +16,7 @@ mod decor;
 mod food;
 mod goods;
 mod house;
+mod kitchen;
 mod moving;
 mod obstacles;
 mod shape;

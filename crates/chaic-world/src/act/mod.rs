@@ -20,7 +20,7 @@ use crate::world::World;
 impl World {
     /// Begins an action: checks what can be known at once and lays out the steps.
     pub(crate) fn begin(&mut self, agent: AgentId, action: Action) {
-        let (queue, failing) = match self.steps_of(agent, action) {
+        let (mut queue, failing) = match self.steps_of(agent, action) {
             Ok(queue) => (queue, None),
             Err(reason) => {
                 let is_taking =
@@ -29,7 +29,6 @@ impl World {
                 (vec![Step::of(Phase::Stand, frames)], Some(reason))
             }
         };
-        let mut queue = queue;
         let step = queue.pop().expect("every action has at least one step");
         self.person_mut(agent).in_stride &= action == Action::MoveForward;
         let since = self.state.frame;

@@ -91,6 +91,10 @@ pub struct PlannerRules {
     pub bookkeeping: Bookkeeping,
     /// Which of several goal places one goes to.
     pub place_choice: PlaceChoice,
+    /// How near to go before an object is picked up, metres (the world steps up from 3 m).
+    pub pick_within_m: f32,
+    /// How near to go before something is put on a goal place, metres.
+    pub put_within_m: f32,
     /// Whether an object is left alone after any failed attempt, not only one beyond one's limits.
     pub any_failure_counts: bool,
     /// How long a goal place is forgotten after a vain put-on, frames.
@@ -139,6 +143,8 @@ impl PlannerRules {
             min_for_container: 3,
             bookkeeping: Bookkeeping::Exact,
             place_choice: PlaceChoice::Nearest,
+            pick_within_m: 1.4,
+            put_within_m: 1.8,
             any_failure_counts: false,
             goal_blackout_frames: 0,
             held_frames: 300,
@@ -169,6 +175,8 @@ impl PlannerRules {
             min_for_container: 0,
             bookkeeping: Bookkeeping::FirstPick,
             place_choice: PlaceChoice::Random,
+            pick_within_m: 1.5,
+            put_within_m: 2.0,
             any_failure_counts: true,
             goal_blackout_frames: 500,
             held_frames: 500,

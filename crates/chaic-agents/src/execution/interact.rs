@@ -7,10 +7,6 @@ use crate::memory::Memory;
 use crate::memory::semantic::{IGNORE_FRAMES, LIFT_FAILURES, Thing};
 use crate::rules::Walking;
 
-/// How near to go before an object is picked up, metres. (The world steps up from 3 m.)
-pub const PICK_WITHIN_M: f32 = 1.4;
-/// How near to go before something is put on a goal place, metres.
-pub const PUT_WITHIN_M: f32 = 1.8;
 /// The arm reaches so far over what an object lies on, metres: less than the world allows to be
 /// on the safe side, and, if no place to stand is found with it, more, as the map is coarse.
 const ARMS_M: [f32; 3] = [0.62, 0.75, 0.95];
@@ -53,6 +49,8 @@ pub struct Interaction {
     n_relaxed: usize,
     /// Steps taken close by since then.
     n_steps: u32,
+    /// Where an object was when the plan began: the original goes there whatever it sees since.
+    frozen: Option<Vec2>,
 }
 
 impl Interaction {
@@ -111,7 +109,7 @@ impl Interaction {
 
     /// The same where near enough is near enough as the crow flies.
     fn step_on_lattice(
-        &self,
+        &mut self,
         memory: &mut Memory,
         navigator: &mut Navigator,
         entity: EntityId,
@@ -123,7 +121,11 @@ impl Interaction {
         // The original walks to a fixed point before the truck: its nearest part.
         let is_long = info.size_m[0].max(info.size_m[2]) > LONG_M;
         let mean = Vec2::new(thing.position_in_world.x, thing.position_in_world.z);
-        let at = if is_long { thing.nearest_point(here) } else { mean };
+        let at = match () {
+            () if is_long => thing.nearest_point(here),
+            () if info.is_movable() => *self.frozen.get_or_insert(mean),
+            () => mean,
+        };
         let destination = Destination { arm_m: Some(0.0), ..Destination::near(at, within_m) };
         match navigator.step(memory, &destination) {
             Nav::Act(action) => Step::Walk(action),

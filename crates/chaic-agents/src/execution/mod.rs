@@ -22,7 +22,7 @@ use crate::memory::Memory;
 use crate::rules::{Exploration, PlaceChoice, Walking};
 use explore::{EXPLORE_FRAMES, Explorer, Found};
 use follow::{Follow, Follower};
-use interact::{Interaction, PICK_WITHIN_M, PUT_WITHIN_M, Step};
+use interact::{Interaction, Step};
 use navigate::Navigator;
 use recover::Recovery;
 use sample::Sampler;
@@ -253,7 +253,7 @@ impl Executor {
         }
         let hand = if is_heavy { Hand::Left } else { hand };
         let act = Action::PickUp { object: entity, hand };
-        self.approach(entity, PICK_WITHIN_M, act, s)
+        self.approach(entity, s.memory.rules.pick_within_m, act, s)
     }
 
     fn remove(&mut self, entity: EntityId, s: &mut Situation<'_>) -> Progress {
@@ -266,7 +266,8 @@ impl Executor {
         let (true, Some(hand)) = (there, Load::of(s.own, s.briefing).free_hand) else {
             return Progress::Failed;
         };
-        self.approach(entity, PICK_WITHIN_M, Action::RemoveObstacle { obstacle: entity, hand }, s)
+        let act = Action::RemoveObstacle { obstacle: entity, hand };
+        self.approach(entity, s.memory.rules.pick_within_m, act, s)
     }
 
     fn approach(
@@ -315,7 +316,8 @@ impl Executor {
             self.place = chosen.map(|(t, _)| t.entity);
         }
         let Some(place) = self.place else { return Progress::Failed };
-        self.approach(place, PUT_WITHIN_M, Action::PutOn { place, hand }, s)
+        let within_m = s.memory.rules.put_within_m;
+        self.approach(place, within_m, Action::PutOn { place, hand }, s)
     }
 
     fn follow(&mut self, relation: Relation, keep_m: f32, s: &mut Situation<'_>) -> Progress {

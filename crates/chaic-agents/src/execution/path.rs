@@ -1,5 +1,7 @@
 //! Ways through the map: A* to a goal, and the cost of getting anywhere.
 
+mod straight;
+
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -7,6 +9,8 @@ use chaic_protocol::Vec2;
 
 use crate::memory::costs::{CostMap, FREE, OCCUPIED};
 use crate::memory::grid::{CELL_M, Grid};
+pub use straight::StraightReach;
+use straight::Visit;
 
 /// Costs are multiplied by this for a straight step, so that a diagonal one is a whole number.
 const STRAIGHT: u32 = 10;
@@ -22,6 +26,7 @@ pub struct Search {
     epoch_of: Vec<u32>,
     epoch: u32,
     queue: BinaryHeap<Reverse<(u32, u32)>>,
+    visits: BinaryHeap<Visit>,
 }
 
 /// A way from cell to cell.
@@ -62,6 +67,7 @@ impl Search {
             epoch_of: vec![0; n_cells],
             epoch: 0,
             queue: BinaryHeap::new(),
+            visits: BinaryHeap::new(),
         }
     }
 
@@ -117,33 +123,6 @@ impl Search {
         None
     }
 
-    /// The cheapest way from `start` to `end` over straight neighbors only, whatever it costs.
-    pub fn straight_way(
-        &mut self,
-        grid: &Grid,
-        costs: &[u32],
-        start: usize,
-        end: usize,
-    ) -> Option<Path> {
-        let (end_i, end_j) = grid.column_row(end);
-        let still = |cell: usize| {
-            let (i, j) = grid.column_row(cell);
-            (i.abs_diff(end_i) + j.abs_diff(end_j)) as u32 * FREE
-        };
-        self.begin(start);
-        while let Some(Reverse((_, cell))) = self.queue.pop() {
-            let cell = cell as usize;
-            if cell == end {
-                return Some(Path { cells: self.trace(start, end), cost: self.best[end] });
-            }
-            for (next, _) in grid.neighbors(cell).filter(|(_, diagonal)| !diagonal) {
-                let total = self.best[cell].saturating_add(costs[next]);
-                self.improve(next, cell, total, still(next));
-            }
-        }
-        None
-    }
-
     fn trace(&self, start: usize, end: usize) -> Vec<usize> {
         let mut cells = vec![end];
         let mut cell = end;
@@ -194,44 +173,6 @@ impl Reach {
     /// The length of free floor that costs as much, metres.
     pub fn metres(cost: u32) -> f32 {
         cost as f32 / COST_PER_M
-    }
-}
-
-/// How far every cell is over straight neighbors, by the same costs as [`Search::straight_way`].
-#[derive(Clone, Debug)]
-pub struct StraightReach {
-    cost_and_steps: Vec<Option<(u32, u32)>>,
-}
-
-impl StraightReach {
-    /// Everything that costs at most `limit` to get to.
-    pub fn from(
-        grid: &Grid,
-        costs: &[u32],
-        start: usize,
-        limit: u32,
-        search: &mut Search,
-    ) -> StraightReach {
-        let mut cost_and_steps: Vec<Option<(u32, u32)>> = vec![None; grid.n_cells()];
-        search.begin(start);
-        while let Some(Reverse((cost, cell))) = search.queue.pop() {
-            let cell = cell as usize;
-            if cost > search.best[cell] || cost > limit || cost_and_steps[cell].is_some() {
-                continue;
-            }
-            let before = cost_and_steps[search.from[cell] as usize].map_or(0, |(_, steps)| steps);
-            cost_and_steps[cell] = Some((cost, before + u32::from(cell != start)));
-            for (next, _) in grid.neighbors(cell).filter(|(_, diagonal)| !diagonal) {
-                search.improve(next, cell, cost.saturating_add(costs[next]), 0);
-            }
-        }
-        StraightReach { cost_and_steps }
-    }
-
-    /// Twice the cells of the way and its cost, in costs of a free cell times [`FREE`]; `None` if
-    /// it is too far.
-    pub fn score(&self, cell: usize) -> Option<u32> {
-        self.cost_and_steps[cell].map(|(cost, steps)| cost + 2 * FREE * steps)
     }
 }
 

@@ -20,6 +20,9 @@ const OCCUPIED_AT_FIRST: u32 = 500_000 * FREE;
 pub const FIRST_FRAMES: Frame = 200;
 /// Added for a wall.
 const WALL_EXTRA: u32 = 500_000 * FREE;
+/// Added for what was ever seen to be as tall as only walls are: it stays a wall, whatever is seen
+/// of its floor later.
+const TRUE_WALL_EXTRA: u32 = 5_000_000 * FREE;
 /// Added around obstacles, for whoever heeds them.
 const OBSTACLE_EXTRA: u32 = 200_000 * FREE;
 /// From an obstacle's middle that is so many cells down and up along each axis.
@@ -54,18 +57,28 @@ pub struct Seen<'a> {
 #[derive(Clone, Debug, Default)]
 pub struct Belief {
     occupied: Vec<bool>,
+    wall: Vec<bool>,
     n_updates: u32,
 }
 
 impl Belief {
-    /// Takes in which cells are occupied by the latest account.
-    fn update(&mut self, now: Vec<bool>) {
+    /// Takes in which cells are occupied, and which of them are walls, by the latest account.
+    fn update(&mut self, now: Vec<bool>, is_wall: impl Fn(usize) -> bool) {
+        self.wall.resize(now.len(), false);
         if self.n_updates.is_multiple_of(BELIEVE_EVERY) {
             self.occupied = now;
         } else {
             self.occupied.iter_mut().zip(now).for_each(|(old, new)| *old |= new);
         }
+        // A wall is one as long as its cell counts as occupied.
+        for (cell, wall) in self.wall.iter_mut().enumerate() {
+            *wall = is_wall(cell) || (*wall && self.occupied[cell]);
+        }
         self.n_updates += 1;
+    }
+
+    fn is_wall(&self, cell: usize) -> bool {
+        self.wall.get(cell).copied().unwrap_or(false)
     }
 
     /// Whether a cell counts as occupied.
@@ -91,7 +104,7 @@ pub fn lattice_costs(grid: &Grid, seen: &Seen<'_>, belief: &mut Belief, cost: &m
             occupied[cell] = true;
         }
     }
-    belief.update(occupied);
+    belief.update(occupied, is_wall);
     cost.fill(FREE);
     for cell in (0..grid.n_cells()).filter(|c| belief.is_occupied(*c)) {
         for (reach, near) in [2, 1].into_iter().zip(NEAR) {
@@ -108,8 +121,11 @@ pub fn lattice_costs(grid: &Grid, seen: &Seen<'_>, belief: &mut Belief, cost: &m
         if !seen.map.is_known(cell) {
             *cost += UNKNOWN_EXTRA;
         }
-        if is_wall(cell) {
+        if belief.is_wall(cell) {
             *cost += WALL_EXTRA;
+        }
+        if seen.map.is_tall(cell) {
+            *cost += TRUE_WALL_EXTRA;
         }
     }
     if seen.heeds_obstacles {

@@ -17,6 +17,9 @@ const WALL_M: f32 = 2.0;
 /// Points above this may be a ceiling and say nothing, metres: the lowest that is usual in homes.
 /// (The original looks up to 4 m, in houses without ceilings; facts 1.4.)
 const TOP_M: f32 = 2.4;
+/// Points above this belong to walls for good: nothing that can be moved is as tall, metres. (The
+/// original: 2.9 m, in houses without ceilings whose walls are 3 m high.)
+const TALL_M: f32 = 2.2;
 /// How sure one is of an occupied cell after one look, and at most.
 const SURE_ONCE: u8 = 3;
 const SURE_MOST: u8 = 6;
@@ -47,11 +50,14 @@ const SEEN_HIGH: u8 = 2;
 const ASSUMED: u8 = 4;
 /// Something of it was seen from near enough to count as known.
 const SEEN_NEAR: u8 = 8;
+/// A wall for good.
+const SEEN_TALL: u8 = 16;
 /// Bits of what one image shows of a cell.
 const NOW_FLOOR: u8 = 1;
 const NOW_OCCUPIED: u8 = 2;
 const NOW_HIGH: u8 = 4;
 const NOW_NEAR: u8 = 8;
+const NOW_TALL: u8 = 16;
 
 /// Where somebody could not get on although the map said so.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -144,6 +150,11 @@ impl OccupancyMap {
         self.seen[cell] & SEEN_NEAR != 0
     }
 
+    /// Whether something as tall as only walls are was ever seen in a cell.
+    pub fn is_tall(&self, cell: usize) -> bool {
+        self.seen[cell] & SEEN_TALL != 0
+    }
+
     /// Frame in which the metre square around a cell was seen last, if ever.
     pub fn place_seen(&self, cell: usize) -> Option<Frame> {
         self.place_seen[self.place_of(cell)].checked_sub(1)
@@ -225,16 +236,21 @@ impl OccupancyMap {
                     NOW_FLOOR
                 } else if p.y > STEP_M && p.y <= head_m.min(WALL_M) {
                     NOW_OCCUPIED
+                } else if p.y > TALL_M && p.y < TOP_M {
+                    NOW_HIGH | NOW_TALL
                 } else if p.y > WALL_M && p.y < TOP_M {
                     NOW_HIGH
+                } else if p.y < TOP_M {
+                    0
                 } else {
                     continue;
                 };
                 let Some(cell) = self.grid.cell_at(xz(p)) else { continue };
-                if self.now[cell] == 0 {
+                let bits = bit | if d < known_m { NOW_NEAR } else { 0 };
+                if self.now[cell] == 0 && bits != 0 {
                     self.touched.push(cell as u32);
                 }
-                self.now[cell] |= bit | if d < known_m { NOW_NEAR } else { 0 };
+                self.now[cell] |= bits;
             }
         }
     }
@@ -257,6 +273,9 @@ impl OccupancyMap {
             }
             if bits & NOW_HIGH != 0 {
                 self.seen[cell] |= SEEN_HIGH;
+            }
+            if bits & NOW_TALL != 0 {
+                self.seen[cell] |= SEEN_TALL;
             }
             if bits & (NOW_FLOOR | NOW_OCCUPIED) != 0 {
                 let place = self.place_of(cell);

@@ -279,3 +279,42 @@ fn wall_mesh(wall: &Wall) -> Mesh {
     cuboid(&mut mesh, &place);
     mesh.finish()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chaic_protocol::briefing::Goal;
+    use chaic_protocol::{Frame, TaskId};
+    use chaic_world::Room;
+
+    #[test]
+    fn there_is_a_ceiling_over_every_room_and_doorway() {
+        let room = |rect| Room { kind: RoomKind::Office, rect };
+        let setup = Setup {
+            task: TaskId::NoConstraint,
+            seed: 0,
+            horizon: Frame::default(),
+            bounds: Rect::new([0.0, 0.0], [5.0, 4.0]),
+            ceiling_m: Some(3.0),
+            // A wall of 0.5 m with a doorway lies between them, an alcove beside the second.
+            rooms: vec![
+                room(Rect::new([0.0, 0.0], [2.0, 4.0])),
+                room(Rect::new([2.5, 0.0], [5.0, 2.0])),
+            ],
+            walls: Vec::new(),
+            openings: Vec::new(),
+            floors: Vec::new(),
+            things: Vec::new(),
+            people: Vec::new(),
+            goal: Goal { targets: Vec::new() },
+            goal_places: Vec::new(),
+        };
+        let pieces = ceiling_pieces(&setup);
+        for i in 0..50 {
+            for k in 0..40 {
+                let p = 0.1 * Vec2::new(i as f32 + 0.5, k as f32 + 0.5);
+                assert!(pieces.iter().any(|r| r.contains(p)), "none above {p}");
+            }
+        }
+    }
+}

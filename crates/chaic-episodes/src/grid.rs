@@ -1,17 +1,18 @@
-//! Where a body of some radius can stand, on a grid of 0.1 m.
+//! Where a body of some radius can stand, on a grid.
 
 use chaic_protocol::Vec2;
 use chaic_protocol::geom::Rect;
 
 use crate::solid::{Solid, rect_distance};
 
-/// Side of a cell, metres.
+/// Usual side of a cell, metres.
 pub(crate) const CELL_M: f32 = 0.1;
 
 /// Cells in plan, one bit of truth each.
 #[derive(Clone, Debug)]
 pub(crate) struct Grid {
     min: Vec2,
+    cell_m: f32,
     pub(crate) nx: usize,
     pub(crate) nz: usize,
     /// Whether a body's middle may be at the cell's middle.
@@ -21,9 +22,14 @@ pub(crate) struct Grid {
 impl Grid {
     /// All cells of a rectangle, free.
     pub(crate) fn new(rect: Rect) -> Grid {
-        let size = rect.size() / CELL_M;
+        Grid::with_cells(rect, CELL_M)
+    }
+
+    /// The same with cells of another size.
+    fn with_cells(rect: Rect, cell_m: f32) -> Grid {
+        let size = rect.size() / cell_m;
         let (nx, nz) = (size.x.ceil().max(1.0) as usize, size.y.ceil().max(1.0) as usize);
-        Grid { min: rect.min, nx, nz, free: vec![true; nx * nz] }
+        Grid { min: rect.min, cell_m, nx, nz, free: vec![true; nx * nz] }
     }
 
     /// Where a body of `radius_m` can stand within `rect` among solids.
@@ -32,7 +38,25 @@ impl Grid {
         radius_m: f32,
         solids: impl IntoIterator<Item = &'a Solid>,
     ) -> Grid {
-        let mut grid = Grid::new(rect);
+        Grid::among(Grid::new(rect), rect, radius_m, solids)
+    }
+
+    /// The same with cells of another size.
+    pub(crate) fn fine<'a>(
+        rect: Rect,
+        cell_m: f32,
+        radius_m: f32,
+        solids: impl IntoIterator<Item = &'a Solid>,
+    ) -> Grid {
+        Grid::among(Grid::with_cells(rect, cell_m), rect, radius_m, solids)
+    }
+
+    fn among<'a>(
+        mut grid: Grid,
+        rect: Rect,
+        radius_m: f32,
+        solids: impl IntoIterator<Item = &'a Solid>,
+    ) -> Grid {
         for i in 0..grid.free.len() {
             let p = grid.middle(i);
             grid.free[i] = rect.grown(-radius_m).contains(p);
@@ -59,12 +83,12 @@ impl Grid {
     /// The middle of a cell.
     pub(crate) fn middle(&self, i: usize) -> Vec2 {
         let (x, z) = (i % self.nx, i / self.nx);
-        self.min + CELL_M * Vec2::new(x as f32 + 0.5, z as f32 + 0.5)
+        self.min + self.cell_m * Vec2::new(x as f32 + 0.5, z as f32 + 0.5)
     }
 
     /// The cell that holds a point.
     pub(crate) fn cell(&self, p: Vec2) -> Option<usize> {
-        let d = (p - self.min) / CELL_M;
+        let d = (p - self.min) / self.cell_m;
         if d.x < 0.0 || d.y < 0.0 {
             return None;
         }
@@ -75,7 +99,8 @@ impl Grid {
     /// The cells whose middles may lie in a rectangle.
     pub(crate) fn cells_in(&self, rect: Rect) -> impl Iterator<Item = usize> + use<> {
         let clamp = |v: f32, n: usize| v.clamp(0.0, n as f32) as usize;
-        let (low, high) = ((rect.min - self.min) / CELL_M, (rect.max - self.min) / CELL_M);
+        let (low, high) =
+            ((rect.min - self.min) / self.cell_m, (rect.max - self.min) / self.cell_m);
         let xs = clamp(low.x.floor(), self.nx)..clamp(high.x.ceil(), self.nx);
         let zs = clamp(low.y.floor(), self.nz)..clamp(high.y.ceil(), self.nz);
         let nx = self.nx;
@@ -86,7 +111,7 @@ impl Grid {
     /// there may touch a wall by less than half a cell).
     pub(crate) fn flood(&self, start: Vec2) -> Vec<bool> {
         let mut seen = vec![false; self.free.len()];
-        let near = Rect { min: start, max: start }.grown(CELL_M);
+        let near = Rect { min: start, max: start }.grown(self.cell_m);
         let mut open: Vec<usize> = self.cells_in(near).filter(|i| self.free[*i]).collect();
         open.iter().for_each(|i| seen[*i] = true);
         while let Some(i) = open.pop() {

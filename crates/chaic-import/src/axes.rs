@@ -9,14 +9,37 @@
 
 use chaic_protocol::geom::{Rect, math, wrap_angle};
 use chaic_protocol::{Vec2, Vec3};
-use serde::Deserialize;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
 
 /// A point, direction, size or triple of angles as the original writes it.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
 pub(crate) struct Triple {
+    #[serde(deserialize_with = "sane")]
     pub x: f32,
+    #[serde(deserialize_with = "sane")]
     pub y: f32,
+    #[serde(deserialize_with = "sane")]
     pub z: f32,
+}
+
+/// Larger numbers of metres, degrees or factors are mistakes.
+const MAX_NUMBER: f64 = 1e4;
+
+/// A number that can be a length, an angle or a factor.
+pub(crate) fn sane<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f32, D::Error> {
+    let x = f64::deserialize(deserializer)?;
+    if x.abs() <= MAX_NUMBER {
+        return Ok(x as f32);
+    }
+    Err(D::Error::custom(format!("{x} is too large, expected at most {MAX_NUMBER}")))
+}
+
+/// A list of such numbers.
+pub(crate) fn sane_list<'de, D: Deserializer<'de>>(d: D) -> Result<Vec<f32>, D::Error> {
+    #[derive(Deserialize)]
+    struct Number(#[serde(deserialize_with = "sane")] f32);
+    Ok(Vec::<Number>::deserialize(d)?.into_iter().map(|n| n.0).collect())
 }
 
 impl From<Triple> for Vec3 {

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 
 use chaic_protocol::TaskId;
 use chaic_protocol::task::TASKS;
+use chaic_world::Setup;
 use serde::Deserialize;
 
-use crate::axes::Triple;
+use crate::axes::{self, Triple};
 use crate::{ImportError, files};
 
 /// One half of the data set.
@@ -59,7 +60,7 @@ pub(crate) struct Task {
 
 /// Categories of goal places: a list indoors, a single one outdoors.
 #[derive(Clone, Debug, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected a name or a list of names")]
 pub(crate) enum Names {
     Many(Vec<String>),
     One(String),
@@ -111,14 +112,17 @@ pub(crate) struct Metadata {
     #[serde(default)]
     pub object_room_list: Vec<(String, String)>,
     /// Height of the bottoms of objects at rest, metres, containers apart; indoors only.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "axes::sane_list")]
     pub object_height: Vec<f32>,
-    #[serde(default)]
+    #[serde(default, deserialize_with = "axes::sane_list")]
     pub container_height: Vec<f32>,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(untagged)]
+#[serde(
+    untagged,
+    expecting = "expected a place, {x, y, z} or [x, y, z], of numbers up to 10000 metres"
+)]
 pub(crate) enum Start {
     Named(Triple),
     Listed([f32; 3]),
@@ -128,6 +132,7 @@ impl Start {
     pub fn position(self) -> glam::Vec3 {
         match self {
             Start::Named(t) => t.into(),
+            // Setups refuse what is too far away.
             Start::Listed(p) => p.into(),
         }
     }
@@ -243,6 +248,15 @@ fn objects(commands: Vec<Command>, path: &Path) -> Result<Vec<Object>, ImportErr
             Command::AddObject { id, name, position, rotation } => {
                 let euler_deg = rotation.unwrap_or(Triple { x: 0.0, y: 0.0, z: 0.0 });
                 let scale = Triple { x: 1.0, y: 1.0, z: 1.0 };
+                let field = format!("[{i}].id");
+                if objects.iter().any(|o| o.id == id) {
+                    let problem = format!("is {id}, which another object has already");
+                    return Err(ImportError::field(path, field, problem));
+                }
+                if objects.len() == Setup::MAX_THINGS {
+                    let problem = format!("adds more than {} objects", Setup::MAX_THINGS);
+                    return Err(ImportError::field(path, field, problem));
+                }
                 objects.push(Object { id, model: name, position, euler_deg, scale });
             }
             Command::RotateObjectToEulerAngles { id, euler_angles } => {

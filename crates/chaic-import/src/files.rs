@@ -14,7 +14,9 @@ const MAX_BYTES: u64 = 64 << 20;
 /// The value in a file of JSON, as Python writes it: numbers that aren't are read as `null`.
 pub(crate) fn read<T: DeserializeOwned>(path: &Path) -> Result<T, ImportError> {
     let text = text(path)?.replace(": NaN", ": null").replace(": Infinity", ": null");
-    let mut json = serde_json::Deserializer::from_str(&text);
+    // Some editors put a mark before the text.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
+    let mut json = serde_json::Deserializer::from_str(text);
     let value = serde_path_to_error::deserialize(&mut json).map_err(|e| {
         let field = e.path().to_string();
         ImportError::field(path, field, e.into_inner().to_string())

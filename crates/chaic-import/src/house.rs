@@ -16,6 +16,8 @@ use crate::{ImportError, axes, common};
 /// Loose pieces stored this far above the floor drop onto it when the scene starts, metres
 /// (the layouts' note on such pieces; everything higher stands on something).
 const DROPS_M: [f32; 2] = [0.0, 0.15];
+/// Loose pieces that are stored at most this far above what is under them lie on it, metres.
+const SINKS_M: f32 = 0.3;
 /// Pieces farther than this outside the house are strays, metres.
 const STRAY_M: f32 = 1.0;
 /// Loose furniture that leans less than this stands upright once settled, degrees.
@@ -51,6 +53,7 @@ pub(crate) fn setup(
         Names::Many(names) => names.clone(),
         Names::One(name) => vec![name.clone()],
     };
+    let mut loose = Vec::new();
     for (i, piece) in package.layout(number, layout)?.iter().enumerate() {
         let problem = |p: String| {
             ImportError::field(package.layouts_path(), format!("{number}.{layout}[{i}].name"), p)
@@ -63,12 +66,15 @@ pub(crate) fn setup(
         if goal_categories.iter().any(|c| c == category) && is_goal(source, piece, &furniture) {
             setup.goal_places.push(Setup::entity(setup.things.len()));
         }
+        if is_loose(piece) && furniture.position.y > DROPS_M[1] {
+            loose.push(setup.things.len());
+        }
         setup.things.push(furniture);
     }
     setup.goal = common::goal(source)?;
     // Everybody looks along Unity's +z at the start.
     setup.people = common::people(source, &setup, [0.0; 3])?;
-    drop_loose(&mut setup);
+    drop_loose(&mut setup, &loose);
     lay_out(&mut setup, source, names, package)?;
     Ok(setup)
 }
@@ -158,7 +164,7 @@ fn room_kind(name: &str) -> RoomKind {
 /// A piece of the layout as it stands once the scene has begun; nobody moves it, unless it is of a
 /// class that may be a target.
 fn furnish(piece: &Piece, package: &Package) -> Result<Thing, String> {
-    let is_loose = piece.gravity && !piece.kinematic;
+    let is_loose = is_loose(piece);
     let mut euler_deg: Vec3 = piece.rotation.into();
     let tilt_deg = |deg: f32| ((deg + 180.0).rem_euclid(360.0) - 180.0).abs();
     if is_loose && tilt_deg(euler_deg.x).max(tilt_deg(euler_deg.z)) < UPRIGHT_DEG {
@@ -179,6 +185,11 @@ fn furnish(piece: &Piece, package: &Package) -> Result<Thing, String> {
     Ok(furniture)
 }
 
+/// Whether a piece falls when the scene starts.
+fn is_loose(piece: &Piece) -> bool {
+    piece.gravity && !piece.kinematic
+}
+
 /// Whether a piece of the right category is a goal place. Of cabinets and refrigerators only high
 /// ones are, and no doors (facts 11.2).
 fn is_goal(source: &Source, piece: &Piece, furniture: &Thing) -> bool {
@@ -187,11 +198,14 @@ fn is_goal(source: &Source, piece: &Piece, furniture: &Thing) -> bool {
     source.task != TaskId::HighGoal || is_high
 }
 
-/// Lets what may be a target and stands on the furniture sink onto it.
-fn drop_loose(setup: &mut Setup) {
+/// Lets what may be a target and stands on the furniture sink onto it, and what else is `loose` and
+/// has not far to go.
+fn drop_loose(setup: &mut Setup, loose: &[usize]) {
     let around = Surroundings::of(setup);
-    for thing in setup.things.iter_mut().filter(|t| !t.fixed) {
-        if let Some(height_m) = around.height_under(thing) {
+    for (k, thing) in setup.things.iter_mut().enumerate() {
+        let Some(height_m) = around.height_under(thing) else { continue };
+        let sinks = loose.contains(&k) && thing.position.y - height_m <= SINKS_M;
+        if !thing.fixed || sinks {
             thing.position.y = height_m;
         }
     }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use chaic_protocol::Vec3;
+use chaic_world::Setup;
 use serde::Deserialize;
 
 use crate::axes::Triple;
@@ -79,12 +80,16 @@ impl Package {
 
     /// The furniture of a house.
     pub fn layout(&self, floorplan: &str, layout: &str) -> Result<&[Piece], ImportError> {
-        let found = self.layouts.get(floorplan).and_then(|l| l.get(layout));
-        found.map(Vec::as_slice).ok_or_else(|| {
-            let problem =
-                format!("is missing: there is no layout {layout} of floor plan {floorplan}");
+        let field = |problem| {
             ImportError::field(&self.layouts_path, format!("{floorplan}.{layout}"), problem)
-        })
+        };
+        let found = self.layouts.get(floorplan).and_then(|l| l.get(layout)).ok_or_else(|| {
+            field(format!("is missing: there is no layout {layout} of floor plan {floorplan}"))
+        })?;
+        if found.len() > Setup::MAX_THINGS {
+            return Err(field(format!("has more than {} pieces", Setup::MAX_THINGS)));
+        }
+        Ok(found)
     }
 
     /// The file that says where furniture stands.

@@ -30,11 +30,9 @@ pub(crate) fn thing(posed: &Posed, package: &Package) -> Result<Thing, String> {
     let name = posed.model;
     let model = MODELS.get(name).ok_or_else(|| format!("is {name:?}, a model without a class"))?;
     let record = package.record(name);
-    let [low, high] = match (model.bounds, record) {
-        (Some(corners), _) => corners.map(Vec3::from),
-        (None, Some(record)) => record.bounds,
-        (None, None) => return Err(format!("is {name:?}, which has no record in the package")),
-    };
+    let record =
+        record.ok_or_else(|| format!("is {name:?}, which has no record in the package"))?;
+    let [low, high] = model.bounds.map_or(record.bounds, |corners| corners.map(Vec3::from));
     let [low, high] = leaned([low * posed.scale, high * posed.scale], posed.euler_deg);
     let (middle, size) = (0.5 * (low + high), high - low);
     let foot = Vec3::new(middle.x, low.y, middle.z);

@@ -120,7 +120,9 @@ impl Surroundings {
     /// Height of the surface under a thing that has just been put over it, metres.
     pub fn height_under(&self, thing: &Thing) -> Option<f32> {
         let p = xz(thing.position);
-        let under = self.surfaces.iter().filter(|s| bears(s, p)).map(|s| s.center.y);
+        let own: Vec<Surface> = tops(thing).collect();
+        let others = self.surfaces.iter().filter(|s| !own.contains(s));
+        let under = others.filter(|s| bears(s, p)).map(|s| s.center.y);
         under.filter(|y| *y <= thing.position.y + SAME_M).max_by(f32::total_cmp)
     }
 

@@ -291,6 +291,59 @@ fn malformed_files_are_refused_with_the_field() {
 }
 
 #[test]
+fn numbers_that_are_none_or_too_large_are_refused_with_the_field() {
+    let far = |v: &mut Value| v[1]["position"]["x"] = json!(1e30);
+    refused(|s| s.edit(COMMANDS, far), &["1a_0_0.json", "[1]", "too large"]);
+    let high = |v: &mut Value| v["object_height"][0] = json!(1e39);
+    refused(|s| s.edit(METADATA, high), &["metadata.json", "object_height[0]", "too large"]);
+    let start = |v: &mut Value| v["agent"]["0"]["z"] = json!(1e39);
+    refused(|s| s.edit(METADATA, start), &["metadata.json", "agent.0", "expected a place"]);
+    let many = |v: &mut Value| v[0]["task"]["goal_task"][0][1] = json!(-1);
+    refused(|s| s.edit(LIST, many), &["test_env.json", "[0].task.goal_task[0][1]", "invalid"]);
+    // Python writes NaN, which isn't JSON.
+    refused(
+        |s| {
+            let text = fs::read_to_string(s.path().join(LAYOUTS)).unwrap();
+            s.write(LAYOUTS, &text.replacen("\"x\":-5.0", "\"x\": NaN", 1));
+        },
+        &["floorplan_layouts.json", "1.0[0].position.x", "null"],
+    );
+}
+
+#[test]
+fn objects_have_ids_of_their_own() {
+    let twice = |v: &mut Value| v[3]["id"] = json!(1);
+    refused(|s| s.edit(COMMANDS, twice), &["1a_0_0.json", "[3].id", "another object"]);
+}
+
+#[test]
+fn a_file_for_a_folder_and_a_folder_for_a_file_are_named() {
+    let swap = |s: &Sample, path: &str| {
+        let path = s.path().join(path);
+        let is_dir = path.is_dir();
+        if is_dir {
+            fs::remove_dir_all(&path).unwrap()
+        } else {
+            fs::remove_file(&path).unwrap()
+        }
+        if is_dir { fs::write(&path, "").unwrap() } else { fs::create_dir(&path).unwrap() }
+    };
+    refused(|s| swap(s, "train_dataset"), &["holds no half"]);
+    refused(|s| swap(s, "train_dataset/normal"), &["normal", "expected a folder"]);
+    refused(|s| swap(s, "tdw"), &["no tdw package"]);
+    refused(|s| swap(s, COMMANDS), &["1a_0_0.json", "can't be read"]);
+    refused(|s| swap(s, RECORDS), &["models_core.json", "can't be read"]);
+}
+
+#[test]
+fn a_mark_before_the_text_does_no_harm() {
+    let sample = Sample::new();
+    let text = fs::read_to_string(sample.path().join(LIST)).expect("the sample has it");
+    sample.write(LIST, &format!("\u{feff}{text}"));
+    assert_eq!(sample.episode().seed(), 2824);
+}
+
+#[test]
 fn paths_that_point_outside_are_refused() {
     for word in ["../../etc/passwd", "/etc/passwd", "", "a\u{0}b"] {
         let change = |v: &mut Value| v[0]["scene"] = json!(word);

@@ -38,12 +38,7 @@ impl Scene {
             structure.push((EntityId::WALL, wall_mesh(wall)));
         }
         if let Some(height) = setup.ceiling_m {
-            let rooms = setup.rooms.iter().filter(|r| r.kind != RoomKind::Outdoors);
-            let mut rects: Vec<Rect> = rooms.map(|r| r.rect.grown(0.15)).collect();
-            if rects.is_empty() {
-                rects.push(setup.bounds);
-            }
-            for rect in rects {
+            for rect in ceiling_pieces(setup) {
                 structure.push((EntityId::CEILING, ceiling_mesh(&rect, height)));
             }
         }
@@ -161,10 +156,11 @@ fn cast_foot(light: &mut Light, class: &ClassMesh, rotation: &Mat3, position: Ve
     });
 }
 
+/// More pieces of floor or ceiling than any street or house needs; bounds the work on odd input.
+const MAX_PIECES: usize = 4096;
+
 /// The floors without overlaps: where two overlap, the later one lies on top.
 fn floor_pieces(setup: &Setup) -> Vec<(Rect, FloorMaterial, [u8; 3])> {
-    /// More pieces than any street needs; bounds the work on odd input.
-    const MAX_PIECES: usize = 4096;
     let mut pieces: Vec<(Rect, FloorMaterial, [u8; 3])> = Vec::new();
     for floor in setup.floors.iter().take(MAX_PIECES) {
         let mut left = Vec::new();
@@ -175,6 +171,29 @@ fn floor_pieces(setup: &Setup) -> Vec<(Rect, FloorMaterial, [u8; 3])> {
         left.truncate(MAX_PIECES);
         pieces = left;
     }
+    pieces
+}
+
+/// The ceilings of rooms, and what is left between them and the outermost walls: doorways and
+/// alcoves belong to no room.
+fn ceiling_pieces(setup: &Setup) -> Vec<Rect> {
+    /// Rooms end at the faces of walls; their ceilings go on into these, metres.
+    const INTO_WALL_M: f32 = 0.15;
+    let rooms = setup.rooms.iter().filter(|r| r.kind != RoomKind::Outdoors);
+    let mut pieces: Vec<Rect> = rooms.map(|r| r.rect.grown(INTO_WALL_M)).collect();
+    let ends = setup.walls.iter().flat_map(|w| [w.a, w.b]);
+    let house = ends.fold(setup.bounds, |r, p| Rect { min: r.min.min(p), max: r.max.max(p) });
+    let mut between = vec![house];
+    for room in &pieces {
+        let mut left = Vec::new();
+        for rect in between {
+            without(&rect, room, |piece| left.push(piece));
+        }
+        left.truncate(MAX_PIECES);
+        between = left;
+    }
+    // They overlap the ceilings of rooms by a millimetre, so that no pixel falls between them.
+    pieces.extend(between.iter().map(|r| r.grown(0.001)));
     pieces
 }
 
@@ -259,4 +278,43 @@ fn wall_mesh(wall: &Wall) -> Mesh {
     mesh.skin(skin);
     cuboid(&mut mesh, &place);
     mesh.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chaic_protocol::briefing::Goal;
+    use chaic_protocol::{Frame, TaskId};
+    use chaic_world::Room;
+
+    #[test]
+    fn there_is_a_ceiling_over_every_room_and_doorway() {
+        let room = |rect| Room { kind: RoomKind::Office, rect };
+        let setup = Setup {
+            task: TaskId::NoConstraint,
+            seed: 0,
+            horizon: Frame::default(),
+            bounds: Rect::new([0.0, 0.0], [5.0, 4.0]),
+            ceiling_m: Some(3.0),
+            // A wall of 0.5 m with a doorway lies between them, an alcove beside the second.
+            rooms: vec![
+                room(Rect::new([0.0, 0.0], [2.0, 4.0])),
+                room(Rect::new([2.5, 0.0], [5.0, 2.0])),
+            ],
+            walls: Vec::new(),
+            openings: Vec::new(),
+            floors: Vec::new(),
+            things: Vec::new(),
+            people: Vec::new(),
+            goal: Goal { targets: Vec::new() },
+            goal_places: Vec::new(),
+        };
+        let pieces = ceiling_pieces(&setup);
+        for i in 0..50 {
+            for k in 0..40 {
+                let p = 0.1 * Vec2::new(i as f32 + 0.5, k as f32 + 0.5);
+                assert!(pieces.iter().any(|r| r.contains(p)), "none above {p}");
+            }
+        }
+    }
 }

@@ -8,6 +8,8 @@ use std::fmt;
 
 use chaic_world::Setup;
 
+pub use reach::{Walker, out_of_reach};
+
 /// Deepest overlap that counts as touching, metres: files are written to the millimetre, and
 /// shapes are boxes around round things.
 const TOLERANCE_M: f32 = 0.02;

@@ -5,8 +5,34 @@ use chaic_protocol::{AgentId, Role, Vec2};
 use chaic_world::{Person, Rules, Setup};
 
 use super::{Demand, Problem, thing_field};
-use crate::grid::Grid;
+use crate::grid::{CELL_M, Grid};
 use crate::solid::Solid;
+
+/// How [`out_of_reach`] looks for ways.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Walker {
+    /// Radius of the body, metres.
+    pub radius_m: f32,
+    /// How far it reaches beside itself, metres in plan, if no wall is between.
+    pub reach_m: f32,
+    /// Side of the cells over which it walks, metres; more than 0.
+    pub cell_m: f32,
+}
+
+/// The things (by their places in [`Setup::things`]) that the task needs and that an agent finds no
+/// way to, once everything that one hand can take out of the way is gone; all of them if it can't
+/// move. Targets, containers, goal places and obstacles are needed.
+pub fn out_of_reach(setup: &Setup, agent: AgentId, walker: Walker) -> Vec<usize> {
+    let Some(person) = setup.people.get(agent.index()) else { return Vec::new() };
+    let walls = Solid::of_walls(setup);
+    let see_through: Vec<Solid> = walls.iter().filter(|w| w.low_m < 1.0).copied().collect();
+    let (grid, seen) = ground(setup, person, &walls, walker);
+    let mut missed = needed_things(setup);
+    missed.retain(|k| {
+        !gets_at(&grid, &seen, walker.reach_m, &Solid::of_thing(&setup.things[*k]), &see_through)
+    });
+    missed
+}
 
 pub(super) fn problems(setup: &Setup, demand: Demand) -> Vec<Problem> {
     let walls = Solid::of_walls(setup);
@@ -19,7 +45,9 @@ pub(super) fn problems(setup: &Setup, demand: Demand) -> Vec<Problem> {
     };
     for agent in agents.iter().copied() {
         let person = &setup.people[agent.index()];
-        let (grid, seen) = ground(setup, person, &walls);
+        let reach_m = Rules::paper().arm_reach_m;
+        let walker = Walker { radius_m: person.capability().radius_m, reach_m, cell_m: CELL_M };
+        let (grid, seen) = ground(setup, person, &walls, walker);
         if !seen.contains(&true) {
             let field = format!("people[{}].pose.position", agent.index());
             found.push(Problem::new(field, format!("leaves the {agent} no room to move")));
@@ -31,14 +59,13 @@ pub(super) fn problems(setup: &Setup, demand: Demand) -> Vec<Problem> {
         let mut missed = Vec::new();
         for k in &needed {
             let thing = Solid::of_thing(&setup.things[*k]);
-            if gets_at(&grid, &seen, &thing, &see_through) {
+            if gets_at(&grid, &seen, reach_m, &thing, &see_through) {
                 let is_goal = setup.goal_places.contains(&Setup::entity(*k));
                 let is_target = setup.goal.wanted(setup.things[*k].class) > 0;
                 got_at = [got_at[0] || is_target, got_at[1] || is_goal];
             } else {
                 let problem = format!(
-                    "is out of reach: the {agent} finds no way to within {} m of it",
-                    Rules::paper().arm_reach_m
+                    "is out of reach: the {agent} finds no way to within {reach_m} m of it"
                 );
                 missed.push(Problem::new(thing_field(setup, *k, "position"), problem));
             }
@@ -64,7 +91,7 @@ fn needed_things(setup: &Setup) -> Vec<usize> {
 }
 
 /// Where a person gets to once everything that one hand can take out of the way is gone.
-fn ground(setup: &Setup, person: &Person, walls: &[Solid]) -> (Grid, Vec<bool>) {
+fn ground(setup: &Setup, person: &Person, walls: &[Solid], walker: Walker) -> (Grid, Vec<bool>) {
     let body = person.capability();
     let stands = [Rules::paper().step_over_m, body.height_m];
     let stays = setup.things.iter().filter(|t| {
@@ -74,17 +101,16 @@ fn ground(setup: &Setup, person: &Person, walls: &[Solid]) -> (Grid, Vec<bool>) 
     let stays = stays.filter(|t| t.class.info().role != Role::Vehicle).flat_map(Solid::of_thing);
     let solids: Vec<Solid> =
         stays.chain(walls.iter().copied()).filter(|s| s.spans(stands)).collect();
-    let grid = Grid::around(setup.bounds, body.radius_m, &solids);
+    let grid = Grid::fine(setup.bounds, walker.cell_m, walker.radius_m, &solids);
     let seen = grid.flood(xz(person.pose.position));
     (grid, seen)
 }
 
-fn gets_at(grid: &Grid, seen: &[bool], thing: &[Solid], walls: &[Solid]) -> bool {
-    let arm_m = Rules::paper().arm_reach_m;
+fn gets_at(grid: &Grid, seen: &[bool], reach_m: f32, thing: &[Solid], walls: &[Solid]) -> bool {
     thing.iter().any(|part| {
-        grid.cells_in(part.bounds().grown(arm_m)).filter(|i| seen[*i]).any(|i| {
+        grid.cells_in(part.bounds().grown(reach_m)).filter(|i| seen[*i]).any(|i| {
             let from = grid.middle(i);
-            part.distance(from) <= arm_m && sees(from, part.nearest(from), walls)
+            part.distance(from) <= reach_m && sees(from, part.nearest(from), walls)
         })
     })
 }

@@ -215,19 +215,20 @@ impl RuleSection<'_> {
         Grid { title: title.to_owned(), header, rows }.to_markdown() + "\n"
     }
 
-    /// EI, IA, CR and ER beside the paper's.
+    /// EI, IA, CR, ER and the standard error of TR beside the paper's.
     fn others(&self) -> String {
         type Pick = (&'static str, fn(&Score) -> Option<f64>, fn(&Figures) -> Option<f64>);
-        const METRICS: [Pick; 4] = [
+        const METRICS: [Pick; 5] = [
             ("EI", |s| s.ei, |f| f.ei),
             ("IA", |s| s.ia, |f| f.ia),
             ("CR", |s| s.cr, |f| f.cr),
             ("ER", |s| s.er, |f| f.er),
+            ("SE", |s| s.tr_se, |f| f.tr_se),
         ];
         let scores = Scores::of(self.results, &formulas(self.rules));
         let mut rows = Vec::new();
         for (metric, ours, papers) in METRICS {
-            for helper in self.helpers.iter().filter(|h| *h != NONE) {
+            for helper in self.helpers {
                 let cell = |task: &TaskId| {
                     let ours = scores.get(*task, helper).and_then(ours);
                     let papers = published(helper).and_then(|row| papers(&row.figures(*task)));
@@ -237,7 +238,8 @@ impl RuleSection<'_> {
                     }
                 };
                 let cells: Vec<String> = self.tasks.iter().map(cell).collect();
-                // The emergency rate is shopping's alone.
+                // Without helper only the standard error is defined; the emergency rate is
+                // shopping's alone.
                 if cells.iter().any(|c| c != "/") {
                     let name = format!("{metric}, {}", title(helper));
                     rows.push(std::iter::once(name).chain(cells).collect());
@@ -245,7 +247,7 @@ impl RuleSection<'_> {
             }
         }
         let title = "Efficiency improvement (EI), goal inference accuracy (IA), completion ratio (CR), \
-                     emergency rate (ER): chaic's, the paper's in brackets";
+                     emergency rate (ER), standard error of TR (SE): chaic's, the paper's in brackets";
         Grid { title: title.to_owned(), header: self.header("Metric"), rows }.to_markdown() + "\n"
     }
 }

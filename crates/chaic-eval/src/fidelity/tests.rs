@@ -152,6 +152,7 @@ fn the_document_has_the_worked_numbers() {
         "Of 3 pairs 2 are kept",
         "| **Oracle - w/o**, chaic | 0.40 | 0.40 |\n| Oracle - w/o, paper | 0.31 | 0.31 |\n",
         "| EI, RHP | 0.00 (0.23) |\n",
+        "| SE, w/o | 0.10 (0.03) |\n",
         "](images/fidelity-compat.svg)",
         "| `world.blocking` | creeps to stops | **0.20** | **0.20** |\n",
         "| Low target | `world.blocking` +0.20 |\n",

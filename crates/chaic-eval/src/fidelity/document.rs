@@ -9,7 +9,8 @@ use chaic_protocol::TaskId;
 
 use crate::CHAIC_VERSION;
 use crate::error::{EvalError, Result};
-use crate::fidelity::plan::{PartState, Plan};
+use crate::fidelity::matrix::PartState;
+use crate::fidelity::plan::Plan;
 use crate::fidelity::sections::{RuleSection, formulas};
 use crate::fidelity::switches;
 use crate::figure::{Bar, Bars, HelperBars, transport_rate};

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use chaic_protocol::TaskId;
 
 use crate::error::Result;
-use crate::fidelity::plan::PartState;
+use crate::fidelity::matrix::PartState;
 use crate::metrics::{Interval, RunKey, RunResult, differences};
 use crate::report::{Grid, interval, title};
 use crate::rules::rule_values;

@@ -123,6 +123,16 @@ pub enum EvalError {
         /// What there is instead.
         known: String,
     },
+    /// A run was told to keep no traces.
+    #[error(
+        "{path} was played with --no-traces, so there is nothing to verify, replay or score anew; \
+         play it again without that option",
+        path = path.display()
+    )]
+    NoTraces {
+        /// The run's folder.
+        path: PathBuf,
+    },
     /// There is no such episode.
     #[error(transparent)]
     Split(#[from] SplitError),

@@ -72,6 +72,8 @@ pub struct Bar {
     pub mean: f64,
     /// Half the length of the whisker.
     pub se: f64,
+    /// Where a dot stands for somebody else's mean, 0 to 1.
+    pub dot: Option<f64>,
 }
 
 /// The bars of one helper.
@@ -90,6 +92,8 @@ pub struct Bars {
     pub tasks: Vec<String>,
     /// The helpers, from left to right within each task.
     pub helpers: Vec<HelperBars>,
+    /// Whose means the dots are; without dots `None`.
+    pub dots: Option<String>,
 }
 
 /// Why a figure could not be drawn.
@@ -122,7 +126,7 @@ pub enum FigureError {
         /// Number of values.
         got: usize,
     },
-    /// A mean outside 0 to 1, or a standard error that is negative or not a number.
+    /// A mean or dot outside 0 to 1, or a standard error that is negative or not a number.
     #[error("cannot draw {bar:?} of helper `{helper}` in task `{task}`, a rate is 0 to 1")]
     Value {
         /// Whose value.
@@ -168,7 +172,8 @@ impl Bars {
             }
             for (task, bar) in self.tasks.iter().zip(values) {
                 let Some(bar) = *bar else { continue };
-                let drawable = (0.0..=1.0).contains(&bar.mean) && (0.0..=1.0).contains(&bar.se);
+                let all = [bar.mean, bar.se, bar.dot.unwrap_or(0.0)];
+                let drawable = all.iter().all(|v| (0.0..=1.0).contains(v));
                 if !drawable {
                     let (helper, task) = (helper.clone(), task.clone());
                     return Err(FigureError::Value { helper, task, bar });
@@ -251,9 +256,10 @@ impl<DB: DrawingBackend> Canvas<DB> {
             self.root.draw(&Text::new(helper.clone(), at, style))?;
             x += width + ENTRY_GAP_PX;
         }
-        let note = "whiskers: one standard error";
+        let dots = bars.dots.as_ref().map_or(String::new(), |whose| format!("; dots: {whose}"));
+        let note = format!("whiskers: one standard error{dots}");
         let style = self.text_style(NOTE_PX, FAINT_INK, HPos::Right, VPos::Center);
-        if x + self.text_width_px(note, &style)? > right {
+        if x + self.text_width_px(&note, &style)? > right {
             y += LEGEND_ROW_PX;
         }
         self.root.draw(&Text::new(note, self.at((right, y)), style))?;
@@ -310,12 +316,26 @@ impl<DB: DrawingBackend> Canvas<DB> {
         let right = (right - self.scale).max(left + 1);
         let corners = [(left, top.min(bottom - 2 * self.scale)), (right, bottom)];
         self.root.draw(&Rectangle::new(corners, color.filled()))?;
-        if bar.se == 0.0 {
-            return Ok(());
+        if bar.se > 0.0 {
+            self.whisker(bar, x.start, [left, right], chart)?;
         }
+        let Some(dot) = bar.dot else { return Ok(()) };
+        let at = ((left + right) / 2, chart.backend_coord(&(x.start, dot)).1);
+        let radius = ((right - left) / 4).clamp(2 * self.scale, 6 * self.scale);
+        self.root.draw(&Circle::new(at, radius, WHITE.filled()))?;
+        self.root.draw(&Circle::new(at, radius, self.stroke(INK)))
+    }
+
+    fn whisker(
+        &self,
+        bar: Bar,
+        x: f64,
+        [left, right]: [i32; 2],
+        chart: &Chart<'_, DB>,
+    ) -> Result<(), DrawError<DB>> {
         let middle = (left + right) / 2;
         let cap = ((right - left) / 5).clamp(self.scale, 5 * self.scale);
-        let y_of = |rate: f64| chart.backend_coord(&(x.start, rate)).1;
+        let y_of = |rate: f64| chart.backend_coord(&(x, rate)).1;
         let low = y_of((bar.mean - bar.se).max(0.0));
         // What passes 1 by far, as with very few episodes, ends below the legend.
         let high = y_of(bar.mean + bar.se).max(y_of(1.0) - (HEADROOM_PX - 4) * self.scale);

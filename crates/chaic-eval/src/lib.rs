@@ -27,8 +27,11 @@ pub mod rules;
 pub mod trace;
 
 pub mod metrics;
+pub mod published;
 pub mod report;
 pub mod run;
+
+pub mod fidelity;
 
 pub mod replay;
 pub mod still;

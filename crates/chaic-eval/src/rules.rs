@@ -118,6 +118,38 @@ pub fn rule_names() -> Vec<String> {
     names
 }
 
+/// The names of the rules in which the two sets differ.
+pub fn differing_rules() -> Vec<String> {
+    let (paper, compat) = (RuleSet::PAPER.to_value(), RuleSet::COMPAT.to_value());
+    let differs = |name: &String| {
+        let pointer = format!("/{}", name.replace('.', "/"));
+        paper.pointer(&pointer) != compat.pointer(&pointer)
+    };
+    rule_names().into_iter().filter(differs).collect()
+}
+
+/// The value of a single rule in both sets, paper's first, as `--set` would take it.
+///
+/// # Errors
+/// [`EvalError::Options`] that lists all names.
+pub fn rule_values(name: &str) -> Result<(String, String)> {
+    let pointer = format!("/{}", name.replace('.', "/"));
+    let of = |set: RuleSet| {
+        let value = set.to_value().pointer(&pointer).filter(|v| !v.is_object()).cloned();
+        value.map(|v| match &v {
+            Value::String(text) => text.clone(),
+            // Rules are single precision: without the digits that only a double has.
+            Value::Number(n) if n.is_f64() => format!("{:?}", n.as_f64().unwrap_or(0.0) as f32),
+            other => other.to_string(),
+        })
+    };
+    let values = of(RuleSet::PAPER).zip(of(RuleSet::COMPAT)).filter(|_| name != "name");
+    values.ok_or_else(|| {
+        let known = rule_names().join(", ");
+        EvalError::Options(format!("no rule `{name}`; the rules are {known}"))
+    })
+}
+
 impl RuleSetName {
     /// The name in commands.
     pub fn as_str(self) -> &'static str {
@@ -177,6 +209,24 @@ mod tests {
             let error = RuleSet::PAPER.with(setting).expect_err(setting).to_string();
             assert!(error.contains(setting) && error.contains(expected), "{error}");
         }
+    }
+
+    #[test]
+    fn the_sets_differ_in_just_the_listed_rules() -> Result<()> {
+        let differing = differing_rules();
+        let made = differing
+            .iter()
+            .try_fold(RuleSet::PAPER, |rules, name| rules.with(&format!("{name}=compat")))?;
+        assert_eq!(RuleSet { name: RuleSetName::Compat, ..made }, RuleSet::COMPAT);
+        for name in &differing {
+            let (paper, compat) = rule_values(name)?;
+            assert_ne!(paper, compat, "{name}");
+            assert_ne!(RuleSet::COMPAT.with(&format!("{name}={paper}"))?, RuleSet::COMPAT);
+        }
+        assert!(differing.iter().any(|n| n == "world.durations.refused_pick"));
+        assert!(!differing.iter().any(|n| n == "world.stride_m"));
+        assert!(rule_values("world.durations").is_err() && rule_values("world.gravity").is_err());
+        Ok(())
     }
 
     #[test]

@@ -61,7 +61,7 @@ pub struct Verdict {
 /// if its name is unknown.
 ///
 /// # Errors
-/// If the run's own files can't be read.
+/// If the run's own files can't be read, or it was played without traces.
 pub fn verify_run(
     folder: &RunFolder,
     options: &RunOptions,
@@ -69,6 +69,9 @@ pub fn verify_run(
     jobs: usize,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<Verdict> {
+    if !options.traces {
+        return Err(EvalError::NoTraces { path: folder.path().to_owned() });
+    }
     let paths = folder.traces()?;
     let (results, warnings) = read_results(&folder.results())?;
     let next = AtomicUsize::new(0);

@@ -1,5 +1,7 @@
 //! What can be said on the command line.
 
+mod fidelity;
+
 use std::ops::Range;
 use std::path::PathBuf;
 
@@ -9,6 +11,8 @@ use chaic_eval::report::Format;
 use chaic_eval::rules::RuleSetName;
 use chaic_protocol::{AgentId, TaskId};
 use clap::{Args, Parser, Subcommand};
+
+pub use self::fidelity::FidelityArguments;
 
 /// Simulator and benchmark for constrained human-AI cooperation.
 #[derive(Debug, Parser)]
@@ -28,6 +32,8 @@ pub enum Command {
     Report(ReportArguments),
     /// Play the recorded actions of a run again and compare; exit code 1 on any difference.
     Verify(VerifyArguments),
+    /// Play both rule sets and single rules, and write how near that is to the paper's results.
+    Fidelity(FidelityArguments),
     /// Make a video of a recorded episode.
     Replay(ReplayArguments),
     /// Make pictures of what somebody sees at some frame: RGB, depth, instance ids.
@@ -103,6 +109,9 @@ pub struct EvalArguments {
     /// Go on with the run in --out; what it plays is recorded there.
     #[arg(long, requires = "out")]
     pub resume: bool,
+    /// Keep results only: little room, but nothing to verify or to replay.
+    #[arg(long)]
+    pub no_traces: bool,
 }
 
 /// `chaic report`.

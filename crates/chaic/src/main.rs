@@ -28,6 +28,7 @@ fn main() -> ExitCode {
         Command::Eval(arguments) => commands::eval::run(&arguments),
         Command::Report(arguments) => commands::report::run(&arguments),
         Command::Verify(arguments) => commands::verify::run(&arguments),
+        Command::Fidelity(arguments) => commands::fidelity::run(&arguments),
         Command::Replay(arguments) => commands::replay::run(&arguments),
         Command::Render(arguments) => commands::render::run(&arguments),
         Command::Episodes(command) => commands::episodes::run(&command),

@@ -118,6 +118,77 @@ fn a_run_from_end_to_end() {
 }
 
 #[test]
+fn fidelity_from_end_to_end() {
+    let dir = workshop();
+    let at = dir.path();
+    let begin = [
+        "fidelity",
+        "--episodes",
+        "short",
+        "--task",
+        "no_constraint",
+        "--first",
+        "1",
+        "--seeds",
+        "1",
+        "--helper",
+        "none,rhp",
+        "--size",
+        "48",
+        "--switch",
+        "world.blocking",
+        "--out",
+        "fid",
+        "--doc",
+        "docs/f.md",
+    ];
+    assert!(well(at, &begin).contains("Document: docs/f.md"));
+    let doc = |name: &str| fs::read_to_string(at.join(name)).expect("it is text");
+    let whole = doc("docs/f.md");
+    for words in
+        ["## By the paper's rules", "creeps to stops", "(images/f-compat.svg)", "of the kind gen"]
+    {
+        assert!(whole.contains(words), "{words}: {whole}");
+    }
+    assert!(!whole.contains("unfinished"), "{whole}");
+    assert!(at.join("docs/images/f-paper.svg").exists());
+
+    // Every part is a run like any other; switches keep no traces, and say so.
+    assert!(well(at, &["report", "fid/compat"]).contains("RHP"));
+    assert!(well(at, &["verify", "fid/paper"]).contains("2 traces"));
+    let switch = "fid/switch/world.blocking";
+    assert!(well(at, &["report", switch, "--format", "md"]).contains("world.blocking=paper"));
+    let id = "no_constraint/gen/0";
+    for command in [
+        &["verify", switch][..],
+        &["report", switch, "--from-traces"],
+        &["replay", switch, id, "--out", "r.gif"],
+    ] {
+        assert!(ill(at, command).contains("--no-traces"), "{command:?}");
+    }
+
+    // What a killed run leaves: a result less, and no report. The document says what is missing,
+    // and going on makes the same one.
+    assert!(ill(at, &begin).contains("isn't empty"));
+    let letter = ["fidelity", "--resume", "--out", "fid", "--doc", "run.txt"];
+    fs::write(at.join("run.txt"), "dear").expect("there is room");
+    assert!(ill(at, &letter).contains("no document of this kind"));
+    let journal = at.join("fid/compat/results.jsonl");
+    let lines = fs::read_to_string(&journal).expect("it is text");
+    let first = lines.find('\n').expect("it has lines") + 1;
+    fs::write(&journal, &lines[..first]).expect("there is room");
+    fs::remove_file(at.join("fid/compat/report.md")).expect("it is there");
+    let said = ill(at, &["fidelity", "--only-document", "--out", "fid"]);
+    assert!(said.contains("1 episode runs are missing"), "{said}");
+    assert!(doc("fid/fidelity.md").contains("- `compat`: 1 of 2 are missing"));
+    let report = chaic(at, &["report", "fid/compat", "--format", "csv"]);
+    assert!(text(&report.stderr).contains("Unfinished: 1 of 2"), "{}", text(&report.stderr));
+    fs::remove_dir_all(at.join("short")).expect("it is there");
+    well(at, &["fidelity", "--resume", "--out", "fid", "--doc", "docs/f.md"]);
+    assert_eq!(doc("docs/f.md"), whole);
+}
+
+#[test]
 fn pictures_and_episodes() {
     let dir = workshop();
     let at = dir.path();

@@ -150,7 +150,8 @@ fn main() -> Result<()> {
     };
     let (mut run, _) = Run::open(Path::new(&out), Access::Resume, &given, &Mine)?;
     run.play(2, &Mine, &AtomicBool::new(false), &mut |_| {})?;
-    let (options, results) = (run.options(), run.results());
-    println!("{}", Report { options, results, formulas: FormulaSet::Paper }.text(Format::Table));
+    let (options, results, planned) = (run.options(), run.results(), run.planned());
+    let report = Report { options, results, planned: &planned, formulas: FormulaSet::Paper };
+    println!("{}", report.text(Format::Table));
     Ok(())
 }

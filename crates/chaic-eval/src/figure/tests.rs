@@ -13,12 +13,12 @@ fn bars(helpers: &[&str]) -> Bars {
             values: (0..tasks.len())
                 .map(|t| {
                     let mean = ((h * 13 + t * 29) % 60) as f64 / 100.0 + 0.2;
-                    Some(Bar { mean, se: 0.02 + t as f64 * 0.005 })
+                    Some(Bar { mean, se: 0.02 + t as f64 * 0.005, dot: None })
                 })
                 .collect(),
         })
         .collect();
-    Bars { tasks, helpers }
+    Bars { tasks, helpers, dots: None }
 }
 
 fn svg(bars: &Bars) -> String {
@@ -59,10 +59,24 @@ fn markup_in_a_name_is_text() {
 fn a_missing_value_leaves_a_gap_and_zero_does_not() {
     let mut bars = bars(&["A", "B"]);
     bars.helpers[0].values[3] = None;
-    bars.helpers[1].values[3] = Some(Bar { mean: 0.0, se: 0.0 });
+    bars.helpers[1].values[3] = Some(Bar { mean: 0.0, se: 0.0, dot: None });
     let svg = svg(&bars);
     assert_eq!(n_fills(&svg, color(0)), 1 + 7);
     assert_eq!(n_fills(&svg, color(1)), 1 + 8);
+}
+
+#[test]
+fn dots_stand_at_their_values_and_are_explained() {
+    let n_circles = |svg: &str| svg.matches("<circle").count();
+    let mut bars = bars(&["A", "B"]);
+    assert_eq!(n_circles(&svg(&bars)), 0);
+    bars.dots = Some("the paper".to_owned());
+    for (dot, task) in [(0.0, 2), (1.0, 5)] {
+        bars.helpers[1].values[task] = Some(Bar { mean: 0.5, se: 0.0, dot: Some(dot) });
+    }
+    let svg = svg(&bars);
+    assert_eq!(n_circles(&svg), 2 * 2, "each a disk and its edge");
+    assert!(svg.contains("dots: the paper"));
 }
 
 #[test]
@@ -98,7 +112,7 @@ fn refuses_what_is_not_a_rate() {
     let out = dir.path().join("figure.svg");
     let with = |mean, se| {
         let mut bars = bars(&["A"]);
-        bars.helpers[0].values[1] = Some(Bar { mean, se });
+        bars.helpers[0].values[1] = Some(Bar { mean, se, dot: None });
         bars
     };
     for bad in [with(1.1, 0.0), with(-0.1, 0.0), with(f64::NAN, 0.0), with(0.5, f64::NAN)] {

@@ -12,8 +12,8 @@ mod tally;
 
 pub use formulas::{FormulaSet, Formulas, Spread};
 pub use result::{Delivery, Ending, RunKey, RunResult, Summary};
-pub use scores::{Difference, Score, Scores, differences};
-pub use stats::{Interval, paired_interval, sample_sd};
+pub use scores::{Difference, Score, Scores, differences, episode_rates};
+pub use stats::{Interval, mean_interval, paired_interval, sample_sd};
 pub use tally::{Tally, tally};
 
 #[cfg(test)]

@@ -181,6 +181,15 @@ fn over_seeds(runs: &[&Summary], value: impl Fn(&Summary) -> f64) -> f64 {
     mean(&runs.iter().map(|s| value(s)).collect::<Vec<f64>>()).unwrap_or(0.0)
 }
 
+/// The transport rate of one helper in one task by episode, seeds averaged.
+pub fn episode_rates(results: &[RunResult], task: TaskId, helper: &str) -> BTreeMap<String, f64> {
+    let groups = grouped(results);
+    let episodes = groups.get(&task).and_then(|helpers| helpers.get(helper));
+    let rate =
+        |(id, runs): (&&str, &Vec<&Summary>)| ((*id).to_owned(), over_seeds(runs, Summary::rate));
+    episodes.into_iter().flatten().map(rate).collect()
+}
+
 /// Paired differences of the transport rate between all helpers, episode by episode (seeds
 /// averaged), with 95 % intervals by Student's t.
 pub fn differences(results: &[RunResult], helpers: &[String]) -> Vec<Difference> {

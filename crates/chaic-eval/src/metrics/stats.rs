@@ -38,8 +38,13 @@ fn squares(values: &[f64]) -> f64 {
 
 /// The interval of the mean of paired differences by Student's t; `None` of fewer than two.
 pub fn paired_interval(differences: &[f64]) -> Option<Interval> {
-    let (m, sd) = (mean(differences)?, sample_sd(differences)?);
-    let n = differences.len();
+    mean_interval(differences)
+}
+
+/// The interval of the mean of independent values by Student's t; `None` of fewer than two.
+pub fn mean_interval(values: &[f64]) -> Option<Interval> {
+    let (m, sd) = (mean(values)?, sample_sd(values)?);
+    let n = values.len();
     let half = t_975(n - 1) * sd / (n as f64).sqrt();
     Some(Interval { mean: m, low: m - half, high: m + half, n })
 }

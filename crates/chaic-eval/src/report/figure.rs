@@ -15,7 +15,8 @@ use crate::report::tables::title;
 pub fn write_figure(scores: &Scores, path: &Path) -> Result<()> {
     let tasks = scores.tasks();
     let bars = |helper: &String| {
-        let bar = |s: &crate::metrics::Score| Bar { mean: s.tr, se: s.tr_se.unwrap_or(0.0) };
+        let bar =
+            |s: &crate::metrics::Score| Bar { mean: s.tr, se: s.tr_se.unwrap_or(0.0), dot: None };
         HelperBars {
             helper: title(helper),
             values: tasks.iter().map(|t| scores.get(*t, helper).map(bar)).collect(),
@@ -24,6 +25,7 @@ pub fn write_figure(scores: &Scores, path: &Path) -> Result<()> {
     let bars = Bars {
         tasks: tasks.iter().map(|t| t.info().title.to_owned()).collect(),
         helpers: scores.helpers().iter().map(bars).collect(),
+        dots: None,
     };
     transport_rate(&bars, path).map_err(|e| EvalError::Picture(e.to_string()))
 }

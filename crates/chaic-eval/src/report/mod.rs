@@ -1,12 +1,16 @@
 //! Scores as people and programs read them.
 
+mod coverage;
 mod figure;
 mod grid;
 mod tables;
 mod write;
 
+pub use coverage::coverage;
 pub use figure::write_figure;
-pub use tables::{additional, main_result, pairs};
+pub(crate) use grid::Grid;
+pub use tables::{additional, main_result, pairs, title};
+pub(crate) use tables::{interval, number, rounded};
 pub use write::{Report, write_files};
 
 use std::fmt;

@@ -99,17 +99,19 @@ fn rate_and_improvement(score: &Score) -> String {
     }
 }
 
-fn number(value: Option<f64>) -> String {
+/// Two decimals, or a sign that there is nothing to say.
+pub(crate) fn number(value: Option<f64>) -> String {
     value.map_or(UNDEFINED.to_owned(), rounded)
 }
 
 /// Two decimals; what rounds to zero has no sign.
-fn rounded(value: f64) -> String {
+pub(crate) fn rounded(value: f64) -> String {
     let text = format!("{value:.2}");
     if text == "-0.00" { "0.00".to_owned() } else { text }
 }
 
-fn interval(interval: Option<&Interval>) -> String {
+/// A mean with its interval, or a sign that there is nothing to say.
+pub(crate) fn interval(interval: Option<&Interval>) -> String {
     /// An interval from fewer episodes is wider than all that a rate can be.
     const MIN_EPISODES: usize = 3;
     match interval {

@@ -43,11 +43,34 @@ fn options() -> RunOptions {
         size: None,
         rules: RuleSetName::Paper,
         set: vec![],
+        traces: true,
     }
 }
 
 fn text(results: &[RunResult], format: Format) -> String {
-    Report { options: &options(), results, formulas: FormulaSet::Paper }.text(format)
+    let planned: Vec<RunKey> = self::results().into_iter().map(|r| r.key).collect();
+    let formulas = FormulaSet::Paper;
+    Report { options: &options(), results, planned: &planned, formulas }.text(format)
+}
+
+#[test]
+fn an_unfinished_run_says_so() {
+    let whole = results();
+    let md = text(&whole, Format::Markdown);
+    assert!(!md.contains("Unfinished") && !md.contains("Unequal"), "{md}");
+    // RHP lacks one episode of the obstacle task, and all of shopping.
+    let some = |r: &&RunResult| {
+        let (k, is_rhp) = (&r.key, r.key.helper == "rhp");
+        !(is_rhp && (k.task == TaskId::Shopping || k.episode == "obstacle/test/01"))
+    };
+    let part: Vec<RunResult> = whole.iter().filter(some).cloned().collect();
+    for format in [Format::Table, Format::Markdown] {
+        let text = text(&part, format);
+        assert!(text.contains("Unfinished: 3 of 48 episode runs are missing (RHP 3)."), "{text}");
+        assert!(text.contains("in obstacle the rows rest on different"), "{text}");
+        assert!(text.contains("(w/o on 2, Oracle on 2, RHP on 1)"), "{text}");
+        assert!(!text.contains("in shopping the rows"), "absent is not unequal: {text}");
+    }
 }
 
 #[test]

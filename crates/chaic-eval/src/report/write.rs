@@ -4,8 +4,9 @@ use std::fmt::Write as _;
 
 use crate::CHAIC_VERSION;
 use crate::error::Result;
-use crate::metrics::{Ending, FormulaSet, RunResult, Scores, differences};
+use crate::metrics::{Ending, FormulaSet, RunKey, RunResult, Scores, differences};
 use crate::report::Format;
+use crate::report::coverage::coverage;
 use crate::report::grid::Grid;
 use crate::report::tables::{additional, main_result, pairs};
 use crate::run::{RunFolder, RunOptions};
@@ -17,6 +18,8 @@ pub struct Report<'a> {
     pub options: &'a RunOptions,
     /// What came out.
     pub results: &'a [RunResult],
+    /// All episode runs that the run consists of.
+    pub planned: &'a [RunKey],
     /// By which formulas it is scored.
     pub formulas: FormulaSet,
 }
@@ -25,6 +28,11 @@ impl Report<'_> {
     /// The scores.
     pub fn scores(&self) -> Scores {
         Scores::of(self.results, &self.formulas.formulas())
+    }
+
+    /// What has to be known of a run that isn't whole; nothing of one that is.
+    pub fn notes(&self) -> Vec<String> {
+        coverage(self.results, self.planned)
     }
 
     /// The report as text that ends with a line break.
@@ -47,6 +55,7 @@ impl Report<'_> {
     fn terminal(&self) -> String {
         let mut text: String = self.grids().iter().map(|g| g.to_terminal() + "\n").collect();
         text += &self.legend();
+        text += &self.notes().iter().map(|n| format!("{n}\n")).collect::<String>();
         text += &self.errors();
         text
     }
@@ -64,6 +73,9 @@ impl Report<'_> {
              {episodes} episodes of each task, seeds per episode: {seeds}. Images: {size}.\n\n",
             self.formulas,
         );
+        for note in self.notes() {
+            let _ = writeln!(text, "**{note}**\n");
+        }
         for grid in self.grids() {
             text += &grid.to_markdown();
             text.push('\n');

@@ -39,11 +39,12 @@ pub fn slug(task: TaskId, id: &str) -> String {
 pub(super) fn items(options: &RunOptions, folder: &RunFolder) -> Result<Vec<Item>> {
     /// A longer list is no benchmark but a mistake, and fills the memory.
     const MAX_ITEMS: usize = 1_000_000;
+    let own = if options.split == FILES { read_files(&folder.episode_files())? } else { vec![] };
     let n_each = options.helpers.len().saturating_mul(options.seeds as usize);
     let mut items = Vec::new();
     for task in &options.tasks {
         let limit = (MAX_ITEMS - items.len()) / n_each.max(1);
-        let episodes = episodes(options, folder, *task, limit)?;
+        let episodes = episodes(options, &own, *task, limit)?;
         if episodes.is_empty() {
             let text = format!("there is no episode of {task} to play");
             return Err(EvalError::Options(text));
@@ -60,23 +61,28 @@ pub(super) fn items(options: &RunOptions, folder: &RunFolder) -> Result<Vec<Item
     Ok(items)
 }
 
-/// Ids and horizons of a task's episodes, `at_most` so many generated ones. Episodes themselves are made when they are played:
-/// there may be more than memory holds.
+/// The keys of all episode runs that a run consists of, finished or not.
+///
+/// # Errors
+/// If the options name no episodes, or the run's copies of episode files can't be read.
+pub fn planned(folder: &RunFolder, options: &RunOptions) -> Result<Vec<RunKey>> {
+    Ok(items(options, folder)?.into_iter().map(|i| i.key).collect())
+}
+
+/// Ids and horizons of a task's episodes, `at_most` so many generated ones; `own` are those of the
+/// run's files. Generated episodes are made when they are played: there may be more than memory
+/// holds.
 fn episodes(
     options: &RunOptions,
-    folder: &RunFolder,
+    own: &[Episode],
     task: TaskId,
     at_most: usize,
 ) -> Result<Vec<(String, Frame)>> {
     let limit = options.first.map_or(usize::MAX, |n| n as usize);
     if options.split == FILES {
-        let mut own: Vec<_> = read_files(&folder.episode_files())?
-            .into_iter()
-            .filter(|e| e.task() == task)
-            .map(|e| (e.id().to_owned(), e.setup().horizon))
-            .collect();
-        own.truncate(limit);
-        return Ok(own);
+        let own =
+            own.iter().filter(|e| e.task() == task).map(|e| (e.id().to_owned(), e.setup().horizon));
+        return Ok(own.take(limit).collect());
     }
     let split: Split = options.split.parse()?;
     let name = |k: usize| match &split {
@@ -118,7 +124,7 @@ pub(super) fn read_bounded(path: &Path) -> Result<Vec<u8>> {
 }
 
 /// The tasks of the episodes in a folder, in the paper's order.
-pub(super) fn tasks_of_files(folder: &Path) -> Result<Vec<TaskId>> {
+pub(crate) fn tasks_of_files(folder: &Path) -> Result<Vec<TaskId>> {
     let present: BTreeSet<TaskId> = read_files(folder)?.iter().map(Episode::task).collect();
     if present.is_empty() {
         let text = format!("{} holds no episode file (*.json)", folder.display());

@@ -11,8 +11,10 @@ mod journal;
 mod options;
 mod worker;
 
+pub(crate) use folder::write_whole;
 pub use folder::{Access, RunFolder};
-pub use items::{Item, slug};
+pub(crate) use items::tasks_of_files;
+pub use items::{Item, planned, slug};
 pub use journal::{Journal, read_results};
 pub use options::{Given, RunOptions};
 pub use worker::{Finished, Progress};
@@ -93,6 +95,11 @@ impl Run {
     /// The results so far.
     pub fn results(&self) -> &[RunResult] {
         &self.results
+    }
+
+    /// The keys of all episode runs that it consists of, finished or not.
+    pub fn planned(&self) -> Vec<RunKey> {
+        self.items.iter().map(|i| i.key.clone()).collect()
     }
 
     /// How far it has come.

@@ -35,6 +35,20 @@ pub struct RunOptions {
     /// Single rules that are set otherwise, as `NAME=VALUE`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub set: Vec<String>,
+    /// Whether traces are kept. Without them a run takes little room, and can't be verified or
+    /// replayed.
+    #[serde(default = "yes", skip_serializing_if = "is_yes")]
+    pub traces: bool,
+}
+
+fn yes() -> bool {
+    true
+}
+
+// `skip_serializing_if` hands over a reference.
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_yes(b: &bool) -> bool {
+    *b
 }
 
 /// What the caller says of a run. What isn't said is as recorded, or as usual for a new run.
@@ -58,6 +72,8 @@ pub struct Given {
     pub rules: Option<RuleSetName>,
     /// `--set`, once for each.
     pub set: Vec<String>,
+    /// `--no-traces`.
+    pub no_traces: bool,
 }
 
 /// What `split` says where the episodes are files.
@@ -108,8 +124,8 @@ impl Given {
             return wrong("a run needs at least one task and one helper".to_owned());
         }
         let (first, rules) = (self.first, self.rules.unwrap_or(RuleSetName::Paper));
-        let set = self.set.clone();
-        let options = RunOptions { tasks, helpers, split, first, seeds, size, rules, set };
+        let (set, traces) = (self.set.clone(), !self.no_traces);
+        let options = RunOptions { tasks, helpers, split, first, seeds, size, rules, set, traces };
         options.rules()?;
         Ok(options)
     }
@@ -148,6 +164,11 @@ impl Given {
                 if recorded.set.is_empty() { number(None) } else { recorded.set.join(" ") },
             ),
             ("--size", self.size.map(|n| n.to_string()), number(recorded.size)),
+            (
+                "--no-traces",
+                self.no_traces.then(|| "given".to_owned()),
+                if recorded.traces { number(None) } else { "given".to_owned() },
+            ),
         ];
         for (option, given, recorded) in said {
             if let Some(given) = given.filter(|g| *g != recorded) {

@@ -52,6 +52,8 @@ pub struct Finished {
     pub worker: usize,
     /// Its result.
     pub result: RunResult,
+    /// How long it took.
+    pub time: Duration,
     /// What is left of the whole run, as far as one can tell from the episodes so far.
     pub left: Option<Duration>,
 }
@@ -107,7 +109,7 @@ impl Crew<'_> {
                         estimate.add(&result.key, time);
                         to_go.remove(&result.key);
                         let left = estimate.left(to_go.keys().copied(), jobs);
-                        progress(&Progress::Finished(Finished { worker, result, left }));
+                        progress(&Progress::Finished(Finished { worker, result, time, left }));
                     }),
                     News::Failed(error) => Err(error),
                 };
@@ -169,18 +171,12 @@ impl Crew<'_> {
                 return Ok(Some(RunResult { key: key.clone(), ending }));
             }
         };
-        match (result, writer) {
-            (Some(result), Some(writer)) => {
-                writer.finish()?;
-                Ok(Some(result))
-            }
-            (_, writer) => {
-                if let Some(writer) = writer {
-                    writer.discard();
-                }
-                Ok(None)
-            }
+        match (&result, writer) {
+            (Some(_), Some(writer)) => writer.finish()?,
+            (None, Some(writer)) => writer.discard(),
+            (_, None) => {}
         }
+        Ok(result)
     }
 
     fn play_to_end(
@@ -200,11 +196,15 @@ impl Crew<'_> {
             image_size: self.options.size,
         };
         let mut play = Play::new(staging, helper)?;
-        let writer = writer.insert(Writer::create(&self.folder.trace(key), play.header())?);
+        if self.options.traces {
+            *writer = Some(Writer::create(&self.folder.trace(key), play.header())?);
+        }
         let mut tally = Tally::new(play.header());
         let (mut result, mut decisions) = (None, 0);
         play.run(self.stop, None, &mut |record| {
-            writer.write(record)?;
+            if let Some(writer) = writer.as_mut() {
+                writer.write(record)?;
+            }
             result = tally.record(record).or(result.take());
             if let Record::Decision(decision) = record {
                 decisions += 1;

@@ -20,6 +20,12 @@ pub struct RunBars {
     all: MultiProgress,
     total: ProgressBar,
     workers: BTreeMap<usize, (ProgressBar, RunKey)>,
+    /// Which of several runs this is; before every line of the log.
+    part: String,
+    /// What is to be said besides the time that this run will take.
+    beside: String,
+    /// Most lines of the log, about.
+    max_lines: u64,
 }
 
 impl RunBars {
@@ -33,7 +39,18 @@ impl RunBars {
         total.set_position((extent.finished - extent.errors) as u64);
         total.set_message("time left: known after the first episode");
         total.enable_steady_tick(Duration::from_millis(500));
-        RunBars { all, total, workers: BTreeMap::new() }
+        let (part, beside) = (String::new(), String::new());
+        RunBars { all, total, workers: BTreeMap::new(), part, beside, max_lines: 100 }
+    }
+
+    /// For one of several runs, of that name, that has come so far.
+    pub fn of_part(extent: Extent, part: &str) -> RunBars {
+        RunBars { part: format!("{part}: "), max_lines: 20, ..RunBars::new(extent) }
+    }
+
+    /// What the next messages say besides the time that this run will take.
+    pub fn say_beside(&mut self, beside: String) {
+        self.beside = beside;
     }
 
     /// Shows what has happened.
@@ -68,7 +85,8 @@ impl RunBars {
                 if let Some(left) = finished.left {
                     // Whole seconds: the estimate isn't any better.
                     let left = HumanDuration(Duration::from_secs(left.as_secs()));
-                    self.total.set_message(format!("about {left} left"));
+                    let (part, beside) = (&self.part, &self.beside);
+                    self.total.set_message(format!("{part}about {left} left{beside}"));
                 }
             }
         }
@@ -76,10 +94,10 @@ impl RunBars {
 
     /// Where there are no bars to see, in a log for example, a line now and then.
     fn log(&self, finished: &Finished) {
-        /// So many lines at most, about.
-        const LINES: u64 = 100;
         let (done, total) = (self.total.position(), self.total.length().unwrap_or(0));
-        if !self.total.is_hidden() || (!done.is_multiple_of(total / LINES + 1) && done != total) {
+        if !self.total.is_hidden()
+            || (!done.is_multiple_of(total / self.max_lines + 1) && done != total)
+        {
             return;
         }
         let key = &finished.result.key;
@@ -90,7 +108,9 @@ impl RunBars {
         let left = finished.left.map_or(String::new(), |left| {
             format!(", about {} left", HumanDuration(Duration::from_secs(left.as_secs())))
         });
-        complain(&format!("{done}/{total} {} with {}: {rate}{left}", key.episode, key.helper));
+        let (part, beside) = (&self.part, &self.beside);
+        let what = format!("{} with {}: {rate}{left}{beside}", key.episode, key.helper);
+        complain(&format!("{part}{done}/{total} {what}"));
     }
 
     /// Takes the bars away.

@@ -63,33 +63,52 @@ pub fn run(arguments: &EvalArguments) -> Result<Ended> {
 }
 
 fn finish(run: &Run, began: Instant) -> Result<Ended> {
-    let (folder, options) = (run.folder(), run.options());
-    let report = Report { options, results: run.results(), formulas: FormulaSet::Paper };
+    let mut text = leave_report(run)?;
+    let path = run.folder().path().display();
+    let secs = began.elapsed().as_secs();
+    let some = run.results().iter().find(|r| r.key.helper == "rhp").or(run.results().first());
+    text += &format!("\nPlayed in {} min {:02} s.\n", secs / 60, secs % 60);
+    text += &format!("Report:  {path}/report.md, {path}/figure.svg\n");
+    if let Some(some) = some.filter(|_| run.options().traces) {
+        let (episode, helper) = (&some.key.episode, &some.key.helper);
+        text +=
+            &format!("Replay:  chaic replay {path} {episode} --helper {helper} --out replay.mp4\n");
+    }
+    if run.options().traces {
+        text += &format!("Verify:  chaic verify {path}\n");
+    }
+    say(&text)?;
+    Ok(if run.extent().errors > 0 { Ended::WithFindings } else { Ended::Well })
+}
+
+/// Writes report and figures into the run's folder, and returns the report for a terminal.
+pub(super) fn leave_report(run: &Run) -> Result<String> {
+    let (folder, options, planned) = (run.folder(), run.options(), run.planned());
+    let (results, formulas) = (run.results(), FormulaSet::Paper);
+    let report = Report { options, results, planned: &planned, formulas };
     write_files(folder, &report)?;
     let scores = report.scores();
     for name in ["figure.svg", "figure.png"] {
         write_figure(&scores, &folder.join(name))?;
     }
-    let path = folder.path().display();
-    let secs = began.elapsed().as_secs();
-    let some = run.results().iter().find(|r| r.key.helper == "rhp").or(run.results().first());
-    let mut text = report.text(Format::Table);
-    text += &format!("\nPlayed in {} min {:02} s.\n", secs / 60, secs % 60);
-    text += &format!("Report:  {path}/report.md, {path}/figure.svg\n");
-    if let Some(some) = some {
-        let (episode, helper) = (&some.key.episode, &some.key.helper);
-        text +=
-            &format!("Replay:  chaic replay {path} {episode} --helper {helper} --out replay.mp4\n");
-    }
-    text += &format!("Verify:  chaic verify {path}\n");
-    say(&text)?;
-    Ok(if run.extent().errors > 0 { Ended::WithFindings } else { Ended::Well })
+    Ok(report.text(Format::Table))
 }
 
 /// What is asked for, and the name of a folder for it. Nothing said at all is the small benchmark.
 fn given(arguments: &EvalArguments) -> (Given, &'static str) {
-    let EvalArguments { task, helper, split, episodes, first, rules, set, seeds, size, .. } =
-        arguments;
+    let EvalArguments {
+        task,
+        helper,
+        split,
+        episodes,
+        first,
+        rules,
+        set,
+        seeds,
+        size,
+        no_traces,
+        ..
+    } = arguments;
     let given = Given {
         tasks: task.as_ref().map(|t| t.0.clone()),
         helpers: helper.clone(),
@@ -100,6 +119,7 @@ fn given(arguments: &EvalArguments) -> (Given, &'static str) {
         episodes: episodes.clone(),
         rules: *rules,
         set: set.clone(),
+        no_traces: *no_traces,
     };
     if given == Given::default() && !arguments.resume {
         return (Given { first: Some(QUICK_EPISODES), ..given }, "quick");
@@ -122,7 +142,7 @@ fn how_to_resume(path: &Path) -> String {
 
 /// What an agent says when it breaks down is shown and noted by the run; the usual message would
 /// come in between the bars.
-fn keep_workers_quiet() {
+pub(super) fn keep_workers_quiet() {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
         let is_worker = |name: &str| name.starts_with("chaic-worker");

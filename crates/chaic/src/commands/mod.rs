@@ -2,6 +2,7 @@
 
 pub mod episodes;
 pub mod eval;
+pub mod fidelity;
 pub mod import;
 pub mod render;
 pub mod replay;

@@ -1,6 +1,7 @@
 //! `chaic replay`.
 
 use anyhow::Result;
+use chaic_eval::EvalError;
 use chaic_eval::replay::{self, ReplayOptions};
 use chaic_eval::run::RunFolder;
 use chaic_eval::trace;
@@ -13,7 +14,10 @@ use crate::output::{complain, say};
 /// Makes a video of a recorded episode.
 pub fn run(arguments: &ReplayArguments) -> Result<Ended> {
     let ReplayArguments { run, episode, out, helper, seed, fps, every } = arguments;
-    let (folder, _) = RunFolder::read(run)?;
+    let (folder, options) = RunFolder::read(run)?;
+    if !options.traces {
+        return Err(EvalError::NoTraces { path: folder.path().to_owned() }.into());
+    }
     let path = replay::find_trace(&folder, episode, helper.as_deref(), *seed)?;
     let (trace, warnings) = trace::read(&path)?;
     for warning in warnings {
@@ -22,9 +26,9 @@ pub fn run(arguments: &ReplayArguments) -> Result<Ended> {
     let key = trace.header.key();
     let episode = folder.episode(&key)?;
     let bar = bars::plain(trace.end().map_or(0, |e| u64::from(e.frame)), "frames");
-    let options = ReplayOptions { fps: *fps, every: *every };
+    let video = ReplayOptions { fps: *fps, every: *every };
     let mut progress = |frame| bar.set_position(u64::from(frame));
-    let pictures = replay::write(&trace, &episode, options, out, &mut progress);
+    let pictures = replay::write(&trace, &episode, video, out, &mut progress);
     bar.finish_and_clear();
     let pictures = pictures?;
     say(&format!(

@@ -1,9 +1,10 @@
 //! `chaic report`.
 
 use anyhow::Result;
+use chaic_eval::EvalError;
 use chaic_eval::metrics::{RunResult, tally};
-use chaic_eval::report::{Report, write_figure};
-use chaic_eval::run::{RunFolder, read_results};
+use chaic_eval::report::{Format, Report, write_figure};
+use chaic_eval::run::{RunFolder, planned, read_results};
 use chaic_eval::trace;
 
 use crate::Ended;
@@ -13,12 +14,26 @@ use crate::output::{complain, say};
 /// Prints the scores of a run.
 pub fn run(arguments: &ReportArguments) -> Result<Ended> {
     let (folder, options) = RunFolder::read(&arguments.run)?;
+    if arguments.from_traces && !options.traces {
+        return Err(EvalError::NoTraces { path: folder.path().to_owned() }.into());
+    }
     let results =
         if arguments.from_traces { from_traces(&folder)? } else { from_journal(&folder)? };
     if results.is_empty() {
         anyhow::bail!("{} has no finished episode yet", arguments.run.display());
     }
-    let report = Report { options: &options, results: &results, formulas: arguments.formulas };
+    // Results say something even where the run's episodes are gone.
+    let planned = planned(&folder, &options).unwrap_or_else(|e| {
+        complain(&format!("warning: can't tell whether the run is whole: {e}"));
+        Vec::new()
+    });
+    let formulas = arguments.formulas;
+    let report = Report { options: &options, results: &results, planned: &planned, formulas };
+    // Tables say it themselves; numbers and figures have no place for it.
+    let is_table = matches!(arguments.format, Format::Table | Format::Markdown);
+    for note in report.notes().iter().filter(|_| !is_table || arguments.figure.is_some()) {
+        complain(&format!("warning: {note}"));
+    }
     match &arguments.figure {
         Some(path) => write_figure(&report.scores(), path)?,
         None => say(&report.text(arguments.format))?,

@@ -1,0 +1,197 @@
+//! The runs of a plan in their folders, and how far they have come.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use chaic_protocol::TaskId;
+use serde::{Deserialize, Serialize};
+
+use crate::CHAIC_VERSION;
+use crate::error::{EvalError, Result};
+use crate::fidelity::plan::{Part, Plan, Wanted};
+use crate::helpers::Helpers;
+use crate::metrics::{RunKey, RunResult};
+use crate::run::{Given, RunFolder, planned, read_results, write_whole};
+
+const FORMAT: &str = "chaic-fidelity";
+const VERSION: u32 = 1;
+const FILE: &str = "fidelity.json";
+
+/// All runs below one folder.
+#[derive(Clone, Debug)]
+pub struct Matrix {
+    /// The folder.
+    pub path: PathBuf,
+    /// What is played there.
+    pub plan: Plan,
+    episodes: Option<PathBuf>,
+}
+
+/// How far one of the runs has come.
+#[derive(Clone, Debug)]
+pub struct PartState {
+    /// Which.
+    pub part: Part,
+    /// All its episode runs.
+    pub planned: Vec<RunKey>,
+    /// Their results so far.
+    pub results: Vec<RunResult>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct PlanFile {
+    format: String,
+    version: u32,
+    chaic: String,
+    plan: Plan,
+}
+
+impl Matrix {
+    /// Begins a matrix in a new or empty folder.
+    ///
+    /// # Errors
+    /// If there is something in the folder, or the options make no matrix.
+    pub fn begin(path: &Path, wanted: &Wanted, helpers: &dyn Helpers) -> Result<Matrix> {
+        let entries = std::fs::read_dir(path).into_iter().flatten().count();
+        if entries > 0 {
+            return Err(EvalError::NotEmpty { path: path.to_owned() });
+        }
+        let episodes = wanted.episodes.clone().ok_or_else(|| {
+            EvalError::Options("give the folder with episode files by --episodes".to_owned())
+        })?;
+        let matrix =
+            Matrix { path: path.to_owned(), plan: wanted.begin(&episodes)?, episodes: None };
+        matrix.plan.check_names(&episodes, helpers)?;
+        let matrix = Matrix { episodes: Some(episodes), ..matrix };
+        std::fs::create_dir_all(path).map_err(EvalError::io("make the folder", path))?;
+        matrix.write()?;
+        Ok(matrix)
+    }
+
+    /// Goes on with the matrix of a folder. Switches may be added, nothing else changed.
+    ///
+    /// # Errors
+    /// If there is none, or it was begun with other options.
+    pub fn resume(path: &Path, wanted: &Wanted) -> Result<Matrix> {
+        let recorded = read(path)?;
+        let plan = wanted.resume(&recorded, path)?;
+        let matrix = Matrix { path: path.to_owned(), plan, episodes: wanted.episodes.clone() };
+        if matrix.plan != recorded {
+            matrix.write()?;
+        }
+        Ok(matrix)
+    }
+
+    /// What is to be played for a part.
+    ///
+    /// # Errors
+    /// If nobody says where the episodes are.
+    pub fn given(&self, part: &Part) -> Result<Given> {
+        let Plan { tasks, first, size, .. } = &self.plan;
+        Ok(Given {
+            tasks: Some(tasks.clone()),
+            helpers: Some(part.helpers.clone()),
+            split: None,
+            first: *first,
+            seeds: Some(part.seeds),
+            size: *size,
+            episodes: Some(self.episodes()?),
+            rules: Some(part.rules),
+            set: part.switch.iter().map(|rule| format!("{rule}=paper")).collect(),
+            no_traces: part.switch.is_some(),
+        })
+    }
+
+    /// The folder of a part.
+    pub fn folder(&self, part: &Part) -> PathBuf {
+        self.path.join(&part.name)
+    }
+
+    /// The copies that the first run made, so that all runs play the same; before it, those that
+    /// the user names.
+    fn episodes(&self) -> Result<PathBuf> {
+        let mut runs = self.plan.parts().into_iter().map(|p| self.folder(&p));
+        let copies = runs.find(|run| run.join("run.json").exists()).map(|r| r.join("episodes"));
+        copies.or_else(|| self.episodes.clone()).ok_or_else(|| {
+            let text = "no run has begun yet; give the folder with episode files by --episodes";
+            EvalError::Options(text.to_owned())
+        })
+    }
+
+    fn write(&self) -> Result<()> {
+        let (format, chaic) = (FORMAT.to_owned(), CHAIC_VERSION.to_owned());
+        let file = PlanFile { format, version: VERSION, chaic, plan: self.plan.clone() };
+        let text = serde_json::to_string_pretty(&file).expect("a plan has string keys") + "\n";
+        write_whole(&self.path.join(FILE), text.as_bytes())
+    }
+}
+
+fn read(path: &Path) -> Result<Plan> {
+    let file = path.join(FILE);
+    if !file.exists() {
+        let (path, text) = (path.display(), "give the folder that `chaic fidelity --out` wrote");
+        return Err(EvalError::Options(format!("{path} has no {FILE}; {text}")));
+    }
+    let text = std::fs::read_to_string(&file).map_err(EvalError::io("read", &file))?;
+    let read: PlanFile = serde_json::from_str(&text).map_err(|e| EvalError::Unreadable {
+        path: file.clone(),
+        line: e.line(),
+        problem: e.to_string(),
+    })?;
+    let is_ours = read.format == FORMAT && read.version == VERSION && read.chaic == CHAIC_VERSION;
+    if !is_ours {
+        return Err(EvalError::OtherVersion {
+            path: file,
+            found: format!("{} version {} (chaic {})", read.format, read.version, read.chaic),
+            expected: format!("{FORMAT} version {VERSION} (chaic {CHAIC_VERSION})"),
+        });
+    }
+    Ok(read.plan)
+}
+
+/// How far all runs of a matrix have come. Runs that have not begun are planned too.
+///
+/// # Errors
+/// If no run has begun, or one can't be read.
+pub fn parts(matrix: &Matrix) -> Result<Vec<PartState>> {
+    let parts = matrix.plan.parts();
+    let begun = |part: &Part| matrix.folder(part).join("run.json").exists();
+    let Some(first) = parts.iter().find(|p| begun(p)) else {
+        let text = format!("{} has no run yet; begin them first", matrix.path.display());
+        return Err(EvalError::Options(text));
+    };
+    let (folder, options) = RunFolder::read(&matrix.folder(first))?;
+    let mut episodes: BTreeMap<(TaskId, String), ()> = BTreeMap::new();
+    for key in planned(&folder, &options)? {
+        episodes.insert((key.task, key.episode), ());
+    }
+    let state = |part: Part| {
+        let mut planned = Vec::new();
+        for (task, episode) in episodes.keys() {
+            for (helper, seed) in
+                part.helpers.iter().flat_map(|h| (0..part.seeds).map(move |s| (h, s)))
+            {
+                let (task, episode, helper) = (*task, episode.clone(), helper.clone());
+                planned.push(RunKey { task, helper, episode, seed });
+            }
+        }
+        planned.sort();
+        let (results, _) = read_results(&matrix.folder(&part).join("results.jsonl"))?;
+        let results = results.into_iter().filter(|r| planned.binary_search(&r.key).is_ok());
+        Ok(PartState { results: results.collect(), planned, part })
+    };
+    parts.into_iter().map(state).collect()
+}
+
+impl PartState {
+    /// The episode runs without a result.
+    pub fn missing(&self) -> Vec<&RunKey> {
+        let done: BTreeSet<&RunKey> = self.results.iter().map(|r| &r.key).collect();
+        self.planned.iter().filter(|k| !done.contains(k)).collect()
+    }
+
+    /// The results that broke down.
+    pub fn n_broken(&self) -> usize {
+        self.results.iter().filter(|r| r.summary().is_none()).count()
+    }
+}

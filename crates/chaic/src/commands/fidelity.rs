@@ -1,0 +1,171 @@
+//! `chaic fidelity`.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use anyhow::{Context as _, Result, anyhow};
+use chaic_eval::fidelity::{Matrix, Part, Sheet, Wanted, check_document, parts, write_document};
+use chaic_eval::helpers::BuiltIn;
+use chaic_eval::rules::differing_rules;
+use chaic_eval::run::{Access, Progress, Run};
+use indicatif::HumanDuration;
+
+use super::eval::{keep_workers_quiet, leave_report};
+use super::{bars::RunBars, jobs};
+use crate::Ended;
+use crate::arguments::FidelityArguments;
+use crate::interrupt;
+use crate::output::{complain, say};
+
+/// Plays what is missing and writes the document.
+pub fn run(arguments: &FidelityArguments) -> Result<Ended> {
+    let wanted = wanted(arguments);
+    let doc = arguments.doc.clone().unwrap_or_else(|| arguments.out.join("fidelity.md"));
+    check_document(&doc)?;
+    let matrix = if arguments.resume || arguments.only_document {
+        Matrix::resume(&arguments.out, &wanted)?
+    } else {
+        Matrix::begin(&arguments.out, &wanted, &BuiltIn)?
+    };
+    if !arguments.only_document {
+        let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
+        let is_whole = play(arguments, &wanted, &matrix, stop);
+        if !is_whole.map_err(|e| anyhow!("{e:#}\n{}", how_to_resume(&arguments.out)))? {
+            complain(&format!("stopped; {}", how_to_resume(&arguments.out)));
+            return Ok(Ended::Interrupted);
+        }
+    }
+    finish(arguments, &matrix, &doc)
+}
+
+fn wanted(arguments: &FidelityArguments) -> Wanted {
+    let is_all = |rules: &Vec<String>| rules.iter().any(|r| r == "all");
+    let switches = match &arguments.switch {
+        _ if arguments.no_switches => Some(Vec::new()),
+        Some(rules) if is_all(rules) => Some(differing_rules()),
+        rules => rules.clone(),
+    };
+    Wanted {
+        episodes: arguments.episodes.clone(),
+        tasks: arguments.task.as_ref().map(|t| t.0.clone()),
+        helpers: arguments.helper.clone(),
+        first: arguments.first,
+        seeds: arguments.seeds,
+        size: arguments.size,
+        switches,
+        switch_helpers: arguments.switch_helper.clone(),
+        switch_seeds: arguments.switch_seeds,
+    }
+}
+
+/// Plays all parts that are wanted now; returns whether they are whole.
+fn play(
+    arguments: &FidelityArguments,
+    wanted: &Wanted,
+    matrix: &Matrix,
+    stop: &AtomicBool,
+) -> Result<bool> {
+    keep_workers_quiet();
+    let jobs = jobs(arguments.jobs);
+    // Images of one moment are drawn in parallel too; more threads than jobs would only wait.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build_global();
+    pool.context("can't start threads")?;
+    let is_wanted = |part: &Part| match (&part.switch, &wanted.switches) {
+        (Some(rule), Some(rules)) => rules.contains(rule),
+        _ => true,
+    };
+    let now: Vec<Part> = matrix.plan.parts().into_iter().filter(is_wanted).collect();
+    let mut pace = Pace { jobs, ..Pace::default() };
+    for (k, part) in now.iter().enumerate() {
+        let (folder, given) = (matrix.folder(part), matrix.given(part)?);
+        let (mut run, warnings) = Run::open(&folder, Access::Resume, &given, &BuiltIn)?;
+        for warning in warnings {
+            complain(&format!("warning: {warning}; that episode is played again"));
+        }
+        let extent = run.extent();
+        let name = format!("part {} of {}, {}", k + 1, now.len(), part.name);
+        if extent.finished - extent.errors == extent.total && folder.join("report.md").exists() {
+            complain(&format!("{name}: its {} episode runs are finished already", extent.total));
+            continue;
+        }
+        pace.to_go = to_go(matrix, &now[k..])?;
+        complain(&format!("{name}: {} of {} episode runs", extent.finished, extent.total));
+        let mut bars = RunBars::of_part(extent, &name);
+        let played = run.play(jobs, &BuiltIn, stop, &mut |progress| {
+            if let Progress::Finished(finished) = progress {
+                pace.add(&finished.result.key.helper, finished.time);
+                // Whole seconds: the estimate isn't any better.
+                let left = HumanDuration(Duration::from_secs(pace.left().as_secs()));
+                bars.say_beside(format!(", about {left} for all parts"));
+            }
+            bars.show(progress);
+        });
+        bars.clear();
+        if !played? {
+            return Ok(false);
+        }
+        leave_report(&run)?;
+    }
+    Ok(true)
+}
+
+/// How many episode runs of each helper these parts still lack.
+fn to_go(matrix: &Matrix, now: &[Part]) -> Result<BTreeMap<String, u32>> {
+    let mut to_go = BTreeMap::new();
+    for state in parts(matrix)?.iter().filter(|s| now.contains(&s.part)) {
+        for key in state.missing() {
+            *to_go.entry(key.helper.clone()).or_default() += 1;
+        }
+    }
+    Ok(to_go)
+}
+
+/// What episode runs took so far, and how many are to go.
+#[derive(Default)]
+struct Pace {
+    jobs: usize,
+    taken: BTreeMap<String, (u32, Duration)>,
+    to_go: BTreeMap<String, u32>,
+}
+
+impl Pace {
+    fn add(&mut self, helper: &str, time: Duration) {
+        let (n, sum) = self.taken.entry(helper.to_owned()).or_default();
+        (*n, *sum) = (*n + 1, *sum + time);
+        if let Some(n) = self.to_go.get_mut(helper) {
+            *n = n.saturating_sub(1);
+        }
+    }
+
+    /// By what runs with each helper took on the mean, or runs with any.
+    fn left(&self) -> Duration {
+        let (n, sum) =
+            self.taken.values().fold((0, Duration::ZERO), |(n, sum), t| (n + t.0, sum + t.1));
+        let any = sum / n.max(1);
+        let mean = |helper| self.taken.get(helper).map_or(any, |(n, sum)| *sum / *n);
+        let all: Duration = self.to_go.iter().map(|(helper, n)| mean(helper) * *n).sum();
+        all / self.jobs.max(1) as u32
+    }
+}
+
+fn finish(arguments: &FidelityArguments, matrix: &Matrix, doc: &Path) -> Result<Ended> {
+    let states = parts(matrix)?;
+    write_document(Sheet { plan: &matrix.plan, parts: &states }, doc)?;
+    say(&format!("Document: {}\n", doc.display()))?;
+    let missing: usize = states.iter().map(|s| s.missing().len()).sum();
+    let broken: usize = states.iter().map(|s| s.n_broken()).sum();
+    if missing > 0 {
+        let hint = how_to_resume(&arguments.out);
+        complain(&format!("warning: {missing} episode runs are missing, as it says; {hint}"));
+    }
+    if broken > 0 {
+        complain(&format!("warning: {broken} episode runs broke down, as it says"));
+    }
+    Ok(if missing + broken > 0 { Ended::WithFindings } else { Ended::Well })
+}
+
+fn how_to_resume(out: &Path) -> String {
+    format!("go on with: chaic fidelity --resume --out {}", out.display())
+}

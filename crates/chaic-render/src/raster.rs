@@ -198,6 +198,9 @@ fn least_of(x: &[f32; TILE]) -> f32 {
     least(least(four[0], four[2]), least(four[1], four[3]))
 }
 
+/// So many pixels are filled at once.
+const LANES: usize = 8;
+
 #[inline]
 fn fill_span(
     nearness: &mut [f32],
@@ -208,14 +211,27 @@ fn fill_span(
     owner: u32,
 ) {
     let Slope { du, low, high, .. } = *slope;
-    let owners = &mut owners[..nearness.len()];
-    for (k, (q, o)) in nearness.iter_mut().zip(owners).enumerate() {
-        let x = q0 + du * (begin + k as i32) as f32;
-        let x = if x < low { low } else { x };
-        let x = if x > high { high } else { x };
-        let wins = x > *q;
-        *q = if wins { x } else { *q };
-        *o = if wins { owner } else { *o };
+    let at = |column: i32| least(high, most(low, q0 + du * column as f32));
+    let (lanes, rest) = nearness.as_chunks_mut::<LANES>();
+    let (owner_lanes, owner_rest) = owners.as_chunks_mut::<LANES>();
+    let mut column = begin;
+    for (q, o) in lanes.iter_mut().zip(owner_lanes) {
+        let x: [f32; LANES] = std::array::from_fn(|k| at(column + k as i32));
+        column += LANES as i32;
+        // Masks instead of conditions, which the compiler would make branches of.
+        let wins: [u32; LANES] = std::array::from_fn(|k| u32::from(x[k] > q[k]).wrapping_neg());
+        if wins.iter().fold(0, |any, win| any | win) == 0 {
+            continue;
+        }
+        *q = std::array::from_fn(|k| most(x[k], q[k]));
+        *o = std::array::from_fn(|k| (owner & wins[k]) | (o[k] & !wins[k]));
+    }
+    for (q, o) in rest.iter_mut().zip(owner_rest) {
+        let x = at(column);
+        column += 1;
+        if x > *q {
+            (*q, *o) = (x, owner);
+        }
     }
 }
 

@@ -115,9 +115,12 @@ fn depths(scratch: &Scratch) -> Vec<f32> {
 }
 
 pub(crate) fn entities(frame: &Frame, scratch: &Scratch) -> Vec<u16> {
-    let entity = |owner: &u32| match *owner {
-        NOBODY => EntityId::NOTHING.0,
-        owner => frame.instances[owner_parts(owner).0].entity.0,
+    let names: Vec<u16> = frame.instances.iter().map(|i| i.entity.0).collect();
+    let nobody = owner_parts(NOBODY).0;
+    debug_assert!(nobody >= 0xffff, "no instance that is drawn has this number");
+    let entity = |owner: &u32| match owner_parts(*owner).0 {
+        instance if instance == nobody => EntityId::NOTHING.0,
+        instance => names[instance],
     };
     scratch.target.owner.iter().map(entity).collect()
 }

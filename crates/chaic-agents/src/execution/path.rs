@@ -1,10 +1,8 @@
 //! Ways through the map: A* to a goal, and the cost of getting anywhere.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
 use chaic_protocol::Vec2;
 
+use super::queue::Queue;
 use crate::memory::costs::{CostMap, FREE, OCCUPIED};
 use crate::memory::grid::{CELL_M, Grid};
 
@@ -17,11 +15,20 @@ const COST_PER_M: f32 = (FREE * STRAIGHT) as f32 / CELL_M;
 /// Working space of searches, kept so that a search allocates nothing.
 #[derive(Clone, Debug)]
 pub struct Search {
-    best: Vec<u32>,
-    from: Vec<u32>,
-    epoch_of: Vec<u32>,
+    nodes: Vec<Node>,
     epoch: u32,
-    queue: BinaryHeap<Reverse<(u32, u32)>>,
+    queue: Queue,
+}
+
+/// What a search knows of a cell.
+#[derive(Clone, Copy, Debug, Default)]
+struct Node {
+    /// The search that knows it; what an earlier one knew counts no more.
+    epoch: u32,
+    /// Least cost of getting there that was found.
+    best: u32,
+    /// The cell before it on that way.
+    from: u32,
 }
 
 /// A way from cell to cell.
@@ -56,27 +63,22 @@ fn step_cost(costs: &[u32], grid: &Grid, from: usize, cell: usize, diagonal: boo
 impl Search {
     /// Working space for maps of this many cells.
     pub fn new(n_cells: usize) -> Search {
-        Search {
-            best: vec![0; n_cells],
-            from: vec![0; n_cells],
-            epoch_of: vec![0; n_cells],
-            epoch: 0,
-            queue: BinaryHeap::new(),
-        }
+        Search { nodes: vec![Node::default(); n_cells], epoch: 0, queue: Queue::new() }
     }
 
     fn begin(&mut self, start: usize) {
         self.epoch += 1;
         self.queue.clear();
-        self.improve(start, start, 0, 0);
+        self.improve(start, start, 0, || 0);
     }
 
-    fn improve(&mut self, cell: usize, from: usize, cost: u32, still: u32) {
-        if self.epoch_of[cell] != self.epoch || cost < self.best[cell] {
-            self.epoch_of[cell] = self.epoch;
-            self.best[cell] = cost;
-            self.from[cell] = from as u32;
-            self.queue.push(Reverse((cost.saturating_add(still), cell as u32)));
+    /// Takes a way to a cell if it is the best so far.
+    #[inline]
+    fn improve(&mut self, cell: usize, from: usize, cost: u32, still: impl FnOnce() -> u32) {
+        let node = &mut self.nodes[cell];
+        if node.epoch != self.epoch || cost < node.best {
+            *node = Node { epoch: self.epoch, best: cost, from: from as u32 };
+            self.queue.push(cost.saturating_add(still()), cell as u32);
         }
     }
 
@@ -93,9 +95,9 @@ impl Search {
         self.begin(start);
         // Rounded down, so that it never exceeds the true cost.
         let still = |cell: usize| (goal.at_least_m(cell).max(0.0) * COST_PER_M) as u32;
-        while let Some(Reverse((estimate, cell))) = self.queue.pop() {
+        while let Some((estimate, cell)) = self.queue.pop() {
             let cell = cell as usize;
-            let cost = self.best[cell];
+            let cost = self.nodes[cell].best;
             if cost > limit {
                 return None;
             }
@@ -107,10 +109,7 @@ impl Search {
             }
             for (next, diagonal) in grid.neighbors(cell) {
                 if let Some(step) = step_cost(costs, grid, cell, next, diagonal) {
-                    let total = cost.saturating_add(step);
-                    if self.epoch_of[next] != self.epoch || total < self.best[next] {
-                        self.improve(next, cell, total, still(next));
-                    }
+                    self.improve(next, cell, cost.saturating_add(step), || still(next));
                 }
             }
         }
@@ -126,19 +125,21 @@ impl Search {
         end: usize,
     ) -> Option<Path> {
         let (end_i, end_j) = grid.column_row(end);
-        let still = |cell: usize| {
-            let (i, j) = grid.column_row(cell);
-            (i.abs_diff(end_i) + j.abs_diff(end_j)) as u32 * FREE
-        };
+        let still = |i: usize, j: usize| (i.abs_diff(end_i) + j.abs_diff(end_j)) as u32 * FREE;
         self.begin(start);
-        while let Some(Reverse((_, cell))) = self.queue.pop() {
+        while let Some((estimate, cell)) = self.queue.pop() {
             let cell = cell as usize;
+            let cost = self.nodes[cell].best;
             if cell == end {
-                return Some(Path { cells: self.trace(start, end), cost: self.best[end] });
+                return Some(Path { cells: self.trace(start, end), cost });
             }
-            for (next, _) in grid.neighbors(cell).filter(|(_, diagonal)| !diagonal) {
-                let total = self.best[cell].saturating_add(costs[next]);
-                self.improve(next, cell, total, still(next));
+            let (i, j) = grid.column_row(cell);
+            if estimate > cost.saturating_add(still(i, j)) {
+                continue;
+            }
+            for (next, i, j) in grid.straight_neighbors(i, j) {
+                let total = cost.saturating_add(costs[next]);
+                self.improve(next, cell, total, || still(i, j));
             }
         }
         None
@@ -148,7 +149,7 @@ impl Search {
         let mut cells = vec![end];
         let mut cell = end;
         while cell != start {
-            cell = self.from[cell] as usize;
+            cell = self.nodes[cell].from as usize;
             cells.push(cell);
         }
         cells.reverse();
@@ -168,9 +169,9 @@ impl Reach {
         let mut reach = Reach { cost: vec![u32::MAX; costs.grid().n_cells()] };
         let Some(start) = costs.grid().cell_at(here) else { return reach };
         search.begin(start);
-        while let Some(Reverse((cost, cell))) = search.queue.pop() {
+        while let Some((cost, cell)) = search.queue.pop() {
             let cell = cell as usize;
-            if cost > search.best[cell] {
+            if cost > search.nodes[cell].best {
                 continue;
             }
             reach.cost[cell] = cost;
@@ -179,7 +180,7 @@ impl Reach {
                     continue;
                 }
                 if let Some(step) = step_cost(costs.costs(), costs.grid(), cell, next, diagonal) {
-                    search.improve(next, cell, cost.saturating_add(step), 0);
+                    search.improve(next, cell, cost.saturating_add(step), || 0);
                 }
             }
         }
@@ -214,15 +215,16 @@ impl StraightReach {
     ) -> StraightReach {
         let mut cost_and_steps: Vec<Option<(u32, u32)>> = vec![None; grid.n_cells()];
         search.begin(start);
-        while let Some(Reverse((cost, cell))) = search.queue.pop() {
+        while let Some((cost, cell)) = search.queue.pop() {
             let cell = cell as usize;
-            if cost > search.best[cell] || cost > limit || cost_and_steps[cell].is_some() {
+            if cost > search.nodes[cell].best || cost > limit || cost_and_steps[cell].is_some() {
                 continue;
             }
-            let before = cost_and_steps[search.from[cell] as usize].map_or(0, |(_, steps)| steps);
+            let before = cost_and_steps[search.nodes[cell].from as usize].map_or(0, |(_, steps)| steps);
             cost_and_steps[cell] = Some((cost, before + u32::from(cell != start)));
-            for (next, _) in grid.neighbors(cell).filter(|(_, diagonal)| !diagonal) {
-                search.improve(next, cell, cost.saturating_add(costs[next]), 0);
+            let (i, j) = grid.column_row(cell);
+            for (next, ..) in grid.straight_neighbors(i, j) {
+                search.improve(next, cell, cost.saturating_add(costs[next]), || 0);
             }
         }
         StraightReach { cost_and_steps }

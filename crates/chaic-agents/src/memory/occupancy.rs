@@ -1,7 +1,7 @@
 //! Where one can walk: free, occupied and unknown space, from depth images.
 
 use chaic_protocol::geom::{Camera, Rect, xz};
-use chaic_protocol::{Frame, Observation, Vec2};
+use chaic_protocol::{Frame, Observation, Vec2, Vec3};
 
 use super::grid::{CELL_M, Grid};
 use crate::perception::{Percepts, Rays};
@@ -40,6 +40,34 @@ pub enum Space {
     Wall,
 }
 
+/// What is known of one cell, as it is stored.
+#[derive(Clone, Copy, Debug)]
+pub struct Cell {
+    /// How sure one is that it is occupied, 0..=6.
+    sure: u8,
+    /// Bits of what was ever seen of it.
+    seen: u8,
+}
+
+impl Cell {
+    /// What is known of it.
+    #[inline]
+    pub fn space(self) -> Space {
+        match (self.sure > 0, self.seen) {
+            (true, seen) if seen & SEEN_HIGH != 0 => Space::Wall,
+            (true, _) => Space::Occupied,
+            (false, seen) if seen & SEEN_FREE != 0 => Space::Free,
+            _ => Space::Unknown,
+        }
+    }
+
+    /// Whether anything of it was ever seen within the known range.
+    #[inline]
+    pub fn is_known(self) -> bool {
+        self.seen & SEEN_NEAR != 0
+    }
+}
+
 /// Bits of what was ever seen of a cell.
 const SEEN_FREE: u8 = 1;
 const SEEN_HIGH: u8 = 2;
@@ -52,6 +80,33 @@ const NOW_FLOOR: u8 = 1;
 const NOW_OCCUPIED: u8 = 2;
 const NOW_HIGH: u8 = 4;
 const NOW_NEAR: u8 = 8;
+
+/// What a pixel shows is a cell times this, and `NOW_*` bits.
+const SHOWN_CELL: u32 = 16;
+
+/// What counts as occupied or near for one body.
+#[derive(Clone, Copy)]
+struct Limits {
+    /// Nothing above this is in the way, metres.
+    head_m: f32,
+    /// What is seen within this counts as known, metres.
+    known_m: f32,
+}
+
+impl Limits {
+    /// What a pixel at depth `d` shows, 0 for nothing.
+    #[inline]
+    fn shown(self, grid: &Grid, point: Vec3, d: f32) -> u32 {
+        let y = point.y;
+        let high = if (y > WALL_M) & (y < TOP_M) { NOW_HIGH } else { 0 };
+        let firm = if (y > STEP_M) & (y <= self.head_m) { NOW_OCCUPIED } else { high };
+        let bits = if y < FLOOR_M { NOW_FLOOR } else { firm };
+        let near = if d < self.known_m { NOW_NEAR } else { 0 };
+        let cell = grid.cell_or_none(point.x, point.z);
+        let counts = (d < MAP_RANGE_M) & (d > Camera::NEAR_M) & (bits != 0) & (cell >= 0);
+        if counts { (cell as u32).wrapping_mul(SHOWN_CELL) | u32::from(bits | near) } else { 0 }
+    }
+}
 
 /// Where somebody could not get on although the map said so.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -125,12 +180,12 @@ impl OccupancyMap {
     /// What is known of a cell.
     #[inline]
     pub fn space(&self, cell: usize) -> Space {
-        match (self.sure[cell], self.seen[cell]) {
-            (1.., seen) if seen & SEEN_HIGH != 0 => Space::Wall,
-            (1.., _) => Space::Occupied,
-            (0, seen) if seen & SEEN_FREE != 0 => Space::Free,
-            _ => Space::Unknown,
-        }
+        Cell { sure: self.sure[cell], seen: self.seen[cell] }.space()
+    }
+
+    /// All cells, row by row.
+    pub fn cells(&self) -> impl Iterator<Item = Cell> + '_ {
+        self.sure.iter().zip(&self.seen).map(|(sure, seen)| Cell { sure: *sure, seen: *seen })
     }
 
     /// Whether there is something to find out at a cell: it is unknown, and not only because it
@@ -206,35 +261,36 @@ impl OccupancyMap {
     ) {
         let stride = percepts.stride.max(1) as usize;
         let (width, height) = (camera.width as usize, camera.height as usize);
-        let masked_width = width.div_ceil(stride);
-        let head_m = height_m + 0.05;
+        let sampled_width = width.div_ceil(stride);
         let rays = Rays::new(camera);
-        let unmasked = vec![false; masked_width];
+        let columns: Vec<_> = rays.columns.iter().step_by(stride).copied().collect();
+        let unmasked = vec![false; sampled_width];
+        let mut sampled = vec![0.0; sampled_width];
+        let mut shown = vec![0; sampled_width];
+        let limits = Limits { head_m: (height_m + 0.05).min(WALL_M), known_m };
         self.touched.clear();
         for (k, row) in (0..height).step_by(stride).enumerate() {
-            let loose = percepts.loose.get(k * masked_width..(k + 1) * masked_width);
+            let loose = percepts.loose.get(k * sampled_width..(k + 1) * sampled_width);
             let loose = loose.unwrap_or(&unmasked);
-            let depth = &depth[row * width..][..width];
-            for (column, loose) in (0..width).step_by(stride).zip(loose) {
-                let d = depth[column];
-                if *loose || d >= MAP_RANGE_M || d <= Camera::NEAR_M {
-                    continue;
+            let depth = depth[row * width..][..width].iter().step_by(stride);
+            sampled.iter_mut().zip(depth).for_each(|(to, d)| *to = *d);
+            // First what each pixel shows, without branches; then where.
+            let pixels = sampled.iter().zip(&columns).zip(loose);
+            for (shown, ((d, column), loose)) in shown.iter_mut().zip(pixels) {
+                let point = rays.eye + *d * (*column + rays.rows[row]);
+                *shown = if *loose { 0 } else { limits.shown(&self.grid, point, *d) };
+            }
+            let mut last = 0;
+            for shown in &shown {
+                // Neighbors mostly show the same.
+                if *shown != last && *shown != 0 {
+                    let (cell, bits) = ((shown / SHOWN_CELL) as usize, (shown % SHOWN_CELL) as u8);
+                    if self.now[cell] == 0 {
+                        self.touched.push(cell as u32);
+                    }
+                    self.now[cell] |= bits;
                 }
-                let p = rays.point(column, row, d);
-                let bit = if p.y < FLOOR_M {
-                    NOW_FLOOR
-                } else if p.y > STEP_M && p.y <= head_m.min(WALL_M) {
-                    NOW_OCCUPIED
-                } else if p.y > WALL_M && p.y < TOP_M {
-                    NOW_HIGH
-                } else {
-                    continue;
-                };
-                let Some(cell) = self.grid.cell_at(xz(p)) else { continue };
-                if self.now[cell] == 0 {
-                    self.touched.push(cell as u32);
-                }
-                self.now[cell] |= bit | if d < known_m { NOW_NEAR } else { 0 };
+                last = *shown;
             }
         }
     }
@@ -283,7 +339,7 @@ impl OccupancyMap {
                 continue;
             }
             let center = self.grid.center(cell);
-            let point = chaic_protocol::Vec3::new(center.x, camera.eye_in_world.y, center.y);
+            let point = Vec3::new(center.x, camera.eye_in_world.y, center.y);
             let Some((px, d)) = camera.project(point) else { continue };
             if px.x < 0.0 || px.x >= camera.width as f32 {
                 continue;

@@ -26,6 +26,26 @@ pub mod math {
         acosf as acos, asinf as asin, atan2f as atan2, cosf as cos, expf as exp, logf as ln, powf,
         sinf as sin, tanf as tan,
     };
+
+    /// From here to twice as much, floats are the whole numbers.
+    const WHOLE: f32 = 8_388_608.0;
+
+    /// The least whole number not below `x`, for 0 <= `x` <= 2^22; any number for any other `x`.
+    /// Without the checks of a conversion, so that it suits loops over pixels.
+    #[inline]
+    pub fn ceil_small(x: f32) -> i32 {
+        let shifted = x + WHOLE;
+        let nearest = shifted.to_bits().wrapping_sub(WHOLE.to_bits()) as i32;
+        nearest.wrapping_add(i32::from(shifted - WHOLE < x))
+    }
+
+    /// The greatest whole number not above `x`, as [`ceil_small`].
+    #[inline]
+    pub fn floor_small(x: f32) -> i32 {
+        let shifted = x + WHOLE;
+        let nearest = shifted.to_bits().wrapping_sub(WHOLE.to_bits()) as i32;
+        nearest.wrapping_sub(i32::from(shifted - WHOLE > x))
+    }
 }
 
 /// The horizontal unit vector that yaw `yaw_rad` looks along.

@@ -92,6 +92,8 @@ pub(crate) fn draw(frame: &Frame, lens: &Lens, omit: Omit, scratch: &mut Scratch
         levels[candidate.index as usize] = level as u8;
         let mesh_drawing = Drawing { instance, index: candidate.index as usize, level, lens };
         mesh_drawing.draw(crosses_near, target, corners);
+        let everywhere = [f32::NEG_INFINITY, f32::NEG_INFINITY, f32::INFINITY, f32::INFINITY];
+        target.touch(if crosses_near { everywhere } else { rect });
         drawn += 1;
         stale = true;
     }

@@ -4,6 +4,8 @@
 //! computed from its two ends in one fixed order, so that two triangles that share an edge leave
 //! neither a gap nor an overlap.
 
+use chaic_protocol::geom::math::ceil_small;
+
 use crate::mesh::Triangle;
 
 /// Nobody's pixel.
@@ -52,6 +54,8 @@ pub(crate) struct Target {
     tiles_wide: usize,
     /// The least nearness in each tile.
     tiles: Vec<f32>,
+    /// For each row of tiles the first tile that may be stale, and the one after the last.
+    stale: Vec<(usize, usize)>,
 }
 
 impl Target {
@@ -65,34 +69,57 @@ impl Target {
         self.tiles_wide = width.div_ceil(TILE);
         self.tiles.clear();
         self.tiles.resize(self.tiles_wide * height.div_ceil(TILE), background);
+        self.stale.clear();
+        self.stale.resize(height.div_ceil(TILE), (self.tiles_wide, 0));
     }
 
-    /// Brings the tiles up to date. Stale tiles are safe: nearness only grows.
+    /// The tiles that the rectangle (least u and v, most u and v) touches: columns and rows, the
+    /// last ones included.
+    fn tiles_of(&self, [u0, v0, u1, v1]: [f32; 4]) -> [(usize, usize); 2] {
+        let tile = |x: f32, n: usize| (x.max(0.0) as usize / TILE).min(n.saturating_sub(1));
+        let n_high = self.stale.len();
+        [
+            (tile(u0, self.tiles_wide), tile(u1, self.tiles_wide)),
+            (tile(v0, n_high), tile(v1, n_high)),
+        ]
+    }
+
+    /// Notes that something is drawn within the rectangle, with a pixel to spare.
+    pub fn touch(&mut self, [u0, v0, u1, v1]: [f32; 4]) {
+        let [(i0, i1), (j0, j1)] = self.tiles_of([u0 - 1.0, v0 - 1.0, u1 + 1.0, v1 + 1.0]);
+        for (first, end) in self.stale.iter_mut().take(j1 + 1).skip(j0) {
+            (*first, *end) = ((*first).min(i0), (*end).max(i1 + 1));
+        }
+    }
+
+    /// Brings the tiles up to date in which [`Target::touch`] announced something. Stale tiles are
+    /// safe: nearness only grows.
     pub fn update_tiles(&mut self) {
         if self.width == 0 {
             return;
         }
-        let band = TILE * self.width;
-        for (rows, tiles) in self.nearness.chunks(band).zip(self.tiles.chunks_mut(self.tiles_wide))
-        {
-            tiles.fill(f32::INFINITY);
-            for row in rows.chunks(self.width) {
-                for (tile, pixels) in tiles.iter_mut().zip(row.chunks(TILE)) {
-                    *tile = match <&[f32; TILE]>::try_from(pixels) {
-                        Ok(eight) => least(*tile, least_of(eight)),
-                        Err(_) => pixels.iter().fold(*tile, |a, b| least(a, *b)),
-                    };
+        let bands = self.nearness.chunks(TILE * self.width);
+        let tiles = self.tiles.chunks_mut(self.tiles_wide);
+        for ((rows, tiles), (first, end)) in bands.zip(tiles).zip(&mut self.stale) {
+            if first < end {
+                let tiles = &mut tiles[*first..*end];
+                tiles.fill(f32::INFINITY);
+                for row in rows.chunks(self.width) {
+                    for (tile, pixels) in tiles.iter_mut().zip(row[TILE * *first..].chunks(TILE)) {
+                        *tile = match <&[f32; TILE]>::try_from(pixels) {
+                            Ok(eight) => least(*tile, least_of(eight)),
+                            Err(_) => pixels.iter().fold(*tile, |a, b| least(a, *b)),
+                        };
+                    }
                 }
+                (*first, *end) = (self.tiles_wide, 0);
             }
         }
     }
 
     /// Whether something no nearer than `q` inside the rectangle is sure to be hidden.
-    pub fn hides(&self, [u0, v0, u1, v1]: [f32; 4], q: f32) -> bool {
-        let tile = |x: f32, n: usize| (x.max(0.0) as usize / TILE).min(n.saturating_sub(1));
-        let n_high = self.height.div_ceil(TILE);
-        let (i0, i1) = (tile(u0, self.tiles_wide), tile(u1, self.tiles_wide));
-        let (j0, j1) = (tile(v0, n_high), tile(v1, n_high));
+    pub fn hides(&self, rect: [f32; 4], q: f32) -> bool {
+        let [(i0, i1), (j0, j1)] = self.tiles_of(rect);
         (j0..=j1).all(|j| {
             let row = &self.tiles[j * self.tiles_wide..][..self.tiles_wide];
             row[i0..=i1].iter().all(|least| *least >= q)
@@ -241,8 +268,7 @@ fn first_center(x: f32, max: i32) -> i32 {
     let t = x - 0.5;
     let t = if t > 0.0 { t } else { 0.0 };
     let t = if t < max as f32 { t } else { max as f32 };
-    let i = t as i32;
-    i + i32::from((i as f32) < t)
+    ceil_small(t)
 }
 
 /// A line down the image.
@@ -312,6 +338,7 @@ mod tests {
         assert!(target.owner.iter().all(|o| *o != 2));
         let mut empty = Target::default();
         empty.clear(0, 0, 0.0);
+        empty.touch([0.0, 0.0, 9.0, 9.0]);
         empty.update_tiles();
         empty.draw([corner(0.0, 0.0), corner(0.0, 9.0), corner(9.0, 0.0)], 1);
     }
@@ -322,6 +349,7 @@ mod tests {
         target.clear(20, 20, 0.0);
         target.draw([corner(-50.0, -50.0), corner(-50.0, 100.0), corner(100.0, -50.0)], 1);
         assert!(!target.hides([2.0, 2.0, 9.0, 9.0], 0.5), "tiles are stale");
+        target.touch([-50.0, -50.0, 100.0, 100.0]);
         target.update_tiles();
         assert!(target.hides([2.0, 2.0, 9.0, 9.0], 0.5));
         assert!(!target.hides([2.0, 2.0, 9.0, 9.0], 1.5));

@@ -114,13 +114,24 @@ fn depths(scratch: &Scratch) -> Vec<f32> {
     scratch.target.nearness.iter().map(depth).collect()
 }
 
+/// So many pixels are named at once.
+const AT_ONCE: usize = 16;
+
 pub(crate) fn entities(frame: &Frame, scratch: &Scratch) -> Vec<u16> {
     let names: Vec<u16> = frame.instances.iter().map(|i| i.entity.0).collect();
-    let nobody = owner_parts(NOBODY).0;
-    debug_assert!(nobody >= 0xffff, "no instance that is drawn has this number");
-    let entity = |owner: &u32| match owner_parts(*owner).0 {
-        instance if instance == nobody => EntityId::NOTHING.0,
-        instance => names[instance],
-    };
-    scratch.target.owner.iter().map(entity).collect()
+    // The number that nobody's pixels have is more than any instance's.
+    let name = |owner: u32| names.get(owner_parts(owner).0).copied();
+    let name = |owner: u32| name(owner).filter(|_| owner != NOBODY).unwrap_or(EntityId::NOTHING.0);
+    let mut out = vec![0; scratch.target.owner.len()];
+    for (out, owners) in out.chunks_mut(AT_ONCE).zip(scratch.target.owner.chunks(AT_ONCE)) {
+        // Neighbors mostly belong to the same instance, if not to the same triangle.
+        let first = owners[0];
+        let differ = owners.iter().fold(0, |bits, owner| bits | (owner ^ first));
+        if owner_parts(differ).0 == 0 {
+            out.fill(name(first));
+        } else {
+            out.iter_mut().zip(owners).for_each(|(out, owner)| *out = name(*owner));
+        }
+    }
+    out
 }

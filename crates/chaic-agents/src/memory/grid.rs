@@ -2,6 +2,7 @@
 
 use chaic_protocol::Vec2;
 use chaic_protocol::geom::Rect;
+use chaic_protocol::geom::math::floor_small;
 
 /// Side of a cell, metres (original facts 1.1).
 pub const CELL_M: f32 = 0.125;
@@ -65,9 +66,10 @@ impl Grid {
     #[inline]
     pub fn cell_or_none(&self, x: f32, z: f32) -> i32 {
         let (x, z) = ((x - self.min.x) * (1.0 / CELL_M), (z - self.min.y) * (1.0 / CELL_M));
-        let inside = (x >= 0.0) & (z >= 0.0) & (x < self.nx as f32) & (z < self.nz as f32);
-        let cell = (z as i32).wrapping_mul(self.nx as i32).wrapping_add(x as i32);
-        if inside { cell } else { -1 }
+        let (nx, nz) = (self.nx as i32, self.nz as i32);
+        let inside = (x >= 0.0) & (z >= 0.0) & (x < nx as f32) & (z < nz as f32);
+        let cell = floor_small(z).wrapping_mul(nx).wrapping_add(floor_small(x));
+        cell | i32::from(inside).wrapping_sub(1)
     }
 
     /// Column and row of a cell.

@@ -83,10 +83,13 @@ const NOW_NEAR: u8 = 8;
 
 /// What a pixel shows is a cell times this, and `NOW_*` bits.
 const SHOWN_CELL: u32 = 16;
+/// So many pixels are looked at at once.
+const LANES: usize = 8;
 
-/// What counts as occupied or near for one body.
+/// What counts as inside the map, as occupied and as near.
 #[derive(Clone, Copy)]
 struct Limits {
+    grid: Grid,
     /// Nothing above this is in the way, metres.
     head_m: f32,
     /// What is seen within this counts as known, metres.
@@ -94,17 +97,36 @@ struct Limits {
 }
 
 impl Limits {
-    /// What a pixel at depth `d` shows, 0 for nothing.
+    /// What pixels of one row at depths `d` show, 0 for nothing. `columns` and `row` are those of
+    /// [`Rays`], axis by axis.
     #[inline]
-    fn shown(self, grid: &Grid, point: Vec3, d: f32) -> u32 {
-        let y = point.y;
-        let high = if (y > WALL_M) & (y < TOP_M) { NOW_HIGH } else { 0 };
-        let firm = if (y > STEP_M) & (y <= self.head_m) { NOW_OCCUPIED } else { high };
-        let bits = if y < FLOOR_M { NOW_FLOOR } else { firm };
-        let near = if d < self.known_m { NOW_NEAR } else { 0 };
-        let cell = grid.cell_or_none(point.x, point.z);
-        let counts = (d < MAP_RANGE_M) & (d > Camera::NEAR_M) & (bits != 0) & (cell >= 0);
-        if counts { (cell as u32).wrapping_mul(SHOWN_CELL) | u32::from(bits | near) } else { 0 }
+    fn shown(
+        &self,
+        d: &[f32; LANES],
+        columns: [&[f32; LANES]; 3],
+        eye: Vec3,
+        row: Vec3,
+    ) -> [u32; LANES] {
+        let head_m = self.head_m.min(WALL_M);
+        let at = |axis: usize| -> [f32; LANES] {
+            std::array::from_fn(|k| eye[axis] + d[k] * (columns[axis][k] + row[axis]))
+        };
+        let [x, y, z] = [0, 1, 2].map(at);
+        // Masks instead of conditions, which the compiler would make branches of.
+        let mask = |is: bool| u32::from(is).wrapping_neg();
+        let bits: [u32; LANES] = std::array::from_fn(|k| {
+            let floor = mask(y[k] < FLOOR_M) & u32::from(NOW_FLOOR);
+            let firm = mask((y[k] > STEP_M) & (y[k] <= head_m)) & u32::from(NOW_OCCUPIED);
+            let high = mask((y[k] > WALL_M) & (y[k] < TOP_M)) & u32::from(NOW_HIGH);
+            floor | firm | high
+        });
+        let cells: [i32; LANES] = std::array::from_fn(|k| self.grid.cell_or_none(x[k], z[k]));
+        std::array::from_fn(|k| {
+            let near = mask(d[k] < self.known_m) & u32::from(NOW_NEAR);
+            let is_near = (d[k] < MAP_RANGE_M) & (d[k] > Camera::NEAR_M);
+            let counts = is_near & (bits[k] != 0) & (cells[k] >= 0);
+            ((cells[k] as u32).wrapping_mul(SHOWN_CELL) | bits[k] | near) & mask(counts)
+        })
     }
 }
 
@@ -263,34 +285,43 @@ impl OccupancyMap {
         let (width, height) = (camera.width as usize, camera.height as usize);
         let sampled_width = width.div_ceil(stride);
         let rays = Rays::new(camera);
-        let columns: Vec<_> = rays.columns.iter().step_by(stride).copied().collect();
-        let unmasked = vec![false; sampled_width];
-        let mut sampled = vec![0.0; sampled_width];
-        let mut shown = vec![0; sampled_width];
-        let limits = Limits { head_m: (height_m + 0.05).min(WALL_M), known_m };
+        // Padded to whole lanes; what is at no distance shows nothing.
+        let padded_width = sampled_width.next_multiple_of(LANES);
+        let columns: [Vec<f32>; 3] = std::array::from_fn(|axis| {
+            let mut columns: Vec<f32> =
+                rays.columns.iter().step_by(stride).map(|c| c[axis]).collect();
+            columns.resize(padded_width, 0.0);
+            columns
+        });
+        let [xs, ys, zs] = columns.each_ref().map(|c| c.as_chunks::<LANES>().0);
+        let mut sampled = vec![0.0; padded_width];
+        let mut shown = vec![0; padded_width];
+        let limits = Limits { grid: self.grid, head_m: height_m + 0.05, known_m };
         self.touched.clear();
         for (k, row) in (0..height).step_by(stride).enumerate() {
-            let loose = percepts.loose.get(k * sampled_width..(k + 1) * sampled_width);
-            let loose = loose.unwrap_or(&unmasked);
             let depth = depth[row * width..][..width].iter().step_by(stride);
             sampled.iter_mut().zip(depth).for_each(|(to, d)| *to = *d);
+            let loose = percepts.loose.get(k * sampled_width..(k + 1) * sampled_width);
+            for (d, loose) in sampled.iter_mut().zip(loose.unwrap_or_default()) {
+                *d = if *loose { 0.0 } else { *d };
+            }
             // First what each pixel shows, without branches; then where.
-            let pixels = sampled.iter().zip(&columns).zip(loose);
-            for (shown, ((d, column), loose)) in shown.iter_mut().zip(pixels) {
-                let point = rays.eye + *d * (*column + rays.rows[row]);
-                *shown = if *loose { 0 } else { limits.shown(&self.grid, point, *d) };
+            let lanes = shown.as_chunks_mut::<LANES>().0.iter_mut();
+            let lanes = lanes.zip(sampled.as_chunks::<LANES>().0);
+            for ((shown, d), ((x, y), z)) in lanes.zip(xs.iter().zip(ys).zip(zs)) {
+                *shown = limits.shown(d, [x, y, z], rays.eye, rays.rows[row]);
             }
             let mut last = 0;
-            for shown in &shown {
+            for &shown in &shown {
                 // Neighbors mostly show the same.
-                if *shown != last && *shown != 0 {
+                if shown != last && shown != 0 {
                     let (cell, bits) = ((shown / SHOWN_CELL) as usize, (shown % SHOWN_CELL) as u8);
                     if self.now[cell] == 0 {
                         self.touched.push(cell as u32);
                     }
                     self.now[cell] |= bits;
                 }
-                last = *shown;
+                last = shown;
             }
         }
     }

@@ -102,15 +102,8 @@ impl Target {
         let tiles = self.tiles.chunks_mut(self.tiles_wide);
         for ((rows, tiles), (first, end)) in bands.zip(tiles).zip(&mut self.stale) {
             if first < end {
-                let tiles = &mut tiles[*first..*end];
-                tiles.fill(f32::INFINITY);
-                for row in rows.chunks(self.width) {
-                    for (tile, pixels) in tiles.iter_mut().zip(row[TILE * *first..].chunks(TILE)) {
-                        *tile = match <&[f32; TILE]>::try_from(pixels) {
-                            Ok(eight) => least(*tile, least_of(eight)),
-                            Err(_) => pixels.iter().fold(*tile, |a, b| least(a, *b)),
-                        };
-                    }
+                for (k, tile) in tiles.iter_mut().enumerate().take(*end).skip(*first) {
+                    *tile = least_in_tile(rows, self.width, TILE * k);
                 }
                 (*first, *end) = (self.tiles_wide, 0);
             }
@@ -219,10 +212,17 @@ fn most(x: f32, y: f32) -> f32 {
     if x > y { x } else { y }
 }
 
+/// The least of a tile that begins in this column of its rows.
 #[inline]
-fn least_of(x: &[f32; TILE]) -> f32 {
-    let four: [f32; 4] = std::array::from_fn(|k| least(x[k], x[k + 4]));
-    least(least(four[0], four[2]), least(four[1], four[3]))
+fn least_in_tile(rows: &[f32], width: usize, column: usize) -> f32 {
+    let mut columns = [f32::INFINITY; TILE];
+    for row in rows.chunks_exact(width) {
+        match row[column..].first_chunk::<TILE>() {
+            Some(pixels) => columns = std::array::from_fn(|k| least(columns[k], pixels[k])),
+            None => row[column..].iter().for_each(|q| columns[0] = least(columns[0], *q)),
+        }
+    }
+    columns.into_iter().fold(f32::INFINITY, least)
 }
 
 /// So many pixels are filled at once.

@@ -63,7 +63,7 @@ fn step_cost(costs: &[u32], grid: &Grid, from: usize, cell: usize, diagonal: boo
 impl Search {
     /// Working space for maps of this many cells.
     pub fn new(n_cells: usize) -> Search {
-        Search { nodes: vec![Node::default(); n_cells], epoch: 0, queue: Queue::new() }
+        Search { nodes: vec![Node::default(); n_cells], epoch: 0, queue: Queue::new(n_cells) }
     }
 
     fn begin(&mut self, start: usize) {
@@ -137,10 +137,10 @@ impl Search {
             if estimate > cost.saturating_add(still(i, j)) {
                 continue;
             }
-            for (next, i, j) in grid.straight_neighbors(i, j) {
+            grid.for_straight_neighbors(i, j, |next, i, j| {
                 let total = cost.saturating_add(costs[next]);
                 self.improve(next, cell, total, || still(i, j));
-            }
+            });
         }
         None
     }
@@ -223,9 +223,9 @@ impl StraightReach {
             let before = cost_and_steps[search.nodes[cell].from as usize].map_or(0, |(_, steps)| steps);
             cost_and_steps[cell] = Some((cost, before + u32::from(cell != start)));
             let (i, j) = grid.column_row(cell);
-            for (next, ..) in grid.straight_neighbors(i, j) {
+            grid.for_straight_neighbors(i, j, |next, _, _| {
                 search.improve(next, cell, cost.saturating_add(costs[next]), || 0);
-            }
+            });
         }
         StraightReach { cost_and_steps }
     }

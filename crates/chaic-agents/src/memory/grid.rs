@@ -102,19 +102,28 @@ impl Grid {
         })
     }
 
-    /// The straight neighbors of the cell in this column and row, in the order of
-    /// [`Grid::neighbors`]: number, column and row of each.
+    /// Visits the straight neighbors of the cell in column `i` and row `j`, in the order of
+    /// [`Grid::neighbors`], with number, column and row of each.
     #[inline]
-    pub fn straight_neighbors(
+    pub fn for_straight_neighbors(
         &self,
         i: usize,
         j: usize,
-    ) -> impl Iterator<Item = (usize, usize, usize)> + use<> {
-        let (nx, nz) = (self.nx, self.nz);
-        DIRECTIONS[..4].iter().filter_map(move |&(di, dj)| {
-            let (a, b) = (i.wrapping_add_signed(di), j.wrapping_add_signed(dj));
-            (a < nx && b < nz).then_some((b * nx + a, a, b))
-        })
+        mut visit: impl FnMut(usize, usize, usize),
+    ) {
+        let cell = j * self.nx + i;
+        if i + 1 < self.nx {
+            visit(cell + 1, i + 1, j);
+        }
+        if i > 0 {
+            visit(cell - 1, i - 1, j);
+        }
+        if j + 1 < self.nz {
+            visit(cell + self.nx, i, j + 1);
+        }
+        if j > 0 {
+            visit(cell - self.nx, i, j - 1);
+        }
     }
 
     /// The cells whose middle is within `radius_m` of `center`.
@@ -170,6 +179,16 @@ mod tests {
         let grid = Grid::over(&Rect::new([0.0, 0.0], [1.0, 1.0]));
         assert_eq!(grid.neighbors(0).count(), 3);
         assert_eq!(grid.neighbors(grid.nx() + 1).count(), 8);
+        for cell in [0, 5, grid.nx() - 1, grid.nx() + 1, grid.n_cells() - 1] {
+            let (i, j) = grid.column_row(cell);
+            let mut visited = Vec::new();
+            grid.for_straight_neighbors(i, j, |next, i, j| {
+                assert_eq!(grid.column_row(next), (i, j));
+                visited.push(next);
+            });
+            let straight = grid.neighbors(cell).filter(|(_, diagonal)| !diagonal);
+            assert_eq!(visited, straight.map(|(next, _)| next).collect::<Vec<_>>());
+        }
         assert_eq!(grid.disc(grid.center(100), 0.13).count(), 5);
     }
 }

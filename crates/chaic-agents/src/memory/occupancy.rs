@@ -107,6 +107,10 @@ impl Limits {
         eye: Vec3,
         row: Vec3,
     ) -> [u32; LANES] {
+        let is_near = |d: f32| (d < MAP_RANGE_M) & (d > Camera::NEAR_M);
+        if !d.iter().fold(false, |any, d| any | is_near(*d)) {
+            return [0; LANES];
+        }
         let head_m = self.head_m.min(WALL_M);
         let at = |axis: usize| -> [f32; LANES] {
             std::array::from_fn(|k| eye[axis] + d[k] * (columns[axis][k] + row[axis]))
@@ -123,8 +127,7 @@ impl Limits {
         let cells: [i32; LANES] = std::array::from_fn(|k| self.grid.cell_or_none(x[k], z[k]));
         std::array::from_fn(|k| {
             let near = mask(d[k] < self.known_m) & u32::from(NOW_NEAR);
-            let is_near = (d[k] < MAP_RANGE_M) & (d[k] > Camera::NEAR_M);
-            let counts = is_near & (bits[k] != 0) & (cells[k] >= 0);
+            let counts = is_near(d[k]) & (bits[k] != 0) & (cells[k] >= 0);
             ((cells[k] as u32).wrapping_mul(SHOWN_CELL) | bits[k] | near) & mask(counts)
         })
     }

@@ -290,7 +290,8 @@ mod tests {
 
     #[test]
     fn rounds_as_the_library_does() {
-        let odd = [f32::NAN, f32::INFINITY, -1e9, 0.49999997, -0.49999997, -0.0, 32767.5, 8388609.0];
+        let odd =
+            [f32::NAN, f32::INFINITY, -1e9, 0.49999997, -0.49999997, -0.0, 32767.5, 8388609.0];
         let usual = (-4000..4000).map(|k| k as f32 * 0.0625);
         for x in usual.chain(odd) {
             assert_eq!(nearest_whole(x), x.round() as i16, "{x}");

@@ -4,6 +4,7 @@
 //! computed from its two ends in one fixed order, so that two triangles that share an edge leave
 //! neither a gap nor an overlap.
 
+use chaic_protocol::EntityId;
 use chaic_protocol::geom::math::ceil_small;
 
 use crate::mesh::Triangle;
@@ -22,6 +23,48 @@ pub(crate) fn pixel_owner(instance: usize, triangle: usize) -> u32 {
 /// The instance and triangle of [`pixel_owner`].
 pub(crate) fn owner_parts(owner: u32) -> (usize, usize) {
     ((owner >> 16) as usize, (owner & 0xffff) as usize)
+}
+
+/// What stands in the image for whoever a pixel belongs to.
+pub(crate) trait Owner: Copy {
+    /// Nobody's pixel.
+    const NOBODY: Self;
+
+    /// Stands for a triangle of an instance of an entity.
+    fn of(entity: EntityId, instance: usize, triangle: usize) -> Self;
+
+    /// `new` if all bits of the mask are set, `self` if none is.
+    fn replaced(self, new: Self, mask: u32) -> Self;
+}
+
+/// To the triangle, as coloring needs it: [`pixel_owner`].
+impl Owner for u32 {
+    const NOBODY: u32 = NOBODY;
+
+    #[inline]
+    fn of(_: EntityId, instance: usize, triangle: usize) -> u32 {
+        pixel_owner(instance, triangle)
+    }
+
+    #[inline]
+    fn replaced(self, new: u32, mask: u32) -> u32 {
+        (new & mask) | (self & !mask)
+    }
+}
+
+/// To the entity, where that is all that is asked for: half as much to write.
+impl Owner for u16 {
+    const NOBODY: u16 = EntityId::NOTHING.0;
+
+    #[inline]
+    fn of(entity: EntityId, _: usize, _: usize) -> u16 {
+        entity.0
+    }
+
+    #[inline]
+    fn replaced(self, new: u16, mask: u32) -> u16 {
+        (new & mask as u16) | (self & !mask as u16)
+    }
 }
 
 /// A corner on the image: pixels from the left and the top, and nearness.
@@ -44,13 +87,13 @@ pub(crate) struct Slope {
 
 /// The image under way.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Target {
+pub(crate) struct Target<O> {
     pub width: usize,
     pub height: usize,
     /// Nearness, shape [height, width].
     pub nearness: Vec<f32>,
-    /// [`pixel_owner`], shape [height, width].
-    pub owner: Vec<u32>,
+    /// Whose each pixel is, shape [height, width].
+    pub owner: Vec<O>,
     tiles_wide: usize,
     /// The least nearness in each tile.
     tiles: Vec<f32>,
@@ -58,14 +101,14 @@ pub(crate) struct Target {
     stale: Vec<(usize, usize)>,
 }
 
-impl Target {
+impl<O: Owner> Target<O> {
     /// Forgets all; what isn't nearer than `background` won't be drawn.
     pub fn clear(&mut self, width: usize, height: usize, background: f32) {
         (self.width, self.height) = (width, height);
         self.nearness.clear();
         self.nearness.resize(width * height, background);
         self.owner.clear();
-        self.owner.resize(width * height, NOBODY);
+        self.owner.resize(width * height, O::NOBODY);
         self.tiles_wide = width.div_ceil(TILE);
         self.tiles.clear();
         self.tiles.resize(self.tiles_wide * height.div_ceil(TILE), background);
@@ -121,7 +164,7 @@ impl Target {
 
     /// Draws a triangle whose corners are all in front of the camera, if it faces it.
     #[inline]
-    pub fn draw(&mut self, corners: [Corner; 3], owner: u32) {
+    pub fn draw(&mut self, corners: [Corner; 3], owner: O) {
         let [a, b, c] = corners;
         let (bu, bv, bq) = (b.u - a.u, b.v - a.v, b.q - a.q);
         let (cu, cv, cq) = (c.u - a.u, c.v - a.v, c.q - a.q);
@@ -142,7 +185,7 @@ impl Target {
     }
 
     /// Fills the pixels whose centers lie in the triangle, whichever way it turns.
-    pub fn fill(&mut self, mut p: [(f32, f32); 3], slope: &Slope, owner: u32) {
+    pub fn fill(&mut self, mut p: [(f32, f32); 3], slope: &Slope, owner: O) {
         let before = |a: (f32, f32), b: (f32, f32)| a.1 < b.1 || (a.1 == b.1 && a.0 < b.0);
         if before(p[1], p[0]) {
             p.swap(0, 1);
@@ -176,7 +219,7 @@ impl Target {
         long: Edge,
         short_is_right: bool,
         slope: &Slope,
-        owner: u32,
+        owner: O,
     ) {
         let (left, right) = if short_is_right { (long, short) } else { (short, long) };
         let columns = self.width as i32;
@@ -229,37 +272,62 @@ fn least_in_tile(rows: &[f32], width: usize, column: usize) -> f32 {
 const LANES: usize = 8;
 
 #[inline]
-fn fill_span(
+fn fill_span<O: Owner>(
     nearness: &mut [f32],
-    owners: &mut [u32],
+    owners: &mut [O],
     q0: f32,
     begin: i32,
     slope: &Slope,
-    owner: u32,
+    owner: O,
+) {
+    let n = nearness.len();
+    let (lanes, rest) = nearness.as_chunks_mut::<LANES>();
+    let is_whole = rest.is_empty();
+    let mut column = begin;
+    for (q, o) in lanes.iter_mut().zip(owners.as_chunks_mut::<LANES>().0) {
+        fill_lanes(q, o, q0, column, slope, owner);
+        column += LANES as i32;
+    }
+    if is_whole {
+        return;
+    }
+    // The end once more in whole lanes: nothing is nearer than itself, so twice does no harm.
+    let end = begin + n as i32;
+    if let (Some(q), Some(o)) = (nearness.last_chunk_mut(), owners.last_chunk_mut()) {
+        fill_lanes::<O, LANES>(q, o, q0, end - LANES as i32, slope, owner);
+    } else if let (Some(q), Some(o)) = (nearness.last_chunk_mut(), owners.last_chunk_mut()) {
+        fill_lanes::<O, 4>(q, o, q0, end - 4, slope, owner);
+        if let (Some(q), Some(o)) = (nearness.first_chunk_mut(), owners.first_chunk_mut()) {
+            fill_lanes::<O, 4>(q, o, q0, begin, slope, owner);
+        }
+    } else {
+        for (k, (q, o)) in nearness.iter_mut().zip(owners).enumerate() {
+            let (q, o) = (std::array::from_mut(q), std::array::from_mut(o));
+            fill_lanes::<O, 1>(q, o, q0, begin + k as i32, slope, owner);
+        }
+    }
+}
+
+/// Fills pixels side by side, the first in this column.
+#[inline]
+fn fill_lanes<O: Owner, const N: usize>(
+    q: &mut [f32; N],
+    o: &mut [O; N],
+    q0: f32,
+    column: i32,
+    slope: &Slope,
+    owner: O,
 ) {
     let Slope { du, low, high, .. } = *slope;
     let at = |column: i32| least(high, most(low, q0 + du * column as f32));
-    let (lanes, rest) = nearness.as_chunks_mut::<LANES>();
-    let (owner_lanes, owner_rest) = owners.as_chunks_mut::<LANES>();
-    let mut column = begin;
-    for (q, o) in lanes.iter_mut().zip(owner_lanes) {
-        let x: [f32; LANES] = std::array::from_fn(|k| at(column + k as i32));
-        column += LANES as i32;
-        // Masks instead of conditions, which the compiler would make branches of.
-        let wins: [u32; LANES] = std::array::from_fn(|k| u32::from(x[k] > q[k]).wrapping_neg());
-        if wins.iter().fold(0, |any, win| any | win) == 0 {
-            continue;
-        }
-        *q = std::array::from_fn(|k| most(x[k], q[k]));
-        *o = std::array::from_fn(|k| (owner & wins[k]) | (o[k] & !wins[k]));
+    let x: [f32; N] = std::array::from_fn(|k| at(column + k as i32));
+    // Masks instead of conditions, which the compiler would make branches of.
+    let wins: [u32; N] = std::array::from_fn(|k| u32::from(x[k] > q[k]).wrapping_neg());
+    if wins.iter().fold(0, |any, win| any | win) == 0 {
+        return;
     }
-    for (q, o) in rest.iter_mut().zip(owner_rest) {
-        let x = at(column);
-        column += 1;
-        if x > *q {
-            (*q, *o) = (x, owner);
-        }
-    }
+    *q = std::array::from_fn(|k| most(x[k], q[k]));
+    *o = std::array::from_fn(|k| o[k].replaced(owner, wins[k]));
 }
 
 /// The smallest whole number whose center (+ 0.5) isn't before `x`, within [0, max].
@@ -317,7 +385,7 @@ mod tests {
         };
         let mut count = vec![0; 64 * 64];
         for k in 0..n {
-            let mut target = Target::default();
+            let mut target = Target::<u32>::default();
             target.clear(64, 64, 0.0);
             target.draw([corner(32.3, 31.7), rim(k + 1), rim(k)], k as u32);
             for (n, o) in count.iter_mut().zip(&target.owner) {
@@ -329,14 +397,14 @@ mod tests {
 
     #[test]
     fn odd_numbers_draw_nothing_and_end() {
-        let mut target = Target::default();
+        let mut target = Target::<u32>::default();
         target.clear(16, 16, 0.0);
         for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e38] {
             target.draw([corner(0.0, 0.0), corner(bad, 8.0), corner(3.0, bad)], 1);
         }
         target.draw([corner(5.0, 5.0); 3], 2);
         assert!(target.owner.iter().all(|o| *o != 2));
-        let mut empty = Target::default();
+        let mut empty = Target::<u32>::default();
         empty.clear(0, 0, 0.0);
         empty.touch([0.0, 0.0, 9.0, 9.0]);
         empty.update_tiles();
@@ -345,7 +413,7 @@ mod tests {
 
     #[test]
     fn tiles_hide_only_what_is_behind() {
-        let mut target = Target::default();
+        let mut target = Target::<u32>::default();
         target.clear(20, 20, 0.0);
         target.draw([corner(-50.0, -50.0), corner(-50.0, 100.0), corner(100.0, -50.0)], 1);
         assert!(!target.hides([2.0, 2.0, 9.0, 9.0], 0.5), "tiles are stale");

@@ -94,44 +94,35 @@ pub(crate) fn look(frame: &Frame, view: &View) -> Images {
     };
     with_scratch(|scratch| {
         let omit = Omit { body: view.hide.map(EntityId::of_agent), ceiling: view.hide_ceiling };
-        draw(frame, &lens, omit, scratch);
+        let Scratch { target, plain, work, row } = scratch;
+        if !rgb {
+            draw(frame, &lens, omit, plain, work);
+            return Images {
+                rgb: None,
+                depth_m: depth.then(|| depths(&plain.nearness)),
+                ids: ids.then(|| plain.owner.clone()),
+            };
+        }
+        draw(frame, &lens, omit, target, work);
+        let mut colors = Vec::new();
+        shade(frame, &lens, &work.levels, target, row, &mut colors);
         Images {
-            rgb: rgb.then(|| {
-                let mut out = Vec::new();
-                let Scratch { levels, target, row, .. } = &mut *scratch;
-                shade(frame, &lens, levels, target, row, &mut out);
-                out
-            }),
-            depth_m: depth.then(|| depths(scratch)),
-            ids: ids.then(|| entities(frame, scratch)),
+            rgb: Some(colors),
+            depth_m: depth.then(|| depths(&target.nearness)),
+            ids: ids.then(|| entities(frame, &target.owner)),
         }
     })
 }
 
-fn depths(scratch: &Scratch) -> Vec<f32> {
+fn depths(nearness: &[f32]) -> Vec<f32> {
     let far = 1.0 / Camera::FAR_M;
-    let depth = |q: &f32| if *q > far { 1.0 / *q } else { Camera::FAR_M };
-    scratch.target.nearness.iter().map(depth).collect()
+    nearness.iter().map(|q| if *q > far { 1.0 / *q } else { Camera::FAR_M }).collect()
 }
 
-/// So many pixels are named at once.
-const AT_ONCE: usize = 16;
-
-pub(crate) fn entities(frame: &Frame, scratch: &Scratch) -> Vec<u16> {
-    let names: Vec<u16> = frame.instances.iter().map(|i| i.entity.0).collect();
-    // The number that nobody's pixels have is more than any instance's.
-    let name = |owner: u32| names.get(owner_parts(owner).0).copied();
-    let name = |owner: u32| name(owner).filter(|_| owner != NOBODY).unwrap_or(EntityId::NOTHING.0);
-    let mut out = vec![0; scratch.target.owner.len()];
-    for (out, owners) in out.chunks_mut(AT_ONCE).zip(scratch.target.owner.chunks(AT_ONCE)) {
-        // Neighbors mostly belong to the same instance, if not to the same triangle.
-        let first = owners[0];
-        let differ = owners.iter().fold(0, |bits, owner| bits | (owner ^ first));
-        if owner_parts(differ).0 == 0 {
-            out.fill(name(first));
-        } else {
-            out.iter_mut().zip(owners).for_each(|(out, owner)| *out = name(*owner));
-        }
-    }
-    out
+fn entities(frame: &Frame, owners: &[u32]) -> Vec<u16> {
+    let entity = |owner: &u32| match *owner {
+        NOBODY => EntityId::NOTHING.0,
+        owner => frame.instances[owner_parts(owner).0].entity.0,
+    };
+    owners.iter().map(entity).collect()
 }

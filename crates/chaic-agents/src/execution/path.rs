@@ -18,6 +18,8 @@ pub struct Search {
     nodes: Vec<Node>,
     epoch: u32,
     queue: Queue,
+    /// The latest straight way: version of the costs, start and end.
+    latest: Option<((u32, usize, usize), Path)>,
 }
 
 /// What a search knows of a cell.
@@ -63,7 +65,8 @@ fn step_cost(costs: &[u32], grid: &Grid, from: usize, cell: usize, diagonal: boo
 impl Search {
     /// Working space for maps of this many cells.
     pub fn new(n_cells: usize) -> Search {
-        Search { nodes: vec![Node::default(); n_cells], epoch: 0, queue: Queue::new(n_cells) }
+        let queue = Queue::new(n_cells);
+        Search { nodes: vec![Node::default(); n_cells], epoch: 0, queue, latest: None }
     }
 
     fn begin(&mut self, start: usize) {
@@ -117,7 +120,20 @@ impl Search {
     }
 
     /// The cheapest way from `start` to `end` over straight neighbors only, whatever it costs.
-    pub fn straight_way(
+    /// A mind has one map of costs, so the latest way is kept for as long as that stays the same.
+    pub fn straight_way(&mut self, costs: &CostMap, start: usize, end: usize) -> Option<Path> {
+        let asked = (costs.version(), start, end);
+        if let Some((found, way)) = &self.latest
+            && *found == asked
+        {
+            return Some(way.clone());
+        }
+        let way = self.find_straight_way(costs.grid(), costs.costs(), start, end)?;
+        self.latest = Some((asked, way.clone()));
+        Some(way)
+    }
+
+    fn find_straight_way(
         &mut self,
         grid: &Grid,
         costs: &[u32],
@@ -220,7 +236,8 @@ impl StraightReach {
             if cost > search.nodes[cell].best || cost > limit || cost_and_steps[cell].is_some() {
                 continue;
             }
-            let before = cost_and_steps[search.nodes[cell].from as usize].map_or(0, |(_, steps)| steps);
+            let before =
+                cost_and_steps[search.nodes[cell].from as usize].map_or(0, |(_, steps)| steps);
             cost_and_steps[cell] = Some((cost, before + u32::from(cell != start)));
             let (i, j) = grid.column_row(cell);
             grid.for_straight_neighbors(i, j, |next, _, _| {

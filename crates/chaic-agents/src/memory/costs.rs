@@ -48,6 +48,8 @@ pub struct CostMap {
     grid: Grid,
     radius_m: f32,
     cost: Vec<u32>,
+    /// Working space: the costs before they were computed last.
+    before: Vec<u32>,
     /// Chamfer distance of each cell from the nearest occupied one; measured when first asked for.
     clearance: OnceCell<Vec<u16>>,
     version: u32,
@@ -61,6 +63,7 @@ impl CostMap {
             grid,
             radius_m,
             cost: vec![FREE + UNKNOWN_EXTRA; grid.n_cells()],
+            before: Vec::new(),
             clearance: OnceCell::from(vec![FARTHEST; grid.n_cells()]),
             version: 0,
             belief: lattice_costs::Belief::default(),
@@ -72,7 +75,7 @@ impl CostMap {
         &self.grid
     }
 
-    /// Grows with every rebuilding.
+    /// Grows whenever costs may have changed.
     pub fn version(&self) -> u32 {
         self.version
     }
@@ -177,8 +180,10 @@ impl CostMap {
 
     /// Computes all costs anew by the original's reckoning.
     pub fn rebuild_lattice(&mut self, seen: &lattice_costs::Seen<'_>) {
-        self.version += 1;
+        std::mem::swap(&mut self.cost, &mut self.before);
+        self.cost.resize(self.grid.n_cells(), 0);
         lattice_costs::lattice_costs(&self.grid, seen, &mut self.belief, &mut self.cost);
+        self.version += u32::from(self.cost != self.before);
         // Hardly anybody asks for it.
         self.clearance.take();
     }

@@ -133,6 +133,17 @@ impl Limits {
     }
 }
 
+/// Every so many-th of a row of pixels.
+#[inline]
+fn every(stride: usize, row: &[f32], sampled: &mut [f32]) {
+    if stride == 2 && row.len().is_multiple_of(2) {
+        // The usual case in a form that the compiler makes a few instructions of.
+        sampled.iter_mut().zip(row.as_chunks::<2>().0).for_each(|(to, pair)| *to = pair[0]);
+    } else {
+        sampled.iter_mut().zip(row.iter().step_by(stride)).for_each(|(to, d)| *to = *d);
+    }
+}
+
 /// Where somebody could not get on although the map said so.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Bump {
@@ -298,34 +309,40 @@ impl OccupancyMap {
         });
         let [xs, ys, zs] = columns.each_ref().map(|c| c.as_chunks::<LANES>().0);
         let mut sampled = vec![0.0; padded_width];
-        let mut shown = vec![0; padded_width];
         let limits = Limits { grid: self.grid, head_m: height_m + 0.05, known_m };
         self.touched.clear();
         for (k, row) in (0..height).step_by(stride).enumerate() {
-            let depth = depth[row * width..][..width].iter().step_by(stride);
-            sampled.iter_mut().zip(depth).for_each(|(to, d)| *to = *d);
+            every(stride, &depth[row * width..][..width], &mut sampled);
             let loose = percepts.loose.get(k * sampled_width..(k + 1) * sampled_width);
             for (d, loose) in sampled.iter_mut().zip(loose.unwrap_or_default()) {
                 *d = if *loose { 0.0 } else { *d };
             }
-            // First what each pixel shows, without branches; then where.
-            let lanes = shown.as_chunks_mut::<LANES>().0.iter_mut();
-            let lanes = lanes.zip(sampled.as_chunks::<LANES>().0);
-            for ((shown, d), ((x, y), z)) in lanes.zip(xs.iter().zip(ys).zip(zs)) {
-                *shown = limits.shown(d, [x, y, z], rays.eye, rays.rows[row]);
-            }
             let mut last = 0;
-            for &shown in &shown {
+            let lanes = sampled.as_chunks::<LANES>().0.iter().zip(xs.iter().zip(ys).zip(zs));
+            for (d, ((x, y), z)) in lanes {
+                let shown = limits.shown(d, [x, y, z], rays.eye, rays.rows[row]);
                 // Neighbors mostly show the same.
-                if shown != last && shown != 0 {
-                    let (cell, bits) = ((shown / SHOWN_CELL) as usize, (shown % SHOWN_CELL) as u8);
-                    if self.now[cell] == 0 {
-                        self.touched.push(cell as u32);
+                if shown.iter().fold(0, |differ, shown| differ | (shown ^ last)) != 0 {
+                    for shown in shown {
+                        if shown != last {
+                            self.mark(shown);
+                        }
+                        last = shown;
                     }
-                    self.now[cell] |= bits;
                 }
-                last = shown;
             }
+        }
+    }
+
+    /// Marks what a pixel shows, see [`Limits::shown`].
+    #[inline]
+    fn mark(&mut self, shown: u32) {
+        if shown != 0 {
+            let (cell, bits) = ((shown / SHOWN_CELL) as usize, (shown % SHOWN_CELL) as u8);
+            if self.now[cell] == 0 {
+                self.touched.push(cell as u32);
+            }
+            self.now[cell] |= bits;
         }
     }
 

@@ -94,13 +94,16 @@ impl Eyes {
             if !is_news(chunk, last) {
                 continue;
             }
-            for id in chunk.iter().filter(|id| **id != last) {
+            for id in chunk {
+                if *id == last {
+                    continue;
+                }
+                last = *id;
                 if let Some(agent) = EntityId(*id).agent() {
                     seen.agents |= 1 << agent.0;
                 }
                 seen.goal_place |= self.goal_places.contains(id);
             }
-            last = chunk[chunk.len() - 1];
         }
         seen
     }

@@ -234,6 +234,16 @@ mod tests {
     use std::f32::consts::{FRAC_PI_2, PI};
 
     #[test]
+    fn small_numbers_are_rounded_as_by_the_library() {
+        let steps = (0..40_000).map(|k| k as f32 * 0.0625);
+        let near = (1..2000).flat_map(|k| [(k as f32).next_down(), (k as f32).next_up()]);
+        for x in steps.chain(near).chain([f32::MIN_POSITIVE, 0.5, 1e-7, 4_194_303.5, 4_194_304.0]) {
+            assert_eq!(math::ceil_small(x), x.ceil() as i32, "{x}");
+            assert_eq!(math::floor_small(x), x.floor() as i32, "{x}");
+        }
+    }
+
+    #[test]
     fn axes_are_right_handed_and_a_positive_yaw_turns_left() {
         let (f, r) = (forward(0.3), right(0.3));
         assert!((r.cross(f) - Vec3::Y).length() < 1e-6, "right x forward is up");

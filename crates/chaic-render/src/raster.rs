@@ -309,7 +309,7 @@ fn fill_span<O: Owner>(
 }
 
 /// Fills pixels side by side, the first in this column.
-#[inline]
+#[inline(always)]
 fn fill_lanes<O: Owner, const N: usize>(
     q: &mut [f32; N],
     o: &mut [O; N],
@@ -393,6 +393,46 @@ mod tests {
             }
         }
         assert!(count.iter().all(|n| *n == 1));
+    }
+
+    /// What [`fill_span`] is to do, pixel by pixel.
+    fn fill_one_by_one(
+        (q, o): (&mut [f32], &mut [u32]),
+        q0: f32,
+        begin: i32,
+        slope: &Slope,
+        owner: u32,
+    ) {
+        for (k, (q, o)) in q.iter_mut().zip(o).enumerate() {
+            let x = q0 + slope.du * (begin + k as i32) as f32;
+            let x = if x < slope.low { slope.low } else { x };
+            let x = if x > slope.high { slope.high } else { x };
+            if x > *q {
+                (*q, *o) = (x, owner);
+            }
+        }
+    }
+
+    #[test]
+    fn spans_of_any_length_are_filled_as_pixel_by_pixel() {
+        let mut rng = chaic_protocol::rng::Stream::new(1, "spans", 0);
+        for n in (0..40).cycle().take(2000) {
+            let before: Vec<f32> = (0..n).map(|_| rng.range(0.0, 1.0)).collect();
+            let du =
+                [0.0, rng.range(-0.05, 0.05), f32::NAN, 1e30][rng.below(40).saturating_sub(36)];
+            let at = Corner { u: 0.0, v: 0.0, q: 0.0 };
+            let slope = Slope { at, du, dv: 0.0, low: 0.2, high: rng.range(0.2, 1.0) };
+            let (q0, begin) = (rng.range(0.0, 1.0), rng.below(500) as i32);
+            let (mut q, mut owners, mut names) = (before.clone(), vec![7u32; n], vec![7u16; n]);
+            fill_span(&mut q, &mut owners, q0, begin, &slope, 9);
+            fill_span(&mut before.clone(), &mut names, q0, begin, &slope, 9);
+            let (mut right_q, mut right_owners) = (before, vec![7u32; n]);
+            fill_one_by_one((&mut right_q, &mut right_owners), q0, begin, &slope, 9);
+            let bits = |q: &[f32]| q.iter().map(|q| q.to_bits()).collect::<Vec<_>>();
+            assert_eq!(bits(&q), bits(&right_q), "{n} pixels, {slope:?}");
+            assert_eq!(owners, right_owners, "{n} pixels, {slope:?}");
+            assert!(names.iter().zip(&owners).all(|(a, b)| u32::from(*a) == *b));
+        }
     }
 
     #[test]

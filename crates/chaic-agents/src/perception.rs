@@ -108,7 +108,7 @@ impl Tally {
         self.low = self.low.min(p.y);
         self.high = self.high.max(p.y);
         if p.y <= FOOTPRINT_HEIGHT_M {
-            let square = [(p.x / FOOTPRINT_M).round() as i16, (p.z / FOOTPRINT_M).round() as i16];
+            let square = [nearest_whole(p.x / FOOTPRINT_M), nearest_whole(p.z / FOOTPRINT_M)];
             if self.squares.last() != Some(&square) {
                 self.squares.push(square);
             }
@@ -132,6 +132,26 @@ impl Tally {
                 .collect(),
         }
     }
+}
+
+/// Rounds half away from zero, as `f32::round` does in a call to the C library for every point.
+#[inline]
+fn nearest_whole(x: f32) -> i16 {
+    let x = x.clamp(-40_000.0, 40_000.0);
+    let whole = x as i32;
+    let rest = x - whole as f32;
+    let whole = whole + i32::from(rest >= 0.5) - i32::from(rest <= -0.5);
+    whole.clamp(i32::from(i16::MIN), i32::from(i16::MAX)) as i16
+}
+
+/// How many of the first ids are the same.
+#[inline]
+fn run_length(ids: &[u16]) -> usize {
+    const AT_ONCE: usize = 16;
+    let Some(first) = ids.first() else { return 0 };
+    let same = |chunk: &&[u16]| chunk.iter().fold(true, |same, id| same & (id == first));
+    let n = AT_ONCE * ids.chunks_exact(AT_ONCE).take_while(same).count();
+    n + ids[n..].iter().take_while(|id| *id == first).count()
 }
 
 /// Directions through pixel centers per metre of depth: the world point of a pixel is
@@ -202,24 +222,35 @@ impl Perception for GroundTruthIds {
         let stride = STRIDE as usize;
         let rays = Rays::new(&observation.camera);
         let mut tallies: Vec<Tally> = looks.iter().map(|_| Tally::NEW).collect();
-        let mut loose = Vec::with_capacity(width.div_ceil(stride) * height.div_ceil(stride));
+        let sampled_width = width.div_ceil(stride);
+        let mut loose = vec![false; sampled_width * height.div_ceil(stride)];
         for row in 0..height {
-            let on_row = row % stride == 0;
             let (ids, depth) = (&ids[row * width..][..width], &depth[row * width..][..width]);
-            for column in 0..width {
-                let id = usize::from(ids[column]);
+            let on_row = row % stride == 0;
+            let mut end = 0;
+            while end < width {
+                let from = end;
+                end += run_length(&ids[from..]);
+                let id = usize::from(ids[from]);
                 let look = looks.get(id).copied().unwrap_or(Look::Firm);
-                let sampled = on_row && column % stride == 0;
-                if sampled {
-                    loose.push(!matches!(look, Look::Firm | Look::Fixed));
+                if on_row && !matches!(look, Look::Firm | Look::Fixed) {
+                    let sampled = from.div_ceil(stride)..end.div_ceil(stride);
+                    loose[row / stride * sampled_width..][sampled].fill(true);
                 }
                 if matches!(look, Look::Firm | Look::Own) {
                     continue;
                 }
                 let tally = &mut tallies[id];
-                tally.n_pixels += 1;
-                if (sampled || look == Look::Small) && depth[column] < OBJECT_RANGE_M {
-                    tally.add(rays.point(column, row, depth[column]));
+                tally.n_pixels += (end - from) as u32;
+                let mut add = |column: usize| {
+                    if depth[column] < OBJECT_RANGE_M {
+                        tally.add(rays.point(column, row, depth[column]));
+                    }
+                };
+                if look == Look::Small {
+                    (from..end).for_each(add);
+                } else if on_row {
+                    (from.next_multiple_of(stride)..end).step_by(stride).for_each(&mut add);
                 }
             }
         }
@@ -255,6 +286,26 @@ mod tests {
         assert!((seen.position_in_world - Vec3::new(0.95, 0.65, -1.9)).length() < 0.12, "{seen:?}");
         assert!((seen.top_m - 0.7).abs() < 0.03, "{}", seen.top_m);
         assert_eq!(percepts.loose.len(), toy.pixels().div_ceil(4) as usize);
+    }
+
+    #[test]
+    fn rounds_as_the_library_does() {
+        let odd =
+            [f32::NAN, f32::INFINITY, -1e9, 0.49999997, -0.49999997, -0.0, 32767.5, 8388609.0];
+        let usual = (-4000..4000).map(|k| k as f32 * 0.0625);
+        for x in usual.chain(odd) {
+            assert_eq!(nearest_whole(x), x.round() as i16, "{x}");
+        }
+    }
+
+    #[test]
+    fn runs_end_where_the_ids_change() {
+        for n in 0..70usize {
+            let mut ids = vec![7; n];
+            assert_eq!(run_length(&ids), n);
+            ids.extend([8, 7, 7]);
+            assert_eq!(run_length(&ids), n.max(1));
+        }
     }
 
     #[test]

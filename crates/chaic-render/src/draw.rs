@@ -5,18 +5,27 @@ use chaic_protocol::{EntityId, Vec3};
 use crate::clip::clip;
 use crate::frame::{Frame, Instance};
 use crate::lens::{IntoCamera, Lens};
-use crate::raster::{Corner, Target, corners_of, pixel_owner};
+use crate::raster::{Corner, Owner, Target, corners_of};
 use crate::solids::level_for;
 
 /// Buffers that one thread uses again and again.
 #[derive(Default)]
 pub(crate) struct Scratch {
-    pub target: Target,
+    /// For views in color.
+    pub target: Target<u32>,
+    /// For all others.
+    pub plain: Target<u16>,
+    pub work: Work,
+    pub row: crate::shade::Row,
+}
+
+/// What drawing needs beside its target.
+#[derive(Default)]
+pub(crate) struct Work {
     corners: Vec<Corner>,
     order: Vec<Candidate>,
     /// Level of detail of each instance in this view.
     pub levels: Vec<u8>,
-    pub row: crate::shade::Row,
 }
 
 /// What is left out of a view.
@@ -43,9 +52,15 @@ struct Outline {
     crosses_near: bool,
 }
 
-/// Draws all that a lens sees of a frame into the scratch's target.
-pub(crate) fn draw(frame: &Frame, lens: &Lens, omit: Omit, scratch: &mut Scratch) {
-    let Scratch { target, corners, order, levels, .. } = scratch;
+/// Draws all that a lens sees of a frame into the target.
+pub(crate) fn draw<O: Owner>(
+    frame: &Frame,
+    lens: &Lens,
+    omit: Omit,
+    target: &mut Target<O>,
+    work: &mut Work,
+) {
+    let Work { corners, order, levels } = work;
     target.clear(lens.width, lens.height, lens.nearness(lens.far_m()).max(0.0));
     levels.clear();
     levels.resize(frame.instances.len(), 0);
@@ -92,6 +107,8 @@ pub(crate) fn draw(frame: &Frame, lens: &Lens, omit: Omit, scratch: &mut Scratch
         levels[candidate.index as usize] = level as u8;
         let mesh_drawing = Drawing { instance, index: candidate.index as usize, level, lens };
         mesh_drawing.draw(crosses_near, target, corners);
+        let everywhere = [f32::NEG_INFINITY, f32::NEG_INFINITY, f32::INFINITY, f32::INFINITY];
+        target.touch(if crosses_near { everywhere } else { rect });
         drawn += 1;
         stale = true;
     }
@@ -154,7 +171,17 @@ struct Drawing<'a> {
 }
 
 impl Drawing<'_> {
-    fn draw(&self, crosses_near: bool, target: &mut Target, corners: &mut Vec<Corner>) {
+    #[inline]
+    fn owner<O: Owner>(&self, triangle: usize) -> O {
+        O::of(self.instance.entity, self.index, triangle)
+    }
+
+    fn draw<O: Owner>(
+        &self,
+        crosses_near: bool,
+        target: &mut Target<O>,
+        corners: &mut Vec<Corner>,
+    ) {
         let lens = self.lens;
         let mesh = self.instance.shape.mesh(self.level);
         let into = lens.camera_from(&self.instance.rotation, self.instance.origin);
@@ -178,17 +205,22 @@ impl Drawing<'_> {
         }
         for (k, triangle) in mesh.triangles.iter().enumerate() {
             let [a, b, c] = corners_of(triangle);
-            target.draw([corners[a], corners[b], corners[c]], pixel_owner(self.index, k));
+            target.draw([corners[a], corners[b], corners[c]], self.owner(k));
         }
     }
 
-    fn draw_clipped(&self, into: &IntoCamera, target: &mut Target, corners: &[Corner]) {
+    fn draw_clipped<O: Owner>(
+        &self,
+        into: &IntoCamera,
+        target: &mut Target<O>,
+        corners: &[Corner],
+    ) {
         let mesh = self.instance.shape.mesh(self.level);
         let near = self.lens.near_m();
         let most = 1.0 / near;
         for (k, triangle) in mesh.triangles.iter().enumerate() {
             let at = corners_of(triangle);
-            let owner = pixel_owner(self.index, k);
+            let owner: O = self.owner(k);
             if at.iter().all(|c| corners[*c].q > 0.0 && corners[*c].q <= most) {
                 target.draw(at.map(|c| corners[c]), owner);
                 continue;

@@ -86,9 +86,9 @@ fn base(scene: &Scene, world: &World, map: &Map, width: u32, height: u32) -> Rgb
     let frame = scene.frame(world.state(), &bodies, true);
     let mut rgb = Vec::new();
     with_scratch(|scratch| {
-        draw_scene(&frame, &lens, Omit { body: None, ceiling: true }, scratch);
-        let Scratch { levels, target, row, .. } = &mut *scratch;
-        shade(&frame, &lens, levels, target, row, &mut rgb);
+        let Scratch { target, work, row, .. } = scratch;
+        draw_scene(&frame, &lens, Omit { body: None, ceiling: true }, target, work);
+        shade(&frame, &lens, &work.levels, target, row, &mut rgb);
     });
     RgbImage::from_raw(width, height, rgb).unwrap_or_else(|| RgbImage::new(width, height))
 }

@@ -4,6 +4,9 @@
 //! computed from its two ends in one fixed order, so that two triangles that share an edge leave
 //! neither a gap nor an overlap.
 
+use chaic_protocol::EntityId;
+use chaic_protocol::geom::math::ceil_small;
+
 use crate::mesh::Triangle;
 
 /// Nobody's pixel.
@@ -20,6 +23,48 @@ pub(crate) fn pixel_owner(instance: usize, triangle: usize) -> u32 {
 /// The instance and triangle of [`pixel_owner`].
 pub(crate) fn owner_parts(owner: u32) -> (usize, usize) {
     ((owner >> 16) as usize, (owner & 0xffff) as usize)
+}
+
+/// What stands in the image for whoever a pixel belongs to.
+pub(crate) trait Owner: Copy {
+    /// Nobody's pixel.
+    const NOBODY: Self;
+
+    /// Stands for a triangle of an instance of an entity.
+    fn of(entity: EntityId, instance: usize, triangle: usize) -> Self;
+
+    /// `new` if all bits of the mask are set, `self` if none is.
+    fn replaced(self, new: Self, mask: u32) -> Self;
+}
+
+/// To the triangle, as coloring needs it: [`pixel_owner`].
+impl Owner for u32 {
+    const NOBODY: u32 = NOBODY;
+
+    #[inline]
+    fn of(_: EntityId, instance: usize, triangle: usize) -> u32 {
+        pixel_owner(instance, triangle)
+    }
+
+    #[inline]
+    fn replaced(self, new: u32, mask: u32) -> u32 {
+        (new & mask) | (self & !mask)
+    }
+}
+
+/// To the entity, where that is all that is asked for: half as much to write.
+impl Owner for u16 {
+    const NOBODY: u16 = EntityId::NOTHING.0;
+
+    #[inline]
+    fn of(entity: EntityId, _: usize, _: usize) -> u16 {
+        entity.0
+    }
+
+    #[inline]
+    fn replaced(self, new: u16, mask: u32) -> u16 {
+        (new & mask as u16) | (self & !mask as u16)
+    }
 }
 
 /// A corner on the image: pixels from the left and the top, and nearness.
@@ -42,57 +87,75 @@ pub(crate) struct Slope {
 
 /// The image under way.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Target {
+pub(crate) struct Target<O> {
     pub width: usize,
     pub height: usize,
     /// Nearness, shape [height, width].
     pub nearness: Vec<f32>,
-    /// [`pixel_owner`], shape [height, width].
-    pub owner: Vec<u32>,
+    /// Whose each pixel is, shape [height, width].
+    pub owner: Vec<O>,
     tiles_wide: usize,
     /// The least nearness in each tile.
     tiles: Vec<f32>,
+    /// For each row of tiles the first tile that may be stale, and the one after the last.
+    stale: Vec<(usize, usize)>,
 }
 
-impl Target {
+impl<O: Owner> Target<O> {
     /// Forgets all; what isn't nearer than `background` won't be drawn.
     pub fn clear(&mut self, width: usize, height: usize, background: f32) {
         (self.width, self.height) = (width, height);
         self.nearness.clear();
         self.nearness.resize(width * height, background);
         self.owner.clear();
-        self.owner.resize(width * height, NOBODY);
+        self.owner.resize(width * height, O::NOBODY);
         self.tiles_wide = width.div_ceil(TILE);
         self.tiles.clear();
         self.tiles.resize(self.tiles_wide * height.div_ceil(TILE), background);
+        self.stale.clear();
+        self.stale.resize(height.div_ceil(TILE), (self.tiles_wide, 0));
     }
 
-    /// Brings the tiles up to date. Stale tiles are safe: nearness only grows.
+    /// The tiles that the rectangle (least u and v, most u and v) touches: columns and rows, the
+    /// last ones included.
+    fn tiles_of(&self, [u0, v0, u1, v1]: [f32; 4]) -> [(usize, usize); 2] {
+        let tile = |x: f32, n: usize| (x.max(0.0) as usize / TILE).min(n.saturating_sub(1));
+        let n_high = self.stale.len();
+        [
+            (tile(u0, self.tiles_wide), tile(u1, self.tiles_wide)),
+            (tile(v0, n_high), tile(v1, n_high)),
+        ]
+    }
+
+    /// Notes that something is drawn within the rectangle, with a pixel to spare.
+    pub fn touch(&mut self, [u0, v0, u1, v1]: [f32; 4]) {
+        let [(i0, i1), (j0, j1)] = self.tiles_of([u0 - 1.0, v0 - 1.0, u1 + 1.0, v1 + 1.0]);
+        for (first, end) in self.stale.iter_mut().take(j1 + 1).skip(j0) {
+            (*first, *end) = ((*first).min(i0), (*end).max(i1 + 1));
+        }
+    }
+
+    /// Brings the tiles up to date in which [`Target::touch`] announced something. Stale tiles are
+    /// safe: nearness only grows.
     pub fn update_tiles(&mut self) {
         if self.width == 0 {
             return;
         }
-        let band = TILE * self.width;
-        for (rows, tiles) in self.nearness.chunks(band).zip(self.tiles.chunks_mut(self.tiles_wide))
-        {
-            tiles.fill(f32::INFINITY);
-            for row in rows.chunks(self.width) {
-                for (tile, pixels) in tiles.iter_mut().zip(row.chunks(TILE)) {
-                    *tile = match <&[f32; TILE]>::try_from(pixels) {
-                        Ok(eight) => least(*tile, least_of(eight)),
-                        Err(_) => pixels.iter().fold(*tile, |a, b| least(a, *b)),
-                    };
+        let bands = self.nearness.chunks(TILE * self.width);
+        let tiles = self.tiles.chunks_mut(self.tiles_wide);
+        for ((rows, tiles), (first, end)) in bands.zip(tiles).zip(&mut self.stale) {
+            if first < end {
+                for (k, tile) in tiles.iter_mut().enumerate().take(*end).skip(*first) {
+                    *tile = least_in_tile(rows, self.width, TILE * k);
                 }
+                (*first, *end) = (self.tiles_wide, 0);
             }
         }
     }
 
     /// Whether something no nearer than `q` inside the rectangle is sure to be hidden.
-    pub fn hides(&self, [u0, v0, u1, v1]: [f32; 4], q: f32) -> bool {
-        let tile = |x: f32, n: usize| (x.max(0.0) as usize / TILE).min(n.saturating_sub(1));
-        let n_high = self.height.div_ceil(TILE);
-        let (i0, i1) = (tile(u0, self.tiles_wide), tile(u1, self.tiles_wide));
-        let (j0, j1) = (tile(v0, n_high), tile(v1, n_high));
+    pub fn hides(&self, rect: [f32; 4], q: f32) -> bool {
+        let [(i0, i1), (j0, j1)] = self.tiles_of(rect);
         (j0..=j1).all(|j| {
             let row = &self.tiles[j * self.tiles_wide..][..self.tiles_wide];
             row[i0..=i1].iter().all(|least| *least >= q)
@@ -101,7 +164,7 @@ impl Target {
 
     /// Draws a triangle whose corners are all in front of the camera, if it faces it.
     #[inline]
-    pub fn draw(&mut self, corners: [Corner; 3], owner: u32) {
+    pub fn draw(&mut self, corners: [Corner; 3], owner: O) {
         let [a, b, c] = corners;
         let (bu, bv, bq) = (b.u - a.u, b.v - a.v, b.q - a.q);
         let (cu, cv, cq) = (c.u - a.u, c.v - a.v, c.q - a.q);
@@ -122,7 +185,7 @@ impl Target {
     }
 
     /// Fills the pixels whose centers lie in the triangle, whichever way it turns.
-    pub fn fill(&mut self, mut p: [(f32, f32); 3], slope: &Slope, owner: u32) {
+    pub fn fill(&mut self, mut p: [(f32, f32); 3], slope: &Slope, owner: O) {
         let before = |a: (f32, f32), b: (f32, f32)| a.1 < b.1 || (a.1 == b.1 && a.0 < b.0);
         if before(p[1], p[0]) {
             p.swap(0, 1);
@@ -156,7 +219,7 @@ impl Target {
         long: Edge,
         short_is_right: bool,
         slope: &Slope,
-        owner: u32,
+        owner: O,
     ) {
         let (left, right) = if short_is_right { (long, short) } else { (short, long) };
         let columns = self.width as i32;
@@ -192,31 +255,79 @@ fn most(x: f32, y: f32) -> f32 {
     if x > y { x } else { y }
 }
 
+/// The least of a tile that begins in this column of its rows.
 #[inline]
-fn least_of(x: &[f32; TILE]) -> f32 {
-    let four: [f32; 4] = std::array::from_fn(|k| least(x[k], x[k + 4]));
-    least(least(four[0], four[2]), least(four[1], four[3]))
+fn least_in_tile(rows: &[f32], width: usize, column: usize) -> f32 {
+    let mut columns = [f32::INFINITY; TILE];
+    for row in rows.chunks_exact(width) {
+        match row[column..].first_chunk::<TILE>() {
+            Some(pixels) => columns = std::array::from_fn(|k| least(columns[k], pixels[k])),
+            None => row[column..].iter().for_each(|q| columns[0] = least(columns[0], *q)),
+        }
+    }
+    columns.into_iter().fold(f32::INFINITY, least)
 }
 
+/// So many pixels are filled at once.
+const LANES: usize = 8;
+
 #[inline]
-fn fill_span(
+fn fill_span<O: Owner>(
     nearness: &mut [f32],
-    owners: &mut [u32],
+    owners: &mut [O],
     q0: f32,
     begin: i32,
     slope: &Slope,
-    owner: u32,
+    owner: O,
+) {
+    let n = nearness.len();
+    let (lanes, rest) = nearness.as_chunks_mut::<LANES>();
+    let is_whole = rest.is_empty();
+    let mut column = begin;
+    for (q, o) in lanes.iter_mut().zip(owners.as_chunks_mut::<LANES>().0) {
+        fill_lanes(q, o, q0, column, slope, owner);
+        column += LANES as i32;
+    }
+    if is_whole {
+        return;
+    }
+    // The end once more in whole lanes: nothing is nearer than itself, so twice does no harm.
+    let end = begin + n as i32;
+    if let (Some(q), Some(o)) = (nearness.last_chunk_mut(), owners.last_chunk_mut()) {
+        fill_lanes::<O, LANES>(q, o, q0, end - LANES as i32, slope, owner);
+    } else if let (Some(q), Some(o)) = (nearness.last_chunk_mut(), owners.last_chunk_mut()) {
+        fill_lanes::<O, 4>(q, o, q0, end - 4, slope, owner);
+        if let (Some(q), Some(o)) = (nearness.first_chunk_mut(), owners.first_chunk_mut()) {
+            fill_lanes::<O, 4>(q, o, q0, begin, slope, owner);
+        }
+    } else {
+        for (k, (q, o)) in nearness.iter_mut().zip(owners).enumerate() {
+            let (q, o) = (std::array::from_mut(q), std::array::from_mut(o));
+            fill_lanes::<O, 1>(q, o, q0, begin + k as i32, slope, owner);
+        }
+    }
+}
+
+/// Fills pixels side by side, the first in this column.
+#[inline(always)]
+fn fill_lanes<O: Owner, const N: usize>(
+    q: &mut [f32; N],
+    o: &mut [O; N],
+    q0: f32,
+    column: i32,
+    slope: &Slope,
+    owner: O,
 ) {
     let Slope { du, low, high, .. } = *slope;
-    let owners = &mut owners[..nearness.len()];
-    for (k, (q, o)) in nearness.iter_mut().zip(owners).enumerate() {
-        let x = q0 + du * (begin + k as i32) as f32;
-        let x = if x < low { low } else { x };
-        let x = if x > high { high } else { x };
-        let wins = x > *q;
-        *q = if wins { x } else { *q };
-        *o = if wins { owner } else { *o };
+    let at = |column: i32| least(high, most(low, q0 + du * column as f32));
+    let x: [f32; N] = std::array::from_fn(|k| at(column + k as i32));
+    // Masks instead of conditions, which the compiler would make branches of.
+    let wins: [u32; N] = std::array::from_fn(|k| u32::from(x[k] > q[k]).wrapping_neg());
+    if wins.iter().fold(0, |any, win| any | win) == 0 {
+        return;
     }
+    *q = std::array::from_fn(|k| most(x[k], q[k]));
+    *o = std::array::from_fn(|k| o[k].replaced(owner, wins[k]));
 }
 
 /// The smallest whole number whose center (+ 0.5) isn't before `x`, within [0, max].
@@ -225,8 +336,7 @@ fn first_center(x: f32, max: i32) -> i32 {
     let t = x - 0.5;
     let t = if t > 0.0 { t } else { 0.0 };
     let t = if t < max as f32 { t } else { max as f32 };
-    let i = t as i32;
-    i + i32::from((i as f32) < t)
+    ceil_small(t)
 }
 
 /// A line down the image.
@@ -275,7 +385,7 @@ mod tests {
         };
         let mut count = vec![0; 64 * 64];
         for k in 0..n {
-            let mut target = Target::default();
+            let mut target = Target::<u32>::default();
             target.clear(64, 64, 0.0);
             target.draw([corner(32.3, 31.7), rim(k + 1), rim(k)], k as u32);
             for (n, o) in count.iter_mut().zip(&target.owner) {
@@ -285,27 +395,69 @@ mod tests {
         assert!(count.iter().all(|n| *n == 1));
     }
 
+    /// What [`fill_span`] is to do, pixel by pixel.
+    fn fill_one_by_one(
+        (q, o): (&mut [f32], &mut [u32]),
+        q0: f32,
+        begin: i32,
+        slope: &Slope,
+        owner: u32,
+    ) {
+        for (k, (q, o)) in q.iter_mut().zip(o).enumerate() {
+            let x = q0 + slope.du * (begin + k as i32) as f32;
+            let x = if x < slope.low { slope.low } else { x };
+            let x = if x > slope.high { slope.high } else { x };
+            if x > *q {
+                (*q, *o) = (x, owner);
+            }
+        }
+    }
+
+    #[test]
+    fn spans_of_any_length_are_filled_as_pixel_by_pixel() {
+        let mut rng = chaic_protocol::rng::Stream::new(1, "spans", 0);
+        for n in (0..40).cycle().take(2000) {
+            let before: Vec<f32> = (0..n).map(|_| rng.range(0.0, 1.0)).collect();
+            let du =
+                [0.0, rng.range(-0.05, 0.05), f32::NAN, 1e30][rng.below(40).saturating_sub(36)];
+            let at = Corner { u: 0.0, v: 0.0, q: 0.0 };
+            let slope = Slope { at, du, dv: 0.0, low: 0.2, high: rng.range(0.2, 1.0) };
+            let (q0, begin) = (rng.range(0.0, 1.0), rng.below(500) as i32);
+            let (mut q, mut owners, mut names) = (before.clone(), vec![7u32; n], vec![7u16; n]);
+            fill_span(&mut q, &mut owners, q0, begin, &slope, 9);
+            fill_span(&mut before.clone(), &mut names, q0, begin, &slope, 9);
+            let (mut right_q, mut right_owners) = (before, vec![7u32; n]);
+            fill_one_by_one((&mut right_q, &mut right_owners), q0, begin, &slope, 9);
+            let bits = |q: &[f32]| q.iter().map(|q| q.to_bits()).collect::<Vec<_>>();
+            assert_eq!(bits(&q), bits(&right_q), "{n} pixels, {slope:?}");
+            assert_eq!(owners, right_owners, "{n} pixels, {slope:?}");
+            assert!(names.iter().zip(&owners).all(|(a, b)| u32::from(*a) == *b));
+        }
+    }
+
     #[test]
     fn odd_numbers_draw_nothing_and_end() {
-        let mut target = Target::default();
+        let mut target = Target::<u32>::default();
         target.clear(16, 16, 0.0);
         for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e38] {
             target.draw([corner(0.0, 0.0), corner(bad, 8.0), corner(3.0, bad)], 1);
         }
         target.draw([corner(5.0, 5.0); 3], 2);
         assert!(target.owner.iter().all(|o| *o != 2));
-        let mut empty = Target::default();
+        let mut empty = Target::<u32>::default();
         empty.clear(0, 0, 0.0);
+        empty.touch([0.0, 0.0, 9.0, 9.0]);
         empty.update_tiles();
         empty.draw([corner(0.0, 0.0), corner(0.0, 9.0), corner(9.0, 0.0)], 1);
     }
 
     #[test]
     fn tiles_hide_only_what_is_behind() {
-        let mut target = Target::default();
+        let mut target = Target::<u32>::default();
         target.clear(20, 20, 0.0);
         target.draw([corner(-50.0, -50.0), corner(-50.0, 100.0), corner(100.0, -50.0)], 1);
         assert!(!target.hides([2.0, 2.0, 9.0, 9.0], 0.5), "tiles are stale");
+        target.touch([-50.0, -50.0, 100.0, 100.0]);
         target.update_tiles();
         assert!(target.hides([2.0, 2.0, 9.0, 9.0], 0.5));
         assert!(!target.hides([2.0, 2.0, 9.0, 9.0], 1.5));

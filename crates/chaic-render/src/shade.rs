@@ -97,7 +97,7 @@ pub(crate) fn shade(
     frame: &Frame,
     lens: &Lens,
     levels: &[u8],
-    target: &Target,
+    target: &Target<u32>,
     row: &mut Row,
     rgb: &mut Vec<u8>,
 ) {

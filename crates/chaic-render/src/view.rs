@@ -94,30 +94,35 @@ pub(crate) fn look(frame: &Frame, view: &View) -> Images {
     };
     with_scratch(|scratch| {
         let omit = Omit { body: view.hide.map(EntityId::of_agent), ceiling: view.hide_ceiling };
-        draw(frame, &lens, omit, scratch);
+        let Scratch { target, plain, work, row } = scratch;
+        if !rgb {
+            draw(frame, &lens, omit, plain, work);
+            return Images {
+                rgb: None,
+                depth_m: depth.then(|| depths(&plain.nearness)),
+                ids: ids.then(|| plain.owner.clone()),
+            };
+        }
+        draw(frame, &lens, omit, target, work);
+        let mut colors = Vec::new();
+        shade(frame, &lens, &work.levels, target, row, &mut colors);
         Images {
-            rgb: rgb.then(|| {
-                let mut out = Vec::new();
-                let Scratch { levels, target, row, .. } = &mut *scratch;
-                shade(frame, &lens, levels, target, row, &mut out);
-                out
-            }),
-            depth_m: depth.then(|| depths(scratch)),
-            ids: ids.then(|| entities(frame, scratch)),
+            rgb: Some(colors),
+            depth_m: depth.then(|| depths(&target.nearness)),
+            ids: ids.then(|| entities(frame, &target.owner)),
         }
     })
 }
 
-fn depths(scratch: &Scratch) -> Vec<f32> {
+fn depths(nearness: &[f32]) -> Vec<f32> {
     let far = 1.0 / Camera::FAR_M;
-    let depth = |q: &f32| if *q > far { 1.0 / *q } else { Camera::FAR_M };
-    scratch.target.nearness.iter().map(depth).collect()
+    nearness.iter().map(|q| if *q > far { 1.0 / *q } else { Camera::FAR_M }).collect()
 }
 
-pub(crate) fn entities(frame: &Frame, scratch: &Scratch) -> Vec<u16> {
+fn entities(frame: &Frame, owners: &[u32]) -> Vec<u16> {
     let entity = |owner: &u32| match *owner {
         NOBODY => EntityId::NOTHING.0,
         owner => frame.instances[owner_parts(owner).0].entity.0,
     };
-    scratch.target.owner.iter().map(entity).collect()
+    owners.iter().map(entity).collect()
 }

@@ -27,7 +27,7 @@ pub fn step(memory: &mut Memory, destination: &Destination) -> Nav {
     let (Some(start), Some(end)) = (grid.cell_at(here), grid.cell_at(target)) else {
         return Nav::Unreachable;
     };
-    let Some(way) = search.straight_way(&grid, costs.costs(), start, end) else {
+    let Some(way) = search.straight_way(costs, start, end) else {
         return Nav::Unreachable;
     };
     let is_short = destination.arm_m.is_none() || way.cells.len() <= INTERACT_CELLS;

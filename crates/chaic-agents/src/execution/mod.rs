@@ -1,6 +1,7 @@
 //! Carrying out plans, one action at a time.
 
 pub mod path;
+mod queue;
 
 pub mod navigate;
 

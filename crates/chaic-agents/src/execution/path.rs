@@ -2,11 +2,11 @@
 
 mod straight;
 
-use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use chaic_protocol::Vec2;
 
+use super::queue::Queue;
 use crate::memory::costs::{CostMap, FREE, OCCUPIED};
 use crate::memory::grid::{CELL_M, Grid};
 pub use straight::StraightReach;
@@ -21,12 +21,24 @@ const COST_PER_M: f32 = (FREE * STRAIGHT) as f32 / CELL_M;
 /// Working space of searches, kept so that a search allocates nothing.
 #[derive(Clone, Debug)]
 pub struct Search {
-    best: Vec<u32>,
-    from: Vec<u32>,
-    epoch_of: Vec<u32>,
+    nodes: Vec<Node>,
     epoch: u32,
-    queue: BinaryHeap<Reverse<(u32, u32)>>,
+    queue: Queue,
+    /// The queue of straight ways.
     visits: BinaryHeap<Visit>,
+    /// The latest straight way: version of the costs, start and end.
+    latest: Option<((u32, usize, usize), Path)>,
+}
+
+/// What a search knows of a cell.
+#[derive(Clone, Copy, Debug, Default)]
+struct Node {
+    /// The search that knows it; what an earlier one knew counts no more.
+    epoch: u32,
+    /// Least cost of getting there that was found.
+    best: u32,
+    /// The cell before it on that way.
+    from: u32,
 }
 
 /// A way from cell to cell.
@@ -62,27 +74,27 @@ impl Search {
     /// Working space for maps of this many cells.
     pub fn new(n_cells: usize) -> Search {
         Search {
-            best: vec![0; n_cells],
-            from: vec![0; n_cells],
-            epoch_of: vec![0; n_cells],
+            nodes: vec![Node::default(); n_cells],
             epoch: 0,
-            queue: BinaryHeap::new(),
+            queue: Queue::new(n_cells),
             visits: BinaryHeap::new(),
+            latest: None,
         }
     }
 
     fn begin(&mut self, start: usize) {
         self.epoch += 1;
         self.queue.clear();
-        self.improve(start, start, 0, 0);
+        self.improve(start, start, 0, || 0);
     }
 
-    fn improve(&mut self, cell: usize, from: usize, cost: u32, still: u32) {
-        if self.epoch_of[cell] != self.epoch || cost < self.best[cell] {
-            self.epoch_of[cell] = self.epoch;
-            self.best[cell] = cost;
-            self.from[cell] = from as u32;
-            self.queue.push(Reverse((cost.saturating_add(still), cell as u32)));
+    /// Takes a way to a cell if it is the best so far.
+    #[inline]
+    fn improve(&mut self, cell: usize, from: usize, cost: u32, still: impl FnOnce() -> u32) {
+        let node = &mut self.nodes[cell];
+        if node.epoch != self.epoch || cost < node.best {
+            *node = Node { epoch: self.epoch, best: cost, from: from as u32 };
+            self.queue.push(cost.saturating_add(still()), cell as u32);
         }
     }
 
@@ -99,9 +111,9 @@ impl Search {
         self.begin(start);
         // Rounded down, so that it never exceeds the true cost.
         let still = |cell: usize| (goal.at_least_m(cell).max(0.0) * COST_PER_M) as u32;
-        while let Some(Reverse((estimate, cell))) = self.queue.pop() {
+        while let Some((estimate, cell)) = self.queue.pop() {
             let cell = cell as usize;
-            let cost = self.best[cell];
+            let cost = self.nodes[cell].best;
             if cost > limit {
                 return None;
             }
@@ -113,10 +125,7 @@ impl Search {
             }
             for (next, diagonal) in grid.neighbors(cell) {
                 if let Some(step) = step_cost(costs, grid, cell, next, diagonal) {
-                    let total = cost.saturating_add(step);
-                    if self.epoch_of[next] != self.epoch || total < self.best[next] {
-                        self.improve(next, cell, total, still(next));
-                    }
+                    self.improve(next, cell, cost.saturating_add(step), || still(next));
                 }
             }
         }
@@ -127,7 +136,7 @@ impl Search {
         let mut cells = vec![end];
         let mut cell = end;
         while cell != start {
-            cell = self.from[cell] as usize;
+            cell = self.nodes[cell].from as usize;
             cells.push(cell);
         }
         cells.reverse();
@@ -147,9 +156,9 @@ impl Reach {
         let mut reach = Reach { cost: vec![u32::MAX; costs.grid().n_cells()] };
         let Some(start) = costs.grid().cell_at(here) else { return reach };
         search.begin(start);
-        while let Some(Reverse((cost, cell))) = search.queue.pop() {
+        while let Some((cost, cell)) = search.queue.pop() {
             let cell = cell as usize;
-            if cost > search.best[cell] {
+            if cost > search.nodes[cell].best {
                 continue;
             }
             reach.cost[cell] = cost;
@@ -158,7 +167,7 @@ impl Reach {
                     continue;
                 }
                 if let Some(step) = step_cost(costs.costs(), costs.grid(), cell, next, diagonal) {
-                    search.improve(next, cell, cost.saturating_add(step), 0);
+                    search.improve(next, cell, cost.saturating_add(step), || 0);
                 }
             }
         }

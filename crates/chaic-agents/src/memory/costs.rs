@@ -1,5 +1,7 @@
 //! What it costs to enter each cell, for one body.
 
+use std::cell::OnceCell;
+
 use chaic_protocol::geom::xz;
 use chaic_protocol::{Frame, Vec2};
 
@@ -46,7 +48,10 @@ pub struct CostMap {
     grid: Grid,
     radius_m: f32,
     cost: Vec<u32>,
-    clearance: Vec<u16>,
+    /// Working space: the costs before they were computed last.
+    before: Vec<u32>,
+    /// Chamfer distance of each cell from the nearest occupied one; measured when first asked for.
+    clearance: OnceCell<Vec<u16>>,
     version: u32,
     belief: lattice_costs::Belief,
 }
@@ -58,7 +63,8 @@ impl CostMap {
             grid,
             radius_m,
             cost: vec![FREE + UNKNOWN_EXTRA; grid.n_cells()],
-            clearance: vec![FARTHEST; grid.n_cells()],
+            before: Vec::new(),
+            clearance: OnceCell::from(vec![FARTHEST; grid.n_cells()]),
             version: 0,
             belief: lattice_costs::Belief::default(),
         }
@@ -69,7 +75,7 @@ impl CostMap {
         &self.grid
     }
 
-    /// Grows with every rebuilding.
+    /// Grows whenever costs may have changed.
     pub fn version(&self) -> u32 {
         self.version
     }
@@ -94,12 +100,22 @@ impl CostMap {
     /// Whether the body touches something (or may not stand at all) with its middle in this cell.
     #[inline]
     pub fn is_tight(&self, cell: usize) -> bool {
-        f32::from(self.clearance[cell]) * M_PER_UNIT < self.radius_m
+        self.clearance_m(cell) < self.radius_m
     }
 
     /// Distance from the middle of the cell to the nearest occupied one, metres, up to 1.5.
+    #[inline]
     pub fn clearance_m(&self, cell: usize) -> f32 {
-        f32::from(self.clearance[cell]) * M_PER_UNIT
+        let clearance = self.clearance.get_or_init(|| self.believed_clearance());
+        f32::from(clearance[cell]) * M_PER_UNIT
+    }
+
+    #[cold]
+    fn believed_clearance(&self) -> Vec<u16> {
+        let distance = |cell| if self.belief.is_occupied(cell) { 0 } else { FARTHEST };
+        let mut clearance: Vec<u16> = (0..self.grid.n_cells()).map(distance).collect();
+        measure_clearance(&self.grid, &mut clearance);
+        clearance
     }
 
     /// Radius of the body, metres.
@@ -128,8 +144,10 @@ impl CostMap {
         now: Frame,
     ) {
         self.version += 1;
-        for (cell, cost) in self.cost.iter_mut().enumerate() {
-            (*cost, self.clearance[cell]) = match map.space(cell) {
+        let mut clearance = self.clearance.take().unwrap_or_default();
+        clearance.resize(self.grid.n_cells(), FARTHEST);
+        for ((cost, clearance), cell) in self.cost.iter_mut().zip(&mut clearance).zip(map.cells()) {
+            (*cost, *clearance) = match cell.space() {
                 Space::Free => (FREE, FARTHEST),
                 Space::Unknown => (FREE + UNKNOWN_EXTRA, FARTHEST),
                 Space::Occupied => (OCCUPIED, 0),
@@ -143,12 +161,13 @@ impl CostMap {
                 let points = thing.footprint.iter().filter(|p| p.distance(here) > OWN_PLACE_M);
                 for cell in points.filter_map(|p| self.grid.cell_at(*p)) {
                     self.cost[cell] = self.cost[cell].max(OCCUPIED);
-                    self.clearance[cell] = 0;
+                    clearance[cell] = 0;
                 }
             }
         }
-        self.measure_clearance();
-        self.add_rings();
+        measure_clearance(&self.grid, &mut clearance);
+        self.add_rings(&clearance);
+        self.clearance = OnceCell::from(clearance);
         for cell in map.bumped_cells() {
             self.cost[cell] += BUMP_EXTRA;
         }
@@ -161,59 +180,15 @@ impl CostMap {
 
     /// Computes all costs anew by the original's reckoning.
     pub fn rebuild_lattice(&mut self, seen: &lattice_costs::Seen<'_>) {
-        self.version += 1;
+        std::mem::swap(&mut self.cost, &mut self.before);
+        self.cost.resize(self.grid.n_cells(), 0);
         lattice_costs::lattice_costs(&self.grid, seen, &mut self.belief, &mut self.cost);
-        for (cell, clearance) in self.clearance.iter_mut().enumerate() {
-            *clearance = if self.belief.is_occupied(cell) { 0 } else { FARTHEST };
-        }
-        self.measure_clearance();
+        self.version += u32::from(self.cost != self.before);
+        // Hardly anybody asks for it.
+        self.clearance.take();
     }
 
-    /// Two-pass chamfer distance transform from the occupied cells.
-    fn measure_clearance(&mut self) {
-        let (nx, nz) = (self.grid.nx(), self.grid.nz());
-        let d = &mut self.clearance;
-        for j in 0..nz {
-            for i in 0..nx {
-                let c = j * nx + i;
-                let mut best = d[c];
-                if i > 0 {
-                    best = best.min(d[c - 1] + STRAIGHT);
-                }
-                if j > 0 {
-                    best = best.min(d[c - nx] + STRAIGHT);
-                    if i > 0 {
-                        best = best.min(d[c - nx - 1] + DIAGONAL);
-                    }
-                    if i + 1 < nx {
-                        best = best.min(d[c - nx + 1] + DIAGONAL);
-                    }
-                }
-                d[c] = best;
-            }
-        }
-        for j in (0..nz).rev() {
-            for i in (0..nx).rev() {
-                let c = j * nx + i;
-                let mut best = d[c];
-                if i + 1 < nx {
-                    best = best.min(d[c + 1] + STRAIGHT);
-                }
-                if j + 1 < nz {
-                    best = best.min(d[c + nx] + STRAIGHT);
-                    if i > 0 {
-                        best = best.min(d[c + nx - 1] + DIAGONAL);
-                    }
-                    if i + 1 < nx {
-                        best = best.min(d[c + nx + 1] + DIAGONAL);
-                    }
-                }
-                d[c] = best;
-            }
-        }
-    }
-
-    fn add_rings(&mut self) {
+    fn add_rings(&mut self, clearance: &[u16]) {
         // Extra cost by clearance, once per possible value instead of once per cell.
         let extra: Vec<u32> = (0..=FARTHEST)
             .map(|units| {
@@ -224,11 +199,49 @@ impl CostMap {
                 RING.iter().find(|(m, _)| beyond_m < *m).map_or(0, |(_, extra)| *extra)
             })
             .collect();
-        for (cost, clearance) in self.cost.iter_mut().zip(&self.clearance) {
+        for (cost, clearance) in self.cost.iter_mut().zip(clearance) {
             if *clearance > 0 {
                 *cost += extra[usize::from((*clearance).min(FARTHEST))];
             }
         }
+    }
+}
+
+/// Two-pass chamfer distance transform from the cells at distance 0.
+fn measure_clearance(grid: &Grid, d: &mut [u16]) {
+    let nx = grid.nx();
+    let mut above: Option<&mut [u16]> = None;
+    for row in d.chunks_exact_mut(nx) {
+        if let Some(above) = above {
+            step_across(row, above);
+        }
+        step_along(row.iter_mut());
+        above = Some(row);
+    }
+    let mut below: Option<&mut [u16]> = None;
+    for row in d.chunks_exact_mut(nx).rev() {
+        if let Some(below) = below {
+            step_across(row, below);
+        }
+        step_along(row.iter_mut().rev());
+        below = Some(row);
+    }
+}
+
+/// Distances of a row that come from the finished row beside it.
+fn step_across(row: &mut [u16], beside: &[u16]) {
+    let shorter = |(to, from): (&mut u16, &u16), step: u16| *to = (*to).min(*from + step);
+    row.iter_mut().zip(beside).for_each(|pair| shorter(pair, STRAIGHT));
+    row[1..].iter_mut().zip(beside).for_each(|pair| shorter(pair, DIAGONAL));
+    row.iter_mut().zip(&beside[1..]).for_each(|pair| shorter(pair, DIAGONAL));
+}
+
+/// Distances of a row that come from the cell before.
+fn step_along<'a>(row: impl Iterator<Item = &'a mut u16>) {
+    let mut before = FARTHEST;
+    for d in row {
+        *d = (*d).min(before + STRAIGHT);
+        before = *d;
     }
 }
 

@@ -2,6 +2,7 @@
 
 use chaic_protocol::Vec2;
 use chaic_protocol::geom::Rect;
+use chaic_protocol::geom::math::floor_small;
 
 /// Side of a cell, metres (original facts 1.1).
 pub const CELL_M: f32 = 0.125;
@@ -61,16 +62,32 @@ impl Grid {
         None
     }
 
+    /// [`Grid::cell_at`] without branches, for loops over very many points; -1 if there is none.
+    #[inline]
+    pub fn cell_or_none(&self, x: f32, z: f32) -> i32 {
+        let (x, z) = ((x - self.min.x) * (1.0 / CELL_M), (z - self.min.y) * (1.0 / CELL_M));
+        let (nx, nz) = (self.nx as i32, self.nz as i32);
+        let inside = (x >= 0.0) & (z >= 0.0) & (x < nx as f32) & (z < nz as f32);
+        let cell = floor_small(z).wrapping_mul(nx).wrapping_add(floor_small(x));
+        cell | i32::from(inside).wrapping_sub(1)
+    }
+
     /// Column and row of a cell.
     #[inline]
     pub fn column_row(&self, cell: usize) -> (usize, usize) {
-        (cell % self.nx, cell / self.nx)
+        // Divides in 32 bits, which takes half as long: there are 2^20 cells at most.
+        let (cell, nx) = (cell as u32, self.nx as u32);
+        ((cell % nx) as usize, (cell / nx) as usize)
     }
 
     /// Middle of a cell (x, z).
     pub fn center(&self, cell: usize) -> Vec2 {
         let (i, j) = self.column_row(cell);
-        self.min + CELL_M * Vec2::new(i as f32 + 0.5, j as f32 + 0.5)
+        self.center_at(i, j)
+    }
+
+    fn center_at(&self, column: usize, row: usize) -> Vec2 {
+        self.min + CELL_M * Vec2::new(column as f32 + 0.5, row as f32 + 0.5)
     }
 
     /// The neighbors of a cell: its number, and whether it lies diagonally.
@@ -85,6 +102,30 @@ impl Grid {
         })
     }
 
+    /// Visits the straight neighbors of the cell in column `i` and row `j`, in the order of
+    /// [`Grid::neighbors`], with number, column and row of each.
+    #[inline]
+    pub fn for_straight_neighbors(
+        &self,
+        i: usize,
+        j: usize,
+        mut visit: impl FnMut(usize, usize, usize),
+    ) {
+        let cell = j * self.nx + i;
+        if i + 1 < self.nx {
+            visit(cell + 1, i + 1, j);
+        }
+        if i > 0 {
+            visit(cell - 1, i - 1, j);
+        }
+        if j + 1 < self.nz {
+            visit(cell + self.nx, i, j + 1);
+        }
+        if j > 0 {
+            visit(cell - self.nx, i, j - 1);
+        }
+    }
+
     /// The cells whose middle is within `radius_m` of `center`.
     pub fn disc(&self, center: Vec2, radius_m: f32) -> impl Iterator<Item = usize> + use<> {
         let grid = *self;
@@ -93,9 +134,11 @@ impl Grid {
         let clip = |v: f32, n: usize| (v.max(0.0) as usize).min(n);
         let (i0, i1) = (clip(low.x, self.nx), clip(high.x + 1.0, self.nx));
         let (j0, j1) = (clip(low.y, self.nz), clip(high.y + 1.0, self.nz));
-        (j0..j1)
-            .flat_map(move |j| (i0..i1).map(move |i| j * grid.nx + i))
-            .filter(move |&c| grid.center(c).distance_squared(center) <= radius_m * radius_m)
+        let within =
+            move |i, j| grid.center_at(i, j).distance_squared(center) <= radius_m * radius_m;
+        (j0..j1).flat_map(move |j| {
+            (i0..i1).filter(move |&i| within(i, j)).map(move |i| j * grid.nx + i)
+        })
     }
 
     /// The cells along a straight line, in steps of half a cell, both ends included; points
@@ -124,6 +167,11 @@ mod tests {
         }
         assert_eq!(grid.cell_at(Vec2::new(-3.1, 0.0)), None);
         assert_eq!(grid.cell_at(Vec2::new(0.0, 5.1)), None);
+        let across = || (-40..60).map(|k| 0.11 * k as f32).chain([f32::NAN, f32::INFINITY, -1e30]);
+        for (x, z) in across().flat_map(|x| across().map(move |z| (x, z))) {
+            let cell = grid.cell_at(Vec2::new(x, z)).map_or(-1, |c| c as i32);
+            assert_eq!(grid.cell_or_none(x, z), cell, "{x} {z}");
+        }
     }
 
     #[test]
@@ -131,6 +179,16 @@ mod tests {
         let grid = Grid::over(&Rect::new([0.0, 0.0], [1.0, 1.0]));
         assert_eq!(grid.neighbors(0).count(), 3);
         assert_eq!(grid.neighbors(grid.nx() + 1).count(), 8);
+        for cell in [0, 5, grid.nx() - 1, grid.nx() + 1, grid.n_cells() - 1] {
+            let (i, j) = grid.column_row(cell);
+            let mut visited = Vec::new();
+            grid.for_straight_neighbors(i, j, |next, i, j| {
+                assert_eq!(grid.column_row(next), (i, j));
+                visited.push(next);
+            });
+            let straight = grid.neighbors(cell).filter(|(_, diagonal)| !diagonal);
+            assert_eq!(visited, straight.map(|(next, _)| next).collect::<Vec<_>>());
+        }
         assert_eq!(grid.disc(grid.center(100), 0.13).count(), 5);
     }
 }

@@ -57,28 +57,31 @@ pub struct Seen<'a> {
 #[derive(Clone, Debug, Default)]
 pub struct Belief {
     occupied: Vec<bool>,
+    /// Whether a cell counts as a wall: as long as it counts as occupied, once it was seen as one.
     wall: Vec<bool>,
     n_updates: u32,
+    /// Working space: the latest account, and which cells are near occupied ones.
+    latest: Vec<bool>,
+    near: [Vec<bool>; 2],
+    rows: Vec<bool>,
 }
 
 impl Belief {
-    /// Takes in which cells are occupied, and which of them are walls, by the latest account.
-    fn update(&mut self, now: Vec<bool>, is_wall: impl Fn(usize) -> bool) {
-        self.wall.resize(now.len(), false);
+    /// Takes in `latest`: which cells are occupied by the latest account.
+    fn update(&mut self) {
         if self.n_updates.is_multiple_of(BELIEVE_EVERY) {
-            self.occupied = now;
+            std::mem::swap(&mut self.occupied, &mut self.latest);
         } else {
-            self.occupied.iter_mut().zip(now).for_each(|(old, new)| *old |= new);
-        }
-        // A wall is one as long as its cell counts as occupied.
-        for (cell, wall) in self.wall.iter_mut().enumerate() {
-            *wall = is_wall(cell) || (*wall && self.occupied[cell]);
+            self.occupied.iter_mut().zip(&self.latest).for_each(|(old, new)| *old |= new);
         }
         self.n_updates += 1;
     }
 
-    fn is_wall(&self, cell: usize) -> bool {
-        self.wall.get(cell).copied().unwrap_or(false)
+    /// Finds the cells near occupied ones.
+    fn spread(&mut self, grid: &Grid) {
+        let Belief { occupied, near: [next_to, within_two], rows, .. } = self;
+        grow(occupied, grid.nx(), rows, next_to);
+        grow(next_to, grid.nx(), rows, within_two);
     }
 
     /// Whether a cell counts as occupied.
@@ -87,11 +90,26 @@ impl Belief {
     }
 }
 
+/// Puts into `grown` the cells that are in `cells` or next to one in it, also diagonally. All are
+/// row by row, `nx` a row.
+fn grow(cells: &[bool], nx: usize, rows: &mut Vec<bool>, grown: &mut Vec<bool>) {
+    rows.clear();
+    rows.extend_from_slice(cells);
+    for (row, from) in rows.chunks_mut(nx).zip(cells.chunks(nx)) {
+        row.iter_mut().zip(&from[1..]).for_each(|(to, right)| *to |= right);
+        row[1..].iter_mut().zip(from).for_each(|(to, left)| *to |= left);
+    }
+    grown.clear();
+    grown.extend_from_slice(rows);
+    grown.iter_mut().zip(&rows[nx..]).for_each(|(to, below)| *to |= below);
+    grown[nx..].iter_mut().zip(rows.iter()).for_each(|(to, above)| *to |= above);
+}
+
 /// Takes in what is seen, and computes the costs of all cells.
 pub fn lattice_costs(grid: &Grid, seen: &Seen<'_>, belief: &mut Belief, cost: &mut [u32]) {
-    let is_wall = |cell| seen.map.space(cell) == Space::Wall;
-    let mut occupied: Vec<bool> =
-        (0..grid.n_cells()).map(|c| seen.map.space(c) >= Space::Occupied).collect();
+    let occupied = &mut belief.latest;
+    occupied.clear();
+    occupied.extend(seen.map.cells().map(|cell| cell.space() >= Space::Occupied));
     let firm = |role| matches!(role, Role::Obstacle | Role::HeavyTarget);
     let standing =
         seen.things.iter().filter(|t| t.is_present && !t.is_gone && seen.now >= t.held_until);
@@ -104,39 +122,33 @@ pub fn lattice_costs(grid: &Grid, seen: &Seen<'_>, belief: &mut Belief, cost: &m
             occupied[cell] = true;
         }
     }
-    belief.update(occupied, is_wall);
-    cost.fill(FREE);
-    for cell in (0..grid.n_cells()).filter(|c| belief.is_occupied(*c)) {
-        for (reach, near) in [2, 1].into_iter().zip(NEAR) {
-            for c in around(grid, cell, [reach, reach]) {
-                cost[c] = cost[c].max(near);
-            }
-        }
-    }
+    belief.update();
+    belief.spread(grid);
     let in_it = if seen.now < FIRST_FRAMES { OCCUPIED_AT_FIRST } else { OCCUPIED };
-    for (cell, cost) in cost.iter_mut().enumerate() {
-        if belief.is_occupied(cell) {
-            *cost = in_it;
-        }
-        if !seen.map.is_known(cell) {
-            *cost += UNKNOWN_EXTRA;
-        }
-        if belief.is_wall(cell) {
-            *cost += WALL_EXTRA;
-        }
-        if seen.map.is_tall(cell) {
-            *cost += TRUE_WALL_EXTRA;
-        }
+    let near = belief.near[0].iter().zip(&belief.near[1]);
+    belief.wall.resize(grid.n_cells(), false);
+    let believed = belief.occupied.iter().zip(&mut belief.wall).zip(near);
+    for ((cost, cell), ((is_occupied, is_wall), (is_next, is_near))) in
+        cost.iter_mut().zip(seen.map.cells()).zip(believed)
+    {
+        let place = if *is_near { NEAR[0] } else { FREE };
+        let place = if *is_next { NEAR[1] } else { place };
+        let place = if *is_occupied { in_it } else { place };
+        let unknown = if cell.is_known() { 0 } else { UNKNOWN_EXTRA };
+        *is_wall = cell.space() == Space::Wall || (*is_wall && *is_occupied);
+        let wall = if *is_wall { WALL_EXTRA } else { 0 };
+        let true_wall = if cell.is_tall() { TRUE_WALL_EXTRA } else { 0 };
+        *cost = place + unknown + wall + true_wall;
     }
     if seen.heeds_obstacles {
         let obstacles = standing.iter().filter(|t| t.class.info().role == Role::Obstacle);
-        let mut heeded = vec![false; grid.n_cells()];
-        for cell in obstacles.filter_map(|t| grid.cell_at(xz(t.position_in_world))) {
-            around(grid, cell, OBSTACLE_CELLS).for_each(|c| heeded[c] = true);
-        }
-        for (cost, _) in cost.iter_mut().zip(heeded).filter(|(_, heeded)| *heeded) {
-            *cost += OBSTACLE_EXTRA;
-        }
+        let mut heeded: Vec<usize> = obstacles
+            .filter_map(|t| grid.cell_at(xz(t.position_in_world)))
+            .flat_map(|cell| around(grid, cell, OBSTACLE_CELLS))
+            .collect();
+        heeded.sort_unstable();
+        heeded.dedup();
+        heeded.into_iter().for_each(|cell| cost[cell] += OBSTACLE_EXTRA);
     }
 }
 

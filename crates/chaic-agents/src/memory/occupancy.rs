@@ -1,7 +1,7 @@
 //! Where one can walk: free, occupied and unknown space, from depth images.
 
 use chaic_protocol::geom::{Camera, Rect, xz};
-use chaic_protocol::{Frame, Observation, Vec2};
+use chaic_protocol::{Frame, Observation, Vec2, Vec3};
 
 use super::grid::{CELL_M, Grid};
 use crate::perception::{Percepts, Rays};
@@ -43,6 +43,40 @@ pub enum Space {
     Wall,
 }
 
+/// What is known of one cell, as it is stored.
+#[derive(Clone, Copy, Debug)]
+pub struct Cell {
+    /// How sure one is that it is occupied, 0..=6.
+    sure: u8,
+    /// Bits of what was ever seen of it.
+    seen: u8,
+}
+
+impl Cell {
+    /// What is known of it.
+    #[inline]
+    pub fn space(self) -> Space {
+        match (self.sure > 0, self.seen) {
+            (true, seen) if seen & SEEN_HIGH != 0 => Space::Wall,
+            (true, _) => Space::Occupied,
+            (false, seen) if seen & SEEN_FREE != 0 => Space::Free,
+            _ => Space::Unknown,
+        }
+    }
+
+    /// Whether anything of it was ever seen within the known range.
+    #[inline]
+    pub fn is_known(self) -> bool {
+        self.seen & SEEN_NEAR != 0
+    }
+
+    /// Whether something as tall as only walls are was ever seen there.
+    #[inline]
+    pub fn is_tall(self) -> bool {
+        self.seen & SEEN_TALL != 0
+    }
+}
+
 /// Bits of what was ever seen of a cell.
 const SEEN_FREE: u8 = 1;
 const SEEN_HIGH: u8 = 2;
@@ -50,14 +84,80 @@ const SEEN_HIGH: u8 = 2;
 const ASSUMED: u8 = 4;
 /// Something of it was seen from near enough to count as known.
 const SEEN_NEAR: u8 = 8;
-/// A wall for good.
+/// Something of it was seen that is as tall as only walls are.
 const SEEN_TALL: u8 = 16;
+/// What tells nothing of where one can walk.
+const BESIDES: u8 = SEEN_NEAR | SEEN_TALL;
 /// Bits of what one image shows of a cell.
 const NOW_FLOOR: u8 = 1;
 const NOW_OCCUPIED: u8 = 2;
 const NOW_HIGH: u8 = 4;
 const NOW_NEAR: u8 = 8;
 const NOW_TALL: u8 = 16;
+
+/// What a pixel shows is a cell times this, and `NOW_*` bits.
+const SHOWN_CELL: u32 = 32;
+/// So many pixels are looked at at once.
+const LANES: usize = 8;
+
+/// What counts as inside the map, as occupied and as near.
+#[derive(Clone, Copy)]
+struct Limits {
+    grid: Grid,
+    /// Nothing above this is in the way, metres.
+    head_m: f32,
+    /// What is seen within this counts as known, metres.
+    known_m: f32,
+}
+
+impl Limits {
+    /// What pixels of one row at depths `d` show, 0 for nothing. `columns` and `row` are those of
+    /// [`Rays`], axis by axis.
+    #[inline]
+    fn shown(
+        &self,
+        d: &[f32; LANES],
+        columns: [&[f32; LANES]; 3],
+        eye: Vec3,
+        row: Vec3,
+    ) -> [u32; LANES] {
+        let is_near = |d: f32| (d < MAP_RANGE_M) & (d > Camera::NEAR_M);
+        if !d.iter().fold(false, |any, d| any | is_near(*d)) {
+            return [0; LANES];
+        }
+        let head_m = self.head_m.min(WALL_M);
+        let at = |axis: usize| -> [f32; LANES] {
+            std::array::from_fn(|k| eye[axis] + d[k] * (columns[axis][k] + row[axis]))
+        };
+        let [x, y, z] = [0, 1, 2].map(at);
+        // Masks instead of conditions, which the compiler would make branches of.
+        let mask = |is: bool| u32::from(is).wrapping_neg();
+        let bits: [u32; LANES] = std::array::from_fn(|k| {
+            let floor = mask(y[k] < FLOOR_M) & u32::from(NOW_FLOOR);
+            let firm = mask((y[k] > STEP_M) & (y[k] <= head_m)) & u32::from(NOW_OCCUPIED);
+            let high = mask((y[k] > WALL_M) & (y[k] < TOP_M)) & u32::from(NOW_HIGH);
+            let tall = mask((y[k] > TALL_M) & (y[k] < TOP_M)) & u32::from(NOW_TALL);
+            let near = mask((d[k] < self.known_m) & (y[k] < TOP_M)) & u32::from(NOW_NEAR);
+            floor | firm | high | tall | near
+        });
+        let cells: [i32; LANES] = std::array::from_fn(|k| self.grid.cell_or_none(x[k], z[k]));
+        std::array::from_fn(|k| {
+            let counts = is_near(d[k]) & (bits[k] != 0) & (cells[k] >= 0);
+            ((cells[k] as u32).wrapping_mul(SHOWN_CELL) | bits[k]) & mask(counts)
+        })
+    }
+}
+
+/// Every so many-th of a row of pixels.
+#[inline]
+fn every(stride: usize, row: &[f32], sampled: &mut [f32]) {
+    if stride == 2 && row.len().is_multiple_of(2) {
+        // The usual case in a form that the compiler makes a few instructions of.
+        sampled.iter_mut().zip(row.as_chunks::<2>().0).for_each(|(to, pair)| *to = pair[0]);
+    } else {
+        sampled.iter_mut().zip(row.iter().step_by(stride)).for_each(|(to, d)| *to = *d);
+    }
+}
 
 /// Where somebody could not get on although the map said so.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -131,12 +231,12 @@ impl OccupancyMap {
     /// What is known of a cell.
     #[inline]
     pub fn space(&self, cell: usize) -> Space {
-        match (self.sure[cell], self.seen[cell]) {
-            (1.., seen) if seen & SEEN_HIGH != 0 => Space::Wall,
-            (1.., _) => Space::Occupied,
-            (0, seen) if seen & SEEN_FREE != 0 => Space::Free,
-            _ => Space::Unknown,
-        }
+        Cell { sure: self.sure[cell], seen: self.seen[cell] }.space()
+    }
+
+    /// All cells, row by row.
+    pub fn cells(&self) -> impl Iterator<Item = Cell> + '_ {
+        self.sure.iter().zip(&self.seen).map(|(sure, seen)| Cell { sure: *sure, seen: *seen })
     }
 
     /// Whether there is something to find out at a cell: it is unknown, and not only because it
@@ -148,11 +248,6 @@ impl OccupancyMap {
     /// Whether anything of a cell was ever seen within the known range.
     pub fn is_known(&self, cell: usize) -> bool {
         self.seen[cell] & SEEN_NEAR != 0
-    }
-
-    /// Whether something as tall as only walls are was ever seen in a cell.
-    pub fn is_tall(&self, cell: usize) -> bool {
-        self.seen[cell] & SEEN_TALL != 0
     }
 
     /// Frame in which the metre square around a cell was seen last, if ever.
@@ -217,41 +312,52 @@ impl OccupancyMap {
     ) {
         let stride = percepts.stride.max(1) as usize;
         let (width, height) = (camera.width as usize, camera.height as usize);
-        let masked_width = width.div_ceil(stride);
-        let head_m = height_m + 0.05;
+        let sampled_width = width.div_ceil(stride);
         let rays = Rays::new(camera);
-        let unmasked = vec![false; masked_width];
+        // Padded to whole lanes; what is at no distance shows nothing.
+        let padded_width = sampled_width.next_multiple_of(LANES);
+        let columns: [Vec<f32>; 3] = std::array::from_fn(|axis| {
+            let mut columns: Vec<f32> =
+                rays.columns.iter().step_by(stride).map(|c| c[axis]).collect();
+            columns.resize(padded_width, 0.0);
+            columns
+        });
+        let [xs, ys, zs] = columns.each_ref().map(|c| c.as_chunks::<LANES>().0);
+        let mut sampled = vec![0.0; padded_width];
+        let limits = Limits { grid: self.grid, head_m: height_m + 0.05, known_m };
         self.touched.clear();
         for (k, row) in (0..height).step_by(stride).enumerate() {
-            let loose = percepts.loose.get(k * masked_width..(k + 1) * masked_width);
-            let loose = loose.unwrap_or(&unmasked);
-            let depth = &depth[row * width..][..width];
-            for (column, loose) in (0..width).step_by(stride).zip(loose) {
-                let d = depth[column];
-                if *loose || d >= MAP_RANGE_M || d <= Camera::NEAR_M {
-                    continue;
-                }
-                let p = rays.point(column, row, d);
-                let bit = if p.y < FLOOR_M {
-                    NOW_FLOOR
-                } else if p.y > STEP_M && p.y <= head_m.min(WALL_M) {
-                    NOW_OCCUPIED
-                } else if p.y > TALL_M && p.y < TOP_M {
-                    NOW_HIGH | NOW_TALL
-                } else if p.y > WALL_M && p.y < TOP_M {
-                    NOW_HIGH
-                } else if p.y < TOP_M {
-                    0
-                } else {
-                    continue;
-                };
-                let Some(cell) = self.grid.cell_at(xz(p)) else { continue };
-                let bits = bit | if d < known_m { NOW_NEAR } else { 0 };
-                if self.now[cell] == 0 && bits != 0 {
-                    self.touched.push(cell as u32);
-                }
-                self.now[cell] |= bits;
+            every(stride, &depth[row * width..][..width], &mut sampled);
+            let loose = percepts.loose.get(k * sampled_width..(k + 1) * sampled_width);
+            for (d, loose) in sampled.iter_mut().zip(loose.unwrap_or_default()) {
+                *d = if *loose { 0.0 } else { *d };
             }
+            let mut last = 0;
+            let lanes = sampled.as_chunks::<LANES>().0.iter().zip(xs.iter().zip(ys).zip(zs));
+            for (d, ((x, y), z)) in lanes {
+                let shown = limits.shown(d, [x, y, z], rays.eye, rays.rows[row]);
+                // Neighbors mostly show the same.
+                if shown.iter().fold(0, |differ, shown| differ | (shown ^ last)) != 0 {
+                    for shown in shown {
+                        if shown != last {
+                            self.mark(shown);
+                        }
+                        last = shown;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Marks what a pixel shows, see [`Limits::shown`].
+    #[inline]
+    fn mark(&mut self, shown: u32) {
+        if shown != 0 {
+            let (cell, bits) = ((shown / SHOWN_CELL) as usize, (shown % SHOWN_CELL) as u8);
+            if self.now[cell] == 0 {
+                self.touched.push(cell as u32);
+            }
+            self.now[cell] |= bits;
         }
     }
 
@@ -261,7 +367,7 @@ impl OccupancyMap {
         let touched = std::mem::take(&mut self.touched);
         for &cell in &touched {
             let cell = cell as usize;
-            let before = (self.sure[cell] > 0, self.seen[cell] & !SEEN_NEAR);
+            let before = (self.sure[cell] > 0, self.seen[cell] & !BESIDES);
             let bits = std::mem::take(&mut self.now[cell]);
             if bits & NOW_OCCUPIED != 0 {
                 self.sure[cell] = (self.sure[cell] + SURE_ONCE).min(SURE_MOST);
@@ -281,7 +387,7 @@ impl OccupancyMap {
                 let place = self.place_of(cell);
                 self.place_seen[place] = now + 1;
             }
-            changed |= before != (self.sure[cell] > 0, self.seen[cell] & !SEEN_NEAR);
+            changed |= before != (self.sure[cell] > 0, self.seen[cell] & !BESIDES);
             if bits & NOW_NEAR != 0 {
                 self.seen[cell] |= SEEN_NEAR;
             }
@@ -302,7 +408,7 @@ impl OccupancyMap {
                 continue;
             }
             let center = self.grid.center(cell);
-            let point = chaic_protocol::Vec3::new(center.x, camera.eye_in_world.y, center.y);
+            let point = Vec3::new(center.x, camera.eye_in_world.y, center.y);
             let Some((px, d)) = camera.project(point) else { continue };
             if px.x < 0.0 || px.x >= camera.width as f32 {
                 continue;

@@ -88,16 +88,22 @@ impl Eyes {
     fn seen(&self, ids: &[u16]) -> Seen {
         let mut seen = Seen::default();
         let mut last = EntityId::NOTHING.0;
-        for id in ids {
-            // Neighboring pixels mostly show the same thing.
-            if *id == last {
+        // Neighboring pixels mostly show the same thing.
+        let is_news = |chunk: &[u16], last| chunk.iter().fold(false, |n, id| n | (*id != last));
+        for chunk in ids.chunks(16) {
+            if !is_news(chunk, last) {
                 continue;
             }
-            last = *id;
-            if let Some(agent) = EntityId(*id).agent() {
-                seen.agents |= 1 << agent.0;
+            for id in chunk {
+                if *id == last {
+                    continue;
+                }
+                last = *id;
+                if let Some(agent) = EntityId(*id).agent() {
+                    seen.agents |= 1 << agent.0;
+                }
+                seen.goal_place |= self.goal_places.contains(id);
             }
-            seen.goal_place |= self.goal_places.contains(id);
         }
         seen
     }

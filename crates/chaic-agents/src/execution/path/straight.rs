@@ -1,9 +1,9 @@
 //! Ways over straight neighbors only, as the original's library finds them.
 
-use std::cmp::{Ordering, Reverse};
+use std::cmp::Ordering;
 
-use super::{Path, Search};
-use crate::memory::costs::FREE;
+use super::{Node, Path, Search};
+use crate::memory::costs::{CostMap, FREE};
 use crate::memory::grid::Grid;
 
 /// A cell to visit. Of equal estimates neither comes first: the heap decides, and with it which of
@@ -39,7 +39,21 @@ impl Ord for Visit {
 impl Search {
     /// The cheapest way from `start` to `end` over straight neighbors only, whatever it costs; of
     /// several the one that pyastar2d finds, the library of the original (facts 1.5).
-    pub fn straight_way(
+    ///
+    /// A mind has one map of costs, so the latest way is kept for as long as that stays the same.
+    pub fn straight_way(&mut self, costs: &CostMap, start: usize, end: usize) -> Option<Path> {
+        let asked = (costs.version(), start, end);
+        if let Some((found, way)) = &self.latest
+            && *found == asked
+        {
+            return Some(way.clone());
+        }
+        let way = self.find_straight_way(costs.grid(), costs.costs(), start, end)?;
+        self.latest = Some((asked, way.clone()));
+        Some(way)
+    }
+
+    fn find_straight_way(
         &mut self,
         grid: &Grid,
         costs: &[u32],
@@ -48,29 +62,31 @@ impl Search {
     ) -> Option<Path> {
         let (nx, nz) = (grid.nx(), grid.nz());
         let (end_i, end_j) = grid.column_row(end);
+        let still = |i: usize, j: usize| (i.abs_diff(end_i) + j.abs_diff(end_j)) as u32 * FREE;
         self.begin(start);
         self.visits.clear();
         self.visits.push(Visit { estimate: 0, cell: start as u32 });
-        while let Some(Visit { cell, .. }) = self.visits.pop() {
+        while let Some(Visit { estimate, cell }) = self.visits.pop() {
             let cell = cell as usize;
+            let cost = self.nodes[cell].best;
             if cell == end {
-                return Some(Path { cells: self.trace(start, end), cost: self.best[end] });
+                return Some(Path { cells: self.trace(start, end), cost });
             }
             let (i, j) = grid.column_row(cell);
+            if estimate > cost.saturating_add(still(i, j)) {
+                continue;
+            }
             // In the library's order: its rows are along x.
             let around = [(i.wrapping_sub(1), j), (i, j.wrapping_sub(1)), (i, j + 1), (i + 1, j)];
             for (i, j) in around.into_iter().filter(|&(i, j)| i < nx && j < nz) {
                 let next = j * nx + i;
-                let total = self.best[cell].saturating_add(costs[next]);
-                if self.epoch_of[next] == self.epoch && total >= self.best[next] {
-                    continue;
+                let total = cost.saturating_add(costs[next]);
+                let node = &mut self.nodes[next];
+                if node.epoch != self.epoch || total < node.best {
+                    *node = Node { epoch: self.epoch, best: total, from: cell as u32 };
+                    let estimate = total.saturating_add(still(i, j));
+                    self.visits.push(Visit { estimate, cell: next as u32 });
                 }
-                self.epoch_of[next] = self.epoch;
-                self.best[next] = total;
-                self.from[next] = cell as u32;
-                let still = (i.abs_diff(end_i) + j.abs_diff(end_j)) as u32 * FREE;
-                let estimate = total.saturating_add(still);
-                self.visits.push(Visit { estimate, cell: next as u32 });
             }
         }
         None
@@ -94,16 +110,18 @@ impl StraightReach {
     ) -> StraightReach {
         let mut cost_and_steps: Vec<Option<(u32, u32)>> = vec![None; grid.n_cells()];
         search.begin(start);
-        while let Some(Reverse((cost, cell))) = search.queue.pop() {
+        while let Some((cost, cell)) = search.queue.pop() {
             let cell = cell as usize;
-            if cost > search.best[cell] || cost > limit || cost_and_steps[cell].is_some() {
+            if cost > search.nodes[cell].best || cost > limit || cost_and_steps[cell].is_some() {
                 continue;
             }
-            let before = cost_and_steps[search.from[cell] as usize].map_or(0, |(_, steps)| steps);
+            let before =
+                cost_and_steps[search.nodes[cell].from as usize].map_or(0, |(_, steps)| steps);
             cost_and_steps[cell] = Some((cost, before + u32::from(cell != start)));
-            for (next, _) in grid.neighbors(cell).filter(|(_, diagonal)| !diagonal) {
-                search.improve(next, cell, cost.saturating_add(costs[next]), 0);
-            }
+            let (i, j) = grid.column_row(cell);
+            grid.for_straight_neighbors(i, j, |next, _, _| {
+                search.improve(next, cell, cost.saturating_add(costs[next]), || 0);
+            });
         }
         StraightReach { cost_and_steps }
     }
@@ -144,7 +162,8 @@ mod tests {
             ((5, 20), (18, 6), "j-j-j-j-j-i+j-i+i+j-i+j-j-i+j-j-j-j-i+i+i+i+i+i+i+i+j-"),
         ] {
             let cell = |(i, j): (usize, usize)| j * n + i;
-            let way = search.straight_way(&grid, &costs, cell(start), cell(end)).expect("open");
+            let way =
+                search.find_straight_way(&grid, &costs, cell(start), cell(end)).expect("open");
             assert_eq!(steps(n, &way), expected, "{start:?} to {end:?}");
         }
     }

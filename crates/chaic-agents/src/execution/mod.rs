@@ -143,11 +143,15 @@ impl Executor {
             self.give_up(plan, s);
             return Progress::Failed;
         }
-        if *plan == Plan::FollowChild
-            && s.memory.companion(s.briefing, Relation::Child).is_some_and(|c| c.is_in_view)
-        {
-            // The time runs only while it is lost.
-            self.since = s.memory.frame;
+        if *plan == Plan::FollowChild {
+            // The time runs only while the child is lost; or, for who doesn't trust it, while it
+            // is where it belongs.
+            let child = s.memory.companion(s.briefing, Relation::Child);
+            let is_needed = match s.memory.rules.trusts_child {
+                true => child.is_some_and(|c| c.is_in_view),
+                false => s.memory.child_is_away(s.briefing),
+            };
+            self.since = if is_needed { s.memory.frame } else { self.since };
         }
         let is_standing = matches!(plan, Plan::PutIn | Plan::TurnAround | Plan::Wait);
         if is_standing || self.has_acted {

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use chaic_protocol::briefing::Relation;
 use chaic_protocol::capability::Gait;
-use chaic_protocol::geom::{Pose, xz};
+use chaic_protocol::geom::{Pose, horizontal_distance, xz};
 use chaic_protocol::{
     Action, AgentId, Briefing, ClassId, EntityId, Frame, Observation, Outcome, Vec2, Vec3,
 };
@@ -255,6 +255,21 @@ impl Memory {
         let is_given_up = |t: &Thing| self.frame < t.ignore_until;
         places.sort_by(|a, b| is_given_up(a.0).cmp(&is_given_up(b.0)).then(a.1.total_cmp(&b.1)));
         places
+    }
+
+    /// Whether child and partner look too far apart: both in view, or both seen a moment ago
+    /// (original facts 2.1, 2.4).
+    pub fn child_is_away(&self, briefing: &Briefing) -> bool {
+        const APART_SEEN_M: f32 = 3.5;
+        const APART_REMEMBERED_M: f32 = 5.5;
+        const FRESH_FRAMES: Frame = 50;
+        let companions =
+            [Relation::Partner, Relation::Child].map(|relation| self.companion(briefing, relation));
+        let [Some(partner), Some(child)] = companions else { return false };
+        let apart_m = horizontal_distance(partner.position_in_world, child.position_in_world);
+        let are_in_view = partner.is_in_view && child.is_in_view;
+        let are_fresh = partner.frame.min(child.frame) + FRESH_FRAMES > self.frame;
+        (are_in_view && apart_m > APART_SEEN_M) || (are_fresh && apart_m > APART_REMEMBERED_M)
     }
 
     /// The last sighting of the companion of this relation.

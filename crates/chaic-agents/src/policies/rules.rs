@@ -18,12 +18,6 @@ const SPARE_FRAMES: f32 = 120.0;
 const WALK_FACTOR: f32 = 1.5;
 /// A pick-up and a put-on take at least so long together, frames.
 const DEED_FRAMES: f32 = 130.0;
-/// Child and guardian this far apart, both in view, is an emergency, metres (original facts 2.1).
-const APART_SEEN_M: f32 = 3.5;
-/// The same for sightings of the last 50 frames, metres.
-const APART_REMEMBERED_M: f32 = 5.5;
-/// Sightings older than this are not compared, frames.
-const FRESH_FRAMES: Frame = 50;
 /// After standing beside the child, it may come back by itself for so long, frames.
 const TRUST_CHILD_FRAMES: Frame = 250;
 /// A failed lift of the partner calls for help for so long, frames.
@@ -149,12 +143,8 @@ impl Rules {
         if self.beside_child.is_some_and(|since| now >= since + TRUST_CHILD_FRAMES) {
             self.beside_child = None;
         }
-        if let (Some(g), Some(c)) = (guardian, child) {
-            let apart = horizontal_distance(g.position_in_world, c.position_in_world);
-            let both_in_view = g.is_in_view && c.is_in_view;
-            let both_fresh = g.frame.min(c.frame) + FRESH_FRAMES > now;
-            let away = (both_in_view && apart > APART_SEEN_M)
-                || (both_fresh && apart > APART_REMEMBERED_M);
+        if let Some(c) = child {
+            let away = memory.child_is_away(context.briefing);
             if away && beside(c) {
                 self.beside_child.get_or_insert(now);
             }

@@ -49,7 +49,7 @@ pub struct Interaction {
     n_relaxed: usize,
     /// Steps taken close by since then.
     n_steps: u32,
-    /// Where an object was when the plan began: the original goes there whatever it sees since.
+    /// Where it was when the plan began, if that is where one goes, as the original does.
     frozen: Option<Vec2>,
 }
 
@@ -123,7 +123,9 @@ impl Interaction {
         let mean = Vec2::new(thing.position_in_world.x, thing.position_in_world.z);
         let at = match () {
             () if is_long => thing.nearest_point(here),
-            () if info.is_movable() => *self.frozen.get_or_insert(mean),
+            () if info.is_movable() || memory.keeps_goal_in_mind() => {
+                *self.frozen.get_or_insert(mean)
+            }
             () => mean,
         };
         let destination = Destination { arm_m: Some(0.0), ..Destination::near(at, within_m) };

@@ -170,6 +170,12 @@ impl Memory {
         self.is_partner && self.gait == Gait::Roll
     }
 
+    /// Whether its owner goes to where the goal place was when the plan began, whatever it sees of
+    /// it since (original facts 2.4).
+    pub fn keeps_goal_in_mind(&self) -> bool {
+        self.is_partner && self.gait == Gait::WalkBike
+    }
+
     /// Brings costs and distances up to date. Cheap if nothing changed.
     pub fn refresh(&mut self) {
         self.refresh_costs();

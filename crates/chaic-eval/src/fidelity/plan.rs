@@ -198,7 +198,7 @@ impl Plan {
             helpers: self.switch_helpers.clone(),
             seeds: self.switch_seeds,
         };
-        let sets = [RuleSetName::Paper, RuleSetName::Compat].map(set);
+        let sets = [RuleSetName::Compat, RuleSetName::Paper].map(set);
         sets.into_iter().chain(self.switches.iter().map(switch)).collect()
     }
 

@@ -41,6 +41,8 @@ fn a_good_file_passes_with_or_without_spaces() {
     let spread = serde_json::to_string_pretty(&good()).expect("it is JSON");
     assert!(Episode::parse(spread.as_bytes(), "x").is_ok());
     assert!(Episode::parse(good().to_string().as_bytes(), "x").is_ok());
+    let marked = format!("\u{feff}{}", good());
+    assert!(Episode::parse(marked.as_bytes(), "x").is_ok(), "editors write byte order marks");
 }
 
 #[test]
@@ -56,7 +58,7 @@ fn a_torn_file_is_called_torn() {
 fn what_is_no_episode_is_refused_first() {
     assert!(matches!(error_of(b"\x89PNG"), EpisodeError::NotJson { .. }));
     assert!(matches!(error_of(b"[1, 2]"), EpisodeError::WrongFormat { .. }));
-    assert!(matches!(error_of(b"17"), EpisodeError::NotJson { .. }));
+    assert!(error_of(b"17").to_string().starts_with("some/file.json: top level: "));
     assert!(matches!(error_of(b"{}"), EpisodeError::WrongFormat { .. }));
     let other = br#"{"format": "gltf", "version": 2}"#;
     assert!(matches!(error_of(other), EpisodeError::WrongFormat { .. }));
@@ -109,8 +111,39 @@ fn numbers_beyond_all_numbers_are_refused() {
 
 #[test]
 fn ids_must_lead_somewhere() {
-    check(|f| f["setup"]["goal_places"] = json!([9999]), &["setup.goal_places[0]", "#9999"]);
+    check(
+        |f| f["setup"]["goal_places"] = json!([9999]),
+        &["setup.goal_places[0]", "9999", "16 (things[0])"],
+    );
     check(|f| f["setup"]["openings"][0]["rooms"][1] = json!(77), &["openings[0].rooms[1]", "77"]);
+}
+
+#[test]
+fn things_are_named_by_their_places_in_the_file() {
+    let k = thing_index(&good(), "trashbin");
+    check(
+        |f| f["setup"]["goal_places"] = json!([16 + k]),
+        &["goal_places[0]", &format!("things[{k}] (trashbin), which isn't fixed")],
+    );
+    let place = good()["setup"]["goal_places"][0].as_u64().expect("an id");
+    check(
+        |f| f["setup"]["goal_places"] = json!([place, place]),
+        &["goal_places[1]", &format!("names things[{}] (", place - 16), "again"],
+    );
+}
+
+#[test]
+fn people_are_partner_helper_and_child_in_this_order() {
+    let swap = |id: &str, a: usize, b: usize| {
+        let mut file = bundled(id);
+        file["setup"]["people"].as_array_mut().expect("people are a list").swap(a, b);
+        file
+    };
+    let swapped = swap("obstacle/test/03", 0, 1);
+    check_file(&swapped, &["people[0].persona: is helper", "people[1].persona: is wheelchair"]);
+    let swapped = swap("shopping/test/00", 1, 2);
+    check_file(&swapped, &["people[1].persona: is child", "people[2].persona: is helper"]);
+    check_file(&swap("shopping/test/00", 0, 2), &["people[2].persona: is rider"]);
 }
 
 #[test]

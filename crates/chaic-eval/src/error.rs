@@ -156,6 +156,12 @@ pub enum EvalError {
 }
 
 impl EvalError {
+    /// Whether it is about what the caller asked for, rather than what came of it.
+    pub fn is_usage(&self) -> bool {
+        use EvalError::{OptionDiffers, Options, UnknownHelper};
+        matches!(self, Options(_) | UnknownHelper { .. } | OptionDiffers { .. })
+    }
+
     /// For `map_err` on what the operating system may refuse.
     pub fn io(what: &'static str, path: &Path) -> impl FnOnce(io::Error) -> EvalError + use<> {
         let path = path.to_owned();

@@ -11,7 +11,7 @@ mod mp4;
 #[cfg(feature = "video")]
 mod yuv;
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
@@ -70,7 +70,7 @@ pub enum VideoError {
     /// The video was finished before its first frame.
     #[error("a video needs at least one frame: {path:?}")]
     NoFrames {
-        /// The file, which holds no video now.
+        /// The file asked for.
         path: PathBuf,
     },
     /// The file could not be written.
@@ -113,6 +113,38 @@ pub struct VideoWriter {
     height: u32,
     n_frames: u32,
     sink: Sink,
+    provisional: Provisional,
+}
+
+/// The name under which a video is written: it gets its own once it is whole, and what never
+/// becomes whole is removed.
+#[derive(Debug)]
+struct Provisional {
+    path: PathBuf,
+    is_kept: bool,
+}
+
+impl Provisional {
+    fn beside(path: &Path) -> Provisional {
+        let mut name = path.file_name().unwrap_or_default().to_owned();
+        name.push(".partial");
+        Provisional { path: path.with_file_name(name), is_kept: false }
+    }
+
+    fn becomes(mut self, path: &Path) -> io::Result<()> {
+        fs::rename(&self.path, path)?;
+        self.is_kept = true;
+        Ok(())
+    }
+}
+
+impl Drop for Provisional {
+    fn drop(&mut self) {
+        if !self.is_kept {
+            // Where it can't be removed, its name says what it is.
+            let _ = fs::remove_file(&self.path);
+        }
+    }
 }
 
 #[derive(Debug)]
@@ -139,7 +171,8 @@ impl VideoWriter {
     /// Starts a video of `width` x `height` pixels at `path`, whose extension picks the format.
     ///
     /// H.264 halves the resolution of color, so an odd side of an MP4 grows by one pixel that
-    /// repeats its neighbor. An existing file is replaced.
+    /// repeats its neighbor. An existing file is replaced as soon as the video is finished; until
+    /// then it is written to `PATH.partial`.
     pub fn create(
         path: &Path,
         width: u32,
@@ -155,11 +188,12 @@ impl VideoWriter {
         if !(1..=max).contains(&fps) {
             return Err(VideoError::FrameRate { fps, max });
         }
-        let sink = File::create(path)
+        let provisional = Provisional::beside(path);
+        let sink = File::create(&provisional.path)
             .map_err(SinkError::Io)
             .and_then(|file| Sink::open(format, BufWriter::new(file), width, height, fps))
             .map_err(|error| error.at(path, 0))?;
-        Ok(VideoWriter { path: path.to_owned(), width, height, n_frames: 0, sink })
+        Ok(VideoWriter { path: path.to_owned(), width, height, n_frames: 0, sink, provisional })
     }
 
     /// Adds the next frame, which has the size of the video.
@@ -195,6 +229,7 @@ impl VideoWriter {
             #[cfg(feature = "video")]
             Sink::Mp4(sink) => sink.finish(),
         }
+        .and_then(|()| self.provisional.becomes(&self.path).map_err(SinkError::Io))
         .map_err(|error| error.at(&self.path, self.n_frames))
     }
 }

@@ -136,7 +136,7 @@ impl Surroundings {
     /// The thing on open floor beside the furniture that it has fallen off.
     pub fn fallen(&self, thing: &Thing, rest: &Rest) -> Option<Thing> {
         let is_open = |t: &Thing| {
-            let reach = 0.5 * t.size_m().x.max(t.size_m().z) + FLOOR_CLEAR_M;
+            let reach = t.half_longer_side_m() + FLOOR_CLEAR_M;
             self.shadows.iter().all(|s| s.distance(xz(t.position)) >= reach)
         };
         around(FALLEN_M, 0.06)

@@ -122,8 +122,6 @@ pub enum FailureReason {
     Full,
     /// No container in one hand and target in the other.
     NotContainerAndTarget,
-    /// The other person had to let go.
-    Interrupted,
 }
 
 impl fmt::Display for FailureReason {
@@ -140,7 +138,6 @@ impl fmt::Display for FailureReason {
             FailureReason::Impossible => "impossible",
             FailureReason::Full => "full",
             FailureReason::NotContainerAndTarget => "needs a container and a target in hand",
-            FailureReason::Interrupted => "interrupted",
         })
     }
 }

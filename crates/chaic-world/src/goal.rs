@@ -14,8 +14,8 @@ impl World {
     /// How near to the middle of a goal place a released thing must come to rest, metres
     /// (facts of the original, 5.2: the margin plus half of the longer side).
     pub fn delivery_radius_m(&self) -> f32 {
-        let size = self.thing(self.setup.goal_places[0]).0.size_m();
-        self.rules.delivery_margin_m + 0.5 * size.x.max(size.z)
+        let (place, _) = self.thing(self.setup.goal_places[0]);
+        self.rules.delivery_margin_m + place.half_longer_side_m()
     }
 
     /// Lowest top that counts as the goal place, metres; 0 for no condition.

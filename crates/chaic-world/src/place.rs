@@ -112,8 +112,7 @@ impl World {
         const ON_TOP: f32 = 0.6;
         let (thing, state) = self.thing(place);
         let yaw = chaic_protocol::geom::yaw_towards(Vec3::ZERO, state.rotation * Vec3::NEG_Z);
-        let size = self.thing(object).0.size_m();
-        let radius = 0.5 * size.x.max(size.z);
+        let radius = self.thing(object).0.half_longer_side_m();
         let surfaces = surfaces_at(thing, state.position, yaw);
         let highest = surfaces.iter().map(|s| s.center.y).fold(f32::NEG_INFINITY, f32::max);
         let mut spots = Vec::new();
@@ -127,7 +126,7 @@ impl World {
         }
         let too_small = surfaces.iter().all(|s| s.half[0].min(s.half[1]) < ON_TOP * radius);
         if too_small {
-            let reach = 0.5 * thing.size_m().x.max(thing.size_m().z) + radius + 0.1;
+            let reach = thing.half_longer_side_m() + radius + 0.1;
             spots = ring(state.position, reach, 4).collect();
         }
         spots.sort_by(|a, b| {
@@ -145,24 +144,23 @@ impl World {
         self.setup.entities().all(|e| {
             let (thing, state) = self.thing(e);
             let lies_there = state.is_resting() && !thing.fixed && e != object;
-            let size = thing.size_m();
             !lies_there
                 || (state.position.y - spot.y).abs() > 0.3
                 || horizontal_distance(state.position, spot)
-                    > radius + 0.5 * size.x.max(size.z) + CLEARANCE_M
+                    > radius + thing.half_longer_side_m() + CLEARANCE_M
         })
     }
 
     /// A free spot on the floor beside a person.
     pub(crate) fn floor_spot_beside(&self, agent: AgentId, object: EntityId) -> Vec3 {
         let pose = self.person(agent).pose;
-        let size = self.thing(object).0.size_m();
-        let radius = 0.5 * size.x.max(size.z);
+        let thing = self.thing(object).0;
+        let radius = thing.half_longer_side_m();
         let distance = self.capability(agent).radius_m + radius + 0.2;
         let back = -forward(pose.yaw_rad);
         let sides = [back, right(pose.yaw_rad), -right(pose.yaw_rad), forward(pose.yaw_rad)];
         let spots = sides.map(|side| pose.position + side * distance);
-        let free = |spot: &&Vec3| self.stands_free(**spot, radius, size.y);
+        let free = |spot: &&Vec3| self.stands_free(**spot, radius, thing.size_m().y);
         spots.iter().find(free).copied().unwrap_or(pose.position)
     }
 

@@ -165,6 +165,13 @@ impl Thing {
     pub fn size_m(&self) -> Vec3 {
         Vec3::from(self.class.info().size_m) * Vec3::from(self.scale)
     }
+
+    /// Half of its longer side in plan, metres: as far as it reaches from its middle wherever a rule
+    /// measures to the middle (facts of the original, 1.1 and 5.2).
+    pub fn half_longer_side_m(&self) -> f32 {
+        let size = self.size_m();
+        0.5 * size.x.max(size.z)
+    }
 }
 
 /// A person at the start.
@@ -381,11 +388,17 @@ impl Setup {
             let last = Setup::entity(self.things.len().saturating_sub(1));
             match self.thing(*entity) {
                 None => {
-                    let problem = format!("names {entity}, but things end at {last}");
+                    let problem = format!(
+                        "is {}, expected the id of a thing: {} (things[0]) to {}",
+                        entity.0,
+                        EntityId::FIRST_OBJECT.0,
+                        last.0
+                    );
                     return Err(SetupError::new(format!("goal_places[{i}]"), problem));
                 }
                 Some(t) if !t.fixed => {
-                    let problem = format!("names {entity} ({}), which isn't fixed", t.class);
+                    let k = self.thing_index(*entity).unwrap_or_default();
+                    let problem = format!("names things[{k}] ({}), which isn't fixed", t.class);
                     return Err(SetupError::new(format!("goal_places[{i}]"), problem));
                 }
                 Some(_) => {}

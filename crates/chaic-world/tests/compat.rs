@@ -144,8 +144,26 @@ fn vases_are_wanted_but_nobody_may_go_for_them() {
         w.briefing(A, Grants::PARTNER).possible_targets.contains(&vase)
     };
     assert!(offered(PAPER) && !offered(Rules { fragile_targets: false, ..PAPER }));
-    let compat = Rules::compat();
-    assert_eq!([compat.break_chance_low, compat.break_chance_high], [0.0, 0.0]);
+}
+
+#[test]
+fn vases_break_by_one_chance_within_a_childs_reach_and_by_another_above_it() {
+    let breaks = |break_chance_low, break_chance_high, is_high: bool| {
+        let cabinet = thing("cabinet", at(0.0, 0.0, -0.6));
+        let y = if is_high { chaic_world::top_surfaces(&cabinet)[0].center.y } else { 0.0 };
+        let things = if is_high {
+            vec![thing("vase", at(0.0, y, -0.6)), cabinet]
+        } else {
+            vec![thing("vase", at(0.0, y, -0.6))]
+        };
+        let setup = hall(things, vec![person(Persona::Child, 0.0, 0.3)]);
+        let mut w = with(Rules { break_chance_low, break_chance_high, ..PAPER }, setup);
+        run(&mut w, A, pick(nth(0)));
+        happened(&mut w, |e| matches!(e.kind, EventKind::Broke { .. }))
+    };
+    for (low, high) in [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0)] {
+        assert_eq!([breaks(low, high, false), breaks(low, high, true)], [low > 0.5, high > 0.5]);
+    }
 }
 
 #[test]
@@ -184,6 +202,26 @@ fn who_chose_the_same_piece_last_is_called_to_lift_it() {
 }
 
 #[test]
+fn one_who_stands_at_furniture_waits_for_the_other_as_long_as_the_rules_say() {
+    let lifted = |await_partner| {
+        let durations = Durations { await_partner, ..PAPER.durations };
+        let piano = thing("piano", at(0.0, 0.0, 0.0));
+        // The helper has some 12 m to walk: 250 frames and more.
+        let people = vec![person(Persona::Frail, 0.0, 1.5), person(Persona::Helper, 9.0, 9.0)];
+        let mut w = with(Rules { durations, ..PAPER }, hall(vec![piano], people));
+        for agent in [A, B] {
+            w.submit(agent, pick(nth(0))).expect("it is free");
+        }
+        for _ in 0..600 {
+            w.tick();
+        }
+        happened(&mut w, |e| matches!(e.kind, EventKind::LiftedTogether { .. }))
+    };
+    assert!(!lifted(PAPER.durations.await_partner));
+    assert!(lifted(Rules::compat().durations.await_partner));
+}
+
+#[test]
 fn single_parts_take_the_original_frames() {
     let frames = |durations, class: &str, off_m: f32| {
         let object = thing(class, at(0.0, 0.0, -off_m));
@@ -192,10 +230,11 @@ fn single_parts_take_the_original_frames() {
     };
     let (ours, theirs): (Durations, Durations) = (PAPER.durations, Rules::compat().durations);
     // From afar a pick-up is refused: at once, or after bringing both arms back.
-    assert_eq!(frames(ours, "apple", 6.0), 1);
-    assert_eq!(frames(theirs, "apple", 6.0), 37);
+    let refused = Durations { refused_pick: theirs.refused_pick, ..ours };
+    assert_eq!([frames(ours, "apple", 6.0), frames(refused, "apple", 6.0)], [1, 37]);
     // 18 frames less of bringing back arms that are full.
-    assert_eq!(frames(ours, "backpack", 0.8) - frames(theirs, "backpack", 0.8), 18);
+    let raised = Durations { raise_furniture: theirs.raise_furniture, ..ours };
+    assert_eq!(frames(ours, "backpack", 0.8) - frames(raised, "backpack", 0.8), 18);
 }
 
 #[test]

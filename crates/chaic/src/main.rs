@@ -7,6 +7,7 @@ mod output;
 
 use std::process::ExitCode;
 
+use chaic_eval::EvalError;
 use clap::Parser as _;
 
 use crate::arguments::{Arguments, Command};
@@ -40,7 +41,9 @@ fn main() -> ExitCode {
         Ok(Ended::Interrupted) => ExitCode::from(130),
         Err(error) => {
             output::complain(&format!("error: {error:#}"));
-            ExitCode::FAILURE
+            // What was asked for can't be: as where the arguments can't even be read.
+            let is_usage = error.downcast_ref().is_some_and(EvalError::is_usage);
+            if is_usage { ExitCode::from(2) } else { ExitCode::FAILURE }
         }
     }
 }

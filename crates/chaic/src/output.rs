@@ -14,6 +14,11 @@ pub fn say(text: &str) -> io::Result<()> {
     }
 }
 
+/// So many of what has a regular plural: `1 task`, `2 tasks`.
+pub fn counted(n: usize, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
+}
+
 /// Writes a line to the standard error; where nobody hears it, nothing can be done.
 pub fn complain(line: &str) {
     let _ = writeln!(io::stderr().lock(), "{line}");

@@ -45,10 +45,9 @@ fn ill(dir: &Path, arguments: &[&str]) -> String {
 fn workshop() -> tempfile::TempDir {
     let dir = tempfile::tempdir().expect("there is room");
     for task in ["no_constraint", "moving_house"] {
-        well(
-            dir.path(),
-            &["episodes", "generate", "--task", task, "--seeds", "0..1", "--out", "short"],
-        );
+        let generate =
+            ["episodes", "generate", "--task", task, "--seeds", "0..1", "--out", "short"];
+        assert_eq!(well(dir.path(), &generate), format!("short: 1 episode of {task}\n"));
     }
     for entry in fs::read_dir(dir.path().join("short")).expect("it is there") {
         let path = entry.expect("it is there").path();
@@ -94,6 +93,11 @@ fn a_run_from_end_to_end() {
     assert_eq!(fs::read_to_string(at.join("run/scores.json")).expect("it is text"), scores);
     let other = ill(at, &["eval", "--resume", "--out", "run", "--helper", "rhp"]);
     assert!(other.contains("--helper none,rhp, not rhp"), "{other}");
+    fs::create_dir(at.join("none")).expect("there is room");
+    let resume = ["eval", "--resume", "--out", "run", "--episodes"];
+    well(at, &[&resume[..], &["short"]].concat());
+    let other = ill(at, &[&resume[..], &["none"]].concat());
+    assert!(other.contains("begun with other episodes than --episodes none"), "{other}");
 
     assert!(well(at, &["verify", "run", "--jobs", "2"]).contains("4 traces"));
     let trace = at.join("run/traces/no_constraint/rhp/gen-0-s0.jsonl");
@@ -109,6 +113,10 @@ fn a_run_from_end_to_end() {
     fs::write(&trace, &whole[..whole.len() - 5]).expect("there is room");
     let out = chaic(at, &["verify", "run"]);
     assert!(text(&out.stderr).contains("is cut off"), "{}", text(&out.stderr));
+    let out = chaic(at, &["report", "run", "--from-traces"]);
+    let missing = "1 of 4 finished episode runs have no whole trace and are left out, first \
+                   no_constraint/gen/0 with rhp and seed 0";
+    assert!(text(&out.stderr).contains(missing), "{}", text(&out.stderr));
     fs::write(&trace, whole).expect("there is room");
 
     let replay = ["replay", "run", "no_constraint/gen/0", "--out", "r.gif", "--every", "40"];
@@ -228,6 +236,31 @@ fn pictures_and_episodes() {
     {
         assert!(found.contains(words), "{words}: {found}");
     }
+}
+
+#[test]
+fn wrong_option_values_end_in_the_same_exit_code() {
+    let dir = workshop();
+    let at = dir.path();
+    well(at, &["eval", "--episodes", "short", "--helper", "none", "--size", "32", "--out", "run"]);
+    let replay = ["replay", "run", "no_constraint/gen/0", "--helper", "none", "--every", "40"];
+    for arguments in [
+        &["eval", "--task", "lunch"][..],
+        &["eval", "--helper", "nobody", "--out", "r"],
+        &["eval", "--size", "5", "--out", "r"],
+        &["eval", "--seeds", "0", "--out", "r"],
+        &["eval", "--set", "world.gravity=1", "--out", "r"],
+        &["eval", "--split", "test", "--episodes", "short", "--out", "r"],
+        &["eval", "--resume", "--out", "run", "--first", "1"],
+        &["report", "run", "--figure", "f.txt"],
+        &[&replay[..], &["--out", "r.avi"]].concat()[..],
+        &[&replay[..], &["--out", "r.gif", "--fps", "51"]].concat()[..],
+        &["episodes", "generate", "--task", "obstacle", "--seeds", "3..3", "--out", "x"],
+    ] {
+        let out = chaic(at, arguments);
+        assert_eq!(out.status.code(), Some(2), "{arguments:?}: {}", text(&out.stderr));
+    }
+    assert_eq!(chaic(at, &["report", "nowhere"]).status.code(), Some(1), "nothing is there");
 }
 
 #[test]

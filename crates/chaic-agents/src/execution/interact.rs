@@ -239,8 +239,7 @@ fn learn_failure(memory: &mut Memory, object: EntityId, reason: FailureReason) {
         | FailureReason::HandFull
         | FailureReason::HandEmpty
         | FailureReason::Full
-        | FailureReason::NotContainerAndTarget
-        | FailureReason::Interrupted => {}
+        | FailureReason::NotContainerAndTarget => {}
     }
 }
 

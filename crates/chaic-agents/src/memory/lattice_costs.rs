@@ -160,3 +160,65 @@ fn around(grid: &Grid, cell: usize, [down, up]: [i32; 2]) -> impl Iterator<Item 
             .filter_map(move |i| grid.cell_at(middle + CELL_M * Vec2::new(i as f32, j as f32)))
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::memory::occupancy::MAP_RANGE_M;
+    use crate::perception::{GroundTruthIds, Perception as _};
+    use crate::test_support::{Toy, ToyObject};
+
+    #[test]
+    fn a_wall_stays_one_for_as_long_as_its_cell_counts_as_occupied() {
+        let mut belief = Belief::default();
+        let mut update = |occupied, wall| {
+            belief.update(vec![occupied], |_| wall);
+            (belief.is_occupied(0), belief.is_wall(0))
+        };
+        assert_eq!(update(true, true), (true, true));
+        for _ in 1..BELIEVE_EVERY {
+            assert_eq!(update(false, false), (true, true), "not believed yet");
+        }
+        assert_eq!(update(true, false), (true, true), "something lower is still there");
+        for _ in 1..BELIEVE_EVERY {
+            update(false, false);
+        }
+        assert_eq!(update(false, false), (false, false), "it has gone");
+        for _ in 1..BELIEVE_EVERY {
+            assert_eq!(update(true, false), (true, false), "something lower is there");
+        }
+    }
+
+    #[test]
+    fn only_what_is_as_tall_as_walls_are_costs_as_much_for_good() {
+        let mut toy = Toy::room(6.0, 6.0);
+        let boxes = [(-0.7, 2.1), (0.7, 2.3)].map(|(x, height_m)| {
+            toy.add(ToyObject::new("cabinet", [x, 0.0, -2.2], [0.8, height_m, 0.8]))
+        });
+        toy.stand([0.0, 0.0], 0.0);
+        let mut map = OccupancyMap::new(&toy.bounds());
+        let (grid, mut belief) = (*map.grid(), Belief::default());
+        let mut cost = vec![0; grid.n_cells()];
+        // The costs where the boxes stand, or stood, after so many looks.
+        let mut look = |toy: &Toy, n: u32| {
+            let observation = toy.observe();
+            let percepts = GroundTruthIds.perceive(&observation);
+            for _ in 0..n {
+                map.integrate(&observation, &percepts, 1.75, MAP_RANGE_M);
+                let seen = Seen {
+                    map: &map,
+                    things: &SemanticMap::default(),
+                    people: &People::default(),
+                    heeds_obstacles: false,
+                    now: FIRST_FRAMES,
+                };
+                lattice_costs(&grid, &seen, &mut belief, &mut cost);
+            }
+            [-0.7, 0.7].map(|x| cost[grid.cell_at(Vec2::new(x, -1.85)).expect("inside")])
+        };
+        let wall = OCCUPIED + WALL_EXTRA;
+        assert_eq!(look(&toy, 1), [wall, wall + TRUE_WALL_EXTRA]);
+        boxes.into_iter().for_each(|entity| toy.remove(entity));
+        assert_eq!(look(&toy, 3 * BELIEVE_EVERY), [FREE, FREE + TRUE_WALL_EXTRA]);
+    }
+}

@@ -497,4 +497,49 @@ mod tests {
         map.bump(Vec2::ZERO, 0);
         assert!(map.version() > version && map.bumped_cells().count() > 4);
     }
+
+    #[test]
+    fn what_is_taller_than_anything_movable_is_never_forgotten() {
+        let mut toy = Toy::room(6.0, 6.0);
+        // Between the heights of a wall and of a wall for good, and above both.
+        let heights_m = [0.5 * (WALL_M + TALL_M), 0.5 * (TALL_M + TOP_M)];
+        let boxes = [(-0.7, heights_m[0]), (0.7, heights_m[1])].map(|(x, height_m)| {
+            toy.add(ToyObject::new("cabinet", [x, 0.0, -2.2], [0.8, height_m, 0.8]))
+        });
+        toy.stand([0.0, 0.0], 0.0);
+        let mut map = OccupancyMap::new(&toy.bounds());
+        let know = |map: &OccupancyMap| {
+            [-0.7, 0.7].map(|x| {
+                let cell = map.grid().cell_at(Vec2::new(x, -1.85)).expect("inside");
+                (map.space(cell), map.is_tall(cell))
+            })
+        };
+        look(&mut map, &toy);
+        assert_eq!(know(&map), [(Space::Wall, false), (Space::Wall, true)]);
+        boxes.into_iter().for_each(|entity| toy.remove(entity));
+        for _ in 0..2 * SURE_MOST {
+            look(&mut map, &toy);
+        }
+        assert_eq!(know(&map), [(Space::Free, false), (Space::Free, true)]);
+    }
+
+    #[test]
+    fn what_hangs_above_the_head_makes_its_place_known_but_neither_free_nor_occupied() {
+        let mut toy = Toy::room(8.0, 8.0);
+        // A wide cabinet hides the floor; a board hangs above it, a little behind.
+        toy.add(ToyObject::new("cabinet", [0.0, 0.0, -1.0], [3.0, 1.2, 0.4]));
+        toy.add(ToyObject::new("cabinet", [0.0, 1.83, -2.6], [0.8, 0.12, 0.4]));
+        toy.stand([0.0, 0.0], 0.0);
+        let observation = toy.observe();
+        let percepts = GroundTruthIds.perceive(&observation);
+        for (known_m, is_known) in [(MAP_RANGE_M, true), (2.0, false)] {
+            let mut map = OccupancyMap::new(&toy.bounds());
+            map.integrate(&observation, &percepts, 1.75, known_m);
+            let [under, beside] =
+                [0.0, 1.0].map(|x| map.grid().cell_at(Vec2::new(x, -2.44)).expect("inside"));
+            assert_eq!(map.is_known(under), is_known, "within {known_m} m");
+            assert!(!map.is_known(beside), "nothing of it is seen");
+            assert_eq!([map.space(under), map.space(beside)], [Space::Unknown; 2]);
+        }
+    }
 }

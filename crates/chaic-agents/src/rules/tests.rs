@@ -1,5 +1,9 @@
 //! Each rule in which the original's planners differ, against a situation worked out by hand: every
-//! case flips one rule of the paper's set.
+//! case flips one rule of the paper's set. What a random helper draws is tested beside it, and when
+//! the child runs away in `child.rs`.
+
+mod others;
+mod walking;
 
 use super::*;
 use crate::behavior::BehaviorLog;
@@ -41,8 +45,13 @@ impl Situated {
         SelfState { pose: Default::default(), hands: self.hands.clone(), last: None }
     }
 
-    /// What somebody of this profile chooses who has (or has not) looked around already.
+    /// What the partner answers who has (or has not) looked around already.
     fn ask<T>(&self, of: impl Fn(&mut Rules, &Context<'_>) -> T) -> T {
+        self.ask_of(&mut Rules::new(RuleProfile::PARTNER), of)
+    }
+
+    /// What this one answers.
+    fn ask_of<T>(&self, who: &mut Rules, of: impl Fn(&mut Rules, &Context<'_>) -> T) -> T {
         let (own, behavior) = (self.own(), BehaviorLog::default());
         let context = Context {
             briefing: &self.briefing,
@@ -51,15 +60,55 @@ impl Situated {
             own: &own,
             is_explored: false,
         };
-        of(&mut Rules::new(RuleProfile::PARTNER), &context)
+        of(who, &context)
     }
 
-    /// The second choice: at first, one may look around.
+    /// The partner's second choice: at first, one may look around.
     fn choose(&self) -> Plan {
-        self.ask(|rules, context| {
+        self.choose_as(RuleProfile::PARTNER)
+    }
+
+    /// The second choice of somebody of this profile.
+    fn choose_as(&self, profile: RuleProfile) -> Plan {
+        self.ask_of(&mut Rules::new(profile), |rules, context| {
             rules.choose(context, &self.valid);
             rules.choose(context, &self.valid)
         })
+    }
+
+    /// The first thing that carrying out a plan comes to.
+    fn begin(&mut self, executor: &mut Executor, plan: Plan) -> Progress {
+        executor.begin(self.memory.frame);
+        self.go_on(executor, plan)
+    }
+
+    /// What carrying out the same plan comes to next.
+    fn go_on(&mut self, executor: &mut Executor, plan: Plan) -> Progress {
+        let own = self.own();
+        let briefing = &self.briefing;
+        executor.step(&plan, &mut Situation { memory: &mut self.memory, own: &own, briefing })
+    }
+
+    /// How often one turns when one looks all around.
+    fn n_turns_around(&mut self) -> u32 {
+        let mut executor = Executor::new(&self.briefing);
+        let mut progress = self.begin(&mut executor, Plan::TurnAround);
+        let mut n = 0;
+        while progress != Progress::Done {
+            assert_eq!(progress, Progress::Act(Action::TurnLeft));
+            progress = self.go_on(&mut executor, Plan::TurnAround);
+            n += 1;
+        }
+        n
+    }
+
+    /// Stands in a toy world and looks.
+    fn look(&mut self, toy: &Toy) {
+        self.briefing.bounds = toy.bounds();
+        let observation = toy.observe();
+        self.memory = Memory::new(&self.briefing, self.memory.rules);
+        let percepts = GroundTruthIds.perceive(&observation);
+        self.memory.update(&self.briefing, &observation, &percepts);
     }
 }
 
@@ -238,13 +287,6 @@ fn only_helpers_without_perfect_eyes_see_nobody_and_know_less() {
 fn a_turn_around_is_as_long_as_the_rules_say() {
     for around_turns in [PAPER.around_turns, PlannerRules::compat().around_turns] {
         let mut s = Situated::new(PlannerRules { around_turns, ..PAPER });
-        let own = s.own();
-        let mut executor = Executor::new(&s.briefing);
-        executor.begin(s.memory.frame);
-        let mut situation = Situation { memory: &mut s.memory, own: &own, briefing: &s.briefing };
-        let n = (0..100)
-            .take_while(|_| executor.step(&Plan::TurnAround, &mut situation) != Progress::Done)
-            .count();
-        assert_eq!(n, around_turns as usize);
+        assert_eq!(s.n_turns_around(), around_turns);
     }
 }

@@ -35,7 +35,7 @@ pub enum EpisodeError {
     NotJson {
         /// What the caller called the bytes.
         source_name: String,
-        /// Path of the field that is read there, `.` outside all fields.
+        /// Path of the field that is read there, `top level` outside all fields.
         field: String,
         /// What the JSON reader says, with line and column.
         problem: String,

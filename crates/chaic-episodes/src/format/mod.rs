@@ -193,6 +193,13 @@ fn name_problem(name: &str) -> Option<String> {
     Some(format!("holds {odd:?}, expected letters, digits and any of _-./:"))
 }
 
+/// What messages call a place outside all fields.
+const TOP_LEVEL: &str = "top level";
+
+fn field_name(path: &serde_path_to_error::Path) -> String {
+    if path.iter().next().is_none() { TOP_LEVEL.to_owned() } else { path.to_string() }
+}
+
 /// The file's content, if it is one of ours and every field fits.
 fn read(bytes: &[u8], source_name: &str) -> Result<EpisodeFile, EpisodeError> {
     let source = || source_name.to_owned();
@@ -200,11 +207,13 @@ fn read(bytes: &[u8], source_name: &str) -> Result<EpisodeFile, EpisodeError> {
         let (bytes, limit) = (bytes.len(), MAX_EPISODE_BYTES);
         return Err(EpisodeError::TooLong { source_name: source(), bytes, limit });
     }
+    // Some editors begin a text with a byte order mark.
+    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     let whole = || -> Result<EpisodeFile, serde_path_to_error::Error<serde_json::Error>> {
         let mut json = serde_json::Deserializer::from_slice(bytes);
         serde_path_to_error::deserialize(&mut json)
     };
-    let field_of = || whole().err().map_or(".".to_owned(), |e| e.path().to_string());
+    let field_of = || whole().err().map_or(TOP_LEVEL.to_owned(), |e| field_name(e.path()));
     let syntax = |e: serde_json::Error| EpisodeError::of_syntax(source_name, &e, field_of);
     // The first pass sees syntax only, so that a torn file isn't taken for a wrong one.
     let header: Header = serde_json::from_slice(bytes).map_err(syntax)?;
@@ -219,7 +228,7 @@ fn read(bytes: &[u8], source_name: &str) -> Result<EpisodeFile, EpisodeError> {
         return Err(EpisodeError::WrongVersion { source_name: source(), found, expected: VERSION });
     }
     whole().map_err(|e| {
-        let field = e.path().to_string();
+        let field = field_name(e.path());
         EpisodeError::Field { source_name: source(), field, problem: e.into_inner().to_string() }
     })
 }

@@ -61,9 +61,18 @@ fn people(setup: &Setup, found: &mut Vec<Problem>) {
         found.push(Problem::new("people", problem));
         return;
     }
-    if info.has_child && setup.people[2].persona != Persona::Child {
-        let problem = format!("is {:?}, expected a child", setup.people[2].persona);
-        found.push(Problem::new("people[2].persona", problem));
+    // Who somebody is follows from the place in the list.
+    for (i, person) in setup.people.iter().enumerate() {
+        let (fits, expected) = match i {
+            0 => (person.persona != Persona::Helper, "the partner"),
+            1 => (person.persona == Persona::Helper, "helper"),
+            _ => (person.persona == Persona::Child, "child"),
+        };
+        if !fits {
+            let persona = format!("{:?}", person.persona).to_lowercase();
+            let problem = format!("is {persona}, expected {expected}");
+            found.push(Problem::new(format!("people[{i}].persona"), problem));
+        }
     }
 }
 
@@ -96,7 +105,7 @@ fn goal(setup: &Setup, demand: Demand, found: &mut Vec<Problem>) {
             found.push(Problem::new(field, problem));
         }
         if setup.goal_places[..i].contains(&setup.goal_places[i]) {
-            let problem = format!("names {} again", setup.goal_places[i]);
+            let problem = format!("names things[{k}] ({}) again", thing.class);
             found.push(Problem::new(format!("goal_places[{i}]"), problem));
         }
     }

@@ -99,9 +99,37 @@ impl RunResult {
             Ending::Error { .. } => None,
         }
     }
+
+    /// Whether its numbers can be those of an episode.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        self.summary().map_or(Ok(()), Summary::check)
+    }
 }
 
 impl Summary {
+    fn check(&self) -> Result<(), String> {
+        /// Masses are sums of numbers that are rounded.
+        const ROUNDING: f64 = 1e-6;
+        let Summary { frames, done, total, .. } = *self;
+        for (name, n) in [("done", done), ("total", total)] {
+            if !(n.is_finite() && n >= 0.0) {
+                return Err(format!("`{name}` is {n}, expected a number from 0 on"));
+            }
+        }
+        if done > total * (1.0 + ROUNDING) {
+            return Err(format!("`done` is {done}, expected at most `total`, {total}"));
+        }
+        let within = [("away_frames", self.away_frames), ("escape_frames", self.escape_frames)];
+        let late = self.deliveries.iter().map(|d| d.frame).max();
+        let within = within.into_iter().chain([("frame of a delivery", late)]);
+        for (name, n) in within.filter_map(|(name, n)| Some((name, n?))) {
+            if n > frames {
+                return Err(format!("`{name}` is {n}, expected at most `frames`, {frames}"));
+            }
+        }
+        Ok(())
+    }
+
     /// The transport rate: what is done of what was wanted.
     pub fn rate(&self) -> f64 {
         if self.total > 0.0 { self.done / self.total } else { 0.0 }

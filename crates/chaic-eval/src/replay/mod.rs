@@ -16,7 +16,7 @@ use crate::error::{EvalError, Result};
 use crate::play::world_of;
 use crate::run::{RunFolder, slug};
 use crate::trace::{Decision, Header, Trace};
-use crate::video::VideoWriter;
+use crate::video::{VideoError, VideoWriter};
 
 pub use panel::{HEIGHT_PX, WIDTH_PX};
 
@@ -101,7 +101,12 @@ pub fn write(
     out: &Path,
     progress: &mut dyn FnMut(Frame),
 ) -> Result<u32> {
-    let bad = |e: crate::video::VideoError| EvalError::Picture(e.to_string());
+    let bad = |e: VideoError| match e {
+        VideoError::UnsupportedExtension { .. } | VideoError::FrameRate { .. } => {
+            EvalError::Options(e.to_string())
+        }
+        _ => EvalError::Picture(e.to_string()),
+    };
     let mut replay = Replay::new(trace, episode)?;
     let mut video = VideoWriter::create(out, WIDTH_PX, HEIGHT_PX, options.fps).map_err(bad)?;
     let every = options.every.max(1);

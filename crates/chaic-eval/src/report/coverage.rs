@@ -27,6 +27,21 @@ fn missing(results: &[RunResult], planned: &[RunKey]) -> Option<String> {
     })
 }
 
+/// The finished ones among the `noted` results that are not among those `scored` from traces, and
+/// so have no whole trace: how many, and which is the first. Nothing if there are none.
+pub fn without_trace(noted: &[RunResult], scored: &[RunResult]) -> Option<String> {
+    let scored: BTreeSet<&RunKey> = scored.iter().map(|r| &r.key).collect();
+    let finished = || noted.iter().filter(|r| r.summary().is_some()).map(|r| &r.key);
+    let missed: Vec<&RunKey> = finished().filter(|k| !scored.contains(k)).collect();
+    let RunKey { helper, episode, seed, .. } = missed.iter().min()?;
+    Some(format!(
+        "{} of {} finished episode runs have no whole trace and are left out, first {episode} with \
+         {helper} and seed {seed}",
+        missed.len(),
+        finished().count()
+    ))
+}
+
 /// Episodes and seeds by helper.
 type ByHelper<'a> = BTreeMap<&'a str, BTreeSet<(&'a str, u32)>>;
 

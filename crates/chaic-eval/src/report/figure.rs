@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::error::{EvalError, Result};
-use crate::figure::{Bar, Bars, HelperBars, transport_rate};
+use crate::figure::{Bar, Bars, FigureError, HelperBars, transport_rate};
 use crate::metrics::Scores;
 use crate::report::tables::title;
 
@@ -27,5 +27,8 @@ pub fn write_figure(scores: &Scores, path: &Path) -> Result<()> {
         helpers: scores.helpers().iter().map(bars).collect(),
         dots: None,
     };
-    transport_rate(&bars, path).map_err(|e| EvalError::Picture(e.to_string()))
+    transport_rate(&bars, path).map_err(|e| match e {
+        FigureError::UnsupportedExtension { .. } => EvalError::Options(e.to_string()),
+        _ => EvalError::Picture(e.to_string()),
+    })
 }

@@ -6,7 +6,7 @@ mod grid;
 mod tables;
 mod write;
 
-pub use coverage::coverage;
+pub use coverage::{coverage, without_trace};
 pub use figure::write_figure;
 pub(crate) use grid::Grid;
 pub use tables::{additional, main_result, pairs, title};

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::io::Read as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use chaic_episodes::{Episode, MAX_EPISODE_BYTES, Split};
 use chaic_protocol::{Frame, TaskId};
@@ -101,17 +101,22 @@ fn episodes(
 
 /// The episodes in a folder's `.json` files, in the order of their ids.
 fn read_files(folder: &Path) -> Result<Vec<Episode>> {
-    let list = fs::read_dir(folder).map_err(EvalError::io("list", folder))?;
     let mut episodes = Vec::new();
-    for entry in list {
-        let path = entry.map_err(EvalError::io("list", folder))?.path();
-        if path.extension().is_some_and(|e| e == "json") {
-            let bytes = read_bounded(&path)?;
-            episodes.push(Episode::parse(&bytes, &path.display().to_string())?);
-        }
+    for path in episode_files(folder)? {
+        let bytes = read_bounded(&path)?;
+        episodes.push(Episode::parse(&bytes, &path.display().to_string())?);
     }
     episodes.sort_by(|a, b| a.id().cmp(b.id()));
     Ok(episodes)
+}
+
+/// A folder's `.json` files, in the order of their names.
+fn episode_files(folder: &Path) -> Result<Vec<PathBuf>> {
+    let list = fs::read_dir(folder).and_then(|d| d.map(|e| e.map(|e| e.path())).collect());
+    let mut files: Vec<PathBuf> = list.map_err(EvalError::io("list", folder))?;
+    files.retain(|p| p.extension().is_some_and(|e| e == "json"));
+    files.sort();
+    Ok(files)
 }
 
 /// The bytes of an episode file; of a file that is too long so many that its reader says so.
@@ -131,6 +136,49 @@ pub(crate) fn tasks_of_files(folder: &Path) -> Result<Vec<TaskId>> {
         return Err(EvalError::Options(text));
     }
     Ok(TaskId::all().filter(|t| present.contains(t)).collect())
+}
+
+/// Whether `source` still holds just the episodes that the run has copies of: whoever names other
+/// ones while going on with it means another run.
+pub(super) fn check_episode_files(
+    source: &Path,
+    tasks: &[TaskId],
+    folder: &RunFolder,
+) -> Result<()> {
+    if same_files(source, &folder.episode_files())? {
+        return Ok(());
+    }
+    let mut named = read_files(source)?;
+    named.retain(|e| tasks.contains(&e.task()));
+    let copies = read_files(&folder.episode_files())?;
+    let other = named.iter().find(|e| !copies.contains(e));
+    let Some(other) = other.or_else(|| copies.iter().find(|e| !named.contains(e))) else {
+        return Ok(());
+    };
+    Err(EvalError::Options(format!(
+        "{} was begun with other episodes than --episodes {}, see {}; leave --episodes away to go \
+         on, or choose another --out",
+        folder.path().display(),
+        source.display(),
+        other.id()
+    )))
+}
+
+/// Whether two folders hold the same episode files, byte by byte: quicker than to read them.
+fn same_files(a: &Path, b: &Path) -> Result<bool> {
+    let (a, b) = (episode_files(a)?, episode_files(b)?);
+    let names = |files: &[PathBuf]| -> Vec<_> {
+        files.iter().filter_map(|p| p.file_name().map(ToOwned::to_owned)).collect()
+    };
+    if names(&a) != names(&b) {
+        return Ok(false);
+    }
+    for (a, b) in a.iter().zip(&b) {
+        if read_bounded(a)? != read_bounded(b)? {
+            return Ok(false);
+        }
+    }
+    Ok(true)
 }
 
 /// Copies the episodes of `source` into the run, which then needs nothing from elsewhere.

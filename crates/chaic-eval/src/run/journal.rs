@@ -44,7 +44,8 @@ impl Journal {
 /// Where an episode run occurs again, its last result holds.
 ///
 /// # Errors
-/// If the file can't be read, or a record that isn't the last one is damaged.
+/// If the file can't be read, a record that isn't the last one is damaged, or any has numbers that
+/// can't be.
 pub fn read_results(path: &Path) -> Result<(Vec<RunResult>, Vec<Warning>)> {
     let (results, warnings, _) = read(path)?;
     Ok((results, warnings))
@@ -67,6 +68,10 @@ fn read(path: &Path) -> Result<(Vec<RunResult>, Vec<Warning>, u64)> {
         };
         match parsed {
             Ok(result) => {
+                if let Err(problem) = result.check() {
+                    let (path, line) = (path.to_owned(), k + 1);
+                    return Err(EvalError::Unreadable { path, line, problem });
+                }
                 whole += line.len();
                 results.insert(result.key.clone(), result);
             }

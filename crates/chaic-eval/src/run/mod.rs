@@ -71,8 +71,11 @@ impl Run {
             None => given.begin()?,
         };
         check(&options, helpers)?;
-        if let (None, Some(source)) = (&recorded, &given.episodes) {
-            items::copy_episode_files(source, &options.tasks, &folder)?;
+        if let Some(source) = &given.episodes {
+            match recorded {
+                None => items::copy_episode_files(source, &options.tasks, &folder)?,
+                Some(_) => items::check_episode_files(source, &options.tasks, &folder)?,
+            }
         }
         let items = items::items(&options, &folder)?;
         if recorded.is_none() {

@@ -137,6 +137,7 @@ impl Given {
     pub fn resume(&self, recorded: &RunOptions, path: &Path) -> Result<RunOptions> {
         let list = |tasks: &[TaskId]| tasks.iter().map(|t| t.name()).collect::<Vec<_>>().join(",");
         let number = |n: Option<u32>| n.map_or("not given".to_owned(), |n| n.to_string());
+        let has_files = recorded.split == FILES;
         let said = [
             (
                 "--task",
@@ -148,12 +149,16 @@ impl Given {
                 self.helpers.as_ref().map(|h| without_repeats(h.clone()).join(",")),
                 recorded.helpers.join(","),
             ),
-            ("--split", self.split.as_ref().map(Split::to_string), recorded.split.clone()),
+            (
+                "--split",
+                self.split.as_ref().map(Split::to_string),
+                if has_files { number(None) } else { recorded.split.clone() },
+            ),
             (
                 "--episodes",
-                // The run has its own copies of the files; the folder itself may be gone.
-                self.episodes.as_ref().map(|_| FILES.to_owned()),
-                recorded.split.clone(),
+                // Whether these are the run's own files is for those who read them.
+                self.episodes.as_ref().filter(|_| !has_files).map(|p| p.display().to_string()),
+                number(None),
             ),
             ("--first", self.first.map(|n| n.to_string()), number(recorded.first)),
             ("--seeds", self.seeds.map(|n| n.to_string()), recorded.seeds.to_string()),

@@ -263,6 +263,20 @@ fn folders_are_guarded() {
     let other = Given { helpers: Some(vec!["none".into(), "turner".into()]), ..mine.clone() };
     let error = open(Access::Resume, &other).unwrap_err().to_string();
     assert!(error.contains("--helper turner, not none,turner"), "{error}");
+    let split = Given { episodes: None, split: Some("test".parse().unwrap()), ..mine.clone() };
+    let error = open(Access::Resume, &split).unwrap_err();
+    assert!(
+        error.is_usage() && error.to_string().contains("--split not given, not test"),
+        "{error}"
+    );
+    // The same episodes in another folder are the same; other ones are not, nor none at all.
+    let same = episode_files(&[TaskId::LowTarget], 1);
+    let other = episode_files(&[TaskId::LowTarget], 2);
+    let named = |path: &Path| Given { episodes: Some(path.to_owned()), ..mine.clone() };
+    assert!(open(Access::Resume, &named(same.path())).is_ok());
+    let error = open(Access::Resume, &named(other.path())).unwrap_err();
+    assert!(error.is_usage() && error.to_string().contains("low_target/short/1"), "{error}");
+    assert!(open(Access::Resume, &named(&dir.path().join("nowhere"))).is_err());
     let unknown = Given { helpers: Some(vec!["nobody".into()]), ..mine.clone() };
     let elsewhere = dir.path().join("elsewhere");
     let error = Run::open(&elsewhere, Access::Begin, &unknown, &helpers).unwrap_err().to_string();
@@ -283,6 +297,41 @@ fn folders_are_guarded() {
     let error = Run::open(&foreign, Access::Resume, &mine, &helpers).unwrap_err();
     assert!(matches!(error, EvalError::NotARun { .. }), "{error}");
     assert!(!foreign.join(".lock").exists());
+}
+
+#[test]
+fn options_of_a_split_rule_out_episode_files_when_going_on() {
+    let recorded = Given { first: Some(1), ..Given::default() }.begin().unwrap();
+    let given = Given { episodes: Some("mine".into()), ..Given::default() };
+    let error = given.resume(&recorded, Path::new("run")).unwrap_err().to_string();
+    assert!(error.contains("--episodes not given, not mine"), "{error}");
+}
+
+#[test]
+fn a_journal_with_impossible_numbers_is_refused_by_file_and_line() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("results.jsonl");
+    let good = r#"{"task":"obstacle","helper":"rhp","episode":"e","seed":0,"status":"done",
+        "frames":90,"done":1.0,"total":2.0,"away_frames":3,"deliveries":[{"frame":80,"object":17,
+        "class":"apple","by":1,"counted":true}],"digest":"0000000000000003"}"#;
+    let good = good.replace("\n        ", "");
+    let read = |line: &str| {
+        fs::write(&path, format!("{good}\n{line}\n")).unwrap();
+        read_results(&path).map(|(_, warnings)| warnings)
+    };
+    assert_eq!(read(&good).unwrap(), []);
+    for (from, to, said) in [
+        ("\"done\":1.0", "\"done\":3.0", "`done` is 3, expected at most `total`, 2"),
+        ("\"done\":1.0", "\"done\":-1.0", "`done` is -1"),
+        ("\"total\":2.0", "\"total\":-2.0", "`total` is -2"),
+        ("\"away_frames\":3", "\"away_frames\":91", "`away_frames` is 91"),
+        ("\"frame\":80", "\"frame\":91", "`frame of a delivery` is 91"),
+    ] {
+        let line = good.replacen(from, to, 1);
+        assert_ne!(line, good, "{from} is there");
+        let error = read(&line).unwrap_err().to_string();
+        assert!(error.contains("results.jsonl: line 2: ") && error.contains(said), "{error}");
+    }
 }
 
 #[test]

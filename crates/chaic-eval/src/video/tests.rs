@@ -51,6 +51,23 @@ fn gif_holds_the_frames() {
 }
 
 #[test]
+fn what_is_not_finished_leaves_what_was_there() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.gif");
+    std::fs::write(&path, "dear").unwrap();
+    let names = || std::fs::read_dir(dir.path()).unwrap().count();
+    let mut video = VideoWriter::create(&path, 64, 48, 10).unwrap();
+    video.push(&frame(64, 48, 0)).unwrap();
+    // What somebody finds who looks now, or after the program was killed.
+    assert_eq!(std::fs::read(&path).unwrap(), b"dear");
+    assert_eq!(names(), 2);
+    drop(video);
+    assert_eq!((std::fs::read(&path).unwrap(), names()), (b"dear".to_vec(), 1));
+    assert!(write(&path, 64, 48, 2).starts_with(b"GIF89a"));
+    assert_eq!(names(), 1);
+}
+
+#[test]
 fn refuses_what_cannot_be_encoded() {
     let dir = tempfile::tempdir().unwrap();
     let gif = dir.path().join("a.gif");

@@ -159,8 +159,7 @@ impl World {
     /// Whether a thing may be stepped up to from here (facts of the original, 3.4).
     fn check_near(&self, agent: AgentId, entity: EntityId) -> Result<(), FailureReason> {
         let (thing, state) = self.thing(entity);
-        let size = thing.size_m();
-        let limit = self.rules.approach_limit_m + 0.5 * size.x.max(size.z);
+        let limit = self.rules.approach_limit_m + thing.half_longer_side_m();
         let distance = horizontal_distance(self.person(agent).pose.position, state.position);
         if distance > limit { Err(FailureReason::TooFar) } else { Ok(()) }
     }

@@ -104,8 +104,7 @@ impl World {
             let mut taken = Vec::new();
             for object in objects.into_iter().rev() {
                 let spot = self.free_spot_on(place, object, from, &taken);
-                let size = self.thing(object).0.size_m();
-                taken.push((spot, 0.5 * size.x.max(size.z)));
+                taken.push((spot, self.thing(object).0.half_longer_side_m()));
                 let at = spot + Vec3::Y * RELEASE_ABOVE_M;
                 let release = Phase::Release {
                     hand: Some(Hand::Right),

@@ -12,7 +12,7 @@ use serde_json::json;
 
 use crate::Ended;
 use crate::arguments::{EpisodesCommand, ListFormat};
-use crate::output::{complain, say};
+use crate::output::{complain, counted, say};
 
 /// Lists, shows, makes or checks episodes.
 pub fn run(command: &EpisodesCommand) -> Result<Ended> {
@@ -79,14 +79,15 @@ fn show(argument: &str, out: &Path, width_px: u32) -> Result<Ended> {
 fn generate(task: TaskId, seeds: Range<u64>, out: &Path) -> Result<Ended> {
     std::fs::create_dir_all(out)
         .with_context(|| format!("can't make the folder {}", out.display()))?;
-    let n = seeds.end - seeds.start;
+    let mut n = 0;
     for seed in seeds {
         let episode = find_episode(&format!("{task}/gen/{seed}"))?;
         let path = out.join(format!("{task}-{seed}.json"));
         let written = std::fs::write(&path, episode.to_json());
         written.with_context(|| format!("can't write {}", path.display()))?;
+        n += 1;
     }
-    say(&format!("{}: {n} episodes of {task}\n", out.display()))?;
+    say(&format!("{}: {} of {task}\n", out.display(), counted(n, "episode")))?;
     Ok(Ended::Well)
 }
 
@@ -107,7 +108,7 @@ fn validate(files: &[PathBuf]) -> Result<Ended> {
         }
     }
     if n_bad > 0 {
-        complain(&format!("{n_bad} of {} files can't be played", files.len()));
+        complain(&format!("{n_bad} of {} can't be played", counted(files.len(), "file")));
         return Ok(Ended::WithFindings);
     }
     Ok(Ended::Well)

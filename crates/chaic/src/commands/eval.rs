@@ -13,7 +13,7 @@ use super::{bars::RunBars, jobs};
 use crate::Ended;
 use crate::arguments::EvalArguments;
 use crate::interrupt;
-use crate::output::{complain, say};
+use crate::output::{complain, counted, say};
 
 /// Episodes of each task in the small benchmark: with all helpers about two minutes on two cores.
 const QUICK_EPISODES: u32 = 2;
@@ -33,14 +33,17 @@ pub fn run(arguments: &EvalArguments) -> Result<Ended> {
     let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
     keep_workers_quiet();
     let extent = run.extent();
-    let (tasks, helpers) = (run.options().tasks.len(), run.options().helpers.join(", "));
+    let (tasks, helpers) = (&run.options().tasks, &run.options().helpers);
     complain(&format!(
-        "{}: {} episode runs, {tasks} tasks, helpers {helpers}{}",
+        "{}: {}, {}, {} {}{}",
         path.display(),
-        extent.total,
+        counted(extent.total, "episode run"),
+        counted(tasks.len(), "task"),
+        if helpers.len() == 1 { "helper" } else { "helpers" },
+        helpers.join(", "),
         match extent.finished - extent.errors {
             0 => String::new(),
-            n => format!("; {n} are finished already"),
+            n => format!("; finished already: {n}"),
         }
     ));
     let jobs = jobs(arguments.jobs);
@@ -55,7 +58,7 @@ pub fn run(arguments: &EvalArguments) -> Result<Ended> {
     if !is_whole {
         let extent = run.extent();
         let done = extent.finished - extent.errors;
-        complain(&format!("stopped after {done} of {} episode runs", extent.total));
+        complain(&format!("stopped after {done} of {}", counted(extent.total, "episode run")));
         complain(&how_to_resume(&path));
         return Ok(Ended::Interrupted);
     }

@@ -5,7 +5,7 @@ use chaic_import::{Half, OnError, Sources, import};
 
 use crate::Ended;
 use crate::arguments::{ImportCommand, ImportHalf, OriginalArguments};
-use crate::output::{complain, say};
+use crate::output::{complain, counted, say};
 
 /// Imports episodes from elsewhere.
 pub fn run(command: &ImportCommand) -> Result<Ended> {
@@ -34,7 +34,7 @@ fn original(arguments: &OriginalArguments) -> Result<Ended> {
     for error in &imported.left_out {
         complain(&format!("left out: {error}"));
     }
-    let n = imported.episodes.len();
-    say(&format!("{}: {n} episodes, {} left out\n", out.display(), imported.left_out.len()))?;
+    let n = counted(imported.episodes.len(), "episode");
+    say(&format!("{}: {n}, {} left out\n", out.display(), imported.left_out.len()))?;
     Ok(if imported.left_out.is_empty() { Ended::Well } else { Ended::WithFindings })
 }

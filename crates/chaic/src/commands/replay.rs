@@ -9,7 +9,7 @@ use chaic_eval::trace;
 use super::bars;
 use crate::Ended;
 use crate::arguments::ReplayArguments;
-use crate::output::{complain, say};
+use crate::output::{complain, counted, say};
 
 /// Makes a video of a recorded episode.
 pub fn run(arguments: &ReplayArguments) -> Result<Ended> {
@@ -32,8 +32,9 @@ pub fn run(arguments: &ReplayArguments) -> Result<Ended> {
     bar.finish_and_clear();
     let pictures = pictures?;
     say(&format!(
-        "{}: {pictures} pictures of {} with {}\n",
+        "{}: {} of {} with {}\n",
         out.display(),
+        counted(pictures as usize, "picture"),
         key.episode,
         key.helper
     ))?;

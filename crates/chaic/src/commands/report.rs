@@ -3,7 +3,7 @@
 use anyhow::Result;
 use chaic_eval::EvalError;
 use chaic_eval::metrics::{RunResult, tally};
-use chaic_eval::report::{Format, Report, write_figure};
+use chaic_eval::report::{Format, Report, without_trace, write_figure};
 use chaic_eval::run::{RunFolder, planned, read_results};
 use chaic_eval::trace;
 
@@ -57,6 +57,14 @@ fn from_traces(folder: &RunFolder) -> Result<Vec<RunResult>> {
             complain(&format!("warning: {warning}"));
         }
         results.extend(tally(&trace));
+    }
+    match read_results(&folder.results()) {
+        Ok((noted, _)) => {
+            if let Some(note) = without_trace(&noted, &results) {
+                complain(&format!("warning: {note}"));
+            }
+        }
+        Err(e) => complain(&format!("warning: can't tell whether traces are missing: {e}")),
     }
     Ok(results)
 }

@@ -8,7 +8,7 @@ use chaic_eval::verify::verify_run;
 use super::{bars, jobs};
 use crate::Ended;
 use crate::arguments::VerifyArguments;
-use crate::output::{complain, say};
+use crate::output::{complain, counted, say};
 
 /// Plays the traces of a run again and compares.
 pub fn run(arguments: &VerifyArguments) -> Result<Ended> {
@@ -27,12 +27,13 @@ pub fn run(arguments: &VerifyArguments) -> Result<Ended> {
     let (traces, decisions) = (verdict.agreeing, verdict.decisions);
     if !verdict.mismatches.is_empty() {
         let n = verdict.mismatches.len();
-        say(&format!("{n} of {} traces differ\n", n + traces))?;
+        say(&format!("traces that differ: {n} of {}\n", n + traces))?;
         return Ok(Ended::WithFindings);
     }
     if traces == 0 {
         anyhow::bail!("{} has no trace to verify", arguments.run.display());
     }
-    say(&format!("{traces} traces with {decisions} decisions agree in every digest\n"))?;
+    let (traces, decisions) = (counted(traces, "trace"), counted(decisions, "decision"));
+    say(&format!("{traces} with {decisions}: all digests agree\n"))?;
     Ok(Ended::Well)
 }

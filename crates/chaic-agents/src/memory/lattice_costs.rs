@@ -67,12 +67,16 @@ pub struct Belief {
 }
 
 impl Belief {
-    /// Takes in `latest`: which cells are occupied by the latest account.
-    fn update(&mut self) {
+    /// Takes in `latest`, which cells are occupied by the latest account, and which are walls.
+    fn update(&mut self, walls: impl Iterator<Item = bool>) {
+        self.wall.resize(self.latest.len(), false);
         if self.n_updates.is_multiple_of(BELIEVE_EVERY) {
             std::mem::swap(&mut self.occupied, &mut self.latest);
         } else {
             self.occupied.iter_mut().zip(&self.latest).for_each(|(old, new)| *old |= new);
+        }
+        for ((wall, is_occupied), now) in self.wall.iter_mut().zip(&self.occupied).zip(walls) {
+            *wall = now || (*wall && *is_occupied);
         }
         self.n_updates += 1;
     }
@@ -122,12 +126,11 @@ pub fn lattice_costs(grid: &Grid, seen: &Seen<'_>, belief: &mut Belief, cost: &m
             occupied[cell] = true;
         }
     }
-    belief.update();
+    belief.update(seen.map.cells().map(|cell| cell.space() == Space::Wall));
     belief.spread(grid);
     let in_it = if seen.now < FIRST_FRAMES { OCCUPIED_AT_FIRST } else { OCCUPIED };
     let near = belief.near[0].iter().zip(&belief.near[1]);
-    belief.wall.resize(grid.n_cells(), false);
-    let believed = belief.occupied.iter().zip(&mut belief.wall).zip(near);
+    let believed = belief.occupied.iter().zip(&belief.wall).zip(near);
     for ((cost, cell), ((is_occupied, is_wall), (is_next, is_near))) in
         cost.iter_mut().zip(seen.map.cells()).zip(believed)
     {
@@ -135,7 +138,6 @@ pub fn lattice_costs(grid: &Grid, seen: &Seen<'_>, belief: &mut Belief, cost: &m
         let place = if *is_next { NEAR[1] } else { place };
         let place = if *is_occupied { in_it } else { place };
         let unknown = if cell.is_known() { 0 } else { UNKNOWN_EXTRA };
-        *is_wall = cell.space() == Space::Wall || (*is_wall && *is_occupied);
         let wall = if *is_wall { WALL_EXTRA } else { 0 };
         let true_wall = if cell.is_tall() { TRUE_WALL_EXTRA } else { 0 };
         *cost = place + unknown + wall + true_wall;
@@ -172,8 +174,9 @@ mod tests {
     fn a_wall_stays_one_for_as_long_as_its_cell_counts_as_occupied() {
         let mut belief = Belief::default();
         let mut update = |occupied, wall| {
-            belief.update(vec![occupied], |_| wall);
-            (belief.is_occupied(0), belief.is_wall(0))
+            belief.latest = vec![occupied];
+            belief.update([wall].into_iter());
+            (belief.is_occupied(0), belief.wall[0])
         };
         assert_eq!(update(true, true), (true, true));
         for _ in 1..BELIEVE_EVERY {

@@ -511,7 +511,7 @@ mod tests {
         let know = |map: &OccupancyMap| {
             [-0.7, 0.7].map(|x| {
                 let cell = map.grid().cell_at(Vec2::new(x, -1.85)).expect("inside");
-                (map.space(cell), map.is_tall(cell))
+                (map.space(cell), map.cells().nth(cell).expect("inside").is_tall())
             })
         };
         look(&mut map, &toy);

@@ -74,11 +74,16 @@ fn minder(rules: PlannerRules) -> Situated {
 
 /// Guardian and child are seen, far from each other; the child is beside the helper.
 fn see_both(s: &mut Situated, frame: Frame) {
+    see_apart(s, frame, 9.5);
+}
+
+/// Guardian and child are seen so far apart; the child is beside the helper.
+fn see_apart(s: &mut Situated, frame: Frame, apart_m: f32) {
     let mut observation = Toy::room(4.0, 4.0).observe();
     observation.images = Default::default();
     observation.frame = frame;
     observation.granted.poses =
-        vec![(AgentId::PARTNER, pose(0.0, 8.0)), (AgentId::CHILD, pose(0.0, -1.5))];
+        vec![(AgentId::PARTNER, pose(0.0, apart_m - 1.5)), (AgentId::CHILD, pose(0.0, -1.5))];
     s.memory.update(&s.briefing, &observation, &GroundTruthIds.perceive(&observation));
 }
 
@@ -122,6 +127,24 @@ fn one_stays_with_the_child_for_a_moment_or_for_as_long_as_it_is_there() {
         assert_eq!(then == Progress::Done, trusts_child, "{then:?}");
         assert_eq!(matches!(then, Progress::Act(_)), !trusts_child, "{then:?}");
     }
+}
+
+#[test]
+fn who_does_not_trust_the_child_leaves_it_a_while_after_it_was_last_away() {
+    let mut s = minder(PlannerRules { trusts_child: false, ..PAPER });
+    let mut executor = Executor::new(&s.briefing);
+    let mut at = |frame, apart_m| {
+        see_apart(&mut s, frame, apart_m);
+        match frame {
+            100 => s.begin(&mut executor, Plan::FollowChild),
+            _ => s.go_on(&mut executor, Plan::FollowChild),
+        }
+    };
+    for (frame, apart_m) in [(100, 9.5), (390, 9.5), (400, 1.0), (690, 1.0)] {
+        let progress = at(frame, apart_m);
+        assert!(matches!(progress, Progress::Act(_)), "{frame}: {progress:?}");
+    }
+    assert_eq!(at(691, 1.0), Progress::Failed, "300 frames after 390");
 }
 
 #[test]

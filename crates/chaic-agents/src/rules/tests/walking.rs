@@ -97,3 +97,42 @@ fn one_picks_up_and_puts_down_from_as_near_as_the_rules_say() {
         assert_eq!([does(more_m, less_m), does(less_m, more_m)], [picks, !picks], "{class}");
     }
 }
+
+#[test]
+fn on_the_lattice_one_goes_to_where_an_object_was_and_a_rider_to_where_the_goal_was() {
+    use chaic_protocol::AgentId;
+    use chaic_protocol::capability::Gait;
+    use std::f32::consts::FRAC_PI_2;
+    // Seen straight ahead and, once the plan has begun and one has turned round, ahead again.
+    for (class, gait, turns_back) in
+        [("apple", Gait::Walk, true), ("bed", Gait::Walk, false), ("bed", Gait::WalkBike, true)]
+    {
+        let mut s = Situated::new(PlannerRules { walking: Walking::Lattice, ..PAPER });
+        (s.briefing.me, s.briefing.capability.gait) = (AgentId::PARTNER, gait);
+        let mut executor = None;
+        let mut progress = Vec::new();
+        for (x, yaw_rad) in [(-3.0, FRAC_PI_2), (3.0, -FRAC_PI_2)] {
+            let mut toy = Toy::room(10.0, 10.0);
+            let entity = toy.add(ToyObject::new(class, [x, 0.0, 0.0], [0.3, 0.6, 0.3]));
+            toy.stand([0.0, 0.0], yaw_rad);
+            let observation = toy.observe();
+            if executor.is_none() {
+                (s.briefing.bounds, s.briefing.goal_place) = (toy.bounds(), ClassId::named("bed"));
+                s.memory = Memory::new(&s.briefing, s.memory.rules);
+            }
+            s.memory.update(&s.briefing, &observation, &GroundTruthIds.perceive(&observation));
+            let plan = match class {
+                "apple" => Plan::PickUp(subject(class, entity.0)),
+                _ => Plan::Deliver,
+            };
+            s.hands[0] = (plan == Plan::Deliver).then(|| held("apple", 90, &[]));
+            progress.push(match &mut executor {
+                Some(executor) => s.go_on(executor, plan),
+                none => s.begin(none.insert(Executor::new(&s.briefing)), plan),
+            });
+        }
+        let ahead = Progress::Act(Action::MoveForward);
+        let went_on = progress.iter().map(|p| *p == ahead).collect::<Vec<_>>();
+        assert_eq!(went_on, [true, !turns_back], "{class} {gait:?}: {progress:?}");
+    }
+}

@@ -1,5 +1,8 @@
 //! Where a body of some radius can stand, on a grid.
 
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
 use chaic_protocol::Vec2;
 use chaic_protocol::geom::Rect;
 
@@ -137,6 +140,38 @@ impl Grid {
         }
         seen
     }
+
+    /// How far it is on the ground from the nearest of some cells to every other, metres, over
+    /// straight and diagonal steps; infinite where one doesn't get.
+    pub(crate) fn ways(&self, starts: impl Iterator<Item = usize>) -> Vec<f32> {
+        let mut way_m = vec![f32::INFINITY; self.free.len()];
+        // Of positive numbers, the order of their bits is their own.
+        let mut open = BinaryHeap::new();
+        for i in starts.filter(|i| self.free[*i]) {
+            way_m[i] = 0.0;
+            open.push(Reverse((0.0_f32.to_bits(), i)));
+        }
+        while let Some(Reverse((bits, i))) = open.pop() {
+            let so_far_m = f32::from_bits(bits);
+            if so_far_m > way_m[i] {
+                continue;
+            }
+            let (x, z) = ((i % self.nx) as isize, (i / self.nx) as isize);
+            for (dx, dz) in (-1..=1).flat_map(|dz| (-1..=1).map(move |dx| (dx, dz))) {
+                let (x, z) = (x + dx, z + dz);
+                if x < 0 || z < 0 || x >= self.nx as isize || z >= self.nz as isize {
+                    continue;
+                }
+                let j = z as usize * self.nx + x as usize;
+                let step_m = self.cell_m * ((dx * dx + dz * dz) as f32).sqrt();
+                if self.free[j] && so_far_m + step_m < way_m[j] {
+                    way_m[j] = so_far_m + step_m;
+                    open.push(Reverse((way_m[j].to_bits(), j)));
+                }
+            }
+        }
+        way_m
+    }
 }
 
 #[cfg(test)]
@@ -153,5 +188,21 @@ mod tests {
             let there = grid.cell(Vec2::new(3.0, 1.0)).map(|i| seen[i]);
             assert_eq!(there, Some(passes), "radius {radius}");
         }
+    }
+
+    #[test]
+    fn ways_go_round_walls_and_diagonally() {
+        // A wall between two halves, open at the top only.
+        let mut grid = Grid::around(Rect::new([0.0, 0.0], [4.0, 4.0]), 0.0, []);
+        grid.block_rect(&Rect::new([1.9, 0.0], [2.1, 3.0]), 0.04);
+        let at = |x, z| grid.cell(Vec2::new(x, z)).expect("inside");
+        let way_m = grid.ways([at(0.05, 0.05)].into_iter());
+        assert!((way_m[at(1.05, 1.05)] - 2.0_f32.sqrt()).abs() < 1e-4);
+        // To the corner and round it by 19 diagonal and 11 straight steps, one along the top, and
+        // down again like that.
+        let expected_m = 0.1 * (38.0 * 2.0_f32.sqrt() + 23.0);
+        let found_m = way_m[at(3.95, 0.05)];
+        assert!((found_m - expected_m).abs() < 1e-3, "{found_m} for {expected_m}");
+        assert_eq!(way_m[at(1.95, 0.05)], f32::INFINITY, "in the wall");
     }
 }

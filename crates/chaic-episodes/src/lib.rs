@@ -34,4 +34,4 @@ pub use solid::{Solid, mm, mm3};
 pub use split::{
     BUNDLED_PER_TASK, Bundled, Split, SplitError, episodes, find_episode, regenerate_bundled,
 };
-pub use validate::{Problem, Walker, out_of_reach, playable, validate};
+pub use validate::{Problem, Walker, out_of_reach, playable, validate, ways_from};

@@ -156,6 +156,14 @@ pub(crate) struct Source {
 /// Names of rooms by floor plan, layout and region.
 pub(crate) type RoomTypes = BTreeMap<String, Vec<Vec<String>>>;
 
+/// Reads the names of rooms, which lie in a folder of episodes or in one of the two above.
+pub(crate) fn room_types(folder: &Path) -> Result<RoomTypes, ImportError> {
+    let file = |p: &Path| p.join("room_types.json");
+    let mut candidates = folder.ancestors().take(3).map(file);
+    let found = candidates.find(|p| p.is_file()).unwrap_or_else(|| file(folder));
+    files::read(&found)
+}
+
 /// The folder of a task.
 #[derive(Debug)]
 pub(crate) struct TaskFolder {
@@ -187,12 +195,9 @@ impl TaskFolder {
         self.path.join("test_env.json")
     }
 
-    /// The names of rooms, which lie beside the episodes and in the folders above.
+    /// The names of rooms.
     pub fn room_types(&self) -> Result<RoomTypes, ImportError> {
-        let file = |p: &Path| p.join("room_types.json");
-        let mut candidates = self.path.ancestors().take(3).map(file);
-        let found = candidates.find(|p| p.is_file()).unwrap_or_else(|| file(&self.path));
-        files::read(&found)
+        room_types(&self.path)
     }
 
     /// Reads one episode.

@@ -27,65 +27,108 @@ const ON_FLOOR_M: f32 = 0.05;
 /// What is put lower than this is put on the floor, metres (the original puts it at 0.1).
 const PUT_ON_FLOOR_M: f32 = 0.2;
 
+/// A house by the names of the original.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct House<'a> {
+    plan: &'static Floorplan,
+    number: &'a str,
+    variant: &'a str,
+    layout: &'a str,
+    /// Names of the rooms, by region.
+    names: &'a [String],
+}
+
+impl<'a> House<'a> {
+    /// The house of a scene like `1a` and a layout like `0`; otherwise which of the two names
+    /// nothing, and what is wrong with it.
+    pub fn named(
+        scene: &'a str,
+        layout: &'a str,
+        rooms: &'a RoomTypes,
+    ) -> Result<House<'a>, (&'static str, String)> {
+        let (number, variant) = scene.split_at(scene.len().min(1));
+        let plan = FLOORPLANS.get(number).filter(|p| p.variants.contains_key(variant));
+        let plan = plan.ok_or_else(|| ("scene", format!("is {scene:?}, which no table has")))?;
+        let names = layout.parse().ok().and_then(|k: usize| rooms.get(number)?.get(k));
+        let names = names.filter(|n| n.len() == plan.regions.len()).ok_or_else(|| {
+            ("layout", format!("is {layout:?}, whose rooms room_types.json doesn't name"))
+        })?;
+        Ok(House { plan, number, variant, layout, names })
+    }
+
+    /// The house with its furniture, as the package has it. Pieces of `goal_categories` are goal
+    /// places. Also which things drop when the scene starts, by their places.
+    pub fn furnished(
+        &self,
+        task: TaskId,
+        goal_categories: &[String],
+        package: &Package,
+    ) -> Result<(Setup, Vec<usize>), ImportError> {
+        let mut setup = shell(task, self);
+        let mut loose = Vec::new();
+        for (i, piece) in package.layout(self.number, self.layout)?.iter().enumerate() {
+            let problem = |p: String| {
+                let field = format!("{}.{}[{i}].name", self.number, self.layout);
+                ImportError::field(package.layouts_path(), field, p)
+            };
+            let furniture = furnish(piece, package).map_err(problem)?;
+            if !setup.bounds.grown(STRAY_M).contains(xz(furniture.position)) {
+                continue;
+            }
+            let category = package.record(&piece.name).map_or("", |r| r.category);
+            if goal_categories.iter().any(|c| c == category) && is_goal(task, piece, &furniture) {
+                setup.goal_places.push(Setup::entity(setup.things.len()));
+            }
+            if is_loose(piece) && furniture.position.y > DROPS_M[1] {
+                loose.push(setup.things.len());
+            }
+            setup.things.push(furniture);
+        }
+        Ok((setup, loose))
+    }
+
+    /// The same with nothing in the air.
+    pub fn settled(&self, package: &Package) -> Result<Setup, ImportError> {
+        let beds = ["bed".to_owned()];
+        let (mut setup, loose) = self.furnished(TaskId::NoConstraint, &beds, package)?;
+        drop_loose(&mut setup, &loose);
+        Ok(setup)
+    }
+}
+
 /// The beginning of an indoor episode.
 pub(crate) fn setup(
     source: &Source,
     rooms: &RoomTypes,
     package: &Package,
 ) -> Result<Setup, ImportError> {
-    let field = |name: &str, problem: String| {
-        ImportError::field(&source.list_path, format!("[{}].{name}", source.index), problem)
-    };
-    let scene = &source.entry.scene;
-    let (number, variant) = scene.split_at(scene.len().min(1));
-    let plan = FLOORPLANS.get(number).filter(|p| p.variants.contains_key(variant));
-    let plan = plan.ok_or_else(|| field("scene", format!("is {scene:?}, which no table has")))?;
-    let layout = source.entry.layout.split('_').next().unwrap_or_default();
-    let names = layout.parse().ok().and_then(|k: usize| rooms.get(number)?.get(k));
-    let names = names.filter(|n| n.len() == plan.regions.len()).ok_or_else(|| {
-        field(
-            "layout",
-            format!("is {:?}, whose rooms room_types.json doesn't name", source.entry.layout),
-        )
+    let entry = &source.entry;
+    let layout = entry.layout.split('_').next().unwrap_or_default();
+    let house = House::named(&entry.scene, layout, rooms).map_err(|(field, problem)| {
+        ImportError::field(&source.list_path, format!("[{}].{field}", source.index), problem)
     })?;
-    let mut setup = shell(source, plan, variant, names);
-    let goal_categories = match &source.entry.task.goal_position_names {
+    let goal_categories = match &entry.task.goal_position_names {
         Names::Many(names) => names.clone(),
         Names::One(name) => vec![name.clone()],
     };
-    let mut loose = Vec::new();
-    for (i, piece) in package.layout(number, layout)?.iter().enumerate() {
-        let problem = |p: String| {
-            ImportError::field(package.layouts_path(), format!("{number}.{layout}[{i}].name"), p)
-        };
-        let furniture = furnish(piece, package).map_err(problem)?;
-        if !setup.bounds.grown(STRAY_M).contains(xz(furniture.position)) {
-            continue;
-        }
-        let category = package.record(&piece.name).map_or("", |r| r.category);
-        if goal_categories.iter().any(|c| c == category) && is_goal(source, piece, &furniture) {
-            setup.goal_places.push(Setup::entity(setup.things.len()));
-        }
-        if is_loose(piece) && furniture.position.y > DROPS_M[1] {
-            loose.push(setup.things.len());
-        }
-        setup.things.push(furniture);
-    }
+    let (mut setup, loose) = house.furnished(source.task, &goal_categories, package)?;
+    setup.seed = entry.seed;
     setup.goal = common::goal(source)?;
     // Everybody looks along Unity's +z at the start.
     setup.people = common::people(source, &setup, [0.0; 3])?;
     drop_loose(&mut setup, &loose);
-    lay_out(&mut setup, source, names, package)?;
+    lay_out(&mut setup, source, house.names, package)?;
     Ok(setup)
 }
 
 /// Walls, rooms and floors.
-fn shell(source: &Source, plan: &Floorplan, variant: &str, names: &[String]) -> Setup {
-    let colors = &plan.variants[variant];
+fn shell(task: TaskId, house: &House<'_>) -> Setup {
+    let House { plan, names, .. } = house;
+    let colors = &plan.variants[house.variant];
     let rooms: Vec<Room> = plan
         .regions
         .iter()
-        .zip(names)
+        .zip(names.iter())
         .map(|(region, name)| Room { kind: room_kind(name), rect: axes::rect(*region) })
         .collect();
     let bounds = axes::rect(plan.bounds);
@@ -108,9 +151,9 @@ fn shell(source: &Source, plan: &Floorplan, variant: &str, names: &[String]) -> 
         color: *color,
     });
     Setup {
-        task: source.task,
-        seed: source.entry.seed,
-        horizon: source.task.info().horizon,
+        task,
+        seed: 0,
+        horizon: task.info().horizon,
         bounds,
         ceiling_m: Some(plan.height_m),
         floors: std::iter::once(under).chain(floors).collect(),
@@ -192,10 +235,10 @@ fn is_loose(piece: &Piece) -> bool {
 
 /// Whether a piece of the right category is a goal place. Of cabinets and refrigerators only high
 /// ones are, and no doors (facts 11.2).
-fn is_goal(source: &Source, piece: &Piece, furniture: &Thing) -> bool {
+fn is_goal(task: TaskId, piece: &Piece, furniture: &Thing) -> bool {
     let top_m = furniture.position.y + furniture.size_m().y;
     let is_high = top_m >= Rules::paper().high_goal_min_top_m && !piece.name.contains("door");
-    source.task != TaskId::HighGoal || is_high
+    task != TaskId::HighGoal || is_high
 }
 
 /// Lets what may be a target and stands on the furniture sink onto it, and what else is `loose` and

@@ -30,6 +30,7 @@ use std::path::{Path, PathBuf};
 use chaic_episodes::Episode;
 use chaic_protocol::TaskId;
 use chaic_protocol::task::SceneKind;
+use chaic_world::Setup;
 
 use crate::dataset::{Source, TaskFolder};
 use crate::package::Package;
@@ -99,6 +100,20 @@ pub fn import(sources: &Sources, on_error: OnError) -> Result<Imported, ImportEr
     Ok(imported)
 }
 
+/// A furnished house of the package, in which nobody is and no episode has laid anything: `scene`
+/// is a floor plan with a variant, like `2a`, `layout` is 0, 1 or 2. Its goal places are its beds.
+///
+/// # Errors
+/// What is wrong with the sources, or that they have no such house.
+pub fn house(sources: &Sources, scene: &str, layout: usize) -> Result<Setup, ImportError> {
+    let package = Package::read(&sources.tdw)?;
+    let (_, folder) = halves(sources)?.swap_remove(0);
+    let (rooms, layout) = (dataset::room_types(&folder)?, layout.to_string());
+    let named = house::House::named(scene, &layout, &rooms);
+    let house = named.map_err(|(field, problem)| ImportError::field(&folder, field, problem))?;
+    house.settled(&package)
+}
+
 /// The halves to import, with their folders.
 fn halves(sources: &Sources) -> Result<Vec<(Half, PathBuf)>, ImportError> {
     let dataset = &sources.dataset;
@@ -137,11 +152,7 @@ fn task_episodes(
 }
 
 /// The envelope around a setup.
-fn finished(
-    half: Half,
-    source: &Source,
-    setup: chaic_world::Setup,
-) -> Result<Episode, ImportError> {
+fn finished(half: Half, source: &Source, setup: Setup) -> Result<Episode, ImportError> {
     let split = format!("original-{}", half.name());
     let id = format!("{}/{split}/{:02}", source.task, source.index);
     let path = source.commands_path.clone();

@@ -8,7 +8,7 @@ use std::fmt;
 
 use chaic_world::Setup;
 
-pub use reach::{Walker, out_of_reach};
+pub use reach::{Walker, out_of_reach, ways_from};
 
 /// Deepest overlap that counts as touching, metres: files are written to the millimetre, and
 /// shapes are boxes around round things.

@@ -1,14 +1,15 @@
 //! Whether everything that the task needs can be got at.
 
+use chaic_protocol::capability::Persona;
 use chaic_protocol::geom::xz;
 use chaic_protocol::{AgentId, Role, Vec2};
-use chaic_world::{Person, Rules, Setup};
+use chaic_world::{Person, Rules, Setup, Thing};
 
 use super::{Demand, Problem, thing_field};
 use crate::grid::{CELL_M, Grid};
 use crate::solid::Solid;
 
-/// How [`out_of_reach`] looks for ways.
+/// How [`out_of_reach`] and [`ways_from`] look for ways.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Walker {
     /// Radius of the body, metres.
@@ -28,10 +29,23 @@ pub fn out_of_reach(setup: &Setup, agent: AgentId, walker: Walker) -> Vec<usize>
     let see_through: Vec<Solid> = walls.iter().filter(|w| w.low_m < 1.0).copied().collect();
     let (grid, seen) = ground(setup, person, &walls, walker);
     let mut missed = needed_things(setup);
-    missed.retain(|k| {
-        !gets_at(&grid, &seen, walker.reach_m, &Solid::of_thing(&setup.things[*k]), &see_through)
-    });
+    missed.retain(|k| !gets_at(&grid, &seen, walker.reach_m, &setup.things[*k], &see_through));
     missed
+}
+
+/// How far a grown-up walks from beside one thing to beside every other, metres, in the order of
+/// [`Setup::things`], once everything that one hand can take out of the way is gone; infinite where
+/// there is no way.
+pub fn ways_from(setup: &Setup, thing: usize, walker: Walker) -> Vec<f32> {
+    let walls = Solid::of_walls(setup);
+    let see_through: Vec<Solid> = walls.iter().filter(|w| w.low_m < 1.0).copied().collect();
+    let height_m = Persona::Adult.capability().height_m;
+    let grid = walkable(setup, height_m, &walls, walker);
+    let beside = |k: usize| beside(&grid, walker.reach_m, &setup.things[k], &see_through);
+    let way_m = grid.ways(beside(thing).into_iter());
+    (0..setup.things.len())
+        .map(|k| beside(k).into_iter().map(|i| way_m[i]).fold(f32::INFINITY, f32::min))
+        .collect()
 }
 
 pub(super) fn problems(setup: &Setup, demand: Demand) -> Vec<Problem> {
@@ -58,8 +72,7 @@ pub(super) fn problems(setup: &Setup, demand: Demand) -> Vec<Problem> {
         let mut got_at = [false; 2];
         let mut missed = Vec::new();
         for k in &needed {
-            let thing = Solid::of_thing(&setup.things[*k]);
-            if gets_at(&grid, &seen, reach_m, &thing, &see_through) {
+            if gets_at(&grid, &seen, reach_m, &setup.things[*k], &see_through) {
                 let is_goal = setup.goal_places.contains(&Setup::entity(*k));
                 let is_target = setup.goal.wanted(setup.things[*k].class) > 0;
                 got_at = [got_at[0] || is_target, got_at[1] || is_goal];
@@ -92,8 +105,14 @@ fn needed_things(setup: &Setup) -> Vec<usize> {
 
 /// Where a person gets to once everything that one hand can take out of the way is gone.
 fn ground(setup: &Setup, person: &Person, walls: &[Solid], walker: Walker) -> (Grid, Vec<bool>) {
-    let body = person.capability();
-    let stands = [Rules::paper().step_over_m, body.height_m];
+    let grid = walkable(setup, person.capability().height_m, walls, walker);
+    let seen = grid.flood(xz(person.pose.position));
+    (grid, seen)
+}
+
+/// Where there is room for somebody of this height, in the same sense.
+fn walkable(setup: &Setup, height_m: f32, walls: &[Solid], walker: Walker) -> Grid {
+    let stands = [Rules::paper().step_over_m, height_m];
     let stays = setup.things.iter().filter(|t| {
         let info = t.class.info();
         t.fixed || !(info.is_carriable() || info.role == Role::Obstacle)
@@ -101,18 +120,22 @@ fn ground(setup: &Setup, person: &Person, walls: &[Solid], walker: Walker) -> (G
     let stays = stays.filter(|t| t.class.info().role != Role::Vehicle).flat_map(Solid::of_thing);
     let solids: Vec<Solid> =
         stays.chain(walls.iter().copied()).filter(|s| s.spans(stands)).collect();
-    let grid = Grid::fine(setup.bounds, walker.cell_m, walker.radius_m, &solids);
-    let seen = grid.flood(xz(person.pose.position));
-    (grid, seen)
+    Grid::fine(setup.bounds, walker.cell_m, walker.radius_m, &solids)
 }
 
-fn gets_at(grid: &Grid, seen: &[bool], reach_m: f32, thing: &[Solid], walls: &[Solid]) -> bool {
-    thing.iter().any(|part| {
-        grid.cells_in(part.bounds().grown(reach_m)).filter(|i| seen[*i]).any(|i| {
-            let from = grid.middle(i);
-            part.distance(from) <= reach_m && sees(from, part.nearest(from), walls)
-        })
-    })
+fn gets_at(grid: &Grid, seen: &[bool], reach_m: f32, thing: &Thing, walls: &[Solid]) -> bool {
+    beside(grid, reach_m, thing, walls).into_iter().any(|i| seen[i])
+}
+
+/// The free cells from which a thing is within reach, and no wall between.
+fn beside(grid: &Grid, reach_m: f32, thing: &Thing, walls: &[Solid]) -> Vec<usize> {
+    let parts = Solid::of_thing(thing);
+    let is_beside = |part: &Solid, i: &usize| {
+        let from = grid.middle(*i);
+        part.distance(from) <= reach_m && sees(from, part.nearest(from), walls)
+    };
+    let near = |part: &Solid| grid.cells_in(part.bounds().grown(reach_m)).filter(|i| grid.free[*i]);
+    parts.iter().flat_map(|part| near(part).filter(|i| is_beside(part, i))).collect()
 }
 
 fn sees(from: Vec2, to: Vec2, walls: &[Solid]) -> bool {

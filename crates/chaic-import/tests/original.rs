@@ -6,8 +6,8 @@ use std::fs;
 use std::io::Write as _;
 use std::path::PathBuf;
 
-use chaic_episodes::Episode;
-use chaic_import::{Half, Imported, OnError, Sources, import};
+use chaic_episodes::{Episode, Walker, ways_from};
+use chaic_import::{Half, Imported, OnError, Sources, house, import};
 use chaic_protocol::TaskId;
 use chaic_protocol::geom::{horizontal_distance, xz};
 use chaic_protocol::task::SceneKind;
@@ -191,4 +191,24 @@ fn indoor_objects_agree_with_a_digest_made_apart() {
         }
     }
     assert!(n_top > 1000 && n_near as f32 >= 0.95 * n_top as f32, "{n_near} of {n_top}");
+}
+
+#[test]
+fn every_house_of_both_halves_has_its_furniture_and_one_bed_that_one_gets_to() {
+    let Some(sources) = sources() else { return };
+    for (scene, layout) in
+        ["1a", "2b", "4c", "5a"].into_iter().flat_map(|s| (0..3).map(move |l| (s, l)))
+    {
+        let setup = house(&sources, scene, layout).expect("it is in the package");
+        assert_eq!(setup.goal_places.len(), 1, "{scene}/{layout}");
+        let bed = setup.thing_index(setup.goal_places[0]).expect("a thing");
+        let walker = Walker { radius_m: 0.2, reach_m: 0.7, cell_m: 0.1 };
+        let ways_m = ways_from(&setup, bed, walker);
+        let n_reached = ways_m.iter().filter(|m| m.is_finite()).count();
+        assert!(n_reached > 30 && ways_m[bed] == 0.0, "{scene}/{layout}: {n_reached}");
+    }
+    for (scene, layout, word) in [("3a", 0, "scene"), ("1d", 0, "scene"), ("1a", 3, "layout")] {
+        let error = house(&sources, scene, layout).expect_err("there is none").to_string();
+        assert!(error.contains(word), "{error}");
+    }
 }

@@ -6,7 +6,7 @@ mod tables;
 mod write;
 
 pub use figure::write_figure;
-pub use tables::{additional, main_result, pairs};
+pub use tables::{additional, counts, main_result, pairs};
 pub use write::{Report, write_files};
 
 use std::fmt;

@@ -25,6 +25,7 @@ fn results() -> Vec<RunResult> {
                         escape_frames: away_frames,
                         deliveries: Vec::new(),
                         digest: Digest(0),
+                        counts: Default::default(),
                     }),
                 });
             }
@@ -43,6 +44,7 @@ fn options() -> RunOptions {
         size: None,
         rules: RuleSetName::Paper,
         set: vec![],
+        partner: None,
     }
 }
 

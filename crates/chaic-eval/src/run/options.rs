@@ -7,6 +7,7 @@ use chaic_protocol::TaskId;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{EvalError, Result};
+use crate::helpers::RULES;
 use crate::rules::{RuleSet, RuleSetName};
 
 /// Largest side of an image that agents may be given, pixels: 16 times the benchmark's area.
@@ -35,6 +36,9 @@ pub struct RunOptions {
     /// Single rules that are set otherwise, as `NAME=VALUE`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub set: Vec<String>,
+    /// Who drives the partner; absent for the rule-based minds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub partner: Option<String>,
 }
 
 /// What the caller says of a run. What isn't said is as recorded, or as usual for a new run.
@@ -58,6 +62,8 @@ pub struct Given {
     pub rules: Option<RuleSetName>,
     /// `--set`, once for each.
     pub set: Vec<String>,
+    /// `--partner`.
+    pub partner: Option<String>,
 }
 
 /// What `split` says where the episodes are files.
@@ -109,7 +115,8 @@ impl Given {
         }
         let (first, rules) = (self.first, self.rules.unwrap_or(RuleSetName::Paper));
         let set = self.set.clone();
-        let options = RunOptions { tasks, helpers, split, first, seeds, size, rules, set };
+        let partner = self.partner.clone().filter(|name| name != RULES);
+        let options = RunOptions { tasks, helpers, split, first, seeds, size, rules, set, partner };
         options.rules()?;
         Ok(options)
     }
@@ -146,6 +153,11 @@ impl Given {
                 "--set",
                 (!self.set.is_empty()).then(|| self.set.join(" ")),
                 if recorded.set.is_empty() { number(None) } else { recorded.set.join(" ") },
+            ),
+            (
+                "--partner",
+                self.partner.clone(),
+                recorded.partner.clone().unwrap_or_else(|| RULES.to_owned()),
             ),
             ("--size", self.size.map(|n| n.to_string()), number(recorded.size)),
         ];

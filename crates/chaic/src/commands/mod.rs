@@ -3,6 +3,7 @@
 pub mod episodes;
 pub mod eval;
 pub mod import;
+pub mod llm;
 pub mod render;
 pub mod replay;
 pub mod report;

@@ -1,10 +1,15 @@
 //! What the others do: a log of their actions and holdings, as far as it is known.
 
+use std::collections::BTreeMap;
+
 use chaic_protocol::geom::horizontal_distance;
 use chaic_protocol::observation::SeenAction;
-use chaic_protocol::{Action, AgentId, ClassId, EntityId, Frame, Hand, Observation, Outcome};
+use chaic_protocol::{Action, AgentId, ClassId, EntityId, Frame, Hand, Observation, Outcome, Vec3};
 
 use crate::memory::{Memory, Thing};
+
+/// A thing that is seen this near to where it lay before has not been moved, metres.
+const SAME_PLACE_M: f32 = 0.4;
 
 /// What is known of the others' doings.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -93,18 +98,34 @@ impl BehaviorModel for GroundTruthBehavior {
 }
 
 /// Infers what one person takes from the own memory alone: what is between that person's hands,
-/// and was not there before, has been taken. Nothing is granted for it. That an attempt failed,
-/// or what was put where, it can't tell.
+/// and was not there before, has been taken; what then still lies where it lay has not. Nothing is
+/// granted for it. That an attempt failed, or what was put where, it can't tell.
 #[derive(Clone, Debug)]
 pub struct SeenBehavior {
     watched: AgentId,
     log: BehaviorLog,
+    /// Where things lay when they were seen lying.
+    lay_at: BTreeMap<EntityId, Vec3>,
 }
 
 impl SeenBehavior {
     /// Watches this person.
     pub fn of(watched: AgentId) -> SeenBehavior {
-        SeenBehavior { watched, log: BehaviorLog::default() }
+        SeenBehavior { watched, log: BehaviorLog::default(), lay_at: BTreeMap::new() }
+    }
+
+    /// Takes back what was inferred of things that still lie where they lay.
+    fn see_lying(&mut self, memory: &Memory) {
+        let lies = |t: &&Thing| t.last_seen == memory.frame && t.held_until <= memory.frame;
+        for thing in memory.things.iter().filter(lies).filter(|t| t.class.info().is_movable()) {
+            let at = thing.position_in_world;
+            let before = self.lay_at.insert(thing.entity, at);
+            if before.is_some_and(|b| b.distance(at) < SAME_PLACE_M) {
+                let is_it = |a: &SeenAction| a.action.subject() == Some(thing.entity);
+                self.log.partner_took.retain(|(entity, _)| *entity != thing.entity);
+                self.log.actions.retain(|action| !is_it(action));
+            }
+        }
     }
 
     /// Whether a thing in the image is in the watched person's hands, not in somebody else's.
@@ -121,10 +142,11 @@ impl SeenBehavior {
 
 impl BehaviorModel for SeenBehavior {
     fn reset(&mut self) {
-        self.log = BehaviorLog::default();
+        *self = SeenBehavior::of(self.watched);
     }
 
     fn watch(&mut self, observation: &Observation, memory: &Memory) {
+        self.see_lying(memory);
         if !memory.people.get(self.watched).is_some_and(|p| p.is_in_view) {
             return;
         }
@@ -226,6 +248,13 @@ mod tests {
             assert_eq!(log.actions.len(), took, "each taking is one action");
         }
         assert_eq!(model.log().partner_took[0].0, EntityId(20), "the child's is the child's");
+        // Seen lying where it lay at first, it was never taken.
+        toy.frame = 50;
+        let observation = toy.observe();
+        let percepts = Percepts { detections: vec![apple(2.0)], ..Percepts::default() };
+        memory.update(&briefing, &observation, &percepts);
+        model.watch(&observation, &memory);
+        assert!(model.log().partner_took.is_empty() && model.log().actions.is_empty());
         // Out of sight nothing is learned, and what was known stays.
         toy.frame = 100;
         let observation = toy.observe();

@@ -1,7 +1,7 @@
 //! Sending one question once, over `ureq`.
 
 use std::collections::BTreeMap;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 use base64::Engine as _;
 use serde::Deserialize;
@@ -11,6 +11,7 @@ use ureq::Agent;
 use crate::error::Result;
 use crate::exchange::{Ask, ContentHash, Fault, FaultKind, Reply, Role, Usage};
 use crate::key::Key;
+use crate::retry_after::retry_after;
 use crate::settings::{Asking, Endpoint, Kind, PictureFormat, Settings, is_local};
 use crate::tokens;
 
@@ -232,12 +233,10 @@ impl Client {
         let completion: Completion =
             serde_json::from_value(value).map_err(|e| wrong(&summary(&e.to_string())))?;
         let choice = completion.choices.into_iter().next().ok_or_else(|| wrong("no choice"))?;
-        let text = choice.message.content.or(choice.message.refusal).unwrap_or_default();
+        let text = said(&choice.message.content).or(choice.message.refusal).unwrap_or_default();
         let text = self.key.mask(text);
-        let usage = match completion.usage {
-            Some(u) => {
-                Usage { prompt: u.prompt_tokens, answer: u.completion_tokens, estimated: false }
-            }
+        let usage = match completion.usage.as_ref().and_then(usage_of) {
+            Some(usage) => usage,
             None => Usage { answer: tokens::estimate(&text) as u64, ..self.worst(ask) },
         };
         let finish = choice.finish_reason.map(|reason| self.key.mask(summary(&reason)));
@@ -250,7 +249,7 @@ impl Client {
 struct Completion {
     choices: Vec<CompletionChoice>,
     #[serde(default)]
-    usage: Option<CompletionUsage>,
+    usage: Option<Value>,
 }
 
 #[derive(Deserialize)]
@@ -263,17 +262,25 @@ struct CompletionChoice {
 #[derive(Deserialize)]
 struct CompletionMessage {
     #[serde(default)]
-    content: Option<String>,
+    content: Value,
     #[serde(default)]
     refusal: Option<String>,
 }
 
-#[derive(Deserialize)]
-struct CompletionUsage {
-    #[serde(default)]
-    prompt_tokens: u64,
-    #[serde(default)]
-    completion_tokens: u64,
+/// A message's text: as such, or in parts.
+fn said(content: &Value) -> Option<String> {
+    let part = |part: &Value| part["text"].as_str().map(str::to_owned);
+    let parts = content.as_array().map(|parts| parts.iter().filter_map(part).collect());
+    content.as_str().map(str::to_owned).or(parts)
+}
+
+/// What an endpoint says a request took, if that makes sense.
+fn usage_of(usage: &Value) -> Option<Usage> {
+    /// More than any request has.
+    const MAX_TOKENS: u64 = 1_000_000_000;
+    let tokens = |name: &str| usage[name].as_u64().map(|n| n.min(MAX_TOKENS));
+    let (prompt, answer) = (tokens("prompt_tokens")?, tokens("completion_tokens").unwrap_or(0));
+    Some(Usage { prompt, answer, estimated: false })
 }
 
 /// Where requests go.
@@ -348,37 +355,6 @@ fn summary(said: &str) -> String {
     clean
 }
 
-/// `Retry-After`: seconds, or a date.
-fn retry_after(value: &str) -> Option<Duration> {
-    if let Ok(secs) = value.trim().parse::<f64>() {
-        return Duration::try_from_secs_f64(secs).ok();
-    }
-    let at = http_date(value.trim())?;
-    Some(at.duration_since(SystemTime::now()).unwrap_or(Duration::ZERO))
-}
-
-/// A date like `Sun, 06 Nov 1994 08:49:37 GMT` (RFC 9110, section 5.6.7).
-fn http_date(text: &str) -> Option<SystemTime> {
-    const MONTHS: [&str; 12] =
-        ["Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec"];
-    let (_, rest) = text.split_once(", ")?;
-    let mut words = rest.split(' ');
-    let day: i64 = words.next()?.parse().ok()?;
-    let month = words.next()?;
-    let month = MONTHS.iter().position(|m| *m == month)? as i64 + 1;
-    let year: i64 = words.next()?.parse().ok()?;
-    let mut clock = words.next()?.split(':').map(|n| n.parse::<i64>().ok());
-    let (h, m, s) = (clock.next()??, clock.next()??, clock.next()??);
-    if words.next()? != "GMT" || !(1970..=9999).contains(&year) {
-        return None;
-    }
-    // Days since 1970 by the civil calendar: years begin in March, so that leap days come last.
-    let (y, m_from_march) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
-    let days = 365 * y + y / 4 - y / 100 + y / 400 + (153 * m_from_march + 2) / 5 + day - 719_469;
-    let secs = u64::try_from(days * 86_400 + h * 3600 + m * 60 + s).ok()?;
-    Some(SystemTime::UNIX_EPOCH + Duration::from_secs(secs))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -407,20 +383,15 @@ mod tests {
     }
 
     #[test]
-    fn an_endpoint_may_ask_to_wait_in_seconds_or_until_a_date() {
-        assert_eq!(retry_after("12"), Some(Duration::from_secs(12)));
-        assert_eq!(retry_after("0.5"), Some(Duration::from_millis(500)));
-        assert_eq!(retry_after("soon"), None);
-        assert_eq!(retry_after("-3"), None);
-        assert_eq!(
-            retry_after("Sun, 06 Nov 1994 08:49:37 GMT"),
-            Some(Duration::ZERO),
-            "it is past"
-        );
-        let at = http_date("Sun, 06 Nov 1994 08:49:37 GMT").unwrap();
-        assert_eq!(at.duration_since(SystemTime::UNIX_EPOCH).unwrap().as_secs(), 784_111_777);
-        let leap = http_date("Thu, 29 Feb 2024 00:00:00 GMT").unwrap();
-        assert_eq!(leap.duration_since(SystemTime::UNIX_EPOCH).unwrap().as_secs(), 1_709_164_800);
+    fn what_endpoints_say_in_their_own_ways_is_understood() {
+        assert_eq!(said(&json!("yes")), Some("yes".to_owned()));
+        let parts = json!([{ "type": "text", "text": "y" }, { "text": "es" }]);
+        assert_eq!(said(&parts), Some("yes".to_owned()));
+        assert_eq!((said(&json!(null)), said(&json!({}))), (None, None));
+        let usage = json!({ "prompt_tokens": u64::MAX, "completion_tokens": -1 });
+        let counted = usage_of(&usage).expect("it counts prompts");
+        assert_eq!((counted.prompt, counted.answer), (1_000_000_000, 0));
+        assert_eq!(usage_of(&json!({ "prompt_tokens": "many" })), None);
     }
 
     #[test]

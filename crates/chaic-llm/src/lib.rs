@@ -34,6 +34,8 @@ pub mod endpoint;
 pub mod gate;
 pub mod record;
 
+mod retry_after;
+
 pub mod asker;
 pub mod policy;
 pub mod session;

@@ -120,7 +120,8 @@ impl Facts {
                 ..all
             }
         };
+        let alone = |track| Facts { others: Vec::new(), ..empty(track) };
         let tracks = [Track::Hidden, Track::Told, Track::Partner];
-        tracks.into_iter().flat_map(|t| [full(t), empty(t)]).collect()
+        tracks.into_iter().flat_map(|t| [full(t), empty(t), alone(t)]).collect()
     }
 }

@@ -1,9 +1,15 @@
 //! What the others do: a log of their actions and holdings, as far as it is known.
 
-use chaic_protocol::observation::SeenAction;
-use chaic_protocol::{Action, AgentId, ClassId, EntityId, Frame, Observation};
+use std::collections::BTreeMap;
 
-use crate::memory::Memory;
+use chaic_protocol::geom::horizontal_distance;
+use chaic_protocol::observation::SeenAction;
+use chaic_protocol::{Action, AgentId, ClassId, EntityId, Frame, Hand, Observation, Outcome, Vec3};
+
+use crate::memory::{Memory, Thing};
+
+/// A thing that is seen this near to where it lay before has not been moved, metres.
+const SAME_PLACE_M: f32 = 0.4;
 
 /// What is known of the others' doings.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -91,9 +97,86 @@ impl BehaviorModel for GroundTruthBehavior {
     }
 }
 
+/// Infers what one person takes from the own memory alone: what is between that person's hands,
+/// and was not there before, has been taken; what then still lies where it lay has not. Nothing is
+/// granted for it. That an attempt failed, or what was put where, it can't tell.
+#[derive(Clone, Debug)]
+pub struct SeenBehavior {
+    watched: AgentId,
+    log: BehaviorLog,
+    /// Where things lay when they were seen lying.
+    lay_at: BTreeMap<EntityId, Vec3>,
+}
+
+impl SeenBehavior {
+    /// Watches this person.
+    pub fn of(watched: AgentId) -> SeenBehavior {
+        SeenBehavior { watched, log: BehaviorLog::default(), lay_at: BTreeMap::new() }
+    }
+
+    /// Takes back what was inferred of things that still lie where they lay.
+    fn see_lying(&mut self, memory: &Memory) {
+        let lies = |t: &&Thing| t.last_seen == memory.frame && t.held_until <= memory.frame;
+        for thing in memory.things.iter().filter(lies).filter(|t| t.class.info().is_movable()) {
+            let at = thing.position_in_world;
+            let before = self.lay_at.insert(thing.entity, at);
+            if before.is_some_and(|b| b.distance(at) < SAME_PLACE_M) {
+                let is_it = |a: &SeenAction| a.action.subject() == Some(thing.entity);
+                self.log.partner_took.retain(|(entity, _)| *entity != thing.entity);
+                self.log.actions.retain(|action| !is_it(action));
+            }
+        }
+    }
+
+    /// Whether a thing in the image is in the watched person's hands, not in somebody else's.
+    fn holds(&self, memory: &Memory, thing: &Thing) -> bool {
+        let is_held = thing.last_seen == memory.frame && thing.held_until > memory.frame;
+        let from = |p: &crate::memory::Person| {
+            horizontal_distance(p.position_in_world, thing.position_in_world)
+        };
+        let in_view = memory.people.iter().filter(|p| p.is_in_view);
+        let nearest = in_view.min_by(|a, b| from(a).total_cmp(&from(b)));
+        is_held && nearest.is_some_and(|p| p.agent == self.watched)
+    }
+}
+
+impl BehaviorModel for SeenBehavior {
+    fn reset(&mut self) {
+        *self = SeenBehavior::of(self.watched);
+    }
+
+    fn watch(&mut self, observation: &Observation, memory: &Memory) {
+        self.see_lying(memory);
+        if !memory.people.get(self.watched).is_some_and(|p| p.is_in_view) {
+            return;
+        }
+        let held = memory.things.iter().filter(|t| self.holds(memory, t));
+        let held: Vec<(EntityId, ClassId)> = held.map(|t| (t.entity, t.class)).collect();
+        let log = &mut self.log;
+        for thing in &held {
+            if !log.partner_took.contains(thing) {
+                log.partner_took.push(*thing);
+                log.actions.push(SeenAction {
+                    agent: self.watched,
+                    frame: observation.frame,
+                    // With which hand can't be told; nobody reads it.
+                    action: Action::PickUp { object: thing.0, hand: Hand::Left },
+                    outcome: Some(Outcome::Success),
+                });
+            }
+        }
+        (log.partner_holds, log.partner_holds_frame) = (held, Some(observation.frame));
+    }
+
+    fn log(&self) -> &BehaviorLog {
+        &self.log
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::perception::{Detection, Percepts};
     use crate::test_support::Toy;
     use chaic_protocol::observation::Held;
     use chaic_protocol::{Hand, Outcome};
@@ -125,5 +208,60 @@ mod tests {
         let last = model.log().last_pick_of(AgentId::PARTNER);
         assert_eq!(last.map(|(_, object)| object), Some(apple.0));
         assert_eq!(model.log().last_pick_of(AgentId::CHILD), None);
+    }
+
+    #[test]
+    fn what_comes_into_somebodys_hands_was_taken_by_that_one() {
+        let mut toy = Toy::room(8.0, 8.0);
+        let briefing = toy.briefing();
+        let mut memory = Memory::new(&briefing, crate::PlannerRules::paper());
+        let mut model = SeenBehavior::of(AgentId::PARTNER);
+        let detection = |entity: EntityId, class: &str, at: [f32; 3]| Detection {
+            entity,
+            class: ClassId::named(class),
+            position_in_world: at.into(),
+            bottom_m: at[1],
+            top_m: at[1] + 0.1,
+            n_pixels: 100,
+            footprint: vec![],
+        };
+        let partner =
+            |x: f32| detection(EntityId::of_agent(AgentId::PARTNER), "person", [x, 1.0, -3.0]);
+        let child = detection(EntityId::of_agent(AgentId::CHILD), "person", [-3.0, 0.6, -3.0]);
+        let apple = |x: f32| detection(EntityId(20), "apple", [x, 1.0, -3.0]);
+        let pear = detection(EntityId(21), "orange", [-2.8, 0.6, -3.0]);
+        // What is seen in turn; what the partner is known to have taken, and to hold.
+        let moments: [(Vec<Detection>, usize, usize); 4] = [
+            (vec![partner(0.0), apple(2.0)], 0, 0),
+            (vec![partner(1.6), apple(1.9)], 0, 0),
+            (vec![partner(0.0), apple(0.5), child, pear], 1, 1),
+            (vec![partner(0.0)], 1, 0),
+        ];
+        for (k, (detections, took, holds)) in moments.into_iter().enumerate() {
+            toy.frame = 10 * k as Frame;
+            let observation = toy.observe();
+            let percepts = Percepts { detections, ..Percepts::default() };
+            memory.update(&briefing, &observation, &percepts);
+            model.watch(&observation, &memory);
+            let log = model.log();
+            assert_eq!((log.partner_took.len(), log.partner_holds.len()), (took, holds), "{k}");
+            assert_eq!(log.actions.len(), took, "each taking is one action");
+        }
+        assert_eq!(model.log().partner_took[0].0, EntityId(20), "the child's is the child's");
+        // Seen lying where it lay at first, it was never taken.
+        toy.frame = 50;
+        let observation = toy.observe();
+        let percepts = Percepts { detections: vec![apple(2.0)], ..Percepts::default() };
+        memory.update(&briefing, &observation, &percepts);
+        model.watch(&observation, &memory);
+        assert!(model.log().partner_took.is_empty() && model.log().actions.is_empty());
+        // Out of sight nothing is learned, and what was known stays.
+        toy.frame = 100;
+        let observation = toy.observe();
+        memory.update(&briefing, &observation, &Percepts::default());
+        model.watch(&observation, &memory);
+        assert_eq!(model.log().partner_holds_frame, Some(30));
+        model.reset();
+        assert!(model.log().partner_took.is_empty());
     }
 }

@@ -1,11 +1,12 @@
 //! What to do next: the plans, which of them are valid, and who chooses.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use chaic_protocol::briefing::Relation;
 use chaic_protocol::geom::xz;
 use chaic_protocol::observation::{Held, SelfState};
-use chaic_protocol::{Briefing, ClassId, EntityId, Frame, Hand, Role};
+use chaic_protocol::{Briefing, ClassId, EntityId, Frame, Hand, Observation, Role};
 
 use crate::behavior::BehaviorLog;
 use crate::memory::{Memory, Thing};
@@ -189,9 +190,22 @@ pub trait Policy: Send {
         false
     }
 
+    /// Sees what its mind sees, before each action; for those who look at pictures themselves.
+    fn look(&mut self, _observation: &Observation) {}
+
+    /// For how many frames its body stands still before the plan just chosen is begun.
+    fn thinking_frames(&self) -> Frame {
+        0
+    }
+
     /// A short word for its state, if it has one.
     fn mood(&self) -> Option<String> {
         None
+    }
+
+    /// What it counted in this episode, by name.
+    fn counts(&self) -> BTreeMap<String, u64> {
+        BTreeMap::new()
     }
 }
 

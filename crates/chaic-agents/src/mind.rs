@@ -1,5 +1,7 @@
 //! A whole mind: perceives, remembers, infers, decides, acts.
 
+use std::collections::BTreeMap;
+
 use chaic_protocol::agent::Thought;
 use chaic_protocol::observation::Senses;
 use chaic_protocol::{Action, Agent, Briefing, EntityId, Observation};
@@ -164,11 +166,16 @@ impl<P: Policy> Agent for Mind<P> {
         let Some(episode) = self.episode.as_mut() else { return pause };
         episode.take_in(observation, self.perception.as_mut());
         self.behavior.watch(observation, &episode.memory);
+        self.policy.look(observation);
         for _ in 0..MAX_PLANS {
             let chosen = episode.choose(&mut self.policy, self.behavior.as_ref(), observation);
             if let Some(plan) = chosen {
-                episode.executor.begin(episode.memory.frame);
+                let thinking = self.policy.thinking_frames();
+                episode.executor.begin(episode.memory.frame + thinking);
                 episode.plan = Some(plan);
+                if thinking > 0 {
+                    return Action::Wait { frames: thinking };
+                }
             }
             let Some(plan) = episode.plan else { return pause };
             let mut situation = Situation {
@@ -189,6 +196,10 @@ impl<P: Policy> Agent for Mind<P> {
             plan: self.plan().map_or_else(|| "think".to_owned(), |plan| plan.to_string()),
             mood: self.policy.mood(),
         }
+    }
+
+    fn counts(&self) -> BTreeMap<String, u64> {
+        self.policy.counts()
     }
 }
 

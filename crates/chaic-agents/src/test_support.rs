@@ -163,6 +163,7 @@ impl Toy {
             container_capacity: 3,
             grants: Grants::IDS,
             goal: None,
+            told: None,
         }
     }
 

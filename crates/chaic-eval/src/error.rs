@@ -100,6 +100,14 @@ pub enum EvalError {
         /// All names.
         known: Vec<String>,
     },
+    /// No mind for the partner has this name.
+    #[error("unknown partner `{name}`; the partners are {known}", known = known.join(", "))]
+    UnknownPartner {
+        /// The name.
+        name: String,
+        /// All names.
+        known: Vec<String>,
+    },
     /// A run or trace names an episode that isn't what it was.
     #[error(
         "the episode {id} has digest {found}, the trace was played on {expected}; it needs the \

@@ -5,9 +5,12 @@ use chaic_protocol::Agent;
 use chaic_protocol::observation::Grants;
 
 use crate::error::{EvalError, Result};
+use crate::metrics::RunKey;
 
 /// The name of having no helper at all.
 pub const NONE: &str = "none";
+/// The name of the rule-based partners.
+pub const RULES: &str = "rules";
 
 /// A helper's mind, and what it is granted.
 pub struct Helper {
@@ -31,6 +34,33 @@ pub trait Helpers: Sync {
 
     /// A fresh helper of this name that plans by these rules, as far as they concern it.
     fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper>;
+
+    /// The helper for one episode run; for those who keep a record of their own.
+    fn make_for(&self, key: &RunKey, rules: PlannerRules) -> Option<Helper> {
+        self.make(&key.helper, rules)
+    }
+
+    /// The names of minds that may drive the partner in place of the rule-based ones.
+    fn partner_names(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// A mind of this name for the partner; of one episode run, or only to know what it asks for.
+    fn partner(&self, _name: &str, _of: Option<&RunKey>, _rules: PlannerRules) -> Option<Helper> {
+        None
+    }
+
+    /// How many episode runs with minds that [wait](Helpers::waits) are played at a time, besides
+    /// those of the jobs.
+    fn waiting_jobs(&self) -> usize {
+        0
+    }
+
+    /// Whether minds of this name (or the partner's) spend their time waiting for somebody else's
+    /// computer, so that others had better be played meanwhile.
+    fn waits(&self, _name: &str) -> bool {
+        false
+    }
 }
 
 /// The helpers of `chaic-agents`.
@@ -52,6 +82,42 @@ impl Helpers for BuiltIn {
 /// # Errors
 /// [`EvalError::UnknownHelper`] with all names.
 pub fn find(helpers: &dyn Helpers, name: &str, rules: PlannerRules) -> Result<Option<Helper>> {
+    some_or_none(helpers, name, || helpers.make(name, rules))
+}
+
+/// The helper of one episode run.
+///
+/// # Errors
+/// [`EvalError::UnknownHelper`] with all names.
+pub fn find_for(
+    helpers: &dyn Helpers,
+    key: &RunKey,
+    rules: PlannerRules,
+) -> Result<Option<Helper>> {
+    some_or_none(helpers, &key.helper, || helpers.make_for(key, rules))
+}
+
+/// The mind that drives the partner; `None` for the rule-based one of its task.
+///
+/// # Errors
+/// [`EvalError::UnknownPartner`] with all names.
+pub fn find_partner(
+    helpers: &dyn Helpers,
+    name: Option<&str>,
+    of: Option<&RunKey>,
+    rules: PlannerRules,
+) -> Result<Option<Helper>> {
+    let Some(name) = name else { return Ok(None) };
+    let known = || std::iter::once(RULES.to_owned()).chain(helpers.partner_names()).collect();
+    let unknown = || EvalError::UnknownPartner { name: name.to_owned(), known: known() };
+    helpers.partner(name, of, rules).map(Some).ok_or_else(unknown)
+}
+
+fn some_or_none(
+    helpers: &dyn Helpers,
+    name: &str,
+    make: impl FnOnce() -> Option<Helper>,
+) -> Result<Option<Helper>> {
     if name == NONE {
         return Ok(None);
     }
@@ -59,5 +125,5 @@ pub fn find(helpers: &dyn Helpers, name: &str, rules: PlannerRules) -> Result<Op
         let known = std::iter::once(NONE.to_owned()).chain(helpers.names()).collect();
         EvalError::UnknownHelper { name: name.to_owned(), known }
     };
-    helpers.make(name, rules).map(Some).ok_or_else(unknown)
+    make().map(Some).ok_or_else(unknown)
 }

@@ -45,7 +45,7 @@ pub struct Still<'a> {
 /// If there is no such agent or helper, or the file system refuses.
 pub fn write(still: &Still<'_>, helpers: &dyn Helpers, out: &Path) -> Result<Frame> {
     let Still { episode, helper, seed, rules, agent, frame, size } = *still;
-    let staging = Staging { episode, seed, rules, helper, image_size: None };
+    let staging = Staging { episode, seed, rules, helper, partner: None, image_size: None };
     let mut play = Play::new(staging, helpers::find(helpers, helper, rules.planner)?)?;
     if agent.index() >= play.world().setup().people.len() {
         let text = format!("{} has no {agent} when the helper is {helper}", episode.id());

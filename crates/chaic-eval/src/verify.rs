@@ -11,8 +11,8 @@ use chaic_world::World;
 
 use crate::error::{EvalError, Result};
 use crate::helpers::{self, BuiltIn, Helpers};
-use crate::metrics::{RunResult, tally};
-use crate::play::{Choice, Flow, Staging, crank, header_of, world_of};
+use crate::metrics::{Ending, RunResult, tally};
+use crate::play::{Choice, Flow, Minds, Staging, crank, header_of, world_of};
 use crate::rules::RuleSet;
 use crate::run::{RunFolder, RunOptions, read_results};
 use crate::trace::{self, Decision, Header, Record, Trace, Warning};
@@ -156,8 +156,8 @@ impl Check<'_> {
         };
         if mismatch.is_none() {
             let mut recorded = self.results.iter().filter(|r| r.summary().is_some());
-            let recorded = recorded.find(|r| r.key == key);
-            if recorded.is_some_and(|r| Some(r) != tally(&trace).as_ref()) {
+            let recorded = recorded.find(|r| r.key == key).map(without_counts);
+            if recorded.is_some() && recorded != tally(&trace) {
                 let frame = trace.end().map_or(0, |e| e.frame);
                 mismatch =
                     differs(frame, "results.jsonl says something else of this run".to_owned());
@@ -173,27 +173,30 @@ impl Check<'_> {
             return Ok(Some("the first line is that of another episode run".to_owned()));
         }
         let episode = self.folder.episode(&key)?;
-        let helper = helpers::find(self.helpers, &key.helper, self.rules.planner).ok();
+        let rules = self.rules.planner;
+        let helper = helpers::find(self.helpers, &key.helper, rules).ok();
+        let name = self.options.partner.as_deref();
+        let partner = helpers::find_partner(self.helpers, name, None, rules);
         let staging = Staging {
             episode: &episode,
             seed: header.seed,
             rules: self.rules,
             helper: &key.helper,
+            partner: name,
             image_size: self.options.size,
         };
-        let expected = match helper {
-            Some(helper) => header_of(staging, helper)?,
-            // A helper that only its author has: what it asked for is its own affair.
-            None => {
-                let stand_in = helpers::find(&BuiltIn, "random", self.rules.planner)?;
-                let mut expected = header_of(staging, stand_in)?;
-                let helpers = expected.people.iter_mut().zip(&header.people);
-                for (expected, said) in helpers.filter(|(p, _)| p.agent == AgentId::HELPER) {
-                    (expected.grants, expected.senses) = (said.grants, said.senses);
-                }
-                expected
-            }
+        // A mind that only its author has: what it asked for is its own affair.
+        let is_unknown = [partner.is_err(), helper.is_none()];
+        let helper = match helper {
+            Some(helper) => helper,
+            None => helpers::find(&BuiltIn, "random", rules)?,
         };
+        let mut expected = header_of(staging, Minds { helper, partner: partner.ok().flatten() })?;
+        for (expected, said) in expected.people.iter_mut().zip(&header.people) {
+            if is_unknown.get(expected.agent.index()).is_some_and(|unknown| *unknown) {
+                (expected.grants, expected.senses) = (said.grants, said.senses);
+            }
+        }
         let expected = Header { chaic: header.chaic.clone(), ..expected };
         let said = serde_json::to_value(header).expect("a header is plain data");
         let comes = serde_json::to_value(&expected).expect("a header is plain data");
@@ -203,6 +206,15 @@ impl Check<'_> {
         let problem = || format!("the first line is not what this run has: {}", wrong.join(", "));
         Ok((!wrong.is_empty()).then(problem))
     }
+}
+
+/// A result as a trace can tell it.
+fn without_counts(result: &RunResult) -> RunResult {
+    let mut result = result.clone();
+    if let Ending::Done(summary) = &mut result.ending {
+        summary.counts.clear();
+    }
+    result
 }
 
 /// Plays the actions of a trace in its world, and finds the first record that comes out different.

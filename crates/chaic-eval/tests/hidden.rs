@@ -81,7 +81,8 @@ fn seen_in(id: &str, helper: &str, grants: Option<Grants>, change: &dyn Fn(&mut 
         actors.push(Actor::new(Box::new(Waiter), Grants::NONE));
     }
     let rules = RuleSet::PAPER;
-    let staging = Staging { episode: &episode, seed: 0, rules, helper, image_size: Some(48) };
+    let (episode, image_size) = (&episode, Some(48));
+    let staging = Staging { episode, seed: 0, rules, helper, partner: None, image_size };
     let mut play = Play::with_cast(staging, Cast { actors }).unwrap();
     assert!(play.run(&AtomicBool::new(false), None, &mut |_| Ok(())).unwrap());
     let seen = seen.lock().unwrap().clone();

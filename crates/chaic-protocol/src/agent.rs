@@ -1,5 +1,7 @@
 //! What every mind is, be it a partner's, a helper's, a scripted or a learned one.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 use crate::{Action, Briefing, Observation, observation::Senses};
@@ -32,5 +34,11 @@ pub trait Agent: Send {
     /// What it is thinking, for the record.
     fn thought(&self) -> Thought {
         Thought::default()
+    }
+
+    /// What it counted of its own doings in this episode, by name, for the record: never read by
+    /// rules or scores.
+    fn counts(&self) -> BTreeMap<String, u64> {
+        BTreeMap::new()
     }
 }

@@ -2,10 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::capability::Capability;
+use crate::capability::{Capability, Persona};
 use crate::geom::Rect;
 use crate::ids::{AgentId, ClassId, EntityId, Frame};
 use crate::observation::Grants;
+use crate::task::TaskId;
 
 /// How many of which class are wanted at the goal.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -83,6 +84,17 @@ pub struct Briefing {
     pub grants: Grants,
     /// The goal: the partner's own, or granted.
     pub goal: Option<Goal>,
+    /// The task, if that is granted.
+    pub told: Option<Told>,
+}
+
+/// What is said of the task to whom it is granted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Told {
+    /// Which task it is.
+    pub task: TaskId,
+    /// What kind of person the partner is.
+    pub partner: Persona,
 }
 
 impl Briefing {

@@ -49,12 +49,27 @@ pub struct Grants {
     pub behavior: bool,
     /// Where everybody is.
     pub positions: bool,
+    /// Which task it is and what kind of person the partner is: what the original's prompts tell.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub task: bool,
+}
+
+// `skip_serializing_if` hands over a reference.
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_false(b: &bool) -> bool {
+    !b
 }
 
 impl Grants {
     /// Nothing beyond own images and state: the `hidden` track proper.
-    pub const NONE: Grants =
-        Grants { ids: false, goal: false, progress: false, behavior: false, positions: false };
+    pub const NONE: Grants = Grants {
+        ids: false,
+        goal: false,
+        progress: false,
+        behavior: false,
+        positions: false,
+        task: false,
+    };
     /// Perfect segmentation of the own image, nothing else.
     pub const IDS: Grants = Grants { ids: true, ..Grants::NONE };
     /// What a partner has: perfect segmentation and its own goal.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use chaic_protocol::action::Hand;
-use chaic_protocol::briefing::{Briefing, Companion, Relation};
+use chaic_protocol::briefing::{Briefing, Companion, Relation, Told};
 use chaic_protocol::capability::Gait;
 use chaic_protocol::catalogue::{CLASSES, Role};
 use chaic_protocol::geom::{Camera, rotate_yaw, yaw_rotation};
@@ -53,7 +53,14 @@ impl World {
             container_capacity: self.rules.container_capacity,
             grants,
             goal: grants.goal.then(|| self.setup.goal.clone()),
+            told: grants.task.then(|| self.told()),
         }
+    }
+
+    fn told(&self) -> Told {
+        let task = self.setup.task;
+        let partner = self.setup.people.first().map_or(task.info().partner, |p| p.persona);
+        Told { task, partner }
     }
 
     /// What an agent knows of itself.

@@ -44,6 +44,9 @@ pub enum Command {
     /// Turn episodes from elsewhere into episode files.
     #[command(subcommand)]
     Import(ImportCommand),
+    /// Language helpers: prompts, records, endpoints; docs/language-helpers.md.
+    #[command(subcommand)]
+    Llm(LlmCommand),
 }
 
 /// A comma-separated list, or `all`.
@@ -76,7 +79,7 @@ pub struct EvalArguments {
     /// Tasks, separated by commas, or `all`.
     #[arg(long, value_name = "NAMES", value_parser = tasks)]
     pub task: Option<Tasks>,
-    /// Helpers, separated by commas: none, random, rhp, oracle, follow.
+    /// Helpers, separated by commas: none, random, rhp, oracle, follow; llm, llm-told, vlm, vlm-told.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub helper: Option<Vec<String>>,
     /// Episodes: test, train or gen:A..B.
@@ -103,6 +106,11 @@ pub struct EvalArguments {
     /// Episodes at a time; changes no result. Usual: one for each core.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
+    /// Who drives the partner: rules (usual), or llm or vlm.
+    #[arg(long, value_name = "NAME")]
+    pub partner: Option<String>,
+    #[command(flatten)]
+    pub language: LanguageArguments,
     /// The run's folder. Usual: the next free `runs/NAME`.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -112,6 +120,60 @@ pub struct EvalArguments {
     /// Keep results only: little room, but nothing to verify or to replay.
     #[arg(long)]
     pub no_traces: bool,
+}
+
+/// Whom language helpers ask.
+#[derive(Args, Debug, Default)]
+pub struct LanguageArguments {
+    /// The language model's address, for example http://127.0.0.1:8000/v1; its key comes from the
+    /// environment variable OPENAI_API_KEY.
+    #[arg(long, value_name = "URL", help_heading = "Language helpers")]
+    pub endpoint: Option<String>,
+    /// The language model's name.
+    #[arg(long, value_name = "NAME", help_heading = "Language helpers")]
+    pub model: Option<String>,
+    /// All settings of language helpers, see docs/language-helpers.md.
+    #[arg(long, value_name = "FILE.toml", help_heading = "Language helpers")]
+    pub llm_config: Option<PathBuf>,
+    /// replay:DIR plays with the answers recorded in the run DIR, and asks nobody.
+    #[arg(long, value_name = "SOURCE", value_parser = chaic_llm::language::replay_folder,
+        conflicts_with_all = ["endpoint", "model", "llm_config"], help_heading = "Language helpers")]
+    pub llm: Option<PathBuf>,
+}
+
+/// `chaic llm`.
+#[derive(Debug, Subcommand)]
+pub enum LlmCommand {
+    /// Write the templates of the prompts into a folder, to be edited.
+    Templates {
+        /// The folder.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
+    /// Print prompts, answers and choices of an episode beside what happened.
+    Show {
+        /// The run's folder.
+        run: PathBuf,
+        /// The episode's id, for example obstacle/test/00.
+        episode: String,
+        /// With which helper. Usual: the first that asked a language model.
+        #[arg(long, value_name = "NAME")]
+        helper: Option<String>,
+        /// With which of the run's seeds. Usual: the lowest.
+        #[arg(long, value_name = "K")]
+        seed: Option<u32>,
+        /// Whose decisions: helper or partner.
+        #[arg(long, default_value = "helper", value_parser = agent)]
+        agent: AgentId,
+        /// Leave the prompts out.
+        #[arg(long)]
+        brief: bool,
+    },
+    /// Ask the endpoint one small question, to see whether everything is set up.
+    Check {
+        #[command(flatten)]
+        language: LanguageArguments,
+    },
 }
 
 /// `chaic report`.

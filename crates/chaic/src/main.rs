@@ -34,6 +34,7 @@ fn main() -> ExitCode {
         Command::Render(arguments) => commands::render::run(&arguments),
         Command::Episodes(command) => commands::episodes::run(&command),
         Command::Import(command) => commands::import::run(&command),
+        Command::Llm(command) => commands::llm::run(&command),
     };
     match ended {
         Ok(Ended::Well) => ExitCode::SUCCESS,

@@ -264,6 +264,74 @@ fn wrong_option_values_end_in_the_same_exit_code() {
 }
 
 #[test]
+fn language_helpers_from_an_endpoint_to_a_table_row() {
+    use chaic_llm_standin::{Options, StandIn};
+    let dir = workshop();
+    let at = dir.path();
+    let standin = StandIn::start(Options::default()).expect("a port is free");
+    let url = standin.url();
+    let check = well(at, &["llm", "check", "--endpoint", &url, "--model", "standin"]);
+    assert!(check.contains("by JSON schema: answers in") && check.contains("as text"), "{check}");
+    let eval = ["eval", "--episodes", "short", "--helper", "none,llm,vlm", "--size", "48"];
+    let live = [&eval[..], &["--endpoint", &url, "--model", "standin", "--out", "live"]].concat();
+    let printed = well(at, &live);
+    for words in ["LLM+BM", "VLM", "helper: decided by model", "helper: prompt tokens"] {
+        assert!(printed.contains(words), "{words}: {printed}");
+    }
+    drop(standin);
+    let scores = well(at, &["report", "live", "--format", "json"]);
+    let again = [&eval[..], &["--llm", "replay:live", "--out", "again"]].concat();
+    well(at, &again);
+    assert_eq!(well(at, &["report", "again", "--format", "json"]), scores);
+    assert!(well(at, &["verify", "again"]).contains("6 traces"));
+
+    let shown = well(at, &["llm", "show", "live", "no_constraint/gen/0"]);
+    for words in ["## Plans", "not a language model", ">>> frame 0: ", "decisions", "## Task"] {
+        assert!(shown.contains(words), "{words}: {shown}");
+    }
+    let vlm = ["llm", "show", "live", "no_constraint/gen/0", "--helper", "vlm", "--brief"];
+    assert!(!well(at, &vlm).contains("## Task"));
+
+    well(at, &["llm", "templates", "--out", "mine"]);
+    assert!(at.join("mine/task.txt").exists());
+    fs::write(at.join("mine/task.txt"), "{{ nonsense }}").expect("there is room");
+    fs::write(at.join("mine.toml"), "[asking]\ntemplates = \"mine\"\n").expect("there is room");
+    let llm = ["eval", "--episodes", "short", "--helper", "llm", "--out", "r"];
+    let remote = "https://models.example.org/v1";
+    let mistyped = [
+        (
+            &["--llm-config", "mine.toml", "--endpoint", &url, "--model", "m"][..],
+            "task.txt: line 1",
+        ),
+        (&["--model", "m"], "give --endpoint"),
+        (&["--endpoint", &url], "give --model"),
+        (&["--endpoint", "https://a:sesame@b/v1", "--model", "m"], "the bare address"),
+        (
+            &["--endpoint", remote, "--model", "m", "--llm-config", "nokey.toml"],
+            "CHAIC_TEST_NO_KEY",
+        ),
+        (&["--llm", "replay:nowhere"], "holds no record of a language model"),
+        (&["--llm", "nowhere"], "write replay:DIR"),
+        (&["--partner", "llm2", "--endpoint", &url, "--model", "m"], "rules, llm, vlm"),
+        (&["--llm-config", "short"], "can't read short"),
+        // Nobody answers any more.
+        (
+            &["--endpoint", &url, "--model", "m", "--llm-config", "quick.toml"],
+            "paused: the model can't",
+        ),
+    ];
+    fs::write(at.join("nokey.toml"), "[endpoint]\nkey_env = \"CHAIC_TEST_NO_KEY\"\n")
+        .expect("there is room");
+    fs::write(at.join("quick.toml"), "[faults]\nattempts = 1\n").expect("there is room");
+    for (arguments, words) in mistyped {
+        let said = ill(at, &[&llm[..], arguments].concat());
+        assert!(said.contains(words) && !said.contains("sesame"), "{arguments:?}: {said}");
+    }
+    assert!(ill(at, &["eval", "--endpoint", &url, "--out", "x"]).contains("--helper llm"));
+    assert!(ill(at, &["llm", "show", "live", "shopping/test/00"]).contains("no trace of"));
+}
+
+#[test]
 fn errors_are_clear() {
     let dir = tempfile::tempdir().expect("there is room");
     let at = dir.path();

@@ -16,6 +16,12 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "chaic-eval",
         &["chaic-protocol", "chaic-world", "chaic-episodes", "chaic-render", "chaic-agents"],
     ),
+    // The stand-in knows nothing of chaic; only tests need it.
+    ("chaic-llm-standin", &[]),
+    (
+        "chaic-llm",
+        &["chaic-protocol", "chaic-episodes", "chaic-agents", "chaic-eval", "chaic-llm-standin"],
+    ),
     ("chaic-import", &["chaic-protocol", "chaic-world", "chaic-episodes"]),
     (
         "chaic",
@@ -27,6 +33,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "chaic-agents",
             "chaic-eval",
             "chaic-import",
+            "chaic-llm",
+            "chaic-llm-standin",
         ],
     ),
     // What a user writes: a helper, and the one call that evaluates it.

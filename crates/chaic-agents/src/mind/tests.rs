@@ -212,3 +212,30 @@ fn the_rider_fills_the_basket_before_delivering_it() {
     assert_eq!(toy.delivered.len(), 4, "{plans:?}");
     assert_eq!(plans.iter().filter(|p| p.starts_with("bring")).count(), 2, "{plans:?}");
 }
+
+/// Explores, and thinks so long about it.
+struct Thinker(chaic_protocol::Frame);
+
+impl Policy for Thinker {
+    fn reset(&mut self, _: &Briefing) {}
+
+    fn choose(&mut self, _: &Context<'_>, _: &[Plan]) -> Plan {
+        Plan::TurnAround
+    }
+
+    fn thinking_frames(&self) -> chaic_protocol::Frame {
+        self.0
+    }
+}
+
+#[test]
+fn a_plan_begins_after_the_thinking() {
+    for (frames, first) in [(0, Action::TurnLeft), (25, Action::Wait { frames: 25 })] {
+        let (mut toy, _) = house();
+        let mut mind = Mind::new(Thinker(frames), PlannerRules::paper());
+        mind.reset(&toy.briefing());
+        assert_eq!(mind.act(&toy.observe()), first);
+        toy.apply(first);
+        assert_eq!(mind.act(&toy.observe()), Action::TurnLeft, "it thinks once for a plan");
+    }
+}

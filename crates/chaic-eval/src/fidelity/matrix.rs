@@ -99,6 +99,7 @@ impl Matrix {
             rules: Some(part.rules),
             set: part.switch.iter().map(|rule| format!("{rule}=paper")).collect(),
             no_traces: part.switch.is_some(),
+            partner: None,
         })
     }
 

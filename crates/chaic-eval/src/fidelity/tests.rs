@@ -25,6 +25,7 @@ fn run(task: TaskId, helper: &str, episode: u32, seed: u32, done: f64) -> RunRes
             escape_frames: None,
             deliveries: Vec::new(),
             digest: Digest(0),
+            counts: Default::default(),
         }),
     }
 }

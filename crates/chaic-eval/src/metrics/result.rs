@@ -1,5 +1,7 @@
 //! What is kept of one episode run: a line of `results.jsonl`, and all that scores are made of.
 
+use std::collections::BTreeMap;
+
 use chaic_protocol::{AgentId, ClassId, EntityId, Frame, Role, TaskId};
 use serde::{Deserialize, Serialize};
 
@@ -62,6 +64,10 @@ pub struct Summary {
     pub deliveries: Vec<Delivery>,
     /// Digest of the world's last state.
     pub digest: Digest,
+    /// What minds counted of their own doings, as `AGENT.NAME`; absent where nobody counts. No
+    /// trace has it, and no score rests on it.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub counts: BTreeMap<String, u64>,
 }
 
 /// One thing that was delivered.

@@ -1,6 +1,6 @@
 //! From the records of one episode to its result.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use chaic_agents::partners::RUN_AWAY;
 use chaic_protocol::{AgentId, ClassId, EntityId, Frame};
@@ -120,6 +120,7 @@ impl Tally {
                 escape_frames: self.has_child.then(|| self.escape.total(end.frame)),
                 deliveries: self.deliveries.clone(),
                 digest: end.digest,
+                counts: BTreeMap::new(),
             }),
         }
     }

@@ -33,6 +33,7 @@ fn result(c: Case<'_>) -> RunResult {
             escape_frames: c.away,
             deliveries: c.deliveries,
             digest: Digest(0),
+            counts: Default::default(),
         }),
     }
 }

@@ -39,14 +39,30 @@ impl Actor {
     }
 }
 
-/// Partner, helper and child of a setup; nobody but the partner if `helper` is `None`.
-pub fn cast(setup: &Setup, helper: Option<Helper>, rules: PlannerRules) -> Cast {
+/// The minds that a run chooses.
+pub struct Minds {
+    /// The helper's; `None` where the partner is alone.
+    pub helper: Option<Helper>,
+    /// The partner's; `None` for the rule-based one of its task.
+    pub partner: Option<Helper>,
+}
+
+impl From<Option<Helper>> for Minds {
+    fn from(helper: Option<Helper>) -> Minds {
+        Minds { helper, partner: None }
+    }
+}
+
+/// Partner, helper and child of a setup; nobody but the partner if there is no helper.
+pub fn cast(setup: &Setup, minds: Minds, rules: PlannerRules) -> Cast {
     let info = setup.task.info();
     let persona = setup.people.first().map_or(info.partner, |p| p.persona);
-    let partner =
-        Actor::new(partners::partner(persona, info.scene, rules), partners::partner_grants(rules));
-    let mut actors = vec![partner];
-    if let Some(Helper { mind, grants }) = helper {
+    let partner = minds.partner.unwrap_or_else(|| Helper {
+        mind: partners::partner(persona, info.scene, rules),
+        grants: partners::partner_grants(rules),
+    });
+    let mut actors = vec![Actor::new(partner.mind, partner.grants)];
+    if let Some(Helper { mind, grants }) = minds.helper {
         actors.push(Actor::new(mind, grants));
     }
     if setup.people.len() > AgentId::CHILD.index() {

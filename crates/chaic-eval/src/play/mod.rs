@@ -4,10 +4,11 @@ mod cast;
 mod crank;
 mod look;
 
-pub use cast::{Actor, Cast, cast, world_seed};
+pub use cast::{Actor, Cast, Minds, cast, world_seed};
 pub use crank::{Choice, Decide, Flow, crank};
 pub use look::Eyes;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -20,7 +21,6 @@ use chaic_world::{Rules, Setup, World};
 use crate::CHAIC_VERSION;
 use crate::digest::Digest;
 use crate::error::{EvalError, Result};
-use crate::helpers::Helper;
 use crate::rules::RuleSet;
 use crate::trace::{FORMAT, Header, Participant, Record, VERSION};
 
@@ -35,6 +35,8 @@ pub struct Staging<'a> {
     pub rules: RuleSet,
     /// Name of the helper, for the record.
     pub helper: &'a str,
+    /// Name of the partner's mind, for the record; `None` for the rule-based one.
+    pub partner: Option<&'a str>,
     /// Side of everybody's images, pixels; `None` for what each mind asks for.
     pub image_size: Option<u32>,
 }
@@ -48,13 +50,14 @@ pub struct Play {
 }
 
 impl Play {
-    /// Sets the stage and briefs everybody; `helper` is `None` where the partner is alone.
+    /// Sets the stage and briefs everybody.
     ///
     /// # Errors
     /// If the setup can't become a world.
-    pub fn new(staging: Staging<'_>, helper: Option<Helper>) -> Result<Play> {
-        let setup = setup_of(&staging, helper.is_some());
-        let cast = cast(&setup, helper, staging.rules.planner);
+    pub fn new(staging: Staging<'_>, minds: impl Into<Minds>) -> Result<Play> {
+        let minds = minds.into();
+        let setup = setup_of(&staging, minds.helper.is_some());
+        let cast = cast(&setup, minds, staging.rules.planner);
         Play::stage(staging, setup, cast)
     }
 
@@ -87,6 +90,15 @@ impl Play {
     /// The world as it stands.
     pub fn world(&self) -> &World {
         &self.world
+    }
+
+    /// What partner and helper counted of their own doings, by agent and name.
+    pub fn counts(&self) -> BTreeMap<String, u64> {
+        let of = |(k, actor): (usize, &Actor)| {
+            let agent = AgentId(k as u8);
+            actor.mind.counts().into_iter().map(move |(name, n)| (format!("{agent}.{name}"), n))
+        };
+        self.cast.actors.iter().enumerate().flat_map(of).collect()
     }
 
     /// What everybody sees with.
@@ -126,7 +138,9 @@ impl Play {
                 }
                 Choice { agent: *agent, action, thought: thought.filter(|_| is_news) }
             });
-            Ok(Some(choices.collect()))
+            let choices: Vec<Choice> = choices.collect();
+            // Who raised `stop` while deciding hasn't decided.
+            Ok((!stop.load(Ordering::Relaxed)).then_some(choices))
         };
         let flow = crank(world, &mut decide, sink)?;
         Ok(flow == Flow::Ended)
@@ -157,9 +171,10 @@ fn brief(staging: &Staging<'_>, setup: &Arc<Setup>, cast: &mut Cast) -> Result<W
 ///
 /// # Errors
 /// If the setup can't become a world.
-pub fn header_of(staging: Staging<'_>, helper: Option<Helper>) -> Result<Header> {
-    let setup = setup_of(&staging, helper.is_some());
-    let mut cast = cast(&setup, helper, staging.rules.planner);
+pub fn header_of(staging: Staging<'_>, minds: impl Into<Minds>) -> Result<Header> {
+    let minds = minds.into();
+    let setup = setup_of(&staging, minds.helper.is_some());
+    let mut cast = cast(&setup, minds, staging.rules.planner);
     brief(&staging, &setup, &mut cast)?;
     Ok(header(&staging, &setup, &cast))
 }
@@ -201,6 +216,7 @@ fn header(staging: &Staging<'_>, setup: &Setup, cast: &Cast) -> Header {
         world_seed: setup.seed,
         rules: staging.rules,
         helper: staging.helper.to_owned(),
+        partner: staging.partner.map(str::to_owned),
         people: people
             .map(|((agent, person), actor)| Participant {
                 agent,

@@ -9,7 +9,7 @@ mod write;
 pub use coverage::{coverage, without_trace};
 pub use figure::write_figure;
 pub(crate) use grid::Grid;
-pub use tables::{additional, main_result, pairs, title};
+pub use tables::{additional, counts, main_result, pairs, title};
 pub(crate) use tables::{interval, number, rounded};
 pub use write::{Report, write_files};
 

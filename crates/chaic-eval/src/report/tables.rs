@@ -1,9 +1,11 @@
 //! The paper's tables.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use chaic_protocol::TaskId;
 
 use crate::helpers::NONE;
-use crate::metrics::{Difference, Interval, Score, Scores};
+use crate::metrics::{Difference, Interval, RunResult, Score, Scores};
 use crate::report::grid::Grid;
 
 /// What stands where there is nothing to say, as in the paper.
@@ -53,6 +55,27 @@ pub fn pairs(differences: &[Difference], tasks: &[TaskId]) -> Grid {
     }
 }
 
+/// What minds counted of their own doings, summed over all episodes; `None` if nobody counted.
+pub fn counts(results: &[RunResult]) -> Option<Grid> {
+    let mut sums: BTreeMap<&str, BTreeMap<&str, u64>> = BTreeMap::new();
+    for result in results {
+        for (name, n) in result.summary().into_iter().flat_map(|s| &s.counts) {
+            *sums.entry(name).or_default().entry(&result.key.helper).or_default() += n;
+        }
+    }
+    let helpers: BTreeSet<&str> = sums.values().flat_map(|by| by.keys().copied()).collect();
+    let row = |(name, by): (&&str, &BTreeMap<&str, u64>)| {
+        let cells = helpers.iter().map(|h| by.get(h).copied().unwrap_or(0).to_string());
+        std::iter::once(name.replace('_', " ").replace('.', ": ")).chain(cells).collect()
+    };
+    let header = std::iter::once("Count".to_owned()).chain(helpers.iter().map(|h| title(h)));
+    (!sums.is_empty()).then(|| Grid {
+        title: "What minds counted of their own doings, all episodes".to_owned(),
+        header: header.collect(),
+        rows: sums.iter().map(row).collect(),
+    })
+}
+
 /// What a table calls a helper.
 pub fn title(helper: &str) -> String {
     match helper {
@@ -61,6 +84,10 @@ pub fn title(helper: &str) -> String {
         "rhp" => "RHP".to_owned(),
         "oracle" => "Oracle".to_owned(),
         "follow" => "Follow".to_owned(),
+        "llm" => "LLM+BM".to_owned(),
+        "llm-told" => "LLM+BM, told".to_owned(),
+        "vlm" => "VLM".to_owned(),
+        "vlm-told" => "VLM, told".to_owned(),
         other => other.to_owned(),
     }
 }

@@ -25,6 +25,7 @@ fn results() -> Vec<RunResult> {
                         escape_frames: away_frames,
                         deliveries: Vec::new(),
                         digest: Digest(0),
+                        counts: Default::default(),
                     }),
                 });
             }
@@ -44,6 +45,7 @@ fn options() -> RunOptions {
         rules: RuleSetName::Paper,
         set: vec![],
         traces: true,
+        partner: None,
     }
 }
 

@@ -8,7 +8,7 @@ use crate::metrics::{Ending, FormulaSet, RunKey, RunResult, Scores, differences}
 use crate::report::Format;
 use crate::report::coverage::coverage;
 use crate::report::grid::Grid;
-use crate::report::tables::{additional, main_result, pairs};
+use crate::report::tables::{additional, counts, main_result, pairs};
 use crate::run::{RunFolder, RunOptions};
 
 /// All that a report is made from.
@@ -49,6 +49,7 @@ impl Report<'_> {
         let scores = self.scores();
         let mut grids = main_result(&scores);
         grids.extend(additional(&scores));
+        grids.extend(counts(self.results));
         grids
     }
 
@@ -61,16 +62,18 @@ impl Report<'_> {
     }
 
     fn markdown(&self) -> String {
-        let RunOptions { split, first, seeds, size, rules, set, .. } = self.options;
+        let RunOptions { split, first, seeds, size, rules, set, partner, .. } = self.options;
         let episodes = first.map_or("all".to_owned(), |n| format!("first {n}"));
         let size = size.map_or("as each mind asks for".to_owned(), |px| format!("{px} pixels"));
         let played_by = match set[..] {
             [] => rules.to_string(),
             _ => format!("{rules} with {}", set.join(", ")),
         };
+        let driven = partner.as_ref();
+        let driven = driven.map_or(String::new(), |p| format!(" The partner is driven by `{p}`."));
         let mut text = format!(
             "# chaic run\n\nchaic {CHAIC_VERSION}, rules `{played_by}`, formulas `{}`. Split `{split}`, \
-             {episodes} episodes of each task, seeds per episode: {seeds}. Images: {size}.\n\n",
+             {episodes} episodes of each task, seeds per episode: {seeds}. Images: {size}.{driven}\n\n",
             self.formulas,
         );
         for note in self.notes() {

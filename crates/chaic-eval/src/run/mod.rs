@@ -112,8 +112,8 @@ impl Run {
         Extent { total: self.items.len(), finished: self.results.len(), errors }
     }
 
-    /// Plays what is missing, and again what broke down, on `jobs` threads. `progress` hears of
-    /// everything in the calling thread.
+    /// Plays what is missing, and again what broke down, on `jobs` threads, and on some more what
+    /// [waits](Helpers::waits). `progress` hears of everything in the calling thread.
     ///
     /// Returns whether all has been played; otherwise `stop` was raised.
     ///
@@ -143,6 +143,7 @@ impl Run {
 
 fn check(options: &RunOptions, helpers: &dyn Helpers) -> Result<()> {
     let rules = options.rules()?.planner;
+    helpers::find_partner(helpers, options.partner.as_deref(), None, rules)?;
     options.helpers.iter().try_for_each(|name| helpers::find(helpers, name, rules).map(|_| ()))
 }
 

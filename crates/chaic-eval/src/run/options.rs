@@ -7,6 +7,7 @@ use chaic_protocol::TaskId;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{EvalError, Result};
+use crate::helpers::RULES;
 use crate::rules::{RuleSet, RuleSetName};
 
 /// Largest side of an image that agents may be given, pixels: 16 times the benchmark's area.
@@ -39,6 +40,9 @@ pub struct RunOptions {
     /// replayed.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub traces: bool,
+    /// Who drives the partner; absent for the rule-based minds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub partner: Option<String>,
 }
 
 fn yes() -> bool {
@@ -74,6 +78,8 @@ pub struct Given {
     pub set: Vec<String>,
     /// `--no-traces`.
     pub no_traces: bool,
+    /// `--partner`.
+    pub partner: Option<String>,
 }
 
 /// What `split` says where the episodes are files.
@@ -125,7 +131,9 @@ impl Given {
         }
         let (first, rules) = (self.first, self.rules.unwrap_or(RuleSetName::Paper));
         let (set, traces) = (self.set.clone(), !self.no_traces);
-        let options = RunOptions { tasks, helpers, split, first, seeds, size, rules, set, traces };
+        let partner = self.partner.clone().filter(|name| name != RULES);
+        let options =
+            RunOptions { tasks, helpers, split, first, seeds, size, rules, set, traces, partner };
         options.rules()?;
         Ok(options)
     }
@@ -167,6 +175,11 @@ impl Given {
                 "--set",
                 (!self.set.is_empty()).then(|| self.set.join(" ")),
                 if recorded.set.is_empty() { number(None) } else { recorded.set.join(" ") },
+            ),
+            (
+                "--partner",
+                self.partner.clone(),
+                recorded.partner.clone().unwrap_or_else(|| RULES.to_owned()),
             ),
             ("--size", self.size.map(|n| n.to_string()), number(recorded.size)),
             (

@@ -348,6 +348,7 @@ fn a_journal_cut_at_any_byte_loses_one_record_at_most() {
             escape_frames: None,
             deliveries: Vec::new(),
             digest: Digest(3),
+            counts: Default::default(),
         }),
     };
     let (mut journal, _, _) = Journal::open(&path).unwrap();

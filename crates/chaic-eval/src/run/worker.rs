@@ -12,7 +12,7 @@ use chaic_protocol::Frame;
 use crate::error::Result;
 use crate::helpers::{self, Helpers};
 use crate::metrics::{Ending, RunKey, RunResult, Tally};
-use crate::play::{Play, Staging};
+use crate::play::{Minds, Play, Staging};
 use crate::run::estimate::Estimate;
 use crate::run::folder::RunFolder;
 use crate::run::items::Item;
@@ -82,8 +82,9 @@ impl Crew<'_> {
         progress: &mut dyn FnMut(&Progress),
         keep: &mut dyn FnMut(&RunResult) -> Result<()>,
     ) -> Result<bool> {
+        let queues = Queues::of(items, |item| self.waits(&item.key));
+        let n_waiting = self.helpers.waiting_jobs().min(queues.waiting.len());
         let jobs = jobs.min(items.len()).max(1);
-        let next = AtomicUsize::new(0);
         // Raised by a failure as well as by the caller's `stop`.
         let failed = AtomicBool::new(false);
         let mut outcome = Ok(());
@@ -91,9 +92,10 @@ impl Crew<'_> {
         let mut estimate = Estimate::default();
         std::thread::scope(|scope| {
             let (sender, receiver) = channel();
-            for worker in 0..jobs {
-                let (sender, next, failed) = (sender.clone(), &next, &failed);
-                let work = move || self.work(worker, items, next, failed, &sender);
+            for worker in 0..jobs + n_waiting {
+                let (sender, queues, failed) = (sender.clone(), &queues, &failed);
+                let next = move || if worker < jobs { queues.any() } else { queues.waiting() };
+                let work = move || self.work(worker, &next, failed, &sender);
                 let name = format!("chaic-worker-{worker}");
                 let spawned = std::thread::Builder::new().name(name).spawn_scoped(scope, work);
                 spawned.expect("the system has a thread for each job");
@@ -108,7 +110,7 @@ impl Crew<'_> {
                     News::Finished { worker, result, time } => keep(&result).map(|()| {
                         estimate.add(&result.key, time);
                         to_go.remove(&result.key);
-                        let left = estimate.left(to_go.keys().copied(), jobs);
+                        let left = estimate.left(to_go.keys().copied(), jobs + n_waiting);
                         progress(&Progress::Finished(Finished { worker, result, time, left }));
                     }),
                     News::Failed(error) => Err(error),
@@ -124,11 +126,16 @@ impl Crew<'_> {
         outcome.map(|()| to_go.is_empty())
     }
 
-    fn work(
+    /// Whether a mind of this episode run waits for somebody else's computer.
+    fn waits(&self, key: &RunKey) -> bool {
+        let partner = self.options.partner.as_deref();
+        [Some(key.helper.as_str()), partner].into_iter().flatten().any(|n| self.helpers.waits(n))
+    }
+
+    fn work<'i>(
         &self,
         worker: usize,
-        items: &[Item],
-        next: &AtomicUsize,
+        next: &dyn Fn() -> Option<&'i Item>,
         failed: &AtomicBool,
         sender: &Sender<News>,
     ) {
@@ -136,7 +143,7 @@ impl Crew<'_> {
             if self.stop.load(Ordering::Relaxed) || failed.load(Ordering::Relaxed) {
                 return;
             }
-            let Some(item) = items.get(next.fetch_add(1, Ordering::Relaxed)) else { return };
+            let Some(item) = next() else { return };
             let began = Instant::now();
             // The receiver lives as long as any worker does.
             let tell = |news| drop(sender.send(news));
@@ -187,15 +194,18 @@ impl Crew<'_> {
     ) -> Result<Option<RunResult>> {
         let episode = self.folder.episode(key)?;
         let rules = self.options.rules()?;
-        let helper = helpers::find(self.helpers, &key.helper, rules.planner)?;
+        let helper = helpers::find_for(self.helpers, key, rules.planner)?;
+        let name = self.options.partner.as_deref();
+        let partner = helpers::find_partner(self.helpers, name, Some(key), rules.planner)?;
         let staging = Staging {
             episode: &episode,
             seed: key.seed,
             rules,
             helper: &key.helper,
+            partner: name,
             image_size: self.options.size,
         };
-        let mut play = Play::new(staging, helper)?;
+        let mut play = Play::new(staging, Minds { helper, partner })?;
         if self.options.traces {
             *writer = Some(Writer::create(&self.folder.trace(key), play.header())?);
         }
@@ -214,7 +224,34 @@ impl Crew<'_> {
             }
             Ok(())
         })?;
+        if let Some(Ending::Done(summary)) = result.as_mut().map(|r| &mut r.ending) {
+            summary.counts = play.counts();
+        }
         Ok(result)
+    }
+}
+
+/// What is to be played, by whether it waits. Each queue is taken from by many.
+struct Queues<'i> {
+    own: Vec<&'i Item>,
+    waiting: Vec<&'i Item>,
+    next: [AtomicUsize; 2],
+}
+
+impl<'i> Queues<'i> {
+    fn of(items: &'i [Item], waits: impl Fn(&Item) -> bool) -> Queues<'i> {
+        let (waiting, own) = items.iter().partition(|item| waits(item));
+        Queues { own, waiting, next: Default::default() }
+    }
+
+    /// What waits for nobody comes first: those who take care of what waits are many.
+    fn any(&self) -> Option<&'i Item> {
+        let own = self.own.get(self.next[0].fetch_add(1, Ordering::Relaxed));
+        own.copied().or_else(|| self.waiting())
+    }
+
+    fn waiting(&self) -> Option<&'i Item> {
+        self.waiting.get(self.next[1].fetch_add(1, Ordering::Relaxed)).copied()
     }
 }
 

@@ -48,6 +48,9 @@ pub struct Header {
     pub rules: RuleSet,
     /// The helper's name; `none` where the partner is alone.
     pub helper: String,
+    /// The name of the partner's mind; absent for the rule-based one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub partner: Option<String>,
     /// Who took part, by agent.
     pub people: Vec<Participant>,
     /// What made the images; only `cpu` gives the same on every machine.

@@ -21,6 +21,7 @@ fn header() -> Header {
         world_seed: u64::MAX,
         rules: RuleSet::PAPER,
         helper: "rhp".to_owned(),
+        partner: None,
         people: vec![Participant {
             agent: AgentId::PARTNER,
             persona: Persona::Wheelchair,

@@ -4,12 +4,14 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, anyhow, bail};
-use chaic_eval::helpers::BuiltIn;
+use chaic_eval::helpers::{BuiltIn, Helpers};
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::{Format, Report, write_figure, write_files};
 use chaic_eval::run::{Access, Given, Run};
 
-use super::{bars::RunBars, jobs};
+use chaic_llm::Language;
+
+use super::{bars::RunBars, jobs, llm};
 use crate::Ended;
 use crate::arguments::EvalArguments;
 use crate::interrupt;
@@ -26,21 +28,29 @@ pub fn run(arguments: &EvalArguments) -> Result<Ended> {
     if arguments.resume && !path.join("run.json").exists() {
         bail!("{} is no run that one could go on with: it has no run.json", path.display());
     }
-    let (mut run, warnings) = Run::open(&path, access, &given, &BuiltIn)?;
+    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
+    let language = llm::language(arguments, &path, stop)?;
+    let helpers: &dyn Helpers = match &language {
+        Some(language) => language,
+        None => &BuiltIn,
+    };
+    let (mut run, warnings) = Run::open(&path, access, &given, helpers)?;
+    if let Some(language) = &language {
+        language.attach(&path)?;
+    }
     for warning in warnings {
         complain(&format!("warning: {warning}; that episode is played again"));
     }
-    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
     keep_workers_quiet();
     let extent = run.extent();
-    let (tasks, helpers) = (&run.options().tasks, &run.options().helpers);
+    let (tasks, names) = (&run.options().tasks, &run.options().helpers);
     complain(&format!(
         "{}: {}, {}, {} {}{}",
         path.display(),
         counted(extent.total, "episode run"),
         counted(tasks.len(), "task"),
-        if helpers.len() == 1 { "helper" } else { "helpers" },
-        helpers.join(", "),
+        if names.len() == 1 { "helper" } else { "helpers" },
+        names.join(", "),
         match extent.finished - extent.errors {
             0 => String::new(),
             n => format!("; finished already: {n}"),
@@ -52,9 +62,12 @@ pub fn run(arguments: &EvalArguments) -> Result<Ended> {
     pool.context("can't start threads")?;
     let began = Instant::now();
     let mut bars = RunBars::new(extent);
-    let played = run.play(jobs, &BuiltIn, stop, &mut |progress| bars.show(progress));
+    let played = run.play(jobs, helpers, stop, &mut |progress| bars.show(progress));
     bars.clear();
     let is_whole = played.map_err(|e| anyhow!("{e:#}\n{}", how_to_resume(&path)))?;
+    if let Some(problem) = language.as_ref().and_then(Language::problem) {
+        bail!("paused: {problem}\n{}", how_to_resume(&path));
+    }
     if !is_whole {
         let extent = run.extent();
         let done = extent.finished - extent.errors;
@@ -112,6 +125,7 @@ fn given(arguments: &EvalArguments) -> (Given, &'static str) {
         no_traces,
         ..
     } = arguments;
+    let partner = arguments.partner.clone();
     let given = Given {
         tasks: task.as_ref().map(|t| t.0.clone()),
         helpers: helper.clone(),
@@ -123,6 +137,7 @@ fn given(arguments: &EvalArguments) -> (Given, &'static str) {
         rules: *rules,
         set: set.clone(),
         no_traces: *no_traces,
+        partner,
     };
     if given == Given::default() && !arguments.resume {
         return (Given { first: Some(QUICK_EPISODES), ..given }, "quick");

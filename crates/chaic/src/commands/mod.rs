@@ -4,6 +4,7 @@ pub mod episodes;
 pub mod eval;
 pub mod fidelity;
 pub mod import;
+pub mod llm;
 pub mod render;
 pub mod replay;
 pub mod report;

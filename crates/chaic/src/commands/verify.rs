@@ -1,11 +1,12 @@
 //! `chaic verify`.
 
 use anyhow::Result;
-use chaic_eval::helpers::BuiltIn;
+use chaic_eval::helpers::{BuiltIn, Helpers};
 use chaic_eval::run::RunFolder;
 use chaic_eval::verify::verify_run;
+use chaic_llm::Language;
 
-use super::{bars, jobs};
+use super::{bars, jobs, llm};
 use crate::Ended;
 use crate::arguments::VerifyArguments;
 use crate::output::{complain, counted, say};
@@ -15,7 +16,12 @@ pub fn run(arguments: &VerifyArguments) -> Result<Ended> {
     let (folder, options) = RunFolder::read(&arguments.run)?;
     let bar = bars::plain(folder.traces()?.len() as u64, "traces");
     let progress = |done: usize| bar.set_position(done as u64);
-    let verdict = verify_run(&folder, &options, &BuiltIn, jobs(arguments.jobs), &progress);
+    let language = Language::recorded(&arguments.run, llm::never())?;
+    let helpers: &dyn Helpers = match &language {
+        Some(language) => language,
+        None => &BuiltIn,
+    };
+    let verdict = verify_run(&folder, &options, helpers, jobs(arguments.jobs), &progress);
     bar.finish_and_clear();
     let verdict = verdict?;
     for warning in &verdict.warnings {

@@ -1,0 +1,219 @@
+//! All the ways in which endpoints fail.
+
+use std::io::{self, Write as _};
+use std::net::TcpStream;
+use std::str::FromStr;
+use std::time::{Duration, Instant};
+
+use serde_json::json;
+
+use crate::completion;
+use crate::http::{head, write_response};
+use crate::script::Question;
+
+/// Bytes of a much too long answer.
+const HUGE: usize = 10 << 20;
+/// Between two bytes of a slow answer.
+const DRIP: Duration = Duration::from_millis(20);
+
+/// A way to fail.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum FaultKind {
+    /// The connection breaks, and for a moment nobody listens.
+    Refused,
+    /// The connection breaks.
+    Reset,
+    /// Nothing comes.
+    Timeout,
+    /// An answer comes byte by byte.
+    SlowDrip,
+    /// Too many requests, with the time to wait.
+    TooManyWithWait,
+    /// Too many requests.
+    TooMany,
+    /// Status 500.
+    Internal,
+    /// Status 503.
+    Unavailable,
+    /// No body.
+    Empty,
+    /// JSON that breaks off.
+    Truncated,
+    /// JSON that is no completion.
+    WrongSchema,
+    /// A plan that isn't in the list.
+    PlanNotListed,
+    /// Ten mebibytes.
+    Huge,
+    /// Bytes that are no UTF-8.
+    InvalidUtf8,
+}
+
+impl FaultKind {
+    /// All of them.
+    pub const ALL: [FaultKind; 14] = [
+        FaultKind::Refused,
+        FaultKind::Reset,
+        FaultKind::Timeout,
+        FaultKind::SlowDrip,
+        FaultKind::TooManyWithWait,
+        FaultKind::TooMany,
+        FaultKind::Internal,
+        FaultKind::Unavailable,
+        FaultKind::Empty,
+        FaultKind::Truncated,
+        FaultKind::WrongSchema,
+        FaultKind::PlanNotListed,
+        FaultKind::Huge,
+        FaultKind::InvalidUtf8,
+    ];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            FaultKind::Refused => "refused",
+            FaultKind::Reset => "reset",
+            FaultKind::Timeout => "timeout",
+            FaultKind::SlowDrip => "slow-drip",
+            FaultKind::TooManyWithWait => "429-with-wait",
+            FaultKind::TooMany => "429",
+            FaultKind::Internal => "500",
+            FaultKind::Unavailable => "503",
+            FaultKind::Empty => "empty",
+            FaultKind::Truncated => "truncated",
+            FaultKind::WrongSchema => "wrong-schema",
+            FaultKind::PlanNotListed => "plan-not-listed",
+            FaultKind::Huge => "huge",
+            FaultKind::InvalidUtf8 => "invalid-utf8",
+        }
+    }
+
+    /// Fails; whether the connection stays open.
+    pub(crate) fn perform(
+        self,
+        stream: &mut TcpStream,
+        question: &Question,
+        stall: Duration,
+    ) -> io::Result<bool> {
+        let whole = || completion(question, &question.answer()).to_string();
+        match self {
+            // Done before anything is read.
+            FaultKind::Refused | FaultKind::Reset => Ok(false),
+            FaultKind::Timeout => {
+                std::thread::sleep(stall);
+                Ok(false)
+            }
+            FaultKind::SlowDrip => {
+                let body = whole();
+                stream.write_all(head(200, &[], body.len()).as_bytes())?;
+                let began = Instant::now();
+                for byte in body.as_bytes() {
+                    if began.elapsed() > stall {
+                        break;
+                    }
+                    stream.write_all(&[*byte])?;
+                    std::thread::sleep(DRIP);
+                }
+                Ok(false)
+            }
+            FaultKind::TooManyWithWait => {
+                write_response(stream, 429, &[("retry-after", "1")], b"{\"error\":{}}")
+            }
+            FaultKind::TooMany => write_response(stream, 429, &[], b"slow down"),
+            FaultKind::Internal => write_response(stream, 500, &[], b"<h1>oh dear</h1>"),
+            FaultKind::Unavailable => write_response(stream, 503, &[], b""),
+            FaultKind::Empty => write_response(stream, 200, &[], b""),
+            FaultKind::Truncated => {
+                let body = whole();
+                let part = &body.as_bytes()[..body.len() / 2];
+                // Every other one also promises more than comes.
+                if body.len() % 2 == 0 {
+                    return write_response(stream, 200, &[], part);
+                }
+                stream.write_all(head(200, &[], body.len()).as_bytes())?;
+                stream.write_all(part)?;
+                Ok(false)
+            }
+            FaultKind::WrongSchema => {
+                let body = json!({ "choices": "none", "greeting": ["hello"] });
+                write_response(stream, 200, &[], body.to_string().as_bytes())
+            }
+            FaultKind::PlanNotListed => {
+                let text = question.form(9999, "There is a plan that nobody listed.");
+                let body = completion(question, &text).to_string();
+                write_response(stream, 200, &[], body.as_bytes())
+            }
+            FaultKind::Huge => {
+                let body = completion(question, &"x".repeat(HUGE)).to_string();
+                // The client may have had enough before the end.
+                write_response(stream, 200, &[], body.as_bytes()).map(|_| false)
+            }
+            FaultKind::InvalidUtf8 => {
+                let mut body = whole().into_bytes();
+                let middle = body.len() / 2;
+                body[middle] = 0xff;
+                write_response(stream, 200, &[], &body)
+            }
+        }
+    }
+}
+
+impl FromStr for FaultKind {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<FaultKind, String> {
+        let found = FaultKind::ALL.into_iter().find(|k| k.name() == text);
+        found.ok_or_else(|| {
+            let names = FaultKind::ALL.map(FaultKind::name).join(", ");
+            format!("no fault `{text}`; they are {names}")
+        })
+    }
+}
+
+/// What luck has in store for one request.
+#[derive(Clone, Copy, Debug)]
+pub struct Draw {
+    /// Of the whole server.
+    pub seed: u64,
+    /// Of the request.
+    pub number: u64,
+}
+
+impl Draw {
+    /// How the request fails, if it does.
+    pub fn fault(self, faults: &[(FaultKind, f64)]) -> Option<FaultKind> {
+        let mut at = self.unit();
+        faults.iter().find_map(|(kind, rate)| {
+            let hit = at < *rate;
+            at -= rate;
+            hit.then_some(*kind)
+        })
+    }
+
+    /// A number in [0, 1): splitmix64.
+    fn unit(self) -> f64 {
+        let mut z =
+            self.seed.wrapping_add(self.number.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faults_come_as_often_as_asked_for() {
+        let faults = [(FaultKind::Reset, 0.2), (FaultKind::Empty, 0.1)];
+        let drawn: Vec<_> =
+            (0..10_000).map(|number| Draw { seed: 1, number }.fault(&faults)).collect();
+        let n = |kind| drawn.iter().filter(|d| **d == kind).count();
+        assert!((1_900..2_100).contains(&n(Some(FaultKind::Reset))));
+        assert!((900..1_100).contains(&n(Some(FaultKind::Empty))));
+        for kind in FaultKind::ALL {
+            assert_eq!(kind.name().parse(), Ok(kind));
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! Where a run gets its language helpers and partners from.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use chaic_agents::behavior::{BehaviorModel, GroundTruthBehavior, SeenBehavior};
+use chaic_agents::perception::GroundTruthIds;
+use chaic_agents::{Mind, PlannerRules, partner_grants};
+use chaic_eval::helpers::{BuiltIn, Helper, Helpers};
+use chaic_eval::metrics::RunKey;
+use chaic_protocol::AgentId;
+use chaic_protocol::observation::{Grants, Senses};
+
+use crate::endpoint::Client;
+use crate::error::{LlmError, Result};
+use crate::gate::Spent;
+use crate::policy::LanguagePolicy;
+use crate::session::{Session, Source, settings_of};
+use crate::settings::{Behavior, Settings};
+use crate::templates::Track;
+
+/// A name that stands behind `--helper`.
+#[derive(Clone, Copy, Debug)]
+struct Kind {
+    name: &'static str,
+    track: Track,
+    looks: bool,
+}
+
+const HELPERS: [Kind; 4] = [
+    Kind { name: "llm", track: Track::Hidden, looks: false },
+    Kind { name: "llm-told", track: Track::Told, looks: false },
+    Kind { name: "vlm", track: Track::Hidden, looks: true },
+    Kind { name: "vlm-told", track: Track::Told, looks: true },
+];
+const PARTNERS: [Kind; 2] = [
+    Kind { name: "llm", track: Track::Partner, looks: false },
+    Kind { name: "vlm", track: Track::Partner, looks: true },
+];
+
+/// Whether a helper of this name asks a language model.
+pub fn is_language_helper(name: &str) -> bool {
+    HELPERS.iter().any(|k| k.name == name)
+}
+
+/// Whether a partner of this name asks a language model.
+pub fn is_language_partner(name: &str) -> bool {
+    PARTNERS.iter().any(|k| k.name == name)
+}
+
+/// The language helpers of a run, besides all built-in ones.
+pub struct Language {
+    session: Arc<Session>,
+}
+
+impl Language {
+    /// Asks an endpoint.
+    ///
+    /// # Errors
+    /// If settings are out of bounds, the key is missing, or a template can't be filled in.
+    pub fn live(settings: Settings, stop: &'static AtomicBool) -> Result<Language> {
+        settings.check()?;
+        let client = Client::new(&settings)?;
+        Language::with(settings, Source::Live(Box::new(client)), stop)
+    }
+
+    /// Plays the record of another run again, with its settings.
+    ///
+    /// # Errors
+    /// If that run has no record.
+    pub fn replay(run: &Path, stop: &'static AtomicBool) -> Result<Language> {
+        let settings =
+            settings_of(run)?.ok_or_else(|| LlmError::NoRecord { path: run.to_owned() })?;
+        Language::with(settings, Source::Replay(run.to_owned()), stop)
+    }
+
+    /// Only to know what the helpers of a recorded run ask for; `None` if it has none.
+    ///
+    /// # Errors
+    /// If its record can't be read.
+    pub fn recorded(run: &Path, stop: &'static AtomicBool) -> Result<Option<Language>> {
+        let settings = settings_of(run)?;
+        settings.map(|s| Language::with(s, Source::Offline, stop)).transpose()
+    }
+
+    /// With answers from a source of the caller's.
+    ///
+    /// # Errors
+    /// If a template can't be filled in.
+    pub fn with(settings: Settings, source: Source, stop: &'static AtomicBool) -> Result<Language> {
+        Ok(Language { session: Arc::new(Session::new(settings, source, stop)?) })
+    }
+
+    /// Ties it to a run's folder, before anything is played.
+    ///
+    /// # Errors
+    /// If the run was begun with other settings, or the file system refuses.
+    pub fn attach(&self, run: &Path) -> Result<()> {
+        self.session.attach(run)
+    }
+
+    /// Why it stopped the run, if it did.
+    pub fn problem(&self) -> Option<String> {
+        self.session.problem()
+    }
+
+    /// The flag that stops the run, which it raises itself when it pauses.
+    pub fn stop(&self) -> &'static AtomicBool {
+        self.session.stop
+    }
+
+    /// What has been spent in this run.
+    pub fn spent(&self) -> Option<Spent> {
+        self.session.gate().map(crate::gate::Gate::spent)
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &Settings {
+        &self.session.settings
+    }
+
+    fn is_live(&self) -> bool {
+        matches!(self.session.source, Source::Live(_))
+    }
+
+    fn helper(&self, name: &str, key: Option<&RunKey>, rules: PlannerRules) -> Option<Helper> {
+        let kind = HELPERS.into_iter().find(|k| k.name == name)?;
+        let is_told = kind.track == Track::Told;
+        let is_granted = self.session.settings.asking.behavior == Behavior::Granted;
+        let behavior = is_told || is_granted || rules.knows_holding;
+        let grants = Grants { behavior, task: is_told, ..Grants::IDS };
+        Some(self.mind(kind, key, grants, AgentId::PARTNER, rules))
+    }
+
+    fn mind(
+        &self,
+        kind: Kind,
+        key: Option<&RunKey>,
+        grants: Grants,
+        watched: AgentId,
+        rules: PlannerRules,
+    ) -> Helper {
+        let session = Arc::clone(&self.session);
+        let policy = LanguagePolicy::new(session, key.cloned(), kind.track, kind.looks);
+        let behavior: Box<dyn BehaviorModel> = match grants.behavior {
+            true => Box::new(GroundTruthBehavior::default()),
+            false => Box::new(SeenBehavior::of(watched)),
+        };
+        let senses = Senses { rgb: kind.looks, ..Senses::DEPTH_AND_IDS };
+        let mind = Mind::with(policy, Box::new(GroundTruthIds), behavior, rules);
+        Helper { mind: Box::new(mind.with_senses(senses)), grants }
+    }
+}
+
+impl Helpers for Language {
+    fn names(&self) -> Vec<String> {
+        let own = HELPERS.iter().map(|k| k.name.to_owned());
+        BuiltIn.names().into_iter().chain(own).collect()
+    }
+
+    fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper> {
+        BuiltIn.make(name, rules).or_else(|| self.helper(name, None, rules))
+    }
+
+    fn make_for(&self, key: &RunKey, rules: PlannerRules) -> Option<Helper> {
+        let built_in = BuiltIn.make(&key.helper, rules);
+        built_in.or_else(|| self.helper(&key.helper, Some(key), rules))
+    }
+
+    fn partner_names(&self) -> Vec<String> {
+        PARTNERS.iter().map(|k| k.name.to_owned()).collect()
+    }
+
+    fn partner(&self, name: &str, of: Option<&RunKey>, rules: PlannerRules) -> Option<Helper> {
+        let kind = PARTNERS.into_iter().find(|k| k.name == name)?;
+        Some(self.mind(kind, of, partner_grants(rules), AgentId::HELPER, rules))
+    }
+
+    fn waiting_jobs(&self) -> usize {
+        if self.is_live() { self.session.settings.endpoint.in_flight } else { 0 }
+    }
+
+    fn waits(&self, name: &str) -> bool {
+        // Names of partners are among those of helpers.
+        self.is_live() && is_language_helper(name)
+    }
+}
+
+/// `replay:DIR`, as `--llm` has it.
+///
+/// # Errors
+/// If it is something else.
+pub fn replay_folder(text: &str) -> std::result::Result<PathBuf, String> {
+    let folder = text.strip_prefix("replay:").filter(|f| !f.is_empty());
+    folder.map(PathBuf::from).ok_or_else(|| format!("no source `{text}`; write replay:DIR"))
+}

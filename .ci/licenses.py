@@ -15,6 +15,8 @@ ACCEPTED = {
     "BSD-3-Clause",
     "BSL-1.0",
     "CC0-1.0",
+    # The root certificates of webpki-roots: data, permissive.
+    "CDLA-Permissive-2.0",
     "ISC",
     "MIT",
     "MIT-0",

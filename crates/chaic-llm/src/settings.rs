@@ -457,8 +457,8 @@ mod tests {
         let settings = Settings::read(&path).unwrap();
         assert_eq!(settings.asking.templates, Some(dir.path().join("mine")));
         assert_eq!((settings.budget.requests, settings.asking.answer_tokens), (Some(5), 512));
-        fs::write(&path, "[asking]\nmodle = \"m\"\n").unwrap();
+        fs::write(&path, "[asking]\nmodel_name = \"m\"\n").unwrap();
         let said = Settings::read(&path).unwrap_err().to_string();
-        assert!(said.contains("modle") && said.contains("llm.toml"), "{said}");
+        assert!(said.contains("model_name") && said.contains("llm.toml"), "{said}");
     }
 }

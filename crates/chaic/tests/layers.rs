@@ -22,7 +22,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "chaic-llm",
         &["chaic-protocol", "chaic-episodes", "chaic-agents", "chaic-eval", "chaic-llm-standin"],
     ),
-    ("chaic-import", &["chaic-protocol", "chaic-world", "chaic-episodes"]),
+    // Only its example draws.
+    ("chaic-import", &["chaic-protocol", "chaic-world", "chaic-episodes", "chaic-render"]),
     (
         "chaic",
         &[

@@ -14,8 +14,9 @@ pub enum Walking {
     /// when stuck.
     Careful,
     /// The original's: 4-connected ways over soft costs, from which nothing is quite impassable;
-    /// near enough is near enough as the crow flies; nothing is ever stuck, but obstacles keep the
-    /// person in the wheelchair turning on the spot (facts 1.5, 1.6).
+    /// near enough is near enough as the crow flies; one goes to where an object was when the plan
+    /// began; nothing is ever stuck, but obstacles keep the person in the wheelchair turning on
+    /// the spot (facts 1.5, 1.6, 2.1).
     Lattice,
 }
 
@@ -123,8 +124,8 @@ pub struct PlannerRules {
     pub stops_turning_when_found: bool,
     /// Child or guardian unseen for so long is looked for, frames.
     pub child_unseen_frames: Frame,
-    /// Whether a helper stays with the child only until it turns back, rather than until the time
-    /// for following is up.
+    /// Whether a helper stays with the child only until it turns back, rather than for the time of
+    /// following after it was last seen away.
     pub trusts_child: bool,
     /// When the child runs away.
     pub child_draws: ChildDraws,

@@ -24,12 +24,12 @@ pub struct Spent {
 impl Spent {
     /// What a request of this usage costs.
     pub fn of(requests: u64, usage: Usage, price: &Price) -> Spent {
-        let money = usage.prompt as f64 * price.prompt_per_million
-            + usage.answer as f64 * price.answer_per_million;
-        Spent { requests, tokens: usage.prompt + usage.answer, money: money / 1e6 }
+        let money = price.millionths(usage) / 1e6;
+        Spent { requests, tokens: usage.prompt + usage.answer, money }
     }
 
-    fn add(&mut self, other: Spent) {
+    /// Adds what else was spent.
+    pub fn add(&mut self, other: Spent) {
         self.requests += other.requests;
         self.tokens += other.tokens;
         self.money += other.money;

@@ -213,10 +213,9 @@ impl LanguagePolicy {
         let model = self.asking().model.clone();
         let ask = Ask { model, purpose, messages: messages.to_vec(), schema_of };
         let exchange = Asker::new(&self.session, &mut self.thread).ask(frame, ask, pictures)?;
-        let Usage { prompt, answer, estimated } = exchange.usage();
-        let price = &self.session.settings.price;
-        let cost =
-            prompt as f64 * price.prompt_per_million + answer as f64 * price.answer_per_million;
+        let usage = exchange.usage();
+        let Usage { prompt, answer, estimated } = usage;
+        let cost_millionths = self.session.settings.price.millionths(usage).round() as u64;
         let n_faults = exchange.faults.len() as u64;
         for (name, n) in [
             ("questions", 1),
@@ -226,8 +225,7 @@ impl LanguagePolicy {
             ("prompt_tokens", prompt),
             ("answer_tokens", answer),
             ("estimated_usage", u64::from(estimated)),
-            // Prices are those of a million tokens, so this is in millionths.
-            ("cost_millionths", cost.round() as u64),
+            ("cost_millionths", cost_millionths),
         ] {
             self.count(name, n);
         }

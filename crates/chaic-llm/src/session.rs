@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::endpoint::Client;
 use crate::error::{LlmError, Result};
-use crate::exchange::{ContentHash, Reply};
+use crate::exchange::ContentHash;
 use crate::gate::{Gate, Spent};
 use crate::record::{self, Entry, Record};
 use crate::settings::{Asking, Budget, Endpoint, Faults, Price, Settings};
@@ -200,14 +200,7 @@ fn spent_before(run: &Path, price: &Price) -> Result<Spent> {
         let Ok(record) = Record::read(&path) else { continue };
         for entry in record.entries {
             if let Entry::Exchange(exchange) = entry {
-                let usage = match &exchange.reply {
-                    Reply::Answer { usage, .. } => *usage,
-                    Reply::Failed(_) => Default::default(),
-                };
-                let cost = Spent::of(exchange.requests(), usage, price);
-                spent.requests += cost.requests;
-                spent.tokens += cost.tokens;
-                spent.money += cost.money;
+                spent.add(Spent::of(exchange.requests(), exchange.usage(), price));
             }
         }
     }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{LlmError, Result};
+use crate::exchange::Usage;
 
 /// Largest configuration file that is read, bytes.
 const MAX_CONFIG_BYTES: usize = 1 << 20;
@@ -221,6 +222,14 @@ pub struct Price {
     pub answer_per_million: f64,
     /// In which currency, for reports.
     pub currency: String,
+}
+
+impl Price {
+    /// What this usage costs, in millionths of the currency.
+    pub fn millionths(&self, usage: Usage) -> f64 {
+        usage.prompt as f64 * self.prompt_per_million
+            + usage.answer as f64 * self.answer_per_million
+    }
 }
 
 impl Default for Asking {

@@ -1,9 +1,12 @@
 //! Promise: no crate reaches past the arrows of ARCHITECTURE.md; agents above all can't see
-//! the world or its pictures.
+//! the world or its pictures. And the README's command knows which program is meant.
 
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
 
 /// Each crate with the crates of this workspace that it may depend on, tests included.
 const ALLOWED: &[(&str, &[&str])] = &[
@@ -41,6 +44,22 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // What a user writes: a helper, and the one call that evaluates it.
     ("minimal-helper", &["chaic-protocol", "chaic-eval"]),
 ];
+
+#[test]
+fn cargo_run_finds_one_program() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("the root");
+    let metadata = ["metadata", "--no-deps", "--offline", "--format-version", "1"];
+    let out = Command::new(env!("CARGO")).args(metadata).current_dir(root).output();
+    let out = out.expect("cargo runs");
+    let told: Value = serde_json::from_slice(&out.stdout).expect("JSON");
+    let list = |v: &Value| v.as_array().expect("a list").clone();
+    let default = list(&told["workspace_default_members"]);
+    let packages = list(&told["packages"]);
+    let built = packages.iter().filter(|p| default.contains(&p["id"]));
+    let targets = built.flat_map(|p| list(&p["targets"]));
+    let programs = targets.filter(|t| t["kind"][0] == "bin");
+    assert_eq!(programs.map(|t| t["name"].clone()).collect::<Vec<_>>(), ["chaic"]);
+}
 
 #[test]
 fn every_dependency_follows_an_arrow() {

@@ -1,5 +1,6 @@
 //! Going to a thing and doing something with it.
 
+use chaic_protocol::geom::xz;
 use chaic_protocol::{Action, Briefing, EntityId, FailureReason, Frame, Outcome, Role, Vec2};
 
 use super::navigate::{Destination, Nav, Navigator};
@@ -120,7 +121,7 @@ impl Interaction {
         let here = memory.here();
         // The original walks to a fixed point before the truck: its nearest part.
         let is_long = info.size_m[0].max(info.size_m[2]) > LONG_M;
-        let mean = Vec2::new(thing.position_in_world.x, thing.position_in_world.z);
+        let mean = xz(thing.position_in_world);
         let at = match () {
             () if is_long => thing.nearest_point(here),
             () if info.is_movable() || memory.keeps_goal_in_mind() => {
@@ -147,7 +148,7 @@ impl Interaction {
 /// Where to stand for doing something with a thing.
 fn destination_at(thing: &Thing, within_m: f32) -> Destination {
     let is_small = thing.class.info().is_carriable() || thing.footprint.is_empty();
-    let mean = Vec2::new(thing.position_in_world.x, thing.position_in_world.z);
+    let mean = xz(thing.position_in_world);
     let points = if is_small { vec![mean] } else { thing.footprint.clone() };
     let middle = points.iter().copied().sum::<Vec2>() / points.len() as f32;
     Destination {

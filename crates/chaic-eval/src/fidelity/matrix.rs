@@ -1,6 +1,6 @@
 //! The runs of a plan in their folders, and how far they have come.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use chaic_protocol::TaskId;
@@ -162,13 +162,12 @@ pub fn parts(matrix: &Matrix) -> Result<Vec<PartState>> {
         return Err(EvalError::Options(text));
     };
     let (folder, options) = RunFolder::read(&matrix.folder(first))?;
-    let mut episodes: BTreeMap<(TaskId, String), ()> = BTreeMap::new();
-    for key in planned(&folder, &options)? {
-        episodes.insert((key.task, key.episode), ());
-    }
+    let planned = planned(&folder, &options)?;
+    let episodes: BTreeSet<(TaskId, String)> =
+        planned.into_iter().map(|key| (key.task, key.episode)).collect();
     let state = |part: Part| {
         let mut planned = Vec::new();
-        for (task, episode) in episodes.keys() {
+        for (task, episode) in &episodes {
             for (helper, seed) in
                 part.helpers.iter().flat_map(|h| (0..part.seeds).map(move |s| (h, s)))
             {

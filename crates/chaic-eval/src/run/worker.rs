@@ -1,7 +1,7 @@
 //! Playing many episodes on several threads.
 
 use std::any::Any;
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Sender, channel};
@@ -88,7 +88,7 @@ impl Crew<'_> {
         // Raised by a failure as well as by the caller's `stop`.
         let failed = AtomicBool::new(false);
         let mut outcome = Ok(());
-        let mut to_go: BTreeMap<&RunKey, ()> = items.iter().map(|i| (&i.key, ())).collect();
+        let mut to_go: BTreeSet<&RunKey> = items.iter().map(|i| &i.key).collect();
         let mut estimate = Estimate::default();
         std::thread::scope(|scope| {
             let (sender, receiver) = channel();
@@ -110,7 +110,7 @@ impl Crew<'_> {
                     News::Finished { worker, result, time } => keep(&result).map(|()| {
                         estimate.add(&result.key, time);
                         to_go.remove(&result.key);
-                        let left = estimate.left(to_go.keys().copied(), jobs + n_waiting);
+                        let left = estimate.left(to_go.iter().copied(), jobs + n_waiting);
                         progress(&Progress::Finished(Finished { worker, result, time, left }));
                     }),
                     News::Failed(error) => Err(error),

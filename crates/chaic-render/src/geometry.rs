@@ -27,6 +27,24 @@ pub const N_LEVELS: usize = solids::N_LEVELS;
 /// The finest level of detail.
 pub const FINEST: usize = N_LEVELS - 1;
 
+/// All textures.
+pub const TEXTURES: [Texture; 14] = [
+    Texture::Plain,
+    Texture::Plaster,
+    Texture::Brushed,
+    Texture::Grain,
+    Texture::Weave,
+    Texture::Wicker,
+    Texture::Mottle,
+    Texture::Crust,
+    Texture::Planks,
+    Texture::Tiles,
+    Texture::Carpet,
+    Texture::Asphalt,
+    Texture::Pavement,
+    Texture::Grass,
+];
+
 /// Everything that can be seen at one moment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Geometry {
@@ -96,6 +114,10 @@ pub struct InstanceData {
     pub tint: Option<[f32; 3]>,
     /// What lights it.
     pub lit_by: LitBy,
+    /// Least coordinates of its shape at any level of detail, in the object's frame, metres.
+    pub min: [f32; 3],
+    /// Greatest coordinates of its shape at any level of detail, in the object's frame, metres.
+    pub max: [f32; 3],
 }
 
 /// What lights an instance.
@@ -188,6 +210,8 @@ impl Scene {
             origin: instance.origin.to_array(),
             tint: instance.tint,
             lit_by,
+            min: instance.min.to_array(),
+            max: instance.max.to_array(),
         }
     }
 

@@ -14,16 +14,22 @@ pub(crate) const PLAN_RANGE_M: f32 = 100.0;
 /// Nearness is what the depth buffer holds: 1 / depth for an eye, which is linear on the image as
 /// depth is not; for a plan view, 1 at the camera falling linearly to 0 at [`PLAN_RANGE_M`].
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Lens {
+pub struct Lens {
+    /// Width of the image, pixels.
     pub width: usize,
+    /// Height of the image, pixels.
     pub height: usize,
+    /// Where the eye is in the world, metres.
     pub eye: Vec3,
-    /// Unit vectors in the world.
+    /// Unit vector in the world to the right of the image.
     pub right: Vec3,
+    /// Unit vector in the world to its top.
     pub up: Vec3,
+    /// Unit vector in the world into it.
     pub ahead: Vec3,
     /// Pixels per unit of slope; pixels per metre of a plan view.
     pub focal: f32,
+    /// Whether it looks straight down without perspective.
     pub is_plan: bool,
 }
 
@@ -88,7 +94,7 @@ impl Lens {
 
     /// The way from an object's frame, given by the columns of a rotation and an origin, into
     /// this camera.
-    pub fn camera_from(&self, rotation: &Mat3, origin: Vec3) -> IntoCamera {
+    pub(crate) fn camera_from(&self, rotation: &Mat3, origin: Vec3) -> IntoCamera {
         let d = origin - self.eye;
         let row = |axis: Vec3| {
             Vec3::new(

@@ -44,8 +44,11 @@ mod texture;
 
 pub mod geometry;
 pub mod image_out;
+pub mod lighting;
 pub mod plan;
 pub mod text;
 
+pub use lens::Lens;
 pub use scene::Scene;
+pub use solids::LEVEL_RADIUS_PX;
 pub use view::{Channels, MAX_SIDE_PX, View};

@@ -168,6 +168,24 @@ impl<'a> Light<'a> {
         }
     }
 
+    /// What stands in the ground's cells; see [`crate::lighting`].
+    pub fn cells(&self) -> crate::lighting::Cells {
+        let g = self.ground;
+        crate::lighting::Cells {
+            min: g.min.to_array(),
+            cells_per_m: g.cells_per_m,
+            n_x: g.nx,
+            n_z: g.nz,
+            rooms: g.rooms.clone(),
+            brightness: self.dark.iter().map(|dark| 255 - dark).collect(),
+        }
+    }
+
+    /// Where each room's lamp hangs.
+    pub fn lamps_of_rooms(&self) -> &[Vec3] {
+        &self.ground.lamps
+    }
+
     /// How bright the ground is at (x, z), 0 to 1.
     #[inline]
     pub fn ground_brightness(&self, x: f32, z: f32) -> f32 {

@@ -1,0 +1,80 @@
+//! How many pictures a second a card draws: `cargo run --release -p chaic-render-gpu --example bench`.
+//!
+//! Worlds of all tasks, two eyes each, images left on the device. Takes the number of worlds; with
+//! `--any` a program in a card's place will do, whose speed says nothing.
+
+use std::time::{Duration, Instant};
+
+use chaic_episodes::find_episode;
+use chaic_protocol::AgentId;
+use chaic_protocol::task::TASKS;
+use chaic_render::{Channels, Scene, View};
+use chaic_render_gpu::{Adapters, Gpu, WorldId};
+use chaic_world::{Rules, World};
+
+/// How long each setting is measured.
+const LONG: Duration = Duration::from_secs(3);
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let any = arguments.iter().any(|a| a == "--any");
+    let number = arguments.iter().find(|a| *a != "--any");
+    let n_worlds: usize = number.map_or(Ok(512), |n| {
+        n.parse().map_err(|_| format!("`{n}` is no number of worlds; write for example 512"))
+    })?;
+    let mut gpu = Gpu::new(if any { Adapters::AnyKind } else { Adapters::Cards })?;
+    println!("{}", gpu.name());
+    let begin = Instant::now();
+    let mut worlds = Vec::new();
+    for k in 0..n_worlds {
+        let task = &TASKS[k % TASKS.len()];
+        let id = format!("{}/train/{:02}", task.name, k / TASKS.len() % 12);
+        let world = World::new(find_episode(&id)?.setup().clone(), Rules::paper())?;
+        let scene = Scene::new(world.setup());
+        let id = gpu.add(&scene, &world)?;
+        worlds.push((id, world));
+    }
+    println!(
+        "{n_worlds} worlds brought in {:.1} s, {} MiB on the device",
+        begin.elapsed().as_secs_f64(),
+        gpu.bytes_of_worlds() >> 20
+    );
+    for (size, views_of_world) in [(128, 2), (512, 1)] {
+        for (what, channels) in [("depth and ids", Channels::DEPTH_AND_IDS), ("all", Channels::ALL)]
+        {
+            let views = eyes(&worlds, size, views_of_world, channels);
+            let rate = frames_per_second(&mut gpu, &views)?;
+            println!("{size}x{size}, {what}: {rate:.0} frames/s, {} views a batch", views.len());
+        }
+    }
+    Ok(())
+}
+
+fn eyes(
+    worlds: &[(WorldId, World)],
+    size: u32,
+    n: usize,
+    channels: Channels,
+) -> Vec<(WorldId, View)> {
+    let eye = |id: WorldId, world: &World, agent: AgentId| {
+        (id, View::of_eye(agent, world.eye(agent, size), channels))
+    };
+    let of_world = |(id, world): &(WorldId, World)| {
+        let agents: Vec<AgentId> = world.setup().agents().take(n).collect();
+        agents.into_iter().map(|agent| eye(*id, world, agent)).collect::<Vec<_>>()
+    };
+    worlds.iter().flat_map(of_world).collect()
+}
+
+fn frames_per_second(
+    gpu: &mut Gpu,
+    views: &[(WorldId, View)],
+) -> Result<f64, Box<dyn std::error::Error>> {
+    gpu.render(views)?.wait()?;
+    let (begin, mut n) = (Instant::now(), 0);
+    while begin.elapsed() < LONG {
+        gpu.render(views)?.wait()?;
+        n += views.len();
+    }
+    Ok(n as f64 / begin.elapsed().as_secs_f64())
+}

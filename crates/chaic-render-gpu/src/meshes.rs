@@ -1,0 +1,82 @@
+//! The meshes on the device: each once, however many worlds use it.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use crate::device::Link;
+use crate::error::GpuError;
+use crate::pool::Pool;
+use crate::records::{MeshRecord, SkinRecord};
+use crate::upload::PackedMesh;
+
+/// All meshes on the device.
+#[derive(Debug)]
+pub(crate) struct Meshes {
+    pub records: Pool<MeshRecord>,
+    pub corners: Pool<[u32; 4]>,
+    pub triangles: Pool<[u32; 2]>,
+    pub skins: Pool<SkinRecord>,
+    known: BTreeMap<u128, Stored>,
+}
+
+#[derive(Debug)]
+struct Stored {
+    record: Range<u32>,
+    corners: Range<u32>,
+    triangles: Range<u32>,
+    skins: Range<u32>,
+    users: u32,
+}
+
+impl Meshes {
+    pub fn new(link: &Link) -> Result<Meshes, GpuError> {
+        Ok(Meshes {
+            records: Pool::new(link, "meshes", 1 << 10)?,
+            corners: Pool::new(link, "corners", 1 << 16)?,
+            triangles: Pool::new(link, "triangles", 1 << 16)?,
+            skins: Pool::new(link, "skins", 1 << 12)?,
+            known: BTreeMap::new(),
+        })
+    }
+
+    /// Keeps a mesh for one user more; says its key and where its record is.
+    pub fn acquire(&mut self, link: &Link, mesh: &PackedMesh) -> Result<(u128, u32), GpuError> {
+        let key = mesh.key();
+        if let Some(stored) = self.known.get_mut(&key) {
+            stored.users += 1;
+            return Ok((key, stored.record.start));
+        }
+        let corners = self.corners.add(link, &mesh.corners)?;
+        let triangles = self.triangles.add(link, &mesh.triangles)?;
+        let skins = self.skins.add(link, &mesh.skins)?;
+        let mut record = mesh.record;
+        for level in &mut record.levels {
+            level[0] += corners.start;
+            level[1] += triangles.start;
+            level[3] += skins.start;
+        }
+        let record = self.records.add(link, &[record])?;
+        let first = record.start;
+        self.known.insert(key, Stored { record, corners, triangles, skins, users: 1 });
+        Ok((key, first))
+    }
+
+    /// Gives up a mesh for one user.
+    pub fn release(&mut self, key: u128) {
+        let Some(stored) = self.known.get_mut(&key) else { return };
+        stored.users -= 1;
+        if stored.users == 0
+            && let Some(stored) = self.known.remove(&key)
+        {
+            self.records.remove(stored.record);
+            self.corners.remove(stored.corners);
+            self.triangles.remove(stored.triangles);
+            self.skins.remove(stored.skins);
+        }
+    }
+
+    /// Bytes on the device.
+    pub fn bytes(&self) -> u64 {
+        self.records.bytes() + self.corners.bytes() + self.triangles.bytes() + self.skins.bytes()
+    }
+}

@@ -1,0 +1,90 @@
+//! The promise of this file: the graphics card draws what the CPU renderer draws. Ids agree on at
+//! least 99.5 % of all pixels, and depth within 5 mm wherever they do, in worlds of every task.
+
+mod common;
+
+use chaic_protocol::observation::Images;
+use chaic_protocol::task::TASKS;
+use chaic_render::{Channels, View};
+use chaic_render_gpu::WorldId;
+use chaic_world::World;
+use common::{episode, gpu, views};
+
+/// How far two renderings of a view are from each other.
+#[derive(Debug, Default)]
+struct Difference {
+    pixels: usize,
+    other_ids: usize,
+    /// Pixels of equal id whose depth differs by more than 5 mm.
+    other_depths: usize,
+    most_depth_m: f32,
+    colors: u64,
+}
+
+impl Difference {
+    fn add(&mut self, cpu: &Images, gpu: &Images) {
+        let ids = |images: &Images| images.ids.clone().expect("asked for");
+        let depths = |images: &Images| images.depth_m.clone().expect("asked for");
+        let (a, b) = (ids(cpu), ids(gpu));
+        assert_eq!(a.len(), b.len());
+        let depths = depths(cpu).into_iter().zip(depths(gpu));
+        for ((a, b), (da, db)) in a.iter().zip(&b).zip(depths) {
+            self.pixels += 1;
+            if a != b {
+                self.other_ids += 1;
+                continue;
+            }
+            let d = (da - db).abs();
+            self.most_depth_m = self.most_depth_m.max(d);
+            self.other_depths += usize::from(d > 0.005);
+        }
+        if let (Some(a), Some(b)) = (&cpu.rgb, &gpu.rgb) {
+            assert_eq!(a.len(), b.len());
+            self.colors += a.iter().zip(b).map(|(a, b)| u64::from(a.abs_diff(*b))).sum::<u64>();
+        }
+    }
+
+    fn check(&self, what: &str) {
+        let share = |n: usize| n as f64 / self.pixels as f64;
+        let gray_levels = self.colors as f64 / (3 * self.pixels) as f64;
+        println!(
+            "{what}: {:.3} % other ids, {:.4} % other depths (most {:.4} m), colors {gray_levels:.2}",
+            100.0 * share(self.other_ids),
+            100.0 * share(self.other_depths),
+            self.most_depth_m,
+        );
+        assert!(share(self.other_ids) < 0.005, "{what}: {self:?}");
+        assert!(share(self.other_depths) < 0.0005, "{what}: {self:?}");
+    }
+}
+
+#[test]
+fn pictures_of_every_task_agree_with_the_cpu() {
+    let Some(mut gpu) = gpu("agreement") else { return };
+    let mut worlds = Vec::new();
+    for task in TASKS {
+        for split in ["train/03", "test/05"] {
+            let id = format!("{}/{split}", task.name);
+            let (world, scene) = episode(&id);
+            let on_device = gpu.add(&scene, &world).expect("it fits");
+            worlds.push((id, world, scene, on_device));
+        }
+    }
+    for size in [128, 256] {
+        // All worlds and cameras in one batch.
+        let mut asked: Vec<(WorldId, View)> = Vec::new();
+        let looks = |world: &World| views(world, size, Channels::ALL);
+        for (_, world, _, on_device) in &worlds {
+            asked.extend(looks(world).into_iter().map(|view| (*on_device, view)));
+        }
+        let batch = gpu.render(&asked).expect("it is drawn");
+        let mut got = batch.read().expect("it comes back").into_iter();
+        for (id, world, scene, _) in &worlds {
+            let mut difference = Difference::default();
+            for cpu in scene.render(world, &looks(world)) {
+                difference.add(&cpu, &got.next().expect("as many as asked for"));
+            }
+            difference.check(&format!("{id} at {size}"));
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! The light of a moment as plain data, for other renderers. Colors are linear, 0 to 1.
+
+use chaic_protocol::Vec3;
+use chaic_world::{Posture, State};
+
+use crate::Scene;
+use crate::people::Body;
+
+/// What shines on a scene at one moment.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lighting {
+    /// Unit vector to the sun.
+    pub to_sun: [f32; 3],
+    /// The sun.
+    pub sun: [f32; 3],
+    /// A room's lamp, at no distance.
+    pub lamp: [f32; 3],
+    /// Light from above and from below, out of doors.
+    pub outdoors: [[f32; 3]; 2],
+    /// The same in a room.
+    pub indoors: [[f32; 3]; 2],
+    /// The sky at the horizon and in the zenith, and the ground below the horizon.
+    pub sky: [[f32; 3]; 3],
+    /// Height of the ceiling, metres.
+    pub ceiling_m: Option<f32>,
+    /// Where the lamp of each room hangs, metres.
+    pub lamps_in_world: Vec<[f32; 3]>,
+    /// The ground.
+    pub cells: Cells,
+}
+
+/// The ground as a grid; shapes are [n_z, n_x].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cells {
+    /// Where the first cell begins (x, z), metres.
+    pub min: [f32; 2],
+    /// Cells along a metre.
+    pub cells_per_m: f32,
+    /// Number of cells along x.
+    pub n_x: usize,
+    /// Number of cells along z.
+    pub n_z: usize,
+    /// Index of the room of each cell; 255 for none.
+    pub rooms: Vec<u8>,
+    /// How bright the middle of each cell is, near walls and the feet of things darker; 255 unshaded.
+    pub brightness: Vec<u8>,
+}
+
+impl Scene {
+    /// What shines on a moment. `postures` are those of the agents in order.
+    pub fn lighting(&self, state: &State, postures: &[Posture]) -> Lighting {
+        let bodies: Vec<Body> = postures.iter().map(|p| Body::new(p, state.frame)).collect();
+        let frame = self.frame(state, &bodies, true);
+        let light = &frame.light;
+        Lighting {
+            to_sun: [0.42, 0.80, 0.43],
+            sun: [0.92, 0.86, 0.74],
+            lamp: [0.66, 0.62, 0.55],
+            outdoors: [[0.36, 0.41, 0.48], [0.24, 0.23, 0.20]],
+            indoors: [[0.40, 0.40, 0.40], [0.34, 0.32, 0.30]],
+            sky: [[0.74, 0.82, 0.88], [0.19, 0.40, 0.74], [0.36, 0.38, 0.34]],
+            ceiling_m: light.ground.ceiling_m,
+            lamps_in_world: light.lamps_of_rooms().iter().map(Vec3::to_array).collect(),
+            cells: light.cells(),
+        }
+    }
+}

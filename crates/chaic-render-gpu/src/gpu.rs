@@ -4,12 +4,13 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use chaic_render::Scene;
+use chaic_render::geometry::atlas;
 use chaic_world::{Posture, State, World};
 
 use crate::batch::Spare;
 use crate::device::{Adapters, Link};
 use crate::error::GpuError;
-use crate::lights::{Lights, PlacedLight, Tiles};
+use crate::lights::{Lights, PlacedLight};
 use crate::meshes::Meshes;
 use crate::passes::Passes;
 use crate::pool::Pool;
@@ -29,7 +30,7 @@ pub struct Gpu {
     pub(crate) meshes: Meshes,
     pub(crate) instances: Pool<InstanceRecord>,
     pub(crate) lights: Lights,
-    pub(crate) tiles: Tiles,
+    pub(crate) atlas: wgpu::Buffer,
     pub(crate) worlds: Vec<Option<Placed>>,
     pub(crate) arena: Arena,
     pub(crate) spare: Spare,
@@ -55,7 +56,7 @@ impl Gpu {
             meshes: Meshes::new(&link)?,
             instances: Pool::new(&link, "instances", 1 << 12)?,
             lights: Lights::new(&link)?,
-            tiles: Tiles::new(&link)?,
+            atlas: link.filled("textures", bytemuck::cast_slice(atlas()))?,
             worlds: Vec::new(),
             arena: Arena::new(&link)?,
             spare: Spare::default(),
@@ -183,7 +184,7 @@ impl Gpu {
         }
         let mut places = Vec::with_capacity(levels[0].meshes.len());
         for index in 0..levels[0].meshes.len() {
-            let mesh = PackedMesh::of(&levels, index, &self.tiles);
+            let mesh = PackedMesh::of(&levels, index);
             let (key, place) = self.meshes.acquire(&self.link, &mesh)?;
             new.meshes.push(key);
             places.push(place);

@@ -1,47 +1,13 @@
-//! The light of worlds, and the textures that all share.
+//! The light of worlds.
 
 use std::ops::Range;
 
-use chaic_render::geometry::{TEXTURES, Texture, TileData, tile};
 use chaic_render::lighting::Lighting;
 
 use crate::device::Link;
 use crate::error::GpuError;
 use crate::pool::Pool;
 use crate::records::LightRecord;
-
-/// Texels along a tile's side.
-pub(crate) const TILE_TEXELS: usize = 128;
-
-/// Every texture's tile at all sizes, on the device.
-#[derive(Debug)]
-pub(crate) struct Tiles {
-    pub quads: wgpu::Buffer,
-    /// Where each texture's tile begins, and its texels per metre.
-    known: Vec<(Texture, u32, f32)>,
-}
-
-impl Tiles {
-    pub fn new(link: &Link) -> Result<Tiles, GpuError> {
-        let (mut quads, mut known) = (Vec::new(), Vec::new());
-        for texture in TEXTURES {
-            let Some(data) = tile(texture).filter(|t| t.side_texels == TILE_TEXELS) else {
-                continue;
-            };
-            let scale = TILE_TEXELS as f32 / data.side_m;
-            known.push((texture, quads.len() as u32, scale));
-            add_levels(&data, &mut quads);
-        }
-        let quads = link.filled("textures", bytemuck::cast_slice(&quads))?;
-        Ok(Tiles { quads, known })
-    }
-
-    /// Where a texture's tile begins, and its texels per metre; 0 without one.
-    pub fn of(&self, texture: Texture) -> (u32, f32) {
-        let found = self.known.iter().find(|(t, ..)| *t == texture);
-        found.map_or((0, 0.0), |(_, first, scale)| (*first, *scale))
-    }
-}
 
 /// The light of each world.
 #[derive(Debug)]
@@ -119,29 +85,3 @@ impl Lights {
 
 /// A ceiling so high that it darkens no wall.
 const NO_CEILING_M: f32 = 1e6;
-
-/// Adds a tile at all sizes down to one texel, each texel with its right, lower and lower right
-/// neighbors.
-fn add_levels(data: &TileData, quads: &mut Vec<u32>) {
-    let mut side = data.side_texels;
-    let mut texels: Vec<f32> = data.texels.iter().map(|t| f32::from(*t)).collect();
-    loop {
-        let at = |j: usize, i: usize| texels[j % side * side + i % side];
-        let whole = |j: usize, i: usize| (at(j, i) + 0.5) as u32;
-        quads.extend((0..side * side).map(|n| {
-            let (j, i) = (n / side, n % side);
-            whole(j, i) | whole(j, i + 1) << 8 | whole(j + 1, i) << 16 | whole(j + 1, i + 1) << 24
-        }));
-        if side == 1 {
-            return;
-        }
-        side /= 2;
-        texels = (0..side * side)
-            .map(|n| {
-                let (j, i) = (2 * (n / side), 2 * (n % side));
-                let at = |dj: usize, di: usize| texels[(j + dj) * 2 * side + i + di];
-                0.25 * (at(0, 0) + at(0, 1) + at(1, 0) + at(1, 1))
-            })
-            .collect();
-    }
-}

@@ -3,9 +3,9 @@
 use chaic_protocol::EntityId;
 use chaic_protocol::geom::Camera;
 use chaic_render::LEVEL_RADIUS_PX;
+use chaic_render::geometry::TILE_TEXELS;
 
 use crate::device::Link;
-use crate::lights::TILE_TEXELS;
 
 /// The shaders in the order in which they run.
 #[derive(Debug)]

@@ -112,8 +112,8 @@ pub(crate) struct SkinRecord {
     pub axes_y: [f32; 3],
     pub is_tinted: u32,
     pub axes_z: [f32; 3],
-    /// Where the texture's tile begins.
-    pub first_quad: u32,
+    /// Where the texture's tile begins in the atlas.
+    pub first_texel: u32,
 }
 
 /// The light of a world; 160 bytes.

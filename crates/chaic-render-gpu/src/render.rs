@@ -266,7 +266,7 @@ impl Gpu {
                         &lights.buffer,
                         &lamps.buffer,
                         &cells.buffer,
-                        &self.tiles.quads,
+                        &self.atlas,
                         depth,
                         color,
                         round,

@@ -1,9 +1,8 @@
 //! Plain geometry as the records that shaders read.
 
-use chaic_render::geometry::{Geometry, InstanceData, LitBy, MeshData, N_LEVELS};
+use chaic_render::geometry::{Geometry, InstanceData, LitBy, MeshData, N_LEVELS, place_in_atlas};
 use xxhash_rust::xxh3::Xxh3;
 
-use crate::lights::Tiles;
 use crate::records::{
     InstanceRecord, LIT_BY_LAMP, LIT_BY_POINT, LIT_BY_SKY, MeshRecord, SkinRecord,
 };
@@ -21,7 +20,7 @@ pub(crate) struct PackedMesh {
 
 impl PackedMesh {
     /// Packs mesh `index` of the geometry at all levels.
-    pub fn of(levels: &[Geometry; N_LEVELS], index: usize, tiles: &Tiles) -> PackedMesh {
+    pub fn of(levels: &[Geometry; N_LEVELS], index: usize) -> PackedMesh {
         let mut packed = PackedMesh {
             corners: Vec::new(),
             triangles: Vec::new(),
@@ -36,12 +35,12 @@ impl PackedMesh {
                 mesh.triangles.len() as u32,
                 packed.skins.len() as u32,
             ];
-            packed.add(mesh, tiles);
+            packed.add(mesh);
         }
         packed
     }
 
-    fn add(&mut self, mesh: &MeshData, tiles: &Tiles) {
+    fn add(&mut self, mesh: &MeshData) {
         for (p, n) in mesh.positions.iter().zip(&mesh.normals) {
             self.corners.push([p[0].to_bits(), p[1].to_bits(), p[2].to_bits(), packed_normal(*n)]);
         }
@@ -50,16 +49,16 @@ impl PackedMesh {
             [a | b << 16, c | u32::from(t.skin) << 16 | u32::from(t.smooth) << 24]
         }));
         self.skins.extend(mesh.skins.iter().map(|skin| {
-            let (first_quad, texels_per_m) = tiles.of(skin.texture);
+            let place = place_in_atlas(skin.texture);
             SkinRecord {
                 color: skin.color,
-                texels_per_m,
+                texels_per_m: place.map_or(0.0, |p| p.texels_per_m),
                 axes_x: skin.axes[0],
                 gloss: skin.gloss as u32,
                 axes_y: skin.axes[1],
                 is_tinted: u32::from(skin.tinted),
                 axes_z: skin.axes[2],
-                first_quad,
+                first_texel: place.map_or(0, |p| p.begin),
             }
         }));
     }

@@ -1,5 +1,6 @@
 //! The promise of this file: the graphics card draws what the CPU renderer draws. Ids agree on at
-//! least 99.5 % of all pixels, and depth within 5 mm wherever they do, in worlds of every task.
+//! least 99.5 % of all pixels, depth is within 5 mm wherever they do, and colors are within 3 gray
+//! levels on average, in worlds of every task.
 
 mod common;
 
@@ -18,6 +19,7 @@ struct Difference {
     /// Pixels of equal id whose depth differs by more than 5 mm.
     other_depths: usize,
     most_depth_m: f32,
+    /// Sum of the differences of all channels.
     colors: u64,
 }
 
@@ -55,6 +57,7 @@ impl Difference {
         );
         assert!(share(self.other_ids) < 0.005, "{what}: {self:?}");
         assert!(share(self.other_depths) < 0.0005, "{what}: {self:?}");
+        assert!(gray_levels < 3.0, "{what}: {self:?}");
     }
 }
 

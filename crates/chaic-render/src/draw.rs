@@ -16,7 +16,7 @@ pub(crate) struct Scratch {
     /// For all others.
     pub plain: Target<u16>,
     pub work: Work,
-    pub row: crate::shade::Row,
+    pub canvas: crate::shade::Canvas,
 }
 
 /// What drawing needs beside its target.
@@ -26,6 +26,10 @@ pub(crate) struct Work {
     order: Vec<Candidate>,
     /// Level of detail of each instance in this view.
     pub levels: Vec<u8>,
+    /// The number of the first triangle of each instance that is drawn.
+    pub firsts: Vec<u32>,
+    /// How many triangles the instances that are drawn have.
+    pub n_triangles: usize,
 }
 
 /// What is left out of a view.
@@ -60,7 +64,10 @@ pub(crate) fn draw<O: Owner>(
     target: &mut Target<O>,
     work: &mut Work,
 ) {
-    let Work { corners, order, levels } = work;
+    let Work { corners, order, levels, firsts, n_triangles } = work;
+    firsts.clear();
+    firsts.resize(frame.instances.len(), 0);
+    *n_triangles = 0;
     target.clear(lens.width, lens.height, lens.nearness(lens.far_m()).max(0.0));
     levels.clear();
     levels.resize(frame.instances.len(), 0);
@@ -105,6 +112,8 @@ pub(crate) fn draw<O: Owner>(
         let radius_px = 0.5 * (rect[2] - rect[0]).max(rect[3] - rect[1]);
         let level = if crosses_near { level_for(f32::MAX) } else { level_for(radius_px) };
         levels[candidate.index as usize] = level as u8;
+        firsts[candidate.index as usize] = *n_triangles as u32;
+        *n_triangles += instance.shape.mesh(level).triangles.len();
         let mesh_drawing = Drawing { instance, index: candidate.index as usize, level, lens };
         mesh_drawing.draw(crosses_near, target, corners);
         let everywhere = [f32::NEG_INFINITY, f32::NEG_INFINITY, f32::INFINITY, f32::INFINITY];

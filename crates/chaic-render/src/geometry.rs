@@ -27,24 +27,6 @@ pub const N_LEVELS: usize = solids::N_LEVELS;
 /// The finest level of detail.
 pub const FINEST: usize = N_LEVELS - 1;
 
-/// All textures.
-pub const TEXTURES: [Texture; 14] = [
-    Texture::Plain,
-    Texture::Plaster,
-    Texture::Brushed,
-    Texture::Grain,
-    Texture::Weave,
-    Texture::Wicker,
-    Texture::Mottle,
-    Texture::Crust,
-    Texture::Planks,
-    Texture::Tiles,
-    Texture::Carpet,
-    Texture::Asphalt,
-    Texture::Pavement,
-    Texture::Grass,
-];
-
 /// Everything that can be seen at one moment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Geometry {
@@ -133,20 +115,50 @@ pub enum LitBy {
 }
 
 /// The square of brightness that a texture repeats.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TileData {
     /// Side of the square, metres.
     pub side_m: f32,
     /// Texels along the side.
     pub side_texels: usize,
     /// Factors on the skin's linear color, 128 meaning 1, shape [v, u].
-    pub texels: &'static [u8],
+    pub texels: Vec<u8>,
 }
 
 /// The tile of a texture; [`Texture::Plain`] has none.
 pub fn tile(texture: Texture) -> Option<TileData> {
-    let texels = texture.tile()?.finest();
-    Some(TileData { side_m: texture.period_m(), side_texels: texture::SIDE, texels })
+    let begin = texture.tile()?.begin as usize;
+    let finest = &texture::atlas()[begin..][..TILE_TEXELS * TILE_TEXELS];
+    // The atlas holds roots.
+    let linear = |texel: &u32| ((texel & 0xff) * (texel & 0xff) / 128).min(255) as u8;
+    let texels = finest.iter().map(linear).collect();
+    Some(TileData { side_m: texture.period_m(), side_texels: TILE_TEXELS, texels })
+}
+
+/// Texels along the side of a tile at its finest; a power of two.
+pub const TILE_TEXELS: usize = texture::SIDE;
+
+/// All tiles, each at sizes from [`TILE_TEXELS`] down to one texel, every size half of the one
+/// before. A texel comes with its neighbors: itself in the lowest byte, then those to the right,
+/// below, and below to the right; 128 means 1. They are factors on what is shown, the root of
+/// linear light.
+pub fn atlas() -> &'static [u32] {
+    texture::atlas()
+}
+
+/// Where a tile is in the [`atlas`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AtlasPlace {
+    /// Index of its first texel.
+    pub begin: u32,
+    /// Texels per metre of its finest size.
+    pub texels_per_m: f32,
+}
+
+/// Where the tile of a texture is; [`Texture::Plain`] has none.
+pub fn place_in_atlas(texture: Texture) -> Option<AtlasPlace> {
+    let tile = texture.tile()?;
+    Some(AtlasPlace { begin: tile.begin, texels_per_m: tile.texels_per_m })
 }
 
 impl Scene {

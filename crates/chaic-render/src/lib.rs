@@ -38,8 +38,8 @@ mod draw;
 mod raster;
 
 mod light;
+mod paint;
 mod shade;
-mod surface;
 mod texture;
 
 pub mod geometry;

@@ -3,15 +3,77 @@
 use chaic_protocol::geom::Rect;
 use chaic_protocol::{Vec2, Vec3};
 use chaic_world::{RoomKind, Setup};
+use glam::Vec4;
 
-use crate::texture::split;
+use crate::lighting::Cells;
+use crate::mesh::Gloss;
 
 /// No room.
 pub(crate) const NO_ROOM: u8 = u8::MAX;
 /// How far the darkness at the foot of things reaches, metres.
 const CONTACT_M: f32 = 0.22;
-/// Most cells of the ground along one side; a house gets cells of a few centimetres.
-const MAX_CELLS: f32 = 400.0;
+/// Cells of the ground along one side at most; a house gets cells of a few centimetres.
+pub(crate) const MAX_CELLS: usize = 256;
+
+/// Cells of the ground, and one for what isn't ground: unshaded.
+pub(crate) const N_GROUND: usize = MAX_CELLS * MAX_CELLS + 1;
+
+/// The light of a scene. Colors are linear.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Lamps {
+    /// Unit vector to the sun.
+    pub to_sun: Vec3,
+    pub sun: Vec3,
+    /// A room's lamp, at no distance.
+    pub lamp: Vec3,
+    /// Light from above and from below, out of doors.
+    pub outdoors: [Vec3; 2],
+    /// The same in a room.
+    pub indoors: [Vec3; 2],
+    /// The sky at the horizon and in the zenith, and the ground below the horizon.
+    pub sky: [Vec3; 3],
+}
+
+impl Lamps {
+    /// The canonical look: a bright day.
+    pub const DAY: Lamps = Lamps {
+        to_sun: Vec3::new(0.42, 0.80, 0.43),
+        sun: Vec3::new(0.92, 0.86, 0.74),
+        lamp: Vec3::new(0.66, 0.62, 0.55),
+        outdoors: [Vec3::new(0.36, 0.41, 0.48), Vec3::new(0.24, 0.23, 0.20)],
+        indoors: [Vec3::new(0.40, 0.40, 0.40), Vec3::new(0.34, 0.32, 0.30)],
+        sky: [
+            Vec3::new(0.74, 0.82, 0.88),
+            Vec3::new(0.19, 0.40, 0.74),
+            Vec3::new(0.36, 0.38, 0.34),
+        ],
+    };
+}
+
+/// Where the direct light at a point comes from.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Direct {
+    /// Unit vector to the lamp or the sun.
+    to: Vec3,
+    /// What distance leaves of it.
+    strength: f32,
+    indoors: bool,
+}
+
+/// What a surface at a point sends to an eye, before its own color: `factor * color + add`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shine {
+    pub factor: Vec4,
+    pub add: Vec4,
+}
+
+fn rgb(color: Vec3) -> Vec4 {
+    color.extend(0.0)
+}
+
+fn dot(a: Vec3, b: Vec3) -> f32 {
+    a.x * b.x + a.y * b.y + a.z * b.z
+}
 
 /// The ground as a grid of cells; x across, z down.
 #[derive(Clone, Debug)]
@@ -33,8 +95,12 @@ pub(crate) struct Ground {
 #[derive(Clone)]
 pub(crate) struct Light<'a> {
     pub ground: &'a Ground,
-    /// Darkness per cell, 0 to 255; empty until shadows are cast.
+    pub lamps: &'a Lamps,
+    /// Darkness per cell, 0 to 255; empty if nobody looks at color.
     dark: Vec<u8>,
+    /// Brightness of the ground, four neighbors a cell as in [`crate::texture::Tile::quads`], 255
+    /// unshaded; rows of [`MAX_CELLS`], and one more that is unshaded. Empty if nobody looks.
+    pub quads: Vec<u32>,
 }
 
 /// The foot of something on the ground.
@@ -58,8 +124,9 @@ impl Ground {
             floors.fold(setup.bounds, |a, b| Rect { min: a.min.min(b.min), max: a.max.max(b.max) });
         let all = all.grown(0.5);
         let size = all.size();
-        let cells_per_m = (MAX_CELLS / size.x.max(size.y)).clamp(0.2, 25.0);
-        let count = |m: f32| ((m * cells_per_m) as usize + 1).min(MAX_CELLS as usize + 1);
+        let most = MAX_CELLS as f32 - 1.0;
+        let cells_per_m = (most / size.x.max(size.y)).clamp(0.2, 25.0);
+        let count = |m: f32| ((m * cells_per_m) as usize + 1).min(MAX_CELLS);
         let (nx, nz) = (count(size.x), count(size.y));
         let height = setup.ceiling_m.unwrap_or(3.0);
         let lamp = |r: &chaic_world::Room| {
@@ -111,6 +178,11 @@ impl Ground {
         self.rooms[z * self.nx + x]
     }
 
+    /// Where each room's lamp hangs.
+    pub fn lamps(&self) -> &[Vec3] {
+        &self.lamps
+    }
+
     /// The lamp of a room.
     pub fn lamp(&self, room: u8) -> Option<Vec3> {
         self.lamps.get(usize::from(room)).copied()
@@ -152,8 +224,9 @@ impl Ground {
 
 impl<'a> Light<'a> {
     /// Light with the shadows of walls only, or none at all if nobody looks at color.
-    pub fn new(ground: &'a Ground, wants_color: bool) -> Light<'a> {
-        Light { ground, dark: if wants_color { ground.walls.clone() } else { Vec::new() } }
+    pub fn new(ground: &'a Ground, lamps: &'a Lamps, wants_color: bool) -> Light<'a> {
+        let dark = if wants_color { ground.walls.clone() } else { Vec::new() };
+        Light { ground, lamps, dark, quads: Vec::new() }
     }
 
     /// Whether shadows are wanted.
@@ -168,39 +241,101 @@ impl<'a> Light<'a> {
         }
     }
 
+    /// Makes the ground ready; to be called when all shadows are cast.
+    pub fn finish(&mut self) {
+        let Ground { nx, nz, .. } = *self.ground;
+        if !self.wants_color() {
+            return;
+        }
+        self.quads.clear();
+        self.quads.resize(N_GROUND, u32::MAX);
+        // What is shown is the root of light.
+        let root = |dark: usize| (255.0 * (1.0 - dark as f32 / 255.0).sqrt()) as u32;
+        let roots: [u32; 256] = std::array::from_fn(root);
+        let bright = |row: &[u8], i: usize| roots[usize::from(row[i])];
+        for (j, quads) in self.quads.chunks_exact_mut(MAX_CELLS).enumerate().take(nz) {
+            let row = |j: usize| &self.dark[j * nx..][..nx];
+            let (here, below) = (row(j), row((j + 1).min(nz - 1)));
+            for (i, quad) in quads.iter_mut().enumerate().take(nx) {
+                let right = (i + 1).min(nx - 1);
+                *quad = bright(here, i)
+                    | bright(here, right) << 8
+                    | bright(below, i) << 16
+                    | bright(below, right) << 24;
+            }
+        }
+    }
+
     /// What stands in the ground's cells; see [`crate::lighting`].
-    pub fn cells(&self) -> crate::lighting::Cells {
+    pub fn cells(&self) -> Cells {
         let g = self.ground;
-        crate::lighting::Cells {
+        let rows = self.quads.chunks_exact(MAX_CELLS).take(g.nz);
+        Cells {
             min: g.min.to_array(),
             cells_per_m: g.cells_per_m,
             n_x: g.nx,
             n_z: g.nz,
             rooms: g.rooms.clone(),
-            brightness: self.dark.iter().map(|dark| 255 - dark).collect(),
+            brightness: rows.flat_map(|row| row[..g.nx].iter().map(|q| *q as u8)).collect(),
         }
     }
 
-    /// Where each room's lamp hangs.
-    pub fn lamps_of_rooms(&self) -> &[Vec3] {
-        &self.ground.lamps
-    }
-
-    /// How bright the ground is at (x, z), 0 to 1.
+    /// Where a point lies on the ground's grid, in cells from the middle of the first.
     #[inline]
-    pub fn ground_brightness(&self, x: f32, z: f32) -> f32 {
-        let g = self.ground;
-        let u = ((x - g.min.x) * g.cells_per_m - 0.5).max(0.0);
-        let v = ((z - g.min.y) * g.cells_per_m - 0.5).max(0.0);
-        let ((i, fu), (j, fv)) = (split(u), split(v));
-        let (i, j) = (i.max(0) as usize, j.max(0) as usize);
-        if i + 1 >= g.nx || j + 1 >= g.nz {
-            return 1.0;
+    pub fn on_ground(&self, x: f32, z: f32) -> (f32, f32) {
+        let Ground { min, cells_per_m, .. } = self.ground;
+        ((x - min.x) * cells_per_m - 0.5, (z - min.y) * cells_per_m - 0.5)
+    }
+
+    /// The direct light at a point of this room.
+    #[inline]
+    pub fn direct(&self, room: u8, p: Vec3) -> Direct {
+        let Some(lamp) = self.ground.lamp(room) else {
+            return Direct { to: self.lamps.to_sun, strength: 1.0, indoors: false };
+        };
+        let d = lamp - p;
+        let d2 = dot(d, d) + 0.3;
+        Direct { to: d * (1.0 / d2.sqrt()), strength: 1.0 / (1.0 + 0.085 * d2), indoors: true }
+    }
+
+    /// What a surface with this unit normal does with that light and with the light around, seen
+    /// along the unit vector `to_eye`.
+    #[inline]
+    pub fn shine(&self, direct: &Direct, normal: Vec3, gloss: Gloss, to_eye: Vec3) -> Shine {
+        let lamps = self.lamps;
+        let facing = dot(direct.to, normal);
+        let (source, [high, low], facing) = if direct.indoors {
+            (lamps.lamp, lamps.indoors, facing + 0.35)
+        } else {
+            (lamps.sun, lamps.outdoors, facing)
+        };
+        let source = rgb(source) * (facing.max(0.0) * direct.strength);
+        // Walls at right angles must differ even where no lamp is near, and what faces down sees
+        // little but its own shadow.
+        let corner = 1.0 + 0.07 * normal.x - 0.05 * normal.z;
+        let corner = if normal.y < -0.5 { 0.7 * corner } else { corner };
+        let (high, low) = (rgb(high), rgb(low));
+        let around = (low + (high - low) * (0.5 * normal.y + 0.5)) * corner;
+        let factor = around + source;
+        if gloss == Gloss::Dull {
+            return Shine { factor, add: Vec4::ZERO };
         }
-        let at = |k: usize| f32::from(self.dark[k]);
-        let (a, b) = (j * g.nx + i, (j + 1) * g.nx + i);
-        let low = at(a) + (at(a + 1) - at(a)) * fu;
-        let high = at(b) + (at(b + 1) - at(b)) * fu;
-        1.0 - (low + (high - low) * fv) * (1.0 / 255.0)
+        let half = direct.to + to_eye;
+        let c = dot(normal, half).max(0.0) * (1.0 / dot(half, half).max(1e-12).sqrt());
+        let (c2, facing) = (c * c, dot(normal, to_eye));
+        let c8 = c2 * c2 * c2 * c2;
+        let away = 1.0 - facing.max(0.0);
+        let edge = away * away;
+        // How far up the mirrored view looks: 0 down, 1 up.
+        let mirror = (0.5 + 0.5 * (2.0 * facing * normal.y - to_eye.y)).max(0.0);
+        let (keep, light, sky) = match gloss {
+            Gloss::Dull => (1.0, 0.0, 0.0),
+            Gloss::Satin => (1.0, 0.07 * c8, 0.02 * edge),
+            Gloss::Shiny => (1.0, 0.45 * c8 * c8 * c8 * c8, 0.07 * edge * edge),
+            Gloss::Metal => (0.62 + 0.75 * mirror * mirror, 0.4 * c8 * c8, 0.05 * edge),
+            Gloss::Glass => (0.6, 0.6 * c8 * c8, 0.75 * mirror * (0.10 + 0.6 * edge * edge)),
+        };
+        let add = source * light + Vec4::new(0.85, 0.95, 1.05, 0.0) * sky;
+        Shine { factor: factor * keep, add }
     }
 }

@@ -42,7 +42,8 @@ pub struct Cells {
     pub n_z: usize,
     /// Index of the room of each cell; 255 for none.
     pub rooms: Vec<u8>,
-    /// How bright the middle of each cell is, near walls and the feet of things darker; 255 unshaded.
+    /// How bright the middle of each cell is, darker near walls and the feet of things: factors on
+    /// what is shown, the root of linear light; 255 unshaded.
     pub brightness: Vec<u8>,
 }
 
@@ -52,15 +53,16 @@ impl Scene {
         let bodies: Vec<Body> = postures.iter().map(|p| Body::new(p, state.frame)).collect();
         let frame = self.frame(state, &bodies, true);
         let light = &frame.light;
+        let lamps = light.lamps;
         Lighting {
-            to_sun: [0.42, 0.80, 0.43],
-            sun: [0.92, 0.86, 0.74],
-            lamp: [0.66, 0.62, 0.55],
-            outdoors: [[0.36, 0.41, 0.48], [0.24, 0.23, 0.20]],
-            indoors: [[0.40, 0.40, 0.40], [0.34, 0.32, 0.30]],
-            sky: [[0.74, 0.82, 0.88], [0.19, 0.40, 0.74], [0.36, 0.38, 0.34]],
+            to_sun: lamps.to_sun.to_array(),
+            sun: lamps.sun.to_array(),
+            lamp: lamps.lamp.to_array(),
+            outdoors: lamps.outdoors.map(|c| c.to_array()),
+            indoors: lamps.indoors.map(|c| c.to_array()),
+            sky: lamps.sky.map(|c| c.to_array()),
             ceiling_m: light.ground.ceiling_m,
-            lamps_in_world: light.lamps_of_rooms().iter().map(Vec3::to_array).collect(),
+            lamps_in_world: light.ground.lamps().iter().map(Vec3::to_array).collect(),
             cells: light.cells(),
         }
     }

@@ -9,7 +9,7 @@ use chaic_protocol::catalogue::Finish;
 use chaic_protocol::geom::math;
 use glam::Mat3;
 
-use crate::texture::{Texture, linear_from_srgb};
+use crate::texture::{Texture, linear_from_shown};
 
 /// How a group of triangles looks.
 #[derive(Clone, Copy, Debug)]
@@ -53,7 +53,7 @@ impl Skin {
             Finish::Crust => (Texture::Crust, Gloss::Dull),
             Finish::Glass => (Texture::Plain, Gloss::Glass),
         };
-        let color = linear_from_srgb(srgb);
+        let color = linear_from_shown(srgb);
         Skin { color, texture, gloss, axes: Mat3::IDENTITY, tinted: false }
     }
 

@@ -9,7 +9,7 @@ use crate::draw::{Omit, Scratch, draw as draw_scene};
 use crate::lens::Lens;
 use crate::people::Body;
 use crate::scene::Scene;
-use crate::shade::shade;
+use crate::shade::{Drawn, Wanted, shade};
 use crate::text::{self, Align, blend};
 use crate::view::with_scratch;
 
@@ -84,11 +84,12 @@ fn base(scene: &Scene, world: &World, map: &Map, width: u32, height: u32) -> Rgb
     let lens = Lens::plan(eye, map.px_per_m, width as usize, height as usize);
     let bodies: Vec<Body> = Vec::new();
     let frame = scene.frame(world.state(), &bodies, true);
-    let mut rgb = Vec::new();
+    let mut rgb = vec![0; 3 * width as usize * height as usize];
     with_scratch(|scratch| {
-        let Scratch { target, work, row, .. } = scratch;
+        let Scratch { target, work, canvas, .. } = scratch;
         draw_scene(&frame, &lens, Omit { body: None, ceiling: true }, target, work);
-        shade(&frame, &lens, &work.levels, target, row, &mut rgb);
+        let wanted = Wanted { rgb: &mut rgb, depth_m: None, ids: None };
+        shade(&frame, &lens, &Drawn::of(work), target, canvas, wanted);
     });
     RgbImage::from_raw(width, height, rgb).unwrap_or_else(|| RgbImage::new(width, height))
 }

@@ -11,11 +11,11 @@ use glam::Mat3;
 use rayon::prelude::*;
 
 use crate::frame::{ClassMesh, Frame, Instance, Shape};
-use crate::light::{Foot, Ground, Light};
+use crate::light::{Foot, Ground, Lamps, Light};
 use crate::mesh::{self, Mesh, Skin};
 use crate::people::Body;
 use crate::solids::cuboid;
-use crate::texture::{Texture, linear_from_srgb};
+use crate::texture::{Texture, linear_from_shown};
 use crate::view::{View, look};
 
 /// Everything of an episode that is drawn and never changes: floors, walls, ceilings, and the
@@ -25,6 +25,7 @@ pub struct Scene {
     structure: Vec<(EntityId, Mesh)>,
     things: Vec<(Arc<ClassMesh>, Option<[f32; 3]>)>,
     ground: Ground,
+    lamps: Lamps,
 }
 
 impl Scene {
@@ -45,10 +46,10 @@ impl Scene {
         let things = setup.things.iter().map(|thing| {
             let palette = thing.class.info().palette;
             let tint = (!palette.is_empty())
-                .then(|| linear_from_srgb(palette[usize::from(thing.variant) % palette.len()]));
+                .then(|| linear_from_shown(palette[usize::from(thing.variant) % palette.len()]));
             (ClassMesh::of(thing), tint)
         });
-        Scene { structure, things: things.collect(), ground: Ground::new(setup) }
+        Scene { structure, things: things.collect(), ground: Ground::new(setup), lamps: Lamps::DAY }
     }
 
     /// What many cameras see of a world, in their order. The images don't depend on the number of
@@ -82,7 +83,7 @@ impl Scene {
         bodies: &'a [Body],
         wants_color: bool,
     ) -> Frame<'a> {
-        let mut light = Light::new(&self.ground, wants_color);
+        let mut light = Light::new(&self.ground, &self.lamps, wants_color);
         let mut instances =
             Vec::with_capacity(self.structure.len() + self.things.len() + bodies.len());
         for (entity, mesh) in &self.structure {
@@ -137,6 +138,7 @@ impl Scene {
                 room: Some(self.ground.room_at(thing.position)),
             });
         }
+        light.finish();
         Frame { instances, light }
     }
 }

@@ -1,9 +1,7 @@
 //! Surface textures: small tiles of brightness, baked once from integer noise, sampled with
 //! smaller copies for what is far away. Also the conversion between sRGB and linear light.
 
-use std::sync::{LazyLock, OnceLock};
-
-use chaic_protocol::geom::math;
+use std::sync::OnceLock;
 
 /// What a surface looks like close up: a tile of brightness that repeats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -43,22 +41,99 @@ const N_TEXTURES: usize = 14;
 pub(crate) const SIDE: usize = 128;
 const LEVELS: usize = 8;
 
-/// A square of brightness that repeats, 128 meaning unchanged.
-pub(crate) struct Tile {
-    texels_per_m: f32,
-    texels: Vec<u8>,
-    /// Where each level begins.
-    begins: [usize; LEVELS],
-    /// Texels per metre of each level.
-    scales: [f32; LEVELS],
+/// Tiles of brightness that repeat, of all textures and at all levels, one after the other.
+///
+/// Each texel comes with its neighbors: itself in the lowest byte, then those to the right, below,
+/// and below to the right, so that one load is enough to mix the four. 128 leaves brightness as it
+/// is; texels are roots of the factors of linear light, to multiply what is shown.
+pub(crate) type Atlas = [u32; N_ATLAS];
+
+/// Texels of one tile at all its levels.
+const N_TILE: usize = (4 * SIDE * SIDE - 1) / 3;
+
+/// A power of two with room for all tiles: an index needs no check but a mask. The last texel
+/// changes nothing.
+pub(crate) const N_ATLAS: usize = (N_TEXTURES * N_TILE + 1).next_power_of_two();
+
+/// The texel of what has no texture.
+pub(crate) const PLAIN: u32 = N_ATLAS as u32 - 1;
+
+/// The tiles, baked when first asked for.
+pub(crate) fn atlas() -> &'static Atlas {
+    static ATLAS: OnceLock<Box<Atlas>> = OnceLock::new();
+    ATLAS.get_or_init(|| {
+        let mut texels = vec![0; N_ATLAS];
+        for texture in Texture::ALL {
+            bake(texture, &mut texels[Tile::of(texture).begin as usize..][..N_TILE]);
+        }
+        texels[PLAIN as usize] = 0x8080_8080;
+        texels.into_boxed_slice().try_into().unwrap_or_else(|_| Box::new([0x8080_8080; N_ATLAS]))
+    })
 }
 
-static TILES: [OnceLock<Tile>; N_TEXTURES] = [const { OnceLock::new() }; N_TEXTURES];
+/// Where a texture is in the [`Atlas`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tile {
+    pub begin: u32,
+    pub texels_per_m: f32,
+}
+
+/// One level of a [`Tile`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Level {
+    /// Where it begins in the [`Atlas`].
+    pub begin: u32,
+    /// Its side is 1 << log2_side texels.
+    pub log2_side: u32,
+    pub texels_per_m: f32,
+}
+
+impl Tile {
+    fn of(texture: Texture) -> Tile {
+        let begin = texture as usize * N_TILE;
+        Tile { begin: begin as u32, texels_per_m: SIDE as f32 / texture.period_m() }
+    }
+
+    /// The level for pixels of this side, metres.
+    #[inline(always)]
+    pub fn level(&self, pixel_m: f32) -> Level {
+        let covered = (pixel_m * self.texels_per_m).clamp(1.0, SIDE as f32);
+        self.level_at(((covered.to_bits() >> 23) as usize - 127).min(LEVELS - 1))
+    }
+
+    #[inline(always)]
+    fn level_at(&self, level: usize) -> Level {
+        // Levels of 4^n, 4^(n-1), ... texels: the first few of them together.
+        let before = (4 * SIDE * SIDE - (4 * SIDE * SIDE >> (2 * level))) / 3;
+        Level {
+            begin: self.begin + before as u32,
+            log2_side: SIDE.ilog2() - level as u32,
+            texels_per_m: self.texels_per_m / (1u32 << level) as f32,
+        }
+    }
+}
 
 impl Texture {
+    const ALL: [Texture; N_TEXTURES] = [
+        Texture::Plain,
+        Texture::Plaster,
+        Texture::Brushed,
+        Texture::Grain,
+        Texture::Weave,
+        Texture::Wicker,
+        Texture::Mottle,
+        Texture::Crust,
+        Texture::Planks,
+        Texture::Tiles,
+        Texture::Carpet,
+        Texture::Asphalt,
+        Texture::Pavement,
+        Texture::Grass,
+    ];
+
     /// The tile, if the surface has any texture.
-    pub(crate) fn tile(self) -> Option<&'static Tile> {
-        (self != Texture::Plain).then(|| TILES[self as usize].get_or_init(|| bake(self)))
+    pub(crate) fn tile(self) -> Option<Tile> {
+        (self != Texture::Plain).then(|| Tile::of(self))
     }
 
     /// Side of the square that repeats, metres.
@@ -188,99 +263,36 @@ fn clouds(u: f32, v: f32, n: u32, seed: u32) -> f32 {
         + 0.15 * noise(u, v, 4 * n, 4 * n, seed + 80)
 }
 
-fn bake(texture: Texture) -> Tile {
-    let mut texels = Vec::with_capacity(SIDE * SIDE * 3 / 2);
-    let mut begins = [0; LEVELS];
-    for j in 0..SIDE {
-        for i in 0..SIDE {
-            let at = |k: usize| (k as f32 + 0.5) / SIDE as f32;
-            texels.push((128.0 * texture.brightness(at(i), at(j))).clamp(0.0, 255.0) as u8);
-        }
-    }
-    for level in 1..LEVELS {
-        begins[level] = texels.len();
-        let (from, side) = (begins[level - 1], SIDE >> level);
-        for j in 0..side {
-            for i in 0..side {
-                let at = |di: usize, dj: usize| {
-                    u32::from(texels[from + (2 * j + dj) * 2 * side + 2 * i + di])
-                };
-                let sum = at(0, 0) + at(1, 0) + at(0, 1) + at(1, 1);
-                texels.push(((sum + 2) / 4) as u8);
-            }
-        }
-    }
-    let texels_per_m = SIDE as f32 / texture.period_m();
-    let scales = std::array::from_fn(|level| texels_per_m / (1u32 << level) as f32);
-    Tile { texels_per_m, texels, begins, scales }
-}
-
-impl Tile {
-    /// The finest level: 128 is the surface's own brightness, row after row along u.
-    pub fn finest(&self) -> &[u8] {
-        &self.texels[..SIDE * SIDE]
-    }
-
-    /// Brightness around 1 at a point given in metres, for a pixel that covers `pixel_m`.
-    #[inline]
-    pub fn sample(&self, u_m: f32, v_m: f32, pixel_m: f32) -> f32 {
-        let covered = (pixel_m * self.texels_per_m).clamp(1.0, 128.0);
-        let level = ((covered.to_bits() >> 23) as usize - 127).min(LEVELS - 1);
+/// Writes all levels of a texture.
+fn bake(texture: Texture, quads: &mut [u32]) {
+    let at = |k: usize| (k as f32 + 0.5) / SIDE as f32;
+    let texel = |n: usize| 128.0 * texture.brightness(at(n % SIDE), at(n / SIDE)).max(0.0).sqrt();
+    let mut texels: Vec<f32> = (0..SIDE * SIDE).map(texel).collect();
+    let mut quads = quads.iter_mut();
+    for level in 0..LEVELS {
         let side = SIDE >> level;
-        let (u, v) = (u_m * self.scales[level], v_m * self.scales[level]);
-        let ((i, fu), (j, fv)) = (split(u), split(v));
-        let mask = side - 1;
-        let (i0, i1) = (i as usize & mask, i.wrapping_add(1) as usize & mask);
-        let (j0, j1) = (j as usize & mask, j.wrapping_add(1) as usize & mask);
-        let level_texels = &self.texels[self.begins[level]..][..side * side];
-        let at = |i: usize, j: usize| f32::from(level_texels[j * side + i]);
-        let low = at(i0, j0) + (at(i1, j0) - at(i0, j0)) * fu;
-        let high = at(i0, j1) + (at(i1, j1) - at(i0, j1)) * fu;
-        (low + (high - low) * fv) * (1.0 / 128.0)
+        let whole = |j: usize, i: usize| texels[j % side * side + i % side].min(255.0) as u32;
+        for (n, quad) in quads.by_ref().take(side * side).enumerate() {
+            let (j, i) = (n / side, n % side);
+            *quad = whole(j, i)
+                | whole(j, i + 1) << 8
+                | whole(j + 1, i) << 16
+                | whole(j + 1, i + 1) << 24;
+        }
+        let half = side / 2;
+        let mean = |n: usize| {
+            let at =
+                |dj: usize, di: usize| texels[(2 * (n / half) + dj) * side + 2 * (n % half) + di];
+            0.25 * (at(0, 0) + at(0, 1) + at(1, 0) + at(1, 1))
+        };
+        texels = (0..half * half).map(mean).collect();
     }
 }
 
-static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| {
-    std::array::from_fn(|k| {
-        let s = k as f32 / 255.0;
-        if s <= 0.040_45 { s / 12.92 } else { math::powf((s + 0.055) / 1.055, 2.4) }
-    })
-});
-
-const N_SRGB: usize = 4096;
-
-/// From linear light in [0, 1], in steps of 1 / 4095, to sRGB.
-pub(crate) static SRGB: LazyLock<Box<[u8; N_SRGB]>> = LazyLock::new(|| {
-    Box::new(std::array::from_fn(|k| {
-        let x = k as f32 / (N_SRGB - 1) as f32;
-        let s = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * math::powf(x, 1.0 / 2.4) - 0.055 };
-        (255.0 * s + 0.5) as u8
-    }))
-});
-
-/// Linear light of an sRGB color.
-pub(crate) fn linear_from_srgb(srgb: [u8; 3]) -> [f32; 3] {
-    srgb.map(|s| LINEAR[usize::from(s)])
-}
-
-/// 1.5 * 2^23: a number below 2^22 added to it has its whole part in the sum's low bits. Cheaper
-/// than a cast, which must mind numbers that don't fit.
-const WHOLE: f32 = 12_582_912.0;
-
-/// The whole number at or next below `x` (|x| < 2^22) and how far `x` is above it, 0 to 1.
-#[inline]
-pub(crate) fn split(x: f32) -> (i32, f32) {
-    let sum = (x - 0.5) + WHOLE;
-    (sum.to_bits().wrapping_sub(WHOLE.to_bits()) as i32, x - (sum - WHOLE))
-}
-
-/// sRGB of linear light; too bright is white.
-#[inline]
-pub(crate) fn srgb_from_linear(table: &[u8; N_SRGB], x: f32) -> u8 {
-    let x = if x < 1.0 { x } else { 1.0 };
-    let x = if x > 0.0 { x } else { 0.0 };
-    let k = (x * (N_SRGB - 1) as f32 + WHOLE).to_bits() as usize;
-    table[k % N_SRGB]
+/// Linear light of a color as it is shown, where 255 is 1: its square, which is near to sRGB's
+/// curve and whose inverse, the root, every machine rounds alike.
+pub(crate) fn linear_from_shown(shown: [u8; 3]) -> [f32; 3] {
+    shown.map(|s| (f32::from(s) / 255.0) * (f32::from(s) / 255.0))
 }
 
 #[cfg(test)]
@@ -288,23 +300,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn srgb_survives_the_way_through_linear_light() {
-        for s in 0..=255u8 {
-            let [x, ..] = linear_from_srgb([s; 3]);
-            assert!(srgb_from_linear(&SRGB, x).abs_diff(s) <= 1, "{s}");
-        }
-    }
-
-    #[test]
     fn textures_are_subtle_and_fade_to_their_mean_far_away() {
         for texture in [Texture::Grain, Texture::Wicker, Texture::Tiles, Texture::Grass] {
             let tile = texture.tile().expect("has a texture");
-            let far = tile.sample(3.3, -7.1, 10.0);
-            assert!((0.7..1.3).contains(&far), "{texture:?}: {far}");
-            assert_eq!(far, tile.sample(-120.0, 55.5, 10.0), "{texture:?}");
-            let near = (0..500).map(|k| tile.sample(0.0037 * k as f32, 0.0021 * k as f32, 1e-4));
-            let (low, high) = near.fold((9.0f32, 0.0f32), |(l, h), x| (l.min(x), h.max(x)));
-            assert!(high - low > 0.05 && high - low < 0.9, "{texture:?}: {low} to {high}");
+            let far = tile.level(10.0);
+            assert_eq!(far.log2_side, 0, "{texture:?}");
+            let [mean, right, below, both] = atlas()[far.begin as usize].to_le_bytes();
+            assert!((90..166).contains(&mean), "{texture:?}: {mean}");
+            assert!(right == mean && below == mean && both == mean, "{texture:?} repeats");
+            let near = tile.level(1e-4);
+            assert_eq!(near.log2_side, 7);
+            let texels = atlas()[near.begin as usize..][..SIDE * SIDE].iter().map(|q| q & 0xff);
+            let (low, high) = texels.fold((255, 0), |(l, h), x| (l.min(x), h.max(x)));
+            assert!((6..115).contains(&(high - low)), "{texture:?}: {low} to {high}");
         }
+        assert_eq!(Texture::ALL.map(|t| t as usize), std::array::from_fn(|k| k));
     }
 }

@@ -9,8 +9,7 @@ use chaic_protocol::{AgentId, EntityId};
 use crate::draw::{Omit, Scratch, draw};
 use crate::frame::Frame;
 use crate::lens::Lens;
-use crate::raster::{NOBODY, owner_parts};
-use crate::shade::shade;
+use crate::shade::{Drawn, Wanted, shade};
 
 /// Longest side of an image, pixels: bounds the memory that one view can ask for to 1.5 GB.
 pub const MAX_SIDE_PX: u32 = 8192;
@@ -94,7 +93,7 @@ pub(crate) fn look(frame: &Frame, view: &View) -> Images {
     };
     with_scratch(|scratch| {
         let omit = Omit { body: view.hide.map(EntityId::of_agent), ceiling: view.hide_ceiling };
-        let Scratch { target, plain, work, row } = scratch;
+        let Scratch { target, plain, work, canvas } = scratch;
         if !rgb {
             draw(frame, &lens, omit, plain, work);
             return Images {
@@ -104,25 +103,22 @@ pub(crate) fn look(frame: &Frame, view: &View) -> Images {
             };
         }
         draw(frame, &lens, omit, target, work);
-        let mut colors = Vec::new();
-        shade(frame, &lens, &work.levels, target, row, &mut colors);
-        Images {
-            rgb: Some(colors),
-            depth_m: depth.then(|| depths(&target.nearness)),
-            ids: ids.then(|| entities(frame, &target.owner)),
-        }
+        let mut images = Images {
+            rgb: Some(vec![0; 3 * n]),
+            depth_m: depth.then(|| vec![0.0; n]),
+            ids: ids.then(|| vec![0; n]),
+        };
+        let wanted = Wanted {
+            rgb: images.rgb.as_deref_mut().unwrap_or_default(),
+            depth_m: images.depth_m.as_deref_mut(),
+            ids: images.ids.as_deref_mut(),
+        };
+        shade(frame, &lens, &Drawn::of(work), target, canvas, wanted);
+        images
     })
 }
 
 fn depths(nearness: &[f32]) -> Vec<f32> {
     let far = 1.0 / Camera::FAR_M;
     nearness.iter().map(|q| if *q > far { 1.0 / *q } else { Camera::FAR_M }).collect()
-}
-
-fn entities(frame: &Frame, owners: &[u32]) -> Vec<u16> {
-    let entity = |owner: &u32| match *owner {
-        NOBODY => EntityId::NOTHING.0,
-        owner => frame.instances[owner_parts(owner).0].entity.0,
-    };
-    owners.iter().map(entity).collect()
 }

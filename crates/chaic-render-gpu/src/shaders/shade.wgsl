@@ -16,8 +16,8 @@
 @group(0) @binding(8) var<storage, read> lamps: array<vec4f>;
 // Of each cell of the ground its brightness, and its room in the second byte; rows along x.
 @group(0) @binding(9) var<storage, read> ground: array<u32>;
-// Of each texture its tile at all sizes, the largest first; four neighbors a word.
-@group(0) @binding(10) var<storage, read> quads: array<u32>;
+// Of each texture its tile at all sizes, the largest first; a texel and three neighbors a word.
+@group(0) @binding(10) var<storage, read> atlas: array<u32>;
 @group(0) @binding(11) var<storage, read> depth: array<f32>;
 // First the triangle's name, then the color; shape [view, row, column].
 @group(0) @binding(12) var<storage, read_write> color: array<u32>;
@@ -35,7 +35,7 @@ struct Skin {
     is_tinted: u32,
     axes_z: vec3f,
     // Where the texture's tile begins.
-    first_quad: u32,
+    first_texel: u32,
 }
 
 // `LightRecord` of records.rs.
@@ -122,7 +122,7 @@ fn sky(light: Light, ray: vec3f) -> vec3f {
     let is_above = y >= 0.0;
     let t = select(min(-6.0 * y, 1.0), 1.0 - up * (0.4 + 0.6 * up), is_above);
     let to = select(light.below, light.zenith, is_above);
-    return mix(sqrt(light.horizon), sqrt(to), t) * 255.0;
+    return shown(mix(light.horizon, to, t));
 }
 
 fn surface(view: View, light: Light, name: u32, ray: vec3f, depth_m: f32) -> vec3f {
@@ -291,7 +291,7 @@ fn structure(light: Light, own: vec3f, gloss: u32, p: vec3f, n: vec3f, ray: vec3
     var factor = s.factor;
     if (n.y < -0.5) {
         // A ceiling sees the whole lit room.
-        factor *= 2.2;
+        factor *= 1.5;
     } else if (n.y < 0.5) {
         let low = max(1.0 - p.y * 2.2, 0.0);
         let high = max(1.0 - (light.ceiling_m - p.y) * 2.2, 0.0);
@@ -340,14 +340,14 @@ fn texture_brightness(skin: Skin, face: vec3f, local: vec3f, covers_m: f32) -> f
     let level = min((bitcast<u32>(covered) >> 23u) - 127u, LOG2_TILE_TEXELS);
     // Levels of 4^n, 4^(n-1), ... texels: the first ones together.
     let whole = 4u * TILE_TEXELS * TILE_TEXELS;
-    let first = skin.first_quad + (whole - (whole >> (2u * level))) / 3u;
+    let first = skin.first_texel + (whole - (whole >> (2u * level))) / 3u;
     let log2_side = LOG2_TILE_TEXELS - level;
     let scale = skin.texels_per_m / f32(1u << level);
     // Middles of texels lie at halves.
     let at = vec2f(dot(u, local), dot(v, local)) * scale - 0.5;
     let k = vec2u(vec2i(floor(at))) & vec2u((1u << log2_side) - 1u);
     let f = at - floor(at);
-    let quad = unpack4x8unorm(quads[first + ((k.y << log2_side) | k.x)]);
-    let mean = mix(mix(quad.x, quad.y, f.x), mix(quad.z, quad.w, f.x), f.y);
+    let texel = unpack4x8unorm(atlas[first + ((k.y << log2_side) | k.x)]);
+    let mean = mix(mix(texel.x, texel.y, f.x), mix(texel.z, texel.w, f.x), f.y);
     return mean * (255.0 / 128.0);
 }

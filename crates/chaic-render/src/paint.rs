@@ -1,0 +1,336 @@
+//! What color a triangle has, worked out once for each triangle in view.
+//!
+//! A quantity that is linear over a triangle, at the point seen at depth w in the pixel with
+//! middle (u, v), is `base + w * (at + u * du + v * dv)`: the point is the eye plus w times a ray
+//! that is linear in (u, v). Nothing is divided, and corners behind the eye do no harm.
+
+use chaic_protocol::{EntityId, Vec3};
+use glam::Vec4;
+
+use crate::frame::{Frame, Instance};
+use crate::lens::Lens;
+use crate::light::{Direct, NO_ROOM};
+use crate::mesh::{Gloss, Mesh, Triangle, unit};
+use crate::texture::Tile;
+
+/// How dark the tops of walls are on maps, 0 to 255.
+const WALL_ON_MAP: f32 = 44.0;
+
+/// What a map shows where nothing is, 0 to 255.
+const PAPER: f32 = 236.0;
+
+/// Quantities that are linear over a triangle, one in each lane.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Plane {
+    base: Vec4,
+    at: Vec4,
+    du: Vec4,
+    dv: Vec4,
+}
+
+impl Plane {
+    const fn constant(base: Vec4) -> Plane {
+        Plane { base, at: Vec4::ZERO, du: Vec4::ZERO, dv: Vec4::ZERO }
+    }
+
+    /// The quantities along a row of pixels whose middles lie at `v`.
+    #[inline(always)]
+    pub fn row(&self, v: f32) -> RowPlane {
+        RowPlane { base: self.base, at: self.at + self.dv * v, du: self.du }
+    }
+
+    /// `start` where `s` and `t` are 0, growing by `ds` with s and `dt` with t; `s` and `t` are
+    /// planes of one quantity each: (base, at, du, dv).
+    fn mixed(start: Vec4, (ds, s): (Vec4, Vec4), (dt, t): (Vec4, Vec4)) -> Plane {
+        Plane {
+            base: start + ds * s.x + dt * t.x,
+            at: ds * s.y + dt * t.y,
+            du: ds * s.z + dt * t.z,
+            dv: ds * s.w + dt * t.w,
+        }
+    }
+}
+
+/// A [`Plane`] on one row.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RowPlane {
+    base: Vec4,
+    at: Vec4,
+    du: Vec4,
+}
+
+impl RowPlane {
+    /// The quantities at column `u` and depth `w`, and their part that is multiplied by depth.
+    #[inline(always)]
+    pub fn at(&self, u: f32, w: f32) -> (Vec4, Vec4) {
+        let slope = self.at + self.du * u;
+        (self.base + slope * w, slope)
+    }
+}
+
+/// How a triangle's color comes about.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Kind {
+    /// The same everywhere but for its texture.
+    Even,
+    /// Linear between its corners.
+    Smooth,
+    /// Structure: lit point by point, since it is large.
+    Structure { floor: bool },
+}
+
+/// A triangle, ready to be looked at.
+#[derive(Clone, Copy)]
+pub(crate) struct Paint {
+    pub entity: u16,
+    pub kind: Kind,
+    /// What is shown, 0 to 255; of structure its linear color as a constant.
+    pub color: Plane,
+    /// Bounds of the corners' colors.
+    pub low: Vec4,
+    pub high: Vec4,
+    pub tile: Option<Tile>,
+    /// Texture coordinates, metres; the third lane's slope is the cosine between normal and ray
+    /// (not normalized).
+    pub texture: Plane,
+    pub normal: Vec3,
+    pub gloss: Gloss,
+}
+
+/// The rays of a view in some frame: from `eye + u * eye_u + v * eye_v` along
+/// `ray + u * ray_u + v * ray_v`, one metre deep.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rays {
+    pub eye: [Vec3; 3],
+    pub ray: [Vec3; 3],
+}
+
+impl Rays {
+    /// In the world.
+    pub fn of(lens: &Lens) -> Rays {
+        let (mu, mv) = lens.middle();
+        let per_px = 1.0 / lens.focal;
+        let (u, v) = (lens.right * per_px, -lens.up * per_px);
+        let corner = -(u * mu) - v * mv;
+        if lens.is_plan {
+            Rays { eye: [lens.eye + corner, u, v], ray: [lens.ahead, Vec3::ZERO, Vec3::ZERO] }
+        } else {
+            Rays { eye: [lens.eye, Vec3::ZERO, Vec3::ZERO], ray: [lens.ahead + corner, u, v] }
+        }
+    }
+
+    /// The point seen in the pixel with middle (u, v) at a depth, and the ray there.
+    #[inline(always)]
+    pub fn point(&self, u: f32, v: f32, depth_m: f32) -> (Vec3, Vec3) {
+        let ray = self.ray[0] + self.ray[1] * u + self.ray[2] * v;
+        (self.eye[0] + self.eye[1] * u + self.eye[2] * v + ray * depth_m, ray)
+    }
+
+    /// The same in the frame of an instance.
+    fn within(&self, instance: &Instance) -> Rays {
+        let r = &instance.rotation;
+        let turn = |p: Vec3| Vec3::new(dot(r.x_axis, p), dot(r.y_axis, p), dot(r.z_axis, p));
+        let [eye, u, v] = self.eye;
+        Rays { eye: [turn(eye - instance.origin), turn(u), turn(v)], ray: self.ray.map(turn) }
+    }
+}
+
+fn dot(a: Vec3, b: Vec3) -> f32 {
+    a.x * b.x + a.y * b.y + a.z * b.z
+}
+
+/// What all triangles of an instance share in a view.
+#[derive(Clone, Copy)]
+pub(crate) struct Sight {
+    rays: Rays,
+    direct: Direct,
+}
+
+/// Works out triangles of one view.
+pub(crate) struct Painter<'a> {
+    pub frame: &'a Frame<'a>,
+    pub is_plan: bool,
+    pub rays: Rays,
+}
+
+impl Painter<'_> {
+    /// What is common to an instance's triangles.
+    pub fn sight(&self, instance: &Instance) -> Sight {
+        let middle = instance.origin + instance.rotation * (0.5 * (instance.min + instance.max));
+        let direct = self.frame.light.direct(instance.room.unwrap_or(NO_ROOM), middle);
+        Sight { rays: self.rays.within(instance), direct }
+    }
+
+    /// A quantity with this gradient (in the instance's frame) that is 0 at `zero`, as (base, at,
+    /// du, dv). In a plan view, whose eyes move with the pixel instead of its rays, the plane of
+    /// the triangle turns depth into a linear quantity too, so that w = 1 fits.
+    fn plane(&self, sight: &Sight, gradient: Vec3, zero: Vec3, normal: Vec3) -> Vec4 {
+        let Rays { eye, ray } = &sight.rays;
+        let base = dot(gradient, eye[0] - zero);
+        let [at, du, dv] = if self.is_plan {
+            let down = dot(normal, ray[0]);
+            let fall = if down.abs() > 1e-6 { dot(gradient, ray[0]) / down } else { 0.0 };
+            let along = |v: Vec3| dot(gradient, v) - fall * dot(normal, v);
+            [-fall * dot(normal, eye[0] - zero), along(eye[1]), along(eye[2])]
+        } else {
+            ray.map(|r| dot(gradient, r))
+        };
+        Vec4::new(base, at, du, dv)
+    }
+
+    /// Works out a triangle of an instance.
+    #[inline(never)]
+    pub fn paint(
+        &self,
+        instance: &Instance,
+        sight: &Sight,
+        mesh: &Mesh,
+        triangle: &Triangle,
+    ) -> Paint {
+        let skin = &mesh.skins[usize::from(triangle.skin)];
+        let corners = triangle.corners.map(usize::from);
+        let [a, b, c] = corners.map(|k| mesh.positions[k]);
+        let flat = (b - a).cross(c - a);
+        let face = unit(flat);
+        let color = match instance.tint {
+            Some(tint) if skin.tinted => tint,
+            _ => skin.color,
+        };
+        let color = Vec3::from(color).extend(0.0);
+        let is_structure = instance.room.is_none();
+        let mut paint = Paint {
+            entity: instance.entity.0,
+            kind: Kind::Structure { floor: instance.entity == EntityId::FLOOR },
+            color: Plane::constant(color),
+            low: color,
+            high: color,
+            tile: skin.texture.tile(),
+            texture: Plane::default(),
+            normal: instance.rotation * face,
+            gloss: skin.gloss,
+        };
+        if paint.tile.is_some() {
+            let axes = &skin.axes;
+            let facing = [axes.x_axis, axes.y_axis, axes.z_axis].map(|x| dot(x, face).abs());
+            // Look along the axis that the face is most square to; the longest axis left is u.
+            let (u, v) = if facing[0] > facing[1] && facing[0] > facing[2] {
+                (axes.y_axis, axes.z_axis)
+            } else if facing[1] > facing[2] {
+                (axes.x_axis, axes.z_axis)
+            } else {
+                (axes.x_axis, axes.y_axis)
+            };
+            paint.texture = self.texture(sight, u, v, a, face);
+        }
+        if is_structure {
+            return paint;
+        }
+        let shown = |p: Vec3, n: Vec3| self.shown(instance, sight, skin.gloss, color, p, n);
+        if !triangle.smooth && skin.gloss == Gloss::Dull {
+            let middle = (a + b + c) * (1.0 / 3.0);
+            let color = shown(middle, face);
+            paint.kind = Kind::Even;
+            paint.color = Plane::constant(color);
+            (paint.low, paint.high) = (color, color);
+            return paint;
+        }
+        let normals = if triangle.smooth { corners.map(|k| mesh.normals[k]) } else { [face; 3] };
+        let [at_a, at_b, at_c] = [(a, 0), (b, 1), (c, 2)].map(|(p, k)| shown(p, normals[k]));
+        let per_area2 = 1.0 / dot(flat, flat).max(1e-30);
+        let s = self.plane(sight, (c - a).cross(flat) * per_area2, a, face);
+        let t = self.plane(sight, flat.cross(b - a) * per_area2, a, face);
+        paint.kind = Kind::Smooth;
+        paint.color = Plane::mixed(at_a, (at_b - at_a, s), (at_c - at_a, t));
+        paint.low = at_a.min(at_b).min(at_c);
+        paint.high = at_a.max(at_b).max(at_c);
+        paint
+    }
+
+    /// Texture coordinates along two axes from the instance's origin.
+    fn texture(&self, sight: &Sight, u: Vec3, v: Vec3, corner: Vec3, face: Vec3) -> Plane {
+        // From a corner of the triangle, so that its plane is right in a plan view; then moved.
+        let (pu, pv) = (self.plane(sight, u, corner, face), self.plane(sight, v, corner, face));
+        let slant = sight.rays.ray.map(|r| dot(face, r));
+        Plane {
+            base: Vec4::new(pu.x + dot(u, corner), pv.x + dot(v, corner), 0.0, 0.0),
+            at: Vec4::new(pu.y, pv.y, slant[0], 0.0),
+            du: Vec4::new(pu.z, pv.z, slant[1], 0.0),
+            dv: Vec4::new(pu.w, pv.w, slant[2], 0.0),
+        }
+    }
+
+    /// What is shown of a point of a thing, given in its frame.
+    fn shown(
+        &self,
+        instance: &Instance,
+        sight: &Sight,
+        gloss: Gloss,
+        color: Vec4,
+        p: Vec3,
+        n: Vec3,
+    ) -> Vec4 {
+        let (point, normal) = (instance.rotation * p, instance.rotation * n);
+        let to_eye = if self.is_plan {
+            Vec3::Y
+        } else if gloss == Gloss::Dull {
+            Vec3::ZERO
+        } else {
+            unit(self.rays.eye[0] - instance.origin - point)
+        };
+        let shine = self.frame.light.shine(&sight.direct, normal, gloss, to_eye);
+        // The foot of a thing stands in its own shadow.
+        let foot = 0.76 + 0.24 * (point.y * 7.0).clamp(0.0, 1.0);
+        shown(color * shine.factor * foot + shine.add)
+    }
+
+    /// What is shown of a point of structure in the world, seen along `ray`.
+    #[inline(always)]
+    pub fn shown_structure(&self, paint: &Paint, p: Vec3, ray: Vec3) -> Vec4 {
+        let light = &self.frame.light;
+        let n = paint.normal;
+        let ground = light.ground;
+        if self.is_plan && n.y > 0.5 && paint.entity == EntityId::WALL.0 {
+            // A map shows where walls are, not how they are lit.
+            return Vec4::new(WALL_ON_MAP, WALL_ON_MAP, WALL_ON_MAP, 0.0);
+        }
+        // A step off the surface leaves the wall.
+        let direct = light.direct(ground.room_at(p + n * 0.1), p);
+        let to_eye = if paint.gloss == Gloss::Dull { Vec3::ZERO } else { -unit(ray) };
+        let shine = light.shine(&direct, n, paint.gloss, to_eye);
+        let mut factor = shine.factor;
+        if n.y < -0.5 {
+            // A ceiling sees the whole lit room.
+            factor *= 1.5;
+        } else if n.y < 0.5 {
+            let low = (1.0 - p.y * 2.2).max(0.0);
+            let high = ground.ceiling_m.map_or(0.0, |c| (1.0 - (c - p.y) * 2.2).max(0.0));
+            factor *= 1.0 - 0.22 * low * low - 0.16 * high * high;
+        }
+        shown(paint.low * factor + shine.add)
+    }
+
+    /// What is shown of the sky in the pixel with middle (u, v).
+    #[inline(always)]
+    pub fn sky(&self, u: f32, v: f32) -> Vec4 {
+        if self.is_plan {
+            return Vec4::splat(PAPER);
+        }
+        let [horizon, zenith, ground] = self.frame.light.lamps.sky.map(|c| c.extend(0.0));
+        let (_, ray) = self.rays.point(u, v, 0.0);
+        let y = ray.y / dot(ray, ray).max(1e-12).sqrt();
+        let up = (1.0 - y) * (1.0 - y);
+        let (to, t) = if y >= 0.0 {
+            (zenith, 1.0 - up * (0.4 + 0.6 * up))
+        } else {
+            (ground, (-6.0 * y).min(1.0))
+        };
+        shown(horizon + (to - horizon) * t)
+    }
+}
+
+/// From linear light to what is shown, 0 to 255.
+#[inline(always)]
+fn shown(linear: Vec4) -> Vec4 {
+    let [r, g, b, _] = linear.clamp(Vec4::ZERO, Vec4::ONE).to_array();
+    Vec3::new(r.sqrt(), g.sqrt(), b.sqrt()).extend(0.0) * 255.0
+}

@@ -93,6 +93,7 @@ pub(crate) fn draw<O: Owner>(
         let ((sa, da), (sb, db)) = (key(a), key(b));
         sa.cmp(&sb).then(da.total_cmp(&db)).then(a.index.cmp(&b.index))
     });
+    let arch = pulp::Arch::new();
     let mut drawn = 0;
     let mut stale = false;
     let mut was_structure = true;
@@ -101,7 +102,7 @@ pub(crate) fn draw<O: Owner>(
         let begins_things = was_structure && !candidate.is_structure;
         was_structure = candidate.is_structure;
         if stale && (begins_things || [5, 12, 24, 48].contains(&drawn) || drawn % 96 == 95) {
-            target.update_tiles();
+            arch.dispatch(UpdateTiles(target));
             stale = false;
         }
         let Outline { rect, nearest, crosses_near } = candidate.outline;
@@ -115,7 +116,7 @@ pub(crate) fn draw<O: Owner>(
         firsts[candidate.index as usize] = *n_triangles as u32;
         *n_triangles += instance.shape.mesh(level).triangles.len();
         let mesh_drawing = Drawing { instance, index: candidate.index as usize, level, lens };
-        mesh_drawing.draw(crosses_near, target, corners);
+        arch.dispatch(DrawOne { drawing: mesh_drawing, crosses_near, target, corners });
         let everywhere = [f32::NEG_INFINITY, f32::NEG_INFINITY, f32::INFINITY, f32::INFINITY];
         target.touch(if crosses_near { everywhere } else { rect });
         drawn += 1;
@@ -179,12 +180,43 @@ struct Drawing<'a> {
     lens: &'a Lens,
 }
 
+/// Draws one instance, compiled for each kind of vectors and called for the widest that the
+/// machine has.
+struct DrawOne<'a, O> {
+    drawing: Drawing<'a>,
+    crosses_near: bool,
+    target: &'a mut Target<O>,
+    corners: &'a mut Vec<Corner>,
+}
+
+impl<O: Owner> pulp::NullaryFnOnce for DrawOne<'_, O> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.drawing.draw(self.crosses_near, self.target, self.corners);
+    }
+}
+
+/// Brings tiles up to date, likewise.
+struct UpdateTiles<'a, O>(&'a mut Target<O>);
+
+impl<O: Owner> pulp::NullaryFnOnce for UpdateTiles<'_, O> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.0.update_tiles();
+    }
+}
+
 impl Drawing<'_> {
-    #[inline]
+    #[inline(always)]
     fn owner<O: Owner>(&self, triangle: usize) -> O {
         O::of(self.instance.entity, self.index, triangle)
     }
 
+    #[inline(always)]
     fn draw<O: Owner>(
         &self,
         crosses_near: bool,
@@ -218,6 +250,7 @@ impl Drawing<'_> {
         }
     }
 
+    #[inline(always)]
     fn draw_clipped<O: Owner>(
         &self,
         into: &IntoCamera,

@@ -7,8 +7,6 @@
 use chaic_protocol::EntityId;
 use chaic_protocol::geom::math::ceil_small;
 
-use crate::mesh::Triangle;
-
 /// Nobody's pixel.
 pub(crate) const NOBODY: u32 = u32::MAX;
 /// Side of the squares in which nearness is summed up, pixels.
@@ -248,12 +246,12 @@ impl<O: Owner> Target<O> {
 }
 
 #[inline(always)]
-fn least(x: f32, y: f32) -> f32 {
+pub(crate) fn least(x: f32, y: f32) -> f32 {
     if x < y { x } else { y }
 }
 
 #[inline(always)]
-fn most(x: f32, y: f32) -> f32 {
+pub(crate) fn most(x: f32, y: f32) -> f32 {
     if x > y { x } else { y }
 }
 
@@ -380,11 +378,6 @@ impl Edge {
     fn u_at(&self, v: f32) -> f32 {
         self.u + (v - self.v) * self.per_row
     }
-}
-
-/// The corners of a mesh's triangle.
-pub(crate) fn corners_of(t: &Triangle) -> [usize; 3] {
-    t.corners.map(usize::from)
 }
 
 #[cfg(test)]

@@ -27,7 +27,11 @@ fn render(c: &mut Criterion) {
                 hide_ceiling: false,
             };
             c.bench_function(&format!("{name}/512/{what}"), |b| {
-                b.iter(|| black_box(scene.render(world, &[view])));
+                let mut images = Vec::new();
+                b.iter(|| {
+                    scene.render_into(world, &[view], &mut images);
+                    black_box(&images);
+                });
             });
         }
     }

@@ -5,7 +5,7 @@ use chaic_protocol::{EntityId, Vec3};
 use crate::clip::clip;
 use crate::frame::{Frame, Instance};
 use crate::lens::{IntoCamera, Lens};
-use crate::raster::{Corner, Owner, Target, corners_of};
+use crate::raster::{Corner, Owner, Target, least, most};
 use crate::solids::level_for;
 
 /// Buffers that one thread uses again and again.
@@ -22,7 +22,9 @@ pub(crate) struct Scratch {
 /// What drawing needs beside its target.
 #[derive(Default)]
 pub(crate) struct Work {
-    corners: Vec<Corner>,
+    corners: Corners,
+    /// Triangles that may cover a pixel.
+    alive: Vec<u32>,
     order: Vec<Candidate>,
     /// Level of detail of each instance in this view.
     pub levels: Vec<u8>,
@@ -64,7 +66,7 @@ pub(crate) fn draw<O: Owner>(
     target: &mut Target<O>,
     work: &mut Work,
 ) {
-    let Work { corners, order, levels, firsts, n_triangles } = work;
+    let Work { corners, alive, order, levels, firsts, n_triangles } = work;
     firsts.clear();
     firsts.resize(frame.instances.len(), 0);
     *n_triangles = 0;
@@ -93,6 +95,7 @@ pub(crate) fn draw<O: Owner>(
         let ((sa, da), (sb, db)) = (key(a), key(b));
         sa.cmp(&sb).then(da.total_cmp(&db)).then(a.index.cmp(&b.index))
     });
+    let arch = pulp::Arch::new();
     let mut drawn = 0;
     let mut stale = false;
     let mut was_structure = true;
@@ -101,7 +104,7 @@ pub(crate) fn draw<O: Owner>(
         let begins_things = was_structure && !candidate.is_structure;
         was_structure = candidate.is_structure;
         if stale && (begins_things || [5, 12, 24, 48].contains(&drawn) || drawn % 96 == 95) {
-            target.update_tiles();
+            arch.dispatch(UpdateTiles(target));
             stale = false;
         }
         let Outline { rect, nearest, crosses_near } = candidate.outline;
@@ -115,7 +118,7 @@ pub(crate) fn draw<O: Owner>(
         firsts[candidate.index as usize] = *n_triangles as u32;
         *n_triangles += instance.shape.mesh(level).triangles.len();
         let mesh_drawing = Drawing { instance, index: candidate.index as usize, level, lens };
-        mesh_drawing.draw(crosses_near, target, corners);
+        arch.dispatch(DrawOne { drawing: mesh_drawing, crosses_near, target, corners, alive });
         let everywhere = [f32::NEG_INFINITY, f32::NEG_INFINITY, f32::INFINITY, f32::INFINITY];
         target.touch(if crosses_near { everywhere } else { rect });
         drawn += 1;
@@ -179,62 +182,85 @@ struct Drawing<'a> {
     lens: &'a Lens,
 }
 
+/// Draws one instance, compiled for each kind of vectors and called for the widest that the
+/// machine has.
+struct DrawOne<'a, O> {
+    drawing: Drawing<'a>,
+    crosses_near: bool,
+    target: &'a mut Target<O>,
+    corners: &'a mut Corners,
+    alive: &'a mut Vec<u32>,
+}
+
+impl<O: Owner> pulp::NullaryFnOnce for DrawOne<'_, O> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.drawing.draw(self.crosses_near, self.target, self.corners, self.alive);
+    }
+}
+
+/// Brings tiles up to date, likewise.
+struct UpdateTiles<'a, O>(&'a mut Target<O>);
+
+impl<O: Owner> pulp::NullaryFnOnce for UpdateTiles<'_, O> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.0.update_tiles();
+    }
+}
+
 impl Drawing<'_> {
-    #[inline]
+    #[inline(always)]
     fn owner<O: Owner>(&self, triangle: usize) -> O {
         O::of(self.instance.entity, self.index, triangle)
     }
 
+    #[inline(always)]
     fn draw<O: Owner>(
         &self,
         crosses_near: bool,
         target: &mut Target<O>,
-        corners: &mut Vec<Corner>,
+        corners: &mut Corners,
+        alive: &mut Vec<u32>,
     ) {
         let lens = self.lens;
         let mesh = self.instance.shape.mesh(self.level);
         let into = lens.camera_from(&self.instance.rotation, self.instance.origin);
-        let (mu, mv) = lens.middle();
-        corners.clear();
-        if lens.is_plan {
-            corners.extend(mesh.positions.iter().map(|p| {
-                let p = into.map(*p);
-                Corner { u: mu + p.x, v: mv + p.y, q: lens.nearness(p.z) }
-            }));
-        } else {
-            corners.extend(mesh.positions.iter().map(|p| {
-                let p = into.map(*p);
-                let q = 1.0 / p.z;
-                Corner { u: mu + p.x * q, v: mv + p.y * q, q }
-            }));
-        }
+        corners.place(&mesh.positions, &into, lens);
         if crosses_near {
             self.draw_clipped(&into, target, corners);
             return;
         }
-        for (k, triangle) in mesh.triangles.iter().enumerate() {
-            let [a, b, c] = corners_of(triangle);
-            target.draw([corners[a], corners[b], corners[c]], self.owner(k));
+        corners.find_alive(&mesh.corners, lens, alive);
+        for k in alive {
+            let triangle = *k as usize;
+            let at = mesh.triangles[triangle].corners;
+            target.draw(at.map(|c| corners.get(c)), self.owner(triangle));
         }
     }
 
+    #[inline(always)]
     fn draw_clipped<O: Owner>(
         &self,
         into: &IntoCamera,
         target: &mut Target<O>,
-        corners: &[Corner],
+        corners: &Corners,
     ) {
         let mesh = self.instance.shape.mesh(self.level);
         let near = self.lens.near_m();
         let most = 1.0 / near;
         for (k, triangle) in mesh.triangles.iter().enumerate() {
-            let at = corners_of(triangle);
             let owner: O = self.owner(k);
-            if at.iter().all(|c| corners[*c].q > 0.0 && corners[*c].q <= most) {
-                target.draw(at.map(|c| corners[c]), owner);
+            let at = triangle.corners.map(|c| corners.get(c));
+            if at.iter().all(|c| c.q > 0.0 && c.q <= most) {
+                target.draw(at, owner);
                 continue;
             }
-            let p: [Vec3; 3] = at.map(|c| into.map(mesh.positions[c]));
+            let p: [Vec3; 3] = triangle.corners.map(|c| into.map(mesh.positions[usize::from(c)]));
             let Some(clipped) = clip(p, near, self.lens.middle()) else { continue };
             for j in 2..clipped.n {
                 let fan = [clipped.corners[0], clipped.corners[j - 1], clipped.corners[j]];
@@ -242,4 +268,94 @@ impl Drawing<'_> {
             }
         }
     }
+}
+
+/// Most corners of a mesh: an index of 16 bits needs no check.
+const N_CORNERS: usize = 1 << 16;
+
+/// The corners of a mesh on the image, a list for each coordinate.
+struct Corners {
+    u: Box<[f32; N_CORNERS]>,
+    v: Box<[f32; N_CORNERS]>,
+    q: Box<[f32; N_CORNERS]>,
+}
+
+impl Default for Corners {
+    fn default() -> Corners {
+        let list = || match vec![0.0; N_CORNERS].into_boxed_slice().try_into() {
+            Ok(list) => list,
+            Err(_) => Box::new([0.0; N_CORNERS]),
+        };
+        Corners { u: list(), v: list(), q: list() }
+    }
+}
+
+impl Corners {
+    #[inline(always)]
+    fn get(&self, corner: u16) -> Corner {
+        let k = usize::from(corner);
+        Corner { u: self.u[k], v: self.v[k], q: self.q[k] }
+    }
+
+    /// Finds where points are on the image.
+    #[inline(always)]
+    fn place(&mut self, positions: &[Vec3], into: &IntoCamera, lens: &Lens) {
+        let (mu, mv) = lens.middle();
+        let n = positions.len().min(N_CORNERS);
+        let (u, v, q) = (&mut self.u[..n], &mut self.v[..n], &mut self.q[..n]);
+        let positions = &positions[..n];
+        if lens.is_plan {
+            for k in 0..n {
+                let p = into.map(positions[k]);
+                (u[k], v[k], q[k]) = (mu + p.x, mv + p.y, lens.nearness(p.z));
+            }
+            return;
+        }
+        for k in 0..n {
+            let p = into.map(positions[k]);
+            let nearness = 1.0 / p.z;
+            (u[k], v[k], q[k]) = (mu + p.x * nearness, mv + p.y * nearness, nearness);
+        }
+    }
+
+    /// Finds the triangles that face the camera and may cover the center of a pixel of the image.
+    #[inline(always)]
+    fn find_alive(&self, corners: &[Vec<u16>; 3], lens: &Lens, alive: &mut Vec<u32>) {
+        let n = corners[0].len().min(corners[1].len()).min(corners[2].len());
+        let [a, b, c] = corners.each_ref().map(|list| &list[..n]);
+        let (u, v) = (&*self.u, &*self.v);
+        let (columns, rows) = (lens.width as f32, lens.height as f32);
+        alive.clear();
+        alive.resize(n, 0);
+        for k in 0..n {
+            let (a, b, c) = (usize::from(a[k]), usize::from(b[k]), usize::from(c[k]));
+            let (au, av, bu, bv, cu, cv) = (u[a], v[a], u[b], v[b], u[c], v[c]);
+            let area = (bu - au) * (cv - av) - (bv - av) * (cu - au);
+            // Edges are rounded where they cross a row: a little wider is safe.
+            let begin = first_center(least(least(au, bu), cu) - 0.01, columns);
+            let end = first_center(most(most(au, bu), cu) + 0.01, columns);
+            let top = first_center(least(least(av, bv), cv), rows);
+            let bottom = first_center(most(most(av, bv), cv), rows);
+            alive[k] = u32::from((area < 0.0) & (begin < end) & (top < bottom));
+        }
+        let mut found = 0;
+        for k in 0..n {
+            let is_alive = alive[k];
+            alive[found] = k as u32;
+            found += is_alive as usize;
+        }
+        alive.truncate(found);
+    }
+}
+
+/// As [`crate::raster`] finds it, in floats.
+#[inline(always)]
+fn first_center(x: f32, max: f32) -> f32 {
+    /// 1.5 * 2^23: what is added to it is rounded to a whole number.
+    const WHOLE: f32 = 12_582_912.0;
+    let t = x - 0.5;
+    let t = if t > 0.0 { t } else { 0.0 };
+    let t = if t < max { t } else { max };
+    let whole = (t + WHOLE) - WHOLE;
+    if whole < t { whole + 1.0 } else { whole }
 }

@@ -172,6 +172,16 @@ impl Ground {
         (whole(at.x, self.nx), whole(at.y, self.nz))
     }
 
+    /// Darkness from walls, 0 to 255, per cell.
+    pub fn walls(&self) -> &[u8] {
+        &self.walls
+    }
+
+    /// Cells per metre, and the corner (x, z) where the first cell begins.
+    pub fn grid(&self) -> (f32, Vec2) {
+        (self.cells_per_m, self.min)
+    }
+
     /// The room at a point, or [`NO_ROOM`].
     pub fn room_at(&self, p: Vec3) -> u8 {
         let (x, z) = self.cell(Vec2::new(p.x, p.z));
@@ -223,10 +233,15 @@ impl Ground {
 }
 
 impl<'a> Light<'a> {
-    /// Light with the shadows of walls only, or none at all if nobody looks at color.
-    pub fn new(ground: &'a Ground, lamps: &'a Lamps, wants_color: bool) -> Light<'a> {
-        let dark = if wants_color { ground.walls.clone() } else { Vec::new() };
+    /// Light with these shadows on the ground (darkness per cell), or none at all if nobody looks
+    /// at color.
+    pub fn new(ground: &'a Ground, lamps: &'a Lamps, dark: Vec<u8>) -> Light<'a> {
         Light { ground, lamps, dark, quads: Vec::new() }
+    }
+
+    /// Darkness per cell, 0 to 255.
+    pub fn dark(&self) -> &[u8] {
+        &self.dark
     }
 
     /// Whether shadows are wanted.
@@ -278,13 +293,6 @@ impl<'a> Light<'a> {
             rooms: g.rooms.clone(),
             brightness: rows.flat_map(|row| row[..g.nx].iter().map(|q| *q as u8)).collect(),
         }
-    }
-
-    /// Where a point lies on the ground's grid, in cells from the middle of the first.
-    #[inline]
-    pub fn on_ground(&self, x: f32, z: f32) -> (f32, f32) {
-        let Ground { min, cells_per_m, .. } = self.ground;
-        ((x - min.x) * cells_per_m - 0.5, (z - min.y) * cells_per_m - 0.5)
     }
 
     /// The direct light at a point of this room.

@@ -78,6 +78,8 @@ pub(crate) struct Mesh {
     /// Unit normals, per corner; meaningless for corners of flat triangles only.
     pub normals: Vec<Vec3>,
     pub triangles: Vec<Triangle>,
+    /// First, second and third corners of all triangles once more, side by side.
+    pub corners: [Vec<u16>; 3],
     pub skins: Vec<Skin>,
     pub min: Vec3,
     pub max: Vec3,
@@ -182,7 +184,11 @@ impl Mesh {
             return;
         }
         let skin = self.skins.len().saturating_sub(1) as u8;
-        self.triangles.push(Triangle { corners: corners.map(|c| c as u16), skin, smooth });
+        let corners = corners.map(|c| c as u16);
+        self.triangles.push(Triangle { corners, skin, smooth });
+        for (list, corner) in self.corners.iter_mut().zip(corners) {
+            list.push(corner);
+        }
     }
 
     /// A quadrilateral, counter-clockwise from outside.

@@ -36,7 +36,7 @@ impl Plane {
     /// The quantities along a row of pixels whose middles lie at `v`.
     #[inline(always)]
     pub fn row(&self, v: f32) -> RowPlane {
-        RowPlane { base: self.base, at: self.at + self.dv * v, du: self.du }
+        RowPlane { base: self.base, at: self.at + self.dv * v + self.du * 0.5, du: self.du }
     }
 
     /// `start` where `s` and `t` are 0, growing by `ds` with s and `dt` with t; `s` and `t` are
@@ -51,20 +51,19 @@ impl Plane {
     }
 }
 
-/// A [`Plane`] on one row.
+/// A [`Plane`] on one row: `base + w * (at + k * du)` in its k-th pixel.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RowPlane {
-    base: Vec4,
-    at: Vec4,
-    du: Vec4,
+    pub base: Vec4,
+    pub at: Vec4,
+    pub du: Vec4,
 }
 
 impl RowPlane {
-    /// The quantities at column `u` and depth `w`, and their part that is multiplied by depth.
+    /// The same, counted from another pixel of the row.
     #[inline(always)]
-    pub fn at(&self, u: f32, w: f32) -> (Vec4, Vec4) {
-        let slope = self.at + self.du * u;
-        (self.base + slope * w, slope)
+    pub fn from(&self, first: usize) -> RowPlane {
+        RowPlane { at: self.at + self.du * first as f32, ..*self }
     }
 }
 
@@ -151,9 +150,28 @@ pub(crate) struct Painter<'a> {
     pub frame: &'a Frame<'a>,
     pub is_plan: bool,
     pub rays: Rays,
+    /// Places on the ground's grid.
+    pub ground: Plane,
 }
 
-impl Painter<'_> {
+impl<'a> Painter<'a> {
+    /// A painter of what a lens sees.
+    pub fn new(frame: &'a Frame<'a>, lens: &Lens) -> Painter<'a> {
+        let Rays { eye, ray } = Rays::of(lens);
+        let flat = |v: Vec3| Vec4::new(v.x, v.z, 0.0, 0.0);
+        let (cells_per_m, first) = frame.light.ground.grid();
+        let from = flat(eye[0]) - Vec4::new(first.x, first.y, 0.0, 0.0);
+        // A plan view looks straight down, whose rays don't move over the ground.
+        let [at, du, dv] = if lens.is_plan { [Vec3::ZERO, eye[1], eye[2]] } else { ray };
+        let ground = Plane {
+            base: from * cells_per_m,
+            at: flat(at) * cells_per_m,
+            du: flat(du) * cells_per_m,
+            dv: flat(dv) * cells_per_m,
+        };
+        Painter { frame, is_plan: lens.is_plan, rays: Rays { eye, ray }, ground }
+    }
+
     /// What is common to an instance's triangles.
     pub fn sight(&self, instance: &Instance) -> Sight {
         let middle = instance.origin + instance.rotation * (0.5 * (instance.min + instance.max));
@@ -234,7 +252,8 @@ impl Painter<'_> {
             (paint.low, paint.high) = (color, color);
             return paint;
         }
-        let normals = if triangle.smooth { corners.map(|k| mesh.normals[k]) } else { [face; 3] };
+        let normals =
+            if triangle.smooth { corners.map(|k| mesh.normals[k]) } else { [face; 3] };
         let [at_a, at_b, at_c] = [(a, 0), (b, 1), (c, 2)].map(|(p, k)| shown(p, normals[k]));
         let per_area2 = 1.0 / dot(flat, flat).max(1e-30);
         let s = self.plane(sight, (c - a).cross(flat) * per_area2, a, face);
@@ -331,6 +350,9 @@ impl Painter<'_> {
 /// From linear light to what is shown, 0 to 255.
 #[inline(always)]
 fn shown(linear: Vec4) -> Vec4 {
-    let [r, g, b, _] = linear.clamp(Vec4::ZERO, Vec4::ONE).to_array();
-    Vec3::new(r.sqrt(), g.sqrt(), b.sqrt()).extend(0.0) * 255.0
+    let mut lanes = linear.clamp(Vec4::ZERO, Vec4::ONE).to_array();
+    for x in &mut lanes {
+        *x = x.sqrt();
+    }
+    Vec4::from_array(lanes) * 255.0
 }

@@ -7,8 +7,6 @@
 use chaic_protocol::EntityId;
 use chaic_protocol::geom::math::ceil_small;
 
-use crate::mesh::Triangle;
-
 /// Nobody's pixel.
 pub(crate) const NOBODY: u32 = u32::MAX;
 /// Side of the squares in which nearness is summed up, pixels.
@@ -46,7 +44,7 @@ impl Owner for u32 {
         pixel_owner(instance, triangle)
     }
 
-    #[inline]
+    #[inline(always)]
     fn replaced(self, new: u32, mask: u32) -> u32 {
         (new & mask) | (self & !mask)
     }
@@ -61,7 +59,7 @@ impl Owner for u16 {
         entity.0
     }
 
-    #[inline]
+    #[inline(always)]
     fn replaced(self, new: u16, mask: u32) -> u16 {
         (new & mask as u16) | (self & !mask as u16)
     }
@@ -137,6 +135,7 @@ impl<O: Owner> Target<O> {
 
     /// Brings the tiles up to date in which [`Target::touch`] announced something. Stale tiles are
     /// safe: nearness only grows.
+    #[inline(always)]
     pub fn update_tiles(&mut self) {
         if self.width == 0 {
             return;
@@ -163,7 +162,7 @@ impl<O: Owner> Target<O> {
     }
 
     /// Draws a triangle whose corners are all in front of the camera, if it faces it.
-    #[inline]
+    #[inline(always)]
     pub fn draw(&mut self, corners: [Corner; 3], owner: O) {
         let [a, b, c] = corners;
         let (bu, bv, bq) = (b.u - a.u, b.v - a.v, b.q - a.q);
@@ -185,6 +184,7 @@ impl<O: Owner> Target<O> {
     }
 
     /// Fills the pixels whose centers lie in the triangle, whichever way it turns.
+    #[inline(always)]
     pub fn fill(&mut self, mut p: [(f32, f32); 3], slope: &Slope, owner: O) {
         let before = |a: (f32, f32), b: (f32, f32)| a.1 < b.1 || (a.1 == b.1 && a.0 < b.0);
         if before(p[1], p[0]) {
@@ -210,7 +210,7 @@ impl<O: Owner> Target<O> {
     }
 
     #[allow(clippy::too_many_arguments, reason = "a piece of one inner loop")]
-    #[inline]
+    #[inline(always)]
     fn half(
         &mut self,
         from: i32,
@@ -245,23 +245,27 @@ impl<O: Owner> Target<O> {
     }
 }
 
-#[inline]
-fn least(x: f32, y: f32) -> f32 {
+#[inline(always)]
+pub(crate) fn least(x: f32, y: f32) -> f32 {
     if x < y { x } else { y }
 }
 
-#[inline]
-fn most(x: f32, y: f32) -> f32 {
+#[inline(always)]
+pub(crate) fn most(x: f32, y: f32) -> f32 {
     if x > y { x } else { y }
 }
 
 /// The least of a tile that begins in this column of its rows.
-#[inline]
+#[inline(always)]
 fn least_in_tile(rows: &[f32], width: usize, column: usize) -> f32 {
     let mut columns = [f32::INFINITY; TILE];
     for row in rows.chunks_exact(width) {
         match row[column..].first_chunk::<TILE>() {
-            Some(pixels) => columns = std::array::from_fn(|k| least(columns[k], pixels[k])),
+            Some(pixels) => {
+                for (column, pixel) in columns.iter_mut().zip(pixels) {
+                    *column = least(*column, *pixel);
+                }
+            }
             None => row[column..].iter().for_each(|q| columns[0] = least(columns[0], *q)),
         }
     }
@@ -269,9 +273,9 @@ fn least_in_tile(rows: &[f32], width: usize, column: usize) -> f32 {
 }
 
 /// So many pixels are filled at once.
-const LANES: usize = 8;
+const LANES: usize = 16;
 
-#[inline]
+#[inline(always)]
 fn fill_span<O: Owner>(
     nearness: &mut [f32],
     owners: &mut [O],
@@ -296,6 +300,11 @@ fn fill_span<O: Owner>(
     if let (Some(q), Some(o)) = (nearness.last_chunk_mut(), owners.last_chunk_mut()) {
         fill_lanes::<O, LANES>(q, o, q0, end - LANES as i32, slope, owner);
     } else if let (Some(q), Some(o)) = (nearness.last_chunk_mut(), owners.last_chunk_mut()) {
+        fill_lanes::<O, 8>(q, o, q0, end - 8, slope, owner);
+        if let (Some(q), Some(o)) = (nearness.first_chunk_mut(), owners.first_chunk_mut()) {
+            fill_lanes::<O, 8>(q, o, q0, begin, slope, owner);
+        }
+    } else if let (Some(q), Some(o)) = (nearness.last_chunk_mut(), owners.last_chunk_mut()) {
         fill_lanes::<O, 4>(q, o, q0, end - 4, slope, owner);
         if let (Some(q), Some(o)) = (nearness.first_chunk_mut(), owners.first_chunk_mut()) {
             fill_lanes::<O, 4>(q, o, q0, begin, slope, owner);
@@ -319,19 +328,29 @@ fn fill_lanes<O: Owner, const N: usize>(
     owner: O,
 ) {
     let Slope { du, low, high, .. } = *slope;
-    let at = |column: i32| least(high, most(low, q0 + du * column as f32));
-    let x: [f32; N] = std::array::from_fn(|k| at(column + k as i32));
+    // Plain loops: closures would be compiled apart, without this machine's vectors.
+    let mut x = [0.0; N];
+    for (k, x) in x.iter_mut().enumerate() {
+        *x = least(high, most(low, q0 + du * (column + k as i32) as f32));
+    }
     // Masks instead of conditions, which the compiler would make branches of.
-    let wins: [u32; N] = std::array::from_fn(|k| u32::from(x[k] > q[k]).wrapping_neg());
-    if wins.iter().fold(0, |any, win| any | win) == 0 {
+    let mut wins = [0; N];
+    let mut any = 0;
+    for k in 0..N {
+        wins[k] = u32::from(x[k] > q[k]).wrapping_neg();
+        any |= wins[k];
+    }
+    if any == 0 {
         return;
     }
-    *q = std::array::from_fn(|k| most(x[k], q[k]));
-    *o = std::array::from_fn(|k| o[k].replaced(owner, wins[k]));
+    for k in 0..N {
+        q[k] = most(x[k], q[k]);
+        o[k] = o[k].replaced(owner, wins[k]);
+    }
 }
 
 /// The smallest whole number whose center (+ 0.5) isn't before `x`, within [0, max].
-#[inline]
+#[inline(always)]
 fn first_center(x: f32, max: i32) -> i32 {
     let t = x - 0.5;
     let t = if t > 0.0 { t } else { 0.0 };
@@ -348,22 +367,17 @@ struct Edge {
 }
 
 impl Edge {
-    #[inline]
+    #[inline(always)]
     fn new(top: (f32, f32), bottom: (f32, f32)) -> Edge {
         let dv = bottom.1 - top.1;
         let per_row = if dv > 0.0 { (bottom.0 - top.0) / dv } else { 0.0 };
         Edge { u: top.0, v: top.1, per_row }
     }
 
-    #[inline]
+    #[inline(always)]
     fn u_at(&self, v: f32) -> f32 {
         self.u + (v - self.v) * self.per_row
     }
-}
-
-/// The corners of a mesh's triangle.
-pub(crate) fn corners_of(t: &Triangle) -> [usize; 3] {
-    t.corners.map(usize::from)
 }
 
 #[cfg(test)]

@@ -1,9 +1,12 @@
 //! Color, depth and ids of pixels whose triangles are known, one row of the image at a time.
 //!
-//! Neighboring pixels of one triangle are a run. Its colors and texture coordinates are worked out
-//! at knots at most [`STEP`] pixels apart and run linearly between; the texture is looked up for
-//! each pixel. Lanes are plain arrays, which the compiler makes vectors of, as wide as the
-//! machine's (see [`Rows`]); each lane's operations stay the same.
+//! Neighboring pixels of one triangle are a run. Along it, colors and texture coordinates follow
+//! the triangle's planes ([`crate::paint`]); only the light on structure, which no plane describes,
+//! is worked out at knots and runs linearly between. Then the whole row takes its texels.
+//!
+//! Lanes are plain arrays and loops, which the compiler makes vectors of, as wide as the machine's
+//! (see [`Rows`]); each lane's operations stay the same. Closures and `array::from_fn` must stay
+//! out of such loops: they are compiled apart, for any machine.
 
 use chaic_protocol::EntityId;
 use chaic_protocol::geom::Camera;
@@ -12,12 +15,15 @@ use glam::Vec4;
 use crate::frame::Frame;
 use crate::lens::Lens;
 use crate::light::{MAX_CELLS, N_GROUND};
-use crate::paint::{Kind, Paint, Painter, Rays, Sight};
+use crate::paint::{Kind, Paint, Painter, RowPlane, Sight};
 use crate::raster::{NOBODY, Target, owner_parts};
 use crate::texture::{Atlas, Level, N_ATLAS, PLAIN, Tile, atlas};
 
-/// Most pixels between two knots.
-const STEP: usize = 32;
+/// Pixels that are worked on at once; a run's last lanes may lie beyond its end, where the next
+/// run writes them again.
+const LANES: usize = 16;
+/// Most pixels between two knots of light.
+const STEP: usize = 64;
 
 /// Buffers for shading, used again and again.
 #[derive(Default)]
@@ -29,16 +35,20 @@ pub(crate) struct Canvas {
     row: Row,
 }
 
-/// The pixels of one row, each array longer by a step than the row is.
+/// The pixels of one row; each array has at least [`LANES`] more than the row.
 #[derive(Default)]
 struct Row {
+    /// Depth, metres; 1 in a plan view (see [`crate::paint::Plane`]).
+    depth: Vec<f32>,
     /// What is shown but for textures, 0 to 255.
-    colors: [Vec<f32>; 3],
+    r: Vec<f32>,
+    g: Vec<f32>,
+    b: Vec<f32>,
     /// The texel in the atlas, and how far the pixel is from it to the right (low 16 bits) and
     /// down, in parts of 256.
     texel: Vec<u32>,
     within: Vec<u32>,
-    /// The same on the ground's grid.
+    /// The same on the ground's grid; only where floor is in the row.
     cell: Vec<u32>,
     within_cell: Vec<u32>,
     /// Red in the lowest byte, then green and blue.
@@ -83,17 +93,9 @@ pub(crate) fn shade(
     canvas.sights.clear();
     canvas.sights.resize(frame.instances.len(), None);
     canvas.row.resize(lens.width);
-    let painter = Painter { frame, is_plan: lens.is_plan, rays: Rays::of(lens) };
-    pulp::Arch::new().dispatch(Rows {
-        painter,
-        lens,
-        drawn,
-        target,
-        canvas,
-        wanted,
-        atlas: atlas(),
-        has_floor: false,
-    });
+    let painter = Painter::new(frame, lens);
+    let atlas = atlas();
+    pulp::Arch::new().dispatch(Rows { painter, lens, drawn, target, canvas, wanted, atlas });
 }
 
 /// All rows of an image, compiled for each kind of vectors and called for the widest that the
@@ -106,8 +108,6 @@ struct Rows<'a> {
     canvas: &'a mut Canvas,
     wanted: Wanted<'a>,
     atlas: &'static Atlas,
-    /// Whether the row under way shows any floor.
-    has_floor: bool,
 }
 
 impl pulp::NullaryFnOnce for Rows<'_> {
@@ -122,22 +122,29 @@ impl pulp::NullaryFnOnce for Rows<'_> {
         for j in 0..self.lens.height {
             let line = j * width..(j + 1) * width;
             let nearness = &self.target.nearness[line.clone()];
-            if let Some(depth) = &mut self.wanted.depth_m {
-                depths(nearness, &mut depth[line.clone()]);
-            }
+            let depth_m = self.wanted.depth_m.as_deref_mut().map(|d| &mut d[line.clone()]);
+            self.canvas.row.find_depths(nearness, self.lens.is_plan, depth_m);
             let owners = &self.target.owner[line.clone()];
-            self.has_floor = false;
+            let mut has_floor = false;
             let mut begin = 0;
             while begin < width {
                 let owner = owners[begin];
                 let end = begin + run_length(&owners[begin..], owner);
-                let id = self.run(j, begin, end, owner, nearness);
+                let (id, is_floor) = self.run(j, begin, end, owner, nearness);
+                if is_floor && !has_floor {
+                    // What came before isn't floor.
+                    self.canvas.row.cell[..begin].fill(NO_CELL);
+                }
+                has_floor |= is_floor;
+                if has_floor && !is_floor {
+                    self.canvas.row.cell[begin..end].fill(NO_CELL);
+                }
                 if let Some(ids) = &mut self.wanted.ids {
                     ids[line.start + begin..line.start + end].fill(id);
                 }
                 begin = end;
             }
-            let ground = self.painter.frame.light.quads.first_chunk().filter(|_| self.has_floor);
+            let ground = self.painter.frame.light.quads.first_chunk().filter(|_| has_floor);
             self.canvas.row.pack(self.atlas, ground);
             let out = &mut self.wanted.rgb[3 * line.start..3 * line.end];
             write(&self.canvas.row.packed, out);
@@ -145,26 +152,24 @@ impl pulp::NullaryFnOnce for Rows<'_> {
     }
 }
 
+/// The cell of what isn't ground.
+const NO_CELL: u32 = N_GROUND as u32 - 1;
+
 /// How many pixels at the beginning have this owner.
 #[inline(always)]
 fn run_length(owners: &[u32], owner: u32) -> usize {
     let mut n = 0;
-    for chunk in owners.as_chunks::<STEP>().0 {
-        if chunk.iter().fold(0, |other, o| other | (o ^ owner)) != 0 {
+    for chunk in owners.as_chunks::<LANES>().0 {
+        let mut other = 0;
+        for o in chunk {
+            other |= o ^ owner;
+        }
+        if other != 0 {
             break;
         }
-        n += STEP;
+        n += LANES;
     }
     n + owners[n..].iter().take_while(|o| **o == owner).count()
-}
-
-/// Depths of nearnesses of an eye; what is farther than can be seen is as far as that.
-#[inline(always)]
-fn depths(nearness: &[f32], depths: &mut [f32]) {
-    let far = 1.0 / Camera::FAR_M;
-    for (q, depth) in nearness.iter().zip(depths) {
-        *depth = if *q > far { 1.0 / *q } else { Camera::FAR_M };
-    }
 }
 
 /// Writes three bytes for each color.
@@ -178,12 +183,32 @@ fn write(colors: &[u32], out: &mut [u8]) {
 
 impl Row {
     fn resize(&mut self, width: usize) {
-        // A whole number of steps, and one more for what is written beyond a run's end.
-        let n = width.div_ceil(STEP) * STEP + STEP;
-        self.colors.iter_mut().for_each(|c| c.resize(n, 0.0));
-        let Row { texel, within, cell, within_cell, packed, .. } = self;
+        let n = width.div_ceil(LANES) * LANES + LANES;
+        let Row { depth, r, g, b, texel, within, cell, within_cell, packed } = self;
+        for array in [depth, r, g, b] {
+            array.resize(n, 1.0);
+        }
         for array in [texel, within, cell, within_cell, packed] {
             array.resize(n, 0);
+        }
+    }
+
+    /// Depths of nearnesses, as [`crate::paint::Plane`] wants them and as eyes see them: what is
+    /// farther than can be seen is as far as that.
+    #[inline(always)]
+    fn find_depths(&mut self, nearness: &[f32], is_plan: bool, seen: Option<&mut [f32]>) {
+        let depth = &mut self.depth[..nearness.len()];
+        if is_plan {
+            depth.fill(1.0);
+            return;
+        }
+        for (d, q) in depth.iter_mut().zip(nearness) {
+            *d = 1.0 / *q;
+        }
+        if let Some(seen) = seen {
+            for (seen, d) in seen.iter_mut().zip(&*depth) {
+                *seen = if *d < Camera::FAR_M { *d } else { Camera::FAR_M };
+            }
         }
     }
 
@@ -191,9 +216,8 @@ impl Row {
     /// left for a slower one.
     #[inline(always)]
     fn pack(&mut self, atlas: &Atlas, ground: Option<&[u32; N_GROUND]>) {
-        let n = self.packed.len() / STEP * STEP;
-        let [r, g, b] = &mut self.colors;
-        let (r, g, b) = (&mut r[..n], &mut g[..n], &mut b[..n]);
+        let n = self.packed.len() / LANES * LANES;
+        let (r, g, b) = (&mut self.r[..n], &mut self.g[..n], &mut self.b[..n]);
         let (texel, within) = (&self.texel[..n], &self.within[..n]);
         let packed = &mut self.packed[..n];
         if let Some(ground) = ground {
@@ -209,8 +233,7 @@ impl Row {
         for k in 0..n {
             let quad = atlas[texel[k] as usize % N_ATLAS];
             let bright = mixed(quad, within[k]) * (1.0 / (128.0 * 65536.0));
-            packed[k] =
-                whole(r[k] * bright) | whole(g[k] * bright) << 8 | whole(b[k] * bright) << 16;
+            packed[k] = whole(r[k] * bright) | whole(g[k] * bright) << 8 | whole(b[k] * bright) << 16;
         }
     }
 }
@@ -234,78 +257,51 @@ fn mixed(quad: u32, within: u32) -> f32 {
     (above * (256 - down) + below * down) as i32 as f32
 }
 
-/// What runs linearly between two knots.
-#[derive(Clone, Copy)]
-struct Knot {
-    /// What is shown, 0 to 255.
-    color: Vec4,
-    /// Texture coordinates, metres.
-    texture: Vec4,
-    /// Cells on the ground's grid; NaN for what isn't ground.
-    ground: (f32, f32),
-    /// Side of the patch that the pixel covers, metres.
-    covers_m: f32,
-}
-
-impl Knot {
-    #[inline(always)]
-    fn plain(color: Vec4) -> Knot {
-        Knot { color, texture: Vec4::ZERO, ground: (f32::NAN, f32::NAN), covers_m: 0.0 }
-    }
-
-    /// With texture coordinates and their slopes, for a pixel that covers `straight_m` seen
-    /// straight on.
-    #[inline(always)]
-    fn textured(mut self, (texture, slope): (Vec4, Vec4), straight_m: f32) -> Knot {
-        self.texture = texture;
-        // Seen at a slant it covers more; the root keeps textures from blurring too early.
-        self.covers_m = straight_m / slope.z.abs().max(0.05).sqrt();
-        self
-    }
-}
-
 impl Rows<'_> {
-    /// Colors the run of pixels `begin..end` of row `j`; tells whose it is.
+    /// Colors the run of pixels `begin..end` of row `j`; tells whose it is, and if it is floor.
     #[inline(always)]
-    fn run(&mut self, j: usize, begin: usize, end: usize, owner: u32, nearness: &[f32]) -> u16 {
+    fn run(
+        &mut self,
+        j: usize,
+        begin: usize,
+        end: usize,
+        owner: u32,
+        nearness: &[f32],
+    ) -> (u16, bool) {
         let v = j as f32 + 0.5;
         if owner == NOBODY {
             let (painter, row) = (&self.painter, &mut self.canvas.row);
-            ramps(row, begin, end, None, |k| Knot::plain(painter.sky(k as f32 + 0.5, v)));
-            return EntityId::NOTHING.0;
+            row.light(begin, end, |k| painter.sky(k as f32 + 0.5, v));
+            row.texel[begin..end].fill(PLAIN);
+            return (EntityId::NOTHING.0, false);
         }
         let at = self.find_paint(owner);
         let Canvas { paints, row, .. } = &mut *self.canvas;
         let paint = &paints[at];
-        let (color, texture) = (paint.color.row(v), paint.texture.row(v));
-        let (painter, lens) = (&self.painter, self.lens);
-        let per_px = 1.0 / lens.focal;
+        let mut is_floor = false;
         match paint.kind {
-            Kind::Even if paint.tile.is_none() => {
-                let knot = Knot::plain(paint.low);
-                ramps(row, begin, end, None, |_| knot);
-            }
-            Kind::Even | Kind::Smooth => ramps(row, begin, end, paint.tile, |k| {
-                let (u, depth) = (k as f32 + 0.5, lens.depth(nearness[k]));
-                let w = if lens.is_plan { 1.0 } else { depth };
-                let color = color.at(u, w).0.clamp(paint.low, paint.high);
-                Knot::plain(color).textured(texture.at(u, w), w * per_px)
-            }),
+            Kind::Even => row.fill_color(begin, end, paint.low),
+            Kind::Smooth => row.color(begin, end, &paint.color.row(v), paint.low, paint.high),
             Kind::Structure { floor } => {
-                self.has_floor |= floor;
-                ramps(row, begin, end, paint.tile, |k| {
-                    let (u, depth) = (k as f32 + 0.5, lens.depth(nearness[k]));
-                    let w = if lens.is_plan { 1.0 } else { depth };
-                    let (p, ray) = painter.rays.point(u, v, depth);
-                    let mut knot = Knot::plain(painter.shown_structure(paint, p, ray));
-                    if floor {
-                        knot.ground = painter.frame.light.on_ground(p.x, p.z);
-                    }
-                    knot.textured(texture.at(u, w), w * per_px)
+                let (painter, lens) = (&self.painter, self.lens);
+                row.light(begin, end, |k| {
+                    let (p, ray) =
+                        painter.rays.point(k as f32 + 0.5, v, lens.depth(nearness[k]));
+                    painter.shown_structure(paint, p, ray)
                 });
+                if floor {
+                    row.cells(begin, end, &painter.ground.row(v));
+                    is_floor = true;
+                }
             }
         }
-        paint.entity
+        match paint.tile {
+            Some(tile) => {
+                row.texture(begin, end, &paint.texture.row(v), tile, 1.0 / self.lens.focal)
+            }
+            None => row.texel[begin..end].fill(PLAIN),
+        }
+        (paint.entity, is_floor)
     }
 
     /// Where the paint of a triangle is; worked out when first asked for.
@@ -327,130 +323,140 @@ impl Rows<'_> {
     fn new_paint(&mut self, index: usize, triangle: usize) -> Paint {
         let instance = &self.painter.frame.instances[index];
         let mesh = instance.shape.mesh(usize::from(self.drawn.levels[index]));
-        let sight = self.canvas.sights[index].get_or_insert_with(|| self.painter.sight(instance));
+        let sight =
+            self.canvas.sights[index].get_or_insert_with(|| self.painter.sight(instance));
         self.painter.paint(instance, sight, mesh, &mesh.triangles[triangle])
     }
 }
 
-/// 1 / n for a distance of n pixels; 0 for none.
-const PER_PIXEL: [f32; STEP + 1] = {
-    let mut table = [0.0; STEP + 1];
-    let mut n = 1;
-    while n <= STEP {
-        table[n] = 1.0 / n as f32;
-        n += 1;
-    }
-    table
-};
-
-/// Fills a run from knot to knot.
-#[inline(always)]
-fn ramps(
-    row: &mut Row,
-    begin: usize,
-    end: usize,
-    tile: Option<Tile>,
-    knot: impl Fn(usize) -> Knot,
-) {
-    let mut from = begin;
-    let mut here = knot(from);
-    loop {
-        let left = end - from;
-        let (next, distance) = if left > STEP { (from + STEP, STEP) } else { (end - 1, left - 1) };
-        let there = if distance == 0 { here } else { knot(next) };
-        let ramp = Ramp { here, there, per_pixel: PER_PIXEL[distance], tile };
-        if left > 16 {
-            ramp.fill::<STEP>(row, from);
-        } else if left > 8 {
-            ramp.fill::<16>(row, from);
-        } else if left > 4 {
-            ramp.fill::<8>(row, from);
-        } else {
-            ramp.fill::<4>(row, from);
-        }
-        if left <= STEP {
-            break;
-        }
-        (from, here) = (next, there);
-    }
-}
-
-/// From one knot towards the next.
-struct Ramp {
-    here: Knot,
-    there: Knot,
-    /// One pixel's share of the way.
-    per_pixel: f32,
-    tile: Option<Tile>,
-}
-
-impl Ramp {
-    /// Writes N pixels; those behind the run's end are written again by the next run.
+/// Filling runs `begin..end` of a row.
+impl Row {
     #[inline(always)]
-    fn fill<const N: usize>(&self, row: &mut Row, from: usize) {
-        let (here, there) = (self.here.color.to_array(), self.there.color.to_array());
-        for (c, channel) in row.colors.iter_mut().enumerate() {
-            let step = (there[c] - here[c]) * self.per_pixel;
-            fill::<f32, N>(channel, from, |k| here[c] + step * k as f32);
+    fn fill_color(&mut self, begin: usize, end: usize, color: Vec4) {
+        self.r[begin..end].fill(color.x);
+        self.g[begin..end].fill(color.y);
+        self.b[begin..end].fill(color.z);
+    }
+
+    /// Colors from knots of light.
+    #[inline(always)]
+    fn light(&mut self, begin: usize, end: usize, knot: impl Fn(usize) -> Vec4) {
+        let mut from = begin;
+        let mut here = knot(from);
+        while from < end {
+            // The last pixel is a knot too.
+            let is_last = end - from <= STEP;
+            let next = if is_last { end - 1 } else { from + STEP };
+            let there = if next > from { knot(next) } else { here };
+            let step = (there - here) * (1.0 / (next - from).max(1) as f32);
+            let last = if is_last { end } else { next };
+            let lanes = lanes(from, last);
+            let channels = [&mut self.r, &mut self.g, &mut self.b];
+            let (starts, steps) = (here.to_array(), step.to_array());
+            for ((channel, start), step) in channels.into_iter().zip(starts).zip(steps) {
+                for (k, x) in channel[lanes.clone()].iter_mut().enumerate() {
+                    *x = start + step * k as u32 as f32;
+                }
+            }
+            (from, here) = (last, there);
         }
-        if let Some(tile) = self.tile {
-            let Level { begin, log2_side, texels_per_m } = tile.level(self.here.covers_m);
-            let scale = 256.0 * texels_per_m;
-            let [u, v, ..] = self.here.texture.to_array();
-            let [u_end, v_end, ..] = self.there.texture.to_array();
-            // Middles of texels lie at halves.
-            let u = Steps::new(u * scale - 128.0, (u_end - u) * scale * self.per_pixel);
-            let v = Steps::new(v * scale - 128.0, (v_end - v) * scale * self.per_pixel);
+    }
+
+    /// Colors from a plane, within bounds.
+    #[inline(always)]
+    fn color(&mut self, begin: usize, end: usize, plane: &RowPlane, low: Vec4, high: Vec4) {
+        let lanes = lanes(begin, end);
+        let plane = plane.from(begin);
+        let depth = &self.depth[lanes.clone()];
+        let channels = [&mut self.r, &mut self.g, &mut self.b];
+        for (c, channel) in channels.into_iter().enumerate() {
+            let (base, at, du) = (plane.base[c], plane.at[c], plane.du[c]);
+            let (low, high) = (low[c], high[c]);
+            let channel = &mut channel[lanes.clone()];
+            for k in 0..channel.len() {
+                let x = base + depth[k] * (at + du * k as u32 as f32);
+                let x = if x > low { x } else { low };
+                channel[k] = if x < high { x } else { high };
+            }
+        }
+    }
+
+    /// Texels from a plane of texture coordinates; `per_px` is what a pixel covers one metre away.
+    #[inline(always)]
+    fn texture(&mut self, begin: usize, end: usize, plane: &RowPlane, tile: Tile, per_px: f32) {
+        for first in (begin..end).step_by(STEP) {
+            let lanes = lanes(first, end.min(first + STEP));
+            let plane = plane.from(first);
+            let depth = &self.depth[lanes.clone()];
+            // Seen at a slant a pixel covers more; the root keeps textures from blurring too early.
+            let covers_m = depth[0] * per_px / plane.at.z.abs().max(0.05).sqrt();
+            let Level { begin, log2_side, texels_per_m } = tile.level(covers_m);
+            let period = 256.0 * (1u32 << log2_side) as f32;
+            let [u, v] = lines(&plane, depth[0], 256.0 * texels_per_m, Some(period));
             let mask = (1u32 << log2_side) - 1;
-            fill::<u32, N>(&mut row.texel, from, |k| {
-                begin + ((v.at(k) >> 8 & mask) << log2_side) + (u.at(k) >> 8 & mask)
-            });
-            fill::<u32, N>(&mut row.within, from, |k| u.at(k) & 0xff | (v.at(k) & 0xff) << 16);
-        } else {
-            fill::<u32, N>(&mut row.texel, from, |_| PLAIN);
+            let (texel, within) = (&mut self.texel[lanes.clone()], &mut self.within[lanes]);
+            for k in 0..depth.len() {
+                let (u, v) = (u.at(k, depth[k]), v.at(k, depth[k]));
+                texel[k] = begin + ((v >> 8 & mask) << log2_side) + (u >> 8 & mask);
+                within[k] = u & 0xff | (v & 0xff) << 16;
+            }
         }
-        let ((x, z), (x_end, z_end)) = (self.here.ground, self.there.ground);
-        if x.is_nan() {
-            fill::<u32, N>(&mut row.cell, from, |_| N_GROUND as u32 - 1);
-            return;
+    }
+
+    /// Cells from a plane of places on the ground's grid.
+    #[inline(always)]
+    fn cells(&mut self, begin: usize, end: usize, plane: &RowPlane) {
+        const MOST: i32 = 256 * (MAX_CELLS as i32 - 1);
+        let lanes = lanes(begin, end);
+        let [x, z] = lines(&plane.from(begin), 0.0, 256.0, None);
+        let depth = &self.depth[lanes.clone()];
+        let (cell, within) = (&mut self.cell[lanes.clone()], &mut self.within_cell[lanes]);
+        for k in 0..depth.len() {
+            let x = (x.at(k, depth[k]) as i32).clamp(0, MOST) as u32;
+            let z = (z.at(k, depth[k]) as i32).clamp(0, MOST) as u32;
+            cell[k] = (z >> 8) * MAX_CELLS as u32 + (x >> 8);
+            within[k] = x & 0xff | (z & 0xff) << 16;
         }
-        let x = Steps::new(256.0 * x, 256.0 * (x_end - x) * self.per_pixel);
-        let z = Steps::new(256.0 * z, 256.0 * (z_end - z) * self.per_pixel);
-        let inside = |t: u32| (t as i32).clamp(0, 256 * (MAX_CELLS as i32 - 1)) as u32;
-        fill::<u32, N>(&mut row.cell, from, |k| {
-            (inside(z.at(k)) >> 8) * MAX_CELLS as u32 + (inside(x.at(k)) >> 8)
-        });
-        fill::<u32, N>(&mut row.within_cell, from, |k| {
-            inside(x.at(k)) & 0xff | (inside(z.at(k)) & 0xff) << 16
-        });
     }
 }
 
+/// The pixels from `begin` in whole [`LANES`].
 #[inline(always)]
-fn fill<T, const N: usize>(array: &mut [T], from: usize, value: impl Fn(usize) -> T) {
-    if let Some(lanes) = array[from..].first_chunk_mut::<N>() {
-        for (k, lane) in lanes.iter_mut().enumerate() {
-            *lane = value(k);
-        }
-    }
+fn lanes(begin: usize, end: usize) -> std::ops::Range<usize> {
+    begin..begin + (end - begin).div_ceil(LANES) * LANES
 }
 
-/// Equal steps in whole numbers.
+/// A coordinate along a row, in whole numbers.
 #[derive(Clone, Copy)]
-struct Steps {
-    start: u32,
-    step: u32,
+struct Line {
+    base: f32,
+    at: f32,
+    du: f32,
 }
 
-impl Steps {
+impl Line {
+    /// In the k-th pixel, at a depth.
     #[inline(always)]
-    fn new(start: f32, step: f32) -> Steps {
-        // 64 bits hold what any sane picture needs; the low ones are those that count.
-        Steps { start: start as i64 as u32, step: step as i64 as u32 }
+    fn at(&self, k: usize, depth: f32) -> u32 {
+        /// Farther off is no sane picture.
+        const FAR: f32 = 2e6;
+        /// 1.5 * 2^23: a number below 2^22 added to it has its whole part in the sum's low bits.
+        const WHOLE: f32 = 12_582_912.0;
+        let x = self.base + depth * (self.at + self.du * k as u32 as f32);
+        let x = if x < FAR { x } else { FAR };
+        let x = if x > -FAR { x } else { -FAR };
+        (x + WHOLE).to_bits().wrapping_sub(WHOLE.to_bits())
     }
+}
 
-    #[inline(always)]
-    fn at(&self, k: usize) -> u32 {
-        self.start.wrapping_add(self.step.wrapping_mul(k as u32))
-    }
+/// The first two quantities of a plane in units of 1 / `scale`, less half of 256 units; less the
+/// whole periods (in the same units) at this depth in the first pixel too, which keeps them small.
+#[inline(always)]
+fn lines(plane: &RowPlane, depth: f32, scale: f32, period: Option<f32>) -> [Line; 2] {
+    let line = |base: f32, at: f32, du: f32| {
+        let (base, at, du) = (base * scale, at * scale, du * scale);
+        let periods = period.map_or(0.0, |p| p * ((base + depth * at) / p).floor());
+        Line { base: base - 128.0 - periods, at, du }
+    };
+    [line(plane.base.x, plane.at.x, plane.du.x), line(plane.base.y, plane.at.y, plane.du.y)]
 }

@@ -75,50 +75,61 @@ pub(crate) fn with_scratch<T>(work: impl FnOnce(&mut Scratch) -> T) -> T {
     })
 }
 
-/// Draws one view.
-pub(crate) fn look(frame: &Frame, view: &View) -> Images {
+/// Draws one view, into images whose memory is used again.
+pub(crate) fn look(frame: &Frame, view: &View, images: &mut Images) {
     let Camera { width, height, .. } = view.camera;
     if width > MAX_SIDE_PX || height > MAX_SIDE_PX {
-        return Images::default();
+        *images = Images::default();
+        return;
     }
     let n = width as usize * height as usize;
     let Channels { rgb, depth, ids } = view.channels;
     let lens = Lens::of(&view.camera).filter(|_| n > 0);
     let Some(lens) = lens else {
-        return Images {
+        *images = Images {
             rgb: rgb.then(|| vec![0; 3 * n]),
             depth_m: depth.then(|| vec![Camera::FAR_M; n]),
             ids: ids.then(|| vec![EntityId::NOTHING.0; n]),
         };
+        return;
     };
+    let Images { rgb: rgb_out, depth_m, ids: ids_out } = images;
+    let rgb_out = sized(rgb_out, rgb, 3 * n);
+    let depth_m = sized(depth_m, depth, n);
+    let ids_out = sized(ids_out, ids, n);
     with_scratch(|scratch| {
         let omit = Omit { body: view.hide.map(EntityId::of_agent), ceiling: view.hide_ceiling };
         let Scratch { target, plain, work, canvas } = scratch;
-        if !rgb {
-            draw(frame, &lens, omit, plain, work);
-            return Images {
-                rgb: None,
-                depth_m: depth.then(|| depths(&plain.nearness)),
-                ids: ids.then(|| plain.owner.clone()),
-            };
+        if let Some(rgb) = rgb_out {
+            draw(frame, &lens, omit, target, work);
+            let wanted = Wanted { rgb, depth_m, ids: ids_out };
+            shade(frame, &lens, &Drawn::of(work), target, canvas, wanted);
+            return;
         }
-        draw(frame, &lens, omit, target, work);
-        let mut images = Images {
-            rgb: Some(vec![0; 3 * n]),
-            depth_m: depth.then(|| vec![0.0; n]),
-            ids: ids.then(|| vec![0; n]),
-        };
-        let wanted = Wanted {
-            rgb: images.rgb.as_deref_mut().unwrap_or_default(),
-            depth_m: images.depth_m.as_deref_mut(),
-            ids: images.ids.as_deref_mut(),
-        };
-        shade(frame, &lens, &Drawn::of(work), target, canvas, wanted);
-        images
-    })
+        draw(frame, &lens, omit, plain, work);
+        if let Some(depth_m) = depth_m {
+            let far = 1.0 / Camera::FAR_M;
+            for (d, q) in depth_m.iter_mut().zip(&plain.nearness) {
+                *d = if *q > far { 1.0 / *q } else { Camera::FAR_M };
+            }
+        }
+        if let Some(ids) = ids_out {
+            ids.copy_from_slice(&plain.owner);
+        }
+    });
 }
 
-fn depths(nearness: &[f32]) -> Vec<f32> {
-    let far = 1.0 / Camera::FAR_M;
-    nearness.iter().map(|q| if *q > far { 1.0 / *q } else { Camera::FAR_M }).collect()
+/// An image of `n` numbers, if it is wanted; what is in it is whatever was there.
+fn sized<T: Clone + Default>(
+    image: &mut Option<Vec<T>>,
+    wanted: bool,
+    n: usize,
+) -> Option<&mut [T]> {
+    if !wanted {
+        *image = None;
+        return None;
+    }
+    let image = image.get_or_insert_default();
+    image.resize(n, T::default());
+    Some(image)
 }

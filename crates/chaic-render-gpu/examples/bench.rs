@@ -3,6 +3,7 @@
 //! Worlds of all tasks, two eyes each, images left on the device. Takes the number of worlds; with
 //! `--any` a program in a card's place will do, whose speed says nothing.
 
+use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use chaic_episodes::find_episode;
@@ -15,7 +16,17 @@ use chaic_world::{Rules, World};
 /// How long each setting is measured.
 const LONG: Duration = Duration::from_secs(3);
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let any = arguments.iter().any(|a| a == "--any");
     let number = arguments.iter().find(|a| *a != "--any");
@@ -32,13 +43,19 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let world = World::new(find_episode(&id)?.setup().clone(), Rules::paper())?;
         let scene = Scene::new(world.setup());
         let id = gpu.add(&scene, &world)?;
-        worlds.push((id, world));
+        worlds.push((id, world, scene));
     }
     println!(
         "{n_worlds} worlds brought in {:.1} s, {} MiB on the device",
         begin.elapsed().as_secs_f64(),
         gpu.bytes_of_worlds() >> 20
     );
+    let begin = Instant::now();
+    for (id, world, scene) in &worlds {
+        gpu.update(*id, scene, world)?;
+    }
+    let rate = n_worlds as f64 / begin.elapsed().as_secs_f64();
+    println!("{rate:.0} updates of a world a second");
     for (size, views_of_world) in [(128, 2), (512, 1)] {
         for (what, channels) in [("depth and ids", Channels::DEPTH_AND_IDS), ("all", Channels::ALL)]
         {
@@ -51,7 +68,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 fn eyes(
-    worlds: &[(WorldId, World)],
+    worlds: &[(WorldId, World, Scene)],
     size: u32,
     n: usize,
     channels: Channels,
@@ -59,7 +76,7 @@ fn eyes(
     let eye = |id: WorldId, world: &World, agent: AgentId| {
         (id, View::of_eye(agent, world.eye(agent, size), channels))
     };
-    let of_world = |(id, world): &(WorldId, World)| {
+    let of_world = |(id, world, _): &(WorldId, World, Scene)| {
         let agents: Vec<AgentId> = world.setup().agents().take(n).collect();
         agents.into_iter().map(|agent| eye(*id, world, agent)).collect::<Vec<_>>()
     };

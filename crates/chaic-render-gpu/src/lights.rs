@@ -14,8 +14,8 @@ use crate::records::LightRecord;
 pub(crate) struct Lights {
     pub records: Pool<LightRecord>,
     pub lamps: Pool<[f32; 4]>,
-    /// Brightness, and the room in the second byte.
-    pub cells: Pool<u32>,
+    /// Two cells a word, of each brightness and room.
+    pub cells: Pool<[u8; 4]>,
 }
 
 /// The light of a world on the device.
@@ -39,9 +39,11 @@ impl Lights {
     pub fn add(&mut self, link: &Link, light: &Lighting) -> Result<PlacedLight, GpuError> {
         let places = light.lamps_in_world.iter().map(|[x, y, z]| [*x, *y, *z, 0.0]);
         let ground = &light.cells;
-        let cells = ground.brightness.iter().zip(&ground.rooms);
-        let cells: Vec<u32> =
-            cells.map(|(b, room)| u32::from(*b) | u32::from(*room) << 8).collect();
+        let mut cells = Vec::with_capacity(ground.brightness.len().div_ceil(2));
+        for (bright, rooms) in ground.brightness.chunks(2).zip(ground.rooms.chunks(2)) {
+            let last = bright.len() - 1;
+            cells.push([bright[0], rooms[0], bright[last], rooms[last]]);
+        }
         let lamps = self.lamps.add(link, &places.collect::<Vec<_>>())?;
         let cells = self.cells.add(link, &cells)?;
         let record = LightRecord {
@@ -52,7 +54,7 @@ impl Lights {
             lamp: light.lamp,
             n_lamps: lamps.end - lamps.start,
             outdoors_high: light.outdoors[0],
-            first_cell: cells.start,
+            first_cell: 2 * cells.start,
             outdoors_low: light.outdoors[1],
             n_x: ground.n_x as u32,
             indoors_high: light.indoors[0],

@@ -14,7 +14,7 @@
 @group(0) @binding(7) var<storage, read> lights: array<Light>;
 // Lamps of all worlds, metres.
 @group(0) @binding(8) var<storage, read> lamps: array<vec4f>;
-// Of each cell of the ground its brightness, and its room in the second byte; rows along x.
+// Of each cell of the ground its brightness and room, a byte each; rows along x.
 @group(0) @binding(9) var<storage, read> ground: array<u32>;
 // Of each texture its tile at all sizes, the largest first; a texel and three neighbors a word.
 @group(0) @binding(10) var<storage, read> atlas: array<u32>;
@@ -284,7 +284,8 @@ fn thing(light: Light, lit: Lit, p: vec3f, n: vec3f) -> vec3f {
 // What is shown of a point of structure in the world.
 fn structure(light: Light, own: vec3f, gloss: u32, p: vec3f, n: vec3f, ray: vec3f) -> vec3f {
     // A step off the surface leaves the wall.
-    let room = ground[cell_of(light, p + 0.1 * n)] >> 8u;
+    let at = on_ground(light, p + 0.1 * n);
+    let room = cell(light, vec2i(at)) >> 8u;
     let has_lamp = room < light.n_lamps;
     let lamp = lamps[light.first_lamp + select(0u, room, has_lamp)].xyz;
     let s = shine(light, direct_light(light, has_lamp, lamp, p), n, gloss, -unit(ray));
@@ -300,26 +301,28 @@ fn structure(light: Light, own: vec3f, gloss: u32, p: vec3f, n: vec3f, ray: vec3
     return shown(own * factor + s.add);
 }
 
-fn cell_of(light: Light, p: vec3f) -> u32 {
-    let at = (p.xz - vec2f(light.min_x, light.min_z)) * light.cells_per_m;
-    return cell(light, vec2i(at));
+// Where a point lies on the ground's grid, in cells.
+fn on_ground(light: Light, p: vec3f) -> vec2f {
+    return (p.xz - vec2f(light.min_x, light.min_z)) * light.cells_per_m;
 }
 
+// Brightness of a cell, and its room in the second byte.
 fn cell(light: Light, at: vec2i) -> u32 {
     let k = vec2u(clamp(at, vec2i(0), vec2i(vec2u(light.n_x, light.n_z)) - 1));
-    return light.first_cell + k.y * light.n_x + k.x;
+    let index = light.first_cell + k.y * light.n_x + k.x;
+    return (ground[index / 2u] >> (16u * (index % 2u))) & 0xffffu;
 }
 
 // How bright the ground is, 0 to 1.
 fn ground_brightness(light: Light, p: vec3f) -> f32 {
-    let at = (p.xz - vec2f(light.min_x, light.min_z)) * light.cells_per_m - 0.5;
+    let at = on_ground(light, p) - 0.5;
     let k = vec2i(floor(at));
     let f = at - floor(at);
     let b = vec4f(
-        f32(ground[cell(light, k)] & 0xffu),
-        f32(ground[cell(light, k + vec2i(1, 0))] & 0xffu),
-        f32(ground[cell(light, k + vec2i(0, 1))] & 0xffu),
-        f32(ground[cell(light, k + vec2i(1, 1))] & 0xffu),
+        f32(cell(light, k) & 0xffu),
+        f32(cell(light, k + vec2i(1, 0)) & 0xffu),
+        f32(cell(light, k + vec2i(0, 1)) & 0xffu),
+        f32(cell(light, k + vec2i(1, 1)) & 0xffu),
     );
     return mix(mix(b.x, b.y, f.x), mix(b.z, b.w, f.x), f.y) / 255.0;
 }

@@ -22,6 +22,7 @@
     reason = "the code map above is for readers of the source"
 )]
 
+mod appearance;
 mod scene;
 mod view;
 
@@ -45,5 +46,6 @@ pub mod image_out;
 pub mod plan;
 pub mod text;
 
+pub use appearance::Appearance;
 pub use scene::Scene;
 pub use view::{Channels, MAX_SIDE_PX, View};

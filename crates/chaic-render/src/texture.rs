@@ -267,7 +267,8 @@ fn bake(texture: Texture, quads: &mut [u32]) {
         }
         let half = side / 2;
         let mean = |n: usize| {
-            let at = |dj: usize, di: usize| texels[(2 * (n / half) + dj) * side + 2 * (n % half) + di];
+            let at =
+                |dj: usize, di: usize| texels[(2 * (n / half) + dj) * side + 2 * (n % half) + di];
             0.25 * (at(0, 0) + at(0, 1) + at(1, 0) + at(1, 1))
         };
         texels = (0..half * half).map(mean).collect();

@@ -40,6 +40,7 @@ pub mod verify;
 pub mod figure;
 pub mod video;
 
+pub use chaic_render::Appearance;
 pub use digest::Digest;
 pub use error::{EvalError, Result};
 

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use chaic_episodes::Episode;
 use chaic_protocol::{AgentId, ClassId, EntityId, Frame};
-use chaic_render::{Channels, Scene, View, image_out, plan};
+use chaic_render::{Appearance, Channels, Scene, View, image_out, plan};
 use chaic_world::{Rules, World};
 use image::DynamicImage;
 
@@ -35,6 +35,8 @@ pub struct Still<'a> {
     pub frame: Frame,
     /// Side of the images, pixels.
     pub size: u32,
+    /// How it is lit and colored.
+    pub appearance: Appearance,
 }
 
 /// Plays an episode up to a moment and writes `rgb.png`, `depth.png` (16 bit, millimetres),
@@ -44,8 +46,9 @@ pub struct Still<'a> {
 /// # Errors
 /// If there is no such agent or helper, or the file system refuses.
 pub fn write(still: &Still<'_>, helpers: &dyn Helpers, out: &Path) -> Result<Frame> {
-    let Still { episode, helper, seed, rules, agent, frame, size } = *still;
-    let staging = Staging { episode, seed, rules, helper, partner: None, image_size: None };
+    let Still { episode, helper, seed, rules, agent, frame, size, appearance } = *still;
+    let (partner, image_size) = (None, None);
+    let staging = Staging { episode, seed, rules, helper, partner, image_size, appearance };
     let mut play = Play::new(staging, helpers::find(helpers, helper, rules.planner)?)?;
     if agent.index() >= play.world().setup().people.len() {
         let text = format!("{} has no {agent} when the helper is {helper}", episode.id());

@@ -184,6 +184,7 @@ impl Check<'_> {
             helper: &key.helper,
             partner: name,
             image_size: self.options.size,
+            appearance: self.options.appearance()?,
         };
         // A mind that only its author has: what it asked for is its own affair.
         let is_unknown = [partner.is_err(), helper.is_none()];

@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex};
 
 use chaic_agents::PlannerRules;
 use chaic_episodes::{Episode, find_episode};
+use chaic_eval::Appearance;
 use chaic_eval::helpers::{BuiltIn, Helpers as _};
 use chaic_eval::play::{Actor, Cast, Play, Staging};
 use chaic_eval::rules::RuleSet;
@@ -82,7 +83,9 @@ fn seen_in(id: &str, helper: &str, grants: Option<Grants>, change: &dyn Fn(&mut 
     }
     let rules = RuleSet::PAPER;
     let (episode, image_size) = (&episode, Some(48));
-    let staging = Staging { episode, seed: 0, rules, helper, partner: None, image_size };
+    let appearance = Appearance::Canonical;
+    let staging =
+        Staging { episode, seed: 0, rules, helper, partner: None, image_size, appearance };
     let mut play = Play::with_cast(staging, Cast { actors }).unwrap();
     assert!(play.run(&AtomicBool::new(false), None, &mut |_| Ok(())).unwrap());
     let seen = seen.lock().unwrap().clone();

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use chaic_render::Scene;
-use chaic_render::geometry::atlas;
+use chaic_render::geometry::{Shapes, atlas};
 use chaic_world::{Posture, State, World};
 
 use crate::batch::Spare;
@@ -16,7 +16,7 @@ use crate::passes::Passes;
 use crate::pool::Pool;
 use crate::records::InstanceRecord;
 use crate::render::Arena;
-use crate::upload::{PackedMesh, instance_record};
+use crate::upload::instance_record;
 
 /// Names a world on the device that gave it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -159,7 +159,7 @@ impl Gpu {
         old: Placed,
     ) -> Result<Placed, GpuError> {
         let mut new = Placed::default();
-        let result = self.fill(scene, state, postures, &mut new);
+        let result = scene.with_shapes(state, postures, |shapes| self.fill(shapes, &mut new));
         self.give_up(old);
         match result {
             Ok(()) => Ok(new),
@@ -170,32 +170,22 @@ impl Gpu {
         }
     }
 
-    fn fill(
-        &mut self,
-        scene: &Scene,
-        state: &State,
-        postures: &[Posture],
-        new: &mut Placed,
-    ) -> Result<(), GpuError> {
-        let levels = scene.geometry_at_all_levels(state, postures);
-        let n = levels[0].instances.len();
+    fn fill(&mut self, shapes: &Shapes, new: &mut Placed) -> Result<(), GpuError> {
+        let n = shapes.instances.len();
         if n > MAX_INSTANCES {
             return Err(GpuError::TooManyInstances { n, most: MAX_INSTANCES });
         }
-        let mut places = Vec::with_capacity(levels[0].meshes.len());
-        for index in 0..levels[0].meshes.len() {
-            let mesh = PackedMesh::of(&levels, index);
-            let (key, place) = self.meshes.acquire(&self.link, &mesh)?;
+        let mut places = Vec::with_capacity(shapes.len());
+        for index in 0..shapes.len() {
+            let (key, place) = self.meshes.acquire(&self.link, shapes, index)?;
             new.meshes.push(key);
             places.push(place);
         }
-        let records: Vec<InstanceRecord> = levels[0]
-            .instances
-            .iter()
-            .filter_map(|i| instance_record(i, *places.get(i.mesh as usize)?))
-            .collect();
+        let instances = shapes.instances.iter();
+        let records: Vec<InstanceRecord> =
+            instances.filter_map(|i| instance_record(i, *places.get(i.mesh as usize)?)).collect();
         new.instances = self.instances.add(&self.link, &records)?;
-        new.light = self.lights.add(&self.link, &scene.lighting(state, postures))?;
+        new.light = self.lights.add(&self.link, &shapes.lighting())?;
         Ok(())
     }
 }

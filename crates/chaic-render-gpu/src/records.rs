@@ -60,7 +60,7 @@ impl ViewRecord {
     }
 }
 
-/// A mesh somewhere in a world; 128 bytes.
+/// A mesh somewhere in a world; 144 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct InstanceRecord {
@@ -83,6 +83,9 @@ pub(crate) struct InstanceRecord {
     pub padding_3: u32,
     pub high: [f32; 3],
     pub padding_4: u32,
+    /// By what linear colors are multiplied.
+    pub factor: [f32; 3],
+    pub padding_5: u32,
 }
 
 /// Lit by the sky and the sun.
@@ -167,7 +170,7 @@ pub(crate) struct Round {
 // The sizes that WGSL gives these structs.
 const _: () = {
     assert!(size_of::<ViewRecord>() == 96);
-    assert!(size_of::<InstanceRecord>() == 128);
+    assert!(size_of::<InstanceRecord>() == 144);
     assert!(size_of::<MeshRecord>() == 64);
     assert!(size_of::<SkinRecord>() == 64);
     assert!(size_of::<LightRecord>() == 160);

@@ -1,6 +1,6 @@
 //! Plain geometry as the records that shaders read.
 
-use chaic_render::geometry::{Geometry, InstanceData, LitBy, MeshData, N_LEVELS, place_in_atlas};
+use chaic_render::geometry::{InstanceData, LitBy, MeshData, N_LEVELS, Shapes, place_in_atlas};
 use xxhash_rust::xxh3::Xxh3;
 
 use crate::records::{
@@ -19,23 +19,23 @@ pub(crate) struct PackedMesh {
 }
 
 impl PackedMesh {
-    /// Packs mesh `index` of the geometry at all levels.
-    pub fn of(levels: &[Geometry; N_LEVELS], index: usize) -> PackedMesh {
+    /// Packs a shape at all levels.
+    pub fn of(shapes: &Shapes, index: usize) -> PackedMesh {
         let mut packed = PackedMesh {
             corners: Vec::new(),
             triangles: Vec::new(),
             skins: Vec::new(),
             record: bytemuck::Zeroable::zeroed(),
         };
-        for (level, geometry) in levels.iter().enumerate() {
-            let mesh = &geometry.meshes[index];
+        for level in 0..N_LEVELS {
+            let mesh = shapes.mesh(index, level);
             packed.record.levels[level] = [
                 packed.corners.len() as u32,
                 packed.triangles.len() as u32,
                 mesh.triangles.len() as u32,
                 packed.skins.len() as u32,
             ];
-            packed.add(mesh);
+            packed.add(&mesh);
         }
         packed
     }
@@ -116,5 +116,7 @@ pub(crate) fn instance_record(instance: &InstanceData, mesh: u32) -> Option<Inst
         padding_3: 0,
         high: instance.max,
         padding_4: 0,
+        factor: instance.factor,
+        padding_5: 0,
     })
 }

@@ -22,6 +22,8 @@ pub(crate) struct Scratch {
 /// What drawing needs beside its target.
 #[derive(Default)]
 pub(crate) struct Work {
+    /// For which vectors the inner loops are compiled: the widest of this machine.
+    pub arch: pulp::Arch,
     corners: Corners,
     /// Triangles that may cover a pixel.
     alive: Vec<u32>,
@@ -66,7 +68,7 @@ pub(crate) fn draw<O: Owner>(
     target: &mut Target<O>,
     work: &mut Work,
 ) {
-    let Work { corners, alive, order, levels, firsts, n_triangles } = work;
+    let Work { arch, corners, alive, order, levels, firsts, n_triangles } = work;
     firsts.clear();
     firsts.resize(frame.instances.len(), 0);
     *n_triangles = 0;
@@ -95,7 +97,6 @@ pub(crate) fn draw<O: Owner>(
         let ((sa, da), (sb, db)) = (key(a), key(b));
         sa.cmp(&sb).then(da.total_cmp(&db)).then(a.index.cmp(&b.index))
     });
-    let arch = pulp::Arch::new();
     let mut drawn = 0;
     let mut stale = false;
     let mut was_structure = true;
@@ -244,12 +245,7 @@ impl Drawing<'_> {
     }
 
     #[inline(always)]
-    fn draw_clipped<O: Owner>(
-        &self,
-        into: &IntoCamera,
-        target: &mut Target<O>,
-        corners: &Corners,
-    ) {
+    fn draw_clipped<O: Owner>(&self, into: &IntoCamera, target: &mut Target<O>, corners: &Corners) {
         let mesh = self.instance.shape.mesh(self.level);
         let near = self.lens.near_m();
         let most = 1.0 / near;

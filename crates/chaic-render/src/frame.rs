@@ -89,6 +89,8 @@ pub(crate) struct Instance<'a> {
     pub max: Vec3,
     /// Color in place of the tinted skins' own, linear.
     pub tint: Option<[f32; 3]>,
+    /// By what linear colors are multiplied.
+    pub factor: Vec3,
     /// The room whose lamp shines on it; structure is lit point by point.
     pub room: Option<u8>,
 }

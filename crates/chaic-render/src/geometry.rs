@@ -4,21 +4,19 @@
 //! counter-clockwise seen from outside, and every solid is closed; floors and ceilings are single
 //! sheets that face the room. Colors are linear light, 0 to 1.
 
-use std::collections::BTreeMap;
-
 use chaic_protocol::{EntityId, Vec3};
 use chaic_world::{Posture, State};
 use glam::Mat3;
 
 use crate::Scene;
-use crate::frame::{Instance, Shape, ShapeKey};
+use crate::frame::Instance;
 use crate::light::NO_ROOM;
 use crate::mesh::{Mesh, Skin};
-use crate::people::Body;
 use crate::solids;
 use crate::texture;
 
 pub use crate::mesh::Gloss;
+pub use crate::shapes::{ShapeName, Shapes};
 pub use crate::texture::Texture;
 
 /// Number of levels of detail; 0 is the coarsest.
@@ -94,6 +92,8 @@ pub struct InstanceData {
     pub origin: [f32; 3],
     /// Linear color of the tinted skins.
     pub tint: Option<[f32; 3]>,
+    /// By what all its linear colors are multiplied, its tint's too.
+    pub factor: [f32; 3],
     /// What lights it.
     pub lit_by: LitBy,
     /// Least coordinates of its shape at any level of detail, in the object's frame, metres.
@@ -185,29 +185,16 @@ impl Scene {
         postures: &[Posture],
         levels: [usize; N],
     ) -> [Geometry; N] {
-        let bodies: Vec<Body> = postures.iter().map(|p| Body::new(p, state.frame)).collect();
-        let frame = self.frame(state, &bodies, false);
-        let mut shapes: Vec<Shape> = Vec::new();
-        let mut known: BTreeMap<ShapeKey, u32> = BTreeMap::new();
-        let mut instances = Vec::with_capacity(frame.instances.len());
-        for instance in &frame.instances {
-            let next = shapes.len() as u32;
-            let mesh = match instance.shape {
-                Shape::Class(class) => *known.entry(class.key()).or_insert(next),
-                Shape::Fixed(_) | Shape::Body(_) => next,
-            };
-            if mesh == next {
-                shapes.push(instance.shape);
-            }
-            instances.push(self.instance_data(instance, mesh));
-        }
-        levels.map(|level| {
-            let mesh_of = |shape: &Shape| MeshData::from(shape.mesh(level.min(FINEST)));
-            Geometry { meshes: shapes.iter().map(mesh_of).collect(), instances: instances.clone() }
+        self.with_shapes(state, postures, |shapes| {
+            let meshes = |level: usize| (0..shapes.len()).map(move |k| shapes.mesh(k, level));
+            levels.map(|level| Geometry {
+                meshes: meshes(level).collect(),
+                instances: shapes.instances.clone(),
+            })
         })
     }
 
-    fn instance_data(&self, instance: &Instance, mesh: u32) -> InstanceData {
+    pub(crate) fn instance_data(&self, instance: &Instance, mesh: u32) -> InstanceData {
         let lit_by = match instance.room {
             None => LitBy::EachPoint,
             Some(NO_ROOM) => LitBy::Sky,
@@ -221,6 +208,7 @@ impl Scene {
             rotation: columns(&instance.rotation),
             origin: instance.origin.to_array(),
             tint: instance.tint,
+            factor: instance.factor.to_array(),
             lit_by,
             min: instance.min.to_array(),
             max: instance.max.to_array(),

@@ -23,6 +23,7 @@
     reason = "the code map above is for readers of the source"
 )]
 
+mod appearance;
 mod scene;
 mod view;
 
@@ -32,6 +33,7 @@ mod lens;
 mod mesh;
 mod people;
 mod solids;
+mod shapes;
 
 mod clip;
 mod draw;
@@ -48,6 +50,7 @@ pub mod lighting;
 pub mod plan;
 pub mod text;
 
+pub use appearance::Appearance;
 pub use lens::Lens;
 pub use scene::Scene;
 pub use solids::LEVEL_RADIUS_PX;

@@ -48,6 +48,20 @@ impl Lamps {
             Vec3::new(0.36, 0.38, 0.34),
         ],
     };
+
+    /// Dusk: the sun low and red, the sky dim, lamps on.
+    pub const EVENING: Lamps = Lamps {
+        to_sun: Vec3::new(0.81, 0.35, 0.47),
+        sun: Vec3::new(0.78, 0.50, 0.30),
+        lamp: Vec3::new(0.74, 0.58, 0.40),
+        outdoors: [Vec3::new(0.25, 0.25, 0.34), Vec3::new(0.17, 0.15, 0.15)],
+        indoors: [Vec3::new(0.26, 0.24, 0.24), Vec3::new(0.24, 0.20, 0.17)],
+        sky: [
+            Vec3::new(0.86, 0.56, 0.36),
+            Vec3::new(0.13, 0.18, 0.40),
+            Vec3::new(0.24, 0.22, 0.21),
+        ],
+    };
 }
 
 /// Where the direct light at a point comes from.
@@ -254,6 +268,28 @@ impl<'a> Light<'a> {
         if self.wants_color() && foot.center.is_finite() && foot.half.max_element() < 50.0 {
             self.ground.darken(&mut self.dark, foot);
         }
+    }
+
+    /// Adds the sun's shadow of something upright, out of doors: as long as it is high, as wide as
+    /// it is on average.
+    pub fn cast_by_sun(&mut self, center: Vec2, half: Vec2, height_m: f32) {
+        /// Higher things are slender at the top: trees, lamps.
+        const LONGEST_M: f32 = 5.0;
+        let sun = self.lamps.to_sun;
+        if self.ground.ceiling_m.is_some() || sun.y < 0.05 {
+            return;
+        }
+        let away = Vec2::new(-sun.x, -sun.z);
+        let flat = (away.x * away.x + away.y * away.y).sqrt();
+        if flat < 1e-3 {
+            return;
+        }
+        let axis = away / flat;
+        let length = (height_m * flat / sun.y).min(LONGEST_M);
+        let wide = 0.5 * (half.x + half.y);
+        let half = Vec2::new(0.5 * length + 0.5 * wide, wide);
+        let center = center + axis * (0.5 * length);
+        self.cast(&Foot { center, axis, half, depth: 0.5, round: false });
     }
 
     /// Makes the ground ready; to be called when all shadows are cast.

@@ -1,10 +1,9 @@
-//! The light of a moment as plain data, for other renderers. Colors are linear, 0 to 1.
+//! The light of a moment as plain data, for other renderers; see [`crate::geometry::Shapes`]. Colors
+//! are linear, 0 to 1.
 
 use chaic_protocol::Vec3;
-use chaic_world::{Posture, State};
 
-use crate::Scene;
-use crate::people::Body;
+use crate::light::Light;
 
 /// What shines on a scene at one moment.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,12 +46,9 @@ pub struct Cells {
     pub brightness: Vec<u8>,
 }
 
-impl Scene {
-    /// What shines on a moment. `postures` are those of the agents in order.
-    pub fn lighting(&self, state: &State, postures: &[Posture]) -> Lighting {
-        let bodies: Vec<Body> = postures.iter().map(|p| Body::new(p, state.frame)).collect();
-        let frame = self.frame(state, &bodies, true);
-        let light = &frame.light;
+impl Lighting {
+    /// What shines on a frame that was made to be looked at in color.
+    pub(crate) fn of(light: &Light) -> Lighting {
         let lamps = light.lamps;
         Lighting {
             to_sun: lamps.to_sun.to_array(),

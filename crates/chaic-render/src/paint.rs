@@ -214,7 +214,7 @@ impl<'a> Painter<'a> {
             Some(tint) if skin.tinted => tint,
             _ => skin.color,
         };
-        let color = Vec3::from(color).extend(0.0);
+        let color = (Vec3::from(color) * instance.factor).extend(0.0);
         let is_structure = instance.room.is_none();
         let mut paint = Paint {
             entity: instance.entity.0,
@@ -252,8 +252,7 @@ impl<'a> Painter<'a> {
             (paint.low, paint.high) = (color, color);
             return paint;
         }
-        let normals =
-            if triangle.smooth { corners.map(|k| mesh.normals[k]) } else { [face; 3] };
+        let normals = if triangle.smooth { corners.map(|k| mesh.normals[k]) } else { [face; 3] };
         let [at_a, at_b, at_c] = [(a, 0), (b, 1), (c, 2)].map(|(p, k)| shown(p, normals[k]));
         let per_area2 = 1.0 / dot(flat, flat).max(1e-30);
         let s = self.plane(sight, (c - a).cross(flat) * per_area2, a, face);

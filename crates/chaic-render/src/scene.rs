@@ -10,6 +10,7 @@ use chaic_world::{FloorMaterial, Place, Posture, RoomKind, Setup, State, ThingSt
 use glam::Mat3;
 use rayon::prelude::*;
 
+use crate::appearance::{Appearance, Painted};
 use crate::frame::{ClassMesh, Frame, Instance, Shape};
 use crate::light::{Foot, Ground, Lamps, Light};
 use crate::mesh::{self, Mesh, Skin};
@@ -25,13 +26,19 @@ pub struct Scene {
     structure: Vec<(EntityId, Mesh)>,
     things: Vec<(Arc<ClassMesh>, Option<[f32; 3]>)>,
     ground: Ground,
+    appearance: Appearance,
     lamps: Lamps,
     still: Mutex<Still>,
 }
 
 impl Scene {
-    /// Makes the shapes of an episode ready.
+    /// Makes the shapes of an episode ready, in the benchmark's colors.
     pub fn new(setup: &Setup) -> Scene {
+        Scene::with_appearance(setup, Appearance::Canonical)
+    }
+
+    /// Makes the shapes of an episode ready.
+    pub fn with_appearance(setup: &Setup, appearance: Appearance) -> Scene {
         let mut structure = Vec::new();
         for (rect, material, color) in floor_pieces(setup) {
             structure.push((EntityId::FLOOR, floor_mesh(&rect, material, color)));
@@ -50,7 +57,14 @@ impl Scene {
                 .then(|| linear_from_shown(palette[usize::from(thing.variant) % palette.len()]));
             (ClassMesh::of(thing), tint)
         });
-        Scene { structure, things: things.collect(), ground: Ground::new(setup), lamps: Lamps::DAY, still: Mutex::default() }
+        Scene {
+            structure,
+            things: things.collect(),
+            ground: Ground::new(setup),
+            appearance,
+            lamps: appearance.lamps(),
+            still: Mutex::default(),
+        }
     }
 
     /// What many cameras see of a world, in their order. The images don't depend on the number of
@@ -112,7 +126,7 @@ impl Scene {
         let mut light = self.still_light(state, wants_color);
         let mut instances =
             Vec::with_capacity(self.structure.len() + self.things.len() + bodies.len());
-        for (entity, mesh) in &self.structure {
+        for (k, (entity, mesh)) in self.structure.iter().enumerate() {
             instances.push(Instance {
                 entity: *entity,
                 shape: Shape::Fixed(mesh),
@@ -121,6 +135,7 @@ impl Scene {
                 min: mesh.min,
                 max: mesh.max,
                 tint: None,
+                factor: self.appearance.factor(Painted::Structure(k)),
                 room: None,
             });
         }
@@ -129,6 +144,8 @@ impl Scene {
             let center = Vec2::new(pose.position.x, pose.position.z);
             let half = Vec2::splat(body.foot_radius_m);
             light.cast(&Foot { center, axis: Vec2::X, half, depth: 0.5, round: true });
+            let height = body.max.y - body.min.y;
+            light.cast_by_sun(center, Vec2::splat(0.6 * body.foot_radius_m), height);
             let rotation = Mat3::from_quat(chaic_protocol::geom::yaw_rotation(pose.yaw_rad));
             instances.push(Instance {
                 entity: EntityId(EntityId::FIRST_PERSON.0 + k.min(7) as u16),
@@ -138,6 +155,7 @@ impl Scene {
                 min: body.min,
                 max: body.max,
                 tint: None,
+                factor: self.appearance.factor(Painted::Person(k)),
                 room: Some(self.ground.room_at(pose.position)),
             });
         }
@@ -152,6 +170,7 @@ impl Scene {
                 min: class.min,
                 max: class.max,
                 tint: *tint,
+                factor: self.appearance.factor(Painted::Thing(k)),
                 room: Some(self.ground.room_at(thing.position)),
             });
         }
@@ -198,7 +217,15 @@ fn shown_rotation(thing: &ThingState) -> Option<Mat3> {
     (thing.place != Place::Broken && is_sane).then(|| Mat3::from_quat(q))
 }
 
+/// Things higher than this cast a shadow of the sun, metres.
+const CASTS_FROM_M: f32 = 0.25;
+
 fn cast_foot(light: &mut Light, class: &ClassMesh, rotation: &Mat3, position: Vec3) {
+    let (low, high) = (position.y + class.min.y, position.y + class.max.y);
+    if low < 0.5 && high > CASTS_FROM_M {
+        let half = 0.5 * (class.max - class.min);
+        light.cast_by_sun(Vec2::new(position.x, position.z), Vec2::new(half.x, half.z), high);
+    }
     // Only what is near the ground darkens it, the more the nearer.
     let depth = 0.55 * (1.0 - 3.0 * position.y).clamp(0.0, 1.0);
     let axis = Vec2::new(rotation.x_axis.x, rotation.x_axis.z);

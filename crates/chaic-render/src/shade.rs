@@ -66,6 +66,7 @@ pub(crate) struct Wanted<'a> {
 
 /// What is drawn: instances with the level and the number of the first triangle of each.
 pub(crate) struct Drawn<'a> {
+    pub arch: pulp::Arch,
     pub levels: &'a [u8],
     pub firsts: &'a [u32],
     pub n_triangles: usize,
@@ -74,7 +75,12 @@ pub(crate) struct Drawn<'a> {
 impl<'a> Drawn<'a> {
     /// What has just been drawn.
     pub fn of(work: &'a crate::draw::Work) -> Drawn<'a> {
-        Drawn { levels: &work.levels, firsts: &work.firsts, n_triangles: work.n_triangles }
+        Drawn {
+            arch: work.arch,
+            levels: &work.levels,
+            firsts: &work.firsts,
+            n_triangles: work.n_triangles,
+        }
     }
 }
 
@@ -95,7 +101,7 @@ pub(crate) fn shade(
     canvas.row.resize(lens.width);
     let painter = Painter::new(frame, lens);
     let atlas = atlas();
-    pulp::Arch::new().dispatch(Rows { painter, lens, drawn, target, canvas, wanted, atlas });
+    drawn.arch.dispatch(Rows { painter, lens, drawn, target, canvas, wanted, atlas });
 }
 
 /// All rows of an image, compiled for each kind of vectors and called for the widest that the
@@ -233,7 +239,8 @@ impl Row {
         for k in 0..n {
             let quad = atlas[texel[k] as usize % N_ATLAS];
             let bright = mixed(quad, within[k]) * (1.0 / (128.0 * 65536.0));
-            packed[k] = whole(r[k] * bright) | whole(g[k] * bright) << 8 | whole(b[k] * bright) << 16;
+            packed[k] =
+                whole(r[k] * bright) | whole(g[k] * bright) << 8 | whole(b[k] * bright) << 16;
         }
     }
 }
@@ -285,8 +292,7 @@ impl Rows<'_> {
             Kind::Structure { floor } => {
                 let (painter, lens) = (&self.painter, self.lens);
                 row.light(begin, end, |k| {
-                    let (p, ray) =
-                        painter.rays.point(k as f32 + 0.5, v, lens.depth(nearness[k]));
+                    let (p, ray) = painter.rays.point(k as f32 + 0.5, v, lens.depth(nearness[k]));
                     painter.shown_structure(paint, p, ray)
                 });
                 if floor {
@@ -323,8 +329,7 @@ impl Rows<'_> {
     fn new_paint(&mut self, index: usize, triangle: usize) -> Paint {
         let instance = &self.painter.frame.instances[index];
         let mesh = instance.shape.mesh(usize::from(self.drawn.levels[index]));
-        let sight =
-            self.canvas.sights[index].get_or_insert_with(|| self.painter.sight(instance));
+        let sight = self.canvas.sights[index].get_or_insert_with(|| self.painter.sight(instance));
         self.painter.paint(instance, sight, mesh, &mesh.triangles[triangle])
     }
 }

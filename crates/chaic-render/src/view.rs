@@ -133,3 +133,44 @@ fn sized<T: Clone + Default>(
     image.resize(n, T::default());
     Some(image)
 }
+
+#[cfg(test)]
+#[path = "../tests/scenes/mod.rs"]
+mod scenes;
+
+#[cfg(test)]
+mod tests {
+    use super::scenes::{camera, house, street, world};
+    use super::*;
+    use crate::Scene;
+
+    fn looked_at(arch: pulp::Arch, color: bool) -> Vec<Images> {
+        let usual = with_scratch(|s| std::mem::replace(&mut s.work.arch, arch));
+        let mut all = Vec::new();
+        for (setup, eye, yaw) in
+            [(house(), [0.6, 1.65, 2.2], -1.57), (street(), [9.0, 1.65, 0.0], 1.3)]
+        {
+            let world = world(setup);
+            let scene = Scene::new(world.setup());
+            let channels = if color { Channels::ALL } else { Channels::DEPTH_AND_IDS };
+            let camera = camera(eye, yaw, -0.1, 203, 149);
+            let view = View { camera, channels, hide: None, hide_ceiling: false };
+            all.extend(scene.render(&world, &[view]));
+        }
+        with_scratch(|s| s.work.arch = usual);
+        all
+    }
+
+    #[test]
+    fn images_are_the_same_bits_with_vectors_of_any_width() {
+        let mut archs = vec![pulp::Arch::new()];
+        #[cfg(target_arch = "x86_64")]
+        archs.extend(pulp::x86::V3::try_new().map(pulp::Arch::V3));
+        for color in [true, false] {
+            let plain = looked_at(pulp::Arch::Scalar, color);
+            for arch in &archs {
+                assert!(looked_at(*arch, color) == plain, "{arch:?}, color {color}");
+            }
+        }
+    }
+}

@@ -6,6 +6,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 use chaic_episodes::Split;
+use chaic_eval::Appearance;
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::Format;
 use chaic_eval::rules::RuleSetName;
@@ -109,6 +110,10 @@ pub struct EvalArguments {
     /// Who drives the partner: rules (usual), or llm or vlm.
     #[arg(long, value_name = "NAME")]
     pub partner: Option<String>,
+    /// Light and colors of all that is seen: canonical (usual), evening, or varied:SEED, which
+    /// draws them from a seed (domain randomization). Changes neither depth nor ids.
+    #[arg(long, value_name = "LOOK")]
+    pub appearance: Option<Appearance>,
     #[command(flatten)]
     pub language: LanguageArguments,
     /// The run's folder. Usual: the next free `runs/NAME`.
@@ -255,6 +260,9 @@ pub struct RenderArguments {
     /// paper, or compat for what the original's code does.
     #[arg(long, value_name = "NAME", default_value = "paper")]
     pub rules: RuleSetName,
+    /// Light and colors: canonical, evening, or varied:SEED, which draws them from a seed.
+    #[arg(long, value_name = "LOOK", default_value = "canonical")]
+    pub appearance: Appearance,
 }
 
 /// `chaic episodes`.

@@ -100,6 +100,7 @@ impl Matrix {
             set: part.switch.iter().map(|rule| format!("{rule}=paper")).collect(),
             no_traces: part.switch.is_some(),
             partner: None,
+            appearance: None,
         })
     }
 

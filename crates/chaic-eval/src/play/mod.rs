@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use chaic_episodes::Episode;
 use chaic_protocol::agent::Thought;
 use chaic_protocol::{AgentId, Frame};
-use chaic_render::Scene;
+use chaic_render::{Appearance, Scene};
 use chaic_world::{Rules, Setup, World};
 
 use crate::CHAIC_VERSION;
@@ -39,6 +39,8 @@ pub struct Staging<'a> {
     pub partner: Option<&'a str>,
     /// Side of everybody's images, pixels; `None` for what each mind asks for.
     pub image_size: Option<u32>,
+    /// How all that eyes see is lit and colored.
+    pub appearance: Appearance,
 }
 
 /// An episode under way, with everybody in it.
@@ -78,7 +80,7 @@ impl Play {
     fn stage(staging: Staging<'_>, setup: Arc<Setup>, mut cast: Cast) -> Result<Play> {
         let world = brief(&staging, &setup, &mut cast)?;
         let header = header(&staging, &setup, &cast);
-        let eyes = Eyes::new(Arc::new(Scene::new(&setup)), &world);
+        let eyes = Eyes::new(Arc::new(Scene::with_appearance(&setup, staging.appearance)), &world);
         Ok(Play { world, cast, eyes, header })
     }
 

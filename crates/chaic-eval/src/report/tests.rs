@@ -46,6 +46,7 @@ fn options() -> RunOptions {
         set: vec![],
         traces: true,
         partner: None,
+        appearance: None,
     }
 }
 

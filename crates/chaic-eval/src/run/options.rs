@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use chaic_episodes::Split;
 use chaic_protocol::TaskId;
+use chaic_render::Appearance;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{EvalError, Result};
@@ -43,6 +44,9 @@ pub struct RunOptions {
     /// Who drives the partner; absent for the rule-based minds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub partner: Option<String>,
+    /// How scenes are lit and colored; absent for the benchmark's own look.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub appearance: Option<String>,
 }
 
 fn yes() -> bool {
@@ -80,6 +84,8 @@ pub struct Given {
     pub no_traces: bool,
     /// `--partner`.
     pub partner: Option<String>,
+    /// `--appearance`.
+    pub appearance: Option<Appearance>,
 }
 
 /// What `split` says where the episodes are files.
@@ -93,6 +99,15 @@ impl RunOptions {
     pub fn rules(&self) -> Result<RuleSet> {
         let named = RuleSet::named(self.rules);
         self.set.iter().try_fold(named, |rules, setting| rules.with(setting))
+    }
+
+    /// How scenes are lit and colored.
+    ///
+    /// # Errors
+    /// If there is no such appearance.
+    pub fn appearance(&self) -> Result<Appearance> {
+        let named = self.appearance.as_deref().unwrap_or("canonical");
+        named.parse().map_err(EvalError::Options)
     }
 }
 
@@ -132,9 +147,22 @@ impl Given {
         let (first, rules) = (self.first, self.rules.unwrap_or(RuleSetName::Paper));
         let (set, traces) = (self.set.clone(), !self.no_traces);
         let partner = self.partner.clone().filter(|name| name != RULES);
-        let options =
-            RunOptions { tasks, helpers, split, first, seeds, size, rules, set, traces, partner };
+        let varies = self.appearance.filter(|a| *a != Appearance::Canonical);
+        let options = RunOptions {
+            tasks,
+            helpers,
+            split,
+            first,
+            seeds,
+            size,
+            rules,
+            set,
+            traces,
+            partner,
+            appearance: varies.map(|a| a.to_string()),
+        };
         options.rules()?;
+        options.appearance()?;
         Ok(options)
     }
 
@@ -180,6 +208,11 @@ impl Given {
                 "--partner",
                 self.partner.clone(),
                 recorded.partner.clone().unwrap_or_else(|| RULES.to_owned()),
+            ),
+            (
+                "--appearance",
+                self.appearance.map(|a| a.to_string()),
+                recorded.appearance.clone().unwrap_or_else(|| Appearance::Canonical.to_string()),
             ),
             ("--size", self.size.map(|n| n.to_string()), number(recorded.size)),
             (

@@ -204,6 +204,7 @@ impl Crew<'_> {
             helper: &key.helper,
             partner: name,
             image_size: self.options.size,
+            appearance: self.options.appearance()?,
         };
         let mut play = Play::new(staging, Minds { helper, partner })?;
         if self.options.traces {

@@ -48,6 +48,9 @@ struct Instance {
     padding_3: u32,
     high: vec3f,
     padding_4: u32,
+    // By what linear colors are multiplied.
+    factor: vec3f,
+    padding_5: u32,
 }
 
 // `MeshRecord` of records.rs.

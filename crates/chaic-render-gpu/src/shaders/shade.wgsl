@@ -145,7 +145,8 @@ fn surface(view: View, light: Light, name: u32, ray: vec3f, depth_m: f32) -> vec
     let point = view.eye + ray * depth_m;
     // The point in the instance's frame.
     let local = (point - instance.origin) * turn;
-    let own = select(skin.color, instance.tint, skin.is_tinted * instance.is_tinted != 0u);
+    let is_tinted = skin.is_tinted * instance.is_tinted != 0u;
+    let own = select(skin.color, instance.tint, is_tinted) * instance.factor;
     var shows = vec3f(0.0);
     var bright = 1.0;
     if (instance.lit_by == EACH_POINT) {

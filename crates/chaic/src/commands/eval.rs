@@ -125,7 +125,7 @@ fn given(arguments: &EvalArguments) -> (Given, &'static str) {
         no_traces,
         ..
     } = arguments;
-    let partner = arguments.partner.clone();
+    let (partner, appearance) = (arguments.partner.clone(), arguments.appearance);
     let given = Given {
         tasks: task.as_ref().map(|t| t.0.clone()),
         helpers: helper.clone(),
@@ -138,6 +138,7 @@ fn given(arguments: &EvalArguments) -> (Given, &'static str) {
         set: set.clone(),
         no_traces: *no_traces,
         partner,
+        appearance,
     };
     if given == Given::default() && !arguments.resume {
         return (Given { first: Some(QUICK_EPISODES), ..given }, "quick");

@@ -11,11 +11,21 @@ use crate::output::say;
 
 /// Makes pictures of one moment.
 pub fn run(arguments: &RenderArguments) -> Result<Ended> {
-    let RenderArguments { episode, agent, frame, out, size, helper, seed, rules } = arguments;
+    let RenderArguments { episode, agent, frame, out, size, helper, seed, rules, appearance } =
+        arguments;
     let episode = super::episode(episode)?;
     let rules = RuleSet::named(*rules);
     let (agent, frame, size, seed) = (*agent, *frame, *size, *seed);
-    let still = Still { episode: &episode, helper, seed, rules, agent, frame, size };
+    let still = Still {
+        episode: &episode,
+        helper,
+        seed,
+        rules,
+        agent,
+        frame,
+        size,
+        appearance: *appearance,
+    };
     let shown = still::write(&still, &BuiltIn, out)?;
     let id = episode.id();
     say(&format!("{}: what the {agent} sees of {id} at frame {shown}\n", out.display()))?;

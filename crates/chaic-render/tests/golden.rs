@@ -1,0 +1,32 @@
+//! The promise of this file: pixels don't change unnoticed. When they are meant to, the new digests
+//! are those that the failing test prints.
+
+mod scenes;
+
+use chaic_render::{Appearance, Channels, Scene, View};
+use scenes::{camera, house, street, world};
+use xxhash_rust::xxh3::xxh3_64;
+
+#[test]
+fn pixels_are_those_of_the_last_version() {
+    let mut found = String::new();
+    for (name, setup, eye, yaw, appearance) in [
+        ("house", house(), [0.6, 1.65, 2.2], -1.57, Appearance::Canonical),
+        ("street", street(), [9.0, 1.65, 0.0], 1.3, Appearance::Canonical),
+        ("street", street(), [9.0, 1.65, 0.0], 1.3, Appearance::Evening),
+        ("house", house(), [0.6, 1.65, 2.2], -1.57, Appearance::Varied { seed: 3 }),
+    ] {
+        let world = world(setup);
+        let camera = camera(eye, yaw, -0.1, 256, 192);
+        let view = View { camera, channels: Channels::ALL, hide: None, hide_ceiling: false };
+        let images = Scene::with_appearance(world.setup(), appearance).render(&world, &[view]);
+        let depth: Vec<u8> =
+            images[0].depth_m.iter().flatten().flat_map(|d| d.to_bits().to_le_bytes()).collect();
+        let ids: Vec<u8> = images[0].ids.iter().flatten().flat_map(|i| i.to_le_bytes()).collect();
+        let rgb = images[0].rgb.as_deref().unwrap_or_default();
+        let [rgb, depth, ids] = [rgb, &depth, &ids].map(xxh3_64);
+        found +=
+            &format!("{name} {appearance}: rgb {rgb:016x} depth {depth:016x} ids {ids:016x}\n");
+    }
+    assert_eq!(found, include_str!("golden.txt"));
+}

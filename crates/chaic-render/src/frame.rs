@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use chaic_protocol::{EntityId, Vec3};
+use chaic_protocol::{ClassId, EntityId, Vec3};
 use chaic_world::Thing;
 use glam::Mat3;
 
@@ -17,6 +17,9 @@ pub(crate) struct ClassMesh {
     pub max: Vec3,
     levels: [OnceLock<Mesh>; N_LEVELS],
 }
+
+/// Class, scale and height of the seat, the latter two as bits.
+pub(crate) type ShapeKey = (ClassId, [u32; 3], Option<u32>);
 
 impl ClassMesh {
     /// The mesh of a thing wherever it is. Those of catalogue size are shared by all scenes of the
@@ -43,6 +46,12 @@ impl ClassMesh {
             (min, max) = (Vec3::ZERO, Vec3::ZERO);
         }
         ClassMesh { thing: *thing, min, max, levels: [const { OnceLock::new() }; N_LEVELS] }
+    }
+
+    /// What decides the shape: equal for equal shapes only.
+    pub fn key(&self) -> ShapeKey {
+        let Thing { class, scale, seat_m, .. } = &self.thing;
+        (*class, scale.map(f32::to_bits), seat_m.map(f32::to_bits))
     }
 
     fn level(&self, level: usize) -> &Mesh {

@@ -2,7 +2,8 @@
 //!
 //! **What it is**: [`Scene`] makes an episode's shapes ready once, [`Scene::render`] draws what
 //! any number of cameras ([`View`]) see at a moment, [`plan::draw`] draws a map for people,
-//! [`image_out`] and [`text`] help to write pictures.
+//! [`image_out`] and [`text`] help to write pictures. [`geometry`] gives the same shapes as plain data,
+//! for other renderers and for files.
 //!
 //! **What it is not**: it changes no state, reads no files, and uses neither GPU nor display.
 //!
@@ -41,6 +42,7 @@ mod shade;
 mod surface;
 mod texture;
 
+pub mod geometry;
 pub mod image_out;
 pub mod plan;
 pub mod text;

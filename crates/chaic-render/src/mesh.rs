@@ -26,12 +26,17 @@ pub(crate) struct Skin {
 }
 
 /// How a surface answers to light.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Gloss {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Gloss {
+    /// No highlight to speak of: cloth, plaster, carpet.
     Dull,
+    /// A broad, faint highlight: wood, skin, tiles.
     Satin,
+    /// A small, bright highlight: varnish, plastic.
     Shiny,
+    /// A highlight in the metal's own color.
     Metal,
+    /// The sharpest highlight; drawn opaque.
     Glass,
 }
 

@@ -71,6 +71,11 @@ impl Scene {
         views.par_iter().map(|view| look(&frame, view)).collect()
     }
 
+    /// What is underfoot, and the lamps.
+    pub(crate) fn ground(&self) -> &Ground {
+        &self.ground
+    }
+
     pub(crate) fn frame<'a>(
         &'a self,
         state: &State,

@@ -5,28 +5,42 @@ use std::sync::{LazyLock, OnceLock};
 
 use chaic_protocol::geom::math;
 
-/// What a surface looks like close up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Texture {
+/// What a surface looks like close up: a tile of brightness that repeats.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Texture {
+    /// One brightness everywhere; has no tile.
     Plain,
+    /// A painted wall, not quite even.
     Plaster,
+    /// Metal with fine lines along it.
     Brushed,
+    /// Wood with its grain.
     Grain,
+    /// Woven threads.
     Weave,
+    /// Woven canes.
     Wicker,
+    /// Blotches, as on a fruit's skin.
     Mottle,
+    /// A baked crust.
     Crust,
+    /// Floorboards.
     Planks,
+    /// Square tiles with joints.
     Tiles,
+    /// Carpet pile.
     Carpet,
+    /// Asphalt.
     Asphalt,
+    /// Paving stones with joints.
     Pavement,
+    /// Blades of grass.
     Grass,
 }
 
 const N_TEXTURES: usize = 14;
 /// Texels along a tile's side; a power of two.
-const SIDE: usize = 128;
+pub(crate) const SIDE: usize = 128;
 const LEVELS: usize = 8;
 
 /// A square of brightness that repeats, 128 meaning unchanged.
@@ -43,12 +57,12 @@ static TILES: [OnceLock<Tile>; N_TEXTURES] = [const { OnceLock::new() }; N_TEXTU
 
 impl Texture {
     /// The tile, if the surface has any texture.
-    pub fn tile(self) -> Option<&'static Tile> {
+    pub(crate) fn tile(self) -> Option<&'static Tile> {
         (self != Texture::Plain).then(|| TILES[self as usize].get_or_init(|| bake(self)))
     }
 
     /// Side of the square that repeats, metres.
-    fn period_m(self) -> f32 {
+    pub fn period_m(self) -> f32 {
         match self {
             Texture::Plain => 1.0,
             Texture::Plaster => 0.9,
@@ -202,6 +216,11 @@ fn bake(texture: Texture) -> Tile {
 }
 
 impl Tile {
+    /// The finest level: 128 is the surface's own brightness, row after row along u.
+    pub fn finest(&self) -> &[u8] {
+        &self.texels[..SIDE * SIDE]
+    }
+
     /// Brightness around 1 at a point given in metres, for a pixel that covers `pixel_m`.
     #[inline]
     pub fn sample(&self, u_m: f32, v_m: f32, pixel_m: f32) -> f32 {

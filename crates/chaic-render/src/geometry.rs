@@ -1,0 +1,228 @@
+//! Everything that can be seen at one moment as plain data: for other renderers, and for files.
+//!
+//! Frames and units are those of [`chaic_protocol::geom`]: metres, right-handed, y up. Triangles are
+//! counter-clockwise seen from outside, and every solid is closed; floors and ceilings are single
+//! sheets that face the room. Colors are linear light, 0 to 1.
+
+use std::collections::BTreeMap;
+
+use chaic_protocol::{EntityId, Vec3};
+use chaic_world::{Posture, State};
+use glam::Mat3;
+
+use crate::Scene;
+use crate::frame::{Instance, Shape, ShapeKey};
+use crate::light::NO_ROOM;
+use crate::mesh::{Mesh, Skin};
+use crate::people::Body;
+use crate::solids;
+use crate::texture;
+
+pub use crate::mesh::Gloss;
+pub use crate::texture::Texture;
+
+/// Number of levels of detail; 0 is the coarsest.
+pub const N_LEVELS: usize = solids::N_LEVELS;
+
+/// The finest level of detail.
+pub const FINEST: usize = N_LEVELS - 1;
+
+/// Everything that can be seen at one moment.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Geometry {
+    /// The shapes, each once; every one is used by an instance.
+    pub meshes: Vec<MeshData>,
+    /// What there is: structure, then people, then things.
+    pub instances: Vec<InstanceData>,
+}
+
+/// A shape in its object's frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeshData {
+    /// Corners, metres.
+    pub positions: Vec<[f32; 3]>,
+    /// Unit normals, as many as positions; without meaning at corners of flat triangles only.
+    pub normals: Vec<[f32; 3]>,
+    /// The triangles, those of one skin one after the other.
+    pub triangles: Vec<TriangleData>,
+    /// What the triangles' skins are.
+    pub skins: Vec<SkinData>,
+    /// Least coordinates of all corners, metres.
+    pub min: [f32; 3],
+    /// Greatest coordinates of all corners, metres.
+    pub max: [f32; 3],
+}
+
+/// One triangle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TriangleData {
+    /// Indices of its corners, counter-clockwise seen from outside.
+    pub corners: [u32; 3],
+    /// Index of its skin.
+    pub skin: u8,
+    /// Whether the corners' normals are interpolated; else the triangle's own plane has the normal.
+    pub smooth: bool,
+}
+
+/// How a group of triangles looks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SkinData {
+    /// Linear red, green and blue, 0 to 1.
+    pub color: [f32; 3],
+    /// What it looks like close up.
+    pub texture: Texture,
+    /// How it answers to light.
+    pub gloss: Gloss,
+    /// The skin's axes in the object's frame, unit vectors, the longest extent's first. A texture is
+    /// laid on a face by leaving out the axis that is most square to it; the first axis left is u.
+    pub axes: [[f32; 3]; 3],
+    /// Whether an instance's tint takes the color's place.
+    pub tinted: bool,
+}
+
+/// A mesh somewhere in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InstanceData {
+    /// What it is; all floors share an id, and so do walls and ceilings.
+    pub entity: EntityId,
+    /// Index of its mesh.
+    pub mesh: u32,
+    /// The columns of the rotation from the object's frame to the world's: where the object's own
+    /// x, y and z point.
+    pub rotation: [[f32; 3]; 3],
+    /// Where the object's origin is in the world, metres.
+    pub origin: [f32; 3],
+    /// Linear color of the tinted skins.
+    pub tint: Option<[f32; 3]>,
+    /// What lights it.
+    pub lit_by: LitBy,
+}
+
+/// What lights an instance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LitBy {
+    /// The sky and the sun.
+    Sky,
+    /// The lamp of the room it is in, at this point in the world, metres.
+    Lamp([f32; 3]),
+    /// Structure spans rooms: each of its points has the light of the room in front of it, see
+    /// [`Scene::lamp_at`].
+    EachPoint,
+}
+
+/// The square of brightness that a texture repeats.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TileData {
+    /// Side of the square, metres.
+    pub side_m: f32,
+    /// Texels along the side.
+    pub side_texels: usize,
+    /// Factors on the skin's linear color, 128 meaning 1, shape [v, u].
+    pub texels: &'static [u8],
+}
+
+/// The tile of a texture; [`Texture::Plain`] has none.
+pub fn tile(texture: Texture) -> Option<TileData> {
+    let texels = texture.tile()?.finest();
+    Some(TileData { side_m: texture.period_m(), side_texels: texture::SIDE, texels })
+}
+
+impl Scene {
+    /// What can be seen at a moment, at a level of detail; levels past the finest are the finest.
+    /// `postures` are those of the agents in order.
+    pub fn geometry(&self, state: &State, postures: &[Posture], level: usize) -> Geometry {
+        let [geometry] = self.geometry_at(state, postures, [level]);
+        geometry
+    }
+
+    /// The same at all levels of detail, the coarsest first. The instances are the same in each,
+    /// and a mesh of the same index is the same shape.
+    pub fn geometry_at_all_levels(
+        &self,
+        state: &State,
+        postures: &[Posture],
+    ) -> [Geometry; N_LEVELS] {
+        self.geometry_at(state, postures, std::array::from_fn(|level| level))
+    }
+
+    fn geometry_at<const N: usize>(
+        &self,
+        state: &State,
+        postures: &[Posture],
+        levels: [usize; N],
+    ) -> [Geometry; N] {
+        let bodies: Vec<Body> = postures.iter().map(|p| Body::new(p, state.frame)).collect();
+        let frame = self.frame(state, &bodies, false);
+        let mut shapes: Vec<Shape> = Vec::new();
+        let mut known: BTreeMap<ShapeKey, u32> = BTreeMap::new();
+        let mut instances = Vec::with_capacity(frame.instances.len());
+        for instance in &frame.instances {
+            let next = shapes.len() as u32;
+            let mesh = match instance.shape {
+                Shape::Class(class) => *known.entry(class.key()).or_insert(next),
+                Shape::Fixed(_) | Shape::Body(_) => next,
+            };
+            if mesh == next {
+                shapes.push(instance.shape);
+            }
+            instances.push(self.instance_data(instance, mesh));
+        }
+        levels.map(|level| {
+            let mesh_of = |shape: &Shape| MeshData::from(shape.mesh(level.min(FINEST)));
+            Geometry { meshes: shapes.iter().map(mesh_of).collect(), instances: instances.clone() }
+        })
+    }
+
+    fn instance_data(&self, instance: &Instance, mesh: u32) -> InstanceData {
+        let lit_by = match instance.room {
+            None => LitBy::EachPoint,
+            Some(NO_ROOM) => LitBy::Sky,
+            Some(room) => {
+                self.ground().lamp(room).map_or(LitBy::Sky, |at| LitBy::Lamp(at.to_array()))
+            }
+        };
+        InstanceData {
+            entity: instance.entity,
+            mesh,
+            rotation: columns(&instance.rotation),
+            origin: instance.origin.to_array(),
+            tint: instance.tint,
+            lit_by,
+        }
+    }
+
+    /// Where the lamp of the room at a point hangs, metres; none outdoors.
+    pub fn lamp_at(&self, point: Vec3) -> Option<Vec3> {
+        let room = self.ground().room_at(point);
+        if room == NO_ROOM { None } else { self.ground().lamp(room) }
+    }
+}
+
+impl From<&Mesh> for MeshData {
+    fn from(mesh: &Mesh) -> MeshData {
+        let triangles = mesh.triangles.iter().map(|t| TriangleData {
+            corners: t.corners.map(u32::from),
+            skin: t.skin,
+            smooth: t.smooth,
+        });
+        MeshData {
+            positions: mesh.positions.iter().map(Vec3::to_array).collect(),
+            normals: mesh.normals.iter().map(Vec3::to_array).collect(),
+            triangles: triangles.collect(),
+            skins: mesh.skins.iter().map(SkinData::from).collect(),
+            min: mesh.min.to_array(),
+            max: mesh.max.to_array(),
+        }
+    }
+}
+
+impl From<&Skin> for SkinData {
+    fn from(skin: &Skin) -> SkinData {
+        let Skin { color, texture, gloss, axes, tinted } = *skin;
+        SkinData { color, texture, gloss, axes: columns(&axes), tinted }
+    }
+}
+
+fn columns(m: &Mat3) -> [[f32; 3]; 3] {
+    m.to_cols_array_2d()
+}

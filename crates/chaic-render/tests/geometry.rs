@@ -68,8 +68,7 @@ fn rays_meet_what_the_renderer_draws() {
         let images = Scene::new(world.setup()).render(&world, &[view]).pop().expect("one");
         let (depth, ids) = (images.depth_m.expect("asked for"), images.ids.expect("asked for"));
         let geometry = geometry_of(&world, FINEST);
-        let half = 0.5 * SIDE as f32;
-        let focal = half / (0.5 * camera.vertical_fov_rad).tan();
+        let (half, focal) = (0.5 * SIDE as f32, camera.focal_px());
         let (mut n, mut agreeing) = (0, 0);
         for row in (5..SIDE).step_by(11) {
             for column in (5..SIDE).step_by(11) {

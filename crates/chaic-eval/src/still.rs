@@ -79,7 +79,8 @@ pub fn write(still: &Still<'_>, helpers: &dyn Helpers, out: &Path) -> Result<Fra
     Ok(world.state().frame)
 }
 
-fn name_of(entity: EntityId, classes: &[Option<ClassId>]) -> &'static str {
+/// What an entity is called, given the classes of things and people.
+pub(crate) fn name_of(entity: EntityId, classes: &[Option<ClassId>]) -> &'static str {
     match entity {
         EntityId::NOTHING => "nothing",
         EntityId::FLOOR => "floor",

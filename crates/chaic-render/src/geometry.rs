@@ -125,6 +125,30 @@ pub struct TileData {
     pub texels: Vec<u8>,
 }
 
+impl Geometry {
+    /// Takes the instances of an entity out, and the meshes that nobody else uses.
+    pub fn leave_out(&mut self, entity: EntityId) {
+        self.instances.retain(|i| i.entity != entity);
+        let mut kept = vec![None; self.meshes.len()];
+        let mut meshes = Vec::new();
+        for instance in &mut self.instances {
+            let old = instance.mesh as usize;
+            let new = *kept[old].get_or_insert_with(|| {
+                meshes.push(self.meshes[old].clone());
+                meshes.len() as u32 - 1
+            });
+            instance.mesh = new;
+        }
+        self.meshes = meshes;
+    }
+
+    /// Triangles of all instances together.
+    pub fn count_triangles(&self) -> usize {
+        let of = |i: &InstanceData| self.meshes[i.mesh as usize].triangles.len();
+        self.instances.iter().map(of).sum()
+    }
+}
+
 /// The tile of a texture; [`Texture::Plain`] has none.
 pub fn tile(texture: Texture) -> Option<TileData> {
     let begin = texture.tile()?.begin as usize;

@@ -3,7 +3,7 @@
 //! **What it is**: [`Scene`] makes an episode's shapes ready once, [`Scene::render`] draws what
 //! any number of cameras ([`View`]) see at a moment, [`plan::draw`] draws a map for people,
 //! [`image_out`] and [`text`] help to write pictures. [`geometry`] gives the same shapes as plain data,
-//! for other renderers and for files.
+//! for other renderers, and [`gltf_out`] as a file.
 //!
 //! **What it is not**: it changes no state, reads no files, and uses neither GPU nor display.
 //!
@@ -45,6 +45,7 @@ mod shade;
 mod texture;
 
 pub mod geometry;
+pub mod gltf_out;
 pub mod image_out;
 pub mod lighting;
 pub mod plan;

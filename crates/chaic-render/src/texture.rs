@@ -295,6 +295,11 @@ pub(crate) fn linear_from_shown(shown: [u8; 3]) -> [f32; 3] {
     shown.map(|s| (f32::from(s) / 255.0) * (f32::from(s) / 255.0))
 }
 
+/// The inverse: 0 to 255, too bright is white.
+pub(crate) fn shown_from_linear(linear: f32) -> u8 {
+    (255.0 * linear.clamp(0.0, 1.0).sqrt() + 0.5) as u8
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

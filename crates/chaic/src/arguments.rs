@@ -1,5 +1,6 @@
 //! What can be said on the command line.
 
+mod bench;
 mod fidelity;
 
 use std::ops::Range;
@@ -13,6 +14,10 @@ use chaic_eval::rules::RuleSetName;
 use chaic_protocol::{AgentId, TaskId};
 use clap::{Args, Parser, Subcommand};
 
+pub use self::bench::{
+    BenchCommand, BenchFormat, LookedAt, RenderBenchArguments, SceneBenchArguments, SceneCommand,
+    SceneName, WorldBenchArguments,
+};
 pub use self::fidelity::FidelityArguments;
 
 /// Simulator and benchmark for constrained human-AI cooperation.
@@ -42,6 +47,12 @@ pub enum Command {
     /// List, show, make and check episodes.
     #[command(subcommand)]
     Episodes(EpisodesCommand),
+    /// Write a scene for other programs.
+    #[command(subcommand)]
+    Scene(SceneCommand),
+    /// Measure what this machine reaches; docs/performance.md.
+    #[command(subcommand)]
+    Bench(BenchCommand),
     /// Turn episodes from elsewhere into episode files.
     #[command(subcommand)]
     Import(ImportCommand),

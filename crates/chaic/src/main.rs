@@ -33,6 +33,8 @@ fn main() -> ExitCode {
         Command::Replay(arguments) => commands::replay::run(&arguments),
         Command::Render(arguments) => commands::render::run(&arguments),
         Command::Episodes(command) => commands::episodes::run(&command),
+        Command::Scene(command) => commands::scene::run(&command),
+        Command::Bench(command) => commands::bench::run(&command),
         Command::Import(command) => commands::import::run(&command),
         Command::Llm(command) => commands::llm::run(&command),
     };

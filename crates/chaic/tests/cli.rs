@@ -239,6 +239,61 @@ fn pictures_and_episodes() {
 }
 
 #[test]
+fn scenes_as_files_and_what_the_machine_reaches() {
+    let dir = tempfile::tempdir().expect("there is room");
+    let at = dir.path();
+    let id = "shopping/test/00";
+    let said = well(at, &["scene", "export", id, "--out", "s.glb", "--detail", "1"]);
+    let scene = gltf::Gltf::open(at.join("s.glb")).expect("the file is valid");
+    let count = |primitive: gltf::Primitive| primitive.indices().map_or(0, |i| i.count() / 3);
+    let meshes = scene.nodes().filter_map(|node| node.mesh());
+    let triangles: usize = meshes.flat_map(|m| m.primitives()).map(count).sum();
+    assert!(said.contains(&format!("{id} in ")), "{said}");
+    assert!(said.ends_with(&format!(" nodes with {triangles} triangles\n")), "{said}");
+    let names: Vec<&str> = scene.nodes().filter_map(|node| node.name()).collect();
+    for name in ["floor#1", "person#8", "eye of partner", "eye of helper", "bike#"] {
+        assert!(names.iter().any(|n| n.starts_with(name)), "{name}: {names:?}");
+    }
+    let house = "obstacle/test/00";
+    let whole = well(at, &["scene", "export", house, "--out", "a.glb"]);
+    let open = well(at, &["scene", "export", house, "--out", "b.glb", "--no-ceiling"]);
+    assert_ne!(whole.split(' ').nth(3), open.split(' ').nth(3), "{whole}{open}");
+    for (arguments, words) in [
+        (["obstacle/test/99", "--out", "x.glb"], "obstacle/test/99"),
+        ([house, "--out", "nowhere/x.glb"], "can't write nowhere/x.glb"),
+        ([house, "--out", "x.obj"], "ends in .glb"),
+    ] {
+        let said = ill(at, &[&["scene", "export"], &arguments[..]].concat());
+        assert!(said.contains(words) && said.lines().count() <= 4, "{arguments:?}: {said}");
+    }
+
+    let quick = ["--seconds", "0.01", "--format", "json"];
+    let looked_at = ["bench", "render", "--size", "32", "--threads", "2"];
+    let json = well(at, &[&looked_at[..], &quick].concat());
+    let speed: serde_json::Value = serde_json::from_str(&json).expect("it is JSON");
+    assert_eq!((&speed["objects"], &speed["size"]), (&150.into(), &32.into()));
+    assert!(speed["triangles"].as_u64() > Some(10_000), "{speed}");
+    for figure in ["ms_per_frame", "frames_per_second"] {
+        assert!(speed[figure].as_f64() > Some(0.0), "{figure}: {speed}");
+    }
+    let text = well(at, &["bench", "render", "--episode", id, "--size", "32", "--seconds", "0.01"]);
+    assert!(text.starts_with(id) && text.contains("ms a frame"), "{text}");
+    let json = well(at, &[&["bench", "world", "--task", "obstacle,shopping"], &quick[..]].concat());
+    let speeds: serde_json::Value = serde_json::from_str(&json).expect("it is JSON");
+    assert_eq!(speeds[1]["episode"], id);
+    assert!(speeds[0]["frames_per_second"].as_f64() > Some(0.0), "{speeds}");
+    well(at, &["bench", "scene", "--size", "32", "--out", "b"]);
+    let cameras = fs::read_to_string(at.join("b/cameras.json")).expect("it is text");
+    let cameras: serde_json::Value = serde_json::from_str(&cameras).expect("it is JSON");
+    assert_eq!(cameras["cameras"].as_array().map(Vec::len), Some(16));
+    assert!(at.join("b/scene.glb").exists() && at.join("b/chaic.png").exists());
+    for wrong in [["--channels", "rgb+smell"], ["--threads", "0"], ["--seconds", "never"]] {
+        let out = chaic(at, &[&["bench", "render"], &wrong[..]].concat());
+        assert_eq!(out.status.code(), Some(2), "{wrong:?}: {}", self::text(&out.stderr));
+    }
+}
+
+#[test]
 fn wrong_option_values_end_in_the_same_exit_code() {
     let dir = workshop();
     let at = dir.path();

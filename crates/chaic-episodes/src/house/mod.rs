@@ -16,6 +16,8 @@ mod slots;
 mod doors;
 mod populate;
 
+mod full;
+
 use chaic_protocol::TaskId;
 use chaic_protocol::geom::Rect;
 use chaic_world::{Floor, Opening, Room, Setup, Thing, Wall};
@@ -33,6 +35,8 @@ const HOUSE_ATTEMPTS: u64 = 200;
 const EPISODE_ATTEMPTS: u64 = 12;
 /// Houses that an episode is tried in.
 const EPISODE_HOUSES: u64 = 4;
+
+pub use full::full;
 
 /// An empty house with its furniture.
 #[derive(Clone, Debug)]

@@ -1,5 +1,6 @@
 //! The commands, one a file.
 
+pub mod bench;
 pub mod episodes;
 pub mod eval;
 pub mod fidelity;
@@ -8,6 +9,7 @@ pub mod llm;
 pub mod render;
 pub mod replay;
 pub mod report;
+pub mod scene;
 pub mod verify;
 
 mod bars;

@@ -1,0 +1,62 @@
+#!/bin/sh
+# Draws the same scene from the same cameras with chaic and with other renderers that need no GPU,
+# one after the other, each on one and the same core, and prints what a picture costs in processor
+# time. A peer that can't be installed or started is named with the reason.
+#
+# usage: benches/peers/run.sh [SIZE] [SECONDS]        (usual: 512 pixels, 10 seconds each)
+#
+# Environment:
+#   OUT      folder for everything that is made (usual: target/peers)
+#   CHAIC    the program to measure (usual: built by cargo build --release)
+#   PYTHON   the interpreter to make the environment with (usual: python3)
+#   CORE     the core to use (usual: 0)
+#   MUJOCO_GL  egl or osmesa (usual: egl; Debian: libegl1 libgl1-mesa-dri, or libosmesa6)
+set -eu
+
+SIZE=${1:-512}
+SECONDS_EACH=${2:-10}
+HERE=$(cd "$(dirname "$0")" && pwd)
+ROOT=$(cd "$HERE/../.." && pwd)
+OUT=${OUT:-$ROOT/target/peers}
+CORE=${CORE:-0}
+PYTHON=${PYTHON:-python3}
+mkdir -p "$OUT"
+OUT=$(cd "$OUT" && pwd)
+rm -f "$OUT"/peer-* "$OUT"/chaic-*.json
+
+if [ -z "${CHAIC:-}" ]; then
+    (cd "$ROOT" && cargo build --release --quiet)
+    CHAIC=$ROOT/target/release/chaic
+fi
+on_one_core() { taskset -c "$CORE" "$@"; }
+
+"$CHAIC" bench scene --size "$SIZE" --out "$OUT"
+
+for channels in rgb+depth+ids rgb depth+ids; do
+    on_one_core "$CHAIC" bench render --size "$SIZE" --channels "$channels" --threads 1 \
+        --seconds "$SECONDS_EACH" --format json > "$OUT/chaic-$channels.json"
+done
+
+VENV=$OUT/venv
+[ -d "$VENV" ] || "$PYTHON" -m venv "$VENV"
+
+export PYTHONDONTWRITEBYTECODE=1
+# One thread each: Mesa's rasteriser, OpenMP and BLAS start more on their own.
+export LP_NUM_THREADS=1 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+export MUJOCO_GL=${MUJOCO_GL:-egl} LIBGL_ALWAYS_SOFTWARE=1
+
+peer() { # NAME PACKAGE...
+    name=$1
+    shift
+    log=$OUT/peer-$name.log
+    if ! "$VENV/bin/pip" install --quiet --only-binary :all: numpy pillow "$@" > "$log" 2>&1 ||
+        ! on_one_core "$VENV/bin/python" "$HERE/peer_$name.py" "$OUT" \
+            --seconds "$SECONDS_EACH" > "$OUT/peer-$name.jsonl" 2> "$log"; then
+        grep -v '^ *$' "$log" | tail -n 1 > "$OUT/peer-$name.reason"
+    fi
+}
+peer pybullet pybullet
+peer mujoco mujoco
+peer embree open3d-cpu
+
+"$VENV/bin/python" "$HERE/table.py" "$OUT" | tee "$OUT/table.md"

@@ -13,7 +13,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("chaic-protocol", &[]),
     ("chaic-world", &["chaic-protocol"]),
     ("chaic-episodes", &["chaic-protocol", "chaic-world"]),
-    ("chaic-render", &["chaic-protocol", "chaic-world"]),
+    // Only its example draws episodes.
+    ("chaic-render", &["chaic-protocol", "chaic-world", "chaic-episodes"]),
     ("chaic-agents", &["chaic-protocol"]),
     (
         "chaic-eval",

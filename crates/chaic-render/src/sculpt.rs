@@ -1,0 +1,664 @@
+//! Forms richer than the catalogue's solids, for what is only looked at: rounded boxes, cushions,
+//! turned vessels, bent pipes, cut outlines, leaves.
+//!
+//! Everything is given in metres at the catalogue's size, like the catalogue itself: upright forms
+//! by the middle of their bottom, the others by their middle or ends. What is smaller than about a
+//! pixel at the level of detail is left out.
+
+use chaic_protocol::Vec3;
+use chaic_protocol::catalogue::{ClassInfo, Finish, Part, Solid};
+use chaic_protocol::geom::math;
+use glam::Mat3;
+
+use crate::mesh::{Mesh, Place, Section, Skin, circle, length, unit};
+use crate::solids::{self, Detail, place_of};
+
+/// What is painted next: color and finish.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Paint {
+    pub color: [u8; 3],
+    pub finish: Finish,
+    /// Whether an object's variant recolors it.
+    pub tinted: bool,
+}
+
+/// A paint of a fixed color.
+pub(crate) const fn paint(color: [u8; 3], finish: Finish) -> Paint {
+    Paint { color, finish, tinted: false }
+}
+
+/// A place in metres.
+pub(crate) type P = [f32; 3];
+
+/// Builds the mesh of one class at one level of detail.
+pub(crate) struct Sculptor {
+    pub class: &'static ClassInfo,
+    /// Which of the class's styles.
+    pub style: u8,
+    pub level: usize,
+    detail: Detail,
+    mesh: Mesh,
+    now: Paint,
+    /// The paint and axes of the mesh's last skin.
+    last: Option<(Paint, Mat3)>,
+}
+
+impl Sculptor {
+    pub fn new(class: &'static ClassInfo, style: u8, level: usize) -> Sculptor {
+        let detail = Detail::of_level(level, 0.5 * length(Vec3::from(class.size_m)));
+        let now = paint([200; 3], Finish::Matte);
+        Sculptor { class, style, level, detail, mesh: Mesh::default(), now, last: None }
+    }
+
+    /// What was built.
+    pub fn mesh(self) -> Mesh {
+        self.mesh
+    }
+
+    /// What follows is painted so.
+    pub fn paint(&mut self, paint: Paint) {
+        self.now = paint;
+    }
+
+    /// The paint of the class's main part, which its variant recolors.
+    pub fn main(&self) -> Paint {
+        let part = &self.class.parts[0];
+        Paint { color: part.color, finish: part.finish, tinted: !self.class.palette.is_empty() }
+    }
+
+    /// The main paint, or for a class without alternatives one of these by style.
+    pub fn main_or(&self, others: &[[u8; 3]]) -> Paint {
+        let mut main = self.main();
+        if !main.tinted {
+            main.color = self.pick(0, others);
+        }
+        main
+    }
+
+    /// One of the options, by style; different slots choose independently.
+    pub fn pick<T: Copy>(&self, slot: u32, options: &[T]) -> T {
+        options[self.chance(slot) as usize % options.len().max(1)]
+    }
+
+    /// A number that depends on class, style and slot only.
+    pub fn chance(&self, slot: u32) -> u32 {
+        // The first four styles take the first four options of slot 0.
+        if slot == 0 {
+            return u32::from(self.style);
+        }
+        scramble(slot.wrapping_mul(64) + u32::from(self.style)) >> 8
+    }
+
+    /// Whether something of this size, metres, covers about a pixel.
+    pub fn shows(&self, size_m: f32) -> bool {
+        size_m * self.detail.px_per_m > 0.9
+    }
+
+    fn shows_extent(&self, e: Vec3) -> bool {
+        let largest = e.max_element();
+        let middle = e.x.max(e.y).min(e.x.max(e.z)).min(e.y.max(e.z));
+        match self.level {
+            // The smallest pictures show the main parts only.
+            0 => self.shows(0.35 * largest) && self.shows(0.8 * middle),
+            _ => self.shows(0.7 * largest) && self.shows(1.6 * middle),
+        }
+    }
+
+    /// Begins a skin whose grain runs along the place.
+    fn skin(&mut self, place: &Place) {
+        let plain = matches!(self.now.finish, Finish::Matte | Finish::Glossy | Finish::Glass);
+        let axes = if plain { Mat3::IDENTITY } else { place.grain() };
+        if self.last != Some((self.now, axes)) {
+            let mut skin = Skin::new(self.now.color, self.now.finish).with_axes(axes);
+            skin.tinted = self.now.tinted;
+            self.mesh.skin(skin);
+            self.last = Some((self.now, axes));
+        }
+    }
+
+    fn plain_skin(&mut self) {
+        self.skin(&Place::upright(Vec3::ZERO, Vec3::ONE));
+    }
+
+    // The catalogue's own parts.
+
+    /// Every part of the class, with its edges rounded.
+    pub fn all(&mut self) {
+        self.without(&[]);
+    }
+
+    /// Every part but these.
+    pub fn without(&mut self, left_out: &[usize]) {
+        for k in (0..self.class.parts.len()).filter(|k| !left_out.contains(k)) {
+            self.part(k);
+        }
+    }
+
+    /// These parts.
+    pub fn only(&mut self, parts: &[usize]) {
+        for k in parts {
+            self.part(*k);
+        }
+    }
+
+    /// One part, in its own color.
+    pub fn part(&mut self, k: usize) {
+        let Some(part) = self.class.parts.get(k) else { return };
+        let main = self.main();
+        let tinted = main.tinted && part.color == main.color;
+        self.now = Paint { color: part.color, finish: part.finish, tinted };
+        self.shape(part);
+    }
+
+    /// One part in the present paint.
+    pub fn shape(&mut self, part: &Part) {
+        let place = place_of(part, Vec3::from(self.class.size_m));
+        if !part.collides && !self.shows_extent(place.extent) {
+            return;
+        }
+        self.skin(&place);
+        let detail = self.detail;
+        match part.solid {
+            Solid::Cuboid => {
+                let least = place.extent.min_element();
+                let round = match part.finish {
+                    Finish::Fabric => (0.3 * least).min(0.05),
+                    Finish::Crust | Finish::Skin => 0.3 * least,
+                    _ => (0.2 * least).min(0.008),
+                };
+                self.rounded(&place, round);
+            }
+            Solid::Frustum { top } if top > 0.05 => {
+                let n = detail.corners(0.5 * place.extent.x.max(place.extent.z));
+                let [r0, r1] = if top > 1.0 { [0.5 / top, 0.5] } else { [0.5, 0.5 * top] };
+                let bevel = 0.12 * place.extent.min_element();
+                let (by, bx) = (bevel / place.extent.y, bevel / place.extent.x.max(place.extent.z));
+                if self.shows(1.2 * bevel) {
+                    let outline = [[r0 - bx, -0.5], [r0, by - 0.5], [r1, 0.5 - by], [r1 - bx, 0.5]];
+                    lathe(&mut self.mesh, &place, &outline, n);
+                } else {
+                    solids::frustum(&mut self.mesh, &place, top, n);
+                }
+            }
+            form => solids::solid(&mut self.mesh, form, &place, detail),
+        }
+    }
+
+    fn rounded(&mut self, place: &Place, round_m: f32) {
+        if self.shows(1.2 * round_m) {
+            rounded_box(&mut self.mesh, place, round_m.min(0.49 * place.extent.min_element()));
+        } else {
+            solids::cuboid(&mut self.mesh, place);
+        }
+    }
+
+    // Forms.
+
+    /// An upright box with rounded edges.
+    pub fn block(&mut self, bottom: P, size: P, round_m: f32) {
+        let middle = [bottom[0], bottom[1] + 0.5 * size[1], bottom[2]];
+        self.block_turned(middle, size, [0.0; 3], round_m);
+    }
+
+    /// A box about its middle, turned (degrees about z, then x, then y).
+    pub fn block_turned(&mut self, middle: P, size: P, turn_deg: P, round_m: f32) {
+        let place = turned(middle, size, turn_deg);
+        if self.shows_extent(place.extent) {
+            self.skin(&place);
+            self.rounded(&place, round_m);
+        }
+    }
+
+    /// An ellipsoid standing on `bottom`.
+    pub fn ball(&mut self, bottom: P, size: P) {
+        let middle = [bottom[0], bottom[1] + 0.5 * size[1], bottom[2]];
+        self.ball_turned(middle, size, [0.0; 3]);
+    }
+
+    /// An ellipsoid about its middle, turned.
+    pub fn ball_turned(&mut self, middle: P, size: P, turn_deg: P) {
+        let place = turned(middle, size, turn_deg);
+        if self.shows_extent(place.extent) {
+            self.skin(&place);
+            let n = self.detail.corners(0.5 * place.extent.max_element());
+            solids::ellipsoid(&mut self.mesh, &place, n);
+        }
+    }
+
+    /// A cushion about its middle: something between a box (`soft` 0) and an ellipsoid (1).
+    pub fn pillow(&mut self, middle: P, size: P, turn_deg: P, soft: f32) {
+        let place = turned(middle, size, turn_deg);
+        if self.shows_extent(place.extent) {
+            self.skin(&place);
+            let n = self.detail.corners(0.5 * place.extent.max_element()).max(8) / 4 * 4;
+            pillow(&mut self.mesh, &place, soft.clamp(0.15, 1.0), n);
+        }
+    }
+
+    /// A lump: an ellipsoid about its middle with flat facets pushed in and out by up to `rough`.
+    pub fn lump(&mut self, middle: P, size: P, rough: f32, seed: u32) {
+        let place = turned(middle, size, [0.0; 3]);
+        if self.shows_extent(place.extent) {
+            self.skin(&place);
+            let n = self.detail.corners(0.7 * place.extent.max_element()).min(18);
+            lump(&mut self.mesh, &place, rough, seed, n);
+        }
+    }
+
+    /// Something turned on a lathe: its outline as (radius, height above `bottom`), from the bottom
+    /// up along the outside and, for vessels, down again along the inside; or back to its first
+    /// point, for a ring.
+    pub fn lathe(&mut self, bottom: P, outline: &[[f32; 2]]) {
+        self.lathe_along(bottom, [0.0, 1.0, 0.0], outline);
+    }
+
+    /// The same about the axis that points from `start` in a direction.
+    pub fn lathe_along(&mut self, start: P, axis: P, outline: &[[f32; 2]]) {
+        let wide = outline.iter().fold(0.0f32, |w, p| w.max(p[0]));
+        let high = outline.iter().fold(0.0f32, |w, p| w.max(p[1].abs()));
+        if !self.shows_extent(Vec3::new(2.0 * wide, high, 2.0 * wide)) {
+            return;
+        }
+        let place =
+            Place { center: Vec3::from(start), axes: upright_along(axis), extent: Vec3::ONE };
+        self.plain_skin();
+        let n = self.detail.corners(wide);
+        lathe(&mut self.mesh, &place, outline, n);
+    }
+
+    /// A straight rod.
+    pub fn rod(&mut self, from: P, to: P, radius_m: f32) {
+        self.taper(from, to, radius_m, radius_m);
+    }
+
+    /// A straight rod that changes its radius.
+    pub fn taper(&mut self, from: P, to: P, radius_from: f32, radius_to: f32) {
+        self.sweep(&[(from, radius_from), (to, radius_to)]);
+    }
+
+    /// A pipe of one radius along a smooth curve through the points.
+    pub fn pipe(&mut self, points: &[P], radius_m: f32) {
+        let points: Vec<(P, f32)> = points.iter().map(|p| (*p, radius_m)).collect();
+        self.curve(&points);
+    }
+
+    /// A pipe through the points with a radius at each, along a smooth curve.
+    pub fn curve(&mut self, points: &[(P, f32)]) {
+        let way: f32 =
+            points.windows(2).map(|w| length(Vec3::from(w[1].0) - Vec3::from(w[0].0))).sum();
+        let per_span = (self.detail.corners(0.4 * way) / points.len().max(1)).clamp(1, 6);
+        let mut fine = Vec::with_capacity(points.len() * per_span);
+        let at = |k: isize| points[k.clamp(0, points.len() as isize - 1) as usize];
+        for k in 0..points.len().saturating_sub(1) as isize {
+            let [a, b, c, d] = [at(k - 1), at(k), at(k + 1), at(k + 2)];
+            for j in 0..per_span {
+                let t = j as f32 / per_span as f32;
+                let p = std::array::from_fn(|i| catmull_rom([a.0[i], b.0[i], c.0[i], d.0[i]], t));
+                fine.push((p, b.1 + (c.1 - b.1) * t));
+            }
+        }
+        fine.extend(points.last());
+        self.sweep(&fine);
+    }
+
+    /// A round pipe with corners where the points are.
+    pub fn sweep(&mut self, points: &[(P, f32)]) {
+        let wide = points.iter().fold(0.0f32, |w, p| w.max(p.1));
+        let way: f32 =
+            points.windows(2).map(|w| length(Vec3::from(w[1].0) - Vec3::from(w[0].0))).sum();
+        if points.len() < 2 || !self.shows_extent(Vec3::new(2.0 * wide, way, 2.0 * wide)) {
+            return;
+        }
+        let n = self.detail.corners(wide).min(16);
+        let n = if self.level < 2 { n.min(6) } else { n };
+        let end = points[points.len() - 1].0;
+        let place = Place {
+            center: Vec3::ZERO,
+            axes: upright_along([
+                end[0] - points[0].0[0],
+                end[1] - points[0].0[1],
+                end[2] - points[0].0[2],
+            ]),
+            extent: Vec3::new(0.1, 1.0, 0.1),
+        };
+        self.skin(&place);
+        let mut sections = Vec::with_capacity(points.len());
+        let mut side = Vec3::ZERO;
+        for k in 0..points.len() {
+            let (before, after) = (k.saturating_sub(1), (k + 1).min(points.len() - 1));
+            let along = unit(Vec3::from(points[after].0) - Vec3::from(points[before].0));
+            let hint = if side != Vec3::ZERO {
+                side
+            } else if along.x.abs() < 0.7 {
+                Vec3::X
+            } else {
+                Vec3::Z
+            };
+            side = unit(hint - along * along.dot(hint));
+            let radius = points[k].1.max(1e-4);
+            let (a, b) = (side * radius, side.cross(along) * radius);
+            sections.push(Section { center: Vec3::from(points[k].0), a, b });
+        }
+        self.mesh.tube(&sections, n);
+    }
+
+    /// A leaf from `root` to `tip`, `width_m` wide, sagging in its middle by `sag_m`.
+    pub fn leaf(&mut self, root: P, tip: P, width_m: f32, sag_m: f32) {
+        let (root, tip) = (Vec3::from(root), Vec3::from(tip));
+        let long = length(tip - root);
+        if !self.shows_extent(Vec3::new(width_m, long, 0.0)) {
+            return;
+        }
+        self.plain_skin();
+        let along = unit(tip - root);
+        let side = unit(along.cross(Vec3::Y) + Vec3::X * 1e-3);
+        let thick = side.cross(along) * (0.04 * width_m).max(0.0006);
+        let shape: &[[f32; 2]] = if self.level < 2 {
+            &[[0.0, 0.1], [0.45, 1.0], [1.0, 0.04]]
+        } else {
+            &[[0.0, 0.1], [0.2, 0.7], [0.45, 1.0], [0.75, 0.65], [1.0, 0.04]]
+        };
+        let sections: Vec<Section> = shape
+            .iter()
+            .map(|[t, w]| Section {
+                center: root + (tip - root) * *t + Vec3::Y * (sag_m * 4.0 * t * (1.0 - t)),
+                a: side * (0.5 * width_m * w),
+                b: thick * (0.3 + 0.7 * w),
+            })
+            .collect();
+        self.mesh.tube(&sections, if self.level < 2 { 4 } else { 6 });
+    }
+
+    /// A ring about `middle` in the plane square to `axis`.
+    pub fn hoop(&mut self, middle: P, axis: P, radius_m: f32, tube_radius_m: f32) {
+        let outer = 2.0 * (radius_m + tube_radius_m);
+        let tube = 2.0 * tube_radius_m;
+        if self.shows(tube) {
+            let extent = Vec3::new(outer, tube, outer);
+            let place = Place { center: Vec3::from(middle), axes: upright_along(axis), extent };
+            self.skin(&place);
+            solids::solid(&mut self.mesh, Solid::Torus { tube: tube / outer }, &place, self.detail);
+        }
+    }
+
+    /// An outline in the plane of the turned x and y axes, counter-clockwise seen from +z and seen
+    /// whole from its middle, `thick_m` thick.
+    pub fn cut(&mut self, middle: P, outline: &[[f32; 2]], thick_m: f32, turn_deg: P) {
+        let (mut low, mut high) = ([f32::MAX; 2], [f32::MIN; 2]);
+        for p in outline {
+            for k in 0..2 {
+                (low[k], high[k]) = (low[k].min(p[k]), high[k].max(p[k]));
+            }
+        }
+        let place = turned(middle, [high[0] - low[0], high[1] - low[1], thick_m], turn_deg);
+        if self.shows_extent(place.extent) {
+            self.skin(&place);
+            let place = Place { extent: Vec3::ONE, ..place };
+            cut(&mut self.mesh, &place, outline, thick_m);
+        }
+    }
+
+    /// A piece of a round wall about the vertical through `bottom`: between two radii, two heights
+    /// and two angles (degrees; 0 is the front, -z; 90 is +x).
+    pub fn sector(&mut self, bottom: P, radii: [f32; 2], heights: [f32; 2], angles_deg: [f32; 2]) {
+        let turn = (angles_deg[1] - angles_deg[0]).to_radians();
+        let extent = Vec3::new(radii[1] * turn, heights[1] - heights[0], radii[1] - radii[0]);
+        if self.shows_extent(extent) {
+            self.plain_skin();
+            let n = (self.detail.corners(radii[1]) as f32 * turn / std::f32::consts::TAU) as usize;
+            sector(&mut self.mesh, Vec3::from(bottom), radii, heights, angles_deg, n.max(1));
+        }
+    }
+}
+
+/// A number from a number, evenly spread.
+pub(crate) fn scramble(x: u32) -> u32 {
+    let x = (x ^ (x >> 16)).wrapping_mul(0x7feb_352d);
+    let x = (x ^ (x >> 15)).wrapping_mul(0x846c_a68b);
+    x ^ (x >> 16)
+}
+
+fn turned(middle: P, size: P, turn_deg: P) -> Place {
+    let part = Part::new(Solid::Cuboid, middle, size, [0; 3], Finish::Matte).turned(turn_deg);
+    place_of(&part, Vec3::ONE)
+}
+
+/// Axes whose y points in a direction.
+fn upright_along(axis: P) -> Mat3 {
+    let y = unit(Vec3::from(axis));
+    let hint = if y.y.abs() > 0.99 { Vec3::X } else { y.cross(Vec3::Y) };
+    let x = unit(hint - y * y.dot(hint));
+    Mat3::from_cols(x, y, x.cross(y))
+}
+
+fn catmull_rom([a, b, c, d]: [f32; 4], t: f32) -> f32 {
+    let (t2, t3) = (t * t, t * t * t);
+    0.5 * (2.0 * b
+        + (c - a) * t
+        + (2.0 * a - 5.0 * b + 4.0 * c - d) * t2
+        + (3.0 * b - a - 3.0 * c + d) * t3)
+}
+
+/// A box whose edges are cut by `r` and shaded round.
+pub(crate) fn rounded_box(mesh: &mut Mesh, place: &Place, r: f32) {
+    let base = mesh.positions.len();
+    let sign = |k: usize, axis: usize| if k >> axis & 1 == 1 { 1.0f32 } else { -1.0 };
+    let half = 0.5 * place.extent;
+    for k in 0..8 {
+        let out = Vec3::new(sign(k, 0), sign(k, 1), sign(k, 2));
+        for face in 0..3 {
+            let axis = Vec3::AXES[face];
+            let p = out * (half - Vec3::splat(r) + axis * r);
+            mesh.corner(place.center + place.axes * p, place.axes * (out * axis));
+        }
+    }
+    let at = |k: usize, face: usize| base + 3 * k + face;
+    for (q, face) in [
+        ([0, 4, 6, 2], 0),
+        ([1, 3, 7, 5], 0),
+        ([0, 1, 5, 4], 1),
+        ([2, 6, 7, 3], 1),
+        ([0, 2, 3, 1], 2),
+        ([4, 5, 7, 6], 2),
+    ] {
+        mesh.quad(q.map(|k| at(k, face)), false);
+    }
+    for edge in 0..3 {
+        let (f, g) = ((edge + 1) % 3, (edge + 2) % 3);
+        for k in (0..8usize).filter(|k| k >> edge & 1 == 0) {
+            let l = k | 1 << edge;
+            let mut quad = [at(k, f), at(k, g), at(l, g), at(l, f)];
+            if sign(k, f) * sign(k, g) < 0.0 {
+                quad.reverse();
+            }
+            mesh.quad(quad, true);
+        }
+    }
+    for k in 0..8 {
+        let mut corners = [at(k, 0), at(k, 1), at(k, 2)];
+        if sign(k, 0) * sign(k, 1) * sign(k, 2) < 0.0 {
+            corners.reverse();
+        }
+        mesh.triangle(corners, true);
+    }
+}
+
+/// A grid of `stacks` by `n` around the y axis: the point (in [-0.5, 0.5]^3) and normal of the
+/// unit form for a latitude and a longitude, radians.
+fn globe(
+    mesh: &mut Mesh,
+    place: &Place,
+    (stacks, n): (usize, usize),
+    smooth: bool,
+    form: impl Fn(f32, f32) -> (Vec3, Vec3),
+) {
+    let pi = std::f32::consts::PI;
+    let add = |mesh: &mut Mesh, lat: f32, k: usize| {
+        let (p, normal) = form(lat, 2.0 * pi * k as f32 / n as f32);
+        mesh.corner(place.point(p), place.normal(normal))
+    };
+    let bottom = add(mesh, -0.5 * pi, 0);
+    let mut below = None;
+    for j in 1..stacks {
+        let lat = pi * (j as f32 / stacks as f32 - 0.5);
+        let ring = mesh.positions.len();
+        for k in 0..n {
+            add(mesh, lat, k);
+        }
+        match below {
+            None => {
+                for k in 0..n {
+                    mesh.triangle([bottom, ring + k, ring + (k + 1) % n], smooth);
+                }
+            }
+            Some(low) => mesh.band(low, ring, n, smooth),
+        }
+        below = Some(ring);
+    }
+    let (top, last) = (add(mesh, 0.5 * pi, 0), below.unwrap_or(bottom));
+    for k in 0..n {
+        mesh.triangle([top, last + (k + 1) % n, last + k], smooth);
+    }
+}
+
+fn pillow(mesh: &mut Mesh, place: &Place, soft: f32, n: usize) {
+    let power = |x: f32, e: f32| {
+        let size = math::powf(x.abs().max(1e-6), e);
+        if x < 0.0 { -size } else { size }
+    };
+    let stacks = (n / 2).clamp(4, 10) / 2 * 2;
+    globe(mesh, place, (stacks, n), true, |lat, lon| {
+        let (sy, cy) = (math::sin(lat), math::cos(lat));
+        let (sx, cx) = (math::sin(lon), math::cos(lon));
+        let r = power(cy, soft);
+        let p = Vec3::new(r * power(cx, soft), power(sy, soft), r * power(sx, soft));
+        let q = power(cy, 2.0 - soft);
+        let normal =
+            Vec3::new(q * power(cx, 2.0 - soft), power(sy, 2.0 - soft), q * power(sx, 2.0 - soft));
+        (0.5 * p, normal)
+    });
+}
+
+fn lump(mesh: &mut Mesh, place: &Place, rough: f32, seed: u32, n: usize) {
+    let stacks = (n / 2).max(3);
+    globe(mesh, place, (stacks, n), false, |lat, lon| {
+        let (y, r) = (math::sin(lat), math::cos(lat));
+        let d = Vec3::new(r * math::cos(lon), y, r * math::sin(lon));
+        let key = [lat, lon].map(|a| ((a + 10.0) * 100.0) as u32);
+        let h = scramble(seed ^ scramble(key[0] ^ scramble(key[1]))) as f32 / u32::MAX as f32;
+        (0.5 * d * (1.0 - rough * h), d)
+    });
+}
+
+/// Revolves an outline of (radius, height) about the place's y axis, in units of its extents. An
+/// outline that ends where it begins makes a ring; others are closed with lids.
+fn lathe(mesh: &mut Mesh, place: &Place, outline: &[[f32; 2]], n: usize) {
+    let m = outline.len();
+    if m < 2 {
+        return;
+    }
+    let slope = |j: usize| {
+        let ([r0, y0], [r1, y1]) = (outline[j], outline[j + 1]);
+        let (dr, dy) = (r1 - r0, y1 - y0);
+        let l = (dr * dr + dy * dy).sqrt().max(1e-9);
+        [dy / l, -dr / l]
+    };
+    let ring = |mesh: &mut Mesh, [r, y]: [f32; 2], [nr, ny]: [f32; 2]| {
+        let base = mesh.positions.len();
+        for k in 0..n {
+            let (c, s) = circle(k, n);
+            let p = place.point(Vec3::new(r * c, y, r * s));
+            mesh.corner(p, place.normal(Vec3::new(nr * c, ny, nr * s)));
+        }
+        base
+    };
+    let mut first = None;
+    let mut last = 0;
+    let mut bent = None;
+    for j in 0..m - 1 {
+        let here = slope(j);
+        let low = match bent {
+            Some(ring) => ring,
+            None => ring(mesh, outline[j], here),
+        };
+        first.get_or_insert(low);
+        // Outlines that bend little are shaded round.
+        let next = (j + 2 < m).then(|| slope(j + 1));
+        let joined = next.filter(|s| s[0] * here[0] + s[1] * here[1] > 0.6);
+        let normal = joined.map_or(here, |s| [s[0] + here[0], s[1] + here[1]]);
+        let high = ring(mesh, outline[j + 1], normal);
+        bent = joined.map(|_| high);
+        for k in 0..n {
+            let l = (k + 1) % n;
+            if outline[j + 1][0] > 1e-5 {
+                mesh.triangle([low + k, high + k, high + l], true);
+            }
+            if outline[j][0] > 1e-5 {
+                mesh.triangle([low + k, high + l, low + l], true);
+            }
+        }
+        last = high;
+    }
+    if outline[0] == outline[m - 1] {
+        return;
+    }
+    if outline[0][0] > 1e-5 {
+        mesh.lid(first.unwrap_or(last), n, true);
+    }
+    if outline[m - 1][0] > 1e-5 {
+        mesh.lid(last, n, false);
+    }
+}
+
+fn cut(mesh: &mut Mesh, place: &Place, outline: &[[f32; 2]], thick_m: f32) {
+    let n = outline.len();
+    let middle = outline.iter().fold([0.0; 2], |m, p| [m[0] + p[0], m[1] + p[1]]);
+    let [mx, my] = middle.map(|x| x / n as f32);
+    let half = 0.5 * thick_m;
+    let mut layer = |z: f32| {
+        let base = mesh.positions.len();
+        for [x, y] in outline {
+            mesh.corner(place.point(Vec3::new(*x, *y, z)), Vec3::Y);
+        }
+        let center = mesh.corner(place.point(Vec3::new(mx, my, z)), Vec3::Y);
+        (base, center)
+    };
+    let ((back, back_middle), (front, front_middle)) = (layer(-half), layer(half));
+    for k in 0..n {
+        let l = (k + 1) % n;
+        mesh.triangle([front_middle, front + k, front + l], false);
+        mesh.triangle([back_middle, back + l, back + k], false);
+        mesh.quad([back + k, back + l, front + l, front + k], false);
+    }
+}
+
+fn sector(
+    mesh: &mut Mesh,
+    bottom: Vec3,
+    radii: [f32; 2],
+    heights: [f32; 2],
+    angles_deg: [f32; 2],
+    n: usize,
+) {
+    let base = mesh.positions.len();
+    for k in 0..=n {
+        let t = k as f32 / n as f32;
+        let a = (angles_deg[0] + (angles_deg[1] - angles_deg[0]) * t).to_radians();
+        let out = Vec3::new(math::sin(a), 0.0, -math::cos(a));
+        for (radius, sign) in [(radii[0], -1.0), (radii[1], 1.0)] {
+            for y in heights {
+                mesh.corner(bottom + out * radius + Vec3::Y * y, out * sign);
+            }
+        }
+    }
+    // Corners of a slice: 0 inside low, 1 inside high, 2 outside low, 3 outside high.
+    let at = |k: usize, corner: usize| base + 4 * k + corner;
+    for k in 0..n {
+        mesh.quad([at(k, 2), at(k, 3), at(k + 1, 3), at(k + 1, 2)], true);
+        mesh.quad([at(k, 0), at(k + 1, 0), at(k + 1, 1), at(k, 1)], true);
+        mesh.quad([at(k, 1), at(k + 1, 1), at(k + 1, 3), at(k, 3)], false);
+        mesh.quad([at(k, 0), at(k, 2), at(k + 1, 2), at(k + 1, 0)], false);
+    }
+    mesh.quad([at(0, 0), at(0, 1), at(0, 3), at(0, 2)], false);
+    mesh.quad([at(n, 0), at(n, 2), at(n, 3), at(n, 1)], false);
+}

@@ -18,6 +18,7 @@ use chaic_render::text::{self, Align};
 use chaic_render::{Channels, N_LEVELS, Scene, View, image_out, plan};
 use chaic_world::{Posture, Setup, Thing, World};
 use image::RgbImage;
+use image::codecs::png::{CompressionType, FilterType as PngFilter, PngEncoder};
 use image::imageops::{FilterType, resize};
 use scenes::{camera, posture};
 
@@ -107,6 +108,13 @@ fn seen(
     resize(&large, width, height, FilterType::Triangle)
 }
 
+/// Writes a picture as small as can be.
+fn save(picture: &RgbImage, path: &Path) -> image::ImageResult<()> {
+    let file = std::io::BufWriter::new(std::fs::File::create(path)?);
+    let encoder = PngEncoder::new_with_quality(file, CompressionType::Best, PngFilter::Adaptive);
+    picture.write_with_encoder(encoder)
+}
+
 fn label(picture: &mut RgbImage, words: &str) {
     text::draw(picture, (3.0, 2.0), 11.0, [20; 3], Align::Left, words);
 }
@@ -117,7 +125,7 @@ fn classes(folder: &Path) -> image::ImageResult<()> {
     for (page, group) in all.chunks(all.len().div_ceil(3)).enumerate() {
         let pictures = group.iter().flat_map(|c| (0..4).map(|v| portrait(*c, v)));
         let pictures: Vec<RgbImage> = pictures.collect();
-        image_out::grid(&pictures, 12).save(folder.join(format!("classes_{page}.png")))?;
+        save(&image_out::grid(&pictures, 12), &folder.join(format!("classes_{page}.png")))?;
     }
     Ok(())
 }
@@ -133,16 +141,18 @@ fn nowhere() -> Setup {
 }
 
 fn portrait(class: ClassId, variant: u8) -> RgbImage {
-    const SIDE_PX: u32 = 112;
+    const SIDE_PX: u32 = 104;
     let mut setup = nowhere();
     let thing = Thing::new(class, Vec3::ZERO, std::f32::consts::PI);
     setup.things.push(Thing { fixed: true, variant, ..thing });
     let size = Vec3::from(class.info().size_m);
-    let away = 1.32 * size.length();
+    // The lens of an eye begins at a few centimetres: what is tiny is seen through a longer one.
+    let near = 1.32 * size.length();
+    let away = near.max(0.25);
     let eye = [0.55 * away, 0.5 * size.y + 0.55 * away, 0.95 * away];
     let down = -chaic_protocol::geom::math::atan2(0.55, 1.098);
     let camera = camera(eye, 0.5248, down, SIDE_PX, SIDE_PX);
-    let camera = Camera { vertical_fov_rad: 0.62, ..camera };
+    let camera = Camera { vertical_fov_rad: 0.62 * near / away, ..camera };
     let world = scenes::world(setup);
     let mut picture = picture(&Scene::new(world.setup()), &world, &[], camera);
     if variant == 0 {
@@ -168,8 +178,8 @@ fn people(folder: &Path) -> image::ImageResult<()> {
             pictures.push(picture);
         }
     }
-    image_out::grid(&pictures, 9).save(folder.join("people.png"))?;
-    together().save(folder.join("people_together.png"))
+    save(&image_out::grid(&pictures, 9), &folder.join("people.png"))?;
+    save(&together(), &folder.join("people_together.png"))
 }
 
 fn arms(mut p: Posture, y: f32, z: f32, grips: [bool; 2]) -> Posture {
@@ -249,6 +259,6 @@ fn tasks(folder: &Path) -> Result<()> {
         label(&mut picture, task.name());
         pictures.push(picture);
     }
-    image_out::grid(&pictures, 4).save(folder.join("task_views.png"))?;
+    save(&image_out::grid(&pictures, 4), &folder.join("task_views.png"))?;
     Ok(())
 }

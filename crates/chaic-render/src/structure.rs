@@ -22,11 +22,14 @@ pub(crate) fn of(setup: &Setup) -> Vec<(EntityId, Mesh)> {
     for (rect, material, color) in floor_pieces(setup) {
         structure.push((EntityId::FLOOR, floor_mesh(&rect, material, color)));
     }
+    let papers = walls::papers(setup);
     for wall in &setup.walls {
-        structure.push((EntityId::WALL, walls::mesh(setup, wall)));
+        structure.push((EntityId::WALL, walls::mesh(setup, wall, &papers)));
     }
     for opening in setup.openings.iter().take(MAX_PIECES) {
-        structure.extend(joinery::door_frame(setup, opening).map(|m| (EntityId::WALL, m)));
+        let meshes = joinery::door_frame(setup, opening).into_iter().flatten();
+        let meshes = meshes.filter(|m| !m.triangles.is_empty());
+        structure.extend(meshes.map(|m| (EntityId::WALL, m)));
     }
     if let Some(height) = setup.ceiling_m {
         for rect in ceiling_pieces(setup) {
@@ -149,35 +152,94 @@ mod tests {
     use super::*;
     use chaic_protocol::briefing::Goal;
     use chaic_protocol::{Frame, TaskId, Vec2};
+    use chaic_world::{Opening, Wall};
 
-    #[test]
-    fn there_is_a_ceiling_over_every_room_and_doorway() {
+    /// Two rooms and a wall of 0.5 m between them with a doorway 0.9 m wide; an alcove is beside
+    /// the second.
+    fn two_rooms() -> Setup {
         let room = |rect| Room { kind: RoomKind::Office, rect };
-        let setup = Setup {
+        let wall = |a: [f32; 2], b: [f32; 2], [bottom_m, top_m]: [f32; 2]| Wall {
+            a: a.into(),
+            b: b.into(),
+            thickness_m: 0.5,
+            bottom_m,
+            top_m,
+            color: [230; 3],
+        };
+        Setup {
             task: TaskId::NoConstraint,
             seed: 0,
             horizon: Frame::default(),
             bounds: Rect::new([0.0, 0.0], [5.0, 4.0]),
             ceiling_m: Some(3.0),
-            // A wall of 0.5 m with a doorway lies between them, an alcove beside the second.
             rooms: vec![
                 room(Rect::new([0.0, 0.0], [2.0, 4.0])),
                 room(Rect::new([2.5, 0.0], [5.0, 2.0])),
             ],
-            walls: Vec::new(),
-            openings: Vec::new(),
+            // Boxes are half a thickness longer at either end.
+            walls: vec![
+                wall([2.25, 0.25], [2.25, 0.35], [0.0, 3.0]),
+                wall([2.25, 1.75], [2.25, 3.75], [0.0, 3.0]),
+                wall([2.25, 0.85], [2.25, 1.25], [2.1, 3.0]),
+                wall([0.25, -0.25], [4.75, -0.25], [0.0, 3.0]),
+            ],
+            openings: vec![Opening {
+                a: Vec2::new(2.25, 0.6),
+                b: Vec2::new(2.25, 1.5),
+                rooms: [0, 1],
+            }],
             floors: Vec::new(),
             things: Vec::new(),
             people: Vec::new(),
             goal: Goal { targets: Vec::new() },
             goal_places: Vec::new(),
-        };
-        let pieces = ceiling_pieces(&setup);
+        }
+    }
+
+    #[test]
+    fn there_is_a_ceiling_over_every_room_and_doorway() {
+        let pieces = ceiling_pieces(&two_rooms());
         for i in 0..50 {
             for k in 0..40 {
                 let p = 0.1 * Vec2::new(i as f32 + 0.5, k as f32 + 0.5);
                 assert!(pieces.iter().any(|r| r.contains(p)), "none above {p}");
             }
         }
+    }
+
+    #[test]
+    fn a_door_frame_leaves_the_way_free() {
+        let setup = two_rooms();
+        let [sides, above] = joinery::door_frame(&setup, &setup.openings[0]).expect("a frame");
+        for p in &sides.positions {
+            assert!(p.z < 0.61 || p.z > 1.49, "{p} stands in the way");
+        }
+        for p in sides.positions.iter().chain(&above.positions) {
+            assert!((p.x - 2.25).abs() < 0.28, "{p} is far off the wall");
+            assert!((0.5..1.6).contains(&p.z), "{p} is far off the doorway");
+        }
+        assert!(above.min.y > 2.0);
+    }
+
+    #[test]
+    fn windows_are_in_outer_walls_and_stand_out_little() {
+        let setup = two_rooms();
+        let papers = walls::papers(&setup);
+        let n: Vec<usize> = setup
+            .walls
+            .iter()
+            .map(|w| {
+                let mesh = walls::mesh(&setup, w, &papers);
+                let line = walls::Line::of(w);
+                for p in &mesh.positions {
+                    let d = Vec2::new(p.x, p.z) - line.middle;
+                    let off = (d.y * line.axis.x - d.x * line.axis.y).abs();
+                    assert!(off < line.half.y + 0.08, "{p}");
+                }
+                mesh.triangles.len()
+            })
+            .collect();
+        assert!(n[3] > 300, "the outer wall has windows: {n:?}");
+        assert!(n[1] < 200, "an inner wall has none, not even in an alcove: {n:?}");
     }
 }

@@ -80,31 +80,15 @@ pub(super) fn sofa_on(s: &mut Sculptor, seat: Paint, frame: Paint, n: usize) {
     for k in 0..n {
         seat_cushion(s, 0, k as f32 / n as f32, (k + 1) as f32 / n as f32);
     }
-    // Loose cushions lean on the back.
+    // Cushions lean on the back, thin enough to leave the seat to what is put there.
     let [low, high] = part_box(s, 0);
     let [_, back] = part_box(s, 2);
     let tall = (back.y - high.y) * 0.98;
     for k in 0..n {
         let x = low.x + (k as f32 + 0.5) / n as f32 * (high.x - low.x);
         let wide = (high.x - low.x) / n as f32;
-        s.pillow(
-            [x, high.y + 0.47 * tall, high.z - 0.3 * tall.min(0.3)],
-            [wide - 0.01, tall, 0.17],
-            [9.0, 0.0, 0.0],
-            0.42,
-        );
-    }
-    if s.pick(4, &[true, true, false]) {
-        let color = s.pick(5, &[[206, 120, 62], [72, 110, 120], [214, 190, 120], [150, 70, 80]]);
-        s.paint(paint(color, Finish::Fabric));
-        let x = low.x + 0.2;
-        let side = (tall * 0.8).min(0.36);
-        s.pillow(
-            [x, high.y + 0.44 * side, high.z - 0.16],
-            [side, side, 0.12],
-            [20.0, 18.0, 8.0],
-            0.55,
-        );
+        let middle = [x, high.y + 0.49 * tall, high.z - 0.05];
+        s.pillow(middle, [wide - 0.01, tall, 0.11], [4.0, 0.0, 0.0], 0.42);
     }
 }
 
@@ -144,8 +128,17 @@ fn corner_sofa(s: &mut Sculptor) {
         let middle = [low.x + 0.5 * size.x, 0.5 * (low.y + high.y), low.z + 0.5 * size.z];
         if k < 5 {
             s.block([middle[0], low.y, middle[2]], size.into(), 0.04);
-        } else {
-            s.pillow(middle, size.into(), [0.0; 3], 0.2);
+            continue;
+        }
+        // Backs are made of cushions side by side.
+        let n = (size.x.max(size.z) / 0.85).max(1.0) as usize;
+        for j in 0..n {
+            let t = (j as f32 + 0.5) / n as f32 - 0.5;
+            let (mut middle, mut extent) = (middle, size.to_array());
+            let along = if size.x > size.z { 0 } else { 2 };
+            middle[along] += t * size[along];
+            extent[along] = size[along] / n as f32 - 0.005;
+            s.pillow(middle, extent, [0.0; 3], 0.25);
         }
     }
     // The back wing in five cushions, the side wing in three, one on the chaise.
@@ -163,11 +156,6 @@ fn corner_sofa(s: &mut Sculptor) {
             [0.0; 3],
             0.26,
         );
-    }
-    for k in 0..4 {
-        let color = s.pick(4 + k, &[[206, 196, 178], [96, 110, 122], [170, 120, 80]]);
-        s.paint(paint(color, Finish::Fabric));
-        s.pillow([-0.9 + 0.85 * k as f32, 0.59, 0.93], [0.44, 0.36, 0.13], [16.0, 0.0, 6.0], 0.55);
     }
 }
 

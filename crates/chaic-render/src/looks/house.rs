@@ -37,8 +37,7 @@ fn bed(s: &mut Sculptor) {
     s.block([0.0, 0.24, -0.36], [2.14, 0.3, 1.84], 0.06);
     s.paint(wood);
     s.block([0.0, 0.08, -0.03], [2.1, 0.2, 2.5], 0.015);
-    let high = s.pick(2, &[1.2, 1.2, 1.2]);
-    s.block([0.0, 0.0, 1.24], [2.194, high, 0.09], 0.03);
+    s.block([0.0, 0.0, 1.24], [2.194, 1.2, 0.09], 0.03);
     if s.style.is_multiple_of(2) {
         s.paint(paint(wood.color.map(|c| (0.9 * f32::from(c)) as u8), Finish::Wood));
         for x in [-0.72, 0.0, 0.72] {
@@ -54,14 +53,7 @@ fn bed(s: &mut Sculptor) {
     s.paint(LINEN);
     s.block([0.0, 0.535, 0.44], [2.12, 0.03, 0.28], 0.014);
     for x in [-0.5, 0.5] {
-        s.pillow([x, 0.6, 0.9], [0.84, 0.2, 0.48], [-8.0, 0.0, 0.0], 0.62);
-    }
-    if s.style != 2 {
-        let color = s.pick(4, &[[206, 160, 110], [120, 140, 150], [190, 110, 100]]);
-        s.paint(paint(color, Finish::Fabric));
-        for x in [-0.3, 0.3] {
-            s.pillow([x, 0.665, 0.68], [0.42, 0.3, 0.13], [38.0, 0.0, 0.0], 0.6);
-        }
+        s.pillow([x, 0.6, 0.9], [0.86, 0.2, 0.5], [0.0; 3], 0.7);
     }
     s.paint(WALNUT);
     for x in [-0.95, 0.95] {

@@ -218,6 +218,34 @@ mod tests {
         }
     }
 
+    /// What lies on a top must stay in sight: above tops there is nothing but what the catalogue
+    /// tells of.
+    #[test]
+    fn nothing_is_added_where_things_are_put() {
+        for thing in things() {
+            let told: Vec<_> = chaic_world::blocks_of(&thing)
+                .into_iter()
+                .chain(chaic_world::ghosts_of(&thing))
+                .collect();
+            for (top, style) in chaic_world::top_surfaces(&thing)
+                .into_iter()
+                .flat_map(|top| (0..N_STYLES).map(move |style| (top, style)))
+            {
+                let mesh = thing_mesh(&thing, style, 3);
+                for p in &mesh.positions {
+                    let d = *p - top.center;
+                    let is_above = d.x.abs() < top.half[0] - 0.02
+                        && d.z.abs() < top.half[1] - 0.02
+                        && (0.015..0.3).contains(&d.y);
+                    let is_told =
+                        told.iter().any(|b| (*p - b.center).abs().cmple(b.half + 0.025).all());
+                    let name = thing.class.name();
+                    assert!(!is_above || is_told, "{name} {style} would hide things at {p}");
+                }
+            }
+        }
+    }
+
     #[test]
     fn a_stretched_thing_looks_stretched() {
         let mut thing = Thing::new(ClassId::named("armchair"), Vec3::ZERO, 0.0);

@@ -27,8 +27,9 @@ fn wood(setup: &Setup) -> Skin {
     Skin::new(color, finish)
 }
 
-/// The frame around a doorway between two walls, if there are such walls.
-pub(super) fn door_frame(setup: &Setup, opening: &Opening) -> Option<Mesh> {
+/// The frame around a doorway between two walls, if there are such walls: its sides, and what is
+/// above people's heads, which a map leaves out.
+pub(super) fn door_frame(setup: &Setup, opening: &Opening) -> Option<[Mesh; 2]> {
     let along = opening.b - opening.a;
     let length = (along.x * along.x + along.y * along.y).sqrt();
     if !(0.3..6.0).contains(&length) {
@@ -67,32 +68,34 @@ pub(super) fn door_frame(setup: &Setup, opening: &Opening) -> Option<Mesh> {
     let head = top.or(setup.ceiling_m)?;
     line.half.y = 0.5 * thick;
 
-    let mut mesh = Mesh::default();
-    mesh.skin(wood(setup).with_axes(line.axes()));
-    let mut board = |center: [f32; 3], extent: [f32; 3]| {
-        rounded_box(&mut mesh, &line.place(center, extent), 0.004);
+    let skin = wood(setup).with_axes(line.axes());
+    let (mut sides, mut above) = (Mesh::default(), Mesh::default());
+    sides.skin(skin);
+    above.skin(skin);
+    let board = |mesh: &mut Mesh, center: [f32; 3], extent: [f32; 3]| {
+        rounded_box(mesh, &line.place(center, extent), 0.004);
     };
     let deep = thick + 2.0 * STANDS_OUT_M;
     for (edge, out) in [(low, -1.0f32), (high, 1.0)] {
         // The lining inside, and a casing on either face.
         let tall = head - if top.is_some() { LINING_M } else { 0.0 };
-        board([edge - out * 0.5 * LINING_M, 0.5 * tall, 0.0], [LINING_M, tall, deep]);
+        board(&mut sides, [edge - out * 0.5 * LINING_M, 0.5 * tall, 0.0], [LINING_M, tall, deep]);
         for side in [-1.0, 1.0] {
             let z = side * 0.5 * (thick + STANDS_OUT_M);
             let x = edge + out * 0.5 * CASING_M;
-            board([x, 0.5 * head, z], [CASING_M, head, STANDS_OUT_M]);
+            board(&mut sides, [x, 0.5 * head, z], [CASING_M, head, STANDS_OUT_M]);
         }
     }
     if top.is_some() {
         let middle = 0.5 * (low + high);
-        board([middle, head - 0.5 * LINING_M, 0.0], [high - low, LINING_M, deep]);
+        board(&mut above, [middle, head - 0.5 * LINING_M, 0.0], [high - low, LINING_M, deep]);
         for side in [-1.0, 1.0] {
             let z = side * 0.5 * (thick + STANDS_OUT_M);
             let wide = high - low + 2.0 * CASING_M;
-            board([middle, head + 0.5 * CASING_M, z], [wide, CASING_M, STANDS_OUT_M]);
+            board(&mut above, [middle, head + 0.5 * CASING_M, z], [wide, CASING_M, STANDS_OUT_M]);
         }
     }
-    Some(mesh.finish())
+    Some([sides.finish(), above.finish()])
 }
 
 /// Windows along a stretch of outer wall, on its inner side, where nothing hangs or stands high.

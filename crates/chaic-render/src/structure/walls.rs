@@ -2,6 +2,7 @@
 //! is outdoors.
 
 use chaic_protocol::catalogue::Finish;
+use chaic_protocol::geom::Rect;
 use chaic_protocol::{Vec2, Vec3};
 use chaic_world::{RoomKind, Setup, Wall};
 use glam::Mat3;
@@ -61,7 +62,7 @@ pub(super) struct Stretch {
 }
 
 /// The mesh of a wall with all that hangs on it.
-pub(super) fn mesh(setup: &Setup, wall: &Wall) -> Mesh {
+pub(super) fn mesh(setup: &Setup, wall: &Wall, papers: &[Skin]) -> Mesh {
     let line = Line::of(wall);
     let cuts = cuts(setup, &line);
     let mut stretches = Vec::new();
@@ -73,13 +74,17 @@ pub(super) fn mesh(setup: &Setup, wall: &Wall) -> Mesh {
         }
     }
     let mut mesh = Mesh::default();
-    faces(&mut mesh, setup, wall, &line, &cuts, &stretches);
+    faces(&mut mesh, wall, &line, papers, &stretches);
     if wall.bottom_m < 0.1 {
         skirting(&mut mesh, &line, &stretches);
+        let rooms = super::indoors(setup).map(|r| r.rect);
+        let house = rooms.reduce(|a, b| Rect { min: a.min.min(b.min), max: a.max.max(b.max) });
+        let Some(house) = house else { return mesh.finish() };
         for stretch in stretches.iter().filter(|s| s.room.is_some()) {
             let beyond =
                 line.plan(0.5 * (stretch.from + stretch.to), -stretch.side * (line.half.y + 0.3));
-            if room_at(setup, beyond).is_none() {
+            // Alcoves belong to no room: outdoors is what lies beyond all rooms.
+            if !house.contains(beyond) {
                 joinery::windows(&mut mesh, setup, wall, &line, stretch);
             }
         }
@@ -114,27 +119,22 @@ fn cuts(setup: &Setup, line: &Line) -> Vec<f32> {
 }
 
 /// The closed box of the wall, its sides cut where rooms meet.
-fn faces(
-    mesh: &mut Mesh,
-    setup: &Setup,
-    wall: &Wall,
-    line: &Line,
-    cuts: &[f32],
-    stretches: &[Stretch],
-) {
+fn faces(mesh: &mut Mesh, wall: &Wall, line: &Line, papers: &[Skin], stretches: &[Stretch]) {
+    let n = stretches.len() / 2;
+    let cuts = stretches[..n].iter().map(|s| s.from).chain(stretches.last().map(|s| s.to));
     let base = mesh.positions.len();
     for t in cuts {
         for z in [-line.half.y, line.half.y] {
             for y in [wall.bottom_m, wall.top_m] {
-                let p = line.plan(*t, z);
+                let p = line.plan(t, z);
                 mesh.corner(Vec3::new(p.x, y, p.y), Vec3::Y);
             }
         }
     }
     // Corners of a cut: 0 and 1 low and high at -z, 2 and 3 at +z.
     let at = |k: usize, corner: usize| base + 4 * k + corner;
-    let n = cuts.len() - 1;
-    mesh.skin(paper(setup, wall, line, None));
+    let bare = plaster(wall.color);
+    mesh.skin(bare.with_axes(line.axes()));
     mesh.quad([at(0, 0), at(0, 2), at(0, 3), at(0, 1)], false);
     mesh.quad([at(n, 0), at(n, 1), at(n, 3), at(n, 2)], false);
     for k in 0..n {
@@ -143,7 +143,8 @@ fn faces(
     }
     for (j, stretch) in stretches.iter().enumerate() {
         let k = j % n;
-        mesh.skin(paper(setup, wall, line, stretch.room));
+        let paper = stretch.room.and_then(|k| papers.get(k)).unwrap_or(&bare);
+        mesh.skin(paper.with_axes(line.axes()));
         if stretch.side < 0.0 {
             mesh.quad([at(k, 0), at(k, 1), at(k + 1, 1), at(k + 1, 0)], false);
         } else {
@@ -152,8 +153,13 @@ fn faces(
     }
 }
 
-/// What a wall is papered with in a room: the wall's own color, shifted as the room likes it.
-fn paper(setup: &Setup, wall: &Wall, line: &Line, room: Option<usize>) -> Skin {
+fn plaster(color: [u8; 3]) -> Skin {
+    Skin { texture: Texture::Plaster, ..Skin::new(color, Finish::Matte) }
+}
+
+/// What the walls of each room are papered with: the color of one of them, shifted as the room
+/// likes it.
+pub(super) fn papers(setup: &Setup) -> Vec<Skin> {
     const SHIFTS: [[f32; 3]; 8] = [
         [1.0, 1.0, 1.0],
         [0.88, 0.97, 1.04],
@@ -164,19 +170,20 @@ fn paper(setup: &Setup, wall: &Wall, line: &Line, room: Option<usize>) -> Skin {
         [0.94, 0.9, 1.0],
         [0.82, 0.88, 0.9],
     ];
-    let shift = room.map_or(SHIFTS[0], |k| {
-        let first = scramble(setup.seed as u32 ^ 0x7a11) as usize;
+    let first = scramble(setup.seed as u32 ^ 0x7a11) as usize % 8;
+    let paper = |(k, room): (usize, &chaic_world::Room)| {
+        let is_near = |w: &&Wall| room.rect.grown(w.thickness_m).contains(Line::of(w).middle);
+        let own = setup.walls.iter().rev().find(is_near).or(setup.walls.first());
+        let color = own.map_or([232, 228, 220], |w| w.color);
         // Neighboring numbers are far apart in the list.
-        SHIFTS[(first % 8 + 3 * k) % 8]
-    });
-    let color = [0, 1, 2].map(|c| (f32::from(wall.color[c]) * shift[c]).min(250.0) as u8);
-    let mut skin = Skin::new(color, Finish::Matte).with_axes(line.axes());
-    let kind = room.map(|k| setup.rooms[k].kind);
-    skin.texture = match kind {
-        Some(RoomKind::Bathroom) => Texture::Tiles,
-        _ => Texture::Plaster,
+        let shift = SHIFTS[(first + 3 * k) % 8];
+        let color = [0, 1, 2].map(|c| (f32::from(color[c]) * shift[c]).min(250.0) as u8);
+        match room.kind {
+            RoomKind::Bathroom => Skin { texture: Texture::Tiles, ..plaster(color) },
+            _ => plaster(color),
+        }
     };
-    skin
+    setup.rooms.iter().enumerate().map(paper).collect()
 }
 
 fn skirting(mesh: &mut Mesh, line: &Line, stretches: &[Stretch]) {

@@ -89,9 +89,15 @@ impl Sculptor {
         scramble(slot.wrapping_mul(64) + u32::from(self.style)) >> 8
     }
 
-    /// Whether something of this size, metres, covers about a pixel.
+    /// Whether something of this size, metres, covers about a pixel. Most things are smaller on the
+    /// image than the largest that a level is for.
     pub fn shows(&self, size_m: f32) -> bool {
-        size_m * self.detail.px_per_m > 0.9
+        size_m * self.detail.px_per_m > if self.level < 3 { 1.5 } else { 1.1 }
+    }
+
+    /// How far an outline may be off, metres.
+    fn slack_m(&self) -> f32 {
+        0.5 / self.detail.px_per_m
     }
 
     fn shows_extent(&self, e: Vec3) -> bool {
@@ -99,7 +105,7 @@ impl Sculptor {
         let middle = e.x.max(e.y).min(e.x.max(e.z)).min(e.y.max(e.z));
         match self.level {
             // The smallest pictures show the main parts only.
-            0 => self.shows(0.35 * largest) && self.shows(0.8 * middle),
+            0 => self.shows(0.5 * largest) && self.shows(1.2 * middle),
             _ => self.shows(0.7 * largest) && self.shows(1.6 * middle),
         }
     }
@@ -173,7 +179,7 @@ impl Sculptor {
                 let [r0, r1] = if top > 1.0 { [0.5 / top, 0.5] } else { [0.5, 0.5 * top] };
                 let bevel = 0.12 * place.extent.min_element();
                 let (by, bx) = (bevel / place.extent.y, bevel / place.extent.x.max(place.extent.z));
-                if self.shows(1.2 * bevel) {
+                if self.shows(bevel) {
                     let outline = [[r0 - bx, -0.5], [r0, by - 0.5], [r1, 0.5 - by], [r1 - bx, 0.5]];
                     lathe(&mut self.mesh, &place, &outline, n);
                 } else {
@@ -185,7 +191,7 @@ impl Sculptor {
     }
 
     fn rounded(&mut self, place: &Place, round_m: f32) {
-        if self.shows(1.2 * round_m) {
+        if self.shows(round_m) {
             rounded_box(&mut self.mesh, place, round_m.min(0.49 * place.extent.min_element()));
         } else {
             solids::cuboid(&mut self.mesh, place);
@@ -263,7 +269,10 @@ impl Sculptor {
             Place { center: Vec3::from(start), axes: upright_along(axis), extent: Vec3::ONE };
         self.plain_skin();
         let n = self.detail.corners(wide);
-        lathe(&mut self.mesh, &place, outline, n);
+        let points: Vec<[f32; 3]> = outline.iter().map(|[r, y]| [*r, *y, 0.0]).collect();
+        let kept = essential(&points, self.slack_m());
+        let kept: Vec<[f32; 2]> = kept.into_iter().map(|k| outline[k]).collect();
+        lathe(&mut self.mesh, &place, &kept, n);
     }
 
     /// A straight rod.
@@ -298,7 +307,16 @@ impl Sculptor {
             }
         }
         fine.extend(points.last());
-        self.sweep(&fine);
+        // What the radius does counts as well.
+        let slack = self.slack_m();
+        let places: Vec<P> = fine.iter().map(|p| p.0).collect();
+        let widths: Vec<P> = fine.iter().enumerate().map(|(k, p)| [k as f32, p.1, 0.0]).collect();
+        let mut kept = essential(&places, slack);
+        kept.extend(essential(&widths, slack));
+        kept.sort_unstable();
+        kept.dedup();
+        let kept: Vec<(P, f32)> = kept.into_iter().map(|k| fine[k]).collect();
+        self.sweep(&kept);
     }
 
     /// A round pipe with corners where the points are.
@@ -409,6 +427,36 @@ impl Sculptor {
             sector(&mut self.mesh, Vec3::from(bottom), radii, heights, angles_deg, n.max(1));
         }
     }
+}
+
+/// Those points of a line without which it would be off by more than `slack`; ends are kept, and
+/// of a closed line some point between (Douglas and Peucker's way).
+fn essential(points: &[P], slack: f32) -> Vec<usize> {
+    let n = points.len();
+    let mut kept = vec![false; n];
+    let mut spans = vec![(0, n.saturating_sub(1))];
+    let closed = n > 2 && points[0] == points[n - 1];
+    while let Some((from, to)) = spans.pop() {
+        kept[from] = true;
+        kept[to] = true;
+        let (a, b) = (Vec3::from(points[from]), Vec3::from(points[to]));
+        let along = b - a;
+        let l2 = along.dot(along);
+        let off = |k: usize| {
+            let d = Vec3::from(points[k]) - a;
+            let t = if l2 > 0.0 { (d.dot(along) / l2).clamp(0.0, 1.0) } else { 0.0 };
+            length(d - along * t)
+        };
+        let worst = (from + 1..to).map(|k| (off(k), k)).max_by(|x, y| x.0.total_cmp(&y.0));
+        let must = closed && (from, to) == (0, n - 1);
+        if let Some((by, k)) = worst
+            && (by > slack || must)
+        {
+            spans.push((from, k));
+            spans.push((k, to));
+        }
+    }
+    (0..n).filter(|k| kept[*k]).collect()
 }
 
 /// A number from a number, evenly spread.

@@ -6,8 +6,8 @@ use chaic_world::{Opening, Room, RoomKind, Setup, Wall};
 
 use super::walls::{Line, Stretch};
 use crate::mesh::{Mesh, Place, Section, Skin};
-use crate::sculpt::{rounded_box, scramble};
-use crate::solids::{Detail, cuboid, ellipsoid, frustum};
+use crate::sculpt::scramble;
+use crate::solids::{cuboid, ellipsoid, frustum};
 
 /// Width of a door's casing, and how far it and a window's frame stand out from the wall, metres.
 const CASING_M: f32 = 0.07;
@@ -73,7 +73,7 @@ pub(super) fn door_frame(setup: &Setup, opening: &Opening) -> Option<[Mesh; 2]> 
     sides.skin(skin);
     above.skin(skin);
     let board = |mesh: &mut Mesh, center: [f32; 3], extent: [f32; 3]| {
-        rounded_box(mesh, &line.place(center, extent), 0.004);
+        cuboid(mesh, &line.place(center, extent));
     };
     let deep = thick + 2.0 * STANDS_OUT_M;
     for (edge, out) in [(low, -1.0f32), (high, 1.0)] {
@@ -195,23 +195,23 @@ fn curtains(
     mesh.skin(Skin::new(CLOTHS[seed as usize / 8 % 6], Finish::Fabric).with_axes(axes));
     let (low, top) = ((sill - 0.2).max(0.1), sill + high + 0.14);
     for end in [-1.0f32, 1.0] {
-        for k in 0..4 {
+        for k in 0..3 {
             // Folds beside the window, wider below.
-            let dx = end * (0.5 * wide - 0.06 + 0.075 * k as f32);
+            let dx = end * (0.5 * wide - 0.05 + 0.1 * k as f32);
             let section = |y: f32, grow: f32| Section {
                 center: at(dx * grow, y, 0.0),
-                a: axes.x_axis * (0.047 * grow),
+                a: axes.x_axis * (0.062 * grow),
                 b: axes.z_axis * 0.03,
             };
-            mesh.tube(&[section(low, 1.02), section(top, 0.98)], 6);
+            mesh.tube(&[section(low, 1.02), section(top, 0.98)], 5);
         }
     }
     mesh.skin(Skin::new([120, 96, 66], Finish::Metal));
     let half = 0.5 * wide + 0.26;
-    mesh.limb(at(-half, top, 0.005), at(half, top, 0.005), 0.013, 0.013, 6);
+    let [x0, y0, z0] = [x, top, side * (out + 0.005)];
+    cuboid(mesh, &line.place([x0, y0, z0], [2.0 * half, 0.022, 0.022]));
     for dx in [-half, half] {
-        let center = at(dx, top, 0.005);
-        ellipsoid(mesh, &Place::upright(center, Vec3::splat(0.045)), 6);
+        cuboid(mesh, &line.place([x0 + dx, y0, z0], [0.05, 0.04, 0.04]));
     }
 }
 
@@ -219,7 +219,7 @@ fn curtains(
 pub(super) fn lamp(room: &Room, ceiling_m: f32) -> Mesh {
     let c = room.rect.center();
     let mut mesh = Mesh::default();
-    let n = Detail { px_per_m: 160.0 }.corners(0.2);
+    let n = 10;
     let at = |y: f32, extent: [f32; 3]| {
         Place::upright(Vec3::new(c.x, ceiling_m - y, c.y), Vec3::from(extent))
     };

@@ -9,7 +9,8 @@ use glam::Mat3;
 
 use super::joinery;
 use crate::mesh::{Mesh, Place, Skin};
-use crate::sculpt::{rounded_box, scramble};
+use crate::sculpt::scramble;
+use crate::solids::cuboid;
 use crate::texture::Texture;
 
 /// Height and thickness of skirting boards, metres.
@@ -192,6 +193,6 @@ fn skirting(mesh: &mut Mesh, line: &Line, stretches: &[Stretch]) {
     for s in stretches.iter().filter(|s| s.room.is_some()) {
         let z = s.side * (line.half.y + 0.5 * thick);
         let center = [0.5 * (s.from + s.to), 0.5 * high, z];
-        rounded_box(mesh, &line.place(center, [s.to - s.from, high, thick]), 0.004);
+        cuboid(mesh, &line.place(center, [s.to - s.from, high, thick]));
     }
 }

@@ -28,6 +28,7 @@ mod view;
 mod frame;
 mod lens;
 
+mod forms;
 mod looks;
 mod mesh;
 mod people;

@@ -183,7 +183,18 @@ fn suitcase(s: &mut Sculptor) {
 }
 
 fn trunk(s: &mut Sculptor) {
-    s.all();
+    const WOODS: [[[u8; 3]; 2]; 4] = [
+        [[150, 116, 88], [128, 96, 72]],
+        [[96, 68, 52], [80, 56, 42]],
+        [[150, 116, 88], [128, 96, 72]],
+        [[92, 108, 92], [78, 92, 80]],
+    ];
+    let [body, lid] = s.pick(0, &WOODS).map(|c| paint(c, Finish::Wood));
+    for (k, color) in [body, lid].into_iter().enumerate() {
+        s.paint(color);
+        s.shape(&s.class.parts[k]);
+    }
+    s.without(&[0, 1]);
     s.paint(paint([96, 70, 50], Finish::Wood));
     for x in [-0.42, 0.0, 0.42] {
         s.block([x, 0.0, -0.327], [0.04, 0.97, 0.02], 0.004);
@@ -204,9 +215,11 @@ fn trunk(s: &mut Sculptor) {
 }
 
 fn woven_box(s: &mut Sculptor) {
-    s.part(0);
-    s.part(1);
-    s.paint(paint([170, 138, 100], Finish::Wicker));
+    let willow = s.main_or(&[[206, 178, 142], [206, 178, 142], [168, 130, 92], [222, 206, 180]]);
+    s.paint(willow);
+    s.shape(&s.class.parts[0]);
+    s.shape(&s.class.parts[1]);
+    s.paint(paint(willow.color.map(|c| (0.82 * f32::from(c)) as u8), Finish::Wicker));
     if s.level > 1 {
         for k in 0..5 {
             s.block([0.0, 0.03 + 0.078 * k as f32, 0.0], [0.708, 0.02, 0.708], 0.006);

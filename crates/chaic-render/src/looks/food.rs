@@ -262,7 +262,9 @@ fn croissant(s: &mut Sculptor) {
 fn donut(s: &mut Sculptor) {
     use chaic_protocol::geom::math::{cos, sin};
     s.part(1);
-    s.part(0);
+    let icing = s.main_or(&[[238, 132, 174], [244, 150, 190], [228, 112, 160], [246, 166, 196]]);
+    s.paint(icing);
+    s.shape(&s.class.parts[0]);
     let n = if s.level < 2 { 8 } else { 26 };
     let colors = [[250, 250, 246], [90, 170, 226], [248, 212, 70], [110, 190, 96], [150, 90, 60]];
     for k in 0..n {

@@ -54,6 +54,7 @@ impl Line {
 }
 
 /// A stretch of one side of a wall that belongs to one room or to none.
+#[derive(Clone, Copy)]
 pub(super) struct Stretch {
     pub from: f32,
     pub to: f32,
@@ -74,6 +75,7 @@ pub(super) fn mesh(setup: &Setup, wall: &Wall, papers: &[Skin]) -> Mesh {
             stretches.push(Stretch { from: ends[0], to: ends[1], side, room });
         }
     }
+    join_scraps(&mut stretches);
     let mut mesh = Mesh::default();
     faces(&mut mesh, wall, &line, papers, &stretches);
     if wall.bottom_m < 0.1 {
@@ -91,6 +93,18 @@ pub(super) fn mesh(setup: &Setup, wall: &Wall, papers: &[Skin]) -> Mesh {
         }
     }
     mesh.finish()
+}
+
+/// Corners and ends of walls belong to the room beside them, though its floor ends before.
+fn join_scraps(stretches: &mut [Stretch]) {
+    const SCRAP_M: f32 = 0.35;
+    for k in 0..stretches.len() {
+        let Stretch { from, to, side, room } = stretches[k];
+        if room.is_none() && to - from < SCRAP_M {
+            let is_near = |s: &&Stretch| s.side == side && (s.to == from || s.from == to);
+            stretches[k].room = stretches.iter().filter(is_near).find_map(|s| s.room);
+        }
+    }
 }
 
 fn room_at(setup: &Setup, p: Vec2) -> Option<usize> {

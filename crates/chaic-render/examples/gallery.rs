@@ -1,31 +1,49 @@
 //! Draws all that can be seen, to be looked at by a person:
 //! `cargo run --release -p chaic-render --example gallery -- FOLDER`.
+//!
+//! It writes contact sheets of every class in its variants and of every kind of person in every
+//! posture, what the helper of each task sees first, and two hand-made worlds; and it prints how
+//! many triangles a furnished house has at each level of detail. docs/gallery.md shows the sheets.
 
 #[path = "../tests/scenes/mod.rs"]
 mod scenes;
 
 use std::path::Path;
 
+use chaic_episodes::{Seeds, generate};
 use chaic_protocol::capability::Persona;
-use chaic_protocol::{ClassId, Role, Vec3};
+use chaic_protocol::geom::Camera;
+use chaic_protocol::{AgentId, ClassId, Role, TaskId, Vec3};
 use chaic_render::text::{self, Align};
-use chaic_render::{Channels, Scene, View, image_out, plan};
-use chaic_world::{FloorMaterial, Posture, Setup, Thing, World};
+use chaic_render::{Channels, N_LEVELS, Scene, View, image_out, plan};
+use chaic_world::{Posture, Setup, Thing, World};
 use image::RgbImage;
+use image::codecs::png::{CompressionType, FilterType as PngFilter, PngEncoder};
+use image::imageops::{FilterType, resize};
 use scenes::{camera, posture};
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
+
+fn main() -> Result<()> {
     let folder = std::env::args().nth(1).ok_or("usage: gallery FOLDER")?;
     let folder = Path::new(&folder);
     std::fs::create_dir_all(folder)?;
     classes(folder)?;
     people(folder)?;
+    tasks(folder)?;
     let (house, street) = (scenes::world(scenes::house()), scenes::world(scenes::street()));
+    let scene = Scene::new(house.setup());
+    let counts: Vec<String> = (0..N_LEVELS).map(|l| scene.n_triangles(l).to_string()).collect();
+    let n = house.setup().things.len();
+    println!(
+        "triangles of a house of eight rooms with {n} things, by level: {}",
+        counts.join(", ")
+    );
     for (name, world, cameras) in [
         (
             "house",
             &house,
-            vec![
+            [
                 camera([5.0, 1.65, 4.1], -0.5, 0.0, 768, 768),
                 camera([0.7, 1.65, 4.2], -0.7, -0.2, 768, 768),
                 camera([9.3, 1.65, 0.6], -2.4, -0.2, 768, 768),
@@ -35,7 +53,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         (
             "street",
             &street,
-            vec![
+            [
                 camera([0.5, 1.65, 4.5], 0.1, 0.0, 768, 768),
                 camera([9.0, 1.65, 0.0], 1.3, 0.0, 768, 768),
                 camera([-3.0, 1.0, -3.0], -0.6, 0.0, 768, 768),
@@ -49,12 +67,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-fn views(
-    folder: &Path,
-    name: &str,
-    world: &World,
-    cameras: &[chaic_protocol::geom::Camera],
-) -> image::ImageResult<()> {
+fn views(folder: &Path, name: &str, world: &World, cameras: &[Camera]) -> image::ImageResult<()> {
     let scene = Scene::new(world.setup());
     let view = |camera| View { camera, channels: Channels::ALL, hide: None, hide_ceiling: false };
     let views: Vec<View> = cameras.iter().map(|c| view(*c)).collect();
@@ -73,87 +86,179 @@ fn views(
     image_out::grid(&pictures, 2).save(folder.join(format!("{name}.png")))
 }
 
-/// Twelve classes to a picture.
+/// One picture, drawn at twice its size and made smooth.
+fn picture(scene: &Scene, world: &World, postures: &[Posture], camera: Camera) -> RgbImage {
+    seen(scene, world, postures, camera, None)
+}
+
+fn seen(
+    scene: &Scene,
+    world: &World,
+    postures: &[Posture],
+    camera: Camera,
+    hide: Option<AgentId>,
+) -> RgbImage {
+    let (width, height) = (camera.width, camera.height);
+    let camera = Camera { width: 2 * width, height: 2 * height, ..camera };
+    let view = View { camera, channels: Channels::RGB, hide, hide_ceiling: false };
+    let images = scene.render_state(world.state(), postures, &[view]);
+    let rgb = images.into_iter().next().and_then(|i| i.rgb).unwrap_or_default();
+    let large = image_out::rgb(&rgb, 2 * width, 2 * height);
+    let large = large.unwrap_or_else(|| RgbImage::new(2 * width, 2 * height));
+    resize(&large, width, height, FilterType::Triangle)
+}
+
+/// Writes a picture as small as can be.
+fn save(picture: &RgbImage, path: &Path) -> image::ImageResult<()> {
+    let file = std::io::BufWriter::new(std::fs::File::create(path)?);
+    let encoder = PngEncoder::new_with_quality(file, CompressionType::Best, PngFilter::Adaptive);
+    picture.write_with_encoder(encoder)
+}
+
+fn label(picture: &mut RgbImage, words: &str) {
+    text::draw(picture, (3.0, 2.0), 11.0, [20; 3], Align::Left, words);
+}
+
+/// Every class in four variants, twelve pictures a line.
 fn classes(folder: &Path) -> image::ImageResult<()> {
     let all: Vec<ClassId> = ClassId::all().filter(|c| c.info().role != Role::Person).collect();
-    for (page, group) in all.chunks(12).enumerate() {
-        let pictures: Vec<RgbImage> = group.iter().map(|c| portrait(*c)).collect();
-        image_out::grid(&pictures, 4).save(folder.join(format!("classes_{page}.png")))?;
+    for (page, group) in all.chunks(all.len().div_ceil(3)).enumerate() {
+        let pictures = group.iter().flat_map(|c| (0..4).map(|v| portrait(*c, v)));
+        let pictures: Vec<RgbImage> = pictures.collect();
+        save(&image_out::grid(&pictures, 12), &folder.join(format!("classes_{page}.png")))?;
     }
     Ok(())
 }
 
-fn portrait(class: ClassId) -> RgbImage {
+/// An empty place without ground, so that pictures stay small as files.
+fn nowhere() -> Setup {
     let mut setup = scenes::empty();
-    setup.floors =
-        vec![scenes::floor([-30.0; 2], [30.0; 2], FloorMaterial::Carpet, [214, 212, 208])];
+    setup.floors.clear();
     setup.bounds = chaic_protocol::geom::Rect::new([-30.0; 2], [30.0; 2]);
-    setup.things.truncate(1);
     setup.things[0].position = Vec3::new(25.0, 0.0, 25.0);
     setup.people[0].pose.position = Vec3::new(-25.0, 0.0, 25.0);
-    setup.things.push(Thing { fixed: true, ..Thing::new(class, Vec3::ZERO, std::f32::consts::PI) });
+    setup
+}
+
+fn portrait(class: ClassId, variant: u8) -> RgbImage {
+    const SIDE_PX: u32 = 104;
+    let mut setup = nowhere();
+    let thing = Thing::new(class, Vec3::ZERO, std::f32::consts::PI);
+    setup.things.push(Thing { fixed: true, variant, ..thing });
     let size = Vec3::from(class.info().size_m);
-    let world = scenes::world(setup);
-    let away = (0.80 * size.length()).max(0.22);
+    // The lens of an eye begins at a few centimetres: what is tiny is seen through a longer one.
+    let near = 1.32 * size.length();
+    let away = near.max(0.25);
     let eye = [0.55 * away, 0.5 * size.y + 0.55 * away, 0.95 * away];
     let down = -chaic_protocol::geom::math::atan2(0.55, 1.098);
-    let camera = camera(eye, 0.5248, down, 360, 360);
-    let view = View { camera, channels: Channels::RGB, hide: None, hide_ceiling: false };
-    let images = Scene::new(world.setup()).render(&world, &[view]);
-    let rgb = images.into_iter().next().and_then(|i| i.rgb).unwrap_or_default();
-    let mut picture = image_out::rgb(&rgb, 360, 360).unwrap_or_else(|| RgbImage::new(360, 360));
-    text::draw(&mut picture, (6.0, 4.0), 18.0, [20; 3], Align::Left, class.name());
+    let camera = camera(eye, 0.5248, down, SIDE_PX, SIDE_PX);
+    let camera = Camera { vertical_fov_rad: 0.62 * near / away, ..camera };
+    let world = scenes::world(setup);
+    let mut picture = picture(&Scene::new(world.setup()), &world, &[], camera);
+    if variant == 0 {
+        label(&mut picture, class.name());
+    }
     picture
 }
 
-/// One picture per kind of person: postures side by side, from the front and from behind.
+/// A line per kind of person with a picture per posture, and one of people who work together.
 fn people(folder: &Path) -> image::ImageResult<()> {
-    let setup = Setup { people: Vec::new(), ..scenes::empty() };
-    let scene = Scene::new(&setup);
-    let state = scenes::world(scenes::empty()).state().clone();
+    let world = scenes::world(nowhere());
+    let scene = Scene::new(world.setup());
+    let mut pictures = Vec::new();
     for persona in Persona::ALL {
-        let mut pictures = Vec::new();
         for (k, (name, p)) in postures(persona).into_iter().enumerate() {
-            for (yaw, side) in [(-2.5, "front"), (0.6, "back")] {
-                let mut p = p;
-                p.pose.yaw_rad = yaw;
-                p.look = k as u8;
-                let h = p.height_m;
-                let camera = camera([0.0, 0.62 * h, 0.80 * h], 0.0, -0.12, 360, 440);
-                let view =
-                    View { camera, channels: Channels::RGB, hide: None, hide_ceiling: false };
-                let images = scene.render_state(&state, &[p], &[view]);
-                let rgb = images.into_iter().next().and_then(|i| i.rgb).unwrap_or_default();
-                let mut picture =
-                    image_out::rgb(&rgb, 360, 440).unwrap_or_else(|| RgbImage::new(360, 440));
-                let label = format!("{persona:?} {name} {side}");
-                text::draw(&mut picture, (6.0, 4.0), 16.0, [20; 3], Align::Left, &label);
-                pictures.push(picture);
-            }
+            let mut p = Posture { look: k as u8, ..p };
+            p.pose.yaw_rad = if name == "walking away" { 0.6 } else { -2.5 };
+            let h = p.height_m;
+            let camera = camera([0.0, 0.66 * h, 2.3 * h], 0.0, -0.06, 132, 176);
+            let camera = Camera { vertical_fov_rad: 0.68, ..camera };
+            let mut picture = picture(&scene, &world, &[p], camera);
+            label(&mut picture, &format!("{persona:?}: {name}"));
+            pictures.push(picture);
         }
-        let name = format!("people_{persona:?}.png").to_lowercase();
-        image_out::grid(&pictures, 6).save(folder.join(name))?;
     }
-    Ok(())
+    save(&image_out::grid(&pictures, 9), &folder.join("people.png"))?;
+    save(&together(), &folder.join("people_together.png"))
 }
 
-fn postures(persona: Persona) -> Vec<(&'static str, Posture)> {
+fn arms(mut p: Posture, y: f32, z: f32, grips: [bool; 2]) -> Posture {
+    for (k, arm) in p.arms.iter_mut().enumerate() {
+        let side = if k == 0 { -1.0 } else { 1.0 };
+        arm.hand_in_body = Vec3::new(0.16 * side, y, z);
+        arm.grips = grips[k];
+    }
+    p
+}
+
+fn postures(persona: Persona) -> [(&'static str, Posture); 9] {
     let rest = posture(persona, 0.0, 0.0, 0.0);
     let h = rest.height_m;
-    let arms = |mut p: Posture, y: f32, z: f32, grips: bool| {
-        for (k, arm) in p.arms.iter_mut().enumerate() {
-            let side = if k == 0 { -1.0 } else { 1.0 };
-            arm.hand_in_body = Vec3::new(0.16 * side, y, z);
-            arm.grips = grips;
-        }
+    let one_hand = arms(rest, 0.6 * h, -0.28 * h, [false, true]);
+    let one_hand = Posture { arms: [rest.arms[0], one_hand.arms[1]], ..one_hand };
+    [
+        ("rest", rest),
+        ("walking", Posture { moving: true, walked_m: 0.35, ..rest }),
+        ("walking on", Posture { moving: true, walked_m: 0.8, ..rest }),
+        ("walking away", Posture { moving: true, walked_m: 0.1, ..rest }),
+        ("one hand", one_hand),
+        ("two hands", arms(rest, 0.57 * h, -0.31 * h, [true; 2])),
+        ("bending", Posture { bend: 1.0, ..arms(rest, 0.1, -0.4, [false; 2]) }),
+        ("stretching", Posture { stretch: 1.0, ..arms(rest, 1.17 * h, -0.2, [false; 2]) }),
+        ("failing", Posture { failing: true, ..arms(rest, 0.7 * h, -0.35, [false; 2]) }),
+    ]
+}
+
+/// Two people who lift a sofa, and a rider with bicycle and child.
+fn together() -> RgbImage {
+    let side = |p: Posture, x: f32, z: f32, yaw: f32| {
+        let mut p = p;
+        p.pose.position = Vec3::new(x, 0.0, z);
+        p.pose.yaw_rad = yaw;
         p
     };
-    vec![
-        ("rest", rest),
-        ("moving", Posture { moving: true, walked_m: 0.35, ..rest }),
-        ("carrying", arms(rest, 0.57 * h, -0.31 * h, true)),
-        ("bending", Posture { bend: 1.0, ..arms(rest, 0.1, -0.4, false) }),
-        ("stretching", Posture { stretch: 1.0, ..arms(rest, 1.25 * h, -0.2, false) }),
-        ("failing", Posture { failing: true, ..arms(rest, 0.7 * h, -0.35, false) }),
-    ]
+    let mut setup = nowhere();
+    let mut sofa = Thing { fixed: true, ..scenes::thing("sofa", 0.0, 0.0, std::f32::consts::PI) };
+    sofa.position.y = 0.55;
+    setup.things.push(sofa);
+    let lifting = |persona, look, yaw: f32, x: f32| {
+        let p = Posture { look, bend: 0.12, ..posture(persona, 0.0, 0.0, 0.0) };
+        side(arms(p, 0.68, -0.32, [true; 2]), x, 0.0, yaw)
+    };
+    let half = std::f32::consts::FRAC_PI_2;
+    let lifters = [lifting(Persona::Adult, 1, -half, -1.0), lifting(Persona::Helper, 2, half, 1.0)];
+    let eye = |height: f32| {
+        let camera = camera([0.6, height, 4.6], 0.12, -0.06, 440, 300);
+        Camera { vertical_fov_rad: 0.6, ..camera }
+    };
+    let world = scenes::world(setup);
+    let first = picture(&Scene::new(world.setup()), &world, &lifters, eye(1.15));
+
+    let mut setup = nowhere();
+    setup.things.push(Thing { fixed: true, ..scenes::thing("bike", -0.35, 0.2, half) });
+    let mut rider = side(posture(Persona::Rider, 0.0, 0.0, 0.0), -0.2, -0.35, half);
+    rider.arms[0].hand_in_body = Vec3::new(-0.35, 1.0, -0.25);
+    rider.arms[0].grips = true;
+    let child = Posture { moving: true, walked_m: 0.3, ..posture(Persona::Child, 0.0, 0.0, 0.0) };
+    let world = scenes::world(setup);
+    let scene = Scene::new(world.setup());
+    let second = picture(&scene, &world, &[rider, side(child, 1.1, 0.3, -2.2)], eye(1.15));
+    image_out::grid(&[first, second], 2)
+}
+
+/// What the helper sees first in an episode of each task.
+fn tasks(folder: &Path) -> Result<()> {
+    const SIDE_PX: u32 = 256;
+    let mut pictures = Vec::new();
+    for task in TaskId::all() {
+        let world = scenes::world(generate(task, Seeds { place: 7, episode: 7 })?);
+        let postures: Vec<Posture> = world.setup().agents().map(|a| world.posture(a)).collect();
+        let eye = world.eye(AgentId::HELPER, SIDE_PX);
+        let scene = Scene::new(world.setup());
+        let mut picture = seen(&scene, &world, &postures, eye, Some(AgentId::HELPER));
+        label(&mut picture, task.name());
+        pictures.push(picture);
+    }
+    save(&image_out::grid(&pictures, 4), &folder.join("task_views.png"))?;
+    Ok(())
 }

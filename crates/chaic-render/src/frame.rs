@@ -6,13 +6,15 @@ use chaic_protocol::{ClassId, EntityId, Vec3};
 use chaic_world::Thing;
 use glam::Mat3;
 
+use crate::looks::{N_STYLES, thing_mesh};
 use crate::mesh::{Mesh, length};
-use crate::solids::{N_LEVELS, place_of, thing_mesh};
+use crate::solids::{N_LEVELS, place_of};
 
 /// The mesh of a thing's shape, at every level of detail, each made when first needed.
 #[derive(Debug)]
 pub(crate) struct ClassMesh {
     thing: Thing,
+    style: u8,
     pub min: Vec3,
     pub max: Vec3,
     levels: [OnceLock<Mesh>; N_LEVELS],
@@ -22,16 +24,19 @@ pub(crate) struct ClassMesh {
 pub(crate) type ShapeKey = (ClassId, [u32; 3], Option<u32>);
 
 impl ClassMesh {
-    /// The mesh of a thing wherever it is. Those of catalogue size are shared by all scenes of the
-    /// process.
-    pub fn of(thing: &Thing) -> Arc<ClassMesh> {
-        static UNSCALED: [OnceLock<Arc<ClassMesh>>; 256] = [const { OnceLock::new() }; 256];
-        let make = || Arc::new(ClassMesh::new(thing));
+    /// The mesh of a thing in a style, wherever it is. Those of catalogue size are shared by all
+    /// scenes of the process.
+    pub fn of(thing: &Thing, style: u8) -> Arc<ClassMesh> {
+        const N: usize = 256 * N_STYLES as usize;
+        static UNSCALED: [OnceLock<Arc<ClassMesh>>; N] = [const { OnceLock::new() }; N];
+        let style = style % N_STYLES;
+        let make = || Arc::new(ClassMesh::new(thing, style));
         let is_usual = thing.scale == [1.0; 3] && thing.seat_m.is_none();
-        if is_usual { UNSCALED[thing.class.index()].get_or_init(make).clone() } else { make() }
+        let slot = thing.class.index() * usize::from(N_STYLES) + usize::from(style);
+        if is_usual { UNSCALED[slot].get_or_init(make).clone() } else { make() }
     }
 
-    fn new(thing: &Thing) -> ClassMesh {
+    fn new(thing: &Thing, style: u8) -> ClassMesh {
         let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for part in thing.parts() {
             let place = place_of(&part, thing.size_m());
@@ -45,7 +50,7 @@ impl ClassMesh {
         if min.x > max.x {
             (min, max) = (Vec3::ZERO, Vec3::ZERO);
         }
-        ClassMesh { thing: *thing, min, max, levels: [const { OnceLock::new() }; N_LEVELS] }
+        ClassMesh { thing: *thing, style, min, max, levels: [const { OnceLock::new() }; N_LEVELS] }
     }
 
     /// What decides the shape: equal for equal shapes only.
@@ -55,7 +60,7 @@ impl ClassMesh {
     }
 
     fn level(&self, level: usize) -> &Mesh {
-        self.levels[level].get_or_init(|| thing_mesh(&self.thing, level))
+        self.levels[level].get_or_init(|| thing_mesh(&self.thing, self.style, level))
     }
 }
 

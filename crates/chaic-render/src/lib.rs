@@ -14,7 +14,7 @@
 //! - No camera, size or posture makes it panic.
 //!
 //! How a view comes about: instances are culled by the camera's frustum and by what is already
-//! drawn ([`draw`]), drawn at a level of detail that fits their size on the image ([`solids`]) into
+//! drawn ([`draw`]), drawn at a level of detail that fits their size on the image ([`looks`]) into
 //! a buffer of nearness and owners ([`raster`]); depth and ids are read off that buffer, and color
 //! is computed for each pixel's owner ([`shade`]) only if it is asked for.
 
@@ -30,10 +30,14 @@ mod view;
 mod frame;
 mod lens;
 
+mod forms;
+mod looks;
 mod mesh;
 mod people;
+mod sculpt;
 mod solids;
 mod shapes;
+mod structure;
 
 mod clip;
 mod draw;
@@ -54,5 +58,5 @@ pub mod text;
 pub use appearance::Appearance;
 pub use lens::Lens;
 pub use scene::Scene;
-pub use solids::LEVEL_RADIUS_PX;
+pub use solids::{LEVEL_RADIUS_PX, N_LEVELS};
 pub use view::{Channels, MAX_SIDE_PX, View};

@@ -2,21 +2,20 @@
 
 use std::sync::{Arc, Mutex};
 
-use chaic_protocol::catalogue::Finish;
-use chaic_protocol::geom::Rect;
 use chaic_protocol::observation::Images;
 use chaic_protocol::{EntityId, Vec2, Vec3};
-use chaic_world::{FloorMaterial, Place, Posture, RoomKind, Setup, State, ThingState, Wall, World};
+use chaic_world::{Place, Posture, Setup, State, ThingState, World};
 use glam::Mat3;
 use rayon::prelude::*;
 
 use crate::appearance::{Appearance, Painted};
 use crate::frame::{ClassMesh, Frame, Instance, Shape};
 use crate::light::{Foot, Ground, Lamps, Light};
-use crate::mesh::{self, Mesh, Skin};
+use crate::looks::{style_of, tint_of};
+use crate::mesh::Mesh;
 use crate::people::Body;
-use crate::solids::cuboid;
-use crate::texture::{Texture, linear_from_shown};
+use crate::solids::N_LEVELS;
+use crate::structure;
 use crate::view::{View, look};
 
 /// Everything of an episode that is drawn and never changes: floors, walls, ceilings, and the
@@ -39,24 +38,12 @@ impl Scene {
 
     /// Makes the shapes of an episode ready.
     pub fn with_appearance(setup: &Setup, appearance: Appearance) -> Scene {
-        let mut structure = Vec::new();
-        for (rect, material, color) in floor_pieces(setup) {
-            structure.push((EntityId::FLOOR, floor_mesh(&rect, material, color)));
-        }
-        for wall in &setup.walls {
-            structure.push((EntityId::WALL, wall_mesh(wall)));
-        }
-        if let Some(height) = setup.ceiling_m {
-            for rect in ceiling_pieces(setup) {
-                structure.push((EntityId::CEILING, ceiling_mesh(&rect, height)));
-            }
-        }
-        let things = setup.things.iter().map(|thing| {
-            let palette = thing.class.info().palette;
-            let tint = (!palette.is_empty())
-                .then(|| linear_from_shown(palette[usize::from(thing.variant) % palette.len()]));
-            (ClassMesh::of(thing), tint)
-        });
+        let structure = structure::of(setup);
+        let things = setup
+            .things
+            .iter()
+            .enumerate()
+            .map(|(k, thing)| (ClassMesh::of(thing, style_of(setup, k)), tint_of(setup, k)));
         Scene {
             structure,
             things: things.collect(),
@@ -65,6 +52,15 @@ impl Scene {
             lamps: appearance.lamps(),
             still: Mutex::default(),
         }
+    }
+
+    /// Triangles of everything that never moves by itself, bodies left out, at a level of detail
+    /// (0 is the coarsest, [`crate::N_LEVELS`] - 1 the finest).
+    pub fn n_triangles(&self, level: usize) -> usize {
+        let level = level.min(N_LEVELS - 1);
+        let structure = self.structure.iter().map(|(_, mesh)| mesh.triangles.len());
+        let things = self.things.iter().map(|(c, _)| Shape::Class(c).mesh(level).triangles.len());
+        structure.chain(things).sum()
     }
 
     /// What many cameras see of a world, in their order. The images don't depend on the number of
@@ -243,167 +239,4 @@ fn cast_foot(light: &mut Light, class: &ClassMesh, rotation: &Mat3, position: Ve
         depth,
         round: half.x.max(half.z) < 0.12,
     });
-}
-
-/// More pieces of floor or ceiling than any street or house needs; bounds the work on odd input.
-const MAX_PIECES: usize = 4096;
-
-/// The floors without overlaps: where two overlap, the later one lies on top.
-fn floor_pieces(setup: &Setup) -> Vec<(Rect, FloorMaterial, [u8; 3])> {
-    let mut pieces: Vec<(Rect, FloorMaterial, [u8; 3])> = Vec::new();
-    for floor in setup.floors.iter().take(MAX_PIECES) {
-        let mut left = Vec::new();
-        for (rect, material, color) in pieces.drain(..) {
-            without(&rect, &floor.rect, |piece| left.push((piece, material, color)));
-        }
-        left.push((floor.rect, floor.material, floor.color));
-        left.truncate(MAX_PIECES);
-        pieces = left;
-    }
-    pieces
-}
-
-/// The ceilings of rooms, and what is left between them and the outermost walls: doorways and
-/// alcoves belong to no room.
-fn ceiling_pieces(setup: &Setup) -> Vec<Rect> {
-    /// Rooms end at the faces of walls; their ceilings go on into these, metres.
-    const INTO_WALL_M: f32 = 0.15;
-    let rooms = setup.rooms.iter().filter(|r| r.kind != RoomKind::Outdoors);
-    let mut pieces: Vec<Rect> = rooms.map(|r| r.rect.grown(INTO_WALL_M)).collect();
-    let ends = setup.walls.iter().flat_map(|w| [w.a, w.b]);
-    let house = ends.fold(setup.bounds, |r, p| Rect { min: r.min.min(p), max: r.max.max(p) });
-    let mut between = vec![house];
-    for room in &pieces {
-        let mut left = Vec::new();
-        for rect in between {
-            without(&rect, room, |piece| left.push(piece));
-        }
-        left.truncate(MAX_PIECES);
-        between = left;
-    }
-    // They overlap the ceilings of rooms by a millimetre, so that no pixel falls between them.
-    pieces.extend(between.iter().map(|r| r.grown(0.001)));
-    pieces
-}
-
-/// The parts of `rect` outside of `hole`.
-fn without(rect: &Rect, hole: &Rect, mut keep: impl FnMut(Rect)) {
-    let (low, high) = (rect.min.max(hole.min), rect.max.min(hole.max));
-    if low.x >= high.x || low.y >= high.y {
-        keep(*rect);
-        return;
-    }
-    let mut keep_some = |x0: f32, z0: f32, x1: f32, z1: f32| {
-        if x1 > x0 && z1 > z0 {
-            keep(Rect::new([x0, z0], [x1, z1]));
-        }
-    };
-    keep_some(rect.min.x, rect.min.y, low.x, rect.max.y);
-    keep_some(high.x, rect.min.y, rect.max.x, rect.max.y);
-    keep_some(low.x, rect.min.y, high.x, low.y);
-    keep_some(low.x, high.y, high.x, rect.max.y);
-}
-
-fn floor_mesh(rect: &Rect, material: FloorMaterial, color: [u8; 3]) -> Mesh {
-    // Neighbors overlap by a millimetre, so that no pixel falls between them.
-    let rect = rect.grown(0.001);
-    let mut mesh = Mesh::default();
-    let mut skin = Skin::new(color, Finish::Matte);
-    skin.texture = match material {
-        FloorMaterial::Wood => Texture::Planks,
-        FloorMaterial::Tiles => Texture::Tiles,
-        FloorMaterial::Carpet => Texture::Carpet,
-        FloorMaterial::Asphalt => Texture::Asphalt,
-        FloorMaterial::Pavement => Texture::Pavement,
-        FloorMaterial::Grass => Texture::Grass,
-    };
-    if matches!(material, FloorMaterial::Wood | FloorMaterial::Tiles) {
-        skin.gloss = mesh::Gloss::Satin;
-    }
-    // Planks run along the longer side.
-    if rect.size().y > rect.size().x {
-        skin.axes = Mat3::from_cols(Vec3::Z, Vec3::Y, Vec3::X);
-    }
-    mesh.skin(skin);
-    level_quad(&mut mesh, &rect, 0.0, false);
-    mesh.finish()
-}
-
-fn ceiling_mesh(rect: &Rect, height_m: f32) -> Mesh {
-    let mut mesh = Mesh::default();
-    mesh.skin(Skin::new([244, 243, 240], Finish::Matte));
-    level_quad(&mut mesh, rect, height_m, true);
-    mesh.finish()
-}
-
-fn level_quad(mesh: &mut Mesh, rect: &Rect, y: f32, downwards: bool) {
-    let (a, b) = (rect.min, rect.max);
-    let ring = [(a.x, a.y), (a.x, b.y), (b.x, b.y), (b.x, a.y)];
-    let mut corners = ring.map(|(x, z)| mesh.corner(Vec3::new(x, y, z), Vec3::Y));
-    if downwards {
-        corners.reverse();
-    }
-    mesh.quad(corners, false);
-}
-
-/// A wall as the box that bodies collide with, overlapping its neighbors by half of its thickness.
-fn wall_mesh(wall: &Wall) -> Mesh {
-    let along = wall.b - wall.a;
-    let length = (along.x * along.x + along.y * along.y).sqrt();
-    let axis = if length > 1e-6 { along / length } else { Vec2::X };
-    let middle = 0.5 * (wall.a + wall.b);
-    let place = mesh::Place {
-        center: Vec3::new(middle.x, 0.5 * (wall.bottom_m + wall.top_m), middle.y),
-        axes: Mat3::from_cols(
-            Vec3::new(axis.x, 0.0, axis.y),
-            Vec3::Y,
-            Vec3::new(-axis.y, 0.0, axis.x),
-        ),
-        extent: Vec3::new(length + wall.thickness_m, wall.top_m - wall.bottom_m, wall.thickness_m),
-    };
-    let mut mesh = Mesh::default();
-    let mut skin = Skin::new(wall.color, Finish::Matte).with_axes(place.axes);
-    skin.texture = Texture::Plaster;
-    mesh.skin(skin);
-    cuboid(&mut mesh, &place);
-    mesh.finish()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use chaic_protocol::briefing::Goal;
-    use chaic_protocol::{Frame, TaskId};
-    use chaic_world::Room;
-
-    #[test]
-    fn there_is_a_ceiling_over_every_room_and_doorway() {
-        let room = |rect| Room { kind: RoomKind::Office, rect };
-        let setup = Setup {
-            task: TaskId::NoConstraint,
-            seed: 0,
-            horizon: Frame::default(),
-            bounds: Rect::new([0.0, 0.0], [5.0, 4.0]),
-            ceiling_m: Some(3.0),
-            // A wall of 0.5 m with a doorway lies between them, an alcove beside the second.
-            rooms: vec![
-                room(Rect::new([0.0, 0.0], [2.0, 4.0])),
-                room(Rect::new([2.5, 0.0], [5.0, 2.0])),
-            ],
-            walls: Vec::new(),
-            openings: Vec::new(),
-            floors: Vec::new(),
-            things: Vec::new(),
-            people: Vec::new(),
-            goal: Goal { targets: Vec::new() },
-            goal_places: Vec::new(),
-        };
-        let pieces = ceiling_pieces(&setup);
-        for i in 0..50 {
-            for k in 0..40 {
-                let p = 0.1 * Vec2::new(i as f32 + 0.5, k as f32 + 0.5);
-                assert!(pieces.iter().any(|r| r.contains(p)), "none above {p}");
-            }
-        }
-    }
 }

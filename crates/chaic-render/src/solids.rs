@@ -3,10 +3,9 @@
 use chaic_protocol::Vec3;
 use chaic_protocol::catalogue::{Part, Solid};
 use chaic_protocol::geom::math;
-use chaic_world::Thing;
 use glam::Mat3;
 
-use crate::mesh::{Mesh, Place, Skin, circle, length};
+use crate::mesh::{Mesh, Place, circle};
 
 /// Number of levels of detail.
 pub const N_LEVELS: usize = 4;
@@ -39,21 +38,6 @@ impl Detail {
         let n = 2.3 * (radius_m.max(0.0) * self.px_per_m).sqrt();
         (n as usize).clamp(5, 32)
     }
-}
-
-/// The mesh of a thing at a level, in its own frame, metres.
-pub(crate) fn thing_mesh(thing: &Thing, level: usize) -> Mesh {
-    let (class, size) = (thing.class.info(), thing.size_m());
-    let detail = Detail::of_level(level, 0.5 * length(size));
-    let mut mesh = Mesh::default();
-    for part in thing.parts() {
-        let place = place_of(&part, size);
-        let mut skin = Skin::new(part.color, part.finish).with_axes(place.grain());
-        skin.tinted = !class.palette.is_empty() && part.color == class.parts[0].color;
-        mesh.skin(skin);
-        solid(&mut mesh, part.solid, &place, detail);
-    }
-    mesh.finish()
 }
 
 /// Where a part of an object of this size lies.
@@ -92,10 +76,13 @@ pub(crate) fn solid(mesh: &mut Mesh, solid: Solid, place: &Place, detail: Detail
         Solid::Frustum { top } => frustum(mesh, place, top, n),
         Solid::Torus { tube } => {
             let m = detail.corners(width * tube).min(16);
-            ring_of_tubes(mesh, place, tube, 360.0, n.max(8), m);
+            // A thin wire needs no more than three sides.
+            let (m, least) = if detail.px_per_m * width * tube < 1.0 { (3, 6) } else { (m, 8) };
+            ring_of_tubes(mesh, place, tube, 360.0, n.max(least), m);
         }
         Solid::Arc { tube, degrees } => {
             let m = detail.corners(width * tube).min(16);
+            let m = if detail.px_per_m * width * tube < 1.0 { 3 } else { m };
             let n = ((n as f32 * degrees / 360.0) as usize + 2).max(4);
             ring_of_tubes(mesh, place, tube, degrees.clamp(1.0, 359.0), n, m);
         }
@@ -266,6 +253,7 @@ fn round_tub(mesh: &mut Mesh, place: &Place, wall: f32, bottom: f32, n: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::Skin;
     use chaic_protocol::catalogue::Finish;
 
     /// Every solid is closed and its triangles look outwards: the signed volume is positive and

@@ -171,7 +171,7 @@ impl Texture {
             }
             Texture::Wicker => wicker(u, v),
             Texture::Mottle => 1.0 + broad(0.28, 7) + fine(0.06, 8),
-            Texture::Crust => 1.0 + 0.7 * (clouds(u, v, 6, 9) - 0.5) + fine(0.12, 10),
+            Texture::Crust => 1.0 + 0.45 * (clouds(u, v, 6, 9) - 0.5) + fine(0.12, 10),
             Texture::Planks => planks(u, v),
             Texture::Tiles => {
                 let gap = joint(u * 4.0, 0.018).min(joint(v * 4.0, 0.018));

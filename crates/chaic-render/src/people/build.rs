@@ -66,7 +66,7 @@ impl Build {
                 girth: 0.82 * h / 1.2,
                 ..adult
             },
-            Persona::Frail => Build { lean_rad: 0.22, girth: 0.9 * h / 1.75, ..adult },
+            Persona::Frail => Build { lean_rad: 0.32, girth: 0.9 * h / 1.75, ..adult },
             _ => adult,
         }
     }

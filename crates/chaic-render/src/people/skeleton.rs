@@ -37,6 +37,41 @@ pub(super) struct Skeleton {
     pub ankles: [Vec3; 2],
     /// How far the feet point down, radians.
     pub foot_pitch: [f32; 2],
+    /// Whether the face shows an effort that fails.
+    pub effort: bool,
+}
+
+/// Distance that this person covers in one cycle of both legs, metres for an adult's height: the
+/// frail take short steps.
+fn stride_m(posture: &Posture) -> f32 {
+    match posture.persona {
+        Persona::Frail => 0.62 * STRIDE_M,
+        Persona::Child => 0.9 * STRIDE_M,
+        _ => STRIDE_M,
+    }
+}
+
+/// How much lower the hips are in the middle of a walk than when standing, as a fraction of the
+/// height: they sink twice in a cycle, when both feet are on the ground.
+fn low_when_walking(posture: &Posture, phase: f32) -> f32 {
+    let sunk = 0.5 - 0.5 * math::cos(2.0 * phase);
+    match posture.persona {
+        // A limp: the body drops onto one leg.
+        Persona::Frail => 0.008 + 0.016 * (0.5 + 0.5 * math::cos(phase)),
+        Persona::Child => 0.004 + 0.022 * sunk,
+        _ => 0.006 + 0.012 * sunk,
+    }
+}
+
+/// How far the trunk leans over the standing leg, radians.
+fn sway_rad(posture: &Posture, phase: f32) -> f32 {
+    let most = match posture.persona {
+        Persona::Frail => 0.11,
+        Persona::Child => 0.05,
+        _ => 0.03,
+    };
+    let lopsided = if posture.persona == Persona::Frail { 0.05 } else { 0.0 };
+    most * math::cos(phase) + lopsided
 }
 
 /// A frame that leans forward by `pitch` and to the right by `roll`.
@@ -72,17 +107,19 @@ impl Skeleton {
         let h = build.top_y;
         let tremble =
             if posture.failing { 0.02 * math::sin(2.1 * (frame % 10_000) as f32) } else { 0.0 };
-        let phase = std::f32::consts::TAU * posture.walked_m / (STRIDE_M * h / 1.75);
+        let phase = std::f32::consts::TAU * posture.walked_m / (stride_m(posture) * h / 1.75);
         let walks = posture.moving && !rolls;
         let (mut hips, pitch) = if rolls {
             (Vec3::new(0.0, 0.56, 0.06), build.lean_rad - 0.06 + 0.95 * bend)
         } else {
-            let low = if walks { 0.012 * h } else { 0.0 };
+            let low = if walks { low_when_walking(posture, phase) * h } else { 0.0 };
             let y = build.hip_y + (0.20 * h - build.hip_y) * bend - low + 0.05 * h * stretch;
             (Vec3::new(0.0, y, 0.10 * h * bend), build.lean_rad + 1.0 * bend)
         };
         hips.x += tremble;
-        let trunk = leaning(pitch, 0.0);
+        let roll = if walks { sway_rad(posture, phase) } else { 0.0 };
+        hips.x += 0.25 * roll;
+        let trunk = leaning(pitch, roll);
         let chest = hips + trunk.y_axis * (build.shoulder_y - build.hip_y);
         let tilt = if posture.failing { 0.28 + 2.0 * tremble } else { 0.0 };
         let head_axes =
@@ -104,6 +141,7 @@ impl Skeleton {
             knees: [hips; 2],
             ankles: [hips; 2],
             foot_pitch: [0.0; 2],
+            effort: posture.failing,
         };
         for (k, side) in [-1.0f32, 1.0].into_iter().enumerate() {
             let cycle = phase + std::f32::consts::PI * k as f32;
@@ -139,7 +177,7 @@ impl Skeleton {
             ankle.y += 0.035 * b.top_y * posture.bend;
         }
         if let Some(cycle) = cycle {
-            let half_step = 0.25 * STRIDE_M * b.top_y / 1.75;
+            let half_step = 0.25 * stride_m(posture) * b.top_y / 1.75;
             let (sn, cs) = (math::sin(cycle), math::cos(cycle));
             ankle.z -= half_step * sn;
             ankle.y += 0.075 * b.top_y * cs.max(0.0) * (1.0 - 0.4 * sn);

@@ -1,0 +1,531 @@
+//! What else stands, lies and hangs in the houses of the original.
+
+use chaic_protocol::catalogue::Finish;
+use chaic_protocol::geom::math::{cos, sin};
+
+use super::Model;
+use super::colors::{
+    BLACK, BRASS, DARK_STEEL, GAP, GLOSSY_BLACK, LAMP, LEAF, PAPER, STEEL, WALNUT, WHITE,
+};
+use crate::sculpt::{Sculptor, paint};
+
+pub(super) fn model(name: &str) -> Option<Model> {
+    Some(match name {
+        "table_lamp" => table_lamp,
+        "painting" => painting,
+        "cushion" => cushion,
+        "suitcase" => suitcase,
+        "trunk" => trunk,
+        "woven_box" => woven_box,
+        "dog_house" => dog_house,
+        "planter" => planter,
+        "flower_vase" => flower_vase,
+        "baking_sheet" => baking_sheet,
+        "notepad" => notepad,
+        "laptop" => laptop,
+        "headphones" => headphones,
+        "globe" => globe,
+        "sculpture" => sculpture,
+        "toy_horse" => toy_horse,
+        "puzzle_box" => puzzle_box,
+        _ => return None,
+    })
+}
+
+fn table_lamp(s: &mut Sculptor) {
+    let shade = s.main_or(&[[244, 230, 200], [200, 120, 90], [150, 176, 170], [238, 236, 230]]);
+    s.paint(shade);
+    s.lathe(
+        [0.0, 0.34, 0.0],
+        &[
+            [0.196, 0.004],
+            [0.2, 0.0],
+            [0.14, 0.257],
+            [0.138, 0.26],
+            [0.135, 0.255],
+            [0.19, 0.012],
+            [0.196, 0.004],
+        ],
+    );
+    s.paint(LAMP);
+    s.ball([0.0, 0.42, 0.0], [0.07, 0.09, 0.07]);
+    s.paint(s.pick(1, &[BRASS, STEEL, paint([70, 96, 120], Finish::Glossy)]));
+    s.lathe(
+        [0.0; 3],
+        &[
+            [0.1, 0.0],
+            [0.1, 0.012],
+            [0.06, 0.022],
+            [0.022, 0.04],
+            [0.03, 0.1],
+            [0.045, 0.16],
+            [0.03, 0.23],
+            [0.014, 0.28],
+            [0.014, 0.43],
+        ],
+    );
+    s.rod([-0.138, 0.585, 0.0], [0.138, 0.585, 0.0], 0.003);
+    s.rod([0.0, 0.5, 0.0], [0.0, 0.595, 0.0], 0.004);
+}
+
+fn painting(s: &mut Sculptor) {
+    let frame = s.pick(1, &[WALNUT, BRASS, WHITE, BLACK]);
+    s.paint(s.main());
+    s.block([0.0, 0.06, 0.0], [0.7, 1.04, 0.034], 0.0);
+    s.paint(frame);
+    for (x, y, w, h) in [
+        (-0.38, 0.0, 0.06, 1.16),
+        (0.38, 0.0, 0.06, 1.16),
+        (0.0, 0.0, 0.7, 0.06),
+        (0.0, 1.1, 0.7, 0.06),
+    ] {
+        s.block([x, y, 0.0], [w, h, 0.04], 0.008);
+    }
+    // Sky and land, fruit in a bowl, or bare shapes.
+    let z = -0.0172;
+    match s.pick(2, &[0, 1, 2]) {
+        0 => {
+            s.paint(paint([150, 186, 214], Finish::Matte));
+            s.block([0.0, 0.55, z], [0.69, 0.54, 0.002], 0.0);
+            s.paint(paint([88, 120, 84], Finish::Matte));
+            s.cut(
+                [0.0, 0.5, z],
+                &[[-0.345, -0.1], [0.345, -0.1], [0.345, 0.12], [0.05, 0.2], [-0.345, 0.06]],
+                0.003,
+                [0.0; 3],
+            );
+            s.paint(paint([244, 220, 130], Finish::Matte));
+            s.ball_turned([0.18, 0.95, z], [0.12, 0.12, 0.004], [0.0; 3]);
+            s.paint(paint([110, 84, 60], Finish::Matte));
+            s.cut(
+                [-0.1, 0.3, z],
+                &[[-0.1, -0.2], [0.12, -0.2], [0.02, 0.2], [-0.02, 0.2]],
+                0.004,
+                [0.0; 3],
+            );
+        }
+        1 => {
+            s.paint(paint([120, 84, 60], Finish::Matte));
+            s.block([0.0, 0.06, z], [0.69, 0.36, 0.002], 0.0);
+            for (k, [x, y, d]) in
+                [[-0.14, 0.55, 0.22], [0.06, 0.53, 0.24], [0.2, 0.5, 0.18], [-0.02, 0.66, 0.2]]
+                    .into_iter()
+                    .enumerate()
+            {
+                s.paint(paint(
+                    [[200, 60, 50], [230, 160, 50], [110, 140, 70], [220, 200, 90]][k],
+                    Finish::Matte,
+                ));
+                s.ball_turned([x, y, z], [d, d, 0.005], [0.0; 3]);
+            }
+            s.paint(paint([90, 110, 140], Finish::Matte));
+            s.cut(
+                [0.0, 0.4, z - 0.001],
+                &[[-0.12, -0.12], [0.12, -0.12], [0.28, 0.1], [-0.28, 0.1]],
+                0.003,
+                [0.0; 3],
+            );
+        }
+        _ => {
+            for (k, [x, y, w, h]) in [
+                [-0.15, 0.7, 0.3, 0.4],
+                [0.15, 0.5, 0.28, 0.6],
+                [0.0, 0.2, 0.5, 0.16],
+                [0.1, 0.92, 0.34, 0.1],
+            ]
+            .into_iter()
+            .enumerate()
+            {
+                s.paint(paint(
+                    [[206, 176, 96], [88, 104, 84], [170, 80, 60], [60, 70, 110]][k],
+                    Finish::Matte,
+                ));
+                s.block([x, y - 0.1, z], [w, h.min(1.0 - y + 0.1), 0.002 + 0.0004 * k as f32], 0.0);
+            }
+        }
+    }
+}
+
+fn cushion(s: &mut Sculptor) {
+    s.paint(s.main());
+    s.pillow([0.0, 0.15, 0.0], [0.13, 0.3, 0.38], [0.0; 3], 0.62);
+    if s.style % 2 == 1 {
+        s.paint(paint([214, 206, 190], Finish::Fabric));
+        for z in [-0.07, 0.07] {
+            s.pillow([0.0, 0.15, z], [0.132, 0.28, 0.03], [0.0; 3], 0.62);
+        }
+    }
+}
+
+fn suitcase(s: &mut Sculptor) {
+    s.paint(s.main());
+    s.block([0.0, 0.0, 0.0], [0.46, 0.34, 0.1], 0.02);
+    s.paint(BLACK);
+    s.block([0.0, 0.16, 0.0], [0.462, 0.012, 0.104], 0.002);
+    s.pipe(
+        &[[-0.07, 0.335, 0.0], [-0.06, 0.375, 0.0], [0.06, 0.375, 0.0], [0.07, 0.335, 0.0]],
+        0.009,
+    );
+    for x in [-0.21, 0.21] {
+        for y in [0.004, 0.29] {
+            s.block([x, y, 0.0], [0.044, 0.046, 0.105], 0.01);
+        }
+    }
+    s.paint(paint([122, 84, 54], Finish::Fabric));
+    for x in [-0.13, 0.13] {
+        s.block([x, 0.0, 0.0], [0.03, 0.342, 0.104], 0.003);
+    }
+    s.paint(BRASS);
+    for x in [-0.13, 0.13] {
+        s.block([x, 0.25, -0.0525], [0.036, 0.04, 0.004], 0.001);
+    }
+    s.block([0.0, 0.28, -0.051], [0.06, 0.04, 0.006], 0.002);
+}
+
+fn trunk(s: &mut Sculptor) {
+    const WOODS: [[[u8; 3]; 2]; 4] = [
+        [[150, 116, 88], [128, 96, 72]],
+        [[96, 68, 52], [80, 56, 42]],
+        [[150, 116, 88], [128, 96, 72]],
+        [[92, 108, 92], [78, 92, 80]],
+    ];
+    let [body, lid] = s.pick(0, &WOODS).map(|c| paint(c, Finish::Wood));
+    for (k, color) in [body, lid].into_iter().enumerate() {
+        s.paint(color);
+        s.shape(&s.class.parts[k]);
+    }
+    s.without(&[0, 1]);
+    s.paint(paint([96, 70, 50], Finish::Wood));
+    for x in [-0.42, 0.0, 0.42] {
+        s.block([x, 0.0, -0.327], [0.04, 0.97, 0.02], 0.004);
+    }
+    s.paint(BRASS);
+    for x in [-0.425, 0.425] {
+        for y in [0.01, 0.62, 0.72, 0.92] {
+            s.block([x, y, -0.3], [0.034, 0.06, 0.078], 0.006);
+        }
+    }
+    for x in [-0.3, 0.3] {
+        for k in 0..7 {
+            s.ball([x, 0.06 + 0.14 * k as f32, -0.34], [0.024, 0.024, 0.01]);
+        }
+    }
+    s.paint(GAP);
+    s.block([0.0, 0.655, -0.3385], [0.016, 0.03, 0.003], 0.0);
+}
+
+fn woven_box(s: &mut Sculptor) {
+    let willow = s.main_or(&[[206, 178, 142], [206, 178, 142], [168, 130, 92], [222, 206, 180]]);
+    s.paint(willow);
+    s.shape(&s.class.parts[0]);
+    s.shape(&s.class.parts[1]);
+    s.paint(paint(willow.color.map(|c| (0.82 * f32::from(c)) as u8), Finish::Wicker));
+    if s.level > 1 {
+        for k in 0..5 {
+            s.block([0.0, 0.03 + 0.078 * k as f32, 0.0], [0.708, 0.02, 0.708], 0.006);
+        }
+    }
+    s.paint(WALNUT);
+    for z in [-0.355, 0.355] {
+        s.pipe(
+            &[[-0.08, 0.31, 0.98 * z], [-0.06, 0.27, z], [0.06, 0.27, z], [0.08, 0.31, 0.98 * z]],
+            0.008,
+        );
+    }
+}
+
+fn dog_house(s: &mut Sculptor) {
+    let boards = s.main_or(&[[132, 130, 132], [168, 120, 80], [132, 130, 132], [150, 80, 70]]);
+    s.paint(boards);
+    s.shape(&s.class.parts[0]);
+    if s.level > 1 {
+        s.paint(paint(boards.color.map(|c| (0.7 * f32::from(c)) as u8), Finish::Wood));
+        for k in 1..6 {
+            s.block([0.0, 0.12 * k as f32, 0.0], [1.046, 0.008, 1.086], 0.0);
+        }
+    }
+    s.paint(boards);
+    s.only(&[1]);
+    s.paint(BLACK);
+    // An arched way in.
+    let arch: [[f32; 2]; 10] = std::array::from_fn(|k| match k {
+        0 => [0.26, -0.3],
+        9 => [-0.26, -0.3],
+        _ => {
+            let a = std::f32::consts::PI * (k - 1) as f32 / 7.0;
+            [0.26 * cos(a), 0.04 + 0.22 * sin(a)]
+        }
+    });
+    s.cut([0.0, 0.36, -0.543], &arch, 0.012, [0.0; 3]);
+    s.paint(WHITE);
+    for k in 0..9 {
+        let a = std::f32::consts::PI * (k as f32 + 0.5) / 9.0;
+        s.block_turned(
+            [0.29 * cos(a), 0.4 + 0.25 * sin(a), -0.545],
+            [0.1, 0.05, 0.02],
+            [0.0, 0.0, a.to_degrees() + 90.0],
+            0.004,
+        );
+    }
+    for x in [-0.29, 0.29] {
+        s.block([x, 0.06, -0.545], [0.05, 0.35, 0.02], 0.004);
+    }
+}
+
+fn planter(s: &mut Sculptor) {
+    s.paint(s.main_or(&[[226, 224, 220], [182, 100, 66], [90, 110, 120], [60, 62, 66]]));
+    s.lathe(
+        [0.0; 3],
+        &[
+            [0.15, 0.0],
+            [0.158, 0.01],
+            [0.2, 0.2],
+            [0.232, 0.42],
+            [0.25, 0.44],
+            [0.256, 0.49],
+            [0.25, 0.503],
+            [0.236, 0.503],
+            [0.226, 0.44],
+            [0.21, 0.4],
+        ],
+    );
+    s.paint(paint([88, 74, 60], Finish::Crust));
+    s.lathe([0.0, 0.38, 0.0], &[[0.2, 0.0], [0.216, 0.03], [0.1, 0.045], [0.0, 0.05]]);
+    s.paint(LEAF);
+    for k in 0..7 {
+        let a = 2.4 * k as f32;
+        let r = 0.06 + 0.02 * (k % 3) as f32;
+        s.leaf(
+            [0.04 * cos(a), 0.42, 0.04 * sin(a)],
+            [2.0 * r * cos(a), 0.485, 2.0 * r * sin(a)],
+            0.04,
+            0.01,
+        );
+    }
+}
+
+fn flower_vase(s: &mut Sculptor) {
+    s.paint(s.main_or(&[[201, 181, 172], [120, 150, 170], [160, 90, 80], [214, 206, 180]]));
+    s.lathe(
+        [0.0; 3],
+        &[
+            [0.028, 0.0],
+            [0.031, 0.006],
+            [0.044, 0.06],
+            [0.0485, 0.1],
+            [0.042, 0.145],
+            [0.026, 0.18],
+            [0.017, 0.21],
+            [0.017, 0.25],
+            [0.0245, 0.288],
+            [0.024, 0.2925],
+            [0.02, 0.288],
+            [0.013, 0.25],
+            [0.012, 0.22],
+        ],
+    );
+    s.paint(paint([120, 90, 80], Finish::Glossy));
+    for (y, r) in [(0.1, 0.048), (0.145, 0.042)] {
+        s.hoop([0.0, y, 0.0], [0.0, 1.0, 0.0], r - 0.0008, 0.0014);
+    }
+}
+
+fn baking_sheet(s: &mut Sculptor) {
+    s.all();
+    s.paint(DARK_STEEL);
+    s.block([0.0, 0.004, 0.0], [0.57, 0.0035, 0.325], 0.0);
+    if s.style % 2 == 1 {
+        s.paint(paint([206, 160, 100], Finish::Crust));
+        for k in 0..12 {
+            let (i, j) = ((k % 4) as f32, (k / 4) as f32);
+            s.ball([-0.2 + 0.133 * i, 0.006, -0.1 + 0.1 * j], [0.07, 0.009, 0.07]);
+        }
+    }
+}
+
+fn notepad(s: &mut Sculptor) {
+    s.paint(PAPER);
+    s.block([0.0, 0.0, 0.0], [0.114, 0.046, 0.114], 0.002);
+    if s.level > 1 {
+        s.paint(paint([206, 204, 196], Finish::Matte));
+        for k in 0..6 {
+            s.block([0.0, 0.006 + 0.007 * k as f32, 0.0], [0.1144, 0.001, 0.1144], 0.0);
+        }
+    }
+    let cover = s.pick(0, &[[246, 224, 120], [246, 224, 120], [160, 210, 230], [240, 170, 180]]);
+    s.paint(paint(cover, Finish::Matte));
+    s.block([0.0, 0.046, 0.0], [0.11, 0.005, 0.11], 0.001);
+    s.paint(paint([70, 80, 120], Finish::Matte));
+    for k in 0..4 {
+        s.block(
+            [-0.01 * (k % 2) as f32, 0.051, -0.035 + 0.02 * k as f32],
+            [0.08, 0.0006, 0.004],
+            0.0,
+        );
+    }
+}
+
+fn laptop(s: &mut Sculptor) {
+    let case = s.main_or(&[STEEL.color, STEEL.color, [70, 72, 78], [214, 190, 170]]);
+    s.paint(case);
+    s.block([0.0, 0.0, -0.02], [0.313, 0.016, 0.215], 0.004);
+    s.block([0.0, 0.014, 0.11], [0.313, 0.26, 0.012], 0.004);
+    s.paint(GLOSSY_BLACK);
+    s.block([0.0, 0.025, 0.1025], [0.3, 0.24, 0.006], 0.0);
+    s.paint(paint(s.pick(2, &[[70, 130, 190], [90, 150, 120], [140, 100, 170]]), Finish::Glossy));
+    s.block([0.0, 0.035, 0.0993], [0.282, 0.21, 0.002], 0.0);
+    s.paint(WHITE);
+    s.block([-0.05, 0.08, 0.098], [0.15, 0.13, 0.001], 0.0);
+    s.paint(paint([60, 70, 90], Finish::Matte));
+    for k in 0..5 {
+        s.block([-0.06, 0.1 + 0.02 * k as f32, 0.0972], [0.1, 0.006, 0.001], 0.0);
+    }
+    s.paint(BLACK);
+    for k in 0..48 {
+        let (i, j) = ((k % 12) as f32, (k / 12) as f32);
+        s.block([-0.126 + 0.0229 * i, 0.0155, -0.03 + 0.024 * j], [0.019, 0.002, 0.019], 0.0);
+    }
+    s.paint(paint(case.color.map(|c| (0.8 * f32::from(c)) as u8), Finish::Glossy));
+    s.block([0.0, 0.0156, -0.09], [0.1, 0.001, 0.055], 0.0);
+    s.paint(BLACK);
+    s.rod([-0.12, 0.014, 0.1], [0.12, 0.014, 0.1], 0.005);
+}
+
+fn headphones(s: &mut Sculptor) {
+    let shell =
+        s.main_or(&[GLOSSY_BLACK.color, GLOSSY_BLACK.color, [226, 226, 222], [170, 40, 44]]);
+    s.paint(shell);
+    for side in [-1.0, 1.0] {
+        s.lathe_along(
+            [0.1 * side, 0.06, 0.0],
+            [side, 0.0, 0.0],
+            &[[0.04, 0.0], [0.048, 0.006], [0.046, 0.02], [0.03, 0.028], [0.0, 0.03]],
+        );
+        s.paint(DARK_STEEL);
+        s.rod([0.11 * side, 0.09, 0.0], [0.114 * side, 0.14, 0.0], 0.006);
+        s.paint(BLACK);
+        s.hoop([0.088 * side, 0.06, 0.0], [1.0, 0.0, 0.0], 0.034, 0.014);
+        s.paint(shell);
+    }
+    let arch: [[f32; 3]; 9] = std::array::from_fn(|k| {
+        let a = std::f32::consts::PI * k as f32 / 8.0;
+        [0.114 * cos(a), 0.125 + 0.107 * sin(a), 0.0]
+    });
+    s.pipe(&arch, 0.011);
+    s.paint(BLACK);
+    s.pipe(&arch[2..7].iter().map(|p| [0.93 * p[0], p[1] - 0.008, 0.0]).collect::<Vec<_>>(), 0.012);
+}
+
+fn globe(s: &mut Sculptor) {
+    s.paint(s.main_or(&[[120, 156, 190], [120, 156, 190], [90, 140, 180], [204, 186, 150]]));
+    s.ball([0.0, 0.05, 0.0], [0.142; 3]);
+    // Land, roughly where it lies.
+    s.paint(paint([110, 150, 84], Finish::Matte));
+    for [lon, lat, wide, high] in [
+        [0.3, 0.7, 0.09, 0.06],
+        [0.9, 0.5, 0.1, 0.07],
+        [0.2, 0.0, 0.06, 0.07],
+        [2.3, -0.4, 0.05, 0.03],
+        [-1.6, 0.7, 0.08, 0.06],
+        [-1.0, -0.3, 0.045, 0.08],
+        [1.7, 0.8, 0.09, 0.05],
+        [3.6, 0.75, 0.08, 0.05],
+    ] {
+        let (r, y) = (0.067 * cos(lat), 0.121 + 0.067 * sin(lat));
+        let turn = [-lat.to_degrees(), lon.to_degrees(), 0.0];
+        s.ball_turned([r * sin(lon), y, r * cos(lon)], [wide * 0.7, high * 0.8, 0.0125], turn);
+    }
+    s.paint(BRASS);
+    let arch: [[f32; 3]; 9] = std::array::from_fn(|k| {
+        let a = (-80.0 + 170.0 * k as f32 / 8.0).to_radians();
+        [0.0735 * cos(a), 0.121 + 0.0725 * sin(a), 0.0]
+    });
+    s.pipe(&arch, 0.0035);
+    s.rod([0.0, 0.01, 0.0], [0.0, 0.055, 0.0], 0.008);
+    s.paint(WALNUT);
+    s.lathe(
+        [0.0; 3],
+        &[[0.048, 0.0], [0.05, 0.006], [0.035, 0.012], [0.014, 0.022], [0.01, 0.035]],
+    );
+}
+
+fn sculpture(s: &mut Sculptor) {
+    s.paint(BLACK);
+    s.block([0.0, 0.0, 0.0], [0.024, 0.006, 0.024], 0.001);
+    s.paint(paint(s.pick(1, &[[128, 92, 62], [196, 196, 190], [90, 110, 96]]), Finish::Metal));
+    s.pillow([0.0, 0.014, 0.0], [0.016, 0.016, 0.012], [0.0, 0.0, 20.0], 0.8);
+    s.ball([0.003, 0.0195, 0.0], [0.01, 0.0105, 0.01]);
+    s.hoop([0.0, 0.018, 0.0], [0.4, 1.0, 0.2], 0.0125, 0.0022);
+}
+
+fn toy_horse(s: &mut Sculptor) {
+    let rocker = s.pick(
+        1,
+        &[WALNUT, paint([176, 60, 54], Finish::Wood), paint([70, 110, 150], Finish::Wood)],
+    );
+    s.paint(s.main());
+    s.pillow([0.02, 0.31, 0.0], [0.5, 0.19, 0.17], [0.0; 3], 0.8);
+    s.curve(&[
+        ([-0.16, 0.34, 0.0], 0.075),
+        ([-0.25, 0.43, 0.0], 0.055),
+        ([-0.29, 0.485, 0.0], 0.048),
+    ]);
+    s.pillow([-0.335, 0.475, 0.0], [0.2, 0.1, 0.085], [0.0, 0.0, 28.0], 0.75);
+    for z in [-0.03, 0.03] {
+        s.taper([-0.275, 0.51, z], [-0.265, 0.55, 1.2 * z], 0.014, 0.003);
+        for (x, lean) in [(-0.14, -0.07), (0.18, 0.07)] {
+            s.taper([x, 0.28, 2.0 * z], [x + lean, 0.045, 3.5 * z], 0.035, 0.02);
+        }
+    }
+    s.paint(rocker);
+    for z in [-0.11, 0.11] {
+        s.pipe(
+            &[
+                [-0.46, 0.075, z],
+                [-0.3, 0.035, z],
+                [0.0, 0.02, z],
+                [0.3, 0.035, z],
+                [0.46, 0.075, z],
+            ],
+            0.0185,
+        );
+    }
+    for x in [-0.24, 0.24] {
+        s.rod([x, 0.035, -0.11], [x, 0.035, 0.11], 0.014);
+    }
+    s.pillow([0.02, 0.395, 0.0], [0.2, 0.04, 0.16], [0.0; 3], 0.5);
+    s.paint(paint([70, 50, 36], Finish::Fabric));
+    for k in 0..5 {
+        let t = k as f32 / 4.0;
+        s.ball_turned([-0.16 - 0.1 * t, 0.41 + 0.1 * t, 0.0], [0.05, 0.06, 0.03], [0.0; 3]);
+    }
+    s.curve(&[([0.25, 0.34, 0.0], 0.02), ([0.32, 0.28, 0.0], 0.024), ([0.33, 0.19, 0.0], 0.008)]);
+    s.rod([-0.27, 0.43, -0.1], [-0.27, 0.43, 0.1], 0.01);
+    s.paint(GLOSSY_BLACK);
+    for z in [-0.037, 0.037] {
+        s.ball([-0.325, 0.485, z], [0.018; 3]);
+    }
+}
+
+fn puzzle_box(s: &mut Sculptor) {
+    s.all();
+    let colors = [[200, 60, 50], [60, 110, 170], [230, 190, 70], [80, 150, 90]];
+    for k in 0..8 {
+        s.paint(paint(colors[(k + usize::from(s.style)) % 4], Finish::Matte));
+        let x = -0.1 + 0.066 * (k % 4) as f32;
+        let z = if k < 4 { -0.1695 } else { 0.1695 };
+        s.block([x, 0.03, z], [0.045, 0.045, 0.005], 0.002);
+    }
+    for z in [-0.1, 0.0, 0.1] {
+        s.paint(paint(colors[((z * 10.0) as i32 + 4) as usize % 4], Finish::Matte));
+        for x in [-0.139, 0.139] {
+            s.lathe_along(
+                [x * 0.99, 0.07, z],
+                [if x < 0.0 { -1.0 } else { 1.0 }, 0.0, 0.0],
+                &[[0.03, 0.0], [0.03, 0.002]],
+            );
+        }
+    }
+    s.paint(GAP);
+    s.block([0.0, 0.114, 0.0], [0.2804, 0.003, 0.3404], 0.0);
+}

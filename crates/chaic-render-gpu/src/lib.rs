@@ -28,6 +28,13 @@
 //!    keeps nearness and owner of its pixels in registers. So no pixel needs an atomic operation, a
 //!    wall over the whole image is nobody's burden alone, and ties are settled in a fixed order.
 //! 4. `shade.wgsl`: color, if a view asks for it.
+//!
+//! Why `wgpu` and shaders of our own, and not CubeCL, in which kernels are Rust: a kernel that draws
+//! 20,000 random boxes by `atomicMax` was written in both (CubeCL 0.11.3, its runtime for `wgpu`). Both
+//! gave the right image on a software Vulkan, in about the same time. But CubeCL needs 197 packages
+//! where this crate needs 135, and 260 seconds of a processor to build unoptimized; its runtime for
+//! processors doesn't build without fetching an LLVM; and it is an alpha whose language still
+//! changes. What it would save is 900 lines of WGSL.
 
 #![allow(
     rustdoc::private_intra_doc_links,

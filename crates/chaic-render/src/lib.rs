@@ -35,8 +35,8 @@ mod looks;
 mod mesh;
 mod people;
 mod sculpt;
-mod solids;
 mod shapes;
+mod solids;
 mod structure;
 
 mod clip;

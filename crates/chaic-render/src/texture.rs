@@ -104,7 +104,7 @@ impl Tile {
     #[inline(always)]
     fn level_at(&self, level: usize) -> Level {
         // Levels of 4^n, 4^(n-1), ... texels: the first few of them together.
-        let before = (4 * SIDE * SIDE - (4 * SIDE * SIDE >> (2 * level))) / 3;
+        let before = (4 * SIDE * SIDE - ((4 * SIDE * SIDE) >> (2 * level))) / 3;
         Level {
             begin: self.begin + before as u32,
             log2_side: SIDE.ilog2() - level as u32,

@@ -179,7 +179,7 @@ impl File {
         }
         let (metallic, roughness) = metallic_roughness(skin.gloss);
         let [r, g, b] = color;
-        let [red, green, blue] = color.map(|x| shown_from_linear(x));
+        let [red, green, blue] = color.map(shown_from_linear);
         let texture = format!("{:?}", skin.texture).to_lowercase();
         let gloss = format!("{:?}", skin.gloss).to_lowercase();
         let index = self.root.push(Material {

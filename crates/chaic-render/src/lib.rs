@@ -16,7 +16,9 @@
 //! How a view comes about: instances are culled by the camera's frustum and by what is already
 //! drawn ([`draw`]), drawn at a level of detail that fits their size on the image ([`looks`]) into
 //! a buffer of nearness and owners ([`raster`]); depth and ids are read off that buffer, and color
-//! is computed for each pixel's owner ([`shade`]) only if it is asked for.
+//! only if it is asked for: each triangle that is seen is lit once ([`paint`]), and rows of pixels
+//! take color and texture from their triangles ([`shade`]). The inner loops are compiled for each
+//! kind of vectors, and do the same operations in each.
 
 #![allow(
     rustdoc::private_intra_doc_links,

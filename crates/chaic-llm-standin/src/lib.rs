@@ -183,6 +183,10 @@ fn listen(listener: TcpListener, address: SocketAddr, shared: &Arc<Shared>) {
             }
         }
         let Some(open) = &listener else { continue };
+        // Whoever ended it while nobody listened has knocked in vain and won't again.
+        if shared.is_over.load(Ordering::SeqCst) {
+            return;
+        }
         let Ok((stream, _)) = open.accept() else { continue };
         let shared = Arc::clone(shared);
         std::thread::spawn(move || {
@@ -327,4 +331,24 @@ fn completion(question: &Question, text: &str) -> Value {
 
 fn error(message: &str) -> Value {
     json!({ "error": { "message": message, "type": "invalid_request_error" } })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_ends_at_once_even_while_nobody_listens() {
+        let standin = StandIn::start(Options::default()).expect("a port");
+        standin.shared.is_deaf.store(true, Ordering::SeqCst);
+        // The listener takes note with the next connection, and is deaf when it is told to end.
+        drop(TcpStream::connect(standin.address));
+        std::thread::sleep(DEAF / 2);
+        let (done, ended) = std::sync::mpsc::channel();
+        std::thread::spawn(move || {
+            drop(standin);
+            let _ = done.send(());
+        });
+        assert_eq!(ended.recv_timeout(Duration::from_secs(20)), Ok(()));
+    }
 }

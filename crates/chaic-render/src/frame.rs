@@ -20,8 +20,8 @@ pub(crate) struct ClassMesh {
     levels: [OnceLock<Mesh>; N_LEVELS],
 }
 
-/// Class, scale and height of the seat, the latter two as bits.
-pub(crate) type ShapeKey = (ClassId, [u32; 3], Option<u32>);
+/// Class, style, scale and height of the seat, the latter two as bits.
+pub(crate) type ShapeKey = (ClassId, u8, [u32; 3], Option<u32>);
 
 impl ClassMesh {
     /// The mesh of a thing in a style, wherever it is. Those of catalogue size are shared by all
@@ -56,7 +56,7 @@ impl ClassMesh {
     /// What decides the shape: equal for equal shapes only.
     pub fn key(&self) -> ShapeKey {
         let Thing { class, scale, seat_m, .. } = &self.thing;
-        (*class, scale.map(f32::to_bits), seat_m.map(f32::to_bits))
+        (*class, self.style, scale.map(f32::to_bits), seat_m.map(f32::to_bits))
     }
 
     fn level(&self, level: usize) -> &Mesh {

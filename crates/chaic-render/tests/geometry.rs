@@ -106,13 +106,14 @@ fn shapes_are_shared_and_whole() {
             assert!(mesh.triangles.is_sorted_by_key(|t| t.skin));
         }
     }
-    // One mesh for each class, none for none.
+    // A mesh for each class, at most one for each of its four styles, and none for none.
     let used: BTreeSet<u32> = levels[0].instances.iter().map(|i| i.mesh).collect();
     assert!(used.iter().copied().eq(0..levels[0].meshes.len() as u32));
     let things = world.setup().things.iter().map(|t| (t.class, t.scale.map(f32::to_bits)));
     let shapes: BTreeSet<_> = things.collect();
-    let meshes = levels[0].instances.iter().filter(|i| i.entity.is_object()).map(|i| i.mesh);
-    assert_eq!(meshes.collect::<BTreeSet<_>>().len(), shapes.len());
+    let objects: Vec<_> = levels[0].instances.iter().filter(|i| i.entity.is_object()).collect();
+    let n_meshes = objects.iter().map(|i| i.mesh).collect::<BTreeSet<_>>().len();
+    assert!((shapes.len()..=4 * shapes.len()).contains(&n_meshes) && n_meshes < objects.len());
     let lamps = levels[0].instances.iter().filter(|i| matches!(i.lit_by, LitBy::Lamp(_)));
     assert!(lamps.count() > 100, "rooms have lamps");
 }

@@ -112,7 +112,7 @@ pub(crate) struct Light<'a> {
     pub lamps: &'a Lamps,
     /// Darkness per cell, 0 to 255; empty if nobody looks at color.
     dark: Vec<u8>,
-    /// Brightness of the ground, four neighbors a cell as in [`crate::texture::Tile::quads`], 255
+    /// Brightness of the ground, four neighbors a cell as in [`crate::texture::Atlas`], 255
     /// unshaded; rows of [`MAX_CELLS`], and one more that is unshaded. Empty if nobody looks.
     pub quads: Vec<u32>,
 }

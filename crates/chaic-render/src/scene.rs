@@ -71,8 +71,7 @@ impl Scene {
         images
     }
 
-    /// The same into images that are there already: their memory is used again, which saves about
-    /// a tenth of the time.
+    /// The same into images that are there already: their memory is used again.
     pub fn render_into(&self, world: &World, views: &[View], images: &mut Vec<Images>) {
         let agents = world.setup().agents();
         let postures: Vec<Posture> = agents.map(|agent| world.posture(agent)).collect();

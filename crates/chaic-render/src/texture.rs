@@ -1,5 +1,5 @@
 //! Surface textures: small tiles of brightness, baked once from integer noise, sampled with
-//! smaller copies for what is far away. Also the conversion between sRGB and linear light.
+//! smaller copies for what is far away. Also the conversion between shown colors and linear light.
 
 use std::sync::OnceLock;
 

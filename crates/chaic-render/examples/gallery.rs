@@ -14,8 +14,9 @@ use chaic_episodes::{Seeds, generate};
 use chaic_protocol::capability::Persona;
 use chaic_protocol::geom::Camera;
 use chaic_protocol::{AgentId, ClassId, Role, TaskId, Vec3};
+use chaic_render::geometry::Geometry;
 use chaic_render::text::{self, Align};
-use chaic_render::{Channels, N_LEVELS, Scene, View, image_out, plan};
+use chaic_render::{Channels, Scene, View, image_out, plan};
 use chaic_world::{Posture, Setup, Thing, World};
 use image::RgbImage;
 use image::codecs::png::{CompressionType, FilterType as PngFilter, PngEncoder};
@@ -33,7 +34,8 @@ fn main() -> Result<()> {
     tasks(folder)?;
     let (house, street) = (scenes::world(scenes::house()), scenes::world(scenes::street()));
     let scene = Scene::new(house.setup());
-    let counts: Vec<String> = (0..N_LEVELS).map(|l| scene.n_triangles(l).to_string()).collect();
+    let levels = scene.geometry_at_all_levels(house.state(), &[]);
+    let counts = levels.each_ref().map(Geometry::count_triangles).map(|n| n.to_string());
     let n = house.setup().things.len();
     println!(
         "triangles of a house of eight rooms with {n} things, by level: {}",

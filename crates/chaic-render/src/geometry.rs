@@ -12,15 +12,12 @@ use crate::Scene;
 use crate::frame::Instance;
 use crate::light::NO_ROOM;
 use crate::mesh::{Mesh, Skin};
-use crate::solids;
 use crate::texture;
 
 pub use crate::mesh::Gloss;
 pub use crate::shapes::{ShapeName, Shapes};
+pub use crate::solids::N_LEVELS;
 pub use crate::texture::Texture;
-
-/// Number of levels of detail; 0 is the coarsest.
-pub const N_LEVELS: usize = solids::N_LEVELS;
 
 /// The finest level of detail.
 pub const FINEST: usize = N_LEVELS - 1;

@@ -60,5 +60,5 @@ pub mod text;
 pub use appearance::Appearance;
 pub use lens::Lens;
 pub use scene::Scene;
-pub use solids::{LEVEL_RADIUS_PX, N_LEVELS};
+pub use solids::LEVEL_RADIUS_PX;
 pub use view::{Channels, MAX_SIDE_PX, View};

@@ -85,10 +85,6 @@ fn rgb(color: Vec3) -> Vec4 {
     color.extend(0.0)
 }
 
-fn dot(a: Vec3, b: Vec3) -> f32 {
-    a.x * b.x + a.y * b.y + a.z * b.z
-}
-
 /// The ground as a grid of cells; x across, z down.
 #[derive(Clone, Debug)]
 pub(crate) struct Ground {
@@ -338,7 +334,7 @@ impl<'a> Light<'a> {
             return Direct { to: self.lamps.to_sun, strength: 1.0, indoors: false };
         };
         let d = lamp - p;
-        let d2 = dot(d, d) + 0.3;
+        let d2 = d.dot(d) + 0.3;
         Direct { to: d * (1.0 / d2.sqrt()), strength: 1.0 / (1.0 + 0.085 * d2), indoors: true }
     }
 
@@ -347,7 +343,7 @@ impl<'a> Light<'a> {
     #[inline]
     pub fn shine(&self, direct: &Direct, normal: Vec3, gloss: Gloss, to_eye: Vec3) -> Shine {
         let lamps = self.lamps;
-        let facing = dot(direct.to, normal);
+        let facing = direct.to.dot(normal);
         let (source, [high, low], facing) = if direct.indoors {
             (lamps.lamp, lamps.indoors, facing + 0.35)
         } else {
@@ -365,8 +361,8 @@ impl<'a> Light<'a> {
             return Shine { factor, add: Vec4::ZERO };
         }
         let half = direct.to + to_eye;
-        let c = dot(normal, half).max(0.0) * (1.0 / dot(half, half).max(1e-12).sqrt());
-        let (c2, facing) = (c * c, dot(normal, to_eye));
+        let c = normal.dot(half).max(0.0) * (1.0 / half.dot(half).max(1e-12).sqrt());
+        let (c2, facing) = (c * c, normal.dot(to_eye));
         let c8 = c2 * c2 * c2 * c2;
         let away = 1.0 - facing.max(0.0);
         let edge = away * away;

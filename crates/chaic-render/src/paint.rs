@@ -29,10 +29,6 @@ pub(crate) struct Plane {
 }
 
 impl Plane {
-    const fn constant(base: Vec4) -> Plane {
-        Plane { base, at: Vec4::ZERO, du: Vec4::ZERO, dv: Vec4::ZERO }
-    }
-
     /// The quantities along a row of pixels whose middles lie at `v`.
     #[inline(always)]
     pub fn row(&self, v: f32) -> RowPlane {
@@ -67,15 +63,25 @@ impl RowPlane {
     }
 }
 
-/// How a triangle's color comes about.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// How a triangle's color comes about. What is shown is 0 to 255, red, green and blue in the lanes.
+#[derive(Clone, Copy)]
 pub(crate) enum Kind {
     /// The same everywhere but for its texture.
-    Even,
-    /// Linear between its corners.
-    Smooth,
-    /// Structure: lit point by point, since it is large.
-    Structure { floor: bool },
+    Even(Vec4),
+    /// Linear between its corners, within their bounds.
+    Smooth { shown: Plane, low: Vec4, high: Vec4 },
+    /// Lit point by point, since it is large.
+    Structure(Surface),
+}
+
+/// A piece of structure before it is lit.
+#[derive(Clone, Copy)]
+pub(crate) struct Surface {
+    pub is_floor: bool,
+    /// Linear.
+    color: Vec4,
+    normal: Vec3,
+    gloss: Gloss,
 }
 
 /// A triangle, ready to be looked at.
@@ -83,17 +89,10 @@ pub(crate) enum Kind {
 pub(crate) struct Paint {
     pub entity: u16,
     pub kind: Kind,
-    /// What is shown, 0 to 255; of structure its linear color as a constant.
-    pub color: Plane,
-    /// Bounds of the corners' colors.
-    pub low: Vec4,
-    pub high: Vec4,
     pub tile: Option<Tile>,
     /// Texture coordinates, metres; the third lane's slope is the cosine between normal and ray
     /// (not normalized).
     pub texture: Plane,
-    pub normal: Vec3,
-    pub gloss: Gloss,
 }
 
 /// The rays of a view in some frame: from `eye + u * eye_u + v * eye_v` along
@@ -128,14 +127,10 @@ impl Rays {
     /// The same in the frame of an instance.
     fn within(&self, instance: &Instance) -> Rays {
         let r = &instance.rotation;
-        let turn = |p: Vec3| Vec3::new(dot(r.x_axis, p), dot(r.y_axis, p), dot(r.z_axis, p));
+        let turn = |p: Vec3| Vec3::new(r.x_axis.dot(p), r.y_axis.dot(p), r.z_axis.dot(p));
         let [eye, u, v] = self.eye;
         Rays { eye: [turn(eye - instance.origin), turn(u), turn(v)], ray: self.ray.map(turn) }
     }
-}
-
-fn dot(a: Vec3, b: Vec3) -> f32 {
-    a.x * b.x + a.y * b.y + a.z * b.z
 }
 
 /// What all triangles of an instance share in a view.
@@ -184,14 +179,14 @@ impl<'a> Painter<'a> {
     /// the triangle turns depth into a linear quantity too, so that w = 1 fits.
     fn plane(&self, sight: &Sight, gradient: Vec3, zero: Vec3, normal: Vec3) -> Vec4 {
         let Rays { eye, ray } = &sight.rays;
-        let base = dot(gradient, eye[0] - zero);
+        let base = gradient.dot(eye[0] - zero);
         let [at, du, dv] = if self.is_plan {
-            let down = dot(normal, ray[0]);
-            let fall = if down.abs() > 1e-6 { dot(gradient, ray[0]) / down } else { 0.0 };
-            let along = |v: Vec3| dot(gradient, v) - fall * dot(normal, v);
-            [-fall * dot(normal, eye[0] - zero), along(eye[1]), along(eye[2])]
+            let down = normal.dot(ray[0]);
+            let fall = if down.abs() > 1e-6 { gradient.dot(ray[0]) / down } else { 0.0 };
+            let along = |v: Vec3| gradient.dot(v) - fall * normal.dot(v);
+            [-fall * normal.dot(eye[0] - zero), along(eye[1]), along(eye[2])]
         } else {
-            ray.map(|r| dot(gradient, r))
+            ray.map(|r| gradient.dot(r))
         };
         Vec4::new(base, at, du, dv)
     }
@@ -215,21 +210,11 @@ impl<'a> Painter<'a> {
             _ => skin.color,
         };
         let color = (Vec3::from(color) * instance.factor).extend(0.0);
-        let is_structure = instance.room.is_none();
-        let mut paint = Paint {
-            entity: instance.entity.0,
-            kind: Kind::Structure { floor: instance.entity == EntityId::FLOOR },
-            color: Plane::constant(color),
-            low: color,
-            high: color,
-            tile: skin.texture.tile(),
-            texture: Plane::default(),
-            normal: instance.rotation * face,
-            gloss: skin.gloss,
-        };
-        if paint.tile.is_some() {
+        let tile = skin.texture.tile();
+        let mut texture = Plane::default();
+        if tile.is_some() {
             let axes = &skin.axes;
-            let facing = [axes.x_axis, axes.y_axis, axes.z_axis].map(|x| dot(x, face).abs());
+            let facing = [axes.x_axis, axes.y_axis, axes.z_axis].map(|x| x.dot(face).abs());
             // Look along the axis that the face is most square to; the longest axis left is u.
             let (u, v) = if facing[0] > facing[1] && facing[0] > facing[2] {
                 (axes.y_axis, axes.z_axis)
@@ -238,39 +223,38 @@ impl<'a> Painter<'a> {
             } else {
                 (axes.x_axis, axes.y_axis)
             };
-            paint.texture = self.texture(sight, u, v, a, face);
+            texture = self.texture(sight, u, v, a, face);
         }
-        if is_structure {
-            return paint;
+        let painted = |kind| Paint { entity: instance.entity.0, kind, tile, texture };
+        if instance.room.is_none() {
+            let is_floor = instance.entity == EntityId::FLOOR;
+            let (normal, gloss) = (instance.rotation * face, skin.gloss);
+            return painted(Kind::Structure(Surface { is_floor, color, normal, gloss }));
         }
         let shown = |p: Vec3, n: Vec3| self.shown(instance, sight, skin.gloss, color, p, n);
         if !triangle.smooth && skin.gloss == Gloss::Dull {
             let middle = (a + b + c) * (1.0 / 3.0);
-            let color = shown(middle, face);
-            paint.kind = Kind::Even;
-            paint.color = Plane::constant(color);
-            (paint.low, paint.high) = (color, color);
-            return paint;
+            return painted(Kind::Even(shown(middle, face)));
         }
         let normals = if triangle.smooth { corners.map(|k| mesh.normals[k]) } else { [face; 3] };
         let [at_a, at_b, at_c] = [(a, 0), (b, 1), (c, 2)].map(|(p, k)| shown(p, normals[k]));
-        let per_area2 = 1.0 / dot(flat, flat).max(1e-30);
+        let per_area2 = 1.0 / flat.dot(flat).max(1e-30);
         let s = self.plane(sight, (c - a).cross(flat) * per_area2, a, face);
         let t = self.plane(sight, flat.cross(b - a) * per_area2, a, face);
-        paint.kind = Kind::Smooth;
-        paint.color = Plane::mixed(at_a, (at_b - at_a, s), (at_c - at_a, t));
-        paint.low = at_a.min(at_b).min(at_c);
-        paint.high = at_a.max(at_b).max(at_c);
-        paint
+        painted(Kind::Smooth {
+            shown: Plane::mixed(at_a, (at_b - at_a, s), (at_c - at_a, t)),
+            low: at_a.min(at_b).min(at_c),
+            high: at_a.max(at_b).max(at_c),
+        })
     }
 
     /// Texture coordinates along two axes from the instance's origin.
     fn texture(&self, sight: &Sight, u: Vec3, v: Vec3, corner: Vec3, face: Vec3) -> Plane {
         // From a corner of the triangle, so that its plane is right in a plan view; then moved.
         let (pu, pv) = (self.plane(sight, u, corner, face), self.plane(sight, v, corner, face));
-        let slant = sight.rays.ray.map(|r| dot(face, r));
+        let slant = sight.rays.ray.map(|r| face.dot(r));
         Plane {
-            base: Vec4::new(pu.x + dot(u, corner), pv.x + dot(v, corner), 0.0, 0.0),
+            base: Vec4::new(pu.x + u.dot(corner), pv.x + v.dot(corner), 0.0, 0.0),
             at: Vec4::new(pu.y, pv.y, slant[0], 0.0),
             du: Vec4::new(pu.z, pv.z, slant[1], 0.0),
             dv: Vec4::new(pu.w, pv.w, slant[2], 0.0),
@@ -303,18 +287,18 @@ impl<'a> Painter<'a> {
 
     /// What is shown of a point of structure in the world, seen along `ray`.
     #[inline(always)]
-    pub fn shown_structure(&self, paint: &Paint, p: Vec3, ray: Vec3) -> Vec4 {
+    pub fn shown_structure(&self, surface: &Surface, p: Vec3, ray: Vec3) -> Vec4 {
         let light = &self.frame.light;
-        let n = paint.normal;
+        let n = surface.normal;
         let ground = light.ground;
-        if self.is_plan && n.y > 0.5 && paint.entity == EntityId::WALL.0 {
+        if self.is_plan && n.y > 0.5 && !surface.is_floor {
             // A map shows where walls are, not how they are lit.
             return Vec4::new(WALL_ON_MAP, WALL_ON_MAP, WALL_ON_MAP, 0.0);
         }
         // A step off the surface leaves the wall.
         let direct = light.direct(ground.room_at(p + n * 0.1), p);
-        let to_eye = if paint.gloss == Gloss::Dull { Vec3::ZERO } else { -unit(ray) };
-        let shine = light.shine(&direct, n, paint.gloss, to_eye);
+        let to_eye = if surface.gloss == Gloss::Dull { Vec3::ZERO } else { -unit(ray) };
+        let shine = light.shine(&direct, n, surface.gloss, to_eye);
         let mut factor = shine.factor;
         if n.y < -0.5 {
             // A ceiling sees the whole lit room.
@@ -324,7 +308,7 @@ impl<'a> Painter<'a> {
             let high = ground.ceiling_m.map_or(0.0, |c| (1.0 - (c - p.y) * 2.2).max(0.0));
             factor *= 1.0 - 0.22 * low * low - 0.16 * high * high;
         }
-        shown(paint.low * factor + shine.add)
+        shown(surface.color * factor + shine.add)
     }
 
     /// What is shown of the sky in the pixel with middle (u, v).
@@ -335,7 +319,7 @@ impl<'a> Painter<'a> {
         }
         let [horizon, zenith, ground] = self.frame.light.lamps.sky.map(|c| c.extend(0.0));
         let (_, ray) = self.rays.point(u, v, 0.0);
-        let y = ray.y / dot(ray, ray).max(1e-12).sqrt();
+        let y = ray.y / ray.dot(ray).max(1e-12).sqrt();
         let up = (1.0 - y) * (1.0 - y);
         let (to, t) = if y >= 0.0 {
             (zenith, 1.0 - up * (0.4 + 0.6 * up))

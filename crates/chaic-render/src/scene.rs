@@ -14,7 +14,6 @@ use crate::light::{Foot, Ground, Lamps, Light};
 use crate::looks::{style_of, tint_of};
 use crate::mesh::Mesh;
 use crate::people::Body;
-use crate::solids::N_LEVELS;
 use crate::structure;
 use crate::view::{View, look};
 
@@ -52,15 +51,6 @@ impl Scene {
             lamps: appearance.lamps(),
             still: Mutex::default(),
         }
-    }
-
-    /// Triangles of everything that never moves by itself, bodies left out, at a level of detail
-    /// (0 is the coarsest, [`crate::N_LEVELS`] - 1 the finest).
-    pub fn n_triangles(&self, level: usize) -> usize {
-        let level = level.min(N_LEVELS - 1);
-        let structure = self.structure.iter().map(|(_, mesh)| mesh.triangles.len());
-        let things = self.things.iter().map(|(c, _)| Shape::Class(c).mesh(level).triangles.len());
-        structure.chain(things).sum()
     }
 
     /// What many cameras see of a world, in their order. The images don't depend on the number of

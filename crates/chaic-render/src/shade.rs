@@ -286,18 +286,18 @@ impl Rows<'_> {
         let Canvas { paints, row, .. } = &mut *self.canvas;
         let paint = &paints[at];
         let mut is_floor = false;
-        match paint.kind {
-            Kind::Even => row.fill_color(begin, end, paint.low),
-            Kind::Smooth => row.color(begin, end, &paint.color.row(v), paint.low, paint.high),
-            Kind::Structure { floor } => {
+        match &paint.kind {
+            Kind::Even(shown) => row.fill_color(begin, end, *shown),
+            Kind::Smooth { shown, low, high } => row.color(begin, end, &shown.row(v), *low, *high),
+            Kind::Structure(surface) => {
                 let (painter, lens) = (&self.painter, self.lens);
                 row.light(begin, end, |k| {
                     let (p, ray) = painter.rays.point(k as f32 + 0.5, v, lens.depth(nearness[k]));
-                    painter.shown_structure(paint, p, ray)
+                    painter.shown_structure(surface, p, ray)
                 });
-                if floor {
+                is_floor = surface.is_floor;
+                if is_floor {
                     row.cells(begin, end, &painter.ground.row(v));
-                    is_floor = true;
                 }
             }
         }

@@ -251,3 +251,26 @@ fn a_plan_shows_walls_people_and_a_legend() {
     assert!(teal > 20, "the helper's marker: {teal}");
     assert!(image_out::ids_view(&[0; 4], 2, 2).is_some());
 }
+
+#[test]
+fn what_was_drawn_before_leaves_no_trace() {
+    let world = world(scenes::street());
+    let channels = Channels::ALL;
+    let looks = [
+        View { channels, ..view(camera([9.0, 1.65, 0.0], 1.3, -0.2, 96, 64)) },
+        View { channels: DEPTH_AND_IDS, ..view(camera([4.0, 1.65, 0.0], 0.3, -0.2, 64, 96)) },
+    ];
+    // Shadows of things are kept from moment to moment: not when one has moved.
+    let mut moved = world.state().clone();
+    let index = moved.things.iter().position(|t| t.position.y < 0.01).expect("one on the ground");
+    moved.things[index].position += Vec3::new(0.0, 0.0, 1.5);
+    let scene = Scene::new(world.setup());
+    let before = scene.render(&world, &looks);
+    let after = scene.render_state(&moved, &[], &looks);
+    assert!(after == Scene::new(world.setup()).render_state(&moved, &[], &looks));
+    assert!(before[0] != after[0]);
+    // Images of other sizes and channels, full of other things, are written over.
+    let mut images = after.into_iter().rev().collect();
+    scene.render_into(&world, &looks, &mut images);
+    assert!(images == before);
+}

@@ -3,6 +3,7 @@
 use chaic_protocol::EntityId;
 use chaic_protocol::geom::Camera;
 use chaic_render::LEVEL_RADIUS_PX;
+use chaic_render::geometry::N_LEVELS;
 use chaic_render::geometry::TILE_TEXELS;
 
 use crate::device::Link;
@@ -29,10 +30,11 @@ impl Passes {
 
 /// A shader whose entry point has its name.
 fn pipeline(link: &Link, name: &'static str, source: &str) -> wgpu::ComputePipeline {
-    let [l0, l1, l2, _] = LEVEL_RADIUS_PX;
+    let radii = LEVEL_RADIUS_PX.map(|r| format!("{r:?}")).join(", ");
     let constants = format!(
         "const NEAR_M: f32 = {:?};\nconst FAR_M: f32 = {:?};\n\
-         const LEVEL_RADIUS_PX = vec3f({l0:?}, {l1:?}, {l2:?});\n\
+         const N_LEVELS: u32 = {N_LEVELS}u;\n\
+         const LEVEL_RADIUS_PX = array<f32, N_LEVELS>({radii});\n\
          const FLOOR: u32 = {}u;\nconst TILE_TEXELS: u32 = {}u;\nconst LOG2_TILE_TEXELS: u32 = {}u;\n",
         Camera::NEAR_M,
         Camera::FAR_M,

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 use chaic_protocol::EntityId;
+use chaic_render::geometry::N_LEVELS;
 use chaic_render::{Lens, View};
 
 use crate::gpu::Placed;
@@ -95,12 +96,12 @@ pub(crate) const LIT_BY_LAMP: u32 = 1;
 /// Lit at each point by the lamp of the room in front of it.
 pub(crate) const LIT_BY_POINT: u32 = 2;
 
-/// Where the levels of a mesh lie; 64 bytes.
+/// Where the levels of a mesh lie; 16 bytes each.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct MeshRecord {
     /// First corner, first triangle, number of triangles, first skin.
-    pub levels: [[u32; 4]; 4],
+    pub levels: [[u32; 4]; N_LEVELS],
 }
 
 /// How a group of triangles looks; 64 bytes.
@@ -171,7 +172,7 @@ pub(crate) struct Round {
 const _: () = {
     assert!(size_of::<ViewRecord>() == 96);
     assert!(size_of::<InstanceRecord>() == 144);
-    assert!(size_of::<MeshRecord>() == 64);
+    assert!(size_of::<MeshRecord>() == 16 * N_LEVELS);
     assert!(size_of::<SkinRecord>() == 64);
     assert!(size_of::<LightRecord>() == 160);
     assert!(size_of::<Tally>() == 16);

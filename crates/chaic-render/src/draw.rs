@@ -5,7 +5,7 @@ use chaic_protocol::{EntityId, Vec3};
 use crate::clip::clip;
 use crate::frame::{Frame, Instance};
 use crate::lens::{IntoCamera, Lens};
-use crate::raster::{Corner, Owner, Target, least, most};
+use crate::raster::{Corner, Owner, Target, first_center, least, most};
 use crate::solids::level_for;
 
 /// Buffers that one thread uses again and again.
@@ -342,16 +342,4 @@ impl Corners {
         }
         alive.truncate(found);
     }
-}
-
-/// As [`crate::raster`] finds it, in floats.
-#[inline(always)]
-fn first_center(x: f32, max: f32) -> f32 {
-    /// 1.5 * 2^23: what is added to it is rounded to a whole number.
-    const WHOLE: f32 = 12_582_912.0;
-    let t = x - 0.5;
-    let t = if t > 0.0 { t } else { 0.0 };
-    let t = if t < max { t } else { max };
-    let whole = (t + WHOLE) - WHOLE;
-    if whole < t { whole + 1.0 } else { whole }
 }

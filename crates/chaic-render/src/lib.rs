@@ -47,6 +47,9 @@ mod raster;
 
 mod light;
 mod paint;
+mod patches;
+mod points;
+mod row;
 mod shade;
 mod texture;
 

@@ -3,10 +3,8 @@
 use chaic_protocol::geom::Rect;
 use chaic_protocol::{Vec2, Vec3};
 use chaic_world::{RoomKind, Setup};
-use glam::Vec4;
 
 use crate::lighting::Cells;
-use crate::mesh::Gloss;
 
 /// No room.
 pub(crate) const NO_ROOM: u8 = u8::MAX;
@@ -62,27 +60,6 @@ impl Lamps {
             Vec3::new(0.24, 0.22, 0.21),
         ],
     };
-}
-
-/// Where the direct light at a point comes from.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Direct {
-    /// Unit vector to the lamp or the sun.
-    to: Vec3,
-    /// What distance leaves of it.
-    strength: f32,
-    indoors: bool,
-}
-
-/// What a surface at a point sends to an eye, before its own color: `factor * color + add`.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Shine {
-    pub factor: Vec4,
-    pub add: Vec4,
-}
-
-fn rgb(color: Vec3) -> Vec4 {
-    color.extend(0.0)
 }
 
 /// The ground as a grid of cells; x across, z down.
@@ -325,57 +302,5 @@ impl<'a> Light<'a> {
             rooms: g.rooms.clone(),
             brightness: rows.flat_map(|row| row[..g.nx].iter().map(|q| *q as u8)).collect(),
         }
-    }
-
-    /// The direct light at a point of this room.
-    #[inline]
-    pub fn direct(&self, room: u8, p: Vec3) -> Direct {
-        let Some(lamp) = self.ground.lamp(room) else {
-            return Direct { to: self.lamps.to_sun, strength: 1.0, indoors: false };
-        };
-        let d = lamp - p;
-        let d2 = d.dot(d) + 0.3;
-        Direct { to: d * (1.0 / d2.sqrt()), strength: 1.0 / (1.0 + 0.085 * d2), indoors: true }
-    }
-
-    /// What a surface with this unit normal does with that light and with the light around, seen
-    /// along the unit vector `to_eye`.
-    #[inline]
-    pub fn shine(&self, direct: &Direct, normal: Vec3, gloss: Gloss, to_eye: Vec3) -> Shine {
-        let lamps = self.lamps;
-        let facing = direct.to.dot(normal);
-        let (source, [high, low], facing) = if direct.indoors {
-            (lamps.lamp, lamps.indoors, facing + 0.35)
-        } else {
-            (lamps.sun, lamps.outdoors, facing)
-        };
-        let source = rgb(source) * (facing.max(0.0) * direct.strength);
-        // Walls at right angles must differ even where no lamp is near, and what faces down sees
-        // little but its own shadow.
-        let corner = 1.0 + 0.07 * normal.x - 0.05 * normal.z;
-        let corner = if normal.y < -0.5 { 0.7 * corner } else { corner };
-        let (high, low) = (rgb(high), rgb(low));
-        let around = (low + (high - low) * (0.5 * normal.y + 0.5)) * corner;
-        let factor = around + source;
-        if gloss == Gloss::Dull {
-            return Shine { factor, add: Vec4::ZERO };
-        }
-        let half = direct.to + to_eye;
-        let c = normal.dot(half).max(0.0) * (1.0 / half.dot(half).max(1e-12).sqrt());
-        let (c2, facing) = (c * c, normal.dot(to_eye));
-        let c8 = c2 * c2 * c2 * c2;
-        let away = 1.0 - facing.max(0.0);
-        let edge = away * away;
-        // How far up the mirrored view looks: 0 down, 1 up.
-        let mirror = (0.5 + 0.5 * (2.0 * facing * normal.y - to_eye.y)).max(0.0);
-        let (keep, light, sky) = match gloss {
-            Gloss::Dull => (1.0, 0.0, 0.0),
-            Gloss::Satin => (1.0, 0.07 * c8, 0.02 * edge),
-            Gloss::Shiny => (1.0, 0.45 * c8 * c8 * c8 * c8, 0.07 * edge * edge),
-            Gloss::Metal => (0.62 + 0.75 * mirror * mirror, 0.4 * c8 * c8, 0.05 * edge),
-            Gloss::Glass => (0.6, 0.6 * c8 * c8, 0.75 * mirror * (0.10 + 0.6 * edge * edge)),
-        };
-        let add = source * light + Vec4::new(0.85, 0.95, 1.05, 0.0) * sky;
-        Shine { factor: factor * keep, add }
     }
 }

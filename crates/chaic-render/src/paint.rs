@@ -9,8 +9,9 @@ use glam::Vec4;
 
 use crate::frame::{Frame, Instance};
 use crate::lens::Lens;
-use crate::light::{Direct, NO_ROOM};
+use crate::light::NO_ROOM;
 use crate::mesh::{Gloss, Mesh, Triangle, unit};
+use crate::points::{Point, Points};
 use crate::texture::Tile;
 
 /// How dark the tops of walls are on maps, 0 to 255.
@@ -22,10 +23,10 @@ const PAPER: f32 = 236.0;
 /// Quantities that are linear over a triangle, one in each lane.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Plane {
-    base: Vec4,
-    at: Vec4,
-    du: Vec4,
-    dv: Vec4,
+    pub base: Vec4,
+    pub at: Vec4,
+    pub du: Vec4,
+    pub dv: Vec4,
 }
 
 impl Plane {
@@ -70,6 +71,8 @@ pub(crate) enum Kind {
     Even(Vec4),
     /// Linear between its corners, within their bounds.
     Smooth { shown: Plane, low: Vec4, high: Vec4 },
+    /// As its corners show, once they are lit; see [`Unlit::lit`].
+    Unlit(Unlit),
     /// Lit point by point, since it is large.
     Structure(Surface),
 }
@@ -79,9 +82,35 @@ pub(crate) enum Kind {
 pub(crate) struct Surface {
     pub is_floor: bool,
     /// Linear.
-    color: Vec4,
+    color: Vec3,
     normal: Vec3,
     gloss: Gloss,
+}
+
+/// A triangle of a thing before its points are lit.
+#[derive(Clone, Copy)]
+pub(crate) struct Unlit {
+    /// The number of its first point.
+    point: u32,
+    /// How far towards the second and the third corner a pixel is; `None` if a single point
+    /// stands for all of it.
+    toward: Option<[Vec4; 2]>,
+}
+
+impl Unlit {
+    /// What becomes of it when its points are lit.
+    #[inline(always)]
+    pub fn lit(&self, points: &Points) -> Kind {
+        let first = self.point as usize;
+        let a = points.shown(first);
+        let Some([s, t]) = self.toward else { return Kind::Even(a) };
+        let (b, c) = (points.shown(first + 1), points.shown(first + 2));
+        Kind::Smooth {
+            shown: Plane::mixed(a, (b - a, s), (c - a, t)),
+            low: a.min(b).min(c),
+            high: a.max(b).max(c),
+        }
+    }
 }
 
 /// A triangle, ready to be looked at.
@@ -137,7 +166,9 @@ impl Rays {
 #[derive(Clone, Copy)]
 pub(crate) struct Sight {
     rays: Rays,
-    direct: Direct,
+    /// Where it is for the lamp.
+    middle: Vec3,
+    lamp: Option<Vec3>,
 }
 
 /// Works out triangles of one view.
@@ -170,8 +201,8 @@ impl<'a> Painter<'a> {
     /// What is common to an instance's triangles.
     pub fn sight(&self, instance: &Instance) -> Sight {
         let middle = instance.origin + instance.rotation * (0.5 * (instance.min + instance.max));
-        let direct = self.frame.light.direct(instance.room.unwrap_or(NO_ROOM), middle);
-        Sight { rays: self.rays.within(instance), direct }
+        let lamp = self.frame.light.ground.lamp(instance.room.unwrap_or(NO_ROOM));
+        Sight { rays: self.rays.within(instance), middle, lamp }
     }
 
     /// A quantity with this gradient (in the instance's frame) that is 0 at `zero`, as (base, at,
@@ -191,7 +222,7 @@ impl<'a> Painter<'a> {
         Vec4::new(base, at, du, dv)
     }
 
-    /// Works out a triangle of an instance.
+    /// Works out a triangle of an instance; what has to be lit is added to the points.
     #[inline(never)]
     pub fn paint(
         &self,
@@ -199,6 +230,7 @@ impl<'a> Painter<'a> {
         sight: &Sight,
         mesh: &Mesh,
         triangle: &Triangle,
+        points: &mut Points,
     ) -> Paint {
         let skin = &mesh.skins[usize::from(triangle.skin)];
         let corners = triangle.corners.map(usize::from);
@@ -209,7 +241,7 @@ impl<'a> Painter<'a> {
             Some(tint) if skin.tinted => tint,
             _ => skin.color,
         };
-        let color = (Vec3::from(color) * instance.factor).extend(0.0);
+        let color = Vec3::from(color) * instance.factor;
         let tile = skin.texture.tile();
         let mut texture = Plane::default();
         if tile.is_some() {
@@ -229,23 +261,26 @@ impl<'a> Painter<'a> {
         if instance.room.is_none() {
             let is_floor = instance.entity == EntityId::FLOOR;
             let (normal, gloss) = (instance.rotation * face, skin.gloss);
+            if self.is_plan && normal.y > 0.5 && !is_floor {
+                // A map shows where walls are, not how they are lit.
+                return painted(Kind::Even(Vec3::splat(WALL_ON_MAP).extend(0.0)));
+            }
             return painted(Kind::Structure(Surface { is_floor, color, normal, gloss }));
         }
-        let shown = |p: Vec3, n: Vec3| self.shown(instance, sight, skin.gloss, color, p, n);
+        let mut push = |p: Vec3, n: Vec3| {
+            let point = self.thing_point(instance, sight, (skin.gloss, color), p, n);
+            points.push(&point) as u32
+        };
         if !triangle.smooth && skin.gloss == Gloss::Dull {
-            let middle = (a + b + c) * (1.0 / 3.0);
-            return painted(Kind::Even(shown(middle, face)));
+            let point = push((a + b + c) * (1.0 / 3.0), face);
+            return painted(Kind::Unlit(Unlit { point, toward: None }));
         }
         let normals = if triangle.smooth { corners.map(|k| mesh.normals[k]) } else { [face; 3] };
-        let [at_a, at_b, at_c] = [(a, 0), (b, 1), (c, 2)].map(|(p, k)| shown(p, normals[k]));
+        let [point, ..] = [(a, 0), (b, 1), (c, 2)].map(|(p, k)| push(p, normals[k]));
         let per_area2 = 1.0 / flat.dot(flat).max(1e-30);
         let s = self.plane(sight, (c - a).cross(flat) * per_area2, a, face);
         let t = self.plane(sight, flat.cross(b - a) * per_area2, a, face);
-        painted(Kind::Smooth {
-            shown: Plane::mixed(at_a, (at_b - at_a, s), (at_c - at_a, t)),
-            low: at_a.min(at_b).min(at_c),
-            high: at_a.max(at_b).max(at_c),
-        })
+        painted(Kind::Unlit(Unlit { point, toward: Some([s, t]) }))
     }
 
     /// Texture coordinates along two axes from the instance's origin.
@@ -261,54 +296,43 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// What is shown of a point of a thing, given in its frame.
-    fn shown(
+    /// A point of a thing, given in its frame.
+    #[inline(always)]
+    fn thing_point(
         &self,
         instance: &Instance,
         sight: &Sight,
-        gloss: Gloss,
-        color: Vec4,
+        (gloss, color): (Gloss, Vec3),
         p: Vec3,
         n: Vec3,
-    ) -> Vec4 {
+    ) -> Point {
         let (point, normal) = (instance.rotation * p, instance.rotation * n);
-        let to_eye = if self.is_plan {
-            Vec3::Y
-        } else if gloss == Gloss::Dull {
-            Vec3::ZERO
-        } else {
-            unit(self.rays.eye[0] - instance.origin - point)
-        };
-        let shine = self.frame.light.shine(&sight.direct, normal, gloss, to_eye);
+        let to_eye =
+            if self.is_plan { Vec3::Y } else { self.rays.eye[0] - instance.origin - point };
         // The foot of a thing stands in its own shadow.
-        let foot = 0.76 + 0.24 * (point.y * 7.0).clamp(0.0, 1.0);
-        shown(color * shine.factor * foot + shine.add)
+        let tone = 0.76 + 0.24 * (point.y * 7.0).clamp(0.0, 1.0);
+        Point { at: sight.middle, lamp: sight.lamp, normal, to_eye, color, gloss, tone }
     }
 
-    /// What is shown of a point of structure in the world, seen along `ray`.
+    /// A point of structure, seen in the pixel with middle (u, v) at a depth.
     #[inline(always)]
-    pub fn shown_structure(&self, surface: &Surface, p: Vec3, ray: Vec3) -> Vec4 {
-        let light = &self.frame.light;
-        let n = surface.normal;
-        let ground = light.ground;
-        if self.is_plan && n.y > 0.5 && !surface.is_floor {
-            // A map shows where walls are, not how they are lit.
-            return Vec4::new(WALL_ON_MAP, WALL_ON_MAP, WALL_ON_MAP, 0.0);
-        }
+    pub fn structure_point(&self, surface: &Surface, u: f32, v: f32, depth_m: f32) -> Point {
+        let (at, ray) = self.rays.point(u, v, depth_m);
+        let Surface { color, normal, gloss, .. } = *surface;
+        let ground = self.frame.light.ground;
         // A step off the surface leaves the wall.
-        let direct = light.direct(ground.room_at(p + n * 0.1), p);
-        let to_eye = if surface.gloss == Gloss::Dull { Vec3::ZERO } else { -unit(ray) };
-        let shine = light.shine(&direct, n, surface.gloss, to_eye);
-        let mut factor = shine.factor;
-        if n.y < -0.5 {
+        let lamp = ground.lamp(ground.room_at(at + normal * 0.1));
+        let tone = if normal.y < -0.5 {
             // A ceiling sees the whole lit room.
-            factor *= 1.5;
-        } else if n.y < 0.5 {
-            let low = (1.0 - p.y * 2.2).max(0.0);
-            let high = ground.ceiling_m.map_or(0.0, |c| (1.0 - (c - p.y) * 2.2).max(0.0));
-            factor *= 1.0 - 0.22 * low * low - 0.16 * high * high;
-        }
-        shown(surface.color * factor + shine.add)
+            1.5
+        } else if normal.y < 0.5 {
+            let low = (1.0 - at.y * 2.2).max(0.0);
+            let high = ground.ceiling_m.map_or(0.0, |c| (1.0 - (c - at.y) * 2.2).max(0.0));
+            1.0 - 0.22 * low * low - 0.16 * high * high
+        } else {
+            1.0
+        };
+        Point { at, lamp, normal, to_eye: -ray, color, gloss, tone }
     }
 
     /// What is shown of the sky in the pixel with middle (u, v).

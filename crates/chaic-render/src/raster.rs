@@ -5,7 +5,6 @@
 //! neither a gap nor an overlap.
 
 use chaic_protocol::EntityId;
-use chaic_protocol::geom::math::ceil_small;
 
 /// Nobody's pixel.
 pub(crate) const NOBODY: u32 = u32::MAX;
@@ -88,10 +87,10 @@ pub(crate) struct Slope {
 pub(crate) struct Target<O> {
     pub width: usize,
     pub height: usize,
-    /// Nearness, shape [height, width].
-    pub nearness: Vec<f32>,
-    /// Whose each pixel is, shape [height, width].
-    pub owner: Vec<O>,
+    /// Nearness, shape [height, width], and [`LANES`] more.
+    nearness: Vec<f32>,
+    /// Whose each pixel is, shape [height, width], and [`LANES`] more.
+    owner: Vec<O>,
     tiles_wide: usize,
     /// The least nearness in each tile.
     tiles: Vec<f32>,
@@ -104,14 +103,24 @@ impl<O: Owner> Target<O> {
     pub fn clear(&mut self, width: usize, height: usize, background: f32) {
         (self.width, self.height) = (width, height);
         self.nearness.clear();
-        self.nearness.resize(width * height, background);
+        self.nearness.resize(width * height + LANES, background);
         self.owner.clear();
-        self.owner.resize(width * height, O::NOBODY);
+        self.owner.resize(width * height + LANES, O::NOBODY);
         self.tiles_wide = width.div_ceil(TILE);
         self.tiles.clear();
         self.tiles.resize(self.tiles_wide * height.div_ceil(TILE), background);
         self.stale.clear();
         self.stale.resize(height.div_ceil(TILE), (self.tiles_wide, 0));
+    }
+
+    /// Nearness, shape [height, width].
+    pub fn nearness(&self) -> &[f32] {
+        &self.nearness[..self.width * self.height]
+    }
+
+    /// Whose each pixel is, shape [height, width].
+    pub fn owner(&self) -> &[O] {
+        &self.owner[..self.width * self.height]
     }
 
     /// The tiles that the rectangle (least u and v, most u and v) touches: columns and rows, the
@@ -140,7 +149,7 @@ impl<O: Owner> Target<O> {
         if self.width == 0 {
             return;
         }
-        let bands = self.nearness.chunks(TILE * self.width);
+        let bands = self.nearness[..self.width * self.height].chunks(TILE * self.width);
         let tiles = self.tiles.chunks_mut(self.tiles_wide);
         for ((rows, tiles), (first, end)) in bands.zip(tiles).zip(&mut self.stale) {
             if first < end {
@@ -197,47 +206,25 @@ impl<O: Owner> Target<O> {
             }
         }
         let [a, b, c] = p;
-        let rows = self.height as i32;
+        let rows = self.height as f32;
         let (first, last) = (first_center(a.1, rows), first_center(c.1, rows));
-        if first >= last {
-            return;
-        }
         let middle = first_center(b.1, rows);
-        let long = Edge::new(a, c);
+        let (long, upper, lower) = (Edge::new(a, c), Edge::new(a, b), Edge::new(b, c));
         let b_is_right = (b.0 - a.0) * (c.1 - a.1) > (c.0 - a.0) * (b.1 - a.1);
-        self.half(first, middle, Edge::new(a, b), long, b_is_right, slope, owner);
-        self.half(middle, last, Edge::new(b, c), long, b_is_right, slope, owner);
-    }
-
-    #[allow(clippy::too_many_arguments, reason = "a piece of one inner loop")]
-    #[inline(always)]
-    fn half(
-        &mut self,
-        from: i32,
-        to: i32,
-        short: Edge,
-        long: Edge,
-        short_is_right: bool,
-        slope: &Slope,
-        owner: O,
-    ) {
-        let (left, right) = if short_is_right { (long, short) } else { (short, long) };
-        let columns = self.width as i32;
-        for row in from..to {
+        let columns = self.width as f32;
+        for row in first..last {
             let v = row as f32 + 0.5;
-            let begin = first_center(left.u_at(v), columns);
-            let end = first_center(right.u_at(v), columns);
-            if begin >= end {
-                continue;
-            }
-            let base = row as usize * self.width;
-            let span = base + begin as usize..base + end as usize;
+            let (long, short) = (long.u_at(v), if row < middle { upper } else { lower }.u_at(v));
+            let begin = first_center(if b_is_right { long } else { short }, columns);
+            let end = first_center(if b_is_right { short } else { long }, columns);
+            let at = row as usize * self.width + begin as usize;
             let q0 = slope.at.q + slope.dv * (v - slope.at.v) + slope.du * (0.5 - slope.at.u);
             fill_span(
-                &mut self.nearness[span.clone()],
-                &mut self.owner[span],
+                &mut self.nearness[at..],
+                &mut self.owner[at..],
                 q0,
                 begin,
+                end,
                 slope,
                 owner,
             );
@@ -272,90 +259,66 @@ fn least_in_tile(rows: &[f32], width: usize, column: usize) -> f32 {
     columns.into_iter().fold(f32::INFINITY, least)
 }
 
-/// So many pixels are filled at once.
+/// So many pixels are filled at once; those beyond the end of a span stay as they are.
 const LANES: usize = 16;
 
+/// Fills the columns `begin..end` of a row; the lists begin there.
 #[inline(always)]
 fn fill_span<O: Owner>(
     nearness: &mut [f32],
     owners: &mut [O],
     q0: f32,
-    begin: i32,
+    begin: u32,
+    end: u32,
     slope: &Slope,
     owner: O,
 ) {
-    let n = nearness.len();
-    let (lanes, rest) = nearness.as_chunks_mut::<LANES>();
-    let is_whole = rest.is_empty();
-    let mut column = begin;
-    for (q, o) in lanes.iter_mut().zip(owners.as_chunks_mut::<LANES>().0) {
-        fill_lanes(q, o, q0, column, slope, owner);
-        column += LANES as i32;
-    }
-    if is_whole {
-        return;
-    }
-    // The end once more in whole lanes: nothing is nearer than itself, so twice does no harm.
-    let end = begin + n as i32;
-    if let (Some(q), Some(o)) = (nearness.last_chunk_mut(), owners.last_chunk_mut()) {
-        fill_lanes::<O, LANES>(q, o, q0, end - LANES as i32, slope, owner);
-    } else if let (Some(q), Some(o)) = (nearness.last_chunk_mut(), owners.last_chunk_mut()) {
-        fill_lanes::<O, 8>(q, o, q0, end - 8, slope, owner);
-        if let (Some(q), Some(o)) = (nearness.first_chunk_mut(), owners.first_chunk_mut()) {
-            fill_lanes::<O, 8>(q, o, q0, begin, slope, owner);
-        }
-    } else if let (Some(q), Some(o)) = (nearness.last_chunk_mut(), owners.last_chunk_mut()) {
-        fill_lanes::<O, 4>(q, o, q0, end - 4, slope, owner);
-        if let (Some(q), Some(o)) = (nearness.first_chunk_mut(), owners.first_chunk_mut()) {
-            fill_lanes::<O, 4>(q, o, q0, begin, slope, owner);
-        }
-    } else {
-        for (k, (q, o)) in nearness.iter_mut().zip(owners).enumerate() {
-            let (q, o) = (std::array::from_mut(q), std::array::from_mut(o));
-            fill_lanes::<O, 1>(q, o, q0, begin + k as i32, slope, owner);
+    // Most spans are shorter than the lanes: no branch tells those from empty ones.
+    let mut at = begin;
+    let (mut nearness, mut owners) = (nearness, owners);
+    while let (Some((q, more_q)), Some((o, more_o))) =
+        (nearness.split_first_chunk_mut(), owners.split_first_chunk_mut())
+    {
+        fill_lanes(q, o, q0, (at, end), slope, owner);
+        (nearness, owners) = (more_q, more_o);
+        at += LANES as u32;
+        if at >= end {
+            break;
         }
     }
 }
 
-/// Fills pixels side by side, the first in this column.
+/// Fills pixels side by side, from one column to below another.
 #[inline(always)]
-fn fill_lanes<O: Owner, const N: usize>(
-    q: &mut [f32; N],
-    o: &mut [O; N],
+fn fill_lanes<O: Owner>(
+    q: &mut [f32; LANES],
+    o: &mut [O; LANES],
     q0: f32,
-    column: i32,
+    (at, end): (u32, u32),
     slope: &Slope,
     owner: O,
 ) {
     let Slope { du, low, high, .. } = *slope;
-    // Plain loops: closures would be compiled apart, without this machine's vectors.
-    let mut x = [0.0; N];
-    for (k, x) in x.iter_mut().enumerate() {
-        *x = least(high, most(low, q0 + du * (column + k as i32) as f32));
-    }
-    // Masks instead of conditions, which the compiler would make branches of.
-    let mut wins = [0; N];
-    let mut any = 0;
-    for k in 0..N {
-        wins[k] = u32::from(x[k] > q[k]).wrapping_neg();
-        any |= wins[k];
-    }
-    if any == 0 {
-        return;
-    }
-    for k in 0..N {
-        q[k] = most(x[k], q[k]);
-        o[k] = o[k].replaced(owner, wins[k]);
+    // Masks instead of conditions, which the compiler would make branches of. Plain loops:
+    // closures would be compiled apart, without this machine's vectors.
+    for k in 0..LANES {
+        let column = at + k as u32;
+        let x = least(high, most(low, q0 + du * column as i32 as f32));
+        let wins = (u32::from(x > q[k]) & u32::from(column < end)).wrapping_neg();
+        q[k] = f32::from_bits(x.to_bits() & wins | q[k].to_bits() & !wins);
+        o[k] = o[k].replaced(owner, wins);
     }
 }
 
-/// The smallest whole number whose center (+ 0.5) isn't before `x`, within [0, max].
+/// The first row or column whose middle (+ 0.5) isn't before `x`, within [0, max]; one that lies
+/// just there is rounded to even.
 #[inline(always)]
-fn first_center(x: f32, max: i32) -> i32 {
-    let t = x - 0.5;
-    let t = if t > 0.0 { t } else { 0.0 };
-    let t = if t < max as f32 { t } else { max as f32 };
-    ceil_small(t)
+pub(crate) fn first_center(x: f32, max: f32) -> u32 {
+    /// From here to twice as much, floats are the whole numbers.
+    const WHOLE: f32 = 8_388_608.0;
+    let x = if x > 0.0 { x } else { 0.0 };
+    let x = if x < max { x } else { max };
+    (x + WHOLE).to_bits().wrapping_sub(WHOLE.to_bits())
 }
 
 /// A line down the image.
@@ -402,7 +365,7 @@ mod tests {
             let mut target = Target::<u32>::default();
             target.clear(64, 64, 0.0);
             target.draw([corner(32.3, 31.7), rim(k + 1), rim(k)], k as u32);
-            for (n, o) in count.iter_mut().zip(&target.owner) {
+            for (n, o) in count.iter_mut().zip(target.owner()) {
                 *n += i32::from(*o != NOBODY);
             }
         }
@@ -413,14 +376,14 @@ mod tests {
     fn fill_one_by_one(
         (q, o): (&mut [f32], &mut [u32]),
         q0: f32,
-        begin: i32,
+        begin: u32,
         slope: &Slope,
         owner: u32,
     ) {
         for (k, (q, o)) in q.iter_mut().zip(o).enumerate() {
-            let x = q0 + slope.du * (begin + k as i32) as f32;
-            let x = if x < slope.low { slope.low } else { x };
-            let x = if x > slope.high { slope.high } else { x };
+            let x = q0 + slope.du * (begin + k as u32) as f32;
+            let x = if x > slope.low { x } else { slope.low };
+            let x = if x < slope.high { x } else { slope.high };
             if x > *q {
                 (*q, *o) = (x, owner);
             }
@@ -431,17 +394,20 @@ mod tests {
     fn spans_of_any_length_are_filled_as_pixel_by_pixel() {
         let mut rng = chaic_protocol::rng::Stream::new(1, "spans", 0);
         for n in (0..40).cycle().take(2000) {
-            let before: Vec<f32> = (0..n).map(|_| rng.range(0.0, 1.0)).collect();
+            let before: Vec<f32> = (0..n + LANES).map(|_| rng.range(0.0, 1.0)).collect();
             let du =
                 [0.0, rng.range(-0.05, 0.05), f32::NAN, 1e30][rng.below(40).saturating_sub(36)];
             let at = Corner { u: 0.0, v: 0.0, q: 0.0 };
             let slope = Slope { at, du, dv: 0.0, low: 0.2, high: rng.range(0.2, 1.0) };
-            let (q0, begin) = (rng.range(0.0, 1.0), rng.below(500) as i32);
-            let (mut q, mut owners, mut names) = (before.clone(), vec![7u32; n], vec![7u16; n]);
-            fill_span(&mut q, &mut owners, q0, begin, &slope, 9);
-            fill_span(&mut before.clone(), &mut names, q0, begin, &slope, 9);
-            let (mut right_q, mut right_owners) = (before, vec![7u32; n]);
-            fill_one_by_one((&mut right_q, &mut right_owners), q0, begin, &slope, 9);
+            let (q0, begin) = (rng.range(0.0, 1.0), rng.below(500) as u32);
+            let end = begin + n as u32;
+            let (mut owners, mut names) = (vec![7u32; n + LANES], vec![7u16; n + LANES]);
+            let mut right_owners = owners.clone();
+            let mut right_q = before.clone();
+            fill_one_by_one((&mut right_q[..n], &mut right_owners[..n]), q0, begin, &slope, 9);
+            fill_span(&mut before.clone(), &mut names, q0, begin, end, &slope, 9);
+            let mut q = before;
+            fill_span(&mut q, &mut owners, q0, begin, end, &slope, 9);
             let bits = |q: &[f32]| q.iter().map(|q| q.to_bits()).collect::<Vec<_>>();
             assert_eq!(bits(&q), bits(&right_q), "{n} pixels, {slope:?}");
             assert_eq!(owners, right_owners, "{n} pixels, {slope:?}");
@@ -457,7 +423,7 @@ mod tests {
             target.draw([corner(0.0, 0.0), corner(bad, 8.0), corner(3.0, bad)], 1);
         }
         target.draw([corner(5.0, 5.0); 3], 2);
-        assert!(target.owner.iter().all(|o| *o != 2));
+        assert!(target.owner().iter().all(|o| *o != 2));
         let mut empty = Target::<u32>::default();
         empty.clear(0, 0, 0.0);
         empty.touch([0.0, 0.0, 9.0, 9.0]);

@@ -12,7 +12,7 @@ use glam::Mat3;
 use crate::forms;
 pub(crate) use crate::forms::scramble;
 use crate::mesh::{Mesh, Place, Section, Skin, length, unit};
-use crate::solids::{self, Detail, place_of};
+use crate::solids::{self, Detail, LEVEL_RADIUS_PX, place_of};
 
 /// What is painted next: color and finish.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,10 +90,15 @@ impl Sculptor {
         scramble(slot.wrapping_mul(64) + u32::from(self.style)) >> 8
     }
 
+    /// Whether half of the object never covers more than this on the image, pixels.
+    pub fn within(&self, radius_px: f32) -> bool {
+        LEVEL_RADIUS_PX[self.level] <= radius_px
+    }
+
     /// Whether something of this size, metres, covers about a pixel. Most things are smaller on the
     /// image than the largest that a level is for.
     pub fn shows(&self, size_m: f32) -> bool {
-        size_m * self.detail.px_per_m > if self.level < 3 { 1.5 } else { 1.1 }
+        size_m * self.detail.px_per_m > if self.within(60.0) { 1.5 } else { 1.1 }
     }
 
     /// How far an outline may be off, metres.
@@ -333,7 +338,7 @@ impl Sculptor {
             return;
         }
         let n = self.detail.corners(wide).min(16);
-        let n = if self.level < 2 { n.min(6) } else { n };
+        let n = if self.within(20.0) { n.min(6) } else { n };
         let end = points[points.len() - 1].0;
         let place = Place {
             center: Vec3::ZERO,
@@ -376,7 +381,7 @@ impl Sculptor {
         let along = unit(tip - root);
         let side = unit(along.cross(Vec3::Y) + Vec3::X * 1e-3);
         let thick = side.cross(along) * (0.04 * width_m).max(0.0006);
-        let shape: &[[f32; 2]] = if self.level < 2 {
+        let shape: &[[f32; 2]] = if self.within(20.0) {
             &[[0.0, 0.1], [0.45, 1.0], [1.0, 0.04]]
         } else {
             &[[0.0, 0.1], [0.2, 0.7], [0.45, 1.0], [0.75, 0.65], [1.0, 0.04]]
@@ -389,7 +394,7 @@ impl Sculptor {
                 b: thick * (0.3 + 0.7 * w),
             })
             .collect();
-        self.mesh.tube(&sections, if self.level < 2 { 4 } else { 6 });
+        self.mesh.tube(&sections, if self.within(20.0) { 4 } else { 6 });
     }
 
     /// A ring about `middle` in the plane square to `axis`.

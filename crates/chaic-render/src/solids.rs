@@ -8,11 +8,11 @@ use glam::Mat3;
 use crate::mesh::{Mesh, Place, circle};
 
 /// Number of levels of detail.
-pub const N_LEVELS: usize = 4;
+pub const N_LEVELS: usize = 7;
 
 /// Half of the size in pixels up to which each level but the last is used. At that size its round
 /// outlines are within about one pixel of the true ones.
-pub const LEVEL_RADIUS_PX: [f32; N_LEVELS] = [7.0, 20.0, 60.0, 200.0];
+pub const LEVEL_RADIUS_PX: [f32; N_LEVELS] = [7.0, 12.0, 20.0, 35.0, 60.0, 110.0, 200.0];
 
 /// The level for an object of this half size on the image.
 pub(crate) fn level_for(radius_px: f32) -> usize {

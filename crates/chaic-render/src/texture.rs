@@ -39,7 +39,7 @@ pub enum Texture {
 const N_TEXTURES: usize = 14;
 /// Texels along a tile's side; a power of two.
 pub(crate) const SIDE: usize = 128;
-const LEVELS: usize = 8;
+pub(crate) const LEVELS: usize = 8;
 
 /// Tiles of brightness that repeat, of all textures and at all levels, one after the other.
 ///
@@ -78,38 +78,16 @@ pub(crate) struct Tile {
     pub texels_per_m: f32,
 }
 
-/// One level of a [`Tile`].
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Level {
-    /// Where it begins in the [`Atlas`].
-    pub begin: u32,
-    /// Its side is 1 << log2_side texels.
-    pub log2_side: u32,
-    pub texels_per_m: f32,
-}
-
 impl Tile {
     fn of(texture: Texture) -> Tile {
         let begin = texture as usize * N_TILE;
         Tile { begin: begin as u32, texels_per_m: SIDE as f32 / texture.period_m() }
     }
 
-    /// The level for pixels of this side, metres.
+    /// Texels before a level: of 4^n, 4^(n-1), ... the first few together.
     #[inline(always)]
-    pub fn level(&self, pixel_m: f32) -> Level {
-        let covered = (pixel_m * self.texels_per_m).clamp(1.0, SIDE as f32);
-        self.level_at(((covered.to_bits() >> 23) as usize - 127).min(LEVELS - 1))
-    }
-
-    #[inline(always)]
-    fn level_at(&self, level: usize) -> Level {
-        // Levels of 4^n, 4^(n-1), ... texels: the first few of them together.
-        let before = (4 * SIDE * SIDE - ((4 * SIDE * SIDE) >> (2 * level))) / 3;
-        Level {
-            begin: self.begin + before as u32,
-            log2_side: SIDE.ilog2() - level as u32,
-            texels_per_m: self.texels_per_m / (1u32 << level) as f32,
-        }
+    pub fn before(level: u32) -> u32 {
+        (4 * (SIDE * SIDE) as u32 - ((4 * (SIDE * SIDE) as u32) >> (2 * level))) / 3
     }
 }
 

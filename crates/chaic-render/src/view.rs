@@ -109,12 +109,12 @@ pub(crate) fn look(frame: &Frame, view: &View, images: &mut Images) {
         draw(frame, &lens, omit, plain, work);
         if let Some(depth_m) = depth_m {
             let far = 1.0 / Camera::FAR_M;
-            for (d, q) in depth_m.iter_mut().zip(&plain.nearness) {
+            for (d, q) in depth_m.iter_mut().zip(plain.nearness()) {
                 *d = if *q > far { 1.0 / *q } else { Camera::FAR_M };
             }
         }
         if let Some(ids) = ids_out {
-            ids.copy_from_slice(&plain.owner);
+            ids.copy_from_slice(plain.owner());
         }
     });
 }

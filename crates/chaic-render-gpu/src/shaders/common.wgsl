@@ -2,7 +2,6 @@
 
 // Nobody's pixel.
 const NOBODY: u32 = 0xffffffffu;
-const N_LEVELS: u32 = 4u;
 
 // `ViewRecord` of records.rs.
 struct View {
@@ -56,7 +55,7 @@ struct Instance {
 // `MeshRecord` of records.rs.
 struct Mesh {
     // First corner, first triangle, number of triangles, first skin.
-    levels: array<vec4u, 4>,
+    levels: array<vec4u, N_LEVELS>,
 }
 
 // What culling found out about a view.

@@ -81,6 +81,9 @@ fn is_between(low: f32, high: f32) -> bool {
 }
 
 fn level_for(radius_px: f32) -> u32 {
-    let is_finer = vec3f(radius_px) > LEVEL_RADIUS_PX;
-    return dot(select(vec3u(0u), vec3u(1u), is_finer), vec3u(1u));
+    var level = 0u;
+    for (var k = 0u; k < N_LEVELS - 1u; k++) {
+        level += select(0u, 1u, radius_px > LEVEL_RADIUS_PX[k]);
+    }
+    return level;
 }

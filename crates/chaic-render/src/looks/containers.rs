@@ -142,7 +142,7 @@ fn band(s: &mut Sculptor, y: f32, half: f32, high: f32, thick: f32) {
 }
 
 fn plastic_basket(s: &mut Sculptor) {
-    if s.level < 2 {
+    if s.within(20.0) {
         s.all();
         return;
     }
@@ -174,13 +174,13 @@ fn wicker_basket(s: &mut Sculptor) {
     ));
     s.shape(&s.class.parts[0]);
     s.paint(DARK_WILLOW);
-    let rows = if s.level < 2 { 0 } else { 5 };
+    let rows = if s.within(20.0) { 0 } else { 5 };
     for k in 0..rows {
         let y = 0.03 + 0.034 * k as f32;
         band(s, y, 0.153 + 0.13 * y, 0.014, 0.008);
     }
     // A plaited rim and foot.
-    let strands = if s.level < 3 { 0 } else { 14 };
+    let strands = if s.within(60.0) { 0 } else { 14 };
     for turn in SIDES {
         for k in 0..strands {
             let x = -0.165 + 0.33 * (k as f32 + 0.5) / strands as f32;
@@ -212,7 +212,7 @@ fn wood_basket(s: &mut Sculptor) {
         s.pick(0, &[[204, 160, 104], [188, 138, 84], [204, 160, 104], [220, 184, 134]]),
         Finish::Wood,
     );
-    if s.level < 2 {
+    if s.within(20.0) {
         s.all();
         return;
     }
@@ -264,7 +264,7 @@ fn bamboo_basket(s: &mut Sculptor) {
     ];
     s.lathe([0.0; 3], &outline);
     s.paint(rim);
-    let staves = if s.level < 2 { 0 } else { 20 };
+    let staves = if s.within(20.0) { 0 } else { 20 };
     for k in 0..staves {
         use chaic_protocol::geom::math::{cos, sin};
         let a = std::f32::consts::TAU * k as f32 / staves as f32;

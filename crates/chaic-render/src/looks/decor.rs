@@ -220,7 +220,7 @@ fn woven_box(s: &mut Sculptor) {
     s.shape(&s.class.parts[0]);
     s.shape(&s.class.parts[1]);
     s.paint(paint(willow.color.map(|c| (0.82 * f32::from(c)) as u8), Finish::Wicker));
-    if s.level > 1 {
+    if !s.within(20.0) {
         for k in 0..5 {
             s.block([0.0, 0.03 + 0.078 * k as f32, 0.0], [0.708, 0.02, 0.708], 0.006);
         }
@@ -238,7 +238,7 @@ fn dog_house(s: &mut Sculptor) {
     let boards = s.main_or(&[[132, 130, 132], [168, 120, 80], [132, 130, 132], [150, 80, 70]]);
     s.paint(boards);
     s.shape(&s.class.parts[0]);
-    if s.level > 1 {
+    if !s.within(20.0) {
         s.paint(paint(boards.color.map(|c| (0.7 * f32::from(c)) as u8), Finish::Wood));
         for k in 1..6 {
             s.block([0.0, 0.12 * k as f32, 0.0], [1.046, 0.008, 1.086], 0.0);
@@ -346,7 +346,7 @@ fn baking_sheet(s: &mut Sculptor) {
 fn notepad(s: &mut Sculptor) {
     s.paint(PAPER);
     s.block([0.0, 0.0, 0.0], [0.114, 0.046, 0.114], 0.002);
-    if s.level > 1 {
+    if !s.within(20.0) {
         s.paint(paint([206, 204, 196], Finish::Matte));
         for k in 0..6 {
             s.block([0.0, 0.006 + 0.007 * k as f32, 0.0], [0.1144, 0.001, 0.1144], 0.0);

@@ -135,7 +135,7 @@ fn grape(s: &mut Sculptor) {
     let colors = s.pick(0, &[PURPLES, PURPLES, PURPLES, GREENS]);
     s.paint(paint(colors[1], Finish::Glossy));
     s.ball([0.0, 0.02, 0.0], [0.1, 0.17, 0.11]);
-    let n = if s.level < 2 { 16 } else { 34 };
+    let n = if s.within(20.0) { 16 } else { 34 };
     for k in 0..n {
         use chaic_protocol::geom::math::{cos, sin};
         let t = (k as f32 + 0.5) / n as f32;
@@ -265,7 +265,7 @@ fn donut(s: &mut Sculptor) {
     let icing = s.main_or(&[[238, 132, 174], [244, 150, 190], [228, 112, 160], [246, 166, 196]]);
     s.paint(icing);
     s.shape(&s.class.parts[0]);
-    let n = if s.level < 2 { 8 } else { 26 };
+    let n = if s.within(20.0) { 8 } else { 26 };
     let colors = [[250, 250, 246], [90, 170, 226], [248, 212, 70], [110, 190, 96], [150, 90, 60]];
     for k in 0..n {
         let (a, r) = (2.4 * k as f32, 0.036 + 0.0022 * (k * 5 % 7) as f32);
@@ -304,7 +304,7 @@ fn label(s: &mut Sculptor, paint: Paint, heights: [f32; 2], angles: [f32; 2]) {
 
 /// A wave around the can: steps up and down.
 fn wave(s: &mut Sculptor, paint: Paint, low: f32, high: f32, swing: f32) {
-    let n = if s.level < 2 { 8 } else { 20 };
+    let n = if s.within(20.0) { 8 } else { 20 };
     for k in 0..n {
         use chaic_protocol::geom::math::sin;
         let span = 360.0 / n as f32;
@@ -315,7 +315,7 @@ fn wave(s: &mut Sculptor, paint: Paint, low: f32, high: f32, swing: f32) {
 
 /// A round sign three times around the can, in horizontal stripes.
 fn disc(s: &mut Sculptor, middle: f32, radius: f32, stripes: [Paint; 3]) {
-    let n = if s.level < 2 { 5 } else { 11 };
+    let n = if s.within(20.0) { 5 } else { 11 };
     let [w, h, _] = s.class.size_m;
     for back in [0.0, 120.0, 240.0] {
         for k in 0..n {

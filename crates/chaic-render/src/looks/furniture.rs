@@ -43,7 +43,7 @@ fn seat_cushion(s: &mut Sculptor, k: usize, from: f32, to: f32) {
 
 /// A sofa whose parts are seat, base, back, left arm and right arm, in that order.
 pub(super) fn sofa_on(s: &mut Sculptor, seat: Paint, frame: Paint, n: usize) {
-    if s.level < 2 {
+    if s.within(20.0) {
         let parts = s.class.parts;
         for (k, part) in parts.iter().enumerate() {
             s.paint(if k == 0 || k > 6 && k < 7 + n { seat } else { frame });
@@ -116,7 +116,7 @@ fn feet(s: &mut Sculptor, x: f32, z: f32, high: f32) {
 }
 
 fn corner_sofa(s: &mut Sculptor) {
-    if s.level < 2 {
+    if s.within(20.0) {
         s.all();
         return;
     }
@@ -161,7 +161,7 @@ fn corner_sofa(s: &mut Sculptor) {
 
 fn bench_sofa(s: &mut Sculptor) {
     s.paint(s.main());
-    if s.level < 2 {
+    if s.within(20.0) {
         s.all();
         return;
     }

@@ -319,7 +319,7 @@ fn vase(s: &mut Sculptor) {
         s.hoop([0.0, y, 0.0], [0.0, 1.0, 0.0], r, 0.0022);
     }
     // A garland around the belly.
-    let n = if s.level < 2 { 6 } else { 12 };
+    let n = if s.within(20.0) { 6 } else { 12 };
     for k in 0..n {
         use chaic_protocol::geom::math::{cos, sin};
         let a = std::f32::consts::TAU * k as f32 / n as f32;

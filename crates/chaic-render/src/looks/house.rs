@@ -260,7 +260,7 @@ fn bookshelf(s: &mut Sculptor) {
     for top in [0.08, 0.51, 0.94, 1.4] {
         s.block([0.0, top - 0.03, 0.0], [0.87, 0.03, 0.299], 0.004);
     }
-    if s.level < 2 {
+    if s.within(20.0) {
         for k in 6..s.class.parts.len() {
             s.part(k);
         }
@@ -325,7 +325,7 @@ fn potted_plant(s: &mut Sculptor) {
     match s.pick(1, &[0, 1, 2]) {
         // Long blades, all from the middle.
         0 => {
-            let n = if s.level < 2 { 9 } else { 16 };
+            let n = if s.within(20.0) { 9 } else { 16 };
             for k in 0..n {
                 let (a, t) = (2.4 * k as f32, (k as f32 + 1.0) / n as f32);
                 let out = 0.205 - 0.12 * (t - 0.35).max(0.0);
@@ -347,7 +347,7 @@ fn potted_plant(s: &mut Sculptor) {
                 ([0.01, 0.6, 0.0], 0.011),
                 ([0.0, 0.98, 0.01], 0.006),
             ]);
-            let n = if s.level < 2 { 8 } else { 15 };
+            let n = if s.within(20.0) { 8 } else { 15 };
             for k in 0..n {
                 let (a, t) = (2.4 * k as f32, (k as f32 + 0.5) / n as f32);
                 let y = 0.45 + 0.5 * t;
@@ -444,7 +444,7 @@ fn rug(s: &mut Sculptor) {
             }
         }
     }
-    if s.level > 2 {
+    if !s.within(60.0) {
         s.paint(paint([232, 224, 204], Finish::Fabric));
         for k in 0..56 {
             let z = -0.69 + 1.38 * (k as f32 + 0.5) / 56.0;
@@ -474,7 +474,7 @@ fn trashbin(s: &mut Sculptor) {
     s.hoop([0.0, 0.548, 0.0], [0.0, 1.0, 0.0], 0.226, 0.012);
     s.hoop([0.0, 0.03, 0.0], [0.0, 1.0, 0.0], 0.178, 0.012);
     // Ribs outside.
-    if s.level > 1 {
+    if !s.within(20.0) {
         for k in 0..18 {
             let a = 0.349 * k as f32;
             let at = |r: f32, y: f32| [r * cos(a), y, r * sin(a)];

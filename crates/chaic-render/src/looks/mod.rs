@@ -144,6 +144,7 @@ pub(crate) fn tint_of(setup: &Setup, index: usize) -> Option<[f32; 3]> {
 mod tests {
     use super::*;
     use crate::frame::ClassMesh;
+    use crate::geometry::FINEST;
     use crate::solids::N_LEVELS;
     use chaic_protocol::{ClassId, Role};
 
@@ -206,7 +207,7 @@ mod tests {
     fn tops_that_carry_things_are_where_the_world_says() {
         for thing in things() {
             let tops = chaic_world::top_surfaces(&thing);
-            let mesh = thing_mesh(&thing, 1, 3);
+            let mesh = thing_mesh(&thing, 1, FINEST);
             for top in tops.iter().filter(|t| t.half[0].min(t.half[1]) > 0.02) {
                 let near = mesh.positions.iter().filter(|p| {
                     (p.y - top.center.y).abs() < 0.012
@@ -231,7 +232,7 @@ mod tests {
                 .into_iter()
                 .flat_map(|top| (0..N_STYLES).map(move |style| (top, style)))
             {
-                let mesh = thing_mesh(&thing, style, 3);
+                let mesh = thing_mesh(&thing, style, FINEST);
                 for p in &mesh.positions {
                     let d = *p - top.center;
                     let is_above = d.x.abs() < top.half[0] - 0.02
@@ -251,7 +252,7 @@ mod tests {
         let mut thing = Thing::new(ClassId::named("armchair"), Vec3::ZERO, 0.0);
         thing.scale = [1.2, 0.9, 1.1];
         thing.seat_m = Some(0.5);
-        let mesh = thing_mesh(&thing, 0, 3);
+        let mesh = thing_mesh(&thing, 0, FINEST);
         let size = thing.size_m();
         assert!((mesh.max.y - size.y).abs() < 0.02 && (mesh.max.x - 0.5 * size.x).abs() < 0.02);
         let near_seat = mesh.positions.iter().filter(|p| (p.y - 0.5).abs() < 0.01);

@@ -393,7 +393,7 @@ fn piano(s: &mut Sculptor) {
     s.paint(ivory);
     s.block([0.0, 0.497, -0.385], [0.97, 0.025, 0.13], 0.004);
     s.paint(GAP);
-    if s.level > 1 {
+    if !s.within(20.0) {
         for k in 1..36 {
             let x = -0.485 + 0.97 * k as f32 / 36.0;
             s.block([x, 0.5215, -0.385], [0.002, 0.0011, 0.13], 0.0);

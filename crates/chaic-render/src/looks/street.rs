@@ -238,7 +238,7 @@ fn bike(s: &mut Sculptor) {
         s.paint(STEEL);
         s.hoop(at, [1.0, 0.0, 0.0], 0.29, 0.011);
         s.rod([-0.05, 0.34, z], [0.05, 0.34, z], 0.02);
-        let n = if s.level < 2 { 6 } else { 18 };
+        let n = if s.within(20.0) { 6 } else { 18 };
         for k in 0..n {
             let a = std::f32::consts::TAU * k as f32 / n as f32;
             let out = if k % 2 == 0 { 0.022 } else { -0.022 };
@@ -352,7 +352,7 @@ fn house_front(s: &mut Sculptor) {
     s.part(0);
     s.paint(roof);
     s.block_turned([0.0, 4.17, 0.0], [8.0, 1.76, 0.08], [30.7, 0.0, 0.0], 0.0);
-    if s.level > 2 {
+    if !s.within(60.0) {
         // Rows of tiles.
         for k in 0..11 {
             let t = (k as f32 + 0.5) / 11.0 - 0.5;
@@ -496,7 +496,7 @@ fn street_lamp(s: &mut Sculptor) {
 
 fn bench(s: &mut Sculptor) {
     let wood = s.main_or(&[[158, 108, 64], [158, 108, 64], [90, 120, 84], [120, 76, 48]]);
-    if s.level < 2 {
+    if s.within(20.0) {
         s.all();
         return;
     }

@@ -24,7 +24,7 @@ pub struct ExportArguments {
     /// The file, .glb.
     #[arg(long, value_name = "FILE", value_parser = glb_file)]
     pub out: PathBuf,
-    /// Level of detail, from 0 (coarsest) to 3 (finest).
+    /// Level of detail, from 0 (coarsest) to 6 (finest).
     #[arg(long, value_name = "LEVEL", default_value_t = FINEST as u8,
         value_parser = clap::value_parser!(u8).range(0..=FINEST as i64))]
     pub detail: u8,

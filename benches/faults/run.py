@@ -1,0 +1,106 @@
+#!/usr/bin/env python3
+"""Plays the whole benchmark with a language helper whose endpoint fails in one way, for each way.
+
+Of the requests of a run 30 % fail. An episode is lost if it has no score at the end. Prints a
+table, and exits with 1 if an episode was lost. The endpoint is the stand-in, whose scores are not
+a language model's.
+
+usage: benches/faults/run.py [--out DIR] [--rate 0.3] [--helper llm] [--first N] [KIND ...]
+
+Environment:
+  BIN   folder of built programs (usual: built by cargo build --release)
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+KINDS = """refused reset timeout slow-drip 429-with-wait 429 500 503 empty truncated wrong-schema
+plan-not-listed huge invalid-utf8""".split()
+# Patience is short, as the stand-in answers at once; all else is as usual.
+CONFIG = """
+[endpoint]
+timeout_secs = 0.3
+[faults]
+attempts = 8
+first_wait_secs = 0.005
+longest_wait_secs = 2.0
+then = "fallback"
+"""
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("kinds", nargs="*", default=KINDS, metavar="KIND", help=" ".join(KINDS))
+    parser.add_argument("--out", type=pathlib.Path, default=ROOT / "target/faults")
+    parser.add_argument("--rate", type=float, default=0.3)
+    parser.add_argument("--helper", default="llm")
+    parser.add_argument("--first", type=int, help="only the first N episodes of each task")
+    return parser.parse_args()
+
+
+def programs():
+    names = ("chaic", "chaic-llm-standin")
+    if folder := os.environ.get("BIN"):
+        return [pathlib.Path(folder) / name for name in names]
+    packages = ["--package", "chaic", "--package", "chaic-llm-standin"]
+    subprocess.run(["cargo", "build", "--release", "--quiet", *packages], cwd=ROOT, check=True)
+    return [ROOT / "target/release" / name for name in names]
+
+
+def play(chaic, standin, args, kind):
+    """Plays a run under one fault; gives the results of its episodes."""
+    out = args.out / kind
+    config = args.out / "patience.toml"
+    config.write_text(CONFIG)
+    faulty = [] if kind == "none" else ["--fault", f"{kind}={args.rate}"]
+    server = subprocess.Popen(
+        [standin, "--port", "0", "--stall-ms", "2000", *faulty], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        address = re.search(r"http://\S+", server.stdout.readline()).group()
+        command = [chaic, "eval", "--split", "test", "--helper", args.helper, "--jobs", "8"]
+        command += ["--llm-config", config, "--endpoint", address, "--model", "standin"]
+        command += ["--no-traces", "--out", out]
+        command += ["--first", str(args.first)] if args.first else []
+        with open(args.out / f"{kind}.log", "w") as log:
+            subprocess.run(command, stdout=log, stderr=log, check=False)
+    finally:
+        server.kill()
+    lines = (out / "results.jsonl").read_text().splitlines()
+    return [json.loads(line) for line in lines]
+
+
+def main():
+    args = arguments()
+    args.out.mkdir(parents=True, exist_ok=True)
+    chaic, standin = programs()
+    expected = 8 * (args.first or 12)
+    print("| fault | episodes scored | questions | requests | failed | fallbacks | minutes |")
+    print("|---|---|---|---|---|---|---|")
+    lost = 0
+    for kind in args.kinds:
+        begin = time.monotonic()
+        results = play(chaic, standin, args, kind)
+        minutes = (time.monotonic() - begin) / 60.0
+        scored = sum(r["status"] == "done" for r in results)
+        lost += expected - scored
+        counts = [r["counts"] for r in results]
+        total = lambda *names: sum(c.get(f"helper.{n}", 0) for c in counts for n in names)
+        fallbacks = total("fallback_invalid", "fallback_fault")
+        print(
+            f"| {kind} | {scored} of {expected} | {total('questions')} | {total('requests')} "
+            f"| {total('faults', 'invalid_answers')} | {fallbacks} | {minutes:.1f} |",
+            flush=True,
+        )
+    return 1 if lost else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

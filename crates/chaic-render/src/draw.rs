@@ -185,7 +185,7 @@ struct Drawing<'a> {
 
 /// Draws one instance, compiled for each kind of vectors and called for the widest that the
 /// machine has.
-struct DrawOne<'a, O> {
+struct DrawOne<'a, O: Owner> {
     drawing: Drawing<'a>,
     crosses_near: bool,
     target: &'a mut Target<O>,
@@ -203,7 +203,7 @@ impl<O: Owner> pulp::NullaryFnOnce for DrawOne<'_, O> {
 }
 
 /// Brings tiles up to date, likewise.
-struct UpdateTiles<'a, O>(&'a mut Target<O>);
+struct UpdateTiles<'a, O: Owner>(&'a mut Target<O>);
 
 impl<O: Owner> pulp::NullaryFnOnce for UpdateTiles<'_, O> {
     type Output = ();

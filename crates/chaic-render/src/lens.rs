@@ -9,6 +9,12 @@ use crate::mesh::unit;
 /// Depth range of plan views, metres: they look down from above everything.
 pub(crate) const PLAN_RANGE_M: f32 = 100.0;
 
+/// The depth that an eye sees of a depth: what is farther than it can see is as far as that, metres.
+#[inline(always)]
+pub(crate) fn seen_depth_m(depth_m: f32) -> f32 {
+    if depth_m < Camera::FAR_M { depth_m } else { Camera::FAR_M }
+}
+
 /// A camera that is fit for use.
 ///
 /// Nearness is what the depth buffer holds: 1 / depth for an eye, which is linear on the image as

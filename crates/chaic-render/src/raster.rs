@@ -4,12 +4,16 @@
 //! computed from its two ends in one fixed order, so that two triangles that share an edge leave
 //! neither a gap nor an overlap.
 
+use std::ops::{Deref, DerefMut};
+
 use chaic_protocol::EntityId;
 
 /// Nobody's pixel.
 pub(crate) const NOBODY: u32 = u32::MAX;
 /// Side of the squares in which nearness is summed up, pixels.
 pub(crate) const TILE: usize = 8;
+/// So many neighboring pixels of a row are filled at once.
+pub(crate) const LANES: usize = 16;
 
 /// Names a triangle of an instance in 32 bits.
 pub(crate) fn pixel_owner(instance: usize, triangle: usize) -> u32 {
@@ -23,9 +27,15 @@ pub(crate) fn owner_parts(owner: u32) -> (usize, usize) {
 }
 
 /// What stands in the image for whoever a pixel belongs to.
-pub(crate) trait Owner: Copy {
+pub(crate) trait Owner: Copy + PartialEq {
     /// Nobody's pixel.
     const NOBODY: Self;
+
+    /// Neighboring pixels, laid out so that they are loaded and stored at once.
+    type Block: Copy + std::fmt::Debug + Default + DerefMut<Target = [Self; LANES]>;
+
+    /// Pixels that are all this one's.
+    fn block(self) -> Self::Block;
 
     /// Stands for a triangle of an instance of an entity.
     fn of(entity: EntityId, instance: usize, triangle: usize) -> Self;
@@ -34,9 +44,56 @@ pub(crate) trait Owner: Copy {
     fn replaced(self, new: Self, mask: u32) -> Self;
 }
 
+/// Pixels whose numbers have 32 bits.
+#[repr(align(64))]
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Wide<T>([T; LANES]);
+
+/// Pixels whose numbers have 16 bits.
+#[repr(align(32))]
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Narrow<T>([T; LANES]);
+
+impl<T> Deref for Wide<T> {
+    type Target = [T; LANES];
+
+    #[inline(always)]
+    fn deref(&self) -> &[T; LANES] {
+        &self.0
+    }
+}
+
+impl<T> DerefMut for Wide<T> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut [T; LANES] {
+        &mut self.0
+    }
+}
+
+impl<T> Deref for Narrow<T> {
+    type Target = [T; LANES];
+
+    #[inline(always)]
+    fn deref(&self) -> &[T; LANES] {
+        &self.0
+    }
+}
+
+impl<T> DerefMut for Narrow<T> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut [T; LANES] {
+        &mut self.0
+    }
+}
+
 /// To the triangle, as coloring needs it: [`pixel_owner`].
 impl Owner for u32 {
     const NOBODY: u32 = NOBODY;
+    type Block = Wide<u32>;
+
+    fn block(self) -> Wide<u32> {
+        Wide([self; LANES])
+    }
 
     #[inline]
     fn of(_: EntityId, instance: usize, triangle: usize) -> u32 {
@@ -52,6 +109,11 @@ impl Owner for u32 {
 /// To the entity, where that is all that is asked for: half as much to write.
 impl Owner for u16 {
     const NOBODY: u16 = EntityId::NOTHING.0;
+    type Block = Narrow<u16>;
+
+    fn block(self) -> Narrow<u16> {
+        Narrow([self; LANES])
+    }
 
     #[inline]
     fn of(entity: EntityId, _: usize, _: usize) -> u16 {
@@ -82,15 +144,43 @@ pub(crate) struct Slope {
     pub high: f32,
 }
 
-/// The image under way.
+/// Blocks of [`LANES`] pixels one below the other, as high as tiles. An image is rows of stacks: what
+/// is near on the image is near in memory, and a thing's pixels stay in the nearest cache.
+type Stack<B> = [B; TILE];
+
+/// A row of blocks across stacks.
+#[derive(Clone, Copy)]
+pub(crate) struct Blocks<'a, B> {
+    stacks: &'a [Stack<B>],
+    row: usize,
+}
+
+impl<'a, B> Blocks<'a, B> {
+    /// The k-th block, if there is one.
+    #[inline(always)]
+    pub fn get(self, k: usize) -> Option<&'a B> {
+        self.stacks.get(k).map(|stack| &stack[self.row])
+    }
+
+    /// All of them.
+    #[inline(always)]
+    pub fn iter(self) -> impl Iterator<Item = &'a B> {
+        self.stacks.iter().map(move |stack| &stack[self.row])
+    }
+}
+
+/// The image under way. What of its stacks lies beyond the image is nobody's, and near, so that it
+/// doesn't count in its tile.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Target<O> {
+pub(crate) struct Target<O: Owner> {
     pub width: usize,
     pub height: usize,
-    /// Nearness, shape [height, width], and [`LANES`] more.
-    nearness: Vec<f32>,
-    /// Whose each pixel is, shape [height, width], and [`LANES`] more.
-    owner: Vec<O>,
+    /// Stacks side by side.
+    stacks_wide: usize,
+    /// Nearness, shape [stacks_high, stacks_wide].
+    nearness: Vec<Stack<Wide<f32>>>,
+    /// Whose each pixel is, of the same shape.
+    owner: Vec<Stack<O::Block>>,
     tiles_wide: usize,
     /// The least nearness in each tile.
     tiles: Vec<f32>,
@@ -102,25 +192,42 @@ impl<O: Owner> Target<O> {
     /// Forgets all; what isn't nearer than `background` won't be drawn.
     pub fn clear(&mut self, width: usize, height: usize, background: f32) {
         (self.width, self.height) = (width, height);
+        self.stacks_wide = width.div_ceil(LANES);
+        let stacks_high = height.div_ceil(TILE);
+        let n = self.stacks_wide * stacks_high;
         self.nearness.clear();
-        self.nearness.resize(width * height + LANES, background);
+        self.nearness.resize(n, [Wide([background; LANES]); TILE]);
+        let (in_last, rows_in_last) = (width % LANES, height % TILE);
+        for (k, stack) in self.nearness.iter_mut().enumerate() {
+            let is_right = in_last > 0 && (k + 1) % self.stacks_wide == 0;
+            if is_right {
+                stack.iter_mut().for_each(|block| block[in_last..].fill(f32::INFINITY));
+            }
+            if rows_in_last > 0 && k / self.stacks_wide + 1 == stacks_high {
+                stack[rows_in_last..].fill(Wide([f32::INFINITY; LANES]));
+            }
+        }
         self.owner.clear();
-        self.owner.resize(width * height + LANES, O::NOBODY);
-        self.tiles_wide = width.div_ceil(TILE);
+        self.owner.resize(n, [O::NOBODY.block(); TILE]);
+        self.tiles_wide = LANES / TILE * self.stacks_wide;
         self.tiles.clear();
-        self.tiles.resize(self.tiles_wide * height.div_ceil(TILE), background);
+        self.tiles.resize(self.tiles_wide * stacks_high, background);
         self.stale.clear();
-        self.stale.resize(height.div_ceil(TILE), (self.tiles_wide, 0));
+        self.stale.resize(stacks_high, (self.tiles_wide, 0));
     }
 
-    /// Nearness, shape [height, width].
-    pub fn nearness(&self) -> &[f32] {
-        &self.nearness[..self.width * self.height]
+    /// Nearness in a row.
+    #[inline(always)]
+    pub fn nearness(&self, row: usize) -> Blocks<'_, Wide<f32>> {
+        let stacks = &self.nearness[row / TILE * self.stacks_wide..][..self.stacks_wide];
+        Blocks { stacks, row: row % TILE }
     }
 
-    /// Whose each pixel is, shape [height, width].
-    pub fn owner(&self) -> &[O] {
-        &self.owner[..self.width * self.height]
+    /// Whose the pixels of a row are.
+    #[inline(always)]
+    pub fn owner(&self, row: usize) -> Blocks<'_, O::Block> {
+        let stacks = &self.owner[row / TILE * self.stacks_wide..][..self.stacks_wide];
+        Blocks { stacks, row: row % TILE }
     }
 
     /// The tiles that the rectangle (least u and v, most u and v) touches: columns and rows, the
@@ -149,12 +256,14 @@ impl<O: Owner> Target<O> {
         if self.width == 0 {
             return;
         }
-        let bands = self.nearness[..self.width * self.height].chunks(TILE * self.width);
+        let bands = self.nearness.chunks(self.stacks_wide);
         let tiles = self.tiles.chunks_mut(self.tiles_wide);
-        for ((rows, tiles), (first, end)) in bands.zip(tiles).zip(&mut self.stale) {
+        for ((stacks, tiles), (first, end)) in bands.zip(tiles).zip(&mut self.stale) {
             if first < end {
-                for (k, tile) in tiles.iter_mut().enumerate().take(*end).skip(*first) {
-                    *tile = least_in_tile(rows, self.width, TILE * k);
+                let changed = *first * TILE / LANES..(*end * TILE).div_ceil(LANES);
+                let tiles = &mut tiles.as_chunks_mut().0[changed.clone()];
+                for (tiles, stack) in tiles.iter_mut().zip(&stacks[changed]) {
+                    *tiles = least_in_tiles(stack);
                 }
                 (*first, *end) = (self.tiles_wide, 0);
             }
@@ -217,17 +326,10 @@ impl<O: Owner> Target<O> {
             let (long, short) = (long.u_at(v), if row < middle { upper } else { lower }.u_at(v));
             let begin = first_center(if b_is_right { long } else { short }, columns);
             let end = first_center(if b_is_right { short } else { long }, columns);
-            let at = row as usize * self.width + begin as usize;
             let q0 = slope.at.q + slope.dv * (v - slope.at.v) + slope.du * (0.5 - slope.at.u);
-            fill_span(
-                &mut self.nearness[at..],
-                &mut self.owner[at..],
-                q0,
-                begin,
-                end,
-                slope,
-                owner,
-            );
+            let (stacks, row) = (row as usize / TILE * self.stacks_wide, row as usize % TILE);
+            let (nearness, owners) = (&mut self.nearness[stacks..], &mut self.owner[stacks..]);
+            fill_span::<O>(nearness, owners, row, q0, (begin, end), slope, owner);
         }
     }
 }
@@ -242,69 +344,65 @@ pub(crate) fn most(x: f32, y: f32) -> f32 {
     if x > y { x } else { y }
 }
 
-/// The least of a tile that begins in this column of its rows.
+/// The least of each of the tiles in a stack.
 #[inline(always)]
-fn least_in_tile(rows: &[f32], width: usize, column: usize) -> f32 {
-    let mut columns = [f32::INFINITY; TILE];
-    for row in rows.chunks_exact(width) {
-        match row[column..].first_chunk::<TILE>() {
-            Some(pixels) => {
-                for (column, pixel) in columns.iter_mut().zip(pixels) {
-                    *column = least(*column, *pixel);
-                }
-            }
-            None => row[column..].iter().for_each(|q| columns[0] = least(columns[0], *q)),
+fn least_in_tiles(stack: &Stack<Wide<f32>>) -> [f32; LANES / TILE] {
+    let mut columns = [f32::INFINITY; LANES];
+    for block in stack {
+        for k in 0..LANES {
+            columns[k] = least(columns[k], block[k]);
         }
     }
-    columns.into_iter().fold(f32::INFINITY, least)
+    let mut tiles = [f32::INFINITY; LANES / TILE];
+    for k in 0..LANES {
+        tiles[k / TILE] = least(tiles[k / TILE], columns[k]);
+    }
+    tiles
 }
 
-/// So many pixels are filled at once; those beyond the end of a span stay as they are.
-const LANES: usize = 16;
-
-/// Fills the columns `begin..end` of a row; the lists begin there.
+/// Fills the columns `begin..end` of a row of the stacks that begin here.
 #[inline(always)]
 fn fill_span<O: Owner>(
-    nearness: &mut [f32],
-    owners: &mut [O],
+    nearness: &mut [Stack<Wide<f32>>],
+    owners: &mut [Stack<O::Block>],
+    row: usize,
     q0: f32,
-    begin: u32,
-    end: u32,
+    (begin, end): (u32, u32),
     slope: &Slope,
     owner: O,
 ) {
-    // Most spans are shorter than the lanes: no branch tells those from empty ones.
-    let mut at = begin;
-    let (mut nearness, mut owners) = (nearness, owners);
-    while let (Some((q, more_q)), Some((o, more_o))) =
-        (nearness.split_first_chunk_mut(), owners.split_first_chunk_mut())
-    {
-        fill_lanes(q, o, q0, (at, end), slope, owner);
-        (nearness, owners) = (more_q, more_o);
-        at += LANES as u32;
-        if at >= end {
+    let mut k = begin as usize / LANES;
+    // Most spans lie within a block: no branch tells those from empty ones.
+    while let (Some(q), Some(o)) = (nearness.get_mut(k), owners.get_mut(k)) {
+        let (q, o) = (&mut q[row], &mut o[row]);
+        fill_block(q, o, q0, (LANES * k) as u32, (begin, end), slope, owner);
+        k += 1;
+        if LANES * k >= end as usize {
             break;
         }
     }
 }
 
-/// Fills pixels side by side, from one column to below another.
+/// Fills those pixels of a block, the first of which is in column `at`.
 #[inline(always)]
-fn fill_lanes<O: Owner>(
+fn fill_block<O: Owner>(
     q: &mut [f32; LANES],
     o: &mut [O; LANES],
     q0: f32,
-    (at, end): (u32, u32),
+    at: u32,
+    (begin, end): (u32, u32),
     slope: &Slope,
     owner: O,
 ) {
     let Slope { du, low, high, .. } = *slope;
+    let length = end.saturating_sub(begin);
     // Masks instead of conditions, which the compiler would make branches of. Plain loops:
     // closures would be compiled apart, without this machine's vectors.
     for k in 0..LANES {
         let column = at + k as u32;
         let x = least(high, most(low, q0 + du * column as i32 as f32));
-        let wins = (u32::from(x > q[k]) & u32::from(column < end)).wrapping_neg();
+        let is_inside = column.wrapping_sub(begin) < length;
+        let wins = (u32::from(x > q[k]) & u32::from(is_inside)).wrapping_neg();
         q[k] = f32::from_bits(x.to_bits() & wins | q[k].to_bits() & !wins);
         o[k] = o[k].replaced(owner, wins);
     }
@@ -351,6 +449,11 @@ mod tests {
         Corner { u, v, q: 1.0 }
     }
 
+    fn owners(target: &Target<u32>) -> impl Iterator<Item = u32> {
+        let rows = (0..target.height).map(|j| target.owner(j));
+        rows.flat_map(|row| row.iter().flat_map(|b| b.0).take(target.width))
+    }
+
     /// A fan of thin triangles around a point covers every pixel exactly once.
     #[test]
     fn neighbors_leave_no_gap_and_no_overlap() {
@@ -365,8 +468,8 @@ mod tests {
             let mut target = Target::<u32>::default();
             target.clear(64, 64, 0.0);
             target.draw([corner(32.3, 31.7), rim(k + 1), rim(k)], k as u32);
-            for (n, o) in count.iter_mut().zip(target.owner()) {
-                *n += i32::from(*o != NOBODY);
+            for (n, o) in count.iter_mut().zip(owners(&target)) {
+                *n += i32::from(o != NOBODY);
             }
         }
         assert!(count.iter().all(|n| *n == 1));
@@ -394,24 +497,29 @@ mod tests {
     fn spans_of_any_length_are_filled_as_pixel_by_pixel() {
         let mut rng = chaic_protocol::rng::Stream::new(1, "spans", 0);
         for n in (0..40).cycle().take(2000) {
-            let before: Vec<f32> = (0..n + LANES).map(|_| rng.range(0.0, 1.0)).collect();
+            let before: Vec<f32> = (0..6 * LANES).map(|_| rng.range(0.0, 1.0)).collect();
             let du =
                 [0.0, rng.range(-0.05, 0.05), f32::NAN, 1e30][rng.below(40).saturating_sub(36)];
             let at = Corner { u: 0.0, v: 0.0, q: 0.0 };
             let slope = Slope { at, du, dv: 0.0, low: 0.2, high: rng.range(0.2, 1.0) };
-            let (q0, begin) = (rng.range(0.0, 1.0), rng.below(500) as u32);
-            let end = begin + n as u32;
-            let (mut owners, mut names) = (vec![7u32; n + LANES], vec![7u16; n + LANES]);
-            let mut right_owners = owners.clone();
+            let (q0, begin) = (rng.range(0.0, 1.0), rng.below(50));
+            let span = begin..begin + n;
+            let mut right_owners = vec![7; before.len()];
             let mut right_q = before.clone();
-            fill_one_by_one((&mut right_q[..n], &mut right_owners[..n]), q0, begin, &slope, 9);
-            fill_span(&mut before.clone(), &mut names, q0, begin, end, &slope, 9);
-            let mut q = before;
-            fill_span(&mut q, &mut owners, q0, begin, end, &slope, 9);
-            let bits = |q: &[f32]| q.iter().map(|q| q.to_bits()).collect::<Vec<_>>();
-            assert_eq!(bits(&q), bits(&right_q), "{n} pixels, {slope:?}");
-            assert_eq!(owners, right_owners, "{n} pixels, {slope:?}");
-            assert!(names.iter().zip(&owners).all(|(a, b)| u32::from(*a) == *b));
+            let right = (&mut right_q[span.clone()], &mut right_owners[span]);
+            fill_one_by_one(right, q0, begin as u32, &slope, 9);
+            let span = (begin as u32, (begin + n) as u32);
+            let mut q: Vec<Wide<f32>> = before.as_chunks().0.iter().map(|b| Wide(*b)).collect();
+            let (mut owners, mut names) =
+                (vec![7u32.block(); q.len()], vec![7u16.block(); q.len()]);
+            fill_span::<u16>(&mut q.clone(), &mut names, q0, span, &slope, 9);
+            fill_span::<u32>(&mut q, &mut owners, q0, span, &slope, 9);
+            let bits = |q: f32| q.to_bits();
+            let (q, owners) = (q.iter().flat_map(|q| q.0), owners.iter().flat_map(|o| o.0));
+            assert!(q.map(bits).eq(right_q.into_iter().map(bits)), "{n} pixels, {slope:?}");
+            assert!(owners.eq(right_owners.iter().copied()), "{n} pixels, {slope:?}");
+            let names = names.iter().flat_map(|o| o[row].0).map(u32::from);
+            assert!(names.eq(right_owners), "{n} pixels, {slope:?}");
         }
     }
 
@@ -423,7 +531,7 @@ mod tests {
             target.draw([corner(0.0, 0.0), corner(bad, 8.0), corner(3.0, bad)], 1);
         }
         target.draw([corner(5.0, 5.0); 3], 2);
-        assert!(target.owner().iter().all(|o| *o != 2));
+        assert!(owners(&target).all(|o| o != 2));
         let mut empty = Target::<u32>::default();
         empty.clear(0, 0, 0.0);
         empty.touch([0.0, 0.0, 9.0, 9.0]);

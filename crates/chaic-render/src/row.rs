@@ -1,17 +1,18 @@
 //! The pixels of one row of the image, a list for each quantity.
+//!
+//! Runs are filled in whole [`LANES`], from left to right: the last ones may lie beyond a run's end,
+//! where the next run writes them again.
 
-use chaic_protocol::geom::Camera;
 use glam::Vec4;
 
+use crate::lens::seen_depth_m;
 use crate::light::{MAX_CELLS, N_GROUND};
 use crate::paint::RowPlane;
 use crate::patches::{Patch, Patches};
 use crate::points::Points;
+use crate::raster::{Blocks, LANES, Wide};
 use crate::texture::{Atlas, N_ATLAS, PLAIN};
 
-/// Pixels that are worked on at once; a run's last lanes may lie beyond its end, where the next
-/// run writes them again.
-pub(crate) const LANES: usize = 16;
 /// Most pixels between two knots of light.
 pub(crate) const STEP: usize = 64;
 
@@ -58,21 +59,28 @@ impl Row {
         self.depth[k]
     }
 
-    /// Depths of nearnesses, as [`crate::paint::Plane`] wants them and as eyes see them: what is
-    /// farther than can be seen is as far as that.
+    /// Depths of nearnesses, as [`crate::paint::Plane`] wants them and as eyes see them.
     #[inline(always)]
-    pub fn find_depths(&mut self, nearness: &[f32], is_plan: bool, seen: Option<&mut [f32]>) {
-        let depth = &mut self.depth[..nearness.len()];
+    pub fn find_depths(
+        &mut self,
+        nearness: Blocks<Wide<f32>>,
+        is_plan: bool,
+        seen: Option<&mut [f32]>,
+    ) {
         if is_plan {
-            depth.fill(1.0);
+            self.depth.fill(1.0);
             return;
         }
-        for (d, q) in depth.iter_mut().zip(nearness) {
-            *d = 1.0 / *q;
+        for (depth, nearness) in
+            self.depth.as_chunks_mut::<LANES>().0.iter_mut().zip(nearness.iter())
+        {
+            for k in 0..LANES {
+                depth[k] = 1.0 / nearness[k];
+            }
         }
         if let Some(seen) = seen {
-            for (seen, d) in seen.iter_mut().zip(&*depth) {
-                *seen = if *d < Camera::FAR_M { *d } else { Camera::FAR_M };
+            for (seen, depth_m) in seen.iter_mut().zip(&self.depth) {
+                *seen = seen_depth_m(*depth_m);
             }
         }
     }

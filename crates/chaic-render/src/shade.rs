@@ -15,8 +15,8 @@ use crate::lens::Lens;
 use crate::paint::{Kind, Paint, Painter, Sight};
 use crate::patches::Patches;
 use crate::points::Points;
-use crate::raster::{NOBODY, Target, owner_parts};
-use crate::row::{LANES, Row, STEP};
+use crate::raster::{Blocks, LANES, NOBODY, Target, Wide, owner_parts};
+use crate::row::{Row, STEP};
 use crate::texture::{Atlas, atlas};
 
 /// Buffers for shading, used again and again.
@@ -28,7 +28,8 @@ pub(crate) struct Canvas {
     sights: Vec<Option<Sight>>,
     /// So many of the paints have been lit.
     n_lit: usize,
-    /// The runs of the row.
+    /// Where the runs of the row begin.
+    begins: Vec<u32>,
     runs: Vec<Run>,
     /// What is lit on the row: new triangles' points and knots of structure.
     points: Points,
@@ -122,10 +123,9 @@ impl pulp::NullaryFnOnce for Rows<'_> {
         }
         for j in 0..self.lens.height {
             let line = j * width..(j + 1) * width;
-            let nearness = &self.target.nearness()[line.clone()];
             let depth_m = self.wanted.depth_m.as_deref_mut().map(|d| &mut d[line.clone()]);
-            self.canvas.row.find_depths(nearness, self.lens.is_plan, depth_m);
-            self.find_runs(j, nearness);
+            self.canvas.row.find_depths(self.target.nearness(j), self.lens.is_plan, depth_m);
+            self.find_runs(j);
             self.light();
             self.canvas.patches.place(j as f32 + 0.5, 1.0 / self.lens.focal);
             let has_floor = self.fill(j);
@@ -137,36 +137,44 @@ impl pulp::NullaryFnOnce for Rows<'_> {
     }
 }
 
-/// How many pixels at the beginning have this owner.
+/// Finds the columns in which runs begin.
 #[inline(always)]
-fn run_length(owners: &[u32], owner: u32) -> usize {
-    let mut n = 0;
-    for chunk in owners.as_chunks::<LANES>().0 {
-        let mut other = 0;
-        for o in chunk {
-            other |= o ^ owner;
+fn find_begins(owners: Blocks<Wide<u32>>, width: usize, begins: &mut Vec<u32>) {
+    begins.clear();
+    let mut last = owners.get(0).map_or(NOBODY, |block| !block[0]);
+    for (b, block) in owners.iter().enumerate() {
+        let mut begin = 0u32;
+        let mut before = [last; LANES];
+        before[1..].copy_from_slice(&block[..LANES - 1]);
+        for k in 0..LANES {
+            begin |= u32::from(block[k] != before[k]) << k;
         }
-        if other != 0 {
-            break;
+        last = block[LANES - 1];
+        while begin != 0 {
+            begins.push((LANES * b) as u32 + begin.trailing_zeros());
+            begin &= begin - 1;
         }
-        n += LANES;
     }
-    n + owners[n..].iter().take_while(|o| **o == owner).count()
+    while begins.last().is_some_and(|last| *last as usize >= width) {
+        begins.pop();
+    }
 }
 
 impl Rows<'_> {
     /// Finds the runs of row `j`, and what has to be lit.
     #[inline(always)]
-    fn find_runs(&mut self, j: usize, nearness: &[f32]) {
+    fn find_runs(&mut self, j: usize) {
         let width = self.lens.width;
-        let owners = &self.target.owner()[j * width..(j + 1) * width];
+        let (owners, nearness) = (self.target.owner(j), self.target.nearness(j));
         self.canvas.runs.clear();
         self.canvas.points.clear();
         self.canvas.patches.clear();
-        let mut begin = 0;
-        while begin < width {
-            let owner = owners[begin];
-            let end = begin + run_length(&owners[begin..], owner);
+        let mut begins = std::mem::take(&mut self.canvas.begins);
+        find_begins(owners, width, &mut begins);
+        for (k, begin) in begins.iter().enumerate() {
+            let begin = *begin as usize;
+            let end = begins.get(k + 1).map_or(width, |end| *end as usize);
+            let owner = owners.get(begin / LANES).map_or(NOBODY, |block| block[begin % LANES]);
             let mut run =
                 Run { begin: begin as u32, end: end as u32, paint: EMPTY, knot: 0, patch: 0 };
             let mut id = EntityId::NOTHING.0;
@@ -184,7 +192,8 @@ impl Rows<'_> {
                 if let Kind::Structure(surface) = &paint.kind {
                     let mut knot = |k: usize| {
                         let (u, v) = (k as f32 + 0.5, j as f32 + 0.5);
-                        let depth_m = self.lens.depth(nearness[k]);
+                        let q = nearness.get(k / LANES).map_or(0.0, |block| block[k % LANES]);
+                        let depth_m = self.lens.depth(q);
                         points.push(&self.painter.structure_point(surface, u, v, depth_m))
                     };
                     run.knot = knot(begin) as u32;
@@ -199,8 +208,8 @@ impl Rows<'_> {
                 ids[j * width + begin..j * width + end].fill(id);
             }
             self.canvas.runs.push(run);
-            begin = end;
         }
+        self.canvas.begins = begins;
     }
 
     /// Lights the points of the row, and finishes the triangles that waited for it.

@@ -8,7 +8,8 @@ use chaic_protocol::{AgentId, EntityId};
 
 use crate::draw::{Omit, Scratch, draw};
 use crate::frame::Frame;
-use crate::lens::Lens;
+use crate::lens::{Lens, seen_depth_m};
+use crate::raster::{LANES, Target};
 use crate::shade::{Drawn, Wanted, shade};
 
 /// Longest side of an image, pixels: bounds the memory that one view can ask for to 1.5 GB.
@@ -107,16 +108,44 @@ pub(crate) fn look(frame: &Frame, view: &View, images: &mut Images) {
             return;
         }
         draw(frame, &lens, omit, plain, work);
-        if let Some(depth_m) = depth_m {
-            let far = 1.0 / Camera::FAR_M;
-            for (d, q) in depth_m.iter_mut().zip(plain.nearness()) {
-                *d = if *q > far { 1.0 / *q } else { Camera::FAR_M };
+        work.arch.dispatch(ReadBack { target: plain, depth_m, ids: ids_out });
+    });
+}
+
+/// Copies depths and ids out, compiled for each kind of vectors and called for the widest that the
+/// machine has.
+struct ReadBack<'a> {
+    target: &'a Target<u16>,
+    depth_m: Option<&'a mut [f32]>,
+    ids: Option<&'a mut [u16]>,
+}
+
+impl pulp::NullaryFnOnce for ReadBack<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let ReadBack { target, mut depth_m, mut ids } = self;
+        for j in 0..target.height {
+            let line = j * target.width..(j + 1) * target.width;
+            if let Some(depth_m) = &mut depth_m {
+                for (out, block) in
+                    depth_m[line.clone()].chunks_mut(LANES).zip(target.nearness(j).iter())
+                {
+                    let mut depth = [0.0; LANES];
+                    for k in 0..LANES {
+                        depth[k] = seen_depth_m(1.0 / block[k]);
+                    }
+                    out.copy_from_slice(&depth[..out.len()]);
+                }
+            }
+            if let Some(ids) = &mut ids {
+                for (out, block) in ids[line].chunks_mut(LANES).zip(target.owner(j).iter()) {
+                    out.copy_from_slice(&block[..out.len()]);
+                }
             }
         }
-        if let Some(ids) = ids_out {
-            ids.copy_from_slice(plain.owner());
-        }
-    });
+    }
 }
 
 /// An image of `n` numbers, if it is wanted; what is in it is whatever was there.

@@ -2,7 +2,7 @@
 
 use chaic_protocol::Vec3;
 
-use crate::raster::{Corner, Slope};
+use crate::setup::Slope;
 
 /// A triangle cut at a depth: up to four corners on the image, and its nearness.
 pub(crate) struct Clipped {
@@ -28,7 +28,9 @@ pub(crate) fn clip(p: [Vec3; 3], near_m: f32, (mu, mv): (f32, f32)) -> Option<Cl
         corners: [(0.0, 0.0); 4],
         n: 0,
         slope: Slope {
-            at: Corner { u: mu, v: mv, q: (n[2] / d) as f32 },
+            q: (n[2] / d) as f32,
+            u0: mu,
+            v0: mv,
             du: (n[0] / d) as f32,
             dv: (n[1] / d) as f32,
             low: 0.0,
@@ -75,7 +77,7 @@ mod tests {
         assert_eq!(clipped.n, 3);
         // 20 px below the middle one looks at a depth of 5 m.
         let s = clipped.slope;
-        let q = s.at.q + s.dv * 20.0;
+        let q = s.q + s.dv * 20.0;
         assert!((1.0 / q - 5.0).abs() < 1e-4, "{}", 1.0 / q);
         assert!(clipped.corners[..3].iter().any(|c| (c.1 - 60.0).abs() < 1e-3), "tip at 10 m");
     }

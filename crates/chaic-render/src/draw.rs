@@ -5,7 +5,8 @@ use chaic_protocol::{EntityId, Vec3};
 use crate::clip::clip;
 use crate::frame::{Frame, Instance};
 use crate::lens::{IntoCamera, Lens};
-use crate::raster::{Corner, Owner, Target, first_center, least, most};
+use crate::raster::{Owner, Target};
+use crate::setup::{Corner, N_SETUPS, Setup, Setups, first_center, least, most};
 use crate::solids::level_for;
 
 /// Buffers that one thread uses again and again.
@@ -25,6 +26,7 @@ pub(crate) struct Work {
     /// For which vectors the inner loops are compiled: the widest of this machine.
     pub arch: pulp::Arch,
     corners: Corners,
+    setups: Setups,
     /// Triangles that may cover a pixel.
     alive: Vec<u32>,
     order: Vec<Candidate>,
@@ -68,7 +70,7 @@ pub(crate) fn draw<O: Owner>(
     target: &mut Target<O>,
     work: &mut Work,
 ) {
-    let Work { arch, corners, alive, order, levels, firsts, n_triangles } = work;
+    let Work { arch, corners, setups, alive, order, levels, firsts, n_triangles } = work;
     firsts.clear();
     firsts.resize(frame.instances.len(), 0);
     *n_triangles = 0;
@@ -118,8 +120,8 @@ pub(crate) fn draw<O: Owner>(
         levels[candidate.index as usize] = level as u8;
         firsts[candidate.index as usize] = *n_triangles as u32;
         *n_triangles += instance.shape.mesh(level).triangles.len();
-        let mesh_drawing = Drawing { instance, index: candidate.index as usize, level, lens };
-        arch.dispatch(DrawOne { drawing: mesh_drawing, crosses_near, target, corners, alive });
+        let drawing = Drawing { instance, index: candidate.index as usize, level, lens };
+        arch.dispatch(DrawOne { drawing, crosses_near, target, corners, setups, alive });
         let everywhere = [f32::NEG_INFINITY, f32::NEG_INFINITY, f32::INFINITY, f32::INFINITY];
         target.touch(if crosses_near { everywhere } else { rect });
         drawn += 1;
@@ -190,6 +192,7 @@ struct DrawOne<'a, O: Owner> {
     crosses_near: bool,
     target: &'a mut Target<O>,
     corners: &'a mut Corners,
+    setups: &'a mut Setups,
     alive: &'a mut Vec<u32>,
 }
 
@@ -198,7 +201,8 @@ impl<O: Owner> pulp::NullaryFnOnce for DrawOne<'_, O> {
 
     #[inline(always)]
     fn call(self) {
-        self.drawing.draw(self.crosses_near, self.target, self.corners, self.alive);
+        let DrawOne { drawing, crosses_near, target, corners, setups, alive } = self;
+        drawing.draw(crosses_near, target, corners, setups, alive);
     }
 }
 
@@ -226,41 +230,52 @@ impl Drawing<'_> {
         crosses_near: bool,
         target: &mut Target<O>,
         corners: &mut Corners,
+        setups: &mut Setups,
         alive: &mut Vec<u32>,
     ) {
         let lens = self.lens;
         let mesh = self.instance.shape.mesh(self.level);
         let into = lens.camera_from(&self.instance.rotation, self.instance.origin);
         corners.place(&mesh.positions, &into, lens);
-        if crosses_near {
-            self.draw_clipped(&into, target, corners);
-            return;
+        // Of a plan view nothing is too near.
+        let nearest = if lens.is_plan { f32::INFINITY } else { 1.0 / lens.near_m() };
+        corners.find_alive(&mesh.corners, lens, nearest, alive);
+        let rows = lens.height as f32;
+        let lists = mesh.corners.each_ref().map(|list| &list[..]);
+        for few in alive.chunks(N_SETUPS) {
+            let mut triangles = [0; N_SETUPS];
+            triangles[..few.len()].copy_from_slice(few);
+            setups.fill(&triangles, &lists, corners, rows);
+            for (k, triangle) in few.iter().enumerate() {
+                target.fill(&setups.get(k), self.owner(*triangle as usize));
+            }
         }
-        corners.find_alive(&mesh.corners, lens, alive);
-        for k in alive {
-            let triangle = *k as usize;
-            let at = mesh.triangles[triangle].corners;
-            target.draw(at.map(|c| corners.get(c)), self.owner(triangle));
+        if crosses_near {
+            self.draw_clipped(&into, nearest, target, corners);
         }
     }
 
+    /// Draws those that reach behind the camera.
     #[inline(always)]
-    fn draw_clipped<O: Owner>(&self, into: &IntoCamera, target: &mut Target<O>, corners: &Corners) {
+    fn draw_clipped<O: Owner>(
+        &self,
+        into: &IntoCamera,
+        nearest: f32,
+        target: &mut Target<O>,
+        corners: &Corners,
+    ) {
         let mesh = self.instance.shape.mesh(self.level);
-        let near = self.lens.near_m();
-        let most = 1.0 / near;
-        for (k, triangle) in mesh.triangles.iter().enumerate() {
-            let owner: O = self.owner(k);
-            let at = triangle.corners.map(|c| corners.get(c));
-            if at.iter().all(|c| c.q > 0.0 && c.q <= most) {
-                target.draw(at, owner);
+        let (near, rows) = (self.lens.near_m(), self.lens.height as f32);
+        for (triangle, (a, b, c)) in mesh.corners_of_triangles().enumerate() {
+            let in_front = [a, b, c].map(|c| corners.is_in_front(c, nearest));
+            if in_front == [true; 3] || in_front == [false; 3] {
                 continue;
             }
-            let p: [Vec3; 3] = triangle.corners.map(|c| into.map(mesh.positions[usize::from(c)]));
+            let p: [Vec3; 3] = [a, b, c].map(|c| into.map(mesh.positions[usize::from(c)]));
             let Some(clipped) = clip(p, near, self.lens.middle()) else { continue };
             for j in 2..clipped.n {
                 let fan = [clipped.corners[0], clipped.corners[j - 1], clipped.corners[j]];
-                target.fill(fan, &clipped.slope, owner);
+                target.fill(&Setup::of(fan, clipped.slope, rows), self.owner(triangle));
             }
         }
     }
@@ -270,7 +285,7 @@ impl Drawing<'_> {
 const N_CORNERS: usize = 1 << 16;
 
 /// The corners of a mesh on the image, a list for each coordinate.
-struct Corners {
+pub(crate) struct Corners {
     u: Box<[f32; N_CORNERS]>,
     v: Box<[f32; N_CORNERS]>,
     q: Box<[f32; N_CORNERS]>,
@@ -288,7 +303,7 @@ impl Default for Corners {
 
 impl Corners {
     #[inline(always)]
-    fn get(&self, corner: u16) -> Corner {
+    pub fn get(&self, corner: u16) -> Corner {
         let k = usize::from(corner);
         Corner { u: self.u[k], v: self.v[k], q: self.q[k] }
     }
@@ -314,12 +329,20 @@ impl Corners {
         }
     }
 
-    /// Finds the triangles that face the camera and may cover the center of a pixel of the image.
+    /// Whether a corner is in front of the camera, no nearer than this.
     #[inline(always)]
-    fn find_alive(&self, corners: &[Vec<u16>; 3], lens: &Lens, alive: &mut Vec<u32>) {
+    fn is_in_front(&self, corner: u16, nearest: f32) -> bool {
+        let q = self.q[usize::from(corner)];
+        (q > 0.0) & (q <= nearest)
+    }
+
+    /// Finds the triangles that face the camera, may cover the center of a pixel of the image and
+    /// are nowhere nearer than this.
+    #[inline(always)]
+    fn find_alive(&self, corners: &[Vec<u16>; 3], lens: &Lens, nearest: f32, alive: &mut Vec<u32>) {
         let n = corners[0].len().min(corners[1].len()).min(corners[2].len());
         let [a, b, c] = corners.each_ref().map(|list| &list[..n]);
-        let (u, v) = (&*self.u, &*self.v);
+        let (u, v, q) = (&*self.u, &*self.v, &*self.q);
         let (columns, rows) = (lens.width as f32, lens.height as f32);
         alive.clear();
         alive.resize(n, 0);
@@ -332,7 +355,10 @@ impl Corners {
             let end = first_center(most(most(au, bu), cu) + 0.01, columns);
             let top = first_center(least(least(av, bv), cv), rows);
             let bottom = first_center(most(most(av, bv), cv), rows);
-            alive[k] = u32::from((area < 0.0) & (begin < end) & (top < bottom));
+            let (nearer, farther) = (most(most(q[a], q[b]), q[c]), least(least(q[a], q[b]), q[c]));
+            let is_in_front = (farther > 0.0) & (nearer <= nearest);
+            // Rows run downwards, so counter-clockwise triangles have negative area here.
+            alive[k] = u32::from((area < 0.0) & (begin < end) & (top < bottom) & is_in_front);
         }
         let mut found = 0;
         for k in 0..n {

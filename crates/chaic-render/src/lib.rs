@@ -44,6 +44,7 @@ mod structure;
 mod clip;
 mod draw;
 mod raster;
+mod setup;
 
 mod light;
 mod paint;

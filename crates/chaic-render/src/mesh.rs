@@ -172,6 +172,12 @@ impl Mesh {
         self
     }
 
+    /// The corners of each triangle.
+    pub fn corners_of_triangles(&self) -> impl Iterator<Item = (u16, u16, u16)> {
+        let [a, b, c] = &self.corners;
+        a.iter().zip(b).zip(c).map(|((a, b), c)| (*a, *b, *c))
+    }
+
     pub fn corner(&mut self, position: Vec3, normal: Vec3) -> usize {
         self.positions.push(position);
         self.normals.push(normal);

@@ -5,8 +5,8 @@
 use glam::Vec4;
 
 use crate::paint::Plane;
-use crate::raster::{least, most};
 use crate::row::{Line, WHOLE};
+use crate::setup::{least, most};
 use crate::texture::{LEVELS, SIDE, Tile};
 
 /// Pieces of the runs of a row.

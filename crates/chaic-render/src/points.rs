@@ -8,7 +8,7 @@ use glam::Vec4;
 
 use crate::light::Lamps;
 use crate::mesh::Gloss;
-use crate::raster::{least, most};
+use crate::setup::{least, most};
 
 /// A point of a surface in the world.
 #[derive(Clone, Copy, Debug)]

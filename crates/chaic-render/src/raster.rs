@@ -1,12 +1,10 @@
 //! Filling triangles: for each pixel, how near the nearest surface is and whose it is.
-//!
-//! A pixel belongs to a triangle if its center does. Each edge's crossing with a row of centers is
-//! computed from its two ends in one fixed order, so that two triangles that share an edge leave
-//! neither a gap nor an overlap.
 
 use std::ops::{Deref, DerefMut};
 
 use chaic_protocol::EntityId;
+
+use crate::setup::{Setup, Slope, first_center, least, most};
 
 /// Nobody's pixel.
 pub(crate) const NOBODY: u32 = u32::MAX;
@@ -14,6 +12,8 @@ pub(crate) const NOBODY: u32 = u32::MAX;
 pub(crate) const TILE: usize = 8;
 /// So many neighboring pixels of a row are filled at once.
 pub(crate) const LANES: usize = 16;
+/// The spans of so many rows are worked out at once.
+const ROWS: usize = 16;
 
 /// Names a triangle of an instance in 32 bits.
 pub(crate) fn pixel_owner(instance: usize, triangle: usize) -> u32 {
@@ -124,24 +124,6 @@ impl Owner for u16 {
     fn replaced(self, new: u16, mask: u32) -> u16 {
         (new & mask as u16) | (self & !mask as u16)
     }
-}
-
-/// A corner on the image: pixels from the left and the top, and nearness.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Corner {
-    pub u: f32,
-    pub v: f32,
-    pub q: f32,
-}
-
-/// Nearness over the image: `q + du * (u - u0) + dv * (v - v0)`, kept within [low, high].
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Slope {
-    pub at: Corner,
-    pub du: f32,
-    pub dv: f32,
-    pub low: f32,
-    pub high: f32,
 }
 
 /// Blocks of [`LANES`] pixels one below the other, as high as tiles. An image is rows of stacks: what
@@ -279,69 +261,39 @@ impl<O: Owner> Target<O> {
         })
     }
 
-    /// Draws a triangle whose corners are all in front of the camera, if it faces it.
+    /// Fills the pixels whose centers lie in a triangle.
     #[inline(always)]
-    pub fn draw(&mut self, corners: [Corner; 3], owner: O) {
-        let [a, b, c] = corners;
-        let (bu, bv, bq) = (b.u - a.u, b.v - a.v, b.q - a.q);
-        let (cu, cv, cq) = (c.u - a.u, c.v - a.v, c.q - a.q);
-        let area = bu * cv - bv * cu;
-        // Rows run downwards, so counter-clockwise triangles have negative area here.
-        if area >= 0.0 || area.is_nan() {
-            return;
-        }
-        let inverse = 1.0 / area;
-        let slope = Slope {
-            at: a,
-            du: (bq * cv - cq * bv) * inverse,
-            dv: (cq * bu - bq * cu) * inverse,
-            low: least(least(a.q, b.q), c.q),
-            high: most(most(a.q, b.q), c.q),
-        };
-        self.fill([(a.u, a.v), (b.u, b.v), (c.u, c.v)], &slope, owner);
-    }
-
-    /// Fills the pixels whose centers lie in the triangle, whichever way it turns.
-    #[inline(always)]
-    pub fn fill(&mut self, mut p: [(f32, f32); 3], slope: &Slope, owner: O) {
-        let before = |a: (f32, f32), b: (f32, f32)| a.1 < b.1 || (a.1 == b.1 && a.0 < b.0);
-        if before(p[1], p[0]) {
-            p.swap(0, 1);
-        }
-        if before(p[2], p[1]) {
-            p.swap(1, 2);
-            if before(p[1], p[0]) {
-                p.swap(0, 1);
-            }
-        }
-        let [a, b, c] = p;
-        let rows = self.height as f32;
-        let (first, last) = (first_center(a.1, rows), first_center(c.1, rows));
-        let middle = first_center(b.1, rows);
-        let (long, upper, lower) = (Edge::new(a, c), Edge::new(a, b), Edge::new(b, c));
-        let b_is_right = (b.0 - a.0) * (c.1 - a.1) > (c.0 - a.0) * (b.1 - a.1);
+    pub fn fill(&mut self, setup: &Setup, owner: O) {
+        let Setup { first, middle, last, top, turn, per_row, turns_right, slope } = *setup;
         let columns = self.width as f32;
-        for row in first..last {
-            let v = row as f32 + 0.5;
-            let (long, short) = (long.u_at(v), if row < middle { upper } else { lower }.u_at(v));
-            let begin = first_center(if b_is_right { long } else { short }, columns);
-            let end = first_center(if b_is_right { short } else { long }, columns);
-            let q0 = slope.at.q + slope.dv * (v - slope.at.v) + slope.du * (0.5 - slope.at.u);
-            let (stacks, row) = (row as usize / TILE * self.stacks_wide, row as usize % TILE);
-            let (nearness, owners) = (&mut self.nearness[stacks..], &mut self.owner[stacks..]);
-            fill_span::<O>(nearness, owners, row, q0, (begin, end), slope, owner);
+        let q_left = slope.q + slope.du * (0.5 - slope.u0);
+        let mut begins = [0; ROWS];
+        let mut ends = [0; ROWS];
+        let mut starts = [0.0; ROWS];
+        let mut row = first;
+        while row < last {
+            for k in 0..ROWS {
+                let row = row + k as u32;
+                let v = row as i32 as f32 + 0.5;
+                let long = top[0] + (v - top[1]) * per_row[0];
+                let upper = top[0] + (v - top[1]) * per_row[1];
+                let lower = turn[0] + (v - turn[1]) * per_row[2];
+                let short = if row < middle { upper } else { lower };
+                begins[k] = first_center(if turns_right { long } else { short }, columns);
+                ends[k] = first_center(if turns_right { short } else { long }, columns);
+                starts[k] = q_left + slope.dv * (v - slope.v0);
+            }
+            let n = (last - row).min(ROWS as u32);
+            for k in 0..n as usize {
+                let row = row as usize + k;
+                let (stacks, row) = (row / TILE * self.stacks_wide, row % TILE);
+                let (nearness, owners) = (&mut self.nearness[stacks..], &mut self.owner[stacks..]);
+                let span = (begins[k], ends[k]);
+                fill_span::<O>(nearness, owners, row, starts[k], span, &slope, owner);
+            }
+            row += n;
         }
     }
-}
-
-#[inline(always)]
-pub(crate) fn least(x: f32, y: f32) -> f32 {
-    if x < y { x } else { y }
-}
-
-#[inline(always)]
-pub(crate) fn most(x: f32, y: f32) -> f32 {
-    if x > y { x } else { y }
 }
 
 /// The least of each of the tiles in a stack.
@@ -405,39 +357,6 @@ fn fill_block<O: Owner>(
         let wins = (u32::from(x > q[k]) & u32::from(is_inside)).wrapping_neg();
         q[k] = f32::from_bits(x.to_bits() & wins | q[k].to_bits() & !wins);
         o[k] = o[k].replaced(owner, wins);
-    }
-}
-
-/// The first row or column whose middle (+ 0.5) isn't before `x`, within [0, max]; one that lies
-/// just there is rounded to even.
-#[inline(always)]
-pub(crate) fn first_center(x: f32, max: f32) -> u32 {
-    /// From here to twice as much, floats are the whole numbers.
-    const WHOLE: f32 = 8_388_608.0;
-    let x = if x > 0.0 { x } else { 0.0 };
-    let x = if x < max { x } else { max };
-    (x + WHOLE).to_bits().wrapping_sub(WHOLE.to_bits())
-}
-
-/// A line down the image.
-#[derive(Clone, Copy)]
-struct Edge {
-    u: f32,
-    v: f32,
-    per_row: f32,
-}
-
-impl Edge {
-    #[inline(always)]
-    fn new(top: (f32, f32), bottom: (f32, f32)) -> Edge {
-        let dv = bottom.1 - top.1;
-        let per_row = if dv > 0.0 { (bottom.0 - top.0) / dv } else { 0.0 };
-        Edge { u: top.0, v: top.1, per_row }
-    }
-
-    #[inline(always)]
-    fn u_at(&self, v: f32) -> f32 {
-        self.u + (v - self.v) * self.per_row
     }
 }
 

@@ -48,9 +48,9 @@ mod setup;
 
 mod light;
 mod paint;
-mod patches;
 mod points;
 mod row;
+mod segments;
 mod shade;
 mod texture;
 

@@ -153,10 +153,10 @@ impl Ground {
         ground
     }
 
+    #[inline(always)]
     fn cell(&self, p: Vec2) -> (usize, usize) {
-        let at = (p - self.min) * self.cells_per_m;
-        let whole = |x: f32, n: usize| (x as i32).clamp(0, n as i32 - 1) as usize;
-        (whole(at.x, self.nx), whole(at.y, self.nz))
+        let (x, z) = ((p.x - self.min.x) * self.cells_per_m, (p.y - self.min.y) * self.cells_per_m);
+        ((x.max(0.0) as usize).min(self.nx - 1), (z.max(0.0) as usize).min(self.nz - 1))
     }
 
     /// Darkness from walls, 0 to 255, per cell.
@@ -170,6 +170,7 @@ impl Ground {
     }
 
     /// The room at a point, or [`NO_ROOM`].
+    #[inline(always)]
     pub fn room_at(&self, p: Vec3) -> u8 {
         let (x, z) = self.cell(Vec2::new(p.x, p.z));
         self.rooms[z * self.nx + x]
@@ -181,6 +182,7 @@ impl Ground {
     }
 
     /// The lamp of a room.
+    #[inline(always)]
     pub fn lamp(&self, room: u8) -> Option<Vec3> {
         self.lamps.get(usize::from(room)).copied()
     }

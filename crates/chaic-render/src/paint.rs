@@ -12,7 +12,7 @@ use crate::lens::Lens;
 use crate::light::NO_ROOM;
 use crate::mesh::{Gloss, Mesh, Triangle, unit};
 use crate::points::{Point, Points};
-use crate::texture::Tile;
+use crate::texture::{Texture, Tile};
 
 /// How dark the tops of walls are on maps, 0 to 255.
 const WALL_ON_MAP: f32 = 44.0;
@@ -30,10 +30,11 @@ pub(crate) struct Plane {
 }
 
 impl Plane {
-    /// The quantities along a row of pixels whose middles lie at `v`.
+    /// The quantities along a row of pixels whose middles lie at `v`, from the pixel `first`.
     #[inline(always)]
-    pub fn row(&self, v: f32) -> RowPlane {
-        RowPlane { base: self.base, at: self.at + self.dv * v + self.du * 0.5, du: self.du }
+    pub fn from(&self, first: usize, v: f32) -> RowPlane {
+        let at = self.at + self.dv * v + self.du * (first as f32 + 0.5);
+        RowPlane { base: self.base, at, du: self.du }
     }
 
     /// `start` where `s` and `t` are 0, growing by `ds` with s and `dt` with t; `s` and `t` are
@@ -48,7 +49,7 @@ impl Plane {
     }
 }
 
-/// A [`Plane`] on one row: `base + w * (at + k * du)` in its k-th pixel.
+/// A [`Plane`] on one row: `base + w * (at + k * du)` k pixels after the first.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RowPlane {
     pub base: Vec4,
@@ -56,25 +57,30 @@ pub(crate) struct RowPlane {
     pub du: Vec4,
 }
 
-impl RowPlane {
-    /// The same, counted from another pixel of the row.
-    #[inline(always)]
-    pub fn from(&self, first: usize) -> RowPlane {
-        RowPlane { at: self.at + self.du * first as f32, ..*self }
-    }
-}
-
 /// How a triangle's color comes about. What is shown is 0 to 255, red, green and blue in the lanes.
 #[derive(Clone, Copy)]
 pub(crate) enum Kind {
-    /// The same everywhere but for its texture.
-    Even(Vec4),
-    /// Linear between its corners, within their bounds.
-    Smooth { shown: Plane, low: Vec4, high: Vec4 },
+    /// Linear, within bounds.
+    Linear(Linear),
     /// As its corners show, once they are lit; see [`Unlit::lit`].
     Unlit(Unlit),
     /// Lit point by point, since it is large.
     Structure(Surface),
+}
+
+/// Colors that are linear over a triangle, within bounds.
+#[derive(Clone, Copy)]
+pub(crate) struct Linear {
+    pub shown: Plane,
+    pub low: Vec4,
+    pub high: Vec4,
+}
+
+impl Linear {
+    /// The same everywhere.
+    fn even(shown: Vec4) -> Linear {
+        Linear { shown: Plane { base: shown, ..Plane::default() }, low: shown, high: shown }
+    }
 }
 
 /// A piece of structure before it is lit.
@@ -100,12 +106,12 @@ pub(crate) struct Unlit {
 impl Unlit {
     /// What becomes of it when its points are lit.
     #[inline(always)]
-    pub fn lit(&self, points: &Points) -> Kind {
+    pub fn lit(&self, points: &Points) -> Linear {
         let first = self.point as usize;
         let a = points.shown(first);
-        let Some([s, t]) = self.toward else { return Kind::Even(a) };
+        let Some([s, t]) = self.toward else { return Linear::even(a) };
         let (b, c) = (points.shown(first + 1), points.shown(first + 2));
-        Kind::Smooth {
+        Linear {
             shown: Plane::mixed(a, (b - a, s), (c - a, t)),
             low: a.min(b).min(c),
             high: a.max(b).max(c),
@@ -118,8 +124,8 @@ impl Unlit {
 pub(crate) struct Paint {
     pub entity: u16,
     pub kind: Kind,
-    pub tile: Option<Tile>,
-    /// Texture coordinates, metres; the third lane's slope is the cosine between normal and ray
+    pub tile: Tile,
+    /// Texture coordinates, metres, all 0 if it has none; the third lane's slope is the cosine between normal and ray
     /// (not normalized).
     pub texture: Plane,
 }
@@ -242,9 +248,9 @@ impl<'a> Painter<'a> {
             _ => skin.color,
         };
         let color = Vec3::from(color) * instance.factor;
-        let tile = skin.texture.tile();
+        let tile = Tile::of(skin.texture);
         let mut texture = Plane::default();
-        if tile.is_some() {
+        if skin.texture != Texture::Plain {
             let axes = &skin.axes;
             let facing = [axes.x_axis, axes.y_axis, axes.z_axis].map(|x| x.dot(face).abs());
             // Look along the axis that the face is most square to; the longest axis left is u.
@@ -263,7 +269,8 @@ impl<'a> Painter<'a> {
             let (normal, gloss) = (instance.rotation * face, skin.gloss);
             if self.is_plan && normal.y > 0.5 && !is_floor {
                 // A map shows where walls are, not how they are lit.
-                return painted(Kind::Even(Vec3::splat(WALL_ON_MAP).extend(0.0)));
+                let shown = Vec3::splat(WALL_ON_MAP).extend(0.0);
+                return painted(Kind::Linear(Linear::even(shown)));
             }
             return painted(Kind::Structure(Surface { is_floor, color, normal, gloss }));
         }
@@ -314,9 +321,22 @@ impl<'a> Painter<'a> {
         Point { at: sight.middle, lamp: sight.lamp, normal, to_eye, color, gloss, tone }
     }
 
+    /// Has a point of structure lit that is seen in column `k` of row `j`; gives its number.
+    #[inline(always)]
+    pub fn knot(
+        &self,
+        points: &mut Points,
+        surface: &Surface,
+        (k, j): (usize, usize),
+        depth_m: f32,
+    ) -> u32 {
+        let point = self.structure_point(surface, k as f32 + 0.5, j as f32 + 0.5, depth_m);
+        points.push(&point) as u32
+    }
+
     /// A point of structure, seen in the pixel with middle (u, v) at a depth.
     #[inline(always)]
-    pub fn structure_point(&self, surface: &Surface, u: f32, v: f32, depth_m: f32) -> Point {
+    fn structure_point(&self, surface: &Surface, u: f32, v: f32, depth_m: f32) -> Point {
         let (at, ray) = self.rays.point(u, v, depth_m);
         let Surface { color, normal, gloss, .. } = *surface;
         let ground = self.frame.light.ground;

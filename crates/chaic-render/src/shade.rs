@@ -9,15 +9,16 @@
 //! out of such loops: they are compiled apart, for any machine.
 
 use chaic_protocol::EntityId;
+use glam::Vec4;
 
 use crate::frame::Frame;
 use crate::lens::Lens;
-use crate::paint::{Kind, Paint, Painter, Sight};
-use crate::patches::Patches;
+use crate::paint::{Kind, Paint, Painter, Plane, Sight};
 use crate::points::Points;
 use crate::raster::{Blocks, LANES, NOBODY, Target, Wide, owner_parts};
-use crate::row::{Row, STEP};
-use crate::texture::{Atlas, atlas};
+use crate::row::{Channel, Look, OnGround, Row};
+use crate::segments::{Line, STEP, Segment, Segments};
+use crate::texture::{Atlas, Texture, Tile, atlas};
 
 /// Buffers for shading, used again and again.
 #[derive(Default)]
@@ -28,26 +29,14 @@ pub(crate) struct Canvas {
     sights: Vec<Option<Sight>>,
     /// So many of the paints have been lit.
     n_lit: usize,
-    /// Where the runs of the row begin.
+    /// Where neighboring pixels of one triangle, a run, begin on the row.
     begins: Vec<u32>,
-    runs: Vec<Run>,
+    segments: Segments,
     /// What is lit on the row: new triangles' points and knots of structure.
     points: Points,
-    patches: Patches,
+    /// The sky every [`STEP`] pixels of the row, if it is seen.
+    sky: Vec<Vec4>,
     row: Row,
-}
-
-/// Neighboring pixels of one triangle.
-#[derive(Clone, Copy)]
-struct Run {
-    begin: u32,
-    end: u32,
-    /// Where its paint is; [`EMPTY`] if it is the sky.
-    paint: u32,
-    /// The number of its first knot, if it is structure.
-    knot: u32,
-    /// The number of its first patch, if it has a texture.
-    patch: u32,
 }
 
 const EMPTY: u32 = u32::MAX;
@@ -123,17 +112,32 @@ impl pulp::NullaryFnOnce for Rows<'_> {
         }
         for j in 0..self.lens.height {
             let line = j * width..(j + 1) * width;
-            let depth_m = self.wanted.depth_m.as_deref_mut().map(|d| &mut d[line.clone()]);
-            self.canvas.row.find_depths(self.target.nearness(j), self.lens.is_plan, depth_m);
-            self.find_runs(j);
+            self.canvas.row.find_depths(self.target.nearness(j), self.lens.is_plan);
+            self.find_segments(j);
             self.light();
-            self.canvas.patches.place(j as f32 + 0.5, 1.0 / self.lens.focal);
-            let has_floor = self.fill(j);
-            let ground = self.painter.frame.light.quads.first_chunk().filter(|_| has_floor);
-            self.canvas.row.pack(self.atlas, ground);
-            let out = &mut self.wanted.rgb[3 * line.start..3 * line.end];
-            self.canvas.row.write(out);
+            self.canvas.segments.place(j as f32 + 0.5, 1.0 / self.lens.focal);
+            self.fill(j);
+            let Wanted { rgb, depth_m, ids } = &mut self.wanted;
+            self.canvas.row.write(
+                &mut rgb[3 * line.start..3 * line.end],
+                depth_m.as_deref_mut().map(|d| &mut d[line.clone()]),
+                ids.as_deref_mut().map(|i| &mut i[line.clone()]),
+            );
         }
+    }
+}
+
+/// A pixel of a row.
+#[inline(always)]
+fn pixel(row: Blocks<Wide<u32>>, k: usize) -> Option<u32> {
+    row.get(k / LANES).map(|block| block[k % LANES])
+}
+
+/// Channels that grow by a step from pixel to pixel.
+#[inline(always)]
+fn ramp(channels: &mut [Channel; 3], start: Vec4, step: Vec4) {
+    for (c, channel) in channels.iter_mut().enumerate() {
+        *channel = Channel { base: start[c], step: step[c], high: 255.0, ..Channel::default() };
     }
 }
 
@@ -161,55 +165,90 @@ fn find_begins(owners: Blocks<Wide<u32>>, width: usize, begins: &mut Vec<u32>) {
 }
 
 impl Rows<'_> {
-    /// Finds the runs of row `j`, and what has to be lit.
+    /// Finds the segments of row `j`, and what has to be lit.
     #[inline(always)]
-    fn find_runs(&mut self, j: usize) {
+    fn find_segments(&mut self, j: usize) {
         let width = self.lens.width;
-        let (owners, nearness) = (self.target.owner(j), self.target.nearness(j));
-        self.canvas.runs.clear();
         self.canvas.points.clear();
-        self.canvas.patches.clear();
+        self.canvas.segments.clear();
+        self.canvas.sky.clear();
         let mut begins = std::mem::take(&mut self.canvas.begins);
-        find_begins(owners, width, &mut begins);
+        find_begins(self.target.owner(j), width, &mut begins);
         for (k, begin) in begins.iter().enumerate() {
             let begin = *begin as usize;
             let end = begins.get(k + 1).map_or(width, |end| *end as usize);
-            let owner = owners.get(begin / LANES).map_or(NOBODY, |block| block[begin % LANES]);
-            let mut run =
-                Run { begin: begin as u32, end: end as u32, paint: EMPTY, knot: 0, patch: 0 };
-            let mut id = EntityId::NOTHING.0;
-            if owner != NOBODY {
-                let at = self.find_paint(owner);
-                run.paint = at as u32;
-                let Canvas { paints, points, patches, row, .. } = &mut *self.canvas;
-                let paint = &paints[at];
-                id = paint.entity;
-                if let Some(tile) = paint.tile {
-                    let mut patch = |k| patches.push(tile, &paint.texture, k, row.depth_at(k));
-                    run.patch = patch(begin) as u32;
-                    (begin + STEP..end).step_by(STEP).for_each(|k| _ = patch(k));
-                }
-                if let Kind::Structure(surface) = &paint.kind {
-                    let mut knot = |k: usize| {
-                        let (u, v) = (k as f32 + 0.5, j as f32 + 0.5);
-                        let q = nearness.get(k / LANES).map_or(0.0, |block| block[k % LANES]);
-                        let depth_m = self.lens.depth(q);
-                        points.push(&self.painter.structure_point(surface, u, v, depth_m))
-                    };
-                    run.knot = knot(begin) as u32;
-                    // The last pixel is a knot too.
-                    (begin + STEP..end - 1).step_by(STEP).for_each(|k| _ = knot(k));
-                    if end - begin > 1 {
-                        knot(end - 1);
-                    }
-                }
+            let owner = pixel(self.target.owner(j), begin).unwrap_or(NOBODY);
+            if owner == NOBODY {
+                self.see_sky(j, begin, end);
+            } else {
+                let paint = self.find_paint(owner);
+                self.see_surface(j, begin, end, paint);
             }
-            if let Some(ids) = &mut self.wanted.ids {
-                ids[j * width + begin..j * width + end].fill(id);
-            }
-            self.canvas.runs.push(run);
         }
         self.canvas.begins = begins;
+    }
+
+    /// Adds the segments of a run of sky, each between two of its knots.
+    #[inline(never)]
+    fn see_sky(&mut self, j: usize, begin: usize, end: usize) {
+        let Canvas { segments, sky, .. } = &mut *self.canvas;
+        if sky.is_empty() {
+            let knots = (0..=self.lens.width.div_ceil(STEP)).map(|k| (STEP * k) as f32 + 0.5);
+            sky.extend(knots.map(|u| self.painter.sky(u, j as f32 + 0.5)));
+        }
+        let mut from = begin;
+        while from < end {
+            let to = end.min((from / STEP + 1) * STEP);
+            let segment = Segment {
+                begin: from as u32,
+                end: to as u32,
+                paint: EMPTY,
+                knots: [0; 2],
+                between: 1,
+            };
+            segments.push(segment, Tile::of(Texture::Plain), &Plane::default(), 1.0);
+            from = to;
+        }
+    }
+
+    /// Adds the segments of a run of a surface.
+    #[inline(always)]
+    fn see_surface(&mut self, j: usize, begin: usize, end: usize, at: usize) {
+        let Canvas { paints, points, segments, row, .. } = &mut *self.canvas;
+        let paint = &paints[at];
+        let depth_at = |k: usize| {
+            if !self.lens.is_plan {
+                return row.depth_at(k);
+            }
+            let nearness = self.target.nearness(j).get(k / LANES).map(|block| block[k % LANES]);
+            self.lens.depth(nearness.unwrap_or_default())
+        };
+        let mut knots = [0; 2];
+        let mut between = 1;
+        let is_long = end - begin > LANES;
+        if let Kind::Structure(surface) = &paint.kind {
+            // Light hardly changes within a short run.
+            let k = if is_long { begin } else { (begin + end) / 2 };
+            knots = [self.painter.knot(points, surface, (k, j), depth_at(k)); 2];
+        }
+        let mut from = begin;
+        while from < end {
+            let to = end.min(from + STEP);
+            if let (Kind::Structure(surface), true) = (&paint.kind, is_long) {
+                let k = to.min(end - 1);
+                let next = self.painter.knot(points, surface, (k, j), depth_at(k));
+                (knots, between) = ([knots[1], next], (k - from).max(1));
+            }
+            let segment = Segment {
+                begin: from as u32,
+                end: to as u32,
+                paint: at as u32,
+                knots,
+                between: between as u32,
+            };
+            segments.push(segment, paint.tile, &paint.texture, row.depth_at(from));
+            from = to;
+        }
     }
 
     /// Lights the points of the row, and finishes the triangles that waited for it.
@@ -219,58 +258,66 @@ impl Rows<'_> {
         points.light(self.painter.frame.light.lamps);
         for paint in &mut paints[*n_lit..] {
             if let Kind::Unlit(unlit) = &paint.kind {
-                paint.kind = unlit.lit(points);
+                paint.kind = Kind::Linear(unlit.lit(points));
             }
         }
         *n_lit = paints.len();
     }
 
-    /// Colors the runs of row `j`; tells whether there is floor among them.
+    /// Fills the segments of row `j`.
     #[inline(always)]
-    fn fill(&mut self, j: usize) -> bool {
+    fn fill(&mut self, j: usize) {
         let v = j as f32 + 0.5;
-        let Canvas { paints, runs, points, patches, row, .. } = &mut *self.canvas;
-        let is_floor = |paint: &Paint| matches!(&paint.kind, Kind::Structure(s) if s.is_floor);
-        let paint_of = |run: &Run| (run.paint != EMPTY).then(|| &paints[run.paint as usize]);
-        let has_floor = runs.iter().any(|run| paint_of(run).is_some_and(is_floor));
-        let mut has_sky = false;
-        for run in &*runs {
-            let (begin, end) = (run.begin as usize, run.end as usize);
-            let Some(paint) = paint_of(run) else {
-                if !has_sky {
-                    row.find_sky(|k| self.painter.sky(k as f32 + 0.5, v));
+        let Canvas { paints, points, segments, sky, row, .. } = &mut *self.canvas;
+        let quads = self.painter.frame.light.quads.first_chunk();
+        for k in 0..segments.len() {
+            let (segment, place) = segments.get(k);
+            let (begin, end) = (segment.begin as usize, segment.end as usize);
+            let mut ground = None;
+            let (mut id, mut channels) = (EntityId::NOTHING.0, [Channel::default(); 3]);
+            match paints.get(segment.paint as usize) {
+                None => {
+                    let (here, there) = (sky[begin / STEP], sky[begin / STEP + 1]);
+                    let step = (there - here) * (1.0 / STEP as f32);
+                    ramp(&mut channels, here + step * (begin % STEP) as f32, step);
                 }
-                has_sky = true;
-                row.fill_sky(begin, end);
-                if has_floor {
-                    row.leave_ground(begin, end);
+                Some(paint) => {
+                    id = paint.entity;
+                    match &paint.kind {
+                        Kind::Linear(linear) => {
+                            let plane = linear.shown.from(begin, v);
+                            for (c, channel) in channels.iter_mut().enumerate() {
+                                *channel = Channel {
+                                    base: plane.base[c],
+                                    step: 0.0,
+                                    at: plane.at[c],
+                                    du: plane.du[c],
+                                    low: linear.low[c],
+                                    high: linear.high[c],
+                                };
+                            }
+                        }
+                        Kind::Structure(surface) => {
+                            let [here, there] = segment.knots.map(|k| points.shown(k as usize));
+                            let step = (there - here) * (1.0 / segment.between as f32);
+                            ramp(&mut channels, here, step);
+                            if let (true, Some(quads)) = (surface.is_floor, quads) {
+                                let plane = self.painter.ground.from(begin, v);
+                                let [x, z] = [0, 1].map(|c| Line {
+                                    base: 256.0 * plane.base[c] - 128.0,
+                                    at: 256.0 * plane.at[c],
+                                    du: 256.0 * plane.du[c],
+                                });
+                                ground = Some(OnGround { quads, x, z });
+                            }
+                        }
+                        // All are lit by now.
+                        Kind::Unlit(_) => {}
+                    }
                 }
-                continue;
-            };
-            let mut on_ground = false;
-            match &paint.kind {
-                Kind::Even(shown) => row.fill_color(begin, end, *shown),
-                Kind::Smooth { shown, low, high } => {
-                    row.color(begin, end, &shown.row(v), *low, *high);
-                }
-                Kind::Structure(surface) => {
-                    row.light(begin, end, run.knot as usize, points);
-                    on_ground = surface.is_floor;
-                }
-                // All are lit by now.
-                Kind::Unlit(_) => {}
             }
-            if on_ground {
-                row.cells(begin, end, &self.painter.ground.row(v));
-            } else if has_floor {
-                row.leave_ground(begin, end);
-            }
-            match paint.tile {
-                Some(_) => row.texture(begin, end, run.patch as usize, patches),
-                None => row.leave_plain(begin, end),
-            }
+            row.fill((begin, end), &Look { id, channels, place }, self.atlas, ground);
         }
-        has_floor
     }
 
     /// Where the paint of a triangle is; worked out when first asked for.

@@ -1,28 +1,44 @@
-//! Where pieces of runs lie on their textures, worked out for many of them at once.
-//!
-//! One plain loop over lists, as in [`crate::points`].
+//! Parts of runs, each on one level of its texture; where they lie on it is worked out for many of
+//! them at once, by one plain loop over lists, as in [`crate::points`].
 
 use glam::Vec4;
 
 use crate::paint::Plane;
-use crate::row::{Line, WHOLE};
 use crate::setup::{least, most};
 use crate::texture::{LEVELS, SIDE, Tile};
 
-/// Pieces of the runs of a row.
+/// Most pixels of a segment.
+pub(crate) const STEP: usize = 64;
+
+/// 1.5 * 2^23: a number below 2^22 added to it is rounded, and the sum's low bits hold it.
+pub(crate) const WHOLE: f32 = 12_582_912.0;
+
+/// Neighboring pixels of one triangle.
+#[derive(Clone, Copy)]
+pub(crate) struct Segment {
+    pub begin: u32,
+    pub end: u32,
+    /// Where its paint is.
+    pub paint: u32,
+    /// The points where structure is lit: in the first pixel and so many pixels to the right.
+    pub knots: [u32; 2],
+    pub between: u32,
+}
+
+/// The segments of a row.
 #[derive(Default)]
-pub(crate) struct Patches {
-    n: usize,
+pub(crate) struct Segments {
+    list: Vec<Segment>,
     blocks: Vec<Block>,
 }
 
-/// So many patches are worked out at once.
+/// So many segments are worked out at once.
 const LANES: usize = 16;
 
-/// Quantities of patches side by side.
+/// Quantities of segments side by side.
 type Lane = [f32; LANES];
 
-/// Neighboring patches; the lists in a list are the lanes of a [`Plane`] of texture coordinates.
+/// Neighboring segments; the lists in a list are the lanes of a [`Plane`] of texture coordinates.
 #[derive(Clone, Default)]
 struct Block {
     base: [Lane; 3],
@@ -41,10 +57,10 @@ struct Block {
     lines: [[Lane; 3]; 2],
 }
 
-/// A part of a run on one level of its texture. Coordinates are in parts of 256 of a texel, half a
-/// texel up and left, counted from the first pixel.
+/// Where a segment lies on a level of its texture. Coordinates are in parts of 256 of a texel, half
+/// a texel up and left.
 #[derive(Clone, Copy)]
-pub(crate) struct Patch {
+pub(crate) struct Place {
     /// Where the level begins in the atlas; its side is 1 << log2_side texels.
     pub begin: u32,
     pub log2_side: u32,
@@ -52,16 +68,41 @@ pub(crate) struct Patch {
     pub v: Line,
 }
 
-impl Patches {
+/// A coordinate along a row, in whole numbers: `base + depth * (at + k * du)` in its k-th pixel.
+#[derive(Clone, Copy)]
+pub(crate) struct Line {
+    pub base: f32,
+    pub at: f32,
+    pub du: f32,
+}
+
+impl Line {
+    /// In the k-th pixel, at a depth.
+    #[inline(always)]
+    pub fn at(&self, k: f32, depth: f32) -> u32 {
+        /// Farther off is no sane picture.
+        const FAR: f32 = 2e6;
+        let x = self.base + depth * (self.at + self.du * k);
+        let x = most(least(x, FAR), -FAR);
+        (x + WHOLE).to_bits().wrapping_sub(WHOLE.to_bits())
+    }
+}
+
+impl Segments {
     /// Forgets all.
     pub fn clear(&mut self) {
-        self.n = 0;
+        self.list.clear();
     }
 
-    /// Adds a patch that begins in a pixel of this depth; gives its number.
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    /// Adds a segment whose first pixel has this depth.
     #[inline(always)]
-    pub fn push(&mut self, tile: Tile, plane: &Plane, first: usize, depth: f32) -> usize {
-        let (block, k) = (self.n / LANES, self.n % LANES);
+    pub fn push(&mut self, segment: Segment, tile: Tile, plane: &Plane, depth: f32) {
+        let (block, k) = (self.list.len() / LANES, self.list.len() % LANES);
         if block >= self.blocks.len() {
             self.blocks.push(Block::default());
         }
@@ -72,26 +113,27 @@ impl Patches {
         put(&mut block.dv, k, plane.dv);
         block.tile[k] = tile.begin;
         block.texels_per_m[k] = tile.texels_per_m;
-        block.first[k] = first as u32;
+        block.first[k] = segment.begin;
         block.depth[k] = depth;
-        self.n += 1;
-        self.n - 1
+        self.list.push(segment);
     }
 
-    /// A patch that has been worked out.
+    /// A segment, and its place once it has been worked out.
     #[inline(always)]
-    pub fn get(&self, patch: usize) -> Patch {
-        let (block, k) = (&self.blocks[patch / LANES], patch % LANES);
-        let line = |[base, at, du]: &[Lane; 3]| Line { base: base[k], at: at[k], du: du[k] };
-        let [u, v] = [line(&block.lines[0]), line(&block.lines[1])];
-        Patch { begin: block.begin[k], log2_side: SIDE.ilog2() - block.level[k], u, v }
+    pub fn get(&self, k: usize) -> (Segment, Place) {
+        let (block, lane) = (&self.blocks[k / LANES], k % LANES);
+        let [u, v] = &block.lines;
+        let u = Line { base: u[0][lane], at: u[1][lane], du: u[2][lane] };
+        let v = Line { base: v[0][lane], at: v[1][lane], du: v[2][lane] };
+        let log2_side = SIDE.ilog2() - block.level[lane];
+        (self.list[k], Place { begin: block.begin[lane], log2_side, u, v })
     }
 
-    /// Works all out, for the row of pixels with middles at `v`; `per_px` is what a pixel covers
-    /// one metre away.
+    /// Works out all places, for the row of pixels with middles at `v`; `per_px` is what a pixel
+    /// covers one metre away.
     #[inline(always)]
     pub fn place(&mut self, v: f32, per_px: f32) {
-        for block in self.blocks.iter_mut().take(self.n.div_ceil(LANES)) {
+        for block in self.blocks.iter_mut().take(self.list.len().div_ceil(LANES)) {
             block.place(v, per_px);
         }
     }

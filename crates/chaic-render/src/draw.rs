@@ -74,7 +74,7 @@ pub(crate) fn draw<O: Owner>(
     firsts.clear();
     firsts.resize(frame.instances.len(), 0);
     *n_triangles = 0;
-    target.clear(lens.width, lens.height, lens.nearness(lens.far_m()).max(0.0));
+    arch.dispatch(Clear { target, lens });
     levels.clear();
     levels.resize(frame.instances.len(), 0);
     order.clear();
@@ -103,11 +103,11 @@ pub(crate) fn draw<O: Owner>(
     let mut stale = false;
     let mut was_structure = true;
     for candidate in order.iter() {
-        // Tiles cost as much as a few hundred triangles: bring them up to date now and then.
+        // That costs as much as a few hundred triangles: only now and then.
         let begins_things = was_structure && !candidate.is_structure;
         was_structure = candidate.is_structure;
         if stale && (begins_things || [5, 12, 24, 48].contains(&drawn) || drawn % 96 == 95) {
-            arch.dispatch(UpdateTiles(target));
+            arch.dispatch(UpdateLeast(target));
             stale = false;
         }
         let Outline { rect, nearest, crosses_near } = candidate.outline;
@@ -206,15 +206,31 @@ impl<O: Owner> pulp::NullaryFnOnce for DrawOne<'_, O> {
     }
 }
 
-/// Brings tiles up to date, likewise.
-struct UpdateTiles<'a, O: Owner>(&'a mut Target<O>);
+/// Begins an image, likewise.
+struct Clear<'a, O: Owner> {
+    target: &'a mut Target<O>,
+    lens: &'a Lens,
+}
 
-impl<O: Owner> pulp::NullaryFnOnce for UpdateTiles<'_, O> {
+impl<O: Owner> pulp::NullaryFnOnce for Clear<'_, O> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        self.0.update_tiles();
+        let Lens { width, height, .. } = *self.lens;
+        self.target.clear(width, height, self.lens.nearness(self.lens.far_m()).max(0.0));
+    }
+}
+
+/// Brings up to date what hides, likewise.
+struct UpdateLeast<'a, O: Owner>(&'a mut Target<O>);
+
+impl<O: Owner> pulp::NullaryFnOnce for UpdateLeast<'_, O> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.0.update_least();
     }
 }
 

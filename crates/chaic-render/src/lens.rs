@@ -15,6 +15,17 @@ pub(crate) fn seen_depth_m(depth_m: f32) -> f32 {
     if depth_m < Camera::FAR_M { depth_m } else { Camera::FAR_M }
 }
 
+/// 1 / x for x from 1e-3 to 1e3, to about one part in 10^7: by multiplications only, which take a
+/// third of the time of a division, and alike on every machine.
+#[inline(always)]
+pub(crate) fn reciprocal(x: f32) -> f32 {
+    // A number's bits are nearly its logarithm; each step doubles the digits that are right.
+    let y = f32::from_bits(0x7ef3_11c7u32.wrapping_sub(x.to_bits()));
+    let y = y * (2.0 - x * y);
+    let y = y * (2.0 - x * y);
+    y * (2.0 - x * y)
+}
+
 /// A camera that is fit for use.
 ///
 /// Nearness is what the depth buffer holds: 1 / depth for an eye, which is linear on the image as
@@ -137,5 +148,20 @@ impl IntoCamera {
     pub fn map(&self, p: Vec3) -> Vec3 {
         let dot = |r: Vec3| r.x * p.x + r.y * p.y + r.z * p.z;
         Vec3::new(dot(self.x) + self.at.x, dot(self.y) + self.at.y, dot(self.w) + self.at.z)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reciprocal_is_one_to_seven_digits() {
+        let mut x = 1e-3f32;
+        while x < 1e3 {
+            let error = f64::from(reciprocal(x)) * f64::from(x) - 1.0;
+            assert!(error.abs() < 2.5e-7, "{x}: {error}");
+            x *= 1.000_37;
+        }
     }
 }

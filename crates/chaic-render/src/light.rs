@@ -1,5 +1,7 @@
 //! Light: lamps of rooms or the sun, and how dark the ground is near what stands on it.
 
+use std::sync::OnceLock;
+
 use chaic_protocol::geom::Rect;
 use chaic_protocol::{Vec2, Vec3};
 use chaic_world::{RoomKind, Setup};
@@ -79,15 +81,25 @@ pub(crate) struct Ground {
 }
 
 /// The light at one moment.
-#[derive(Clone)]
 pub(crate) struct Light<'a> {
     pub ground: &'a Ground,
     pub lamps: &'a Lamps,
-    /// Darkness per cell, 0 to 255; empty if nobody looks at color.
+    /// None if nobody looks at color.
+    pub shadows: Option<Shadows>,
+    /// Of which arrangement of still things the shadows are.
+    pub version: u64,
+}
+
+/// Shadows on the ground.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Shadows {
+    /// Darkness per cell, 0 to 255.
     dark: Vec<u8>,
     /// Brightness of the ground, four neighbors a cell as in [`crate::texture::Atlas`], 255
-    /// unshaded; rows of [`MAX_CELLS`], and one more that is unshaded. Empty if nobody looks.
-    pub quads: Vec<u32>,
+    /// unshaded; rows of [`MAX_CELLS`], and one more that is unshaded. Empty until it is asked for.
+    quads: Vec<u32>,
+    /// Where something was added: cells from the first x and z to the last.
+    touched: Vec<[usize; 4]>,
 }
 
 /// The foot of something on the ground.
@@ -159,11 +171,6 @@ impl Ground {
         ((x.max(0.0) as usize).min(self.nx - 1), (z.max(0.0) as usize).min(self.nz - 1))
     }
 
-    /// Darkness from walls, 0 to 255, per cell.
-    pub fn walls(&self) -> &[u8] {
-        &self.walls
-    }
-
     /// Cells per metre, and the corner (x, z) where the first cell begins.
     pub fn grid(&self) -> (f32, Vec2) {
         (self.cells_per_m, self.min)
@@ -187,7 +194,8 @@ impl Ground {
         self.lamps.get(usize::from(room)).copied()
     }
 
-    fn darken(&self, dark: &mut [u8], foot: &Foot) {
+    /// Adds the shadow of a foot; gives the cells from the first x and z to the last.
+    fn darken(&self, dark: &mut [u8], foot: &Foot) -> [usize; 4] {
         // Small things darken less around them.
         let size = foot.half.x.max(foot.half.y);
         let reach_m = CONTACT_M.min(0.02 + 0.6 * size).max(1.2 / self.cells_per_m);
@@ -218,30 +226,86 @@ impl Ground {
                 *cell = (*cell).max(value);
             }
         }
+        [x0, z0, x1, z1]
     }
 }
 
+impl Shadows {
+    /// Those of walls.
+    pub fn of_walls(ground: &Ground) -> Shadows {
+        Shadows { dark: ground.walls.clone(), ..Shadows::default() }
+    }
+
+    /// Brightness of the ground in quads, once it is worked out.
+    pub fn quads(&self) -> Option<&[u32; N_GROUND]> {
+        self.quads.first_chunk()
+    }
+
+    /// Works out the brightness where it has changed.
+    fn finish(&mut self, ground: &Ground) {
+        if self.quads.is_empty() {
+            self.quads.resize(N_GROUND, u32::MAX);
+            self.touched.clear();
+            self.brighten(ground, [0, 0, ground.nx - 1, ground.nz - 1]);
+            return;
+        }
+        for k in 0..self.touched.len() {
+            self.brighten(ground, self.touched[k]);
+        }
+    }
+
+    /// Works out the brightness of quads that show any of these cells.
+    fn brighten(&mut self, ground: &Ground, [x0, z0, x1, z1]: [usize; 4]) {
+        let Ground { nx, nz, .. } = *ground;
+        let (x0, z0) = (x0.saturating_sub(1), z0.saturating_sub(1));
+        let roots = roots();
+        let bright = |row: &[u8], i: usize| roots[usize::from(row[i])];
+        for z in z0..=z1 {
+            let row = |j: usize| &self.dark[j * nx..][..nx];
+            let (here, below) = (row(z), row((z + 1).min(nz - 1)));
+            let quads = &mut self.quads[z * MAX_CELLS..][x0..=x1];
+            for (x, quad) in (x0..=x1).zip(quads) {
+                let right = (x + 1).min(nx - 1);
+                *quad = bright(here, x)
+                    | bright(here, right) << 8
+                    | bright(below, x) << 16
+                    | bright(below, right) << 24;
+            }
+        }
+    }
+
+    /// Takes back what was added to these shadows.
+    pub fn restore(&mut self, from: &Shadows, ground: &Ground) {
+        for [x0, z0, x1, z1] in std::mem::take(&mut self.touched) {
+            for z in z0.saturating_sub(1)..=z1 {
+                let cells = z * ground.nx + x0..=z * ground.nx + x1;
+                self.dark[cells.clone()].copy_from_slice(&from.dark[cells]);
+                let quads = z * MAX_CELLS + x0.saturating_sub(1)..=z * MAX_CELLS + x1;
+                self.quads[quads.clone()].copy_from_slice(&from.quads[quads]);
+            }
+        }
+    }
+}
+
+/// What is shown of light, its root, for each darkness; 255 for none.
+fn roots() -> &'static [u32; 256] {
+    static ROOTS: OnceLock<[u32; 256]> = OnceLock::new();
+    let root = |dark: usize| (255.0 * (1.0 - dark as f32 / 255.0).sqrt()) as u32;
+    ROOTS.get_or_init(|| std::array::from_fn(root))
+}
+
 impl<'a> Light<'a> {
-    /// Light with these shadows on the ground (darkness per cell), or none at all if nobody looks
-    /// at color.
-    pub fn new(ground: &'a Ground, lamps: &'a Lamps, dark: Vec<u8>) -> Light<'a> {
-        Light { ground, lamps, dark, quads: Vec::new() }
-    }
-
-    /// Darkness per cell, 0 to 255.
-    pub fn dark(&self) -> &[u8] {
-        &self.dark
-    }
-
-    /// Whether shadows are wanted.
-    pub fn wants_color(&self) -> bool {
-        !self.dark.is_empty()
+    /// Light with these shadows on the ground, or none if nobody looks at color.
+    pub fn new(ground: &'a Ground, lamps: &'a Lamps, shadows: Option<Shadows>) -> Light<'a> {
+        Light { ground, lamps, shadows, version: 0 }
     }
 
     /// Adds the shadow of a foot.
     pub fn cast(&mut self, foot: &Foot) {
-        if self.wants_color() && foot.center.is_finite() && foot.half.max_element() < 50.0 {
-            self.ground.darken(&mut self.dark, foot);
+        let is_sane = foot.center.is_finite() && foot.half.max_element() < 50.0;
+        if let (Some(shadows), true) = (&mut self.shadows, is_sane) {
+            let cells = self.ground.darken(&mut shadows.dark, foot);
+            shadows.touched.push(cells);
         }
     }
 
@@ -269,33 +333,16 @@ impl<'a> Light<'a> {
 
     /// Makes the ground ready; to be called when all shadows are cast.
     pub fn finish(&mut self) {
-        let Ground { nx, nz, .. } = *self.ground;
-        if !self.wants_color() {
-            return;
-        }
-        self.quads.clear();
-        self.quads.resize(N_GROUND, u32::MAX);
-        // What is shown is the root of light.
-        let root = |dark: usize| (255.0 * (1.0 - dark as f32 / 255.0).sqrt()) as u32;
-        let roots: [u32; 256] = std::array::from_fn(root);
-        let bright = |row: &[u8], i: usize| roots[usize::from(row[i])];
-        for (j, quads) in self.quads.chunks_exact_mut(MAX_CELLS).enumerate().take(nz) {
-            let row = |j: usize| &self.dark[j * nx..][..nx];
-            let (here, below) = (row(j), row((j + 1).min(nz - 1)));
-            for (i, quad) in quads.iter_mut().enumerate().take(nx) {
-                let right = (i + 1).min(nx - 1);
-                *quad = bright(here, i)
-                    | bright(here, right) << 8
-                    | bright(below, i) << 16
-                    | bright(below, right) << 24;
-            }
+        if let Some(shadows) = &mut self.shadows {
+            shadows.finish(self.ground);
         }
     }
 
     /// What stands in the ground's cells; see [`crate::lighting`].
     pub fn cells(&self) -> Cells {
         let g = self.ground;
-        let rows = self.quads.chunks_exact(MAX_CELLS).take(g.nz);
+        let quads = self.shadows.as_ref().map_or(&[][..], |s| &s.quads);
+        let rows = quads.chunks_exact(MAX_CELLS).take(g.nz);
         Cells {
             min: g.min.to_array(),
             cells_per_m: g.cells_per_m,

@@ -8,7 +8,7 @@ use crate::setup::{Setup, Slope, first_center, least, most};
 
 /// Nobody's pixel.
 pub(crate) const NOBODY: u32 = u32::MAX;
-/// Side of the squares in which nearness is summed up, pixels.
+/// Pixels one below the other whose least nearness is kept.
 pub(crate) const TILE: usize = 8;
 /// So many neighboring pixels of a row are filled at once.
 pub(crate) const LANES: usize = 16;
@@ -126,8 +126,8 @@ impl Owner for u16 {
     }
 }
 
-/// Blocks of [`LANES`] pixels one below the other, as high as tiles. An image is rows of stacks: what
-/// is near on the image is near in memory, and a thing's pixels stay in the nearest cache.
+/// Blocks of [`LANES`] pixels one below the other. An image is rows of stacks: what is near on the
+/// image is near in memory, and a thing's pixels stay in the nearest cache.
 type Stack<B> = [B; TILE];
 
 /// A row of blocks across stacks.
@@ -152,7 +152,7 @@ impl<'a, B> Blocks<'a, B> {
 }
 
 /// The image under way. What of its stacks lies beyond the image is nobody's, and near, so that it
-/// doesn't count in its tile.
+/// doesn't count.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Target<O: Owner> {
     pub width: usize,
@@ -163,39 +163,39 @@ pub(crate) struct Target<O: Owner> {
     nearness: Vec<Stack<Wide<f32>>>,
     /// Whose each pixel is, of the same shape.
     owner: Vec<Stack<O::Block>>,
-    tiles_wide: usize,
-    /// The least nearness in each tile.
-    tiles: Vec<f32>,
-    /// For each row of tiles the first tile that may be stale, and the one after the last.
+    /// The least nearness in each column of each stack.
+    least: Vec<Wide<f32>>,
+    /// For each row of stacks the first whose least may be stale, and the one after the last.
     stale: Vec<(usize, usize)>,
 }
 
 impl<O: Owner> Target<O> {
     /// Forgets all; what isn't nearer than `background` won't be drawn.
+    #[inline(always)]
     pub fn clear(&mut self, width: usize, height: usize, background: f32) {
         (self.width, self.height) = (width, height);
         self.stacks_wide = width.div_ceil(LANES);
         let stacks_high = height.div_ceil(TILE);
         let n = self.stacks_wide * stacks_high;
-        self.nearness.clear();
-        self.nearness.resize(n, [Wide([background; LANES]); TILE]);
+        self.nearness.resize_with(n, Default::default);
+        self.nearness.fill([Wide([background; LANES]); TILE]);
         let (in_last, rows_in_last) = (width % LANES, height % TILE);
-        for (k, stack) in self.nearness.iter_mut().enumerate() {
-            let is_right = in_last > 0 && (k + 1) % self.stacks_wide == 0;
-            if is_right {
-                stack.iter_mut().for_each(|block| block[in_last..].fill(f32::INFINITY));
-            }
-            if rows_in_last > 0 && k / self.stacks_wide + 1 == stacks_high {
-                stack[rows_in_last..].fill(Wide([f32::INFINITY; LANES]));
+        if in_last > 0 || rows_in_last > 0 {
+            for (k, stack) in self.nearness.iter_mut().enumerate() {
+                if in_last > 0 && (k + 1) % self.stacks_wide == 0 {
+                    stack.iter_mut().for_each(|block| block[in_last..].fill(f32::INFINITY));
+                }
+                if rows_in_last > 0 && k / self.stacks_wide + 1 == stacks_high {
+                    stack[rows_in_last..].fill(Wide([f32::INFINITY; LANES]));
+                }
             }
         }
-        self.owner.clear();
-        self.owner.resize(n, [O::NOBODY.block(); TILE]);
-        self.tiles_wide = LANES / TILE * self.stacks_wide;
-        self.tiles.clear();
-        self.tiles.resize(self.tiles_wide * stacks_high, background);
+        self.owner.resize_with(n, Default::default);
+        self.owner.fill([O::NOBODY.block(); TILE]);
+        self.least.clear();
+        self.least.resize(n, Wide([background; LANES]));
         self.stale.clear();
-        self.stale.resize(stacks_high, (self.tiles_wide, 0));
+        self.stale.resize(stacks_high, (self.stacks_wide, 0));
     }
 
     /// Nearness in a row.
@@ -212,52 +212,55 @@ impl<O: Owner> Target<O> {
         Blocks { stacks, row: row % TILE }
     }
 
-    /// The tiles that the rectangle (least u and v, most u and v) touches: columns and rows, the
-    /// last ones included.
-    fn tiles_of(&self, [u0, v0, u1, v1]: [f32; 4]) -> [(usize, usize); 2] {
-        let tile = |x: f32, n: usize| (x.max(0.0) as usize / TILE).min(n.saturating_sub(1));
-        let n_high = self.stale.len();
-        [
-            (tile(u0, self.tiles_wide), tile(u1, self.tiles_wide)),
-            (tile(v0, n_high), tile(v1, n_high)),
-        ]
+    /// The pixels that the rectangle (least u and v, most u and v) touches: first and last columns
+    /// and rows.
+    fn pixels_of(&self, [u0, v0, u1, v1]: [f32; 4]) -> [(usize, usize); 2] {
+        let pixel = |x: f32, n: usize| (x.max(0.0) as usize).min(n.saturating_sub(1));
+        let (columns, rows) = (self.width, self.height);
+        [(pixel(u0, columns), pixel(u1, columns)), (pixel(v0, rows), pixel(v1, rows))]
     }
 
     /// Notes that something is drawn within the rectangle, with a pixel to spare.
     pub fn touch(&mut self, [u0, v0, u1, v1]: [f32; 4]) {
-        let [(i0, i1), (j0, j1)] = self.tiles_of([u0 - 1.0, v0 - 1.0, u1 + 1.0, v1 + 1.0]);
-        for (first, end) in self.stale.iter_mut().take(j1 + 1).skip(j0) {
-            (*first, *end) = ((*first).min(i0), (*end).max(i1 + 1));
+        let [(i0, i1), (j0, j1)] = self.pixels_of([u0 - 1.0, v0 - 1.0, u1 + 1.0, v1 + 1.0]);
+        for (first, end) in self.stale.iter_mut().take(j1 / TILE + 1).skip(j0 / TILE) {
+            (*first, *end) = ((*first).min(i0 / LANES), (*end).max(i1 / LANES + 1));
         }
     }
 
-    /// Brings the tiles up to date in which [`Target::touch`] announced something. Stale tiles are
-    /// safe: nearness only grows.
+    /// Brings up to date what [`Target::hides`] goes by where [`Target::touch`] announced something.
+    /// Until then it is safe: nearness only grows.
     #[inline(always)]
-    pub fn update_tiles(&mut self) {
+    pub fn update_least(&mut self) {
         if self.width == 0 {
             return;
         }
-        let bands = self.nearness.chunks(self.stacks_wide);
-        let tiles = self.tiles.chunks_mut(self.tiles_wide);
-        for ((stacks, tiles), (first, end)) in bands.zip(tiles).zip(&mut self.stale) {
+        let rows = self.nearness.chunks(self.stacks_wide);
+        let least = self.least.chunks_mut(self.stacks_wide);
+        for ((stacks, least), (first, end)) in rows.zip(least).zip(&mut self.stale) {
             if first < end {
-                let changed = *first * TILE / LANES..(*end * TILE).div_ceil(LANES);
-                let tiles = &mut tiles.as_chunks_mut().0[changed.clone()];
-                for (tiles, stack) in tiles.iter_mut().zip(&stacks[changed]) {
-                    *tiles = least_in_tiles(stack);
+                for (least, stack) in least[*first..*end].iter_mut().zip(&stacks[*first..*end]) {
+                    *least = least_of(stack);
                 }
-                (*first, *end) = (self.tiles_wide, 0);
+                (*first, *end) = (self.stacks_wide, 0);
             }
         }
     }
 
     /// Whether something no nearer than `q` inside the rectangle is sure to be hidden.
     pub fn hides(&self, rect: [f32; 4], q: f32) -> bool {
-        let [(i0, i1), (j0, j1)] = self.tiles_of(rect);
-        (j0..=j1).all(|j| {
-            let row = &self.tiles[j * self.tiles_wide..][..self.tiles_wide];
-            row[i0..=i1].iter().all(|least| *least >= q)
+        let [(i0, i1), (j0, j1)] = self.pixels_of(rect);
+        (j0 / TILE..=j1 / TILE).all(|j| {
+            let row = &self.least[j * self.stacks_wide..][..self.stacks_wide];
+            (i0 / LANES..=i1 / LANES).all(|i| {
+                let mut shows = 0;
+                for k in 0..LANES {
+                    let column = LANES * i + k;
+                    let is_inside = (column >= i0) & (column <= i1);
+                    shows |= u32::from(is_inside & (row[i][k] < q));
+                }
+                shows == 0
+            })
         })
     }
 
@@ -296,20 +299,16 @@ impl<O: Owner> Target<O> {
     }
 }
 
-/// The least of each of the tiles in a stack.
+/// The least in each column.
 #[inline(always)]
-fn least_in_tiles(stack: &Stack<Wide<f32>>) -> [f32; LANES / TILE] {
-    let mut columns = [f32::INFINITY; LANES];
+fn least_of(stack: &Stack<Wide<f32>>) -> Wide<f32> {
+    let mut columns = Wide([f32::INFINITY; LANES]);
     for block in stack {
         for k in 0..LANES {
             columns[k] = least(columns[k], block[k]);
         }
     }
-    let mut tiles = [f32::INFINITY; LANES / TILE];
-    for k in 0..LANES {
-        tiles[k / TILE] = least(tiles[k / TILE], columns[k]);
-    }
-    tiles
+    columns
 }
 
 /// Fills the columns `begin..end` of a row of the stacks that begin here.
@@ -363,9 +362,15 @@ fn fill_block<O: Owner>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::setup::Corner;
 
     fn corner(u: f32, v: f32) -> Corner {
         Corner { u, v, q: 1.0 }
+    }
+
+    fn draw(target: &mut Target<u32>, [a, b, c]: [Corner; 3], owner: u32) {
+        let setup = Setup::through(a, b, c, target.height as f32);
+        target.fill(&setup, owner);
     }
 
     fn owners(target: &Target<u32>) -> impl Iterator<Item = u32> {
@@ -386,7 +391,7 @@ mod tests {
         for k in 0..n {
             let mut target = Target::<u32>::default();
             target.clear(64, 64, 0.0);
-            target.draw([corner(32.3, 31.7), rim(k + 1), rim(k)], k as u32);
+            draw(&mut target, [corner(32.3, 31.7), rim(k + 1), rim(k)], k as u32);
             for (n, o) in count.iter_mut().zip(owners(&target)) {
                 *n += i32::from(o != NOBODY);
             }
@@ -419,8 +424,7 @@ mod tests {
             let before: Vec<f32> = (0..6 * LANES).map(|_| rng.range(0.0, 1.0)).collect();
             let du =
                 [0.0, rng.range(-0.05, 0.05), f32::NAN, 1e30][rng.below(40).saturating_sub(36)];
-            let at = Corner { u: 0.0, v: 0.0, q: 0.0 };
-            let slope = Slope { at, du, dv: 0.0, low: 0.2, high: rng.range(0.2, 1.0) };
+            let slope = Slope { du, low: 0.2, high: rng.range(0.2, 1.0), ..Slope::default() };
             let (q0, begin) = (rng.range(0.0, 1.0), rng.below(50));
             let span = begin..begin + n;
             let mut right_owners = vec![7; before.len()];
@@ -428,13 +432,16 @@ mod tests {
             let right = (&mut right_q[span.clone()], &mut right_owners[span]);
             fill_one_by_one(right, q0, begin as u32, &slope, 9);
             let span = (begin as u32, (begin + n) as u32);
-            let mut q: Vec<Wide<f32>> = before.as_chunks().0.iter().map(|b| Wide(*b)).collect();
-            let (mut owners, mut names) =
-                (vec![7u32.block(); q.len()], vec![7u16.block(); q.len()]);
-            fill_span::<u16>(&mut q.clone(), &mut names, q0, span, &slope, 9);
-            fill_span::<u32>(&mut q, &mut owners, q0, span, &slope, 9);
+            let row = rng.below(TILE);
+            let mut q: Vec<Stack<Wide<f32>>> =
+                before.as_chunks().0.iter().map(|b| [Wide(*b); TILE]).collect();
+            let mut owners = vec![[7u32.block(); TILE]; q.len()];
+            let mut names = vec![[7u16.block(); TILE]; q.len()];
+            fill_span::<u16>(&mut q.clone(), &mut names, row, q0, span, &slope, 9);
+            fill_span::<u32>(&mut q, &mut owners, row, q0, span, &slope, 9);
             let bits = |q: f32| q.to_bits();
-            let (q, owners) = (q.iter().flat_map(|q| q.0), owners.iter().flat_map(|o| o.0));
+            let (q, owners) =
+                (q.iter().flat_map(|q| q[row].0), owners.iter().flat_map(|o| o[row].0));
             assert!(q.map(bits).eq(right_q.into_iter().map(bits)), "{n} pixels, {slope:?}");
             assert!(owners.eq(right_owners.iter().copied()), "{n} pixels, {slope:?}");
             let names = names.iter().flat_map(|o| o[row].0).map(u32::from);
@@ -447,25 +454,25 @@ mod tests {
         let mut target = Target::<u32>::default();
         target.clear(16, 16, 0.0);
         for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e38] {
-            target.draw([corner(0.0, 0.0), corner(bad, 8.0), corner(3.0, bad)], 1);
+            draw(&mut target, [corner(0.0, 0.0), corner(bad, 8.0), corner(3.0, bad)], 1);
         }
-        target.draw([corner(5.0, 5.0); 3], 2);
+        draw(&mut target, [corner(5.0, 5.0); 3], 2);
         assert!(owners(&target).all(|o| o != 2));
         let mut empty = Target::<u32>::default();
         empty.clear(0, 0, 0.0);
         empty.touch([0.0, 0.0, 9.0, 9.0]);
-        empty.update_tiles();
-        empty.draw([corner(0.0, 0.0), corner(0.0, 9.0), corner(9.0, 0.0)], 1);
+        empty.update_least();
+        draw(&mut empty, [corner(0.0, 0.0), corner(0.0, 9.0), corner(9.0, 0.0)], 1);
     }
 
     #[test]
-    fn tiles_hide_only_what_is_behind() {
+    fn only_what_is_behind_is_hidden() {
         let mut target = Target::<u32>::default();
         target.clear(20, 20, 0.0);
-        target.draw([corner(-50.0, -50.0), corner(-50.0, 100.0), corner(100.0, -50.0)], 1);
-        assert!(!target.hides([2.0, 2.0, 9.0, 9.0], 0.5), "tiles are stale");
+        draw(&mut target, [corner(-50.0, -50.0), corner(-50.0, 100.0), corner(100.0, -50.0)], 1);
+        assert!(!target.hides([2.0, 2.0, 9.0, 9.0], 0.5), "not yet brought up to date");
         target.touch([-50.0, -50.0, 100.0, 100.0]);
-        target.update_tiles();
+        target.update_least();
         assert!(target.hides([2.0, 2.0, 9.0, 9.0], 0.5));
         assert!(!target.hides([2.0, 2.0, 9.0, 9.0], 1.5));
     }

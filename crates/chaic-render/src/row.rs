@@ -3,7 +3,7 @@
 //! Segments are filled in whole [`LANES`], from left to right: the last ones may lie beyond a
 //! segment's end, where the next one writes them again.
 
-use crate::lens::seen_depth_m;
+use crate::lens::{reciprocal, seen_depth_m};
 use crate::light::{MAX_CELLS, N_GROUND};
 use crate::raster::{Blocks, LANES, Wide};
 use crate::segments::{Line, Place};
@@ -81,7 +81,7 @@ impl Row {
             self.depth.as_chunks_mut::<LANES>().0.iter_mut().zip(nearness.iter())
         {
             for k in 0..LANES {
-                depth[k] = 1.0 / nearness[k];
+                depth[k] = reciprocal(nearness[k]);
             }
         }
     }
@@ -109,9 +109,15 @@ impl Row {
     /// Writes what was found: three bytes of color for each pixel, and what else is wanted.
     #[inline(always)]
     pub fn write(&self, rgb: &mut [u8], depth_m: Option<&mut [f32]>, ids: Option<&mut [u16]>) {
-        for (pixel, color) in rgb.chunks_exact_mut(3).zip(&self.colors) {
-            let [r, g, b, _] = color.to_le_bytes();
-            pixel.copy_from_slice(&[r, g, b]);
+        let (fours, rest) = rgb.as_chunks_mut::<12>();
+        let colors = self.colors.as_chunks::<4>().0;
+        for (out, [a, b, c, d]) in fours.iter_mut().zip(colors) {
+            let words = [a | b << 24, b >> 8 | c << 16, c >> 16 | d << 8].map(u32::to_le_bytes);
+            out.copy_from_slice(words.as_flattened());
+        }
+        let rest_of_colors = &self.colors[4 * fours.len()..];
+        for (pixel, color) in rest.chunks_exact_mut(3).zip(rest_of_colors) {
+            pixel.copy_from_slice(&color.to_le_bytes()[..3]);
         }
         if let Some(out) = depth_m {
             for (out, depth_m) in out.iter_mut().zip(&self.depth) {

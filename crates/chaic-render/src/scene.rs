@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::appearance::{Appearance, Painted};
 use crate::frame::{ClassMesh, Frame, Instance, Shape};
-use crate::light::{Foot, Ground, Lamps, Light};
+use crate::light::{Foot, Ground, Lamps, Light, Shadows};
 use crate::looks::{style_of, tint_of};
 use crate::mesh::Mesh;
 use crate::people::Body;
@@ -89,12 +89,11 @@ impl Scene {
         let frame = self.frame(state, &bodies, wants_color);
         if let ([view], [images]) = (views, &mut images[..]) {
             look(&frame, view, images);
-            return;
+        } else {
+            let pairs = views.par_iter().zip(images.par_iter_mut());
+            pairs.for_each(|(view, images)| look(&frame, view, images));
         }
-        views
-            .par_iter()
-            .zip(images.par_iter_mut())
-            .for_each(|(view, images)| look(&frame, view, images));
+        self.give_back(frame.light);
     }
 
     /// What is underfoot, and the lamps.
@@ -109,6 +108,7 @@ impl Scene {
         wants_color: bool,
     ) -> Frame<'a> {
         let mut light = self.still_light(state, wants_color);
+        self.cast_moving(state, &mut light);
         let mut instances =
             Vec::with_capacity(self.structure.len() + self.things.len() + bodies.len());
         for (k, (entity, mesh)) in self.structure.iter().enumerate() {
@@ -129,8 +129,7 @@ impl Scene {
             let center = Vec2::new(pose.position.x, pose.position.z);
             let half = Vec2::splat(body.foot_radius_m);
             light.cast(&Foot { center, axis: Vec2::X, half, depth: 0.5, round: true });
-            let height = body.max.y - body.min.y;
-            light.cast_by_sun(center, Vec2::splat(0.6 * body.foot_radius_m), height);
+            light.cast_by_sun(center, Vec2::splat(0.6 * body.foot_radius_m), body.height_m);
             let rotation = Mat3::from_quat(chaic_protocol::geom::yaw_rotation(pose.yaw_rad));
             instances.push(Instance {
                 entity: EntityId(EntityId::FIRST_PERSON.0 + k.min(7) as u16),
@@ -163,35 +162,66 @@ impl Scene {
         Frame { instances, light }
     }
 
-    /// The light with the shadows of all things, which mostly lie still: those of the last moment
-    /// are kept.
+    /// The light with the shadows of walls and of all things that lie still: those of the last
+    /// moment are kept.
     fn still_light(&self, state: &State, wants_color: bool) -> Light<'_> {
         if !wants_color {
-            return Light::new(&self.ground, &self.lamps, Vec::new());
+            return Light::new(&self.ground, &self.lamps, None);
         }
-        let places = state.things.iter().map(|t| shown_rotation(t).map(|r| (t.position, r)));
+        let places = state.things.iter().map(|thing| {
+            let is_still = matches!(thing.place, Place::Resting { .. });
+            shown_rotation(thing).filter(|_| is_still).map(|r| (thing.position, r))
+        });
         let mut still = self.still.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        if !still.dark.is_empty() && still.places.iter().copied().eq(places.clone()) {
-            return Light::new(&self.ground, &self.lamps, still.dark.clone());
+        if still.version == 0 || !still.places.iter().copied().eq(places.clone()) {
+            still.version += 1;
+            still.places = places.collect();
+            still.spare.clear();
+            let shadows = Shadows::of_walls(&self.ground);
+            let mut light = Light::new(&self.ground, &self.lamps, Some(shadows));
+            for ((class, _), place) in self.things.iter().zip(&still.places) {
+                if let Some((position, rotation)) = place {
+                    cast_foot(&mut light, class, rotation, *position);
+                }
+            }
+            light.finish();
+            still.shadows = light.shadows.unwrap_or_default();
         }
-        let mut light = Light::new(&self.ground, &self.lamps, self.ground.walls().to_vec());
-        still.places = places.collect();
-        for ((class, _), place) in self.things.iter().zip(&still.places) {
-            if let Some((position, rotation)) = place {
-                cast_foot(&mut light, class, rotation, *position);
+        let shadows = still.spare.pop().unwrap_or_else(|| still.shadows.clone());
+        Light { version: still.version, ..Light::new(&self.ground, &self.lamps, Some(shadows)) }
+    }
+
+    /// Adds the shadows of things that don't lie still.
+    fn cast_moving(&self, state: &State, light: &mut Light) {
+        for ((class, _), thing) in self.things.iter().zip(&state.things) {
+            let moves = !matches!(thing.place, Place::Resting { .. });
+            if let (Some(rotation), true) = (shown_rotation(thing), moves) {
+                cast_foot(light, class, &rotation, thing.position);
             }
         }
-        still.dark = light.dark().to_vec();
-        light
+    }
+
+    /// Takes the memory of shadows back, to be used again.
+    fn give_back(&self, light: Light) {
+        let Light { shadows: Some(mut shadows), version, .. } = light else { return };
+        let mut still = self.still.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if still.version == version {
+            shadows.restore(&still.shadows, &self.ground);
+            still.spare.push(shadows);
+        }
     }
 }
 
-/// The shadows of things where they were when last looked at in color.
+/// The shadows of what lay still when it was last looked at in color.
 #[derive(Debug, Default)]
 struct Still {
-    /// Position and rotation of each thing, if it is there to be seen.
+    /// Counts up when something that lay still has been moved; 0 before the first look.
+    version: u64,
+    /// Position and rotation of each thing that lies still.
     places: Vec<Option<(Vec3, Mat3)>>,
-    dark: Vec<u8>,
+    shadows: Shadows,
+    /// Copies of the shadows, to be added to.
+    spare: Vec<Shadows>,
 }
 
 /// How a thing is turned, if it is there to be seen.

@@ -13,6 +13,7 @@ use glam::Vec4;
 
 use crate::frame::Frame;
 use crate::lens::Lens;
+use crate::light::Shadows;
 use crate::paint::{Kind, Paint, Painter, Plane, Sight};
 use crate::points::Points;
 use crate::raster::{Blocks, LANES, NOBODY, Target, Wide, owner_parts};
@@ -31,6 +32,8 @@ pub(crate) struct Canvas {
     n_lit: usize,
     /// Where neighboring pixels of one triangle, a run, begin on the row.
     begins: Vec<u32>,
+    /// Whose the row's pixels are, after one that is someone else's than the first.
+    owners: Vec<u32>,
     segments: Segments,
     /// What is lit on the row: new triangles' points and knots of structure.
     points: Points,
@@ -127,12 +130,6 @@ impl pulp::NullaryFnOnce for Rows<'_> {
     }
 }
 
-/// A pixel of a row.
-#[inline(always)]
-fn pixel(row: Blocks<Wide<u32>>, k: usize) -> Option<u32> {
-    row.get(k / LANES).map(|block| block[k % LANES])
-}
-
 /// Channels that grow by a step from pixel to pixel.
 #[inline(always)]
 fn ramp(channels: &mut [Channel; 3], start: Vec4, step: Vec4) {
@@ -141,19 +138,22 @@ fn ramp(channels: &mut [Channel; 3], start: Vec4, step: Vec4) {
     }
 }
 
-/// Finds the columns in which runs begin.
+/// Finds the columns in which runs begin; `owners` gets the row's, after one that isn't.
 #[inline(always)]
-fn find_begins(owners: Blocks<Wide<u32>>, width: usize, begins: &mut Vec<u32>) {
+fn find_begins(row: Blocks<Wide<u32>>, width: usize, owners: &mut Vec<u32>, begins: &mut Vec<u32>) {
+    owners.resize(width.div_ceil(LANES) * LANES + 1, 0);
+    let Some((before, after)) = owners.split_first_mut() else { return };
+    for (out, block) in after.as_chunks_mut::<LANES>().0.iter_mut().zip(row.iter()) {
+        *out = **block;
+    }
+    *before = !after.first().copied().unwrap_or_default();
     begins.clear();
-    let mut last = owners.get(0).map_or(NOBODY, |block| !block[0]);
-    for (b, block) in owners.iter().enumerate() {
+    let pairs = owners.as_chunks::<LANES>().0.iter().zip(owners[1..].as_chunks::<LANES>().0);
+    for (b, (before, block)) in pairs.enumerate() {
         let mut begin = 0u32;
-        let mut before = [last; LANES];
-        before[1..].copy_from_slice(&block[..LANES - 1]);
         for k in 0..LANES {
             begin |= u32::from(block[k] != before[k]) << k;
         }
-        last = block[LANES - 1];
         while begin != 0 {
             begins.push((LANES * b) as u32 + begin.trailing_zeros());
             begin &= begin - 1;
@@ -173,11 +173,11 @@ impl Rows<'_> {
         self.canvas.segments.clear();
         self.canvas.sky.clear();
         let mut begins = std::mem::take(&mut self.canvas.begins);
-        find_begins(self.target.owner(j), width, &mut begins);
+        find_begins(self.target.owner(j), width, &mut self.canvas.owners, &mut begins);
         for (k, begin) in begins.iter().enumerate() {
             let begin = *begin as usize;
             let end = begins.get(k + 1).map_or(width, |end| *end as usize);
-            let owner = pixel(self.target.owner(j), begin).unwrap_or(NOBODY);
+            let owner = self.canvas.owners[begin + 1];
             if owner == NOBODY {
                 self.see_sky(j, begin, end);
             } else {
@@ -269,7 +269,7 @@ impl Rows<'_> {
     fn fill(&mut self, j: usize) {
         let v = j as f32 + 0.5;
         let Canvas { paints, points, segments, sky, row, .. } = &mut *self.canvas;
-        let quads = self.painter.frame.light.quads.first_chunk();
+        let quads = self.painter.frame.light.shadows.as_ref().and_then(Shadows::quads);
         for k in 0..segments.len() {
             let (segment, place) = segments.get(k);
             let (begin, end) = (segment.begin as usize, segment.end as usize);

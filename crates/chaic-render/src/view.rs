@@ -8,7 +8,7 @@ use chaic_protocol::{AgentId, EntityId};
 
 use crate::draw::{Omit, Scratch, draw};
 use crate::frame::Frame;
-use crate::lens::{Lens, seen_depth_m};
+use crate::lens::{Lens, reciprocal, seen_depth_m};
 use crate::raster::{LANES, Target};
 use crate::shade::{Drawn, Wanted, shade};
 
@@ -134,7 +134,7 @@ impl pulp::NullaryFnOnce for ReadBack<'_> {
                 {
                     let mut depth = [0.0; LANES];
                     for k in 0..LANES {
-                        depth[k] = seen_depth_m(1.0 / block[k]);
+                        depth[k] = seen_depth_m(reciprocal(block[k]));
                     }
                     out.copy_from_slice(&depth[..out.len()]);
                 }

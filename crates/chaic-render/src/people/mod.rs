@@ -28,7 +28,7 @@ pub(crate) struct Body {
     pub max: Vec3,
     /// Radius of its shadow on the ground, metres.
     pub foot_radius_m: f32,
-    height_m: f32,
+    pub height_m: f32,
     rolls: bool,
     walked_m: f32,
     build: Build,
@@ -43,24 +43,24 @@ impl Body {
         let posture = &sane(posture);
         let build = Build::of(posture);
         let rolls = posture.gait == Gait::Roll || posture.persona == Persona::Wheelchair;
-        let mut body = Body {
+        let skeleton = Skeleton::of(posture, &build, rolls, frame);
+        let (mut min, mut max) = skeleton.bounds(&build);
+        if rolls {
+            (min, max) = (min.min(wheelchair::MIN), max.max(wheelchair::MAX));
+        }
+        Body {
             pose: posture.pose,
-            min: Vec3::ZERO,
-            max: Vec3::ZERO,
+            min,
+            max,
             foot_radius_m: if rolls { 0.38 } else { 0.17 * posture.height_m },
             height_m: posture.height_m,
             rolls,
             walked_m: posture.walked_m,
             dress: Dress::of(posture),
-            skeleton: Skeleton::of(posture, &build, rolls, frame),
+            skeleton,
             build,
             levels: [const { OnceLock::new() }; N_LEVELS],
-        };
-        let coarse = body.make(0);
-        // Finer levels bulge a little farther than the coarsest.
-        (body.min, body.max) = (coarse.min - 0.04, coarse.max + 0.04);
-        body.levels[0] = OnceLock::from(coarse);
-        body
+        }
     }
 
     /// The mesh at a level of detail.
@@ -99,4 +99,35 @@ fn sane(posture: &Posture) -> Posture {
         arm.hand_in_body = arm.hand_in_body.clamp(Vec3::splat(-3.0), Vec3::splat(3.0));
     }
     p
+}
+
+#[cfg(test)]
+mod tests {
+    use chaic_protocol::{AgentId, Persona};
+
+    use super::*;
+    use crate::geometry::FINEST;
+
+    #[test]
+    fn a_body_stays_within_its_bounds_and_they_are_close() {
+        let setup = scenes::house();
+        let world = scenes::world(setup);
+        let usual = world.posture(AgentId(0));
+        let mut rng = chaic_protocol::rng::Stream::new(1, "bodies", 0);
+        for persona in Persona::ALL {
+            for _ in 0..40 {
+                let mut posture = Posture { persona, ..usual };
+                posture.walked_m = rng.range(0.0, 5.0);
+                posture.bend = rng.range(0.0, 1.0);
+                posture.stretch = rng.range(0.0, 1.0);
+                posture.height_m = rng.range(1.0, 1.9);
+                let body = Body::new(&posture, rng.below(100) as u32);
+                let (mesh, spare) = (body.level(FINEST), 0.35);
+                assert!(body.min.cmple(mesh.min).all(), "{posture:?}: {} {}", body.min, mesh.min);
+                assert!(body.max.cmpge(mesh.max).all(), "{posture:?}: {} {}", body.max, mesh.max);
+                let slack = (mesh.min - body.min).max(body.max - mesh.max).max_element();
+                assert!(slack < spare, "{posture:?}: {slack} m");
+            }
+        }
+    }
 }

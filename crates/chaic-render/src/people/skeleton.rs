@@ -102,6 +102,26 @@ fn two_bones(root: Vec3, target: Vec3, bones: [f32; 2], pole: Vec3) -> (Vec3, Ve
 }
 
 impl Skeleton {
+    /// A box around all flesh and clothes, metres: around a joint they reach no farther than this,
+    /// with a few centimetres to spare.
+    pub fn bounds(&self, b: &Build) -> (Vec3, Vec3) {
+        let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        let mut around = |joint: Vec3, reach_m: f32| {
+            (min, max) = (min.min(joint - reach_m), max.max(joint + reach_m));
+        };
+        around(self.hips, b.shoulder_x + 0.06);
+        around(self.chest, b.shoulder_x + 0.08);
+        around(self.head, 0.80 * b.head + 0.05);
+        for k in 0..2 {
+            around(self.shoulders[k], 0.10 * b.girth);
+            around(self.elbows[k], 0.09 * b.girth);
+            around(self.hands[k], 0.12 * b.girth);
+            around(self.knees[k], 0.12 * b.girth);
+            around(self.ankles[k], 0.22 * b.girth);
+        }
+        (min, max)
+    }
+
     pub fn of(posture: &Posture, build: &Build, rolls: bool, frame: u32) -> Skeleton {
         let (bend, stretch) = (posture.bend, posture.stretch);
         let h = build.top_y;

@@ -14,6 +14,11 @@ const CLOTH: [u8; 3] = [34, 38, 48];
 const TYRE: [u8; 3] = [26, 26, 28];
 
 /// Adds a wheelchair that has rolled `walked_m`.
+/// A box around all of it, metres.
+pub(super) const MIN: Vec3 = Vec3::new(-0.34, -0.01, -0.62);
+pub(super) const MAX: Vec3 = Vec3::new(0.34, 1.02, 0.46);
+
+/// Adds it.
 pub(super) fn add(mesh: &mut Mesh, walked_m: f32, detail: Detail) {
     seat(mesh);
     frame(mesh, detail);

@@ -106,7 +106,7 @@ pub(crate) fn draw<O: Owner>(
         // That costs as much as a few hundred triangles: only now and then.
         let begins_things = was_structure && !candidate.is_structure;
         was_structure = candidate.is_structure;
-        if stale && (begins_things || [5, 12, 24, 48].contains(&drawn) || drawn % 96 == 95) {
+        if stale && (begins_things || [12, 36].contains(&drawn) || drawn % 96 == 95) {
             arch.dispatch(UpdateLeast(target));
             stale = false;
         }

@@ -9,9 +9,11 @@ use glam::Vec4;
 
 use crate::frame::{Frame, Instance};
 use crate::lens::Lens;
-use crate::light::NO_ROOM;
+use crate::light::{N_GROUND, NO_ROOM};
 use crate::mesh::{Gloss, Mesh, Triangle, unit};
 use crate::points::{Point, Points};
+use crate::row::OnGround;
+use crate::segments::Line;
 use crate::texture::{Texture, Tile};
 
 /// How dark the tops of walls are on maps, 0 to 255.
@@ -353,6 +355,17 @@ impl<'a> Painter<'a> {
             1.0
         };
         Point { at, lamp, normal, to_eye: -ray, color, gloss, tone }
+    }
+
+    /// How a row with middles at `v` goes over the ground from a column on.
+    #[inline(always)]
+    pub fn on_ground<'q>(&self, quads: &'q [u32; N_GROUND], begin: usize, v: f32) -> OnGround<'q> {
+        let RowPlane { base, at, du } = self.ground.from(begin, v);
+        let line = |base: f32, at: f32, du: f32| {
+            // In parts of 256 of a cell, half a cell less.
+            Line { base: 256.0 * base - 128.0, at: 256.0 * at, du: 256.0 * du }
+        };
+        OnGround { quads, x: line(base.x, at.x, du.x), z: line(base.y, at.y, du.y) }
     }
 
     /// What is shown of the sky in the pixel with middle (u, v).

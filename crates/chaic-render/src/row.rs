@@ -3,8 +3,11 @@
 //! Segments are filled in whole [`LANES`], from left to right: the last ones may lie beyond a
 //! segment's end, where the next one writes them again.
 
+use glam::Vec4;
+
 use crate::lens::{reciprocal, seen_depth_m};
 use crate::light::{MAX_CELLS, N_GROUND};
+use crate::paint::RowPlane;
 use crate::raster::{Blocks, LANES, Wide};
 use crate::segments::{Line, Place};
 use crate::setup::{least, most};
@@ -16,35 +19,26 @@ pub(crate) struct Row {
     /// Depth, metres; 1 in a plan view (see [`crate::paint::Plane`]).
     depth: Vec<f32>,
     ids: Vec<u16>,
+    /// By what textures and shadows multiply the color.
+    bright: Vec<f32>,
     /// Red in the lowest byte, then green and blue.
     colors: Vec<u32>,
 }
 
-/// How a channel goes along a segment but for textures, 0 to 255:
-/// `base + k * step + depth * (at + k * du)` in its k-th pixel, within bounds.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct Channel {
-    pub base: f32,
-    pub step: f32,
-    pub at: f32,
-    pub du: f32,
-    pub low: f32,
-    pub high: f32,
-}
-
-impl Channel {
-    #[inline(always)]
-    fn at(&self, k: f32, depth: f32) -> f32 {
-        let x = (self.base + self.step * k) + depth * (self.at + self.du * k);
-        least(most(x, self.low), self.high)
-    }
+/// How a channel goes along a segment but for textures, 0 to 255.
+#[derive(Clone, Copy)]
+pub(crate) enum Hue {
+    /// Within bounds, `base + depth * (at + k * du)` in the k-th pixel.
+    Linear { plane: RowPlane, low: Vec4, high: Vec4 },
+    /// By so much more from pixel to pixel.
+    Ramp { start: Vec4, step: Vec4 },
 }
 
 /// What a segment looks like.
 #[derive(Clone, Copy)]
 pub(crate) struct Look {
     pub id: u16,
-    pub channels: [Channel; 3],
+    pub hue: Hue,
     pub place: Place,
 }
 
@@ -60,6 +54,7 @@ impl Row {
     pub fn resize(&mut self, width: usize) {
         let n = width.div_ceil(LANES) * LANES + LANES;
         self.depth.resize(n, 1.0);
+        self.bright.resize(n, 1.0);
         self.ids.resize(n, 0);
         self.colors.resize(n, 0);
     }
@@ -96,13 +91,17 @@ impl Row {
         ground: Option<OnGround>,
     ) {
         let lanes = begin..begin + (end - begin).div_ceil(LANES) * LANES;
-        self.ids[lanes.clone()].fill(look.id);
-        let (colors, depth) = (&mut self.colors[lanes.clone()], &self.depth[lanes]);
-        match ground {
-            None => color(colors, depth, look, atlas),
-            Some(OnGround { quads, x, z }) => {
-                color_ground(colors, depth, look, atlas, quads, [x, z])
-            }
+        let Row { depth, ids, bright, colors, .. } = self;
+        let depth = &depth[lanes.clone()];
+        let (bright, colors) = (&mut bright[lanes.clone()], &mut colors[lanes.clone()]);
+        ids[lanes].fill(look.id);
+        texture(bright, depth, &look.place, atlas);
+        if let Some(OnGround { quads, x, z }) = ground {
+            darken(bright, depth, quads, [x, z]);
+        }
+        match &look.hue {
+            Hue::Linear { plane, low, high } => linear(colors, bright, depth, plane, *low, *high),
+            Hue::Ramp { start, step } => ramp(colors, bright, *start, *step),
         }
     }
 
@@ -130,39 +129,64 @@ impl Row {
     }
 }
 
-// The next two differ in what the ground adds. Lists are arguments of their own, by which the
-// compiler knows that they don't overlap.
+// Loops over the pixels of a segment. Each has few numbers that stay the same, so that they stay in
+// registers. Lists are arguments of their own, by which the compiler knows that they don't overlap.
 
+/// The brightness of a texture.
 #[inline(always)]
-fn color(colors: &mut [u32], depth: &[f32], look: &Look, atlas: &Atlas) {
-    let Look { channels: [r, g, b], place: Place { begin, log2_side, u, v }, .. } = *look;
+fn texture(bright: &mut [f32], depth: &[f32], place: &Place, atlas: &Atlas) {
+    let Place { begin, log2_side, u, v } = *place;
     let mask = (1u32 << log2_side) - 1;
     for k in 0..depth.len() {
         let (d, x) = (depth[k], k as u32 as f32);
-        let (texel, within) = texel(u.at(x, d), v.at(x, d), begin, mask, log2_side);
-        let bright = mixed(atlas[texel as usize % N_ATLAS], within) * PER_TEXEL;
-        colors[k] = packed([r.at(x, d), g.at(x, d), b.at(x, d)], bright);
+        let (u, v) = (u.at(x, d), v.at(x, d));
+        let texel = begin + ((v >> 8 & mask) << log2_side) + (u >> 8 & mask);
+        let within = u & 0xff | (v & 0xff) << 16;
+        bright[k] = mixed(atlas[texel as usize % N_ATLAS], within) * PER_TEXEL;
     }
 }
 
+/// Makes what stands on the ground's dark cells darker.
 #[inline(always)]
-fn color_ground(
-    colors: &mut [u32],
-    depth: &[f32],
-    look: &Look,
-    atlas: &Atlas,
-    quads: &[u32; N_GROUND],
-    [ground_x, ground_z]: [Line; 2],
-) {
-    let Look { channels: [r, g, b], place: Place { begin, log2_side, u, v }, .. } = *look;
-    let mask = (1u32 << log2_side) - 1;
+fn darken(bright: &mut [f32], depth: &[f32], quads: &[u32; N_GROUND], [x, z]: [Line; 2]) {
+    const MOST: i32 = 256 * (MAX_CELLS as i32 - 1);
     for k in 0..depth.len() {
+        let (d, at) = (depth[k], k as u32 as f32);
+        let x = (x.at(at, d) as i32).clamp(0, MOST) as u32;
+        let z = (z.at(at, d) as i32).clamp(0, MOST) as u32;
+        let cell = (z >> 8) * MAX_CELLS as u32 + (x >> 8);
+        let within = x & 0xff | (z & 0xff) << 16;
+        bright[k] *= mixed(quads[(cell as usize).min(N_GROUND - 1)], within) * PER_CELL;
+    }
+}
+
+/// [`Hue::Linear`].
+#[inline(always)]
+fn linear(
+    colors: &mut [u32],
+    bright: &[f32],
+    depth: &[f32],
+    plane: &RowPlane,
+    low: Vec4,
+    high: Vec4,
+) {
+    let RowPlane { base, at, du } = *plane;
+    for k in 0..depth.len().min(bright.len()) {
         let (d, x) = (depth[k], k as u32 as f32);
-        let (texel, within) = texel(u.at(x, d), v.at(x, d), begin, mask, log2_side);
-        let bright = mixed(atlas[texel as usize % N_ATLAS], within) * PER_TEXEL;
-        let (cell, within) = cell(ground_x.at(x, d), ground_z.at(x, d));
-        let shade = mixed(quads[(cell as usize).min(N_GROUND - 1)], within) * PER_CELL;
-        colors[k] = packed([r.at(x, d), g.at(x, d), b.at(x, d)], bright * shade);
+        let r = least(most(base.x + d * (at.x + du.x * x), low.x), high.x);
+        let g = least(most(base.y + d * (at.y + du.y * x), low.y), high.y);
+        let b = least(most(base.z + d * (at.z + du.z * x), low.z), high.z);
+        colors[k] = packed([r, g, b], bright[k]);
+    }
+}
+
+/// [`Hue::Ramp`].
+#[inline(always)]
+fn ramp(colors: &mut [u32], bright: &[f32], start: Vec4, step: Vec4) {
+    for k in 0..bright.len() {
+        let x = k as u32 as f32;
+        let channels = [start.x + step.x * x, start.y + step.y * x, start.z + step.z * x];
+        colors[k] = packed(channels, bright[k]);
     }
 }
 
@@ -172,30 +196,18 @@ const PER_CELL: f32 = 1.0 / (255.0 * 65536.0);
 /// From what [`mixed`] gives of texels to a factor.
 const PER_TEXEL: f32 = 1.0 / (128.0 * 65536.0);
 
-/// The texel of a place on a texture, and how far right (low 16 bits) and down of it that is.
-#[inline(always)]
-fn texel(u: u32, v: u32, begin: u32, mask: u32, log2_side: u32) -> (u32, u32) {
-    let texel = begin + ((v >> 8 & mask) << log2_side) + (u >> 8 & mask);
-    (texel, u & 0xff | (v & 0xff) << 16)
-}
-
-/// The cell of a place on the ground's grid, and how far within.
-#[inline(always)]
-fn cell(x: u32, z: u32) -> (u32, u32) {
-    const MOST: i32 = 256 * (MAX_CELLS as i32 - 1);
-    let (x, z) = ((x as i32).clamp(0, MOST) as u32, (z as i32).clamp(0, MOST) as u32);
-    ((z >> 8) * MAX_CELLS as u32 + (x >> 8), x & 0xff | (z & 0xff) << 16)
-}
-
 /// Mixes the four bytes of a quad by how far right (low 16 bits) and down the point is; 65,536
 /// times their mean.
 #[inline(always)]
 fn mixed(quad: u32, within: u32) -> f32 {
     let (right, down) = (within & 0xffff, within >> 16);
+    // Two bytes at once: what one half borrows from the other for a moment, it gives back.
     let (left_bytes, right_bytes) = (quad & 0x00ff_00ff, quad >> 8 & 0x00ff_00ff);
-    let rows = left_bytes * (256 - right) + right_bytes * right;
+    let step = right_bytes.wrapping_sub(left_bytes).wrapping_mul(right);
+    let rows = (left_bytes << 8).wrapping_add(step);
     let (above, below) = (rows & 0xffff, rows >> 16);
-    (above * (256 - down) + below * down) as i32 as f32
+    let step = below.wrapping_sub(above).wrapping_mul(down);
+    (above << 8).wrapping_add(step) as i32 as f32
 }
 
 /// Three channels, each times `bright`, without their fractions; more than 255 is 255.

@@ -77,13 +77,10 @@ pub(crate) struct Line {
 }
 
 impl Line {
-    /// In the k-th pixel, at a depth.
+    /// In the k-th pixel, at a depth; any number from 2^22 on.
     #[inline(always)]
     pub fn at(&self, k: f32, depth: f32) -> u32 {
-        /// Farther off is no sane picture.
-        const FAR: f32 = 2e6;
         let x = self.base + depth * (self.at + self.du * k);
-        let x = most(least(x, FAR), -FAR);
         (x + WHOLE).to_bits().wrapping_sub(WHOLE.to_bits())
     }
 }

@@ -14,11 +14,11 @@ use glam::Vec4;
 use crate::frame::Frame;
 use crate::lens::Lens;
 use crate::light::Shadows;
-use crate::paint::{Kind, Paint, Painter, Plane, Sight};
+use crate::paint::{Kind, Linear, Paint, Painter, Plane, Sight};
 use crate::points::Points;
 use crate::raster::{Blocks, LANES, NOBODY, Target, Wide, owner_parts};
-use crate::row::{Channel, Look, OnGround, Row};
-use crate::segments::{Line, STEP, Segment, Segments};
+use crate::row::{Hue, Look, Row};
+use crate::segments::{STEP, Segment, Segments};
 use crate::texture::{Atlas, Texture, Tile, atlas};
 
 /// Buffers for shading, used again and again.
@@ -127,14 +127,6 @@ impl pulp::NullaryFnOnce for Rows<'_> {
                 ids.as_deref_mut().map(|i| &mut i[line.clone()]),
             );
         }
-    }
-}
-
-/// Channels that grow by a step from pixel to pixel.
-#[inline(always)]
-fn ramp(channels: &mut [Channel; 3], start: Vec4, step: Vec4) {
-    for (c, channel) in channels.iter_mut().enumerate() {
-        *channel = Channel { base: start[c], step: step[c], high: 255.0, ..Channel::default() };
     }
 }
 
@@ -274,49 +266,34 @@ impl Rows<'_> {
             let (segment, place) = segments.get(k);
             let (begin, end) = (segment.begin as usize, segment.end as usize);
             let mut ground = None;
-            let (mut id, mut channels) = (EntityId::NOTHING.0, [Channel::default(); 3]);
-            match paints.get(segment.paint as usize) {
+            let (id, hue) = match paints.get(segment.paint as usize) {
                 None => {
                     let (here, there) = (sky[begin / STEP], sky[begin / STEP + 1]);
                     let step = (there - here) * (1.0 / STEP as f32);
-                    ramp(&mut channels, here + step * (begin % STEP) as f32, step);
+                    let start = here + step * (begin % STEP) as f32;
+                    (EntityId::NOTHING.0, Hue::Ramp { start, step })
                 }
                 Some(paint) => {
-                    id = paint.entity;
-                    match &paint.kind {
-                        Kind::Linear(linear) => {
-                            let plane = linear.shown.from(begin, v);
-                            for (c, channel) in channels.iter_mut().enumerate() {
-                                *channel = Channel {
-                                    base: plane.base[c],
-                                    step: 0.0,
-                                    at: plane.at[c],
-                                    du: plane.du[c],
-                                    low: linear.low[c],
-                                    high: linear.high[c],
-                                };
-                            }
+                    let hue = match &paint.kind {
+                        Kind::Linear(Linear { shown, low, high }) => {
+                            let plane = shown.from(begin, v);
+                            Hue::Linear { plane, low: *low, high: *high }
                         }
                         Kind::Structure(surface) => {
-                            let [here, there] = segment.knots.map(|k| points.shown(k as usize));
-                            let step = (there - here) * (1.0 / segment.between as f32);
-                            ramp(&mut channels, here, step);
                             if let (true, Some(quads)) = (surface.is_floor, quads) {
-                                let plane = self.painter.ground.from(begin, v);
-                                let [x, z] = [0, 1].map(|c| Line {
-                                    base: 256.0 * plane.base[c] - 128.0,
-                                    at: 256.0 * plane.at[c],
-                                    du: 256.0 * plane.du[c],
-                                });
-                                ground = Some(OnGround { quads, x, z });
+                                ground = Some(self.painter.on_ground(quads, begin, v));
                             }
+                            let [start, there] = segment.knots.map(|k| points.shown(k as usize));
+                            let step = (there - start) * (1.0 / segment.between as f32);
+                            Hue::Ramp { start, step }
                         }
                         // All are lit by now.
-                        Kind::Unlit(_) => {}
-                    }
+                        Kind::Unlit(_) => Hue::Ramp { start: Vec4::ZERO, step: Vec4::ZERO },
+                    };
+                    (paint.entity, hue)
                 }
-            }
-            row.fill((begin, end), &Look { id, channels, place }, self.atlas, ground);
+            };
+            row.fill((begin, end), &Look { id, hue, place }, self.atlas, ground);
         }
     }
 

@@ -409,8 +409,8 @@ mod tests {
     ) {
         for (k, (q, o)) in q.iter_mut().zip(o).enumerate() {
             let x = q0 + slope.du * (begin + k as u32) as f32;
-            let x = if x > slope.low { x } else { slope.low };
-            let x = if x < slope.high { x } else { slope.high };
+            let x = if x < slope.low { slope.low } else { x };
+            let x = if x > slope.high { slope.high } else { x };
             if x > *q {
                 (*q, *o) = (x, owner);
             }

@@ -165,7 +165,7 @@ fn sized<T: Clone + Default>(
 
 #[cfg(test)]
 #[path = "../tests/scenes/mod.rs"]
-mod scenes;
+pub(crate) mod scenes;
 
 #[cfg(test)]
 mod tests {

@@ -103,16 +103,15 @@ fn sane(posture: &Posture) -> Posture {
 
 #[cfg(test)]
 mod tests {
-    use chaic_protocol::{AgentId, Persona};
+    use chaic_protocol::AgentId;
 
     use super::*;
     use crate::geometry::FINEST;
+    use crate::view::scenes;
 
     #[test]
     fn a_body_stays_within_its_bounds_and_they_are_close() {
-        let setup = scenes::house();
-        let world = scenes::world(setup);
-        let usual = world.posture(AgentId(0));
+        let usual = scenes::world(scenes::house()).posture(AgentId(0));
         let mut rng = chaic_protocol::rng::Stream::new(1, "bodies", 0);
         for persona in Persona::ALL {
             for _ in 0..40 {

@@ -10,7 +10,8 @@ use chaic_protocol::geom::{Camera, Pose, Rect, yaw_rotation};
 use chaic_protocol::observation::Images;
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{AgentId, ClassId, EntityId, Frame, Quat, TaskId, Vec2, Vec3};
-use chaic_render::{Appearance, Channels, MAX_SIDE_PX, Scene, View, plan};
+use chaic_render::geometry::FINEST;
+use chaic_render::{Appearance, Channels, MAX_SIDE_PX, Scene, View, gltf_out, plan};
 use chaic_world::{
     Arm, Floor, FloorMaterial, Opening, Person, PersonState, Place, Posture, Room, RoomKind, Rules,
     Setup, State, Thing, ThingState, Wall, World,
@@ -386,10 +387,31 @@ pub fn check(case: &Case, [one, three]: &[ThreadPool; 2]) {
             assert!(!wanted || is_same, "{view:?}: other channels disturb {channel}");
         }
     }
+    check_geometry(case, &scene);
     let usual = draw(Appearance::Canonical, views);
     for (a, b) in usual.iter().zip(&images) {
         assert!(a.depth_m == b.depth_m && a.ids == b.ids, "{appearance} is more than color");
     }
+}
+
+/// The same shapes as plain data, and as a file.
+fn check_geometry(case: &Case, scene: &Scene) {
+    let level = case.state.things.len() % (FINEST + 1);
+    let geometry = scene.geometry(&case.state, &case.postures, level);
+    for mesh in &geometry.meshes {
+        let n = mesh.positions.len();
+        assert_eq!(n, mesh.normals.len());
+        for triangle in &mesh.triangles {
+            let is_there = triangle.corners.iter().all(|c| (*c as usize) < n);
+            assert!(is_there, "{triangle:?} of a mesh with {n} corners");
+            assert!(usize::from(triangle.skin) < mesh.skins.len(), "{triangle:?} has no skin");
+        }
+    }
+    let n = geometry.meshes.len();
+    assert!(geometry.instances.iter().all(|i| (i.mesh as usize) < n), "a mesh is missing");
+    let cameras: Vec<(String, Camera)> =
+        case.views.iter().map(|v| ("eye".to_owned(), v.camera)).collect();
+    assert!(gltf_out::glb(&geometry, &|_| "thing", &cameras).starts_with(b"glTF"));
 }
 
 fn check_view(case: &Case, view: &View, images: &Images) {

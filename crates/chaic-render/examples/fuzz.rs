@@ -1,8 +1,9 @@
 //! Draws pictures of random and hostile worlds:
 //! `cargo run --release -p chaic-render --example fuzz -- 10000 [FIRST]`.
 //!
-//! So many seeds, from FIRST on (0 if it isn't given), each a setup, a state, cameras and a plan. It says which seeds break a promise and
-//! ends with exit code 1 if there are any. See `tests/hostile` for what is promised.
+//! So many seeds, from FIRST on (0 if it isn't given), each a setup, a state, cameras and a plan.
+//! It says which seeds break a promise, and ends with exit code 1 if there are any. See
+//! `tests/hostile` for what is promised.
 
 #[path = "../tests/hostile/mod.rs"]
 mod hostile;

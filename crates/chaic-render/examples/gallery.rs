@@ -2,8 +2,8 @@
 //! `cargo run --release -p chaic-render --example gallery -- FOLDER`.
 //!
 //! It writes contact sheets of every class in its variants and of every kind of person in every
-//! posture, what the helper of each task sees first, and two hand-made worlds; and it prints how
-//! many triangles a furnished house has at each level of detail. docs/gallery.md shows the sheets.
+//! posture, what the helper of each task sees first, by day and in other appearances, and two
+//! hand-made worlds; and it prints how many triangles a furnished house has at each level of detail. docs/gallery.md shows the sheets.
 
 #[path = "../tests/scenes/mod.rs"]
 mod scenes;
@@ -16,7 +16,7 @@ use chaic_protocol::geom::Camera;
 use chaic_protocol::{AgentId, ClassId, Role, TaskId, Vec3};
 use chaic_render::geometry::Geometry;
 use chaic_render::text::{self, Align};
-use chaic_render::{Channels, Scene, View, image_out, plan};
+use chaic_render::{Appearance, Channels, LEVEL_RADIUS_PX, Scene, View, image_out, plan};
 use chaic_world::{Posture, Setup, Thing, World};
 use image::RgbImage;
 use image::codecs::png::{CompressionType, FilterType as PngFilter, PngEncoder};
@@ -31,15 +31,21 @@ fn main() -> Result<()> {
     std::fs::create_dir_all(folder)?;
     classes(folder)?;
     people(folder)?;
-    tasks(folder)?;
+    tasks(folder, Appearance::Canonical, "task_views", 224)?;
+    tasks(folder, Appearance::Evening, "task_views_evening", 192)?;
+    tasks(folder, VARIED[0], "task_views_varied", 192)?;
+    appearances(folder)?;
     let (house, street) = (scenes::world(scenes::house()), scenes::world(scenes::street()));
     let scene = Scene::new(house.setup());
     let levels = scene.geometry_at_all_levels(house.state(), &[]);
     let counts = levels.each_ref().map(Geometry::count_triangles).map(|n| n.to_string());
     let n = house.setup().things.len();
+    let up_to = LEVEL_RADIUS_PX[..counts.len() - 1].iter().map(f32::to_string);
     println!(
-        "triangles of a house of eight rooms with {n} things, by level: {}",
-        counts.join(", ")
+        "triangles of a house of eight rooms with {n} things: {}; levels for half diagonals up to {} \
+         pixels, and above",
+        counts.join(", "),
+        up_to.collect::<Vec<_>>().join(", ")
     );
     for (name, world, cameras) in [
         (
@@ -124,7 +130,7 @@ fn label(picture: &mut RgbImage, words: &str) {
 /// Every class in four variants, twelve pictures a line.
 fn classes(folder: &Path) -> image::ImageResult<()> {
     let all: Vec<ClassId> = ClassId::all().filter(|c| c.info().role != Role::Person).collect();
-    for (page, group) in all.chunks(all.len().div_ceil(3)).enumerate() {
+    for (page, group) in all.chunks(all.len().div_ceil(5)).enumerate() {
         let pictures = group.iter().flat_map(|c| (0..4).map(|v| portrait(*c, v)));
         let pictures: Vec<RgbImage> = pictures.collect();
         save(&image_out::grid(&pictures, 12), &folder.join(format!("classes_{page}.png")))?;
@@ -249,18 +255,45 @@ fn together() -> RgbImage {
 }
 
 /// What the helper sees first in an episode of each task.
-fn tasks(folder: &Path) -> Result<()> {
-    const SIDE_PX: u32 = 256;
+fn tasks(folder: &Path, appearance: Appearance, name: &str, side_px: u32) -> Result<()> {
     let mut pictures = Vec::new();
     for task in TaskId::all() {
         let world = scenes::world(generate(task, Seeds { place: 7, episode: 7 })?);
         let postures: Vec<Posture> = world.setup().agents().map(|a| world.posture(a)).collect();
-        let eye = world.eye(AgentId::HELPER, SIDE_PX);
-        let scene = Scene::new(world.setup());
+        let eye = world.eye(AgentId::HELPER, side_px);
+        let scene = Scene::with_appearance(world.setup(), appearance);
         let mut picture = seen(&scene, &world, &postures, eye, Some(AgentId::HELPER));
         label(&mut picture, task.name());
         pictures.push(picture);
     }
-    save(&image_out::grid(&pictures, 4), &folder.join("task_views.png"))?;
+    save(&image_out::grid(&pictures, 4), &folder.join(format!("{name}.png")))?;
     Ok(())
+}
+
+/// Appearances that are drawn from seeds.
+const VARIED: [Appearance; 2] = [Appearance::Varied { seed: 3 }, Appearance::Varied { seed: 8 }];
+
+/// Two rooms and a street, in a line for each appearance.
+fn appearances(folder: &Path) -> image::ImageResult<()> {
+    const SIDE_PX: u32 = 168;
+    let (house, street) = (scenes::world(scenes::house()), scenes::world(scenes::street()));
+    let places = [
+        (&house, [0.7, 1.65, 4.2], -0.7, -0.2),
+        (&house, [14.0, 1.2, 4.2], -0.7, -0.1),
+        (&street, [0.5, 1.65, 4.5], 0.1, 0.0),
+    ];
+    let mut pictures = Vec::new();
+    for appearance in [Appearance::Canonical, Appearance::Evening, VARIED[0], VARIED[1]] {
+        for (k, (world, eye, yaw, pitch)) in places.into_iter().enumerate() {
+            let scene = Scene::with_appearance(world.setup(), appearance);
+            let postures: Vec<Posture> = world.setup().agents().map(|a| world.posture(a)).collect();
+            let camera = camera(eye, yaw, pitch, SIDE_PX, SIDE_PX);
+            let mut picture = picture(&scene, world, &postures, camera);
+            if k == 0 {
+                label(&mut picture, &appearance.to_string());
+            }
+            pictures.push(picture);
+        }
+    }
+    save(&image_out::grid(&pictures, 3), &folder.join("appearances.png"))
 }

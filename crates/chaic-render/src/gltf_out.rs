@@ -19,14 +19,15 @@ use gltf::json::scene::UnitQuaternion;
 use gltf::json::validation::{Checked::Valid, USize64};
 use gltf::json::{Accessor, Asset, Buffer, Index, Material, Mesh, Node, Root, Scene};
 
-use crate::geometry::{Geometry, Gloss, MeshData, SkinData, TriangleData};
+use crate::geometry::{Geometry, Gloss, InstanceData, MeshData, SkinData, TriangleData};
 use crate::mesh::unit;
 use crate::texture::shown_from_linear;
 
 /// A scene as the bytes of a `.glb` file.
 ///
 /// There is a node `class#id` for each instance, with both as extras; a mesh for each shape in each
-/// tint, with a primitive for each skin; and a node for each camera. `class_of` names what an
+/// tint and factor, with a primitive for each skin; and a node for each camera. A material is shared
+/// by all that look the same; its color is the skin's or the tint, times the factor, at most 1. `class_of` names what an
 /// entity is. The corners of flat triangles are their own, so that they have one normal.
 pub fn glb(
     geometry: &Geometry,
@@ -40,9 +41,13 @@ pub fn glb(
     for instance in &geometry.instances {
         let class = class_of(instance.entity);
         let parts = &shapes[instance.mesh as usize];
-        let key = (instance.mesh, instance.tint.map(|tint| tint.map(f32::to_bits)));
+        let key = (
+            instance.mesh,
+            instance.tint.map(|tint| tint.map(f32::to_bits)),
+            instance.factor.map(f32::to_bits),
+        );
         let mesh = (!parts.is_empty())
-            .then(|| *meshes.entry(key).or_insert_with(|| file.mesh(class, parts, instance.tint)));
+            .then(|| *meshes.entry(key).or_insert_with(|| file.mesh(class, parts, instance)));
         let m = Mat3::from_cols_array_2d(&instance.rotation);
         let id = instance.entity.0;
         nodes.push(file.root.push(Node {
@@ -145,10 +150,13 @@ impl File {
         at
     }
 
-    fn mesh(&mut self, class: &str, parts: &[Part], tint: Option<[f32; 3]>) -> Index<Mesh> {
+    fn mesh(&mut self, class: &str, parts: &[Part], instance: &InstanceData) -> Index<Mesh> {
         let mut primitives = Vec::with_capacity(parts.len());
         for part in parts {
-            let color = tint.filter(|_| part.skin.tinted).unwrap_or(part.skin.color);
+            let color = instance.tint.filter(|_| part.skin.tinted).unwrap_or(part.skin.color);
+            let color = Vec3::from(color) * Vec3::from(instance.factor);
+            // A material can't reflect more light than there is.
+            let color = color.clamp(Vec3::ZERO, Vec3::ONE).to_array();
             let attributes = [
                 (Valid(Semantic::Positions), part.positions),
                 (Valid(Semantic::Normals), part.normals),

@@ -125,7 +125,7 @@ impl Ground {
         let size = all.size();
         let most = MAX_CELLS as f32 - 1.0;
         let cells_per_m = (most / size.x.max(size.y)).clamp(0.2, 25.0);
-        let count = |m: f32| ((m * cells_per_m) as usize + 1).min(MAX_CELLS);
+        let count = |m: f32| ((m * cells_per_m) as usize).min(MAX_CELLS - 1) + 1;
         let (nx, nz) = (count(size.x), count(size.y));
         let height = setup.ceiling_m.unwrap_or(3.0);
         let lamp = |r: &chaic_world::Room| {
@@ -148,7 +148,9 @@ impl Ground {
             }
             let (x0, z0) = ground.cell(room.rect.min);
             let (x1, z1) = ground.cell(room.rect.max);
-            for z in z0..=z1 {
+            // Corners may be swapped.
+            let (x0, x1) = (x0.min(x1), x0.max(x1));
+            for z in z0.min(z1)..=z0.max(z1) {
                 ground.rooms[z * nx + x0..=z * nx + x1].fill(k as u8);
             }
         }

@@ -112,6 +112,8 @@ impl Scene {
         let mut instances =
             Vec::with_capacity(self.structure.len() + self.things.len() + bodies.len());
         for (k, (entity, mesh)) in self.structure.iter().enumerate() {
+            // Pieces of ceiling lie in one plane and overlap: they are of one color.
+            let k = if *entity == EntityId::CEILING { usize::MAX } else { k };
             instances.push(Instance {
                 entity: *entity,
                 shape: Shape::Fixed(mesh),
@@ -143,7 +145,7 @@ impl Scene {
                 room: Some(self.ground.room_at(pose.position)),
             });
         }
-        for (k, (class, tint)) in self.things.iter().enumerate() {
+        for (k, (class, tint)) in self.things.iter().enumerate().take(N_IDS) {
             let Some(thing) = state.things.get(k) else { break };
             let Some(rotation) = shown_rotation(thing) else { continue };
             instances.push(Instance {
@@ -211,6 +213,9 @@ impl Scene {
         }
     }
 }
+
+/// As many things as ids can name; what comes after them has none, and can't be drawn.
+const N_IDS: usize = (u16::MAX - EntityId::FIRST_OBJECT.0) as usize + 1;
 
 /// The shadows of what lay still when it was last looked at in color.
 #[derive(Debug, Default)]

@@ -2,11 +2,11 @@
 
 mod scenes;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use chaic_protocol::{AgentId, EntityId, Vec3};
 use chaic_render::geometry::{FINEST, Geometry};
-use chaic_render::{Scene, gltf_out};
+use chaic_render::{Appearance, Scene, gltf_out};
 use chaic_world::World;
 use glam::{Mat4, Quat};
 use scenes::{house, street, world};
@@ -22,8 +22,13 @@ fn class_of(entity: EntityId) -> &'static str {
 }
 
 fn geometry_of(world: &World) -> Geometry {
+    geometry_in(world, Appearance::Canonical)
+}
+
+fn geometry_in(world: &World, appearance: Appearance) -> Geometry {
     let postures: Vec<_> = world.setup().agents().map(|a| world.posture(a)).collect();
-    Scene::new(world.setup()).geometry(world.state(), &postures, FINEST)
+    let scene = Scene::with_appearance(world.setup(), appearance);
+    scene.geometry(world.state(), &postures, FINEST)
 }
 
 /// Triangles, and the bounds of their corners in the world.
@@ -135,4 +140,53 @@ fn shapes_materials_and_cameras_are_as_they_should() {
     assert_eq!(Vec3::from(origin), eye.eye_in_world);
     let ahead = Quat::from_array(rotation) * Vec3::NEG_Z;
     assert!((ahead - eye.world_from_camera * Vec3::NEG_Z).length() < 1e-6);
+}
+
+/// By name of node, the colors of its materials as bits.
+fn colors_in(file: &[u8]) -> BTreeMap<String, Vec<BTreeSet<[u32; 3]>>> {
+    let gltf = gltf::Gltf::from_slice(file).expect("the file is valid");
+    let mut colors: BTreeMap<String, Vec<BTreeSet<[u32; 3]>>> = BTreeMap::new();
+    for node in gltf.nodes() {
+        let Some(mesh) = node.mesh() else { continue };
+        let of_material = |primitive: gltf::Primitive| {
+            let [r, g, b, a] = primitive.material().pbr_metallic_roughness().base_color_factor();
+            assert!([r, g, b].iter().all(|c| (0.0..=1.0).contains(c)) && a == 1.0);
+            [r, g, b].map(f32::to_bits)
+        };
+        let name = node.name().expect("nodes have names").to_owned();
+        colors.entry(name).or_default().push(mesh.primitives().map(of_material).collect());
+    }
+    colors
+}
+
+#[test]
+fn every_instance_has_the_colors_that_its_factor_makes() {
+    let world = world(house());
+    let geometry = geometry_in(&world, Appearance::Varied { seed: 5 });
+    let file = gltf_out::glb(&geometry, &class_of, &[]);
+    let found = colors_in(&file);
+    let mut wanted: BTreeMap<String, Vec<BTreeSet<[u32; 3]>>> = BTreeMap::new();
+    for instance in &geometry.instances {
+        let mesh = &geometry.meshes[instance.mesh as usize];
+        let used: BTreeSet<u8> = mesh.triangles.iter().map(|t| t.skin).collect();
+        let color = |k: u8| {
+            let skin = mesh.skins[usize::from(k)];
+            let own = instance.tint.filter(|_| skin.tinted).unwrap_or(skin.color);
+            let times = |c: usize| (own[c] * instance.factor[c]).min(1.0).to_bits();
+            [times(0), times(1), times(2)]
+        };
+        let name = format!("{}{}", class_of(instance.entity), instance.entity);
+        wanted.entry(name).or_default().push(used.into_iter().map(color).collect());
+    }
+    assert_eq!(found, wanted);
+    assert!(found != colors_in(&gltf_out::glb(&geometry_of(&world), &class_of, &[])));
+
+    // Two of a shape with one factor share a mesh, and differ from one with another.
+    let mut three = geometry.clone();
+    let shape = geometry.instances.iter().find(|i| i.entity.is_object()).expect("there are things");
+    let of = |factor: [f32; 3]| chaic_render::geometry::InstanceData { factor, ..*shape };
+    three.instances = vec![of([0.5; 3]), of([0.5; 3]), of([0.25; 3])];
+    let file = gltf_out::glb(&three, &class_of, &[]);
+    let gltf = gltf::Gltf::from_slice(&file).expect("the file is valid");
+    assert_eq!((gltf.nodes().count(), gltf.meshes().count()), (3, 2));
 }

@@ -238,6 +238,73 @@ fn pictures_and_episodes() {
     }
 }
 
+/// What a wrong appearance is answered with.
+const APPEARANCES: &str = "expected canonical, evening or varied:SEED";
+
+#[test]
+fn appearances_change_colors_and_nothing_else() {
+    let dir = workshop();
+    let at = dir.path();
+    let render = ["render", "short/no_constraint-0.json", "--frame", "20", "--size", "64"];
+    let folders = ["canonical", "evening", "varied:3"].map(|appearance| {
+        well(at, &[&render[..], &["--appearance", appearance, "--out", appearance]].concat());
+        at.join(appearance)
+    });
+    well(at, &[&render[..], &["--out", "usual"]].concat());
+    let file = |folder: &Path, name: &str| fs::read(folder.join(name)).expect("it was written");
+    for name in ["rgb.png", "depth.png", "ids.png", "ids.json", "plan.png"] {
+        assert!(file(&at.join("usual"), name) == file(&folders[0], name), "{name}");
+        let others: Vec<Vec<u8>> = folders.iter().map(|folder| file(folder, name)).collect();
+        let is_color = ["rgb.png", "plan.png"].contains(&name);
+        for (a, b) in [(0, 1), (0, 2), (1, 2)] {
+            assert_eq!(others[a] != others[b], is_color, "{name} of {a} and {b}");
+        }
+    }
+    for wrong in ["", "dusk", "varied", "varied:-1", "varied:x"] {
+        let out = chaic(at, &[&render[..], &["--appearance", wrong, "--out", "w"]].concat());
+        let said = text(&out.stderr);
+        assert_eq!(out.status.code(), Some(2), "{wrong:?}: {said}");
+        assert!(said.contains(APPEARANCES) && said.contains("--appearance"), "{wrong:?}: {said}");
+    }
+    assert!(!at.join("w").exists());
+}
+
+#[test]
+fn a_replay_looks_like_what_was_played() {
+    let dir = workshop();
+    let at = dir.path();
+    let eval = ["eval", "--episodes", "short", "--task", "no_constraint", "--helper", "rhp"];
+    let id = "no_constraint/gen/0";
+    let pictures = ["canonical", "evening"].map(|appearance| {
+        let said = ["--size", "48", "--appearance", appearance, "--out", appearance];
+        well(at, &[&eval[..], &said].concat());
+        assert!(well(at, &["verify", appearance]).contains("1 trace"));
+        let video = format!("{appearance}.gif");
+        well(at, &["replay", appearance, id, "--every", "40", "--out", &video]);
+        fs::read(at.join(video)).expect("it was written")
+    });
+    assert!(pictures[0] != pictures[1], "the light of what was played is lost");
+    let trace = |run: &str| {
+        let path = at.join(run).join("traces/no_constraint/rhp/gen-0-s0.jsonl");
+        fs::read_to_string(path).expect("it is text")
+    };
+    let (day, evening) = (trace("canonical"), trace("evening"));
+    assert_eq!(day, evening.replacen(",\"appearance\":\"evening\"", "", 1));
+
+    // A trace that says something else than its run is found out, and so is nonsense.
+    for (changed, words) in [
+        (day, "the first line is not what this run has: appearance"),
+        (evening.replacen("\"evening\"", "\"dusk\"", 1), APPEARANCES),
+    ] {
+        fs::write(at.join("evening/traces/no_constraint/rhp/gen-0-s0.jsonl"), changed)
+            .expect("there is room");
+        let said = ill(at, &["verify", "evening"]);
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    let said = ill(at, &["replay", "evening", id, "--out", "x.gif"]);
+    assert!(said.contains("line 1") && said.contains(APPEARANCES), "{said}");
+}
+
 #[test]
 fn scenes_as_files_and_what_the_machine_reaches() {
     let dir = tempfile::tempdir().expect("there is room");
@@ -304,6 +371,7 @@ fn wrong_option_values_end_in_the_same_exit_code() {
         &["eval", "--helper", "nobody", "--out", "r"],
         &["eval", "--size", "5", "--out", "r"],
         &["eval", "--seeds", "0", "--out", "r"],
+        &["eval", "--appearance", "varied", "--out", "r"],
         &["eval", "--set", "world.gravity=1", "--out", "r"],
         &["eval", "--split", "test", "--episodes", "short", "--out", "r"],
         &["eval", "--resume", "--out", "run", "--first", "1"],
@@ -396,6 +464,8 @@ fn errors_are_clear() {
         (&["eval", "--split", "gen:5..5", "--out", "r"], "no split `gen:5..5`"),
         (&["eval", "--size", "5", "--out", "r"], "--size is 5"),
         (&["eval", "--seeds", "0", "--out", "r"], "at least 1"),
+        (&["eval", "--appearance", "dusk", "--out", "r"], APPEARANCES),
+        (&["render", "shopping/test/00", "--appearance", "varied:x", "--out", "r"], APPEARANCES),
         (&["eval", "--rules", "mine", "--out", "r"], "they are paper and compat"),
         (&["eval", "--set", "world.gravity=1", "--out", "r"], "world.dropped_counts"),
         (&["eval", "--episodes", "nowhere", "--out", "r"], "nowhere"),

@@ -228,5 +228,6 @@ fn header(staging: &Staging<'_>, setup: &Setup, cast: &Cast) -> Header {
             })
             .collect(),
         renderer: "cpu".to_owned(),
+        appearance: staging.appearance,
     }
 }

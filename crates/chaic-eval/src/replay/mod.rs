@@ -147,7 +147,7 @@ impl<'a> Replay<'a> {
     /// If the episode isn't the one that was played.
     pub fn new(trace: &'a Trace, episode: &Episode) -> Result<Replay<'a>> {
         let world = world_of(&trace.header, episode)?;
-        let scene = Scene::new(world.setup());
+        let scene = Scene::with_appearance(world.setup(), trace.header.appearance);
         let n = world.setup().people.len();
         let last = trace.end().map(|e| e.frame);
         let last = last.or_else(|| trace.decisions().last().map(|d| d.frame)).unwrap_or(0);

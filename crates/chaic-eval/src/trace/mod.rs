@@ -14,6 +14,7 @@ pub use write::Writer;
 use chaic_protocol::capability::Persona;
 use chaic_protocol::observation::{Grants, Senses};
 use chaic_protocol::{AgentId, TaskId};
+use chaic_render::Appearance;
 use serde::{Deserialize, Serialize};
 
 use crate::digest::Digest;
@@ -55,6 +56,34 @@ pub struct Header {
     pub people: Vec<Participant>,
     /// What made the images; only `cpu` gives the same on every machine.
     pub renderer: String,
+    /// How what eyes see was lit and colored; absent for the benchmark's own look.
+    #[serde(default, skip_serializing_if = "is_canonical", with = "as_text")]
+    pub appearance: Appearance,
+}
+
+// `skip_serializing_if` hands over a reference.
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_canonical(appearance: &Appearance) -> bool {
+    *appearance == Appearance::Canonical
+}
+
+/// An appearance as the command line has it.
+mod as_text {
+    use chaic_render::Appearance;
+    use serde::de::Error as _;
+    use serde::{Deserialize as _, Deserializer, Serializer};
+
+    #[allow(clippy::trivially_copy_pass_by_ref)]
+    pub(super) fn serialize<S: Serializer>(
+        appearance: &Appearance,
+        to: S,
+    ) -> Result<S::Ok, S::Error> {
+        to.collect_str(appearance)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Appearance, D::Error> {
+        String::deserialize(from)?.parse().map_err(D::Error::custom)
+    }
 }
 
 impl Header {

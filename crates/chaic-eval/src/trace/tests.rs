@@ -29,6 +29,7 @@ fn header() -> Header {
             senses: Senses::DEPTH_AND_IDS,
         }],
         renderer: "cpu".to_owned(),
+        appearance: Appearance::Canonical,
     }
 }
 
@@ -111,4 +112,27 @@ fn another_version_is_named() {
     let error = parse(other.as_bytes(), Path::new("t.jsonl")).unwrap_err().to_string();
     assert!(error.contains("version 2") && error.contains("version 1"), "{error}");
     assert!(error.contains("chaic 0.1.0"), "{error}");
+}
+
+#[test]
+fn the_appearance_is_told_where_it_is_not_the_usual() {
+    let line = |appearance| serde_json::to_string(&Header { appearance, ..header() }).unwrap();
+    let read = |line: &str| parse(format!("{line}\n").as_bytes(), Path::new("t.jsonl"));
+    let usual = line(Appearance::Canonical);
+    assert!(!usual.contains("appearance"), "as in traces from before there was a choice: {usual}");
+    for appearance in
+        [Appearance::Canonical, Appearance::Evening, Appearance::Varied { seed: u64::MAX }]
+    {
+        assert_eq!(read(&line(appearance)).unwrap().0.header.appearance, appearance);
+    }
+    let evening = line(Appearance::Evening);
+    assert!(evening.ends_with(",\"appearance\":\"evening\"}"), "{evening}");
+    for (wrong, words) in [
+        ("\"dusk\"", "no appearance \"dusk\", expected canonical, evening or varied:SEED"),
+        ("\"varied:-1\"", "no appearance \"varied:-1\""),
+        ("3", "expected a string"),
+    ] {
+        let error = read(&evening.replace("\"evening\"", wrong)).unwrap_err().to_string();
+        assert!(error.starts_with("t.jsonl: line 1: ") && error.contains(words), "{error}");
+    }
 }

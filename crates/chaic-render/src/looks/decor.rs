@@ -147,13 +147,35 @@ fn painting(s: &mut Sculptor) {
 }
 
 fn cushion(s: &mut Sculptor) {
+    // Seams that run in a little between the corners; filling, fullest in the middle, with a button
+    // on either face.
+    const CORNER: [f32; 2] = [0.184, 0.144];
+    const SIDE: [f32; 2] = [0.174, 0.134];
+    let [[x, y], [u, v]] = [CORNER, SIDE];
     s.paint(s.main());
-    s.pillow([0.0, 0.15, 0.0], [0.13, 0.3, 0.38], [0.0; 3], 0.62);
-    if s.style % 2 == 1 {
-        s.paint(paint([214, 206, 190], Finish::Fabric));
-        for z in [-0.07, 0.07] {
-            s.pillow([0.0, 0.15, z], [0.132, 0.28, 0.03], [0.0; 3], 0.62);
-        }
+    s.cut(
+        [0.0, 0.15, 0.0],
+        &[[x, -y], [u, 0.0], [x, y], [0.0, v], [-x, y], [-u, 0.0], [-x, -y], [0.0, -v]],
+        0.02,
+        [0.0, 90.0, 0.0],
+    );
+    s.pillow([0.0, 0.15, 0.0], [0.13, 2.0 * v, 2.0 * u], [0.0; 3], 0.52);
+    if s.within(12.0) {
+        return;
+    }
+    s.paint(s.pick(
+        1,
+        &[
+            paint([222, 214, 198], Finish::Fabric),
+            paint([66, 60, 58], Finish::Fabric),
+            paint([190, 150, 84], Finish::Fabric),
+        ],
+    ));
+    let at = |z: f32, y: f32| [0.0, 0.15 + y, z];
+    for side in [-1.0, 1.0] {
+        s.pipe(&[at(side * x, -y), at(side * u, 0.0), at(side * x, y)], 0.0075);
+        s.pipe(&[at(-x, side * y), at(0.0, side * v), at(x, side * y)], 0.0075);
+        s.ball_turned([0.063 * side, 0.15, 0.0], [0.01, 0.03, 0.03], [0.0; 3]);
     }
 }
 
@@ -216,13 +238,31 @@ fn trunk(s: &mut Sculptor) {
 
 fn woven_box(s: &mut Sculptor) {
     let willow = s.main_or(&[[206, 178, 142], [206, 178, 142], [168, 130, 92], [222, 206, 180]]);
-    s.paint(willow);
+    let darker = |by: f32| willow.color.map(|c| (by * f32::from(c)) as u8);
+    s.paint(if s.within(20.0) { willow } else { paint(darker(0.6), Finish::Wicker) });
     s.shape(&s.class.parts[0]);
+    s.paint(willow);
     s.shape(&s.class.parts[1]);
-    s.paint(paint(willow.color.map(|c| (0.82 * f32::from(c)) as u8), Finish::Wicker));
     if !s.within(20.0) {
-        for k in 0..5 {
-            s.block([0.0, 0.03 + 0.078 * k as f32, 0.0], [0.708, 0.02, 0.708], 0.006);
+        // Strands that go over and under each other.
+        const COLUMNS: usize = 7;
+        const ROWS: usize = 5;
+        let (wide, high) = (0.69 / COLUMNS as f32, 0.41 / ROWS as f32);
+        for (k, tone) in [1.0, 0.84].into_iter().enumerate() {
+            s.paint(paint(darker(tone), Finish::Wicker));
+            for cell in
+                (0..COLUMNS * ROWS).filter(|cell| (cell % COLUMNS + cell / COLUMNS) % 2 == k)
+            {
+                let along = (cell % COLUMNS) as f32 * wide - 0.5 * (0.69 - wide);
+                let y = (cell / COLUMNS) as f32 * high + 0.004;
+                // One lies along, the next stands.
+                let [w, h] = if k == 0 { [wide, 0.72 * high] } else { [0.62 * wide, high] };
+                let y = y + 0.5 * (high - h);
+                for out in [-0.35, 0.35] {
+                    s.block([along, y, out], [w, h, 0.012], 0.0);
+                    s.block([out, y, along], [0.012, h, w], 0.0);
+                }
+            }
         }
     }
     s.paint(WALNUT);
@@ -324,9 +364,43 @@ fn flower_vase(s: &mut Sculptor) {
             [0.012, 0.22],
         ],
     );
-    s.paint(paint([120, 90, 80], Finish::Glossy));
-    for (y, r) in [(0.1, 0.048), (0.145, 0.042)] {
-        s.hoop([0.0, y, 0.0], [0.0, 1.0, 0.0], r - 0.0008, 0.0014);
+    if s.within(12.0) {
+        return;
+    }
+    // Glazed rings at foot, shoulder and rim, the dark inside, and painted blossoms.
+    s.paint(
+        s.pick(2, &[paint([64, 84, 128], Finish::Glossy), paint([112, 66, 50], Finish::Glossy)]),
+    );
+    for (y, r, thick) in [(0.008, 0.0315, 0.003), (0.178, 0.0265, 0.0022), (0.289, 0.0235, 0.0026)]
+    {
+        s.hoop([0.0, y, 0.0], [0.0, 1.0, 0.0], r - 0.5 * thick, thick);
+    }
+    s.paint(paint([40, 34, 32], Finish::Matte));
+    s.lathe([0.0, 0.282, 0.0], &[[0.017, 0.0], [0.0195, 0.0065]]);
+    for k in 0..5 {
+        let (turn, y) = (72.0 * k as f32, 0.098);
+        let (sn, cs) = (sin(turn.to_radians()), cos(turn.to_radians()));
+        let at =
+            |along: f32, up: f32, out: f32| [sn * out + cs * along, y + up, cs * out - sn * along];
+        s.paint(LEAF);
+        for side in [-1.0, 1.0] {
+            s.ball_turned(
+                at(0.013 * side, -0.018, 0.0455),
+                [0.017, 0.007, 0.004],
+                [0.0, turn, 0.0],
+            );
+        }
+        s.paint(s.pick(
+            3,
+            &[WHITE, paint([214, 96, 110], Finish::Matte), paint([236, 196, 90], Finish::Matte)],
+        ));
+        for petal in 0..5 {
+            let a = (72.0 * petal as f32).to_radians();
+            let (dx, dy) = (0.0075 * sin(a), 0.0075 * cos(a));
+            s.ball_turned(at(dx, dy, 0.0475), [0.01, 0.01, 0.004], [0.0, turn, 0.0]);
+        }
+        s.paint(BRASS);
+        s.ball_turned(at(0.0, 0.0, 0.0488), [0.0065, 0.0065, 0.004], [0.0, turn, 0.0]);
     }
 }
 

@@ -236,25 +236,36 @@ fn loaf(s: &mut Sculptor) {
 
 fn croissant(s: &mut Sculptor) {
     use chaic_protocol::geom::math::{cos, sin};
-    let colors = s.pick(1, &[[CRUST, DARK_CRUST], [DARK_CRUST, CRUST]]);
-    // Rolled dough: rings that narrow towards both tips, each overlapping the next.
+    let baked = s.pick(1, &[[206u8, 146, 72], [186, 120, 54]]);
+    let shade = |by: f32| paint(baked.map(|c| (by * f32::from(c)) as u8), Finish::Crust);
+    // Rolled dough: a crescent whose layers narrow towards both tips, each edge lying on the next
+    // layer, darker where the oven was hottest.
     let at = |deg: f32| {
         let a = deg.to_radians();
         [0.051 * sin(a), 0.026, 0.014 - 0.054 * cos(a)]
     };
-    let steps = [0.0f32, 30.0, 56.0, 80.0, 102.0];
+    let steps = [0.0f32, 17.0, 40.0, 62.0, 82.0, 100.0];
     for side in [-1.0, 1.0] {
-        for k in 0..4 {
-            let (a, b) = (side * steps[k], side * (steps[k + 1] + 8.0));
-            let r = 0.0265 - 0.0052 * k as f32;
-            s.paint(colors[k % 2]);
-            let mut ends = [(at(a), r), (at(0.5 * (a + b)), r * 1.02), (at(b), 0.62 * r)];
+        for k in 0..5 {
+            let (a, b) = (side * steps[k], side * (steps[k + 1] + 6.0));
+            let r = 0.028 - 0.0043 * k as f32;
+            s.paint(shade(1.0 - 0.035 * k as f32));
+            let mut ends = [(at(a), 0.96 * r), (at(0.4 * a + 0.6 * b), r), (at(b), 0.72 * r)];
             ends.iter_mut().for_each(|(p, r)| p[1] = *r + 0.001);
             s.curve(&ends);
+            // The edge of the layer.
+            if !s.within(60.0) {
+                s.paint(shade(0.66));
+                let edge = 0.4 * a + 0.6 * b;
+                let (p, along) = (at(edge), edge.to_radians());
+                let axis = [0.051 * cos(along), 0.0, 0.054 * sin(along)];
+                s.hoop([p[0], r + 0.001, p[2]], axis, r - 0.0008, 0.0011);
+            }
         }
-        let mut tip = [(at(side * 104.0), 0.008), (at(side * 122.0), 0.003)];
-        tip.iter_mut().for_each(|(p, r)| p[1] = *r + 0.004);
-        s.paint(DARK_CRUST);
+        let mut tip =
+            [(at(side * 100.0), 0.0085), (at(side * 114.0), 0.0055), (at(side * 124.0), 0.002)];
+        tip.iter_mut().for_each(|(p, r)| p[1] = *r + 0.003);
+        s.paint(shade(0.74));
         s.sweep(&tip);
     }
 }

@@ -111,6 +111,9 @@ fn room_at(setup: &Setup, p: Vec2) -> Option<usize> {
     setup.rooms.iter().position(|r| r.kind != RoomKind::Outdoors && r.rect.grown(0.02).contains(p))
 }
 
+/// Most cuts of a wall, its ends among them: bounds the work on odd input.
+const MAX_CUTS: usize = 64;
+
 /// Where along the wall a room begins or ends, from end to end.
 fn cuts(setup: &Setup, line: &Line) -> Vec<f32> {
     let mut cuts = vec![-line.half.x, line.half.x];
@@ -129,7 +132,11 @@ fn cuts(setup: &Setup, line: &Line) -> Vec<f32> {
     }
     cuts.sort_by(f32::total_cmp);
     cuts.dedup_by(|a, b| (*a - *b).abs() < 0.02);
-    cuts.truncate(64);
+    // However short the wall is, and however many rooms it passes, it has two ends.
+    if cuts.len() < 2 || cuts.len() > MAX_CUTS {
+        cuts.truncate(MAX_CUTS - 1);
+        cuts.push(line.half.x);
+    }
     cuts
 }
 

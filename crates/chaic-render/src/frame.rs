@@ -53,6 +53,11 @@ impl ClassMesh {
         ClassMesh { thing: *thing, style, min, max, levels: [const { OnceLock::new() }; N_LEVELS] }
     }
 
+    /// The class.
+    pub fn class(&self) -> ClassId {
+        self.thing.class
+    }
+
     /// What decides the shape: equal for equal shapes only.
     pub fn key(&self) -> ShapeKey {
         let Thing { class, scale, seat_m, .. } = &self.thing;

@@ -13,7 +13,7 @@ pub fn rgb(buffer: &[u8], width: u32, height: u32) -> Option<RgbImage> {
 
 /// Depth in millimetres, 65535 for all beyond; `None` if the length doesn't fit.
 pub fn depth_mm(depth_m: &[f32], width: u32, height: u32) -> Option<Gray16Image> {
-    let mm = depth_m.iter().map(|d| (1000.0 * d + 0.5) as u16).collect();
+    let mm = depth_m.iter().map(|d| crate::depth_mm(*d)).collect();
     Gray16Image::from_raw(width, height, mm)
 }
 

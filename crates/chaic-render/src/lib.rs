@@ -1,7 +1,8 @@
 //! What eyes see: RGB, depth and instance ids from a world's state and a camera.
 //!
 //! **What it is**: [`Scene`] makes an episode's shapes ready once, [`Scene::render`] draws what
-//! any number of cameras ([`View`]) see at a moment, [`plan::draw`] draws a map for people,
+//! any number of cameras ([`View`]) see at a moment, [`render_batch`] those of many worlds,
+//! [`Scene::label`] labels what learners see, [`plan::draw`] draws a map for people,
 //! [`image_out`] and [`text`] help to write pictures. [`geometry`] gives the same shapes as plain data,
 //! for other renderers, and [`gltf_out`] as a file.
 //!
@@ -15,10 +16,12 @@
 //!
 //! How a view comes about: instances are culled by the camera's frustum and by what is already
 //! drawn ([`draw`]), drawn at a level of detail that fits their size on the image ([`looks`]) into
-//! a buffer of nearness and owners ([`raster`]); depth and ids are read off that buffer, and color
-//! only if it is asked for: each triangle that is seen is lit once ([`paint`]), and rows of pixels
-//! take color and texture from their triangles ([`shade`]). The inner loops are compiled for each
-//! kind of vectors, and do the same operations in each.
+//! a buffer of nearness and owners: triangles are set up many at once ([`setup`]) and filled span by
+//! span ([`raster`]). Depth and ids are read off that buffer, and color only if it is asked for: each
+//! triangle that is seen gets a paint ([`paint`]) whose points are lit many at once ([`points`]); each
+//! row of pixels is cut into segments of one triangle ([`shade`], [`segments`]) that are filled from
+//! paint and texture ([`row`]). The inner loops are compiled for each kind of vectors, and do the same
+//! operations in each.
 
 #![allow(
     rustdoc::private_intra_doc_links,
@@ -26,6 +29,7 @@
 )]
 
 mod appearance;
+mod labels;
 mod scene;
 mod view;
 
@@ -62,7 +66,8 @@ pub mod plan;
 pub mod text;
 
 pub use appearance::Appearance;
+pub use labels::{Labels, depth_mm};
 pub use lens::Lens;
-pub use scene::Scene;
+pub use scene::{Looks, Scene, render_batch};
 pub use solids::LEVEL_RADIUS_PX;
 pub use view::{Channels, MAX_SIDE_PX, View};

@@ -286,10 +286,39 @@ impl<'a> Painter<'a> {
         }
         let normals = if triangle.smooth { corners.map(|k| mesh.normals[k]) } else { [face; 3] };
         let [point, ..] = [(a, 0), (b, 1), (c, 2)].map(|(p, k)| push(p, normals[k]));
+        let toward = Some(self.toward(sight, [a, b, c], flat));
+        painted(Kind::Unlit(Unlit { point, toward }))
+    }
+
+    /// Normals of a triangle in the world, not of length 1.
+    pub fn normals(
+        &self,
+        instance: &Instance,
+        sight: &Sight,
+        mesh: &Mesh,
+        triangle: &Triangle,
+    ) -> Plane {
+        let corners = triangle.corners.map(usize::from);
+        let [a, b, c] = corners.map(|k| mesh.positions[k]);
+        let flat = (b - a).cross(c - a);
+        let face = unit(flat);
+        let in_world = |n: Vec3| (instance.rotation * n).extend(0.0);
+        if !triangle.smooth {
+            return Plane { base: in_world(face), ..Plane::default() };
+        }
+        let [at_a, at_b, at_c] = corners.map(|k| in_world(mesh.normals[k]));
+        let [s, t] = self.toward(sight, [a, b, c], flat);
+        Plane::mixed(at_a, (at_b - at_a, s), (at_c - at_a, t))
+    }
+
+    /// How far towards its second and its third corner a pixel of a triangle is; `flat` is the
+    /// product of the edges from its first corner.
+    fn toward(&self, sight: &Sight, [a, b, c]: [Vec3; 3], flat: Vec3) -> [Vec4; 2] {
+        let face = unit(flat);
         let per_area2 = 1.0 / flat.dot(flat).max(1e-30);
         let s = self.plane(sight, (c - a).cross(flat) * per_area2, a, face);
         let t = self.plane(sight, flat.cross(b - a) * per_area2, a, face);
-        painted(Kind::Unlit(Unlit { point, toward: Some([s, t]) }))
+        [s, t]
     }
 
     /// Texture coordinates along two axes from the instance's origin.

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex};
 
 use chaic_protocol::observation::Images;
-use chaic_protocol::{EntityId, Vec2, Vec3};
+use chaic_protocol::{ClassId, EntityId, Vec2, Vec3};
 use chaic_world::{Place, Posture, Setup, State, ThingState, World};
 use glam::Mat3;
 use rayon::prelude::*;
@@ -27,6 +27,26 @@ pub struct Scene {
     appearance: Appearance,
     lamps: Lamps,
     still: Mutex<Still>,
+}
+
+/// Cameras in a world.
+#[derive(Clone, Copy, Debug)]
+pub struct Looks<'a> {
+    /// Of the world's episode.
+    pub scene: &'a Scene,
+    /// The world as it is now.
+    pub world: &'a World,
+    /// The cameras.
+    pub views: &'a [View],
+}
+
+/// What many cameras in many worlds see, in their order, into images whose memory is used again. The
+/// work goes to all threads of the pool, which take it from each other. The images don't depend on
+/// their number.
+pub fn render_batch(batch: &[Looks], images: &mut Vec<Vec<Images>>) {
+    images.resize_with(batch.len(), Vec::new);
+    let pairs = batch.par_iter().zip(images.par_iter_mut());
+    pairs.for_each(|(looks, images)| looks.scene.render_into(looks.world, looks.views, images));
 }
 
 impl Scene {
@@ -94,6 +114,12 @@ impl Scene {
             pairs.for_each(|(view, images)| look(&frame, view, images));
         }
         self.give_back(frame.light);
+    }
+
+    /// The class of a thing.
+    pub fn class_of(&self, entity: EntityId) -> Option<ClassId> {
+        let index = entity.0.checked_sub(EntityId::FIRST_OBJECT.0)?;
+        self.things.get(usize::from(index)).map(|(mesh, _)| mesh.class())
     }
 
     /// What is underfoot, and the lamps.

@@ -62,6 +62,11 @@ impl View {
     pub fn of_eye(agent: AgentId, camera: Camera, channels: Channels) -> View {
         View { camera, channels, hide: Some(agent), hide_ceiling: false }
     }
+
+    /// What is left out of it.
+    pub(crate) fn omit(&self) -> Omit {
+        Omit { body: self.hide.map(EntityId::of_agent), ceiling: self.hide_ceiling }
+    }
 }
 
 thread_local! {
@@ -99,7 +104,7 @@ pub(crate) fn look(frame: &Frame, view: &View, images: &mut Images) {
     let depth_m = sized(depth_m, depth, n);
     let ids_out = sized(ids_out, ids, n);
     with_scratch(|scratch| {
-        let omit = Omit { body: view.hide.map(EntityId::of_agent), ceiling: view.hide_ceiling };
+        let omit = view.omit();
         let Scratch { target, plain, work, canvas } = scratch;
         if let Some(rgb) = rgb_out {
             draw(frame, &lens, omit, target, work);

@@ -7,7 +7,9 @@ use chaic_protocol::capability::Persona;
 use chaic_protocol::geom::Camera;
 use chaic_protocol::observation::Images;
 use chaic_protocol::{AgentId, ClassId, EntityId, Vec3};
-use chaic_render::{Channels, MAX_SIDE_PX, Scene, View, image_out, plan};
+use chaic_render::{
+    Channels, Labels, Looks, MAX_SIDE_PX, Scene, View, image_out, plan, render_batch,
+};
 use chaic_world::{Setup, Thing, Wall, World};
 use scenes::{camera, empty, posture, thing, wall, world};
 
@@ -136,6 +138,84 @@ fn any_number_of_threads_makes_the_same_bits() {
     assert!(all[0] == all[1] && all[1] == all[2]);
     let world = world(scenes::house());
     assert_eq!(all[0][3], render(&world, views[3]), "and so does a view alone");
+}
+
+#[test]
+fn many_worlds_at_once_look_as_one_by_one() {
+    let worlds = [wall_ahead(), scenes::house(), scenes::street(), empty()].map(world);
+    let scenes: Vec<Scene> = worlds.iter().map(|w| Scene::new(w.setup())).collect();
+    let eyes = [[0.0, 1.6, 0.0], [1.0, 1.2, 2.0], [0.6, 1.65, 2.2]];
+    let views: Vec<View> = eyes
+        .iter()
+        .zip([Channels::ALL, Channels::RGB, DEPTH_AND_IDS])
+        .map(|(eye, channels)| View { channels, ..view(camera(*eye, 0.4, -0.1, 93, 57)) })
+        .collect();
+    let batch: Vec<Looks> = worlds
+        .iter()
+        .zip(&scenes)
+        .enumerate()
+        .map(|(k, (world, scene))| Looks { scene, world, views: &views[..k % 4] })
+        .collect();
+    let alone: Vec<Vec<Images>> =
+        batch.iter().map(|b| Scene::new(b.world.setup()).render(b.world, b.views)).collect();
+    for n_threads in [1, 3] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().expect("threads");
+        let mut images = vec![Vec::new(); 9];
+        pool.install(|| render_batch(&batch, &mut images));
+        assert!(images == alone, "{n_threads} threads");
+    }
+}
+
+#[test]
+fn labels_name_what_images_show() {
+    let world = world(wall_ahead());
+    let scene = Scene::new(world.setup());
+    let view = view(camera([0.0, 1.6, 0.0], 0.0, 0.0, 64, 48));
+    let images = scene.render(&world, &[view]).pop().expect("one view");
+    let labels = scene.label(&world, &view);
+    assert_eq!(Some(&labels.ids), images.ids.as_ref());
+    let mm = images.depth_m.iter().flatten().map(|d| chaic_render::depth_mm(*d));
+    assert!(mm.eq(labels.depth_mm.iter().copied()));
+    let normals = labels.normals.as_chunks::<3>().0;
+    let mut n_wall = 0;
+    for (k, (id, normal)) in labels.ids.iter().zip(normals).enumerate() {
+        let class = scene.class_of(EntityId(*id)).map_or(Labels::NO_CLASS, |c| c.index() as u8);
+        assert_eq!(labels.classes[k], class);
+        // The wall looks at the eye, the floor up; nothing looks nowhere.
+        let expected = match EntityId(*id) {
+            EntityId::WALL => [0.0, 0.0, 1.0],
+            EntityId::FLOOR => [0.0, 1.0, 0.0],
+            EntityId::NOTHING => [0.0; 3],
+            _ => continue,
+        };
+        n_wall += usize::from(EntityId(*id) == EntityId::WALL);
+        let error = normal.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(error < 1e-5, "{k}: {id} {normal:?}");
+    }
+    assert!(n_wall > 500, "{n_wall} pixels of wall");
+    assert!(labels.depth_mm.contains(&2999) || labels.depth_mm.contains(&3000));
+}
+
+#[test]
+fn round_things_have_round_normals() {
+    let mut setup = empty();
+    let apple = thing("apple", 0.0, -0.6, 0.0);
+    setup.things.push(Thing { position: Vec3::new(0.0, 1.6, -0.6), ..apple });
+    let world = world(setup);
+    let scene = Scene::new(world.setup());
+    let view = view(camera([0.0, 1.63, 0.0], 0.0, 0.0, 256, 256));
+    let labels = scene.label(&world, &view);
+    let class = ClassId::named("apple").index() as u8;
+    let seen: Vec<usize> = (0..256 * 256).filter(|k| labels.classes[*k] == class).collect();
+    assert!(seen.len() > 100, "{} pixels", seen.len());
+    let normals = labels.normals.as_chunks::<3>().0;
+    let mut left = 0.0;
+    for k in &seen {
+        let [x, y, z] = normals[*k];
+        assert!((x * x + y * y + z * z - 1.0).abs() < 1e-4);
+        left += x * (if k % 256 < 128 { -1.0 } else { 1.0 });
+    }
+    assert!(left / seen.len() as f32 > 0.2, "its sides look to the sides: {left}");
 }
 
 #[test]

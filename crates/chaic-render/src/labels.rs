@@ -2,13 +2,14 @@
 //!
 //! Not for agents, who get what their senses grant, and not made for speed.
 
-use chaic_protocol::{EntityId, Vec3};
+use chaic_protocol::EntityId;
 use chaic_world::World;
 
 use crate::Scene;
 use crate::draw::{Scratch, draw};
 use crate::frame::Frame;
 use crate::lens::{Lens, reciprocal, seen_depth_m};
+use crate::mesh::unit;
 use crate::paint::{Painter, Plane};
 use crate::people::Body;
 use crate::raster::{NOBODY, owner_parts};
@@ -91,8 +92,7 @@ fn label(frame: &Frame, lens: &Lens, view: &View, scratch: &mut Scratch, labels:
             }
             let row = last.1.from(k, j as f32 + 0.5);
             let depth_m = reciprocal(*nearness);
-            let normal = (row.base + row.at * depth_m).truncate();
-            let normal = crate::mesh::unit(Vec3::from(normal));
+            let normal = unit((row.base + row.at * depth_m).truncate());
             let pixel = j * lens.width + k;
             labels.depth_mm[pixel] = depth_mm(seen_depth_m(depth_m));
             labels.ids[pixel] = instance.entity.0;

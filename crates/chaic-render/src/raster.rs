@@ -253,13 +253,11 @@ impl<O: Owner> Target<O> {
         (j0 / TILE..=j1 / TILE).all(|j| {
             let row = &self.least[j * self.stacks_wide..][..self.stacks_wide];
             (i0 / LANES..=i1 / LANES).all(|i| {
-                let mut shows = 0;
-                for k in 0..LANES {
-                    let column = LANES * i + k;
-                    let is_inside = (column >= i0) & (column <= i1);
-                    shows |= u32::from(is_inside & (row[i][k] < q));
+                let mut shows = false;
+                for (column, least) in (LANES * i..).zip(&*row[i]) {
+                    shows |= (column >= i0) & (column <= i1) & (*least < q);
                 }
-                shows == 0
+                !shows
             })
         })
     }

@@ -137,9 +137,8 @@ impl Setups {
         let n = mesh[0].len();
         let last = n - 1;
         let (m0, m1, m2) = (&mesh[0][..n], &mesh[1][..n], &mesh[2][..n]);
-        for k in 0..N_SETUPS {
-            let triangle = triangles[k] as usize;
-            let triangle = if triangle < last { triangle } else { last };
+        for (k, triangle) in triangles.iter().enumerate() {
+            let triangle = (*triangle as usize).min(last);
             let (a, b, c) =
                 (corners.get(m0[triangle]), corners.get(m1[triangle]), corners.get(m2[triangle]));
             let s = Setup::through(a, b, c, rows);

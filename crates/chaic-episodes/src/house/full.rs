@@ -9,30 +9,34 @@ use crate::generate::{GenerateError, Seeds};
 
 /// The place seed of a house of eight rooms.
 const PLACE_SEED: u64 = 12;
-/// Things in the house.
-const N_THINGS: usize = 150;
+/// Usual number of things in the house.
+pub const N_THINGS: usize = 150;
 /// Episodes whose things are gathered until there are that many.
 const MOST_EPISODES: u64 = 20;
 /// Between things of different episodes, metres.
 const APART_M: f32 = 0.3;
 
-/// A house of eight rooms with 150 things, and a partner and a helper in it.
+/// A house of eight rooms with up to so many things, and a partner and a helper in it.
 ///
 /// It is an obstacle episode with the loose things of further episodes in the same house, wherever
-/// nothing else is near. It isn't meant to be played.
+/// nothing else is near, until there are that many or there is no room left. It isn't meant to be
+/// played.
 ///
 /// # Errors
 /// [`GenerateError`] if one of these episodes can't be made.
-pub fn full() -> Result<Setup, GenerateError> {
+pub fn filled(n_things: usize) -> Result<Setup, GenerateError> {
     let place = PLACE_SEED;
     let mut setup = generate(TaskId::Obstacle, Seeds { place, episode: 0 })?;
     for episode in 1..=MOST_EPISODES {
+        if setup.things.len() >= n_things {
+            break;
+        }
         let other = generate(TaskId::LowTarget, Seeds { place, episode })?;
         if other.walls != setup.walls {
             continue;
         }
         for thing in other.things.iter().filter(|t| !t.fixed) {
-            if setup.things.len() < N_THINGS && is_clear(thing, &setup) {
+            if setup.things.len() < n_things && is_clear(thing, &setup) {
                 setup.things.push(*thing);
             }
         }
@@ -58,9 +62,9 @@ mod tests {
 
     #[test]
     fn the_full_house_has_eight_rooms_and_is_sound() {
-        let setup = full().expect("its seeds are fixed");
+        let setup = filled(N_THINGS).expect("its seeds are fixed");
         assert_eq!((setup.rooms.len(), setup.things.len()), (8, N_THINGS));
         assert_eq!(crate::validate(&setup), []);
-        assert_eq!(setup, full().expect("its seeds are fixed"));
+        assert_eq!(setup, filled(N_THINGS).expect("its seeds are fixed"));
     }
 }

@@ -36,7 +36,7 @@ const EPISODE_ATTEMPTS: u64 = 12;
 /// Houses that an episode is tried in.
 const EPISODE_HOUSES: u64 = 4;
 
-pub use full::full;
+pub use full::{N_THINGS, filled};
 
 /// An empty house with its furniture.
 #[derive(Clone, Debug)]

@@ -36,12 +36,12 @@ pub struct BenchScene {
 }
 
 impl BenchScene {
-    /// The usual one: [`house::full`].
+    /// The usual one, with [`house::N_THINGS`] things or up to so many others: [`house::filled`].
     ///
     /// # Errors
     /// If the house can't be made.
-    pub fn house(size_px: u32) -> Result<BenchScene> {
-        let setup = house::full().map_err(|e| EvalError::Options(e.to_string()))?;
+    pub fn house(n_things: usize, size_px: u32) -> Result<BenchScene> {
+        let setup = house::filled(n_things).map_err(|e| EvalError::Options(e.to_string()))?;
         BenchScene::of("house".to_owned(), setup, size_px)
     }
 
@@ -192,7 +192,7 @@ mod tests {
 
     #[test]
     fn eyes_are_spread_over_the_rooms_and_see_things() {
-        let scene = BenchScene::house(64).expect("its seeds are fixed");
+        let scene = BenchScene::house(house::N_THINGS, 64).expect("its seeds are fixed");
         let setup = scene.world.setup();
         for room in &setup.rooms {
             let inside =

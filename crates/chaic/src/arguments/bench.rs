@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use chaic_episodes::house;
 use chaic_eval::bench::channels_named;
 use chaic_render::Channels;
 use chaic_render::geometry::FINEST;
@@ -60,6 +61,9 @@ pub struct LookedAt {
     /// house: eight rooms with 150 things, seen from 16 places.
     #[arg(long, value_name = "NAME", default_value = "house", conflicts_with = "episode")]
     pub scene: SceneName,
+    /// Up to so many things in the house, if there is room for them.
+    #[arg(long, value_name = "N", default_value_t = house::N_THINGS, conflicts_with = "episode")]
+    pub things: usize,
     /// The beginning of this episode instead: an id, for example shopping/test/00, or a file.
     #[arg(long, value_name = "EPISODE")]
     pub episode: Option<String>,

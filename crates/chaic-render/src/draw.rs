@@ -5,6 +5,7 @@ use chaic_protocol::{EntityId, Vec3};
 use crate::clip::clip;
 use crate::frame::{Frame, Instance};
 use crate::lens::{IntoCamera, Lens};
+use crate::mesh::Mesh;
 use crate::raster::{Owner, Target};
 use crate::setup::{Corner, N_SETUPS, Setup, Setups, first_center, least, most};
 use crate::solids::level_for;
@@ -236,8 +237,8 @@ impl<O: Owner> pulp::NullaryFnOnce for UpdateLeast<'_, O> {
 
 impl Drawing<'_> {
     #[inline(always)]
-    fn owner<O: Owner>(&self, triangle: usize) -> O {
-        O::of(self.instance.entity, self.index, triangle)
+    fn owner<O: Owner>(&self, mesh: &Mesh, triangle: usize) -> O {
+        O::of(self.instance.entity, self.index, usize::from(mesh.faces[triangle]))
     }
 
     #[inline(always)]
@@ -263,7 +264,7 @@ impl Drawing<'_> {
             triangles[..few.len()].copy_from_slice(few);
             setups.fill(&triangles, &lists, corners, rows);
             for (k, triangle) in few.iter().enumerate() {
-                target.fill(&setups.get(k), self.owner(*triangle as usize));
+                target.fill(&setups.get(k), self.owner(mesh, *triangle as usize));
             }
         }
         if crosses_near {
@@ -291,7 +292,7 @@ impl Drawing<'_> {
             let Some(clipped) = clip(p, near, self.lens.middle()) else { continue };
             for j in 2..clipped.n {
                 let fan = [clipped.corners[0], clipped.corners[j - 1], clipped.corners[j]];
-                target.fill(&Setup::of(fan, clipped.slope, rows), self.owner(triangle));
+                target.fill(&Setup::of(fan, clipped.slope, rows), self.owner(mesh, triangle));
             }
         }
     }

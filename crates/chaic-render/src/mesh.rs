@@ -80,6 +80,9 @@ pub(crate) struct Mesh {
     pub triangles: Vec<Triangle>,
     /// First, second and third corners of all triangles once more, side by side.
     pub corners: [Vec<u16>; 3],
+    /// The first triangle of the face that each triangle is part of: the halves of a flat
+    /// quadrilateral look as one.
+    pub faces: Vec<u16>,
     pub skins: Vec<Skin>,
     pub min: Vec3,
     pub max: Vec3,
@@ -150,6 +153,10 @@ pub(crate) struct Section {
     pub b: Vec3,
 }
 
+/// The least cosine between the normals of the halves of a quadrilateral that counts as flat: their
+/// angle is below half a degree.
+const FLAT: f32 = 0.999_97;
+
 impl Mesh {
     /// Most corners: indices have 16 bits.
     const MAX_CORNERS: usize = 65_000;
@@ -191,6 +198,7 @@ impl Mesh {
         }
         let skin = self.skins.len().saturating_sub(1) as u8;
         let corners = corners.map(|c| c as u16);
+        self.faces.push(self.triangles.len() as u16);
         self.triangles.push(Triangle { corners, skin, smooth });
         for (list, corner) in self.corners.iter_mut().zip(corners) {
             list.push(corner);
@@ -199,8 +207,16 @@ impl Mesh {
 
     /// A quadrilateral, counter-clockwise from outside.
     pub fn quad(&mut self, [a, b, c, d]: [usize; 4], smooth: bool) {
+        let n = self.triangles.len();
         self.triangle([a, b, c], smooth);
         self.triangle([a, c, d], smooth);
+        if !smooth && self.triangles.len() == n + 2 {
+            let [a, b, c, d] = [a, b, c, d].map(|k| self.positions[k]);
+            let [one, other] = [(b - a).cross(c - a), (c - a).cross(d - a)].map(unit);
+            if one.dot(other) > FLAT {
+                self.faces[n + 1] = n as u16;
+            }
+        }
     }
 
     /// Joins two rings of `n` corners that begin at `low` and `high`. Outside is to the right of

@@ -103,6 +103,7 @@ pub(crate) struct Unlit {
     /// How far towards the second and the third corner a pixel is; `None` if a single point
     /// stands for all of it.
     toward: Option<[Vec4; 2]>,
+    is_flat: bool,
 }
 
 impl Unlit {
@@ -113,11 +114,13 @@ impl Unlit {
         let a = points.shown(first);
         let Some([s, t]) = self.toward else { return Linear::even(a) };
         let (b, c) = (points.shown(first + 1), points.shown(first + 2));
-        Linear {
-            shown: Plane::mixed(a, (b - a, s), (c - a, t)),
-            low: a.min(b).min(c),
-            high: a.max(b).max(c),
+        let (mut low, mut high) = (a.min(b).min(c), a.max(b).max(c));
+        if self.is_flat {
+            // It may be half of a parallelogram.
+            let d = a + c - b;
+            (low, high) = (low.min(d).max(Vec4::ZERO), high.max(d).min(Vec4::splat(255.0)));
         }
+        Linear { shown: Plane::mixed(a, (b - a, s), (c - a, t)), low, high }
     }
 }
 
@@ -282,12 +285,12 @@ impl<'a> Painter<'a> {
         };
         if !triangle.smooth && skin.gloss == Gloss::Dull {
             let point = push((a + b + c) * (1.0 / 3.0), face);
-            return painted(Kind::Unlit(Unlit { point, toward: None }));
+            return painted(Kind::Unlit(Unlit { point, toward: None, is_flat: true }));
         }
         let normals = if triangle.smooth { corners.map(|k| mesh.normals[k]) } else { [face; 3] };
         let [point, ..] = [(a, 0), (b, 1), (c, 2)].map(|(p, k)| push(p, normals[k]));
         let toward = Some(self.toward(sight, [a, b, c], flat));
-        painted(Kind::Unlit(Unlit { point, toward }))
+        painted(Kind::Unlit(Unlit { point, toward, is_flat: !triangle.smooth }))
     }
 
     /// Normals of a triangle in the world, not of length 1.

@@ -3,9 +3,9 @@
 use std::fmt;
 use std::str::FromStr;
 
-use chaic_protocol::Vec3;
 use chaic_protocol::geom::math;
 use chaic_protocol::rng::Stream;
+use chaic_protocol::{EntityId, Vec3};
 
 use crate::light::Lamps;
 use crate::mesh::unit;
@@ -55,7 +55,9 @@ impl fmt::Display for Appearance {
 /// the others as they are.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Painted {
-    Structure(usize),
+    Floor(usize),
+    /// All walls, or all ceilings.
+    Shell(EntityId),
     Thing(usize),
     Person(usize),
 }
@@ -74,7 +76,8 @@ impl Appearance {
     pub(crate) fn factor(self, painted: Painted) -> Vec3 {
         let Appearance::Varied { seed } = self else { return Vec3::ONE };
         let (name, k, hue, dimmest) = match painted {
-            Painted::Structure(k) => ("appearance of structure", k, 0.22, 0.75),
+            Painted::Floor(k) => ("appearance of floors", k, 0.22, 0.75),
+            Painted::Shell(e) => ("appearance of structure", usize::from(e.0), 0.22, 0.75),
             Painted::Thing(k) => ("appearance of things", k, 0.25, 0.7),
             Painted::Person(k) => ("appearance of people", k, 0.08, 0.8),
         };

@@ -138,8 +138,11 @@ impl Scene {
         let mut instances =
             Vec::with_capacity(self.structure.len() + self.things.len() + bodies.len());
         for (k, (entity, mesh)) in self.structure.iter().enumerate() {
-            // Pieces of ceiling lie in one plane and overlap: they are of one color.
-            let k = if *entity == EntityId::CEILING { usize::MAX } else { k };
+            // Walls and ceilings are made of pieces, which must not differ in color.
+            let painted = match *entity {
+                EntityId::FLOOR => Painted::Floor(k),
+                other => Painted::Shell(other),
+            };
             instances.push(Instance {
                 entity: *entity,
                 shape: Shape::Fixed(mesh),
@@ -148,7 +151,7 @@ impl Scene {
                 min: mesh.min,
                 max: mesh.max,
                 tint: None,
-                factor: self.appearance.factor(Painted::Structure(k)),
+                factor: self.appearance.factor(painted),
                 room: None,
             });
         }

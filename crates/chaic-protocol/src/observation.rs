@@ -116,7 +116,7 @@ impl SelfState {
 /// granted are absent.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Images {
-    /// RGB, u8, shape [height, width, 3], sRGB.
+    /// RGB, u8, shape [height, width, 3], as screens show it: 255 times the root of linear light.
     pub rgb: Option<Vec<u8>>,
     /// Depth along the camera's axis, f32 metres, shape [height, width]; [`Camera::FAR_M`] where
     /// nothing is seen.

@@ -57,7 +57,7 @@ impl Batch {
         self.outputs.as_ref().map(|o| &o.ids)
     }
 
-    /// Color, u8, sRGB, shape [view, height, width, 4] (red, green, blue, 255); only if a view
+    /// Color as it is shown, u8, shape [view, height, width, 4] (red, green, blue, 255); only if a view
     /// asked for it.
     pub fn color(&self) -> Option<&wgpu::Buffer> {
         let is_there = self.channels.iter().any(|c| c.rgb);

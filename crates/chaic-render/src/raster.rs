@@ -15,7 +15,7 @@ pub(crate) const LANES: usize = 16;
 /// The spans of so many rows are worked out at once.
 const ROWS: usize = 16;
 
-/// Names a triangle of an instance in 32 bits.
+/// Names a triangle of an instance, or the first one of a face, in 32 bits.
 pub(crate) fn pixel_owner(instance: usize, triangle: usize) -> u32 {
     debug_assert!(instance < 0xffff && triangle < 0x1_0000);
     (instance as u32) << 16 | triangle as u32

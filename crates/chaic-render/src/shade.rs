@@ -1,8 +1,10 @@
 //! Color, depth and ids of pixels whose triangles are known, one row of the image at a time.
 //!
-//! Neighboring pixels of one triangle are a run. Along it, colors and texture coordinates follow
-//! the triangle's planes ([`crate::paint`]); only the light on structure, which no plane describes,
-//! is worked out at knots and runs linearly between. Then the whole row takes its texels.
+//! Neighboring pixels of one face are a run, which is cut into segments of limited length. Along
+//! them, colors and texture coordinates follow the face's planes ([`crate::paint`]); only the light
+//! on structure, which no plane describes, is worked out at knots and runs linearly between. For each
+//! row the segments are found first, then all that has to be lit is lit together, then all places on
+//! textures are worked out together, and at last the segments are filled.
 //!
 //! Lanes are plain arrays and loops, which the compiler makes vectors of, as wide as the machine's
 //! (see [`Rows`]); each lane's operations stay the same. Closures and `array::from_fn` must stay

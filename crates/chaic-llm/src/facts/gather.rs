@@ -8,6 +8,7 @@ use chaic_protocol::geom::{horizontal_distance, xz};
 use chaic_protocol::observation::{Held, SeenAction};
 use chaic_protocol::{Action, AgentId, ClassId, EntityId, Frame, Outcome, Role};
 
+use super::hands::put_away;
 use super::{
     Body, Count, Deed, Facts, GoalPlace, Length, Map, Other, Own, PlanFacts, ProgressFacts,
     ThingFacts, ToldFacts, plain, plan_text,
@@ -156,7 +157,8 @@ fn own(context: &Context<'_>, last_plan: Option<Plan>, length: Length) -> Own {
     let deeds: Vec<Deed> = memory
         .history
         .iter()
-        .map(|done| deed(memory, done.frame, done.action, Some(done.outcome)))
+        .zip(put_away(&memory.history, |entity| memory.class_of(entity)))
+        .map(|(done, put)| deed(memory, done.frame, done.action, Some(done.outcome), put))
         .collect();
     let left_out = deeds.len().saturating_sub(length.deeds);
     Own {
@@ -170,13 +172,21 @@ fn own(context: &Context<'_>, last_plan: Option<Plan>, length: Length) -> Own {
     }
 }
 
-fn deed(memory: &Memory, frame: Frame, action: Action, outcome: Option<Outcome>) -> Deed {
+/// A deed; `put` is what it put away, where that is known.
+fn deed(
+    memory: &Memory,
+    frame: Frame,
+    action: Action,
+    outcome: Option<Outcome>,
+    put: Option<EntityId>,
+) -> Deed {
     let name = |entity| named(entity, memory.class_of(entity));
+    let put = put.map_or("something".to_owned(), name);
     let what = match action {
         Action::PickUp { object, .. } => format!("pick up {}", name(object)),
-        Action::PutOn { place, .. } => format!("put something on {}", name(place)),
+        Action::PutOn { place, .. } => format!("put {put} on {}", name(place)),
         Action::RemoveObstacle { obstacle, .. } => format!("clear away {}", name(obstacle)),
-        Action::PutIn => "put something into a container".to_owned(),
+        Action::PutIn => format!("put {put} into a container"),
         Action::Wait { .. } => "wait".to_owned(),
         Action::MoveForward | Action::TurnLeft | Action::TurnRight => "walk".to_owned(),
     };
@@ -220,7 +230,7 @@ fn others(context: &Context<'_>, length: Length) -> Vec<Other> {
             .iter()
             .filter(|a| a.agent == companion.agent)
             .filter(|a| !(is_partner && is_told_by_taking(a)))
-            .map(|a| deed(memory, a.frame, a.action, a.outcome))
+            .map(|a| deed(memory, a.frame, a.action, a.outcome, None))
             .collect();
         let left_out = actions.len().saturating_sub(length.deeds);
         let at = seen.map(|p| xz(p.position_in_world)).unwrap_or_default();

@@ -3,6 +3,7 @@
 //! Every name passes through [`plain`]: whatever a name says, it stays a name on its line.
 
 mod gather;
+mod hands;
 mod samples;
 
 use chaic_agents::decision::Plan;

@@ -30,16 +30,8 @@ pub mod math {
     /// From here to twice as much, floats are the whole numbers.
     const WHOLE: f32 = 8_388_608.0;
 
-    /// The least whole number not below `x`, for 0 <= `x` <= 2^22; any number for any other `x`.
+    /// The greatest whole number not above `x`, for 0 <= `x` <= 2^22; any number for any other `x`.
     /// Without the checks of a conversion, so that it suits loops over pixels.
-    #[inline]
-    pub fn ceil_small(x: f32) -> i32 {
-        let shifted = x + WHOLE;
-        let nearest = shifted.to_bits().wrapping_sub(WHOLE.to_bits()) as i32;
-        nearest.wrapping_add(i32::from(shifted - WHOLE < x))
-    }
-
-    /// The greatest whole number not above `x`, as [`ceil_small`].
     #[inline]
     pub fn floor_small(x: f32) -> i32 {
         let shifted = x + WHOLE;
@@ -238,7 +230,6 @@ mod tests {
         let steps = (0..40_000).map(|k| k as f32 * 0.0625);
         let near = (1..2000).flat_map(|k| [(k as f32).next_down(), (k as f32).next_up()]);
         for x in steps.chain(near).chain([f32::MIN_POSITIVE, 0.5, 1e-7, 4_194_303.5, 4_194_304.0]) {
-            assert_eq!(math::ceil_small(x), x.ceil() as i32, "{x}");
             assert_eq!(math::floor_small(x), x.floor() as i32, "{x}");
         }
     }

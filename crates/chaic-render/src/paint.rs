@@ -9,11 +9,9 @@ use glam::Vec4;
 
 use crate::frame::{Frame, Instance};
 use crate::lens::Lens;
-use crate::light::{N_GROUND, NO_ROOM};
+use crate::light::NO_ROOM;
 use crate::mesh::{Gloss, Mesh, Triangle, unit};
 use crate::points::{Point, Points};
-use crate::row::OnGround;
-use crate::segments::Line;
 use crate::texture::{Texture, Tile};
 
 /// How dark the tops of walls are on maps, 0 to 255.
@@ -130,8 +128,8 @@ pub(crate) struct Paint {
     pub entity: u16,
     pub kind: Kind,
     pub tile: Tile,
-    /// Texture coordinates, metres, all 0 if it has none; the third lane's slope is the cosine between normal and ray
-    /// (not normalized).
+    /// Texture coordinates, metres, all 0 if it has none; the third lane's slope is the cosine
+    /// between normal and ray (not normalized).
     pub texture: Plane,
 }
 
@@ -387,17 +385,6 @@ impl<'a> Painter<'a> {
             1.0
         };
         Point { at, lamp, normal, to_eye: -ray, color, gloss, tone }
-    }
-
-    /// How a row with middles at `v` goes over the ground from a column on.
-    #[inline(always)]
-    pub fn on_ground<'q>(&self, quads: &'q [u32; N_GROUND], begin: usize, v: f32) -> OnGround<'q> {
-        let RowPlane { base, at, du } = self.ground.from(begin, v);
-        let line = |base: f32, at: f32, du: f32| {
-            // In parts of 256 of a cell, half a cell less.
-            Line { base: 256.0 * base - 128.0, at: 256.0 * at, du: 256.0 * du }
-        };
-        OnGround { quads, x: line(base.x, at.x, du.x), z: line(base.y, at.y, du.y) }
     }
 
     /// What is shown of the sky in the pixel with middle (u, v).

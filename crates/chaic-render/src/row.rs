@@ -10,7 +10,7 @@ use crate::light::{MAX_CELLS, N_GROUND};
 use crate::paint::RowPlane;
 use crate::raster::{Blocks, LANES, Wide};
 use crate::segments::{Line, Place};
-use crate::setup::{least, most};
+use crate::setup::{WHOLES, least, most};
 use crate::texture::{Atlas, N_ATLAS};
 
 /// The row; each list has at least [`LANES`] more than it has pixels.
@@ -48,6 +48,21 @@ pub(crate) struct OnGround<'a> {
     pub quads: &'a [u32; N_GROUND],
     pub x: Line,
     pub z: Line,
+}
+
+impl<'a> OnGround<'a> {
+    /// Over the ground along a plane of places on its grid.
+    #[inline(always)]
+    pub fn along(quads: &'a [u32; N_GROUND], plane: &RowPlane) -> OnGround<'a> {
+        let RowPlane { base, at, du } = *plane;
+        // In parts of 256 of a cell, half a cell less.
+        let line = |base: f32, at: f32, du: f32| Line {
+            base: 256.0 * base - 128.0,
+            at: 256.0 * at,
+            du: 256.0 * du,
+        };
+        OnGround { quads, x: line(base.x, at.x, du.x), z: line(base.y, at.y, du.y) }
+    }
 }
 
 impl Row {
@@ -210,7 +225,7 @@ fn mixed(quad: u32, within: u32) -> f32 {
     (above << 8).wrapping_add(step) as i32 as f32
 }
 
-/// Three channels, each times `bright`, without their fractions; more than 255 is 255.
+/// Three channels, each times `bright` and rounded; more than 255 is 255.
 #[inline(always)]
 fn packed([r, g, b]: [f32; 3], bright: f32) -> u32 {
     whole(r * bright) | whole(g * bright) << 8 | whole(b * bright) << 16
@@ -218,6 +233,5 @@ fn packed([r, g, b]: [f32; 3], bright: f32) -> u32 {
 
 #[inline(always)]
 fn whole(x: f32) -> u32 {
-    // 2^23 added, a number has its whole part in the lowest bits.
-    (least(x, 255.0) + 8_388_608.0).to_bits() & 0xff
+    (least(x, 255.0) + WHOLES).to_bits() & 0xff
 }

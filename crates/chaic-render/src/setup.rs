@@ -1,10 +1,12 @@
-//! What is worked out of a triangle before its pixels are filled.
+//! What is worked out of corners and triangles before pixels are filled.
 //!
 //! A pixel belongs to a triangle if its center does. Each edge's crossing with a row of centers is
 //! computed from its two ends in one fixed order, so that two triangles that share an edge leave
 //! neither a gap nor an overlap.
 
-use crate::draw::Corners;
+use chaic_protocol::Vec3;
+
+use crate::lens::{IntoCamera, Lens};
 
 /// A corner on the image: pixels from the left and the top, and nearness.
 #[derive(Clone, Copy, Debug)]
@@ -12,6 +14,101 @@ pub(crate) struct Corner {
     pub u: f32,
     pub v: f32,
     pub q: f32,
+}
+
+/// Most corners of a mesh: an index of 16 bits needs no check.
+const N_CORNERS: usize = 1 << 16;
+
+/// The corners of a mesh on the image, a list for each coordinate.
+pub(crate) struct Corners {
+    u: Box<[f32; N_CORNERS]>,
+    v: Box<[f32; N_CORNERS]>,
+    q: Box<[f32; N_CORNERS]>,
+}
+
+impl Default for Corners {
+    fn default() -> Corners {
+        let list = || match vec![0.0; N_CORNERS].into_boxed_slice().try_into() {
+            Ok(list) => list,
+            Err(_) => Box::new([0.0; N_CORNERS]),
+        };
+        Corners { u: list(), v: list(), q: list() }
+    }
+}
+
+impl Corners {
+    #[inline(always)]
+    fn get(&self, corner: u16) -> Corner {
+        let k = usize::from(corner);
+        Corner { u: self.u[k], v: self.v[k], q: self.q[k] }
+    }
+
+    /// Finds where points are on the image.
+    #[inline(always)]
+    pub fn place(&mut self, positions: &[Vec3], into: &IntoCamera, lens: &Lens) {
+        let (mu, mv) = lens.middle();
+        let n = positions.len().min(N_CORNERS);
+        let (u, v, q) = (&mut self.u[..n], &mut self.v[..n], &mut self.q[..n]);
+        let positions = &positions[..n];
+        if lens.is_plan {
+            for k in 0..n {
+                let p = into.map(positions[k]);
+                (u[k], v[k], q[k]) = (mu + p.x, mv + p.y, lens.nearness(p.z));
+            }
+            return;
+        }
+        for k in 0..n {
+            let p = into.map(positions[k]);
+            let nearness = 1.0 / p.z;
+            (u[k], v[k], q[k]) = (mu + p.x * nearness, mv + p.y * nearness, nearness);
+        }
+    }
+
+    /// Whether a corner is in front of the camera, no nearer than this.
+    #[inline(always)]
+    pub fn is_in_front(&self, corner: u16, nearest: f32) -> bool {
+        let q = self.q[usize::from(corner)];
+        (q > 0.0) & (q <= nearest)
+    }
+
+    /// Finds the triangles that face the camera, may cover the center of a pixel of the image and
+    /// are nowhere nearer than this.
+    #[inline(always)]
+    pub fn find_alive(
+        &self,
+        corners: &[Vec<u16>; 3],
+        lens: &Lens,
+        nearest: f32,
+        alive: &mut Vec<u32>,
+    ) {
+        let n = corners[0].len().min(corners[1].len()).min(corners[2].len());
+        let [a, b, c] = corners.each_ref().map(|list| &list[..n]);
+        let (u, v, q) = (&*self.u, &*self.v, &*self.q);
+        let (columns, rows) = (lens.width as f32, lens.height as f32);
+        alive.clear();
+        alive.resize(n, 0);
+        for k in 0..n {
+            let (a, b, c) = (usize::from(a[k]), usize::from(b[k]), usize::from(c[k]));
+            let (au, av, bu, bv, cu, cv) = (u[a], v[a], u[b], v[b], u[c], v[c]);
+            let area = (bu - au) * (cv - av) - (bv - av) * (cu - au);
+            // Edges are rounded where they cross a row: a little wider is safe.
+            let begin = first_center(least(least(au, bu), cu) - 0.01, columns);
+            let end = first_center(most(most(au, bu), cu) + 0.01, columns);
+            let top = first_center(least(least(av, bv), cv), rows);
+            let bottom = first_center(most(most(av, bv), cv), rows);
+            let (nearer, farther) = (most(most(q[a], q[b]), q[c]), least(least(q[a], q[b]), q[c]));
+            let is_in_front = (farther > 0.0) & (nearer <= nearest);
+            // Rows run downwards, so counter-clockwise triangles have negative area here.
+            alive[k] = u32::from((area < 0.0) & (begin < end) & (top < bottom) & is_in_front);
+        }
+        let mut found = 0;
+        for k in 0..n {
+            let is_alive = alive[k];
+            alive[found] = k as u32;
+            found += is_alive as usize;
+        }
+        alive.truncate(found);
+    }
 }
 
 /// Nearness over the image: `q + du * (u - u0) + dv * (v - v0)`, kept within [low, high].
@@ -190,13 +287,14 @@ pub(crate) fn most(x: f32, y: f32) -> f32 {
     if x > y { x } else { y }
 }
 
+/// 2^23: from here to twice as much, floats are the whole numbers.
+pub(crate) const WHOLES: f32 = 8_388_608.0;
+
 /// The first row or column whose middle (+ 0.5) isn't before `x`, within [0, max]; one that lies
 /// just there is rounded to even.
 #[inline(always)]
 pub(crate) fn first_center(x: f32, max: f32) -> u32 {
-    /// From here to twice as much, floats are the whole numbers.
-    const WHOLE: f32 = 8_388_608.0;
     let x = if x > 0.0 { x } else { 0.0 };
     let x = if x < max { x } else { max };
-    (x + WHOLE).to_bits().wrapping_sub(WHOLE.to_bits())
+    (x + WHOLES).to_bits().wrapping_sub(WHOLES.to_bits())
 }

@@ -19,7 +19,7 @@ use crate::light::Shadows;
 use crate::paint::{Kind, Linear, Paint, Painter, Plane, Sight};
 use crate::points::Points;
 use crate::raster::{Blocks, LANES, NOBODY, Target, Wide, owner_parts};
-use crate::row::{Hue, Look, Row};
+use crate::row::{Hue, Look, OnGround, Row};
 use crate::segments::{STEP, Segment, Segments};
 use crate::texture::{Atlas, Texture, Tile, atlas};
 
@@ -283,7 +283,8 @@ impl Rows<'_> {
                         }
                         Kind::Structure(surface) => {
                             if let (true, Some(quads)) = (surface.is_floor, quads) {
-                                ground = Some(self.painter.on_ground(quads, begin, v));
+                                let plane = self.painter.ground.from(begin, v);
+                                ground = Some(OnGround::along(quads, &plane));
                             }
                             let [start, there] = segment.knots.map(|k| points.shown(k as usize));
                             let step = (there - start) * (1.0 / segment.between as f32);

@@ -97,6 +97,22 @@ pub struct PersonState {
     pub draws: u32,
 }
 
+impl PersonState {
+    /// Somebody who stands there with empty hands and has done nothing yet.
+    pub fn at(pose: Pose) -> PersonState {
+        PersonState {
+            pose,
+            hands: [None; 2],
+            activity: None,
+            last: None,
+            last_deed: None,
+            in_stride: false,
+            walked_m: 0.0,
+            draws: 0,
+        }
+    }
+}
+
 /// An action under way.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Activity {

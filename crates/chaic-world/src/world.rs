@@ -365,20 +365,10 @@ fn initial_state(setup: &Setup) -> State {
     for (i, thing) in things.iter_mut().enumerate() {
         thing.place = Place::Resting { on: initial_support(setup, i) };
     }
-    let person = |p: &crate::setup::Person| PersonState {
-        pose: p.pose,
-        hands: [None, None],
-        activity: None,
-        last: None,
-        last_deed: None,
-        in_stride: false,
-        walked_m: 0.0,
-        draws: 0,
-    };
     State {
         frame: 0,
         things,
-        people: setup.people.iter().map(person).collect(),
+        people: setup.people.iter().map(|person| PersonState::at(person.pose)).collect(),
         joint: None,
         child_away_frames: 0,
         child_is_away: false,

@@ -16,6 +16,7 @@ use crate::texture::linear_from_shown;
 mod colors;
 mod containers;
 mod decor;
+mod desk;
 mod food;
 mod furniture;
 mod goods;
@@ -33,7 +34,7 @@ type Model = fn(&mut Sculptor);
 fn model(class: &ClassInfo) -> Option<Model> {
     [food::model, goods::model, containers::model, moving::model, street::model, house::model]
         .into_iter()
-        .chain([furniture::model, kitchen::model, decor::model])
+        .chain([furniture::model, kitchen::model, decor::model, desk::model])
         .find_map(|models| models(class.name))
 }
 

@@ -236,16 +236,7 @@ impl Draw {
             let more = self.up_to(3);
             things.extend(things.first().cloned().into_iter().cycle().take(more));
         }
-        let people = setup.people.iter().map(|person| PersonState {
-            pose: person.pose,
-            hands: [None; 2],
-            activity: None,
-            last: None,
-            last_deed: None,
-            in_stride: false,
-            walked_m: 0.0,
-            draws: 0,
-        });
+        let people = setup.people.iter().map(|person| PersonState::at(person.pose));
         State {
             frame: self.one(&[0, 7, 1000, Frame::MAX]),
             things,

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use chaic_render::Scene;
-use chaic_render::geometry::{Shapes, atlas};
+use chaic_render::geometry::{Regions, Shapes, atlas};
 use chaic_world::{Posture, State, World};
 
 use crate::batch::Spare;
@@ -41,6 +41,7 @@ pub struct Gpu {
 pub(crate) struct Placed {
     pub instances: Range<u32>,
     pub light: PlacedLight,
+    pub regions: Arc<Regions>,
     meshes: Vec<u128>,
 }
 
@@ -158,7 +159,7 @@ impl Gpu {
         postures: &[Posture],
         old: Placed,
     ) -> Result<Placed, GpuError> {
-        let mut new = Placed::default();
+        let mut new = Placed { regions: scene.regions().clone(), ..Placed::default() };
         let result = scene.with_shapes(state, postures, |shapes| self.fill(shapes, &mut new));
         self.give_up(old);
         match result {

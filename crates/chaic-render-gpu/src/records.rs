@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 use chaic_protocol::EntityId;
-use chaic_render::geometry::N_LEVELS;
+use chaic_render::geometry::{N_LEVELS, RegionSet};
 use chaic_render::{Lens, View};
 
 use crate::gpu::Placed;
@@ -30,7 +30,9 @@ pub(crate) struct ViewRecord {
     pub first_visible: u32,
     /// Index of the world's [`LightRecord`].
     pub light: u32,
-    pub padding: [u32; 3],
+    /// A bit for each region that may be seen.
+    pub regions: [u32; 2],
+    pub padding: u32,
 }
 
 impl ViewRecord {
@@ -56,9 +58,16 @@ impl ViewRecord {
             hidden_ceiling: id(view.hide_ceiling.then_some(EntityId::CEILING)),
             first_visible,
             light: world.light.record.start,
-            padding: [0; 3],
+            regions: words(world.regions.seen_by(&lens)),
+            padding: 0,
         }
     }
+}
+
+/// The bits of a set of regions, those of the first regions first.
+pub(crate) fn words(regions: RegionSet) -> [u32; 2] {
+    let bits = regions.bits();
+    [bits as u32, (bits >> 32) as u32]
 }
 
 /// A mesh somewhere in a world; 144 bytes.
@@ -76,17 +85,18 @@ pub(crate) struct InstanceRecord {
     pub origin: [f32; 3],
     pub is_tinted: u32,
     pub tint: [f32; 3],
-    pub padding: u32,
+    /// A bit for each region that it reaches into, in two words.
+    pub regions_low: u32,
     pub lamp: [f32; 3],
-    pub padding_2: u32,
+    pub regions_high: u32,
     /// Bounds of all levels, in the object's frame.
     pub low: [f32; 3],
-    pub padding_3: u32,
+    pub padding: u32,
     pub high: [f32; 3],
-    pub padding_4: u32,
+    pub padding_2: u32,
     /// By what linear colors are multiplied.
     pub factor: [f32; 3],
-    pub padding_5: u32,
+    pub padding_3: u32,
 }
 
 /// Lit by the sky and the sun.

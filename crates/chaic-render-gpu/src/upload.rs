@@ -4,7 +4,7 @@ use chaic_render::geometry::{InstanceData, LitBy, MeshData, N_LEVELS, Shapes, pl
 use xxhash_rust::xxh3::Xxh3;
 
 use crate::records::{
-    InstanceRecord, LIT_BY_LAMP, LIT_BY_POINT, LIT_BY_SKY, MeshRecord, SkinRecord,
+    InstanceRecord, LIT_BY_LAMP, LIT_BY_POINT, LIT_BY_SKY, MeshRecord, SkinRecord, words,
 };
 
 /// A mesh at all its levels, in the layout of the device.
@@ -99,6 +99,7 @@ pub(crate) fn instance_record(instance: &InstanceData, mesh: u32) -> Option<Inst
         LitBy::Lamp(at) => (LIT_BY_LAMP, at),
         LitBy::EachPoint => (LIT_BY_POINT, [0.0; 3]),
     };
+    let [regions_low, regions_high] = words(instance.regions);
     Some(InstanceRecord {
         x,
         mesh,
@@ -109,14 +110,14 @@ pub(crate) fn instance_record(instance: &InstanceData, mesh: u32) -> Option<Inst
         origin: instance.origin,
         is_tinted: u32::from(instance.tint.is_some()),
         tint: instance.tint.unwrap_or_default(),
-        padding: 0,
+        regions_low,
         lamp,
-        padding_2: 0,
+        regions_high,
         low: instance.min,
-        padding_3: 0,
+        padding: 0,
         high: instance.max,
-        padding_4: 0,
+        padding_2: 0,
         factor: instance.factor,
-        padding_5: 0,
+        padding_3: 0,
     })
 }

@@ -7,6 +7,7 @@ use crate::frame::{Frame, Instance};
 use crate::lens::{IntoCamera, Lens};
 use crate::mesh::Mesh;
 use crate::raster::{Owner, Target};
+use crate::regions::Seen;
 use crate::setup::{Corners, N_SETUPS, Setup, Setups};
 use crate::solids::level_for;
 
@@ -31,6 +32,7 @@ pub(crate) struct Work {
     /// Triangles that may cover a pixel.
     alive: Vec<u32>,
     order: Vec<Candidate>,
+    seen: Seen,
     /// Level of detail of each instance in this view.
     pub levels: Vec<u8>,
     /// The number of the first triangle of each instance that is drawn.
@@ -71,7 +73,7 @@ pub(crate) fn draw<O: Owner>(
     target: &mut Target<O>,
     work: &mut Work,
 ) {
-    let Work { arch, corners, setups, alive, order, levels, firsts, n_triangles } = work;
+    let Work { arch, corners, setups, alive, order, seen, levels, firsts, n_triangles } = work;
     firsts.clear();
     firsts.resize(frame.instances.len(), 0);
     *n_triangles = 0;
@@ -79,6 +81,7 @@ pub(crate) fn draw<O: Owner>(
     levels.clear();
     levels.resize(frame.instances.len(), 0);
     order.clear();
+    frame.regions.find_seen(lens, seen);
     for (index, instance) in frame.instances.iter().enumerate().take(0xffff) {
         if omit.body == Some(instance.entity)
             || (omit.ceiling && instance.entity == EntityId::CEILING)
@@ -89,6 +92,10 @@ pub(crate) fn draw<O: Owner>(
         }
         let into = lens.camera_from(&instance.rotation, instance.origin);
         if let Some(outline) = outline(instance, lens, &into) {
+            let rect = (!outline.crosses_near).then_some(outline.rect);
+            if !seen.shows(instance.regions_among(frame.regions), rect) {
+                continue;
+            }
             let is_structure = instance.entity < EntityId::FIRST_PERSON;
             let distance = instance.distance(lens.eye);
             order.push(Candidate { distance, index: index as u32, is_structure, outline });

@@ -8,6 +8,7 @@ use glam::Mat3;
 
 use crate::looks::{N_STYLES, thing_mesh};
 use crate::mesh::{Mesh, length};
+use crate::regions::{RegionSet, Regions};
 use crate::solids::{N_LEVELS, place_of};
 
 /// The mesh of a thing's shape, at every level of detail, each made when first needed.
@@ -103,6 +104,8 @@ pub(crate) struct Instance<'a> {
     pub factor: Vec3,
     /// The room whose lamp shines on it; structure is lit point by point.
     pub room: Option<u8>,
+    /// The regions it reaches into, where they are known already: those of structure.
+    pub regions: Option<RegionSet>,
 }
 
 impl Instance<'_> {
@@ -115,6 +118,23 @@ impl Instance<'_> {
             self.rotation.z_axis.dot(d),
         );
         length(local - local.max(self.min).min(self.max))
+    }
+
+    /// The bounds in the world's frame: least and greatest coordinates.
+    pub fn bounds_in_world(&self) -> (Vec3, Vec3) {
+        let middle = self.origin + self.rotation * (0.5 * (self.min + self.max));
+        let half = 0.5 * (self.max - self.min);
+        let [x, y, z] = [self.rotation.x_axis, self.rotation.y_axis, self.rotation.z_axis];
+        let reach = x.abs() * half.x + y.abs() * half.y + z.abs() * half.z;
+        (middle - reach, middle + reach)
+    }
+
+    /// The regions that it reaches into.
+    pub fn regions_among(&self, regions: &Regions) -> RegionSet {
+        self.regions.unwrap_or_else(|| {
+            let (min, max) = self.bounds_in_world();
+            regions.of_box(min, max)
+        })
     }
 
     /// The corners of the bounds, in the object's frame.
@@ -133,5 +153,6 @@ impl Instance<'_> {
 /// Everything that can be seen at one moment.
 pub(crate) struct Frame<'a> {
     pub instances: Vec<Instance<'a>>,
+    pub regions: &'a Regions,
     pub light: crate::light::Light<'a>,
 }

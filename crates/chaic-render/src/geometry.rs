@@ -15,6 +15,7 @@ use crate::mesh::{Mesh, Skin};
 use crate::texture;
 
 pub use crate::mesh::Gloss;
+pub use crate::regions::{RegionSet, Regions};
 pub use crate::shapes::{ShapeName, Shapes};
 pub use crate::solids::N_LEVELS;
 pub use crate::texture::Texture;
@@ -93,6 +94,8 @@ pub struct InstanceData {
     pub factor: [f32; 3],
     /// What lights it.
     pub lit_by: LitBy,
+    /// The regions of [`Scene::regions`] that it reaches into.
+    pub regions: RegionSet,
     /// Least coordinates of its shape at any level of detail, in the object's frame, metres.
     pub min: [f32; 3],
     /// Greatest coordinates of its shape at any level of detail, in the object's frame, metres.
@@ -231,6 +234,7 @@ impl Scene {
             tint: instance.tint,
             factor: instance.factor.to_array(),
             lit_by,
+            regions: instance.regions_among(self.regions()),
             min: instance.min.to_array(),
             max: instance.max.to_array(),
         }

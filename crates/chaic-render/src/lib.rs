@@ -14,8 +14,8 @@
 //!   [`chaic_protocol::geom::math`].
 //! - No camera, size or posture makes it panic.
 //!
-//! How a view comes about: instances are culled by the camera's frustum and by what is already
-//! drawn ([`draw`]), drawn at a level of detail that fits their size on the image ([`looks`]) into
+//! How a view comes about: instances are culled by the camera's frustum, by the rooms that can be seen
+//! from where it stands ([`regions`]) and by what is already drawn ([`draw`]), drawn at a level of detail that fits their size on the image ([`looks`]) into
 //! a buffer of nearness and owners: triangles are set up many at once ([`setup`]) and filled span by
 //! span ([`raster`]). Depth and ids are read off that buffer, and color only if it is asked for: each
 //! triangle that is seen gets a paint ([`paint`]) whose points are lit many at once ([`points`]); each
@@ -27,6 +27,10 @@
     rustdoc::private_intra_doc_links,
     reason = "the code map above is for readers of the source"
 )]
+
+// What tests share with integration tests calls this crate by its name.
+#[cfg(test)]
+extern crate self as chaic_render;
 
 mod appearance;
 mod labels;
@@ -48,6 +52,7 @@ mod structure;
 mod clip;
 mod draw;
 mod raster;
+mod regions;
 mod setup;
 
 mod light;

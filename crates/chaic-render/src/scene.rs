@@ -14,6 +14,7 @@ use crate::light::{Foot, Ground, Lamps, Light, Shadows};
 use crate::looks::{style_of, tint_of};
 use crate::mesh::Mesh;
 use crate::people::Body;
+use crate::regions::{RegionSet, Regions};
 use crate::structure;
 use crate::view::{View, look};
 
@@ -21,9 +22,10 @@ use crate::view::{View, look};
 /// shapes of things. Cheap to make; cameras share it.
 #[derive(Debug)]
 pub struct Scene {
-    structure: Vec<(EntityId, Mesh)>,
+    structure: Vec<(EntityId, Mesh, RegionSet)>,
     things: Vec<(Arc<ClassMesh>, Option<[f32; 3]>)>,
     ground: Ground,
+    regions: Arc<Regions>,
     appearance: Appearance,
     lamps: Lamps,
     still: Mutex<Still>,
@@ -57,16 +59,21 @@ impl Scene {
 
     /// Makes the shapes of an episode ready.
     pub fn with_appearance(setup: &Setup, appearance: Appearance) -> Scene {
-        let structure = structure::of(setup);
+        let regions = Regions::new(setup);
+        let structure = structure::of(setup).into_iter().map(|(entity, mesh)| {
+            let reached = regions.of_box(mesh.min, mesh.max);
+            (entity, mesh, reached)
+        });
         let things = setup
             .things
             .iter()
             .enumerate()
             .map(|(k, thing)| (ClassMesh::of(thing, style_of(setup, k)), tint_of(setup, k)));
         Scene {
-            structure,
+            structure: structure.collect(),
             things: things.collect(),
             ground: Ground::new(setup),
+            regions: Arc::new(regions),
             appearance,
             lamps: appearance.lamps(),
             still: Mutex::default(),
@@ -122,6 +129,19 @@ impl Scene {
         self.things.get(usize::from(index)).map(|(mesh, _)| mesh.class())
     }
 
+    /// Which parts of the house are seen from where.
+    pub fn regions(&self) -> &Arc<Regions> {
+        &self.regions
+    }
+
+    /// The same, but that everything may be seen from everywhere.
+    #[cfg(test)]
+    pub(crate) fn without_regions(mut self) -> Scene {
+        self.regions = Arc::default();
+        self.structure.iter_mut().for_each(|(.., regions)| *regions = RegionSet::ALL);
+        self
+    }
+
     /// What is underfoot, and the lamps.
     pub(crate) fn ground(&self) -> &Ground {
         &self.ground
@@ -137,7 +157,7 @@ impl Scene {
         self.cast_moving(state, &mut light);
         let mut instances =
             Vec::with_capacity(self.structure.len() + self.things.len() + bodies.len());
-        for (k, (entity, mesh)) in self.structure.iter().enumerate() {
+        for (k, (entity, mesh, regions)) in self.structure.iter().enumerate() {
             // Walls and ceilings are made of pieces, which must not differ in color.
             let painted = match *entity {
                 EntityId::FLOOR => Painted::Floor(k),
@@ -153,6 +173,7 @@ impl Scene {
                 tint: None,
                 factor: self.appearance.factor(painted),
                 room: None,
+                regions: Some(*regions),
             });
         }
         for (k, body) in bodies.iter().enumerate().filter(|(_, b)| b.pose.position.is_finite()) {
@@ -172,6 +193,7 @@ impl Scene {
                 tint: None,
                 factor: self.appearance.factor(Painted::Person(k)),
                 room: Some(self.ground.room_at(pose.position)),
+                regions: None,
             });
         }
         for (k, (class, tint)) in self.things.iter().enumerate().take(N_IDS) {
@@ -187,10 +209,11 @@ impl Scene {
                 tint: *tint,
                 factor: self.appearance.factor(Painted::Thing(k)),
                 room: Some(self.ground.room_at(thing.position)),
+                regions: None,
             });
         }
         light.finish();
-        Frame { instances, light }
+        Frame { instances, regions: &self.regions, light }
     }
 
     /// The light with the shadows of walls and of all things that lie still: those of the last

@@ -16,6 +16,8 @@ use crate::texture::Texture;
 mod joinery;
 mod walls;
 
+pub(crate) use walls::Line;
+
 /// Every mesh of the building, in the world's frame.
 pub(crate) fn of(setup: &Setup) -> Vec<(EntityId, Mesh)> {
     let mut structure = Vec::new();

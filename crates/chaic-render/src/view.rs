@@ -169,6 +169,9 @@ fn sized<T: Clone + Default>(
 }
 
 #[cfg(test)]
+#[path = "../tests/hostile/mod.rs"]
+pub(crate) mod hostile;
+#[cfg(test)]
 #[path = "../tests/scenes/mod.rs"]
 pub(crate) mod scenes;
 

@@ -22,9 +22,10 @@ struct View {
     first_visible: u32,
     // The world's light.
     light: u32,
+    // A bit for each region that may be seen, in two words.
+    regions_low: u32,
+    regions_high: u32,
     padding: u32,
-    padding_2: u32,
-    padding_3: u32,
 }
 
 // `InstanceRecord` of records.rs.
@@ -39,17 +40,18 @@ struct Instance {
     origin: vec3f,
     is_tinted: u32,
     tint: vec3f,
-    padding: u32,
+    // A bit for each region that it reaches into, in two words.
+    regions_low: u32,
     lamp: vec3f,
-    padding_2: u32,
+    regions_high: u32,
     // Bounds of all levels, in the object's frame.
     low: vec3f,
-    padding_3: u32,
+    padding: u32,
     high: vec3f,
-    padding_4: u32,
+    padding_2: u32,
     // By what linear colors are multiplied.
     factor: vec3f,
-    padding_5: u32,
+    padding_3: u32,
 }
 
 // `MeshRecord` of records.rs.

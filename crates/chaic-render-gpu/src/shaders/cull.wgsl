@@ -33,6 +33,11 @@ fn look(view: View, k: u32) {
     if (instance.entity == view.hidden_body || instance.entity == view.hidden_ceiling) {
         return;
     }
+    // Walls hide what is in rooms that no line of sight gets to.
+    let seen = view.regions_low & instance.regions_low;
+    if ((seen | (view.regions_high & instance.regions_high)) == 0u) {
+        return;
+    }
     let into = camera_from(view, instance);
     var outside_all = 63u;
     var crosses_near = false;

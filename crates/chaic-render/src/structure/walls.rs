@@ -18,7 +18,7 @@ const SKIRTING_M: [f32; 2] = [0.085, 0.012];
 
 /// A wall's own frame: x along it, y up, z to one side.
 #[derive(Clone, Copy)]
-pub(super) struct Line {
+pub(crate) struct Line {
     pub middle: Vec2,
     pub axis: Vec2,
     /// Half of its length and of its thickness, metres.

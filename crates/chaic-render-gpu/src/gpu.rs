@@ -4,10 +4,11 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use chaic_render::Scene;
-use chaic_render::geometry::{Regions, Shapes, atlas};
+use chaic_render::geometry::{Regions, ShapeName, Shapes, atlas};
 use chaic_world::{Posture, State, World};
 
 use crate::batch::Spare;
+use crate::bodies::PlacedBody;
 use crate::device::{Adapters, Link};
 use crate::error::GpuError;
 use crate::lights::{Lights, PlacedLight};
@@ -41,8 +42,20 @@ pub struct Gpu {
 pub(crate) struct Placed {
     pub instances: Range<u32>,
     pub light: PlacedLight,
+    /// Of its scene, whose own they are.
     pub regions: Arc<Regions>,
-    meshes: Vec<u128>,
+    pub bodies: Vec<PlacedBody>,
+    /// All its other shapes, those of structure first.
+    meshes: Vec<PlacedMesh>,
+}
+
+/// A shape of a world that is no body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct PlacedMesh {
+    name: Option<ShapeName>,
+    key: u128,
+    /// Where its record is.
+    record: u32,
 }
 
 /// Pixels name their instance in 16 bits, of which one value means nobody.
@@ -146,7 +159,8 @@ impl Gpu {
     }
 
     fn give_up(&mut self, old: Placed) {
-        old.meshes.into_iter().for_each(|key| self.meshes.release(key));
+        old.meshes.into_iter().for_each(|mesh| self.meshes.release(mesh.key));
+        old.bodies.into_iter().for_each(|body| body.remove(&mut self.meshes));
         self.instances.remove(old.instances);
         self.lights.remove(old.light);
     }
@@ -160,7 +174,9 @@ impl Gpu {
         old: Placed,
     ) -> Result<Placed, GpuError> {
         let mut new = Placed { regions: scene.regions().clone(), ..Placed::default() };
-        let result = scene.with_shapes(state, postures, |shapes| self.fill(shapes, &mut new));
+        let mut old = old;
+        let result =
+            scene.with_shapes(state, postures, |shapes| self.fill(shapes, &mut new, &mut old));
         self.give_up(old);
         match result {
             Ok(()) => Ok(new),
@@ -171,22 +187,68 @@ impl Gpu {
         }
     }
 
-    fn fill(&mut self, shapes: &Shapes, new: &mut Placed) -> Result<(), GpuError> {
+    /// Fills in what a world consists of, with all that stays of what was in its place before.
+    fn fill(
+        &mut self,
+        shapes: &Shapes,
+        new: &mut Placed,
+        old: &mut Placed,
+    ) -> Result<(), GpuError> {
         let n = shapes.instances.len();
         if n > MAX_INSTANCES {
             return Err(GpuError::TooManyInstances { n, most: MAX_INSTANCES });
         }
+        let is_same_scene = Arc::ptr_eq(&new.regions, &old.regions);
+        let mut none = Vec::new();
+        let known = if is_same_scene { &mut old.meshes } else { &mut none };
+        self.fill_meshes(shapes, &mut new.meshes, known)?;
+        let mut records = new.meshes.iter().map(|mesh| mesh.record);
         let mut places = Vec::with_capacity(shapes.len());
         for index in 0..shapes.len() {
-            let (key, place) = self.meshes.acquire(&self.link, shapes, index)?;
-            new.meshes.push(key);
-            places.push(place);
+            let Some(shape) = shapes.body(index) else {
+                places.extend(records.next());
+                continue;
+            };
+            let instance = shapes.instances.iter().find(|i| i.mesh as usize == index);
+            let Some(instance) = instance.copied() else { continue };
+            let body = PlacedBody::new(&mut self.meshes, &self.link, instance, shape)?;
+            places.push(body.record());
+            new.bodies.push(body);
         }
         let instances = shapes.instances.iter();
         let records: Vec<InstanceRecord> =
             instances.filter_map(|i| instance_record(i, *places.get(i.mesh as usize)?)).collect();
         new.instances = self.instances.add(&self.link, &records)?;
-        new.light = self.lights.add(&self.link, &shapes.lighting())?;
+        if is_same_scene {
+            new.light = std::mem::take(&mut old.light);
+            self.lights.update(&self.link, &mut new.light, &shapes.lighting());
+        } else {
+            new.light = self.lights.add(&self.link, &shapes.lighting())?;
+        }
+        Ok(())
+    }
+
+    /// Brings the shapes over that are no bodies; `old` are those of an earlier moment of the same
+    /// scene, if there is one.
+    fn fill_meshes(
+        &mut self,
+        shapes: &Shapes,
+        new: &mut Vec<PlacedMesh>,
+        old: &mut Vec<PlacedMesh>,
+    ) -> Result<(), GpuError> {
+        let meshes = (0..shapes.len()).filter(|index| !shapes.is_body(*index));
+        let names = meshes.clone().map(|index| shapes.name(index));
+        if !old.is_empty() && names.eq(old.iter().map(|mesh| mesh.name)) {
+            std::mem::swap(new, old);
+            return Ok(());
+        }
+        for index in meshes {
+            // Structure never changes.
+            let known = old.get(index).filter(|_| shapes.is_structure(index));
+            let known = known.map(|mesh| mesh.key);
+            let (key, record) = self.meshes.acquire(&self.link, shapes, index, known)?;
+            new.push(PlacedMesh { name: shapes.name(index), key, record });
+        }
         Ok(())
     }
 }

@@ -19,8 +19,9 @@
 //!
 //! How a batch comes about, all in compute shaders (graphics cards in data centers are weak at
 //! drawing triangles the usual way):
-//! 1. `cull.wgsl`, one workgroup a view: which instances are in the frustum, and at which level of
-//!    detail. The host reads back how many triangles each view may have, and lays the views out in
+//! 1. `cull.wgsl`, one workgroup a view: which instances are in the frustum and in a room that may be
+//!    seen, and at which level of detail. The host has found out the rooms, and shaped the bodies that
+//!    the views see. The host reads back how many triangles each view may have, and lays the views out in
 //!    rounds that fit the room for triangles.
 //! 2. `setup.wgsl`: triangles are brought onto the image, those that turn their back or cover no
 //!    center of a pixel are dropped, those that reach behind the eye are cut.
@@ -50,6 +51,7 @@ mod records;
 mod meshes;
 mod upload;
 
+mod bodies;
 mod gpu;
 mod lights;
 mod passes;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use chaic_render::geometry::{ShapeName, Shapes};
+use chaic_render::geometry::{N_LEVELS, ShapeName, Shapes};
 
 use crate::device::Link;
 use crate::error::GpuError;
@@ -18,19 +18,26 @@ pub(crate) struct Meshes {
     pub corners: Pool<[u32; 4]>,
     pub triangles: Pool<[u32; 2]>,
     pub skins: Pool<SkinRecord>,
-    known: BTreeMap<u128, Stored>,
+    known: BTreeMap<u128, Shared>,
     /// Keys of the catalogue's shapes that are stored.
     named: BTreeMap<ShapeName, u128>,
 }
 
 #[derive(Debug)]
-struct Stored {
-    name: Option<ShapeName>,
+struct Shared {
+    /// Its names in the catalogue: styles of a class may be the same shape.
+    names: Vec<ShapeName>,
     record: Range<u32>,
+    parts: Parts,
+    users: u32,
+}
+
+/// Where the parts of a mesh are.
+#[derive(Debug)]
+pub(crate) struct Parts {
     corners: Range<u32>,
     triangles: Range<u32>,
     skins: Range<u32>,
-    users: u32,
 }
 
 impl Meshes {
@@ -45,25 +52,37 @@ impl Meshes {
         })
     }
 
-    /// Keeps a shape for one user more; says its key and where its record is.
+    /// Keeps a shape for one user more, whose key is `known` if it is stored already; says its key
+    /// and where its record is.
     pub fn acquire(
         &mut self,
         link: &Link,
         shapes: &Shapes,
         index: usize,
+        known: Option<u128>,
     ) -> Result<(u128, u32), GpuError> {
+        if let Some(key) = known
+            && let Some(place) = self.share(key)
+        {
+            return Ok((key, place));
+        }
         let name = shapes.name(index);
         if let Some(key) = name.and_then(|name| self.named.get(&name)).copied()
             && let Some(place) = self.share(key)
         {
             return Ok((key, place));
         }
-        let mesh = PackedMesh::of(shapes, index);
+        let mesh = PackedMesh::of((0..N_LEVELS).map(|level| (level, shapes.mesh(index, level))));
         let key = mesh.key();
-        match self.share(key) {
-            Some(place) => Ok((key, place)),
-            None => Ok((key, self.store(link, &mesh, key, name)?)),
+        let place = match self.share(key) {
+            Some(place) => place,
+            None => self.store(link, &mesh, key)?,
+        };
+        if let (Some(name), Some(shared)) = (name, self.known.get_mut(&key)) {
+            shared.names.push(name);
+            self.named.insert(name, key);
         }
+        Ok((key, place))
     }
 
     /// Counts one user more of a mesh, if it is there.
@@ -73,29 +92,36 @@ impl Meshes {
         Some(stored.record.start)
     }
 
-    fn store(
-        &mut self,
-        link: &Link,
-        mesh: &PackedMesh,
-        key: u128,
-        name: Option<ShapeName>,
-    ) -> Result<u32, GpuError> {
-        let corners = self.corners.add(link, &mesh.corners)?;
-        let triangles = self.triangles.add(link, &mesh.triangles)?;
-        let skins = self.skins.add(link, &mesh.skins)?;
-        let mut record = mesh.record;
-        for level in &mut record.levels {
-            level[0] += corners.start;
-            level[1] += triangles.start;
-            level[3] += skins.start;
-        }
+    /// Brings a mesh onto the device for a first user; says where its record is.
+    fn store(&mut self, link: &Link, mesh: &PackedMesh, key: u128) -> Result<u32, GpuError> {
+        let (parts, record) = self.put(link, mesh)?;
         let record = self.records.add(link, &[record])?;
         let first = record.start;
-        self.known.insert(key, Stored { name, record, corners, triangles, skins, users: 1 });
-        if let Some(name) = name {
-            self.named.insert(name, key);
-        }
+        self.known.insert(key, Shared { names: Vec::new(), record, parts, users: 1 });
         Ok(first)
+    }
+
+    /// Brings the parts of a mesh onto the device, but no record of it; gives that.
+    pub fn put(&mut self, link: &Link, mesh: &PackedMesh) -> Result<(Parts, MeshRecord), GpuError> {
+        let parts = Parts {
+            corners: self.corners.add(link, &mesh.corners)?,
+            triangles: self.triangles.add(link, &mesh.triangles)?,
+            skins: self.skins.add(link, &mesh.skins)?,
+        };
+        let mut record = mesh.record;
+        for level in &mut record.levels {
+            level[0] += parts.corners.start;
+            level[1] += parts.triangles.start;
+            level[3] += parts.skins.start;
+        }
+        Ok((parts, record))
+    }
+
+    /// Takes the parts of a mesh off the device.
+    pub fn take(&mut self, parts: Parts) {
+        self.corners.remove(parts.corners);
+        self.triangles.remove(parts.triangles);
+        self.skins.remove(parts.skins);
     }
 
     /// Gives up a mesh for one user.
@@ -105,13 +131,11 @@ impl Meshes {
         if stored.users == 0
             && let Some(stored) = self.known.remove(&key)
         {
-            if let Some(name) = stored.name {
-                self.named.remove(&name);
+            for name in &stored.names {
+                self.named.remove(name);
             }
             self.records.remove(stored.record);
-            self.corners.remove(stored.corners);
-            self.triangles.remove(stored.triangles);
-            self.skins.remove(stored.skins);
+            self.take(stored.parts);
         }
     }
 

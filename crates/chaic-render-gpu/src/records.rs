@@ -9,6 +9,21 @@ use chaic_render::{Lens, View};
 
 use crate::gpu::Placed;
 
+/// What a view works out on the host.
+pub(crate) struct Sight {
+    pub lens: Lens,
+    /// Those that may be seen.
+    pub regions: RegionSet,
+}
+
+impl Sight {
+    /// Of a view of a world; `None` if it makes no picture.
+    pub fn of(view: &View, world: &Placed) -> Option<Sight> {
+        let lens = Lens::of(&view.camera)?;
+        Some(Sight { lens, regions: world.regions.seen_by(&lens) })
+    }
+}
+
 /// A camera; 96 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -37,8 +52,13 @@ pub(crate) struct ViewRecord {
 
 impl ViewRecord {
     /// The record of a view of a world; its lists of instances begin at `first_visible`.
-    pub fn of(view: &View, world: &Placed, first_visible: u32) -> ViewRecord {
-        let Some(lens) = Lens::of(&view.camera) else {
+    pub fn of(
+        view: &View,
+        sight: Option<&Sight>,
+        world: &Placed,
+        first_visible: u32,
+    ) -> ViewRecord {
+        let Some(Sight { lens, regions }) = sight else {
             return ViewRecord { first_visible, ..ViewRecord::zeroed() };
         };
         let Range { start, end } = world.instances.clone();
@@ -58,7 +78,7 @@ impl ViewRecord {
             hidden_ceiling: id(view.hide_ceiling.then_some(EntityId::CEILING)),
             first_visible,
             light: world.light.record.start,
-            regions: words(world.regions.seen_by(&lens)),
+            regions: words(*regions),
             padding: 0,
         }
     }

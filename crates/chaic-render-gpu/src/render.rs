@@ -11,7 +11,7 @@ use crate::error::GpuError;
 use crate::gpu::{Gpu, WorldId};
 use crate::lights::Lights;
 use crate::passes::bind;
-use crate::records::{Round, Tally, ViewRecord};
+use crate::records::{Round, Sight, Tally, ViewRecord};
 
 /// Most views of a batch: one dimension of a dispatch.
 pub const MAX_VIEWS: usize = 65_535;
@@ -164,13 +164,16 @@ impl Gpu {
     }
 
     /// Finds out what each view may see.
-    fn cull(&self, views: &[(WorldId, View)]) -> Result<Lists, GpuError> {
+    fn cull(&mut self, views: &[(WorldId, View)]) -> Result<Lists, GpuError> {
+        let sight = |(world, view): &(WorldId, View)| Ok(Sight::of(view, self.placed(*world)?));
+        let sights = views.iter().map(sight).collect::<Result<Vec<_>, GpuError>>()?;
+        self.shape_bodies(views, &sights)?;
         let link = &self.link;
         let mut records = Vec::with_capacity(views.len());
         let mut n_listed = 0;
-        for (world, view) in views {
+        for ((world, view), sight) in views.iter().zip(&sights) {
             let world = self.placed(*world)?;
-            records.push(ViewRecord::of(view, world, n_listed as u32));
+            records.push(ViewRecord::of(view, sight.as_ref(), world, n_listed as u32));
             n_listed += world.instances.len() as u64;
         }
         if 4 * n_listed > link.most_bytes() {

@@ -1,34 +1,34 @@
 //! Plain geometry as the records that shaders read.
 
-use chaic_render::geometry::{InstanceData, LitBy, MeshData, N_LEVELS, Shapes, place_in_atlas};
+use chaic_render::geometry::{InstanceData, LitBy, MeshData, place_in_atlas};
 use xxhash_rust::xxh3::Xxh3;
 
 use crate::records::{
     InstanceRecord, LIT_BY_LAMP, LIT_BY_POINT, LIT_BY_SKY, MeshRecord, SkinRecord, words,
 };
 
-/// A mesh at all its levels, in the layout of the device.
+/// A mesh at some levels, in the layout of the device.
 pub(crate) struct PackedMesh {
     /// Position, and the normal in two signed 16-bit numbers.
     pub corners: Vec<[u32; 4]>,
     /// Corner, corner, corner, skin, whether smooth: 16, 16, 16, 8 and 8 bits.
     pub triangles: Vec<[u32; 2]>,
     pub skins: Vec<SkinRecord>,
-    /// Offsets count from the mesh's own first corner, triangle and skin.
+    /// Offsets count from the mesh's own first corner, triangle and skin. Levels that aren't there
+    /// have no triangles.
     pub record: MeshRecord,
 }
 
 impl PackedMesh {
-    /// Packs a shape at all levels.
-    pub fn of(shapes: &Shapes, index: usize) -> PackedMesh {
+    /// Packs levels of a shape.
+    pub fn of(levels: impl Iterator<Item = (usize, MeshData)>) -> PackedMesh {
         let mut packed = PackedMesh {
             corners: Vec::new(),
             triangles: Vec::new(),
             skins: Vec::new(),
             record: bytemuck::Zeroable::zeroed(),
         };
-        for level in 0..N_LEVELS {
-            let mesh = shapes.mesh(index, level);
+        for (level, mesh) in levels {
             packed.record.levels[level] = [
                 packed.corners.len() as u32,
                 packed.triangles.len() as u32,

@@ -9,7 +9,7 @@ use chaic_protocol::observation::Images;
 use chaic_protocol::task::TASKS;
 use chaic_render::{Appearance, Channels, Scene, View};
 use chaic_render_gpu::WorldId;
-use chaic_world::World;
+use chaic_world::{Place, World};
 use common::{episode, gpu, views};
 
 /// How far two renderings of a view are from each other.
@@ -124,10 +124,14 @@ fn a_world_that_moved_is_shown_as_it_is_now() {
     let looks = views(&world, 128, Channels::ALL);
     let asked: Vec<_> = looks.iter().map(|view| (on_device, *view)).collect();
     let before = gpu.render(&asked).expect("it is drawn").read().expect("it comes back");
-    for _ in 0..3 {
+    for step in 0..4 {
         state.frame += 7;
-        for (k, thing) in state.things.iter_mut().enumerate() {
+        // Everything moves; then only people do; then something is gone.
+        for (k, thing) in state.things.iter_mut().enumerate().filter(|_| step < 2) {
             thing.position += Vec3::new(0.05, 0.01 * (k % 3) as f32, -0.04);
+        }
+        if step == 3 {
+            state.things[4].place = Place::Broken;
         }
         for posture in &mut postures {
             posture.pose.position.x += 0.1;
@@ -142,5 +146,10 @@ fn a_world_that_moved_is_shown_as_it_is_now() {
         let cpu = scene.render_state(&state, &postures, &looks);
         cpu.iter().zip(&got).for_each(|(a, b)| difference.add(a, b));
         difference.check(&format!("frame {}", state.frame));
+        let anew = gpu.add_state(&scene, &state, &postures).expect("it fits");
+        let asked: Vec<_> = looks.iter().map(|view| (anew, *view)).collect();
+        let fresh = gpu.render(&asked).expect("it is drawn").read().expect("it comes back");
+        assert!(got == fresh, "step {step}: what was there before shows");
+        gpu.remove(anew).expect("it is there");
     }
 }

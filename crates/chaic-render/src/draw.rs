@@ -58,11 +58,20 @@ struct Candidate {
 
 /// Where the bounds of an instance are on the image.
 #[derive(Clone, Copy)]
-struct Outline {
+pub(crate) struct Outline {
     /// Least u, least v, most u, most v, pixels.
     rect: [f32; 4],
     nearest: f32,
     crosses_near: bool,
+}
+
+impl Outline {
+    /// Half of the longer side, pixels: what decides the level of detail. Large if it reaches behind
+    /// the near plane.
+    pub fn radius_px(&self) -> f32 {
+        let [u0, v0, u1, v1] = self.rect;
+        if self.crosses_near { f32::MAX } else { 0.5 * (u1 - u0).max(v1 - v0) }
+    }
 }
 
 /// Draws all that a lens sees of a frame into the target.
@@ -91,7 +100,7 @@ pub(crate) fn draw<O: Owner>(
             continue;
         }
         let into = lens.camera_from(&instance.rotation, instance.origin);
-        if let Some(outline) = outline(instance, lens, &into) {
+        if let Some(outline) = outline(instance.corners(), lens, &into) {
             let rect = (!outline.crosses_near).then_some(outline.rect);
             if !seen.shows(instance.regions_among(frame.regions), rect) {
                 continue;
@@ -123,8 +132,7 @@ pub(crate) fn draw<O: Owner>(
             continue;
         }
         let instance = &frame.instances[candidate.index as usize];
-        let radius_px = 0.5 * (rect[2] - rect[0]).max(rect[3] - rect[1]);
-        let level = if crosses_near { level_for(f32::MAX) } else { level_for(radius_px) };
+        let level = level_for(candidate.outline.radius_px());
         levels[candidate.index as usize] = level as u8;
         firsts[candidate.index as usize] = *n_triangles as u32;
         *n_triangles += instance.shape.mesh(level).triangles.len();
@@ -137,15 +145,15 @@ pub(crate) fn draw<O: Owner>(
     }
 }
 
-/// Where the bounds are on the image; `None` if outside of it.
-fn outline(instance: &Instance, lens: &Lens, into: &IntoCamera) -> Option<Outline> {
+/// Where a box of these corners is on the image; `None` if outside of it.
+pub(crate) fn outline(corners: [Vec3; 8], lens: &Lens, into: &IntoCamera) -> Option<Outline> {
     let (mu, mv) = lens.middle();
     let (near, far) = (lens.near_m(), lens.far_m());
     let mut outside_all = 0b11_1111u32;
     let mut crosses_near = false;
     let mut rect = [f32::INFINITY, f32::INFINITY, f32::NEG_INFINITY, f32::NEG_INFINITY];
     let mut nearest = f32::INFINITY;
-    for corner in instance.corners() {
+    for corner in corners {
         let p = into.map(corner);
         if !p.is_finite() {
             return None;

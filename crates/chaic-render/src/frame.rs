@@ -139,15 +139,16 @@ impl Instance<'_> {
 
     /// The corners of the bounds, in the object's frame.
     pub fn corners(&self) -> [Vec3; 8] {
-        std::array::from_fn(|k| {
-            let pick = |bit: usize, low: f32, high: f32| if k >> bit & 1 == 1 { high } else { low };
-            Vec3::new(
-                pick(0, self.min.x, self.max.x),
-                pick(1, self.min.y, self.max.y),
-                pick(2, self.min.z, self.max.z),
-            )
-        })
+        corners(self.min, self.max)
     }
+}
+
+/// The corners of a box.
+pub(crate) fn corners(min: Vec3, max: Vec3) -> [Vec3; 8] {
+    std::array::from_fn(|k| {
+        let pick = |bit: usize, low: f32, high: f32| if k >> bit & 1 == 1 { high } else { low };
+        Vec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z))
+    })
 }
 
 /// Everything that can be seen at one moment.

@@ -8,16 +8,17 @@ use chaic_protocol::{EntityId, Vec3};
 use chaic_world::{Posture, State};
 use glam::Mat3;
 
-use crate::Scene;
-use crate::frame::Instance;
+use crate::draw::outline;
+use crate::frame::{Instance, corners};
 use crate::light::NO_ROOM;
 use crate::mesh::{Mesh, Skin};
 use crate::texture;
+use crate::{Lens, Scene};
 
 pub use crate::mesh::Gloss;
 pub use crate::regions::{RegionSet, Regions};
-pub use crate::shapes::{ShapeName, Shapes};
-pub use crate::solids::N_LEVELS;
+pub use crate::shapes::{BodyShape, ShapeName, Shapes};
+pub use crate::solids::{N_LEVELS, level_for};
 pub use crate::texture::Texture;
 
 /// The finest level of detail.
@@ -100,6 +101,16 @@ pub struct InstanceData {
     pub min: [f32; 3],
     /// Greatest coordinates of its shape at any level of detail, in the object's frame, metres.
     pub max: [f32; 3],
+}
+
+impl InstanceData {
+    /// Half of the longer side of its bounds on the image of a lens, pixels, which decides its level
+    /// of detail ([`level_for`]); `None` if it is outside of the image.
+    pub fn radius_px(&self, lens: &Lens) -> Option<f32> {
+        let rotation = Mat3::from_cols_array_2d(&self.rotation);
+        let into = lens.camera_from(&rotation, self.origin.into());
+        outline(corners(self.min.into(), self.max.into()), lens, &into).map(|o| o.radius_px())
+    }
 }
 
 /// What lights an instance.

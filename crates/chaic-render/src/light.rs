@@ -6,8 +6,6 @@ use chaic_protocol::geom::Rect;
 use chaic_protocol::{Vec2, Vec3};
 use chaic_world::{RoomKind, Setup};
 
-use crate::lighting::Cells;
-
 /// No room.
 pub(crate) const NO_ROOM: u8 = u8::MAX;
 /// How far the darkness at the foot of things reaches, metres.
@@ -178,6 +176,16 @@ impl Ground {
         (self.cells_per_m, self.min)
     }
 
+    /// Number of cells along x and z.
+    pub fn size(&self) -> [usize; 2] {
+        [self.nx, self.nz]
+    }
+
+    /// The room of each cell in a row along x, or [`NO_ROOM`].
+    pub fn rooms_in_row(&self, z: usize) -> &[u8] {
+        &self.rooms[z * self.nx..][..self.nx]
+    }
+
     /// The room at a point, or [`NO_ROOM`].
     #[inline(always)]
     pub fn room_at(&self, p: Vec3) -> u8 {
@@ -241,6 +249,16 @@ impl Shadows {
     /// Brightness of the ground in quads, once it is worked out.
     pub fn quads(&self) -> Option<&[u32; N_GROUND]> {
         self.quads.first_chunk()
+    }
+
+    /// The quads of a row along x, and what is beyond the ground; none before they are worked out.
+    pub fn row(&self, z: usize) -> &[u32] {
+        self.quads.get(z * MAX_CELLS..(z + 1) * MAX_CELLS).unwrap_or_default()
+    }
+
+    /// Where something was added: cells from the first x and z to the last.
+    pub fn touched(&self) -> &[[usize; 4]] {
+        &self.touched
     }
 
     /// Works out the brightness where it has changed.
@@ -337,21 +355,6 @@ impl<'a> Light<'a> {
     pub fn finish(&mut self) {
         if let Some(shadows) = &mut self.shadows {
             shadows.finish(self.ground);
-        }
-    }
-
-    /// What stands in the ground's cells; see [`crate::lighting`].
-    pub fn cells(&self) -> Cells {
-        let g = self.ground;
-        let quads = self.shadows.as_ref().map_or(&[][..], |s| &s.quads);
-        let rows = quads.chunks_exact(MAX_CELLS).take(g.nz);
-        Cells {
-            min: g.min.to_array(),
-            cells_per_m: g.cells_per_m,
-            n_x: g.nx,
-            n_z: g.nz,
-            rooms: g.rooms.clone(),
-            brightness: rows.flat_map(|row| row[..g.nx].iter().map(|q| *q as u8)).collect(),
         }
     }
 }

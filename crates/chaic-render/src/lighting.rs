@@ -1,13 +1,15 @@
 //! The light of a moment as plain data, for other renderers; see [`crate::geometry::Shapes`]. Colors
 //! are linear, 0 to 1.
 
+use std::ops::Range;
+
 use chaic_protocol::Vec3;
 
-use crate::light::Light;
+use crate::light::{Ground, Light, Shadows};
 
 /// What shines on a scene at one moment.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Lighting {
+#[derive(Clone, Debug)]
+pub struct Lighting<'a> {
     /// Unit vector to the sun.
     pub to_sun: [f32; 3],
     /// The sun.
@@ -25,12 +27,12 @@ pub struct Lighting {
     /// Where the lamp of each room hangs, metres.
     pub lamps_in_world: Vec<[f32; 3]>,
     /// The ground.
-    pub cells: Cells,
+    pub cells: Cells<'a>,
 }
 
-/// The ground as a grid; shapes are [n_z, n_x].
-#[derive(Clone, Debug, PartialEq)]
-pub struct Cells {
+/// The ground as a grid; shape [n_z, n_x].
+#[derive(Clone, Debug)]
+pub struct Cells<'a> {
     /// Where the first cell begins (x, z), metres.
     pub min: [f32; 2],
     /// Cells along a metre.
@@ -39,17 +41,42 @@ pub struct Cells {
     pub n_x: usize,
     /// Number of cells along z.
     pub n_z: usize,
-    /// Index of the room of each cell; 255 for none.
-    pub rooms: Vec<u8>,
-    /// How bright the middle of each cell is, darker near walls and the feet of things: factors on
-    /// what is shown, the root of linear light; 255 unshaded.
-    pub brightness: Vec<u8>,
+    /// Counts what has become of the shadows of all that lies still. Between two moments of a scene
+    /// for which it is the same, only [`Cells::touched`] of either differ.
+    pub version: u64,
+    ground: &'a Ground,
+    shadows: Option<&'a Shadows>,
 }
 
-impl Lighting {
+impl Cells<'_> {
+    /// Index of the room of each cell in a row along x; 255 for none.
+    ///
+    /// # Panics
+    /// If there is no such row.
+    pub fn rooms(&self, z: usize) -> &[u8] {
+        self.ground.rooms_in_row(z)
+    }
+
+    /// How bright the middle of each cell in a row is, darker near walls and the feet of things:
+    /// factors on what is shown, the root of linear light; 255 unshaded.
+    pub fn brightness(&self, z: usize) -> impl Iterator<Item = u8> {
+        let row = self.shadows.map_or(&[][..], |shadows| shadows.row(z));
+        (0..self.n_x).map(|x| row.get(x).map_or(u8::MAX, |quad| *quad as u8))
+    }
+
+    /// Rows with shadows of what moves; some may overlap.
+    pub fn touched(&self) -> impl Iterator<Item = Range<usize>> {
+        let touched = self.shadows.map_or(&[][..], Shadows::touched);
+        touched.iter().map(|[_, first, _, last]| *first..last + 1)
+    }
+}
+
+impl Lighting<'_> {
     /// What shines on a frame that was made to be looked at in color.
-    pub(crate) fn of(light: &Light) -> Lighting {
-        let lamps = light.lamps;
+    pub(crate) fn of<'a>(light: &'a Light) -> Lighting<'a> {
+        let (lamps, ground) = (light.lamps, light.ground);
+        let (cells_per_m, min) = ground.grid();
+        let [n_x, n_z] = ground.size();
         Lighting {
             to_sun: lamps.to_sun.to_array(),
             sun: lamps.sun.to_array(),
@@ -57,9 +84,17 @@ impl Lighting {
             outdoors: lamps.outdoors.map(|c| c.to_array()),
             indoors: lamps.indoors.map(|c| c.to_array()),
             sky: lamps.sky.map(|c| c.to_array()),
-            ceiling_m: light.ground.ceiling_m,
-            lamps_in_world: light.ground.lamps().iter().map(Vec3::to_array).collect(),
-            cells: light.cells(),
+            ceiling_m: ground.ceiling_m,
+            lamps_in_world: ground.lamps().iter().map(Vec3::to_array).collect(),
+            cells: Cells {
+                min: min.to_array(),
+                cells_per_m,
+                n_x,
+                n_z,
+                version: light.version,
+                ground,
+                shadows: light.shadows.as_ref(),
+            },
         }
     }
 }

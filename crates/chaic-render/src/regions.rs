@@ -287,12 +287,8 @@ impl Regions {
         let into = lens.camera_from(&Mat3::IDENTITY, Vec3::ZERO);
         let at = |p: Vec2, y: f32| into.map(Vec3::new(p.x, y, p.y));
         let top = self.top_m + 2.0 * SLACK_M;
-        let ring = [
-            at(portal.a, -SLACK_M),
-            at(portal.b, -SLACK_M),
-            at(portal.b, top),
-            at(portal.a, top),
-        ];
+        let ring =
+            [at(portal.a, -SLACK_M), at(portal.b, -SLACK_M), at(portal.b, top), at(portal.a, top)];
         let (mu, mv) = lens.middle();
         let mut outline = [f32::INFINITY, f32::INFINITY, f32::NEG_INFINITY, f32::NEG_INFINITY];
         let mut add = |p: Vec3| {
@@ -321,9 +317,9 @@ impl Regions {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::view::hostile::{self, Case};
     use crate::view::scenes::{camera, empty, house, wall, world};
     use crate::{Channels, Scene, View};
-    use crate::view::hostile::{self, Case};
     use chaic_protocol::rng::Stream;
     use chaic_world::{Room, RoomKind, Wall};
     use std::f32::consts::{FRAC_PI_2, PI};

@@ -256,7 +256,7 @@ impl Scene {
     }
 
     /// Takes the memory of shadows back, to be used again.
-    fn give_back(&self, light: Light) {
+    pub(crate) fn give_back(&self, light: Light) {
         let Light { shadows: Some(mut shadows), version, .. } = light else { return };
         let mut still = self.still.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if still.version == version {

@@ -22,6 +22,17 @@ pub struct Shapes<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct ShapeName(ShapeKey);
 
+/// A body in one posture; its meshes are made when they are asked for.
+#[derive(Clone, Debug)]
+pub struct BodyShape(Body);
+
+impl BodyShape {
+    /// The mesh at a level of detail; levels past the finest are the finest.
+    pub fn mesh(&self, level: usize) -> MeshData {
+        MeshData::from(self.0.level(level.min(FINEST)))
+    }
+}
+
 impl Shapes<'_> {
     /// Number of shapes; those that instances name by their index.
     pub fn len(&self) -> usize {
@@ -41,6 +52,24 @@ impl Shapes<'_> {
         }
     }
 
+    /// Whether a shape is a piece of structure: in the same place of every moment of its scene.
+    pub fn is_structure(&self, index: usize) -> bool {
+        matches!(self.shapes.get(index), Some(Shape::Fixed(_)))
+    }
+
+    /// Whether a shape is a body: that of no other moment.
+    pub fn is_body(&self, index: usize) -> bool {
+        matches!(self.shapes.get(index), Some(Shape::Body(_)))
+    }
+
+    /// A shape that is a body, to be kept.
+    pub fn body(&self, index: usize) -> Option<BodyShape> {
+        match self.shapes.get(index)? {
+            Shape::Body(body) => Some(BodyShape(Body::clone(body))),
+            Shape::Fixed(_) | Shape::Class(_) => None,
+        }
+    }
+
     /// A shape at a level of detail; levels past the finest are the finest.
     ///
     /// # Panics
@@ -50,7 +79,7 @@ impl Shapes<'_> {
     }
 
     /// What shines on them.
-    pub fn lighting(&self) -> Lighting {
+    pub fn lighting(&self) -> Lighting<'_> {
         Lighting::of(&self.frame.light)
     }
 }
@@ -79,6 +108,8 @@ impl Scene {
             }
             instances.push(self.instance_data(instance, mesh));
         }
-        look(&Shapes { instances, shapes, frame: &frame })
+        let result = look(&Shapes { instances, shapes, frame: &frame });
+        self.give_back(frame.light);
+        result
     }
 }

@@ -15,7 +15,7 @@ pub const N_LEVELS: usize = 7;
 pub const LEVEL_RADIUS_PX: [f32; N_LEVELS] = [7.0, 12.0, 20.0, 35.0, 60.0, 110.0, 200.0];
 
 /// The level for an object of this half size on the image.
-pub(crate) fn level_for(radius_px: f32) -> usize {
+pub fn level_for(radius_px: f32) -> usize {
     LEVEL_RADIUS_PX[..N_LEVELS - 1].iter().take_while(|r| radius_px > **r).count()
 }
 

@@ -14,7 +14,8 @@
 @group(0) @binding(7) var<storage, read> lights: array<Light>;
 // Lamps of all worlds, metres.
 @group(0) @binding(8) var<storage, read> lamps: array<vec4f>;
-// Of each cell of the ground its brightness and room, a byte each; rows along x.
+// Of each cell of the ground its brightness and room, a byte each, two cells a word; rows along x
+// begin with a word.
 @group(0) @binding(9) var<storage, read> ground: array<u32>;
 // Of each texture its tile at all sizes, the largest first; a texel and three neighbors a word.
 @group(0) @binding(10) var<storage, read> atlas: array<u32>;
@@ -310,8 +311,8 @@ fn on_ground(light: Light, p: vec3f) -> vec2f {
 // Brightness of a cell, and its room in the second byte.
 fn cell(light: Light, at: vec2i) -> u32 {
     let k = vec2u(clamp(at, vec2i(0), vec2i(vec2u(light.n_x, light.n_z)) - 1));
-    let index = light.first_cell + k.y * light.n_x + k.x;
-    return (ground[index / 2u] >> (16u * (index % 2u))) & 0xffffu;
+    let word = light.first_cell + k.y * ((light.n_x + 1u) / 2u) + k.x / 2u;
+    return (ground[word] >> (16u * (k.x % 2u))) & 0xffffu;
 }
 
 // How bright the ground is, 0 to 1.

@@ -20,7 +20,7 @@ use dress::Dress;
 use skeleton::Skeleton;
 
 /// One body at one moment; its meshes are made when first needed.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Body {
     pub pose: Pose,
     /// Bounds in the body's frame, metres.

@@ -13,7 +13,9 @@ use gltf::binary::{Glb, Header};
 use gltf::json::accessor::{ComponentType, GenericComponentType, Type};
 use gltf::json::buffer::{Stride, Target, View};
 use gltf::json::extras::RawValue;
-use gltf::json::material::{PbrBaseColorFactor, PbrMetallicRoughness, StrengthFactor};
+use gltf::json::material::{
+    EmissiveFactor, PbrBaseColorFactor, PbrMetallicRoughness, StrengthFactor,
+};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::scene::UnitQuaternion;
 use gltf::json::validation::{Checked::Valid, USize64};
@@ -187,6 +189,7 @@ impl File {
         }
         let (metallic, roughness) = metallic_roughness(skin.gloss);
         let [r, g, b] = color;
+        let gives_light = matches!(skin.gloss, Gloss::Glow | Gloss::Pane);
         let [red, green, blue] = color.map(shown_from_linear);
         let texture = format!("{:?}", skin.texture).to_lowercase();
         let gloss = format!("{:?}", skin.gloss).to_lowercase();
@@ -198,6 +201,7 @@ impl File {
                 roughness_factor: StrengthFactor(roughness),
                 ..Default::default()
             },
+            emissive_factor: EmissiveFactor(if gives_light { color } else { [0.0; 3] }),
             extras: extras(&serde_json::json!({ "texture": texture, "gloss": gloss })),
             ..Default::default()
         });
@@ -296,11 +300,11 @@ fn accessor(view: usize, at: usize, count: usize) -> Accessor {
 /// The metallic-roughness material nearest to our highlights.
 fn metallic_roughness(gloss: Gloss) -> (f32, f32) {
     match gloss {
-        Gloss::Dull => (0.0, 0.95),
+        Gloss::Dull | Gloss::Glow => (0.0, 0.95),
         Gloss::Satin => (0.0, 0.6),
         Gloss::Shiny => (0.0, 0.3),
         Gloss::Metal => (1.0, 0.4),
-        Gloss::Glass => (0.0, 0.1),
+        Gloss::Glass | Gloss::Pane => (0.0, 0.1),
     }
 }
 

@@ -10,6 +10,11 @@ use chaic_world::{RoomKind, Setup};
 pub(crate) const NO_ROOM: u8 = u8::MAX;
 /// How far the darkness at the foot of things reaches, metres.
 const CONTACT_M: f32 = 0.22;
+/// A ceiling is lit as if it were higher by so much, metres: lamps shine downwards, and what reaches it
+/// is mostly what comes back from below.
+pub(crate) const CEILING_FARTHER_M: f32 = 1.0;
+/// By what light on ceilings is multiplied: they see the whole lit room.
+pub(crate) const CEILING_TONE: f32 = 1.05;
 /// Cells of the ground along one side at most; a house gets cells of a few centimetres.
 pub(crate) const MAX_CELLS: usize = 256;
 
@@ -60,6 +65,31 @@ impl Lamps {
             Vec3::new(0.24, 0.22, 0.21),
         ],
     };
+
+    /// By what the color of a lamp is multiplied: half of its light's color, as bright as can be shown.
+    pub fn glow(&self) -> Vec3 {
+        0.5 + 0.5 * self.lamp / self.lamp.max_element().max(1e-6)
+    }
+
+    /// What is seen of a level surface out of doors, of linear color, without shadow.
+    pub fn in_the_open(&self, color: Vec3) -> Vec3 {
+        color * (self.outdoors[0] + self.sun * self.to_sun.y.max(0.0))
+    }
+
+    /// The linear color of the sky along a ray, and of the ground, far away, that has this color
+    /// close by.
+    #[inline(always)]
+    pub fn sky_along(&self, ray: Vec3, ground: Vec3) -> Vec3 {
+        let [horizon, zenith, _] = self.sky;
+        let y = ray.y / ray.dot(ray).max(1e-12).sqrt();
+        let up = (1.0 - y) * (1.0 - y);
+        let (to, t) = if y >= 0.0 {
+            (zenith, 1.0 - up * (0.4 + 0.6 * up))
+        } else {
+            (ground, (-6.0 * y).min(1.0))
+        };
+        horizon + (to - horizon) * t
+    }
 }
 
 /// The ground as a grid of cells; x across, z down.

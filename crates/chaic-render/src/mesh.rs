@@ -38,6 +38,10 @@ pub enum Gloss {
     Metal,
     /// The sharpest highlight; drawn opaque.
     Glass,
+    /// Gives light of its own color, as warm as the scene's lamps: a lamp.
+    Glow,
+    /// A window's pane, through which the sky is seen, and a lawn below the horizon. Of structure only.
+    Pane,
 }
 
 impl Skin {

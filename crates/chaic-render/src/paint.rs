@@ -9,13 +9,16 @@ use glam::Vec4;
 
 use crate::frame::{Frame, Instance};
 use crate::lens::Lens;
-use crate::light::NO_ROOM;
+use crate::light::{CEILING_FARTHER_M, CEILING_TONE, NO_ROOM};
 use crate::mesh::{Gloss, Mesh, Triangle, unit};
 use crate::points::{Point, Points};
 use crate::texture::{Texture, Tile};
 
 /// How dark the tops of walls are on maps, 0 to 255.
 const WALL_ON_MAP: f32 = 44.0;
+
+/// The lawn outside of windows, linear.
+const LAWN: [f32; 3] = [0.16, 0.28, 0.09];
 
 /// What a map shows where nothing is, 0 to 255.
 const PAPER: f32 = 236.0;
@@ -187,6 +190,8 @@ pub(crate) struct Painter<'a> {
     pub rays: Rays,
     /// Places on the ground's grid.
     pub ground: Plane,
+    /// What is seen of a lawn out of doors, linear.
+    lawn: Vec3,
 }
 
 impl<'a> Painter<'a> {
@@ -204,7 +209,8 @@ impl<'a> Painter<'a> {
             du: flat(du) * cells_per_m,
             dv: flat(dv) * cells_per_m,
         };
-        Painter { frame, is_plan: lens.is_plan, rays: Rays { eye, ray }, ground }
+        let lawn = frame.light.lamps.in_the_open(LAWN.into());
+        Painter { frame, is_plan: lens.is_plan, rays: Rays { eye, ray }, ground, lawn }
     }
 
     /// What is common to an instance's triangles.
@@ -281,7 +287,7 @@ impl<'a> Painter<'a> {
             let point = self.thing_point(instance, sight, (skin.gloss, color), p, n);
             points.push(&point) as u32
         };
-        if !triangle.smooth && skin.gloss == Gloss::Dull {
+        if !triangle.smooth && matches!(skin.gloss, Gloss::Dull | Gloss::Glow) {
             let point = push((a + b + c) * (1.0 / 3.0), face);
             return painted(Kind::Unlit(Unlit { point, toward: None, is_flat: true }));
         }
@@ -348,6 +354,8 @@ impl<'a> Painter<'a> {
         let (point, normal) = (instance.rotation * p, instance.rotation * n);
         let to_eye =
             if self.is_plan { Vec3::Y } else { self.rays.eye[0] - instance.origin - point };
+        let glows = gloss == Gloss::Glow;
+        let color = if glows { color * self.frame.light.lamps.glow() } else { color };
         // The foot of a thing stands in its own shadow.
         let tone = 0.76 + 0.24 * (point.y * 7.0).clamp(0.0, 1.0);
         Point { at: sight.middle, lamp: sight.lamp, normal, to_eye, color, gloss, tone }
@@ -371,12 +379,17 @@ impl<'a> Painter<'a> {
     fn structure_point(&self, surface: &Surface, u: f32, v: f32, depth_m: f32) -> Point {
         let (at, ray) = self.rays.point(u, v, depth_m);
         let Surface { color, normal, gloss, .. } = *surface;
-        let ground = self.frame.light.ground;
+        let (ground, lamps) = (self.frame.light.ground, self.frame.light.lamps);
+        let (color, gloss) = match gloss {
+            Gloss::Pane => (lamps.sky_along(ray, self.lawn), Gloss::Glow),
+            Gloss::Glow => (color * lamps.glow(), gloss),
+            _ => (color, gloss),
+        };
         // A step off the surface leaves the wall.
         let lamp = ground.lamp(ground.room_at(at + normal * 0.1));
-        let tone = if normal.y < -0.5 {
-            // A ceiling sees the whole lit room.
-            1.5
+        let is_ceiling = normal.y < -0.5;
+        let tone = if is_ceiling {
+            CEILING_TONE
         } else if normal.y < 0.5 {
             let low = (1.0 - at.y * 2.2).max(0.0);
             let high = ground.ceiling_m.map_or(0.0, |c| (1.0 - (c - at.y) * 2.2).max(0.0));
@@ -384,6 +397,8 @@ impl<'a> Painter<'a> {
         } else {
             1.0
         };
+        let farther = if is_ceiling { CEILING_FARTHER_M } else { 0.0 };
+        let at = Vec3::new(at.x, at.y + farther, at.z);
         Point { at, lamp, normal, to_eye: -ray, color, gloss, tone }
     }
 
@@ -393,16 +408,9 @@ impl<'a> Painter<'a> {
         if self.is_plan {
             return Vec4::splat(PAPER);
         }
-        let [horizon, zenith, ground] = self.frame.light.lamps.sky.map(|c| c.extend(0.0));
+        let lamps = self.frame.light.lamps;
         let (_, ray) = self.rays.point(u, v, 0.0);
-        let y = ray.y / ray.dot(ray).max(1e-12).sqrt();
-        let up = (1.0 - y) * (1.0 - y);
-        let (to, t) = if y >= 0.0 {
-            (zenith, 1.0 - up * (0.4 + 0.6 * up))
-        } else {
-            (ground, (-6.0 * y).min(1.0))
-        };
-        shown(horizon + (to - horizon) * t)
+        shown(lamps.sky_along(ray, lamps.sky[2]).extend(0.0))
     }
 }
 

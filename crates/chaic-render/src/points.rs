@@ -158,7 +158,8 @@ impl Block {
                 + of(&EDGE_2, gloss) * (edge * edge)
                 + mirror * (of(&MIRROR, gloss) + of(&MIRROR_EDGE, gloss) * (edge * edge));
             let keep = keep * tone[k];
-            let answer = Answer { indoors, direct, corner, up, keep, glint, mirrored };
+            let glow = of(&GLOW, gloss);
+            let answer = Answer { indoors, direct, corner, up, keep, glow, glint, mirrored };
             r[k] = answer.shown(red[k], &source[0], REFLECTED[0]);
             g[k] = answer.shown(green[k], &source[1], REFLECTED[1]);
             b[k] = answer.shown(blue[k], &source[2], REFLECTED[2]);
@@ -187,6 +188,8 @@ struct Answer {
     up: f32,
     /// What it keeps of all this light on its own color.
     keep: f32,
+    /// What it gives of its own color, whatever the light.
+    glow: f32,
     glint: f32,
     mirrored: f32,
 }
@@ -199,7 +202,8 @@ impl Answer {
         let direct = if self.indoors { direct[1] } else { direct[0] } * self.direct;
         let high = if self.indoors { high[1] } else { high[0] };
         let low = if self.indoors { low[1] } else { low[0] };
-        let factor = ((low + (high - low) * self.up) * self.corner + direct) * self.keep;
+        let lit = ((low + (high - low) * self.up) * self.corner + direct) * self.keep;
+        let factor = lit + self.glow;
         let linear = color * factor + direct * self.glint + reflected * self.mirrored;
         255.0 * most(least(linear, 1.0), 0.0).sqrt()
     }
@@ -214,12 +218,14 @@ fn of(table: &[f32; 8], gloss: u32) -> f32 {
 /// The color of what mirrors, which is mostly windows and the sky.
 const REFLECTED: [f32; 3] = [0.85, 0.95, 1.05];
 
-// How each gloss answers to light: dull, satin, shiny, metal, glass.
+// How each gloss answers to light: dull, satin, shiny, metal, glass, glow. Panes come as glow.
 
 /// What it keeps of the light on its own color.
 const KEEP: [f32; 8] = [1.0, 1.0, 1.0, 0.62, 0.6, 0.0, 0.0, 0.0];
 /// The same, growing with the square of how far up the mirrored view looks.
 const KEEP_MIRROR: [f32; 8] = [0.0, 0.0, 0.0, 0.75, 0.0, 0.0, 0.0, 0.0];
+/// What it gives of its own color, whatever the light.
+const GLOW: [f32; 8] = [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0];
 /// A highlight of the 8th, 16th and 32nd power.
 const GLINT_8: [f32; 8] = [0.0, 0.07, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
 const GLINT_16: [f32; 8] = [0.0, 0.0, 0.0, 0.4, 0.6, 0.0, 0.0, 0.0];

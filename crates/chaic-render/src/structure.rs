@@ -227,7 +227,7 @@ mod tests {
     fn windows_are_in_outer_walls_and_stand_out_little() {
         let setup = two_rooms();
         let papers = walls::papers(&setup);
-        let n: Vec<usize> = setup
+        let has_window: Vec<bool> = setup
             .walls
             .iter()
             .map(|w| {
@@ -238,10 +238,10 @@ mod tests {
                     let off = (d.y * line.axis.x - d.x * line.axis.y).abs();
                     assert!(off < line.half.y + 0.08, "{p}");
                 }
-                mesh.triangles.len()
+                mesh.skins.iter().any(|skin| skin.gloss == mesh::Gloss::Pane)
             })
             .collect();
-        assert!(n[3] > 300, "the outer wall has windows: {n:?}");
-        assert!(n[1] < 200, "an inner wall has none, not even in an alcove: {n:?}");
+        // The other walls are inner ones; one of them is beside an alcove.
+        assert_eq!(has_window, [false, false, false, true]);
     }
 }

@@ -74,8 +74,16 @@ const SATIN: u32 = 1u;
 const SHINY: u32 = 2u;
 const METAL: u32 = 3u;
 const GLASS: u32 = 4u;
+const GLOW: u32 = 5u;
+const PANE: u32 = 6u;
 
 const NO_ROOM: u32 = 255u;
+
+// As in `chaic-render`'s light.rs and paint.rs.
+const CEILING_FARTHER_M: f32 = 1.0;
+const CEILING_TONE: f32 = 1.05;
+// The lawn outside of windows, linear.
+const LAWN: vec3f = vec3f(0.16, 0.28, 0.09);
 
 // Where the direct light at a point comes from.
 struct Direct {
@@ -109,7 +117,7 @@ fn shade(@builtin(global_invocation_id) at: vec3u) {
     let name = color[pixel];
     var shows = vec3f(0.0);
     if (name == NOBODY) {
-        shows = sky(light, ray);
+        shows = shown(sky_along(light, ray, light.below));
     } else {
         shows = surface(view, light, name, ray, depth[pixel]);
     }
@@ -117,13 +125,13 @@ fn shade(@builtin(global_invocation_id) at: vec3u) {
     color[pixel] = whole.x | (whole.y << 8u) | (whole.z << 16u) | 0xff000000u;
 }
 
-fn sky(light: Light, ray: vec3f) -> vec3f {
+// The linear color of the sky along a ray, and of the ground, far away, that has this color close by.
+fn sky_along(light: Light, ray: vec3f, ground: vec3f) -> vec3f {
     let y = ray.y * inverseSqrt(max(dot(ray, ray), 1e-12));
     let up = (1.0 - y) * (1.0 - y);
     let is_above = y >= 0.0;
     let t = select(min(-6.0 * y, 1.0), 1.0 - up * (0.4 + 0.6 * up), is_above);
-    let to = select(light.below, light.zenith, is_above);
-    return shown(mix(light.horizon, to, t));
+    return mix(light.horizon, select(ground, light.zenith, is_above), t);
 }
 
 fn surface(view: View, light: Light, name: u32, ray: vec3f, depth_m: f32) -> vec3f {
@@ -263,6 +271,11 @@ fn shown(linear: vec3f) -> vec3f {
     return sqrt(clamp(linear, vec3f(0.0), vec3f(1.0))) * 255.0;
 }
 
+// By what the color of a lamp is multiplied.
+fn glow(light: Light) -> vec3f {
+    return 0.5 + 0.5 * light.lamp / max(max(light.lamp.x, max(light.lamp.y, light.lamp.z)), 1e-6);
+}
+
 // What all corners of a thing's triangle share.
 struct Lit {
     turn: mat3x3f,
@@ -277,6 +290,9 @@ struct Lit {
 fn thing(light: Light, lit: Lit, p: vec3f, n: vec3f) -> vec3f {
     let point = lit.turn * p;
     let to_eye = unit(lit.eye - lit.origin - point);
+    if (lit.gloss == GLOW) {
+        return shown(lit.color * glow(light));
+    }
     let s = shine(light, lit.direct, lit.turn * n, lit.gloss, to_eye);
     // The foot of a thing stands in its own shadow.
     let foot = 0.76 + 0.24 * clamp(point.y * 7.0, 0.0, 1.0);
@@ -285,16 +301,25 @@ fn thing(light: Light, lit: Lit, p: vec3f, n: vec3f) -> vec3f {
 
 // What is shown of a point of structure in the world.
 fn structure(light: Light, own: vec3f, gloss: u32, p: vec3f, n: vec3f, ray: vec3f) -> vec3f {
+    if (gloss == PANE) {
+        let lawn = LAWN * (light.outdoors_high + light.sun * max(light.to_sun.y, 0.0));
+        return shown(sky_along(light, ray, lawn));
+    }
+    if (gloss == GLOW) {
+        return shown(own * glow(light));
+    }
     // A step off the surface leaves the wall.
     let at = on_ground(light, p + 0.1 * n);
     let room = cell(light, vec2i(at)) >> 8u;
     let has_lamp = room < light.n_lamps;
     let lamp = lamps[light.first_lamp + select(0u, room, has_lamp)].xyz;
-    let s = shine(light, direct_light(light, has_lamp, lamp, p), n, gloss, -unit(ray));
+    // A ceiling is lit as if it were higher.
+    let is_ceiling = n.y < -0.5;
+    let farther = vec3f(0.0, select(0.0, CEILING_FARTHER_M, is_ceiling), 0.0);
+    let s = shine(light, direct_light(light, has_lamp, lamp, p + farther), n, gloss, -unit(ray));
     var factor = s.factor;
-    if (n.y < -0.5) {
-        // A ceiling sees the whole lit room.
-        factor *= 1.5;
+    if (is_ceiling) {
+        factor *= CEILING_TONE;
     } else if (n.y < 0.5) {
         let low = max(1.0 - p.y * 2.2, 0.0);
         let high = max(1.0 - (light.ceiling_m - p.y) * 2.2, 0.0);

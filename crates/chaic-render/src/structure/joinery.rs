@@ -5,7 +5,7 @@ use chaic_protocol::{Vec2, Vec3};
 use chaic_world::{Opening, Room, RoomKind, Setup, Wall};
 
 use super::walls::{Line, Stretch};
-use crate::mesh::{Mesh, Place, Section, Skin};
+use crate::mesh::{Gloss, Mesh, Place, Section, Skin};
 use crate::sculpt::scramble;
 use crate::solids::{cuboid, ellipsoid, frustum};
 
@@ -146,17 +146,8 @@ fn window(
         let center = [x + center[0], sill + center[1], z(0.5 * thick)];
         cuboid(mesh, &line.place(center, [extent[0], extent[1], thick]));
     };
-    // Behind the panes: sky that pales towards the horizon, and green below.
-    let bands: [([u8; 3], f32, f32); 4] = [
-        ([126, 158, 104], 0.0, 0.2),
-        ([222, 234, 242], 0.2, 0.42),
-        ([202, 224, 244], 0.42, 0.7),
-        ([180, 210, 242], 0.7, 1.0),
-    ];
-    for (color, low, top) in bands {
-        mesh.skin(Skin { gloss: crate::mesh::Gloss::Satin, ..Skin::new(color, Finish::Matte) });
-        block(mesh, [0.0, 0.5 * (low + top) * high], [wide, (top - low) * high], 0.008);
-    }
+    mesh.skin(Skin { gloss: Gloss::Pane, ..Skin::new([180, 210, 242], Finish::Glass) });
+    block(mesh, [0.0, 0.5 * high], [wide, high], 0.008);
     mesh.skin(wood(setup).with_axes(line.axes()));
     let bar = 0.055;
     for dx in [-0.5, 0.5] {
@@ -224,8 +215,8 @@ pub(super) fn lamp(room: &Room, ceiling_m: f32) -> Mesh {
         Place::upright(Vec3::new(c.x, ceiling_m - y, c.y), Vec3::from(extent))
     };
     mesh.skin(Skin::new([176, 178, 182], Finish::Metal));
-    frustum(&mut mesh, &at(0.015, [0.34, 0.03, 0.34]), 1.0, n);
-    mesh.skin(Skin::new([255, 253, 244], Finish::Glossy));
+    frustum(&mut mesh, &at(0.015, [0.46, 0.03, 0.46]), 1.0, n);
+    mesh.skin(Skin { gloss: Gloss::Glow, ..Skin::new([255, 253, 250], Finish::Matte) });
     ellipsoid(&mut mesh, &at(0.03, [0.4, 0.16, 0.4]), n);
     mesh.finish()
 }

@@ -1,7 +1,7 @@
 //! Pictures of one moment: what an agent sees, as files for people and programs.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use chaic_episodes::Episode;
@@ -40,8 +40,10 @@ pub struct Still<'a> {
 }
 
 /// Plays an episode up to a moment and writes `rgb.png`, `depth.png` (16 bit, millimetres),
-/// `ids.png` (16 bit), `ids.json` (id to class) and `plan.png` (everything from above) into `out`.
-/// Returns the frame that is shown.
+/// `ids.png` (16 bit), `ids.json` (id to class), `classes.png` (8 bit, see
+/// [`chaic_render::Labels`]), `classes.json` (index to class), `normals.png` (in the world, see
+/// [`image_out::normals_view`]) and `plan.png` (everything from above) into `out`. Returns the frame
+/// that is shown.
 ///
 /// # Errors
 /// If there is no such agent or helper, or the file system refuses.
@@ -65,15 +67,22 @@ pub fn write(still: &Still<'_>, helpers: &dyn Helpers, out: &Path) -> Result<Fra
     let depth = images.depth_m.as_deref().and_then(|b| image_out::depth_mm(b, size, size));
     save(depth.ok_or_else(no_picture)?.into(), &out.join("depth.png"))?;
     let ids = images.ids.unwrap_or_default();
-    let present: std::collections::BTreeSet<u16> = ids.iter().copied().collect();
+    let present: BTreeSet<u16> = ids.iter().copied().collect();
     let picture = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(size, size, ids);
     save(picture.ok_or_else(no_picture)?.into(), &out.join("ids.png"))?;
     let classes = world.classes();
     let names: BTreeMap<u16, &str> =
         present.into_iter().map(|id| (id, name_of(EntityId(id), &classes))).collect();
-    let json = serde_json::to_string_pretty(&names).expect("numbers and names") + "\n";
-    let path = out.join("ids.json");
-    std::fs::write(&path, json).map_err(EvalError::io("write", &path))?;
+    save_names(&names, &out.join("ids.json"))?;
+    let labels = play.eyes().scene().label(world, &view);
+    let present: BTreeSet<u8> = labels.classes.iter().copied().collect();
+    let classes = ClassId::all().map(|class| (class.index() as u16, class.name()));
+    let names = classes.filter(|(k, _)| present.contains(&(*k as u8))).collect();
+    save_names(&names, &out.join("classes.json"))?;
+    let picture = image::GrayImage::from_raw(size, size, labels.classes);
+    save(picture.ok_or_else(no_picture)?.into(), &out.join("classes.png"))?;
+    let normals = image_out::normals_view(&labels.normals, size, size);
+    save(normals.ok_or_else(no_picture)?.into(), &out.join("normals.png"))?;
     let from_above = plan::draw_scene_plan(play.eyes().scene(), world, size.max(PLAN_MIN_PX));
     save(from_above.into(), &out.join("plan.png"))?;
     Ok(world.state().frame)
@@ -104,9 +113,9 @@ pub fn write_plan(episode: &Episode, width_px: u32, path: &Path) -> Result<()> {
     save(plan::draw_scene_plan(&scene, &world, width_px).into(), path)
 }
 
-/// The pictures that `write` leaves in a folder.
-pub fn files(out: &Path) -> Vec<PathBuf> {
-    ["rgb.png", "depth.png", "ids.png", "ids.json", "plan.png"].map(|n| out.join(n)).to_vec()
+fn save_names(names: &BTreeMap<u16, &str>, path: &Path) -> Result<()> {
+    let json = serde_json::to_string_pretty(names).expect("numbers and names") + "\n";
+    std::fs::write(path, json).map_err(EvalError::io("write", path))
 }
 
 fn save(picture: DynamicImage, path: &Path) -> Result<()> {

@@ -30,6 +30,17 @@ pub fn ids_view(ids: &[u16], width: u32, height: u32) -> Option<RgbImage> {
     RgbImage::from_raw(width, height, colors)
 }
 
+/// Unit normals, shape [height, width, 3], as color: each coordinate from -1 to 1 is 0 to 255, and
+/// black is where there is none.
+pub fn normals_view(normals: &[f32], width: u32, height: u32) -> Option<RgbImage> {
+    let seen = |n: &[f32]| n.iter().any(|x| *x != 0.0);
+    let colors = normals.chunks_exact(3).flat_map(|n| match n {
+        [x, y, z] if seen(n) => [x, y, z].map(|c| (127.5 * (c + 1.0) + 0.5) as u8),
+        _ => [0; 3],
+    });
+    RgbImage::from_raw(width, height, colors.collect())
+}
+
 /// The color that [`ids_view`] gives an id: grays for structure, vivid ones for all else.
 pub fn id_color(id: u16) -> [u8; 3] {
     match id {
@@ -74,6 +85,8 @@ mod tests {
         let mm = depth_mm(&[1.234, 100.0], 2, 1).expect("fits");
         assert_eq!(mm.into_raw(), [1234, 65535]);
         assert!(rgb(&[0; 5], 1, 2).is_none());
+        let normals = normals_view(&[0.0, 0.0, 0.0, -1.0, 1.0, 0.0], 2, 1).expect("fits");
+        assert_eq!(normals.into_raw(), [0, 0, 0, 0, 255, 128]);
         let colors: std::collections::BTreeSet<_> = (8..200).map(id_color).collect();
         assert!(colors.len() > 185, "ids are told apart: {}", colors.len());
     }

@@ -256,7 +256,8 @@ pub struct RenderArguments {
     /// The frame; the first one from it on in which somebody decides is shown.
     #[arg(long, default_value_t = 0)]
     pub frame: u32,
-    /// Folder for rgb.png, depth.png (16 bit, millimetres), ids.png (16 bit), ids.json and plan.png.
+    /// Folder for rgb.png, depth.png (16 bit, millimetres), ids.png (16 bit) and ids.json, classes.png
+    /// and classes.json, normals.png (in the world), and plan.png.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// Side of the images, pixels.

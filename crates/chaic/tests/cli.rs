@@ -196,6 +196,18 @@ fn fidelity_from_end_to_end() {
     assert_eq!(doc("docs/f.md"), whole);
 }
 
+/// What `chaic render` writes.
+const PICTURES: [&str; 8] = [
+    "rgb.png",
+    "depth.png",
+    "ids.png",
+    "ids.json",
+    "classes.png",
+    "classes.json",
+    "normals.png",
+    "plan.png",
+];
+
 #[test]
 fn pictures_and_episodes() {
     let dir = workshop();
@@ -206,9 +218,11 @@ fn pictures_and_episodes() {
         &["render", file, "--agent", "partner", "--frame", "20", "--out", "p", "--size", "64"],
     );
     assert!(printed.contains("partner"), "{printed}");
-    for name in ["rgb.png", "depth.png", "ids.png", "ids.json", "plan.png"] {
+    for name in PICTURES {
         assert!(at.join("p").join(name).exists(), "{name}");
     }
+    let classes = fs::read_to_string(at.join("p/classes.json")).expect("it is text");
+    assert!(serde_json::from_str::<std::collections::BTreeMap<u8, String>>(&classes).is_ok());
     let ids = fs::read_to_string(at.join("p/ids.json")).expect("it is text");
     assert!(ids.contains("\"floor\""), "{ids}");
     let child = ill(at, &["render", file, "--agent", "child", "--out", "c"]);
@@ -252,7 +266,7 @@ fn appearances_change_colors_and_nothing_else() {
     });
     well(at, &[&render[..], &["--out", "usual"]].concat());
     let file = |folder: &Path, name: &str| fs::read(folder.join(name)).expect("it was written");
-    for name in ["rgb.png", "depth.png", "ids.png", "ids.json", "plan.png"] {
+    for name in PICTURES {
         assert!(file(&at.join("usual"), name) == file(&folders[0], name), "{name}");
         let others: Vec<Vec<u8>> = folders.iter().map(|folder| file(folder, name)).collect();
         let is_color = ["rgb.png", "plan.png"].contains(&name);

@@ -1,8 +1,8 @@
-//! How a thing that was let go comes to rest.
+//! How things that were let go come to rest.
 //!
-//! The whole fall is worked out when it begins, by a small rigid-body simulation of the thing
-//! alone among what stands near it, and then played back frame by frame. So physics is a pure
-//! function, the state stays plain data, and a frame in which nothing falls costs nothing.
+//! The whole fall is worked out when it begins, by a small rigid-body simulation of what begins to
+//! fall at that moment among what stands near it, and then played back frame by frame. So physics
+//! is a pure function, the state stays plain data, and a frame in which nothing falls costs nothing.
 
 use chaic_protocol::{EntityId, Quat, Vec3};
 use rapier3d::prelude::*;
@@ -12,6 +12,7 @@ use crate::shape::Block;
 /// What falls.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Falling {
+    pub entity: EntityId,
     /// Middle of its bottom, metres.
     pub position: Vec3,
     pub rotation: Quat,
@@ -57,8 +58,8 @@ const STILL_FRAMES: usize = 4;
 /// Sliding friction of household things on wood or cloth.
 const FRICTION: f32 = 0.8;
 
-/// Lets a thing fall among `obstacles` above the ground at y = 0.
-pub(crate) fn fall(thing: Falling, obstacles: &[Obstacle], step_s: f32) -> Fall {
+/// Lets things fall together among `obstacles` above the ground at y = 0, until all lie still.
+pub(crate) fn fall(things: &[Falling], obstacles: &[Obstacle], step_s: f32) -> Vec<Fall> {
     let mut world = PhysicsWorld::new();
     world.gravity = Vector::new(0.0, -9.81, 0.0);
     world.integration_parameters.dt = step_s;
@@ -74,6 +75,35 @@ pub(crate) fn fall(thing: Falling, obstacles: &[Obstacle], step_s: f32) -> Fall 
             .friction(FRICTION)
             .user_data(u128::from(EntityId::FLOOR.0)),
     );
+    let bodies: Vec<(RigidBodyHandle, ColliderHandle)> =
+        things.iter().map(|thing| add(&mut world, thing)).collect();
+    let mut falls = vec![Fall { path: Vec::new(), on: None }; things.len()];
+    let mut still = 0;
+    for _ in 0..MAX_FRAMES {
+        world.step();
+        let mut is_still = true;
+        for ((body, collider), (thing, fall)) in bodies.iter().zip(things.iter().zip(&mut falls)) {
+            let b = &world.bodies[*body];
+            let rotation = *b.rotation();
+            let bottom = b.translation() - rotation * (Vec3::Y * (0.5 * thing.size.y));
+            fall.path.push((bottom, rotation));
+            let touches = world.contact_pairs_with(*collider).any(|p| p.has_any_active_contact());
+            let slow =
+                b.linvel().length() < STILL_M_PER_S && b.angvel().length() < 10.0 * STILL_M_PER_S;
+            is_still &= touches && slow;
+        }
+        still = if is_still { still + 1 } else { 0 };
+        if still >= STILL_FRAMES {
+            break;
+        }
+    }
+    for ((_, collider), fall) in bodies.iter().zip(&mut falls) {
+        fall.on = support(&world, *collider);
+    }
+    falls
+}
+
+fn add(world: &mut PhysicsWorld, thing: &Falling) -> (RigidBodyHandle, ColliderHandle) {
     let half = 0.5 * thing.size;
     let center = thing.position + thing.rotation * (Vec3::Y * half.y);
     let body = world.bodies.insert(
@@ -87,27 +117,12 @@ pub(crate) fn fall(thing: Falling, obstacles: &[Obstacle], step_s: f32) -> Fall 
     let collider = world.colliders.insert_with_parent(
         ColliderBuilder::cuboid(half.x, half.y, half.z)
             .friction(FRICTION)
-            .mass(thing.mass_kg.max(0.01)),
+            .mass(thing.mass_kg.max(0.01))
+            .user_data(u128::from(thing.entity.0)),
         body,
         &mut world.bodies,
     );
-
-    let mut path = Vec::new();
-    let mut still = 0;
-    for _ in 0..MAX_FRAMES {
-        world.step();
-        let b = &world.bodies[body];
-        let rotation = *b.rotation();
-        path.push((b.translation() - rotation * (Vec3::Y * half.y), rotation));
-        let touches = world.contact_pairs_with(collider).any(|p| p.has_any_active_contact());
-        let slow =
-            b.linvel().length() < STILL_M_PER_S && b.angvel().length() < 10.0 * STILL_M_PER_S;
-        still = if touches && slow { still + 1 } else { 0 };
-        if still >= STILL_FRAMES {
-            break;
-        }
-    }
-    Fall { on: support(&world, collider), path }
+    (body, collider)
 }
 
 /// What carries the fallen thing: among what touches it, the one touched lowest.
@@ -140,7 +155,22 @@ mod tests {
     use super::*;
 
     fn apple_at(position: Vec3) -> Falling {
-        Falling { position, rotation: Quat::IDENTITY, size: Vec3::splat(0.1), mass_kg: 0.2 }
+        let (entity, size) = (EntityId(21), Vec3::splat(0.1));
+        Falling { entity, position, rotation: Quat::IDENTITY, size, mass_kg: 0.2 }
+    }
+
+    fn fall_alone(thing: Falling, obstacles: &[Obstacle]) -> Fall {
+        super::fall(&[thing], obstacles, 0.01).remove(0)
+    }
+
+    #[test]
+    fn what_falls_together_ends_up_beside_or_upon_each_other() {
+        let other = Falling { entity: EntityId(22), ..apple_at(Vec3::new(0.12, 1.1, 0.01)) };
+        let falls = super::fall(&[apple_at(Vec3::new(0.1, 0.95, 0.0)), other], &[table()], 0.01);
+        let ends = falls.iter().map(|fall| fall.path.last().unwrap().0).collect::<Vec<_>>();
+        assert!(ends[0].distance(ends[1]) > 0.09, "{ends:?} are in each other");
+        assert!(falls.iter().all(|fall| fall.on.is_some()), "both lie on something");
+        assert_eq!(falls[0].path.len(), falls[1].path.len());
     }
 
     fn table() -> Obstacle {
@@ -154,7 +184,7 @@ mod tests {
 
     #[test]
     fn a_drop_lands_on_what_is_below_it() {
-        let fall = super::fall(apple_at(Vec3::new(0.1, 0.95, 0.0)), &[table()], 0.01);
+        let fall = fall_alone(apple_at(Vec3::new(0.1, 0.95, 0.0)), &[table()]);
         let (end, _) = *fall.path.last().unwrap();
         assert!((end.y - 0.75).abs() < 0.01, "{end}");
         assert_eq!(fall.on, Some(EntityId(20)));
@@ -164,7 +194,7 @@ mod tests {
 
     #[test]
     fn a_drop_beside_it_lands_on_the_ground() {
-        let fall = super::fall(apple_at(Vec3::new(1.0, 0.95, 0.0)), &[table()], 0.01);
+        let fall = fall_alone(apple_at(Vec3::new(1.0, 0.95, 0.0)), &[table()]);
         let (end, _) = *fall.path.last().unwrap();
         assert!(end.y.abs() < 0.01, "{end}");
         assert_eq!(fall.on, None);
@@ -172,7 +202,7 @@ mod tests {
 
     #[test]
     fn the_same_fall_has_the_same_bits() {
-        let run = || super::fall(apple_at(Vec3::new(0.58, 0.9, 0.02)), &[table()], 0.01).path;
+        let run = || fall_alone(apple_at(Vec3::new(0.58, 0.9, 0.02)), &[table()]).path;
         assert_eq!(run(), run());
     }
 }

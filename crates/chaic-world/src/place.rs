@@ -172,12 +172,18 @@ impl World {
         let radius = 0.5 * size.x.hypot(size.z);
         let nearest = self.capability(agent).radius_m + radius + 0.05;
         let spots = (0..5).flat_map(|i| ring(pose.position, nearest + 0.25 * i as f32, 24));
-        let free = |spot: &Vec3| self.stands_free(*spot, radius, size.y);
+        let free = |spot: &Vec3| self.is_free_floor(obstacle, *spot);
         let best = spots.filter(free).max_by(|a, b| {
             let d = |p: &Vec3| self.setup.distance_to_opening(*p).min(3.0);
             d(a).total_cmp(&d(b))
         });
         best.unwrap_or_else(|| self.floor_spot_beside(agent, obstacle))
+    }
+
+    /// Whether a thing can stand on the floor at a point.
+    pub(crate) fn is_free_floor(&self, object: EntityId, at: Vec3) -> bool {
+        let size = self.thing(object).0.size_m();
+        self.stands_free(at, 0.5 * size.x.hypot(size.z), size.y)
     }
 
     /// Whether an upright thing of this radius and height can stand on the floor at `p`, within
@@ -188,28 +194,36 @@ impl World {
             && self.surroundings.overlap(body, xz(p), &self.movable_blocks(), &self.discs()) <= 0.0
     }
 
-    /// Lets a thing go at `at` (its bottom).
-    pub(crate) fn start_fall(&mut self, object: EntityId, at: Vec3) {
+    /// Lets things go where they are, at the same time.
+    pub(crate) fn start_fall(&mut self, objects: &[EntityId]) {
         /// Things farther away can't be touched by what falls here, metres.
         const NEAR_M: f32 = 1.5;
-        let (thing, state) = self.thing(object);
-        let falling = Falling {
-            position: at,
-            rotation: state.rotation,
-            size: thing.size_m(),
-            mass_kg: thing.class.info().mass_kg,
+        let falling = objects.iter().map(|object| {
+            let (thing, state) = self.thing(*object);
+            Falling {
+                entity: *object,
+                position: state.position,
+                rotation: state.rotation,
+                size: thing.size_m(),
+                mass_kg: thing.class.info().mass_kg,
+            }
+        });
+        let falling: Vec<Falling> = falling.collect();
+        let is_near = |nearest: &dyn Fn(Vec3) -> Vec3| {
+            let mut from = falling.iter().map(|thing| thing.position);
+            from.any(|from| horizontal_distance(nearest(from), from) < NEAR_M)
         };
         let mut around: Vec<Obstacle> = self
             .surroundings
             .blocks()
             .iter()
-            .filter(|b| horizontal_distance(b.nearest_in_plan(at).0, at) < NEAR_M)
+            .filter(|b| is_near(&|from| b.nearest_in_plan(from).0))
             .map(Obstacle::from)
             .collect();
         for (i, (other, state)) in self.setup.things.iter().zip(&self.state.things).enumerate() {
             let entity = Setup::entity(i);
-            let near = horizontal_distance(state.position, at) < NEAR_M;
-            let lies = state.is_resting() && !other.fixed && near && entity != object;
+            let near = is_near(&|_| state.position);
+            let lies = state.is_resting() && !other.fixed && near && !objects.contains(&entity);
             if !lies {
                 continue;
             }
@@ -225,10 +239,11 @@ impl World {
                 );
             }
         }
-        let mut fall = fall::fall(falling, &around, self.rules.fall_step_s);
-        fall.path.reverse();
-        self.thing_mut(object).position = at;
-        self.thing_mut(object).place = Place::Falling { path: fall.path, on: fall.on };
+        let falls = fall::fall(&falling, &around, self.rules.fall_step_s);
+        for (object, mut fall) in objects.iter().zip(falls) {
+            fall.path.reverse();
+            self.thing_mut(*object).place = Place::Falling { path: fall.path, on: fall.on };
+        }
     }
 }
 

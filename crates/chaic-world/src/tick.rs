@@ -105,8 +105,8 @@ impl World {
             Phase::Walk { .. } => self.walk(agent, &mut activity.step),
             Phase::Approach { .. } => self.approach(agent, &mut activity.step),
             Phase::Turn { to_yaw_rad } => {
-                self.person_mut(agent).pose.yaw_rad = to_yaw_rad;
-                counted
+                let turns = self.turn_to(agent, to_yaw_rad);
+                if turns { counted } else { Progress::Fails(FailureReason::Blocked) }
             }
             Phase::Face { to } => {
                 let to = self.thing(to).1.position;
@@ -176,7 +176,7 @@ impl World {
         let from = self.person(agent).pose.position;
         let target = self.point_to_reach(from, entity);
         let yaw = yaw_towards(from, target);
-        self.person_mut(agent).pose.yaw_rad = yaw;
+        self.turn_to(agent, yaw);
         let speed = self.capability(agent).approach_speed_m_per_frame;
         self.step_towards(agent, forward(yaw), speed);
         if self.rules.blocking == Blocking::Creeps && self.meets_something(agent) {
@@ -209,7 +209,13 @@ impl World {
         moved
     }
 
-    fn slide(&self, agent: AgentId, except: Option<AgentId>, from: Vec3, to: Vec3) -> Vec3 {
+    pub(crate) fn slide(
+        &self,
+        agent: AgentId,
+        except: Option<AgentId>,
+        from: Vec3,
+        to: Vec3,
+    ) -> Vec3 {
         let xz = |v: Vec3| Vec2::new(v.x, v.z);
         if self.rules.blocking == Blocking::Creeps {
             let p = xz(to).clamp(self.setup.bounds.min, self.setup.bounds.max);
@@ -228,7 +234,7 @@ impl World {
     pub(crate) fn face(&mut self, agent: AgentId, to: Vec3) {
         let from = self.person(agent).pose.position;
         if horizontal_distance(from, to) > 1e-3 {
-            self.person_mut(agent).pose.yaw_rad = yaw_towards(from, to);
+            self.turn_to(agent, yaw_towards(from, to));
         }
     }
 

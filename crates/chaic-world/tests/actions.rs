@@ -6,11 +6,17 @@ mod common;
 use chaic_protocol::action::{Action, FailureReason, Hand, Outcome};
 use chaic_protocol::capability::Persona;
 use chaic_protocol::{AgentId, EntityId, TaskId};
-use chaic_world::{EventKind, Place, World};
+use chaic_world::{EventKind, Place, Snapshot, State, Wall, World};
 use common::*;
 
 fn pick(object: EntityId) -> Action {
     Action::PickUp { object, hand: Hand::Right }
+}
+
+/// Makes the world be in this state.
+fn restore(world: &mut World, state: &State) {
+    let bytes = postcard::to_stdvec(state).expect("a state is plain data");
+    world.restore(&Snapshot(bytes)).expect("it is of this world");
 }
 
 fn fails(reason: FailureReason) -> Outcome {
@@ -275,6 +281,106 @@ fn furniture_too_heavy_for_one_is_lifted_by_two() {
     assert!((apart(&w) - before).abs() < 1e-3, "they stay together");
     let mut alone = world(setup(3));
     assert_eq!(run(&mut alone, A, pick(nth(0))).0, fails(FailureReason::BeyondLimits));
+}
+
+#[test]
+fn what_lay_on_a_taken_thing_falls_together() {
+    let tray = thing("tea_tray", at(0.0, 0.0, -0.6));
+    let top = tray.size_m().y;
+    let apple = |x: f32| thing("apple", at(x, top + 0.001, -0.6));
+    // The upper one lies on the lower one.
+    let size = apple(0.0).size_m();
+    let upper = thing("apple", at(0.01, top + 0.002 + size.y, -0.6));
+    let mut w = world(hall(vec![tray, apple(0.0), upper], vec![person(Persona::Adult, 0.0, 0.0)]));
+    // As if they had fallen there.
+    let mut state = w.state().clone();
+    state.things[2].place = Place::Resting { on: Some(nth(0)) };
+    state.things[3].place = Place::Resting { on: Some(nth(1)) };
+    restore(&mut w, &state);
+    assert_eq!(run(&mut w, A, pick(nth(0))).0, Outcome::Success);
+    for _ in 0..300 {
+        w.tick();
+    }
+    let things = &w.state().things;
+    let [lower, upper] = [things[2].position, things[3].position];
+    assert!(things[2].is_resting() && things[3].is_resting());
+    assert!(
+        lower.distance(upper) > 0.9 * size.min_element(),
+        "{lower} and {upper} are in each other"
+    );
+    let lost = |e: &chaic_world::Event| matches!(e.kind, EventKind::LostSupport { .. });
+    assert_eq!(w.drain_events().iter().filter(|e| lost(e)).count(), 2);
+}
+
+/// A piano carried by two: the leader at (0, z), the follower to its right and ahead.
+fn carried_by_two(walls: Vec<Wall>) -> World {
+    let mut setup = hall(
+        vec![thing("piano", at(0.0, 0.0, 0.0))],
+        vec![person(Persona::Frail, 0.0, 1.15), person(Persona::Helper, 3.0, 0.0)],
+    );
+    setup.seed = 3;
+    setup.walls = walls;
+    let mut w = world(setup);
+    w.submit(A, pick(nth(0))).unwrap();
+    w.submit(B, pick(nth(0))).unwrap();
+    w.advance();
+    assert!(happened(&mut w, |e| matches!(e.kind, EventKind::LiftedTogether { .. })));
+    w
+}
+
+#[test]
+fn who_leads_swings_the_other_one_around_if_there_is_room() {
+    let positions = |w: &World| [0, 1].map(|k| w.state().people[k].pose.position);
+    let mut free = carried_by_two(Vec::new());
+    let [leader, follower] = positions(&free);
+    assert_eq!(run(&mut free, A, Action::TurnLeft).0, Outcome::Success);
+    let [pivot, swung] = positions(&free);
+    assert!(pivot == leader && swung.distance(follower) > 0.3, "{follower} to {swung}");
+    assert!(swung.z < follower.z - 0.15, "a left turn swings it ahead");
+
+    // A wall ahead of the follower: they turn about the follower instead.
+    let ahead = wall([-9.0, follower.z - 0.38], [9.0, follower.z - 0.38]);
+    let mut w = carried_by_two(vec![ahead]);
+    assert_eq!(positions(&w), [leader, follower], "the wall is in nobody's way yet");
+    assert_eq!(run(&mut w, A, Action::TurnLeft).0, Outcome::Success);
+    let [stepped, pivot] = positions(&w);
+    assert!(pivot.distance(follower) < 1e-3, "{follower} to {pivot}");
+    assert!((stepped.distance(leader) - swung.distance(follower)).abs() < 1e-3);
+
+    // And one behind the leader: there is no room to turn.
+    let behind = wall([-9.0, leader.z + 0.38], [9.0, leader.z + 0.38]);
+    let mut w = carried_by_two(vec![ahead, behind]);
+    assert_eq!(run(&mut w, A, Action::TurnLeft).0, fails(FailureReason::Blocked));
+    assert_eq!(positions(&w), [leader, follower]);
+}
+
+#[test]
+fn an_obstacle_is_not_set_down_where_somebody_has_come_to() {
+    let setup = || {
+        let people = vec![person(Persona::Wheelchair, 9.0, 9.0), person(Persona::Helper, 0.6, 1.2)];
+        hall(vec![thing("trashbin", at(0.3, 0.0, 0.0))], people)
+    };
+    let remove = Action::RemoveObstacle { obstacle: nth(0), hand: Hand::Right };
+    let mut w = world(setup());
+    run(&mut w, B, remove);
+    let spot = w.state().things[1].position;
+    // Once more, and the partner comes to that spot while the hand is on its way.
+    let mut w = world(setup());
+    w.submit(B, remove).unwrap();
+    while w.state().things[1].holder().is_none() {
+        w.tick();
+    }
+    for _ in 0..30 {
+        w.tick();
+    }
+    let mut state = w.state().clone();
+    state.people[0].pose.position = spot;
+    restore(&mut w, &state);
+    while w.state().people[1].activity.is_some() {
+        w.tick();
+    }
+    let bin = w.state().things[1].position;
+    assert!(w.state().things[1].is_resting() && bin.distance(spot) > 0.4, "{bin} is at {spot}");
 }
 
 #[test]

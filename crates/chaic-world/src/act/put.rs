@@ -198,6 +198,10 @@ impl World {
         self.happened(EventKind::Released { agent, object, on });
         let carried_jointly = self.state.joint.is_some_and(|j| j.object == object);
         let is_goal = on.filter(|place| self.setup.goal_places.contains(place));
+        let is_aside = set_down && on.is_none();
+        // Somebody may have come there meanwhile.
+        let is_taken = is_aside && !self.is_free_floor(object, at);
+        let at = if is_taken { self.spot_aside(agent, object) } else { at };
         let thing = self.thing_mut(object);
         thing.released_at = is_goal;
         thing.last_holder = Some(agent);
@@ -205,11 +209,12 @@ impl World {
             thing.position = at;
             thing.place = Place::Resting { on };
             self.come_to_rest(object);
-            if on.is_none() {
+            if is_aside {
                 self.happened(EventKind::ObstacleRemoved { agent, object });
             }
         } else {
-            self.start_fall(object, at);
+            thing.position = at;
+            self.start_fall(&[object]);
         }
         if carried_jointly {
             self.end_joint_carry();

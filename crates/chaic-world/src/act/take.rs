@@ -167,18 +167,27 @@ impl World {
         Progress::Done
     }
 
-    /// What lay on a thing that was taken falls.
+    /// What lay on a thing that was taken falls, and what lay on that.
     fn drop_dependents(&mut self, taken: EntityId) {
-        let on_it = |e: &EntityId| self.thing(*e).1.place == Place::Resting { on: Some(taken) };
-        let dependents: Vec<EntityId> = self.setup.entities().filter(on_it).collect();
-        for object in dependents {
-            let delivered = self.thing(object).1.delivered.is_some();
-            if !delivered && self.thing(object).0.class.info().is_movable() {
-                let at = self.thing(object).1.position;
-                self.happened(EventKind::LostSupport { object });
-                self.start_fall(object, at);
-                self.drop_dependents(object);
-            }
+        let mut falling = Vec::new();
+        let mut below = vec![taken];
+        while let Some(support) = below.pop() {
+            let lost_it = |e: &EntityId| {
+                let (thing, state) = self.thing(*e);
+                state.place == Place::Resting { on: Some(support) }
+                    && state.delivered.is_none()
+                    && thing.class.info().is_movable()
+                    && !falling.contains(e)
+            };
+            let dependents: Vec<EntityId> = self.setup.entities().filter(lost_it).collect();
+            below.extend(&dependents);
+            falling.extend(dependents);
+        }
+        for object in &falling {
+            self.happened(EventKind::LostSupport { object: *object });
+        }
+        if !falling.is_empty() {
+            self.start_fall(&falling);
         }
     }
 }

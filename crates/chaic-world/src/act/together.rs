@@ -2,6 +2,7 @@
 
 use chaic_protocol::action::FailureReason;
 use chaic_protocol::catalogue::Role;
+use chaic_protocol::geom::{Pose, horizontal_distance};
 use chaic_protocol::{Action, AgentId, EntityId, Vec3};
 
 use crate::event::EventKind;
@@ -128,6 +129,37 @@ impl World {
         self.state.joint = Some(JointCarry { follower_in_leader, under_way: true, ..joint });
         let follower = joint.follower;
         self.happened(EventKind::LiftedTogether { leader: agent, follower, object });
+    }
+
+    /// Turns a person. Who leads at furniture swings the other one around; if something is in the
+    /// other's way, the two turn about the other instead. Returns whether there was room.
+    pub(crate) fn turn_to(&mut self, agent: AgentId, yaw_rad: f32) -> bool {
+        let pose = self.person(agent).pose;
+        let turned = Pose { yaw_rad, ..pose };
+        if let Some(joint) = self.state.joint.filter(|j| j.leader == agent && j.under_way) {
+            let other = pose.to_world(joint.follower_in_leader);
+            let swung = turned.to_world(joint.follower_in_leader);
+            if !self.has_room(joint.follower, agent, other, swung) {
+                let stepped = pose.position + other - swung;
+                if !self.has_room(agent, joint.follower, pose.position, stepped) {
+                    return false;
+                }
+                let person = self.person_mut(agent);
+                person.pose.position = stepped;
+                person.walked_m += horizontal_distance(pose.position, stepped);
+            }
+        }
+        self.person_mut(agent).pose.yaw_rad = yaw_rad;
+        true
+    }
+
+    /// Whether one of two who carry furniture can be moved from one point to another, and stands there
+    /// no tighter than before.
+    fn has_room(&self, agent: AgentId, partner: AgentId, from: Vec3, to: Vec3) -> bool {
+        /// Nearer to things than this is as good as beside them, metres.
+        const SLACK_M: f32 = 0.02;
+        let pushed = |to: Vec3| horizontal_distance(self.slide(agent, Some(partner), from, to), to);
+        pushed(to) <= pushed(from).max(SLACK_M)
     }
 
     /// A joint lift that can't be: the follower is free again.

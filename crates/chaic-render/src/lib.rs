@@ -38,6 +38,7 @@ mod scene;
 mod view;
 
 mod frame;
+mod grid;
 mod lens;
 
 mod forms;

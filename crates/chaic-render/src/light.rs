@@ -6,6 +6,8 @@ use chaic_protocol::geom::Rect;
 use chaic_protocol::{Vec2, Vec3};
 use chaic_world::{RoomKind, Setup};
 
+use crate::grid::neighbors;
+
 /// No room.
 pub(crate) const NO_ROOM: u8 = u8::MAX;
 /// How far the darkness at the foot of things reaches, metres.
@@ -182,6 +184,7 @@ impl Ground {
                 ground.rooms[z * nx + x0..=z * nx + x1].fill(k as u8);
             }
         }
+        ground.spread_rooms();
         let mut walls = std::mem::take(&mut ground.walls);
         for w in setup.walls.iter().filter(|w| w.bottom_m < 0.1) {
             let along = w.b - w.a;
@@ -193,6 +196,25 @@ impl Ground {
         }
         ground.walls = walls;
         ground
+    }
+
+    /// Gives what belongs to no room of a house (doorways, alcoves, the cells beneath walls) to the
+    /// nearest room, counted in cells: its lamp shines there too.
+    fn spread_rooms(&mut self) {
+        let mut front: Vec<usize> =
+            (0..self.rooms.len()).filter(|k| self.rooms[*k] != NO_ROOM).collect();
+        while !front.is_empty() {
+            let mut next = Vec::new();
+            for k in front {
+                for neighbor in neighbors(k, self.nx, self.nz) {
+                    if self.rooms[neighbor] == NO_ROOM {
+                        self.rooms[neighbor] = self.rooms[k];
+                        next.push(neighbor);
+                    }
+                }
+            }
+            front = next;
+        }
     }
 
     #[inline(always)]

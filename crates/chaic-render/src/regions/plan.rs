@@ -5,6 +5,7 @@ use chaic_protocol::geom::Rect;
 use chaic_world::{RoomKind, Setup, Wall};
 
 use super::{MAX_REGIONS, Portal, Run, SLACK_M, WALL};
+use crate::grid::neighbors;
 use crate::structure::Line;
 
 /// Side of a cell, metres, unless the plan is too large for it: walls that are twice as thick have
@@ -108,14 +109,7 @@ impl Plan {
         self.cells[k] = region;
         let mut todo = vec![k];
         while let Some(k) = todo.pop() {
-            let (x, z) = (k % self.n_x, k / self.n_x);
-            let neighbors = [
-                (x > 0).then(|| k - 1),
-                (x + 1 < self.n_x).then(|| k + 1),
-                (z > 0).then(|| k - self.n_x),
-                (z + 1 < self.n_z).then(|| k + self.n_x),
-            ];
-            for k in neighbors.into_iter().flatten() {
+            for k in neighbors(k, self.n_x, self.n_z) {
                 if self.cells[k] == NONE {
                     self.cells[k] = region;
                     todo.push(k);

@@ -234,6 +234,9 @@ fn the_schema_describes_the_file() {
         assert!(fields.iter().any(|f| *f == field), "{field}");
     }
     assert!(schema.to_string().contains("bright_fire_extinguisher"), "classes are listed");
+    // A schema can't say all that the validator looks at, so it says who does.
+    let description = schema["description"].as_str().expect("it has one");
+    assert!(description.contains("`chaic episodes validate`"), "{description}");
 }
 
 proptest::proptest! {

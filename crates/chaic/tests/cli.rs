@@ -524,12 +524,53 @@ fn a_reader_that_leaves_is_no_error() {
     assert_eq!(text(&out.stderr), "");
 }
 
-/// Waits until the run in `path` has something under way.
+#[test]
+fn a_list_without_end_ends_with_its_reader() {
+    use std::io::Read as _;
+    let dir = tempfile::tempdir().expect("there is room");
+    let at = dir.path();
+    let list = ["episodes", "list", "--task", "moving_house", "--split"];
+    for (format, begin) in [("table", "┌"), ("json", "[\n  {\n")] {
+        // So many take years.
+        let endless = [&list[..], &["gen:0..100000000000", "--format", format]].concat();
+        let mut child = command(at, &endless)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the command starts");
+        let mut out = child.stdout.take().expect("it is piped");
+        let (sender, receiver) = std::sync::mpsc::channel();
+        std::thread::spawn(move || {
+            let mut read = vec![0; begin.len()];
+            let _ = sender.send(out.read_exact(&mut read).map(|()| read));
+        });
+        let read = receiver.recv_timeout(std::time::Duration::from_secs(120));
+        if read.is_err() {
+            child.kill().expect("it runs");
+        }
+        let read = read.expect("it prints while it goes").expect("it prints");
+        assert_eq!(text(&read), begin);
+        let ended = child.wait_with_output().expect("it ends");
+        assert!(ended.status.success(), "{}", text(&ended.stderr));
+        assert_eq!(text(&ended.stderr), "");
+    }
+    // More than one table, and still one JSON.
+    let some = [&list[..], &["gen:0..97", "--format"]].concat();
+    let tables = well(at, &[&some[..], &["table"]].concat());
+    assert_eq!(tables.matches("Episode").count(), 2, "{tables}");
+    assert_eq!(tables.matches("moving_house/gen/").count(), 97, "{tables}");
+    let json = well(at, &[&some[..], &["json"]].concat());
+    let json: Vec<serde_json::Value> = serde_json::from_str(&json).expect("it is JSON");
+    assert_eq!(json.len(), 97);
+    assert_eq!(json[96]["id"], "moving_house/gen/96");
+}
+
+/// Waits until something is under way below `path`.
 #[cfg(unix)]
 fn until_under_way(path: &Path) {
     use std::time::{Duration, Instant};
     let began = Instant::now();
-    let is_under_way = || files(&path.join("traces")).iter().any(|p| p.ends_with(".partial"));
+    let is_under_way = || files(path).iter().any(|p| p.ends_with(".partial"));
     while !is_under_way() {
         assert!(began.elapsed() < Duration::from_secs(60), "nothing begins");
         std::thread::yield_now();
@@ -562,7 +603,7 @@ fn an_interrupted_run_goes_on() {
             .stderr(Stdio::piped())
             .spawn()
             .expect("the command starts");
-        until_under_way(&at.join(&out));
+        until_under_way(&at.join(&out).join("traces"));
         // While it runs, nobody else may.
         let second = ill(at, &["eval", "--resume", "--out", &out]);
         assert!(second.contains("in use by another"), "{second}");

@@ -619,3 +619,34 @@ fn an_interrupted_run_goes_on() {
         assert!(ill(at, &["report", &out]).contains("no finished episode"));
     }
 }
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_replay_leaves_no_torn_video() {
+    let dir = workshop();
+    let at = dir.path();
+    well(at, &["eval", "--episodes", "short", "--helper", "none", "--size", "48", "--out", "run"]);
+    for (signal, code) in [("-INT", Some(130)), ("-KILL", None)] {
+        let out = format!("video{signal}/r.gif");
+        fs::create_dir(at.join(format!("video{signal}"))).expect("there is room");
+        fs::write(at.join(&out), "an older one").expect("there is room");
+        let replay = ["replay", "run", "no_constraint/gen/0", "--every", "1", "--out", &out];
+        let child = command(at, &replay)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the command starts");
+        until_under_way(&at.join(format!("video{signal}")));
+        let id = child.id().to_string();
+        let sent = Command::new("kill").args([signal, &id]).status().expect("there is a kill");
+        assert!(sent.success());
+        let ended = child.wait_with_output().expect("it ends");
+        assert_eq!(ended.status.code(), code);
+        let said = text(&ended.stderr);
+        assert_eq!(said.contains("r.gif is not written"), code.is_some(), "{said}");
+        assert_eq!(fs::read(at.join(&out)).expect("it is there"), b"an older one");
+        // What Ctrl-C leaves is what was there.
+        let left = files(&at.join(format!("video{signal}")));
+        assert_eq!(left.len(), if code.is_some() { 1 } else { 2 }, "{left:?}");
+    }
+}

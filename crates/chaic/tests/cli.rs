@@ -93,6 +93,11 @@ fn a_run_from_end_to_end() {
     assert_eq!(fs::read_to_string(at.join("run/scores.json")).expect("it is text"), scores);
     let other = ill(at, &["eval", "--resume", "--out", "run", "--helper", "rhp"]);
     assert!(other.contains("--helper none,rhp, not rhp"), "{other}");
+    well(at, &["eval", "--resume", "--out", "run", "--helper", "rhp,none"]);
+    for language in [["--endpoint", "http://localhost/v1"], ["--model", "m"]] {
+        let other = ill(at, &[&["eval", "--resume", "--out", "run"], &language[..]].concat());
+        assert!(other.contains("begun with no helper or partner that asks"), "{other}");
+    }
     fs::create_dir(at.join("none")).expect("there is room");
     let resume = ["eval", "--resume", "--out", "run", "--episodes"];
     well(at, &[&resume[..], &["short"]].concat());
@@ -389,6 +394,8 @@ fn wrong_option_values_end_in_the_same_exit_code() {
         &["eval", "--set", "world.gravity=1", "--out", "r"],
         &["eval", "--split", "test", "--episodes", "short", "--out", "r"],
         &["eval", "--resume", "--out", "run", "--first", "1"],
+        &["eval", "--resume", "--out", "run", "--model", "m"],
+        &["eval", "--model", "m", "--out", "r"],
         &["report", "run", "--figure", "f.txt"],
         &[&replay[..], &["--out", "r.avi"]].concat()[..],
         &[&replay[..], &["--out", "r.gif", "--fps", "51"]].concat()[..],

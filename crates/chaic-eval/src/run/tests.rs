@@ -263,6 +263,17 @@ fn folders_are_guarded() {
     let other = Given { helpers: Some(vec!["none".into(), "turner".into()]), ..mine.clone() };
     let error = open(Access::Resume, &other).unwrap_err().to_string();
     assert!(error.contains("--helper turner, not none,turner"), "{error}");
+    // The order plays no role.
+    let both = Given { helpers: Some(vec!["none".into(), "turner".into()]), ..mine.clone() };
+    let second = dir.path().join("second");
+    drop(Run::open(&second, Access::Begin, &both, &helpers).unwrap());
+    let turned = ["turner", "none", "turner"].map(str::to_owned).to_vec();
+    let turned = Given { helpers: Some(turned), ..mine.clone() };
+    let (run, _) = Run::open(&second, Access::Resume, &turned, &helpers).unwrap();
+    assert_eq!(run.options().helpers, ["none", "turner"]);
+    let other = Given { no_traces: true, ..mine.clone() };
+    let error = open(Access::Resume, &other).unwrap_err().to_string();
+    assert!(error.contains("--no-traces off, not on"), "{error}");
     let split = Given { episodes: None, split: Some("test".parse().unwrap()), ..mine.clone() };
     let error = open(Access::Resume, &split).unwrap_err();
     assert!(

@@ -122,6 +122,14 @@ fn a_run_from_end_to_end() {
     let missing = "1 of 4 finished episode runs have no whole trace and are left out, first \
                    no_constraint/gen/0 with rhp and seed 0";
     assert!(text(&out.stderr).contains(missing), "{}", text(&out.stderr));
+    let json = well(at, &["report", "run", "--from-traces", "--format", "json"]);
+    let json: serde_json::Value = serde_json::from_str(&json).expect("it is JSON");
+    assert_eq!(json["episode_runs"]["planned"], 4);
+    assert_eq!(json["episode_runs"]["scored"], 3);
+    fs::rename(at.join("run/traces"), at.join("run/elsewhere")).expect("it is there");
+    let said = ill(at, &["report", "run", "--from-traces"]);
+    assert!(said.contains("4 of 4 finished") && said.contains("no whole trace yet"), "{said}");
+    fs::rename(at.join("run/elsewhere"), at.join("run/traces")).expect("it is there");
     fs::write(&trace, whole).expect("there is room");
 
     let replay = ["replay", "run", "no_constraint/gen/0", "--out", "r.gif", "--every", "40"];

@@ -77,11 +77,11 @@ impl Run {
                 Some(_) => items::check_episode_files(source, &options.tasks, &folder)?,
             }
         }
-        let items = items::items(&options, &folder)?;
+        let items = planned(&folder, &options)?;
         if recorded.is_none() {
             folder.write_options(&options)?;
         }
-        let (journal, results, warnings) = Journal::open(&folder.results())?;
+        let (journal, results, warnings) = Journal::open(&folder.results(), &items)?;
         Ok((Run { folder, options, journal, items, results }, warnings))
     }
 

@@ -246,6 +246,36 @@ fn verify_finds_what_was_changed() {
 }
 
 #[test]
+fn another_build_of_the_same_version_is_found_out() {
+    let files = episode_files(&[TaskId::LowTarget, TaskId::Shopping], 1);
+    let dir = tempfile::tempdir().unwrap();
+    let helpers = TestHelpers::new();
+    let given = given(&files, &["none", "turner"]);
+    let (mut run, _) = Run::open(dir.path(), Access::Begin, &given, &helpers).unwrap();
+    let check = |run: &Run| run.check_code(&helpers, &helpers.stop);
+    check(&run).unwrap();
+    assert!(play(&mut run, 1, &helpers));
+    let traces = run.folder().traces().unwrap();
+    check(&run).unwrap();
+    assert_eq!(run.folder().traces().unwrap(), traces);
+    // What each helper is asked to play again is of another task.
+    let mut found = Vec::new();
+    for k in 0..run.results.len() {
+        let Ending::Done(summary) = &mut run.results[k].ending else { unreachable!() };
+        let digest = std::mem::replace(&mut summary.digest, Digest(1));
+        if let Err(EvalError::OtherCode { key, .. }) = check(&run) {
+            assert_eq!(key, run.results[k].key);
+            found.push((key.task, key.helper));
+        }
+        let Ending::Done(summary) = &mut run.results[k].ending else { unreachable!() };
+        summary.digest = digest;
+    }
+    found.sort();
+    let expected = [(TaskId::LowTarget, "none"), (TaskId::Shopping, "turner")];
+    assert_eq!(found, expected.map(|(task, helper)| (task, helper.to_owned())));
+}
+
+#[test]
 fn folders_are_guarded() {
     let files = episode_files(&[TaskId::LowTarget], 1);
     let dir = tempfile::tempdir().unwrap();

@@ -77,6 +77,7 @@ fn play(
         _ => true,
     };
     let now: Vec<Part> = matrix.plan.parts().into_iter().filter(is_wanted).collect();
+    check_code(matrix, &now, stop)?;
     let mut pace = Pace { jobs, ..Pace::default() };
     for (k, part) in now.iter().enumerate() {
         let (folder, given) = (matrix.folder(part), matrix.given(part)?);
@@ -109,6 +110,22 @@ fn play(
         leave_report(&run)?;
     }
     Ok(true)
+}
+
+/// Before anything is added to the runs of both rule sets: whether this program plays as the one that
+/// began them. Parts without results can't tell, and where all is played it makes no difference.
+fn check_code(matrix: &Matrix, now: &[Part], stop: &AtomicBool) -> Result<()> {
+    let mut begun: Vec<Part> = matrix.plan.parts();
+    begun.retain(|p| p.switch.is_none() && matrix.folder(p).join("run.json").exists());
+    if begun.is_empty() || to_go(matrix, now)?.is_empty() {
+        return Ok(());
+    }
+    for part in begun {
+        let given = matrix.given(&part)?;
+        let (run, _) = Run::open(&matrix.folder(&part), Access::Resume, &given, &BuiltIn)?;
+        run.check_code(&BuiltIn, stop)?;
+    }
+    Ok(())
 }
 
 /// How many episode runs of each helper these parts still lack.

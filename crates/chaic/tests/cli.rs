@@ -213,7 +213,7 @@ fn fidelity_from_end_to_end() {
     fs::write(&other, theirs).expect("there is room");
     let said = ill(at, &["fidelity", "--resume", "--out", "fid"]);
     assert!(said.contains("comes out otherwise than it did"), "{said}");
-    assert!(said.contains("no_constraint/gen/0 with "), "{said}");
+    assert!(said.contains("no_constraint/gen/0 with ") && !said.contains("--resume"), "{said}");
     assert_eq!(fs::read_to_string(&journal).expect("it is text"), lines[..first]);
     fs::write(&other, ours).expect("there is room");
     well(at, &["fidelity", "--resume", "--out", "fid", "--doc", "docs/f.md"]);

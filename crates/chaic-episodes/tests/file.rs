@@ -147,6 +147,17 @@ fn people_are_partner_helper_and_child_in_this_order() {
 }
 
 #[test]
+fn there_are_no_more_people_than_numbers_for_their_bodies() {
+    let mut setup = find_episode("shopping/test/00").expect("bundled").into_setup();
+    let most = chaic_protocol::AgentId::MAX_AGENTS;
+    setup.people = vec![setup.people[0]; most];
+    assert_eq!(setup.check(), Ok(()));
+    setup.people.push(setup.people[0]);
+    let problem = setup.check().expect_err("one too many").to_string();
+    assert_eq!(problem, format!("people: has {} entries, expected 1 to {most}", most + 1));
+}
+
+#[test]
 fn things_and_people_have_room() {
     let at_wall = |f: &mut Value| {
         let wall = f["setup"]["walls"][0].clone();
@@ -223,6 +234,9 @@ fn the_schema_describes_the_file() {
         assert!(fields.iter().any(|f| *f == field), "{field}");
     }
     assert!(schema.to_string().contains("bright_fire_extinguisher"), "classes are listed");
+    // A schema can't say all that the validator looks at, so it says who does.
+    let description = schema["description"].as_str().expect("it has one");
+    assert!(description.contains("`chaic episodes validate`"), "{description}");
 }
 
 proptest::proptest! {

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use chaic_episodes::{EpisodeError, SplitError};
 use chaic_world::SetupError;
 
+use crate::metrics::RunKey;
+
 /// The result of anything in this crate.
 pub type Result<T> = std::result::Result<T, EvalError>;
 
@@ -88,6 +90,19 @@ pub enum EvalError {
         recorded: String,
         /// Its value now.
         given: String,
+    },
+    /// Another build of the same version began a run.
+    #[error(
+        "{path}: {episode} with {helper} and seed {seed} comes out otherwise than it did, so another \
+         build of chaic {chaic} began this; go on with that one, or begin anew in another --out",
+        path = path.display(), episode = key.episode, helper = key.helper, seed = key.seed,
+        chaic = crate::CHAIC_VERSION
+    )]
+    OtherCode {
+        /// The run's folder.
+        path: PathBuf,
+        /// The episode run that was played again.
+        key: RunKey,
     },
     /// Options make no run.
     #[error("{0}")]

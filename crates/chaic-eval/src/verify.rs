@@ -14,7 +14,7 @@ use crate::helpers::{self, BuiltIn, Helpers};
 use crate::metrics::{Ending, RunResult, tally};
 use crate::play::{Choice, Flow, Minds, Staging, crank, header_of, world_of};
 use crate::rules::RuleSet;
-use crate::run::{RunFolder, RunOptions, read_results};
+use crate::run::{RunFolder, RunOptions, planned, read_results};
 use crate::trace::{self, Decision, Header, Record, Trace, Warning};
 
 /// The first place where a trace and its re-simulation differ.
@@ -73,7 +73,9 @@ pub fn verify_run(
         return Err(EvalError::NoTraces { path: folder.path().to_owned() });
     }
     let paths = folder.traces()?;
-    let (results, warnings) = read_results(&folder.results())?;
+    // Where its episodes are gone, every trace says so.
+    let planned = planned(folder, options).unwrap_or_default();
+    let (results, warnings) = read_results(&folder.results(), &planned)?;
     let next = AtomicUsize::new(0);
     let rules = options.rules()?;
     let check = Check { folder, options, rules, helpers, results: &results };

@@ -34,9 +34,14 @@ impl EntityId {
     /// The first number that names an object.
     pub const FIRST_OBJECT: EntityId = EntityId(16);
 
-    /// The body of an agent.
+    /// The body of an agent; [`EntityId::NOTHING`] for a number from [`AgentId::MAX_AGENTS`] on, which
+    /// no episode has.
     pub fn of_agent(agent: AgentId) -> EntityId {
-        EntityId(EntityId::FIRST_PERSON.0 + u16::from(agent.0))
+        if agent.index() < AgentId::MAX_AGENTS {
+            EntityId(EntityId::FIRST_PERSON.0 + u16::from(agent.0))
+        } else {
+            EntityId::NOTHING
+        }
     }
 
     /// The agent whose body this is.
@@ -72,6 +77,8 @@ impl AgentId {
     pub const HELPER: AgentId = AgentId(1);
     /// The child who comes along while shopping.
     pub const CHILD: AgentId = AgentId(2);
+    /// Most agents of one episode: so many numbers are there for their bodies.
+    pub const MAX_AGENTS: usize = (EntityId::FIRST_OBJECT.0 - EntityId::FIRST_PERSON.0) as usize;
 
     /// Its place in per-agent arrays.
     pub fn index(self) -> usize {
@@ -178,5 +185,22 @@ impl JsonSchema for ClassId {
             "description": "The name of a class of the catalogue",
             "enum": names,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bodies_are_nothing_else() {
+        for number in 0..=u8::MAX {
+            let agent = AgentId(number);
+            let body = EntityId::of_agent(agent);
+            let has_one = agent.index() < AgentId::MAX_AGENTS;
+            assert_eq!(body.agent(), has_one.then_some(agent), "{number}");
+            assert_eq!(body == EntityId::NOTHING, !has_one, "{number}");
+            assert!(!body.is_object(), "{number}");
+        }
     }
 }

@@ -334,8 +334,9 @@ impl Setup {
                 number(format!("things[{i}].seat_m"), seat_m, 0.001, t.size_m().y)?;
             }
         }
-        if self.people.is_empty() || self.people.len() > 8 {
-            let problem = format!("has {} entries, expected 1 to 8", self.people.len());
+        if self.people.is_empty() || self.people.len() > AgentId::MAX_AGENTS {
+            let (n, most) = (self.people.len(), AgentId::MAX_AGENTS);
+            let problem = format!("has {n} entries, expected 1 to {most}");
             return Err(SetupError::new("people", problem));
         }
         for (i, p) in self.people.iter().enumerate() {

@@ -7,10 +7,18 @@ use std::io::{self, Write as _};
 /// # Errors
 /// If it can't be written, unless nobody reads any more.
 pub fn say(text: &str) -> io::Result<()> {
+    say_to_reader(text).map(|_| ())
+}
+
+/// Like [`say`], for who has much to say: returns whether anybody reads on.
+///
+/// # Errors
+/// Those of [`say`].
+pub fn say_to_reader(text: &str) -> io::Result<bool> {
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-        other => other,
+        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(false),
+        other => other.map(|()| true),
     }
 }
 

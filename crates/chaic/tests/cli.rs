@@ -93,6 +93,11 @@ fn a_run_from_end_to_end() {
     assert_eq!(fs::read_to_string(at.join("run/scores.json")).expect("it is text"), scores);
     let other = ill(at, &["eval", "--resume", "--out", "run", "--helper", "rhp"]);
     assert!(other.contains("--helper none,rhp, not rhp"), "{other}");
+    well(at, &["eval", "--resume", "--out", "run", "--helper", "rhp,none"]);
+    for language in [["--endpoint", "http://localhost/v1"], ["--model", "m"]] {
+        let other = ill(at, &[&["eval", "--resume", "--out", "run"], &language[..]].concat());
+        assert!(other.contains("begun with no helper or partner that asks"), "{other}");
+    }
     fs::create_dir(at.join("none")).expect("there is room");
     let resume = ["eval", "--resume", "--out", "run", "--episodes"];
     well(at, &[&resume[..], &["short"]].concat());
@@ -117,6 +122,14 @@ fn a_run_from_end_to_end() {
     let missing = "1 of 4 finished episode runs have no whole trace and are left out, first \
                    no_constraint/gen/0 with rhp and seed 0";
     assert!(text(&out.stderr).contains(missing), "{}", text(&out.stderr));
+    let json = well(at, &["report", "run", "--from-traces", "--format", "json"]);
+    let json: serde_json::Value = serde_json::from_str(&json).expect("it is JSON");
+    assert_eq!(json["episode_runs"]["planned"], 4);
+    assert_eq!(json["episode_runs"]["scored"], 3);
+    fs::rename(at.join("run/traces"), at.join("run/elsewhere")).expect("it is there");
+    let said = ill(at, &["report", "run", "--from-traces"]);
+    assert!(said.contains("4 of 4 finished") && said.contains("no whole trace yet"), "{said}");
+    fs::rename(at.join("run/elsewhere"), at.join("run/traces")).expect("it is there");
     fs::write(&trace, whole).expect("there is room");
 
     let replay = ["replay", "run", "no_constraint/gen/0", "--out", "r.gif", "--every", "40"];
@@ -192,6 +205,17 @@ fn fidelity_from_end_to_end() {
     let report = chaic(at, &["report", "fid/compat", "--format", "csv"]);
     assert!(text(&report.stderr).contains("Unfinished: 1 of 2"), "{}", text(&report.stderr));
     fs::remove_dir_all(at.join("short")).expect("it is there");
+    // Another build, by whose rules an episode comes out otherwise, doesn't mix its results in.
+    let other = at.join("fid/paper/results.jsonl");
+    let ours = fs::read_to_string(&other).expect("it is text");
+    let at_digest = ours.rfind("\"digest\":\"").expect("it has one") + 10;
+    let theirs = format!("{}{}{}", &ours[..at_digest], "0123456789abcdef", &ours[at_digest + 16..]);
+    fs::write(&other, theirs).expect("there is room");
+    let said = ill(at, &["fidelity", "--resume", "--out", "fid"]);
+    assert!(said.contains("comes out otherwise than it did"), "{said}");
+    assert!(said.contains("no_constraint/gen/0 with ") && !said.contains("--resume"), "{said}");
+    assert_eq!(fs::read_to_string(&journal).expect("it is text"), lines[..first]);
+    fs::write(&other, ours).expect("there is room");
     well(at, &["fidelity", "--resume", "--out", "fid", "--doc", "docs/f.md"]);
     assert_eq!(doc("docs/f.md"), whole);
 }
@@ -389,6 +413,8 @@ fn wrong_option_values_end_in_the_same_exit_code() {
         &["eval", "--set", "world.gravity=1", "--out", "r"],
         &["eval", "--split", "test", "--episodes", "short", "--out", "r"],
         &["eval", "--resume", "--out", "run", "--first", "1"],
+        &["eval", "--resume", "--out", "run", "--model", "m"],
+        &["eval", "--model", "m", "--out", "r"],
         &["report", "run", "--figure", "f.txt"],
         &[&replay[..], &["--out", "r.avi"]].concat()[..],
         &[&replay[..], &["--out", "r.gif", "--fps", "51"]].concat()[..],
@@ -524,12 +550,53 @@ fn a_reader_that_leaves_is_no_error() {
     assert_eq!(text(&out.stderr), "");
 }
 
-/// Waits until the run in `path` has something under way.
+#[test]
+fn a_list_without_end_ends_with_its_reader() {
+    use std::io::Read as _;
+    let dir = tempfile::tempdir().expect("there is room");
+    let at = dir.path();
+    let list = ["episodes", "list", "--task", "moving_house", "--split"];
+    for (format, begin) in [("table", "┌"), ("json", "[\n  {\n")] {
+        // So many take years.
+        let endless = [&list[..], &["gen:0..100000000000", "--format", format]].concat();
+        let mut child = command(at, &endless)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the command starts");
+        let mut out = child.stdout.take().expect("it is piped");
+        let (sender, receiver) = std::sync::mpsc::channel();
+        std::thread::spawn(move || {
+            let mut read = vec![0; begin.len()];
+            let _ = sender.send(out.read_exact(&mut read).map(|()| read));
+        });
+        let read = receiver.recv_timeout(std::time::Duration::from_secs(120));
+        if read.is_err() {
+            child.kill().expect("it runs");
+        }
+        let read = read.expect("it prints while it goes").expect("it prints");
+        assert_eq!(text(&read), begin);
+        let ended = child.wait_with_output().expect("it ends");
+        assert!(ended.status.success(), "{}", text(&ended.stderr));
+        assert_eq!(text(&ended.stderr), "");
+    }
+    // More than one table, and still one JSON.
+    let some = [&list[..], &["gen:0..97", "--format"]].concat();
+    let tables = well(at, &[&some[..], &["table"]].concat());
+    assert_eq!(tables.matches("Episode").count(), 2, "{tables}");
+    assert_eq!(tables.matches("moving_house/gen/").count(), 97, "{tables}");
+    let json = well(at, &[&some[..], &["json"]].concat());
+    let json: Vec<serde_json::Value> = serde_json::from_str(&json).expect("it is JSON");
+    assert_eq!(json.len(), 97);
+    assert_eq!(json[96]["id"], "moving_house/gen/96");
+}
+
+/// Waits until something is under way below `path`.
 #[cfg(unix)]
 fn until_under_way(path: &Path) {
     use std::time::{Duration, Instant};
     let began = Instant::now();
-    let is_under_way = || files(&path.join("traces")).iter().any(|p| p.ends_with(".partial"));
+    let is_under_way = || files(path).iter().any(|p| p.ends_with(".partial"));
     while !is_under_way() {
         assert!(began.elapsed() < Duration::from_secs(60), "nothing begins");
         std::thread::yield_now();
@@ -562,7 +629,7 @@ fn an_interrupted_run_goes_on() {
             .stderr(Stdio::piped())
             .spawn()
             .expect("the command starts");
-        until_under_way(&at.join(&out));
+        until_under_way(&at.join(&out).join("traces"));
         // While it runs, nobody else may.
         let second = ill(at, &["eval", "--resume", "--out", &out]);
         assert!(second.contains("in use by another"), "{second}");
@@ -576,5 +643,36 @@ fn an_interrupted_run_goes_on() {
             assert!(said.contains(&format!("chaic eval --resume --out {out}")), "{said}");
         }
         assert!(ill(at, &["report", &out]).contains("no finished episode"));
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_replay_leaves_no_torn_video() {
+    let dir = workshop();
+    let at = dir.path();
+    well(at, &["eval", "--episodes", "short", "--helper", "none", "--size", "48", "--out", "run"]);
+    for (signal, code) in [("-INT", Some(130)), ("-KILL", None)] {
+        let out = format!("video{signal}/r.gif");
+        fs::create_dir(at.join(format!("video{signal}"))).expect("there is room");
+        fs::write(at.join(&out), "an older one").expect("there is room");
+        let replay = ["replay", "run", "no_constraint/gen/0", "--every", "1", "--out", &out];
+        let child = command(at, &replay)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the command starts");
+        until_under_way(&at.join(format!("video{signal}")));
+        let id = child.id().to_string();
+        let sent = Command::new("kill").args([signal, &id]).status().expect("there is a kill");
+        assert!(sent.success());
+        let ended = child.wait_with_output().expect("it ends");
+        assert_eq!(ended.status.code(), code);
+        let said = text(&ended.stderr);
+        assert_eq!(said.contains("r.gif is not written"), code.is_some(), "{said}");
+        assert_eq!(fs::read(at.join(&out)).expect("it is there"), b"an older one");
+        // What Ctrl-C leaves is what was there.
+        let left = files(&at.join(format!("video{signal}")));
+        assert_eq!(left.len(), if code.is_some() { 1 } else { 2 }, "{left:?}");
     }
 }

@@ -39,7 +39,11 @@ pub struct GeneratorInfo {
 /// The file as it is written.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(title = "chaic-episode", description = "One episode of chaic")]
+#[schemars(
+    title = "chaic-episode",
+    description = "One episode of chaic. This schema says how it is written; whether it can be played \
+                   is for `chaic episodes validate` to decide"
+)]
 struct EpisodeFile {
     /// Always `chaic-episode`.
     format: String,

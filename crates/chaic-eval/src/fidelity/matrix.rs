@@ -1,9 +1,9 @@
 //! The runs of a plan in their folders, and how far they have come.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use chaic_protocol::TaskId;
+use chaic_protocol::{Frame, TaskId};
 use serde::{Deserialize, Serialize};
 
 use crate::CHAIC_VERSION;
@@ -11,7 +11,7 @@ use crate::error::{EvalError, Result};
 use crate::fidelity::plan::{Part, Plan, Wanted};
 use crate::helpers::Helpers;
 use crate::metrics::{RunKey, RunResult};
-use crate::run::{Given, RunFolder, planned, read_results, write_whole};
+use crate::run::{Given, Item, RunFolder, planned, read_results, write_whole};
 
 const FORMAT: &str = "chaic-fidelity";
 const VERSION: u32 = 1;
@@ -164,22 +164,23 @@ pub fn parts(matrix: &Matrix) -> Result<Vec<PartState>> {
     };
     let (folder, options) = RunFolder::read(&matrix.folder(first))?;
     let planned = planned(&folder, &options)?;
-    let episodes: BTreeSet<(TaskId, String)> =
-        planned.into_iter().map(|key| (key.task, key.episode)).collect();
+    let episodes: BTreeMap<(TaskId, String), Frame> =
+        planned.into_iter().map(|i| ((i.key.task, i.key.episode), i.horizon)).collect();
     let state = |part: Part| {
-        let mut planned = Vec::new();
-        for (task, episode) in &episodes {
+        let mut items = Vec::new();
+        for ((task, episode), horizon) in &episodes {
             for (helper, seed) in
                 part.helpers.iter().flat_map(|h| (0..part.seeds).map(move |s| (h, s)))
             {
                 let (task, episode, helper) = (*task, episode.clone(), helper.clone());
-                planned.push(RunKey { task, helper, episode, seed });
+                let key = RunKey { task, helper, episode, seed };
+                items.push(Item { key, horizon: *horizon });
             }
         }
+        let (results, _) = read_results(&matrix.folder(&part).join("results.jsonl"), &items)?;
+        let mut planned: Vec<RunKey> = items.into_iter().map(|i| i.key).collect();
         planned.sort();
-        let (results, _) = read_results(&matrix.folder(&part).join("results.jsonl"))?;
-        let results = results.into_iter().filter(|r| planned.binary_search(&r.key).is_ok());
-        Ok(PartState { results: results.collect(), planned, part })
+        Ok(PartState { results, planned, part })
     };
     parts.into_iter().map(state).collect()
 }

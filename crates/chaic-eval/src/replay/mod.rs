@@ -3,6 +3,7 @@
 mod panel;
 
 use std::collections::VecDeque;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use chaic_episodes::Episode;
@@ -88,8 +89,8 @@ pub fn find_trace(
     })
 }
 
-/// Draws a trace as a video. `progress` hears of every frame of the episode. Returns how many
-/// pictures it has.
+/// Draws a trace as a video. `progress` hears of every frame of the episode, and says whether to go
+/// on. Returns how many pictures it has; `None` if it was broken off, which leaves no video.
 ///
 /// # Errors
 /// If the episode isn't the one that was played, the trace doesn't fit it, or the video can't be
@@ -99,8 +100,8 @@ pub fn write(
     episode: &Episode,
     options: ReplayOptions,
     out: &Path,
-    progress: &mut dyn FnMut(Frame),
-) -> Result<u32> {
+    progress: &mut dyn FnMut(Frame) -> ControlFlow<()>,
+) -> Result<Option<u32>> {
     let bad = |e: VideoError| match e {
         VideoError::UnsupportedExtension { .. } | VideoError::FrameRate { .. } => {
             EvalError::Options(e.to_string())
@@ -112,7 +113,9 @@ pub fn write(
     let every = options.every.max(1);
     loop {
         let frame = replay.world.state().frame;
-        progress(frame);
+        if progress(frame).is_break() {
+            return Ok(None);
+        }
         let is_last = !replay.step()?;
         if frame.is_multiple_of(every) || is_last {
             video.push(&replay.picture()).map_err(bad)?;
@@ -123,7 +126,7 @@ pub fn write(
     }
     let n = video.n_frames();
     video.finish().map_err(bad)?;
-    Ok(n)
+    Ok(Some(n))
 }
 
 /// A trace that is being played again.

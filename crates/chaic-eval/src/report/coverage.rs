@@ -23,7 +23,10 @@ fn missing(results: &[RunResult], planned: &[RunKey]) -> Option<String> {
     let each: Vec<String> = by_helper.iter().map(|(h, n)| format!("{} {n}", title(h))).collect();
     (n > 0).then(|| {
         let (total, each) = (planned.len(), each.join(", "));
-        format!("Unfinished: {n} of {total} episode runs are missing ({each}).")
+        format!(
+            "Unfinished: {n} of {total} episode runs are missing ({each}); all numbers are of those \
+             that were played."
+        )
     })
 }
 

@@ -69,11 +69,16 @@ fn an_unfinished_run_says_so() {
     let part: Vec<RunResult> = whole.iter().filter(some).cloned().collect();
     for format in [Format::Table, Format::Markdown] {
         let text = text(&part, format);
-        assert!(text.contains("Unfinished: 3 of 48 episode runs are missing (RHP 3)."), "{text}");
+        let missing =
+            "Unfinished: 3 of 48 episode runs are missing (RHP 3); all numbers are of those";
+        assert!(text.contains(missing), "{text}");
         assert!(text.contains("in obstacle the rows rest on different"), "{text}");
         assert!(text.contains("(w/o on 2, Oracle on 2, RHP on 1)"), "{text}");
         assert!(!text.contains("in shopping the rows"), "absent is not unequal: {text}");
     }
+    let json: serde_json::Value = serde_json::from_str(&text(&part, Format::Json)).unwrap();
+    let runs = serde_json::json!({"planned": 48, "scored": 45, "broken": 0});
+    assert_eq!(json["episode_runs"], runs);
 }
 
 #[test]

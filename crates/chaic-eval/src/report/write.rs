@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use serde::Serialize;
+
 use crate::CHAIC_VERSION;
 use crate::error::Result;
 use crate::metrics::{Ending, FormulaSet, RunKey, RunResult, Scores, differences};
@@ -41,8 +43,30 @@ impl Report<'_> {
             Format::Table => self.terminal(),
             Format::Markdown => self.markdown(),
             Format::Csv => self.csv(),
-            Format::Json => json(&self.scores()),
+            Format::Json => self.json(),
         }
+    }
+
+    fn json(&self) -> String {
+        #[derive(Serialize)]
+        struct File {
+            /// Absent where the run's episodes are gone.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            episode_runs: Option<EpisodeRuns>,
+            #[serde(flatten)]
+            scores: Scores,
+        }
+        #[derive(Serialize)]
+        struct EpisodeRuns {
+            planned: usize,
+            scored: usize,
+            broken: usize,
+        }
+        let scored = self.results.iter().filter(|r| r.summary().is_some()).count();
+        let (planned, broken) = (self.planned.len(), self.results.len() - scored);
+        let episode_runs = (planned > 0).then_some(EpisodeRuns { planned, scored, broken });
+        let file = File { episode_runs, scores: self.scores() };
+        serde_json::to_string_pretty(&file).expect("scores have string keys") + "\n"
     }
 
     fn grids(&self) -> Vec<Grid> {
@@ -139,15 +163,11 @@ impl Report<'_> {
     }
 }
 
-fn json(scores: &Scores) -> String {
-    serde_json::to_string_pretty(scores).expect("scores have string keys") + "\n"
-}
-
 /// Writes `scores.json` and `report.md` into the run's folder.
 ///
 /// # Errors
 /// If the file system refuses.
 pub fn write_files(folder: &RunFolder, report: &Report<'_>) -> Result<()> {
-    folder.write("scores.json", json(&report.scores()).as_bytes())?;
+    folder.write("scores.json", report.json().as_bytes())?;
     folder.write("report.md", report.markdown().as_bytes())
 }

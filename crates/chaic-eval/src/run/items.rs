@@ -35,8 +35,12 @@ pub fn slug(task: TaskId, id: &str) -> String {
     rest.trim_start_matches('.').chars().map(safe).collect()
 }
 
-/// All episode runs, episode by episode, so that a run that is cut short can be compared.
-pub(super) fn items(options: &RunOptions, folder: &RunFolder) -> Result<Vec<Item>> {
+/// All episode runs that a run consists of, finished or not: episode by episode, so that a run that
+/// is cut short can be compared.
+///
+/// # Errors
+/// If the options name no episodes, or the run's copies of episode files can't be read.
+pub fn planned(folder: &RunFolder, options: &RunOptions) -> Result<Vec<Item>> {
     /// A longer list is no benchmark but a mistake, and fills the memory.
     const MAX_ITEMS: usize = 1_000_000;
     let own = if options.split == FILES { read_files(&folder.episode_files())? } else { vec![] };
@@ -59,14 +63,6 @@ pub(super) fn items(options: &RunOptions, folder: &RunFolder) -> Result<Vec<Item
         }
     }
     Ok(items)
-}
-
-/// The keys of all episode runs that a run consists of, finished or not.
-///
-/// # Errors
-/// If the options name no episodes, or the run's copies of episode files can't be read.
-pub fn planned(folder: &RunFolder, options: &RunOptions) -> Result<Vec<RunKey>> {
-    Ok(items(options, folder)?.into_iter().map(|i| i.key).collect())
 }
 
 /// Ids and horizons of a task's episodes, `at_most` so many generated ones; `own` are those of the

@@ -5,8 +5,11 @@ use std::fs::{self, File};
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
+use chaic_protocol::Frame;
+
 use crate::error::{EvalError, Result};
 use crate::metrics::{RunKey, RunResult};
+use crate::run::items::Item;
 use crate::trace::Warning;
 
 /// A journal that is open for appending.
@@ -17,14 +20,15 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Opens or begins a journal, and reads what is in it. A torn last record is cut off.
+    /// Opens or begins a journal of these episode runs, and reads what is in it. A torn last record
+    /// is cut off.
     ///
     /// # Errors
-    /// If the file system refuses, or a record that isn't the last one is damaged.
-    pub fn open(path: &Path) -> Result<(Journal, Vec<RunResult>, Vec<Warning>)> {
+    /// If the file system refuses, and those of [`read_results`].
+    pub fn open(path: &Path, planned: &[Item]) -> Result<(Journal, Vec<RunResult>, Vec<Warning>)> {
         let refused = || EvalError::io("open", path);
         let file = File::options().create(true).append(true).open(path).map_err(refused())?;
-        let (results, warnings, whole) = read(path)?;
+        let (results, warnings, whole) = read(path, planned)?;
         file.set_len(whole).map_err(refused())?;
         Ok((Journal { file, path: path.to_owned() }, results, warnings))
     }
@@ -41,47 +45,78 @@ impl Journal {
 }
 
 /// The results in a journal, up to its last whole record; where that isn't all, a warning says so.
-/// Where an episode run occurs again, its last result holds.
+/// Where an episode run occurs again, its last result holds. `planned` is all that the run plays;
+/// empty where nobody knows.
 ///
 /// # Errors
-/// If the file can't be read, a record that isn't the last one is damaged, or any has numbers that
-/// can't be.
-pub fn read_results(path: &Path) -> Result<(Vec<RunResult>, Vec<Warning>)> {
-    let (results, warnings, _) = read(path)?;
+/// If the file can't be read, or a record is damaged otherwise than by a crash while it was written,
+/// has numbers that can't be, or is of an episode run that isn't planned.
+pub fn read_results(path: &Path, planned: &[Item]) -> Result<(Vec<RunResult>, Vec<Warning>)> {
+    let (results, warnings, _) = read(path, planned)?;
     Ok((results, warnings))
 }
 
 /// Also returns how many bytes are whole.
-fn read(path: &Path) -> Result<(Vec<RunResult>, Vec<Warning>, u64)> {
+fn read(path: &Path, planned: &[Item]) -> Result<(Vec<RunResult>, Vec<Warning>, u64)> {
     let bytes = match fs::read(path) {
         Err(e) if e.kind() == ErrorKind::NotFound => Vec::new(),
         other => other.map_err(EvalError::io("read", path))?,
     };
+    let horizons: BTreeMap<&RunKey, Frame> = planned.iter().map(|i| (&i.key, i.horizon)).collect();
     let mut results: BTreeMap<RunKey, RunResult> = BTreeMap::new();
     let mut warnings = Vec::new();
     let mut whole = 0;
     for (k, line) in bytes.split_inclusive(|b| *b == b'\n').enumerate() {
-        let is_last = whole + line.len() == bytes.len();
-        let parsed = match line.strip_suffix(b"\n") {
-            None => Err("is cut off".to_owned()),
-            Some(text) => serde_json::from_slice::<RunResult>(text).map_err(|e| e.to_string()),
-        };
-        match parsed {
+        let (path, number) = (path.to_owned(), k + 1);
+        match parse(line).and_then(|result| check(&result, &horizons).map(|()| result)) {
             Ok(result) => {
-                if let Err(problem) = result.check() {
-                    let (path, line) = (path.to_owned(), k + 1);
-                    return Err(EvalError::Unreadable { path, line, problem });
-                }
                 whole += line.len();
                 results.insert(result.key.clone(), result);
             }
-            Err(problem) if is_last => {
-                warnings.push(Warning::Torn { path: path.to_owned(), line: k + 1, problem });
+            Err(problem) if whole + line.len() == bytes.len() && is_torn(line) => {
+                warnings.push(Warning::Torn { path, line: number, problem });
             }
-            Err(problem) => {
-                return Err(EvalError::Unreadable { path: path.to_owned(), line: k + 1, problem });
-            }
+            Err(problem) => return Err(EvalError::Unreadable { path, line: number, problem }),
         }
     }
     Ok((results.into_values().collect(), warnings, whole as u64))
+}
+
+fn parse(line: &[u8]) -> std::result::Result<RunResult, String> {
+    let text = line.strip_suffix(b"\n").ok_or("is cut off")?;
+    serde_json::from_slice(text).map_err(|e| {
+        // Its own line number is always 1.
+        let said = e.to_string();
+        let what = said.split(" at line ").next().unwrap_or_default();
+        format!("{what}, at column {}", e.column())
+    })
+}
+
+/// Whether a crash can have left this as the last line: without its end, or with blocks that never
+/// came to the disk.
+fn is_torn(line: &[u8]) -> bool {
+    !line.ends_with(b"\n") || line.contains(&0)
+}
+
+fn check(
+    result: &RunResult,
+    horizons: &BTreeMap<&RunKey, Frame>,
+) -> std::result::Result<(), String> {
+    result.check()?;
+    let RunKey { task, helper, episode, seed } = &result.key;
+    let horizon = match horizons.get(&result.key) {
+        Some(horizon) => *horizon,
+        None if horizons.is_empty() => return Ok(()),
+        None => {
+            let what = format!("{episode} ({task}) with helper {helper} and seed {seed}");
+            return Err(format!("is of {what}, which this run doesn't play"));
+        }
+    };
+    match result.summary() {
+        Some(summary) if summary.frames > horizon => {
+            let n = summary.frames;
+            Err(format!("`frames` is {n}, expected at most {horizon}, the episode's horizon"))
+        }
+        _ => Ok(()),
+    }
 }

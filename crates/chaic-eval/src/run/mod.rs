@@ -23,7 +23,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use crate::error::Result;
+use crate::error::{EvalError, Result};
 use crate::helpers::{self, Helpers, NONE};
 use crate::metrics::{Ending, RunKey, RunResult};
 use crate::trace::Warning;
@@ -77,11 +77,11 @@ impl Run {
                 Some(_) => items::check_episode_files(source, &options.tasks, &folder)?,
             }
         }
-        let items = items::items(&options, &folder)?;
+        let items = planned(&folder, &options)?;
         if recorded.is_none() {
             folder.write_options(&options)?;
         }
-        let (journal, results, warnings) = Journal::open(&folder.results())?;
+        let (journal, results, warnings) = Journal::open(&folder.results(), &items)?;
         Ok((Run { folder, options, journal, items, results }, warnings))
     }
 
@@ -110,6 +110,34 @@ impl Run {
         let errors =
             self.results.iter().filter(|r| matches!(r.ending, Ending::Error { .. })).count();
         Extent { total: self.items.len(), finished: self.results.len(), errors }
+    }
+
+    /// Whether this program plays as the one that began the run, whatever its version says: plays one
+    /// finished episode run of each helper again, of different tasks where there are, and compares
+    /// the results. Nothing is written, and language models aren't asked.
+    ///
+    /// # Errors
+    /// [`EvalError::OtherCode`] if one comes out otherwise; if an episode can't be read.
+    pub fn check_code(&self, helpers: &dyn Helpers, stop: &AtomicBool) -> Result<()> {
+        let options = RunOptions { traces: false, ..self.options.clone() };
+        let crew = worker::Crew { folder: &self.folder, options: &options, helpers, stop };
+        let mut finished: Vec<&RunResult> =
+            self.results.iter().filter(|r| r.summary().is_some()).collect();
+        finished.sort_by(|a, b| a.key.cmp(&b.key));
+        let names = &self.options.helpers;
+        for (k, name) in names.iter().enumerate() {
+            let of_helper: Vec<&RunResult> =
+                finished.iter().copied().filter(|r| r.key.helper == *name).collect();
+            let Some(then) = of_helper.get(k * of_helper.len() / names.len()) else { continue };
+            // Nothing comes out if the caller stops it.
+            let now =
+                if crew.waits(&then.key) { None } else { crew.play_one(&then.key, &mut |_| ())? };
+            if now.is_some_and(|now| now != **then) {
+                let (path, key) = (self.folder.path().to_owned(), then.key.clone());
+                return Err(EvalError::OtherCode { path, key });
+            }
+        }
+        Ok(())
     }
 
     /// Plays what is missing, and again what broke down, on `jobs` threads, and on some more what

@@ -174,17 +174,11 @@ impl Given {
         let list = |tasks: &[TaskId]| tasks.iter().map(|t| t.name()).collect::<Vec<_>>().join(",");
         let number = |n: Option<u32>| n.map_or("not given".to_owned(), |n| n.to_string());
         let has_files = recorded.split == FILES;
+        let tasks = self.tasks.as_ref().filter(|t| !are_the_same(t, &recorded.tasks));
+        let helpers = self.helpers.as_ref().filter(|h| !are_the_same(h, &recorded.helpers));
         let said = [
-            (
-                "--task",
-                self.tasks.as_ref().map(|t| list(&without_repeats(t.clone()))),
-                list(&recorded.tasks),
-            ),
-            (
-                "--helper",
-                self.helpers.as_ref().map(|h| without_repeats(h.clone()).join(",")),
-                recorded.helpers.join(","),
-            ),
+            ("--task", tasks.map(|t| list(t)), list(&recorded.tasks)),
+            ("--helper", helpers.map(|h| h.join(",")), recorded.helpers.join(",")),
             (
                 "--split",
                 self.split.as_ref().map(Split::to_string),
@@ -217,8 +211,8 @@ impl Given {
             ("--size", self.size.map(|n| n.to_string()), number(recorded.size)),
             (
                 "--no-traces",
-                self.no_traces.then(|| "given".to_owned()),
-                if recorded.traces { number(None) } else { "given".to_owned() },
+                self.no_traces.then(|| "on".to_owned()),
+                if recorded.traces { "off" } else { "on" }.to_owned(),
             ),
         ];
         for (option, given, recorded) in said {
@@ -237,6 +231,11 @@ impl Given {
 
 /// The helpers of a run that names none.
 pub const DEFAULT_HELPERS: [&str; 4] = ["none", "random", "rhp", "oracle"];
+
+/// Whether two lists name the same, in whatever order and however often.
+fn are_the_same<T: PartialEq>(a: &[T], b: &[T]) -> bool {
+    a.iter().all(|x| b.contains(x)) && b.iter().all(|x| a.contains(x))
+}
 
 fn without_repeats<T: PartialEq>(items: Vec<T>) -> Vec<T> {
     items.into_iter().fold(Vec::new(), |mut kept, item| {

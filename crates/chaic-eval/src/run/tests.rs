@@ -164,7 +164,10 @@ fn the_number_of_workers_and_an_interruption_change_nothing() {
     assert!(play(&mut run, 2, &helpers));
     assert_eq!(sorted(run.results()), all[0]);
     // The journal says the same as memory, and the traces say the same as the journal.
-    assert_eq!(read_results(&run.folder().results()).unwrap(), (all[0].clone(), vec![]));
+    assert_eq!(
+        read_results(&run.folder().results(), &run.items).unwrap(),
+        (all[0].clone(), vec![])
+    );
     let traces = run.folder().traces().unwrap();
     assert_eq!(traces.len(), 8);
     let tallied = traces.iter().map(|p| crate::metrics::tally(&crate::trace::read(p).unwrap().0));
@@ -243,6 +246,36 @@ fn verify_finds_what_was_changed() {
 }
 
 #[test]
+fn another_build_of_the_same_version_is_found_out() {
+    let files = episode_files(&[TaskId::LowTarget, TaskId::Shopping], 1);
+    let dir = tempfile::tempdir().unwrap();
+    let helpers = TestHelpers::new();
+    let given = given(&files, &["none", "turner"]);
+    let (mut run, _) = Run::open(dir.path(), Access::Begin, &given, &helpers).unwrap();
+    let check = |run: &Run| run.check_code(&helpers, &helpers.stop);
+    check(&run).unwrap();
+    assert!(play(&mut run, 1, &helpers));
+    let traces = run.folder().traces().unwrap();
+    check(&run).unwrap();
+    assert_eq!(run.folder().traces().unwrap(), traces);
+    // What each helper is asked to play again is of another task.
+    let mut found = Vec::new();
+    for k in 0..run.results.len() {
+        let Ending::Done(summary) = &mut run.results[k].ending else { unreachable!() };
+        let digest = std::mem::replace(&mut summary.digest, Digest(1));
+        if let Err(EvalError::OtherCode { key, .. }) = check(&run) {
+            assert_eq!(key, run.results[k].key);
+            found.push((key.task, key.helper));
+        }
+        let Ending::Done(summary) = &mut run.results[k].ending else { unreachable!() };
+        summary.digest = digest;
+    }
+    found.sort();
+    let expected = [(TaskId::LowTarget, "none"), (TaskId::Shopping, "turner")];
+    assert_eq!(found, expected.map(|(task, helper)| (task, helper.to_owned())));
+}
+
+#[test]
 fn folders_are_guarded() {
     let files = episode_files(&[TaskId::LowTarget], 1);
     let dir = tempfile::tempdir().unwrap();
@@ -263,6 +296,17 @@ fn folders_are_guarded() {
     let other = Given { helpers: Some(vec!["none".into(), "turner".into()]), ..mine.clone() };
     let error = open(Access::Resume, &other).unwrap_err().to_string();
     assert!(error.contains("--helper turner, not none,turner"), "{error}");
+    // The order plays no role.
+    let both = Given { helpers: Some(vec!["none".into(), "turner".into()]), ..mine.clone() };
+    let second = dir.path().join("second");
+    drop(Run::open(&second, Access::Begin, &both, &helpers).unwrap());
+    let turned = ["turner", "none", "turner"].map(str::to_owned).to_vec();
+    let turned = Given { helpers: Some(turned), ..mine.clone() };
+    let (run, _) = Run::open(&second, Access::Resume, &turned, &helpers).unwrap();
+    assert_eq!(run.options().helpers, ["none", "turner"]);
+    let other = Given { no_traces: true, ..mine.clone() };
+    let error = open(Access::Resume, &other).unwrap_err().to_string();
+    assert!(error.contains("--no-traces off, not on"), "{error}");
     let split = Given { episodes: None, split: Some("test".parse().unwrap()), ..mine.clone() };
     let error = open(Access::Resume, &split).unwrap_err();
     assert!(
@@ -315,9 +359,11 @@ fn a_journal_with_impossible_numbers_is_refused_by_file_and_line() {
         "frames":90,"done":1.0,"total":2.0,"away_frames":3,"deliveries":[{"frame":80,"object":17,
         "class":"apple","by":1,"counted":true}],"digest":"0000000000000003"}"#;
     let good = good.replace("\n        ", "");
+    let key = RunKey { task: TaskId::Obstacle, helper: "rhp".into(), episode: "e".into(), seed: 0 };
+    let items = [Item { key, horizon: 100 }];
     let read = |line: &str| {
         fs::write(&path, format!("{good}\n{line}\n")).unwrap();
-        read_results(&path).map(|(_, warnings)| warnings)
+        read_results(&path, &items).map(|(_, warnings)| warnings)
     };
     assert_eq!(read(&good).unwrap(), []);
     for (from, to, said) in [
@@ -326,12 +372,20 @@ fn a_journal_with_impossible_numbers_is_refused_by_file_and_line() {
         ("\"total\":2.0", "\"total\":-2.0", "`total` is -2"),
         ("\"away_frames\":3", "\"away_frames\":91", "`away_frames` is 91"),
         ("\"frame\":80", "\"frame\":91", "`frame of a delivery` is 91"),
+        ("\"frames\":90", "\"frames\":101", "`frames` is 101, expected at most 100"),
+        ("\"done\":1.0", "\"done\":NaN", "expected value, at column"),
+        ("\"obstacle\"", "\"lunch\"", "unknown variant `lunch`, expected one of"),
+        ("\"rhp\"", "\"nobody\"", "e (obstacle) with helper nobody and seed 0, which this run"),
+        ("\"seed\":0", "\"seed\":7", "seed 7, which this run doesn't play"),
     ] {
         let line = good.replacen(from, to, 1);
         assert_ne!(line, good, "{from} is there");
         let error = read(&line).unwrap_err().to_string();
         assert!(error.contains("results.jsonl: line 2: ") && error.contains(said), "{error}");
+        assert!(!error.contains("line 1"), "{error}");
     }
+    // Blocks that a crash kept from the disk are no such line.
+    assert_eq!(read(&good.replacen("\"done\"", "\0\0\0\0\0\0", 1)).unwrap().len(), 1);
 }
 
 #[test]
@@ -351,18 +405,18 @@ fn a_journal_cut_at_any_byte_loses_one_record_at_most() {
             counts: Default::default(),
         }),
     };
-    let (mut journal, _, _) = Journal::open(&path).unwrap();
+    let (mut journal, _, _) = Journal::open(&path, &[]).unwrap();
     journal.append(&result(0)).unwrap();
     let first = fs::read(&path).unwrap().len();
     journal.append(&result(1)).unwrap();
     let bytes = fs::read(&path).unwrap();
     for cut in first..bytes.len() {
         fs::write(&path, &bytes[..cut]).unwrap();
-        let (read, warnings) = read_results(&path).unwrap();
+        let (read, warnings) = read_results(&path, &[]).unwrap();
         assert_eq!(read, [result(0)]);
         assert_eq!(warnings.len(), usize::from(cut > first), "{cut}");
         // What is appended next doesn't stick to the torn record.
-        let (mut journal, results, _) = Journal::open(&path).unwrap();
+        let (mut journal, results, _) = Journal::open(&path, &[]).unwrap();
         assert_eq!(results, [result(0)]);
         journal.append(&result(1)).unwrap();
         assert_eq!(fs::read(&path).unwrap(), bytes, "{cut}");
@@ -371,6 +425,6 @@ fn a_journal_cut_at_any_byte_loses_one_record_at_most() {
     let mut damaged = bytes.clone();
     damaged[0] = b'!';
     fs::write(&path, &damaged).unwrap();
-    assert!(matches!(Journal::open(&path), Err(EvalError::Unreadable { line: 1, .. })));
+    assert!(matches!(Journal::open(&path, &[]), Err(EvalError::Unreadable { line: 1, .. })));
     assert_eq!(fs::read(&path).unwrap(), damaged);
 }

@@ -127,7 +127,7 @@ impl Crew<'_> {
     }
 
     /// Whether a mind of this episode run waits for somebody else's computer.
-    fn waits(&self, key: &RunKey) -> bool {
+    pub fn waits(&self, key: &RunKey) -> bool {
         let partner = self.options.partner.as_deref();
         [Some(key.helper.as_str()), partner].into_iter().flatten().any(|n| self.helpers.waits(n))
     }
@@ -164,7 +164,7 @@ impl Crew<'_> {
     }
 
     /// Plays one item; `None` if it was stopped.
-    fn play_one(&self, key: &RunKey, at: &mut dyn FnMut(Frame)) -> Result<Option<RunResult>> {
+    pub fn play_one(&self, key: &RunKey, at: &mut dyn FnMut(Frame)) -> Result<Option<RunResult>> {
         let mut writer = None;
         let played = catch_unwind(AssertUnwindSafe(|| self.play_to_end(key, &mut writer, at)));
         let result = match played {

@@ -12,7 +12,7 @@ use serde_json::json;
 
 use crate::Ended;
 use crate::arguments::{EpisodesCommand, ListFormat};
-use crate::output::{complain, counted, say};
+use crate::output::{complain, counted, say, say_to_reader};
 
 /// Lists, shows, makes or checks episodes.
 pub fn run(command: &EpisodesCommand) -> Result<Ended> {
@@ -28,45 +28,70 @@ pub fn run(command: &EpisodesCommand) -> Result<Ended> {
     }
 }
 
+/// Episodes of one table; a longer list is several, so that none waits for those after it.
+const ROWS: usize = 96;
+
+/// Prints while it goes: a split may have more episodes than memory holds, or than anybody reads.
 fn list(split: &Split, tasks: &[TaskId], format: ListFormat) -> Result<Ended> {
+    let mut listed = tasks.iter().flat_map(|task| episodes(split, *task));
+    match format {
+        ListFormat::Table => loop {
+            let rows: Vec<Episode> = listed.by_ref().take(ROWS).collect::<Result<_, _>>()?;
+            if rows.is_empty() || !say_to_reader(&(table(&rows).trim_fmt() + "\n"))? {
+                break;
+            }
+        },
+        ListFormat::Json => {
+            let mut before = "[\n";
+            for episode in listed {
+                let text = serde_json::to_string_pretty(&json_of(&episode?))?;
+                let text = text.replace('\n', "\n  ");
+                if !say_to_reader(&format!("{before}  {text}"))? {
+                    return Ok(Ended::Well);
+                }
+                before = ",\n";
+            }
+            say("\n]\n")?;
+        }
+    }
+    Ok(Ended::Well)
+}
+
+fn table(rows: &[Episode]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::UTF8_FULL_CONDENSED);
     table.set_content_arrangement(ContentArrangement::Disabled);
     table.set_header(["Episode", "Partner", "Goal", "Things", "Frames", "Seed"]);
-    let mut rows = Vec::new();
-    for task in tasks {
-        for episode in episodes(split, *task) {
-            let episode = episode?;
-            let setup = episode.setup();
-            let partner = setup.people[0].persona;
-            let goal: Vec<String> =
-                setup.goal.targets.iter().map(|(c, n)| format!("{n} {c}")).collect();
-            table.add_row([
-                episode.id().to_owned(),
-                format!("{partner:?}").to_lowercase(),
-                goal.join(", "),
-                setup.things.len().to_string(),
-                setup.horizon.to_string(),
-                episode.seed().to_string(),
-            ]);
-            rows.push(json!({
-                "id": episode.id(),
-                "task": task,
-                "split": episode.split(),
-                "partner": partner,
-                "goal": setup.goal,
-                "things": setup.things.len(),
-                "horizon": setup.horizon,
-                "seed": episode.seed(),
-                "generator": episode.generator(),
-            }));
-        }
+    for episode in rows {
+        let setup = episode.setup();
+        let partner = setup.people[0].persona;
+        let goal: Vec<String> =
+            setup.goal.targets.iter().map(|(c, n)| format!("{n} {c}")).collect();
+        table.add_row([
+            episode.id().to_owned(),
+            format!("{partner:?}").to_lowercase(),
+            goal.join(", "),
+            setup.things.len().to_string(),
+            setup.horizon.to_string(),
+            episode.seed().to_string(),
+        ]);
     }
-    match format {
-        ListFormat::Table => say(&(table.trim_fmt() + "\n"))?,
-        ListFormat::Json => say(&(serde_json::to_string_pretty(&rows)? + "\n"))?,
-    }
-    Ok(Ended::Well)
+    table
+}
+
+fn json_of(episode: &Episode) -> serde_json::Value {
+    let setup = episode.setup();
+    json!({
+        "id": episode.id(),
+        "task": setup.task,
+        "split": episode.split(),
+        "partner": setup.people[0].persona,
+        "goal": setup.goal,
+        "things": setup.things.len(),
+        "horizon": setup.horizon,
+        "seed": episode.seed(),
+        "generator": episode.generator(),
+    })
 }
 
 fn show(argument: &str, out: &Path, width_px: u32) -> Result<Ended> {

@@ -31,7 +31,14 @@ pub fn run(arguments: &FidelityArguments) -> Result<Ended> {
     };
     if !arguments.only_document {
         let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
-        let is_whole = play(arguments, &wanted, &matrix, stop);
+        keep_workers_quiet();
+        let jobs = jobs(arguments.jobs);
+        // Images of one moment are drawn in parallel too; more threads than jobs would only wait.
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build_global();
+        pool.context("can't start threads")?;
+        let now = wanted_now(&wanted, &matrix);
+        check_code(&matrix, &now, stop)?;
+        let is_whole = play(jobs, &now, &matrix, stop);
         if !is_whole.map_err(|e| anyhow!("{e:#}\n{}", how_to_resume(&arguments.out)))? {
             complain(&format!("stopped; {}", how_to_resume(&arguments.out)));
             return Ok(Ended::Interrupted);
@@ -60,30 +67,20 @@ fn wanted(arguments: &FidelityArguments) -> Wanted {
     }
 }
 
-/// Plays all parts that are wanted now; returns whether they are whole.
-fn play(
-    arguments: &FidelityArguments,
-    wanted: &Wanted,
-    matrix: &Matrix,
-    stop: &AtomicBool,
-) -> Result<bool> {
-    keep_workers_quiet();
-    let jobs = jobs(arguments.jobs);
-    // Images of one moment are drawn in parallel too; more threads than jobs would only wait.
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build_global();
-    pool.context("can't start threads")?;
+/// The parts that are wanted now.
+fn wanted_now(wanted: &Wanted, matrix: &Matrix) -> Vec<Part> {
     let is_wanted = |part: &Part| match (&part.switch, &wanted.switches) {
         (Some(rule), Some(rules)) => rules.contains(rule),
         _ => true,
     };
-    let now: Vec<Part> = matrix.plan.parts().into_iter().filter(is_wanted).collect();
+    matrix.plan.parts().into_iter().filter(is_wanted).collect()
+}
+
+/// Plays these parts; returns whether they are whole.
+fn play(jobs: usize, now: &[Part], matrix: &Matrix, stop: &AtomicBool) -> Result<bool> {
     let mut pace = Pace { jobs, ..Pace::default() };
     for (k, part) in now.iter().enumerate() {
-        let (folder, given) = (matrix.folder(part), matrix.given(part)?);
-        let (mut run, warnings) = Run::open(&folder, Access::Resume, &given, &BuiltIn)?;
-        for warning in warnings {
-            complain(&format!("warning: {warning}; that episode is played again"));
-        }
+        let (folder, mut run) = (matrix.folder(part), open(matrix, part)?);
         let extent = run.extent();
         let name = format!("part {} of {}, {}", k + 1, now.len(), part.name);
         if extent.finished - extent.errors == extent.total && folder.join("report.md").exists() {
@@ -109,6 +106,30 @@ fn play(
         leave_report(&run)?;
     }
     Ok(true)
+}
+
+fn open(matrix: &Matrix, part: &Part) -> Result<Run> {
+    let (folder, given) = (matrix.folder(part), matrix.given(part)?);
+    let (run, warnings) = Run::open(&folder, Access::Resume, &given, &BuiltIn)?;
+    for warning in warnings {
+        complain(&format!("warning: {warning}; that episode is played again"));
+    }
+    Ok(run)
+}
+
+/// Before anything is added to the runs of both rule sets: whether this program plays as the one that
+/// began them. Parts without results can't tell, and where all is played it makes no difference.
+fn check_code(matrix: &Matrix, now: &[Part], stop: &AtomicBool) -> Result<()> {
+    let mut begun: Vec<Part> = matrix.plan.parts();
+    begun.retain(|p| p.switch.is_none() && matrix.folder(p).join("run.json").exists());
+    if begun.is_empty() || to_go(matrix, now)?.is_empty() {
+        return Ok(());
+    }
+    complain("playing some episodes again, to see whether this build plays as the one that began");
+    for part in begun {
+        open(matrix, &part)?.check_code(&BuiltIn, stop)?;
+    }
+    Ok(())
 }
 
 /// How many episode runs of each helper these parts still lack.

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context as _, Result, bail};
+use chaic_eval::EvalError;
 use chaic_eval::replay::find_trace;
 use chaic_eval::run::RunFolder;
 use chaic_eval::trace;
@@ -83,10 +84,19 @@ pub fn language(
         || arguments.partner.as_deref().is_some_and(is_language_partner);
     let recorded = if arguments.resume { session::settings_of(path)? } else { None };
     if !is_named && recorded.is_none() {
-        let is_given =
-            given.llm.is_some() || given.endpoint.is_some() || given.llm_config.is_some();
-        if is_given && !arguments.resume {
-            bail!("no helper or partner asks a language model; name one, for example --helper llm");
+        let is_given = given.llm.is_some()
+            || given.endpoint.is_some()
+            || given.model.is_some()
+            || given.llm_config.is_some();
+        if is_given && arguments.resume {
+            let text = "was begun with no helper or partner that asks a language model; leave the \
+                        options of language helpers away to go on, or choose another --out";
+            return Err(EvalError::Options(format!("{} {text}", path.display())).into());
+        }
+        if is_given {
+            let text =
+                "no helper or partner asks a language model; name one, for example --helper llm";
+            return Err(EvalError::Options(text.to_owned()).into());
         }
         return Ok(None);
     }

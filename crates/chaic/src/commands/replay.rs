@@ -1,6 +1,9 @@
 //! `chaic replay`.
 
-use anyhow::Result;
+use std::ops::ControlFlow;
+use std::sync::atomic::Ordering;
+
+use anyhow::{Context as _, Result};
 use chaic_eval::EvalError;
 use chaic_eval::replay::{self, ReplayOptions};
 use chaic_eval::run::RunFolder;
@@ -9,6 +12,7 @@ use chaic_eval::trace;
 use super::bars;
 use crate::Ended;
 use crate::arguments::ReplayArguments;
+use crate::interrupt;
 use crate::output::{complain, counted, say};
 
 /// Makes a video of a recorded episode.
@@ -27,10 +31,21 @@ pub fn run(arguments: &ReplayArguments) -> Result<Ended> {
     let episode = folder.episode(&key)?;
     let bar = bars::plain(trace.end().map_or(0, |e| u64::from(e.frame)), "frames");
     let video = ReplayOptions { fps: *fps, every: *every };
-    let mut progress = |frame| bar.set_position(u64::from(frame));
+    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
+    let mut progress = |frame| {
+        bar.set_position(u64::from(frame));
+        if stop.load(Ordering::Relaxed) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    };
     let pictures = replay::write(&trace, &episode, video, out, &mut progress);
     bar.finish_and_clear();
-    let pictures = pictures?;
+    let Some(pictures) = pictures? else {
+        complain(&format!("stopped; {} is not written", out.display()));
+        return Ok(Ended::Interrupted);
+    };
     say(&format!(
         "{}: {} of {} with {}\n",
         out.display(),

@@ -2,9 +2,9 @@
 
 use anyhow::Result;
 use chaic_eval::EvalError;
-use chaic_eval::metrics::{RunResult, tally};
+use chaic_eval::metrics::{RunKey, RunResult, tally};
 use chaic_eval::report::{Format, Report, without_trace, write_figure};
-use chaic_eval::run::{RunFolder, planned, read_results};
+use chaic_eval::run::{Item, RunFolder, planned, read_results};
 use chaic_eval::trace;
 
 use crate::Ended;
@@ -17,19 +17,24 @@ pub fn run(arguments: &ReportArguments) -> Result<Ended> {
     if arguments.from_traces && !options.traces {
         return Err(EvalError::NoTraces { path: folder.path().to_owned() }.into());
     }
-    let results =
-        if arguments.from_traces { from_traces(&folder)? } else { from_journal(&folder)? };
-    if results.is_empty() {
-        anyhow::bail!("{} has no finished episode yet", arguments.run.display());
-    }
     // Results say something even where the run's episodes are gone.
     let planned = planned(&folder, &options).unwrap_or_else(|e| {
         complain(&format!("warning: can't tell whether the run is whole: {e}"));
         Vec::new()
     });
+    let results = if arguments.from_traces {
+        from_traces(&folder, &planned)?
+    } else {
+        from_journal(&folder, &planned)?
+    };
+    if results.is_empty() {
+        let what = if arguments.from_traces { "whole trace" } else { "finished episode" };
+        anyhow::bail!("{} has no {what} yet", arguments.run.display());
+    }
+    let planned: Vec<RunKey> = planned.into_iter().map(|i| i.key).collect();
     let formulas = arguments.formulas;
     let report = Report { options: &options, results: &results, planned: &planned, formulas };
-    // Tables say it themselves; numbers and figures have no place for it.
+    // Tables say it themselves; numbers and figures have hardly a place for it.
     let is_table = matches!(arguments.format, Format::Table | Format::Markdown);
     for note in report.notes().iter().filter(|_| !is_table || arguments.figure.is_some()) {
         complain(&format!("warning: {note}"));
@@ -41,15 +46,15 @@ pub fn run(arguments: &ReportArguments) -> Result<Ended> {
     Ok(Ended::Well)
 }
 
-fn from_journal(folder: &RunFolder) -> Result<Vec<RunResult>> {
-    let (results, warnings) = read_results(&folder.results())?;
+fn from_journal(folder: &RunFolder, planned: &[Item]) -> Result<Vec<RunResult>> {
+    let (results, warnings) = read_results(&folder.results(), planned)?;
     for warning in warnings {
         complain(&format!("warning: {warning}"));
     }
     Ok(results)
 }
 
-fn from_traces(folder: &RunFolder) -> Result<Vec<RunResult>> {
+fn from_traces(folder: &RunFolder, planned: &[Item]) -> Result<Vec<RunResult>> {
     let mut results = Vec::new();
     for path in folder.traces()? {
         let (trace, warnings) = trace::read(&path)?;
@@ -58,7 +63,7 @@ fn from_traces(folder: &RunFolder) -> Result<Vec<RunResult>> {
         }
         results.extend(tally(&trace));
     }
-    match read_results(&folder.results()) {
+    match read_results(&folder.results(), planned) {
         Ok((noted, _)) => {
             if let Some(note) = without_trace(&noted, &results) {
                 complain(&format!("warning: {note}"));

@@ -7,7 +7,7 @@ use chaic_protocol::geom::math;
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{EntityId, Vec3};
 
-use crate::light::Lamps;
+use crate::lamps::Lamps;
 use crate::mesh::unit;
 
 /// How a scene is lit and colored.

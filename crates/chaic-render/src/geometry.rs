@@ -10,7 +10,7 @@ use glam::Mat3;
 
 use crate::draw::outline;
 use crate::frame::{Instance, corners};
-use crate::light::NO_ROOM;
+use crate::ground::NO_ROOM;
 use crate::mesh::{Mesh, Skin};
 use crate::texture;
 use crate::{Lens, Scene};

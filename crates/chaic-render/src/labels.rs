@@ -10,8 +10,9 @@ use crate::draw::{Scratch, draw};
 use crate::frame::Frame;
 use crate::lens::{Lens, reciprocal, seen_depth_m};
 use crate::mesh::unit;
-use crate::paint::{Painter, Plane};
+use crate::paint::Painter;
 use crate::people::Body;
+use crate::planes::Plane;
 use crate::raster::{NOBODY, owner_parts};
 use crate::view::{MAX_SIDE_PX, View, with_scratch};
 

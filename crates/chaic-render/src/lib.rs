@@ -56,8 +56,11 @@ mod raster;
 mod regions;
 mod setup;
 
+mod ground;
+mod lamps;
 mod light;
 mod paint;
+mod planes;
 mod points;
 mod row;
 mod segments;

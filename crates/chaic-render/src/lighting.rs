@@ -5,7 +5,8 @@ use std::ops::Range;
 
 use chaic_protocol::Vec3;
 
-use crate::light::{Ground, Light, Shadows};
+use crate::ground::Ground;
+use crate::light::{Light, Shadows};
 
 /// What shines on a scene at one moment.
 #[derive(Clone, Debug)]
@@ -76,7 +77,6 @@ impl Lighting<'_> {
     pub(crate) fn of<'a>(light: &'a Light) -> Lighting<'a> {
         let (lamps, ground) = (light.lamps, light.ground);
         let (cells_per_m, min) = ground.grid();
-        let [n_x, n_z] = ground.size();
         Lighting {
             to_sun: lamps.to_sun.to_array(),
             sun: lamps.sun.to_array(),
@@ -89,8 +89,8 @@ impl Lighting<'_> {
             cells: Cells {
                 min: min.to_array(),
                 cells_per_m,
-                n_x,
-                n_z,
+                n_x: ground.nx,
+                n_z: ground.nz,
                 version: light.version,
                 ground,
                 shadows: light.shadows.as_ref(),

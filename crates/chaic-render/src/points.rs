@@ -6,7 +6,7 @@
 use chaic_protocol::Vec3;
 use glam::Vec4;
 
-use crate::light::Lamps;
+use crate::lamps::Lamps;
 use crate::mesh::Gloss;
 use crate::setup::{least, most};
 

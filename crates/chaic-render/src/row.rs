@@ -5,9 +5,9 @@
 
 use glam::Vec4;
 
+use crate::ground::{MAX_CELLS, N_GROUND};
 use crate::lens::{reciprocal, seen_depth_m};
-use crate::light::{MAX_CELLS, N_GROUND};
-use crate::paint::RowPlane;
+use crate::planes::RowPlane;
 use crate::raster::{Blocks, LANES, Wide};
 use crate::segments::{Line, Place};
 use crate::setup::{WHOLES, least, most};
@@ -16,7 +16,7 @@ use crate::texture::{Atlas, N_ATLAS};
 /// The row; each list has at least [`LANES`] more than it has pixels.
 #[derive(Default)]
 pub(crate) struct Row {
-    /// Depth, metres; 1 in a plan view (see [`crate::paint::Plane`]).
+    /// Depth, metres; 1 in a plan view (see [`crate::planes::Plane`]).
     depth: Vec<f32>,
     ids: Vec<u16>,
     /// By what textures and shadows multiply the color.
@@ -74,13 +74,13 @@ impl Row {
         self.colors.resize(n, 0);
     }
 
-    /// Depth in a pixel, as [`crate::paint::Plane`] wants it.
+    /// Depth in a pixel, as [`crate::planes::Plane`] wants it.
     #[inline(always)]
     pub fn depth_at(&self, k: usize) -> f32 {
         self.depth[k]
     }
 
-    /// Depths of nearnesses, as [`crate::paint::Plane`] wants them.
+    /// Depths of nearnesses, as [`crate::planes::Plane`] wants them.
     #[inline(always)]
     pub fn find_depths(&mut self, nearness: Blocks<Wide<f32>>, is_plan: bool) {
         if is_plan {

@@ -10,7 +10,9 @@ use rayon::prelude::*;
 
 use crate::appearance::{Appearance, Painted};
 use crate::frame::{ClassMesh, Frame, Instance, Shape};
-use crate::light::{Foot, Ground, Lamps, Light, Shadows};
+use crate::ground::{Foot, Ground};
+use crate::lamps::Lamps;
+use crate::light::{Light, Shadows};
 use crate::looks::{style_of, tint_of};
 use crate::mesh::Mesh;
 use crate::people::Body;

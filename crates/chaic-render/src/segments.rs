@@ -3,7 +3,7 @@
 
 use glam::Vec4;
 
-use crate::paint::Plane;
+use crate::planes::Plane;
 use crate::setup::{least, most};
 use crate::texture::{LEVELS, SIDE, Tile};
 

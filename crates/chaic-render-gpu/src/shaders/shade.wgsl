@@ -79,7 +79,7 @@ const PANE: u32 = 6u;
 
 const NO_ROOM: u32 = 255u;
 
-// As in `chaic-render`'s light.rs and paint.rs.
+// As in `chaic-render`'s lamps.rs and paint.rs.
 const CEILING_FARTHER_M: f32 = 1.0;
 const CEILING_TONE: f32 = 1.05;
 // The lawn outside of windows, linear.

@@ -3,7 +3,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 
 use assert_cmd::cargo::cargo_bin;
 
@@ -21,6 +21,12 @@ fn command(dir: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(cargo_bin!("chaic"));
     command.current_dir(dir).args(arguments).stdin(Stdio::null());
     command
+}
+
+/// A command that goes on beside the test.
+fn start(dir: &Path, arguments: &[&str]) -> Child {
+    let mut command = command(dir, arguments);
+    command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the command starts")
 }
 
 fn text(bytes: &[u8]) -> String {
@@ -559,11 +565,7 @@ fn a_list_without_end_ends_with_its_reader() {
     for (format, begin) in [("table", "┌"), ("json", "[\n  {\n")] {
         // So many take years.
         let endless = [&list[..], &["gen:0..100000000000", "--format", format]].concat();
-        let mut child = command(at, &endless)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("the command starts");
+        let mut child = start(at, &endless);
         let mut out = child.stdout.take().expect("it is piped");
         let (sender, receiver) = std::sync::mpsc::channel();
         std::thread::spawn(move || {
@@ -624,11 +626,7 @@ fn an_interrupted_run_goes_on() {
         let out = format!("run{signal}");
         let mut arguments = long.to_vec();
         arguments.extend(["--jobs", "1", "--out", &out]);
-        let child = command(at, &arguments)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("the command starts");
+        let child = start(at, &arguments);
         until_under_way(&at.join(&out).join("traces"));
         // While it runs, nobody else may.
         let second = ill(at, &["eval", "--resume", "--out", &out]);
@@ -648,6 +646,31 @@ fn an_interrupted_run_goes_on() {
 
 #[cfg(unix)]
 #[test]
+fn interrupted_generation_leaves_whole_episodes_and_says_how_to_go_on() {
+    let dir = tempfile::tempdir().expect("there is room");
+    let at = dir.path();
+    let generate =
+        ["episodes", "generate", "--task", "shopping", "--seeds", "0..1000000", "--out", "g"];
+    let child = start(at, &generate);
+    let began = std::time::Instant::now();
+    while !files(&at.join("g")).iter().any(|name| name.ends_with(".json")) {
+        assert!(began.elapsed().as_secs() < 60, "nothing begins");
+        std::thread::yield_now();
+    }
+    let id = child.id().to_string();
+    assert!(Command::new("kill").args(["-INT", &id]).status().expect("there is a kill").success());
+    let ended = child.wait_with_output().expect("it ends");
+    assert_eq!(ended.status.code(), Some(130));
+    let made = files(&at.join("g"));
+    let said = text(&ended.stderr);
+    assert!(said.contains(&format!("--seeds {}..1000000 makes the rest", made.len())), "{said}");
+    let validate: Vec<&str> =
+        ["episodes", "validate"].into_iter().chain(made.iter().map(String::as_str)).collect();
+    well(at, &validate);
+}
+
+#[cfg(unix)]
+#[test]
 fn an_interrupted_replay_leaves_no_torn_video() {
     let dir = workshop();
     let at = dir.path();
@@ -657,11 +680,7 @@ fn an_interrupted_replay_leaves_no_torn_video() {
         fs::create_dir(at.join(format!("video{signal}"))).expect("there is room");
         fs::write(at.join(&out), "an older one").expect("there is room");
         let replay = ["replay", "run", "no_constraint/gen/0", "--every", "1", "--out", &out];
-        let child = command(at, &replay)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("the command starts");
+        let child = start(at, &replay);
         until_under_way(&at.join(format!("video{signal}")));
         let id = child.id().to_string();
         let sent = Command::new("kill").args([signal, &id]).status().expect("there is a kill");

@@ -198,7 +198,10 @@ impl RunFolder {
 }
 
 /// Writes a file as a whole or not at all: to a name beside it, which then becomes its own.
-pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
+///
+/// # Errors
+/// If the file system refuses.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(".tmp");
     let beside = path.with_file_name(name);

@@ -11,7 +11,7 @@ mod journal;
 mod options;
 mod worker;
 
-pub(crate) use folder::write_whole;
+pub use folder::write_whole;
 pub use folder::{Access, RunFolder};
 pub(crate) use items::tasks_of_files;
 pub use items::{Item, planned, slug};

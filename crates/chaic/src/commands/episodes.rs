@@ -2,16 +2,20 @@
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result};
 use chaic_episodes::{Episode, EpisodeError, Split, episodes, find_episode, json_schema};
+use chaic_eval::run::write_whole;
 use chaic_eval::still;
 use chaic_protocol::TaskId;
 use comfy_table::{ContentArrangement, Table, presets};
 use serde_json::json;
 
+use super::bars;
 use crate::Ended;
 use crate::arguments::{EpisodesCommand, ListFormat};
+use crate::interrupt;
 use crate::output::{complain, counted, say, say_to_reader};
 
 /// Lists, shows, makes or checks episodes.
@@ -104,15 +108,22 @@ fn show(argument: &str, out: &Path, width_px: u32) -> Result<Ended> {
 fn generate(task: TaskId, seeds: Range<u64>, out: &Path) -> Result<Ended> {
     std::fs::create_dir_all(out)
         .with_context(|| format!("can't make the folder {}", out.display()))?;
-    let mut n = 0;
-    for seed in seeds {
+    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
+    let bar = bars::plain(seeds.end - seeds.start, "episodes");
+    for seed in seeds.clone() {
+        if stop.load(Ordering::Relaxed) {
+            bar.finish_and_clear();
+            complain(&format!("stopped; --seeds {seed}..{} makes the rest", seeds.end));
+            return Ok(Ended::Interrupted);
+        }
         let episode = find_episode(&format!("{task}/gen/{seed}"))?;
         let path = out.join(format!("{task}-{seed}.json"));
-        let written = std::fs::write(&path, episode.to_json());
-        written.with_context(|| format!("can't write {}", path.display()))?;
-        n += 1;
+        write_whole(&path, episode.to_json().as_bytes())?;
+        bar.inc(1);
     }
-    say(&format!("{}: {} of {task}\n", out.display(), counted(n, "episode")))?;
+    bar.finish_and_clear();
+    let n = counted((seeds.end - seeds.start) as usize, "episode");
+    say(&format!("{}: {n} of {task}\n", out.display()))?;
     Ok(Ended::Well)
 }
 

@@ -1,6 +1,7 @@
 //! `chaic import`.
 
 use anyhow::{Context as _, Result};
+use chaic_eval::run::write_whole;
 use chaic_import::{Half, OnError, Sources, import};
 
 use crate::Ended;
@@ -28,8 +29,7 @@ fn original(arguments: &OriginalArguments) -> Result<Ended> {
         .with_context(|| format!("can't make the folder {}", out.display()))?;
     for episode in &imported.episodes {
         let path = out.join(format!("{}.json", episode.id().replace('/', "-")));
-        let written = std::fs::write(&path, episode.to_json());
-        written.with_context(|| format!("can't write {}", path.display()))?;
+        write_whole(&path, episode.to_json().as_bytes())?;
     }
     for error in &imported.left_out {
         complain(&format!("left out: {error}"));

@@ -72,6 +72,16 @@ fn overlap(a: Outline, b: Outline) -> Outline {
     [a[0].max(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].min(b[3])]
 }
 
+/// What holds both.
+fn hull(a: Outline, b: Outline) -> Outline {
+    [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])]
+}
+
+/// Where nothing is.
+const NOWHERE: Outline = [f32::INFINITY, f32::INFINITY, f32::NEG_INFINITY, f32::NEG_INFINITY];
+/// Wherever one looks.
+const EVERYWHERE: Outline = [f32::NEG_INFINITY, f32::NEG_INFINITY, f32::INFINITY, f32::INFINITY];
+
 fn is_empty(o: Outline) -> bool {
     !(o[0] < o[2] && o[1] < o[3])
 }
@@ -211,24 +221,15 @@ impl Regions {
         seen.set = RegionSet::ALL;
         let Some(start) = self.region_of_eye(lens) else { return };
         let whole = [0.0, 0.0, lens.width as f32, lens.height as f32];
-        let nothing = [f32::INFINITY, f32::INFINITY, f32::NEG_INFINITY, f32::NEG_INFINITY];
         let Seen { outlines, todo, .. } = seen;
-        outlines.fill(nothing);
+        outlines.fill(NOWHERE);
         todo.clear();
         let mut set = RegionSet::default();
         let mut see = |region: u8, outline: Outline, todo: &mut Vec<_>| {
             let known = &mut outlines[usize::from(region)];
-            let [u0, v0, u1, v1] = *known;
-            let is_known =
-                u0 <= outline[0] && v0 <= outline[1] && u1 >= outline[2] && v1 >= outline[3];
-            if !is_known {
-                let (low, high) = ([u0, v0], [u1, v1]);
-                *known = [
-                    low[0].min(outline[0]),
-                    low[1].min(outline[1]),
-                    high[0].max(outline[2]),
-                    high[1].max(outline[3]),
-                ];
+            let both = hull(*known, outline);
+            if both != *known {
+                *known = both;
                 set.insert(region);
                 todo.push((region, outline));
             }
@@ -282,7 +283,7 @@ impl Regions {
         let eye = Vec2::new(lens.eye.x, lens.eye.z);
         let nearest = eye.max(portal.a.min(portal.b)).min(portal.a.max(portal.b));
         if (eye - nearest).abs().max_element() < 2.0 * self.cell_m {
-            return [f32::NEG_INFINITY, f32::NEG_INFINITY, f32::INFINITY, f32::INFINITY];
+            return EVERYWHERE;
         }
         let into = lens.camera_from(&Mat3::IDENTITY, Vec3::ZERO);
         let at = |p: Vec2, y: f32| into.map(Vec3::new(p.x, y, p.y));
@@ -290,15 +291,10 @@ impl Regions {
         let ring =
             [at(portal.a, -SLACK_M), at(portal.b, -SLACK_M), at(portal.b, top), at(portal.a, top)];
         let (mu, mv) = lens.middle();
-        let mut outline = [f32::INFINITY, f32::INFINITY, f32::NEG_INFINITY, f32::NEG_INFINITY];
+        let mut outline = NOWHERE;
         let mut add = |p: Vec3| {
             let (u, v) = (mu + p.x / p.z, mv + p.y / p.z);
-            outline = [
-                outline[0].min(u - 1.0),
-                outline[1].min(v - 1.0),
-                outline[2].max(u + 1.0),
-                outline[3].max(v + 1.0),
-            ];
+            outline = hull(outline, [u - 1.0, v - 1.0, u + 1.0, v + 1.0]);
         };
         for (from, to) in ring.into_iter().zip(ring.into_iter().cycle().skip(1)) {
             if from.z >= CUT_M {

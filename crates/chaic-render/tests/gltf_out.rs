@@ -135,6 +135,16 @@ fn shapes_materials_and_cameras_are_as_they_should() {
             .any(|m| m.pbr_metallic_roughness().base_color_factor() == [r, g, b, 1.0]);
         assert!(is_there, "no material is {r} {g} {b}");
     }
+    // Windows give light and nothing else does: lamps went with the ceilings.
+    let mut n_glowing = 0;
+    for material in gltf.materials() {
+        let name = material.name().expect("materials have names");
+        let [r, g, b, _] = material.pbr_metallic_roughness().base_color_factor();
+        let glows = name.contains(" glow ") || name.contains(" pane ");
+        assert_eq!(material.emissive_factor(), if glows { [r, g, b] } else { [0.0; 3] }, "{name}");
+        n_glowing += usize::from(glows);
+    }
+    assert_eq!(n_glowing, 1);
     let node = gltf.nodes().find(|n| n.camera().is_some()).expect("a camera was given");
     let (origin, rotation, _) = node.transform().decomposed();
     assert_eq!(Vec3::from(origin), eye.eye_in_world);

@@ -8,7 +8,7 @@ use chaic_protocol::{AgentId, EntityId, Vec3};
 use crate::collide::Body;
 use crate::fall::{self, Falling, Obstacle};
 use crate::setup::Setup;
-use crate::shape::{blocks_at, surfaces_at};
+use crate::shape::{Block, surfaces_at};
 use crate::state::Place;
 use crate::world::World;
 
@@ -209,20 +209,17 @@ impl World {
             }
         });
         let falling: Vec<Falling> = falling.collect();
-        let is_near = |nearest: &dyn Fn(Vec3) -> Vec3| {
-            let mut from = falling.iter().map(|thing| thing.position);
-            from.any(|from| horizontal_distance(nearest(from), from) < NEAR_M)
+        let is_near =
+            |to: Vec3| falling.iter().any(|t| horizontal_distance(to, t.position) < NEAR_M);
+        let has_near_point = |b: &&Block| {
+            let mut nearest = falling.iter().map(|t| (t.position, b.nearest_in_plan(t.position).0));
+            nearest.any(|(from, to)| horizontal_distance(from, to) < NEAR_M)
         };
-        let mut around: Vec<Obstacle> = self
-            .surroundings
-            .blocks()
-            .iter()
-            .filter(|b| is_near(&|from| b.nearest_in_plan(from).0))
-            .map(Obstacle::from)
-            .collect();
+        let mut around: Vec<Obstacle> =
+            self.surroundings.blocks().iter().filter(has_near_point).map(Obstacle::from).collect();
         for (i, (other, state)) in self.setup.things.iter().zip(&self.state.things).enumerate() {
             let entity = Setup::entity(i);
-            let near = is_near(&|_| state.position);
+            let near = is_near(state.position);
             let lies = state.is_resting() && !other.fixed && near && !objects.contains(&entity);
             if !lies {
                 continue;
@@ -232,11 +229,7 @@ impl World {
                 let center = state.position + state.rotation * (Vec3::Y * half.y);
                 around.push(Obstacle { center, half, rotation: state.rotation, entity });
             } else {
-                let yaw =
-                    chaic_protocol::geom::yaw_towards(Vec3::ZERO, state.rotation * Vec3::NEG_Z);
-                around.extend(
-                    blocks_at(other, entity, state.position, yaw).map(|b| Obstacle::from(&b)),
-                );
+                around.extend(self.blocks_now(i).map(|b| Obstacle::from(&b)));
             }
         }
         let falls = fall::fall(&falling, &around, self.rules.fall_step_s);

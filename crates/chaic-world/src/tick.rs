@@ -231,6 +231,15 @@ impl World {
         Vec3::new(p.x, from.y, p.y)
     }
 
+    /// Turns a person, if there is room. Returns whether there was.
+    fn turn_to(&mut self, agent: AgentId, yaw_rad: f32) -> bool {
+        let has_room = self.make_room_to_turn(agent, yaw_rad);
+        if has_room {
+            self.person_mut(agent).pose.yaw_rad = yaw_rad;
+        }
+        has_room
+    }
+
     pub(crate) fn face(&mut self, agent: AgentId, to: Vec3) {
         let from = self.person(agent).pose.position;
         if horizontal_distance(from, to) > 1e-3 {

@@ -1,4 +1,4 @@
-//! Lifting furniture by two.
+//! Lifting furniture by two, and turning with it.
 
 use chaic_protocol::action::FailureReason;
 use chaic_protocol::catalogue::Role;
@@ -131,26 +131,27 @@ impl World {
         self.happened(EventKind::LiftedTogether { leader: agent, follower, object });
     }
 
-    /// Turns a person. Who leads at furniture swings the other one around; if something is in the
-    /// other's way, the two turn about the other instead. Returns whether there was room.
-    pub(crate) fn turn_to(&mut self, agent: AgentId, yaw_rad: f32) -> bool {
+    /// Makes room for a turn of who leads at furniture, which swings the other one around: where
+    /// something is in the other's way, the leader steps so that the two turn about the other.
+    /// Returns whether there is room.
+    pub(crate) fn make_room_to_turn(&mut self, agent: AgentId, yaw_rad: f32) -> bool {
+        let Some(joint) = self.state.joint.filter(|j| j.leader == agent && j.under_way) else {
+            return true;
+        };
         let pose = self.person(agent).pose;
-        let turned = Pose { yaw_rad, ..pose };
-        if let Some(joint) = self.state.joint.filter(|j| j.leader == agent && j.under_way) {
-            let other = pose.to_world(joint.follower_in_leader);
-            let swung = turned.to_world(joint.follower_in_leader);
-            if !self.has_room(joint.follower, agent, other, swung) {
-                let stepped = pose.position + other - swung;
-                if !self.has_room(agent, joint.follower, pose.position, stepped) {
-                    return false;
-                }
-                let person = self.person_mut(agent);
-                person.pose.position = stepped;
-                person.walked_m += horizontal_distance(pose.position, stepped);
-            }
+        let other = pose.to_world(joint.follower_in_leader);
+        let swung = Pose { yaw_rad, ..pose }.to_world(joint.follower_in_leader);
+        if self.has_room(joint.follower, agent, other, swung) {
+            return true;
         }
-        self.person_mut(agent).pose.yaw_rad = yaw_rad;
-        true
+        let stepped = pose.position + other - swung;
+        let has_room = self.has_room(agent, joint.follower, pose.position, stepped);
+        if has_room {
+            let person = self.person_mut(agent);
+            person.pose.position = stepped;
+            person.walked_m += horizontal_distance(pose.position, stepped);
+        }
+        has_room
     }
 
     /// Whether one of two who carry furniture can be moved from one point to another, and stands there

@@ -3,32 +3,45 @@
 use std::collections::BTreeMap;
 
 use chaic_protocol::geom::horizontal_distance;
-use chaic_protocol::observation::SeenAction;
-use chaic_protocol::{Action, AgentId, ClassId, EntityId, Frame, Hand, Observation, Outcome, Vec3};
+use chaic_protocol::{Action, AgentId, ClassId, Frame, Hand, Observation, Outcome, Vec3};
 
 use crate::memory::{Memory, Thing};
+use crate::track::{Intent, TrackId};
 
 /// A thing that is seen this near to where it lay before has not been moved, metres.
 const SAME_PLACE_M: f32 = 0.4;
+
+/// Something that somebody else did, as far as its onlooker can tell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeenInteraction {
+    /// Who did it.
+    pub agent: AgentId,
+    /// When it ended (or began, if under way).
+    pub frame: Frame,
+    /// What it was.
+    pub action: Intent,
+    /// How it ended; `None` while under way.
+    pub outcome: Option<Outcome>,
+}
 
 /// What is known of the others' doings.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BehaviorLog {
     /// Their actions other than moving about, oldest first; an action under way is replaced by
     /// its end.
-    pub actions: Vec<SeenAction>,
+    pub actions: Vec<SeenInteraction>,
     /// What the partner held when that was known last, contents included.
-    pub partner_holds: Vec<(EntityId, ClassId)>,
+    pub partner_holds: Vec<(TrackId, ClassId)>,
     /// When that was.
     pub partner_holds_frame: Option<Frame>,
     /// Every object that the partner was ever known to take, in the order of taking.
-    pub partner_took: Vec<(EntityId, ClassId)>,
+    pub partner_took: Vec<(TrackId, ClassId)>,
 }
 
 impl BehaviorLog {
     /// The last known attempt of this person to pick something up that has ended.
-    pub fn last_pick_of(&self, agent: AgentId) -> Option<(&SeenAction, EntityId)> {
-        let has_ended = |seen: &&SeenAction| seen.agent == agent && seen.outcome.is_some();
+    pub fn last_pick_of(&self, agent: AgentId) -> Option<(&SeenInteraction, TrackId)> {
+        let has_ended = |seen: &&SeenInteraction| seen.agent == agent && seen.outcome.is_some();
         self.actions.iter().rev().filter(has_ended).find_map(|seen| match seen.action {
             Action::PickUp { object, .. } => Some((seen, object)),
             _ => None,
@@ -62,14 +75,20 @@ impl BehaviorModel for GroundTruthBehavior {
     fn watch(&mut self, observation: &Observation, _: &Memory) {
         let log = &mut self.log;
         for seen in &observation.granted.behavior {
-            let same = |old: &&mut SeenAction| {
+            let seen = SeenInteraction {
+                agent: seen.agent,
+                frame: seen.frame,
+                action: seen.action.map(TrackId::from),
+                outcome: seen.outcome,
+            };
+            let same = |old: &&mut SeenInteraction| {
                 old.agent == seen.agent
                     && old.action == seen.action
                     && (old.frame == seen.frame || old.outcome.is_none())
             };
             match log.actions.iter_mut().rev().take(4).find(same) {
-                Some(old) => *old = *seen,
-                None => log.actions.push(*seen),
+                Some(old) => *old = seen,
+                None => log.actions.push(seen),
             }
         }
         if let Some(hands) = &observation.granted.partner_hands {
@@ -79,6 +98,7 @@ impl BehaviorModel for GroundTruthBehavior {
                 .flat_map(|h| {
                     std::iter::once((h.entity, h.class)).chain(h.contents.iter().copied())
                 })
+                .map(|(entity, class)| (entity.into(), class))
                 .collect();
             // Furniture is held by both hands and appears twice.
             log.partner_holds.sort_unstable();
@@ -105,7 +125,7 @@ pub struct SeenBehavior {
     watched: AgentId,
     log: BehaviorLog,
     /// Where things lay when they were seen lying.
-    lay_at: BTreeMap<EntityId, Vec3>,
+    lay_at: BTreeMap<TrackId, Vec3>,
 }
 
 impl SeenBehavior {
@@ -119,10 +139,10 @@ impl SeenBehavior {
         let lies = |t: &&Thing| t.last_seen == memory.frame && t.held_until <= memory.frame;
         for thing in memory.things.iter().filter(lies).filter(|t| t.class.info().is_movable()) {
             let at = thing.position_in_world;
-            let before = self.lay_at.insert(thing.entity, at);
+            let before = self.lay_at.insert(thing.track, at);
             if before.is_some_and(|b| b.distance(at) < SAME_PLACE_M) {
-                let is_it = |a: &SeenAction| a.action.subject() == Some(thing.entity);
-                self.log.partner_took.retain(|(entity, _)| *entity != thing.entity);
+                let is_it = |a: &SeenInteraction| a.action.subject() == Some(thing.track);
+                self.log.partner_took.retain(|(track, _)| *track != thing.track);
                 self.log.actions.retain(|action| !is_it(action));
             }
         }
@@ -151,12 +171,12 @@ impl BehaviorModel for SeenBehavior {
             return;
         }
         let held = memory.things.iter().filter(|t| self.holds(memory, t));
-        let held: Vec<(EntityId, ClassId)> = held.map(|t| (t.entity, t.class)).collect();
+        let held: Vec<(TrackId, ClassId)> = held.map(|t| (t.track, t.class)).collect();
         let log = &mut self.log;
         for thing in &held {
             if !log.partner_took.contains(thing) {
                 log.partner_took.push(*thing);
-                log.actions.push(SeenAction {
+                log.actions.push(SeenInteraction {
                     agent: self.watched,
                     frame: observation.frame,
                     // With which hand can't be told; nobody reads it.
@@ -178,7 +198,8 @@ mod tests {
     use super::*;
     use crate::perception::{Detection, Percepts};
     use crate::test_support::Toy;
-    use chaic_protocol::observation::Held;
+    use chaic_protocol::EntityId;
+    use chaic_protocol::observation::{Identity, SeenAction};
     use chaic_protocol::{Hand, Outcome};
 
     #[test]
@@ -186,11 +207,11 @@ mod tests {
         let toy = Toy::room(4.0, 4.0);
         let memory = Memory::new(&toy.briefing(), crate::PlannerRules::paper());
         let mut model = GroundTruthBehavior::default();
-        let apple = (EntityId(20), ClassId::named("apple"));
+        let apple = (TrackId(20), ClassId::named("apple"));
         let mut seen = SeenAction {
             agent: AgentId::PARTNER,
             frame: 10,
-            action: Action::PickUp { object: apple.0, hand: Hand::Left },
+            action: Action::PickUp { object: EntityId(20), hand: Hand::Left },
             outcome: None,
         };
         let mut observation = toy.observe();
@@ -199,11 +220,12 @@ mod tests {
         assert_eq!(model.log().last_pick_of(AgentId::PARTNER), None, "it is under way");
         (seen.frame, seen.outcome) = (40, Some(Outcome::Success));
         observation.granted.behavior = vec![seen];
-        let held = Held { entity: apple.0, class: apple.1, contents: vec![] };
+        let held = Identity { entity: EntityId(20), class: apple.1, contents: vec![] };
         observation.granted.partner_hands = Some([Some(held.clone()), Some(held)]);
         model.watch(&observation, &memory);
         model.watch(&observation, &memory);
-        assert_eq!(model.log().actions, vec![seen]);
+        let [one] = &model.log().actions[..] else { panic!("one action is one record") };
+        assert_eq!((one.frame, one.outcome), (seen.frame, seen.outcome));
         assert_eq!(model.log().partner_took, vec![apple]);
         let last = model.log().last_pick_of(AgentId::PARTNER);
         assert_eq!(last.map(|(_, object)| object), Some(apple.0));
@@ -216,20 +238,24 @@ mod tests {
         let briefing = toy.briefing();
         let mut memory = Memory::new(&briefing, crate::PlannerRules::paper());
         let mut model = SeenBehavior::of(AgentId::PARTNER);
-        let detection = |entity: EntityId, class: &str, at: [f32; 3]| Detection {
-            entity,
+        let detection = |track: TrackId, class: &str, at: [f32; 3]| Detection {
+            track,
             class: ClassId::named(class),
+            person: u16::try_from(track.0).ok().and_then(|e| EntityId(e).agent()),
+            pixel: [0, 0],
             position_in_world: at.into(),
             bottom_m: at[1],
             top_m: at[1] + 0.1,
             n_pixels: 100,
             footprint: vec![],
         };
-        let partner =
-            |x: f32| detection(EntityId::of_agent(AgentId::PARTNER), "person", [x, 1.0, -3.0]);
-        let child = detection(EntityId::of_agent(AgentId::CHILD), "person", [-3.0, 0.6, -3.0]);
-        let apple = |x: f32| detection(EntityId(20), "apple", [x, 1.0, -3.0]);
-        let pear = detection(EntityId(21), "orange", [-2.8, 0.6, -3.0]);
+        let partner = |x: f32| {
+            detection(EntityId::of_agent(AgentId::PARTNER).into(), "person", [x, 1.0, -3.0])
+        };
+        let child =
+            detection(EntityId::of_agent(AgentId::CHILD).into(), "person", [-3.0, 0.6, -3.0]);
+        let apple = |x: f32| detection(TrackId(20), "apple", [x, 1.0, -3.0]);
+        let pear = detection(TrackId(21), "orange", [-2.8, 0.6, -3.0]);
         // What is seen in turn; what the partner is known to have taken, and to hold.
         let moments: [(Vec<Detection>, usize, usize); 4] = [
             (vec![partner(0.0), apple(2.0)], 0, 0),
@@ -247,7 +273,7 @@ mod tests {
             assert_eq!((log.partner_took.len(), log.partner_holds.len()), (took, holds), "{k}");
             assert_eq!(log.actions.len(), took, "each taking is one action");
         }
-        assert_eq!(model.log().partner_took[0].0, EntityId(20), "the child's is the child's");
+        assert_eq!(model.log().partner_took[0].0, TrackId(20), "the child's is the child's");
         // Seen lying where it lay at first, it was never taken.
         toy.frame = 50;
         let observation = toy.observe();

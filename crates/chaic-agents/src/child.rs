@@ -14,6 +14,7 @@ use crate::execution::recover::Recovery;
 use crate::memory::{Memory, Space};
 use crate::perception::{GroundTruthIds, Perception as _};
 use crate::rules::{ChildDraws, PlannerRules, Walking};
+use crate::track::{Intent, named};
 
 /// Between two draws pass more than so many frames.
 const PLAN_FRAMES: Frame = 100;
@@ -183,7 +184,7 @@ impl Episode {
         map.grid().disc(point, FREE_M).all(|c| map.space(c) < Space::Occupied)
     }
 
-    fn act(&mut self, observation: &Observation) -> Action {
+    fn act(&mut self, observation: &Observation) -> Intent {
         let percepts = GroundTruthIds.perceive(observation);
         self.memory.update(&self.briefing, observation, &percepts);
         self.change_mood();
@@ -217,7 +218,7 @@ impl Episode {
         }
     }
 
-    fn run_to(&mut self, point: Vec2) -> Action {
+    fn run_to(&mut self, point: Vec2) -> Intent {
         match self.navigator.step(&mut self.memory, &Destination::near(point, THERE_M)) {
             Nav::Act(action) => action,
             Nav::Arrived => self.fidget(),
@@ -229,7 +230,7 @@ impl Episode {
     }
 
     /// Stands about, looking here and there.
-    fn fidget(&mut self) -> Action {
+    fn fidget(&mut self) -> Intent {
         self.recovery.stand();
         match self.rng.below(4) {
             0 => Action::TurnLeft,
@@ -249,10 +250,9 @@ impl Agent for Child {
     }
 
     fn act(&mut self, observation: &Observation) -> Action {
-        match self.episode.as_mut() {
-            Some(episode) => episode.act(observation),
-            None => Action::Wait { frames: 5 },
-        }
+        let intent = self.episode.as_mut().map(|episode| episode.act(observation));
+        let action = intent.and_then(|intent| named(intent, |track| GroundTruthIds.target(track)));
+        action.unwrap_or(Action::Wait { frames: 5 })
     }
 
     fn thought(&self) -> Thought {

@@ -5,11 +5,11 @@ use std::fmt;
 
 use chaic_protocol::briefing::Relation;
 use chaic_protocol::geom::xz;
-use chaic_protocol::observation::{Held, SelfState};
-use chaic_protocol::{Briefing, ClassId, EntityId, Frame, Hand, Observation, Role};
+use chaic_protocol::{Briefing, ClassId, Frame, Hand, Observation, Role};
 
 use crate::behavior::BehaviorLog;
 use crate::memory::{Memory, Thing};
+use crate::track::{Carried, Hands, TrackId};
 
 /// The partner stands at a piece of furniture if it is this near, metres.
 const AT_PIECE_M: f32 = 1.5;
@@ -20,20 +20,20 @@ const AT_PIECE_FRAMES: Frame = 150;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Subject {
     /// Which one.
-    pub entity: EntityId,
+    pub track: TrackId,
     /// Its class.
     pub class: ClassId,
 }
 
 impl Subject {
     fn of(thing: &Thing) -> Subject {
-        Subject { entity: thing.entity, class: thing.class }
+        Subject { track: thing.track, class: thing.class }
     }
 }
 
 impl fmt::Display for Subject {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} {}", self.class.info().label, self.entity)
+        write!(f, "{} {}", self.class.info().label, self.track)
     }
 }
 
@@ -102,7 +102,7 @@ pub struct Load {
     /// Whether a container is in hand.
     pub has_container: bool,
     /// Possible targets carried, those in containers and baskets included.
-    pub targets: Vec<(EntityId, ClassId)>,
+    pub targets: Vec<(TrackId, ClassId)>,
     /// Whether another target can be taken.
     pub can_take_target: bool,
     /// Whether a container can be taken.
@@ -114,45 +114,39 @@ pub struct Load {
 }
 
 impl Load {
-    /// What this body carries.
-    pub fn of(own: &SelfState, briefing: &Briefing) -> Load {
-        let capacity = briefing.container_capacity as usize;
-        let is_target = |class: &ClassId| briefing.possible_targets.contains(class);
-        let role = |held: &Held| held.class.info().role;
-        let is_container = |held: &Held| role(held) == Role::Container;
-        let basket = own.held().find(|h| role(h) == Role::Vehicle);
+    /// What these hands of the briefing's reader carry.
+    pub fn of(hands: &Hands, briefing: &Briefing) -> Load {
+        let capacity = briefing.container_capacity;
+        let is_target = |class: ClassId| briefing.possible_targets.contains(&class);
+        let role = |held: &Carried| held.class().map(|c| c.info().role);
+        let is_container = |held: &Carried| role(held) == Some(Role::Container);
+        let basket = hands.held().find(|h| role(h) == Some(Role::Vehicle));
         let is_moving =
             briefing.possible_targets.iter().any(|c| c.info().role == Role::HeavyTarget);
-        let free_hand = Hand::BOTH.into_iter().find(|h| own.hands[h.index()].is_none());
-        let has_container = own.held().any(is_container);
+        let free_hand = Hand::BOTH.into_iter().find(|h| hands.hands[h.index()].is_none());
+        let has_container = hands.held().any(is_container);
         let can_put_in = Hand::BOTH.into_iter().any(|hand| {
-            let [one, other] = [hand, hand.other()].map(|h| own.hands[h.index()].as_ref());
-            one.is_some_and(|h| is_container(h) && h.contents.len() < capacity)
-                && other.is_some_and(|h| is_target(&h.class) && !is_container(h))
+            let [one, other] = [hand, hand.other()].map(|h| hands.hands[h.index()].as_ref());
+            one.is_some_and(|h| is_container(h) && h.n_contents < capacity)
+                && other.is_some_and(|h| h.class().is_some_and(is_target) && !is_container(h))
         });
         let can_take_target = match basket {
-            Some(basket) => basket.contents.len() < capacity,
-            None if is_moving => own.held().next().is_none(),
+            Some(basket) => basket.n_contents < capacity,
+            None if is_moving => hands.held().next().is_none(),
             None => free_hand.is_some(),
         };
-        let carries =
-            |h: &Held| is_target(&h.class) || h.contents.iter().any(|(_, class)| is_target(class));
+        // What nobody knows is got rid of at the goal place, too.
+        let carries = |h: &Carried| h.what.is_none() || h.all().any(|(_, class)| is_target(class));
         Load {
             free_hand,
             has_container,
-            targets: own
-                .held()
-                .flat_map(|h| {
-                    std::iter::once((h.entity, h.class)).chain(h.contents.iter().copied())
-                })
-                .filter(|(_, class)| is_target(class))
-                .collect(),
+            targets: hands.all().filter(|(_, class)| is_target(*class)).collect(),
             can_take_target,
             can_take_container: basket.is_none() && !has_container && free_hand.is_some(),
             can_put_in,
             to_deliver: Hand::BOTH
                 .into_iter()
-                .find(|hand| own.hands[hand.index()].as_ref().is_some_and(carries)),
+                .find(|hand| hands.hands[hand.index()].as_ref().is_some_and(carries)),
         }
     }
 }
@@ -166,8 +160,6 @@ pub struct Context<'a> {
     pub memory: &'a Memory,
     /// What it knows of the others' doings.
     pub behavior: &'a BehaviorLog,
-    /// The own body.
-    pub own: &'a SelfState,
     /// Whether everything that can be got to has been explored.
     pub is_explored: bool,
 }
@@ -210,8 +202,8 @@ pub trait Policy: Send {
 }
 
 /// Every plan that can be begun now, those of one kind nearest first. Never empty.
-pub fn valid_plans(memory: &Memory, own: &SelfState, briefing: &Briefing) -> Vec<Plan> {
-    let load = Load::of(own, briefing);
+pub fn valid_plans(memory: &Memory, briefing: &Briefing) -> Vec<Plan> {
+    let load = Load::of(&memory.hands, briefing);
     let mut plans = vec![Plan::Explore];
     if load.can_put_in {
         plans.push(Plan::PutIn);
@@ -228,7 +220,7 @@ pub fn valid_plans(memory: &Memory, own: &SelfState, briefing: &Briefing) -> Vec
     if load.free_hand.is_some() {
         plans.extend(reachable(memory, &briefing.obstacles).map(Plan::RemoveObstacle));
     }
-    if own.held().next().is_none() {
+    if memory.hands.held().next().is_none() {
         plans.extend(pieces_at_partner(memory, briefing).map(Plan::LiftWith));
     }
     if memory.companion(briefing, Relation::Partner).is_some() {
@@ -276,23 +268,20 @@ fn pieces_at_partner<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_support::held;
+    use crate::test_support::{carried, hands};
 
     fn briefing() -> Briefing {
         crate::test_support::Toy::room(4.0, 4.0).briefing()
     }
 
-    fn own(hands: [Option<Held>; 2]) -> SelfState {
-        SelfState { pose: Default::default(), hands, last: None }
-    }
-
     #[test]
     fn what_hands_allow() {
-        let apple = || Some(held("apple", 30, &[]));
-        let basket = |n: usize| Some(held("wicker_basket", 31, &["apple", "apple", "apple"][..n]));
-        let bike = |n: usize| Some(held("bike", 32, &["apple", "apple", "apple"][..n]));
+        let apple = || Some(carried("apple", 30, &[]));
+        let basket =
+            |n: usize| Some(carried("wicker_basket", 31, &["apple", "apple", "apple"][..n]));
+        let bike = |n: usize| Some(carried("bike", 32, &["apple", "apple", "apple"][..n]));
         // Hands; can take a target, take a container, put in; has something to deliver.
-        for (hands, expected) in [
+        for (held, expected) in [
             ([None, None], [true, true, false, false]),
             ([apple(), None], [true, true, false, true]),
             ([apple(), apple()], [false, false, false, true]),
@@ -305,26 +294,26 @@ mod tests {
             ([bike(2), None], [true, false, false, true]),
             ([bike(3), None], [false, false, false, true]),
         ] {
-            let load = Load::of(&own(hands.clone()), &briefing());
+            let load = Load::of(&hands(held.clone()), &briefing());
             let got = [
                 load.can_take_target,
                 load.can_take_container,
                 load.can_put_in,
                 load.to_deliver.is_some(),
             ];
-            assert_eq!(got, expected, "{hands:?}");
+            assert_eq!(got, expected, "{held:?}");
         }
     }
 
     #[test]
     fn plans_read_as_sentences() {
-        let it = Subject { entity: EntityId(31), class: ClassId::named("apple") };
+        let it = Subject { track: TrackId(31), class: ClassId::named("apple") };
         assert_eq!(Plan::PickUp(it).to_string(), "go to apple #31 and pick it up");
     }
 
     #[test]
     fn a_walk_to_an_object_is_not_dropped_for_another_but_for_an_obstacle() {
-        let it = |n| Subject { entity: EntityId(n), class: ClassId::named("apple") };
+        let it = |n| Subject { track: TrackId(n), class: ClassId::named("apple") };
         let current = Plan::PickUp(it(30));
         assert!(!Plan::PickUp(it(31)).supersedes(&current));
         assert!(!Plan::Explore.supersedes(&current));

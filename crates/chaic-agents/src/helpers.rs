@@ -44,7 +44,7 @@ pub fn helper(name: &str, rules: PlannerRules) -> Option<Box<dyn Agent>> {
 /// What the helper of this name asks to be granted; nothing for an unknown name.
 pub fn helper_grants(name: &str, rules: PlannerRules) -> Grants {
     match name {
-        "random" | "rhp" | "follow" => Grants { behavior: rules.knows_holding, ..Grants::IDS },
+        "random" | "rhp" | "follow" => Grants { behavior: rules.knows_holding, ..Grants::PLANNER },
         "oracle" => Grants::ORACLE,
         _ => Grants::NONE,
     }

@@ -20,6 +20,8 @@
 //! assert!(rhp.senses().depth && helpers::helper_grants("rhp", PlannerRules::paper()).ids);
 //! ```
 
+pub mod track;
+
 pub mod perception;
 pub mod rules;
 
@@ -46,3 +48,4 @@ pub use helpers::{HELPERS, helper, helper_grants};
 pub use mind::Mind;
 pub use partners::{child, partner, partner_grants};
 pub use rules::PlannerRules;
+pub use track::{Intent, TrackId};

@@ -4,20 +4,30 @@ use std::collections::BTreeMap;
 
 use chaic_protocol::agent::Thought;
 use chaic_protocol::observation::Senses;
-use chaic_protocol::{Action, Agent, Briefing, EntityId, Observation};
+use chaic_protocol::{Action, Agent, Briefing, Observation, Outcome, Target};
 
 use crate::behavior::{BehaviorModel, GroundTruthBehavior};
 use crate::decision::{Context, Plan, Policy, valid_plans};
 use crate::execution::interact::learn;
+use crate::execution::navigate::face;
 use crate::execution::{Executor, Progress, Situation};
 use crate::memory::Memory;
+use crate::memory::semantic::IGNORE_FRAMES;
 use crate::perception::{GroundTruthIds, Perception};
 use crate::rules::PlannerRules;
+use crate::track::{Intent, TrackId, named};
 
 /// So many plans may end without an action within one decision; then one waits for a moment.
 const MAX_PLANS: usize = 6;
 /// How long that moment is, frames.
 const PAUSE_FRAMES: u32 = 5;
+/// One who points at things stands at least this far off when it does, metres: a level eye at
+/// 1.65 m that sees 45 degrees down has the floor in view from there on.
+const POINT_FROM_M: f32 = 2.2;
+/// Facing something within this angle, it is looked at, radians: half of a turn.
+const FACING_RAD: f32 = std::f32::consts::PI / 24.0;
+/// Decisions spent on getting a thing into view before it is left alone.
+const MAX_GLANCES: u32 = 14;
 
 /// A mind whose plans are chosen by a policy. Partners and helpers are both of this kind.
 pub struct Mind<P: Policy> {
@@ -36,7 +46,11 @@ struct Episode {
     executor: Executor,
     plan: Option<Plan>,
     news: u32,
-    held: Vec<EntityId>,
+    held: Vec<TrackId>,
+    /// The last action as it was meant and as it was named.
+    sent: Option<(Intent, Action)>,
+    /// Turns made lately to get the thing that one wants to point at into view.
+    n_glances: u32,
 }
 
 impl<P: Policy> Mind<P> {
@@ -51,8 +65,12 @@ impl<P: Policy> Mind<P> {
         policy: P,
         perception: Box<dyn Perception>,
         behavior: Box<dyn BehaviorModel>,
-        rules: PlannerRules,
+        mut rules: PlannerRules,
     ) -> Mind<P> {
+        if perception.points() {
+            rules.pick_within_m = rules.pick_within_m.max(POINT_FROM_M);
+            rules.put_within_m = rules.put_within_m.max(POINT_FROM_M);
+        }
         let senses = Senses::DEPTH_AND_IDS;
         Mind { perception, behavior, policy, senses, rules, episode: None }
     }
@@ -88,19 +106,16 @@ impl Episode {
             plan: None,
             news: 0,
             held: Vec::new(),
+            sent: None,
+            n_glances: 0,
         }
     }
 
-    fn context<'a>(
-        &'a self,
-        behavior: &'a dyn BehaviorModel,
-        observation: &'a Observation,
-    ) -> Context<'a> {
+    fn context<'a>(&'a self, behavior: &'a dyn BehaviorModel) -> Context<'a> {
         Context {
             briefing: &self.briefing,
             memory: &self.memory,
             behavior: behavior.log(),
-            own: &observation.own,
             is_explored: self.executor.is_explored(),
         }
     }
@@ -111,42 +126,100 @@ impl Episode {
             self.briefing.goal.get_or_insert_with(|| goal.clone());
         }
         let percepts = perception.perceive(observation);
+        self.memory.last = self.last_intent(observation);
         self.memory.update(&self.briefing, observation, &percepts);
-        let holds: Vec<EntityId> = observation
-            .own
-            .held()
-            .flat_map(|h| std::iter::once(h.entity).chain(h.contents.iter().map(|(e, _)| *e)))
-            .collect();
-        if let Some(last) = observation.own.last {
-            let knows = observation.delivered.is_some();
-            learn(&mut self.memory, &self.briefing, last, &self.held, &holds, knows);
+        let holds: Vec<TrackId> = self.memory.hands.all().map(|(track, _)| track).collect();
+        if let Some(last) = self.memory.last {
+            learn(&mut self.memory, &self.briefing, last, &self.held, &holds);
         }
         self.held = holds;
     }
 
+    /// The action that has ended, as it was meant. With ids granted, another one's choice may have
+    /// replaced it by a joint lift (the original's rules).
+    fn last_intent(&self, observation: &Observation) -> Option<(Intent, Outcome)> {
+        let (action, outcome) = observation.own.last?;
+        let meant = self.sent.filter(|(_, sent)| *sent == action).map(|(intent, _)| intent);
+        let told = || match action.subject() {
+            None | Some(Target::Entity(_)) => Some(action.map(|target| match target {
+                Target::Entity(entity) => entity.into(),
+                Target::Pixel { .. } => TrackId(0),
+            })),
+            Some(Target::Pixel { .. }) => None,
+        };
+        Some((meant.or_else(told)?, outcome))
+    }
+
+    /// The action for an intent: if the thing can't be pointed at now, a turn towards where it
+    /// is believed to be; `None` if it can't be got into view.
+    fn name(&mut self, intent: Intent, perception: &dyn Perception) -> Option<(Intent, Action)> {
+        let target = |track| perception.target(track);
+        if let Some(action) = named(intent, target) {
+            self.n_glances *= u32::from(action.is_locomotion());
+            return Some((intent, action));
+        }
+        let track = intent.subject()?;
+        self.n_glances += 1;
+        let at = self.memory.things.get(track).map(|t| t.nearest_point(self.memory.here()));
+        let (here, yaw) = (self.memory.here(), self.memory.pose.yaw_rad);
+        let turn = at.and_then(|at| face(here, yaw, at, FACING_RAD));
+        match turn.filter(|_| self.n_glances <= MAX_GLANCES) {
+            Some(turn) => named(turn, target).map(|action| (turn, action)),
+            None => {
+                self.n_glances = 0;
+                self.memory.things.ignore(track, self.memory.frame + IGNORE_FRAMES);
+                None
+            }
+        }
+    }
+
     /// Lets the policy choose; `None` if it sticks to the current plan.
-    fn choose<P: Policy>(
-        &mut self,
-        policy: &mut P,
-        behavior: &dyn BehaviorModel,
-        observation: &Observation,
-    ) -> Option<Plan> {
+    fn choose<P: Policy>(&mut self, policy: &mut P, behavior: &dyn BehaviorModel) -> Option<Plan> {
         let news = self.memory.things.news();
         if let Some(current) = self.plan {
-            let context = self.context(behavior, observation);
+            let context = self.context(behavior);
             if !policy.reconsiders(&context, &current, news != self.news) {
                 return None;
             }
         }
         self.news = news;
         self.memory.refresh();
-        let context = self.context(behavior, observation);
-        let valid = valid_plans(&self.memory, &observation.own, &self.briefing);
+        let context = self.context(behavior);
+        let valid = valid_plans(&self.memory, &self.briefing);
         let chosen = policy.choose(&context, &valid);
         match self.plan {
             Some(current) if !chosen.supersedes(&current) => None,
             _ => Some(chosen),
         }
+    }
+}
+
+impl<P: Policy> Mind<P> {
+    /// What to do next, as it is meant and as it is named; `None` for a pause.
+    fn decide(&mut self, episode: &mut Episode) -> Option<(Intent, Action)> {
+        for _ in 0..MAX_PLANS {
+            let chosen = episode.choose(&mut self.policy, self.behavior.as_ref());
+            if let Some(plan) = chosen {
+                let thinking = self.policy.thinking_frames();
+                episode.executor.begin(episode.memory.frame + thinking);
+                episode.plan = Some(plan);
+                if thinking > 0 {
+                    let wait = Action::Wait { frames: thinking };
+                    return Some((Action::Wait { frames: thinking }, wait));
+                }
+            }
+            let plan = episode.plan?;
+            let mut situation =
+                Situation { memory: &mut episode.memory, briefing: &episode.briefing };
+            match episode.executor.step(&plan, &mut situation) {
+                Progress::Act(intent) => match episode.name(intent, self.perception.as_ref()) {
+                    Some(named) => return Some(named),
+                    None => episode.plan = None,
+                },
+                Progress::Done | Progress::Failed => episode.plan = None,
+            }
+        }
+        None
     }
 }
 
@@ -163,32 +236,14 @@ impl<P: Policy> Agent for Mind<P> {
 
     fn act(&mut self, observation: &Observation) -> Action {
         let pause = Action::Wait { frames: PAUSE_FRAMES };
-        let Some(episode) = self.episode.as_mut() else { return pause };
+        let Some(mut episode) = self.episode.take() else { return pause };
         episode.take_in(observation, self.perception.as_mut());
         self.behavior.watch(observation, &episode.memory);
         self.policy.look(observation);
-        for _ in 0..MAX_PLANS {
-            let chosen = episode.choose(&mut self.policy, self.behavior.as_ref(), observation);
-            if let Some(plan) = chosen {
-                let thinking = self.policy.thinking_frames();
-                episode.executor.begin(episode.memory.frame + thinking);
-                episode.plan = Some(plan);
-                if thinking > 0 {
-                    return Action::Wait { frames: thinking };
-                }
-            }
-            let Some(plan) = episode.plan else { return pause };
-            let mut situation = Situation {
-                memory: &mut episode.memory,
-                own: &observation.own,
-                briefing: &episode.briefing,
-            };
-            match episode.executor.step(&plan, &mut situation) {
-                Progress::Act(action) => return action,
-                Progress::Done | Progress::Failed => episode.plan = None,
-            }
-        }
-        pause
+        episode.sent = self.decide(&mut episode);
+        let action = episode.sent.map_or(pause, |(_, action)| action);
+        self.episode = Some(episode);
+        action
     }
 
     fn thought(&self) -> Thought {

@@ -1,6 +1,9 @@
 //! What is in the image: detections, and which pixels tell nothing of the room.
 
-use chaic_protocol::{ClassId, EntityId, Observation, Role, Vec2, Vec3};
+use chaic_protocol::observation::Identity;
+use chaic_protocol::{AgentId, ClassId, EntityId, Observation, Role, Target, Vec2, Vec3};
+
+use crate::track::{Carried, Hands, TrackId};
 
 /// Fewer pixels than this are no detection (original facts 1.8).
 pub const MIN_PIXELS: u32 = 5;
@@ -16,10 +19,14 @@ const FOOTPRINT_M: f32 = 0.125;
 /// One thing seen in an image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Detection {
-    /// A track: the same thing has the same name in all images. With ground truth, its entity.
-    pub entity: EntityId,
+    /// The same thing has the same track in all images.
+    pub track: TrackId,
     /// Its class.
     pub class: ClassId,
+    /// Whose body it is, for people.
+    pub person: Option<AgentId>,
+    /// Column and row of a pixel that shows it.
+    pub pixel: [u32; 2],
     /// Mean of its visible points, metres.
     pub position_in_world: Vec3,
     /// Height of its lowest visible point, metres.
@@ -42,12 +49,24 @@ pub struct Percepts {
     pub loose: Vec<bool>,
     /// Which pixels `loose` samples: every how many rows and columns.
     pub stride: u32,
+    /// What the own hands hold, if perception can tell; otherwise the mind keeps account of what it
+    /// saw itself take.
+    pub hands: Option<Hands>,
 }
 
 /// Turns images into detections.
 pub trait Perception: Send {
     /// Looks at one observation. Images that are missing show nothing.
     fn perceive(&mut self, observation: &Observation) -> Percepts;
+
+    /// How an action can name this thing now; `None` if it can't, because the thing is not in the
+    /// image looked at last.
+    fn target(&self, track: TrackId) -> Option<Target>;
+
+    /// Whether things must be in the image to be named, so that actions need them in view.
+    fn points(&self) -> bool {
+        false
+    }
 }
 
 /// Perfect segmentation, classification and association; needs [`Grants::ids`].
@@ -55,6 +74,32 @@ pub trait Perception: Send {
 /// [`Grants::ids`]: chaic_protocol::observation::Grants
 #[derive(Clone, Debug, Default)]
 pub struct GroundTruthIds;
+
+/// Names things by pixels of the last image instead of whatever the perception within would use:
+/// for minds that see perfectly and act as if they were granted no ids.
+#[derive(Clone, Debug, Default)]
+pub struct Pointing<P> {
+    /// What does the seeing.
+    pub inner: P,
+    last: Vec<(TrackId, [u32; 2])>,
+}
+
+impl<P: Perception> Perception for Pointing<P> {
+    fn perceive(&mut self, observation: &Observation) -> Percepts {
+        let percepts = self.inner.perceive(observation);
+        self.last = percepts.detections.iter().map(|d| (d.track, d.pixel)).collect();
+        percepts
+    }
+
+    fn target(&self, track: TrackId) -> Option<Target> {
+        let (_, [column, row]) = *self.last.iter().find(|(t, _)| *t == track)?;
+        Some(Target::Pixel { column, row })
+    }
+
+    fn points(&self) -> bool {
+        true
+    }
+}
 
 #[derive(Clone, Copy, PartialEq)]
 enum Look {
@@ -90,10 +135,15 @@ struct Tally {
     low: f32,
     high: f32,
     squares: Vec<[i16; 2]>,
+    /// The longest run of pixels, and its middle.
+    longest: u32,
+    pixel: [u32; 2],
 }
 
 impl Tally {
     const NEW: Tally = Tally {
+        longest: 0,
+        pixel: [0, 0],
         n_pixels: 0,
         n_points: 0,
         sum: Vec3::ZERO,
@@ -115,12 +165,23 @@ impl Tally {
         }
     }
 
+    fn run(&mut self, row: usize, from: usize, end: usize) {
+        let n = (end - from) as u32;
+        self.n_pixels += n;
+        if n > self.longest {
+            self.longest = n;
+            self.pixel = [(from + end) as u32 / 2, row as u32];
+        }
+    }
+
     fn detection(mut self, entity: EntityId, class: ClassId) -> Detection {
         self.squares.sort_unstable();
         self.squares.dedup();
         Detection {
-            entity,
+            track: entity.into(),
             class,
+            person: entity.agent(),
+            pixel: self.pixel,
             position_in_world: self.sum / self.n_points as f32,
             bottom_m: self.low,
             top_m: self.high,
@@ -187,21 +248,36 @@ impl Rays {
 impl GroundTruthIds {
     /// How each entity is looked at, by entity number.
     fn looks(observation: &Observation) -> Option<Vec<Look>> {
-        let classes = observation.granted.classes.as_ref()?;
-        let mut looks: Vec<Look> = classes
-            .iter()
-            .enumerate()
-            .map(|(i, class)| Look::of(EntityId(i as u16), *class))
-            .collect();
-        let own = observation.own.held().flat_map(|held| {
-            std::iter::once(held.entity).chain(held.contents.iter().map(|(e, _)| *e))
-        });
+        let classes = &observation.granted.classes;
+        let n = usize::from(classes.last()?.0.0) + 1;
+        let mut looks = vec![Look::Firm; n];
+        for (entity, class) in classes {
+            looks[usize::from(entity.0)] = Look::of(*entity, Some(*class));
+        }
+        let own = observation.own.held().filter_map(|held| held.identity.as_ref());
+        let own = own
+            .flat_map(|it| std::iter::once(it.entity).chain(it.contents.iter().map(|(e, _)| *e)));
         for entity in own {
             if let Some(look) = looks.get_mut(usize::from(entity.0)) {
                 *look = Look::Own;
             }
         }
         Some(looks)
+    }
+
+    /// What the hands hold, as the grant of ids tells.
+    fn hands(observation: &Observation) -> Option<Hands> {
+        let own = &observation.own;
+        let is_told = own.held().all(|held| held.identity.is_some());
+        let carried = |it: &Identity| Carried {
+            what: Some((it.entity.into(), it.class)),
+            contents: it.contents.iter().map(|(e, class)| ((*e).into(), *class)).collect(),
+            n_contents: it.contents.len() as u32,
+        };
+        is_told.then(|| Hands {
+            hands: [0, 1].map(|k| own.hands[k].as_ref()?.identity.as_ref().map(carried)),
+            is_joint: own.held().any(|h| h.in_both_hands),
+        })
     }
 }
 
@@ -210,14 +286,14 @@ impl Perception for GroundTruthIds {
         let (width, height) =
             (observation.camera.width as usize, observation.camera.height as usize);
         let images = &observation.images;
+        let hands = GroundTruthIds::hands(observation);
         let (Some(ids), Some(depth)) = (images.ids.as_ref(), images.depth_m.as_ref()) else {
-            return Percepts::default();
+            return Percepts { hands, ..Percepts::default() };
         };
-        let Some(looks) = GroundTruthIds::looks(observation) else {
-            return Percepts::default();
-        };
+        // An image without any object shows structure alone.
+        let looks = GroundTruthIds::looks(observation).unwrap_or_default();
         if ids.len() != width * height || depth.len() != width * height {
-            return Percepts::default();
+            return Percepts { hands, ..Percepts::default() };
         }
         let stride = STRIDE as usize;
         let rays = Rays::new(&observation.camera);
@@ -241,7 +317,7 @@ impl Perception for GroundTruthIds {
                     continue;
                 }
                 let tally = &mut tallies[id];
-                tally.n_pixels += (end - from) as u32;
+                tally.run(row, from, end);
                 let mut add = |column: usize| {
                     if depth[column] < OBJECT_RANGE_M {
                         tally.add(rays.point(column, row, depth[column]));
@@ -254,19 +330,20 @@ impl Perception for GroundTruthIds {
                 }
             }
         }
-        let classes = observation.granted.classes.as_deref().map_or(&[][..], Vec::as_slice);
         let detections = tallies
             .into_iter()
             .enumerate()
             .filter(|(_, t)| t.n_pixels >= MIN_PIXELS && t.n_points > 0)
             .filter_map(|(i, t)| {
                 let entity = EntityId(i as u16);
-                let person = || ClassId::by_name("person");
-                let class = classes[i].or_else(|| entity.agent().and_then(|_| person()))?;
-                Some(t.detection(entity, class))
+                Some(t.detection(entity, observation.granted.class_of(entity)?))
             })
             .collect();
-        Percepts { detections, loose, stride: STRIDE }
+        Percepts { detections, loose, stride: STRIDE, hands }
+    }
+
+    fn target(&self, track: TrackId) -> Option<Target> {
+        u16::try_from(track.0).ok().map(|e| Target::Entity(EntityId(e)))
     }
 }
 
@@ -281,7 +358,7 @@ mod tests {
         let apple = toy.add(ToyObject::new("apple", [1.0, 0.5, -2.0], [0.2, 0.2, 0.2]));
         toy.stand([0.0, 0.0], 0.0);
         let percepts = GroundTruthIds.perceive(&toy.observe());
-        let seen = percepts.detections.iter().find(|d| d.entity == apple).expect("it is in view");
+        let seen = percepts.detections.iter().find(|d| d.track == apple).expect("it is in view");
         assert_eq!(seen.class.name(), "apple");
         assert!((seen.position_in_world - Vec3::new(0.95, 0.65, -1.9)).length() < 0.12, "{seen:?}");
         assert!((seen.top_m - 0.7).abs() < 0.03, "{}", seen.top_m);
@@ -315,7 +392,7 @@ mod tests {
         let speck = toy.add(ToyObject::new("apple", [0.0, 1.6, -8.0], [0.02, 0.02, 0.02]));
         toy.stand([0.0, 0.0], 0.0);
         let percepts = GroundTruthIds.perceive(&toy.observe());
-        assert!(percepts.detections.iter().all(|d| d.entity != behind && d.entity != speck));
+        assert!(percepts.detections.iter().all(|d| d.track != behind && d.track != speck));
     }
 
     #[test]
@@ -324,9 +401,9 @@ mod tests {
         let apple = toy.add(ToyObject::new("apple", [0.0, 1.0, -0.6], [0.3, 0.3, 0.3]));
         toy.stand([0.0, 0.0], 0.0);
         let before = GroundTruthIds.perceive(&toy.observe());
-        assert!(before.detections.iter().any(|d| d.entity == apple));
+        assert!(before.detections.iter().any(|d| d.track == apple));
         toy.hold(0, apple);
         let after = GroundTruthIds.perceive(&toy.observe());
-        assert!(after.detections.iter().all(|d| d.entity != apple));
+        assert!(after.detections.iter().all(|d| d.track != apple));
     }
 }

@@ -1,15 +1,13 @@
 //! A toy world for tests: boxes in a room, a tiny ray caster, and one body that walks, picks up
 //! and puts down without ever failing by chance.
 
-use std::sync::Arc;
-
 use chaic_protocol::briefing::{Companion, Goal, Relation};
 use chaic_protocol::capability::Persona;
 use chaic_protocol::geom::{Camera, Pose, Rect, forward, wrap_angle, xz, yaw_rotation};
-use chaic_protocol::observation::{Granted, Grants, Held, Images, SelfState};
+use chaic_protocol::observation::{Granted, Grants, Held, Identity, Images, SelfState};
 use chaic_protocol::{
     Action, Agent, AgentId, Briefing, ClassId, EntityId, FailureReason, Frame, Hand, Observation,
-    Outcome, Role, Vec2, Vec3,
+    Outcome, Role, Target, Vec2, Vec3,
 };
 
 use crate::memory::costs::CostMap;
@@ -17,6 +15,7 @@ use crate::memory::grid::Grid;
 use crate::memory::occupancy::{OccupancyMap, Space};
 use crate::memory::{Memory, People, SemanticMap};
 use crate::perception::{GroundTruthIds, Perception as _};
+use crate::track::{Carried, Hands, TrackId};
 
 /// A thing of the toy world: an upright box of a class.
 pub struct ToyObject {
@@ -65,8 +64,9 @@ pub struct Toy {
     classes: Vec<Option<ClassId>>,
     pose: Pose,
     pub frame: Frame,
-    hands: [Option<Held>; 2],
-    pub delivered: Vec<EntityId>,
+    hands: [Option<Identity>; 2],
+    pub grants_ids: bool,
+    pub delivered: Vec<TrackId>,
     last: Option<(Action, Outcome)>,
     pub size: u32,
     pub radius_m: f32,
@@ -85,6 +85,7 @@ impl Toy {
             pose: Pose::default(),
             frame: 0,
             hands: [None, None],
+            grants_ids: true,
             delivered: Vec::new(),
             last: None,
             size: 128,
@@ -116,14 +117,16 @@ impl Toy {
         });
     }
 
-    pub fn add(&mut self, object: ToyObject) -> EntityId {
+    /// Adds a thing; minds with perfect perception know it by the track that is returned.
+    pub fn add(&mut self, object: ToyObject) -> TrackId {
         let entity = EntityId(self.classes.len() as u16);
         self.classes.push(Some(object.class));
         self.solids.push(Solid { entity, low: object.low, high: object.high });
-        entity
+        entity.into()
     }
 
-    pub fn remove(&mut self, entity: EntityId) {
+    pub fn remove(&mut self, track: TrackId) {
+        let entity = EntityId(track.0 as u16);
         self.solids.retain(|s| s.entity != entity);
     }
 
@@ -135,14 +138,14 @@ impl Toy {
         xz(self.pose.position)
     }
 
-    pub fn class(&self, entity: EntityId) -> ClassId {
-        self.classes[usize::from(entity.0)].expect("an object has a class")
+    pub fn class(&self, track: TrackId) -> ClassId {
+        self.classes[track.0 as usize].expect("an object has a class")
     }
 
     /// Puts something into a hand, without taking it out of the picture.
-    pub fn hold(&mut self, hand: usize, entity: EntityId) {
-        let class = self.class(entity);
-        self.hands[hand] = Some(Held { entity, class, contents: Vec::new() });
+    pub fn hold(&mut self, hand: usize, track: TrackId) {
+        let (entity, class) = (EntityId(track.0 as u16), self.class(track));
+        self.hands[hand] = Some(Identity { entity, class, contents: Vec::new() });
     }
 
     pub fn briefing(&self) -> Briefing {
@@ -157,9 +160,8 @@ impl Toy {
             possible_targets: classes(&["apple", "banana", "orange"]),
             containers: classes(&["wicker_basket"]),
             obstacles: classes(&["trashbin"]),
-            goal_place: ClassId::named("bed"),
+            goal_places: vec![ClassId::named("bed")],
             goal_place_min_top_m: 0.0,
-            delivery_radius_m: 2.0,
             container_capacity: 3,
             grants: Grants::IDS,
             goal: None,
@@ -189,22 +191,36 @@ impl Toy {
                 ids.push(id.0);
             }
         }
-        let sees_goal = self.solids.iter().any(|s| {
-            s.entity.is_object()
-                && ["bed", "truck"].contains(&self.class(s.entity).name())
-                && ids.contains(&s.entity.0)
-        });
+        let is_joint = matches!(&self.hands, [Some(l), Some(r)] if l.entity == r.entity);
+        let felt = |it: &Identity| Held {
+            n_contents: it.contents.len() as u32,
+            in_both_hands: is_joint,
+            identity: self.grants_ids.then(|| it.clone()),
+        };
+        let hands = [0, 1].map(|k| self.hands[k].as_ref().map(felt));
+        let in_view = |e: &EntityId| ids.contains(&e.0);
+        let all = (0..self.classes.len()).map(|i| EntityId(i as u16));
+        let class = |e: EntityId| Some((e, self.classes[usize::from(e.0)]?));
+        let granted = Granted {
+            classes: all.filter(in_view).filter_map(class).collect(),
+            delivered: self.delivered.iter().filter_map(|t| class(EntityId(t.0 as u16))).collect(),
+            ..Granted::default()
+        };
         Observation {
             frame: self.frame,
-            own: SelfState { pose: self.pose, hands: self.hands.clone(), last: self.last },
+            own: SelfState { pose: self.pose, hands, last: self.last },
             camera,
             images: Images { rgb: None, depth_m: Some(depth), ids: Some(ids) },
-            delivered: sees_goal.then(|| self.delivered.clone()),
-            removed: Vec::new(),
-            granted: Granted {
-                classes: Some(Arc::new(self.classes.clone())),
-                ..Granted::default()
-            },
+            granted,
+        }
+    }
+
+    /// What an action names: an entity, or what a pixel of the present view shows.
+    fn resolve(&self, target: Target) -> EntityId {
+        let ids = || self.observe().images.ids.expect("a toy always shows ids");
+        match target {
+            Target::Entity(entity) => entity,
+            Target::Pixel { column, row } => EntityId(ids()[(row * self.size + column) as usize]),
         }
     }
 
@@ -225,7 +241,8 @@ impl Toy {
 
     fn is_free(&self, p: Vec2) -> bool {
         self.solids.iter().all(|s| {
-            let is_small = s.entity.is_object() && self.class(s.entity).info().is_carriable();
+            let is_small =
+                s.entity.is_object() && self.class(s.entity.into()).info().is_carriable();
             is_small || s.high.y < 0.12 || s.distance_from(p) >= self.radius_m
         })
     }
@@ -246,11 +263,11 @@ impl Toy {
     /// Steps up to a thing; whether the arm reaches it.
     fn step_up(&mut self, entity: EntityId) -> Result<(), FailureReason> {
         let solid = |t: &Toy| t.solids.iter().position(|s| s.entity == entity);
-        let i = solid(self).ok_or(FailureReason::Impossible)?;
+        let i = solid(self).ok_or(FailureReason::OutOfReach)?;
         let target = 0.5 * (xz(self.solids[i].low) + xz(self.solids[i].high));
         let half = 0.5 * xz(self.solids[i].high - self.solids[i].low).max_element();
         if self.here().distance(target) > 3.0 + half {
-            return Err(FailureReason::TooFar);
+            return Err(FailureReason::OutOfReach);
         }
         for _ in 0..60 {
             if self.solids[i].distance_from(self.here()) <= 0.7 {
@@ -275,16 +292,17 @@ impl Toy {
                 self.n_blocked += u32::from(got < 0.1);
                 (10, if got < 0.1 { Err(FailureReason::Blocked) } else { Ok(()) })
             }
-            Action::PickUp { object, hand } => (40, self.pick_up(object, hand)),
+            Action::PickUp { object, hand } => (40, self.pick_up(self.resolve(object), hand)),
             Action::RemoveObstacle { obstacle, .. } => {
+                let obstacle = self.resolve(obstacle);
                 let result = self.step_up(obstacle);
                 if result.is_ok() {
-                    self.remove(obstacle);
+                    self.remove(obstacle.into());
                 }
                 (60, result)
             }
             Action::PutIn => (20, self.put_in()),
-            Action::PutOn { place, hand } => (40, self.put_on(place, hand)),
+            Action::PutOn { place, hand } => (40, self.put_on(self.resolve(place), hand)),
         };
         self.frame += frames;
         let outcome = result.map_or_else(Outcome::Failure, |()| Outcome::Success);
@@ -299,7 +317,7 @@ impl Toy {
     }
 
     fn pick_up(&mut self, object: EntityId, hand: Hand) -> Result<(), FailureReason> {
-        let class = self.class(object);
+        let class = self.class(object.into());
         if let Some(bike) = self.hands[0].as_ref().filter(|h| h.class.name() == "bike") {
             if bike.contents.len() >= 3 {
                 return Err(FailureReason::Full);
@@ -308,20 +326,20 @@ impl Toy {
             return Err(FailureReason::HandFull);
         }
         self.step_up(object)?;
-        self.remove(object);
+        self.remove(object.into());
         match self.hands[0].as_mut().filter(|h| h.class.name() == "bike") {
             Some(bike) => bike.contents.push((object, class)),
             None if class.info().role == Role::HeavyTarget => {
-                self.hold(0, object);
-                self.hold(1, object);
+                self.hold(0, object.into());
+                self.hold(1, object.into());
             }
-            None => self.hold(hand.index(), object),
+            None => self.hold(hand.index(), object.into()),
         }
         Ok(())
     }
 
     fn put_in(&mut self) -> Result<(), FailureReason> {
-        let container = |h: &Option<Held>| {
+        let container = |h: &Option<Identity>| {
             h.as_ref()
                 .is_some_and(|h| h.class.info().role == Role::Container && h.contents.len() < 3)
         };
@@ -339,15 +357,15 @@ impl Toy {
         }
         self.step_up(place)?;
         if let Some(bike) = self.hands[0].as_mut().filter(|h| h.class.name() == "bike") {
-            self.delivered.extend(bike.contents.drain(..).map(|(e, _)| e));
+            self.delivered.extend(bike.contents.drain(..).map(|(e, _)| TrackId::from(e)));
             return Ok(());
         }
         let held = self.hands[hand.index()].take().expect("just looked");
         if held.class.info().role == Role::HeavyTarget {
             self.hands = [None, None];
         }
-        self.delivered.push(held.entity);
-        self.delivered.extend(held.contents.iter().map(|(e, _)| *e));
+        self.delivered.push(held.entity.into());
+        self.delivered.extend(held.contents.iter().map(|(e, _)| TrackId::from(*e)));
         Ok(())
     }
 
@@ -399,20 +417,36 @@ impl ToyRun {
         self.memory = Some(memory);
     }
 
-    pub fn act(&mut self, action: Action, memory: Memory) {
+    pub fn act(&mut self, action: crate::Intent, memory: Memory) {
         self.keep(memory);
-        self.toy.apply(action);
+        let target = |track| GroundTruthIds.target(track);
+        self.toy.apply(crate::track::named(action, target).expect("everything has a name"));
     }
 }
 
 /// Something in a hand, with contents numbered from 90.
-pub fn held(class: &str, entity: u16, contents: &[&str]) -> Held {
+pub fn identity(class: &str, entity: u16, contents: &[&str]) -> Identity {
     let contents = contents.iter().zip(90..);
-    Held {
+    Identity {
         entity: EntityId(entity),
         class: ClassId::named(class),
         contents: contents.map(|(c, e)| (EntityId(e), ClassId::named(c))).collect(),
     }
+}
+
+/// The same as a mind knows it.
+pub fn carried(class: &str, track: u16, contents: &[&str]) -> Carried {
+    let it = identity(class, track, contents);
+    Carried {
+        what: Some((it.entity.into(), it.class)),
+        n_contents: it.contents.len() as u32,
+        contents: it.contents.into_iter().map(|(e, class)| (e.into(), class)).collect(),
+    }
+}
+
+/// Hands that hold these.
+pub fn hands(hands: [Option<Carried>; 2]) -> Hands {
+    Hands { hands, is_joint: false }
 }
 
 /// A drawn plan: `.` free, `#` wall, `?` unknown.

@@ -5,12 +5,12 @@ use std::hint::black_box;
 
 use chaic_episodes::find_episode;
 use chaic_protocol::rng::Stream;
-use chaic_protocol::{Action, EntityId, Hand};
+use chaic_protocol::{Action, EntityId, Hand, ResolvedAction};
 use chaic_world::{Rules, Setup, World};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
 /// Half of all actions are steps, a quarter turns; the rest are deeds with things of the episode.
-fn any_action(rng: &mut Stream, n_things: usize) -> Action {
+fn any_action(rng: &mut Stream, n_things: usize) -> ResolvedAction {
     let hand = if rng.chance(0.5) { Hand::Left } else { Hand::Right };
     let thing = |rng: &mut Stream| -> EntityId { Setup::entity(rng.below(n_things)) };
     match rng.below(16) {

@@ -129,7 +129,7 @@ impl Language {
         let is_told = kind.track == Track::Told;
         let is_granted = self.session.settings.asking.behavior == Behavior::Granted;
         let behavior = is_told || is_granted || rules.knows_holding;
-        let grants = Grants { behavior, task: is_told, ..Grants::IDS };
+        let grants = Grants { behavior, task: is_told, ..Grants::PLANNER };
         Some(self.mind(kind, key, grants, AgentId::PARTNER, rules))
     }
 

@@ -70,14 +70,12 @@ pub struct Briefing {
     pub containers: Vec<ClassId>,
     /// Classes that may stand in the way and can be removed.
     pub obstacles: Vec<ClassId>,
-    /// The class of the place that targets are brought to (the paper's prompts give it; it is no
-    /// part of the hidden goal).
-    pub goal_place: ClassId,
-    /// Only tops at least this high count as the goal place, metres; 0 for no condition.
+    /// Classes of the places that targets may be brought to in this kind of scene; only the one
+    /// that they are brought to where the goal place is granted.
+    pub goal_places: Vec<ClassId>,
+    /// Only tops at least this high count as the goal place, metres; 0 for no condition, or where
+    /// the goal place is not granted.
     pub goal_place_min_top_m: f32,
-    /// How near to the goal place something must be released to count, metres from the middle of
-    /// its top.
-    pub delivery_radius_m: f32,
     /// Objects that one container or basket holds.
     pub container_capacity: u32,
     /// What has been granted beyond own images and state.

@@ -27,7 +27,7 @@ pub mod observation;
 
 pub mod rng;
 
-pub use action::{Action, FailureReason, Hand, Outcome};
+pub use action::{Action, FailureReason, Hand, Outcome, ResolvedAction, Target};
 pub use agent::Agent;
 pub use briefing::Briefing;
 pub use catalogue::{ClassInfo, Role};

@@ -1,11 +1,9 @@
 //! What an agent perceives when it is asked.
 
-use std::sync::Arc;
-
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::action::{Action, Outcome};
+use crate::action::{Action, Outcome, ResolvedAction};
 use crate::briefing::Goal;
 use crate::geom::{Camera, Pose};
 use crate::ids::{AgentId, ClassId, EntityId, Frame};
@@ -39,8 +37,14 @@ impl Senses {
 /// What an agent is given beyond its own images and state. Written into every trace.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Grants {
-    /// Instance ids of its image with their classes: perfect segmentation and association.
+    /// Instance ids of its own image, with the classes of the ids in that image; which thing each
+    /// hand holds; which things in the image are delivered. Perfect segmentation and association,
+    /// and nothing of what is not in the image.
     pub ids: bool,
+    /// The goal place: its class and the least height of its top. The paper's prompts and the
+    /// original's planners have it; it is no part of the hidden goal.
+    #[serde(default)]
+    pub goal_place: bool,
     /// The partner's goal.
     pub goal: bool,
     /// What has been delivered, wherever the agent is.
@@ -64,6 +68,7 @@ impl Grants {
     /// Nothing beyond own images and state: the `hidden` track proper.
     pub const NONE: Grants = Grants {
         ids: false,
+        goal_place: false,
         goal: false,
         progress: false,
         behavior: false,
@@ -72,17 +77,31 @@ impl Grants {
     };
     /// Perfect segmentation of the own image, nothing else.
     pub const IDS: Grants = Grants { ids: true, ..Grants::NONE };
-    /// What a partner has: perfect segmentation and its own goal.
-    pub const PARTNER: Grants = Grants { goal: true, ..Grants::IDS };
+    /// What the paper's planners stand on: perfect segmentation and the goal place.
+    pub const PLANNER: Grants = Grants { goal_place: true, ..Grants::IDS };
+    /// What a partner has: perfect segmentation, the goal place and its own goal.
+    pub const PARTNER: Grants = Grants { goal: true, ..Grants::PLANNER };
     /// What the paper's oracle has.
     pub const ORACLE: Grants = Grants { progress: true, behavior: true, ..Grants::PARTNER };
     /// What the child has.
     pub const CHILD: Grants = Grants { positions: true, ..Grants::IDS };
 }
 
-/// One object in a hand, with what it contains.
+/// Something in a hand, as the hand feels it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Held {
+    /// How many things are in it; 0 for anything but containers and vehicles.
+    pub n_contents: u32,
+    /// Whether both hands hold this one thing: furniture.
+    pub in_both_hands: bool,
+    /// Which thing it is; only where ids are granted. Otherwise an agent knows what it saw itself
+    /// take.
+    pub identity: Option<Identity>,
+}
+
+/// Which thing something is, with what it contains.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Identity {
     /// The object.
     pub entity: EntityId,
     /// Its class.
@@ -99,7 +118,9 @@ pub struct SelfState {
     /// What the left and the right hand hold. A rider's left hand holds the bicycle, whose
     /// contents are the basket's. Furniture is held by both: it appears in both.
     pub hands: [Option<Held>; 2],
-    /// The action that has just ended, with its outcome; `None` at the start.
+    /// The action that has just ended, its object named as the agent named it, with its outcome.
+    /// `None` at the start, and after an action that another one's choice replaced by a joint lift
+    /// (original's rules), unless ids are granted.
     pub last: Option<(Action, Outcome)>,
 }
 
@@ -107,7 +128,7 @@ impl SelfState {
     /// The distinct things held.
     pub fn held(&self) -> impl Iterator<Item = &Held> {
         let [left, right] = &self.hands;
-        let same = matches!((left, right), (Some(l), Some(r)) if l.entity == r.entity);
+        let same = left.as_ref().is_some_and(|l| l.in_both_hands);
         left.iter().chain(right.iter().filter(move |_| !same))
     }
 }
@@ -133,7 +154,7 @@ pub struct SeenAction {
     /// When it ended (or began, if under way).
     pub frame: Frame,
     /// What it was.
-    pub action: Action,
+    pub action: ResolvedAction,
     /// How it ended; `None` while under way.
     pub outcome: Option<Outcome>,
 }
@@ -141,14 +162,21 @@ pub struct SeenAction {
 /// What was granted beyond the own image and state; every field is empty without its grant.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Granted {
-    /// `ids`: class of every entity of the episode, indexed by [`EntityId`]; shared, constant.
-    pub classes: Option<Arc<Vec<Option<ClassId>>>>,
+    /// `ids`: the class of each object and person in the own image, in the order of ids. Structure
+    /// has none.
+    pub classes: Vec<(EntityId, ClassId)>,
+    /// `ids`: what is delivered among the things in the own image; `progress`: all that is
+    /// delivered, wanted or not, wherever the agent is. In the order of ids.
+    pub delivered: Vec<(EntityId, ClassId)>,
+    /// `ids`: the obstacles that have been removed, where the rules tell everybody of them (the
+    /// original's do).
+    pub removed: Vec<EntityId>,
     /// `goal`: what the partner wants.
     pub goal: Option<Goal>,
     /// `behavior`: what the others did last other than moving about, if they are in the image.
     pub behavior: Vec<SeenAction>,
     /// `behavior`: what the partner (for the partner: the helper) holds, if in the image.
-    pub partner_hands: Option<[Option<Held>; 2]>,
+    pub partner_hands: Option<[Option<Identity>; 2]>,
     /// `positions`: where everybody is, by agent.
     pub poses: Vec<(AgentId, Pose)>,
 }
@@ -164,13 +192,16 @@ pub struct Observation {
     pub camera: Camera,
     /// What the eye sees.
     pub images: Images,
-    /// Everything delivered so far, wanted or not, if the goal place is in view or near (or
-    /// progress is granted); otherwise `None`.
-    pub delivered: Option<Vec<EntityId>>,
-    /// The obstacles that have been removed, where the rules tell everybody of them.
-    pub removed: Vec<EntityId>,
     /// What was granted beyond that.
     pub granted: Granted,
+}
+
+impl Granted {
+    /// The class of an id of the own image; needs the grant of ids.
+    pub fn class_of(&self, entity: EntityId) -> Option<ClassId> {
+        let at = self.classes.binary_search_by_key(&entity, |(e, _)| *e).ok()?;
+        Some(self.classes[at].1)
+    }
 }
 
 impl Observation {

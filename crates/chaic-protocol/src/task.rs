@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::capability::Persona;
 use crate::catalogue::TargetSet;
-use crate::ids::Frame;
+use crate::ids::{ClassId, Frame};
 
 /// Names a task, everywhere and in this spelling.
 #[derive(
@@ -67,6 +67,9 @@ pub struct TaskInfo {
     pub horizon: Frame,
     /// The target sets that the goal is drawn from.
     pub sets: &'static [TargetSet],
+    /// Names of the classes that the goal place may have (paper, appendix on task generation; the
+    /// high goal places are those of the original's episodes).
+    pub goal_places: &'static [&'static str],
 }
 
 const INDOOR: &[TargetSet] =
@@ -78,6 +81,7 @@ const fn indoor(
     title: &'static str,
     original_name: &'static str,
     partner: Persona,
+    goal_places: &'static [&'static str],
 ) -> TaskInfo {
     TaskInfo {
         id,
@@ -89,23 +93,28 @@ const fn indoor(
         has_child: false,
         horizon: 3000,
         sets: INDOOR,
+        goal_places,
     }
 }
 
+const BED: &[&str] = &["bed"];
+const HIGH: &[&str] = &["cabinet", "refrigerator"];
+
 /// The tasks in the order of the paper's result table.
 pub static TASKS: [TaskInfo; 8] = [
-    indoor(TaskId::NoConstraint, "no_constraint", "No constraint", "normal", Persona::Adult),
-    indoor(TaskId::HighTarget, "high_target", "High target", "highthing", Persona::Child),
+    indoor(TaskId::NoConstraint, "no_constraint", "No constraint", "normal", Persona::Adult, BED),
+    indoor(TaskId::HighTarget, "high_target", "High target", "highthing", Persona::Child, BED),
     indoor(
         TaskId::HighContainer,
         "high_container",
         "High container",
         "highcontainer",
         Persona::Child,
+        BED,
     ),
-    indoor(TaskId::HighGoal, "high_goal", "High goal", "highgoalplace", Persona::Child),
-    indoor(TaskId::LowTarget, "low_target", "Low target", "lowthing", Persona::Wheelchair),
-    indoor(TaskId::Obstacle, "obstacle", "Obstacle", "wheelchair", Persona::Wheelchair),
+    indoor(TaskId::HighGoal, "high_goal", "High goal", "highgoalplace", Persona::Child, HIGH),
+    indoor(TaskId::LowTarget, "low_target", "Low target", "lowthing", Persona::Wheelchair, BED),
+    indoor(TaskId::Obstacle, "obstacle", "Obstacle", "wheelchair", Persona::Wheelchair, BED),
     TaskInfo {
         id: TaskId::Shopping,
         name: "shopping",
@@ -116,6 +125,7 @@ pub static TASKS: [TaskInfo; 8] = [
         has_child: true,
         horizon: 3000,
         sets: &[TargetSet::ShopFruit, TargetSet::ShopBakery, TargetSet::ShopDrinks],
+        goal_places: &["fire_hydrant"],
     },
     TaskInfo {
         id: TaskId::MovingHouse,
@@ -127,6 +137,7 @@ pub static TASKS: [TaskInfo; 8] = [
         has_child: false,
         horizon: 1500,
         sets: &[TargetSet::Furniture],
+        goal_places: &["truck"],
     },
 ];
 
@@ -150,6 +161,15 @@ impl TaskId {
 impl fmt::Display for TaskId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
+    }
+}
+
+impl SceneKind {
+    /// Classes that the goal place may have in some task of this kind of scene, in the catalogue's
+    /// order.
+    pub fn goal_places(self) -> Vec<ClassId> {
+        let tasks = || TASKS.iter().filter(|t| t.scene == self);
+        ClassId::all().filter(|c| tasks().any(|t| t.goal_places.contains(&c.name()))).collect()
     }
 }
 

@@ -1,6 +1,6 @@
 //! What happens, one record per happening.
 
-use chaic_protocol::{Action, AgentId, EntityId, Frame, Outcome};
+use chaic_protocol::{AgentId, EntityId, Frame, Outcome, ResolvedAction};
 use serde::{Deserialize, Serialize};
 
 /// Something that happened.
@@ -22,14 +22,14 @@ pub enum EventKind {
         /// Who.
         agent: AgentId,
         /// What.
-        action: Action,
+        action: ResolvedAction,
     },
     /// An agent's action ended.
     Ended {
         /// Who.
         agent: AgentId,
         /// What.
-        action: Action,
+        action: ResolvedAction,
         /// How.
         outcome: Outcome,
     },

@@ -2,7 +2,7 @@
 
 use chaic_protocol::action::{FailureReason, Hand};
 use chaic_protocol::geom::Pose;
-use chaic_protocol::{Action, AgentId, EntityId, Frame, Outcome, Quat, Vec3};
+use chaic_protocol::{AgentId, EntityId, Frame, Outcome, Quat, ResolvedAction, Vec3};
 use serde::{Deserialize, Serialize};
 
 /// Everything that changes during an episode.
@@ -86,9 +86,9 @@ pub struct PersonState {
     /// What this person is doing; `None` while it waits to be asked.
     pub activity: Option<Activity>,
     /// The last action with its outcome.
-    pub last: Option<(Action, Outcome)>,
+    pub last: Option<(ResolvedAction, Outcome)>,
     /// The last action other than moving and waiting, for onlookers: when it ended, and how.
-    pub last_deed: Option<(Frame, Action, Outcome)>,
+    pub last_deed: Option<(Frame, ResolvedAction, Outcome)>,
     /// Whether the legs are still moving from the last frame.
     pub in_stride: bool,
     /// Distance walked so far, metres; legs and wheels turn by it.
@@ -117,7 +117,7 @@ impl PersonState {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Activity {
     /// The action.
-    pub action: Action,
+    pub action: ResolvedAction,
     /// When it began.
     pub since: Frame,
     /// What is being done right now.

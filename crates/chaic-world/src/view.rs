@@ -1,16 +1,14 @@
 //! What agents are told and can see of themselves, and how bodies look to others.
 
-use std::sync::Arc;
-
 use chaic_protocol::action::Hand;
 use chaic_protocol::briefing::{Briefing, Companion, Relation, Told};
 use chaic_protocol::capability::Gait;
 use chaic_protocol::catalogue::{CLASSES, Role};
 use chaic_protocol::geom::{Camera, rotate_yaw, yaw_rotation};
-use chaic_protocol::observation::{Granted, Grants, Held, SeenAction, SelfState};
+use chaic_protocol::observation::{Granted, Grants, Held, Identity, SeenAction, SelfState};
 use chaic_protocol::rng::Stream;
 use chaic_protocol::task::SceneKind;
-use chaic_protocol::{AgentId, ClassId, EntityId, Vec3};
+use chaic_protocol::{Action, AgentId, ClassId, EntityId, Outcome, ResolvedAction, Vec3};
 
 use crate::posture::{Arm, Posture};
 use crate::state::{Phase, Place};
@@ -47,9 +45,11 @@ impl World {
                 offered && c.info().role == Role::Container && scene != SceneKind::Yard
             }),
             obstacles: classes(&|c| c.info().role == Role::Obstacle && scene == SceneKind::House),
-            goal_place: self.thing(self.setup.goal_places[0]).0.class,
-            goal_place_min_top_m: self.goal_min_top_m(),
-            delivery_radius_m: self.delivery_radius_m(),
+            goal_places: match grants.goal_place {
+                true => vec![self.thing(self.setup.goal_places[0]).0.class],
+                false => scene.goal_places(),
+            },
+            goal_place_min_top_m: if grants.goal_place { self.goal_min_top_m() } else { 0.0 },
             container_capacity: self.rules.container_capacity,
             grants,
             goal: grants.goal.then(|| self.setup.goal.clone()),
@@ -63,34 +63,56 @@ impl World {
         Told { task, partner }
     }
 
-    /// What an agent knows of itself.
-    pub fn own_state(&self, agent: AgentId) -> SelfState {
-        let person = self.person(agent);
-        SelfState { pose: person.pose, hands: self.hands(agent), last: person.last }
-    }
-
-    /// What is granted to an agent beyond its own images and state, now. `partner_in_view` is
-    /// whether the partner is in the agent's image.
-    pub fn granted(
+    /// What an agent feels and knows of itself. `last` is its last action in its own words;
+    /// `grants.ids` lets it know what its hands hold.
+    pub fn own_state(
         &self,
         agent: AgentId,
         grants: Grants,
-        classes: &Arc<Vec<Option<ClassId>>>,
-        in_view: &dyn Fn(AgentId) -> bool,
-    ) -> Granted {
+        last: Option<(Action, Outcome)>,
+    ) -> SelfState {
+        let in_both_hands = self.holds_furniture(agent).is_some();
+        let hands = self.person(agent).hands.map(|held| {
+            held.map(|entity| Held {
+                n_contents: self.contents(entity).len() as u32,
+                in_both_hands,
+                identity: grants.ids.then(|| self.identity(entity)),
+            })
+        });
+        SelfState { pose: self.person(agent).pose, hands, last }
+    }
+
+    /// The action of an agent that ended last, with its outcome.
+    pub fn last_action(&self, agent: AgentId) -> Option<(ResolvedAction, Outcome)> {
+        self.person(agent).last
+    }
+
+    /// What is granted to an agent beyond its own images and state, now. `in_view` holds the
+    /// entities of the agent's own image in the order of ids, structure left out.
+    pub fn granted(&self, agent: AgentId, grants: Grants, in_view: &[EntityId]) -> Granted {
         let mut granted = Granted::default();
+        let shows = |entity: EntityId| in_view.binary_search(&entity).is_ok();
         if grants.ids {
-            granted.classes = Some(Arc::clone(classes));
+            let class = |e: &EntityId| Some((*e, self.class_of(*e)?));
+            granted.classes = in_view.iter().filter_map(class).collect();
+            granted.removed = self.told_removed();
+        }
+        if grants.ids || grants.progress {
+            let all = self.delivered().into_iter();
+            let told = all.filter(|e| grants.progress || shows(*e));
+            granted.delivered = told.map(|e| (e, self.thing(e).0.class)).collect();
         }
         if grants.goal {
             granted.goal = Some(self.setup.goal.clone());
         }
         let mate = if agent == AgentId::PARTNER { AgentId::HELPER } else { AgentId::PARTNER };
         if grants.behavior {
-            for other in self.setup.agents().filter(|a| *a != agent && in_view(*a)) {
+            let is_seen = |a: &AgentId| *a != agent && shows(EntityId::of_agent(*a));
+            for other in self.setup.agents().filter(is_seen) {
                 granted.behavior.extend(self.seen_deed(other));
                 if other == mate {
-                    granted.partner_hands = Some(self.hands(other));
+                    let hands = self.person(other).hands;
+                    granted.partner_hands = Some(hands.map(|h| h.map(|e| self.identity(e))));
                 }
             }
         }
@@ -100,32 +122,24 @@ impl World {
         granted
     }
 
-    /// The class of every entity, indexed by id; constant during an episode.
-    pub fn classes(&self) -> Arc<Vec<Option<ClassId>>> {
-        let n = usize::from(EntityId::FIRST_OBJECT.0) + self.setup.things.len();
-        let mut classes = vec![None; n];
-        let person = ClassId::named("person");
-        for agent in self.setup.agents() {
-            classes[usize::from(EntityId::of_agent(agent).0)] = Some(person);
-        }
-        for (entity, thing) in self.setup.entities().zip(&self.setup.things) {
-            classes[usize::from(entity.0)] = Some(thing.class);
-        }
-        Arc::new(classes)
+    /// The class of an object or person.
+    fn class_of(&self, entity: EntityId) -> Option<ClassId> {
+        let is_person = || entity.agent().is_some_and(|a| a.index() < self.setup.people.len());
+        let person = || is_person().then(|| ClassId::named("person"));
+        self.setup.thing(entity).map(|t| t.class).or_else(person)
     }
 
-    fn hands(&self, agent: AgentId) -> [Option<Held>; 2] {
-        self.person(agent).hands.map(|held| {
-            held.map(|entity| Held {
-                entity,
-                class: self.thing(entity).0.class,
-                contents: self
-                    .contents(entity)
-                    .into_iter()
-                    .map(|e| (e, self.thing(e).0.class))
-                    .collect(),
-            })
-        })
+    /// The class of every entity, indexed by id; constant during an episode. For pictures and
+    /// labels, never for an agent.
+    pub fn classes(&self) -> Vec<Option<ClassId>> {
+        let n = usize::from(EntityId::FIRST_OBJECT.0) + self.setup.things.len();
+        (0..n).map(|i| self.class_of(EntityId(i as u16))).collect()
+    }
+
+    fn identity(&self, entity: EntityId) -> Identity {
+        let class = |e: EntityId| self.thing(e).0.class;
+        let contents = self.contents(entity).into_iter().map(|e| (e, class(e))).collect();
+        Identity { entity, class: class(entity), contents }
     }
 
     fn seen_deed(&self, agent: AgentId) -> Option<SeenAction> {

@@ -6,7 +6,7 @@ use chaic_protocol::capability::{Capability, Gait};
 use chaic_protocol::catalogue::Role;
 use chaic_protocol::geom::{horizontal_distance, yaw_rotation};
 use chaic_protocol::rng::Stream;
-use chaic_protocol::{Action, AgentId, EntityId, Hand, TaskId, Vec3};
+use chaic_protocol::{AgentId, EntityId, Hand, ResolvedAction, TaskId, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::collide::{Body, Disc, Surroundings};
@@ -127,7 +127,7 @@ impl World {
     ///
     /// # Errors
     /// If the agent doesn't exist, is busy, or the episode is over.
-    pub fn submit(&mut self, agent: AgentId, action: Action) -> Result<(), SubmitError> {
+    pub fn submit(&mut self, agent: AgentId, action: ResolvedAction) -> Result<(), SubmitError> {
         if agent.index() >= self.state.people.len() {
             return Err(SubmitError::NoSuchAgent(agent));
         }

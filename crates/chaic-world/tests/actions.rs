@@ -5,11 +5,11 @@ mod common;
 
 use chaic_protocol::action::{Action, FailureReason, Hand, Outcome};
 use chaic_protocol::capability::Persona;
-use chaic_protocol::{AgentId, EntityId, TaskId};
+use chaic_protocol::{AgentId, EntityId, ResolvedAction, TaskId};
 use chaic_world::{EventKind, Place, Snapshot, State, Wall, World};
 use common::*;
 
-fn pick(object: EntityId) -> Action {
+fn pick(object: EntityId) -> ResolvedAction {
     Action::PickUp { object, hand: Hand::Right }
 }
 
@@ -81,11 +81,11 @@ fn impossible_actions_fail_with_a_reason() {
     let people = vec![person(Persona::Adult, 0.0, 0.0), person(Persona::Helper, 1.2, 0.0)];
     let mut w = world(hall(things, people));
     for (action, reason) in [
-        (pick(EntityId(999)), FailureReason::Impossible),
-        (pick(EntityId::WALL), FailureReason::Impossible),
-        (pick(EntityId::of_agent(B)), FailureReason::Impossible),
+        (pick(EntityId(999)), FailureReason::OutOfReach),
+        (pick(EntityId::WALL), FailureReason::OutOfReach),
+        (pick(EntityId::of_agent(B)), FailureReason::OutOfReach),
         (pick(EntityId::FIRST_OBJECT), FailureReason::Impossible),
-        (pick(nth(1)), FailureReason::TooFar),
+        (pick(nth(1)), FailureReason::OutOfReach),
         (Action::PutIn, FailureReason::NotContainerAndTarget),
         (Action::PutOn { place: nth(0), hand: Hand::Left }, FailureReason::HandEmpty),
         (Action::RemoveObstacle { obstacle: nth(0), hand: Hand::Left }, FailureReason::Impossible),
@@ -135,7 +135,7 @@ fn containers_take_three_and_are_lost_on_delivery() {
 }
 
 /// Share of successes over many seeds, with the reason of the failures.
-fn success_rate(make: impl Fn(u64) -> World, action: Action) -> f64 {
+fn success_rate(make: impl Fn(u64) -> World, action: ResolvedAction) -> f64 {
     let n = 400;
     let wins = (0..n).filter(|seed| run(&mut make(*seed), A, action).0.is_success()).count();
     wins as f64 / n as f64

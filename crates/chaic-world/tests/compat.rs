@@ -6,7 +6,7 @@ mod common;
 use chaic_protocol::action::{Action, FailureReason, Hand, Outcome};
 use chaic_protocol::capability::{Capability, Persona};
 use chaic_protocol::observation::Grants;
-use chaic_protocol::{ClassId, EntityId, TaskId};
+use chaic_protocol::{ClassId, EntityId, ResolvedAction, TaskId};
 use chaic_world::{Blocking, Durations, EventKind, JointLift, ReachTo, Rules, Setup, World};
 use common::*;
 
@@ -16,11 +16,11 @@ fn with(rules: Rules, setup: Setup) -> World {
     World::new(setup, rules).expect("the test's setup is valid")
 }
 
-fn pick(object: EntityId) -> Action {
+fn pick(object: EntityId) -> ResolvedAction {
     Action::PickUp { object, hand: Hand::Right }
 }
 
-fn put(place: EntityId) -> Action {
+fn put(place: EntityId) -> ResolvedAction {
     Action::PutOn { place, hand: Hand::Right }
 }
 

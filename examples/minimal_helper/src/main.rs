@@ -14,10 +14,10 @@ use chaic_eval::report::{Format, Report};
 use chaic_eval::rules::PlannerRules;
 use chaic_eval::run::{Access, Given, Run};
 use chaic_protocol::geom::{horizontal_distance, wrap_angle, yaw_towards};
-use chaic_protocol::observation::{Grants, Senses};
+use chaic_protocol::observation::{Grants, Identity, Senses};
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{
-    Action, Agent, Briefing, ClassId, EntityId, Hand, Observation, Outcome, TaskId, Vec3,
+    Action, Agent, Briefing, ClassId, EntityId, Hand, Observation, Outcome, Target, TaskId, Vec3,
 };
 
 /// How near to walk before taking or putting, metres.
@@ -31,7 +31,7 @@ struct Minimal {
     /// What it was told; set by `reset`.
     told: Option<(Briefing, Stream)>,
     /// What it has tried in vain.
-    given_up: Vec<EntityId>,
+    given_up: Vec<Target>,
     /// The way it goes round things: turns left to do.
     detour: u32,
 }
@@ -55,22 +55,24 @@ impl Agent for Minimal {
         let holds = seen.own.held().next().is_some();
         let wanted = |class: ClassId| {
             if holds {
-                class == briefing.goal_place
+                briefing.goal_places.contains(&class)
             } else {
                 briefing.possible_targets.contains(&class)
             }
         };
         let subject = nearest(seen, &wanted, |e| {
-            !self.given_up.contains(&e) && seen.own.held().all(|h| h.entity != e)
+            let holds_it = |k: &Identity| k.entity == e;
+            !self.given_up.contains(&Target::Entity(e))
+                && !seen.own.held().filter_map(|h| h.identity.as_ref()).any(holds_it)
         });
         match subject {
             Some((entity, at)) if horizontal_distance(at, seen.own.pose.position) < NEAR_M => {
                 self.detour = 0;
                 let hand = Hand::Right;
                 if holds {
-                    Action::PutOn { place: entity, hand }
+                    Action::PutOn { place: Target::Entity(entity), hand }
                 } else {
-                    Action::PickUp { object: entity, hand }
+                    Action::PickUp { object: Target::Entity(entity), hand }
                 }
             }
             _ if self.detour > 0 => {
@@ -94,10 +96,9 @@ fn nearest(
     is_open: impl Fn(EntityId) -> bool,
 ) -> Option<(EntityId, Vec3)> {
     let (ids, depth) = (seen.images.ids.as_ref()?, seen.images.depth_m.as_ref()?);
-    let classes = seen.granted.classes.as_ref()?;
     let mut sums = std::collections::BTreeMap::<u16, (Vec3, f32)>::new();
     for (i, (id, depth_m)) in ids.iter().zip(depth).enumerate() {
-        let class = classes.get(usize::from(*id)).copied().flatten();
+        let class = seen.granted.class_of(EntityId(*id));
         if class.is_some_and(wanted) && is_open(EntityId(*id)) {
             let (row, column) = (i as u32 / seen.camera.width, i as u32 % seen.camera.width);
             let sum = sums.entry(*id).or_default();
@@ -136,7 +137,7 @@ impl Helpers for Mine {
 
     fn make(&self, name: &str, _: PlannerRules) -> Option<Helper> {
         (name == "minimal")
-            .then(|| Helper { mind: Box::new(Minimal::default()), grants: Grants::IDS })
+            .then(|| Helper { mind: Box::new(Minimal::default()), grants: Grants::PLANNER })
     }
 }
 

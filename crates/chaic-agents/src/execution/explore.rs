@@ -7,6 +7,7 @@ use chaic_protocol::{Action, Frame, Vec2};
 use super::navigate::{Destination, Nav, Navigator, face};
 use super::path::Reach;
 use crate::memory::{Memory, Space};
+use crate::track::Intent;
 
 /// Borders shorter than this lead nowhere, cells (0.6 m).
 const MIN_FRONTIER: usize = 5;
@@ -41,7 +42,7 @@ struct Target {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Found {
     /// Do this next.
-    Act(Action),
+    Act(Intent),
     /// The border pursued is known now; ask again for the next.
     Resolved,
 }

@@ -5,6 +5,7 @@ use chaic_protocol::{Action, AgentId};
 
 use super::navigate::{Destination, Nav, Navigator, face};
 use crate::memory::Memory;
+use crate::track::Intent;
 
 /// Facing somebody to within this is enough, radians (original facts 1.6: 11.25 degrees).
 const FACING_RAD: f32 = 0.2;
@@ -19,9 +20,9 @@ const SEARCH_TURNS: u32 = 18;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Follow {
     /// Do this next.
-    Act(Action),
+    Act(Intent),
     /// One is near enough: nothing to do but stand.
-    Near(Action),
+    Near(Intent),
     /// Nobody knows where that person is.
     Lost,
 }

@@ -1,12 +1,13 @@
 //! Going to a thing and doing something with it.
 
 use chaic_protocol::geom::xz;
-use chaic_protocol::{Action, Briefing, EntityId, FailureReason, Frame, Outcome, Role, Vec2};
+use chaic_protocol::{Action, Briefing, FailureReason, Frame, Outcome, Role, Vec2};
 
 use super::navigate::{Destination, Nav, Navigator};
-use crate::memory::Memory;
 use crate::memory::semantic::{IGNORE_FRAMES, LIFT_FAILURES, Thing};
+use crate::memory::{Memory, SETTLE_FRAMES};
 use crate::rules::Walking;
+use crate::track::{Intent, TrackId};
 
 /// The arm reaches so far over what an object lies on, metres: less than the world allows to be
 /// on the safe side, and, if no place to stand is found with it, more, as the map is coarse.
@@ -23,8 +24,8 @@ const MAX_STEPS: u32 = 14;
 const UNREACHABLE_FRAMES: Frame = 250;
 /// Something that somebody else had in hand is left alone for so long, frames.
 const HELD_FOR_SURE_FRAMES: Frame = 60;
-/// What was put on the goal place lies still after so long at the latest, frames.
-const SETTLE_FRAMES: Frame = 240;
+/// Whatever is nearer than this by memory, and not within reach, is no longer there, metres.
+const THERE_M: f32 = 2.0;
 /// Something that can't be done at all is left alone for so long, frames.
 const IMPOSSIBLE_FRAMES: Frame = 2000;
 
@@ -32,7 +33,7 @@ const IMPOSSIBLE_FRAMES: Frame = 2000;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Step {
     /// Do this next, on the way.
-    Walk(Action),
+    Walk(Intent),
     /// One stands before it: do the deed.
     There,
     /// It can't be done now.
@@ -66,20 +67,20 @@ impl Interaction {
         Interaction { tried, ..Interaction::default() }
     }
 
-    /// The next step towards `entity`.
+    /// The next step towards `track`.
     pub fn step(
         &mut self,
         memory: &mut Memory,
         navigator: &mut Navigator,
-        entity: EntityId,
+        track: TrackId,
         within_m: f32,
     ) -> Step {
-        let Some(thing) = memory.things.get(entity) else { return Step::GiveUp };
+        let Some(thing) = memory.things.get(track) else { return Step::GiveUp };
         if self.n_tries >= MAX_TRIES {
-            return self.give_up(memory, entity);
+            return self.give_up(memory, track);
         }
         if memory.rules.walking == Walking::Lattice {
-            return self.step_on_lattice(memory, navigator, entity, within_m);
+            return self.step_on_lattice(memory, navigator, track, within_m);
         }
         let is_near = thing.distance_from(memory.here()) < within_m + 0.5;
         let mut destination = destination_at(thing, within_m);
@@ -103,7 +104,7 @@ impl Interaction {
                 }
                 Nav::Arrived => return Step::There,
                 Nav::Unreachable if destination.arm_m.is_some() => self.n_relaxed += 1,
-                Nav::Unreachable => return self.give_up(memory, entity),
+                Nav::Unreachable => return self.give_up(memory, track),
             }
         }
     }
@@ -113,10 +114,10 @@ impl Interaction {
         &mut self,
         memory: &mut Memory,
         navigator: &mut Navigator,
-        entity: EntityId,
+        track: TrackId,
         within_m: f32,
     ) -> Step {
-        let Some(thing) = memory.things.get(entity) else { return Step::GiveUp };
+        let Some(thing) = memory.things.get(track) else { return Step::GiveUp };
         let info = thing.class.info();
         let here = memory.here();
         // The original walks to a fixed point before the truck: its nearest part.
@@ -133,14 +134,14 @@ impl Interaction {
         match navigator.step(memory, &destination) {
             Nav::Act(action) => Step::Walk(action),
             Nav::Arrived => Step::There,
-            Nav::Unreachable => self.give_up(memory, entity),
+            Nav::Unreachable => self.give_up(memory, track),
         }
     }
 
-    fn give_up(&self, memory: &mut Memory, entity: EntityId) -> Step {
+    fn give_up(&self, memory: &mut Memory, track: TrackId) -> Step {
         let until =
             memory.frame + if self.n_tries == 0 { UNREACHABLE_FRAMES } else { IGNORE_FRAMES };
-        memory.things.ignore(entity, until);
+        memory.things.ignore(track, until);
         Step::GiveUp
     }
 }
@@ -163,14 +164,13 @@ fn destination_at(thing: &Thing, within_m: f32) -> Destination {
 pub fn learn(
     memory: &mut Memory,
     briefing: &Briefing,
-    last: (Action, Outcome),
-    held: &[EntityId],
-    holds: &[EntityId],
-    knows_delivered: bool,
+    last: (Intent, Outcome),
+    held: &[TrackId],
+    holds: &[TrackId],
 ) {
     let now = memory.frame;
     let (action, outcome) = last;
-    let released: Vec<EntityId> = held.iter().copied().filter(|e| !holds.contains(e)).collect();
+    let released: Vec<TrackId> = held.iter().copied().filter(|e| !holds.contains(e)).collect();
     match (action, outcome) {
         (Action::PickUp { object, .. }, Outcome::Success) => {
             memory.things.forgive(object);
@@ -186,33 +186,26 @@ pub fn learn(
             learn_failure(memory, object, reason);
         }
         (Action::PutOn { place, .. }, Outcome::Success) => {
-            let is_goal = memory.things.get(place).is_some_and(|t| t.class == briefing.goal_place);
-            if is_goal && !knows_delivered {
-                memory.delivered.extend(released.iter().copied());
-            }
-            for entity in released.iter().copied().filter(|_| is_goal) {
-                if knows_delivered {
-                    // Whether it counts is known as soon as it lies still.
-                    memory.things.ignore(entity, now + SETTLE_FRAMES);
-                } else if memory.class_of(entity).is_none_or(|c| briefing.containers.contains(&c)) {
-                    // Containers are lost on delivery.
-                    memory.things.mark_gone(entity);
-                }
+            let is_goal =
+                memory.things.get(place).is_some_and(|t| briefing.goal_places.contains(&t.class));
+            for track in released.iter().copied().filter(|_| is_goal) {
+                memory.things.ignore(track, now + SETTLE_FRAMES);
+                memory.believe_delivered(track);
             }
         }
         (Action::PutOn { place, .. }, Outcome::Failure(FailureReason::BeyondLimits)) => {
             // It fell: what was not managed once is left alone for a while. The place is not, in
             // the paper's rules.
             memory.things.ignore(place, now + memory.rules.goal_blackout_frames);
-            for entity in released {
-                memory.things.ignore(entity, now + IGNORE_FRAMES);
+            for track in released {
+                memory.things.ignore(track, now + IGNORE_FRAMES);
             }
         }
         _ => {}
     }
 }
 
-fn learn_failure(memory: &mut Memory, object: EntityId, reason: FailureReason) {
+fn learn_failure(memory: &mut Memory, object: TrackId, reason: FailureReason) {
     let now = memory.frame;
     let reason = match reason {
         FailureReason::Broke | FailureReason::OutOfPlay => reason,
@@ -235,8 +228,13 @@ fn learn_failure(memory: &mut Memory, object: EntityId, reason: FailureReason) {
             memory.things.ignore(object, now + HELD_FOR_SURE_FRAMES);
         }
         FailureReason::Impossible => memory.things.ignore(object, now + IMPOSSIBLE_FRAMES),
+        FailureReason::OutOfReach => {
+            let here = memory.here();
+            if memory.things.get(object).is_some_and(|t| t.distance_from(here) < THERE_M) {
+                memory.things.mark_absent(object);
+            }
+        }
         FailureReason::Blocked
-        | FailureReason::TooFar
         | FailureReason::HandFull
         | FailureReason::HandEmpty
         | FailureReason::Full
@@ -253,16 +251,16 @@ mod tests {
     use chaic_protocol::{ClassId, Hand};
 
     /// A memory of a room with one object straight ahead.
-    fn memory_of(class: &str) -> (Memory, Briefing, EntityId) {
+    fn memory_of(class: &str) -> (Memory, Briefing, TrackId) {
         let mut toy = Toy::room(8.0, 8.0);
-        let entity = toy.add(ToyObject::new(class, [0.0, 0.0, -2.5], [0.5, 0.5, 0.5]));
+        let track = toy.add(ToyObject::new(class, [0.0, 0.0, -2.5], [0.5, 0.5, 0.5]));
         toy.stand([0.0, 0.0], 0.0);
         let mut briefing = toy.briefing();
-        briefing.goal_place = ClassId::named(class);
+        briefing.goal_places = vec![ClassId::named(class)];
         let mut memory = Memory::new(&briefing, crate::PlannerRules::paper());
         let observation = toy.observe();
         memory.update(&briefing, &observation, &GroundTruthIds.perceive(&observation));
-        (memory, briefing, entity)
+        (memory, briefing, track)
     }
 
     #[test]
@@ -280,7 +278,7 @@ mod tests {
         ] {
             let (mut memory, briefing, apple) = memory_of("apple");
             let action = Action::PickUp { object: apple, hand: Hand::Left };
-            learn(&mut memory, &briefing, (action, Outcome::Failure(reason)), &[], &[], false);
+            learn(&mut memory, &briefing, (action, Outcome::Failure(reason)), &[], &[]);
             let thing = memory.things.get(apple).expect("seen");
             let got = [0, 300, 500, 2000].map(|frame| thing.is_available(frame));
             assert_eq!(got, expected, "{reason}");
@@ -290,13 +288,13 @@ mod tests {
     #[test]
     fn what_is_put_on_the_goal_place_is_delivered_and_the_place_never_forgotten() {
         let (mut memory, briefing, place) = memory_of("bed");
-        let apple = EntityId(40);
+        let apple = TrackId(40);
         let action = Action::PutOn { place, hand: Hand::Left };
         let failed = Outcome::Failure(FailureReason::BeyondLimits);
-        learn(&mut memory, &briefing, (action, failed), &[apple], &[], false);
+        learn(&mut memory, &briefing, (action, failed), &[apple], &[]);
         assert!(memory.things.get(place).expect("seen").is_available(0));
         assert!(memory.delivered.is_empty());
-        learn(&mut memory, &briefing, (action, Outcome::Success), &[apple], &[], false);
+        learn(&mut memory, &briefing, (action, Outcome::Success), &[apple], &[]);
         assert!(memory.delivered.contains(&apple));
     }
 }

@@ -14,13 +14,13 @@ pub mod sample;
 
 use chaic_protocol::briefing::Relation;
 use chaic_protocol::geom::xz;
-use chaic_protocol::observation::SelfState;
 use chaic_protocol::rng::Stream;
-use chaic_protocol::{Action, Briefing, EntityId, FailureReason, Frame, Hand, Outcome, Role, Vec2};
+use chaic_protocol::{Action, Briefing, FailureReason, Frame, Hand, Outcome, Role, Vec2};
 
 use crate::decision::{Load, Plan};
 use crate::memory::Memory;
 use crate::rules::{Exploration, PlaceChoice, Walking};
+use crate::track::{Intent, TrackId};
 use explore::{EXPLORE_FRAMES, Explorer, Found};
 use follow::{Follow, Follower};
 use interact::{Interaction, Step};
@@ -53,7 +53,7 @@ const LIFTS_TOGETHER: u32 = 8;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
     /// Do this next.
-    Act(Action),
+    Act(Intent),
     /// The plan is carried out.
     Done,
     /// The plan can't be carried out.
@@ -65,8 +65,6 @@ pub enum Progress {
 pub struct Situation<'a> {
     /// What the mind remembers.
     pub memory: &'a mut Memory,
-    /// The own body.
-    pub own: &'a SelfState,
     /// What the mind was told.
     pub briefing: &'a Briefing,
 }
@@ -81,13 +79,13 @@ pub struct Executor {
     follower: Follower,
     interaction: Option<Interaction>,
     /// What could not be done from where, and when.
-    bad_places: Vec<(EntityId, Vec2, Frame)>,
+    bad_places: Vec<(TrackId, Vec2, Frame)>,
     rng: Stream,
     since: Frame,
     n_turns: u32,
     n_lifts: u32,
     near_since: Option<Frame>,
-    place: Option<EntityId>,
+    place: Option<TrackId>,
     /// Whether the last action was the deed that the plan is for.
     has_acted: bool,
 }
@@ -158,7 +156,7 @@ impl Executor {
             self.recovery.stand();
         }
         if !is_standing && s.memory.rules.walking == Walking::Careful {
-            if let Some(action) = self.recovery.step(s.memory, s.own.last, &mut self.rng) {
+            if let Some(action) = self.recovery.step(s.memory, s.memory.last, &mut self.rng) {
                 return Progress::Act(action);
             }
             if self.recovery.is_hopeless() {
@@ -179,10 +177,10 @@ impl Executor {
                 }
             }
             Plan::PickUp(subject) | Plan::PickContainer(subject) => {
-                self.pick(subject.entity, s, false)
+                self.pick(subject.track, s, false)
             }
-            Plan::LiftWith(subject) => self.pick(subject.entity, s, true),
-            Plan::RemoveObstacle(subject) => self.remove(subject.entity, s),
+            Plan::LiftWith(subject) => self.pick(subject.track, s, true),
+            Plan::RemoveObstacle(subject) => self.remove(subject.track, s),
             Plan::PutIn => self.put_in(s),
             Plan::Deliver => self.deliver(s),
             Plan::FollowPartner => self.follow(Relation::Partner, PARTNER_M, s),
@@ -210,17 +208,19 @@ impl Executor {
             | Plan::LiftWith(subject)
             | Plan::RemoveObstacle(subject) => {
                 let until = s.memory.frame + crate::memory::semantic::IGNORE_FRAMES;
-                s.memory.things.ignore(subject.entity, until);
+                s.memory.things.ignore(subject.track, until);
             }
             _ => {}
         }
     }
 
     /// Whether the deed of the plan was just done, and how it ended.
-    fn deed(&mut self, s: &Situation<'_>, subject: EntityId) -> Option<Outcome> {
-        let (action, outcome) = s.own.last?;
+    fn deed(&mut self, s: &Situation<'_>, subject: TrackId) -> Option<Outcome> {
+        let (action, outcome) = s.memory.last?;
         let mine = std::mem::take(&mut self.has_acted) && action.subject() == Some(subject);
-        if mine && let Outcome::Failure(FailureReason::Blocked | FailureReason::TooFar) = outcome {
+        if mine
+            && let Outcome::Failure(FailureReason::Blocked | FailureReason::OutOfReach) = outcome
+        {
             let here = s.memory.here();
             self.bad_places.push((subject, here, s.memory.frame));
             if let Some(interaction) = &mut self.interaction {
@@ -231,18 +231,18 @@ impl Executor {
         mine.then_some(outcome)
     }
 
-    fn pick(&mut self, entity: EntityId, s: &mut Situation<'_>, together: bool) -> Progress {
-        match self.deed(s, entity) {
+    fn pick(&mut self, track: TrackId, s: &mut Situation<'_>, together: bool) -> Progress {
+        match self.deed(s, track) {
             Some(Outcome::Success) => return Progress::Done,
             Some(Outcome::Failure(_)) => self.n_lifts += 1,
             None => {}
         }
-        if s.own.held().any(|h| h.entity == entity) {
+        if s.memory.hands.holds(track) {
             return Progress::Done;
         }
-        let load = Load::of(s.own, s.briefing);
+        let load = Load::of(&s.memory.hands, s.briefing);
         let now = s.memory.frame;
-        let Some(thing) = s.memory.things.get(entity) else { return Progress::Failed };
+        let Some(thing) = s.memory.things.get(track) else { return Progress::Failed };
         let is_heavy = thing.class.info().role == Role::HeavyTarget;
         let ignored = !together && now < thing.ignore_until;
         if !thing.is_present || thing.is_gone || now < thing.held_until || ignored {
@@ -257,35 +257,35 @@ impl Executor {
             return Progress::Failed;
         }
         let hand = if is_heavy { Hand::Left } else { hand };
-        let act = Action::PickUp { object: entity, hand };
-        self.approach(entity, s.memory.rules.pick_within_m, act, s)
+        let act = Action::PickUp { object: track, hand };
+        self.approach(track, s.memory.rules.pick_within_m, act, s)
     }
 
-    fn remove(&mut self, entity: EntityId, s: &mut Situation<'_>) -> Progress {
-        match self.deed(s, entity) {
+    fn remove(&mut self, track: TrackId, s: &mut Situation<'_>) -> Progress {
+        match self.deed(s, track) {
             Some(Outcome::Success) => return Progress::Done,
             Some(Outcome::Failure(_)) | None => {}
         }
         let now = s.memory.frame;
-        let there = s.memory.things.get(entity).is_some_and(|t| t.is_available(now));
-        let (true, Some(hand)) = (there, Load::of(s.own, s.briefing).free_hand) else {
+        let there = s.memory.things.get(track).is_some_and(|t| t.is_available(now));
+        let (true, Some(hand)) = (there, Load::of(&s.memory.hands, s.briefing).free_hand) else {
             return Progress::Failed;
         };
-        let act = Action::RemoveObstacle { obstacle: entity, hand };
-        self.approach(entity, s.memory.rules.pick_within_m, act, s)
+        let act = Action::RemoveObstacle { obstacle: track, hand };
+        self.approach(track, s.memory.rules.pick_within_m, act, s)
     }
 
     fn approach(
         &mut self,
-        entity: EntityId,
+        track: TrackId,
         within_m: f32,
-        act: Action,
+        act: Intent,
         s: &mut Situation<'_>,
     ) -> Progress {
-        let tried = || self.bad_places.iter().filter(|(e, ..)| *e == entity).map(|(_, p, _)| *p);
+        let tried = || self.bad_places.iter().filter(|(e, ..)| *e == track).map(|(_, p, _)| *p);
         let interaction =
             self.interaction.get_or_insert_with(|| Interaction::knowing(tried().collect()));
-        match interaction.step(s.memory, &mut self.navigator, entity, within_m) {
+        match interaction.step(s.memory, &mut self.navigator, track, within_m) {
             Step::Walk(action) => Progress::Act(action),
             Step::There => {
                 self.has_acted = true;
@@ -297,15 +297,17 @@ impl Executor {
 
     fn put_in(&mut self, s: &mut Situation<'_>) -> Progress {
         if std::mem::replace(&mut self.has_acted, true) {
-            let is_done = matches!(s.own.last, Some((Action::PutIn, o)) if o.is_success());
+            let is_done = matches!(s.memory.last, Some((Action::PutIn, o)) if o.is_success());
             return if is_done { Progress::Done } else { Progress::Failed };
         }
-        let can = Load::of(s.own, s.briefing).can_put_in;
+        let can = Load::of(&s.memory.hands, s.briefing).can_put_in;
         if can { Progress::Act(Action::PutIn) } else { Progress::Failed }
     }
 
     fn deliver(&mut self, s: &mut Situation<'_>) -> Progress {
-        let Some(hand) = Load::of(s.own, s.briefing).to_deliver else { return Progress::Done };
+        let Some(hand) = Load::of(&s.memory.hands, s.briefing).to_deliver else {
+            return Progress::Done;
+        };
         if let Some(place) = self.place
             && let Some(Outcome::Failure(FailureReason::Impossible)) = self.deed(s, place)
         {
@@ -318,7 +320,7 @@ impl Executor {
                 PlaceChoice::Nearest => places.first(),
                 PlaceChoice::Random => self.rng.choose(&places),
             };
-            self.place = chosen.map(|(t, _)| t.entity);
+            self.place = chosen.map(|(t, _)| t.track);
         }
         let Some(place) = self.place else { return Progress::Failed };
         let within_m = s.memory.rules.put_within_m;

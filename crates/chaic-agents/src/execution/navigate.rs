@@ -9,6 +9,7 @@ use super::path::Goal;
 use crate::memory::Memory;
 use crate::memory::costs::{CostMap, OCCUPIED};
 use crate::rules::Walking;
+use crate::track::Intent;
 
 /// One turn, radians.
 pub const TURN_RAD: f32 = PI / 12.0;
@@ -160,7 +161,7 @@ impl Goal for Search<'_> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Nav {
     /// Do this next.
-    Act(Action),
+    Act(Intent),
     /// One is there.
     Arrived,
     /// No way is known.
@@ -268,7 +269,7 @@ impl Navigator {
 
 /// Turns or walks so as to get to `target`: of the 24 headings that turns can lead to, takes the
 /// one nearest to the target's direction along which the next step is free.
-fn steer(costs: &CostMap, here: Vec2, yaw: f32, target: Vec2) -> Action {
+fn steer(costs: &CostMap, here: Vec2, yaw: f32, target: Vec2) -> Intent {
     let bearing = yaw_to(here, target);
     let is_free = |heading: f32| {
         let ahead = xz(geom::forward(heading));
@@ -295,7 +296,7 @@ fn steer(costs: &CostMap, here: Vec2, yaw: f32, target: Vec2) -> Action {
     turn_or(best.map_or(nearest.1, |(_, k)| k), Action::MoveForward)
 }
 
-fn turn_or(turns: i32, ahead: Action) -> Action {
+fn turn_or(turns: i32, ahead: Intent) -> Intent {
     match turns {
         0 => ahead,
         1.. => Action::TurnLeft,
@@ -308,7 +309,7 @@ fn yaw_to(from: Vec2, to: Vec2) -> f32 {
 }
 
 /// The turn that faces `target` better, or `None` if one faces it within `tolerance_rad`.
-pub fn face(here: Vec2, yaw: f32, target: Vec2, tolerance_rad: f32) -> Option<Action> {
+pub fn face(here: Vec2, yaw: f32, target: Vec2, tolerance_rad: f32) -> Option<Intent> {
     let error = wrap_angle(yaw_to(here, target) - yaw);
     (error.abs() > tolerance_rad.max(0.5 * TURN_RAD + 1e-3)).then_some(if error > 0.0 {
         Action::TurnLeft

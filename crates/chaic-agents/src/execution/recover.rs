@@ -7,6 +7,7 @@ use chaic_protocol::rng::Stream;
 use chaic_protocol::{Action, FailureReason, Frame, Outcome, Vec2};
 
 use crate::memory::Memory;
+use crate::track::Intent;
 
 /// Decisions over which one should get somewhere.
 const WINDOW: usize = 48;
@@ -28,7 +29,7 @@ const BUMP_AHEAD_M: f32 = 0.12;
 /// Notices being stuck, and gets free.
 #[derive(Clone, Debug, Default)]
 pub struct Recovery {
-    queue: VecDeque<Action>,
+    queue: VecDeque<Intent>,
     n_bumps: u32,
     last_bump: Frame,
     n_waits: u32,
@@ -53,12 +54,12 @@ impl Recovery {
     }
 
     /// An action that has to come before anything else, if any.
-    pub fn step(
+    pub fn step<T: Copy + PartialEq>(
         &mut self,
         memory: &mut Memory,
-        last: Option<(Action, Outcome)>,
+        last: Option<(Action<T>, Outcome)>,
         rng: &mut Stream,
-    ) -> Option<Action> {
+    ) -> Option<Intent> {
         let here = memory.here();
         let blocked = Outcome::Failure(FailureReason::Blocked);
         if last == Some((Action::MoveForward, blocked)) {
@@ -138,7 +139,7 @@ mod tests {
     use super::*;
     use crate::test_support::Toy;
 
-    const BLOCKED: Option<(Action, Outcome)> =
+    const BLOCKED: Option<(Intent, Outcome)> =
         Some((Action::MoveForward, Outcome::Failure(FailureReason::Blocked)));
 
     #[test]
@@ -149,10 +150,10 @@ mod tests {
         let (mut recovery, mut rng) = (Recovery::default(), Stream::new(1, "test", 0));
         let first = recovery.step(&mut memory, BLOCKED, &mut rng).expect("it reacts");
         assert!(matches!(first, Action::TurnLeft | Action::TurnRight));
-        let second = recovery.step(&mut memory, None, &mut rng);
-        let third = recovery.step(&mut memory, None, &mut rng);
+        let second = recovery.step::<()>(&mut memory, None, &mut rng);
+        let third = recovery.step::<()>(&mut memory, None, &mut rng);
         assert_eq!((second, third), (Some(first), Some(Action::MoveForward)));
-        assert_eq!(recovery.step(&mut memory, None, &mut rng), None);
+        assert_eq!(recovery.step::<()>(&mut memory, None, &mut rng), None);
         assert!(memory.map.bumped_cells().count() > 0);
         for _ in 1..HOPELESS_BUMPS {
             assert!(!recovery.is_hopeless());
@@ -168,7 +169,7 @@ mod tests {
         memory.refresh();
         let (mut recovery, mut rng) = (Recovery::default(), Stream::new(1, "test", 0));
         let n = (0..200)
-            .position(|_| recovery.step(&mut memory, None, &mut rng).is_some())
+            .position(|_| recovery.step::<()>(&mut memory, None, &mut rng).is_some())
             .expect("it reacts");
         assert_eq!(n, WINDOW);
     }

@@ -1,6 +1,7 @@
 //! What a mind remembers: the plan of the place, what is where, who was where, what was done.
 
 pub mod grid;
+pub mod hands;
 pub mod occupancy;
 pub mod people;
 pub mod semantic;
@@ -8,15 +9,13 @@ pub mod semantic;
 pub mod costs;
 pub mod lattice_costs;
 
-use std::collections::BTreeSet;
-use std::sync::Arc;
+use std::collections::{BTreeMap, BTreeSet};
 
 use chaic_protocol::briefing::Relation;
 use chaic_protocol::capability::Gait;
 use chaic_protocol::geom::{Pose, horizontal_distance, xz};
-use chaic_protocol::{
-    Action, AgentId, Briefing, ClassId, EntityId, Frame, Observation, Outcome, Vec2, Vec3,
-};
+use chaic_protocol::observation::Grants;
+use chaic_protocol::{AgentId, Briefing, ClassId, Frame, Observation, Outcome, Vec2, Vec3};
 
 pub use grid::{CELL_M, Grid};
 pub use occupancy::{OccupancyMap, Space};
@@ -26,6 +25,7 @@ pub use semantic::{SemanticMap, Thing};
 use crate::execution::path::{Reach, Search};
 use crate::perception::Percepts;
 use crate::rules::{Exploration, PlannerRules, Walking};
+use crate::track::{Hands, Intent, TrackId};
 use costs::CostMap;
 
 /// A top may look this much lower than it is, metres.
@@ -33,13 +33,16 @@ const TOP_TOLERANCE_M: f32 = 0.1;
 /// From this near to a thing it counts as reached when distances are estimated, metres.
 const NEAR_THING_M: f32 = 1.5;
 
+/// What was put on the goal place lies still after so long at the latest, frames.
+pub const SETTLE_FRAMES: Frame = 240;
+
 /// One own action that ended, for the record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Done {
     /// When it had ended.
     pub frame: Frame,
     /// What it was.
-    pub action: Action,
+    pub action: Intent,
     /// How it ended.
     pub outcome: Outcome,
 }
@@ -59,13 +62,20 @@ pub struct Memory {
     pub things: SemanticMap,
     /// Who was where.
     pub people: People,
-    /// What is known to be delivered.
-    pub delivered: BTreeSet<EntityId>,
+    /// What the own hands hold.
+    pub hands: Hands,
+    /// The own action that has just ended; set by the mind before each update.
+    pub last: Option<(Intent, Outcome)>,
+    /// What is known or believed to be delivered.
+    pub delivered: BTreeSet<TrackId>,
+    /// What was put on the goal place and has not been seen there since, and when it was put there.
+    believed: BTreeMap<TrackId, Frame>,
     /// The own actions other than moving about, oldest first.
     pub history: Vec<Done>,
-    classes: Option<Arc<Vec<Option<ClassId>>>>,
+    /// The class of each track that ever came up.
+    classes: BTreeMap<TrackId, ClassId>,
     height_m: f32,
-    goal_place: ClassId,
+    goal_places: Vec<ClassId>,
     goal_place_min_top_m: f32,
     costs: CostMap,
     costs_of: Option<(u32, u32)>,
@@ -89,11 +99,14 @@ impl Memory {
             pose: Pose::default(),
             things: SemanticMap::default(),
             people: People::default(),
+            hands: Hands::default(),
+            last: None,
             delivered: BTreeSet::new(),
+            believed: BTreeMap::new(),
             history: Vec::new(),
-            classes: None,
+            classes: BTreeMap::new(),
             height_m: briefing.capability.height_m,
-            goal_place: briefing.goal_place,
+            goal_places: briefing.goal_places.clone(),
             goal_place_min_top_m: briefing.goal_place_min_top_m,
             search: Search::new(map.grid().n_cells()),
             map,
@@ -110,50 +123,25 @@ impl Memory {
     /// Takes in one observation.
     pub fn update(&mut self, briefing: &Briefing, observation: &Observation, percepts: &Percepts) {
         let before = self.frame;
-        if self.classes.is_none() {
-            self.classes.clone_from(&observation.granted.classes);
-        }
         self.frame = observation.frame;
         self.pose = observation.own.pose;
-        let seen = if self.rules.sees_people(briefing) { &percepts.detections[..] } else { &[] };
+        let detections = &percepts.detections[..];
+        self.classes.extend(detections.iter().map(|d| (d.track, d.class)));
+        let seen = if self.rules.sees_people(briefing) { detections } else { &[] };
         self.people.see(briefing, observation, seen);
         self.people_moved = self.people.iter().any(|p| p.frame + 60 > self.frame);
         let in_view: Vec<Vec3> =
             self.people.iter().filter(|p| p.is_in_view).map(|p| p.position_in_world).collect();
         let hands_at = if self.rules.sees_holding { &in_view[..] } else { &[] };
-        self.things.see(&percepts.detections, hands_at, self.frame);
+        self.things.see(detections, hands_at, self.frame);
         if self.rules.forgets_missing {
             self.things.forget_missing(observation);
         }
         self.things.expire(before, self.frame);
-        for held in observation.own.held() {
-            self.things.mark_absent(held.entity);
-            for (entity, _) in &held.contents {
-                self.things.mark_absent(*entity);
-            }
-        }
-        for hands in observation.granted.partner_hands.iter() {
-            for held in hands.iter().flatten() {
-                self.things.mark_held(held.entity, self.frame + self.rules.held_frames);
-                for (entity, _) in &held.contents {
-                    self.things.mark_held(*entity, self.frame + self.rules.held_frames);
-                }
-            }
-        }
-        for obstacle in &observation.removed {
-            self.things.mark_gone(*obstacle);
-        }
-        if let Some(delivered) = &observation.delivered {
-            for entity in delivered {
-                if self.delivered.insert(*entity) {
-                    self.things.mark_gone(*entity);
-                }
-            }
-        }
-        for entity in &self.delivered {
-            self.things.mark_gone(*entity);
-        }
-        if let Some((action, outcome)) = observation.own.last
+        self.feel(observation, percepts.hands.as_ref());
+        self.take_in_grants(observation);
+        self.settle(percepts, briefing.grants);
+        if let Some((action, outcome)) = self.last
             && action.subject().is_some()
         {
             self.history.push(Done { frame: self.frame, action, outcome });
@@ -162,6 +150,71 @@ impl Memory {
         self.map.integrate(observation, percepts, self.height_m, known_m);
         self.reach = None;
         self.is_stale = true;
+    }
+
+    /// What the own hands hold: as told, or by keeping account.
+    fn feel(&mut self, observation: &Observation, told: Option<&Hands>) {
+        let class_of = |track| self.classes.get(&track).copied();
+        self.hands = match told {
+            Some(hands) => hands.clone(),
+            None => hands::account(&self.hands, &observation.own, self.last, self.gait, class_of),
+        };
+        for (track, class) in self.hands.all() {
+            self.classes.insert(track, class);
+            self.things.mark_absent(track);
+        }
+    }
+
+    /// What was granted beyond the own image and state.
+    fn take_in_grants(&mut self, observation: &Observation) {
+        let granted = &observation.granted;
+        for it in granted.partner_hands.iter().flatten().flatten() {
+            let until = self.frame + self.rules.held_frames;
+            for (entity, class) in std::iter::once(&(it.entity, it.class)).chain(&it.contents) {
+                self.classes.insert((*entity).into(), *class);
+                self.things.mark_held((*entity).into(), until);
+            }
+        }
+        for obstacle in &granted.removed {
+            self.things.mark_gone((*obstacle).into());
+        }
+        for (entity, class) in &granted.delivered {
+            let track = TrackId::from(*entity);
+            self.classes.insert(track, *class);
+            self.delivered.insert(track);
+            self.believed.remove(&track);
+        }
+        for track in &self.delivered {
+            self.things.mark_gone(*track);
+        }
+    }
+
+    /// Takes back what was believed to be delivered and isn't: seen lying still elsewhere, or
+    /// (for whom everything is told) not among what is delivered.
+    fn settle(&mut self, percepts: &Percepts, grants: Grants) {
+        if !(grants.ids || grants.progress) {
+            return;
+        }
+        let now = self.frame;
+        let is_seen = |track| percepts.detections.iter().any(|d| d.track == track);
+        let is_refuted = |(track, since): (&TrackId, &Frame)| {
+            now >= since + SETTLE_FRAMES && (grants.progress || is_seen(*track))
+        };
+        let pending = self.believed.iter().filter(|(t, since)| is_refuted((t, since)));
+        let refuted: Vec<TrackId> = pending.map(|(track, _)| *track).collect();
+        for track in refuted {
+            self.believed.remove(&track);
+            self.delivered.remove(&track);
+            self.things.return_to_play(track);
+        }
+    }
+
+    /// Something was put on the goal place: it is believed to be delivered until seen otherwise.
+    pub fn believe_delivered(&mut self, track: TrackId) {
+        if self.delivered.insert(track) {
+            self.believed.insert(track, self.frame);
+            self.things.mark_gone(track);
+        }
     }
 
     /// Whether its owner waits before obstacles until somebody has cleared them away (original
@@ -217,10 +270,9 @@ impl Memory {
         &self.costs
     }
 
-    /// The class of an object, if it was seen or granted.
-    pub fn class_of(&self, entity: EntityId) -> Option<ClassId> {
-        let granted = || self.classes.as_ref()?.get(usize::from(entity.0)).copied()?;
-        self.things.get(entity).map(|t| t.class).or_else(granted)
+    /// The class of an object, if it was ever seen or told.
+    pub fn class_of(&self, track: TrackId) -> Option<ClassId> {
+        self.classes.get(&track).copied()
     }
 
     /// Where one stands (x, z).
@@ -253,7 +305,7 @@ impl Memory {
         let mut places: Vec<_> = self
             .things
             .iter()
-            .filter(|t| t.class == self.goal_place && t.is_present)
+            .filter(|t| self.goal_places.contains(&t.class) && t.is_present)
             .filter(|t| self.rules.goal_blackout_frames == 0 || self.frame >= t.ignore_until)
             .filter(|t| t.top_m + TOP_TOLERANCE_M >= self.goal_place_min_top_m)
             .filter_map(|t| Some((t, self.way_to(t)?)))

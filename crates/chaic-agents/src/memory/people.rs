@@ -40,7 +40,7 @@ impl People {
             person.is_in_view = false;
         }
         for detection in seen {
-            if let Some(agent) = detection.entity.agent() {
+            if let Some(agent) = detection.person {
                 self.note(agent, detection.position_in_world, observation.frame);
             }
         }

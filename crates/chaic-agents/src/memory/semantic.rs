@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 
 use chaic_protocol::geom::{horizontal_distance, xz};
-use chaic_protocol::{ClassId, EntityId, Frame, Observation, Role, Vec2, Vec3};
+use chaic_protocol::{ClassId, Frame, Observation, Role, Vec2, Vec3};
 
 use crate::perception::Detection;
+use crate::track::TrackId;
 
 /// How long an object is left alone after a failed attempt, frames (original facts 1.1).
 pub const IGNORE_FRAMES: Frame = 500;
@@ -34,7 +35,7 @@ const MAX_FOOTPRINT: usize = 512;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Thing {
     /// Which one it is.
-    pub entity: EntityId,
+    pub track: TrackId,
     /// Its class.
     pub class: ClassId,
     /// Mean of its points when seen last, metres.
@@ -66,7 +67,7 @@ pub struct Thing {
 impl Thing {
     fn new(seen: &Detection, now: Frame) -> Thing {
         Thing {
-            entity: seen.entity,
+            track: seen.track,
             class: seen.class,
             position_in_world: seen.position_in_world,
             bottom_m: seen.bottom_m,
@@ -157,7 +158,7 @@ fn order(a: (f32, f32), b: (f32, f32)) -> std::cmp::Ordering {
 /// Every object seen so far.
 #[derive(Clone, Debug, Default)]
 pub struct SemanticMap {
-    things: BTreeMap<EntityId, Thing>,
+    things: BTreeMap<TrackId, Thing>,
     news: u32,
     layout: u32,
 }
@@ -169,8 +170,8 @@ impl SemanticMap {
     }
 
     /// What is remembered of one object.
-    pub fn get(&self, entity: EntityId) -> Option<&Thing> {
-        self.things.get(&entity)
+    pub fn get(&self, track: TrackId) -> Option<&Thing> {
+        self.things.get(&track)
     }
 
     /// Grows when something comes up that may change a plan: an object seen for the first time,
@@ -192,9 +193,9 @@ impl SemanticMap {
     /// Takes in what is seen now. `people` are the places of the people in the image: what is
     /// between their hands is held.
     pub fn see(&mut self, detections: &[Detection], people: &[Vec3], now: Frame) {
-        for seen in detections.iter().filter(|d| d.entity.is_object()) {
-            let held = looks_held(seen, self.things.get(&seen.entity), people, now);
-            match self.things.get_mut(&seen.entity) {
+        for seen in detections.iter().filter(|d| d.person.is_none()) {
+            let held = looks_held(seen, self.things.get(&seen.track), people, now);
+            match self.things.get_mut(&seen.track) {
                 Some(thing) => {
                     self.news += u32::from(!thing.is_present);
                     self.layout += u32::from(thing.see(seen, now));
@@ -202,10 +203,10 @@ impl SemanticMap {
                 None => {
                     self.news += 1;
                     self.layout += 1;
-                    self.things.insert(seen.entity, Thing::new(seen, now));
+                    self.things.insert(seen.track, Thing::new(seen, now));
                 }
             }
-            if let Some(thing) = self.things.get_mut(&seen.entity) {
+            if let Some(thing) = self.things.get_mut(&seen.track) {
                 if held {
                     thing.held_until = now + HELD_FRAMES;
                 } else if thing.held_until > now {
@@ -257,45 +258,53 @@ impl SemanticMap {
     }
 
     /// After a failed attempt: leaves the object alone for a while.
-    pub fn ignore(&mut self, entity: EntityId, until: Frame) {
-        if let Some(thing) = self.things.get_mut(&entity) {
+    pub fn ignore(&mut self, track: TrackId, until: Frame) {
+        if let Some(thing) = self.things.get_mut(&track) {
             thing.ignore_until = thing.ignore_until.max(until);
         }
     }
 
     /// Counts a failed attempt; the new count.
-    pub fn count_failure(&mut self, entity: EntityId) -> u32 {
-        self.things.get_mut(&entity).map_or(0, |thing| {
+    pub fn count_failure(&mut self, track: TrackId) -> u32 {
+        self.things.get_mut(&track).map_or(0, |thing| {
             thing.failures += 1;
             thing.failures
         })
     }
 
     /// Forgives earlier failures.
-    pub fn forgive(&mut self, entity: EntityId) {
-        if let Some(thing) = self.things.get_mut(&entity) {
+    pub fn forgive(&mut self, track: TrackId) {
+        if let Some(thing) = self.things.get_mut(&track) {
             thing.failures = 0;
         }
     }
 
     /// Somebody else has it, and will have it until then as far as one can tell.
-    pub fn mark_held(&mut self, entity: EntityId, until: Frame) {
-        if let Some(thing) = self.things.get_mut(&entity) {
+    pub fn mark_held(&mut self, track: TrackId, until: Frame) {
+        if let Some(thing) = self.things.get_mut(&track) {
             thing.held_until = until;
         }
     }
 
     /// It is no longer where it was seen (one has taken it oneself, say).
-    pub fn mark_absent(&mut self, entity: EntityId) {
-        if let Some(thing) = self.things.get_mut(&entity) {
+    pub fn mark_absent(&mut self, track: TrackId) {
+        if let Some(thing) = self.things.get_mut(&track) {
             self.layout += u32::from(thing.is_present);
             thing.is_present = false;
         }
     }
 
+    /// It is in play again.
+    pub fn return_to_play(&mut self, track: TrackId) {
+        if let Some(thing) = self.things.get_mut(&track) {
+            thing.is_gone = false;
+            self.news += 1;
+        }
+    }
+
     /// It is out of play.
-    pub fn mark_gone(&mut self, entity: EntityId) {
-        if let Some(thing) = self.things.get_mut(&entity) {
+    pub fn mark_gone(&mut self, track: TrackId) {
+        if let Some(thing) = self.things.get_mut(&track) {
             thing.is_gone = true;
         }
     }

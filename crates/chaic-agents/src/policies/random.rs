@@ -64,29 +64,27 @@ fn is_same_kind(a: &Plan, b: &Plan) -> bool {
 mod tests {
     use super::*;
     use crate::PlannerRules;
+    use crate::TrackId;
     use crate::behavior::BehaviorLog;
     use crate::decision::Subject;
     use crate::memory::Memory;
     use crate::test_support::Toy;
-    use chaic_protocol::observation::SelfState;
-    use chaic_protocol::{ClassId, EntityId};
+    use chaic_protocol::ClassId;
 
     #[test]
     fn drawing_kinds_first_gives_ten_objects_no_more_weight_than_one_plan() {
         let briefing = Toy::room(4.0, 4.0).briefing();
-        let subject = |n| Subject { entity: EntityId(n), class: ClassId::named("apple") };
+        let subject = |n| Subject { track: TrackId(n), class: ClassId::named("apple") };
         let mut valid = vec![Plan::Explore, Plan::TurnAround, Plan::FollowPartner];
         valid.extend((20..29).map(|n| Plan::PickUp(subject(n))));
         for (draw, expected) in [(RandomDraw::Plans, 900), (RandomDraw::KindsFirst, 300)] {
             let rules = PlannerRules { random_draw: draw, ..PlannerRules::paper() };
             let memory = Memory::new(&briefing, rules);
-            let own = SelfState { pose: Default::default(), hands: [None, None], last: None };
             let behavior = BehaviorLog::default();
             let context = Context {
                 briefing: &briefing,
                 memory: &memory,
                 behavior: &behavior,
-                own: &own,
                 is_explored: false,
             };
             let mut random = Random::default();

@@ -2,11 +2,12 @@
 
 use chaic_protocol::briefing::{Goal, Relation};
 use chaic_protocol::geom::horizontal_distance;
-use chaic_protocol::{Action, Briefing, ClassId, EntityId, FailureReason, Frame, Outcome, Role};
+use chaic_protocol::{Action, Briefing, ClassId, FailureReason, Frame, Outcome, Role};
 
 use crate::decision::{Context, Load, Plan, Policy, Subject};
 use crate::memory::{Memory, Person};
 use crate::rules::Bookkeeping;
+use crate::track::TrackId;
 
 /// A plan under way is looked at again after so long, frames.
 const RECONSIDER_FRAMES: Frame = 40;
@@ -169,7 +170,7 @@ impl Rules {
                 Plan::PickUp(subject) => Some(*subject),
                 _ => None,
             })
-            .filter(|s| need.wants(s.class) && there_is_time(context, s.entity))
+            .filter(|s| need.wants(s.class) && there_is_time(context, s.track))
             .collect();
         if self.profile.order == TargetOrder::HeaviestLiftable {
             let strength_kg = context.briefing.capability.strength_kg;
@@ -200,7 +201,7 @@ impl Rules {
         let strength_kg = context.briefing.capability.strength_kg;
         valid.iter().copied().find(|plan| match plan {
             Plan::LiftWith(it) => {
-                it.class.info().mass_kg > strength_kg || in_vain == Some(it.entity)
+                it.class.info().mass_kg > strength_kg || in_vain == Some(it.track)
             }
             _ => false,
         })
@@ -218,7 +219,7 @@ impl Policy for Rules {
         if !std::mem::replace(&mut self.has_looked_around, true) && rules.looks_around_first {
             return Plan::TurnAround;
         }
-        let load = Load::of(context.own, context.briefing);
+        let load = Load::of(&context.memory.hands, context.briefing);
         let need = Need::of(context, &load, &self.profile);
         let is_valid = |plan: Plan| valid.contains(&plan).then_some(plan);
         // Delivering needs a goal place: without one, look for it.
@@ -384,9 +385,9 @@ fn must_go(context: &Context<'_>, profile: &RuleProfile) -> bool {
 
 /// Whether there may be time to fetch an object and bring it to a known goal place: on the
 /// straightest way, at full speed.
-fn there_is_time(context: &Context<'_>, entity: EntityId) -> bool {
+fn there_is_time(context: &Context<'_>, track: TrackId) -> bool {
     let memory = context.memory;
-    let Some(thing) = memory.things.get(entity).filter(|_| memory.rules.weighs_time) else {
+    let Some(thing) = memory.things.get(track).filter(|_| memory.rules.weighs_time) else {
         return true;
     };
     let at = chaic_protocol::geom::xz(thing.position_in_world);

@@ -13,21 +13,22 @@ use crate::execution::{Executor, Progress, Situation};
 use crate::memory::{Done, Memory};
 use crate::perception::{GroundTruthIds, Perception as _};
 use crate::policies::{RuleProfile, Rules};
-use crate::test_support::{Toy, ToyObject, held};
-use chaic_protocol::observation::{Grants, Held, SelfState};
-use chaic_protocol::{Action, ClassId, EntityId, FailureReason, Hand, Outcome};
+use crate::test_support::{Toy, ToyObject, carried, hands};
+use crate::track::{Carried, TrackId};
+use chaic_protocol::observation::Grants;
+use chaic_protocol::{Action, ClassId, FailureReason, Hand, Outcome};
 
 const PAPER: PlannerRules = PlannerRules::paper();
 
-fn subject(class: &str, entity: u16) -> Subject {
-    Subject { entity: EntityId(entity), class: ClassId::named(class) }
+fn subject(class: &str, track: u32) -> Subject {
+    Subject { track: TrackId(track), class: ClassId::named(class) }
 }
 
 /// A choice to make.
 struct Situated {
     memory: Memory,
     briefing: Briefing,
-    hands: [Option<Held>; 2],
+    hands: [Option<Carried>; 2],
     valid: Vec<Plan>,
 }
 
@@ -41,10 +42,6 @@ impl Situated {
         Situated { memory, briefing, hands: [None, None], valid: vec![Plan::Explore] }
     }
 
-    fn own(&self) -> SelfState {
-        SelfState { pose: Default::default(), hands: self.hands.clone(), last: None }
-    }
-
     /// What the partner answers who has (or has not) looked around already.
     fn ask<T>(&self, of: impl Fn(&mut Rules, &Context<'_>) -> T) -> T {
         self.ask_of(&mut Rules::new(RuleProfile::PARTNER), of)
@@ -52,12 +49,13 @@ impl Situated {
 
     /// What this one answers.
     fn ask_of<T>(&self, who: &mut Rules, of: impl Fn(&mut Rules, &Context<'_>) -> T) -> T {
-        let (own, behavior) = (self.own(), BehaviorLog::default());
+        let behavior = BehaviorLog::default();
+        let mut memory = self.memory.clone();
+        memory.hands = hands(self.hands.clone());
         let context = Context {
             briefing: &self.briefing,
-            memory: &self.memory,
+            memory: &memory,
             behavior: &behavior,
-            own: &own,
             is_explored: false,
         };
         of(who, &context)
@@ -84,9 +82,9 @@ impl Situated {
 
     /// What carrying out the same plan comes to next.
     fn go_on(&mut self, executor: &mut Executor, plan: Plan) -> Progress {
-        let own = self.own();
+        self.memory.hands = hands(self.hands.clone());
         let briefing = &self.briefing;
-        executor.step(&plan, &mut Situation { memory: &mut self.memory, own: &own, briefing })
+        executor.step(&plan, &mut Situation { memory: &mut self.memory, briefing })
     }
 
     /// How often one turns when one looks all around.
@@ -145,7 +143,7 @@ fn delivering_once_nothing_is_left_or_only_when_time_is_short() {
     for (delivers_when_done, expected) in [(true, Plan::Deliver), (false, Plan::Explore)] {
         let mut s = Situated::new(PlannerRules { delivers_when_done, ..PAPER });
         s.briefing.goal = Toy::goal(&[("apple", 1)]);
-        s.hands[0] = Some(held("apple", 30, &[]));
+        s.hands[0] = Some(carried("apple", 30, &[]));
         s.valid.push(Plan::Deliver);
         assert_eq!(s.choose(), expected);
         s.memory.frame = s.briefing.horizon * 4 / 5;
@@ -159,13 +157,13 @@ fn a_class_wanted_once_is_dropped_after_the_first_pick_and_no_other_ever() {
         let mut s = Situated::new(PlannerRules { bookkeeping, ..PAPER });
         // Seen and delivered long ago, by oneself.
         let mut toy = Toy::room(8.0, 8.0);
-        let entity = toy.add(ToyObject::new(taken, [0.0, 0.0, -2.5], [0.3, 0.3, 0.3]));
+        let track = toy.add(ToyObject::new(taken, [0.0, 0.0, -2.5], [0.3, 0.3, 0.3]));
         toy.stand([0.0, 0.0], 0.0);
         let observation = toy.observe();
         s.memory.update(&s.briefing, &observation, &GroundTruthIds.perceive(&observation));
-        let action = Action::PickUp { object: entity, hand: Hand::Left };
+        let action = Action::PickUp { object: track, hand: Hand::Left };
         s.memory.history.push(Done { frame: 50, action, outcome: Outcome::Success });
-        s.memory.delivered.extend([entity]);
+        s.memory.delivered.extend([track]);
         s.valid.push(Plan::PickUp(seen));
         s.choose()
     };
@@ -187,7 +185,7 @@ fn there_is_no_time_for_what_is_far_off() {
     for (weighs_time, expected) in [(true, Plan::Explore), (false, apple)] {
         let mut s = Situated::new(PlannerRules { weighs_time, ..PAPER });
         s.briefing.bounds = toy.bounds();
-        s.briefing.goal_place = ClassId::named("bed");
+        s.briefing.goal_places = vec![ClassId::named("bed")];
         s.memory = Memory::new(&s.briefing, s.memory.rules);
         let observation = toy.observe();
         s.memory.update(&s.briefing, &observation, &GroundTruthIds.perceive(&observation));
@@ -199,16 +197,16 @@ fn there_is_no_time_for_what_is_far_off() {
 }
 
 /// A memory in which there is one thing, 2.5 m ahead.
-fn memory_of(class: &str, rules: PlannerRules) -> (Memory, Briefing, EntityId) {
+fn memory_of(class: &str, rules: PlannerRules) -> (Memory, Briefing, TrackId) {
     let mut toy = Toy::room(8.0, 8.0);
-    let entity = toy.add(ToyObject::new(class, [0.0, 0.0, -2.5], [0.5, 0.5, 0.5]));
+    let track = toy.add(ToyObject::new(class, [0.0, 0.0, -2.5], [0.5, 0.5, 0.5]));
     toy.stand([0.0, 0.0], 0.0);
     let mut briefing = toy.briefing();
-    briefing.goal_place = ClassId::named(class);
+    briefing.goal_places = vec![ClassId::named(class)];
     let mut memory = Memory::new(&briefing, rules);
     let observation = toy.observe();
     memory.update(&briefing, &observation, &GroundTruthIds.perceive(&observation));
-    (memory, briefing, entity)
+    (memory, briefing, track)
 }
 
 #[test]
@@ -217,14 +215,14 @@ fn what_is_left_alone_after_a_failure_and_for_how_long() {
     let any = PlannerRules { any_failure_counts: true, ..PAPER };
     let longer = PlannerRules { held_frames: 500, ..PAPER };
     for (rules, reason, from) in [
-        (PAPER, FailureReason::TooFar, 0),
-        (any, FailureReason::TooFar, 500),
+        (PAPER, FailureReason::OutOfReach, 0),
+        (any, FailureReason::OutOfReach, 500),
         (PAPER, FailureReason::HeldByOther, 300),
         (longer, FailureReason::HeldByOther, 500),
     ] {
         let (mut memory, briefing, apple) = memory_of("apple", rules);
         let action = Action::PickUp { object: apple, hand: Hand::Left };
-        learn(&mut memory, &briefing, (action, Outcome::Failure(reason)), &[], &[], false);
+        learn(&mut memory, &briefing, (action, Outcome::Failure(reason)), &[], &[]);
         let thing = memory.things.get(apple).expect("seen");
         assert!(thing.is_available(from), "{reason}");
         assert!(from == 0 || !thing.is_available(from - 1), "{reason}");
@@ -238,7 +236,7 @@ fn the_goal_place_is_forgotten_after_a_vain_put() {
         let (mut memory, briefing, bed) = memory_of("bed", rules);
         let action = Action::PutOn { place: bed, hand: Hand::Left };
         let failed = Outcome::Failure(FailureReason::BeyondLimits);
-        learn(&mut memory, &briefing, (action, failed), &[], &[], false);
+        learn(&mut memory, &briefing, (action, failed), &[], &[]);
         let known = [499, 500].map(|frame| {
             memory.frame = frame;
             memory.goal_places().len()

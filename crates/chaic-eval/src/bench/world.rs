@@ -5,7 +5,7 @@ use std::time::Duration;
 use chaic_episodes::{Split, episodes};
 use chaic_protocol::action::Hand;
 use chaic_protocol::rng::Stream;
-use chaic_protocol::{Action, TaskId};
+use chaic_protocol::{Action, ResolvedAction, TaskId};
 use chaic_world::{Rules, Setup, World};
 use serde::Serialize;
 
@@ -99,7 +99,7 @@ pub fn measure_world(
 
 /// The mix of `benches/world.rs` of `chaic-episodes`: half of all actions are steps, a quarter turns;
 /// the rest are deeds with things of the episode.
-fn random_action(setup: &Setup, luck: &mut Stream) -> Action {
+fn random_action(setup: &Setup, luck: &mut Stream) -> ResolvedAction {
     let hand = if luck.chance(0.5) { Hand::Left } else { Hand::Right };
     let thing = |luck: &mut Stream| Setup::entity(luck.below(setup.things.len()));
     match luck.below(16) {

@@ -3,7 +3,7 @@
 use chaic_agents::{PlannerRules, partners};
 use chaic_protocol::observation::{Grants, Senses};
 use chaic_protocol::rng::Stream;
-use chaic_protocol::{Action, Agent, AgentId, Briefing, Observation};
+use chaic_protocol::{Action, Agent, AgentId, Briefing, Observation, ResolvedAction};
 use chaic_world::{Setup, World};
 
 use crate::helpers::Helper;
@@ -16,6 +16,8 @@ pub struct Actor {
     pub grants: Grants,
     /// What it wants to perceive; known once the episode has begun.
     pub senses: Senses,
+    /// Its last action, as it named it and as it was resolved.
+    pub(super) submitted: Option<(Action, ResolvedAction)>,
 }
 
 /// Everybody, in the order of their ids.
@@ -27,7 +29,7 @@ pub struct Cast {
 impl Actor {
     /// A mind before its first episode.
     pub fn new(mind: Box<dyn Agent>, grants: Grants) -> Actor {
-        Actor { mind, grants, senses: Senses::NONE }
+        Actor { mind, grants, senses: Senses::NONE, submitted: None }
     }
 
     /// Briefs the mind and asks what it wants to perceive.

@@ -1,7 +1,7 @@
 //! The loop that every episode runs through, be it played or played again.
 
 use chaic_protocol::agent::Thought;
-use chaic_protocol::{Action, AgentId};
+use chaic_protocol::{AgentId, ResolvedAction};
 use chaic_world::World;
 
 use crate::digest::Digest;
@@ -14,7 +14,7 @@ pub struct Choice {
     /// Who.
     pub agent: AgentId,
     /// What.
-    pub action: Action,
+    pub action: ResolvedAction,
     /// What it thought, if that changed.
     pub thought: Option<Thought>,
 }

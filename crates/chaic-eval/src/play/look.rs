@@ -1,9 +1,9 @@
-//! What agents perceive when they are about to decide.
+//! What agents perceive when they are about to decide, and what they mean when they answer.
 
 use std::sync::Arc;
 
 use chaic_protocol::observation::{Images, Observation, Senses};
-use chaic_protocol::{AgentId, ClassId, EntityId};
+use chaic_protocol::{Action, AgentId, EntityId, ResolvedAction, Target};
 use chaic_render::{Channels, Scene, View};
 use chaic_world::World;
 
@@ -13,23 +13,44 @@ use crate::play::cast::Actor;
 #[derive(Clone)]
 pub struct Eyes {
     scene: Arc<Scene>,
-    classes: Arc<Vec<Option<ClassId>>>,
-    goal_places: Vec<u16>,
 }
 
-/// What of an image decides over grants.
-#[derive(Clone, Copy, Debug, Default)]
-struct Seen {
-    /// A bit for each agent.
-    agents: u8,
-    goal_place: bool,
+/// What an agent perceives, with what only the environment knows of its image.
+#[derive(Clone, Debug)]
+pub struct Glance {
+    /// What the agent is given.
+    pub observation: Observation,
+    /// Instance ids of its image, u16, shape [height, width], where the agent itself isn't given
+    /// them; they resolve the pixels that it points at.
+    hidden_ids: Option<Vec<u16>>,
+    may_name_entities: bool,
+}
+
+impl Glance {
+    /// The action with its target resolved to what the pixel shows, or to the entity where ids are
+    /// granted; anything else names [`EntityId::NOTHING`].
+    pub fn resolve(&self, action: Action) -> ResolvedAction {
+        action.map(|target| match target {
+            Target::Entity(entity) if self.may_name_entities => entity,
+            Target::Entity(_) => EntityId::NOTHING,
+            Target::Pixel { column, row } => self.at_pixel(column, row),
+        })
+    }
+
+    fn at_pixel(&self, column: u32, row: u32) -> EntityId {
+        let ids = self.hidden_ids.as_ref().or(self.observation.images.ids.as_ref());
+        let (width, height) = (self.observation.camera.width, self.observation.camera.height);
+        let is_inside = column < width && row < height;
+        let index = || row as usize * width as usize + column as usize;
+        let shown = ids.filter(|_| is_inside).and_then(|ids| ids.get(index()));
+        shown.map_or(EntityId::NOTHING, |id| EntityId(*id))
+    }
 }
 
 impl Eyes {
-    /// Eyes for a world.
-    pub fn new(scene: Arc<Scene>, world: &World) -> Eyes {
-        let goal_places = world.setup().goal_places.iter().map(|e| e.0).collect();
-        Eyes { scene, classes: world.classes(), goal_places }
+    /// Eyes for a world with these shapes.
+    pub fn new(scene: Arc<Scene>) -> Eyes {
+        Eyes { scene }
     }
 
     /// The shapes that are seen.
@@ -39,11 +60,11 @@ impl Eyes {
 
     /// What these agents perceive now: images are made for all of them at once, and only those
     /// that are wanted.
-    pub fn observe(&self, world: &World, who: &[(AgentId, &Actor)]) -> Vec<Observation> {
+    pub fn observe(&self, world: &World, who: &[(AgentId, &Actor)]) -> Vec<Glance> {
         let looking: Vec<_> = who.iter().filter(|(_, a)| a.senses.wants_image()).collect();
         let view = |(agent, actor): &&(AgentId, &Actor)| {
             let camera = world.eye(*agent, actor.senses.image_size);
-            // Ids are always made: they tell whether the goal place and the others are in view.
+            // Ids are always made: they resolve what is pointed at, and tell what is in view.
             let channels = Channels { ids: true, ..Channels::from(actor.senses) };
             View::of_eye(*agent, camera, channels)
         };
@@ -57,67 +78,65 @@ impl Eyes {
             .map(|(agent, actor)| {
                 let images = if actor.senses.wants_image() { images.next() } else { None }
                     .unwrap_or_default();
-                self.observation(world, *agent, actor, images)
+                glance(world, *agent, actor, images)
             })
             .collect()
     }
-
-    fn observation(
-        &self,
-        world: &World,
-        agent: AgentId,
-        actor: &Actor,
-        mut images: Images,
-    ) -> Observation {
-        let seen = images.ids.as_deref().map_or(Seen::default(), |ids| self.seen(ids));
-        let Actor { grants, senses, .. } = actor;
-        strip(&mut images, *senses, grants.ids);
-        let in_view = |other: AgentId| seen.agents >> other.0 & 1 == 1;
-        let knows_progress = grants.progress || seen.goal_place || world.is_near_goal(agent);
-        Observation {
-            frame: world.state().frame,
-            own: world.own_state(agent),
-            camera: world.eye(agent, senses.image_size),
-            images,
-            delivered: knows_progress.then(|| world.delivered()),
-            removed: world.told_removed(),
-            granted: world.granted(agent, *grants, &self.classes, &in_view),
-        }
-    }
-
-    fn seen(&self, ids: &[u16]) -> Seen {
-        let mut seen = Seen::default();
-        let mut last = EntityId::NOTHING.0;
-        // Neighboring pixels mostly show the same thing.
-        let is_news = |chunk: &[u16], last| chunk.iter().fold(false, |n, id| n | (*id != last));
-        for chunk in ids.chunks(16) {
-            if !is_news(chunk, last) {
-                continue;
-            }
-            for id in chunk {
-                if *id == last {
-                    continue;
-                }
-                last = *id;
-                if let Some(agent) = EntityId(*id).agent() {
-                    seen.agents |= 1 << agent.0;
-                }
-                seen.goal_place |= self.goal_places.contains(id);
-            }
-        }
-        seen
-    }
 }
 
-/// Takes away what wasn't asked for or isn't granted.
-fn strip(images: &mut Images, senses: Senses, may_have_ids: bool) {
+fn glance(world: &World, agent: AgentId, actor: &Actor, mut images: Images) -> Glance {
+    let Actor { grants, senses, .. } = *actor;
+    let in_view = images.ids.as_deref().map_or(Vec::new(), present);
+    let hidden_ids = strip(&mut images, senses, grants.ids);
+    let observation = Observation {
+        frame: world.state().frame,
+        own: world.own_state(agent, grants, last_action(world, agent, actor)),
+        camera: world.eye(agent, senses.image_size),
+        images,
+        granted: world.granted(agent, grants, &in_view),
+    };
+    Glance { observation, hidden_ids, may_name_entities: grants.ids }
+}
+
+/// The last action of an agent with its outcome, in the agent's own words.
+fn last_action(
+    world: &World,
+    agent: AgentId,
+    actor: &Actor,
+) -> Option<(Action, chaic_protocol::Outcome)> {
+    let (done, outcome) = world.last_action(agent)?;
+    let meant = actor.submitted.filter(|(_, resolved)| *resolved == done).map(|(meant, _)| meant);
+    let told = || actor.grants.ids.then(|| done.map(Target::Entity));
+    Some((meant.or_else(told)?, outcome))
+}
+
+/// The objects and people whose ids an image holds, in the order of ids.
+fn present(ids: &[u16]) -> Vec<EntityId> {
+    let mut is_there = [0_u64; 1 << 10];
+    let mut last = EntityId::NOTHING.0;
+    // Neighboring pixels mostly show the same thing.
+    let is_news = |chunk: &[u16], last| chunk.iter().fold(false, |n, id| n | (*id != last));
+    for chunk in ids.chunks(16) {
+        if !is_news(chunk, last) {
+            continue;
+        }
+        for id in chunk {
+            last = *id;
+            is_there[usize::from(*id >> 6)] |= 1 << (id & 63);
+        }
+    }
+    let set = |id: &u16| is_there[usize::from(id >> 6)] >> (id & 63) & 1 == 1;
+    let named = |e: &EntityId| e.is_object() || e.agent().is_some();
+    (0..=u16::MAX).filter(set).map(EntityId).filter(named).collect()
+}
+
+/// Takes away what wasn't asked for or isn't granted; ids that were taken away.
+fn strip(images: &mut Images, senses: Senses, may_have_ids: bool) -> Option<Vec<u16>> {
     if !senses.rgb {
         images.rgb = None;
     }
     if !senses.depth {
         images.depth_m = None;
     }
-    if !senses.ids || !may_have_ids {
-        images.ids = None;
-    }
+    if senses.ids && may_have_ids { None } else { images.ids.take() }
 }

@@ -6,7 +6,7 @@ mod look;
 
 pub use cast::{Actor, Cast, Minds, cast, world_seed};
 pub use crank::{Choice, Decide, Flow, crank};
-pub use look::Eyes;
+pub use look::{Eyes, Glance};
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -80,7 +80,7 @@ impl Play {
     fn stage(staging: Staging<'_>, setup: Arc<Setup>, mut cast: Cast) -> Result<Play> {
         let world = brief(&staging, &setup, &mut cast)?;
         let header = header(&staging, &setup, &cast);
-        let eyes = Eyes::new(Arc::new(Scene::with_appearance(&setup, staging.appearance)), &world);
+        let eyes = Eyes::new(Arc::new(Scene::with_appearance(&setup, staging.appearance)));
         Ok(Play { world, cast, eyes, header })
     }
 
@@ -129,10 +129,12 @@ impl Play {
                 return Ok(None);
             }
             let wanted: Vec<_> = waiting.iter().map(|a| (*a, &cast.actors[a.index()])).collect();
-            let observations = eyes.observe(world, &wanted);
-            let choices = waiting.iter().zip(observations).map(|(agent, observation)| {
+            let glances = eyes.observe(world, &wanted);
+            let choices = waiting.iter().zip(glances).map(|(agent, glance)| {
                 let actor = &mut cast.actors[agent.index()];
-                let action = actor.mind.act(&observation);
+                let meant = actor.mind.act(&glance.observation);
+                let action = glance.resolve(meant);
+                actor.submitted = Some((meant, action));
                 let thought = Some(actor.mind.thought());
                 let is_news = said[agent.index()] != thought;
                 if is_news {

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use chaic_episodes::Episode;
 use chaic_protocol::agent::Thought;
-use chaic_protocol::{Action, AgentId, EntityId, Frame, Outcome, TaskId};
+use chaic_protocol::{Action, AgentId, EntityId, Frame, Outcome, ResolvedAction, TaskId};
 use chaic_render::{Channels, Scene, View, plan};
 use chaic_world::{EventKind, World};
 use image::RgbImage;
@@ -242,7 +242,7 @@ impl<'a> Replay<'a> {
         Caption { who, action, plan: format!("{}{mood}", thought.plan) }
     }
 
-    fn words(&self, action: &Action) -> String {
+    fn words(&self, action: &ResolvedAction) -> String {
         match *action {
             Action::MoveForward => "walks ahead".to_owned(),
             Action::TurnLeft => "turns left".to_owned(),

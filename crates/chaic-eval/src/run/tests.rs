@@ -37,7 +37,7 @@ impl Agent for Turner {
             0 => Action::PutIn,
             1 => Action::TurnLeft,
             _ => Action::PickUp {
-                object: chaic_protocol::EntityId(9999),
+                object: chaic_protocol::Target::Entity(chaic_protocol::EntityId(9999)),
                 hand: chaic_protocol::Hand::Left,
             },
         }

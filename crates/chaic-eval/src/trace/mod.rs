@@ -24,7 +24,7 @@ use crate::rules::RuleSet;
 /// What the field `format` of a header says.
 pub const FORMAT: &str = "chaic-trace";
 /// The version of the format.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// What was played, under which rules, and what everybody was told.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use chaic_protocol::agent::Thought;
-use chaic_protocol::{Action, AgentId, ClassId, Frame};
+use chaic_protocol::{Action, AgentId, ClassId, Frame, ResolvedAction};
 use chaic_world::{Event, EventKind, World};
 use serde::de::{Error as _, SeqAccess, Visitor};
 use serde::ser::SerializeTuple as _;
@@ -30,8 +30,8 @@ pub struct Decision {
     pub frame: Frame,
     /// Who.
     pub agent: AgentId,
-    /// What.
-    pub action: Action,
+    /// What, its target resolved to an entity.
+    pub action: ResolvedAction,
     /// Digest of the world's state right before the action was submitted.
     pub digest: Digest,
     /// What it thought, if that changed.

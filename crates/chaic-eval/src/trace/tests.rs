@@ -42,7 +42,7 @@ fn records() -> Vec<Record> {
         Record::Decision(Decision { frame, agent, action, digest, thought })
     };
     let thought = Thought { plan: "go to \"apple\" #31\n".to_owned(), mood: Some("x".to_owned()) };
-    let failed = Outcome::Failure(FailureReason::TooFar);
+    let failed = Outcome::Failure(FailureReason::OutOfReach);
     vec![
         decision(0, pick, Some(thought)),
         event(9, EventKind::Ended { agent: AgentId::HELPER, action: pick, outcome: failed }, None),

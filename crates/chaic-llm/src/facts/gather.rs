@@ -1,12 +1,14 @@
 //! Facts from a mind's memory.
 
+use chaic_agents::behavior::SeenInteraction;
 use chaic_agents::decision::{Context, Plan};
 use chaic_agents::memory::{Memory, Thing};
+use chaic_agents::track::Carried;
+use chaic_agents::{Intent, TrackId};
 use chaic_protocol::briefing::Relation;
 use chaic_protocol::capability::{Capability, Gait, Persona};
 use chaic_protocol::geom::{horizontal_distance, xz};
-use chaic_protocol::observation::{Held, SeenAction};
-use chaic_protocol::{Action, AgentId, ClassId, EntityId, Frame, Outcome, Role};
+use chaic_protocol::{Action, AgentId, ClassId, Frame, Outcome, Role};
 
 use super::hands::put_away;
 use super::{
@@ -48,7 +50,7 @@ impl Facts {
         let wanted = briefing.goal.iter().filter(|_| track == Track::Partner);
         let facts = Facts {
             track,
-            goal_place: plain(briefing.goal_place.info().label),
+            goal_place: labels(&briefing.goal_places).join(" or "),
             targets: labels(&briefing.possible_targets),
             containers: labels(&briefing.containers),
             obstacles: labels(&briefing.obstacles),
@@ -98,9 +100,9 @@ pub(super) fn metres(x: f32) -> String {
     if text == "-0.0" { "0.0".to_owned() } else { text }
 }
 
-fn named(entity: EntityId, class: Option<ClassId>) -> String {
+fn named(track: TrackId, class: Option<ClassId>) -> String {
     let label = class.map_or("something".to_owned(), |c| plain(c.info().label));
-    format!("{label} {entity}")
+    format!("{label} {track}")
 }
 
 pub(super) fn reach(capability: &Capability) -> Option<[String; 2]> {
@@ -140,10 +142,12 @@ pub(super) fn persona(persona: Persona) -> String {
     }
 }
 
-fn holding(held: &Held) -> String {
-    let name = named(held.entity, Some(held.class));
-    let inside: Vec<String> = held.contents.iter().map(|(e, c)| named(*e, Some(*c))).collect();
-    let is_holder = matches!(held.class.info().role, Role::Container | Role::Vehicle);
+fn holding(held: &Carried) -> String {
+    let name = held.what.map_or("something".to_owned(), |(t, class)| named(t, Some(class)));
+    let mut inside: Vec<String> = held.contents.iter().map(|(t, c)| named(*t, Some(*c))).collect();
+    inside.resize(held.n_contents as usize, "something".to_owned());
+    let role = held.class().map(|class| class.info().role);
+    let is_holder = matches!(role, Some(Role::Container | Role::Vehicle));
     match (is_holder, inside.is_empty()) {
         (true, true) => format!("{name} with nothing in it"),
         (true, false) => format!("{name} with {} in it", inside.join(", ")),
@@ -152,20 +156,21 @@ fn holding(held: &Held) -> String {
 }
 
 fn own(context: &Context<'_>, last_plan: Option<Plan>, length: Length) -> Own {
-    let Context { memory, own, .. } = *context;
+    let Context { memory, .. } = *context;
+    let hands = &memory.hands;
     let here = memory.here();
     let deeds: Vec<Deed> = memory
         .history
         .iter()
-        .zip(put_away(&memory.history, |entity| memory.class_of(entity)))
+        .zip(put_away(&memory.history, |track| memory.class_of(track)))
         .map(|(done, put)| deed(memory, done.frame, done.action, Some(done.outcome), put))
         .collect();
     let left_out = deeds.len().saturating_sub(length.deeds);
     Own {
         x: metres(here.x),
         z: metres(here.y),
-        hands: own.held().map(holding).collect(),
-        free_hands: own.hands.iter().filter(|h| h.is_none()).count(),
+        hands: hands.held().map(holding).collect(),
+        free_hands: hands.hands.iter().filter(|h| h.is_none()).count(),
         history: deeds[left_out..].to_vec(),
         history_left_out: left_out,
         plan: last_plan.map(|p| plan_text(&p)),
@@ -176,11 +181,11 @@ fn own(context: &Context<'_>, last_plan: Option<Plan>, length: Length) -> Own {
 fn deed(
     memory: &Memory,
     frame: Frame,
-    action: Action,
+    action: Intent,
     outcome: Option<Outcome>,
-    put: Option<EntityId>,
+    put: Option<TrackId>,
 ) -> Deed {
-    let name = |entity| named(entity, memory.class_of(entity));
+    let name = |track| named(track, memory.class_of(track));
     let put = put.map_or("something".to_owned(), name);
     let what = match action {
         Action::PickUp { object, .. } => format!("pick up {}", name(object)),
@@ -217,11 +222,11 @@ fn others(context: &Context<'_>, length: Length) -> Vec<Other> {
         let apart = apart
             .map(|(c, g)| horizontal_distance(c.position_in_world, g.position_in_world))
             .filter(|m| *m > AWAY_M);
-        let took = |list: &[(EntityId, ClassId)]| -> Vec<String> {
+        let took = |list: &[(TrackId, ClassId)]| -> Vec<String> {
             let skip = list.len().saturating_sub(2 * length.deeds);
             list[skip..].iter().map(|(e, c)| named(*e, Some(*c))).collect()
         };
-        let is_told_by_taking = |seen: &&SeenAction| {
+        let is_told_by_taking = |seen: &&SeenInteraction| {
             matches!(seen.action, Action::PickUp { object, .. } if seen.outcome == Some(Outcome::Success)
                 && behavior.partner_took.iter().any(|(e, _)| *e == object))
         };
@@ -264,7 +269,7 @@ fn progress(context: &Context<'_>) -> ProgressFacts {
         }
     }
     let place = |(thing, way_m): &(&Thing, f32)| GoalPlace {
-        name: named(thing.entity, Some(thing.class)),
+        name: named(thing.track, Some(thing.class)),
         x: metres(thing.position_in_world.x),
         z: metres(thing.position_in_world.z),
         way_m: metres(*way_m),
@@ -311,7 +316,7 @@ fn map(context: &Context<'_>, length: Length) -> Map {
         };
         ThingFacts {
             kind: kind(thing.class).flatten(),
-            name: named(thing.entity, Some(thing.class)),
+            name: named(thing.track, Some(thing.class)),
             x: metres(thing.position_in_world.x),
             z: metres(thing.position_in_world.z),
             top_m: metres(thing.top_m),
@@ -324,7 +329,7 @@ fn map(context: &Context<'_>, length: Length) -> Map {
 fn plan_facts(memory: &Memory, plan: &Plan) -> PlanFacts {
     let subject = match plan {
         Plan::PickUp(s) | Plan::PickContainer(s) | Plan::RemoveObstacle(s) | Plan::LiftWith(s) => {
-            memory.things.get(s.entity).and_then(|t| memory.way_to(t))
+            memory.things.get(s.track).and_then(|t| memory.way_to(t))
         }
         Plan::Deliver => memory.goal_places().first().map(|(_, way_m)| *way_m),
         _ => None,

@@ -1,17 +1,18 @@
 //! What somebody put away, from what they did before.
 
+use chaic_agents::TrackId;
 use chaic_agents::memory::Done;
-use chaic_protocol::{Action, ClassId, EntityId, Outcome, Role};
+use chaic_protocol::{Action, ClassId, Outcome, Role};
 
 /// For each of the deeds, the oldest first, what was put down or into a container, where that is
 /// known.
 pub(super) fn put_away(
     history: &[Done],
-    class_of: impl Fn(EntityId) -> Option<ClassId>,
-) -> Vec<Option<EntityId>> {
-    let mut hands: [Option<EntityId>; 2] = [None; 2];
-    let holds = |entity: EntityId| {
-        let role = class_of(entity).map(|class| class.info().role);
+    class_of: impl Fn(TrackId) -> Option<ClassId>,
+) -> Vec<Option<TrackId>> {
+    let mut hands: [Option<TrackId>; 2] = [None; 2];
+    let holds = |track: TrackId| {
+        let role = class_of(track).map(|class| class.info().role);
         matches!(role, Some(Role::Container | Role::Vehicle))
     };
     let put = |done: &Done| {
@@ -41,14 +42,14 @@ mod tests {
 
     #[test]
     fn what_was_put_away_is_what_the_hand_had_taken() {
-        let [apple, plate, bed] = [20, 21, 22].map(EntityId);
+        let [apple, plate, bed] = [20, 21, 22].map(TrackId);
         let class_of = |e| {
             let name = if e == apple { "apple" } else { "plate" };
             (e != bed).then(|| ClassId::named(name))
         };
         let done = |action, outcome| Done { frame: 0, action, outcome };
         let good = Outcome::Success;
-        let failed = Outcome::Failure(chaic_protocol::action::FailureReason::TooFar);
+        let failed = Outcome::Failure(chaic_protocol::action::FailureReason::OutOfReach);
         let take = |hand, object| Action::PickUp { hand, object };
         let put = |hand| Action::PutOn { hand, place: bed };
         let history = [

@@ -256,8 +256,9 @@ pub fn plan_text(plan: &Plan) -> String {
 
 #[cfg(test)]
 mod tests {
+    use chaic_agents::TrackId;
     use chaic_agents::decision::Subject;
-    use chaic_protocol::{ClassId, EntityId};
+    use chaic_protocol::ClassId;
 
     use super::gather::shorten;
     use super::*;
@@ -278,7 +279,7 @@ mod tests {
 
     #[test]
     fn the_nearest_of_each_kind_are_kept() {
-        let it = |n| Subject { entity: EntityId(n), class: ClassId::named("apple") };
+        let it = |n| Subject { track: TrackId(n), class: ClassId::named("apple") };
         let plans = [
             Plan::Explore,
             Plan::PickUp(it(30)),

@@ -10,7 +10,7 @@ mod together;
 use chaic_protocol::action::{FailureReason, Hand};
 use chaic_protocol::catalogue::Role;
 use chaic_protocol::geom::{horizontal_distance, wrap_angle, xz};
-use chaic_protocol::{Action, AgentId, EntityId, Vec3};
+use chaic_protocol::{Action, AgentId, EntityId, ResolvedAction, Vec3};
 
 use crate::event::EventKind;
 use crate::rules::{JointLift, ReachTo};
@@ -19,8 +19,15 @@ use crate::world::World;
 
 impl World {
     /// Begins an action: checks what can be known at once and lays out the steps.
-    pub(crate) fn begin(&mut self, agent: AgentId, action: Action) {
-        let (mut queue, failing) = match self.steps_of(agent, action) {
+    ///
+    /// Reach and sight come first: whatever is not there to be felt or seen fails for one reason
+    /// and in the same time, be it far away, in somebody's hands elsewhere, or nothing at all.
+    pub(crate) fn begin(&mut self, agent: AgentId, action: ResolvedAction) {
+        let steps = match action.subject() {
+            Some(subject) if !self.is_at_hand(agent, subject) => Err(FailureReason::OutOfReach),
+            _ => self.steps_of(agent, action),
+        };
+        let (mut queue, failing) = match steps {
             Ok(queue) => (queue, None),
             Err(reason) => {
                 let is_taking =
@@ -40,7 +47,7 @@ impl World {
     }
 
     /// The first steps of an action, next one last; later ones are added by the judging steps.
-    fn steps_of(&self, agent: AgentId, action: Action) -> Result<Vec<Step>, FailureReason> {
+    fn steps_of(&self, agent: AgentId, action: ResolvedAction) -> Result<Vec<Step>, FailureReason> {
         let d = &self.rules.durations;
         let person = self.person(agent);
         match action {
@@ -61,9 +68,6 @@ impl World {
                 self.check_takeable(agent, object, hand)?;
                 let role = self.thing(object).0.class.info().role;
                 let heavy = role == Role::HeavyTarget;
-                if !heavy {
-                    self.check_near(agent, object)?;
-                }
                 let hand = if heavy {
                     None
                 } else if self.vehicle(agent).is_some() {
@@ -87,16 +91,12 @@ impl World {
                 if self.thing(obstacle).0.class.info().role != Role::Obstacle {
                     return Err(FailureReason::Impossible);
                 }
-                self.check_near(agent, obstacle)?;
                 let judge = Phase::JudgeTake { hand: Some(hand), object: obstacle };
                 let mut steps = vec![Step::of(judge, 0)];
                 self.push_approach(agent, obstacle, &mut steps);
                 Ok(steps)
             }
             Action::PutOn { place, hand } => {
-                if self.setup.thing_index(place).is_none() {
-                    return Err(FailureReason::Impossible);
-                }
                 if self.to_put_down(agent, hand).is_empty() {
                     return Err(FailureReason::HandEmpty);
                 }
@@ -104,9 +104,6 @@ impl World {
                     return Err(FailureReason::Impossible);
                 }
                 let heavy = self.holds_furniture(agent).is_some();
-                if !heavy {
-                    self.check_near(agent, place)?;
-                }
                 let whole = heavy || self.vehicle(agent).is_some();
                 let hand = if whole { None } else { Some(hand) };
                 let mut steps = vec![Step::of(Phase::JudgePut { hand, place }, 0)];
@@ -156,12 +153,24 @@ impl World {
         Step::of(Phase::Stand, self.rules.durations.gap)
     }
 
-    /// Whether a thing may be stepped up to from here (facts of the original, 3.4).
-    fn check_near(&self, agent: AgentId, entity: EntityId) -> Result<(), FailureReason> {
+    /// Whether a thing exists, may be stepped up to from here (facts of the original, 3.4), and is
+    /// not behind a wall where walls count. Furniture that two carry is brought by either of them.
+    fn is_at_hand(&self, agent: AgentId, entity: EntityId) -> bool {
+        if !self.is_visible(entity) {
+            return false;
+        }
         let (thing, state) = self.thing(entity);
-        let limit = self.rules.approach_limit_m + thing.half_longer_side_m();
-        let distance = horizontal_distance(self.person(agent).pose.position, state.position);
-        if distance > limit { Err(FailureReason::TooFar) } else { Ok(()) }
+        let limit_m = self.rules.approach_limit_m + thing.half_longer_side_m();
+        let joint = self.state.joint.filter(|j| j.leader == agent && j.under_way);
+        let near = |a: AgentId| {
+            let from = self.person(a).pose.position;
+            let is_in_sight = |to| !self.wall_between(from, to);
+            horizontal_distance(from, state.position) <= limit_m
+                && (self.rules.reach_to == ReachTo::Middle
+                    || is_in_sight(state.position)
+                    || is_in_sight(self.nearest_point(from, entity)))
+        };
+        near(agent) || joint.is_some_and(|j| near(j.follower))
     }
 
     /// Whether a hand gets at a thing from where its owner stands now.

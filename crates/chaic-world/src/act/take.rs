@@ -11,21 +11,22 @@ use crate::tick::Progress;
 use crate::world::World;
 
 impl World {
-    /// Whether this hand could take this thing, as far as can be said before trying.
+    /// Whether this hand could take this thing, which is at hand, as far as can be said before
+    /// trying.
     pub(super) fn check_takeable(
         &self,
         agent: AgentId,
         object: EntityId,
         hand: Hand,
     ) -> Result<(), FailureReason> {
-        let Some(index) = self.setup.thing_index(object) else {
-            return Err(FailureReason::Impossible);
-        };
-        let (thing, state) = (&self.setup.things[index], &self.state.things[index]);
+        let (thing, state) = self.thing(object);
+        if state.place == Place::Broken {
+            return Err(FailureReason::OutOfReach);
+        }
         if thing.fixed || !thing.class.info().is_movable() {
             return Err(FailureReason::Impossible);
         }
-        if state.delivered.is_some() || state.place == Place::Broken {
+        if state.delivered.is_some() {
             return Err(FailureReason::OutOfPlay);
         }
         let root = self.root(object);
@@ -66,8 +67,8 @@ impl World {
         object: EntityId,
     ) -> Progress {
         let checks = self
-            .check_takeable(agent, object, hand.unwrap_or(Hand::Right))
-            .and_then(|()| self.check_within_reach(agent, object));
+            .check_within_reach(agent, object)
+            .and_then(|()| self.check_takeable(agent, object, hand.unwrap_or(Hand::Right)));
         if let Err(reason) = checks {
             return Progress::Fails(reason);
         }

@@ -3,7 +3,7 @@
 use chaic_protocol::action::FailureReason;
 use chaic_protocol::catalogue::Role;
 use chaic_protocol::geom::{Pose, horizontal_distance};
-use chaic_protocol::{Action, AgentId, EntityId, Vec3};
+use chaic_protocol::{Action, AgentId, EntityId, ResolvedAction, Vec3};
 
 use crate::event::EventKind;
 use crate::state::{Activity, JointCarry, Phase, Step};
@@ -49,7 +49,7 @@ impl World {
 
     /// Somebody chooses a piece of furniture: whoever chose the same piece last drops what it does
     /// and goes there too ([`JointLift::LastChoice`](crate::JointLift)).
-    pub(super) fn call_to_lift(&mut self, agent: AgentId, action: Action) {
+    pub(super) fn call_to_lift(&mut self, agent: AgentId, action: ResolvedAction) {
         let Action::PickUp { object, .. } = action else { return };
         if self.thing(object).0.class.info().role != Role::HeavyTarget {
             return;
@@ -185,6 +185,6 @@ impl World {
     }
 }
 
-fn is_pick_up(action: Action) -> bool {
+fn is_pick_up(action: ResolvedAction) -> bool {
     matches!(action, Action::PickUp { .. })
 }

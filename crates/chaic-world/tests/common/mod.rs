@@ -4,7 +4,7 @@
 use chaic_protocol::briefing::Goal;
 use chaic_protocol::capability::Persona;
 use chaic_protocol::geom::{Pose, Rect};
-use chaic_protocol::{Action, AgentId, ClassId, EntityId, Outcome, TaskId, Vec2, Vec3};
+use chaic_protocol::{AgentId, ClassId, EntityId, Outcome, ResolvedAction, TaskId, Vec2, Vec3};
 use chaic_world::{Event, Person, Rules, Setup, Thing, Wall, World};
 
 /// Agent 0.
@@ -72,7 +72,7 @@ pub fn world(setup: Setup) -> World {
 
 /// Lets `agent` do one action to its end while everybody else waits; returns its outcome and
 /// the frames it took.
-pub fn run(world: &mut World, agent: AgentId, action: Action) -> (Outcome, u32) {
+pub fn run(world: &mut World, agent: AgentId, action: ResolvedAction) -> (Outcome, u32) {
     let began = world.state().frame;
     world.submit(agent, action).expect("the agent is free");
     while world.state().people[agent.index()].activity.is_some() && !world.is_over() {

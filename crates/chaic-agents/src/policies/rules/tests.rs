@@ -2,20 +2,21 @@
 
 use super::*;
 use crate::behavior::BehaviorLog;
+use crate::behavior::SeenInteraction;
 use crate::memory::Memory;
-use crate::test_support::{Toy, held};
-use chaic_protocol::observation::{Held, SeenAction, SelfState};
+use crate::test_support::{Toy, carried, hands};
+use crate::track::Carried;
 use chaic_protocol::{Action, AgentId, Hand};
 
-fn subject(class: &str, entity: u16) -> Subject {
-    Subject { entity: EntityId(entity), class: ClassId::named(class) }
+fn subject(class: &str, track: u32) -> Subject {
+    Subject { track: TrackId(track), class: ClassId::named(class) }
 }
 
 /// One situation and what is to be done in it.
 struct Case {
     what: &'static str,
     frame: Frame,
-    hands: [Option<Held>; 2],
+    hands: [Option<Carried>; 2],
     valid: Vec<Plan>,
     expected: Plan,
 }
@@ -25,14 +26,9 @@ fn choose(profile: RuleProfile, case: &Case, log: &BehaviorLog) -> Plan {
     briefing.goal = Toy::goal(&[("apple", 3), ("banana", 2)]);
     let mut memory = Memory::new(&briefing, crate::PlannerRules::paper());
     memory.frame = case.frame;
-    let own = SelfState { pose: Default::default(), hands: case.hands.clone(), last: None };
-    let context = Context {
-        briefing: &briefing,
-        memory: &memory,
-        behavior: log,
-        own: &own,
-        is_explored: false,
-    };
+    memory.hands = hands(case.hands.clone());
+    let context =
+        Context { briefing: &briefing, memory: &memory, behavior: log, is_explored: false };
     let mut rules = Rules::new(profile);
     rules.has_looked_around = true;
     rules.choose(&context, &case.valid)
@@ -44,7 +40,7 @@ fn the_partner_does_what_the_paper_says() {
     let (apple, orange, banana) =
         (subject("apple", 20), subject("orange", 21), subject("banana", 22));
     let basket = subject("wicker_basket", 23);
-    let hold = |class, n: u16| Some(held(class, n, &[]));
+    let hold = |class, n: u16| Some(carried(class, n, &[]));
     let fruit = ["apple"; 3];
     let cases = [
         Case {
@@ -113,14 +109,14 @@ fn the_partner_does_what_the_paper_says() {
         Case {
             what: "a full basket leaves a hand for one more target",
             frame: 1000,
-            hands: [Some(held("wicker_basket", 41, &fruit[..1])), None],
+            hands: [Some(carried("wicker_basket", 41, &fruit[..1])), None],
             valid: vec![Explore, Deliver, PickUp(banana)],
             expected: PickUp(banana),
         },
         Case {
             what: "enough apples in hand: no more of them",
             frame: 1000,
-            hands: [Some(held("wicker_basket", 41, &fruit)), None],
+            hands: [Some(carried("wicker_basket", 41, &fruit)), None],
             valid: vec![Explore, Deliver, PickUp(apple), PickUp(banana)],
             expected: PickUp(banana),
         },
@@ -173,7 +169,7 @@ fn what_the_partner_holds_is_no_longer_wanted_by_the_oracle() {
     let mut log = BehaviorLog::default();
     assert_eq!(choose(RuleProfile::ORACLE, &case, &log), case.expected);
     let class = ClassId::named("banana");
-    log.partner_holds = vec![(EntityId(60), class), (EntityId(61), class)];
+    log.partner_holds = vec![(TrackId(60), class), (TrackId(61), class)];
     log.partner_holds_frame = Some(1500);
     assert_eq!(choose(RuleProfile::ORACLE, &case, &log), Plan::Explore);
 }
@@ -183,7 +179,7 @@ fn the_oracle_takes_the_heaviest_it_can_lift_and_helps_with_the_rest() {
     let pieces: Vec<Subject> = ClassId::all()
         .filter(|c| c.info().role == Role::HeavyTarget)
         .zip(70..)
-        .map(|(class, n)| Subject { entity: EntityId(n), class })
+        .map(|(class, n)| Subject { track: TrackId(n), class })
         .collect();
     let mass = |s: &Subject| s.class.info().mass_kg;
     let heaviest = pieces
@@ -209,10 +205,10 @@ fn the_oracle_takes_the_heaviest_it_can_lift_and_helps_with_the_rest() {
     let lightest = pieces.iter().min_by(|a, b| mass(a).total_cmp(&mass(b))).expect("some");
     case.valid.push(Plan::LiftWith(*lightest));
     assert!(matches!(choose(profile, &case, &log), Plan::PickUp(_)), "no help called for");
-    log.actions.push(SeenAction {
+    log.actions.push(SeenInteraction {
         agent: AgentId::PARTNER,
         frame: 90,
-        action: Action::PickUp { object: lightest.entity, hand: Hand::Left },
+        action: Action::PickUp { object: lightest.track, hand: Hand::Left },
         outcome: Some(Outcome::Failure(FailureReason::BeyondLimits)),
     });
     assert_eq!(choose(profile, &case, &log), Plan::LiftWith(*lightest));

@@ -3,6 +3,7 @@
 use super::*;
 use crate::helpers::helper_grants;
 use crate::partners::partner_grants;
+use crate::test_support::identity;
 use chaic_protocol::briefing::{Companion, Relation};
 use chaic_protocol::geom::Pose;
 use chaic_protocol::{AgentId, Frame, Vec3};
@@ -47,7 +48,8 @@ fn what_one_is_told_the_other_holds_is_left_alone_for_as_long_as_the_rules_say()
         let mut observation = Toy::room(8.0, 8.0).observe();
         observation.images = Default::default();
         observation.frame = 10;
-        observation.granted.partner_hands = Some([Some(held("apple", apple.0, &[])), None]);
+        observation.granted.partner_hands =
+            Some([Some(identity("apple", apple.0 as u16, &[])), None]);
         memory.update(&briefing, &observation, &GroundTruthIds.perceive(&observation));
         let thing = memory.things.get(apple).expect("seen");
         let until = 10 + held_frames;

@@ -48,7 +48,7 @@ fn of_two_goal_places_the_nearest_is_chosen_or_any() {
         for seed in 0..20 {
             let mut s = Situated::new(PlannerRules { place_choice, ..PAPER });
             s.briefing.seed = seed;
-            s.hands[0] = Some(held("apple", 30, &[]));
+            s.hands[0] = Some(carried("apple", 30, &[]));
             s.look(&toy);
             // Both are within reach of where one stands.
             let progress = s.begin(&mut Executor::new(&s.briefing), Plan::Deliver);
@@ -69,20 +69,20 @@ fn of_two_goal_places_the_nearest_is_chosen_or_any() {
 #[test]
 fn one_picks_up_and_puts_down_from_as_near_as_the_rules_say() {
     for class in ["apple", "bed"] {
-        let (memory, briefing, entity) = memory_of(class, PAPER);
-        let off_m = memory.things.get(entity).expect("seen").distance_from(memory.here());
+        let (memory, briefing, track) = memory_of(class, PAPER);
+        let off_m = memory.things.get(track).expect("seen").distance_from(memory.here());
         let (plan, deed) = match class {
             "apple" => (
-                Plan::PickUp(subject(class, entity.0)),
-                Action::PickUp { object: entity, hand: Hand::Left },
+                Plan::PickUp(subject(class, track.0)),
+                Action::PickUp { object: track, hand: Hand::Left },
             ),
-            _ => (Plan::Deliver, Action::PutOn { place: entity, hand: Hand::Left }),
+            _ => (Plan::Deliver, Action::PutOn { place: track, hand: Hand::Left }),
         };
         let step = |pick_within_m, put_within_m| {
             let mut s = Situated::new(PAPER);
             (s.memory, s.briefing) = (memory.clone(), briefing.clone());
             s.memory.rules = PlannerRules { pick_within_m, put_within_m, ..PAPER };
-            s.hands[0] = (plan == Plan::Deliver).then(|| held("apple", 30, &[]));
+            s.hands[0] = (plan == Plan::Deliver).then(|| carried("apple", 30, &[]));
             s.begin(&mut Executor::new(&briefing), plan)
         };
         // Whether one does it from here; otherwise one goes on.
@@ -113,19 +113,20 @@ fn on_the_lattice_one_goes_to_where_an_object_was_and_a_rider_to_where_the_goal_
         let mut progress = Vec::new();
         for (x, yaw_rad) in [(-3.0, FRAC_PI_2), (3.0, -FRAC_PI_2)] {
             let mut toy = Toy::room(10.0, 10.0);
-            let entity = toy.add(ToyObject::new(class, [x, 0.0, 0.0], [0.3, 0.6, 0.3]));
+            let track = toy.add(ToyObject::new(class, [x, 0.0, 0.0], [0.3, 0.6, 0.3]));
             toy.stand([0.0, 0.0], yaw_rad);
             let observation = toy.observe();
             if executor.is_none() {
-                (s.briefing.bounds, s.briefing.goal_place) = (toy.bounds(), ClassId::named("bed"));
+                (s.briefing.bounds, s.briefing.goal_places) =
+                    (toy.bounds(), vec![ClassId::named("bed")]);
                 s.memory = Memory::new(&s.briefing, s.memory.rules);
             }
             s.memory.update(&s.briefing, &observation, &GroundTruthIds.perceive(&observation));
             let plan = match class {
-                "apple" => Plan::PickUp(subject(class, entity.0)),
+                "apple" => Plan::PickUp(subject(class, track.0)),
                 _ => Plan::Deliver,
             };
-            s.hands[0] = (plan == Plan::Deliver).then(|| held("apple", 90, &[]));
+            s.hands[0] = (plan == Plan::Deliver).then(|| carried("apple", 90, &[]));
             progress.push(match &mut executor {
                 Some(executor) => s.go_on(executor, plan),
                 none => s.begin(none.insert(Executor::new(&s.briefing)), plan),

@@ -4,7 +4,7 @@
 //! [`trace`] records all that happened, [`run`] plays whole benchmarks on several threads and
 //! keeps a journal, [`metrics`] computes the paper's scores from what was recorded, [`report`]
 //! prints them, [`verify`] plays a trace's actions again and compares, [`replay`] and [`still`]
-//! draw what was played, [`scene_file`] writes what there is to draw, [`bench`](mod@bench) measures
+//! draw what was played, [`audit`] shows that what is hidden is hidden, [`scene_file`] writes what there is to draw, [`bench`](mod@bench) measures
 //! how fast this machine draws and steps.
 //!
 //! **What it is not**: it holds no rules of the world, and decides for nobody.
@@ -38,6 +38,8 @@ pub mod replay;
 pub mod scene_file;
 pub mod still;
 pub mod verify;
+
+pub mod audit;
 
 pub mod bench;
 

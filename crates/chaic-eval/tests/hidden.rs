@@ -1,185 +1,180 @@
 //! What is hidden from a helper is hidden: goal and constraint of the partner reach it neither
-//! through its briefing nor through anything it perceives, as long as the partner does nothing that
-//! shows them.
+//! through its briefing nor through anything it perceives, until it sees or feels them itself. An
+//! agent that tries everything learns nothing; and each leak that was ever found, planted again,
+//! is found again.
 
-use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
 use chaic_agents::PlannerRules;
 use chaic_episodes::{Episode, find_episode};
-use chaic_eval::Appearance;
-use chaic_eval::helpers::{BuiltIn, Helpers as _};
-use chaic_eval::play::{Actor, Cast, Play, Staging};
+use chaic_eval::audit::{Finding, Leak, Pair, Partner, Prober, Secret, compare};
+use chaic_eval::helpers::{BuiltIn, Helper, Helpers as _};
 use chaic_eval::rules::RuleSet;
-use chaic_protocol::briefing::Goal;
-use chaic_protocol::capability::Capability;
-use chaic_protocol::observation::{Grants, Senses};
-use chaic_protocol::{Action, Agent, Briefing, ClassId, Observation};
-use chaic_world::Setup;
+use chaic_protocol::observation::{Granted, Grants, Senses};
+use chaic_protocol::{Action, Agent, Briefing, Observation, TaskId};
 
 /// Long enough to explore, to pick up and to deliver.
-const FRAMES: u32 = 1200;
+const FRAMES: u32 = 900;
 
-#[derive(Clone, Debug, Default, PartialEq)]
-struct Seen {
-    briefing: Option<Briefing>,
-    observations: Vec<Observation>,
-    actions: Vec<Action>,
+fn pair(episode: &Episode, secret: Secret, partner: Partner) -> Pair<'_> {
+    let rules = RuleSet::PAPER;
+    Pair { episode, secret, partner, rules, frames: FRAMES, image_size: 48 }
 }
 
-/// Notes all that a mind is told.
-struct Spy {
+fn of_task(task: TaskId) -> Episode {
+    find_episode(&format!("{task}/test/01")).unwrap()
+}
+
+fn built_in(name: &str) -> Helper {
+    BuiltIn.make(name, PlannerRules::paper()).unwrap()
+}
+
+fn prober(episode: &Episode, sees: bool, grants: Grants) -> Helper {
+    let n_things = episode.setup().things.len();
+    Helper { mind: Box::new(Prober::new(sees, n_things)), grants }
+}
+
+/// Every task, with the goal or the constraint changed by turns.
+fn tasks_and_secrets() -> impl Iterator<Item = (TaskId, Secret)> {
+    TaskId::all().enumerate().map(|(k, task)| (task, Secret::ALL[k % 2]))
+}
+
+fn finds_nothing(pair: &Pair<'_>, who: &str, make: &dyn Fn() -> Helper) -> usize {
+    let verdict = compare(pair, make, None).unwrap();
+    let id = pair.episode.id();
+    if let Some(finding) = verdict.finding {
+        panic!("{id}, {who}, {:?}, partner {:?}: {finding}", pair.secret, pair.partner);
+    }
+    verdict.compared
+}
+
+#[test]
+fn the_built_in_helpers_are_told_nothing() {
+    for (k, (task, secret)) in tasks_and_secrets().enumerate() {
+        let episode = of_task(task);
+        let helper = ["rhp", "random", "follow"][k % 3];
+        let acting = pair(&episode, secret, Partner::Acts);
+        finds_nothing(&acting, helper, &|| built_in(helper));
+        let waiting = pair(&episode, secret, Partner::Waits);
+        let n = finds_nothing(&waiting, helper, &|| built_in(helper));
+        assert!(n > 20, "{task}, {helper}: it did something, {n}");
+    }
+}
+
+#[test]
+fn whoever_tries_everything_learns_nothing() {
+    for (k, (task, secret)) in tasks_and_secrets().enumerate() {
+        let episode = of_task(task);
+        for (sees, grants) in [(false, Grants::IDS), (true, [Grants::IDS, Grants::NONE][k % 2])] {
+            let acting = pair(&episode, secret, Partner::Acts);
+            finds_nothing(&acting, "prober", &|| prober(&episode, sees, grants));
+        }
+    }
+}
+
+/// The first pair that finds a planted leak, if any does.
+fn found(leak: Leak) -> Option<Finding> {
+    for (task, secret) in tasks_and_secrets() {
+        let episode = of_task(task);
+        let acting = Pair { frames: 2000, ..pair(&episode, secret, Partner::Acts) };
+        let make = || prober(&episode, false, Grants::IDS);
+        let verdict = compare(&acting, &make, Some(leak)).unwrap();
+        if verdict.finding.is_some() {
+            return verdict.finding;
+        }
+    }
+    None
+}
+
+#[test]
+fn every_leak_that_is_planted_is_found() {
+    for leak in Leak::ALL {
+        assert!(found(leak).is_some(), "{leak:?} goes unnoticed");
+    }
+}
+
+#[test]
+fn what_is_granted_differs() {
+    // The same look finds what an oracle is told: the goal.
+    let episode = of_task(TaskId::HighTarget);
+    let verdict =
+        compare(&pair(&episode, Secret::Goal, Partner::Waits), &|| built_in("oracle"), None);
+    assert!(verdict.unwrap().finding.is_some_and(|f| f.what == "the briefing"));
+    // Of the constraint it is told nothing.
+    finds_nothing(&pair(&episode, Secret::Constraint, Partner::Waits), "oracle", &|| {
+        built_in("oracle")
+    });
+}
+
+/// Checks each observation by a function.
+struct Checker {
     mind: Box<dyn Agent>,
-    seen: Arc<Mutex<Seen>>,
+    check: fn(&Observation, &Mutex<[u32; 3]>),
+    counts: Arc<Mutex<[u32; 3]>>,
 }
 
-impl Agent for Spy {
+impl Agent for Checker {
     fn senses(&self) -> Senses {
-        // Color too: nothing of what is hidden may be painted on anything.
         Senses { rgb: true, ..self.mind.senses() }
     }
 
     fn reset(&mut self, briefing: &Briefing) {
-        self.seen.lock().unwrap().briefing = Some(briefing.clone());
         self.mind.reset(briefing);
     }
 
     fn act(&mut self, observation: &Observation) -> Action {
-        let action = self.mind.act(observation);
-        let mut seen = self.seen.lock().unwrap();
-        seen.observations.push(observation.clone());
-        seen.actions.push(action);
-        action
+        (self.check)(observation, &self.counts);
+        self.mind.act(observation)
     }
 }
 
-/// Stands there.
-struct Waiter;
-
-impl Agent for Waiter {
-    fn senses(&self) -> Senses {
-        Senses::NONE
-    }
-
-    fn reset(&mut self, _: &Briefing) {}
-
-    fn act(&mut self, _: &Observation) -> Action {
-        Action::Wait { frames: 25 }
-    }
-}
-
-fn seen_in(id: &str, helper: &str, grants: Option<Grants>, change: &dyn Fn(&mut Setup)) -> Seen {
-    let mut setup = find_episode(id).unwrap().into_setup();
-    setup.horizon = FRAMES;
-    change(&mut setup);
-    let episode = Episode::new(id, "hidden", None, setup).unwrap();
-    let seen = Arc::new(Mutex::new(Seen::default()));
-    let built_in = BuiltIn.make(helper, PlannerRules::paper()).unwrap();
-    let spy = Spy { mind: built_in.mind, seen: Arc::clone(&seen) };
-    let mut actors = vec![Actor::new(Box::new(Waiter), Grants::PARTNER)];
-    actors.push(Actor::new(Box::new(spy), grants.unwrap_or(built_in.grants)));
-    for _ in 2..episode.setup().people.len() {
-        actors.push(Actor::new(Box::new(Waiter), Grants::NONE));
-    }
-    let rules = RuleSet::PAPER;
-    let (episode, image_size) = (&episode, Some(48));
-    let appearance = Appearance::Canonical;
-    let staging =
-        Staging { episode, seed: 0, rules, helper, partner: None, image_size, appearance };
-    let mut play = Play::with_cast(staging, Cast { actors }).unwrap();
-    assert!(play.run(&AtomicBool::new(false), None, &mut |_| Ok(())).unwrap());
-    let seen = seen.lock().unwrap().clone();
-    assert!(seen.observations.len() > 20, "the helper did something");
-    seen
-}
-
-/// Another goal on the same things: each wanted class is replaced by one that isn't wanted.
-fn other_goal(setup: &mut Setup) {
-    let is_there = |c: ClassId| setup.things.iter().any(|t| t.class == c && !t.fixed);
-    let unwanted = ClassId::all()
-        .find(|c| c.info().is_possible_target() && is_there(*c) && setup.goal.wanted(*c) == 0);
-    match unwanted {
-        Some(class) => setup.goal = Goal { targets: vec![(class, 1)] },
-        // Moving house wants all there is: one less.
-        None => setup.goal.targets.truncate(setup.goal.targets.len() - 1),
-    }
-}
-
-fn other_constraint(setup: &mut Setup) {
-    let own = setup.people[0].capability();
-    setup.people[0].capability = Some(Capability {
-        pick_range_m: [0.0, 3.0],
-        put_range_m: [0.0, 3.0],
-        strength_kg: 600.0,
-        speed_m_per_frame: 0.04,
-        approach_speed_m_per_frame: 0.04,
-        docking_frames: 7,
-        breaks_fragile: !own.breaks_fragile,
-        ..own
-    });
-}
-
-fn check(id: &str, helper: &str) {
-    let as_it_is = seen_in(id, helper, None, &|_| ());
-    for (what, change) in
-        [("goal", &other_goal as &dyn Fn(&mut Setup)), ("constraint", &other_constraint)]
-    {
-        let changed = seen_in(id, helper, None, change);
-        assert_eq!(as_it_is.briefing, changed.briefing, "{id}: the briefing tells the {what}");
-        assert_eq!(as_it_is.actions, changed.actions, "{id}: {helper} acts on the {what}");
-        let same = as_it_is.observations == changed.observations;
-        assert!(same, "{id}: an observation tells the {what}");
-    }
-}
-
-#[test]
-fn a_house_hides_goal_and_constraint() {
-    check("high_target/test/00", "rhp");
-    check("obstacle/test/01", "rhp");
-}
-
-#[test]
-fn a_street_and_a_yard_hide_goal_and_constraint() {
-    check("shopping/test/00", "rhp");
-    check("moving_house/test/00", "rhp");
-}
-
-#[test]
-fn the_same_look_finds_what_is_granted() {
-    let goal_of = |change: &dyn Fn(&mut Setup)| {
-        let seen = seen_in("high_target/test/00", "oracle", None, change);
-        seen.briefing.and_then(|b| b.goal)
+/// What the check counted while `helper` lived with these grants.
+fn checked(
+    task: TaskId,
+    helper: &str,
+    grants: Grants,
+    check: fn(&Observation, &Mutex<[u32; 3]>),
+) -> [u32; 3] {
+    let counts = Arc::new(Mutex::new([0; 3]));
+    let episode = of_task(task);
+    let make = || {
+        let mind = built_in(helper).mind;
+        let mind = Box::new(Checker { mind, check, counts: Arc::clone(&counts) });
+        Helper { mind, grants }
     };
-    assert_ne!(goal_of(&|_| ()), goal_of(&other_goal), "the oracle is told the goal");
+    let pair = Pair { frames: 2000, ..pair(&episode, Secret::Goal, Partner::Acts) };
+    compare(&pair, &make, None).unwrap();
+    let counts = *counts.lock().unwrap();
+    counts
 }
 
 #[test]
 fn without_grants_there_are_images_and_own_state_only() {
-    let seen = seen_in("no_constraint/test/00", "random", Some(Grants::NONE), &|_| ());
-    assert_eq!(seen.briefing.as_ref().and_then(|b| b.goal.clone()), None);
-    for o in &seen.observations {
+    let [n, ..] = checked(TaskId::NoConstraint, "random", Grants::NONE, |o, counts| {
         assert!(o.images.ids.is_none() && o.images.rgb.is_some() && o.images.depth_m.is_some());
-        assert_eq!(o.granted, chaic_protocol::observation::Granted::default());
-    }
+        assert_eq!(o.granted, Granted::default());
+        assert!(o.own.held().all(|held| held.identity.is_none()));
+        counts.lock().unwrap()[0] += 1;
+    });
+    assert!(n > 20, "it was asked {n} times");
 }
 
 #[test]
-fn what_is_delivered_is_known_where_the_goal_place_is_in_view_or_near() {
-    let id = "low_target/test/00";
-    let setup = find_episode(id).unwrap().into_setup();
-    let seen = seen_in(id, "rhp", None, &|_| ());
-    let (mut known, mut unknown) = (0, 0);
-    for o in &seen.observations {
-        let ids = o.images.ids.as_ref().expect("rhp is granted ids");
-        let in_view = setup.goal_places.iter().any(|g| ids.contains(&g.0));
-        let near = setup.goal_places.iter().any(|g| {
-            let place = setup.thing(*g).expect("a goal place is a thing");
-            // Delivery radius: 2 m and half of the longer side.
-            let radius = 2.0 + 0.5 * place.size_m().x.max(place.size_m().z);
-            chaic_protocol::geom::horizontal_distance(place.position, o.own.pose.position) <= radius
+fn the_grant_of_ids_is_about_the_own_image_alone() {
+    let [n, delivered, elsewhere] =
+        checked(TaskId::LowTarget, "rhp", Grants::PLANNER, |o, counts| {
+            let ids = o.images.ids.as_ref().expect("rhp is granted ids");
+            let named = |id: &u16| chaic_protocol::EntityId(*id).is_object();
+            let mut seen: Vec<u16> = ids.iter().copied().filter(named).collect();
+            seen.sort_unstable();
+            seen.dedup();
+            let told: Vec<u16> = o.granted.classes.iter().map(|(e, _)| e.0).filter(named).collect();
+            assert_eq!(told, seen, "frame {}", o.frame);
+            assert!(o.granted.delivered.iter().all(|(e, _)| seen.contains(&e.0)));
+            let mut counts = counts.lock().unwrap();
+            counts[0] += 1;
+            counts[1] += u32::from(!o.granted.delivered.is_empty());
+            counts[2] += u32::from(o.granted.delivered.is_empty());
         });
-        assert_eq!(o.delivered.is_some(), in_view || near, "frame {}", o.frame);
-        *(if in_view || near { &mut known } else { &mut unknown }) += 1;
-    }
-    assert!(known > 0 && unknown > 0, "both occur: {known}, {unknown}");
+    assert!(n > 20 && delivered > 0 && elsewhere > 0, "{n}, {delivered}, {elsewhere}");
 }

@@ -6,7 +6,7 @@ use chaic_protocol::{Action, AgentId};
 use super::navigate::{Destination, Nav, Navigator, face};
 use crate::memory::Memory;
 
-/// Facing somebody to within this is enough, radians (original facts 1.6: 11.25 degrees).
+/// Facing somebody to within this is enough, radians (facts A1.6: 11.25 degrees).
 const FACING_RAD: f32 = 0.2;
 /// How long to stand beside somebody before looking again, frames.
 const STAND_FRAMES: u32 = 3;

@@ -156,7 +156,7 @@ impl World {
         Step::of(Phase::Stand, self.rules.durations.gap)
     }
 
-    /// Whether a thing may be stepped up to from here (facts of the original, 3.4).
+    /// Whether a thing may be stepped up to from here (facts S3.4).
     fn check_near(&self, agent: AgentId, entity: EntityId) -> Result<(), FailureReason> {
         let (thing, state) = self.thing(entity);
         let limit = self.rules.approach_limit_m + thing.half_longer_side_m();

@@ -67,7 +67,7 @@ pub enum RandomDraw {
 pub enum ChildDraws {
     /// By the episode's own luck.
     Seeded,
-    /// By the same draws in every episode, of which the 6th, 14th and 26th are escapes (facts A2.4).
+    /// By the same draws in each episode, of which the 6th, 14th and 26th are escapes (facts A2.4).
     Constant,
 }
 

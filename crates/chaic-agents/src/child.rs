@@ -1,5 +1,5 @@
 //! The child who comes along while shopping: follows, now and then runs away, and comes back when
-//! the helper is near (original facts 2.4).
+//! the helper is near (facts A2.4).
 
 use chaic_protocol::agent::Thought;
 use chaic_protocol::briefing::Relation;

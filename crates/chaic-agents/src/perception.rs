@@ -5,11 +5,11 @@ use chaic_protocol::{AgentId, ClassId, EntityId, Observation, Role, Target, Vec2
 
 use crate::track::{Carried, Hands, TrackId};
 
-/// Fewer pixels than this are no detection (original facts 1.8).
+/// Fewer pixels than this are no detection (facts A1.8).
 pub const MIN_PIXELS: u32 = 5;
 /// Every how many rows and columns large surfaces are looked at.
 pub const STRIDE: u32 = 2;
-/// Points farther than this say nothing of where an object is, metres (original facts 1.1).
+/// Points farther than this say nothing of where an object is, metres (facts A1.1).
 const OBJECT_RANGE_M: f32 = 10.0;
 /// Points higher than this belong to no footprint: nobody bumps into them, metres.
 const FOOTPRINT_HEIGHT_M: f32 = 2.0;

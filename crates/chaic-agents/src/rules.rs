@@ -16,7 +16,7 @@ pub enum Walking {
     /// The original's: 4-connected ways over soft costs, from which nothing is quite impassable;
     /// near enough is near enough as the crow flies; one goes to where an object was when the plan
     /// began; nothing is ever stuck, but obstacles keep the person in the wheelchair turning on
-    /// the spot (facts 1.5, 1.6, 2.1).
+    /// the spot (facts A1.5, A1.6, A2.1).
     Lattice,
 }
 
@@ -26,7 +26,7 @@ pub enum Walking {
 pub enum Exploration {
     /// To the nearest border of the known (paper section 5.1.1).
     Frontier,
-    /// To the cheapest of some hundred random cells within the unknown (facts 1.10).
+    /// To the cheapest of some hundred random cells within the unknown (facts A1.10).
     Sampled,
 }
 
@@ -37,7 +37,7 @@ pub enum Bookkeeping {
     /// What is wanted less what is delivered or held, by anybody.
     Exact,
     /// The partner drops a class of which one is wanted after its own first pick, and no other
-    /// class ever; helpers who know the goal never drop any (facts 2.2).
+    /// class ever; helpers who know the goal never drop any (facts A2.2).
     FirstPick,
 }
 
@@ -47,7 +47,7 @@ pub enum Bookkeeping {
 pub enum PlaceChoice {
     /// The nearest.
     Nearest,
-    /// Any (facts 2.1).
+    /// Any (facts A2.1).
     Random,
 }
 
@@ -57,7 +57,7 @@ pub enum PlaceChoice {
 pub enum RandomDraw {
     /// From all valid plans.
     Plans,
-    /// From the kinds of valid plans, then from those of that kind (facts 2.2).
+    /// From the kinds of valid plans, then from those of that kind (facts A2.2).
     KindsFirst,
 }
 
@@ -67,7 +67,7 @@ pub enum RandomDraw {
 pub enum ChildDraws {
     /// By the episode's own luck.
     Seeded,
-    /// By the same draws in every episode, of which the 6th, 14th and 26th are escapes (facts 2.4).
+    /// By the same draws in each episode, of which the 6th, 14th and 26th are escapes (facts A2.4).
     Constant,
 }
 
@@ -109,7 +109,7 @@ pub struct PlannerRules {
     /// Whether partner and rule-based helpers are told what the other holds while it is in view.
     pub knows_holding: bool,
     /// Whether rule-based helpers perceive people at all: the original's detector has no class for
-    /// them, and its result replaces what the environment would tell (facts 5).
+    /// them, and its result replaces what the environment would tell (facts A5).
     pub helpers_see_people: bool,
     /// How far helpers without perfect segmentation know the place they look at, metres: it moves
     /// what is left to explore.

@@ -1,4 +1,4 @@
-//! The shopping street: six shops along a road, the house at its end (facts 8.1, mirrored in z).
+//! The shopping street: six shops along a road, the house at its end (facts S8.1, mirrored in z).
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -27,7 +27,7 @@ const PAVEMENT_Z: [f32; 2] = [-6.1, 3.9];
 const HYDRANT: [f32; 2] = [2.0, -5.5];
 /// Where shelves stand, from the tent's middle along the road, and towards it.
 const SHELF_OFFSET_M: [f32; 2] = [0.7, 0.5];
-/// The shelf's outdoor size over the catalogue's (facts 8.1 against 9.1).
+/// The shelf's outdoor size over the catalogue's (facts S8.1 against S9.1).
 const SHELF_SCALE: [f32; 3] = [1.25, 1.0, 1.5];
 /// Places of goods along a shelf, metres from its middle.
 const SLOTS_M: [f32; 3] = [0.0, -0.4, 0.4];
@@ -178,7 +178,7 @@ fn on_shelf(shelf: &Thing, class: &str, level: usize, along_m: f32, rng: &mut St
     thing
 }
 
-/// Everything of the episode's category, and one of something else (facts 8.1).
+/// Everything of the episode's category, and one of something else (facts S8.1).
 fn goal(seed: u64, rng: &mut Stream) -> Goal {
     let category = (seed % 3) as usize;
     let stock = |c: usize| SHOPS[2 * c..2 * c + 2].iter().flat_map(|s| s.stock.iter());

@@ -1,5 +1,5 @@
 //! The yard of a house that somebody moves out of: five pieces of furniture and a truck (facts
-//! 9.2 and 12.4, mirrored in z).
+//! S9.2 and S12.4, mirrored in z).
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -29,7 +29,7 @@ const PAVEMENT_Z: [f32; 2] = [-4.6, 3.4];
 const PLACES: Rect = Rect { min: Vec2::new(-1.5, -2.75), max: Vec2::new(5.5, 1.25) };
 const TRUCK: [f32; 2] = [14.0, 0.0];
 const N_PIECES: usize = 5;
-/// From a piece's middle to the others, metres (facts 9.2).
+/// From a piece's middle to the others, metres (facts S9.2).
 const PIECE_CLEAR_M: f32 = 1.25;
 /// From a piece's outline to the others', metres: two pass with a third between them.
 const OUTLINE_CLEAR_M: f32 = 0.5;
@@ -38,7 +38,7 @@ const PERSON_CLEAR_M: f32 = 0.45;
 const PEOPLE_APART_M: f32 = 0.9;
 const TRIES: usize = 200;
 
-/// The line-ups of the original's twelve episodes, the same in train and test (facts 12.4).
+/// The line-ups of the original's twelve episodes, the same in train and test (facts S12.4).
 const LINE_UPS: [[&str; N_PIECES]; 12] = [
     ["microwave", "sofa", "table", "navy_chair", "navy_chair"],
     ["wood_shelving", "piano", "backpack", "backpack", "drawer"],

@@ -234,7 +234,7 @@ fn is_loose(piece: &Piece) -> bool {
 }
 
 /// Whether a piece of the right category is a goal place. Of cabinets and refrigerators only high
-/// ones are, and no doors (facts 11.2).
+/// ones are, and no doors (facts S5.1).
 fn is_goal(task: TaskId, piece: &Piece, furniture: &Thing) -> bool {
     let top_m = furniture.position.y + furniture.size_m().y;
     let is_high = top_m >= Rules::paper().high_goal_min_top_m && !piece.name.contains("door");
@@ -323,7 +323,7 @@ fn recorded(
             *objects.next().ok_or_else(|| missing("object_height"))?
         };
         let (model, room) = rooms.next().ok_or_else(|| missing("object_room_list"))?;
-        // Names of what was put on the floor are unreliable (facts 12.4), its place is exact.
+        // Names of what was put on the floor are unreliable (facts S12.4), its place is exact.
         let is_sure = object.position.y >= PUT_ON_FLOOR_M;
         if is_sure && *model != object.model {
             let problem = format!("names {model}, expected {} as in the commands", object.model);

@@ -75,7 +75,7 @@ pub enum Steps {
     /// Reasoning and choice in one answer.
     #[default]
     One,
-    /// First the reasoning, then, asked again, the choice (original facts 3.4).
+    /// First the reasoning, then, asked again, the choice (facts A3.4).
     Two,
 }
 
@@ -239,7 +239,7 @@ impl Default for Asking {
             templates: None,
             steps: Steps::One,
             form: Form::Auto,
-            // Original facts 3.4.
+            // Facts A3.4.
             temperature: Some(0.7),
             top_p: Some(1.0),
             seed: None,

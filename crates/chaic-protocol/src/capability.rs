@@ -39,13 +39,13 @@ pub enum Gait {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Capability {
     /// Lowest and highest top of an object that this person picks up without risk of failing,
-    /// metres (paper section 3.1; original facts 1.1).
+    /// metres (paper section 3.1; facts S1.1).
     pub pick_range_m: [f32; 2],
     /// The same for the top of a surface that something is put on, metres.
     pub put_range_m: [f32; 2],
-    /// Heaviest mass lifted without risk of failing, kilograms (original facts 1.1).
+    /// Heaviest mass lifted without risk of failing, kilograms (facts S1.1).
     pub strength_kg: f32,
-    /// Distance covered in a frame of walking, metres (original facts 1.5).
+    /// Distance covered in a frame of walking, metres (facts S1.5).
     pub speed_m_per_frame: f32,
     /// Distance covered in a frame while stepping up to an object that is being picked up or put
     /// somewhere, metres.
@@ -59,17 +59,17 @@ pub struct Capability {
     pub eye_height_m: f32,
     /// Way of moving.
     pub gait: Gait,
-    /// Frames to dock a vehicle before the hands are free, 0 without vehicle (original facts 8.2).
+    /// Frames to dock a vehicle before the hands are free, 0 without vehicle (facts S8.2).
     pub docking_frames: u32,
-    /// Whether fragile things may break in these hands (original facts 6).
+    /// Whether fragile things may break in these hands (facts S6).
     pub breaks_fragile: bool,
 }
 
-/// Heights that everybody without a limit reaches (original facts 1.1).
+/// Heights that everybody without a limit reaches (facts S1.1).
 const FREE_RANGE_M: [f32; 2] = [0.0, 3.0];
-/// Mean of the walk cycle measured on the original's recordings (facts 1.5).
+/// Mean of the walk cycle measured on the original's recordings (facts S1.5).
 const ADULT_SPEED: f32 = 0.047;
-/// The original's child and rider walk at half of it (facts 1.5, measured).
+/// The original's child and rider walk at half of it (facts S1.5, measured).
 const SLOW_SPEED: f32 = 0.0236;
 
 const ADULT: Capability = Capability {
@@ -124,7 +124,7 @@ impl Persona {
                 ..ADULT
             },
             // The original's rider lets go of the bicycle's pace to step up to an object
-            // (facts 8.2): the approach is at an adult's speed.
+            // (facts S8.2): the approach is at an adult's speed.
             Persona::Rider => Capability {
                 speed_m_per_frame: SLOW_SPEED,
                 gait: Gait::WalkBike,

@@ -180,7 +180,7 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// Full angle of view of an agent's eye, 90 degrees (facts of the original, section 10.3).
+    /// Full angle of view of an agent's eye, 90 degrees (facts S10.3).
     pub const EYE_FOV_RAD: f32 = std::f32::consts::FRAC_PI_2;
     /// Nothing nearer than this is seen, metres (original: 0.1).
     pub const NEAR_M: f32 = 0.1;

@@ -12,7 +12,7 @@ const SUNK_M: f32 = 0.02;
 
 impl World {
     /// How near to the middle of a goal place a released thing must come to rest, metres
-    /// (facts of the original, 5.2: the margin plus half of the longer side).
+    /// (facts S5.2: the margin plus half of the longer side).
     pub fn delivery_radius_m(&self) -> f32 {
         let (place, _) = self.thing(self.setup.goal_places[0]);
         self.rules.delivery_margin_m + place.half_longer_side_m()
@@ -65,7 +65,7 @@ impl World {
         })
     }
 
-    /// What one object of a class counts for: 1, or its mass when moving house (facts 5.4).
+    /// What one object of a class counts for: 1, or its mass when moving house (facts S5.4).
     pub fn worth(&self, class: ClassId) -> f64 {
         if self.setup.task == TaskId::MovingHouse { f64::from(class.info().mass_kg) } else { 1.0 }
     }
@@ -99,7 +99,7 @@ impl World {
     }
 
     /// Delivers all that somebody has taken and let go so far, wherever it lies: the original's
-    /// second rule (facts 5.3).
+    /// second rule (facts S5.3).
     pub(crate) fn deliver_all_let_go(&mut self, agent: AgentId) {
         let is_let_go = |e: &EntityId| {
             let (thing, state) = self.thing(*e);

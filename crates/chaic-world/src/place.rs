@@ -63,7 +63,7 @@ impl World {
 
     /// Where furniture is carried: before the body, or between two.
     fn furniture_in_world(&self, agent: AgentId, object: EntityId) -> Vec3 {
-        /// How high its bottom is carried, metres: hands hang at 0.75 (facts of the original, 16.2).
+        /// How high its bottom is carried, metres: hands hang at 0.75 (facts S16.1).
         const CARRY_HEIGHT_M: f32 = 0.45;
         let pose = self.person(agent).pose;
         let depth = self.thing(object).0.size_m().z;

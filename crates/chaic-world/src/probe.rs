@@ -1,5 +1,5 @@
 //! What a walker meets that nothing stops for good ([`Blocking::Creeps`]): a flat box ahead of it
-//! is tested in every frame (facts of the original, 1.5 and 3.3).
+//! is tested in every frame (facts S1.5 and S3.3).
 //!
 //! [`Blocking::Creeps`]: crate::Blocking::Creeps
 
@@ -25,10 +25,10 @@ struct Probe {
     height_m: [f32; 2],
 }
 
-/// A grown-up's (facts 1.5).
+/// A grown-up's (facts S1.5).
 const GROWN_UP: Probe =
     Probe { ahead_m: 0.5, half_width_m: 0.319, half_depth_m: 0.0875, height_m: [0.119, 1.881] };
-/// A child's (facts 1.5).
+/// A child's (facts S1.5).
 const CHILD: Probe =
     Probe { ahead_m: 0.4, half_width_m: 0.139, half_depth_m: 0.0475, height_m: [0.0, 1.081] };
 /// The box is tested as a row of so many upright cylinders as thick as it is deep.

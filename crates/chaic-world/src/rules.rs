@@ -4,7 +4,7 @@
 use chaic_protocol::capability::LimitPenalty;
 use serde::{Deserialize, Serialize};
 
-/// Frames that the parts of actions take (facts of the original, section 2.2, measured on its
+/// Frames that the parts of actions take (facts S2.2, measured on the original's
 /// recordings).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Durations {
@@ -44,7 +44,7 @@ pub enum Blocking {
     Stops,
     /// Nothing stops it for good: a step that meets something ends after one frame, well, and the
     /// next one goes on through. Targets, and in the street tents, shelves, bicycle and goal place
-    /// are not even met (facts 3.3).
+    /// are not even met (facts S3.3).
     Creeps,
 }
 
@@ -55,7 +55,7 @@ pub enum ReachTo {
     /// Its nearest point counts, and no wall may be between.
     NearestPoint,
     /// Its middle counts, walls don't, and putting something somewhere asks for no distance at
-    /// all (facts 3.5 and 3.7).
+    /// all (facts S3.5 and S3.7).
     Middle,
 }
 
@@ -66,7 +66,7 @@ pub enum JointLift {
     /// When both have chosen to, and stand at it.
     BothAtIt,
     /// When one chooses to and the other's last choice was the same piece, however long ago and
-    /// however it ended: both drop what they do and go there (facts 9.4).
+    /// however it ended: both drop what they do and go there (facts S9.4).
     LastChoice,
 }
 
@@ -75,65 +75,65 @@ pub enum JointLift {
 pub struct Rules {
     /// Frames of the parts of actions.
     pub durations: Durations,
-    /// A step ahead ends once it has covered more than this, metres (facts 2.2).
+    /// A step ahead ends once it has covered more than this, metres (facts S2.2).
     pub stride_m: f32,
-    /// One turn, radians (facts 3.1: 15 degrees).
+    /// One turn, radians (facts S3.1: 15 degrees).
     pub turn_rad: f32,
     /// A step ahead that covered less than this failed, metres: an eighth of a step.
     pub min_progress_m: f32,
     /// What becomes of somebody who walks against something.
     pub blocking: Blocking,
-    /// Lower things are stepped over, metres (facts 1.5: the original's probe begins at 0.12 m).
+    /// Lower things are stepped over, metres (facts S1.5: the original's probe begins at 0.12 m).
     pub step_over_m: f32,
     /// Farthest that one steps up to a thing, from its middle less half its longer side, metres
-    /// (facts 1.1).
+    /// (facts S1.1).
     pub approach_limit_m: f32,
     /// How near one steps up to the nearest point of a thing, metres: the original stops 0.7 m
-    /// from the middle (facts 2.2); here bodies are solid, so it is an arm's length from the edge.
+    /// from the middle (facts S2.2); here bodies are solid, so it is an arm's length from the edge.
     pub arm_reach_m: f32,
     /// From how far one still reaches a thing that one can't step up to any nearer, metres, if no
-    /// wall is between (facts 3.5: 2 m to the middle).
+    /// wall is between (facts S3.5: 2 m to the middle).
     pub reach_limit_m: f32,
-    /// The same for furniture that is being moved (facts 9.3: 3 m).
+    /// The same for furniture that is being moved (facts S9.3: 3 m).
     pub furniture_reach_limit_m: f32,
     /// From where reaching is measured.
     pub reach_to: ReachTo,
     /// When two lift furniture together.
     pub joint_lift: JointLift,
-    /// Whether everybody is told at once which obstacles have been removed (facts 5.5).
+    /// Whether everybody is told at once which obstacles have been removed (facts S5.5).
     pub tells_removed: bool,
-    /// Chance of picking up beyond one's range of heights (facts 1.3).
+    /// Chance of picking up beyond one's range of heights (facts S1.3).
     pub pick_penalty: LimitPenalty,
-    /// Chance of putting on beyond one's range of heights (facts 1.3).
+    /// Chance of putting on beyond one's range of heights (facts S1.3).
     pub put_penalty: LimitPenalty,
-    /// Chance of lifting beyond one's strength (facts 1.3).
+    /// Chance of lifting beyond one's strength (facts S1.3).
     pub lift_penalty: LimitPenalty,
     /// Objects in one container or basket (paper section 3.3).
     pub container_capacity: u32,
     /// How far from the goal place's middle, less half its longer side, a released thing may come
-    /// to rest and still count, metres (facts 5.2).
+    /// to rest and still count, metres (facts S5.2).
     pub delivery_margin_m: f32,
     /// Whether a thing that was dropped by a put-on beyond one's limits counts if it lands near
     /// enough; the original's radius rule lets it.
     pub dropped_counts: bool,
     /// Whether a put-on that succeeded anywhere delivers all that its agent has let go so far:
-    /// the original's second rule (facts 5.3), taken for a mistake and off in both rule sets.
+    /// the original's second rule (facts S5.3), taken for a mistake and off in both rule sets.
     pub delivered_anywhere: bool,
     /// Whether containers are offered where a wheelchair takes part; the original's minds never
-    /// take note of one there (facts 13, number 12).
+    /// take note of one there (facts S13, number 12).
     pub containers_with_wheelchair: bool,
     /// Whether fragile things may be targets; in the original's data nobody can go for them, but
-    /// they count in the total (facts 6).
+    /// they count in the total (facts S6).
     pub fragile_targets: bool,
-    /// Chance that a fragile thing within a child's reach breaks when picked up (facts 6).
+    /// Chance that a fragile thing within a child's reach breaks when picked up (facts S6).
     pub break_chance_low: f32,
     /// The same above the child's reach.
     pub break_chance_high: f32,
-    /// The child is away beyond this distance from its guardian, metres (facts 8.4).
+    /// The child is away beyond this distance from its guardian, metres (facts S8.4).
     pub child_away_m: f32,
-    /// Lowest top that counts as a high goal place, metres (facts 5.1).
+    /// Lowest top that counts as a high goal place, metres (facts S5.1).
     pub high_goal_min_top_m: f32,
-    /// Time of one frame for falling things, seconds (facts 2.1: one physics step of 0.01 s).
+    /// Time of one frame for falling things, seconds (facts S2.1: one physics step of 0.01 s).
     pub fall_step_s: f32,
 }
 
@@ -191,11 +191,11 @@ impl Rules {
         let paper = Rules::paper();
         Rules {
             durations: Durations {
-                // Whoever is called to lift comes, from wherever (facts 9.4).
+                // Whoever is called to lift comes, from wherever (facts S9.4).
                 await_partner: 3000,
-                // Facts 9.3: raised by one reach, without bringing the arms back.
+                // Facts S9.3: raised by one reach, without bringing the arms back.
                 raise_furniture: 17,
-                // Facts 2.2: one frame, then both arms are brought back.
+                // Facts S2.2: one frame, then both arms are brought back.
                 refused_pick: 37,
                 ..paper.durations
             },

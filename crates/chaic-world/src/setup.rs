@@ -167,7 +167,7 @@ impl Thing {
     }
 
     /// Half of its longer side in plan, metres: as far as it reaches from its middle wherever a rule
-    /// measures to the middle (facts of the original, 1.1 and 5.2).
+    /// measures to the middle (facts S1.1 and S5.2).
     pub fn half_longer_side_m(&self) -> f32 {
         let size = self.size_m();
         0.5 * size.x.max(size.z)

@@ -181,7 +181,7 @@ impl World {
     }
 
     /// Where a hand rests in the body's frame: hanging, or before the body if it holds something
-    /// (facts of the original, 16.1, in proportion to the body's height).
+    /// (facts S16.1, in proportion to the body's height).
     fn rest_in_body(&self, agent: AgentId, hand: Hand, holding: bool) -> Vec3 {
         let c = self.capability(agent);
         let side = if hand == Hand::Left { -1.0 } else { 1.0 };

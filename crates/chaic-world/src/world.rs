@@ -285,7 +285,7 @@ impl World {
     }
 
     /// The point of a thing that one goes to from `p`. Nobody walks into the middle of the truck:
-    /// the original has furniture brought to a point before it (facts 9.4).
+    /// the original has furniture brought to a point before it (facts S9.4).
     pub(crate) fn point_to_reach(&self, p: Vec3, entity: EntityId) -> Vec3 {
         let is_truck =
             self.setup.task == TaskId::MovingHouse && self.setup.goal_places.contains(&entity);

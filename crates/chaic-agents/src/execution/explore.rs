@@ -11,7 +11,7 @@ use crate::track::Intent;
 
 /// Borders shorter than this lead nowhere, cells (0.6 m).
 const MIN_FRONTIER: usize = 5;
-/// One border is pursued for so long, frames (original facts 2.1).
+/// One border is pursued for so long, frames (facts A2.1).
 pub const EXPLORE_FRAMES: Frame = 250;
 /// A border that could not be resolved is left alone for so long, frames.
 const BLACKLIST_FRAMES: Frame = 1000;

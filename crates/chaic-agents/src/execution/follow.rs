@@ -7,7 +7,7 @@ use super::navigate::{Destination, Nav, Navigator, face};
 use crate::memory::Memory;
 use crate::track::Intent;
 
-/// Facing somebody to within this is enough, radians (original facts 1.6: 11.25 degrees).
+/// Facing somebody to within this is enough, radians (facts A1.6: 11.25 degrees).
 const FACING_RAD: f32 = 0.2;
 /// How long to stand beside somebody before looking again, frames.
 const STAND_FRAMES: u32 = 3;

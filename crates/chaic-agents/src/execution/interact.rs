@@ -216,7 +216,7 @@ fn learn_failure(memory: &mut Memory, object: TrackId, reason: FailureReason) {
         FailureReason::BeyondLimits => {
             let is_heavy =
                 memory.things.get(object).is_some_and(|t| t.class.info().role == Role::HeavyTarget);
-            // Furniture is tried again at once, up to a limit (original facts 2.5).
+            // Furniture is tried again at once, up to a limit (facts A2.5).
             if !is_heavy || memory.things.count_failure(object) >= LIFT_FAILURES {
                 memory.things.ignore(object, now + IGNORE_FRAMES);
             }

@@ -1,5 +1,5 @@
 //! Walking as the original does ([`Walking::Lattice`]): a way over straight neighbors, planned anew
-//! at every decision; turns of 15 degrees towards a cell a little ahead on it (facts 1.6).
+//! at every decision; turns of 15 degrees towards a cell a little ahead on it (facts A1.6).
 //!
 //! [`Walking::Lattice`]: crate::rules::Walking
 

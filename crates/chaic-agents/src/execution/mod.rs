@@ -28,19 +28,19 @@ use navigate::Navigator;
 use recover::Recovery;
 use sample::Sampler;
 
-/// Picking up, putting and removing take at most so long, frames (original facts 2.1).
+/// Picking up, putting and removing take at most so long, frames (facts A2.1).
 pub const INTERACT_FRAMES: Frame = 1000;
-/// The partner is followed for so long, frames (original facts 2.1).
+/// The partner is followed for so long, frames (facts A2.1).
 pub const FOLLOW_FRAMES: Frame = 250;
-/// The child is followed for so long, frames (original facts 2.1).
+/// The child is followed for so long, frames (facts A2.1).
 pub const CHILD_FRAMES: Frame = 300;
 /// How near to stay to the partner, metres.
 const PARTNER_M: f32 = 2.2;
-/// How near to get to the child, metres: it comes back from 2.5 m (original facts 2.4).
+/// How near to get to the child, metres: it comes back from 2.5 m (facts A2.4).
 const CHILD_M: f32 = 1.9;
 /// How long to stand beside the child, frames: it decides every 18 frames or so.
 const CHILD_STAND_FRAMES: Frame = 30;
-/// A wait lasts so long, frames (original facts 2.1).
+/// A wait lasts so long, frames (facts A2.1).
 const WAIT_FRAMES: u32 = 10;
 /// A place from where something could not be done is remembered so long, frames.
 const BAD_PLACE_FRAMES: Frame = 800;
@@ -346,7 +346,7 @@ impl Executor {
     }
 }
 
-/// Whether partner and child were both seen a moment ago (original facts 2.1).
+/// Whether partner and child were both seen a moment ago (facts A2.1).
 fn has_found_both(s: &Situation<'_>) -> bool {
     const MOMENT_FRAMES: Frame = 50;
     [Relation::Partner, Relation::Child].into_iter().all(|relation| {

@@ -1,5 +1,5 @@
 //! Finding out by chance ([`Exploration::Sampled`]): goes to the cheapest of some random places
-//! within the unknown (facts 1.10).
+//! within the unknown (facts A1.10).
 //!
 //! [`Exploration::Sampled`]: crate::rules::Exploration
 

@@ -14,7 +14,7 @@ use super::semantic::SemanticMap;
 /// Cost of entering a free cell with nothing near. Costs rise in the paper's order: free,
 /// unknown, near something, occupied, wall.
 pub const FREE: u32 = 10;
-/// Added for a cell whose floor was never seen (original facts 1.5: 2.5 times a free cell).
+/// Added for a cell whose floor was never seen (facts A1.5: 2.5 times a free cell).
 pub const UNKNOWN_EXTRA: u32 = 25;
 /// A cell in which the body, if it stood there, would touch something.
 pub const TIGHT: u32 = 600;

@@ -4,7 +4,7 @@ use chaic_protocol::Vec2;
 use chaic_protocol::geom::Rect;
 use chaic_protocol::geom::math::floor_small;
 
-/// Side of a cell, metres (original facts 1.1).
+/// Side of a cell, metres (facts A1.1).
 pub const CELL_M: f32 = 0.125;
 /// How far the lattice reaches beyond the bounds of the episode, metres.
 const MARGIN_M: f32 = 1.0;

@@ -1,4 +1,4 @@
-//! What it costs to enter each cell by the original's reckoning (facts 1.5): soft rings, nothing
+//! What it costs to enter each cell by the original's reckoning (facts A1.5): soft rings, nothing
 //! quite impassable, and for the partner a wide berth around obstacles.
 
 use chaic_protocol::geom::xz;
@@ -27,12 +27,12 @@ const TRUE_WALL_EXTRA: u32 = 5_000_000 * FREE;
 const OBSTACLE_EXTRA: u32 = 200_000 * FREE;
 /// From an obstacle's middle that is so many cells down and up along each axis.
 const OBSTACLE_CELLS: [i32; 2] = [5, 6];
-/// A way that costs more than this leads past an obstacle or through a wall (facts 1.6).
+/// A way that costs more than this leads past an obstacle or through a wall (facts A1.6).
 pub const BLOCKED: u32 = 500_000 * FREE;
-/// A way that costs more than this is not worth exploring (facts 1.10).
+/// A way that costs more than this is not worth exploring (facts A1.10).
 pub const FARTHEST: u32 = 10_000 * FREE;
 /// Where something was seen counts as occupied until, every so many updates, what has been found
-/// free since is believed (facts 1.1: 10).
+/// free since is believed (facts A1.1: 10).
 const BELIEVE_EVERY: u32 = 10;
 /// Where a person was seen counts as occupied for so long, frames.
 const PERSON_FRAMES: Frame = 200;

@@ -217,14 +217,14 @@ impl Memory {
         }
     }
 
-    /// Whether its owner waits before obstacles until somebody has cleared them away (original
-    /// facts 1.6).
+    /// Whether its owner waits before obstacles until somebody has cleared them away (facts
+    /// A1.6).
     pub fn waits_for_obstacles(&self) -> bool {
         self.is_partner && self.gait == Gait::Roll
     }
 
     /// Whether its owner goes to where the goal place was when the plan began, whatever it sees of
-    /// it since (original facts 2.4).
+    /// it since (facts A2.4).
     pub fn keeps_goal_in_mind(&self) -> bool {
         self.is_partner && self.gait == Gait::WalkBike
     }
@@ -316,7 +316,7 @@ impl Memory {
     }
 
     /// Whether child and partner look too far apart: both in view, or both seen a moment ago
-    /// (original facts 2.1, 2.4).
+    /// (facts A2.1, A2.4).
     pub fn child_is_away(&self, briefing: &Briefing) -> bool {
         const APART_SEEN_M: f32 = 3.5;
         const APART_REMEMBERED_M: f32 = 5.5;

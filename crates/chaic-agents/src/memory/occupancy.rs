@@ -6,16 +6,16 @@ use chaic_protocol::{Frame, Observation, Vec2, Vec3};
 use super::grid::{CELL_M, Grid};
 use crate::perception::{Percepts, Rays};
 
-/// Depth is trusted up to here for maps, metres (original facts 1.1).
+/// Depth is trusted up to here for maps, metres (facts A1.1).
 pub const MAP_RANGE_M: f32 = 5.0;
 /// Points below this are floor, metres. (The paper's code uses 0.05; rugs and curbs need more.)
 const FLOOR_M: f32 = 0.08;
 /// Points above this are stepped over no more, metres.
 const STEP_M: f32 = 0.12;
-/// Occupied cells with points above this are walls, metres (original facts 1.1).
+/// Occupied cells with points above this are walls, metres (facts A1.1).
 const WALL_M: f32 = 2.0;
 /// Points above this may be a ceiling and say nothing, metres: the lowest that is usual in homes.
-/// (The original looks up to 4 m, in houses without ceilings; facts 1.4.)
+/// (The original looks up to 4 m, in houses without ceilings; facts A1.4.)
 const TOP_M: f32 = 2.4;
 /// Points above this belong to walls for good: nothing that can be moved is as tall, metres. (The
 /// original: 2.9 m, in houses without ceilings whose walls are 3 m high.)

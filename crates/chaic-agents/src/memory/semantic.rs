@@ -8,9 +8,9 @@ use chaic_protocol::{ClassId, Frame, Observation, Role, Vec2, Vec3};
 use crate::perception::Detection;
 use crate::track::TrackId;
 
-/// How long an object is left alone after a failed attempt, frames (original facts 1.1).
+/// How long an object is left alone after a failed attempt, frames (facts A1.1).
 pub const IGNORE_FRAMES: Frame = 500;
-/// Failed lifts of one piece of furniture before it is left alone (original facts 2.5).
+/// Failed lifts of one piece of furniture before it is left alone (facts A2.5).
 pub const LIFT_FAILURES: u32 = 5;
 /// How long something taken by somebody else counts as held, frames.
 const HELD_FRAMES: Frame = 300;

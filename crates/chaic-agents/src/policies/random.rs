@@ -42,7 +42,7 @@ impl Random {
                 kinds.push(*plan);
             }
         }
-        // To follow somebody whose place nobody knows is to explore (original facts 2.1).
+        // To follow somebody whose place nobody knows is to explore (facts A2.1).
         let followed =
             [(Relation::Partner, Plan::FollowPartner), (Relation::Child, Plan::FollowChild)];
         for (relation, follow) in followed {

@@ -79,7 +79,7 @@ impl RuleProfile {
         deliver_below_unknown: 0.375,
     };
     /// The rider: delivers in the last 1000 of 3000 frames, 1500 with the goal place unknown
-    /// (original facts 2.4).
+    /// (facts A2.4).
     pub const RIDER: RuleProfile = RuleProfile {
         deliver_below: 1.0 / 3.0,
         deliver_below_unknown: 0.5,
@@ -124,7 +124,7 @@ impl Rules {
         }
     }
 
-    /// The child's rules (original facts 2.4), before all others.
+    /// The child's rules (facts A2.4), before all others.
     fn mind_child(&mut self, context: &Context<'_>) -> Option<Plan> {
         let (memory, now) = (context.memory, context.memory.frame);
         let child = context.briefing.companion(Relation::Child)?;
@@ -277,7 +277,7 @@ impl Policy for Rules {
 
 impl Rules {
     /// Whether the child's rules, which are all that interrupts a plan of the original, do so now
-    /// (original facts 2.4).
+    /// (facts A2.4).
     fn is_interrupted(&mut self, context: &Context<'_>, current: &Plan) -> bool {
         match current {
             // The time since looking around begins when that has ended.

@@ -11,7 +11,7 @@ use crate::solid::{Solid, mm, mm3, plan_bounds};
 /// Free width beside an obstacle, metres: more than the 0.40 of a walker, less than the 0.70 of a
 /// wheelchair, with room for a planner's grid of 0.1 m.
 const GAP_M: [f32; 2] = [0.56, 0.66];
-/// Fewest and most obstacles of an episode (facts 7).
+/// Fewest and most obstacles of an episode (facts S7 for the most; the fewest ours).
 const COUNT: [usize; 2] = [3, 5];
 /// Choices of doorways that are compared.
 const CHOICES: usize = 12;

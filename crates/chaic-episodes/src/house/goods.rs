@@ -6,7 +6,7 @@ use chaic_protocol::rng::Stream;
 use chaic_protocol::{ClassId, TaskId};
 
 /// The sets of targets with the classes that objects are dealt to in turn. The iPhone is listed
-/// twice, as in the original (facts 11.2), so that there are more of them.
+/// twice, as in the original (facts S11.2), so that there are more of them.
 const SETS: [(TargetSet, &[&str]); 4] = [
     (TargetSet::Fruit, &["apple", "banana", "orange"]),
     (TargetSet::Bread, &["bread", "burger", "loaf_bread"]),
@@ -18,7 +18,7 @@ const EXTRA: usize = 4;
 /// Vases of a high-target episode.
 pub(super) const VASES: usize = 2;
 
-/// Containers that hold food, and those that hold anything (facts 11.2).
+/// Containers that hold food, and those that hold anything (facts S11.2).
 pub(super) const DISHES: [&str; 3] = ["bowl", "plate", "tea_tray"];
 pub(super) const BASKETS: [&str; 3] = ["plastic_basket", "wicker_basket", "wood_basket"];
 
@@ -30,7 +30,7 @@ pub(super) struct Goods {
     pub goal: Goal,
 }
 
-/// Draws objects and goal (facts 11.2).
+/// Draws objects and goal (facts S11.2).
 pub(super) fn goods(task: TaskId, rng: &mut Stream) -> Goods {
     let counts: Vec<Vec<(ClassId, u32)>> =
         SETS.iter().map(|(_, names)| dealt(rng, names)).collect();
@@ -66,7 +66,7 @@ fn dealt(rng: &mut Stream, names: &[&str]) -> Vec<(ClassId, u32)> {
     counts
 }
 
-/// The containers of an episode with so many places for them (facts 11.2): all six if there is
+/// The containers of an episode with so many places for them (facts S11.2): all six if there is
 /// room; else three of one kind and the rest of the other.
 pub(super) fn containers(rng: &mut Stream, places: usize) -> Vec<ClassId> {
     let (mut first, mut second) = (DISHES, BASKETS);

@@ -12,17 +12,17 @@ use super::walls::CEILING_M;
 use super::{House, doors, slots};
 use crate::solid::mm;
 
-/// Most small objects on high tops (facts 11.2).
+/// Most small objects on high tops (facts S11.2).
 const MOST_HIGH: usize = 15;
-/// Fewest target classes among them (facts 11.2).
+/// Fewest target classes among them (facts S11.2).
 const LEAST_HIGH_CLASSES: usize = 2;
 /// Between two things on the floor, metres.
 const FLOOR_APART_M: f32 = 0.5;
 /// Around people at the start, metres: 0.5 from walls (paper), with room for rounding.
 const START_CLEAR_M: f32 = 0.6;
-/// Between people at the start, metres (facts 12.5: 0.7 to 24).
+/// Between people at the start, metres (facts S12.5: 0.7 to 24).
 const PEOPLE_APART_M: f32 = 0.9;
-/// How often the refrigerators are the high goal place (facts 5.1: 2 of 24 episodes).
+/// How often the refrigerators are the high goal place (facts S11.2: one of twelve episodes).
 const REFRIGERATOR_GOAL: f32 = 2.0 / 24.0;
 
 /// A scene that is being filled.
@@ -202,7 +202,7 @@ fn people(house: &House, task: TaskId, rng: &mut Stream) -> Option<Vec<Person>> 
     for persona in [task.info().partner, Persona::Helper] {
         let apart =
             |p: &Vec2| people.iter().all(|o| xz(o.pose.position).distance(*p) >= PEOPLE_APART_M);
-        // A room first, so that small rooms are as likely as large ones (facts 11.2).
+        // A room first, so that small rooms are as likely as large ones (facts S11.2).
         let p = (0..32).find_map(|_| {
             let room = rng.choose(&house.rooms)?.rect;
             let inside: Vec<Vec2> =

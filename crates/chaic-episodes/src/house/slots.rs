@@ -9,7 +9,7 @@ use super::House;
 use super::room::foot;
 use crate::solid::{Solid, mm, mm3, rect_distance};
 
-/// Furniture on which small things lie in ordinary life (facts 11.2: tables, sofas, chairs).
+/// Furniture on which small things lie in ordinary life (facts S11.2: tables, sofas, chairs).
 const LOW_HOSTS: [&str; 10] = [
     "dining_table",
     "coffee_table",
@@ -22,7 +22,7 @@ const LOW_HOSTS: [&str; 10] = [
     "long_sofa",
     "stool",
 ];
-/// Furniture whose top is high (facts 11.1).
+/// Furniture whose top is high (facts S11.1).
 pub(super) const HIGH_HOSTS: [&str; 2] = ["cabinet", "refrigerator"];
 /// Below this surfaces are low, metres (paper: "tables, chairs, sofas").
 const LOW_M: f32 = 1.2;
@@ -31,7 +31,7 @@ const LOW_M: f32 = 1.2;
 const REACH_M: f32 = 0.70;
 /// Between things on one surface, metres.
 const APART_M: f32 = 0.015;
-/// Around a thing on the floor, metres from furniture, walls and doorways (facts 11.2: 0.65).
+/// Around a thing on the floor, metres from furniture, walls and doorways (facts S11.2: 0.65).
 const FLOOR_CLEAR_M: f32 = 0.65;
 
 /// A place on a top.
@@ -109,7 +109,7 @@ fn room_of(house: &House, thing: &Thing) -> Option<usize> {
     house.rooms.iter().position(|r| r.rect.contains(xz(thing.position)))
 }
 
-/// All places on low furniture that anybody reaches: three a table, two a seat (facts 11.2).
+/// All places on low furniture that anybody reaches: three a table, two a seat (facts S11.2).
 pub(super) fn low(house: &House) -> Vec<Slot> {
     let mut slots = Vec::new();
     for (host, thing) in house.furniture.iter().enumerate() {

@@ -10,7 +10,7 @@ use crate::metrics::Summary;
 pub enum FormulaSet {
     /// What the paper says (section 4.1, "Evaluation Metrics", and appendix "Additional Metrics").
     Paper,
-    /// What the original's scripts compute (facts of the original's agents, section 7).
+    /// What the original's scripts compute (facts A7).
     Original,
 }
 

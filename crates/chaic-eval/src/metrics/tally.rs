@@ -22,7 +22,7 @@ pub struct Tally {
     escape: Escape,
 }
 
-/// The child's escapes as the original counts them (facts 8.4): by the child's decisions.
+/// The child's escapes as the original counts them (facts S8.4): by the child's decisions.
 #[derive(Clone, Copy, Debug, Default)]
 struct Escape {
     /// Whether its mood is to run away, as of its last decision.

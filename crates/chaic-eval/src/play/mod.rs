@@ -152,7 +152,7 @@ impl Play {
 }
 
 /// The setup as it is played: with its seed, and without helper and child where the partner is
-/// alone (facts of the original, section 8: its runs without helper have no child either).
+/// alone (facts A8: the original's runs without helper have no child either).
 fn setup_of(staging: &Staging<'_>, has_helper: bool) -> Arc<Setup> {
     let mut setup = staging.episode.setup().clone();
     setup.seed = world_seed(setup.seed, staging.seed);

@@ -4,8 +4,8 @@
 //! solids it is made. Generators place by it, the world collides and lifts by it, the renderer
 //! draws it, perception names it, and the docs list it.
 //!
-//! Sizes and masses of the benchmark's classes are the original's after its own scaling (facts of
-//! the original, sections 8.1, 9.1 and 11.3, measured from its model records); masses of small
+//! Sizes and masses of the benchmark's classes are the original's after its own scaling (facts
+//! S8.1, S9.1 and S11.3, measured from its model records); masses of small
 //! things, which the original sets to arbitrary numbers, are those of the real thing.
 
 use serde::Serialize;

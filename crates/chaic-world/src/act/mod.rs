@@ -153,7 +153,7 @@ impl World {
         Step::of(Phase::Stand, self.rules.durations.gap)
     }
 
-    /// Whether a thing exists, may be stepped up to from here (facts of the original, 3.4), and is
+    /// Whether a thing exists, may be stepped up to from here (facts S3.4), and is
     /// not behind a wall where walls count. Furniture that two carry is brought by either of them.
     fn is_at_hand(&self, agent: AgentId, entity: EntityId) -> bool {
         if !self.is_visible(entity) {

@@ -11,7 +11,7 @@ use crate::state::{Activity, Phase, Place, Step};
 use crate::tick::Progress;
 use crate::world::World;
 
-/// Height above its place at which a thing is let go, metres (facts of the original, 3.7).
+/// Height above its place at which a thing is let go, metres (facts S3.7).
 const RELEASE_ABOVE_M: f32 = 0.2;
 
 impl World {
@@ -99,7 +99,7 @@ impl World {
             return Progress::Instant;
         }
         if self.vehicle(agent).is_some() {
-            // One after the other out of the basket (facts of the original, 8.2).
+            // One after the other out of the basket (facts S8.2).
             let mut steps = vec![self.reach(Some(Hand::Right), self.rest_of(agent, Hand::Right))];
             let mut taken = Vec::new();
             for object in objects.into_iter().rev() {
@@ -125,7 +125,7 @@ impl World {
             return Progress::Instant;
         }
         let spot = self.free_spot_on(place, first, from, &[]);
-        // Facts of the original, 3.7: the height that counts is that of the place's top.
+        // Facts S3.7: the height that counts is that of the place's top.
         let height_excess = excess(self.top_of(place), self.capability(agent).put_range_m);
         let p = self.rules.put_penalty.chance(height_excess);
         if self.luck(agent, "put", p) {
@@ -141,7 +141,7 @@ impl World {
                 Step::of(Phase::Face { to: place }, d.turn),
             ];
         } else {
-            // Facts 1.4: after a vain attempt it drops to the floor beside the person.
+            // Facts S1.4: after a vain attempt it drops to the floor beside the person.
             activity.failing = Some(FailureReason::BeyondLimits);
             let mut vain_to = spot;
             let [low, high] = self.capability(agent).put_range_m;

@@ -38,7 +38,7 @@ impl Ord for Visit {
 
 impl Search {
     /// The cheapest way from `start` to `end` over straight neighbors only, whatever it costs; of
-    /// several the one that pyastar2d finds, the library of the original (facts 1.5).
+    /// several the one that pyastar2d finds, the library of the original (facts A1.5).
     ///
     /// A mind has one map of costs, so the latest way is kept for as long as that stays the same.
     pub fn straight_way(&mut self, costs: &CostMap, start: usize, end: usize) -> Option<Path> {

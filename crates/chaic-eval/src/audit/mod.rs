@@ -204,7 +204,7 @@ impl Side {
             pair.secret.change(&mut setup);
         }
         let episode = Episode::new(pair.episode.id(), "audit", None, setup)?;
-        let log = Arc::new(Mutex::new(Log { leak, ..Log::default() }));
+        let log = Arc::new(Mutex::new(Log::leaking_by(leak)));
         let Pair { rules, image_size, .. } = *pair;
         let staging = Staging {
             episode: &episode,

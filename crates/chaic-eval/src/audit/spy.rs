@@ -47,6 +47,11 @@ pub(super) struct Log {
 }
 
 impl Log {
+    /// Nothing told yet, with a leak planted or without.
+    pub(super) fn leaking_by(leak: Option<Leak>) -> Log {
+        Log { leak, ..Log::default() }
+    }
+
     /// Looks into the world, for the planted leak.
     pub(super) fn overhear(&mut self, world: &World) {
         let class = |e: EntityId| world.setup().thing(e).map(|t| (e, t.class));

@@ -4,6 +4,7 @@
 mod common;
 
 mod faults;
+mod hidden;
 mod injection;
 mod prompts;
 mod run;

@@ -14,7 +14,7 @@ use chaic_protocol::observation::{Grants, Senses};
 use chaic_protocol::{
     Action, Agent, Briefing, ClassId, Hand, Observation, Outcome, Target, TaskId, Vec2, Vec3,
 };
-use chaic_world::{Person, Setup, Thing, Wall};
+use chaic_world::{Person, Room, RoomKind, Setup, Thing, Wall};
 
 /// Side of its images, pixels.
 const SIZE: u32 = 256;
@@ -134,7 +134,7 @@ fn hall() -> Setup {
         horizon: 3000,
         bounds: Rect::new([-5.0, -5.0], [5.0, 5.0]),
         ceiling_m: Some(2.9),
-        rooms: vec![],
+        rooms: vec![Room { kind: RoomKind::Bedroom, rect: Rect::new([-5.0, -5.0], [5.0, 5.0]) }],
         walls: corners.windows(2).map(wall).collect(),
         openings: vec![],
         floors: vec![],

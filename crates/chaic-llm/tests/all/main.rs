@@ -8,3 +8,4 @@ mod injection;
 mod prompts;
 mod run;
 mod secrets;
+mod stop;

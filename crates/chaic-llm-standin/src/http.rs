@@ -98,6 +98,7 @@ pub fn write_response(
 pub fn head(status: u16, headers: &[(&str, &str)], length: usize) -> String {
     let reason = match status {
         200 => "OK",
+        307 => "Temporary Redirect",
         400 => "Bad Request",
         401 => "Unauthorized",
         404 => "Not Found",

@@ -58,6 +58,8 @@ pub struct Options {
     pub key: Option<String>,
     /// Whether it refuses JSON schemas, as some servers do.
     pub refuses_schema: bool,
+    /// The address that it sends everybody on to, with their request.
+    pub redirects_to: Option<String>,
     /// How it answers.
     pub manner: Manner,
 }
@@ -72,6 +74,7 @@ impl Default for Options {
             stall: Duration::from_secs(2),
             key: None,
             refuses_schema: false,
+            redirects_to: None,
             manner: Manner::Script,
         }
     }
@@ -271,6 +274,10 @@ impl Shared {
             return write_response(stream, status, &[], body.to_string().as_bytes());
         }
         self.seen().requests += 1;
+        if let Some(address) = &self.options.redirects_to {
+            // The status by which clients send the same again.
+            return write_response(stream, 307, &[("location", address)], b"");
+        }
         if let Some(key) = &self.options.key
             && request.key() != Some(key.as_str())
         {

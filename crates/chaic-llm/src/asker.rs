@@ -7,7 +7,7 @@ use std::time::Duration;
 use chaic_eval::metrics::RunKey;
 use chaic_protocol::{AgentId, Frame};
 
-use crate::endpoint::{Client, Failure, PicturesByHash};
+use crate::endpoint::{Client, Failure, NoReply, PicturesByHash};
 use crate::exchange::{Ask, Decided, Exchange, Fault, FaultKind, Reply, Usage};
 use crate::gate::{self, Admission, Gate, Spent};
 use crate::record::{self, Entry, Head, Record, Recorder};
@@ -143,24 +143,28 @@ impl<'a> Asker<'a> {
                     return Ok(Exchange::new(frame, ask, faults, Reply::Failed(fault)));
                 }
             }
-            match self.send(client, gate, worst, &ask, pictures) {
+            let failure = match self.send(client, gate, worst, &ask, pictures) {
                 Ok(reply) => return Ok(Exchange::new(frame, ask, faults, reply)),
-                Err(failure) => {
-                    let Failure { fault, may_pass, retry_after } = failure;
-                    faults.push(fault.clone());
-                    let attempts = faults.len() as u32;
-                    if fault.kind == FaultKind::Schema {
-                        return Ok(Exchange::new(frame, ask, faults, Reply::Failed(fault)));
-                    }
-                    if !may_pass || attempts >= settings.faults.attempts {
-                        self.given_up(&fault, attempts)?;
-                        return Ok(Exchange::new(frame, ask, faults, Reply::Failed(fault)));
-                    }
-                    let wait = self.wait(&ask, attempts, retry_after);
-                    if !gate::sleep(wait, self.session.stop) {
-                        return Err(Halted);
-                    }
-                }
+                Err(NoReply::Abandoned) => return Err(Halted),
+                Err(NoReply::Failed(failure)) => failure,
+            };
+            let Failure { fault, may_pass, retry_after } = failure;
+            faults.push(fault.clone());
+            let attempts = faults.len() as u32;
+            if fault.kind == FaultKind::Schema {
+                return Ok(Exchange::new(frame, ask, faults, Reply::Failed(fault)));
+            }
+            let is_over = !may_pass || attempts >= settings.faults.attempts;
+            if is_over {
+                self.given_up(&fault, attempts)?;
+            }
+            self.session.failed(&fault);
+            if is_over {
+                return Ok(Exchange::new(frame, ask, faults, Reply::Failed(fault)));
+            }
+            let wait = self.wait(&ask, attempts, retry_after);
+            if !gate::sleep(wait, self.session.stop) {
+                return Err(Halted);
             }
         }
     }
@@ -172,11 +176,14 @@ impl<'a> Asker<'a> {
         worst: Spent,
         ask: &Ask,
         pictures: &PicturesByHash,
-    ) -> Result<Reply, Failure> {
-        let sent = client.send(ask, pictures);
+    ) -> Result<Reply, NoReply> {
+        let sent = client.send(ask, pictures, &|| self.session.is_interrupted());
+        if sent.is_ok() {
+            self.session.answered();
+        }
         let usage = match &sent {
             Ok(Reply::Answer { usage, .. }) => *usage,
-            // What a failed request costs isn't told.
+            // What a failed or abandoned request costs isn't told.
             _ => Usage::default(),
         };
         gate.settle(worst, Spent::of(1, usage, &self.session.settings.price));

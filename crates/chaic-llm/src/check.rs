@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::endpoint::{Client, PicturesByHash};
+use crate::endpoint::{Client, Failure, NoReply, PicturesByHash};
 use crate::error::{LlmError, Result};
 use crate::exchange::{Ask, FaultKind, Message, Purpose, Reply, Role};
 use crate::settings::Settings;
@@ -21,7 +21,7 @@ pub fn check(settings: &Settings) -> Result<String> {
     for (schema_of, form) in [(Some(2), "by JSON schema"), (None, "as text")] {
         let (model, messages) = (settings.asking.model.clone(), vec![message.clone()]);
         let ask = Ask { model, purpose: Purpose::Decide, messages, schema_of };
-        match client.send(&ask, &PicturesByHash::new()) {
+        match client.send(&ask, &PicturesByHash::new(), &|| false) {
             Ok(Reply::Answer { text, usage, latency_ms, .. }) => {
                 let text: String = text.split_whitespace().collect::<Vec<_>>().join(" ");
                 let _ = writeln!(
@@ -33,11 +33,14 @@ pub fn check(settings: &Settings) -> Result<String> {
                     text.chars().take(200).collect::<String>()
                 );
             }
-            Err(failure) if failure.fault.kind == FaultKind::Schema => {
+            Err(NoReply::Failed(Failure { fault, .. })) if fault.kind == FaultKind::Schema => {
                 let _ = writeln!(said, "{form}: refused; answers are asked for as text");
             }
-            Err(failure) => {
-                return Err(LlmError::Endpoint { problem: failure.fault.detail });
+            Err(NoReply::Failed(Failure { fault, .. })) => {
+                return Err(LlmError::Endpoint { problem: fault.detail });
+            }
+            Err(NoReply::Abandoned) => {
+                return Err(LlmError::Endpoint { problem: "nobody waits for it".to_owned() });
             }
             Ok(Reply::Failed(fault)) => {
                 return Err(LlmError::Endpoint { problem: fault.detail });

@@ -1,24 +1,24 @@
-//! Sending one question once, over `ureq`.
+//! Sending one question once.
+
+mod wire;
 
 use std::collections::BTreeMap;
-use std::time::{Duration, Instant};
+use std::sync::Arc;
+use std::time::Duration;
 
 use base64::Engine as _;
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
-use ureq::Agent;
 
 use crate::error::Result;
 use crate::exchange::{Ask, ContentHash, Fault, FaultKind, Reply, Role, Usage};
 use crate::key::Key;
-use crate::retry_after::retry_after;
-use crate::settings::{Asking, Endpoint, Kind, PictureFormat, Settings, is_local};
+use crate::settings::{Asking, Kind, PictureFormat, Settings};
 use crate::tokens;
+use wire::{Response, Wire};
 
 /// So much of what an endpoint says of an error is kept, characters.
 const MAX_DETAIL: usize = 300;
-/// Connecting takes at most so long.
-const CONNECT: Duration = Duration::from_secs(10);
 /// Tokens that a picture is taken for where the endpoint doesn't say (two tiles of 512 pixels and
 /// their base in the first vision models' counting).
 const PICTURE_TOKENS: u64 = 425;
@@ -37,13 +37,26 @@ pub struct Failure {
     pub retry_after: Option<Duration>,
 }
 
+/// Why there is no reply.
+#[derive(Clone, Debug, PartialEq)]
+pub enum NoReply {
+    /// The request failed.
+    Failed(Failure),
+    /// Nobody waits for it any more.
+    Abandoned,
+}
+
+impl From<Failure> for NoReply {
+    fn from(failure: Failure) -> NoReply {
+        NoReply::Failed(failure)
+    }
+}
+
 /// A way to an endpoint.
 pub struct Client {
-    agent: Agent,
-    address: String,
+    wire: Arc<Wire>,
     kind: Kind,
     key: Key,
-    max_answer_bytes: u64,
     asking: Asking,
 }
 
@@ -59,29 +72,8 @@ impl Client {
 
     /// The same with a key that is known already.
     pub fn with_key(settings: &Settings, key: Key) -> Client {
-        let Endpoint { url, kind, max_answer_bytes, timeout_secs, in_flight, .. } =
-            &settings.endpoint;
-        let timeout = Duration::from_secs_f32(*timeout_secs);
-        let mut config = Agent::config_builder()
-            .http_status_as_error(false)
-            // Whoever redirects gets neither key nor question.
-            .max_redirects(0)
-            .max_redirects_will_error(false)
-            .timeout_global(Some(timeout))
-            .timeout_connect(Some(timeout.min(CONNECT)))
-            .max_idle_connections_per_host(*in_flight)
-            .user_agent(concat!("chaic/", env!("CARGO_PKG_VERSION")));
-        if is_local(url) {
-            config = config.proxy(None);
-        }
-        Client {
-            agent: config.build().new_agent(),
-            address: address(&settings.endpoint, &settings.asking.model),
-            kind: *kind,
-            key,
-            max_answer_bytes: *max_answer_bytes,
-            asking: settings.asking.clone(),
-        }
+        let wire = Arc::new(Wire::new(settings, key.clone()));
+        Client { wire, kind: settings.endpoint.kind, key, asking: settings.asking.clone() }
     }
 
     /// What the question's tokens are at most, for the budget.
@@ -92,42 +84,25 @@ impl Client {
         Usage { prompt, answer: u64::from(self.asking.answer_tokens), estimated: true }
     }
 
-    /// Asks once.
+    /// Asks once. Who waits looks now and then whether to go on waiting; an answer that is on its way
+    /// still has a moment to arrive then, as it is paid for.
     ///
     /// # Errors
-    /// Whatever goes wrong on the way, or with what comes back.
+    /// Whatever goes wrong on the way, or with what comes back; or nobody waits any more.
     pub fn send(
         &self,
         ask: &Ask,
         pictures: &PicturesByHash,
-    ) -> std::result::Result<Reply, Failure> {
+        is_given_up: &dyn Fn() -> bool,
+    ) -> std::result::Result<Reply, NoReply> {
         let body = self.body(ask, pictures).to_string();
-        let began = Instant::now();
-        let mut request = self.agent.post(&self.address).header("content-type", "application/json");
-        if let Some(key) = self.key.expose() {
-            request = match self.kind {
-                Kind::Openai => request.header("authorization", format!("Bearer {key}")),
-                Kind::Azure => request.header("api-key", key),
-            };
-        }
-        let mut response = request.send(body.as_bytes()).map_err(|e| transport(&e))?;
-        let status = response.status().as_u16();
-        let header = |name: &str| response.headers().get(name).and_then(|v| v.to_str().ok());
-        let retry_after = header("retry-after").and_then(retry_after);
-        let limit = self.max_answer_bytes;
-        let bytes = response.body_mut().with_config().limit(limit).read_to_vec();
-        let latency = began.elapsed();
+        let Response { status, retry_after, body, latency } =
+            wire::post(&self.wire, body, is_given_up)?;
         if !(200..300).contains(&status) {
-            let said = bytes.map_or(String::new(), |b| String::from_utf8_lossy(&b).into_owned());
-            return Err(self.refusal(status, &said, retry_after, ask));
+            let said = body.map_or(String::new(), |b| String::from_utf8_lossy(&b).into_owned());
+            return Err(self.refusal(status, &said, retry_after, ask).into());
         }
-        let bytes = bytes.map_err(|e| match e {
-            ureq::Error::BodyExceedsLimit(_) => {
-                failure(FaultKind::TooLong, format!("the answer is longer than {limit} bytes"))
-            }
-            other => transport(&other),
-        })?;
-        self.reply(ask, bytes, latency)
+        Ok(self.reply(ask, body?, latency)?)
     }
 
     /// The request as the endpoint gets it.
@@ -283,20 +258,6 @@ fn usage_of(usage: &Value) -> Option<Usage> {
     Some(Usage { prompt, answer, estimated: false })
 }
 
-/// Where requests go.
-fn address(endpoint: &Endpoint, model: &str) -> String {
-    const PATH: &str = "/chat/completions";
-    let base = endpoint.url.trim_end_matches('/');
-    match endpoint.kind {
-        Kind::Openai if base.ends_with(PATH) => base.to_owned(),
-        Kind::Openai => format!("{base}{PATH}"),
-        Kind::Azure => {
-            let version = &endpoint.api_version;
-            format!("{base}/openai/deployments/{model}{PATH}?api-version={version}")
-        }
-    }
-}
-
 /// The form of an answer that names one of `n` plans.
 fn schema(n: usize) -> Value {
     let numbers: Vec<usize> = (1..=n).collect();
@@ -323,31 +284,6 @@ fn failure(kind: FaultKind, detail: String) -> Failure {
     Failure { fault, may_pass: true, retry_after: None }
 }
 
-/// What went wrong before there was an answer. The address isn't repeated: it is in the settings.
-fn transport(error: &ureq::Error) -> Failure {
-    use ureq::Error;
-    let broken = |what: String| failure(FaultKind::Connection, what);
-    match error {
-        Error::Timeout(_) => failure(FaultKind::Timeout, "the endpoint takes too long".to_owned()),
-        Error::Io(e) if e.kind() == std::io::ErrorKind::TimedOut => {
-            failure(FaultKind::Timeout, "the endpoint takes too long".to_owned())
-        }
-        Error::Io(e) => broken(format!("the connection failed ({})", e.kind())),
-        Error::HostNotFound => broken("the endpoint's host isn't known".to_owned()),
-        Error::ConnectionFailed => broken("no connection".to_owned()),
-        Error::Protocol(_) => broken("the endpoint doesn't keep to HTTP, or broke off".to_owned()),
-        Error::Tls(_) | Error::Rustls(_) => {
-            let failure = broken("no secure connection: is the certificate valid?".to_owned());
-            Failure { may_pass: false, ..failure }
-        }
-        Error::BadUri(_) | Error::Http(_) => {
-            let failure = broken("the address or the key can't stand in a request".to_owned());
-            Failure { may_pass: false, ..failure }
-        }
-        _ => broken("the request failed".to_owned()),
-    }
-}
-
 /// The beginning of what somebody else said, as one line.
 fn summary(said: &str) -> String {
     let line = said.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -364,22 +300,6 @@ mod tests {
         (settings.endpoint.url, settings.endpoint.kind) = (url.to_owned(), kind);
         settings.asking.model = "m".to_owned();
         settings
-    }
-
-    #[test]
-    fn addresses_of_all_dialects() {
-        for (url, kind, expected) in [
-            ("http://h:1/v1", Kind::Openai, "http://h:1/v1/chat/completions"),
-            ("http://h:1/v1/", Kind::Openai, "http://h:1/v1/chat/completions"),
-            ("http://h/v1/chat/completions", Kind::Openai, "http://h/v1/chat/completions"),
-            (
-                "https://me.openai.azure.com",
-                Kind::Azure,
-                "https://me.openai.azure.com/openai/deployments/m/chat/completions?api-version=2024-10-21",
-            ),
-        ] {
-            assert_eq!(address(&settings(url, kind).endpoint, "m"), expected);
-        }
     }
 
     #[test]

@@ -19,6 +19,9 @@ pub enum LlmError {
         /// The refusal.
         refusal: io::Error,
     },
+    /// A file of the run can't be written.
+    #[error(transparent)]
+    Run(#[from] chaic_eval::EvalError),
     /// A setting can't be what it is.
     #[error("{field} is {found}, expected {expected}")]
     Setting {
@@ -75,6 +78,24 @@ pub enum LlmError {
         recorded: String,
         /// Its value now.
         given: String,
+    },
+    /// A run is gone on with, and nobody but its folder says whom to ask.
+    #[error(
+        "{path} was begun with the endpoint {url} and {key}; a run's folder doesn't decide who is \
+         sent questions and keys: name the endpoint by --endpoint{and_key}",
+        path = path.display(),
+        key = if key_env.is_empty() { "no key".to_owned() } else { format!("the key in {key_env}") },
+        and_key = if *is_key_named { "" } else { ", and the key's variable by --llm-key-env" },
+    )]
+    NotNamed {
+        /// The run's folder.
+        path: PathBuf,
+        /// The recorded address.
+        url: String,
+        /// The recorded environment variable of the key; empty for none.
+        key_env: String,
+        /// Whether the user has named a variable, or the usual one is the recorded one.
+        is_key_named: bool,
     },
     /// A run has no record of a language model.
     #[error("{path} holds no record of a language model", path = path.display())]

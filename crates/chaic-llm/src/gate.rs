@@ -8,7 +8,7 @@ use crate::exchange::Usage;
 use crate::settings::{Budget, Price};
 
 /// How often somebody who waits looks whether the run is to stop.
-const LOOK_EVERY: Duration = Duration::from_millis(50);
+pub(crate) const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 /// What has been spent, or may be.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

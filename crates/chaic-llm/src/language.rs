@@ -16,7 +16,7 @@ use crate::endpoint::Client;
 use crate::error::{LlmError, Result};
 use crate::gate::Spent;
 use crate::policy::LanguagePolicy;
-use crate::session::{Session, Source, settings_of};
+use crate::session::{Listener, Session, Source, settings_of};
 use crate::settings::{Behavior, Settings};
 use crate::templates::Track;
 
@@ -98,6 +98,11 @@ impl Language {
     /// If the run was begun with other settings, or the file system refuses.
     pub fn attach(&self, run: &Path) -> Result<()> {
         self.session.attach(run)
+    }
+
+    /// Tells this listener what a user should know while the run goes on.
+    pub fn listen(&self, listener: Listener) {
+        self.session.listen(listener);
     }
 
     /// Why it stopped the run, if it did.

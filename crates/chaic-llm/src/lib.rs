@@ -13,6 +13,7 @@
 //! - A prompt holds what its mind remembers, was briefed and was granted, and nothing else.
 //! - Whatever a model answers, what comes of it is one of the plans that were listed to it.
 //! - A key is in a request's header and nowhere else: in no file, message, log or error.
+//! - Whom to ask, and with which key, is what the user [`named`]: never what a run's folder says.
 //! - Every question and its reply is on the disk before the plan is followed; with the record the
 //!   same episodes play again offline, bit for bit.
 //! - Clocks are read for time limits, waits and latencies only. A latency moves a result only where
@@ -20,6 +21,7 @@
 
 pub mod error;
 pub mod key;
+pub mod named;
 pub mod settings;
 
 pub mod exchange;

@@ -2,15 +2,16 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, OnceLock};
 
 use chaic_eval::CHAIC_VERSION;
+use chaic_eval::run::write_whole;
 use serde::{Deserialize, Serialize};
 
 use crate::endpoint::Client;
 use crate::error::{LlmError, Result};
-use crate::exchange::ContentHash;
+use crate::exchange::{ContentHash, Fault};
 use crate::gate::{Gate, Spent};
 use crate::record::{self, Entry, Record};
 use crate::settings::{Asking, Budget, Endpoint, Faults, Price, Settings};
@@ -37,8 +38,19 @@ pub struct Session {
     /// Raised to stop the run; by the session itself when it is to pause.
     pub stop: &'static AtomicBool,
     problem: Mutex<Option<String>>,
+    listener: OnceLock<Listener>,
+    /// Requests that failed since the last that didn't. Begins so that the very first failure is
+    /// told.
+    failures: AtomicU32,
     run: OnceLock<(PathBuf, Gate)>,
 }
+
+/// Hears what a user should know while the run goes on.
+pub type Listener = Box<dyn Fn(&str) + Send + Sync>;
+
+/// The user is told when so many requests in a row have failed. Ours: with the usual waits a few
+/// seconds of an endpoint that is gone, and rare where three in ten requests fail.
+const TOLD_AFTER: u32 = 4;
 
 const FORMAT: &str = "chaic-llm-settings";
 const VERSION: u32 = 1;
@@ -69,9 +81,11 @@ impl Session {
     /// # Errors
     /// If settings are out of bounds, or templates can't be filled in.
     pub fn new(settings: Settings, source: Source, stop: &'static AtomicBool) -> Result<Session> {
+        settings.check_bounds()?;
         let templates = Templates::load(settings.asking.templates.as_deref())?;
-        let (problem, run) = (Mutex::new(None), OnceLock::new());
-        Ok(Session { settings, templates, source, stop, problem, run })
+        let (problem, listener, run) = (Mutex::new(None), OnceLock::new(), OnceLock::new());
+        let failures = AtomicU32::new(TOLD_AFTER - 1);
+        Ok(Session { settings, templates, source, stop, problem, listener, failures, run })
     }
 
     /// Ties the session to a run's folder: the settings are recorded there, or held against those
@@ -89,7 +103,8 @@ impl Session {
                 self.templates.write(&folder.join("templates"))?;
                 let text = serde_json::to_string_pretty(&ours).expect("settings have string keys");
                 let path = folder.join(FILE);
-                fs::write(&path, text + "\n").map_err(LlmError::io("write", &path))?;
+                // The last: until it is there whole, nothing is recorded.
+                write_whole(&path, (text + "\n").as_bytes())?;
             }
         }
         let before = spent_before(run, &self.settings.price)?;
@@ -125,11 +140,43 @@ impl Session {
         self.run.get().map(|(_, gate)| gate)
     }
 
-    /// Stops the run for a reason that its user should know; the first one holds.
+    /// Tells this listener what a user should know while the run goes on; the first one holds.
+    pub fn listen(&self, listener: Listener) {
+        let _ = self.listener.set(listener);
+    }
+
+    /// A request was answered.
+    pub fn answered(&self) {
+        self.failures.store(0, Ordering::Relaxed);
+    }
+
+    /// A request failed and the run goes on. The user hears of it if nothing was answered before, and
+    /// whenever several in a row have failed.
+    pub fn failed(&self, fault: &Fault) {
+        let n = self.failures.fetch_add(1, Ordering::Relaxed).saturating_add(1);
+        if let (TOLD_AFTER, Some(listener)) = (n, self.listener.get()) {
+            let attempts = self.settings.faults.attempts;
+            listener(&format!(
+                "the model can't be asked just now: {fault}; each question is tried up to \
+                 {attempts} times"
+            ));
+        }
+    }
+
+    /// Stops the run for a reason that its user should know; the first one holds, and none does if
+    /// the user has stopped the run before.
     pub fn halt(&self, why: String) {
+        // Held until both are set: who sees the flag sees the reason.
         let mut problem = self.problem.lock().unwrap_or_else(|e| e.into_inner());
-        problem.get_or_insert(why);
-        self.stop.store(true, Ordering::SeqCst);
+        if !self.stop.swap(true, Ordering::SeqCst) {
+            problem.get_or_insert(why);
+        }
+    }
+
+    /// Whether the run is to stop and the session isn't the reason. Then nobody waits for answers;
+    /// where it is, those that are on their way are waited for, as they count in the budget.
+    pub fn is_interrupted(&self) -> bool {
+        self.stop.load(Ordering::SeqCst) && self.problem().is_none()
     }
 
     /// Why the session stopped the run, if it did.
@@ -205,4 +252,33 @@ fn spent_before(run: &Path, price: &Price) -> Result<Spent> {
         }
     }
     Ok(spent)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn session() -> Session {
+        let mut settings = Settings::default();
+        settings.asking.model = "m".to_owned();
+        let stop = Box::leak(Box::new(AtomicBool::new(false)));
+        Session::new(settings, Source::Offline, stop).unwrap()
+    }
+
+    #[test]
+    fn answers_are_waited_for_unless_the_user_stops_the_run() {
+        let paused = session();
+        assert!(!paused.is_interrupted());
+        paused.halt("the budget is spent".to_owned());
+        paused.halt("another reason".to_owned());
+        assert!(!paused.is_interrupted());
+        assert_eq!(paused.problem().as_deref(), Some("the budget is spent"));
+
+        let stopped = session();
+        stopped.stop.store(true, Ordering::SeqCst);
+        assert!(stopped.is_interrupted());
+        stopped.halt("the model can't be asked".to_owned());
+        assert!(stopped.is_interrupted(), "the user was first");
+        assert_eq!(stopped.problem(), None);
+    }
 }

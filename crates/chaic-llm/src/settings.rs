@@ -1,5 +1,7 @@
 //! How a language model is asked: what a configuration file says.
 
+mod check;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -158,6 +160,9 @@ pub struct Endpoint {
     pub max_answer_bytes: u64,
     /// How long one request may take, seconds.
     pub timeout_secs: f32,
+    /// Whether plain http to another machine is fine: everybody on the way can read questions and
+    /// key.
+    pub allow_http: bool,
 }
 
 /// Which dialect an endpoint speaks.
@@ -273,6 +278,7 @@ impl Default for Endpoint {
             in_flight: 16,
             max_answer_bytes: 1 << 20,
             timeout_secs: 120.0,
+            allow_http: false,
         }
     }
 }
@@ -282,9 +288,6 @@ impl Default for Faults {
         Faults { attempts: 8, first_wait_secs: 1.0, longest_wait_secs: 60.0, then: Then::Pause }
     }
 }
-
-/// The longest time that is waited for anything, seconds.
-const MAX_SECS: f32 = 86_400.0;
 
 impl Settings {
     /// Reads a configuration file.
@@ -299,6 +302,10 @@ impl Settings {
         }
         let mut settings: Settings =
             toml::from_str(&text).map_err(|e| wrong(e.to_string().trim().to_owned()))?;
+        // TOML has no null: it is what nan and inf become on their way to JSON.
+        if let Some((name, _)) = settings.asking.extra.iter().find(|(_, value)| holds_null(value)) {
+            return Err(wrong(format!("asking.extra.{name} is no finite number")));
+        }
         if let Some(folder) = &mut settings.asking.templates
             && folder.is_relative()
         {
@@ -308,104 +315,25 @@ impl Settings {
         Ok(settings)
     }
 
-    /// Whether everything is within its bounds.
-    ///
-    /// # Errors
-    /// [`LlmError::Setting`] with the first that isn't.
-    pub fn check(&self) -> Result<()> {
-        let Settings { asking, endpoint, faults, budget, price } = self;
-        let wrong = |field, found: String, expected: &str| {
-            Err(LlmError::Setting { field, found, expected: expected.to_owned() })
-        };
-        if asking.model.is_empty() {
-            return wrong("asking.model", "empty".to_owned(), "the model's name; give --model");
-        }
-        if !(1..=1_000_000).contains(&asking.answer_tokens) {
-            let found = asking.answer_tokens.to_string();
-            return wrong("asking.answer_tokens", found, "1 to 1000000");
-        }
-        if !(500..=1_000_000).contains(&asking.prompt_tokens) {
-            let found = asking.prompt_tokens.to_string();
-            return wrong("asking.prompt_tokens", found, "500 to 1000000");
-        }
-        if !(1..=100).contains(&asking.images.count) {
-            return wrong("asking.images.count", asking.images.count.to_string(), "1 to 100");
-        }
-        if !(16..=2048).contains(&asking.images.size) {
-            return wrong("asking.images.size", asking.images.size.to_string(), "16 to 2048");
-        }
-        if !(1..=3000).contains(&asking.wait_frames) {
-            return wrong("asking.wait_frames", asking.wait_frames.to_string(), "1 to 3000");
-        }
-        if !(0.0..=1000.0).contains(&asking.frames_per_second) {
-            let found = asking.frames_per_second.to_string();
-            return wrong("asking.frames_per_second", found, "0 to 1000");
-        }
-        if !(1..=256).contains(&endpoint.in_flight) {
-            return wrong("endpoint.in_flight", endpoint.in_flight.to_string(), "1 to 256");
-        }
-        if !(1..=100).contains(&faults.attempts) {
-            return wrong("faults.attempts", faults.attempts.to_string(), "1 to 100");
-        }
-        for (field, secs) in [
-            ("endpoint.timeout_secs", endpoint.timeout_secs),
-            ("faults.first_wait_secs", faults.first_wait_secs),
-            ("faults.longest_wait_secs", faults.longest_wait_secs),
-        ] {
-            if !(0.001..=MAX_SECS).contains(&secs) {
-                return wrong(field, secs.to_string(), "0.001 to 86400 seconds");
-            }
-        }
-        let prices = price.prompt_per_million + price.answer_per_million;
-        if !prices.is_finite() || price.prompt_per_million.min(price.answer_per_million) < 0.0 {
-            return wrong("price", prices.to_string(), "prices of a million tokens, 0 or more");
-        }
-        if budget.money.is_some() && prices == 0.0 {
-            return wrong("budget.money", "given".to_owned(), "prices in [price] to go with it");
-        }
-        check_url(&endpoint.url)
-    }
-
     /// The environment variable that holds the key; empty for none.
     pub fn key_env(&self) -> String {
         let usual = match self.endpoint.kind {
             Kind::Azure => "AZURE_OPENAI_API_KEY",
-            Kind::Openai if is_local(&self.endpoint.url) => "",
+            Kind::Openai if self.endpoint.is_local() => "",
             Kind::Openai => "OPENAI_API_KEY",
         };
         self.endpoint.key_env.clone().unwrap_or_else(|| usual.to_owned())
     }
 }
 
-fn check_url(url: &str) -> Result<()> {
-    let wrong = |found: &str, expected: &str| {
-        let (found, expected) = (found.to_owned(), expected.to_owned());
-        Err(LlmError::Setting { field: "endpoint.url", found, expected })
-    };
-    if url.is_empty() {
-        return wrong("empty", "the endpoint's address; give --endpoint");
+fn holds_null(value: &serde_json::Value) -> bool {
+    use serde_json::Value;
+    match value {
+        Value::Null => true,
+        Value::Array(values) => values.iter().any(holds_null),
+        Value::Object(fields) => fields.values().any(holds_null),
+        _ => false,
     }
-    let Some((_, rest)) =
-        url.split_once("://").filter(|(scheme, _)| ["http", "https"].contains(scheme))
-    else {
-        return wrong("no address", "one like http://127.0.0.1:8000/v1");
-    };
-    // What may hold a secret isn't repeated.
-    if rest.contains(['@', '?', '#']) {
-        return wrong(
-            "an address with a name, password or query",
-            "the bare address; the key comes from an environment variable (endpoint.key_env)",
-        );
-    }
-    Ok(())
-}
-
-/// Whether an address is on this machine itself.
-pub(crate) fn is_local(url: &str) -> bool {
-    let host = url.split_once("://").map_or(url, |(_, rest)| rest);
-    ["127.0.0.1", "localhost", "[::1]"].iter().any(|local| {
-        host.strip_prefix(local).is_some_and(|r| r.is_empty() || r.starts_with([':', '/']))
-    })
 }
 
 #[cfg(test)]
@@ -417,30 +345,6 @@ mod tests {
         settings.asking.model = "m".to_owned();
         settings.endpoint.url = "http://127.0.0.1:8000/v1".to_owned();
         settings
-    }
-
-    #[test]
-    fn the_usual_settings_are_fine_and_out_of_bounds_ones_are_named() {
-        good().check().unwrap();
-        type Change = fn(&mut Settings);
-        let changes: [(Change, &str); 10] = [
-            (|s| s.asking.model.clear(), "--model"),
-            (|s| s.endpoint.url.clear(), "--endpoint"),
-            (|s| s.endpoint.url = "ftp://x".to_owned(), "http://127.0.0.1"),
-            (|s| s.endpoint.url = "https://me:sesame@x/v1".to_owned(), "bare address"),
-            (|s| s.endpoint.url = "https://x/v1?key=sesame".to_owned(), "bare address"),
-            (|s| s.endpoint.in_flight = 0, "endpoint.in_flight is 0"),
-            (|s| s.faults.attempts = 0, "faults.attempts is 0"),
-            (|s| s.endpoint.timeout_secs = f32::NAN, "endpoint.timeout_secs is NaN"),
-            (|s| s.budget.money = Some(1.0), "[price]"),
-            (|s| s.asking.prompt_tokens = 10, "asking.prompt_tokens is 10"),
-        ];
-        for (change, words) in changes {
-            let mut settings = good();
-            change(&mut settings);
-            let said = settings.check().expect_err(words).to_string();
-            assert!(said.contains(words) && !said.contains("sesame"), "{said}");
-        }
     }
 
     #[test]
@@ -469,5 +373,10 @@ mod tests {
         fs::write(&path, "[asking]\nmodel_name = \"m\"\n").unwrap();
         let said = Settings::read(&path).unwrap_err().to_string();
         assert!(said.contains("model_name") && said.contains("llm.toml"), "{said}");
+        for text in ["top_k = nan", "deep = { list = [1.0, inf] }"] {
+            fs::write(&path, format!("[asking.extra]\n{text}\n")).unwrap();
+            let said = Settings::read(&path).unwrap_err().to_string();
+            assert!(said.contains("is no finite number"), "{said}");
+        }
     }
 }

@@ -142,18 +142,25 @@ pub struct EvalArguments {
 #[derive(Args, Debug, Default)]
 pub struct LanguageArguments {
     /// The language model's address, for example http://127.0.0.1:8000/v1; its key comes from the
-    /// environment variable OPENAI_API_KEY.
+    /// environment variable OPENAI_API_KEY. To be named again with --resume.
     #[arg(long, value_name = "URL", help_heading = "Language helpers")]
     pub endpoint: Option<String>,
     /// The language model's name.
     #[arg(long, value_name = "NAME", help_heading = "Language helpers")]
     pub model: Option<String>,
+    /// Take the key from another environment variable; "" sends none.
+    #[arg(long, value_name = "NAME", help_heading = "Language helpers")]
+    pub llm_key_env: Option<String>,
+    /// Send questions and key by plain http, even to another machine: all on the way can read them.
+    #[arg(long, help_heading = "Language helpers")]
+    pub llm_allow_http: bool,
     /// All settings of language helpers, see docs/language-helpers.md.
     #[arg(long, value_name = "FILE.toml", help_heading = "Language helpers")]
     pub llm_config: Option<PathBuf>,
     /// replay:DIR plays with the answers recorded in the run DIR, and asks nobody.
     #[arg(long, value_name = "SOURCE", value_parser = chaic_llm::language::replay_folder,
-        conflicts_with_all = ["endpoint", "model", "llm_config"], help_heading = "Language helpers")]
+        conflicts_with_all = ["endpoint", "model", "llm_key_env", "llm_allow_http", "llm_config"],
+        help_heading = "Language helpers")]
     pub llm: Option<PathBuf>,
 }
 

@@ -1,5 +1,8 @@
 //! The command `chaic`: a door to the crates, without logic of its own.
 
+// What is printed goes through `output`, which escapes control characters.
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
 mod arguments;
 mod commands;
 mod interrupt;

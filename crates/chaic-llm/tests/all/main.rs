@@ -9,3 +9,4 @@ mod injection;
 mod prompts;
 mod run;
 mod secrets;
+mod stop;

@@ -51,3 +51,19 @@ fn the_key_is_nowhere_to_be_read() {
         }
     }
 }
+
+#[test]
+fn nobody_gets_key_or_question_by_a_redirect() {
+    let bench = Bench::new(&[TaskId::NoConstraint], 100);
+    let (other, _) = standin(Options::default());
+    let redirects_to = Some(format!("{}/chat/completions", other.url()));
+    let (named, mut settings) = standin(Options { redirects_to, ..Options::default() });
+    settings.faults.then = Then::Pause;
+    let client = Client::with_key(&settings, Key::new(KEY));
+    let language = Language::with(settings, Source::Live(Box::new(client)), flag()).unwrap();
+    let (is_whole, _) = bench.play("run", &bench.given(&["llm"]), &language);
+    assert!(!is_whole);
+    assert_eq!((named.seen().requests, other.seen().requests), (1, 0));
+    let problem = language.problem().unwrap();
+    assert!(problem.contains("307") && problem.contains("redirects to"), "{problem}");
+}

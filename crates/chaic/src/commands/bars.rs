@@ -7,7 +7,7 @@ use chaic_eval::metrics::{Ending, RunKey};
 use chaic_eval::run::{Extent, Finished, Progress};
 use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressStyle};
 
-use crate::output::complain;
+use crate::output::{complain, printable};
 
 /// A bar that counts something.
 pub fn plain(total: u64, what: &str) -> ProgressBar {
@@ -48,6 +48,12 @@ impl RunBars {
         RunBars { part: format!("{part}: "), max_lines: 20, ..RunBars::new(extent) }
     }
 
+    /// Says a line in between the bars, from any thread.
+    pub fn voice(&self) -> impl Fn(&str) + Send + Sync + use<> {
+        let all = self.all.clone();
+        move |line| all.suspend(|| complain(line))
+    }
+
     /// What the next messages say besides the time that this run will take.
     pub fn say_beside(&mut self, beside: String) {
         self.beside = beside;
@@ -61,7 +67,8 @@ impl RunBars {
                 let style = ProgressStyle::with_template("{bar:20} {pos:>4}/{len} frames  {msg}");
                 bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
                 let bar = self.all.insert_before(&self.total, bar);
-                bar.set_message(format!("{} with {}", key.episode, key.helper));
+                let message = format!("{} with {}", key.episode, key.helper);
+                bar.set_message(printable(&message).into_owned());
                 if let Some((old, _)) = self.workers.insert(*worker, (bar, key.clone())) {
                     old.finish_and_clear();
                 }

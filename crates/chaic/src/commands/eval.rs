@@ -62,17 +62,20 @@ pub fn run(arguments: &EvalArguments) -> Result<Ended> {
     pool.context("can't start threads")?;
     let began = Instant::now();
     let mut bars = RunBars::new(extent);
+    if let Some(language) = &language {
+        language.listen(Box::new(bars.voice()));
+    }
     let played = run.play(jobs, helpers, stop, &mut |progress| bars.show(progress));
     bars.clear();
-    let is_whole = played.map_err(|e| anyhow!("{e:#}\n{}", how_to_resume(&path)))?;
+    let is_whole = played.map_err(|e| anyhow!("{e:#}\n{}", how_to_resume(&path, arguments)))?;
     if let Some(problem) = language.as_ref().and_then(Language::problem) {
-        bail!("paused: {problem}\n{}", how_to_resume(&path));
+        bail!("paused: {problem}\n{}", how_to_resume(&path, arguments));
     }
     if !is_whole {
         let extent = run.extent();
         let done = extent.finished - extent.errors;
         complain(&format!("stopped after {done} of {}", counted(extent.total, "episode run")));
-        complain(&how_to_resume(&path));
+        complain(&how_to_resume(&path, arguments));
         return Ok(Ended::Interrupted);
     }
     finish(&run, began)
@@ -155,8 +158,9 @@ fn free_folder(name: &str) -> Result<PathBuf> {
     candidates.find(|p| !p.exists()).context("every runs/... folder is taken; give one with --out")
 }
 
-fn how_to_resume(path: &Path) -> String {
-    format!("go on with: chaic eval --resume --out {}", path.display())
+fn how_to_resume(path: &Path, arguments: &EvalArguments) -> String {
+    let language = llm::to_resume(&arguments.language);
+    format!("go on with: chaic eval --resume --out {}{language}", path.display())
 }
 
 /// What an agent says when it breaks down is shown and noted by the run; the usual message would

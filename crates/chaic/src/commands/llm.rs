@@ -1,6 +1,6 @@
 //! `chaic llm`, and where `chaic eval` gets its language helpers from.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context as _, Result, bail};
@@ -9,6 +9,7 @@ use chaic_eval::replay::find_trace;
 use chaic_eval::run::RunFolder;
 use chaic_eval::trace;
 use chaic_llm::language::{Language, is_language_helper, is_language_partner};
+use chaic_llm::named::Named;
 use chaic_llm::settings::Settings;
 use chaic_llm::show::{self, Detail};
 use chaic_llm::templates::Templates;
@@ -17,7 +18,7 @@ use chaic_protocol::AgentId;
 
 use crate::Ended;
 use crate::arguments::{EvalArguments, LanguageArguments, LlmCommand};
-use crate::output::{complain, say};
+use crate::output::{complain, quoted, say};
 
 /// A flag that nobody raises.
 pub fn never() -> &'static AtomicBool {
@@ -44,7 +45,7 @@ pub fn run(command: &LlmCommand) -> Result<Ended> {
             say(&shown(run, episode, helper.as_deref(), *seed, *agent, detail)?)?;
         }
         LlmCommand::Check { language } => {
-            let settings = settings(language, Settings::default())?;
+            let settings = named(language).over(file(language)?.unwrap_or_default());
             settings.check()?;
             say(&check::check(&settings)?)?;
         }
@@ -79,15 +80,17 @@ pub fn language(
     stop: &'static AtomicBool,
 ) -> Result<Option<Language>> {
     let given = &arguments.language;
-    let names = arguments.helper.iter().flatten();
-    let is_named = names.into_iter().any(|n| is_language_helper(n))
-        || arguments.partner.as_deref().is_some_and(is_language_partner);
+    // What isn't said is what the run was begun with; a folder that can't be read says so later.
+    let begun = arguments.resume.then(|| RunFolder::read(path).ok()).flatten();
+    let begun = begun.map(|(_, options)| options);
+    let helpers = arguments.helper.as_ref().or(begun.as_ref().map(|o| &o.helpers));
+    let partner = arguments.partner.as_ref().or(begun.as_ref().and_then(|o| o.partner.as_ref()));
+    let is_named = helpers.into_iter().flatten().any(|n| is_language_helper(n))
+        || partner.is_some_and(|n| is_language_partner(n));
     let recorded = if arguments.resume { session::settings_of(path)? } else { None };
     if !is_named && recorded.is_none() {
-        let is_given = given.llm.is_some()
-            || given.endpoint.is_some()
-            || given.model.is_some()
-            || given.llm_config.is_some();
+        let is_given = given.llm.is_some() || given.llm_config.is_some();
+        let is_given = is_given || named(given) != Named::default();
         if is_given && arguments.resume {
             let text = "was begun with no helper or partner that asks a language model; leave the \
                         options of language helpers away to go on, or choose another --out";
@@ -103,21 +106,40 @@ pub fn language(
     if let Some(run) = &given.llm {
         return Ok(Some(Language::replay(run, stop)?));
     }
-    let settings = settings(given, recorded.unwrap_or_default())?;
+    let settings = match (file(given)?, recorded) {
+        (None, Some(recorded)) => named(given).over_recorded(path, recorded)?,
+        (file, _) => named(given).over(file.unwrap_or_default()),
+    };
     Ok(Some(Language::live(settings, stop)?))
 }
 
-/// What a file says, and what is said beside it.
-fn settings(given: &LanguageArguments, usual: Settings) -> Result<Settings> {
-    let mut settings = match &given.llm_config {
-        Some(path) => Settings::read(path)?,
-        None => usual,
+/// What is to be said again to go on with a run, of what a run's folder doesn't decide.
+pub fn to_resume(given: &LanguageArguments) -> String {
+    let LanguageArguments { endpoint, model: _, llm_key_env, llm_allow_http, llm_config, llm } =
+        given;
+    let option = |name: &str, value: Option<String>| {
+        value.map_or(String::new(), |value| format!(" {name} {}", quoted(&value)))
     };
-    if let Some(url) = &given.endpoint {
-        settings.endpoint.url.clone_from(url);
+    let path = |path: &PathBuf| path.display().to_string();
+    [
+        option("--endpoint", endpoint.clone()),
+        option("--llm-key-env", llm_key_env.clone()),
+        if *llm_allow_http { " --llm-allow-http".to_owned() } else { String::new() },
+        option("--llm-config", llm_config.as_ref().map(path)),
+        option("--llm", llm.as_ref().map(|run| format!("replay:{}", run.display()))),
+    ]
+    .concat()
+}
+
+fn named(given: &LanguageArguments) -> Named {
+    Named {
+        url: given.endpoint.clone(),
+        model: given.model.clone(),
+        key_env: given.llm_key_env.clone(),
+        allow_http: given.llm_allow_http,
     }
-    if let Some(model) = &given.model {
-        settings.asking.model.clone_from(model);
-    }
-    Ok(settings)
+}
+
+fn file(given: &LanguageArguments) -> Result<Option<Settings>> {
+    Ok(given.llm_config.as_deref().map(Settings::read).transpose()?)
 }

@@ -8,6 +8,7 @@ use std::process::{Child, Command, Output, Stdio};
 use assert_cmd::cargo::cargo_bin;
 
 mod interrupted;
+mod language;
 mod pictures;
 
 /// Frames of the episodes of these tests.

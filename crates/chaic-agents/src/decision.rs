@@ -283,7 +283,7 @@ mod tests {
     }
 
     fn own(hands: [Option<Held>; 2]) -> SelfState {
-        SelfState { pose: Default::default(), hands, last: None }
+        SelfState { pose: Default::default(), hands, last: None, other_end: None }
     }
 
     #[test]

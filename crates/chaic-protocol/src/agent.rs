@@ -16,6 +16,19 @@ pub struct Thought {
     pub mood: Option<String>,
 }
 
+/// What the child who comes along is doing, by its own decision. The original's emergency rate asks
+/// for it (facts 8.4), so it is a record of its own in traces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ChildState {
+    /// Comes along with its guardian.
+    Follow,
+    /// Runs to a place far off, or stays there.
+    RunAway,
+    /// Goes back to its guardian.
+    GotoGuardian,
+}
+
 /// A mind: it is briefed once, then asked for an action each time its last one has ended.
 ///
 /// Everything it may know comes through these three calls. The same sequence of calls must lead
@@ -34,6 +47,11 @@ pub trait Agent: Send {
     /// What it is thinking, for the record.
     fn thought(&self) -> Thought {
         Thought::default()
+    }
+
+    /// What it is doing, if it is the child's mind; asked after each [`Agent::act`].
+    fn child_state(&self) -> Option<ChildState> {
+        None
     }
 
     /// What it counted of its own doings in this episode, by name, for the record: never read by

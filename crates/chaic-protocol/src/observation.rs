@@ -91,6 +91,15 @@ pub struct Held {
     pub contents: Vec<(EntityId, ClassId)>,
 }
 
+/// Who holds the other end of the furniture that an agent leads with, as its hands tell it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OtherEnd {
+    /// Who.
+    pub agent: AgentId,
+    /// Where, in the own body's frame, metres; it stays so until the furniture is put down.
+    pub position_in_body: Vec3,
+}
+
 /// What an agent knows of itself.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SelfState {
@@ -101,6 +110,9 @@ pub struct SelfState {
     pub hands: [Option<Held>; 2],
     /// The action that has just ended, with its outcome; `None` at the start.
     pub last: Option<(Action, Outcome)>,
+    /// Who carries along, for the one who leads.
+    #[serde(default)]
+    pub other_end: Option<OtherEnd>,
 }
 
 impl SelfState {

@@ -7,7 +7,7 @@ use chaic_protocol::briefing::{Briefing, Companion, Relation, Told};
 use chaic_protocol::capability::Gait;
 use chaic_protocol::catalogue::{CLASSES, Role};
 use chaic_protocol::geom::{Camera, rotate_yaw, yaw_rotation};
-use chaic_protocol::observation::{Granted, Grants, Held, SeenAction, SelfState};
+use chaic_protocol::observation::{Granted, Grants, Held, OtherEnd, SeenAction, SelfState};
 use chaic_protocol::rng::Stream;
 use chaic_protocol::task::SceneKind;
 use chaic_protocol::{AgentId, ClassId, EntityId, Vec3};
@@ -66,7 +66,10 @@ impl World {
     /// What an agent knows of itself.
     pub fn own_state(&self, agent: AgentId) -> SelfState {
         let person = self.person(agent);
-        SelfState { pose: person.pose, hands: self.hands(agent), last: person.last }
+        let joint = self.state.joint.filter(|j| j.leader == agent && j.under_way);
+        let other_end =
+            joint.map(|j| OtherEnd { agent: j.follower, position_in_body: j.follower_in_leader });
+        SelfState { pose: person.pose, hands: self.hands(agent), last: person.last, other_end }
     }
 
     /// What is granted to an agent beyond its own images and state, now. `partner_in_view` is

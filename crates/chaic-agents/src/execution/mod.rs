@@ -3,6 +3,7 @@
 pub mod path;
 mod queue;
 
+pub mod carry;
 pub mod navigate;
 
 pub mod explore;

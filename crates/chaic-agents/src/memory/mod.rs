@@ -13,9 +13,11 @@ use std::sync::Arc;
 
 use chaic_protocol::briefing::Relation;
 use chaic_protocol::capability::Gait;
-use chaic_protocol::geom::{Pose, horizontal_distance, xz};
+use chaic_protocol::geom::{Pose, Rect, horizontal_distance, xz};
+use chaic_protocol::observation::OtherEnd;
 use chaic_protocol::{
-    Action, AgentId, Briefing, ClassId, EntityId, Frame, Observation, Outcome, Vec2, Vec3,
+    Action, AgentId, Briefing, ClassId, EntityId, FailureReason, Frame, Observation, Outcome, Vec2,
+    Vec3,
 };
 
 pub use grid::{CELL_M, Grid};
@@ -70,6 +72,12 @@ pub struct Memory {
     costs: CostMap,
     costs_of: Option<(u32, u32)>,
     people_moved: bool,
+    /// Nobody gets out of this.
+    pub bounds: Rect,
+    /// Who carries along what one leads with.
+    pub other_end: Option<OtherEnd>,
+    /// The last action, if it was one of moving about and something was in the way.
+    pub blocked: Option<Action>,
     /// Whether anything was taken in since costs were computed last.
     is_stale: bool,
     is_partner: bool,
@@ -100,6 +108,9 @@ impl Memory {
             costs,
             costs_of: None,
             people_moved: true,
+            bounds: briefing.bounds,
+            other_end: None,
+            blocked: None,
             is_stale: true,
             is_partner: briefing.me == AgentId::PARTNER,
             gait: briefing.capability.gait,
@@ -115,6 +126,11 @@ impl Memory {
         }
         self.frame = observation.frame;
         self.pose = observation.own.pose;
+        self.other_end = observation.own.other_end;
+        self.blocked = observation.own.last.and_then(|(action, outcome)| {
+            let is_blocked = outcome == Outcome::Failure(FailureReason::Blocked);
+            (is_blocked && action.is_locomotion()).then_some(action)
+        });
         let seen = if self.rules.sees_people(briefing) { &percepts.detections[..] } else { &[] };
         self.people.see(briefing, observation, seen);
         self.people_moved = self.people.iter().any(|p| p.frame + 60 > self.frame);
@@ -188,9 +204,10 @@ impl Memory {
 
     fn refresh_costs(&mut self) {
         if self.rules.walking == Walking::Lattice {
-            let Memory { map, things, people, .. } = self;
+            let people = self.in_the_way();
+            let Memory { map, things, .. } = self;
             let (heeds_obstacles, now) = (self.is_partner, self.frame);
-            let seen = lattice_costs::Seen { map, things, people, heeds_obstacles, now };
+            let seen = lattice_costs::Seen { map, things, people: &people, heeds_obstacles, now };
             if std::mem::take(&mut self.is_stale) {
                 self.costs.rebuild_lattice(&seen);
             }
@@ -198,11 +215,20 @@ impl Memory {
         }
         let of = (self.map.version(), self.things.layout());
         if self.costs_of != Some(of) || self.people_moved {
-            let here = self.here();
-            self.costs.rebuild(&self.map, &self.things, &self.people, here, self.frame);
+            let (here, people) = (self.here(), self.in_the_way());
+            self.costs.rebuild(&self.map, &self.things, &people, here, self.frame);
             self.costs_of = Some(of);
             self.people_moved = false;
             self.reach = None;
+        }
+    }
+
+    /// The people whom one would have to go around: not who carries along (original facts 2.5: while
+    /// two carry, the leader leaves the other one's body out of its map).
+    fn in_the_way(&self) -> People {
+        match self.other_end {
+            Some(end) => self.people.without(end.agent),
+            None => self.people.clone(),
         }
     }
 

@@ -80,7 +80,12 @@ mod tests {
         for (draw, expected) in [(RandomDraw::Plans, 900), (RandomDraw::KindsFirst, 300)] {
             let rules = PlannerRules { random_draw: draw, ..PlannerRules::paper() };
             let memory = Memory::new(&briefing, rules);
-            let own = SelfState { pose: Default::default(), hands: [None, None], last: None };
+            let own = SelfState {
+                pose: Default::default(),
+                hands: [None, None],
+                last: None,
+                other_end: None,
+            };
             let behavior = BehaviorLog::default();
             let context = Context {
                 briefing: &briefing,

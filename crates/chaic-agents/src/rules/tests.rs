@@ -42,7 +42,12 @@ impl Situated {
     }
 
     fn own(&self) -> SelfState {
-        SelfState { pose: Default::default(), hands: self.hands.clone(), last: None }
+        SelfState {
+            pose: Default::default(),
+            hands: self.hands.clone(),
+            last: None,
+            other_end: None,
+        }
     }
 
     /// What the partner answers who has (or has not) looked around already.

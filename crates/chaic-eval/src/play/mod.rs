@@ -133,12 +133,12 @@ impl Play {
             let choices = waiting.iter().zip(observations).map(|(agent, observation)| {
                 let actor = &mut cast.actors[agent.index()];
                 let action = actor.mind.act(&observation);
-                let thought = Some(actor.mind.thought());
+                let (thought, child) = (Some(actor.mind.thought()), actor.mind.child_state());
                 let is_news = said[agent.index()] != thought;
                 if is_news {
                     said[agent.index()].clone_from(&thought);
                 }
-                Choice { agent: *agent, action, thought: thought.filter(|_| is_news) }
+                Choice { agent: *agent, action, thought: thought.filter(|_| is_news), child }
             });
             let choices: Vec<Choice> = choices.collect();
             // Who raised `stop` while deciding hasn't decided.

@@ -8,7 +8,7 @@ mod record;
 mod write;
 
 pub use read::{MAX_TRACE_BYTES, Warning, parse, read};
-pub use record::{Decision, End, Record, TraceEvent, is_recorded};
+pub use record::{ChildRecord, Decision, End, Record, TraceEvent, is_recorded};
 pub use write::Writer;
 
 use chaic_protocol::capability::Persona;
@@ -24,7 +24,7 @@ use crate::rules::RuleSet;
 /// What the field `format` of a header says.
 pub const FORMAT: &str = "chaic-trace";
 /// The version of the format.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// What was played, under which rules, and what everybody was told.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

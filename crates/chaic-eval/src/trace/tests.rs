@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use chaic_protocol::agent::Thought;
+use chaic_protocol::agent::{ChildState, Thought};
 use chaic_protocol::{Action, AgentId, ClassId, EntityId, FailureReason, Hand, Outcome};
 use chaic_world::{Event, EventKind};
 
@@ -52,6 +52,7 @@ fn records() -> Vec<Record> {
             EventKind::Delivered { object: EntityId(31), by: AgentId::HELPER, counted: true },
             Some(ClassId::named("apple")),
         ),
+        Record::Child(ChildRecord { frame: 20, state: ChildState::RunAway }),
         event(30, EventKind::ChildAway { away: true }, None),
         Record::End(End {
             frame: 30,
@@ -59,6 +60,7 @@ fn records() -> Vec<Record> {
             total: 3.0,
             complete: false,
             away_frames: 4,
+            stuck_frames: 5,
             digest: Digest(1),
         }),
     ]

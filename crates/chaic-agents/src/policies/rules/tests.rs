@@ -25,7 +25,12 @@ fn choose(profile: RuleProfile, case: &Case, log: &BehaviorLog) -> Plan {
     briefing.goal = Toy::goal(&[("apple", 3), ("banana", 2)]);
     let mut memory = Memory::new(&briefing, crate::PlannerRules::paper());
     memory.frame = case.frame;
-    let own = SelfState { pose: Default::default(), hands: case.hands.clone(), last: None };
+    let own = SelfState {
+        pose: Default::default(),
+        hands: case.hands.clone(),
+        last: None,
+        other_end: None,
+    };
     let context = Context {
         briefing: &briefing,
         memory: &memory,

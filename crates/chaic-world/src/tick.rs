@@ -85,7 +85,8 @@ impl World {
         person.last = Some((action, outcome));
         if !action.is_locomotion() && !matches!(action, Action::Wait { .. }) {
             person.last_deed = Some((frame, action, outcome));
-            if outcome.is_success() {
+            let is_tried = outcome == Outcome::Failure(FailureReason::BeyondLimits);
+            if outcome.is_success() || is_tried {
                 (person.progress.frame, person.progress.position) = (frame, person.pose.position);
             }
         }

@@ -109,8 +109,9 @@ pub const STUCK_AFTER_FRAMES: Frame = 200;
 pub const PROGRESS_M: f32 = 0.5;
 
 /// When and where a person made progress last: got farther than [`PROGRESS_M`] from where it had
-/// made some before, on its own feet or carried along, or ended an action well that was neither a
-/// step, nor a turn, nor a wait. Why it makes none does not matter: who waits on purpose makes none.
+/// made some before, on its own feet or carried along, or carried out an action that was neither a
+/// step, nor a turn, nor a wait: well, or in vain because it was beyond its limits, which is a draw
+/// of luck. Why it makes none does not matter: who waits on purpose makes none.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LastProgress {
     /// When.

@@ -278,6 +278,7 @@ impl Perception for GroundTruthIds {
 mod tests {
     use super::*;
     use crate::test_support::{Toy, ToyObject};
+    use chaic_protocol::AgentId;
 
     #[test]
     fn a_detection_is_where_the_object_is_and_knows_how_high_it_is() {

@@ -2,7 +2,7 @@
 //! in the steps and turns that the world makes of actions, so that neither disc meets anything.
 
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::{BTreeMap, BinaryHeap, VecDeque};
 use std::f32::consts::TAU;
 
 use chaic_protocol::geom::{Pose, Rect, wrap_angle, xz};
@@ -23,6 +23,8 @@ const MAX_POSES: usize = 40_000;
 const NEAR_M: f32 = 1.8;
 /// A place is another one than where it failed from this far on, metres.
 const OTHER_PLACE_M: f32 = 0.4;
+/// A way is kept for so many actions: steps are a little longer or shorter than they are planned.
+const KEEP_ACTIONS: usize = 16;
 /// Spacing of the points of a step that are looked at, as parts of it.
 const PARTS: u32 = 3;
 
@@ -39,18 +41,37 @@ struct Pair<'a> {
 struct Node {
     pose: Pose,
     cost: u32,
-    first: Option<Action>,
+    /// The node before it, and the action between.
+    from: Option<(usize, Action)>,
 }
 
-/// The first action of the way of two to `destination`; `None` if the search finds none.
-pub fn step(memory: &mut Memory, destination: &Destination) -> Option<Nav> {
+/// The next action of the way of two to `destination`; `None` if nobody carries along or there is no
+/// way at all. `way` keeps what comes after it: who plans anew after each turn may turn to and fro.
+pub fn step(
+    memory: &mut Memory,
+    destination: &Destination,
+    way: &mut VecDeque<Action>,
+) -> Option<Nav> {
     let other_in_body = memory.other_end?.position_in_body;
     let (pose, blocked, bounds) = (memory.pose, memory.blocked, memory.bounds);
     let (costs, _) = memory.costs_and_search();
     let mut pair = Pair { costs, bounds, other_in_body, room_m: [costs.radius_m(); 2] };
+    if pair.is_there(pose, destination) {
+        return Some(Nav::Arrived);
+    }
     let now = pair.bodies(pose).map(|p| pair.clearance_m(p));
     pair.room_m = [0, 1].map(|i| pair.room_m[i].min(now[i]));
-    pair.search(pose, destination, blocked)
+    let next = way.front().and_then(|action| pair.after(pose, *action));
+    if blocked.is_some() || next.is_none() {
+        way.clear();
+        let found = pair.search(pose, destination, blocked).or_else(|| {
+            // Wedged, by the map: costs alone show the way out.
+            pair.room_m = [0.0; 2];
+            pair.search(pose, destination, blocked)
+        });
+        way.extend(found?.into_iter().take(KEEP_ACTIONS));
+    }
+    way.pop_front().map(Nav::Act)
 }
 
 impl Pair<'_> {
@@ -93,6 +114,15 @@ impl Pair<'_> {
         self.has_room(0, xz(position)).then_some(Pose { position, ..turned })
     }
 
+    fn after(&self, pose: Pose, action: Action) -> Option<Pose> {
+        match action {
+            Action::MoveForward => self.ahead(pose),
+            Action::TurnLeft => self.turned(pose, 1.0),
+            Action::TurnRight => self.turned(pose, -1.0),
+            _ => None,
+        }
+    }
+
     /// Distance of the nearer of the two from the destination, metres.
     fn distance_m(&self, pose: Pose, to: &Destination) -> f32 {
         let away = self.bodies(pose).map(|p| to.nearest(p).distance(p));
@@ -111,8 +141,14 @@ impl Pair<'_> {
         self.bodies(pose).map(|p| cost(p).saturating_sub(FREE) / COST_PER_FRAME).iter().sum()
     }
 
-    /// A*: poses that share a cell and a heading are one.
-    fn search(&self, start: Pose, to: &Destination, blocked: Option<Action>) -> Option<Nav> {
+    /// A*: poses that share a cell and a heading are one. The actions to the destination, of which
+    /// the first is not the one that was just blocked.
+    fn search(
+        &self,
+        start: Pose,
+        to: &Destination,
+        blocked: Option<Action>,
+    ) -> Option<Vec<Action>> {
         let key = |pose: Pose| {
             let turns = (wrap_angle(pose.yaw_rad - start.yaw_rad) / TURN_RAD).round() as i32;
             let heading = turns.rem_euclid((TAU / TURN_RAD).round() as i32);
@@ -121,36 +157,47 @@ impl Pair<'_> {
         let still = |pose: Pose| {
             (self.distance_m(pose, to) - to.within_m).max(0.0) / STEP_M * STEP_FRAMES as f32
         };
-        let mut nodes = vec![Node { pose: start, cost: 0, first: None }];
+        let mut nodes = vec![Node { pose: start, cost: 0, from: None }];
         let mut best = BTreeMap::from([(key(start)?, 0)]);
         let mut queue = BinaryHeap::from([Reverse((still(start) as u32, 0))]);
         while let Some(Reverse((_, k))) = queue.pop() {
-            let Node { pose, cost, first } = nodes[k];
+            let Node { pose, cost, .. } = nodes[k];
             if self.is_there(pose, to) {
-                return Some(first.map_or(Nav::Arrived, Nav::Act));
+                return Some(actions_to(&nodes, k));
             }
             if best.get(&key(pose)?).is_some_and(|best| *best < cost) || nodes.len() > MAX_POSES {
                 continue;
             }
-            for (action, next, frames) in [
-                (Action::MoveForward, self.ahead(pose), STEP_FRAMES),
-                (Action::TurnLeft, self.turned(pose, 1.0), TURN_FRAMES),
-                (Action::TurnRight, self.turned(pose, -1.0), TURN_FRAMES),
+            for (action, frames) in [
+                (Action::MoveForward, STEP_FRAMES),
+                (Action::TurnLeft, TURN_FRAMES),
+                (Action::TurnRight, TURN_FRAMES),
             ] {
-                let Some(next) = next.filter(|_| first.is_some() || blocked != Some(action)) else {
+                let is_allowed = k > 0 || blocked != Some(action);
+                let next = self.after(pose, action).filter(|_| is_allowed);
+                let Some((next, key)) = next.and_then(|next| Some((next, key(next)?))) else {
                     continue;
                 };
-                let Some(key) = key(next) else { continue };
                 let cost = cost + frames + self.cost_frames(next);
                 if best.get(&key).is_none_or(|best| cost < *best) {
                     best.insert(key, cost);
                     queue.push(Reverse((cost + still(next) as u32, nodes.len())));
-                    nodes.push(Node { pose: next, cost, first: first.or(Some(action)) });
+                    nodes.push(Node { pose: next, cost, from: Some((k, action)) });
                 }
             }
         }
         None
     }
+}
+
+fn actions_to(nodes: &[Node], mut k: usize) -> Vec<Action> {
+    let mut actions = Vec::new();
+    while let Some((before, action)) = nodes[k].from {
+        actions.push(action);
+        k = before;
+    }
+    actions.reverse();
+    actions
 }
 
 #[cfg(test)]
@@ -166,6 +213,7 @@ mod tests {
         let mut memory = Memory::new(&toy.briefing(), crate::PlannerRules::paper());
         let end =
             OtherEnd { agent: AgentId::HELPER, position_in_body: Vec3::new(0.0, 0.0, -ahead_m) };
+        let mut way = VecDeque::new();
         for n in 0..120 {
             let mut observation = toy.observe();
             observation.own.other_end = Some(end);
@@ -174,7 +222,7 @@ mod tests {
                 &observation,
             );
             memory.update(&toy.briefing(), &observation, &percepts);
-            let action = match step(&mut memory, &Destination::near(to, 0.6))? {
+            let action = match step(&mut memory, &Destination::near(to, 0.6), &mut way)? {
                 Nav::Act(action) => action,
                 Nav::Arrived => return Some(n),
                 Nav::Unreachable => return None,
@@ -184,11 +232,7 @@ mod tests {
             let pair =
                 Pair { costs, bounds: toy.bounds(), other_in_body: end.position_in_body, room_m };
             let pose = observation.own.pose;
-            let next = match action {
-                Action::TurnLeft => pair.turned(pose, 1.0),
-                Action::TurnRight => pair.turned(pose, -1.0),
-                _ => pair.ahead(pose),
-            };
+            let next = pair.after(pose, action);
             let next = next.expect("it has room");
             for body in pair.bodies(next) {
                 assert!(toy.is_clear(body, 0.1), "something is met at {body} after {n} actions");

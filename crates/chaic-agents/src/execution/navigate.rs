@@ -1,5 +1,6 @@
 //! Walking somewhere: follows the cheapest way in steps and turns of 15 degrees.
 
+use std::collections::VecDeque;
 use std::f32::consts::PI;
 
 use chaic_protocol::geom::{self, wrap_angle, xz};
@@ -176,12 +177,15 @@ pub struct Navigator {
     to: Option<(Vec2, f32)>,
     age: u32,
     is_tight_way: bool,
+    /// What comes next where two carry furniture.
+    joint_way: VecDeque<Action>,
 }
 
 impl Navigator {
     /// Forgets the present way.
     pub fn reset(&mut self) {
         self.way.clear();
+        self.joint_way.clear();
     }
 
     /// The next action on the way to `destination`.
@@ -189,7 +193,7 @@ impl Navigator {
         if memory.rules.walking == Walking::Lattice {
             return super::lattice::step(memory, destination);
         }
-        if let Some(nav) = super::carry::step(memory, destination) {
+        if let Some(nav) = super::carry::step(memory, destination, &mut self.joint_way) {
             return nav;
         }
         let (here, yaw) = (memory.here(), memory.pose.yaw_rad);

@@ -11,7 +11,7 @@ use crate::{Action, Briefing, Observation, observation::Senses};
 pub struct Thought {
     /// The plan it follows, in words, for example `go to apple #31 and pick it up`.
     pub plan: String,
-    /// A short word for its state if it has one, for example the child's `run_away`.
+    /// A short word for its state if it has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mood: Option<String>,
 }

@@ -56,7 +56,7 @@ pub struct Summary {
     /// Frames in which the child was away; absent without child.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub away_frames: Option<u32>,
-    /// Frames of its escapes as the original counts them: while its mood was to run away and it was
+    /// Frames of its escapes as the original counts them: while it ran away by its own decision and was
     /// away; absent without child.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub escape_frames: Option<u32>,

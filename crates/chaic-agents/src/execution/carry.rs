@@ -17,8 +17,10 @@ const STEP_FRAMES: u32 = 11;
 const TURN_FRAMES: u32 = 2;
 /// Cost of cells that is worth a frame: what is near to things is gone around if it costs little.
 const COST_PER_FRAME: u32 = 20;
-/// Most poses that one search looks at (ours: a way across a yard takes some thousand).
-const MAX_POSES: usize = 40_000;
+/// Most poses that one search looks at (ours: more than there are in the largest yard).
+const MAX_POSES: usize = 200_000;
+/// Poses in one square of this side are one, metres: two thirds of a step.
+const SQUARE_M: f32 = 0.25;
 /// From this near to the place one can put down, metres: the world asks for 2 m of either of the two.
 const NEAR_M: f32 = 1.8;
 /// A place is another one than where it failed from this far on, metres.
@@ -141,7 +143,7 @@ impl Pair<'_> {
         self.bodies(pose).map(|p| cost(p).saturating_sub(FREE) / COST_PER_FRAME).iter().sum()
     }
 
-    /// A*: poses that share a cell and a heading are one. The actions to the destination, of which
+    /// A*: poses that share a square and a heading are one. The actions to the destination, of which
     /// the first is not the one that was just blocked.
     fn search(
         &self,
@@ -152,20 +154,21 @@ impl Pair<'_> {
         let key = |pose: Pose| {
             let turns = (wrap_angle(pose.yaw_rad - start.yaw_rad) / TURN_RAD).round() as i32;
             let heading = turns.rem_euclid((TAU / TURN_RAD).round() as i32);
-            Some((self.costs.grid().cell_at(xz(pose.position))?, heading))
+            let square = |m: f32| (m / SQUARE_M).floor() as i32;
+            (square(pose.position.x), square(pose.position.z), heading)
         };
         let still = |pose: Pose| {
             (self.distance_m(pose, to) - to.within_m).max(0.0) / STEP_M * STEP_FRAMES as f32
         };
         let mut nodes = vec![Node { pose: start, cost: 0, from: None }];
-        let mut best = BTreeMap::from([(key(start)?, 0)]);
+        let mut best = BTreeMap::from([(key(start), 0)]);
         let mut queue = BinaryHeap::from([Reverse((still(start) as u32, 0))]);
         while let Some(Reverse((_, k))) = queue.pop() {
             let Node { pose, cost, .. } = nodes[k];
             if self.is_there(pose, to) {
                 return Some(actions_to(&nodes, k));
             }
-            if best.get(&key(pose)?).is_some_and(|best| *best < cost) || nodes.len() > MAX_POSES {
+            if best.get(&key(pose)).is_some_and(|best| *best < cost) || nodes.len() > MAX_POSES {
                 continue;
             }
             for (action, frames) in [
@@ -175,9 +178,8 @@ impl Pair<'_> {
             ] {
                 let is_allowed = k > 0 || blocked != Some(action);
                 let next = self.after(pose, action).filter(|_| is_allowed);
-                let Some((next, key)) = next.and_then(|next| Some((next, key(next)?))) else {
-                    continue;
-                };
+                let Some(next) = next else { continue };
+                let key = key(next);
                 let cost = cost + frames + self.cost_frames(next);
                 if best.get(&key).is_none_or(|best| cost < *best) {
                     best.insert(key, cost);

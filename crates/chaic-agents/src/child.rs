@@ -1,7 +1,7 @@
 //! The child who comes along while shopping: follows, now and then runs away, and comes back when
 //! the helper is near (facts A2.4).
 
-use chaic_protocol::agent::Thought;
+use chaic_protocol::agent::{ChildState, Thought};
 use chaic_protocol::briefing::Relation;
 use chaic_protocol::geom::{wrap_angle, xz, yaw_towards};
 use chaic_protocol::observation::Senses;
@@ -44,9 +44,6 @@ const FREE_M: f32 = 1.0;
 const DRAWS: (usize, usize) = (2000, 500);
 /// So near to the point it is there, metres.
 const THERE_M: f32 = 0.5;
-
-/// The child's mood while it runs away, as its thoughts name it.
-pub const RUN_AWAY: &str = "run_away";
 
 /// What the child is up to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -256,12 +253,20 @@ impl Agent for Child {
     }
 
     fn thought(&self) -> Thought {
-        let (mood, plan) = match self.episode.as_ref().map(|e| e.mood) {
-            Some(Mood::RunAway(_)) => (RUN_AWAY, "run away"),
-            Some(Mood::GotoGuardian) => ("goto_guardian", "go back"),
-            Some(Mood::Follow) | None => ("follow", "come along"),
+        let plan = match self.episode.as_ref().map(|e| e.mood) {
+            Some(Mood::RunAway(_)) => "run away",
+            Some(Mood::GotoGuardian) => "go back",
+            Some(Mood::Follow) | None => "come along",
         };
-        Thought { plan: plan.to_owned(), mood: Some(mood.to_owned()) }
+        Thought { plan: plan.to_owned(), mood: None }
+    }
+
+    fn child_state(&self) -> Option<ChildState> {
+        self.episode.as_ref().map(|e| match e.mood {
+            Mood::Follow => ChildState::Follow,
+            Mood::RunAway(_) => ChildState::RunAway,
+            Mood::GotoGuardian => ChildState::GotoGuardian,
+        })
     }
 }
 
@@ -299,14 +304,14 @@ mod tests {
             Stage { child, observation }
         }
 
-        fn mood_at(&mut self, frame: Frame, guardian_x: f32, helper_x: f32) -> String {
+        fn state_at(&mut self, frame: Frame, guardian_x: f32, helper_x: f32) -> ChildState {
             self.observation.frame = frame;
             self.observation.granted.poses = vec![
                 (AgentId::PARTNER, seen_at(guardian_x, 0.0)),
                 (AgentId::HELPER, seen_at(helper_x, 0.0)),
             ];
             self.child.act(&self.observation);
-            self.child.thought().mood.expect("a child always has a mood")
+            self.child.child_state().expect("it was briefed")
         }
     }
 
@@ -315,16 +320,20 @@ mod tests {
         let (mut escapes, n) = (0, 600);
         for seed in 0..n {
             let mut stage = Stage::new(seed);
-            escapes += u32::from(stage.mood_at(0, 1.0, 9.0) == "run_away");
+            escapes += u32::from(stage.state_at(0, 1.0, 9.0) == ChildState::RunAway);
         }
         // 120 expected, standard deviation 9.8.
         assert!((85..155).contains(&escapes), "{escapes} of {n}");
         let mut stage = (0..50)
             .map(Stage::new)
-            .find_map(|mut s| (s.mood_at(0, 1.0, 9.0) == "follow").then_some(s))
+            .find_map(|mut s| (s.state_at(0, 1.0, 9.0) == ChildState::Follow).then_some(s))
             .expect("most follow at first");
         for frame in 1..=PLAN_FRAMES {
-            assert_eq!(stage.mood_at(frame, 1.0, 9.0), "follow", "no draw before frame 101");
+            assert_eq!(
+                stage.state_at(frame, 1.0, 9.0),
+                ChildState::Follow,
+                "no draw before frame 101"
+            );
         }
     }
 
@@ -335,7 +344,8 @@ mod tests {
             stage.child.rules.child_draws = ChildDraws::Constant;
             stage.child.episode.as_mut().expect("briefed").memory.rules = stage.child.rules;
             // A draw at once, and then one every 101 frames.
-            let first = (0..2000).find(|frame| stage.mood_at(*frame, 1.0, 9.0) == RUN_AWAY);
+            let first =
+                (0..2000).find(|frame| stage.state_at(*frame, 1.0, 9.0) == ChildState::RunAway);
             assert_eq!(first, Some(5 * (PLAN_FRAMES + 1)), "seed {seed}");
         }
     }
@@ -344,21 +354,21 @@ mod tests {
     fn it_comes_back_only_when_the_helper_is_near_and_follows_when_home() {
         let mut stage = (0..50)
             .map(Stage::new)
-            .find_map(|mut s| (s.mood_at(0, 1.0, 9.0) == "run_away").then_some(s))
+            .find_map(|mut s| (s.state_at(0, 1.0, 9.0) == ChildState::RunAway).then_some(s))
             .expect("some run at once");
         for frame in (10..2000).step_by(10) {
-            assert_eq!(stage.mood_at(frame, 1.0, 2.6), "run_away");
+            assert_eq!(stage.state_at(frame, 1.0, 2.6), ChildState::RunAway);
         }
-        assert_eq!(stage.mood_at(2000, 6.0, 2.4), "goto_guardian");
-        assert_eq!(stage.mood_at(2101, 6.0, 2.4), "goto_guardian", "still 6 m from home");
-        assert_eq!(stage.mood_at(2202, 2.9, 9.0), "follow");
+        assert_eq!(stage.state_at(2000, 6.0, 2.4), ChildState::GotoGuardian);
+        assert_eq!(stage.state_at(2101, 6.0, 2.4), ChildState::GotoGuardian, "still 6 m from home");
+        assert_eq!(stage.state_at(2202, 2.9, 9.0), ChildState::Follow);
     }
 
     #[test]
     fn points_to_run_to_are_far_inside_and_away_from_the_guardian() {
         for seed in 0..40 {
             let mut stage = Stage::new(seed);
-            stage.mood_at(0, 2.0, 9.0);
+            stage.state_at(0, 2.0, 9.0);
             let episode = stage.child.episode.as_mut().expect("briefed");
             let guardian = Vec3::new(2.0, 0.0, 0.0);
             let point = episode.far_point(guardian).expect("there is room");

@@ -5,7 +5,7 @@ use chaic_protocol::capability::Persona;
 use chaic_protocol::observation::Grants;
 use chaic_protocol::task::SceneKind;
 
-pub use crate::child::{Child, RUN_AWAY};
+pub use crate::child::Child;
 use crate::mind::Mind;
 use crate::policies::{RuleProfile, Rules};
 use crate::rules::PlannerRules;

@@ -11,6 +11,8 @@ pub const MIN_PIXELS: u32 = 5;
 pub const STRIDE: u32 = 2;
 /// Points farther than this say nothing of where an object is, metres (facts A1.1).
 const OBJECT_RANGE_M: f32 = 10.0;
+/// People are seen from anywhere (facts A1.8: whoever is in the image is placed where it is).
+const PERSON_RANGE_M: f32 = f32::INFINITY;
 /// Points higher than this belong to no footprint: nobody bumps into them, metres.
 const FOOTPRINT_HEIGHT_M: f32 = 2.0;
 /// Spacing of footprint points, metres.
@@ -318,8 +320,10 @@ impl Perception for GroundTruthIds {
                 }
                 let tally = &mut tallies[id];
                 tally.run(row, from, end);
+                let is_person = EntityId(id as u16).agent().is_some();
+                let range_m = if is_person { PERSON_RANGE_M } else { OBJECT_RANGE_M };
                 let mut add = |column: usize| {
-                    if depth[column] < OBJECT_RANGE_M {
+                    if depth[column] < range_m {
                         tally.add(rays.point(column, row, depth[column]));
                     }
                 };
@@ -351,6 +355,7 @@ impl Perception for GroundTruthIds {
 mod tests {
     use super::*;
     use crate::test_support::{Toy, ToyObject};
+    use chaic_protocol::AgentId;
 
     #[test]
     fn a_detection_is_where_the_object_is_and_knows_how_high_it_is() {
@@ -393,6 +398,19 @@ mod tests {
         toy.stand([0.0, 0.0], 0.0);
         let percepts = GroundTruthIds.perceive(&toy.observe());
         assert!(percepts.detections.iter().all(|d| d.track != behind && d.track != speck));
+    }
+
+    #[test]
+    fn objects_are_seen_up_to_ten_metres_off_and_people_from_anywhere() {
+        for (z, is_seen) in [(-8.0, true), (-14.0, false)] {
+            let mut toy = Toy::room(40.0, 40.0);
+            let bed = toy.add(ToyObject::new("bed", [2.0, 0.0, z], [1.6, 1.0, 1.6]));
+            let partner = toy.add_person(AgentId::PARTNER, [-2.0, z]);
+            toy.stand([0.0, 0.0], 0.0);
+            let seen = GroundTruthIds.perceive(&toy.observe()).detections;
+            let sees = |track| seen.iter().any(|d| d.track == track);
+            assert_eq!((sees(bed), sees(partner)), (is_seen, true), "{z} m off");
+        }
     }
 
     #[test]

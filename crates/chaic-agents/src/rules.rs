@@ -122,6 +122,9 @@ pub struct PlannerRules {
     pub around_turns: u32,
     /// Whether looking around ends as soon as partner and child have both been seen.
     pub stops_turning_when_found: bool,
+    /// Whether helpers with the child's rules heed them at all; without them one sees what they are
+    /// worth (ours).
+    pub minds_child: bool,
     /// Child or guardian unseen for so long is looked for, frames.
     pub child_unseen_frames: Frame,
     /// Whether a helper stays with the child only until it turns back, rather than for the time of
@@ -158,7 +161,8 @@ impl PlannerRules {
             random_draw: RandomDraw::Plans,
             around_turns: 18,
             stops_turning_when_found: false,
-            child_unseen_frames: 300,
+            minds_child: true,
+            child_unseen_frames: 200,
             trusts_child: true,
             child_draws: ChildDraws::Seeded,
         }
@@ -190,6 +194,7 @@ impl PlannerRules {
             random_draw: RandomDraw::KindsFirst,
             around_turns: 24,
             stops_turning_when_found: true,
+            minds_child: true,
             child_unseen_frames: 200,
             trusts_child: false,
             child_draws: ChildDraws::Constant,

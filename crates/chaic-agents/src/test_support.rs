@@ -125,6 +125,20 @@ impl Toy {
         entity.into()
     }
 
+    /// Somebody who stands there.
+    pub fn add_person(&mut self, agent: AgentId, at: [f32; 2]) -> TrackId {
+        let entity = EntityId::of_agent(agent);
+        let (low, high) = (Vec3::new(-0.2, 0.0, -0.2), Vec3::new(0.2, 1.7, 0.2));
+        let at = Vec3::new(at[0], 0.0, at[1]);
+        self.solids.push(Solid { entity, low: at + low, high: at + high });
+        entity.into()
+    }
+
+    /// Whether everything is at least so far from a point.
+    pub fn is_clear(&self, p: Vec2, least_m: f32) -> bool {
+        self.solids.iter().all(|s| s.distance_from(p) >= least_m)
+    }
+
     pub fn remove(&mut self, track: TrackId) {
         let entity = EntityId(track.0 as u16);
         self.solids.retain(|s| s.entity != entity);
@@ -208,7 +222,7 @@ impl Toy {
         };
         Observation {
             frame: self.frame,
-            own: SelfState { pose: self.pose, hands, last: self.last },
+            own: SelfState { pose: self.pose, hands, last: self.last, other_end: None },
             camera,
             images: Images { rgb: None, depth_m: Some(depth), ids: Some(ids) },
             granted,

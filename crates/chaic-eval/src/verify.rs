@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use chaic_protocol::agent::ChildState;
 use chaic_protocol::{AgentId, Frame};
 use chaic_world::World;
 
@@ -230,14 +231,14 @@ fn without_counts(result: &RunResult) -> RunResult {
 /// # Errors
 /// None of its own; those of a broken world.
 pub fn verify(trace: &Trace, world: &mut World, path: &Path) -> Result<Option<Mismatch>> {
-    let mut decisions: VecDeque<&Decision> = trace.decisions().collect();
+    let mut decisions: VecDeque<(&Decision, Option<ChildState>)> = decisions_of(trace);
     let mut recorded = trace.records.iter();
     let mut found = None;
     let mut last: Option<Decision> = None;
     let mut decide = |world: &World, waiting: &[AgentId]| {
         let mut choices = Vec::new();
         let frame = world.state().frame;
-        while let Some(d) = decisions.front() {
+        while let Some((d, child)) = decisions.front() {
             let is_now = d.frame == frame
                 && waiting.contains(&d.agent)
                 && !choices.iter().any(|c: &Choice| c.agent == d.agent);
@@ -245,7 +246,7 @@ pub fn verify(trace: &Trace, world: &mut World, path: &Path) -> Result<Option<Mi
                 break;
             }
             let Decision { agent, action, ref thought, .. } = **d;
-            choices.push(Choice { agent, action, thought: thought.clone() });
+            choices.push(Choice { agent, action, thought: thought.clone(), child: *child });
             decisions.pop_front();
         }
         // Everybody who waited in this frame has decided, if the trace goes so far.
@@ -267,6 +268,23 @@ pub fn verify(trace: &Trace, world: &mut World, path: &Path) -> Result<Option<Mi
         Err(error) => Err(error),
         Ok(flow) => Ok(leftover(path, flow, recorded.next(), world)),
     }
+}
+
+/// The decisions of a trace, each with what the child does from it on if the trace says so.
+fn decisions_of(trace: &Trace) -> VecDeque<(&Decision, Option<ChildState>)> {
+    let mut decisions: VecDeque<(&Decision, Option<ChildState>)> = VecDeque::new();
+    for record in &trace.records {
+        match record {
+            Record::Decision(decision) => decisions.push_back((decision, None)),
+            Record::Child(child) => {
+                if let Some((_, state)) = decisions.back_mut() {
+                    *state = Some(child.state);
+                }
+            }
+            Record::Event(_) | Record::End(_) => {}
+        }
+    }
+    decisions
 }
 
 /// What the trace says that never came out.
@@ -293,6 +311,7 @@ fn mismatch(
 ) -> Mismatch {
     let place = |record: &Record| match record {
         Record::Decision(d) => (d.frame, Some(d.agent)),
+        Record::Child(c) => (c.frame, Some(AgentId::CHILD)),
         Record::Event(e) => (e.event.frame, None),
         Record::End(e) => (e.frame, None),
     };

@@ -11,9 +11,22 @@ use crate::{Action, Briefing, Observation, observation::Senses};
 pub struct Thought {
     /// The plan it follows, in words, for example `go to apple #31 and pick it up`.
     pub plan: String,
-    /// A short word for its state if it has one, for example the child's `run_away`.
+    /// A short word for its state if it has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mood: Option<String>,
+}
+
+/// What the child who comes along is doing, by its own decision. The original's emergency rate asks
+/// for it (facts 8.4), so it is a record of its own in traces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ChildState {
+    /// Comes along with its guardian.
+    Follow,
+    /// Runs to a place far off, or stays there.
+    RunAway,
+    /// Goes back to its guardian.
+    GotoGuardian,
 }
 
 /// A mind: it is briefed once, then asked for an action each time its last one has ended.
@@ -34,6 +47,11 @@ pub trait Agent: Send {
     /// What it is thinking, for the record.
     fn thought(&self) -> Thought {
         Thought::default()
+    }
+
+    /// What it is doing, if it is the child's mind; asked after each [`Agent::act`].
+    fn child_state(&self) -> Option<ChildState> {
+        None
     }
 
     /// What it counted of its own doings in this episode, by name, for the record: never read by

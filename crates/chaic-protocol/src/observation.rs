@@ -110,6 +110,15 @@ pub struct Identity {
     pub contents: Vec<(EntityId, ClassId)>,
 }
 
+/// Who holds the other end of the furniture that an agent leads with, as its hands tell it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OtherEnd {
+    /// Who.
+    pub agent: AgentId,
+    /// Where, in the own body's frame, metres; it stays so until the furniture is put down.
+    pub position_in_body: Vec3,
+}
+
 /// What an agent knows of itself.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SelfState {
@@ -122,6 +131,9 @@ pub struct SelfState {
     /// `None` at the start, and after an action that another one's choice replaced by a joint lift
     /// (original's rules), unless ids are granted.
     pub last: Option<(Action, Outcome)>,
+    /// Who carries along, for the one who leads.
+    #[serde(default)]
+    pub other_end: Option<OtherEnd>,
 }
 
 impl SelfState {

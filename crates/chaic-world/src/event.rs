@@ -100,6 +100,13 @@ pub enum EventKind {
         /// Whether it is away now.
         away: bool,
     },
+    /// The partner or the helper has made no progress for long, or makes some again.
+    Stuck {
+        /// Who.
+        agent: AgentId,
+        /// Whether it is stuck now.
+        stuck: bool,
+    },
     /// The episode ended.
     Over {
         /// Whether everything wanted was delivered.

@@ -39,5 +39,8 @@ pub use setup::{
     Floor, FloorMaterial, Opening, Person, Room, RoomKind, Setup, SetupError, Thing, Wall,
 };
 pub use shape::{Block, Surface, blocks_of, ghosts_of, top_surfaces};
-pub use state::{Activity, JointCarry, PersonState, Phase, Place, State, Step, ThingState};
+pub use state::{
+    Activity, JointCarry, LastProgress, PROGRESS_M, PersonState, Phase, Place, STUCK_AFTER_FRAMES,
+    State, Step, ThingState,
+};
 pub use world::{Snapshot, SnapshotError, SubmitError, World};

@@ -27,8 +27,10 @@ impl World {
     pub(crate) fn carry_along(&mut self) {
         if let Some(joint) = self.state.joint.filter(|j| j.under_way) {
             let leader = self.person(joint.leader).pose;
-            let follower = self.person_mut(joint.follower);
-            follower.pose.position = leader.to_world(joint.follower_in_leader);
+            // Where turns aren't checked, the follower would be swung out of the place.
+            let (at, bounds) = (leader.to_world(joint.follower_in_leader), self.setup.bounds);
+            let inside = xz(at).clamp(bounds.min, bounds.max);
+            self.person_mut(joint.follower).pose.position = Vec3::new(inside.x, at.y, inside.y);
             self.face(joint.follower, leader.position);
         }
         for agent in self.setup.agents() {

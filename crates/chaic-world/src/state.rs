@@ -20,6 +20,8 @@ pub struct State {
     pub child_away_frames: u32,
     /// Whether it is away now.
     pub child_is_away: bool,
+    /// Frames in which the partner or the helper was stuck.
+    pub stuck_frames: u32,
     /// Whether the episode has ended.
     pub over: bool,
 }
@@ -95,6 +97,29 @@ pub struct PersonState {
     pub walked_m: f32,
     /// How many draws of luck this person has had.
     pub draws: u32,
+    /// The last progress that this person made.
+    pub progress: LastProgress,
+}
+
+/// Who has made no progress for so many frames is stuck (ours: twice as long as the longest action
+/// other than waiting for another takes).
+pub const STUCK_AFTER_FRAMES: Frame = 200;
+/// Getting farther than this from where one made progress last is progress, metres (ours: more than
+/// a step, so that stepping to and fro is none).
+pub const PROGRESS_M: f32 = 0.5;
+
+/// When and where a person made progress last: got farther than [`PROGRESS_M`] from where it had
+/// made some before, on its own feet or carried along, or carried out an action that was neither a
+/// step, nor a turn, nor a wait: well, or in vain because it was beyond its limits, which is a draw
+/// of luck. Why it makes none does not matter: who waits on purpose makes none.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LastProgress {
+    /// When.
+    pub frame: Frame,
+    /// Where it stood then.
+    pub position: Vec3,
+    /// Whether it is stuck: that was [`STUCK_AFTER_FRAMES`] ago or longer.
+    pub is_stuck: bool,
 }
 
 impl PersonState {
@@ -109,6 +134,7 @@ impl PersonState {
             in_stride: false,
             walked_m: 0.0,
             draws: 0,
+            progress: LastProgress { frame: 0, position: pose.position, is_stuck: false },
         }
     }
 }

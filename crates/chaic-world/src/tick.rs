@@ -12,7 +12,7 @@ use chaic_protocol::{Action, AgentId, Outcome, Vec2, Vec3};
 
 use crate::event::EventKind;
 use crate::rules::Blocking;
-use crate::state::{Activity, Phase, Place, Step};
+use crate::state::{Activity, PROGRESS_M, Phase, Place, STUCK_AFTER_FRAMES, Step};
 use crate::world::World;
 
 /// What became of a step in this frame.
@@ -40,6 +40,7 @@ impl World {
         self.carry_along();
         self.state.frame += 1;
         self.watch_child();
+        self.watch_progress();
         self.end_if_over();
     }
 
@@ -84,6 +85,10 @@ impl World {
         person.last = Some((action, outcome));
         if !action.is_locomotion() && !matches!(action, Action::Wait { .. }) {
             person.last_deed = Some((frame, action, outcome));
+            let is_tried = outcome == Outcome::Failure(FailureReason::BeyondLimits);
+            if outcome.is_success() || is_tried {
+                (person.progress.frame, person.progress.position) = (frame, person.pose.position);
+            }
         }
         person.in_stride = action == Action::MoveForward && outcome.is_success();
         self.happened(EventKind::Ended { agent, action, outcome });
@@ -277,6 +282,26 @@ impl World {
             self.state.child_is_away = away;
             self.happened(EventKind::ChildAway { away });
         }
+    }
+
+    /// Notes who of partner and helper makes progress, and counts the frames in which one of them
+    /// is stuck.
+    fn watch_progress(&mut self) {
+        let frame = self.state.frame;
+        let mut is_anybody_stuck = false;
+        for agent in self.setup.agents().filter(|a| *a != AgentId::CHILD) {
+            let person = self.person_mut(agent);
+            let (here, progress) = (person.pose.position, &mut person.progress);
+            if horizontal_distance(here, progress.position) > PROGRESS_M {
+                (progress.frame, progress.position) = (frame, here);
+            }
+            let stuck = frame >= progress.frame + STUCK_AFTER_FRAMES;
+            is_anybody_stuck |= stuck;
+            if std::mem::replace(&mut progress.is_stuck, stuck) != stuck {
+                self.happened(EventKind::Stuck { agent, stuck });
+            }
+        }
+        self.state.stuck_frames += u32::from(is_anybody_stuck);
     }
 
     fn end_if_over(&mut self) {

@@ -5,7 +5,9 @@ use chaic_protocol::briefing::{Briefing, Companion, Relation, Told};
 use chaic_protocol::capability::Gait;
 use chaic_protocol::catalogue::{CLASSES, Role};
 use chaic_protocol::geom::{Camera, rotate_yaw, yaw_rotation};
-use chaic_protocol::observation::{Granted, Grants, Held, Identity, SeenAction, SelfState};
+use chaic_protocol::observation::{
+    Granted, Grants, Held, Identity, OtherEnd, SeenAction, SelfState,
+};
 use chaic_protocol::rng::Stream;
 use chaic_protocol::task::SceneKind;
 use chaic_protocol::{Action, AgentId, ClassId, EntityId, Outcome, ResolvedAction, Vec3};
@@ -79,7 +81,10 @@ impl World {
                 identity: grants.ids.then(|| self.identity(entity)),
             })
         });
-        SelfState { pose: self.person(agent).pose, hands, last }
+        let joint = self.state.joint.filter(|j| j.leader == agent && j.under_way);
+        let other_end =
+            joint.map(|j| OtherEnd { agent: j.follower, position_in_body: j.follower_in_leader });
+        SelfState { pose: self.person(agent).pose, hands, last, other_end }
     }
 
     /// The action of an agent that ended last, with its outcome.

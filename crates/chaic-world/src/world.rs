@@ -372,6 +372,7 @@ fn initial_state(setup: &Setup) -> State {
         joint: None,
         child_away_frames: 0,
         child_is_away: false,
+        stuck_frames: 0,
         over: false,
     }
 }

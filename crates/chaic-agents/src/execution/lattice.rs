@@ -15,11 +15,14 @@ use crate::memory::{CELL_M, Memory, Space};
 const AHEAD: usize = 5;
 /// Heading for it within this, one walks on, radians: 1.2 turns.
 const WALK_RAD: f32 = 1.2 * TURN_RAD;
+/// Who has turned so often without a step takes one (ours). Nobody needs more than half a circle to
+/// face any way; but what one sees on turning may move the way to the other side, and back again.
+const MOST_TURNS: u32 = 24;
 /// To do something with a thing, the way to it may have so many cells at most.
 const INTERACT_CELLS: usize = 25;
 
-/// The next action on the way to `destination`.
-pub fn step(memory: &mut Memory, destination: &Destination) -> Nav {
+/// The next action on the way to `destination`; `n_turns` counts the turns since the last step.
+pub fn step(memory: &mut Memory, destination: &Destination, n_turns: &mut u32) -> Nav {
     let (here, yaw) = (memory.here(), memory.pose.yaw_rad);
     let target = destination.nearest(here);
     let (costs, search) = memory.costs_and_search();
@@ -41,7 +44,9 @@ pub fn step(memory: &mut Memory, destination: &Destination) -> Nav {
     let to = waypoint(memory, &way);
     let at = |p: Vec2| Vec3::new(p.x, 0.0, p.y);
     let error = wrap_angle(yaw_towards(at(here), at(to)) - yaw);
-    Nav::Act(if error.abs() < WALK_RAD || to == here {
+    *n_turns += 1;
+    Nav::Act(if error.abs() < WALK_RAD || to == here || *n_turns > MOST_TURNS {
+        *n_turns = 0;
         Action::MoveForward
     } else if error > 0.0 {
         Action::TurnLeft
@@ -90,7 +95,7 @@ mod tests {
             &observation,
         );
         memory.update(&briefing, &observation, &percepts);
-        step(&mut memory, &Destination::near(Vec2::new(2.0, 0.0), 0.3))
+        step(&mut memory, &Destination::near(Vec2::new(2.0, 0.0), 0.3), &mut 0)
     }
 
     #[test]

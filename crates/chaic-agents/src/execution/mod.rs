@@ -3,6 +3,7 @@
 pub mod path;
 mod queue;
 
+pub mod carry;
 pub mod navigate;
 
 pub mod explore;
@@ -155,7 +156,9 @@ impl Executor {
         if is_standing || self.has_acted {
             self.recovery.stand();
         }
-        if !is_standing && s.memory.rules.walking == Walking::Careful {
+        // Two who carry get free by planning for both.
+        let is_pair = s.memory.other_end.is_some();
+        if !is_standing && !is_pair && s.memory.rules.walking == Walking::Careful {
             if let Some(action) = self.recovery.step(s.memory, s.memory.last, &mut self.rng) {
                 return Progress::Act(action);
             }

@@ -1,5 +1,6 @@
 //! Walking somewhere: follows the cheapest way in steps and turns of 15 degrees.
 
+use std::collections::VecDeque;
 use std::f32::consts::PI;
 
 use chaic_protocol::geom::{self, wrap_angle, xz};
@@ -97,14 +98,15 @@ impl Destination {
         point.distance(here) <= self.within_m
             && self.avoid.iter().all(|tried| self.is_other_side(*tried, here, point))
             && self.arm_m.is_none_or(|arm_m| is_line_clear(costs, here, point, arm_m + tolerance_m))
-            && !self.same_room_as.is_some_and(|middle| self.is_behind_wall(costs, here, middle))
+            && !self.is_walled_off(costs, here)
     }
 }
 
 impl Destination {
-    /// Whether a wall is between somebody at `here` and a large thing with this middle. What is as
-    /// high as a wall is one on the map: the thing's own outline does not count.
-    fn is_behind_wall(&self, costs: &CostMap, here: Vec2, middle: Vec2) -> bool {
+    /// Whether a wall is between somebody at `here` and the large thing that this is about. What is
+    /// as high as a wall is one on the map: the thing's own outline does not count.
+    pub(super) fn is_walled_off(&self, costs: &CostMap, here: Vec2) -> bool {
+        let Some(middle) = self.same_room_as else { return false };
         /// So far inside the thing the line ends, metres: the wall may be all that it touches.
         const INSIDE_M: f32 = 0.35;
         let nearest = self.nearest(here);
@@ -176,18 +178,26 @@ pub struct Navigator {
     to: Option<(Vec2, f32)>,
     age: u32,
     is_tight_way: bool,
+    /// Turns since the last step, where ways are those of the original.
+    n_turns: u32,
+    /// What comes next where two carry furniture.
+    joint_way: VecDeque<Intent>,
 }
 
 impl Navigator {
     /// Forgets the present way.
     pub fn reset(&mut self) {
         self.way.clear();
+        self.joint_way.clear();
     }
 
     /// The next action on the way to `destination`.
     pub fn step(&mut self, memory: &mut Memory, destination: &Destination) -> Nav {
         if memory.rules.walking == Walking::Lattice {
-            return super::lattice::step(memory, destination);
+            return super::lattice::step(memory, destination, &mut self.n_turns);
+        }
+        if let Some(nav) = super::carry::step(memory, destination, &mut self.joint_way) {
+            return nav;
         }
         let (here, yaw) = (memory.here(), memory.pose.yaw_rad);
         let (costs, _) = memory.costs_and_search();

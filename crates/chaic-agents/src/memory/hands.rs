@@ -76,7 +76,8 @@ mod tests {
         ];
         let mut hands = Hands::default();
         for (action, own, expected) in story {
-            let own = SelfState { pose: Default::default(), hands: own, last: None };
+            let own =
+                SelfState { pose: Default::default(), hands: own, last: None, other_end: None };
             let last = Some((action, Outcome::Success));
             hands = account(&hands, &own, last, Gait::Walk, class_of);
             let text = |c: &Option<Carried>| match c {
@@ -94,7 +95,12 @@ mod tests {
 
     #[test]
     fn what_one_did_not_see_oneself_take_is_something() {
-        let own = SelfState { pose: Default::default(), hands: [felt(0), felt(2)], last: None };
+        let own = SelfState {
+            pose: Default::default(),
+            hands: [felt(0), felt(2)],
+            last: None,
+            other_end: None,
+        };
         let hands = account(&Hands::default(), &own, None, Gait::WalkBike, |_| None);
         assert_eq!(hands.hands[0].as_ref().and_then(Carried::class), ClassId::by_name("bike"));
         let right = hands.hands[1].as_ref().expect("it is felt");

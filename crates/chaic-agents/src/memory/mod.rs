@@ -13,9 +13,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use chaic_protocol::briefing::Relation;
 use chaic_protocol::capability::Gait;
-use chaic_protocol::geom::{Pose, horizontal_distance, xz};
-use chaic_protocol::observation::Grants;
-use chaic_protocol::{AgentId, Briefing, ClassId, Frame, Observation, Outcome, Vec2, Vec3};
+use chaic_protocol::geom::{Pose, Rect, horizontal_distance, xz};
+use chaic_protocol::observation::{Grants, OtherEnd};
+use chaic_protocol::{
+    AgentId, Briefing, ClassId, FailureReason, Frame, Observation, Outcome, Vec2, Vec3,
+};
 
 pub use grid::{CELL_M, Grid};
 pub use occupancy::{OccupancyMap, Space};
@@ -80,6 +82,12 @@ pub struct Memory {
     costs: CostMap,
     costs_of: Option<(u32, u32)>,
     people_moved: bool,
+    /// Nobody gets out of this.
+    pub bounds: Rect,
+    /// Who carries along what one leads with.
+    pub other_end: Option<OtherEnd>,
+    /// The last action, if it was one of moving about and something was in the way.
+    pub blocked: Option<Intent>,
     /// Whether anything was taken in since costs were computed last.
     is_stale: bool,
     is_partner: bool,
@@ -113,6 +121,9 @@ impl Memory {
             costs,
             costs_of: None,
             people_moved: true,
+            bounds: briefing.bounds,
+            other_end: None,
+            blocked: None,
             is_stale: true,
             is_partner: briefing.me == AgentId::PARTNER,
             gait: briefing.capability.gait,
@@ -125,6 +136,11 @@ impl Memory {
         let before = self.frame;
         self.frame = observation.frame;
         self.pose = observation.own.pose;
+        self.other_end = observation.own.other_end;
+        self.blocked = self.last.and_then(|(action, outcome)| {
+            let is_blocked = outcome == Outcome::Failure(FailureReason::Blocked);
+            (is_blocked && action.is_locomotion()).then_some(action)
+        });
         let detections = &percepts.detections[..];
         self.classes.extend(detections.iter().map(|d| (d.track, d.class)));
         let seen = if self.rules.sees_people(briefing) { detections } else { &[] };
@@ -241,9 +257,10 @@ impl Memory {
 
     fn refresh_costs(&mut self) {
         if self.rules.walking == Walking::Lattice {
-            let Memory { map, things, people, .. } = self;
+            let people = self.in_the_way();
+            let Memory { map, things, .. } = self;
             let (heeds_obstacles, now) = (self.is_partner, self.frame);
-            let seen = lattice_costs::Seen { map, things, people, heeds_obstacles, now };
+            let seen = lattice_costs::Seen { map, things, people: &people, heeds_obstacles, now };
             if std::mem::take(&mut self.is_stale) {
                 self.costs.rebuild_lattice(&seen);
             }
@@ -251,11 +268,20 @@ impl Memory {
         }
         let of = (self.map.version(), self.things.layout());
         if self.costs_of != Some(of) || self.people_moved {
-            let here = self.here();
-            self.costs.rebuild(&self.map, &self.things, &self.people, here, self.frame);
+            let (here, people) = (self.here(), self.in_the_way());
+            self.costs.rebuild(&self.map, &self.things, &people, here, self.frame);
             self.costs_of = Some(of);
             self.people_moved = false;
             self.reach = None;
+        }
+    }
+
+    /// The people whom one would have to go around: not who carries along (original facts 2.5: while
+    /// two carry, the leader leaves the other one's body out of its map).
+    fn in_the_way(&self) -> People {
+        match self.other_end {
+            Some(end) => self.people.without(end.agent),
+            None => self.people.clone(),
         }
     }
 

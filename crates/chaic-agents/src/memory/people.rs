@@ -34,6 +34,11 @@ impl People {
         self.seen.iter()
     }
 
+    /// All but one.
+    pub fn without(&self, agent: AgentId) -> People {
+        People { seen: self.seen.iter().copied().filter(|p| p.agent != agent).collect() }
+    }
+
     /// Takes in who is seen now.
     pub fn see(&mut self, briefing: &Briefing, observation: &Observation, seen: &[Detection]) {
         for person in &mut self.seen {

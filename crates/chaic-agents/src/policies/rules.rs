@@ -128,7 +128,7 @@ impl Rules {
     fn mind_child(&mut self, context: &Context<'_>) -> Option<Plan> {
         let (memory, now) = (context.memory, context.memory.frame);
         let child = context.briefing.companion(Relation::Child)?;
-        if !self.profile.minds_child {
+        if !(self.profile.minds_child && memory.rules.minds_child) {
             return None;
         }
         let guardian = memory.companion(context.briefing, Relation::Partner);

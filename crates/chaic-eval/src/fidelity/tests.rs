@@ -22,6 +22,7 @@ fn run(task: TaskId, helper: &str, episode: u32, seed: u32, done: f64) -> RunRes
             done,
             total: 10.0,
             away_frames: None,
+            stuck_frames: None,
             escape_frames: None,
             deliveries: Vec::new(),
             digest: Digest(0),

@@ -35,7 +35,7 @@ pub struct Formulas {
     pub spread: Spread,
     /// Whether CR credits the helper with what it once took and the partner delivered.
     pub credits_handing_over: bool,
-    /// Whether ER counts frames only while the child's mood was to run away, by its decisions.
+    /// Whether ER counts frames only while the child ran away, by its own decisions.
     pub er_by_mood: bool,
 }
 

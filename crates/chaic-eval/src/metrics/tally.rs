@@ -2,12 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use chaic_agents::partners::RUN_AWAY;
+use chaic_protocol::agent::ChildState;
 use chaic_protocol::{AgentId, ClassId, EntityId, Frame};
 use chaic_world::EventKind;
 
 use crate::metrics::{Delivery, Ending, RunKey, RunResult, Summary};
-use crate::trace::{Decision, End, Header, Record, Trace};
+use crate::trace::{End, Header, Record, Trace};
 
 /// Reads records one by one.
 #[derive(Clone, Debug)]
@@ -25,7 +25,7 @@ pub struct Tally {
 /// The child's escapes as the original counts them (facts S8.4): by the child's decisions.
 #[derive(Clone, Copy, Debug, Default)]
 struct Escape {
-    /// Whether its mood is to run away, as of its last decision.
+    /// Whether it runs away, as of its last decision.
     is_running: bool,
     /// Whether it is far from its guardian now.
     is_away: bool,
@@ -36,14 +36,11 @@ struct Escape {
 }
 
 impl Escape {
-    fn decides(&mut self, decision: &Decision) {
+    fn decides(&mut self, frame: Frame) {
         if self.is_running && self.is_away {
-            self.frames += decision.frame - self.decided;
+            self.frames += frame - self.decided;
         }
-        self.decided = decision.frame;
-        if let Some(thought) = &decision.thought {
-            self.is_running = thought.mood.as_deref() == Some(RUN_AWAY);
-        }
+        self.decided = frame;
     }
 
     /// All frames counted, with those left when the episode ends, wherever the child is then.
@@ -70,8 +67,12 @@ impl Tally {
         match record {
             Record::Decision(decision) => {
                 if decision.agent == AgentId::CHILD {
-                    self.escape.decides(decision);
+                    self.escape.decides(decision.frame);
                 }
+                None
+            }
+            Record::Child(child) => {
+                self.escape.is_running = child.state == ChildState::RunAway;
                 None
             }
             Record::Event(event) => {
@@ -118,6 +119,7 @@ impl Tally {
                 total: end.total,
                 away_frames: self.has_child.then_some(end.away_frames),
                 escape_frames: self.has_child.then(|| self.escape.total(end.frame)),
+                stuck_frames: Some(end.stuck_frames),
                 deliveries: self.deliveries.clone(),
                 digest: end.digest,
                 counts: BTreeMap::new(),
@@ -135,27 +137,22 @@ pub fn tally(trace: &Trace) -> Option<RunResult> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::digest::Digest;
-    use chaic_protocol::Action;
-    use chaic_protocol::agent::Thought;
 
     #[test]
     fn escapes_are_counted_by_the_childs_decisions_and_to_the_end() {
         let mut escape = Escape::default();
-        let mut decides = |frame, mood: Option<&str>, is_away| {
-            let mood = mood.map(str::to_owned);
-            let thought = mood.map(|m| Thought { plan: String::new(), mood: Some(m) });
-            let (agent, action, digest) = (AgentId::CHILD, Action::TurnLeft, Digest(0));
+        let mut decides = |frame, is_running, is_away| {
             escape.is_away = is_away;
-            escape.decides(&Decision { frame, agent, action, digest, thought });
+            escape.decides(frame);
+            escape.is_running = is_running;
             (escape.frames, escape.total(200))
         };
         // Frames so far, and those counted if the episode ended at frame 200.
-        assert_eq!(decides(0, Some("follow"), true), (0, 0), "away, but not on the run");
-        assert_eq!(decides(50, Some(RUN_AWAY), false), (0, 150));
-        assert_eq!(decides(70, None, false), (0, 130), "on the run, but still near");
-        assert_eq!(decides(90, None, true), (20, 130));
-        assert_eq!(decides(120, Some("goto_guardian"), true), (50, 50));
-        assert_eq!(decides(150, None, true), (50, 50), "on the way back");
+        assert_eq!(decides(0, false, true), (0, 0), "away, but not on the run");
+        assert_eq!(decides(50, true, false), (0, 150));
+        assert_eq!(decides(70, true, false), (0, 130), "on the run, but still near");
+        assert_eq!(decides(90, true, true), (20, 130));
+        assert_eq!(decides(120, false, true), (50, 50));
+        assert_eq!(decides(150, false, true), (50, 50), "on the way back");
     }
 }

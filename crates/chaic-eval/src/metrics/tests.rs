@@ -30,6 +30,7 @@ fn result(c: Case<'_>) -> RunResult {
             done: c.done,
             total: c.total,
             away_frames: c.away,
+            stuck_frames: None,
             escape_frames: c.away,
             deliveries: c.deliveries,
             digest: Digest(0),

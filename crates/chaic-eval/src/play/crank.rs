@@ -1,12 +1,12 @@
 //! The loop that every episode runs through, be it played or played again.
 
-use chaic_protocol::agent::Thought;
+use chaic_protocol::agent::{ChildState, Thought};
 use chaic_protocol::{AgentId, ResolvedAction};
 use chaic_world::World;
 
 use crate::digest::Digest;
 use crate::error::Result;
-use crate::trace::{Decision, End, Record, TraceEvent, is_recorded};
+use crate::trace::{ChildRecord, Decision, End, Record, TraceEvent, is_recorded};
 
 /// What somebody chose to do.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,6 +17,8 @@ pub struct Choice {
     pub action: ResolvedAction,
     /// What it thought, if that changed.
     pub thought: Option<Thought>,
+    /// What it is doing, if it is the child.
+    pub child: Option<ChildState>,
 }
 
 /// Chooses for those who wait; `None` to stop.
@@ -43,12 +45,18 @@ pub fn crank(
     decide: &mut Decide<'_>,
     sink: &mut dyn FnMut(&Record) -> Result<()>,
 ) -> Result<Flow> {
+    let mut child = None;
     while !world.is_over() {
         let waiting = world.waiting();
         if !waiting.is_empty() {
             let Some(choices) = decide(world, &waiting)? else { return Ok(Flow::Stopped) };
             for choice in choices {
+                let state = choice.child;
                 submit(world, choice, sink)?;
+                if let Some(state) = state.filter(|_| child != state) {
+                    child = Some(state);
+                    sink(&Record::Child(ChildRecord { frame: world.state().frame, state }))?;
+                }
             }
         }
         world.advance();
@@ -62,7 +70,7 @@ pub fn crank(
 
 fn submit(
     world: &mut World,
-    Choice { agent, action, thought }: Choice,
+    Choice { agent, action, thought, .. }: Choice,
     sink: &mut dyn FnMut(&Record) -> Result<()>,
 ) -> Result<()> {
     // Another's choice of this frame may have given this agent something to do already.

@@ -135,12 +135,12 @@ impl Play {
                 let meant = actor.mind.act(&glance.observation);
                 let action = glance.resolve(meant);
                 actor.submitted = Some((meant, action));
-                let thought = Some(actor.mind.thought());
+                let (thought, child) = (Some(actor.mind.thought()), actor.mind.child_state());
                 let is_news = said[agent.index()] != thought;
                 if is_news {
                     said[agent.index()].clone_from(&thought);
                 }
-                Choice { agent: *agent, action, thought: thought.filter(|_| is_news) }
+                Choice { agent: *agent, action, thought: thought.filter(|_| is_news), child }
             });
             let choices: Vec<Choice> = choices.collect();
             // Who raised `stop` while deciding hasn't decided.

@@ -22,6 +22,7 @@ fn results() -> Vec<RunResult> {
                         done: done + f64::from(k),
                         total: 10.0,
                         away_frames,
+                        stuck_frames: None,
                         escape_frames: away_frames,
                         deliveries: Vec::new(),
                         digest: Digest(0),

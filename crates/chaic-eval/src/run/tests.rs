@@ -399,6 +399,7 @@ fn a_journal_cut_at_any_byte_loses_one_record_at_most() {
             done: 1.0,
             total: 10.0,
             away_frames: None,
+            stuck_frames: None,
             escape_frames: None,
             deliveries: Vec::new(),
             digest: Digest(3),

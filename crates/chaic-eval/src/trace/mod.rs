@@ -8,7 +8,7 @@ mod record;
 mod write;
 
 pub use read::{MAX_TRACE_BYTES, Warning, parse, read};
-pub use record::{Decision, End, Record, TraceEvent, is_recorded};
+pub use record::{ChildRecord, Decision, End, Record, TraceEvent, is_recorded};
 pub use write::Writer;
 
 use chaic_protocol::capability::Persona;

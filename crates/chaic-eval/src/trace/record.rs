@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use chaic_protocol::agent::Thought;
+use chaic_protocol::agent::{ChildState, Thought};
 use chaic_protocol::{Action, AgentId, ClassId, Frame, ResolvedAction};
 use chaic_world::{Event, EventKind, World};
 use serde::de::{Error as _, SeqAccess, Visitor};
@@ -16,6 +16,8 @@ use crate::digest::Digest;
 pub enum Record {
     /// An agent decided.
     Decision(Decision),
+    /// The child does something else from its decision before this on.
+    Child(ChildRecord),
     /// The world tells.
     Event(TraceEvent),
     /// The episode is over.
@@ -36,6 +38,17 @@ pub struct Decision {
     pub digest: Digest,
     /// What it thought, if that changed.
     pub thought: Option<Thought>,
+}
+
+/// What the child has decided to do. Its mind says so, not the world: a trace that is played again
+/// takes it over as it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChildRecord {
+    /// When.
+    pub frame: Frame,
+    /// What it does from now on.
+    pub state: ChildState,
 }
 
 /// An event, with what metrics need to know of its object.
@@ -63,6 +76,8 @@ pub struct End {
     pub complete: bool,
     /// Frames in which the child was away.
     pub away_frames: u32,
+    /// Frames in which the partner or the helper had made no progress for 200 frames.
+    pub stuck_frames: u32,
     /// Digest of the last state.
     pub digest: Digest,
 }
@@ -100,6 +115,7 @@ impl End {
             total,
             complete: world.is_complete(),
             away_frames: world.state().child_away_frames,
+            stuck_frames: world.state().stuck_frames,
             digest: Digest(world.digest()),
         }
     }
@@ -110,11 +126,17 @@ struct EndLine {
     end: End,
 }
 
+#[derive(Serialize, Deserialize)]
+struct ChildLine {
+    child: ChildRecord,
+}
+
 impl Record {
     /// The line without its line break.
     pub fn to_line(&self) -> String {
         let text = match self {
             Record::Decision(decision) => serde_json::to_string(decision),
+            Record::Child(child) => serde_json::to_string(&ChildLine { child: *child }),
             Record::Event(event) => serde_json::to_string(event),
             Record::End(end) => serde_json::to_string(&EndLine { end: end.clone() }),
         };
@@ -128,6 +150,9 @@ impl Record {
         }
         if line.starts_with("{\"end\"") {
             return serde_json::from_str(line).map(|l: EndLine| Record::End(l.end));
+        }
+        if line.starts_with("{\"child\"") {
+            return serde_json::from_str(line).map(|l: ChildLine| Record::Child(l.child));
         }
         serde_json::from_str(line).map(Record::Event)
     }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use chaic_protocol::agent::Thought;
+use chaic_protocol::agent::{ChildState, Thought};
 use chaic_protocol::{Action, AgentId, ClassId, EntityId, FailureReason, Hand, Outcome};
 use chaic_world::{Event, EventKind};
 
@@ -52,6 +52,7 @@ fn records() -> Vec<Record> {
             EventKind::Delivered { object: EntityId(31), by: AgentId::HELPER, counted: true },
             Some(ClassId::named("apple")),
         ),
+        Record::Child(ChildRecord { frame: 20, state: ChildState::RunAway }),
         event(30, EventKind::ChildAway { away: true }, None),
         Record::End(End {
             frame: 30,
@@ -59,6 +60,7 @@ fn records() -> Vec<Record> {
             total: 3.0,
             complete: false,
             away_frames: 4,
+            stuck_frames: 5,
             digest: Digest(1),
         }),
     ]
@@ -108,9 +110,12 @@ fn a_cut_at_any_byte_leaves_all_whole_records() {
 fn another_version_is_named() {
     let dir = tempfile::tempdir().unwrap();
     let text = std::fs::read_to_string(written(dir.path())).unwrap();
-    let other = text.replacen("\"version\":1", "\"version\":2", 1);
+    let own = format!("\"version\":{VERSION}");
+    assert!(text.contains(&own), "{text}");
+    let other = text.replacen(&own, "\"version\":77", 1);
     let error = parse(other.as_bytes(), Path::new("t.jsonl")).unwrap_err().to_string();
-    assert!(error.contains("version 2") && error.contains("version 1"), "{error}");
+    let expected = format!("version {VERSION}");
+    assert!(error.contains("version 77") && error.contains(&expected), "{error}");
     assert!(error.contains("chaic 0.1.0"), "{error}");
 }
 

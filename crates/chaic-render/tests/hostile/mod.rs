@@ -243,6 +243,7 @@ impl Draw {
             people: people.collect(),
             joint: None,
             child_away_frames: 0,
+            stuck_frames: 0,
             child_is_away: false,
             over: false,
         }

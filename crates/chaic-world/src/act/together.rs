@@ -6,6 +6,7 @@ use chaic_protocol::geom::{Pose, horizontal_distance};
 use chaic_protocol::{Action, AgentId, EntityId, ResolvedAction, Vec3};
 
 use crate::event::EventKind;
+use crate::rules::Blocking;
 use crate::state::{Activity, JointCarry, Phase, Step};
 use crate::tick::Progress;
 use crate::world::World;
@@ -135,7 +136,8 @@ impl World {
     /// something is in the other's way, the leader steps so that the two turn about the other.
     /// Returns whether there is room.
     pub(crate) fn make_room_to_turn(&mut self, agent: AgentId, yaw_rad: f32) -> bool {
-        let Some(joint) = self.state.joint.filter(|j| j.leader == agent && j.under_way) else {
+        let joint = self.state.joint.filter(|j| j.leader == agent && j.under_way);
+        let Some(joint) = joint.filter(|_| self.rules.blocking == Blocking::Stops) else {
             return true;
         };
         let pose = self.person(agent).pose;

@@ -6,7 +6,8 @@ use crate::partners::partner_grants;
 use crate::test_support::identity;
 use chaic_protocol::briefing::{Companion, Relation};
 use chaic_protocol::geom::Pose;
-use chaic_protocol::{AgentId, Frame, Vec3};
+use chaic_protocol::observation::OtherEnd;
+use chaic_protocol::{AgentId, Frame, Vec2, Vec3};
 
 fn pose(x: f32, z: f32) -> Pose {
     Pose { position: Vec3::new(x, 0.0, z), yaw_rad: 0.0 }
@@ -155,5 +156,37 @@ fn a_turn_around_ends_when_both_are_found_or_goes_on() {
         let mut s = minder(PlannerRules { stops_turning_when_found, ..PAPER });
         see_both(&mut s, 100);
         assert_eq!(s.n_turns_around(), n);
+    }
+}
+
+#[test]
+fn a_child_that_is_away_is_followed_by_who_minds_it_and_by_nobody_else() {
+    for (minds_child, expected) in [(true, Plan::FollowChild), (false, Plan::Explore)] {
+        let mut s = minder(PlannerRules { minds_child, looks_around_first: false, ..PAPER });
+        see_both(&mut s, 100);
+        assert_eq!(s.choose_as(RuleProfile::RHP), expected);
+        // The partner's rules have none for the child in any case.
+        assert_eq!(s.choose_as(RuleProfile::PARTNER), Plan::Explore);
+    }
+}
+
+#[test]
+fn who_carries_along_is_not_in_the_leaders_way() {
+    for walking in [Walking::Careful, Walking::Lattice] {
+        let cost_there = |leads: bool| {
+            let mut s = Situated::new(PlannerRules { walking, ..PAPER });
+            let mut observation = Toy::room(4.0, 4.0).observe();
+            observation.images = Default::default();
+            observation.granted.poses = vec![(AgentId::PARTNER, pose(0.0, -1.2))];
+            observation.own.other_end = leads.then_some(OtherEnd {
+                agent: AgentId::PARTNER,
+                position_in_body: Vec3::new(0.0, 0.0, -1.2),
+            });
+            s.memory.update(&s.briefing, &observation, &GroundTruthIds.perceive(&observation));
+            s.memory.refresh();
+            let cell = s.memory.map.grid().cell_at(Vec2::new(0.0, -1.2)).expect("inside");
+            s.memory.costs().cost(cell)
+        };
+        assert!(cost_there(false) > cost_there(true), "{walking:?}");
     }
 }

@@ -104,7 +104,8 @@ pub enum FailureReason {
     Blocked,
     /// The object or place is too far away to step up to.
     TooFar,
-    /// Beyond the height or strength of this person, and this attempt did not succeed.
+    /// Beyond the height or strength of this person, and this attempt did not succeed; or nothing
+    /// that this person can do at all.
     BeyondLimits,
     /// The fragile object broke.
     Broke,

@@ -5,6 +5,8 @@ use chaic_protocol::geom::Pose;
 use chaic_protocol::{Action, AgentId, EntityId, Frame, Outcome, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
+use crate::luck::Draws;
+
 /// Everything that changes during an episode.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State {
@@ -94,7 +96,7 @@ pub struct PersonState {
     /// Distance walked so far, metres; legs and wheels turn by it.
     pub walked_m: f32,
     /// How many draws of luck this person has had.
-    pub draws: u32,
+    pub draws: Draws,
 }
 
 impl PersonState {
@@ -108,7 +110,7 @@ impl PersonState {
             last_deed: None,
             in_stride: false,
             walked_m: 0.0,
-            draws: 0,
+            draws: Draws::default(),
         }
     }
 }

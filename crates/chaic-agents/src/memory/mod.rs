@@ -74,6 +74,7 @@ pub struct Memory {
     is_stale: bool,
     is_partner: bool,
     gait: Gait,
+    removes_obstacles: bool,
     reach: Option<Reach>,
     search: Search,
 }
@@ -103,6 +104,7 @@ impl Memory {
             is_stale: true,
             is_partner: briefing.me == AgentId::PARTNER,
             gait: briefing.capability.gait,
+            removes_obstacles: briefing.capability.removes_obstacles,
             reach: None,
         }
     }
@@ -164,10 +166,10 @@ impl Memory {
         self.is_stale = true;
     }
 
-    /// Whether its owner waits before obstacles until somebody has cleared them away (original
-    /// facts 1.6).
+    /// Whether its owner, who can't clear obstacles away, waits before them until somebody has
+    /// (original facts 1.6).
     pub fn waits_for_obstacles(&self) -> bool {
-        self.is_partner && self.gait == Gait::Roll
+        !self.removes_obstacles
     }
 
     /// Whether its owner goes to where the goal place was when the plan began, whatever it sees of

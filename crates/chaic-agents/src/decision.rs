@@ -217,7 +217,7 @@ pub fn valid_plans(memory: &Memory, briefing: &Briefing) -> Vec<Plan> {
     if load.can_take_container {
         plans.extend(reachable(memory, &briefing.containers).map(Plan::PickContainer));
     }
-    if load.free_hand.is_some() {
+    if load.free_hand.is_some() && briefing.capability.removes_obstacles {
         plans.extend(reachable(memory, &briefing.obstacles).map(Plan::RemoveObstacle));
     }
     if memory.hands.held().next().is_none() {

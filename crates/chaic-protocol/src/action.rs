@@ -146,7 +146,8 @@ pub enum FailureReason {
     /// no longer there, or never there at all. One reason for all of these, so that no failure
     /// tells of what can't be seen.
     OutOfReach,
-    /// Beyond the height or strength of this person, and this attempt did not succeed.
+    /// Beyond the height or strength of this person, and this attempt did not succeed; or nothing
+    /// that this person can do at all.
     BeyondLimits,
     /// The fragile object broke.
     Broke,

@@ -17,7 +17,7 @@ pub struct Thought {
 }
 
 /// What the child who comes along is doing, by its own decision. The original's emergency rate asks
-/// for it (facts 8.4), so it is a record of its own in traces.
+/// for it (facts S8.4), so it is a record of its own in traces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ChildState {

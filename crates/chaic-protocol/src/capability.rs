@@ -63,6 +63,15 @@ pub struct Capability {
     pub docking_frames: u32,
     /// Whether fragile things may break in these hands (facts S6).
     pub breaks_fragile: bool,
+    /// Whether this person can lift obstacles out of the way (paper section 3.1: somebody in a
+    /// wheelchair can't).
+    #[serde(default = "able")]
+    pub removes_obstacles: bool,
+}
+
+/// What an ability is where a file says nothing of it.
+fn able() -> bool {
+    true
 }
 
 /// Heights that everybody without a limit reaches (facts S1.1).
@@ -84,6 +93,7 @@ const ADULT: Capability = Capability {
     gait: Gait::Walk,
     docking_frames: 0,
     breaks_fragile: false,
+    removes_obstacles: true,
 };
 
 impl Persona {
@@ -121,6 +131,7 @@ impl Persona {
                 height_m: 1.35,
                 eye_height_m: 1.2,
                 gait: Gait::Roll,
+                removes_obstacles: false,
                 ..ADULT
             },
             // The original's rider lets go of the bicycle's pace to step up to an object

@@ -23,8 +23,8 @@ use serde::{Deserialize, Serialize};
 /// bits. The standard library's versions call whatever the platform brings.
 pub mod math {
     pub use libm::{
-        acosf as acos, asinf as asin, atan2f as atan2, cosf as cos, expf as exp, logf as ln, powf,
-        sinf as sin, tanf as tan,
+        acosf as acos, asinf as asin, atan2f as atan2, cosf as cos, expf as exp, hypotf as hypot,
+        logf as ln, powf, sinf as sin, tanf as tan,
     };
 
     /// From here to twice as much, floats are the whole numbers.

@@ -81,6 +81,31 @@ pub(crate) fn with_scratch<T>(work: impl FnOnce(&mut Scratch) -> T) -> T {
     })
 }
 
+/// Calls `look` once for each width of vectors that this machine has, by name, and for none
+/// (`scalar`). Meanwhile this thread draws single views for that width. Pictures don't depend on it:
+/// this is for those who check that.
+pub fn with_each_width(mut look: impl FnMut(&str)) {
+    let usual = with_scratch(|s| s.work.arch);
+    for (name, arch) in widths() {
+        with_scratch(|s| s.work.arch = arch);
+        look(name);
+    }
+    with_scratch(|s| s.work.arch = usual);
+}
+
+/// What inner loops can be compiled for that this machine runs.
+fn widths() -> Vec<(&'static str, pulp::Arch)> {
+    let mut widths = vec![("scalar", pulp::Arch::Scalar)];
+    #[cfg(target_arch = "x86_64")]
+    {
+        widths.extend(pulp::x86::V3::try_new().map(|v3| ("x86-64-v3", pulp::Arch::V3(v3))));
+        widths.extend(pulp::x86::V4::try_new().map(|v4| ("x86-64-v4", pulp::Arch::V4(v4))));
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    widths.push(("widest", pulp::Arch::new()));
+    widths
+}
+
 /// Draws one view, into images whose memory is used again.
 pub(crate) fn look(frame: &Frame, view: &View, images: &mut Images) {
     let Camera { width, height, .. } = view.camera;
@@ -181,8 +206,7 @@ mod tests {
     use super::*;
     use crate::Scene;
 
-    fn looked_at(arch: pulp::Arch, color: bool) -> Vec<Images> {
-        let usual = with_scratch(|s| std::mem::replace(&mut s.work.arch, arch));
+    fn looked_at(color: bool) -> Vec<Images> {
         let mut all = Vec::new();
         for (setup, eye, yaw) in
             [(house(), [0.6, 1.65, 2.2], -1.57), (street(), [9.0, 1.65, 0.0], 1.3)]
@@ -194,20 +218,16 @@ mod tests {
             let view = View { camera, channels, hide: None, hide_ceiling: false };
             all.extend(scene.render(&world, &[view]));
         }
-        with_scratch(|s| s.work.arch = usual);
         all
     }
 
     #[test]
     fn images_are_the_same_bits_with_vectors_of_any_width() {
-        let mut archs = vec![pulp::Arch::new()];
-        #[cfg(target_arch = "x86_64")]
-        archs.extend(pulp::x86::V3::try_new().map(pulp::Arch::V3));
         for color in [true, false] {
-            let plain = looked_at(pulp::Arch::Scalar, color);
-            for arch in &archs {
-                assert!(looked_at(*arch, color) == plain, "{arch:?}, color {color}");
-            }
+            let usual = looked_at(color);
+            with_each_width(|width| {
+                assert!(looked_at(color) == usual, "{width}, color {color}");
+            });
         }
     }
 }

@@ -15,6 +15,8 @@
 mod setup;
 mod state;
 
+mod luck;
+
 mod rules;
 
 mod event;
@@ -33,6 +35,7 @@ mod view;
 mod world;
 
 pub use event::{Event, EventKind};
+pub use luck::Draws;
 pub use posture::{Arm, Posture};
 pub use rules::{Blocking, Durations, JointLift, ReachTo, Rules};
 pub use setup::{

@@ -2,7 +2,9 @@
 
 use chaic_protocol::action::Hand;
 use chaic_protocol::catalogue::Role;
-use chaic_protocol::geom::{forward, horizontal_distance, right, rotate_yaw, xz, yaw_rotation};
+use chaic_protocol::geom::{
+    forward, horizontal_distance, math, right, rotate_yaw, xz, yaw_rotation,
+};
 use chaic_protocol::{AgentId, EntityId, Vec3};
 
 use crate::collide::Body;
@@ -171,7 +173,7 @@ impl World {
     pub(crate) fn spot_aside(&self, agent: AgentId, obstacle: EntityId) -> Vec3 {
         let pose = self.person(agent).pose;
         let size = self.thing(obstacle).0.size_m();
-        let radius = 0.5 * size.x.hypot(size.z);
+        let radius = 0.5 * math::hypot(size.x, size.z);
         let nearest = self.capability(agent).radius_m + radius + 0.05;
         let spots = (0..5).flat_map(|i| ring(pose.position, nearest + 0.25 * i as f32, 24));
         let free = |spot: &Vec3| self.is_free_floor(obstacle, *spot);
@@ -185,7 +187,7 @@ impl World {
     /// Whether a thing can stand on the floor at a point.
     pub(crate) fn is_free_floor(&self, object: EntityId, at: Vec3) -> bool {
         let size = self.thing(object).0.size_m();
-        self.stands_free(at, 0.5 * size.x.hypot(size.z), size.y)
+        self.stands_free(at, 0.5 * math::hypot(size.x, size.z), size.y)
     }
 
     /// Whether an upright thing of this radius and height can stand on the floor at `p`, within

@@ -18,6 +18,10 @@ pub struct Durations {
     pub reach: u32,
     /// Closing a hand.
     pub grasp: u32,
+    /// Closing a hand in vain, where a limit is exceeded. As long as a good one, so that both
+    /// attempts take the same time: ours. The original leaves it out (facts S1.4 and S2.2: 55
+    /// frames in place of 57).
+    pub vain_grasp: u32,
     /// Bringing both arms back.
     pub reset_arms: u32,
     /// Between two parts of a composite action.
@@ -28,6 +32,10 @@ pub struct Durations {
     pub open_hand: u32,
     /// Most further frames in which one watches what was let go.
     pub watch_fall: u32,
+    /// Most further frames in which one watches what was put into a container. How many they are
+    /// is drawn evenly: a put-in takes 80 to 104 frames (facts S2.2), and nothing says how often
+    /// which.
+    pub watch_put_in: u32,
     /// Most frames that one who stands at furniture waits for the other who is on the way to it.
     pub await_partner: u32,
     /// Raising furniture once it is in hand.
@@ -147,11 +155,13 @@ impl Rules {
                 keep_walking: 1,
                 reach: 16,
                 grasp: 2,
+                vain_grasp: 2,
                 reset_arms: 35,
                 gap: 1,
                 move_away: 4,
                 open_hand: 2,
                 watch_fall: 25,
+                watch_put_in: 24,
                 await_partner: 150,
                 raise_furniture: 35,
                 refused_pick: 1,
@@ -197,6 +207,8 @@ impl Rules {
                 raise_furniture: 17,
                 // Facts S2.2: one frame, then both arms are brought back.
                 refused_pick: 37,
+                // Facts 1.4 and 2.2: after a vain reach the arms are brought back at once.
+                vain_grasp: 0,
                 ..paper.durations
             },
             blocking: Blocking::Creeps,

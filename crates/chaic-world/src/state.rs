@@ -5,6 +5,8 @@ use chaic_protocol::geom::Pose;
 use chaic_protocol::{AgentId, EntityId, Frame, Outcome, Quat, ResolvedAction, Vec3};
 use serde::{Deserialize, Serialize};
 
+use crate::luck::Draws;
+
 /// Everything that changes during an episode.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State {
@@ -96,7 +98,7 @@ pub struct PersonState {
     /// Distance walked so far, metres; legs and wheels turn by it.
     pub walked_m: f32,
     /// How many draws of luck this person has had.
-    pub draws: u32,
+    pub draws: Draws,
     /// The last progress that this person made.
     pub progress: LastProgress,
 }
@@ -133,7 +135,7 @@ impl PersonState {
             last_deed: None,
             in_stride: false,
             walked_m: 0.0,
-            draws: 0,
+            draws: Draws::default(),
             progress: LastProgress { frame: 0, position: pose.position, is_stuck: false },
         }
     }

@@ -131,6 +131,7 @@ impl World {
             Phase::Insert { object, container } => {
                 if elapsed == self.rules.durations.open_hand {
                     self.insert(agent, object, container);
+                    activity.step.frames += self.frames_watched(agent, activity.action);
                 }
                 counted
             }

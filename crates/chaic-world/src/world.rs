@@ -5,7 +5,6 @@ use std::sync::Arc;
 use chaic_protocol::capability::{Capability, Gait};
 use chaic_protocol::catalogue::Role;
 use chaic_protocol::geom::{horizontal_distance, yaw_rotation};
-use chaic_protocol::rng::Stream;
 use chaic_protocol::{AgentId, EntityId, Hand, ResolvedAction, TaskId, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -210,15 +209,6 @@ impl World {
 
     pub(crate) fn happened(&mut self, kind: EventKind) {
         self.events.push(Event { frame: self.state.frame, kind });
-    }
-
-    /// One draw of luck with the chance `p`, from the person's own stream.
-    pub(crate) fn luck(&mut self, agent: AgentId, purpose: &str, p: f32) -> bool {
-        let seed = self.setup.seed;
-        let person = self.person_mut(agent);
-        let index = u64::from(agent.0) << 32 | u64::from(person.draws);
-        person.draws += 1;
-        Stream::new(seed, purpose, index).chance(p)
     }
 
     /// The colliding parts of a thing as it stands now.

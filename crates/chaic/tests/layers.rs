@@ -18,6 +18,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // Only its tests and its bench need episodes. Nobody depends on it: its pictures aren't exact.
     ("chaic-render-gpu", &["chaic-protocol", "chaic-world", "chaic-episodes", "chaic-render"]),
     ("chaic-agents", &["chaic-protocol"]),
+    // Built for every processor: nothing that needs more than Rust.
+    ("chaic-goldens", &["chaic-protocol", "chaic-world", "chaic-episodes", "chaic-render"]),
     (
         "chaic-eval",
         &["chaic-protocol", "chaic-world", "chaic-episodes", "chaic-render", "chaic-agents"],

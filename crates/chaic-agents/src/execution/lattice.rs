@@ -76,15 +76,15 @@ mod tests {
     use crate::rules::Walking;
     use crate::test_support::{Toy, ToyObject};
     use chaic_protocol::AgentId;
-    use chaic_protocol::capability::Gait;
+    use chaic_protocol::capability::Persona;
 
     /// The first step of somebody towards an obstacle straight ahead.
-    fn first_step(gait: Gait, me: AgentId) -> Nav {
+    fn first_step(persona: Persona, me: AgentId) -> Nav {
         let mut toy = Toy::room(10.0, 10.0);
         toy.add(ToyObject::new("trashbin", [2.0, 0.0, 0.0], [0.5, 0.6, 0.5]));
         toy.stand([-1.0, 0.0], -std::f32::consts::FRAC_PI_2);
         let mut briefing = toy.briefing();
-        briefing.capability.gait = gait;
+        briefing.capability.removes_obstacles = persona.capability().removes_obstacles;
         briefing.me = me;
         let rules = PlannerRules { walking: Walking::Lattice, ..PlannerRules::paper() };
         let mut memory = Memory::new(&briefing, rules);
@@ -100,9 +100,9 @@ mod tests {
 
     #[test]
     fn an_obstacle_keeps_the_partner_in_the_wheelchair_turning_and_nobody_else() {
-        let (roll, walk) = (Gait::Roll, Gait::Walk);
-        assert_eq!(first_step(roll, AgentId::PARTNER), Nav::Act(Action::TurnLeft));
-        assert_eq!(first_step(walk, AgentId::PARTNER), Nav::Act(Action::MoveForward));
-        assert_eq!(first_step(roll, AgentId::HELPER), Nav::Act(Action::MoveForward));
+        let (rolls, walks) = (Persona::Wheelchair, Persona::Adult);
+        assert_eq!(first_step(rolls, AgentId::PARTNER), Nav::Act(Action::TurnLeft));
+        assert_eq!(first_step(walks, AgentId::PARTNER), Nav::Act(Action::MoveForward));
+        assert_eq!(first_step(rolls, AgentId::HELPER), Nav::Act(Action::MoveForward));
     }
 }

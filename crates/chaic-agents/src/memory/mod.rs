@@ -92,6 +92,7 @@ pub struct Memory {
     is_stale: bool,
     is_partner: bool,
     gait: Gait,
+    removes_obstacles: bool,
     reach: Option<Reach>,
     search: Search,
 }
@@ -127,6 +128,7 @@ impl Memory {
             is_stale: true,
             is_partner: briefing.me == AgentId::PARTNER,
             gait: briefing.capability.gait,
+            removes_obstacles: briefing.capability.removes_obstacles,
             reach: None,
         }
     }
@@ -233,10 +235,10 @@ impl Memory {
         }
     }
 
-    /// Whether its owner waits before obstacles until somebody has cleared them away (facts
-    /// A1.6).
+    /// Whether its owner, who can't clear obstacles away, waits before them until somebody has
+    /// (facts A1.6).
     pub fn waits_for_obstacles(&self) -> bool {
-        self.is_partner && self.gait == Gait::Roll
+        !self.removes_obstacles
     }
 
     /// Whether its owner goes to where the goal place was when the plan began, whatever it sees of
@@ -276,7 +278,7 @@ impl Memory {
         }
     }
 
-    /// The people whom one would have to go around: not who carries along (original facts 2.5: while
+    /// The people whom one would have to go around: not who carries along (facts A2.5: while
     /// two carry, the leader leaves the other one's body out of its map).
     fn in_the_way(&self) -> People {
         match self.other_end {

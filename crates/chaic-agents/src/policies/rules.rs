@@ -49,7 +49,7 @@ pub struct RuleProfile {
     pub wanted: Wanted,
     /// In which order.
     pub order: TargetOrder,
-    /// Whether it clears obstacles away.
+    /// Whether it clears away the obstacles that its body can lift.
     pub removes_obstacles: bool,
     /// Whether it looks after the child.
     pub minds_child: bool,

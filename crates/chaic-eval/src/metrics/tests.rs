@@ -83,7 +83,7 @@ fn transport_rate_and_efficiency_improvement() {
     close(team.ei, (0.5 + 0.0 - 1.0 / 3.0) / 3.0);
     // Means of episodes 0.6, 0, 1/3: deviation 0.3006..., over the root of 3.
     let m = (0.6 + 1.0 / 3.0) / 3.0;
-    let ss: f64 = [0.6, 0.0, 1.0 / 3.0].iter().map(|v: &f64| (v - m).powi(2)).sum();
+    let ss: f64 = [0.6, 0.0, 1.0 / 3.0].iter().map(|v: &f64| (v - m) * (v - m)).sum();
     close(team.tr_se, (ss / 2.0).sqrt() / 3f64.sqrt());
 
     // By the scripts: e1 (6 - 3) / 6; e2 0 / max(0, 0, 1); e3 (2 - 3) / 3. Same here, as rates and

@@ -112,15 +112,7 @@ impl World {
             }
             Action::PutIn => {
                 let (object, container, hand) = self.check_put_in(agent)?;
-                let to = self.front_of(agent);
-                Ok(vec![
-                    Step::of(Phase::ResetArms { from: Some(to), hand: Some(hand) }, d.reset_arms),
-                    Step::of(Phase::Insert { object, container }, d.open_hand + d.gap),
-                    self.reach(Some(hand), to + Vec3::Y * 0.15),
-                    Step::of(Phase::Stand, d.gap),
-                    self.reach(Some(hand.other()), to),
-                    Step::of(Phase::Stand, d.gap + d.move_away),
-                ])
+                Ok(self.put_in_steps(agent, object, container, hand))
             }
         }
     }

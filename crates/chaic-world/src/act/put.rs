@@ -3,9 +3,10 @@
 use chaic_protocol::action::{FailureReason, Hand};
 use chaic_protocol::capability::excess;
 use chaic_protocol::catalogue::Role;
-use chaic_protocol::{AgentId, EntityId, Vec3};
+use chaic_protocol::{Action, AgentId, EntityId, ResolvedAction, Vec3};
 
 use crate::event::EventKind;
+use crate::luck::Luck;
 use crate::rules::ReachTo;
 use crate::state::{Activity, Phase, Place, Step};
 use crate::tick::Progress;
@@ -13,6 +14,9 @@ use crate::world::World;
 
 /// Height above its place at which a thing is let go, metres (facts S3.7).
 const RELEASE_ABOVE_M: f32 = 0.2;
+/// Height above the floor from which a thing drops after a vain put-on, metres: ours, that of a
+/// hand that bends down, so that nothing rolls far.
+const DROP_FROM_M: f32 = 0.3;
 
 impl World {
     /// The object, the container and the object's hand of a put-in.
@@ -35,6 +39,43 @@ impl World {
             }
         }
         Err(FailureReason::NotContainerAndTarget)
+    }
+
+    /// The steps of a put-in, next one last: 80 frames and those in which one watches what was
+    /// dropped.
+    pub(super) fn put_in_steps(
+        &self,
+        agent: AgentId,
+        object: EntityId,
+        container: EntityId,
+        hand: Hand,
+    ) -> Vec<Step> {
+        let d = self.rules.durations;
+        let to = self.front_of(agent);
+        // To be part of the container takes what was dropped a frame (facts S2.2).
+        let parented = d.gap;
+        vec![
+            self.reset_arms(Some(hand), to),
+            self.gap(),
+            Step::of(Phase::Insert { object, container }, d.open_hand + d.gap + parented),
+            self.gap(),
+            self.reach(Some(hand), to + Vec3::Y * 0.15),
+            self.gap(),
+            self.reach(Some(hand.other()), to),
+            self.gap(),
+            Step::of(Phase::Stand, d.move_away),
+            self.gap(),
+        ]
+    }
+
+    /// How many frames longer one watches what came into a container. A basket is no place to
+    /// watch: its owner's other hand is on the handlebar (facts S2.2: 2 frames).
+    pub(crate) fn frames_watched(&mut self, agent: AgentId, action: ResolvedAction) -> u32 {
+        if action != Action::PutIn {
+            return 0;
+        }
+        let most = self.rules.durations.watch_put_in;
+        self.luck(agent, Luck::WatchPutIn).below(most as usize + 1) as u32
     }
 
     /// Puts a held object into a container or basket.
@@ -98,66 +139,110 @@ impl World {
             ];
             return Progress::Instant;
         }
-        if self.vehicle(agent).is_some() {
-            // One after the other out of the basket (facts S8.2).
-            let mut steps = vec![self.reach(Some(Hand::Right), self.rest_of(agent, Hand::Right))];
-            let mut taken = Vec::new();
-            for object in objects.into_iter().rev() {
-                let spot = self.free_spot_on(place, object, from, &taken);
-                taken.push((spot, self.thing(object).0.half_longer_side_m()));
-                let at = spot + Vec3::Y * RELEASE_ABOVE_M;
-                let release = Phase::Release {
-                    hand: Some(Hand::Right),
-                    object,
-                    on: Some(place),
-                    at,
-                    set_down: false,
-                };
-                steps.extend([
-                    Step::of(release, d.open_hand),
-                    self.reach(Some(Hand::Right), at),
-                    Step::of(Phase::Stand, d.grasp + d.gap),
-                    self.reach(Some(Hand::Right), self.basket_of(agent)),
-                ]);
-            }
-            steps.push(Step::of(Phase::Face { to: place }, d.turn));
-            activity.queue = steps;
-            return Progress::Instant;
-        }
-        let spot = self.free_spot_on(place, first, from, &[]);
-        // Facts S3.7: the height that counts is that of the place's top.
+        // Facts of the original, 3.7: the height that counts is that of the place's top. One draw for
+        // the whole of a rider's basket: it is one attempt.
         let height_excess = excess(self.top_of(place), self.capability(agent).put_range_m);
         let p = self.rules.put_penalty.chance(height_excess);
-        if self.luck(agent, "put", p) {
-            let at = spot + Vec3::Y * RELEASE_ABOVE_M;
-            let release =
-                Phase::Release { hand, object: first, on: Some(place), at, set_down: false };
-            activity.queue = vec![
-                self.reset_arms(hand, at),
-                Step::of(release, d.open_hand + d.watch_fall),
-                self.reach(hand, at),
-                self.gap(),
-                self.reach(hand, spot),
-                Step::of(Phase::Face { to: place }, d.turn),
-            ];
-        } else {
-            // Facts S1.4: after a vain attempt it drops to the floor beside the person.
+        let is_vain = !self.luck(agent, Luck::PutOn).chance(p);
+        let is_rider = self.vehicle(agent).is_some();
+        if is_vain {
             activity.failing = Some(FailureReason::BeyondLimits);
-            let mut vain_to = spot;
-            let [low, high] = self.capability(agent).put_range_m;
-            vain_to.y = vain_to.y.clamp(low, high);
-            let at = self.floor_spot_beside(agent, first) + Vec3::Y * 0.3;
-            let release = Phase::Release { hand, object: first, on: None, at, set_down: false };
-            activity.queue = vec![
-                self.reset_arms(hand, at),
-                Step::of(release, d.open_hand + d.watch_fall),
-                self.reach(hand, at),
-                self.gap(),
-                Step::of(Phase::Reach { hand, to: vain_to, vain: true }, d.reach),
-                Step::of(Phase::Face { to: place }, d.turn),
-            ];
         }
+        activity.queue = match (is_vain, is_rider) {
+            (false, false) => self.put_steps(agent, hand, first, place),
+            (false, true) => self.unload_steps(agent, objects, place),
+            (true, false) => {
+                let mut steps = vec![self.reset_arms(hand, self.drop_spot(agent, first))];
+                steps.extend(self.vain_put_steps(agent, hand, first, place));
+                steps
+            }
+            (true, true) => {
+                let hand = Some(Hand::Right);
+                let mut steps = vec![self.reach(hand, self.rest_of(agent, Hand::Right))];
+                steps.extend(self.vain_put_steps(agent, hand, first, place));
+                steps.extend(self.out_of_basket(agent));
+                steps
+            }
+        };
+        activity.queue.push(Step::of(Phase::Face { to: place }, d.turn));
         Progress::Instant
+    }
+
+    /// Putting what a hand holds on a place, next step last.
+    fn put_steps(
+        &self,
+        agent: AgentId,
+        hand: Option<Hand>,
+        object: EntityId,
+        place: EntityId,
+    ) -> Vec<Step> {
+        let d = self.rules.durations;
+        let spot = self.free_spot_on(place, object, self.person(agent).pose.position, &[]);
+        let at = spot + Vec3::Y * RELEASE_ABOVE_M;
+        let release = Phase::Release { hand, object, on: Some(place), at, set_down: false };
+        vec![
+            self.reset_arms(hand, at),
+            Step::of(release, d.open_hand + d.watch_fall),
+            self.reach(hand, at),
+            self.gap(),
+            self.reach(hand, spot),
+        ]
+    }
+
+    /// Putting on a place what is in a rider's basket, one after the other (facts of the original,
+    /// 8.2), next step last.
+    fn unload_steps(&self, agent: AgentId, objects: Vec<EntityId>, place: EntityId) -> Vec<Step> {
+        let d = self.rules.durations;
+        let hand = Some(Hand::Right);
+        let from = self.person(agent).pose.position;
+        let mut steps = vec![self.reach(hand, self.rest_of(agent, Hand::Right))];
+        let mut taken = Vec::new();
+        for object in objects.into_iter().rev() {
+            let spot = self.free_spot_on(place, object, from, &taken);
+            taken.push((spot, self.thing(object).0.half_longer_side_m()));
+            let at = spot + Vec3::Y * RELEASE_ABOVE_M;
+            let release = Phase::Release { hand, object, on: Some(place), at, set_down: false };
+            steps.extend([Step::of(release, d.open_hand), self.reach(hand, at)]);
+            steps.extend(self.out_of_basket(agent));
+        }
+        steps
+    }
+
+    /// Taking a thing out of one's basket, next step last.
+    fn out_of_basket(&self, agent: AgentId) -> [Step; 2] {
+        let d = self.rules.durations;
+        [
+            Step::of(Phase::Stand, d.grasp + d.gap),
+            self.reach(Some(Hand::Right), self.basket_of(agent)),
+        ]
+    }
+
+    /// A try beyond one's limits, next step last: the hand comes as far as it can, and the thing
+    /// drops to the floor beside the person (facts S1.4).
+    fn vain_put_steps(
+        &self,
+        agent: AgentId,
+        hand: Option<Hand>,
+        object: EntityId,
+        place: EntityId,
+    ) -> [Step; 4] {
+        let d = self.rules.durations;
+        let mut to = self.free_spot_on(place, object, self.person(agent).pose.position, &[]);
+        let [low, high] = self.capability(agent).put_range_m;
+        to.y = to.y.clamp(low, high);
+        let at = self.drop_spot(agent, object);
+        let release = Phase::Release { hand, object, on: None, at, set_down: false };
+        [
+            Step::of(release, d.open_hand + d.watch_fall),
+            self.reach(hand, at),
+            self.gap(),
+            Step::of(Phase::Reach { hand, to, vain: true }, d.reach),
+        ]
+    }
+
+    /// Where a thing is let go after a vain put-on.
+    fn drop_spot(&self, agent: AgentId, object: EntityId) -> Vec3 {
+        self.floor_spot_beside(agent, object) + Vec3::Y * DROP_FROM_M
     }
 
     /// Finds where to put a removed obstacle, and lays out the steps.

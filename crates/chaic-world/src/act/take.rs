@@ -6,6 +6,7 @@ use chaic_protocol::catalogue::Role;
 use chaic_protocol::{Action, AgentId, EntityId, Vec3};
 
 use crate::event::EventKind;
+use crate::luck::Luck;
 use crate::state::{Activity, Phase, Place, Step};
 use crate::tick::Progress;
 use crate::world::World;
@@ -37,6 +38,10 @@ impl World {
             }
             _ => {}
         }
+        let is_obstacle = thing.class.info().role == Role::Obstacle;
+        if is_obstacle && !self.capability(agent).removes_obstacles {
+            return Err(FailureReason::BeyondLimits);
+        }
         let hands = &self.person(agent).hands;
         if thing.class.info().role == Role::HeavyTarget {
             return if hands.iter().all(Option::is_none) {
@@ -47,9 +52,7 @@ impl World {
         }
         if let Some(vehicle) = self.vehicle(agent) {
             // A basket takes goods, not other baskets.
-            if thing.class.info().role == Role::Container
-                || thing.class.info().role == Role::Obstacle
-            {
+            if is_obstacle || thing.class.info().role == Role::Container {
                 return Err(FailureReason::Impossible);
             }
             let full = self.contents(vehicle).len() >= self.rules.container_capacity as usize;
@@ -84,14 +87,14 @@ impl World {
             } else {
                 self.rules.break_chance_low
             };
-            if self.luck(agent, "break", p) {
+            if self.luck(agent, Luck::Break).chance(p) {
                 activity.failing = Some(FailureReason::Broke);
             }
         }
         if activity.failing.is_none() {
             let p = self.rules.pick_penalty.chance(height_excess)
                 * self.rules.lift_penalty.chance(info.mass_kg - capability.strength_kg);
-            if !self.luck(agent, "take", p) {
+            if !self.luck(agent, Luck::Take).chance(p) {
                 activity.failing = Some(FailureReason::BeyondLimits);
                 // The hand comes as far as it can.
                 to.y = to.y.clamp(capability.pick_range_m[0], capability.pick_range_m[1]);
@@ -106,9 +109,12 @@ impl World {
             None => self.raise_furniture(to),
         }];
         if !vain || breaks {
-            activity.queue.extend([Step::of(Phase::Grasp { hand, object }, d.grasp), self.gap()]);
+            activity.queue.push(Step::of(Phase::Grasp { hand, object }, d.grasp));
+        } else if d.vain_grasp > 0 {
+            activity.queue.push(Step::of(Phase::Stand, d.vain_grasp));
         }
         activity.queue.extend([
+            self.gap(),
             Step::of(Phase::Reach { hand, to, vain }, d.reach),
             self.gap(),
             Step::of(Phase::Face { to: object }, d.turn),

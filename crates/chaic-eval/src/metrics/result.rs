@@ -37,7 +37,7 @@ pub struct RunResult {
 pub enum Ending {
     /// It was played to its end.
     Done(Summary),
-    /// An agent broke down; nothing is scored.
+    /// An agent broke down, which counts as zero.
     Error {
         /// What it said.
         message: String,
@@ -60,6 +60,10 @@ pub struct Summary {
     /// away; absent without child.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub escape_frames: Option<u32>,
+    /// Frames in which the partner or the helper had made no progress for 200 frames; absent in
+    /// results of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stuck_frames: Option<u32>,
     /// Everything that was delivered, in order.
     pub deliveries: Vec<Delivery>,
     /// Digest of the world's last state.
@@ -125,7 +129,11 @@ impl Summary {
         if done > total * (1.0 + ROUNDING) {
             return Err(format!("`done` is {done}, expected at most `total`, {total}"));
         }
-        let within = [("away_frames", self.away_frames), ("escape_frames", self.escape_frames)];
+        let within = [
+            ("away_frames", self.away_frames),
+            ("escape_frames", self.escape_frames),
+            ("stuck_frames", self.stuck_frames),
+        ];
         let late = self.deliveries.iter().map(|d| d.frame).max();
         let within = within.into_iter().chain([("frame of a delivery", late)]);
         for (name, n) in within.filter_map(|(name, n)| Some((name, n?))) {

@@ -118,6 +118,7 @@ impl Tally {
                 total: end.total,
                 away_frames: self.has_child.then_some(end.away_frames),
                 escape_frames: self.has_child.then(|| self.escape.total(end.frame)),
+                stuck_frames: None,
                 deliveries: self.deliveries.clone(),
                 digest: end.digest,
                 counts: BTreeMap::new(),

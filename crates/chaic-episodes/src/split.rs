@@ -94,13 +94,22 @@ impl Split {
         }
     }
 
-    /// Its first seed, if it is bundled.
-    fn base_seed(&self) -> Option<u64> {
-        match self {
-            Split::Train => Some(FIRST_BUNDLED_SEED),
-            Split::Test => Some(2 * FIRST_BUNDLED_SEED),
-            Split::Generated(_) => None,
-        }
+    /// The name of the surroundings of its k-th episode of a task, as
+    /// [`GeneratorInfo::environment`](crate::GeneratorInfo::environment) has it, without making the
+    /// episode.
+    pub fn environment(&self, task: TaskId, k: u64) -> String {
+        generator_info(task, self.seeds(task, k)).environment()
+    }
+
+    fn seeds(&self, task: TaskId, k: u64) -> Seeds {
+        let base = match self {
+            Split::Train => FIRST_BUNDLED_SEED,
+            Split::Test => 2 * FIRST_BUNDLED_SEED,
+            Split::Generated(seeds) => return own_place(seeds.start + k),
+        };
+        // All indoor tasks share the houses of a split, so that they can be compared.
+        let place = base + k % PLACES_PER_SPLIT;
+        Seeds { place, episode: base + (task_index(task) * BUNDLED_PER_TASK) as u64 + k }
     }
 }
 
@@ -147,8 +156,13 @@ fn task_index(task: TaskId) -> usize {
     TASKS.iter().position(|t| t.id == task).expect("the table lists every task")
 }
 
+/// Generated episodes share no surroundings.
+fn own_place(seed: u64) -> Seeds {
+    Seeds { place: seed, episode: seed }
+}
+
 fn generated(task: TaskId, seed: u64) -> Result<Episode, SplitError> {
-    let seeds = Seeds { place: seed, episode: seed };
+    let seeds = own_place(seed);
     let setup = generate(task, seeds)?;
     let id = format!("{task}/gen/{seed}");
     Ok(Episode::trusted(id, "generated".to_owned(), generator_info(task, seeds), setup))
@@ -179,15 +193,10 @@ pub fn regenerate_bundled() -> Result<Bundled, GenerateError> {
 }
 
 fn regenerate(split: &Split) -> Result<String, GenerateError> {
-    let base = split.base_seed().expect("only bundled splits are regenerated");
     let mut text = String::new();
-    for (t, info) in TASKS.iter().enumerate() {
+    for info in &TASKS {
         for k in 0..BUNDLED_PER_TASK as u64 {
-            let seeds = Seeds {
-                // All indoor tasks share the houses of a split, so that they can be compared.
-                place: base + k % PLACES_PER_SPLIT,
-                episode: base + (t * BUNDLED_PER_TASK) as u64 + k,
-            };
+            let seeds = split.seeds(info.id, k);
             let setup = generate(info.id, seeds)?;
             let id = format!("{}/{split}/{k:02}", info.name);
             let generator = generator_info(info.id, seeds);

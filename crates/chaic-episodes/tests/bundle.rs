@@ -56,6 +56,19 @@ fn no_surroundings_are_in_both_splits() {
 }
 
 #[test]
+fn splits_name_the_surroundings_of_their_episodes() {
+    for split in [Split::Train, Split::Test, Split::Generated(3..5)] {
+        for task in TaskId::all() {
+            for (k, episode) in (0..).zip(episodes(&split, task)) {
+                let episode = episode.expect("every seed works");
+                let generator = episode.generator().expect("a generator made it");
+                assert_eq!(split.environment(task, k), generator.environment(), "{}", episode.id());
+            }
+        }
+    }
+}
+
+#[test]
 fn each_indoor_task_has_six_houses_a_split() {
     for task in TaskId::all().take(6) {
         for split in [Split::Train, Split::Test] {

@@ -60,18 +60,18 @@ const BOTTOM_PX: i32 = 44;
 /// From the left edge of the figure to the name of the axis.
 const AXIS_NAME_PX: i32 = 12;
 const LEGEND_ROW_PX: i32 = 30;
-/// Room between legend and plot, for whiskers that pass 1.
+/// Room between legend and plot.
 const HEADROOM_PX: i32 = 26;
 /// Part of a task's width that its bars take.
 const GROUP_WIDTH: f64 = 0.82;
 
-/// A mean with its standard error.
+/// A mean with its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bar {
     /// Height of the bar, 0 to 1.
     pub mean: f64,
-    /// Half the length of the whisker.
-    pub se: f64,
+    /// The ends of the whisker, 0 to 1 with the mean between them; `None` for no whisker.
+    pub interval: Option<[f64; 2]>,
     /// Where a dot stands for somebody else's mean, 0 to 1.
     pub dot: Option<f64>,
 }
@@ -126,7 +126,7 @@ pub enum FigureError {
         /// Number of values.
         got: usize,
     },
-    /// A mean or dot outside 0 to 1, or a standard error that is negative or not a number.
+    /// A mean, a dot or an end of an interval outside 0 to 1, or an interval without its mean.
     #[error("cannot draw {bar:?} of helper `{helper}` in task `{task}`, a rate is 0 to 1")]
     Value {
         /// Whose value.
@@ -146,8 +146,8 @@ pub enum FigureError {
     },
 }
 
-/// Draws the transport rate of each helper in each task as grouped bars with whiskers of one
-/// standard error; the extension of `out` picks SVG or PNG.
+/// Draws the transport rate of each helper in each task as grouped bars with whiskers for 95 %
+/// intervals; the extension of `out` picks SVG or PNG.
 pub fn transport_rate(bars: &Bars, out: &Path) -> Result<(), FigureError> {
     bars.check()?;
     let extension = out.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
@@ -172,8 +172,10 @@ impl Bars {
             }
             for (task, bar) in self.tasks.iter().zip(values) {
                 let Some(bar) = *bar else { continue };
-                let all = [bar.mean, bar.se, bar.dot.unwrap_or(0.0)];
-                let drawable = all.iter().all(|v| (0.0..=1.0).contains(v));
+                let [low, high] = bar.interval.unwrap_or([bar.mean; 2]);
+                let all = [bar.mean, low, high, bar.dot.unwrap_or(0.0)];
+                let is_ordered = low <= bar.mean && bar.mean <= high;
+                let drawable = is_ordered && all.iter().all(|v| (0.0..=1.0).contains(v));
                 if !drawable {
                     let (helper, task) = (helper.clone(), task.clone());
                     return Err(FigureError::Value { helper, task, bar });
@@ -257,7 +259,7 @@ impl<DB: DrawingBackend> Canvas<DB> {
             x += width + ENTRY_GAP_PX;
         }
         let dots = bars.dots.as_ref().map_or(String::new(), |whose| format!("; dots: {whose}"));
-        let note = format!("whiskers: one standard error{dots}");
+        let note = format!("whiskers: 95 % intervals over environments{dots}");
         let style = self.text_style(NOTE_PX, FAINT_INK, HPos::Right, VPos::Center);
         if x + self.text_width_px(&note, &style)? > right {
             y += LEGEND_ROW_PX;
@@ -316,8 +318,8 @@ impl<DB: DrawingBackend> Canvas<DB> {
         let right = (right - self.scale).max(left + 1);
         let corners = [(left, top.min(bottom - 2 * self.scale)), (right, bottom)];
         self.root.draw(&Rectangle::new(corners, color.filled()))?;
-        if bar.se > 0.0 {
-            self.whisker(bar, x.start, [left, right], chart)?;
+        if let Some(ends) = bar.interval {
+            self.whisker(ends, x.start, [left, right], chart)?;
         }
         let Some(dot) = bar.dot else { return Ok(()) };
         let at = ((left + right) / 2, chart.backend_coord(&(x.start, dot)).1);
@@ -328,17 +330,14 @@ impl<DB: DrawingBackend> Canvas<DB> {
 
     fn whisker(
         &self,
-        bar: Bar,
+        ends: [f64; 2],
         x: f64,
         [left, right]: [i32; 2],
         chart: &Chart<'_, DB>,
     ) -> Result<(), DrawError<DB>> {
         let middle = (left + right) / 2;
         let cap = ((right - left) / 5).clamp(self.scale, 5 * self.scale);
-        let y_of = |rate: f64| chart.backend_coord(&(x, rate)).1;
-        let low = y_of((bar.mean - bar.se).max(0.0));
-        // What passes 1 by far, as with very few episodes, ends below the legend.
-        let high = y_of(bar.mean + bar.se).max(y_of(1.0) - (HEADROOM_PX - 4) * self.scale);
+        let [low, high] = ends.map(|rate| chart.backend_coord(&(x, rate)).1);
         for line in [
             [(middle, low), (middle, high)],
             [(middle - cap, low), (middle + cap, low)],

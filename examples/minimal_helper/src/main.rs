@@ -152,7 +152,8 @@ fn main() -> Result<()> {
     let (mut run, _) = Run::open(Path::new(&out), Access::Resume, &given, &Mine)?;
     run.play(2, &Mine, &AtomicBool::new(false), &mut |_| {})?;
     let (options, results, planned) = (run.options(), run.results(), run.planned());
-    let report = Report { options, results, planned: &planned, formulas: FormulaSet::Paper };
+    let (granted, formulas) = (Some(run.granted()), FormulaSet::Paper);
+    let report = Report { options, results, planned, granted, formulas };
     println!("{}", report.text(Format::Table));
     Ok(())
 }

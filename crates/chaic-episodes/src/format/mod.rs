@@ -36,6 +36,14 @@ pub struct GeneratorInfo {
     pub place_seed: u64,
 }
 
+impl GeneratorInfo {
+    /// A name of the surroundings: episodes that share it happen in the same house, street or yard,
+    /// and so are no independent samples.
+    pub fn environment(&self) -> String {
+        format!("{}/{}", self.name, self.place_seed)
+    }
+}
+
 /// The file as it is written.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -1,66 +1,58 @@
 //! Measured transport rates against published ones, and how much of a difference chance explains.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use chaic_protocol::TaskId;
 
-use crate::metrics::{
-    Interval, RunResult, Summary, differences, episode_rates, mean_interval, sample_sd,
-};
+use crate::metrics::{Clusters, Interval, Played, RunResult, Summary, differences, t_975};
 use crate::published::published;
 
 /// Episodes of each task in the original's test split, over which published means are taken
 /// (paper section 3.3.2, "Dataset Construction").
 pub const PUBLISHED_EPISODES: f64 = 12.0;
 
-/// Standard errors beyond which a difference is taken for more than chance: 95 % of a normal.
-const BEYOND: f64 = 1.96;
-
 /// The transport rate of one helper in one task, measured and published.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TaskRate {
     /// The task.
     pub task: TaskId,
-    /// The mean over episodes, seeds averaged first.
+    /// The mean over episodes and seeds.
     pub tr: f64,
-    /// The sample deviation over episodes, seeds averaged first; undefined for one.
-    pub sd: Option<f64>,
-    /// The same where each episode is played once: its variance is the mean over seeds.
-    pub sd_once: Option<f64>,
-    /// The 95 % interval of the mean over episodes; undefined for one.
+    /// Its 95 % interval over environments; undefined for one.
     pub interval: Option<Interval>,
+    /// Its standard error over environments if each episode were played once: the variance is the
+    /// mean over seeds.
+    pub se_once: Option<f64>,
     /// How many episodes.
     pub n: usize,
     /// What the paper reports, if it has this helper.
     pub published: Option<f64>,
 }
 
-/// The rate of a helper in a task; `None` without results.
-pub fn task_rate(results: &[RunResult], task: TaskId, helper: &str) -> Option<TaskRate> {
-    let rates: Vec<f64> = episode_rates(results, task, helper).into_values().collect();
-    let n = rates.len();
-    (n > 0).then(|| TaskRate {
+/// The rate of a helper in a task; `None` without results. Runs that broke down count as zero.
+pub fn task_rate(played: Played<'_>, task: TaskId, helper: &str) -> Option<TaskRate> {
+    let is_it = |r: &&RunResult| r.key.task == task && r.key.helper == helper;
+    let mut all = Clusters::default();
+    let mut by_seed: BTreeMap<u32, Clusters<'_>> = BTreeMap::new();
+    let mut episodes = BTreeSet::new();
+    for result in played.results.iter().filter(is_it) {
+        let rate = result.summary().map_or(0.0, Summary::rate);
+        let environment = played.environments.of(&result.key.episode);
+        all.add(task, environment, rate);
+        by_seed.entry(result.key.seed).or_default().add(task, environment, rate);
+        episodes.insert(&result.key.episode);
+    }
+    let errors: Option<Vec<f64>> =
+        by_seed.values().map(|of_seed| of_seed.interval().map(|i| i.se)).collect();
+    let variance = errors.map(|se| se.iter().map(|se| se * se).sum::<f64>() / se.len() as f64);
+    Some(TaskRate {
         task,
-        tr: rates.iter().sum::<f64>() / n as f64,
-        sd: sample_sd(&rates),
-        sd_once: sd_once(results, task, helper),
-        interval: mean_interval(&rates),
-        n,
+        tr: all.mean()?,
+        interval: all.interval(),
+        se_once: variance.map(f64::sqrt),
+        n: episodes.len(),
         published: published(helper).map(|row| row.figures(task).tr),
     })
-}
-
-fn sd_once(results: &[RunResult], task: TaskId, helper: &str) -> Option<f64> {
-    let is_it = |r: &&RunResult| r.key.task == task && r.key.helper == helper;
-    let mut by_seed: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
-    for result in results.iter().filter(is_it) {
-        let rates = by_seed.entry(result.key.seed).or_default();
-        rates.extend(result.summary().map(Summary::rate));
-    }
-    let deviations: Option<Vec<f64>> = by_seed.values().map(|rates| sample_sd(rates)).collect();
-    let deviations = deviations.filter(|d| !d.is_empty())?;
-    let variance = deviations.iter().map(|sd| sd * sd).sum::<f64>() / deviations.len() as f64;
-    Some(variance.sqrt())
 }
 
 impl TaskRate {
@@ -70,16 +62,17 @@ impl TaskRate {
     }
 
     /// The standard error of the difference between these episodes' mean and that of
-    /// [`PUBLISHED_EPISODES`] others with the same spread, played once, if only chance tells them
-    /// apart.
+    /// [`PUBLISHED_EPISODES`] others, played once, with the same spread and as many in one
+    /// environment, if only chance tells them apart.
     pub fn chance_se(&self) -> Option<f64> {
-        let (sd, once) = (self.sd?, self.sd_once?);
-        Some((sd * sd / self.n as f64 + once * once / PUBLISHED_EPISODES).sqrt())
+        let (se, once) = (self.interval?.se, self.se_once?);
+        Some((se * se + once * once * self.n as f64 / PUBLISHED_EPISODES).sqrt())
     }
 
-    /// Whether the difference is more than chance explains in 95 of 100 cases.
+    /// Whether the difference is more than chance explains in 95 of 100 cases, by Student's t.
     pub fn is_beyond_chance(&self) -> bool {
-        self.difference().zip(self.chance_se()).is_some_and(|(d, se)| d.abs() > BEYOND * se)
+        let known = self.difference().zip(self.chance_se()).zip(self.interval);
+        known.is_some_and(|((d, se), i)| d.abs() > t_975(i.df) * se)
     }
 }
 
@@ -143,9 +136,9 @@ pub struct Order {
 }
 
 /// The order of helpers in a task; those without results or published rate are left out.
-pub fn order(results: &[RunResult], task: TaskId, helpers: &[String]) -> Order {
+pub fn order(played: Played<'_>, task: TaskId, helpers: &[String]) -> Order {
     let rate = |h: &String| {
-        let rate = task_rate(results, task, h)?;
+        let rate = task_rate(played, task, h)?;
         Some((h.clone(), rate.tr, rate.published?))
     };
     let mut rates: Vec<(String, f64, f64)> = helpers.iter().filter_map(rate).collect();
@@ -163,7 +156,7 @@ pub fn order(results: &[RunResult], task: TaskId, helpers: &[String]) -> Order {
             }
             let pair = [lower.clone(), higher.clone()];
             let interval =
-                differences(results, &pair).pop().and_then(|d| d.tasks.get(&task).copied());
+                differences(played, &pair).pop().and_then(|d| d.tasks.get(&task).copied());
             let (higher, lower) = (higher.clone(), lower.clone());
             order.inverted.push(Inversion { higher, lower, interval });
         }

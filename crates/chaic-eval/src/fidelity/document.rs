@@ -14,9 +14,9 @@ use crate::fidelity::plan::Plan;
 use crate::fidelity::sections::{RuleSection, formulas};
 use crate::fidelity::switches;
 use crate::figure::{Bar, Bars, HelperBars, transport_rate};
-use crate::metrics::{Ending, Scores};
+use crate::metrics::{Ending, Played, Scores};
 use crate::published::published;
-use crate::report::{coverage, title};
+use crate::report::{coverage, shown_interval};
 
 /// Before what is written by hand.
 pub const CAUSES_BEGIN: &str =
@@ -75,9 +75,9 @@ pub fn document(sheet: Sheet<'_>, stem: &str, causes: &str) -> Result<String> {
     text += &sheet.state();
     text += &sheet.method();
     for part in shown {
-        let (rules, results) = (part.part.rules, part.results.as_slice());
+        let (rules, played, labels) = (part.part.rules, part.played(), part.labels());
         let (tasks, helpers) = (plan.tasks.as_slice(), plan.helpers.as_slice());
-        let section = RuleSection { rules, results, tasks, helpers };
+        let section = RuleSection { rules, played, labels, tasks, helpers };
         text += &section.markdown(&format!("images/{}", figure_name(stem, part)));
     }
     if let Some(base) = sheet.base() {
@@ -144,13 +144,13 @@ impl<'a> Sheet<'a> {
         }
         for part in self.parts {
             // What is missing altogether has just been said.
-            for note in coverage(&part.results, &[]) {
+            for note in coverage(Played { planned: &[], ..part.played() }) {
                 let _ = writeln!(text, "**{}: {note}**\n", part.part.name);
             }
         }
         let broken: usize = self.parts.iter().map(PartState::n_broken).sum();
         if broken > 0 {
-            let _ = writeln!(text, "**{broken} episode runs broke down and are not scored:**\n");
+            let _ = writeln!(text, "**{broken} episode runs broke down and count as zero:**\n");
             for (part, result) in
                 self.parts.iter().flat_map(|p| p.results.iter().map(move |r| (p, r)))
             {
@@ -201,6 +201,8 @@ impl<'a> Sheet<'a> {
             ),
         };
         text += "\n\n";
+        let granted = self.parts.first().and_then(|p| p.labels().sentence(&plan.helpers));
+        text += &granted.map_or(String::new(), |granted| format!("**{granted}**\n\n"));
         if plan.tasks.len() < TaskId::all().count() {
             let names: Vec<&str> = plan.tasks.iter().map(|t| t.info().title).collect();
             let _ = writeln!(text, "Only these of the eight tasks: {}.\n", names.join(", "));
@@ -209,15 +211,16 @@ impl<'a> Sheet<'a> {
     }
 
     fn bars(self, part: &PartState) -> Bars {
-        let scores = Scores::of(&part.results, &formulas(part.part.rules));
+        let scores = Scores::of(part.played(), &formulas(part.part.rules));
         let tasks = &self.plan.tasks;
         let bars = |helper: &String| {
             let bar = |task: &TaskId| {
                 let score = scores.get(*task, helper)?;
                 let dot = published(helper).map(|row| row.figures(*task).tr);
-                Some(Bar { mean: score.tr, se: score.tr_se.unwrap_or(0.0), dot })
+                Some(Bar { mean: score.tr, interval: shown_interval(score), dot })
             };
-            HelperBars { helper: title(helper), values: tasks.iter().map(bar).collect() }
+            let helper_title = part.labels().title(helper);
+            HelperBars { helper: helper_title, values: tasks.iter().map(bar).collect() }
         };
         Bars {
             tasks: tasks.iter().map(|t| t.info().title.to_owned()).collect(),

@@ -1,6 +1,6 @@
 //! The runs of a plan in their folders, and how far they have come.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use chaic_protocol::{Frame, TaskId};
@@ -10,8 +10,11 @@ use crate::CHAIC_VERSION;
 use crate::error::{EvalError, Result};
 use crate::fidelity::plan::{Part, Plan, Wanted};
 use crate::helpers::Helpers;
-use crate::metrics::{RunKey, RunResult};
-use crate::run::{Given, Item, RunFolder, planned, read_results, write_whole};
+use crate::metrics::{Environments, Played, RunKey, RunResult};
+use crate::report::Labels;
+use crate::run::{
+    Given, Item, RunFolder, RunGrants, environments, planned, read_results, write_whole,
+};
 
 const FORMAT: &str = "chaic-fidelity";
 const VERSION: u32 = 1;
@@ -36,6 +39,10 @@ pub struct PartState {
     pub planned: Vec<RunKey>,
     /// Their results so far.
     pub results: Vec<RunResult>,
+    /// Where the episodes take place.
+    pub environments: Environments,
+    /// What everybody is granted; `None` where the part hasn't begun.
+    pub granted: Option<RunGrants>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -164,32 +171,49 @@ pub fn parts(matrix: &Matrix) -> Result<Vec<PartState>> {
     };
     let (folder, options) = RunFolder::read(&matrix.folder(first))?;
     let planned = planned(&folder, &options)?;
-    let episodes: BTreeMap<(TaskId, String), Frame> =
-        planned.into_iter().map(|i| ((i.key.task, i.key.episode), i.horizon)).collect();
+    let environments = environments(&planned);
+    let episodes: BTreeMap<(TaskId, String), (Frame, String)> = planned
+        .into_iter()
+        .map(|i| ((i.key.task, i.key.episode), (i.horizon, i.environment)))
+        .collect();
     let state = |part: Part| {
         let mut items = Vec::new();
-        for ((task, episode), horizon) in &episodes {
+        for ((task, episode), (horizon, environment)) in &episodes {
             for (helper, seed) in
                 part.helpers.iter().flat_map(|h| (0..part.seeds).map(move |s| (h, s)))
             {
                 let (task, episode, helper) = (*task, episode.clone(), helper.clone());
                 let key = RunKey { task, helper, episode, seed };
-                items.push(Item { key, horizon: *horizon });
+                items.push(Item { key, horizon: *horizon, environment: environment.clone() });
             }
         }
         let (results, _) = read_results(&matrix.folder(&part).join("results.jsonl"), &items)?;
         let mut planned: Vec<RunKey> = items.into_iter().map(|i| i.key).collect();
         planned.sort();
-        Ok(PartState { results, planned, part })
+        let granted = match begun(&part) {
+            true => RunFolder::read(&matrix.folder(&part))?.0.granted()?,
+            false => None,
+        };
+        Ok(PartState { results, planned, part, environments: environments.clone(), granted })
     };
     parts.into_iter().map(state).collect()
 }
 
 impl PartState {
+    /// What its scores are made from.
+    pub fn played(&self) -> Played<'_> {
+        let PartState { planned, results, environments, .. } = self;
+        Played { results, planned, environments }
+    }
+
+    /// What its rows are called.
+    pub fn labels(&self) -> Labels<'_> {
+        Labels { granted: self.granted.as_ref() }
+    }
+
     /// The episode runs without a result.
     pub fn missing(&self) -> Vec<&RunKey> {
-        let done: BTreeSet<&RunKey> = self.results.iter().map(|r| &r.key).collect();
-        self.planned.iter().filter(|k| !done.contains(k)).collect()
+        self.played().missing()
     }
 
     /// The results that broke down.

@@ -1,5 +1,6 @@
 //! What the document says of one rule set.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use chaic_protocol::TaskId;
@@ -8,21 +9,22 @@ use crate::fidelity::compare::{
     Distance, Inversion, Order, PUBLISHED_EPISODES, TaskRate, distance, order, task_rate,
 };
 use crate::helpers::NONE;
-use crate::metrics::{Formulas, RunResult, Score, Scores, Spread, differences};
+use crate::metrics::{Formulas, Played, Score, Scores, Spread, differences};
 use crate::published::{Figures, published};
-use crate::report::{Grid, interval, number, rounded, title};
+use crate::report::{Grid, Labels, interval, number, rounded, title};
 use crate::rules::RuleSetName;
 
 /// The results of one rule set.
 pub(super) struct RuleSection<'a> {
     pub rules: RuleSetName,
-    pub results: &'a [RunResult],
+    pub played: Played<'a>,
+    pub labels: Labels<'a>,
     pub tasks: &'a [TaskId],
     pub helpers: &'a [String],
 }
 
 /// The formulas that a rule set is scored by: the paper's by the paper's, the original's by those
-/// of its scripts; standard errors are always over episodes.
+/// of its scripts; standard errors are always over environments.
 pub(super) fn formulas(rules: RuleSetName) -> Formulas {
     match rules {
         RuleSetName::Paper => Formulas::PAPER,
@@ -42,7 +44,7 @@ impl RuleSection<'_> {
             RuleSetName::Compat => {
                 "Scored by the formulas of the original's scripts, where these differ from the \
                  paper's (EI, CR, ER; see [metrics.md](metrics.md)); standard errors are over \
-                 episodes, as everywhere here."
+                 environments, as everywhere here."
             }
         };
         let mut text = format!(
@@ -58,7 +60,7 @@ impl RuleSection<'_> {
 
     /// The rates of a helper in all tasks that have any.
     fn task_rates(&self, helper: &str) -> Vec<TaskRate> {
-        self.tasks.iter().filter_map(|t| task_rate(self.results, *t, helper)).collect()
+        self.tasks.iter().filter_map(|t| task_rate(self.played, *t, helper)).collect()
     }
 
     fn header(&self, first: &str) -> Vec<String> {
@@ -70,13 +72,13 @@ impl RuleSection<'_> {
         let mut rows = Vec::new();
         for helper in self.helpers {
             let rates: Vec<Option<TaskRate>> =
-                self.tasks.iter().map(|t| task_rate(self.results, *t, helper)).collect();
+                self.tasks.iter().map(|t| task_rate(self.played, *t, helper)).collect();
             let row = |name: String, cell: &dyn Fn(&TaskRate) -> String| {
                 let cells = rates.iter().map(|r| r.as_ref().map_or("/".to_owned(), cell));
                 std::iter::once(name).chain(cells).collect::<Vec<String>>()
             };
             let name = title(helper);
-            rows.push(row(format!("**{name}**, chaic"), &|r| rounded(r.tr)));
+            rows.push(row(format!("**{}**, chaic", self.labels.title(helper)), &|r| rounded(r.tr)));
             if published(helper).is_some() {
                 rows.push(row(format!("{name}, paper"), &|r| number(r.published)));
                 rows.push(row("difference".to_owned(), &difference));
@@ -85,12 +87,26 @@ impl RuleSection<'_> {
         let title = "Transport rate, measured and published".to_owned();
         let grid = Grid { title, header: self.header("TR"), rows };
         format!(
-            "{}\nBehind ± stands half the 95 % interval of chaic's mean over episodes (Student's t, \
-             the seeds of an episode averaged first). **Bold**: the difference is more than 1.96 \
-             standard errors of the difference between these episodes and {PUBLISHED_EPISODES} \
-             others with the same spread, played once.\n\n",
-            grid.to_markdown()
+            "{}\nBehind ± stands half the 95 % interval of chaic's mean over environments ({}; cluster \
+             bootstrap with Student's t, see [metrics.md](metrics.md)). **Bold**: the difference is \
+             more than chance explains in 95 of 100 cases between these episodes and \
+             {PUBLISHED_EPISODES} others with the same spread and as many in one environment, played \
+             once. The paper's helpers perceive by a trained Mask R-CNN; what chaic's are granted \
+             stands behind their names.\n\n",
+            grid.to_markdown(),
+            self.environments(),
         )
+    }
+
+    /// How many environments the episodes of each task take place in.
+    fn environments(&self) -> String {
+        let of = |t: &TaskId| {
+            let results = self.played.results.iter().filter(|r| r.key.task == *t);
+            let places: BTreeSet<&str> =
+                results.map(|r| self.played.environments.of(&r.key.episode)).collect();
+            format!("{}: {}", t.info().title.to_lowercase(), places.len())
+        };
+        self.tasks.iter().map(of).collect::<Vec<_>>().join(", ")
     }
 
     fn distances(&self) -> String {
@@ -119,9 +135,10 @@ impl RuleSection<'_> {
         format!(
             "{}\nBy chance: what the MAD would be on average, and its standard deviation, if chaic's \
              figures and the published ones were means over episodes of the same kind, chaic's own and \
-             {PUBLISHED_EPISODES} others played once, with the spread over episodes and seeds that \
-             chaic's show (the mean absolute value of a normal is 0.80 of its standard deviation). \
-             What the MAD exceeds that by is not sampling. Beyond chance: tasks in bold above; of \
+             {PUBLISHED_EPISODES} others played once, with the spread over environments and seeds \
+             that chaic's show (the mean absolute value of a normal is 0.80 of its standard deviation). \
+             What the MAD exceeds that by is not sampling. Tasks in one house are taken as independent, so \
+             the deviation is at least that. Beyond chance: tasks in bold above; of \
              eight, chance gives 0.4.\n\n",
             grid.to_markdown()
         )
@@ -129,7 +146,7 @@ impl RuleSection<'_> {
 
     fn orders(&self) -> String {
         let orders: Vec<(TaskId, Order)> =
-            self.tasks.iter().map(|t| (*t, order(self.results, *t, self.helpers))).collect();
+            self.tasks.iter().map(|t| (*t, order(self.played, *t, self.helpers))).collect();
         let row = |(task, o): &(TaskId, Order)| {
             let inverted: Vec<String> = o.inverted.iter().map(inversion).collect();
             vec![
@@ -171,7 +188,7 @@ impl RuleSection<'_> {
     /// The helpers from the highest rate to the lowest.
     fn ranking(&self, task: TaskId, as_published: bool) -> String {
         let rate = |h: &String| {
-            let rate = task_rate(self.results, task, h)?;
+            let rate = task_rate(self.played, task, h)?;
             let published = rate.published?;
             Some((title(h), if as_published { published } else { rate.tr }))
         };
@@ -192,7 +209,7 @@ impl RuleSection<'_> {
         let mut rows = Vec::new();
         for helper in &helpers {
             let pair = [NONE.to_owned(), (*helper).clone()];
-            let Some(found) = differences(self.results, &pair).pop() else { continue };
+            let Some(found) = differences(self.played, &pair).pop() else { continue };
             let cells = self.tasks.iter().map(|t| interval(found.tasks.get(t)));
             let name = format!("**{} - w/o**, chaic", title(helper));
             let all = interval(found.all.as_ref());
@@ -211,7 +228,7 @@ impl RuleSection<'_> {
         }
         let mut header = self.header("TR difference");
         header.insert(1, "all".to_owned());
-        let title = "What a helper adds to no helper, with 95 % intervals over the same episodes";
+        let title = "What a helper adds to no helper on the same episodes, with 95 % intervals over environments";
         Grid { title: title.to_owned(), header, rows }.to_markdown() + "\n"
     }
 
@@ -225,7 +242,7 @@ impl RuleSection<'_> {
             ("ER", |s| s.er, |f| f.er),
             ("SE", |s| s.tr_se, |f| f.tr_se),
         ];
-        let scores = Scores::of(self.results, &formulas(self.rules));
+        let scores = Scores::of(self.played, &formulas(self.rules));
         let mut rows = Vec::new();
         for (metric, ours, papers) in METRICS {
             for helper in self.helpers {

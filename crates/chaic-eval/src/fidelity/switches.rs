@@ -7,7 +7,7 @@ use chaic_protocol::TaskId;
 
 use crate::error::Result;
 use crate::fidelity::matrix::PartState;
-use crate::metrics::{Interval, RunKey, RunResult, differences};
+use crate::metrics::{Interval, Played, RunKey, RunResult, differences};
 use crate::report::{Grid, interval, title};
 use crate::rules::rule_values;
 
@@ -27,23 +27,26 @@ pub struct Change {
     pub all: Option<Interval>,
 }
 
-/// The change of a helper's rates from `base` to `switched`, over the episode runs that both have.
-pub fn change(rule: &str, base: &[RunResult], switched: &[RunResult], helper: &str) -> Change {
+/// The change of a helper's rates from `base` to `switched`, over the episode runs that both played
+/// to their end.
+pub fn change(rule: &str, base: Played<'_>, switched: &[RunResult], helper: &str) -> Change {
     const NAMES: [&str; 2] = ["base", "switched"];
     let keys = |results: &[RunResult]| -> BTreeSet<RunKey> {
         let scored = results.iter().filter(|r| r.key.helper == helper && r.summary().is_some());
         scored.map(|r| r.key.clone()).collect()
     };
-    let both: BTreeSet<RunKey> = keys(base).intersection(&keys(switched)).cloned().collect();
+    let both: BTreeSet<RunKey> =
+        keys(base.results).intersection(&keys(switched)).cloned().collect();
     let mut named = Vec::new();
-    for (name, results) in NAMES.iter().zip([base, switched]) {
+    for (name, results) in NAMES.iter().zip([base.results, switched]) {
         for result in results.iter().filter(|r| both.contains(&r.key)) {
             let mut result = result.clone();
             result.key.helper = (*name).to_owned();
             named.push(result);
         }
     }
-    let found = differences(&named, &NAMES.map(str::to_owned)).pop();
+    let named = Played { results: &named, planned: &[], ..base };
+    let found = differences(named, &NAMES.map(str::to_owned)).pop();
     let (tasks, all) = found.map_or((BTreeMap::new(), None), |d| (d.tasks, d.all));
     Change { rule: rule.to_owned(), helper: helper.to_owned(), tasks, all }
 }
@@ -64,14 +67,14 @@ pub(super) fn section(
     let mut text = format!(
         "## One rule at a time\n\nThe rules `compat` with one rule set as `paper` has it, on the same \
          episodes with {seeds}: by how much that moves TR, with the 95 % interval of the paired \
-         change over episodes. Sorted by the size of the change over all tasks; **bold** where the \
+         change over environments. Sorted by the size of the change over all tasks; **bold** where the \
          interval excludes zero. `0` means that not one episode's rate changed.\n\n"
     );
     let mut changes: BTreeMap<&str, Vec<Change>> = BTreeMap::new();
     for helper in helpers {
         let of = |s: &&PartState| {
             let rule = s.part.switch.as_deref().unwrap_or("");
-            change(rule, &base.results, &s.results, helper)
+            change(rule, base.played(), &s.results, helper)
         };
         let mut list: Vec<Change> = switches.iter().map(of).collect();
         list.sort_by(|a, b| size(b.all.as_ref()).total_cmp(&size(a.all.as_ref())));

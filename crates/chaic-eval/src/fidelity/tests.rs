@@ -3,13 +3,15 @@
 use std::fs;
 
 use chaic_protocol::TaskId;
+use chaic_protocol::observation::Grants;
 
 use super::*;
 use crate::digest::Digest;
 use crate::error::EvalError;
 use crate::helpers::BuiltIn;
-use crate::metrics::{Ending, RunKey, RunResult, Summary};
+use crate::metrics::{Ending, Environments, Played, RunKey, RunResult, Summary};
 use crate::rules::{RuleSetName, differing_rules};
+use crate::run::RunGrants;
 
 const LOW: TaskId = TaskId::LowTarget;
 
@@ -46,22 +48,27 @@ fn low() -> Vec<RunResult> {
 }
 
 fn near(a: f64, b: f64) {
-    assert!((a - b).abs() < 1e-6, "{a} is not {b}");
+    // Resamples leave the fourth digit of a standard error to chance.
+    assert!((a - b).abs() < 1e-4, "{a} is not {b}");
 }
 
 #[test]
 fn rates_and_what_chance_explains() {
-    let none = task_rate(&low(), LOW, "none").unwrap();
+    let environments = Environments::default();
+    let of = |results: &[RunResult], task, helper: &str| {
+        task_rate(Played { results, planned: &[], environments: &environments }, task, helper)
+    };
+    let none = of(&low(), LOW, "none").unwrap();
     near(none.tr, 0.4);
     // Means 0.5 and 0.3; each seed alone 0.4 and 0.2, or 0.6 and 0.4: all deviate by 0.02^0.5.
-    near(none.sd.unwrap(), 0.02f64.sqrt());
-    near(none.sd_once.unwrap(), 0.02f64.sqrt());
+    near(none.interval.unwrap().se, (0.02f64 / 2.0).sqrt());
+    near(none.se_once.unwrap(), (0.02f64 / 2.0).sqrt());
     near(none.difference().unwrap(), -0.11);
     near(none.chance_se().unwrap(), (0.02f64 / 2.0 + 0.02 / 12.0).sqrt());
     assert!(!none.is_beyond_chance());
     // Obstacle: always 1 of 10 (published 0.07), so chance explains nothing.
     let obstacle = runs(TaskId::Obstacle, "none", [1.0; 4]);
-    let obstacle = task_rate(&obstacle, TaskId::Obstacle, "none").unwrap();
+    let obstacle = of(&obstacle, TaskId::Obstacle, "none").unwrap();
     assert!(obstacle.is_beyond_chance());
     let d = distance(&[none, obstacle]).unwrap();
     near(d.mad, 0.07);
@@ -70,15 +77,20 @@ fn rates_and_what_chance_explains() {
     near(d.by_chance, 0.043090);
     near(d.chance_sd, 0.032556);
     assert_eq!((d.tasks, d.beyond), (2, 1));
-    assert!(task_rate(&low(), LOW, "random").is_none());
+    assert!(of(&low(), LOW, "random").is_none());
     let unpublished = runs(LOW, "follow", [1.0; 4]);
-    assert_eq!(distance(&[task_rate(&unpublished, LOW, "follow").unwrap()]), None);
+    assert_eq!(distance(&[of(&unpublished, LOW, "follow").unwrap()]), None);
+}
+
+fn order_of(results: &[RunResult], helpers: &[String]) -> Order {
+    let environments = Environments::default();
+    order(Played { results, planned: &[], environments: &environments }, LOW, helpers)
 }
 
 #[test]
 fn orders_are_kept_pair_by_pair() {
     let helpers = ["none", "rhp", "oracle"].map(str::to_owned);
-    let equal = order(&low(), LOW, &helpers);
+    let equal = order_of(&low(), &helpers);
     assert_eq!((equal.pairs, equal.inverted.len()), (3, 1));
     let inversion = &equal.inverted[0];
     assert_eq!((inversion.higher.as_str(), inversion.lower.as_str()), ("rhp", "none"));
@@ -87,27 +99,29 @@ fn orders_are_kept_pair_by_pair() {
     let mut results = low();
     results.retain(|r| r.key.helper != "rhp");
     results.extend(runs(LOW, "rhp", [4.0, 4.0, 2.0, 2.0]));
-    let worse = order(&results, LOW, &helpers);
+    let worse = order_of(&results, &helpers);
     near(worse.inverted[0].interval.unwrap().mean, -0.1);
     assert!(!worse.is_within_intervals());
     // The paper has w/o at 0.51 and Random at 0.50; Random above is an inversion.
     let mut results = low();
     results.extend(runs(LOW, "random", [9.5; 4]));
     let helpers = ["none", "random", "oracle"].map(str::to_owned);
-    assert_eq!(order(&results, LOW, &helpers).inverted.len(), 2);
-    assert!(order(&[], LOW, &helpers).is_preserved());
+    assert_eq!(order_of(&results, &helpers).inverted.len(), 2);
+    assert!(order_of(&[], &helpers).is_preserved());
 }
 
 #[test]
 fn a_switch_is_compared_on_what_both_played() {
     // One seed only: 4 and 2 become 6 and 4. The second seed of the base doesn't count.
     let switched = [run(LOW, "none", 0, 0, 6.0), run(LOW, "none", 1, 0, 4.0)];
-    let change = change("world.blocking", &low(), &switched, "none");
+    let (low, environments) = (low(), Environments::default());
+    let base = Played { results: &low, planned: &[], environments: &environments };
+    let change = change("world.blocking", base, &switched, "none");
     near(change.tasks[&LOW].mean, 0.2);
     near(change.all.unwrap().low, 0.2);
-    let untouched = super::change("world.blocking", &low(), &low(), "oracle");
+    let untouched = super::change("world.blocking", base, &low, "oracle");
     assert_eq!((untouched.tasks[&LOW].low, untouched.tasks[&LOW].high), (0.0, 0.0));
-    assert!(super::change("world.blocking", &low(), &switched, "rhp").all.is_none());
+    assert!(super::change("world.blocking", base, &switched, "rhp").all.is_none());
 }
 
 fn plan() -> Plan {
@@ -131,7 +145,10 @@ fn states(plan: &Plan) -> Vec<PartState> {
             Some(_) => vec![run(LOW, "none", 0, 0, 6.0), run(LOW, "none", 1, 0, 4.0)],
         };
         let planned = results.iter().map(|r| r.key.clone()).collect();
-        PartState { part, planned, results }
+        let helpers = [("rhp", Grants::IDS), ("oracle", Grants::ORACLE)];
+        let helpers = helpers.map(|(name, grants)| (name.to_owned(), grants)).into();
+        let granted = Some(RunGrants { helpers, partner: Grants::PARTNER });
+        PartState { part, planned, results, environments: Environments::default(), granted }
     };
     plan.parts().into_iter().map(state).collect()
 }
@@ -146,6 +163,9 @@ fn the_document_has_the_worked_numbers() {
          --switch-seeds 1 --switch-helper none\n",
         "Only these of the eight tasks: Low target.",
         "**The published figures are over the original's test split, these over its training split**",
+        "**Granted: RHP: ids from ground truth; Oracle: ids from ground truth, told behavior, goal,",
+        "| **RHP (ids from ground truth)**, chaic | 0.40 |",
+        "over environments (low target: 2; cluster bootstrap",
         "| **w/o**, chaic | 0.40 |\n| w/o, paper | 0.51 |\n| difference | -0.11 ±1.27 |\n",
         "| Oracle, paper | 0.82 |\n| difference | -0.02 ±1.27 |\n",
         "| w/o | 0.11 | 0.09 | 0.07 | -0.11 | 0 of 1 |\n",
@@ -180,9 +200,9 @@ fn what_is_missing_is_said_first() {
         "- `paper`: 12 of 12 are missing",
         "- `compat`: 1 of 12 are missing",
         "- `switch/world.blocking`: 1 of 2 are missing",
-        "compat: Unequal: in low target the rows rest on different episode runs (w/o on 3, Oracle on \
+        "compat: Unequal: in low target the rows rest on different episode runs (w/o on 4, Oracle on \
          4, RHP on 3)",
-        "1 episode runs broke down",
+        "1 episode runs broke down and count as zero",
         "`compat`: low_target/original-train/00 with none, seed 0: out of ideas",
     ] {
         assert!(top.contains(line), "{line}\nis missing in\n{top}");

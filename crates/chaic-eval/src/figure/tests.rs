@@ -13,7 +13,8 @@ fn bars(helpers: &[&str]) -> Bars {
             values: (0..tasks.len())
                 .map(|t| {
                     let mean = ((h * 13 + t * 29) % 60) as f64 / 100.0 + 0.2;
-                    Some(Bar { mean, se: 0.02 + t as f64 * 0.005, dot: None })
+                    let se = 0.02 + t as f64 * 0.005;
+                    Some(Bar { mean, interval: Some([mean - se, mean + 2.0 * se]), dot: None })
                 })
                 .collect(),
         })
@@ -36,13 +37,13 @@ fn n_fills(svg: &str, color: RGBColor) -> usize {
 
 #[test]
 fn names_every_task_and_helper() {
-    let helpers = ["No helper", "Random", "Rule-based", "LLM + BM", "VLM", "Oracle"];
+    let helpers = ["No helper", "Random", "Rule-based", "LLM", "VLM", "Oracle"];
     let bars = bars(&helpers);
     let svg = svg(&bars);
     for label in bars.tasks.iter().map(String::as_str).chain(helpers) {
         assert!(svg.contains(label), "no `{label}`");
     }
-    assert!(svg.contains("transport rate"));
+    assert!(svg.contains("transport rate") && svg.contains("95 % intervals"));
     assert!(svg.contains("font-family=\"sans-serif\""));
     for (index, helper) in helpers.iter().enumerate() {
         assert_eq!(n_fills(&svg, color(index)), 1 + 8, "{helper}");
@@ -59,7 +60,7 @@ fn markup_in_a_name_is_text() {
 fn a_missing_value_leaves_a_gap_and_zero_does_not() {
     let mut bars = bars(&["A", "B"]);
     bars.helpers[0].values[3] = None;
-    bars.helpers[1].values[3] = Some(Bar { mean: 0.0, se: 0.0, dot: None });
+    bars.helpers[1].values[3] = Some(Bar { mean: 0.0, interval: None, dot: None });
     let svg = svg(&bars);
     assert_eq!(n_fills(&svg, color(0)), 1 + 7);
     assert_eq!(n_fills(&svg, color(1)), 1 + 8);
@@ -72,7 +73,7 @@ fn dots_stand_at_their_values_and_are_explained() {
     assert_eq!(n_circles(&svg(&bars)), 0);
     bars.dots = Some("the paper".to_owned());
     for (dot, task) in [(0.0, 2), (1.0, 5)] {
-        bars.helpers[1].values[task] = Some(Bar { mean: 0.5, se: 0.0, dot: Some(dot) });
+        bars.helpers[1].values[task] = Some(Bar { mean: 0.5, interval: None, dot: Some(dot) });
     }
     let svg = svg(&bars);
     assert_eq!(n_circles(&svg), 2 * 2, "each a disk and its edge");
@@ -110,12 +111,19 @@ fn most_helpers_have_different_colors() {
 fn refuses_what_is_not_a_rate() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("figure.svg");
-    let with = |mean, se| {
+    let with = |mean, interval| {
         let mut bars = bars(&["A"]);
-        bars.helpers[0].values[1] = Some(Bar { mean, se, dot: None });
+        bars.helpers[0].values[1] = Some(Bar { mean, interval, dot: None });
         bars
     };
-    for bad in [with(1.1, 0.0), with(-0.1, 0.0), with(f64::NAN, 0.0), with(0.5, f64::NAN)] {
+    for bad in [
+        with(1.1, None),
+        with(-0.1, None),
+        with(f64::NAN, None),
+        with(0.5, Some([f64::NAN, 0.6])),
+        with(0.5, Some([0.4, 1.1])),
+        with(0.5, Some([0.6, 0.7])),
+    ] {
         assert!(matches!(transport_rate(&bad, &out), Err(FigureError::Value { .. })));
     }
     let mut short = bars(&["A"]);

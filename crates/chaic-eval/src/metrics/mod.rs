@@ -4,16 +4,20 @@
 //! results of a run into scores by one of two [`Formulas`]. `docs/metrics.md` gives the formulas
 //! and where they come from.
 
+mod cluster;
+mod differences;
 mod formulas;
 mod result;
 mod scores;
 mod stats;
 mod tally;
 
+pub use cluster::{Clusters, Environments, Interval};
+pub use differences::{Difference, Resolution, differences, resolution};
 pub use formulas::{FormulaSet, Formulas, Spread};
 pub use result::{Delivery, Ending, RunKey, RunResult, Summary};
-pub use scores::{Difference, Score, Scores, differences, episode_rates};
-pub use stats::{Interval, mean_interval, paired_interval, sample_sd};
+pub use scores::{MAX_NAMED, Played, Score, Scores};
+pub use stats::t_975;
 pub use tally::{Tally, tally};
 
 #[cfg(test)]

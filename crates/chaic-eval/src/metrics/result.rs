@@ -37,7 +37,7 @@ pub struct RunResult {
 pub enum Ending {
     /// It was played to its end.
     Done(Summary),
-    /// An agent broke down; nothing is scored.
+    /// An agent broke down, which counts as zero.
     Error {
         /// What it said.
         message: String,

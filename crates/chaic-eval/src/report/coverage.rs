@@ -4,28 +4,34 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use chaic_protocol::TaskId;
 
-use crate::metrics::{RunKey, RunResult};
-use crate::report::tables::title;
+use crate::metrics::{Played, RunKey, RunResult};
+use crate::report::labels::title;
 
-/// What a reader of these results has to know: that episode runs of `planned` are missing, and
-/// where helpers rest on different ones. Nothing of a whole run.
-pub fn coverage(results: &[RunResult], planned: &[RunKey]) -> Vec<String> {
-    missing(results, planned).into_iter().chain(unequal(results)).collect()
+/// How many missing episode runs a note names.
+const NAMED: usize = 5;
+
+/// What a reader of these results has to know: which episode runs are missing, and where helpers
+/// rest on different ones. Nothing of a whole run.
+pub fn coverage(played: Played<'_>) -> Vec<String> {
+    missing(played).into_iter().chain(unequal(played.results)).collect()
 }
 
-fn missing(results: &[RunResult], planned: &[RunKey]) -> Option<String> {
-    let played: BTreeSet<&RunKey> = results.iter().map(|r| &r.key).collect();
+fn missing(played: Played<'_>) -> Option<String> {
+    let missing = played.missing();
     let mut by_helper: BTreeMap<&str, usize> = BTreeMap::new();
-    for key in planned.iter().filter(|k| !played.contains(k)) {
+    for key in &missing {
         *by_helper.entry(&key.helper).or_default() += 1;
     }
-    let n: usize = by_helper.values().sum();
     let each: Vec<String> = by_helper.iter().map(|(h, n)| format!("{} {n}", title(h))).collect();
-    (n > 0).then(|| {
-        let (total, each) = (planned.len(), each.join(", "));
+    let name = |k: &&RunKey| format!("{} with {}, seed {}", k.episode, k.helper, k.seed);
+    let named: Vec<String> = missing.iter().take(NAMED).map(name).collect();
+    (!missing.is_empty()).then(|| {
+        let (n, total, each) = (missing.len(), played.planned.len(), each.join(", "));
+        let more = if n > NAMED { "; ..." } else { "" };
         format!(
             "Unfinished: {n} of {total} episode runs are missing ({each}); all numbers are of those \
-             that were played."
+             that were played. Missing: {}{more}.",
+            named.join("; ")
         )
     })
 }
@@ -50,7 +56,7 @@ type ByHelper<'a> = BTreeMap<&'a str, BTreeSet<(&'a str, u32)>>;
 
 fn unequal(results: &[RunResult]) -> Vec<String> {
     let mut by_task: BTreeMap<TaskId, ByHelper<'_>> = BTreeMap::new();
-    for RunResult { key, .. } in results.iter().filter(|r| r.summary().is_some()) {
+    for RunResult { key, .. } in results {
         let helpers = by_task.entry(key.task).or_default();
         helpers.entry(&key.helper).or_default().insert((&key.episode, key.seed));
     }

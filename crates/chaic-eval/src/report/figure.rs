@@ -1,24 +1,28 @@
-//! Scores as the paper's figure: transport rates with one standard error.
+//! Scores as the paper's figure: transport rates with 95 % intervals.
 
 use std::path::Path;
 
 use crate::error::{EvalError, Result};
 use crate::figure::{Bar, Bars, FigureError, HelperBars, transport_rate};
-use crate::metrics::Scores;
-use crate::report::tables::title;
+use crate::metrics::{Score, Scores};
+use crate::report::labels::Labels;
+use crate::report::tables::shown_interval;
 
-/// Draws transport rates with their standard errors into a `.svg` or `.png` file.
+/// Draws transport rates with their 95 % intervals into a `.svg` or `.png` file.
 ///
 /// # Errors
 /// If the extension is another one, there are more helpers than can be told apart, or the file
 /// system refuses.
-pub fn write_figure(scores: &Scores, path: &Path) -> Result<()> {
+pub fn write_figure(scores: &Scores, labels: Labels<'_>, path: &Path) -> Result<()> {
     let tasks = scores.tasks();
     let bars = |helper: &String| {
-        let bar =
-            |s: &crate::metrics::Score| Bar { mean: s.tr, se: s.tr_se.unwrap_or(0.0), dot: None };
+        let bar = |s: &Score| Bar { mean: s.tr, interval: shown_interval(s), dot: None };
+        let is_incomplete = tasks.iter().any(|t| {
+            scores.is_unplayed(*t, helper) || scores.get(*t, helper).is_some_and(|s| s.incomplete)
+        });
+        let mark = if is_incomplete { ", incomplete" } else { "" };
         HelperBars {
-            helper: title(helper),
+            helper: labels.title(helper) + mark,
             values: tasks.iter().map(|t| scores.get(*t, helper).map(bar)).collect(),
         }
     };

@@ -29,7 +29,8 @@ impl Grid {
         // An empty first line stands for the title before it.
         let flat = |h: &String| h.trim_start_matches('\n').replace('\n', "<br>");
         let header: Vec<String> = self.header.iter().map(flat).collect();
-        let rows: String = self.rows.iter().map(|r| line(r)).collect();
+        let rows: String =
+            self.rows.iter().map(|r| line(&r.iter().map(flat).collect::<Vec<_>>())).collect();
         format!("**{}**\n\n{}{}{rows}", self.title, line(&header), line(&rule))
     }
 

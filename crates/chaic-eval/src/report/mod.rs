@@ -3,14 +3,16 @@
 mod coverage;
 mod figure;
 mod grid;
+mod labels;
 mod tables;
 mod write;
 
 pub use coverage::{coverage, without_trace};
 pub use figure::write_figure;
 pub(crate) use grid::Grid;
-pub use tables::{additional, counts, main_result, pairs, title};
-pub(crate) use tables::{interval, number, rounded};
+pub use labels::{GrantsFile, Labels, title};
+pub use tables::{additional, counts, intervals, main_result, pairs, resolutions, stuck};
+pub(crate) use tables::{interval, number, rounded, shown_interval};
 pub use write::{Report, write_files};
 
 use std::fmt;

@@ -4,12 +4,18 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use chaic_protocol::TaskId;
 
-use crate::helpers::NONE;
-use crate::metrics::{Difference, Interval, RunResult, Score, Scores};
+use crate::metrics::{Difference, Interval, RunResult, Score, Scores, resolution};
 use crate::report::grid::Grid;
+use crate::report::labels::{Labels, title};
 
 /// What stands where there is nothing to say, as in the paper.
 const UNDEFINED: &str = "/";
+/// Behind a number of which some episode runs broke down and count as zero.
+pub(super) const BROKEN: &str = "*";
+/// Behind a number of which some episode runs are missing, or in place of it if all are.
+pub(super) const MISSING: &str = "?";
+/// An interval from fewer environments is wider than all that a rate can be.
+const MIN_ENVIRONMENTS: usize = 3;
 /// Tasks side by side in one table, as in the paper.
 const TASKS_ABREAST: usize = 4;
 
@@ -21,26 +27,76 @@ struct Column {
 }
 
 /// The paper's main table: TR(EI), IA, and ER while shopping.
-pub fn main_result(scores: &Scores) -> Vec<Grid> {
+pub fn main_result(scores: &Scores, labels: Labels<'_>) -> Vec<Grid> {
     let columns = [
         Column { name: "TR(EI)", in_task: |_| true, cell: rate_and_improvement },
         Column { name: "IA", in_task: |_| true, cell: |s| number(s.ia) },
         Column { name: "ER", in_task: |t| t.info().has_child, cell: |s| number(s.er) },
     ];
-    blocks(scores, "Transport rate (efficiency improvement), goal inference accuracy", &columns)
+    let name = "Transport rate (efficiency improvement), goal inference accuracy";
+    blocks(scores, labels, name, &columns)
 }
 
 /// The paper's additional table: CR, and how uncertain TR is.
-pub fn additional(scores: &Scores) -> Vec<Grid> {
+pub fn additional(scores: &Scores, labels: Labels<'_>) -> Vec<Grid> {
     let columns = [
         Column { name: "CR", in_task: |_| true, cell: |s| number(s.cr) },
         Column { name: "SE", in_task: |_| true, cell: |s| number(s.tr_se) },
     ];
-    blocks(scores, "Completion ratio of the helper, standard error of TR", &columns)
+    blocks(scores, labels, "Completion ratio of the helper, standard error of TR", &columns)
 }
 
-/// Differences of TR between helpers, with 95 % intervals.
-pub fn pairs(differences: &[Difference], tasks: &[TaskId]) -> Grid {
+/// For how much of their time partner or helper were stuck; nothing where no result tells.
+pub fn stuck(scores: &Scores, labels: Labels<'_>) -> Vec<Grid> {
+    let columns = [Column { name: "stuck", in_task: |_| true, cell: |s| thousandths(s.stuck) }];
+    let is_known = scores.tasks.values().flat_map(|row| row.values()).any(|s| s.stuck.is_some());
+    let name = "Share of frames in which partner or helper had made no progress for 200 frames";
+    if is_known { blocks(scores, labels, name, &columns) } else { Vec::new() }
+}
+
+/// The transport rates with their 95 % intervals.
+pub fn intervals(scores: &Scores, labels: Labels<'_>) -> Grid {
+    let tasks = scores.tasks();
+    let cell = |helper: &String, task: &TaskId| {
+        let Some(score) = scores.get(*task, helper) else { return UNDEFINED.to_owned() };
+        let ends = shown_interval(score)
+            .map(|[low, high]| format!(" [{}, {}]", rounded(low), rounded(high)));
+        rounded(score.tr) + &ends.unwrap_or_default()
+    };
+    let row = |helper: &String| {
+        let cells = tasks.iter().map(|t| cell(helper, t));
+        std::iter::once(labels.lines(helper)).chain(cells).collect()
+    };
+    let header = std::iter::once("TR".to_owned());
+    Grid {
+        title: "Transport rate with 95 % intervals over environments".to_owned(),
+        header: header.chain(tasks.iter().map(|t| t.info().title.to_owned())).collect(),
+        rows: scores.helpers().iter().map(row).collect(),
+    }
+}
+
+/// What the episodes can tell apart, task by task; `None` where no pair of helpers has an interval.
+pub fn resolutions(differences: &[Difference], tasks: &[TaskId]) -> Option<Grid> {
+    let of_task = tasks.iter().map(|t| (t.info().title, Some(*t)));
+    let rows = of_task.chain(std::iter::once(("all tasks", None))).filter_map(|(name, task)| {
+        let r = resolution(differences, task)?;
+        let numbers = [r.environments.to_string(), rounded(r.median), rounded(r.largest)];
+        Some(std::iter::once(name.to_owned()).chain(numbers).collect())
+    });
+    let rows: Vec<Vec<String>> = rows.collect();
+    let header = ["Task", "environments", "median pair of helpers", "widest pair"];
+    (!rows.is_empty()).then(|| Grid {
+        title:
+            "Smallest difference of TR that can be told from zero (half the 95 % interval of the \
+                paired difference)"
+                .to_owned(),
+        header: header.map(str::to_owned).to_vec(),
+        rows,
+    })
+}
+
+/// Differences of TR between helpers, with 95 % intervals; `granted` says what these are granted.
+pub fn pairs(differences: &[Difference], tasks: &[TaskId], granted: Option<&str>) -> Grid {
     let header = ["TR difference".to_owned(), "all".to_owned()].into_iter();
     let header = header.chain(tasks.iter().map(|t| t.info().title.to_owned()));
     let row = |d: &Difference| {
@@ -49,14 +105,17 @@ pub fn pairs(differences: &[Difference], tasks: &[TaskId]) -> Grid {
         [name, interval(d.all.as_ref())].into_iter().chain(cells).collect()
     };
     Grid {
-        title: "Differences of TR on the same episodes, with 95 % intervals".to_owned(),
+        title: format!(
+            "Differences of TR on the same episodes, with 95 % intervals over environments{}",
+            granted.map_or(String::new(), |text| format!(". {text}"))
+        ),
         header: header.collect(),
         rows: differences.iter().map(row).collect(),
     }
 }
 
 /// What minds counted of their own doings, summed over all episodes; `None` if nobody counted.
-pub fn counts(results: &[RunResult]) -> Option<Grid> {
+pub fn counts(results: &[RunResult], labels: Labels<'_>) -> Option<Grid> {
     let mut sums: BTreeMap<&str, BTreeMap<&str, u64>> = BTreeMap::new();
     for result in results {
         for (name, n) in result.summary().into_iter().flat_map(|s| &s.counts) {
@@ -68,7 +127,7 @@ pub fn counts(results: &[RunResult]) -> Option<Grid> {
         let cells = helpers.iter().map(|h| by.get(h).copied().unwrap_or(0).to_string());
         std::iter::once(name.replace('_', " ").replace('.', ": ")).chain(cells).collect()
     };
-    let header = std::iter::once("Count".to_owned()).chain(helpers.iter().map(|h| title(h)));
+    let header = std::iter::once("Count".to_owned()).chain(helpers.iter().map(|h| labels.lines(h)));
     (!sums.is_empty()).then(|| Grid {
         title: "What minds counted of their own doings, all episodes".to_owned(),
         header: header.collect(),
@@ -76,23 +135,7 @@ pub fn counts(results: &[RunResult]) -> Option<Grid> {
     })
 }
 
-/// What a table calls a helper.
-pub fn title(helper: &str) -> String {
-    match helper {
-        NONE => "w/o".to_owned(),
-        "random" => "Random".to_owned(),
-        "rhp" => "RHP".to_owned(),
-        "oracle" => "Oracle".to_owned(),
-        "follow" => "Follow".to_owned(),
-        "llm" => "LLM+BM".to_owned(),
-        "llm-told" => "LLM+BM, told".to_owned(),
-        "vlm" => "VLM".to_owned(),
-        "vlm-told" => "VLM, told".to_owned(),
-        other => other.to_owned(),
-    }
-}
-
-fn blocks(scores: &Scores, name: &str, columns: &[Column]) -> Vec<Grid> {
+fn blocks(scores: &Scores, labels: Labels<'_>, name: &str, columns: &[Column]) -> Vec<Grid> {
     let tasks = scores.tasks();
     let helpers = scores.helpers();
     let grid = |tasks: &[TaskId]| {
@@ -108,15 +151,36 @@ fn blocks(scores: &Scores, name: &str, columns: &[Column]) -> Vec<Grid> {
             last = Some(*task);
         }
         let row = |helper: &String| {
-            let cell = |(task, column): &(TaskId, &Column)| {
-                scores.get(*task, helper).map_or(UNDEFINED.to_owned(), column.cell)
+            let cell = |(task, column): &(TaskId, &Column)| match scores.get(*task, helper) {
+                // One mark a task and row is enough.
+                Some(score) if column.name == columns[0].name => {
+                    (column.cell)(score) + marks(score)
+                }
+                Some(score) => (column.cell)(score),
+                None if scores.is_unplayed(*task, helper) => MISSING.to_owned(),
+                None => UNDEFINED.to_owned(),
             };
-            std::iter::once(title(helper)).chain(shown.iter().map(cell)).collect()
+            std::iter::once(labels.lines(helper)).chain(shown.iter().map(cell)).collect()
         };
         let rows = helpers.iter().map(row).collect();
         Grid { title: name.to_owned(), header, rows }
     };
     tasks.chunks(TASKS_ABREAST).map(grid).collect()
+}
+
+/// The interval of TR where it says more than that a rate is between 0 and 1.
+pub(crate) fn shown_interval(score: &Score) -> Option<[f64; 2]> {
+    score.tr_ci.filter(|_| score.environments >= MIN_ENVIRONMENTS)
+}
+
+/// Behind the first number of a row that doesn't rest on what it should.
+fn marks(score: &Score) -> &'static str {
+    match (score.broken > 0, score.incomplete) {
+        (false, false) => "",
+        (true, false) => BROKEN,
+        (false, true) => MISSING,
+        (true, true) => "*?",
+    }
 }
 
 fn rate_and_improvement(score: &Score) -> String {
@@ -131,6 +195,11 @@ pub(crate) fn number(value: Option<f64>) -> String {
     value.map_or(UNDEFINED.to_owned(), rounded)
 }
 
+/// Three decimals: a share of 1 % is much here.
+fn thousandths(value: Option<f64>) -> String {
+    value.map_or(UNDEFINED.to_owned(), |v| format!("{v:.3}"))
+}
+
 /// Two decimals; what rounds to zero has no sign.
 pub(crate) fn rounded(value: f64) -> String {
     let text = format!("{value:.2}");
@@ -139,11 +208,9 @@ pub(crate) fn rounded(value: f64) -> String {
 
 /// A mean with its interval, or a sign that there is nothing to say.
 pub(crate) fn interval(interval: Option<&Interval>) -> String {
-    /// An interval from fewer episodes is wider than all that a rate can be.
-    const MIN_EPISODES: usize = 3;
     match interval {
         None => UNDEFINED.to_owned(),
-        Some(i) if i.n < MIN_EPISODES => rounded(i.mean),
+        Some(i) if i.environments < MIN_ENVIRONMENTS => rounded(i.mean),
         Some(i) => format!("{} [{}, {}]", rounded(i.mean), rounded(i.low), rounded(i.high)),
     }
 }

@@ -2,11 +2,12 @@
 
 use crate::rules::RuleSetName;
 use chaic_protocol::TaskId;
+use chaic_protocol::observation::Grants;
 
 use super::*;
 use crate::digest::Digest;
 use crate::metrics::{Ending, FormulaSet, RunKey, RunResult, Summary};
-use crate::run::RunOptions;
+use crate::run::{Item, RunGrants, RunOptions};
 
 fn results() -> Vec<RunResult> {
     let mut results = Vec::new();
@@ -51,10 +52,22 @@ fn options() -> RunOptions {
     }
 }
 
+/// As `rhp` and `oracle` ask for; the partner as given.
+fn granted(partner: Grants) -> RunGrants {
+    let helpers = [("rhp", Grants::IDS), ("oracle", Grants::ORACLE)];
+    RunGrants { helpers: helpers.map(|(name, g)| (name.to_owned(), g)).into(), partner }
+}
+
 fn text(results: &[RunResult], format: Format) -> String {
-    let planned: Vec<RunKey> = self::results().into_iter().map(|r| r.key).collect();
+    text_with(results, Some(&granted(Grants::PARTNER)), format)
+}
+
+fn text_with(results: &[RunResult], granted: Option<&RunGrants>, format: Format) -> String {
+    let item =
+        |r: RunResult| Item { environment: r.key.episode.clone(), key: r.key, horizon: 1000 };
+    let planned: Vec<Item> = self::results().into_iter().map(item).collect();
     let formulas = FormulaSet::Paper;
-    Report { options: &options(), results, planned: &planned, formulas }.text(format)
+    Report { options: &options(), results, planned: &planned, granted, formulas }.text(format)
 }
 
 #[test]
@@ -75,11 +88,20 @@ fn an_unfinished_run_says_so() {
         assert!(text.contains(missing), "{text}");
         assert!(text.contains("in obstacle the rows rest on different"), "{text}");
         assert!(text.contains("(w/o on 2, Oracle on 2, RHP on 1)"), "{text}");
+        assert!(text.contains("Missing: obstacle/test/01 with rhp, seed 0; shopping"), "{text}");
+        assert!(text.contains("0.20(0.50)?"), "the row with one missing is marked: {text}");
+        assert!(text.contains("? Incomplete: episode runs are missing."), "{text}");
         assert!(!text.contains("in shopping the rows"), "absent is not unequal: {text}");
     }
     let json: serde_json::Value = serde_json::from_str(&text(&part, Format::Json)).unwrap();
-    let runs = serde_json::json!({"planned": 48, "scored": 45, "broken": 0});
+    let runs = serde_json::json!({"planned": 48, "scored": 45, "broken": 0, "missing": 3});
     assert_eq!(json["episode_runs"], runs);
+    assert_eq!(json["incomplete"], true);
+    assert_eq!(json["missing"].as_array().unwrap().len(), 3);
+    let row = &json["tasks"]["obstacle"]["rhp"];
+    assert_eq!(row["incomplete"], true);
+    assert_eq!(row["missing"], serde_json::json!(["obstacle/test/01 seed 0"]));
+    assert_eq!(json["tasks"]["obstacle"]["none"]["incomplete"], false);
 }
 
 #[test]
@@ -100,12 +122,59 @@ fn every_format_has_every_task_and_helper() {
     let results = results();
     let csv = text(&results, Format::Csv);
     assert_eq!(csv.lines().count(), 1 + 8 * 3);
-    assert!(csv.contains("\nshopping,rhp,0.250000,0.050000,0.416667,,,0.250000,2\n"), "{csv}");
+    let row = csv.lines().find(|l| l.starts_with("shopping,rhp,")).unwrap();
+    assert!(row.starts_with("shopping,rhp,ids,ground_truth,0.250000,0.04999"), "{row}");
+    assert!(row.ends_with(",,,0.250000,,2,2,0,false"), "{row}");
+    assert!(row.contains(",0.416667,"), "{row}");
     let json: serde_json::Value = serde_json::from_str(&text(&results, Format::Json)).unwrap();
     assert_eq!(json["tasks"].as_object().unwrap().len(), 8);
     assert_eq!(json["tasks"]["obstacle"]["none"]["ei"], serde_json::Value::Null);
     let md = text(&results, Format::Markdown);
     assert!(md.contains("| RHP - w/o | 0.10 [0.10, 0.10] |"), "{md}");
+    // Houses of all indoor tasks, and two streets and two yards.
+    assert!(md.contains("| all tasks | 16 | 0.00 | 0.00 |"), "{md}");
+}
+
+#[test]
+fn what_was_granted_stands_in_every_format() {
+    let results = results();
+    for format in [Format::Table, Format::Markdown] {
+        let text = text(&results, format);
+        let tables = text.matches("ids from ground truth").count();
+        assert!(tables >= 2 * 4, "both helpers in each of four tables: {text}");
+        assert!(!text.contains("partner is told more"), "{text}");
+    }
+    let all = "**Granted: RHP: ids from ground truth; Oracle: ids from ground truth, told behavior, \
+               goal, progress.**";
+    assert!(text(&results, Format::Markdown).contains(all));
+    let json: serde_json::Value = serde_json::from_str(&text(&results, Format::Json)).unwrap();
+    let oracle = ["behavior", "goal", "ids", "progress"];
+    assert_eq!(
+        json["helpers"],
+        serde_json::json!({
+            "none": {"grants": [], "perception": "none"},
+            "rhp": {"grants": ["ids"], "perception": "ground_truth"},
+            "oracle": {"grants": oracle, "perception": "ground_truth"},
+        })
+    );
+    assert_eq!(json["partner"]["grants"], serde_json::json!(["goal", "ids"]));
+    let own =
+        RunGrants { helpers: [("rhp".to_owned(), Grants::NONE)].into(), ..granted(Grants::ORACLE) };
+    let md = text_with(&results, Some(&own), Format::Markdown);
+    let said = "RHP: own eyes only; Oracle: grants not recorded; the partner is told more than usual: \
+                behavior, progress.";
+    assert!(md.contains(said), "{md}");
+    let json = text_with(&results, Some(&own), Format::Json);
+    assert!(json.contains("\"perception\": \"own\""), "{json}");
+    let unknown = text_with(&results, None, Format::Table);
+    assert!(unknown.contains("grants not recorded"), "{unknown}");
+}
+
+#[test]
+fn names_of_helpers_promise_no_more_than_there_is() {
+    for helper in ["llm", "llm-told"] {
+        assert!(!title(helper).contains("BM"), "no model of behavior sees failures");
+    }
 }
 
 #[test]
@@ -115,6 +184,10 @@ fn what_broke_down_is_named() {
     results[0].ending = Ending::Error { message };
     for format in [Format::Table, Format::Markdown] {
         let text = text(&results, format);
-        assert!(text.contains("no_constraint/test/00 with oracle (seed 0): the episode"), "{text}");
+        let said = "Broke down, counts as zero: no_constraint/test/00 with oracle (seed 0): the";
+        assert!(text.contains(said), "{text}");
+        // 0 and 4 of 10 in the place of 3 and 4.
+        assert!(text.contains("0.20(") && text.contains(")*"), "{text}");
+        assert!(text.contains("* Episode runs broke down; they count as zero."), "{text}");
     }
 }

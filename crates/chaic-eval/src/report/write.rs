@@ -1,17 +1,24 @@
 //! The whole report, as text and as files.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use serde::Serialize;
 
 use crate::CHAIC_VERSION;
 use crate::error::Result;
-use crate::metrics::{Ending, FormulaSet, RunKey, RunResult, Scores, differences};
+use crate::metrics::{
+    Ending, Environments, FormulaSet, MAX_NAMED, Played, RunKey, RunResult, Score, Scores,
+    differences,
+};
 use crate::report::Format;
 use crate::report::coverage::coverage;
 use crate::report::grid::Grid;
-use crate::report::tables::{additional, counts, main_result, pairs};
-use crate::run::{RunFolder, RunOptions};
+use crate::report::labels::{GrantsFile, Labels};
+use crate::report::tables::{
+    BROKEN, MISSING, additional, counts, intervals, main_result, pairs, resolutions, stuck,
+};
+use crate::run::{Item, RunFolder, RunGrants, RunOptions, environments};
 
 /// All that a report is made from.
 #[derive(Clone, Copy, Debug)]
@@ -21,20 +28,36 @@ pub struct Report<'a> {
     /// What came out.
     pub results: &'a [RunResult],
     /// All episode runs that the run consists of.
-    pub planned: &'a [RunKey],
+    pub planned: &'a [Item],
+    /// What everybody was granted; `None` where nobody has recorded it.
+    pub granted: Option<&'a RunGrants>,
     /// By which formulas it is scored.
     pub formulas: FormulaSet,
+}
+
+/// What metrics need of the episode runs that were planned.
+struct Plan {
+    keys: Vec<RunKey>,
+    environments: Environments,
 }
 
 impl Report<'_> {
     /// The scores.
     pub fn scores(&self) -> Scores {
-        Scores::of(self.results, &self.formulas.formulas())
+        Scores::of(self.played(&self.plan()), &self.formulas.formulas())
+    }
+
+    /// What rows are called.
+    pub fn labels(&self) -> Labels<'_> {
+        Labels { granted: self.granted }
     }
 
     /// What has to be known of a run that isn't whole; nothing of one that is.
     pub fn notes(&self) -> Vec<String> {
-        coverage(self.results, self.planned)
+        let unknown = "Environments unknown, as the episodes are gone: each counts as independent, so \
+                       standard errors and intervals may be too small.";
+        let unknown = self.planned.is_empty().then(|| unknown.to_owned());
+        coverage(self.played(&self.plan())).into_iter().chain(unknown).collect()
     }
 
     /// The report as text that ends with a line break.
@@ -47,12 +70,29 @@ impl Report<'_> {
         }
     }
 
+    fn plan(&self) -> Plan {
+        let keys = self.planned.iter().map(|i| i.key.clone()).collect();
+        Plan { keys, environments: environments(self.planned) }
+    }
+
+    fn played<'a>(&'a self, plan: &'a Plan) -> Played<'a> {
+        let Plan { keys, environments } = plan;
+        Played { results: self.results, planned: keys, environments }
+    }
+
     fn json(&self) -> String {
         #[derive(Serialize)]
-        struct File {
+        struct File<'a> {
             /// Absent where the run's episodes are gone.
             #[serde(skip_serializing_if = "Option::is_none")]
             episode_runs: Option<EpisodeRuns>,
+            incomplete: bool,
+            #[serde(skip_serializing_if = "Vec::is_empty")]
+            missing: Vec<&'a RunKey>,
+            #[serde(skip_serializing_if = "Option::is_none")]
+            helpers: Option<BTreeMap<String, GrantsFile>>,
+            #[serde(skip_serializing_if = "Option::is_none")]
+            partner: Option<GrantsFile>,
             #[serde(flatten)]
             scores: Scores,
         }
@@ -61,31 +101,74 @@ impl Report<'_> {
             planned: usize,
             scored: usize,
             broken: usize,
+            missing: usize,
         }
-        let scored = self.results.iter().filter(|r| r.summary().is_some()).count();
-        let (planned, broken) = (self.planned.len(), self.results.len() - scored);
-        let episode_runs = (planned > 0).then_some(EpisodeRuns { planned, scored, broken });
-        let file = File { episode_runs, scores: self.scores() };
+        let plan = self.plan();
+        let mut missing = self.played(&plan).missing();
+        let episode_runs = (!self.planned.is_empty()).then_some(EpisodeRuns {
+            planned: self.planned.len(),
+            scored: self.results.len(),
+            broken: self.results.iter().filter(|r| r.summary().is_none()).count(),
+            missing: missing.len(),
+        });
+        let incomplete = !missing.is_empty();
+        missing.truncate(MAX_NAMED);
+        let (labels, scores) = (self.labels(), self.scores());
+        let helpers = labels.helpers_file(&self.options.helpers);
+        let partner = labels.partner_file();
+        let file = File { episode_runs, incomplete, missing, helpers, partner, scores };
         serde_json::to_string_pretty(&file).expect("scores have string keys") + "\n"
     }
 
-    fn grids(&self) -> Vec<Grid> {
-        let scores = self.scores();
-        let mut grids = main_result(&scores);
-        grids.extend(additional(&scores));
-        grids.extend(counts(self.results));
+    fn grids(&self, scores: &Scores) -> Vec<Grid> {
+        let labels = self.labels();
+        let mut grids = main_result(scores, labels);
+        grids.extend(additional(scores, labels));
+        grids.extend(stuck(scores, labels));
+        grids.extend(counts(self.results, labels));
         grids
     }
 
     fn terminal(&self) -> String {
-        let mut text: String = self.grids().iter().map(|g| g.to_terminal() + "\n").collect();
-        text += &self.legend();
+        let scores = self.scores();
+        let differences = differences(self.played(&self.plan()), &scores.helpers());
+        let mut grids = self.grids(&scores);
+        grids.extend(resolutions(&differences, &scores.tasks()));
+        let mut text: String = grids.iter().map(|g| g.to_terminal() + "\n").collect();
+        text += &self.legend(&scores);
         text += &self.notes().iter().map(|n| format!("{n}\n")).collect::<String>();
         text += &self.errors();
         text
     }
 
     fn markdown(&self) -> String {
+        let scores = self.scores();
+        let mut text = self.heading();
+        let granted = self.labels().sentence(&scores.helpers());
+        if let Some(granted) = &granted {
+            let _ = writeln!(text, "**{granted}**\n");
+        }
+        for note in self.notes() {
+            let _ = writeln!(text, "**{note}**\n");
+        }
+        let differences = differences(self.played(&self.plan()), &scores.helpers());
+        let mut grids = self.grids(&scores);
+        grids.push(intervals(&scores, self.labels()));
+        if !differences.is_empty() {
+            grids.push(pairs(&differences, &scores.tasks(), granted.as_deref()));
+        }
+        grids.extend(resolutions(&differences, &scores.tasks()));
+        for grid in grids {
+            text += &grid.to_markdown();
+            text.push('\n');
+        }
+        text += &self.legend(&scores);
+        text += &self.errors();
+        text
+    }
+
+    /// What was played, by what.
+    fn heading(&self) -> String {
         let RunOptions { split, first, seeds, size, rules, set, partner, .. } = self.options;
         let episodes = first.map_or("all".to_owned(), |n| format!("first {n}"));
         let size = size.map_or("as each mind asks for".to_owned(), |px| format!("{px} pixels"));
@@ -95,56 +178,58 @@ impl Report<'_> {
         };
         let driven = partner.as_ref();
         let driven = driven.map_or(String::new(), |p| format!(" The partner is driven by `{p}`."));
-        let mut text = format!(
+        format!(
             "# chaic run\n\nchaic {CHAIC_VERSION}, rules `{played_by}`, formulas `{}`. Split `{split}`, \
              {episodes} episodes of each task, seeds per episode: {seeds}. Images: {size}.{driven}\n\n",
             self.formulas,
-        );
-        for note in self.notes() {
-            let _ = writeln!(text, "**{note}**\n");
-        }
-        for grid in self.grids() {
-            text += &grid.to_markdown();
-            text.push('\n');
-        }
-        let scores = self.scores();
-        let differences = differences(self.results, &scores.helpers());
-        if !differences.is_empty() {
-            text += &pairs(&differences, &scores.tasks()).to_markdown();
-            text.push('\n');
-        }
-        text += &self.legend();
-        text += &self.errors();
-        text
+        )
     }
 
     fn csv(&self) -> String {
         let scores = self.scores();
-        let mut text = String::from("task,helper,tr,tr_se,ei,ia,cr,er,episodes\n");
+        let granted = self.labels().helpers_file(&self.options.helpers).unwrap_or_default();
+        let mut text = String::from(
+            "task,helper,grants,perception,tr,tr_se,tr_low,tr_high,ei,ei_low,ei_high,ia,cr,er,stuck,\
+             episodes,environments,broken,incomplete\n",
+        );
         for task in scores.tasks() {
             for helper in scores.helpers() {
                 let Some(s) = scores.get(task, &helper) else { continue };
-                let cell = |v: Option<f64>| v.map_or(String::new(), |v| format!("{v:.6}"));
-                let cells = [Some(s.tr), s.tr_se, s.ei, s.ia, s.cr, s.er].map(cell).join(",");
-                let _ = writeln!(text, "{task},{helper},{cells},{}", s.episodes);
+                let (grants, perception) = granted
+                    .get(&helper)
+                    .map_or((String::new(), ""), |g| (g.grants.join("+"), g.perception));
+                let numbers = csv_numbers(s);
+                let Score { episodes, environments, broken, incomplete, .. } = s;
+                let _ = writeln!(
+                    text,
+                    "{task},{helper},{grants},{perception},{numbers},{episodes},{environments},{broken},\
+                     {incomplete}"
+                );
             }
         }
         text
     }
 
-    fn legend(&self) -> String {
+    fn legend(&self, scores: &Scores) -> String {
         let spread = match self.formulas {
-            FormulaSet::Paper => "SE standard error of TR over episodes",
+            FormulaSet::Paper => "SE standard error of TR over environments",
             FormulaSet::Original => {
                 "SE (original) standard deviation of TR over episodes and seeds"
             }
         };
-        let n = self.results.iter().filter(|r| r.summary().is_some()).count();
-        format!(
+        let mut text = format!(
             "TR transport rate, EI efficiency improvement over no helper (w/o), IA goal inference \
-             accuracy,\nER emergency rate, CR completion ratio of the helper, {spread}.\n\
-             {n} episode runs.\n"
-        )
+             accuracy,\nER emergency rate, CR completion ratio of the helper, {spread}.\n"
+        );
+        let rows = || scores.tasks.values().flat_map(|row| row.values());
+        if rows().any(|s| s.broken > 0) {
+            let _ = writeln!(text, "{BROKEN} Episode runs broke down; they count as zero.");
+        }
+        if !self.played(&self.plan()).missing().is_empty() {
+            let _ = writeln!(text, "{MISSING} Incomplete: episode runs are missing.");
+        }
+        let _ = writeln!(text, "{} episode runs.", self.results.len());
+        text
     }
 
     fn errors(&self) -> String {
@@ -154,13 +239,24 @@ impl Report<'_> {
                 let k = &result.key;
                 let _ = writeln!(
                     text,
-                    "Not scored: {} with {} (seed {}): {message}",
+                    "Broke down, counts as zero: {} with {} (seed {}): {message}",
                     k.episode, k.helper, k.seed
                 );
             }
         }
         text
     }
+}
+
+fn csv_numbers(s: &Score) -> String {
+    let low = |ends: Option<[f64; 2]>| ends.map(|[low, _]| low);
+    let high = |ends: Option<[f64; 2]>| ends.map(|[_, high]| high);
+    let [tr_low, tr_high] = [low(s.tr_ci), high(s.tr_ci)];
+    let [ei_low, ei_high] = [low(s.ei_ci), high(s.ei_ci)];
+    let numbers =
+        [Some(s.tr), s.tr_se, tr_low, tr_high, s.ei, ei_low, ei_high, s.ia, s.cr, s.er, s.stuck];
+    let cell = |v: Option<f64>| v.map_or(String::new(), |v| format!("{v:.6}"));
+    numbers.map(cell).join(",")
 }
 
 /// Writes `scores.json` and `report.md` into the run's folder.

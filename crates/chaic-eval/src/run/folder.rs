@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::CHAIC_VERSION;
 use crate::error::{EvalError, Result};
 use crate::metrics::RunKey;
+use crate::run::granted::RunGrants;
 use crate::run::items::{read_bounded, slug};
 use crate::run::options::RunOptions;
 
@@ -42,6 +43,9 @@ struct RunFile {
     chaic: String,
     renderer: String,
     options: RunOptions,
+    /// Absent in runs of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    granted: Option<RunGrants>,
 }
 
 impl RunFolder {
@@ -87,6 +91,26 @@ impl RunFolder {
         let file =
             folder.recorded()?.ok_or_else(|| EvalError::NotARun { path: path.to_owned() })?;
         Ok((folder, file.options))
+    }
+
+    /// What everybody of the run is granted; `None` if an older version began it.
+    ///
+    /// # Errors
+    /// If `run.json` can't be read.
+    pub fn granted(&self) -> Result<Option<RunGrants>> {
+        Ok(self.recorded()?.and_then(|file| file.granted))
+    }
+
+    /// Refuses to go on with a run whose helpers would be granted something else from now on.
+    pub(crate) fn check_grants(&self, now: &RunGrants) -> Result<()> {
+        if self.granted()?.is_none_or(|then| then == *now) {
+            return Ok(());
+        }
+        let path = self.path.join("run.json");
+        Err(EvalError::Options(format!(
+            "helpers or partner are granted something else than {} says; begin a new run",
+            path.display()
+        )))
     }
 
     /// The folder itself.
@@ -147,13 +171,14 @@ impl RunFolder {
         self.episode_files().join(format!("{task}-{}.json", slug(task, id)))
     }
 
-    pub(crate) fn write_options(&self, options: &RunOptions) -> Result<()> {
+    pub(crate) fn write_options(&self, options: &RunOptions, granted: &RunGrants) -> Result<()> {
         let file = RunFile {
             format: FORMAT.to_owned(),
             version: VERSION,
             chaic: CHAIC_VERSION.to_owned(),
             renderer: "cpu".to_owned(),
             options: options.clone(),
+            granted: Some(granted.clone()),
         };
         let text = serde_json::to_string_pretty(&file).expect("options have string keys") + "\n";
         self.write("run.json", text.as_bytes())

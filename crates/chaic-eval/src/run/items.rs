@@ -10,6 +10,7 @@ use chaic_protocol::{Frame, TaskId};
 
 use crate::error::{EvalError, Result};
 use crate::metrics::RunKey;
+use crate::run::environment::environment;
 use crate::run::folder::{RunFolder, write_whole};
 use crate::run::options::{FILES, RunOptions};
 
@@ -20,6 +21,8 @@ pub struct Item {
     pub key: RunKey,
     /// How long it may take.
     pub horizon: Frame,
+    /// The name of its surroundings; episodes that share them are no independent samples.
+    pub environment: String,
 }
 
 /// A name for files that belong to an episode: its id without the task, `/` and `:` as `-`.
@@ -53,11 +56,12 @@ pub fn planned(folder: &RunFolder, options: &RunOptions) -> Result<Vec<Item>> {
             let text = format!("there is no episode of {task} to play");
             return Err(EvalError::Options(text));
         }
-        for (episode, horizon) in episodes {
+        for Entry { id, horizon, environment } in episodes {
             for seed in 0..options.seeds {
                 for helper in &options.helpers {
-                    let (task, helper, episode) = (*task, helper.clone(), episode.clone());
-                    items.push(Item { key: RunKey { task, helper, episode, seed }, horizon });
+                    let (task, helper, episode) = (*task, helper.clone(), id.clone());
+                    let key = RunKey { task, helper, episode, seed };
+                    items.push(Item { key, horizon, environment: environment.clone() });
                 }
             }
         }
@@ -65,7 +69,14 @@ pub fn planned(folder: &RunFolder, options: &RunOptions) -> Result<Vec<Item>> {
     Ok(items)
 }
 
-/// Ids and horizons of a task's episodes, `at_most` so many generated ones; `own` are those of the
+/// An episode as far as a plan needs it.
+struct Entry {
+    id: String,
+    horizon: Frame,
+    environment: String,
+}
+
+/// A task's episodes, `at_most` so many generated ones; `own` are those of the
 /// run's files. Generated episodes are made when they are played: there may be more than memory
 /// holds.
 fn episodes(
@@ -73,12 +84,14 @@ fn episodes(
     own: &[Episode],
     task: TaskId,
     at_most: usize,
-) -> Result<Vec<(String, Frame)>> {
+) -> Result<Vec<Entry>> {
     let limit = options.first.map_or(usize::MAX, |n| n as usize);
     if options.split == FILES {
-        let own =
-            own.iter().filter(|e| e.task() == task).map(|e| (e.id().to_owned(), e.setup().horizon));
-        return Ok(own.take(limit).collect());
+        let entry = |e: &Episode| {
+            let (id, horizon) = (e.id().to_owned(), e.setup().horizon);
+            Entry { id, horizon, environment: environment(e) }
+        };
+        return Ok(own.iter().filter(|e| e.task() == task).take(limit).map(entry).collect());
     }
     let split: Split = options.split.parse()?;
     let name = |k: usize| match &split {
@@ -92,7 +105,8 @@ fn episodes(
             format!("{n} episodes of {task} are too many for one run; give --first or fewer seeds");
         return Err(EvalError::Options(text));
     }
-    Ok((0..n).map(|k| (name(k), horizon)).collect())
+    let entry = |k| Entry { id: name(k), horizon, environment: split.environment(task, k as u64) };
+    Ok((0..n).map(entry).collect())
 }
 
 /// The episodes in a folder's `.json` files, in the order of their ids.

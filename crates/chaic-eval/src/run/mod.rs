@@ -4,15 +4,19 @@
 //! episode run), `traces/`, copies of episode files in `episodes/`, and, once finished, the
 //! report. `docs/trace.md` describes them.
 
+mod environment;
 mod estimate;
 mod folder;
+mod granted;
 mod items;
 mod journal;
 mod options;
 mod worker;
 
+pub use environment::environments;
 pub use folder::write_whole;
 pub use folder::{Access, RunFolder};
+pub use granted::RunGrants;
 pub(crate) use items::tasks_of_files;
 pub use items::{Item, planned, slug};
 pub use journal::{Journal, read_results};
@@ -33,6 +37,7 @@ use crate::trace::Warning;
 pub struct Run {
     folder: RunFolder,
     options: RunOptions,
+    granted: RunGrants,
     journal: Journal,
     items: Vec<Item>,
     results: Vec<RunResult>,
@@ -78,11 +83,13 @@ impl Run {
             }
         }
         let items = planned(&folder, &options)?;
-        if recorded.is_none() {
-            folder.write_options(&options)?;
+        let granted = RunGrants::of(&options, helpers)?;
+        match recorded {
+            None => folder.write_options(&options, &granted)?,
+            Some(_) => folder.check_grants(&granted)?,
         }
         let (journal, results, warnings) = Journal::open(&folder.results(), &items)?;
-        Ok((Run { folder, options, journal, items, results }, warnings))
+        Ok((Run { folder, options, granted, journal, items, results }, warnings))
     }
 
     /// The folder.
@@ -95,14 +102,19 @@ impl Run {
         &self.options
     }
 
+    /// What everybody is granted.
+    pub fn granted(&self) -> &RunGrants {
+        &self.granted
+    }
+
     /// The results so far.
     pub fn results(&self) -> &[RunResult] {
         &self.results
     }
 
-    /// The keys of all episode runs that it consists of, finished or not.
-    pub fn planned(&self) -> Vec<RunKey> {
-        self.items.iter().map(|i| i.key.clone()).collect()
+    /// All episode runs that it consists of, finished or not.
+    pub fn planned(&self) -> &[Item] {
+        &self.items
     }
 
     /// How far it has come.

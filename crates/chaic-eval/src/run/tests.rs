@@ -360,7 +360,7 @@ fn a_journal_with_impossible_numbers_is_refused_by_file_and_line() {
         "class":"apple","by":1,"counted":true}],"digest":"0000000000000003"}"#;
     let good = good.replace("\n        ", "");
     let key = RunKey { task: TaskId::Obstacle, helper: "rhp".into(), episode: "e".into(), seed: 0 };
-    let items = [Item { key, horizon: 100 }];
+    let items = [Item { key, horizon: 100, environment: "house/1".to_owned() }];
     let read = |line: &str| {
         fs::write(&path, format!("{good}\n{line}\n")).unwrap();
         read_results(&path, &items).map(|(_, warnings)| warnings)

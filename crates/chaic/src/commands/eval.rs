@@ -103,12 +103,12 @@ fn finish(run: &Run, began: Instant) -> Result<Ended> {
 /// Writes report and figures into the run's folder, and returns the report for a terminal.
 pub(super) fn leave_report(run: &Run) -> Result<String> {
     let (folder, options, planned) = (run.folder(), run.options(), run.planned());
-    let (results, formulas) = (run.results(), FormulaSet::Paper);
-    let report = Report { options, results, planned: &planned, formulas };
+    let (results, granted, formulas) = (run.results(), Some(run.granted()), FormulaSet::Paper);
+    let report = Report { options, results, planned, granted, formulas };
     write_files(folder, &report)?;
     let scores = report.scores();
     for name in ["figure.svg", "figure.png"] {
-        write_figure(&scores, &folder.join(name))?;
+        write_figure(&scores, report.labels(), &folder.join(name))?;
     }
     Ok(report.text(Format::Table))
 }

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use chaic_eval::EvalError;
-use chaic_eval::metrics::{RunKey, RunResult, tally};
+use chaic_eval::metrics::{RunResult, tally};
 use chaic_eval::report::{Format, Report, without_trace, write_figure};
 use chaic_eval::run::{Item, RunFolder, planned, read_results};
 use chaic_eval::trace;
@@ -31,16 +31,16 @@ pub fn run(arguments: &ReportArguments) -> Result<Ended> {
         let what = if arguments.from_traces { "whole trace" } else { "finished episode" };
         anyhow::bail!("{} has no {what} yet", arguments.run.display());
     }
-    let planned: Vec<RunKey> = planned.into_iter().map(|i| i.key).collect();
-    let formulas = arguments.formulas;
-    let report = Report { options: &options, results: &results, planned: &planned, formulas };
+    let (granted, formulas) = (folder.granted()?, arguments.formulas);
+    let (granted, planned) = (granted.as_ref(), planned.as_slice());
+    let report = Report { options: &options, results: &results, planned, granted, formulas };
     // Tables say it themselves; numbers and figures have hardly a place for it.
     let is_table = matches!(arguments.format, Format::Table | Format::Markdown);
     for note in report.notes().iter().filter(|_| !is_table || arguments.figure.is_some()) {
         complain(&format!("warning: {note}"));
     }
     match &arguments.figure {
-        Some(path) => write_figure(&report.scores(), path)?,
+        Some(path) => write_figure(&report.scores(), report.labels(), path)?,
         None => say(&report.text(arguments.format))?,
     }
     Ok(Ended::Well)

@@ -273,7 +273,7 @@ fn language_helpers_from_an_endpoint_to_a_table_row() {
     let eval = ["eval", "--episodes", "short", "--helper", "none,llm,vlm", "--size", "48"];
     let live = [&eval[..], &["--endpoint", &url, "--model", "standin", "--out", "live"]].concat();
     let printed = well(at, &live);
-    for words in ["LLM+BM", "VLM", "helper: decided by model", "helper: prompt tokens"] {
+    for words in ["LLM", "VLM", "helper: decided by model", "helper: prompt tokens"] {
         assert!(printed.contains(words), "{words}: {printed}");
     }
     drop(standin);

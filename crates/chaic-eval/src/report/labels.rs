@@ -1,0 +1,142 @@
+//! What rows are called: a helper's name never stands without what it is granted.
+
+use std::collections::BTreeMap;
+
+use chaic_agents::partners::PARTNER_GRANTS;
+use chaic_protocol::observation::Grants;
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::helpers::NONE;
+use crate::run::RunGrants;
+
+/// Longest line of a row's name in a terminal, characters: tables stay within 120.
+const MAX_LINE: usize = 21;
+
+/// Names of rows, from what a run granted.
+#[derive(Clone, Copy, Debug)]
+pub struct Labels<'a> {
+    /// `None` where nobody has recorded it.
+    pub granted: Option<&'a RunGrants>,
+}
+
+/// What somebody is granted, as `scores.json` has it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct GrantsFile {
+    /// The names of the grants.
+    pub grants: Vec<String>,
+    /// `ground_truth` where ids and classes of what is in the image are given, `own` where they have
+    /// to be found in the image, `none` where there is nobody to perceive.
+    pub perception: &'static str,
+}
+
+impl Labels<'_> {
+    /// The helper's title with what it is granted, on one line.
+    pub fn title(&self, helper: &str) -> String {
+        match self.grants(helper) {
+            Some(words) => format!("{} ({})", title(helper), words.join(", ")),
+            None => title(helper),
+        }
+    }
+
+    /// The same on lines that are short enough for the first column of a table.
+    pub fn lines(&self, helper: &str) -> String {
+        let mut lines = vec![title(helper)];
+        for words in self.grants(helper).unwrap_or_default() {
+            let mut line = String::new();
+            for word in words.split(' ') {
+                if !line.is_empty() && line.len() + 1 + word.len() > MAX_LINE {
+                    lines.push(std::mem::take(&mut line));
+                }
+                line += if line.is_empty() { "" } else { " " };
+                line += word;
+            }
+            lines.push(line);
+        }
+        lines.join("\n")
+    }
+
+    /// What all these helpers are granted, and the partner where that is more than usual, as a
+    /// sentence; nothing where there is nothing to say.
+    pub fn sentence(&self, helpers: &[String]) -> Option<String> {
+        let each = helpers
+            .iter()
+            .filter_map(|h| Some(format!("{}: {}", title(h), self.grants(h)?.join(", "))));
+        let all: Vec<String> = each.chain(self.partner()).collect();
+        (!all.is_empty()).then(|| format!("Granted: {}.", all.join("; ")))
+    }
+
+    /// Every helper of the run by name, with nobody for `none`, as `scores.json` has them.
+    pub fn helpers_file(&self, helpers: &[String]) -> Option<BTreeMap<String, GrantsFile>> {
+        let granted = self.granted?;
+        let file = |name: &String| {
+            let grants = granted.helpers.get(name).map(GrantsFile::of);
+            let nobody = GrantsFile { grants: Vec::new(), perception: "none" };
+            (name.clone(), grants.unwrap_or(nobody))
+        };
+        Some(helpers.iter().map(file).collect())
+    }
+
+    /// The partner's.
+    pub fn partner_file(&self) -> Option<GrantsFile> {
+        self.granted.map(|g| GrantsFile::of(&g.partner))
+    }
+
+    /// What a helper is granted, in words, kind by kind; `None` for nobody.
+    fn grants(&self, helper: &str) -> Option<Vec<String>> {
+        let unknown = || vec!["grants not recorded".to_owned()];
+        let granted = self.granted.and_then(|g| g.helpers.get(helper));
+        (helper != NONE).then(|| granted.map_or_else(unknown, words))
+    }
+
+    /// What the partner is granted beyond what every partner is.
+    fn partner(&self) -> Option<String> {
+        let usual = names(&PARTNER_GRANTS);
+        let more: Vec<String> =
+            names(&self.granted?.partner).into_iter().filter(|n| !usual.contains(n)).collect();
+        (!more.is_empty()).then(|| format!("the partner is told more than usual: {}", told(&more)))
+    }
+}
+
+impl GrantsFile {
+    fn of(grants: &Grants) -> GrantsFile {
+        let perception = if grants.ids { "ground_truth" } else { "own" };
+        GrantsFile { grants: names(grants), perception }
+    }
+}
+
+/// The names of what is granted, as traces have them.
+fn names(grants: &Grants) -> Vec<String> {
+    let value = serde_json::to_value(grants).expect("grants have string keys");
+    let fields = value.as_object().into_iter().flatten();
+    fields.filter(|(_, v)| **v == Value::Bool(true)).map(|(name, _)| name.clone()).collect()
+}
+
+fn words(grants: &Grants) -> Vec<String> {
+    let others = names(&Grants { ids: false, ..*grants });
+    let ids = grants.ids.then(|| "ids from ground truth".to_owned());
+    let others = (!others.is_empty()).then(|| format!("told {}", told(&others)));
+    let all: Vec<String> = ids.into_iter().chain(others).collect();
+    if all.is_empty() { vec!["own eyes only".to_owned()] } else { all }
+}
+
+fn told(names: &[String]) -> String {
+    names.iter().map(|n| n.replace('_', " ")).collect::<Vec<_>>().join(", ")
+}
+
+/// What a table calls a helper.
+pub fn title(helper: &str) -> String {
+    match helper {
+        NONE => "w/o".to_owned(),
+        "random" => "Random".to_owned(),
+        "rhp" => "RHP".to_owned(),
+        "oracle" => "Oracle".to_owned(),
+        "follow" => "Follow".to_owned(),
+        // Without "BM": no behavior model of ours sees failures, as the paper's does.
+        "llm" => "LLM".to_owned(),
+        "llm-told" => "LLM, told".to_owned(),
+        "vlm" => "VLM".to_owned(),
+        "vlm-told" => "VLM, told".to_owned(),
+        other => other.to_owned(),
+    }
+}

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock};
 
 use chaic_eval::CHAIC_VERSION;
+use chaic_eval::files::write_whole;
 use serde::{Deserialize, Serialize};
 
 use crate::endpoint::Client;
@@ -88,8 +89,7 @@ impl Session {
             None => {
                 self.templates.write(&folder.join("templates"))?;
                 let text = serde_json::to_string_pretty(&ours).expect("settings have string keys");
-                let path = folder.join(FILE);
-                fs::write(&path, text + "\n").map_err(LlmError::io("write", &path))?;
+                write_whole(&folder.join(FILE), (text + "\n").as_bytes())?;
             }
         }
         let before = spent_before(run, &self.settings.price)?;

@@ -11,7 +11,7 @@ pub use figure::write_figure;
 pub(crate) use grid::Grid;
 pub use tables::{additional, counts, main_result, pairs, title};
 pub(crate) use tables::{interval, number, rounded};
-pub use write::{Report, write_files};
+pub use write::{Report, differing_files, write_files};
 
 use std::fmt;
 use std::str::FromStr;

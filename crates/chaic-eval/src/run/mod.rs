@@ -11,7 +11,6 @@ mod journal;
 mod options;
 mod worker;
 
-pub use folder::write_whole;
 pub use folder::{Access, RunFolder};
 pub(crate) use items::tasks_of_files;
 pub use items::{Item, planned, slug};
@@ -22,6 +21,8 @@ pub use worker::{Finished, Progress};
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
+
+use chaic_episodes::Episode;
 
 use crate::error::{EvalError, Result};
 use crate::helpers::{self, Helpers, NONE};
@@ -61,26 +62,16 @@ impl Run {
         given: &Given,
         helpers: &dyn Helpers,
     ) -> Result<(Run, Vec<Warning>)> {
-        // Nothing is left behind by options that make no run.
-        if access == Access::Begin {
-            check(&given.begin()?, helpers)?;
-        }
+        // What is asked for is checked before anything is written.
+        let is_resumed = access == Access::Resume && RunFolder::is_run(path);
+        let fresh = if is_resumed { None } else { Some(Fresh::of(given, helpers)?) };
         let (folder, recorded) = RunFolder::lock(path, access)?;
-        let options = match &recorded {
-            Some(recorded) => given.resume(recorded, path)?,
-            None => given.begin()?,
+        let (options, items) = match (recorded, fresh) {
+            (Some(recorded), _) => resume(&folder, &recorded, given, helpers)?,
+            (None, Some(fresh)) => fresh.begin(&folder, helpers)?,
+            // It was removed between the first look and the lock.
+            (None, None) => return Err(EvalError::NotARun { path: path.to_owned() }),
         };
-        check(&options, helpers)?;
-        if let Some(source) = &given.episodes {
-            match recorded {
-                None => items::copy_episode_files(source, &options.tasks, &folder)?,
-                Some(_) => items::check_episode_files(source, &options.tasks, &folder)?,
-            }
-        }
-        let items = planned(&folder, &options)?;
-        if recorded.is_none() {
-            folder.write_options(&options)?;
-        }
         let (journal, results, warnings) = Journal::open(&folder.results(), &items)?;
         Ok((Run { folder, options, journal, items, results }, warnings))
     }
@@ -167,6 +158,52 @@ impl Run {
             Ok(())
         })
     }
+}
+
+/// A run that is not begun yet.
+struct Fresh {
+    options: RunOptions,
+    items: Vec<Item>,
+    /// Episodes from files; `None` where they are of a split.
+    own: Option<Vec<Episode>>,
+}
+
+impl Fresh {
+    fn of(given: &Given, helpers: &dyn Helpers) -> Result<Fresh> {
+        let options = given.begin()?;
+        check(&options, helpers)?;
+        let source = given.episodes.as_ref();
+        let own = source.map(|s| items::read_source(s, &options.tasks)).transpose()?;
+        let items = items::plan(&options, own.as_deref().unwrap_or_default())?;
+        Ok(Fresh { options, items, own })
+    }
+
+    /// Writes all that a run needs, and `run.json` last: until then the folder holds no run, and
+    /// the next beginning removes what is there.
+    fn begin(self, folder: &RunFolder, helpers: &dyn Helpers) -> Result<(RunOptions, Vec<Item>)> {
+        if let Some(own) = &self.own {
+            items::copy_episodes(own, folder)?;
+        }
+        helpers.attach(folder.path())?;
+        folder.write_options(&self.options)?;
+        Ok((self.options, self.items))
+    }
+}
+
+fn resume(
+    folder: &RunFolder,
+    recorded: &RunOptions,
+    given: &Given,
+    helpers: &dyn Helpers,
+) -> Result<(RunOptions, Vec<Item>)> {
+    let options = given.resume(recorded, folder.path())?;
+    check(&options, helpers)?;
+    if let Some(source) = &given.episodes {
+        items::check_episode_files(source, &options.tasks, folder)?;
+    }
+    let items = planned(folder, &options)?;
+    helpers.attach(folder.path())?;
+    Ok((options, items))
 }
 
 fn check(options: &RunOptions, helpers: &dyn Helpers) -> Result<()> {

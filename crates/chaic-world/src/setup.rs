@@ -219,10 +219,10 @@ impl Setup {
     pub const MAX_LENGTH_M: f32 = 200.0;
     /// Most walls in one episode.
     pub const MAX_WALLS: usize = 4096;
-    /// Most rooms in one episode: ten times those of any building that fits the bounds' usual size;
-    /// looking up a place's room takes time in their number.
+    /// Most rooms in one episode. Ours: many times those of any generated or imported house, and few
+    /// enough that all may be searched for the one at a place.
     pub const MAX_ROOMS: usize = 256;
-    /// Most openings, and most floors, in one episode: several for each room.
+    /// Most openings, and most floors, in one episode. Ours: several for each room.
     pub const MAX_OPENINGS: usize = 1024;
     /// See [`Setup::MAX_OPENINGS`].
     pub const MAX_FLOORS: usize = 1024;

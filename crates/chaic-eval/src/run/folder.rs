@@ -23,7 +23,8 @@ const MAX_RUN_FILE_BYTES: u64 = 1 << 20;
 const RUN_FILE: &str = "run.json";
 /// The first file that a run writes; whoever holds its lock may write the others.
 const LOCK: &str = ".lock";
-const EPISODES: &str = "episodes";
+/// Copies of episode files.
+pub(super) const EPISODES: &str = "episodes";
 /// What helpers that ask language models record; `chaic-llm` writes it.
 const RECORDS: &str = "llm";
 /// What lies there before the first question is asked.

@@ -19,6 +19,7 @@ pub use options::{Given, RunOptions};
 pub use worker::{Finished, Progress};
 
 use std::collections::BTreeSet;
+use std::fs;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -27,6 +28,7 @@ use chaic_episodes::Episode;
 use crate::error::{EvalError, Result};
 use crate::helpers::{self, Helpers, NONE};
 use crate::metrics::{Ending, RunKey, RunResult};
+use crate::run::folder::EPISODES;
 use crate::trace::Warning;
 
 /// A run with its folder, which nobody else writes to as long as this exists.
@@ -64,7 +66,7 @@ impl Run {
     ) -> Result<(Run, Vec<Warning>)> {
         // What is asked for is checked before anything is written.
         let is_resumed = access == Access::Resume && RunFolder::is_run(path);
-        let fresh = if is_resumed { None } else { Some(Fresh::of(given, helpers)?) };
+        let fresh = if is_resumed { None } else { Some(Fresh::of(path, given, helpers)?) };
         let (folder, recorded) = RunFolder::lock(path, access)?;
         let (options, items) = match (recorded, fresh) {
             (Some(recorded), _) => resume(&folder, &recorded, given, helpers)?,
@@ -169,7 +171,13 @@ struct Fresh {
 }
 
 impl Fresh {
-    fn of(given: &Given, helpers: &dyn Helpers) -> Result<Fresh> {
+    fn of(path: &Path, given: &Given, helpers: &dyn Helpers) -> Result<Fresh> {
+        // What lies in the run's own place for copies may be removed; a user's files never are.
+        let place = fs::canonicalize(path.join(EPISODES)).ok();
+        let source = given.episodes.as_ref().and_then(|s| fs::canonicalize(s).ok());
+        if place.is_some() && place == source {
+            return Err(EvalError::NotEmpty { path: path.to_owned() });
+        }
         let options = given.begin()?;
         check(&options, helpers)?;
         let source = given.episodes.as_ref();

@@ -539,6 +539,16 @@ fn what_no_run_has_left_is_never_removed() {
         assert!(matches!(resumed, EvalError::NotARun { .. }), "{name}: {resumed}");
         assert_eq!(files_below(&path), before);
     }
+    // Episodes that are named as the run's own are somebody's, whatever else lies there.
+    let path = dir.path().join("own");
+    fs::create_dir_all(path.join("episodes")).unwrap();
+    fs::write(path.join(".lock"), "").unwrap();
+    fs::copy(source.path().join("low_target-0.json"), path.join("episodes/a.json")).unwrap();
+    let own = Given { episodes: Some(path.join("episodes")), ..given.clone() };
+    let before = files_below(&path);
+    let error = Run::open(&path, Access::Begin, &own, &helpers).unwrap_err();
+    assert!(matches!(error, EvalError::NotEmpty { .. }), "{error}");
+    assert_eq!(files_below(&path), before);
     // A folder of episodes without a lock is somebody's.
     let path = dir.path().join("mine");
     fs::create_dir_all(path.join("episodes")).unwrap();

@@ -99,7 +99,8 @@ def run(command):
 def again(chaic, begin, folder):
     """Plays what was killed to its end; gives what is wrong, if anything is."""
     is_run = (folder / "run.json").exists()
-    command = [chaic, "eval", "--resume", "--out", folder] if is_run else begin
+    # The order of results is that of their ending, so one job keeps it.
+    command = [chaic, "eval", "--resume", "--jobs", "1", "--out", folder] if is_run else begin
     ended = run(command)
     if ended.returncode != 0:
         how = "resumed" if is_run else "begun again"

@@ -13,7 +13,12 @@ impl Digest {
     /// The digest of how an episode begins.
     pub fn of_setup(setup: &Setup) -> Digest {
         let bytes = serde_json::to_vec(setup).expect("a setup has no maps and no failing parts");
-        Digest(xxhash_rust::xxh3::xxh3_64(&bytes))
+        Digest::of_bytes(&bytes)
+    }
+
+    /// The digest of bytes: XXH3 64.
+    pub fn of_bytes(bytes: &[u8]) -> Digest {
+        Digest(xxhash_rust::xxh3::xxh3_64(bytes))
     }
 }
 

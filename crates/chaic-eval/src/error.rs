@@ -33,6 +33,26 @@ pub enum EvalError {
         /// The folder.
         path: PathBuf,
     },
+    /// A run was stopped before it began.
+    #[error(
+        "a run in {path} was stopped before anything was recorded, so there is nothing to go on \
+         with; give its command again without --resume",
+        path = path.display()
+    )]
+    NotBegun {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// `run.json` is not what the run wrote.
+    #[error(
+        "{path} was changed after the run began: its options don't fit their digest; undo the \
+         change, or play with other options in another --out",
+        path = path.display()
+    )]
+    Altered {
+        /// The file.
+        path: PathBuf,
+    },
     /// A file is of another version or format.
     #[error(
         "{path} is of {found}, this program (chaic {chaic}) reads {expected}; use the chaic that \
@@ -156,6 +176,22 @@ pub enum EvalError {
         /// The run's folder.
         path: PathBuf,
     },
+    /// The system gives no more threads.
+    #[error(
+        "can't start thread {n} of {wanted}: {refusal}; choose fewer --jobs, or let the system \
+         allow more threads and memory"
+    )]
+    NoThread {
+        /// The thread, from 1.
+        n: usize,
+        /// How many are wanted.
+        wanted: usize,
+        /// The refusal.
+        refusal: io::Error,
+    },
+    /// Helpers from elsewhere can't take part.
+    #[error("{0}")]
+    Helpers(Box<dyn std::error::Error + Send + Sync>),
     /// There is no such episode.
     #[error(transparent)]
     Split(#[from] SplitError),
@@ -181,8 +217,15 @@ pub enum EvalError {
 impl EvalError {
     /// Whether it is about what the caller asked for, rather than what came of it.
     pub fn is_usage(&self) -> bool {
-        use EvalError::{OptionDiffers, Options, UnknownHelper};
-        matches!(self, Options(_) | UnknownHelper { .. } | OptionDiffers { .. })
+        use EvalError::{OptionDiffers, Options, Split, UnknownHelper, UnknownPartner};
+        matches!(
+            self,
+            Options(_)
+                | UnknownHelper { .. }
+                | UnknownPartner { .. }
+                | OptionDiffers { .. }
+                | Split(_)
+        )
     }
 
     /// For `map_err` on what the operating system may refuse.

@@ -4,6 +4,7 @@
 //! those of a run can stand side by side.
 
 use std::error::Error;
+use std::io::Cursor;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -14,6 +15,9 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::FontStyle;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use crate::error::EvalError;
+use crate::files::write_whole;
 
 /// File name extensions that a figure can have.
 pub const EXTENSIONS: &[&str] = &["svg", "png"];
@@ -136,14 +140,15 @@ pub enum FigureError {
         /// The value.
         bar: Bar,
     },
-    /// The file could not be written.
-    #[error("cannot write the figure: {source}: {path:?}")]
-    Write {
-        /// The file.
-        path: PathBuf,
+    /// The library refused to draw.
+    #[error("cannot draw the figure: {source}")]
+    Draw {
         /// What the library said.
-        source: Box<dyn Error + Send + Sync>,
+        source: DynError,
     },
+    /// The file could not be written.
+    #[error(transparent)]
+    Write(#[from] EvalError),
 }
 
 /// Draws the transport rate of each helper in each task as grouped bars with whiskers for 95 %
@@ -151,12 +156,19 @@ pub enum FigureError {
 pub fn transport_rate(bars: &Bars, out: &Path) -> Result<(), FigureError> {
     bars.check()?;
     let extension = out.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    let written = match extension.as_deref() {
-        Some("svg") => write_svg(bars, out),
-        Some("png") => write_png(bars, out),
+    let drawn = match extension.as_deref() {
+        Some("svg") => draw_svg(bars).map(String::into_bytes),
+        Some("png") => draw_png(bars),
         _ => return Err(FigureError::UnsupportedExtension { path: out.to_owned() }),
     };
-    written.map_err(|source| FigureError::Write { path: out.to_owned(), source })
+    let bytes = drawn.map_err(|source| FigureError::Draw { source })?;
+    Ok(write_whole(out, &bytes)?)
+}
+
+/// The text of the SVG file that [`transport_rate`] writes.
+pub fn svg_text(bars: &Bars) -> Result<String, FigureError> {
+    bars.check()?;
+    draw_svg(bars).map_err(|source| FigureError::Draw { source })
 }
 
 impl Bars {
@@ -190,21 +202,24 @@ type DynError = Box<dyn Error + Send + Sync>;
 type DrawError<DB> = DrawingAreaErrorKind<<DB as DrawingBackend>::ErrorType>;
 type Chart<'a, DB> = ChartContext<'a, DB, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
-fn write_svg(bars: &Bars, out: &Path) -> Result<(), DynError> {
+fn draw_svg(bars: &Bars) -> Result<String, DynError> {
     let mut text = String::new();
     let root = SVGBackend::with_string(&mut text, SIZE_PX).into_drawing_area();
     Canvas { root, scale: 1 }.draw(bars)?;
-    Ok(std::fs::write(out, text)?)
+    Ok(text)
 }
 
-fn write_png(bars: &Bars, out: &Path) -> Result<(), DynError> {
+/// The bytes of a PNG file.
+fn draw_png(bars: &Bars) -> Result<Vec<u8>, DynError> {
     let scale = PNG_OVERSAMPLING;
     let size = (SIZE_PX.0 * scale, SIZE_PX.1 * scale);
     let mut large = RgbImage::new(size.0, size.1);
     let root = BitMapBackend::with_buffer(&mut large, size).into_drawing_area();
     Canvas { root, scale: scale as i32 }.draw(bars)?;
     let image = imageops::thumbnail(&large, SIZE_PX.0, SIZE_PX.1);
-    Ok(image.save_with_format(out, ImageFormat::Png)?)
+    let mut bytes = Cursor::new(Vec::new());
+    image.write_to(&mut bytes, ImageFormat::Png)?;
+    Ok(bytes.into_inner())
 }
 
 /// Without a system font library the fonts that may be drawn have to be announced.

@@ -1,5 +1,7 @@
 //! Who can be the helper of a run.
 
+use std::path::Path;
+
 use chaic_agents::{HELPERS, PlannerRules, helper, helper_grants};
 use chaic_protocol::Agent;
 use chaic_protocol::observation::Grants;
@@ -38,6 +40,15 @@ pub trait Helpers: Sync {
     /// The helper for one episode run; for those who keep a record of their own.
     fn make_for(&self, key: &RunKey, rules: PlannerRules) -> Option<Helper> {
         self.make(&key.helper, rules)
+    }
+
+    /// Ties the helpers to a run's folder, before `run.json` makes it a run and whenever it is gone
+    /// on with; for those who keep a record there.
+    ///
+    /// # Errors
+    /// If the run was begun otherwise, or the file system refuses.
+    fn attach(&self, _run: &Path) -> Result<()> {
+        Ok(())
     }
 
     /// The names of minds that may drive the partner in place of the rule-based ones.

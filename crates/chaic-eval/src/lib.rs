@@ -21,6 +21,7 @@
 mod error;
 
 mod digest;
+pub mod files;
 pub mod helpers;
 pub mod play;
 pub mod rules;

@@ -9,6 +9,7 @@ use chaic_render::{Scene, gltf_out};
 use chaic_world::{Posture, Rules, World};
 
 use crate::error::{EvalError, Result};
+use crate::files::write_whole;
 use crate::still::name_of;
 
 /// How a scene becomes a file.
@@ -63,6 +64,6 @@ pub fn write_world(
     }
     let classes = world.classes();
     let bytes = gltf_out::glb(&geometry, &|entity| name_of(entity, &classes), cameras);
-    std::fs::write(path, bytes).map_err(EvalError::io("write", path))?;
+    write_whole(path, &bytes)?;
     Ok(Written { instances: geometry.instances.len(), triangles: geometry.count_triangles() })
 }

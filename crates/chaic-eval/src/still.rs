@@ -1,6 +1,7 @@
 //! Pictures of one moment: what an agent sees, as files for people and programs.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::io::Cursor;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -8,9 +9,10 @@ use chaic_episodes::Episode;
 use chaic_protocol::{AgentId, ClassId, EntityId, Frame};
 use chaic_render::{Appearance, Channels, Scene, View, image_out, plan};
 use chaic_world::{Rules, World};
-use image::DynamicImage;
+use image::{DynamicImage, ImageError, ImageFormat};
 
 use crate::error::{EvalError, Result};
+use crate::files::write_whole;
 use crate::helpers::{self, Helpers};
 use crate::play::{Play, Staging};
 use crate::rules::RuleSet;
@@ -115,11 +117,15 @@ pub fn write_plan(episode: &Episode, width_px: u32, path: &Path) -> Result<()> {
 
 fn save_names(names: &BTreeMap<u16, &str>, path: &Path) -> Result<()> {
     let json = serde_json::to_string_pretty(names).expect("numbers and names") + "\n";
-    std::fs::write(path, json).map_err(EvalError::io("write", path))
+    write_whole(path, json.as_bytes())
 }
 
-fn save(picture: DynamicImage, path: &Path) -> Result<()> {
+/// Writes a picture as a whole or not at all; the extension picks the format.
+pub(crate) fn save(picture: DynamicImage, path: &Path) -> Result<()> {
     let refused =
-        |e: image::ImageError| EvalError::Picture(format!("can't write {}: {e}", path.display()));
-    picture.save(path).map_err(refused)
+        |e: ImageError| EvalError::Picture(format!("can't write {}: {e}", path.display()));
+    let mut bytes = Cursor::new(Vec::new());
+    let format = ImageFormat::from_path(path).map_err(refused)?;
+    picture.write_to(&mut bytes, format).map_err(refused)?;
+    write_whole(path, bytes.get_ref())
 }

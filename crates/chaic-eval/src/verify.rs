@@ -1,5 +1,9 @@
 //! Playing a trace's actions again, to see whether they lead where the trace says.
 
+mod coverage;
+
+pub use coverage::{Coverage, ReportState};
+
 use std::collections::{BTreeSet, VecDeque};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -12,7 +16,7 @@ use chaic_world::World;
 
 use crate::error::{EvalError, Result};
 use crate::helpers::{self, BuiltIn, Helpers};
-use crate::metrics::{Ending, RunResult, tally};
+use crate::metrics::{Ending, RunKey, RunResult, tally};
 use crate::play::{Choice, Flow, Minds, Staging, crank, header_of, world_of};
 use crate::rules::RuleSet;
 use crate::run::{RunFolder, RunOptions, planned, read_results};
@@ -52,17 +56,32 @@ pub struct Verdict {
     pub mismatches: Vec<Mismatch>,
     /// Files that could only be read in part.
     pub warnings: Vec<Warning>,
+    /// How many episode runs have results.
+    pub coverage: Coverage,
+    /// Whether the report is what the results give.
+    pub report: ReportState,
+}
+
+impl Verdict {
+    /// Whether the run is whole, and all that it says is so.
+    pub fn is_good(&self) -> bool {
+        let is_altered =
+            matches!(&self.report, ReportState::Compared { altered } if !altered.is_empty());
+        self.mismatches.is_empty() && self.coverage.is_whole() && !is_altered
+    }
 }
 
 /// Re-simulates every trace of a run on `jobs` threads, and compares all that is recorded: who
 /// took part by which rules, digests at each decision, events, the end, and the line of
-/// `results.jsonl`. A trace that can't be checked counts as one that differs.
+/// `results.jsonl`. A trace that can't be checked counts as one that differs. Then it counts the
+/// results, and compares the report with what they give.
 ///
 /// `options` are the run's, `helpers` those that played; what a helper asked for isn't checked
 /// if its name is unknown.
 ///
 /// # Errors
-/// If the run's own files can't be read, or it was played without traces.
+/// If the run's own files can't be read, it was played without traces, or a trace is of another
+/// version of the format; if the system gives no thread for a job.
 pub fn verify_run(
     folder: &RunFolder,
     options: &RunOptions,
@@ -77,26 +96,43 @@ pub fn verify_run(
     // Where its episodes are gone, every trace says so.
     let planned = planned(folder, options).unwrap_or_default();
     let (results, warnings) = read_results(&folder.results(), &planned)?;
-    let next = AtomicUsize::new(0);
+    let keys: Vec<RunKey> = planned.iter().map(|item| item.key.clone()).collect();
     let rules = options.rules()?;
-    let check = Check { folder, options, rules, helpers, results: &results };
-    let verdict = Mutex::new(Verdict { warnings, ..Verdict::default() });
-    let done = AtomicUsize::new(0);
-    std::thread::scope(|scope| {
-        for _ in 0..jobs.clamp(1, paths.len().max(1)) {
-            scope.spawn(|| {
-                while let Some(path) = paths.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let one = check.file(path).unwrap_or_else(|e| One::unreadable(path, &e));
-                    verdict.lock().unwrap_or_else(|e| e.into_inner()).add(one);
-                    progress(done.fetch_add(1, Ordering::Relaxed) + 1);
-                }
-            });
-        }
-    });
-    let mut verdict = verdict.into_inner().unwrap_or_else(|e| e.into_inner());
+    let check = Check { folder, options, rules, helpers, planned: &keys, results: &results };
+    let checked = check.files(&paths, jobs, progress)?;
+    let mut verdict = Verdict {
+        warnings,
+        coverage: Coverage::of(&planned, &results),
+        report: ReportState::of(folder, options, &planned, &results)?,
+        ..Verdict::default()
+    };
+    for (path, one) in paths.iter().zip(checked) {
+        verdict.add(match one {
+            Ok(one) => one,
+            // It concerns the whole run, so once is enough.
+            Err(error @ EvalError::OtherVersion { .. }) => return Err(error),
+            Err(error) => One::unreadable(path, &error),
+        });
+    }
     verdict.add_missing(folder, &results);
     verdict.mismatches.sort_by(|a, b| a.path.cmp(&b.path));
     Ok(verdict)
+}
+
+/// Whether a single trace of a run says what playing its actions again gives: its first line, and
+/// every record. Returns the first difference.
+///
+/// # Errors
+/// If the run's episode can't be read or isn't the one that was played.
+pub fn verify_trace(
+    folder: &RunFolder,
+    options: &RunOptions,
+    helpers: &dyn Helpers,
+    trace: &Trace,
+    path: &Path,
+) -> Result<Option<Mismatch>> {
+    let rules = options.rules()?;
+    Check { folder, options, rules, helpers, planned: &[], results: &[] }.trace(trace, path)
 }
 
 /// What verifying one trace found.
@@ -140,33 +176,68 @@ struct Check<'a> {
     options: &'a RunOptions,
     rules: RuleSet,
     helpers: &'a dyn Helpers,
+    /// All that the run plays; empty where nobody knows.
+    planned: &'a [RunKey],
     results: &'a [RunResult],
 }
 
 impl Check<'_> {
-    fn file(&self, path: &Path) -> Result<One> {
-        let (trace, warnings) = trace::read(path)?;
-        let differs = |frame: Frame, problem: String| {
-            Some(Mismatch { path: path.to_owned(), frame, agent: None, problem })
-        };
-        let key = trace.header.key();
-        let mut mismatch = match self.header_problem(&trace.header, path)? {
-            Some(problem) => differs(0, problem),
-            None => {
-                let mut world = world_of(&trace.header, &self.folder.episode(&key)?)?;
-                verify(&trace, &mut world, path)?
+    /// All traces on `jobs` threads, in their order.
+    fn files(
+        &self,
+        paths: &[PathBuf],
+        jobs: usize,
+        progress: &(dyn Fn(usize) + Sync),
+    ) -> Result<Vec<Result<One>>> {
+        let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let wanted = jobs.clamp(1, paths.len().max(1));
+        let checked = Mutex::new(Vec::with_capacity(paths.len()));
+        let work = || {
+            while let Some((k, path)) = numbered(paths, next.fetch_add(1, Ordering::Relaxed)) {
+                let one = self.file(path);
+                checked.lock().unwrap_or_else(|e| e.into_inner()).push((k, one));
+                progress(done.fetch_add(1, Ordering::Relaxed) + 1);
             }
         };
+        std::thread::scope(|scope| {
+            for n in 1..=wanted {
+                let spawned = std::thread::Builder::new().spawn_scoped(scope, work);
+                if let Err(refusal) = spawned {
+                    // Those that run already end with the traces that they have begun.
+                    next.store(paths.len(), Ordering::Relaxed);
+                    return Err(EvalError::NoThread { n, wanted, refusal });
+                }
+            }
+            Ok(())
+        })?;
+        let mut checked = checked.into_inner().unwrap_or_else(|e| e.into_inner());
+        checked.sort_by_key(|(k, _)| *k);
+        Ok(checked.into_iter().map(|(_, one)| one).collect())
+    }
+
+    fn file(&self, path: &Path) -> Result<One> {
+        let (trace, warnings) = trace::read(path)?;
+        let mut mismatch = self.trace(&trace, path)?;
         if mismatch.is_none() {
+            let key = trace.header.key();
             let mut recorded = self.results.iter().filter(|r| r.summary().is_some());
             let recorded = recorded.find(|r| r.key == key).map(without_counts);
             if recorded.is_some() && recorded != tally(&trace) {
                 let frame = trace.end().map_or(0, |e| e.frame);
-                mismatch =
-                    differs(frame, "results.jsonl says something else of this run".to_owned());
+                let problem = "results.jsonl says something else of this run".to_owned();
+                mismatch = Some(Mismatch { path: path.to_owned(), frame, agent: None, problem });
             }
         }
         Ok(One { decisions: trace.decisions().count(), mismatch, warnings })
+    }
+
+    fn trace(&self, trace: &Trace, path: &Path) -> Result<Option<Mismatch>> {
+        if let Some(problem) = self.header_problem(&trace.header, path)? {
+            let path = path.to_owned();
+            return Ok(Some(Mismatch { path, frame: 0, agent: None, problem }));
+        }
+        let mut world = world_of(&trace.header, &self.folder.episode(&trace.header.key())?)?;
+        verify(trace, &mut world, path)
     }
 
     /// What the first line of a trace says that isn't so.
@@ -174,6 +245,9 @@ impl Check<'_> {
         let key = header.key();
         if self.folder.trace(&key) != path {
             return Ok(Some("the first line is that of another episode run".to_owned()));
+        }
+        if !self.planned.is_empty() && !self.planned.contains(&key) {
+            return Ok(Some("this run doesn't play that episode run".to_owned()));
         }
         let episode = self.folder.episode(&key)?;
         let rules = self.rules.planner;
@@ -215,6 +289,10 @@ impl Check<'_> {
         let problem = || format!("the first line is not what this run has: {}", wrong.join(", "));
         Ok((!wrong.is_empty()).then(problem))
     }
+}
+
+fn numbered(paths: &[PathBuf], k: usize) -> Option<(usize, &PathBuf)> {
+    paths.get(k).map(|path| (k, path))
 }
 
 /// A result as a trace can tell it.

@@ -116,6 +116,11 @@ pub enum LlmError {
 }
 
 impl LlmError {
+    /// Whether it is about what the caller asked for, rather than what came of it.
+    pub fn is_usage(&self) -> bool {
+        matches!(self, LlmError::Setting { .. } | LlmError::SettingDiffers { .. })
+    }
+
     /// For `map_err` on what the operating system may refuse.
     pub fn io(what: &'static str, path: &Path) -> impl FnOnce(io::Error) -> LlmError + use<> {
         let path = path.to_owned();

@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 use chaic_agents::behavior::{BehaviorModel, GroundTruthBehavior, SeenBehavior};
 use chaic_agents::perception::GroundTruthIds;
 use chaic_agents::{Mind, PlannerRules, partner_grants};
+use chaic_eval::EvalError;
 use chaic_eval::helpers::{BuiltIn, Helper, Helpers};
 use chaic_eval::metrics::RunKey;
 use chaic_protocol::AgentId;
@@ -38,6 +39,17 @@ const PARTNERS: [Kind; 2] = [
     Kind { name: "llm", track: Track::Partner, looks: false },
     Kind { name: "vlm", track: Track::Partner, looks: true },
 ];
+
+/// The names that may stand behind `--helper`, without `none`: the built-in ones first.
+pub fn helper_names() -> Vec<String> {
+    let own = HELPERS.iter().map(|k| k.name.to_owned());
+    BuiltIn.names().into_iter().chain(own).collect()
+}
+
+/// The names of partners that ask a language model.
+pub fn partner_names() -> Vec<String> {
+    PARTNERS.iter().map(|k| k.name.to_owned()).collect()
+}
 
 /// Whether a helper of this name asks a language model.
 pub fn is_language_helper(name: &str) -> bool {
@@ -160,8 +172,7 @@ impl Language {
 
 impl Helpers for Language {
     fn names(&self) -> Vec<String> {
-        let own = HELPERS.iter().map(|k| k.name.to_owned());
-        BuiltIn.names().into_iter().chain(own).collect()
+        helper_names()
     }
 
     fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper> {
@@ -174,7 +185,11 @@ impl Helpers for Language {
     }
 
     fn partner_names(&self) -> Vec<String> {
-        PARTNERS.iter().map(|k| k.name.to_owned()).collect()
+        partner_names()
+    }
+
+    fn attach(&self, run: &Path) -> chaic_eval::Result<()> {
+        self.session.attach(run).map_err(|e| EvalError::Helpers(e.into()))
     }
 
     fn partner(&self, name: &str, of: Option<&RunKey>, rules: PlannerRules) -> Option<Helper> {

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, OnceLock};
 
 use chaic_eval::CHAIC_VERSION;
-use chaic_eval::run::write_whole;
+use chaic_eval::files::write_whole;
 use serde::{Deserialize, Serialize};
 
 use crate::endpoint::Client;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use chaic_eval::files::write_whole;
 use minijinja::syntax::SyntaxConfig;
 use minijinja::value::{Serde, Value};
 use minijinja::{Environment, UndefinedBehavior};
@@ -103,7 +104,7 @@ impl Templates {
         fs::create_dir_all(folder).map_err(LlmError::io("make the folder", folder))?;
         for (name, text) in &self.texts {
             let path = folder.join(name);
-            fs::write(&path, text).map_err(LlmError::io("write", &path))?;
+            write_whole(&path, text.as_bytes())?;
         }
         Ok(())
     }

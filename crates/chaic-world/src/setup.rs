@@ -219,6 +219,13 @@ impl Setup {
     pub const MAX_LENGTH_M: f32 = 200.0;
     /// Most walls in one episode.
     pub const MAX_WALLS: usize = 4096;
+    /// Most rooms in one episode. Ours: many times those of any generated or imported house, and few
+    /// enough that all may be searched for the one at a place.
+    pub const MAX_ROOMS: usize = 256;
+    /// Most openings, and most floors, in one episode. Ours: several for each room.
+    pub const MAX_OPENINGS: usize = 1024;
+    /// See [`Setup::MAX_OPENINGS`].
+    pub const MAX_FLOORS: usize = 1024;
     /// Farthest coordinate, metres: f32 keeps millimetres there.
     pub const MAX_COORDINATE_M: f32 = 1000.0;
 
@@ -280,14 +287,17 @@ impl Setup {
         for (axis, length) in [("x", extent.x), ("z", extent.y)] {
             number(format!("bounds (its length along {axis})"), length, 0.1, Setup::MAX_LENGTH_M)?;
         }
-        if self.things.len() > Setup::MAX_THINGS {
-            let problem =
-                format!("has {} entries, at most {}", self.things.len(), Setup::MAX_THINGS);
-            return Err(SetupError::new("things", problem));
-        }
-        if self.walls.len() > Setup::MAX_WALLS {
-            let problem = format!("has {} entries, at most {}", self.walls.len(), Setup::MAX_WALLS);
-            return Err(SetupError::new("walls", problem));
+        for (field, n, most) in [
+            ("rooms", self.rooms.len(), Setup::MAX_ROOMS),
+            ("walls", self.walls.len(), Setup::MAX_WALLS),
+            ("openings", self.openings.len(), Setup::MAX_OPENINGS),
+            ("floors", self.floors.len(), Setup::MAX_FLOORS),
+            ("things", self.things.len(), Setup::MAX_THINGS),
+            ("goal_places", self.goal_places.len(), Setup::MAX_THINGS),
+        ] {
+            if n > most {
+                return Err(SetupError::new(field, format!("has {n} entries, at most {most}")));
+            }
         }
         if self.horizon == 0 {
             return Err(SetupError::new("horizon", "is 0, expected at least one frame"));

@@ -23,6 +23,10 @@ pub use self::fidelity::FidelityArguments;
 /// Simulator and benchmark for constrained human-AI cooperation.
 #[derive(Debug, Parser)]
 #[command(name = "chaic", version, arg_required_else_help = true)]
+#[command(
+    after_help = "Exit codes: 0 well, 1 failed or found something wrong, 2 can't be asked for, \
+                        130 Ctrl-C; docs/exit-codes.md."
+)]
 pub struct Arguments {
     /// What to do.
     #[command(subcommand)]
@@ -36,7 +40,8 @@ pub enum Command {
     Eval(EvalArguments),
     /// Print the scores of a run, computed anew from its results or traces.
     Report(ReportArguments),
-    /// Play the recorded actions of a run again and compare; exit code 1 on any difference.
+    /// Play the recorded actions of a run again, count its results and compare its report; exit code
+    /// 1 on any difference, or if results are missing.
     Verify(VerifyArguments),
     /// Play both rule sets and single rules, and write how near that is to the paper's results.
     Fidelity(FidelityArguments),

@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use crate::exit;
 use crate::output::complain;
 
 /// Raised by the first Ctrl-C.
@@ -14,7 +15,7 @@ static STOP: AtomicBool = AtomicBool::new(false);
 pub fn stop_flag() -> Result<&'static AtomicBool, ctrlc::Error> {
     ctrlc::set_handler(|| {
         if STOP.swap(true, Ordering::SeqCst) {
-            std::process::exit(130);
+            std::process::exit(exit::INTERRUPTED.into());
         }
         complain("stopping; press Ctrl-C again to stop at once");
     })?;

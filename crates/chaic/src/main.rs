@@ -5,26 +5,15 @@
 
 mod arguments;
 mod commands;
+mod exit;
 mod interrupt;
 mod output;
 
 use std::process::ExitCode;
 
-use chaic_eval::EvalError;
 use clap::Parser as _;
 
 use crate::arguments::{Arguments, Command};
-
-/// How a command ended without an error.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Ended {
-    /// As intended.
-    Well,
-    /// It found something wrong, and has said what.
-    WithFindings,
-    /// By Ctrl-C.
-    Interrupted,
-}
 
 fn main() -> ExitCode {
     let Arguments { command } = Arguments::parse();
@@ -42,14 +31,10 @@ fn main() -> ExitCode {
         Command::Llm(command) => commands::llm::run(&command),
     };
     match ended {
-        Ok(Ended::Well) => ExitCode::SUCCESS,
-        Ok(Ended::WithFindings) => ExitCode::FAILURE,
-        Ok(Ended::Interrupted) => ExitCode::from(130),
+        Ok(ended) => ended.into(),
         Err(error) => {
             output::complain(&format!("error: {error:#}"));
-            // What was asked for can't be: as where the arguments can't even be read.
-            let is_usage = error.downcast_ref().is_some_and(EvalError::is_usage);
-            if is_usage { ExitCode::from(2) } else { ExitCode::FAILURE }
+            exit::of(&error)
         }
     }
 }

@@ -6,12 +6,15 @@
 use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
+use std::path::Path;
+
+use anyhow::{Context as _, Result};
 
 /// Writes text to the standard output.
 ///
 /// # Errors
 /// If it can't be written, unless nobody reads any more.
-pub fn say(text: &str) -> io::Result<()> {
+pub fn say(text: &str) -> Result<()> {
     say_to_reader(text).map(|_| ())
 }
 
@@ -19,11 +22,11 @@ pub fn say(text: &str) -> io::Result<()> {
 ///
 /// # Errors
 /// Those of [`say`].
-pub fn say_to_reader(text: &str) -> io::Result<bool> {
+pub fn say_to_reader(text: &str) -> Result<bool> {
     let mut out = io::stdout().lock();
     match out.write_all(printable(text).as_bytes()).and_then(|()| out.flush()) {
         Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(false),
-        other => other.map(|()| true),
+        other => other.map(|()| true).context("can't write to the standard output"),
     }
 }
 
@@ -62,6 +65,11 @@ fn is_control(c: char) -> bool {
         '\u{061c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}'
     );
     is_bidi || c.is_control() && c != '\n' && c != '\t'
+}
+
+/// A path as a shell takes it for one word.
+pub fn quoted_path(path: &Path) -> String {
+    quoted(&path.display().to_string()).into_owned()
 }
 
 /// An argument as a shell takes it for one word.

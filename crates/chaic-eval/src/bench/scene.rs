@@ -11,7 +11,9 @@ use chaic_world::{Posture, RoomKind, Rules, Setup, Thing, World};
 use serde_json::json;
 
 use crate::error::{EvalError, Result};
+use crate::files::write_whole;
 use crate::scene_file::{SceneOptions, Written, write_world};
+use crate::still::save;
 
 /// Number of eye poses.
 pub const N_VIEWS: usize = 16;
@@ -93,8 +95,7 @@ impl BenchScene {
         });
         let json = json!({ "scene": self.name, "entities": entities, "cameras": described });
         let text = serde_json::to_string_pretty(&json).expect("names and finite numbers") + "\n";
-        let path = out.join("cameras.json");
-        std::fs::write(&path, text).map_err(EvalError::io("write", &path))?;
+        write_whole(&out.join("cameras.json"), text.as_bytes())?;
         self.write_picture(&out.join("chaic.png"))?;
         Ok(written)
     }
@@ -107,8 +108,7 @@ impl BenchScene {
         let picture = rgb.as_deref().and_then(|rgb| image_out::rgb(rgb, width, height));
         let picture = picture
             .ok_or_else(|| EvalError::Picture(format!("{width} is no size of a picture")))?;
-        let refused = |e| EvalError::Picture(format!("can't write {}: {e}", path.display()));
-        picture.save(path).map_err(refused)
+        save(picture.into(), path)
     }
 }
 

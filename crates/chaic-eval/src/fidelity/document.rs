@@ -13,7 +13,8 @@ use crate::fidelity::matrix::PartState;
 use crate::fidelity::plan::Plan;
 use crate::fidelity::sections::{RuleSection, formulas};
 use crate::fidelity::switches;
-use crate::figure::{Bar, Bars, HelperBars, transport_rate};
+use crate::figure::{Bar, Bars, FigureError, HelperBars, transport_rate};
+use crate::files::write_whole;
 use crate::metrics::{Ending, Played, Scores};
 use crate::published::published;
 use crate::report::{coverage, shown_interval};
@@ -46,10 +47,13 @@ pub fn write_document(sheet: Sheet<'_>, path: &Path) -> Result<()> {
     for part in sheet.rule_sets() {
         let bars = sheet.bars(part);
         let file = folder.join(figure_name(&stem, part));
-        transport_rate(&bars, &file).map_err(|e| EvalError::Picture(e.to_string()))?;
+        transport_rate(&bars, &file).map_err(|e| match e {
+            FigureError::Write(refusal) => refusal,
+            other => EvalError::Picture(other.to_string()),
+        })?;
     }
     let text = document(sheet, &stem, &causes)?;
-    fs::write(path, text).map_err(EvalError::io("write", path))
+    write_whole(path, text.as_bytes())
 }
 
 /// Whether a document could be written to `path`, for whoever would play for hours before.

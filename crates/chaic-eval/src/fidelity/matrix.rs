@@ -9,12 +9,11 @@ use serde::{Deserialize, Serialize};
 use crate::CHAIC_VERSION;
 use crate::error::{EvalError, Result};
 use crate::fidelity::plan::{Part, Plan, Wanted};
+use crate::files::{UNFINISHED, write_whole};
 use crate::helpers::Helpers;
 use crate::metrics::{Environments, Played, RunKey, RunResult};
 use crate::report::Labels;
-use crate::run::{
-    Given, Item, RunFolder, RunGrants, environments, planned, read_results, write_whole,
-};
+use crate::run::{Given, Item, RunFolder, RunGrants, environments, planned, read_results};
 
 const FORMAT: &str = "chaic-fidelity";
 const VERSION: u32 = 1;
@@ -59,8 +58,10 @@ impl Matrix {
     /// # Errors
     /// If there is something in the folder, or the options make no matrix.
     pub fn begin(path: &Path, wanted: &Wanted, helpers: &dyn Helpers) -> Result<Matrix> {
-        let entries = std::fs::read_dir(path).into_iter().flatten().count();
-        if entries > 0 {
+        // What a matrix leaves that is stopped in its first moment is nothing.
+        let unfinished = format!("{FILE}{UNFINISHED}");
+        let mut entries = std::fs::read_dir(path).into_iter().flatten().flatten();
+        if entries.any(|e| e.file_name() != *unfinished) {
             return Err(EvalError::NotEmpty { path: path.to_owned() });
         }
         let episodes = wanted.episodes.clone().ok_or_else(|| {

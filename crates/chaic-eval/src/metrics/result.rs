@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use chaic_protocol::{AgentId, ClassId, EntityId, Frame, Role, TaskId};
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::{Map, Value};
 
 use crate::digest::Digest;
 
@@ -21,7 +23,7 @@ pub struct RunKey {
 }
 
 /// What became of one episode run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RunResult {
     /// Which.
     #[serde(flatten)]
@@ -33,7 +35,7 @@ pub struct RunResult {
 
 /// How an episode run ended.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "status", rename_all = "snake_case")]
+#[serde(tag = "status", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Ending {
     /// It was played to its end.
     Done(Summary),
@@ -46,6 +48,7 @@ pub enum Ending {
 
 /// What scores need to know of an episode run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Summary {
     /// Frames that passed.
     pub frames: Frame,
@@ -76,6 +79,7 @@ pub struct Summary {
 
 /// One thing that was delivered.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Delivery {
     /// When.
     pub frame: Frame,
@@ -99,6 +103,25 @@ pub struct Delivery {
 #[allow(clippy::trivially_copy_pass_by_ref)]
 fn is_false(b: &bool) -> bool {
     !b
+}
+
+impl<'de> Deserialize<'de> for RunResult {
+    /// By hand, as a flattened field takes unknown names in silence: what is not of the key must be
+    /// of the ending.
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<RunResult, D::Error> {
+        let mut ending = Map::deserialize(from)?;
+        let key: Map<String, Value> =
+            RunKey::FIELDS.iter().filter_map(|name| ending.remove_entry(*name)).collect();
+        Ok(RunResult {
+            key: RunKey::deserialize(Value::Object(key)).map_err(D::Error::custom)?,
+            ending: Ending::deserialize(Value::Object(ending)).map_err(D::Error::custom)?,
+        })
+    }
+}
+
+impl RunKey {
+    /// The names of its fields.
+    const FIELDS: [&str; 4] = ["task", "helper", "episode", "seed"];
 }
 
 impl RunResult {

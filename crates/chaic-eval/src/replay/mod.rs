@@ -13,6 +13,7 @@ use chaic_render::{Channels, Scene, View, plan};
 use chaic_world::{EventKind, World};
 use image::RgbImage;
 
+use crate::digest::Digest;
 use crate::error::{EvalError, Result};
 use crate::play::world_of;
 use crate::run::{RunFolder, slug};
@@ -173,7 +174,7 @@ impl<'a> Replay<'a> {
     /// Lets those who wait do what they did, and one frame pass; false once there is no more.
     ///
     /// # Errors
-    /// If the trace doesn't fit the world.
+    /// If the trace doesn't fit the world, as an altered one does.
     pub fn step(&mut self) -> Result<bool> {
         let frame = self.world.state().frame;
         if self.world.is_over() || frame >= self.last {
@@ -185,19 +186,29 @@ impl<'a> Replay<'a> {
             {
                 slot.clone_from(thought);
             }
-            self.world.submit(d.agent, d.action).map_err(|e| {
-                let text = format!(
-                    "{} at frame {frame}: {e}; `chaic verify` says more",
-                    self.header.episode
-                );
-                EvalError::Difference(text)
-            })?;
+            let comes = Digest(self.world.digest());
+            if comes != d.digest {
+                let said = d.digest;
+                return Err(self.differs(&format!(
+                    "the state's digest is {said} in the trace, {comes} when played again"
+                )));
+            }
+            self.world.submit(d.agent, d.action).map_err(|e| self.differs(&e.to_string()))?;
+        }
+        if let Some(late) = self.decisions.front().filter(|d| d.frame <= frame) {
+            let text = format!("a decision of frame {} comes too late", late.frame);
+            return Err(self.differs(&text));
         }
         self.world.tick();
         for event in self.world.drain_events() {
             self.tell(&event.kind);
         }
         Ok(true)
+    }
+
+    fn differs(&self, what: &str) -> EvalError {
+        let (episode, frame) = (&self.header.episode, self.world.state().frame);
+        EvalError::Difference(format!("{episode} at frame {frame}: {what}; the trace was altered"))
     }
 
     /// The picture of this moment.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::error::{EvalError, Result};
-use crate::figure::{Bar, Bars, FigureError, HelperBars, transport_rate};
+use crate::figure::{Bar, Bars, FigureError, HelperBars, svg_text, transport_rate};
 use crate::metrics::{Score, Scores};
 use crate::report::labels::Labels;
 use crate::report::tables::shown_interval;
@@ -14,6 +14,26 @@ use crate::report::tables::shown_interval;
 /// If the extension is another one, there are more helpers than can be told apart, or the file
 /// system refuses.
 pub fn write_figure(scores: &Scores, labels: Labels<'_>, path: &Path) -> Result<()> {
+    transport_rate(&bars(scores, labels), path).map_err(error_of)
+}
+
+/// The text of the same figure as SVG.
+///
+/// # Errors
+/// If there are more helpers than can be told apart.
+pub(super) fn figure_text(scores: &Scores, labels: Labels<'_>) -> Result<String> {
+    svg_text(&bars(scores, labels)).map_err(error_of)
+}
+
+fn error_of(error: FigureError) -> EvalError {
+    match error {
+        FigureError::UnsupportedExtension { .. } => EvalError::Options(error.to_string()),
+        FigureError::Write(refusal) => refusal,
+        _ => EvalError::Picture(error.to_string()),
+    }
+}
+
+fn bars(scores: &Scores, labels: Labels<'_>) -> Bars {
     let tasks = scores.tasks();
     let bars = |helper: &String| {
         let bar = |s: &Score| Bar { mean: s.tr, interval: shown_interval(s), dot: None };
@@ -26,13 +46,9 @@ pub fn write_figure(scores: &Scores, labels: Labels<'_>, path: &Path) -> Result<
             values: tasks.iter().map(|t| scores.get(*t, helper).map(bar)).collect(),
         }
     };
-    let bars = Bars {
+    Bars {
         tasks: tasks.iter().map(|t| t.info().title.to_owned()).collect(),
         helpers: scores.helpers().iter().map(bars).collect(),
         dots: None,
-    };
-    transport_rate(&bars, path).map_err(|e| match e {
-        FigureError::UnsupportedExtension { .. } => EvalError::Options(e.to_string()),
-        _ => EvalError::Picture(e.to_string()),
-    })
+    }
 }

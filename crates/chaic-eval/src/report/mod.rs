@@ -13,7 +13,7 @@ pub(crate) use grid::Grid;
 pub use labels::{GrantsFile, Labels, title};
 pub use tables::{additional, counts, intervals, main_result, pairs, resolutions, stuck};
 pub(crate) use tables::{interval, number, rounded, shown_interval};
-pub use write::{Report, write_files};
+pub use write::{Report, differing_files, write_files};
 
 use std::fmt;
 use std::str::FromStr;

@@ -7,12 +7,14 @@ use serde::Serialize;
 
 use crate::CHAIC_VERSION;
 use crate::error::Result;
+use crate::files::read_bounded;
 use crate::metrics::{
     Ending, Environments, FormulaSet, MAX_NAMED, Played, RunKey, RunResult, Score, Scores,
     differences,
 };
 use crate::report::Format;
 use crate::report::coverage::coverage;
+use crate::report::figure::{figure_text, write_figure};
 use crate::report::grid::Grid;
 use crate::report::labels::{GrantsFile, Labels};
 use crate::report::tables::{
@@ -234,7 +236,9 @@ impl Report<'_> {
 
     fn errors(&self) -> String {
         let mut text = String::new();
-        for result in self.results {
+        let mut results: Vec<&RunResult> = self.results.iter().collect();
+        results.sort_by(|a, b| a.key.cmp(&b.key));
+        for result in results {
             if let Ending::Error { message } = &result.ending {
                 let k = &result.key;
                 let _ = writeln!(
@@ -259,11 +263,49 @@ fn csv_numbers(s: &Score) -> String {
     numbers.map(cell).join(",")
 }
 
-/// Writes `scores.json` and `report.md` into the run's folder.
+impl Report<'_> {
+    /// The files of it that are text, by name; without the figure if there are more helpers than
+    /// one can show.
+    fn texts(&self) -> Vec<(&'static str, String)> {
+        let figure =
+            figure_text(&self.scores(), self.labels()).ok().map(|figure| ("figure.svg", figure));
+        let texts = [("scores.json", self.json()), ("report.md", self.markdown())];
+        texts.into_iter().chain(figure).collect()
+    }
+}
+
+/// Writes `scores.json`, `report.md`, `figure.svg` and `figure.png` into the run's folder.
 ///
 /// # Errors
 /// If the file system refuses.
 pub fn write_files(folder: &RunFolder, report: &Report<'_>) -> Result<()> {
-    folder.write("scores.json", report.json().as_bytes())?;
-    folder.write("report.md", report.markdown().as_bytes())
+    for (name, text) in report.texts() {
+        folder.write(name, text.as_bytes())?;
+    }
+    write_figure(&report.scores(), report.labels(), &folder.join("figure.png"))
+}
+
+/// The files of a run's report that are not as [`write_files`] writes them; `None` if there is no
+/// report. Pictures are left out, as their bytes may depend on the machine.
+///
+/// # Errors
+/// If a file can't be read.
+pub fn differing_files(
+    folder: &RunFolder,
+    report: &Report<'_>,
+) -> Result<Option<Vec<&'static str>>> {
+    let mut found = report.texts();
+    found.retain(|(name, _)| folder.join(name).exists());
+    if found.is_empty() {
+        return Ok(None);
+    }
+    let mut differing = Vec::new();
+    for (name, text) in found {
+        // One byte more tells a longer file from an equal one.
+        let bytes = read_bounded(&folder.join(name), text.len() as u64 + 1)?;
+        if bytes != text.as_bytes() {
+            differing.push(name);
+        }
+    }
+    Ok(Some(differing))
 }

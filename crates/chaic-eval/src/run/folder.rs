@@ -1,23 +1,35 @@
 //! The folder of a run: where what lies, and who may write.
 
 use std::fs::{self, File, TryLockError};
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use chaic_episodes::{Episode, find_episode};
 use serde::{Deserialize, Serialize};
 
 use crate::CHAIC_VERSION;
+use crate::digest::Digest;
 use crate::error::{EvalError, Result};
+use crate::files::{UNFINISHED, entries, read_bounded, read_episode_file, write_whole};
 use crate::metrics::RunKey;
 use crate::run::granted::RunGrants;
-use crate::run::items::{read_bounded, slug};
+use crate::run::items::slug;
 use crate::run::options::RunOptions;
 
 const FORMAT: &str = "chaic-run";
-const VERSION: u32 = 1;
+/// 2: with the digest of the options.
+const VERSION: u32 = 2;
+/// Longest `run.json` that is read, bytes: a thousand times a usual one.
+const MAX_RUN_FILE_BYTES: u64 = 1 << 20;
+/// Its presence makes a folder a run, so it is written after all that a run needs.
+const RUN_FILE: &str = "run.json";
+/// The first file that a run writes; whoever holds its lock may write the others.
 const LOCK: &str = ".lock";
-const EPISODES: &str = "episodes";
+/// Copies of episode files.
+pub(super) const EPISODES: &str = "episodes";
+/// What helpers that ask language models record; `chaic-llm` writes it.
+const RECORDS: &str = "llm";
+/// What lies there before the first question is asked.
+const RECORDS_OF_BEGINNING: [&str; 3] = ["settings.json", "settings.json.tmp", "templates"];
 
 /// Whether a run is begun or gone on with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,44 +54,114 @@ struct RunFile {
     version: u32,
     chaic: String,
     renderer: String,
+    /// Of the options as compact JSON, so that a change by hand is found.
+    digest: Digest,
     options: RunOptions,
     /// Absent in runs of older versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     granted: Option<RunGrants>,
 }
 
+/// What lies in a folder that is to become a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Contents {
+    /// Nothing, or a lock that nobody holds.
+    Nothing,
+    /// What a run leaves that is stopped before its `run.json` is written.
+    Beginning,
+    /// A run.
+    Run,
+    /// Something that no run has left.
+    Other,
+}
+
+impl Contents {
+    fn of(path: &Path) -> Result<Contents> {
+        if path.join(RUN_FILE).exists() {
+            return Ok(Contents::Run);
+        }
+        let found = if path.exists() { entries(path)? } else { Vec::new() };
+        let is_locked = found.iter().any(|p| name(p) == LOCK);
+        let rest: Vec<&PathBuf> = found.iter().filter(|p| name(p) != LOCK).collect();
+        Ok(match rest[..] {
+            [] => Contents::Nothing,
+            _ if is_locked && rest.iter().all(|p| is_of_beginning(p)) => Contents::Beginning,
+            _ => Contents::Other,
+        })
+    }
+}
+
+/// Whether a run writes this before its `run.json`.
+fn is_of_beginning(path: &Path) -> bool {
+    let all = |folder: &Path, is_known: &dyn Fn(&str) -> bool| {
+        entries(folder).is_ok_and(|found| found.iter().all(|p| is_known(name(p))))
+    };
+    match name(path) {
+        EPISODES => {
+            all(path, &|file| file.strip_suffix(UNFINISHED).unwrap_or(file).ends_with(".json"))
+        }
+        RECORDS => all(path, &|file| RECORDS_OF_BEGINNING.contains(&file)),
+        file => file.strip_suffix(UNFINISHED) == Some(RUN_FILE),
+    }
+}
+
+/// The name of a file; empty where it is no text, as no file of a run is named.
+fn name(path: &Path) -> &str {
+    path.file_name().and_then(|n| n.to_str()).unwrap_or_default()
+}
+
 impl RunFolder {
-    /// Opens a folder for writing, and the options recorded there.
+    /// Whether there is a run to go on with or to read.
+    pub fn is_run(path: &Path) -> bool {
+        path.join(RUN_FILE).exists()
+    }
+
+    /// Refuses a folder in which no run can be resumed.
     ///
     /// # Errors
-    /// If it is in use, or not empty and `access` is to begin, or no run and not empty.
+    /// [`EvalError::NotBegun`] if a run was stopped there before it began, [`EvalError::NotARun`]
+    /// for any other folder without a run.
+    pub fn check_begun(path: &Path) -> Result<()> {
+        match Contents::of(path)? {
+            Contents::Run => Ok(()),
+            Contents::Nothing | Contents::Beginning if path.join(LOCK).exists() => {
+                Err(EvalError::NotBegun { path: path.to_owned() })
+            }
+            _ => Err(EvalError::NotARun { path: path.to_owned() }),
+        }
+    }
+
+    /// Opens a folder for writing, and the options recorded there. What a run has left that was
+    /// stopped before it began is removed.
+    ///
+    /// # Errors
+    /// If it is in use, or holds a run and `access` is to begin, or holds anything else; if
+    /// `run.json` was changed by hand or is of another version.
     pub fn lock(path: &Path, access: Access) -> Result<(RunFolder, Option<RunOptions>)> {
-        if access == Access::Begin && !is_empty(path)? {
+        if let Err(refusal) = check_access(path, access) {
             // Whoever is at work here says more than that something lies here.
             if path.join(LOCK).exists() {
                 take_lock(path)?;
             }
-            return Err(EvalError::NotEmpty { path: path.to_owned() });
-        }
-        if access == Access::Resume && !path.join("run.json").exists() && !nothing_yet(path)? {
-            return Err(EvalError::NotARun { path: path.to_owned() });
+            return Err(refusal);
         }
         fs::create_dir_all(path).map_err(EvalError::io("make the folder", path))?;
         let lock = take_lock(path)?;
+        // Another process may have been at work between the first look and the lock.
+        check_access(path, access)?;
         let folder = RunFolder { path: path.to_owned(), _lock: Some(lock) };
-        let recorded = folder.recorded()?;
-        match (&recorded, access) {
-            // Another process began a run between the first look and the lock.
-            (Some(_), Access::Begin) => Err(EvalError::NotEmpty { path: path.to_owned() }),
-            (Some(file), Access::Resume) if file.chaic != CHAIC_VERSION => {
-                Err(EvalError::OtherVersion {
-                    path: folder.path.join("run.json"),
-                    found: format!("a run begun by chaic {}", file.chaic),
-                    expected: format!("and resumes runs of chaic {CHAIC_VERSION}"),
-                })
-            }
-            _ => Ok((folder, recorded.map(|f| f.options))),
+        let Some(file) = folder.recorded()? else {
+            folder.clear_beginning()?;
+            return Ok((folder, None));
+        };
+        if file.chaic != CHAIC_VERSION {
+            return Err(EvalError::OtherVersion {
+                path: folder.join(RUN_FILE),
+                found: format!("a run begun by chaic {}", file.chaic),
+                expected: format!("and resumes runs of chaic {CHAIC_VERSION}"),
+            });
         }
+        Ok((folder, Some(file.options)))
     }
 
     /// Opens a run for reading.
@@ -111,6 +193,11 @@ impl RunFolder {
             "helpers or partner are granted something else than {} says; begin a new run",
             path.display()
         )))
+    }
+
+    /// The version of chaic that began the run, if it is another one.
+    pub(crate) fn other_version(&self) -> Result<Option<String>> {
+        Ok(self.recorded()?.map(|file| file.chaic).filter(|chaic| chaic != CHAIC_VERSION))
     }
 
     /// The folder itself.
@@ -161,7 +248,7 @@ impl RunFolder {
     pub fn episode(&self, key: &RunKey) -> Result<Episode> {
         let copy = self.episode_copy(key.task, &key.episode);
         if copy.exists() {
-            let bytes = read_bounded(&copy)?;
+            let bytes = read_episode_file(&copy)?;
             return Ok(Episode::parse(&bytes, &copy.display().to_string())?);
         }
         Ok(find_episode(&key.episode)?)
@@ -177,11 +264,23 @@ impl RunFolder {
             version: VERSION,
             chaic: CHAIC_VERSION.to_owned(),
             renderer: "cpu".to_owned(),
+            digest: options.digest(),
             options: options.clone(),
             granted: Some(granted.clone()),
         };
         let text = serde_json::to_string_pretty(&file).expect("options have string keys") + "\n";
-        self.write("run.json", text.as_bytes())
+        self.write(RUN_FILE, text.as_bytes())
+    }
+
+    /// Removes what [`Contents::Beginning`] consists of, but the lock.
+    fn clear_beginning(&self) -> Result<()> {
+        let leftovers = entries(&self.path)?;
+        for path in leftovers.iter().filter(|p| name(p) != LOCK) {
+            let removed =
+                if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+            removed.map_err(EvalError::io("remove", path))?;
+        }
+        Ok(())
     }
 
     /// Writes a file of the run as a whole or not at all.
@@ -193,11 +292,11 @@ impl RunFolder {
     }
 
     fn recorded(&self) -> Result<Option<RunFile>> {
-        let path = self.path.join("run.json");
+        let path = self.path.join(RUN_FILE);
         if !path.exists() {
             return Ok(None);
         }
-        let text = fs::read_to_string(&path).map_err(EvalError::io("read", &path))?;
+        let text = read_bounded(&path, MAX_RUN_FILE_BYTES)?;
         #[derive(Deserialize)]
         struct Version {
             format: String,
@@ -210,7 +309,7 @@ impl RunFolder {
             line: e.line(),
             problem: e.to_string(),
         };
-        let v: Version = serde_json::from_str(&text).map_err(bad)?;
+        let v: Version = serde_json::from_slice(&text).map_err(bad)?;
         if v.format != FORMAT || v.version != VERSION {
             return Err(EvalError::OtherVersion {
                 found: format!("{} version {} (written by chaic {})", v.format, v.version, v.chaic),
@@ -218,25 +317,23 @@ impl RunFolder {
                 path,
             });
         }
-        serde_json::from_str(&text).map(Some).map_err(bad)
+        let file: RunFile = serde_json::from_slice(&text).map_err(bad)?;
+        if file.options.digest() != file.digest {
+            return Err(EvalError::Altered { path });
+        }
+        Ok(Some(file))
     }
 }
 
-/// Writes a file as a whole or not at all: to a name beside it, which then becomes its own.
-///
-/// # Errors
-/// If the file system refuses.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(".tmp");
-    let beside = path.with_file_name(name);
-    let write = || -> std::io::Result<()> {
-        let mut file = File::create(&beside)?;
-        file.write_all(bytes)?;
-        file.sync_all()?;
-        fs::rename(&beside, path)
-    };
-    write().map_err(EvalError::io("write", path))
+/// Whether a folder may be begun in or gone on with.
+fn check_access(path: &Path, access: Access) -> Result<()> {
+    match (Contents::of(path)?, access) {
+        (Contents::Run | Contents::Other, Access::Begin) => {
+            Err(EvalError::NotEmpty { path: path.to_owned() })
+        }
+        (Contents::Other, Access::Resume) => Err(EvalError::NotARun { path: path.to_owned() }),
+        _ => Ok(()),
+    }
 }
 
 fn take_lock(path: &Path) -> Result<File> {
@@ -249,26 +346,6 @@ fn take_lock(path: &Path) -> Result<File> {
         Err(TryLockError::WouldBlock) => Err(EvalError::Locked { path: path.to_owned() }),
         Err(TryLockError::Error(e)) => Err(refused()(e)),
     }
-}
-
-fn entries(path: &Path) -> Result<Vec<PathBuf>> {
-    let list = fs::read_dir(path).and_then(|d| d.map(|e| e.map(|e| e.path())).collect());
-    list.map_err(EvalError::io("list", path))
-}
-
-/// A lock alone, of which nobody holds the key any more, is nothing.
-fn is_empty(path: &Path) -> Result<bool> {
-    Ok(!path.exists() || entries(path)?.iter().all(|p| p.file_name().is_some_and(|n| n == LOCK)))
-}
-
-/// Whether a folder holds at most what a run that was killed in its first moment leaves.
-fn nothing_yet(path: &Path) -> Result<bool> {
-    if !path.exists() {
-        return Ok(true);
-    }
-    let known = [LOCK, EPISODES, "run.json.tmp"];
-    let is_known = |p: &PathBuf| p.file_name().is_some_and(|n| known.iter().any(|k| n == *k));
-    Ok(entries(path)?.iter().all(is_known))
 }
 
 fn walk(folder: &Path, depth: u32, found: &mut Vec<PathBuf>) -> Result<()> {

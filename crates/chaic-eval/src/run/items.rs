@@ -2,16 +2,16 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use chaic_episodes::{Episode, MAX_EPISODE_BYTES, Split};
+use chaic_episodes::{Episode, Split};
 use chaic_protocol::{Frame, TaskId};
 
 use crate::error::{EvalError, Result};
+use crate::files::{entries, read_episode_file, write_whole};
 use crate::metrics::RunKey;
 use crate::run::environment::environment;
-use crate::run::folder::{RunFolder, write_whole};
+use crate::run::folder::RunFolder;
 use crate::run::options::{FILES, RunOptions};
 
 /// One episode run.
@@ -44,14 +44,19 @@ pub fn slug(task: TaskId, id: &str) -> String {
 /// # Errors
 /// If the options name no episodes, or the run's copies of episode files can't be read.
 pub fn planned(folder: &RunFolder, options: &RunOptions) -> Result<Vec<Item>> {
+    let own = if options.split == FILES { read_files(&folder.episode_files())? } else { vec![] };
+    plan(options, &own)
+}
+
+/// The same for a run whose episodes are not copied yet.
+pub(super) fn plan(options: &RunOptions, own: &[Episode]) -> Result<Vec<Item>> {
     /// A longer list is no benchmark but a mistake, and fills the memory.
     const MAX_ITEMS: usize = 1_000_000;
-    let own = if options.split == FILES { read_files(&folder.episode_files())? } else { vec![] };
     let n_each = options.helpers.len().saturating_mul(options.seeds as usize);
     let mut items = Vec::new();
     for task in &options.tasks {
         let limit = (MAX_ITEMS - items.len()) / n_each.max(1);
-        let episodes = episodes(options, &own, *task, limit)?;
+        let episodes = episodes(options, own, *task, limit)?;
         if episodes.is_empty() {
             let text = format!("there is no episode of {task} to play");
             return Err(EvalError::Options(text));
@@ -113,7 +118,7 @@ fn episodes(
 fn read_files(folder: &Path) -> Result<Vec<Episode>> {
     let mut episodes = Vec::new();
     for path in episode_files(folder)? {
-        let bytes = read_bounded(&path)?;
+        let bytes = read_episode_file(&path)?;
         episodes.push(Episode::parse(&bytes, &path.display().to_string())?);
     }
     episodes.sort_by(|a, b| a.id().cmp(b.id()));
@@ -122,20 +127,9 @@ fn read_files(folder: &Path) -> Result<Vec<Episode>> {
 
 /// A folder's `.json` files, in the order of their names.
 fn episode_files(folder: &Path) -> Result<Vec<PathBuf>> {
-    let list = fs::read_dir(folder).and_then(|d| d.map(|e| e.map(|e| e.path())).collect());
-    let mut files: Vec<PathBuf> = list.map_err(EvalError::io("list", folder))?;
+    let mut files = entries(folder)?;
     files.retain(|p| p.extension().is_some_and(|e| e == "json"));
-    files.sort();
     Ok(files)
-}
-
-/// The bytes of an episode file; of a file that is too long so many that its reader says so.
-pub(super) fn read_bounded(path: &Path) -> Result<Vec<u8>> {
-    let file = fs::File::open(path).map_err(EvalError::io("open", path))?;
-    let mut bytes = Vec::new();
-    let read = file.take(MAX_EPISODE_BYTES as u64 + 1).read_to_end(&mut bytes);
-    read.map_err(EvalError::io("read", path))?;
-    Ok(bytes)
 }
 
 /// The tasks of the episodes in a folder, in the paper's order.
@@ -184,29 +178,37 @@ fn same_files(a: &Path, b: &Path) -> Result<bool> {
         return Ok(false);
     }
     for (a, b) in a.iter().zip(&b) {
-        if read_bounded(a)? != read_bounded(b)? {
+        if read_episode_file(a)? != read_episode_file(b)? {
             return Ok(false);
         }
     }
     Ok(true)
 }
 
-/// Copies the episodes of `source` into the run, which then needs nothing from elsewhere.
-pub(super) fn copy_episode_files(
-    source: &Path,
-    tasks: &[TaskId],
-    folder: &RunFolder,
-) -> Result<()> {
-    let to = folder.episode_files();
-    fs::create_dir_all(&to).map_err(EvalError::io("make the folder", &to))?;
+/// The episodes of these tasks in a user's folder.
+///
+/// # Errors
+/// If one can't be read, or two of them would be copied to the same file.
+pub(super) fn read_source(source: &Path, tasks: &[TaskId]) -> Result<Vec<Episode>> {
+    let mut episodes = read_files(source)?;
+    episodes.retain(|e| tasks.contains(&e.task()));
     let mut names = BTreeSet::new();
-    for episode in read_files(source)?.iter().filter(|e| tasks.contains(&e.task())) {
-        let copy = folder.episode_copy(episode.task(), episode.id());
-        if !names.insert(copy.clone()) {
+    for episode in &episodes {
+        if !names.insert((episode.task(), slug(episode.task(), episode.id()))) {
             let (id, source) = (episode.id(), source.display());
             let text = format!("{source} holds two episodes that are named like {id}; rename one");
             return Err(EvalError::Options(text));
         }
+    }
+    Ok(episodes)
+}
+
+/// Copies episodes into the run, which then needs nothing from elsewhere.
+pub(super) fn copy_episodes(episodes: &[Episode], folder: &RunFolder) -> Result<()> {
+    let to = folder.episode_files();
+    fs::create_dir_all(&to).map_err(EvalError::io("make the folder", &to))?;
+    for episode in episodes {
+        let copy = folder.episode_copy(episode.task(), episode.id());
         write_whole(&copy, episode.to_json().as_bytes())?;
     }
     Ok(())

@@ -85,10 +85,10 @@ fn read(path: &Path, planned: &[Item]) -> Result<(Vec<RunResult>, Vec<Warning>, 
 fn parse(line: &[u8]) -> std::result::Result<RunResult, String> {
     let text = line.strip_suffix(b"\n").ok_or("is cut off")?;
     serde_json::from_slice(text).map_err(|e| {
-        // Its own line number is always 1.
+        // Its own line number is always 1, and a wrong value has no column.
         let said = e.to_string();
         let what = said.split(" at line ").next().unwrap_or_default();
-        format!("{what}, at column {}", e.column())
+        if e.is_data() { what.to_owned() } else { format!("{what}, at column {}", e.column()) }
     })
 }
 

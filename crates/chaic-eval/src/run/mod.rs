@@ -14,7 +14,6 @@ mod options;
 mod worker;
 
 pub use environment::environments;
-pub use folder::write_whole;
 pub use folder::{Access, RunFolder};
 pub use granted::RunGrants;
 pub(crate) use items::tasks_of_files;
@@ -24,12 +23,16 @@ pub use options::{Given, RunOptions};
 pub use worker::{Finished, Progress};
 
 use std::collections::BTreeSet;
+use std::fs;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
+
+use chaic_episodes::Episode;
 
 use crate::error::{EvalError, Result};
 use crate::helpers::{self, Helpers, NONE};
 use crate::metrics::{Ending, RunKey, RunResult};
+use crate::run::folder::EPISODES;
 use crate::trace::Warning;
 
 /// A run with its folder, which nobody else writes to as long as this exists.
@@ -66,28 +69,16 @@ impl Run {
         given: &Given,
         helpers: &dyn Helpers,
     ) -> Result<(Run, Vec<Warning>)> {
-        // Nothing is left behind by options that make no run.
-        if access == Access::Begin {
-            check(&given.begin()?, helpers)?;
-        }
+        // What is asked for is checked before anything is written.
+        let is_resumed = access == Access::Resume && RunFolder::is_run(path);
+        let fresh = if is_resumed { None } else { Some(Fresh::of(path, given, helpers)?) };
         let (folder, recorded) = RunFolder::lock(path, access)?;
-        let options = match &recorded {
-            Some(recorded) => given.resume(recorded, path)?,
-            None => given.begin()?,
+        let (options, granted, items) = match (recorded, fresh) {
+            (Some(recorded), _) => resume(&folder, &recorded, given, helpers)?,
+            (None, Some(fresh)) => fresh.begin(&folder, helpers)?,
+            // It was removed between the first look and the lock.
+            (None, None) => return Err(EvalError::NotARun { path: path.to_owned() }),
         };
-        check(&options, helpers)?;
-        if let Some(source) = &given.episodes {
-            match recorded {
-                None => items::copy_episode_files(source, &options.tasks, &folder)?,
-                Some(_) => items::check_episode_files(source, &options.tasks, &folder)?,
-            }
-        }
-        let items = planned(&folder, &options)?;
-        let granted = RunGrants::of(&options, helpers)?;
-        match recorded {
-            None => folder.write_options(&options, &granted)?,
-            Some(_) => folder.check_grants(&granted)?,
-        }
         let (journal, results, warnings) = Journal::open(&folder.results(), &items)?;
         Ok((Run { folder, options, granted, journal, items, results }, warnings))
     }
@@ -179,6 +170,64 @@ impl Run {
             Ok(())
         })
     }
+}
+
+/// What a run plays, what it grants, and its episode runs.
+type Opened = (RunOptions, RunGrants, Vec<Item>);
+
+/// A run that is not begun yet.
+struct Fresh {
+    options: RunOptions,
+    items: Vec<Item>,
+    /// Episodes from files; `None` where they are of a split.
+    own: Option<Vec<Episode>>,
+}
+
+impl Fresh {
+    fn of(path: &Path, given: &Given, helpers: &dyn Helpers) -> Result<Fresh> {
+        // What lies in the run's own place for copies may be removed; a user's files never are.
+        let place = fs::canonicalize(path.join(EPISODES)).ok();
+        let source = given.episodes.as_ref().and_then(|s| fs::canonicalize(s).ok());
+        if place.is_some() && place == source {
+            return Err(EvalError::NotEmpty { path: path.to_owned() });
+        }
+        let options = given.begin()?;
+        check(&options, helpers)?;
+        let source = given.episodes.as_ref();
+        let own = source.map(|s| items::read_source(s, &options.tasks)).transpose()?;
+        let items = items::plan(&options, own.as_deref().unwrap_or_default())?;
+        Ok(Fresh { options, items, own })
+    }
+
+    /// Writes all that a run needs, and `run.json` last: until then the folder holds no run, and
+    /// the next beginning removes what is there.
+    fn begin(self, folder: &RunFolder, helpers: &dyn Helpers) -> Result<Opened> {
+        if let Some(own) = &self.own {
+            items::copy_episodes(own, folder)?;
+        }
+        helpers.attach(folder.path())?;
+        let granted = RunGrants::of(&self.options, helpers)?;
+        folder.write_options(&self.options, &granted)?;
+        Ok((self.options, granted, self.items))
+    }
+}
+
+fn resume(
+    folder: &RunFolder,
+    recorded: &RunOptions,
+    given: &Given,
+    helpers: &dyn Helpers,
+) -> Result<Opened> {
+    let options = given.resume(recorded, folder.path())?;
+    check(&options, helpers)?;
+    if let Some(source) = &given.episodes {
+        items::check_episode_files(source, &options.tasks, folder)?;
+    }
+    let items = planned(folder, &options)?;
+    let granted = RunGrants::of(&options, helpers)?;
+    folder.check_grants(&granted)?;
+    helpers.attach(folder.path())?;
+    Ok((options, granted, items))
 }
 
 fn check(options: &RunOptions, helpers: &dyn Helpers) -> Result<()> {

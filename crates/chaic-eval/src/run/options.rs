@@ -7,6 +7,7 @@ use chaic_protocol::TaskId;
 use chaic_render::Appearance;
 use serde::{Deserialize, Serialize};
 
+use crate::digest::Digest;
 use crate::error::{EvalError, Result};
 use crate::helpers::RULES;
 use crate::rules::{RuleSet, RuleSetName};
@@ -99,6 +100,11 @@ impl RunOptions {
     pub fn rules(&self) -> Result<RuleSet> {
         let named = RuleSet::named(self.rules);
         self.set.iter().try_fold(named, |rules, setting| rules.with(setting))
+    }
+
+    /// The digest of all of them, as compact JSON.
+    pub fn digest(&self) -> Digest {
+        Digest::of_bytes(&serde_json::to_vec(self).expect("options have string keys"))
     }
 
     /// How scenes are lit and colored.

@@ -13,6 +13,7 @@ use crate::digest::Digest;
 use crate::error::EvalError;
 use crate::helpers::Helper;
 use crate::metrics::Summary;
+use crate::verify::ReportState;
 
 /// Frames of a test's episodes: enough for a few decisions of everybody.
 const HORIZON: u32 = 90;
@@ -150,8 +151,8 @@ fn the_number_of_workers_and_an_interruption_change_nothing() {
 
     // The same, stopped in the middle of the third episode and gone on with by another process.
     let path = dir.path().join("interrupted");
-    // Options are checked twice, with a helper made for each.
-    let hasty = TestHelpers { stop_after: 4, ..TestHelpers::new() };
+    // One is made to check the options.
+    let hasty = TestHelpers { stop_after: 3, ..TestHelpers::new() };
     let (mut run, _) = Run::open(&path, Access::Begin, &given, &hasty).unwrap();
     assert!(!play(&mut run, 1, &hasty));
     let so_far = run.results().len();
@@ -329,12 +330,32 @@ fn folders_are_guarded() {
     // A folder of another version, and one that is something else.
     let run_file = path.join("run.json");
     let text = fs::read_to_string(&run_file).unwrap();
-    fs::write(&run_file, text.replace("\"version\": 1", "\"version\": 9")).unwrap();
+    fs::write(&run_file, text.replace("\"version\": 2", "\"version\": 9")).unwrap();
     let error = open(Access::Resume, &mine).unwrap_err().to_string();
-    assert!(error.contains("version 9") && error.contains("version 1"), "{error}");
+    assert!(error.contains("version 9") && error.contains("version 2"), "{error}");
+    assert_eq!(error.lines().count(), 1, "{error}");
     fs::write(&run_file, text.replace(crate::CHAIC_VERSION, "7.7.7")).unwrap();
     let error = open(Access::Resume, &mine).unwrap_err().to_string();
     assert!(error.contains("7.7.7") && error.contains(crate::CHAIC_VERSION), "{error}");
+    // Options that somebody else has written into it.
+    let changed =
+        "{} was changed after the run began".replace("{}", &run_file.display().to_string());
+    for (from, to) in [
+        ("\"rules\": \"paper\"", "\"rules\": \"compat\""),
+        ("\"size\": 32", "\"size\": 64"),
+        ("\"seeds\": 2", "\"seeds\": 1"),
+        ("\"seeds\": 2", "\"seeds\": 2, \"traces\": false"),
+    ] {
+        let other = text.replace(from, to);
+        assert_ne!(other, text, "{from} is there");
+        fs::write(&run_file, other).unwrap();
+        for error in [
+            Run::open(&path, Access::Resume, &Given::default(), &helpers).unwrap_err(),
+            RunFolder::read(&path).unwrap_err(),
+        ] {
+            assert!(error.to_string().contains(&changed), "{error}");
+        }
+    }
     let foreign = dir.path().join("foreign");
     fs::create_dir(&foreign).unwrap();
     fs::write(foreign.join("letter.txt"), "dear").unwrap();
@@ -377,6 +398,10 @@ fn a_journal_with_impossible_numbers_is_refused_by_file_and_line() {
         ("\"obstacle\"", "\"lunch\"", "unknown variant `lunch`, expected one of"),
         ("\"rhp\"", "\"nobody\"", "e (obstacle) with helper nobody and seed 0, which this run"),
         ("\"seed\":0", "\"seed\":7", "seed 7, which this run doesn't play"),
+        ("\"away_frames\"", "\"~way_frames\"", "unknown field `~way_frames`"),
+        ("\"counted\"", "\"handled\":true,\"counted\"", "unknown field `handled`"),
+        ("\"seed\":0", "\"seed\":0,\"message\":\"\"", "unknown field `message`"),
+        ("\"helper\":\"rhp\",", "", "missing field `helper`"),
     ] {
         let line = good.replacen(from, to, 1);
         assert_ne!(line, good, "{from} is there");
@@ -428,4 +453,234 @@ fn a_journal_cut_at_any_byte_loses_one_record_at_most() {
     fs::write(&path, &damaged).unwrap();
     assert!(matches!(Journal::open(&path, &[]), Err(EvalError::Unreadable { line: 1, .. })));
     assert_eq!(fs::read(&path).unwrap(), damaged);
+}
+
+/// What a run of one episode file writes before its `run.json`, beside the lock.
+const BEGINNING: [&str; 7] = [
+    "episodes/low_target-short-0.json",
+    "episodes/low_target-short-0.json.tmp",
+    "episodes/shopping-old.json",
+    "llm/settings.json",
+    "llm/settings.json.tmp",
+    "llm/templates/task.txt",
+    "run.json.tmp",
+];
+
+#[test]
+fn a_run_that_was_stopped_before_it_began_begins_again() {
+    let source = episode_files(&[TaskId::LowTarget], 1);
+    let dir = tempfile::tempdir().unwrap();
+    let helpers = TestHelpers::new();
+    let given = given(&source, &["turner"]);
+    let names = |path: &Path| {
+        let mut names: Vec<_> = files_below(path).into_iter().collect();
+        names.sort();
+        names
+    };
+    let undisturbed = dir.path().join("undisturbed");
+    drop(Run::open(&undisturbed, Access::Begin, &given, &helpers).unwrap());
+    // Whatever of it is there: all orders of writing leave one of these.
+    for left in 0..1_u32 << BEGINNING.len() {
+        let path = dir.path().join(left.to_string());
+        fs::create_dir(&path).unwrap();
+        fs::write(path.join(".lock"), "").unwrap();
+        for (_, name) in BEGINNING.iter().enumerate().filter(|(k, _)| left >> k & 1 == 1) {
+            fs::create_dir_all(path.join(name).parent().unwrap()).unwrap();
+            fs::write(path.join(name), "{ torn").unwrap();
+        }
+        let error = RunFolder::check_begun(&path).unwrap_err();
+        assert!(matches!(error, EvalError::NotBegun { .. }), "{left}: {error}");
+        let access = if left % 2 == 0 { Access::Begin } else { Access::Resume };
+        drop(Run::open(&path, access, &given, &helpers).unwrap());
+        assert_eq!(names(&path), names(&undisturbed), "{left}");
+    }
+}
+
+/// Names and contents of all files below a folder.
+fn files_below(path: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut found = Vec::new();
+    for entry in crate::files::entries(path).unwrap() {
+        let name = entry.file_name().unwrap().to_str().unwrap().to_owned();
+        if entry.is_dir() {
+            let below = files_below(&entry).into_iter();
+            found.extend(below.map(|(below, bytes)| (format!("{name}/{below}"), bytes)));
+        } else {
+            found.push((name, fs::read(&entry).unwrap()));
+        }
+    }
+    found
+}
+
+#[test]
+fn what_no_run_has_left_is_never_removed() {
+    let source = episode_files(&[TaskId::LowTarget], 1);
+    let dir = tempfile::tempdir().unwrap();
+    let helpers = TestHelpers::new();
+    let given = given(&source, &["turner"]);
+    for (k, name) in [
+        "episodes/letter.txt",
+        "episodes/more/a.json",
+        "letter.txt",
+        "results.jsonl",
+        "traces/a.jsonl",
+        "llm/low_target/vlm/short-0-s0.jsonl",
+    ]
+    .iter()
+    .enumerate()
+    {
+        let path = dir.path().join(k.to_string());
+        fs::create_dir_all(path.join(name).parent().unwrap()).unwrap();
+        for file in [".lock", name] {
+            fs::write(path.join(file), "dear").unwrap();
+        }
+        let before = files_below(&path);
+        let open = |access| Run::open(&path, access, &given, &helpers).unwrap_err();
+        let (begun, resumed) = (open(Access::Begin), open(Access::Resume));
+        assert!(matches!(begun, EvalError::NotEmpty { .. }), "{name}: {begun}");
+        assert!(matches!(resumed, EvalError::NotARun { .. }), "{name}: {resumed}");
+        assert_eq!(files_below(&path), before);
+    }
+    // Episodes that are named as the run's own are somebody's, whatever else lies there.
+    let path = dir.path().join("own");
+    fs::create_dir_all(path.join("episodes")).unwrap();
+    fs::write(path.join(".lock"), "").unwrap();
+    fs::copy(source.path().join("low_target-0.json"), path.join("episodes/a.json")).unwrap();
+    let own = Given { episodes: Some(path.join("episodes")), ..given.clone() };
+    let before = files_below(&path);
+    let error = Run::open(&path, Access::Begin, &own, &helpers).unwrap_err();
+    assert!(matches!(error, EvalError::NotEmpty { .. }), "{error}");
+    assert_eq!(files_below(&path), before);
+    // A folder of episodes without a lock is somebody's.
+    let path = dir.path().join("mine");
+    fs::create_dir_all(path.join("episodes")).unwrap();
+    fs::write(path.join("episodes/a.json"), "{}").unwrap();
+    let error = Run::open(&path, Access::Begin, &given, &helpers).unwrap_err();
+    assert!(matches!(error, EvalError::NotEmpty { .. }), "{error}");
+    assert_eq!(files_below(&path).len(), 1);
+}
+
+#[test]
+fn mistakes_leave_nothing_behind() {
+    let source = episode_files(&[TaskId::LowTarget], 1);
+    let dir = tempfile::tempdir().unwrap();
+    let helpers = TestHelpers::new();
+    let path = dir.path().join("run");
+    let good = given(&source, &["turner"]);
+    let file = source.path().join("low_target-0.json");
+    let twin = source.path().join("twin.json");
+    fs::copy(&file, &twin).unwrap();
+    for given in [
+        good.clone(),
+        Given { tasks: Some(vec![TaskId::Shopping]), ..good.clone() },
+        Given { partner: Some("nobody".to_owned()), ..good.clone() },
+        Given { episodes: None, split: "gen:0..2000000".parse().ok(), ..good.clone() },
+    ] {
+        for access in [Access::Begin, Access::Resume] {
+            let error = Run::open(&path, access, &given, &helpers).unwrap_err();
+            assert!(error.is_usage(), "{error}");
+            assert!(!path.exists(), "{error}");
+        }
+    }
+    fs::remove_file(&twin).unwrap();
+    Run::open(&path, Access::Begin, &good, &helpers).unwrap();
+}
+
+#[test]
+fn verify_counts_results_and_compares_the_report() {
+    let source = episode_files(&[TaskId::LowTarget, TaskId::Shopping], 1);
+    let dir = tempfile::tempdir().unwrap();
+    let helpers = TestHelpers::new();
+    let given = Given { seeds: None, ..given(&source, &["none", "turner"]) };
+    let (mut run, _) = Run::open(dir.path(), Access::Begin, &given, &helpers).unwrap();
+    assert!(play(&mut run, 1, &helpers));
+    let verdict =
+        || crate::verify::verify_run(run.folder(), run.options(), &helpers, 2, &|_| ()).unwrap();
+    assert_eq!(verdict().report, ReportState::Absent);
+    assert!(verdict().is_good());
+    let report = crate::report::Report {
+        options: run.options(),
+        results: run.results(),
+        planned: run.planned(),
+        granted: Some(run.granted()),
+        formulas: crate::metrics::FormulaSet::Paper,
+    };
+    crate::report::write_files(run.folder(), &report).unwrap();
+    assert_eq!(verdict().report, ReportState::Compared { altered: Vec::new() });
+    assert_eq!(verdict().coverage.to_string(), "4 of 4 episode runs are finished");
+    for name in ["scores.json", "report.md", "figure.svg"] {
+        let file = run.folder().join(name);
+        let text = fs::read_to_string(&file).unwrap();
+        for other in [text.replacen('0', "1", 1), format!("{text}\n"), String::new()] {
+            fs::write(&file, other).unwrap();
+            assert_eq!(verdict().report, ReportState::Compared { altered: vec![name] });
+            assert!(!verdict().is_good());
+        }
+        fs::write(&file, text).unwrap();
+    }
+    // A line less, and one that says that an episode broke down.
+    let journal = run.folder().results();
+    let lines = fs::read_to_string(&journal).unwrap();
+    let (first, rest) = lines.split_once('\n').unwrap();
+    fs::write(&journal, rest).unwrap();
+    let said = verdict().coverage.to_string();
+    assert!(said.contains("3 of 4 episode runs are finished; missing: 1, first "), "{said}");
+    assert!(!verdict().is_good());
+    let key: RunKey = serde_json::from_str::<RunResult>(first).unwrap().key;
+    let ending = Ending::Error { message: "the episode broke down: as it is told".to_owned() };
+    let broken = serde_json::to_string(&RunResult { key, ending }).unwrap();
+    fs::write(&journal, format!("{broken}\n{rest}")).unwrap();
+    let said = verdict().coverage.to_string();
+    assert!(said.contains("3 of 4 episode runs are finished; broke down: 1, first "), "{said}");
+    assert!(!verdict().is_good());
+    fs::write(&journal, &lines).unwrap();
+    assert!(verdict().is_good());
+
+    // A trace that another chaic wrote concerns the whole run: one line says so.
+    let trace = run.folder().traces().unwrap().remove(1);
+    let text = fs::read_to_string(&trace).unwrap();
+    fs::write(&trace, text.replacen("\"version\":1", "\"version\":99", 1)).unwrap();
+    let error = crate::verify::verify_run(run.folder(), run.options(), &helpers, 2, &|_| ());
+    let error = error.unwrap_err().to_string();
+    assert!(error.contains("is of chaic-trace version 99") && error.contains("use the chaic that"));
+    assert_eq!(error.lines().count(), 1, "{error}");
+}
+
+#[test]
+fn a_replay_of_an_altered_trace_stops_at_the_first_wrong_digest() {
+    let source = episode_files(&[TaskId::LowTarget], 1);
+    let dir = tempfile::tempdir().unwrap();
+    let helpers = TestHelpers::new();
+    let given = Given { seeds: None, ..given(&source, &["turner"]) };
+    let (mut run, _) = Run::open(dir.path(), Access::Begin, &given, &helpers).unwrap();
+    assert!(play(&mut run, 1, &helpers));
+    let path = run.folder().traces().unwrap().remove(0);
+    let whole = crate::trace::read(&path).unwrap().0;
+    let episode = run.folder().episode(&whole.header.key()).unwrap();
+    let replayed = |trace: &crate::trace::Trace| {
+        let mut replay = crate::replay::Replay::new(trace, &episode)?;
+        while replay.step()? {}
+        Ok::<_, EvalError>(())
+    };
+    replayed(&whole).unwrap();
+    let decisions: Vec<usize> = (0..whole.records.len())
+        .filter(|k| matches!(whole.records[*k], crate::trace::Record::Decision(_)))
+        .collect();
+    // What the last decisions lead to shows in no later decision, only in the end.
+    for k in &decisions[..decisions.len() / 2] {
+        let mut altered = whole.clone();
+        if let crate::trace::Record::Decision(decision) = &mut altered.records[*k] {
+            decision.action = match decision.action {
+                Action::TurnLeft => Action::TurnRight,
+                _ => Action::TurnLeft,
+            };
+        }
+        let error = replayed(&altered).unwrap_err().to_string();
+        assert!(error.contains("the trace was altered"), "{k}: {error}");
+        let verdict =
+            crate::verify::verify_trace(run.folder(), run.options(), &helpers, &altered, &path);
+        assert!(verdict.unwrap().is_some(), "{k}");
+        altered = whole.clone();
+        altered.records.remove(*k);
+        assert!(replayed(&altered).is_err(), "{k} removed");
+    }
 }

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use chaic_protocol::Frame;
 
-use crate::error::Result;
+use crate::error::{EvalError, Result};
 use crate::helpers::{self, Helpers};
 use crate::metrics::{Ending, RunKey, RunResult, Tally};
 use crate::play::{Minds, Play, Staging};
@@ -70,7 +70,7 @@ pub(super) struct Crew<'a> {
 enum News {
     Progress(Progress),
     Finished { worker: usize, result: RunResult, time: Duration },
-    Failed(crate::EvalError),
+    Failed(EvalError),
 }
 
 impl Crew<'_> {
@@ -98,7 +98,13 @@ impl Crew<'_> {
                 let work = move || self.work(worker, &next, failed, &sender);
                 let name = format!("chaic-worker-{worker}");
                 let spawned = std::thread::Builder::new().name(name).spawn_scoped(scope, work);
-                spawned.expect("the system has a thread for each job");
+                if let Err(refusal) = spawned {
+                    // Those that run already end with the episodes that they have begun.
+                    failed.store(true, Ordering::Relaxed);
+                    let (n, wanted) = (worker + 1, jobs + n_waiting);
+                    outcome = Err(EvalError::NoThread { n, wanted, refusal });
+                    break;
+                }
             }
             drop(sender);
             for news in receiver {

@@ -1,13 +1,12 @@
 //! Reading a trace, as far as it is whole.
 
 use std::fmt;
-use std::fs::File;
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
 use crate::error::{EvalError, Result};
+use crate::files::read_bounded;
 use crate::trace::{FORMAT, Header, Record, Trace, VERSION};
 
 /// Longest trace that is read, bytes: a thousand times a usual one.
@@ -57,11 +56,8 @@ impl fmt::Display for Warning {
 /// # Errors
 /// If the file can't be read at all, has no whole header, or is of another format or version.
 pub fn read(path: &Path) -> Result<(Trace, Vec<Warning>)> {
-    let mut bytes = Vec::new();
-    let file = File::open(path).map_err(EvalError::io("open", path))?;
     // One byte more than the limit tells a file at the limit from a longer one.
-    let got = file.take(MAX_TRACE_BYTES + 1).read_to_end(&mut bytes);
-    got.map_err(EvalError::io("read", path))?;
+    let bytes = read_bounded(path, MAX_TRACE_BYTES + 1)?;
     parse(&bytes, path)
 }
 

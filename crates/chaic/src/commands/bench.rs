@@ -8,11 +8,11 @@ use chaic_eval::scene_file::Written;
 use comfy_table::{ContentArrangement, Table, presets};
 
 use super::bars;
-use crate::Ended;
 use crate::arguments::{
     BenchCommand, BenchFormat, LookedAt, RenderBenchArguments, SceneBenchArguments, SceneName,
     WorldBenchArguments,
 };
+use crate::exit::Ended;
 use crate::output::{complain, say};
 
 /// Measures what this machine reaches.

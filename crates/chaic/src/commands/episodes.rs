@@ -6,15 +6,15 @@ use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result};
 use chaic_episodes::{Episode, EpisodeError, Split, episodes, find_episode, json_schema};
-use chaic_eval::run::write_whole;
+use chaic_eval::files::{read_episode_file, write_whole};
 use chaic_eval::still;
 use chaic_protocol::TaskId;
 use comfy_table::{ContentArrangement, Table, presets};
 use serde_json::json;
 
 use super::bars;
-use crate::Ended;
 use crate::arguments::{EpisodesCommand, ListFormat};
+use crate::exit::Ended;
 use crate::interrupt;
 use crate::output::{complain, counted, say, say_to_reader};
 
@@ -131,9 +131,9 @@ fn validate(files: &[PathBuf]) -> Result<Ended> {
     let mut n_bad = 0;
     for path in files {
         let name = path.display().to_string();
-        let parsed = match super::read_episode_file(path) {
+        let parsed = match read_episode_file(path) {
             Ok(bytes) => Episode::parse(&bytes, &name).map_err(|e| lines_of(&e)),
-            Err(error) => Err(vec![format!("{error:#}")]),
+            Err(error) => Err(vec![error.to_string()]),
         };
         match parsed {
             Ok(episode) => say(&format!("{name}: fine ({})\n", episode.id()))?,

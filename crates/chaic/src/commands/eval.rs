@@ -6,16 +6,16 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, anyhow, bail};
 use chaic_eval::helpers::{BuiltIn, Helpers};
 use chaic_eval::metrics::FormulaSet;
-use chaic_eval::report::{Format, Report, write_figure, write_files};
-use chaic_eval::run::{Access, Given, Run};
+use chaic_eval::report::{Format, Report, write_files};
+use chaic_eval::run::{Access, Given, Run, RunFolder};
 
 use chaic_llm::Language;
 
 use super::{bars::RunBars, jobs, llm};
-use crate::Ended;
 use crate::arguments::EvalArguments;
+use crate::exit::Ended;
 use crate::interrupt;
-use crate::output::{complain, counted, say};
+use crate::output::{complain, counted, quoted_path, say};
 
 /// Episodes of each task in the small benchmark: with all helpers about two minutes on two cores.
 const QUICK_EPISODES: u32 = 2;
@@ -25,8 +25,8 @@ pub fn run(arguments: &EvalArguments) -> Result<Ended> {
     let (given, name) = given(arguments);
     let path = arguments.out.clone().map_or_else(|| free_folder(name), Ok)?;
     let access = if arguments.resume { Access::Resume } else { Access::Begin };
-    if arguments.resume && !path.join("run.json").exists() {
-        bail!("{} is no run that one could go on with: it has no run.json", path.display());
+    if arguments.resume {
+        RunFolder::check_begun(&path)?;
     }
     let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
     let language = llm::language(arguments, &path, stop)?;
@@ -35,9 +35,6 @@ pub fn run(arguments: &EvalArguments) -> Result<Ended> {
         None => &BuiltIn,
     };
     let (mut run, warnings) = Run::open(&path, access, &given, helpers)?;
-    if let Some(language) = &language {
-        language.attach(&path)?;
-    }
     for warning in warnings {
         complain(&format!("warning: {warning}; that episode is played again"));
     }
@@ -84,17 +81,19 @@ pub fn run(arguments: &EvalArguments) -> Result<Ended> {
 fn finish(run: &Run, began: Instant) -> Result<Ended> {
     let mut text = leave_report(run)?;
     let path = run.folder().path().display();
+    let run_at = quoted_path(run.folder().path());
     let secs = began.elapsed().as_secs();
     let some = run.results().iter().find(|r| r.key.helper == "rhp").or(run.results().first());
     text += &format!("\nPlayed in {} min {:02} s.\n", secs / 60, secs % 60);
     text += &format!("Report:  {path}/report.md, {path}/figure.svg\n");
     if let Some(some) = some.filter(|_| run.options().traces) {
         let (episode, helper) = (&some.key.episode, &some.key.helper);
-        text +=
-            &format!("Replay:  chaic replay {path} {episode} --helper {helper} --out replay.mp4\n");
+        text += &format!(
+            "Replay:  chaic replay {run_at} {episode} --helper {helper} --out replay.mp4\n"
+        );
     }
     if run.options().traces {
-        text += &format!("Verify:  chaic verify {path}\n");
+        text += &format!("Verify:  chaic verify {run_at}\n");
     }
     say(&text)?;
     Ok(if run.extent().errors > 0 { Ended::WithFindings } else { Ended::Well })
@@ -106,10 +105,6 @@ pub(super) fn leave_report(run: &Run) -> Result<String> {
     let (results, granted, formulas) = (run.results(), Some(run.granted()), FormulaSet::Paper);
     let report = Report { options, results, planned, granted, formulas };
     write_files(folder, &report)?;
-    let scores = report.scores();
-    for name in ["figure.svg", "figure.png"] {
-        write_figure(&scores, report.labels(), &folder.join(name))?;
-    }
     Ok(report.text(Format::Table))
 }
 
@@ -160,7 +155,7 @@ fn free_folder(name: &str) -> Result<PathBuf> {
 
 fn how_to_resume(path: &Path, arguments: &EvalArguments) -> String {
     let language = llm::to_resume(&arguments.language);
-    format!("go on with: chaic eval --resume --out {}{language}", path.display())
+    format!("go on with: chaic eval --resume --out {}{language}", quoted_path(path))
 }
 
 /// What an agent says when it breaks down is shown and noted by the run; the usual message would

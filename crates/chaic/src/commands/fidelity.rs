@@ -14,10 +14,10 @@ use indicatif::HumanDuration;
 
 use super::eval::{keep_workers_quiet, leave_report};
 use super::{bars::RunBars, jobs};
-use crate::Ended;
 use crate::arguments::FidelityArguments;
+use crate::exit::Ended;
 use crate::interrupt;
-use crate::output::{complain, say};
+use crate::output::{complain, quoted_path, say};
 
 /// Plays what is missing and writes the document.
 pub fn run(arguments: &FidelityArguments) -> Result<Ended> {
@@ -188,5 +188,5 @@ fn finish(arguments: &FidelityArguments, matrix: &Matrix, doc: &Path) -> Result<
 }
 
 fn how_to_resume(out: &Path) -> String {
-    format!("go on with: chaic fidelity --resume --out {}", out.display())
+    format!("go on with: chaic fidelity --resume --out {}", quoted_path(out))
 }

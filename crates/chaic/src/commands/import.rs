@@ -1,11 +1,11 @@
 //! `chaic import`.
 
 use anyhow::{Context as _, Result};
-use chaic_eval::run::write_whole;
+use chaic_eval::files::write_whole;
 use chaic_import::{Half, OnError, Sources, import};
 
-use crate::Ended;
 use crate::arguments::{ImportCommand, ImportHalf, OriginalArguments};
+use crate::exit::Ended;
 use crate::output::{complain, counted, say};
 
 /// Imports episodes from elsewhere.

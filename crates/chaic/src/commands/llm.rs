@@ -5,10 +5,13 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context as _, Result, bail};
 use chaic_eval::EvalError;
+use chaic_eval::helpers::{NONE, RULES};
 use chaic_eval::replay::find_trace;
 use chaic_eval::run::RunFolder;
 use chaic_eval::trace;
-use chaic_llm::language::{Language, is_language_helper, is_language_partner};
+use chaic_llm::language::{
+    Language, helper_names, is_language_helper, is_language_partner, partner_names,
+};
 use chaic_llm::named::Named;
 use chaic_llm::settings::Settings;
 use chaic_llm::show::{self, Detail};
@@ -16,8 +19,8 @@ use chaic_llm::templates::Templates;
 use chaic_llm::{check, session};
 use chaic_protocol::AgentId;
 
-use crate::Ended;
 use crate::arguments::{EvalArguments, LanguageArguments, LlmCommand};
+use crate::exit::Ended;
 use crate::output::{complain, quoted, say};
 
 /// A flag that nobody raises.
@@ -79,6 +82,7 @@ pub fn language(
     path: &Path,
     stop: &'static AtomicBool,
 ) -> Result<Option<Language>> {
+    check_names(arguments)?;
     let given = &arguments.language;
     // What isn't said is what the run was begun with; a folder that can't be read says so later.
     let begun = arguments.resume.then(|| RunFolder::read(path).ok()).flatten();
@@ -111,6 +115,20 @@ pub fn language(
         (file, _) => named(given).over(file.unwrap_or_default()),
     };
     Ok(Some(Language::live(settings, stop)?))
+}
+
+/// Who names nobody known hears of all names, also of those that ask a language model.
+fn check_names(arguments: &EvalArguments) -> Result<(), EvalError> {
+    let known: Vec<String> = [NONE.to_owned()].into_iter().chain(helper_names()).collect();
+    let mut helpers = arguments.helper.iter().flatten();
+    if let Some(name) = helpers.find(|name| !known.contains(name)) {
+        return Err(EvalError::UnknownHelper { name: name.clone(), known });
+    }
+    let known: Vec<String> = [RULES.to_owned()].into_iter().chain(partner_names()).collect();
+    match arguments.partner.clone().filter(|name| !known.contains(name)) {
+        Some(name) => Err(EvalError::UnknownPartner { name, known }),
+        None => Ok(()),
+    }
 }
 
 /// What is to be said again to go on with a run, of what a run's folder doesn't decide.

@@ -16,8 +16,9 @@ mod bars;
 
 use std::path::Path;
 
-use anyhow::{Context as _, Result};
-use chaic_episodes::{Episode, MAX_EPISODE_BYTES, find_episode};
+use anyhow::Result;
+use chaic_episodes::{Episode, find_episode};
+use chaic_eval::files::read_episode_file;
 
 /// The episode that an argument means: a file if there is one of this name, else an id.
 ///
@@ -25,24 +26,11 @@ use chaic_episodes::{Episode, MAX_EPISODE_BYTES, find_episode};
 /// If there is neither, or the file is no valid episode.
 fn episode(argument: &str) -> Result<Episode> {
     let path = Path::new(argument);
-    if path.is_file() {
+    let is_name = argument.ends_with(".json") || (path.exists() && !path.is_dir());
+    if is_name {
         return Ok(Episode::parse(&read_episode_file(path)?, argument)?);
     }
-    if argument.ends_with(".json") {
-        anyhow::bail!("there is no file {argument}");
-    }
     Ok(find_episode(argument)?)
-}
-
-/// The bytes of a file that may be an episode; of a longer file only so many that it is seen.
-fn read_episode_file(path: &Path) -> Result<Vec<u8>> {
-    use std::io::Read as _;
-    let file =
-        std::fs::File::open(path).with_context(|| format!("can't open {}", path.display()))?;
-    let mut bytes = Vec::new();
-    let read = file.take(MAX_EPISODE_BYTES as u64 + 1).read_to_end(&mut bytes);
-    read.with_context(|| format!("can't read {}", path.display()))?;
-    Ok(bytes)
 }
 
 /// So many threads as the machine has cores, unless the user says otherwise.

@@ -5,8 +5,8 @@ use chaic_eval::helpers::BuiltIn;
 use chaic_eval::rules::RuleSet;
 use chaic_eval::still::{self, Still};
 
-use crate::Ended;
 use crate::arguments::RenderArguments;
+use crate::exit::Ended;
 use crate::output::say;
 
 /// Makes pictures of one moment.

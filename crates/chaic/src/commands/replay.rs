@@ -3,15 +3,18 @@
 use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, bail};
 use chaic_eval::EvalError;
+use chaic_eval::helpers::{BuiltIn, Helpers};
 use chaic_eval::replay::{self, ReplayOptions};
 use chaic_eval::run::RunFolder;
 use chaic_eval::trace;
+use chaic_eval::verify::verify_trace;
+use chaic_llm::Language;
 
-use super::bars;
-use crate::Ended;
+use super::{bars, llm};
 use crate::arguments::ReplayArguments;
+use crate::exit::Ended;
 use crate::interrupt;
 use crate::output::{complain, counted, say};
 
@@ -26,6 +29,11 @@ pub fn run(arguments: &ReplayArguments) -> Result<Ended> {
     let (trace, warnings) = trace::read(&path)?;
     for warning in warnings {
         complain(&format!("warning: {warning}"));
+    }
+    let language = Language::recorded(run, llm::never())?;
+    let helpers = language.as_ref().map_or(&BuiltIn as &dyn Helpers, |l| l);
+    if let Some(difference) = verify_trace(&folder, &options, helpers, &trace, &path)? {
+        bail!("the trace was altered, so no video is made: {difference}");
     }
     let key = trace.header.key();
     let episode = folder.episode(&key)?;

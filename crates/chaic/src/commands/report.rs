@@ -7,8 +7,8 @@ use chaic_eval::report::{Format, Report, without_trace, write_figure};
 use chaic_eval::run::{Item, RunFolder, planned, read_results};
 use chaic_eval::trace;
 
-use crate::Ended;
 use crate::arguments::ReportArguments;
+use crate::exit::Ended;
 use crate::output::{complain, say};
 
 /// Prints the scores of a run.

@@ -3,8 +3,8 @@
 use anyhow::Result;
 use chaic_eval::scene_file::{self, SceneOptions, Written};
 
-use crate::Ended;
 use crate::arguments::SceneCommand;
+use crate::exit::Ended;
 use crate::output::say;
 
 /// Writes scenes for other programs.

@@ -3,12 +3,12 @@
 use anyhow::Result;
 use chaic_eval::helpers::{BuiltIn, Helpers};
 use chaic_eval::run::RunFolder;
-use chaic_eval::verify::verify_run;
+use chaic_eval::verify::{ReportState, Verdict, verify_run};
 use chaic_llm::Language;
 
 use super::{bars, jobs, llm};
-use crate::Ended;
 use crate::arguments::VerifyArguments;
+use crate::exit::Ended;
 use crate::output::{complain, counted, say};
 
 /// Plays the traces of a run again and compares.
@@ -30,16 +30,39 @@ pub fn run(arguments: &VerifyArguments) -> Result<Ended> {
     for mismatch in &verdict.mismatches {
         say(&format!("DIFFERS {mismatch}\n"))?;
     }
-    let (traces, decisions) = (verdict.agreeing, verdict.decisions);
-    if !verdict.mismatches.is_empty() {
-        let n = verdict.mismatches.len();
-        say(&format!("traces that differ: {n} of {}\n", n + traces))?;
-        return Ok(Ended::WithFindings);
-    }
-    if traces == 0 {
+    if verdict.agreeing + verdict.mismatches.len() == 0 {
         anyhow::bail!("{} has no trace to verify", arguments.run.display());
     }
-    let (traces, decisions) = (counted(traces, "trace"), counted(decisions, "decision"));
-    say(&format!("{traces} with {decisions}: all digests agree\n"))?;
-    Ok(Ended::Well)
+    say(&(summary(&verdict) + "\n"))?;
+    Ok(if verdict.is_good() { Ended::Well } else { Ended::WithFindings })
+}
+
+/// What was found in the run, its traces and its report, a line each.
+fn summary(verdict: &Verdict) -> String {
+    let (agreeing, n) = (verdict.agreeing, verdict.mismatches.len());
+    let traces = if n > 0 {
+        format!("traces that differ: {n} of {}", n + agreeing)
+    } else {
+        let (traces, decisions) = (counted(agreeing, "trace"), verdict.decisions);
+        format!("{traces} with {}: all digests agree", counted(decisions, "decision"))
+    };
+    let report = match &verdict.report {
+        ReportState::Absent => "there is no report yet".to_owned(),
+        ReportState::OfOtherVersion(chaic) => {
+            format!("the report is not checked, as chaic {chaic} began the run")
+        }
+        ReportState::Compared { altered } if altered.is_empty() => {
+            "the report is what the results give".to_owned()
+        }
+        ReportState::Compared { altered } => {
+            let names = altered.join(", ");
+            format!("ALTERED {names}: the results give something else")
+        }
+    };
+    // Where its episodes are gone, nobody knows how many there should be.
+    let coverage = match &verdict.coverage {
+        coverage if coverage.planned > 0 => format!("{coverage}\n"),
+        _ => String::new(),
+    };
+    format!("{coverage}{traces}\n{report}")
 }

@@ -7,6 +7,7 @@ use std::process::{Child, Command, Output, Stdio};
 
 use assert_cmd::cargo::cargo_bin;
 
+mod files;
 mod interrupted;
 mod language;
 mod pictures;

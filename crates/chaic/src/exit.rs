@@ -1,0 +1,47 @@
+//! Exit codes; `docs/exit-codes.md` has the same table for users.
+
+use std::process::ExitCode;
+
+use chaic_episodes::SplitError;
+use chaic_eval::EvalError;
+use chaic_llm::error::LlmError;
+
+/// As intended.
+pub const OK: u8 = 0;
+/// It failed, or it found something wrong and said what.
+pub const FAILED: u8 = 1;
+/// What was asked for can't be; the parser of the command line ends with the same.
+pub const USAGE: u8 = 2;
+/// Ended by Ctrl-C: 128 + 2, the number of SIGINT, as shells have it.
+pub const INTERRUPTED: u8 = 130;
+
+/// How a command ended without an error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ended {
+    /// As intended.
+    Well,
+    /// It found something wrong, and has said what.
+    WithFindings,
+    /// By Ctrl-C.
+    Interrupted,
+}
+
+impl From<Ended> for ExitCode {
+    fn from(ended: Ended) -> ExitCode {
+        ExitCode::from(match ended {
+            Ended::Well => OK,
+            Ended::WithFindings => FAILED,
+            Ended::Interrupted => INTERRUPTED,
+        })
+    }
+}
+
+/// The code of an error.
+pub fn of(error: &anyhow::Error) -> ExitCode {
+    let is_usage = match error.downcast_ref() {
+        Some(EvalError::Helpers(inner)) => inner.downcast_ref().is_some_and(LlmError::is_usage),
+        Some(error) => error.is_usage(),
+        None => error.downcast_ref().is_some_and(LlmError::is_usage) || error.is::<SplitError>(),
+    };
+    ExitCode::from(if is_usage { USAGE } else { FAILED })
+}

@@ -81,10 +81,6 @@ fn episodes(
         return Ok(own.take(limit).collect());
     }
     let split: Split = options.split.parse()?;
-    let name = |k: usize| match &split {
-        Split::Generated(seeds) => format!("{task}/gen/{}", seeds.start + k as u64),
-        bundled => format!("{task}/{bundled}/{k:02}"),
-    };
     let horizon = task.info().horizon;
     let n = split.len_per_task().min(limit);
     if n > at_most {
@@ -92,7 +88,7 @@ fn episodes(
             format!("{n} episodes of {task} are too many for one run; give --first or fewer seeds");
         return Err(EvalError::Options(text));
     }
-    Ok((0..n).map(|k| (name(k), horizon)).collect())
+    Ok((0..n).map(|k| (split.episode_id(task, k), horizon)).collect())
 }
 
 /// The episodes in a folder's `.json` files, in the order of their ids.

@@ -9,6 +9,7 @@ use assert_cmd::cargo::cargo_bin;
 
 mod interrupted;
 mod pictures;
+mod splits;
 
 /// Frames of the episodes of these tests.
 const FRAMES: u32 = 80;

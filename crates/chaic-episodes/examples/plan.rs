@@ -1,4 +1,5 @@
-//! Draws episodes from above: `cargo run -p chaic-episodes --example plan -- TASK SEED.. OUT.png`.
+//! Draws episodes from above: `cargo run -p chaic-episodes --example plan -- EPISODE.. OUT.png`, for
+//! example with the episodes `obstacle/test/03` and `obstacle/gen-standard/7`.
 //!
 //! A quick look for authors of generators; walls are dark, furniture colored by kind with a notch
 //! at its front, targets red, other objects orange, containers blue, obstacles magenta, people
@@ -6,9 +7,9 @@
 
 use std::collections::BTreeMap;
 
-use chaic_episodes::{Episode, Split, episodes};
+use chaic_episodes::{Episode, find_episode};
 use chaic_protocol::geom::{forward, rotate_yaw, xz};
-use chaic_protocol::{Role, TaskId, Vec2, Vec3};
+use chaic_protocol::{Role, Vec2, Vec3};
 use chaic_world::{Thing, Wall};
 use image::{Rgb, RgbImage};
 
@@ -122,15 +123,12 @@ fn draw(episode: &Episode) -> RgbImage {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
-    let [task, seeds @ .., out] = &args[..] else {
-        return Err("usage: plan TASK SEED.. OUT.png".into());
+    let [ids @ .., out] = &args[..] else {
+        return Err("usage: plan EPISODE.. OUT.png".into());
     };
-    let task: TaskId = task.parse()?;
     let mut images = Vec::new();
-    for seed in seeds {
-        let seed: u64 = seed.parse()?;
-        let episode =
-            episodes(&Split::Generated(seed..seed + 1), task).next().ok_or("no seed")??;
+    for id in ids {
+        let episode = find_episode(id)?;
         let mut counts: BTreeMap<&str, u32> = BTreeMap::new();
         for thing in &episode.setup().things {
             *counts.entry(thing.class.name()).or_default() += 1;

@@ -1,4 +1,5 @@
-//! Generates and checks many episodes: `cargo run --release -p chaic-episodes --example soak -- 1000`.
+//! Generates and checks many episodes: `cargo run --release -p chaic-episodes --example soak -- 1000`, and
+//! `-- 1000 standard` with the settings of the standard split.
 //!
 //! Every task is made for so many seeds; each episode must be valid, survive its own file, and
 //! come out the same twice. Prints what the episodes are like.
@@ -7,18 +8,18 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use chaic_episodes::house::House;
-use chaic_episodes::{Episode, Split, episodes};
+use chaic_episodes::{Episode, Settings, Split, episodes};
 use chaic_protocol::{Role, TaskId};
 use chaic_world::RoomKind;
 
 /// How houses come out, and what they are refused for.
-fn houses(n: u64) {
+fn houses(n: u64, settings: Settings) {
     let mut results: BTreeMap<&str, u32> = BTreeMap::new();
     let mut places: BTreeMap<usize, u32> = BTreeMap::new();
     let mut most = 0;
     for seed in 0..n {
         for attempt in 0..u64::MAX {
-            let house = House::attempt(seed, attempt);
+            let house = House::attempt(seed, settings, attempt);
             *results.entry(house.as_ref().map_or_else(|why| *why, |_| "fit")).or_default() += 1;
             if let Ok(house) = house {
                 *places.entry(house.count_low_places() / 10 * 10).or_default() += 1;
@@ -34,7 +35,14 @@ fn houses(n: u64) {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let n: u64 = std::env::args().nth(1).map_or(Ok(100), |n| n.parse())?;
     let mut failures = 0;
-    houses(n);
+    let settings = match std::env::args().nth(2).as_deref() {
+        None => Settings::PAPER,
+        Some("standard") => Settings::STANDARD,
+        Some(other) => {
+            return Err(format!("no settings `{other}`; write standard, or nothing").into());
+        }
+    };
+    houses(n, settings);
     let mut rooms: BTreeMap<usize, u32> = BTreeMap::new();
     let mut hosts: BTreeMap<&str, u32> = BTreeMap::new();
     for task in TaskId::all() {
@@ -43,7 +51,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut parse_spent = 0.0;
         for seed in 0..n {
             let start = Instant::now();
-            let episode = episodes(&Split::Generated(seed..seed + 1), task).next();
+            let split = match settings {
+                Settings::STANDARD => Split::GeneratedStandard(seed..seed + 1),
+                _ => Split::Generated(seed..seed + 1),
+            };
+            let episode = episodes(&split, task).next();
             let took = start.elapsed().as_secs_f64();
             spent += took;
             slowest = slowest.max(took);
@@ -72,9 +84,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             parse_spent += start.elapsed().as_secs_f64();
             let setup = episode.setup();
             if seed % 50 == 0
-                && chaic_episodes::generate(
+                && chaic_episodes::generate_with(
                     task,
                     chaic_episodes::Seeds { place: seed, episode: seed },
+                    settings,
                 )
                 .as_ref()
                     != Ok(setup)

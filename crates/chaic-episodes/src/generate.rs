@@ -5,7 +5,7 @@ use chaic_protocol::task::SceneKind;
 use chaic_world::Setup;
 
 use crate::format::GeneratorInfo;
-use crate::{Problem, house, street, yard};
+use crate::{Problem, Settings, house, street, yard};
 
 /// Seeds from here on belong to the bundled episodes; a multiple of 12, so that a seed modulo 12
 /// is the place of its episode within task and split.
@@ -40,26 +40,39 @@ pub struct GenerateError {
     pub last: String,
 }
 
-/// The episode's beginning for these seeds: valid, and the same on every machine.
+/// An episode's beginning of the paper's shape: valid, and the same on every machine.
 ///
 /// # Errors
 /// [`GenerateError`] if no attempt led to a valid setup.
 pub fn generate(task: TaskId, seeds: Seeds) -> Result<Setup, GenerateError> {
+    generate_with(task, seeds, Settings::PAPER)
+}
+
+/// The same with other settings.
+///
+/// # Errors
+/// [`GenerateError`] if no attempt led to a valid setup.
+pub fn generate_with(
+    task: TaskId,
+    seeds: Seeds,
+    settings: Settings,
+) -> Result<Setup, GenerateError> {
     match task.info().scene {
-        SceneKind::House => house::generate(task, seeds),
-        SceneKind::Street => street::generate(seeds),
-        SceneKind::Yard => yard::generate(seeds),
+        SceneKind::House => house::generate(task, seeds, settings),
+        SceneKind::Street => street::generate(seeds, settings),
+        SceneKind::Yard => yard::generate(seeds, settings),
     }
 }
 
 /// Who makes episodes of this task.
-pub(crate) fn generator_info(task: TaskId, seeds: Seeds) -> GeneratorInfo {
+pub(crate) fn generator_info(task: TaskId, seeds: Seeds, settings: Settings) -> GeneratorInfo {
     let (name, version) = match task.info().scene {
         SceneKind::House => ("house", house::VERSION),
         SceneKind::Street => ("street", street::VERSION),
         SceneKind::Yard => ("yard", yard::VERSION),
     };
-    GeneratorInfo { name: name.to_owned(), version, seed: seeds.episode, place_seed: seeds.place }
+    let (seed, place_seed) = (seeds.episode, seeds.place);
+    GeneratorInfo { name: name.to_owned(), version, seed, place_seed, settings }
 }
 
 /// Takes the first valid setup of at most `attempts` tries; a try that can't go on says why.

@@ -3,7 +3,7 @@
 use std::f32::consts::PI;
 
 use chaic_protocol::briefing::Goal;
-use chaic_protocol::geom::Rect;
+use chaic_protocol::geom::{Rect, wrap_angle};
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{ClassId, TaskId, Vec2, Vec3};
 use chaic_world::{Floor, FloorMaterial, Person, Room, RoomKind, Setup, Thing};
@@ -145,6 +145,19 @@ pub(crate) fn ground(
         strip(pavement_z, FloorMaterial::Pavement, shade([178, 172, 162], rng)),
         strip(road_z, FloorMaterial::Asphalt, shade([92, 94, 98], rng)),
     ]
+}
+
+/// Mirrors positions and headings at the plane of this x; what they are of keeps its shape.
+pub(crate) fn mirror(things: &mut [Thing], people: &mut [Person], at_x: f32) {
+    let mirrored = |x: f32| mm(2.0 * at_x - x);
+    for thing in things {
+        thing.position.x = mirrored(thing.position.x);
+        thing.yaw_rad = mm(wrap_angle(-thing.yaw_rad));
+    }
+    for person in people {
+        person.pose.position.x = mirrored(person.pose.position.x);
+        person.pose.yaw_rad = mm(wrap_angle(-person.pose.yaw_rad));
+    }
 }
 
 /// One of 24 headings.

@@ -1,4 +1,4 @@
-//! The bundled benchmark, and episodes without end.
+//! The bundled benchmark, the standard split, and episodes without end.
 //!
 //! The 192 bundled episodes are data, a line each in `data/train.jsonl` and `data/test.jsonl`, in
 //! the order of the paper's tasks. `cargo run --release -p chaic-episodes --example bundle` writes
@@ -12,7 +12,9 @@ use chaic_protocol::TaskId;
 use chaic_protocol::task::TASKS;
 
 use crate::format::{Episode, EpisodeError};
-use crate::generate::{FIRST_BUNDLED_SEED, GenerateError, Seeds, generate, generator_info};
+use crate::generate::{FIRST_BUNDLED_SEED, GenerateError, Seeds, generate_with, generator_info};
+use crate::standard::{STANDARD_PER_TASK, standard, standard_seeds};
+use crate::{Settings, generate};
 
 /// Episodes of each task in each of the bundled splits (paper, "Dataset Construction").
 pub const BUNDLED_PER_TASK: usize = 12;
@@ -22,31 +24,53 @@ const PLACES_PER_SPLIT: u64 = 6;
 static TRAIN: &str = include_str!("../data/train.jsonl");
 static TEST: &str = include_str!("../data/test.jsonl");
 
-/// A set of episodes: `train`, `test` or `gen:A..B`.
+/// A set of episodes: `train`, `test`, `standard`, `gen:A..B` or `gen-standard:A..B`.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Split {
     /// The bundled episodes to learn from.
     Train,
     /// The bundled episodes to be compared on.
     Test,
+    /// 100 generated episodes a task that are the same for everybody, to rank helpers on.
+    Standard,
     /// Generated episodes of these seeds; a seed is the number of its episode.
     Generated(Range<u64>),
+    /// The same, made with the settings of the standard split.
+    GeneratedStandard(Range<u64>),
 }
 
 /// Why there is no such episode.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SplitError {
     /// The text names no split.
-    #[error("no split `{text}`; write train, test or gen:A..B with A < B <= {FIRST_BUNDLED_SEED}")]
+    #[error(
+        "no split `{text}`; write train, test, standard, gen:A..B or gen-standard:A..B with \
+         A < B <= {FIRST_BUNDLED_SEED}"
+    )]
     Syntax {
         /// What was written.
         text: String,
     },
     /// The text names no episode.
-    #[error("no episode `{id}`; write for example obstacle/test/07 or obstacle/gen/123")]
+    #[error(
+        "no episode `{id}`; write for example obstacle/test/07, obstacle/standard/007 or obstacle/gen/123"
+    )]
     NoSuchEpisode {
         /// What was written.
         id: String,
+    },
+    /// This build makes another episode than the one that the standard split names.
+    #[error(
+        "{id}: this build makes an episode of digest {found}, the standard split names {expected}; \
+         its generators are not those of the split: report this"
+    )]
+    NotStandard {
+        /// The episode.
+        id: String,
+        /// The digest that is committed.
+        expected: String,
+        /// The digest of what was made.
+        found: String,
     },
     /// The generator failed.
     #[error(transparent)]
@@ -61,7 +85,11 @@ impl fmt::Display for Split {
         match self {
             Split::Train => f.pad("train"),
             Split::Test => f.pad("test"),
+            Split::Standard => f.pad("standard"),
             Split::Generated(seeds) => f.pad(&format!("gen:{}..{}", seeds.start, seeds.end)),
+            Split::GeneratedStandard(seeds) => {
+                f.pad(&format!("gen-standard:{}..{}", seeds.start, seeds.end))
+            }
         }
     }
 }
@@ -70,18 +98,20 @@ impl FromStr for Split {
     type Err = SplitError;
 
     fn from_str(text: &str) -> Result<Split, SplitError> {
-        let seeds = || {
-            let (a, b) = text.strip_prefix("gen:")?.split_once("..")?;
+        let seeds = |range: &str| {
+            let (a, b) = range.split_once("..")?;
             let (a, b) = (a.parse().ok()?, b.parse().ok()?);
             (a < b && b <= FIRST_BUNDLED_SEED).then_some(a..b)
         };
-        match text {
-            "train" => Ok(Split::Train),
-            "test" => Ok(Split::Test),
-            _ => seeds()
-                .map(Split::Generated)
-                .ok_or_else(|| SplitError::Syntax { text: text.to_owned() }),
-        }
+        let split = match text.split_once(':') {
+            None if text == "train" => Some(Split::Train),
+            None if text == "test" => Some(Split::Test),
+            None if text == "standard" => Some(Split::Standard),
+            Some(("gen", range)) => seeds(range).map(Split::Generated),
+            Some(("gen-standard", range)) => seeds(range).map(Split::GeneratedStandard),
+            _ => None,
+        };
+        split.ok_or_else(|| SplitError::Syntax { text: text.to_owned() })
     }
 }
 
@@ -90,7 +120,10 @@ impl Split {
     pub fn len_per_task(&self) -> usize {
         match self {
             Split::Train | Split::Test => BUNDLED_PER_TASK,
-            Split::Generated(seeds) => seeds.end.saturating_sub(seeds.start) as usize,
+            Split::Standard => STANDARD_PER_TASK,
+            Split::Generated(seeds) | Split::GeneratedStandard(seeds) => {
+                seeds.end.saturating_sub(seeds.start) as usize
+            }
         }
     }
 
@@ -98,18 +131,41 @@ impl Split {
     /// [`GeneratorInfo::environment`](crate::GeneratorInfo::environment) has it, without making the
     /// episode.
     pub fn environment(&self, task: TaskId, k: u64) -> String {
-        generator_info(task, self.seeds(task, k)).environment()
+        generator_info(task, self.seeds(task, k), self.settings()).environment()
+    }
+
+    /// With which settings its episodes are made.
+    fn settings(&self) -> Settings {
+        match self {
+            Split::Train | Split::Test | Split::Generated(_) => Settings::PAPER,
+            Split::Standard | Split::GeneratedStandard(_) => Settings::STANDARD,
+        }
     }
 
     fn seeds(&self, task: TaskId, k: u64) -> Seeds {
         let base = match self {
             Split::Train => FIRST_BUNDLED_SEED,
             Split::Test => 2 * FIRST_BUNDLED_SEED,
-            Split::Generated(seeds) => return own_place(seeds.start + k),
+            Split::Standard => return standard_seeds(task, k),
+            Split::Generated(seeds) | Split::GeneratedStandard(seeds) => {
+                return own_place(seeds.start + k);
+            }
         };
         // All indoor tasks share the houses of a split, so that they can be compared.
         let place = base + k % PLACES_PER_SPLIT;
         Seeds { place, episode: base + (task_index(task) * BUNDLED_PER_TASK) as u64 + k }
+    }
+
+    /// The name of its `k`-th episode of a task, which [`find_episode`] takes.
+    pub fn episode_id(&self, task: TaskId, k: usize) -> String {
+        match self {
+            Split::Train | Split::Test => format!("{task}/{self}/{k:02}"),
+            Split::Standard => format!("{task}/{self}/{k:03}"),
+            Split::Generated(seeds) => format!("{task}/gen/{}", seeds.start + k as u64),
+            Split::GeneratedStandard(seeds) => {
+                format!("{task}/gen-standard/{}", seeds.start + k as u64)
+            }
+        }
     }
 }
 
@@ -123,11 +179,14 @@ pub fn episodes(
     (0..split.len_per_task() as u64).map(move |k| match &split {
         Split::Train => bundled(TRAIN, "train", task, k),
         Split::Test => bundled(TEST, "test", task, k),
-        Split::Generated(seeds) => generated(task, seeds.start + k),
+        Split::Standard => standard(task, k),
+        Split::Generated(seeds) => generated(task, seeds.start + k, Settings::PAPER),
+        Split::GeneratedStandard(seeds) => generated(task, seeds.start + k, Settings::STANDARD),
     })
 }
 
-/// The episode of this name: `TASK/train/NN`, `TASK/test/NN` or `TASK/gen/SEED`.
+/// The episode of this name: `TASK/train/NN`, `TASK/test/NN`, `TASK/standard/NNN`, `TASK/gen/SEED` or
+/// `TASK/gen-standard/SEED`.
 ///
 /// # Errors
 /// [`SplitError::NoSuchEpisode`] if the name is none.
@@ -140,7 +199,11 @@ pub fn find_episode(id: &str) -> Result<Episode, SplitError> {
     match split {
         "train" if number < BUNDLED_PER_TASK as u64 => bundled(TRAIN, split, task, number),
         "test" if number < BUNDLED_PER_TASK as u64 => bundled(TEST, split, task, number),
-        "gen" if number < FIRST_BUNDLED_SEED => generated(task, number),
+        "standard" if number < STANDARD_PER_TASK as u64 => standard(task, number),
+        "gen" if number < FIRST_BUNDLED_SEED => generated(task, number, Settings::PAPER),
+        "gen-standard" if number < FIRST_BUNDLED_SEED => {
+            generated(task, number, Settings::STANDARD)
+        }
         _ => Err(no_such()),
     }
 }
@@ -152,20 +215,22 @@ fn bundled(text: &str, split: &str, task: TaskId, k: u64) -> Result<Episode, Spl
     Ok(Episode::parse_trusted(line, &id)?)
 }
 
-fn task_index(task: TaskId) -> usize {
+pub(crate) fn task_index(task: TaskId) -> usize {
     TASKS.iter().position(|t| t.id == task).expect("the table lists every task")
 }
 
 /// Generated episodes share no surroundings.
-fn own_place(seed: u64) -> Seeds {
+pub(crate) fn own_place(seed: u64) -> Seeds {
     Seeds { place: seed, episode: seed }
 }
 
-fn generated(task: TaskId, seed: u64) -> Result<Episode, SplitError> {
+fn generated(task: TaskId, seed: u64, settings: Settings) -> Result<Episode, SplitError> {
     let seeds = own_place(seed);
-    let setup = generate(task, seeds)?;
-    let id = format!("{task}/gen/{seed}");
-    Ok(Episode::trusted(id, "generated".to_owned(), generator_info(task, seeds), setup))
+    let setup = generate_with(task, seeds, settings)?;
+    let word = if settings == Settings::STANDARD { "gen-standard" } else { "gen" };
+    let id = format!("{task}/{word}/{seed}");
+    let generator = generator_info(task, seeds, settings);
+    Ok(Episode::trusted(id, "generated".to_owned(), generator, setup))
 }
 
 /// The text of the two bundled files.
@@ -198,8 +263,8 @@ fn regenerate(split: &Split) -> Result<String, GenerateError> {
         for k in 0..BUNDLED_PER_TASK as u64 {
             let seeds = split.seeds(info.id, k);
             let setup = generate(info.id, seeds)?;
-            let id = format!("{}/{split}/{k:02}", info.name);
-            let generator = generator_info(info.id, seeds);
+            let id = split.episode_id(info.id, k as usize);
+            let generator = generator_info(info.id, seeds, Settings::PAPER);
             text += &Episode::trusted(id, split.to_string(), generator, setup).to_json_line();
             text.push('\n');
         }

@@ -9,6 +9,7 @@ use chaic_protocol::rng::Stream;
 use chaic_protocol::{ClassId, TaskId, Vec2, Vec3};
 use chaic_world::{Person, Setup, Thing, top_surfaces};
 
+use crate::Settings;
 use crate::generate::{GenerateError, Seeds, first_valid};
 use crate::outdoors::{self, OutdoorParts, Scenery, ground};
 use crate::solid::{mm, mm3};
@@ -33,12 +34,22 @@ const SHELF_SCALE: [f32; 3] = [1.25, 1.0, 1.5];
 const SLOTS_M: [f32; 3] = [0.0, -0.4, 0.4];
 /// Between partner and helper at the start, metres.
 const PEOPLE_APART_M: f32 = 5.0;
+/// How far the shops of one side, and each for itself, may stand from the paper's places along the
+/// road and how far back, metres (ours: tents of 2.4 m every 5 m stay apart, and people start
+/// between them).
+const SIDE_SHIFT_M: f32 = 1.0;
+const SHOP_SHIFT_M: f32 = 0.7;
+const SHOP_BACK_M: f32 = 0.3;
+/// How far the hydrant may stand from the paper's place, metres: still before the rider's house,
+/// which goes with it, and inside the bounds.
+const HYDRANT_SHIFT_M: f32 = 1.5;
 /// How many shops have a basket.
 const BASKETS: usize = 3;
 const BASKET_CLASSES: [&str; 4] =
     ["bamboo_basket", "plastic_basket", "wicker_basket", "wood_basket"];
 
 /// A shop: its tent's middle and what it sells.
+#[derive(Clone, Copy)]
 struct Shop {
     at: [f32; 2],
     stock: &'static [(&'static str, usize)],
@@ -61,41 +72,85 @@ impl Shop {
     }
 }
 
+/// Where a street has its shops and its goal place.
+struct Layout {
+    shops: [Shop; 6],
+    /// Which of a shop's shelves is listed first, and may bear a basket: the one at lower x, or not.
+    first_shelf: [f32; 6],
+    hydrant: [f32; 2],
+    /// Whether the rider's house is at the other end of the road.
+    is_mirrored: bool,
+}
+
+impl Layout {
+    /// The original's, in every episode.
+    const PAPER: Layout =
+        Layout { shops: SHOPS, first_shelf: [-1.0; 6], hydrant: HYDRANT, is_mirrored: false };
+
+    /// Another one: who sells what where, and where along the road the shops and the house are.
+    fn varied(rng: &mut Stream) -> Layout {
+        let mut stocks = SHOPS.map(|shop| shop.stock);
+        rng.shuffle(&mut stocks);
+        let mut side = || rng.range(-SIDE_SHIFT_M, SIDE_SHIFT_M);
+        let shift_m = [side(), side()];
+        let mut shops = SHOPS;
+        for (shop, stock) in shops.iter_mut().zip(stocks) {
+            shop.stock = stock;
+            let row_m = shift_m[usize::from(shop.at[1] > 0.0)];
+            shop.at[0] += row_m + rng.range(-SHOP_SHIFT_M, SHOP_SHIFT_M);
+            // Away from the road only, which stays as wide as it is.
+            shop.at[1] += shop.at[1].signum() * rng.range(0.0, SHOP_BACK_M);
+        }
+        let first_shelf = shops.map(|_| if rng.chance(0.5) { -1.0 } else { 1.0 });
+        let hydrant = [HYDRANT[0] + rng.range(-HYDRANT_SHIFT_M, HYDRANT_SHIFT_M), HYDRANT[1]];
+        Layout { shops, first_shelf, hydrant, is_mirrored: rng.chance(0.5) }
+    }
+}
+
 /// A shopping episode of these seeds.
 ///
 /// # Errors
 /// [`GenerateError`] if no attempt led to a valid setup.
-pub fn generate(seeds: Seeds) -> Result<Setup, GenerateError> {
-    first_valid(TaskId::Shopping, seeds, ATTEMPTS, |attempt| setup(seeds, attempt))
+pub fn generate(seeds: Seeds, settings: Settings) -> Result<Setup, GenerateError> {
+    first_valid(TaskId::Shopping, seeds, ATTEMPTS, |attempt| setup(seeds, settings, attempt))
 }
 
-fn setup(seeds: Seeds, attempt: u64) -> Result<Setup, &'static str> {
+fn setup(seeds: Seeds, settings: Settings, attempt: u64) -> Result<Setup, &'static str> {
     let stream = |purpose: &str| Stream::new(seeds.episode, purpose, attempt);
-    let people = people(&mut stream("shopping/people"))?;
+    let mut people = people(&mut stream("shopping/people"))?;
+    let layout = if settings.varied_layout {
+        Layout::varied(&mut Stream::new(seeds.place, "street/layout", attempt / PLACE_ATTEMPTS))
+    } else {
+        Layout::PAPER
+    };
     // The place stays the same for many attempts, so that episodes share it.
     let scenery_rng = &mut Stream::new(seeds.place, "street/scenery", attempt / PLACE_ATTEMPTS);
     let floors = ground(BOUNDS, ROAD_Z, PAVEMENT_Z, scenery_rng);
     let mut scenery = Scenery::new(vec![Rect::new([8.0, ROAD_Z[0]], [22.0, ROAD_Z[1]])]);
-    let hydrant = scenery.put("fire_hydrant", HYDRANT, PI, 0);
-    let shelves = shops(&mut scenery, scenery_rng);
-    surroundings(&mut scenery, scenery_rng);
+    let hydrant = scenery.put("fire_hydrant", layout.hydrant, PI, 0);
+    let shelves = shops(&mut scenery, &layout, scenery_rng);
+    surroundings(&mut scenery, layout.hydrant, scenery_rng);
 
     let mut things = scenery.things;
+    if layout.is_mirrored {
+        outdoors::mirror(&mut things, &mut people, BOUNDS.center().x);
+    }
     things.push(bicycle(&people[0]));
-    stock(&mut things, &shelves, &mut stream("shopping/stock"));
+    stock(&mut things, &layout.shops, &shelves, &mut stream("shopping/stock"));
     let goal = goal(seeds.episode, &mut stream("shopping/goal"));
     let parts = OutdoorParts { floors, things, people, goal, goal_place: hydrant };
     Ok(outdoors::setup(TaskId::Shopping, seeds.episode, BOUNDS, parts))
 }
 
 /// Tents with two shelves each; returns per shop which things its shelves are.
-fn shops(scenery: &mut Scenery, rng: &mut Stream) -> Vec<[usize; 2]> {
+fn shops(scenery: &mut Scenery, layout: &Layout, rng: &mut Stream) -> Vec<[usize; 2]> {
     let mut shelves = Vec::new();
-    for (k, shop) in SHOPS.iter().enumerate() {
+    for (k, shop) in layout.shops.iter().enumerate() {
         let variant = rng.below(8) + k;
         scenery.put("tent", shop.at, shop.yaw_rad(), variant);
         let towards_road = if shop.at[1] > 0.0 { -SHELF_OFFSET_M[1] } else { SHELF_OFFSET_M[1] };
-        shelves.push([-1.0, 1.0].map(|side| {
+        let first = layout.first_shelf[k];
+        shelves.push([first, -first].map(|side| {
             let at = [shop.at[0] + side * SHELF_OFFSET_M[0], shop.at[1] + towards_road];
             // The shelf's long side is its z.
             let i = scenery.put("wood_shelving", at, FRAC_PI_2, 0);
@@ -107,8 +162,8 @@ fn shops(scenery: &mut Scenery, rng: &mut Stream) -> Vec<[usize; 2]> {
 }
 
 /// The rider's house, its neighbors, and what stands along the road.
-fn surroundings(scenery: &mut Scenery, rng: &mut Stream) {
-    scenery.put("house_front", [HYDRANT[0], -8.05], PI, rng.below(8));
+fn surroundings(scenery: &mut Scenery, hydrant: [f32; 2], rng: &mut Stream) {
+    scenery.put("house_front", [hydrant[0], -8.05], PI, rng.below(8));
     scenery.houses(rng, [7.0, 30.0], -8.8, PI);
     scenery.houses(rng, [-8.0, 30.0], 7.4, 0.0);
     let fence = rng.below(8);
@@ -135,12 +190,12 @@ fn surroundings(scenery: &mut Scenery, rng: &mut Stream) {
 }
 
 /// Puts the goods of all shops, and baskets on the first shelves of three.
-fn stock(things: &mut Vec<Thing>, shelves: &[[usize; 2]], rng: &mut Stream) {
-    let mut with_basket: Vec<usize> = (0..SHOPS.len()).collect();
+fn stock(things: &mut Vec<Thing>, shops: &[Shop], shelves: &[[usize; 2]], rng: &mut Stream) {
+    let mut with_basket: Vec<usize> = (0..shops.len()).collect();
     rng.shuffle(&mut with_basket);
     let mut baskets = BASKET_CLASSES;
     rng.shuffle(&mut baskets);
-    for (k, shop) in SHOPS.iter().enumerate() {
+    for (k, shop) in shops.iter().enumerate() {
         let basket = with_basket.iter().position(|s| *s == k).filter(|n| *n < BASKETS);
         let mut slots: Vec<(usize, usize, f32)> = Vec::new();
         for shelf in 0..2 {

@@ -11,6 +11,7 @@ use chaic_protocol::rng::Stream;
 use chaic_protocol::{ClassId, TaskId, Vec2, Vec3};
 use chaic_world::{Person, Setup, Thing};
 
+use crate::Settings;
 use crate::generate::{FIRST_BUNDLED_SEED, GenerateError, Seeds, first_valid};
 use crate::outdoors::{self, OutdoorParts, Scenery, ground, heading, is_clear};
 use crate::solid::{mm, plan_bounds};
@@ -28,6 +29,9 @@ const PAVEMENT_Z: [f32; 2] = [-4.6, 3.4];
 /// Where furniture and people are at the start.
 const PLACES: Rect = Rect { min: Vec2::new(-1.5, -2.75), max: Vec2::new(5.5, 1.25) };
 const TRUCK: [f32; 2] = [14.0, 0.0];
+/// How far the truck may stand from the paper's place along and across the road, metres: still about
+/// 10 m from the furniture (paper), and on the road.
+const TRUCK_SHIFT_M: [f32; 2] = [1.5, 0.9];
 const N_PIECES: usize = 5;
 /// From a piece's middle to the others, metres (facts S9.2).
 const PIECE_CLEAR_M: f32 = 1.25;
@@ -58,14 +62,16 @@ const LINE_UPS: [[&str; N_PIECES]; 12] = [
 ///
 /// # Errors
 /// [`GenerateError`] if no attempt led to a valid setup.
-pub fn generate(seeds: Seeds) -> Result<Setup, GenerateError> {
-    let line_up = line_up(seeds.episode);
-    first_valid(TaskId::MovingHouse, seeds, ATTEMPTS, |attempt| setup(seeds, &line_up, attempt))
+pub fn generate(seeds: Seeds, settings: Settings) -> Result<Setup, GenerateError> {
+    let line_up = line_up(seeds.episode, settings);
+    first_valid(TaskId::MovingHouse, seeds, ATTEMPTS, |attempt| {
+        setup(seeds, settings, &line_up, attempt)
+    })
 }
 
 /// The original's line-up for a bundled episode, a random one for any other.
-fn line_up(seed: u64) -> Vec<ClassId> {
-    if seed >= FIRST_BUNDLED_SEED {
+fn line_up(seed: u64, settings: Settings) -> Vec<ClassId> {
+    if seed >= FIRST_BUNDLED_SEED && !settings.varied_layout {
         return LINE_UPS[(seed % 12) as usize].map(ClassId::named).to_vec();
     }
     let is_furniture = |c: &ClassId| c.info().sets.contains(&TargetSet::Furniture);
@@ -74,20 +80,36 @@ fn line_up(seed: u64) -> Vec<ClassId> {
     (0..N_PIECES).map(|_| all[rng.below(all.len())]).collect()
 }
 
-fn setup(seeds: Seeds, line_up: &[ClassId], attempt: u64) -> Result<Setup, &'static str> {
+fn setup(
+    seeds: Seeds,
+    settings: Settings,
+    line_up: &[ClassId],
+    attempt: u64,
+) -> Result<Setup, &'static str> {
     let stream = |purpose: &str| Stream::new(seeds.episode, purpose, attempt);
-    let pieces = pieces(line_up, &mut stream("moving_house/pieces"))?;
-    let people = people(&pieces, &mut stream("moving_house/people"))?;
+    let mut pieces = pieces(line_up, &mut stream("moving_house/pieces"))?;
+    let mut people = people(&pieces, &mut stream("moving_house/people"))?;
     // The place stays the same for many attempts, so that episodes share it.
     let scenery_rng = &mut Stream::new(seeds.place, "yard/scenery", attempt / PLACE_ATTEMPTS);
     let floors = ground(BOUNDS, ROAD_Z, PAVEMENT_Z, scenery_rng);
     let keep_clear = Rect::new([-4.0, ROAD_Z[0]], [18.0, ROAD_Z[1]]);
     let mut scenery = Scenery::new(vec![keep_clear]);
     // The cab looks along +x, the open rear towards the furniture.
-    let truck = scenery.put("truck", TRUCK, -FRAC_PI_2, 0);
+    let layout_rng = &mut Stream::new(seeds.place, "yard/layout", attempt / PLACE_ATTEMPTS);
+    let (mut shift, mut is_mirrored) = ([0.0; 2], false);
+    if settings.varied_layout {
+        shift = TRUCK_SHIFT_M.map(|m| layout_rng.range(-m, m));
+        is_mirrored = layout_rng.chance(0.5);
+    }
+    let at = [TRUCK[0] + shift[0], TRUCK[1] + shift[1]];
+    let truck = scenery.put("truck", at, -FRAC_PI_2, 0);
     surroundings(&mut scenery, scenery_rng);
 
     let mut things = scenery.things;
+    if is_mirrored {
+        outdoors::mirror(&mut things, &mut [], BOUNDS.center().x);
+        outdoors::mirror(&mut pieces, &mut people, BOUNDS.center().x);
+    }
     things.extend(pieces);
     let mut targets: Vec<(ClassId, u32)> = Vec::new();
     for class in line_up {

@@ -99,7 +99,7 @@ pub struct EvalArguments {
     /// Helpers, separated by commas: none, random, rhp, oracle, follow; llm, llm-told, vlm, vlm-told.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub helper: Option<Vec<String>>,
-    /// Episodes: test, train or gen:A..B.
+    /// Episodes: test, train, standard, gen:A..B or gen-standard:A..B.
     #[arg(long)]
     pub split: Option<Split>,
     /// Play the episode files (*.json) of this folder instead of a split.
@@ -294,7 +294,7 @@ pub struct RenderArguments {
 pub enum EpisodesCommand {
     /// List the episodes of a split.
     List {
-        /// test, train or gen:A..B.
+        /// test, train, standard, gen:A..B or gen-standard:A..B.
         #[arg(long, default_value = "test")]
         split: Split,
         /// Tasks, separated by commas, or `all`.
@@ -320,18 +320,25 @@ pub enum EpisodesCommand {
         /// The task.
         #[arg(long)]
         task: TaskId,
-        /// Their seeds, A..B.
+        /// Their seeds, A..B: short for --split gen:A..B.
         #[arg(long, value_name = "A..B", value_parser = seed_range)]
-        seeds: Range<u64>,
+        #[arg(conflicts_with = "split", required_unless_present = "split")]
+        seeds: Option<Range<u64>>,
+        /// standard, gen:A..B, gen-standard:A..B, or a bundled split.
+        #[arg(long)]
+        split: Option<Split>,
         /// The folder for the files.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
     },
-    /// Check episode files; exit code 1 if one can't be played.
+    /// Check episode files, or all episodes of a split; exit code 1 if one can't be played.
     Validate {
         /// The files.
-        #[arg(required = true)]
+        #[arg(required_unless_present = "split", conflicts_with = "split")]
         files: Vec<PathBuf>,
+        /// A split instead; of standard each episode must have its committed digest, too.
+        #[arg(long)]
+        split: Option<Split>,
     },
     /// Print the JSON schema of an episode file.
     Schema,

@@ -10,6 +10,7 @@ use chaic_world::Setup;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::Settings;
 use crate::validate::{playable, validate};
 
 /// Longest episode file that is read, bytes: a hundred times a bundled episode.
@@ -34,6 +35,9 @@ pub struct GeneratorInfo {
     pub seed: u64,
     /// The seed of the surroundings: walls, furniture, scenery.
     pub place_seed: u64,
+    /// What it was asked for besides; absent for the paper's shape.
+    #[serde(default, skip_serializing_if = "Settings::is_paper")]
+    pub settings: Settings,
 }
 
 impl GeneratorInfo {

@@ -16,7 +16,7 @@ const COUNT: [usize; 2] = [3, 5];
 /// Choices of doorways that are compared.
 const CHOICES: usize = 12;
 
-const CLASSES: [&str; 2] = ["trashbin", "bright_fire_extinguisher"];
+pub(super) const CLASSES: [&str; 2] = ["trashbin", "bright_fire_extinguisher"];
 
 /// Obstacles in three to five doorways, chosen so that the partner's room and the rooms around it
 /// are cut off from much of the house.

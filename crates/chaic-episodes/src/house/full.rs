@@ -4,8 +4,7 @@ use chaic_protocol::TaskId;
 use chaic_protocol::geom::xz;
 use chaic_world::{Setup, Thing};
 
-use super::generate;
-use crate::generate::{GenerateError, Seeds};
+use crate::generate::{GenerateError, Seeds, generate};
 
 /// The place seed of a house of eight rooms.
 const PLACE_SEED: u64 = 12;

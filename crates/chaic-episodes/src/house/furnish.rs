@@ -6,7 +6,8 @@ use chaic_world::{Floor, FloorMaterial, Room, RoomKind};
 
 use super::plan::{Plan, WALL_M, plan};
 use super::room::{BODY_M, RoomPlan};
-use super::{House, recipes, slots};
+use super::{House, decoys, recipes, slots};
+use crate::Settings;
 use crate::grid::Grid;
 use crate::solid::Solid;
 
@@ -30,12 +31,16 @@ const CARPETS: [[u8; 3]; 5] =
     [[152, 142, 134], [128, 140, 156], [164, 146, 130], [140, 152, 136], [168, 156, 160]];
 
 /// The house of a place seed at this attempt, if it came out well.
-pub(super) fn house(place_seed: u64, attempt: u64) -> Result<House, &'static str> {
+pub(super) fn house(
+    place_seed: u64,
+    settings: Settings,
+    attempt: u64,
+) -> Result<House, &'static str> {
     // Drawn once for all attempts, or the sizes that come out easily would crowd out the others.
     let n_rooms = 6 + Stream::new(place_seed, "house/size", 0).below(3);
     let mut rng = Stream::new(place_seed, "house/plan", attempt);
     let plan = plan(&mut rng, n_rooms).ok_or("no floor plan")?;
-    let mut rooms = furnished(&plan, place_seed, attempt)?;
+    let mut rooms = furnished(&plan, place_seed, settings, attempt)?;
     let mut colors = Stream::new(place_seed, "house/colors", attempt);
     let mut color = |of: &[[u8; 3]]| of[colors.below(of.len())];
     let walls = plan.walls(color(&WALL_COLORS), color(&WALL_COLORS));
@@ -62,12 +67,17 @@ pub(super) fn house(place_seed: u64, attempt: u64) -> Result<House, &'static str
         walkable: Vec::new(),
     };
     survey(&mut house);
-    offers_enough(&house)?;
+    offers_enough(&house, settings)?;
     Ok(house)
 }
 
 /// Furniture for every room of a plan.
-fn furnished(plan: &Plan, place_seed: u64, attempt: u64) -> Result<Vec<RoomPlan>, &'static str> {
+fn furnished(
+    plan: &Plan,
+    place_seed: u64,
+    settings: Settings,
+    attempt: u64,
+) -> Result<Vec<RoomPlan>, &'static str> {
     let stream =
         |purpose: &str, room: usize| Stream::new(place_seed, purpose, attempt * 64 + room as u64);
     let mut living = 0;
@@ -93,17 +103,23 @@ fn furnished(plan: &Plan, place_seed: u64, attempt: u64) -> Result<Vec<RoomPlan>
     let mut order: Vec<usize> =
         (0..rooms.len()).filter(|i| plan.rooms[*i].0 != RoomKind::Corridor).collect();
     rng.shuffle(&mut order);
-    let mut cabinets = 3 + rng.below(2);
+    let mut cabinets = if settings.decoys { decoys::CABINETS } else { 3 + rng.below(2) };
     for i in &order {
         if cabinets > 0 && recipes::add(&mut rooms[*i], rng, "cabinet") {
             cabinets -= 1;
         }
     }
+    let eats = |k: RoomKind| matches!(k, RoomKind::Kitchen | RoomKind::LivingRoom);
     // The second refrigerator of a house stands where the family eats.
     if rng.chance(0.35) {
-        let eats = |k: RoomKind| matches!(k, RoomKind::Kitchen | RoomKind::LivingRoom);
         let mut places = order.iter().filter(|i| eats(plan.rooms[**i].0));
         places.any(|i| recipes::add(&mut rooms[*i], rng, "refrigerator"));
+    }
+    if settings.decoys {
+        let rng = &mut stream("house/low refrigerator", 0);
+        rng.shuffle(&mut order);
+        order.sort_by_key(|i| !eats(plan.rooms[*i].0));
+        decoys::refrigerators(&mut rooms, &order, rng)?;
     }
     for (i, room) in rooms.iter_mut().enumerate() {
         let fillers: &[&str] = match plan.rooms[i].0 {
@@ -128,7 +144,7 @@ fn survey(house: &mut House) {
 }
 
 /// Checks that every task finds what it needs: all rooms joined, places low and high.
-fn offers_enough(house: &House) -> Result<(), &'static str> {
+fn offers_enough(house: &House, settings: Settings) -> Result<(), &'static str> {
     let stands = |p| house.ground.cell(p).is_some_and(|i| house.walkable[i]);
     if !house.openings.iter().all(|o| stands(0.5 * (o.a + o.b))) {
         return Err("a doorway can't be reached");
@@ -138,7 +154,8 @@ fn offers_enough(house: &House) -> Result<(), &'static str> {
     }
     let high = slots::high(house);
     let tops = |class: &str| high.iter().filter(|t| t.class.name() == class).count();
-    if !(3..=4).contains(&tops("cabinet")) || !(1..=2).contains(&tops("refrigerator")) {
+    let cabinets = if settings.decoys { decoys::CABINETS..=decoys::CABINETS } else { 3..=4 };
+    if !cabinets.contains(&tops("cabinet")) || !(1..=2).contains(&tops("refrigerator")) {
         return Err("a high top can't be reached");
     }
     Ok(())
@@ -151,10 +168,13 @@ mod tests {
     #[test]
     fn many_first_attempts_are_fit_to_live_in() {
         let mut why = std::collections::BTreeMap::<&str, u32>::new();
-        for seed in 0..60 {
-            let result = house(seed, 0).map(|_| ());
-            *why.entry(result.err().unwrap_or("fit")).or_default() += 1;
+        for settings in [Settings::PAPER, Settings::STANDARD] {
+            why.clear();
+            for seed in 0..60 {
+                let result = house(seed, settings, 0).map(|_| ());
+                *why.entry(result.err().unwrap_or("fit")).or_default() += 1;
+            }
+            assert!(why.get("fit").is_some_and(|n| *n >= 10), "{why:?}");
         }
-        assert!(why.get("fit").is_some_and(|n| *n >= 10), "{why:?}");
     }
 }

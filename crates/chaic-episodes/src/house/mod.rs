@@ -16,12 +16,16 @@ mod slots;
 mod doors;
 mod populate;
 
+mod beside;
+mod decoys;
+
 mod full;
 
 use chaic_protocol::TaskId;
 use chaic_protocol::geom::Rect;
 use chaic_world::{Floor, Opening, Room, Setup, Thing, Wall};
 
+use crate::Settings;
 use crate::generate::{GenerateError, Seeds, first_valid};
 use crate::grid::Grid;
 
@@ -59,16 +63,21 @@ impl House {
     /// The `nth` house of a place seed that is fit to live in.
     ///
     /// `None` if there are fewer among the bounded number of attempts.
-    pub fn new(place_seed: u64, nth: u64) -> Option<House> {
-        (0..HOUSE_ATTEMPTS).filter_map(|k| furnish::house(place_seed, k).ok()).nth(nth as usize)
+    pub fn new(place_seed: u64, settings: Settings, nth: u64) -> Option<House> {
+        let house = |attempt| furnish::house(place_seed, settings, attempt).ok();
+        (0..HOUSE_ATTEMPTS).filter_map(house).nth(nth as usize)
     }
 
     /// One attempt at a house of a place seed, or why it isn't fit to live in.
     ///
     /// # Errors
     /// What is missing, in words.
-    pub fn attempt(place_seed: u64, attempt: u64) -> Result<House, &'static str> {
-        furnish::house(place_seed, attempt)
+    pub fn attempt(
+        place_seed: u64,
+        settings: Settings,
+        attempt: u64,
+    ) -> Result<House, &'static str> {
+        furnish::house(place_seed, settings, attempt)
     }
 
     /// How many places for small things its low furniture has.
@@ -94,14 +103,18 @@ impl House {
 ///
 /// # Panics
 /// If the task isn't one that happens in a house.
-pub fn generate(task: TaskId, seeds: Seeds) -> Result<Setup, GenerateError> {
+pub fn generate(task: TaskId, seeds: Seeds, settings: Settings) -> Result<Setup, GenerateError> {
     assert_eq!(task.info().scene, chaic_protocol::task::SceneKind::House, "{task} is outdoors");
     let mut house = None;
     first_valid(task, seeds, EPISODE_HOUSES * EPISODE_ATTEMPTS, |attempt| {
         if attempt % EPISODE_ATTEMPTS == 0 {
-            house = House::new(seeds.place, attempt / EPISODE_ATTEMPTS);
+            house = House::new(seeds.place, settings, attempt / EPISODE_ATTEMPTS);
         }
         let house = house.as_ref().ok_or("no house passes")?;
-        populate::setup(house, task, seeds.episode, attempt)
+        if settings.decoys {
+            decoys::setup(house, task, seeds.episode, attempt)
+        } else {
+            populate::setup(house, task, seeds.episode, attempt)
+        }
     })
 }

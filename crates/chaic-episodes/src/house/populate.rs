@@ -1,5 +1,6 @@
 //! What lies and stands in a house for one episode.
 
+use chaic_protocol::briefing::Goal;
 use chaic_protocol::capability::Persona;
 use chaic_protocol::geom::{Pose, xz};
 use chaic_protocol::rng::Stream;
@@ -15,7 +16,7 @@ use crate::solid::mm;
 /// Most small objects on high tops (facts S11.2).
 const MOST_HIGH: usize = 15;
 /// Fewest target classes among them (facts S11.2).
-const LEAST_HIGH_CLASSES: usize = 2;
+pub(super) const LEAST_HIGH_CLASSES: usize = 2;
 /// Between two things on the floor, metres.
 const FLOOR_APART_M: f32 = 0.5;
 /// Around people at the start, metres: 0.5 from walls (paper), with room for rounding.
@@ -26,11 +27,11 @@ const PEOPLE_APART_M: f32 = 0.9;
 const REFRIGERATOR_GOAL: f32 = 2.0 / 24.0;
 
 /// A scene that is being filled.
-struct Scene<'a> {
-    house: &'a House,
-    rng: Stream,
+pub(super) struct Scene<'a> {
+    pub house: &'a House,
+    pub rng: Stream,
     /// What has been put so far, without furniture.
-    put: Vec<Thing>,
+    pub put: Vec<Thing>,
 }
 
 /// An episode in this house, or why this draw leads to none.
@@ -52,9 +53,23 @@ pub(super) fn setup(
         scene.put = obstacles.ok_or("obstacles close too little")?;
     }
     scene.lay_out(task, &goods)?;
+    let put = scene.put;
+    Ok(assembled(house, task, seed, Contents { put, people, goal: goods.goal, goal_places }))
+}
+
+/// What an episode adds to a house.
+pub(super) struct Contents {
+    pub put: Vec<Thing>,
+    pub people: Vec<Person>,
+    pub goal: Goal,
+    pub goal_places: Vec<EntityId>,
+}
+
+/// The episode of this house and these contents.
+pub(super) fn assembled(house: &House, task: TaskId, seed: u64, contents: Contents) -> Setup {
     let mut things = house.furniture.clone();
-    things.extend(scene.put);
-    Ok(Setup {
+    things.extend(contents.put);
+    Setup {
         task,
         seed,
         horizon: task.info().horizon,
@@ -65,10 +80,10 @@ pub(super) fn setup(
         openings: house.openings.clone(),
         floors: house.floors.clone(),
         things,
-        people,
-        goal: goods.goal,
-        goal_places,
-    })
+        people: contents.people,
+        goal: contents.goal,
+        goal_places: contents.goal_places,
+    }
 }
 
 impl Scene<'_> {
@@ -95,7 +110,12 @@ impl Scene<'_> {
     }
 
     /// Puts each on the first free low place that suits it; a place takes one thing.
-    fn on_low(&mut self, classes: &[ClassId], low: &mut Vec<Slot>, turn_rad: f32) -> Option<()> {
+    pub fn on_low(
+        &mut self,
+        classes: &[ClassId],
+        low: &mut Vec<Slot>,
+        turn_rad: f32,
+    ) -> Option<()> {
         for class in classes {
             let (k, thing) = (0..low.len()).find_map(|k| {
                 let turn_rad = turn_rad * self.rng.unit();
@@ -156,7 +176,7 @@ impl Scene<'_> {
         if enough { Ok(()) } else { Err("too few target classes are high") }
     }
 
-    fn on_floor(&mut self, classes: &[ClassId]) -> Result<(), &'static str> {
+    pub fn on_floor(&mut self, classes: &[ClassId]) -> Result<(), &'static str> {
         let mut points = slots::floor_for_goods(self.house);
         self.rng.shuffle(&mut points);
         let mut taken: Vec<Vec2> = Vec::new();
@@ -171,7 +191,7 @@ impl Scene<'_> {
         Ok(())
     }
 
-    fn push(&mut self, mut thing: Thing) {
+    pub fn push(&mut self, mut thing: Thing) {
         let n = thing.class.info().palette.len().max(1);
         thing.variant = self.rng.below(n) as u8;
         self.put.push(thing);
@@ -196,7 +216,7 @@ fn goal_places(
 }
 
 /// Partner and helper, each in a random room.
-fn people(house: &House, task: TaskId, rng: &mut Stream) -> Option<Vec<Person>> {
+pub(super) fn people(house: &House, task: TaskId, rng: &mut Stream) -> Option<Vec<Person>> {
     let free = slots::floor(house, START_CLEAR_M);
     let mut people: Vec<Person> = Vec::new();
     for persona in [task.info().partner, Persona::Helper] {

@@ -26,6 +26,8 @@ const LOW_HOSTS: [&str; 10] = [
 pub(super) const HIGH_HOSTS: [&str; 2] = ["cabinet", "refrigerator"];
 /// Below this surfaces are low, metres (paper: "tables, chairs, sofas").
 const LOW_M: f32 = 1.2;
+/// From here on tops are high, metres (facts S11.1).
+pub(super) const HIGH_M: f32 = 1.5;
 /// From the middle of a place to where a wide body can stand, metres; an arm reaches 0.7 from
 /// there to the nearest point, and a wheelchair stands 0.05 nearer.
 const REACH_M: f32 = 0.70;
@@ -159,7 +161,7 @@ pub(super) fn high(house: &House) -> Vec<HighTop> {
         let Some(room) = room_of(house, thing) else { continue };
         let highest =
             top_surfaces(thing).into_iter().max_by(|a, b| a.center.y.total_cmp(&b.center.y));
-        let Some(surface) = highest else { continue };
+        let Some(surface) = highest.filter(|s| s.center.y >= HIGH_M) else { continue };
         // Towards the front, where an arm gets to.
         let slot = |u: f32| Slot { host, surface, uv: Vec2::new(u, -0.45) };
         if !within_reach(house, room, xz(slot(0.0).point()), REACH_M) {
@@ -174,6 +176,12 @@ pub(super) fn high(house: &House) -> Vec<HighTop> {
 }
 
 impl Slot {
+    /// The place on the same surface at this share of its half length, from its middle.
+    pub fn along(mut self, u: f32) -> Slot {
+        self.uv.x = u;
+        self
+    }
+
     /// The same place a little aside, so that no two episodes look alike.
     pub fn jittered(mut self, rng: &mut Stream) -> Slot {
         self.uv += Vec2::new(rng.range(-0.12, 0.12), rng.range(-0.12, 0.12));

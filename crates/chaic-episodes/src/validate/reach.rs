@@ -2,7 +2,7 @@
 
 use chaic_protocol::capability::Persona;
 use chaic_protocol::geom::xz;
-use chaic_protocol::{AgentId, Role, Vec2};
+use chaic_protocol::{AgentId, Role, TaskId, Vec2};
 use chaic_world::{Person, Rules, Setup, Thing};
 
 use super::{Demand, Problem, thing_field};
@@ -27,7 +27,7 @@ pub fn out_of_reach(setup: &Setup, agent: AgentId, walker: Walker) -> Vec<usize>
     let Some(person) = setup.people.get(agent.index()) else { return Vec::new() };
     let walls = Solid::of_walls(setup);
     let see_through: Vec<Solid> = walls.iter().filter(|w| w.low_m < 1.0).copied().collect();
-    let (grid, seen) = ground(setup, person, &walls, walker);
+    let (grid, seen) = ground(setup, person, &walls, walker, Obstacles::Gone);
     let mut missed = needed_things(setup);
     missed.retain(|k| !gets_at(&grid, &seen, walker.reach_m, &setup.things[*k], &see_through));
     missed
@@ -40,7 +40,7 @@ pub fn ways_from(setup: &Setup, thing: usize, walker: Walker) -> Vec<f32> {
     let walls = Solid::of_walls(setup);
     let see_through: Vec<Solid> = walls.iter().filter(|w| w.low_m < 1.0).copied().collect();
     let height_m = Persona::Adult.capability().height_m;
-    let grid = walkable(setup, height_m, &walls, walker);
+    let grid = walkable(setup, height_m, &walls, walker, Obstacles::Gone);
     let beside = |k: usize| beside(&grid, walker.reach_m, &setup.things[k], &see_through);
     let way_m = grid.ways(beside(thing).into_iter());
     (0..setup.things.len())
@@ -61,7 +61,7 @@ pub(super) fn problems(setup: &Setup, demand: Demand) -> Vec<Problem> {
         let person = &setup.people[agent.index()];
         let reach_m = Rules::paper().arm_reach_m;
         let walker = Walker { radius_m: person.capability().radius_m, reach_m, cell_m: CELL_M };
-        let (grid, seen) = ground(setup, person, &walls, walker);
+        let (grid, seen) = ground(setup, person, &walls, walker, Obstacles::Gone);
         if !seen.contains(&true) {
             let field = format!("people[{}].pose.position", agent.index());
             found.push(Problem::new(field, format!("leaves the {agent} no room to move")));
@@ -87,7 +87,42 @@ pub(super) fn problems(setup: &Setup, demand: Demand) -> Vec<Problem> {
             found.extend(missed);
         }
     }
+    if demand == Demand::Fair && found.is_empty() {
+        found.extend(obstacle_problem(setup, &walls));
+    }
     found
+}
+
+/// Obstacles keep the partner from something where the task is about them, and nowhere else.
+fn obstacle_problem(setup: &Setup, walls: &[Solid]) -> Option<Problem> {
+    let is_obstacle = |k: &usize| setup.things[*k].class.info().role == Role::Obstacle;
+    (0..setup.things.len()).find(is_obstacle)?;
+    let person = setup.people.first()?;
+    let reach_m = Rules::paper().arm_reach_m;
+    let walker = Walker { radius_m: person.capability().radius_m, reach_m, cell_m: CELL_M };
+    let (grid, seen) = ground(setup, person, walls, walker, Obstacles::There);
+    let see_through: Vec<Solid> = walls.iter().filter(|w| w.low_m < 1.0).copied().collect();
+    let needed = needed_things(setup).into_iter().filter(|k| !is_obstacle(k));
+    let mut missed =
+        needed.filter(|k| !gets_at(&grid, &seen, reach_m, &setup.things[*k], &see_through));
+    match (setup.task == TaskId::Obstacle, missed.next()) {
+        (true, None) => {
+            let problem = "hold no obstacle that keeps the partner from anything";
+            Some(Problem::new("things", problem))
+        }
+        (false, Some(k)) => {
+            let problem = "is cut off from the partner by obstacles, which aren't the task's";
+            Some(Problem::new(thing_field(setup, k, "position"), problem))
+        }
+        _ => None,
+    }
+}
+
+/// Whether obstacles stand where the setup puts them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Obstacles {
+    There,
+    Gone,
 }
 
 /// Targets, containers, goal places and obstacles.
@@ -103,19 +138,33 @@ fn needed_things(setup: &Setup) -> Vec<usize> {
     (0..setup.things.len()).filter(is_needed).collect()
 }
 
-/// Where a person gets to once everything that one hand can take out of the way is gone.
-fn ground(setup: &Setup, person: &Person, walls: &[Solid], walker: Walker) -> (Grid, Vec<bool>) {
-    let grid = walkable(setup, person.capability().height_m, walls, walker);
+/// Where a person gets to once everything that one hand can take out of the way is gone, but maybe
+/// for obstacles.
+fn ground(
+    setup: &Setup,
+    person: &Person,
+    walls: &[Solid],
+    walker: Walker,
+    obstacles: Obstacles,
+) -> (Grid, Vec<bool>) {
+    let grid = walkable(setup, person.capability().height_m, walls, walker, obstacles);
     let seen = grid.flood(xz(person.pose.position));
     (grid, seen)
 }
 
 /// Where there is room for somebody of this height, in the same sense.
-fn walkable(setup: &Setup, height_m: f32, walls: &[Solid], walker: Walker) -> Grid {
+fn walkable(
+    setup: &Setup,
+    height_m: f32,
+    walls: &[Solid],
+    walker: Walker,
+    obstacles: Obstacles,
+) -> Grid {
     let stands = [Rules::paper().step_over_m, height_m];
     let stays = setup.things.iter().filter(|t| {
         let info = t.class.info();
-        t.fixed || !(info.is_carriable() || info.role == Role::Obstacle)
+        let is_gone = info.role == Role::Obstacle && obstacles == Obstacles::Gone;
+        t.fixed || !(info.is_carriable() || is_gone)
     });
     let stays = stays.filter(|t| t.class.info().role != Role::Vehicle).flat_map(Solid::of_thing);
     let solids: Vec<Solid> =

@@ -22,6 +22,9 @@ pub(super) fn problems(setup: &Setup, demand: Demand) -> Vec<Problem> {
     people(setup, &mut found);
     goal(setup, demand, &mut found);
     task_needs(setup, &mut found);
+    if demand == Demand::Fair {
+        found.extend(height_problem(setup));
+    }
     found
 }
 
@@ -139,6 +142,31 @@ fn task_needs(setup: &Setup, found: &mut Vec<Problem>) {
         let problem = format!("hold {vehicles} bicycles for {riders} who walk one");
         found.push(Problem::new("things", problem));
     }
+}
+
+/// What lies out of the partner's reach where the task is about that.
+fn height_problem(setup: &Setup) -> Option<Problem> {
+    let [lowest_m, highest_m] = setup.task.info().partner.capability().pick_range_m;
+    let top_m = |t: &&Thing| t.position.y + t.size_m().y;
+    let wanted = || setup.things.iter().filter(|t| !t.fixed && setup.goal.wanted(t.class) > 0);
+    let is_container = |t: &&Thing| t.class.info().role == Role::Container && !t.fixed;
+    let n_high = |high: bool| {
+        let containers = setup.things.iter().filter(is_container);
+        containers.filter(|t| (top_m(t) > highest_m) == high).count()
+    };
+    let problem = match setup.task {
+        TaskId::HighTarget if !wanted().any(|t| top_m(&t) > highest_m) => {
+            "hold nothing wanted that is high"
+        }
+        TaskId::LowTarget if !wanted().any(|t| top_m(&t) < lowest_m) => {
+            "hold nothing wanted that is low"
+        }
+        TaskId::HighContainer if n_high(true) <= n_high(false) => {
+            "hold no more containers high than low"
+        }
+        _ => return None,
+    };
+    Some(Problem::new("things", problem))
 }
 
 /// Whether a hand must get at it.

@@ -99,10 +99,6 @@ fn episodes(
         return Ok(own.iter().filter(|e| e.task() == task).take(limit).map(entry).collect());
     }
     let split: Split = options.split.parse()?;
-    let name = |k: usize| match &split {
-        Split::Generated(seeds) => format!("{task}/gen/{}", seeds.start + k as u64),
-        bundled => format!("{task}/{bundled}/{k:02}"),
-    };
     let horizon = task.info().horizon;
     let n = split.len_per_task().min(limit);
     if n > at_most {
@@ -110,7 +106,11 @@ fn episodes(
             format!("{n} episodes of {task} are too many for one run; give --first or fewer seeds");
         return Err(EvalError::Options(text));
     }
-    let entry = |k| Entry { id: name(k), horizon, environment: split.environment(task, k as u64) };
+    let entry = |k: usize| Entry {
+        id: split.episode_id(task, k),
+        horizon,
+        environment: split.environment(task, k as u64),
+    };
     Ok((0..n).map(entry).collect())
 }
 

@@ -1,6 +1,5 @@
 //! `chaic episodes`.
 
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
@@ -23,8 +22,13 @@ pub fn run(command: &EpisodesCommand) -> Result<Ended> {
     match command {
         EpisodesCommand::List { split, task, format } => list(split, &task.0, *format),
         EpisodesCommand::Show { episode, out, width } => show(episode, out, *width),
-        EpisodesCommand::Generate { task, seeds, out } => generate(*task, seeds.clone(), out),
-        EpisodesCommand::Validate { files } => validate(files),
+        EpisodesCommand::Generate { task, seeds, split, out } => {
+            let of_seeds = seeds.clone().map(Split::Generated);
+            let split = of_seeds.or(split.clone()).context("give --seeds or --split")?;
+            generate(*task, &split, out)
+        }
+        EpisodesCommand::Validate { split: Some(split), .. } => validate_split(split),
+        EpisodesCommand::Validate { files, .. } => validate(files),
         EpisodesCommand::Schema => {
             say(&(serde_json::to_string_pretty(&json_schema())? + "\n"))?;
             Ok(Ended::Well)
@@ -105,25 +109,79 @@ fn show(argument: &str, out: &Path, width_px: u32) -> Result<Ended> {
     Ok(Ended::Well)
 }
 
-fn generate(task: TaskId, seeds: Range<u64>, out: &Path) -> Result<Ended> {
+fn generate(task: TaskId, split: &Split, out: &Path) -> Result<Ended> {
     std::fs::create_dir_all(out)
         .with_context(|| format!("can't make the folder {}", out.display()))?;
     let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
-    let bar = bars::plain(seeds.end - seeds.start, "episodes");
-    for seed in seeds.clone() {
+    let n = split.len_per_task();
+    let bar = bars::plain(n as u64, "episodes");
+    for k in 0..n {
         if stop.load(Ordering::Relaxed) {
             bar.finish_and_clear();
-            complain(&format!("stopped; --seeds {seed}..{} makes the rest", seeds.end));
+            complain(&rest(split, k));
             return Ok(Ended::Interrupted);
         }
-        let episode = find_episode(&format!("{task}/gen/{seed}"))?;
-        let path = out.join(format!("{task}-{seed}.json"));
+        let id = split.episode_id(task, k);
+        let episode = find_episode(&id)?;
+        // `obstacle/gen/7` is written to `obstacle-7.json`, and `obstacle/standard/007` to
+        // `obstacle-standard-007.json`.
+        let name = id.replace("/gen/", "-").replace('/', "-");
+        let path = out.join(format!("{name}.json"));
         write_whole(&path, episode.to_json().as_bytes())?;
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let n = counted((seeds.end - seeds.start) as usize, "episode");
-    say(&format!("{}: {n} of {task}\n", out.display()))?;
+    say(&format!("{}: {} of {task}\n", out.display(), counted(n, "episode")))?;
+    Ok(Ended::Well)
+}
+
+/// How to go on after the first `k` episodes of a split.
+fn rest(split: &Split, k: usize) -> String {
+    match split {
+        Split::Generated(seeds) => {
+            format!("stopped; --seeds {}..{} makes the rest", seeds.start + k as u64, seeds.end)
+        }
+        Split::GeneratedStandard(seeds) => {
+            let rest = Split::GeneratedStandard(seeds.start + k as u64..seeds.end);
+            format!("stopped; --split {rest} makes the rest")
+        }
+        _ => format!("stopped after {}; begin again to have all", counted(k, "episode")),
+    }
+}
+
+/// Makes or reads every episode of a split and checks it as a file would be.
+fn validate_split(split: &Split) -> Result<Ended> {
+    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
+    let n = split.len_per_task().saturating_mul(TaskId::all().count());
+    let bar = bars::plain(n as u64, "episodes");
+    let (mut n_bad, mut done) = (0, 0);
+    for (task, episode) in TaskId::all().flat_map(|t| episodes(split, t).map(move |e| (t, e))) {
+        if stop.load(Ordering::Relaxed) {
+            bar.finish_and_clear();
+            complain(&format!("stopped after {done} of {n} episodes"));
+            return Ok(Ended::Interrupted);
+        }
+        let lines: Vec<String> = match &episode {
+            Ok(episode) => {
+                let problems = chaic_episodes::validate(episode.setup());
+                problems.iter().map(|p| format!("{}: {p}", episode.id())).collect()
+            }
+            Err(error) => vec![format!("{task}: {error}")],
+        };
+        n_bad += usize::from(!lines.is_empty());
+        lines.iter().for_each(|line| complain(line));
+        done += 1;
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    if n_bad > 0 {
+        complain(&format!(
+            "{n_bad} of {} of {split} aren't as they should be",
+            counted(n, "episode")
+        ));
+        return Ok(Ended::WithFindings);
+    }
+    say(&format!("{split}: {} fine\n", counted(n, "episode")))?;
     Ok(Ended::Well)
 }
 

@@ -11,6 +11,7 @@ mod files;
 mod interrupted;
 mod language;
 mod pictures;
+mod splits;
 
 /// Frames of the episodes of these tests.
 const FRAMES: u32 = 80;

@@ -4,7 +4,8 @@
 A first run is traced: its main thread's system calls from the first that names the run's folder
 to the end, or to the first --seconds of it. For each of them another run is killed as it enters the
 call. Then the run is resumed if its folder is a run, and else begun again by the same command. At
-the end all files must be those of a run that nobody disturbed, byte by byte. Prints a line for each
+the end all files must be those of a run that nobody disturbed, byte by byte (but for the order of lines in
+`results.jsonl`). Prints a line for each
 failure and the counts, and exits with 1 if there was a failure.
 
 usage: benches/faults/first_moment.py [--out DIR] [--seconds 1] [--every 1] [--model]
@@ -81,9 +82,12 @@ def calls_of(log, folder, seconds):
 
 
 def files(folder):
-    """All that a run leaves, but the lock and what the language model was asked."""
+    """All that a run leaves, but the lock and what the language model was asked. Results stand in the
+    order of their ending, which is nobody's promise, so their lines are sorted."""
     paths = (p for p in folder.rglob("*") if p.is_file() and p.name != ".lock")
     found = {str(p.relative_to(folder)): p.read_bytes() for p in paths}
+    if results := found.get("results.jsonl"):
+        found["results.jsonl"] = b"".join(sorted(results.splitlines(keepends=True)))
     is_asked = re.compile(r"llm/(?!settings|templates)").match
     return {name: data for name, data in found.items() if not is_asked(name)}
 
@@ -96,11 +100,11 @@ def run(command):
     return subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
 
 
-def again(chaic, begin, folder):
+def again(chaic, begin, asked, folder):
     """Plays what was killed to its end; gives what is wrong, if anything is."""
     is_run = (folder / "run.json").exists()
-    # The order of results is that of their ending, so one job keeps it.
-    command = [chaic, "eval", "--resume", "--jobs", "1", "--out", folder] if is_run else begin
+    resume = [chaic, "eval", "--resume", *asked, "--out", folder]
+    command = resume if is_run else begin
     ended = run(command)
     if ended.returncode != 0:
         how = "resumed" if is_run else "begun again"
@@ -145,7 +149,7 @@ def kill_everywhere(args, chaic, asked):
         killed += ended.returncode in (-9, 137)
         state = "nothing" if not folder.exists() else "before run.json"
         states["run.json" if (folder / "run.json").exists() else state] += 1
-        problem = again(chaic, begin, folder)
+        problem = again(chaic, begin, asked, folder)
         if not problem and (changed := differences(files(folder), expected)):
             problem = f"not the same: {', '.join(changed)}"
         if problem:

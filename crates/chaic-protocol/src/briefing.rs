@@ -74,7 +74,7 @@ pub struct Briefing {
     /// that they are brought to where the goal place is granted.
     pub goal_places: Vec<ClassId>,
     /// Only tops at least this high count as the goal place, metres; 0 for no condition, or where
-    /// the goal place is not granted.
+    /// the goal is not granted: it tells a task from the others.
     pub goal_place_min_top_m: f32,
     /// Objects that one container or basket holds.
     pub container_capacity: u32,

@@ -41,11 +41,11 @@ pub struct Grants {
     /// hand holds; which things in the image are delivered. Perfect segmentation and association,
     /// and nothing of what is not in the image.
     pub ids: bool,
-    /// The goal place: its class and the least height of its top. The paper's prompts and the
-    /// original's planners have it; it is no part of the hidden goal.
+    /// The class of the goal place. The paper's prompts and the original's planners have it; it is
+    /// no part of the hidden goal.
     #[serde(default)]
     pub goal_place: bool,
-    /// The partner's goal.
+    /// The partner's goal, and the least height of the goal place's top.
     pub goal: bool,
     /// What has been delivered, wherever the agent is.
     pub progress: bool,

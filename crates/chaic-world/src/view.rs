@@ -51,7 +51,7 @@ impl World {
                 true => vec![self.thing(self.setup.goal_places[0]).0.class],
                 false => scene.goal_places(),
             },
-            goal_place_min_top_m: if grants.goal_place { self.goal_min_top_m() } else { 0.0 },
+            goal_place_min_top_m: if grants.goal { self.goal_min_top_m() } else { 0.0 },
             container_capacity: self.rules.container_capacity,
             grants,
             goal: grants.goal.then(|| self.setup.goal.clone()),

@@ -190,7 +190,7 @@ pub fn learn(
                 memory.things.get(place).is_some_and(|t| briefing.goal_places.contains(&t.class));
             for track in released.iter().copied().filter(|_| is_goal) {
                 memory.things.ignore(track, now + SETTLE_FRAMES);
-                memory.believe_delivered(track);
+                memory.believe_delivered(track, place);
             }
         }
         (Action::PutOn { place, .. }, Outcome::Failure(FailureReason::BeyondLimits)) => {

@@ -70,8 +70,13 @@ pub struct Memory {
     pub last: Option<(Intent, Outcome)>,
     /// What is known or believed to be delivered.
     pub delivered: BTreeSet<TrackId>,
-    /// What was put on the goal place and has not been seen there since, and when it was put there.
-    believed: BTreeMap<TrackId, Frame>,
+    /// What was put on a goal place and has not been seen delivered since, with the place and when
+    /// it was put there.
+    believed: BTreeMap<TrackId, (TrackId, Frame)>,
+    /// Places of the goal place's class on which something was put in vain: too low, for example.
+    vain_places: BTreeSet<TrackId>,
+    /// Lowest and highest top that the own hands put something on, metres.
+    put_range_m: [f32; 2],
     /// The own actions other than moving about, oldest first.
     pub history: Vec<Done>,
     /// The class of each track that ever came up.
@@ -112,6 +117,8 @@ impl Memory {
             last: None,
             delivered: BTreeSet::new(),
             believed: BTreeMap::new(),
+            vain_places: BTreeSet::new(),
+            put_range_m: briefing.capability.put_range_m,
             history: Vec::new(),
             classes: BTreeMap::new(),
             height_m: briefing.capability.height_m,
@@ -215,22 +222,24 @@ impl Memory {
         }
         let now = self.frame;
         let is_seen = |track| percepts.detections.iter().any(|d| d.track == track);
-        let is_refuted = |(track, since): (&TrackId, &Frame)| {
-            now >= since + SETTLE_FRAMES && (grants.progress || is_seen(*track))
+        let is_refuted = |(track, (_, since)): &(&TrackId, &(TrackId, Frame))| {
+            now >= since + SETTLE_FRAMES && (grants.progress || is_seen(**track))
         };
-        let pending = self.believed.iter().filter(|(t, since)| is_refuted((t, since)));
-        let refuted: Vec<TrackId> = pending.map(|(track, _)| *track).collect();
-        for track in refuted {
+        let pending = self.believed.iter().filter(is_refuted);
+        let refuted: Vec<(TrackId, TrackId)> =
+            pending.map(|(t, (place, _))| (*t, *place)).collect();
+        for (track, place) in refuted {
+            self.vain_places.insert(place);
             self.believed.remove(&track);
             self.delivered.remove(&track);
             self.things.return_to_play(track);
         }
     }
 
-    /// Something was put on the goal place: it is believed to be delivered until seen otherwise.
-    pub fn believe_delivered(&mut self, track: TrackId) {
+    /// Something was put on a goal place: it is believed to be delivered until seen otherwise.
+    pub fn believe_delivered(&mut self, track: TrackId, place: TrackId) {
         if self.delivered.insert(track) {
-            self.believed.insert(track, self.frame);
+            self.believed.insert(track, (place, self.frame));
             self.things.mark_gone(track);
         }
     }
@@ -327,8 +336,9 @@ impl Memory {
         Some(Reach::metres(cost).max(straight_m))
     }
 
-    /// The known goal places that one can get to, nearest first, with the way to each in metres;
-    /// those that were given up lately come last.
+    /// The known goal places that one can get to, nearest first, with the way to each in metres.
+    /// First come those on which nothing was put in vain, then those within the own reach, and last
+    /// those that were given up lately.
     pub fn goal_places(&self) -> Vec<(&Thing, f32)> {
         let mut places: Vec<_> = self
             .things
@@ -338,8 +348,13 @@ impl Memory {
             .filter(|t| t.top_m + TOP_TOLERANCE_M >= self.goal_place_min_top_m)
             .filter_map(|t| Some((t, self.way_to(t)?)))
             .collect();
-        let is_given_up = |t: &Thing| self.frame < t.ignore_until;
-        places.sort_by(|a, b| is_given_up(a.0).cmp(&is_given_up(b.0)).then(a.1.total_cmp(&b.1)));
+        let [low_m, high_m] = self.put_range_m;
+        let drawback = |t: &Thing| {
+            let is_out_of_reach = t.top_m > high_m || t.top_m < low_m;
+            let is_given_up = self.frame < t.ignore_until;
+            (self.vain_places.contains(&t.track), is_given_up, is_out_of_reach)
+        };
+        places.sort_by(|a, b| drawback(a.0).cmp(&drawback(b.0)).then(a.1.total_cmp(&b.1)));
         places
     }
 

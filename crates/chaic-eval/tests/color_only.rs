@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use chaic_episodes::Episode;
 use chaic_eval::Appearance;
-use chaic_eval::play::{Actor, Cast, Play, Staging};
+use chaic_eval::play::{Actor, Bystander, Cast, Play, Staging};
 use chaic_eval::rules::RuleSet;
 use chaic_protocol::briefing::Goal;
 use chaic_protocol::capability::Persona;
@@ -99,20 +99,6 @@ impl Blob {
     }
 }
 
-struct Waiter;
-
-impl Agent for Waiter {
-    fn senses(&self) -> Senses {
-        Senses::NONE
-    }
-
-    fn reset(&mut self, _: &Briefing) {}
-
-    fn act(&mut self, _: &Observation) -> Action {
-        Action::Wait { frames: 100 }
-    }
-}
-
 /// A hall of 10 by 10 m with a bed and an apple, which is wanted.
 fn hall() -> Setup {
     let thing = |class, at: [f32; 3]| Thing::new(ClassId::named(class), Vec3::from(at), 0.0);
@@ -153,7 +139,7 @@ fn hall() -> Setup {
 fn whoever_sees_color_alone_points_picks_up_and_delivers() {
     let episode = Episode::new("no_constraint/hall/0", "hall", None, hall()).unwrap();
     let actors = vec![
-        Actor::new(Box::new(Waiter), Grants::NONE),
+        Actor::new(Box::new(Bystander), Grants::NONE),
         Actor::new(Box::new(ColorOnly::default()), Grants::NONE),
     ];
     let staging = Staging {

@@ -144,8 +144,7 @@ fn checked(
     };
     let pair = Pair { frames: 2000, ..pair(&episode, Secret::Goal, Partner::Acts) };
     compare(&pair, &make, None).unwrap();
-    let counts = *counts.lock().unwrap();
-    counts
+    *counts.lock().unwrap()
 }
 
 #[test]

@@ -71,7 +71,7 @@ impl World {
 mod tests {
     use super::*;
     use crate::setup::Setup;
-    use crate::{Person, Rules};
+    use crate::{Person, Rules, Thing};
     use chaic_protocol::briefing::Goal;
     use chaic_protocol::capability::Persona;
     use chaic_protocol::geom::{Pose, Rect};
@@ -94,10 +94,10 @@ mod tests {
             walls: vec![],
             openings: vec![],
             floors: vec![],
-            things: vec![],
+            things: vec![Thing::new(ClassId::named("bed"), Vec3::ZERO, 0.0)],
             people: vec![person(-1.0), person(1.0)],
             goal: Goal { targets: vec![(ClassId::named("apple"), 1)] },
-            goal_places: vec![],
+            goal_places: vec![Setup::entity(0)],
         };
         World::new(setup, Rules::paper()).expect("a bare field is a world")
     }

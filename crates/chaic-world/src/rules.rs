@@ -207,7 +207,7 @@ impl Rules {
                 raise_furniture: 17,
                 // Facts S2.2: one frame, then both arms are brought back.
                 refused_pick: 37,
-                // Facts 1.4 and 2.2: after a vain reach the arms are brought back at once.
+                // Facts S1.4 and S2.2: after a vain reach the arms are brought back at once.
                 vain_grasp: 0,
                 ..paper.durations
             },

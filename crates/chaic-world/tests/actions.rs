@@ -84,7 +84,7 @@ fn impossible_actions_fail_with_a_reason() {
         (pick(EntityId(999)), FailureReason::OutOfReach),
         (pick(EntityId::WALL), FailureReason::OutOfReach),
         (pick(EntityId::of_agent(B)), FailureReason::OutOfReach),
-        (pick(EntityId::FIRST_OBJECT), FailureReason::Impossible),
+        (pick(EntityId::FIRST_OBJECT), FailureReason::OutOfReach),
         (pick(nth(1)), FailureReason::OutOfReach),
         (Action::PutIn, FailureReason::NotContainerAndTarget),
         (Action::PutOn { place: nth(0), hand: Hand::Left }, FailureReason::HandEmpty),
@@ -97,6 +97,35 @@ fn impossible_actions_fail_with_a_reason() {
     assert_eq!(run(&mut w, A, pick(nth(0))).0, Outcome::Success);
     assert_eq!(run(&mut w, A, pick(nth(0))).0, fails(FailureReason::Impossible));
     assert_eq!(run(&mut w, B, pick(nth(0))).0, fails(FailureReason::HeldByOther));
+}
+
+#[test]
+fn whatever_is_not_at_hand_fails_for_one_reason_and_in_one_time() {
+    let apple = |x, z| thing("apple", at(x, 0.0, z));
+    // In the other's hand, delivered, behind a wall, far off, broken, and never there.
+    let things = vec![
+        apple(8.0, 0.0),
+        apple(-7.9, -7.0),
+        apple(0.0, 1.5),
+        apple(0.0, -6.0),
+        thing("vase", at(8.0, 0.0, 0.5)),
+    ];
+    let people = vec![person(Persona::Adult, 0.0, 0.0), person(Persona::Helper, 8.0, 0.8)];
+    let mut setup = hall(things, people);
+    setup.walls = vec![wall([-5.0, 0.8], [5.0, 0.8])];
+    let mut w = world(setup);
+    assert_eq!(run(&mut w, B, pick(nth(0))).0, Outcome::Success);
+    let mut state = w.state().clone();
+    state.things[2].delivered = Some(0);
+    state.things[5].place = Place::Broken;
+    w.restore(&Snapshot(postcard::to_stdvec(&state).unwrap())).unwrap();
+    for object in [nth(0), nth(1), nth(2), nth(3), nth(4), EntityId(999), EntityId::WALL] {
+        let hand = Hand::Right;
+        for action in [pick(object), Action::RemoveObstacle { obstacle: object, hand }] {
+            let ended = run(&mut w, A, action);
+            assert_eq!(ended, (fails(FailureReason::OutOfReach), 1), "{action:?}");
+        }
+    }
 }
 
 #[test]
@@ -386,7 +415,7 @@ fn an_obstacle_is_not_set_down_where_somebody_has_come_to() {
 #[test]
 fn two_bring_furniture_to_the_truck() {
     let mut setup = hall(
-        vec![thing("sofa", at(0.0, 0.0, 0.0)), thing("truck", at(0.0, 0.0, 7.0))],
+        vec![thing("sofa", at(0.0, 0.0, 0.0)), thing("truck", at(0.0, 0.0, 5.2))],
         vec![person(Persona::Frail, 1.5, -1.0), person(Persona::Helper, -1.5, 1.0)],
     );
     setup.goal_places = vec![nth(1)];

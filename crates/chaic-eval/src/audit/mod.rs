@@ -24,12 +24,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use chaic_agents::{PlannerRules, partners};
 use chaic_episodes::Episode;
 use chaic_protocol::geom::horizontal_distance;
-use chaic_protocol::{Agent, AgentId, Frame, Vec3};
+use chaic_protocol::{AgentId, Frame, Vec3};
 use chaic_world::{Setup, World};
 
 use crate::error::Result;
 use crate::helpers::Helper;
-use crate::play::{Actor, Cast, Minds, Play, Staging, cast};
+use crate::play::{Actor, Bystander, Cast, Minds, Play, Staging, cast};
 use crate::rules::RuleSet;
 use spy::{Log, Seen, Spy};
 
@@ -248,8 +248,8 @@ fn people(
     let helper = Helper { mind: Box::new(spy), grants: helper.grants };
     let mut cast = cast(setup, Minds { helper: Some(helper), partner: None }, rules);
     if pair.partner == Partner::Waits {
-        let waits: Box<dyn Agent> = Box::new(spy::Waiter);
-        cast.actors[AgentId::PARTNER.index()] = Actor::new(waits, partners::PARTNER_GRANTS);
+        let waits = Actor::new(Box::new(Bystander), partners::PARTNER_GRANTS);
+        cast.actors[AgentId::PARTNER.index()] = waits;
     }
     cast
 }

@@ -122,18 +122,3 @@ impl Agent for Spy {
         action
     }
 }
-
-/// Stands there.
-pub(super) struct Waiter;
-
-impl Agent for Waiter {
-    fn senses(&self) -> Senses {
-        Senses::NONE
-    }
-
-    fn reset(&mut self, _: &Briefing) {}
-
-    fn act(&mut self, _: &Observation) -> Action {
-        Action::Wait { frames: 25 }
-    }
-}

@@ -77,7 +77,9 @@ pub fn cast(setup: &Setup, minds: Minds, rules: PlannerRules) -> Cast {
     Cast { actors }
 }
 
-struct Bystander;
+/// Somebody who stands there and looks at nothing.
+#[derive(Clone, Copy, Debug)]
+pub struct Bystander;
 
 impl Agent for Bystander {
     fn senses(&self) -> Senses {

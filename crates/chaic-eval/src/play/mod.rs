@@ -4,7 +4,7 @@ mod cast;
 mod crank;
 mod look;
 
-pub use cast::{Actor, Cast, Minds, cast, world_seed};
+pub use cast::{Actor, Bystander, Cast, Minds, cast, world_seed};
 pub use crank::{Choice, Decide, Flow, crank};
 pub use look::{Eyes, Glance};
 

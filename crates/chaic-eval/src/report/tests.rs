@@ -145,10 +145,10 @@ fn what_was_granted_stands_in_every_format() {
         assert!(!text.contains("partner is told more"), "{text}");
     }
     let all = "**Granted: RHP: ids from ground truth; Oracle: ids from ground truth, told behavior, \
-               goal, progress.**";
+               goal, goal place, progress.**";
     assert!(text(&results, Format::Markdown).contains(all));
     let json: serde_json::Value = serde_json::from_str(&text(&results, Format::Json)).unwrap();
-    let oracle = ["behavior", "goal", "ids", "progress"];
+    let oracle = ["behavior", "goal", "goal_place", "ids", "progress"];
     assert_eq!(
         json["helpers"],
         serde_json::json!({
@@ -157,7 +157,7 @@ fn what_was_granted_stands_in_every_format() {
             "oracle": {"grants": oracle, "perception": "ground_truth"},
         })
     );
-    assert_eq!(json["partner"]["grants"], serde_json::json!(["goal", "ids"]));
+    assert_eq!(json["partner"]["grants"], serde_json::json!(["goal", "goal_place", "ids"]));
     let own =
         RunGrants { helpers: [("rhp".to_owned(), Grants::NONE)].into(), ..granted(Grants::ORACLE) };
     let md = text_with(&results, Some(&own), Format::Markdown);

@@ -219,7 +219,7 @@ fn verify_finds_what_was_changed() {
     let changes = [
         // The second decision of the helper: the next digest differs.
         ("1,\"turn_left\"", "1,\"turn_right\"", "digest"),
-        ("\"impossible\"", "\"blocked\"", "played again it is"),
+        ("\"out_of_reach\"", "\"blocked\"", "played again it is"),
         ("\"complete\":false", "\"complete\":true", "played again it is"),
         ("\"seed\":0", "", "results.jsonl has this run"),
         // The first line: who was told what, by which rules, in which world.
@@ -637,8 +637,9 @@ fn verify_counts_results_and_compares_the_report() {
 
     // A trace that another chaic wrote concerns the whole run: one line says so.
     let trace = run.folder().traces().unwrap().remove(1);
+    let now = format!("\"version\":{}", crate::trace::VERSION);
     let text = fs::read_to_string(&trace).unwrap();
-    fs::write(&trace, text.replacen("\"version\":1", "\"version\":99", 1)).unwrap();
+    fs::write(&trace, text.replacen(&now, "\"version\":99", 1)).unwrap();
     let error = crate::verify::verify_run(run.folder(), run.options(), &helpers, 2, &|_| ());
     let error = error.unwrap_err().to_string();
     assert!(error.contains("is of chaic-trace version 99") && error.contains("use the chaic that"));

@@ -139,7 +139,7 @@ impl World {
             ];
             return Progress::Instant;
         }
-        // Facts of the original, 3.7: the height that counts is that of the place's top. One draw for
+        // Facts S3.7: the height that counts is that of the place's top. One draw for
         // the whole of a rider's basket: it is one attempt.
         let height_excess = excess(self.top_of(place), self.capability(agent).put_range_m);
         let p = self.rules.put_penalty.chance(height_excess);
@@ -189,8 +189,8 @@ impl World {
         ]
     }
 
-    /// Putting on a place what is in a rider's basket, one after the other (facts of the original,
-    /// 8.2), next step last.
+    /// Putting on a place what is in a rider's basket, one after the other (facts
+    /// S8.2), next step last.
     fn unload_steps(&self, agent: AgentId, objects: Vec<EntityId>, place: EntityId) -> Vec<Step> {
         let d = self.rules.durations;
         let hand = Some(Hand::Right);

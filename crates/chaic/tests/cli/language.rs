@@ -225,7 +225,7 @@ fn an_endpoint_that_says_nothing_holds_up_nobody_who_stops_the_run() {
     let answers = standin(Options::default());
     let url = answers.url();
     let resume = ["eval", "--resume", "--out", "run", "--endpoint", &url];
-    assert!(well(at, &resume).contains("LLM+BM"));
+    assert!(well(at, &resume).contains("LLM"));
     let whole = [&play(&url, "whole")[..], &task].concat();
     well(at, &whole);
     let scores = |run: &str| well(at, &["report", run, "--format", "json"]);

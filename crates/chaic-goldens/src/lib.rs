@@ -44,7 +44,7 @@ pub enum GoldenError {
     Setup(String, SetupError),
 }
 
-/// The table: for each task a line for each frame of [`FRAMES`] and for two pictures.
+/// The table: for each task a line for each frame of `FRAMES` and for two pictures.
 ///
 /// # Errors
 /// If a task's first test episode can't be played.

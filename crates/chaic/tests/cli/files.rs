@@ -76,7 +76,7 @@ fn an_altered_run_is_found_out() {
     for (name, from, to, words) in [
         ("scores.json", "0.", "1.", "ALTERED scores.json"),
         ("report.md", "# chaic", "# Chaic", "ALTERED report.md"),
-        ("results.jsonl", "\"status\":\"done\"", "\"~tatus\":\"done\"", "line 1: missing field"),
+        ("results.jsonl", "\"status\":\"done\"", "\"x_status\":\"done\"", "line 1: missing field"),
         ("results.jsonl", "\"total\"", "\"sum\":0,\"total\"", "unknown field `sum`"),
         ("run.json", "\"rules\": \"paper\"", "\"rules\": \"compat\"", "was changed after the run"),
     ] {

@@ -35,7 +35,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
 /// so that the parser says so.
 ///
 /// # Errors
-/// See [`read_bounded`].
+/// If it is no regular file, is longer, or can't be read.
 pub fn read_episode_file(path: &Path) -> Result<Vec<u8>> {
     read_bounded(path, MAX_EPISODE_BYTES as u64 + 1)
 }

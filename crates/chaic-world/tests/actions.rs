@@ -5,7 +5,7 @@ mod common;
 
 use chaic_protocol::action::{Action, FailureReason, Hand, Outcome};
 use chaic_protocol::capability::Persona;
-use chaic_protocol::{AgentId, EntityId, ResolvedAction, TaskId};
+use chaic_protocol::{AgentId, ClassId, EntityId, ResolvedAction, TaskId};
 use chaic_world::{EventKind, Place, Snapshot, State, Wall, World};
 use common::*;
 
@@ -113,6 +113,7 @@ fn whatever_is_not_at_hand_fails_for_one_reason_and_in_one_time() {
     let people = vec![person(Persona::Adult, 0.0, 0.0), person(Persona::Helper, 8.0, 0.8)];
     let mut setup = hall(things, people);
     setup.walls = vec![wall([-5.0, 0.8], [5.0, 0.8])];
+    setup.goal.targets = vec![(ClassId::named("apple"), 4)];
     let mut w = world(setup);
     assert_eq!(run(&mut w, B, pick(nth(0))).0, Outcome::Success);
     let mut state = w.state().clone();

@@ -28,6 +28,9 @@ const NEAR_M: f32 = 1.8;
 const OTHER_PLACE_M: f32 = 0.4;
 /// A way is kept for so many actions: steps are a little longer or shorter than they are planned.
 const KEEP_ACTIONS: usize = 16;
+/// Parts of the room that two need with which a way is searched for, one after the other: the map is
+/// coarse, so that a door may look too narrow. With none, costs alone show the way out (ours).
+const ROOMS: [f32; 3] = [1.0, 0.6, 0.0];
 /// Spacing of the points of a step that are looked at, as parts of it.
 const PARTS: u32 = 3;
 
@@ -67,9 +70,9 @@ pub fn step(
     let next = way.front().and_then(|action| pair.after(pose, *action));
     if blocked.is_some() || next.is_none() {
         way.clear();
-        let found = pair.search(pose, destination, blocked).or_else(|| {
-            // Wedged, by the map: costs alone show the way out.
-            pair.room_m = [0.0; 2];
+        let room_m = pair.room_m;
+        let found = ROOMS.into_iter().find_map(|part| {
+            pair.room_m = room_m.map(|m| part * m);
             pair.search(pose, destination, blocked)
         });
         way.extend(found?.into_iter().take(KEEP_ACTIONS));
@@ -231,10 +234,11 @@ mod tests {
                 Nav::Unreachable => return None,
             };
             let (costs, _) = memory.costs_and_search();
-            let room_m = [0.0; 2];
-            let pair =
-                Pair { costs, bounds: toy.bounds(), other_in_body: end.position_in_body, room_m };
+            let (bounds, other_in_body) = (toy.bounds(), end.position_in_body);
             let pose = observation.own.pose;
+            let mut pair = Pair { costs, bounds, other_in_body, room_m: [costs.radius_m(); 2] };
+            let now = pair.bodies(pose).map(|p| pair.clearance_m(p));
+            pair.room_m = [0, 1].map(|i| pair.room_m[i].min(now[i]));
             let next = pair.after(pose, action);
             let next = next.expect("it has room");
             for body in pair.bodies(next) {

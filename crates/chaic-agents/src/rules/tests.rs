@@ -76,7 +76,7 @@ impl Situated {
 
     /// The first thing that carrying out a plan comes to.
     fn begin(&mut self, executor: &mut Executor, plan: Plan) -> Progress {
-        executor.begin(self.memory.frame);
+        executor.begin(self.memory.frame, &self.memory.rules);
         self.go_on(executor, plan)
     }
 

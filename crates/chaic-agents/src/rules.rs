@@ -104,7 +104,8 @@ pub struct PlannerRules {
     pub any_failure_counts: bool,
     /// How long a goal place is forgotten after a vain put-on, frames.
     pub goal_blackout_frames: Frame,
-    /// How long something that somebody else was seen, told or found to hold is left alone, frames.
+    /// How long something that somebody else was seen, told or found to hold is left alone,
+    /// frames.
     pub held_frames: Frame,
     /// Whether an object is forgotten whose place is seen empty.
     pub forgets_missing: bool,

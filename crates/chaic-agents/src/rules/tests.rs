@@ -2,6 +2,7 @@
 //! case flips one rule of the paper's set. What a random helper draws is tested beside it, and when
 //! the child runs away in `child.rs`.
 
+mod constants;
 mod others;
 mod walking;
 

@@ -11,11 +11,6 @@ use crate::behavior::BehaviorLog;
 use crate::memory::{Memory, Thing};
 use crate::track::{Carried, Hands, TrackId};
 
-/// The partner stands at a piece of furniture if it is this near, metres.
-const AT_PIECE_M: f32 = 1.5;
-/// And was seen there so recently, frames.
-const AT_PIECE_FRAMES: Frame = 150;
-
 /// One object that a plan is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Subject {
@@ -253,15 +248,16 @@ fn pieces_at_partner<'a>(
     memory: &'a Memory,
     briefing: &Briefing,
 ) -> impl Iterator<Item = Subject> + use<'a> {
+    let rules = memory.rules.lifting;
     let partner = memory
         .companion(briefing, Relation::Partner)
-        .filter(|p| p.frame + AT_PIECE_FRAMES > memory.frame)
+        .filter(|p| p.frame + rules.at_piece_frames > memory.frame)
         .map(|p| xz(p.position_in_world));
     memory
         .things
         .iter()
         .filter(|t| t.class.info().role == Role::HeavyTarget && t.is_available(memory.frame))
-        .filter(move |t| partner.is_some_and(|p| t.distance_from(p) < AT_PIECE_M))
+        .filter(move |t| partner.is_some_and(|p| t.distance_from(p) < rules.at_piece_m))
         .map(Subject::of)
 }
 

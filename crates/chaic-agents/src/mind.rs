@@ -12,7 +12,6 @@ use crate::execution::interact::learn;
 use crate::execution::navigate::face;
 use crate::execution::{Executor, Progress, Situation};
 use crate::memory::Memory;
-use crate::memory::semantic::IGNORE_FRAMES;
 use crate::perception::{GroundTruthIds, Perception};
 use crate::rules::PlannerRules;
 use crate::track::{Intent, TrackId, named};
@@ -167,7 +166,8 @@ impl Episode {
             Some(turn) => named(turn, target).map(|action| (turn, action)),
             None => {
                 self.n_glances = 0;
-                self.memory.things.ignore(track, self.memory.frame + IGNORE_FRAMES);
+                let until = self.memory.frame + self.memory.rules.failures.ignore_frames;
+                self.memory.things.ignore(track, until);
                 None
             }
         }
@@ -201,7 +201,8 @@ impl<P: Policy> Mind<P> {
             let chosen = episode.choose(&mut self.policy, self.behavior.as_ref());
             if let Some(plan) = chosen {
                 let thinking = self.policy.thinking_frames();
-                episode.executor.begin(episode.memory.frame + thinking);
+                let begin = episode.memory.frame + thinking;
+                episode.executor.begin(begin, &episode.memory.rules);
                 episode.plan = Some(plan);
                 if thinking > 0 {
                     let wait = Action::Wait { frames: thinking };

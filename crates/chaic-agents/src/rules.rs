@@ -2,9 +2,13 @@
 //! paper's planners and the original's code is a value here, read where it matters.
 //! `docs/rules.md` lists every field with its reason.
 
+mod groups;
+
 use chaic_protocol::Frame;
 use chaic_protocol::briefing::Briefing;
 use serde::{Deserialize, Serialize};
+
+pub use groups::{FailureRules, LiftingRules, PeopleRules, PlanLimits, TimeRules};
 
 /// How ways are planned and walked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -100,7 +104,8 @@ pub struct PlannerRules {
     pub any_failure_counts: bool,
     /// How long a goal place is forgotten after a vain put-on, frames.
     pub goal_blackout_frames: Frame,
-    /// How long something that somebody else held is left alone, frames.
+    /// How long something that somebody else was seen, told or found to hold is left alone,
+    /// frames.
     pub held_frames: Frame,
     /// Whether an object is forgotten whose place is seen empty.
     pub forgets_missing: bool,
@@ -132,6 +137,21 @@ pub struct PlannerRules {
     pub trusts_child: bool,
     /// When the child runs away.
     pub child_draws: ChildDraws,
+    /// How time is weighed, and when a plan is looked at again.
+    #[serde(default)]
+    pub time: TimeRules,
+    /// How long a plan lasts at most.
+    #[serde(default)]
+    pub limits: PlanLimits,
+    /// What is made of failed attempts.
+    #[serde(default)]
+    pub failures: FailureRules,
+    /// When one lifts furniture together with the partner.
+    #[serde(default)]
+    pub lifting: LiftingRules,
+    /// How near one stays to people, and what is made of the child.
+    #[serde(default)]
+    pub people: PeopleRules,
 }
 
 impl PlannerRules {
@@ -165,6 +185,11 @@ impl PlannerRules {
             child_unseen_frames: 200,
             trusts_child: true,
             child_draws: ChildDraws::Seeded,
+            time: TimeRules::STANDARD,
+            limits: PlanLimits::STANDARD,
+            failures: FailureRules::STANDARD,
+            lifting: LiftingRules::STANDARD,
+            people: PeopleRules::STANDARD,
         }
     }
 
@@ -198,6 +223,11 @@ impl PlannerRules {
             child_unseen_frames: 200,
             trusts_child: false,
             child_draws: ChildDraws::Constant,
+            time: TimeRules::STANDARD,
+            limits: PlanLimits::STANDARD,
+            failures: FailureRules::STANDARD,
+            lifting: LiftingRules::STANDARD,
+            people: PeopleRules::STANDARD,
         }
     }
 

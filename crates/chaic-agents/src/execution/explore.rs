@@ -11,8 +11,6 @@ use crate::track::Intent;
 
 /// Borders shorter than this lead nowhere, cells (0.6 m).
 const MIN_FRONTIER: usize = 5;
-/// One border is pursued for so long, frames (facts A2.1).
-pub const EXPLORE_FRAMES: Frame = 250;
 /// A border that could not be resolved is left alone for so long, frames.
 const BLACKLIST_FRAMES: Frame = 1000;
 /// And everything within this radius of it, metres.
@@ -78,7 +76,7 @@ impl Explorer {
     pub fn step(&mut self, memory: &mut Memory, navigator: &mut Navigator) -> Found {
         let now = memory.frame;
         self.blacklist.retain(|(_, until)| *until > now);
-        if self.target.is_some_and(|t| now > t.since + EXPLORE_FRAMES) {
+        if self.target.is_some_and(|t| now > t.since + memory.rules.limits.explore_frames) {
             self.give_up(now);
         }
         if let Some(target) = self.target

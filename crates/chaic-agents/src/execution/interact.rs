@@ -1,10 +1,10 @@
 //! Going to a thing and doing something with it.
 
 use chaic_protocol::geom::xz;
-use chaic_protocol::{Action, Briefing, FailureReason, Frame, Outcome, Role, Vec2};
+use chaic_protocol::{Action, Briefing, FailureReason, Outcome, Role, Vec2};
 
 use super::navigate::{Destination, Nav, Navigator};
-use crate::memory::semantic::{IGNORE_FRAMES, LIFT_FAILURES, Thing};
+use crate::memory::semantic::Thing;
 use crate::memory::{Memory, SETTLE_FRAMES};
 use crate::rules::Walking;
 use crate::track::{Intent, TrackId};
@@ -16,18 +16,11 @@ const ARMS_M: [f32; 3] = [0.62, 0.75, 0.95];
 const RELAXED_M: f32 = 2.4;
 /// Things longer than this are walked up to at their nearest part, metres.
 const LONG_M: f32 = 4.0;
-/// From how many places an object is tried before it is left alone.
-const MAX_TRIES: usize = 4;
 /// Steps close to an object, on the way to a place to stand, before any place will do.
 const MAX_STEPS: u32 = 14;
-/// Something that can't be got to is left alone for so long, frames.
-const UNREACHABLE_FRAMES: Frame = 250;
-/// Something that somebody else had in hand is left alone for so long, frames.
-const HELD_FOR_SURE_FRAMES: Frame = 60;
-/// Whatever is nearer than this by memory, and not within reach, is no longer there, metres.
+/// Whatever is nearer than this by memory, and not within reach, is no longer there, metres: the
+/// world reaches as far (`world.reach_limit_m` of the paper's rules).
 const THERE_M: f32 = 2.0;
-/// Something that can't be done at all is left alone for so long, frames.
-const IMPOSSIBLE_FRAMES: Frame = 2000;
 
 /// What an interaction says.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,7 +39,7 @@ pub struct Interaction {
     /// From where it was tried without success, in earlier plans too.
     tried: Vec<Vec2>,
     /// How often it was tried in this plan.
-    n_tries: usize,
+    n_tries: u32,
     /// How often the demands on a place to stand were lowered.
     n_relaxed: usize,
     /// Steps taken close by since then.
@@ -76,7 +69,7 @@ impl Interaction {
         within_m: f32,
     ) -> Step {
         let Some(thing) = memory.things.get(track) else { return Step::GiveUp };
-        if self.n_tries >= MAX_TRIES {
+        if self.n_tries >= memory.rules.failures.places_tried {
             return self.give_up(memory, track);
         }
         if memory.rules.walking == Walking::Lattice {
@@ -139,9 +132,9 @@ impl Interaction {
     }
 
     fn give_up(&self, memory: &mut Memory, track: TrackId) -> Step {
-        let until =
-            memory.frame + if self.n_tries == 0 { UNREACHABLE_FRAMES } else { IGNORE_FRAMES };
-        memory.things.ignore(track, until);
+        let rules = memory.rules.failures;
+        let frames = if self.n_tries == 0 { rules.unreachable_frames } else { rules.ignore_frames };
+        memory.things.ignore(track, memory.frame + frames);
         Step::GiveUp
     }
 }
@@ -198,7 +191,7 @@ pub fn learn(
             // the paper's rules.
             memory.things.ignore(place, now + memory.rules.goal_blackout_frames);
             for track in released {
-                memory.things.ignore(track, now + IGNORE_FRAMES);
+                memory.things.ignore(track, now + memory.rules.failures.ignore_frames);
             }
         }
         _ => {}
@@ -207,6 +200,7 @@ pub fn learn(
 
 fn learn_failure(memory: &mut Memory, object: TrackId, reason: FailureReason) {
     let now = memory.frame;
+    let rules = memory.rules.failures;
     let reason = match reason {
         FailureReason::Broke | FailureReason::OutOfPlay => reason,
         _ if memory.rules.any_failure_counts => FailureReason::BeyondLimits,
@@ -217,17 +211,17 @@ fn learn_failure(memory: &mut Memory, object: TrackId, reason: FailureReason) {
             let is_heavy =
                 memory.things.get(object).is_some_and(|t| t.class.info().role == Role::HeavyTarget);
             // Furniture is tried again at once, up to a limit (facts A2.5).
-            if !is_heavy || memory.things.count_failure(object) >= LIFT_FAILURES {
-                memory.things.ignore(object, now + IGNORE_FRAMES);
+            if !is_heavy || memory.things.count_failure(object) >= rules.lift_tries {
+                memory.things.ignore(object, now + rules.ignore_frames);
             }
         }
         FailureReason::Broke | FailureReason::OutOfPlay => memory.things.mark_gone(object),
         FailureReason::HeldByOther => {
             memory.things.mark_held(object, now + memory.rules.held_frames);
             // Whatever it looks like: the one who tried knows.
-            memory.things.ignore(object, now + HELD_FOR_SURE_FRAMES);
+            memory.things.ignore(object, now + rules.held_for_sure_frames);
         }
-        FailureReason::Impossible => memory.things.ignore(object, now + IMPOSSIBLE_FRAMES),
+        FailureReason::Impossible => memory.things.ignore(object, now + rules.impossible_frames),
         FailureReason::OutOfReach => {
             let here = memory.here();
             if memory.things.get(object).is_some_and(|t| t.distance_from(here) < THERE_M) {

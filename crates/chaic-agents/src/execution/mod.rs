@@ -20,35 +20,14 @@ use chaic_protocol::{Action, Briefing, FailureReason, Frame, Hand, Outcome, Role
 
 use crate::decision::{Load, Plan};
 use crate::memory::Memory;
-use crate::rules::{Exploration, PlaceChoice, Walking};
+use crate::rules::{Exploration, PlaceChoice, PlanLimits, PlannerRules, Walking};
 use crate::track::{Intent, TrackId};
-use explore::{EXPLORE_FRAMES, Explorer, Found};
+use explore::{Explorer, Found};
 use follow::{Follow, Follower};
 use interact::{Interaction, Step};
 use navigate::Navigator;
 use recover::Recovery;
 use sample::Sampler;
-
-/// Picking up, putting and removing take at most so long, frames (facts A2.1).
-pub const INTERACT_FRAMES: Frame = 1000;
-/// The partner is followed for so long, frames (facts A2.1).
-pub const FOLLOW_FRAMES: Frame = 250;
-/// The child is followed for so long, frames (facts A2.1).
-pub const CHILD_FRAMES: Frame = 300;
-/// How near to stay to the partner, metres.
-const PARTNER_M: f32 = 2.2;
-/// How near to get to the child, metres: it comes back from 2.5 m (facts A2.4).
-const CHILD_M: f32 = 1.9;
-/// How long to stand beside the child, frames: it decides every 18 frames or so.
-const CHILD_STAND_FRAMES: Frame = 30;
-/// A wait lasts so long, frames (facts A2.1).
-const WAIT_FRAMES: u32 = 10;
-/// A place from where something could not be done is remembered so long, frames.
-const BAD_PLACE_FRAMES: Frame = 800;
-/// A partner seen this far from a piece won't lift it now, metres.
-const LEFT_PIECE_M: f32 = 3.0;
-/// Lifts tried together before giving up.
-const LIFTS_TOGETHER: u32 = 8;
 
 /// What the executor says of the plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -123,13 +102,14 @@ impl Executor {
     }
 
     /// Begins a plan.
-    pub fn begin(&mut self, now: Frame) {
+    pub fn begin(&mut self, now: Frame, rules: &PlannerRules) {
         self.navigator.reset();
         self.recovery.reset();
         self.follower = Follower::default();
         self.sampler.begin();
         self.interaction = None;
-        self.bad_places.retain(|(_, _, since)| since + BAD_PLACE_FRAMES > now);
+        let kept_frames = rules.failures.bad_place_frames;
+        self.bad_places.retain(|(_, _, since)| since + kept_frames > now);
         self.since = now;
         (self.n_turns, self.n_lifts) = (0, 0);
         (self.near_since, self.place, self.has_acted) = (None, None, false);
@@ -138,7 +118,7 @@ impl Executor {
     /// The next action of `plan`.
     pub fn step(&mut self, plan: &Plan, s: &mut Situation<'_>) -> Progress {
         let elapsed = s.memory.frame.saturating_sub(self.since);
-        if elapsed > time_limit(plan) {
+        if elapsed > time_limit(plan, &s.memory.rules.limits) {
             self.give_up(plan, s);
             return Progress::Failed;
         }
@@ -186,8 +166,12 @@ impl Executor {
             Plan::RemoveObstacle(subject) => self.remove(subject.track, s),
             Plan::PutIn => self.put_in(s),
             Plan::Deliver => self.deliver(s),
-            Plan::FollowPartner => self.follow(Relation::Partner, PARTNER_M, s),
-            Plan::FollowChild => self.follow(Relation::Child, CHILD_M, s),
+            Plan::FollowPartner => {
+                self.follow(Relation::Partner, s.memory.rules.people.partner_within_m, s)
+            }
+            Plan::FollowChild => {
+                self.follow(Relation::Child, s.memory.rules.people.child_within_m, s)
+            }
             Plan::TurnAround => {
                 self.n_turns += 1;
                 let has_found = s.memory.rules.stops_turning_when_found && has_found_both(s);
@@ -196,7 +180,7 @@ impl Executor {
             }
             Plan::Wait => {
                 self.n_turns += 1;
-                let action = Action::Wait { frames: WAIT_FRAMES };
+                let action = Action::Wait { frames: s.memory.rules.limits.wait_frames };
                 if self.n_turns > 1 { Progress::Done } else { Progress::Act(action) }
             }
         }
@@ -210,7 +194,7 @@ impl Executor {
             | Plan::PickContainer(subject)
             | Plan::LiftWith(subject)
             | Plan::RemoveObstacle(subject) => {
-                let until = s.memory.frame + crate::memory::semantic::IGNORE_FRAMES;
+                let until = s.memory.frame + s.memory.rules.failures.ignore_frames;
                 s.memory.things.ignore(subject.track, until);
             }
             _ => {}
@@ -253,10 +237,11 @@ impl Executor {
         }
         let Some(hand) = load.free_hand else { return Progress::Failed };
         let partner = s.memory.companion(s.briefing, Relation::Partner);
+        let lifting = s.memory.rules.lifting;
         let partner_left = partner.is_some_and(|p| {
-            p.is_in_view && thing.distance_from(xz(p.position_in_world)) > LEFT_PIECE_M
+            p.is_in_view && thing.distance_from(xz(p.position_in_world)) > lifting.left_piece_m
         });
-        if together && (partner_left || self.n_lifts >= LIFTS_TOGETHER) {
+        if together && (partner_left || self.n_lifts >= lifting.tries_together) {
             return Progress::Failed;
         }
         let hand = if is_heavy { Hand::Left } else { hand };
@@ -338,8 +323,9 @@ impl Executor {
                 self.recovery.stand();
                 let since = *self.near_since.get_or_insert(s.memory.frame);
                 let stood = s.memory.frame.saturating_sub(since);
-                let trusts = s.memory.rules.trusts_child;
-                if relation == Relation::Child && trusts && stood > CHILD_STAND_FRAMES {
+                let rules = s.memory.rules;
+                let is_enough = rules.trusts_child && stood > rules.people.child_stand_frames;
+                if relation == Relation::Child && is_enough {
                     return Progress::Done;
                 }
                 Progress::Act(action)
@@ -351,18 +337,18 @@ impl Executor {
 
 /// Whether partner and child were both seen a moment ago (facts A2.1).
 fn has_found_both(s: &Situation<'_>) -> bool {
-    const MOMENT_FRAMES: Frame = 50;
+    let fresh_frames = s.memory.rules.people.fresh_frames;
     [Relation::Partner, Relation::Child].into_iter().all(|relation| {
         let person = s.memory.companion(s.briefing, relation);
-        person.is_some_and(|p| p.frame + MOMENT_FRAMES > s.memory.frame)
+        person.is_some_and(|p| p.frame + fresh_frames > s.memory.frame)
     })
 }
 
-fn time_limit(plan: &Plan) -> Frame {
+fn time_limit(plan: &Plan, limits: &PlanLimits) -> Frame {
     match plan {
-        Plan::Explore => EXPLORE_FRAMES,
-        Plan::FollowPartner => FOLLOW_FRAMES,
-        Plan::FollowChild => CHILD_FRAMES,
-        _ => INTERACT_FRAMES,
+        Plan::Explore => limits.explore_frames,
+        Plan::FollowPartner => limits.follow_partner_frames,
+        Plan::FollowChild => limits.follow_child_frames,
+        _ => limits.interact_frames,
     }
 }

@@ -158,7 +158,7 @@ impl Memory {
         let in_view: Vec<Vec3> =
             self.people.iter().filter(|p| p.is_in_view).map(|p| p.position_in_world).collect();
         let hands_at = if self.rules.sees_holding { &in_view[..] } else { &[] };
-        self.things.see(detections, hands_at, self.frame);
+        self.things.see(detections, hands_at, self.rules.held_frames, self.frame);
         if self.rules.forgets_missing {
             self.things.forget_missing(observation);
         }
@@ -361,16 +361,15 @@ impl Memory {
     /// Whether child and partner look too far apart: both in view, or both seen a moment ago
     /// (facts A2.1, A2.4).
     pub fn child_is_away(&self, briefing: &Briefing) -> bool {
-        const APART_SEEN_M: f32 = 3.5;
-        const APART_REMEMBERED_M: f32 = 5.5;
-        const FRESH_FRAMES: Frame = 50;
+        let rules = self.rules.people;
         let companions =
             [Relation::Partner, Relation::Child].map(|relation| self.companion(briefing, relation));
         let [Some(partner), Some(child)] = companions else { return false };
         let apart_m = horizontal_distance(partner.position_in_world, child.position_in_world);
         let are_in_view = partner.is_in_view && child.is_in_view;
-        let are_fresh = partner.frame.min(child.frame) + FRESH_FRAMES > self.frame;
-        (are_in_view && apart_m > APART_SEEN_M) || (are_fresh && apart_m > APART_REMEMBERED_M)
+        let are_fresh = partner.frame.min(child.frame) + rules.fresh_frames > self.frame;
+        (are_in_view && apart_m > rules.child_apart_in_view_m)
+            || (are_fresh && apart_m > rules.child_apart_remembered_m)
     }
 
     /// The last sighting of the companion of this relation.

@@ -8,12 +8,6 @@ use chaic_protocol::{ClassId, Frame, Observation, Role, Vec2, Vec3};
 use crate::perception::Detection;
 use crate::track::TrackId;
 
-/// How long an object is left alone after a failed attempt, frames (facts A1.1).
-pub const IGNORE_FRAMES: Frame = 500;
-/// Failed lifts of one piece of furniture before it is left alone (facts A2.5).
-pub const LIFT_FAILURES: u32 = 5;
-/// How long something taken by somebody else counts as held, frames.
-const HELD_FRAMES: Frame = 300;
 /// Something that moved by less has not been moved, metres.
 const MOVED_M: f32 = 0.5;
 /// A place is in clear view if nothing is seen before it by more than this, metres. (That
@@ -191,8 +185,14 @@ impl SemanticMap {
     }
 
     /// Takes in what is seen now. `people` are the places of the people in the image: what is
-    /// between their hands is held.
-    pub fn see(&mut self, detections: &[Detection], people: &[Vec3], now: Frame) {
+    /// between their hands counts as held for `held_frames`.
+    pub fn see(
+        &mut self,
+        detections: &[Detection],
+        people: &[Vec3],
+        held_frames: Frame,
+        now: Frame,
+    ) {
         for seen in detections.iter().filter(|d| d.person.is_none()) {
             let held = looks_held(seen, self.things.get(&seen.track), people, now);
             match self.things.get_mut(&seen.track) {
@@ -208,7 +208,7 @@ impl SemanticMap {
             }
             if let Some(thing) = self.things.get_mut(&seen.track) {
                 if held {
-                    thing.held_until = now + HELD_FRAMES;
+                    thing.held_until = now + held_frames;
                 } else if thing.held_until > now {
                     thing.held_until = 0;
                     self.news += 1;
@@ -354,7 +354,7 @@ mod tests {
     fn look(map: &mut SemanticMap, toy: &Toy, people: &[Vec3]) {
         let observation = toy.observe();
         let percepts = GroundTruthIds.perceive(&observation);
-        map.see(&percepts.detections, people, observation.frame);
+        map.see(&percepts.detections, people, 300, observation.frame);
         map.forget_missing(&observation);
     }
 

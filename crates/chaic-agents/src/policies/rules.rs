@@ -9,21 +9,6 @@ use crate::memory::{Memory, Person};
 use crate::rules::Bookkeeping;
 use crate::track::TrackId;
 
-/// A plan under way is looked at again after so long, frames.
-const RECONSIDER_FRAMES: Frame = 40;
-/// What the partner held counts for so long after it was seen, frames.
-const HOLDINGS_FRAMES: Frame = 300;
-/// Time to look out for, beyond the walk to the goal place, frames.
-const SPARE_FRAMES: f32 = 120.0;
-/// Walking as it is, turns included, takes longer than the way at full speed by this factor.
-const WALK_FACTOR: f32 = 1.5;
-/// A pick-up and a put-on take at least so long together, frames.
-const DEED_FRAMES: f32 = 130.0;
-/// After standing beside the child, it may come back by itself for so long, frames.
-const TRUST_CHILD_FRAMES: Frame = 250;
-/// A failed lift of the partner calls for help for so long, frames.
-const CALL_FRAMES: Frame = 300;
-
 /// Which objects one goes for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wanted {
@@ -57,11 +42,12 @@ pub struct RuleProfile {
     pub lifts_together: bool,
     /// Whether it counts what it takes itself, where bookkeeping is the original's.
     pub counts_picks: bool,
-    /// With more than this part of the time left, a container comes first.
+    /// With more than this part of the time left, a container comes first (facts A2.2).
     pub container_above: f32,
-    /// With less than this part of the time left, what is carried is delivered at once.
+    /// With less than this part of the time left, what is carried is delivered at once (facts
+    /// A2.2).
     pub deliver_below: f32,
-    /// The same while no goal place is known.
+    /// The same while no goal place is known (facts A2.2).
     pub deliver_below_unknown: f32,
 }
 
@@ -133,15 +119,17 @@ impl Rules {
         }
         let guardian = memory.companion(context.briefing, Relation::Partner);
         let child = memory.people.get(child);
+        let people = memory.rules.people;
         let beside = |c: &Person| {
-            c.is_in_view && horizontal_distance(memory.pose.position, c.position_in_world) < 2.3
+            let apart_m = horizontal_distance(memory.pose.position, c.position_in_world);
+            c.is_in_view && apart_m < people.child_beside_m
         };
         // The child turns back at its next decision; from then on it needs no company.
+        let has_stood = |since: Frame| now > since + people.child_stand_frames;
+        let is_overdue = |since: Frame| now >= since + people.child_trust_frames;
         let trusted = memory.rules.trusts_child
-            && self
-                .beside_child
-                .is_some_and(|since| now > since + 30 && now < since + TRUST_CHILD_FRAMES);
-        if self.beside_child.is_some_and(|since| now >= since + TRUST_CHILD_FRAMES) {
+            && self.beside_child.is_some_and(|since| has_stood(since) && !is_overdue(since));
+        if self.beside_child.is_some_and(is_overdue) {
             self.beside_child = None;
         }
         if let Some(c) = child {
@@ -192,11 +180,12 @@ impl Rules {
             return None;
         }
         let now = context.memory.frame;
+        let call_frames = context.memory.rules.lifting.call_frames;
         let failed = Outcome::Failure(FailureReason::BeyondLimits);
         let partner = context.briefing.companion(Relation::Partner);
         let in_vain = partner
             .and_then(|p| context.behavior.last_pick_of(p))
-            .filter(|(seen, _)| seen.frame + CALL_FRAMES > now && seen.outcome == Some(failed))
+            .filter(|(seen, _)| seen.frame + call_frames > now && seen.outcome == Some(failed))
             .map(|(_, object)| object);
         let strength_kg = context.briefing.capability.strength_kg;
         valid.iter().copied().find(|plan| match plan {
@@ -259,7 +248,8 @@ impl Policy for Rules {
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, is_news: bool) -> bool {
-        if !context.memory.rules.reconsiders {
+        let rules = context.memory.rules;
+        if !rules.reconsiders {
             return self.is_interrupted(context, current);
         }
         if matches!(current, Plan::Deliver | Plan::PutIn | Plan::LiftWith(_) | Plan::TurnAround) {
@@ -271,7 +261,7 @@ impl Policy for Rules {
         }
         is_news
             || self.child_calls(context)
-            || context.memory.frame >= self.last_choice + RECONSIDER_FRAMES
+            || context.memory.frame >= self.last_choice + rules.time.reconsider_frames
     }
 }
 
@@ -317,7 +307,8 @@ impl<'a> Need<'a> {
             memory.delivered.iter().filter_map(|e| memory.class_of(*e)).collect();
         done.extend(load.targets.iter().map(|(_, class)| *class));
         let behavior = context.behavior;
-        if behavior.partner_holds_frame.is_some_and(|f| f + HOLDINGS_FRAMES > memory.frame) {
+        let holds_frames = memory.rules.time.partner_holds_frames;
+        if behavior.partner_holds_frame.is_some_and(|f| f + holds_frames > memory.frame) {
             let still =
                 behavior.partner_holds.iter().filter(|(e, _)| !memory.delivered.contains(e));
             done.extend(still.map(|(_, class)| *class));
@@ -367,7 +358,8 @@ fn frames_left(context: &Context<'_>) -> f32 {
 
 /// Frames to walk so far.
 fn frames_for(context: &Context<'_>, way_m: f32) -> f32 {
-    WALK_FACTOR * way_m / context.briefing.capability.speed_m_per_frame.max(1e-3)
+    context.memory.rules.time.walk_factor * way_m
+        / context.briefing.capability.speed_m_per_frame.max(1e-3)
 }
 
 /// Whether what is carried must be brought now: by the paper's rule, or because the way is long.
@@ -377,9 +369,10 @@ fn must_go(context: &Context<'_>, profile: &RuleProfile) -> bool {
         Some(_) => profile.deliver_below,
         None => profile.deliver_below_unknown,
     };
-    let is_far = context.memory.rules.weighs_time
-        && place
-            .is_some_and(|m| frames_left(context) < frames_for(context, m) + 2.0 * SPARE_FRAMES);
+    let rules = context.memory.rules;
+    let spare = rules.time.spare_frames as f32;
+    let is_far = rules.weighs_time
+        && place.is_some_and(|m| frames_left(context) < frames_for(context, m) + spare);
     part_left(context) < below || is_far
 }
 
@@ -396,7 +389,7 @@ fn there_is_time(context: &Context<'_>, track: TrackId) -> bool {
     let Some(onward_m) = onward_m else { return true };
     let way_m = thing.distance_from(memory.here()) + onward_m;
     let speed = context.briefing.capability.speed_m_per_frame.max(1e-3);
-    frames_left(context) > way_m / speed + DEED_FRAMES
+    frames_left(context) > way_m / speed + memory.rules.time.pick_and_put_frames as f32
 }
 
 #[cfg(test)]

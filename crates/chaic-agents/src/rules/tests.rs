@@ -2,6 +2,7 @@
 //! case flips one rule of the paper's set. What a random helper draws is tested beside it, and when
 //! the child runs away in `child.rs`.
 
+mod constants;
 mod others;
 mod walking;
 
@@ -76,7 +77,7 @@ impl Situated {
 
     /// The first thing that carrying out a plan comes to.
     fn begin(&mut self, executor: &mut Executor, plan: Plan) -> Progress {
-        executor.begin(self.memory.frame);
+        executor.begin(self.memory.frame, &self.memory.rules);
         self.go_on(executor, plan)
     }
 

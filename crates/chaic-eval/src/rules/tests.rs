@@ -1,5 +1,5 @@
-//! Promises: single rules are set by name, both sets are made of the rules that are listed, every rule
-//! stands in `docs/rules.md` with the values that it has, and old listings are read.
+//! Promises: single rules are set by name, both sets are made of the rules that are listed, every
+//! rule stands in `docs/rules.md` with the values that it has, and old listings are read.
 
 use super::*;
 
@@ -79,9 +79,8 @@ fn listed(page: &str) -> Vec<(&str, Vec<&str>)> {
 
 /// Whether a row says what is so, be it as 2 or as 2.0.
 fn says(row: &str, value: &str) -> bool {
-    let same_number =
-        row.parse::<f32>().ok().zip(value.parse::<f32>().ok()).is_some_and(|(a, b)| a == b);
-    row == value || same_number
+    let number = |text: &str| text.parse::<f32>().ok();
+    row == value || number(row).is_some_and(|n| number(value) == Some(n))
 }
 
 #[test]

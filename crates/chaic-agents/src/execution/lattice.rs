@@ -15,14 +15,59 @@ use crate::memory::{CELL_M, Memory, Space};
 const AHEAD: usize = 5;
 /// Heading for it within this, one walks on, radians: 1.2 turns.
 const WALK_RAD: f32 = 1.2 * TURN_RAD;
-/// Who has turned so often without a step takes one (ours). Nobody needs more than half a circle to
-/// face any way; but what one sees on turning may move the way to the other side, and back again.
+/// Who has turned towards its way so often without a step keeps to the way that it then knows, and
+/// waits for nobody meanwhile (ours). Nobody needs more than half a circle to face any way; but what
+/// one sees on turning may move the way to the other side, or block it, and back again.
 const MOST_TURNS: u32 = 24;
+/// A way is kept for so many cells (1.5 m), and for so many actions (ours: half a circle of turns
+/// to either side, and the steps).
+const KEPT_CELLS: usize = 12;
+const KEPT_ACTIONS: u32 = 40;
+/// Whoever is farther than this from the way that it keeps to has left it, metres.
+const OFF_WAY_M: f32 = 0.5;
 /// To do something with a thing, the way to it may have so many cells at most.
 const INTERACT_CELLS: usize = 25;
 
-/// The next action on the way to `destination`; `n_turns` counts the turns since the last step.
-pub fn step(memory: &mut Memory, destination: &Destination, n_turns: &mut u32) -> Nav {
+/// What lasts between decisions, so that nobody turns to and fro for ever.
+#[derive(Clone, Debug, Default)]
+pub struct Steadiness {
+    /// Turns towards the way since the last step.
+    n_turns: u32,
+    /// The way that one keeps to, whatever is seen meanwhile, and for how many actions yet.
+    kept: Option<(Vec<usize>, u32)>,
+}
+
+impl Steadiness {
+    /// Notes a turn towards `way`, the one that is known now.
+    fn turn(&mut self, way: &Path) {
+        self.n_turns += 1;
+        if self.n_turns > MOST_TURNS {
+            self.n_turns = 0;
+            let cells = way.cells.iter().copied().take(KEPT_CELLS).collect();
+            self.kept = Some((cells, KEPT_ACTIONS));
+        }
+    }
+
+    /// What is left of the way that one keeps to. It ends where one has left it, or where a wall
+    /// turns out to stand on it; not where an obstacle does, which is seen from one side and not from
+    /// the other while one turns.
+    fn kept_way(&mut self, memory: &Memory) -> Option<Path> {
+        let (cells, n_left) = self.kept.take().filter(|(_, n_left)| *n_left > 0)?;
+        let (grid, here) = (memory.map.grid(), memory.here());
+        let away_m = |cell: &usize| grid.center(*cell).distance(here);
+        let nearest = cells.iter().map(away_m).enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+        let (first, _) = nearest.filter(|(_, away_m)| *away_m <= OFF_WAY_M)?;
+        let ahead = cells.get(first..).filter(|ahead| ahead.len() > 1)?.to_vec();
+        if ahead.iter().any(|cell| memory.map.space(*cell) == Space::Wall) {
+            return None;
+        }
+        self.kept = Some((cells, n_left - 1));
+        Some(Path { cells: ahead, cost: 0 })
+    }
+}
+
+/// The next action on the way to `destination`.
+pub fn step(memory: &mut Memory, destination: &Destination, steady: &mut Steadiness) -> Nav {
     let (here, yaw) = (memory.here(), memory.pose.yaw_rad);
     let target = destination.nearest(here);
     let (costs, search) = memory.costs_and_search();
@@ -37,6 +82,7 @@ pub fn step(memory: &mut Memory, destination: &Destination, n_turns: &mut u32) -
     if here.distance(target) < destination.within_m && is_short {
         return Nav::Arrived;
     }
+    let way = steady.kept_way(memory).unwrap_or(way);
     if memory.waits_for_obstacles() && way.cost > BLOCKED && memory.map.space(end) != Space::Wall {
         // It waits for somebody to clear the way.
         return Nav::Act(Action::TurnLeft);
@@ -44,15 +90,12 @@ pub fn step(memory: &mut Memory, destination: &Destination, n_turns: &mut u32) -
     let to = waypoint(memory, &way);
     let at = |p: Vec2| Vec3::new(p.x, 0.0, p.y);
     let error = wrap_angle(yaw_towards(at(here), at(to)) - yaw);
-    *n_turns += 1;
-    Nav::Act(if error.abs() < WALK_RAD || to == here || *n_turns > MOST_TURNS {
-        *n_turns = 0;
-        Action::MoveForward
-    } else if error > 0.0 {
-        Action::TurnLeft
-    } else {
-        Action::TurnRight
-    })
+    if error.abs() < WALK_RAD || to == here {
+        steady.n_turns = 0;
+        return Nav::Act(Action::MoveForward);
+    }
+    steady.turn(&way);
+    Nav::Act(if error > 0.0 { Action::TurnLeft } else { Action::TurnRight })
 }
 
 /// The cell to head for: a little ahead, or the next one if a wall is anywhere between.
@@ -73,6 +116,7 @@ fn waypoint(memory: &Memory, way: &Path) -> Vec2 {
 mod tests {
     use super::*;
     use crate::PlannerRules;
+    use crate::perception::{GroundTruthIds, Perception as _};
     use crate::rules::Walking;
     use crate::test_support::{Toy, ToyObject};
     use chaic_protocol::AgentId;
@@ -90,12 +134,44 @@ mod tests {
         let mut memory = Memory::new(&briefing, rules);
         let mut observation = toy.observe();
         observation.frame = 300;
-        let percepts = crate::perception::Perception::perceive(
-            &mut crate::perception::GroundTruthIds,
-            &observation,
-        );
+        let percepts = GroundTruthIds.perceive(&observation);
         memory.update(&briefing, &observation, &percepts);
-        step(&mut memory, &Destination::near(Vec2::new(2.0, 0.0), 0.3), &mut 0)
+        step(&mut memory, &Destination::near(Vec2::new(2.0, 0.0), 0.3), &mut Steadiness::default())
+    }
+
+    #[test]
+    fn who_turns_to_and_fro_keeps_to_one_way_and_leaves_it_in_time() {
+        let mut toy = Toy::room(10.0, 10.0);
+        let briefing = toy.briefing();
+        let rules = PlannerRules { walking: Walking::Lattice, ..PlannerRules::paper() };
+        let mut memory = Memory::new(&briefing, rules);
+        let look = |toy: &Toy, memory: &mut Memory| {
+            let observation = toy.observe();
+            let percepts = GroundTruthIds.perceive(&observation);
+            memory.update(&briefing, &observation, &percepts);
+            memory.refresh();
+        };
+        look(&toy, &mut memory);
+        let grid = *memory.map.grid();
+        let cells = |x: f32| {
+            let at = |k: u32| grid.cell_at(Vec2::new(x * k as f32 * CELL_M, 0.0));
+            (0..20).map(|k| at(k).expect("inside")).collect()
+        };
+        let [left, right] = [-1.0, 1.0].map(|x| Path { cells: cells(x), cost: 0 });
+        let mut steady = Steadiness::default();
+        for way in [&left, &right].into_iter().cycle().take(MOST_TURNS as usize) {
+            steady.turn(way);
+            assert!(steady.kept_way(&memory).is_none());
+        }
+        steady.turn(&left);
+        let kept = steady.kept_way(&memory).expect("it has turned too often");
+        assert_eq!(kept.cells, left.cells[..KEPT_CELLS]);
+        toy.stand([-0.5, 0.0], 0.0);
+        look(&toy, &mut memory);
+        let rest = steady.kept_way(&memory).expect("it goes on");
+        assert_eq!(rest.cells, left.cells[4..KEPT_CELLS]);
+        let n_more = std::iter::from_fn(|| steady.kept_way(&memory)).count();
+        assert_eq!(n_more, KEPT_ACTIONS as usize - 2, "not for ever");
     }
 
     #[test]

@@ -178,8 +178,8 @@ pub struct Navigator {
     to: Option<(Vec2, f32)>,
     age: u32,
     is_tight_way: bool,
-    /// Turns since the last step, where ways are those of the original.
-    n_turns: u32,
+    /// What lasts between decisions where ways are those of the original.
+    steady: super::lattice::Steadiness,
     /// What comes next where two carry furniture.
     joint_way: VecDeque<Intent>,
 }
@@ -194,7 +194,7 @@ impl Navigator {
     /// The next action on the way to `destination`.
     pub fn step(&mut self, memory: &mut Memory, destination: &Destination) -> Nav {
         if memory.rules.walking == Walking::Lattice {
-            return super::lattice::step(memory, destination, &mut self.n_turns);
+            return super::lattice::step(memory, destination, &mut self.steady);
         }
         if let Some(nav) = super::carry::step(memory, destination, &mut self.joint_way) {
             return nav;

@@ -193,6 +193,30 @@ mod tests {
     }
 
     #[test]
+    fn a_lintel_is_no_wall_once_the_floor_below_it_is_seen() {
+        let mut toy = Toy::room(8.0, 8.0);
+        let lintel = toy.add(ToyObject::new("cabinet", [0.0, 2.1, -2.5], [1.0, 0.4, 0.3]));
+        toy.stand([0.0, 0.0], 0.0);
+        let mut map = OccupancyMap::new(&toy.bounds());
+        let (grid, mut belief) = (*map.grid(), Belief::default());
+        let mut cost = vec![0; grid.n_cells()];
+        let observation = toy.observe();
+        let percepts = GroundTruthIds.perceive(&observation);
+        assert!(percepts.detections.iter().any(|d| d.track == lintel), "it is in view");
+        map.integrate(&observation, &percepts, 1.75, MAP_RANGE_M);
+        let seen = Seen {
+            map: &map,
+            things: &SemanticMap::default(),
+            people: &People::default(),
+            heeds_obstacles: false,
+            now: FIRST_FRAMES,
+        };
+        lattice_costs(&grid, &seen, &mut belief, &mut cost);
+        let below = grid.disc(Vec2::new(0.0, -2.4), 0.3);
+        assert!(below.map(|cell| cost[cell]).all(|cost| cost < WALL_EXTRA));
+    }
+
+    #[test]
     fn only_what_is_as_tall_as_walls_are_costs_as_much_for_good() {
         let mut toy = Toy::room(6.0, 6.0);
         let boxes = [(-0.7, 2.1), (0.7, 2.3)].map(|(x, height_m)| {

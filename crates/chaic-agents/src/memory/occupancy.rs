@@ -70,10 +70,12 @@ impl Cell {
         self.seen & SEEN_NEAR != 0
     }
 
-    /// Whether something as tall as only walls are was ever seen there.
+    /// Whether something as tall as only walls are was ever seen there, and reaches down to where
+    /// people are. A lintel does not: its floor is seen, and nothing between.
     #[inline]
     pub fn is_tall(self) -> bool {
-        self.seen & SEEN_TALL != 0
+        let is_open = self.seen & SEEN_FREE != 0 && self.seen & SEEN_FIRM == 0;
+        self.seen & SEEN_TALL != 0 && !is_open
     }
 }
 
@@ -86,8 +88,10 @@ const ASSUMED: u8 = 4;
 const SEEN_NEAR: u8 = 8;
 /// Something of it was seen that is as tall as only walls are.
 const SEEN_TALL: u8 = 16;
+/// Something between ankle and head was seen there.
+const SEEN_FIRM: u8 = 32;
 /// What tells nothing of where one can walk.
-const BESIDES: u8 = SEEN_NEAR | SEEN_TALL;
+const BESIDES: u8 = SEEN_NEAR | SEEN_TALL | SEEN_FIRM;
 /// Bits of what one image shows of a cell.
 const NOW_FLOOR: u8 = 1;
 const NOW_OCCUPIED: u8 = 2;
@@ -371,6 +375,7 @@ impl OccupancyMap {
             let bits = std::mem::take(&mut self.now[cell]);
             if bits & NOW_OCCUPIED != 0 {
                 self.sure[cell] = (self.sure[cell] + SURE_ONCE).min(SURE_MOST);
+                self.seen[cell] |= SEEN_FIRM;
             } else if bits & NOW_FLOOR != 0 {
                 self.sure[cell] = self.sure[cell].saturating_sub(1);
             }

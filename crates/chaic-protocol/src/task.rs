@@ -67,8 +67,9 @@ pub struct TaskInfo {
     pub horizon: Frame,
     /// The target sets that the goal is drawn from.
     pub sets: &'static [TargetSet],
-    /// Names of the classes that the goal place may have (paper, appendix on task generation; the
-    /// high goal places are those of the original's episodes).
+    /// Names of the classes that the goal place has in episodes of the paper's shape (paper, appendix on
+    /// task generation; the high goal places are those of the original's episodes). With decoys, all
+    /// indoor tasks have one of the house's.
     pub goal_places: &'static [&'static str],
 }
 

@@ -20,14 +20,14 @@ Environment:
 import argparse
 import collections
 import json
-import os
 import pathlib
 import re
 import shutil
 import subprocess
 import sys
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+from programs import ROOT, programs
+
 # Enough for some decisions of everybody, and no more.
 FRAMES = 40
 TASKS = ("no_constraint", "shopping")
@@ -41,15 +41,6 @@ def arguments():
     parser.add_argument("--every", type=int, default=1, help="kill at every N-th call only")
     parser.add_argument("--model", action="store_true", help="with a language helper")
     return parser.parse_args()
-
-
-def programs():
-    names = ("chaic", "chaic-llm-standin")
-    if folder := os.environ.get("BIN"):
-        return [pathlib.Path(folder) / name for name in names]
-    packages = ["--package", "chaic", "--package", "chaic-llm-standin"]
-    subprocess.run(["cargo", "build", "--release", "--quiet", *packages], cwd=ROOT, check=True)
-    return [ROOT / "target/release" / name for name in names]
 
 
 def short_episodes(chaic, folder):

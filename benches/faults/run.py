@@ -13,14 +13,14 @@ Environment:
 
 import argparse
 import json
-import os
 import pathlib
 import re
 import subprocess
 import sys
 import time
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+from programs import ROOT, programs
+
 KINDS = """refused reset timeout slow-drip 429-with-wait 429 500 503 empty truncated wrong-schema
 plan-not-listed huge invalid-utf8""".split()
 # Patience is short, as the stand-in answers at once; all else is as usual.
@@ -43,15 +43,6 @@ def arguments():
     parser.add_argument("--helper", default="llm")
     parser.add_argument("--first", type=int, help="only the first N episodes of each task")
     return parser.parse_args()
-
-
-def programs():
-    names = ("chaic", "chaic-llm-standin")
-    if folder := os.environ.get("BIN"):
-        return [pathlib.Path(folder) / name for name in names]
-    packages = ["--package", "chaic", "--package", "chaic-llm-standin"]
-    subprocess.run(["cargo", "build", "--release", "--quiet", *packages], cwd=ROOT, check=True)
-    return [ROOT / "target/release" / name for name in names]
 
 
 def play(chaic, standin, args, kind):

@@ -20,8 +20,8 @@ use crate::track::{Intent, TrackId, named};
 const MAX_PLANS: usize = 6;
 /// How long that moment is, frames.
 const PAUSE_FRAMES: u32 = 5;
-/// One who points at things stands at least this far off when it does, metres: a level eye at
-/// 1.65 m that sees 45 degrees down has the floor in view from there on.
+/// One who points at things acts from this near on, metres: farther off than an arm, since a level eye
+/// at 1.65 m that sees 45 degrees down has the floor in view from 1.65 m on only.
 const POINT_FROM_M: f32 = 2.2;
 /// Facing something within this angle, it is looked at, radians: half of a turn.
 const FACING_RAD: f32 = std::f32::consts::PI / 24.0;
@@ -154,7 +154,9 @@ impl Episode {
     fn name(&mut self, intent: Intent, perception: &dyn Perception) -> Option<(Intent, Action)> {
         let target = |track| perception.target(track);
         if let Some(action) = named(intent, target) {
-            self.n_glances *= u32::from(action.is_locomotion());
+            if !action.is_locomotion() {
+                self.n_glances = 0;
+            }
             return Some((intent, action));
         }
         let track = intent.subject()?;
@@ -205,8 +207,8 @@ impl<P: Policy> Mind<P> {
                 episode.executor.begin(begin, &episode.memory.rules);
                 episode.plan = Some(plan);
                 if thinking > 0 {
-                    let wait = Action::Wait { frames: thinking };
-                    return Some((Action::Wait { frames: thinking }, wait));
+                    let frames = thinking;
+                    return Some((Action::Wait { frames }, Action::Wait { frames }));
                 }
             }
             let plan = episode.plan?;

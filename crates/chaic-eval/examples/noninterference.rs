@@ -22,7 +22,7 @@ const FIRST_SEED: u64 = 500_000;
 const FRAMES: u32 = 1500;
 /// Side of the images, pixels.
 const IMAGE_SIZE: u32 = 64;
-/// Who watches, by turns.
+/// Who watches, by turns: seven, so that all meet all eight tasks.
 const OBSERVERS: [&str; 7] =
     ["rhp", "random", "follow", "blind prober", "seeing prober", "pointing prober", "rhp"];
 

@@ -295,7 +295,7 @@ fn summary(said: &str) -> String {
 mod tests {
     use super::*;
 
-    fn settings(url: &str, kind: Kind) -> Settings {
+    pub(super) fn settings(url: &str, kind: Kind) -> Settings {
         let mut settings = Settings::default();
         (settings.endpoint.url, settings.endpoint.kind) = (url.to_owned(), kind);
         settings.asking.model = "m".to_owned();

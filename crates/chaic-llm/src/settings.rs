@@ -340,7 +340,7 @@ fn holds_null(value: &serde_json::Value) -> bool {
 mod tests {
     use super::*;
 
-    fn good() -> Settings {
+    pub(super) fn good() -> Settings {
         let mut settings = Settings::default();
         settings.asking.model = "m".to_owned();
         settings.endpoint.url = "http://127.0.0.1:8000/v1".to_owned();

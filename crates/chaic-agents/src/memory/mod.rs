@@ -337,8 +337,8 @@ impl Memory {
     }
 
     /// The known goal places that one can get to, nearest first, with the way to each in metres.
-    /// First come those on which nothing was put in vain, then those within the own reach, and last
-    /// those that were given up lately.
+    /// Those on which something was put in vain come last, before them those that were given up
+    /// lately, and before these the ones out of the own reach.
     pub fn goal_places(&self) -> Vec<(&Thing, f32)> {
         let mut places: Vec<_> = self
             .things

@@ -56,12 +56,12 @@ impl Log {
     pub(super) fn overhear(&mut self, world: &World) {
         let class = |e: EntityId| world.setup().thing(e).map(|t| (e, t.class));
         let is_held = |e: &EntityId| {
-            let holders = world.setup().agents().filter(|a| *a != AgentId::HELPER);
-            holders.into_iter().any(|a| world.state().people[a.index()].hands.contains(&Some(*e)))
+            let mut holders = world.setup().agents().filter(|a| *a != AgentId::HELPER);
+            holders.any(|a| world.state().people[a.index()].hands.contains(&Some(*e)))
         };
         self.held_by_other = world.setup().entities().filter(is_held).collect();
-        self.delivered = world.delivered().into_iter().filter_map(class).collect();
         let delivered = world.delivered();
+        self.delivered = delivered.iter().copied().filter_map(class).collect();
         let in_play = world.setup().entities().filter(|e| !delivered.contains(e));
         self.in_play = in_play.filter(|e| !is_held(e)).filter_map(class).collect();
     }

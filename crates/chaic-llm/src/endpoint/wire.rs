@@ -170,14 +170,8 @@ fn transport(error: &ureq::Error) -> Failure {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::settings;
     use super::*;
-
-    fn settings(url: &str, kind: Kind) -> Settings {
-        let mut settings = Settings::default();
-        (settings.endpoint.url, settings.endpoint.kind) = (url.to_owned(), kind);
-        settings.asking.model = "m".to_owned();
-        settings
-    }
 
     #[test]
     fn addresses_of_all_dialects() {

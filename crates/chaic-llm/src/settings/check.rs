@@ -144,14 +144,8 @@ fn wrong(field: &'static str, found: &str, expected: &str) -> Result<()> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::good;
     use super::*;
-
-    fn good() -> Settings {
-        let mut settings = Settings::default();
-        settings.asking.model = "m".to_owned();
-        settings.endpoint.url = "http://127.0.0.1:8000/v1".to_owned();
-        settings
-    }
 
     type Change = fn(&mut Settings);
 

@@ -1,0 +1,134 @@
+//! The first moment of a run: whatever was stopped there begins again, and nothing of anybody else's is
+//! removed.
+
+use super::*;
+
+/// What a run of one episode file writes before its `run.json`, beside the lock.
+const BEGINNING: [&str; 7] = [
+    "episodes/low_target-short-0.json",
+    "episodes/low_target-short-0.json.tmp",
+    "episodes/shopping-old.json",
+    "llm/settings.json",
+    "llm/settings.json.tmp",
+    "llm/templates/task.txt",
+    "run.json.tmp",
+];
+
+#[test]
+fn a_run_that_was_stopped_before_it_began_begins_again() {
+    let source = episode_files(&[TaskId::LowTarget], 1);
+    let dir = tempfile::tempdir().unwrap();
+    let helpers = TestHelpers::new();
+    let given = given(&source, &["turner"]);
+    let names = |path: &Path| {
+        let mut names: Vec<_> = files_below(path).into_iter().collect();
+        names.sort();
+        names
+    };
+    let undisturbed = dir.path().join("undisturbed");
+    drop(Run::open(&undisturbed, Access::Begin, &given, &helpers).unwrap());
+    // Whatever of it is there: all orders of writing leave one of these.
+    for left in 0..1_u32 << BEGINNING.len() {
+        let path = dir.path().join(left.to_string());
+        fs::create_dir(&path).unwrap();
+        fs::write(path.join(".lock"), "").unwrap();
+        for (_, name) in BEGINNING.iter().enumerate().filter(|(k, _)| left >> k & 1 == 1) {
+            fs::create_dir_all(path.join(name).parent().unwrap()).unwrap();
+            fs::write(path.join(name), "{ torn").unwrap();
+        }
+        let error = RunFolder::check_begun(&path).unwrap_err();
+        assert!(matches!(error, EvalError::NotBegun { .. }), "{left}: {error}");
+        let access = if left % 2 == 0 { Access::Begin } else { Access::Resume };
+        drop(Run::open(&path, access, &given, &helpers).unwrap());
+        assert_eq!(names(&path), names(&undisturbed), "{left}");
+    }
+}
+
+/// Names and contents of all files below a folder.
+fn files_below(path: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut found = Vec::new();
+    for entry in crate::files::entries(path).unwrap() {
+        let name = entry.file_name().unwrap().to_str().unwrap().to_owned();
+        if entry.is_dir() {
+            let below = files_below(&entry).into_iter();
+            found.extend(below.map(|(below, bytes)| (format!("{name}/{below}"), bytes)));
+        } else {
+            found.push((name, fs::read(&entry).unwrap()));
+        }
+    }
+    found
+}
+
+#[test]
+fn what_no_run_has_left_is_never_removed() {
+    let source = episode_files(&[TaskId::LowTarget], 1);
+    let dir = tempfile::tempdir().unwrap();
+    let helpers = TestHelpers::new();
+    let given = given(&source, &["turner"]);
+    for (k, name) in [
+        "episodes/letter.txt",
+        "episodes/more/a.json",
+        "letter.txt",
+        "results.jsonl",
+        "traces/a.jsonl",
+        "llm/low_target/vlm/short-0-s0.jsonl",
+    ]
+    .iter()
+    .enumerate()
+    {
+        let path = dir.path().join(k.to_string());
+        fs::create_dir_all(path.join(name).parent().unwrap()).unwrap();
+        for file in [".lock", name] {
+            fs::write(path.join(file), "dear").unwrap();
+        }
+        let before = files_below(&path);
+        let open = |access| Run::open(&path, access, &given, &helpers).unwrap_err();
+        let (begun, resumed) = (open(Access::Begin), open(Access::Resume));
+        assert!(matches!(begun, EvalError::NotEmpty { .. }), "{name}: {begun}");
+        assert!(matches!(resumed, EvalError::NotARun { .. }), "{name}: {resumed}");
+        assert_eq!(files_below(&path), before);
+    }
+    // Episodes that are named as the run's own are somebody's, whatever else lies there.
+    let path = dir.path().join("own");
+    fs::create_dir_all(path.join("episodes")).unwrap();
+    fs::write(path.join(".lock"), "").unwrap();
+    fs::copy(source.path().join("low_target-0.json"), path.join("episodes/a.json")).unwrap();
+    let own = Given { episodes: Some(path.join("episodes")), ..given.clone() };
+    let before = files_below(&path);
+    let error = Run::open(&path, Access::Begin, &own, &helpers).unwrap_err();
+    assert!(matches!(error, EvalError::NotEmpty { .. }), "{error}");
+    assert_eq!(files_below(&path), before);
+    // A folder of episodes without a lock is somebody's.
+    let path = dir.path().join("mine");
+    fs::create_dir_all(path.join("episodes")).unwrap();
+    fs::write(path.join("episodes/a.json"), "{}").unwrap();
+    let error = Run::open(&path, Access::Begin, &given, &helpers).unwrap_err();
+    assert!(matches!(error, EvalError::NotEmpty { .. }), "{error}");
+    assert_eq!(files_below(&path).len(), 1);
+}
+
+#[test]
+fn mistakes_leave_nothing_behind() {
+    let source = episode_files(&[TaskId::LowTarget], 1);
+    let dir = tempfile::tempdir().unwrap();
+    let helpers = TestHelpers::new();
+    let path = dir.path().join("run");
+    let good = given(&source, &["turner"]);
+    let file = source.path().join("low_target-0.json");
+    let twin = source.path().join("twin.json");
+    fs::copy(&file, &twin).unwrap();
+    for given in [
+        good.clone(),
+        Given { tasks: Some(vec![TaskId::Shopping]), ..good.clone() },
+        Given { partner: Some("nobody".to_owned()), ..good.clone() },
+        Given { episodes: None, split: "gen:0..2000000".parse().ok(), ..good.clone() },
+    ] {
+        for access in [Access::Begin, Access::Resume] {
+            let error = Run::open(&path, access, &given, &helpers).unwrap_err();
+            assert!(error.is_usage(), "{error}");
+            assert!(!path.exists(), "{error}");
+        }
+    }
+    fs::remove_file(&twin).unwrap();
+    Run::open(&path, Access::Begin, &good, &helpers).unwrap();
+}

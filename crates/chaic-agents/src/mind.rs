@@ -197,7 +197,8 @@ impl Episode {
 }
 
 impl<P: Policy> Mind<P> {
-    /// What to do next, as it is meant and as it is named; `None` for a pause.
+    /// What to do next, as it is meant and as it is named; `None` for a pause. Where nothing that the
+    /// policy chooses can be done, one looks around elsewhere, from where it may be possible.
     fn decide(&mut self, episode: &mut Episode) -> Option<(Intent, Action)> {
         for _ in 0..MAX_PLANS {
             let chosen = episode.choose(&mut self.policy, self.behavior.as_ref());
@@ -222,7 +223,14 @@ impl<P: Policy> Mind<P> {
                 Progress::Done | Progress::Failed => episode.plan = None,
             }
         }
-        None
+        episode.executor.begin(episode.memory.frame, &episode.memory.rules);
+        episode.plan = Some(Plan::Explore);
+        let mut situation = Situation { memory: &mut episode.memory, briefing: &episode.briefing };
+        let progress = episode.executor.step(&Plan::Explore, &mut situation);
+        match progress {
+            Progress::Act(intent) => episode.name(intent, self.perception.as_ref()),
+            Progress::Done | Progress::Failed => None,
+        }
     }
 }
 

@@ -7,8 +7,11 @@ use crate::track::{Carried, Hands, TrackId};
 
 /// Fewer pixels than this are no detection (facts A1.8).
 pub const MIN_PIXELS: u32 = 5;
-/// Every how many rows and columns large surfaces are looked at.
+/// Every how many rows and columns it is looked at what says nothing of the room.
 pub const STRIDE: u32 = 2;
+/// A row of an image is measured at so many points at least, as far as large things go: at 5 m they
+/// are 8 cm apart then, less than points of a footprint.
+const MEASURED_PER_ROW: usize = 128;
 /// Points farther than this say nothing of where an object is, metres (facts A1.1).
 const OBJECT_RANGE_M: f32 = 10.0;
 /// People are seen from anywhere (facts A1.8: whoever is in the image is placed where it is).
@@ -298,6 +301,7 @@ impl Perception for GroundTruthIds {
             return Percepts { hands, ..Percepts::default() };
         }
         let stride = STRIDE as usize;
+        let coarse_stride = (width / MEASURED_PER_ROW).max(stride);
         let rays = Rays::new(&observation.camera);
         let mut tallies: Vec<Tally> = looks.iter().map(|_| Tally::NEW).collect();
         let sampled_width = width.div_ceil(stride);
@@ -329,8 +333,9 @@ impl Perception for GroundTruthIds {
                 };
                 if look == Look::Small {
                     (from..end).for_each(add);
-                } else if on_row {
-                    (from.next_multiple_of(stride)..end).step_by(stride).for_each(&mut add);
+                } else if row % coarse_stride == 0 {
+                    let first = from.next_multiple_of(coarse_stride);
+                    (first..end).step_by(coarse_stride).for_each(&mut add);
                 }
             }
         }

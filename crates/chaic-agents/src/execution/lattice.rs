@@ -4,12 +4,13 @@
 //! [`Walking::Lattice`]: crate::rules::Walking
 
 use chaic_protocol::geom::{wrap_angle, yaw_towards};
-use chaic_protocol::{Action, Vec2, Vec3};
+use chaic_protocol::{Action, Frame, Vec2, Vec3};
 
 use super::navigate::{Destination, Nav, TURN_RAD};
 use super::path::Path;
 use crate::memory::lattice_costs::BLOCKED;
 use crate::memory::{CELL_M, Memory, Space};
+use crate::rules::FailureRules;
 
 /// One heads for the cell that is so many ahead on the way.
 const AHEAD: usize = 5;
@@ -35,6 +36,10 @@ pub struct Steadiness {
     n_turns: u32,
     /// The way that one keeps to, whatever is seen meanwhile, and for how many actions yet.
     kept: Option<(Vec<usize>, u32)>,
+    /// Since when one has waited for an obstacle to be cleared away.
+    waits_since: Option<Frame>,
+    /// One waits for none until then, having waited in vain.
+    impatient_until: Frame,
 }
 
 impl Steadiness {
@@ -46,6 +51,20 @@ impl Steadiness {
             let cells = way.cells.iter().copied().take(KEPT_CELLS).collect();
             self.kept = Some((cells, KEPT_ACTIONS));
         }
+    }
+
+    /// Whether one still waits for the obstacle in the way.
+    fn is_patient(&mut self, now: Frame, rules: &FailureRules) -> bool {
+        if now < self.impatient_until {
+            return false;
+        }
+        let since = *self.waits_since.get_or_insert(now);
+        let is_patient = now < since + rules.obstacle_patience_frames;
+        if !is_patient {
+            self.waits_since = None;
+            self.impatient_until = now + rules.ignore_frames;
+        }
+        is_patient
     }
 
     /// What is left of the way that one keeps to. It ends where one has left it, or where a wall
@@ -84,9 +103,11 @@ pub fn step(memory: &mut Memory, destination: &Destination, steady: &mut Steadin
     }
     let way = steady.kept_way(memory).unwrap_or(way);
     if memory.waits_for_obstacles() && way.cost > BLOCKED && memory.map.space(end) != Space::Wall {
-        // It waits for somebody to clear the way.
-        return Nav::Act(Action::TurnLeft);
+        // It waits for somebody to clear the way, though not for ever.
+        let is_patient = steady.is_patient(memory.frame, &memory.rules.failures);
+        return if is_patient { Nav::Act(Action::TurnLeft) } else { Nav::Unreachable };
     }
+    steady.waits_since = None;
     let to = waypoint(memory, &way);
     let at = |p: Vec2| Vec3::new(p.x, 0.0, p.y);
     let error = wrap_angle(yaw_towards(at(here), at(to)) - yaw);
@@ -122,8 +143,8 @@ mod tests {
     use chaic_protocol::AgentId;
     use chaic_protocol::capability::Persona;
 
-    /// The first step of somebody towards an obstacle straight ahead.
-    fn first_step(persona: Persona, me: AgentId) -> Nav {
+    /// What somebody remembers who stands before an obstacle, with the obstacle straight ahead.
+    fn before_obstacle(persona: Persona, me: AgentId) -> Memory {
         let mut toy = Toy::room(10.0, 10.0);
         toy.add(ToyObject::new("trashbin", [2.0, 0.0, 0.0], [0.5, 0.6, 0.5]));
         toy.stand([-1.0, 0.0], -std::f32::consts::FRAC_PI_2);
@@ -136,7 +157,31 @@ mod tests {
         observation.frame = 300;
         let percepts = GroundTruthIds.perceive(&observation);
         memory.update(&briefing, &observation, &percepts);
-        step(&mut memory, &Destination::near(Vec2::new(2.0, 0.0), 0.3), &mut Steadiness::default())
+        memory
+    }
+
+    /// The first step of somebody towards an obstacle straight ahead.
+    fn first_step(persona: Persona, me: AgentId) -> Nav {
+        step(&mut before_obstacle(persona, me), &beyond_obstacle(), &mut Steadiness::default())
+    }
+
+    fn beyond_obstacle() -> Destination {
+        Destination::near(Vec2::new(2.0, 0.0), 0.3)
+    }
+
+    #[test]
+    fn nobody_waits_for_an_obstacle_to_be_cleared_for_ever() {
+        let mut memory = before_obstacle(Persona::Wheelchair, AgentId::PARTNER);
+        let (mut steady, begin) = (Steadiness::default(), memory.frame);
+        let FailureRules { obstacle_patience_frames, ignore_frames, .. } = memory.rules.failures;
+        let again = obstacle_patience_frames + ignore_frames;
+        for after in (0..again + 10).step_by(2) {
+            memory.frame = begin + after;
+            let waits = after < obstacle_patience_frames || after >= again;
+            let expected = if waits { Nav::Act(Action::TurnLeft) } else { Nav::Unreachable };
+            let nav = step(&mut memory, &beyond_obstacle(), &mut steady);
+            assert_eq!(nav, expected, "after {after} frames");
+        }
     }
 
     #[test]

@@ -59,6 +59,35 @@ pub trait Goal {
     fn at_least_m(&self, cell: usize) -> f32;
 }
 
+/// Visits the neighbors that one can step to from a cell without cutting an occupied corner, with
+/// the cost of each cell and what it is multiplied by.
+#[inline(always)]
+fn for_steps(costs: &[u32], grid: &Grid, from: usize, mut visit: impl FnMut(usize, u32, u32)) {
+    let (i, j) = grid.column_row(from);
+    let nx = grid.nx();
+    if i == 0 || j == 0 || i + 1 == nx || j + 1 == grid.nz() {
+        for (next, diagonal) in grid.neighbors(from) {
+            if step_cost(costs, grid, from, next, diagonal).is_some() {
+                visit(next, costs[next], if diagonal { DIAGONAL } else { STRAIGHT });
+            }
+        }
+        return;
+    }
+    let (above, below) = (from - nx, from + nx);
+    let [up, left, right, down] = [above, from - 1, from + 1, below].map(|c| costs[c]);
+    visit(above, up, STRAIGHT);
+    visit(from - 1, left, STRAIGHT);
+    visit(from + 1, right, STRAIGHT);
+    visit(below, down, STRAIGHT);
+    for (beside, row) in [(up, above), (down, below)] {
+        for (corner, next) in [(left, row - 1), (right, row + 1)] {
+            if beside < OCCUPIED && corner < OCCUPIED {
+                visit(next, costs[next], DIAGONAL);
+            }
+        }
+    }
+}
+
 /// What a step into `cell` costs; `None` if it cuts an occupied corner.
 fn step_cost(costs: &[u32], grid: &Grid, from: usize, cell: usize, diagonal: bool) -> Option<u32> {
     if !diagonal {
@@ -123,11 +152,10 @@ impl Search {
             if goal.is_goal(cell) {
                 return Some(Path { cells: self.trace(start, cell), cost });
             }
-            for (next, diagonal) in grid.neighbors(cell) {
-                if let Some(step) = step_cost(costs, grid, cell, next, diagonal) {
-                    self.improve(next, cell, cost.saturating_add(step), || still(next));
-                }
-            }
+            for_steps(costs, grid, cell, |next, enter, factor| {
+                let step = enter.saturating_mul(factor);
+                self.improve(next, cell, cost.saturating_add(step), || still(next));
+            });
         }
         None
     }
@@ -162,14 +190,11 @@ impl Reach {
                 continue;
             }
             reach.cost[cell] = cost;
-            for (next, diagonal) in costs.grid().neighbors(cell) {
-                if costs.is_blocked(next) {
-                    continue;
+            for_steps(costs.costs(), costs.grid(), cell, |next, enter, factor| {
+                if enter < OCCUPIED {
+                    search.improve(next, cell, cost.saturating_add(enter * factor), || 0);
                 }
-                if let Some(step) = step_cost(costs.costs(), costs.grid(), cell, next, diagonal) {
-                    search.improve(next, cell, cost.saturating_add(step), || 0);
-                }
-            }
+            });
         }
         reach
     }

@@ -97,7 +97,7 @@ impl Recovery {
         let ahead = xz(memory.pose.forward());
         let reach_m = memory.costs().radius_m() + BUMP_AHEAD_M;
         let at = memory.here() + reach_m * ahead;
-        memory.map.bump(at, memory.frame);
+        memory.map.bump(at, memory.frame, memory.rules.failures.barred_frames);
         // A small turn first, then larger ones.
         let n_turns = [2, 3, 5, 8].get(self.n_bumps as usize - 1).copied();
         self.back_off(memory, n_turns.unwrap_or(4 + rng.below(8)), rng);

@@ -165,6 +165,11 @@ impl CostMap {
                 }
             }
         }
+        let own = |cell: usize| self.grid.center(cell).distance(here) <= OWN_PLACE_M;
+        for cell in map.barred_cells(self.radius_m).filter(|cell| !own(*cell)) {
+            self.cost[cell] = self.cost[cell].max(OCCUPIED);
+            clearance[cell] = 0;
+        }
         measure_clearance(&self.grid, &mut clearance);
         self.add_rings(&clearance);
         self.clearance = OnceCell::from(clearance);

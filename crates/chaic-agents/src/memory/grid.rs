@@ -63,7 +63,7 @@ impl Grid {
     }
 
     /// [`Grid::cell_at`] without branches, for loops over very many points; -1 if there is none.
-    #[inline]
+    #[inline(always)]
     pub fn cell_or_none(&self, x: f32, z: f32) -> i32 {
         let (x, z) = ((x - self.min.x) * (1.0 / CELL_M), (z - self.min.y) * (1.0 / CELL_M));
         let (nx, nz) = (self.nx as i32, self.nz as i32);

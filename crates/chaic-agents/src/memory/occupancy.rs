@@ -27,6 +27,9 @@ const SURE_MOST: u8 = 6;
 const PLACE_CELLS: usize = 8;
 /// How long a bump is remembered, frames.
 const BUMP_FRAMES: Frame = 300;
+/// So many bumps within this of each other are a barrier, metres.
+const BARRIER_BUMPS: usize = 3;
+const BARRIER_M: f32 = 0.6;
 /// Radius of the place around a bump that is avoided, metres.
 const BUMP_RADIUS_M: f32 = 0.2;
 
@@ -102,7 +105,7 @@ const NOW_TALL: u8 = 16;
 /// What a pixel shows is a cell times this, and `NOW_*` bits.
 const SHOWN_CELL: u32 = 32;
 /// So many pixels are looked at at once.
-const LANES: usize = 8;
+const LANES: usize = 16;
 
 /// What counts as inside the map, as occupied and as near.
 #[derive(Clone, Copy)]
@@ -117,7 +120,7 @@ struct Limits {
 impl Limits {
     /// What pixels of one row at depths `d` show, 0 for nothing. `columns` and `row` are those of
     /// [`Rays`], axis by axis.
-    #[inline]
+    #[inline(always)]
     fn shown(
         &self,
         d: &[f32; LANES],
@@ -153,13 +156,31 @@ impl Limits {
 }
 
 /// Every so many-th of a row of pixels.
-#[inline]
+#[inline(always)]
 fn every(stride: usize, row: &[f32], sampled: &mut [f32]) {
     if stride == 2 && row.len().is_multiple_of(2) {
         // The usual case in a form that the compiler makes a few instructions of.
         sampled.iter_mut().zip(row.as_chunks::<2>().0).for_each(|(to, pair)| *to = pair[0]);
     } else {
         sampled.iter_mut().zip(row.iter().step_by(stride)).for_each(|(to, d)| *to = *d);
+    }
+}
+
+/// A scan of one image, so that it is compiled for vectors of each width.
+struct Scan<'a> {
+    map: &'a mut OccupancyMap,
+    depth: &'a [f32],
+    percepts: &'a Percepts,
+    camera: &'a Camera,
+    limits_m: [f32; 2],
+}
+
+impl pulp::NullaryFnOnce for Scan<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.map.scan(self.depth, self.percepts, self.camera, self.limits_m);
     }
 }
 
@@ -183,6 +204,8 @@ pub struct OccupancyMap {
     /// Frame in which each coarse square was seen last, plus one; 0 if never.
     place_seen: Vec<Frame>,
     bumps: Vec<Bump>,
+    /// Where nobody of this body gets through, for all that one knows.
+    barriers: Vec<Bump>,
     version: u32,
 }
 
@@ -218,6 +241,7 @@ impl OccupancyMap {
             touched: Vec::new(),
             place_seen: vec![0; n_places],
             bumps: Vec::new(),
+            barriers: Vec::new(),
             version: 0,
         }
     }
@@ -264,10 +288,21 @@ impl OccupancyMap {
         (j / PLACE_CELLS) * self.grid.nx().div_ceil(PLACE_CELLS) + i / PLACE_CELLS
     }
 
-    /// Remembers that one could not get on at `at` (x, z).
-    pub fn bump(&mut self, at: Vec2, now: Frame) {
+    /// Remembers that one could not get on at `at` (x, z). Where that happens again and again, there
+    /// is a barrier for `barred_frames`: something that isn't seen, or leaves too little room.
+    pub fn bump(&mut self, at: Vec2, now: Frame, barred_frames: Frame) {
         self.bumps.push(Bump { at, until: now + BUMP_FRAMES });
+        let is_here = |bump: &Bump| bump.at.distance(at) < BARRIER_M;
+        if self.bumps.iter().filter(|b| is_here(b)).count() >= BARRIER_BUMPS {
+            let here = self.bumps.extract_if(.., |b| is_here(b));
+            self.barriers.extend(here.map(|b| Bump { until: now + barred_frames, ..b }));
+        }
         self.version += 1;
+    }
+
+    /// Cells in the way of a body of this radius, metres, because of barriers.
+    pub fn barred_cells(&self, radius_m: f32) -> impl Iterator<Item = usize> + '_ {
+        self.barriers.iter().flat_map(move |b| self.grid.disc(b.at, radius_m))
     }
 
     /// Cells to avoid because of bumps; one that was bumped into twice comes twice.
@@ -285,13 +320,15 @@ impl OccupancyMap {
         known_m: f32,
     ) {
         let now = observation.frame;
-        let n_bumps = self.bumps.len();
+        let n_bumps = self.bumps.len() + self.barriers.len();
         self.bumps.retain(|b| b.until > now);
-        let mut changed = self.bumps.len() != n_bumps;
+        self.barriers.retain(|b| b.until > now);
+        let mut changed = self.bumps.len() + self.barriers.len() != n_bumps;
         if let Some(depth) = observation.images.depth_m.as_ref() {
             let camera = &observation.camera;
             if depth.len() == camera.width as usize * camera.height as usize {
-                self.scan(depth, percepts, camera, [height_m, known_m]);
+                let limits_m = [height_m, known_m];
+                pulp::Arch::new().dispatch(Scan { map: self, depth, percepts, camera, limits_m });
                 changed |= self.apply_scan(now);
                 changed |= self.assume_near(depth, camera);
             }
@@ -307,6 +344,7 @@ impl OccupancyMap {
     }
 
     /// Marks in `now` what the image shows of each cell.
+    #[inline(always)]
     fn scan(
         &mut self,
         depth: &[f32],
@@ -340,21 +378,22 @@ impl OccupancyMap {
             let lanes = sampled.as_chunks::<LANES>().0.iter().zip(xs.iter().zip(ys).zip(zs));
             for (d, ((x, y), z)) in lanes {
                 let shown = limits.shown(d, [x, y, z], rays.eye, rays.rows[row]);
-                // Neighbors mostly show the same.
-                if shown.iter().fold(0, |differ, shown| differ | (shown ^ last)) != 0 {
-                    for shown in shown {
-                        if shown != last {
-                            self.mark(shown);
-                        }
-                        last = shown;
-                    }
+                // Neighbors mostly show the same: a bit for each that doesn't.
+                let before = |k: usize| if k == 0 { last } else { shown[k - 1] };
+                let before: [u32; LANES] = std::array::from_fn(before);
+                let bit = |k: usize| u32::from(shown[k] != before[k]) << k;
+                let mut changes = (0..LANES).fold(0, |changes, k| changes | bit(k));
+                while changes != 0 {
+                    self.mark(shown[changes.trailing_zeros() as usize % LANES]);
+                    changes &= changes - 1;
                 }
+                last = shown[LANES - 1];
             }
         }
     }
 
     /// Marks what a pixel shows, see [`Limits::shown`].
-    #[inline]
+    #[inline(always)]
     fn mark(&mut self, shown: u32) {
         if shown != 0 {
             let (cell, bits) = ((shown / SHOWN_CELL) as usize, (shown % SHOWN_CELL) as u8);
@@ -499,8 +538,28 @@ mod tests {
         let version = map.version();
         look(&mut map, &toy);
         assert_eq!(map.version(), version);
-        map.bump(Vec2::ZERO, 0);
+        map.bump(Vec2::ZERO, 0, 0);
         assert!(map.version() > version && map.bumped_cells().count() > 4);
+    }
+
+    #[test]
+    fn where_one_bumps_again_and_again_is_a_barrier_for_a_while() {
+        let mut toy = Toy::room(6.0, 6.0);
+        toy.stand([0.0, 0.0], 0.3);
+        let mut map = OccupancyMap::new(&toy.bounds());
+        let n_barred = |map: &OccupancyMap| map.barred_cells(0.35).count();
+        map.bump(Vec2::new(0.0, -1.0), 0, 1000);
+        map.bump(Vec2::new(0.0, -2.0), 0, 1000);
+        map.bump(Vec2::new(0.2, -1.0), 0, 1000);
+        assert_eq!(n_barred(&map), 0, "bumps here and there");
+        map.bump(Vec2::new(-0.2, -1.0), 0, 1000);
+        assert!(n_barred(&map) > 10);
+        assert!(map.bumped_cells().count() > 4, "the one elsewhere is remembered");
+        for (frame, is_barred) in [(999, true), (1000, false)] {
+            toy.frame = frame;
+            look(&mut map, &toy);
+            assert_eq!(n_barred(&map) > 0, is_barred, "at frame {frame}");
+        }
     }
 
     #[test]

@@ -255,3 +255,55 @@ fn a_plan_begins_after_the_thinking() {
         assert_eq!(mind.act(&toy.observe()), Action::TurnLeft, "it thinks once for a plan");
     }
 }
+
+/// Never chooses anything that can be done.
+struct Stubborn;
+
+impl Policy for Stubborn {
+    fn reset(&mut self, _: &Briefing) {}
+
+    fn choose(&mut self, _: &Context<'_>, _: &[Plan]) -> Plan {
+        Plan::PutIn
+    }
+}
+
+#[test]
+fn who_can_do_nothing_that_it_wants_looks_around_instead_of_standing_there() {
+    let (mut toy, _) = house();
+    let briefing = Briefing { horizon: 600, ..toy.briefing() };
+    let from = toy.here();
+    let mut farthest_m: f32 = 0.0;
+    let mut mind = Mind::new(Stubborn, PlannerRules::paper());
+    mind.reset(&briefing);
+    while toy.frame < briefing.horizon {
+        let action = mind.act(&toy.observe());
+        assert!(action.is_locomotion(), "{action:?}");
+        toy.apply(action);
+        farthest_m = farthest_m.max(toy.here().distance(from));
+    }
+    assert!(farthest_m > 3.0, "{farthest_m} m");
+}
+
+#[test]
+fn nobody_tries_a_blocked_doorway_over_and_over() {
+    // The doorway looks free, but the body is wider than it believes.
+    let mut toy = Toy::room(10.0, 5.0);
+    toy.add_wall([-0.05, -2.5], [0.05, -0.55]);
+    toy.add_wall([-0.05, 0.55], [0.05, 2.5]);
+    toy.radius_m = 0.6;
+    toy.stand([-2.5, 0.0], 0.0);
+    let mut briefing = toy.briefing();
+    (briefing.capability.radius_m, briefing.horizon) = (0.35, 3000);
+    let mut mind = helpers::rhp(crate::PlannerRules::paper());
+    mind.reset(&briefing);
+    // Where it last got farther than half a metre from, and when.
+    let (mut from, mut since, mut longest) = (toy.here(), 0, 0);
+    while toy.frame < briefing.horizon {
+        toy.apply(mind.act(&toy.observe()));
+        if toy.here().distance(from) > 0.5 {
+            (from, since) = (toy.here(), toy.frame);
+        }
+        longest = longest.max(toy.frame - since);
+    }
+    assert!(longest < 300, "{longest} frames at one place");
+}

@@ -60,6 +60,14 @@ pub struct FailureRules {
     /// An object with which what was tried is impossible is left alone for so long, frames. Ours:
     /// two thirds of an episode, as what is impossible stays so.
     pub impossible_frames: Frame,
+    /// Where one has bumped into something again and again, nobody gets through for so long, frames.
+    /// Ours: a third of an episode, as obstacles stay unless somebody clears them away.
+    pub barred_frames: Frame,
+    /// Who waits for somebody to clear an obstacle away, where ways are those of the original, gives
+    /// up after so long, frames, and does other things for `ignore_frames`. Ours: less than after
+    /// which one counts as stuck. The original waits until its plan ends (facts A1.6), and then
+    /// makes the same plan again.
+    pub obstacle_patience_frames: Frame,
 }
 
 /// When one lifts furniture together with the partner. The original's planners never mean to
@@ -141,6 +149,8 @@ impl FailureRules {
         unreachable_frames: 250,
         held_for_sure_frames: 60,
         impossible_frames: 2000,
+        barred_frames: 1000,
+        obstacle_patience_frames: 150,
     };
 }
 

@@ -125,9 +125,19 @@ fn present(ids: &[u16]) -> Vec<EntityId> {
             is_there[usize::from(*id >> 6)] |= 1 << (id & 63);
         }
     }
-    let set = |id: &u16| is_there[usize::from(id >> 6)] >> (id & 63) & 1 == 1;
+    let ids_of = |(word, bits): (usize, &u64)| {
+        let bits = *bits;
+        let set = (0..64_u16).filter(move |k| bits >> k & 1 == 1);
+        set.map(move |k| EntityId(64 * word as u16 + k))
+    };
     let named = |e: &EntityId| e.is_object() || e.agent().is_some();
-    (0..=u16::MAX).filter(set).map(EntityId).filter(named).collect()
+    is_there
+        .iter()
+        .enumerate()
+        .filter(|(_, bits)| **bits != 0)
+        .flat_map(ids_of)
+        .filter(named)
+        .collect()
 }
 
 /// Takes away what wasn't asked for or isn't granted; ids that were taken away.

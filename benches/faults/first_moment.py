@@ -26,7 +26,8 @@ import shutil
 import subprocess
 import sys
 
-from programs import ROOT, programs
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+from programs import ROOT, programs, serving  # noqa: E402
 
 # Enough for some decisions of everybody, and no more.
 FRAMES = 40
@@ -109,16 +110,10 @@ def main():
     args.out.mkdir(parents=True)
     chaic, standin = programs()
     short_episodes(chaic, args.out / "episodes")
-    server, asked = None, []
-    if args.model:
-        server = subprocess.Popen([standin, "--port", "0"], stdout=subprocess.PIPE, text=True)
-        address = re.search(r"http://\S+", server.stdout.readline()).group()
-        asked = ["--endpoint", address, "--model", "standin"]
-    try:
-        return kill_everywhere(args, chaic, asked)
-    finally:
-        if server:
-            server.kill()
+    if not args.model:
+        return kill_everywhere(args, chaic, [])
+    with serving(standin) as address:
+        return kill_everywhere(args, chaic, ["--endpoint", address, "--model", "standin"])
 
 
 def kill_everywhere(args, chaic, asked):

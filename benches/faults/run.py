@@ -14,12 +14,12 @@ Environment:
 import argparse
 import json
 import pathlib
-import re
 import subprocess
 import sys
 import time
 
-from programs import ROOT, programs
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+from programs import ROOT, programs, serving  # noqa: E402
 
 KINDS = """refused reset timeout slow-drip 429-with-wait 429 500 503 empty truncated wrong-schema
 plan-not-listed huge invalid-utf8""".split()
@@ -51,19 +51,13 @@ def play(chaic, standin, args, kind):
     config = args.out / "patience.toml"
     config.write_text(CONFIG)
     faulty = [] if kind == "none" else ["--fault", f"{kind}={args.rate}"]
-    server = subprocess.Popen(
-        [standin, "--port", "0", "--stall-ms", "2000", *faulty], stdout=subprocess.PIPE, text=True
-    )
-    try:
-        address = re.search(r"http://\S+", server.stdout.readline()).group()
+    with serving(standin, "--stall-ms", "2000", *faulty) as address:
         command = [chaic, "eval", "--split", "test", "--helper", args.helper, "--jobs", "8"]
         command += ["--llm-config", config, "--endpoint", address, "--model", "standin"]
         command += ["--no-traces", "--out", out]
         command += ["--first", str(args.first)] if args.first else []
         with open(args.out / f"{kind}.log", "w") as log:
             subprocess.run(command, stdout=log, stderr=log, check=False)
-    finally:
-        server.kill()
     lines = (out / "results.jsonl").read_text().splitlines()
     return [json.loads(line) for line in lines]
 

@@ -1,0 +1,31 @@
+"""The programs that commands of these folders run: those in the folder BIN, or built here."""
+
+import contextlib
+import os
+import pathlib
+import re
+import subprocess
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+
+
+def programs():
+    """Paths of chaic and of the stand-in for a language model."""
+    names = ("chaic", "chaic-llm-standin")
+    if folder := os.environ.get("BIN"):
+        return [pathlib.Path(folder).resolve() / name for name in names]
+    packages = ["--package", "chaic", "--package", "chaic-llm-standin"]
+    subprocess.run(["cargo", "build", "--release", "--quiet", *packages], cwd=ROOT, check=True)
+    return [ROOT / "target/release" / name for name in names]
+
+
+@contextlib.contextmanager
+def serving(standin, *options):
+    """Runs the stand-in, and gives its address."""
+    command = [standin, "--port", "0", *options]
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        yield re.search(r"http://\S+", server.stdout.readline()).group()
+    finally:
+        server.kill()
+        server.wait()

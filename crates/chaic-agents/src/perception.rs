@@ -157,6 +157,7 @@ impl Tally {
         squares: Vec::new(),
     };
 
+    #[inline(always)]
     fn add(&mut self, p: Vec3) {
         self.n_points += 1;
         self.sum += p;
@@ -170,6 +171,7 @@ impl Tally {
         }
     }
 
+    #[inline(always)]
     fn run(&mut self, row: usize, from: usize, end: usize) {
         let n = (end - from) as u32;
         self.n_pixels += n;
@@ -201,7 +203,7 @@ impl Tally {
 }
 
 /// Rounds half away from zero, as `f32::round` does in a call to the C library for every point.
-#[inline]
+#[inline(always)]
 fn nearest_whole(x: f32) -> i16 {
     let x = x.clamp(-40_000.0, 40_000.0);
     let whole = x as i32;
@@ -211,9 +213,9 @@ fn nearest_whole(x: f32) -> i16 {
 }
 
 /// How many of the first ids are the same.
-#[inline]
+#[inline(always)]
 fn run_length(ids: &[u16]) -> usize {
-    const AT_ONCE: usize = 16;
+    const AT_ONCE: usize = 32;
     let Some(first) = ids.first() else { return 0 };
     let same = |chunk: &&[u16]| chunk.iter().fold(true, |same, id| same & (id == first));
     let n = AT_ONCE * ids.chunks_exact(AT_ONCE).take_while(same).count();
@@ -244,9 +246,68 @@ impl Rays {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     pub(crate) fn point(&self, column: usize, row: usize, depth_m: f32) -> Vec3 {
         self.eye + depth_m * (self.columns[column] + self.rows[row])
+    }
+}
+
+/// A walk over the pixels of one image, compiled for vectors of each width: the sums over each thing,
+/// and [`Percepts::loose`].
+struct Measure<'a> {
+    ids: &'a [u16],
+    depth: &'a [f32],
+    width: usize,
+    looks: &'a [Look],
+    rays: &'a Rays,
+}
+
+impl pulp::NullaryFnOnce for Measure<'_> {
+    type Output = (Vec<Tally>, Vec<bool>);
+
+    #[inline(always)]
+    fn call(self) -> Self::Output {
+        let Measure { ids, depth, width, looks, rays } = self;
+        let height = rays.rows.len();
+        let stride = STRIDE as usize;
+        let coarse_stride = (width / MEASURED_PER_ROW).max(stride);
+        let mut tallies: Vec<Tally> = looks.iter().map(|_| Tally::NEW).collect();
+        let sampled_width = width.div_ceil(stride);
+        let mut loose = vec![false; sampled_width * height.div_ceil(stride)];
+        for row in 0..height {
+            let (ids, depth) = (&ids[row * width..][..width], &depth[row * width..][..width]);
+            let on_row = row % stride == 0;
+            let mut end = 0;
+            while end < width {
+                let from = end;
+                end += run_length(&ids[from..]);
+                let id = usize::from(ids[from]);
+                let look = looks.get(id).copied().unwrap_or(Look::Firm);
+                if on_row && !matches!(look, Look::Firm | Look::Fixed) {
+                    let sampled = from.div_ceil(stride)..end.div_ceil(stride);
+                    loose[row / stride * sampled_width..][sampled].fill(true);
+                }
+                if matches!(look, Look::Firm | Look::Own) {
+                    continue;
+                }
+                let tally = &mut tallies[id];
+                tally.run(row, from, end);
+                let is_person = EntityId(id as u16).agent().is_some();
+                let range_m = if is_person { PERSON_RANGE_M } else { OBJECT_RANGE_M };
+                let mut add = |column: usize| {
+                    if depth[column] < range_m {
+                        tally.add(rays.point(column, row, depth[column]));
+                    }
+                };
+                if look == Look::Small {
+                    (from..end).for_each(add);
+                } else if row % coarse_stride == 0 {
+                    let first = from.next_multiple_of(coarse_stride);
+                    (first..end).step_by(coarse_stride).for_each(&mut add);
+                }
+            }
+        }
+        (tallies, loose)
     }
 }
 
@@ -300,45 +361,9 @@ impl Perception for GroundTruthIds {
         if ids.len() != width * height || depth.len() != width * height {
             return Percepts { hands, ..Percepts::default() };
         }
-        let stride = STRIDE as usize;
-        let coarse_stride = (width / MEASURED_PER_ROW).max(stride);
         let rays = Rays::new(&observation.camera);
-        let mut tallies: Vec<Tally> = looks.iter().map(|_| Tally::NEW).collect();
-        let sampled_width = width.div_ceil(stride);
-        let mut loose = vec![false; sampled_width * height.div_ceil(stride)];
-        for row in 0..height {
-            let (ids, depth) = (&ids[row * width..][..width], &depth[row * width..][..width]);
-            let on_row = row % stride == 0;
-            let mut end = 0;
-            while end < width {
-                let from = end;
-                end += run_length(&ids[from..]);
-                let id = usize::from(ids[from]);
-                let look = looks.get(id).copied().unwrap_or(Look::Firm);
-                if on_row && !matches!(look, Look::Firm | Look::Fixed) {
-                    let sampled = from.div_ceil(stride)..end.div_ceil(stride);
-                    loose[row / stride * sampled_width..][sampled].fill(true);
-                }
-                if matches!(look, Look::Firm | Look::Own) {
-                    continue;
-                }
-                let tally = &mut tallies[id];
-                tally.run(row, from, end);
-                let is_person = EntityId(id as u16).agent().is_some();
-                let range_m = if is_person { PERSON_RANGE_M } else { OBJECT_RANGE_M };
-                let mut add = |column: usize| {
-                    if depth[column] < range_m {
-                        tally.add(rays.point(column, row, depth[column]));
-                    }
-                };
-                if look == Look::Small {
-                    (from..end).for_each(add);
-                } else if row % coarse_stride == 0 {
-                    let first = from.next_multiple_of(coarse_stride);
-                    (first..end).step_by(coarse_stride).for_each(&mut add);
-                }
-            }
-        }
+        let measure = Measure { ids, depth, width, looks: &looks, rays: &rays };
+        let (tallies, loose) = pulp::Arch::new().dispatch(measure);
         let detections = tallies
             .into_iter()
             .enumerate()

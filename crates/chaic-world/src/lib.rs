@@ -28,6 +28,7 @@ mod fall;
 mod probe;
 
 mod act;
+mod aside;
 mod goal;
 mod place;
 mod tick;

@@ -18,6 +18,8 @@ use crate::world::World;
 const SPOT_SPACING_M: f32 = 0.12;
 /// Clear space around a thing on a surface, metres.
 const CLEARANCE_M: f32 = 0.02;
+/// What is no higher than this is stood upon, metres: rugs.
+const RUG_M: f32 = 0.03;
 /// Middle of a bicycle's basket in the bicycle's frame, as a fraction of its size; the front
 /// faces -z.
 const BASKET_IN_VEHICLE: [f32; 3] = [0.0, 0.78, -0.36];
@@ -168,22 +170,6 @@ impl World {
         spots.iter().find(free).copied().unwrap_or(pose.position)
     }
 
-    /// Where an obstacle is put aside: on free floor within an arm and a step, as far from every
-    /// doorway as can be had.
-    pub(crate) fn spot_aside(&self, agent: AgentId, obstacle: EntityId) -> Vec3 {
-        let pose = self.person(agent).pose;
-        let size = self.thing(obstacle).0.size_m();
-        let radius = 0.5 * math::hypot(size.x, size.z);
-        let nearest = self.capability(agent).radius_m + radius + 0.05;
-        let spots = (0..5).flat_map(|i| ring(pose.position, nearest + 0.25 * i as f32, 24));
-        let free = |spot: &Vec3| self.is_free_floor(obstacle, *spot);
-        let best = spots.filter(free).max_by(|a, b| {
-            let d = |p: &Vec3| self.setup.distance_to_opening(*p).min(3.0);
-            d(a).total_cmp(&d(b))
-        });
-        best.unwrap_or_else(|| self.floor_spot_beside(agent, obstacle))
-    }
-
     /// Whether a thing can stand on the floor at a point.
     pub(crate) fn is_free_floor(&self, object: EntityId, at: Vec3) -> bool {
         let size = self.thing(object).0.size_m();
@@ -193,7 +179,7 @@ impl World {
     /// Whether an upright thing of this radius and height can stand on the floor at `p`, within
     /// bounds and clear of everything and everybody.
     fn stands_free(&self, p: Vec3, radius_m: f32, height_m: f32) -> bool {
-        let body = Body { radius_m, low_m: 0.0, high_m: height_m };
+        let body = Body { radius_m, low_m: RUG_M, high_m: height_m };
         self.setup.bounds.grown(-radius_m).contains(xz(p))
             && self.surroundings.overlap(body, xz(p), &self.movable_blocks(), &self.discs()) <= 0.0
     }

@@ -414,6 +414,29 @@ fn an_obstacle_is_not_set_down_where_somebody_has_come_to() {
 }
 
 #[test]
+fn nobody_walls_itself_in_with_an_obstacle() {
+    // A dead end with an obstacle in it, a rug all along, and a person before it.
+    for z in [-1.6, -1.75, -1.9] {
+        let mut setup = hall(
+            vec![thing("trashbin", at(0.0, 0.0, -2.5)), thing("rug", at(0.0, 0.0, -1.5))],
+            vec![person(Persona::Wheelchair, 9.0, 9.0), person(Persona::Helper, 0.0, z)],
+        );
+        setup.things[2].fixed = true;
+        let sides = [-0.5, 0.5].map(|x| wall([x, -3.0], [x, 0.0]));
+        setup.walls.extend(sides);
+        setup.walls.push(wall([-0.5, -3.0], [0.5, -3.0]));
+        let mut w = world(setup);
+        let remove = Action::RemoveObstacle { obstacle: nth(0), hand: Hand::Right };
+        assert_eq!(run(&mut w, B, remove).0, Outcome::Success, "from {z}");
+        for action in [[Action::TurnLeft; 12], [Action::MoveForward; 12]].concat() {
+            run(&mut w, B, action);
+        }
+        let out = w.state().people[1].pose.position;
+        assert!(out.z > 1.0, "it began at {z} and is at {out}");
+    }
+}
+
+#[test]
 fn two_bring_furniture_to_the_truck() {
     let mut setup = hall(
         vec![thing("sofa", at(0.0, 0.0, 0.0)), thing("truck", at(0.0, 0.0, 5.2))],

@@ -149,13 +149,15 @@ impl Explorer {
 
     fn choose(&mut self, memory: &mut Memory) -> Option<Target> {
         memory.refresh();
-        let memory = &*memory;
         let reach = memory.reach()?;
         let frontier = self.nearest_frontier(memory, reach);
         self.is_exhausted = frontier.is_none();
         let target = frontier.or_else(|| self.longest_unseen(memory, reach));
         if target.is_none() {
-            self.blacklist.retain(|(at, _)| at.distance(memory.here()) < BLACKLIST_M);
+            let here = memory.here();
+            self.blacklist.retain(|(at, _)| at.distance(here) < BLACKLIST_M);
+            // Who can get nowhere is not walled in: one of the barriers isn't there.
+            memory.map.forget_barriers();
         }
         target
     }

@@ -86,7 +86,8 @@ impl Recovery {
             (self.n_bumps, self.n_waits) = (0, 0);
         }
         self.last_bump = memory.frame;
-        if person_ahead(memory) && self.n_waits < GIVE_WAYS {
+        let is_person = person_ahead(memory);
+        if is_person && self.n_waits < GIVE_WAYS {
             self.n_waits += 1;
             let (least, beyond) = GIVE_WAY_FRAMES;
             let frames = least + rng.below(beyond) as u32;
@@ -97,7 +98,9 @@ impl Recovery {
         let ahead = xz(memory.pose.forward());
         let reach_m = memory.costs().radius_m() + BUMP_AHEAD_M;
         let at = memory.here() + reach_m * ahead;
-        memory.map.bump(at, memory.frame, memory.rules.failures.barred_frames);
+        // People go away.
+        let barred_frames = if is_person { 0 } else { memory.rules.failures.barred_frames };
+        memory.map.bump(at, memory.frame, barred_frames);
         // A small turn first, then larger ones.
         let n_turns = [2, 3, 5, 8].get(self.n_bumps as usize - 1).copied();
         self.back_off(memory, n_turns.unwrap_or(4 + rng.below(8)), rng);

@@ -300,6 +300,12 @@ impl OccupancyMap {
         self.version += 1;
     }
 
+    /// Takes no place for a barrier any more.
+    pub fn forget_barriers(&mut self) {
+        self.version += u32::from(!self.barriers.is_empty());
+        self.barriers.clear();
+    }
+
     /// Cells in the way of a body of this radius, metres, because of barriers.
     pub fn barred_cells(&self, radius_m: f32) -> impl Iterator<Item = usize> + '_ {
         self.barriers.iter().flat_map(move |b| self.grid.disc(b.at, radius_m))

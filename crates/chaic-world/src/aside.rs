@@ -1,0 +1,122 @@
+//! Where an obstacle is put aside: not where it closes a way, or walls in who puts it there.
+
+use std::collections::VecDeque;
+
+use chaic_protocol::geom::{math, xz};
+use chaic_protocol::{AgentId, EntityId, Vec2, Vec3};
+
+use crate::collide::Body;
+use crate::world::World;
+
+/// A place this far from every doorway is far enough, metres.
+const FAR_M: f32 = 3.0;
+/// It is put no farther off than this from where arms reach without a step, metres.
+const STEP_M: f32 = 1.0;
+/// Side of a cell of the floor around a person, metres.
+const CELL_M: f32 = 0.125;
+/// Cells to each side of the person: 2 m.
+const HALF: i32 = 16;
+const SIDE: i32 = 2 * HALF + 1;
+/// So many cells may be cut off: corners in which nobody has anything to do.
+const CUT_OFF: usize = 8;
+
+impl World {
+    /// On free floor within an arm and a step: as far from every doorway as can be, where everybody
+    /// still gets everywhere; or else where the least is cut off.
+    pub(crate) fn spot_aside(&self, agent: AgentId, obstacle: EntityId) -> Vec3 {
+        let pose = self.person(agent).pose;
+        let size = self.thing(obstacle).0.size_m();
+        let radius = 0.5 * math::hypot(size.x, size.z);
+        let nearest = self.capability(agent).radius_m + radius + 0.05;
+        let reach = nearest..nearest + STEP_M;
+        let middle = xz(pose.position);
+        let spots = (0..SIDE * SIDE).map(|cell| center(middle, cell));
+        let spots = spots.filter(|spot| reach.contains(&spot.distance(middle)));
+        let spots = spots.map(|spot| Vec3::new(spot.x, 0.0, spot.y));
+        let free = |spot: &Vec3| self.is_free_floor(obstacle, *spot);
+        let from_opening_m = |p: Vec3| (p, self.setup.distance_to_opening(p).min(FAR_M));
+        let mut spots: Vec<_> = spots.filter(free).map(from_opening_m).collect();
+        spots.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let floor = Floor::around(self, middle);
+        let mut best: Option<(usize, Vec3)> = None;
+        for (spot, _) in spots {
+            let lost = floor.cut_off(xz(spot), radius);
+            if best.is_none_or(|(least, _)| lost < least) {
+                best = Some((lost, spot));
+            }
+            if lost <= CUT_OFF {
+                break;
+            }
+        }
+        best.map_or_else(|| self.floor_spot_beside(agent, obstacle), |(_, spot)| spot)
+    }
+}
+
+/// Where the widest body among the people fits around one of them, nobody being there.
+struct Floor {
+    middle: Vec2,
+    widest_m: f32,
+    /// Row by row.
+    fits: Vec<bool>,
+    /// Cells that one can get to from the middle.
+    reached: Vec<bool>,
+}
+
+impl Floor {
+    fn around(world: &World, middle: Vec2) -> Floor {
+        let capability = |a: AgentId| world.capability(a);
+        let people = || world.setup.agents().map(capability);
+        let widest_m = people().map(|c| c.radius_m).fold(0.0, f32::max);
+        let high_m = people().map(|c| c.height_m).fold(0.0, f32::max);
+        let body = Body { radius_m: widest_m, low_m: world.rules.step_over_m, high_m };
+        let bounds = world.setup.bounds.grown(-widest_m);
+        let movable = world.movable_blocks();
+        let fits = |p: Vec2| {
+            bounds.contains(p) && world.surroundings.overlap(body, p, &movable, &[]) <= 0.0
+        };
+        let cells = (0..SIDE * SIDE).map(|cell| fits(center(middle, cell)));
+        let mut floor = Floor { middle, widest_m, fits: cells.collect(), reached: Vec::new() };
+        floor.reached = floor.reach(|_| true);
+        floor
+    }
+
+    /// How many cells a thing of this radius at `p` cuts off that can be got to without it.
+    fn cut_off(&self, p: Vec2, radius_m: f32) -> usize {
+        let clear_m = radius_m + self.widest_m;
+        let is_clear = |cell: i32| center(self.middle, cell).distance(p) > clear_m;
+        let still = self.reach(is_clear);
+        let lost =
+            |cell: &i32| self.reached[*cell as usize] && !still[*cell as usize] && is_clear(*cell);
+        (0..SIDE * SIDE).filter(lost).count()
+    }
+
+    /// The cells that one can get to from the one nearest to the middle that `is_clear`.
+    fn reach(&self, is_clear: impl Fn(i32) -> bool) -> Vec<bool> {
+        let is_open = |cell: i32| self.fits[cell as usize] && is_clear(cell);
+        let mut reached = vec![false; self.fits.len()];
+        let away_m = |cell: &i32| center(Vec2::ZERO, *cell).length();
+        let open = (0..SIDE * SIDE).filter(|cell| is_open(*cell));
+        let Some(start) = open.min_by(|a, b| away_m(a).total_cmp(&away_m(b))) else {
+            return reached;
+        };
+        reached[start as usize] = true;
+        let mut queue = VecDeque::from([start]);
+        while let Some(cell) = queue.pop_front() {
+            let (i, j) = (cell % SIDE, cell / SIDE);
+            let beside = [(i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)];
+            let inside =
+                beside.into_iter().filter(|(i, j)| (0..SIDE).contains(i) && (0..SIDE).contains(j));
+            for next in inside.map(|(i, j)| j * SIDE + i) {
+                if is_open(next) && !std::mem::replace(&mut reached[next as usize], true) {
+                    queue.push_back(next);
+                }
+            }
+        }
+        reached
+    }
+}
+
+/// The middle of a cell around `middle`.
+fn center(middle: Vec2, cell: i32) -> Vec2 {
+    middle + CELL_M * Vec2::new((cell % SIDE - HALF) as f32, (cell / SIDE - HALF) as f32)
+}

@@ -1,5 +1,5 @@
-//! Promise: the table of results in the README is what the run that it names gave. The run's
-//! `scores.json` is `docs/results/test.json`; whoever changes one of them has to change the other.
+//! Promise: the tables of results in the README are what the runs that it names gave. The runs'
+//! `scores.json` are `docs/results/{standard,test}.json`; whoever changes one has to change the other.
 
 use std::fs;
 use std::path::Path;
@@ -37,6 +37,13 @@ fn rate_and_improvement(score: &Value) -> String {
     number(&score["ei"]).map_or(tr.clone(), |ei| format!("{tr} ({ei})"))
 }
 
+/// Transport rate, with its 95 % interval in brackets.
+fn rate_and_interval(score: &Value) -> String {
+    let tr = number(&score["tr"]).expect("every score has a rate");
+    let [low, high] = [0, 1].map(|k| number(&score["tr_ci"][k]).expect("it has an interval"));
+    format!("{tr} ({low}–{high})")
+}
+
 /// Compares the rows `| **HELPER**, NAME |` with the scores of a run of so many episode runs.
 fn assert_table(name: &str, scores: &str, n_scored: u64, cell: fn(&Value) -> String) {
     let (readme, scores) = (text("README.md"), text(scores));
@@ -53,6 +60,11 @@ fn assert_table(name: &str, scores: &str, n_scored: u64, cell: fn(&Value) -> Str
             TASKS.iter().map(|task| cell(&scores["tasks"][task][helper])).collect();
         assert_eq!(cells, expected, "{start}");
     }
+}
+
+#[test]
+fn the_table_of_the_standard_split_is_that_of_its_run() {
+    assert_table("standard", "docs/results/standard.json", 4 * 800, rate_and_interval);
 }
 
 #[test]

@@ -194,6 +194,12 @@ impl Episode {
             _ => Some(chosen),
         }
     }
+
+    /// What `plan` comes to next.
+    fn step(&mut self, plan: &Plan) -> Progress {
+        let mut situation = Situation { memory: &mut self.memory, briefing: &self.briefing };
+        self.executor.step(plan, &mut situation)
+    }
 }
 
 impl<P: Policy> Mind<P> {
@@ -213,9 +219,7 @@ impl<P: Policy> Mind<P> {
                 }
             }
             let plan = episode.plan?;
-            let mut situation =
-                Situation { memory: &mut episode.memory, briefing: &episode.briefing };
-            match episode.executor.step(&plan, &mut situation) {
+            match episode.step(&plan) {
                 Progress::Act(intent) => match episode.name(intent, self.perception.as_ref()) {
                     Some(named) => return Some(named),
                     None => episode.plan = None,
@@ -225,9 +229,7 @@ impl<P: Policy> Mind<P> {
         }
         episode.executor.begin(episode.memory.frame, &episode.memory.rules);
         episode.plan = Some(Plan::Explore);
-        let mut situation = Situation { memory: &mut episode.memory, briefing: &episode.briefing };
-        let progress = episode.executor.step(&Plan::Explore, &mut situation);
-        match progress {
+        match episode.step(&Plan::Explore) {
             Progress::Act(intent) => episode.name(intent, self.perception.as_ref()),
             Progress::Done | Progress::Failed => None,
         }

@@ -8,39 +8,42 @@ use chaic_protocol::{AgentId, EntityId, Vec2, Vec3};
 use crate::collide::Body;
 use crate::world::World;
 
-/// A place this far from every doorway is far enough, metres.
+/// A place this far from every doorway is far enough, metres (ours, as all here).
 const FAR_M: f32 = 3.0;
 /// It is put no farther off than this from where arms reach without a step, metres.
 const STEP_M: f32 = 1.0;
 /// Side of a cell of the floor around a person, metres.
 const CELL_M: f32 = 0.125;
-/// Cells to each side of the person: 2 m.
-const HALF: i32 = 16;
+/// Cells to each side of the person: 3 m, so that what is put at arm's length and a step is clear
+/// of the border by the widest body.
+const HALF: i32 = 24;
 const SIDE: i32 = 2 * HALF + 1;
 /// So many cells may be cut off: corners in which nobody has anything to do.
 const CUT_OFF: usize = 8;
 
 impl World {
-    /// On free floor within an arm and a step: as far from every doorway as can be, where everybody
-    /// still gets everywhere; or else where the least is cut off.
+    /// On free floor within an arm and a step, nothing fixed in between: as far from every doorway
+    /// as can be, where everybody still gets everywhere; or else where the least is cut off.
     pub(crate) fn spot_aside(&self, agent: AgentId, obstacle: EntityId) -> Vec3 {
         let pose = self.person(agent).pose;
         let size = self.thing(obstacle).0.size_m();
         let radius = 0.5 * math::hypot(size.x, size.z);
         let nearest = self.capability(agent).radius_m + radius + 0.05;
-        let reach = nearest..nearest + STEP_M;
+        let within_reach = nearest..nearest + STEP_M;
         let middle = xz(pose.position);
         let spots = (0..SIDE * SIDE).map(|cell| center(middle, cell));
-        let spots = spots.filter(|spot| reach.contains(&spot.distance(middle)));
+        let spots = spots.filter(|spot| within_reach.contains(&spot.distance(middle)));
         let spots = spots.map(|spot| Vec3::new(spot.x, 0.0, spot.y));
-        let free = |spot: &Vec3| self.is_free_floor(obstacle, *spot);
+        let free = |spot: &Vec3| {
+            self.is_free_floor(obstacle, *spot) && self.is_open_between(middle, xz(*spot), size.y)
+        };
         let from_opening_m = |p: Vec3| (p, self.setup.distance_to_opening(p).min(FAR_M));
         let mut spots: Vec<_> = spots.filter(free).map(from_opening_m).collect();
         spots.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let floor = Floor::around(self, middle);
+        let space = FreeSpace::around(self, middle);
         let mut best: Option<(usize, Vec3)> = None;
         for (spot, _) in spots {
-            let lost = floor.cut_off(xz(spot), radius);
+            let lost = space.cut_off(xz(spot), radius);
             if best.is_none_or(|(least, _)| lost < least) {
                 best = Some((lost, spot));
             }
@@ -50,10 +53,18 @@ impl World {
         }
         best.map_or_else(|| self.floor_spot_beside(agent, obstacle), |(_, spot)| spot)
     }
+
+    /// Whether no wall or other fixed thing stands between two places, up to this height.
+    fn is_open_between(&self, from: Vec2, to: Vec2, high_m: f32) -> bool {
+        let arm = Body { radius_m: 0.5 * CELL_M, low_m: self.rules.step_over_m, high_m };
+        let steps = (from.distance(to) / CELL_M).ceil();
+        let mut along = (0..=steps as i32).map(|step| from.lerp(to, step as f32 / steps));
+        along.all(|p| self.surroundings.overlap(arm, p, &[], &[]) <= 0.0)
+    }
 }
 
 /// Where the widest body among the people fits around one of them, nobody being there.
-struct Floor {
+struct FreeSpace {
     middle: Vec2,
     widest_m: f32,
     /// Row by row.
@@ -62,10 +73,9 @@ struct Floor {
     reached: Vec<bool>,
 }
 
-impl Floor {
-    fn around(world: &World, middle: Vec2) -> Floor {
-        let capability = |a: AgentId| world.capability(a);
-        let people = || world.setup.agents().map(capability);
+impl FreeSpace {
+    fn around(world: &World, middle: Vec2) -> FreeSpace {
+        let people = || world.setup.agents().map(|agent| world.capability(agent));
         let widest_m = people().map(|c| c.radius_m).fold(0.0, f32::max);
         let high_m = people().map(|c| c.height_m).fold(0.0, f32::max);
         let body = Body { radius_m: widest_m, low_m: world.rules.step_over_m, high_m };
@@ -75,23 +85,23 @@ impl Floor {
             bounds.contains(p) && world.surroundings.overlap(body, p, &movable, &[]) <= 0.0
         };
         let cells = (0..SIDE * SIDE).map(|cell| fits(center(middle, cell)));
-        let mut floor = Floor { middle, widest_m, fits: cells.collect(), reached: Vec::new() };
-        floor.reached = floor.reach(|_| true);
-        floor
+        let mut space = FreeSpace { middle, widest_m, fits: cells.collect(), reached: Vec::new() };
+        space.reached = space.flood(|_| true);
+        space
     }
 
     /// How many cells a thing of this radius at `p` cuts off that can be got to without it.
     fn cut_off(&self, p: Vec2, radius_m: f32) -> usize {
         let clear_m = radius_m + self.widest_m;
         let is_clear = |cell: i32| center(self.middle, cell).distance(p) > clear_m;
-        let still = self.reach(is_clear);
+        let still = self.flood(is_clear);
         let lost =
             |cell: &i32| self.reached[*cell as usize] && !still[*cell as usize] && is_clear(*cell);
         (0..SIDE * SIDE).filter(lost).count()
     }
 
     /// The cells that one can get to from the one nearest to the middle that `is_clear`.
-    fn reach(&self, is_clear: impl Fn(i32) -> bool) -> Vec<bool> {
+    fn flood(&self, is_clear: impl Fn(i32) -> bool) -> Vec<bool> {
         let is_open = |cell: i32| self.fits[cell as usize] && is_clear(cell);
         let mut reached = vec![false; self.fits.len()];
         let away_m = |cell: &i32| center(Vec2::ZERO, *cell).length();

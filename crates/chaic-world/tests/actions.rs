@@ -5,8 +5,8 @@ mod common;
 
 use chaic_protocol::action::{Action, FailureReason, Hand, Outcome};
 use chaic_protocol::capability::Persona;
-use chaic_protocol::{AgentId, ClassId, EntityId, ResolvedAction, TaskId};
-use chaic_world::{EventKind, Place, Snapshot, State, Wall, World};
+use chaic_protocol::{AgentId, ClassId, EntityId, ResolvedAction, TaskId, Vec2};
+use chaic_world::{EventKind, Opening, Place, Room, RoomKind, Snapshot, State, Wall, World};
 use common::*;
 
 fn pick(object: EntityId) -> ResolvedAction {
@@ -415,19 +415,27 @@ fn an_obstacle_is_not_set_down_where_somebody_has_come_to() {
 
 #[test]
 fn nobody_walls_itself_in_with_an_obstacle() {
-    // A dead end with an obstacle in it, a rug all along, and a person before it.
-    for z in [-1.6, -1.75, -1.9] {
+    // A dead end with an obstacle in it, a rug all along, and a person before it. Far from both
+    // doorways, of which one is before the open end, is between the person and the open end.
+    for z in [-1.1, -1.2, -1.3] {
         let mut setup = hall(
-            vec![thing("trashbin", at(0.0, 0.0, -2.5)), thing("rug", at(0.0, 0.0, -1.5))],
+            vec![thing("trashbin", at(0.0, 0.0, -2.0)), thing("rug", at(0.0, 0.0, -1.0))],
             vec![person(Persona::Wheelchair, 9.0, 9.0), person(Persona::Helper, 0.0, z)],
         );
         setup.things[2].fixed = true;
-        let sides = [-0.5, 0.5].map(|x| wall([x, -3.0], [x, 0.0]));
+        let sides = [-0.5, 0.5].map(|x| wall([x, -2.5], [x, 0.0]));
         setup.walls.extend(sides);
-        setup.walls.push(wall([-0.5, -3.0], [0.5, -3.0]));
+        setup.walls.push(wall([-0.5, -2.5], [0.5, -2.5]));
+        setup.rooms.push(Room { kind: RoomKind::Corridor, rect: setup.bounds });
+        setup.openings.extend([-2.5, 0.5].map(|z| {
+            let (a, b) = (Vec2::new(-0.4, z), Vec2::new(0.4, z));
+            Opening { a, b, rooms: [0, 0] }
+        }));
         let mut w = world(setup);
         let remove = Action::RemoveObstacle { obstacle: nth(0), hand: Hand::Right };
         assert_eq!(run(&mut w, B, remove).0, Outcome::Success, "from {z}");
+        let bin = w.state().things[1].position;
+        assert!(bin.x.abs() < 0.5 || bin.z > 0.0, "from {z} it was put through a wall: {bin}");
         for action in [[Action::TurnLeft; 12], [Action::MoveForward; 12]].concat() {
             run(&mut w, B, action);
         }

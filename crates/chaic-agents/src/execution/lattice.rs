@@ -53,8 +53,8 @@ impl Steadiness {
         }
     }
 
-    /// Whether one still waits for the obstacle in the way.
-    fn is_patient(&mut self, now: Frame, rules: &FailureRules) -> bool {
+    /// Waits for the obstacle in the way, and tells whether one goes on waiting.
+    fn goes_on_waiting(&mut self, now: Frame, rules: &FailureRules) -> bool {
         if now < self.impatient_until {
             return false;
         }
@@ -104,8 +104,8 @@ pub fn step(memory: &mut Memory, destination: &Destination, steady: &mut Steadin
     let way = steady.kept_way(memory).unwrap_or(way);
     if memory.waits_for_obstacles() && way.cost > BLOCKED && memory.map.space(end) != Space::Wall {
         // It waits for somebody to clear the way, though not for ever.
-        let is_patient = steady.is_patient(memory.frame, &memory.rules.failures);
-        return if is_patient { Nav::Act(Action::TurnLeft) } else { Nav::Unreachable };
+        let waits = steady.goes_on_waiting(memory.frame, &memory.rules.failures);
+        return if waits { Nav::Act(Action::TurnLeft) } else { Nav::Unreachable };
     }
     steady.waits_since = None;
     let to = waypoint(memory, &way);

@@ -157,7 +157,7 @@ mod tests {
         let third = recovery.step::<()>(&mut memory, None, &mut rng);
         assert_eq!((second, third), (Some(first), Some(Action::MoveForward)));
         assert_eq!(recovery.step::<()>(&mut memory, None, &mut rng), None);
-        assert!(memory.map.bumped_cells().count() > 0);
+        assert!(memory.map.bumps().cells(memory.map.grid()).count() > 0);
         for _ in 1..HOPELESS_BUMPS {
             assert!(!recovery.is_hopeless());
             recovery.step(&mut memory, BLOCKED, &mut rng);

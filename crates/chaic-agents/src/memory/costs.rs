@@ -166,14 +166,14 @@ impl CostMap {
             }
         }
         let own = |cell: usize| self.grid.center(cell).distance(here) <= OWN_PLACE_M;
-        for cell in map.barred_cells(self.radius_m).filter(|cell| !own(*cell)) {
+        for cell in map.bumps().barred_cells(&self.grid, self.radius_m).filter(|cell| !own(*cell)) {
             self.cost[cell] = self.cost[cell].max(OCCUPIED);
             clearance[cell] = 0;
         }
         measure_clearance(&self.grid, &mut clearance);
         self.add_rings(&clearance);
         self.clearance = OnceCell::from(clearance);
-        for cell in map.bumped_cells() {
+        for cell in map.bumps().cells(&self.grid) {
             self.cost[cell] += BUMP_EXTRA;
         }
         for person in people.iter().filter(|p| p.frame + PERSON_FRAMES > now) {

@@ -1,5 +1,6 @@
 //! What a mind remembers: the plan of the place, what is where, who was where, what was done.
 
+pub mod bumps;
 pub mod grid;
 pub mod hands;
 pub mod occupancy;

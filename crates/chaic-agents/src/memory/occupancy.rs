@@ -3,6 +3,7 @@
 use chaic_protocol::geom::{Camera, Rect, xz};
 use chaic_protocol::{Frame, Observation, Vec2, Vec3};
 
+use super::bumps::Bumps;
 use super::grid::{CELL_M, Grid};
 use crate::perception::{Percepts, Rays};
 
@@ -25,13 +26,6 @@ const SURE_ONCE: u8 = 3;
 const SURE_MOST: u8 = 6;
 /// Side of the coarse squares that remember when a place was seen last, cells (1 m).
 const PLACE_CELLS: usize = 8;
-/// How long a bump is remembered, frames.
-const BUMP_FRAMES: Frame = 300;
-/// So many bumps within this of each other are a barrier, metres.
-const BARRIER_BUMPS: usize = 3;
-const BARRIER_M: f32 = 0.6;
-/// Radius of the place around a bump that is avoided, metres.
-const BUMP_RADIUS_M: f32 = 0.2;
 
 /// What is known of one cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -184,13 +178,6 @@ impl pulp::NullaryFnOnce for Scan<'_> {
     }
 }
 
-/// Where somebody could not get on although the map said so.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Bump {
-    at: Vec2,
-    until: Frame,
-}
-
 /// A plan of what stands firmly: structure and furniture. People and whatever can be moved are
 /// not in it; the semantic map knows of them.
 #[derive(Clone, Debug)]
@@ -203,9 +190,7 @@ pub struct OccupancyMap {
     touched: Vec<u32>,
     /// Frame in which each coarse square was seen last, plus one; 0 if never.
     place_seen: Vec<Frame>,
-    bumps: Vec<Bump>,
-    /// Where nobody of this body gets through, for all that one knows.
-    barriers: Vec<Bump>,
+    bumps: Bumps,
     version: u32,
 }
 
@@ -240,8 +225,7 @@ impl OccupancyMap {
             now: vec![0; n],
             touched: Vec::new(),
             place_seen: vec![0; n_places],
-            bumps: Vec::new(),
-            barriers: Vec::new(),
+            bumps: Bumps::default(),
             version: 0,
         }
     }
@@ -288,32 +272,20 @@ impl OccupancyMap {
         (j / PLACE_CELLS) * self.grid.nx().div_ceil(PLACE_CELLS) + i / PLACE_CELLS
     }
 
-    /// Remembers that one could not get on at `at` (x, z). Where that happens again and again, there
-    /// is a barrier for `barred_frames`: something that isn't seen, or leaves too little room.
+    /// Remembers that one could not get on at `at` (x, z), see [`Bumps::note`].
     pub fn bump(&mut self, at: Vec2, now: Frame, barred_frames: Frame) {
-        self.bumps.push(Bump { at, until: now + BUMP_FRAMES });
-        let is_here = |bump: &Bump| bump.at.distance(at) < BARRIER_M;
-        if self.bumps.iter().filter(|b| is_here(b)).count() >= BARRIER_BUMPS {
-            let here = self.bumps.extract_if(.., |b| is_here(b));
-            self.barriers.extend(here.map(|b| Bump { until: now + barred_frames, ..b }));
-        }
+        self.bumps.note(at, now, barred_frames);
         self.version += 1;
     }
 
     /// Takes no place for a barrier any more.
     pub fn forget_barriers(&mut self) {
-        self.version += u32::from(!self.barriers.is_empty());
-        self.barriers.clear();
+        self.version += u32::from(self.bumps.forget_barriers());
     }
 
-    /// Cells in the way of a body of this radius, metres, because of barriers.
-    pub fn barred_cells(&self, radius_m: f32) -> impl Iterator<Item = usize> + '_ {
-        self.barriers.iter().flat_map(move |b| self.grid.disc(b.at, radius_m))
-    }
-
-    /// Cells to avoid because of bumps; one that was bumped into twice comes twice.
-    pub fn bumped_cells(&self) -> impl Iterator<Item = usize> + '_ {
-        self.bumps.iter().flat_map(|b| self.grid.disc(b.at, BUMP_RADIUS_M))
+    /// Where one could not get on although the map said so.
+    pub fn bumps(&self) -> &Bumps {
+        &self.bumps
     }
 
     /// Takes in what one image shows. `height_m` is the height of the own body: nothing above it
@@ -326,10 +298,7 @@ impl OccupancyMap {
         known_m: f32,
     ) {
         let now = observation.frame;
-        let n_bumps = self.bumps.len() + self.barriers.len();
-        self.bumps.retain(|b| b.until > now);
-        self.barriers.retain(|b| b.until > now);
-        let mut changed = self.bumps.len() + self.barriers.len() != n_bumps;
+        let mut changed = self.bumps.expire(now);
         if let Some(depth) = observation.images.depth_m.as_ref() {
             let camera = &observation.camera;
             if depth.len() == camera.width as usize * camera.height as usize {
@@ -545,27 +514,7 @@ mod tests {
         look(&mut map, &toy);
         assert_eq!(map.version(), version);
         map.bump(Vec2::ZERO, 0, 0);
-        assert!(map.version() > version && map.bumped_cells().count() > 4);
-    }
-
-    #[test]
-    fn where_one_bumps_again_and_again_is_a_barrier_for_a_while() {
-        let mut toy = Toy::room(6.0, 6.0);
-        toy.stand([0.0, 0.0], 0.3);
-        let mut map = OccupancyMap::new(&toy.bounds());
-        let n_barred = |map: &OccupancyMap| map.barred_cells(0.35).count();
-        map.bump(Vec2::new(0.0, -1.0), 0, 1000);
-        map.bump(Vec2::new(0.0, -2.0), 0, 1000);
-        map.bump(Vec2::new(0.2, -1.0), 0, 1000);
-        assert_eq!(n_barred(&map), 0, "bumps here and there");
-        map.bump(Vec2::new(-0.2, -1.0), 0, 1000);
-        assert!(n_barred(&map) > 10);
-        assert!(map.bumped_cells().count() > 4, "the one elsewhere is remembered");
-        for (frame, is_barred) in [(999, true), (1000, false)] {
-            toy.frame = frame;
-            look(&mut map, &toy);
-            assert_eq!(n_barred(&map) > 0, is_barred, "at frame {frame}");
-        }
+        assert!(map.version() > version && map.bumps().cells(map.grid()).count() > 4);
     }
 
     #[test]

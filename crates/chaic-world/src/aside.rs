@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use chaic_protocol::capability::Capability;
 use chaic_protocol::geom::{math, xz};
 use chaic_protocol::{AgentId, EntityId, Vec2, Vec3};
 
@@ -15,7 +16,7 @@ const STEP_M: f32 = 1.0;
 /// Side of a cell of the floor around a person, metres.
 const CELL_M: f32 = 0.125;
 /// Cells to each side of the person: 3 m, so that what is put at arm's length and a step is clear
-/// of the border by the widest body.
+/// of the border by any body.
 const HALF: i32 = 24;
 const SIDE: i32 = 2 * HALF + 1;
 /// So many cells may be cut off: corners in which nobody has anything to do.
@@ -23,7 +24,8 @@ const CUT_OFF: usize = 8;
 
 impl World {
     /// On free floor within an arm and a step, nothing fixed in between: as far from every doorway
-    /// as can be, where everybody still gets everywhere; or else where the least is cut off.
+    /// as can be, where everybody still gets everywhere; or else where the least is cut off, which
+    /// may be where it stood at the beginning.
     pub(crate) fn spot_aside(&self, agent: AgentId, obstacle: EntityId) -> Vec3 {
         let pose = self.person(agent).pose;
         let size = self.thing(obstacle).0.size_m();
@@ -40,10 +42,17 @@ impl World {
         let from_opening_m = |p: Vec3| (p, self.setup.distance_to_opening(p).min(FAR_M));
         let mut spots: Vec<_> = spots.filter(free).map(from_opening_m).collect();
         spots.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let space = FreeSpace::around(self, middle);
+        let stood = self.thing(obstacle).0.position;
+        let nobody_is_at =
+            |p| self.discs().iter().all(|d| d.center.distance(xz(p)) > d.radius_m + radius);
+        if nobody_is_at(stood) && self.is_free_for(obstacle, stood, radius) {
+            spots.push(from_opening_m(stood));
+        }
+        let spaces: Vec<_> =
+            self.setup.agents().map(|who| FreeSpace::around(self, who, middle)).collect();
         let mut best: Option<(usize, Vec3)> = None;
         for (spot, _) in spots {
-            let lost = space.cut_off(xz(spot), radius);
+            let lost = spaces.iter().map(|space| space.cut_off(xz(spot), radius)).sum();
             if best.is_none_or(|(least, _)| lost < least) {
                 best = Some((lost, spot));
             }
@@ -63,10 +72,10 @@ impl World {
     }
 }
 
-/// Where the widest body among the people fits around one of them, nobody being there.
+/// Where a person fits around a place, nobody being there.
 struct FreeSpace {
     middle: Vec2,
-    widest_m: f32,
+    body_m: f32,
     /// Row by row.
     fits: Vec<bool>,
     /// Cells that one can get to from the middle.
@@ -74,25 +83,24 @@ struct FreeSpace {
 }
 
 impl FreeSpace {
-    fn around(world: &World, middle: Vec2) -> FreeSpace {
-        let people = || world.setup.agents().map(|agent| world.capability(agent));
-        let widest_m = people().map(|c| c.radius_m).fold(0.0, f32::max);
-        let high_m = people().map(|c| c.height_m).fold(0.0, f32::max);
-        let body = Body { radius_m: widest_m, low_m: world.rules.step_over_m, high_m };
-        let bounds = world.setup.bounds.grown(-widest_m);
+    fn around(world: &World, person: AgentId, middle: Vec2) -> FreeSpace {
+        let Capability { radius_m, height_m, .. } = world.capability(person);
+        let body = Body { radius_m: radius_m, low_m: world.rules.step_over_m, high_m: height_m };
+        let bounds = world.setup.bounds.grown(-radius_m);
         let movable = world.movable_blocks();
         let fits = |p: Vec2| {
             bounds.contains(p) && world.surroundings.overlap(body, p, &movable, &[]) <= 0.0
         };
         let cells = (0..SIDE * SIDE).map(|cell| fits(center(middle, cell)));
-        let mut space = FreeSpace { middle, widest_m, fits: cells.collect(), reached: Vec::new() };
+        let mut space =
+            FreeSpace { middle, body_m: radius_m, fits: cells.collect(), reached: Vec::new() };
         space.reached = space.flood(|_| true);
         space
     }
 
     /// How many cells a thing of this radius at `p` cuts off that can be got to without it.
     fn cut_off(&self, p: Vec2, radius_m: f32) -> usize {
-        let clear_m = radius_m + self.widest_m;
+        let clear_m = radius_m + self.body_m;
         let is_clear = |cell: i32| center(self.middle, cell).distance(p) > clear_m;
         let still = self.flood(is_clear);
         let lost =

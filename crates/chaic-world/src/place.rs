@@ -146,7 +146,7 @@ impl World {
     }
 
     /// Whether nothing else lies where a thing of this radius would be put.
-    fn is_free_for(&self, object: EntityId, spot: Vec3, radius: f32) -> bool {
+    pub(crate) fn is_free_for(&self, object: EntityId, spot: Vec3, radius: f32) -> bool {
         self.setup.entities().all(|e| {
             let (thing, state) = self.thing(e);
             let lies_there = state.is_resting() && !thing.fixed && e != object;

@@ -445,6 +445,21 @@ fn nobody_walls_itself_in_with_an_obstacle() {
 }
 
 #[test]
+fn an_obstacle_in_a_corner_goes_back_there_if_it_would_close_the_way_elsewhere() {
+    // A long dead end, as wide as the trashbin and a person, with the trashbin at its end.
+    let mut setup = hall(
+        vec![thing("trashbin", at(0.0, 0.0, -2.7))],
+        vec![person(Persona::Wheelchair, 9.0, 9.0), person(Persona::Helper, 0.0, -1.8)],
+    );
+    setup.walls.extend([-0.36, 0.36].map(|x| wall([x, -3.0], [x, 3.0])));
+    setup.walls.push(wall([-0.36, -3.0], [0.36, -3.0]));
+    let mut w = world(setup);
+    let remove = Action::RemoveObstacle { obstacle: nth(0), hand: Hand::Right };
+    assert_eq!(run(&mut w, B, remove).0, Outcome::Success);
+    assert_eq!(w.state().things[1].position, at(0.0, 0.0, -2.7));
+}
+
+#[test]
 fn two_bring_furniture_to_the_truck() {
     let mut setup = hall(
         vec![thing("sofa", at(0.0, 0.0, 0.0)), thing("truck", at(0.0, 0.0, 5.2))],

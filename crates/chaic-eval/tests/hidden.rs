@@ -3,15 +3,18 @@
 //! agent that tries everything learns nothing; and each leak that was ever found, planted again,
 //! is found again.
 
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
 use chaic_agents::PlannerRules;
 use chaic_episodes::{Episode, find_episode};
 use chaic_eval::audit::{Finding, Leak, Pair, Partner, Prober, Secret, compare};
 use chaic_eval::helpers::{BuiltIn, Helper, Helpers as _};
+use chaic_eval::play::{Play, Staging};
 use chaic_eval::rules::RuleSet;
 use chaic_protocol::observation::{Granted, Grants, Senses};
 use chaic_protocol::{Action, Agent, Briefing, Observation, TaskId};
+use chaic_render::Appearance;
 
 /// Long enough to explore, to pick up and to deliver.
 const FRAMES: u32 = 900;
@@ -136,14 +139,19 @@ fn checked(
     check: fn(&Observation, &Mutex<[u32; 3]>),
 ) -> [u32; 3] {
     let counts = Arc::new(Mutex::new([0; 3]));
-    let episode = of_task(task);
-    let make = || {
-        let mind = built_in(helper).mind;
-        let mind = Box::new(Checker { mind, check, counts: Arc::clone(&counts) });
-        Helper { mind, grants }
+    let mind = built_in(helper).mind;
+    let mind = Box::new(Checker { mind, check, counts: Arc::clone(&counts) });
+    let staging = Staging {
+        episode: &of_task(task),
+        seed: 0,
+        rules: RuleSet::PAPER,
+        helper,
+        partner: None,
+        image_size: Some(48),
+        appearance: Appearance::Canonical,
     };
-    let pair = Pair { frames: 2000, ..pair(&episode, Secret::Goal, Partner::Acts) };
-    compare(&pair, &make, None).unwrap();
+    let mut play = Play::new(staging, Some(Helper { mind, grants })).unwrap();
+    play.run(&AtomicBool::new(false), None, &mut |_| Ok(())).unwrap();
     *counts.lock().unwrap()
 }
 

@@ -19,7 +19,7 @@ pub use spy::Leak;
 
 use std::fmt;
 use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use chaic_agents::{PlannerRules, partners};
 use chaic_episodes::Episode;
@@ -87,29 +87,48 @@ pub struct Verdict {
     pub finding: Option<Finding>,
 }
 
-/// Plays both and compares. `make` gives the watched helper, a fresh one each time.
+/// Plays both side by side and compares, to the first difference. `make` gives the watched helper, a
+/// fresh one each time.
 ///
 /// # Errors
 /// If the episode can't be played.
 pub fn compare(pair: &Pair<'_>, make: &dyn Fn() -> Helper, leak: Option<Leak>) -> Result<Verdict> {
-    let [one, other] = [false, true].map(|changed| Side::new(pair, changed, make, leak));
-    let (one, other) = (one?, other?);
-    let (a, b) = (one.log(), other.log());
+    let mut sides = [Side::begin(pair, false, make, leak)?, Side::begin(pair, true, make, leak)?];
     let found = |frame, what| Some(Finding { frame, what });
-    if a.briefing != b.briefing {
+    if sides[0].log().briefing != sides[1].log().briefing {
         return Ok(Verdict { compared: 0, finding: found(0, "the briefing") });
     }
-    let n = a.seen.len().min(b.seen.len());
-    let differs = |k: &usize| difference(&a.seen[*k], &b.seen[*k]).is_some();
-    let first = (0..n).find(differs);
-    let Some(k) = first else {
-        // One of them may have been asked once more before the end, if it was kept busy.
-        return Ok(Verdict { compared: n, finding: None });
-    };
-    let what = difference(&a.seen[k], &b.seen[k]).unwrap_or("something");
-    let frame = a.seen[k].observation.frame.min(b.seen[k].observation.frame);
-    let is_fair = is_visible_or_felt(pair, make, what, frame)?;
-    Ok(Verdict { compared: k, finding: if is_fair { None } else { found(frame, what) } })
+    let mut compared = 0;
+    // Both worlds when the first of the two was told what comes next.
+    let mut told_in: Option<[World; 2]> = None;
+    // One of them may be asked once more before the end, if it was kept busy.
+    while let Some(frame) = sides.iter().filter_map(Side::next_decision).min() {
+        let is_next = |side: &Side| side.next_decision() == Some(frame);
+        if told_in.is_none() && sides.iter().any(|side| is_next(side) && side.asks_helper()) {
+            told_in = Some([sides[0].play.world().clone(), sides[1].play.world().clone()]);
+        }
+        for side in sides.iter_mut().filter(|side| is_next(side)) {
+            side.decide()?;
+        }
+        let Some([a, b]) = both_told(&sides) else { continue };
+        if let Some(what) = difference(&a, &b) {
+            let is_fair = told_in.is_some_and(|worlds| is_visible_or_felt(&worlds, what));
+            let frame = a.observation.frame.min(b.observation.frame);
+            let finding = if is_fair { None } else { found(frame, what) };
+            return Ok(Verdict { compared, finding });
+        }
+        (compared, told_in) = (compared + 1, None);
+    }
+    Ok(Verdict { compared, finding: None })
+}
+
+/// What both were told next, once they were.
+fn both_told(sides: &[Side; 2]) -> Option<[Seen; 2]> {
+    let [mut a, mut b] = sides.each_ref().map(Side::log);
+    if a.seen.is_empty() || b.seen.is_empty() {
+        return None;
+    }
+    Some([a.seen.pop_front()?, b.seen.pop_front()?])
 }
 
 /// What differs between two moments, if anything does. Images come last: whatever else differs has
@@ -128,26 +147,13 @@ fn difference(a: &Seen, b: &Seen) -> Option<&'static str> {
     checks.into_iter().find(|(_, same)| !same).map(|(what, _)| what)
 }
 
-/// Whether the two worlds differ, at this moment, in something that the helper can see or feel.
-fn is_visible_or_felt(
-    pair: &Pair<'_>,
-    make: &dyn Fn() -> Helper,
-    what: &str,
-    frame: Frame,
-) -> Result<bool> {
-    let until = |changed| {
-        let mut side = Side::begin(pair, changed, make, None)?;
-        side.play.run(&AtomicBool::new(false), Some(frame), &mut |_| Ok(()))?;
-        Ok::<Side, crate::EvalError>(side)
-    };
-    let (one, other) = (until(false)?, until(true)?);
-    let (a, b) = (one.play.world(), other.play.world());
+/// Whether two worlds differ, at one moment, in something that the helper can see or feel.
+fn is_visible_or_felt([a, b]: &[World; 2], what: &str) -> bool {
     if what == "an image" {
-        return Ok(differing(a, b).next().is_some());
+        return differing(a, b).next().is_some();
     }
     let here = a.state().people[AgentId::HELPER.index()].pose.position;
-    let near = differing(a, b).any(|(at, half_m)| horizontal_distance(at, here) < FELT_M + half_m);
-    Ok(near)
+    differing(a, b).any(|(at, half_m)| horizontal_distance(at, here) < FELT_M + half_m)
 }
 
 /// Where two worlds of one episode differ in what stands or moves, with half the length of it.
@@ -175,23 +181,6 @@ struct Side {
 }
 
 impl Side {
-    /// Played to its end.
-    fn new(
-        pair: &Pair<'_>,
-        changed: bool,
-        make: &dyn Fn() -> Helper,
-        leak: Option<Leak>,
-    ) -> Result<Side> {
-        let mut side = Side::begin(pair, changed, make, leak)?;
-        match leak {
-            None => {
-                side.play.run(&AtomicBool::new(false), None, &mut |_| Ok(()))?;
-            }
-            Some(_) => side.play_leaking()?,
-        }
-        Ok(side)
-    }
-
     fn begin(
         pair: &Pair<'_>,
         changed: bool,
@@ -219,20 +208,28 @@ impl Side {
         Ok(Side { play: Play::with_cast(staging, people)?, log })
     }
 
-    /// The same with a leak planted: before each decision the log learns what the leak tells.
-    fn play_leaking(&mut self) -> Result<()> {
-        let stop = AtomicBool::new(false);
-        loop {
-            let frame = self.play.world().state().frame;
-            self.log.lock().unwrap_or_else(PoisonError::into_inner).overhear(self.play.world());
-            if self.play.run(&stop, Some(frame + 1), &mut |_| Ok(()))? {
-                return Ok(());
-            }
-        }
+    /// When somebody decides next; `None` at the end.
+    fn next_decision(&self) -> Option<Frame> {
+        let world = self.play.world();
+        (!world.is_over()).then_some(world.state().frame)
     }
 
-    fn log(&self) -> Log {
-        self.log.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    /// Whether the watched helper decides next.
+    fn asks_helper(&self) -> bool {
+        self.play.world().waiting().contains(&AgentId::HELPER)
+    }
+
+    /// Lets all decide whose turn it is, and plays on to the next decision.
+    fn decide(&mut self) -> Result<()> {
+        let world = self.play.world();
+        self.log().overhear(world);
+        let next = world.state().frame + 1;
+        self.play.run(&AtomicBool::new(false), Some(next), &mut |_| Ok(()))?;
+        Ok(())
+    }
+
+    fn log(&self) -> MutexGuard<'_, Log> {
+        self.log.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

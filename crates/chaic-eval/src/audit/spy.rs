@@ -1,5 +1,6 @@
 //! Notes all that a mind is told.
 
+use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use chaic_protocol::observation::{Observation, Senses};
@@ -28,17 +29,18 @@ impl Leak {
 }
 
 /// One decision of the watched mind.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Seen {
     pub(super) observation: Observation,
     pub(super) action: Action,
 }
 
 /// All that a mind was told, and what it answered.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub(super) struct Log {
     pub(super) briefing: Option<Briefing>,
-    pub(super) seen: Vec<Seen>,
+    /// What hasn't been compared yet.
+    pub(super) seen: VecDeque<Seen>,
     pub(super) leak: Option<Leak>,
     /// What the planted leak has to tell now.
     held_by_other: Vec<EntityId>,
@@ -52,8 +54,11 @@ impl Log {
         Log { leak, ..Log::default() }
     }
 
-    /// Looks into the world, for the planted leak.
+    /// Looks into the world for the planted leak, if there is one.
     pub(super) fn overhear(&mut self, world: &World) {
+        if self.leak.is_none() {
+            return;
+        }
         let class = |e: EntityId| world.setup().thing(e).map(|t| (e, t.class));
         let is_held = |e: &EntityId| {
             let mut holders = world.setup().agents().filter(|a| *a != AgentId::HELPER);
@@ -118,7 +123,7 @@ impl Agent for Spy {
     fn act(&mut self, observation: &Observation) -> Action {
         let observation = self.log().leaking(observation.clone());
         let action = self.mind.act(&observation);
-        self.log().seen.push(Seen { observation, action });
+        self.log().seen.push_back(Seen { observation, action });
         action
     }
 }

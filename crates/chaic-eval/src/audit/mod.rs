@@ -3,8 +3,8 @@
 //!
 //! As long as nothing differs that the agent's eyes could see or its hands could feel, all that it
 //! is told must be the same: images, outcomes of its actions, their reasons and durations,
-//! everything. The first difference without such a cause is a [`Finding`]. What follows after a
-//! visible difference proves nothing, and is not looked at.
+//! everything. The first difference without such a cause is a [`Finding`], unless a rule or a grant
+//! states that it is told. What follows after a difference proves nothing, and is not looked at.
 //!
 //! **What it is not**: it judges no helper. Its own agent, the [`Prober`], tries whatever an agent
 //! may try, to learn what it should not.
@@ -24,6 +24,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use chaic_agents::{PlannerRules, partners};
 use chaic_episodes::Episode;
 use chaic_protocol::geom::horizontal_distance;
+use chaic_protocol::observation::Observation;
 use chaic_protocol::{AgentId, Frame, Vec3};
 use chaic_world::{Setup, World};
 
@@ -36,6 +37,9 @@ use spy::{Log, Seen, Spy};
 /// Whatever differs within this distance of an agent, beyond half of its own length, may be felt,
 /// metres: the world lets one step up to things at 3 m, and bodies touch on the way.
 const FELT_M: f32 = 4.5;
+
+/// What differs, if it is neither seen nor felt.
+const GRANTED: &str = "what is granted";
 
 /// What the partner does while it is watched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,8 +116,10 @@ pub fn compare(pair: &Pair<'_>, make: &dyn Fn() -> Helper, leak: Option<Leak>) -
         }
         let Some([a, b]) = both_told(&sides) else { continue };
         if let Some(what) = difference(&a, &b) {
-            let is_fair = told_in.is_some_and(|worlds| is_visible_or_felt(&worlds, what));
-            let frame = a.observation.frame.min(b.observation.frame);
+            let (x, y) = (&a.observation, &b.observation);
+            let is_fair = is_stated(pair, what, x, y)
+                || told_in.is_some_and(|worlds| is_visible_or_felt(&worlds, what));
+            let frame = x.frame.min(y.frame);
             let finding = if is_fair { None } else { found(frame, what) };
             return Ok(Verdict { compared, finding });
         }
@@ -141,10 +147,28 @@ fn difference(a: &Seen, b: &Seen) -> Option<&'static str> {
         ("the outcome of the own action", x.own.last == y.own.last),
         ("the own state", x.own == y.own),
         ("the camera", x.camera == y.camera),
-        ("what is granted", x.granted == y.granted),
+        (GRANTED, x.granted == y.granted),
         ("the own action", a.action == b.action),
     ];
     checks.into_iter().find(|(_, same)| !same).map(|(what, _)| what)
+}
+
+/// Whether all that is granted differently is stated to be told: removed obstacles, where the rules
+/// announce them to everybody, and what the partner in the image is about, where that is granted. It
+/// may have begun what its posture doesn't show yet.
+fn is_stated(pair: &Pair<'_>, what: &str, a: &Observation, b: &Observation) -> bool {
+    let rest = |o: &Observation| {
+        let mut granted = o.granted.clone();
+        if pair.rules.world.tells_removed {
+            granted.removed.clear();
+        }
+        if granted.classes.iter().any(|(e, _)| e.agent() == Some(AgentId::PARTNER)) {
+            granted.behavior.retain(|seen| seen.agent != AgentId::PARTNER);
+            granted.partner_hands = None;
+        }
+        granted
+    };
+    what == GRANTED && rest(a) == rest(b)
 }
 
 /// Whether two worlds differ, at one moment, in something that the helper can see or feel.

@@ -1,87 +1,127 @@
-//! One episode: who takes part, what they see, and the loop.
-
-mod cast;
-mod crank;
-mod look;
-
-pub use cast::{Actor, Bystander, Cast, Minds, cast, world_seed};
-pub use crank::{Choice, Decide, Flow, crank};
-pub use look::{Eyes, Glance};
+//! An episode under way.
 
 use std::collections::BTreeMap;
+use std::convert::Infallible;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use chaic_episodes::Episode;
-use chaic_protocol::agent::Thought;
-use chaic_protocol::{AgentId, Frame};
-use chaic_render::{Appearance, Scene};
-use chaic_world::{Rules, Setup, World};
+use chaic_protocol::agent::{ChildState, Thought};
+use chaic_protocol::{Action, AgentId, Briefing, Frame, Observation};
+use chaic_render::Scene;
+use chaic_world::{Setup, World};
 
-use crate::CHAIC_VERSION;
-use crate::digest::Digest;
-use crate::error::{EvalError, Result};
-use crate::rules::RuleSet;
-use crate::trace::{FORMAT, Header, Participant, Record, VERSION};
+use crate::config::EpisodeConfig;
+use crate::error::{EnvError, Result};
+use crate::observer::{Glimpse, Observer};
+use crate::run_loop::{Choice, run_loop};
+use crate::seat::{Driver, Minds, Seat, seats};
+use crate::trace::{Header, Record};
 
-/// What is played, apart from the minds.
-#[derive(Clone, Copy, Debug)]
-pub struct Staging<'a> {
-    /// The episode.
-    pub episode: &'a Episode,
-    /// Which of the run's seeds.
-    pub seed: u32,
-    /// The rules.
-    pub rules: RuleSet,
-    /// Name of the helper, for the record.
-    pub helper: &'a str,
-    /// Name of the partner's mind, for the record; `None` for the rule-based one.
-    pub partner: Option<&'a str>,
-    /// Side of everybody's images, pixels; `None` for what each mind asks for.
-    pub image_size: Option<u32>,
-    /// How all that eyes see is lit and colored.
-    pub appearance: Appearance,
+/// The choices of those who wait; `None` if not all have chosen.
+type Decided<E> = std::result::Result<Option<Vec<Choice>>, E>;
+
+/// Why [`Env::run`] returned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flow {
+    /// The episode ended.
+    Ended,
+    /// It was told to stop, or has come to the frame until which it was to run.
+    Stopped,
+    /// The caller's choice is needed, see [`Env::waiting`].
+    Waits,
 }
 
 /// An episode under way, with everybody in it.
-pub struct Play {
+pub struct Env {
     world: World,
-    cast: Cast,
-    eyes: Eyes,
+    seats: Vec<Seat>,
+    filled: Filled,
+    observer: Observer,
     header: Header,
+    turns: Vec<Turn>,
 }
 
-impl Play {
-    /// Sets the stage and briefs everybody.
+/// Which seats the caller filled; all others are for the rule-based minds of an episode.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Filled {
+    Some { helper: bool, partner: bool },
+    All,
+}
+
+/// What an agent whose action has ended perceives, until all have chosen.
+#[derive(Default)]
+struct Turn {
+    glimpse: Option<Glimpse>,
+    choice: Option<Choice>,
+    /// What it last said of itself.
+    said: Said,
+}
+
+/// What a mind says of itself.
+#[derive(Clone, Default, PartialEq)]
+struct Said {
+    thought: Option<Thought>,
+    child: Option<ChildState>,
+}
+
+impl Env {
+    /// Begins an episode and briefs everybody.
     ///
     /// # Errors
     /// If the setup can't become a world.
-    pub fn new(staging: Staging<'_>, minds: impl Into<Minds>) -> Result<Play> {
+    pub fn new(config: EpisodeConfig<'_>, minds: impl Into<Minds>) -> Result<Env> {
         let minds = minds.into();
-        let setup = setup_of(&staging, minds.helper.is_some());
-        let cast = cast(&setup, minds, staging.rules.planner);
-        Play::stage(staging, setup, cast)
+        let filled =
+            Filled::Some { helper: minds.helper.is_some(), partner: minds.partner.is_some() };
+        let setup = config.setup(minds.helper.is_some());
+        let world = config.world(&setup)?;
+        let seats = seats(&setup, minds, config.rules.planner);
+        Ok(Env::begin(config, world, seats, filled))
     }
 
-    /// The same with a cast of the caller's: scripted partners, other minds for the child.
+    /// The same with all seats filled by the caller: scripted partners, other minds for the child.
     ///
     /// # Errors
     /// If the setup can't become a world, or has another number of people.
-    pub fn with_cast(staging: Staging<'_>, cast: Cast) -> Result<Play> {
-        let setup = setup_of(&staging, true);
-        let (minds, people) = (cast.actors.len(), setup.people.len());
-        if minds != people {
-            let text = format!("{} has {people} people, not {minds}", staging.episode.id());
-            return Err(EvalError::Options(text));
-        }
-        Play::stage(staging, setup, cast)
+    pub fn with_seats(config: EpisodeConfig<'_>, seats: Vec<Seat>) -> Result<Env> {
+        let setup = config.setup(true);
+        check_seats(&config, &setup, seats.len())?;
+        let world = config.world(&setup)?;
+        Ok(Env::begin(config, world, seats, Filled::All))
     }
 
-    fn stage(staging: Staging<'_>, setup: Arc<Setup>, mut cast: Cast) -> Result<Play> {
-        let world = brief(&staging, &setup, &mut cast)?;
-        let header = header(&staging, &setup, &cast);
-        let eyes = Eyes::new(Arc::new(Scene::with_appearance(&setup, staging.appearance)));
-        Ok(Play { world, cast, eyes, header })
+    fn begin(config: EpisodeConfig<'_>, world: World, mut seats: Vec<Seat>, filled: Filled) -> Env {
+        config.brief(&world, &mut seats);
+        let header = config.header(world.setup(), &seats);
+        let scene = Scene::with_appearance(world.setup(), config.appearance);
+        let observer = Observer::new(Arc::new(scene));
+        let turns = seats.iter().map(|_| Turn::default()).collect();
+        Env { world, seats, filled, observer, header, turns }
+    }
+
+    /// Begins another episode with the same minds and callers, and with the rule-based partner and
+    /// child that belong to it; for learners that play one episode after the other.
+    ///
+    /// # Errors
+    /// If the setup can't become a world, or has another number of people than all seats that the
+    /// caller filled. The environment is as it was then.
+    pub fn reset(&mut self, config: EpisodeConfig<'_>) -> Result<()> {
+        let setup = config.setup(self.seats.len() > 1);
+        if self.filled == Filled::All {
+            check_seats(&config, &setup, self.seats.len())?;
+        }
+        let world = config.world(&setup)?;
+        let mut old = std::mem::take(&mut self.seats);
+        let seats = match self.filled {
+            Filled::All => old,
+            Filled::Some { helper, partner } => {
+                let helper = helper.then(|| old.swap_remove(AgentId::HELPER.index()));
+                let partner = partner.then(|| old.swap_remove(AgentId::PARTNER.index()));
+                seats(&setup, Minds { helper, partner }, config.rules.planner)
+            }
+        };
+        *self = Env::begin(config, world, seats, self.filled);
+        Ok(())
     }
 
     /// What stands at the head of its trace.
@@ -94,142 +134,131 @@ impl Play {
         &self.world
     }
 
-    /// What partner and helper counted of their own doings, by agent and name.
-    pub fn counts(&self) -> BTreeMap<String, u64> {
-        let of = |(k, actor): (usize, &Actor)| {
-            let agent = AgentId(k as u8);
-            actor.mind.counts().into_iter().map(move |(name, n)| (format!("{agent}.{name}"), n))
-        };
-        self.cast.actors.iter().enumerate().flat_map(of).collect()
-    }
-
     /// What everybody sees with.
-    pub fn eyes(&self) -> &Eyes {
-        &self.eyes
+    pub fn observer(&self) -> &Observer {
+        &self.observer
     }
 
-    /// Plays to the end, or to the first frame in which somebody decides at or after `until`.
-    /// Every record is handed to `sink`, whose error ends the play.
-    ///
-    /// Returns false if `stop` was raised before the end.
+    /// What the minds counted of their own doings, by agent and name.
+    pub fn counts(&self) -> BTreeMap<String, u64> {
+        let minds = self.seats.iter().enumerate().filter_map(|(k, seat)| Some((k, seat.mind()?)));
+        minds
+            .flat_map(|(k, mind)| {
+                let agent = AgentId(k as u8);
+                mind.counts().into_iter().map(move |(name, n)| (format!("{agent}.{name}"), n))
+            })
+            .collect()
+    }
+
+    /// What the agent in this seat is told at the beginning.
+    pub fn briefing(&self, agent: AgentId) -> Briefing {
+        let grants = self.seats[agent.index()].grants;
+        self.world.briefing(agent, grants)
+    }
+
+    /// The agents whose choices are the caller's and needed now.
+    pub fn waiting(&self) -> impl Iterator<Item = AgentId> + '_ {
+        let turns = self.turns.iter().enumerate();
+        turns
+            .filter(|(_, turn)| turn.glimpse.is_some() && turn.choice.is_none())
+            .map(|(k, _)| AgentId(k as u8))
+    }
+
+    /// What an agent that is [waiting](Env::waiting) perceives.
+    pub fn observation(&self, agent: AgentId) -> Option<&Observation> {
+        let turn = self.turns.get(agent.index())?;
+        turn.glimpse.as_ref().map(|glimpse| &glimpse.observation)
+    }
+
+    /// The caller's choice for an agent that is [waiting](Env::waiting); it acts once all have
+    /// chosen. Returns false, and changes nothing, if the agent isn't waiting.
+    pub fn submit(&mut self, agent: AgentId, action: Action) -> bool {
+        if !self.waiting().any(|a| a == agent) {
+            return false;
+        }
+        let turn = &mut self.turns[agent.index()];
+        let Some(glimpse) = &turn.glimpse else { return false };
+        let resolved = glimpse.resolve(action);
+        self.seats[agent.index()].submitted = Some((action, resolved));
+        turn.choice = Some(Choice { agent, action: resolved, thought: None, child: None });
+        true
+    }
+
+    /// Plays on without keeping records: until a choice of the caller's is needed or the episode
+    /// ends, or to the first frame in which somebody decides at or after `until`.
+    pub fn advance(&mut self, until: Option<Frame>) -> Flow {
+        let run = self.run(&AtomicBool::new(false), until, &mut |_| Ok::<(), Infallible>(()));
+        run.unwrap_or_else(|never| match never {})
+    }
+
+    /// Plays until a choice of the caller's is needed or the episode ends, or to the first frame in
+    /// which somebody decides at or after `until`. Every record is handed to `sink`, whose error
+    /// ends the play.
     ///
     /// # Errors
     /// Those of `sink`.
-    pub fn run(
+    pub fn run<E>(
         &mut self,
         stop: &AtomicBool,
         until: Option<Frame>,
-        sink: &mut dyn FnMut(&Record) -> Result<()>,
-    ) -> Result<bool> {
-        let Play { world, cast, eyes, .. } = self;
-        let mut said: Vec<Option<Thought>> = vec![None; cast.actors.len()];
-        let mut decide = |world: &World, waiting: &[AgentId]| {
+        sink: &mut dyn FnMut(&Record) -> std::result::Result<(), E>,
+    ) -> std::result::Result<Flow, E> {
+        let Env { world, seats, observer, turns, .. } = self;
+        let mut flow = Flow::Stopped;
+        let mut decide = |world: &World, waiting: &[AgentId]| -> Decided<E> {
             let late = until.is_some_and(|f| world.state().frame >= f);
             if stop.load(Ordering::Relaxed) || late {
                 return Ok(None);
             }
-            let wanted: Vec<_> = waiting.iter().map(|a| (*a, &cast.actors[a.index()])).collect();
-            let glances = eyes.observe(world, &wanted);
-            let choices = waiting.iter().zip(glances).map(|(agent, glance)| {
-                let actor = &mut cast.actors[agent.index()];
-                let meant = actor.mind.act(&glance.observation);
-                let action = glance.resolve(meant);
-                actor.submitted = Some((meant, action));
-                let (thought, child) = (Some(actor.mind.thought()), actor.mind.child_state());
-                let is_news = said[agent.index()] != thought;
-                if is_news {
-                    said[agent.index()].clone_from(&thought);
-                }
-                Choice { agent: *agent, action, thought: thought.filter(|_| is_news), child }
-            });
-            let choices: Vec<Choice> = choices.collect();
+            let fresh: Vec<_> =
+                waiting.iter().filter(|a| turns[a.index()].glimpse.is_none()).copied().collect();
+            let glimpses = {
+                let looking: Vec<_> = fresh.iter().map(|a| (*a, &seats[a.index()])).collect();
+                observer.observe(world, &looking)
+            };
+            for (agent, glimpse) in fresh.iter().copied().zip(glimpses) {
+                let turn = &mut turns[agent.index()];
+                turn.choice = choose(&mut seats[agent.index()], agent, &glimpse, &mut turn.said);
+                turn.glimpse = Some(glimpse);
+            }
             // Who raised `stop` while deciding hasn't decided.
-            Ok((!stop.load(Ordering::Relaxed)).then_some(choices))
+            if stop.load(Ordering::Relaxed) {
+                for agent in &fresh {
+                    turns[agent.index()] = Turn::default();
+                }
+                return Ok(None);
+            }
+            if waiting.iter().any(|a| turns[a.index()].choice.is_none()) {
+                flow = Flow::Waits;
+                return Ok(None);
+            }
+            let mut take = |agent: &AgentId| {
+                let turn = &mut turns[agent.index()];
+                turn.glimpse = None;
+                turn.choice.take()
+            };
+            Ok(Some(waiting.iter().filter_map(&mut take).collect()))
         };
-        let flow = crank(world, &mut decide, sink)?;
-        Ok(flow == Flow::Ended)
+        let has_ended = run_loop(world, &mut decide, sink)?;
+        Ok(if has_ended { Flow::Ended } else { flow })
     }
 }
 
-/// The setup as it is played: with its seed, and without helper and child where the partner is
-/// alone (facts A8: the original's runs without helper have no child either).
-fn setup_of(staging: &Staging<'_>, has_helper: bool) -> Arc<Setup> {
-    let mut setup = staging.episode.setup().clone();
-    setup.seed = world_seed(setup.seed, staging.seed);
-    if !has_helper {
-        setup.people.truncate(1);
-    }
-    Arc::new(setup)
+fn check_seats(config: &EpisodeConfig<'_>, setup: &Setup, seats: usize) -> Result<()> {
+    let people = setup.people.len();
+    let id = || config.episode.id().to_owned();
+    if people == seats { Ok(()) } else { Err(EnvError::Seats { id: id(), people, seats }) }
 }
 
-/// The world at its beginning, with everybody briefed.
-fn brief(staging: &Staging<'_>, setup: &Arc<Setup>, cast: &mut Cast) -> Result<World> {
-    let world = new_world(setup, staging.rules.world, staging.episode.id())?;
-    for (agent, actor) in setup.agents().zip(&mut cast.actors) {
-        actor.begin(agent, &world, staging.image_size);
-    }
-    Ok(world)
-}
-
-/// What stands at the head of the trace, without playing.
-///
-/// # Errors
-/// If the setup can't become a world.
-pub fn header_of(staging: Staging<'_>, minds: impl Into<Minds>) -> Result<Header> {
-    let minds = minds.into();
-    let setup = setup_of(&staging, minds.helper.is_some());
-    let mut cast = cast(&setup, minds, staging.rules.planner);
-    brief(&staging, &setup, &mut cast)?;
-    Ok(header(&staging, &setup, &cast))
-}
-
-fn new_world(setup: &Arc<Setup>, rules: Rules, id: &str) -> Result<World> {
-    let refused = |problem| EvalError::Setup { id: id.to_owned(), problem };
-    World::new(Arc::clone(setup), rules).map_err(refused)
-}
-
-/// The world of a trace at its beginning, from the episode that it was played on.
-///
-/// # Errors
-/// If the episode isn't the one that was played.
-pub fn world_of(header: &Header, episode: &Episode) -> Result<World> {
-    let digest = Digest::of_setup(episode.setup());
-    if digest != header.setup {
-        return Err(EvalError::OtherEpisode {
-            id: header.episode.clone(),
-            found: digest.to_string(),
-            expected: header.setup.to_string(),
-        });
-    }
-    let mut setup = episode.setup().clone();
-    setup.seed = header.world_seed;
-    setup.people.truncate(header.people.len().max(1));
-    new_world(&Arc::new(setup), header.rules.world, episode.id())
-}
-
-fn header(staging: &Staging<'_>, setup: &Setup, cast: &Cast) -> Header {
-    let people = setup.agents().zip(&setup.people).zip(&cast.actors);
-    Header {
-        format: FORMAT.to_owned(),
-        version: VERSION,
-        chaic: CHAIC_VERSION.to_owned(),
-        task: setup.task,
-        episode: staging.episode.id().to_owned(),
-        setup: Digest::of_setup(staging.episode.setup()),
-        seed: staging.seed,
-        world_seed: setup.seed,
-        rules: staging.rules,
-        helper: staging.helper.to_owned(),
-        partner: staging.partner.map(str::to_owned),
-        people: people
-            .map(|((agent, person), actor)| Participant {
-                agent,
-                persona: person.persona,
-                grants: actor.grants,
-                senses: actor.senses,
-            })
-            .collect(),
-        renderer: "cpu".to_owned(),
-        appearance: staging.appearance,
-    }
+/// What the mind of a seat chooses; `None` if the caller drives it.
+fn choose(seat: &mut Seat, agent: AgentId, glimpse: &Glimpse, said: &mut Said) -> Option<Choice> {
+    let Driver::Mind(mind) = &mut seat.driver else { return None };
+    let meant = mind.act(&glimpse.observation);
+    let action = glimpse.resolve(meant);
+    seat.submitted = Some((meant, action));
+    let says = Said { thought: Some(mind.thought()), child: mind.child_state() };
+    let thought = says.thought.clone().filter(|_| says.thought != said.thought);
+    let child = says.child.filter(|_| says.child != said.child);
+    *said = says;
+    Some(Choice { agent, action, thought, child })
 }

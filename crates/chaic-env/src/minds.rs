@@ -6,8 +6,8 @@ use chaic_agents::{HELPERS, PlannerRules, helper, helper_grants};
 use chaic_protocol::Agent;
 use chaic_protocol::observation::Grants;
 
-use crate::error::{EvalError, Result};
-use crate::metrics::RunKey;
+use crate::error::{EnvError, Result};
+use crate::key::RunKey;
 
 /// The name of having no helper at all.
 pub const NONE: &str = "none";
@@ -25,7 +25,7 @@ pub struct Helper {
 /// Where a run gets its helpers from: by name, a fresh one for each episode.
 ///
 /// ```
-/// use chaic_eval::helpers::{BuiltIn, Helpers as _};
+/// use chaic_env::minds::{BuiltIn, Helpers as _};
 /// use chaic_agents::PlannerRules;
 /// assert!(BuiltIn.make("rhp", PlannerRules::paper()).is_some());
 /// assert!(BuiltIn.make("nobody", PlannerRules::paper()).is_none());
@@ -91,7 +91,7 @@ impl Helpers for BuiltIn {
 /// The helper of this name; `None` for [`NONE`].
 ///
 /// # Errors
-/// [`EvalError::UnknownHelper`] with all names.
+/// [`EnvError::UnknownHelper`] with all names.
 pub fn find(helpers: &dyn Helpers, name: &str, rules: PlannerRules) -> Result<Option<Helper>> {
     some_or_none(helpers, name, || helpers.make(name, rules))
 }
@@ -99,7 +99,7 @@ pub fn find(helpers: &dyn Helpers, name: &str, rules: PlannerRules) -> Result<Op
 /// The helper of one episode run.
 ///
 /// # Errors
-/// [`EvalError::UnknownHelper`] with all names.
+/// [`EnvError::UnknownHelper`] with all names.
 pub fn find_for(
     helpers: &dyn Helpers,
     key: &RunKey,
@@ -111,7 +111,7 @@ pub fn find_for(
 /// The mind that drives the partner; `None` for the rule-based one of its task.
 ///
 /// # Errors
-/// [`EvalError::UnknownPartner`] with all names.
+/// [`EnvError::UnknownPartner`] with all names.
 pub fn find_partner(
     helpers: &dyn Helpers,
     name: Option<&str>,
@@ -120,7 +120,7 @@ pub fn find_partner(
 ) -> Result<Option<Helper>> {
     let Some(name) = name else { return Ok(None) };
     let known = || std::iter::once(RULES.to_owned()).chain(helpers.partner_names()).collect();
-    let unknown = || EvalError::UnknownPartner { name: name.to_owned(), known: known() };
+    let unknown = || EnvError::UnknownPartner { name: name.to_owned(), known: known() };
     helpers.partner(name, of, rules).map(Some).ok_or_else(unknown)
 }
 
@@ -134,7 +134,7 @@ fn some_or_none(
     }
     let unknown = || {
         let known = std::iter::once(NONE.to_owned()).chain(helpers.names()).collect();
-        EvalError::UnknownHelper { name: name.to_owned(), known }
+        EnvError::UnknownHelper { name: name.to_owned(), known }
     };
     make().map(Some).ok_or_else(unknown)
 }

@@ -7,17 +7,17 @@ use chaic_protocol::{Action, AgentId, EntityId, ResolvedAction, Target};
 use chaic_render::{Channels, Scene, View};
 use chaic_world::World;
 
-use crate::play::cast::Actor;
+use crate::seat::Seat;
 
 /// The eyes of everybody in an episode.
 #[derive(Clone)]
-pub struct Eyes {
+pub struct Observer {
     scene: Arc<Scene>,
 }
 
 /// What an agent perceives, with what only the environment knows of its image.
 #[derive(Clone, Debug)]
-pub struct Glance {
+pub struct Glimpse {
     /// What the agent is given.
     pub observation: Observation,
     /// Instance ids of its image, u16, shape [height, width], where the agent itself isn't given
@@ -26,7 +26,7 @@ pub struct Glance {
     may_name_entities: bool,
 }
 
-impl Glance {
+impl Glimpse {
     /// The action with its target resolved to what the pixel shows, or to the entity where ids are
     /// granted; anything else names [`EntityId::NOTHING`].
     pub fn resolve(&self, action: Action) -> ResolvedAction {
@@ -47,10 +47,10 @@ impl Glance {
     }
 }
 
-impl Eyes {
-    /// Eyes for a world with these shapes.
-    pub fn new(scene: Arc<Scene>) -> Eyes {
-        Eyes { scene }
+impl Observer {
+    /// Observer for a world with these shapes.
+    pub fn new(scene: Arc<Scene>) -> Observer {
+        Observer { scene }
     }
 
     /// The shapes that are seen.
@@ -60,12 +60,12 @@ impl Eyes {
 
     /// What these agents perceive now: images are made for all of them at once, and only those
     /// that are wanted.
-    pub fn observe(&self, world: &World, who: &[(AgentId, &Actor)]) -> Vec<Glance> {
+    pub fn observe(&self, world: &World, who: &[(AgentId, &Seat)]) -> Vec<Glimpse> {
         let looking: Vec<_> = who.iter().filter(|(_, a)| a.senses.wants_image()).collect();
-        let view = |(agent, actor): &&(AgentId, &Actor)| {
-            let camera = world.eye(*agent, actor.senses.image_size);
+        let view = |(agent, seat): &&(AgentId, &Seat)| {
+            let camera = world.eye(*agent, seat.senses.image_size);
             // Ids are always made: they resolve what is pointed at, and tell what is in view.
-            let channels = Channels { ids: true, ..Channels::from(actor.senses) };
+            let channels = Channels { ids: true, ..Channels::from(seat.senses) };
             View::of_eye(*agent, camera, channels)
         };
         let views: Vec<View> = looking.iter().map(view).collect();
@@ -75,38 +75,38 @@ impl Eyes {
         }
         .into_iter();
         who.iter()
-            .map(|(agent, actor)| {
-                let images = if actor.senses.wants_image() { images.next() } else { None }
+            .map(|(agent, seat)| {
+                let images = if seat.senses.wants_image() { images.next() } else { None }
                     .unwrap_or_default();
-                glance(world, *agent, actor, images)
+                glimpse(world, *agent, seat, images)
             })
             .collect()
     }
 }
 
-fn glance(world: &World, agent: AgentId, actor: &Actor, mut images: Images) -> Glance {
-    let Actor { grants, senses, .. } = *actor;
+fn glimpse(world: &World, agent: AgentId, seat: &Seat, mut images: Images) -> Glimpse {
+    let Seat { grants, senses, .. } = *seat;
     let in_view = images.ids.as_deref().map_or(Vec::new(), present);
     let hidden_ids = strip(&mut images, senses, grants.ids);
     let observation = Observation {
         frame: world.state().frame,
-        own: world.own_state(agent, grants, last_action(world, agent, actor)),
+        own: world.own_state(agent, grants, last_action(world, agent, seat)),
         camera: world.eye(agent, senses.image_size),
         images,
         granted: world.granted(agent, grants, &in_view),
     };
-    Glance { observation, hidden_ids, may_name_entities: grants.ids }
+    Glimpse { observation, hidden_ids, may_name_entities: grants.ids }
 }
 
 /// The last action of an agent with its outcome, in the agent's own words.
 fn last_action(
     world: &World,
     agent: AgentId,
-    actor: &Actor,
+    seat: &Seat,
 ) -> Option<(Action, chaic_protocol::Outcome)> {
     let (done, outcome) = world.last_action(agent)?;
-    let meant = actor.submitted.filter(|(_, resolved)| *resolved == done).map(|(meant, _)| meant);
-    let told = || actor.grants.ids.then(|| done.map(Target::Entity));
+    let meant = seat.submitted.filter(|(_, resolved)| *resolved == done).map(|(meant, _)| meant);
+    let told = || seat.grants.ids.then(|| done.map(Target::Entity));
     Some((meant.or_else(told)?, outcome))
 }
 

@@ -9,7 +9,7 @@ pub use chaic_world::Rules;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::error::{EvalError, Result};
+use crate::error::{EnvError, Result};
 
 /// Names a rule set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -57,17 +57,17 @@ impl RuleSet {
     /// `world.dropped_counts=true`; a VALUE of `paper` or `compat` takes that set's.
     ///
     /// # Errors
-    /// [`EvalError::Options`] that lists all names, or says what is wrong with the value.
+    /// [`EnvError::Rule`] that lists all names, or says what is wrong with the value.
     ///
     /// ```
-    /// use chaic_eval::rules::RuleSet;
+    /// use chaic_env::rules::RuleSet;
     /// let rules = RuleSet::PAPER.with("planner.exploration=sampled")?;
     /// assert_eq!(RuleSet::COMPAT.planner.exploration, rules.planner.exploration);
     /// assert!(RuleSet::PAPER.with("world.gravity=0").is_err());
-    /// # Ok::<(), chaic_eval::EvalError>(())
+    /// # Ok::<(), chaic_env::EnvError>(())
     /// ```
     pub fn with(self, setting: &str) -> Result<RuleSet> {
-        let wrong = |problem: String| EvalError::Options(format!("--set {setting}: {problem}"));
+        let wrong = |problem| EnvError::Rule { setting: setting.to_owned(), problem };
         let (name, text) =
             setting.split_once('=').ok_or_else(|| wrong("expected NAME=VALUE".to_owned()))?;
         let pointer = format!("/{}", name.replace('.', "/"));
@@ -131,7 +131,7 @@ pub fn differing_rules() -> Vec<String> {
 /// The value of a single rule in both sets, paper's first, as `--set` would take it.
 ///
 /// # Errors
-/// [`EvalError::Options`] that lists all names.
+/// [`EnvError::Rule`] that lists all names.
 pub fn rule_values(name: &str) -> Result<(String, String)> {
     let pointer = format!("/{}", name.replace('.', "/"));
     let of = |set: RuleSet| {
@@ -145,8 +145,8 @@ pub fn rule_values(name: &str) -> Result<(String, String)> {
     };
     let values = of(RuleSet::PAPER).zip(of(RuleSet::COMPAT)).filter(|_| name != "name");
     values.ok_or_else(|| {
-        let known = rule_names().join(", ");
-        EvalError::Options(format!("no rule `{name}`; the rules are {known}"))
+        let known = rule_names();
+        EnvError::UnknownRule { name: name.to_owned(), known }
     })
 }
 

@@ -5,7 +5,6 @@ use chaic_protocol::{AgentId, ResolvedAction};
 use chaic_world::World;
 
 use crate::digest::Digest;
-use crate::error::Result;
 use crate::trace::{ChildRecord, Decision, End, Record, TraceEvent, is_recorded};
 
 /// What somebody chose to do.
@@ -17,21 +16,12 @@ pub struct Choice {
     pub action: ResolvedAction,
     /// What it thought, if that changed.
     pub thought: Option<Thought>,
-    /// What it is doing, if it is the child.
+    /// What it is doing, if it is the child and that changed.
     pub child: Option<ChildState>,
 }
 
 /// Chooses for those who wait; `None` to stop.
-pub type Decide<'a> = dyn FnMut(&World, &[AgentId]) -> Result<Option<Vec<Choice>>> + 'a;
-
-/// Why the loop returned.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Flow {
-    /// The episode ended.
-    Ended,
-    /// `decide` had no more choices.
-    Stopped,
-}
+pub type Decide<'a, E> = dyn FnMut(&World, &[AgentId]) -> Result<Option<Vec<Choice>>, E> + 'a;
 
 /// Asks `decide` whenever somebody waits, submits the choices in their order, lets frames pass,
 /// and hands `sink` all that is worth recording, until the episode ends or `decide` returns `None`.
@@ -40,21 +30,19 @@ pub enum Flow {
 ///
 /// # Errors
 /// Those of `decide` and `sink`.
-pub fn crank(
+pub fn run_loop<E>(
     world: &mut World,
-    decide: &mut Decide<'_>,
-    sink: &mut dyn FnMut(&Record) -> Result<()>,
-) -> Result<Flow> {
-    let mut child = None;
+    decide: &mut Decide<'_, E>,
+    sink: &mut dyn FnMut(&Record) -> Result<(), E>,
+) -> Result<bool, E> {
     while !world.is_over() {
         let waiting = world.waiting();
         if !waiting.is_empty() {
-            let Some(choices) = decide(world, &waiting)? else { return Ok(Flow::Stopped) };
+            let Some(choices) = decide(world, &waiting)? else { return Ok(false) };
             for choice in choices {
                 let state = choice.child;
                 submit(world, choice, sink)?;
-                if let Some(state) = state.filter(|_| child != state) {
-                    child = Some(state);
+                if let Some(state) = state {
                     sink(&Record::Child(ChildRecord { frame: world.state().frame, state }))?;
                 }
             }
@@ -65,14 +53,14 @@ pub fn crank(
         }
     }
     sink(&Record::End(End::of(world)))?;
-    Ok(Flow::Ended)
+    Ok(true)
 }
 
-fn submit(
+fn submit<E>(
     world: &mut World,
     Choice { agent, action, thought, .. }: Choice,
-    sink: &mut dyn FnMut(&Record) -> Result<()>,
-) -> Result<()> {
+    sink: &mut dyn FnMut(&Record) -> Result<(), E>,
+) -> Result<(), E> {
     // Another's choice of this frame may have given this agent something to do already.
     if !world.waiting().contains(&agent) {
         return Ok(());

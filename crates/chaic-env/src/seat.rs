@@ -1,4 +1,4 @@
-//! Who takes part in an episode.
+//! Who takes part in an episode: seats, with who drives each and what it is granted.
 
 use chaic_agents::{PlannerRules, partners};
 use chaic_protocol::observation::{Grants, Senses};
@@ -6,82 +6,111 @@ use chaic_protocol::rng::Stream;
 use chaic_protocol::{Action, Agent, AgentId, Briefing, Observation, ResolvedAction};
 use chaic_world::{Setup, World};
 
-use crate::helpers::Helper;
+use crate::minds::Helper;
 
-/// A mind with what it is granted and what it wants to perceive.
-pub struct Actor {
-    /// The mind.
-    pub mind: Box<dyn Agent>,
+/// Who decides for a seat.
+pub enum Driver {
+    /// A mind, which the environment asks.
+    Mind(Box<dyn Agent>),
+    /// The caller of the environment: a learner, or a program that speaks another language.
+    Caller,
+}
+
+/// A place in an episode: who drives it, what that one is granted, and what it wants to perceive.
+pub struct Seat {
+    /// Who decides.
+    pub driver: Driver,
     /// What it is granted.
     pub grants: Grants,
-    /// What it wants to perceive; known once the episode has begun.
+    /// What it wants to perceive; a mind says so once the episode has begun.
     pub senses: Senses,
     /// Its last action, as it named it and as it was resolved.
-    pub(super) submitted: Option<(Action, ResolvedAction)>,
+    pub(crate) submitted: Option<(Action, ResolvedAction)>,
 }
 
-/// Everybody, in the order of their ids.
-pub struct Cast {
-    /// By agent.
-    pub actors: Vec<Actor>,
-}
-
-impl Actor {
-    /// A mind before its first episode.
-    pub fn new(mind: Box<dyn Agent>, grants: Grants) -> Actor {
-        Actor { mind, grants, senses: Senses::NONE, submitted: None }
+impl Seat {
+    /// For a mind before its first episode.
+    pub fn of_mind(mind: Box<dyn Agent>, grants: Grants) -> Seat {
+        Seat { driver: Driver::Mind(mind), grants, senses: Senses::NONE, submitted: None }
     }
 
-    /// Briefs the mind and asks what it wants to perceive.
-    pub(super) fn begin(&mut self, agent: AgentId, world: &World, image_size: Option<u32>) {
-        self.mind.reset(&world.briefing(agent, self.grants));
-        let senses = self.mind.senses();
-        let image_size = image_size.unwrap_or(senses.image_size);
-        self.senses = Senses { image_size, ..senses };
+    /// For a caller who perceives by these senses.
+    pub fn of_caller(grants: Grants, senses: Senses) -> Seat {
+        Seat { driver: Driver::Caller, grants, senses, submitted: None }
+    }
+
+    /// Briefs a mind and asks what it wants to perceive.
+    pub(crate) fn begin(&mut self, agent: AgentId, world: &World, image_size: Option<u32>) {
+        self.submitted = None;
+        if let Driver::Mind(mind) = &mut self.driver {
+            mind.reset(&world.briefing(agent, self.grants));
+            self.senses = mind.senses();
+        }
+        self.senses.image_size = image_size.unwrap_or(self.senses.image_size);
+    }
+
+    /// Its mind, if it has one.
+    pub fn mind(&self) -> Option<&dyn Agent> {
+        match &self.driver {
+            Driver::Mind(mind) => Some(&**mind),
+            Driver::Caller => None,
+        }
     }
 }
 
-/// The minds that a run chooses.
+impl From<Helper> for Seat {
+    fn from(Helper { mind, grants }: Helper) -> Seat {
+        Seat::of_mind(mind, grants)
+    }
+}
+
+/// The seats that a run fills.
 pub struct Minds {
     /// The helper's; `None` where the partner is alone.
-    pub helper: Option<Helper>,
-    /// The partner's; `None` for the rule-based one of its task.
-    pub partner: Option<Helper>,
+    pub helper: Option<Seat>,
+    /// The partner's; `None` for the rule-based mind of its task.
+    pub partner: Option<Seat>,
+}
+
+impl Minds {
+    /// A helper's mind, and one for the partner in place of the rule-based one.
+    pub fn of(helper: Option<Helper>, partner: Option<Helper>) -> Minds {
+        Minds { helper: helper.map(Seat::from), partner: partner.map(Seat::from) }
+    }
 }
 
 impl From<Option<Helper>> for Minds {
     fn from(helper: Option<Helper>) -> Minds {
-        Minds { helper, partner: None }
+        Minds::of(helper, None)
     }
 }
 
-/// Partner, helper and child of a setup; nobody but the partner if there is no helper.
-pub fn cast(setup: &Setup, minds: Minds, rules: PlannerRules) -> Cast {
+/// Partner, helper and child of a setup, in the order of their ids; nobody but the partner if there
+/// is no helper.
+pub fn seats(setup: &Setup, minds: Minds, rules: PlannerRules) -> Vec<Seat> {
     let info = setup.task.info();
     let persona = setup.people.first().map_or(info.partner, |p| p.persona);
-    let partner = minds.partner.unwrap_or_else(|| Helper {
-        mind: partners::partner(persona, info.scene, rules),
-        grants: partners::partner_grants(rules),
-    });
-    let mut actors = vec![Actor::new(partner.mind, partner.grants)];
-    if let Some(Helper { mind, grants }) = minds.helper {
-        actors.push(Actor::new(mind, grants));
-    }
+    let by_rules = || {
+        let mind = partners::partner(persona, info.scene, rules);
+        Seat::of_mind(mind, partners::partner_grants(rules))
+    };
+    let mut seats = vec![minds.partner.unwrap_or_else(by_rules)];
+    seats.extend(minds.helper);
     if setup.people.len() > AgentId::CHILD.index() {
-        actors.push(Actor::new(partners::child(rules), Grants::CHILD));
+        seats.push(Seat::of_mind(partners::child(rules), Grants::CHILD));
     }
     // The world's rules allow more people than the tasks have; anybody further only stands there.
-    while actors.len() < setup.people.len() {
-        actors.push(Actor::new(Box::new(Bystander), Grants::NONE));
+    while seats.len() < setup.people.len() {
+        seats.push(Seat::of_mind(Box::new(Idle), Grants::NONE));
     }
-    Cast { actors }
+    seats
 }
 
 /// Somebody who stands there and looks at nothing.
 #[derive(Clone, Copy, Debug)]
-pub struct Bystander;
+pub struct Idle;
 
-impl Agent for Bystander {
+impl Agent for Idle {
     fn senses(&self) -> Senses {
         Senses::NONE
     }

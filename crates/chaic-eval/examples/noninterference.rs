@@ -9,10 +9,10 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use chaic_env::minds::{BuiltIn, Helper, Helpers as _};
+use chaic_env::rules::RuleSet;
 use chaic_episodes::{Episode, Split, episodes};
 use chaic_eval::audit::{Pair, Partner, Prober, Secret, compare};
-use chaic_eval::helpers::{BuiltIn, Helper, Helpers as _};
-use chaic_eval::rules::RuleSet;
 use chaic_protocol::TaskId;
 use chaic_protocol::observation::Grants;
 

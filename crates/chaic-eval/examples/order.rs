@@ -6,14 +6,13 @@
 //! margin is a fifth and a third of the distances, so that only a broken helper or world fails.
 
 use std::process::ExitCode;
-use std::sync::atomic::AtomicBool;
 
 use chaic_agents::PlannerRules;
+use chaic_env::minds::{BuiltIn, Helpers as _};
+use chaic_env::rules::RuleSet;
+use chaic_env::{Appearance, Env, EpisodeConfig};
 use chaic_episodes::{Episode, Split, episodes};
-use chaic_eval::helpers::{BuiltIn, Helpers as _};
-use chaic_eval::play::{Play, Staging};
-use chaic_eval::rules::RuleSet;
-use chaic_eval::{Appearance, Result};
+use chaic_eval::Result;
 use chaic_protocol::TaskId;
 use rayon::prelude::*;
 
@@ -26,7 +25,7 @@ const HELPERS: [&str; 3] = ["none", "rhp", "oracle"];
 
 /// Part of what was wanted that is delivered at the end.
 fn transport_rate(episode: &Episode, helper: &str) -> Result<f64> {
-    let staging = Staging {
+    let config = EpisodeConfig {
         episode,
         seed: 0,
         rules: RuleSet::PAPER,
@@ -35,9 +34,9 @@ fn transport_rate(episode: &Episode, helper: &str) -> Result<f64> {
         image_size: Some(256),
         appearance: Appearance::Canonical,
     };
-    let mut play = Play::new(staging, BuiltIn.make(helper, PlannerRules::paper()))?;
-    play.run(&AtomicBool::new(false), None, &mut |_| Ok(()))?;
-    let (done, total) = play.world().progress();
+    let mut env = Env::new(config, BuiltIn.make(helper, PlannerRules::paper()))?;
+    env.advance(None);
+    let (done, total) = env.world().progress();
     Ok(done / total)
 }
 

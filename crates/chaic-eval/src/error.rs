@@ -3,10 +3,9 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use chaic_env::{EnvError, RunKey};
 use chaic_episodes::{EpisodeError, SplitError};
-use chaic_world::SetupError;
-
-use crate::metrics::RunKey;
+use chaic_files::FileError;
 
 /// The result of anything in this crate.
 pub type Result<T> = std::result::Result<T, EvalError>;
@@ -15,15 +14,8 @@ pub type Result<T> = std::result::Result<T, EvalError>;
 #[derive(Debug, thiserror::Error)]
 pub enum EvalError {
     /// The operating system refused something.
-    #[error("can't {what} {path}: {refusal}", path = path.display())]
-    Io {
-        /// What was tried, for example `write`.
-        what: &'static str,
-        /// With which file or folder.
-        path: PathBuf,
-        /// The refusal.
-        refusal: io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
     /// A folder isn't a run.
     #[error(
         "{path} is no run: it has no run.json; give the folder that `chaic eval --out` wrote",
@@ -52,30 +44,6 @@ pub enum EvalError {
     Altered {
         /// The file.
         path: PathBuf,
-    },
-    /// A file is of another version or format.
-    #[error(
-        "{path} is of {found}, this program (chaic {chaic}) reads {expected}; use the chaic that \
-         wrote it",
-        path = path.display(), chaic = crate::CHAIC_VERSION
-    )]
-    OtherVersion {
-        /// The file.
-        path: PathBuf,
-        /// What it says it is.
-        found: String,
-        /// What was expected.
-        expected: String,
-    },
-    /// A file can't be understood.
-    #[error("{path}: line {line}: {problem}", path = path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// The line, from 1.
-        line: usize,
-        /// What is wrong.
-        problem: String,
     },
     /// Another process writes to the run.
     #[error(
@@ -116,7 +84,7 @@ pub enum EvalError {
         "{path}: {episode} with {helper} and seed {seed} comes out otherwise than it did, so another \
          build of chaic {chaic} began this; go on with that one, or begin anew in another --out",
         path = path.display(), episode = key.episode, helper = key.helper, seed = key.seed,
-        chaic = crate::CHAIC_VERSION
+        chaic = chaic_env::CHAIC_VERSION
     )]
     OtherCode {
         /// The run's folder.
@@ -124,38 +92,12 @@ pub enum EvalError {
         /// The episode run that was played again.
         key: RunKey,
     },
+    /// An episode can't be played.
+    #[error(transparent)]
+    Env(#[from] EnvError),
     /// Options make no run.
     #[error("{0}")]
     Options(String),
-    /// No helper has this name.
-    #[error("unknown helper `{name}`; the helpers are {known}", known = known.join(", "))]
-    UnknownHelper {
-        /// The name.
-        name: String,
-        /// All names.
-        known: Vec<String>,
-    },
-    /// No mind for the partner has this name.
-    #[error("unknown partner `{name}`; the partners are {known}", known = known.join(", "))]
-    UnknownPartner {
-        /// The name.
-        name: String,
-        /// All names.
-        known: Vec<String>,
-    },
-    /// A run or trace names an episode that isn't what it was.
-    #[error(
-        "the episode {id} has digest {found}, the trace was played on {expected}; it needs the \
-         chaic that wrote it"
-    )]
-    OtherEpisode {
-        /// The episode.
-        id: String,
-        /// Digest of the episode as it is.
-        found: String,
-        /// Digest of the episode that was played.
-        expected: String,
-    },
     /// There is no such trace in a run.
     #[error("{path} has no trace of {wanted}; it has {known}", path = path.display())]
     NoTrace {
@@ -189,23 +131,12 @@ pub enum EvalError {
         /// The refusal.
         refusal: io::Error,
     },
-    /// Helpers from elsewhere can't take part.
-    #[error("{0}")]
-    Helpers(Box<dyn std::error::Error + Send + Sync>),
     /// There is no such episode.
     #[error(transparent)]
     Split(#[from] SplitError),
     /// An episode file is wrong.
     #[error(transparent)]
     Episode(#[from] EpisodeError),
-    /// A setup can't become a world.
-    #[error("the setup of {id} makes no world: {problem}")]
-    Setup {
-        /// The episode.
-        id: String,
-        /// Why.
-        problem: SetupError,
-    },
     /// A trace's actions don't lead where the trace says.
     #[error("{0}")]
     Difference(String),
@@ -217,20 +148,16 @@ pub enum EvalError {
 impl EvalError {
     /// Whether it is about what the caller asked for, rather than what came of it.
     pub fn is_usage(&self) -> bool {
-        use EvalError::{OptionDiffers, Options, Split, UnknownHelper, UnknownPartner};
-        matches!(
-            self,
-            Options(_)
-                | UnknownHelper { .. }
-                | UnknownPartner { .. }
-                | OptionDiffers { .. }
-                | Split(_)
-        )
+        match self {
+            EvalError::Options(_) | EvalError::OptionDiffers { .. } | EvalError::Split(_) => true,
+            EvalError::Env(error) => error.is_usage(),
+            _ => false,
+        }
     }
 
     /// For `map_err` on what the operating system may refuse.
     pub fn io(what: &'static str, path: &Path) -> impl FnOnce(io::Error) -> EvalError + use<> {
-        let path = path.to_owned();
-        move |refusal| EvalError::Io { what, path, refusal }
+        let refused = FileError::of(what, path);
+        move |refusal| refused(refusal).into()
     }
 }

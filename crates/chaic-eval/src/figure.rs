@@ -9,15 +9,13 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
+use chaic_files::{FileError, write_whole};
 use image::{ImageFormat, RgbImage, imageops};
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::FontStyle;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
-
-use crate::error::EvalError;
-use crate::files::write_whole;
 
 /// File name extensions that a figure can have.
 pub const EXTENSIONS: &[&str] = &["svg", "png"];
@@ -148,7 +146,7 @@ pub enum FigureError {
     },
     /// The file could not be written.
     #[error(transparent)]
-    Write(#[from] EvalError),
+    Write(#[from] FileError),
 }
 
 /// Draws the transport rate of each helper in each task as grouped bars with whiskers for 95 %

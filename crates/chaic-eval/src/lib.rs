@@ -1,8 +1,7 @@
-//! Runs, traces, metrics, reports and replays.
+//! Runs, metrics, reports and replays.
 //!
-//! **What it is**: the place where both sides meet. [`play`] turns the crank of one episode,
-//! [`trace`] records all that happened, [`run`] plays whole benchmarks on several threads and
-//! keeps a journal, [`metrics`] computes the paper's scores from what was recorded, [`report`]
+//! **What it is**: what becomes of episodes that `chaic-env` plays. [`run`] plays whole benchmarks on
+//! several threads, keeps a journal and writes a [`trace_file`] of each, [`metrics`] computes the paper's scores from what was recorded, [`report`]
 //! prints them, [`verify`] plays a trace's actions again and compares, [`replay`] and [`still`]
 //! draw what was played, [`audit`] shows that what is hidden is hidden, [`scene_file`] writes what there is to draw, [`bench`](mod@bench) measures
 //! how fast this machine draws and steps.
@@ -10,23 +9,16 @@
 //! **What it is not**: it holds no rules of the world, and decides for nobody.
 //!
 //! **Invariants**
-//! - What an agent gets is its briefing and its observations, made here and nowhere else, and what
-//!   it is granted stands in the trace.
 //! - A score depends on episodes, seeds, helper and rules only: not on the number of workers, not
 //!   on the clock, not on whether a run was interrupted.
 //! - Metrics read records and never step a world.
 //! - A run folder is readable after a crash at any moment; at most the episodes under way are
 //!   lost.
 
+mod episode_file;
 mod error;
 
-mod digest;
-pub mod files;
-pub mod helpers;
-pub mod play;
-pub mod rules;
-
-pub mod trace;
+pub mod trace_file;
 
 pub mod metrics;
 pub mod published;
@@ -47,9 +39,5 @@ pub mod bench;
 pub mod figure;
 pub mod video;
 
-pub use chaic_render::Appearance;
-pub use digest::Digest;
+pub use episode_file::read_episode_file;
 pub use error::{EvalError, Result};
-
-/// The version of the program, as it stands in run folders and traces.
-pub const CHAIC_VERSION: &str = env!("CARGO_PKG_VERSION");

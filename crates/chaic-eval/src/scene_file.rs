@@ -2,14 +2,15 @@
 
 use std::path::Path;
 
+use chaic_env::EnvError;
 use chaic_episodes::Episode;
+use chaic_files::write_whole;
 use chaic_protocol::EntityId;
 use chaic_protocol::geom::Camera;
 use chaic_render::{Scene, gltf_out};
 use chaic_world::{Posture, Rules, World};
 
-use crate::error::{EvalError, Result};
-use crate::files::write_whole;
+use crate::error::Result;
 use crate::still::name_of;
 
 /// How a scene becomes a file.
@@ -38,7 +39,7 @@ const SIZE_PX: u32 = 512;
 /// # Errors
 /// If the setup makes no world, or the file system refuses.
 pub fn write(episode: &Episode, options: SceneOptions, path: &Path) -> Result<Written> {
-    let refused = |problem| EvalError::Setup { id: episode.id().to_owned(), problem };
+    let refused = |problem| EnvError::Setup { id: episode.id().to_owned(), problem };
     let world = World::new(episode.setup().clone(), Rules::paper()).map_err(refused)?;
     let agents = episode.setup().agents();
     let eyes: Vec<(String, Camera)> =

@@ -3,19 +3,18 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Cursor;
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 
+use chaic_env::minds::{self, Helpers};
+use chaic_env::rules::RuleSet;
+use chaic_env::{Env, EnvError, EpisodeConfig};
 use chaic_episodes::Episode;
+use chaic_files::write_whole;
 use chaic_protocol::{AgentId, ClassId, EntityId, Frame};
 use chaic_render::{Appearance, Channels, Scene, View, image_out, plan};
 use chaic_world::{Rules, World};
 use image::{DynamicImage, ImageError, ImageFormat};
 
 use crate::error::{EvalError, Result};
-use crate::files::write_whole;
-use crate::helpers::{self, Helpers};
-use crate::play::{Play, Staging};
-use crate::rules::RuleSet;
 
 /// A plan smaller than this can't be read, pixels.
 const PLAN_MIN_PX: u32 = 960;
@@ -52,16 +51,16 @@ pub struct Still<'a> {
 pub fn write(still: &Still<'_>, helpers: &dyn Helpers, out: &Path) -> Result<Frame> {
     let Still { episode, helper, seed, rules, agent, frame, size, appearance } = *still;
     let (partner, image_size) = (None, None);
-    let staging = Staging { episode, seed, rules, helper, partner, image_size, appearance };
-    let mut play = Play::new(staging, helpers::find(helpers, helper, rules.planner)?)?;
-    if agent.index() >= play.world().setup().people.len() {
+    let config = EpisodeConfig { episode, seed, rules, helper, partner, image_size, appearance };
+    let mut env = Env::new(config, minds::find(helpers, helper, rules.planner)?)?;
+    if agent.index() >= env.world().setup().people.len() {
         let text = format!("{} has no {agent} when the helper is {helper}", episode.id());
         return Err(EvalError::Options(text));
     }
-    play.run(&AtomicBool::new(false), Some(frame), &mut |_| Ok(()))?;
-    let world = play.world();
+    env.advance(Some(frame));
+    let world = env.world();
     let view = View::of_eye(agent, world.eye(agent, size), Channels::ALL);
-    let images = play.eyes().scene().render(world, &[view]).pop().unwrap_or_default();
+    let images = env.observer().scene().render(world, &[view]).pop().unwrap_or_default();
     std::fs::create_dir_all(out).map_err(EvalError::io("make the folder", out))?;
     let no_picture = || EvalError::Picture(format!("{size} is no size of a picture"));
     let rgb = images.rgb.as_deref().and_then(|b| image_out::rgb(b, size, size));
@@ -76,7 +75,7 @@ pub fn write(still: &Still<'_>, helpers: &dyn Helpers, out: &Path) -> Result<Fra
     let names: BTreeMap<u16, &str> =
         present.into_iter().map(|id| (id, name_of(EntityId(id), &classes))).collect();
     save_names(&names, &out.join("ids.json"))?;
-    let labels = play.eyes().scene().label(world, &view);
+    let labels = env.observer().scene().label(world, &view);
     let present: BTreeSet<u8> = labels.classes.iter().copied().collect();
     let classes = ClassId::all().map(|class| (class.index() as u16, class.name()));
     let names = classes.filter(|(k, _)| present.contains(&(*k as u8))).collect();
@@ -85,7 +84,7 @@ pub fn write(still: &Still<'_>, helpers: &dyn Helpers, out: &Path) -> Result<Fra
     save(picture.ok_or_else(no_picture)?.into(), &out.join("classes.png"))?;
     let normals = image_out::normals_view(&labels.normals, size, size);
     save(normals.ok_or_else(no_picture)?.into(), &out.join("normals.png"))?;
-    let from_above = plan::draw_scene_plan(play.eyes().scene(), world, size.max(PLAN_MIN_PX));
+    let from_above = plan::draw_scene_plan(env.observer().scene(), world, size.max(PLAN_MIN_PX));
     save(from_above.into(), &out.join("plan.png"))?;
     Ok(world.state().frame)
 }
@@ -109,7 +108,7 @@ pub(crate) fn name_of(entity: EntityId, classes: &[Option<ClassId>]) -> &'static
 /// # Errors
 /// If the setup makes no world, or the file system refuses.
 pub fn write_plan(episode: &Episode, width_px: u32, path: &Path) -> Result<()> {
-    let refused = |problem| EvalError::Setup { id: episode.id().to_owned(), problem };
+    let refused = |problem| EnvError::Setup { id: episode.id().to_owned(), problem };
     let world = World::new(episode.setup().clone(), Rules::paper()).map_err(refused)?;
     let scene = Scene::new(episode.setup());
     save(plan::draw_scene_plan(&scene, &world, width_px).into(), path)
@@ -117,7 +116,7 @@ pub fn write_plan(episode: &Episode, width_px: u32, path: &Path) -> Result<()> {
 
 fn save_names(names: &BTreeMap<u16, &str>, path: &Path) -> Result<()> {
     let json = serde_json::to_string_pretty(names).expect("numbers and names") + "\n";
-    write_whole(path, json.as_bytes())
+    Ok(write_whole(path, json.as_bytes())?)
 }
 
 /// Writes a picture as a whole or not at all; the extension picks the format.
@@ -127,5 +126,5 @@ pub(crate) fn save(picture: DynamicImage, path: &Path) -> Result<()> {
     let mut bytes = Cursor::new(Vec::new());
     let format = ImageFormat::from_path(path).map_err(refused)?;
     picture.write_to(&mut bytes, format).map_err(refused)?;
-    write_whole(path, bytes.get_ref())
+    Ok(write_whole(path, bytes.get_ref())?)
 }

@@ -10,17 +10,18 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use chaic_env::minds::{self, BuiltIn, Helpers};
+use chaic_env::rules::RuleSet;
+use chaic_env::trace::{Decision, Header, Record, Trace, Warning};
+use chaic_env::{Choice, EnvError, EpisodeConfig, Minds, RunKey, header_of, run_loop, world_of};
 use chaic_protocol::agent::ChildState;
 use chaic_protocol::{AgentId, Frame};
 use chaic_world::World;
 
 use crate::error::{EvalError, Result};
-use crate::helpers::{self, BuiltIn, Helpers};
-use crate::metrics::{Ending, RunKey, RunResult, tally};
-use crate::play::{Choice, Flow, Minds, Staging, crank, header_of, world_of};
-use crate::rules::RuleSet;
+use crate::metrics::{Ending, RunResult, tally};
 use crate::run::{RunFolder, RunOptions, planned, read_results};
-use crate::trace::{self, Decision, Header, Record, Trace, Warning};
+use crate::trace_file;
 
 /// The first place where a trace and its re-simulation differ.
 #[derive(Clone, Debug, PartialEq)]
@@ -110,7 +111,7 @@ pub fn verify_run(
         verdict.add(match one {
             Ok(one) => one,
             // It concerns the whole run, so once is enough.
-            Err(error @ EvalError::OtherVersion { .. }) => return Err(error),
+            Err(error @ EvalError::Env(EnvError::OtherVersion { .. })) => return Err(error),
             Err(error) => One::unreadable(path, &error),
         });
     }
@@ -216,7 +217,7 @@ impl Check<'_> {
     }
 
     fn file(&self, path: &Path) -> Result<One> {
-        let (trace, warnings) = trace::read(path)?;
+        let (trace, warnings) = trace_file::read(path)?;
         let mut mismatch = self.trace(&trace, path)?;
         if mismatch.is_none() {
             let key = trace.header.key();
@@ -251,10 +252,10 @@ impl Check<'_> {
         }
         let episode = self.folder.episode(&key)?;
         let rules = self.rules.planner;
-        let helper = helpers::find(self.helpers, &key.helper, rules).ok();
+        let helper = minds::find(self.helpers, &key.helper, rules).ok();
         let name = self.options.partner.as_deref();
-        let partner = helpers::find_partner(self.helpers, name, None, rules);
-        let staging = Staging {
+        let partner = minds::find_partner(self.helpers, name, None, rules);
+        let config = EpisodeConfig {
             episode: &episode,
             seed: header.seed,
             rules: self.rules,
@@ -267,9 +268,9 @@ impl Check<'_> {
         let is_unknown = [partner.is_err(), helper.is_none()];
         let helper = match helper {
             Some(helper) => helper,
-            None => helpers::find(&BuiltIn, "random", rules)?,
+            None => minds::find(&BuiltIn, "random", rules)?,
         };
-        let mut expected = header_of(staging, Minds { helper, partner: partner.ok().flatten() })?;
+        let mut expected = header_of(config, Minds::of(helper, partner.ok().flatten()))?;
         for (expected, said) in expected.people.iter_mut().zip(&header.people) {
             if is_unknown.get(expected.agent.index()).is_some_and(|unknown| *unknown) {
                 (expected.grants, expected.senses) = (said.grants, said.senses);
@@ -330,7 +331,7 @@ pub fn verify(trace: &Trace, world: &mut World, path: &Path) -> Result<Option<Mi
         // Everybody who waited in this frame has decided, if the trace goes so far.
         Ok((!choices.is_empty()).then_some(choices))
     };
-    let flow = crank(world, &mut decide, &mut |record| {
+    let played = run_loop(world, &mut decide, &mut |record| {
         let said = recorded.next();
         if said == Some(record) {
             if let Record::Decision(decision) = record {
@@ -341,10 +342,10 @@ pub fn verify(trace: &Trace, world: &mut World, path: &Path) -> Result<Option<Mi
         found = Some(mismatch(path, said, record, last.as_ref()));
         Err(EvalError::Difference(String::new()))
     });
-    match flow {
+    match played {
         Err(EvalError::Difference(_)) => Ok(found),
         Err(error) => Err(error),
-        Ok(flow) => Ok(leftover(path, flow, recorded.next(), world)),
+        Ok(has_ended) => Ok(leftover(path, has_ended, recorded.next(), world)),
     }
 }
 
@@ -366,12 +367,16 @@ fn decisions_of(trace: &Trace) -> VecDeque<(&Decision, Option<ChildState>)> {
 }
 
 /// What the trace says that never came out.
-fn leftover(path: &Path, flow: Flow, next: Option<&Record>, world: &World) -> Option<Mismatch> {
+fn leftover(
+    path: &Path,
+    has_ended: bool,
+    next: Option<&Record>,
+    world: &World,
+) -> Option<Mismatch> {
     let frame = world.state().frame;
-    let (agent, problem) = match (flow, next) {
+    let (agent, problem) = match (has_ended, next) {
         (_, Some(Record::Decision(d))) => {
-            let waits =
-                if flow == Flow::Ended { "the episode is over" } else { "somebody else waits" };
+            let waits = if has_ended { "the episode is over" } else { "somebody else waits" };
             (Some(d.agent), format!("the trace has a decision at frame {}, but {waits}", d.frame))
         }
         (_, Some(other)) => (None, format!("the trace goes on with {}", other.to_line())),

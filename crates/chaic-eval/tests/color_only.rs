@@ -1,12 +1,9 @@
 //! Somebody who is granted nothing and looks at color alone can point at what it sees, pick it up
 //! and deliver it: what learned perception stands on.
 
-use std::sync::atomic::AtomicBool;
-
+use chaic_env::rules::RuleSet;
+use chaic_env::{Appearance, Env, EpisodeConfig, Flow, Idle, Seat};
 use chaic_episodes::Episode;
-use chaic_eval::Appearance;
-use chaic_eval::play::{Actor, Bystander, Cast, Play, Staging};
-use chaic_eval::rules::RuleSet;
 use chaic_protocol::briefing::Goal;
 use chaic_protocol::capability::Persona;
 use chaic_protocol::geom::{Pose, Rect};
@@ -138,11 +135,11 @@ fn hall() -> Setup {
 #[test]
 fn whoever_sees_color_alone_points_picks_up_and_delivers() {
     let episode = Episode::new("no_constraint/hall/0", "hall", None, hall()).unwrap();
-    let actors = vec![
-        Actor::new(Box::new(Bystander), Grants::NONE),
-        Actor::new(Box::new(ColorOnly::default()), Grants::NONE),
+    let seats = vec![
+        Seat::of_mind(Box::new(Idle), Grants::NONE),
+        Seat::of_mind(Box::new(ColorOnly::default()), Grants::NONE),
     ];
-    let staging = Staging {
+    let config = EpisodeConfig {
         episode: &episode,
         seed: 0,
         rules: RuleSet::PAPER,
@@ -151,7 +148,8 @@ fn whoever_sees_color_alone_points_picks_up_and_delivers() {
         image_size: None,
         appearance: Appearance::Canonical,
     };
-    let mut play = Play::with_cast(staging, Cast { actors }).unwrap();
-    assert!(play.run(&AtomicBool::new(false), None, &mut |_| Ok(())).unwrap());
-    assert!(play.world().is_complete(), "the apple is where it was wanted");
+    let mut env = Env::with_seats(config, seats).unwrap();
+    let flow = env.advance(None);
+    assert_eq!(flow, Flow::Ended);
+    assert!(env.world().is_complete(), "the apple is where it was wanted");
 }

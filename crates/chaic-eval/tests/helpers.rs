@@ -1,15 +1,15 @@
 //! Promise: helpers are of use in real episodes, seen through their own eyes. In each task the rule-based
 //! one or the oracle brings something to the goal, and who only follows stays with the partner.
 
+use std::convert::Infallible;
 use std::sync::atomic::AtomicBool;
 
 use chaic_agents::PlannerRules;
+use chaic_env::minds::{BuiltIn, Helpers as _};
+use chaic_env::rules::RuleSet;
+use chaic_env::{Appearance, Env, EpisodeConfig, Flow};
 use chaic_episodes::{Episode, Split, episodes};
-use chaic_eval::Appearance;
-use chaic_eval::helpers::{BuiltIn, Helpers as _};
 use chaic_eval::metrics::{Summary, Tally};
-use chaic_eval::play::{Play, Staging};
-use chaic_eval::rules::RuleSet;
 use chaic_protocol::geom::horizontal_distance;
 use chaic_protocol::{AgentId, TaskId};
 
@@ -19,8 +19,8 @@ const SIDE_PX: u32 = 128;
 const EPISODES: usize = 6;
 
 /// An episode before its first frame.
-fn stage(episode: &Episode, helper: &str) -> Play {
-    let staging = Staging {
+fn stage(episode: &Episode, helper: &str) -> Env {
+    let config = EpisodeConfig {
         episode,
         seed: 0,
         rules: RuleSet::PAPER,
@@ -31,7 +31,7 @@ fn stage(episode: &Episode, helper: &str) -> Play {
     };
     let mind = BuiltIn.make(helper, PlannerRules::paper());
     assert!(mind.is_some(), "{helper} is built in");
-    Play::new(staging, mind).expect("the bundled episodes can be played")
+    Env::new(config, mind).expect("the bundled episodes can be played")
 }
 
 fn bundled(task: TaskId) -> impl Iterator<Item = Episode> {
@@ -40,14 +40,15 @@ fn bundled(task: TaskId) -> impl Iterator<Item = Episode> {
 
 /// Whether the helper has delivered something wanted: by itself, or carried together with the partner.
 fn helper_delivers(episode: &Episode, helper: &str) -> bool {
-    let mut play = stage(episode, helper);
-    let mut tally = Tally::new(play.header());
+    let mut env = stage(episode, helper);
+    let mut tally = Tally::new(env.header());
     let mut summary: Option<Summary> = None;
     let mut sink = |record: &_| {
         summary = tally.record(record).and_then(|r| r.summary().cloned()).or(summary.take());
-        Ok(())
+        Ok::<(), Infallible>(())
     };
-    assert!(play.run(&AtomicBool::new(false), None, &mut sink).expect("the sink takes all"));
+    let flow = env.run(&AtomicBool::new(false), None, &mut sink);
+    assert_eq!(flow.expect("the sink takes all"), Flow::Ended);
     let summary = summary.expect("the episode has ended");
     summary.deliveries.iter().any(|d| d.counted && (d.by == AgentId::HELPER || d.together))
 }
@@ -75,15 +76,13 @@ fn who_follows_stays_with_the_partner() {
     /// Until then it may look for the partner.
     const FOUND_BY: u32 = 600;
     let episode = bundled(TaskId::NoConstraint).next().expect("bundled");
-    let mut play = stage(&episode, "follow");
+    let mut env = stage(&episode, "follow");
     let (mut near, mut looks, mut walked_m) = (0, 0, 0.0);
     for frame in (FOUND_BY..3000).step_by(EVERY as usize) {
-        let stop = AtomicBool::new(false);
-        let over = play.run(&stop, Some(frame), &mut |_| Ok(())).expect("the sink takes all");
-        if over {
+        if env.advance(Some(frame)) == Flow::Ended {
             break;
         }
-        let people = &play.world().state().people;
+        let people = &env.world().state().people;
         let [partner, helper] = [AgentId::PARTNER, AgentId::HELPER].map(|a| &people[a.index()]);
         let apart_m = horizontal_distance(partner.pose.position, helper.pose.position);
         near += u32::from(apart_m < 3.5);

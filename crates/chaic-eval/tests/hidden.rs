@@ -3,15 +3,14 @@
 //! agent that tries everything learns nothing; and each leak that was ever found, planted again,
 //! is found again.
 
-use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
 use chaic_agents::PlannerRules;
+use chaic_env::minds::{BuiltIn, Helper, Helpers as _};
+use chaic_env::rules::RuleSet;
+use chaic_env::{Env, EpisodeConfig};
 use chaic_episodes::{Episode, find_episode};
 use chaic_eval::audit::{Finding, Leak, Pair, Partner, Prober, Secret, compare};
-use chaic_eval::helpers::{BuiltIn, Helper, Helpers as _};
-use chaic_eval::play::{Play, Staging};
-use chaic_eval::rules::RuleSet;
 use chaic_protocol::observation::{Granted, Grants, Senses};
 use chaic_protocol::{Action, Agent, Briefing, Observation, TaskId};
 use chaic_render::Appearance;
@@ -141,7 +140,7 @@ fn checked(
     let counts = Arc::new(Mutex::new([0; 3]));
     let mind = built_in(helper).mind;
     let mind = Box::new(Checker { mind, check, counts: Arc::clone(&counts) });
-    let staging = Staging {
+    let config = EpisodeConfig {
         episode: &of_task(task),
         seed: 0,
         rules: RuleSet::PAPER,
@@ -150,8 +149,8 @@ fn checked(
         image_size: Some(48),
         appearance: Appearance::Canonical,
     };
-    let mut play = Play::new(staging, Some(Helper { mind, grants })).unwrap();
-    play.run(&AtomicBool::new(false), None, &mut |_| Ok(())).unwrap();
+    let mut env = Env::new(config, Some(Helper { mind, grants })).unwrap();
+    env.advance(None);
     *counts.lock().unwrap()
 }
 

@@ -1,16 +1,37 @@
 //! Files that are whole or absent, and reads that never wait for a writer.
+//!
+//! **What it is not**: it knows nothing of what is in the files.
 
 use std::ffi::OsString;
 use std::fs::{self, File};
 use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
-use chaic_episodes::MAX_EPISODE_BYTES;
+/// The operating system refused something.
+#[derive(Debug, thiserror::Error)]
+#[error("can't {what} {path}: {refusal}", path = path.display())]
+pub struct FileError {
+    /// What was tried, for example `write`.
+    pub what: &'static str,
+    /// With which file or folder.
+    pub path: PathBuf,
+    /// The refusal.
+    pub refusal: io::Error,
+}
 
-use crate::error::{EvalError, Result};
+impl FileError {
+    /// For `map_err` on what the operating system may refuse.
+    pub fn of(what: &'static str, path: &Path) -> impl FnOnce(io::Error) -> FileError + use<> {
+        let path = path.to_owned();
+        move |refusal| FileError { what, path, refusal }
+    }
+}
+
+/// The result of anything in this crate.
+pub type Result<T> = std::result::Result<T, FileError>;
 
 /// What [`write_whole`] appends to the name of a file that is not whole yet.
-pub(crate) const UNFINISHED: &str = ".tmp";
+pub const UNFINISHED: &str = ".tmp";
 
 /// Writes a file as a whole or not at all: to a name beside it, which then becomes its own.
 ///
@@ -27,17 +48,8 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     write().map_err(|refusal| {
         // Its name says what it is where it cannot be removed.
         let _ = fs::remove_file(&beside);
-        EvalError::io("write", path)(refusal)
+        FileError::of("write", path)(refusal)
     })
-}
-
-/// The bytes of an episode file. Of a file that is too long it reads one byte more than the limit,
-/// so that the parser says so.
-///
-/// # Errors
-/// If it is no regular file, is longer, or can't be read.
-pub fn read_episode_file(path: &Path) -> Result<Vec<u8>> {
-    read_bounded(path, MAX_EPISODE_BYTES as u64 + 1)
 }
 
 /// At most the first `limit` bytes of a regular file. Whoever opens a pipe waits for its writer, so
@@ -45,15 +57,15 @@ pub fn read_episode_file(path: &Path) -> Result<Vec<u8>> {
 ///
 /// # Errors
 /// If it is no regular file, or the file system refuses.
-pub(crate) fn read_bounded(path: &Path, limit: u64) -> Result<Vec<u8>> {
-    let kind = fs::metadata(path).map_err(EvalError::io("open", path))?.file_type();
+pub fn read_bounded(path: &Path, limit: u64) -> Result<Vec<u8>> {
+    let kind = fs::metadata(path).map_err(FileError::of("open", path))?.file_type();
     if !kind.is_file() {
         let what = if kind.is_dir() { "it is a folder" } else { "it is no regular file" };
-        return Err(EvalError::io("read", path)(io::Error::other(what)));
+        return Err(FileError::of("read", path)(io::Error::other(what)));
     }
     let mut bytes = Vec::new();
-    let file = File::open(path).map_err(EvalError::io("open", path))?;
-    file.take(limit).read_to_end(&mut bytes).map_err(EvalError::io("read", path))?;
+    let file = File::open(path).map_err(FileError::of("open", path))?;
+    file.take(limit).read_to_end(&mut bytes).map_err(FileError::of("read", path))?;
     Ok(bytes)
 }
 
@@ -61,15 +73,15 @@ pub(crate) fn read_bounded(path: &Path, limit: u64) -> Result<Vec<u8>> {
 ///
 /// # Errors
 /// If the file system refuses.
-pub(crate) fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
+pub fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     let list = fs::read_dir(folder).and_then(|d| d.map(|e| e.map(|e| e.path())).collect());
-    let mut entries: Vec<PathBuf> = list.map_err(EvalError::io("list", folder))?;
+    let mut entries: Vec<PathBuf> = list.map_err(FileError::of("list", folder))?;
     entries.sort();
     Ok(entries)
 }
 
 /// The path with its file name made longer.
-pub(crate) fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
+pub fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     let mut name: OsString = path.file_name().unwrap_or_default().to_owned();
     name.push(suffix);
     path.with_file_name(name)

@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use chaic_eval::metrics::RunKey;
+use chaic_env::RunKey;
 use chaic_protocol::{AgentId, Frame};
 
 use crate::endpoint::{Client, Failure, NoReply, PicturesByHash};

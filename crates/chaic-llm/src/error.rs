@@ -3,6 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use chaic_files::FileError;
+
 /// The result of anything in this crate.
 pub type Result<T> = std::result::Result<T, LlmError>;
 
@@ -10,18 +12,8 @@ pub type Result<T> = std::result::Result<T, LlmError>;
 #[derive(Debug, thiserror::Error)]
 pub enum LlmError {
     /// The operating system refused something.
-    #[error("can't {what} {path}: {refusal}", path = path.display())]
-    Io {
-        /// What was tried, for example `write`.
-        what: &'static str,
-        /// With which file or folder.
-        path: PathBuf,
-        /// The refusal.
-        refusal: io::Error,
-    },
-    /// A file of the run can't be written.
     #[error(transparent)]
-    Run(#[from] chaic_eval::EvalError),
+    File(#[from] FileError),
     /// A setting can't be what it is.
     #[error("{field} is {found}, expected {expected}")]
     Setting {
@@ -123,7 +115,7 @@ impl LlmError {
 
     /// For `map_err` on what the operating system may refuse.
     pub fn io(what: &'static str, path: &Path) -> impl FnOnce(io::Error) -> LlmError + use<> {
-        let path = path.to_owned();
-        move |refusal| LlmError::Io { what, path, refusal }
+        let refused = FileError::of(what, path);
+        move |refusal| refused(refusal).into()
     }
 }

@@ -7,9 +7,8 @@ use std::sync::atomic::AtomicBool;
 use chaic_agents::behavior::{BehaviorModel, GroundTruthBehavior, SeenBehavior};
 use chaic_agents::perception::GroundTruthIds;
 use chaic_agents::{Mind, PlannerRules, partner_grants};
-use chaic_eval::EvalError;
-use chaic_eval::helpers::{BuiltIn, Helper, Helpers};
-use chaic_eval::metrics::RunKey;
+use chaic_env::minds::{BuiltIn, Helper, Helpers};
+use chaic_env::{EnvError, RunKey};
 use chaic_protocol::AgentId;
 use chaic_protocol::observation::{Grants, Senses};
 
@@ -188,8 +187,8 @@ impl Helpers for Language {
         partner_names()
     }
 
-    fn attach(&self, run: &Path) -> chaic_eval::Result<()> {
-        self.session.attach(run).map_err(|e| EvalError::Helpers(e.into()))
+    fn attach(&self, run: &Path) -> chaic_env::Result<()> {
+        self.session.attach(run).map_err(|e| EnvError::Minds(e.into()))
     }
 
     fn partner(&self, name: &str, of: Option<&RunKey>, rules: PlannerRules) -> Option<Helper> {

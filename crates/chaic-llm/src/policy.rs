@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use chaic_agents::decision::{Context, Plan, Policy};
 use chaic_agents::policies::{RuleProfile, Rules};
-use chaic_eval::metrics::RunKey;
+use chaic_env::RunKey;
 use chaic_protocol::capability::Gait;
 use chaic_protocol::{Briefing, Frame, Observation};
 

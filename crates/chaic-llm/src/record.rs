@@ -7,8 +7,7 @@ use std::fs::{self, File};
 use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
-use chaic_eval::metrics::RunKey;
-use chaic_eval::run::slug;
+use chaic_env::{RunKey, slug};
 use chaic_protocol::AgentId;
 use serde::{Deserialize, Serialize};
 

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, OnceLock};
 
-use chaic_eval::CHAIC_VERSION;
-use chaic_eval::files::write_whole;
+use chaic_env::CHAIC_VERSION;
+use chaic_files::write_whole;
 use serde::{Deserialize, Serialize};
 
 use crate::endpoint::Client;

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use chaic_eval::metrics::RunKey;
-use chaic_eval::trace::{self, Trace};
+use chaic_env::RunKey;
+use chaic_env::trace::{self, Trace};
 use chaic_protocol::{AgentId, Frame};
 use serde_json::Value;
 

@@ -85,7 +85,7 @@ struct FreeSpace {
 impl FreeSpace {
     fn around(world: &World, person: AgentId, middle: Vec2) -> FreeSpace {
         let Capability { radius_m, height_m, .. } = world.capability(person);
-        let body = Body { radius_m: radius_m, low_m: world.rules.step_over_m, high_m: height_m };
+        let body = Body { radius_m, low_m: world.rules.step_over_m, high_m: height_m };
         let bounds = world.setup.bounds.grown(-radius_m);
         let movable = world.movable_blocks();
         let fits = |p: Vec2| {

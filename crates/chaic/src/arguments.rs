@@ -6,11 +6,11 @@ mod fidelity;
 use std::ops::Range;
 use std::path::PathBuf;
 
+use chaic_env::Appearance;
+use chaic_env::rules::RuleSetName;
 use chaic_episodes::Split;
-use chaic_eval::Appearance;
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::Format;
-use chaic_eval::rules::RuleSetName;
 use chaic_protocol::{AgentId, TaskId};
 use clap::{Args, Parser, Subcommand};
 

@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use chaic_env::EnvError;
 use chaic_episodes::SplitError;
 use chaic_eval::EvalError;
 use chaic_llm::error::LlmError;
@@ -38,10 +39,17 @@ impl From<Ended> for ExitCode {
 
 /// The code of an error.
 pub fn of(error: &anyhow::Error) -> ExitCode {
-    let is_usage = match error.downcast_ref() {
-        Some(EvalError::Helpers(inner)) => inner.downcast_ref().is_some_and(LlmError::is_usage),
-        Some(error) => error.is_usage(),
-        None => error.downcast_ref().is_some_and(LlmError::is_usage) || error.is::<SplitError>(),
+    let of_env = match error.downcast_ref() {
+        Some(EvalError::Env(inner)) => Some(inner),
+        _ => error.downcast_ref(),
     };
+    let of_llm = match of_env {
+        Some(EnvError::Minds(inner)) => inner.downcast_ref(),
+        _ => error.downcast_ref(),
+    };
+    let is_usage = of_env.is_some_and(EnvError::is_usage)
+        || of_llm.is_some_and(LlmError::is_usage)
+        || error.downcast_ref().is_some_and(EvalError::is_usage)
+        || error.is::<SplitError>();
     ExitCode::from(if is_usage { USAGE } else { FAILED })
 }

@@ -1,96 +1,168 @@
 //! Promise: no crate reaches past the arrows of ARCHITECTURE.md; agents above all can't see
 //! the world or its pictures. And the README's command knows which program is meant.
 
-use std::collections::BTreeSet;
-use std::fs;
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
-/// Each crate with the crates of this workspace that it may depend on, tests included.
-const ALLOWED: &[(&str, &[&str])] = &[
-    ("chaic-protocol", &[]),
-    ("chaic-world", &["chaic-protocol"]),
-    ("chaic-episodes", &["chaic-protocol", "chaic-world"]),
-    // Only its example draws episodes.
-    ("chaic-render", &["chaic-protocol", "chaic-world", "chaic-episodes"]),
-    // Only its tests and its bench need episodes. Nobody depends on it: its pictures aren't exact.
-    ("chaic-render-gpu", &["chaic-protocol", "chaic-world", "chaic-episodes", "chaic-render"]),
-    ("chaic-agents", &["chaic-protocol"]),
-    // Built for every processor: nothing that needs more than Rust.
-    ("chaic-goldens", &["chaic-protocol", "chaic-world", "chaic-episodes", "chaic-render"]),
-    (
-        "chaic-eval",
+/// A crate with the crates of this workspace that it may depend on, and those that its tests, benches
+/// and examples may depend on besides.
+struct Arrows {
+    of: &'static str,
+    to: &'static [&'static str],
+    tests_to: &'static [&'static str],
+}
+
+const fn arrows(
+    of: &'static str,
+    to: &'static [&'static str],
+    tests_to: &'static [&'static str],
+) -> Arrows {
+    Arrows { of, to, tests_to }
+}
+
+/// The map. ARCHITECTURE.md says why.
+const ALLOWED: &[Arrows] = &[
+    arrows("chaic-files", &[], &[]),
+    arrows("chaic-protocol", &[], &[]),
+    arrows("chaic-world", &["chaic-protocol"], &[]),
+    arrows("chaic-episodes", &["chaic-protocol", "chaic-world"], &[]),
+    arrows("chaic-render", &["chaic-protocol", "chaic-world"], &["chaic-episodes"]),
+    arrows(
+        "chaic-render-gpu",
+        &["chaic-protocol", "chaic-world", "chaic-render"],
+        &["chaic-episodes"],
+    ),
+    arrows(
+        "chaic-goldens",
+        &["chaic-protocol", "chaic-world", "chaic-episodes", "chaic-render"],
+        &[],
+    ),
+    arrows("chaic-agents", &["chaic-protocol"], &[]),
+    arrows(
+        "chaic-env",
         &["chaic-protocol", "chaic-world", "chaic-episodes", "chaic-render", "chaic-agents"],
+        &[],
     ),
-    // The stand-in knows nothing of chaic; only tests need it.
-    ("chaic-llm-standin", &[]),
-    (
-        "chaic-llm",
-        &["chaic-protocol", "chaic-episodes", "chaic-agents", "chaic-eval", "chaic-llm-standin"],
-    ),
-    // Only its example draws.
-    ("chaic-import", &["chaic-protocol", "chaic-world", "chaic-episodes", "chaic-render"]),
-    (
-        "chaic",
+    arrows(
+        "chaic-eval",
         &[
+            "chaic-files",
             "chaic-protocol",
             "chaic-world",
             "chaic-episodes",
             "chaic-render",
             "chaic-agents",
+            "chaic-env",
+        ],
+        &[],
+    ),
+    arrows("chaic-llm-standin", &[], &[]),
+    arrows(
+        "chaic-llm",
+        &["chaic-files", "chaic-protocol", "chaic-agents", "chaic-env"],
+        &["chaic-episodes", "chaic-eval", "chaic-llm-standin"],
+    ),
+    arrows("chaic-import", &["chaic-protocol", "chaic-world", "chaic-episodes"], &["chaic-render"]),
+    arrows(
+        "chaic",
+        &[
+            "chaic-files",
+            "chaic-protocol",
+            "chaic-episodes",
+            "chaic-render",
+            "chaic-env",
             "chaic-eval",
             "chaic-import",
             "chaic-llm",
-            "chaic-llm-standin",
         ],
+        &["chaic-llm-standin"],
     ),
     // What a user writes: a helper, and the one call that evaluates it.
-    ("minimal-helper", &["chaic-protocol", "chaic-eval"]),
+    arrows("minimal-helper", &["chaic-protocol", "chaic-env", "chaic-eval"], &[]),
 ];
+
+fn metadata() -> Value {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("the root");
+    let arguments = ["metadata", "--no-deps", "--offline", "--format-version", "1"];
+    let out = Command::new(env!("CARGO")).args(arguments).current_dir(root).output();
+    serde_json::from_slice(&out.expect("cargo runs").stdout).expect("JSON")
+}
+
+fn list(value: &Value) -> &[Value] {
+    value.as_array().expect("a list")
+}
+
+fn text(value: &Value) -> &str {
+    value.as_str().expect("a text")
+}
+
+/// What is wrong with the dependencies that `cargo metadata` tells.
+fn wrong_arrows(metadata: &Value) -> Vec<String> {
+    let packages: BTreeMap<&str, &Value> =
+        list(&metadata["packages"]).iter().map(|p| (text(&p["name"]), p)).collect();
+    let mut wrong = Vec::new();
+    for name in packages.keys().filter(|name| !ALLOWED.iter().any(|a| a.of == **name)) {
+        wrong.push(format!("{name} isn't on the map: add it to ARCHITECTURE.md and here"));
+    }
+    for Arrows { of, to, tests_to } in ALLOWED {
+        let Some(package) = packages.get(of) else {
+            wrong.push(format!("{of} is on the map, but gone"));
+            continue;
+        };
+        for dependency in list(&package["dependencies"]) {
+            let name = text(&dependency["name"]);
+            let is_for_tests = dependency["kind"] == "dev";
+            let is_allowed = to.contains(&name) || is_for_tests && tests_to.contains(&name);
+            if packages.contains_key(name) && !is_allowed {
+                let who = if is_for_tests { "the tests of " } else { "" };
+                wrong.push(format!("{who}{of} may not depend on {name}"));
+            }
+        }
+    }
+    wrong
+}
 
 #[test]
 fn cargo_run_finds_one_program() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("the root");
-    let metadata = ["metadata", "--no-deps", "--offline", "--format-version", "1"];
-    let out = Command::new(env!("CARGO")).args(metadata).current_dir(root).output();
-    let out = out.expect("cargo runs");
-    let told: Value = serde_json::from_slice(&out.stdout).expect("JSON");
-    let list = |v: &Value| v.as_array().expect("a list").clone();
+    let told = metadata();
     let default = list(&told["workspace_default_members"]);
-    let packages = list(&told["packages"]);
-    let built = packages.iter().filter(|p| default.contains(&p["id"]));
+    let built = list(&told["packages"]).iter().filter(|p| default.contains(&p["id"]));
     let targets = built.flat_map(|p| list(&p["targets"]));
     let programs = targets.filter(|t| t["kind"][0] == "bin");
-    assert_eq!(programs.map(|t| t["name"].clone()).collect::<Vec<_>>(), ["chaic"]);
+    assert_eq!(programs.map(|t| &t["name"]).collect::<Vec<_>>(), ["chaic"]);
 }
 
 #[test]
 fn every_dependency_follows_an_arrow() {
-    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("crates/");
-    let examples = crates.parent().expect("the root").join("examples");
-    let folders = [crates, &examples].map(|f| fs::read_dir(f).expect("it can be listed"));
-    let mut found = BTreeSet::new();
-    for entry in folders.into_iter().flatten() {
-        let manifest = entry.expect("an entry").path().join("Cargo.toml");
-        let Ok(text) = fs::read_to_string(&manifest) else { continue };
-        let name = text
-            .lines()
-            .find_map(|l| l.strip_prefix("name = "))
-            .map(|n| n.trim_matches('"').to_owned())
-            .expect("a manifest names its package");
-        let (_, allowed) = ALLOWED.iter().find(|(n, _)| *n == name).unwrap_or_else(|| {
-            panic!("{name} isn't on the map: add it to ARCHITECTURE.md and here")
-        });
-        for line in text.lines().filter(|l| l.starts_with("chaic")) {
-            let dependency = line.split(['.', ' ', '=']).next().expect("a word");
-            assert!(
-                dependency == name || allowed.contains(&dependency),
-                "{name} may not depend on {dependency}"
-            );
-        }
-        found.insert(name);
-    }
-    assert_eq!(found.len(), ALLOWED.len(), "the map lists crates that are gone: {found:?}");
+    assert_eq!(wrong_arrows(&metadata()), [""; 0]);
+}
+
+#[test]
+fn a_wrong_arrow_is_found() {
+    let with = |of: &str, name: &str, kind: Value| {
+        let mut told = metadata();
+        let packages = told["packages"].as_array_mut().expect("a list");
+        let package = packages.iter_mut().find(|p| p["name"] == of).expect("a crate");
+        let dependencies = package["dependencies"].as_array_mut().expect("a list");
+        dependencies.push(json!({ "name": name, "kind": kind }));
+        wrong_arrows(&told)
+    };
+    let none: [&str; 0] = [];
+    assert_eq!(
+        with("chaic-agents", "chaic-world", Value::Null),
+        ["chaic-agents may not depend on chaic-world"]
+    );
+    // Only tests of the renderer draw episodes.
+    assert_eq!(with("chaic-render", "chaic-episodes", json!("dev")), none);
+    assert_eq!(
+        with("chaic-render", "chaic-episodes", Value::Null),
+        ["chaic-render may not depend on chaic-episodes"]
+    );
+    assert_eq!(
+        with("chaic-env", "chaic-eval", json!("dev")),
+        ["the tests of chaic-env may not depend on chaic-eval"]
+    );
 }

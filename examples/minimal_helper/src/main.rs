@@ -8,10 +8,10 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::Result;
-use chaic_eval::helpers::{Helper, Helpers};
+use chaic_env::minds::{Helper, Helpers};
+use chaic_env::rules::PlannerRules;
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::{Format, Report};
-use chaic_eval::rules::PlannerRules;
 use chaic_eval::run::{Access, Given, Run};
 use chaic_protocol::geom::{horizontal_distance, wrap_angle, yaw_towards};
 use chaic_protocol::observation::{Grants, Identity, Senses};

@@ -1,15 +1,13 @@
-//! What happened in one episode, as a file that is only ever appended to.
+//! What happened in one episode, as lines that are only ever appended.
 //!
 //! A trace is JSON lines: a [`Header`], then [`Record`]s in the order in which they happened, the
 //! last of which is an [`End`]. `docs/trace.md` describes the format for other programs.
 
-mod read;
+mod parse;
 mod record;
-mod write;
 
-pub use read::{MAX_TRACE_BYTES, Warning, parse, read};
+pub use parse::{MAX_TRACE_BYTES, Warning, parse};
 pub use record::{ChildRecord, Decision, End, Record, TraceEvent, is_recorded};
-pub use write::Writer;
 
 use chaic_protocol::capability::Persona;
 use chaic_protocol::observation::{Grants, Senses};
@@ -18,7 +16,7 @@ use chaic_render::Appearance;
 use serde::{Deserialize, Serialize};
 
 use crate::digest::Digest;
-use crate::metrics::RunKey;
+use crate::key::RunKey;
 use crate::rules::RuleSet;
 
 /// What the field `format` of a header says.
@@ -87,6 +85,11 @@ mod as_text {
 }
 
 impl Header {
+    /// The first line of a trace, without its line break.
+    pub fn to_line(&self) -> String {
+        serde_json::to_string(self).expect("a header has string keys")
+    }
+
     /// The episode run that this is the trace of.
     pub fn key(&self) -> RunKey {
         RunKey {

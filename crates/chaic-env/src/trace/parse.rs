@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use crate::error::{EvalError, Result};
-use crate::files::read_bounded;
+use crate::error::{EnvError, Result};
 use crate::trace::{FORMAT, Header, Record, Trace, VERSION};
 
 /// Longest trace that is read, bytes: a thousand times a usual one.
@@ -51,22 +50,13 @@ impl fmt::Display for Warning {
     }
 }
 
-/// Reads a trace up to its last whole record, and says so where that isn't all.
+/// Reads a trace up to its last whole record, and says so where that isn't all; `path` is what
+/// messages call it.
 ///
 /// # Errors
-/// If the file can't be read at all, has no whole header, or is of another format or version.
-pub fn read(path: &Path) -> Result<(Trace, Vec<Warning>)> {
-    // One byte more than the limit tells a file at the limit from a longer one.
-    let bytes = read_bounded(path, MAX_TRACE_BYTES + 1)?;
-    parse(&bytes, path)
-}
-
-/// The same for bytes that are there already; `path` is what messages call them.
-///
-/// # Errors
-/// See [`read`].
+/// If it has no whole header, is too long, or is of another format or version.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<(Trace, Vec<Warning>)> {
-    let bad = |line, problem: &str| EvalError::Unreadable {
+    let bad = |line, problem: &str| EnvError::Unreadable {
         path: path.to_owned(),
         line,
         problem: problem.to_owned(),
@@ -115,11 +105,11 @@ fn header(line: &str, path: &Path) -> Result<Header> {
         #[serde(default)]
         chaic: String,
     }
-    let bad = |problem| EvalError::Unreadable { path: path.to_owned(), line: 1, problem };
+    let bad = |problem| EnvError::Unreadable { path: path.to_owned(), line: 1, problem };
     let v: Version =
         serde_json::from_str(line).map_err(|e| bad(format!("is no header of a trace: {e}")))?;
     if v.format != FORMAT || v.version != VERSION {
-        return Err(EvalError::OtherVersion {
+        return Err(EnvError::OtherVersion {
             path: path.to_owned(),
             found: format!("{} version {} (written by chaic {})", v.format, v.version, v.chaic),
             expected: format!("{FORMAT} version {VERSION}"),

@@ -7,7 +7,7 @@ use chaic_protocol::{Action, AgentId, ClassId, EntityId, FailureReason, Hand, Ou
 use chaic_world::{Event, EventKind};
 
 use super::*;
-use crate::error::EvalError;
+use crate::error::EnvError;
 
 fn header() -> Header {
     Header {
@@ -66,21 +66,14 @@ fn records() -> Vec<Record> {
     ]
 }
 
-fn written(dir: &Path) -> std::path::PathBuf {
-    let path = dir.join("a/b/t.jsonl");
-    let mut writer = Writer::create(&path, &header()).unwrap();
-    for record in records() {
-        writer.write(&record).unwrap();
-    }
-    assert!(!path.exists(), "a trace has its name only when it is whole");
-    writer.finish().unwrap();
-    path
+fn written() -> String {
+    let lines = std::iter::once(header().to_line());
+    lines.chain(records().iter().map(Record::to_line)).map(|line| line + "\n").collect()
 }
 
 #[test]
 fn reads_back_what_was_written() {
-    let dir = tempfile::tempdir().unwrap();
-    let (trace, warnings) = read(&written(dir.path())).unwrap();
+    let (trace, warnings) = parse(written().as_bytes(), Path::new("t.jsonl")).unwrap();
     assert_eq!(trace, Trace { header: header(), records: records() });
     assert_eq!(warnings, []);
     assert_eq!(trace.decisions().count(), 2);
@@ -88,13 +81,12 @@ fn reads_back_what_was_written() {
 
 #[test]
 fn a_cut_at_any_byte_leaves_all_whole_records() {
-    let dir = tempfile::tempdir().unwrap();
-    let bytes = std::fs::read(written(dir.path())).unwrap();
+    let bytes = written().into_bytes();
     let header_len = bytes.iter().position(|b| *b == b'\n').unwrap() + 1;
     for cut in 0..bytes.len() {
         let parsed = parse(&bytes[..cut], Path::new("t.jsonl"));
         if cut < header_len {
-            assert!(matches!(parsed, Err(EvalError::Unreadable { line: 1, .. })), "{cut}");
+            assert!(matches!(parsed, Err(EnvError::Unreadable { line: 1, .. })), "{cut}");
             continue;
         }
         let (trace, warnings) = parsed.unwrap();
@@ -108,8 +100,7 @@ fn a_cut_at_any_byte_leaves_all_whole_records() {
 
 #[test]
 fn another_version_is_named() {
-    let dir = tempfile::tempdir().unwrap();
-    let text = std::fs::read_to_string(written(dir.path())).unwrap();
+    let text = written();
     let own = format!("\"version\":{VERSION}");
     assert!(text.contains(&own), "{text}");
     let other = text.replacen(&own, "\"version\":77", 1);

@@ -18,21 +18,20 @@ pub use secret::Secret;
 pub use spy::Leak;
 
 use std::fmt;
-use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use chaic_agents::{PlannerRules, partners};
+use chaic_env::minds::Helper;
+use chaic_env::rules::RuleSet;
+use chaic_env::{Env, EpisodeConfig, Idle, Minds, Seat, seats};
 use chaic_episodes::Episode;
 use chaic_protocol::geom::horizontal_distance;
 use chaic_protocol::observation::Observation;
 use chaic_protocol::{AgentId, Frame, Vec3};
 use chaic_world::{Setup, World};
+use spy::{Log, Seen, Spy};
 
 use crate::error::Result;
-use crate::helpers::Helper;
-use crate::play::{Actor, Bystander, Cast, Minds, Play, Staging, cast};
-use crate::rules::RuleSet;
-use spy::{Log, Seen, Spy};
 
 /// Whatever differs within this distance of an agent, beyond half of its own length, may be felt,
 /// metres: the world lets one step up to things at 3 m, and bodies touch on the way.
@@ -109,7 +108,7 @@ pub fn compare(pair: &Pair<'_>, make: &dyn Fn() -> Helper, leak: Option<Leak>) -
     while let Some(frame) = sides.iter().filter_map(Side::next_decision).min() {
         let is_next = |side: &Side| side.next_decision() == Some(frame);
         if told_in.is_none() && sides.iter().any(|side| is_next(side) && side.asks_helper()) {
-            told_in = Some([sides[0].play.world().clone(), sides[1].play.world().clone()]);
+            told_in = Some([sides[0].env.world().clone(), sides[1].env.world().clone()]);
         }
         for side in sides.iter_mut().filter(|side| is_next(side)) {
             side.decide()?;
@@ -200,7 +199,7 @@ fn differing<'a>(a: &'a World, b: &'a World) -> impl Iterator<Item = (Vec3, f32)
 
 /// One of the two plays.
 struct Side {
-    play: Play,
+    env: Env,
     log: Arc<Mutex<Log>>,
 }
 
@@ -219,7 +218,7 @@ impl Side {
         let episode = Episode::new(pair.episode.id(), "audit", None, setup)?;
         let log = Arc::new(Mutex::new(Log::leaking_by(leak)));
         let Pair { rules, image_size, .. } = *pair;
-        let staging = Staging {
+        let config = EpisodeConfig {
             episode: &episode,
             seed: 0,
             rules,
@@ -229,26 +228,26 @@ impl Side {
             appearance: chaic_render::Appearance::Canonical,
         };
         let people = people(pair, episode.setup(), rules.planner, make(), &log);
-        Ok(Side { play: Play::with_cast(staging, people)?, log })
+        Ok(Side { env: Env::with_seats(config, people)?, log })
     }
 
     /// When somebody decides next; `None` at the end.
     fn next_decision(&self) -> Option<Frame> {
-        let world = self.play.world();
+        let world = self.env.world();
         (!world.is_over()).then_some(world.state().frame)
     }
 
     /// Whether the watched helper decides next.
     fn asks_helper(&self) -> bool {
-        self.play.world().waiting().contains(&AgentId::HELPER)
+        self.env.world().waiting().contains(&AgentId::HELPER)
     }
 
     /// Lets all decide whose turn it is, and plays on to the next decision.
     fn decide(&mut self) -> Result<()> {
-        let world = self.play.world();
+        let world = self.env.world();
         self.log().overhear(world);
         let next = world.state().frame + 1;
-        self.play.run(&AtomicBool::new(false), Some(next), &mut |_| Ok(()))?;
+        self.env.advance(Some(next));
         Ok(())
     }
 
@@ -264,13 +263,13 @@ fn people(
     rules: PlannerRules,
     helper: Helper,
     log: &Arc<Mutex<Log>>,
-) -> Cast {
+) -> Vec<Seat> {
     let spy = Spy { mind: helper.mind, log: Arc::clone(log) };
     let helper = Helper { mind: Box::new(spy), grants: helper.grants };
-    let mut cast = cast(setup, Minds { helper: Some(helper), partner: None }, rules);
+    let mut seats = seats(setup, Minds::of(Some(helper), None), rules);
     if pair.partner == Partner::Waits {
-        let waits = Actor::new(Box::new(Bystander), partners::PARTNER_GRANTS);
-        cast.actors[AgentId::PARTNER.index()] = waits;
+        let waits = Seat::of_mind(Box::new(Idle), partners::PARTNER_GRANTS);
+        seats[AgentId::PARTNER.index()] = waits;
     }
-    cast
+    seats
 }

@@ -30,7 +30,7 @@ impl Machine {
             platform: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
             target_features: target_features(),
             cpu_features: cpu_features(),
-            chaic: crate::CHAIC_VERSION,
+            chaic: chaic_env::CHAIC_VERSION,
             optimized: !cfg!(debug_assertions),
         }
     }

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
+use chaic_env::EnvError;
 use chaic_episodes::{Episode, house};
+use chaic_files::write_whole;
 use chaic_protocol::geom::{Camera, Rect, math, yaw_rotation};
 use chaic_protocol::{EntityId, Vec2, Vec3};
 use chaic_render::geometry::FINEST;
@@ -11,7 +13,6 @@ use chaic_world::{Posture, RoomKind, Rules, Setup, Thing, World};
 use serde_json::json;
 
 use crate::error::{EvalError, Result};
-use crate::files::write_whole;
 use crate::scene_file::{SceneOptions, Written, write_world};
 use crate::still::save;
 
@@ -57,7 +58,7 @@ impl BenchScene {
 
     fn of(name: String, setup: Setup, size_px: u32) -> Result<BenchScene> {
         let cameras = cameras(&setup, size_px);
-        let refused = |problem| EvalError::Setup { id: name.clone(), problem };
+        let refused = |problem| EnvError::Setup { id: name.clone(), problem };
         let world = World::new(setup, Rules::paper()).map_err(refused)?;
         Ok(BenchScene { name, world, cameras })
     }

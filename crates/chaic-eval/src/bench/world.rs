@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use chaic_env::EnvError;
 use chaic_episodes::{Split, episodes};
 use chaic_protocol::action::Hand;
 use chaic_protocol::rng::Stream;
@@ -54,7 +55,7 @@ pub fn measure_world(
     let episode = episodes(&Split::Test, task).next();
     let episode = episode
         .ok_or_else(|| EvalError::Options(format!("there is no test episode of {task}")))??;
-    let refused = |problem| EvalError::Setup { id: episode.id().to_owned(), problem };
+    let refused = |problem| EnvError::Setup { id: episode.id().to_owned(), problem };
     let mut setup = episode.setup().clone();
     setup.people.truncate(2);
     let begin = World::new(setup, Rules::paper()).map_err(refused)?;

@@ -5,16 +5,16 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use chaic_env::CHAIC_VERSION;
+use chaic_files::write_whole;
 use chaic_protocol::TaskId;
 
-use crate::CHAIC_VERSION;
 use crate::error::{EvalError, Result};
 use crate::fidelity::matrix::PartState;
 use crate::fidelity::plan::Plan;
 use crate::fidelity::sections::{RuleSection, formulas};
 use crate::fidelity::switches;
 use crate::figure::{Bar, Bars, FigureError, HelperBars, transport_rate};
-use crate::files::write_whole;
 use crate::metrics::{Ending, Played, Scores};
 use crate::published::published;
 use crate::report::{coverage, shown_interval};
@@ -48,12 +48,12 @@ pub fn write_document(sheet: Sheet<'_>, path: &Path) -> Result<()> {
         let bars = sheet.bars(part);
         let file = folder.join(figure_name(&stem, part));
         transport_rate(&bars, &file).map_err(|e| match e {
-            FigureError::Write(refusal) => refusal,
+            FigureError::Write(refusal) => refusal.into(),
             other => EvalError::Picture(other.to_string()),
         })?;
     }
     let text = document(sheet, &stem, &causes)?;
-    write_whole(path, text.as_bytes())
+    Ok(write_whole(path, text.as_bytes())?)
 }
 
 /// Whether a document could be written to `path`, for whoever would play for hours before.
@@ -122,7 +122,7 @@ impl<'a> Sheet<'a> {
 
     /// The run that switches are compared with.
     fn base(self) -> Option<&'a PartState> {
-        self.rule_sets().find(|p| p.part.rules == crate::rules::RuleSetName::Compat)
+        self.rule_sets().find(|p| p.part.rules == chaic_env::rules::RuleSetName::Compat)
     }
 
     fn switches(self) -> impl Iterator<Item = &'a PartState> {

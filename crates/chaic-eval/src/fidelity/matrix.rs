@@ -3,15 +3,15 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use chaic_env::minds::Helpers;
+use chaic_env::{CHAIC_VERSION, EnvError, RunKey};
+use chaic_files::{UNFINISHED, write_whole};
 use chaic_protocol::{Frame, TaskId};
 use serde::{Deserialize, Serialize};
 
-use crate::CHAIC_VERSION;
 use crate::error::{EvalError, Result};
 use crate::fidelity::plan::{Part, Plan, Wanted};
-use crate::files::{UNFINISHED, write_whole};
-use crate::helpers::Helpers;
-use crate::metrics::{Environments, Played, RunKey, RunResult};
+use crate::metrics::{Environments, Played, RunResult};
 use crate::report::Labels;
 use crate::run::{Given, Item, RunFolder, RunGrants, environments, planned, read_results};
 
@@ -132,7 +132,7 @@ impl Matrix {
         let (format, chaic) = (FORMAT.to_owned(), CHAIC_VERSION.to_owned());
         let file = PlanFile { format, version: VERSION, chaic, plan: self.plan.clone() };
         let text = serde_json::to_string_pretty(&file).expect("a plan has string keys") + "\n";
-        write_whole(&self.path.join(FILE), text.as_bytes())
+        Ok(write_whole(&self.path.join(FILE), text.as_bytes())?)
     }
 }
 
@@ -143,18 +143,18 @@ fn read(path: &Path) -> Result<Plan> {
         return Err(EvalError::Options(format!("{path} has no {FILE}; {text}")));
     }
     let text = std::fs::read_to_string(&file).map_err(EvalError::io("read", &file))?;
-    let read: PlanFile = serde_json::from_str(&text).map_err(|e| EvalError::Unreadable {
+    let read: PlanFile = serde_json::from_str(&text).map_err(|e| EnvError::Unreadable {
         path: file.clone(),
         line: e.line(),
         problem: e.to_string(),
     })?;
     let is_ours = read.format == FORMAT && read.version == VERSION && read.chaic == CHAIC_VERSION;
     if !is_ours {
-        return Err(EvalError::OtherVersion {
+        return Err(EvalError::Env(EnvError::OtherVersion {
             path: file,
             found: format!("{} version {} (chaic {})", read.format, read.version, read.chaic),
             expected: format!("{FORMAT} version {VERSION} (chaic {CHAIC_VERSION})"),
-        });
+        }));
     }
     Ok(read.plan)
 }

@@ -3,12 +3,13 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use chaic_env::EnvError;
+use chaic_env::minds::{Helpers, NONE};
+use chaic_env::rules::{RuleSetName, differing_rules, rule_values};
 use chaic_protocol::TaskId;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{EvalError, Result};
-use crate::helpers::{Helpers, NONE};
-use crate::rules::{RuleSetName, differing_rules, rule_values};
 use crate::run::{Given, helper_names, tasks_of_files};
 
 /// What is played, as `fidelity.json` records it.
@@ -180,7 +181,7 @@ impl Plan {
         }
         let known = helper_names(helpers);
         match self.helpers.iter().find(|h| !known.contains(h)) {
-            Some(name) => Err(EvalError::UnknownHelper { name: name.clone(), known }),
+            Some(name) => Err(EnvError::UnknownHelper { name: name.clone(), known }.into()),
             None => Ok(()),
         }
     }

@@ -3,16 +3,16 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
+use chaic_env::minds::NONE;
+use chaic_env::rules::RuleSetName;
 use chaic_protocol::TaskId;
 
 use crate::fidelity::compare::{
     Distance, Inversion, Order, PUBLISHED_EPISODES, TaskRate, distance, order, task_rate,
 };
-use crate::helpers::NONE;
 use crate::metrics::{Formulas, Played, Score, Scores, Spread, differences};
 use crate::published::{Figures, published};
 use crate::report::{Grid, Labels, interval, number, rounded, title};
-use crate::rules::RuleSetName;
 
 /// The results of one rule set.
 pub(super) struct RuleSection<'a> {

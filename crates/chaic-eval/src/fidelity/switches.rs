@@ -3,13 +3,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use chaic_env::RunKey;
+use chaic_env::rules::rule_values;
 use chaic_protocol::TaskId;
 
 use crate::error::Result;
 use crate::fidelity::matrix::PartState;
-use crate::metrics::{Interval, Played, RunKey, RunResult, differences};
+use crate::metrics::{Interval, Played, RunResult, differences};
 use crate::report::{Grid, interval, title};
-use crate::rules::rule_values;
 
 /// How many rules are named for a task.
 const MOST: usize = 3;

@@ -2,15 +2,15 @@
 
 use std::fs;
 
+use chaic_env::minds::BuiltIn;
+use chaic_env::rules::{RuleSetName, differing_rules};
+use chaic_env::{Digest, RunKey};
 use chaic_protocol::TaskId;
 use chaic_protocol::observation::Grants;
 
 use super::*;
-use crate::digest::Digest;
 use crate::error::EvalError;
-use crate::helpers::BuiltIn;
-use crate::metrics::{Ending, Environments, Played, RunKey, RunResult, Summary};
-use crate::rules::{RuleSetName, differing_rules};
+use crate::metrics::{Ending, Environments, Played, RunResult, Summary};
 use crate::run::RunGrants;
 
 const LOW: TaskId = TaskId::LowTarget;

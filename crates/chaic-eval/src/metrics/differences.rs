@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use chaic_env::minds::NONE;
 use chaic_protocol::TaskId;
 
-use crate::helpers::NONE;
 use crate::metrics::cluster::{Clusters, Interval};
 use crate::metrics::scores::{ByEpisode, grouped, over_played, over_seeds};
 use crate::metrics::{Played, Summary};

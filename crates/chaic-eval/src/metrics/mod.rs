@@ -15,7 +15,7 @@ mod tally;
 pub use cluster::{Clusters, Environments, Interval};
 pub use differences::{Difference, Resolution, differences, resolution};
 pub use formulas::{FormulaSet, Formulas, Spread};
-pub use result::{Delivery, Ending, RunKey, RunResult, Summary};
+pub use result::{Delivery, Ending, RunResult, Summary};
 pub use scores::{MAX_NAMED, Played, Score, Scores};
 pub use stats::t_975;
 pub use tally::{Tally, tally};

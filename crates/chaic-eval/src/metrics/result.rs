@@ -2,25 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use chaic_env::{Digest, RunKey};
 use chaic_protocol::{AgentId, ClassId, EntityId, Frame, Role, TaskId};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value};
-
-use crate::digest::Digest;
-
-/// Names one episode run within a run. Their order is that of reports.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct RunKey {
-    /// The task.
-    pub task: TaskId,
-    /// The helper.
-    pub helper: String,
-    /// The episode's id.
-    pub episode: String,
-    /// Which of the run's seeds.
-    pub seed: u32,
-}
 
 /// What became of one episode run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -117,11 +103,6 @@ impl<'de> Deserialize<'de> for RunResult {
             ending: Ending::deserialize(Value::Object(ending)).map_err(D::Error::custom)?,
         })
     }
-}
-
-impl RunKey {
-    /// The names of its fields.
-    const FIELDS: [&str; 4] = ["task", "helper", "episode", "seed"];
 }
 
 impl RunResult {

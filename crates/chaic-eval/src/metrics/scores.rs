@@ -2,13 +2,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use chaic_env::RunKey;
+use chaic_env::minds::NONE;
 use chaic_protocol::TaskId;
 use serde::{Deserialize, Serialize};
 
-use crate::helpers::NONE;
 use crate::metrics::cluster::{Clusters, Environments};
 use crate::metrics::stats::{mean, population_sd};
-use crate::metrics::{Formulas, RunKey, RunResult, Spread, Summary};
+use crate::metrics::{Formulas, RunResult, Spread, Summary};
 
 /// How many missing episode runs are named: more help nobody, and a plan may have millions.
 pub const MAX_NAMED: usize = 20;

@@ -2,12 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use chaic_env::RunKey;
+use chaic_env::trace::{End, Header, Record, Trace};
 use chaic_protocol::agent::ChildState;
 use chaic_protocol::{AgentId, ClassId, EntityId, Frame};
 use chaic_world::EventKind;
 
-use crate::metrics::{Delivery, Ending, RunKey, RunResult, Summary};
-use crate::trace::{End, Header, Record, Trace};
+use crate::metrics::{Delivery, Ending, RunResult, Summary};
 
 /// Reads records one by one.
 #[derive(Clone, Debug)]

@@ -1,9 +1,9 @@
 //! Scores against tables worked by hand.
 
+use chaic_env::{Digest, RunKey};
 use chaic_protocol::{AgentId, ClassId, EntityId, TaskId};
 
 use super::*;
-use crate::digest::Digest;
 
 struct Case<'a> {
     task: TaskId,

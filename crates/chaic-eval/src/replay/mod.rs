@@ -6,6 +6,8 @@ use std::collections::VecDeque;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
+use chaic_env::trace::{Decision, Header, Trace};
+use chaic_env::{Digest, slug, world_of};
 use chaic_episodes::Episode;
 use chaic_protocol::agent::Thought;
 use chaic_protocol::{Action, AgentId, EntityId, Frame, Outcome, ResolvedAction, TaskId};
@@ -13,11 +15,8 @@ use chaic_render::{Channels, Scene, View, plan};
 use chaic_world::{EventKind, World};
 use image::RgbImage;
 
-use crate::digest::Digest;
 use crate::error::{EvalError, Result};
-use crate::play::world_of;
-use crate::run::{RunFolder, slug};
-use crate::trace::{Decision, Header, Trace};
+use crate::run::RunFolder;
 use crate::video::{VideoError, VideoWriter};
 
 pub use panel::{HEIGHT_PX, WIDTH_PX};

@@ -1,12 +1,12 @@
 //! One picture of a replay: what both see, the map, and what is done and planned.
 
+use chaic_env::trace::Header;
 use chaic_protocol::observation::Images;
 use chaic_render::text::{self, Align};
 use chaic_world::World;
 use image::{Rgb, RgbImage, imageops};
 
 use crate::replay::Caption;
-use crate::trace::Header;
 
 /// Width of a picture, pixels.
 pub const WIDTH_PX: u32 = 1440;

@@ -2,9 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use chaic_env::RunKey;
 use chaic_protocol::TaskId;
 
-use crate::metrics::{Played, RunKey, RunResult};
+use crate::metrics::{Played, RunResult};
 use crate::report::labels::title;
 
 /// How many missing episode runs a note names.

@@ -28,7 +28,7 @@ pub(super) fn figure_text(scores: &Scores, labels: Labels<'_>) -> Result<String>
 fn error_of(error: FigureError) -> EvalError {
     match error {
         FigureError::UnsupportedExtension { .. } => EvalError::Options(error.to_string()),
-        FigureError::Write(refusal) => refusal,
+        FigureError::Write(refusal) => refusal.into(),
         _ => EvalError::Picture(error.to_string()),
     }
 }

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use chaic_agents::partners::PARTNER_GRANTS;
+use chaic_env::minds::NONE;
 use chaic_protocol::observation::Grants;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::helpers::NONE;
 use crate::run::RunGrants;
 
 /// Longest line of a row's name in a terminal, characters: tables stay within 120.

@@ -1,12 +1,12 @@
 //! Reports say what the scores say, in every format.
 
-use crate::rules::RuleSetName;
+use chaic_env::rules::RuleSetName;
+use chaic_env::{Digest, RunKey};
 use chaic_protocol::TaskId;
 use chaic_protocol::observation::Grants;
 
 use super::*;
-use crate::digest::Digest;
-use crate::metrics::{Ending, FormulaSet, RunKey, RunResult, Summary};
+use crate::metrics::{Ending, FormulaSet, RunResult, Summary};
 use crate::run::{Item, RunGrants, RunOptions};
 
 fn results() -> Vec<RunResult> {

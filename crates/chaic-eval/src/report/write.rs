@@ -3,14 +3,13 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use chaic_env::{CHAIC_VERSION, RunKey};
+use chaic_files::read_bounded;
 use serde::Serialize;
 
-use crate::CHAIC_VERSION;
 use crate::error::Result;
-use crate::files::read_bounded;
 use crate::metrics::{
-    Ending, Environments, FormulaSet, MAX_NAMED, Played, RunKey, RunResult, Score, Scores,
-    differences,
+    Ending, Environments, FormulaSet, MAX_NAMED, Played, RunResult, Score, Scores, differences,
 };
 use crate::report::Format;
 use crate::report::coverage::coverage;

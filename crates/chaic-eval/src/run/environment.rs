@@ -1,10 +1,10 @@
 //! In which surroundings an episode takes place: those who share them are no independent samples.
 
+use chaic_env::Digest;
 use chaic_episodes::Episode;
 use chaic_protocol::Role;
 use chaic_world::Setup;
 
-use crate::digest::Digest;
 use crate::metrics::Environments;
 use crate::run::items::Item;
 

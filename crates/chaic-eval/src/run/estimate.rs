@@ -3,9 +3,8 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use chaic_env::RunKey;
 use chaic_protocol::TaskId;
-
-use crate::metrics::RunKey;
 
 /// Times of finished episode runs.
 #[derive(Clone, Debug, Default)]

@@ -3,16 +3,13 @@
 use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 
+use chaic_env::{CHAIC_VERSION, Digest, EnvError, RunKey, slug};
 use chaic_episodes::{Episode, find_episode};
+use chaic_files::{UNFINISHED, entries, read_bounded, write_whole};
 use serde::{Deserialize, Serialize};
 
-use crate::CHAIC_VERSION;
-use crate::digest::Digest;
 use crate::error::{EvalError, Result};
-use crate::files::{UNFINISHED, entries, read_bounded, read_episode_file, write_whole};
-use crate::metrics::RunKey;
 use crate::run::granted::RunGrants;
-use crate::run::items::slug;
 use crate::run::options::RunOptions;
 
 const FORMAT: &str = "chaic-run";
@@ -155,11 +152,11 @@ impl RunFolder {
             return Ok((folder, None));
         };
         if file.chaic != CHAIC_VERSION {
-            return Err(EvalError::OtherVersion {
+            return Err(EvalError::Env(EnvError::OtherVersion {
                 path: folder.join(RUN_FILE),
                 found: format!("a run begun by chaic {}", file.chaic),
                 expected: format!("and resumes runs of chaic {CHAIC_VERSION}"),
-            });
+            }));
         }
         Ok((folder, Some(file.options)))
     }
@@ -248,7 +245,7 @@ impl RunFolder {
     pub fn episode(&self, key: &RunKey) -> Result<Episode> {
         let copy = self.episode_copy(key.task, &key.episode);
         if copy.exists() {
-            let bytes = read_episode_file(&copy)?;
+            let bytes = crate::read_episode_file(&copy)?;
             return Ok(Episode::parse(&bytes, &copy.display().to_string())?);
         }
         Ok(find_episode(&key.episode)?)
@@ -288,7 +285,7 @@ impl RunFolder {
     /// # Errors
     /// If the file system refuses.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
-        write_whole(&self.path.join(name), bytes)
+        Ok(write_whole(&self.path.join(name), bytes)?)
     }
 
     fn recorded(&self) -> Result<Option<RunFile>> {
@@ -304,18 +301,18 @@ impl RunFolder {
             #[serde(default)]
             chaic: String,
         }
-        let bad = |e: serde_json::Error| EvalError::Unreadable {
+        let bad = |e: serde_json::Error| EnvError::Unreadable {
             path: path.clone(),
             line: e.line(),
             problem: e.to_string(),
         };
         let v: Version = serde_json::from_slice(&text).map_err(bad)?;
         if v.format != FORMAT || v.version != VERSION {
-            return Err(EvalError::OtherVersion {
+            return Err(EvalError::Env(EnvError::OtherVersion {
                 found: format!("{} version {} (written by chaic {})", v.format, v.version, v.chaic),
                 expected: format!("{FORMAT} version {VERSION}"),
                 path,
-            });
+            }));
         }
         let file: RunFile = serde_json::from_slice(&text).map_err(bad)?;
         if file.options.digest() != file.digest {

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use chaic_agents::partners::partner_grants;
+use chaic_env::minds::{self, Helpers};
 use chaic_protocol::observation::Grants;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
-use crate::helpers::{self, Helpers};
 use crate::run::options::RunOptions;
 
 /// The grants of a run. Every trace has them too; a run without traces is labeled by these.
@@ -29,10 +29,10 @@ impl RunGrants {
         let rules = options.rules()?.planner;
         let mut by_name = BTreeMap::new();
         for name in &options.helpers {
-            let helper = helpers::find(helpers, name, rules)?;
+            let helper = minds::find(helpers, name, rules)?;
             by_name.extend(helper.map(|h| (name.clone(), h.grants)));
         }
-        let partner = helpers::find_partner(helpers, options.partner.as_deref(), None, rules)?;
+        let partner = minds::find_partner(helpers, options.partner.as_deref(), None, rules)?;
         let partner = partner.map_or_else(|| partner_grants(rules), |p| p.grants);
         Ok(RunGrants { helpers: by_name, partner })
     }

@@ -4,12 +4,13 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use chaic_env::{RunKey, slug};
 use chaic_episodes::{Episode, Split};
+use chaic_files::{entries, write_whole};
 use chaic_protocol::{Frame, TaskId};
 
 use crate::error::{EvalError, Result};
-use crate::files::{entries, read_episode_file, write_whole};
-use crate::metrics::RunKey;
+use crate::read_episode_file;
 use crate::run::environment::environment;
 use crate::run::folder::RunFolder;
 use crate::run::options::{FILES, RunOptions};
@@ -23,19 +24,6 @@ pub struct Item {
     pub horizon: Frame,
     /// The name of its surroundings; episodes that share them are no independent samples.
     pub environment: String,
-}
-
-/// A name for files that belong to an episode: its id without the task, `/` and `:` as `-`.
-///
-/// ```
-/// use chaic_protocol::TaskId;
-/// assert_eq!(chaic_eval::run::slug(TaskId::Obstacle, "obstacle/test/07"), "test-07");
-/// ```
-pub fn slug(task: TaskId, id: &str) -> String {
-    let rest = id.strip_prefix(task.name()).and_then(|r| r.strip_prefix('/')).unwrap_or(id);
-    let safe = |c: char| if c.is_ascii_alphanumeric() || "._-".contains(c) { c } else { '-' };
-    // No name becomes hidden, or one of the two special ones.
-    rest.trim_start_matches('.').chars().map(safe).collect()
 }
 
 /// All episode runs that a run consists of, finished or not: episode by episode, so that a run that

@@ -5,12 +5,13 @@ use std::fs::{self, File};
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
+use chaic_env::trace::Warning;
+use chaic_env::{EnvError, RunKey};
 use chaic_protocol::Frame;
 
 use crate::error::{EvalError, Result};
-use crate::metrics::{RunKey, RunResult};
+use crate::metrics::RunResult;
 use crate::run::items::Item;
-use crate::trace::Warning;
 
 /// A journal that is open for appending.
 #[derive(Debug)]
@@ -76,7 +77,7 @@ fn read(path: &Path, planned: &[Item]) -> Result<(Vec<RunResult>, Vec<Warning>, 
             Err(problem) if whole + line.len() == bytes.len() && is_torn(line) => {
                 warnings.push(Warning::Torn { path, line: number, problem });
             }
-            Err(problem) => return Err(EvalError::Unreadable { path, line: number, problem }),
+            Err(problem) => return Err(EnvError::Unreadable { path, line: number, problem }.into()),
         }
     }
     Ok((results.into_values().collect(), warnings, whole as u64))

@@ -17,7 +17,7 @@ pub use environment::environments;
 pub use folder::{Access, RunFolder};
 pub use granted::RunGrants;
 pub(crate) use items::tasks_of_files;
-pub use items::{Item, planned, slug};
+pub use items::{Item, planned};
 pub use journal::{Journal, read_results};
 pub use options::{Given, RunOptions};
 pub use worker::{Finished, Progress};
@@ -27,13 +27,14 @@ use std::fs;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use chaic_env::RunKey;
+use chaic_env::minds::{self, Helpers, NONE};
+use chaic_env::trace::Warning;
 use chaic_episodes::Episode;
 
 use crate::error::{EvalError, Result};
-use crate::helpers::{self, Helpers, NONE};
-use crate::metrics::{Ending, RunKey, RunResult};
+use crate::metrics::{Ending, RunResult};
 use crate::run::folder::EPISODES;
-use crate::trace::Warning;
 
 /// A run with its folder, which nobody else writes to as long as this exists.
 #[derive(Debug)]
@@ -232,8 +233,9 @@ fn resume(
 
 fn check(options: &RunOptions, helpers: &dyn Helpers) -> Result<()> {
     let rules = options.rules()?.planner;
-    helpers::find_partner(helpers, options.partner.as_deref(), None, rules)?;
-    options.helpers.iter().try_for_each(|name| helpers::find(helpers, name, rules).map(|_| ()))
+    minds::find_partner(helpers, options.partner.as_deref(), None, rules)?;
+    options.helpers.iter().try_for_each(|name| minds::find(helpers, name, rules).map(|_| ()))?;
+    Ok(())
 }
 
 /// The names that may stand behind `--helper`.

@@ -2,15 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
+use chaic_env::Digest;
+use chaic_env::minds::RULES;
+use chaic_env::rules::{RuleSet, RuleSetName};
 use chaic_episodes::Split;
 use chaic_protocol::TaskId;
 use chaic_render::Appearance;
 use serde::{Deserialize, Serialize};
 
-use crate::digest::Digest;
 use crate::error::{EvalError, Result};
-use crate::helpers::RULES;
-use crate::rules::{RuleSet, RuleSetName};
 
 /// Largest side of an image that agents may be given, pixels: 16 times the benchmark's area.
 pub const MAX_IMAGE_SIZE: u32 = 2048;
@@ -99,7 +99,7 @@ impl RunOptions {
     /// If a single rule is set that isn't there, or to what it can't be.
     pub fn rules(&self) -> Result<RuleSet> {
         let named = RuleSet::named(self.rules);
-        self.set.iter().try_fold(named, |rules, setting| rules.with(setting))
+        Ok(self.set.iter().try_fold(named, |rules, setting| rules.with(setting))?)
     }
 
     /// The digest of all of them, as compact JSON.

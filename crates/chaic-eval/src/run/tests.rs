@@ -6,14 +6,14 @@ use std::fs;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use chaic_agents::PlannerRules;
+use chaic_env::minds::Helper;
+use chaic_env::{Digest, EnvError};
 use chaic_episodes::Episode;
 use chaic_protocol::observation::{Grants, Senses};
 use chaic_protocol::{Action, Agent, Briefing, Observation, TaskId};
 
 use super::*;
-use crate::digest::Digest;
 use crate::error::EvalError;
-use crate::helpers::Helper;
 use crate::metrics::Summary;
 use crate::verify::ReportState;
 
@@ -173,7 +173,8 @@ fn the_number_of_workers_and_an_interruption_change_nothing() {
     );
     let traces = run.folder().traces().unwrap();
     assert_eq!(traces.len(), 8);
-    let tallied = traces.iter().map(|p| crate::metrics::tally(&crate::trace::read(p).unwrap().0));
+    let tallied =
+        traces.iter().map(|p| crate::metrics::tally(&crate::trace_file::read(p).unwrap().0));
     assert_eq!(sorted(&tallied.map(Option::unwrap).collect::<Vec<_>>()), all[0]);
     let verdict =
         crate::verify::verify_run(run.folder(), run.options(), &helpers, 2, &|_| ()).unwrap();
@@ -336,9 +337,9 @@ fn folders_are_guarded() {
     let error = open(Access::Resume, &mine).unwrap_err().to_string();
     assert!(error.contains("version 9") && error.contains("version 2"), "{error}");
     assert_eq!(error.lines().count(), 1, "{error}");
-    fs::write(&run_file, text.replace(crate::CHAIC_VERSION, "7.7.7")).unwrap();
+    fs::write(&run_file, text.replace(chaic_env::CHAIC_VERSION, "7.7.7")).unwrap();
     let error = open(Access::Resume, &mine).unwrap_err().to_string();
-    assert!(error.contains("7.7.7") && error.contains(crate::CHAIC_VERSION), "{error}");
+    assert!(error.contains("7.7.7") && error.contains(chaic_env::CHAIC_VERSION), "{error}");
     // Options that somebody else has written into it.
     let changed =
         "{} was changed after the run began".replace("{}", &run_file.display().to_string());
@@ -453,7 +454,10 @@ fn a_journal_cut_at_any_byte_loses_one_record_at_most() {
     let mut damaged = bytes.clone();
     damaged[0] = b'!';
     fs::write(&path, &damaged).unwrap();
-    assert!(matches!(Journal::open(&path, &[]), Err(EvalError::Unreadable { line: 1, .. })));
+    assert!(matches!(
+        Journal::open(&path, &[]),
+        Err(EvalError::Env(EnvError::Unreadable { line: 1, .. }))
+    ));
     assert_eq!(fs::read(&path).unwrap(), damaged);
 }
 
@@ -509,7 +513,7 @@ fn verify_counts_results_and_compares_the_report() {
 
     // A trace that another chaic wrote concerns the whole run: one line says so.
     let trace = run.folder().traces().unwrap().remove(1);
-    let now = format!("\"version\":{}", crate::trace::VERSION);
+    let now = format!("\"version\":{}", chaic_env::trace::VERSION);
     let text = fs::read_to_string(&trace).unwrap();
     fs::write(&trace, text.replacen(&now, "\"version\":99", 1)).unwrap();
     let error = crate::verify::verify_run(run.folder(), run.options(), &helpers, 2, &|_| ());
@@ -527,21 +531,21 @@ fn a_replay_of_an_altered_trace_stops_at_the_first_wrong_digest() {
     let (mut run, _) = Run::open(dir.path(), Access::Begin, &given, &helpers).unwrap();
     assert!(play(&mut run, 1, &helpers));
     let path = run.folder().traces().unwrap().remove(0);
-    let whole = crate::trace::read(&path).unwrap().0;
+    let whole = crate::trace_file::read(&path).unwrap().0;
     let episode = run.folder().episode(&whole.header.key()).unwrap();
-    let replayed = |trace: &crate::trace::Trace| {
+    let replayed = |trace: &chaic_env::trace::Trace| {
         let mut replay = crate::replay::Replay::new(trace, &episode)?;
         while replay.step()? {}
         Ok::<_, EvalError>(())
     };
     replayed(&whole).unwrap();
     let decisions: Vec<usize> = (0..whole.records.len())
-        .filter(|k| matches!(whole.records[*k], crate::trace::Record::Decision(_)))
+        .filter(|k| matches!(whole.records[*k], chaic_env::trace::Record::Decision(_)))
         .collect();
     // What the last decisions lead to shows in no later decision, only in the end.
     for k in &decisions[..decisions.len() / 2] {
         let mut altered = whole.clone();
-        if let crate::trace::Record::Decision(decision) = &mut altered.records[*k] {
+        if let chaic_env::trace::Record::Decision(decision) = &mut altered.records[*k] {
             decision.action = match decision.action {
                 Action::TurnLeft => Action::TurnRight,
                 _ => Action::TurnLeft,

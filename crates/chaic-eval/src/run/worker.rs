@@ -7,17 +7,18 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::time::{Duration, Instant};
 
+use chaic_env::minds::{self, Helpers};
+use chaic_env::trace::Record;
+use chaic_env::{Env, EpisodeConfig, Minds, RunKey};
 use chaic_protocol::Frame;
 
 use crate::error::{EvalError, Result};
-use crate::helpers::{self, Helpers};
-use crate::metrics::{Ending, RunKey, RunResult, Tally};
-use crate::play::{Minds, Play, Staging};
+use crate::metrics::{Ending, RunResult, Tally};
 use crate::run::estimate::Estimate;
 use crate::run::folder::RunFolder;
 use crate::run::items::Item;
 use crate::run::options::RunOptions;
-use crate::trace::{Record, Writer};
+use crate::trace_file::Writer;
 
 /// A worker tells of its frames every so many decisions.
 const NEWS_EVERY: u32 = 32;
@@ -200,10 +201,10 @@ impl Crew<'_> {
     ) -> Result<Option<RunResult>> {
         let episode = self.folder.episode(key)?;
         let rules = self.options.rules()?;
-        let helper = helpers::find_for(self.helpers, key, rules.planner)?;
+        let helper = minds::find_for(self.helpers, key, rules.planner)?;
         let name = self.options.partner.as_deref();
-        let partner = helpers::find_partner(self.helpers, name, Some(key), rules.planner)?;
-        let staging = Staging {
+        let partner = minds::find_partner(self.helpers, name, Some(key), rules.planner)?;
+        let config = EpisodeConfig {
             episode: &episode,
             seed: key.seed,
             rules,
@@ -212,13 +213,13 @@ impl Crew<'_> {
             image_size: self.options.size,
             appearance: self.options.appearance()?,
         };
-        let mut play = Play::new(staging, Minds { helper, partner })?;
+        let mut env = Env::new(config, Minds::of(helper, partner))?;
         if self.options.traces {
-            *writer = Some(Writer::create(&self.folder.trace(key), play.header())?);
+            *writer = Some(Writer::create(&self.folder.trace(key), env.header())?);
         }
-        let mut tally = Tally::new(play.header());
+        let mut tally = Tally::new(env.header());
         let (mut result, mut decisions) = (None, 0);
-        play.run(self.stop, None, &mut |record| {
+        env.run(self.stop, None, &mut |record| -> Result<()> {
             if let Some(writer) = writer.as_mut() {
                 writer.write(record)?;
             }
@@ -232,7 +233,7 @@ impl Crew<'_> {
             Ok(())
         })?;
         if let Some(Ending::Done(summary)) = result.as_mut().map(|r| &mut r.ending) {
-            summary.counts = play.counts();
+            summary.counts = env.counts();
         }
         Ok(result)
     }

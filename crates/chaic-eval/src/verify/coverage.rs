@@ -3,8 +3,10 @@
 use std::collections::BTreeSet;
 use std::fmt;
 
+use chaic_env::RunKey;
+
 use crate::error::Result;
-use crate::metrics::{Ending, FormulaSet, RunKey, RunResult};
+use crate::metrics::{Ending, FormulaSet, RunResult};
 use crate::report::{Report, differing_files};
 use crate::run::{Item, RunFolder, RunOptions};
 

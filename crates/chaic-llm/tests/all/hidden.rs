@@ -3,11 +3,11 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use chaic_env::RunKey;
+use chaic_env::minds::Helpers as _;
+use chaic_env::rules::RuleSet;
 use chaic_episodes::find_episode;
 use chaic_eval::audit::{Pair, Partner, Secret, compare};
-use chaic_eval::helpers::Helpers as _;
-use chaic_eval::metrics::RunKey;
-use chaic_eval::rules::RuleSet;
 use chaic_llm::Language;
 use chaic_llm_standin::Options;
 use chaic_protocol::TaskId;

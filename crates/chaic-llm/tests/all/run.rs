@@ -3,7 +3,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use chaic_eval::helpers::Helpers as _;
+use chaic_env::minds::Helpers as _;
 use chaic_eval::run::RunFolder;
 use chaic_eval::verify::verify_run;
 use chaic_llm::exchange::{By, Purpose, Reply};

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use chaic_eval::metrics::{Ending, RunKey};
+use chaic_env::RunKey;
+use chaic_eval::metrics::Ending;
 use chaic_eval::run::{Extent, Finished, Progress};
 use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressStyle};
 

@@ -5,8 +5,9 @@ use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result};
 use chaic_episodes::{Episode, EpisodeError, Split, episodes, find_episode, json_schema};
-use chaic_eval::files::{read_episode_file, write_whole};
+use chaic_eval::read_episode_file;
 use chaic_eval::still;
+use chaic_files::write_whole;
 use chaic_protocol::TaskId;
 use comfy_table::{ContentArrangement, Table, presets};
 use serde_json::json;

@@ -4,11 +4,10 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, anyhow, bail};
-use chaic_eval::helpers::{BuiltIn, Helpers};
+use chaic_env::minds::{BuiltIn, Helpers};
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::{Format, Report, write_files};
 use chaic_eval::run::{Access, Given, Run, RunFolder};
-
 use chaic_llm::Language;
 
 use super::{bars::RunBars, jobs, llm};

@@ -6,9 +6,9 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use anyhow::{Context as _, Result, anyhow};
+use chaic_env::minds::BuiltIn;
+use chaic_env::rules::differing_rules;
 use chaic_eval::fidelity::{Matrix, Part, Sheet, Wanted, check_document, parts, write_document};
-use chaic_eval::helpers::BuiltIn;
-use chaic_eval::rules::differing_rules;
 use chaic_eval::run::{Access, Progress, Run};
 use indicatif::HumanDuration;
 

@@ -1,7 +1,7 @@
 //! `chaic import`.
 
 use anyhow::{Context as _, Result};
-use chaic_eval::files::write_whole;
+use chaic_files::write_whole;
 use chaic_import::{Half, OnError, Sources, import};
 
 use crate::arguments::{ImportCommand, ImportHalf, OriginalArguments};

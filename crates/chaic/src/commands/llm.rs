@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context as _, Result, bail};
+use chaic_env::EnvError;
+use chaic_env::minds::{NONE, RULES};
 use chaic_eval::EvalError;
-use chaic_eval::helpers::{NONE, RULES};
 use chaic_eval::replay::find_trace;
 use chaic_eval::run::RunFolder;
-use chaic_eval::trace;
+use chaic_eval::trace_file;
 use chaic_llm::language::{
     Language, helper_names, is_language_helper, is_language_partner, partner_names,
 };
@@ -69,7 +70,7 @@ fn shown(
     let usual = options.helpers.iter().find(asked).map(String::as_str);
     let helper = helper.or(usual).context("no helper of this run asked a language model")?;
     let path = find_trace(&folder, episode, Some(helper), seed)?;
-    let (trace, warnings) = trace::read(&path)?;
+    let (trace, warnings) = trace_file::read(&path)?;
     for warning in warnings {
         complain(&format!("warning: {warning}"));
     }
@@ -118,15 +119,15 @@ pub fn language(
 }
 
 /// Who names nobody known hears of all names, also of those that ask a language model.
-fn check_names(arguments: &EvalArguments) -> Result<(), EvalError> {
+fn check_names(arguments: &EvalArguments) -> Result<(), EnvError> {
     let known: Vec<String> = [NONE.to_owned()].into_iter().chain(helper_names()).collect();
     let mut helpers = arguments.helper.iter().flatten();
     if let Some(name) = helpers.find(|name| !known.contains(name)) {
-        return Err(EvalError::UnknownHelper { name: name.clone(), known });
+        return Err(EnvError::UnknownHelper { name: name.clone(), known });
     }
     let known: Vec<String> = [RULES.to_owned()].into_iter().chain(partner_names()).collect();
     match arguments.partner.clone().filter(|name| !known.contains(name)) {
-        Some(name) => Err(EvalError::UnknownPartner { name, known }),
+        Some(name) => Err(EnvError::UnknownPartner { name, known }),
         None => Ok(()),
     }
 }

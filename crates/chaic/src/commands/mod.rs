@@ -18,7 +18,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use chaic_episodes::{Episode, find_episode};
-use chaic_eval::files::read_episode_file;
+use chaic_eval::read_episode_file;
 
 /// The episode that an argument means: a file if there is one of this name, else an id.
 ///

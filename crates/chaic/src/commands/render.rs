@@ -1,8 +1,8 @@
 //! `chaic render`.
 
 use anyhow::Result;
-use chaic_eval::helpers::BuiltIn;
-use chaic_eval::rules::RuleSet;
+use chaic_env::minds::BuiltIn;
+use chaic_env::rules::RuleSet;
 use chaic_eval::still::{self, Still};
 
 use crate::arguments::RenderArguments;

@@ -4,11 +4,11 @@ use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result, bail};
+use chaic_env::minds::{BuiltIn, Helpers};
 use chaic_eval::EvalError;
-use chaic_eval::helpers::{BuiltIn, Helpers};
 use chaic_eval::replay::{self, ReplayOptions};
 use chaic_eval::run::RunFolder;
-use chaic_eval::trace;
+use chaic_eval::trace_file;
 use chaic_eval::verify::verify_trace;
 use chaic_llm::Language;
 
@@ -26,7 +26,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<Ended> {
         return Err(EvalError::NoTraces { path: folder.path().to_owned() }.into());
     }
     let path = replay::find_trace(&folder, episode, helper.as_deref(), *seed)?;
-    let (trace, warnings) = trace::read(&path)?;
+    let (trace, warnings) = trace_file::read(&path)?;
     for warning in warnings {
         complain(&format!("warning: {warning}"));
     }

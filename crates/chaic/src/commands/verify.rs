@@ -1,7 +1,7 @@
 //! `chaic verify`.
 
 use anyhow::Result;
-use chaic_eval::helpers::{BuiltIn, Helpers};
+use chaic_env::minds::{BuiltIn, Helpers};
 use chaic_eval::run::RunFolder;
 use chaic_eval::verify::{ReportState, Verdict, verify_run};
 use chaic_llm::Language;

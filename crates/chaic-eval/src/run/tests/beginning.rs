@@ -47,7 +47,7 @@ fn a_run_that_was_stopped_before_it_began_begins_again() {
 /// Names and contents of all files below a folder.
 fn files_below(path: &Path) -> Vec<(String, Vec<u8>)> {
     let mut found = Vec::new();
-    for entry in crate::files::entries(path).unwrap() {
+    for entry in chaic_files::entries(path).unwrap() {
         let name = entry.file_name().unwrap().to_str().unwrap().to_owned();
         if entry.is_dir() {
             let below = files_below(&entry).into_iter();

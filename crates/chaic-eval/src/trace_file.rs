@@ -1,11 +1,23 @@
-//! Writing a trace: to `NAME.partial`, which becomes `NAME` when the trace is whole.
+//! Files of traces: written to `NAME.partial`, which becomes `NAME` when the trace is whole.
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
+use chaic_env::trace::{Header, MAX_TRACE_BYTES, Record, Trace, Warning, parse};
+use chaic_files::read_bounded;
+
 use crate::error::{EvalError, Result};
-use crate::trace::{Header, Record};
+
+/// Reads a trace up to its last whole record, and says so where that isn't all.
+///
+/// # Errors
+/// If the file can't be read at all, has no whole header, or is of another format or version.
+pub fn read(path: &Path) -> Result<(Trace, Vec<Warning>)> {
+    // One byte more than the limit tells a file at the limit from a longer one.
+    let bytes = read_bounded(path, MAX_TRACE_BYTES + 1)?;
+    Ok(parse(&bytes, path)?)
+}
 
 /// Appends records to a trace file.
 #[derive(Debug)]
@@ -27,8 +39,7 @@ impl Writer {
         let partial = partial_path(path);
         let file = File::create(&partial).map_err(EvalError::io("create", &partial))?;
         let mut writer = Writer { file: BufWriter::new(file), partial, path: path.to_owned() };
-        let header = serde_json::to_string(header).expect("a header has string keys");
-        writer.line(&header)?;
+        writer.line(&header.to_line())?;
         Ok(writer)
     }
 
@@ -68,4 +79,36 @@ fn partial_path(path: &Path) -> PathBuf {
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(".partial");
     path.with_file_name(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use chaic_env::rules::RuleSet;
+    use chaic_env::{Appearance, EpisodeConfig, header_of};
+    use chaic_episodes::find_episode;
+
+    use super::*;
+
+    #[test]
+    fn a_trace_has_its_name_only_when_it_is_whole() {
+        let episode = find_episode("shopping/test/01").unwrap();
+        let config = EpisodeConfig {
+            episode: &episode,
+            seed: 0,
+            rules: RuleSet::PAPER,
+            helper: "none",
+            partner: None,
+            image_size: None,
+            appearance: Appearance::Canonical,
+        };
+        let header = header_of(config, None).unwrap();
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a/b/t.jsonl");
+        let writer = Writer::create(&path, &header).unwrap();
+        assert!(!path.exists());
+        writer.finish().unwrap();
+        let (trace, warnings) = read(&path).unwrap();
+        assert_eq!((trace.header, trace.records.len()), (header, 0));
+        assert_eq!(warnings, [Warning::NoEnd { path, records: 0 }]);
+    }
 }

@@ -27,8 +27,8 @@ use chaic_env::{Env, EpisodeConfig, Idle, Minds, Seat, seats};
 use chaic_episodes::Episode;
 use chaic_protocol::geom::horizontal_distance;
 use chaic_protocol::observation::Observation;
-use chaic_protocol::{AgentId, Frame, Vec3};
-use chaic_world::{Setup, World};
+use chaic_protocol::{Action, AgentId, Frame, Vec3};
+use chaic_world::{JointLift, Setup, World};
 use spy::{Log, Seen, Spy};
 
 use crate::error::Result;
@@ -116,8 +116,10 @@ pub fn compare(pair: &Pair<'_>, make: &dyn Fn() -> Helper, leak: Option<Leak>) -
         let Some([a, b]) = both_told(&sides) else { continue };
         if let Some(what) = difference(&a, &b) {
             let (x, y) = (&a.observation, &b.observation);
-            let is_fair = is_stated(pair, what, x, y)
-                || told_in.is_some_and(|worlds| is_visible_or_felt(&worlds, what));
+            let is_caused = |worlds: &[World; 2]| {
+                is_visible_or_felt(worlds, what) || worlds.iter().any(is_called_to_lift)
+            };
+            let is_fair = is_stated(pair, what, x, y) || told_in.as_ref().is_some_and(is_caused);
             let frame = x.frame.min(y.frame);
             let finding = if is_fair { None } else { found(frame, what) };
             return Ok(Verdict { compared, finding });
@@ -177,6 +179,19 @@ fn is_visible_or_felt([a, b]: &[World; 2], what: &str) -> bool {
     }
     let here = a.state().people[AgentId::HELPER.index()].pose.position;
     differing(a, b).any(|(at, half_m)| horizontal_distance(at, here) < FELT_M + half_m)
+}
+
+/// Whether the partner may have called the helper to a piece of furniture that both chose last, where
+/// rules have it so: the helper finds itself going there, however far away the partner is.
+fn is_called_to_lift(world: &World) -> bool {
+    let chose = |agent: AgentId| {
+        let person = &world.state().people[agent.index()];
+        let last = person.activity.as_ref().map(|a| a.action).or(person.last.map(|l| l.0));
+        last.filter(|action| matches!(action, Action::PickUp { .. }))?.subject()
+    };
+    world.rules().joint_lift == JointLift::LastChoice
+        && chose(AgentId::HELPER).is_some()
+        && chose(AgentId::HELPER) == chose(AgentId::PARTNER)
 }
 
 /// Where two worlds of one episode differ in what stands or moves, with half the length of it.

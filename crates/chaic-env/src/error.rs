@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use chaic_protocol::Frame;
 use chaic_world::SetupError;
 
 /// The result of anything in this crate.
@@ -40,6 +41,16 @@ pub enum EnvError {
         found: String,
         /// Digest of the episode that was played.
         expected: String,
+    },
+    /// A trace doesn't fit the world that it was played in.
+    #[error("{episode} at frame {frame}: {problem}; the trace was altered")]
+    Altered {
+        /// The episode.
+        episode: String,
+        /// The frame up to which it fits.
+        frame: Frame,
+        /// What doesn't fit.
+        problem: String,
     },
     /// No helper has this name.
     #[error("unknown helper `{name}`; the helpers are {known}", known = known.join(", "))]

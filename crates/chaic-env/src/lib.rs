@@ -4,7 +4,8 @@
 //! **What it is**: where minds and world meet. An [`Env`] has a [`Seat`] for everybody in an episode,
 //! driven by a mind or by the caller. It renders what those perceive whose action has ended,
 //! resolves the pixels they point at, submits what they choose, and tells all that happened as
-//! [`trace::Record`]s. [`run_loop`] is the loop itself, which audits run with decisions of a trace.
+//! [`trace::Record`]s. [`run_loop`] is the loop itself, which audits run with decisions of a trace;
+//! a [`Playback`] shows a trace frame by frame.
 //! [`minds`] says where minds come from by name, [`rules`] by which rules they and the world go.
 //!
 //! **What it is not**: it knows no files, scores of many episodes, plots or video, and it decides
@@ -24,6 +25,7 @@ mod error;
 mod key;
 pub mod minds;
 mod observer;
+mod playback;
 pub mod rules;
 mod run_loop;
 mod seat;
@@ -36,6 +38,7 @@ pub use env::{Env, Flow};
 pub use error::{EnvError, Result};
 pub use key::{RunKey, slug};
 pub use observer::{Glimpse, Observer};
+pub use playback::Playback;
 pub use run_loop::{Choice, Decide, run_loop};
 pub use seat::{Driver, Idle, Minds, Seat, seats, world_seed};
 

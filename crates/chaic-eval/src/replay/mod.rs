@@ -2,14 +2,12 @@
 
 mod panel;
 
-use std::collections::VecDeque;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use chaic_env::trace::{Decision, Header, Trace};
-use chaic_env::{Digest, slug, world_of};
+use chaic_env::trace::Trace;
+use chaic_env::{Playback, slug};
 use chaic_episodes::Episode;
-use chaic_protocol::agent::Thought;
 use chaic_protocol::{Action, AgentId, EntityId, Frame, Outcome, ResolvedAction, TaskId};
 use chaic_render::{Channels, Scene, View, plan};
 use chaic_world::{EventKind, World};
@@ -112,7 +110,7 @@ pub fn write(
     let mut video = VideoWriter::create(out, WIDTH_PX, HEIGHT_PX, options.fps).map_err(bad)?;
     let every = options.every.max(1);
     loop {
-        let frame = replay.world.state().frame;
+        let frame = replay.world().state().frame;
         if progress(frame).is_break() {
             return Ok(None);
         }
@@ -129,18 +127,12 @@ pub fn write(
     Ok(Some(n))
 }
 
-/// A trace that is being played again.
+/// A trace that is being drawn.
 pub struct Replay<'a> {
-    header: &'a Header,
+    playback: Playback<'a>,
     scene: Scene,
-    world: World,
-    /// Those to come, first one first.
-    decisions: VecDeque<&'a Decision>,
-    thoughts: Vec<Thought>,
     /// What happened last, newest last.
     news: Vec<String>,
-    /// The last frame that the trace knows of.
-    last: Frame,
 }
 
 impl<'a> Replay<'a> {
@@ -149,83 +141,45 @@ impl<'a> Replay<'a> {
     /// # Errors
     /// If the episode isn't the one that was played.
     pub fn new(trace: &'a Trace, episode: &Episode) -> Result<Replay<'a>> {
-        let world = world_of(&trace.header, episode)?;
-        let scene = Scene::with_appearance(world.setup(), trace.header.appearance);
-        let n = world.setup().people.len();
-        let last = trace.end().map(|e| e.frame);
-        let last = last.or_else(|| trace.decisions().last().map(|d| d.frame)).unwrap_or(0);
-        Ok(Replay {
-            header: &trace.header,
-            scene,
-            world,
-            decisions: trace.decisions().collect(),
-            thoughts: vec![Thought::default(); n],
-            news: Vec::new(),
-            last,
-        })
+        let playback = Playback::new(trace, episode)?;
+        let scene = Scene::with_appearance(playback.world().setup(), trace.header.appearance);
+        Ok(Replay { playback, scene, news: Vec::new() })
     }
 
     /// The world as it stands.
     pub fn world(&self) -> &World {
-        &self.world
+        self.playback.world()
     }
 
-    /// Lets those who wait do what they did, and one frame pass; false once there is no more.
+    /// Lets one frame pass; false once there is no more.
     ///
     /// # Errors
     /// If the trace doesn't fit the world, as an altered one does.
     pub fn step(&mut self) -> Result<bool> {
-        let frame = self.world.state().frame;
-        if self.world.is_over() || frame >= self.last {
-            return Ok(false);
-        }
-        while let Some(d) = self.decisions.pop_front_if(|d| d.frame == frame) {
-            if let (Some(thought), Some(slot)) =
-                (&d.thought, self.thoughts.get_mut(d.agent.index()))
-            {
-                slot.clone_from(thought);
-            }
-            let comes = Digest(self.world.digest());
-            if comes != d.digest {
-                let said = d.digest;
-                return Err(self.differs(&format!(
-                    "the state's digest is {said} in the trace, {comes} when played again"
-                )));
-            }
-            self.world.submit(d.agent, d.action).map_err(|e| self.differs(&e.to_string()))?;
-        }
-        if let Some(late) = self.decisions.front().filter(|d| d.frame <= frame) {
-            let text = format!("a decision of frame {} comes too late", late.frame);
-            return Err(self.differs(&text));
-        }
-        self.world.tick();
-        for event in self.world.drain_events() {
+        let Some(events) = self.playback.step()? else { return Ok(false) };
+        for event in events {
             self.tell(&event.kind);
         }
         Ok(true)
     }
 
-    fn differs(&self, what: &str) -> EvalError {
-        let (episode, frame) = (&self.header.episode, self.world.state().frame);
-        EvalError::Difference(format!("{episode} at frame {frame}: {what}; the trace was altered"))
-    }
-
     /// The picture of this moment.
     pub fn picture(&self) -> RgbImage {
         let eyes = [AgentId::PARTNER, AgentId::HELPER];
-        let present = eyes.iter().filter(|a| a.index() < self.thoughts.len());
+        let present = eyes.iter().filter(|a| a.index() < self.playback.thoughts().len());
         let view = |agent: &AgentId| {
-            View::of_eye(*agent, self.world.eye(*agent, panel::EYE_PX), Channels::RGB)
+            View::of_eye(*agent, self.world().eye(*agent, panel::EYE_PX), Channels::RGB)
         };
         let views: Vec<View> = present.map(view).collect();
         let (images, map) = rayon::join(
-            || self.scene.render(&self.world, &views),
-            || plan::draw_scene_plan(&self.scene, &self.world, panel::MAP_PX),
+            || self.scene.render(self.world(), &views),
+            || plan::draw_scene_plan(&self.scene, self.world(), panel::MAP_PX),
         );
-        let captions: Vec<Caption> = self.world.setup().agents().map(|a| self.caption(a)).collect();
+        let captions: Vec<Caption> =
+            self.world().setup().agents().map(|a| self.caption(a)).collect();
         panel::compose(&panel::Contents {
-            header: self.header,
-            world: &self.world,
+            header: self.playback.header(),
+            world: self.world(),
             eyes: &images,
             map: &map,
             captions: &captions,
@@ -234,7 +188,7 @@ impl<'a> Replay<'a> {
     }
 
     fn caption(&self, agent: AgentId) -> Caption {
-        let person = &self.world.state().people[agent.index()];
+        let person = &self.world().state().people[agent.index()];
         let action = match (&person.activity, &person.last) {
             (Some(activity), _) => self.words(&activity.action),
             (None, Some((action, outcome))) => match outcome {
@@ -243,10 +197,10 @@ impl<'a> Replay<'a> {
             },
             (None, None) => "about to begin".to_owned(),
         };
-        let thought = &self.thoughts[agent.index()];
+        let thought = &self.playback.thoughts()[agent.index()];
         let mood = thought.mood.as_ref().map_or(String::new(), |m| format!(" ({m})"));
         let who = match agent {
-            AgentId::HELPER => format!("{agent} ({})", self.header.helper),
+            AgentId::HELPER => format!("{agent} ({})", self.playback.header().helper),
             _ => agent.to_string(),
         };
         Caption { who, action, plan: format!("{}{mood}", thought.plan) }
@@ -266,7 +220,7 @@ impl<'a> Replay<'a> {
     }
 
     fn name(&self, entity: EntityId) -> String {
-        let class = self.world.setup().thing(entity).map(|t| t.class);
+        let class = self.world().setup().thing(entity).map(|t| t.class);
         class.map_or(entity.to_string(), |c| format!("{} {entity}", c.info().label))
     }
 
@@ -292,6 +246,6 @@ impl<'a> Replay<'a> {
         if self.news.len() == panel::MAX_NEWS {
             self.news.remove(0);
         }
-        self.news.push(format!("{:>5}  {news}", self.world.state().frame));
+        self.news.push(format!("{:>5}  {news}", self.world().state().frame));
     }
 }

@@ -6,7 +6,9 @@ use chaic_protocol::briefing::Relation;
 use chaic_protocol::geom::{wrap_angle, xz, yaw_towards};
 use chaic_protocol::observation::Senses;
 use chaic_protocol::rng::Stream;
-use chaic_protocol::{Action, Agent, AgentId, Briefing, Frame, Observation, Vec2, Vec3};
+use chaic_protocol::{
+    Action, Agent, AgentError, AgentId, Briefing, Frame, Observation, Vec2, Vec3,
+};
 
 use crate::execution::follow::{Follow, Follower};
 use crate::execution::navigate::{Destination, Nav, Navigator};
@@ -246,10 +248,10 @@ impl Agent for Child {
         self.episode = Some(Episode::new(briefing, self.rules));
     }
 
-    fn act(&mut self, observation: &Observation) -> Action {
+    fn act(&mut self, observation: &Observation) -> Result<Action, AgentError> {
         let intent = self.episode.as_mut().map(|episode| episode.act(observation));
         let action = intent.and_then(|intent| named(intent, |track| GroundTruthIds.target(track)));
-        action.unwrap_or(Action::Wait { frames: 5 })
+        Ok(action.unwrap_or(Action::Wait { frames: 5 }))
     }
 
     fn thought(&self) -> Thought {
@@ -310,7 +312,7 @@ mod tests {
                 (AgentId::PARTNER, seen_at(guardian_x, 0.0)),
                 (AgentId::HELPER, seen_at(helper_x, 0.0)),
             ];
-            self.child.act(&self.observation);
+            self.child.act(&self.observation).expect("rules decide");
             self.child.child_state().expect("it was briefed")
         }
     }

@@ -5,7 +5,7 @@ use std::fmt;
 
 use chaic_protocol::briefing::Relation;
 use chaic_protocol::geom::xz;
-use chaic_protocol::{Briefing, ClassId, Frame, Hand, Observation, Role};
+use chaic_protocol::{AgentError, Briefing, ClassId, Frame, Hand, Observation, Role};
 
 use crate::behavior::BehaviorLog;
 use crate::memory::{Memory, Thing};
@@ -166,7 +166,10 @@ pub trait Policy: Send {
 
     /// The plan to follow next. `valid` is never empty, and holds the plans of one kind nearest
     /// first.
-    fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan;
+    ///
+    /// # Errors
+    /// If it can't choose; its mind decides nothing then.
+    fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError>;
 
     /// Whether to choose anew although `current` is not finished. `is_news` says that something
     /// has come up since the last choice. The new choice is taken if it [supersedes] the current

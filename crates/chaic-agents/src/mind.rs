@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use chaic_protocol::agent::Thought;
 use chaic_protocol::observation::Senses;
-use chaic_protocol::{Action, Agent, Briefing, Observation, Outcome, Target};
+use chaic_protocol::{Action, Agent, AgentError, Briefing, Observation, Outcome, Target};
 
 use crate::behavior::{BehaviorModel, GroundTruthBehavior};
 use crate::decision::{Context, Plan, Policy, valid_plans};
@@ -176,23 +176,27 @@ impl Episode {
     }
 
     /// Lets the policy choose; `None` if it sticks to the current plan.
-    fn choose<P: Policy>(&mut self, policy: &mut P, behavior: &dyn BehaviorModel) -> Option<Plan> {
+    fn choose<P: Policy>(
+        &mut self,
+        policy: &mut P,
+        behavior: &dyn BehaviorModel,
+    ) -> Result<Option<Plan>, AgentError> {
         let news = self.memory.things.news();
         if let Some(current) = self.plan {
             let context = self.context(behavior);
             if !policy.reconsiders(&context, &current, news != self.news) {
-                return None;
+                return Ok(None);
             }
         }
         self.news = news;
         self.memory.refresh();
         let context = self.context(behavior);
         let valid = valid_plans(&self.memory, &self.briefing);
-        let chosen = policy.choose(&context, &valid);
-        match self.plan {
+        let chosen = policy.choose(&context, &valid)?;
+        Ok(match self.plan {
             Some(current) if !chosen.supersedes(&current) => None,
             _ => Some(chosen),
-        }
+        })
     }
 
     /// What `plan` comes to next.
@@ -205,9 +209,9 @@ impl Episode {
 impl<P: Policy> Mind<P> {
     /// What to do next, as it is meant and as it is named; `None` for a pause. Where nothing that the
     /// policy chooses can be done, one looks around elsewhere, from where it may be possible.
-    fn decide(&mut self, episode: &mut Episode) -> Option<(Intent, Action)> {
+    fn decide(&mut self, episode: &mut Episode) -> Result<Option<(Intent, Action)>, AgentError> {
         for _ in 0..MAX_PLANS {
-            let chosen = episode.choose(&mut self.policy, self.behavior.as_ref());
+            let chosen = episode.choose(&mut self.policy, self.behavior.as_ref())?;
             if let Some(plan) = chosen {
                 let thinking = self.policy.thinking_frames();
                 let begin = episode.memory.frame + thinking;
@@ -215,13 +219,13 @@ impl<P: Policy> Mind<P> {
                 episode.plan = Some(plan);
                 if thinking > 0 {
                     let frames = thinking;
-                    return Some((Action::Wait { frames }, Action::Wait { frames }));
+                    return Ok(Some((Action::Wait { frames }, Action::Wait { frames })));
                 }
             }
-            let plan = episode.plan?;
+            let Some(plan) = episode.plan else { return Ok(None) };
             match episode.step(&plan) {
                 Progress::Act(intent) => match episode.name(intent, self.perception.as_ref()) {
-                    Some(named) => return Some(named),
+                    Some(named) => return Ok(Some(named)),
                     None => episode.plan = None,
                 },
                 Progress::Done | Progress::Failed => episode.plan = None,
@@ -229,10 +233,10 @@ impl<P: Policy> Mind<P> {
         }
         episode.executor.begin(episode.memory.frame, &episode.memory.rules);
         episode.plan = Some(Plan::Explore);
-        match episode.step(&Plan::Explore) {
+        Ok(match episode.step(&Plan::Explore) {
             Progress::Act(intent) => episode.name(intent, self.perception.as_ref()),
             Progress::Done | Progress::Failed => None,
-        }
+        })
     }
 }
 
@@ -247,16 +251,18 @@ impl<P: Policy> Agent for Mind<P> {
         self.episode = Some(Episode::new(briefing, self.rules));
     }
 
-    fn act(&mut self, observation: &Observation) -> Action {
+    fn act(&mut self, observation: &Observation) -> Result<Action, AgentError> {
         let pause = Action::Wait { frames: PAUSE_FRAMES };
-        let Some(mut episode) = self.episode.take() else { return pause };
+        let Some(mut episode) = self.episode.take() else { return Ok(pause) };
         episode.take_in(observation, self.perception.as_mut());
         self.behavior.watch(observation, &episode.memory);
         self.policy.look(observation);
-        episode.sent = self.decide(&mut episode);
-        let action = episode.sent.map_or(pause, |(_, action)| action);
+        let decided = self.decide(&mut episode);
+        if let Ok(sent) = &decided {
+            episode.sent = *sent;
+        }
         self.episode = Some(episode);
-        action
+        Ok(decided?.map_or(pause, |(_, action)| action))
     }
 
     fn thought(&self) -> Thought {

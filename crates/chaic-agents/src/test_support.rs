@@ -388,7 +388,7 @@ impl Toy {
         mind.reset(briefing);
         let mut plans = Vec::new();
         while self.frame < briefing.horizon {
-            let action = mind.act(&self.observe());
+            let action = mind.act(&self.observe()).expect("rules decide");
             let plan = mind.thought().plan;
             if plans.last() != Some(&plan) {
                 plans.push(plan);

@@ -1,12 +1,11 @@
 //! An episode under way.
 
 use std::collections::BTreeMap;
-use std::convert::Infallible;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use chaic_protocol::agent::{ChildState, Thought};
-use chaic_protocol::{Action, AgentId, Briefing, Frame, Observation};
+use chaic_protocol::{Action, AgentError, AgentId, Briefing, Frame, Observation};
 use chaic_render::Scene;
 use chaic_world::{Setup, World};
 
@@ -186,9 +185,11 @@ impl Env {
 
     /// Plays on without keeping records: until a choice of the caller's is needed or the episode
     /// ends, or to the first frame in which somebody decides at or after `until`.
-    pub fn advance(&mut self, until: Option<Frame>) -> Flow {
-        let run = self.run(&AtomicBool::new(false), until, &mut |_| Ok::<(), Infallible>(()));
-        run.unwrap_or_else(|never| match never {})
+    ///
+    /// # Errors
+    /// If a mind can't decide.
+    pub fn advance(&mut self, until: Option<Frame>) -> std::result::Result<Flow, AgentError> {
+        self.run(&AtomicBool::new(false), until, &mut |_| Ok(()))
     }
 
     /// Plays until a choice of the caller's is needed or the episode ends, or to the first frame in
@@ -196,8 +197,8 @@ impl Env {
     /// ends the play.
     ///
     /// # Errors
-    /// Those of `sink`.
-    pub fn run<E>(
+    /// Those of `sink`, and of a mind that can't decide.
+    pub fn run<E: From<AgentError>>(
         &mut self,
         stop: &AtomicBool,
         until: Option<Frame>,
@@ -216,17 +217,10 @@ impl Env {
                 let looking: Vec<_> = fresh.iter().map(|a| (*a, &seats[a.index()])).collect();
                 observer.observe(world, &looking)
             };
-            for (agent, glimpse) in fresh.iter().copied().zip(glimpses) {
+            for (agent, glimpse) in fresh.into_iter().zip(glimpses) {
                 let turn = &mut turns[agent.index()];
-                turn.choice = choose(&mut seats[agent.index()], agent, &glimpse, &mut turn.said);
+                turn.choice = choose(&mut seats[agent.index()], agent, &glimpse, &mut turn.said)?;
                 turn.glimpse = Some(glimpse);
-            }
-            // Who raised `stop` while deciding hasn't decided.
-            if stop.load(Ordering::Relaxed) {
-                for agent in &fresh {
-                    turns[agent.index()] = Turn::default();
-                }
-                return Ok(None);
             }
             if waiting.iter().any(|a| turns[a.index()].choice.is_none()) {
                 flow = Flow::Waits;
@@ -251,14 +245,19 @@ fn check_seats(config: &EpisodeConfig<'_>, setup: &Setup, seats: usize) -> Resul
 }
 
 /// What the mind of a seat chooses; `None` if the caller drives it.
-fn choose(seat: &mut Seat, agent: AgentId, glimpse: &Glimpse, said: &mut Said) -> Option<Choice> {
-    let Driver::Mind(mind) = &mut seat.driver else { return None };
-    let meant = mind.act(&glimpse.observation);
+fn choose(
+    seat: &mut Seat,
+    agent: AgentId,
+    glimpse: &Glimpse,
+    said: &mut Said,
+) -> std::result::Result<Option<Choice>, AgentError> {
+    let Driver::Mind(mind) = &mut seat.driver else { return Ok(None) };
+    let meant = mind.act(&glimpse.observation)?;
     let action = glimpse.resolve(meant);
     seat.submitted = Some((meant, action));
     let says = Said { thought: Some(mind.thought()), child: mind.child_state() };
     let thought = says.thought.clone().filter(|_| says.thought != said.thought);
     let child = says.child.filter(|_| says.child != said.child);
     *said = says;
-    Some(Choice { agent, action, thought, child })
+    Ok(Some(Choice { agent, action, thought, child }))
 }

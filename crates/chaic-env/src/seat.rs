@@ -3,7 +3,7 @@
 use chaic_agents::{PlannerRules, partners};
 use chaic_protocol::observation::{Grants, Senses};
 use chaic_protocol::rng::Stream;
-use chaic_protocol::{Action, Agent, AgentId, Briefing, Observation, ResolvedAction};
+use chaic_protocol::{Action, Agent, AgentError, AgentId, Briefing, Observation, ResolvedAction};
 use chaic_world::{Setup, World};
 
 use crate::minds::Helper;
@@ -117,8 +117,8 @@ impl Agent for Idle {
 
     fn reset(&mut self, _: &Briefing) {}
 
-    fn act(&mut self, _: &Observation) -> Action {
-        Action::Wait { frames: 100 }
+    fn act(&mut self, _: &Observation) -> Result<Action, AgentError> {
+        Ok(Action::Wait { frames: 100 })
     }
 }
 

@@ -2,7 +2,6 @@
 //! same whether a mind sits in the environment or its caller asks it, in one go or in pieces, in a
 //! new environment or in one that was reset.
 
-use std::convert::Infallible;
 use std::sync::atomic::AtomicBool;
 
 use chaic_agents::PlannerRules;
@@ -12,7 +11,7 @@ use chaic_env::trace::Record;
 use chaic_env::{Appearance, Env, EnvError, EpisodeConfig, Flow, Idle, Minds, Seat};
 use chaic_episodes::{Episode, find_episode};
 use chaic_protocol::observation::Grants;
-use chaic_protocol::{Action, AgentId, TaskId};
+use chaic_protocol::{Action, AgentError, AgentId, TaskId};
 
 /// Frames that are played.
 const UNTIL: u32 = 700;
@@ -41,7 +40,7 @@ fn rhp() -> Helper {
 fn run(env: &mut Env, until: u32, records: &mut Vec<Record>) -> Flow {
     let mut sink = |record: &Record| {
         records.push(record.clone());
-        Ok::<(), Infallible>(())
+        Ok::<(), AgentError>(())
     };
     env.run(&AtomicBool::new(false), Some(until), &mut sink).expect("the sink takes all")
 }
@@ -81,7 +80,7 @@ fn a_mind_that_the_caller_asks_does_as_one_that_sits_inside() {
         while run(&mut env, UNTIL, &mut records) == Flow::Waits {
             assert_eq!(env.waiting().collect::<Vec<_>>(), [AgentId::HELPER]);
             let seen = env.observation(AgentId::HELPER).expect("it waits");
-            let action = mind.act(seen);
+            let action = mind.act(seen).expect("rules decide");
             assert!(!env.submit(AgentId::PARTNER, action), "a mind sits there");
             assert!(env.submit(AgentId::HELPER, action));
             assert!(!env.submit(AgentId::HELPER, action), "it has chosen already");
@@ -124,7 +123,7 @@ fn seats_that_the_caller_filled_are_as_many_as_people() {
     let refused = env.reset(config(&three));
     assert!(matches!(refused, Err(EnvError::Seats { people: 3, seats: 2, .. })), "a child more");
     assert_eq!(env.header().task, TaskId::Obstacle, "it is as it was");
-    assert_eq!(env.advance(Some(300)), Flow::Stopped);
+    assert_eq!(env.advance(Some(300)), Ok(Flow::Stopped));
     assert!(Env::with_seats(config(&three), vec![idle()]).is_err());
 }
 

@@ -35,7 +35,7 @@ fn transport_rate(episode: &Episode, helper: &str) -> Result<f64> {
         appearance: Appearance::Canonical,
     };
     let mut env = Env::new(config, BuiltIn.make(helper, PlannerRules::paper()))?;
-    env.advance(None);
+    env.advance(None)?;
     let (done, total) = env.world().progress();
     Ok(done / total)
 }

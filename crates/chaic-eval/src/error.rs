@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use chaic_env::{EnvError, RunKey};
 use chaic_episodes::{EpisodeError, SplitError};
 use chaic_files::FileError;
+use chaic_protocol::AgentError;
 
 /// The result of anything in this crate.
 pub type Result<T> = std::result::Result<T, EvalError>;
@@ -95,6 +96,9 @@ pub enum EvalError {
     /// An episode can't be played.
     #[error(transparent)]
     Env(#[from] EnvError),
+    /// A mind can't decide.
+    #[error(transparent)]
+    Agent(#[from] AgentError),
     /// Options make no run.
     #[error("{0}")]
     Options(String),

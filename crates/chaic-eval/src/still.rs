@@ -57,7 +57,7 @@ pub fn write(still: &Still<'_>, helpers: &dyn Helpers, out: &Path) -> Result<Fra
         let text = format!("{} has no {agent} when the helper is {helper}", episode.id());
         return Err(EvalError::Options(text));
     }
-    env.advance(Some(frame));
+    env.advance(Some(frame))?;
     let world = env.world();
     let view = View::of_eye(agent, world.eye(agent, size), Channels::ALL);
     let images = env.observer().scene().render(world, &[view]).pop().unwrap_or_default();

@@ -9,7 +9,8 @@ use chaic_protocol::capability::Persona;
 use chaic_protocol::geom::{Pose, Rect};
 use chaic_protocol::observation::{Grants, Senses};
 use chaic_protocol::{
-    Action, Agent, Briefing, ClassId, Hand, Observation, Outcome, Target, TaskId, Vec2, Vec3,
+    Action, Agent, AgentError, Briefing, ClassId, Hand, Observation, Outcome, Target, TaskId, Vec2,
+    Vec3,
 };
 use chaic_world::{Person, Room, RoomKind, Setup, Thing, Wall};
 
@@ -36,7 +37,7 @@ impl Agent for ColorOnly {
 
     fn reset(&mut self, _: &Briefing) {}
 
-    fn act(&mut self, seen: &Observation) -> Action {
+    fn act(&mut self, seen: &Observation) -> Result<Action, AgentError> {
         assert!(seen.images.ids.is_none() && seen.images.depth_m.is_none());
         let holds = seen.own.held().next().is_some();
         if let Some((Action::MoveForward, Outcome::Failure(_))) = seen.own.last {
@@ -44,21 +45,21 @@ impl Agent for ColorOnly {
         }
         if self.detour > 0 {
             self.detour -= 1;
-            return if self.detour == 0 { Action::MoveForward } else { Action::TurnLeft };
+            return Ok(if self.detour == 0 { Action::MoveForward } else { Action::TurnLeft });
         }
         let rgb = seen.images.rgb.as_deref().expect("it asked for color");
         let Some(blob) = Blob::of(rgb, if holds { is_blue } else { is_red }) else {
-            return Action::TurnLeft;
+            return Ok(Action::TurnLeft);
         };
         let off = blob.middle.x - 0.5 * SIZE as f32;
         let (hand, [column, row]) = (Hand::Right, blob.pixel);
-        match off {
+        Ok(match off {
             _ if off < -AHEAD_COLUMNS => Action::TurnLeft,
             _ if off > AHEAD_COLUMNS => Action::TurnRight,
             _ if blob.lowest < NEAR_ROW => Action::MoveForward,
             _ if holds => Action::PutOn { place: Target::Pixel { column, row }, hand },
             _ => Action::PickUp { object: Target::Pixel { column, row }, hand },
-        }
+        })
     }
 }
 
@@ -150,6 +151,6 @@ fn whoever_sees_color_alone_points_picks_up_and_delivers() {
     };
     let mut env = Env::with_seats(config, seats).unwrap();
     let flow = env.advance(None);
-    assert_eq!(flow, Flow::Ended);
+    assert_eq!(flow, Ok(Flow::Ended));
     assert!(env.world().is_complete(), "the apple is where it was wanted");
 }

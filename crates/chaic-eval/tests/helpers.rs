@@ -1,7 +1,6 @@
 //! Promise: helpers are of use in real episodes, seen through their own eyes. In each task the rule-based
 //! one or the oracle brings something to the goal, and who only follows stays with the partner.
 
-use std::convert::Infallible;
 use std::sync::atomic::AtomicBool;
 
 use chaic_agents::PlannerRules;
@@ -11,7 +10,7 @@ use chaic_env::{Appearance, Env, EpisodeConfig, Flow};
 use chaic_episodes::{Episode, Split, episodes};
 use chaic_eval::metrics::{Summary, Tally};
 use chaic_protocol::geom::horizontal_distance;
-use chaic_protocol::{AgentId, TaskId};
+use chaic_protocol::{AgentError, AgentId, TaskId};
 
 /// Side of everybody's images, pixels: enough to find one's way.
 const SIDE_PX: u32 = 128;
@@ -45,7 +44,7 @@ fn helper_delivers(episode: &Episode, helper: &str) -> bool {
     let mut summary: Option<Summary> = None;
     let mut sink = |record: &_| {
         summary = tally.record(record).and_then(|r| r.summary().cloned()).or(summary.take());
-        Ok::<(), Infallible>(())
+        Ok::<(), AgentError>(())
     };
     let flow = env.run(&AtomicBool::new(false), None, &mut sink);
     assert_eq!(flow.expect("the sink takes all"), Flow::Ended);
@@ -79,7 +78,7 @@ fn who_follows_stays_with_the_partner() {
     let mut env = stage(&episode, "follow");
     let (mut near, mut looks, mut walked_m) = (0, 0, 0.0);
     for frame in (FOUND_BY..3000).step_by(EVERY as usize) {
-        if env.advance(Some(frame)) == Flow::Ended {
+        if env.advance(Some(frame)) == Ok(Flow::Ended) {
             break;
         }
         let people = &env.world().state().people;

@@ -12,7 +12,7 @@ use chaic_env::{Env, EpisodeConfig};
 use chaic_episodes::{Episode, find_episode};
 use chaic_eval::audit::{Finding, Leak, Pair, Partner, Prober, Secret, compare};
 use chaic_protocol::observation::{Granted, Grants, Senses};
-use chaic_protocol::{Action, Agent, Briefing, Observation, TaskId};
+use chaic_protocol::{Action, Agent, AgentError, Briefing, Observation, TaskId};
 use chaic_render::Appearance;
 
 /// Long enough to explore, to pick up and to deliver.
@@ -124,7 +124,7 @@ impl Agent for Checker {
         self.mind.reset(briefing);
     }
 
-    fn act(&mut self, observation: &Observation) -> Action {
+    fn act(&mut self, observation: &Observation) -> Result<Action, AgentError> {
         (self.check)(observation, &self.counts);
         self.mind.act(observation)
     }
@@ -150,7 +150,7 @@ fn checked(
         appearance: Appearance::Canonical,
     };
     let mut env = Env::new(config, Some(Helper { mind, grants })).unwrap();
-    env.advance(None);
+    env.advance(None).unwrap();
     *counts.lock().unwrap()
 }
 

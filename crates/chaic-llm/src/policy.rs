@@ -7,7 +7,7 @@ use chaic_agents::decision::{Context, Plan, Policy};
 use chaic_agents::policies::{RuleProfile, Rules};
 use chaic_env::RunKey;
 use chaic_protocol::capability::Gait;
-use chaic_protocol::{Briefing, Frame, Observation};
+use chaic_protocol::{AgentError, Briefing, Frame, Observation};
 
 use crate::answer;
 use crate::asker::{Asker, Halted, Thread};
@@ -285,7 +285,7 @@ impl LanguagePolicy {
         let chosen = match self.asking().fallback {
             Fallback::Wait => Some(Plan::Wait),
             Fallback::Explore => None,
-            Fallback::Rules => Some(self.rules.choose(context, menu)),
+            Fallback::Rules => Some(self.rules.decide(context, menu)),
         };
         let usual = [Plan::Explore, Plan::TurnAround, Plan::Wait];
         chosen.filter(|p| menu.contains(p)).or_else(|| first_of(&usual)).unwrap_or(Plan::Wait)
@@ -358,21 +358,23 @@ impl Policy for LanguagePolicy {
         self.counts.clear();
     }
 
-    fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
+    fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
         self.thinking_frames = 0;
         let now = context.memory.frame;
         if now < self.wait_until {
-            return Plan::Wait;
+            return Ok(Plan::Wait);
         }
         let menu = self.menu(now, valid);
-        // Who is halted decides nothing; the run stops before the plan is followed.
-        let plan = self.decide(context, &menu).unwrap_or(Plan::Wait);
+        let plan = self.decide(context, &menu).map_err(|Halted| {
+            let why = self.session.problem();
+            AgentError::Halted(why.unwrap_or_else(|| "its user stops the run".to_owned()))
+        })?;
         self.tried.1.push(plan);
         self.last_plan = Some(plan);
         if plan == Plan::Wait {
             self.wait_until = now + self.thinking_frames + self.asking().wait_frames;
         }
-        plan
+        Ok(plan)
     }
 
     fn look(&mut self, observation: &Observation) {

@@ -29,6 +29,19 @@ pub enum ChildState {
     GotoGuardian,
 }
 
+/// Why a mind can't decide.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum AgentError {
+    /// It can't go on for now: its user stops it, or nobody answers what it asks. A run pauses, and
+    /// plays the episode anew when it goes on.
+    #[error("{0}")]
+    Halted(String),
+    /// It broke down, like a process that ended or code that raised an exception. The episode counts
+    /// as zero.
+    #[error("{0}")]
+    Broken(String),
+}
+
 /// A mind: it is briefed once, then asked for an action each time its last one has ended.
 ///
 /// Everything it may know comes through these three calls. The same sequence of calls must lead
@@ -42,7 +55,10 @@ pub trait Agent: Send {
     fn reset(&mut self, briefing: &Briefing);
 
     /// Decides what to do next.
-    fn act(&mut self, observation: &Observation) -> Action;
+    ///
+    /// # Errors
+    /// If it can't; it isn't asked again in this episode.
+    fn act(&mut self, observation: &Observation) -> Result<Action, AgentError>;
 
     /// What it is thinking, for the record.
     fn thought(&self) -> Thought {

@@ -28,7 +28,7 @@ pub mod observation;
 pub mod rng;
 
 pub use action::{Action, FailureReason, Hand, Outcome, ResolvedAction, Target};
-pub use agent::Agent;
+pub use agent::{Agent, AgentError};
 pub use briefing::Briefing;
 pub use catalogue::{ClassInfo, Role};
 pub use glam::{Quat, Vec2, Vec3};

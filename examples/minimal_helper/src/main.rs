@@ -17,7 +17,8 @@ use chaic_protocol::geom::{horizontal_distance, wrap_angle, yaw_towards};
 use chaic_protocol::observation::{Grants, Identity, Senses};
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{
-    Action, Agent, Briefing, ClassId, EntityId, Hand, Observation, Outcome, Target, TaskId, Vec3,
+    Action, Agent, AgentError, Briefing, ClassId, EntityId, Hand, Observation, Outcome, Target,
+    TaskId, Vec3,
 };
 
 /// How near to walk before taking or putting, metres.
@@ -46,8 +47,10 @@ impl Agent for Minimal {
         *self = Minimal { told: Some((briefing.clone(), stream)), ..Minimal::default() };
     }
 
-    fn act(&mut self, seen: &Observation) -> Action {
-        let Some((briefing, stream)) = &mut self.told else { return Action::Wait { frames: 10 } };
+    fn act(&mut self, seen: &Observation) -> Result<Action, AgentError> {
+        let Some((briefing, stream)) = &mut self.told else {
+            return Ok(Action::Wait { frames: 10 });
+        };
         if let Some((action, Outcome::Failure(_))) = seen.own.last {
             self.given_up.extend(action.subject());
             self.detour = 2 + stream.below(4) as u32;
@@ -65,7 +68,7 @@ impl Agent for Minimal {
             !self.given_up.contains(&Target::Entity(e))
                 && !seen.own.held().filter_map(|h| h.identity.as_ref()).any(holds_it)
         });
-        match subject {
+        Ok(match subject {
             Some((entity, at)) if horizontal_distance(at, seen.own.pose.position) < NEAR_M => {
                 self.detour = 0;
                 let hand = Hand::Right;
@@ -85,7 +88,7 @@ impl Agent for Minimal {
             }
             Some((_, at)) => steer(seen, at),
             None => Action::MoveForward,
-        }
+        })
     }
 }
 

@@ -112,7 +112,7 @@ fn the_random_helper_chooses_all_valid_plans_equally_often() {
     random.reset(&briefing);
     let mut counts = [0; 3];
     for _ in 0..3000 {
-        let plan = random.choose(&context, &valid);
+        let plan = random.decide(&context, &valid);
         counts[valid.iter().position(|p| *p == plan).expect("valid")] += 1;
     }
     assert!(counts.iter().all(|c| (900..1100).contains(c)), "{counts:?}");
@@ -123,12 +123,12 @@ fn an_unbriefed_or_blind_mind_does_not_panic() {
     let (toy, _) = house();
     let mut observation = toy.observe();
     let mut mind = helpers::rhp(crate::PlannerRules::paper());
-    assert_eq!(mind.act(&observation), Action::Wait { frames: PAUSE_FRAMES });
+    assert_eq!(mind.act(&observation).unwrap(), Action::Wait { frames: PAUSE_FRAMES });
     mind.reset(&toy.briefing());
     observation.images = Default::default();
     for frame in 0..60 {
         observation.frame = frame;
-        mind.act(&observation);
+        mind.act(&observation).unwrap();
     }
 }
 
@@ -235,8 +235,8 @@ struct Thinker(chaic_protocol::Frame);
 impl Policy for Thinker {
     fn reset(&mut self, _: &Briefing) {}
 
-    fn choose(&mut self, _: &Context<'_>, _: &[Plan]) -> Plan {
-        Plan::TurnAround
+    fn choose(&mut self, _: &Context<'_>, _: &[Plan]) -> Result<Plan, AgentError> {
+        Ok(Plan::TurnAround)
     }
 
     fn thinking_frames(&self) -> chaic_protocol::Frame {
@@ -250,9 +250,13 @@ fn a_plan_begins_after_the_thinking() {
         let (mut toy, _) = house();
         let mut mind = Mind::new(Thinker(frames), PlannerRules::paper());
         mind.reset(&toy.briefing());
-        assert_eq!(mind.act(&toy.observe()), first);
+        assert_eq!(mind.act(&toy.observe()).unwrap(), first);
         toy.apply(first);
-        assert_eq!(mind.act(&toy.observe()), Action::TurnLeft, "it thinks once for a plan");
+        assert_eq!(
+            mind.act(&toy.observe()).unwrap(),
+            Action::TurnLeft,
+            "it thinks once for a plan"
+        );
     }
 }
 
@@ -262,8 +266,8 @@ struct Stubborn;
 impl Policy for Stubborn {
     fn reset(&mut self, _: &Briefing) {}
 
-    fn choose(&mut self, _: &Context<'_>, _: &[Plan]) -> Plan {
-        Plan::PutIn
+    fn choose(&mut self, _: &Context<'_>, _: &[Plan]) -> Result<Plan, AgentError> {
+        Ok(Plan::PutIn)
     }
 }
 
@@ -276,7 +280,7 @@ fn who_can_do_nothing_that_it_wants_looks_around_instead_of_standing_there() {
     let mut mind = Mind::new(Stubborn, PlannerRules::paper());
     mind.reset(&briefing);
     while toy.frame < briefing.horizon {
-        let action = mind.act(&toy.observe());
+        let action = mind.act(&toy.observe()).unwrap();
         assert!(action.is_locomotion(), "{action:?}");
         toy.apply(action);
         farthest_m = farthest_m.max(toy.here().distance(from));
@@ -299,7 +303,7 @@ fn nobody_tries_a_blocked_doorway_over_and_over() {
     // Where it last got farther than half a metre from, and when.
     let (mut from, mut since, mut longest) = (toy.here(), 0, 0);
     while toy.frame < briefing.horizon {
-        toy.apply(mind.act(&toy.observe()));
+        toy.apply(mind.act(&toy.observe()).unwrap());
         if toy.here().distance(from) > 0.5 {
             (from, since) = (toy.here(), toy.frame);
         }

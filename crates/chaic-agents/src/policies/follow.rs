@@ -1,7 +1,7 @@
 //! Always beside the partner: for collecting videos of what people do.
 
-use chaic_protocol::Briefing;
 use chaic_protocol::briefing::Relation;
+use chaic_protocol::{AgentError, Briefing};
 
 use crate::decision::{Context, Plan, Policy};
 
@@ -11,12 +11,9 @@ pub struct Follow {
     was_around: bool,
 }
 
-impl Policy for Follow {
-    fn reset(&mut self, _: &Briefing) {
-        self.was_around = false;
-    }
-
-    fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
+impl Follow {
+    /// The partner's place if it is known, or where to look for it.
+    pub fn decide(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
         // A sighting that led nowhere is 60 frames old by then.
         let partner = context.memory.companion(context.briefing, Relation::Partner);
         let is_fresh = partner.is_some_and(|p| p.frame + 60 > context.memory.frame);
@@ -25,6 +22,16 @@ impl Policy for Follow {
             return Plan::FollowPartner;
         }
         if std::mem::replace(&mut self.was_around, true) { Plan::Explore } else { Plan::TurnAround }
+    }
+}
+
+impl Policy for Follow {
+    fn reset(&mut self, _: &Briefing) {
+        self.was_around = false;
+    }
+
+    fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
+        Ok(self.decide(context, valid))
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, _: bool) -> bool {

@@ -1,8 +1,8 @@
 //! Any valid plan, all equally likely.
 
-use chaic_protocol::Briefing;
 use chaic_protocol::briefing::Relation;
 use chaic_protocol::rng::Stream;
+use chaic_protocol::{AgentError, Briefing};
 
 use crate::decision::{Context, Plan, Policy};
 use crate::rules::RandomDraw;
@@ -24,16 +24,21 @@ impl Policy for Random {
         self.rng = Stream::new(briefing.seed, "random policy", 0);
     }
 
-    fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
+    fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
+        Ok(self.decide(context, valid))
+    }
+}
+
+impl Random {
+    /// A plan drawn from the valid ones.
+    pub fn decide(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
         let drawn = match context.memory.rules.random_draw {
             RandomDraw::Plans => self.rng.choose(valid).copied(),
             RandomDraw::KindsFirst => self.choose_kind(context, valid),
         };
         drawn.unwrap_or(Plan::Explore)
     }
-}
 
-impl Random {
     /// Draws a kind of plan, then a plan of that kind.
     fn choose_kind(&mut self, context: &Context<'_>, valid: &[Plan]) -> Option<Plan> {
         let mut kinds: Vec<Plan> = Vec::new();
@@ -89,7 +94,7 @@ mod tests {
             };
             let mut random = Random::default();
             let n = (0..1200)
-                .filter(|_| matches!(random.choose(&context, &valid), Plan::PickUp(_)))
+                .filter(|_| matches!(random.decide(&context, &valid), Plan::PickUp(_)))
                 .count();
             // Standard deviation 15.
             assert!(n.abs_diff(expected) < 75, "{n}, expected about {expected}");

@@ -2,7 +2,7 @@
 
 use chaic_protocol::briefing::{Goal, Relation};
 use chaic_protocol::geom::horizontal_distance;
-use chaic_protocol::{Action, Briefing, ClassId, FailureReason, Frame, Outcome, Role};
+use chaic_protocol::{Action, AgentError, Briefing, ClassId, FailureReason, Frame, Outcome, Role};
 
 use crate::decision::{Context, Load, Plan, Policy, Subject};
 use crate::memory::{Memory, Person};
@@ -99,6 +99,52 @@ pub struct Rules {
 }
 
 impl Rules {
+    /// The plan that the rules choose.
+    pub fn decide(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
+        self.last_choice = context.memory.frame;
+        let rules = context.memory.rules;
+        if !std::mem::replace(&mut self.has_looked_around, true) && rules.looks_around_first {
+            return Plan::TurnAround;
+        }
+        let load = Load::of(&context.memory.hands, context.briefing);
+        let need = Need::of(context, &load, &self.profile);
+        let is_valid = |plan: Plan| valid.contains(&plan).then_some(plan);
+        // Delivering needs a goal place: without one, look for it.
+        let deliver = is_valid(Plan::Deliver).unwrap_or(Plan::Explore);
+        let carries = load.to_deliver.is_some();
+        if let Some(plan) = self.mind_child(context) {
+            return plan;
+        }
+        if let Some(plan) = is_valid(Plan::PutIn) {
+            return plan;
+        }
+        if carries && (!load.can_take_target || must_go(context, &self.profile)) {
+            return deliver;
+        }
+        if self.profile.removes_obstacles
+            && let Some(plan) = valid.iter().find(|p| matches!(p, Plan::RemoveObstacle(_)))
+        {
+            return *plan;
+        }
+        let left = part_left(context);
+        if left > self.profile.container_above
+            && need.n_left() >= rules.min_for_container
+            && let Some(plan) = valid.iter().find(|p| matches!(p, Plan::PickContainer(_)))
+        {
+            return *plan;
+        }
+        if let Some(plan) = self.to_lift_together(context, valid) {
+            return plan;
+        }
+        if let Some(subject) = self.targets(context, valid, &need).first() {
+            return Plan::PickUp(*subject);
+        }
+        if carries && rules.delivers_when_done && (need.is_nothing_left() || context.is_explored) {
+            return deliver;
+        }
+        Plan::Explore
+    }
+
     /// Rules of this profile.
     pub fn new(profile: RuleProfile) -> Rules {
         Rules {
@@ -202,49 +248,8 @@ impl Policy for Rules {
         *self = Rules::new(self.profile);
     }
 
-    fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
-        self.last_choice = context.memory.frame;
-        let rules = context.memory.rules;
-        if !std::mem::replace(&mut self.has_looked_around, true) && rules.looks_around_first {
-            return Plan::TurnAround;
-        }
-        let load = Load::of(&context.memory.hands, context.briefing);
-        let need = Need::of(context, &load, &self.profile);
-        let is_valid = |plan: Plan| valid.contains(&plan).then_some(plan);
-        // Delivering needs a goal place: without one, look for it.
-        let deliver = is_valid(Plan::Deliver).unwrap_or(Plan::Explore);
-        let carries = load.to_deliver.is_some();
-        if let Some(plan) = self.mind_child(context) {
-            return plan;
-        }
-        if let Some(plan) = is_valid(Plan::PutIn) {
-            return plan;
-        }
-        if carries && (!load.can_take_target || must_go(context, &self.profile)) {
-            return deliver;
-        }
-        if self.profile.removes_obstacles
-            && let Some(plan) = valid.iter().find(|p| matches!(p, Plan::RemoveObstacle(_)))
-        {
-            return *plan;
-        }
-        let left = part_left(context);
-        if left > self.profile.container_above
-            && need.n_left() >= rules.min_for_container
-            && let Some(plan) = valid.iter().find(|p| matches!(p, Plan::PickContainer(_)))
-        {
-            return *plan;
-        }
-        if let Some(plan) = self.to_lift_together(context, valid) {
-            return plan;
-        }
-        if let Some(subject) = self.targets(context, valid, &need).first() {
-            return Plan::PickUp(*subject);
-        }
-        if carries && rules.delivers_when_done && (need.is_nothing_left() || context.is_explored) {
-            return deliver;
-        }
-        Plan::Explore
+    fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
+        Ok(self.decide(context, valid))
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, is_news: bool) -> bool {

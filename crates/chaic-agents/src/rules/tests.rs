@@ -70,8 +70,8 @@ impl Situated {
     /// The second choice of somebody of this profile.
     fn choose_as(&self, profile: RuleProfile) -> Plan {
         self.ask_of(&mut Rules::new(profile), |rules, context| {
-            rules.choose(context, &self.valid);
-            rules.choose(context, &self.valid)
+            rules.decide(context, &self.valid);
+            rules.decide(context, &self.valid)
         })
     }
 
@@ -115,7 +115,7 @@ impl Situated {
 fn looking_around_first() {
     for (looks_around_first, expected) in [(true, Plan::TurnAround), (false, Plan::Explore)] {
         let s = Situated::new(PlannerRules { looks_around_first, ..PAPER });
-        assert_eq!(s.ask(|rules, context| rules.choose(context, &s.valid)), expected);
+        assert_eq!(s.ask(|rules, context| rules.decide(context, &s.valid)), expected);
     }
 }
 

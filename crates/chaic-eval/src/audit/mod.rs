@@ -262,7 +262,7 @@ impl Side {
         let world = self.env.world();
         self.log().overhear(world);
         let next = world.state().frame + 1;
-        self.env.advance(Some(next));
+        self.env.advance(Some(next))?;
         Ok(())
     }
 

@@ -2,7 +2,7 @@
 
 use chaic_protocol::observation::Senses;
 use chaic_protocol::rng::Stream;
-use chaic_protocol::{Action, Agent, Briefing, EntityId, Hand, Observation, Target};
+use chaic_protocol::{Action, Agent, AgentError, Briefing, EntityId, Hand, Observation, Target};
 
 /// Names of entities beyond any that an episode has, to be tried too.
 const BEYOND: usize = 20;
@@ -50,10 +50,10 @@ impl Agent for Prober {
         self.stream = Stream::new(briefing.seed, "prober", 0);
     }
 
-    fn act(&mut self, observation: &Observation) -> Action {
+    fn act(&mut self, observation: &Observation) -> Result<Action, AgentError> {
         let target = self.target(observation.camera.width);
         let hand = Hand::BOTH[self.stream.below(2)];
-        match self.stream.below(12) {
+        Ok(match self.stream.below(12) {
             0..=3 => Action::MoveForward,
             4 => Action::TurnLeft,
             5 => Action::TurnRight,
@@ -62,6 +62,6 @@ impl Agent for Prober {
             10 => Action::RemoveObstacle { obstacle: target, hand },
             _ if self.stream.chance(0.5) => Action::PutIn,
             _ => Action::Wait { frames: 1 + self.stream.below(20) as u32 },
-        }
+        })
     }
 }

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use chaic_protocol::observation::{Observation, Senses};
 use chaic_protocol::{
-    Action, Agent, AgentId, Briefing, ClassId, EntityId, FailureReason, Outcome, Target,
+    Action, Agent, AgentError, AgentId, Briefing, ClassId, EntityId, FailureReason, Outcome, Target,
 };
 use chaic_world::World;
 
@@ -120,10 +120,10 @@ impl Agent for Spy {
         self.mind.reset(briefing);
     }
 
-    fn act(&mut self, observation: &Observation) -> Action {
+    fn act(&mut self, observation: &Observation) -> Result<Action, AgentError> {
         let observation = self.log().leaking(observation.clone());
-        let action = self.mind.act(&observation);
+        let action = self.mind.act(&observation)?;
         self.log().seen.push_back(Seen { observation, action });
-        action
+        Ok(action)
     }
 }

@@ -10,7 +10,7 @@ use chaic_env::minds::Helper;
 use chaic_env::{Digest, EnvError};
 use chaic_episodes::Episode;
 use chaic_protocol::observation::{Grants, Senses};
-use chaic_protocol::{Action, Agent, Briefing, Observation, TaskId};
+use chaic_protocol::{Action, Agent, AgentError, Briefing, Observation, TaskId};
 
 use super::*;
 use crate::error::EvalError;
@@ -34,20 +34,29 @@ impl Agent for Turner {
 
     fn reset(&mut self, _: &Briefing) {}
 
-    fn act(&mut self, _: &Observation) -> Action {
+    fn act(&mut self, _: &Observation) -> std::result::Result<Action, AgentError> {
         self.turns += 1;
-        match self.turns % 3 {
+        Ok(match self.turns % 3 {
             0 => Action::PutIn,
             1 => Action::TurnLeft,
             _ => Action::PickUp {
                 object: chaic_protocol::Target::Entity(chaic_protocol::EntityId(9999)),
                 hand: chaic_protocol::Hand::Left,
             },
-        }
+        })
     }
 }
 
-struct Breaker;
+/// How a mind ends at frame 30.
+#[derive(Clone, Copy)]
+enum Breaks {
+    Never,
+    ByPanic,
+    BySayingSo,
+    Halts,
+}
+
+struct Breaker(Breaks);
 
 impl Agent for Breaker {
     fn senses(&self) -> Senses {
@@ -56,9 +65,14 @@ impl Agent for Breaker {
 
     fn reset(&mut self, _: &Briefing) {}
 
-    fn act(&mut self, observation: &Observation) -> Action {
-        assert!(observation.frame < 30, "out of ideas");
-        Action::Wait { frames: 10 }
+    fn act(&mut self, observation: &Observation) -> std::result::Result<Action, AgentError> {
+        match self.0 {
+            _ if observation.frame < 30 => Ok(Action::Wait { frames: 10 }),
+            Breaks::Never => Ok(Action::Wait { frames: 10 }),
+            Breaks::ByPanic => panic!("out of ideas"),
+            Breaks::BySayingSo => Err(AgentError::Broken("out of ideas".to_owned())),
+            Breaks::Halts => Err(AgentError::Halted("nobody answers".to_owned())),
+        }
     }
 }
 
@@ -67,13 +81,13 @@ struct TestHelpers {
     made: AtomicUsize,
     stop_after: usize,
     stop: AtomicBool,
-    breaks: bool,
+    breaks: Breaks,
 }
 
 impl TestHelpers {
     fn new() -> TestHelpers {
         let (made, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
-        TestHelpers { made, stop_after: usize::MAX, stop, breaks: true }
+        TestHelpers { made, stop_after: usize::MAX, stop, breaks: Breaks::ByPanic }
     }
 }
 
@@ -87,8 +101,8 @@ impl Helpers for TestHelpers {
             self.stop.store(true, Ordering::SeqCst);
         }
         let mind: Box<dyn Agent> = match name {
-            "breaker" if self.breaks => Box::new(Breaker),
-            "turner" | "breaker" => Box::new(Turner { turns: 0 }),
+            "breaker" => Box::new(Breaker(self.breaks)),
+            "turner" => Box::new(Turner { turns: 0 }),
             _ => return None,
         };
         Some(Helper { mind, grants: Grants::NONE })
@@ -183,26 +197,46 @@ fn the_number_of_workers_and_an_interruption_change_nothing() {
 
 #[test]
 fn a_helper_that_breaks_down_costs_its_episode_only() {
+    for breaks in [Breaks::ByPanic, Breaks::BySayingSo] {
+        let files = episode_files(&[TaskId::MovingHouse], 1);
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("run");
+        let helpers = TestHelpers { breaks, ..TestHelpers::new() };
+        let given = given(&files, &["breaker", "none"]);
+        let (mut run, _) = Run::open(&path, Access::Begin, &given, &helpers).unwrap();
+        assert!(play(&mut run, 1, &helpers));
+        assert_eq!(run.extent(), Extent { total: 4, finished: 4, errors: 2 });
+        let is_broken = |r: &&RunResult| matches!(r.ending, Ending::Error { .. });
+        for broken in run.results().iter().filter(is_broken) {
+            assert_eq!(broken.key.helper, "breaker");
+            let Ending::Error { message } = &broken.ending else { unreachable!() };
+            assert_eq!(message, "the episode broke down: out of ideas");
+            assert!(!run.folder().trace(&broken.key).exists());
+        }
+        drop(run);
+        // A repaired helper gets its episodes again.
+        let repaired = TestHelpers { breaks: Breaks::Never, ..TestHelpers::new() };
+        let (mut run, _) = Run::open(&path, Access::Resume, &Given::default(), &repaired).unwrap();
+        assert!(play(&mut run, 1, &repaired));
+        assert_eq!(run.extent(), Extent { total: 4, finished: 4, errors: 0 });
+    }
+}
+
+#[test]
+fn a_helper_that_halts_stops_the_run_which_goes_on_later() {
     let files = episode_files(&[TaskId::MovingHouse], 1);
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("run");
-    let helpers = TestHelpers::new();
+    let helpers = TestHelpers { breaks: Breaks::Halts, ..TestHelpers::new() };
     let given = given(&files, &["breaker", "none"]);
     let (mut run, _) = Run::open(&path, Access::Begin, &given, &helpers).unwrap();
-    assert!(play(&mut run, 1, &helpers));
-    assert_eq!(run.extent(), Extent { total: 4, finished: 4, errors: 2 });
-    let is_broken = |r: &&RunResult| matches!(&r.ending, Ending::Error { .. });
-    for broken in run.results().iter().filter(is_broken) {
-        assert_eq!(broken.key.helper, "breaker");
-        let Ending::Error { message } = &broken.ending else { unreachable!() };
-        assert_eq!(message, "the episode broke down: out of ideas");
-        assert!(!run.folder().trace(&broken.key).exists());
-    }
+    let halted = run.play(1, &helpers, &helpers.stop, &mut |_| ());
+    assert_eq!(halted.unwrap_err().to_string(), "nobody answers");
+    assert_eq!(run.extent().errors, 0, "nothing counts as zero");
     drop(run);
-    // A repaired helper gets its episodes again.
-    let repaired = TestHelpers { breaks: false, ..TestHelpers::new() };
-    let (mut run, _) = Run::open(&path, Access::Resume, &Given::default(), &repaired).unwrap();
-    assert!(play(&mut run, 1, &repaired));
+    let answered = TestHelpers { breaks: Breaks::Never, ..TestHelpers::new() };
+    let (mut run, _) = Run::open(&path, Access::Resume, &Given::default(), &answered).unwrap();
+    assert!(play(&mut run, 1, &answered));
     assert_eq!(run.extent(), Extent { total: 4, finished: 4, errors: 0 });
 }
 

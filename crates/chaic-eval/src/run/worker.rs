@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use chaic_env::minds::{self, Helpers};
 use chaic_env::trace::Record;
 use chaic_env::{Env, EpisodeConfig, Minds, RunKey};
-use chaic_protocol::Frame;
+use chaic_protocol::{AgentError, Frame};
 
 use crate::error::{EvalError, Result};
 use crate::metrics::{Ending, RunResult, Tally};
@@ -133,6 +133,10 @@ impl Crew<'_> {
         outcome.map(|()| to_go.is_empty())
     }
 
+    fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
     /// Whether a mind of this episode run waits for somebody else's computer.
     pub fn waits(&self, key: &RunKey) -> bool {
         let partner = self.options.partner.as_deref();
@@ -147,7 +151,7 @@ impl Crew<'_> {
         sender: &Sender<News>,
     ) {
         loop {
-            if self.stop.load(Ordering::Relaxed) || failed.load(Ordering::Relaxed) {
+            if self.is_stopped() || failed.load(Ordering::Relaxed) {
                 return;
             }
             let Some(item) = next() else { return };
@@ -174,17 +178,20 @@ impl Crew<'_> {
     pub fn play_one(&self, key: &RunKey, at: &mut dyn FnMut(Frame)) -> Result<Option<RunResult>> {
         let mut writer = None;
         let played = catch_unwind(AssertUnwindSafe(|| self.play_to_end(key, &mut writer, at)));
-        let result = match played {
-            Ok(result) => result?,
-            Err(panic) => {
-                let message = format!("the episode broke down: {}", text_of(panic.as_ref()));
-                let ending = Ending::Error { message };
-                if let Some(writer) = writer.take() {
-                    writer.discard();
-                }
-                return Ok(Some(RunResult { key: key.clone(), ending }));
-            }
+        let (result, broken) = match played {
+            // Who halts because the run stops says nothing new.
+            Ok(Err(EvalError::Agent(AgentError::Halted(_)))) if self.is_stopped() => (None, None),
+            Ok(Err(EvalError::Agent(AgentError::Broken(text)))) => (None, Some(text)),
+            Ok(result) => (result?, None),
+            Err(panic) => (None, Some(text_of(panic.as_ref()).to_owned())),
         };
+        if let Some(text) = broken {
+            let ending = Ending::Error { message: format!("the episode broke down: {text}") };
+            if let Some(writer) = writer.take() {
+                writer.discard();
+            }
+            return Ok(Some(RunResult { key: key.clone(), ending }));
+        }
         match (&result, writer) {
             (Some(_), Some(writer)) => writer.finish()?,
             (None, Some(writer)) => writer.discard(),

@@ -31,7 +31,7 @@ fn choose(profile: RuleProfile, case: &Case, log: &BehaviorLog) -> Plan {
         Context { briefing: &briefing, memory: &memory, behavior: log, is_explored: false };
     let mut rules = Rules::new(profile);
     rules.has_looked_around = true;
-    rules.choose(&context, &case.valid)
+    rules.decide(&context, &case.valid)
 }
 
 #[test]

@@ -111,7 +111,7 @@ fn a_child_that_one_stood_beside_is_trusted_to_come_back_or_not() {
         let mut rhp = Rules::new(RuleProfile::RHP);
         let chosen = [100, 140].map(|frame| {
             see_both(&mut s, frame);
-            s.ask_of(&mut rhp, |rules, context| rules.choose(context, &s.valid))
+            s.ask_of(&mut rhp, |rules, context| rules.decide(context, &s.valid))
         });
         assert_eq!(chosen, [Plan::FollowChild, expected]);
     }

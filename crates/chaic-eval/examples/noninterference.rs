@@ -80,7 +80,7 @@ fn main() -> ExitCode {
                         eprintln!("{finding}");
                         findings.lock().unwrap_or_else(|e| e.into_inner()).push(finding);
                     }
-                    if (k + 1) % 500 == 0 {
+                    if (k + 1).is_multiple_of(500) {
                         eprintln!("{} of {n} pairs", k + 1);
                     }
                 }

@@ -48,7 +48,7 @@ impl Glimpse {
 }
 
 impl Observer {
-    /// Observer for a world with these shapes.
+    /// The eyes for a world with these shapes.
     pub fn new(scene: Arc<Scene>) -> Observer {
         Observer { scene }
     }

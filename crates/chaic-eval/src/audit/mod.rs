@@ -39,6 +39,7 @@ const FELT_M: f32 = 4.5;
 
 /// What differs, if it is neither seen nor felt.
 const GRANTED: &str = "what is granted";
+const TIME: &str = "the time";
 
 /// What the partner does while it is watched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -117,7 +118,7 @@ pub fn compare(pair: &Pair<'_>, make: &dyn Fn() -> Helper, leak: Option<Leak>) -
         if let Some(what) = difference(&a, &b) {
             let (x, y) = (&a.observation, &b.observation);
             let is_caused = |worlds: &[World; 2]| {
-                is_visible_or_felt(worlds, what) || worlds.iter().any(is_called_to_lift)
+                is_visible_or_felt(worlds, what) || is_called_to_lift(worlds, what)
             };
             let is_fair = is_stated(pair, what, x, y) || told_in.as_ref().is_some_and(is_caused);
             let frame = x.frame.min(y.frame);
@@ -144,7 +145,7 @@ fn difference(a: &Seen, b: &Seen) -> Option<&'static str> {
     let (x, y) = (&a.observation, &b.observation);
     let checks = [
         ("an image", x.images == y.images),
-        ("the time", x.frame == y.frame),
+        (TIME, x.frame == y.frame),
         ("the outcome of the own action", x.own.last == y.own.last),
         ("the own state", x.own == y.own),
         ("the camera", x.camera == y.camera),
@@ -181,17 +182,20 @@ fn is_visible_or_felt([a, b]: &[World; 2], what: &str) -> bool {
     differing(a, b).any(|(at, half_m)| horizontal_distance(at, here) < FELT_M + half_m)
 }
 
-/// Whether the partner may have called the helper to a piece of furniture that both chose last, where
-/// rules have it so: the helper finds itself going there, however far away the partner is.
-fn is_called_to_lift(world: &World) -> bool {
-    let chose = |agent: AgentId| {
-        let person = &world.state().people[agent.index()];
-        let last = person.activity.as_ref().map(|a| a.action).or(person.last.map(|l| l.0));
-        last.filter(|action| matches!(action, Action::PickUp { .. }))?.subject()
+/// Whether the own action took another time since, in one of the two worlds alone, the partner chose
+/// the piece of furniture that the helper chose last: where rules have it so, the helper finds itself
+/// going there, however far away the partner is.
+fn is_called_to_lift([a, b]: &[World; 2], what: &str) -> bool {
+    let is_called = |world: &World| {
+        let chose = |agent: AgentId| {
+            let person = &world.state().people[agent.index()];
+            let last = person.activity.as_ref().map(|a| a.action).or(person.last.map(|l| l.0));
+            last.filter(|action| matches!(action, Action::PickUp { .. }))?.subject()
+        };
+        let calls = world.rules().joint_lift == JointLift::LastChoice;
+        calls && chose(AgentId::HELPER).is_some_and(|o| chose(AgentId::PARTNER) == Some(o))
     };
-    world.rules().joint_lift == JointLift::LastChoice
-        && chose(AgentId::HELPER).is_some()
-        && chose(AgentId::HELPER) == chose(AgentId::PARTNER)
+    what == TIME && is_called(a) != is_called(b)
 }
 
 /// Where two worlds of one episode differ in what stands or moves, with half the length of it.

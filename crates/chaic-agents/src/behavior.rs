@@ -59,6 +59,9 @@ pub trait BehaviorModel: Send {
 
     /// What is known so far.
     fn log(&self) -> &BehaviorLog;
+
+    /// A copy that goes on as this one would.
+    fn fork(&self) -> Box<dyn BehaviorModel>;
 }
 
 /// Reads what was granted, and nothing else; silent without a grant.
@@ -114,6 +117,10 @@ impl BehaviorModel for GroundTruthBehavior {
 
     fn log(&self) -> &BehaviorLog {
         &self.log
+    }
+
+    fn fork(&self) -> Box<dyn BehaviorModel> {
+        Box::new(self.clone())
     }
 }
 
@@ -190,6 +197,10 @@ impl BehaviorModel for SeenBehavior {
 
     fn log(&self) -> &BehaviorLog {
         &self.log
+    }
+
+    fn fork(&self) -> Box<dyn BehaviorModel> {
+        Box::new(self.clone())
     }
 }
 

@@ -57,13 +57,13 @@ enum Mood {
 }
 
 /// The child's mind. It knows where everybody is.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Child {
     rules: PlannerRules,
     episode: Option<Episode>,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Episode {
     briefing: Briefing,
     memory: Memory,
@@ -269,6 +269,10 @@ impl Agent for Child {
             Mood::RunAway(_) => ChildState::RunAway,
             Mood::GotoGuardian => ChildState::GotoGuardian,
         })
+    }
+
+    fn fork(&self) -> Option<Box<dyn Agent>> {
+        Some(Box::new(self.clone()))
     }
 }
 

@@ -160,7 +160,7 @@ pub struct Context<'a> {
 }
 
 /// Chooses among valid plans.
-pub trait Policy: Send {
+pub trait Policy: Send + 'static {
     /// Begins an episode.
     fn reset(&mut self, briefing: &Briefing);
 
@@ -196,6 +196,14 @@ pub trait Policy: Send {
     /// What it counted in this episode, by name.
     fn counts(&self) -> BTreeMap<String, u64> {
         BTreeMap::new()
+    }
+
+    /// A copy that goes on as this one would; `None` if it can't be copied.
+    fn fork(&self) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        None
     }
 }
 

@@ -39,6 +39,7 @@ pub struct Mind<P: Policy> {
 }
 
 /// What lasts for one episode.
+#[derive(Clone)]
 struct Episode {
     briefing: Briefing,
     memory: Memory,
@@ -274,6 +275,17 @@ impl<P: Policy> Agent for Mind<P> {
 
     fn counts(&self) -> BTreeMap<String, u64> {
         self.policy.counts()
+    }
+
+    fn fork(&self) -> Option<Box<dyn Agent>> {
+        Some(Box::new(Mind {
+            perception: self.perception.fork(),
+            behavior: self.behavior.fork(),
+            policy: self.policy.fork()?,
+            senses: self.senses,
+            rules: self.rules,
+            episode: self.episode.clone(),
+        }))
     }
 }
 

@@ -72,6 +72,9 @@ pub trait Perception: Send {
     fn points(&self) -> bool {
         false
     }
+
+    /// A copy that goes on as this one would.
+    fn fork(&self) -> Box<dyn Perception>;
 }
 
 /// Perfect segmentation, classification and association; needs [`Grants::ids`].
@@ -89,7 +92,7 @@ pub struct Pointing<P> {
     last: Vec<(TrackId, [u32; 2])>,
 }
 
-impl<P: Perception> Perception for Pointing<P> {
+impl<P: Perception + Clone + 'static> Perception for Pointing<P> {
     fn perceive(&mut self, observation: &Observation) -> Percepts {
         let percepts = self.inner.perceive(observation);
         self.last = percepts.detections.iter().map(|d| (d.track, d.pixel)).collect();
@@ -103,6 +106,10 @@ impl<P: Perception> Perception for Pointing<P> {
 
     fn points(&self) -> bool {
         true
+    }
+
+    fn fork(&self) -> Box<dyn Perception> {
+        Box::new(self.clone())
     }
 }
 
@@ -378,6 +385,10 @@ impl Perception for GroundTruthIds {
 
     fn target(&self, track: TrackId) -> Option<Target> {
         u16::try_from(track.0).ok().map(|e| Target::Entity(EntityId(e)))
+    }
+
+    fn fork(&self) -> Box<dyn Perception> {
+        Box::new(self.clone())
     }
 }
 

@@ -5,16 +5,18 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use chaic_protocol::agent::{ChildState, Thought};
-use chaic_protocol::{Action, AgentError, AgentId, Briefing, Frame, Observation};
-use chaic_render::Scene;
+use chaic_protocol::{Action, AgentError, AgentId, Briefing, Frame, Observation, Target};
+use chaic_render::{ImagesMut, Scene};
 use chaic_world::{Setup, World};
 
 use crate::config::EpisodeConfig;
+use crate::digest::Digest;
 use crate::error::{EnvError, Result};
-use crate::observer::{Glimpse, Observer};
+use crate::observer::{Glimpse, Observer, resolve_unseen};
+use crate::reward::{RewardTerms, Standing};
 use crate::run_loop::{Choice, run_loop};
 use crate::seat::{Driver, Minds, Seat, seats};
-use crate::trace::{Header, Record};
+use crate::trace::{End, Header, Record};
 
 /// The choices of those who wait; `None` if not all have chosen.
 type Decided<E> = std::result::Result<Option<Vec<Choice>>, E>;
@@ -40,6 +42,15 @@ pub struct Env {
     turns: Vec<Turn>,
 }
 
+/// All of an episode as it stood, minds included; see [`Env::snapshot`]. It lives in memory only: minds
+/// are no data. What can be kept on a disk is the world's [`Snapshot`](chaic_world::Snapshot).
+pub struct EnvSnapshot {
+    world: World,
+    seats: Vec<Seat>,
+    turns: Vec<Turn>,
+    header: Header,
+}
+
 /// Which seats the caller filled; all others are for the rule-based minds of an episode.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Filled {
@@ -47,13 +58,31 @@ enum Filled {
     All,
 }
 
-/// What an agent whose action has ended perceives, until all have chosen.
-#[derive(Default)]
+/// The turn of an agent whose action has ended, until all who wait have chosen.
+#[derive(Clone, Default)]
 struct Turn {
+    /// Whether it has begun.
+    is_open: bool,
+    /// What the agent perceives, once it has looked.
     glimpse: Option<Glimpse>,
     choice: Option<Choice>,
     /// What it last said of itself.
     said: Said,
+    /// How things stood when the agent last chose, for callers.
+    before: Option<Standing>,
+    /// Memory for the ids of its next image.
+    spare_ids: Vec<u16>,
+}
+
+impl Turn {
+    /// Ends the turn with the agent's choice.
+    fn close(&mut self) -> Option<Choice> {
+        self.is_open = false;
+        if let Some(ids) = self.glimpse.take().and_then(|glimpse| glimpse.hidden_ids) {
+            self.spare_ids = ids;
+        }
+        self.choice.take()
+    }
 }
 
 /// What a mind says of itself.
@@ -149,6 +178,17 @@ impl Env {
             .collect()
     }
 
+    /// Everybody's seats, by agent.
+    pub fn seats(&self) -> &[Seat] {
+        &self.seats
+    }
+
+    /// The agents whose seats the caller drives.
+    pub(crate) fn callers(&self) -> impl Iterator<Item = AgentId> + '_ {
+        let seats = self.seats.iter().enumerate();
+        seats.filter(|(_, seat)| seat.mind().is_none()).map(|(k, _)| AgentId(k as u8))
+    }
+
     /// What the agent in this seat is told at the beginning.
     pub fn briefing(&self, agent: AgentId) -> Briefing {
         let grants = self.seats[agent.index()].grants;
@@ -159,28 +199,109 @@ impl Env {
     pub fn waiting(&self) -> impl Iterator<Item = AgentId> + '_ {
         let turns = self.turns.iter().enumerate();
         turns
-            .filter(|(_, turn)| turn.glimpse.is_some() && turn.choice.is_none())
+            .filter(|(_, turn)| turn.is_open && turn.choice.is_none())
             .map(|(k, _)| AgentId(k as u8))
     }
 
-    /// What an agent that is [waiting](Env::waiting) perceives.
-    pub fn observation(&self, agent: AgentId) -> Option<&Observation> {
-        let turn = self.turns.get(agent.index())?;
+    /// What an agent that is [waiting](Env::waiting) perceives; `None` for anybody else. Images are
+    /// made at the first call of a turn.
+    pub fn observe(&mut self, agent: AgentId) -> Option<&Observation> {
+        if !self.is_waiting(agent) {
+            return None;
+        }
+        let turn = &mut self.turns[agent.index()];
+        if turn.glimpse.is_none() {
+            let looking = [(agent, &self.seats[agent.index()])];
+            turn.glimpse = self.observer.observe(&self.world, &looking).pop();
+        }
         turn.glimpse.as_ref().map(|glimpse| &glimpse.observation)
+    }
+
+    /// The same with the images in buffers of the caller's, in place of the observation's own.
+    pub(crate) fn observe_into(&mut self, agent: AgentId, images: ImagesMut<'_>) {
+        let turn = &mut self.turns[agent.index()];
+        let ids = std::mem::take(&mut turn.spare_ids);
+        let who = (agent, &self.seats[agent.index()]);
+        turn.glimpse = Some(self.observer.observe_into(&self.world, who, images, ids));
+    }
+
+    /// What an agent perceived that is waiting and has looked.
+    pub(crate) fn observed(&self, agent: AgentId) -> Option<&Observation> {
+        let glimpse = self.turns[agent.index()].glimpse.as_ref();
+        glimpse.filter(|_| self.is_waiting(agent)).map(|glimpse| &glimpse.observation)
+    }
+
+    pub(crate) fn is_waiting(&self, agent: AgentId) -> bool {
+        self.waiting().any(|a| a == agent)
     }
 
     /// The caller's choice for an agent that is [waiting](Env::waiting); it acts once all have
     /// chosen. Returns false, and changes nothing, if the agent isn't waiting.
     pub fn submit(&mut self, agent: AgentId, action: Action) -> bool {
-        if !self.waiting().any(|a| a == agent) {
+        let points = matches!(action.subject(), Some(Target::Pixel { .. }));
+        if !self.is_waiting(agent) || (points && self.observe(agent).is_none()) {
             return false;
         }
         let turn = &mut self.turns[agent.index()];
-        let Some(glimpse) = &turn.glimpse else { return false };
-        let resolved = glimpse.resolve(action);
-        self.seats[agent.index()].submitted = Some((action, resolved));
+        let seat = &mut self.seats[agent.index()];
+        let resolved = match &turn.glimpse {
+            Some(glimpse) => glimpse.resolve(action),
+            None => resolve_unseen(seat, action),
+        };
+        seat.submitted = Some((action, resolved));
         turn.choice = Some(Choice { agent, action: resolved, thought: None, child: None });
+        turn.before = Some(Standing::of(&self.world, agent));
         true
+    }
+
+    /// What has come of the action that the caller last chose for an agent, until now: the terms of
+    /// a reward. `None` before the first choice.
+    pub fn reward(&self, agent: AgentId) -> Option<RewardTerms> {
+        let before = self.turns.get(agent.index())?.before.as_ref()?;
+        Some(RewardTerms::between(before, &self.world, agent))
+    }
+
+    /// How the episode would be scored if it ended now.
+    pub fn score(&self) -> End {
+        End::of(&self.world)
+    }
+
+    /// A number that differs between different states of the world, and is the same for equal ones.
+    pub fn digest(&self) -> Digest {
+        Digest(self.world.digest())
+    }
+
+    /// All of the episode as it stands, minds included, to go on from later or more than once.
+    ///
+    /// # Errors
+    /// [`EnvError::NoFork`] if a mind can't be copied: one that lives in another process, or asks a
+    /// language model.
+    pub fn snapshot(&self) -> Result<EnvSnapshot> {
+        Ok(EnvSnapshot {
+            world: self.world.clone(),
+            seats: fork(&self.seats)?,
+            turns: self.turns.clone(),
+            header: self.header.clone(),
+        })
+    }
+
+    /// Goes back (or on) to a snapshot of the same episode. What follows is what followed then,
+    /// where the same is chosen.
+    ///
+    /// # Errors
+    /// [`EnvError::OtherSnapshot`] if the snapshot is of another episode, seed, rules or minds. The
+    /// environment is as it was then.
+    pub fn restore(&mut self, snapshot: &EnvSnapshot) -> Result<()> {
+        if snapshot.header != self.header {
+            return Err(EnvError::OtherSnapshot {
+                id: self.header.episode.clone(),
+                of: snapshot.header.episode.clone(),
+            });
+        }
+        self.seats = fork(&snapshot.seats)?;
+        self.world = snapshot.world.clone();
+        self.turns.clone_from(&snapshot.turns);
+        Ok(())
     }
 
     /// Plays on without keeping records: until a choice of the caller's is needed or the episode
@@ -212,26 +333,25 @@ impl Env {
                 return Ok(None);
             }
             let fresh: Vec<_> =
-                waiting.iter().filter(|a| turns[a.index()].glimpse.is_none()).copied().collect();
+                waiting.iter().filter(|a| !turns[a.index()].is_open).copied().collect();
+            let minds: Vec<_> =
+                fresh.iter().filter(|a| seats[a.index()].mind().is_some()).copied().collect();
             let glimpses = {
-                let looking: Vec<_> = fresh.iter().map(|a| (*a, &seats[a.index()])).collect();
+                let looking: Vec<_> = minds.iter().map(|a| (*a, &seats[a.index()])).collect();
                 observer.observe(world, &looking)
             };
-            for (agent, glimpse) in fresh.into_iter().zip(glimpses) {
+            for (agent, glimpse) in minds.into_iter().zip(glimpses) {
                 let turn = &mut turns[agent.index()];
                 turn.choice = choose(&mut seats[agent.index()], agent, &glimpse, &mut turn.said)?;
-                turn.glimpse = Some(glimpse);
+            }
+            for agent in fresh {
+                turns[agent.index()].is_open = true;
             }
             if waiting.iter().any(|a| turns[a.index()].choice.is_none()) {
                 flow = Flow::Waits;
                 return Ok(None);
             }
-            let mut take = |agent: &AgentId| {
-                let turn = &mut turns[agent.index()];
-                turn.glimpse = None;
-                turn.choice.take()
-            };
-            Ok(Some(waiting.iter().filter_map(&mut take).collect()))
+            Ok(Some(waiting.iter().filter_map(|a| turns[a.index()].close()).collect()))
         };
         let has_ended = run_loop(world, &mut decide, sink)?;
         Ok(if has_ended { Flow::Ended } else { flow })
@@ -242,6 +362,14 @@ fn check_seats(config: &EpisodeConfig<'_>, setup: &Setup, seats: usize) -> Resul
     let people = setup.people.len();
     let id = || config.episode.id().to_owned();
     if people == seats { Ok(()) } else { Err(EnvError::Seats { id: id(), people, seats }) }
+}
+
+fn fork(seats: &[Seat]) -> Result<Vec<Seat>> {
+    let fork = |(k, seat): (usize, &Seat)| {
+        let agent = AgentId(k as u8);
+        seat.fork().ok_or(EnvError::NoFork { agent })
+    };
+    seats.iter().enumerate().map(fork).collect()
 }
 
 /// What the mind of a seat chooses; `None` if the caller drives it.

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use chaic_protocol::Frame;
+use chaic_protocol::{AgentId, Frame};
 use chaic_world::SetupError;
 
 /// The result of anything in this crate.
@@ -28,6 +28,33 @@ pub enum EnvError {
         people: usize,
         /// How many seats there are.
         seats: usize,
+    },
+    /// A mind can't be copied.
+    #[error("the mind of the {agent} can't be copied, so that there is no snapshot of the episode")]
+    NoFork {
+        /// Whose mind.
+        agent: AgentId,
+    },
+    /// A snapshot is of another episode, or of other minds, rules or seeds.
+    #[error("a snapshot of {of} doesn't fit {id} with these minds, rules and seed")]
+    OtherSnapshot {
+        /// The episode under way.
+        id: String,
+        /// The episode of the snapshot.
+        of: String,
+    },
+    /// Environments can't be stepped together.
+    #[error("{0}")]
+    Batch(String),
+    /// A buffer for images has another length than its images.
+    #[error("the buffer for {image} has {found} numbers, it needs {expected}")]
+    Buffer {
+        /// Which image.
+        image: &'static str,
+        /// How many numbers it has.
+        found: usize,
+        /// How many it needs.
+        expected: usize,
     },
     /// A trace was played on another episode.
     #[error(

@@ -8,6 +8,44 @@
 //! a [`Playback`] shows a trace frame by frame.
 //! [`minds`] says where minds come from by name, [`rules`] by which rules they and the world go.
 //!
+//! An [`EnvBatch`] is many of them at once.
+//!
+//! A learner that drives the helper itself, beside the rule-based partner of the task:
+//!
+//! ```
+//! use chaic_env::rules::RuleSet;
+//! use chaic_env::{Appearance, Env, EpisodeConfig, Flow, Minds, RewardWeights, Seat};
+//! use chaic_protocol::observation::{Grants, Senses};
+//! use chaic_protocol::{Action, AgentId};
+//!
+//! let episode = chaic_episodes::find_episode("low_target/train/00")?;
+//! let config = EpisodeConfig {
+//!     episode: &episode,
+//!     seed: 0,
+//!     rules: RuleSet::PAPER,
+//!     helper: "learner",
+//!     partner: None,
+//!     image_size: Some(64),
+//!     appearance: Appearance::Canonical,
+//! };
+//! let senses = Senses { image_size: 64, rgb: true, depth: true, ids: false };
+//! let helper = Some(Seat::of_caller(Grants::NONE, senses));
+//! let mut env = Env::new(config, Minds { helper, partner: None })?;
+//! let briefing = env.briefing(AgentId::HELPER);
+//! assert!(briefing.goal.is_none(), "nobody tells a helper what the partner wants");
+//!
+//! while env.advance(Some(90))? == Flow::Waits {
+//!     let reward = env.reward(AgentId::HELPER).map(|terms| terms.weigh(&RewardWeights::STANDARD));
+//!     let seen = env.observe(AgentId::HELPER).expect("it waits");
+//!     assert_eq!(seen.images.rgb.as_ref().map(Vec::len), Some(3 * 64 * 64));
+//!     // A policy would decide by `seen`, and learn by `reward`.
+//!     assert!(reward.is_none_or(|r| r < 10.0));
+//!     env.submit(AgentId::HELPER, Action::TurnLeft);
+//! }
+//! println!("{} of {} delivered", env.score().done, env.score().total);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! **What it is not**: it knows no files, scores of many episodes, plots or video, and it decides
 //! for nobody.
 //!
@@ -18,6 +56,7 @@
 //!   often the loop was stopped and gone on with.
 //! - All who wait in one frame choose before any of them acts.
 
+mod batch;
 mod config;
 mod digest;
 mod env;
@@ -26,19 +65,22 @@ mod key;
 pub mod minds;
 mod observer;
 mod playback;
+mod reward;
 pub mod rules;
 mod run_loop;
 mod seat;
 pub mod trace;
 
-pub use chaic_render::Appearance;
+pub use batch::{EnvBatch, ImageLayout, Slot};
+pub use chaic_render::{Appearance, ImagesMut};
 pub use config::{EpisodeConfig, header_of, world_of};
 pub use digest::Digest;
-pub use env::{Env, Flow};
+pub use env::{Env, EnvSnapshot, Flow};
 pub use error::{EnvError, Result};
 pub use key::{RunKey, slug};
 pub use observer::{Glimpse, Observer};
 pub use playback::Playback;
+pub use reward::{RewardTerms, RewardWeights};
 pub use run_loop::{Choice, Decide, run_loop};
 pub use seat::{Driver, Idle, Minds, Seat, seats, world_seed};
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use chaic_protocol::observation::{Images, Observation, Senses};
 use chaic_protocol::{Action, AgentId, EntityId, ResolvedAction, Target};
-use chaic_render::{Channels, Scene, View};
+use chaic_render::{Channels, ImagesMut, Scene, View};
 use chaic_world::World;
 
 use crate::seat::Seat;
@@ -22,7 +22,7 @@ pub struct Glimpse {
     pub observation: Observation,
     /// Instance ids of its image, u16, shape [height, width], where the agent itself isn't given
     /// them; they resolve the pixels that it points at.
-    hidden_ids: Option<Vec<u16>>,
+    pub(crate) hidden_ids: Option<Vec<u16>>,
     may_name_entities: bool,
 }
 
@@ -30,11 +30,7 @@ impl Glimpse {
     /// The action with its target resolved to what the pixel shows, or to the entity where ids are
     /// granted; anything else names [`EntityId::NOTHING`].
     pub fn resolve(&self, action: Action) -> ResolvedAction {
-        action.map(|target| match target {
-            Target::Entity(entity) if self.may_name_entities => entity,
-            Target::Entity(_) => EntityId::NOTHING,
-            Target::Pixel { column, row } => self.at_pixel(column, row),
-        })
+        resolve(action, self.may_name_entities, |column, row| self.at_pixel(column, row))
     }
 
     fn at_pixel(&self, column: u32, row: u32) -> EntityId {
@@ -45,6 +41,23 @@ impl Glimpse {
         let shown = ids.filter(|_| is_inside).and_then(|ids| ids.get(index()));
         shown.map_or(EntityId::NOTHING, |id| EntityId(*id))
     }
+}
+
+/// The action of an agent that has not looked: it can point at nothing.
+pub(crate) fn resolve_unseen(seat: &Seat, action: Action) -> ResolvedAction {
+    resolve(action, seat.grants.ids, |_, _| EntityId::NOTHING)
+}
+
+fn resolve(
+    action: Action,
+    may_name_entities: bool,
+    at_pixel: impl Fn(u32, u32) -> EntityId,
+) -> ResolvedAction {
+    action.map(|target| match target {
+        Target::Entity(entity) if may_name_entities => entity,
+        Target::Entity(_) => EntityId::NOTHING,
+        Target::Pixel { column, row } => at_pixel(column, row),
+    })
 }
 
 impl Observer {
@@ -61,14 +74,9 @@ impl Observer {
     /// What these agents perceive now: images are made for all of them at once, and only those
     /// that are wanted.
     pub fn observe(&self, world: &World, who: &[(AgentId, &Seat)]) -> Vec<Glimpse> {
-        let looking: Vec<_> = who.iter().filter(|(_, a)| a.senses.wants_image()).collect();
-        let view = |(agent, seat): &&(AgentId, &Seat)| {
-            let camera = world.eye(*agent, seat.senses.image_size);
-            // Ids are always made: they resolve what is pointed at, and tell what is in view.
-            let channels = Channels { ids: true, ..Channels::from(seat.senses) };
-            View::of_eye(*agent, camera, channels)
-        };
-        let views: Vec<View> = looking.iter().map(view).collect();
+        let looking = who.iter().filter(|(_, a)| a.senses.wants_image());
+        let views: Vec<View> =
+            looking.map(|(agent, seat)| view_of(world, *agent, seat.senses)).collect();
         let mut images = match views[..] {
             [] => Vec::new(),
             _ => self.scene.render(world, &views),
@@ -82,20 +90,63 @@ impl Observer {
             })
             .collect()
     }
+
+    /// What one agent perceives now, with the images in buffers of the caller's instead of the
+    /// observation. `ids` are taken to keep the ids in, which resolve what the agent points at.
+    pub(crate) fn observe_into(
+        &self,
+        world: &World,
+        (agent, seat): (AgentId, &Seat),
+        images: ImagesMut<'_>,
+        mut ids: Vec<u16>,
+    ) -> Glimpse {
+        let view = view_of(world, agent, seat.senses);
+        let ImagesMut { rgb, depth_m, ids: ids_out } = images;
+        if seat.senses.wants_image() {
+            ids.resize(view.camera.width as usize * view.camera.height as usize, 0);
+            let images = ImagesMut { rgb, depth_m, ids: Some(&mut ids) };
+            self.scene.render_view_into(world, &view, images);
+        }
+        if let Some(out) = ids_out {
+            out.copy_from_slice(&ids);
+        }
+        let in_view = present(&ids);
+        Glimpse {
+            observation: observation(world, agent, seat, &in_view, Images::default()),
+            hidden_ids: Some(ids),
+            may_name_entities: seat.grants.ids,
+        }
+    }
+}
+
+/// The camera of an agent's eye. Ids are always made: they resolve what is pointed at, and tell what
+/// is in view.
+fn view_of(world: &World, agent: AgentId, senses: Senses) -> View {
+    let camera = world.eye(agent, senses.image_size);
+    View::of_eye(agent, camera, Channels { ids: true, ..Channels::from(senses) })
 }
 
 fn glimpse(world: &World, agent: AgentId, seat: &Seat, mut images: Images) -> Glimpse {
-    let Seat { grants, senses, .. } = *seat;
     let in_view = images.ids.as_deref().map_or(Vec::new(), present);
-    let hidden_ids = strip(&mut images, senses, grants.ids);
-    let observation = Observation {
+    let hidden_ids = strip(&mut images, seat.senses, seat.grants.ids);
+    let observation = observation(world, agent, seat, &in_view, images);
+    Glimpse { observation, hidden_ids, may_name_entities: seat.grants.ids }
+}
+
+fn observation(
+    world: &World,
+    agent: AgentId,
+    seat: &Seat,
+    in_view: &[EntityId],
+    images: Images,
+) -> Observation {
+    Observation {
         frame: world.state().frame,
-        own: world.own_state(agent, grants, last_action(world, agent, seat)),
-        camera: world.eye(agent, senses.image_size),
+        own: world.own_state(agent, seat.grants, last_action(world, agent, seat)),
+        camera: world.eye(agent, seat.senses.image_size),
         images,
-        granted: world.granted(agent, grants, &in_view),
-    };
-    Glimpse { observation, hidden_ids, may_name_entities: grants.ids }
+        granted: world.granted(agent, seat.grants, in_view),
+    }
 }
 
 /// The last action of an agent with its outcome, in the agent's own words.

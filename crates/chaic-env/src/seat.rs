@@ -39,6 +39,15 @@ impl Seat {
         Seat { driver: Driver::Caller, grants, senses, submitted: None }
     }
 
+    /// A copy that goes on as this one would; `None` if its mind can't be copied.
+    pub(crate) fn fork(&self) -> Option<Seat> {
+        let driver = match &self.driver {
+            Driver::Mind(mind) => Driver::Mind(mind.fork()?),
+            Driver::Caller => Driver::Caller,
+        };
+        Some(Seat { driver, ..*self })
+    }
+
     /// Briefs a mind and asks what it wants to perceive.
     pub(crate) fn begin(&mut self, agent: AgentId, world: &World, image_size: Option<u32>) {
         self.submitted = None;
@@ -119,6 +128,10 @@ impl Agent for Idle {
 
     fn act(&mut self, _: &Observation) -> Result<Action, AgentError> {
         Ok(Action::Wait { frames: 100 })
+    }
+
+    fn fork(&self) -> Option<Box<dyn Agent>> {
+        Some(Box::new(*self))
     }
 }
 

@@ -8,10 +8,12 @@ use chaic_agents::PlannerRules;
 use chaic_env::minds::{BuiltIn, Helper, Helpers as _};
 use chaic_env::rules::RuleSet;
 use chaic_env::trace::Record;
-use chaic_env::{Appearance, Env, EnvError, EpisodeConfig, Flow, Idle, Minds, Seat};
+use chaic_env::{
+    Appearance, Env, EnvError, EpisodeConfig, Flow, Idle, Minds, RewardTerms, RewardWeights, Seat,
+};
 use chaic_episodes::{Episode, find_episode};
-use chaic_protocol::observation::Grants;
-use chaic_protocol::{Action, AgentError, AgentId, TaskId};
+use chaic_protocol::observation::{Grants, Senses};
+use chaic_protocol::{Action, Agent, AgentError, AgentId, Briefing, Observation, TaskId};
 
 /// Frames that are played.
 const UNTIL: u32 = 700;
@@ -79,7 +81,7 @@ fn a_mind_that_the_caller_asks_does_as_one_that_sits_inside() {
         let mut records = Vec::new();
         while run(&mut env, UNTIL, &mut records) == Flow::Waits {
             assert_eq!(env.waiting().collect::<Vec<_>>(), [AgentId::HELPER]);
-            let seen = env.observation(AgentId::HELPER).expect("it waits");
+            let seen = env.observe(AgentId::HELPER).expect("it waits");
             let action = mind.act(seen).expect("rules decide");
             assert!(!env.submit(AgentId::PARTNER, action), "a mind sits there");
             assert!(env.submit(AgentId::HELPER, action));
@@ -133,6 +135,99 @@ fn a_choice_of_nobody_who_waits_is_refused() {
     let mut env = Env::new(config(&episode), None).unwrap();
     assert_eq!(env.waiting().count(), 0);
     for agent in [AgentId::PARTNER, AgentId::HELPER, AgentId(200)] {
-        assert!(!env.submit(agent, Action::TurnLeft) && env.observation(agent).is_none());
+        assert!(!env.submit(agent, Action::TurnLeft) && env.observe(agent).is_none());
     }
+}
+
+#[test]
+fn what_follows_a_snapshot_follows_it_again() {
+    for task in [TaskId::Obstacle, TaskId::Shopping, TaskId::MovingHouse] {
+        let episode = of_task(task);
+        let mut env = Env::new(config(&episode), Some(rhp())).unwrap();
+        run(&mut env, 300, &mut Vec::new());
+        let snapshot = env.snapshot().expect("rule-based minds can be copied");
+        let begin = env.digest();
+        let once = played(&mut env);
+        assert_ne!(env.digest(), begin);
+        for _ in 0..2 {
+            env.restore(&snapshot).unwrap();
+            assert_eq!(env.digest(), begin);
+            assert_eq!(played(&mut env), once, "{task}");
+        }
+        let other = of_task(TaskId::NoConstraint);
+        let mut other = Env::new(config(&other), Some(rhp())).unwrap();
+        let before = other.digest();
+        assert!(matches!(other.restore(&snapshot), Err(EnvError::OtherSnapshot { .. })));
+        assert_eq!(other.digest(), before);
+    }
+}
+
+/// A mind that can't be copied.
+struct Single;
+
+impl Agent for Single {
+    fn senses(&self) -> Senses {
+        Senses::NONE
+    }
+
+    fn reset(&mut self, _: &Briefing) {}
+
+    fn act(&mut self, _: &Observation) -> Result<Action, AgentError> {
+        Ok(Action::TurnLeft)
+    }
+}
+
+#[test]
+fn a_mind_that_can_t_be_copied_allows_no_snapshot() {
+    let episode = of_task(TaskId::Obstacle);
+    let single = Helper { mind: Box::new(Single), grants: Grants::NONE };
+    let env = Env::new(config(&episode), Some(single)).unwrap();
+    let refused = env.snapshot().map(|_| ());
+    assert!(matches!(refused, Err(EnvError::NoFork { agent: AgentId::HELPER })));
+}
+
+#[test]
+fn deliveries_approaches_and_failures_are_rewarded_as_they_come() {
+    let episode = of_task(TaskId::NoConstraint);
+    let Helper { mut mind, grants } = BuiltIn.make("oracle", PlannerRules::paper()).unwrap();
+    let seat = Seat::of_caller(grants, Senses { image_size: 128, ..Senses::DEPTH_AND_IDS });
+    let minds = Minds { helper: Some(seat), partner: None };
+    let whole = EpisodeConfig { image_size: Some(128), ..config(&episode) };
+    let mut env = Env::new(whole, minds).unwrap();
+    mind.reset(&env.briefing(AgentId::HELPER));
+    assert_eq!(env.reward(AgentId::HELPER), None, "nothing has been chosen");
+    let (mut delivered, mut towards_m, mut n_failed) = (0.0, 0.0, 0);
+    let here = |env: &Env| env.world().state().people[AgentId::HELPER.index()].pose.position;
+    let mut before = here(&env);
+    while env.advance(None) == Ok(Flow::Waits) {
+        if let Some(terms) = env.reward(AgentId::HELPER) {
+            delivered += terms.delivered;
+            towards_m += terms.approached_m.max(0.0);
+            // Whatever the others took or dropped: one comes nearer by one's own way alone, and by
+            // the length of an arm, to and fro, where one takes something.
+            let walked_m = f64::from(here(&env).distance(before)) + 0.01;
+            let action = env.world().last_action(AgentId::HELPER).map(|(action, _)| action);
+            let arm_m = if action.is_some_and(|a| a.is_locomotion()) { 0.0 } else { 4.0 };
+            assert!(terms.approached_m.abs() <= walked_m + arm_m, "{terms:?}: {walked_m} m");
+            n_failed += u32::from(terms.is_invalid);
+            let outcome = env.world().last_action(AgentId::HELPER).map(|(_, outcome)| outcome);
+            assert_eq!(terms.is_invalid, outcome.is_some_and(|o| !o.is_success()));
+        }
+        let seen = env.observe(AgentId::HELPER).expect("it waits");
+        // One vain action, to see that it is told.
+        let action = match seen.frame {
+            0 => Action::PutIn,
+            _ => mind.act(seen).expect("rules decide"),
+        };
+        before = here(&env);
+        assert!(env.submit(AgentId::HELPER, action));
+    }
+    let end = env.score();
+    let missed = env.reward(AgentId::HELPER).expect("it acted").delivered;
+    assert!(end.done > 0.0 && n_failed >= 1);
+    assert!((delivered + missed - end.done / end.total).abs() < 1e-9, "{delivered} {missed}");
+    assert!(towards_m > 10.0, "{towards_m} m towards targets and goal");
+    let terms = RewardTerms { delivered: 0.2, approached_m: 2.0, is_invalid: true };
+    let reward = terms.weigh(&RewardWeights::STANDARD);
+    assert!((reward - 2.0).abs() < 1e-9, "0.2 * 10 + 2 * 0.05 - 0.1 is not {reward}");
 }

@@ -75,4 +75,10 @@ pub trait Agent: Send {
     fn counts(&self) -> BTreeMap<String, u64> {
         BTreeMap::new()
     }
+
+    /// A copy that goes on as this one would, for snapshots of an episode; `None` if it can't be
+    /// copied, like a mind in another process.
+    fn fork(&self) -> Option<Box<dyn Agent>> {
+        None
+    }
 }

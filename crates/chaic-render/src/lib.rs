@@ -79,4 +79,4 @@ pub use labels::{Labels, depth_mm};
 pub use lens::Lens;
 pub use scene::{Looks, Scene, render_batch};
 pub use solids::LEVEL_RADIUS_PX;
-pub use view::{Channels, MAX_SIDE_PX, View, with_each_width};
+pub use view::{Channels, ImagesMut, MAX_SIDE_PX, View, with_each_width};

@@ -18,7 +18,7 @@ use crate::mesh::Mesh;
 use crate::people::Body;
 use crate::regions::{RegionSet, Regions};
 use crate::structure;
-use crate::view::{View, look};
+use crate::view::{ImagesMut, View, look, look_into};
 
 /// Everything of an episode that is drawn and never changes: floors, walls, ceilings, and the
 /// shapes of things. Cheap to make; cameras share it.
@@ -51,6 +51,14 @@ pub fn render_batch(batch: &[Looks], images: &mut Vec<Vec<Images>>) {
     images.resize_with(batch.len(), Vec::new);
     let pairs = batch.par_iter().zip(images.par_iter_mut());
     pairs.for_each(|(looks, images)| looks.scene.render_into(looks.world, looks.views, images));
+}
+
+fn postures(world: &World) -> Vec<Posture> {
+    world.setup().agents().map(|agent| world.posture(agent)).collect()
+}
+
+fn bodies(postures: &[Posture], state: &State) -> Vec<Body> {
+    postures.iter().map(|p| Body::new(p, state.frame)).collect()
 }
 
 impl Scene {
@@ -92,9 +100,19 @@ impl Scene {
 
     /// The same into images that are there already: their memory is used again.
     pub fn render_into(&self, world: &World, views: &[View], images: &mut Vec<Images>) {
-        let agents = world.setup().agents();
-        let postures: Vec<Posture> = agents.map(|agent| world.posture(agent)).collect();
-        self.render_state_into(world.state(), &postures, views, images);
+        self.render_state_into(world.state(), &postures(world), views, images);
+    }
+
+    /// What one camera sees of a world, into buffers of the caller's. Which images are made depends
+    /// on which buffers are there, not on the view's channels.
+    ///
+    /// # Panics
+    /// If a buffer has another length than the camera's images.
+    pub fn render_view_into(&self, world: &World, view: &View, images: ImagesMut<'_>) {
+        let bodies = bodies(&postures(world), world.state());
+        let frame = self.frame(world.state(), &bodies, images.rgb.is_some());
+        look_into(&frame, view, images);
+        self.give_back(frame.light);
     }
 
     /// What cameras see of a state and postures that come from elsewhere: a recording, a test.
@@ -114,7 +132,7 @@ impl Scene {
     ) {
         images.resize_with(views.len(), Images::default);
         let wants_color = views.iter().any(|v| v.channels.rgb);
-        let bodies: Vec<Body> = postures.iter().map(|p| Body::new(p, state.frame)).collect();
+        let bodies = bodies(postures, state);
         let frame = self.frame(state, &bodies, wants_color);
         if let ([view], [images]) = (views, &mut images[..]) {
             look(&frame, view, images);

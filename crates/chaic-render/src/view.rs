@@ -106,6 +106,26 @@ fn widths() -> Vec<(&'static str, pulp::Arch)> {
     widths
 }
 
+/// Buffers for the images of one view, all of them the caller's. Those that are absent aren't made.
+#[derive(Debug, Default)]
+pub struct ImagesMut<'a> {
+    /// RGB, shape [height, width, 3], as in [`Images::rgb`].
+    pub rgb: Option<&'a mut [u8]>,
+    /// Depth in metres, shape [height, width], as in [`Images::depth_m`].
+    pub depth_m: Option<&'a mut [f32]>,
+    /// Instance ids, shape [height, width], as in [`Images::ids`].
+    pub ids: Option<&'a mut [u16]>,
+}
+
+impl ImagesMut<'_> {
+    /// Whether each buffer is as long as a camera of `n` pixels needs.
+    fn fits(&self, n: usize) -> bool {
+        self.rgb.as_ref().is_none_or(|b| b.len() == 3 * n)
+            && self.depth_m.as_ref().is_none_or(|b| b.len() == n)
+            && self.ids.as_ref().is_none_or(|b| b.len() == n)
+    }
+}
+
 /// Draws one view, into images whose memory is used again.
 pub(crate) fn look(frame: &Frame, view: &View, images: &mut Images) {
     let Camera { width, height, .. } = view.camera;
@@ -115,30 +135,39 @@ pub(crate) fn look(frame: &Frame, view: &View, images: &mut Images) {
     }
     let n = width as usize * height as usize;
     let Channels { rgb, depth, ids } = view.channels;
-    let lens = Lens::of(&view.camera).filter(|_| n > 0);
-    let Some(lens) = lens else {
-        *images = Images {
-            rgb: rgb.then(|| vec![0; 3 * n]),
-            depth_m: depth.then(|| vec![Camera::FAR_M; n]),
-            ids: ids.then(|| vec![EntityId::NOTHING.0; n]),
-        };
+    let images = ImagesMut {
+        rgb: sized(&mut images.rgb, rgb, 3 * n),
+        depth_m: sized(&mut images.depth_m, depth, n),
+        ids: sized(&mut images.ids, ids, n),
+    };
+    look_into(frame, view, images);
+}
+
+/// Draws one view into buffers of the caller's; which images are made depends on which are there.
+///
+/// # Panics
+/// If a buffer has another length than the camera's images.
+pub(crate) fn look_into(frame: &Frame, view: &View, images: ImagesMut<'_>) {
+    let n = view.camera.width as usize * view.camera.height as usize;
+    assert!(images.fits(n), "buffers of another length than the {n} pixels of the view");
+    let ImagesMut { rgb, depth_m, ids } = images;
+    let Some(lens) = Lens::of(&view.camera).filter(|_| n > 0) else {
+        rgb.into_iter().for_each(|b| b.fill(0));
+        depth_m.into_iter().for_each(|b| b.fill(Camera::FAR_M));
+        ids.into_iter().for_each(|b| b.fill(EntityId::NOTHING.0));
         return;
     };
-    let Images { rgb: rgb_out, depth_m, ids: ids_out } = images;
-    let rgb_out = sized(rgb_out, rgb, 3 * n);
-    let depth_m = sized(depth_m, depth, n);
-    let ids_out = sized(ids_out, ids, n);
     with_scratch(|scratch| {
         let omit = view.omit();
         let Scratch { target, plain, work, canvas } = scratch;
-        if let Some(rgb) = rgb_out {
+        if let Some(rgb) = rgb {
             draw(frame, &lens, omit, target, work);
-            let wanted = Wanted { rgb, depth_m, ids: ids_out };
+            let wanted = Wanted { rgb, depth_m, ids };
             shade(frame, &lens, &Drawn::of(work), target, canvas, wanted);
             return;
         }
         draw(frame, &lens, omit, plain, work);
-        work.arch.dispatch(ReadBack { target: plain, depth_m, ids: ids_out });
+        work.arch.dispatch(ReadBack { target: plain, depth_m, ids });
     });
 }
 

@@ -15,8 +15,8 @@ use chaic_protocol::{AgentId, TaskId};
 use clap::{Args, Parser, Subcommand};
 
 pub use self::bench::{
-    BenchCommand, BenchFormat, LookedAt, RenderBenchArguments, SceneBenchArguments, SceneCommand,
-    SceneName, WorldBenchArguments,
+    BenchCommand, BenchFormat, EnvBenchArguments, LookedAt, RenderBenchArguments,
+    SceneBenchArguments, SceneCommand, SceneName, WorldBenchArguments,
 };
 pub use self::fidelity::FidelityArguments;
 

@@ -38,4 +38,8 @@ impl Policy for Follow {
         let person = context.memory.companion(context.briefing, Relation::Partner);
         *current != Plan::FollowPartner && person.is_some_and(|p| p.is_in_view)
     }
+
+    fn fork(&self) -> Option<Follow> {
+        Some(self.clone())
+    }
 }

@@ -27,6 +27,10 @@ impl Policy for Random {
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
         Ok(self.decide(context, valid))
     }
+
+    fn fork(&self) -> Option<Random> {
+        Some(self.clone())
+    }
 }
 
 impl Random {

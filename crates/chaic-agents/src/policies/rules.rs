@@ -268,6 +268,10 @@ impl Policy for Rules {
             || self.child_calls(context)
             || context.memory.frame >= self.last_choice + rules.time.reconsider_frames
     }
+
+    fn fork(&self) -> Option<Rules> {
+        Some(self.clone())
+    }
 }
 
 impl Rules {

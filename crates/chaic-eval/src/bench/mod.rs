@@ -1,5 +1,6 @@
 //! How fast this machine draws and steps. Nothing measured here reaches a trace or a score.
 
+mod env;
 mod machine;
 mod render;
 mod scene;
@@ -7,6 +8,7 @@ mod world;
 
 use std::time::{Duration, Instant};
 
+pub use env::{EnvBench, EnvSpeed};
 pub use machine::Machine;
 pub use render::{RenderBench, RenderSpeed, channels_named};
 pub use scene::{BenchScene, N_VIEWS};

@@ -110,7 +110,7 @@ impl RenderBench<'_> {
     }
 }
 
-fn name_of(channels: Channels) -> String {
+pub(super) fn name_of(channels: Channels) -> String {
     let all = [("rgb", channels.rgb), ("depth", channels.depth), ("ids", channels.ids)];
     let names: Vec<&str> = all.into_iter().filter(|(_, on)| *on).map(|(name, _)| name).collect();
     names.join("+")

@@ -51,6 +51,9 @@ pub enum BenchCommand {
     Render(RenderBenchArguments),
     /// Measure how fast this machine steps worlds; people act at random and nothing is drawn.
     World(WorldBenchArguments),
+    /// Measure how fast this machine steps many environments side by side: worlds, rule-based partners
+    /// and what random helpers see.
+    Env(EnvBenchArguments),
     /// Write what the render bench looks at, for other renderers: scene.glb, cameras.json, chaic.png.
     Scene(SceneBenchArguments),
 }
@@ -100,6 +103,28 @@ pub struct WorldBenchArguments {
     /// Tasks, separated by commas, or `all`: the first test episode of each.
     #[arg(long, value_name = "NAMES", value_parser = tasks, default_value = "all")]
     pub task: Tasks,
+    #[command(flatten)]
+    pub measuring: Measuring,
+}
+
+/// `chaic bench env`.
+#[derive(Args, Debug)]
+pub struct EnvBenchArguments {
+    /// Tasks, separated by commas, or `all`: their bundled training episodes, by turns.
+    #[arg(long, value_name = "NAMES", value_parser = tasks, default_value = "all")]
+    pub task: Tasks,
+    /// How many environments are stepped together.
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..=8192))]
+    pub envs: u16,
+    /// Side of everybody's images, pixels.
+    #[arg(long, value_name = "PIXELS", default_value_t = 128, value_parser = clap::value_parser!(u32).range(16..=1024))]
+    pub size: u32,
+    /// What the helpers look at: rgb, depth and ids, joined by +.
+    #[arg(long, value_name = "NAMES", default_value = "rgb+depth", value_parser = channels_named)]
+    pub channels: Channels,
+    /// Threads.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: u16,
     #[command(flatten)]
     pub measuring: Measuring,
 }

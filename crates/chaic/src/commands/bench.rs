@@ -2,15 +2,16 @@
 
 use anyhow::Result;
 use chaic_eval::bench::{
-    BenchScene, Machine, N_VIEWS, RenderBench, RenderSpeed, WorldSpeed, measure_world,
+    BenchScene, EnvBench, EnvSpeed, Machine, N_VIEWS, RenderBench, RenderSpeed, WorldSpeed,
+    measure_world,
 };
 use chaic_eval::scene_file::Written;
 use comfy_table::{ContentArrangement, Table, presets};
 
 use super::bars;
 use crate::arguments::{
-    BenchCommand, BenchFormat, LookedAt, RenderBenchArguments, SceneBenchArguments, SceneName,
-    WorldBenchArguments,
+    BenchCommand, BenchFormat, EnvBenchArguments, LookedAt, RenderBenchArguments,
+    SceneBenchArguments, SceneName, WorldBenchArguments,
 };
 use crate::exit::Ended;
 use crate::output::{complain, say};
@@ -20,6 +21,7 @@ pub fn run(command: &BenchCommand) -> Result<Ended> {
     match command {
         BenchCommand::Render(arguments) => render(arguments),
         BenchCommand::World(arguments) => world(arguments),
+        BenchCommand::Env(arguments) => env(arguments),
         BenchCommand::Scene(arguments) => scene(arguments),
     }
 }
@@ -100,6 +102,38 @@ fn world_text(speeds: &[WorldSpeed]) -> String {
     }
     let machine = speeds.first().map_or(String::new(), |s| machine_text(&s.machine));
     table.trim_fmt() + "\n" + &machine
+}
+
+fn env(arguments: &EnvBenchArguments) -> Result<Ended> {
+    warn_of_slow_build();
+    let bench = EnvBench {
+        tasks: arguments.task.0.clone(),
+        envs: usize::from(arguments.envs),
+        size: arguments.size,
+        channels: arguments.channels,
+        threads: usize::from(arguments.threads),
+        seconds: arguments.measuring.seconds,
+    };
+    let bar = bars::plain(100, "% of the time");
+    let speed = bench.measure(&mut |part| bar.set_position((100.0 * part) as u64));
+    bar.finish_and_clear();
+    let speed = speed?;
+    match arguments.measuring.format {
+        BenchFormat::Json => say(&(serde_json::to_string_pretty(&speed)? + "\n"))?,
+        BenchFormat::Text => say(&env_text(&speed))?,
+    }
+    Ok(Ended::Well)
+}
+
+fn env_text(speed: &EnvSpeed) -> String {
+    let EnvSpeed { envs, size, channels, threads, episodes, .. } = speed;
+    let (steps, frames) = (speed.steps_per_second, speed.frames_per_second);
+    let threads = crate::output::counted(*threads, "thread");
+    format!(
+        "{envs} environments, {channels}, {size} x {size}, {threads}: {steps:.0} decisions of the \
+         helpers a second, {frames:.0} frames a second; {episodes} episodes ended\n{}",
+        machine_text(&speed.machine)
+    )
 }
 
 fn scene(arguments: &SceneBenchArguments) -> Result<Ended> {

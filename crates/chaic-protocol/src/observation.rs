@@ -83,6 +83,46 @@ impl Grants {
     pub const PARTNER: Grants = Grants { goal: true, ..Grants::PLANNER };
     /// What the paper's oracle has.
     pub const ORACLE: Grants = Grants { progress: true, behavior: true, ..Grants::PARTNER };
+    /// Every grant by its name, in the order of docs/grants.md, and whether it is given.
+    pub fn named(&self) -> [(&'static str, bool); 7] {
+        [
+            ("ids", self.ids),
+            ("goal_place", self.goal_place),
+            ("goal", self.goal),
+            ("progress", self.progress),
+            ("behavior", self.behavior),
+            ("positions", self.positions),
+            ("task", self.task),
+        ]
+    }
+
+    /// The grants of these names.
+    ///
+    /// # Errors
+    /// The first name that is no grant's.
+    ///
+    /// ```
+    /// use chaic_protocol::observation::Grants;
+    /// assert_eq!(Grants::of_names(["goal_place", "ids"]), Ok(Grants::PLANNER));
+    /// assert_eq!(Grants::of_names(["gold"]), Err("gold".to_owned()));
+    /// ```
+    pub fn of_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Grants, String> {
+        let mut grants = Grants::NONE;
+        for name in names {
+            *match name {
+                "ids" => &mut grants.ids,
+                "goal_place" => &mut grants.goal_place,
+                "goal" => &mut grants.goal,
+                "progress" => &mut grants.progress,
+                "behavior" => &mut grants.behavior,
+                "positions" => &mut grants.positions,
+                "task" => &mut grants.task,
+                other => return Err(other.to_owned()),
+            } = true;
+        }
+        Ok(grants)
+    }
+
     /// What the child has.
     pub const CHILD: Grants = Grants { positions: true, ..Grants::IDS };
 }
@@ -172,7 +212,7 @@ pub struct SeenAction {
 }
 
 /// What was granted beyond the own image and state; every field is empty without its grant.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Granted {
     /// `ids`: the class of each object and person in the own image, in the order of ids. Structure
     /// has none.

@@ -1,6 +1,7 @@
 //! What can be said on the command line.
 
 mod bench;
+mod exec;
 mod fidelity;
 
 use std::ops::Range;
@@ -17,6 +18,9 @@ use clap::{Args, Parser, Subcommand};
 pub use self::bench::{
     BenchCommand, BenchFormat, EnvBenchArguments, LookedAt, RenderBenchArguments,
     SceneBenchArguments, SceneCommand, SceneName, WorldBenchArguments,
+};
+pub use self::exec::{
+    ExecArguments, HelperArgument, HelperCheckArguments, HelperCommand, HelperServeArguments,
 };
 pub use self::fidelity::FidelityArguments;
 
@@ -37,7 +41,7 @@ pub struct Arguments {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Play a benchmark; without options a small, complete one of about two minutes.
-    Eval(EvalArguments),
+    Eval(Box<EvalArguments>),
     /// Print the scores of a run, computed anew from its results or traces.
     Report(ReportArguments),
     /// Play the recorded actions of a run again, count its results and compare its report; exit code
@@ -61,6 +65,10 @@ pub enum Command {
     /// Turn episodes from elsewhere into episode files.
     #[command(subcommand)]
     Import(ImportCommand),
+    /// Helpers in other processes: try whether one keeps to the protocol, or be one;
+    /// docs/subprocess-helpers.md.
+    #[command(subcommand)]
+    Helper(HelperCommand),
     /// Language helpers: prompts, records, endpoints; docs/language-helpers.md.
     #[command(subcommand)]
     Llm(LlmCommand),
@@ -96,9 +104,10 @@ pub struct EvalArguments {
     /// Tasks, separated by commas, or `all`.
     #[arg(long, value_name = "NAMES", value_parser = tasks)]
     pub task: Option<Tasks>,
-    /// Helpers, separated by commas: none, random, rhp, oracle, follow; llm, llm-told, vlm, vlm-told.
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
-    pub helper: Option<Vec<String>>,
+    /// Helpers, separated by commas: none, random, rhp, oracle, follow; llm, llm-told, vlm, vlm-told. Or
+    /// one in another process, exec:COMMAND or NAME=exec:COMMAND. May be given often.
+    #[arg(long, value_name = "NAMES", value_parser = exec::helper)]
+    pub helper: Option<Vec<HelperArgument>>,
     /// Episodes: test, train, standard, gen:A..B or gen-standard:A..B.
     #[arg(long)]
     pub split: Option<Split>,
@@ -131,6 +140,8 @@ pub struct EvalArguments {
     #[arg(long, value_name = "LOOK")]
     pub appearance: Option<Appearance>,
     #[command(flatten)]
+    pub exec: ExecArguments,
+    #[command(flatten)]
     pub language: LanguageArguments,
     /// The run's folder. Usual: the next free `runs/NAME`.
     #[arg(long, value_name = "DIR")]
@@ -141,6 +152,23 @@ pub struct EvalArguments {
     /// Keep results only: little room, but nothing to verify or to replay.
     #[arg(long)]
     pub no_traces: bool,
+}
+
+impl EvalArguments {
+    /// The names of the helpers that were given.
+    pub fn helper_names(&self) -> Option<Vec<String>> {
+        let given = self.helper.as_ref()?;
+        Some(given.iter().flat_map(HelperArgument::names).collect())
+    }
+
+    /// The helpers in other processes.
+    pub fn commands(&self) -> Vec<chaic_subprocess::Command> {
+        let command = |argument: &HelperArgument| match argument {
+            HelperArgument::Names(_) => None,
+            HelperArgument::Exec { name, line } => Some(self.exec.command(name, line)),
+        };
+        self.helper.iter().flatten().filter_map(command).collect()
+    }
 }
 
 /// Whom language helpers ask.

@@ -6,6 +6,7 @@ use chaic_env::EnvError;
 use chaic_episodes::SplitError;
 use chaic_eval::EvalError;
 use chaic_llm::error::LlmError;
+use chaic_subprocess::Refusal;
 
 /// As intended.
 pub const OK: u8 = 0;
@@ -43,12 +44,14 @@ pub fn of(error: &anyhow::Error) -> ExitCode {
         Some(EvalError::Env(inner)) => Some(inner),
         _ => error.downcast_ref(),
     };
-    let of_llm = match of_env {
-        Some(EnvError::Minds(inner)) => inner.downcast_ref(),
-        _ => error.downcast_ref(),
+    let of_minds = match of_env {
+        Some(EnvError::Minds(inner)) => Some(inner),
+        _ => None,
     };
+    let of_llm = of_minds.map_or_else(|| error.downcast_ref(), |inner| inner.downcast_ref());
     let is_usage = of_env.is_some_and(EnvError::is_usage)
         || of_llm.is_some_and(LlmError::is_usage)
+        || of_minds.is_some_and(|inner| inner.is::<Refusal>())
         || error.downcast_ref().is_some_and(EvalError::is_usage)
         || error.is::<SplitError>();
     ExitCode::from(if is_usage { USAGE } else { FAILED })

@@ -28,6 +28,7 @@ fn main() -> ExitCode {
         Command::Scene(command) => commands::scene::run(&command),
         Command::Bench(command) => commands::bench::run(&command),
         Command::Import(command) => commands::import::run(&command),
+        Command::Helper(command) => commands::helper::run(&command),
         Command::Llm(command) => commands::llm::run(&command),
     };
     match ended {

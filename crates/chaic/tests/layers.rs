@@ -65,6 +65,11 @@ const ALLOWED: &[Arrows] = &[
         &["chaic-files", "chaic-protocol", "chaic-agents", "chaic-env"],
         &["chaic-episodes", "chaic-eval", "chaic-llm-standin"],
     ),
+    arrows(
+        "chaic-subprocess",
+        &["chaic-files", "chaic-protocol", "chaic-episodes", "chaic-agents", "chaic-env"],
+        &[],
+    ),
     arrows("chaic-import", &["chaic-protocol", "chaic-world", "chaic-episodes"], &["chaic-render"]),
     arrows(
         "chaic",
@@ -77,6 +82,7 @@ const ALLOWED: &[Arrows] = &[
             "chaic-eval",
             "chaic-import",
             "chaic-llm",
+            "chaic-subprocess",
         ],
         &["chaic-llm-standin"],
     ),

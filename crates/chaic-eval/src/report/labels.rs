@@ -6,7 +6,6 @@ use chaic_agents::partners::PARTNER_GRANTS;
 use chaic_env::minds::NONE;
 use chaic_protocol::observation::Grants;
 use serde::Serialize;
-use serde_json::Value;
 
 use crate::run::RunGrants;
 
@@ -107,9 +106,8 @@ impl GrantsFile {
 
 /// The names of what is granted, as traces have them.
 fn names(grants: &Grants) -> Vec<String> {
-    let value = serde_json::to_value(grants).expect("grants have string keys");
-    let fields = value.as_object().into_iter().flatten();
-    fields.filter(|(_, v)| **v == Value::Bool(true)).map(|(name, _)| name.clone()).collect()
+    let given = grants.named().into_iter().filter(|(_, is_given)| *is_given);
+    given.map(|(name, _)| name.to_owned()).collect()
 }
 
 fn words(grants: &Grants) -> Vec<String> {

@@ -25,6 +25,8 @@ const LOCK: &str = ".lock";
 pub(super) const EPISODES: &str = "episodes";
 /// What helpers that ask language models record; `chaic-llm` writes it.
 const RECORDS: &str = "llm";
+/// The commands of helpers that run in other processes; `chaic-subprocess` writes it.
+const COMMANDS: &str = "commands.json";
 /// What lies there before the first question is asked.
 const RECORDS_OF_BEGINNING: [&str; 3] = ["settings.json", "settings.json.tmp", "templates"];
 
@@ -98,7 +100,8 @@ fn is_of_beginning(path: &Path) -> bool {
             all(path, &|file| file.strip_suffix(UNFINISHED).unwrap_or(file).ends_with(".json"))
         }
         RECORDS => all(path, &|file| RECORDS_OF_BEGINNING.contains(&file)),
-        file => file.strip_suffix(UNFINISHED) == Some(RUN_FILE),
+        COMMANDS => true,
+        file => [RUN_FILE, COMMANDS].map(Some).contains(&file.strip_suffix(UNFINISHED)),
     }
 }
 

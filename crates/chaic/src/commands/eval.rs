@@ -9,12 +9,13 @@ use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::{Format, Report, write_files};
 use chaic_eval::run::{Access, Given, Run, RunFolder};
 use chaic_llm::Language;
+use chaic_subprocess::Commands;
 
 use super::{bars::RunBars, jobs, llm};
-use crate::arguments::EvalArguments;
+use crate::arguments::{EvalArguments, ExecArguments, HelperArgument};
 use crate::exit::Ended;
 use crate::interrupt;
-use crate::output::{complain, counted, quoted_path, say};
+use crate::output::{complain, counted, quoted, quoted_path, say};
 
 /// Episodes of each task in the small benchmark: with all helpers about two minutes on two cores.
 const QUICK_EPISODES: u32 = 2;
@@ -29,10 +30,15 @@ pub fn run(arguments: &EvalArguments) -> Result<Ended> {
     }
     let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
     let language = llm::language(arguments, &path, stop)?;
-    let helpers: &dyn Helpers = match &language {
+    let others: &dyn Helpers = match &language {
         Some(language) => language,
         None => &BuiltIn,
     };
+    let commands = Commands::beside(others, arguments.commands(), stop)?;
+    if arguments.resume {
+        commands.check_begun(&path)?;
+    }
+    let helpers: &dyn Helpers = &commands;
     let (mut run, warnings) = Run::open(&path, access, &given, helpers)?;
     for warning in warnings {
         complain(&format!("warning: {warning}; that episode is played again"));
@@ -109,23 +115,12 @@ pub(super) fn leave_report(run: &Run) -> Result<String> {
 
 /// What is asked for, and the name of a folder for it. Nothing said at all is the small benchmark.
 fn given(arguments: &EvalArguments) -> (Given, &'static str) {
-    let EvalArguments {
-        task,
-        helper,
-        split,
-        episodes,
-        first,
-        rules,
-        set,
-        seeds,
-        size,
-        no_traces,
-        ..
-    } = arguments;
+    let EvalArguments { task, split, episodes, first, rules, set, seeds, size, no_traces, .. } =
+        arguments;
     let (partner, appearance) = (arguments.partner.clone(), arguments.appearance);
     let given = Given {
         tasks: task.as_ref().map(|t| t.0.clone()),
-        helpers: helper.clone(),
+        helpers: arguments.helper_names(),
         split: split.clone(),
         first: *first,
         seeds: *seeds,
@@ -154,7 +149,8 @@ fn free_folder(name: &str) -> Result<PathBuf> {
 
 fn how_to_resume(path: &Path, arguments: &EvalArguments) -> String {
     let language = llm::to_resume(&arguments.language);
-    format!("go on with: chaic eval --resume --out {}{language}", quoted_path(path))
+    let helpers = exec_to_resume(arguments);
+    format!("go on with: chaic eval --resume --out {}{helpers}{language}", quoted_path(path))
 }
 
 /// What an agent says when it breaks down is shown and noted by the run; the usual message would
@@ -167,4 +163,36 @@ pub(super) fn keep_workers_quiet() {
             usual(info);
         }
     }));
+}
+
+/// What is to be said again where helpers run in other processes: a run's folder decides neither
+/// which command is run nor what it may take.
+fn exec_to_resume(arguments: &EvalArguments) -> String {
+    if arguments.commands().is_empty() {
+        return String::new();
+    }
+    let given = arguments.helper.iter().flatten().map(|helper| match helper {
+        HelperArgument::Names(names) => format!(" --helper {}", quoted(&names.join(","))),
+        HelperArgument::Exec { name, line } => {
+            format!(" --helper {}", quoted(&format!("{name}=exec:{line}")))
+        }
+    });
+    let ExecArguments {
+        exec_grants,
+        exec_decision_s,
+        exec_start_s,
+        exec_episode_s,
+        exec_memory_mib,
+    } = &arguments.exec;
+    let granted = exec_grants.iter().map(|grants| {
+        let names = grants.named().into_iter().filter(|(_, is_given)| *is_given);
+        format!(" --exec-grants {}", names.map(|(name, _)| name).collect::<Vec<_>>().join(","))
+    });
+    let times =
+        [("decision", exec_decision_s), ("start", exec_start_s), ("episode", exec_episode_s)];
+    let times = times.into_iter().filter_map(|(name, time)| {
+        time.map(|time| format!(" --exec-{name}-s {}", time.as_secs_f64()))
+    });
+    let memory = exec_memory_mib.iter().map(|mib| format!(" --exec-memory-mib {mib}"));
+    given.chain(granted).chain(times).chain(memory).collect()
 }

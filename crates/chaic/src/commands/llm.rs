@@ -88,7 +88,8 @@ pub fn language(
     // What isn't said is what the run was begun with; a folder that can't be read says so later.
     let begun = arguments.resume.then(|| RunFolder::read(path).ok()).flatten();
     let begun = begun.map(|(_, options)| options);
-    let helpers = arguments.helper.as_ref().or(begun.as_ref().map(|o| &o.helpers));
+    let named_helpers = arguments.helper_names();
+    let helpers = named_helpers.as_ref().or(begun.as_ref().map(|o| &o.helpers));
     let partner = arguments.partner.as_ref().or(begun.as_ref().and_then(|o| o.partner.as_ref()));
     let is_named = helpers.into_iter().flatten().any(|n| is_language_helper(n))
         || partner.is_some_and(|n| is_language_partner(n));
@@ -121,9 +122,11 @@ pub fn language(
 /// Who names nobody known hears of all names, also of those that ask a language model.
 fn check_names(arguments: &EvalArguments) -> Result<(), EnvError> {
     let known: Vec<String> = [NONE.to_owned()].into_iter().chain(helper_names()).collect();
-    let mut helpers = arguments.helper.iter().flatten();
-    if let Some(name) = helpers.find(|name| !known.contains(name)) {
-        return Err(EnvError::UnknownHelper { name: name.clone(), known });
+    let known_here = arguments.commands().into_iter().map(|c| c.name).chain(known.clone());
+    let known_here: Vec<String> = known_here.collect();
+    let mut helpers = arguments.helper_names().into_iter().flatten();
+    if let Some(name) = helpers.find(|name| !known_here.contains(name)) {
+        return Err(EnvError::UnknownHelper { name, known });
     }
     let known: Vec<String> = [RULES.to_owned()].into_iter().chain(partner_names()).collect();
     match arguments.partner.clone().filter(|name| !known.contains(name)) {

@@ -4,6 +4,7 @@ pub mod bench;
 pub mod episodes;
 pub mod eval;
 pub mod fidelity;
+pub mod helper;
 pub mod import;
 pub mod llm;
 pub mod render;

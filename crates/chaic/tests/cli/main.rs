@@ -12,6 +12,7 @@ mod interrupted;
 mod language;
 mod pictures;
 mod splits;
+mod subprocess;
 
 /// Frames of the episodes of these tests.
 const FRAMES: u32 = 80;

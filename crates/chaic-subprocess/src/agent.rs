@@ -1,0 +1,134 @@
+//! A mind whose decisions are made in another process.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use chaic_protocol::agent::Thought;
+use chaic_protocol::observation::Senses;
+use chaic_protocol::{Action, Agent, AgentError, Briefing, Observation};
+
+use crate::commands::Command;
+use crate::message::{PROTOCOL, ToEnv, ToMind, observation_frame, plain};
+use crate::process::Process;
+
+/// A mind in another process, which is started when an episode begins and ends with it.
+pub struct SubprocessAgent {
+    command: Arc<Command>,
+    stop: &'static AtomicBool,
+    state: State,
+}
+
+enum State {
+    Idle,
+    Running {
+        process: Process,
+        senses: Senses,
+        thought: Thought,
+    },
+    /// It couldn't be started or briefed.
+    Lost(AgentError),
+}
+
+impl SubprocessAgent {
+    /// A mind that runs this command for each of its episodes. `stop` raised ends its waiting.
+    pub fn new(command: Arc<Command>, stop: &'static AtomicBool) -> SubprocessAgent {
+        SubprocessAgent { command, stop, state: State::Idle }
+    }
+
+    /// Starts a process and makes its acquaintance; what it calls itself.
+    pub(crate) fn start(
+        command: &Arc<Command>,
+        stop: &'static AtomicBool,
+    ) -> Result<(Process, String), AgentError> {
+        let mut process = Process::start(command, stop)?;
+        let hello =
+            ToMind::Hello { protocol: PROTOCOL, chaic: chaic_env::CHAIC_VERSION.to_owned() };
+        match process.ask(plain(&hello), command.limits.start)? {
+            ToEnv::Hello { protocol: PROTOCOL, name } => Ok((process, name)),
+            ToEnv::Hello { protocol, .. } => Err(AgentError::Broken(format!(
+                "`{}` speaks version {protocol} of the protocol, this chaic speaks {PROTOCOL}",
+                command.line
+            ))),
+            other => Err(unexpected(command, "hello", &other)),
+        }
+    }
+
+    /// Briefs a process; what it wants to perceive.
+    pub(crate) fn brief(
+        process: &mut Process,
+        command: &Command,
+        briefing: &Briefing,
+    ) -> Result<Senses, AgentError> {
+        let reset = ToMind::Reset { briefing: Box::new(briefing.clone()) };
+        match process.ask(plain(&reset), command.limits.start)? {
+            ToEnv::Ready { senses } => Ok(senses),
+            other => Err(unexpected(command, "reset", &other)),
+        }
+    }
+
+    /// Shows a process what its agent sees; what it answers.
+    pub(crate) fn ask(
+        process: &mut Process,
+        command: &Command,
+        observation: &Observation,
+    ) -> Result<(Action, Option<Thought>), AgentError> {
+        match process.ask(observation_frame(observation), command.limits.decision)? {
+            ToEnv::Act { action, thought } => Ok((action, thought)),
+            other => Err(unexpected(command, "observe", &other)),
+        }
+    }
+}
+
+fn unexpected(command: &Command, asked: &str, answer: &ToEnv) -> AgentError {
+    let kind = match answer {
+        ToEnv::Hello { .. } => "hello",
+        ToEnv::Ready { .. } => "ready",
+        ToEnv::Act { .. } => "act",
+        ToEnv::Failed { .. } => "failed",
+    };
+    AgentError::Broken(format!("`{}` answered `{asked}` with `{kind}`", command.line))
+}
+
+impl Agent for SubprocessAgent {
+    fn senses(&self) -> Senses {
+        match &self.state {
+            State::Running { senses, .. } => *senses,
+            State::Idle | State::Lost(_) => Senses::NONE,
+        }
+    }
+
+    fn reset(&mut self, briefing: &Briefing) {
+        // The process of the last episode ends before another one begins.
+        self.state = State::Idle;
+        let begun =
+            SubprocessAgent::start(&self.command, self.stop).and_then(|(mut process, _)| {
+                let senses = SubprocessAgent::brief(&mut process, &self.command, briefing)?;
+                Ok((process, senses))
+            });
+        self.state = match begun {
+            Ok((process, senses)) => {
+                State::Running { process, senses, thought: Thought::default() }
+            }
+            Err(error) => State::Lost(error),
+        };
+    }
+
+    fn act(&mut self, observation: &Observation) -> Result<Action, AgentError> {
+        match &mut self.state {
+            State::Idle => Err(AgentError::Broken("a mind that was not briefed".to_owned())),
+            State::Lost(error) => Err(error.clone()),
+            State::Running { process, thought, .. } => {
+                let (action, thinks) = SubprocessAgent::ask(process, &self.command, observation)?;
+                *thought = thinks.unwrap_or_default();
+                Ok(action)
+            }
+        }
+    }
+
+    fn thought(&self) -> Thought {
+        match &self.state {
+            State::Running { thought, .. } => thought.clone(),
+            State::Idle | State::Lost(_) => Thought::default(),
+        }
+    }
+}

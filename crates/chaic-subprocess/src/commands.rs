@@ -1,0 +1,206 @@
+//! Where a run gets the helpers from that run in other processes.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use chaic_agents::PlannerRules;
+use chaic_env::minds::{Helper, Helpers};
+use chaic_env::{EnvError, RunKey};
+use chaic_protocol::observation::Grants;
+use serde::{Deserialize, Serialize};
+
+use crate::agent::SubprocessAgent;
+
+/// What a process may take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// For its start, and for each briefing.
+    pub start: Duration,
+    /// For each decision.
+    pub decision: Duration,
+    /// For all that it is waited for in an episode.
+    pub episode: Duration,
+    /// Memory that it and each of its children may hold, MiB; where the system bounds that (Linux).
+    pub memory_mib: u64,
+}
+
+impl Default for Limits {
+    /// Ours: a network is loaded within two minutes, and somebody who takes longer than half a minute
+    /// for one of some hundred decisions had better say so.
+    fn default() -> Limits {
+        Limits {
+            start: Duration::from_secs(120),
+            decision: Duration::from_secs(30),
+            episode: Duration::from_secs(3600),
+            memory_mib: 8192,
+        }
+    }
+}
+
+/// A helper in another process.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Command {
+    /// What the helper is called in this run.
+    pub name: String,
+    /// The command, for `sh -c`.
+    pub line: String,
+    /// What it is granted.
+    pub grants: Grants,
+    /// What it may take.
+    pub limits: Limits,
+}
+
+/// What was asked for that can't be, and what to do.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct Refusal(pub String);
+
+impl From<Refusal> for EnvError {
+    fn from(refusal: Refusal) -> EnvError {
+        EnvError::Minds(refusal.into())
+    }
+}
+
+/// What a run's folder tells of such a helper.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Recorded {
+    name: String,
+    command: String,
+}
+
+/// The file with the commands of a run, for readers: nothing in it is ever run.
+pub const FILE: &str = "commands.json";
+
+/// Longest file that is read, bytes.
+const MAX_FILE: u64 = 1 << 20;
+
+fn io(error: chaic_files::FileError) -> EnvError {
+    EnvError::Minds(error.into())
+}
+
+/// Helpers in other processes, besides those of elsewhere.
+pub struct Commands<'a> {
+    commands: Vec<Arc<Command>>,
+    others: &'a dyn Helpers,
+    stop: &'static AtomicBool,
+}
+
+impl<'a> Commands<'a> {
+    /// Adds commands to the helpers of elsewhere; `stop` raised ends all waiting.
+    ///
+    /// # Errors
+    /// [`Refusal`] if a name is none, or is taken.
+    pub fn beside(
+        others: &'a dyn Helpers,
+        commands: Vec<Command>,
+        stop: &'static AtomicBool,
+    ) -> chaic_env::Result<Commands<'a>> {
+        let mut taken = others.names();
+        taken.push(chaic_env::minds::NONE.to_owned());
+        for Command { name, .. } in &commands {
+            let is_name = |c: char| c.is_ascii_alphanumeric() || "_-".contains(c);
+            if name.is_empty() || name.len() > 40 || !name.chars().all(is_name) {
+                let text =
+                    format!("`{name}` is no name for a helper; use letters, digits, _ and -");
+                return Err(Refusal(text).into());
+            }
+            if taken.contains(name) {
+                let text = format!(
+                    "there is a helper `{name}` already; name this one, for example \
+                     mine=exec:COMMAND"
+                );
+                return Err(Refusal(text).into());
+            }
+            taken.push(name.clone());
+        }
+        let commands = commands.into_iter().map(Arc::new).collect();
+        Ok(Commands { commands, others, stop })
+    }
+
+    fn named(&self, name: &str) -> Option<&Arc<Command>> {
+        self.commands.iter().find(|c| c.name == name)
+    }
+
+    /// Refuses to go on with a run that was begun with other commands.
+    ///
+    /// # Errors
+    /// [`Refusal`] with the command that is to be named again.
+    pub fn check_begun(&self, run: &Path) -> chaic_env::Result<()> {
+        let path = run.join(FILE);
+        if !path.exists() {
+            return Ok(());
+        }
+        let bytes = chaic_files::read_bounded(&path, MAX_FILE).map_err(io)?;
+        let begun: Vec<Recorded> = serde_json::from_slice(&bytes)
+            .map_err(|e| EnvError::Minds(format!("{}: {e}", path.display()).into()))?;
+        let own = self.recorded();
+        match begun.iter().find(|recorded| !own.contains(recorded)) {
+            None => Ok(()),
+            Some(Recorded { name, command }) => Err(Refusal(format!(
+                "{} was begun with the command {name}=exec:{command}; a command is only run if you \
+                 name it: give all of --helper again, or choose another --out",
+                run.display()
+            ))
+            .into()),
+        }
+    }
+
+    fn recorded(&self) -> Vec<Recorded> {
+        let recorded =
+            |c: &Arc<Command>| Recorded { name: c.name.clone(), command: c.line.clone() };
+        self.commands.iter().map(recorded).collect()
+    }
+}
+
+impl Helpers for Commands<'_> {
+    fn names(&self) -> Vec<String> {
+        self.others
+            .names()
+            .into_iter()
+            .chain(self.commands.iter().map(|c| c.name.clone()))
+            .collect()
+    }
+
+    fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper> {
+        let Some(command) = self.named(name) else { return self.others.make(name, rules) };
+        let mind = Box::new(SubprocessAgent::new(Arc::clone(command), self.stop));
+        Some(Helper { mind, grants: command.grants })
+    }
+
+    fn make_for(&self, key: &RunKey, rules: PlannerRules) -> Option<Helper> {
+        match self.named(&key.helper) {
+            Some(_) => self.make(&key.helper, rules),
+            None => self.others.make_for(key, rules),
+        }
+    }
+
+    fn attach(&self, run: &Path) -> chaic_env::Result<()> {
+        self.others.attach(run)?;
+        self.check_begun(run)?;
+        if self.commands.is_empty() {
+            return Ok(());
+        }
+        let text =
+            serde_json::to_vec_pretty(&self.recorded()).expect("names and commands are JSON");
+        chaic_files::write_whole(&run.join(FILE), &text).map_err(io)
+    }
+
+    fn partner_names(&self) -> Vec<String> {
+        self.others.partner_names()
+    }
+
+    fn partner(&self, name: &str, of: Option<&RunKey>, rules: PlannerRules) -> Option<Helper> {
+        self.others.partner(name, of, rules)
+    }
+
+    fn waiting_jobs(&self) -> usize {
+        self.others.waiting_jobs()
+    }
+
+    fn waits(&self, name: &str) -> bool {
+        self.others.waits(name)
+    }
+}

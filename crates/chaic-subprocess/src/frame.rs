@@ -1,0 +1,114 @@
+//! Frames of bytes on a pipe: a head of JSON, and images behind it.
+//!
+//! A frame is, without anything in between:
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 4 | length of the head, u32, little-endian |
+//! | 4 | length of the body, u32, little-endian |
+//! | .. | head: one JSON object, UTF-8 |
+//! | .. | body: raw images, see [`crate::message::ImageHead`] |
+
+use std::io::{self, Read, Write};
+
+/// Longest head, bytes: the longest that was seen is a fiftieth of it.
+pub const MAX_HEAD: usize = 1 << 20;
+/// Longest body, bytes: all images of a side of 2,048 pixels.
+pub const MAX_BODY: usize = 2048 * 2048 * (3 + 4 + 2);
+
+/// One frame.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Frame {
+    /// JSON.
+    pub head: Vec<u8>,
+    /// Images.
+    pub body: Vec<u8>,
+}
+
+impl Frame {
+    /// Writes it, and flushes.
+    ///
+    /// # Errors
+    /// If the pipe is closed.
+    ///
+    /// # Panics
+    /// If it is longer than frames may be.
+    pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
+        assert!(self.head.len() <= MAX_HEAD && self.body.len() <= MAX_BODY, "a frame too long");
+        out.write_all(&(self.head.len() as u32).to_le_bytes())?;
+        out.write_all(&(self.body.len() as u32).to_le_bytes())?;
+        out.write_all(&self.head)?;
+        out.write_all(&self.body)?;
+        out.flush()
+    }
+
+    /// Reads the next one; `None` if the pipe was closed before it.
+    ///
+    /// # Errors
+    /// If the pipe is closed within a frame, or a length is out of bounds.
+    pub fn read(from: &mut dyn Read) -> io::Result<Option<Frame>> {
+        let mut lengths = [0; 8];
+        let n = read_up_to(from, &mut lengths)?;
+        if n == 0 {
+            return Ok(None);
+        }
+        if n < lengths.len() {
+            return Err(io::ErrorKind::UnexpectedEof.into());
+        }
+        let length = |k: usize| {
+            u32::from_le_bytes([lengths[k], lengths[k + 1], lengths[k + 2], lengths[k + 3]])
+                as usize
+        };
+        let (head, body) = (length(0), length(4));
+        if head > MAX_HEAD || body > MAX_BODY {
+            let text = format!(
+                "a frame of {head} and {body} bytes, more than {MAX_HEAD} and {MAX_BODY}; is \
+                 something else printed on the standard output?"
+            );
+            return Err(io::Error::new(io::ErrorKind::InvalidData, text));
+        }
+        let mut frame = Frame { head: vec![0; head], body: vec![0; body] };
+        from.read_exact(&mut frame.head)?;
+        from.read_exact(&mut frame.body)?;
+        Ok(Some(frame))
+    }
+}
+
+/// Reads until the buffer is full or the pipe is closed.
+fn read_up_to(from: &mut dyn Read, buffer: &mut [u8]) -> io::Result<usize> {
+    let mut n = 0;
+    while n < buffer.len() {
+        match from.read(&mut buffer[n..]) {
+            Ok(0) => break,
+            Ok(more) => n += more,
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(e),
+        }
+    }
+    Ok(n)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_is_read_as_it_was_written() {
+        let frame = Frame { head: b"{\"type\":\"bye\"}".to_vec(), body: vec![0, 255, 10] };
+        let mut bytes = Vec::new();
+        frame.write(&mut bytes).unwrap();
+        assert_eq!(bytes[..8], [14, 0, 0, 0, 3, 0, 0, 0]);
+        let mut pipe = &bytes[..];
+        assert_eq!(Frame::read(&mut pipe).unwrap(), Some(frame));
+        assert_eq!(Frame::read(&mut pipe).unwrap(), None);
+        for cut in 1..bytes.len() {
+            assert!(Frame::read(&mut &bytes[..cut]).is_err(), "cut after {cut} bytes");
+        }
+    }
+
+    #[test]
+    fn text_on_the_pipe_is_no_frame() {
+        let error = Frame::read(&mut &b"Hello world, I am loading weights"[..]).unwrap_err();
+        assert!(error.to_string().contains("standard output"), "{error}");
+    }
+}

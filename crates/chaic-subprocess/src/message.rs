@@ -1,0 +1,169 @@
+//! What is said between an environment and a mind in another process.
+
+use chaic_protocol::agent::Thought;
+use chaic_protocol::geom::Camera;
+use chaic_protocol::observation::{Granted, Images, SelfState, Senses};
+use chaic_protocol::{Action, Briefing, Observation};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use crate::frame::Frame;
+
+/// The version of the protocol. Both sides say theirs, and part if they differ.
+pub const PROTOCOL: u32 = 1;
+
+/// What the environment says, with the answers that it waits for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub enum ToMind {
+    /// Comes first; answered by [`ToEnv::Hello`].
+    Hello {
+        /// [`PROTOCOL`].
+        protocol: u32,
+        /// Version of the program.
+        chaic: String,
+    },
+    /// An episode begins; answered by [`ToEnv::Ready`].
+    Reset {
+        /// What the agent is told.
+        briefing: Box<Briefing>,
+    },
+    /// The agent's last action has ended; answered by [`ToEnv::Act`]. The images are the body of the
+    /// frame.
+    Observe(Box<Seen>),
+    /// The episode is over, and nothing is to be answered: the process ends.
+    Bye,
+}
+
+/// What the mind answers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub enum ToEnv {
+    /// It is there.
+    Hello {
+        /// [`PROTOCOL`].
+        protocol: u32,
+        /// What it calls itself.
+        name: String,
+    },
+    /// It is briefed.
+    Ready {
+        /// What it wants to perceive.
+        senses: Senses,
+    },
+    /// It has decided.
+    Act {
+        /// What to do.
+        action: Action,
+        /// What it thinks, for replays.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        thought: Option<Thought>,
+    },
+    /// In place of any other answer: it can't go on. Its episode counts as zero.
+    Failed {
+        /// Why.
+        problem: String,
+    },
+}
+
+/// An observation without the images themselves; fields as in [`Observation`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Seen {
+    /// Frames since the episode began.
+    pub frame: chaic_protocol::Frame,
+    /// What the agent knows of itself.
+    pub own: SelfState,
+    /// The camera that took the images.
+    pub camera: Camera,
+    /// What was granted beyond that.
+    pub granted: Granted,
+    /// Where the images are.
+    pub images: Vec<ImageHead>,
+}
+
+/// Where an image lies in the body of its frame: row-major, row 0 at the top, little-endian.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ImageHead {
+    /// `rgb`, `depth_m` or `ids`, as in [`Images`].
+    pub name: String,
+    /// `u8`, `f32` or `u16`.
+    pub dtype: String,
+    /// Height and width, and 3 for color.
+    pub shape: Vec<u32>,
+    /// The first byte.
+    pub offset: usize,
+    /// How many bytes.
+    pub bytes: usize,
+}
+
+/// A frame for a message without images.
+pub(crate) fn plain<M: Serialize>(message: &M) -> Frame {
+    Frame { head: serde_json::to_vec(message).expect("messages are JSON"), body: Vec::new() }
+}
+
+/// The message in the head of a frame.
+pub(crate) fn message<M: DeserializeOwned>(frame: &Frame) -> Result<M, String> {
+    serde_json::from_slice(&frame.head).map_err(|e| {
+        let start = String::from_utf8_lossy(&frame.head[..frame.head.len().min(200)]).into_owned();
+        format!("no message of the protocol ({e}): {start}")
+    })
+}
+
+/// The frame of an observation.
+pub fn observation_frame(observation: &Observation) -> Frame {
+    let Observation { frame, own, camera, images, granted } = observation;
+    let (mut heads, mut body) = (Vec::new(), Vec::new());
+    let shape = [camera.height, camera.width];
+    let mut add = |name: &str, dtype: &str, shape: &[u32], bytes: &mut dyn Iterator<Item = u8>| {
+        let offset = body.len();
+        body.extend(bytes);
+        heads.push(ImageHead {
+            name: name.to_owned(),
+            dtype: dtype.to_owned(),
+            shape: shape.to_vec(),
+            offset,
+            bytes: body.len() - offset,
+        });
+    };
+    if let Some(rgb) = &images.rgb {
+        add("rgb", "u8", &[shape[0], shape[1], 3], &mut rgb.iter().copied());
+    }
+    if let Some(depth) = &images.depth_m {
+        add("depth_m", "f32", &shape, &mut depth.iter().flat_map(|d| d.to_le_bytes()));
+    }
+    if let Some(ids) = &images.ids {
+        add("ids", "u16", &shape, &mut ids.iter().flat_map(|id| id.to_le_bytes()));
+    }
+    let seen = Seen {
+        frame: *frame,
+        own: own.clone(),
+        camera: *camera,
+        granted: granted.clone(),
+        images: heads,
+    };
+    Frame { body, ..plain(&ToMind::Observe(Box::new(seen))) }
+}
+
+/// The observation in a frame.
+pub(crate) fn observation(seen: Seen, body: &[u8]) -> Result<Observation, String> {
+    let mut images = Images::default();
+    for head in &seen.images {
+        let end = head.offset.checked_add(head.bytes);
+        let bytes = end.and_then(|end| body.get(head.offset..end));
+        let bytes = bytes.ok_or_else(|| format!("the image {} isn't there", head.name))?;
+        match head.name.as_str() {
+            "rgb" => images.rgb = Some(bytes.to_vec()),
+            "depth_m" => {
+                let (numbers, _) = bytes.as_chunks::<4>();
+                images.depth_m = Some(numbers.iter().map(|b| f32::from_le_bytes(*b)).collect());
+            }
+            "ids" => {
+                let (numbers, _) = bytes.as_chunks::<2>();
+                images.ids = Some(numbers.iter().map(|b| u16::from_le_bytes(*b)).collect());
+            }
+            other => return Err(format!("there is no image `{other}`")),
+        }
+    }
+    let Seen { frame, own, camera, granted, .. } = seen;
+    Ok(Observation { frame, own, camera, images, granted })
+}

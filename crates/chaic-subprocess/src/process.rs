@@ -1,0 +1,199 @@
+//! A process with pipes, deadlines and limits.
+
+use std::io::Read;
+use std::process::{Child, ChildStdin, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use chaic_protocol::AgentError;
+
+use crate::commands::Command;
+use crate::frame::Frame;
+use crate::message::{ToEnv, ToMind, message, plain};
+
+/// How often one who waits looks whether it is to stop.
+const LOOK: Duration = Duration::from_millis(50);
+/// How long a process may take to end by itself when it is told to.
+const GRACE: Duration = Duration::from_secs(2);
+/// How much of what it said last on its standard error is kept, bytes.
+const KEPT_ERRORS: usize = 2000;
+
+/// A running command.
+pub(crate) struct Process {
+    child: Child,
+    to: Option<Sender<Frame>>,
+    from: Receiver<Result<Frame, String>>,
+    errors: Arc<Mutex<Vec<u8>>>,
+    command: Arc<Command>,
+    /// How long it has been waited for, in all.
+    waited: Duration,
+    stop: &'static AtomicBool,
+}
+
+impl Process {
+    /// Starts the command.
+    pub fn start(command: &Arc<Command>, stop: &'static AtomicBool) -> Result<Process, AgentError> {
+        let mut starting = std::process::Command::new("sh");
+        starting.arg("-c").arg(script(command));
+        starting.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut starting, 0);
+        let failed = |e: std::io::Error| AgentError::Broken(format!("sh can't be started: {e}"));
+        let mut child = starting.spawn().map_err(failed)?;
+        let (stdin, stdout, stderr) =
+            (child.stdin.take(), child.stdout.take(), child.stderr.take());
+        let (Some(stdin), Some(stdout), Some(stderr)) = (stdin, stdout, stderr) else {
+            return Err(AgentError::Broken("a process without pipes".to_owned()));
+        };
+        let errors = Arc::new(Mutex::new(Vec::new()));
+        let kept = Arc::clone(&errors);
+        std::thread::spawn(move || keep_errors(stderr, &kept));
+        Ok(Process {
+            child,
+            to: Some(writer(stdin)),
+            from: reader(stdout),
+            errors,
+            command: Arc::clone(command),
+            waited: Duration::ZERO,
+            stop,
+        })
+    }
+
+    /// Sends a frame, and waits for the answer.
+    pub fn ask(&mut self, frame: Frame, within: Duration) -> Result<ToEnv, AgentError> {
+        // If the pipe is closed, the answer says why.
+        let sent = self.to.as_ref().map(|to| to.send(frame));
+        let began = Instant::now();
+        let left = self.command.limits.episode.saturating_sub(self.waited);
+        let answer = match sent {
+            Some(_) => self.wait(within.min(left)),
+            None => Err(self.broken("was ended")),
+        };
+        self.waited += began.elapsed();
+        match message(&answer?).map_err(|text| self.broken(&format!("sent {text}")))? {
+            ToEnv::Failed { problem } => Err(self.broken(&format!("said: {problem}"))),
+            answer => Ok(answer),
+        }
+    }
+
+    fn wait(&mut self, within: Duration) -> Result<Frame, AgentError> {
+        let began = Instant::now();
+        loop {
+            if self.stop.load(Ordering::Relaxed) {
+                return Err(AgentError::Halted("the run stops".to_owned()));
+            }
+            let left = within.saturating_sub(began.elapsed());
+            match self.from.recv_timeout(left.min(LOOK)) {
+                Ok(Ok(frame)) => return Ok(frame),
+                Ok(Err(text)) => return Err(self.broken(&text)),
+                Err(RecvTimeoutError::Timeout) if left > LOOK => {}
+                Err(RecvTimeoutError::Timeout) => {
+                    let text = format!("gave no answer within {} s", within.as_secs_f32());
+                    return Err(self.broken(&text));
+                }
+                Err(RecvTimeoutError::Disconnected) => return Err(self.broken("is gone")),
+            }
+        }
+    }
+
+    /// What it did, with what it complained of last.
+    fn broken(&mut self, what: &str) -> AgentError {
+        self.kill();
+        // All of its complaints are there once its pipe is closed; it may leave children behind that
+        // keep it open.
+        std::thread::sleep(Duration::from_millis(20));
+        let errors = self.errors.lock().unwrap_or_else(PoisonError::into_inner);
+        let said = String::from_utf8_lossy(&errors).trim().to_owned();
+        let said = if said.is_empty() { String::new() } else { format!("; it complained: {said}") };
+        AgentError::Broken(format!("`{}` {what}{said}", self.command.line))
+    }
+
+    fn kill(&mut self) {
+        self.to = None;
+        #[cfg(unix)]
+        if let Some(group) =
+            i32::try_from(self.child.id()).ok().and_then(rustix::process::Pid::from_raw)
+        {
+            // It may be gone already.
+            let _ = rustix::process::kill_process_group(group, rustix::process::Signal::KILL);
+        }
+        let _ = self.child.kill();
+    }
+}
+
+impl Process {
+    /// Closes its standard input, having told it to end or not; whether it ended within this time.
+    pub fn close(&mut self, told: bool, within: Duration) -> bool {
+        let Some(to) = self.to.take() else { return false };
+        if told {
+            let _ = to.send(plain(&ToMind::Bye));
+        }
+        drop(to);
+        // Its end closes the pipe.
+        let began = Instant::now();
+        while began.elapsed() < within && !self.stop.load(Ordering::Relaxed) {
+            if let Err(RecvTimeoutError::Disconnected) = self.from.recv_timeout(LOOK) {
+                return true;
+            }
+        }
+        false
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        self.close(true, GRACE);
+        self.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// The command under its limit of memory.
+fn script(command: &Command) -> String {
+    let kib = command.limits.memory_mib.saturating_mul(1024);
+    format!("ulimit -d {kib} || exit 125\n{}", command.line)
+}
+
+/// A thread that writes, so that a process that doesn't read holds nobody up.
+fn writer(mut stdin: ChildStdin) -> Sender<Frame> {
+    let (to, frames) = channel::<Frame>();
+    std::thread::spawn(move || {
+        for frame in frames {
+            if frame.write(&mut stdin).is_err() {
+                return;
+            }
+        }
+    });
+    to
+}
+
+/// A thread that reads frames until the pipe is closed.
+fn reader(mut stdout: impl Read + Send + 'static) -> Receiver<Result<Frame, String>> {
+    let (sender, frames) = channel();
+    std::thread::spawn(move || {
+        loop {
+            let read = match Frame::read(&mut stdout) {
+                Ok(Some(frame)) => Ok(frame),
+                Ok(None) => return,
+                Err(e) => Err(format!("sent {e}")),
+            };
+            let is_last = read.is_err();
+            if sender.send(read).is_err() || is_last {
+                return;
+            }
+        }
+    });
+    frames
+}
+
+fn keep_errors(mut stderr: impl Read, kept: &Mutex<Vec<u8>>) {
+    let mut buffer = [0; 1024];
+    while let Ok(n @ 1..) = stderr.read(&mut buffer) {
+        let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.extend_from_slice(&buffer[..n]);
+        let too_many = kept.len().saturating_sub(KEPT_ERRORS);
+        kept.drain(..too_many);
+    }
+}

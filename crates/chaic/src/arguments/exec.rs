@@ -1,0 +1,135 @@
+//! Helpers in other processes: what stands behind `--helper`, and `chaic helper`.
+
+use std::time::Duration;
+
+use chaic_env::rules::RuleSetName;
+use chaic_protocol::observation::Grants;
+use chaic_subprocess::{Command, Limits};
+use clap::{Args, Subcommand};
+
+/// What a command is called that has no name of its own.
+const USUAL_NAME: &str = "exec";
+
+/// One value of `--helper`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum HelperArgument {
+    /// Names, separated by commas.
+    Names(Vec<String>),
+    /// `exec:COMMAND` or `NAME=exec:COMMAND`.
+    Exec {
+        /// What it is called.
+        name: String,
+        /// For `sh -c`.
+        line: String,
+    },
+}
+
+impl HelperArgument {
+    /// The names that it adds to a run.
+    pub fn names(&self) -> Vec<String> {
+        match self {
+            HelperArgument::Names(names) => names.clone(),
+            HelperArgument::Exec { name, .. } => vec![name.clone()],
+        }
+    }
+}
+
+/// Reads one value of `--helper`.
+pub fn helper(text: &str) -> Result<HelperArgument, String> {
+    let named = text.split_once("=exec:").filter(|(name, _)| !name.contains([',', ':']));
+    let (name, line) = match (named, text.strip_prefix("exec:")) {
+        (Some((name, line)), _) => (name, line),
+        (None, Some(line)) => (USUAL_NAME, line),
+        (None, None) => {
+            return Ok(HelperArgument::Names(text.split(',').map(str::to_owned).collect()));
+        }
+    };
+    if line.trim().is_empty() {
+        return Err(
+            "no command; write exec:COMMAND, for example exec:\"python3 helper.py\"".to_owned()
+        );
+    }
+    Ok(HelperArgument::Exec { name: name.to_owned(), line: line.to_owned() })
+}
+
+/// What helpers in other processes get, and may take.
+#[derive(Args, Clone, Debug, Default)]
+pub struct ExecArguments {
+    /// What helpers of exec:COMMAND are granted beyond their own images and state, separated by
+    /// commas: ids, goal_place, goal, progress, behavior, positions, task; docs/grants.md.
+    #[arg(long, value_name = "NAMES", value_parser = grants, help_heading = "Helpers in other processes")]
+    pub exec_grants: Option<Grants>,
+    /// Longest time for one decision, seconds. Usual: 30.
+    #[arg(long, value_name = "S", value_parser = seconds, help_heading = "Helpers in other processes")]
+    pub exec_decision_s: Option<Duration>,
+    /// Longest time for starting and for a briefing, seconds. Usual: 120.
+    #[arg(long, value_name = "S", value_parser = seconds, help_heading = "Helpers in other processes")]
+    pub exec_start_s: Option<Duration>,
+    /// Longest time of all decisions of an episode, seconds. Usual: 3600.
+    #[arg(long, value_name = "S", value_parser = seconds, help_heading = "Helpers in other processes")]
+    pub exec_episode_s: Option<Duration>,
+    /// Memory for each of its processes, MiB, on Linux. Usual: 8192.
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1 << 30), help_heading = "Helpers in other processes")]
+    pub exec_memory_mib: Option<u64>,
+}
+
+impl ExecArguments {
+    /// A helper of this name and command line.
+    pub fn command(&self, name: &str, line: &str) -> Command {
+        let usual = Limits::default();
+        Command {
+            name: name.to_owned(),
+            line: line.to_owned(),
+            grants: self.exec_grants.unwrap_or(Grants::NONE),
+            limits: Limits {
+                start: self.exec_start_s.unwrap_or(usual.start),
+                decision: self.exec_decision_s.unwrap_or(usual.decision),
+                episode: self.exec_episode_s.unwrap_or(usual.episode),
+                memory_mib: self.exec_memory_mib.unwrap_or(usual.memory_mib),
+            },
+        }
+    }
+}
+
+/// `chaic helper`.
+#[derive(Debug, Subcommand)]
+pub enum HelperCommand {
+    /// Try whether a command keeps to the protocol for helpers in other processes.
+    Check(HelperCheckArguments),
+    /// Be such a process: a built-in helper that speaks the protocol on standard input and output.
+    Serve(HelperServeArguments),
+}
+
+/// `chaic helper check`.
+#[derive(Args, Debug)]
+pub struct HelperCheckArguments {
+    /// The command, for a shell: \"python3 helper.py\".
+    #[arg(value_name = "COMMAND")]
+    pub line: String,
+    #[command(flatten)]
+    pub exec: ExecArguments,
+}
+
+/// `chaic helper serve`.
+#[derive(Args, Debug)]
+pub struct HelperServeArguments {
+    /// Its name: random, rhp, oracle or follow.
+    #[arg(value_name = "NAME")]
+    pub name: String,
+    /// paper, or compat for what the original's code does.
+    #[arg(long, value_name = "NAME", default_value = "paper")]
+    pub rules: RuleSetName,
+}
+
+fn grants(text: &str) -> Result<Grants, String> {
+    Grants::of_names(text.split(',')).map_err(|name| {
+        let all: Vec<_> = Grants::NONE.named().iter().map(|(name, _)| *name).collect();
+        format!("no grant `{name}`; the grants are {}", all.join(", "))
+    })
+}
+
+fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds = text.parse().ok().filter(|s| (0.001..=86_400.0).contains(s));
+    let seconds = seconds.ok_or_else(|| format!("no time `{text}`; write seconds, up to 86400"))?;
+    Ok(Duration::from_secs_f64(seconds))
+}

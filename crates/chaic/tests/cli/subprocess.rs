@@ -1,0 +1,87 @@
+//! Helpers in other processes, as users run them.
+
+use std::fs;
+
+use assert_cmd::cargo::cargo_bin;
+
+use super::{chaic, ill, text, well, workshop};
+
+#[test]
+fn a_served_helper_gets_the_row_of_the_one_within() {
+    let dir = workshop();
+    let program = cargo_bin!("chaic").display().to_string();
+    let served = format!("served=exec:'{program}' helper serve rhp");
+    let play = ["eval", "--episodes", "short", "--helper", "rhp", "--helper", &served];
+    let grants = ["--exec-grants", "ids,goal_place"];
+    let out = ["--size", "48", "--out", "run"];
+    let all: Vec<&str> = play.iter().chain(&grants).chain(&out).copied().collect();
+    let table = well(dir.path(), &all);
+    assert!(table.contains("served") && !table.contains("own eyes only"), "{table}");
+    let run = dir.path().join("run");
+    for task in ["no_constraint", "moving_house"] {
+        let traces = run.join("traces").join(task);
+        let last = |helper: &str| {
+            let traces = fs::read_dir(traces.join(helper)).expect("it played");
+            let path = traces.map(|e| e.expect("it is there").path()).next().expect("a trace");
+            let text = fs::read_to_string(path).expect("it is text");
+            text.lines().skip(1).map(str::to_owned).collect::<Vec<_>>()
+        };
+        assert_eq!(last("served"), last("rhp"), "{task}");
+    }
+    assert!(well(dir.path(), &["verify", "run"]).contains("all digests agree"));
+
+    // A run's folder decides no command.
+    let commands = run.join("commands.json");
+    let written = fs::read_to_string(&commands).expect("it is noted");
+    assert!(written.contains("helper serve rhp"), "{written}");
+    let proof = dir.path().join("proof");
+    let planted = format!(r#"[{{"name":"served","command":"touch '{}'"}}]"#, proof.display());
+    let resume = ["eval", "--resume", "--out", "run"];
+    fs::write(&commands, &planted).expect("there is room");
+    let bare = chaic(dir.path(), &resume);
+    assert_eq!(bare.status.code(), Some(2), "{}", text(&bare.stderr));
+    let again = ["--helper", "rhp", "--helper", &served, "--exec-grants", "ids,goal_place"];
+    let again: Vec<&str> = resume.iter().chain(&again).copied().collect();
+    let said = ill(dir.path(), &again);
+    assert!(said.contains("a command is only run if you name it"), "{said}");
+    assert!(!proof.exists(), "what the folder named was run");
+    fs::write(&commands, written).expect("there is room");
+    well(dir.path(), &again);
+    let fewer: Vec<&str> = again[..again.len() - 2].to_vec();
+    let said = ill(dir.path(), &fewer);
+    assert!(said.contains("granted something else"), "{said}");
+}
+
+#[test]
+fn a_helper_that_breaks_gets_zero_and_says_why() {
+    let dir = workshop();
+    let play = ["eval", "--episodes", "short", "--size", "48", "--out", "run"];
+    let broken = ["--helper", "exec:echo no weights >&2; exit 1"];
+    let out = chaic(dir.path(), &play.iter().chain(&broken).copied().collect::<Vec<_>>());
+    assert_eq!(out.status.code(), Some(1), "it ends with findings");
+    let said = text(&out.stderr);
+    assert!(said.contains("is gone; it complained: no weights"), "{said}");
+    let results = fs::read_to_string(dir.path().join("run/results.jsonl")).expect("it is there");
+    assert_eq!(results.lines().filter(|l| l.contains("no weights")).count(), 2, "{results}");
+}
+
+#[test]
+fn a_command_is_tried_from_the_command_line() {
+    let dir = workshop();
+    let program = cargo_bin!("chaic").display().to_string();
+    let kept = well(dir.path(), &["helper", "check", &format!("'{program}' helper serve random")]);
+    assert!(kept.contains("It keeps to the protocol") && !kept.contains("FAILED"), "{kept}");
+    let out = chaic(dir.path(), &["helper", "check", "cat"]);
+    assert_eq!(out.status.code(), Some(1));
+    assert!(text(&out.stdout).contains("1 promise not kept"), "{}", text(&out.stdout));
+    for wrong in [
+        &["eval", "--helper", "exec:"][..],
+        &["eval", "--helper", "rhp=exec:true"],
+        &["eval", "--helper", "exec:true", "--helper", "exec:false"],
+        &["eval", "--helper", "exec:true", "--exec-grants", "gold"],
+        &["eval", "--helper", "exec:true", "--exec-decision-s", "soon"],
+        &["helper", "serve", "nobody"],
+    ] {
+        assert_eq!(chaic(dir.path(), wrong).status.code(), Some(2), "{wrong:?}");
+    }
+}

@@ -1,0 +1,83 @@
+"""A helper in Python: it walks to the nearest possible target in sight, takes it, looks for the goal
+place, and puts it there. It knows no map and makes no plans.
+
+    chaic eval --helper none --helper "exec:python3 examples/python_helper/helper.py" \
+        --exec-grants ids,goal_place --task no_constraint,low_target --first 4
+"""
+
+import math
+import random
+
+from chaic_helper import serve
+
+NEAR_M = 1.2  # How near to walk before taking or putting, metres.
+BLOCKED_M = 0.6  # Something this near straight ahead is in the way, metres.
+SIZE = 64  # Side of the images, pixels.
+
+
+class Walker:
+    senses = {"image_size": SIZE, "rgb": False, "depth": True, "ids": True}
+
+    def reset(self, briefing):
+        self.briefing = briefing
+        # The same episode must lead to the same decisions: draw by the briefing's seed.
+        self.random = random.Random(briefing["seed"])
+        self.given_up = set()
+        self.aimed_at = None
+        self.turns_left = 0
+
+    def act(self, seen, images):
+        last = seen["own"]["last"]
+        if last is not None and last[1] != "success":
+            # A step against something, or a thing out of reach: turn away from it.
+            self.turns_left = self.random.randrange(2, 6)
+            if self.aimed_at is not None:
+                self.given_up.add(self.aimed_at)
+        self.aimed_at = None
+        hands = [hand for hand in seen["own"]["hands"] if hand is not None]
+        wanted = self.briefing["goal_places" if hands else "possible_targets"]
+        found = self.nearest(seen, images, wanted, hands)
+        if found is not None and found[0] < NEAR_M:
+            _, pixel, entity = found
+            self.turns_left = 0
+            self.aimed_at = entity
+            target = {"pixel": {"column": pixel % SIZE, "row": pixel // SIZE}}
+            if hands:
+                return {"put_on": {"place": target, "hand": "right"}}
+            return {"pick_up": {"object": target, "hand": "right"}}
+        if self.turns_left > 0:
+            self.turns_left -= 1
+            return "turn_left"
+        if self.ahead_m(images) < BLOCKED_M or (found is None and self.random.random() < 0.04):
+            self.turns_left = self.random.randrange(1, 9)
+            return "turn_left"
+        if found is not None:
+            off = found[1] % SIZE + 0.5 - SIZE / 2
+            if abs(off) > SIZE / 8:
+                return "turn_right" if off > 0 else "turn_left"
+        return "move_forward"
+
+    def ahead_m(self, images):
+        """Depth of the nearest thing that a body would walk into, metres."""
+        middle = range(SIZE // 2 - SIZE // 16, SIZE // 2 + SIZE // 16)
+        return min(images.depth_m[SIZE * row + column] for row in middle for column in middle)
+
+    def nearest(self, seen, images, wanted, hands):
+        """Distance in metres, pixel and id of the nearest thing in sight of a wanted class."""
+        held = {hand["identity"]["entity"] for hand in hands if hand["identity"]}
+        classes = dict(seen["granted"]["classes"])
+        ids = {e for e, c in classes.items() if c in wanted and e not in held | self.given_up}
+        focal = SIZE / 2 / math.tan(seen["camera"]["vertical_fov_rad"] / 2)
+        best = None
+        for pixel, entity in enumerate(images.ids or ()):
+            if entity in ids:
+                depth = images.depth_m[pixel]
+                sideways = depth * (pixel % SIZE + 0.5 - SIZE / 2) / focal
+                distance = math.hypot(depth, sideways)
+                if best is None or distance < best[0]:
+                    best = (distance, pixel, entity)
+        return best
+
+
+if __name__ == "__main__":
+    serve(Walker(), "walker")

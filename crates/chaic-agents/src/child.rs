@@ -49,7 +49,7 @@ const THERE_M: f32 = 0.5;
 
 /// What the child is up to.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Mood {
+enum ChildBehavior {
     Follow,
     /// Runs to a point (x, z).
     RunAway(Vec2),
@@ -72,7 +72,7 @@ struct Episode {
     follower: Follower,
     rng: Stream,
     n_draws: u32,
-    mood: Mood,
+    behavior: ChildBehavior,
     since: Option<Frame>,
 }
 
@@ -93,7 +93,7 @@ impl Episode {
             follower: Follower::default(),
             rng: Stream::new(briefing.seed, "child", 0),
             n_draws: 0,
-            mood: Mood::Follow,
+            behavior: ChildBehavior::Follow,
             since: None,
         }
     }
@@ -120,26 +120,28 @@ impl Episode {
             (self.position_of(self.guardian()), self.position_of(self.helper()));
         let now = self.memory.frame;
         let is_due = self.since.is_none_or(|since| now > since + PLAN_FRAMES);
-        let next = match self.mood {
-            Mood::RunAway(_) if away_m(helper) < CATCH_M => Mood::GotoGuardian,
-            Mood::GotoGuardian if is_due && away_m(guardian) < HOME_M => Mood::Follow,
-            Mood::Follow if is_due => {
+        let next = match self.behavior {
+            ChildBehavior::RunAway(_) if away_m(helper) < CATCH_M => ChildBehavior::GotoGuardian,
+            ChildBehavior::GotoGuardian if is_due && away_m(guardian) < HOME_M => {
+                ChildBehavior::Follow
+            }
+            ChildBehavior::Follow if is_due => {
                 let runs = self.draws_escape();
                 match guardian.filter(|_| runs).and_then(|g| self.far_point(g)) {
-                    Some(point) => Mood::RunAway(point),
-                    None => Mood::Follow,
+                    Some(point) => ChildBehavior::RunAway(point),
+                    None => ChildBehavior::Follow,
                 }
             }
             same => same,
         };
-        if is_due || next != self.mood {
+        if is_due || next != self.behavior {
             self.since = Some(now);
         }
-        if next != self.mood {
+        if next != self.behavior {
             self.navigator.reset();
             self.recovery.reset();
             self.follower = Follower::default();
-            self.mood = next;
+            self.behavior = next;
         }
     }
 
@@ -189,9 +191,9 @@ impl Episode {
         self.change_mood();
         if self.recovery.is_hopeless() {
             self.recovery = Recovery::default();
-            if matches!(self.mood, Mood::RunAway(_)) {
+            if matches!(self.behavior, ChildBehavior::RunAway(_)) {
                 // It can't get there: here is as good.
-                self.mood = Mood::RunAway(self.memory.here());
+                self.behavior = ChildBehavior::RunAway(self.memory.here());
             }
         }
         let last = observation.own.last;
@@ -200,9 +202,9 @@ impl Episode {
         {
             return action;
         }
-        match self.mood {
-            Mood::RunAway(point) => self.run_to(point),
-            Mood::Follow | Mood::GotoGuardian => {
+        match self.behavior {
+            ChildBehavior::RunAway(point) => self.run_to(point),
+            ChildBehavior::Follow | ChildBehavior::GotoGuardian => {
                 let Some(guardian) = self.guardian() else { return self.fidget() };
                 let keep_m = FOLLOW_M;
                 match self.follower.step(&mut self.memory, &mut self.navigator, guardian, keep_m) {
@@ -222,7 +224,7 @@ impl Episode {
             Nav::Act(action) => action,
             Nav::Arrived => self.fidget(),
             Nav::Unreachable => {
-                self.mood = Mood::RunAway(self.memory.here());
+                self.behavior = ChildBehavior::RunAway(self.memory.here());
                 self.fidget()
             }
         }
@@ -255,19 +257,19 @@ impl Agent for Child {
     }
 
     fn thought(&self) -> Thought {
-        let plan = match self.episode.as_ref().map(|e| e.mood) {
-            Some(Mood::RunAway(_)) => "run away",
-            Some(Mood::GotoGuardian) => "go back",
-            Some(Mood::Follow) | None => "come along",
+        let plan = match self.episode.as_ref().map(|e| e.behavior) {
+            Some(ChildBehavior::RunAway(_)) => "run away",
+            Some(ChildBehavior::GotoGuardian) => "go back",
+            Some(ChildBehavior::Follow) | None => "come along",
         };
         Thought { plan: plan.to_owned(), mood: None }
     }
 
     fn child_state(&self) -> Option<ChildState> {
-        self.episode.as_ref().map(|e| match e.mood {
-            Mood::Follow => ChildState::Follow,
-            Mood::RunAway(_) => ChildState::RunAway,
-            Mood::GotoGuardian => ChildState::GotoGuardian,
+        self.episode.as_ref().map(|e| match e.behavior {
+            ChildBehavior::Follow => ChildState::Follow,
+            ChildBehavior::RunAway(_) => ChildState::RunAway,
+            ChildBehavior::GotoGuardian => ChildState::GotoGuardian,
         })
     }
 

@@ -91,7 +91,7 @@ impl Plan {
 
 /// What the hands hold, as far as decisions care.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Load {
+pub struct HandState {
     /// A hand with nothing in it.
     pub free_hand: Option<Hand>,
     /// Whether a container is in hand.
@@ -108,9 +108,9 @@ pub struct Load {
     pub to_deliver: Option<Hand>,
 }
 
-impl Load {
+impl HandState {
     /// What these hands of the briefing's reader carry.
-    pub fn of(hands: &Hands, briefing: &Briefing) -> Load {
+    pub fn of(hands: &Hands, briefing: &Briefing) -> HandState {
         let capacity = briefing.container_capacity;
         let is_target = |class: ClassId| briefing.possible_targets.contains(&class);
         let role = |held: &Carried| held.class().map(|c| c.info().role);
@@ -132,7 +132,7 @@ impl Load {
         };
         // What nobody knows is got rid of at the goal place, too.
         let carries = |h: &Carried| h.what.is_none() || h.all().any(|(_, class)| is_target(class));
-        Load {
+        HandState {
             free_hand,
             has_container,
             targets: hands.all().filter(|(_, class)| is_target(*class)).collect(),
@@ -209,21 +209,21 @@ pub trait Policy: Send + 'static {
 
 /// Every plan that can be begun now, those of one kind nearest first. Never empty.
 pub fn valid_plans(memory: &Memory, briefing: &Briefing) -> Vec<Plan> {
-    let load = Load::of(&memory.hands, briefing);
+    let hands = HandState::of(&memory.hands, briefing);
     let mut plans = vec![Plan::Explore];
-    if load.can_put_in {
+    if hands.can_put_in {
         plans.push(Plan::PutIn);
     }
-    if load.to_deliver.is_some() && !memory.goal_places().is_empty() {
+    if hands.to_deliver.is_some() && !memory.goal_places().is_empty() {
         plans.push(Plan::Deliver);
     }
-    if load.can_take_target {
+    if hands.can_take_target {
         plans.extend(reachable(memory, &briefing.possible_targets).map(Plan::PickUp));
     }
-    if load.can_take_container {
+    if hands.can_take_container {
         plans.extend(reachable(memory, &briefing.containers).map(Plan::PickContainer));
     }
-    if load.free_hand.is_some() && briefing.capability.removes_obstacles {
+    if hands.free_hand.is_some() && briefing.capability.removes_obstacles {
         plans.extend(reachable(memory, &briefing.obstacles).map(Plan::RemoveObstacle));
     }
     if memory.hands.held().next().is_none() {
@@ -301,12 +301,12 @@ mod tests {
             ([bike(2), None], [true, false, false, true]),
             ([bike(3), None], [false, false, false, true]),
         ] {
-            let load = Load::of(&hands(held.clone()), &briefing());
+            let hands = HandState::of(&hands(held.clone()), &briefing());
             let got = [
-                load.can_take_target,
-                load.can_take_container,
-                load.can_put_in,
-                load.to_deliver.is_some(),
+                hands.can_take_target,
+                hands.can_take_container,
+                hands.can_put_in,
+                hands.to_deliver.is_some(),
             ];
             assert_eq!(got, expected, "{held:?}");
         }

@@ -4,7 +4,7 @@ use chaic_protocol::Agent;
 use chaic_protocol::observation::Grants;
 
 use crate::mind::Mind;
-use crate::policies::{Follow, Random, RuleProfile, Rules};
+use crate::policies::{Follow, Random, RulePolicy, RuleProfile};
 use crate::rules::PlannerRules;
 
 /// The names of all helpers of this crate.
@@ -16,13 +16,13 @@ pub fn random(rules: PlannerRules) -> Mind<Random> {
 }
 
 /// The rule-based hierarchical planner: like the partner, without knowing its goal.
-pub fn rhp(rules: PlannerRules) -> Mind<Rules> {
-    Mind::new(Rules::new(RuleProfile::RHP), rules)
+pub fn rhp(rules: PlannerRules) -> Mind<RulePolicy> {
+    Mind::new(RulePolicy::new(RuleProfile::RHP), rules)
 }
 
 /// The same rules with the goal, the progress and the partner's doings known.
-pub fn oracle(rules: PlannerRules) -> Mind<Rules> {
-    Mind::new(Rules::new(RuleProfile::ORACLE), rules)
+pub fn oracle(rules: PlannerRules) -> Mind<RulePolicy> {
+    Mind::new(RulePolicy::new(RuleProfile::ORACLE), rules)
 }
 
 /// Always beside the partner.

@@ -7,7 +7,7 @@ use chaic_protocol::task::SceneKind;
 
 pub use crate::child::Child;
 use crate::mind::Mind;
-use crate::policies::{RuleProfile, Rules};
+use crate::policies::{RulePolicy, RuleProfile};
 use crate::rules::PlannerRules;
 
 /// What a partner is granted: perfect segmentation and its own goal.
@@ -15,19 +15,19 @@ pub const PARTNER_GRANTS: Grants = Grants::PARTNER;
 
 /// The constrained person indoors: adult, child or in a wheelchair. Obstacles are left to others
 /// (paper section 5.1.1).
-pub fn constrained(rules: PlannerRules) -> Mind<Rules> {
-    Mind::new(Rules::new(RuleProfile::PARTNER), rules)
+pub fn constrained(rules: PlannerRules) -> Mind<RulePolicy> {
+    Mind::new(RulePolicy::new(RuleProfile::PARTNER), rules)
 }
 
 /// The person with the bicycle: fills the basket, then delivers it.
-pub fn rider(rules: PlannerRules) -> Mind<Rules> {
-    Mind::new(Rules::new(RuleProfile::RIDER), rules)
+pub fn rider(rules: PlannerRules) -> Mind<RulePolicy> {
+    Mind::new(RulePolicy::new(RuleProfile::RIDER), rules)
 }
 
 /// The frail person who moves house: takes the nearest furniture, and tries again when it is too
 /// heavy. With furniture the rules of time come to "carry what you hold to the truck".
-pub fn frail(rules: PlannerRules) -> Mind<Rules> {
-    Mind::new(Rules::new(RuleProfile::PARTNER), rules)
+pub fn frail(rules: PlannerRules) -> Mind<RulePolicy> {
+    Mind::new(RulePolicy::new(RuleProfile::PARTNER), rules)
 }
 
 /// The mind of a task's partner.

@@ -51,8 +51,8 @@ pub struct Percepts {
     pub detections: Vec<Detection>,
     /// Pixels that say nothing of what stands firmly in the room: own burden, people, and whatever
     /// can be carried or moved. Bool, shape [height / stride, width / stride] rounded up.
-    pub loose: Vec<bool>,
-    /// Which pixels `loose` samples: every how many rows and columns.
+    pub dynamic_mask: Vec<bool>,
+    /// Which pixels `dynamic_mask` samples: every how many rows and columns.
     pub stride: u32,
     /// What the own hands hold, if perception can tell; otherwise the mind keeps account of what it
     /// saw itself take.
@@ -114,7 +114,7 @@ impl<P: Perception + Clone + 'static> Perception for Pointing<P> {
 }
 
 #[derive(Clone, Copy, PartialEq)]
-enum Look {
+enum PixelKind {
     /// Structure, or something that is not to be reported.
     Firm,
     /// Own burden.
@@ -122,19 +122,21 @@ enum Look {
     /// Small: every pixel counts.
     Small,
     /// Large and movable, or a person.
-    Loose,
+    Dynamic,
     /// Large and fixed.
     Fixed,
 }
 
-impl Look {
-    fn of(entity: EntityId, class: Option<ClassId>) -> Look {
+impl PixelKind {
+    fn of(entity: EntityId, class: Option<ClassId>) -> PixelKind {
         match class.map(|c| c.info().role) {
-            _ if entity.agent().is_some() => Look::Loose,
-            Some(Role::Target | Role::Container | Role::Fragile) => Look::Small,
-            Some(Role::Obstacle | Role::HeavyTarget | Role::Vehicle | Role::Person) => Look::Loose,
-            Some(Role::Furnishing) => Look::Fixed,
-            None => Look::Firm,
+            _ if entity.agent().is_some() => PixelKind::Dynamic,
+            Some(Role::Target | Role::Container | Role::Fragile) => PixelKind::Small,
+            Some(Role::Obstacle | Role::HeavyTarget | Role::Vehicle | Role::Person) => {
+                PixelKind::Dynamic
+            }
+            Some(Role::Furnishing) => PixelKind::Fixed,
+            None => PixelKind::Firm,
         }
     }
 }
@@ -260,12 +262,12 @@ impl Rays {
 }
 
 /// A walk over the pixels of one image, compiled for vectors of each width: the sums over each thing,
-/// and [`Percepts::loose`].
+/// and [`Percepts::dynamic_mask`].
 struct Measure<'a> {
     ids: &'a [u16],
     depth: &'a [f32],
     width: usize,
-    looks: &'a [Look],
+    kinds: &'a [PixelKind],
     rays: &'a Rays,
 }
 
@@ -274,13 +276,13 @@ impl pulp::NullaryFnOnce for Measure<'_> {
 
     #[inline(always)]
     fn call(self) -> Self::Output {
-        let Measure { ids, depth, width, looks, rays } = self;
+        let Measure { ids, depth, width, kinds, rays } = self;
         let height = rays.rows.len();
         let stride = STRIDE as usize;
         let coarse_stride = (width / MEASURED_PER_ROW).max(stride);
-        let mut tallies: Vec<Tally> = looks.iter().map(|_| Tally::NEW).collect();
+        let mut tallies: Vec<Tally> = kinds.iter().map(|_| Tally::NEW).collect();
         let sampled_width = width.div_ceil(stride);
-        let mut loose = vec![false; sampled_width * height.div_ceil(stride)];
+        let mut dynamic_mask = vec![false; sampled_width * height.div_ceil(stride)];
         for row in 0..height {
             let (ids, depth) = (&ids[row * width..][..width], &depth[row * width..][..width]);
             let on_row = row % stride == 0;
@@ -289,12 +291,12 @@ impl pulp::NullaryFnOnce for Measure<'_> {
                 let from = end;
                 end += run_length(&ids[from..]);
                 let id = usize::from(ids[from]);
-                let look = looks.get(id).copied().unwrap_or(Look::Firm);
-                if on_row && !matches!(look, Look::Firm | Look::Fixed) {
+                let kind = kinds.get(id).copied().unwrap_or(PixelKind::Firm);
+                if on_row && !matches!(kind, PixelKind::Firm | PixelKind::Fixed) {
                     let sampled = from.div_ceil(stride)..end.div_ceil(stride);
-                    loose[row / stride * sampled_width..][sampled].fill(true);
+                    dynamic_mask[row / stride * sampled_width..][sampled].fill(true);
                 }
-                if matches!(look, Look::Firm | Look::Own) {
+                if matches!(kind, PixelKind::Firm | PixelKind::Own) {
                     continue;
                 }
                 let tally = &mut tallies[id];
@@ -306,7 +308,7 @@ impl pulp::NullaryFnOnce for Measure<'_> {
                         tally.add(rays.point(column, row, depth[column]));
                     }
                 };
-                if look == Look::Small {
+                if kind == PixelKind::Small {
                     (from..end).for_each(add);
                 } else if row % coarse_stride == 0 {
                     let first = from.next_multiple_of(coarse_stride);
@@ -314,28 +316,28 @@ impl pulp::NullaryFnOnce for Measure<'_> {
                 }
             }
         }
-        (tallies, loose)
+        (tallies, dynamic_mask)
     }
 }
 
 impl GroundTruthIds {
     /// How each entity is looked at, by entity number.
-    fn looks(observation: &Observation) -> Option<Vec<Look>> {
+    fn kinds(observation: &Observation) -> Option<Vec<PixelKind>> {
         let classes = &observation.granted.classes;
         let n = usize::from(classes.last()?.0.0) + 1;
-        let mut looks = vec![Look::Firm; n];
+        let mut kinds = vec![PixelKind::Firm; n];
         for (entity, class) in classes {
-            looks[usize::from(entity.0)] = Look::of(*entity, Some(*class));
+            kinds[usize::from(entity.0)] = PixelKind::of(*entity, Some(*class));
         }
         let own = observation.own.held().filter_map(|held| held.identity.as_ref());
         let own = own
             .flat_map(|it| std::iter::once(it.entity).chain(it.contents.iter().map(|(e, _)| *e)));
         for entity in own {
-            if let Some(look) = looks.get_mut(usize::from(entity.0)) {
-                *look = Look::Own;
+            if let Some(kind) = kinds.get_mut(usize::from(entity.0)) {
+                *kind = PixelKind::Own;
             }
         }
-        Some(looks)
+        Some(kinds)
     }
 
     /// What the hands hold, as the grant of ids tells.
@@ -364,13 +366,13 @@ impl Perception for GroundTruthIds {
             return Percepts { hands, ..Percepts::default() };
         };
         // An image without any object shows structure alone.
-        let looks = GroundTruthIds::looks(observation).unwrap_or_default();
+        let kinds = GroundTruthIds::kinds(observation).unwrap_or_default();
         if ids.len() != width * height || depth.len() != width * height {
             return Percepts { hands, ..Percepts::default() };
         }
         let rays = Rays::new(&observation.camera);
-        let measure = Measure { ids, depth, width, looks: &looks, rays: &rays };
-        let (tallies, loose) = pulp::Arch::new().dispatch(measure);
+        let measure = Measure { ids, depth, width, kinds: &kinds, rays: &rays };
+        let (tallies, dynamic_mask) = pulp::Arch::new().dispatch(measure);
         let detections = tallies
             .into_iter()
             .enumerate()
@@ -380,7 +382,7 @@ impl Perception for GroundTruthIds {
                 Some(t.detection(entity, observation.granted.class_of(entity)?))
             })
             .collect();
-        Percepts { detections, loose, stride: STRIDE, hands }
+        Percepts { detections, dynamic_mask, stride: STRIDE, hands }
     }
 
     fn target(&self, track: TrackId) -> Option<Target> {
@@ -408,7 +410,7 @@ mod tests {
         assert_eq!(seen.class.name(), "apple");
         assert!((seen.position_in_world - Vec3::new(0.95, 0.65, -1.9)).length() < 0.12, "{seen:?}");
         assert!((seen.top_m - 0.7).abs() < 0.03, "{}", seen.top_m);
-        assert_eq!(percepts.loose.len(), toy.pixels().div_ceil(4) as usize);
+        assert_eq!(percepts.dynamic_mask.len(), toy.pixels().div_ceil(4) as usize);
     }
 
     #[test]

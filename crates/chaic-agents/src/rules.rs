@@ -102,7 +102,7 @@ pub struct PlannerRules {
     pub put_within_m: f32,
     /// Whether an object is left alone after any failed attempt, not only one beyond one's limits.
     pub any_failure_counts: bool,
-    /// How long a goal place is forgotten after a vain put-on, frames.
+    /// How long a goal place is forgotten after a failed put-on, frames.
     pub goal_blackout_frames: Frame,
     /// How long something that somebody else was seen, told or found to hold is left alone,
     /// frames.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use chaic_protocol::agent::{ChildState, Thought};
+use chaic_protocol::observation::Images;
 use chaic_protocol::{Action, AgentError, AgentId, Briefing, Frame, Observation, Target};
 use chaic_render::{ImagesMut, Scene};
 use chaic_world::{Setup, World};
@@ -40,6 +41,8 @@ pub struct Env {
     observer: Observer,
     header: Header,
     turns: Vec<Turn>,
+    /// Images that nobody looks at any more.
+    spare: Vec<Images>,
 }
 
 /// All of an episode as it stood, minds included; see [`Env::snapshot`]. It lives in memory only: minds
@@ -124,7 +127,7 @@ impl Env {
         let scene = Scene::with_appearance(world.setup(), config.appearance);
         let observer = Observer::new(Arc::new(scene));
         let turns = seats.iter().map(|_| Turn::default()).collect();
-        Env { world, seats, filled, observer, header, turns }
+        Env { world, seats, filled, observer, header, turns, spare: Vec::new() }
     }
 
     /// Begins another episode with the same minds and callers, and with the rule-based partner and
@@ -212,7 +215,7 @@ impl Env {
         let turn = &mut self.turns[agent.index()];
         if turn.glimpse.is_none() {
             let looking = [(agent, &self.seats[agent.index()])];
-            turn.glimpse = self.observer.observe(&self.world, &looking).pop();
+            turn.glimpse = self.observer.observe(&self.world, &looking, &mut self.spare).pop();
         }
         turn.glimpse.as_ref().map(|glimpse| &glimpse.observation)
     }
@@ -325,7 +328,7 @@ impl Env {
         until: Option<Frame>,
         sink: &mut dyn FnMut(&Record) -> std::result::Result<(), E>,
     ) -> std::result::Result<Flow, E> {
-        let Env { world, seats, observer, turns, .. } = self;
+        let Env { world, seats, observer, turns, spare, .. } = self;
         let mut flow = Flow::Stopped;
         let mut decide = |world: &World, waiting: &[AgentId]| -> Decided<E> {
             let late = until.is_some_and(|f| world.state().frame >= f);
@@ -338,11 +341,14 @@ impl Env {
                 fresh.iter().filter(|a| seats[a.index()].mind().is_some()).copied().collect();
             let glimpses = {
                 let looking: Vec<_> = minds.iter().map(|a| (*a, &seats[a.index()])).collect();
-                observer.observe(world, &looking)
+                observer.observe(world, &looking, spare)
             };
             for (agent, glimpse) in minds.into_iter().zip(glimpses) {
                 let turn = &mut turns[agent.index()];
                 turn.choice = choose(&mut seats[agent.index()], agent, &glimpse, &mut turn.said)?;
+                if seats[agent.index()].senses.wants_image() {
+                    spare.push(glimpse.into_images());
+                }
             }
             for agent in fresh {
                 turns[agent.index()].is_open = true;

@@ -27,6 +27,13 @@ pub struct Glimpse {
 }
 
 impl Glimpse {
+    /// Its images, for their memory.
+    pub(crate) fn into_images(self) -> Images {
+        let mut images = self.observation.images;
+        images.ids = images.ids.or(self.hidden_ids);
+        images
+    }
+
     /// The action with its target resolved to what the pixel shows, or to the entity where ids are
     /// granted; anything else names [`EntityId::NOTHING`].
     pub fn resolve(&self, action: Action) -> ResolvedAction {
@@ -72,16 +79,21 @@ impl Observer {
     }
 
     /// What these agents perceive now: images are made for all of them at once, and only those
-    /// that are wanted.
-    pub fn observe(&self, world: &World, who: &[(AgentId, &Seat)]) -> Vec<Glimpse> {
+    /// that are wanted. Memory of `spare` images is used again.
+    pub fn observe(
+        &self,
+        world: &World,
+        who: &[(AgentId, &Seat)],
+        spare: &mut Vec<Images>,
+    ) -> Vec<Glimpse> {
         let looking = who.iter().filter(|(_, a)| a.senses.wants_image());
         let views: Vec<View> =
             looking.map(|(agent, seat)| view_of(world, *agent, seat.senses)).collect();
-        let mut images = match views[..] {
-            [] => Vec::new(),
-            _ => self.scene.render(world, &views),
+        let mut images = spare.split_off(spare.len().saturating_sub(views.len()));
+        if !views.is_empty() {
+            self.scene.render_into(world, &views, &mut images);
         }
-        .into_iter();
+        let mut images = images.into_iter();
         who.iter()
             .map(|(agent, seat)| {
                 let images = if seat.senses.wants_image() { images.next() } else { None }

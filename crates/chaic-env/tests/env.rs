@@ -214,7 +214,7 @@ fn deliveries_approaches_and_failures_are_rewarded_as_they_come() {
             assert_eq!(terms.is_invalid, outcome.is_some_and(|o| !o.is_success()));
         }
         let seen = env.observe(AgentId::HELPER).expect("it waits");
-        // One vain action, to see that it is told.
+        // One that must fail, to see that it is told.
         let action = match seen.frame {
             0 => Action::PutIn,
             _ => mind.act(seen).expect("rules decide"),

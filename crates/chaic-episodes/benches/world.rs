@@ -9,7 +9,7 @@ use chaic_protocol::{Action, EntityId, Hand, ResolvedAction};
 use chaic_world::{Rules, Setup, World};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
-/// Half of all actions are steps, a quarter turns; the rest are deeds with things of the episode.
+/// Half of all actions are steps, a quarter turns; the rest are interactions with things of the episode.
 fn any_action(rng: &mut Stream, n_things: usize) -> ResolvedAction {
     let hand = if rng.chance(0.5) { Hand::Left } else { Hand::Right };
     let thing = |rng: &mut Stream| -> EntityId { Setup::entity(rng.below(n_things)) };

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use chaic_episodes::{Split, episodes};
 use chaic_protocol::{AgentId, TaskId};
-use chaic_render::{Channels, Looks, Scene, View, render_batch};
+use chaic_render::{Channels, Scene, View, WorldViews, render_batch};
 use chaic_world::{Rules, World};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -30,11 +30,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .iter()
         .map(|world| [View::of_eye(helper, world.eye(helper, size), Channels::ALL)])
         .collect();
-    let batch: Vec<Looks> = worlds
+    let batch: Vec<WorldViews> = worlds
         .iter()
         .zip(&scenes)
         .zip(&views)
-        .map(|((world, scene), views)| Looks { scene, world, views })
+        .map(|((world, scene), views)| WorldViews { scene, world, views })
         .collect();
     let mut images = Vec::new();
     // The first round makes textures and meshes.

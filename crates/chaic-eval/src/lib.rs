@@ -28,9 +28,9 @@ pub mod run;
 
 pub mod fidelity;
 
+pub mod frame_export;
 pub mod replay;
 pub mod scene_file;
-pub mod still;
 pub mod verify;
 
 pub mod audit;

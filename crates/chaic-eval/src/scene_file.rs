@@ -11,7 +11,7 @@ use chaic_render::{Scene, gltf_out};
 use chaic_world::{Posture, Rules, World};
 
 use crate::error::Result;
-use crate::still::name_of;
+use crate::frame_export::name_of;
 
 /// How a scene becomes a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -76,6 +76,6 @@ fn draw(mut setup: Setup, path: &std::path::Path) -> Result<(), Box<dyn Error>> 
     let pose = Pose { position, yaw_rad: 0.0 };
     setup.people.push(Person { persona: Persona::Adult, pose, look: 0, capability: None });
     let world = World::new(setup, Rules::paper())?;
-    chaic_render::plan::draw(&world, 960).save(path)?;
+    chaic_render::floor_plan::draw(&world, 960).save(path)?;
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! Helpers and partners whose plans a language model chooses.
 //!
 //! **What it is**: a [`policy::LanguagePolicy`] for the minds of `chaic-agents`. What the mind's
-//! own memory holds becomes [`facts`], these fill [`templates`] in six parts, an [`asker`] gets an
+//! own memory holds becomes [`prompt_context`], these fill [`templates`] in six parts, an [`asker`] gets an
 //! answer (from an [`endpoint`], through the [`gate`] that keeps the budget, or from a [`record`]),
 //! and [`answer`] reads the number of a listed plan in it. [`language`] hands a run its helpers,
 //! [`show`] prints what was asked and answered.
@@ -25,7 +25,7 @@ pub mod named;
 pub mod settings;
 
 pub mod exchange;
-pub mod facts;
+pub mod prompt_context;
 pub mod templates;
 pub mod tokens;
 

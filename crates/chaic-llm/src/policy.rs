@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use chaic_agents::decision::{Context, Plan, Policy};
-use chaic_agents::policies::{RuleProfile, Rules};
+use chaic_agents::policies::{RulePolicy, RuleProfile};
 use chaic_env::RunKey;
 use chaic_protocol::capability::Gait;
 use chaic_protocol::{AgentError, Briefing, Frame, Observation};
@@ -15,8 +15,8 @@ use crate::endpoint::PicturesByHash;
 use crate::exchange::{
     Ask, By, Decided, Exchange, FaultKind, Message, Purpose, Reply, Role, Usage,
 };
-use crate::facts::{Facts, LENGTHS};
 use crate::pictures::Album;
+use crate::prompt_context::{LENGTHS, PromptContext};
 use crate::session::Session;
 use crate::settings::{Asking, Fallback, Form, Steps};
 use crate::templates::{Question, Track};
@@ -33,7 +33,7 @@ pub struct LanguagePolicy {
     key: Option<RunKey>,
     track: Track,
     looks: bool,
-    rules: Rules,
+    rules: RulePolicy,
     thread: Thread,
     by_schema: bool,
     album: Album,
@@ -48,7 +48,7 @@ pub struct LanguagePolicy {
 
 /// A prompt with what it lists.
 struct Prompt {
-    facts: Facts,
+    facts: PromptContext,
     plans: Vec<Plan>,
     texts: Vec<String>,
     text: String,
@@ -73,7 +73,7 @@ impl LanguagePolicy {
             key,
             track,
             looks,
-            rules: Rules::new(RuleProfile::RHP),
+            rules: RulePolicy::new(RuleProfile::RHP),
             thread: Thread::default(),
             by_schema: false,
             album: Album::default(),
@@ -255,7 +255,7 @@ impl LanguagePolicy {
         let mut shortest = None;
         for (shortened, length) in LENGTHS.into_iter().enumerate() {
             let (facts, plans) =
-                Facts::of(self.track, context, menu, self.last_plan, images, length);
+                PromptContext::of(self.track, context, menu, self.last_plan, images, length);
             let text = self.fill(self.session.templates.prompt(&facts, question))?;
             let mut tokens = tokens::estimate(&text) + AGAIN_TOKENS;
             if asking.steps == Steps::Two {
@@ -320,7 +320,7 @@ impl LanguagePolicy {
         let decided = Decided {
             frame,
             number,
-            plan: crate::facts::plan_text(&plan),
+            plan: crate::prompt_context::plan_text(&plan),
             by,
             lenient,
             prompt_tokens: prompt.map(|p| p.tokens),
@@ -345,7 +345,7 @@ impl Policy for LanguagePolicy {
             (Track::Partner, _) => RuleProfile::PARTNER,
             (Track::Hidden | Track::Told, _) => RuleProfile::RHP,
         };
-        self.rules = Rules::new(profile);
+        self.rules = RulePolicy::new(profile);
         self.rules.reset(briefing);
         self.thread = match &self.key {
             Some(key) => Thread::open(&self.session, key, briefing.me),

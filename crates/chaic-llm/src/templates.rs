@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use crate::error::{LlmError, Result};
 use crate::exchange::ContentHash;
-use crate::facts::Facts;
+use crate::prompt_context::PromptContext;
 
 /// Longest template that is read, bytes.
 const MAX_TEMPLATE_BYTES: u64 = 1 << 20;
@@ -119,7 +119,7 @@ impl Templates {
     ///
     /// # Errors
     /// If a template can't be filled in.
-    pub fn prompt(&self, facts: &Facts, question: Question) -> Result<String> {
+    pub fn prompt(&self, facts: &PromptContext, question: Question) -> Result<String> {
         let task = match facts.track {
             Track::Hidden => "task.txt",
             Track::Told => "task_told.txt",
@@ -153,7 +153,7 @@ impl Templates {
     ///
     /// # Errors
     /// If the template can't be filled in.
-    pub fn choose(&self, facts: &Facts) -> Result<String> {
+    pub fn choose(&self, facts: &PromptContext) -> Result<String> {
         self.fill("ask_choose.txt", facts)
     }
 
@@ -161,11 +161,11 @@ impl Templates {
     ///
     /// # Errors
     /// If the template can't be filled in.
-    pub fn again(&self, facts: &Facts, problem: &str, schema: bool) -> Result<String> {
+    pub fn again(&self, facts: &PromptContext, problem: &str, schema: bool) -> Result<String> {
         #[derive(Serialize)]
         struct Again<'a> {
             #[serde(flatten)]
-            facts: &'a Facts,
+            facts: &'a PromptContext,
             problem: &'a str,
             schema: bool,
         }
@@ -181,7 +181,7 @@ impl Templates {
 
     /// Fills in everything once, so that a mistake is found before the first episode.
     fn try_all(&self) -> Result<()> {
-        for facts in Facts::samples() {
+        for facts in PromptContext::samples() {
             for question in [Question::Schema, Question::Text, Question::Think] {
                 self.prompt(&facts, question)?;
             }
@@ -232,7 +232,7 @@ mod tests {
     #[test]
     fn the_built_in_ones_can_be_filled_in_and_have_all_six_parts() {
         let templates = Templates::load(None).unwrap();
-        for facts in Facts::samples() {
+        for facts in PromptContext::samples() {
             let prompt = templates.prompt(&facts, Question::Schema).unwrap();
             let titles: Vec<&str> = prompt.lines().filter(|l| l.starts_with("## ")).collect();
             assert_eq!(titles.len(), 6, "{prompt}");
@@ -246,7 +246,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         fs::write(dir.path().join("ask_text.txt"), "Say a number, {{ track }}.").unwrap();
         let templates = Templates::load(Some(dir.path())).unwrap();
-        let facts = &Facts::samples()[0];
+        let facts = &PromptContext::samples()[0];
         assert!(
             templates.prompt(facts, Question::Text).unwrap().ends_with("Say a number, hidden.")
         );

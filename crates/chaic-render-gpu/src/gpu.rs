@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use chaic_render::Scene;
-use chaic_render::geometry::{Regions, ShapeName, Shapes, atlas};
+use chaic_render::geometry::{PortalGraph, ShapeName, Shapes, atlas};
 use chaic_world::{Posture, State, World};
 
 use crate::batch::Spare;
@@ -43,7 +43,7 @@ pub(crate) struct Placed {
     pub instances: Range<u32>,
     pub light: PlacedLight,
     /// Of its scene, whose own they are.
-    pub regions: Arc<Regions>,
+    pub regions: Arc<PortalGraph>,
     pub bodies: Vec<PlacedBody>,
     /// All its other shapes, those of structure first.
     meshes: Vec<PlacedMesh>,

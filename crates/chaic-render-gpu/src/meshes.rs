@@ -15,7 +15,7 @@ use crate::upload::PackedMesh;
 #[derive(Debug)]
 pub(crate) struct Meshes {
     pub records: Pool<MeshRecord>,
-    pub corners: Pool<[u32; 4]>,
+    pub vertices: Pool<[u32; 4]>,
     pub triangles: Pool<[u32; 2]>,
     pub skins: Pool<SkinRecord>,
     known: BTreeMap<u128, Shared>,
@@ -35,7 +35,7 @@ struct Shared {
 /// Where the parts of a mesh are.
 #[derive(Debug)]
 pub(crate) struct Parts {
-    corners: Range<u32>,
+    vertices: Range<u32>,
     triangles: Range<u32>,
     skins: Range<u32>,
 }
@@ -44,7 +44,7 @@ impl Meshes {
     pub fn new(link: &Link) -> Result<Meshes, GpuError> {
         Ok(Meshes {
             records: Pool::new(link, "meshes", 1 << 10)?,
-            corners: Pool::new(link, "corners", 1 << 16)?,
+            vertices: Pool::new(link, "vertices", 1 << 16)?,
             triangles: Pool::new(link, "triangles", 1 << 16)?,
             skins: Pool::new(link, "skins", 1 << 12)?,
             known: BTreeMap::new(),
@@ -104,13 +104,13 @@ impl Meshes {
     /// Brings the parts of a mesh onto the device, but no record of it; gives that.
     pub fn put(&mut self, link: &Link, mesh: &PackedMesh) -> Result<(Parts, MeshRecord), GpuError> {
         let parts = Parts {
-            corners: self.corners.add(link, &mesh.corners)?,
+            vertices: self.vertices.add(link, &mesh.vertices)?,
             triangles: self.triangles.add(link, &mesh.triangles)?,
             skins: self.skins.add(link, &mesh.skins)?,
         };
         let mut record = mesh.record;
         for level in &mut record.levels {
-            level[0] += parts.corners.start;
+            level[0] += parts.vertices.start;
             level[1] += parts.triangles.start;
             level[3] += parts.skins.start;
         }
@@ -119,7 +119,7 @@ impl Meshes {
 
     /// Takes the parts of a mesh off the device.
     pub fn take(&mut self, parts: Parts) {
-        self.corners.remove(parts.corners);
+        self.vertices.remove(parts.vertices);
         self.triangles.remove(parts.triangles);
         self.skins.remove(parts.skins);
     }
@@ -141,6 +141,6 @@ impl Meshes {
 
     /// Bytes on the device.
     pub fn bytes(&self) -> u64 {
-        self.records.bytes() + self.corners.bytes() + self.triangles.bytes() + self.skins.bytes()
+        self.records.bytes() + self.vertices.bytes() + self.triangles.bytes() + self.skins.bytes()
     }
 }

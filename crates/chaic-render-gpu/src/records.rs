@@ -130,7 +130,7 @@ pub(crate) const LIT_BY_POINT: u32 = 2;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct MeshRecord {
-    /// First corner, first triangle, number of triangles, first skin.
+    /// First vertex, first triangle, number of triangles, first skin.
     pub levels: [[u32; 4]; N_LEVELS],
 }
 

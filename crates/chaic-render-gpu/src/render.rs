@@ -217,7 +217,7 @@ impl Gpu {
         self.fit_arena(&lists.most)?;
         let (link, passes) = (&self.link, &self.passes);
         let (records, instances) = (&self.meshes.records.buffer, &self.instances.buffer);
-        let (corners, triangles) = (&self.meshes.corners.buffer, &self.meshes.triangles.buffer);
+        let (vertices, triangles) = (&self.meshes.vertices.buffer, &self.meshes.triangles.buffer);
         let Arena { bounds, filled, .. } = &self.arena;
         let Lists { views, visible, levels, tallies, .. } = lists;
         let groups = groups(&lists.most, self.arena.triangles);
@@ -239,7 +239,7 @@ impl Gpu {
                 link,
                 &passes.setup,
                 &[
-                    views, instances, records, visible, levels, tallies, corners, triangles,
+                    views, instances, records, visible, levels, tallies, vertices, triangles,
                     firsts, bounds, filled, round,
                 ],
             );
@@ -263,7 +263,7 @@ impl Gpu {
                         instances,
                         records,
                         levels,
-                        corners,
+                        vertices,
                         triangles,
                         skins,
                         &lights.buffer,

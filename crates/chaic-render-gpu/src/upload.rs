@@ -10,11 +10,11 @@ use crate::records::{
 /// A mesh at some levels, in the layout of the device.
 pub(crate) struct PackedMesh {
     /// Position, and the normal in two signed 16-bit numbers.
-    pub corners: Vec<[u32; 4]>,
-    /// Corner, corner, corner, skin, whether smooth: 16, 16, 16, 8 and 8 bits.
+    pub vertices: Vec<[u32; 4]>,
+    /// Vertex, vertex, vertex, skin, whether smooth: 16, 16, 16, 8 and 8 bits.
     pub triangles: Vec<[u32; 2]>,
     pub skins: Vec<SkinRecord>,
-    /// Offsets count from the mesh's own first corner, triangle and skin. Levels that aren't there
+    /// Offsets count from the mesh's own first vertex, triangle and skin. Levels that aren't there
     /// have no triangles.
     pub record: MeshRecord,
 }
@@ -23,14 +23,14 @@ impl PackedMesh {
     /// Packs levels of a shape.
     pub fn of(levels: impl Iterator<Item = (usize, MeshData)>) -> PackedMesh {
         let mut packed = PackedMesh {
-            corners: Vec::new(),
+            vertices: Vec::new(),
             triangles: Vec::new(),
             skins: Vec::new(),
             record: bytemuck::Zeroable::zeroed(),
         };
         for (level, mesh) in levels {
             packed.record.levels[level] = [
-                packed.corners.len() as u32,
+                packed.vertices.len() as u32,
                 packed.triangles.len() as u32,
                 mesh.triangles.len() as u32,
                 packed.skins.len() as u32,
@@ -42,10 +42,10 @@ impl PackedMesh {
 
     fn add(&mut self, mesh: &MeshData) {
         for (p, n) in mesh.positions.iter().zip(&mesh.normals) {
-            self.corners.push([p[0].to_bits(), p[1].to_bits(), p[2].to_bits(), packed_normal(*n)]);
+            self.vertices.push([p[0].to_bits(), p[1].to_bits(), p[2].to_bits(), packed_normal(*n)]);
         }
         self.triangles.extend(mesh.triangles.iter().map(|t| {
-            let [a, b, c] = t.corners;
+            let [a, b, c] = t.vertices;
             [a | b << 16, c | u32::from(t.skin) << 16 | u32::from(t.smooth) << 24]
         }));
         self.skins.extend(mesh.skins.iter().map(|skin| {
@@ -67,7 +67,7 @@ impl PackedMesh {
     pub fn key(&self) -> u128 {
         let mut hash = Xxh3::new();
         hash.update(bytemuck::bytes_of(&self.record));
-        hash.update(bytemuck::cast_slice(&self.corners));
+        hash.update(bytemuck::cast_slice(&self.vertices));
         hash.update(bytemuck::cast_slice(&self.triangles));
         hash.update(bytemuck::cast_slice(&self.skins));
         hash.digest128()

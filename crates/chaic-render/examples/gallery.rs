@@ -16,7 +16,7 @@ use chaic_protocol::geom::Camera;
 use chaic_protocol::{AgentId, ClassId, Role, TaskId, Vec3};
 use chaic_render::geometry::Geometry;
 use chaic_render::text::{self, Align};
-use chaic_render::{Appearance, Channels, LEVEL_RADIUS_PX, Scene, View, image_out, plan};
+use chaic_render::{Appearance, Channels, LEVEL_RADIUS_PX, Scene, View, floor_plan, image_out};
 use chaic_world::{Posture, Setup, Thing, World};
 use image::RgbImage;
 use image::codecs::png::{CompressionType, FilterType as PngFilter, PngEncoder};
@@ -70,7 +70,7 @@ fn main() -> Result<()> {
         ),
     ] {
         views(folder, name, world, &cameras)?;
-        plan::draw(world, 1100).save(folder.join(format!("{name}_plan.png")))?;
+        floor_plan::draw(world, 1100).save(folder.join(format!("{name}_plan.png")))?;
     }
     Ok(())
 }

@@ -7,7 +7,7 @@ use chaic_protocol::geom::math;
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{EntityId, Vec3};
 
-use crate::lamps::Lamps;
+use crate::light_rig::LightRig;
 use crate::mesh::unit;
 
 /// How a scene is lit and colored.
@@ -64,10 +64,10 @@ pub(crate) enum Painted {
 
 impl Appearance {
     /// The lights.
-    pub(crate) fn lamps(self) -> Lamps {
+    pub(crate) fn light_rig(self) -> LightRig {
         match self {
-            Appearance::Canonical => Lamps::DAY,
-            Appearance::Evening => Lamps::EVENING,
+            Appearance::Canonical => LightRig::DAY,
+            Appearance::Evening => LightRig::EVENING,
             Appearance::Varied { seed } => varied(seed),
         }
     }
@@ -88,9 +88,9 @@ impl Appearance {
     }
 }
 
-fn varied(seed: u64) -> Lamps {
+fn varied(seed: u64) -> LightRig {
     let mut rng = Stream::new(seed, "appearance of light", 0);
-    let from = if rng.range(0.0, 1.0) < 0.7 { Lamps::DAY } else { Lamps::EVENING };
+    let from = if rng.range(0.0, 1.0) < 0.7 { LightRig::DAY } else { LightRig::EVENING };
     let azimuth = rng.range(0.0, std::f32::consts::TAU);
     let elevation = rng.range(0.25, 1.25);
     let flat = math::cos(elevation);
@@ -105,7 +105,7 @@ fn varied(seed: u64) -> Lamps {
     let lamp = color(from.lamp, [0.6, 1.2], 0.2);
     let around = color(Vec3::ONE, [0.75, 1.15], 0.1);
     let sky = color(Vec3::ONE, [0.85, 1.1], 0.08);
-    Lamps {
+    LightRig {
         to_sun,
         sun,
         lamp,
@@ -133,9 +133,9 @@ mod tests {
     fn every_draw_can_be_seen_by() {
         for seed in 0..2000 {
             let appearance = Appearance::Varied { seed };
-            let lamps = appearance.lamps();
-            assert!((lamps.to_sun.length() - 1.0).abs() < 1e-4 && lamps.to_sun.y > 0.2);
-            for [high, low] in [lamps.indoors, lamps.outdoors] {
+            let rig = appearance.light_rig();
+            assert!((rig.to_sun.length() - 1.0).abs() < 1e-4 && rig.to_sun.y > 0.2);
+            for [high, low] in [rig.indoors, rig.outdoors] {
                 assert!(high.min_element() > 0.1 && low.min_element() > 0.08, "{seed}: dark");
                 assert!(high.max_element() < 0.75, "{seed}: glaring");
             }

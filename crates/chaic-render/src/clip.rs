@@ -4,9 +4,9 @@ use chaic_protocol::Vec3;
 
 use crate::setup::Slope;
 
-/// A triangle cut at a depth: up to four corners on the image, and its nearness.
+/// A triangle cut at a depth: up to four vertices on the image, and its inverse depth.
 pub(crate) struct Clipped {
-    pub corners: [(f32, f32); 4],
+    pub vertices: [(f32, f32); 4],
     pub n: usize,
     pub slope: Slope,
 }
@@ -14,8 +14,8 @@ pub(crate) struct Clipped {
 /// Cuts a triangle given in camera coordinates (see [`crate::lens::IntoCamera`]) at depth `near_m`;
 /// `None` if nothing is left or it turns its back.
 pub(crate) fn clip(p: [Vec3; 3], near_m: f32, (mu, mv): (f32, f32)) -> Option<Clipped> {
-    // The plane n . p = d gives nearness 1 / w = (n.x * x / w + n.y * y / w + n.z) / d exactly,
-    // however far outside of the image the corners are.
+    // The plane n . p = d gives inverse depth 1 / w = (n.x * x / w + n.y * y / w + n.z) / d exactly,
+    // however far outside of the image the vertices are.
     let [a, b, c] = p.map(|p| [f64::from(p.x), f64::from(p.y), f64::from(p.z)]);
     let minus = |p: [f64; 3], q: [f64; 3]| [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
     let (e, f) = (minus(b, a), minus(c, a));
@@ -25,7 +25,7 @@ pub(crate) fn clip(p: [Vec3; 3], near_m: f32, (mu, mv): (f32, f32)) -> Option<Cl
         return None;
     }
     let mut out = Clipped {
-        corners: [(0.0, 0.0); 4],
+        vertices: [(0.0, 0.0); 4],
         n: 0,
         slope: Slope {
             q: (n[2] / d) as f32,
@@ -57,7 +57,7 @@ pub(crate) fn clip(p: [Vec3; 3], near_m: f32, (mu, mv): (f32, f32)) -> Option<Cl
 impl Clipped {
     fn push(&mut self, p: Vec3, mu: f32, mv: f32) {
         if self.n < 4 {
-            self.corners[self.n] = (mu + p.x / p.z, mv + p.y / p.z);
+            self.vertices[self.n] = (mu + p.x / p.z, mv + p.y / p.z);
             self.n += 1;
         }
     }
@@ -79,6 +79,6 @@ mod tests {
         let s = clipped.slope;
         let q = s.q + s.dv * 20.0;
         assert!((1.0 / q - 5.0).abs() < 1e-4, "{}", 1.0 / q);
-        assert!(clipped.corners[..3].iter().any(|c| (c.1 - 60.0).abs() < 1e-3), "tip at 10 m");
+        assert!(clipped.vertices[..3].iter().any(|c| (c.1 - 60.0).abs() < 1e-3), "tip at 10 m");
     }
 }

@@ -1,4 +1,4 @@
-//! Who is seen where: culling, order and drawing of one camera's view.
+//! Drawing of one camera's view: frustum, portal and occlusion culling, draw order, rasterization.
 
 use chaic_protocol::{EntityId, Vec3};
 
@@ -6,9 +6,9 @@ use crate::clip::clip;
 use crate::frame::{Frame, Instance};
 use crate::lens::{IntoCamera, Lens};
 use crate::mesh::Mesh;
-use crate::raster::{Owner, Target};
-use crate::regions::Seen;
-use crate::setup::{Corners, N_SETUPS, Setup, Setups};
+use crate::portals::VisibleRegions;
+use crate::raster::{Target, VisibilityId};
+use crate::setup::{N_SETUPS, ScreenVertices, Setup, Setups};
 use crate::solids::level_for;
 
 /// Buffers that one thread uses again and again.
@@ -27,12 +27,12 @@ pub(crate) struct Scratch {
 pub(crate) struct Work {
     /// For which vectors the inner loops are compiled: the widest of this machine.
     pub arch: pulp::Arch,
-    corners: Corners,
+    vertices: ScreenVertices,
     setups: Setups,
     /// Triangles that may cover a pixel.
     alive: Vec<u32>,
     order: Vec<Candidate>,
-    seen: Seen,
+    seen: VisibleRegions,
     /// Level of detail of each instance in this view.
     pub levels: Vec<u8>,
     /// The number of the first triangle of each instance that is drawn.
@@ -75,14 +75,14 @@ impl Outline {
 }
 
 /// Draws all that a lens sees of a frame into the target.
-pub(crate) fn draw<O: Owner>(
+pub(crate) fn draw<O: VisibilityId>(
     frame: &Frame,
     lens: &Lens,
     omit: Omit,
     target: &mut Target<O>,
     work: &mut Work,
 ) {
-    let Work { arch, corners, setups, alive, order, seen, levels, firsts, n_triangles } = work;
+    let Work { arch, vertices, setups, alive, order, seen, levels, firsts, n_triangles } = work;
     firsts.clear();
     firsts.resize(frame.instances.len(), 0);
     *n_triangles = 0;
@@ -90,7 +90,7 @@ pub(crate) fn draw<O: Owner>(
     levels.clear();
     levels.resize(frame.instances.len(), 0);
     order.clear();
-    frame.regions.find_seen(lens, seen);
+    frame.regions.find_visible(lens, seen);
     for (index, instance) in frame.instances.iter().enumerate().take(0xffff) {
         if omit.body == Some(instance.entity)
             || (omit.ceiling && instance.entity == EntityId::CEILING)
@@ -116,19 +116,10 @@ pub(crate) fn draw<O: Owner>(
         let ((sa, da), (sb, db)) = (key(a), key(b));
         sa.cmp(&sb).then(da.total_cmp(&db)).then(a.index.cmp(&b.index))
     });
-    let mut drawn = 0;
-    let mut stale = false;
-    let mut was_structure = true;
     for candidate in order.iter() {
-        // That costs as much as a few hundred triangles: only now and then.
-        let begins_things = was_structure && !candidate.is_structure;
-        was_structure = candidate.is_structure;
-        if stale && (begins_things || [12, 36].contains(&drawn) || drawn % 96 == 95) {
-            arch.dispatch(UpdateLeast(target));
-            stale = false;
-        }
         let Outline { rect, nearest, crosses_near } = candidate.outline;
-        if !crosses_near && target.hides(rect, lens.nearness(nearest)) {
+        let q = lens.inverse_depth(nearest);
+        if !crosses_near && arch.dispatch(IsOccluded { target: &mut *target, rect, q }) {
             continue;
         }
         let instance = &frame.instances[candidate.index as usize];
@@ -137,11 +128,9 @@ pub(crate) fn draw<O: Owner>(
         firsts[candidate.index as usize] = *n_triangles as u32;
         *n_triangles += instance.shape.mesh(level).triangles.len();
         let drawing = Drawing { instance, index: candidate.index as usize, level, lens };
-        arch.dispatch(DrawOne { drawing, crosses_near, target, corners, setups, alive });
+        arch.dispatch(DrawOne { drawing, crosses_near, target, vertices, setups, alive });
         let everywhere = [f32::NEG_INFINITY, f32::NEG_INFINITY, f32::INFINITY, f32::INFINITY];
         target.touch(if crosses_near { everywhere } else { rect });
-        drawn += 1;
-        stale = true;
     }
 }
 
@@ -203,111 +192,116 @@ struct Drawing<'a> {
 
 /// Draws one instance, compiled for each kind of vectors and called for the widest that the
 /// machine has.
-struct DrawOne<'a, O: Owner> {
+struct DrawOne<'a, O: VisibilityId> {
     drawing: Drawing<'a>,
     crosses_near: bool,
     target: &'a mut Target<O>,
-    corners: &'a mut Corners,
+    vertices: &'a mut ScreenVertices,
     setups: &'a mut Setups,
     alive: &'a mut Vec<u32>,
 }
 
-impl<O: Owner> pulp::NullaryFnOnce for DrawOne<'_, O> {
+impl<O: VisibilityId> pulp::NullaryFnOnce for DrawOne<'_, O> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        let DrawOne { drawing, crosses_near, target, corners, setups, alive } = self;
-        drawing.draw(crosses_near, target, corners, setups, alive);
+        let DrawOne { drawing, crosses_near, target, vertices, setups, alive } = self;
+        drawing.draw(crosses_near, target, vertices, setups, alive);
     }
 }
 
 /// Begins an image, likewise.
-struct Clear<'a, O: Owner> {
+struct Clear<'a, O: VisibilityId> {
     target: &'a mut Target<O>,
     lens: &'a Lens,
 }
 
-impl<O: Owner> pulp::NullaryFnOnce for Clear<'_, O> {
+impl<O: VisibilityId> pulp::NullaryFnOnce for Clear<'_, O> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
         let Lens { width, height, .. } = *self.lens;
-        self.target.clear(width, height, self.lens.nearness(self.lens.far_m()).max(0.0));
+        self.target.clear(width, height, self.lens.inverse_depth(self.lens.far_m()).max(0.0));
     }
 }
 
-/// Brings up to date what hides, likewise.
-struct UpdateLeast<'a, O: Owner>(&'a mut Target<O>);
+/// Asks the hierarchical Z buffer, likewise.
+struct IsOccluded<'a, O: VisibilityId> {
+    target: &'a mut Target<O>,
+    rect: [f32; 4],
+    q: f32,
+}
 
-impl<O: Owner> pulp::NullaryFnOnce for UpdateLeast<'_, O> {
-    type Output = ();
+impl<O: VisibilityId> pulp::NullaryFnOnce for IsOccluded<'_, O> {
+    type Output = bool;
 
     #[inline(always)]
-    fn call(self) {
-        self.0.update_least();
+    fn call(self) -> bool {
+        self.target.is_occluded(self.rect, self.q)
     }
 }
 
 impl Drawing<'_> {
     #[inline(always)]
-    fn owner<O: Owner>(&self, mesh: &Mesh, triangle: usize) -> O {
+    fn visibility_id<O: VisibilityId>(&self, mesh: &Mesh, triangle: usize) -> O {
         O::of(self.instance.entity, self.index, usize::from(mesh.faces[triangle]))
     }
 
     #[inline(always)]
-    fn draw<O: Owner>(
+    fn draw<O: VisibilityId>(
         &self,
         crosses_near: bool,
         target: &mut Target<O>,
-        corners: &mut Corners,
+        vertices: &mut ScreenVertices,
         setups: &mut Setups,
         alive: &mut Vec<u32>,
     ) {
         let lens = self.lens;
         let mesh = self.instance.shape.mesh(self.level);
         let into = lens.camera_from(&self.instance.rotation, self.instance.origin);
-        corners.place(&mesh.positions, &into, lens);
+        vertices.place(&mesh.positions, &into, lens);
         // Of a plan view nothing is too near.
         let nearest = if lens.is_plan { f32::INFINITY } else { 1.0 / lens.near_m() };
-        corners.find_alive(&mesh.corners, lens, nearest, alive);
+        vertices.find_alive(&mesh.indices, lens, nearest, alive);
         let rows = lens.height as f32;
-        let lists = mesh.corners.each_ref().map(|list| &list[..]);
+        let lists = mesh.indices.each_ref().map(|list| &list[..]);
         for few in alive.chunks(N_SETUPS) {
             let mut triangles = [0; N_SETUPS];
             triangles[..few.len()].copy_from_slice(few);
-            setups.fill(&triangles, &lists, corners, rows);
+            setups.fill(&triangles, &lists, vertices, rows);
             for (k, triangle) in few.iter().enumerate() {
-                target.fill(&setups.get(k), self.owner(mesh, *triangle as usize));
+                target.fill(&setups.get(k), self.visibility_id(mesh, *triangle as usize));
             }
         }
         if crosses_near {
-            self.draw_clipped(&into, nearest, target, corners);
+            self.draw_clipped(&into, nearest, target, vertices);
         }
     }
 
     /// Draws those that reach behind the camera.
     #[inline(always)]
-    fn draw_clipped<O: Owner>(
+    fn draw_clipped<O: VisibilityId>(
         &self,
         into: &IntoCamera,
         nearest: f32,
         target: &mut Target<O>,
-        corners: &Corners,
+        vertices: &ScreenVertices,
     ) {
         let mesh = self.instance.shape.mesh(self.level);
         let (near, rows) = (self.lens.near_m(), self.lens.height as f32);
-        for (triangle, (a, b, c)) in mesh.corners_of_triangles().enumerate() {
-            let in_front = [a, b, c].map(|c| corners.is_in_front(c, nearest));
+        for (triangle, (a, b, c)) in mesh.triangle_indices().enumerate() {
+            let in_front = [a, b, c].map(|c| vertices.is_in_front(c, nearest));
             if in_front == [true; 3] || in_front == [false; 3] {
                 continue;
             }
             let p: [Vec3; 3] = [a, b, c].map(|c| into.map(mesh.positions[usize::from(c)]));
             let Some(clipped) = clip(p, near, self.lens.middle()) else { continue };
             for j in 2..clipped.n {
-                let fan = [clipped.corners[0], clipped.corners[j - 1], clipped.corners[j]];
-                target.fill(&Setup::of(fan, clipped.slope, rows), self.owner(mesh, triangle));
+                let fan = [clipped.vertices[0], clipped.vertices[j - 1], clipped.vertices[j]];
+                target
+                    .fill(&Setup::of(fan, clipped.slope, rows), self.visibility_id(mesh, triangle));
             }
         }
     }

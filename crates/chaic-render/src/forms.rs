@@ -22,7 +22,7 @@ pub(crate) fn rounded_box(mesh: &mut Mesh, place: &Place, r: f32) {
         for face in 0..3 {
             let axis = Vec3::AXES[face];
             let p = out * (half - Vec3::splat(r) + axis * r);
-            mesh.corner(place.center + place.axes * p, place.axes * (out * axis));
+            mesh.vertex(place.center + place.axes * p, place.axes * (out * axis));
         }
     }
     let at = |k: usize, face: usize| base + 3 * k + face;
@@ -68,7 +68,7 @@ fn globe(
     let pi = std::f32::consts::PI;
     let add = |mesh: &mut Mesh, lat: f32, k: usize| {
         let (p, normal) = form(lat, 2.0 * pi * k as f32 / n as f32);
-        mesh.corner(place.point(p), place.normal(normal))
+        mesh.vertex(place.point(p), place.normal(normal))
     };
     let bottom = add(mesh, -0.5 * pi, 0);
     let mut below = None;
@@ -113,7 +113,7 @@ pub(crate) fn pillow(mesh: &mut Mesh, place: &Place, soft: f32, n: usize) {
     });
 }
 
-/// An ellipsoid of flat facets, its corners pushed in by up to `rough` of the radius.
+/// An ellipsoid of flat facets, its vertices pushed in by up to `rough` of the radius.
 pub(crate) fn lump(mesh: &mut Mesh, place: &Place, rough: f32, seed: u32, n: usize) {
     let stacks = (n / 2).max(3);
     globe(mesh, place, (stacks, n), false, |lat, lon| {
@@ -143,7 +143,7 @@ pub(crate) fn lathe(mesh: &mut Mesh, place: &Place, outline: &[[f32; 2]], n: usi
         for k in 0..n {
             let (c, s) = circle(k, n);
             let p = place.point(Vec3::new(r * c, y, r * s));
-            mesh.corner(p, place.normal(Vec3::new(nr * c, ny, nr * s)));
+            mesh.vertex(p, place.normal(Vec3::new(nr * c, ny, nr * s)));
         }
         base
     };
@@ -194,9 +194,9 @@ pub(crate) fn cut(mesh: &mut Mesh, place: &Place, outline: &[[f32; 2]], thick_m:
     let mut layer = |z: f32| {
         let base = mesh.positions.len();
         for [x, y] in outline {
-            mesh.corner(place.point(Vec3::new(*x, *y, z)), Vec3::Y);
+            mesh.vertex(place.point(Vec3::new(*x, *y, z)), Vec3::Y);
         }
-        let center = mesh.corner(place.point(Vec3::new(mx, my, z)), Vec3::Y);
+        let center = mesh.vertex(place.point(Vec3::new(mx, my, z)), Vec3::Y);
         (base, center)
     };
     let ((back, back_middle), (front, front_middle)) = (layer(-half), layer(half));
@@ -208,7 +208,7 @@ pub(crate) fn cut(mesh: &mut Mesh, place: &Place, outline: &[[f32; 2]], thick_m:
     }
 }
 
-/// A piece of a round wall about the vertical through `bottom`; see [`crate::sculpt::Sculptor`].
+/// A piece of a round wall about the vertical through `bottom`; see [`crate::mesh_builder::MeshBuilder`].
 pub(crate) fn sector(
     mesh: &mut Mesh,
     bottom: Vec3,
@@ -224,7 +224,7 @@ pub(crate) fn sector(
         let out = Vec3::new(math::sin(a), 0.0, -math::cos(a));
         for (radius, sign) in [(radii[0], -1.0), (radii[1], 1.0)] {
             for y in heights {
-                mesh.corner(bottom + out * radius + Vec3::Y * y, out * sign);
+                mesh.vertex(bottom + out * radius + Vec3::Y * y, out * sign);
             }
         }
     }

@@ -6,9 +6,9 @@ use chaic_protocol::{ClassId, EntityId, Vec3};
 use chaic_world::Thing;
 use glam::Mat3;
 
-use crate::looks::{N_STYLES, thing_mesh};
 use crate::mesh::{Mesh, length};
-use crate::regions::{RegionSet, Regions};
+use crate::models::{N_STYLES, thing_mesh};
+use crate::portals::{PortalGraph, RegionSet};
 use crate::solids::{N_LEVELS, place_of};
 
 /// The mesh of a thing's shape, at every level of detail, each made when first needed.
@@ -130,7 +130,7 @@ impl Instance<'_> {
     }
 
     /// The regions that it reaches into.
-    pub fn regions_among(&self, regions: &Regions) -> RegionSet {
+    pub fn regions_among(&self, regions: &PortalGraph) -> RegionSet {
         self.regions.unwrap_or_else(|| {
             let (min, max) = self.bounds_in_world();
             regions.of_box(min, max)
@@ -154,6 +154,6 @@ pub(crate) fn corners(min: Vec3, max: Vec3) -> [Vec3; 8] {
 /// Everything that can be seen at one moment.
 pub(crate) struct Frame<'a> {
     pub instances: Vec<Instance<'a>>,
-    pub regions: &'a Regions,
+    pub regions: &'a PortalGraph,
     pub light: crate::light::Light<'a>,
 }

@@ -16,7 +16,7 @@ use crate::texture;
 use crate::{Lens, Scene};
 
 pub use crate::mesh::Gloss;
-pub use crate::regions::{RegionSet, Regions};
+pub use crate::portals::{PortalGraph, RegionSet};
 pub use crate::shapes::{BodyShape, ShapeName, Shapes};
 pub use crate::solids::{N_LEVELS, level_for};
 pub use crate::texture::Texture;
@@ -38,26 +38,26 @@ pub struct Geometry {
 pub struct MeshData {
     /// Corners, metres.
     pub positions: Vec<[f32; 3]>,
-    /// Unit normals, as many as positions; without meaning at corners of flat triangles only.
+    /// Unit normals, as many as positions; without meaning at vertices of flat triangles only.
     pub normals: Vec<[f32; 3]>,
     /// The triangles, those of one skin one after the other.
     pub triangles: Vec<TriangleData>,
     /// What the triangles' skins are.
     pub skins: Vec<SkinData>,
-    /// Least coordinates of all corners, metres.
+    /// Least coordinates of all vertices, metres.
     pub min: [f32; 3],
-    /// Greatest coordinates of all corners, metres.
+    /// Greatest coordinates of all vertices, metres.
     pub max: [f32; 3],
 }
 
 /// One triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TriangleData {
-    /// Indices of its corners, counter-clockwise seen from outside.
-    pub corners: [u32; 3],
+    /// Indices of its vertices, counter-clockwise seen from outside.
+    pub vertices: [u32; 3],
     /// Index of its skin.
     pub skin: u8,
-    /// Whether the corners' normals are interpolated; else the triangle's own plane has the normal.
+    /// Whether the vertices' normals are interpolated; else the triangle's own plane has the normal.
     pub smooth: bool,
 }
 
@@ -261,7 +261,7 @@ impl Scene {
 impl From<&Mesh> for MeshData {
     fn from(mesh: &Mesh) -> MeshData {
         let triangles = mesh.triangles.iter().map(|t| TriangleData {
-            corners: t.corners.map(u32::from),
+            vertices: t.vertices.map(u32::from),
             skin: t.skin,
             smooth: t.smooth,
         });

@@ -114,9 +114,9 @@ impl File {
         let mut indices = Vec::with_capacity(3 * triangles.len());
         let mut shared: BTreeMap<u32, u32> = BTreeMap::new();
         for triangle in triangles {
-            let [a, b, c] = triangle.corners.map(|k| Vec3::from(mesh.positions[k as usize]));
+            let [a, b, c] = triangle.vertices.map(|k| Vec3::from(mesh.positions[k as usize]));
             let plane = unit((b - a).cross(c - a)).to_array();
-            for corner in triangle.corners {
+            for corner in triangle.vertices {
                 let next = positions.len() as u32;
                 let index =
                     if triangle.smooth { *shared.entry(corner).or_insert(next) } else { next };

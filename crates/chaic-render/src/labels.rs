@@ -13,7 +13,7 @@ use crate::mesh::unit;
 use crate::paint::Painter;
 use crate::people::Body;
 use crate::planes::Plane;
-use crate::raster::{NOBODY, owner_parts};
+use crate::raster::{BACKGROUND, unpack_visibility_id};
 use crate::view::{MAX_SIDE_PX, View, with_scratch};
 
 /// Labels of the pixels of a view, row-major, row 0 at the top.
@@ -75,15 +75,16 @@ fn label(frame: &Frame, lens: &Lens, view: &View, scratch: &mut Scratch, labels:
     let Scratch { target, work, .. } = scratch;
     draw(frame, lens, view.omit(), target, work);
     let painter = Painter::new(frame, lens);
-    let mut last = (NOBODY, Plane::default());
+    let mut last = (BACKGROUND, Plane::default());
     for j in 0..lens.height {
-        let blocks = target.owner(j).iter().zip(target.nearness(j).iter());
-        let pixels = blocks.flat_map(|(owners, nearness)| owners.iter().zip(nearness.iter()));
-        for (k, (owner, nearness)) in pixels.enumerate().take(lens.width) {
-            if *owner == NOBODY {
+        let blocks = target.visibility_ids(j).iter().zip(target.inverse_depth(j).iter());
+        let pixels =
+            blocks.flat_map(|(owners, inverse_depth)| owners.iter().zip(inverse_depth.iter()));
+        for (k, (owner, inverse_depth)) in pixels.enumerate().take(lens.width) {
+            if *owner == BACKGROUND {
                 continue;
             }
-            let (index, triangle) = owner_parts(*owner);
+            let (index, triangle) = unpack_visibility_id(*owner);
             let instance = &frame.instances[index];
             if last.0 != *owner {
                 let mesh = instance.shape.mesh(usize::from(work.levels[index]));
@@ -92,7 +93,7 @@ fn label(frame: &Frame, lens: &Lens, view: &View, scratch: &mut Scratch, labels:
                 last = (*owner, painter.normals(instance, &sight, mesh, triangle));
             }
             let row = last.1.from(k, j as f32 + 0.5);
-            let depth_m = reciprocal(*nearness);
+            let depth_m = reciprocal(*inverse_depth);
             let normal = unit((row.base + row.at * depth_m).truncate());
             let pixel = j * lens.width + k;
             labels.depth_mm[pixel] = depth_mm(seen_depth_m(depth_m));

@@ -28,7 +28,7 @@ pub(crate) fn reciprocal(x: f32) -> f32 {
 
 /// A camera that is fit for use.
 ///
-/// Nearness is what the depth buffer holds: 1 / depth for an eye, which is linear on the image as
+/// Inverse depth is what the depth buffer holds: 1 / depth for an eye, which is linear on the image as
 /// depth is not; for a plan view, 1 at the camera falling linearly to 0 at [`PLAN_RANGE_M`].
 #[derive(Clone, Copy, Debug)]
 pub struct Lens {
@@ -99,14 +99,14 @@ impl Lens {
         if self.is_plan { PLAN_RANGE_M } else { Camera::FAR_M }
     }
 
-    /// Nearness of a depth.
-    pub fn nearness(&self, depth_m: f32) -> f32 {
+    /// Inverse depth of a depth.
+    pub fn inverse_depth(&self, depth_m: f32) -> f32 {
         if self.is_plan { 1.0 - depth_m / PLAN_RANGE_M } else { 1.0 / depth_m }
     }
 
-    /// Depth of a nearness.
-    pub fn depth(&self, nearness: f32) -> f32 {
-        if self.is_plan { (1.0 - nearness) * PLAN_RANGE_M } else { 1.0 / nearness }
+    /// Depth of a inverse depth.
+    pub fn depth(&self, inverse_depth: f32) -> f32 {
+        if self.is_plan { (1.0 - inverse_depth) * PLAN_RANGE_M } else { 1.0 / inverse_depth }
     }
 
     /// The way from an object's frame, given by the columns of a rotation and an origin, into

@@ -2,7 +2,7 @@
 //!
 //! **What it is**: [`Scene`] makes an episode's shapes ready once, [`Scene::render`] draws what
 //! any number of cameras ([`View`]) see at a moment, [`render_batch`] those of many worlds,
-//! [`Scene::label`] labels what learners see, [`plan::draw`] draws a map for people,
+//! [`Scene::label`] labels what learners see, [`floor_plan::draw`] draws a map for people,
 //! [`image_out`] and [`text`] help to write pictures. [`geometry`] gives the same shapes as plain data,
 //! for other renderers, and [`gltf_out`] as a file.
 //!
@@ -15,8 +15,8 @@
 //! - No camera, size or posture makes it panic.
 //!
 //! How a view comes about: instances are culled by the camera's frustum, by the rooms that can be seen
-//! from where it stands ([`regions`]) and by what is already drawn ([`draw`]), drawn at a level of detail that fits their size on the image ([`looks`]) into
-//! a buffer of nearness and owners: triangles are set up many at once ([`setup`]) and filled span by
+//! from where it stands ([`portals`]) and by what is already drawn ([`draw`]), drawn at a level of detail that fits their size on the image ([`models`]) into
+//! a buffer of inverse_depth and owners: triangles are set up many at once ([`setup`]) and filled span by
 //! span ([`raster`]). Depth and ids are read off that buffer, and color only if it is asked for: each
 //! triangle that is seen gets a paint ([`paint`]) whose points are lit many at once ([`points`]); each
 //! row of pixels is cut into segments of one triangle ([`shade`], [`segments`]) that are filled from
@@ -42,23 +42,23 @@ mod grid;
 mod lens;
 
 mod forms;
-mod looks;
 mod mesh;
+mod mesh_builder;
+mod models;
 mod people;
-mod sculpt;
 mod shapes;
 mod solids;
 mod structure;
 
 mod clip;
 mod draw;
+mod portals;
 mod raster;
-mod regions;
 mod setup;
 
 mod ground;
-mod lamps;
 mod light;
+mod light_rig;
 mod paint;
 mod planes;
 mod points;
@@ -67,16 +67,16 @@ mod segments;
 mod shade;
 mod texture;
 
+pub mod floor_plan;
 pub mod geometry;
 pub mod gltf_out;
 pub mod image_out;
 pub mod lighting;
-pub mod plan;
 pub mod text;
 
 pub use appearance::Appearance;
 pub use labels::{Labels, depth_mm};
 pub use lens::Lens;
-pub use scene::{Looks, Scene, render_batch};
+pub use scene::{Scene, WorldViews, render_batch};
 pub use solids::LEVEL_RADIUS_PX;
 pub use view::{Channels, ImagesMut, MAX_SIDE_PX, View, with_each_width};

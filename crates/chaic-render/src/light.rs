@@ -5,12 +5,12 @@ use std::sync::OnceLock;
 use chaic_protocol::Vec2;
 
 use crate::ground::{Foot, Ground, MAX_CELLS, N_GROUND};
-use crate::lamps::Lamps;
+use crate::light_rig::LightRig;
 
 /// The light at one moment.
 pub(crate) struct Light<'a> {
     pub ground: &'a Ground,
-    pub lamps: &'a Lamps,
+    pub rig: &'a LightRig,
     /// None if nobody looks at color.
     pub shadows: Option<Shadows>,
     /// Of which arrangement of still things the shadows are.
@@ -105,8 +105,8 @@ fn roots() -> &'static [u32; 256] {
 
 impl<'a> Light<'a> {
     /// Light with these shadows on the ground, or none if nobody looks at color.
-    pub fn new(ground: &'a Ground, lamps: &'a Lamps, shadows: Option<Shadows>) -> Light<'a> {
-        Light { ground, lamps, shadows, version: 0 }
+    pub fn new(ground: &'a Ground, rig: &'a LightRig, shadows: Option<Shadows>) -> Light<'a> {
+        Light { ground, rig, shadows, version: 0 }
     }
 
     /// Adds the shadow of a foot.
@@ -123,7 +123,7 @@ impl<'a> Light<'a> {
     pub fn cast_by_sun(&mut self, center: Vec2, half: Vec2, height_m: f32) {
         /// Higher things are slender at the top: trees, lamps.
         const LONGEST_M: f32 = 5.0;
-        let sun = self.lamps.to_sun;
+        let sun = self.rig.to_sun;
         if self.ground.ceiling_m.is_some() || sun.y < 0.05 {
             return;
         }

@@ -75,15 +75,15 @@ impl Cells<'_> {
 impl Lighting<'_> {
     /// What shines on a frame that was made to be looked at in color.
     pub(crate) fn of<'a>(light: &'a Light) -> Lighting<'a> {
-        let (lamps, ground) = (light.lamps, light.ground);
+        let (rig, ground) = (light.rig, light.ground);
         let (cells_per_m, min) = ground.grid();
         Lighting {
-            to_sun: lamps.to_sun.to_array(),
-            sun: lamps.sun.to_array(),
-            lamp: lamps.lamp.to_array(),
-            outdoors: lamps.outdoors.map(|c| c.to_array()),
-            indoors: lamps.indoors.map(|c| c.to_array()),
-            sky: lamps.sky.map(|c| c.to_array()),
+            to_sun: rig.to_sun.to_array(),
+            sun: rig.sun.to_array(),
+            lamp: rig.lamp.to_array(),
+            outdoors: rig.outdoors.map(|c| c.to_array()),
+            indoors: rig.indoors.map(|c| c.to_array()),
+            sky: rig.sky.map(|c| c.to_array()),
             ceiling_m: ground.ceiling_m,
             lamps_in_world: ground.lamps().iter().map(Vec3::to_array).collect(),
             cells: Cells {

@@ -1,7 +1,7 @@
 //! Triangle meshes, and the ways of building them.
 //!
 //! Corners are shared between flat and smooth triangles: a flat triangle takes its own plane's
-//! normal, a smooth one interpolates the corners' normals. Triangles are counter-clockwise seen
+//! normal, a smooth one interpolates the vertices' normals. Triangles are counter-clockwise seen
 //! from outside, and every solid is closed, so that back faces never need to be drawn.
 
 use chaic_protocol::Vec3;
@@ -70,7 +70,7 @@ impl Skin {
 /// One triangle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Triangle {
-    pub corners: [u16; 3],
+    pub vertices: [u16; 3],
     pub skin: u8,
     pub smooth: bool,
 }
@@ -79,11 +79,11 @@ pub(crate) struct Triangle {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Mesh {
     pub positions: Vec<Vec3>,
-    /// Unit normals, per corner; meaningless for corners of flat triangles only.
+    /// Unit normals, per vertex; meaningless for vertices of flat triangles only.
     pub normals: Vec<Vec3>,
     pub triangles: Vec<Triangle>,
-    /// First, second and third corners of all triangles once more, side by side.
-    pub corners: [Vec<u16>; 3],
+    /// First, second and third vertices of all triangles once more, side by side.
+    pub indices: [Vec<u16>; 3],
     /// The first triangle of the face that each triangle is part of: the halves of a flat
     /// quadrilateral look as one.
     pub faces: Vec<u16>,
@@ -162,8 +162,8 @@ pub(crate) struct Section {
 const FLAT: f32 = 0.999_97;
 
 impl Mesh {
-    /// Most corners: indices have 16 bits.
-    const MAX_CORNERS: usize = 65_000;
+    /// Most vertices: indices have 16 bits.
+    const MAX_VERTICES: usize = 65_000;
 
     /// Begins a new skin for what is added next.
     pub fn skin(&mut self, skin: Skin) {
@@ -183,29 +183,29 @@ impl Mesh {
         self
     }
 
-    /// The corners of each triangle.
-    pub fn corners_of_triangles(&self) -> impl Iterator<Item = (u16, u16, u16)> {
-        let [a, b, c] = &self.corners;
+    /// The vertices of each triangle.
+    pub fn triangle_indices(&self) -> impl Iterator<Item = (u16, u16, u16)> {
+        let [a, b, c] = &self.indices;
         a.iter().zip(b).zip(c).map(|((a, b), c)| (*a, *b, *c))
     }
 
-    pub fn corner(&mut self, position: Vec3, normal: Vec3) -> usize {
+    pub fn vertex(&mut self, position: Vec3, normal: Vec3) -> usize {
         self.positions.push(position);
         self.normals.push(normal);
         self.positions.len() - 1
     }
 
-    pub fn triangle(&mut self, corners: [usize; 3], smooth: bool) {
-        let fits = corners.iter().all(|c| *c < Mesh::MAX_CORNERS);
-        if !fits || self.triangles.len() >= Mesh::MAX_CORNERS {
+    pub fn triangle(&mut self, vertices: [usize; 3], smooth: bool) {
+        let fits = vertices.iter().all(|c| *c < Mesh::MAX_VERTICES);
+        if !fits || self.triangles.len() >= Mesh::MAX_VERTICES {
             return;
         }
         let skin = self.skins.len().saturating_sub(1) as u8;
-        let corners = corners.map(|c| c as u16);
+        let vertices = vertices.map(|c| c as u16);
         self.faces.push(self.triangles.len() as u16);
-        self.triangles.push(Triangle { corners, skin, smooth });
-        for (list, corner) in self.corners.iter_mut().zip(corners) {
-            list.push(corner);
+        self.triangles.push(Triangle { vertices, skin, smooth });
+        for (list, vertex) in self.indices.iter_mut().zip(vertices) {
+            list.push(vertex);
         }
     }
 
@@ -223,7 +223,7 @@ impl Mesh {
         }
     }
 
-    /// Joins two rings of `n` corners that begin at `low` and `high`. Outside is to the right of
+    /// Joins two rings of `n` vertices that begin at `low` and `high`. Outside is to the right of
     /// the direction from low to high for rings that turn from +x to +z.
     pub fn band(&mut self, low: usize, high: usize, n: usize, smooth: bool) {
         for k in 0..n {
@@ -232,7 +232,7 @@ impl Mesh {
         }
     }
 
-    /// Closes a ring with a flat fan around its own first corner.
+    /// Closes a ring with a flat fan around its own first vertex.
     pub fn lid(&mut self, ring: usize, n: usize, reversed: bool) {
         for k in 1..n.saturating_sub(1) {
             let (a, b) = if reversed { (k, k + 1) } else { (k + 1, k) };
@@ -247,7 +247,7 @@ impl Mesh {
         for s in sections {
             for k in 0..n {
                 let (c, sn) = circle(k, n);
-                self.corner(s.center + s.a * c + s.b * sn, Vec3::Y);
+                self.vertex(s.center + s.a * c + s.b * sn, Vec3::Y);
             }
         }
         let m = sections.len();

@@ -5,8 +5,8 @@ use glam::Vec4;
 
 use crate::frame::{Frame, Instance};
 use crate::ground::NO_ROOM;
-use crate::lamps::{CEILING_FARTHER_M, CEILING_TONE};
 use crate::lens::Lens;
+use crate::light_rig::{CEILING_FARTHER_M, CEILING_TONE};
 use crate::mesh::{Gloss, Mesh, Triangle, unit};
 use crate::planes::{Plane, Rays};
 use crate::points::{Point, Points};
@@ -26,7 +26,7 @@ const PAPER: f32 = 236.0;
 pub(crate) enum Kind {
     /// Linear, within bounds.
     Linear(Linear),
-    /// As its corners show, once they are lit; see [`Unlit::lit`].
+    /// As its vertices show, once they are lit; see [`Unlit::lit`].
     Unlit(Unlit),
     /// Lit point by point, since it is large.
     Structure(Surface),
@@ -62,9 +62,9 @@ pub(crate) struct Surface {
 pub(crate) struct Unlit {
     /// The number of its first point.
     point: u32,
-    /// How far towards the second and the third corner a pixel is; `None` if a single point
-    /// stands for all of it.
-    toward: Option<[Vec4; 2]>,
+    /// Second and third barycentric coordinate over the image; `None` if a single point stands for
+    /// all of it.
+    barycentric: Option<[Vec4; 2]>,
     is_flat: bool,
 }
 
@@ -74,7 +74,7 @@ impl Unlit {
     pub fn lit(&self, points: &Points) -> Linear {
         let first = self.point as usize;
         let a = points.shown(first);
-        let Some([s, t]) = self.toward else { return Linear::even(a) };
+        let Some([s, t]) = self.barycentric else { return Linear::even(a) };
         let (b, c) = (points.shown(first + 1), points.shown(first + 2));
         let (mut low, mut high) = (a.min(b).min(c), a.max(b).max(c));
         if self.is_flat {
@@ -132,7 +132,7 @@ impl<'a> Painter<'a> {
             du: flat(du) * cells_per_m,
             dv: flat(dv) * cells_per_m,
         };
-        let lawn = frame.light.lamps.in_the_open(LAWN.into());
+        let lawn = frame.light.rig.in_the_open(LAWN.into());
         Painter { frame, is_plan: lens.is_plan, rays: Rays { eye, ray }, ground, lawn }
     }
 
@@ -171,8 +171,8 @@ impl<'a> Painter<'a> {
         points: &mut Points,
     ) -> Paint {
         let skin = &mesh.skins[usize::from(triangle.skin)];
-        let corners = triangle.corners.map(usize::from);
-        let [a, b, c] = corners.map(|k| mesh.positions[k]);
+        let vertices = triangle.vertices.map(usize::from);
+        let [a, b, c] = vertices.map(|k| mesh.positions[k]);
         let flat = (b - a).cross(c - a);
         let face = unit(flat);
         let color = match instance.tint {
@@ -212,12 +212,12 @@ impl<'a> Painter<'a> {
         };
         if !triangle.smooth && matches!(skin.gloss, Gloss::Dull | Gloss::Glow) {
             let point = push((a + b + c) * (1.0 / 3.0), face);
-            return painted(Kind::Unlit(Unlit { point, toward: None, is_flat: true }));
+            return painted(Kind::Unlit(Unlit { point, barycentric: None, is_flat: true }));
         }
-        let normals = if triangle.smooth { corners.map(|k| mesh.normals[k]) } else { [face; 3] };
+        let normals = if triangle.smooth { vertices.map(|k| mesh.normals[k]) } else { [face; 3] };
         let [point, ..] = [(a, 0), (b, 1), (c, 2)].map(|(p, k)| push(p, normals[k]));
-        let toward = Some(self.toward(sight, [a, b, c], flat));
-        painted(Kind::Unlit(Unlit { point, toward, is_flat: !triangle.smooth }))
+        let barycentric = Some(self.barycentric(sight, [a, b, c], flat));
+        painted(Kind::Unlit(Unlit { point, barycentric, is_flat: !triangle.smooth }))
     }
 
     /// Normals of a triangle in the world, not of length 1.
@@ -228,22 +228,22 @@ impl<'a> Painter<'a> {
         mesh: &Mesh,
         triangle: &Triangle,
     ) -> Plane {
-        let corners = triangle.corners.map(usize::from);
-        let [a, b, c] = corners.map(|k| mesh.positions[k]);
+        let vertices = triangle.vertices.map(usize::from);
+        let [a, b, c] = vertices.map(|k| mesh.positions[k]);
         let flat = (b - a).cross(c - a);
         let face = unit(flat);
         let in_world = |n: Vec3| (instance.rotation * n).extend(0.0);
         if !triangle.smooth {
             return Plane { base: in_world(face), ..Plane::default() };
         }
-        let [at_a, at_b, at_c] = corners.map(|k| in_world(mesh.normals[k]));
-        let [s, t] = self.toward(sight, [a, b, c], flat);
+        let [at_a, at_b, at_c] = vertices.map(|k| in_world(mesh.normals[k]));
+        let [s, t] = self.barycentric(sight, [a, b, c], flat);
         Plane::mixed(at_a, (at_b - at_a, s), (at_c - at_a, t))
     }
 
-    /// How far towards its second and its third corner a pixel of a triangle is; `flat` is the
-    /// product of the edges from its first corner.
-    fn toward(&self, sight: &Sight, [a, b, c]: [Vec3; 3], flat: Vec3) -> [Vec4; 2] {
+    /// The second and third barycentric coordinate of a triangle over the image; `flat` is the cross
+    /// product of the edges from its first vertex.
+    fn barycentric(&self, sight: &Sight, [a, b, c]: [Vec3; 3], flat: Vec3) -> [Vec4; 2] {
         let face = unit(flat);
         let per_area2 = 1.0 / flat.dot(flat).max(1e-30);
         let s = self.plane(sight, (c - a).cross(flat) * per_area2, a, face);
@@ -252,12 +252,12 @@ impl<'a> Painter<'a> {
     }
 
     /// Texture coordinates along two axes from the instance's origin.
-    fn texture(&self, sight: &Sight, u: Vec3, v: Vec3, corner: Vec3, face: Vec3) -> Plane {
-        // From a corner of the triangle, so that its plane is right in a plan view; then moved.
-        let (pu, pv) = (self.plane(sight, u, corner, face), self.plane(sight, v, corner, face));
+    fn texture(&self, sight: &Sight, u: Vec3, v: Vec3, vertex: Vec3, face: Vec3) -> Plane {
+        // From a vertex of the triangle, so that its plane is right in a plan view; then moved.
+        let (pu, pv) = (self.plane(sight, u, vertex, face), self.plane(sight, v, vertex, face));
         let slant = sight.rays.ray.map(|r| face.dot(r));
         Plane {
-            base: Vec4::new(pu.x + u.dot(corner), pv.x + v.dot(corner), 0.0, 0.0),
+            base: Vec4::new(pu.x + u.dot(vertex), pv.x + v.dot(vertex), 0.0, 0.0),
             at: Vec4::new(pu.y, pv.y, slant[0], 0.0),
             du: Vec4::new(pu.z, pv.z, slant[1], 0.0),
             dv: Vec4::new(pu.w, pv.w, slant[2], 0.0),
@@ -278,7 +278,7 @@ impl<'a> Painter<'a> {
         let to_eye =
             if self.is_plan { Vec3::Y } else { self.rays.eye[0] - instance.origin - point };
         let glows = gloss == Gloss::Glow;
-        let color = if glows { color * self.frame.light.lamps.glow() } else { color };
+        let color = if glows { color * self.frame.light.rig.glow() } else { color };
         // The foot of a thing stands in its own shadow.
         let tone = 0.76 + 0.24 * (point.y * 7.0).clamp(0.0, 1.0);
         Point { at: sight.middle, lamp: sight.lamp, normal, to_eye, color, gloss, tone }
@@ -302,10 +302,10 @@ impl<'a> Painter<'a> {
     fn structure_point(&self, surface: &Surface, u: f32, v: f32, depth_m: f32) -> Point {
         let (at, ray) = self.rays.point(u, v, depth_m);
         let Surface { color, normal, gloss, .. } = *surface;
-        let (ground, lamps) = (self.frame.light.ground, self.frame.light.lamps);
+        let (ground, rig) = (self.frame.light.ground, self.frame.light.rig);
         let (color, gloss) = match gloss {
-            Gloss::Pane => (lamps.sky_along(ray, self.lawn), Gloss::Glow),
-            Gloss::Glow => (color * lamps.glow(), gloss),
+            Gloss::Pane => (rig.sky_along(ray, self.lawn), Gloss::Glow),
+            Gloss::Glow => (color * rig.glow(), gloss),
             _ => (color, gloss),
         };
         // A step off the surface leaves the wall.
@@ -331,9 +331,9 @@ impl<'a> Painter<'a> {
         if self.is_plan {
             return Vec4::splat(PAPER);
         }
-        let lamps = self.frame.light.lamps;
+        let rig = self.frame.light.rig;
         let (_, ray) = self.rays.point(u, v, 0.0);
-        shown(lamps.sky_along(ray, lamps.sky[2]).extend(0.0))
+        shown(rig.sky_along(ray, rig.sky[2]).extend(0.0))
     }
 }
 

@@ -1,4 +1,8 @@
-//! What points of surfaces show, worked out for many of them at once.
+//! Shading of surface points, many at once: Blinn-Phong.
+//!
+//! Diffuse light comes from the sun or the room's lamp (Lambert, wrapped a little indoors) and from around
+//! (hemisphere ambient); the specular term is a power of the cosine between the normal and the half
+//! vector of eye and light; what mirrors shows one even color, more of it at grazing angles (Schlick).
 //!
 //! Each quantity is a list of its own, and all lists go through one plain loop, which the compiler
 //! makes vectors of (see [`crate::shade`]).
@@ -6,7 +10,7 @@
 use chaic_protocol::Vec3;
 use glam::Vec4;
 
-use crate::lamps::Lamps;
+use crate::light_rig::LightRig;
 use crate::mesh::Gloss;
 use crate::setup::{least, most};
 
@@ -91,14 +95,14 @@ impl Points {
 
     /// Works out what all points show.
     #[inline(always)]
-    pub fn light(&mut self, lamps: &Lamps) {
+    pub fn light(&mut self, rig: &LightRig) {
         let source = [0, 1, 2].map(|c| Source {
-            direct: [lamps.sun[c], lamps.lamp[c]],
-            high: [lamps.outdoors[0][c], lamps.indoors[0][c]],
-            low: [lamps.outdoors[1][c], lamps.indoors[1][c]],
+            direct: [rig.sun[c], rig.lamp[c]],
+            high: [rig.outdoors[0][c], rig.indoors[0][c]],
+            low: [rig.outdoors[1][c], rig.indoors[1][c]],
         });
         for block in self.blocks.iter_mut().take(self.n.div_ceil(LANES)) {
-            block.light(lamps.to_sun, &source);
+            block.light(rig.to_sun, &source);
         }
     }
 }
@@ -140,8 +144,8 @@ impl Block {
             let per_d = 1.0 / most(x * x + y * y + z * z, 1e-12).sqrt();
             let (x, y, z) = (x * per_d, y * per_d, z * per_d);
             let (hx, hy, hz) = (to_x + x, to_y + y, to_z + z);
-            let per_h = 1.0 / most(hx * hx + hy * hy + hz * hz, 1e-12).sqrt();
-            let c = most(hx * nx[k] + hy * ny[k] + hz * nz[k], 0.0) * per_h;
+            let per_half = 1.0 / most(hx * hx + hy * hy + hz * hz, 1e-12).sqrt();
+            let c = most(hx * nx[k] + hy * ny[k] + hz * nz[k], 0.0) * per_half;
             let c8 = c * c * (c * c) * (c * c) * (c * c);
             let c16 = c8 * c8;
             let seen = x * nx[k] + y * ny[k] + z * nz[k];
@@ -151,18 +155,19 @@ impl Block {
             let mirror = most(0.5 + 0.5 * (2.0 * seen * ny[k] - y), 0.0);
             let gloss = gloss[k];
             let keep = of(&KEEP, gloss) + of(&KEEP_MIRROR, gloss) * (mirror * mirror);
-            let glint = of(&GLINT_8, gloss) * c8
-                + of(&GLINT_16, gloss) * c16
-                + of(&GLINT_32, gloss) * (c16 * c16);
+            let specular = of(&SPECULAR_8, gloss) * c8
+                + of(&SPECULAR_16, gloss) * c16
+                + of(&SPECULAR_32, gloss) * (c16 * c16);
             let mirrored = of(&EDGE, gloss) * edge
                 + of(&EDGE_2, gloss) * (edge * edge)
                 + mirror * (of(&MIRROR, gloss) + of(&MIRROR_EDGE, gloss) * (edge * edge));
             let keep = keep * tone[k];
             let glow = of(&GLOW, gloss);
-            let answer = Answer { indoors, direct, corner, up, keep, glow, glint, mirrored };
-            r[k] = answer.shown(red[k], &source[0], REFLECTED[0]);
-            g[k] = answer.shown(green[k], &source[1], REFLECTED[1]);
-            b[k] = answer.shown(blue[k], &source[2], REFLECTED[2]);
+            let reflectance =
+                Reflectance { indoors, direct, corner, up, keep, glow, specular, mirrored };
+            r[k] = reflectance.shown(red[k], &source[0], REFLECTED[0]);
+            g[k] = reflectance.shown(green[k], &source[1], REFLECTED[1]);
+            b[k] = reflectance.shown(blue[k], &source[2], REFLECTED[2]);
         }
     }
 }
@@ -177,8 +182,8 @@ struct Source {
     low: [f32; 2],
 }
 
-/// How a point answers to light.
-struct Answer {
+/// How a point reflects light.
+struct Reflectance {
     indoors: bool,
     /// What it gets of direct light, 0 to 1.
     direct: f32,
@@ -190,11 +195,11 @@ struct Answer {
     keep: f32,
     /// What it gives of its own color, whatever the light.
     glow: f32,
-    glint: f32,
+    specular: f32,
     mirrored: f32,
 }
 
-impl Answer {
+impl Reflectance {
     /// What is shown of a linear color in a channel, 0 to 255.
     #[inline(always)]
     fn shown(&self, color: f32, source: &Source, reflected: f32) -> f32 {
@@ -204,7 +209,7 @@ impl Answer {
         let low = if self.indoors { low[1] } else { low[0] };
         let lit = ((low + (high - low) * self.up) * self.corner + direct) * self.keep;
         let factor = lit + self.glow;
-        let linear = color * factor + direct * self.glint + reflected * self.mirrored;
+        let linear = color * factor + direct * self.specular + reflected * self.mirrored;
         255.0 * most(least(linear, 1.0), 0.0).sqrt()
     }
 }
@@ -227,9 +232,9 @@ const KEEP_MIRROR: [f32; 8] = [0.0, 0.0, 0.0, 0.75, 0.0, 0.0, 0.0, 0.0];
 /// What it gives of its own color, whatever the light.
 const GLOW: [f32; 8] = [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0];
 /// A highlight of the 8th, 16th and 32nd power.
-const GLINT_8: [f32; 8] = [0.0, 0.07, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-const GLINT_16: [f32; 8] = [0.0, 0.0, 0.0, 0.4, 0.6, 0.0, 0.0, 0.0];
-const GLINT_32: [f32; 8] = [0.0, 0.0, 0.45, 0.0, 0.0, 0.0, 0.0, 0.0];
+const SPECULAR_8: [f32; 8] = [0.0, 0.07, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+const SPECULAR_16: [f32; 8] = [0.0, 0.0, 0.0, 0.4, 0.6, 0.0, 0.0, 0.0];
+const SPECULAR_32: [f32; 8] = [0.0, 0.0, 0.45, 0.0, 0.0, 0.0, 0.0, 0.0];
 /// What is mirrored, growing with the 2nd and 4th power towards the edge as the eye sees it.
 const EDGE: [f32; 8] = [0.0, 0.02, 0.0, 0.05, 0.0, 0.0, 0.0, 0.0];
 const EDGE_2: [f32; 8] = [0.0, 0.0, 0.07, 0.0, 0.0, 0.0, 0.0, 0.0];

@@ -1,4 +1,9 @@
-//! Filling triangles: for each pixel, how near the nearest surface is and whose it is.
+//! Rasterization: triangles into a buffer of inverse depth and visibility ids, span by span, with a
+//! hierarchical Z buffer for occlusion culling.
+//!
+//! For each pixel, the buffer holds how near the nearest surface is and whose it is (a visibility
+//! buffer): colors are worked out afterwards, for what is seen only. The inner loops are SIMD over
+//! [`LANES`] pixels by plain arrays, see [`crate::view`].
 
 use std::ops::{Deref, DerefMut};
 
@@ -7,8 +12,8 @@ use chaic_protocol::EntityId;
 use crate::setup::{Setup, Slope, first_center, least, most};
 
 /// Nobody's pixel.
-pub(crate) const NOBODY: u32 = u32::MAX;
-/// Pixels one below the other whose least nearness is kept.
+pub(crate) const BACKGROUND: u32 = u32::MAX;
+/// Pixels one below the other whose least inverse depth is kept.
 pub(crate) const TILE: usize = 8;
 /// So many neighboring pixels of a row are filled at once.
 pub(crate) const LANES: usize = 16;
@@ -16,20 +21,20 @@ pub(crate) const LANES: usize = 16;
 const ROWS: usize = 16;
 
 /// Names a triangle of an instance, or the first one of a face, in 32 bits.
-pub(crate) fn pixel_owner(instance: usize, triangle: usize) -> u32 {
+pub(crate) fn visibility_id(instance: usize, triangle: usize) -> u32 {
     debug_assert!(instance < 0xffff && triangle < 0x1_0000);
     (instance as u32) << 16 | triangle as u32
 }
 
-/// The instance and triangle of [`pixel_owner`].
-pub(crate) fn owner_parts(owner: u32) -> (usize, usize) {
-    ((owner >> 16) as usize, (owner & 0xffff) as usize)
+/// The instance and triangle of [`visibility_id`].
+pub(crate) fn unpack_visibility_id(id: u32) -> (usize, usize) {
+    ((id >> 16) as usize, (id & 0xffff) as usize)
 }
 
-/// What stands in the image for whoever a pixel belongs to.
-pub(crate) trait Owner: Copy + PartialEq {
+/// What stands in the visibility buffer for whoever a pixel belongs to.
+pub(crate) trait VisibilityId: Copy + PartialEq {
     /// Nobody's pixel.
-    const NOBODY: Self;
+    const BACKGROUND: Self;
 
     /// Neighboring pixels, laid out so that they are loaded and stored at once.
     type Block: Copy + std::fmt::Debug + Default + DerefMut<Target = [Self; LANES]>;
@@ -87,9 +92,9 @@ impl<T> DerefMut for Narrow<T> {
     }
 }
 
-/// To the triangle, as coloring needs it: [`pixel_owner`].
-impl Owner for u32 {
-    const NOBODY: u32 = NOBODY;
+/// To the triangle, as coloring needs it: [`visibility_id`].
+impl VisibilityId for u32 {
+    const BACKGROUND: u32 = BACKGROUND;
     type Block = Wide<u32>;
 
     fn block(self) -> Wide<u32> {
@@ -98,7 +103,7 @@ impl Owner for u32 {
 
     #[inline]
     fn of(_: EntityId, instance: usize, triangle: usize) -> u32 {
-        pixel_owner(instance, triangle)
+        visibility_id(instance, triangle)
     }
 
     #[inline(always)]
@@ -108,8 +113,8 @@ impl Owner for u32 {
 }
 
 /// To the entity, where that is all that is asked for: half as much to write.
-impl Owner for u16 {
-    const NOBODY: u16 = EntityId::NOTHING.0;
+impl VisibilityId for u16 {
+    const BACKGROUND: u16 = EntityId::NOTHING.0;
     type Block = Narrow<u16>;
 
     fn block(self) -> Narrow<u16> {
@@ -155,22 +160,22 @@ impl<'a, B> Blocks<'a, B> {
 /// The image under way. What of its stacks lies beyond the image is nobody's, and near, so that it
 /// doesn't count.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Target<O: Owner> {
+pub(crate) struct Target<O: VisibilityId> {
     pub width: usize,
     pub height: usize,
     /// Stacks side by side.
     stacks_wide: usize,
-    /// Nearness, shape [stacks_high, stacks_wide].
-    nearness: Vec<Stack<Wide<f32>>>,
+    /// Inverse depth, shape [stacks_high, stacks_wide].
+    inverse_depth: Vec<Stack<Wide<f32>>>,
     /// Whose each pixel is, of the same shape.
-    owner: Vec<Stack<O::Block>>,
-    /// The least nearness in each column of each stack.
-    least: Vec<Wide<f32>>,
-    /// For each row of stacks the first whose least may be stale, and the one after the last.
-    stale: Vec<(usize, usize)>,
+    visibility_ids: Vec<Stack<O::Block>>,
+    /// Hierarchical Z: the least inverse depth (the farthest) in each column of each stack.
+    hi_z: Vec<Wide<f32>>,
+    /// Whether something was drawn in a stack since its `hi_z` was worked out.
+    is_dirty: Vec<bool>,
 }
 
-impl<O: Owner> Target<O> {
+impl<O: VisibilityId> Target<O> {
     /// Forgets all; what isn't nearer than `background` won't be drawn.
     #[inline(always)]
     pub fn clear(&mut self, width: usize, height: usize, background: f32) {
@@ -178,11 +183,11 @@ impl<O: Owner> Target<O> {
         self.stacks_wide = width.div_ceil(LANES);
         let stacks_high = height.div_ceil(TILE);
         let n = self.stacks_wide * stacks_high;
-        self.nearness.resize_with(n, Default::default);
-        self.nearness.fill([Wide([background; LANES]); TILE]);
+        self.inverse_depth.resize_with(n, Default::default);
+        self.inverse_depth.fill([Wide([background; LANES]); TILE]);
         let (in_last, rows_in_last) = (width % LANES, height % TILE);
         if in_last > 0 || rows_in_last > 0 {
-            for (k, stack) in self.nearness.iter_mut().enumerate() {
+            for (k, stack) in self.inverse_depth.iter_mut().enumerate() {
                 if in_last > 0 && (k + 1) % self.stacks_wide == 0 {
                     stack.iter_mut().for_each(|block| block[in_last..].fill(f32::INFINITY));
                 }
@@ -191,25 +196,25 @@ impl<O: Owner> Target<O> {
                 }
             }
         }
-        self.owner.resize_with(n, Default::default);
-        self.owner.fill([O::NOBODY.block(); TILE]);
-        self.least.clear();
-        self.least.resize(n, Wide([background; LANES]));
-        self.stale.clear();
-        self.stale.resize(stacks_high, (self.stacks_wide, 0));
+        self.visibility_ids.resize_with(n, Default::default);
+        self.visibility_ids.fill([O::BACKGROUND.block(); TILE]);
+        self.hi_z.clear();
+        self.hi_z.resize(n, Wide([background; LANES]));
+        self.is_dirty.clear();
+        self.is_dirty.resize(n, false);
     }
 
-    /// Nearness in a row.
+    /// Inverse depth in a row.
     #[inline(always)]
-    pub fn nearness(&self, row: usize) -> Blocks<'_, Wide<f32>> {
-        let stacks = &self.nearness[row / TILE * self.stacks_wide..][..self.stacks_wide];
+    pub fn inverse_depth(&self, row: usize) -> Blocks<'_, Wide<f32>> {
+        let stacks = &self.inverse_depth[row / TILE * self.stacks_wide..][..self.stacks_wide];
         Blocks { stacks, row: row % TILE }
     }
 
     /// Whose the pixels of a row are.
     #[inline(always)]
-    pub fn owner(&self, row: usize) -> Blocks<'_, O::Block> {
-        let stacks = &self.owner[row / TILE * self.stacks_wide..][..self.stacks_wide];
+    pub fn visibility_ids(&self, row: usize) -> Blocks<'_, O::Block> {
+        let stacks = &self.visibility_ids[row / TILE * self.stacks_wide..][..self.stacks_wide];
         Blocks { stacks, row: row % TILE }
     }
 
@@ -224,48 +229,44 @@ impl<O: Owner> Target<O> {
     /// Notes that something is drawn within the rectangle, with a pixel to spare.
     pub fn touch(&mut self, [u0, v0, u1, v1]: [f32; 4]) {
         let [(i0, i1), (j0, j1)] = self.pixels_of([u0 - 1.0, v0 - 1.0, u1 + 1.0, v1 + 1.0]);
-        for (first, end) in self.stale.iter_mut().take(j1 / TILE + 1).skip(j0 / TILE) {
-            (*first, *end) = ((*first).min(i0 / LANES), (*end).max(i1 / LANES + 1));
+        let rows = self.is_dirty.chunks_mut(self.stacks_wide.max(1));
+        for row in rows.take(j1 / TILE + 1).skip(j0 / TILE) {
+            row[i0 / LANES..=i1 / LANES].fill(true);
         }
     }
 
-    /// Brings up to date what [`Target::hides`] goes by where [`Target::touch`] announced something.
-    /// Until then it is safe: nearness only grows.
+    /// Whether something no nearer than `q` inside the rectangle is sure to be hidden. What
+    /// [`Target::touch`] announced is brought up to date where it decides: most of what shows does so in
+    /// the first stack that is looked at.
     #[inline(always)]
-    pub fn update_least(&mut self) {
-        if self.width == 0 {
-            return;
+    pub fn is_occluded(&mut self, rect: [f32; 4], q: f32) -> bool {
+        let [(i0, i1), (j0, j1)] = self.pixels_of(rect);
+        if self.hi_z.is_empty() {
+            return false;
         }
-        let rows = self.nearness.chunks(self.stacks_wide);
-        let least = self.least.chunks_mut(self.stacks_wide);
-        for ((stacks, least), (first, end)) in rows.zip(least).zip(&mut self.stale) {
-            if first < end {
-                for (least, stack) in least[*first..*end].iter_mut().zip(&stacks[*first..*end]) {
-                    *least = least_of(stack);
+        for j in j0 / TILE..=j1 / TILE {
+            for i in i0 / LANES..=i1 / LANES {
+                let k = j * self.stacks_wide + i;
+                let columns = (LANES * i, (i0, i1));
+                if !shows(&self.hi_z[k], columns, q) {
+                    continue;
                 }
-                (*first, *end) = (self.stacks_wide, 0);
+                // What was true before something was drawn there is so still: depth only shrinks.
+                if !std::mem::take(&mut self.is_dirty[k]) {
+                    return false;
+                }
+                self.hi_z[k] = farthest_of(&self.inverse_depth[k]);
+                if shows(&self.hi_z[k], columns, q) {
+                    return false;
+                }
             }
         }
-    }
-
-    /// Whether something no nearer than `q` inside the rectangle is sure to be hidden.
-    pub fn hides(&self, rect: [f32; 4], q: f32) -> bool {
-        let [(i0, i1), (j0, j1)] = self.pixels_of(rect);
-        (j0 / TILE..=j1 / TILE).all(|j| {
-            let row = &self.least[j * self.stacks_wide..][..self.stacks_wide];
-            (i0 / LANES..=i1 / LANES).all(|i| {
-                let mut shows = false;
-                for (column, least) in (LANES * i..).zip(&*row[i]) {
-                    shows |= (column >= i0) & (column <= i1) & (*least < q);
-                }
-                !shows
-            })
-        })
+        true
     }
 
     /// Fills the pixels whose centers lie in a triangle.
     #[inline(always)]
-    pub fn fill(&mut self, setup: &Setup, owner: O) {
+    pub fn fill(&mut self, setup: &Setup, id: O) {
         let Setup { first, middle, last, top, turn, per_row, turns_right, slope } = *setup;
         let columns = self.width as f32;
         let q_left = slope.q + slope.du * (0.5 - slope.u0);
@@ -289,18 +290,31 @@ impl<O: Owner> Target<O> {
             for k in 0..n as usize {
                 let row = row as usize + k;
                 let (stacks, row) = (row / TILE * self.stacks_wide, row % TILE);
-                let (nearness, owners) = (&mut self.nearness[stacks..], &mut self.owner[stacks..]);
+                let (inverse_depth, visibility_ids) =
+                    (&mut self.inverse_depth[stacks..], &mut self.visibility_ids[stacks..]);
                 let span = (begins[k], ends[k]);
-                fill_span::<O>(nearness, owners, row, starts[k], span, &slope, owner);
+                fill_span::<O>(inverse_depth, visibility_ids, row, starts[k], span, &slope, id);
             }
             row += n;
         }
     }
 }
 
+/// Whether something at `q` is nearer than the farthest of a stack in one of the columns `i0..=i1`; the
+/// stack's first one is `at`.
+#[inline(always)]
+fn shows(farthest: &Wide<f32>, (at, (i0, i1)): (usize, (usize, usize)), q: f32) -> bool {
+    let mut shows = false;
+    for k in 0..LANES {
+        let column = at + k;
+        shows |= (column >= i0) & (column <= i1) & (farthest[k] < q);
+    }
+    shows
+}
+
 /// The least in each column.
 #[inline(always)]
-fn least_of(stack: &Stack<Wide<f32>>) -> Wide<f32> {
+fn farthest_of(stack: &Stack<Wide<f32>>) -> Wide<f32> {
     let mut columns = Wide([f32::INFINITY; LANES]);
     for block in stack {
         for k in 0..LANES {
@@ -312,20 +326,20 @@ fn least_of(stack: &Stack<Wide<f32>>) -> Wide<f32> {
 
 /// Fills the columns `begin..end` of a row of the stacks that begin here.
 #[inline(always)]
-fn fill_span<O: Owner>(
-    nearness: &mut [Stack<Wide<f32>>],
-    owners: &mut [Stack<O::Block>],
+fn fill_span<O: VisibilityId>(
+    inverse_depth: &mut [Stack<Wide<f32>>],
+    visibility_ids: &mut [Stack<O::Block>],
     row: usize,
     q0: f32,
     (begin, end): (u32, u32),
     slope: &Slope,
-    owner: O,
+    id: O,
 ) {
     let mut k = begin as usize / LANES;
     // Most spans lie within a block: no branch tells those from empty ones.
-    while let (Some(q), Some(o)) = (nearness.get_mut(k), owners.get_mut(k)) {
+    while let (Some(q), Some(o)) = (inverse_depth.get_mut(k), visibility_ids.get_mut(k)) {
         let (q, o) = (&mut q[row], &mut o[row]);
-        fill_block(q, o, q0, (LANES * k) as u32, (begin, end), slope, owner);
+        fill_block(q, o, q0, (LANES * k) as u32, (begin, end), slope, id);
         k += 1;
         if LANES * k >= end as usize {
             break;
@@ -335,14 +349,14 @@ fn fill_span<O: Owner>(
 
 /// Fills those pixels of a block, the first of which is in column `at`.
 #[inline(always)]
-fn fill_block<O: Owner>(
+fn fill_block<O: VisibilityId>(
     q: &mut [f32; LANES],
     o: &mut [O; LANES],
     q0: f32,
     at: u32,
     (begin, end): (u32, u32),
     slope: &Slope,
-    owner: O,
+    id: O,
 ) {
     let Slope { du, low, high, .. } = *slope;
     let length = end.saturating_sub(begin);
@@ -354,26 +368,26 @@ fn fill_block<O: Owner>(
         let is_inside = column.wrapping_sub(begin) < length;
         let wins = (u32::from(x > q[k]) & u32::from(is_inside)).wrapping_neg();
         q[k] = f32::from_bits(x.to_bits() & wins | q[k].to_bits() & !wins);
-        o[k] = o[k].replaced(owner, wins);
+        o[k] = o[k].replaced(id, wins);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::setup::Corner;
+    use crate::setup::ScreenVertex;
 
-    fn corner(u: f32, v: f32) -> Corner {
-        Corner { u, v, q: 1.0 }
+    fn vertex(u: f32, v: f32) -> ScreenVertex {
+        ScreenVertex { u, v, q: 1.0 }
     }
 
-    fn draw(target: &mut Target<u32>, [a, b, c]: [Corner; 3], owner: u32) {
+    fn draw(target: &mut Target<u32>, [a, b, c]: [ScreenVertex; 3], id: u32) {
         let setup = Setup::through(a, b, c, target.height as f32);
-        target.fill(&setup, owner);
+        target.fill(&setup, id);
     }
 
-    fn owners(target: &Target<u32>) -> impl Iterator<Item = u32> {
-        let rows = (0..target.height).map(|j| target.owner(j));
+    fn visibility_ids(target: &Target<u32>) -> impl Iterator<Item = u32> {
+        let rows = (0..target.height).map(|j| target.visibility_ids(j));
         rows.flat_map(|row| row.iter().flat_map(|b| b.0).take(target.width))
     }
 
@@ -384,15 +398,15 @@ mod tests {
         let rim = |k: usize| {
             let a = std::f32::consts::TAU * (k % n) as f32 / n as f32;
             let (c, s) = (chaic_protocol::geom::math::cos(a), chaic_protocol::geom::math::sin(a));
-            corner(32.3 + 200.0 * c, 31.7 + 200.0 * s)
+            vertex(32.3 + 200.0 * c, 31.7 + 200.0 * s)
         };
         let mut count = vec![0; 64 * 64];
         for k in 0..n {
             let mut target = Target::<u32>::default();
             target.clear(64, 64, 0.0);
-            draw(&mut target, [corner(32.3, 31.7), rim(k + 1), rim(k)], k as u32);
-            for (n, o) in count.iter_mut().zip(owners(&target)) {
-                *n += i32::from(o != NOBODY);
+            draw(&mut target, [vertex(32.3, 31.7), rim(k + 1), rim(k)], k as u32);
+            for (n, o) in count.iter_mut().zip(visibility_ids(&target)) {
+                *n += i32::from(o != BACKGROUND);
             }
         }
         assert!(count.iter().all(|n| *n == 1));
@@ -404,14 +418,14 @@ mod tests {
         q0: f32,
         begin: u32,
         slope: &Slope,
-        owner: u32,
+        id: u32,
     ) {
         for (k, (q, o)) in q.iter_mut().zip(o).enumerate() {
             let x = q0 + slope.du * (begin + k as u32) as f32;
             let x = if x < slope.low { slope.low } else { x };
             let x = if x > slope.high { slope.high } else { x };
             if x > *q {
-                (*q, *o) = (x, owner);
+                (*q, *o) = (x, id);
             }
         }
     }
@@ -434,15 +448,15 @@ mod tests {
             let row = rng.below(TILE);
             let mut q: Vec<Stack<Wide<f32>>> =
                 before.as_chunks().0.iter().map(|b| [Wide(*b); TILE]).collect();
-            let mut owners = vec![[7u32.block(); TILE]; q.len()];
+            let mut visibility_ids = vec![[7u32.block(); TILE]; q.len()];
             let mut names = vec![[7u16.block(); TILE]; q.len()];
             fill_span::<u16>(&mut q.clone(), &mut names, row, q0, span, &slope, 9);
-            fill_span::<u32>(&mut q, &mut owners, row, q0, span, &slope, 9);
+            fill_span::<u32>(&mut q, &mut visibility_ids, row, q0, span, &slope, 9);
             let bits = |q: f32| q.to_bits();
-            let (q, owners) =
-                (q.iter().flat_map(|q| q[row].0), owners.iter().flat_map(|o| o[row].0));
+            let (q, visibility_ids) =
+                (q.iter().flat_map(|q| q[row].0), visibility_ids.iter().flat_map(|o| o[row].0));
             assert!(q.map(bits).eq(right_q.into_iter().map(bits)), "{n} pixels, {slope:?}");
-            assert!(owners.eq(right_owners.iter().copied()), "{n} pixels, {slope:?}");
+            assert!(visibility_ids.eq(right_owners.iter().copied()), "{n} pixels, {slope:?}");
             let names = names.iter().flat_map(|o| o[row].0).map(u32::from);
             assert!(names.eq(right_owners), "{n} pixels, {slope:?}");
         }
@@ -453,26 +467,25 @@ mod tests {
         let mut target = Target::<u32>::default();
         target.clear(16, 16, 0.0);
         for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e38] {
-            draw(&mut target, [corner(0.0, 0.0), corner(bad, 8.0), corner(3.0, bad)], 1);
+            draw(&mut target, [vertex(0.0, 0.0), vertex(bad, 8.0), vertex(3.0, bad)], 1);
         }
-        draw(&mut target, [corner(5.0, 5.0); 3], 2);
-        assert!(owners(&target).all(|o| o != 2));
+        draw(&mut target, [vertex(5.0, 5.0); 3], 2);
+        assert!(visibility_ids(&target).all(|o| o != 2));
         let mut empty = Target::<u32>::default();
         empty.clear(0, 0, 0.0);
         empty.touch([0.0, 0.0, 9.0, 9.0]);
-        empty.update_least();
-        draw(&mut empty, [corner(0.0, 0.0), corner(0.0, 9.0), corner(9.0, 0.0)], 1);
+        assert!(!empty.is_occluded([0.0, 0.0, 9.0, 9.0], 1.0));
+        draw(&mut empty, [vertex(0.0, 0.0), vertex(0.0, 9.0), vertex(9.0, 0.0)], 1);
     }
 
     #[test]
     fn only_what_is_behind_is_hidden() {
         let mut target = Target::<u32>::default();
         target.clear(20, 20, 0.0);
-        draw(&mut target, [corner(-50.0, -50.0), corner(-50.0, 100.0), corner(100.0, -50.0)], 1);
-        assert!(!target.hides([2.0, 2.0, 9.0, 9.0], 0.5), "not yet brought up to date");
+        draw(&mut target, [vertex(-50.0, -50.0), vertex(-50.0, 100.0), vertex(100.0, -50.0)], 1);
+        assert!(!target.is_occluded([2.0, 2.0, 9.0, 9.0], 0.5), "not yet announced");
         target.touch([-50.0, -50.0, 100.0, 100.0]);
-        target.update_least();
-        assert!(target.hides([2.0, 2.0, 9.0, 9.0], 0.5));
-        assert!(!target.hides([2.0, 2.0, 9.0, 9.0], 1.5));
+        assert!(target.is_occluded([2.0, 2.0, 9.0, 9.0], 0.5));
+        assert!(!target.is_occluded([2.0, 2.0, 9.0, 9.0], 1.5));
     }
 }

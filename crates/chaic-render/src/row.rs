@@ -36,7 +36,7 @@ pub(crate) enum Hue {
 
 /// What a segment looks like.
 #[derive(Clone, Copy)]
-pub(crate) struct Look {
+pub(crate) struct SegmentStyle {
     pub id: u16,
     pub hue: Hue,
     pub place: Place,
@@ -80,18 +80,18 @@ impl Row {
         self.depth[k]
     }
 
-    /// Depths of nearnesses, as [`crate::planes::Plane`] wants them.
+    /// Depths of inverse depths, as [`crate::planes::Plane`] wants them.
     #[inline(always)]
-    pub fn find_depths(&mut self, nearness: Blocks<Wide<f32>>, is_plan: bool) {
+    pub fn find_depths(&mut self, inverse_depth: Blocks<Wide<f32>>, is_plan: bool) {
         if is_plan {
             self.depth.fill(1.0);
             return;
         }
-        for (depth, nearness) in
-            self.depth.as_chunks_mut::<LANES>().0.iter_mut().zip(nearness.iter())
+        for (depth, inverse_depth) in
+            self.depth.as_chunks_mut::<LANES>().0.iter_mut().zip(inverse_depth.iter())
         {
             for k in 0..LANES {
-                depth[k] = reciprocal(nearness[k]);
+                depth[k] = reciprocal(inverse_depth[k]);
             }
         }
     }
@@ -101,7 +101,7 @@ impl Row {
     pub fn fill(
         &mut self,
         (begin, end): (usize, usize),
-        look: &Look,
+        style: &SegmentStyle,
         atlas: &Atlas,
         ground: Option<OnGround>,
     ) {
@@ -109,12 +109,12 @@ impl Row {
         let Row { depth, ids, bright, colors, .. } = self;
         let depth = &depth[lanes.clone()];
         let (bright, colors) = (&mut bright[lanes.clone()], &mut colors[lanes.clone()]);
-        ids[lanes].fill(look.id);
-        texture(bright, depth, &look.place, atlas);
+        ids[lanes].fill(style.id);
+        texture(bright, depth, &style.place, atlas);
         if let Some(OnGround { quads, x, z }) = ground {
             darken(bright, depth, quads, [x, z]);
         }
-        match &look.hue {
+        match &style.hue {
             Hue::Linear { plane, low, high } => linear(colors, bright, depth, plane, *low, *high),
             Hue::Ramp { start, step } => ramp(colors, bright, *start, *step),
         }

@@ -11,14 +11,14 @@ use rayon::prelude::*;
 use crate::appearance::{Appearance, Painted};
 use crate::frame::{ClassMesh, Frame, Instance, Shape};
 use crate::ground::{Foot, Ground};
-use crate::lamps::Lamps;
 use crate::light::{Light, Shadows};
-use crate::looks::{style_of, tint_of};
+use crate::light_rig::LightRig;
 use crate::mesh::Mesh;
+use crate::models::{style_of, tint_of};
 use crate::people::Body;
-use crate::regions::{RegionSet, Regions};
+use crate::portals::{PortalGraph, RegionSet};
 use crate::structure;
-use crate::view::{ImagesMut, View, look, look_into};
+use crate::view::{ImagesMut, View, draw_view, draw_view_into};
 
 /// Everything of an episode that is drawn and never changes: floors, walls, ceilings, and the
 /// shapes of things. Cheap to make; cameras share it.
@@ -27,15 +27,15 @@ pub struct Scene {
     structure: Vec<(EntityId, Mesh, RegionSet)>,
     things: Vec<(Arc<ClassMesh>, Option<[f32; 3]>)>,
     ground: Ground,
-    regions: Arc<Regions>,
+    regions: Arc<PortalGraph>,
     appearance: Appearance,
-    lamps: Lamps,
-    still: Mutex<Still>,
+    rig: LightRig,
+    static_shadows: Mutex<StaticShadows>,
 }
 
 /// Cameras in a world.
 #[derive(Clone, Copy, Debug)]
-pub struct Looks<'a> {
+pub struct WorldViews<'a> {
     /// Of the world's episode.
     pub scene: &'a Scene,
     /// The world as it is now.
@@ -47,10 +47,10 @@ pub struct Looks<'a> {
 /// What many cameras in many worlds see, in their order, into images whose memory is used again. The
 /// work goes to all threads of the pool, which take it from each other. The images don't depend on
 /// their number.
-pub fn render_batch(batch: &[Looks], images: &mut Vec<Vec<Images>>) {
+pub fn render_batch(batch: &[WorldViews], images: &mut Vec<Vec<Images>>) {
     images.resize_with(batch.len(), Vec::new);
     let pairs = batch.par_iter().zip(images.par_iter_mut());
-    pairs.for_each(|(looks, images)| looks.scene.render_into(looks.world, looks.views, images));
+    pairs.for_each(|(job, images)| job.scene.render_into(job.world, job.views, images));
 }
 
 fn postures(world: &World) -> Vec<Posture> {
@@ -69,7 +69,7 @@ impl Scene {
 
     /// Makes the shapes of an episode ready.
     pub fn with_appearance(setup: &Setup, appearance: Appearance) -> Scene {
-        let regions = Regions::new(setup);
+        let regions = PortalGraph::new(setup);
         let structure = structure::of(setup).into_iter().map(|(entity, mesh)| {
             let reached = regions.of_box(mesh.min, mesh.max);
             (entity, mesh, reached)
@@ -85,8 +85,8 @@ impl Scene {
             ground: Ground::new(setup),
             regions: Arc::new(regions),
             appearance,
-            lamps: appearance.lamps(),
-            still: Mutex::default(),
+            rig: appearance.light_rig(),
+            static_shadows: Mutex::default(),
         }
     }
 
@@ -111,8 +111,8 @@ impl Scene {
     pub fn render_view_into(&self, world: &World, view: &View, images: ImagesMut<'_>) {
         let bodies = bodies(&postures(world), world.state());
         let frame = self.frame(world.state(), &bodies, images.rgb.is_some());
-        look_into(&frame, view, images);
-        self.give_back(frame.light);
+        draw_view_into(&frame, view, images);
+        self.recycle(frame.light);
     }
 
     /// What cameras see of a state and postures that come from elsewhere: a recording, a test.
@@ -135,12 +135,12 @@ impl Scene {
         let bodies = bodies(postures, state);
         let frame = self.frame(state, &bodies, wants_color);
         if let ([view], [images]) = (views, &mut images[..]) {
-            look(&frame, view, images);
+            draw_view(&frame, view, images);
         } else {
             let pairs = views.par_iter().zip(images.par_iter_mut());
-            pairs.for_each(|(view, images)| look(&frame, view, images));
+            pairs.for_each(|(view, images)| draw_view(&frame, view, images));
         }
-        self.give_back(frame.light);
+        self.recycle(frame.light);
     }
 
     /// The class of a thing.
@@ -150,7 +150,7 @@ impl Scene {
     }
 
     /// Which parts of the house are seen from where.
-    pub fn regions(&self) -> &Arc<Regions> {
+    pub fn regions(&self) -> &Arc<PortalGraph> {
         &self.regions
     }
 
@@ -173,7 +173,7 @@ impl Scene {
         bodies: &'a [Body],
         wants_color: bool,
     ) -> Frame<'a> {
-        let mut light = self.still_light(state, wants_color);
+        let mut light = self.static_light(state, wants_color);
         self.cast_moving(state, &mut light);
         let mut instances =
             Vec::with_capacity(self.structure.len() + self.things.len() + bodies.len());
@@ -238,21 +238,22 @@ impl Scene {
 
     /// The light with the shadows of walls and of all things that lie still: those of the last
     /// moment are kept.
-    fn still_light(&self, state: &State, wants_color: bool) -> Light<'_> {
+    fn static_light(&self, state: &State, wants_color: bool) -> Light<'_> {
         if !wants_color {
-            return Light::new(&self.ground, &self.lamps, None);
+            return Light::new(&self.ground, &self.rig, None);
         }
         let places = state.things.iter().map(|thing| {
             let is_still = matches!(thing.place, Place::Resting { .. });
             shown_rotation(thing).filter(|_| is_still).map(|r| (thing.position, r))
         });
-        let mut still = self.still.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut still =
+            self.static_shadows.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if still.version == 0 || !still.places.iter().copied().eq(places.clone()) {
             still.version += 1;
             still.places = places.collect();
             still.spare.clear();
             let shadows = Shadows::of_walls(&self.ground);
-            let mut light = Light::new(&self.ground, &self.lamps, Some(shadows));
+            let mut light = Light::new(&self.ground, &self.rig, Some(shadows));
             for ((class, _), place) in self.things.iter().zip(&still.places) {
                 if let Some((position, rotation)) = place {
                     cast_foot(&mut light, class, rotation, *position);
@@ -262,7 +263,7 @@ impl Scene {
             still.shadows = light.shadows.unwrap_or_default();
         }
         let shadows = still.spare.pop().unwrap_or_else(|| still.shadows.clone());
-        Light { version: still.version, ..Light::new(&self.ground, &self.lamps, Some(shadows)) }
+        Light { version: still.version, ..Light::new(&self.ground, &self.rig, Some(shadows)) }
     }
 
     /// Adds the shadows of things that don't lie still.
@@ -276,9 +277,10 @@ impl Scene {
     }
 
     /// Takes the memory of shadows back, to be used again.
-    pub(crate) fn give_back(&self, light: Light) {
+    pub(crate) fn recycle(&self, light: Light) {
         let Light { shadows: Some(mut shadows), version, .. } = light else { return };
-        let mut still = self.still.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut still =
+            self.static_shadows.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if still.version == version {
             shadows.restore(&still.shadows, &self.ground);
             still.spare.push(shadows);
@@ -291,7 +293,7 @@ const N_IDS: usize = (u16::MAX - EntityId::FIRST_OBJECT.0) as usize + 1;
 
 /// The shadows of what lay still when it was last looked at in color.
 #[derive(Debug, Default)]
-struct Still {
+struct StaticShadows {
     /// Counts up when something that lay still has been moved; 0 before the first look.
     version: u64,
     /// Position and rotation of each thing that lies still.

@@ -1,4 +1,4 @@
-//! What is worked out of corners and triangles before pixels are filled.
+//! Triangle setup: projected vertices, back-face culling, edges and slopes, before pixels are filled.
 //!
 //! A pixel belongs to a triangle if its center does. Each edge's crossing with a row of centers is
 //! computed from its two ends in one fixed order, so that two triangles that share an edge leave
@@ -8,66 +8,67 @@ use chaic_protocol::Vec3;
 
 use crate::lens::{IntoCamera, Lens};
 
-/// A corner on the image: pixels from the left and the top, and nearness.
+/// A vertex on the image: pixels from the left and the top, and inverse depth.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Corner {
+pub(crate) struct ScreenVertex {
     pub u: f32,
     pub v: f32,
     pub q: f32,
 }
 
-/// Most corners of a mesh: an index of 16 bits needs no check.
-const N_CORNERS: usize = 1 << 16;
+/// Most vertices of a mesh: an index of 16 bits needs no check.
+const N_VERTICES: usize = 1 << 16;
 
-/// The corners of a mesh on the image, a list for each coordinate.
-pub(crate) struct Corners {
-    u: Box<[f32; N_CORNERS]>,
-    v: Box<[f32; N_CORNERS]>,
-    q: Box<[f32; N_CORNERS]>,
+/// The vertices of a mesh on the image, a list for each coordinate.
+pub(crate) struct ScreenVertices {
+    u: Box<[f32; N_VERTICES]>,
+    v: Box<[f32; N_VERTICES]>,
+    q: Box<[f32; N_VERTICES]>,
 }
 
-impl Default for Corners {
-    fn default() -> Corners {
-        let list = || match vec![0.0; N_CORNERS].into_boxed_slice().try_into() {
+impl Default for ScreenVertices {
+    fn default() -> ScreenVertices {
+        let list = || match vec![0.0; N_VERTICES].into_boxed_slice().try_into() {
             Ok(list) => list,
-            Err(_) => Box::new([0.0; N_CORNERS]),
+            Err(_) => Box::new([0.0; N_VERTICES]),
         };
-        Corners { u: list(), v: list(), q: list() }
+        ScreenVertices { u: list(), v: list(), q: list() }
     }
 }
 
-impl Corners {
+impl ScreenVertices {
     #[inline(always)]
-    fn get(&self, corner: u16) -> Corner {
-        let k = usize::from(corner);
-        Corner { u: self.u[k], v: self.v[k], q: self.q[k] }
+    fn get(&self, vertex: u16) -> ScreenVertex {
+        let k = usize::from(vertex);
+        ScreenVertex { u: self.u[k], v: self.v[k], q: self.q[k] }
     }
 
     /// Finds where points are on the image.
     #[inline(always)]
     pub fn place(&mut self, positions: &[Vec3], into: &IntoCamera, lens: &Lens) {
         let (mu, mv) = lens.middle();
-        let n = positions.len().min(N_CORNERS);
+        let n = positions.len().min(N_VERTICES);
         let (u, v, q) = (&mut self.u[..n], &mut self.v[..n], &mut self.q[..n]);
         let positions = &positions[..n];
         if lens.is_plan {
             for k in 0..n {
                 let p = into.map(positions[k]);
-                (u[k], v[k], q[k]) = (mu + p.x, mv + p.y, lens.nearness(p.z));
+                (u[k], v[k], q[k]) = (mu + p.x, mv + p.y, lens.inverse_depth(p.z));
             }
             return;
         }
         for k in 0..n {
             let p = into.map(positions[k]);
-            let nearness = 1.0 / p.z;
-            (u[k], v[k], q[k]) = (mu + p.x * nearness, mv + p.y * nearness, nearness);
+            let inverse_depth = 1.0 / p.z;
+            (u[k], v[k], q[k]) =
+                (mu + p.x * inverse_depth, mv + p.y * inverse_depth, inverse_depth);
         }
     }
 
-    /// Whether a corner is in front of the camera, no nearer than this.
+    /// Whether a vertex is in front of the camera, no nearer than this.
     #[inline(always)]
-    pub fn is_in_front(&self, corner: u16, nearest: f32) -> bool {
-        let q = self.q[usize::from(corner)];
+    pub fn is_in_front(&self, vertex: u16, nearest: f32) -> bool {
+        let q = self.q[usize::from(vertex)];
         (q > 0.0) & (q <= nearest)
     }
 
@@ -76,13 +77,13 @@ impl Corners {
     #[inline(always)]
     pub fn find_alive(
         &self,
-        corners: &[Vec<u16>; 3],
+        vertices: &[Vec<u16>; 3],
         lens: &Lens,
         nearest: f32,
         alive: &mut Vec<u32>,
     ) {
-        let n = corners[0].len().min(corners[1].len()).min(corners[2].len());
-        let [a, b, c] = corners.each_ref().map(|list| &list[..n]);
+        let n = vertices[0].len().min(vertices[1].len()).min(vertices[2].len());
+        let [a, b, c] = vertices.each_ref().map(|list| &list[..n]);
         let (u, v, q) = (&*self.u, &*self.v, &*self.q);
         let (columns, rows) = (lens.width as f32, lens.height as f32);
         alive.clear();
@@ -111,10 +112,10 @@ impl Corners {
     }
 }
 
-/// Nearness over the image: `q + du * (u - u0) + dv * (v - v0)`, kept within [low, high].
+/// Inverse depth over the image: `q + du * (u - u0) + dv * (v - v0)`, kept within [low, high].
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Slope {
-    /// Nearness at u0 and v0.
+    /// Inverse depth at u0 and v0.
     pub q: f32,
     pub u0: f32,
     pub v0: f32,
@@ -125,9 +126,9 @@ pub(crate) struct Slope {
 }
 
 impl Slope {
-    /// Through three corners; without meaning if they lie on a line.
+    /// Through three vertices; without meaning if they lie on a line.
     #[inline(always)]
-    fn through(a: Corner, b: Corner, c: Corner) -> Slope {
+    fn through(a: ScreenVertex, b: ScreenVertex, c: ScreenVertex) -> Slope {
         let (bu, bv, bq) = (b.u - a.u, b.v - a.v, b.q - a.q);
         let (cu, cv, cq) = (c.u - a.u, c.v - a.v, c.q - a.q);
         let inverse = 1.0 / (bu * cv - bv * cu);
@@ -164,12 +165,12 @@ pub(crate) struct Setup {
 impl Setup {
     /// Of a triangle that faces the camera.
     #[inline(always)]
-    pub fn through(a: Corner, b: Corner, c: Corner, rows: f32) -> Setup {
+    pub fn through(a: ScreenVertex, b: ScreenVertex, c: ScreenVertex, rows: f32) -> Setup {
         let slope = Slope::through(a, b, c);
         Setup::of([(a.u, a.v), (b.u, b.v), (c.u, c.v)], slope, rows)
     }
 
-    /// Of these corners on an image of so many rows, whichever way they turn.
+    /// Of these vertices on an image of so many rows, whichever way they turn.
     #[inline(always)]
     pub fn of([a, b, c]: [(f32, f32); 3], slope: Slope, rows: f32) -> Setup {
         let (a, b) = in_order(a, b);
@@ -228,7 +229,7 @@ impl Setups {
         &mut self,
         triangles: &[u32; N_SETUPS],
         mesh: &[&[u16]; 3],
-        corners: &Corners,
+        vertices: &ScreenVertices,
         rows: f32,
     ) {
         let n = mesh[0].len();
@@ -236,8 +237,11 @@ impl Setups {
         let (m0, m1, m2) = (&mesh[0][..n], &mesh[1][..n], &mesh[2][..n]);
         for (k, triangle) in triangles.iter().enumerate() {
             let triangle = (*triangle as usize).min(last);
-            let (a, b, c) =
-                (corners.get(m0[triangle]), corners.get(m1[triangle]), corners.get(m2[triangle]));
+            let (a, b, c) = (
+                vertices.get(m0[triangle]),
+                vertices.get(m1[triangle]),
+                vertices.get(m2[triangle]),
+            );
             let s = Setup::through(a, b, c, rows);
             (self.first[k], self.middle[k], self.last[k]) = (s.first, s.middle, s.last);
             (self.top[0][k], self.top[1][k]) = (s.top[0], s.top[1]);

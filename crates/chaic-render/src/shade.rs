@@ -19,8 +19,8 @@ use crate::light::Shadows;
 use crate::paint::{Kind, Linear, Paint, Painter, Sight};
 use crate::planes::Plane;
 use crate::points::Points;
-use crate::raster::{Blocks, LANES, NOBODY, Target, Wide, owner_parts};
-use crate::row::{Hue, Look, OnGround, Row};
+use crate::raster::{BACKGROUND, Blocks, LANES, Target, Wide, unpack_visibility_id};
+use crate::row::{Hue, OnGround, Row, SegmentStyle};
 use crate::segments::{STEP, Segment, Segments};
 use crate::texture::{Atlas, Texture, Tile, atlas};
 
@@ -118,7 +118,7 @@ impl pulp::NullaryFnOnce for Rows<'_> {
         }
         for j in 0..self.lens.height {
             let line = j * width..(j + 1) * width;
-            self.canvas.row.find_depths(self.target.nearness(j), self.lens.is_plan);
+            self.canvas.row.find_depths(self.target.inverse_depth(j), self.lens.is_plan);
             self.find_segments(j);
             self.light();
             self.canvas.segments.place(j as f32 + 0.5, 1.0 / self.lens.focal);
@@ -168,12 +168,12 @@ impl Rows<'_> {
         self.canvas.segments.clear();
         self.canvas.sky.clear();
         let mut begins = std::mem::take(&mut self.canvas.begins);
-        find_begins(self.target.owner(j), width, &mut self.canvas.owners, &mut begins);
+        find_begins(self.target.visibility_ids(j), width, &mut self.canvas.owners, &mut begins);
         for (k, begin) in begins.iter().enumerate() {
             let begin = *begin as usize;
             let end = begins.get(k + 1).map_or(width, |end| *end as usize);
             let owner = self.canvas.owners[begin + 1];
-            if owner == NOBODY {
+            if owner == BACKGROUND {
                 self.see_sky(j, begin, end);
             } else {
                 let paint = self.find_paint(owner);
@@ -215,8 +215,9 @@ impl Rows<'_> {
             if !self.lens.is_plan {
                 return row.depth_at(k);
             }
-            let nearness = self.target.nearness(j).get(k / LANES).map(|block| block[k % LANES]);
-            self.lens.depth(nearness.unwrap_or_default())
+            let inverse_depth =
+                self.target.inverse_depth(j).get(k / LANES).map(|block| block[k % LANES]);
+            self.lens.depth(inverse_depth.unwrap_or_default())
         };
         let mut knots = [0; 2];
         let mut between = 1;
@@ -250,7 +251,7 @@ impl Rows<'_> {
     #[inline(always)]
     fn light(&mut self) {
         let Canvas { paints, points, n_lit, .. } = &mut *self.canvas;
-        points.light(self.painter.frame.light.lamps);
+        points.light(self.painter.frame.light.rig);
         for paint in &mut paints[*n_lit..] {
             if let Kind::Unlit(unlit) = &paint.kind {
                 paint.kind = Kind::Linear(unlit.lit(points));
@@ -297,14 +298,14 @@ impl Rows<'_> {
                     (paint.entity, hue)
                 }
             };
-            row.fill((begin, end), &Look { id, hue, place }, self.atlas, ground);
+            row.fill((begin, end), &SegmentStyle { id, hue, place }, self.atlas, ground);
         }
     }
 
     /// Where the paint of a triangle is; worked out when first asked for.
     #[inline(always)]
     fn find_paint(&mut self, owner: u32) -> usize {
-        let (index, triangle) = owner_parts(owner);
+        let (index, triangle) = unpack_visibility_id(owner);
         let slot = self.drawn.firsts[index] as usize + triangle;
         let known = self.canvas.slots[slot];
         if known != EMPTY {

@@ -109,7 +109,7 @@ impl Scene {
             instances.push(self.instance_data(instance, mesh));
         }
         let result = look(&Shapes { instances, shapes, frame: &frame });
-        self.give_back(frame.light);
+        self.recycle(frame.light);
         result
     }
 }

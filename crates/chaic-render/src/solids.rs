@@ -32,9 +32,9 @@ impl Detail {
         Detail { px_per_m: LEVEL_RADIUS_PX[level] / radius_m.max(1e-3) }
     }
 
-    /// Corners of a full circle of this radius: a chord of n leaves its arc by
+    /// Segments of a full circle of this radius: a chord of n leaves its arc by
     /// r pi^2 / (2 n^2), which is kept near one pixel.
-    pub fn corners(&self, radius_m: f32) -> usize {
+    pub fn segments(&self, radius_m: f32) -> usize {
         let n = 2.3 * (radius_m.max(0.0) * self.px_per_m).sqrt();
         (n as usize).clamp(5, 32)
     }
@@ -66,22 +66,22 @@ fn rotation(axis: Vec3, b: Vec3, c: Vec3, rad: f32) -> Mat3 {
 /// Adds one solid.
 pub(crate) fn solid(mesh: &mut Mesh, solid: Solid, place: &Place, detail: Detail) {
     let width = 0.5 * place.extent.x.max(place.extent.z);
-    let n = detail.corners(width);
+    let n = detail.segments(width);
     match solid {
         Solid::Cuboid => cuboid(mesh, place),
         Solid::Ellipsoid => {
-            let n = detail.corners(0.5 * place.extent.max_element());
+            let n = detail.segments(0.5 * place.extent.max_element());
             ellipsoid(mesh, place, n);
         }
         Solid::Frustum { top } => frustum(mesh, place, top, n),
         Solid::Torus { tube } => {
-            let m = detail.corners(width * tube).min(16);
+            let m = detail.segments(width * tube).min(16);
             // A thin wire needs no more than three sides.
             let (m, least) = if detail.px_per_m * width * tube < 1.0 { (3, 6) } else { (m, 8) };
             ring_of_tubes(mesh, place, tube, 360.0, n.max(least), m);
         }
         Solid::Arc { tube, degrees } => {
-            let m = detail.corners(width * tube).min(16);
+            let m = detail.segments(width * tube).min(16);
             let m = if detail.px_per_m * width * tube < 1.0 { 3 } else { m };
             let n = ((n as f32 * degrees / 360.0) as usize + 2).max(4);
             ring_of_tubes(mesh, place, tube, degrees.clamp(1.0, 359.0), n, m);
@@ -95,7 +95,7 @@ pub(crate) fn cuboid(mesh: &mut Mesh, place: &Place) {
     let base = mesh.positions.len();
     for k in 0..8 {
         let sign = |bit: usize| if k >> bit & 1 == 1 { 0.5 } else { -0.5 };
-        mesh.corner(place.point(Vec3::new(sign(0), sign(1), sign(2))), Vec3::Y);
+        mesh.vertex(place.point(Vec3::new(sign(0), sign(1), sign(2))), Vec3::Y);
     }
     for q in [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]] {
         mesh.quad(q.map(|c| base + c), false);
@@ -105,7 +105,7 @@ pub(crate) fn cuboid(mesh: &mut Mesh, place: &Place) {
 pub(crate) fn ellipsoid(mesh: &mut Mesh, place: &Place, n: usize) {
     let stacks = (n / 2 + 1).clamp(3, 14);
     let pole = |mesh: &mut Mesh, y: f32| {
-        mesh.corner(place.point(Vec3::new(0.0, 0.5 * y, 0.0)), place.normal(Vec3::Y * y))
+        mesh.vertex(place.point(Vec3::new(0.0, 0.5 * y, 0.0)), place.normal(Vec3::Y * y))
     };
     let bottom = pole(mesh, -1.0);
     let mut below = None;
@@ -116,7 +116,7 @@ pub(crate) fn ellipsoid(mesh: &mut Mesh, place: &Place, n: usize) {
         for k in 0..n {
             let (c, s) = circle(k, n);
             let d = Vec3::new(r * c, y, r * s);
-            mesh.corner(place.point(0.5 * d), place.normal(d));
+            mesh.vertex(place.point(0.5 * d), place.normal(d));
         }
         match below {
             None => {
@@ -134,7 +134,7 @@ pub(crate) fn ellipsoid(mesh: &mut Mesh, place: &Place, n: usize) {
     }
 }
 
-/// A ring of corners of a lathed form: radius `r` (0.5 fills the box) at height `y`, normal with
+/// A ring of vertices of a lathed form: radius `r` (0.5 fills the box) at height `y`, normal with
 /// slope `ny` against radial `nr`.
 fn ring(
     mesh: &mut Mesh,
@@ -148,7 +148,7 @@ fn ring(
     for k in 0..n {
         let (c, s) = circle(k, n);
         let p = place.point(Vec3::new(rx * c, y, rz * s));
-        mesh.corner(p, place.normal(Vec3::new(nr * c, ny, nr * s)));
+        mesh.vertex(p, place.normal(Vec3::new(nr * c, ny, nr * s)));
     }
     base
 }
@@ -165,7 +165,7 @@ pub(crate) fn frustum(mesh: &mut Mesh, place: &Place, top: f32, n: usize) {
         for k in 0..n {
             let (c, s) = circle(2 * k + 1, 2 * n);
             let tip = Vec3::new(0.0, 0.5, 0.0);
-            let tip = mesh.corner(place.point(tip), place.normal(Vec3::new(c, slope.1, s)));
+            let tip = mesh.vertex(place.point(tip), place.normal(Vec3::new(c, slope.1, s)));
             mesh.triangle([tip, low + (k + 1) % n, low + k], true);
         }
         return;
@@ -190,7 +190,7 @@ fn ring_of_tubes(mesh: &mut Mesh, place: &Place, tube: f32, degrees: f32, n: usi
             let r = major + minor * c;
             let p = place.point(Vec3::new(r * dx, 0.5 * s, r * dz));
             let normal = Vec3::new(c * dx / minor, s / 0.5, c * dz / minor);
-            mesh.corner(p, place.normal(normal));
+            mesh.vertex(p, place.normal(normal));
         }
     }
     for j in 0..spans {
@@ -223,7 +223,7 @@ fn tub(mesh: &mut Mesh, place: &Place, wall: f32, bottom: f32) {
     ];
     for (x, z, y) in levels {
         for (sx, sz) in [(1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0)] {
-            mesh.corner(place.point(Vec3::new(sx * x, y, sz * z)), Vec3::Y);
+            mesh.vertex(place.point(Vec3::new(sx * x, y, sz * z)), Vec3::Y);
         }
     }
     for level in 0..3 {
@@ -281,7 +281,7 @@ mod tests {
             solid(&mut mesh, form, &place, Detail { px_per_m: 500.0 });
             let (mut volume, mut edges) = (0.0, std::collections::BTreeMap::new());
             for t in &mesh.triangles {
-                let [a, b, c] = t.corners.map(|c| mesh.positions[usize::from(c)] - place.center);
+                let [a, b, c] = t.vertices.map(|c| mesh.positions[usize::from(c)] - place.center);
                 volume += a.dot(b.cross(c)) / 6.0;
                 let key = |v: Vec3| v.to_array().map(|x| (x * 1e5) as i32);
                 for (p, q) in [(a, b), (b, c), (c, a)] {
@@ -290,7 +290,7 @@ mod tests {
                 }
                 if t.smooth {
                     let flat = (b - a).cross(c - a);
-                    for k in t.corners {
+                    for k in t.vertices {
                         assert!(mesh.normals[usize::from(k)].dot(flat) > 0.0, "{form:?}: normal");
                     }
                 }

@@ -127,7 +127,7 @@ impl ImagesMut<'_> {
 }
 
 /// Draws one view, into images whose memory is used again.
-pub(crate) fn look(frame: &Frame, view: &View, images: &mut Images) {
+pub(crate) fn draw_view(frame: &Frame, view: &View, images: &mut Images) {
     let Camera { width, height, .. } = view.camera;
     if width > MAX_SIDE_PX || height > MAX_SIDE_PX {
         *images = Images::default();
@@ -140,14 +140,14 @@ pub(crate) fn look(frame: &Frame, view: &View, images: &mut Images) {
         depth_m: sized(&mut images.depth_m, depth, n),
         ids: sized(&mut images.ids, ids, n),
     };
-    look_into(frame, view, images);
+    draw_view_into(frame, view, images);
 }
 
 /// Draws one view into buffers of the caller's; which images are made depends on which are there.
 ///
 /// # Panics
 /// If a buffer has another length than the camera's images.
-pub(crate) fn look_into(frame: &Frame, view: &View, images: ImagesMut<'_>) {
+pub(crate) fn draw_view_into(frame: &Frame, view: &View, images: ImagesMut<'_>) {
     let n = view.camera.width as usize * view.camera.height as usize;
     assert!(images.fits(n), "buffers of another length than the {n} pixels of the view");
     let ImagesMut { rgb, depth_m, ids } = images;
@@ -188,19 +188,27 @@ impl pulp::NullaryFnOnce for ReadBack<'_> {
         for j in 0..target.height {
             let line = j * target.width..(j + 1) * target.width;
             if let Some(depth_m) = &mut depth_m {
-                for (out, block) in
-                    depth_m[line.clone()].chunks_mut(LANES).zip(target.nearness(j).iter())
-                {
-                    let mut depth = [0.0; LANES];
+                let (whole, rest) = depth_m[line.clone()].as_chunks_mut::<LANES>();
+                let mut blocks = target.inverse_depth(j).iter();
+                for (out, block) in whole.iter_mut().zip(&mut blocks) {
                     for k in 0..LANES {
-                        depth[k] = seen_depth_m(reciprocal(block[k]));
+                        out[k] = seen_depth_m(reciprocal(block[k]));
                     }
-                    out.copy_from_slice(&depth[..out.len()]);
+                }
+                if let Some(block) = blocks.next() {
+                    for (out, q) in rest.iter_mut().zip(&**block) {
+                        *out = seen_depth_m(reciprocal(*q));
+                    }
                 }
             }
             if let Some(ids) = &mut ids {
-                for (out, block) in ids[line].chunks_mut(LANES).zip(target.owner(j).iter()) {
-                    out.copy_from_slice(&block[..out.len()]);
+                let (whole, rest) = ids[line].as_chunks_mut::<LANES>();
+                let mut blocks = target.visibility_ids(j).iter();
+                for (out, block) in whole.iter_mut().zip(&mut blocks) {
+                    *out = **block;
+                }
+                if let Some(block) = blocks.next() {
+                    rest.copy_from_slice(&block[..rest.len()]);
                 }
             }
         }

@@ -34,7 +34,7 @@ fn first_hit(geometry: &Geometry, eye: Vec3, ray: Vec3) -> Option<(EntityId, f32
             continue;
         }
         for triangle in &mesh.triangles {
-            let [a, b, c] = triangle.corners.map(|k| Vec3::from(mesh.positions[k as usize]));
+            let [a, b, c] = triangle.vertices.map(|k| Vec3::from(mesh.positions[k as usize]));
             let (e1, e2) = (b - a, c - a);
             let det = e1.dot(d.cross(e2));
             // Counter-clockwise seen from outside: others face away.
@@ -101,7 +101,7 @@ fn shapes_are_shared_and_whole() {
         for mesh in &level.meshes {
             assert_eq!(mesh.positions.len(), mesh.normals.len());
             let n = mesh.positions.len() as u32;
-            assert!(mesh.triangles.iter().all(|t| t.corners.iter().all(|c| *c < n)));
+            assert!(mesh.triangles.iter().all(|t| t.vertices.iter().all(|c| *c < n)));
             assert!(mesh.triangles.iter().all(|t| usize::from(t.skin) < mesh.skins.len()));
             assert!(mesh.triangles.is_sorted_by_key(|t| t.skin));
         }

@@ -82,7 +82,7 @@ fn extents_of(geometry: &Geometry) -> BTreeMap<String, Extent> {
         let m = glam::Mat3::from_cols_array_2d(&instance.rotation);
         let name = format!("{}{}", class_of(instance.entity), instance.entity);
         let extent = extents.entry(name).or_insert(NOTHING);
-        let corners = mesh.triangles.iter().flat_map(|t| t.corners);
+        let corners = mesh.triangles.iter().flat_map(|t| t.vertices);
         let points = corners
             .map(|k| m * Vec3::from(mesh.positions[k as usize]) + Vec3::from(instance.origin));
         grow(extent, mesh.triangles.len(), points);

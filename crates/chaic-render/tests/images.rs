@@ -8,7 +8,7 @@ use chaic_protocol::geom::Camera;
 use chaic_protocol::observation::Images;
 use chaic_protocol::{AgentId, ClassId, EntityId, Vec3};
 use chaic_render::{
-    Channels, Labels, Looks, MAX_SIDE_PX, Scene, View, image_out, plan, render_batch,
+    Channels, Labels, MAX_SIDE_PX, Scene, View, WorldViews, floor_plan, image_out, render_batch,
 };
 use chaic_world::{Setup, Thing, Wall, World};
 use scenes::{camera, empty, posture, thing, wall, world};
@@ -150,11 +150,11 @@ fn many_worlds_at_once_look_as_one_by_one() {
         .zip([Channels::ALL, Channels::RGB, DEPTH_AND_IDS])
         .map(|(eye, channels)| View { channels, ..view(camera(*eye, 0.4, -0.1, 93, 57)) })
         .collect();
-    let batch: Vec<Looks> = worlds
+    let batch: Vec<WorldViews> = worlds
         .iter()
         .zip(&scenes)
         .enumerate()
-        .map(|(k, (world, scene))| Looks { scene, world, views: &views[..k % 4] })
+        .map(|(k, (world, scene))| WorldViews { scene, world, views: &views[..k % 4] })
         .collect();
     let alone: Vec<Vec<Images>> =
         batch.iter().map(|b| Scene::new(b.world.setup()).render(b.world, b.views)).collect();
@@ -322,7 +322,7 @@ fn odd_postures_are_drawn_as_something() {
 #[test]
 fn a_plan_shows_walls_people_and_a_legend() {
     let world = world(scenes::house());
-    let map = plan::draw(&world, 400);
+    let map = floor_plan::draw(&world, 400);
     assert_eq!(map.width(), 400);
     assert!(map.height() > 200, "the house is twice as wide as deep");
     let dark = map.pixels().filter(|p| p.0.iter().all(|c| *c < 70)).count();

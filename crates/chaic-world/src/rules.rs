@@ -18,7 +18,7 @@ pub struct Durations {
     pub reach: u32,
     /// Closing a hand.
     pub grasp: u32,
-    /// Closing a hand in vain, where a limit is exceeded. As long as a good one, so that both
+    /// Closing a hand on nothing, where a limit is exceeded. As long as a good one, so that both
     /// attempts take the same time: ours. The original leaves it out (facts S1.4 and S2.2: 55
     /// frames in place of 57).
     pub vain_grasp: u32,
@@ -207,7 +207,7 @@ impl Rules {
                 raise_furniture: 17,
                 // Facts S2.2: one frame, then both arms are brought back.
                 refused_pick: 37,
-                // Facts S1.4 and S2.2: after a vain reach the arms are brought back at once.
+                // Facts S1.4 and S2.2: after a failed reach the arms are brought back at once.
                 vain_grasp: 0,
                 ..paper.durations
             },

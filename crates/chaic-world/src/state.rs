@@ -112,7 +112,7 @@ pub const PROGRESS_M: f32 = 0.5;
 
 /// When and where a person made progress last: got farther than [`PROGRESS_M`] from where it had
 /// made some before, on its own feet or carried along, or carried out an action that was neither a
-/// step, nor a turn, nor a wait: well, or in vain because it was beyond its limits, which is a draw
+/// step, nor a turn, nor a wait: well, or failing because it was beyond its limits, which is a draw
 /// of luck. Why it makes none does not matter: who waits on purpose makes none.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LastProgress {
@@ -204,8 +204,8 @@ pub enum Phase {
         hand: Option<Hand>,
         /// Where, in the world, metres.
         to: Vec3,
-        /// Whether it is a vain attempt.
-        vain: bool,
+        /// Whether it is a failed attempt.
+        fails: bool,
     },
     /// Closing the hand around a thing.
     Grasp {

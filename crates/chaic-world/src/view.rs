@@ -217,9 +217,9 @@ impl World {
         };
         let t = step.progress();
         match step.phase {
-            Phase::Reach { hand: h, to, vain } if applies(h) => {
-                // A vain reach goes up and comes half back.
-                let t = if vain { (1.5 * t).min(1.0) } else { t };
+            Phase::Reach { hand: h, to, fails } if applies(h) => {
+                // A failed reach goes up and comes half back.
+                let t = if fails { (1.5 * t).min(1.0) } else { t };
                 rest.lerp(spread(to, h), t * t * (3.0 - 2.0 * t))
             }
             Phase::Grasp { hand: h, object } if applies(h) => {

@@ -186,8 +186,8 @@ fn who_chose_the_same_piece_last_is_called_to_lift_it() {
         let piano = thing("piano", at(0.0, 0.0, 0.0));
         let people = vec![person(Persona::Frail, 0.0, 1.5), person(Persona::Helper, 2.2, 2.2)];
         let mut w = with(rules, hall(vec![piano], people));
-        let vain = Outcome::Failure(FailureReason::BeyondLimits);
-        assert_eq!(run(&mut w, A, pick(nth(0))).0, vain, "too heavy for one");
+        let failed = Outcome::Failure(FailureReason::BeyondLimits);
+        assert_eq!(run(&mut w, A, pick(nth(0))).0, failed, "too heavy for one");
         w.submit(B, pick(nth(0))).expect("it is free");
         let called = w.state().people[0].activity.is_some();
         for _ in 0..400 {

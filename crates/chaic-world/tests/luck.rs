@@ -87,9 +87,9 @@ fn a_vain_pick_up_takes_as_long_as_a_good_one_and_two_frames_less_by_compat() {
                 (outcome.is_success() == success).then_some(frames)
             })
         };
-        let [good, vain] = [true, false].map(|s| frames_of(s).expect("both happen at 0.43"));
+        let [good, failed] = [true, false].map(|s| frames_of(s).expect("both happen at 0.43"));
         assert_eq!(good, 57 + 1, "57 and one that finds it within reach");
-        assert_eq!(vain, good - shorter);
+        assert_eq!(failed, good - shorter);
     }
 }
 

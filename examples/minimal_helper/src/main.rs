@@ -12,7 +12,7 @@ use chaic_env::minds::{Helper, Helpers};
 use chaic_env::rules::PlannerRules;
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::{Format, Report};
-use chaic_eval::run::{Access, Given, Run};
+use chaic_eval::run::{Access, Run, RunRequest};
 use chaic_protocol::geom::{horizontal_distance, wrap_angle, yaw_towards};
 use chaic_protocol::observation::{Grants, Identity, Senses};
 use chaic_protocol::rng::Stream;
@@ -146,11 +146,11 @@ impl Helpers for Mine {
 
 fn main() -> Result<()> {
     let out = std::env::args().nth(1).unwrap_or_else(|| "runs/minimal".to_owned());
-    let given = Given {
+    let given = RunRequest {
         tasks: Some(vec![TaskId::NoConstraint, TaskId::LowTarget, TaskId::Shopping]),
         helpers: Some(vec!["none".to_owned(), "minimal".to_owned()]),
         first: Some(4),
-        ..Given::default()
+        ..RunRequest::default()
     };
     let (mut run, _) = Run::open(Path::new(&out), Access::Resume, &given, &Mine)?;
     run.play(2, &Mine, &AtomicBool::new(false), &mut |_| {})?;

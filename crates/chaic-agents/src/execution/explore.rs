@@ -5,7 +5,7 @@ use chaic_protocol::geom::{Rect, xz};
 use chaic_protocol::{Action, Frame, Vec2};
 
 use super::navigate::{Destination, Nav, Navigator, face};
-use super::path::Reach;
+use super::path::CostField;
 use crate::memory::{Memory, Space};
 use crate::track::Intent;
 
@@ -149,10 +149,10 @@ impl Explorer {
 
     fn choose(&mut self, memory: &mut Memory) -> Option<Target> {
         memory.refresh();
-        let reach = memory.reach()?;
-        let frontier = self.nearest_frontier(memory, reach);
+        let field = memory.cost_field()?;
+        let frontier = self.nearest_frontier(memory, field);
         self.is_exhausted = frontier.is_none();
-        let target = frontier.or_else(|| self.longest_unseen(memory, reach));
+        let target = frontier.or_else(|| self.longest_unseen(memory, field));
         if target.is_none() {
             let here = memory.here();
             self.blacklist.retain(|(at, _)| at.distance(here) < BLACKLIST_M);
@@ -167,10 +167,10 @@ impl Explorer {
     }
 
     /// The border that is cheapest to get to, long ones preferred a little.
-    fn nearest_frontier(&self, memory: &Memory, reach: &Reach) -> Option<Target> {
+    fn nearest_frontier(&self, memory: &Memory, field: &CostField) -> Option<Target> {
         let grid = memory.map.grid();
         let mut is_open: Vec<bool> = (0..grid.n_cells())
-            .map(|c| reach.cost(c).is_some() && self.is_frontier(memory, c))
+            .map(|c| field.cost(c).is_some() && self.is_frontier(memory, c))
             .collect();
         let mut best: Option<(f32, Target)> = None;
         let mut cluster = Vec::new();
@@ -195,11 +195,11 @@ impl Explorer {
             let nearest = cluster
                 .iter()
                 .filter(|c| !self.is_blacklisted(grid.center(**c)))
-                .filter_map(|c| Some((reach.cost(*c)?, *c)))
+                .filter_map(|c| Some((field.cost(*c)?, *c)))
                 .min();
             let Some((cost, cell)) = nearest else { continue };
             let worth_m = (WORTH_M.0 * cluster.len() as f32).min(WORTH_M.1);
-            let score = Reach::metres(cost) - worth_m;
+            let score = CostField::metres(cost) - worth_m;
             if best.is_none_or(|(s, _)| score < s) {
                 let at = grid.center(cell);
                 let side = self.unknown_side(memory, cell).map_or(at, |c| grid.center(c));
@@ -212,14 +212,14 @@ impl Explorer {
     }
 
     /// The place that nobody has looked at for longest, for the length of the way to it.
-    fn longest_unseen(&self, memory: &Memory, reach: &Reach) -> Option<Target> {
+    fn longest_unseen(&self, memory: &Memory, field: &CostField) -> Option<Target> {
         let grid = memory.map.grid();
         let mut best: Option<(f32, Vec2)> = None;
         for (i, j) in
             (0..grid.nz()).step_by(4).flat_map(|j| (0..grid.nx()).step_by(4).map(move |i| (i, j)))
         {
             let cell = j * grid.nx() + i;
-            let (at, Some(cost)) = (grid.center(cell), reach.cost(cell)) else { continue };
+            let (at, Some(cost)) = (grid.center(cell), field.cost(cell)) else { continue };
             let usable = memory.map.space(cell) == Space::Free
                 && !memory.costs().is_tight(cell)
                 && self.bounds.contains(at)
@@ -229,7 +229,7 @@ impl Explorer {
                 continue;
             }
             let age = (memory.frame + 1).saturating_sub(memory.map.place_seen(cell).unwrap_or(0));
-            let score = age as f32 / (5.0 + Reach::metres(cost));
+            let score = age as f32 / (5.0 + CostField::metres(cost));
             if best.is_none_or(|(s, _)| score > s) {
                 best = Some((score, at));
             }

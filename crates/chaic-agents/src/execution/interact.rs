@@ -27,7 +27,7 @@ const THERE_M: f32 = 2.0;
 pub enum Step {
     /// Do this next, on the way.
     Walk(Intent),
-    /// One stands before it: do the deed.
+    /// One stands before it: do the interaction.
     There,
     /// It can't be done now.
     GiveUp,
@@ -49,7 +49,7 @@ pub struct Interaction {
 }
 
 impl Interaction {
-    /// Notes that the deed failed because of where one stood.
+    /// Notes that the interaction failed because of where one stood.
     pub fn note_bad_place(&mut self, here: Vec2) {
         self.tried.push(here);
         self.n_tries += 1;

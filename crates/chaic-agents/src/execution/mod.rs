@@ -1,7 +1,7 @@
 //! Carrying out plans, one action at a time.
 
+mod bucket_queue;
 pub mod path;
-mod queue;
 
 pub mod carry;
 pub mod navigate;
@@ -18,7 +18,7 @@ use chaic_protocol::geom::xz;
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{Action, Briefing, FailureReason, Frame, Hand, Outcome, Role, Vec2};
 
-use crate::decision::{Load, Plan};
+use crate::decision::{HandState, Plan};
 use crate::memory::Memory;
 use crate::rules::{Exploration, PlaceChoice, PlanLimits, PlannerRules, Walking};
 use crate::track::{Intent, TrackId};
@@ -66,7 +66,7 @@ pub struct Executor {
     n_lifts: u32,
     near_since: Option<Frame>,
     place: Option<TrackId>,
-    /// Whether the last action was the deed that the plan is for.
+    /// Whether the last action was the interaction that the plan is for.
     has_acted: bool,
 }
 
@@ -201,8 +201,8 @@ impl Executor {
         }
     }
 
-    /// Whether the deed of the plan was just done, and how it ended.
-    fn deed(&mut self, s: &Situation<'_>, subject: TrackId) -> Option<Outcome> {
+    /// Whether the interaction of the plan was just done, and how it ended.
+    fn interaction_done(&mut self, s: &Situation<'_>, subject: TrackId) -> Option<Outcome> {
         let (action, outcome) = s.memory.last?;
         let mine = std::mem::take(&mut self.has_acted) && action.subject() == Some(subject);
         if mine
@@ -219,7 +219,7 @@ impl Executor {
     }
 
     fn pick(&mut self, track: TrackId, s: &mut Situation<'_>, together: bool) -> Progress {
-        match self.deed(s, track) {
+        match self.interaction_done(s, track) {
             Some(Outcome::Success) => return Progress::Done,
             Some(Outcome::Failure(_)) => self.n_lifts += 1,
             None => {}
@@ -227,7 +227,7 @@ impl Executor {
         if s.memory.hands.holds(track) {
             return Progress::Done;
         }
-        let load = Load::of(&s.memory.hands, s.briefing);
+        let hands = HandState::of(&s.memory.hands, s.briefing);
         let now = s.memory.frame;
         let Some(thing) = s.memory.things.get(track) else { return Progress::Failed };
         let is_heavy = thing.class.info().role == Role::HeavyTarget;
@@ -235,7 +235,7 @@ impl Executor {
         if !thing.is_present || thing.is_gone || now < thing.held_until || ignored {
             return Progress::Failed;
         }
-        let Some(hand) = load.free_hand else { return Progress::Failed };
+        let Some(hand) = hands.free_hand else { return Progress::Failed };
         let partner = s.memory.companion(s.briefing, Relation::Partner);
         let lifting = s.memory.rules.lifting;
         let partner_left = partner.is_some_and(|p| {
@@ -250,13 +250,14 @@ impl Executor {
     }
 
     fn remove(&mut self, track: TrackId, s: &mut Situation<'_>) -> Progress {
-        match self.deed(s, track) {
+        match self.interaction_done(s, track) {
             Some(Outcome::Success) => return Progress::Done,
             Some(Outcome::Failure(_)) | None => {}
         }
         let now = s.memory.frame;
         let there = s.memory.things.get(track).is_some_and(|t| t.is_available(now));
-        let (true, Some(hand)) = (there, Load::of(&s.memory.hands, s.briefing).free_hand) else {
+        let (true, Some(hand)) = (there, HandState::of(&s.memory.hands, s.briefing).free_hand)
+        else {
             return Progress::Failed;
         };
         let act = Action::RemoveObstacle { obstacle: track, hand };
@@ -288,16 +289,17 @@ impl Executor {
             let is_done = matches!(s.memory.last, Some((Action::PutIn, o)) if o.is_success());
             return if is_done { Progress::Done } else { Progress::Failed };
         }
-        let can = Load::of(&s.memory.hands, s.briefing).can_put_in;
+        let can = HandState::of(&s.memory.hands, s.briefing).can_put_in;
         if can { Progress::Act(Action::PutIn) } else { Progress::Failed }
     }
 
     fn deliver(&mut self, s: &mut Situation<'_>) -> Progress {
-        let Some(hand) = Load::of(&s.memory.hands, s.briefing).to_deliver else {
+        let Some(hand) = HandState::of(&s.memory.hands, s.briefing).to_deliver else {
             return Progress::Done;
         };
         if let Some(place) = self.place
-            && let Some(Outcome::Failure(FailureReason::Impossible)) = self.deed(s, place)
+            && let Some(Outcome::Failure(FailureReason::Impossible)) =
+                self.interaction_done(s, place)
         {
             return Progress::Failed;
         }

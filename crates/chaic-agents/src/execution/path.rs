@@ -6,10 +6,10 @@ use std::collections::BinaryHeap;
 
 use chaic_protocol::Vec2;
 
-use super::queue::Queue;
+use super::bucket_queue::BucketQueue;
 use crate::memory::costs::{CostMap, FREE, OCCUPIED};
 use crate::memory::grid::{CELL_M, Grid};
-pub use straight::StraightReach;
+pub use straight::StraightCostField;
 use straight::Visit;
 
 /// Costs are multiplied by this for a straight step, so that a diagonal one is a whole number.
@@ -23,7 +23,7 @@ const COST_PER_M: f32 = (FREE * STRAIGHT) as f32 / CELL_M;
 pub struct Search {
     nodes: Vec<Node>,
     epoch: u32,
-    queue: Queue,
+    queue: BucketQueue,
     /// The queue of straight ways.
     visits: BinaryHeap<Visit>,
     /// The latest straight way: version of the costs, start and end.
@@ -46,7 +46,7 @@ struct Node {
 pub struct Path {
     /// The cells, start and end included.
     pub cells: Vec<usize>,
-    /// Its cost; see [`Reach::metres`].
+    /// Its cost; see [`CostField::metres`].
     pub cost: u32,
 }
 
@@ -105,7 +105,7 @@ impl Search {
         Search {
             nodes: vec![Node::default(); n_cells],
             epoch: 0,
-            queue: Queue::new(n_cells),
+            queue: BucketQueue::new(n_cells),
             visits: BinaryHeap::new(),
             latest: None,
         }
@@ -174,29 +174,29 @@ impl Search {
 
 /// The cost of getting from one place to every cell without passing occupied ones.
 #[derive(Clone, Debug)]
-pub struct Reach {
+pub struct CostField {
     cost: Vec<u32>,
 }
 
-impl Reach {
+impl CostField {
     /// Dijkstra's algorithm from `here` over everything that is not occupied.
-    pub fn from(costs: &CostMap, here: Vec2, search: &mut Search) -> Reach {
-        let mut reach = Reach { cost: vec![u32::MAX; costs.grid().n_cells()] };
-        let Some(start) = costs.grid().cell_at(here) else { return reach };
+    pub fn from(costs: &CostMap, here: Vec2, search: &mut Search) -> CostField {
+        let mut field = CostField { cost: vec![u32::MAX; costs.grid().n_cells()] };
+        let Some(start) = costs.grid().cell_at(here) else { return field };
         search.begin(start);
         while let Some((cost, cell)) = search.queue.pop() {
             let cell = cell as usize;
             if cost > search.nodes[cell].best {
                 continue;
             }
-            reach.cost[cell] = cost;
+            field.cost[cell] = cost;
             for_steps(costs.costs(), costs.grid(), cell, |next, enter, factor| {
                 if enter < OCCUPIED {
                     search.improve(next, cell, cost.saturating_add(enter * factor), || 0);
                 }
             });
         }
-        reach
+        field
     }
 
     /// The cost of getting to a cell, if one can.
@@ -298,11 +298,11 @@ mod tests {
         let costs = plan.costs(0.05);
         let grid = *costs.grid();
         let mut search = Search::new(grid.n_cells());
-        let reach = Reach::from(&costs, grid.center(64), &mut search);
+        let field = CostField::from(&costs, grid.center(64), &mut search);
         let to = 64 + 9;
         let path =
             search.a_star(&grid, costs.costs(), 64, &ToCell { grid, cell: to }, u32::MAX).unwrap();
-        assert_eq!(reach.cost(to), Some(path.cost));
-        assert_eq!(reach.cost(64 + 15), None);
+        assert_eq!(field.cost(to), Some(path.cost));
+        assert_eq!(field.cost(64 + 15), None);
     }
 }

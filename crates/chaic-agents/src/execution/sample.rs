@@ -8,7 +8,7 @@ use chaic_protocol::{Action, Briefing, Frame, Vec2};
 
 use super::explore::Found;
 use super::navigate::{Destination, Nav, Navigator};
-use super::path::StraightReach;
+use super::path::StraightCostField;
 use crate::memory::lattice_costs::FARTHEST;
 use crate::memory::{Memory, Space};
 
@@ -62,7 +62,7 @@ impl Sampler {
         let (costs, search) = memory.costs_and_search();
         let grid = *costs.grid();
         let start = grid.cell_at(here)?;
-        let reach = StraightReach::from(&grid, costs.costs(), start, FARTHEST, search);
+        let field = StraightCostField::from(&grid, costs.costs(), start, FARTHEST, search);
         let inner = |cell: &usize| {
             let (i, j) = grid.column_row(*cell);
             (BORDER..grid.nx() - BORDER).contains(&i) && (BORDER..grid.nz() - BORDER).contains(&j)
@@ -76,7 +76,7 @@ impl Sampler {
         for draw in 0..if unknown.is_empty() { 0 } else { DRAWS.0 } {
             let cell = unknown[self.rng.below(unknown.len())];
             let Some(score) =
-                reach.score(cell).filter(|_| grid.center(cell).distance(here) > THERE_M)
+                field.score(cell).filter(|_| grid.center(cell).distance(here) > THERE_M)
             else {
                 continue;
             };
@@ -95,7 +95,7 @@ impl Sampler {
             // Nothing unknown can be got to: anywhere else will do.
             (0..DRAWS.0).map(|_| self.rng.below(grid.n_cells())).find_map(|cell| {
                 let at = grid.center(cell);
-                (reach.score(cell).is_some() && at.distance(here) > THERE_M).then_some(at)
+                (field.score(cell).is_some() && at.distance(here) > THERE_M).then_some(at)
             })
         })
     }

@@ -25,7 +25,7 @@ pub use occupancy::{OccupancyMap, Space};
 pub use people::{People, Person};
 pub use semantic::{SemanticMap, Thing};
 
-use crate::execution::path::{Reach, Search};
+use crate::execution::path::{CostField, Search};
 use crate::perception::Percepts;
 use crate::rules::{Exploration, PlannerRules, Walking};
 use crate::track::{Hands, Intent, TrackId};
@@ -74,8 +74,8 @@ pub struct Memory {
     /// What was put on a goal place and has not been seen delivered since, with the place and when
     /// it was put there.
     believed: BTreeMap<TrackId, (TrackId, Frame)>,
-    /// Places of the goal place's class on which something was put in vain: too low, for example.
-    vain_places: BTreeSet<TrackId>,
+    /// Places of the goal place's class on which something could not be put: too low, for example.
+    failed_places: BTreeSet<TrackId>,
     /// Lowest and highest top that the own hands put something on, metres.
     put_range_m: [f32; 2],
     /// The own actions other than moving about, oldest first.
@@ -99,7 +99,7 @@ pub struct Memory {
     is_partner: bool,
     gait: Gait,
     removes_obstacles: bool,
-    reach: Option<Reach>,
+    cost_field: Option<CostField>,
     search: Search,
 }
 
@@ -118,7 +118,7 @@ impl Memory {
             last: None,
             delivered: BTreeSet::new(),
             believed: BTreeMap::new(),
-            vain_places: BTreeSet::new(),
+            failed_places: BTreeSet::new(),
             put_range_m: briefing.capability.put_range_m,
             history: Vec::new(),
             classes: BTreeMap::new(),
@@ -137,7 +137,7 @@ impl Memory {
             is_partner: briefing.me == AgentId::PARTNER,
             gait: briefing.capability.gait,
             removes_obstacles: briefing.capability.removes_obstacles,
-            reach: None,
+            cost_field: None,
         }
     }
 
@@ -174,7 +174,7 @@ impl Memory {
         }
         let known_m = self.rules.known_range_m(briefing);
         self.map.integrate(observation, percepts, self.height_m, known_m);
-        self.reach = None;
+        self.cost_field = None;
         self.is_stale = true;
     }
 
@@ -230,7 +230,7 @@ impl Memory {
         let refuted: Vec<(TrackId, TrackId)> =
             pending.map(|(t, (place, _))| (*t, *place)).collect();
         for (track, place) in refuted {
-            self.vain_places.insert(place);
+            self.failed_places.insert(place);
             self.believed.remove(&track);
             self.delivered.remove(&track);
             self.things.return_to_play(track);
@@ -260,10 +260,10 @@ impl Memory {
     /// Brings costs and distances up to date. Cheap if nothing changed.
     pub fn refresh(&mut self) {
         self.refresh_costs();
-        let needs_reach = self.rules.walking == Walking::Careful
+        let needs_cost_field = self.rules.walking == Walking::Careful
             || self.rules.exploration == Exploration::Frontier;
-        if needs_reach && self.reach.is_none() {
-            self.reach = Some(Reach::from(&self.costs, self.here(), &mut self.search));
+        if needs_cost_field && self.cost_field.is_none() {
+            self.cost_field = Some(CostField::from(&self.costs, self.here(), &mut self.search));
         }
     }
 
@@ -284,7 +284,7 @@ impl Memory {
             self.costs.rebuild(&self.map, &self.things, &people, here, self.frame);
             self.costs_of = Some(of);
             self.people_moved = false;
-            self.reach = None;
+            self.cost_field = None;
         }
     }
 
@@ -319,26 +319,26 @@ impl Memory {
     }
 
     /// How costly each cell is to get to, as of the last [`Memory::refresh`].
-    pub fn reach(&self) -> Option<&Reach> {
-        self.reach.as_ref()
+    pub fn cost_field(&self) -> Option<&CostField> {
+        self.cost_field.as_ref()
     }
 
     /// Length of the way to a thing, metres, made longer by narrow and unknown places; `None` if
     /// no way is known. Straight distance before the first [`Memory::refresh`].
     pub fn way_to(&self, thing: &Thing) -> Option<f32> {
         let straight_m = thing.distance_from(self.here());
-        let reach = self.reach.as_ref().filter(|_| self.rules.walking == Walking::Careful);
-        let Some(reach) = reach else { return Some(straight_m) };
+        let field = self.cost_field.as_ref().filter(|_| self.rules.walking == Walking::Careful);
+        let Some(field) = field else { return Some(straight_m) };
         let grid = self.map.grid();
-        let near = |p: Vec2| grid.disc(p, NEAR_THING_M).filter_map(|c| reach.cost(c)).min();
+        let near = |p: Vec2| grid.disc(p, NEAR_THING_M).filter_map(|c| field.cost(c)).min();
         let at = near(thing.nearest_point(self.here()));
         // The nearest point of a long thing may be behind a wall: ask for its middle too.
         let cost = at.into_iter().chain(near(xz(thing.position_in_world))).min()?;
-        Some(Reach::metres(cost).max(straight_m))
+        Some(CostField::metres(cost).max(straight_m))
     }
 
     /// The known goal places that one can get to, nearest first, with the way to each in metres.
-    /// Those on which something was put in vain come last, before them those that were given up
+    /// Those on which something could not be put come last, before them those that were given up
     /// lately, and before these the ones out of the own reach.
     pub fn goal_places(&self) -> Vec<(&Thing, f32)> {
         let mut places: Vec<_> = self
@@ -353,7 +353,7 @@ impl Memory {
         let drawback = |t: &Thing| {
             let is_out_of_reach = t.top_m > high_m || t.top_m < low_m;
             let is_given_up = self.frame < t.ignore_until;
-            (self.vain_places.contains(&t.track), is_given_up, is_out_of_reach)
+            (self.failed_places.contains(&t.track), is_given_up, is_out_of_reach)
         };
         places.sort_by(|a, b| drawback(a.0).cmp(&drawback(b.0)).then(a.1.total_cmp(&b.1)));
         places

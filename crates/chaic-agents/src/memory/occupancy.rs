@@ -345,9 +345,9 @@ impl OccupancyMap {
         self.touched.clear();
         for (k, row) in (0..height).step_by(stride).enumerate() {
             every(stride, &depth[row * width..][..width], &mut sampled);
-            let loose = percepts.loose.get(k * sampled_width..(k + 1) * sampled_width);
-            for (d, loose) in sampled.iter_mut().zip(loose.unwrap_or_default()) {
-                *d = if *loose { 0.0 } else { *d };
+            let dynamic = percepts.dynamic_mask.get(k * sampled_width..(k + 1) * sampled_width);
+            for (d, is_dynamic) in sampled.iter_mut().zip(dynamic.unwrap_or_default()) {
+                *d = if *is_dynamic { 0.0 } else { *d };
             }
             let mut last = 0;
             let lanes = sampled.as_chunks::<LANES>().0.iter().zip(xs.iter().zip(ys).zip(zs));

@@ -5,7 +5,7 @@ use chaic_protocol::observation::Grants;
 
 use super::*;
 use crate::perception::Pointing;
-use crate::policies::{RuleProfile, Rules};
+use crate::policies::{RulePolicy, RuleProfile};
 use crate::test_support::{Toy, ToyObject};
 use crate::{helpers, partners};
 
@@ -60,7 +60,7 @@ fn one_who_only_points_at_what_it_sees_delivers_too() {
     let perception = Pointing::<GroundTruthIds>::default();
     let behavior = Box::new(GroundTruthBehavior::default());
     let rules = crate::PlannerRules::paper();
-    let policy = Rules::new(RuleProfile::RHP);
+    let policy = RulePolicy::new(RuleProfile::RHP);
     let mut mind = Mind::with(policy, Box::new(perception), behavior, rules);
     let plans = toy.live(&mut mind, &briefing);
     assert!(toy.delivered.len() >= n, "{} delivered: {}", toy.delivered.len(), plans.join("; "));

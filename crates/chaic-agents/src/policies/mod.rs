@@ -2,8 +2,8 @@
 
 mod follow;
 mod random;
-mod rules;
+mod rule_policy;
 
 pub use follow::Follow;
 pub use random::Random;
-pub use rules::{RuleProfile, Rules, TargetOrder, Wanted};
+pub use rule_policy::{RulePolicy, RuleProfile, TargetOrder, Wanted};

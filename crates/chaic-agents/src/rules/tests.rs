@@ -13,7 +13,7 @@ use crate::execution::interact::learn;
 use crate::execution::{Executor, Progress, Situation};
 use crate::memory::{Done, Memory};
 use crate::perception::{GroundTruthIds, Perception as _};
-use crate::policies::{RuleProfile, Rules};
+use crate::policies::{RulePolicy, RuleProfile};
 use crate::test_support::{Toy, ToyObject, carried, hands};
 use crate::track::{Carried, TrackId};
 use chaic_protocol::observation::Grants;
@@ -44,12 +44,16 @@ impl Situated {
     }
 
     /// What the partner answers who has (or has not) looked around already.
-    fn ask<T>(&self, of: impl Fn(&mut Rules, &Context<'_>) -> T) -> T {
-        self.ask_of(&mut Rules::new(RuleProfile::PARTNER), of)
+    fn ask<T>(&self, of: impl Fn(&mut RulePolicy, &Context<'_>) -> T) -> T {
+        self.ask_of(&mut RulePolicy::new(RuleProfile::PARTNER), of)
     }
 
     /// What this one answers.
-    fn ask_of<T>(&self, who: &mut Rules, of: impl Fn(&mut Rules, &Context<'_>) -> T) -> T {
+    fn ask_of<T>(
+        &self,
+        who: &mut RulePolicy,
+        of: impl Fn(&mut RulePolicy, &Context<'_>) -> T,
+    ) -> T {
         let behavior = BehaviorLog::default();
         let mut memory = self.memory.clone();
         memory.hands = hands(self.hands.clone());
@@ -69,7 +73,7 @@ impl Situated {
 
     /// The second choice of somebody of this profile.
     fn choose_as(&self, profile: RuleProfile) -> Plan {
-        self.ask_of(&mut Rules::new(profile), |rules, context| {
+        self.ask_of(&mut RulePolicy::new(profile), |rules, context| {
             rules.decide(context, &self.valid);
             rules.decide(context, &self.valid)
         })
@@ -231,7 +235,7 @@ fn what_is_left_alone_after_a_failure_and_for_how_long() {
 }
 
 #[test]
-fn the_goal_place_is_forgotten_after_a_vain_put() {
+fn the_goal_place_is_forgotten_after_a_failed_put() {
     for (goal_blackout_frames, expected) in [(0, [1, 1]), (500, [0, 1])] {
         let rules = PlannerRules { goal_blackout_frames, ..PAPER };
         let (mut memory, briefing, bed) = memory_of("bed", rules);

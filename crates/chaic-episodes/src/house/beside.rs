@@ -8,7 +8,7 @@ use chaic_world::{RoomKind, Thing};
 
 use super::House;
 use super::doors::CLASSES;
-use super::plan::WALL_M;
+use super::layout::WALL_M;
 use super::room::{BODY_M, foot};
 use crate::solid::{Solid, mm, mm3, plan_bounds, rect_distance};
 

@@ -5,7 +5,7 @@ use chaic_protocol::{ClassId, Vec2, Vec3};
 use chaic_world::Thing;
 
 use super::House;
-use super::plan::DOOR_M;
+use super::layout::DOOR_M;
 use crate::solid::{Solid, mm, mm3, plan_bounds};
 
 /// Free width beside an obstacle, metres: more than the 0.40 of a walker, less than the 0.70 of a

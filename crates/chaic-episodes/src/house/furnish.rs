@@ -4,7 +4,7 @@ use chaic_protocol::geom::Rect;
 use chaic_protocol::rng::Stream;
 use chaic_world::{Floor, FloorMaterial, Room, RoomKind};
 
-use super::plan::{Plan, WALL_M, plan};
+use super::layout::{Plan, WALL_M, plan};
 use super::room::{BODY_M, RoomPlan};
 use super::{House, decoys, recipes, slots};
 use crate::Settings;

@@ -3,7 +3,7 @@
 //! The surroundings ([`House`]) depend on the place seed alone, so that all tasks can share a
 //! house; what lies and stands in it depends on the task and the episode seed.
 
-mod plan;
+mod layout;
 mod walls;
 
 mod furnish;

@@ -8,7 +8,7 @@ use chaic_protocol::rng::Stream;
 use chaic_protocol::{ClassId, Vec2, Vec3};
 use chaic_world::Thing;
 
-use super::plan::{DOOR_M, Door, WALL_M};
+use super::layout::{DOOR_M, Door, WALL_M};
 use crate::grid::Grid;
 use crate::solid::{mm, mm3};
 

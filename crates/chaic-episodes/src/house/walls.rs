@@ -3,7 +3,7 @@
 use chaic_protocol::Vec2;
 use chaic_world::Wall;
 
-use super::plan::{DOOR_M, Door, Plan, WALL_M};
+use super::layout::{DOOR_M, Door, Plan, WALL_M};
 use crate::solid::mm;
 
 /// Height of rooms, metres.

@@ -196,7 +196,7 @@ mod tests {
             size: 32,
             channels: Channels::ALL,
             threads: 2,
-            seconds: 0.01,
+            seconds: 0.5,
         };
         let mut parts = Vec::new();
         let speed = bench.measure(&mut |part| parts.push(part)).expect("bundled episodes");

@@ -13,8 +13,8 @@ use chaic_world::{Posture, RoomKind, Rules, Setup, Thing, World};
 use serde_json::json;
 
 use crate::error::{EvalError, Result};
+use crate::frame_export::save;
 use crate::scene_file::{SceneOptions, Written, write_world};
-use crate::still::save;
 
 /// Number of eye poses.
 pub const N_VIEWS: usize = 16;

@@ -99,7 +99,7 @@ pub fn measure_world(
 }
 
 /// The mix of `benches/world.rs` of `chaic-episodes`: half of all actions are steps, a quarter turns;
-/// the rest are deeds with things of the episode.
+/// the rest are interactions with things of the episode.
 fn random_action(setup: &Setup, luck: &mut Stream) -> ResolvedAction {
     let hand = if luck.chance(0.5) { Hand::Left } else { Hand::Right };
     let thing = |luck: &mut Stream| Setup::entity(luck.below(setup.things.len()));

@@ -10,8 +10,8 @@ use chaic_files::write_whole;
 use chaic_protocol::TaskId;
 
 use crate::error::{EvalError, Result};
+use crate::fidelity::experiment::Experiment;
 use crate::fidelity::matrix::PartState;
-use crate::fidelity::plan::Plan;
 use crate::fidelity::sections::{RuleSection, formulas};
 use crate::fidelity::switches;
 use crate::figure::{Bar, Bars, FigureError, HelperBars, transport_rate};
@@ -29,7 +29,7 @@ pub const CAUSES_END: &str = "<!-- end of causes -->";
 #[derive(Clone, Copy, Debug)]
 pub struct Sheet<'a> {
     /// What is played.
-    pub plan: &'a Plan,
+    pub plan: &'a Experiment,
     /// What came out so far.
     pub parts: &'a [PartState],
 }

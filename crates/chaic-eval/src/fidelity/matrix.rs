@@ -10,10 +10,10 @@ use chaic_protocol::{Frame, TaskId};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{EvalError, Result};
-use crate::fidelity::plan::{Part, Plan, Wanted};
+use crate::fidelity::experiment::{Experiment, ExperimentRequest, Part};
 use crate::metrics::{Environments, Played, RunResult};
 use crate::report::Labels;
-use crate::run::{Given, Item, RunFolder, RunGrants, environments, planned, read_results};
+use crate::run::{Item, RunFolder, RunGrants, RunRequest, environments, planned, read_results};
 
 const FORMAT: &str = "chaic-fidelity";
 const VERSION: u32 = 1;
@@ -25,7 +25,7 @@ pub struct Matrix {
     /// The folder.
     pub path: PathBuf,
     /// What is played there.
-    pub plan: Plan,
+    pub plan: Experiment,
     episodes: Option<PathBuf>,
 }
 
@@ -49,7 +49,7 @@ struct PlanFile {
     format: String,
     version: u32,
     chaic: String,
-    plan: Plan,
+    plan: Experiment,
 }
 
 impl Matrix {
@@ -57,7 +57,7 @@ impl Matrix {
     ///
     /// # Errors
     /// If there is something in the folder, or the options make no matrix.
-    pub fn begin(path: &Path, wanted: &Wanted, helpers: &dyn Helpers) -> Result<Matrix> {
+    pub fn begin(path: &Path, wanted: &ExperimentRequest, helpers: &dyn Helpers) -> Result<Matrix> {
         // What a matrix leaves that is stopped in its first moment is nothing.
         let unfinished = format!("{FILE}{UNFINISHED}");
         let mut entries = std::fs::read_dir(path).into_iter().flatten().flatten();
@@ -80,7 +80,7 @@ impl Matrix {
     ///
     /// # Errors
     /// If there is none, or it was begun with other options.
-    pub fn resume(path: &Path, wanted: &Wanted) -> Result<Matrix> {
+    pub fn resume(path: &Path, wanted: &ExperimentRequest) -> Result<Matrix> {
         let recorded = read(path)?;
         let plan = wanted.resume(&recorded, path)?;
         let matrix = Matrix { path: path.to_owned(), plan, episodes: wanted.episodes.clone() };
@@ -94,9 +94,9 @@ impl Matrix {
     ///
     /// # Errors
     /// If nobody says where the episodes are.
-    pub fn given(&self, part: &Part) -> Result<Given> {
-        let Plan { tasks, first, size, .. } = &self.plan;
-        Ok(Given {
+    pub fn given(&self, part: &Part) -> Result<RunRequest> {
+        let Experiment { tasks, first, size, .. } = &self.plan;
+        Ok(RunRequest {
             tasks: Some(tasks.clone()),
             helpers: Some(part.helpers.clone()),
             split: None,
@@ -136,7 +136,7 @@ impl Matrix {
     }
 }
 
-fn read(path: &Path) -> Result<Plan> {
+fn read(path: &Path) -> Result<Experiment> {
     let file = path.join(FILE);
     if !file.exists() {
         let (path, text) = (path.display(), "give the folder that `chaic fidelity --out` wrote");

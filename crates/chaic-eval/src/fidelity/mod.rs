@@ -1,6 +1,6 @@
 //! How near one comes to the paper's published results, and what moves them.
 //!
-//! A [`Plan`] says which runs are played below one folder: both rule sets with all helpers, then
+//! A [`Experiment`] says which runs are played below one folder: both rule sets with all helpers, then
 //! the original's rules with one rule at a time set as the paper has it (a *switch*). Each is an
 //! ordinary run folder. [`parts()`] reads them all, [`document()`] writes what they say as Markdown
 //! with figures; nothing in it comes from anywhere but those folders and
@@ -8,8 +8,8 @@
 
 mod compare;
 mod document;
+mod experiment;
 mod matrix;
-mod plan;
 mod sections;
 mod switches;
 
@@ -17,8 +17,8 @@ pub use compare::{
     Distance, Inversion, Order, PUBLISHED_EPISODES, TaskRate, distance, order, task_rate,
 };
 pub use document::{CAUSES_BEGIN, CAUSES_END, Sheet, check_document, document, write_document};
+pub use experiment::{Experiment, ExperimentRequest, Part};
 pub use matrix::{Matrix, PartState, parts};
-pub use plan::{Part, Plan, Wanted};
 pub use switches::{Change, change};
 
 #[cfg(test)]

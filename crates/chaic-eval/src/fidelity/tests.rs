@@ -124,8 +124,8 @@ fn a_switch_is_compared_on_what_both_played() {
     assert!(super::change("world.blocking", base, &switched, "rhp").all.is_none());
 }
 
-fn plan() -> Plan {
-    Plan {
+fn plan() -> Experiment {
+    Experiment {
         tasks: vec![LOW],
         helpers: ["none", "rhp", "oracle"].map(str::to_owned).to_vec(),
         first: None,
@@ -138,7 +138,7 @@ fn plan() -> Plan {
 }
 
 /// All parts, whole.
-fn states(plan: &Plan) -> Vec<PartState> {
+fn states(plan: &Experiment) -> Vec<PartState> {
     let state = |part: Part| {
         let results = match part.switch {
             None => low(),
@@ -242,21 +242,33 @@ fn plans_that_answer_nothing_are_refused() {
     let episode = chaic_episodes::find_episode("low_target/test/00").unwrap();
     fs::write(files.join("a.json"), episode.to_json()).unwrap();
     let out = dir.path().join("out");
-    let usual = Wanted { episodes: Some(files), ..Wanted::default() };
+    let usual = ExperimentRequest { episodes: Some(files), ..ExperimentRequest::default() };
     let list = |names: &[&str]| Some(names.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>());
     for (wanted, said) in [
-        (Wanted { helpers: list(&["rhp"]), ..usual.clone() }, "--helper needs `none`"),
-        (Wanted { helpers: list(&["none", "nobody"]), ..usual.clone() }, "unknown helper `nobody`"),
-        (Wanted { switch_helpers: list(&["follow"]), ..usual.clone() }, "--switch-helper follow"),
-        (Wanted { switch_seeds: Some(6), ..usual.clone() }, "1 to 5"),
-        (Wanted { seeds: Some(0), ..usual.clone() }, "at least 1"),
-        (Wanted { switches: list(&["world.gravity"]), ..usual.clone() }, "no rule `world.gravity`"),
-        (Wanted { switches: list(&["world.stride_m"]), ..usual.clone() }, "is 0.4 in both"),
+        (ExperimentRequest { helpers: list(&["rhp"]), ..usual.clone() }, "--helper needs `none`"),
         (
-            Wanted { tasks: Some(vec![TaskId::Obstacle]), ..usual.clone() },
+            ExperimentRequest { helpers: list(&["none", "nobody"]), ..usual.clone() },
+            "unknown helper `nobody`",
+        ),
+        (
+            ExperimentRequest { switch_helpers: list(&["follow"]), ..usual.clone() },
+            "--switch-helper follow",
+        ),
+        (ExperimentRequest { switch_seeds: Some(6), ..usual.clone() }, "1 to 5"),
+        (ExperimentRequest { seeds: Some(0), ..usual.clone() }, "at least 1"),
+        (
+            ExperimentRequest { switches: list(&["world.gravity"]), ..usual.clone() },
+            "no rule `world.gravity`",
+        ),
+        (
+            ExperimentRequest { switches: list(&["world.stride_m"]), ..usual.clone() },
+            "is 0.4 in both",
+        ),
+        (
+            ExperimentRequest { tasks: Some(vec![TaskId::Obstacle]), ..usual.clone() },
             "has no episode of obstacle; it has those of low_target",
         ),
-        (Wanted::default(), "--episodes"),
+        (ExperimentRequest::default(), "--episodes"),
     ] {
         let error = Matrix::begin(&out, &wanted, &BuiltIn).unwrap_err().to_string();
         assert!(error.contains(said), "{said}: {error}");
@@ -265,7 +277,9 @@ fn plans_that_answer_nothing_are_refused() {
     assert!(Matrix::resume(&out, &usual).unwrap_err().to_string().contains("fidelity.json"));
 
     let two = list(&["planner.walking", "world.blocking"]);
-    let begun = Matrix::begin(&out, &Wanted { switches: two, ..usual.clone() }, &BuiltIn).unwrap();
+    let begun =
+        Matrix::begin(&out, &ExperimentRequest { switches: two, ..usual.clone() }, &BuiltIn)
+            .unwrap();
     let names: Vec<String> = begun.plan.parts().into_iter().map(|p| p.name).collect();
     let mut in_order: Vec<String> = differing_rules();
     in_order.retain(|r| r == "planner.walking" || r == "world.blocking");
@@ -278,10 +292,11 @@ fn plans_that_answer_nothing_are_refused() {
     assert!(matches!(Matrix::begin(&out, &usual, &BuiltIn), Err(EvalError::NotEmpty { .. })));
     // Nothing has run yet; switches may be added, the rest stays.
     assert!(parts(&begun).unwrap_err().to_string().contains("has no run yet"));
-    let more = Wanted { switches: list(&["world.reach_to"]), ..Wanted::default() };
+    let more =
+        ExperimentRequest { switches: list(&["world.reach_to"]), ..ExperimentRequest::default() };
     assert_eq!(Matrix::resume(&out, &more).unwrap().plan.switches.len(), 3);
-    assert_eq!(Matrix::resume(&out, &Wanted::default()).unwrap().plan.switches.len(), 3);
-    let other = Wanted { seeds: Some(2), ..Wanted::default() };
+    assert_eq!(Matrix::resume(&out, &ExperimentRequest::default()).unwrap().plan.switches.len(), 3);
+    let other = ExperimentRequest { seeds: Some(2), ..ExperimentRequest::default() };
     let error = Matrix::resume(&out, &other).unwrap_err().to_string();
     assert!(error.contains("--seeds 5, not 2"), "{error}");
 }

@@ -9,7 +9,7 @@ use chaic_env::trace::Trace;
 use chaic_env::{Playback, slug};
 use chaic_episodes::Episode;
 use chaic_protocol::{Action, AgentId, EntityId, Frame, Outcome, ResolvedAction, TaskId};
-use chaic_render::{Channels, Scene, View, plan};
+use chaic_render::{Channels, Scene, View, floor_plan};
 use chaic_world::{EventKind, World};
 use image::RgbImage;
 
@@ -173,7 +173,7 @@ impl<'a> Replay<'a> {
         let views: Vec<View> = present.map(view).collect();
         let (images, map) = rayon::join(
             || self.scene.render(self.world(), &views),
-            || plan::draw_scene_plan(&self.scene, self.world(), panel::MAP_PX),
+            || floor_plan::draw_scene_plan(&self.scene, self.world(), panel::MAP_PX),
         );
         let captions: Vec<Caption> =
             self.world().setup().agents().map(|a| self.caption(a)).collect();

@@ -104,10 +104,12 @@ impl GrantsFile {
     }
 }
 
-/// The names of what is granted, as traces have them.
+/// The names of what is granted, in alphabetical order.
 fn names(grants: &Grants) -> Vec<String> {
     let given = grants.named().into_iter().filter(|(_, is_given)| *is_given);
-    given.map(|(name, _)| name.to_owned()).collect()
+    let mut names: Vec<String> = given.map(|(name, _)| name.to_owned()).collect();
+    names.sort_unstable();
+    names
 }
 
 fn words(grants: &Grants) -> Vec<String> {

@@ -19,7 +19,7 @@ pub use granted::RunGrants;
 pub(crate) use items::tasks_of_files;
 pub use items::{Item, planned};
 pub use journal::{Journal, read_results};
-pub use options::{Given, RunOptions};
+pub use options::{RunOptions, RunRequest};
 pub use worker::{Finished, Progress};
 
 use std::collections::BTreeSet;
@@ -67,7 +67,7 @@ impl Run {
     pub fn open(
         path: &Path,
         access: Access,
-        given: &Given,
+        given: &RunRequest,
         helpers: &dyn Helpers,
     ) -> Result<(Run, Vec<Warning>)> {
         // What is asked for is checked before anything is written.
@@ -185,7 +185,7 @@ struct Fresh {
 }
 
 impl Fresh {
-    fn of(path: &Path, given: &Given, helpers: &dyn Helpers) -> Result<Fresh> {
+    fn of(path: &Path, given: &RunRequest, helpers: &dyn Helpers) -> Result<Fresh> {
         // What lies in the run's own place for copies may be removed; a user's files never are.
         let place = fs::canonicalize(path.join(EPISODES)).ok();
         let source = given.episodes.as_ref().and_then(|s| fs::canonicalize(s).ok());
@@ -216,7 +216,7 @@ impl Fresh {
 fn resume(
     folder: &RunFolder,
     recorded: &RunOptions,
-    given: &Given,
+    given: &RunRequest,
     helpers: &dyn Helpers,
 ) -> Result<Opened> {
     let options = given.resume(recorded, folder.path())?;

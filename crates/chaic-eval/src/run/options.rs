@@ -62,7 +62,7 @@ fn is_yes(b: &bool) -> bool {
 
 /// What the caller says of a run. What isn't said is as recorded, or as usual for a new run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Given {
+pub struct RunRequest {
     /// `--task`.
     pub tasks: Option<Vec<TaskId>>,
     /// `--helper`.
@@ -117,7 +117,7 @@ impl RunOptions {
     }
 }
 
-impl Given {
+impl RunRequest {
     /// The options of a new run.
     ///
     /// # Errors

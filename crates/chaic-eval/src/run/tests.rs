@@ -124,13 +124,13 @@ fn episode_files(tasks: &[TaskId], per_task: usize) -> tempfile::TempDir {
     dir
 }
 
-fn given(files: &tempfile::TempDir, helpers: &[&str]) -> Given {
-    Given {
+fn given(files: &tempfile::TempDir, helpers: &[&str]) -> RunRequest {
+    RunRequest {
         helpers: Some(helpers.iter().map(|h| (*h).to_owned()).collect()),
         seeds: Some(2),
         size: Some(SIZE),
         episodes: Some(files.path().to_owned()),
-        ..Given::default()
+        ..RunRequest::default()
     }
 }
 
@@ -176,7 +176,7 @@ fn the_number_of_workers_and_an_interruption_change_nothing() {
     drop(run);
     drop(files);
     let helpers = TestHelpers::new();
-    let (mut run, _) = Run::open(&path, Access::Resume, &Given::default(), &helpers).unwrap();
+    let (mut run, _) = Run::open(&path, Access::Resume, &RunRequest::default(), &helpers).unwrap();
     assert_eq!(run.extent().finished, so_far);
     assert!(play(&mut run, 2, &helpers));
     assert_eq!(sorted(run.results()), all[0]);
@@ -216,7 +216,8 @@ fn a_helper_that_breaks_down_costs_its_episode_only() {
         drop(run);
         // A repaired helper gets its episodes again.
         let repaired = TestHelpers { breaks: Breaks::Never, ..TestHelpers::new() };
-        let (mut run, _) = Run::open(&path, Access::Resume, &Given::default(), &repaired).unwrap();
+        let (mut run, _) =
+            Run::open(&path, Access::Resume, &RunRequest::default(), &repaired).unwrap();
         assert!(play(&mut run, 1, &repaired));
         assert_eq!(run.extent(), Extent { total: 4, finished: 4, errors: 0 });
     }
@@ -235,7 +236,7 @@ fn a_helper_that_halts_stops_the_run_which_goes_on_later() {
     assert_eq!(run.extent().errors, 0, "nothing counts as zero");
     drop(run);
     let answered = TestHelpers { breaks: Breaks::Never, ..TestHelpers::new() };
-    let (mut run, _) = Run::open(&path, Access::Resume, &Given::default(), &answered).unwrap();
+    let (mut run, _) = Run::open(&path, Access::Resume, &RunRequest::default(), &answered).unwrap();
     assert!(play(&mut run, 1, &answered));
     assert_eq!(run.extent(), Extent { total: 4, finished: 4, errors: 0 });
 }
@@ -245,7 +246,7 @@ fn verify_finds_what_was_changed() {
     let files = episode_files(&[TaskId::LowTarget], 1);
     let dir = tempfile::tempdir().unwrap();
     let helpers = TestHelpers::new();
-    let given = Given { seeds: None, ..given(&files, &["turner"]) };
+    let given = RunRequest { seeds: None, ..given(&files, &["turner"]) };
     let (mut run, _) = Run::open(dir.path(), Access::Begin, &given, &helpers).unwrap();
     assert!(play(&mut run, 1, &helpers));
     let path = run.folder().traces().unwrap().remove(0);
@@ -320,7 +321,7 @@ fn folders_are_guarded() {
     let path = dir.path().join("run");
     let helpers = TestHelpers::new();
     let mine = given(&files, &["turner"]);
-    let open = |access, given: &Given| Run::open(&path, access, given, &helpers).map(|_| ());
+    let open = |access, given: &RunRequest| Run::open(&path, access, given, &helpers).map(|_| ());
     let (held, _) = Run::open(&path, Access::Begin, &mine, &helpers).unwrap();
     for access in [Access::Begin, Access::Resume] {
         assert!(matches!(open(access, &mine), Err(EvalError::Locked { .. })));
@@ -328,24 +329,24 @@ fn folders_are_guarded() {
     drop(held);
     assert!(matches!(open(Access::Begin, &mine), Err(EvalError::NotEmpty { .. })));
     assert!(open(Access::Resume, &mine).is_ok());
-    let other = Given { seeds: Some(3), ..mine.clone() };
+    let other = RunRequest { seeds: Some(3), ..mine.clone() };
     let error = open(Access::Resume, &other).unwrap_err().to_string();
     assert!(error.contains("--seeds 2, not 3"), "{error}");
-    let other = Given { helpers: Some(vec!["none".into(), "turner".into()]), ..mine.clone() };
+    let other = RunRequest { helpers: Some(vec!["none".into(), "turner".into()]), ..mine.clone() };
     let error = open(Access::Resume, &other).unwrap_err().to_string();
     assert!(error.contains("--helper turner, not none,turner"), "{error}");
     // The order plays no role.
-    let both = Given { helpers: Some(vec!["none".into(), "turner".into()]), ..mine.clone() };
+    let both = RunRequest { helpers: Some(vec!["none".into(), "turner".into()]), ..mine.clone() };
     let second = dir.path().join("second");
     drop(Run::open(&second, Access::Begin, &both, &helpers).unwrap());
     let turned = ["turner", "none", "turner"].map(str::to_owned).to_vec();
-    let turned = Given { helpers: Some(turned), ..mine.clone() };
+    let turned = RunRequest { helpers: Some(turned), ..mine.clone() };
     let (run, _) = Run::open(&second, Access::Resume, &turned, &helpers).unwrap();
     assert_eq!(run.options().helpers, ["none", "turner"]);
-    let other = Given { no_traces: true, ..mine.clone() };
+    let other = RunRequest { no_traces: true, ..mine.clone() };
     let error = open(Access::Resume, &other).unwrap_err().to_string();
     assert!(error.contains("--no-traces off, not on"), "{error}");
-    let split = Given { episodes: None, split: Some("test".parse().unwrap()), ..mine.clone() };
+    let split = RunRequest { episodes: None, split: Some("test".parse().unwrap()), ..mine.clone() };
     let error = open(Access::Resume, &split).unwrap_err();
     assert!(
         error.is_usage() && error.to_string().contains("--split not given, not test"),
@@ -354,12 +355,12 @@ fn folders_are_guarded() {
     // The same episodes in another folder are the same; other ones are not, nor none at all.
     let same = episode_files(&[TaskId::LowTarget], 1);
     let other = episode_files(&[TaskId::LowTarget], 2);
-    let named = |path: &Path| Given { episodes: Some(path.to_owned()), ..mine.clone() };
+    let named = |path: &Path| RunRequest { episodes: Some(path.to_owned()), ..mine.clone() };
     assert!(open(Access::Resume, &named(same.path())).is_ok());
     let error = open(Access::Resume, &named(other.path())).unwrap_err();
     assert!(error.is_usage() && error.to_string().contains("low_target/short/1"), "{error}");
     assert!(open(Access::Resume, &named(&dir.path().join("nowhere"))).is_err());
-    let unknown = Given { helpers: Some(vec!["nobody".into()]), ..mine.clone() };
+    let unknown = RunRequest { helpers: Some(vec!["nobody".into()]), ..mine.clone() };
     let elsewhere = dir.path().join("elsewhere");
     let error = Run::open(&elsewhere, Access::Begin, &unknown, &helpers).unwrap_err().to_string();
     assert!(error.contains("`nobody`") && error.contains("none, turner, breaker"), "{error}");
@@ -387,7 +388,7 @@ fn folders_are_guarded() {
         assert_ne!(other, text, "{from} is there");
         fs::write(&run_file, other).unwrap();
         for error in [
-            Run::open(&path, Access::Resume, &Given::default(), &helpers).unwrap_err(),
+            Run::open(&path, Access::Resume, &RunRequest::default(), &helpers).unwrap_err(),
             RunFolder::read(&path).unwrap_err(),
         ] {
             assert!(error.to_string().contains(&changed), "{error}");
@@ -403,8 +404,8 @@ fn folders_are_guarded() {
 
 #[test]
 fn options_of_a_split_rule_out_episode_files_when_going_on() {
-    let recorded = Given { first: Some(1), ..Given::default() }.begin().unwrap();
-    let given = Given { episodes: Some("mine".into()), ..Given::default() };
+    let recorded = RunRequest { first: Some(1), ..RunRequest::default() }.begin().unwrap();
+    let given = RunRequest { episodes: Some("mine".into()), ..RunRequest::default() };
     let error = given.resume(&recorded, Path::new("run")).unwrap_err().to_string();
     assert!(error.contains("--episodes not given, not mine"), "{error}");
 }
@@ -500,7 +501,7 @@ fn verify_counts_results_and_compares_the_report() {
     let source = episode_files(&[TaskId::LowTarget, TaskId::Shopping], 1);
     let dir = tempfile::tempdir().unwrap();
     let helpers = TestHelpers::new();
-    let given = Given { seeds: None, ..given(&source, &["none", "turner"]) };
+    let given = RunRequest { seeds: None, ..given(&source, &["none", "turner"]) };
     let (mut run, _) = Run::open(dir.path(), Access::Begin, &given, &helpers).unwrap();
     assert!(play(&mut run, 1, &helpers));
     let verdict =
@@ -561,7 +562,7 @@ fn a_replay_of_an_altered_trace_stops_at_the_first_wrong_digest() {
     let source = episode_files(&[TaskId::LowTarget], 1);
     let dir = tempfile::tempdir().unwrap();
     let helpers = TestHelpers::new();
-    let given = Given { seeds: None, ..given(&source, &["turner"]) };
+    let given = RunRequest { seeds: None, ..given(&source, &["turner"]) };
     let (mut run, _) = Run::open(dir.path(), Access::Begin, &given, &helpers).unwrap();
     assert!(play(&mut run, 1, &helpers));
     let path = run.folder().traces().unwrap().remove(0);

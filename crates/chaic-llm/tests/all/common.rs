@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use chaic_episodes::{Episode, find_episode};
 use chaic_eval::metrics::{RunResult, Summary};
-use chaic_eval::run::{Access, Given, Run};
+use chaic_eval::run::{Access, Run, RunRequest};
 use chaic_llm::exchange::{Decided, Exchange};
 use chaic_llm::record::{self, Entry, Record};
 use chaic_llm::settings::Then;
@@ -41,17 +41,22 @@ impl Bench {
         self.dir.path().join(name)
     }
 
-    pub fn given(&self, helpers: &[&str]) -> Given {
-        Given {
+    pub fn given(&self, helpers: &[&str]) -> RunRequest {
+        RunRequest {
             helpers: Some(helpers.iter().map(|h| (*h).to_owned()).collect()),
             size: Some(SIZE),
             episodes: Some(self.path("episodes")),
-            ..Given::default()
+            ..RunRequest::default()
         }
     }
 
     /// Plays, in a new folder or on in one that is there; whether to the end, and the results.
-    pub fn play(&self, name: &str, given: &Given, language: &Language) -> (bool, Vec<RunResult>) {
+    pub fn play(
+        &self,
+        name: &str,
+        given: &RunRequest,
+        language: &Language,
+    ) -> (bool, Vec<RunResult>) {
         let path = self.path(name);
         let (mut run, _) = Run::open(&path, Access::Resume, given, language).unwrap();
         language.attach(&path).unwrap();

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use chaic_llm::Language;
 use chaic_llm::answer;
-use chaic_llm::facts::plain;
+use chaic_llm::prompt_context::plain;
 use chaic_llm_standin::script::Question;
 use chaic_llm_standin::{Manner, Options};
 use chaic_protocol::TaskId;

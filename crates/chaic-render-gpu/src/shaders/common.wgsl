@@ -56,7 +56,7 @@ struct Instance {
 
 // `MeshRecord` of records.rs.
 struct Mesh {
-    // First corner, first triangle, number of triangles, first skin.
+    // First vertex, first triangle, number of triangles, first skin.
     levels: array<vec4u, N_LEVELS>,
 }
 

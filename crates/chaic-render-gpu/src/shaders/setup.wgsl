@@ -7,9 +7,9 @@
 @group(0) @binding(4) var<storage, read> levels: array<u32>;
 // `Tally` word by word, for the atomic count.
 @group(0) @binding(5) var<storage, read_write> tallies: array<atomic<u32>>;
-// Position, and what shading reads; shape [corner].
-@group(0) @binding(6) var<storage, read> corners: array<vec4u>;
-// Three corners, skin, whether smooth, packed; shape [triangle].
+// Position, and what shading reads; shape [vertex].
+@group(0) @binding(6) var<storage, read> vertices: array<vec4u>;
+// Three vertices, skin, whether smooth, packed; shape [triangle].
 @group(0) @binding(7) var<storage, read> triangles: array<vec2u>;
 // Where in the round's triangles each view's begin; shape [view].
 @group(0) @binding(8) var<storage, read> firsts: array<u32>;
@@ -58,9 +58,9 @@ fn setup(
         for (var t = thread; t < level.z; t += N_THREADS) {
             let packed = triangles[level.y + t];
             let p = array<vec3f, 3>(
-                corner(into, level.x + (packed.x & 0xffffu)),
-                corner(into, level.x + (packed.x >> 16u)),
-                corner(into, level.x + (packed.y & 0xffffu)),
+                vertex(into, level.x + (packed.x & 0xffffu)),
+                vertex(into, level.x + (packed.x >> 16u)),
+                vertex(into, level.x + (packed.y & 0xffffu)),
             );
             let slot = Slot(v, (index << 16u) | t);
             if (crosses_near && min(min(p[0].z, p[1].z), p[2].z) < NEAR_M) {
@@ -72,8 +72,8 @@ fn setup(
     }
 }
 
-fn corner(into: IntoCamera, k: u32) -> vec3f {
-    return into_camera(into, bitcast<vec3f>(corners[k].xyz));
+fn vertex(into: IntoCamera, k: u32) -> vec3f {
+    return into_camera(into, bitcast<vec3f>(vertices[k].xyz));
 }
 
 // A triangle in front of the camera, if it faces it.
@@ -101,10 +101,10 @@ fn project(view: View, p: array<vec3f, 3>, slot: Slot) {
 }
 
 // A triangle that reaches behind the near plane: what is left of it is a triangle or two.
-fn cut(view: View, corner: array<vec3f, 3>, slot: Slot) {
-    var p = corner;
-    // The plane n . p = d gives nearness 1 / w = (n.x * x / w + n.y * y / w + n.z) / d, however far
-    // outside of the image the corners are.
+fn cut(view: View, vertex: array<vec3f, 3>, slot: Slot) {
+    var p = vertex;
+    // The plane n . p = d gives inverse depth 1 / w = (n.x * x / w + n.y * y / w + n.z) / d, however far
+    // outside of the image the vertices are.
     let n = cross(p[1] - p[0], p[2] - p[0]);
     let d = dot(n, p[0]);
     if (!(d < 0.0)) {
@@ -149,8 +149,8 @@ fn per_row(top: vec2f, bottom: vec2f) -> f32 {
     return select(0.0, (bottom.x - top.x) / dv, dv > 0.0);
 }
 
-// Appends what tiles need to fill a triangle: corners a, b, c from top to bottom, how far edges go
-// to the right from row to row (ac, ab, bc), nearness at a and its slope, rows and columns.
+// Appends what tiles need to fill a triangle: vertices a, b, c from top to bottom, how far edges go
+// to the right from row to row (ac, ab, bc), inverse depth at a and its slope, rows and columns.
 fn fill(p: vec2f, q: vec2f, r: vec2f, slope: Slope, slot: Slot) {
     var a = p;
     var b = q;

@@ -1,6 +1,6 @@
 // Color of each pixel whose triangle is known: one thread a pixel.
 //
-// What is shown is worked out for each corner of a thing's triangle and mixed by where the pixel
+// What is shown is worked out for each vertex of a thing's triangle and mixed by where the pixel
 // sees it; structure, which is large, is lit at the point seen. Then textures and the darkness of
 // the ground dim it. `chaic-render` does the same (paint.rs, shade.rs), a few pixels at a time.
 
@@ -8,7 +8,7 @@
 @group(0) @binding(1) var<storage, read> instances: array<Instance>;
 @group(0) @binding(2) var<storage, read> meshes: array<Mesh>;
 @group(0) @binding(3) var<storage, read> levels: array<u32>;
-@group(0) @binding(4) var<storage, read> corners: array<vec4u>;
+@group(0) @binding(4) var<storage, read> vertices: array<vec4u>;
 @group(0) @binding(5) var<storage, read> triangles: array<vec2u>;
 @group(0) @binding(6) var<storage, read> skins: array<Skin>;
 @group(0) @binding(7) var<storage, read> lights: array<Light>;
@@ -141,9 +141,9 @@ fn surface(view: View, light: Light, name: u32, ray: vec3f, depth_m: f32) -> vec
     let packed = triangles[level.y + (name & 0xffffu)];
     let is_smooth = packed.y >> 24u != 0u;
     let skin = skins[level.w + ((packed.y >> 16u) & 0xffu)];
-    let ca = corners[level.x + (packed.x & 0xffffu)];
-    let cb = corners[level.x + (packed.x >> 16u)];
-    let cc = corners[level.x + (packed.y & 0xffffu)];
+    let ca = vertices[level.x + (packed.x & 0xffffu)];
+    let cb = vertices[level.x + (packed.x >> 16u)];
+    let cc = vertices[level.x + (packed.y & 0xffffu)];
     let a = bitcast<vec3f>(ca.xyz);
     let b = bitcast<vec3f>(cb.xyz);
     let c = bitcast<vec3f>(cc.xyz);
@@ -276,7 +276,7 @@ fn glow(light: Light) -> vec3f {
     return 0.5 + 0.5 * light.lamp / max(max(light.lamp.x, max(light.lamp.y, light.lamp.z)), 1e-6);
 }
 
-// What all corners of a thing's triangle share.
+// What all vertices of a thing's triangle share.
 struct Lit {
     turn: mat3x3f,
     origin: vec3f,

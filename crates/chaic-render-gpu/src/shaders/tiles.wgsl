@@ -1,4 +1,4 @@
-// Nearness, owner, depth and ids of each pixel: one workgroup a tile of 32 by 32 pixels, one thread
+// Inverse depth, visibility id, depth and ids of each pixel: one workgroup a tile of 32 by 32 pixels, one thread
 // four pixels. A workgroup goes through the triangles of its view in chunks, keeps those that touch
 // its tile, and lets each thread compare them with its own pixels. Whoever is nearest wins, the
 // lower name where two are equally near: the order of triangles doesn't matter.

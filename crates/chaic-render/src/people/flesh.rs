@@ -33,14 +33,14 @@ fn bare(color: [u8; 3]) -> Skin {
     Skin { gloss: crate::mesh::Gloss::Satin, ..Skin::new(color, Finish::Matte) }
 }
 
-fn corners(detail: Detail, radius_m: f32) -> usize {
-    detail.corners(radius_m).min(14)
+fn segments(detail: Detail, radius_m: f32) -> usize {
+    detail.segments(radius_m).min(14)
 }
 
 fn trunk(mesh: &mut Mesh, s: &Skeleton, b: &Build, dress: &Dress, detail: Detail) {
     let (w, d) = (b.shoulder_x, 0.105 * b.girth);
     let long = b.shoulder_y - b.hip_y;
-    let n = corners(detail, 1.3 * w).max(6);
+    let n = segments(detail, 1.3 * w).max(6);
     // A bent back bulges between hips and neck.
     let hunch = 0.22 * (b.lean_rad - 0.1).max(0.0) * b.top_y;
     let section = |up: f32, width: f32, depth: f32, back: f32| Section {
@@ -93,7 +93,7 @@ fn trunk(mesh: &mut Mesh, s: &Skeleton, b: &Build, dress: &Dress, detail: Detail
         s.head - s.head_axes.y_axis * (0.25 * b.head),
         neck,
         neck,
-        corners(detail, neck),
+        segments(detail, neck),
     );
 }
 
@@ -165,7 +165,7 @@ fn place_back(section: &dyn Fn(f32, f32, f32, f32) -> Section) -> Vec3 {
 
 fn leg(mesh: &mut Mesh, s: &Skeleton, b: &Build, dress: &Dress, k: usize, detail: Detail) {
     let g = b.girth;
-    let n = corners(detail, 0.08 * g);
+    let n = segments(detail, 0.08 * g);
     let (hip, knee, ankle) = (s.hip_joints[k], s.knees[k], s.ankles[k]);
     mesh.skin(cloth(dress.trousers));
     if dress.short_trousers {
@@ -186,7 +186,7 @@ fn leg(mesh: &mut Mesh, s: &Skeleton, b: &Build, dress: &Dress, k: usize, detail
     let axes = Mat3::from_cols(Vec3::X, up, back);
     let long = 0.148 * b.top_y;
     let center = ankle - back * (0.27 * long) - up * (0.45 * b.ankle_y);
-    let n = corners(detail, 0.5 * long);
+    let n = segments(detail, 0.5 * long);
     mesh.skin(Skin::new(dress.shoes, Finish::Glossy));
     let extent = Vec3::new(0.092 * g, 1.05 * b.ankle_y, long);
     ellipsoid(mesh, &Place { center, axes, extent }, n);
@@ -217,7 +217,7 @@ fn leg(mesh: &mut Mesh, s: &Skeleton, b: &Build, dress: &Dress, k: usize, detail
 
 fn arm(mesh: &mut Mesh, s: &Skeleton, b: &Build, dress: &Dress, k: usize, detail: Detail) {
     let g = b.girth;
-    let n = corners(detail, 0.055 * g);
+    let n = segments(detail, 0.055 * g);
     let (shoulder, elbow, hand) = (s.shoulders[k], s.elbows[k], s.hands[k]);
     let along = unit(hand - elbow);
     let wrist = hand - along * (0.045 * g);
@@ -272,7 +272,7 @@ fn head(mesh: &mut Mesh, s: &Skeleton, b: &Build, dress: &Dress, detail: Detail)
     let at = |x: f32, y: f32, z: f32| {
         s.head + s.head_axes * (0.5 * Vec3::new(x * wide, y * tall, z * deep))
     };
-    let n = corners(detail, 0.5 * deep).max(6);
+    let n = segments(detail, 0.5 * deep).max(6);
     let blob = |mesh: &mut Mesh, c: Vec3, e: Vec3, n: usize| {
         ellipsoid(mesh, &Place { center: c, axes: s.head_axes, extent: e }, n);
     };
@@ -295,7 +295,7 @@ fn head(mesh: &mut Mesh, s: &Skeleton, b: &Build, dress: &Dress, detail: Detail)
         b: s.head_axes.z_axis * (0.5 * d * deep),
     });
     mesh.tube(&slices, n);
-    let small = detail.corners(0.12 * wide);
+    let small = detail.segments(0.12 * wide);
     for x in [-1.0, 1.0] {
         blob(mesh, at(x, -0.08, 0.1), size * Vec3::new(0.10, 0.24, 0.16), small);
     }

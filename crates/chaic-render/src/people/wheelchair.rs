@@ -44,7 +44,7 @@ fn seat(mesh: &mut Mesh) {
 
 fn frame(mesh: &mut Mesh, detail: Detail) {
     mesh.skin(Skin::new(FRAME, Finish::Metal));
-    let n = detail.corners(0.015).min(8);
+    let n = detail.segments(0.015).min(8);
     for side in [-1.0, 1.0] {
         let mut rod = |a: [f32; 3], b: [f32; 3]| {
             let at = |p: [f32; 3]| Vec3::new(side * p[0], p[1], p[2]);
@@ -85,7 +85,7 @@ fn wheel(mesh: &mut Mesh, side: f32, walked_m: f32, detail: Detail) {
     };
     solid(mesh, Solid::Torus { tube: 0.035 }, &rim, detail);
     let hub = Place { center, axes, extent: Vec3::new(0.06, 0.06, 0.06) };
-    frustum(mesh, &hub, 1.0, detail.corners(0.03));
+    frustum(mesh, &hub, 1.0, detail.segments(0.03));
     for k in 0..5 {
         let axes = wheel_axes(
             -(walked_m / WHEEL_RADIUS_M) % std::f32::consts::TAU + 0.628_318_5 * k as f32,
@@ -102,6 +102,6 @@ fn caster(mesh: &mut Mesh, side: f32, walked_m: f32, detail: Detail) {
         mesh,
         &Place { center, axes, extent: Vec3::new(0.16, 0.03, 0.16) },
         1.0,
-        detail.corners(0.08),
+        detail.segments(0.08),
     );
 }

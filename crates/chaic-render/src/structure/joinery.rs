@@ -6,7 +6,7 @@ use chaic_world::{Opening, Room, RoomKind, Setup, Wall};
 
 use super::walls::{Line, Stretch};
 use crate::mesh::{Gloss, Mesh, Place, Section, Skin};
-use crate::sculpt::scramble;
+use crate::mesh_builder::scramble;
 use crate::solids::{cuboid, ellipsoid, frustum};
 
 /// Width of a door's casing, and how far it and a window's frame stand out from the wall, metres.

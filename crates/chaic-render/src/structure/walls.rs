@@ -9,7 +9,7 @@ use glam::Mat3;
 
 use super::joinery;
 use crate::mesh::{Mesh, Place, Skin};
-use crate::sculpt::scramble;
+use crate::mesh_builder::scramble;
 use crate::solids::cuboid;
 use crate::texture::Texture;
 
@@ -149,7 +149,7 @@ fn faces(mesh: &mut Mesh, wall: &Wall, line: &Line, papers: &[Skin], stretches: 
         for z in [-line.half.y, line.half.y] {
             for y in [wall.bottom_m, wall.top_m] {
                 let p = line.plan(t, z);
-                mesh.corner(Vec3::new(p.x, y, p.y), Vec3::Y);
+                mesh.vertex(Vec3::new(p.x, y, p.y), Vec3::Y);
             }
         }
     }

@@ -11,7 +11,7 @@ use chaic_protocol::observation::Images;
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{AgentId, ClassId, EntityId, Frame, Quat, TaskId, Vec2, Vec3};
 use chaic_render::geometry::FINEST;
-use chaic_render::{Appearance, Channels, MAX_SIDE_PX, Scene, View, gltf_out, plan};
+use chaic_render::{Appearance, Channels, MAX_SIDE_PX, Scene, View, floor_plan, gltf_out};
 use chaic_world::{
     Arm, Floor, FloorMaterial, Opening, Person, PersonState, Place, Posture, Room, RoomKind, Rules,
     Setup, State, Thing, ThingState, Wall, World,
@@ -394,7 +394,7 @@ fn check_geometry(case: &Case, scene: &Scene) {
         let n = mesh.positions.len();
         assert_eq!(n, mesh.normals.len());
         for triangle in &mesh.triangles {
-            let is_there = triangle.corners.iter().all(|c| (*c as usize) < n);
+            let is_there = triangle.vertices.iter().all(|c| (*c as usize) < n);
             assert!(is_there, "{triangle:?} of a mesh with {n} corners");
             assert!(usize::from(triangle.skin) < mesh.skins.len(), "{triangle:?} has no skin");
         }
@@ -465,9 +465,9 @@ pub fn check_plan(seed: u64) -> bool {
     let appearance = draw.appearance();
     let Ok(world) = World::new(setup, Rules::paper()) else { return false };
     let scene = Scene::with_appearance(world.setup(), appearance);
-    let picture = plan::draw_scene_plan(&scene, &world, width);
+    let picture = floor_plan::draw_scene_plan(&scene, &world, width);
     assert_eq!(picture.width(), width.clamp(64, MAX_SIDE_PX));
-    assert!(picture == plan::draw_scene_plan(&scene, &world, width));
+    assert!(picture == floor_plan::draw_scene_plan(&scene, &world, width));
     true
 }
 

@@ -3,9 +3,9 @@
 //! There is one implementation of each action for everybody; who may be blocked, who is too
 //! short and who is too weak is in [`Capability`](chaic_protocol::capability::Capability).
 
+mod joint_lift;
 mod put;
 mod take;
-mod together;
 
 use chaic_protocol::action::{FailureReason, Hand};
 use chaic_protocol::catalogue::Role;
@@ -128,7 +128,7 @@ impl World {
     }
 
     fn reach(&self, hand: Option<Hand>, to: Vec3) -> Step {
-        Step::of(Phase::Reach { hand, to, vain: false }, self.rules.durations.reach)
+        Step::of(Phase::Reach { hand, to, fails: false }, self.rules.durations.reach)
     }
 
     fn reset_arms(&self, hand: Option<Hand>, from: Vec3) -> Step {

@@ -14,7 +14,7 @@ use crate::world::World;
 
 /// Height above its place at which a thing is let go, metres (facts S3.7).
 const RELEASE_ABOVE_M: f32 = 0.2;
-/// Height above the floor from which a thing drops after a vain put-on, metres: ours, that of a
+/// Height above the floor from which a thing drops after a failed put-on, metres: ours, that of a
 /// hand that bends down, so that nothing rolls far.
 const DROP_FROM_M: f32 = 0.3;
 
@@ -143,12 +143,12 @@ impl World {
         // the whole of a rider's basket: it is one attempt.
         let height_excess = excess(self.top_of(place), self.capability(agent).put_range_m);
         let p = self.rules.put_penalty.chance(height_excess);
-        let is_vain = !self.luck(agent, Luck::PutOn).chance(p);
+        let fails = !self.luck(agent, Luck::PutOn).chance(p);
         let is_rider = self.vehicle(agent).is_some();
-        if is_vain {
+        if fails {
             activity.failing = Some(FailureReason::BeyondLimits);
         }
-        activity.queue = match (is_vain, is_rider) {
+        activity.queue = match (fails, is_rider) {
             (false, false) => self.put_steps(agent, hand, first, place),
             (false, true) => self.unload_steps(agent, objects, place),
             (true, false) => {
@@ -236,11 +236,11 @@ impl World {
             Step::of(release, d.open_hand + d.watch_fall),
             self.reach(hand, at),
             self.gap(),
-            Step::of(Phase::Reach { hand, to, vain: true }, d.reach),
+            Step::of(Phase::Reach { hand, to, fails: true }, d.reach),
         ]
     }
 
-    /// Where a thing is let go after a vain put-on.
+    /// Where a thing is let go after a failed put-on.
     fn drop_spot(&self, agent: AgentId, object: EntityId) -> Vec3 {
         self.floor_spot_beside(agent, object) + Vec3::Y * DROP_FROM_M
     }

@@ -101,21 +101,21 @@ impl World {
             }
         }
         let breaks = activity.failing == Some(FailureReason::Broke);
-        let vain = activity.failing.is_some();
+        let fails = activity.failing.is_some();
         let d = self.rules.durations;
         // Next one last.
         activity.queue = vec![match hand {
             Some(_) => self.reset_arms(hand, to),
             None => self.raise_furniture(to),
         }];
-        if !vain || breaks {
+        if !fails || breaks {
             activity.queue.push(Step::of(Phase::Grasp { hand, object }, d.grasp));
         } else if d.vain_grasp > 0 {
             activity.queue.push(Step::of(Phase::Stand, d.vain_grasp));
         }
         activity.queue.extend([
             self.gap(),
-            Step::of(Phase::Reach { hand, to, vain }, d.reach),
+            Step::of(Phase::Reach { hand, to, fails }, d.reach),
             self.gap(),
             Step::of(Phase::Face { to: object }, d.turn),
         ]);

@@ -5,8 +5,8 @@ use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result};
 use chaic_episodes::{Episode, EpisodeError, Split, episodes, find_episode, json_schema};
+use chaic_eval::frame_export;
 use chaic_eval::read_episode_file;
-use chaic_eval::still;
 use chaic_files::write_whole;
 use chaic_protocol::TaskId;
 use comfy_table::{ContentArrangement, Table, presets};
@@ -105,7 +105,7 @@ fn json_of(episode: &Episode) -> serde_json::Value {
 
 fn show(argument: &str, out: &Path, width_px: u32) -> Result<Ended> {
     let episode = super::episode(argument)?;
-    still::write_plan(&episode, width_px, out)?;
+    frame_export::write_plan(&episode, width_px, out)?;
     say(&format!("{}: the map of {}\n", out.display(), episode.id()))?;
     Ok(Ended::Well)
 }

@@ -7,7 +7,7 @@ use anyhow::{Context as _, Result, anyhow, bail};
 use chaic_env::minds::{BuiltIn, Helpers};
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::{Format, Report, write_files};
-use chaic_eval::run::{Access, Given, Run, RunFolder};
+use chaic_eval::run::{Access, Run, RunFolder, RunRequest};
 use chaic_llm::Language;
 use chaic_subprocess::Commands;
 
@@ -114,11 +114,11 @@ pub(super) fn leave_report(run: &Run) -> Result<String> {
 }
 
 /// What is asked for, and the name of a folder for it. Nothing said at all is the small benchmark.
-fn given(arguments: &EvalArguments) -> (Given, &'static str) {
+fn given(arguments: &EvalArguments) -> (RunRequest, &'static str) {
     let EvalArguments { task, split, episodes, first, rules, set, seeds, size, no_traces, .. } =
         arguments;
     let (partner, appearance) = (arguments.partner.clone(), arguments.appearance);
-    let given = Given {
+    let given = RunRequest {
         tasks: task.as_ref().map(|t| t.0.clone()),
         helpers: arguments.helper_names(),
         split: split.clone(),
@@ -132,8 +132,8 @@ fn given(arguments: &EvalArguments) -> (Given, &'static str) {
         partner,
         appearance,
     };
-    if given == Given::default() && !arguments.resume {
-        return (Given { first: Some(QUICK_EPISODES), ..given }, "quick");
+    if given == RunRequest::default() && !arguments.resume {
+        return (RunRequest { first: Some(QUICK_EPISODES), ..given }, "quick");
     }
     (given, "eval")
 }

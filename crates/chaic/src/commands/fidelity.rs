@@ -8,7 +8,9 @@ use std::time::Duration;
 use anyhow::{Context as _, Result, anyhow};
 use chaic_env::minds::BuiltIn;
 use chaic_env::rules::differing_rules;
-use chaic_eval::fidelity::{Matrix, Part, Sheet, Wanted, check_document, parts, write_document};
+use chaic_eval::fidelity::{
+    ExperimentRequest, Matrix, Part, Sheet, check_document, parts, write_document,
+};
 use chaic_eval::run::{Access, Progress, Run};
 use indicatif::HumanDuration;
 
@@ -47,14 +49,14 @@ pub fn run(arguments: &FidelityArguments) -> Result<Ended> {
     finish(arguments, &matrix, &doc)
 }
 
-fn wanted(arguments: &FidelityArguments) -> Wanted {
+fn wanted(arguments: &FidelityArguments) -> ExperimentRequest {
     let is_all = |rules: &Vec<String>| rules.iter().any(|r| r == "all");
     let switches = match &arguments.switch {
         _ if arguments.no_switches => Some(Vec::new()),
         Some(rules) if is_all(rules) => Some(differing_rules()),
         rules => rules.clone(),
     };
-    Wanted {
+    ExperimentRequest {
         episodes: arguments.episodes.clone(),
         tasks: arguments.task.as_ref().map(|t| t.0.clone()),
         helpers: arguments.helper.clone(),
@@ -68,7 +70,7 @@ fn wanted(arguments: &FidelityArguments) -> Wanted {
 }
 
 /// The parts that are wanted now.
-fn wanted_now(wanted: &Wanted, matrix: &Matrix) -> Vec<Part> {
+fn wanted_now(wanted: &ExperimentRequest, matrix: &Matrix) -> Vec<Part> {
     let is_wanted = |part: &Part| match (&part.switch, &wanted.switches) {
         (Some(rule), Some(rules)) => rules.contains(rule),
         _ => true,

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use chaic_env::minds::BuiltIn;
 use chaic_env::rules::RuleSet;
-use chaic_eval::still::{self, Still};
+use chaic_eval::frame_export::{self, FrameExport};
 
 use crate::arguments::RenderArguments;
 use crate::exit::Ended;
@@ -16,7 +16,7 @@ pub fn run(arguments: &RenderArguments) -> Result<Ended> {
     let episode = super::episode(episode)?;
     let rules = RuleSet::named(*rules);
     let (agent, frame, size, seed) = (*agent, *frame, *size, *seed);
-    let still = Still {
+    let still = FrameExport {
         episode: &episode,
         helper,
         seed,
@@ -26,7 +26,7 @@ pub fn run(arguments: &RenderArguments) -> Result<Ended> {
         size,
         appearance: *appearance,
     };
-    let shown = still::write(&still, &BuiltIn, out)?;
+    let shown = frame_export::write(&still, &BuiltIn, out)?;
     let id = episode.id();
     say(&format!("{}: what the {agent} sees of {id} at frame {shown}\n", out.display()))?;
     Ok(Ended::Well)

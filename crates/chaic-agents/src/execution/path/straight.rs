@@ -95,11 +95,11 @@ impl Search {
 
 /// How far every cell is over straight neighbors, by the same costs as [`Search::straight_way`].
 #[derive(Clone, Debug)]
-pub struct StraightReach {
+pub struct StraightCostField {
     cost_and_steps: Vec<Option<(u32, u32)>>,
 }
 
-impl StraightReach {
+impl StraightCostField {
     /// Everything that costs at most `limit` to get to.
     pub fn from(
         grid: &Grid,
@@ -107,7 +107,7 @@ impl StraightReach {
         start: usize,
         limit: u32,
         search: &mut Search,
-    ) -> StraightReach {
+    ) -> StraightCostField {
         let mut cost_and_steps: Vec<Option<(u32, u32)>> = vec![None; grid.n_cells()];
         search.begin(start);
         while let Some((cost, cell)) = search.queue.pop() {
@@ -123,7 +123,7 @@ impl StraightReach {
                 search.improve(next, cell, cost.saturating_add(costs[next]), || 0);
             });
         }
-        StraightReach { cost_and_steps }
+        StraightCostField { cost_and_steps }
     }
 
     /// Twice the cells of the way and its cost, in costs of a free cell times [`FREE`]; `None` if

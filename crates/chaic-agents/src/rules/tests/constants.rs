@@ -11,7 +11,7 @@ fn a_plan_is_looked_at_again_after_as_long_as_the_rules_say() {
     for reconsider_frames in [PAPER.time.reconsider_frames, 80] {
         let time = TimeRules { reconsider_frames, ..PAPER.time };
         let mut s = Situated::new(PlannerRules { time, ..PAPER });
-        let mut partner = Rules::new(RuleProfile::PARTNER);
+        let mut partner = RulePolicy::new(RuleProfile::PARTNER);
         s.ask_of(&mut partner, |rules, context| rules.decide(context, &s.valid));
         let chosen = s.memory.frame;
         let looks = [reconsider_frames - 1, reconsider_frames].map(|after| {

@@ -108,7 +108,7 @@ fn a_child_unseen_for_long_is_looked_for() {
 fn a_child_that_one_stood_beside_is_trusted_to_come_back_or_not() {
     for (trusts_child, expected) in [(true, Plan::Explore), (false, Plan::FollowChild)] {
         let mut s = minder(PlannerRules { trusts_child, looks_around_first: false, ..PAPER });
-        let mut rhp = Rules::new(RuleProfile::RHP);
+        let mut rhp = RulePolicy::new(RuleProfile::RHP);
         let chosen = [100, 140].map(|frame| {
             see_both(&mut s, frame);
             s.ask_of(&mut rhp, |rules, context| rules.decide(context, &s.valid))

@@ -71,7 +71,7 @@ fn one_picks_up_and_puts_down_from_as_near_as_the_rules_say() {
     for class in ["apple", "bed"] {
         let (memory, briefing, track) = memory_of(class, PAPER);
         let off_m = memory.things.get(track).expect("seen").distance_from(memory.here());
-        let (plan, deed) = match class {
+        let (plan, interaction) = match class {
             "apple" => (
                 Plan::PickUp(subject(class, track.0)),
                 Action::PickUp { object: track, hand: Hand::Left },
@@ -90,7 +90,7 @@ fn one_picks_up_and_puts_down_from_as_near_as_the_rules_say() {
             let Progress::Act(action) = step(pick_within_m, put_within_m) else {
                 panic!("it can be done");
             };
-            action == deed
+            action == interaction
         };
         let (less_m, more_m) = (off_m - 0.05, off_m + 0.05);
         let picks = class == "apple";

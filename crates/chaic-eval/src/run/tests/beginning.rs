@@ -93,7 +93,7 @@ fn what_no_run_has_left_is_never_removed() {
     fs::create_dir_all(path.join("episodes")).unwrap();
     fs::write(path.join(".lock"), "").unwrap();
     fs::copy(source.path().join("low_target-0.json"), path.join("episodes/a.json")).unwrap();
-    let own = Given { episodes: Some(path.join("episodes")), ..given.clone() };
+    let own = RunRequest { episodes: Some(path.join("episodes")), ..given.clone() };
     let before = files_below(&path);
     let error = Run::open(&path, Access::Begin, &own, &helpers).unwrap_err();
     assert!(matches!(error, EvalError::NotEmpty { .. }), "{error}");
@@ -119,9 +119,9 @@ fn mistakes_leave_nothing_behind() {
     fs::copy(&file, &twin).unwrap();
     for given in [
         good.clone(),
-        Given { tasks: Some(vec![TaskId::Shopping]), ..good.clone() },
-        Given { partner: Some("nobody".to_owned()), ..good.clone() },
-        Given { episodes: None, split: "gen:0..2000000".parse().ok(), ..good.clone() },
+        RunRequest { tasks: Some(vec![TaskId::Shopping]), ..good.clone() },
+        RunRequest { partner: Some("nobody".to_owned()), ..good.clone() },
+        RunRequest { episodes: None, split: "gen:0..2000000".parse().ok(), ..good.clone() },
     ] {
         for access in [Access::Begin, Access::Resume] {
             let error = Run::open(&path, access, &given, &helpers).unwrap_err();

@@ -1,4 +1,4 @@
-//! Facts from a mind's memory.
+//! PromptContext from a mind's memory.
 
 use chaic_agents::behavior::SeenInteraction;
 use chaic_agents::decision::{Context, Plan};
@@ -12,8 +12,8 @@ use chaic_protocol::{Action, AgentId, ClassId, Frame, Outcome, Role};
 
 use super::hands::put_away;
 use super::{
-    Body, Count, Deed, Facts, GoalPlace, Length, Map, Other, Own, PlanFacts, ProgressFacts,
-    ThingFacts, ToldFacts, plain, plan_text,
+    Body, Count, GoalPlace, Interaction, Length, Map, Other, Own, PlanFacts, ProgressFacts,
+    PromptContext, ThingFacts, ToldFacts, plain, plan_text,
 };
 use crate::templates::Track;
 
@@ -26,7 +26,7 @@ const MAX_GOAL_PLACES: usize = 3;
 /// Walking as it is, turns included, takes longer than the way at full speed by this factor.
 const WALK_FACTOR: f32 = 1.5;
 
-impl Facts {
+impl PromptContext {
     /// What a mind with this memory may say, and which of `plans` are listed: those of one kind
     /// come nearest first.
     pub fn of(
@@ -36,7 +36,7 @@ impl Facts {
         last_plan: Option<Plan>,
         images: usize,
         length: Length,
-    ) -> (Facts, Vec<Plan>) {
+    ) -> (PromptContext, Vec<Plan>) {
         let Context { briefing, memory, .. } = *context;
         let listed = shorten(plans, length.plans_of_a_kind);
         let labels = |classes: &[ClassId]| {
@@ -48,7 +48,7 @@ impl Facts {
         };
         let speed = briefing.capability.speed_m_per_frame.max(1e-3);
         let wanted = briefing.goal.iter().filter(|_| track == Track::Partner);
-        let facts = Facts {
+        let facts = PromptContext {
             track,
             goal_place: labels(&briefing.goal_places).join(" or "),
             targets: labels(&briefing.possible_targets),
@@ -159,32 +159,32 @@ fn own(context: &Context<'_>, last_plan: Option<Plan>, length: Length) -> Own {
     let Context { memory, .. } = *context;
     let hands = &memory.hands;
     let here = memory.here();
-    let deeds: Vec<Deed> = memory
+    let interactions: Vec<Interaction> = memory
         .history
         .iter()
         .zip(put_away(&memory.history, |track| memory.class_of(track)))
-        .map(|(done, put)| deed(memory, done.frame, done.action, Some(done.outcome), put))
+        .map(|(done, put)| interaction(memory, done.frame, done.action, Some(done.outcome), put))
         .collect();
-    let left_out = deeds.len().saturating_sub(length.deeds);
+    let left_out = interactions.len().saturating_sub(length.interactions);
     Own {
         x: metres(here.x),
         z: metres(here.y),
         hands: hands.held().map(holding).collect(),
         free_hands: hands.hands.iter().filter(|h| h.is_none()).count(),
-        history: deeds[left_out..].to_vec(),
+        history: interactions[left_out..].to_vec(),
         history_left_out: left_out,
         plan: last_plan.map(|p| plan_text(&p)),
     }
 }
 
-/// A deed; `put` is what it put away, where that is known.
-fn deed(
+/// A interaction; `put` is what it put away, where that is known.
+fn interaction(
     memory: &Memory,
     frame: Frame,
     action: Intent,
     outcome: Option<Outcome>,
     put: Option<TrackId>,
-) -> Deed {
+) -> Interaction {
     let name = |track| named(track, memory.class_of(track));
     let put = put.map_or("something".to_owned(), name);
     let what = match action {
@@ -199,7 +199,7 @@ fn deed(
         Outcome::Success => "done".to_owned(),
         Outcome::Failure(reason) => format!("failed ({reason})"),
     });
-    Deed { frame, what, outcome }
+    Interaction { frame, what, outcome }
 }
 
 fn others(context: &Context<'_>, length: Length) -> Vec<Other> {
@@ -223,21 +223,21 @@ fn others(context: &Context<'_>, length: Length) -> Vec<Other> {
             .map(|(c, g)| horizontal_distance(c.position_in_world, g.position_in_world))
             .filter(|m| *m > AWAY_M);
         let took = |list: &[(TrackId, ClassId)]| -> Vec<String> {
-            let skip = list.len().saturating_sub(2 * length.deeds);
+            let skip = list.len().saturating_sub(2 * length.interactions);
             list[skip..].iter().map(|(e, c)| named(*e, Some(*c))).collect()
         };
         let is_told_by_taking = |seen: &&SeenInteraction| {
             matches!(seen.action, Action::PickUp { object, .. } if seen.outcome == Some(Outcome::Success)
                 && behavior.partner_took.iter().any(|(e, _)| *e == object))
         };
-        let actions: Vec<Deed> = behavior
+        let actions: Vec<Interaction> = behavior
             .actions
             .iter()
             .filter(|a| a.agent == companion.agent)
             .filter(|a| !(is_partner && is_told_by_taking(a)))
-            .map(|a| deed(memory, a.frame, a.action, a.outcome, None))
+            .map(|a| interaction(memory, a.frame, a.action, a.outcome, None))
             .collect();
-        let left_out = actions.len().saturating_sub(length.deeds);
+        let left_out = actions.len().saturating_sub(length.interactions);
         let at = seen.map(|p| xz(p.position_in_world)).unwrap_or_default();
         Other {
             who,

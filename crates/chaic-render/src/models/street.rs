@@ -5,7 +5,7 @@ use chaic_protocol::geom::math::{cos, sin};
 
 use super::Model;
 use super::colors::{BLACK, BRASS, DARK_STEEL, GAP, GLASS, IRON, LAMP, RUBBER, STEEL, WHITE};
-use crate::sculpt::{Sculptor, paint};
+use crate::mesh_builder::{MeshBuilder, paint};
 
 pub(super) fn model(name: &str) -> Option<Model> {
     Some(match name {
@@ -25,7 +25,7 @@ pub(super) fn model(name: &str) -> Option<Model> {
 
 const RED: [u8; 3] = [206, 40, 36];
 
-fn truck(s: &mut Sculptor) {
+fn truck(s: &mut MeshBuilder) {
     let body = s.main_or(&[[240, 190, 48], [240, 190, 48], [70, 120, 180], [196, 70, 50]]);
     let bed = paint([112, 118, 124], Finish::Metal);
     s.paint(body);
@@ -139,7 +139,7 @@ fn truck(s: &mut Sculptor) {
     }
 }
 
-fn hydrant(s: &mut Sculptor) {
+fn hydrant(s: &mut MeshBuilder) {
     let red = s.main_or(&[[202, 40, 34], [202, 40, 34], [220, 170, 40], [202, 40, 34]]);
     let cap = s.pick(
         1,
@@ -205,7 +205,7 @@ fn hydrant(s: &mut Sculptor) {
     );
 }
 
-fn bike(s: &mut Sculptor) {
+fn bike(s: &mut MeshBuilder) {
     let color = s.main_or(&[[58, 148, 150], [58, 148, 150], [176, 60, 70], [70, 90, 150]]);
     let leather = paint([112, 70, 44], Finish::Fabric);
     let x = 0.0;
@@ -305,7 +305,7 @@ fn bike(s: &mut Sculptor) {
     }
 }
 
-fn tent(s: &mut Sculptor) {
+fn tent(s: &mut MeshBuilder) {
     let canvas = s.main_or(&[[200, 54, 48], [56, 110, 168], [64, 140, 90], [226, 150, 50]]);
     let white = paint([240, 236, 224], Finish::Fabric);
     for k in 0..7 {
@@ -345,7 +345,7 @@ fn tent(s: &mut Sculptor) {
     }
 }
 
-fn house_front(s: &mut Sculptor) {
+fn house_front(s: &mut MeshBuilder) {
     let trim = paint([240, 238, 230], Finish::Matte);
     let door = s.pick(1, &[[60, 92, 82], [130, 52, 44], [50, 66, 110], [96, 66, 44]]);
     let roof = paint(s.pick(2, &[[126, 62, 50], [84, 84, 92], [110, 80, 60]]), Finish::Matte);
@@ -426,7 +426,7 @@ fn house_front(s: &mut Sculptor) {
     }
 }
 
-fn tree(s: &mut Sculptor) {
+fn tree(s: &mut MeshBuilder) {
     let bark = paint([104, 78, 54], Finish::Wood);
     s.paint(bark);
     s.curve(&[
@@ -469,7 +469,7 @@ fn tree(s: &mut Sculptor) {
     }
 }
 
-fn street_lamp(s: &mut Sculptor) {
+fn street_lamp(s: &mut MeshBuilder) {
     s.paint(s.pick(0, &[IRON, IRON, paint([60, 90, 76], Finish::Metal), DARK_STEEL]));
     s.lathe(
         [0.0, 0.0, 0.57],
@@ -494,7 +494,7 @@ fn street_lamp(s: &mut Sculptor) {
     s.pillow([0.0, 4.455, -0.44], [0.24, 0.12, 0.5], [0.0; 3], 0.8);
 }
 
-fn bench(s: &mut Sculptor) {
+fn bench(s: &mut MeshBuilder) {
     let wood = s.main_or(&[[158, 108, 64], [158, 108, 64], [90, 120, 84], [120, 76, 48]]);
     if s.within(20.0) {
         s.all();
@@ -529,7 +529,7 @@ fn bench(s: &mut Sculptor) {
     }
 }
 
-fn mailbox(s: &mut Sculptor) {
+fn mailbox(s: &mut MeshBuilder) {
     let blue = s.main_or(&[[36, 74, 146], [36, 74, 146], [196, 40, 36], [30, 100, 70]]);
     s.paint(blue);
     s.block([0.0, 0.16, 0.0], [0.5, 0.8, 0.48], 0.015);
@@ -562,7 +562,7 @@ fn mailbox(s: &mut Sculptor) {
     }
 }
 
-fn fence(s: &mut Sculptor) {
+fn fence(s: &mut MeshBuilder) {
     let color = s.main_or(&[[240, 240, 234], [240, 240, 234], [150, 110, 74], [120, 140, 130]]);
     s.paint(color);
     for y in [0.24, 0.68] {

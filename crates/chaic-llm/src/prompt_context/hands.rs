@@ -4,7 +4,7 @@ use chaic_agents::TrackId;
 use chaic_agents::memory::Done;
 use chaic_protocol::{Action, ClassId, Outcome, Role};
 
-/// For each of the deeds, the oldest first, what was put down or into a container, where that is
+/// For each of the interactions, the oldest first, what was put down or into a container, where that is
 /// known.
 pub(super) fn put_away(
     history: &[Done],

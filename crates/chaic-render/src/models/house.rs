@@ -8,7 +8,7 @@ use super::colors::{
     BLACK, BRASS, DARK_STEEL, GAP, GLOSSY_BLACK, LAMP, LINEN, OAK, PALE_OAK, PAPER, STEEL, WALNUT,
     WHITE,
 };
-use crate::sculpt::{Paint, Sculptor, paint};
+use crate::mesh_builder::{MeshBuilder, Paint, paint};
 
 pub(super) fn model(name: &str) -> Option<Model> {
     Some(match name {
@@ -28,7 +28,7 @@ pub(super) fn model(name: &str) -> Option<Model> {
     })
 }
 
-fn bed(s: &mut Sculptor) {
+fn bed(s: &mut MeshBuilder) {
     let wood = s.pick(1, &[OAK, WALNUT, paint([226, 222, 214], Finish::Wood)]);
     let cover = s.main();
     s.paint(LINEN);
@@ -62,7 +62,7 @@ fn bed(s: &mut Sculptor) {
 }
 
 /// A handle in front of a door or drawer at (x, y, z): a knob, a bar or a bow, by style.
-fn handle(s: &mut Sculptor, at: [f32; 3], upright: bool, metal: Paint) {
+fn handle(s: &mut MeshBuilder, at: [f32; 3], upright: bool, metal: Paint) {
     let [x, y, z] = at;
     s.paint(metal);
     let along = |t: f32| if upright { [x, y + t, z] } else { [x + t, y, z] };
@@ -83,7 +83,7 @@ fn handle(s: &mut Sculptor, at: [f32; 3], upright: bool, metal: Paint) {
 }
 
 /// A door or drawer front about (x, z) from height `y`, with a raised or sunken panel.
-fn front(s: &mut Sculptor, at: [f32; 3], wide: f32, high: f32, color: Paint) {
+fn front(s: &mut MeshBuilder, at: [f32; 3], wide: f32, high: f32, color: Paint) {
     let [x, y, z] = at;
     s.paint(color);
     s.block([x, y, z], [wide, high, 0.02], 0.005);
@@ -101,7 +101,7 @@ fn front(s: &mut Sculptor, at: [f32; 3], wide: f32, high: f32, color: Paint) {
     }
 }
 
-fn nightstand(s: &mut Sculptor) {
+fn nightstand(s: &mut MeshBuilder) {
     let [wood, door] = s.pick(0, &[[OAK, PALE_OAK], [WALNUT, OAK], [WHITE, WHITE], [OAK, WHITE]]);
     s.paint(wood);
     s.block([0.0, 0.12, 0.01], [0.43, 0.355, 0.37], 0.006);
@@ -128,7 +128,7 @@ fn nightstand(s: &mut Sculptor) {
     }
 }
 
-fn wardrobe(s: &mut Sculptor) {
+fn wardrobe(s: &mut MeshBuilder) {
     const WOODS: [[[u8; 3]; 2]; 4] = [
         [[112, 74, 50], [138, 94, 64]],
         [[192, 150, 98], [214, 180, 132]],
@@ -154,7 +154,7 @@ fn wardrobe(s: &mut Sculptor) {
     }
 }
 
-fn cabinet(s: &mut Sculptor) {
+fn cabinet(s: &mut MeshBuilder) {
     const WOODS: [[[u8; 3]; 2]; 4] = [
         [[192, 150, 98], [214, 180, 132]],
         [[192, 150, 98], [214, 180, 132]],
@@ -175,7 +175,7 @@ fn cabinet(s: &mut Sculptor) {
     }
 }
 
-fn desk(s: &mut Sculptor) {
+fn desk(s: &mut MeshBuilder) {
     let body = s.pick(1, &[paint([236, 234, 228], Finish::Glossy), s.main(), DARK_STEEL]);
     let legs = s.pick(1, &[body, s.main(), BLACK]);
     s.paint(s.main());
@@ -196,7 +196,7 @@ fn desk(s: &mut Sculptor) {
     s.block([-0.6, 0.08, 0.0], [0.03, 0.03, 0.54], 0.004);
 }
 
-fn tv_stand(s: &mut Sculptor) {
+fn tv_stand(s: &mut MeshBuilder) {
     let door = s.pick(1, &[PALE_OAK, s.main(), WHITE]);
     s.paint(s.main());
     s.block([0.0, 0.46, 0.0], [1.4, 0.04, 0.4], 0.008);
@@ -243,7 +243,7 @@ const SPINES: [[u8; 3]; 12] = [
     [112, 120, 70],
 ];
 
-fn bookshelf(s: &mut Sculptor) {
+fn bookshelf(s: &mut MeshBuilder) {
     const WOODS: [[[u8; 3]; 2]; 4] = [
         [[192, 150, 98], [112, 74, 50]],
         [[112, 74, 50], [80, 52, 36]],
@@ -305,7 +305,7 @@ fn bookshelf(s: &mut Sculptor) {
     }
 }
 
-fn potted_plant(s: &mut Sculptor) {
+fn potted_plant(s: &mut MeshBuilder) {
     s.paint(s.main());
     let pot = [
         [0.118, 0.0],
@@ -385,7 +385,7 @@ fn potted_plant(s: &mut Sculptor) {
     }
 }
 
-fn floor_lamp(s: &mut Sculptor) {
+fn floor_lamp(s: &mut MeshBuilder) {
     let metal = s.pick(1, &[DARK_STEEL, BRASS, STEEL, BLACK]);
     s.paint(s.main());
     // An open shade with a bulb in it.
@@ -419,7 +419,7 @@ fn floor_lamp(s: &mut Sculptor) {
     s.ball([0.03, 1.205, 0.0], [0.012, 0.02, 0.012]);
 }
 
-fn rug(s: &mut Sculptor) {
+fn rug(s: &mut MeshBuilder) {
     s.part(0);
     match s.pick(1, &[0, 1, 2]) {
         0 => s.without(&[0]),
@@ -455,7 +455,7 @@ fn rug(s: &mut Sculptor) {
     }
 }
 
-fn trashbin(s: &mut Sculptor) {
+fn trashbin(s: &mut MeshBuilder) {
     let bin = s.main_or(&[[142, 148, 152], [142, 148, 152], [120, 126, 132], [96, 104, 110]]);
     s.paint(bin);
     let wall = [
@@ -496,7 +496,7 @@ fn trashbin(s: &mut Sculptor) {
     s.block_turned([0.0, 0.43, 0.02], [0.06, 0.11, 0.06], [14.0, 30.0, 24.0], 0.006);
 }
 
-fn extinguisher(s: &mut Sculptor) {
+fn extinguisher(s: &mut MeshBuilder) {
     let red = s.main_or(&[[214, 28, 30], [214, 28, 30], [196, 22, 26], [224, 44, 36]]);
     s.paint(red);
     let body = [

@@ -5,7 +5,7 @@ use chaic_protocol::catalogue::Finish;
 
 use super::Model;
 use super::colors::{BLACK, DARK_STEEL, IRON, STEEL, WALNUT};
-use crate::sculpt::{Paint, Sculptor, paint};
+use crate::mesh_builder::{MeshBuilder, Paint, paint};
 
 pub(super) fn model(name: &str) -> Option<Model> {
     Some(match name {
@@ -24,7 +24,7 @@ pub(super) fn model(name: &str) -> Option<Model> {
 }
 
 /// A box of the catalogue: its lowest and highest corner, metres.
-fn part_box(s: &Sculptor, k: usize) -> [Vec3; 2] {
+fn part_box(s: &MeshBuilder, k: usize) -> [Vec3; 2] {
     let part = &s.class.parts[k];
     let size = Vec3::from(s.class.size_m);
     let (center, half) = (Vec3::from(part.center) * size, 0.5 * Vec3::from(part.extent) * size);
@@ -32,7 +32,7 @@ fn part_box(s: &Sculptor, k: usize) -> [Vec3; 2] {
 }
 
 /// A cushion that fills part `k` of the class between two fractions of its width.
-fn seat_cushion(s: &mut Sculptor, k: usize, from: f32, to: f32) {
+fn seat_cushion(s: &mut MeshBuilder, k: usize, from: f32, to: f32) {
     let [low, high] = part_box(s, k);
     let size = high - low;
     let gap = 0.004;
@@ -42,7 +42,7 @@ fn seat_cushion(s: &mut Sculptor, k: usize, from: f32, to: f32) {
 }
 
 /// A sofa whose parts are seat, base, back, left arm and right arm, in that order.
-pub(super) fn sofa_on(s: &mut Sculptor, seat: Paint, frame: Paint, n: usize) {
+pub(super) fn sofa_on(s: &mut MeshBuilder, seat: Paint, frame: Paint, n: usize) {
     if s.within(20.0) {
         let parts = s.class.parts;
         for (k, part) in parts.iter().enumerate() {
@@ -92,13 +92,13 @@ pub(super) fn sofa_on(s: &mut Sculptor, seat: Paint, frame: Paint, n: usize) {
     }
 }
 
-fn armchair(s: &mut Sculptor) {
+fn armchair(s: &mut MeshBuilder) {
     let frame = paint(s.pick(1, &[[70, 72, 78], [70, 72, 78], [150, 138, 124]]), Finish::Fabric);
     sofa_on(s, s.main(), frame, 1);
     feet(s, 0.36, 0.32, 0.085);
 }
 
-fn long_sofa(s: &mut Sculptor) {
+fn long_sofa(s: &mut MeshBuilder) {
     let frame = s.pick(1, &[None, Some([122, 126, 132]), Some([96, 84, 76])]);
     let frame = frame.map_or(s.main(), |c| paint(c, Finish::Fabric));
     sofa_on(s, s.main(), frame, 3);
@@ -106,7 +106,7 @@ fn long_sofa(s: &mut Sculptor) {
 }
 
 /// Four turned feet.
-fn feet(s: &mut Sculptor, x: f32, z: f32, high: f32) {
+fn feet(s: &mut MeshBuilder, x: f32, z: f32, high: f32) {
     s.paint(WALNUT);
     for sx in [-x, x] {
         for sz in [-z, z] {
@@ -115,7 +115,7 @@ fn feet(s: &mut Sculptor, x: f32, z: f32, high: f32) {
     }
 }
 
-fn corner_sofa(s: &mut Sculptor) {
+fn corner_sofa(s: &mut MeshBuilder) {
     if s.within(20.0) {
         s.all();
         return;
@@ -159,7 +159,7 @@ fn corner_sofa(s: &mut Sculptor) {
     }
 }
 
-fn bench_sofa(s: &mut Sculptor) {
+fn bench_sofa(s: &mut MeshBuilder) {
     s.paint(s.main());
     if s.within(20.0) {
         s.all();
@@ -176,7 +176,7 @@ fn bench_sofa(s: &mut Sculptor) {
     }
 }
 
-fn side_chair(s: &mut Sculptor) {
+fn side_chair(s: &mut MeshBuilder) {
     const COVERS: [[u8; 3]; 4] = [[232, 188, 62], [232, 188, 62], [222, 170, 48], [240, 204, 96]];
     let cover = paint(s.pick(0, &COVERS), Finish::Fabric);
     let wood = s.pick(1, &[WALNUT, paint([192, 150, 98], Finish::Wood), BLACK]);
@@ -203,7 +203,7 @@ fn side_chair(s: &mut Sculptor) {
     s.block([0.0, 0.355, 0.2], [0.36, 0.035, 0.02], 0.004);
 }
 
-fn dining_table(s: &mut Sculptor) {
+fn dining_table(s: &mut MeshBuilder) {
     let legs = s.pick(1, &[s.main(), WALNUT, s.main(), DARK_STEEL]);
     s.paint(s.main());
     s.block([0.0, 0.71, 0.0], [1.5, 0.04, 0.9], 0.012);
@@ -236,7 +236,7 @@ fn dining_table(s: &mut Sculptor) {
     }
 }
 
-fn coffee_table(s: &mut Sculptor) {
+fn coffee_table(s: &mut MeshBuilder) {
     s.paint(s.main());
     s.block([0.0, 0.385, 0.0], [1.1, 0.035, 0.6], 0.01);
     let shelf = s.pick(1, &[true, false, true]);
@@ -268,7 +268,7 @@ fn coffee_table(s: &mut Sculptor) {
     }
 }
 
-fn stool(s: &mut Sculptor) {
+fn stool(s: &mut MeshBuilder) {
     let wood = s.pick(1, &[paint([214, 180, 132], Finish::Wood), WALNUT, IRON]);
     s.paint(s.main());
     s.lathe([0.0, 0.44, 0.0], &[[0.17, 0.0], [0.187, 0.008], [0.19, 0.03], [0.182, 0.04]]);
@@ -286,7 +286,7 @@ fn stool(s: &mut Sculptor) {
     }
 }
 
-fn round_table(s: &mut Sculptor) {
+fn round_table(s: &mut MeshBuilder) {
     let metal = s.pick(1, &[DARK_STEEL, STEEL, WALNUT]);
     s.paint(s.main());
     s.lathe([0.0, 0.41, 0.0], &[[0.28, 0.0], [0.3, 0.012], [0.3, 0.034], [0.294, 0.04]]);
@@ -305,7 +305,7 @@ fn round_table(s: &mut Sculptor) {
     );
 }
 
-fn stacked_tables(s: &mut Sculptor) {
+fn stacked_tables(s: &mut MeshBuilder) {
     let tops = s.main_or(&[[238, 238, 234], [214, 180, 132], [112, 74, 50], [60, 62, 66]]);
     s.paint(tops);
     s.block([-0.4, 0.4315, 0.027], [0.5, 0.04, 0.94], 0.008);

@@ -19,7 +19,7 @@ const BORDER: usize = 2;
 const NONE: u8 = u8::MAX - 1;
 
 /// A house's plan in cells.
-pub(super) struct Plan {
+pub(super) struct FloorGrid {
     /// Where the first cell begins.
     pub min: Vec2,
     pub cell_m: f32,
@@ -29,9 +29,9 @@ pub(super) struct Plan {
     cells: Vec<u8>,
 }
 
-impl Plan {
+impl FloorGrid {
     /// The plan of a house; `None` if it has no walls, or no size.
-    pub fn new(setup: &Setup, ceiling_m: f32) -> Option<Plan> {
+    pub fn new(setup: &Setup, ceiling_m: f32) -> Option<FloorGrid> {
         let is_high = |w: &&Wall| w.bottom_m <= SLACK_M && w.top_m >= ceiling_m - SLACK_M;
         let walls: Vec<Line> = setup.walls.iter().filter(is_high).map(Line::of).collect();
         let ends = setup.walls.iter().flat_map(|w| [w.a, w.b]);
@@ -44,7 +44,7 @@ impl Plan {
         let count = |m: f32| (m / cell_m) as usize + 2 * BORDER + 1;
         let (n_x, n_z) = (count(size.x), count(size.y));
         let min = house.min - BORDER as f32 * cell_m;
-        let mut plan = Plan { min, cell_m, n_x, n_z, cells: vec![NONE; n_x * n_z] };
+        let mut plan = FloorGrid { min, cell_m, n_x, n_z, cells: vec![NONE; n_x * n_z] };
         for wall in &walls {
             plan.fill_wall(wall);
         }

@@ -10,12 +10,12 @@ use chaic_protocol::TaskId;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{EvalError, Result};
-use crate::run::{Given, helper_names, tasks_of_files};
+use crate::run::{RunRequest, helper_names, tasks_of_files};
 
 /// What is played, as `fidelity.json` records it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Plan {
+pub struct Experiment {
     /// The tasks.
     pub tasks: Vec<TaskId>,
     /// The helpers of both rule sets; `none` is among them.
@@ -36,7 +36,7 @@ pub struct Plan {
 
 /// What the caller says. What isn't said is as recorded, or as usual.
 #[derive(Clone, Debug, Default)]
-pub struct Wanted {
+pub struct ExperimentRequest {
     /// `--episodes`.
     pub episodes: Option<PathBuf>,
     /// `--task`.
@@ -79,22 +79,22 @@ pub struct Part {
     pub seeds: u32,
 }
 
-impl Wanted {
-    pub(super) fn begin(&self, episodes: &Path) -> Result<Plan> {
+impl ExperimentRequest {
+    pub(super) fn begin(&self, episodes: &Path) -> Result<Experiment> {
         // What a run says of its options holds here too.
-        let run = Given {
+        let run = RunRequest {
             tasks: self.tasks.clone(),
             helpers: Some(self.helpers.clone().unwrap_or_else(|| owned(&HELPERS))),
             first: self.first,
             seeds: Some(self.seeds.unwrap_or(SEEDS)),
             size: self.size,
             episodes: Some(episodes.to_owned()),
-            ..Given::default()
+            ..RunRequest::default()
         };
         let run = run.begin()?;
         let usual: Vec<String> = owned(&SWITCH_HELPERS);
         let usual = usual.into_iter().filter(|h| run.helpers.contains(h)).collect();
-        let plan = Plan {
+        let plan = Experiment {
             tasks: run.tasks,
             helpers: run.helpers,
             first: run.first,
@@ -107,7 +107,7 @@ impl Wanted {
         plan.checked()
     }
 
-    pub(super) fn resume(&self, recorded: &Plan, path: &Path) -> Result<Plan> {
+    pub(super) fn resume(&self, recorded: &Experiment, path: &Path) -> Result<Experiment> {
         let list = |tasks: &[TaskId]| tasks.iter().map(|t| t.name()).collect::<Vec<_>>().join(",");
         let number = |n: Option<u32>| n.map_or("not given".to_owned(), |n| n.to_string());
         let said = [
@@ -143,8 +143,8 @@ fn owned(names: &[&str]) -> Vec<String> {
     names.iter().map(|n| (*n).to_owned()).collect()
 }
 
-impl Plan {
-    fn checked(mut self) -> Result<Plan> {
+impl Experiment {
+    fn checked(mut self) -> Result<Experiment> {
         let wrong = |text: String| Err(EvalError::Options(text));
         if !self.helpers.iter().any(|h| h == NONE) {
             return wrong("--helper needs `none`: the others are compared with it".to_owned());

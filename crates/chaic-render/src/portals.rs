@@ -1,5 +1,5 @@
-//! What can be seen of a house's rooms from one of them: whatever lies only where no line of sight
-//! gets to isn't looked at any further.
+//! Cells-and-portals visibility: what can be seen of a house's rooms from one of them. Whatever lies
+//! only where no line of sight gets to is culled.
 //!
 //! The plan is a grid of cells. Those that walls as high as the ceiling fill are opaque; all others
 //! belong to a region: a room, or what lies between rooms (a doorway, say), or outdoors. Where cells
@@ -7,7 +7,7 @@
 //! portals, so that what is seen of the next region is seen through the portal's outline on the
 //! image.
 //!
-//! Regions only ever leave out what walls hide: pictures are the same with and without. Where
+//! PortalGraph only ever leave out what walls hide: pictures are the same with and without. Where
 //! things are odd (no ceiling, an eye in a wall or above it, a plan of tatters) everything may be
 //! seen.
 
@@ -18,9 +18,9 @@ use glam::Mat3;
 
 use crate::lens::Lens;
 
-mod plan;
+mod floor_grid;
 
-use plan::Plan;
+use floor_grid::FloorGrid;
 
 /// A cell of the plan that walls fill.
 const WALL: u8 = u8::MAX;
@@ -88,19 +88,19 @@ fn is_empty(o: Outline) -> bool {
 
 /// What a view sees of regions; used again and again.
 #[derive(Debug)]
-pub(crate) struct Seen {
+pub(crate) struct VisibleRegions {
     set: RegionSet,
     outlines: [Outline; MAX_REGIONS],
     todo: Vec<(u8, Outline)>,
 }
 
-impl Default for Seen {
-    fn default() -> Seen {
-        Seen { set: RegionSet::ALL, outlines: [[0.0; 4]; MAX_REGIONS], todo: Vec::new() }
+impl Default for VisibleRegions {
+    fn default() -> VisibleRegions {
+        VisibleRegions { set: RegionSet::ALL, outlines: [[0.0; 4]; MAX_REGIONS], todo: Vec::new() }
     }
 }
 
-impl Seen {
+impl VisibleRegions {
     /// Whether something in these regions may be seen, which lies within `outline` on the image;
     /// wherever it likes if that is unknown.
     pub fn shows(&self, regions: RegionSet, outline: Option<Outline>) -> bool {
@@ -134,7 +134,7 @@ struct Portal {
 
 /// The regions of a house's plan, which its walls part.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Regions {
+pub struct PortalGraph {
     /// Where the first cell begins.
     min: Vec2,
     cell_m: f32,
@@ -148,16 +148,16 @@ pub struct Regions {
     top_m: f32,
 }
 
-impl Regions {
+impl PortalGraph {
     /// Those of an episode's plan.
-    pub(crate) fn new(setup: &Setup) -> Regions {
-        let Some(ceiling_m) = setup.ceiling_m else { return Regions::default() };
-        let Some(plan) = Plan::new(setup, ceiling_m) else { return Regions::default() };
+    pub(crate) fn new(setup: &Setup) -> PortalGraph {
+        let Some(ceiling_m) = setup.ceiling_m else { return PortalGraph::default() };
+        let Some(plan) = FloorGrid::new(setup, ceiling_m) else { return PortalGraph::default() };
         let portals = plan.portals();
         if portals.len() > MAX_PORTALS {
-            return Regions::default();
+            return PortalGraph::default();
         }
-        Regions {
+        PortalGraph {
             min: plan.min,
             cell_m: plan.cell_m,
             n: [plan.n_x, plan.n_z],
@@ -211,17 +211,17 @@ impl Regions {
 
     /// What a lens may see.
     pub fn seen_by(&self, lens: &Lens) -> RegionSet {
-        let mut seen = Seen::default();
-        self.find_seen(lens, &mut seen);
+        let mut seen = VisibleRegions::default();
+        self.find_visible(lens, &mut seen);
         seen.set
     }
 
     /// Finds out what a lens sees, and through which outlines.
-    pub(crate) fn find_seen(&self, lens: &Lens, seen: &mut Seen) {
+    pub(crate) fn find_visible(&self, lens: &Lens, seen: &mut VisibleRegions) {
         seen.set = RegionSet::ALL;
         let Some(start) = self.region_of_eye(lens) else { return };
         let whole = [0.0, 0.0, lens.width as f32, lens.height as f32];
-        let Seen { outlines, todo, .. } = seen;
+        let VisibleRegions { outlines, todo, .. } = seen;
         outlines.fill(NOWHERE);
         todo.clear();
         let mut set = RegionSet::default();
@@ -342,21 +342,21 @@ mod tests {
         setup
     }
 
-    fn seen(regions: &Regions, eye: [f32; 3], yaw_rad: f32) -> Seen {
+    fn seen(regions: &PortalGraph, eye: [f32; 3], yaw_rad: f32) -> VisibleRegions {
         let lens = Lens::of(&camera(eye, yaw_rad, 0.0, 128, 128)).expect("a camera");
-        let mut seen = Seen::default();
-        regions.find_seen(&lens, &mut seen);
+        let mut seen = VisibleRegions::default();
+        regions.find_visible(&lens, &mut seen);
         seen
     }
 
-    fn at(regions: &Regions, x: f32, z: f32) -> RegionSet {
+    fn at(regions: &PortalGraph, x: f32, z: f32) -> RegionSet {
         let p = Vec3::new(x, 1.0, z);
         regions.of_box(p - 0.1, p + 0.1)
     }
 
     #[test]
     fn the_next_room_is_seen_through_its_doorway_only() {
-        let regions = Regions::new(&two_rooms());
+        let regions = PortalGraph::new(&two_rooms());
         let (near, far, outside) =
             (at(&regions, 2.0, 2.0), at(&regions, 6.0, 2.0), at(&regions, 9.0, 2.0));
         let sets = [near, far, outside];
@@ -381,14 +381,14 @@ mod tests {
 
     #[test]
     fn odd_eyes_and_odd_plans_see_everything() {
-        let regions = Regions::new(&two_rooms());
+        let regions = PortalGraph::new(&two_rooms());
         for eye in [[4.0, 1.5, 0.7], [2.0, 3.5, 2.0], [-3.0, 1.5, 2.0], [3.9, 1.5, 0.7]] {
             assert_eq!(seen(&regions, eye, PI).set, RegionSet::ALL, "{eye:?}");
         }
         let high = regions.of_box(Vec3::ZERO, Vec3::new(1.0, 3.0, 1.0));
         assert_eq!(high, RegionSet::ALL, "what stands out above the walls");
         let roofless = Setup { ceiling_m: None, ..two_rooms() };
-        assert_eq!(Regions::new(&roofless), Regions::default());
+        assert_eq!(PortalGraph::new(&roofless), PortalGraph::default());
     }
 
     /// Eyes anywhere in a plan, in walls and out of doors too.
@@ -417,8 +417,8 @@ mod tests {
             let mut hidden = 0;
             for view in &views {
                 let lens = Lens::of(&view.camera).expect("a camera");
-                let mut seen = Seen::default();
-                scene.regions().find_seen(&lens, &mut seen);
+                let mut seen = VisibleRegions::default();
+                scene.regions().find_visible(&lens, &mut seen);
                 hidden += usize::from(seen.set != RegionSet::ALL);
             }
             assert!(hidden > 15, "regions of {hidden} views only");

@@ -10,7 +10,7 @@ use chaic_env::{Env, EnvError, EpisodeConfig};
 use chaic_episodes::Episode;
 use chaic_files::write_whole;
 use chaic_protocol::{AgentId, ClassId, EntityId, Frame};
-use chaic_render::{Appearance, Channels, Scene, View, image_out, plan};
+use chaic_render::{Appearance, Channels, Scene, View, floor_plan, image_out};
 use chaic_world::{Rules, World};
 use image::{DynamicImage, ImageError, ImageFormat};
 
@@ -21,7 +21,7 @@ const PLAN_MIN_PX: u32 = 960;
 
 /// Which moment of which episode, and whose eyes.
 #[derive(Clone, Copy, Debug)]
-pub struct Still<'a> {
+pub struct FrameExport<'a> {
     /// The episode.
     pub episode: &'a Episode,
     /// Name of the helper that takes part.
@@ -48,8 +48,8 @@ pub struct Still<'a> {
 ///
 /// # Errors
 /// If there is no such agent or helper, or the file system refuses.
-pub fn write(still: &Still<'_>, helpers: &dyn Helpers, out: &Path) -> Result<Frame> {
-    let Still { episode, helper, seed, rules, agent, frame, size, appearance } = *still;
+pub fn write(still: &FrameExport<'_>, helpers: &dyn Helpers, out: &Path) -> Result<Frame> {
+    let FrameExport { episode, helper, seed, rules, agent, frame, size, appearance } = *still;
     let (partner, image_size) = (None, None);
     let config = EpisodeConfig { episode, seed, rules, helper, partner, image_size, appearance };
     let mut env = Env::new(config, minds::find(helpers, helper, rules.planner)?)?;
@@ -84,7 +84,8 @@ pub fn write(still: &Still<'_>, helpers: &dyn Helpers, out: &Path) -> Result<Fra
     save(picture.ok_or_else(no_picture)?.into(), &out.join("classes.png"))?;
     let normals = image_out::normals_view(&labels.normals, size, size);
     save(normals.ok_or_else(no_picture)?.into(), &out.join("normals.png"))?;
-    let from_above = plan::draw_scene_plan(env.observer().scene(), world, size.max(PLAN_MIN_PX));
+    let from_above =
+        floor_plan::draw_scene_plan(env.observer().scene(), world, size.max(PLAN_MIN_PX));
     save(from_above.into(), &out.join("plan.png"))?;
     Ok(world.state().frame)
 }
@@ -111,7 +112,7 @@ pub fn write_plan(episode: &Episode, width_px: u32, path: &Path) -> Result<()> {
     let refused = |problem| EnvError::Setup { id: episode.id().to_owned(), problem };
     let world = World::new(episode.setup().clone(), Rules::paper()).map_err(refused)?;
     let scene = Scene::new(episode.setup());
-    save(plan::draw_scene_plan(&scene, &world, width_px).into(), path)
+    save(floor_plan::draw_scene_plan(&scene, &world, width_px).into(), path)
 }
 
 fn save_names(names: &BTreeMap<u16, &str>, path: &Path) -> Result<()> {

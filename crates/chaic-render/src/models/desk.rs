@@ -5,7 +5,7 @@ use chaic_protocol::geom::math::{cos, sin};
 
 use super::Model;
 use super::colors::{BLACK, BRASS, DARK_STEEL, GAP, GLOSSY_BLACK, PAPER, STEEL, WALNUT, WHITE};
-use crate::sculpt::{Sculptor, paint};
+use crate::mesh_builder::{MeshBuilder, paint};
 
 pub(super) fn model(name: &str) -> Option<Model> {
     Some(match name {
@@ -21,7 +21,7 @@ pub(super) fn model(name: &str) -> Option<Model> {
     })
 }
 
-fn baking_sheet(s: &mut Sculptor) {
+fn baking_sheet(s: &mut MeshBuilder) {
     s.all();
     s.paint(DARK_STEEL);
     s.block([0.0, 0.004, 0.0], [0.57, 0.0035, 0.325], 0.0);
@@ -34,7 +34,7 @@ fn baking_sheet(s: &mut Sculptor) {
     }
 }
 
-fn notepad(s: &mut Sculptor) {
+fn notepad(s: &mut MeshBuilder) {
     s.paint(PAPER);
     s.block([0.0, 0.0, 0.0], [0.114, 0.046, 0.114], 0.002);
     if !s.within(20.0) {
@@ -56,7 +56,7 @@ fn notepad(s: &mut Sculptor) {
     }
 }
 
-fn laptop(s: &mut Sculptor) {
+fn laptop(s: &mut MeshBuilder) {
     let case = s.main_or(&[STEEL.color, STEEL.color, [70, 72, 78], [214, 190, 170]]);
     s.paint(case);
     s.block([0.0, 0.0, -0.02], [0.313, 0.016, 0.215], 0.004);
@@ -82,7 +82,7 @@ fn laptop(s: &mut Sculptor) {
     s.rod([-0.12, 0.014, 0.1], [0.12, 0.014, 0.1], 0.005);
 }
 
-fn headphones(s: &mut Sculptor) {
+fn headphones(s: &mut MeshBuilder) {
     let shell =
         s.main_or(&[GLOSSY_BLACK.color, GLOSSY_BLACK.color, [226, 226, 222], [170, 40, 44]]);
     s.paint(shell);
@@ -107,7 +107,7 @@ fn headphones(s: &mut Sculptor) {
     s.pipe(&arch[2..7].iter().map(|p| [0.93 * p[0], p[1] - 0.008, 0.0]).collect::<Vec<_>>(), 0.012);
 }
 
-fn globe(s: &mut Sculptor) {
+fn globe(s: &mut MeshBuilder) {
     s.paint(s.main_or(&[[120, 156, 190], [120, 156, 190], [90, 140, 180], [204, 186, 150]]));
     s.ball([0.0, 0.05, 0.0], [0.142; 3]);
     // Land, roughly where it lies.
@@ -140,7 +140,7 @@ fn globe(s: &mut Sculptor) {
     );
 }
 
-fn sculpture(s: &mut Sculptor) {
+fn sculpture(s: &mut MeshBuilder) {
     s.paint(BLACK);
     s.block([0.0, 0.0, 0.0], [0.024, 0.006, 0.024], 0.001);
     s.paint(paint(s.pick(1, &[[128, 92, 62], [196, 196, 190], [90, 110, 96]]), Finish::Metal));
@@ -149,7 +149,7 @@ fn sculpture(s: &mut Sculptor) {
     s.hoop([0.0, 0.018, 0.0], [0.4, 1.0, 0.2], 0.0125, 0.0022);
 }
 
-fn toy_horse(s: &mut Sculptor) {
+fn toy_horse(s: &mut MeshBuilder) {
     let rocker = s.pick(
         1,
         &[WALNUT, paint([176, 60, 54], Finish::Wood), paint([70, 110, 150], Finish::Wood)],
@@ -198,7 +198,7 @@ fn toy_horse(s: &mut Sculptor) {
     }
 }
 
-fn puzzle_box(s: &mut Sculptor) {
+fn puzzle_box(s: &mut MeshBuilder) {
     s.all();
     let colors = [[200, 60, 50], [60, 110, 170], [230, 190, 70], [80, 150, 90]];
     for k in 0..8 {

@@ -29,7 +29,7 @@ fn choose(profile: RuleProfile, case: &Case, log: &BehaviorLog) -> Plan {
     memory.hands = hands(case.hands.clone());
     let context =
         Context { briefing: &briefing, memory: &memory, behavior: log, is_explored: false };
-    let mut rules = Rules::new(profile);
+    let mut rules = RulePolicy::new(profile);
     rules.has_looked_around = true;
     rules.decide(&context, &case.valid)
 }

@@ -10,7 +10,7 @@ use chaic_protocol::catalogue::{ClassInfo, Part};
 use chaic_world::{Setup, Thing};
 
 use crate::mesh::{Mesh, unit};
-use crate::sculpt::{Sculptor, scramble};
+use crate::mesh_builder::{MeshBuilder, scramble};
 use crate::texture::linear_from_shown;
 
 mod colors;
@@ -29,7 +29,7 @@ mod street;
 pub(crate) const N_STYLES: u8 = 4;
 
 /// How a class is built at the finer levels.
-type Model = fn(&mut Sculptor);
+type Model = fn(&mut MeshBuilder);
 
 fn model(class: &ClassInfo) -> Option<Model> {
     [food::model, goods::model, containers::model, moving::model, street::model, house::model]
@@ -40,7 +40,7 @@ fn model(class: &ClassInfo) -> Option<Model> {
 
 /// The mesh of a thing in a style at a level of detail, in its own frame, metres.
 pub(crate) fn thing_mesh(thing: &Thing, style: u8, level: usize) -> Mesh {
-    let mut s = Sculptor::new(thing.class.info(), style, level);
+    let mut s = MeshBuilder::new(thing.class.info(), style, level);
     match model(s.class) {
         // The smallest pictures need no more than the catalogue's solids.
         Some(model) if level > 0 => model(&mut s),
@@ -177,7 +177,7 @@ mod tests {
                 }
                 let (mut edges, mut volume) = (std::collections::BTreeMap::new(), 0.0);
                 for t in &mesh.triangles {
-                    let [a, b, c] = t.corners.map(|c| mesh.positions[usize::from(c)]);
+                    let [a, b, c] = t.vertices.map(|c| mesh.positions[usize::from(c)]);
                     volume += f64::from(a.dot(b.cross(c)) / 6.0);
                     let key = |v: Vec3| v.to_array().map(f32::to_bits);
                     for (p, q) in [(a, b), (b, c), (c, a)] {

@@ -1,17 +1,18 @@
-//! Facts to try templates on.
+//! PromptContext to try templates on.
 
 use chaic_protocol::capability::Persona;
 
 use super::gather::{body, metres, persona, reach};
 use super::{
-    Count, Deed, Facts, GoalPlace, Map, Other, Own, PlanFacts, ProgressFacts, ThingFacts, ToldFacts,
+    Count, GoalPlace, Interaction, Map, Other, Own, PlanFacts, ProgressFacts, PromptContext,
+    ThingFacts, ToldFacts,
 };
 use crate::templates::Track;
 
-impl Facts {
+impl PromptContext {
     /// One of each kind, with everything and with nothing in it, to try templates on.
-    pub(crate) fn samples() -> Vec<Facts> {
-        let full = |track| Facts {
+    pub(crate) fn samples() -> Vec<PromptContext> {
+        let full = |track| PromptContext {
             track,
             goal_place: "bed".to_owned(),
             targets: vec!["apple".to_owned(), "bread".to_owned()],
@@ -37,7 +38,7 @@ impl Facts {
                 z: metres(-2.0),
                 hands: vec!["apple #31".to_owned()],
                 free_hands: 1,
-                history: vec![Deed {
+                history: vec![Interaction {
                     frame: 10,
                     what: "pick up apple #31".to_owned(),
                     outcome: Some("done".to_owned()),
@@ -56,7 +57,7 @@ impl Facts {
                 away_m: Some(metres(6.0)),
                 took: vec!["apple #32".to_owned()],
                 holds: vec!["apple #32".to_owned()],
-                actions: vec![Deed {
+                actions: vec![Interaction {
                     frame: 20,
                     what: "pick up bread #40".to_owned(),
                     outcome: None,
@@ -97,7 +98,7 @@ impl Facts {
         };
         let empty = |track| {
             let all = full(track);
-            Facts {
+            PromptContext {
                 containers: Vec::new(),
                 obstacles: Vec::new(),
                 moving: true,
@@ -120,7 +121,7 @@ impl Facts {
                 ..all
             }
         };
-        let alone = |track| Facts { others: Vec::new(), ..empty(track) };
+        let alone = |track| PromptContext { others: Vec::new(), ..empty(track) };
         let tracks = [Track::Hidden, Track::Told, Track::Partner];
         tracks.into_iter().flat_map(|t| [full(t), empty(t), alone(t)]).collect()
     }

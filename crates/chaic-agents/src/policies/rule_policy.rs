@@ -4,7 +4,7 @@ use chaic_protocol::briefing::{Goal, Relation};
 use chaic_protocol::geom::horizontal_distance;
 use chaic_protocol::{Action, AgentError, Briefing, ClassId, FailureReason, Frame, Outcome, Role};
 
-use crate::decision::{Context, Load, Plan, Policy, Subject};
+use crate::decision::{Context, HandState, Plan, Policy, Subject};
 use crate::memory::{Memory, Person};
 use crate::rules::Bookkeeping;
 use crate::track::TrackId;
@@ -71,7 +71,7 @@ impl RuleProfile {
         deliver_below_unknown: 0.5,
         ..RuleProfile::PARTNER
     };
-    /// The rule-based helper (paper, "Detailed Rules for RHP").
+    /// The rule-based helper (paper, "Detailed RulePolicy for RHP").
     pub const RHP: RuleProfile = RuleProfile {
         wanted: Wanted::AnyPossible,
         removes_obstacles: true,
@@ -90,7 +90,7 @@ impl RuleProfile {
 
 /// Chooses by the paper's rules.
 #[derive(Clone, Debug)]
-pub struct Rules {
+pub struct RulePolicy {
     profile: RuleProfile,
     has_looked_around: bool,
     last_around: Frame,
@@ -98,7 +98,7 @@ pub struct Rules {
     beside_child: Option<Frame>,
 }
 
-impl Rules {
+impl RulePolicy {
     /// The plan that the rules choose.
     pub fn decide(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
         self.last_choice = context.memory.frame;
@@ -106,19 +106,19 @@ impl Rules {
         if !std::mem::replace(&mut self.has_looked_around, true) && rules.looks_around_first {
             return Plan::TurnAround;
         }
-        let load = Load::of(&context.memory.hands, context.briefing);
-        let need = Need::of(context, &load, &self.profile);
+        let hands = HandState::of(&context.memory.hands, context.briefing);
+        let need = Need::of(context, &hands, &self.profile);
         let is_valid = |plan: Plan| valid.contains(&plan).then_some(plan);
         // Delivering needs a goal place: without one, look for it.
         let deliver = is_valid(Plan::Deliver).unwrap_or(Plan::Explore);
-        let carries = load.to_deliver.is_some();
+        let carries = hands.to_deliver.is_some();
         if let Some(plan) = self.mind_child(context) {
             return plan;
         }
         if let Some(plan) = is_valid(Plan::PutIn) {
             return plan;
         }
-        if carries && (!load.can_take_target || must_go(context, &self.profile)) {
+        if carries && (!hands.can_take_target || must_go(context, &self.profile)) {
             return deliver;
         }
         if self.profile.removes_obstacles
@@ -145,9 +145,9 @@ impl Rules {
         Plan::Explore
     }
 
-    /// Rules of this profile.
-    pub fn new(profile: RuleProfile) -> Rules {
-        Rules {
+    /// RulePolicy of this profile.
+    pub fn new(profile: RuleProfile) -> RulePolicy {
+        RulePolicy {
             profile,
             has_looked_around: false,
             last_around: 0,
@@ -229,23 +229,23 @@ impl Rules {
         let call_frames = context.memory.rules.lifting.call_frames;
         let failed = Outcome::Failure(FailureReason::BeyondLimits);
         let partner = context.briefing.companion(Relation::Partner);
-        let in_vain = partner
+        let failed_on = partner
             .and_then(|p| context.behavior.last_pick_of(p))
             .filter(|(seen, _)| seen.frame + call_frames > now && seen.outcome == Some(failed))
             .map(|(_, object)| object);
         let strength_kg = context.briefing.capability.strength_kg;
         valid.iter().copied().find(|plan| match plan {
             Plan::LiftWith(it) => {
-                it.class.info().mass_kg > strength_kg || in_vain == Some(it.track)
+                it.class.info().mass_kg > strength_kg || failed_on == Some(it.track)
             }
             _ => false,
         })
     }
 }
 
-impl Policy for Rules {
+impl Policy for RulePolicy {
     fn reset(&mut self, _: &Briefing) {
-        *self = Rules::new(self.profile);
+        *self = RulePolicy::new(self.profile);
     }
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
@@ -269,12 +269,12 @@ impl Policy for Rules {
             || context.memory.frame >= self.last_choice + rules.time.reconsider_frames
     }
 
-    fn fork(&self) -> Option<Rules> {
+    fn fork(&self) -> Option<RulePolicy> {
         Some(self.clone())
     }
 }
 
-impl Rules {
+impl RulePolicy {
     /// Whether the child's rules, which are all that interrupts a plan of the original, do so now
     /// (facts A2.4).
     fn is_interrupted(&mut self, context: &Context<'_>, current: &Plan) -> bool {
@@ -302,7 +302,7 @@ struct Need<'a> {
 }
 
 impl<'a> Need<'a> {
-    fn of(context: &Context<'a>, load: &Load, profile: &RuleProfile) -> Need<'a> {
+    fn of(context: &Context<'a>, hands: &HandState, profile: &RuleProfile) -> Need<'a> {
         let goal = match profile.wanted {
             Wanted::ByGoal => context.briefing.goal.as_ref(),
             Wanted::AnyPossible => None,
@@ -314,7 +314,7 @@ impl<'a> Need<'a> {
         }
         let mut done: Vec<ClassId> =
             memory.delivered.iter().filter_map(|e| memory.class_of(*e)).collect();
-        done.extend(load.targets.iter().map(|(_, class)| *class));
+        done.extend(hands.targets.iter().map(|(_, class)| *class));
         let behavior = context.behavior;
         let holds_frames = memory.rules.time.partner_holds_frames;
         if behavior.partner_holds_frame.is_some_and(|f| f + holds_frames > memory.frame) {

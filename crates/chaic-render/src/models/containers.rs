@@ -3,7 +3,7 @@
 use chaic_protocol::catalogue::Finish;
 
 use super::Model;
-use crate::sculpt::{Paint, Sculptor, paint};
+use crate::mesh_builder::{MeshBuilder, Paint, paint};
 
 pub(super) fn model(name: &str) -> Option<Model> {
     Some(match name {
@@ -18,7 +18,7 @@ pub(super) fn model(name: &str) -> Option<Model> {
     })
 }
 
-fn bowl(s: &mut Sculptor) {
+fn bowl(s: &mut MeshBuilder) {
     s.paint(s.main());
     let outline = [
         [0.095, 0.0],
@@ -50,7 +50,7 @@ fn bowl(s: &mut Sculptor) {
     }
 }
 
-fn plate(s: &mut Sculptor) {
+fn plate(s: &mut MeshBuilder) {
     let china = s.main_or(&[[238, 238, 232], [238, 238, 232], [224, 232, 236], [240, 230, 212]]);
     let ring = s.pick(1, &[[76, 112, 168], [170, 62, 58], [92, 132, 96], [200, 164, 74]]);
     s.paint(china);
@@ -84,7 +84,7 @@ fn plate(s: &mut Sculptor) {
     }
 }
 
-fn tea_tray(s: &mut Sculptor) {
+fn tea_tray(s: &mut MeshBuilder) {
     const WOODS: [[[u8; 3]; 2]; 4] = [
         [[128, 82, 48], [98, 60, 36]],
         [[166, 120, 74], [120, 80, 46]],
@@ -134,14 +134,14 @@ fn on_side(turn_deg: f32, x: f32, y: f32, out: f32) -> [f32; 3] {
 }
 
 /// A band around a square basket that is `half` wide outside at height `y`.
-fn band(s: &mut Sculptor, y: f32, half: f32, high: f32, thick: f32) {
+fn band(s: &mut MeshBuilder, y: f32, half: f32, high: f32, thick: f32) {
     for turn in SIDES {
         let middle = on_side(turn, 0.0, y + 0.5 * high, half - 0.5 * thick);
         s.block_turned(middle, [2.0 * half, high, thick], [0.0, turn, 0.0], 0.3 * thick);
     }
 }
 
-fn plastic_basket(s: &mut Sculptor) {
+fn plastic_basket(s: &mut MeshBuilder) {
     if s.within(20.0) {
         s.all();
         return;
@@ -167,7 +167,7 @@ fn plastic_basket(s: &mut Sculptor) {
 const WILLOW: Paint = paint([166, 118, 70], Finish::Wicker);
 const DARK_WILLOW: Paint = paint([124, 82, 46], Finish::Wicker);
 
-fn wicker_basket(s: &mut Sculptor) {
+fn wicker_basket(s: &mut MeshBuilder) {
     s.paint(paint(
         s.pick(0, &[WILLOW.color, [188, 146, 96], WILLOW.color, [140, 98, 60]]),
         Finish::Wicker,
@@ -207,7 +207,7 @@ fn wicker_basket(s: &mut Sculptor) {
     }
 }
 
-fn wood_basket(s: &mut Sculptor) {
+fn wood_basket(s: &mut MeshBuilder) {
     let slat = paint(
         s.pick(0, &[[204, 160, 104], [188, 138, 84], [204, 160, 104], [220, 184, 134]]),
         Finish::Wood,
@@ -245,7 +245,7 @@ fn wood_basket(s: &mut Sculptor) {
     }
 }
 
-fn bamboo_basket(s: &mut Sculptor) {
+fn bamboo_basket(s: &mut MeshBuilder) {
     let body = paint(
         s.pick(0, &[[216, 190, 122], [200, 168, 104], [216, 190, 122], [180, 150, 96]]),
         Finish::Wicker,

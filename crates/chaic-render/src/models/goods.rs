@@ -4,7 +4,7 @@ use chaic_protocol::catalogue::Finish;
 
 use super::Model;
 use super::colors::{BLACK, BRASS, DARK_STEEL, GLOSSY_BLACK, STEEL, WHITE};
-use crate::sculpt::{Paint, Sculptor, paint};
+use crate::mesh_builder::{MeshBuilder, Paint, paint};
 
 pub(super) fn model(name: &str) -> Option<Model> {
     Some(match name {
@@ -41,7 +41,7 @@ fn round_rectangle<const N: usize>(wide: f32, high: f32, round: f32) -> [[f32; 2
 
 const SCREENS: [[u8; 3]; 4] = [[44, 96, 158], [120, 72, 140], [46, 120, 104], [180, 110, 70]];
 
-fn iphone(s: &mut Sculptor) {
+fn iphone(s: &mut MeshBuilder) {
     const FLAT: [f32; 3] = [-90.0, 0.0, 0.0];
     s.paint(s.pick(0, &[STEEL, STEEL, paint([226, 200, 150], Finish::Metal), DARK_STEEL]));
     s.cut([0.0, 0.006, 0.0], &round_rectangle::<16>(0.095, 0.185, 0.014), 0.012, FLAT);
@@ -72,7 +72,7 @@ fn iphone(s: &mut Sculptor) {
     s.block([-0.0478, 0.005, -0.05], [0.0015, 0.004, 0.02], 0.0);
 }
 
-fn ipod(s: &mut Sculptor) {
+fn ipod(s: &mut MeshBuilder) {
     const COLORS: [[u8; 3]; 4] = [[238, 204, 44], [238, 204, 44], [232, 190, 30], [244, 214, 70]];
     s.paint(paint(s.pick(0, &COLORS), Finish::Glossy));
     s.cut([0.0, 0.099, 0.0005], &round_rectangle::<16>(0.094, 0.198, 0.012), 0.009, [0.0; 3]);
@@ -96,7 +96,7 @@ fn ipod(s: &mut Sculptor) {
     s.lathe_along([0.0, 0.054, -0.004], toward, &[[0.013, 0.0], [0.013, 0.0008], [0.0, 0.001]]);
 }
 
-fn purse(s: &mut Sculptor) {
+fn purse(s: &mut MeshBuilder) {
     const LEATHERS: [[u8; 3]; 4] = [[176, 54, 84], [60, 70, 120], [150, 96, 58], [176, 54, 84]];
     let leather = paint(s.pick(0, &LEATHERS), Finish::Fabric);
     let dark = paint(leather.color.map(|c| (0.62 * f32::from(c)) as u8), Finish::Fabric);
@@ -136,7 +136,7 @@ fn purse(s: &mut Sculptor) {
     s.ball([0.0, 0.034, -0.0203], [0.01, 0.01, 0.003]);
 }
 
-fn key(s: &mut Sculptor) {
+fn key(s: &mut MeshBuilder) {
     let metal = s.pick(0, &[BRASS, BRASS, paint([214, 178, 96], Finish::Metal), BRASS]);
     s.all();
     s.paint(metal);
@@ -147,7 +147,7 @@ fn key(s: &mut Sculptor) {
     s.hoop([-0.004, 0.003, -0.012], [0.0, 0.0, 1.0], 0.0052, 0.0016);
 }
 
-fn mouse(s: &mut Sculptor) {
+fn mouse(s: &mut MeshBuilder) {
     s.paint(BLACK);
     s.pillow([0.0, 0.009, 0.0], [0.07, 0.018, 0.126], [0.0; 3], 0.55);
     s.paint(s.main());
@@ -164,7 +164,7 @@ fn mouse(s: &mut Sculptor) {
     s.ball([0.0, 0.0382, 0.026], [0.014, 0.003, 0.018]);
 }
 
-fn pen(s: &mut Sculptor) {
+fn pen(s: &mut MeshBuilder) {
     let axis = [1.0, 0.0, 0.0];
     s.paint(s.main());
     s.lathe_along(
@@ -190,7 +190,7 @@ fn pen(s: &mut Sculptor) {
     s.ball([0.047, 0.0262, 0.0], [0.008, 0.005, 0.006]);
 }
 
-fn pencil_bucket(s: &mut Sculptor) {
+fn pencil_bucket(s: &mut MeshBuilder) {
     s.paint(s.main());
     let wall = [
         [0.0405, 0.0],
@@ -235,7 +235,7 @@ fn pencil_bucket(s: &mut Sculptor) {
     s.block_turned([0.0, 0.087, 0.0], [0.024, 0.162, 0.003], [0.0, 25.0, 6.0], 0.0);
 }
 
-fn calculator(s: &mut Sculptor) {
+fn calculator(s: &mut MeshBuilder) {
     const BODIES: [[u8; 3]; 4] = [[62, 64, 70], [200, 202, 206], [62, 64, 70], [70, 84, 110]];
     s.paint(paint(s.pick(0, &BODIES), Finish::Matte));
     s.block([0.0, 0.0, 0.0], [0.1, 0.022, 0.132], 0.006);
@@ -272,7 +272,7 @@ fn calculator(s: &mut Sculptor) {
     }
 }
 
-fn lighter(s: &mut Sculptor) {
+fn lighter(s: &mut MeshBuilder) {
     s.paint(s.main());
     s.pillow([0.0, 0.057, 0.0], [0.02, 0.114, 0.045], [0.0; 3], 0.3);
     s.paint(STEEL);
@@ -291,7 +291,7 @@ fn lighter(s: &mut Sculptor) {
     }
 }
 
-fn vase(s: &mut Sculptor) {
+fn vase(s: &mut MeshBuilder) {
     let glaze = paint(s.pick(1, &[[56, 92, 160], [150, 60, 50], [50, 110, 90]]), Finish::Glossy);
     s.paint(s.main());
     let outline = [

@@ -5,7 +5,7 @@ use chaic_protocol::geom::math::{cos, sin};
 
 use super::Model;
 use super::colors::{BLACK, BRASS, GAP, LAMP, LEAF, STEEL, WALNUT, WHITE};
-use crate::sculpt::{Sculptor, paint};
+use crate::mesh_builder::{MeshBuilder, paint};
 
 pub(super) fn model(name: &str) -> Option<Model> {
     Some(match name {
@@ -22,7 +22,7 @@ pub(super) fn model(name: &str) -> Option<Model> {
     })
 }
 
-fn table_lamp(s: &mut Sculptor) {
+fn table_lamp(s: &mut MeshBuilder) {
     let shade = s.main_or(&[[244, 230, 200], [200, 120, 90], [150, 176, 170], [238, 236, 230]]);
     s.paint(shade);
     s.lathe(
@@ -58,7 +58,7 @@ fn table_lamp(s: &mut Sculptor) {
     s.rod([0.0, 0.5, 0.0], [0.0, 0.595, 0.0], 0.004);
 }
 
-fn painting(s: &mut Sculptor) {
+fn painting(s: &mut MeshBuilder) {
     let frame = s.pick(1, &[WALNUT, BRASS, WHITE, BLACK]);
     s.paint(s.main());
     s.block([0.0, 0.06, 0.0], [0.7, 1.04, 0.034], 0.0);
@@ -136,7 +136,7 @@ fn painting(s: &mut Sculptor) {
     }
 }
 
-fn cushion(s: &mut Sculptor) {
+fn cushion(s: &mut MeshBuilder) {
     // Seams that run in a little between the corners; filling, fullest in the middle, with a button
     // on either face.
     const CORNER: [f32; 2] = [0.184, 0.144];
@@ -169,7 +169,7 @@ fn cushion(s: &mut Sculptor) {
     }
 }
 
-fn suitcase(s: &mut Sculptor) {
+fn suitcase(s: &mut MeshBuilder) {
     s.paint(s.main());
     s.block([0.0, 0.0, 0.0], [0.46, 0.34, 0.1], 0.02);
     s.paint(BLACK);
@@ -194,7 +194,7 @@ fn suitcase(s: &mut Sculptor) {
     s.block([0.0, 0.28, -0.051], [0.06, 0.04, 0.006], 0.002);
 }
 
-fn trunk(s: &mut Sculptor) {
+fn trunk(s: &mut MeshBuilder) {
     const WOODS: [[[u8; 3]; 2]; 4] = [
         [[150, 116, 88], [128, 96, 72]],
         [[96, 68, 52], [80, 56, 42]],
@@ -226,7 +226,7 @@ fn trunk(s: &mut Sculptor) {
     s.block([0.0, 0.655, -0.3385], [0.016, 0.03, 0.003], 0.0);
 }
 
-fn woven_box(s: &mut Sculptor) {
+fn woven_box(s: &mut MeshBuilder) {
     let willow = s.main_or(&[[206, 178, 142], [206, 178, 142], [168, 130, 92], [222, 206, 180]]);
     let darker = |by: f32| willow.color.map(|c| (by * f32::from(c)) as u8);
     s.paint(if s.within(20.0) { willow } else { paint(darker(0.6), Finish::Wicker) });
@@ -264,7 +264,7 @@ fn woven_box(s: &mut Sculptor) {
     }
 }
 
-fn dog_house(s: &mut Sculptor) {
+fn dog_house(s: &mut MeshBuilder) {
     let boards = s.main_or(&[[132, 130, 132], [168, 120, 80], [132, 130, 132], [150, 80, 70]]);
     s.paint(boards);
     s.shape(&s.class.parts[0]);
@@ -302,7 +302,7 @@ fn dog_house(s: &mut Sculptor) {
     }
 }
 
-fn planter(s: &mut Sculptor) {
+fn planter(s: &mut MeshBuilder) {
     s.paint(s.main_or(&[[226, 224, 220], [182, 100, 66], [90, 110, 120], [60, 62, 66]]));
     s.lathe(
         [0.0; 3],
@@ -334,7 +334,7 @@ fn planter(s: &mut Sculptor) {
     }
 }
 
-fn flower_vase(s: &mut Sculptor) {
+fn flower_vase(s: &mut MeshBuilder) {
     s.paint(s.main_or(&[[201, 181, 172], [120, 150, 170], [160, 90, 80], [214, 206, 180]]));
     s.lathe(
         [0.0; 3],

@@ -10,7 +10,7 @@ pub(crate) const CEILING_TONE: f32 = 1.05;
 
 /// The light of a scene. Colors are linear.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Lamps {
+pub(crate) struct LightRig {
     /// Unit vector to the sun.
     pub to_sun: Vec3,
     pub sun: Vec3,
@@ -24,9 +24,9 @@ pub(crate) struct Lamps {
     pub sky: [Vec3; 3],
 }
 
-impl Lamps {
+impl LightRig {
     /// The canonical look: a bright day.
-    pub const DAY: Lamps = Lamps {
+    pub const DAY: LightRig = LightRig {
         to_sun: Vec3::new(0.42, 0.80, 0.43),
         sun: Vec3::new(0.92, 0.86, 0.74),
         lamp: Vec3::new(0.66, 0.62, 0.55),
@@ -40,7 +40,7 @@ impl Lamps {
     };
 
     /// Dusk: the sun low and red, the sky dim, lamps on.
-    pub const EVENING: Lamps = Lamps {
+    pub const EVENING: LightRig = LightRig {
         to_sun: Vec3::new(0.81, 0.35, 0.47),
         sun: Vec3::new(0.78, 0.50, 0.30),
         lamp: Vec3::new(0.74, 0.58, 0.40),

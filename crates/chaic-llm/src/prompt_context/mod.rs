@@ -18,24 +18,24 @@ const MAX_NAME: usize = 40;
 /// How much of everything is listed. Each further one lists less.
 #[derive(Clone, Copy, Debug)]
 pub struct Length {
-    deeds: usize,
+    interactions: usize,
     things: usize,
     plans_of_a_kind: usize,
 }
 
 /// From the longest to the shortest (docs/language-helpers.md).
 pub const LENGTHS: [Length; 6] = [
-    Length { deeds: 20, things: 60, plans_of_a_kind: 60 },
-    Length { deeds: 10, things: 40, plans_of_a_kind: 40 },
-    Length { deeds: 6, things: 25, plans_of_a_kind: 25 },
-    Length { deeds: 4, things: 12, plans_of_a_kind: 15 },
-    Length { deeds: 2, things: 6, plans_of_a_kind: 8 },
-    Length { deeds: 1, things: 0, plans_of_a_kind: 4 },
+    Length { interactions: 20, things: 60, plans_of_a_kind: 60 },
+    Length { interactions: 10, things: 40, plans_of_a_kind: 40 },
+    Length { interactions: 6, things: 25, plans_of_a_kind: 25 },
+    Length { interactions: 4, things: 12, plans_of_a_kind: 15 },
+    Length { interactions: 2, things: 6, plans_of_a_kind: 8 },
+    Length { interactions: 1, things: 0, plans_of_a_kind: 4 },
 ];
 
 /// All that templates may name. Lengths in metres and coordinates are texts with one decimal.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Facts {
+pub struct PromptContext {
     /// Whose prompt it is.
     pub track: Track,
     /// What the goal place is called.
@@ -129,7 +129,7 @@ pub struct Own {
     /// Hands with nothing in them.
     pub free_hands: usize,
     /// Own actions other than walking, oldest first.
-    pub history: Vec<Deed>,
+    pub history: Vec<Interaction>,
     /// Earlier ones that are left out.
     pub history_left_out: usize,
     /// The last plan.
@@ -138,7 +138,7 @@ pub struct Own {
 
 /// Something that was done.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Deed {
+pub struct Interaction {
     /// When.
     pub frame: Frame,
     /// What.
@@ -171,7 +171,7 @@ pub struct Other {
     /// What it held when that was known last.
     pub holds: Vec<String>,
     /// What else it was seen to do, oldest first.
-    pub actions: Vec<Deed>,
+    pub actions: Vec<Interaction>,
     /// Earlier ones that are left out.
     pub actions_left_out: usize,
 }

@@ -4,7 +4,7 @@ use chaic_protocol::catalogue::Finish;
 
 use super::Model;
 use super::colors::{BLACK, DARK_STEEL, GAP, GLASS, GLOSSY_BLACK, STEEL, WALNUT, WHITE};
-use crate::sculpt::{Sculptor, paint};
+use crate::mesh_builder::{MeshBuilder, paint};
 
 pub(super) fn model(name: &str) -> Option<Model> {
     Some(match name {
@@ -25,7 +25,7 @@ pub(super) fn model(name: &str) -> Option<Model> {
 
 const LACQUER: [u8; 3] = [236, 234, 228];
 
-fn refrigerator(s: &mut Sculptor) {
+fn refrigerator(s: &mut MeshBuilder) {
     let steel = paint([200, 204, 208], Finish::Metal);
     let [body, door] = s.pick(
         0,
@@ -71,7 +71,7 @@ fn refrigerator(s: &mut Sculptor) {
     }
 }
 
-fn counter(s: &mut Sculptor) {
+fn counter(s: &mut MeshBuilder) {
     let doors = s.pick(
         1,
         &[
@@ -112,7 +112,7 @@ fn counter(s: &mut Sculptor) {
     }
 }
 
-fn stove(s: &mut Sculptor) {
+fn stove(s: &mut MeshBuilder) {
     let body = s.pick(
         0,
         &[
@@ -175,7 +175,7 @@ fn stove(s: &mut Sculptor) {
     }
 }
 
-fn coffee_maker(s: &mut Sculptor) {
+fn coffee_maker(s: &mut MeshBuilder) {
     let case = s.main_or(&[WHITE.color, [40, 42, 46], [170, 40, 40], WHITE.color]);
     s.paint(case);
     s.block([0.0, 0.0, 0.0], [0.327, 0.05, 0.165], 0.012);
@@ -198,7 +198,7 @@ fn coffee_maker(s: &mut Sculptor) {
     s.ball([0.11, 0.28, -0.081], [0.016, 0.016, 0.004]);
 }
 
-fn toaster(s: &mut Sculptor) {
+fn toaster(s: &mut MeshBuilder) {
     s.paint(s.main_or(&[STEEL.color, STEEL.color, [150, 40, 40], [206, 222, 214]]));
     s.pillow([0.0, 0.092, 0.0], [0.35, 0.178, 0.17], [0.0; 3], 0.24);
     s.paint(BLACK);
@@ -215,7 +215,7 @@ fn toaster(s: &mut Sculptor) {
     }
 }
 
-fn jug(s: &mut Sculptor) {
+fn jug(s: &mut MeshBuilder) {
     let clay = s.main_or(&[[64, 44, 26], [150, 96, 56], [70, 90, 110], [206, 196, 176]]);
     let clay = paint(clay.color, Finish::Glossy);
     s.paint(clay);
@@ -251,7 +251,7 @@ fn jug(s: &mut Sculptor) {
     s.hoop([0.025, 0.225, 0.0], [0.0, 1.0, 0.0], 0.0365, 0.004);
 }
 
-fn pan(s: &mut Sculptor) {
+fn pan(s: &mut MeshBuilder) {
     let metal = s.main_or(&[DARK_STEEL.color, STEEL.color, [150, 50, 46], [60, 62, 66]]);
     s.paint(metal);
     s.lathe([0.0, 0.0, 0.08], &[[0.14, 0.0], [0.15, 0.006], [0.155, 0.058], [0.153, 0.06]]);
@@ -273,7 +273,7 @@ fn pan(s: &mut Sculptor) {
     ]);
 }
 
-fn wineglass(s: &mut Sculptor) {
+fn wineglass(s: &mut MeshBuilder) {
     s.paint(paint([206, 216, 222], Finish::Glossy));
     s.lathe(
         [0.0; 3],
@@ -302,7 +302,7 @@ fn wineglass(s: &mut Sculptor) {
     }
 }
 
-fn pepper_mill(s: &mut Sculptor) {
+fn pepper_mill(s: &mut MeshBuilder) {
     let wood = s.pick(0, &[WALNUT, paint([192, 150, 98], Finish::Wood), BLACK, WALNUT]);
     s.paint(wood);
     s.lathe(
@@ -326,7 +326,7 @@ fn pepper_mill(s: &mut Sculptor) {
     s.ball([0.0, 0.112, 0.0], [0.01, 0.008, 0.01]);
 }
 
-fn cutlery(s: &mut Sculptor) {
+fn cutlery(s: &mut MeshBuilder) {
     s.paint(STEEL);
     let handle = [
         ([0.0, 0.005, 0.084], 0.0035),
@@ -346,7 +346,7 @@ fn cutlery(s: &mut Sculptor) {
     }
 }
 
-fn kitchen_tool(s: &mut Sculptor) {
+fn kitchen_tool(s: &mut MeshBuilder) {
     s.paint(s.pick(1, &[BLACK, WALNUT]));
     s.curve(&[([0.0, 0.03, 0.22], 0.009), ([0.0, 0.031, 0.1], 0.008), ([0.0, 0.03, 0.0], 0.006)]);
     s.paint(DARK_STEEL);

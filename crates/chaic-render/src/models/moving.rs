@@ -5,7 +5,7 @@ use chaic_protocol::catalogue::Finish;
 use super::Model;
 use super::colors::{BLACK, BRASS, DARK_STEEL, GAP, GLASS, GLOSSY_BLACK, STEEL, WALNUT, WHITE};
 use super::furniture::sofa_on;
-use crate::sculpt::{Paint, Sculptor, paint};
+use crate::mesh_builder::{MeshBuilder, Paint, paint};
 
 pub(super) fn model(name: &str) -> Option<Model> {
     Some(match name {
@@ -25,7 +25,7 @@ pub(super) fn model(name: &str) -> Option<Model> {
     })
 }
 
-fn backpack(s: &mut Sculptor) {
+fn backpack(s: &mut MeshBuilder) {
     let strap = paint([38, 40, 46], Finish::Fabric);
     let pocket = paint(s.pick(1, &[[72, 78, 88], [58, 62, 70], [110, 96, 70]]), Finish::Fabric);
     s.paint(s.main());
@@ -81,7 +81,7 @@ fn backpack(s: &mut Sculptor) {
     }
 }
 
-fn kettle(s: &mut Sculptor) {
+fn kettle(s: &mut MeshBuilder) {
     s.paint(s.main());
     let outline = [
         [0.15, 0.004],
@@ -125,7 +125,7 @@ fn kettle(s: &mut Sculptor) {
     );
 }
 
-fn navy_chair(s: &mut Sculptor) {
+fn navy_chair(s: &mut MeshBuilder) {
     let metal = s.main_or(&[[198, 200, 203], [198, 200, 203], [176, 180, 186], [150, 154, 160]]);
     s.paint(metal);
     s.pillow([0.0, 0.453, -0.02], [0.41, 0.028, 0.44], [0.0; 3], 0.3);
@@ -151,7 +151,7 @@ fn navy_chair(s: &mut Sculptor) {
     s.pillow([0.0, 0.82, 0.226], [0.42, 0.075, 0.026], [3.0, 0.0, 0.0], 0.35);
 }
 
-fn wood_shelving(s: &mut Sculptor) {
+fn wood_shelving(s: &mut MeshBuilder) {
     const WOODS: [[[u8; 3]; 2]; 4] = [
         [[206, 168, 112], [184, 144, 90]],
         [[206, 168, 112], [184, 144, 90]],
@@ -177,7 +177,7 @@ fn wood_shelving(s: &mut Sculptor) {
     }
 }
 
-fn printer(s: &mut Sculptor) {
+fn printer(s: &mut MeshBuilder) {
     let body = s.main_or(&[[188, 190, 194], [214, 214, 210], [188, 190, 194], [70, 72, 78]]);
     let dark = paint([66, 70, 76], Finish::Matte);
     s.paint(body);
@@ -204,7 +204,7 @@ fn printer(s: &mut Sculptor) {
     s.block([0.0, 0.038, -0.141], [0.08, 0.01, 0.006], 0.002);
 }
 
-fn table(s: &mut Sculptor) {
+fn table(s: &mut MeshBuilder) {
     let wood = s.main_or(&[[124, 80, 56], [124, 80, 56], [166, 118, 76], [92, 60, 44]]);
     s.paint(wood);
     s.block([0.0, 0.475, 0.0], [0.76, 0.035, 0.76], 0.01);
@@ -235,7 +235,7 @@ fn table(s: &mut Sculptor) {
     }
 }
 
-fn television(s: &mut Sculptor) {
+fn television(s: &mut MeshBuilder) {
     let case = s.main_or(&[[54, 54, 58], [54, 54, 58], [96, 70, 52], [120, 122, 126]]);
     s.paint(case);
     s.block([0.0, 0.02, -0.13], [0.83, 0.53, 0.25], 0.02);
@@ -269,7 +269,7 @@ fn television(s: &mut Sculptor) {
     }
 }
 
-fn microwave(s: &mut Sculptor) {
+fn microwave(s: &mut MeshBuilder) {
     let case = s.main_or(&[STEEL.color, STEEL.color, [226, 226, 222], [64, 66, 70]]);
     s.paint(case);
     s.block([0.0, 0.015, 0.02], [0.76, 0.425, 0.4], 0.014);
@@ -310,7 +310,7 @@ fn microwave(s: &mut Sculptor) {
     }
 }
 
-fn dishwasher(s: &mut Sculptor) {
+fn dishwasher(s: &mut MeshBuilder) {
     let front = s.pick(0, &[STEEL, paint([232, 232, 228], Finish::Glossy), STEEL, DARK_STEEL]);
     s.only(&[0, 1]);
     s.paint(front);
@@ -332,7 +332,7 @@ fn dishwasher(s: &mut Sculptor) {
     s.block([-0.03, 0.64, -0.272], [0.03, 0.012, 0.004], 0.0);
 }
 
-fn drawer(s: &mut Sculptor) {
+fn drawer(s: &mut MeshBuilder) {
     const WOODS: [[[u8; 3]; 2]; 4] = [
         [[200, 146, 88], [216, 166, 106]],
         [[200, 146, 88], [216, 166, 106]],
@@ -370,7 +370,7 @@ fn drawer(s: &mut Sculptor) {
     }
 }
 
-fn piano(s: &mut Sculptor) {
+fn piano(s: &mut MeshBuilder) {
     let lacquer =
         s.main_or(&[GLOSSY_BLACK.color, GLOSSY_BLACK.color, [70, 34, 24], GLOSSY_BLACK.color]);
     let ivory = paint([244, 240, 226], Finish::Glossy);
@@ -430,7 +430,7 @@ fn piano(s: &mut Sculptor) {
     }
 }
 
-fn sofa(s: &mut Sculptor) {
+fn sofa(s: &mut MeshBuilder) {
     const FABRICS: [[[u8; 3]; 2]; 4] = [
         [[172, 160, 150], [142, 130, 120]],
         [[172, 160, 150], [142, 130, 120]],

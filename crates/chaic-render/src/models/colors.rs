@@ -2,7 +2,7 @@
 
 use chaic_protocol::catalogue::Finish;
 
-use crate::sculpt::{Paint, paint};
+use crate::mesh_builder::{Paint, paint};
 
 pub(super) const WHITE: Paint = paint([238, 238, 234], Finish::Matte);
 pub(super) const BLACK: Paint = paint([28, 28, 31], Finish::Matte);

@@ -32,7 +32,7 @@ pub(crate) const fn paint(color: [u8; 3], finish: Finish) -> Paint {
 pub(crate) type P = [f32; 3];
 
 /// Builds the mesh of one class at one level of detail.
-pub(crate) struct Sculptor {
+pub(crate) struct MeshBuilder {
     pub class: &'static ClassInfo,
     /// Which of the class's styles.
     pub style: u8,
@@ -44,11 +44,11 @@ pub(crate) struct Sculptor {
     last: Option<(Paint, Mat3)>,
 }
 
-impl Sculptor {
-    pub fn new(class: &'static ClassInfo, style: u8, level: usize) -> Sculptor {
+impl MeshBuilder {
+    pub fn new(class: &'static ClassInfo, style: u8, level: usize) -> MeshBuilder {
         let detail = Detail::of_level(level, 0.5 * length(Vec3::from(class.size_m)));
         let now = paint([200; 3], Finish::Matte);
-        Sculptor { class, style, level, detail, mesh: Mesh::default(), now, last: None }
+        MeshBuilder { class, style, level, detail, mesh: Mesh::default(), now, last: None }
     }
 
     /// What was built.
@@ -181,7 +181,7 @@ impl Sculptor {
                 self.rounded(&place, round);
             }
             Solid::Frustum { top } if top > 0.05 => {
-                let n = detail.corners(0.5 * place.extent.x.max(place.extent.z));
+                let n = detail.segments(0.5 * place.extent.x.max(place.extent.z));
                 let [r0, r1] = if top > 1.0 { [0.5 / top, 0.5] } else { [0.5, 0.5 * top] };
                 let bevel = 0.12 * place.extent.min_element();
                 let (by, bx) = (bevel / place.extent.y, bevel / place.extent.x.max(place.extent.z));
@@ -236,7 +236,7 @@ impl Sculptor {
         let place = turned(middle, size, turn_deg);
         if self.shows_extent(place.extent) {
             self.skin(&place);
-            let n = self.detail.corners(0.5 * place.extent.max_element());
+            let n = self.detail.segments(0.5 * place.extent.max_element());
             solids::ellipsoid(&mut self.mesh, &place, n);
         }
     }
@@ -246,7 +246,7 @@ impl Sculptor {
         let place = turned(middle, size, turn_deg);
         if self.shows_extent(place.extent) {
             self.skin(&place);
-            let n = self.detail.corners(0.5 * place.extent.max_element()).max(8) / 4 * 4;
+            let n = self.detail.segments(0.5 * place.extent.max_element()).max(8) / 4 * 4;
             forms::pillow(&mut self.mesh, &place, soft.clamp(0.15, 1.0), n);
         }
     }
@@ -256,7 +256,7 @@ impl Sculptor {
         let place = turned(middle, size, [0.0; 3]);
         if self.shows_extent(place.extent) {
             self.skin(&place);
-            let n = self.detail.corners(0.7 * place.extent.max_element()).min(18);
+            let n = self.detail.segments(0.7 * place.extent.max_element()).min(18);
             forms::lump(&mut self.mesh, &place, rough, seed, n);
         }
     }
@@ -278,7 +278,7 @@ impl Sculptor {
         let place =
             Place { center: Vec3::from(start), axes: upright_along(axis), extent: Vec3::ONE };
         self.plain_skin();
-        let n = self.detail.corners(wide);
+        let n = self.detail.segments(wide);
         let points: Vec<[f32; 3]> = outline.iter().map(|[r, y]| [*r, *y, 0.0]).collect();
         let kept = essential(&points, self.slack_m());
         let kept: Vec<[f32; 2]> = kept.into_iter().map(|k| outline[k]).collect();
@@ -305,7 +305,7 @@ impl Sculptor {
     pub fn curve(&mut self, points: &[(P, f32)]) {
         let way: f32 =
             points.windows(2).map(|w| length(Vec3::from(w[1].0) - Vec3::from(w[0].0))).sum();
-        let per_span = (self.detail.corners(0.4 * way) / points.len().max(1)).clamp(1, 6);
+        let per_span = (self.detail.segments(0.4 * way) / points.len().max(1)).clamp(1, 6);
         let mut fine = Vec::with_capacity(points.len() * per_span);
         let at = |k: isize| points[k.clamp(0, points.len() as isize - 1) as usize];
         for k in 0..points.len().saturating_sub(1) as isize {
@@ -337,7 +337,7 @@ impl Sculptor {
         if points.len() < 2 || !self.shows_extent(Vec3::new(2.0 * wide, way, 2.0 * wide)) {
             return;
         }
-        let n = self.detail.corners(wide).min(16);
+        let n = self.detail.segments(wide).min(16);
         let n = if self.within(20.0) { n.min(6) } else { n };
         let end = points[points.len() - 1].0;
         let place = Place {
@@ -433,7 +433,7 @@ impl Sculptor {
         let extent = Vec3::new(radii[1] * turn, heights[1] - heights[0], radii[1] - radii[0]);
         if self.shows_extent(extent) {
             self.plain_skin();
-            let n = (self.detail.corners(radii[1]) as f32 * turn / std::f32::consts::TAU) as usize;
+            let n = (self.detail.segments(radii[1]) as f32 * turn / std::f32::consts::TAU) as usize;
             forms::sector(&mut self.mesh, Vec3::from(bottom), radii, heights, angles_deg, n.max(1));
         }
     }

@@ -13,7 +13,7 @@ const RING: usize = 1024;
 /// the present estimate are bits of a set, those of the next ones lie unsorted in a list for each
 /// estimate, and a heap holds all others; any order of pushes will do.
 #[derive(Clone, Debug)]
-pub struct Queue {
+pub struct BucketQueue {
     level: u32,
     present: CellSet,
     /// Cells with estimate `e`, level < e < level + RING, in list `e % RING`.
@@ -24,10 +24,10 @@ pub struct Queue {
     others: BinaryHeap<Reverse<u64>>,
 }
 
-impl Queue {
+impl BucketQueue {
     /// An empty queue for cells with numbers below `n_cells`.
-    pub fn new(n_cells: usize) -> Queue {
-        Queue {
+    pub fn new(n_cells: usize) -> BucketQueue {
+        BucketQueue {
             level: 0,
             present: CellSet::new(n_cells),
             ring: vec![Vec::new(); RING],
@@ -172,7 +172,7 @@ mod tests {
 
     #[test]
     fn cells_come_out_as_from_a_heap_whatever_the_order_of_pushes() {
-        let mut queue = Queue::new(10_000);
+        let mut queue = BucketQueue::new(10_000);
         for seed in 0..60 {
             let mut rng = Stream::new(seed, "queue", 0);
             let mut heap = BinaryHeap::new();

@@ -4,7 +4,7 @@ use chaic_protocol::catalogue::Finish;
 
 use super::Model;
 use super::colors::{DARK_STEEL, LEAF, STALK, STEEL};
-use crate::sculpt::{P, Paint, Sculptor, paint};
+use crate::mesh_builder::{MeshBuilder, P, Paint, paint};
 
 pub(super) fn model(name: &str) -> Option<Model> {
     Some(match name {
@@ -26,7 +26,7 @@ pub(super) fn model(name: &str) -> Option<Model> {
     })
 }
 
-fn apple(s: &mut Sculptor) {
+fn apple(s: &mut MeshBuilder) {
     s.paint(s.main());
     // Wider or taller by style.
     let w = s.pick(1, &[1.0, 0.97, 0.94, 0.98]);
@@ -62,7 +62,14 @@ const PEEL_END: Paint = paint([86, 70, 40], Finish::Skin);
 
 /// A banana along an arc of `radius` about (x, y, z), between two angles in degrees (0 is -x, 90 is
 /// -z), rising by `lift` in its middle.
-fn one_banana(s: &mut Sculptor, middle: P, radius: f32, angles: [f32; 2], thick: f32, lift: f32) {
+fn one_banana(
+    s: &mut MeshBuilder,
+    middle: P,
+    radius: f32,
+    angles: [f32; 2],
+    thick: f32,
+    lift: f32,
+) {
     use chaic_protocol::geom::math::{cos, sin};
     let at = |t: f32| {
         let a = (angles[0] + (angles[1] - angles[0]) * t).to_radians();
@@ -88,12 +95,12 @@ fn one_banana(s: &mut Sculptor, middle: P, radius: f32, angles: [f32; 2], thick:
     s.sweep(&[(at(0.0), 0.09 * thick), (at(0.012), 0.1 * thick)]);
 }
 
-fn banana(s: &mut Sculptor) {
+fn banana(s: &mut MeshBuilder) {
     // Its ends lie at the +x and the +z side of its box, its back at the corner between.
     one_banana(s, [0.0345, 0.0175, 0.0345], 0.1, [-23.0, 113.0], 0.0345, 0.0);
 }
 
-fn bananas(s: &mut Sculptor) {
+fn bananas(s: &mut MeshBuilder) {
     s.paint(paint([138, 124, 52], Finish::Skin));
     s.lathe([0.084, 0.03, 0.01], &[[0.012, 0.0], [0.013, 0.04], [0.009, 0.075], [0.008, 0.088]]);
     for (y, z, turn) in [
@@ -120,7 +127,7 @@ fn bananas(s: &mut Sculptor) {
     }
 }
 
-fn orange(s: &mut Sculptor) {
+fn orange(s: &mut MeshBuilder) {
     s.part(0);
     s.paint(paint([84, 122, 48], Finish::Matte));
     s.lathe([0.0, 0.0925, 0.0], &[[0.008, 0.0], [0.006, 0.0025], [0.0, 0.0035]]);
@@ -129,7 +136,7 @@ fn orange(s: &mut Sculptor) {
     }
 }
 
-fn grape(s: &mut Sculptor) {
+fn grape(s: &mut MeshBuilder) {
     const PURPLES: [[u8; 3]; 3] = [[112, 34, 70], [86, 26, 60], [128, 48, 86]];
     const GREENS: [[u8; 3]; 3] = [[150, 176, 72], [132, 160, 60], [170, 190, 90]];
     let colors = s.pick(0, &[PURPLES, PURPLES, PURPLES, GREENS]);
@@ -159,7 +166,7 @@ const CRUST: Paint = paint([190, 132, 70], Finish::Crust);
 const DARK_CRUST: Paint = paint([156, 98, 46], Finish::Crust);
 const CRUMB: Paint = paint([232, 204, 152], Finish::Crust);
 
-fn bread(s: &mut Sculptor) {
+fn bread(s: &mut MeshBuilder) {
     s.paint(s.main());
     let bun = [
         [0.046, 0.0],
@@ -183,7 +190,7 @@ fn bread(s: &mut Sculptor) {
     }
 }
 
-fn burger(s: &mut Sculptor) {
+fn burger(s: &mut MeshBuilder) {
     s.paint(CRUST);
     s.lathe([0.0; 3], &[[0.044, 0.0], [0.049, 0.005], [0.050, 0.014], [0.047, 0.02]]);
     s.paint(paint([84, 48, 30], Finish::Crust));
@@ -222,7 +229,7 @@ fn burger(s: &mut Sculptor) {
     }
 }
 
-fn loaf(s: &mut Sculptor) {
+fn loaf(s: &mut MeshBuilder) {
     s.paint(s.main());
     s.pillow([0.0, 0.0255, 0.0], [0.085, 0.051, 0.194], [0.0; 3], 0.72);
     s.paint(CRUMB);
@@ -234,7 +241,7 @@ fn loaf(s: &mut Sculptor) {
     }
 }
 
-fn croissant(s: &mut Sculptor) {
+fn croissant(s: &mut MeshBuilder) {
     use chaic_protocol::geom::math::{cos, sin};
     let baked = s.pick(1, &[[206u8, 146, 72], [186, 120, 54]]);
     let shade = |by: f32| paint(baked.map(|c| (by * f32::from(c)) as u8), Finish::Crust);
@@ -270,7 +277,7 @@ fn croissant(s: &mut Sculptor) {
     }
 }
 
-fn donut(s: &mut Sculptor) {
+fn donut(s: &mut MeshBuilder) {
     use chaic_protocol::geom::math::{cos, sin};
     s.part(1);
     let icing = s.main_or(&[[238, 132, 174], [244, 150, 190], [228, 112, 160], [246, 166, 196]]);
@@ -289,7 +296,7 @@ fn donut(s: &mut Sculptor) {
 }
 
 /// A can: its wall, its rims and its tab.
-fn can(s: &mut Sculptor, main: Paint) {
+fn can(s: &mut MeshBuilder, main: Paint) {
     let [w, h, _] = s.class.size_m;
     let outline =
         [[0.40, 0.0], [0.435, 0.012], [0.475, 0.055], [0.475, 0.90], [0.43, 0.945], [0.405, 0.965]]
@@ -307,14 +314,14 @@ fn can(s: &mut Sculptor, main: Paint) {
 }
 
 /// A label's piece around the can, between heights (fractions) and angles, degrees.
-fn label(s: &mut Sculptor, paint: Paint, heights: [f32; 2], angles: [f32; 2]) {
+fn label(s: &mut MeshBuilder, paint: Paint, heights: [f32; 2], angles: [f32; 2]) {
     let [w, h, _] = s.class.size_m;
     s.paint(paint);
     s.sector([0.0; 3], [0.46 * w, 0.482 * w], heights.map(|y| y * h), angles);
 }
 
 /// A wave around the can: steps up and down.
-fn wave(s: &mut Sculptor, paint: Paint, low: f32, high: f32, swing: f32) {
+fn wave(s: &mut MeshBuilder, paint: Paint, low: f32, high: f32, swing: f32) {
     let n = if s.within(20.0) { 8 } else { 20 };
     for k in 0..n {
         use chaic_protocol::geom::math::sin;
@@ -325,7 +332,7 @@ fn wave(s: &mut Sculptor, paint: Paint, low: f32, high: f32, swing: f32) {
 }
 
 /// A round sign three times around the can, in horizontal stripes.
-fn disc(s: &mut Sculptor, middle: f32, radius: f32, stripes: [Paint; 3]) {
+fn disc(s: &mut MeshBuilder, middle: f32, radius: f32, stripes: [Paint; 3]) {
     let n = if s.within(20.0) { 5 } else { 11 };
     let [w, h, _] = s.class.size_m;
     for back in [0.0, 120.0, 240.0] {
@@ -347,13 +354,13 @@ const CAN_BLUE: Paint = paint([26, 66, 166], Finish::Glossy);
 const CAN_GREEN: Paint = paint([28, 142, 66], Finish::Glossy);
 const CAN_YELLOW: Paint = paint([244, 222, 60], Finish::Glossy);
 
-fn pepsi(s: &mut Sculptor) {
+fn pepsi(s: &mut MeshBuilder) {
     can(s, s.pick(0, &[CAN_BLUE, paint([18, 48, 140], Finish::Glossy), CAN_BLUE]));
     disc(s, 0.52, 0.17, [CAN_BLUE, CAN_WHITE, CAN_RED]);
     label(s, CAN_WHITE, [0.22, 0.25], [0.0, 359.0]);
 }
 
-fn cola(s: &mut Sculptor) {
+fn cola(s: &mut MeshBuilder) {
     can(s, s.pick(0, &[CAN_RED, paint([184, 16, 28], Finish::Glossy), CAN_RED]));
     wave(s, CAN_WHITE, 0.36, 0.44, 0.06);
     // The lettering, from afar.
@@ -365,13 +372,13 @@ fn cola(s: &mut Sculptor) {
     }
 }
 
-fn sprite(s: &mut Sculptor) {
+fn sprite(s: &mut MeshBuilder) {
     can(s, s.pick(0, &[CAN_GREEN, paint([20, 124, 54], Finish::Glossy), CAN_GREEN]));
     wave(s, CAN_BLUE, 0.14, 0.3, 0.03);
     disc(s, 0.57, 0.12, [CAN_YELLOW, CAN_YELLOW, CAN_WHITE]);
 }
 
-fn fanta(s: &mut Sculptor) {
+fn fanta(s: &mut MeshBuilder) {
     let orange = paint([240, 124, 22], Finish::Glossy);
     can(s, s.pick(0, &[orange, paint([232, 108, 18], Finish::Glossy), orange]));
     disc(s, 0.5, 0.16, [CAN_BLUE, CAN_WHITE, CAN_BLUE]);

@@ -7,8 +7,57 @@ use crate::mind::Mind;
 use crate::policies::{Follow, Random, RulePolicy, RuleProfile};
 use crate::rules::PlannerRules;
 
-/// The names of all helpers of this crate.
-pub const HELPERS: &[&str] = &["random", "rhp", "oracle", "follow"];
+/// A helper as runs and tables know it.
+#[derive(Clone, Copy, Debug)]
+pub struct HelperInfo {
+    /// Its name in commands and files.
+    pub name: &'static str,
+    /// What tables call it.
+    pub title: &'static str,
+    /// Makes one that plans by these rules.
+    pub make: fn(PlannerRules) -> Box<dyn Agent>,
+    /// What it asks to be granted under these rules.
+    pub grants: fn(PlannerRules) -> Grants,
+}
+
+/// All helpers of this crate.
+pub static HELPERS: [HelperInfo; 4] = [
+    HelperInfo {
+        name: "random",
+        title: "Random",
+        make: |rules| Box::new(random(rules)),
+        grants: planner_grants,
+    },
+    HelperInfo {
+        name: "rhp",
+        title: "RHP",
+        make: |rules| Box::new(rhp(rules)),
+        grants: planner_grants,
+    },
+    HelperInfo {
+        name: "oracle",
+        title: "Oracle",
+        make: |rules| Box::new(oracle(rules)),
+        grants: |_| Grants::ORACLE,
+    },
+    HelperInfo {
+        name: "follow",
+        title: "Follow",
+        make: |rules| Box::new(follow(rules)),
+        grants: planner_grants,
+    },
+];
+
+fn planner_grants(rules: PlannerRules) -> Grants {
+    Grants { behavior: rules.knows_holding, ..Grants::PLANNER }
+}
+
+impl HelperInfo {
+    /// The helper of this name.
+    pub fn named(name: &str) -> Option<&'static HelperInfo> {
+        HELPERS.iter().find(|helper| helper.name == name)
+    }
+}
 
 /// Any valid plan (paper section 5.2).
 pub fn random(rules: PlannerRules) -> Mind<Random> {
@@ -30,42 +79,23 @@ pub fn follow(rules: PlannerRules) -> Mind<Follow> {
     Mind::new(Follow::default(), rules)
 }
 
-/// The helper of this name.
-pub fn helper(name: &str, rules: PlannerRules) -> Option<Box<dyn Agent>> {
-    Some(match name {
-        "random" => Box::new(random(rules)),
-        "rhp" => Box::new(rhp(rules)),
-        "oracle" => Box::new(oracle(rules)),
-        "follow" => Box::new(follow(rules)),
-        _ => return None,
-    })
-}
-
-/// What the helper of this name asks to be granted; nothing for an unknown name.
-pub fn helper_grants(name: &str, rules: PlannerRules) -> Grants {
-    match name {
-        "random" | "rhp" | "follow" => Grants { behavior: rules.knows_holding, ..Grants::PLANNER },
-        "oracle" => Grants::ORACLE,
-        _ => Grants::NONE,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn every_name_has_a_helper_and_only_the_oracle_is_told_the_goal() {
-        for name in HELPERS {
-            assert!(helper(name, PlannerRules::paper()).is_some(), "{name}");
+        for info in &HELPERS {
+            let name = info.name;
+            assert!((info.make)(PlannerRules::paper()).senses().depth, "{name}");
             for rules in [PlannerRules::paper(), PlannerRules::compat()] {
-                let grants = helper_grants(name, rules);
-                assert_eq!(grants.goal, *name == "oracle");
+                let grants = (info.grants)(rules);
+                assert_eq!(grants.goal, name == "oracle");
                 assert!(grants.ids);
-                assert_eq!(grants.behavior, *name == "oracle" || rules.knows_holding);
+                assert_eq!(grants.behavior, name == "oracle" || rules.knows_holding);
             }
+            assert_eq!(HelperInfo::named(name).map(|h| h.title), Some(info.title));
         }
-        assert!(helper("nobody", PlannerRules::paper()).is_none());
-        assert_eq!(helper_grants("nobody", PlannerRules::paper()), Grants::NONE);
+        assert!(HelperInfo::named("nobody").is_none());
     }
 }

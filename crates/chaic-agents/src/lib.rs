@@ -15,9 +15,10 @@
 //!   come from [`chaic_protocol::rng::Stream`], there is no clock, and no hash map is iterated.
 //!
 //! ```
-//! use chaic_agents::{PlannerRules, helpers};
-//! let mut rhp = helpers::helper("rhp", PlannerRules::paper()).expect("it is in the registry");
-//! assert!(rhp.senses().depth && helpers::helper_grants("rhp", PlannerRules::paper()).ids);
+//! use chaic_agents::{HelperInfo, PlannerRules};
+//! let rhp = HelperInfo::named("rhp").expect("it is in the table");
+//! assert!((rhp.make)(PlannerRules::paper()).senses().depth);
+//! assert!((rhp.grants)(PlannerRules::paper()).ids);
 //! ```
 
 pub mod track;
@@ -44,7 +45,7 @@ mod child;
 #[cfg(test)]
 mod test_support;
 
-pub use helpers::{HELPERS, helper, helper_grants};
+pub use helpers::{HELPERS, HelperInfo};
 pub use mind::Mind;
 pub use partners::{child, partner, partner_grants};
 pub use rules::PlannerRules;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use chaic_agents::{HELPERS, PlannerRules, helper, helper_grants};
+use chaic_agents::{HELPERS, HelperInfo, PlannerRules};
 use chaic_protocol::Agent;
 use chaic_protocol::observation::Grants;
 
@@ -80,11 +80,12 @@ pub struct BuiltIn;
 
 impl Helpers for BuiltIn {
     fn names(&self) -> Vec<String> {
-        HELPERS.iter().map(|n| (*n).to_owned()).collect()
+        HELPERS.iter().map(|helper| helper.name.to_owned()).collect()
     }
 
     fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper> {
-        Some(Helper { mind: helper(name, rules)?, grants: helper_grants(name, rules) })
+        let info = HelperInfo::named(name)?;
+        Some(Helper { mind: (info.make)(rules), grants: (info.grants)(rules) })
     }
 }
 

@@ -59,8 +59,8 @@ pub fn generate_with(
 ) -> Result<Setup, GenerateError> {
     match task.info().scene {
         SceneKind::House => house::generate(task, seeds, settings),
-        SceneKind::Street => street::generate(seeds, settings),
-        SceneKind::Yard => yard::generate(seeds, settings),
+        SceneKind::Street => street::generate(task, seeds, settings),
+        SceneKind::Yard => yard::generate(task, seeds, settings),
     }
 }
 

@@ -111,11 +111,16 @@ impl Layout {
 ///
 /// # Errors
 /// [`GenerateError`] if no attempt led to a valid setup.
-pub fn generate(seeds: Seeds, settings: Settings) -> Result<Setup, GenerateError> {
-    first_valid(TaskId::Shopping, seeds, ATTEMPTS, |attempt| setup(seeds, settings, attempt))
+pub fn generate(task: TaskId, seeds: Seeds, settings: Settings) -> Result<Setup, GenerateError> {
+    first_valid(task, seeds, ATTEMPTS, |attempt| setup(task, seeds, settings, attempt))
 }
 
-fn setup(seeds: Seeds, settings: Settings, attempt: u64) -> Result<Setup, &'static str> {
+fn setup(
+    task: TaskId,
+    seeds: Seeds,
+    settings: Settings,
+    attempt: u64,
+) -> Result<Setup, &'static str> {
     let stream = |purpose: &str| Stream::new(seeds.episode, purpose, attempt);
     let mut people = people(&mut stream("shopping/people"))?;
     let layout = if settings.varied_layout {
@@ -139,7 +144,7 @@ fn setup(seeds: Seeds, settings: Settings, attempt: u64) -> Result<Setup, &'stat
     stock(&mut things, &layout.shops, &shelves, &mut stream("shopping/stock"));
     let goal = goal(seeds.episode, &mut stream("shopping/goal"));
     let parts = OutdoorParts { floors, things, people, goal, goal_place: hydrant };
-    Ok(outdoors::setup(TaskId::Shopping, seeds.episode, BOUNDS, parts))
+    Ok(outdoors::setup(task, seeds.episode, BOUNDS, parts))
 }
 
 /// Tents with two shelves each; returns per shop which things its shelves are.

@@ -62,11 +62,9 @@ const LINE_UPS: [[&str; N_PIECES]; 12] = [
 ///
 /// # Errors
 /// [`GenerateError`] if no attempt led to a valid setup.
-pub fn generate(seeds: Seeds, settings: Settings) -> Result<Setup, GenerateError> {
+pub fn generate(task: TaskId, seeds: Seeds, settings: Settings) -> Result<Setup, GenerateError> {
     let line_up = line_up(seeds.episode, settings);
-    first_valid(TaskId::MovingHouse, seeds, ATTEMPTS, |attempt| {
-        setup(seeds, settings, &line_up, attempt)
-    })
+    first_valid(task, seeds, ATTEMPTS, |attempt| setup(task, seeds, settings, &line_up, attempt))
 }
 
 /// The original's line-up for a bundled episode, a random one for any other.
@@ -81,6 +79,7 @@ fn line_up(seed: u64, settings: Settings) -> Vec<ClassId> {
 }
 
 fn setup(
+    task: TaskId,
     seeds: Seeds,
     settings: Settings,
     line_up: &[ClassId],
@@ -121,7 +120,7 @@ fn setup(
     targets.sort();
     let goal = Goal { targets };
     let parts = OutdoorParts { floors, things, people, goal, goal_place: truck };
-    Ok(outdoors::setup(TaskId::MovingHouse, seeds.episode, BOUNDS, parts))
+    Ok(outdoors::setup(task, seeds.episode, BOUNDS, parts))
 }
 
 /// The house, its neighbors and what grows around them.

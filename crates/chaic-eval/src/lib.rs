@@ -3,7 +3,7 @@
 //! **What it is**: what becomes of episodes that `chaic-env` plays. [`run`] plays whole benchmarks on
 //! several threads, keeps a journal and writes a [`trace_file`] of each, [`metrics`] computes the
 //! paper's scores from what was recorded, [`report`] prints them, [`verify`] plays a trace's actions
-//! again and compares, [`replay`] and [`still`] draw what was played, [`audit`] shows that what is
+//! again and compares, [`replay`] and [`frame_export`] draw what was played, [`audit`] shows that what is
 //! hidden is hidden, [`scene_file`] writes what there is to draw, [`bench`](mod@bench) measures how
 //! fast this machine draws and steps.
 //!

@@ -3,6 +3,7 @@
 use chaic_episodes::mm;
 use chaic_protocol::briefing::Goal;
 use chaic_protocol::geom::{Rect, xz};
+use chaic_protocol::task::GoalTop;
 use chaic_protocol::{Role, TaskId, Vec2, Vec3};
 use chaic_world::{Floor, FloorMaterial, Opening, Room, RoomKind, Rules, Setup, Thing, Wall};
 
@@ -238,7 +239,7 @@ fn is_loose(piece: &Piece) -> bool {
 fn is_goal(task: TaskId, piece: &Piece, furniture: &Thing) -> bool {
     let top_m = furniture.position.y + furniture.size_m().y;
     let is_high = top_m >= Rules::paper().high_goal_min_top_m && !piece.name.contains("door");
-    task != TaskId::HighGoal || is_high
+    task.info().goal_top == GoalTop::Any || is_high
 }
 
 /// Lets what may be a target and stands on the furniture sink onto it, and what else is `loose` and

@@ -7,7 +7,8 @@
 
 use chaic_protocol::catalogue::Role;
 use chaic_protocol::geom::Rect;
-use chaic_protocol::{ClassId, TaskId, Vec3};
+use chaic_protocol::task::SceneKind;
+use chaic_protocol::{ClassId, Vec3};
 use chaic_world::{Floor, FloorMaterial, Room, RoomKind, Setup, Thing};
 
 use crate::dataset::Source;
@@ -49,7 +50,7 @@ const FENCES_Z: [f32; 2] = [9.45, -8.7];
 
 /// The beginning of an outdoor episode.
 pub(crate) fn setup(source: &Source, package: &Package) -> Result<Setup, ImportError> {
-    let is_shopping = source.task == TaskId::Shopping;
+    let is_shopping = source.task.info().scene == SceneKind::Street;
     let bounds = axes::rect(if is_shopping { SHOPPING } else { MOVING_HOUSE });
     let mut setup = Setup {
         task: source.task,
@@ -74,8 +75,8 @@ pub(crate) fn setup(source: &Source, package: &Package) -> Result<Setup, ImportE
 
 /// Stands first, then what lies on them.
 fn lay_out(setup: &mut Setup, source: &Source, package: &Package) -> Result<(), ImportError> {
-    let goal_class = if source.task == TaskId::Shopping { "fire_hydrant" } else { "truck" };
-    let is_shopping = source.task == TaskId::Shopping;
+    let goal_class = source.task.info().goal_places[0];
+    let is_shopping = source.task.info().scene == SceneKind::Street;
     let mut goods = Vec::new();
     for i in 0..source.objects.len() {
         let mut thing = common::object(source, i, package)?;

@@ -46,7 +46,69 @@ pub enum SceneKind {
     Yard,
 }
 
-/// What is fixed for a task.
+/// What an object of the goal counts for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Worth {
+    /// Each as much as any other.
+    Count,
+    /// Its mass in kilograms (facts S5.4).
+    Mass,
+}
+
+impl Worth {
+    /// What one object of a class counts for.
+    pub fn of(self, class: ClassId) -> f64 {
+        match self {
+            Worth::Count => 1.0,
+            Worth::Mass => f64::from(class.info().mass_kg),
+        }
+    }
+
+    /// The unit of sums of it; empty for a mere number.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Worth::Count => "",
+            Worth::Mass => "kg",
+        }
+    }
+}
+
+/// How high the top of a goal place must be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GoalTop {
+    /// As it is.
+    Any,
+    /// As high as the rules' `high_goal_min_top_m` at least.
+    High,
+}
+
+/// To which point of a goal place one brings things.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GoalApproach {
+    /// As to any other thing.
+    Usual,
+    /// The nearest point, by all rules: nobody walks into the middle of a truck (facts S9.4).
+    NearestPoint,
+}
+
+/// How the things of a house lie, so that the partner's constraint matters: what its generator and
+/// the validator go by. Streets and yards have one arrangement only.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Arrangement {
+    /// Wherever there is room.
+    Usual,
+    /// Some targets on high tops, among them fragile ones (paper, appendix on task generation).
+    HighTargets,
+    /// The containers on high tops.
+    HighContainers,
+    /// Half of the targets on the floor.
+    LowTargets,
+    /// Obstacles in doorways between the partner and the goal.
+    Obstacles,
+}
+
+/// What is fixed for a task: all that tells it from the others. Nothing but this table knows tasks by
+/// their names.
 #[derive(Clone, Copy, Debug)]
 pub struct TaskInfo {
     /// The task.
@@ -71,6 +133,14 @@ pub struct TaskInfo {
     /// task generation; the high goal places are those of the original's episodes). With decoys, all
     /// indoor tasks have one of the house's.
     pub goal_places: &'static [&'static str],
+    /// What an object of the goal counts for.
+    pub worth: Worth,
+    /// How high the goal place must be.
+    pub goal_top: GoalTop,
+    /// To which point of the goal place one brings things.
+    pub goal_approach: GoalApproach,
+    /// How things lie.
+    pub arrangement: Arrangement,
 }
 
 const INDOOR: &[TargetSet] =
@@ -82,8 +152,9 @@ const fn indoor(
     title: &'static str,
     original_name: &'static str,
     partner: Persona,
-    goal_places: &'static [&'static str],
+    arrangement: Arrangement,
 ) -> TaskInfo {
+    let goal_places = BED;
     TaskInfo {
         id,
         name,
@@ -95,27 +166,69 @@ const fn indoor(
         horizon: 3000,
         sets: INDOOR,
         goal_places,
+        worth: Worth::Count,
+        goal_top: GoalTop::Any,
+        goal_approach: GoalApproach::Usual,
+        arrangement,
     }
 }
 
 const BED: &[&str] = &["bed"];
-const HIGH: &[&str] = &["cabinet", "refrigerator"];
 
 /// The tasks in the order of the paper's result table.
 pub static TASKS: [TaskInfo; 8] = [
-    indoor(TaskId::NoConstraint, "no_constraint", "No constraint", "normal", Persona::Adult, BED),
-    indoor(TaskId::HighTarget, "high_target", "High target", "highthing", Persona::Child, BED),
+    indoor(
+        TaskId::NoConstraint,
+        "no_constraint",
+        "No constraint",
+        "normal",
+        Persona::Adult,
+        Arrangement::Usual,
+    ),
+    indoor(
+        TaskId::HighTarget,
+        "high_target",
+        "High target",
+        "highthing",
+        Persona::Child,
+        Arrangement::HighTargets,
+    ),
     indoor(
         TaskId::HighContainer,
         "high_container",
         "High container",
         "highcontainer",
         Persona::Child,
-        BED,
+        Arrangement::HighContainers,
     ),
-    indoor(TaskId::HighGoal, "high_goal", "High goal", "highgoalplace", Persona::Child, HIGH),
-    indoor(TaskId::LowTarget, "low_target", "Low target", "lowthing", Persona::Wheelchair, BED),
-    indoor(TaskId::Obstacle, "obstacle", "Obstacle", "wheelchair", Persona::Wheelchair, BED),
+    TaskInfo {
+        goal_places: &["cabinet", "refrigerator"],
+        goal_top: GoalTop::High,
+        ..indoor(
+            TaskId::HighGoal,
+            "high_goal",
+            "High goal",
+            "highgoalplace",
+            Persona::Child,
+            Arrangement::Usual,
+        )
+    },
+    indoor(
+        TaskId::LowTarget,
+        "low_target",
+        "Low target",
+        "lowthing",
+        Persona::Wheelchair,
+        Arrangement::LowTargets,
+    ),
+    indoor(
+        TaskId::Obstacle,
+        "obstacle",
+        "Obstacle",
+        "wheelchair",
+        Persona::Wheelchair,
+        Arrangement::Obstacles,
+    ),
     TaskInfo {
         id: TaskId::Shopping,
         name: "shopping",
@@ -127,6 +240,10 @@ pub static TASKS: [TaskInfo; 8] = [
         horizon: 3000,
         sets: &[TargetSet::ShopFruit, TargetSet::ShopBakery, TargetSet::ShopDrinks],
         goal_places: &["fire_hydrant"],
+        worth: Worth::Count,
+        goal_top: GoalTop::Any,
+        goal_approach: GoalApproach::Usual,
+        arrangement: Arrangement::Usual,
     },
     TaskInfo {
         id: TaskId::MovingHouse,
@@ -139,6 +256,10 @@ pub static TASKS: [TaskInfo; 8] = [
         horizon: 1500,
         sets: &[TargetSet::Furniture],
         goal_places: &["truck"],
+        worth: Worth::Mass,
+        goal_top: GoalTop::Any,
+        goal_approach: GoalApproach::NearestPoint,
+        arrangement: Arrangement::Usual,
     },
 ];
 

@@ -2,7 +2,7 @@
 
 use chaic_protocol::catalogue::Role;
 use chaic_protocol::geom::horizontal_distance;
-use chaic_protocol::{AgentId, ClassId, EntityId, TaskId};
+use chaic_protocol::{AgentId, ClassId, EntityId};
 
 use crate::event::EventKind;
 use crate::world::World;
@@ -20,7 +20,7 @@ impl World {
 
     /// Lowest top that counts as the goal place, metres; 0 for no condition.
     pub fn goal_min_top_m(&self) -> f32 {
-        if self.setup.task == TaskId::HighGoal { self.rules.high_goal_min_top_m } else { 0.0 }
+        self.rules.goal_min_top_m(self.setup.task)
     }
 
     /// Whether somebody stands within the delivery radius of a goal place.
@@ -54,8 +54,10 @@ impl World {
         self.delivered().iter().filter(|e| of_class(e)).count() as u32
     }
 
-    /// What is done of what is wanted, and all that is wanted: objects, or kilograms when moving
-    /// house.
+    /// What is done of what is wanted, and all that is wanted, by the task's [`Worth`]: objects, or
+    /// kilograms.
+    ///
+    /// [`Worth`]: chaic_protocol::task::Worth
     pub fn progress(&self) -> (f64, f64) {
         let goal = &self.setup.goal.targets;
         goal.iter().fold((0.0, 0.0), |(done, all), (class, wanted)| {
@@ -65,9 +67,9 @@ impl World {
         })
     }
 
-    /// What one object of a class counts for: 1, or its mass when moving house (facts S5.4).
+    /// What one object of a class counts for in this task.
     pub fn worth(&self, class: ClassId) -> f64 {
-        if self.setup.task == TaskId::MovingHouse { f64::from(class.info().mass_kg) } else { 1.0 }
+        self.setup.task.info().worth.of(class)
     }
 
     /// Whether everything the goal asks for has been delivered.

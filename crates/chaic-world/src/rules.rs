@@ -1,7 +1,9 @@
 //! By which constants a world goes on. Rule sets are data: a change of rules is a change of a
 //! value here, never an `if` elsewhere. `docs/rules.md` lists every field with its source.
 
+use chaic_protocol::TaskId;
 use chaic_protocol::capability::LimitPenalty;
+use chaic_protocol::task::GoalTop;
 use serde::{Deserialize, Serialize};
 
 /// Frames that the parts of actions take (facts S2.2, measured on the original's
@@ -146,6 +148,14 @@ pub struct Rules {
 }
 
 impl Rules {
+    /// Lowest top that counts as a task's goal place, metres; 0 for no condition.
+    pub fn goal_min_top_m(&self, task: TaskId) -> f32 {
+        match task.info().goal_top {
+            GoalTop::High => self.high_goal_min_top_m,
+            GoalTop::Any => 0.0,
+        }
+    }
+
     /// The paper's rules, with the original's measured numbers where the paper gives none.
     pub const fn paper() -> Rules {
         Rules {

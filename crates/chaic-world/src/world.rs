@@ -5,7 +5,8 @@ use std::sync::Arc;
 use chaic_protocol::capability::{Capability, Gait};
 use chaic_protocol::catalogue::Role;
 use chaic_protocol::geom::{horizontal_distance, yaw_rotation};
-use chaic_protocol::{AgentId, EntityId, Hand, ResolvedAction, TaskId, Vec3};
+use chaic_protocol::task::GoalApproach;
+use chaic_protocol::{AgentId, EntityId, Hand, ResolvedAction, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::collide::{Body, Disc, Surroundings};
@@ -274,13 +275,13 @@ impl World {
         horizontal_distance(p, self.point_to_reach(p, entity))
     }
 
-    /// The point of a thing that one goes to from `p`. Nobody walks into the middle of the truck:
-    /// the original has furniture brought to a point before it (facts S9.4).
+    /// The point of a thing that one goes to from `p`; of a goal place as the task has it.
     pub(crate) fn point_to_reach(&self, p: Vec3, entity: EntityId) -> Vec3 {
-        let is_truck =
-            self.setup.task == TaskId::MovingHouse && self.setup.goal_places.contains(&entity);
+        let approach = self.setup.task.info().goal_approach;
+        let is_beside =
+            approach == GoalApproach::NearestPoint && self.setup.goal_places.contains(&entity);
         match self.rules.reach_to {
-            ReachTo::Middle if !is_truck => self.thing(entity).1.position,
+            ReachTo::Middle if !is_beside => self.thing(entity).1.position,
             ReachTo::Middle | ReachTo::NearestPoint => self.nearest_point(p, entity),
         }
     }

@@ -10,6 +10,7 @@ use std::f32::consts::TAU;
 use chaic_protocol::briefing::Goal;
 use chaic_protocol::geom::xz;
 use chaic_protocol::rng::Stream;
+use chaic_protocol::task::{Arrangement, GoalTop};
 use chaic_protocol::{ClassId, EntityId, TaskId};
 use chaic_world::{Setup, Thing};
 
@@ -110,7 +111,8 @@ pub(super) fn setup(
     let people = people(&house, task, &mut stream("people")).ok_or("no room for the people")?;
     let goal_places = goal_places(&house, task);
     let mut put = Vec::new();
-    if task == TaskId::Obstacle {
+    let info = task.info();
+    if info.arrangement == Arrangement::Obstacles {
         let first = goal_places.first().ok_or("the house has no goal place")?;
         let goal = house.furniture[usize::from(first.0 - EntityId::FIRST_OBJECT.0)].position;
         let partner = xz(people[0].pose.position);
@@ -132,26 +134,28 @@ pub(super) fn setup(
 
 /// The tall refrigerators where the goal is high, else all of them.
 fn goal_places(house: &House, task: TaskId) -> Vec<EntityId> {
+    let is_any = task.info().goal_top == GoalTop::Any;
     let is_goal = |k: &usize| {
         let thing = &house.furniture[*k];
         let is_high = thing.position.y + thing.size_m().y >= HIGH_M;
-        thing.class.name() == GOAL_CLASS && (is_high || task != TaskId::HighGoal)
+        thing.class.name() == GOAL_CLASS && (is_high || is_any)
     };
     (0..house.furniture.len()).filter(is_goal).map(Setup::entity).collect()
 }
 
 /// What lies on high tops and on the floor, for this task's partner.
 fn shares(task: TaskId, goal: &Goal, rng: &mut Stream) -> [Share; 2] {
-    let [lowest_m, highest_m] = task.info().partner.capability().pick_range_m;
-    let high = match task {
+    let info = task.info();
+    let [lowest_m, highest_m] = info.partner.capability().pick_range_m;
+    let high = match info.arrangement {
         // A third to a half of the wanted ones, as in the paper's shape.
-        TaskId::HighTarget => Share::Wanted(3 + rng.below(2)),
+        Arrangement::HighTargets => Share::Wanted(3 + rng.below(2)),
         _ if highest_m < HIGH_M + 1.0 => Share::Unwanted,
         _ => Share::Any,
     };
-    let floor = match task {
+    let floor = match info.arrangement {
         // Half of the wanted ones, as in the paper's shape.
-        TaskId::LowTarget => Share::Wanted(goal.total().div_ceil(2) as usize),
+        Arrangement::LowTargets => Share::Wanted(goal.total().div_ceil(2) as usize),
         _ if lowest_m > 0.0 => Share::Unwanted,
         _ => Share::Any,
     };
@@ -204,15 +208,16 @@ impl Scene<'_> {
             up.iter().copied().filter(|c| goal.wanted(*c) > 0).collect();
         targets.sort();
         targets.dedup();
-        if task == TaskId::HighTarget && targets.len() < LEAST_HIGH_CLASSES {
+        let arrangement = task.info().arrangement;
+        if arrangement == Arrangement::HighTargets && targets.len() < LEAST_HIGH_CLASSES {
             return Err("too few target classes are high");
         }
         let vase = ClassId::named("vase");
         up.insert(rng.below(up.len() + 1), vase);
         objects.extend(std::iter::repeat_n(vase, VASES - 1));
         rng.shuffle(&mut objects);
-        let n_high = match task {
-            TaskId::HighContainer => CABINETS,
+        let n_high = match arrangement {
+            Arrangement::HighContainers => CABINETS,
             _ => inventory.n_containers_high,
         };
         let low_containers = self.up(n_high, &up)?;

@@ -3,6 +3,7 @@
 use chaic_protocol::briefing::Goal;
 use chaic_protocol::catalogue::TargetSet;
 use chaic_protocol::rng::Stream;
+use chaic_protocol::task::Arrangement;
 use chaic_protocol::{ClassId, TaskId};
 
 /// The sets of targets with the classes that objects are dealt to in turn. The iPhone is listed
@@ -39,7 +40,7 @@ pub(super) fn goods(task: TaskId, rng: &mut Stream) -> Goods {
     let other = (wanted + 1 + rng.below(SETS.len() - 1)) % SETS.len();
     let classes: Vec<ClassId> = counts[other].iter().map(|(c, _)| *c).collect();
     targets.extend(rng.choose(&classes).map(|c| (*c, 1)));
-    if task == TaskId::HighTarget {
+    if task.info().arrangement == Arrangement::HighTargets {
         targets.push((ClassId::named("vase"), VASES as u32));
     }
     targets.sort();

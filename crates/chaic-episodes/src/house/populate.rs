@@ -4,6 +4,7 @@ use chaic_protocol::briefing::Goal;
 use chaic_protocol::capability::Persona;
 use chaic_protocol::geom::{Pose, xz};
 use chaic_protocol::rng::Stream;
+use chaic_protocol::task::{Arrangement, GoalTop};
 use chaic_protocol::{ClassId, EntityId, TaskId, Vec2, Vec3};
 use chaic_world::{Person, Setup, Thing};
 
@@ -47,7 +48,7 @@ pub(super) fn setup(
     let people = people(house, task, &mut stream("people")).ok_or("no room for the people")?;
     let goal_places = goal_places(house, task, &mut stream("goal place"))?;
     let first_goal = house.furniture[usize::from(goal_places[0].0 - EntityId::FIRST_OBJECT.0)];
-    if task == TaskId::Obstacle {
+    if task.info().arrangement == Arrangement::Obstacles {
         let (partner, goal) = (xz(people[0].pose.position), xz(first_goal.position));
         let obstacles = doors::obstacles(house, partner, goal, &mut stream("obstacles"));
         scene.put = obstacles.ok_or("obstacles close too little")?;
@@ -91,16 +92,17 @@ impl Scene<'_> {
         let mut low = slots::low(self.house);
         self.rng.shuffle(&mut low);
         let tops = slots::high(self.house);
-        if task == TaskId::HighContainer {
+        let arrangement = task.info().arrangement;
+        if arrangement == Arrangement::HighContainers {
             self.containers_up(&tops)?;
         } else {
             let containers = containers(&mut self.rng, 6);
             self.on_low(&containers, &mut low, 0.0).ok_or("no room for the containers")?;
         }
         let mut objects = goods.objects.clone();
-        match task {
-            TaskId::HighTarget => self.objects_up(goods, &tops, &mut objects)?,
-            TaskId::LowTarget => {
+        match arrangement {
+            Arrangement::HighTargets => self.objects_up(goods, &tops, &mut objects)?,
+            Arrangement::LowTargets => {
                 let on_floor: Vec<ClassId> = objects.drain(..objects.len().div_ceil(2)).collect();
                 self.on_floor(&on_floor)?;
             }
@@ -204,10 +206,10 @@ fn goal_places(
     task: TaskId,
     rng: &mut Stream,
 ) -> Result<Vec<EntityId>, &'static str> {
-    let class = match task {
-        TaskId::HighGoal if rng.chance(REFRIGERATOR_GOAL) => "refrigerator",
-        TaskId::HighGoal => "cabinet",
-        _ => "bed",
+    let class = match task.info().goal_top {
+        GoalTop::High if rng.chance(REFRIGERATOR_GOAL) => "refrigerator",
+        GoalTop::High => "cabinet",
+        GoalTop::Any => "bed",
     };
     let is_goal = |k: &usize| house.furniture[*k].class.name() == class;
     let places: Vec<EntityId> =

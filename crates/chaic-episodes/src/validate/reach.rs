@@ -2,7 +2,8 @@
 
 use chaic_protocol::capability::Persona;
 use chaic_protocol::geom::xz;
-use chaic_protocol::{AgentId, Role, TaskId, Vec2};
+use chaic_protocol::task::Arrangement;
+use chaic_protocol::{AgentId, Role, Vec2};
 use chaic_world::{Person, Rules, Setup, Thing};
 
 use super::{Demand, Problem, thing_field};
@@ -105,7 +106,7 @@ fn obstacle_problem(setup: &Setup, walls: &[Solid]) -> Option<Problem> {
     let needed = needed_things(setup).into_iter().filter(|k| !is_obstacle(k));
     let mut missed =
         needed.filter(|k| !gets_at(&grid, &seen, reach_m, &setup.things[*k], &see_through));
-    match (setup.task == TaskId::Obstacle, missed.next()) {
+    match (setup.task.info().arrangement == Arrangement::Obstacles, missed.next()) {
         (true, None) => {
             let problem = "hold no obstacle that keeps the partner from anything";
             Some(Problem::new("things", problem))

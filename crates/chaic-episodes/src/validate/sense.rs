@@ -1,8 +1,9 @@
 //! Whether the task has what it needs, whatever the places.
 
+use chaic_protocol::Role;
 use chaic_protocol::capability::{Gait, Persona};
 use chaic_protocol::task::SceneKind;
-use chaic_protocol::{ClassId, Role, TaskId};
+use chaic_protocol::task::{Arrangement, GoalApproach};
 use chaic_world::{Rules, Setup, Thing};
 
 use super::{Demand, Problem, thing_field};
@@ -99,8 +100,7 @@ fn goal(setup: &Setup, demand: Demand, found: &mut Vec<Problem>) {
     let places = setup.goal_places.iter().filter_map(|e| setup.thing_index(*e));
     for (i, k) in places.enumerate() {
         let thing = &setup.things[k];
-        let needed_m =
-            if setup.task == TaskId::HighGoal { Rules::paper().high_goal_min_top_m } else { 0.0 };
+        let needed_m = Rules::paper().goal_min_top_m(setup.task);
         let top_m = thing.position.y + thing.size_m().y;
         if top_m < needed_m {
             let (class, field) = (thing.class, format!("goal_places[{i}]"));
@@ -120,21 +120,22 @@ fn task_needs(setup: &Setup, found: &mut Vec<Problem>) {
         found.push(Problem::new("walls", "are missing: the task happens in a house"));
     }
     let has = |role: Role| setup.things.iter().any(|t| t.class.info().role == role && !t.fixed);
-    match setup.task {
-        TaskId::Obstacle if !has(Role::Obstacle) => {
+    let info = setup.task.info();
+    match info.arrangement {
+        Arrangement::Obstacles if !has(Role::Obstacle) => {
             found.push(Problem::new("things", "hold no obstacle that can be removed"));
         }
-        TaskId::HighContainer if !has(Role::Container) => {
+        Arrangement::HighContainers if !has(Role::Container) => {
             found.push(Problem::new("things", "hold no container"));
         }
-        TaskId::MovingHouse => {
-            let truck = ClassId::by_name("truck");
-            let places = setup.goal_places.iter().filter_map(|e| setup.thing(*e));
-            if places.into_iter().any(|t| Some(t.class) != truck) {
-                found.push(Problem::new("goal_places", "name something else than a truck"));
-            }
-        }
         _ => {}
+    }
+    if info.goal_approach == GoalApproach::NearestPoint {
+        let mut places = setup.goal_places.iter().filter_map(|e| setup.thing(*e));
+        if places.any(|t| !info.goal_places.contains(&t.class.name())) {
+            let problem = format!("name something else than a {}", info.goal_places.join(" or "));
+            found.push(Problem::new("goal_places", problem));
+        }
     }
     let riders = setup.people.iter().filter(|p| p.capability().gait == Gait::WalkBike).count();
     let vehicles = setup.things.iter().filter(|t| t.class.info().role == Role::Vehicle).count();
@@ -154,14 +155,14 @@ fn height_problem(setup: &Setup) -> Option<Problem> {
         let containers = setup.things.iter().filter(is_container);
         containers.filter(|t| (top_m(t) > highest_m) == high).count()
     };
-    let problem = match setup.task {
-        TaskId::HighTarget if !wanted().any(|t| top_m(&t) > highest_m) => {
+    let problem = match setup.task.info().arrangement {
+        Arrangement::HighTargets if !wanted().any(|t| top_m(&t) > highest_m) => {
             "hold nothing wanted that is high"
         }
-        TaskId::LowTarget if !wanted().any(|t| top_m(&t) < lowest_m) => {
+        Arrangement::LowTargets if !wanted().any(|t| top_m(&t) < lowest_m) => {
             "hold nothing wanted that is low"
         }
-        TaskId::HighContainer if n_high(true) <= n_high(false) => {
+        Arrangement::HighContainers if n_high(true) <= n_high(false) => {
             "hold no more containers high than low"
         }
         _ => return None,

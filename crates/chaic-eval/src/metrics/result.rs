@@ -165,8 +165,8 @@ impl Delivery {
         matches!(self.class.info().role, Role::Target | Role::Fragile | Role::HeavyTarget)
     }
 
-    /// What it counts for: 1, or its mass in kilograms when moving house.
+    /// What it counts for in this task.
     pub fn worth(&self, task: TaskId) -> f64 {
-        if task == TaskId::MovingHouse { f64::from(self.class.info().mass_kg) } else { 1.0 }
+        task.info().worth.of(self.class)
     }
 }

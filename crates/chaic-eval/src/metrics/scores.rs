@@ -133,7 +133,8 @@ impl Scores {
         let played = self.tasks.values().flat_map(|h| h.keys());
         let present: BTreeSet<&String> =
             played.chain(self.unplayed.iter().map(|(_, helper)| helper)).collect();
-        let known = std::iter::once(NONE).chain(chaic_agents::HELPERS.iter().copied());
+        let known =
+            std::iter::once(NONE).chain(chaic_agents::HELPERS.iter().map(|helper| helper.name));
         let mut order: Vec<&str> = known.filter(|n| present.iter().any(|p| p == n)).collect();
         // The oracle isn't compared with but looked up to: the paper's tables have it last.
         order.sort_by_key(|name| *name == "oracle");

@@ -65,7 +65,10 @@ fn head(image: &mut RgbImage, Contents { header, world, .. }: &Contents<'_>) {
     let left = MARGIN_PX as f32;
     text::draw(image, (left, 10.0), 20.0, INK, Align::Left, &title);
     let (done, total) = world.progress();
-    let unit = if world.setup().task == chaic_protocol::TaskId::MovingHouse { " kg" } else { "" };
+    let unit = match world.setup().task.info().worth.unit() {
+        "" => String::new(),
+        unit => format!(" {unit}"),
+    };
     let (frame, horizon) = (world.state().frame, world.setup().horizon);
     let words = format!("done {done:.0} of {total:.0}{unit}    frame {frame} of {horizon}");
     let right = (WIDTH_PX - MARGIN_PX) as f32;

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use chaic_agents::HelperInfo;
 use chaic_agents::partners::PARTNER_GRANTS;
 use chaic_env::minds::NONE;
 use chaic_protocol::observation::Grants;
@@ -124,19 +125,20 @@ fn told(names: &[String]) -> String {
     names.iter().map(|n| n.replace('_', " ")).collect::<Vec<_>>().join(", ")
 }
 
+/// Titles of helpers that other crates make: a report knows names only.
+const ELSEWHERE: [(&str, &str); 5] = [
+    (NONE, "w/o"),
+    // Without "BM": no behavior model of ours sees failures, as the paper's does.
+    ("llm", "LLM"),
+    ("llm-told", "LLM, told"),
+    ("vlm", "VLM"),
+    ("vlm-told", "VLM, told"),
+];
+
 /// What a table calls a helper.
 pub fn title(helper: &str) -> String {
-    match helper {
-        NONE => "w/o".to_owned(),
-        "random" => "Random".to_owned(),
-        "rhp" => "RHP".to_owned(),
-        "oracle" => "Oracle".to_owned(),
-        "follow" => "Follow".to_owned(),
-        // Without "BM": no behavior model of ours sees failures, as the paper's does.
-        "llm" => "LLM".to_owned(),
-        "llm-told" => "LLM, told".to_owned(),
-        "vlm" => "VLM".to_owned(),
-        "vlm-told" => "VLM, told".to_owned(),
-        other => other.to_owned(),
-    }
+    let built_in = HelperInfo::named(helper).map(|info| info.title);
+    let of_elsewhere =
+        || ELSEWHERE.iter().find(|(name, _)| *name == helper).map(|(_, title)| *title);
+    built_in.or_else(of_elsewhere).unwrap_or(helper).to_owned()
 }

@@ -24,6 +24,9 @@ mod house;
 mod kitchen;
 mod moving;
 mod street;
+mod style_seeds;
+
+use style_seeds::style_seed;
 
 /// Styles of each class: other forms of what doesn't collide, other colors.
 pub(crate) const N_STYLES: u8 = 4;
@@ -117,7 +120,7 @@ fn seed_of(setup: &Setup, index: usize) -> u32 {
     let thing = &setup.things[index];
     let mut h = scramble(setup.seed as u32 ^ 0x51ed_270b);
     let mut mix = |x: u32| h = scramble(h ^ x).wrapping_add(0x9e37_79b9);
-    mix(thing.class.index() as u32);
+    mix(style_seed(thing.class));
     if SETS.contains(&thing.class.name()) {
         for scale in thing.scale {
             mix(scale.to_bits());

@@ -1,7 +1,7 @@
 //! Rules of what one makes of the others: the partner, the child, and what they hold.
 
 use super::*;
-use crate::helpers::helper_grants;
+use crate::helpers::HelperInfo;
 use crate::partners::partner_grants;
 use crate::test_support::identity;
 use chaic_protocol::briefing::{Companion, Relation};
@@ -34,10 +34,11 @@ fn what_the_other_holds_is_told_to_everybody_or_to_the_oracle_alone() {
     for knows_holding in [false, true] {
         let rules = PlannerRules { knows_holding, ..PAPER };
         assert_eq!(partner_grants(rules).behavior, knows_holding);
+        let grants = |name: &str| (HelperInfo::named(name).expect("it is built in").grants)(rules);
         for helper in ["random", "rhp", "follow"] {
-            assert_eq!(helper_grants(helper, rules).behavior, knows_holding, "{helper}");
+            assert_eq!(grants(helper).behavior, knows_holding, "{helper}");
         }
-        assert!(helper_grants("oracle", rules).behavior);
+        assert!(grants("oracle").behavior);
     }
 }
 

@@ -191,9 +191,12 @@ impl pulp::NullaryFnOnce for ReadBack<'_> {
                 let (whole, rest) = depth_m[line.clone()].as_chunks_mut::<LANES>();
                 let mut blocks = target.inverse_depth(j).iter();
                 for (out, block) in whole.iter_mut().zip(&mut blocks) {
+                    // In a list of its own, which becomes a vector.
+                    let mut depth = [0.0; LANES];
                     for k in 0..LANES {
-                        out[k] = seen_depth_m(reciprocal(block[k]));
+                        depth[k] = seen_depth_m(reciprocal(block[k]));
                     }
+                    *out = depth;
                 }
                 if let Some(block) = blocks.next() {
                     for (out, q) in rest.iter_mut().zip(&**block) {

@@ -12,7 +12,7 @@ from chaic_helper import serve
 
 NEAR_M = 1.2  # How near to walk before taking or putting, metres.
 BLOCKED_M = 0.6  # Something this near straight ahead is in the way, metres.
-SIZE = 64  # Side of the images, pixels.
+SIZE = 64  # Side of the images that it asks for, pixels; `chaic eval --size` may give others.
 
 
 class Walker:
@@ -27,6 +27,7 @@ class Walker:
         self.turns_left = 0
 
     def act(self, seen, images):
+        self.size = seen["camera"]["width"]
         last = seen["own"]["last"]
         if last is not None and last[1] != "success":
             # A step against something, or a thing out of reach: turn away from it.
@@ -41,7 +42,7 @@ class Walker:
             _, pixel, entity = found
             self.turns_left = 0
             self.aimed_at = entity
-            target = {"pixel": {"column": pixel % SIZE, "row": pixel // SIZE}}
+            target = {"pixel": {"column": pixel % self.size, "row": pixel // self.size}}
             if hands:
                 return {"put_on": {"place": target, "hand": "right"}}
             return {"pick_up": {"object": target, "hand": "right"}}
@@ -52,27 +53,29 @@ class Walker:
             self.turns_left = self.random.randrange(1, 9)
             return "turn_left"
         if found is not None:
-            off = found[1] % SIZE + 0.5 - SIZE / 2
-            if abs(off) > SIZE / 8:
+            off = found[1] % self.size + 0.5 - self.size / 2
+            if abs(off) > self.size / 8:
                 return "turn_right" if off > 0 else "turn_left"
         return "move_forward"
 
     def ahead_m(self, images):
         """Depth of the nearest thing that a body would walk into, metres."""
-        middle = range(SIZE // 2 - SIZE // 16, SIZE // 2 + SIZE // 16)
-        return min(images.depth_m[SIZE * row + column] for row in middle for column in middle)
+        size = self.size
+        middle = range(size // 2 - size // 16, size // 2 + size // 16)
+        return min(images.depth_m[size * row + column] for row in middle for column in middle)
 
     def nearest(self, seen, images, wanted, hands):
         """Distance in metres, pixel and id of the nearest thing in sight of a wanted class."""
         held = {hand["identity"]["entity"] for hand in hands if hand["identity"]}
         classes = dict(seen["granted"]["classes"])
         ids = {e for e, c in classes.items() if c in wanted and e not in held | self.given_up}
-        focal = SIZE / 2 / math.tan(seen["camera"]["vertical_fov_rad"] / 2)
+        size = self.size
+        focal = size / 2 / math.tan(seen["camera"]["vertical_fov_rad"] / 2)
         best = None
         for pixel, entity in enumerate(images.ids or ()):
             if entity in ids:
                 depth = images.depth_m[pixel]
-                sideways = depth * (pixel % SIZE + 0.5 - SIZE / 2) / focal
+                sideways = depth * (pixel % size + 0.5 - size / 2) / focal
                 distance = math.hypot(depth, sideways)
                 if best is None or distance < best[0]:
                     best = (distance, pixel, entity)

@@ -43,6 +43,8 @@ pub struct Env {
     turns: Vec<Turn>,
     /// Images that nobody looks at any more.
     spare: Vec<Images>,
+    /// Why a mind couldn't decide, if one couldn't: nobody is asked again then.
+    broken: Option<AgentError>,
 }
 
 /// All of an episode as it stood, minds included; see [`Env::snapshot`]. It lives in memory only: minds
@@ -52,6 +54,7 @@ pub struct EnvSnapshot {
     seats: Vec<Seat>,
     turns: Vec<Turn>,
     header: Header,
+    filled: Filled,
 }
 
 /// Which seats the caller filled; all others are for the rule-based minds of an episode.
@@ -127,7 +130,7 @@ impl Env {
         let scene = Scene::with_appearance(world.setup(), config.appearance);
         let observer = Observer::new(Arc::new(scene));
         let turns = seats.iter().map(|_| Turn::default()).collect();
-        Env { world, seats, filled, observer, header, turns, spare: Vec::new() }
+        Env { world, seats, filled, observer, header, turns, spare: Vec::new(), broken: None }
     }
 
     /// Begins another episode with the same minds and callers, and with the rule-based partner and
@@ -260,8 +263,11 @@ impl Env {
     /// What has come of the action that the caller last chose for an agent, until now: the terms of
     /// a reward. `None` before the first choice.
     pub fn reward(&self, agent: AgentId) -> Option<RewardTerms> {
-        let before = self.turns.get(agent.index())?.before.as_ref()?;
-        Some(RewardTerms::between(before, &self.world, agent))
+        let turn = self.turns.get(agent.index())?;
+        let terms = RewardTerms::between(turn.before.as_ref()?, &self.world, agent);
+        // What is chosen but waits for others has come to nothing yet.
+        let is_begun = turn.choice.is_none();
+        Some(RewardTerms { is_invalid: terms.is_invalid && is_begun, ..terms })
     }
 
     /// How the episode would be scored if it ended now.
@@ -285,6 +291,7 @@ impl Env {
             seats: fork(&self.seats)?,
             turns: self.turns.clone(),
             header: self.header.clone(),
+            filled: self.filled,
         })
     }
 
@@ -295,7 +302,11 @@ impl Env {
     /// [`EnvError::OtherSnapshot`] if the snapshot is of another episode, seed, rules or minds. The
     /// environment is as it was then.
     pub fn restore(&mut self, snapshot: &EnvSnapshot) -> Result<()> {
-        if snapshot.header != self.header {
+        let drivers = |seats: &[Seat]| seats.iter().map(|s| s.mind().is_some()).collect::<Vec<_>>();
+        if snapshot.header != self.header
+            || snapshot.filled != self.filled
+            || drivers(&snapshot.seats) != drivers(&self.seats)
+        {
             return Err(EnvError::OtherSnapshot {
                 id: self.header.episode.clone(),
                 of: snapshot.header.episode.clone(),
@@ -304,6 +315,7 @@ impl Env {
         self.seats = fork(&snapshot.seats)?;
         self.world = snapshot.world.clone();
         self.turns.clone_from(&snapshot.turns);
+        self.broken = None;
         Ok(())
     }
 
@@ -328,7 +340,10 @@ impl Env {
         until: Option<Frame>,
         sink: &mut dyn FnMut(&Record) -> std::result::Result<(), E>,
     ) -> std::result::Result<Flow, E> {
-        let Env { world, seats, observer, turns, spare, .. } = self;
+        if let Some(error) = &self.broken {
+            return Err(error.clone().into());
+        }
+        let Env { world, seats, observer, turns, spare, broken, .. } = self;
         let mut flow = Flow::Stopped;
         let mut decide = |world: &World, waiting: &[AgentId]| -> Decided<E> {
             let late = until.is_some_and(|f| world.state().frame >= f);
@@ -345,7 +360,8 @@ impl Env {
             };
             for (agent, glimpse) in minds.into_iter().zip(glimpses) {
                 let turn = &mut turns[agent.index()];
-                turn.choice = choose(&mut seats[agent.index()], agent, &glimpse, &mut turn.said)?;
+                let chosen = choose(&mut seats[agent.index()], agent, &glimpse, &mut turn.said);
+                turn.choice = chosen.inspect_err(|error| *broken = Some(error.clone()))?;
                 if seats[agent.index()].senses.wants_image() {
                     spare.push(glimpse.into_images());
                 }

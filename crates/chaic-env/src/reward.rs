@@ -19,7 +19,7 @@ pub struct RewardTerms {
     /// somebody took, dropped or delivered meanwhile are left out, so that what others do neither
     /// rewards nor punishes, and going to and fro earns nothing.
     pub approached_m: f64,
-    /// Whether the action failed.
+    /// Whether the action has ended and failed.
     pub is_invalid: bool,
 }
 
@@ -49,7 +49,10 @@ impl RewardTerms {
             - if self.is_invalid { weights.invalid } else { 0.0 }
     }
 
+    /// What has come of an action that was begun as things stood `before`.
     pub(crate) fn between(before: &Standing, world: &World, agent: AgentId) -> RewardTerms {
+        let person = world.state().people.get(agent.index());
+        let is_under_way = person.is_none_or(|p| p.activity.is_some());
         let now = Standing::of(world, agent);
         let both = || before.ways_m.iter().zip(&now.ways_m).filter_map(|(a, b)| (*a).zip(*b));
         let shortest = |ways: &mut dyn Iterator<Item = f32>| ways.min_by(f32::total_cmp);
@@ -58,7 +61,8 @@ impl RewardTerms {
         RewardTerms {
             delivered: now.done - before.done,
             approached_m: before_m.zip(now_m).map_or(0.0, |(a, b)| f64::from(a - b)),
-            is_invalid: world.last_action(agent).is_some_and(|(_, outcome)| !outcome.is_success()),
+            is_invalid: !is_under_way
+                && world.last_action(agent).is_some_and(|(_, outcome)| !outcome.is_success()),
         }
     }
 }

@@ -210,8 +210,9 @@ fn deliveries_approaches_and_failures_are_rewarded_as_they_come() {
             let arm_m = if action.is_some_and(|a| a.is_locomotion()) { 0.0 } else { 4.0 };
             assert!(terms.approached_m.abs() <= walked_m + arm_m, "{terms:?}: {walked_m} m");
             n_failed += u32::from(terms.is_invalid);
-            let outcome = env.world().last_action(AgentId::HELPER).map(|(_, outcome)| outcome);
-            assert_eq!(terms.is_invalid, outcome.is_some_and(|o| !o.is_success()));
+            // The environment tells the agent itself how its action ended.
+            let last = env.observe(AgentId::HELPER).and_then(|seen| seen.own.last);
+            assert_eq!(terms.is_invalid, last.is_some_and(|(_, outcome)| !outcome.is_success()));
         }
         let seen = env.observe(AgentId::HELPER).expect("it waits");
         // One that must fail, to see that it is told.
@@ -221,6 +222,8 @@ fn deliveries_approaches_and_failures_are_rewarded_as_they_come() {
         };
         before = here(&env);
         assert!(env.submit(AgentId::HELPER, action));
+        let under_way = env.reward(AgentId::HELPER).expect("it has chosen");
+        assert!(!under_way.is_invalid, "what has not ended has not failed");
     }
     let end = env.score();
     let missed = env.reward(AgentId::HELPER).expect("it acted").delivered;
@@ -230,4 +233,59 @@ fn deliveries_approaches_and_failures_are_rewarded_as_they_come() {
     let terms = RewardTerms { delivered: 0.2, approached_m: 2.0, is_invalid: true };
     let reward = terms.weigh(&RewardWeights::STANDARD);
     assert!((reward - 2.0).abs() < 1e-9, "0.2 * 10 + 2 * 0.05 - 0.1 is not {reward}");
+}
+
+#[test]
+fn a_snapshot_of_a_caller_s_turn_is_gone_on_with() {
+    let episode = of_task(TaskId::Obstacle);
+    let seat = || Seat::of_caller(Grants::IDS, Senses { image_size: 64, ..Senses::DEPTH_AND_IDS });
+    let minds = || Minds { helper: Some(seat()), partner: None };
+    let mut env = Env::new(config(&episode), minds()).unwrap();
+    let go_on = |env: &mut Env, action: Action| {
+        assert!(env.submit(AgentId::HELPER, action));
+        assert_eq!(env.advance(None), Ok(Flow::Waits));
+        let seen = env.observe(AgentId::HELPER).expect("it waits").clone();
+        (seen, env.reward(AgentId::HELPER), env.digest())
+    };
+    assert_eq!(env.advance(None), Ok(Flow::Waits));
+    go_on(&mut env, Action::MoveForward);
+    // In the middle of a turn, having looked.
+    let snapshot = env.snapshot().unwrap();
+    let one = go_on(&mut env, Action::TurnLeft);
+    let other = go_on(&mut env, Action::PutIn);
+    assert!(other.1.is_some_and(|terms| terms.is_invalid) && one.2 != other.2);
+    env.restore(&snapshot).unwrap();
+    assert_eq!(go_on(&mut env, Action::TurnLeft), one);
+    assert_eq!(go_on(&mut env, Action::PutIn), other);
+    // A mind in the caller's seat is another episode.
+    let mut with_mind = Env::new(config(&episode), Some(rhp())).unwrap();
+    assert!(matches!(with_mind.restore(&snapshot), Err(EnvError::OtherSnapshot { .. })));
+}
+
+/// A mind that breaks down, and counts how often it is asked.
+struct Breaks(std::sync::Arc<std::sync::atomic::AtomicU32>);
+
+impl Agent for Breaks {
+    fn senses(&self) -> Senses {
+        Senses::NONE
+    }
+
+    fn reset(&mut self, _: &Briefing) {}
+
+    fn act(&mut self, _: &Observation) -> Result<Action, AgentError> {
+        self.0.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        Err(AgentError::Broken("out of order".to_owned()))
+    }
+}
+
+#[test]
+fn who_broke_down_is_not_asked_again() {
+    let asked = std::sync::Arc::default();
+    let episode = of_task(TaskId::NoConstraint);
+    let mind = Box::new(Breaks(std::sync::Arc::clone(&asked)));
+    let mut env = Env::new(config(&episode), Some(Helper { mind, grants: Grants::NONE })).unwrap();
+    for _ in 0..3 {
+        assert_eq!(env.advance(None), Err(AgentError::Broken("out of order".to_owned())));
+    }
+    assert_eq!(asked.load(std::sync::atomic::Ordering::Relaxed), 1);
 }

@@ -26,7 +26,7 @@
 //! 2. `setup.wgsl`: triangles are brought onto the image, those that turn their back or cover no
 //!    center of a pixel are dropped, those that reach behind the eye are cut.
 //! 3. `tiles.wgsl`, one workgroup for each 32 by 32 pixels: it goes through its view's triangles and
-//!    keeps inverse depth and owner of its pixels in registers. So no pixel needs an atomic operation, a
+//!    keeps inverse depth and visibility id of its pixels in registers. So no pixel needs an atomic operation, a
 //!    wall over the whole image is nobody's burden alone, and ties are settled in a fixed order.
 //! 4. `shade.wgsl`: color, if a view asks for it.
 //!

@@ -30,7 +30,7 @@ use crate::texture::shown_from_linear;
 /// There is a node `class#id` for each instance, with both as extras; a mesh for each shape in each
 /// tint and factor, with a primitive for each skin; and a node for each camera. A material is shared
 /// by all that look the same; its color is the skin's or the tint, times the factor, at most 1. `class_of` names what an
-/// entity is. The corners of flat triangles are their own, so that they have one normal.
+/// entity is. The vertices of flat triangles are their own, so that they have one normal.
 pub fn glb(
     geometry: &Geometry,
     class_of: &dyn Fn(EntityId) -> &'static str,
@@ -116,13 +116,13 @@ impl File {
         for triangle in triangles {
             let [a, b, c] = triangle.vertices.map(|k| Vec3::from(mesh.positions[k as usize]));
             let plane = unit((b - a).cross(c - a)).to_array();
-            for corner in triangle.vertices {
+            for vertex in triangle.vertices {
                 let next = positions.len() as u32;
                 let index =
-                    if triangle.smooth { *shared.entry(corner).or_insert(next) } else { next };
+                    if triangle.smooth { *shared.entry(vertex).or_insert(next) } else { next };
                 if index == next {
-                    let normal = mesh.normals[corner as usize];
-                    positions.push(mesh.positions[corner as usize]);
+                    let normal = mesh.normals[vertex as usize];
+                    positions.push(mesh.positions[vertex as usize]);
                     normals.push(if triangle.smooth { normal } else { plane });
                 }
                 indices.push(index);

@@ -78,19 +78,20 @@ fn label(frame: &Frame, lens: &Lens, view: &View, scratch: &mut Scratch, labels:
     let mut last = (BACKGROUND, Plane::default());
     for j in 0..lens.height {
         let blocks = target.visibility_ids(j).iter().zip(target.inverse_depth(j).iter());
-        let pixels =
-            blocks.flat_map(|(owners, inverse_depth)| owners.iter().zip(inverse_depth.iter()));
-        for (k, (owner, inverse_depth)) in pixels.enumerate().take(lens.width) {
-            if *owner == BACKGROUND {
+        let pixels = blocks.flat_map(|(visibility_ids, inverse_depth)| {
+            visibility_ids.iter().zip(inverse_depth.iter())
+        });
+        for (k, (visibility_id, inverse_depth)) in pixels.enumerate().take(lens.width) {
+            if *visibility_id == BACKGROUND {
                 continue;
             }
-            let (index, triangle) = unpack_visibility_id(*owner);
+            let (index, triangle) = unpack_visibility_id(*visibility_id);
             let instance = &frame.instances[index];
-            if last.0 != *owner {
+            if last.0 != *visibility_id {
                 let mesh = instance.shape.mesh(usize::from(work.levels[index]));
                 let sight = painter.sight(instance);
                 let triangle = &mesh.triangles[triangle];
-                last = (*owner, painter.normals(instance, &sight, mesh, triangle));
+                last = (*visibility_id, painter.normals(instance, &sight, mesh, triangle));
             }
             let row = last.1.from(k, j as f32 + 0.5);
             let depth_m = reciprocal(*inverse_depth);

@@ -15,13 +15,14 @@
 //! - No camera, size or posture makes it panic.
 //!
 //! How a view comes about: instances are culled by the camera's frustum, by the rooms that can be seen
-//! from where it stands ([`portals`]) and by what is already drawn ([`draw`]), drawn at a level of detail that fits their size on the image ([`models`]) into
-//! a buffer of inverse_depth and owners: triangles are set up many at once ([`setup`]) and filled span by
-//! span ([`raster`]). Depth and ids are read off that buffer, and color only if it is asked for: each
-//! triangle that is seen gets a paint ([`paint`]) whose points are lit many at once ([`points`]); each
-//! row of pixels is cut into segments of one triangle ([`shade`], [`segments`]) that are filled from
-//! paint and texture ([`row`]). The inner loops are compiled for each kind of vectors, and do the same
-//! operations in each.
+//! from where it stands ([`portals`]) and by what is already drawn ([`draw`]), drawn at a level of
+//! detail that fits their size on the image ([`models`]) into a visibility buffer (inverse depth and
+//! visibility ids): triangles are set up many at once ([`setup`]) and filled span by span ([`raster`]).
+//! Depth and ids are read off that buffer, and color only if it is asked for: each triangle that is
+//! seen gets a paint ([`paint`]) whose points are lit many at once ([`points`]); each row of pixels is
+//! cut into segments of one triangle ([`shade`], [`segments`]) that are filled from paint and texture
+//! ([`row`]). The inner loops are compiled for each kind of vectors, and do the same operations in
+//! each.
 
 #![allow(
     rustdoc::private_intra_doc_links,

@@ -440,9 +440,9 @@ mod tests {
             let slope = Slope { du, low: 0.2, high: rng.range(0.2, 1.0), ..Slope::default() };
             let (q0, begin) = (rng.range(0.0, 1.0), rng.below(50));
             let span = begin..begin + n;
-            let mut right_owners = vec![7; before.len()];
+            let mut right_ids = vec![7; before.len()];
             let mut right_q = before.clone();
-            let right = (&mut right_q[span.clone()], &mut right_owners[span]);
+            let right = (&mut right_q[span.clone()], &mut right_ids[span]);
             fill_one_by_one(right, q0, begin as u32, &slope, 9);
             let span = (begin as u32, (begin + n) as u32);
             let row = rng.below(TILE);
@@ -456,9 +456,9 @@ mod tests {
             let (q, visibility_ids) =
                 (q.iter().flat_map(|q| q[row].0), visibility_ids.iter().flat_map(|o| o[row].0));
             assert!(q.map(bits).eq(right_q.into_iter().map(bits)), "{n} pixels, {slope:?}");
-            assert!(visibility_ids.eq(right_owners.iter().copied()), "{n} pixels, {slope:?}");
+            assert!(visibility_ids.eq(right_ids.iter().copied()), "{n} pixels, {slope:?}");
             let names = names.iter().flat_map(|o| o[row].0).map(u32::from);
-            assert!(names.eq(right_owners), "{n} pixels, {slope:?}");
+            assert!(names.eq(right_ids), "{n} pixels, {slope:?}");
         }
     }
 

@@ -36,7 +36,7 @@ pub(crate) struct Canvas {
     /// Where neighboring pixels of one triangle, a run, begin on the row.
     begins: Vec<u32>,
     /// Whose the row's pixels are, after one that is someone else's than the first.
-    owners: Vec<u32>,
+    visibility_ids: Vec<u32>,
     segments: Segments,
     /// What is lit on the row: new triangles' points and knots of structure.
     points: Points,
@@ -133,17 +133,26 @@ impl pulp::NullaryFnOnce for Rows<'_> {
     }
 }
 
-/// Finds the columns in which runs begin; `owners` gets the row's, after one that isn't.
+/// Finds the columns in which runs begin; `visibility_ids` gets the row's, after one that isn't.
 #[inline(always)]
-fn find_begins(row: Blocks<Wide<u32>>, width: usize, owners: &mut Vec<u32>, begins: &mut Vec<u32>) {
-    owners.resize(width.div_ceil(LANES) * LANES + 1, 0);
-    let Some((before, after)) = owners.split_first_mut() else { return };
+fn find_begins(
+    row: Blocks<Wide<u32>>,
+    width: usize,
+    visibility_ids: &mut Vec<u32>,
+    begins: &mut Vec<u32>,
+) {
+    visibility_ids.resize(width.div_ceil(LANES) * LANES + 1, 0);
+    let Some((before, after)) = visibility_ids.split_first_mut() else { return };
     for (out, block) in after.as_chunks_mut::<LANES>().0.iter_mut().zip(row.iter()) {
         *out = **block;
     }
     *before = !after.first().copied().unwrap_or_default();
     begins.clear();
-    let pairs = owners.as_chunks::<LANES>().0.iter().zip(owners[1..].as_chunks::<LANES>().0);
+    let pairs = visibility_ids
+        .as_chunks::<LANES>()
+        .0
+        .iter()
+        .zip(visibility_ids[1..].as_chunks::<LANES>().0);
     for (b, (before, block)) in pairs.enumerate() {
         let mut begin = 0u32;
         for k in 0..LANES {
@@ -168,15 +177,20 @@ impl Rows<'_> {
         self.canvas.segments.clear();
         self.canvas.sky.clear();
         let mut begins = std::mem::take(&mut self.canvas.begins);
-        find_begins(self.target.visibility_ids(j), width, &mut self.canvas.owners, &mut begins);
+        find_begins(
+            self.target.visibility_ids(j),
+            width,
+            &mut self.canvas.visibility_ids,
+            &mut begins,
+        );
         for (k, begin) in begins.iter().enumerate() {
             let begin = *begin as usize;
             let end = begins.get(k + 1).map_or(width, |end| *end as usize);
-            let owner = self.canvas.owners[begin + 1];
-            if owner == BACKGROUND {
+            let visibility_id = self.canvas.visibility_ids[begin + 1];
+            if visibility_id == BACKGROUND {
                 self.see_sky(j, begin, end);
             } else {
-                let paint = self.find_paint(owner);
+                let paint = self.find_paint(visibility_id);
                 self.see_surface(j, begin, end, paint);
             }
         }
@@ -304,8 +318,8 @@ impl Rows<'_> {
 
     /// Where the paint of a triangle is; worked out when first asked for.
     #[inline(always)]
-    fn find_paint(&mut self, owner: u32) -> usize {
-        let (index, triangle) = unpack_visibility_id(owner);
+    fn find_paint(&mut self, visibility_id: u32) -> usize {
+        let (index, triangle) = unpack_visibility_id(visibility_id);
         let slot = self.drawn.firsts[index] as usize + triangle;
         let known = self.canvas.slots[slot];
         if known != EMPTY {

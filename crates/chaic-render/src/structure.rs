@@ -142,11 +142,11 @@ fn ceiling_mesh(rect: &Rect, height_m: f32) -> Mesh {
 fn level_quad(mesh: &mut Mesh, rect: &Rect, y: f32, downwards: bool) {
     let (a, b) = (rect.min, rect.max);
     let ring = [(a.x, a.y), (a.x, b.y), (b.x, b.y), (b.x, a.y)];
-    let mut corners = ring.map(|(x, z)| mesh.vertex(Vec3::new(x, y, z), Vec3::Y));
+    let mut vertices = ring.map(|(x, z)| mesh.vertex(Vec3::new(x, y, z), Vec3::Y));
     if downwards {
-        corners.reverse();
+        vertices.reverse();
     }
-    mesh.quad(corners, false);
+    mesh.quad(vertices, false);
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use chaic_protocol::observation::Senses;
 use chaic_protocol::{Action, Agent, AgentError, Briefing, Observation};
 
 use crate::commands::Command;
-use crate::message::{PROTOCOL, ToEnv, ToMind, observation_frame, plain};
+use crate::message::{IMAGE_SIZES, PROTOCOL, ToEnv, ToMind, cut, observation_frame, plain};
 use crate::process::Process;
 
 /// A mind in another process, which is started when an episode begins and ends with it.
@@ -61,7 +61,11 @@ impl SubprocessAgent {
     ) -> Result<Senses, AgentError> {
         let reset = ToMind::Reset { briefing: Box::new(briefing.clone()) };
         match process.ask(plain(&reset), command.limits.start)? {
-            ToEnv::Ready { senses } => Ok(senses),
+            ToEnv::Ready { senses } if IMAGE_SIZES.contains(&senses.image_size) => Ok(senses),
+            ToEnv::Ready { senses } => Err(AgentError::Broken(format!(
+                "`{}` wants images of {} pixels, not {IMAGE_SIZES:?}",
+                command.line, senses.image_size
+            ))),
             other => Err(unexpected(command, "reset", &other)),
         }
     }
@@ -73,7 +77,13 @@ impl SubprocessAgent {
         observation: &Observation,
     ) -> Result<(Action, Option<Thought>), AgentError> {
         match process.ask(observation_frame(observation), command.limits.decision)? {
-            ToEnv::Act { action, thought } => Ok((action, thought)),
+            ToEnv::Act { action, thought } => Ok((
+                action,
+                thought.map(|Thought { plan, mood }| Thought {
+                    plan: cut(&plan),
+                    mood: mood.as_deref().map(cut),
+                }),
+            )),
             other => Err(unexpected(command, "observe", &other)),
         }
     }

@@ -45,8 +45,9 @@ impl Frame {
     /// Reads the next one; `None` if the pipe was closed before it.
     ///
     /// # Errors
-    /// If the pipe is closed within a frame, or a length is out of bounds.
-    pub fn read(from: &mut dyn Read) -> io::Result<Option<Frame>> {
+    /// If the pipe is closed within a frame, or a length is out of bounds: [`MAX_HEAD`], and
+    /// `max_body`, which is [`MAX_BODY`] for minds and 0 for the environment.
+    pub fn read(from: &mut dyn Read, max_body: usize) -> io::Result<Option<Frame>> {
         let mut lengths = [0; 8];
         let n = read_up_to(from, &mut lengths)?;
         if n == 0 {
@@ -60,9 +61,9 @@ impl Frame {
                 as usize
         };
         let (head, body) = (length(0), length(4));
-        if head > MAX_HEAD || body > MAX_BODY {
+        if head > MAX_HEAD || body > max_body {
             let text = format!(
-                "a frame of {head} and {body} bytes, more than {MAX_HEAD} and {MAX_BODY}; is \
+                "a frame of {head} and {body} bytes, more than {MAX_HEAD} and {max_body}; is \
                  something else printed on the standard output?"
             );
             return Err(io::Error::new(io::ErrorKind::InvalidData, text));
@@ -99,16 +100,18 @@ mod tests {
         frame.write(&mut bytes).unwrap();
         assert_eq!(bytes[..8], [14, 0, 0, 0, 3, 0, 0, 0]);
         let mut pipe = &bytes[..];
-        assert_eq!(Frame::read(&mut pipe).unwrap(), Some(frame));
-        assert_eq!(Frame::read(&mut pipe).unwrap(), None);
+        assert_eq!(Frame::read(&mut pipe, 3).unwrap(), Some(frame));
+        assert_eq!(Frame::read(&mut pipe, 3).unwrap(), None);
         for cut in 1..bytes.len() {
-            assert!(Frame::read(&mut &bytes[..cut]).is_err(), "cut after {cut} bytes");
+            assert!(Frame::read(&mut &bytes[..cut], 3).is_err(), "cut after {cut} bytes");
         }
+        assert!(Frame::read(&mut &bytes[..], 2).is_err(), "a body that is too long");
     }
 
     #[test]
     fn text_on_the_pipe_is_no_frame() {
-        let error = Frame::read(&mut &b"Hello world, I am loading weights"[..]).unwrap_err();
+        let error =
+            Frame::read(&mut &b"Hello world, I am loading weights"[..], MAX_BODY).unwrap_err();
         assert!(error.to_string().contains("standard output"), "{error}");
     }
 }

@@ -12,7 +12,7 @@
 //! - What goes over the pipe is the agent's briefing and its observations, and nothing else.
 //! - A process that is silent, broken, greedy or talks nonsense ends its own episode, by a message
 //!   that says what it did, and never hangs or ends a run.
-//! - No process outlives its episode.
+//! - No process outlives its episode, nor does what it started, unless that leaves its process group.
 //! - A command is run because the user named it, never because a run's folder did.
 
 pub mod agent;

@@ -9,6 +9,17 @@ use serde::{Deserialize, Serialize};
 
 use crate::frame::Frame;
 
+/// Sides of images that a mind may ask for, pixels.
+pub const IMAGE_SIZES: std::ops::RangeInclusive<u32> = 16..=2048;
+/// Longest text of a mind that is kept, bytes: a thought, a problem.
+pub const MAX_TEXT: usize = 2000;
+
+/// The beginning of a text that may be of any length.
+pub(crate) fn cut(text: &str) -> String {
+    let end = (0..=text.len().min(MAX_TEXT)).rev().find(|k| text.is_char_boundary(*k));
+    text[..end.unwrap_or(0)].to_owned()
+}
+
 /// The version of the protocol. Both sides say theirs, and part if they differ.
 pub const PROTOCOL: u32 = 1;
 
@@ -105,7 +116,7 @@ pub(crate) fn plain<M: Serialize>(message: &M) -> Frame {
 pub(crate) fn message<M: DeserializeOwned>(frame: &Frame) -> Result<M, String> {
     serde_json::from_slice(&frame.head).map_err(|e| {
         let start = String::from_utf8_lossy(&frame.head[..frame.head.len().min(200)]).into_owned();
-        format!("no message of the protocol ({e}): {start}")
+        cut(&format!("no message of the protocol: {start} ({e})"))
     })
 }
 

@@ -3,7 +3,7 @@
 use std::io::Read;
 use std::process::{Child, ChildStdin, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -11,7 +11,7 @@ use chaic_protocol::AgentError;
 
 use crate::commands::Command;
 use crate::frame::Frame;
-use crate::message::{ToEnv, ToMind, message, plain};
+use crate::message::{ToEnv, ToMind, cut, message, plain};
 
 /// How often one who waits looks whether it is to stop.
 const LOOK: Duration = Duration::from_millis(50);
@@ -26,6 +26,8 @@ pub(crate) struct Process {
     to: Option<Sender<Frame>>,
     from: Receiver<Result<Frame, String>>,
     errors: Arc<Mutex<Vec<u8>>>,
+    /// Closed once all of its complaints are there.
+    no_more_errors: Receiver<()>,
     command: Arc<Command>,
     /// How long it has been waited for, in all.
     waited: Duration,
@@ -49,12 +51,17 @@ impl Process {
         };
         let errors = Arc::new(Mutex::new(Vec::new()));
         let kept = Arc::clone(&errors);
-        std::thread::spawn(move || keep_errors(stderr, &kept));
+        let (until, no_more_errors) = channel();
+        std::thread::spawn(move || {
+            keep_errors(stderr, &kept);
+            drop(until);
+        });
         Ok(Process {
             child,
             to: Some(writer(stdin)),
             from: reader(stdout),
             errors,
+            no_more_errors,
             command: Arc::clone(command),
             waited: Duration::ZERO,
             stop,
@@ -63,22 +70,27 @@ impl Process {
 
     /// Sends a frame, and waits for the answer.
     pub fn ask(&mut self, frame: Frame, within: Duration) -> Result<ToEnv, AgentError> {
+        match self.from.try_recv() {
+            Ok(Ok(_)) => return Err(self.broken("spoke without being asked")),
+            Ok(Err(text)) => return Err(self.broken(&text)),
+            Err(_) => {}
+        }
         // If the pipe is closed, the answer says why.
         let sent = self.to.as_ref().map(|to| to.send(frame));
         let began = Instant::now();
         let left = self.command.limits.episode.saturating_sub(self.waited);
         let answer = match sent {
-            Some(_) => self.wait(within.min(left)),
+            Some(_) => self.wait(within.min(left), left < within),
             None => Err(self.broken("was ended")),
         };
         self.waited += began.elapsed();
         match message(&answer?).map_err(|text| self.broken(&format!("sent {text}")))? {
-            ToEnv::Failed { problem } => Err(self.broken(&format!("said: {problem}"))),
+            ToEnv::Failed { problem } => Err(self.broken(&format!("said: {}", cut(&problem)))),
             answer => Ok(answer),
         }
     }
 
-    fn wait(&mut self, within: Duration) -> Result<Frame, AgentError> {
+    fn wait(&mut self, within: Duration, is_last: bool) -> Result<Frame, AgentError> {
         let began = Instant::now();
         loop {
             if self.stop.load(Ordering::Relaxed) {
@@ -91,7 +103,8 @@ impl Process {
                 Err(RecvTimeoutError::Timeout) if left > LOOK => {}
                 Err(RecvTimeoutError::Timeout) => {
                     let text = format!("gave no answer within {} s", within.as_secs_f32());
-                    return Err(self.broken(&text));
+                    let used_up = ", which used up the time of the episode";
+                    return Err(self.broken(&(text + if is_last { used_up } else { "" })));
                 }
                 Err(RecvTimeoutError::Disconnected) => return Err(self.broken("is gone")),
             }
@@ -101,9 +114,8 @@ impl Process {
     /// What it did, with what it complained of last.
     fn broken(&mut self, what: &str) -> AgentError {
         self.kill();
-        // All of its complaints are there once its pipe is closed; it may leave children behind that
-        // keep it open.
-        std::thread::sleep(Duration::from_millis(20));
+        // All of its complaints are there once its pipe is closed, unless somebody holds it open.
+        let _ = self.no_more_errors.recv_timeout(Duration::from_secs(1));
         let errors = self.errors.lock().unwrap_or_else(PoisonError::into_inner);
         let said = String::from_utf8_lossy(&errors).trim().to_owned();
         let said = if said.is_empty() { String::new() } else { format!("; it complained: {said}") };
@@ -131,14 +143,28 @@ impl Process {
             let _ = to.send(plain(&ToMind::Bye));
         }
         drop(to);
-        // Its end closes the pipe.
         let began = Instant::now();
         while began.elapsed() < within && !self.stop.load(Ordering::Relaxed) {
-            if let Err(RecvTimeoutError::Disconnected) = self.from.recv_timeout(LOOK) {
+            if self.has_ended() {
                 return true;
             }
+            std::thread::sleep(LOOK / 10);
         }
         false
+    }
+
+    /// Whether it has ended; its number isn't given to another process yet.
+    #[cfg(unix)]
+    fn has_ended(&mut self) -> bool {
+        use rustix::process::{Pid, WaitId, WaitIdOptions, waitid};
+        let looks = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
+        let pid = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw);
+        pid.is_none_or(|pid| !matches!(waitid(WaitId::Pid(pid), looks), Ok(None)))
+    }
+
+    #[cfg(not(unix))]
+    fn has_ended(&mut self) -> bool {
+        !matches!(self.child.try_wait(), Ok(None))
     }
 }
 
@@ -171,10 +197,11 @@ fn writer(mut stdin: ChildStdin) -> Sender<Frame> {
 
 /// A thread that reads frames until the pipe is closed.
 fn reader(mut stdout: impl Read + Send + 'static) -> Receiver<Result<Frame, String>> {
-    let (sender, frames) = channel();
+    // No more than one answer is ever due.
+    let (sender, frames) = sync_channel(1);
     std::thread::spawn(move || {
         loop {
-            let read = match Frame::read(&mut stdout) {
+            let read = match Frame::read(&mut stdout, 0) {
                 Ok(Some(frame)) => Ok(frame),
                 Ok(None) => return,
                 Err(e) => Err(format!("sent {e}")),

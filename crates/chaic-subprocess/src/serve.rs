@@ -4,7 +4,7 @@ use std::io::{self, Read, Write};
 
 use chaic_protocol::Agent;
 
-use crate::frame::Frame;
+use crate::frame::{Frame, MAX_BODY};
 use crate::message::{PROTOCOL, ToEnv, ToMind, message, observation, plain};
 
 /// Lets a mind answer on a pipe until it is told to end, or the pipe is closed.
@@ -18,7 +18,7 @@ pub fn serve(
     output: &mut dyn Write,
 ) -> io::Result<()> {
     let wrong = |text: String| io::Error::new(io::ErrorKind::InvalidData, text);
-    while let Some(frame) = Frame::read(input)? {
+    while let Some(frame) = Frame::read(input, MAX_BODY)? {
         let answer = match message(&frame).map_err(wrong)? {
             ToMind::Hello { .. } => ToEnv::Hello { protocol: PROTOCOL, name: name.to_owned() },
             ToMind::Reset { briefing } => {

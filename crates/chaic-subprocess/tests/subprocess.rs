@@ -145,7 +145,7 @@ impl Agent for Piped {
         let message = ToMind::Reset { briefing: Box::new(briefing.clone()) };
         let frame = Frame { head: serde_json::to_vec(&message).unwrap(), body: Vec::new() };
         frame.write(&mut self.stream).unwrap();
-        let answer = Frame::read(&mut self.stream).unwrap().unwrap();
+        let answer = Frame::read(&mut self.stream, 0).unwrap().unwrap();
         match serde_json::from_slice(&answer.head).unwrap() {
             ToEnv::Ready { senses } => self.senses = senses,
             other => panic!("{other:?}"),
@@ -155,7 +155,7 @@ impl Agent for Piped {
     fn act(&mut self, observation: &chaic_protocol::Observation) -> Result<Action, AgentError> {
         use chaic_subprocess::message::{ToEnv, observation_frame};
         observation_frame(observation).write(&mut self.stream).unwrap();
-        let answer = Frame::read(&mut self.stream).unwrap().unwrap();
+        let answer = Frame::read(&mut self.stream, 0).unwrap().unwrap();
         match serde_json::from_slice(&answer.head).unwrap() {
             ToEnv::Act { action, thought } => {
                 self.thought = thought.unwrap_or_default();
@@ -227,10 +227,18 @@ fn whatever_a_process_does_wrong_is_said() {
         ("say({'type': 'hello', 'protocol': 1, 'name': 'x'})", "answered `observe` with `hello`"),
         ("sys.stdout.buffer.write(b'\\xff' * 100); sys.stdout.buffer.flush()", "a frame of"),
         ("raise ValueError('no weights')", "ValueError: no weights"),
+        (
+            "a = {'type': 'act', 'action': 'turn_left'}; [say(a) for _ in range(1000)]",
+            "without being asked",
+        ),
+        ("say({'type': 'failed', 'problem': 'x' * 100000})", "said: xxxx"),
+        ("sys.stdout.buffer.write(struct.pack('<II', 2, 5) + b'{}hello')", "a frame of"),
     ] {
         let text = short(&speaks_then(then));
-        assert!(text.contains(said), "{then}: {text}");
+        assert!(text.contains(said) && text.len() < 6000, "{then}: {text}");
     }
+    let huge = speaks_then("").replace("'image_size': 64", "'image_size': 64000");
+    assert!(short(&huge).contains("wants images of 64000 pixels"));
     let old = speaks_then("").replace("'protocol': 1", "'protocol': 7");
     assert!(short(&old).contains("speaks version 7"));
 }

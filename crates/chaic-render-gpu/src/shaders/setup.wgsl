@@ -28,7 +28,7 @@ struct Slot {
     name: u32,
 }
 
-// Nearness over the image: `q + du * (u - u0) + dv * (v - v0)`, kept within [low, high].
+// Inverse depth over the image: `q + du * (u - u0) + dv * (v - v0)`, kept within [low, high].
 struct Slope {
     u0: f32,
     v0: f32,

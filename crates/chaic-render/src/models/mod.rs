@@ -172,7 +172,7 @@ mod tests {
                     wrong.push(format!("{name} is empty"));
                 }
                 if mesh.skins.len() >= 255 || mesh.positions.len() >= 60_000 {
-                    wrong.push(format!("{name} has too many skins or corners"));
+                    wrong.push(format!("{name} has too many skins or vertices"));
                 }
                 let out = (bounds.min - mesh.min).max(mesh.max - bounds.max);
                 if out.max_element() > room {

@@ -154,7 +154,7 @@ fn faces(mesh: &mut Mesh, wall: &Wall, line: &Line, papers: &[Skin], stretches: 
         }
     }
     // Corners of a cut: 0 and 1 low and high at -z, 2 and 3 at +z.
-    let at = |k: usize, corner: usize| base + 4 * k + corner;
+    let at = |k: usize, vertex: usize| base + 4 * k + vertex;
     let bare = plaster(wall.color);
     mesh.skin(bare.with_axes(line.axes()));
     mesh.quad([at(0, 0), at(0, 2), at(0, 3), at(0, 1)], false);

@@ -65,7 +65,7 @@ pub struct ExecArguments {
     /// Longest time for starting and for a briefing, seconds. Usual: 120.
     #[arg(long, value_name = "S", value_parser = seconds, help_heading = "Helpers in other processes")]
     pub exec_start_s: Option<Duration>,
-    /// Longest time of all decisions of an episode, seconds. Usual: 3600.
+    /// Longest time that an episode waits for it in all, seconds. Usual: 3600.
     #[arg(long, value_name = "S", value_parser = seconds, help_heading = "Helpers in other processes")]
     pub exec_episode_s: Option<Duration>,
     /// Memory for each of its processes, MiB, on Linux. Usual: 8192.
@@ -103,7 +103,7 @@ pub enum HelperCommand {
 /// `chaic helper check`.
 #[derive(Args, Debug)]
 pub struct HelperCheckArguments {
-    /// The command, for a shell: \"python3 helper.py\".
+    /// The command, for a shell, such as `python3 helper.py`.
     #[arg(value_name = "COMMAND")]
     pub line: String,
     #[command(flatten)]

@@ -2,6 +2,7 @@
 
 use std::io::{stdin, stdout};
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result};
 use chaic_env::minds::{BuiltIn, Helpers as _, find};
@@ -27,6 +28,9 @@ fn checked(arguments: &HelperCheckArguments) -> Result<Ended> {
     let command = Arc::new(arguments.exec.command("exec", &arguments.line));
     let mut printed = Ok(());
     let mut print = |check: &Check| {
+        if stop.load(Ordering::Relaxed) {
+            return;
+        }
         let line = match &check.kept {
             Ok(()) => format!("ok      {}\n", check.promise),
             Err(problem) => format!("FAILED  {}\n        {problem}\n", check.promise),
@@ -37,6 +41,9 @@ fn checked(arguments: &HelperCheckArguments) -> Result<Ended> {
     };
     let checks = check(&command, stop, &mut print);
     printed?;
+    if stop.load(Ordering::Relaxed) {
+        return Ok(Ended::Interrupted);
+    }
     let n_broken = checks.iter().filter(|c| c.kept.is_err()).count();
     if n_broken == 0 {
         say("It keeps to the protocol.\n")?;

@@ -7,6 +7,7 @@ use chaic_eval::bench::{
 };
 use chaic_eval::scene_file::Written;
 use comfy_table::{ContentArrangement, Table, presets};
+use serde::Serialize;
 
 use super::bars;
 use crate::arguments::{
@@ -33,6 +34,26 @@ fn looked_at(wanted: &LookedAt) -> Result<BenchScene> {
     }
 }
 
+/// Measures, with a bar for the part of the time that has passed.
+fn with_bar<T, E>(measure: impl FnOnce(&mut dyn FnMut(f32)) -> Result<T, E>) -> Result<T, E> {
+    let bar = bars::plain(100, "% of the time");
+    let measured = measure(&mut |part| bar.set_position((100.0 * part) as u64));
+    bar.finish_and_clear();
+    measured
+}
+
+fn print<S: Serialize>(
+    speed: &S,
+    format: BenchFormat,
+    text: impl FnOnce(&S) -> String,
+) -> Result<Ended> {
+    match format {
+        BenchFormat::Json => say(&(serde_json::to_string_pretty(speed)? + "\n"))?,
+        BenchFormat::Text => say(&text(speed))?,
+    }
+    Ok(Ended::Well)
+}
+
 fn render(arguments: &RenderBenchArguments) -> Result<Ended> {
     let scene = looked_at(&arguments.looked_at)?;
     warn_of_slow_build();
@@ -42,15 +63,8 @@ fn render(arguments: &RenderBenchArguments) -> Result<Ended> {
         threads: usize::from(arguments.threads),
         seconds: arguments.measuring.seconds,
     };
-    let bar = bars::plain(100, "% of the time");
-    let speed = bench.measure(&mut |part| bar.set_position((100.0 * part) as u64));
-    bar.finish_and_clear();
-    let speed = speed?;
-    match arguments.measuring.format {
-        BenchFormat::Json => say(&(serde_json::to_string_pretty(&speed)? + "\n"))?,
-        BenchFormat::Text => say(&render_text(&speed))?,
-    }
-    Ok(Ended::Well)
+    let speed = with_bar(|progress| bench.measure(progress))?;
+    print(&speed, arguments.measuring.format, render_text)
 }
 
 fn render_text(speed: &RenderSpeed) -> String {
@@ -78,11 +92,7 @@ fn world(arguments: &WorldBenchArguments) -> Result<Ended> {
         speeds.push(measure_world(*task, arguments.measuring.seconds, &mut progress)?);
     }
     bar.finish_and_clear();
-    match arguments.measuring.format {
-        BenchFormat::Json => say(&(serde_json::to_string_pretty(&speeds)? + "\n"))?,
-        BenchFormat::Text => say(&world_text(&speeds))?,
-    }
-    Ok(Ended::Well)
+    print(&speeds, arguments.measuring.format, |speeds| world_text(speeds))
 }
 
 fn world_text(speeds: &[WorldSpeed]) -> String {
@@ -114,15 +124,8 @@ fn env(arguments: &EnvBenchArguments) -> Result<Ended> {
         threads: usize::from(arguments.threads),
         seconds: arguments.measuring.seconds,
     };
-    let bar = bars::plain(100, "% of the time");
-    let speed = bench.measure(&mut |part| bar.set_position((100.0 * part) as u64));
-    bar.finish_and_clear();
-    let speed = speed?;
-    match arguments.measuring.format {
-        BenchFormat::Json => say(&(serde_json::to_string_pretty(&speed)? + "\n"))?,
-        BenchFormat::Text => say(&env_text(&speed))?,
-    }
-    Ok(Ended::Well)
+    let speed = with_bar(|progress| bench.measure(progress))?;
+    print(&speed, arguments.measuring.format, env_text)
 }
 
 fn env_text(speed: &EnvSpeed) -> String {

@@ -113,7 +113,7 @@ impl Episode {
     }
 
     /// The state machine of the original's child.
-    fn change_mood(&mut self) {
+    fn change_behavior(&mut self) {
         let here = self.memory.pose.position;
         let away_m = |p: Option<Vec3>| p.map_or(f32::INFINITY, |p| xz(p).distance(xz(here)));
         let (guardian, helper) =
@@ -188,7 +188,7 @@ impl Episode {
     fn act(&mut self, observation: &Observation) -> Intent {
         let percepts = GroundTruthIds.perceive(observation);
         self.memory.update(&self.briefing, observation, &percepts);
-        self.change_mood();
+        self.change_behavior();
         if self.recovery.is_hopeless() {
             self.recovery = Recovery::default();
             if matches!(self.behavior, ChildBehavior::RunAway(_)) {

@@ -58,6 +58,9 @@ pub struct Grants {
     pub task: bool,
 }
 
+/// Where a grant stands.
+type GrantField = fn(&mut Grants) -> &mut bool;
+
 // `skip_serializing_if` hands over a reference.
 #[allow(clippy::trivially_copy_pass_by_ref)]
 fn is_false(b: &bool) -> bool {
@@ -83,17 +86,20 @@ impl Grants {
     pub const PARTNER: Grants = Grants { goal: true, ..Grants::PLANNER };
     /// What the paper's oracle has.
     pub const ORACLE: Grants = Grants { progress: true, behavior: true, ..Grants::PARTNER };
+    /// Every grant by its name, in the order of docs/grants.md, with where it stands.
+    const FIELDS: [(&'static str, GrantField); 7] = [
+        ("ids", |grants| &mut grants.ids),
+        ("goal_place", |grants| &mut grants.goal_place),
+        ("goal", |grants| &mut grants.goal),
+        ("progress", |grants| &mut grants.progress),
+        ("behavior", |grants| &mut grants.behavior),
+        ("positions", |grants| &mut grants.positions),
+        ("task", |grants| &mut grants.task),
+    ];
+
     /// Every grant by its name, in the order of docs/grants.md, and whether it is given.
-    pub fn named(&self) -> [(&'static str, bool); 7] {
-        [
-            ("ids", self.ids),
-            ("goal_place", self.goal_place),
-            ("goal", self.goal),
-            ("progress", self.progress),
-            ("behavior", self.behavior),
-            ("positions", self.positions),
-            ("task", self.task),
-        ]
+    pub fn named(mut self) -> [(&'static str, bool); 7] {
+        Grants::FIELDS.map(|(name, field)| (name, *field(&mut self)))
     }
 
     /// The grants of these names.
@@ -109,16 +115,9 @@ impl Grants {
     pub fn of_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Grants, String> {
         let mut grants = Grants::NONE;
         for name in names {
-            *match name {
-                "ids" => &mut grants.ids,
-                "goal_place" => &mut grants.goal_place,
-                "goal" => &mut grants.goal,
-                "progress" => &mut grants.progress,
-                "behavior" => &mut grants.behavior,
-                "positions" => &mut grants.positions,
-                "task" => &mut grants.task,
-                other => return Err(other.to_owned()),
-            } = true;
+            let known = Grants::FIELDS.iter().find(|(known, _)| *known == name);
+            let (_, field) = known.ok_or_else(|| name.to_owned())?;
+            *field(&mut grants) = true;
         }
         Ok(grants)
     }

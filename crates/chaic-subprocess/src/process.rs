@@ -8,6 +8,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use chaic_protocol::AgentError;
+#[cfg(unix)]
+use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
 
 use crate::commands::Command;
 use crate::frame::Frame;
@@ -122,20 +124,22 @@ impl Process {
         AgentError::Broken(format!("`{}` {what}{said}", self.command.line))
     }
 
+    /// Its number, which is that of its process group too.
+    #[cfg(unix)]
+    fn pid(&self) -> Option<Pid> {
+        i32::try_from(self.child.id()).ok().and_then(Pid::from_raw)
+    }
+
     fn kill(&mut self) {
         self.to = None;
         #[cfg(unix)]
-        if let Some(group) =
-            i32::try_from(self.child.id()).ok().and_then(rustix::process::Pid::from_raw)
-        {
+        if let Some(group) = self.pid() {
             // It may be gone already.
-            let _ = rustix::process::kill_process_group(group, rustix::process::Signal::KILL);
+            let _ = kill_process_group(group, Signal::KILL);
         }
         let _ = self.child.kill();
     }
-}
 
-impl Process {
     /// Closes its standard input, having told it to end or not; whether it ended within this time.
     pub fn close(&mut self, told: bool, within: Duration) -> bool {
         let Some(to) = self.to.take() else { return false };
@@ -156,10 +160,8 @@ impl Process {
     /// Whether it has ended; its number isn't given to another process yet.
     #[cfg(unix)]
     fn has_ended(&mut self) -> bool {
-        use rustix::process::{Pid, WaitId, WaitIdOptions, waitid};
         let looks = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
-        let pid = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw);
-        pid.is_none_or(|pid| !matches!(waitid(WaitId::Pid(pid), looks), Ok(None)))
+        self.pid().is_none_or(|pid| !matches!(waitid(WaitId::Pid(pid), looks), Ok(None)))
     }
 
     #[cfg(not(unix))]

@@ -277,11 +277,12 @@ impl World {
 
     /// The point of a thing that one goes to from `p`; of a goal place as the task has it.
     pub(crate) fn point_to_reach(&self, p: Vec3, entity: EntityId) -> Vec3 {
-        let approach = self.setup.task.info().goal_approach;
-        let is_beside =
-            approach == GoalApproach::NearestPoint && self.setup.goal_places.contains(&entity);
+        let is_beside = || {
+            self.setup.goal_places.contains(&entity)
+                && self.setup.task.info().goal_approach == GoalApproach::NearestPoint
+        };
         match self.rules.reach_to {
-            ReachTo::Middle if !is_beside => self.thing(entity).1.position,
+            ReachTo::Middle if !is_beside() => self.thing(entity).1.position,
             ReachTo::Middle | ReachTo::NearestPoint => self.nearest_point(p, entity),
         }
     }

@@ -144,7 +144,7 @@ fn cargo_run_finds_one_program() {
 /// What a source file says outside of its tests and comments.
 fn code(path: &Path) -> String {
     let text = std::fs::read_to_string(path).expect("it can be read");
-    let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+    let code = text.split("\n#[cfg(test)]\nmod ").next().unwrap_or_default();
     code.lines().filter(|line| !line.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n")
 }
 

@@ -111,8 +111,7 @@ pub(super) fn setup(
     let people = people(&house, task, &mut stream("people")).ok_or("no room for the people")?;
     let goal_places = goal_places(&house, task);
     let mut put = Vec::new();
-    let info = task.info();
-    if info.arrangement == Arrangement::Obstacles {
+    if task.info().arrangement == Arrangement::Obstacles {
         let first = goal_places.first().ok_or("the house has no goal place")?;
         let goal = house.furniture[usize::from(first.0 - EntityId::FIRST_OBJECT.0)].position;
         let partner = xz(people[0].pose.position);

@@ -4,13 +4,12 @@
 //! [`Walking::Lattice`]: crate::rules::Walking
 
 use chaic_protocol::geom::{wrap_angle, yaw_towards};
-use chaic_protocol::{Action, Frame, Vec2, Vec3};
+use chaic_protocol::{Action, Vec2, Vec3};
 
 use super::navigate::{Destination, Nav, TURN_RAD};
 use super::path::Path;
 use crate::memory::lattice_costs::BLOCKED;
 use crate::memory::{CELL_M, Memory, Space};
-use crate::rules::FailureRules;
 
 /// One heads for the cell that is so many ahead on the way.
 const AHEAD: usize = 5;
@@ -36,10 +35,6 @@ pub struct Steadiness {
     n_turns: u32,
     /// The way that one keeps to, whatever is seen meanwhile, and for how many actions yet.
     kept: Option<(Vec<usize>, u32)>,
-    /// Since when one has waited for an obstacle to be cleared away.
-    waits_since: Option<Frame>,
-    /// One waits for none until then, having waited in vain.
-    impatient_until: Frame,
 }
 
 impl Steadiness {
@@ -51,20 +46,6 @@ impl Steadiness {
             let cells = way.cells.iter().copied().take(KEPT_CELLS).collect();
             self.kept = Some((cells, KEPT_ACTIONS));
         }
-    }
-
-    /// Waits for the obstacle in the way, and tells whether one goes on waiting.
-    fn goes_on_waiting(&mut self, now: Frame, rules: &FailureRules) -> bool {
-        if now < self.impatient_until {
-            return false;
-        }
-        let since = *self.waits_since.get_or_insert(now);
-        let is_patient = now < since + rules.obstacle_patience_frames;
-        if !is_patient {
-            self.waits_since = None;
-            self.impatient_until = now + rules.ignore_frames;
-        }
-        is_patient
     }
 
     /// What is left of the way that one keeps to. It ends where one has left it, or where a wall
@@ -104,15 +85,18 @@ pub fn step(memory: &mut Memory, destination: &Destination, steady: &mut Steadin
     let way = steady.kept_way(memory).unwrap_or(way);
     if memory.waits_for_obstacles() && way.cost > BLOCKED && memory.map.space(end) != Space::Wall {
         // It waits for somebody to clear the way, though not for ever.
-        let waits = steady.goes_on_waiting(memory.frame, &memory.rules.failures);
-        return if waits { Nav::Act(Action::TurnLeft) } else { Nav::Unreachable };
+        return if memory.goes_on_waiting() {
+            Nav::Act(Action::TurnLeft)
+        } else {
+            Nav::Unreachable
+        };
     }
-    steady.waits_since = None;
     let to = waypoint(memory, &way);
     let at = |p: Vec2| Vec3::new(p.x, 0.0, p.y);
     let error = wrap_angle(yaw_towards(at(here), at(to)) - yaw);
     if error.abs() < WALK_RAD || to == here {
         steady.n_turns = 0;
+        memory.gets_on();
         return Nav::Act(Action::MoveForward);
     }
     steady.turn(&way);
@@ -138,7 +122,7 @@ mod tests {
     use super::*;
     use crate::PlannerRules;
     use crate::perception::{GroundTruthIds, Perception as _};
-    use crate::rules::Walking;
+    use crate::rules::{FailureRules, Walking};
     use crate::test_support::{Toy, ToyObject};
     use chaic_protocol::AgentId;
     use chaic_protocol::capability::Persona;
@@ -172,16 +156,34 @@ mod tests {
     #[test]
     fn nobody_waits_for_an_obstacle_to_be_cleared_for_ever() {
         let mut memory = before_obstacle(Persona::Wheelchair, AgentId::PARTNER);
-        let (mut steady, begin) = (Steadiness::default(), memory.frame);
+        let begin = memory.frame;
         let FailureRules { obstacle_patience_frames, ignore_frames, .. } = memory.rules.failures;
         let again = obstacle_patience_frames + ignore_frames;
         for after in (0..again + 10).step_by(2) {
             memory.frame = begin + after;
-            let waits = after < obstacle_patience_frames || after >= again;
+            let waits = after <= obstacle_patience_frames || after >= again;
             let expected = if waits { Nav::Act(Action::TurnLeft) } else { Nav::Unreachable };
-            let nav = step(&mut memory, &beyond_obstacle(), &mut steady);
+            let nav = step(&mut memory, &beyond_obstacle(), &mut Steadiness::default());
             assert_eq!(nav, expected, "after {after} frames");
         }
+    }
+
+    #[test]
+    fn who_has_waited_in_vain_goes_where_there_is_just_enough_room() {
+        let mut memory = before_obstacle(Persona::Wheelchair, AgentId::PARTNER);
+        // Beside the obstacle's front, from (1.75, -0.25) to (1.75, 0.25): in a corner of the square
+        // that the original leaves free, and where the body would touch.
+        let [corner, touching] = [[2.2, 0.65], [1.8, 0.35]].map(Vec2::from);
+        let is_open = |memory: &mut Memory, at: Vec2| {
+            memory.refresh();
+            let cell = memory.map.grid().cell_at(at).expect("inside");
+            memory.costs().cost(cell) < BLOCKED / 3
+        };
+        assert!(!is_open(&mut memory, corner) && !is_open(&mut memory, touching));
+        memory.goes_on_waiting();
+        memory.frame += memory.rules.failures.obstacle_patience_frames;
+        assert!(memory.goes_on_waiting(), "to the end of its patience");
+        assert!(is_open(&mut memory, corner) && !is_open(&mut memory, touching));
     }
 
     #[test]

@@ -46,7 +46,13 @@ impl Sampler {
         if self.target.is_none() {
             self.target = self.choose(memory).map(|at| (at, memory.frame));
         }
-        let Some((at, since)) = self.target else { return Found::Act(Action::TurnLeft) };
+        let Some((at, since)) = self.target else {
+            // An obstacle may be what closes one in.
+            if memory.waits_for_obstacles() {
+                memory.goes_on_waiting();
+            }
+            return Found::Act(Action::TurnLeft);
+        };
         let is_known = memory.map.grid().cell_at(at).is_some_and(|c| memory.map.is_known(c));
         if is_known && memory.frame > since + KNOWN_FRAMES {
             return Found::Resolved;

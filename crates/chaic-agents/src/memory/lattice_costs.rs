@@ -47,10 +47,19 @@ pub struct Seen<'a> {
     pub things: &'a SemanticMap,
     /// Who was where.
     pub people: &'a People,
-    /// Whether obstacles are given a wide berth.
-    pub heeds_obstacles: bool,
+    /// How much room is left around obstacles, by whoever heeds them.
+    pub berth: Option<Berth>,
     /// The present frame.
     pub now: Frame,
+}
+
+/// The room that is left around an obstacle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Berth {
+    /// The original's: a square of cells around its middle.
+    Wide,
+    /// As much as a body of this radius, metres, needs to get past it (ours).
+    Narrow(f32),
 }
 
 /// Which cells count as occupied. What is seen counts at once, what is gone only after a while.
@@ -142,15 +151,22 @@ pub fn lattice_costs(grid: &Grid, seen: &Seen<'_>, belief: &mut Belief, cost: &m
         let true_wall = if cell.is_tall() { TRUE_WALL_EXTRA } else { 0 };
         *cost = place + unknown + wall + true_wall;
     }
-    if seen.heeds_obstacles {
+    if let Some(berth) = seen.berth {
         let obstacles = standing.iter().filter(|t| t.class.info().role == Role::Obstacle);
-        let mut heeded: Vec<usize> = obstacles
-            .filter_map(|t| grid.cell_at(xz(t.position_in_world)))
-            .flat_map(|cell| around(grid, cell, OBSTACLE_CELLS))
-            .collect();
+        let (mut heeded, extra): (Vec<usize>, u32) = match berth {
+            Berth::Wide => {
+                let middles = obstacles.filter_map(|t| grid.cell_at(xz(t.position_in_world)));
+                let squares = middles.flat_map(|cell| around(grid, cell, OBSTACLE_CELLS));
+                (squares.collect(), OBSTACLE_EXTRA)
+            }
+            Berth::Narrow(radius_m) => {
+                let points = obstacles.flat_map(|t| &t.footprint);
+                (points.flat_map(|p| grid.disc(*p, radius_m)).collect(), BLOCKED)
+            }
+        };
         heeded.sort_unstable();
         heeded.dedup();
-        heeded.into_iter().for_each(|cell| cost[cell] += OBSTACLE_EXTRA);
+        heeded.into_iter().for_each(|cell| cost[cell] += extra);
     }
 }
 
@@ -208,7 +224,7 @@ mod tests {
             map: &map,
             things: &SemanticMap::default(),
             people: &People::default(),
-            heeds_obstacles: false,
+            berth: None,
             now: FIRST_FRAMES,
         };
         lattice_costs(&grid, &seen, &mut belief, &mut cost);
@@ -236,7 +252,7 @@ mod tests {
                     map: &map,
                     things: &SemanticMap::default(),
                     people: &People::default(),
-                    heeds_obstacles: false,
+                    berth: None,
                     now: FIRST_FRAMES,
                 };
                 lattice_costs(&grid, &seen, &mut belief, &mut cost);

@@ -27,9 +27,10 @@ pub use semantic::{SemanticMap, Thing};
 
 use crate::execution::path::{CostField, Search};
 use crate::perception::Percepts;
-use crate::rules::{Exploration, PlannerRules, Walking};
+use crate::rules::{Exploration, FailureRules, PlannerRules, Walking};
 use crate::track::{Hands, Intent, TrackId};
 use costs::CostMap;
+use lattice_costs::Berth;
 
 /// A top may look this much lower than it is, metres.
 const TOP_TOLERANCE_M: f32 = 0.1;
@@ -99,8 +100,18 @@ pub struct Memory {
     is_partner: bool,
     gait: Gait,
     removes_obstacles: bool,
+    patience: Patience,
     cost_field: Option<CostField>,
     search: Search,
+}
+
+/// How long one has waited for somebody to clear an obstacle away.
+#[derive(Clone, Copy, Debug, Default)]
+struct Patience {
+    /// The first wait since one got on.
+    since: Option<Frame>,
+    /// One waits for none until then, having waited in vain.
+    over_until: Frame,
 }
 
 impl Memory {
@@ -137,6 +148,7 @@ impl Memory {
             is_partner: briefing.me == AgentId::PARTNER,
             gait: briefing.capability.gait,
             removes_obstacles: briefing.capability.removes_obstacles,
+            patience: Patience::default(),
             cost_field: None,
         }
     }
@@ -251,6 +263,26 @@ impl Memory {
         !self.removes_obstacles
     }
 
+    /// Waits before an obstacle, and tells whether its owner goes on waiting. Who has waited in
+    /// vain tries for a while whether there is just enough room to get past.
+    pub fn goes_on_waiting(&mut self) -> bool {
+        let FailureRules { obstacle_patience_frames, ignore_frames, .. } = self.rules.failures;
+        if self.frame < self.patience.over_until {
+            return false;
+        }
+        let since = *self.patience.since.get_or_insert(self.frame);
+        if self.frame >= since + obstacle_patience_frames {
+            self.patience = Patience { since: None, over_until: self.frame + ignore_frames };
+            self.is_stale = true;
+        }
+        true
+    }
+
+    /// Its owner gets on: from here on it has waited for nothing.
+    pub fn gets_on(&mut self) {
+        self.patience.since = None;
+    }
+
     /// Whether its owner goes to where the goal place was when the plan began, whatever it sees of
     /// it since (facts A2.4).
     pub fn keeps_goal_in_mind(&self) -> bool {
@@ -270,9 +302,13 @@ impl Memory {
     fn refresh_costs(&mut self) {
         if self.rules.walking == Walking::Lattice {
             let people = self.in_the_way();
+            let berth = match self.frame < self.patience.over_until {
+                true => Berth::Narrow(self.costs.radius_m()),
+                false => Berth::Wide,
+            };
             let Memory { map, things, .. } = self;
-            let (heeds_obstacles, now) = (self.is_partner, self.frame);
-            let seen = lattice_costs::Seen { map, things, people: &people, heeds_obstacles, now };
+            let (berth, now) = (self.is_partner.then_some(berth), self.frame);
+            let seen = lattice_costs::Seen { map, things, people: &people, berth, now };
             if std::mem::take(&mut self.is_stale) {
                 self.costs.rebuild_lattice(&seen);
             }

@@ -64,9 +64,9 @@ pub struct FailureRules {
     /// Ours: a third of an episode, as obstacles stay unless somebody clears them away.
     pub barred_frames: Frame,
     /// Who waits for somebody to clear an obstacle away, where ways are those of the original, gives
-    /// up after so long, frames, and does other things for `ignore_frames`. Ours: less than after
-    /// which one counts as stuck. The original waits until its plan ends (facts A1.6), and then
-    /// makes the same plan again.
+    /// up after so long, frames, and for `ignore_frames` goes where there is just enough room to get
+    /// past, or does other things. Ours: less than after which one counts as stuck. The original
+    /// waits until its plan ends (facts A1.6), and then makes the same plan again.
     pub obstacle_patience_frames: Frame,
 }
 

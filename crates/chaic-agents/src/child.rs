@@ -18,35 +18,11 @@ use crate::perception::{GroundTruthIds, Perception as _};
 use crate::rules::{ChildDraws, PlannerRules, Walking};
 use crate::track::{Intent, named};
 
-/// Between two draws pass more than so many frames.
-const PLAN_FRAMES: Frame = 100;
-/// Chance to run away at each draw.
-const RUN_CHANCE: f32 = 0.20;
 /// The draws that are escapes if they are the same in every episode: those of the original's first
 /// forty that are at most 20 of 100. In 3000 frames there are 30 draws at most.
 const ESCAPES: [u32; 6] = [6, 14, 26, 38, 39, 40];
-/// The helper catches the child from here, metres.
-const CATCH_M: f32 = 2.5;
-/// Back with the guardian from here, metres.
-const HOME_M: f32 = 3.0;
-/// Follows to here, metres.
-const FOLLOW_M: f32 = 2.0;
-/// A point to run to is at least so far, metres.
-const RUN_MIN_M: f32 = 5.0;
-/// From here on the guardian's direction counts less, metres.
-const FAR_GUARDIAN_M: f32 = 10.0;
-/// The point lies off the guardian's direction by more than this, radians: 60 degrees, or 30 if
-/// the point is far from the guardian.
-const OFF_RAD: (f32, f32) = (std::f32::consts::FRAC_PI_3, std::f32::consts::FRAC_PI_6);
-/// Distance of the point to the border of the place, metres (6 cells of the original).
-const BORDER_M: f32 = 0.75;
-/// Nothing is known to stand so near to the point, metres.
-const FREE_M: f32 = 1.0;
 /// Points drawn and points kept at most.
 const DRAWS: (usize, usize) = (2000, 500);
-/// So near to the point it is there, metres.
-const THERE_M: f32 = 0.5;
-
 /// What the child is up to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum ChildBehavior {
@@ -118,11 +94,13 @@ impl Episode {
         let away_m = |p: Option<Vec3>| p.map_or(f32::INFINITY, |p| xz(p).distance(xz(here)));
         let (guardian, helper) =
             (self.position_of(self.guardian()), self.position_of(self.helper()));
-        let now = self.memory.frame;
-        let is_due = self.since.is_none_or(|since| now > since + PLAN_FRAMES);
+        let (now, rules) = (self.memory.frame, self.memory.rules.child);
+        let is_due = self.since.is_none_or(|since| now > since + rules.plan_frames);
         let next = match self.behavior {
-            ChildBehavior::RunAway(_) if away_m(helper) < CATCH_M => ChildBehavior::GotoGuardian,
-            ChildBehavior::GotoGuardian if is_due && away_m(guardian) < HOME_M => {
+            ChildBehavior::RunAway(_) if away_m(helper) < rules.caught_m => {
+                ChildBehavior::GotoGuardian
+            }
+            ChildBehavior::GotoGuardian if is_due && away_m(guardian) < rules.home_m => {
                 ChildBehavior::Follow
             }
             ChildBehavior::Follow if is_due => {
@@ -148,7 +126,7 @@ impl Episode {
     fn draws_escape(&mut self) -> bool {
         self.n_draws += 1;
         match self.memory.rules.child_draws {
-            ChildDraws::Seeded => self.rng.chance(RUN_CHANCE),
+            ChildDraws::Seeded => self.rng.chance(self.memory.rules.child.run_chance),
             ChildDraws::Constant => ESCAPES.contains(&self.n_draws),
         }
     }
@@ -156,7 +134,8 @@ impl Episode {
     /// A point far off and away from the guardian: of all that were drawn, the one at three
     /// quarters by distance from the guardian.
     fn far_point(&mut self, guardian: Vec3) -> Option<Vec2> {
-        let inside = self.briefing.bounds.grown(-BORDER_M);
+        let rules = self.memory.rules.child;
+        let inside = self.briefing.bounds.grown(-rules.border_m);
         let here = self.memory.here();
         let to_guardian = yaw_towards(self.memory.pose.position, guardian);
         let mut kept: Vec<(f32, Vec2)> = Vec::new();
@@ -168,8 +147,9 @@ impl Episode {
             let from_guardian_m = point.distance(xz(guardian));
             let yaw = yaw_towards(self.memory.pose.position, Vec3::new(point.x, 0.0, point.y));
             let off = wrap_angle(yaw - to_guardian).abs();
-            let enough = if from_guardian_m > FAR_GUARDIAN_M { OFF_RAD.1 } else { OFF_RAD.0 };
-            if point.distance(here) > RUN_MIN_M && off > enough && self.is_free(point) {
+            let is_far = from_guardian_m > rules.far_m;
+            let enough = if is_far { rules.off_far_rad } else { rules.off_rad };
+            if point.distance(here) > rules.run_min_m && off > enough && self.is_free(point) {
                 kept.push((from_guardian_m, point));
             }
             if kept.len() == DRAWS.1 {
@@ -181,8 +161,8 @@ impl Episode {
     }
 
     fn is_free(&self, point: Vec2) -> bool {
-        let map = &self.memory.map;
-        map.grid().disc(point, FREE_M).all(|c| map.space(c) < Space::Occupied)
+        let Memory { map, rules, .. } = &self.memory;
+        map.grid().disc(point, rules.child.free_m).all(|c| map.space(c) < Space::Occupied)
     }
 
     fn act(&mut self, observation: &Observation) -> Intent {
@@ -206,7 +186,7 @@ impl Episode {
             ChildBehavior::RunAway(point) => self.run_to(point),
             ChildBehavior::Follow | ChildBehavior::GotoGuardian => {
                 let Some(guardian) = self.guardian() else { return self.fidget() };
-                let keep_m = FOLLOW_M;
+                let keep_m = self.memory.rules.child.follow_m;
                 match self.follower.step(&mut self.memory, &mut self.navigator, guardian, keep_m) {
                     Follow::Act(action) => action,
                     Follow::Near(action) => {
@@ -220,7 +200,8 @@ impl Episode {
     }
 
     fn run_to(&mut self, point: Vec2) -> Intent {
-        match self.navigator.step(&mut self.memory, &Destination::near(point, THERE_M)) {
+        let there_m = self.memory.rules.child.there_m;
+        match self.navigator.step(&mut self.memory, &Destination::near(point, there_m)) {
             Nav::Act(action) => action,
             Nav::Arrived => self.fidget(),
             Nav::Unreachable => {
@@ -281,6 +262,7 @@ impl Agent for Child {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::rules::ChildRules;
     use crate::test_support::Toy;
     use chaic_protocol::briefing::Companion;
     use chaic_protocol::geom::Pose;
@@ -336,7 +318,7 @@ mod tests {
             .map(Stage::new)
             .find_map(|mut s| (s.state_at(0, 1.0, 9.0) == ChildState::Follow).then_some(s))
             .expect("most follow at first");
-        for frame in 1..=PLAN_FRAMES {
+        for frame in 1..=ChildRules::STANDARD.plan_frames {
             assert_eq!(
                 stage.state_at(frame, 1.0, 9.0),
                 ChildState::Follow,
@@ -354,7 +336,7 @@ mod tests {
             // A draw at once, and then one every 101 frames.
             let first =
                 (0..2000).find(|frame| stage.state_at(*frame, 1.0, 9.0) == ChildState::RunAway);
-            assert_eq!(first, Some(5 * (PLAN_FRAMES + 1)), "seed {seed}");
+            assert_eq!(first, Some(5 * (ChildRules::STANDARD.plan_frames + 1)), "seed {seed}");
         }
     }
 
@@ -381,12 +363,12 @@ mod tests {
             let guardian = Vec3::new(2.0, 0.0, 0.0);
             let point = episode.far_point(guardian).expect("there is room");
             assert!(episode.briefing.bounds.contains(point));
-            assert!(point.length() > RUN_MIN_M);
+            assert!(point.length() > ChildRules::STANDARD.run_min_m);
             let off = wrap_angle(
                 yaw_towards(Vec3::ZERO, Vec3::new(point.x, 0.0, point.y))
                     - yaw_towards(Vec3::ZERO, guardian),
             );
-            assert!(off.abs() > OFF_RAD.1);
+            assert!(off.abs() > ChildRules::STANDARD.off_far_rad);
         }
     }
 }

@@ -23,8 +23,6 @@ const PAUSE_FRAMES: u32 = 5;
 /// One who points at things acts from this near on, metres: farther off than an arm, since a level eye
 /// at 1.65 m that sees 45 degrees down has the floor in view from 1.65 m on only.
 const POINT_FROM_M: f32 = 2.2;
-/// Facing something within this angle, it is looked at, radians: half of a turn.
-const FACING_RAD: f32 = std::f32::consts::PI / 24.0;
 /// Decisions spent on getting a thing into view before it is left alone.
 const MAX_GLANCES: u32 = 14;
 
@@ -163,8 +161,7 @@ impl Episode {
         let track = intent.subject()?;
         self.n_glances += 1;
         let at = self.memory.things.get(track).map(|t| t.nearest_point(self.memory.here()));
-        let (here, yaw) = (self.memory.here(), self.memory.pose.yaw_rad);
-        let turn = at.and_then(|at| face(here, yaw, at, FACING_RAD));
+        let turn = at.and_then(|at| face(&self.memory, at, 0.0));
         match turn.filter(|_| self.n_glances <= MAX_GLANCES) {
             Some(turn) => named(turn, target).map(|action| (turn, action)),
             None => {

@@ -8,7 +8,7 @@ use chaic_protocol::Frame;
 use chaic_protocol::briefing::Briefing;
 use serde::{Deserialize, Serialize};
 
-pub use groups::{FailureRules, LiftingRules, PeopleRules, PlanLimits, TimeRules};
+pub use groups::{ChildRules, FailureRules, LiftingRules, PeopleRules, PlanLimits, TimeRules};
 
 /// How ways are planned and walked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -152,6 +152,9 @@ pub struct PlannerRules {
     /// How near one stays to people, and what is made of the child.
     #[serde(default)]
     pub people: PeopleRules,
+    /// What the child itself does.
+    #[serde(default)]
+    pub child: ChildRules,
 }
 
 impl PlannerRules {
@@ -190,6 +193,7 @@ impl PlannerRules {
             failures: FailureRules::STANDARD,
             lifting: LiftingRules::STANDARD,
             people: PeopleRules::STANDARD,
+            child: ChildRules::STANDARD,
         }
     }
 
@@ -228,6 +232,7 @@ impl PlannerRules {
             failures: FailureRules::STANDARD,
             lifting: LiftingRules::STANDARD,
             people: PeopleRules::STANDARD,
+            child: ChildRules::STANDARD,
         }
     }
 

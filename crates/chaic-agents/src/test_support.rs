@@ -1,7 +1,7 @@
 //! A toy world for tests: boxes in a room, a tiny ray caster, and one body that walks, picks up
 //! and puts down without ever failing by chance.
 
-use chaic_protocol::briefing::{Companion, Goal, Relation};
+use chaic_protocol::briefing::{Companion, Goal, Motion, Relation};
 use chaic_protocol::capability::Persona;
 use chaic_protocol::geom::{Camera, Pose, Rect, forward, wrap_angle, xz, yaw_rotation};
 use chaic_protocol::observation::{Granted, Grants, Held, Identity, Images, SelfState};
@@ -10,12 +10,22 @@ use chaic_protocol::{
     Outcome, Role, Target, Vec2, Vec3,
 };
 
+use crate::execution::navigate::step_m;
 use crate::memory::costs::CostMap;
 use crate::memory::grid::Grid;
 use crate::memory::occupancy::{OccupancyMap, Space};
 use crate::memory::{Memory, People, SemanticMap};
 use crate::perception::{GroundTruthIds, Perception as _};
 use crate::track::{Carried, Hands, TrackId};
+
+/// How the body moves and reaches: as by the world's rules of the paper.
+pub const MOTION: Motion = Motion {
+    turn_rad: std::f32::consts::PI / 12.0,
+    stride_m: 0.4,
+    step_over_m: 0.12,
+    arm_reach_m: 0.7,
+    reach_limit_m: 2.0,
+};
 
 /// A thing of the toy world: an upright box of a class.
 pub struct ToyObject {
@@ -167,6 +177,7 @@ impl Toy {
         Briefing {
             me: AgentId::HELPER,
             capability: Persona::Helper.capability(),
+            motion: MOTION,
             companions: vec![Companion { agent: AgentId::PARTNER, relation: Relation::Partner }],
             seed: 1,
             horizon: 3000,
@@ -284,7 +295,7 @@ impl Toy {
             return Err(FailureReason::OutOfReach);
         }
         for _ in 0..60 {
-            if self.solids[i].distance_from(self.here()) <= 0.7 {
+            if self.solids[i].distance_from(self.here()) <= MOTION.arm_reach_m {
                 return Ok(());
             }
             let ahead = (target - self.here()).normalize_or_zero();
@@ -302,7 +313,7 @@ impl Toy {
             Action::TurnRight => (2, self.turn(-1.0)),
             Action::Wait { frames } => (frames.max(1), Ok(())),
             Action::MoveForward => {
-                let got = self.walk(0.42 * xz(forward(self.pose.yaw_rad)));
+                let got = self.walk(step_m(&MOTION) * xz(forward(self.pose.yaw_rad)));
                 self.n_blocked += u32::from(got < 0.1);
                 (10, if got < 0.1 { Err(FailureReason::Blocked) } else { Ok(()) })
             }
@@ -325,8 +336,7 @@ impl Toy {
     }
 
     fn turn(&mut self, sign: f32) -> Result<(), FailureReason> {
-        let turn = std::f32::consts::PI / 12.0;
-        self.pose.yaw_rad = wrap_angle(self.pose.yaw_rad + sign * turn);
+        self.pose.yaw_rad = wrap_angle(self.pose.yaw_rad + sign * MOTION.turn_rad);
         Ok(())
     }
 

@@ -48,6 +48,21 @@ pub enum Relation {
     Guardian,
 }
 
+/// How bodies move and reach in this world: the constants of its rules that planning needs.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Motion {
+    /// One turn, radians.
+    pub turn_rad: f32,
+    /// A step ahead ends with the frame in which it has covered more than this, metres.
+    pub stride_m: f32,
+    /// Lower things are stepped over, metres.
+    pub step_over_m: f32,
+    /// How near one steps up to the nearest point of a thing before reaching for it, metres.
+    pub arm_reach_m: f32,
+    /// From how far one still reaches a thing that one can't step up to any nearer, metres.
+    pub reach_limit_m: f32,
+}
+
 /// What an agent is told before an episode. A helper's says nothing of the partner's goal or
 /// constraint unless that is granted, and the grant is on record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -56,6 +71,8 @@ pub struct Briefing {
     pub me: AgentId,
     /// What the reader's own body can do.
     pub capability: Capability,
+    /// How bodies move and reach in this world.
+    pub motion: Motion,
     /// The other people.
     pub companions: Vec<Companion>,
     /// Seed of the reader's own random streams; differs between agents of one episode.

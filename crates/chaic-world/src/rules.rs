@@ -2,6 +2,7 @@
 //! value here, never an `if` elsewhere. `docs/rules.md` lists every field with its source.
 
 use chaic_protocol::TaskId;
+use chaic_protocol::briefing::Motion;
 use chaic_protocol::capability::LimitPenalty;
 use chaic_protocol::task::GoalTop;
 use serde::{Deserialize, Serialize};
@@ -154,6 +155,12 @@ impl Rules {
             GoalTop::High => self.high_goal_min_top_m,
             GoalTop::Any => 0.0,
         }
+    }
+
+    /// What a briefing says of these rules.
+    pub fn motion(&self) -> Motion {
+        let Rules { turn_rad, stride_m, step_over_m, arm_reach_m, reach_limit_m, .. } = *self;
+        Motion { turn_rad, stride_m, step_over_m, arm_reach_m, reach_limit_m }
     }
 
     /// The paper's rules, with the original's measured numbers where the paper gives none.

@@ -32,6 +32,7 @@ impl World {
         Briefing {
             me,
             capability: self.capability(me),
+            motion: self.rules.motion(),
             companions: others
                 .map(|agent| Companion { agent, relation: relation(agent) })
                 .collect(),

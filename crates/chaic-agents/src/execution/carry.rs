@@ -5,10 +5,11 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap, VecDeque};
 use std::f32::consts::TAU;
 
+use chaic_protocol::briefing::Motion;
 use chaic_protocol::geom::{Pose, Rect, wrap_angle, xz};
 use chaic_protocol::{Action, Vec2, Vec3};
 
-use super::navigate::{Destination, Nav, STEP_M, TURN_RAD};
+use super::navigate::{Destination, Nav, step_m};
 use crate::memory::Memory;
 use crate::memory::costs::{CostMap, FREE};
 use crate::track::Intent;
@@ -22,8 +23,8 @@ const COST_PER_FRAME: u32 = 20;
 const MAX_POSES: usize = 200_000;
 /// Poses in one square of this side are one, metres: two thirds of a step.
 const SQUARE_M: f32 = 0.25;
-/// From this near to the place one can put down, metres: the world asks for 2 m of either of the two.
-const NEAR_M: f32 = 1.8;
+/// One puts down from so much nearer than the world asks of either of the two, metres.
+const NEARER_M: f32 = 0.2;
 /// A place is another one than where it failed from this far on, metres.
 const OTHER_PLACE_M: f32 = 0.4;
 /// A way is kept for so many actions: steps are a little longer or shorter than they are planned.
@@ -38,6 +39,7 @@ const PARTS: u32 = 3;
 struct Pair<'a> {
     costs: &'a CostMap,
     bounds: Rect,
+    motion: Motion,
     other_in_body: Vec3,
     /// How much room the leader and the other one need: no more than they have at the start.
     room_m: [f32; 2],
@@ -59,9 +61,10 @@ pub fn step(
     way: &mut VecDeque<Intent>,
 ) -> Option<Nav> {
     let other_in_body = memory.other_end?.position_in_body;
-    let (pose, blocked, bounds) = (memory.pose, memory.blocked, memory.bounds);
+    let (pose, blocked) = (memory.pose, memory.blocked);
+    let (bounds, motion) = (memory.bounds, memory.motion);
     let (costs, _) = memory.costs_and_search();
-    let mut pair = Pair { costs, bounds, other_in_body, room_m: [costs.radius_m(); 2] };
+    let mut pair = Pair { costs, bounds, motion, other_in_body, room_m: [costs.radius_m(); 2] };
     if pair.is_there(pose, destination) {
         return Some(Nav::Arrived);
     }
@@ -98,7 +101,7 @@ impl Pair<'_> {
     /// The pose after a step ahead, if there is room for both all along.
     fn ahead(&self, pose: Pose) -> Option<Pose> {
         let at = |part: u32| {
-            let way = pose.forward() * (STEP_M * part as f32 / PARTS as f32);
+            let way = pose.forward() * (step_m(&self.motion) * part as f32 / PARTS as f32);
             Pose { position: pose.position + way, ..pose }
         };
         let is_free = |pose: Pose| {
@@ -111,7 +114,8 @@ impl Pair<'_> {
     /// The pose after a turn: about the leader or, where something is in the other one's way, about
     /// the other one.
     fn turned(&self, pose: Pose, sign: f32) -> Option<Pose> {
-        let turned = Pose { yaw_rad: wrap_angle(pose.yaw_rad + sign * TURN_RAD), ..pose };
+        let turned =
+            Pose { yaw_rad: wrap_angle(pose.yaw_rad + sign * self.motion.turn_rad), ..pose };
         let swung = turned.to_world(self.other_in_body);
         if self.has_room(1, xz(swung)) {
             return Some(turned);
@@ -137,7 +141,7 @@ impl Pair<'_> {
 
     fn is_there(&self, pose: Pose, to: &Destination) -> bool {
         let here = xz(pose.position);
-        self.distance_m(pose, to) <= to.within_m.min(NEAR_M)
+        self.distance_m(pose, to) <= to.within_m.min(self.motion.reach_limit_m - NEARER_M)
             && to.avoid.iter().all(|tried| tried.distance(here) > OTHER_PLACE_M)
             && !to.is_walled_off(self.costs, here)
     }
@@ -156,13 +160,15 @@ impl Pair<'_> {
         blocked: Option<Intent>,
     ) -> Option<Vec<Intent>> {
         let key = |pose: Pose| {
-            let turns = (wrap_angle(pose.yaw_rad - start.yaw_rad) / TURN_RAD).round() as i32;
-            let heading = turns.rem_euclid((TAU / TURN_RAD).round() as i32);
+            let turn_rad = self.motion.turn_rad;
+            let turns = (wrap_angle(pose.yaw_rad - start.yaw_rad) / turn_rad).round() as i32;
+            let heading = turns.rem_euclid((TAU / turn_rad).round() as i32);
             let square = |m: f32| (m / SQUARE_M).floor() as i32;
             (square(pose.position.x), square(pose.position.z), heading)
         };
         let still = |pose: Pose| {
-            (self.distance_m(pose, to) - to.within_m).max(0.0) / STEP_M * STEP_FRAMES as f32
+            (self.distance_m(pose, to) - to.within_m).max(0.0) / step_m(&self.motion)
+                * STEP_FRAMES as f32
         };
         let mut nodes = vec![Node { pose: start, cost: 0, from: None }];
         let mut best = BTreeMap::from([(key(start), 0)]);
@@ -209,7 +215,7 @@ fn actions_to(nodes: &[Node], mut k: usize) -> Vec<Intent> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_support::Toy;
+    use crate::test_support::{MOTION, Toy};
     use chaic_protocol::AgentId;
     use chaic_protocol::observation::OtherEnd;
 
@@ -234,9 +240,14 @@ mod tests {
                 Nav::Unreachable => return None,
             };
             let (costs, _) = memory.costs_and_search();
-            let (bounds, other_in_body) = (toy.bounds(), end.position_in_body);
             let pose = observation.own.pose;
-            let mut pair = Pair { costs, bounds, other_in_body, room_m: [costs.radius_m(); 2] };
+            let mut pair = Pair {
+                costs,
+                bounds: toy.bounds(),
+                motion: MOTION,
+                other_in_body: end.position_in_body,
+                room_m: [costs.radius_m(); 2],
+            };
             let now = pair.bodies(pose).map(|p| pair.clearance_m(p));
             pair.room_m = [0, 1].map(|i| pair.room_m[i].min(now[i]));
             let next = pair.after(pose, action);

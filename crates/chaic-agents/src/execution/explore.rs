@@ -108,7 +108,7 @@ impl Explorer {
     /// At the place: looks beyond the border, or around.
     fn look(&mut self, memory: &Memory, target: Target) -> Found {
         if target.is_frontier {
-            if let Some(turn) = face(memory.here(), memory.pose.yaw_rad, target.beyond, 0.3)
+            if let Some(turn) = face(memory, target.beyond, 0.3)
                 && target.n_turns < REVISIT_TURNS
             {
                 self.target = Some(Target { n_turns: target.n_turns + 1, ..target });

@@ -47,7 +47,7 @@ impl Follower {
         if person.is_in_view {
             self.n_turns = 0;
             if here.distance(at) <= keep_m {
-                let turn = face(here, memory.pose.yaw_rad, at, FACING_RAD);
+                let turn = face(memory, at, FACING_RAD);
                 return Follow::Near(turn.unwrap_or(Action::Wait { frames: STAND_FRAMES }));
             }
         }
@@ -56,7 +56,7 @@ impl Follower {
             match navigator.step(memory, &Destination::near(at, within_m)) {
                 Nav::Act(action) => return Follow::Act(action),
                 Nav::Arrived | Nav::Unreachable if person.is_in_view => {
-                    let turn = face(here, memory.pose.yaw_rad, at, FACING_RAD);
+                    let turn = face(memory, at, FACING_RAD);
                     return Follow::Act(turn.unwrap_or(Action::Wait { frames: STAND_FRAMES }));
                 }
                 Nav::Arrived | Nav::Unreachable => {}

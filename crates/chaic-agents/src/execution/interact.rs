@@ -9,18 +9,16 @@ use crate::memory::{Memory, SETTLE_FRAMES};
 use crate::rules::Walking;
 use crate::track::{Intent, TrackId};
 
-/// The arm reaches so far over what an object lies on, metres: less than the world allows to be
-/// on the safe side, and, if no place to stand is found with it, more, as the map is coarse.
-const ARMS_M: [f32; 3] = [0.62, 0.75, 0.95];
+/// The arm reaches farther by so much over what an object lies on than the world lets it, metres:
+/// less to be on the safe side, and, if no place to stand is found with it, more, as the map is
+/// coarse.
+const ARMS_BEYOND_M: [f32; 3] = [-0.08, 0.05, 0.25];
 /// If there is no such place either: how near at least, metres.
 const RELAXED_M: f32 = 2.4;
 /// Things longer than this are walked up to at their nearest part, metres.
 const LONG_M: f32 = 4.0;
 /// Steps close to an object, on the way to a place to stand, before any place will do.
 const MAX_STEPS: u32 = 14;
-/// Whatever is nearer than this by memory, and not within reach, is no longer there, metres: the
-/// world reaches as far (`world.reach_limit_m` of the paper's rules).
-const THERE_M: f32 = 2.0;
 
 /// What an interaction says.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,7 +77,8 @@ impl Interaction {
         let mut destination = destination_at(thing, within_m);
         destination.avoid.clone_from(&self.tried);
         loop {
-            destination.arm_m = ARMS_M.get(self.n_relaxed).copied();
+            destination.arm_m =
+                ARMS_BEYOND_M.get(self.n_relaxed).map(|m| memory.motion.arm_reach_m + m);
             if destination.arm_m.is_none() {
                 destination.within_m = RELAXED_M;
             }
@@ -91,7 +90,7 @@ impl Interaction {
                     }
                     // One does not get where one wants to: something like it must do.
                     (self.n_steps, self.n_relaxed) = (0, self.n_relaxed + 1);
-                    if self.n_relaxed > ARMS_M.len() {
+                    if self.n_relaxed > ARMS_BEYOND_M.len() {
                         return Step::There;
                     }
                 }
@@ -223,8 +222,9 @@ fn learn_failure(memory: &mut Memory, object: TrackId, reason: FailureReason) {
         }
         FailureReason::Impossible => memory.things.ignore(object, now + rules.impossible_frames),
         FailureReason::OutOfReach => {
-            let here = memory.here();
-            if memory.things.get(object).is_some_and(|t| t.distance_from(here) < THERE_M) {
+            // Where it is nearer by memory than one reaches, it is no longer.
+            let (here, reach_m) = (memory.here(), memory.motion.reach_limit_m);
+            if memory.things.get(object).is_some_and(|t| t.distance_from(here) < reach_m) {
                 memory.things.mark_absent(object);
             }
         }

@@ -6,15 +6,15 @@
 use chaic_protocol::geom::{wrap_angle, yaw_towards};
 use chaic_protocol::{Action, Vec2, Vec3};
 
-use super::navigate::{Destination, Nav, TURN_RAD};
+use super::navigate::{Destination, Nav};
 use super::path::Path;
 use crate::memory::lattice_costs::BLOCKED;
 use crate::memory::{CELL_M, Memory, Space};
 
 /// One heads for the cell that is so many ahead on the way.
 const AHEAD: usize = 5;
-/// Heading for it within this, one walks on, radians: 1.2 turns.
-const WALK_RAD: f32 = 1.2 * TURN_RAD;
+/// Heading for it within so many turns, one walks on.
+const WALK_TURNS: f32 = 1.2;
 /// Who has turned towards its way so often without a step keeps to the way that it then knows, and
 /// waits for nobody meanwhile (ours). Nobody needs more than half a circle to face any way; but what
 /// one sees on turning may move the way to the other side, or block it, and back again.
@@ -94,7 +94,7 @@ pub fn step(memory: &mut Memory, destination: &Destination, steady: &mut Steadin
     let to = waypoint(memory, &way);
     let at = |p: Vec2| Vec3::new(p.x, 0.0, p.y);
     let error = wrap_angle(yaw_towards(at(here), at(to)) - yaw);
-    if error.abs() < WALK_RAD || to == here {
+    if error.abs() < WALK_TURNS * memory.motion.turn_rad || to == here {
         steady.n_turns = 0;
         memory.gets_on();
         return Nav::Act(Action::MoveForward);

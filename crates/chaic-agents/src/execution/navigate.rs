@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::f32::consts::PI;
 
+use chaic_protocol::briefing::Motion;
 use chaic_protocol::geom::{self, wrap_angle, xz};
 use chaic_protocol::{Action, Vec2, Vec3};
 
@@ -12,13 +13,11 @@ use crate::memory::costs::{CostMap, OCCUPIED};
 use crate::rules::Walking;
 use crate::track::Intent;
 
-/// One turn, radians.
-pub const TURN_RAD: f32 = PI / 12.0;
 /// Whoever heads for the target this well walks on, radians (9 degrees). Half a turn is 7.5, so
 /// that one does not turn to and fro.
 const WALK_RAD: f32 = 0.157;
-/// One step, metres.
-pub const STEP_M: f32 = 0.42;
+/// A step, which ends with a frame, is longer than the stride by this factor on average.
+const STEP_PER_STRIDE: f32 = 1.05;
 /// A way that costs more than this passes something occupied.
 const LIMIT: u32 = 10 * OCCUPIED - 1;
 /// How far ahead on the way to look for a point to walk to, cells (2.5 m).
@@ -40,6 +39,11 @@ const AVOID_COS_LARGE: f32 = 0.34;
 
 /// One step is longer than a place to stand beside furniture is wide, metres.
 const ARRIVAL_M: f32 = 0.12;
+
+/// The length of a step, metres.
+pub fn step_m(motion: &Motion) -> f32 {
+    STEP_PER_STRIDE * motion.stride_m
+}
 
 /// Where to go.
 #[derive(Clone, Debug, PartialEq)]
@@ -199,7 +203,7 @@ impl Navigator {
         if let Some(nav) = super::carry::step(memory, destination, &mut self.joint_way) {
             return nav;
         }
-        let (here, yaw) = (memory.here(), memory.pose.yaw_rad);
+        let (here, yaw, motion) = (memory.here(), memory.pose.yaw_rad, memory.motion);
         let (costs, _) = memory.costs_and_search();
         if destination.is_reached(costs, here) {
             self.way.clear();
@@ -211,7 +215,7 @@ impl Navigator {
         }
         let (costs, _) = memory.costs_and_search();
         let target = self.look_ahead(costs, here);
-        Nav::Act(steer(costs, here, yaw, target))
+        Nav::Act(steer(costs, here, yaw, target, &motion))
     }
 
     fn is_still_good(&mut self, costs: &CostMap, here: Vec2, to: &Destination) -> bool {
@@ -277,13 +281,14 @@ impl Navigator {
     }
 }
 
-/// Turns or walks so as to get to `target`: of the 24 headings that turns can lead to, takes the
+/// Turns or walks so as to get to `target`: of the headings that turns can lead to, takes the
 /// one nearest to the target's direction along which the next step is free.
-fn steer(costs: &CostMap, here: Vec2, yaw: f32, target: Vec2) -> Intent {
+fn steer(costs: &CostMap, here: Vec2, yaw: f32, target: Vec2, motion: &Motion) -> Intent {
+    let half_circle = (PI / motion.turn_rad).round() as i32;
     let bearing = yaw_to(here, target);
     let is_free = |heading: f32| {
         let ahead = xz(geom::forward(heading));
-        let (from, to) = (here + OWN_M * ahead, here + (STEP_M + 0.05) * ahead);
+        let (from, to) = (here + OWN_M * ahead, here + (step_m(motion) + 0.05) * ahead);
         costs.is_straight_clear(from, to)
     };
     if wrap_angle(bearing - yaw).abs() < WALK_RAD && is_free(yaw) {
@@ -292,8 +297,8 @@ fn steer(costs: &CostMap, here: Vec2, yaw: f32, target: Vec2) -> Intent {
     let mut best: Option<(f32, i32)> = None;
     let mut nearest = (f32::INFINITY, 0);
     // Small turns first, so that of two equally good headings the nearer one is taken.
-    for k in (0..=12).flat_map(|k: i32| [k, -k]) {
-        let heading = yaw + k as f32 * TURN_RAD;
+    for k in (0..=half_circle).flat_map(|k: i32| [k, -k]) {
+        let heading = yaw + k as f32 * motion.turn_rad;
         let error = wrap_angle(bearing - heading).abs();
         if error + 1e-4 < nearest.0 {
             nearest = (error, k);
@@ -318,14 +323,12 @@ fn yaw_to(from: Vec2, to: Vec2) -> f32 {
     geom::yaw_towards(Vec3::new(from.x, 0.0, from.y), Vec3::new(to.x, 0.0, to.y))
 }
 
-/// The turn that faces `target` better, or `None` if one faces it within `tolerance_rad`.
-pub fn face(here: Vec2, yaw: f32, target: Vec2, tolerance_rad: f32) -> Option<Intent> {
-    let error = wrap_angle(yaw_to(here, target) - yaw);
-    (error.abs() > tolerance_rad.max(0.5 * TURN_RAD + 1e-3)).then_some(if error > 0.0 {
-        Action::TurnLeft
-    } else {
-        Action::TurnRight
-    })
+/// The turn that faces `target` better, or `None` if one faces it within `tolerance_rad`, or
+/// within half a turn if that is more.
+pub fn face(memory: &Memory, target: Vec2, tolerance_rad: f32) -> Option<Intent> {
+    let error = wrap_angle(yaw_to(memory.here(), target) - memory.pose.yaw_rad);
+    (error.abs() > tolerance_rad.max(0.5 * memory.motion.turn_rad + 1e-3))
+        .then_some(if error > 0.0 { Action::TurnLeft } else { Action::TurnRight })
 }
 
 #[cfg(test)]
@@ -371,8 +374,16 @@ mod tests {
 
     #[test]
     fn turns_the_short_way() {
-        assert_eq!(face(Vec2::ZERO, 0.0, Vec2::new(-1.0, -1.0), 0.2), Some(Action::TurnLeft));
-        assert_eq!(face(Vec2::ZERO, 0.0, Vec2::new(1.0, -1.0), 0.2), Some(Action::TurnRight));
-        assert_eq!(face(Vec2::ZERO, 0.0, Vec2::new(0.1, -1.0), 0.2), None);
+        let mut toy = Toy::room(6.0, 6.0);
+        toy.stand([0.0, 0.0], 0.0);
+        let mut memory = ToyRun::new(toy).look();
+        let turn = |memory: &Memory, x| face(memory, Vec2::new(x, -1.0), 0.0);
+        assert_eq!(turn(&memory, -1.0), Some(Action::TurnLeft));
+        assert_eq!(turn(&memory, 1.0), Some(Action::TurnRight));
+        assert_eq!(turn(&memory, 0.1), None);
+        // What is less than half a turn off is faced, however large a turn is.
+        assert_eq!(turn(&memory, 0.2), Some(Action::TurnRight));
+        memory.motion.turn_rad *= 2.0;
+        assert_eq!(turn(&memory, 0.2), None);
     }
 }

@@ -109,7 +109,7 @@ impl Recovery {
     /// Turns to the side with more room and takes a step.
     fn back_off(&mut self, memory: &mut Memory, n_turns: usize, rng: &mut Stream) {
         let room = |memory: &Memory, sign: f32| {
-            let heading = memory.pose.yaw_rad + sign * n_turns as f32 * super::navigate::TURN_RAD;
+            let heading = memory.pose.yaw_rad + sign * n_turns as f32 * memory.motion.turn_rad;
             let ahead = xz(chaic_protocol::geom::forward(heading));
             let costs = memory.costs();
             (1..=8)

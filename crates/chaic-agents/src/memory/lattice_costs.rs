@@ -184,7 +184,7 @@ mod tests {
     use super::*;
     use crate::memory::occupancy::MAP_RANGE_M;
     use crate::perception::{GroundTruthIds, Perception as _};
-    use crate::test_support::{Toy, ToyObject};
+    use crate::test_support::{MOTION, Toy, ToyObject};
 
     #[test]
     fn a_wall_stays_one_for_as_long_as_its_cell_counts_as_occupied() {
@@ -213,7 +213,7 @@ mod tests {
         let mut toy = Toy::room(8.0, 8.0);
         let lintel = toy.add(ToyObject::new("cabinet", [0.0, 2.1, -2.5], [1.0, 0.4, 0.3]));
         toy.stand([0.0, 0.0], 0.0);
-        let mut map = OccupancyMap::new(&toy.bounds());
+        let mut map = OccupancyMap::new(&toy.bounds(), MOTION.step_over_m);
         let (grid, mut belief) = (*map.grid(), Belief::default());
         let mut cost = vec![0; grid.n_cells()];
         let observation = toy.observe();
@@ -239,7 +239,7 @@ mod tests {
             toy.add(ToyObject::new("cabinet", [x, 0.0, -2.2], [0.8, height_m, 0.8]))
         });
         toy.stand([0.0, 0.0], 0.0);
-        let mut map = OccupancyMap::new(&toy.bounds());
+        let mut map = OccupancyMap::new(&toy.bounds(), MOTION.step_over_m);
         let (grid, mut belief) = (*map.grid(), Belief::default());
         let mut cost = vec![0; grid.n_cells()];
         // The costs where the boxes stand, or stood, after so many looks.

@@ -12,7 +12,7 @@ pub mod lattice_costs;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use chaic_protocol::briefing::Relation;
+use chaic_protocol::briefing::{Motion, Relation};
 use chaic_protocol::capability::Gait;
 use chaic_protocol::geom::{Pose, Rect, horizontal_distance, xz};
 use chaic_protocol::observation::{Grants, OtherEnd};
@@ -60,6 +60,8 @@ pub struct Memory {
     pub frame: Frame,
     /// Where the own body is.
     pub pose: Pose,
+    /// How bodies move and reach.
+    pub motion: Motion,
     /// What stands firmly.
     pub map: OccupancyMap,
     /// What is where.
@@ -117,12 +119,13 @@ struct Patience {
 impl Memory {
     /// Nothing remembered yet.
     pub fn new(briefing: &Briefing, rules: PlannerRules) -> Memory {
-        let map = OccupancyMap::new(&briefing.bounds);
+        let map = OccupancyMap::new(&briefing.bounds, briefing.motion.step_over_m);
         let costs = CostMap::new(*map.grid(), briefing.capability.radius_m);
         Memory {
             rules,
             frame: 0,
             pose: Pose::default(),
+            motion: briefing.motion,
             things: SemanticMap::default(),
             people: People::default(),
             hands: Hands::default(),

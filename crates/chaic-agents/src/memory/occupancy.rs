@@ -11,8 +11,6 @@ use crate::perception::{Percepts, Rays};
 pub const MAP_RANGE_M: f32 = 5.0;
 /// Points below this are floor, metres. (The paper's code uses 0.05; rugs and curbs need more.)
 const FLOOR_M: f32 = 0.08;
-/// Points above this are stepped over no more, metres.
-const STEP_M: f32 = 0.12;
 /// Occupied cells with points above this are walls, metres (facts A1.1).
 const WALL_M: f32 = 2.0;
 /// Points above this may be a ceiling and say nothing, metres: the lowest that is usual in homes.
@@ -105,8 +103,9 @@ const LANES: usize = 16;
 #[derive(Clone, Copy)]
 struct Limits {
     grid: Grid,
-    /// Nothing above this is in the way, metres.
+    /// Nothing above this is in the way, metres; lower things are stepped over.
     head_m: f32,
+    step_over_m: f32,
     /// What is seen within this counts as known, metres.
     known_m: f32,
 }
@@ -135,7 +134,7 @@ impl Limits {
         let mask = |is: bool| u32::from(is).wrapping_neg();
         let bits: [u32; LANES] = std::array::from_fn(|k| {
             let floor = mask(y[k] < FLOOR_M) & u32::from(NOW_FLOOR);
-            let firm = mask((y[k] > STEP_M) & (y[k] <= head_m)) & u32::from(NOW_OCCUPIED);
+            let firm = mask((y[k] > self.step_over_m) & (y[k] <= head_m)) & u32::from(NOW_OCCUPIED);
             let high = mask((y[k] > WALL_M) & (y[k] < TOP_M)) & u32::from(NOW_HIGH);
             let tall = mask((y[k] > TALL_M) & (y[k] < TOP_M)) & u32::from(NOW_TALL);
             let near = mask((d[k] < self.known_m) & (y[k] < TOP_M)) & u32::from(NOW_NEAR);
@@ -183,6 +182,8 @@ impl pulp::NullaryFnOnce for Scan<'_> {
 #[derive(Clone, Debug)]
 pub struct OccupancyMap {
     grid: Grid,
+    /// Lower things are stepped over, metres.
+    step_over_m: f32,
     /// How sure one is that the cell is occupied, 0..=6.
     sure: Vec<u8>,
     seen: Vec<u8>,
@@ -195,15 +196,15 @@ pub struct OccupancyMap {
 }
 
 impl OccupancyMap {
-    /// An unknown place.
-    pub fn new(bounds: &Rect) -> OccupancyMap {
-        OccupancyMap::on(Grid::over(bounds))
+    /// An unknown place, where things lower than `step_over_m` are in nobody's way.
+    pub fn new(bounds: &Rect, step_over_m: f32) -> OccupancyMap {
+        OccupancyMap::on(Grid::over(bounds), step_over_m)
     }
 
     /// A drawn place.
     #[cfg(test)]
     pub(crate) fn of_spaces(grid: Grid, spaces: &[Space]) -> OccupancyMap {
-        let mut map = OccupancyMap::on(grid);
+        let mut map = OccupancyMap::on(grid, crate::test_support::MOTION.step_over_m);
         for (cell, space) in spaces.iter().enumerate() {
             (map.sure[cell], map.seen[cell]) = match space {
                 Space::Free => (0, SEEN_FREE),
@@ -215,11 +216,12 @@ impl OccupancyMap {
         map
     }
 
-    fn on(grid: Grid) -> OccupancyMap {
+    fn on(grid: Grid, step_over_m: f32) -> OccupancyMap {
         let n = grid.n_cells();
         let n_places = grid.nx().div_ceil(PLACE_CELLS) * grid.nz().div_ceil(PLACE_CELLS);
         OccupancyMap {
             grid,
+            step_over_m,
             sure: vec![0; n],
             seen: vec![0; n],
             now: vec![0; n],
@@ -341,7 +343,12 @@ impl OccupancyMap {
         });
         let [xs, ys, zs] = columns.each_ref().map(|c| c.as_chunks::<LANES>().0);
         let mut sampled = vec![0.0; padded_width];
-        let limits = Limits { grid: self.grid, head_m: height_m + 0.05, known_m };
+        let limits = Limits {
+            grid: self.grid,
+            head_m: height_m + 0.05,
+            step_over_m: self.step_over_m,
+            known_m,
+        };
         self.touched.clear();
         for (k, row) in (0..height).step_by(stride).enumerate() {
             every(stride, &depth[row * width..][..width], &mut sampled);
@@ -445,7 +452,7 @@ impl OccupancyMap {
 mod tests {
     use super::*;
     use crate::perception::{GroundTruthIds, Perception as _};
-    use crate::test_support::{Toy, ToyObject};
+    use crate::test_support::{MOTION, Toy, ToyObject};
 
     fn look(map: &mut OccupancyMap, toy: &Toy) {
         let observation = toy.observe();
@@ -463,7 +470,7 @@ mod tests {
         toy.add(ToyObject::new("cabinet", [1.0, 0.0, -2.0], [0.8, 1.0, 0.4]));
         toy.add(ToyObject::new("apple", [-1.0, 0.0, -2.0], [0.3, 0.3, 0.3]));
         toy.stand([0.0, 0.0], 0.0);
-        let mut map = OccupancyMap::new(&toy.bounds());
+        let mut map = OccupancyMap::new(&toy.bounds(), MOTION.step_over_m);
         look(&mut map, &toy);
         assert_eq!(space(&map, 0.0, -2.0), Space::Free);
         assert_eq!(space(&map, 1.0, -1.82), Space::Occupied);
@@ -482,7 +489,7 @@ mod tests {
         toy.add(ToyObject::new("cabinet", [1.0, 0.0, -2.0], [0.8, 1.0, 0.4]));
         toy.add(ToyObject::new("bed", [0.0, 2.6, 0.0], [6.0, 0.1, 6.0]));
         toy.stand([0.0, 0.0], 0.0);
-        let mut map = OccupancyMap::new(&toy.bounds());
+        let mut map = OccupancyMap::new(&toy.bounds(), MOTION.step_over_m);
         look(&mut map, &toy);
         assert_eq!(space(&map, 1.0, -1.82), Space::Occupied);
         let face = space(&map, 0.0, -3.01).max(space(&map, 0.0, -2.99));
@@ -494,7 +501,7 @@ mod tests {
         let mut toy = Toy::room(6.0, 6.0);
         let cabinet = toy.add(ToyObject::new("cabinet", [0.0, 0.0, -2.2], [0.8, 0.6, 0.8]));
         toy.stand([0.0, 0.0], 0.0);
-        let mut map = OccupancyMap::new(&toy.bounds());
+        let mut map = OccupancyMap::new(&toy.bounds(), MOTION.step_over_m);
         look(&mut map, &toy);
         assert_eq!(space(&map, 0.0, -1.85), Space::Occupied);
         toy.remove(cabinet);
@@ -508,7 +515,7 @@ mod tests {
     fn a_still_look_changes_nothing() {
         let mut toy = Toy::room(6.0, 6.0);
         toy.stand([0.0, 0.0], 0.3);
-        let mut map = OccupancyMap::new(&toy.bounds());
+        let mut map = OccupancyMap::new(&toy.bounds(), MOTION.step_over_m);
         look(&mut map, &toy);
         let version = map.version();
         look(&mut map, &toy);
@@ -526,7 +533,7 @@ mod tests {
             toy.add(ToyObject::new("cabinet", [x, 0.0, -2.2], [0.8, height_m, 0.8]))
         });
         toy.stand([0.0, 0.0], 0.0);
-        let mut map = OccupancyMap::new(&toy.bounds());
+        let mut map = OccupancyMap::new(&toy.bounds(), MOTION.step_over_m);
         let know = |map: &OccupancyMap| {
             [-0.7, 0.7].map(|x| {
                 let cell = map.grid().cell_at(Vec2::new(x, -1.85)).expect("inside");
@@ -552,7 +559,7 @@ mod tests {
         let observation = toy.observe();
         let percepts = GroundTruthIds.perceive(&observation);
         for (known_m, is_known) in [(MAP_RANGE_M, true), (2.0, false)] {
-            let mut map = OccupancyMap::new(&toy.bounds());
+            let mut map = OccupancyMap::new(&toy.bounds(), MOTION.step_over_m);
             map.integrate(&observation, &percepts, 1.75, known_m);
             let [under, beside] =
                 [0.0, 1.0].map(|x| map.grid().cell_at(Vec2::new(x, -2.44)).expect("inside"));

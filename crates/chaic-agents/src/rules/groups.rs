@@ -117,6 +117,35 @@ pub struct PeopleRules {
     pub child_apart_remembered_m: f32,
 }
 
+/// What the child itself does: the original's numbers (facts A2.4), but for the last two.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ChildRules {
+    /// Between two draws whether it runs away pass more than so many frames.
+    pub plan_frames: Frame,
+    /// Chance to run away at each draw, where draws are by the episode's luck.
+    pub run_chance: f32,
+    /// It turns back once the helper is this near, metres.
+    pub caught_m: f32,
+    /// It is back with its guardian from here, metres.
+    pub home_m: f32,
+    /// How near it follows its guardian, metres.
+    pub follow_m: f32,
+    /// It runs at least so far, metres.
+    pub run_min_m: f32,
+    /// To a point that lies off its guardian's direction by more than this, radians: 60 degrees.
+    pub off_rad: f32,
+    /// Or by more than this, radians, where the point is far from the guardian: 30 degrees.
+    pub off_far_rad: f32,
+    /// Farther from the guardian than this is far, metres.
+    pub far_m: f32,
+    /// The point is at least so far inside the place, metres: 6 cells of the original's map.
+    pub border_m: f32,
+    /// Nothing is known to stand so near to the point, metres. Ours: room for the child.
+    pub free_m: f32,
+    /// So near to the point it is there, metres. Ours: a little more than a step.
+    pub there_m: f32,
+}
+
 impl TimeRules {
     /// Of both rule sets.
     pub const STANDARD: TimeRules = TimeRules {
@@ -179,6 +208,24 @@ impl PeopleRules {
     };
 }
 
+impl ChildRules {
+    /// Of both rule sets.
+    pub const STANDARD: ChildRules = ChildRules {
+        plan_frames: 100,
+        run_chance: 0.2,
+        caught_m: 2.5,
+        home_m: 3.0,
+        follow_m: 2.0,
+        run_min_m: 5.0,
+        off_rad: std::f32::consts::FRAC_PI_3,
+        off_far_rad: std::f32::consts::FRAC_PI_6,
+        far_m: 10.0,
+        border_m: 0.75,
+        free_m: 1.0,
+        there_m: 0.5,
+    };
+}
+
 /// For listings of rules that were written before these constants were rules: they were played
 /// by just these.
 macro_rules! standard_by_default {
@@ -191,4 +238,4 @@ macro_rules! standard_by_default {
     )*};
 }
 
-standard_by_default!(TimeRules, PlanLimits, FailureRules, LiftingRules, PeopleRules);
+standard_by_default!(TimeRules, PlanLimits, FailureRules, LiftingRules, PeopleRules, ChildRules);

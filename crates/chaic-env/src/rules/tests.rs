@@ -109,7 +109,7 @@ fn listings_from_before_constants_were_rules_are_read_as_they_were_played() {
     for rules in [RuleSet::PAPER, RuleSet::COMPAT] {
         let mut listing = rules.to_value();
         let planner = listing["planner"].as_object_mut().expect("a struct");
-        for group in ["time", "limits", "failures", "lifting", "people"] {
+        for group in ["time", "limits", "failures", "lifting", "people", "child"] {
             assert!(planner.remove(group).is_some(), "{group}");
         }
         assert_eq!(serde_json::from_value::<RuleSet>(listing).expect("readable"), rules);

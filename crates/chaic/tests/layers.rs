@@ -197,6 +197,23 @@ fn no_task_is_known_by_its_name() {
 }
 
 #[test]
+fn every_crate_says_what_it_is() {
+    let metadata = metadata();
+    let packages = list(&metadata["packages"]);
+    assert!(packages.len() > 10);
+    for package in packages {
+        let name = text(&package["name"]);
+        let folder = Path::new(text(&package["manifest_path"])).parent().expect("a folder");
+        assert!(
+            package["description"].as_str().is_some_and(|d| d.len() > 20),
+            "{name}: description"
+        );
+        let readme = std::fs::read_to_string(folder.join("README.md")).unwrap_or_default();
+        assert!(readme.starts_with("# "), "{name}: README.md");
+    }
+}
+
+#[test]
 fn every_dependency_follows_an_arrow() {
     assert_eq!(wrong_arrows(&metadata()), [""; 0]);
 }

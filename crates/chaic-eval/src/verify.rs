@@ -15,12 +15,13 @@ use chaic_env::rules::RuleSet;
 use chaic_env::trace::{Decision, Header, Record, Trace, Warning};
 use chaic_env::{Choice, EnvError, EpisodeConfig, Minds, RunKey, header_of, run_loop, world_of};
 use chaic_protocol::agent::ChildState;
+use chaic_protocol::observation::Grants;
 use chaic_protocol::{AgentId, Frame};
 use chaic_world::World;
 
 use crate::error::{EvalError, Result};
 use crate::metrics::{Ending, RunResult, tally};
-use crate::run::{RunFolder, RunOptions, planned, read_results};
+use crate::run::{RunFolder, RunGrants, RunOptions, planned, read_results};
 use crate::trace_file;
 
 /// The first place where a trace and its re-simulation differ.
@@ -99,7 +100,9 @@ pub fn verify_run(
     let (results, warnings) = read_results(&folder.results(), &planned)?;
     let keys: Vec<RunKey> = planned.iter().map(|item| item.key.clone()).collect();
     let rules = options.rules()?;
-    let check = Check { folder, options, rules, helpers, planned: &keys, results: &results };
+    let granted = folder.granted()?;
+    let check =
+        Check { folder, options, rules, granted, helpers, planned: &keys, results: &results };
     let checked = check.files(&paths, jobs, progress)?;
     let mut verdict = Verdict {
         warnings,
@@ -133,7 +136,9 @@ pub fn verify_trace(
     path: &Path,
 ) -> Result<Option<Mismatch>> {
     let rules = options.rules()?;
-    Check { folder, options, rules, helpers, planned: &[], results: &[] }.trace(trace, path)
+    let granted = folder.granted()?;
+    Check { folder, options, rules, granted, helpers, planned: &[], results: &[] }
+        .trace(trace, path)
 }
 
 /// What verifying one trace found.
@@ -176,6 +181,8 @@ struct Check<'a> {
     folder: &'a RunFolder,
     options: &'a RunOptions,
     rules: RuleSet,
+    /// What `run.json` says of grants.
+    granted: Option<RunGrants>,
     helpers: &'a dyn Helpers,
     /// All that the run plays; empty where nobody knows.
     planned: &'a [RunKey],
@@ -272,8 +279,13 @@ impl Check<'_> {
         };
         let mut expected = header_of(config, Minds::of(helper, partner.ok().flatten()))?;
         for (expected, said) in expected.people.iter_mut().zip(&header.people) {
+            let recorded = self.recorded_grants(expected.agent, &key.helper);
             if is_unknown.get(expected.agent.index()).is_some_and(|unknown| *unknown) {
-                (expected.grants, expected.senses) = (said.grants, said.senses);
+                expected.grants = recorded.unwrap_or(said.grants);
+                expected.senses = said.senses;
+            } else if recorded.is_some_and(|grants| grants != expected.grants) {
+                let problem = format!("run.json says that the {} is granted", expected.agent);
+                return Ok(Some(problem + " something else than such a mind is"));
             }
         }
         let expected = Header { chaic: header.chaic.clone(), ..expected };
@@ -289,6 +301,18 @@ impl Check<'_> {
             .collect();
         let problem = || format!("the first line is not what this run has: {}", wrong.join(", "));
         Ok((!wrong.is_empty()).then(problem))
+    }
+}
+
+impl Check<'_> {
+    /// What `run.json` says that an agent is granted.
+    fn recorded_grants(&self, agent: AgentId, helper: &str) -> Option<Grants> {
+        let granted = self.granted.as_ref()?;
+        match agent {
+            AgentId::PARTNER => Some(granted.partner),
+            AgentId::HELPER => granted.helpers.get(helper).copied(),
+            _ => None,
+        }
     }
 }
 

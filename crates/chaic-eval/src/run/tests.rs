@@ -285,6 +285,27 @@ fn verify_finds_what_was_changed() {
 }
 
 #[test]
+fn verify_holds_a_helper_that_is_not_at_hand_to_what_the_run_granted() {
+    let files = episode_files(&[TaskId::LowTarget], 1);
+    let dir = tempfile::tempdir().unwrap();
+    let helpers = TestHelpers::new();
+    let given = RunRequest { seeds: None, ..given(&files, &["turner"]) };
+    let (mut run, _) = Run::open(dir.path(), Access::Begin, &given, &helpers).unwrap();
+    assert!(play(&mut run, 1, &helpers));
+    let path = run.folder().traces().unwrap().remove(0);
+    let text = fs::read_to_string(&path).unwrap();
+    let verdict = || {
+        let built_in = chaic_env::minds::BuiltIn;
+        crate::verify::verify_run(run.folder(), run.options(), &built_in, 1, &|_| ()).unwrap()
+    };
+    assert_eq!(verdict().mismatches, []);
+    fs::write(&path, text.replacen("\"goal\":false", "\"goal\":true", 1)).unwrap();
+    let mismatches = verdict().mismatches;
+    assert_eq!(mismatches.len(), 1);
+    assert!(mismatches[0].problem.contains("not what this run has: people"), "{mismatches:?}");
+}
+
+#[test]
 fn another_build_of_the_same_version_is_found_out() {
     let files = episode_files(&[TaskId::LowTarget, TaskId::Shopping], 1);
     let dir = tempfile::tempdir().unwrap();

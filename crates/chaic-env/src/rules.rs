@@ -86,7 +86,23 @@ impl RuleSet {
         if let Some(place) = all.pointer_mut(&pointer) {
             *place = new;
         }
-        serde_json::from_value(all).map_err(|e| wrong(format!("{hint}: {e}")))
+        let made: RuleSet =
+            serde_json::from_value(all).map_err(|e| wrong(format!("{hint}: {e}")))?;
+        made.check_motion().map_err(wrong)?;
+        Ok(made)
+    }
+
+    /// Planners divide by the length of a turn and of a step.
+    fn check_motion(&self) -> std::result::Result<(), String> {
+        let Rules { turn_rad, stride_m, .. } = self.world;
+        for (name, value, most) in
+            [("turn_rad", turn_rad, std::f32::consts::PI), ("stride_m", stride_m, 10.0)]
+        {
+            if !(0.01..=most).contains(&value) {
+                return Err(format!("`world.{name}` is from 0.01 to {most:.2}"));
+            }
+        }
+        Ok(())
     }
 
     fn to_value(self) -> Value {

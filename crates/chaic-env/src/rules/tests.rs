@@ -29,6 +29,9 @@ fn a_wrong_setting_is_refused_with_what_would_be_right() {
         ("name=paper", "no rule `name`"),
         ("world.stride_m", "NAME=VALUE"),
         ("world.stride_m=far", "0.4"),
+        ("world.stride_m=0", "0.01 to 10"),
+        ("world.turn_rad=0", "0.01 to 3.14"),
+        ("world.turn_rad=-0.3", "0.01 to 3.14"),
         ("planner.exploration=nowhere", "frontier"),
         ("world.dropped_counts=1", "false"),
     ] {

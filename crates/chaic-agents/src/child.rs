@@ -23,6 +23,7 @@ use crate::track::{Intent, named};
 const ESCAPES: [u32; 6] = [6, 14, 26, 38, 39, 40];
 /// Points drawn and points kept at most.
 const DRAWS: (usize, usize) = (2000, 500);
+
 /// What the child is up to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum ChildBehavior {

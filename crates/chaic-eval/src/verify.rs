@@ -248,6 +248,16 @@ impl Check<'_> {
         verify(trace, &mut world, path)
     }
 
+    /// What `run.json` says that an agent is granted.
+    fn recorded_grants(&self, agent: AgentId, helper: &str) -> Option<Grants> {
+        let granted = self.granted.as_ref()?;
+        match agent {
+            AgentId::PARTNER => Some(granted.partner),
+            AgentId::HELPER => granted.helpers.get(helper).copied(),
+            _ => None,
+        }
+    }
+
     /// What the first line of a trace says that isn't so.
     fn header_problem(&self, header: &Header, path: &Path) -> Result<Option<String>> {
         let key = header.key();
@@ -301,18 +311,6 @@ impl Check<'_> {
             .collect();
         let problem = || format!("the first line is not what this run has: {}", wrong.join(", "));
         Ok((!wrong.is_empty()).then(problem))
-    }
-}
-
-impl Check<'_> {
-    /// What `run.json` says that an agent is granted.
-    fn recorded_grants(&self, agent: AgentId, helper: &str) -> Option<Grants> {
-        let granted = self.granted.as_ref()?;
-        match agent {
-            AgentId::PARTNER => Some(granted.partner),
-            AgentId::HELPER => granted.helpers.get(helper).copied(),
-            _ => None,
-        }
     }
 }
 

@@ -85,7 +85,7 @@ pub fn step(memory: &mut Memory, destination: &Destination, steady: &mut Steadin
     let way = steady.kept_way(memory).unwrap_or(way);
     if memory.waits_for_obstacles() && way.cost > BLOCKED && memory.map.space(end) != Space::Wall {
         // It waits for somebody to clear the way, though not for ever.
-        return if memory.goes_on_waiting() {
+        return if memory.wait_for_obstacle() {
             Nav::Act(Action::TurnLeft)
         } else {
             Nav::Unreachable
@@ -96,7 +96,7 @@ pub fn step(memory: &mut Memory, destination: &Destination, steady: &mut Steadin
     let error = wrap_angle(yaw_towards(at(here), at(to)) - yaw);
     if error.abs() < WALK_TURNS * memory.motion.turn_rad || to == here {
         steady.n_turns = 0;
-        memory.gets_on();
+        memory.note_step();
         return Nav::Act(Action::MoveForward);
     }
     steady.turn(&way);
@@ -180,9 +180,9 @@ mod tests {
             memory.costs().cost(cell) < BLOCKED / 3
         };
         assert!(!is_open(&mut memory, corner) && !is_open(&mut memory, touching));
-        memory.goes_on_waiting();
+        memory.wait_for_obstacle();
         memory.frame += memory.rules.failures.obstacle_patience_frames;
-        assert!(memory.goes_on_waiting(), "to the end of its patience");
+        assert!(memory.wait_for_obstacle(), "to the end of its patience");
         assert!(is_open(&mut memory, corner) && !is_open(&mut memory, touching));
     }
 

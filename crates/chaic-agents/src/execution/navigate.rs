@@ -16,7 +16,8 @@ use crate::track::Intent;
 /// Whoever heads for the target this well walks on, radians (9 degrees). Half a turn is 7.5, so
 /// that one does not turn to and fro.
 const WALK_RAD: f32 = 0.157;
-/// A step, which ends with a frame, is longer than the stride by this factor on average.
+/// A step ends with a whole frame: an adult's, of 9 frames at 0.047 m, covers a little more than the
+/// stride (facts S1.5 and S2.2).
 const STEP_PER_STRIDE: f32 = 1.05;
 /// A way that costs more than this passes something occupied.
 const LIMIT: u32 = 10 * OCCUPIED - 1;

@@ -49,7 +49,7 @@ impl Sampler {
         let Some((at, since)) = self.target else {
             // An obstacle may be what closes one in.
             if memory.waits_for_obstacles() {
-                memory.goes_on_waiting();
+                memory.wait_for_obstacle();
             }
             return Found::Act(Action::TurnLeft);
         };

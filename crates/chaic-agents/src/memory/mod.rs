@@ -268,7 +268,7 @@ impl Memory {
 
     /// Waits before an obstacle, and tells whether its owner goes on waiting. Who has waited in
     /// vain tries for a while whether there is just enough room to get past.
-    pub fn goes_on_waiting(&mut self) -> bool {
+    pub fn wait_for_obstacle(&mut self) -> bool {
         let FailureRules { obstacle_patience_frames, ignore_frames, .. } = self.rules.failures;
         if self.frame < self.patience.over_until {
             return false;
@@ -281,8 +281,8 @@ impl Memory {
         true
     }
 
-    /// Its owner gets on: from here on it has waited for nothing.
-    pub fn gets_on(&mut self) {
+    /// Notes a step ahead: from here on its owner has waited for nothing.
+    pub fn note_step(&mut self) {
         self.patience.since = None;
     }
 

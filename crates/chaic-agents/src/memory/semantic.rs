@@ -21,7 +21,10 @@ const MISS_RANGE_M: f32 = 4.0;
 /// Part of the image's width that is too near to the border to prove anything.
 const MISS_MARGIN: f32 = 0.08;
 /// Looks at an empty place before the object is forgotten.
-const MISSES: u8 = 3;
+const MISSES: u32 = 3;
+/// What turns up again where it was given up takes so many times as many looks the next time: it
+/// shows too little to be found from everywhere.
+const MISSES_GROW: u32 = 4;
 /// Most footprint points kept for one thing: a truck's outline and more.
 const MAX_FOOTPRINT: usize = 512;
 
@@ -55,7 +58,9 @@ pub struct Thing {
     /// Whether it is out of play: delivered, lost or broken.
     pub is_gone: bool,
     /// Looks at its place that did not show it.
-    misses: u8,
+    misses: u32,
+    /// So many of them and it is forgotten.
+    misses_to_forget: u32,
 }
 
 impl Thing {
@@ -75,6 +80,7 @@ impl Thing {
             is_present: true,
             is_gone: false,
             misses: 0,
+            misses_to_forget: MISSES,
         }
     }
 
@@ -108,9 +114,13 @@ impl Thing {
     /// Takes in a sighting; whether that changes what is in the way.
     fn see(&mut self, seen: &Detection, now: Frame) -> bool {
         let n_points = self.footprint.len();
-        let moved = !self.is_present
-            || horizontal_distance(seen.position_in_world, self.position_in_world) > MOVED_M
+        let elsewhere = horizontal_distance(seen.position_in_world, self.position_in_world)
+            > MOVED_M
             || (seen.position_in_world.y - self.position_in_world.y).abs() > MOVED_M;
+        let moved = !self.is_present || elsewhere;
+        if !elsewhere && self.misses >= self.misses_to_forget {
+            self.misses_to_forget = self.misses_to_forget.saturating_mul(MISSES_GROW);
+        }
         if self.is_fixed() || (!moved && !self.class.info().is_carriable()) {
             self.merge_footprint(&seen.footprint);
             self.bottom_m = self.bottom_m.min(seen.bottom_m);
@@ -251,7 +261,7 @@ impl SemanticMap {
                 && expected_pixels(thing.class, d, camera.focal_px()) > MISS_PIXELS
             {
                 thing.misses += 1;
-                thing.is_present = thing.misses < MISSES;
+                thing.is_present = thing.misses < thing.misses_to_forget;
                 self.layout += 1;
             }
         }
@@ -378,6 +388,27 @@ mod tests {
             }
             assert_eq!(map.get(apple).expect("still on record").is_present, hidden);
         }
+    }
+
+    #[test]
+    fn what_shows_from_here_and_not_from_there_is_given_up_ever_more_seldom() {
+        let mut toy = Toy::room(8.0, 8.0);
+        toy.size = 256;
+        let apple = toy.add(ToyObject::new("apple", [0.0, 0.0, -1.9], [0.2, 0.2, 0.2]));
+        toy.stand([0.0, 0.0], 0.0);
+        let shown = GroundTruthIds.perceive(&toy.observe()).detections;
+        toy.remove(apple);
+        let mut map = SemanticMap::default();
+        let mut n_given_up = 0;
+        for _ in 0..50 {
+            map.see(&shown, &[], 300, toy.frame);
+            for _ in 0..2 * MISSES {
+                toy.frame += 1;
+                look(&mut map, &toy, &[]);
+            }
+            n_given_up += u32::from(!map.get(apple).expect("on record").is_present);
+        }
+        assert_eq!(n_given_up, 1);
     }
 
     #[test]

@@ -118,7 +118,9 @@ impl HandState {
         let basket = hands.held().find(|h| role(h) == Some(Role::Vehicle));
         let is_moving =
             briefing.possible_targets.iter().any(|c| c.info().role == Role::HeavyTarget);
-        let free_hand = Hand::BOTH.into_iter().find(|h| hands.hands[h.index()].is_none());
+        let body = &briefing.capability;
+        let is_free = |h: &Hand| hands.hands[h.index()].is_none();
+        let free_hand = body.hands.all().iter().copied().find(is_free);
         let has_container = hands.held().any(is_container);
         let can_put_in = Hand::BOTH.into_iter().any(|hand| {
             let [one, other] = [hand, hand.other()].map(|h| hands.hands[h.index()].as_ref());
@@ -127,7 +129,7 @@ impl HandState {
         });
         let can_take_target = match basket {
             Some(basket) => basket.n_contents < capacity,
-            None if is_moving => hands.held().next().is_none(),
+            None if is_moving => body.lifts_furniture && hands.held().next().is_none(),
             None => free_hand.is_some(),
         };
         // What nobody knows is got rid of at the goal place, too.
@@ -137,7 +139,10 @@ impl HandState {
             has_container,
             targets: hands.all().filter(|(_, class)| is_target(*class)).collect(),
             can_take_target,
-            can_take_container: basket.is_none() && !has_container && free_hand.is_some(),
+            can_take_container: basket.is_none()
+                && body.carries_containers
+                && !has_container
+                && free_hand.is_some(),
             can_put_in,
             to_deliver: Hand::BOTH
                 .into_iter()
@@ -226,7 +231,7 @@ pub fn valid_plans(memory: &Memory, briefing: &Briefing) -> Vec<Plan> {
     if hands.free_hand.is_some() && briefing.capability.removes_obstacles {
         plans.extend(reachable(memory, &briefing.obstacles).map(Plan::RemoveObstacle));
     }
-    if memory.hands.held().next().is_none() {
+    if briefing.capability.lifts_furniture && memory.hands.held().next().is_none() {
         plans.extend(pieces_at_partner(memory, briefing).map(Plan::LiftWith));
     }
     if memory.companion(briefing, Relation::Partner).is_some() {

@@ -134,8 +134,8 @@ impl Observer {
 /// The camera of an agent's eye. Ids are always made: they resolve what is pointed at, and tell what
 /// is in view.
 fn view_of(world: &World, agent: AgentId, senses: Senses) -> View {
-    let camera = world.eye(agent, senses.image_size);
-    View::of_eye(agent, camera, Channels { ids: true, ..Channels::from(senses) })
+    let channels = Channels { ids: true, ..Channels::from(senses) };
+    View::of_agent(world, agent, senses.image_size, channels)
 }
 
 fn glimpse(world: &World, agent: AgentId, seat: &Seat, mut images: Images) -> Glimpse {

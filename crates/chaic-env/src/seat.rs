@@ -98,7 +98,7 @@ impl From<Option<Helper>> for Minds {
 /// is no helper.
 pub fn seats(setup: &Setup, minds: Minds, rules: PlannerRules) -> Vec<Seat> {
     let info = setup.task.info();
-    let persona = setup.people.first().map_or(info.partner, |p| p.persona);
+    let persona = setup.people.first().map_or(info.partner.persona, |p| p.persona);
     let by_rules = || {
         let mind = partners::partner(persona, info.scene, rules);
         Seat::of_mind(mind, partners::partner_grants(rules))

@@ -289,3 +289,32 @@ fn who_broke_down_is_not_asked_again() {
     }
     assert_eq!(asked.load(std::sync::atomic::Ordering::Relaxed), 1);
 }
+
+#[test]
+fn who_sees_little_is_shown_nothing_that_is_far() {
+    let near_sighted =
+        of_task(TaskId::NoConstraint).with_partner("adult+low_vision".parse().unwrap());
+    let episodes =
+        [of_task(TaskId::NoConstraint), near_sighted.expect("such a person can play it")];
+    let mut n_far = [0, 0];
+    for (episode, n_far) in episodes.iter().zip(&mut n_far) {
+        let seat = Seat::of_caller(Grants::PARTNER, Senses { rgb: true, ..Senses::DEPTH_AND_IDS });
+        let minds = Minds { helper: None, partner: Some(seat) };
+        let mut env = Env::new(config(episode), minds).unwrap();
+        for _ in 0..30 {
+            env.advance(None).expect("nobody breaks down");
+            let pose = env.world().state().people[0].pose.position;
+            let seen = env.observe(AgentId::PARTNER).expect("it is waiting");
+            let (camera, images) = (&seen.camera, &seen.images);
+            let (depth_m, ids) = (images.depth_m.as_ref().unwrap(), images.ids.as_ref().unwrap());
+            for (k, (d, id)) in depth_m.iter().zip(ids).enumerate() {
+                let p = camera.unproject(k as u32 % camera.width, k as u32 / camera.width, *d);
+                let is_far = chaic_protocol::geom::horizontal_distance(p, pose) > 2.001;
+                *n_far += u32::from(is_far);
+                assert!(!(is_far && *d == 0.0) && !(*d == 0.0 && *id != 0), "{p} {d} {id}");
+            }
+            assert!(env.submit(AgentId::PARTNER, Action::TurnLeft));
+        }
+    }
+    assert!(n_far[0] > 10_000 && n_far[1] == 0, "{n_far:?}");
+}

@@ -9,7 +9,7 @@ use std::ops::Range;
 use std::str::FromStr;
 
 use chaic_protocol::TaskId;
-use chaic_protocol::task::TASKS;
+use chaic_protocol::task::{Origin, TASKS};
 
 use crate::format::{Episode, EpisodeError};
 use crate::generate::{FIRST_BUNDLED_SEED, GenerateError, Seeds, generate_with, generator_info};
@@ -116,9 +116,12 @@ impl FromStr for Split {
 }
 
 impl Split {
-    /// How many episodes it has of each task.
-    pub fn len_per_task(&self) -> usize {
+    /// How many episodes it has of a task: those that are the same for everybody are of the paper's
+    /// tasks only.
+    pub fn len_of(&self, task: TaskId) -> usize {
+        let is_papers = task.info().origin != Origin::Ours;
         match self {
+            Split::Train | Split::Test | Split::Standard if !is_papers => 0,
             Split::Train | Split::Test => BUNDLED_PER_TASK,
             Split::Standard => STANDARD_PER_TASK,
             Split::Generated(seeds) | Split::GeneratedStandard(seeds) => {
@@ -176,7 +179,7 @@ pub fn episodes(
     task: TaskId,
 ) -> impl Iterator<Item = Result<Episode, SplitError>> + Send + use<> {
     let split = split.clone();
-    (0..split.len_per_task() as u64).map(move |k| match &split {
+    (0..split.len_of(task) as u64).map(move |k| match &split {
         Split::Train => bundled(TRAIN, "train", task, k),
         Split::Test => bundled(TEST, "test", task, k),
         Split::Standard => standard(task, k),
@@ -186,17 +189,25 @@ pub fn episodes(
 }
 
 /// The episode of this name: `TASK/train/NN`, `TASK/test/NN`, `TASK/standard/NNN`, `TASK/gen/SEED` or
-/// `TASK/gen-standard/SEED`.
+/// `TASK/gen-standard/SEED`; each may be followed by `/KIND` for another partner than the task's.
 ///
 /// # Errors
 /// [`SplitError::NoSuchEpisode`] if the name is none.
 pub fn find_episode(id: &str) -> Result<Episode, SplitError> {
     let no_such = || SplitError::NoSuchEpisode { id: id.to_owned() };
     let parts: Vec<&str> = id.split('/').collect();
-    let [task, split, number] = parts[..] else { return Err(no_such()) };
+    let (task, split, number) = match parts[..] {
+        [task, split, number] => (task, split, number),
+        [task, split, number, kind] => {
+            let kind = kind.parse().map_err(|_| no_such())?;
+            return Ok(find_episode(&[task, split, number].join("/"))?.with_partner(kind)?);
+        }
+        _ => return Err(no_such()),
+    };
     let task: TaskId = task.parse().map_err(|_| no_such())?;
     let number: u64 = number.parse().map_err(|_| no_such())?;
     match split {
+        "train" | "test" | "standard" if task.info().origin == Origin::Ours => Err(no_such()),
         "train" if number < BUNDLED_PER_TASK as u64 => bundled(TRAIN, split, task, number),
         "test" if number < BUNDLED_PER_TASK as u64 => bundled(TEST, split, task, number),
         "standard" if number < STANDARD_PER_TASK as u64 => standard(task, number),
@@ -259,12 +270,12 @@ pub fn regenerate_bundled() -> Result<Bundled, GenerateError> {
 
 fn regenerate(split: &Split) -> Result<String, GenerateError> {
     let mut text = String::new();
-    for info in &TASKS {
+    for task in TaskId::paper() {
         for k in 0..BUNDLED_PER_TASK as u64 {
-            let seeds = split.seeds(info.id, k);
-            let setup = generate(info.id, seeds)?;
-            let id = split.episode_id(info.id, k as usize);
-            let generator = generator_info(info.id, seeds, Settings::PAPER);
+            let seeds = split.seeds(task, k);
+            let setup = generate(task, seeds)?;
+            let id = split.episode_id(task, k as usize);
+            let generator = generator_info(task, seeds, Settings::PAPER);
             text += &Episode::trusted(id, split.to_string(), generator, setup).to_json_line();
             text.push('\n');
         }

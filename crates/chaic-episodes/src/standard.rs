@@ -46,7 +46,7 @@ fn pinned(episode: Episode, line: &str) -> Result<Episode, SplitError> {
 /// [`GenerateError`] if a seed of the split has no episode.
 pub fn standard_table() -> Result<String, GenerateError> {
     let mut text = String::new();
-    for task in TaskId::all() {
+    for task in TaskId::paper() {
         for k in 0..STANDARD_PER_TASK as u64 {
             writeln!(text, "{}", line_of(&made(task, k)?)).expect("a string takes all text");
         }
@@ -80,7 +80,7 @@ mod tests {
 
     #[test]
     fn the_table_names_800_different_episodes() {
-        let ids = TaskId::all()
+        let ids = TaskId::paper()
             .flat_map(|t| (0..STANDARD_PER_TASK).map(move |k| Split::Standard.episode_id(t, k)));
         let (mut digests, mut n) = (BTreeSet::new(), 0);
         for (line, id) in TABLE.lines().zip(ids) {
@@ -95,7 +95,7 @@ mod tests {
     /// `chaic episodes validate --split standard` does this for all.
     #[test]
     fn some_of_each_task_have_their_digest_and_another_episode_has_not() {
-        for task in TaskId::all() {
+        for task in TaskId::paper() {
             for k in [0, 57] {
                 let episode = standard(task, k).expect("the table pins it");
                 let next = TABLE.lines().nth(task_index(task) * STANDARD_PER_TASK + k as usize + 1);

@@ -3,7 +3,7 @@
 use std::f32::consts::{FRAC_PI_2, PI};
 
 use chaic_protocol::briefing::Goal;
-use chaic_protocol::capability::Persona;
+use chaic_protocol::capability::{PersonKind, Persona};
 use chaic_protocol::geom::{Pose, Rect, xz};
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{ClassId, TaskId, Vec2, Vec3};
@@ -122,7 +122,7 @@ fn setup(
     attempt: u64,
 ) -> Result<Setup, &'static str> {
     let stream = |purpose: &str| Stream::new(seeds.episode, purpose, attempt);
-    let mut people = people(&mut stream("shopping/people"))?;
+    let mut people = people(task, &mut stream("shopping/people"))?;
     let layout = if settings.varied_layout {
         Layout::varied(&mut Stream::new(seeds.place, "street/layout", attempt / PLACE_ATTEMPTS))
     } else {
@@ -263,7 +263,7 @@ fn goal(seed: u64, rng: &mut Stream) -> Goal {
 }
 
 /// The rider looking homewards, the helper some way off, the child by the rider.
-fn people(rng: &mut Stream) -> Result<Vec<Person>, &'static str> {
+fn people(task: TaskId, rng: &mut Stream) -> Result<Vec<Person>, &'static str> {
     let mut anywhere = || {
         let (x, z) = (rng.range(10.0, 20.0), rng.range(-1.8, 0.8));
         Vec3::new(mm(x), 0.0, mm(z))
@@ -273,16 +273,13 @@ fn people(rng: &mut Stream) -> Result<Vec<Person>, &'static str> {
         return Err("partner and helper are too near to each other");
     }
     let child = mm3(partner + Vec3::new(1.0, 0.0, -1.0));
-    let mut person = |persona: Persona, position: Vec3, yaw_rad: f32| Person {
-        persona,
-        pose: Pose { position, yaw_rad: mm(yaw_rad) },
-        look: rng.below(16) as u8,
-        capability: None,
+    let mut person = |kind: PersonKind, position: Vec3, yaw_rad: f32| {
+        Person::new(kind, Pose { position, yaw_rad: mm(yaw_rad) }, rng.below(16) as u8)
     };
     Ok(vec![
-        person(Persona::Rider, partner, FRAC_PI_2),
-        person(Persona::Helper, helper, 0.0),
-        person(Persona::Child, child, 0.75 * PI),
+        person(task.info().partner, partner, FRAC_PI_2),
+        person(Persona::Helper.into(), helper, 0.0),
+        person(Persona::Child.into(), child, 0.75 * PI),
     ])
 }
 

@@ -87,7 +87,7 @@ fn setup(
 ) -> Result<Setup, &'static str> {
     let stream = |purpose: &str| Stream::new(seeds.episode, purpose, attempt);
     let mut pieces = pieces(line_up, &mut stream("moving_house/pieces"))?;
-    let mut people = people(&pieces, &mut stream("moving_house/people"))?;
+    let mut people = people(task, &pieces, &mut stream("moving_house/people"))?;
     // The place stays the same for many attempts, so that episodes share it.
     let scenery_rng = &mut Stream::new(seeds.place, "yard/scenery", attempt / PLACE_ATTEMPTS);
     let floors = ground(BOUNDS, ROAD_Z, PAVEMENT_Z, scenery_rng);
@@ -172,10 +172,10 @@ fn pieces(line_up: &[ClassId], rng: &mut Stream) -> Result<Vec<Thing>, &'static 
 }
 
 /// The two who carry, among the furniture.
-fn people(pieces: &[Thing], rng: &mut Stream) -> Result<Vec<Person>, &'static str> {
+fn people(task: TaskId, pieces: &[Thing], rng: &mut Stream) -> Result<Vec<Person>, &'static str> {
     let taken: Vec<Rect> = pieces.iter().map(plan_bounds).collect();
     let mut people: Vec<Person> = Vec::new();
-    for persona in [Persona::Frail, Persona::Helper] {
+    for kind in [task.info().partner, Persona::Helper.into()] {
         let position = (0..TRIES).find_map(|_| {
             let x = mm(rng.range(PLACES.min.x, PLACES.max.x));
             let z = mm(rng.range(PLACES.min.y, PLACES.max.y));
@@ -185,7 +185,7 @@ fn people(pieces: &[Thing], rng: &mut Stream) -> Result<Vec<Person>, &'static st
         });
         let position = position.ok_or("no room for the people")?;
         let pose = Pose { position, yaw_rad: heading(rng) };
-        people.push(Person { persona, pose, look: rng.below(16) as u8, capability: None });
+        people.push(Person::new(kind, pose, rng.below(16) as u8));
     }
     Ok(people)
 }

@@ -21,7 +21,7 @@ const LUCK: f64 = 0.125;
 const CONTAINERS: f64 = 0.125;
 
 fn indoor() -> Vec<TaskId> {
-    TaskId::all().filter(|t| t.info().scene == SceneKind::House).collect()
+    TaskId::paper().filter(|t| t.info().scene == SceneKind::House).collect()
 }
 
 /// Those of [`setups`] with decoys, made once for all tests.

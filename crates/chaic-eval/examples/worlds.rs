@@ -15,9 +15,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let mut number = |usual| arguments.next().map_or(Ok(usual), |text| text.parse::<u32>());
     let (n, size) = (number(1000)?, number(128)?);
-    let n_tasks = TaskId::all().count() as u64;
+    let n_tasks = TaskId::paper().count() as u64;
     let mut worlds = Vec::new();
-    for task in TaskId::all() {
+    for task in TaskId::paper() {
         for episode in episodes(&Split::Generated(0..u64::from(n).div_ceil(n_tasks)), task) {
             let setup = episode?.setup().clone();
             worlds.push(World::new(setup, Rules::paper()).map_err(|problem| format!("{problem}"))?);

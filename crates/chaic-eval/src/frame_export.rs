@@ -59,7 +59,7 @@ pub fn write(still: &FrameExport<'_>, helpers: &dyn Helpers, out: &Path) -> Resu
     }
     env.advance(Some(frame))?;
     let world = env.world();
-    let view = View::of_eye(agent, world.eye(agent, size), Channels::ALL);
+    let view = View::of_agent(world, agent, size, Channels::ALL);
     let images = env.observer().scene().render(world, &[view]).pop().unwrap_or_default();
     std::fs::create_dir_all(out).map_err(EvalError::io("make the folder", out))?;
     let no_picture = || EvalError::Picture(format!("{size} is no size of a picture"));

@@ -100,12 +100,10 @@ impl Blob {
 /// A hall of 10 by 10 m with a bed and an apple, which is wanted.
 fn hall() -> Setup {
     let thing = |class, at: [f32; 3]| Thing::new(ClassId::named(class), Vec3::from(at), 0.0);
-    let person = |persona, x, z, yaw_rad| Person {
-        persona,
-        pose: Pose { position: Vec3::new(x, 0.0, z), yaw_rad },
+    let person = |persona, x, z, yaw_rad| {
         // In green and gray: nothing red or blue about anybody.
-        look: 2,
-        capability: None,
+        let look = 2;
+        Person::new(persona, Pose { position: Vec3::new(x, 0.0, z), yaw_rad }, look)
     };
     let corners = [[-5.0, -5.0], [5.0, -5.0], [5.0, 5.0], [-5.0, 5.0], [-5.0, -5.0]];
     let wall = |ends: &[[f32; 2]]| Wall {

@@ -74,7 +74,7 @@ fn draw(mut setup: Setup, path: &std::path::Path) -> Result<(), Box<dyn Error>> 
     setup.goal.targets.push((ClassId::named("pencil_bucket"), 1));
     let position = (setup.bounds.min - 5.0).extend(0.0).xzy();
     let pose = Pose { position, yaw_rad: 0.0 };
-    setup.people.push(Person { persona: Persona::Adult, pose, look: 0, capability: None });
+    setup.people.push(Person::new(Persona::Adult, pose, 0));
     let world = World::new(setup, Rules::paper())?;
     chaic_render::floor_plan::draw(&world, 960).save(path)?;
     Ok(())

@@ -2,7 +2,7 @@
 
 use chaic_episodes::{mm, mm3};
 use chaic_protocol::briefing::Goal;
-use chaic_protocol::capability::Persona;
+use chaic_protocol::capability::{PersonKind, Persona};
 use chaic_protocol::geom::{Pose, xz};
 use chaic_protocol::{ClassId, TaskId, Vec2, Vec3};
 use chaic_world::{Person, Setup, Thing};
@@ -33,10 +33,10 @@ pub(crate) fn goal(source: &Source) -> Result<Goal, ImportError> {
 }
 
 /// Who takes part, in the order of agents.
-fn personas(task: TaskId) -> Vec<Persona> {
-    let mut personas = vec![task.info().partner, Persona::Helper];
-    personas.extend(task.info().has_child.then_some(Persona::Child));
-    personas
+fn kinds(task: TaskId) -> Vec<PersonKind> {
+    let mut kinds = vec![task.info().partner, Persona::Helper.into()];
+    kinds.extend(task.info().has_child.then_some(PersonKind::from(Persona::Child)));
+    kinds
 }
 
 /// Where an agent stands at the start.
@@ -59,9 +59,9 @@ pub(crate) fn people(
 ) -> Result<Vec<Person>, ImportError> {
     let around = Surroundings::of(setup);
     let mut people: Vec<Person> = Vec::new();
-    for (agent, persona) in personas(source.task).into_iter().enumerate() {
+    for (agent, kind) in kinds(source.task).into_iter().enumerate() {
         let recorded = start(source, agent)?;
-        let radius_m = persona.capability().radius_m;
+        let radius_m = kind.capability().radius_m;
         let apart = |p: &Person| (xz(p.pose.position), p.capability().radius_m + radius_m);
         let apart: Vec<(Vec2, f32)> = people.iter().map(apart).collect();
         // Bodies keep a centimetre apart, so that nobody starts in touch with anything.
@@ -71,14 +71,14 @@ pub(crate) fn people(
             position: mm3(Vec3::new(p.x, 0.0, p.y)),
             yaw_rad: mm(axes::yaw_rad(yaws_deg[agent])),
         };
-        people.push(person(source, agent, persona, pose));
+        people.push(person(source, agent, kind, pose));
     }
     Ok(people)
 }
 
 /// A person; looks differ from episode to episode.
-fn person(source: &Source, agent: usize, persona: Persona, pose: Pose) -> Person {
-    Person { persona, pose, look: ((3 * source.index + 5 * agent) % 16) as u8, capability: None }
+fn person(source: &Source, agent: usize, kind: PersonKind, pose: Pose) -> Person {
+    Person::new(kind, pose, ((3 * source.index + 5 * agent) % 16) as u8)
 }
 
 /// An object as the commands leave it, before it falls.

@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use chaic_protocol::TaskId;
-use chaic_protocol::task::TASKS;
 use chaic_world::Setup;
 use serde::Deserialize;
 
@@ -175,7 +174,7 @@ pub(crate) struct TaskFolder {
 impl TaskFolder {
     /// Reads the list of episodes of the task with this name in the original.
     pub fn read(half: &Path, task: TaskId) -> Result<TaskFolder, ImportError> {
-        let path = half.join(task.info().original_name);
+        let path = half.join(task.original_name().unwrap_or_default());
         if !path.is_dir() {
             return Err(ImportError::unreadable(
                 &path,
@@ -210,8 +209,8 @@ impl TaskFolder {
             }
         }
         let kind = &entry.task.task_kind;
-        if *kind != self.task.info().original_name {
-            let names: Vec<&str> = TASKS.iter().map(|t| t.original_name).collect();
+        if self.task.original_name() != Some(kind) {
+            let names: Vec<&str> = TaskId::paper().filter_map(TaskId::original_name).collect();
             let field = format!("[{index}].task.task_kind");
             let problem = if names.contains(&kind.as_str()) {
                 format!("is {kind:?}, but lies among episodes of another task")

@@ -83,7 +83,7 @@ pub fn import(sources: &Sources, on_error: OnError) -> Result<Imported, ImportEr
         }
     };
     for (half, folder) in halves(sources)? {
-        for task in TaskId::all() {
+        for task in TaskId::paper() {
             match task_episodes(half, &folder, task, &package) {
                 Err(error) => note(error)?,
                 Ok(results) => {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::capability::{Capability, Persona};
+use crate::capability::{Capability, PersonKind};
 use crate::geom::Rect;
 use crate::ids::{AgentId, ClassId, EntityId, Frame};
 use crate::observation::Grants;
@@ -109,7 +109,7 @@ pub struct Told {
     /// Which task it is.
     pub task: TaskId,
     /// What kind of person the partner is.
-    pub partner: Persona,
+    pub partner: PersonKind,
 }
 
 impl Briefing {

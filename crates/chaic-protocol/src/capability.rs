@@ -1,7 +1,13 @@
 //! What a body can do. A constraint is a value of [`Capability`], never a piece of code.
 
+use std::fmt;
+use std::str::FromStr;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use crate::action::Hand;
+pub use crate::impairment::{IMPAIRMENTS, Impairment, ImpairmentInfo, Impairments};
 
 /// The kinds of people of the paper (section 3.1).
 #[derive(
@@ -67,11 +73,118 @@ pub struct Capability {
     /// wheelchair can't).
     #[serde(default = "able")]
     pub removes_obstacles: bool,
+    /// Whether this person can take containers, which the other hand fills.
+    #[serde(default = "able", skip_serializing_if = "is_able")]
+    pub carries_containers: bool,
+    /// Whether this person can get hold of furniture, alone or with somebody.
+    #[serde(default = "able", skip_serializing_if = "is_able")]
+    pub lifts_furniture: bool,
+    /// The hands that this person can use.
+    #[serde(default, skip_serializing_if = "UsableHands::are_both")]
+    pub hands: UsableHands,
+    /// How far and how sharply this person sees, if not as the benchmark's cameras.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sight: Option<Sight>,
+    /// How this person tires, if it does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub endurance: Option<Endurance>,
+    /// How things slip from this person's hands, if they do.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tremor: Option<Tremor>,
 }
 
 /// What an ability is where a file says nothing of it.
 fn able() -> bool {
     true
+}
+
+// `skip_serializing_if` hands over a reference.
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_able(able: &bool) -> bool {
+    *able
+}
+
+/// The hands that somebody can use.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum UsableHands {
+    /// The left and the right.
+    #[default]
+    Both,
+    /// The right one.
+    Right,
+}
+
+impl UsableHands {
+    /// Each of them, left before right.
+    pub fn all(self) -> &'static [Hand] {
+        match self {
+            UsableHands::Both => &Hand::BOTH,
+            UsableHands::Right => &[Hand::Right],
+        }
+    }
+
+    /// Whether this is one of them.
+    pub fn include(self, hand: Hand) -> bool {
+        self.all().contains(&hand)
+    }
+
+    // `skip_serializing_if` hands over a reference.
+    #[allow(clippy::trivially_copy_pass_by_ref)]
+    fn are_both(&self) -> bool {
+        *self == UsableHands::Both
+    }
+}
+
+/// How far, how sharply and how widely somebody sees. What is not seen has no color, no instance id,
+/// and depth 0.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Sight {
+    /// Nothing farther away than this, measured over the floor, is seen, metres.
+    pub range_m: f32,
+    /// Standard deviation of the blur, radians of visual angle at the middle of the image.
+    pub blur_rad: f32,
+    /// Angle of the cone that is seen, radians.
+    pub field_rad: f32,
+    /// How far the gaze is lowered from level, radians: who sees little looks before the feet.
+    pub lowered_rad: f32,
+}
+
+/// How somebody tires: fatigue grows by `1 / work_frames` in each frame of walking, handling or
+/// carrying along, falls by `1 / rest_frames` in any other, and stays within 0 and 1.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Endurance {
+    /// Frames of work after which somebody rested is exhausted.
+    pub work_frames: f32,
+    /// Frames of rest after which somebody exhausted is rested.
+    pub rest_frames: f32,
+    /// Part of speed and strength that is left when exhausted.
+    pub least: f32,
+}
+
+impl Endurance {
+    /// Fatigue a frame later.
+    pub fn after_frame(&self, fatigue: f32, works: bool) -> f32 {
+        let change = if works { 1.0 / self.work_frames } else { -1.0 / self.rest_frames };
+        (fatigue + change).clamp(0.0, 1.0)
+    }
+
+    /// Part of speed and strength that is left.
+    pub fn part_left(&self, fatigue: f32) -> f32 {
+        1.0 - (1.0 - self.least) * fatigue
+    }
+}
+
+/// How things slip from somebody's hands.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Tremor {
+    /// Chance that a grasp slips that would have held.
+    pub slip_chance: f32,
+    /// Chance to drop what a hand holds, in each frame of walking or standing.
+    pub drop_chance: f32,
 }
 
 /// Heights that everybody without a limit reaches (facts S1.1).
@@ -94,7 +207,23 @@ const ADULT: Capability = Capability {
     docking_frames: 0,
     breaks_fragile: false,
     removes_obstacles: true,
+    carries_containers: true,
+    lifts_furniture: true,
+    hands: UsableHands::Both,
+    sight: None,
+    endurance: None,
+    tremor: None,
 };
+
+/// Every kind of person by its name, as files and commands spell it.
+const NAMES: [(Persona, &str); 6] = [
+    (Persona::Adult, "adult"),
+    (Persona::Helper, "helper"),
+    (Persona::Child, "child"),
+    (Persona::Wheelchair, "wheelchair"),
+    (Persona::Rider, "rider"),
+    (Persona::Frail, "frail"),
+];
 
 impl Persona {
     /// Every kind.
@@ -106,6 +235,11 @@ impl Persona {
         Persona::Rider,
         Persona::Frail,
     ];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        NAMES.iter().find(|(p, _)| *p == self).map_or("", |(_, name)| name)
+    }
 
     /// The limits and measures of this kind of person.
     pub const fn capability(self) -> Capability {
@@ -149,6 +283,89 @@ impl Persona {
     }
 }
 
+/// What kind of person, and what impairs it: written `child` or `child+one_handed`.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
+)]
+#[serde(into = "String", try_from = "String")]
+#[schemars(with = "String")]
+pub struct PersonKind {
+    /// The kind.
+    pub persona: Persona,
+    /// What impairs it besides.
+    pub impairments: Impairments,
+}
+
+impl PersonKind {
+    /// The limits and measures of such a person.
+    pub fn capability(self) -> Capability {
+        self.impairments.apply(self.persona.capability())
+    }
+}
+
+impl From<Persona> for PersonKind {
+    fn from(persona: Persona) -> PersonKind {
+        PersonKind { persona, impairments: Impairments::NONE }
+    }
+}
+
+impl From<PersonKind> for String {
+    fn from(kind: PersonKind) -> String {
+        kind.to_string()
+    }
+}
+
+impl TryFrom<String> for PersonKind {
+    type Error = UnknownPerson;
+
+    fn try_from(text: String) -> Result<PersonKind, UnknownPerson> {
+        text.parse()
+    }
+}
+
+impl fmt::Display for PersonKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.persona.name())?;
+        self.impairments.iter().try_for_each(|i| write!(f, "+{}", i.info().name))
+    }
+}
+
+/// No person is called so.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnknownPerson(pub String);
+
+impl fmt::Display for UnknownPerson {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let people = NAMES.map(|(_, name)| name).join(", ");
+        let impairments = IMPAIRMENTS.map(|i| i.name).join(", ");
+        write!(
+            f,
+            "no person is called `{}`; write one of {people}, and + before each of {impairments} that \
+             it has besides",
+            self.0
+        )
+    }
+}
+
+impl std::error::Error for UnknownPerson {}
+
+impl FromStr for PersonKind {
+    type Err = UnknownPerson;
+
+    fn from_str(text: &str) -> Result<PersonKind, UnknownPerson> {
+        let unknown = || UnknownPerson(text.to_owned());
+        let mut words = text.split('+');
+        let persona = words.next().unwrap_or_default();
+        let (persona, _) = NAMES.iter().find(|(_, n)| *n == persona).ok_or_else(unknown)?;
+        let mut kind = PersonKind::from(*persona);
+        for word in words {
+            let info = IMPAIRMENTS.iter().find(|i| i.name == word).ok_or_else(unknown)?;
+            kind.impairments = kind.impairments.with(info.id);
+        }
+        Ok(kind)
+    }
+}
+
 /// How far `value` lies outside `[low, high]`; 0 inside.
 pub fn excess(value: f32, [low, high]: [f32; 2]) -> f32 {
     (low - value).max(value - high).max(0.0)
@@ -189,6 +406,43 @@ mod tests {
         let (frail, helper) = (Persona::Frail.capability(), Persona::Helper.capability());
         assert_eq!(frail.strength_kg * 6.0, helper.strength_kg);
         assert_eq!(Persona::Child.capability().height_m, 1.2);
+    }
+
+    #[test]
+    fn people_are_written_as_they_are_read() {
+        for text in ["child", "child+one_handed", "frail+one_handed+low_vision+tires+tremor"] {
+            let kind: PersonKind = text.parse().expect("it is a person");
+            assert_eq!(kind.to_string(), text);
+        }
+        assert_eq!(
+            "adult+tremor+tires".parse::<PersonKind>().unwrap().to_string(),
+            "adult+tires+tremor"
+        );
+        for text in ["", "ogre", "child+", "child+wheelchair", "one_handed"] {
+            let error = text.parse::<PersonKind>().unwrap_err().to_string();
+            assert!(error.contains("one_handed"), "{error}");
+        }
+        for persona in Persona::ALL {
+            let json = serde_json::to_string(&persona).unwrap();
+            assert_eq!(json, format!("\"{}\"", persona.name()));
+        }
+    }
+
+    #[test]
+    fn whom_nothing_impairs_is_written_as_before_there_were_impairments() {
+        let json = serde_json::to_value(Persona::Child.capability()).unwrap();
+        assert_eq!(json.as_object().map(|fields| fields.len()), Some(12));
+    }
+
+    #[test]
+    fn who_tires_recovers() {
+        let endurance = Endurance { work_frames: 100.0, rest_frames: 50.0, least: 0.4 };
+        let after = |frames: u32, works: bool, from: f32| {
+            (0..frames).fold(from, |fatigue, _| endurance.after_frame(fatigue, works))
+        };
+        assert!((after(50, true, 0.0) - 0.5).abs() < 1e-5 && after(200, true, 0.0) == 1.0);
+        assert!((after(25, false, 1.0) - 0.5).abs() < 1e-5 && after(80, false, 1.0) == 0.0);
+        assert!(endurance.part_left(0.0) == 1.0 && (endurance.part_left(1.0) - 0.4).abs() < 1e-6);
     }
 
     #[test]

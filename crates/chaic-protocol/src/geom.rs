@@ -80,6 +80,12 @@ pub fn yaw_rotation(yaw_rad: f32) -> Quat {
     Quat::from_xyzw(0.0, math::sin(half), 0.0, math::cos(half))
 }
 
+/// The rotation that lifts the gaze of a level eye by `pitch_rad`.
+pub fn pitch_rotation(pitch_rad: f32) -> Quat {
+    let half = 0.5 * pitch_rad;
+    Quat::from_xyzw(math::sin(half), 0.0, 0.0, math::cos(half))
+}
+
 /// Rotates `v` about the vertical by `yaw_rad`.
 pub fn rotate_yaw(v: Vec3, yaw_rad: f32) -> Vec3 {
     let (s, c) = (math::sin(yaw_rad), math::cos(yaw_rad));

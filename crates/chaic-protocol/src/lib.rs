@@ -2,7 +2,7 @@
 //!
 //! **What it is**: the vocabulary that every room of chaic shares. Frames of reference
 //! ([`geom`]), handles ([`ids`]), the catalogue of object classes ([`catalogue`]), what bodies
-//! can do ([`capability`]), the eight tasks ([`task`]), what an agent may do ([`action`]), what it
+//! can do ([`capability`]), the tasks ([`task`]), what an agent may do ([`action`]), what it
 //! is told before ([`briefing`]) and during an episode ([`observation`]), the [`agent::Agent`]
 //! trait, and the named random streams ([`rng`]).
 //!
@@ -18,6 +18,7 @@ pub mod ids;
 
 pub mod capability;
 pub mod catalogue;
+mod impairment;
 pub mod task;
 
 pub mod action;

@@ -1,4 +1,4 @@
-//! The eight tasks of the challenge (paper, table 1), and what is public about each.
+//! The eight tasks of the challenge (paper, table 1), further ones, and what is public about each.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,7 +6,7 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::capability::Persona;
+use crate::capability::{Impairment, Impairments, PersonKind, Persona};
 use crate::catalogue::TargetSet;
 use crate::ids::{ClassId, Frame};
 
@@ -32,6 +32,23 @@ pub enum TaskId {
     Shopping,
     /// Furniture onto a truck with a frail partner.
     MovingHouse,
+    /// A partner with one arm in a sling (ours).
+    OneHanded,
+    /// A partner who sees two metres far (ours).
+    LowVision,
+    /// A partner who tires (ours).
+    Tires,
+    /// A partner whose hands tremble (ours).
+    Tremor,
+}
+
+/// Where a task comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// The paper's table 1, under the original's word for it.
+    Paper(&'static str),
+    /// Ours: there are no published results, and neither bundled nor standard episodes.
+    Ours,
 }
 
 /// Where a task happens.
@@ -117,12 +134,12 @@ pub struct TaskInfo {
     pub name: &'static str,
     /// Column title in tables.
     pub title: &'static str,
-    /// The original's word for it.
-    pub original_name: &'static str,
+    /// Where it comes from.
+    pub origin: Origin,
     /// Where it happens.
     pub scene: SceneKind,
     /// Who the partner is.
-    pub partner: Persona,
+    pub partner: PersonKind,
     /// Whether a child comes along.
     pub has_child: bool,
     /// Frames until the episode ends (paper section 3.3.2).
@@ -159,9 +176,9 @@ const fn indoor(
         id,
         name,
         title,
-        original_name,
+        origin: Origin::Paper(original_name),
         scene: SceneKind::House,
-        partner,
+        partner: only(partner),
         has_child: false,
         horizon: 3000,
         sets: INDOOR,
@@ -173,10 +190,28 @@ const fn indoor(
     }
 }
 
+const fn only(persona: Persona) -> PersonKind {
+    PersonKind { persona, impairments: Impairments::NONE }
+}
+
+/// A task like the paper's without constraint, but for what impairs the partner.
+const fn impaired(
+    id: TaskId,
+    name: &'static str,
+    title: &'static str,
+    impairment: Impairment,
+) -> TaskInfo {
+    TaskInfo {
+        origin: Origin::Ours,
+        partner: PersonKind { persona: Persona::Adult, impairments: Impairments::of(impairment) },
+        ..indoor(id, name, title, "", Persona::Adult, Arrangement::Usual)
+    }
+}
+
 const BED: &[&str] = &["bed"];
 
-/// The tasks in the order of the paper's result table.
-pub static TASKS: [TaskInfo; 8] = [
+/// All tasks: the paper's in the order of its result table, then ours.
+pub static TASKS: [TaskInfo; 12] = [
     indoor(
         TaskId::NoConstraint,
         "no_constraint",
@@ -233,9 +268,9 @@ pub static TASKS: [TaskInfo; 8] = [
         id: TaskId::Shopping,
         name: "shopping",
         title: "Shopping",
-        original_name: "outdoor_shopping",
+        origin: Origin::Paper("outdoor_shopping"),
         scene: SceneKind::Street,
-        partner: Persona::Rider,
+        partner: only(Persona::Rider),
         has_child: true,
         horizon: 3000,
         sets: &[TargetSet::ShopFruit, TargetSet::ShopBakery, TargetSet::ShopDrinks],
@@ -249,9 +284,9 @@ pub static TASKS: [TaskInfo; 8] = [
         id: TaskId::MovingHouse,
         name: "moving_house",
         title: "Moving house",
-        original_name: "outdoor_furniture",
+        origin: Origin::Paper("outdoor_furniture"),
         scene: SceneKind::Yard,
-        partner: Persona::Frail,
+        partner: only(Persona::Frail),
         has_child: false,
         horizon: 1500,
         sets: &[TargetSet::Furniture],
@@ -261,12 +296,26 @@ pub static TASKS: [TaskInfo; 8] = [
         goal_approach: GoalApproach::NearestPoint,
         arrangement: Arrangement::Usual,
     },
+    impaired(TaskId::OneHanded, "one_handed", "One-handed", Impairment::OneHanded),
+    impaired(TaskId::LowVision, "low_vision", "Low vision", Impairment::LowVision),
+    impaired(TaskId::Tires, "tires", "Tires", Impairment::Tires),
+    impaired(TaskId::Tremor, "tremor", "Tremor", Impairment::Tremor),
 ];
 
 impl TaskId {
-    /// All tasks in the order of the paper's table.
+    /// All tasks: the paper's, then ours.
     pub fn all() -> impl Iterator<Item = TaskId> {
         TASKS.iter().map(|t| t.id)
+    }
+
+    /// The benchmark's eight tasks, in the order of the paper's result table.
+    pub fn paper() -> impl Iterator<Item = TaskId> {
+        TASKS.iter().filter(|t| t.origin != Origin::Ours).map(|t| t.id)
+    }
+
+    /// The tasks beyond the paper's.
+    pub fn ours() -> impl Iterator<Item = TaskId> {
+        TASKS.iter().filter(|t| t.origin == Origin::Ours).map(|t| t.id)
     }
 
     /// What is fixed for this task.
@@ -277,6 +326,14 @@ impl TaskId {
     /// Its name.
     pub fn name(self) -> &'static str {
         self.info().name
+    }
+
+    /// The original's word for it, if it is the paper's.
+    pub fn original_name(self) -> Option<&'static str> {
+        match self.info().origin {
+            Origin::Paper(name) => Some(name),
+            Origin::Ours => None,
+        }
     }
 }
 
@@ -323,6 +380,13 @@ impl FromStr for TaskId {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_papers_tasks_come_first() {
+        let ids: Vec<TaskId> = TaskId::paper().chain(TaskId::ours()).collect();
+        assert_eq!(ids, TaskId::all().collect::<Vec<_>>());
+        assert_eq!(TaskId::paper().count(), 8);
+    }
 
     #[test]
     fn names_in_files_and_in_the_table_agree() {

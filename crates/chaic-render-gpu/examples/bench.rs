@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use chaic_episodes::find_episode;
 use chaic_protocol::AgentId;
-use chaic_protocol::task::TASKS;
+use chaic_protocol::TaskId;
 use chaic_render::{Channels, Scene, View};
 use chaic_render_gpu::{Adapters, Gpu, GpuError, WorldId};
 use chaic_world::{Rules, World};
@@ -38,9 +38,10 @@ fn run() -> Result<(), Box<dyn std::error::Error>> {
     println!("{}", gpu.name());
     let begin = Instant::now();
     let mut worlds = Vec::new();
+    let tasks: Vec<TaskId> = TaskId::paper().collect();
     for k in 0..n_worlds {
-        let task = &TASKS[k % TASKS.len()];
-        let id = format!("{}/train/{:02}", task.name, k / TASKS.len() % 12);
+        let task = tasks[k % tasks.len()];
+        let id = format!("{task}/train/{:02}", k / tasks.len() % 12);
         let world = World::new(find_episode(&id)?.setup().clone(), Rules::paper())?;
         let scene = Scene::new(world.setup());
         let id = gpu.add(&scene, &world)?;

@@ -20,12 +20,7 @@ fn render(c: &mut Criterion) {
     ] {
         let scene = Scene::new(world.setup());
         for (what, channels) in [("depth_ids", Channels::DEPTH_AND_IDS), ("rgb", Channels::RGB)] {
-            let view = View {
-                camera: camera(eye, yaw, 0.0, 512, 512),
-                channels,
-                hide: None,
-                hide_ceiling: false,
-            };
+            let view = View::of_camera(camera(eye, yaw, 0.0, 512, 512), channels);
             c.bench_function(&format!("{name}/512/{what}"), |b| {
                 let mut images = Vec::new();
                 b.iter(|| {
@@ -39,7 +34,7 @@ fn render(c: &mut Criterion) {
     let views: Vec<View> = (0..16)
         .map(|k| {
             let camera = camera([5.0, 1.6, 4.0], 0.4 * k as f32, 0.0, 128, 128);
-            View { camera, channels: Channels::DEPTH_AND_IDS, hide: None, hide_ceiling: false }
+            View::of_camera(camera, Channels::DEPTH_AND_IDS)
         })
         .collect();
     c.bench_function("house/16x128/depth_ids", |b| {

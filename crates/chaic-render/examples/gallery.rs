@@ -11,7 +11,7 @@ mod scenes;
 use std::path::Path;
 
 use chaic_episodes::{Seeds, generate};
-use chaic_protocol::capability::Persona;
+use chaic_protocol::capability::{IMPAIRMENTS, Impairment, Impairments, PersonKind, Persona};
 use chaic_protocol::geom::Camera;
 use chaic_protocol::{AgentId, ClassId, Role, TaskId, Vec3};
 use chaic_render::geometry::Geometry;
@@ -77,7 +77,7 @@ fn main() -> Result<()> {
 
 fn views(folder: &Path, name: &str, world: &World, cameras: &[Camera]) -> image::ImageResult<()> {
     let scene = Scene::new(world.setup());
-    let view = |camera| View { camera, channels: Channels::ALL, hide: None, hide_ceiling: false };
+    let view = |camera| View::of_camera(camera, Channels::ALL);
     let views: Vec<View> = cameras.iter().map(|c| view(*c)).collect();
     let mut pictures = Vec::new();
     for (k, images) in scene.render(world, &views).into_iter().enumerate() {
@@ -108,7 +108,7 @@ fn seen(
 ) -> RgbImage {
     let (width, height) = (camera.width, camera.height);
     let camera = Camera { width: 2 * width, height: 2 * height, ..camera };
-    let view = View { camera, channels: Channels::RGB, hide, hide_ceiling: false };
+    let view = View { hide, ..View::of_camera(camera, Channels::RGB) };
     let images = scene.render_state(world.state(), postures, &[view]);
     let rgb = images.into_iter().next().and_then(|i| i.rgb).unwrap_or_default();
     let large = image_out::rgb(&rgb, 2 * width, 2 * height);
@@ -187,7 +187,36 @@ fn people(folder: &Path) -> image::ImageResult<()> {
         }
     }
     save(&image_out::grid(&pictures, 9), &folder.join("people.png"))?;
+    save(&impaired(&scene, &world), &folder.join("people_impaired.png"))?;
     save(&together(), &folder.join("people_together.png"))
+}
+
+/// A line per impairment, of an adult, and one of somebody who has several.
+fn impaired(scene: &Scene, world: &chaic_world::World) -> RgbImage {
+    let mut kinds: Vec<PersonKind> = IMPAIRMENTS
+        .iter()
+        .map(|i| PersonKind { persona: Persona::Adult, impairments: Impairments::of(i.id) })
+        .collect();
+    kinds.push("child+one_handed+tires".parse().expect("such a person can be"));
+    let mut pictures = Vec::new();
+    for kind in kinds {
+        for (k, (name, p)) in postures(kind.persona).into_iter().enumerate() {
+            let is_tired = kind.impairments.has(Impairment::Tires);
+            let mut p = Posture { look: k as u8, impairments: kind.impairments, ..p };
+            p.fatigue = if is_tired { 1.0 } else { 0.0 };
+            if kind.impairments.has(Impairment::OneHanded) {
+                p.arms[0].grips = false;
+            }
+            p.pose.yaw_rad = if name == "walking away" { 0.6 } else { -2.5 };
+            let h = p.height_m;
+            let camera = camera([0.0, 0.66 * h, 2.3 * h], 0.0, -0.06, 132, 176);
+            let camera = Camera { vertical_fov_rad: 0.68, ..camera };
+            let mut picture = picture(scene, world, &[p], camera);
+            label(&mut picture, &if k == 0 { kind.to_string() } else { name.to_owned() });
+            pictures.push(picture);
+        }
+    }
+    image_out::grid(&pictures, 9)
 }
 
 fn arms(mut p: Posture, y: f32, z: f32, grips: [bool; 2]) -> Posture {

@@ -66,6 +66,7 @@ mod points;
 mod row;
 mod segments;
 mod shade;
+mod sight;
 mod texture;
 
 pub mod floor_plan;

@@ -398,7 +398,7 @@ mod tests {
             let [x, z] = [rng.range(min.x, max.x), rng.range(min.y, max.y)];
             let eye = [x, rng.range(0.2, 2.2), z];
             let camera = camera(eye, rng.range(-PI, PI), rng.range(-0.6, 0.3), 120, 90);
-            View { camera, channels: Channels::ALL, hide: None, hide_ceiling: false }
+            View::of_camera(camera, Channels::ALL)
         };
         (0..n).map(view).collect()
     }

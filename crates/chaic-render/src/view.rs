@@ -2,15 +2,18 @@
 
 use std::cell::RefCell;
 
+use chaic_protocol::capability::Sight;
 use chaic_protocol::geom::Camera;
 use chaic_protocol::observation::{Images, Senses};
 use chaic_protocol::{AgentId, EntityId};
+use chaic_world::World;
 
 use crate::draw::{Omit, Scratch, draw};
 use crate::frame::Frame;
 use crate::lens::{Lens, reciprocal, seen_depth_m};
 use crate::raster::{LANES, Target};
 use crate::shade::{Drawn, Wanted, shade};
+use crate::sight::dim;
 
 /// Longest side of an image, pixels: bounds the memory that one view can ask for to 1.5 GB.
 pub const MAX_SIDE_PX: u32 = 8192;
@@ -55,12 +58,25 @@ pub struct View {
     pub hide: Option<AgentId>,
     /// Whether ceilings are left out, to look into a house from above.
     pub hide_ceiling: bool,
+    /// How far and how sharply it is seen, if not as by a camera.
+    pub sight: Option<Sight>,
 }
 
 impl View {
-    /// What the agent whose eye this is sees.
+    /// What a camera sees, with everybody and everything.
+    pub fn of_camera(camera: Camera, channels: Channels) -> View {
+        View { camera, channels, hide: None, hide_ceiling: false, sight: None }
+    }
+
+    /// What the agent whose eye this is would see if it saw as far and as sharply as a camera.
     pub fn of_eye(agent: AgentId, camera: Camera, channels: Channels) -> View {
-        View { camera, channels, hide: Some(agent), hide_ceiling: false }
+        View { hide: Some(agent), ..View::of_camera(camera, channels) }
+    }
+
+    /// What an agent sees, in an image of this side in pixels.
+    pub fn of_agent(world: &World, agent: AgentId, size_px: u32, channels: Channels) -> View {
+        let sight = world.sight(agent);
+        View { sight, ..View::of_eye(agent, world.eye(agent, size_px), channels) }
     }
 
     /// What is left out of it.
@@ -150,6 +166,21 @@ pub(crate) fn draw_view(frame: &Frame, view: &View, images: &mut Images) {
 pub(crate) fn draw_view_into(frame: &Frame, view: &View, images: ImagesMut<'_>) {
     let n = view.camera.width as usize * view.camera.height as usize;
     assert!(images.fits(n), "buffers of another length than the {n} pixels of the view");
+    if let Some(sight) = &view.sight {
+        let mut whole = View { sight: None, ..*view };
+        whole.channels.depth = true;
+        let ImagesMut { mut rgb, depth_m, mut ids } = images;
+        let mut own_depth_m = vec![0.0; if depth_m.is_some() { 0 } else { n }];
+        let depth_m = depth_m.unwrap_or(&mut own_depth_m);
+        let all = ImagesMut {
+            rgb: rgb.as_deref_mut(),
+            depth_m: Some(&mut *depth_m),
+            ids: ids.as_deref_mut(),
+        };
+        draw_view_into(frame, &whole, all);
+        dim(sight, &view.camera, rgb, depth_m, ids);
+        return;
+    }
     let ImagesMut { rgb, depth_m, ids } = images;
     let Some(lens) = Lens::of(&view.camera).filter(|_| n > 0) else {
         rgb.into_iter().for_each(|b| b.fill(0));
@@ -255,7 +286,7 @@ mod tests {
             let scene = Scene::new(world.setup());
             let channels = if color { Channels::ALL } else { Channels::DEPTH_AND_IDS };
             let camera = camera(eye, yaw, -0.1, 203, 149);
-            let view = View { camera, channels, hide: None, hide_ceiling: false };
+            let view = View::of_camera(camera, channels);
             all.extend(scene.render(&world, &[view]));
         }
         all

@@ -63,8 +63,7 @@ fn rays_meet_what_the_renderer_draws() {
     ] {
         let world = world(setup);
         let camera = camera(eye, yaw, -0.1, SIDE, SIDE);
-        let view =
-            View { camera, channels: Channels::DEPTH_AND_IDS, hide: None, hide_ceiling: false };
+        let view = View::of_camera(camera, Channels::DEPTH_AND_IDS);
         let images = Scene::new(world.setup()).render(&world, &[view]).pop().expect("one");
         let (depth, ids) = (images.depth_m.expect("asked for"), images.ids.expect("asked for"));
         let geometry = geometry_of(&world, FINEST);

@@ -18,7 +18,7 @@ fn pixels_are_those_of_the_last_version() {
     ] {
         let world = world(setup);
         let camera = camera(eye, yaw, -0.1, 256, 192);
-        let view = View { camera, channels: Channels::ALL, hide: None, hide_ceiling: false };
+        let view = View::of_camera(camera, Channels::ALL);
         let images = Scene::with_appearance(world.setup(), appearance).render(&world, &[view]);
         let depth: Vec<u8> =
             images[0].depth_m.iter().flatten().flat_map(|d| d.to_bits().to_le_bytes()).collect();

@@ -16,7 +16,7 @@ use scenes::{camera, empty, posture, thing, wall, world};
 const DEPTH_AND_IDS: Channels = Channels::DEPTH_AND_IDS;
 
 fn view(camera: Camera) -> View {
-    View { camera, channels: DEPTH_AND_IDS, hide: None, hide_ceiling: false }
+    View::of_camera(camera, DEPTH_AND_IDS)
 }
 
 fn render(world: &World, view: View) -> Images {

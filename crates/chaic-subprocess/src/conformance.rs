@@ -49,9 +49,9 @@ pub fn check(
     {
         return checks;
     }
-    let first = TaskId::all().next().unwrap_or(TaskId::NoConstraint);
+    let first = TaskId::paper().next().unwrap_or(TaskId::NoConstraint);
     let mut played = Vec::new();
-    let all = TaskId::all().try_for_each(|task| {
+    let all = TaskId::paper().try_for_each(|task| {
         let actions = trial.fresh(task)?;
         if task == first {
             played = actions;

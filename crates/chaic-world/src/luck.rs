@@ -4,6 +4,7 @@ use chaic_protocol::AgentId;
 use chaic_protocol::rng::Stream;
 use serde::{Deserialize, Serialize};
 
+use crate::state::State;
 use crate::world::World;
 
 /// What luck decides. Each purpose has its own named stream and its own count of draws per person,
@@ -18,6 +19,10 @@ pub(crate) enum Luck {
     PutOn,
     /// How long one watches what was put into a container.
     WatchPutIn,
+    /// Whether a grasp slips.
+    Slip,
+    /// Whether something drops from a hand.
+    Drop,
 }
 
 /// How many draws of each purpose a person has had.
@@ -41,17 +46,8 @@ impl Luck {
             Luck::Take => "take",
             Luck::PutOn => "put on",
             Luck::WatchPutIn => "watch put in",
-        }
-    }
-}
-
-impl Draws {
-    fn count_mut(&mut self, luck: Luck) -> &mut u32 {
-        match luck {
-            Luck::Break => &mut self.breaks,
-            Luck::Take => &mut self.takes,
-            Luck::PutOn => &mut self.puts_on,
-            Luck::WatchPutIn => &mut self.puts_in,
+            Luck::Slip => "slip",
+            Luck::Drop => "drop",
         }
     }
 }
@@ -60,7 +56,17 @@ impl World {
     /// The stream of a person's next draw of this purpose.
     pub(crate) fn luck(&mut self, agent: AgentId, luck: Luck) -> Stream {
         let seed = self.setup.seed;
-        let count = self.person_mut(agent).draws.count_mut(luck);
+        let State { people, conditions, .. } = &mut self.state;
+        let draws = &mut people[agent.index()].draws;
+        let count = match luck {
+            Luck::Break => &mut draws.breaks,
+            Luck::Take => &mut draws.takes,
+            Luck::PutOn => &mut draws.puts_on,
+            Luck::WatchPutIn => &mut draws.puts_in,
+            // Only asked for people who tremble, who have a condition.
+            Luck::Slip => &mut conditions[agent.index()].slips,
+            Luck::Drop => &mut conditions[agent.index()].drops,
+        };
         let index = u64::from(agent.0) << 32 | u64::from(*count);
         *count += 1;
         Stream::new(seed, luck.purpose(), index)
@@ -73,16 +79,17 @@ mod tests {
     use crate::setup::Setup;
     use crate::{Person, Rules, Thing};
     use chaic_protocol::briefing::Goal;
-    use chaic_protocol::capability::Persona;
+    use chaic_protocol::capability::{Impairment, Impairments, PersonKind, Persona};
     use chaic_protocol::geom::{Pose, Rect};
     use chaic_protocol::{ClassId, TaskId, Vec3};
 
     fn world() -> World {
-        let person = |x: f32| Person {
+        let trembling = PersonKind {
             persona: Persona::Adult,
-            pose: Pose { position: Vec3::new(x, 0.0, 0.0), yaw_rad: 0.0 },
-            look: 0,
-            capability: None,
+            impairments: Impairments::of(Impairment::Tremor),
+        };
+        let person = |x: f32| {
+            Person::new(trembling, Pose { position: Vec3::new(x, 0.0, 0.0), yaw_rad: 0.0 }, 0)
         };
         let setup = Setup {
             task: TaskId::NoConstraint,
@@ -104,7 +111,8 @@ mod tests {
 
     #[test]
     fn a_draw_of_one_purpose_moves_no_draw_of_another() {
-        const ALL: [Luck; 4] = [Luck::Break, Luck::Take, Luck::PutOn, Luck::WatchPutIn];
+        const ALL: [Luck; 6] =
+            [Luck::Break, Luck::Take, Luck::PutOn, Luck::WatchPutIn, Luck::Slip, Luck::Drop];
         let (me, other) = (AgentId(0), AgentId(1));
         let three = |world: &mut World, luck| [(); 3].map(|()| world.luck(me, luck).unit());
         for luck in ALL {
@@ -120,6 +128,6 @@ mod tests {
             assert!(alone[0] != alone[1] && alone[1] != alone[2], "{luck:?} draws anew");
         }
         let firsts = ALL.map(|luck| world().luck(me, luck).unit().to_bits());
-        assert!((1..4).all(|i| !firsts[..i].contains(&firsts[i])), "each has its own stream");
+        assert!((1..6).all(|i| !firsts[..i].contains(&firsts[i])), "each has its own stream");
     }
 }

@@ -1,7 +1,7 @@
 //! How a body holds itself: what an onlooker can see of what it does.
 
 use chaic_protocol::Vec3;
-use chaic_protocol::capability::{Gait, Persona};
+use chaic_protocol::capability::{Gait, Impairments, Persona};
 use chaic_protocol::geom::Pose;
 
 /// One arm.
@@ -19,6 +19,10 @@ pub struct Arm {
 pub struct Posture {
     /// What kind of person.
     pub persona: Persona,
+    /// What impairs it.
+    pub impairments: Impairments,
+    /// How tired it is: 0 rested, 1 exhausted.
+    pub fatigue: f32,
     /// How this person gets about.
     pub gait: Gait,
     /// Height of the body, metres.

@@ -1,7 +1,7 @@
 //! How an episode begins.
 
 use chaic_protocol::briefing::Goal;
-use chaic_protocol::capability::{Capability, Persona};
+use chaic_protocol::capability::{Capability, Gait, Impairments, PersonKind, Persona, UsableHands};
 use chaic_protocol::geom::{Pose, Rect, xz};
 use chaic_protocol::{AgentId, ClassId, EntityId, Frame, TaskId, Vec2, Vec3};
 use schemars::JsonSchema;
@@ -187,12 +187,26 @@ pub struct Person {
     /// Limits and measures other than the persona's own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub capability: Option<Capability>,
+    /// What impairs this person besides.
+    #[serde(default, skip_serializing_if = "Impairments::is_empty")]
+    pub impairments: Impairments,
 }
 
 impl Person {
+    /// Somebody of this kind, without limits and measures of its own.
+    pub fn new(kind: impl Into<PersonKind>, pose: Pose, look: u8) -> Person {
+        let PersonKind { persona, impairments } = kind.into();
+        Person { persona, pose, look, capability: None, impairments }
+    }
+
     /// The limits and measures that hold for this person.
     pub fn capability(&self) -> Capability {
-        self.capability.unwrap_or_else(|| self.persona.capability())
+        self.impairments.apply(self.capability.unwrap_or_else(|| self.persona.capability()))
+    }
+
+    /// What kind of person this is.
+    pub fn kind(&self) -> PersonKind {
+        PersonKind { persona: self.persona, impairments: self.impairments }
     }
 }
 
@@ -210,6 +224,49 @@ impl SetupError {
     fn new(field: impl Into<String>, problem: impl Into<String>) -> SetupError {
         SetupError { field: field.into(), problem: problem.into() }
     }
+}
+
+fn number(field: String, x: f32, low: f32, high: f32) -> Result<(), SetupError> {
+    if x >= low && x <= high {
+        Ok(())
+    } else {
+        Err(SetupError::new(field, format!("is {x}, expected a number in [{low}, {high}]")))
+    }
+}
+
+/// The limits that only some people have.
+fn check_impaired(i: usize, c: &Capability) -> Result<(), SetupError> {
+    const FRAMES: [f32; 2] = [1.0, 1e6];
+    let mut limits: Vec<(&str, f32, [f32; 2])> = vec![];
+    if let Some(sight) = c.sight {
+        limits.extend([
+            ("sight.range_m", sight.range_m, [0.1, 1000.0]),
+            ("sight.blur_rad", sight.blur_rad, [0.0, 0.2]),
+            ("sight.field_rad", sight.field_rad, [0.01, std::f32::consts::PI]),
+            ("sight.lowered_rad", sight.lowered_rad, [0.0, std::f32::consts::FRAC_PI_2]),
+        ]);
+    }
+    if let Some(endurance) = c.endurance {
+        limits.extend([
+            ("endurance.work_frames", endurance.work_frames, FRAMES),
+            ("endurance.rest_frames", endurance.rest_frames, FRAMES),
+            ("endurance.least", endurance.least, [0.05, 1.0]),
+        ]);
+    }
+    if let Some(tremor) = c.tremor {
+        limits.extend([
+            ("tremor.slip_chance", tremor.slip_chance, [0.0, 1.0]),
+            ("tremor.drop_chance", tremor.drop_chance, [0.0, 1.0]),
+        ]);
+    }
+    for (name, x, [low, high]) in limits {
+        number(format!("people[{i}].capability.{name}"), x, low, high)?;
+    }
+    if c.gait == Gait::WalkBike && c.hands != UsableHands::Both {
+        let problem = "are one, expected both: a bicycle needs one and its basket the other";
+        return Err(SetupError::new(format!("people[{i}].capability.hands"), problem));
+    }
+    Ok(())
 }
 
 impl Setup {
@@ -264,13 +321,6 @@ impl Setup {
     /// Whether the episode makes sense to play is for the validator of `chaic-episodes`.
     pub fn check(&self) -> Result<(), SetupError> {
         let max = Setup::MAX_COORDINATE_M;
-        let number = |field: String, x: f32, low: f32, high: f32| {
-            if x >= low && x <= high {
-                Ok(())
-            } else {
-                Err(SetupError::new(field, format!("is {x}, expected a number in [{low}, {high}]")))
-            }
-        };
         let rect = |field: String, r: &Rect| {
             for (name, v) in [("min", r.min), ("max", r.max)] {
                 number(format!("{field}.{name}[0]"), v.x, -max, max)?;
@@ -375,6 +425,7 @@ impl Setup {
             ] {
                 number(format!("people[{i}].capability.{name}"), x, low, high)?;
             }
+            check_impaired(i, &c)?;
         }
         if self.goal.targets.is_empty() {
             return Err(SetupError::new("goal.targets", "is empty, expected at least one class"));

@@ -26,6 +26,22 @@ pub struct State {
     pub stuck_frames: u32,
     /// Whether the episode has ended.
     pub over: bool,
+    /// Per person, how tired it is and the like; empty if nobody tires or trembles. It stands behind
+    /// the rest in a snapshot, so that worlds without such people have the bytes that they always
+    /// had.
+    #[serde(skip)]
+    pub conditions: Vec<Condition>,
+}
+
+/// What changes about a person who tires or trembles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Condition {
+    /// 0 rested, 1 exhausted.
+    pub fatigue: f32,
+    /// Draws of whether a grasp slips.
+    pub slips: u32,
+    /// Draws of whether something drops.
+    pub drops: u32,
 }
 
 /// One thing.

@@ -7,10 +7,12 @@
 //! that is under way when the time ends is cut off and has no outcome.
 
 use chaic_protocol::action::FailureReason;
+use chaic_protocol::catalogue::Role;
 use chaic_protocol::geom::{forward, horizontal_distance, yaw_towards};
-use chaic_protocol::{Action, AgentId, Outcome, Vec2, Vec3};
+use chaic_protocol::{Action, AgentId, EntityId, Hand, Outcome, Vec2, Vec3};
 
 use crate::event::EventKind;
+use crate::luck::Luck;
 use crate::rules::Blocking;
 use crate::state::{Activity, PROGRESS_M, Phase, Place, STUCK_AFTER_FRAMES, Step};
 use crate::world::World;
@@ -34,7 +36,10 @@ impl World {
             return;
         }
         for agent in self.setup.agents() {
+            let works = self.works(agent);
             self.act_for_a_frame(agent);
+            self.tire(agent, works);
+            self.let_slip(agent);
         }
         self.let_fall();
         self.carry_along();
@@ -149,7 +154,7 @@ impl World {
     /// One frame of a step ahead.
     fn walk(&mut self, agent: AgentId, step: &mut Step) -> Progress {
         let Phase::Walk { left_m, made_m } = &mut step.phase else { return Progress::Done };
-        let speed = self.capability(agent).speed_m_per_frame;
+        let speed = self.capability(agent).speed_m_per_frame * self.part_left(agent);
         let ahead = forward(self.person(agent).pose.yaw_rad);
         let moved = self.step_towards(agent, ahead, speed);
         *left_m -= speed;
@@ -183,7 +188,7 @@ impl World {
         let target = self.point_to_reach(from, entity);
         let yaw = yaw_towards(from, target);
         self.turn_to(agent, yaw);
-        let speed = self.capability(agent).approach_speed_m_per_frame;
+        let speed = self.capability(agent).approach_speed_m_per_frame * self.part_left(agent);
         self.step_towards(agent, forward(yaw), speed);
         if self.rules.blocking == Blocking::Creeps && self.meets_something(agent) {
             return Progress::Done;
@@ -250,6 +255,48 @@ impl World {
         let from = self.person(agent).pose.position;
         if horizontal_distance(from, to) > 1e-3 {
             self.turn_to(agent, yaw_towards(from, to));
+        }
+    }
+
+    /// Whether what a person is about to do in this frame is work.
+    fn works(&self, agent: AgentId) -> bool {
+        let handles = |phase: Phase| {
+            matches!(
+                phase,
+                Phase::Reach { .. }
+                    | Phase::Grasp { .. }
+                    | Phase::Release { .. }
+                    | Phase::Insert { .. }
+                    | Phase::ResetArms { .. }
+            )
+        };
+        self.is_moving(agent) || self.person(agent).phase().is_some_and(|s| handles(s.phase))
+    }
+
+    fn tire(&mut self, agent: AgentId, works: bool) {
+        if let Some(endurance) = self.capability(agent).endurance {
+            let condition = &mut self.state.conditions[agent.index()];
+            condition.fatigue = endurance.after_frame(condition.fatigue, works);
+        }
+    }
+
+    /// What drops from a trembling hand on the way. Hands that are at work hold on to what they have.
+    fn let_slip(&mut self, agent: AgentId) {
+        let Some(tremor) = self.capability(agent).tremor else { return };
+        let action = self.person(agent).activity.as_ref().map(|a| a.action);
+        if action.is_some_and(|a| !a.is_locomotion() && !matches!(a, Action::Wait { .. })) {
+            return;
+        }
+        for hand in Hand::BOTH {
+            let held = self.person(agent).hands[hand.index()];
+            let slips = |e: &EntityId| {
+                !matches!(self.thing(*e).0.class.info().role, Role::HeavyTarget | Role::Vehicle)
+            };
+            let Some(object) = held.filter(slips) else { continue };
+            if self.luck(agent, Luck::Drop).chance(tremor.drop_chance) {
+                let at = self.drop_spot(agent, object);
+                self.release(agent, object, None, at, false);
+            }
         }
     }
 

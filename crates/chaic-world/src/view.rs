@@ -2,9 +2,9 @@
 
 use chaic_protocol::action::Hand;
 use chaic_protocol::briefing::{Briefing, Companion, Relation, Told};
-use chaic_protocol::capability::Gait;
+use chaic_protocol::capability::{Gait, Sight};
 use chaic_protocol::catalogue::{CLASSES, Role};
-use chaic_protocol::geom::{Camera, rotate_yaw, yaw_rotation};
+use chaic_protocol::geom::{Camera, pitch_rotation, rotate_yaw, yaw_rotation};
 use chaic_protocol::observation::{
     Granted, Grants, Held, Identity, OtherEnd, SeenAction, SelfState,
 };
@@ -13,6 +13,7 @@ use chaic_protocol::task::SceneKind;
 use chaic_protocol::{Action, AgentId, ClassId, EntityId, Outcome, ResolvedAction, Vec3};
 
 use crate::posture::{Arm, Posture};
+use crate::setup::Person;
 use crate::state::{Phase, Place};
 use crate::world::World;
 
@@ -62,7 +63,7 @@ impl World {
 
     fn told(&self) -> Told {
         let task = self.setup.task;
-        let partner = self.setup.people.first().map_or(task.info().partner, |p| p.persona);
+        let partner = self.setup.people.first().map_or(task.info().partner, Person::kind);
         Told { task, partner }
     }
 
@@ -162,16 +163,24 @@ impl World {
         })
     }
 
-    /// An agent's eye: level, at eye height, looking ahead. `size` is the image's side in pixels.
+    /// An agent's eye: at eye height, looking ahead, level but for who lowers the gaze. `size` is the
+    /// image's side in pixels.
     pub fn eye(&self, agent: AgentId, size: u32) -> Camera {
-        let pose = self.person(agent).pose;
+        let (pose, level) =
+            (self.person(agent).pose, yaw_rotation(self.person(agent).pose.yaw_rad));
+        let lowered = |sight: Sight| level * pitch_rotation(-sight.lowered_rad);
         Camera {
             eye_in_world: pose.position + Vec3::Y * self.capability(agent).eye_height_m,
-            world_from_camera: yaw_rotation(pose.yaw_rad),
+            world_from_camera: self.sight(agent).map_or(level, lowered),
             vertical_fov_rad: Camera::EYE_FOV_RAD,
             width: size,
             height: size,
         }
+    }
+
+    /// How far and how sharply an agent sees, if not as its camera does.
+    pub fn sight(&self, agent: AgentId) -> Option<Sight> {
+        self.capability(agent).sight
     }
 
     /// A point in front of a person at the height where things are held.
@@ -192,6 +201,8 @@ impl World {
         let c = self.capability(agent);
         let side = if hand == Hand::Left { -1.0 } else { 1.0 };
         match (c.gait, holding) {
+            // In a sling, before the chest.
+            _ if !c.hands.include(hand) => Vec3::new(0.0, 0.66 * c.height_m, -0.12 * c.height_m),
             (Gait::Roll, true) => Vec3::new(side * 0.18, 0.82, -0.5),
             (Gait::Roll, false) => Vec3::new(side * 0.33, 0.62, 0.0),
             (Gait::WalkBike, _) if hand == Hand::Left => Vec3::new(-0.4, 0.98, -0.35),
@@ -265,19 +276,28 @@ impl World {
         let above = (highest - 1.1 * c.height_m) / (0.25 * c.height_m);
         Posture {
             persona: self.setup.people[agent.index()].persona,
+            impairments: self.setup.people[agent.index()].impairments,
+            fatigue: self.fatigue(agent),
             gait: c.gait,
             height_m: c.height_m,
             look: self.setup.people[agent.index()].look,
             pose: person.pose,
-            moving: matches!(phase, Some(Phase::Walk { .. } | Phase::Approach { .. }))
-                || (person.in_stride && matches!(phase, Some(Phase::Stand)))
-                || self.is_led(agent),
+            moving: self.is_moving(agent),
             walked_m: person.walked_m,
             arms,
             bend: if busy { below.clamp(0.0, 1.0) } else { 0.0 },
             stretch: if busy { above.clamp(0.0, 1.0) } else { 0.0 },
             failing: busy && person.activity.as_ref().is_some_and(|a| a.failing.is_some()),
         }
+    }
+
+    /// Whether legs or wheels are moving.
+    pub(crate) fn is_moving(&self, agent: AgentId) -> bool {
+        let person = self.person(agent);
+        let phase = person.phase().map(|s| s.phase);
+        matches!(phase, Some(Phase::Walk { .. } | Phase::Approach { .. }))
+            || (person.in_stride && matches!(phase, Some(Phase::Stand)))
+            || self.is_led(agent)
     }
 
     fn is_led(&self, agent: AgentId) -> bool {

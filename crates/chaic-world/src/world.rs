@@ -12,9 +12,9 @@ use serde::{Deserialize, Serialize};
 use crate::collide::{Body, Disc, Surroundings};
 use crate::event::{Event, EventKind};
 use crate::rules::{ReachTo, Rules};
-use crate::setup::{Setup, SetupError, Thing};
+use crate::setup::{Person, Setup, SetupError, Thing};
 use crate::shape::{Block, blocks_at, wall_blocks};
-use crate::state::{PersonState, Place, State, ThingState};
+use crate::state::{Condition, PersonState, Place, State, ThingState};
 
 /// An episode under way.
 #[derive(Clone, Debug)]
@@ -25,6 +25,8 @@ pub struct World {
     pub(crate) surroundings: Arc<Surroundings>,
     /// Things that can be moved and block bodies: derived from the setup.
     pub(crate) movable_blockers: Arc<[usize]>,
+    /// What each person's body can do: derived from the setup.
+    capabilities: Arc<[Capability]>,
     pub(crate) state: State,
     pub(crate) events: Vec<Event>,
 }
@@ -88,8 +90,10 @@ impl World {
             .map(|(i, _)| i)
             .collect();
         let state = initial_state(&setup);
+        let capabilities = setup.people.iter().map(Person::capability).collect();
+        let events = Vec::new();
         let mut world =
-            World { setup, rules, surroundings, movable_blockers, state, events: Vec::new() };
+            World { setup, rules, surroundings, movable_blockers, capabilities, state, events };
         world.attach_vehicles();
         world.carry_along();
         Ok(world)
@@ -155,7 +159,11 @@ impl World {
 
     /// The state as bytes.
     pub fn snapshot(&self) -> Snapshot {
-        Snapshot(postcard::to_stdvec(&self.state).expect("a state is plain data"))
+        let mut bytes = postcard::to_stdvec(&self.state).expect("a state is plain data");
+        if !self.state.conditions.is_empty() {
+            bytes = postcard::to_extend(&self.state.conditions, bytes).expect("so are conditions");
+        }
+        Snapshot(bytes)
     }
 
     /// Goes back (or on) to a saved state of the same setup. Undrained events are dropped.
@@ -163,12 +171,17 @@ impl World {
     /// # Errors
     /// If the bytes are no state of this setup; the world is then unchanged.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), SnapshotError> {
-        let state: State = postcard::from_bytes(&snapshot.0)
-            .map_err(|e| SnapshotError::Unreadable(e.to_string()))?;
+        let unreadable = |e: postcard::Error| SnapshotError::Unreadable(e.to_string());
+        let (mut state, rest): (State, _) =
+            postcard::take_from_bytes(&snapshot.0).map_err(unreadable)?;
+        if !rest.is_empty() {
+            state.conditions = postcard::from_bytes(rest).map_err(unreadable)?;
+        }
         let count = |things: usize, people: usize| format!("{things} things and {people} people");
         let got = count(state.things.len(), state.people.len());
         let expected = count(self.setup.things.len(), self.setup.people.len());
-        if got != expected {
+        let tires = state.conditions.len() == self.state.conditions.len();
+        if got != expected || !tires {
             return Err(SnapshotError::OtherSetup { got, expected });
         }
         self.state = state;
@@ -190,7 +203,18 @@ impl World {
     }
 
     pub(crate) fn capability(&self, agent: AgentId) -> Capability {
-        self.setup.people[agent.index()].capability()
+        self.capabilities[agent.index()]
+    }
+
+    /// Part of speed and strength that this person's fatigue leaves.
+    pub(crate) fn part_left(&self, agent: AgentId) -> f32 {
+        let endurance = self.capability(agent).endurance;
+        endurance.map_or(1.0, |e| e.part_left(self.fatigue(agent)))
+    }
+
+    /// How tired a person is: 0 rested, 1 exhausted.
+    pub fn fatigue(&self, agent: AgentId) -> f32 {
+        self.state.conditions.get(agent.index()).map_or(0.0, |c| c.fatigue)
     }
 
     /// Setup and state of a thing that exists.
@@ -366,7 +390,15 @@ fn initial_state(setup: &Setup) -> State {
         child_is_away: false,
         stuck_frames: 0,
         over: false,
+        conditions: initial_conditions(setup),
     }
+}
+
+fn initial_conditions(setup: &Setup) -> Vec<Condition> {
+    let changes =
+        |p: &Person| p.capability().endurance.is_some() || p.capability().tremor.is_some();
+    let n = if setup.people.iter().any(changes) { setup.people.len() } else { 0 };
+    vec![Condition::default(); n]
 }
 
 /// What a thing stands on at the start: the thing whose top surface is right below its bottom.

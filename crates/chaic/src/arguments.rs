@@ -12,6 +12,7 @@ use chaic_env::rules::RuleSetName;
 use chaic_episodes::Split;
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::Format;
+use chaic_protocol::capability::PersonKind;
 use chaic_protocol::{AgentId, TaskId};
 use clap::{Args, Parser, Subcommand};
 
@@ -80,7 +81,7 @@ pub struct Tasks(pub Vec<TaskId>);
 
 fn tasks(text: &str) -> Result<Tasks, String> {
     if text == "all" {
-        return Ok(Tasks(TaskId::all().collect()));
+        return Ok(Tasks(TaskId::paper().collect()));
     }
     let parsed: Result<Vec<TaskId>, _> = text.split(',').map(str::parse).collect();
     parsed.map(Tasks).map_err(|e| e.to_string())
@@ -132,6 +133,10 @@ pub struct EvalArguments {
     /// Episodes at a time; changes no result. Usual: one for each core.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
+    /// What kind of person the partner is, in place of who it is in each episode: adult, child,
+    /// wheelchair, rider or frail, each with +one_handed, +low_vision, +tires or +tremor if you like
+    #[arg(long, value_name = "KIND")]
+    pub partner_is: Option<PersonKind>,
     /// Who drives the partner: rules (usual), or llm or vlm.
     #[arg(long, value_name = "NAME")]
     pub partner: Option<String>,

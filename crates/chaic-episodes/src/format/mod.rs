@@ -6,7 +6,8 @@ mod layout;
 pub use error::EpisodeError;
 
 use chaic_protocol::TaskId;
-use chaic_world::Setup;
+use chaic_protocol::capability::PersonKind;
+use chaic_world::{Person, Setup};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -153,6 +154,18 @@ impl Episode {
         }
     }
 
+    /// The same with somebody of this kind for a partner; its name is followed by the kind's.
+    ///
+    /// # Errors
+    /// [`EpisodeError::Invalid`] if such a person can't play it: has no room to start, or no bicycle.
+    pub fn with_partner(self, kind: PersonKind) -> Result<Episode, EpisodeError> {
+        let EpisodeFile { id, split, mut setup, .. } = self.file;
+        let Person { pose, look, .. } = setup.people[0];
+        setup.people[0] = Person::new(kind, pose, look);
+        // Without its generator's name: that promises who the partner is.
+        Episode::new(format!("{id}/{kind}"), split, None, setup)
+    }
+
     /// Its name, for example `obstacle/test/07`.
     pub fn id(&self) -> &str {
         &self.file.id
@@ -205,8 +218,8 @@ fn name_problem(name: &str) -> Option<String> {
     if name.is_empty() || name.len() > MAX_NAME_BYTES {
         return Some(format!("has {} bytes, expected 1 to {MAX_NAME_BYTES}", name.len()));
     }
-    let odd = name.chars().find(|c| !(c.is_ascii_alphanumeric() || "_-./:".contains(*c)))?;
-    Some(format!("holds {odd:?}, expected letters, digits and any of _-./:"))
+    let odd = name.chars().find(|c| !(c.is_ascii_alphanumeric() || "_-./:+".contains(*c)))?;
+    Some(format!("holds {odd:?}, expected letters, digits and any of _-./:+"))
 }
 
 /// What messages call a place outside all fields.

@@ -221,7 +221,7 @@ fn goal_places(
 pub(super) fn people(house: &House, task: TaskId, rng: &mut Stream) -> Option<Vec<Person>> {
     let free = slots::floor(house, START_CLEAR_M);
     let mut people: Vec<Person> = Vec::new();
-    for persona in [task.info().partner, Persona::Helper] {
+    for kind in [task.info().partner, Persona::Helper.into()] {
         let apart =
             |p: &Vec2| people.iter().all(|o| xz(o.pose.position).distance(*p) >= PEOPLE_APART_M);
         // A room first, so that small rooms are as likely as large ones (facts S11.2).
@@ -236,7 +236,7 @@ pub(super) fn people(house: &House, task: TaskId, rng: &mut Stream) -> Option<Ve
             position: Vec3::new(mm(p.x), 0.0, mm(p.y)),
             yaw_rad: mm(heading * std::f32::consts::PI / 12.0),
         };
-        people.push(Person { persona, pose, look: rng.below(16) as u8, capability: None });
+        people.push(Person::new(kind, pose, rng.below(16) as u8));
     }
     Some(people)
 }

@@ -65,7 +65,7 @@ impl BenchScene {
 
     /// What is wanted of the eyes.
     pub fn views(&self, channels: Channels) -> Vec<View> {
-        let view = |camera| View { camera, channels, hide: None, hide_ceiling: false };
+        let view = |camera| View::of_camera(camera, channels);
         self.cameras.iter().map(|c| view(*c)).collect()
     }
 

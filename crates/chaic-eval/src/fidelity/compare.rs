@@ -51,7 +51,7 @@ pub fn task_rate(played: Played<'_>, task: TaskId, helper: &str) -> Option<TaskR
         interval: all.interval(),
         se_once: variance.map(f64::sqrt),
         n: episodes.len(),
-        published: published(helper).map(|row| row.figures(task).tr),
+        published: published(helper).and_then(|row| Some(row.figures(task)?.tr)),
     })
 }
 

@@ -207,7 +207,7 @@ impl<'a> Sheet<'a> {
         text += "\n\n";
         let granted = self.parts.first().and_then(|p| p.labels().sentence(&plan.helpers));
         text += &granted.map_or(String::new(), |granted| format!("**{granted}**\n\n"));
-        if plan.tasks.len() < TaskId::all().count() {
+        if plan.tasks.len() < TaskId::paper().count() {
             let names: Vec<&str> = plan.tasks.iter().map(|t| t.info().title).collect();
             let _ = writeln!(text, "Only these of the eight tasks: {}.\n", names.join(", "));
         }
@@ -220,7 +220,7 @@ impl<'a> Sheet<'a> {
         let bars = |helper: &String| {
             let bar = |task: &TaskId| {
                 let score = scores.get(*task, helper)?;
-                let dot = published(helper).map(|row| row.figures(*task).tr);
+                let dot = published(helper).and_then(|row| Some(row.figures(*task)?.tr));
                 Some(Bar { mean: score.tr, interval: shown_interval(score), dot })
             };
             let helper_title = part.labels().title(helper);

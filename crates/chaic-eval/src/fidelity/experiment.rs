@@ -210,7 +210,7 @@ impl Experiment {
         let mut text =
             format!("chaic fidelity --episodes EPISODES --out OUT --seeds {}", self.seeds);
         text += &format!(" --helper {}", self.helpers.join(","));
-        if self.tasks != TaskId::all().collect::<Vec<_>>() {
+        if self.tasks != TaskId::paper().collect::<Vec<_>>() {
             let names: Vec<&str> = self.tasks.iter().map(|t| t.name()).collect();
             text += &format!(" --task {}", names.join(","));
         }

@@ -108,6 +108,7 @@ impl Matrix {
             set: part.switch.iter().map(|rule| format!("{rule}=paper")).collect(),
             no_traces: part.switch.is_some(),
             partner: None,
+            partner_is: None,
             appearance: None,
         })
     }

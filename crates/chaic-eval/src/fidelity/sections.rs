@@ -215,7 +215,7 @@ impl RuleSection<'_> {
             let all = interval(found.all.as_ref());
             rows.push([name, all].into_iter().chain(cells).collect::<Vec<String>>());
             let gain = |t: TaskId| {
-                let tr = |h: &str| published(h).map(|row| row.figures(t).tr);
+                let tr = |h: &str| published(h).and_then(|row| Some(row.figures(t)?.tr));
                 Some(tr(helper)? - tr(NONE)?)
             };
             let gains: Vec<Option<f64>> = self.tasks.iter().map(|t| gain(*t)).collect();
@@ -248,7 +248,7 @@ impl RuleSection<'_> {
             for helper in self.helpers {
                 let cell = |task: &TaskId| {
                     let ours = scores.get(*task, helper).and_then(ours);
-                    let papers = published(helper).and_then(|row| papers(&row.figures(*task)));
+                    let papers = published(helper).and_then(|row| papers(&row.figures(*task)?));
                     match (ours, papers) {
                         (None, None) => "/".to_owned(),
                         _ => format!("{} ({})", number(ours), number(papers)),

@@ -167,9 +167,8 @@ impl<'a> Replay<'a> {
     pub fn picture(&self) -> RgbImage {
         let eyes = [AgentId::PARTNER, AgentId::HELPER];
         let present = eyes.iter().filter(|a| a.index() < self.playback.thoughts().len());
-        let view = |agent: &AgentId| {
-            View::of_eye(*agent, self.world().eye(*agent, panel::EYE_PX), Channels::RGB)
-        };
+        let view =
+            |agent: &AgentId| View::of_agent(self.world(), *agent, panel::EYE_PX, Channels::RGB);
         let views: Vec<View> = present.map(view).collect();
         let (images, map) = rayon::join(
             || self.scene.render(self.world(), &views),

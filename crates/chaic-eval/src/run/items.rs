@@ -5,8 +5,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use chaic_env::{RunKey, slug};
-use chaic_episodes::{Episode, Split};
+use chaic_episodes::{Episode, Split, find_episode};
 use chaic_files::{entries, write_whole};
+use chaic_protocol::task::Origin;
 use chaic_protocol::{Frame, TaskId};
 
 use crate::error::{EvalError, Result};
@@ -46,7 +47,13 @@ pub(super) fn plan(options: &RunOptions, own: &[Episode]) -> Result<Vec<Item>> {
         let limit = (MAX_ITEMS - items.len()) / n_each.max(1);
         let episodes = episodes(options, own, *task, limit)?;
         if episodes.is_empty() {
-            let text = format!("there is no episode of {task} to play");
+            let hint = match task.info().origin {
+                Origin::Ours if options.split != FILES => {
+                    "; it has generated ones: give --split gen:0..12"
+                }
+                _ => "",
+            };
+            let text = format!("there is no episode of {task} to play{hint}");
             return Err(EvalError::Options(text));
         }
         for Entry { id, horizon, environment } in episodes {
@@ -60,6 +67,13 @@ pub(super) fn plan(options: &RunOptions, own: &[Episode]) -> Result<Vec<Item>> {
         }
     }
     Ok(items)
+}
+
+/// Whether another partner than the task's can play at all: looks at the first episode of each task.
+pub(super) fn check_partner(items: &[Item]) -> Result<()> {
+    let mut tasks = BTreeSet::new();
+    let mut firsts = items.iter().filter(|item| tasks.insert(item.key.task));
+    firsts.try_for_each(|item| Ok(find_episode(&item.key.episode).map(|_| ())?))
 }
 
 /// An episode as far as a plan needs it.
@@ -88,14 +102,15 @@ fn episodes(
     }
     let split: Split = options.split.parse()?;
     let horizon = task.info().horizon;
-    let n = split.len_per_task().min(limit);
+    let n = split.len_of(task).min(limit);
     if n > at_most {
         let text =
             format!("{n} episodes of {task} are too many for one run; give --first or fewer seeds");
         return Err(EvalError::Options(text));
     }
+    let partner = options.partner_is.map_or_else(String::new, |kind| format!("/{kind}"));
     let entry = |k: usize| Entry {
-        id: split.episode_id(task, k),
+        id: split.episode_id(task, k) + &partner,
         horizon,
         environment: split.environment(task, k as u64),
     };
@@ -134,14 +149,13 @@ pub(crate) fn tasks_of_files(folder: &Path) -> Result<Vec<TaskId>> {
 /// ones while going on with it means another run.
 pub(super) fn check_episode_files(
     source: &Path,
-    tasks: &[TaskId],
+    options: &RunOptions,
     folder: &RunFolder,
 ) -> Result<()> {
     if same_files(source, &folder.episode_files())? {
         return Ok(());
     }
-    let mut named = read_files(source)?;
-    named.retain(|e| tasks.contains(&e.task()));
+    let named = read_with_partner(source, options)?;
     let copies = read_files(&folder.episode_files())?;
     let other = named.iter().find(|e| !copies.contains(e));
     let Some(other) = other.or_else(|| copies.iter().find(|e| !named.contains(e))) else {
@@ -173,13 +187,24 @@ fn same_files(a: &Path, b: &Path) -> Result<bool> {
     Ok(true)
 }
 
-/// The episodes of these tasks in a user's folder.
+/// The episodes of the run's tasks in a user's folder, with the run's partner.
+fn read_with_partner(source: &Path, options: &RunOptions) -> Result<Vec<Episode>> {
+    let episodes = read_files(source)?.into_iter();
+    let of_tasks = episodes.filter(|e| options.tasks.contains(&e.task()));
+    of_tasks
+        .map(|episode| match options.partner_is {
+            Some(kind) => Ok(episode.with_partner(kind)?),
+            None => Ok(episode),
+        })
+        .collect()
+}
+
+/// The episodes of the run's tasks in a user's folder, as they are copied.
 ///
 /// # Errors
 /// If one can't be read, or two of them would be copied to the same file.
-pub(super) fn read_source(source: &Path, tasks: &[TaskId]) -> Result<Vec<Episode>> {
-    let mut episodes = read_files(source)?;
-    episodes.retain(|e| tasks.contains(&e.task()));
+pub(super) fn read_source(source: &Path, options: &RunOptions) -> Result<Vec<Episode>> {
+    let episodes = read_with_partner(source, options)?;
     let mut names = BTreeSet::new();
     for episode in &episodes {
         if !names.insert((episode.task(), slug(episode.task(), episode.id()))) {

@@ -195,8 +195,11 @@ impl Fresh {
         let options = given.begin()?;
         check(&options, helpers)?;
         let source = given.episodes.as_ref();
-        let own = source.map(|s| items::read_source(s, &options.tasks)).transpose()?;
+        let own = source.map(|s| items::read_source(s, &options)).transpose()?;
         let items = items::plan(&options, own.as_deref().unwrap_or_default())?;
+        if own.is_none() && options.partner_is.is_some() {
+            items::check_partner(&items)?;
+        }
         Ok(Fresh { options, items, own })
     }
 
@@ -222,7 +225,7 @@ fn resume(
     let options = given.resume(recorded, folder.path())?;
     check(&options, helpers)?;
     if let Some(source) = &given.episodes {
-        items::check_episode_files(source, &options.tasks, folder)?;
+        items::check_episode_files(source, &options, folder)?;
     }
     let items = planned(folder, &options)?;
     let granted = RunGrants::of(&options, helpers)?;

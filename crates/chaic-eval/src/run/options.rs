@@ -7,6 +7,7 @@ use chaic_env::minds::RULES;
 use chaic_env::rules::{RuleSet, RuleSetName};
 use chaic_episodes::Split;
 use chaic_protocol::TaskId;
+use chaic_protocol::capability::PersonKind;
 use chaic_render::Appearance;
 use serde::{Deserialize, Serialize};
 
@@ -45,6 +46,9 @@ pub struct RunOptions {
     /// Who drives the partner; absent for the rule-based minds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub partner: Option<String>,
+    /// What kind of person the partner is; absent for who it is in each episode.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub partner_is: Option<PersonKind>,
     /// How scenes are lit and colored; absent for the benchmark's own look.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub appearance: Option<String>,
@@ -85,6 +89,8 @@ pub struct RunRequest {
     pub no_traces: bool,
     /// `--partner`.
     pub partner: Option<String>,
+    /// `--partner-is`.
+    pub partner_is: Option<PersonKind>,
     /// `--appearance`.
     pub appearance: Option<Appearance>,
 }
@@ -144,7 +150,7 @@ impl RunRequest {
         let tasks = match (&self.tasks, &self.episodes) {
             (Some(tasks), _) => tasks.clone(),
             (None, Some(folder)) => super::items::tasks_of_files(folder)?,
-            (None, None) => TaskId::all().collect(),
+            (None, None) => TaskId::paper().collect(),
         };
         let (tasks, helpers) = (without_repeats(tasks), without_repeats(helpers));
         if tasks.is_empty() || helpers.is_empty() {
@@ -165,6 +171,7 @@ impl RunRequest {
             set,
             traces,
             partner,
+            partner_is: self.partner_is,
             appearance: varies.map(|a| a.to_string()),
         };
         options.rules()?;
@@ -208,6 +215,11 @@ impl RunRequest {
                 "--partner",
                 self.partner.clone(),
                 recorded.partner.clone().unwrap_or_else(|| RULES.to_owned()),
+            ),
+            (
+                "--partner-is",
+                self.partner_is.map(|k| k.to_string()),
+                recorded.partner_is.map_or("not given".to_owned(), |k| k.to_string()),
             ),
             (
                 "--appearance",

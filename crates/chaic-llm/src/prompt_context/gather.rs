@@ -6,7 +6,7 @@ use chaic_agents::memory::{Memory, Thing};
 use chaic_agents::track::Carried;
 use chaic_agents::{Intent, TrackId};
 use chaic_protocol::briefing::Relation;
-use chaic_protocol::capability::{Capability, Gait, Persona};
+use chaic_protocol::capability::{Capability, Gait, Impairments, PersonKind, Persona};
 use chaic_protocol::geom::{horizontal_distance, xz};
 use chaic_protocol::{Action, AgentId, ClassId, Frame, Outcome, Role};
 
@@ -64,7 +64,7 @@ impl PromptContext {
             me: body(&briefing.capability),
             told: briefing.told.filter(|_| track == Track::Told).map(|told| ToldFacts {
                 task: told.task.name(),
-                partner: persona(told.partner),
+                partner: person(told.partner),
                 reach: reach(&told.partner.capability()),
                 strength_kg: told.partner.capability().strength_kg as u32,
             }),
@@ -120,7 +120,7 @@ pub(super) fn body(capability: &Capability) -> Body {
         Gait::Walk => format!("a person of {height_m:.2} m"),
     };
     Body {
-        kind,
+        kind: impaired(kind, Impairments::seen_in(capability)),
         reach: reach(capability),
         strength_kg: capability.strength_kg as u32,
         docks: capability.docking_frames > 0,
@@ -128,10 +128,14 @@ pub(super) fn body(capability: &Capability) -> Body {
     }
 }
 
-pub(super) fn persona(persona: Persona) -> String {
+pub(super) fn person(kind: PersonKind) -> String {
+    let PersonKind { persona, impairments } = kind;
     let height_m = persona.capability().height_m;
-    match persona {
-        Persona::Adult | Persona::Helper => "an adult without any constraint".to_owned(),
+    let plainly = match persona {
+        Persona::Adult | Persona::Helper if impairments.is_empty() => {
+            "an adult without any constraint".to_owned()
+        }
+        Persona::Adult | Persona::Helper => "an adult".to_owned(),
         Persona::Child => format!("a child of {height_m:.1} m who walks at half your speed"),
         Persona::Wheelchair => "a person in a wheelchair".to_owned(),
         Persona::Rider => {
@@ -139,7 +143,16 @@ pub(super) fn persona(persona: Persona) -> String {
                 .to_owned()
         }
         Persona::Frail => "a frail person".to_owned(),
-    }
+    };
+    impaired(plainly, impairments)
+}
+
+/// Somebody with what impairs it.
+fn impaired(who: String, impairments: Impairments) -> String {
+    let sentence = |text: String, about: &str| format!("{text} and who {about}");
+    let mut abouts = impairments.iter().map(|i| i.info().about);
+    let Some(first) = abouts.next() else { return who };
+    abouts.fold(format!("{who} who {first}"), sentence)
 }
 
 fn holding(held: &Carried) -> String {
@@ -156,8 +169,8 @@ fn holding(held: &Carried) -> String {
 }
 
 fn own(context: &Context<'_>, last_plan: Option<Plan>, length: Length) -> Own {
-    let Context { memory, .. } = *context;
-    let hands = &memory.hands;
+    let Context { memory, briefing, .. } = *context;
+    let (hands, usable) = (&memory.hands, briefing.capability.hands.all().iter());
     let here = memory.here();
     let interactions: Vec<Interaction> = memory
         .history
@@ -170,7 +183,7 @@ fn own(context: &Context<'_>, last_plan: Option<Plan>, length: Length) -> Own {
         x: metres(here.x),
         z: metres(here.y),
         hands: hands.held().map(holding).collect(),
-        free_hands: hands.hands.iter().filter(|h| h.is_none()).count(),
+        free_hands: usable.filter(|h| hands.hands[h.index()].is_none()).count(),
         history: interactions[left_out..].to_vec(),
         history_left_out: left_out,
         plan: last_plan.map(|p| plan_text(&p)),

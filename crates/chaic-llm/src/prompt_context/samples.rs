@@ -2,7 +2,7 @@
 
 use chaic_protocol::capability::Persona;
 
-use super::gather::{body, metres, persona, reach};
+use super::gather::{body, metres, person, reach};
 use super::{
     Count, GoalPlace, Interaction, Map, Other, Own, PlanFacts, ProgressFacts, PromptContext,
     ThingFacts, ToldFacts,
@@ -28,7 +28,7 @@ impl PromptContext {
             me: body(&Persona::Child.capability()),
             told: Some(ToldFacts {
                 task: "shopping",
-                partner: persona(Persona::Rider),
+                partner: person(Persona::Rider.into()),
                 reach: reach(&Persona::Wheelchair.capability()),
                 strength_kg: 100,
             }),

@@ -53,6 +53,6 @@ pub fn views(world: &World, size: u32, channels: Channels) -> Vec<View> {
         world_from_camera: down,
         ..eye
     };
-    views.push(View { camera: above, channels, hide: None, hide_ceiling: true });
+    views.push(View { hide_ceiling: true, ..View::of_camera(above, channels) });
     views
 }

@@ -1,6 +1,6 @@
 //! Clothes, hair and skin.
 
-use chaic_protocol::capability::Persona;
+use chaic_protocol::capability::{Impairment, Persona};
 use chaic_world::Posture;
 
 /// What is on the head.
@@ -51,6 +51,8 @@ pub(super) struct Dress {
     pub headwear: Headwear,
     pub headwear_color: [u8; 3],
     pub glasses: bool,
+    /// Whether glasses are dark.
+    pub dark_glasses: bool,
 }
 
 const SKINS: [[u8; 3]; 5] =
@@ -92,6 +94,7 @@ impl Dress {
             headwear: Headwear::None,
             headwear_color: [30, 140, 140],
             glasses: false,
+            dark_glasses: posture.impairments.has(Impairment::LowVision),
         };
         match posture.persona {
             Persona::Adult => plain,

@@ -18,6 +18,41 @@ pub(super) fn add(mesh: &mut Mesh, s: &Skeleton, b: &Build, dress: &Dress, detai
         arm(mesh, s, b, dress, k, detail);
     }
     head(mesh, s, b, dress, detail);
+    if s.sling {
+        sling(mesh, s, b, detail);
+    }
+    if let Some([handle, tip]) = s.cane {
+        cane(mesh, handle, tip, detail);
+    }
+}
+
+/// The sling of the left arm: a cloth around the forearm, and its strap around the neck.
+fn sling(mesh: &mut Mesh, s: &Skeleton, b: &Build, detail: Detail) {
+    let g = b.girth;
+    let n = segments(detail, 0.07 * g).max(6);
+    let (elbow, hand) = (s.elbows[0], s.hands[0]);
+    mesh.skin(cloth([238, 238, 232]));
+    let behind = elbow + (elbow - hand) * 0.12;
+    mesh.limb(behind, elbow.lerp(hand, 0.85), 0.082 * g, 0.062 * g, n);
+    // Over the chest, before which the forearm lies.
+    let neck = s.chest + s.trunk.y_axis * (0.05 * b.top_y);
+    let front = -s.trunk.z_axis * (0.10 * g);
+    for (end, side) in [(elbow.lerp(hand, 0.1), -1.0), (elbow.lerp(hand, 0.8), 1.0)] {
+        let collar = neck + s.trunk.x_axis * (side * 0.07 * g) + front * 0.5;
+        let over = end.lerp(collar, 0.5) + front * 0.35;
+        mesh.limb(end, over, 0.018 * g, 0.018 * g, 5);
+        mesh.limb(over, collar, 0.018 * g, 0.018 * g, 5);
+    }
+}
+
+/// A white cane with a red end.
+fn cane(mesh: &mut Mesh, handle: Vec3, tip: Vec3, detail: Detail) {
+    let n = segments(detail, 0.012).max(4);
+    let low = handle.lerp(tip, 0.78);
+    mesh.skin(Skin::new([244, 244, 242], Finish::Glossy));
+    mesh.limb(handle, low, 0.014, 0.012, n);
+    mesh.skin(Skin::new([200, 40, 36], Finish::Glossy));
+    mesh.limb(low, tip, 0.012, 0.012, n);
 }
 
 /// Whether something of this size can be seen.
@@ -376,7 +411,13 @@ fn face(
     // A mouth that opens with effort.
     let (y, wide, open) = if effort { (-0.54, 0.24, 0.15) } else { (-0.52, 0.34, 0.06) };
     blob(mesh, at(0.0, y, -0.80), size * Vec3::new(wide, open, 0.16), n);
-    if dress.glasses {
+    if dress.dark_glasses {
+        mesh.skin(Skin::new([18, 18, 22], Finish::Glossy));
+        for x in [-0.40, 0.40] {
+            blob(mesh, at(x, 0.06, -0.97), size * Vec3::new(0.36, 0.24, 0.08), n);
+        }
+        blob(mesh, at(0.0, 0.12, -1.0), size * Vec3::new(0.2, 0.04, 0.05), n);
+    } else if dress.glasses {
         mesh.skin(Skin::new([60, 56, 60], Finish::Metal));
         for x in [-0.40, 0.40] {
             for (dx, dy, w, h) in [

@@ -89,6 +89,7 @@ fn sane(posture: &Posture) -> Posture {
     p.walked_m = within(p.walked_m, 0.0, 1e6, 0.0);
     p.bend = within(p.bend, 0.0, 1.0, 0.0);
     p.stretch = within(p.stretch, 0.0, 1.0, 0.0);
+    p.fatigue = within(p.fatigue, 0.0, 1.0, 0.0);
     if !p.pose.yaw_rad.is_finite() {
         p.pose.yaw_rad = 0.0;
     }
@@ -104,6 +105,7 @@ fn sane(posture: &Posture) -> Posture {
 #[cfg(test)]
 mod tests {
     use chaic_protocol::AgentId;
+    use chaic_protocol::capability::{IMPAIRMENTS, ImpairmentInfo};
 
     use super::*;
     use crate::geometry::FINEST;
@@ -119,6 +121,9 @@ mod tests {
                 posture.walked_m = rng.range(0.0, 5.0);
                 posture.bend = rng.range(0.0, 1.0);
                 posture.stretch = rng.range(0.0, 1.0);
+                posture.fatigue = rng.range(0.0, 1.0);
+                let has = |_: &&ImpairmentInfo| rng.chance(0.5);
+                posture.impairments = IMPAIRMENTS.iter().filter(has).map(|i| i.id).collect();
                 posture.height_m = rng.range(1.0, 1.9);
                 let body = Body::new(&posture, rng.below(100) as u32);
                 let (mesh, spare) = (body.level(FINEST), 0.35);

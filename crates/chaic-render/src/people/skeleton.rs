@@ -1,7 +1,7 @@
 //! Where the joints of a body are.
 
 use chaic_protocol::Vec3;
-use chaic_protocol::capability::Persona;
+use chaic_protocol::capability::{Impairment, Persona};
 use chaic_protocol::geom::math;
 use chaic_world::Posture;
 use glam::Mat3;
@@ -39,16 +39,39 @@ pub(super) struct Skeleton {
     pub foot_pitch: [f32; 2],
     /// Whether the face shows an effort that fails.
     pub effort: bool,
+    /// Whether the left arm is in a sling.
+    pub sling: bool,
+    /// Handle and tip of a white cane.
+    pub cane: Option<[Vec3; 2]>,
 }
 
 /// Distance that this person covers in one cycle of both legs, metres for an adult's height: the
 /// frail take short steps.
 fn stride_m(posture: &Posture) -> f32 {
-    match posture.persona {
+    let rested_m = match posture.persona {
         Persona::Frail => 0.62 * STRIDE_M,
         Persona::Child => 0.9 * STRIDE_M,
         _ => STRIDE_M,
-    }
+    };
+    rested_m * (1.0 - 0.35 * posture.fatigue)
+}
+
+/// How far the hands of this person tremble now, metres.
+fn tremor_m(posture: &Posture, frame: u32) -> f32 {
+    let swing = || math::sin(2.1 * (frame % 10_000) as f32);
+    if posture.impairments.has(Impairment::Tremor) { 0.022 * swing() } else { 0.0 }
+}
+
+/// Handle and tip of the cane that somebody swings to and fro who sees little and has a free hand.
+fn cane(posture: &Posture, right_hand: Vec3, phase: f32, rolls: bool) -> Option<[Vec3; 2]> {
+    let hangs = posture.arms[1].hand_in_body.y < 0.5 * posture.height_m;
+    let is_free = !posture.arms[1].grips && hangs && posture.bend < 0.3;
+    let sees_little = posture.impairments.has(Impairment::LowVision);
+    (sees_little && is_free && !rolls).then(|| {
+        let h = posture.height_m;
+        let swing = if posture.moving { 0.16 * h * math::sin(phase) } else { 0.0 };
+        [right_hand, Vec3::new(swing + 0.04 * h, 0.01, right_hand.z - 0.52 * h)]
+    })
 }
 
 /// How much lower the hips are in the middle of a walk than when standing, as a fraction of the
@@ -109,6 +132,13 @@ impl Skeleton {
         let mut around = |joint: Vec3, reach_m: f32| {
             (min, max) = (min.min(joint - reach_m), max.max(joint + reach_m));
         };
+        if let Some([handle, tip]) = self.cane {
+            around(handle, 0.02);
+            around(tip, 0.02);
+        }
+        if self.sling {
+            around(self.elbows[0], 0.15 * b.girth);
+        }
         around(self.hips, b.shoulder_x + 0.06);
         around(self.chest, b.shoulder_x + 0.08);
         around(self.head, 0.80 * b.head + 0.05);
@@ -136,14 +166,21 @@ impl Skeleton {
             let y = build.hip_y + (0.20 * h - build.hip_y) * bend - low + 0.05 * h * stretch;
             (Vec3::new(0.0, y, 0.10 * h * bend), build.lean_rad + 1.0 * bend)
         };
+        // Who is tired stoops.
+        let pitch = pitch + 0.3 * posture.fatigue;
         hips.x += tremble;
         let roll = if walks { sway_rad(posture, phase) } else { 0.0 };
         hips.x += 0.25 * roll;
         let trunk = leaning(pitch, roll);
         let chest = hips + trunk.y_axis * (build.shoulder_y - build.hip_y);
         let tilt = if posture.failing { 0.28 + 2.0 * tremble } else { 0.0 };
-        let head_axes =
-            leaning(0.45 * pitch - 0.35 * stretch + if posture.failing { 0.3 } else { 0.0 }, tilt);
+        let tremble = tremble + tremor_m(posture, frame);
+        // Who sees little looks before the feet.
+        let lowered = if posture.impairments.has(Impairment::LowVision) { 0.4 } else { 0.0 };
+        let head_axes = leaning(
+            0.45 * pitch + lowered - 0.35 * stretch + if posture.failing { 0.3 } else { 0.0 },
+            tilt,
+        );
         let neck = build.top_y - build.shoulder_y - 0.5 * build.head;
         let head = chest + (0.5 * (trunk.y_axis + head_axes.y_axis)) * neck;
 
@@ -162,12 +199,15 @@ impl Skeleton {
             ankles: [hips; 2],
             foot_pitch: [0.0; 2],
             effort: posture.failing,
+            sling: posture.impairments.has(Impairment::OneHanded),
+            cane: None,
         };
         for (k, side) in [-1.0f32, 1.0].into_iter().enumerate() {
             let cycle = phase + std::f32::consts::PI * k as f32;
             s.place_leg(k, side, build, rolls, if walks { Some(cycle) } else { None }, posture);
             s.place_arm(k, side, build, rolls, cycle, posture, tremble);
         }
+        s.cane = cane(posture, s.hands[1], phase, rolls);
         s
     }
 
@@ -227,8 +267,14 @@ impl Skeleton {
             + Vec3::Y * (0.015 * b.top_y * posture.stretch);
         self.shoulders[k] = shoulder;
         let mut target = posture.arms[k].hand_in_body;
-        let hangs = !posture.arms[k].grips && target.y < b.hip_y + 0.12 && posture.bend < 0.3;
-        if rolls && !posture.arms[k].grips && (posture.moving || hangs) {
+        let rests = k == 0 && self.sling;
+        if rests {
+            let (front, down) = (-self.trunk.z_axis, -self.trunk.y_axis);
+            target = self.chest + front * (0.13 * b.top_y) + down * (0.15 * b.top_y);
+        }
+        let hangs =
+            !rests && !posture.arms[k].grips && target.y < b.hip_y + 0.12 && posture.bend < 0.3;
+        if rolls && !rests && !posture.arms[k].grips && (posture.moving || hangs) {
             // Hands follow the rims forward and come back above them.
             let push = if posture.moving {
                 math::sin(posture.walked_m / (2.0 * WHEEL_RADIUS_M) * 3.0)
@@ -247,7 +293,8 @@ impl Skeleton {
         if posture.failing && !posture.arms[k].grips {
             target.y -= 0.05 * b.top_y;
         }
-        if posture.persona == Persona::Frail || posture.failing {
+        let trembles = posture.impairments.has(Impairment::Tremor);
+        if posture.persona == Persona::Frail || posture.failing || trembles {
             target += Vec3::new(tremble, 0.7 * tremble, 0.0);
         }
         let pole = Vec3::new(0.55 * side, -0.6, 0.7);

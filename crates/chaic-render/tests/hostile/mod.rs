@@ -5,7 +5,7 @@
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 use chaic_protocol::briefing::Goal;
-use chaic_protocol::capability::{Gait, Persona};
+use chaic_protocol::capability::{Gait, IMPAIRMENTS, Persona, Sight};
 use chaic_protocol::geom::{Camera, Pose, Rect, yaw_rotation};
 use chaic_protocol::observation::Images;
 use chaic_protocol::rng::Stream;
@@ -213,7 +213,7 @@ impl Draw {
 
     fn person(&mut self, reach: f32) -> Person {
         let look = self.up_to(255) as u8;
-        Person { persona: self.persona(), pose: self.pose(reach), look, capability: None }
+        Person::new(self.persona(), self.pose(reach), look)
     }
 
     fn state(&mut self, setup: &Setup) -> State {
@@ -246,6 +246,7 @@ impl Draw {
             stuck_frames: 0,
             child_is_away: false,
             over: false,
+            conditions: vec![],
         }
     }
 
@@ -256,8 +257,12 @@ impl Draw {
             let hand_in_body = if self.chance(self.hostile) { self.point(3.0) } else { usual };
             Arm { hand_in_body, grips: self.chance(0.3) }
         });
+        let impairments =
+            IMPAIRMENTS.map(|i| i.id).into_iter().filter(|_| self.chance(0.2)).collect();
         Posture {
             persona,
+            impairments,
+            fatigue: self.between(-0.5, 1.5),
             gait: self.one(&[Gait::Walk, Gait::Roll, Gait::WalkBike]),
             height_m: self.between(0.9, 2.1),
             look: self.up_to(255) as u8,
@@ -323,6 +328,16 @@ impl Draw {
             channels: Channels { rgb, depth, ids },
             hide: if self.chance(0.4) { Some(AgentId(self.up_to(4) as u8)) } else { None },
             hide_ceiling: self.chance(0.2),
+            sight: if self.chance(0.1) { Some(self.sight()) } else { None },
+        }
+    }
+
+    fn sight(&mut self) -> Sight {
+        Sight {
+            range_m: self.between(0.1, 20.0),
+            blur_rad: self.between(0.0, 0.2),
+            field_rad: self.between(0.01, 3.1416),
+            lowered_rad: 0.0,
         }
     }
 
@@ -419,7 +434,8 @@ fn check_view(case: &Case, view: &View, images: &Images) {
     assert_eq!(images.ids.as_ref().map(Vec::len), ids.then_some(n));
     for d in images.depth_m.iter().flatten() {
         // The nearest plane, but for rounding.
-        let is_sound = *d >= 0.999 * Camera::NEAR_M && *d <= Camera::FAR_M;
+        let is_seen = *d >= 0.999 * Camera::NEAR_M && *d <= Camera::FAR_M;
+        let is_sound = is_seen || (*d == 0.0 && view.sight.is_some());
         assert!(is_sound, "{view:?}: a depth of {d} m");
     }
     for id in images.ids.iter().flatten() {
@@ -440,7 +456,8 @@ fn check_view(case: &Case, view: &View, images: &Images) {
         assert!(exists, "{view:?}: there is no {id}");
     }
     if let (Some(depth), Some(ids)) = (&images.depth_m, &images.ids) {
-        let sky = |(d, id): (&f32, &u16)| EntityId(*id) != EntityId::NOTHING || *d == Camera::FAR_M;
+        let unseen = |d: f32| d == Camera::FAR_M || (d == 0.0 && view.sight.is_some());
+        let sky = |(d, id): (&f32, &u16)| EntityId(*id) != EntityId::NOTHING || unseen(*d);
         assert!(depth.iter().zip(ids).all(sky), "{view:?}: nothing is near");
     }
 }

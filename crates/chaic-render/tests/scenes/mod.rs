@@ -2,7 +2,7 @@
 #![allow(dead_code, reason = "each user takes what it needs")]
 
 use chaic_protocol::briefing::Goal;
-use chaic_protocol::capability::{Gait, Persona};
+use chaic_protocol::capability::{Gait, Impairments, Persona};
 use chaic_protocol::geom::{Camera, Pose, Rect, yaw_rotation};
 use chaic_protocol::{ClassId, Quat, TaskId, Vec2, Vec3};
 use chaic_world::{
@@ -41,7 +41,7 @@ pub fn thing(class: &str, x: f32, z: f32, yaw_rad: f32) -> Thing {
 
 pub fn person(persona: Persona, x: f32, z: f32, yaw_rad: f32) -> Person {
     let pose = Pose { position: Vec3::new(x, 0.0, z), yaw_rad };
-    Person { persona, pose, look: 0, capability: None }
+    Person::new(persona, pose, 0)
 }
 
 pub fn floor(min: [f32; 2], max: [f32; 2], material: FloorMaterial, color: [u8; 3]) -> Floor {
@@ -75,6 +75,8 @@ pub fn posture(persona: Persona, x: f32, z: f32, yaw_rad: f32) -> Posture {
     };
     Posture {
         persona,
+        impairments: Impairments::NONE,
+        fatigue: 0.0,
         gait: c.gait,
         height_m: c.height_m,
         look: 0,

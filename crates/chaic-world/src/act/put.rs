@@ -241,7 +241,7 @@ impl World {
     }
 
     /// Where a thing is let go after a failed put-on.
-    fn drop_spot(&self, agent: AgentId, object: EntityId) -> Vec3 {
+    pub(crate) fn drop_spot(&self, agent: AgentId, object: EntityId) -> Vec3 {
         self.floor_spot_beside(agent, object) + Vec3::Y * DROP_FROM_M
     }
 

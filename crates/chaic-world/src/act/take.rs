@@ -1,7 +1,7 @@
 //! Taking things: who may, who can, and what comes down with them.
 
 use chaic_protocol::action::{FailureReason, Hand};
-use chaic_protocol::capability::excess;
+use chaic_protocol::capability::{Tremor, excess};
 use chaic_protocol::catalogue::Role;
 use chaic_protocol::{Action, AgentId, EntityId, Vec3};
 
@@ -38,12 +38,18 @@ impl World {
             }
             _ => {}
         }
-        let is_obstacle = thing.class.info().role == Role::Obstacle;
-        if is_obstacle && !self.capability(agent).removes_obstacles {
+        let (role, body) = (thing.class.info().role, self.capability(agent));
+        let is_able = match role {
+            Role::Obstacle => body.removes_obstacles,
+            Role::Container => body.carries_containers,
+            Role::HeavyTarget => body.lifts_furniture,
+            _ => true,
+        };
+        if !is_able || (role != Role::HeavyTarget && !body.hands.include(hand)) {
             return Err(FailureReason::BeyondLimits);
         }
         let hands = &self.person(agent).hands;
-        if thing.class.info().role == Role::HeavyTarget {
+        if role == Role::HeavyTarget {
             return if hands.iter().all(Option::is_none) {
                 Ok(())
             } else {
@@ -52,7 +58,7 @@ impl World {
         }
         if let Some(vehicle) = self.vehicle(agent) {
             // A basket takes goods, not other baskets.
-            if is_obstacle || thing.class.info().role == Role::Container {
+            if matches!(role, Role::Obstacle | Role::Container) {
                 return Err(FailureReason::Impossible);
             }
             let full = self.contents(vehicle).len() >= self.rules.container_capacity as usize;
@@ -76,6 +82,7 @@ impl World {
             return Progress::Fails(reason);
         }
         let capability = self.capability(agent);
+        let strength_kg = capability.strength_kg * self.part_left(agent);
         let (thing, state) = self.thing(object);
         let info = thing.class.info();
         let top = self.top_of(object);
@@ -93,8 +100,13 @@ impl World {
         }
         if activity.failing.is_none() {
             let p = self.rules.pick_penalty.chance(height_excess)
-                * self.rules.lift_penalty.chance(info.mass_kg - capability.strength_kg);
-            if !self.luck(agent, Luck::Take).chance(p) {
+                * self.rules.lift_penalty.chance(info.mass_kg - strength_kg);
+            let slips = |world: &mut World, tremor: Tremor| {
+                world.luck(agent, Luck::Slip).chance(tremor.slip_chance)
+            };
+            if !self.luck(agent, Luck::Take).chance(p)
+                || capability.tremor.is_some_and(|tremor| slips(self, tremor))
+            {
                 activity.failing = Some(FailureReason::BeyondLimits);
                 // The hand comes as far as it can.
                 to.y = to.y.clamp(capability.pick_range_m[0], capability.pick_range_m[1]);

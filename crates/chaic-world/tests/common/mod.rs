@@ -21,12 +21,7 @@ pub fn thing(class: &str, position: Vec3) -> Thing {
 }
 
 pub fn person(persona: Persona, x: f32, z: f32) -> Person {
-    Person {
-        persona,
-        pose: Pose { position: at(x, 0.0, z), yaw_rad: 0.0 },
-        look: 0,
-        capability: None,
-    }
+    Person::new(persona, Pose { position: at(x, 0.0, z), yaw_rad: 0.0 }, 0)
 }
 
 pub fn wall(a: [f32; 2], b: [f32; 2]) -> Wall {

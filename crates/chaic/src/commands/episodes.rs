@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, bail};
 use chaic_episodes::{Episode, EpisodeError, Split, episodes, find_episode, json_schema};
 use chaic_eval::frame_export;
 use chaic_eval::read_episode_file;
@@ -114,7 +114,10 @@ fn generate(task: TaskId, split: &Split, out: &Path) -> Result<Ended> {
     std::fs::create_dir_all(out)
         .with_context(|| format!("can't make the folder {}", out.display()))?;
     let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
-    let n = split.len_per_task();
+    let n = split.len_of(task);
+    if n == 0 {
+        bail!("{split} has no episodes of {task}, which is not the paper's; give --seeds");
+    }
     let bar = bars::plain(n as u64, "episodes");
     for k in 0..n {
         if stop.load(Ordering::Relaxed) {
@@ -153,7 +156,7 @@ fn rest(split: &Split, k: usize) -> String {
 /// Makes or reads every episode of a split and checks it as a file would be.
 fn validate_split(split: &Split) -> Result<Ended> {
     let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
-    let n = split.len_per_task().saturating_mul(TaskId::all().count());
+    let n = TaskId::all().map(|task| split.len_of(task)).fold(0, usize::saturating_add);
     let bar = bars::plain(n as u64, "episodes");
     let (mut n_bad, mut done) = (0, 0);
     for (task, episode) in TaskId::all().flat_map(|t| episodes(split, t).map(move |e| (t, e))) {

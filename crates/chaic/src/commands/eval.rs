@@ -115,8 +115,19 @@ pub(super) fn leave_report(run: &Run) -> Result<String> {
 
 /// What is asked for, and the name of a folder for it. Nothing said at all is the small benchmark.
 fn given(arguments: &EvalArguments) -> (RunRequest, &'static str) {
-    let EvalArguments { task, split, episodes, first, rules, set, seeds, size, no_traces, .. } =
-        arguments;
+    let EvalArguments {
+        task,
+        split,
+        episodes,
+        first,
+        rules,
+        set,
+        seeds,
+        size,
+        no_traces,
+        partner_is,
+        ..
+    } = arguments;
     let (partner, appearance) = (arguments.partner.clone(), arguments.appearance);
     let given = RunRequest {
         tasks: task.as_ref().map(|t| t.0.clone()),
@@ -130,6 +141,7 @@ fn given(arguments: &EvalArguments) -> (RunRequest, &'static str) {
         set: set.clone(),
         no_traces: *no_traces,
         partner,
+        partner_is: *partner_is,
         appearance,
     };
     if given == RunRequest::default() && !arguments.resume {

@@ -25,5 +25,37 @@ fn standard_episodes_are_listed_written_and_checked() {
     let checked = well(at, &["episodes", "validate", one, two]);
     assert_eq!(checked.matches("fine").count(), 2, "{checked}");
     let checked = well(at, &["episodes", "validate", "--split", "gen-standard:7..8"]);
-    assert_eq!(checked, "gen-standard:7..8: 8 episodes fine\n");
+    assert_eq!(checked, "gen-standard:7..8: 12 episodes fine\n");
+}
+
+#[test]
+fn another_partner_plays_the_same_episodes() {
+    let dir = tempfile::tempdir().expect("there is room");
+    let at = dir.path();
+    let play =
+        ["eval", "--task", "high_target", "--helper", "none", "--first", "1", "--size", "32"];
+    let kind = ["--partner-is", "child+one_handed+tires"];
+    well(at, &[&play[..], &kind, &["--out", "run"]].concat());
+    assert!(well(at, &["verify", "run"]).contains("all digests agree"));
+    let id = "high_target/test/00/child+one_handed+tires";
+    let results = fs::read_to_string(at.join("run/results.jsonl")).expect("it is text");
+    assert!(results.contains(&format!("\"episode\":\"{id}\"")), "{results}");
+    well(at, &["render", id, "--out", "pictures"]);
+
+    // From files as well, and gone on with by the same partner only.
+    let generate = ["episodes", "generate", "--task", "tremor", "--seeds", "0..1", "--out", "e"];
+    well(at, &generate);
+    let files = ["eval", "--episodes", "e", "--helper", "none", "--size", "32", "--out", "files"];
+    well(at, &[&files[..], &["--partner-is", "wheelchair"]].concat());
+    let again = ["eval", "--resume", "--out", "files", "--partner-is"];
+    well(at, &[&again[..], &["wheelchair", "--episodes", "e"]].concat());
+    let refused = ill(at, &[&again[..], &["frail"]].concat());
+    assert!(refused.contains("--partner-is"), "{refused}");
+
+    for (kind, words) in [("ogre", "no person is called"), ("rider", "0 bicycles")] {
+        let refused = ill(at, &[&play[..], &["--partner-is", kind, "--out", "none"]].concat());
+        assert!(refused.contains(words) && !at.join("none").exists(), "{refused}");
+    }
+    let refused = ill(at, &["eval", "--task", "tires", "--out", "none"]);
+    assert!(refused.contains("give --split gen:"), "{refused}");
 }

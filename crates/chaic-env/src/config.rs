@@ -75,6 +75,7 @@ impl EpisodeConfig<'_> {
                 .map(|((agent, person), seat)| Participant {
                     agent,
                     persona: person.persona,
+                    impairments: person.impairments,
                     grants: seat.grants,
                     senses: seat.senses,
                 })

@@ -230,7 +230,8 @@ impl Check<'_> {
             let key = trace.header.key();
             let mut recorded = self.results.iter().filter(|r| r.summary().is_some());
             let recorded = recorded.find(|r| r.key == key).map(without_counts);
-            if recorded.is_some() && recorded != tally(&trace) {
+            let found = tally(&trace).map(|found| as_known_to(recorded.as_ref(), found));
+            if recorded.is_some() && recorded != found {
                 let frame = trace.end().map_or(0, |e| e.frame);
                 let problem = "results.jsonl says something else of this run".to_owned();
                 mismatch = Some(Mismatch { path: path.to_owned(), frame, agent: None, problem });
@@ -316,6 +317,17 @@ impl Check<'_> {
 
 fn numbered(paths: &[PathBuf], k: usize) -> Option<(usize, &PathBuf)> {
     paths.get(k).map(|path| (k, path))
+}
+
+/// A result as the version that recorded another could tell it: older ones had no measures.
+fn as_known_to(recorded: Option<&RunResult>, mut found: RunResult) -> RunResult {
+    let has_none = recorded.and_then(RunResult::summary).is_some_and(|s| s.measures.is_empty());
+    if let Ending::Done(summary) = &mut found.ending
+        && has_none
+    {
+        summary.measures.clear();
+    }
+    found
 }
 
 /// A result as a trace can tell it.

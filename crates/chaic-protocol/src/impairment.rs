@@ -134,9 +134,9 @@ impl Impairments {
         self.0 & impairment.bit() != 0
     }
 
+    /// Whether there are none.
     // `skip_serializing_if` hands over a reference.
     #[allow(clippy::trivially_copy_pass_by_ref)]
-    /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.0 == 0
     }

@@ -191,7 +191,7 @@ pub struct Images {
     /// RGB, u8, shape [height, width, 3], as screens show it: 255 times the root of linear light.
     pub rgb: Option<Vec<u8>>,
     /// Depth along the camera's axis, f32 metres, shape [height, width]; [`Camera::FAR_M`] where
-    /// nothing is seen.
+    /// there is nothing, 0 where eyes of low vision make out nothing.
     pub depth_m: Option<Vec<f32>>,
     /// Instance ids ([`EntityId`]), u16, shape [height, width].
     pub ids: Option<Vec<u16>>,

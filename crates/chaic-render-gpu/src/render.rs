@@ -82,7 +82,7 @@ fn groups(most: &[u32], capacity: u64) -> Vec<Group> {
 impl Gpu {
     /// Draws what views of worlds see, all of one size, in one batch; a view without a picture (see
     /// [`View`]) gets the blank images of the CPU renderer. Other than there, a side over
-    /// [`MAX_SIDE_PX`] is an error.
+    /// [`MAX_SIDE_PX`] is an error, and all is seen as by a camera: [`View::sight`] is left out.
     pub fn render(&mut self, views: &[(WorldId, View)]) -> Result<Batch, GpuError> {
         let (width, height) = self.size_of(views)?;
         let channels: Vec<_> = views.iter().map(|(_, view)| view.channels).collect();

@@ -4,9 +4,9 @@
 
 mod common;
 
+use chaic_protocol::TaskId;
 use chaic_protocol::Vec3;
 use chaic_protocol::observation::Images;
-use chaic_protocol::TaskId;
 use chaic_render::{Appearance, Channels, Scene, View};
 use chaic_render_gpu::WorldId;
 use chaic_world::{Place, World};

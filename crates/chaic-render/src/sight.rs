@@ -15,7 +15,7 @@ const BLUR_REACH: f32 = 3.0;
 /// Takes out of an image what such eyes don't see. `depth_m` is that of the whole picture; what is
 /// out of range or field gets depth 0, which is no measurement, no id and no color. Shapes as in
 /// [`ImagesMut`](crate::ImagesMut).
-pub(crate) fn dim(
+pub(crate) fn limit_vision(
     sight: &Sight,
     camera: &Camera,
     rgb: Option<&mut [u8]>,
@@ -149,7 +149,7 @@ mod tests {
         let n = SIDE * SIDE;
         let mut rgb: Vec<u8> = (0..3 * n).map(|k| (k * 37 % 251) as u8).collect();
         let (mut depth, mut ids) = (vec![depth_m; n], vec![40; n]);
-        dim(sight, &camera(), Some(&mut rgb), &mut depth, Some(&mut ids));
+        limit_vision(sight, &camera(), Some(&mut rgb), &mut depth, Some(&mut ids));
         (rgb, depth, ids)
     }
 

@@ -13,7 +13,7 @@ use crate::frame::Frame;
 use crate::lens::{Lens, reciprocal, seen_depth_m};
 use crate::raster::{LANES, Target};
 use crate::shade::{Drawn, Wanted, shade};
-use crate::sight::dim;
+use crate::sight::limit_vision;
 
 /// Longest side of an image, pixels: bounds the memory that one view can ask for to 1.5 GB.
 pub const MAX_SIDE_PX: u32 = 8192;
@@ -178,7 +178,7 @@ pub(crate) fn draw_view_into(frame: &Frame, view: &View, images: ImagesMut<'_>) 
             ids: ids.as_deref_mut(),
         };
         draw_view_into(frame, &whole, all);
-        dim(sight, &view.camera, rgb, depth_m, ids);
+        limit_vision(sight, &view.camera, rgb, depth_m, ids);
         return;
     }
     let ImagesMut { rgb, depth_m, ids } = images;

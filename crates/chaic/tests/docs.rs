@@ -1,8 +1,11 @@
 //! Promise: every page of `docs/` is listed in `docs/SUMMARY.md`, once, and every link between the
-//! pages of the repository leads to a file, and to a heading if it names one.
+//! pages of the repository leads to a file, and to a heading if it names one. docs/people.md has a row
+//! for each impairment.
 
 use std::fs;
 use std::path::{Path, PathBuf};
+
+use chaic_protocol::capability::IMPAIRMENTS;
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("the root")
@@ -80,4 +83,15 @@ fn links_between_pages_lead_somewhere() {
         }
     }
     assert!(n_links > 100, "{n_links} links");
+}
+
+#[test]
+fn every_impairment_has_its_row() {
+    let page = fs::read_to_string(root().join("docs/people.md")).expect("it is text");
+    let named: Vec<&str> = page
+        .lines()
+        .filter_map(|line| line.strip_prefix("| `")?.split_once('`'))
+        .map(|(name, _)| name)
+        .collect();
+    assert_eq!(named, IMPAIRMENTS.map(|row| row.name));
 }

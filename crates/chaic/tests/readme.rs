@@ -1,5 +1,6 @@
-//! Promise: the tables of results in the README are what the runs that it names gave. The runs'
-//! `scores.json` are `docs/results/{standard,test}.json`; whoever changes one has to change the other.
+//! Promise: the tables of results in the README and in docs/people.md are what the runs that they name
+//! gave. The runs' `scores.json` are `docs/results/{standard,test,impaired}.json`; whoever changes one
+//! has to change the other.
 
 use std::fs;
 use std::path::Path;
@@ -10,7 +11,7 @@ use serde_json::Value;
 const ROWS: [(&str, &str); 4] =
     [("w/o", "none"), ("Random", "random"), ("RHP", "rhp"), ("Oracle", "oracle")];
 /// The columns of its tables, in order.
-const TASKS: [&str; 8] = [
+const PAPERS: [&str; 8] = [
     "no_constraint",
     "high_target",
     "high_container",
@@ -44,30 +45,38 @@ fn rate_and_interval(score: &Value) -> String {
     format!("{tr} ({low}–{high})")
 }
 
-/// Compares the rows `| **HELPER**, NAME |` with the scores of a run of so many episode runs.
-fn assert_table(name: &str, scores: &str, n_scored: u64, cell: fn(&Value) -> String) {
-    let (readme, scores) = (text("README.md"), text(scores));
+/// Compares the rows `| **HELPER**, NAME |` of a page with the scores in `docs/results/NAME.json`, of
+/// a run of so many episode runs.
+fn assert_table(page: &str, name: &str, tasks: &[&str], n_scored: u64, cell: fn(&Value) -> String) {
+    let (readme, scores) = (text(page), text(&format!("docs/results/{name}.json")));
     let scores: Value = serde_json::from_str(&scores).expect("it is JSON");
     assert_eq!(scores["incomplete"], false, "the run is whole");
     assert_eq!(scores["episode_runs"]["scored"], n_scored);
     for (title, helper) in ROWS {
-        let start = format!("| **{title}**, {name} |");
+        let shown = if name == "test" { "chaic" } else { name };
+        let start = format!("| **{title}**, {shown} |");
         let row = readme.lines().find(|line| line.starts_with(&start));
         let row = row.unwrap_or_else(|| panic!("no row begins with {start}"));
         let cells = row[start.len()..].trim_end_matches('|').split('|');
         let cells: Vec<&str> = cells.map(str::trim).collect();
         let expected: Vec<String> =
-            TASKS.iter().map(|task| cell(&scores["tasks"][task][helper])).collect();
+            tasks.iter().map(|task| cell(&scores["tasks"][task][helper])).collect();
         assert_eq!(cells, expected, "{start}");
     }
 }
 
 #[test]
 fn the_table_of_the_standard_split_is_that_of_its_run() {
-    assert_table("standard", "docs/results/standard.json", 4 * 800, rate_and_interval);
+    assert_table("README.md", "standard", &PAPERS, 4 * 800, rate_and_interval);
 }
 
 #[test]
 fn the_table_beside_the_papers_is_that_of_its_run() {
-    assert_table("chaic", "docs/results/test.json", 4 * 96, rate_and_improvement);
+    assert_table("README.md", "test", &PAPERS, 4 * 96, rate_and_improvement);
+}
+
+#[test]
+fn the_table_of_impaired_partners_is_that_of_its_run() {
+    let tasks = ["no_constraint", "one_handed", "low_vision", "tires", "tremor"];
+    assert_table("docs/people.md", "impaired", &tasks, 4 * 200, rate_and_interval);
 }

@@ -9,7 +9,7 @@ mod record;
 pub use parse::{MAX_TRACE_BYTES, Warning, parse};
 pub use record::{ChildRecord, Decision, End, Record, TraceEvent, is_recorded};
 
-use chaic_protocol::capability::Persona;
+use chaic_protocol::capability::{Impairments, Persona};
 use chaic_protocol::observation::{Grants, Senses};
 use chaic_protocol::{AgentId, TaskId};
 use chaic_render::Appearance;
@@ -108,6 +108,9 @@ pub struct Participant {
     pub agent: AgentId,
     /// What kind of person.
     pub persona: Persona,
+    /// What impairs it besides.
+    #[serde(default, skip_serializing_if = "Impairments::is_empty")]
+    pub impairments: Impairments,
     /// What it is granted beyond own images and state.
     pub grants: Grants,
     /// Which images it looks at.

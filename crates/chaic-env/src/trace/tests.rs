@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use chaic_protocol::agent::{ChildState, Thought};
+use chaic_protocol::capability::Impairment;
 use chaic_protocol::{Action, AgentId, ClassId, EntityId, FailureReason, Hand, Outcome};
 use chaic_world::{Event, EventKind};
 
@@ -25,6 +26,7 @@ fn header() -> Header {
         people: vec![Participant {
             agent: AgentId::PARTNER,
             persona: Persona::Wheelchair,
+            impairments: Impairments::of(Impairment::Tremor),
             grants: Grants::PARTNER,
             senses: Senses::DEPTH_AND_IDS,
         }],

@@ -10,8 +10,8 @@ use chaic_protocol::TaskId;
 use crate::fidelity::compare::{
     Distance, Inversion, Order, PUBLISHED_EPISODES, TaskRate, distance, order, task_rate,
 };
-use crate::metrics::{Formulas, Played, Score, Scores, Spread, differences};
-use crate::published::{Figures, published};
+use crate::metrics::{Formulas, Metric, Played, Scores, Spread, differences};
+use crate::published::published;
 use crate::report::{Grid, Labels, interval, number, rounded, title};
 
 /// The results of one rule set.
@@ -234,21 +234,15 @@ impl RuleSection<'_> {
 
     /// EI, IA, CR, ER and the standard error of TR beside the paper's.
     fn others(&self) -> String {
-        type Pick = (&'static str, fn(&Score) -> Option<f64>, fn(&Figures) -> Option<f64>);
-        const METRICS: [Pick; 5] = [
-            ("EI", |s| s.ei, |f| f.ei),
-            ("IA", |s| s.ia, |f| f.ia),
-            ("CR", |s| s.cr, |f| f.cr),
-            ("ER", |s| s.er, |f| f.er),
-            ("SE", |s| s.tr_se, |f| f.tr_se),
-        ];
+        let metrics = ["ei", "ia", "cr", "er", "tr_se"].map(Metric::of);
         let scores = Scores::of(self.played, &formulas(self.rules));
         let mut rows = Vec::new();
-        for (metric, ours, papers) in METRICS {
+        for metric in metrics {
             for helper in self.helpers {
                 let cell = |task: &TaskId| {
-                    let ours = scores.get(*task, helper).and_then(ours);
-                    let papers = published(helper).and_then(|row| papers(&row.figures(*task)?));
+                    let ours = scores.get(*task, helper).and_then(metric.value);
+                    let figures = published(helper).and_then(|row| row.figures(*task));
+                    let papers = figures.as_ref().and_then(metric.published);
                     match (ours, papers) {
                         (None, None) => "/".to_owned(),
                         _ => format!("{} ({})", number(ours), number(papers)),
@@ -258,7 +252,7 @@ impl RuleSection<'_> {
                 // Without helper only the standard error is defined; the emergency rate is
                 // shopping's alone.
                 if cells.iter().any(|c| c != "/") {
-                    let name = format!("{metric}, {}", title(helper));
+                    let name = format!("{}, {}", metric.name, title(helper));
                     rows.push(std::iter::once(name).chain(cells).collect());
                 }
             }

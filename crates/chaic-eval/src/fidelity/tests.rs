@@ -29,6 +29,7 @@ fn run(task: TaskId, helper: &str, episode: u32, seed: u32, done: f64) -> RunRes
             deliveries: Vec::new(),
             digest: Digest(0),
             counts: Default::default(),
+            measures: Default::default(),
         }),
     }
 }

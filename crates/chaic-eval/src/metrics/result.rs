@@ -61,6 +61,10 @@ pub struct Summary {
     /// trace has it, and no score rests on it.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub counts: BTreeMap<String, u64>,
+    /// What each of the [`MEASURES`](crate::metrics::MEASURES) came to, by its key; those with nothing
+    /// to say, and all in results of older versions, are absent.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub measures: BTreeMap<String, f64>,
 }
 
 /// One thing that was delivered.
@@ -138,6 +142,9 @@ impl Summary {
             ("escape_frames", self.escape_frames),
             ("stuck_frames", self.stuck_frames),
         ];
+        if let Some((name, n)) = self.measures.iter().find(|(_, n)| !n.is_finite()) {
+            return Err(format!("`measures.{name}` is {n}, expected a number"));
+        }
         let late = self.deliveries.iter().map(|d| d.frame).max();
         let within = within.into_iter().chain([("frame of a delivery", late)]);
         for (name, n) in within.filter_map(|(name, n)| Some((name, n?))) {

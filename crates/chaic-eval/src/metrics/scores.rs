@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::metrics::cluster::{Clusters, Environments};
 use crate::metrics::stats::{mean, population_sd};
-use crate::metrics::{Formulas, RunResult, Spread, Summary};
+use crate::metrics::{Formulas, MEASURES, RunResult, Spread, Summary};
 
 /// How many missing episode runs are named: more help nobody, and a plan may have millions.
 pub const MAX_NAMED: usize = 20;
@@ -47,6 +47,10 @@ pub struct Score {
     pub er: Option<f64>,
     /// In how many frames the partner or the helper was stuck, 0 to 1.
     pub stuck: Option<f64>,
+    /// The mean of each of the [`MEASURES`](crate::metrics::MEASURES) over the episode runs that were
+    /// played and have it, by its key.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub measures: BTreeMap<String, f64>,
     /// How many episode runs (episodes times seeds) it rests on, with those that broke down.
     pub episodes: usize,
     /// In how many environments these take place.
@@ -214,6 +218,7 @@ impl Group<'_> {
                 has_child.then_some(1.0),
             ),
             stuck: self.part_of_frames(|s| s.stuck_frames),
+            measures: self.measures(),
             episodes: rates.len(),
             environments: by_environment.environments(),
             broken: rates.len() - played,
@@ -247,6 +252,15 @@ impl Group<'_> {
         }
         let accuracy = (goods > 0).then(|| f64::from(useful) / f64::from(goods));
         (accuracy, (has_helper && counted > 0.0).then(|| helpers / counted))
+    }
+
+    fn measures(&self) -> BTreeMap<String, f64> {
+        let of = |key: &str| {
+            let values: Vec<f64> =
+                self.played().filter_map(|s| s.measures.get(key).copied()).collect();
+            mean(&values)
+        };
+        MEASURES.iter().filter_map(|m| Some((m.key.to_owned(), of(m.key)?))).collect()
     }
 
     /// Frames that count over all frames, pooled over the runs that know; `None` if none does.

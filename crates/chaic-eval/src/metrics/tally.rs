@@ -8,10 +8,10 @@ use chaic_protocol::agent::ChildState;
 use chaic_protocol::{AgentId, ClassId, EntityId, Frame};
 use chaic_world::EventKind;
 
-use crate::metrics::{Delivery, Ending, RunResult, Summary};
+use crate::metrics::{Delivery, Ending, Fold, MEASURES, RunResult, Summary};
 
 /// Reads records one by one.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Tally {
     key: RunKey,
     has_child: bool,
@@ -21,6 +21,8 @@ pub struct Tally {
     taken_by_helper: BTreeSet<EntityId>,
     deliveries: Vec<Delivery>,
     escape: Escape,
+    /// One for each measure.
+    folds: Vec<Box<dyn Fold>>,
 }
 
 /// The child's escapes as the original counts them (facts S8.4): by the child's decisions.
@@ -60,11 +62,13 @@ impl Tally {
             taken_by_helper: BTreeSet::new(),
             deliveries: Vec::new(),
             escape: Escape::default(),
+            folds: MEASURES.iter().map(|measure| (measure.begin)()).collect(),
         }
     }
 
     /// Takes in a record; the last one of an episode gives the result.
     pub fn record(&mut self, record: &Record) -> Option<RunResult> {
+        self.folds.iter_mut().for_each(|fold| fold.take_in(record));
         match record {
             Record::Decision(decision) => {
                 if decision.agent == AgentId::CHILD {
@@ -124,8 +128,14 @@ impl Tally {
                 deliveries: self.deliveries.clone(),
                 digest: end.digest,
                 counts: BTreeMap::new(),
+                measures: self.measures(),
             }),
         }
+    }
+
+    fn measures(&self) -> BTreeMap<String, f64> {
+        let folded = MEASURES.iter().zip(&self.folds);
+        folded.filter_map(|(m, fold)| Some((m.key.to_owned(), fold.value()?))).collect()
     }
 }
 

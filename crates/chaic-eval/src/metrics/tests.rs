@@ -35,6 +35,7 @@ fn result(c: Case<'_>) -> RunResult {
             deliveries: c.deliveries,
             digest: Digest(0),
             counts: Default::default(),
+            measures: Default::default(),
         }),
     }
 }

@@ -11,7 +11,7 @@ pub use coverage::{coverage, without_trace};
 pub use figure::write_figure;
 pub(crate) use grid::Grid;
 pub use labels::{GrantsFile, Labels, title};
-pub use tables::{additional, counts, intervals, main_result, pairs, resolutions, stuck};
+pub use tables::{additional, counts, intervals, main_result, measures, pairs, resolutions, stuck};
 pub(crate) use tables::{interval, number, rounded, shown_interval};
 pub use write::{Report, differing_files, write_files};
 

@@ -4,7 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use chaic_protocol::TaskId;
 
-use crate::metrics::{Difference, Interval, RunResult, Score, Scores, resolution};
+use crate::metrics::{
+    Difference, Interval, MEASURES, Measure, Metric, RunResult, Score, Scores, resolution,
+};
 use crate::report::grid::Grid;
 use crate::report::labels::{Labels, title};
 
@@ -23,15 +25,38 @@ const TASKS_ABREAST: usize = 4;
 struct Column {
     name: &'static str,
     in_task: fn(TaskId) -> bool,
-    cell: fn(&Score) -> String,
+    cell: Cell,
+}
+
+/// How the text of a cell is made.
+enum Cell {
+    Metric(&'static Metric),
+    Text(fn(&Score) -> String),
+}
+
+impl Column {
+    fn of(key: &str) -> Column {
+        let metric = Metric::of(key);
+        Column { name: metric.name, in_task: metric.in_task, cell: Cell::Metric(metric) }
+    }
+
+    fn text(&self, score: &Score) -> String {
+        match &self.cell {
+            Cell::Metric(metric) => {
+                let shown = (metric.value)(score).map(|v| fixed(v, metric.decimals));
+                shown.unwrap_or_else(|| UNDEFINED.to_owned())
+            }
+            Cell::Text(text) => text(score),
+        }
+    }
 }
 
 /// The paper's main table: TR(EI), IA, and ER while shopping.
 pub fn main_result(scores: &Scores, labels: Labels<'_>) -> Vec<Grid> {
     let columns = [
-        Column { name: "TR(EI)", in_task: |_| true, cell: rate_and_improvement },
-        Column { name: "IA", in_task: |_| true, cell: |s| number(s.ia) },
-        Column { name: "ER", in_task: |t| t.info().has_child, cell: |s| number(s.er) },
+        Column { name: "TR(EI)", in_task: |_| true, cell: Cell::Text(rate_and_improvement) },
+        Column::of("ia"),
+        Column::of("er"),
     ];
     let name = "Transport rate (efficiency improvement), goal inference accuracy";
     blocks(scores, labels, name, &columns)
@@ -39,19 +64,42 @@ pub fn main_result(scores: &Scores, labels: Labels<'_>) -> Vec<Grid> {
 
 /// The paper's additional table: CR, and how uncertain TR is.
 pub fn additional(scores: &Scores, labels: Labels<'_>) -> Vec<Grid> {
-    let columns = [
-        Column { name: "CR", in_task: |_| true, cell: |s| number(s.cr) },
-        Column { name: "SE", in_task: |_| true, cell: |s| number(s.tr_se) },
-    ];
+    let columns = ["cr", "tr_se"].map(Column::of);
     blocks(scores, labels, "Completion ratio of the helper, standard error of TR", &columns)
 }
 
 /// For how much of their time partner or helper were stuck; nothing where no result tells.
 pub fn stuck(scores: &Scores, labels: Labels<'_>) -> Vec<Grid> {
-    let columns = [Column { name: "stuck", in_task: |_| true, cell: |s| thousandths(s.stuck) }];
+    let columns = [Column::of("stuck")];
     let is_known = scores.tasks.values().flat_map(|row| row.values()).any(|s| s.stuck.is_some());
     let name = "Share of frames in which partner or helper had made no progress for 200 frames";
     if is_known { blocks(scores, labels, name, &columns) } else { Vec::new() }
+}
+
+/// What else was measured, a table for each of the [`MEASURES`]; nothing where no result has it.
+pub fn measures(scores: &Scores, labels: Labels<'_>) -> Vec<Grid> {
+    let tasks = scores.tasks();
+    let grid = |measure: &Measure| {
+        let of = |task: TaskId, helper: &str| {
+            scores.get(task, helper)?.measures.get(measure.key).copied()
+        };
+        let row = |helper: &String| {
+            let cell = |task: &TaskId| {
+                let shown = |value: f64| fixed(value, measure.decimals);
+                of(*task, helper).map_or(UNDEFINED.to_owned(), shown)
+            };
+            std::iter::once(labels.lines(helper)).chain(tasks.iter().map(cell)).collect()
+        };
+        let header = std::iter::once("Helper".to_owned());
+        let helpers = scores.helpers();
+        let is_known = helpers.iter().any(|h| tasks.iter().any(|t| of(*t, h).is_some()));
+        is_known.then(|| Grid {
+            title: measure.title.to_owned(),
+            header: header.chain(tasks.iter().map(|t| t.info().title.to_owned())).collect(),
+            rows: helpers.iter().map(row).collect(),
+        })
+    };
+    MEASURES.iter().filter_map(grid).collect()
 }
 
 /// The transport rates with their 95 % intervals.
@@ -153,10 +201,8 @@ fn blocks(scores: &Scores, labels: Labels<'_>, name: &str, columns: &[Column]) -
         let row = |helper: &String| {
             let cell = |(task, column): &(TaskId, &Column)| match scores.get(*task, helper) {
                 // One mark a task and row is enough.
-                Some(score) if column.name == columns[0].name => {
-                    (column.cell)(score) + marks(score)
-                }
-                Some(score) => (column.cell)(score),
+                Some(score) if column.name == columns[0].name => column.text(score) + marks(score),
+                Some(score) => column.text(score),
                 None if scores.is_unplayed(*task, helper) => MISSING.to_owned(),
                 None => UNDEFINED.to_owned(),
             };
@@ -195,15 +241,16 @@ pub(crate) fn number(value: Option<f64>) -> String {
     value.map_or(UNDEFINED.to_owned(), rounded)
 }
 
-/// Three decimals: a share of 1 % is much here.
-fn thousandths(value: Option<f64>) -> String {
-    value.map_or(UNDEFINED.to_owned(), |v| format!("{v:.3}"))
+/// So many decimals; what rounds to zero has no sign.
+fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let is_zero = text.chars().all(|c| "-0.".contains(c));
+    if is_zero { text.trim_start_matches('-').to_owned() } else { text }
 }
 
 /// Two decimals; what rounds to zero has no sign.
 pub(crate) fn rounded(value: f64) -> String {
-    let text = format!("{value:.2}");
-    if text == "-0.00" { "0.00".to_owned() } else { text }
+    fixed(value, 2)
 }
 
 /// A mean with its interval, or a sign that there is nothing to say.

@@ -28,6 +28,7 @@ fn results() -> Vec<RunResult> {
                         deliveries: Vec::new(),
                         digest: Digest(0),
                         counts: Default::default(),
+                        measures: Default::default(),
                     }),
                 });
             }

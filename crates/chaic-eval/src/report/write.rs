@@ -17,7 +17,8 @@ use crate::report::figure::{figure_text, write_figure};
 use crate::report::grid::Grid;
 use crate::report::labels::{GrantsFile, Labels};
 use crate::report::tables::{
-    BROKEN, MISSING, additional, counts, intervals, main_result, pairs, resolutions, stuck,
+    BROKEN, MISSING, additional, counts, intervals, main_result, measures, pairs, resolutions,
+    stuck,
 };
 use crate::run::{Item, RunFolder, RunGrants, RunOptions, environments};
 
@@ -159,6 +160,7 @@ impl Report<'_> {
             grids.push(pairs(&differences, &scores.tasks(), granted.as_deref()));
         }
         grids.extend(resolutions(&differences, &scores.tasks()));
+        grids.extend(measures(&scores, self.labels()));
         for grid in grids {
             text += &grid.to_markdown();
             text.push('\n');
@@ -170,7 +172,8 @@ impl Report<'_> {
 
     /// What was played, by what.
     fn heading(&self) -> String {
-        let RunOptions { split, first, seeds, size, rules, set, partner, .. } = self.options;
+        let RunOptions { split, first, seeds, size, rules, set, partner, partner_is, .. } =
+            self.options;
         let episodes = first.map_or("all".to_owned(), |n| format!("first {n}"));
         let size = size.map_or("as each mind asks for".to_owned(), |px| format!("{px} pixels"));
         let played_by = match set[..] {
@@ -179,9 +182,10 @@ impl Report<'_> {
         };
         let driven = partner.as_ref();
         let driven = driven.map_or(String::new(), |p| format!(" The partner is driven by `{p}`."));
+        let person = partner_is.map_or(String::new(), |k| format!(" The partner is `{k}`."));
         format!(
             "# chaic run\n\nchaic {CHAIC_VERSION}, rules `{played_by}`, formulas `{}`. Split `{split}`, \
-             {episodes} episodes of each task, seeds per episode: {seeds}. Images: {size}.{driven}\n\n",
+             {episodes} episodes of each task, seeds per episode: {seeds}. Images: {size}.{driven}{person}\n\n",
             self.formulas,
         )
     }

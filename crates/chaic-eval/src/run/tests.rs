@@ -425,6 +425,7 @@ fn a_journal_cut_at_any_byte_loses_one_record_at_most() {
             deliveries: Vec::new(),
             digest: Digest(3),
             counts: Default::default(),
+            measures: Default::default(),
         }),
     };
     let (mut journal, _, _) = Journal::open(&path, &[]).unwrap();

@@ -187,7 +187,7 @@ mod tests {
         let n_seen = ids.iter().filter(|id| **id == 40).count() as f32;
         // A circle of radius f tan(0.25), f half of the width.
         let radius_px = 0.5 * SIDE as f32 * 0.2553;
-        assert!((n_seen - 3.1416 * radius_px * radius_px).abs() < 8.0, "{n_seen}");
+        assert!((n_seen - std::f32::consts::PI * radius_px * radius_px).abs() < 8.0, "{n_seen}");
         assert_eq!(rgb[0], HAZE as u8);
     }
 }

@@ -1,10 +1,10 @@
 //! A figure names every task and helper, and shows what was measured and nothing else.
 
 use super::*;
+use chaic_protocol::TaskId;
 
 fn bars(helpers: &[&str]) -> Bars {
-    let tasks: Vec<String> =
-        chaic_protocol::task::TASKS.iter().map(|t| t.title.to_owned()).collect();
+    let tasks: Vec<String> = TaskId::paper().map(|t| t.info().title.to_owned()).collect();
     let helpers = helpers
         .iter()
         .enumerate()

@@ -336,7 +336,7 @@ impl Draw {
         Sight {
             range_m: self.between(0.1, 20.0),
             blur_rad: self.between(0.0, 0.2),
-            field_rad: self.between(0.01, 3.1416),
+            field_rad: self.between(0.01, std::f32::consts::PI),
             lowered_rad: 0.0,
         }
     }

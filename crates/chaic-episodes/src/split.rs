@@ -207,10 +207,9 @@ pub fn find_episode(id: &str) -> Result<Episode, SplitError> {
     let task: TaskId = task.parse().map_err(|_| no_such())?;
     let number: u64 = number.parse().map_err(|_| no_such())?;
     match split {
-        "train" | "test" | "standard" if task.info().origin == Origin::Ours => Err(no_such()),
-        "train" if number < BUNDLED_PER_TASK as u64 => bundled(TRAIN, split, task, number),
-        "test" if number < BUNDLED_PER_TASK as u64 => bundled(TEST, split, task, number),
-        "standard" if number < STANDARD_PER_TASK as u64 => standard(task, number),
+        "train" if number < Split::Train.len_of(task) as u64 => bundled(TRAIN, split, task, number),
+        "test" if number < Split::Test.len_of(task) as u64 => bundled(TEST, split, task, number),
+        "standard" if number < Split::Standard.len_of(task) as u64 => standard(task, number),
         "gen" if number < FIRST_BUNDLED_SEED => generated(task, number, Settings::PAPER),
         "gen-standard" if number < FIRST_BUNDLED_SEED => {
             generated(task, number, Settings::STANDARD)

@@ -215,16 +215,6 @@ const ADULT: Capability = Capability {
     tremor: None,
 };
 
-/// Every kind of person by its name, as files and commands spell it.
-const NAMES: [(Persona, &str); 6] = [
-    (Persona::Adult, "adult"),
-    (Persona::Helper, "helper"),
-    (Persona::Child, "child"),
-    (Persona::Wheelchair, "wheelchair"),
-    (Persona::Rider, "rider"),
-    (Persona::Frail, "frail"),
-];
-
 impl Persona {
     /// Every kind.
     pub const ALL: [Persona; 6] = [
@@ -236,9 +226,16 @@ impl Persona {
         Persona::Frail,
     ];
 
-    /// Its name.
+    /// Its name, as files and commands spell it.
     pub fn name(self) -> &'static str {
-        NAMES.iter().find(|(p, _)| *p == self).map_or("", |(_, name)| name)
+        match self {
+            Persona::Adult => "adult",
+            Persona::Helper => "helper",
+            Persona::Child => "child",
+            Persona::Wheelchair => "wheelchair",
+            Persona::Rider => "rider",
+            Persona::Frail => "frail",
+        }
     }
 
     /// The limits and measures of this kind of person.
@@ -297,6 +294,13 @@ pub struct PersonKind {
 }
 
 impl PersonKind {
+    /// How people are written, for messages: all names that there are.
+    pub fn choices() -> String {
+        let people = Persona::ALL.map(Persona::name).join(", ");
+        let impairments = IMPAIRMENTS.map(|i| i.name).join(", ");
+        format!("one of {people}, and + before each of {impairments} that it has besides")
+    }
+
     /// The limits and measures of such a person.
     pub fn capability(self) -> Capability {
         self.impairments.apply(self.persona.capability())
@@ -336,14 +340,7 @@ pub struct UnknownPerson(pub String);
 
 impl fmt::Display for UnknownPerson {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let people = NAMES.map(|(_, name)| name).join(", ");
-        let impairments = IMPAIRMENTS.map(|i| i.name).join(", ");
-        write!(
-            f,
-            "no person is called `{}`; write one of {people}, and + before each of {impairments} that \
-             it has besides",
-            self.0
-        )
+        write!(f, "no person is called `{}`; write {}", self.0, PersonKind::choices())
     }
 }
 
@@ -356,8 +353,8 @@ impl FromStr for PersonKind {
         let unknown = || UnknownPerson(text.to_owned());
         let mut words = text.split('+');
         let persona = words.next().unwrap_or_default();
-        let (persona, _) = NAMES.iter().find(|(_, n)| *n == persona).ok_or_else(unknown)?;
-        let mut kind = PersonKind::from(*persona);
+        let persona = Persona::ALL.into_iter().find(|p| p.name() == persona).ok_or_else(unknown)?;
+        let mut kind = PersonKind::from(persona);
         for word in words {
             let info = IMPAIRMENTS.iter().find(|i| i.name == word).ok_or_else(unknown)?;
             kind.impairments = kind.impairments.with(info.id);

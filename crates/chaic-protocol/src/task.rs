@@ -167,8 +167,8 @@ const fn indoor(
     id: TaskId,
     name: &'static str,
     title: &'static str,
-    original_name: &'static str,
-    partner: Persona,
+    origin: Origin,
+    partner: PersonKind,
     arrangement: Arrangement,
 ) -> TaskInfo {
     let goal_places = BED;
@@ -176,9 +176,9 @@ const fn indoor(
         id,
         name,
         title,
-        origin: Origin::Paper(original_name),
+        origin,
         scene: SceneKind::House,
-        partner: only(partner),
+        partner,
         has_child: false,
         horizon: 3000,
         sets: INDOOR,
@@ -201,11 +201,9 @@ const fn impaired(
     title: &'static str,
     impairment: Impairment,
 ) -> TaskInfo {
-    TaskInfo {
-        origin: Origin::Ours,
-        partner: PersonKind { persona: Persona::Adult, impairments: Impairments::of(impairment) },
-        ..indoor(id, name, title, "", Persona::Adult, Arrangement::Usual)
-    }
+    let impairments = Impairments::of(impairment);
+    let partner = PersonKind { persona: Persona::Adult, impairments };
+    indoor(id, name, title, Origin::Ours, partner, Arrangement::Usual)
 }
 
 const BED: &[&str] = &["bed"];
@@ -216,24 +214,24 @@ pub static TASKS: [TaskInfo; 12] = [
         TaskId::NoConstraint,
         "no_constraint",
         "No constraint",
-        "normal",
-        Persona::Adult,
+        Origin::Paper("normal"),
+        only(Persona::Adult),
         Arrangement::Usual,
     ),
     indoor(
         TaskId::HighTarget,
         "high_target",
         "High target",
-        "highthing",
-        Persona::Child,
+        Origin::Paper("highthing"),
+        only(Persona::Child),
         Arrangement::HighTargets,
     ),
     indoor(
         TaskId::HighContainer,
         "high_container",
         "High container",
-        "highcontainer",
-        Persona::Child,
+        Origin::Paper("highcontainer"),
+        only(Persona::Child),
         Arrangement::HighContainers,
     ),
     TaskInfo {
@@ -243,8 +241,8 @@ pub static TASKS: [TaskInfo; 12] = [
             TaskId::HighGoal,
             "high_goal",
             "High goal",
-            "highgoalplace",
-            Persona::Child,
+            Origin::Paper("highgoalplace"),
+            only(Persona::Child),
             Arrangement::Usual,
         )
     },
@@ -252,16 +250,16 @@ pub static TASKS: [TaskInfo; 12] = [
         TaskId::LowTarget,
         "low_target",
         "Low target",
-        "lowthing",
-        Persona::Wheelchair,
+        Origin::Paper("lowthing"),
+        only(Persona::Wheelchair),
         Arrangement::LowTargets,
     ),
     indoor(
         TaskId::Obstacle,
         "obstacle",
         "Obstacle",
-        "wheelchair",
-        Persona::Wheelchair,
+        Origin::Paper("wheelchair"),
+        only(Persona::Wheelchair),
         Arrangement::Obstacles,
     ),
     TaskInfo {

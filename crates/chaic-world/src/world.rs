@@ -177,11 +177,16 @@ impl World {
         if !rest.is_empty() {
             state.conditions = postcard::from_bytes(rest).map_err(unreadable)?;
         }
-        let count = |things: usize, people: usize| format!("{things} things and {people} people");
-        let got = count(state.things.len(), state.people.len());
-        let expected = count(self.setup.things.len(), self.setup.people.len());
-        let tires = state.conditions.len() == self.state.conditions.len();
-        if got != expected || !tires {
+        let count = |state: &State| {
+            let (things, people) = (state.things.len(), state.people.len());
+            let conditions = match state.conditions.len() {
+                0 => String::new(),
+                n => format!(" with {n} conditions"),
+            };
+            format!("{things} things and {people} people{conditions}")
+        };
+        let (got, expected) = (count(&state), count(&self.state));
+        if got != expected {
             return Err(SnapshotError::OtherSetup { got, expected });
         }
         self.state = state;

@@ -25,6 +25,11 @@ pub use self::exec::{
 };
 pub use self::fidelity::FidelityArguments;
 
+fn partner_is_help() -> String {
+    let choices = PersonKind::choices();
+    format!("What kind of person the partner is, in place of who it is in each episode: {choices}")
+}
+
 /// Simulator and benchmark for constrained human-AI cooperation.
 #[derive(Debug, Parser)]
 #[command(name = "chaic", version, arg_required_else_help = true)]
@@ -133,9 +138,7 @@ pub struct EvalArguments {
     /// Episodes at a time; changes no result. Usual: one for each core.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
-    /// What kind of person the partner is, in place of who it is in each episode: adult, child,
-    /// wheelchair, rider or frail, each with +one_handed, +low_vision, +tires or +tremor if you like
-    #[arg(long, value_name = "KIND")]
+    #[arg(long, value_name = "KIND", help = partner_is_help())]
     pub partner_is: Option<PersonKind>,
     /// Who drives the partner: rules (usual), or llm or vlm.
     #[arg(long, value_name = "NAME")]

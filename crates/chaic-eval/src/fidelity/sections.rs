@@ -12,7 +12,7 @@ use crate::fidelity::compare::{
 };
 use crate::metrics::{Formulas, Metric, Played, Scores, Spread, differences};
 use crate::published::published;
-use crate::report::{Grid, Labels, interval, number, rounded, title};
+use crate::report::{Grid, Labels, capitalized, interval, number, rounded, title};
 
 /// The results of one rule set.
 pub(super) struct RuleSection<'a> {
@@ -257,9 +257,9 @@ impl RuleSection<'_> {
                 }
             }
         }
-        let title = "Efficiency improvement (EI), goal inference accuracy (IA), completion ratio (CR), \
-                     emergency rate (ER), standard error of TR (SE): chaic's, the paper's in brackets";
-        Grid { title: title.to_owned(), header: self.header("Metric"), rows }.to_markdown() + "\n"
+        let titles = metrics.map(|m| format!("{} ({})", m.title, m.name)).join(", ");
+        let title = capitalized(&titles) + ": chaic's, the paper's in brackets";
+        Grid { title, header: self.header("Metric"), rows }.to_markdown() + "\n"
     }
 }
 

@@ -12,7 +12,7 @@ pub use figure::write_figure;
 pub(crate) use grid::Grid;
 pub use labels::{GrantsFile, Labels, title};
 pub use tables::{additional, counts, intervals, main_result, measures, pairs, resolutions, stuck};
-pub(crate) use tables::{interval, number, rounded, shown_interval};
+pub(crate) use tables::{capitalized, interval, number, rounded, shown_interval};
 pub use write::{Report, differing_files, write_files};
 
 use std::fmt;

@@ -72,8 +72,8 @@ pub fn additional(scores: &Scores, labels: Labels<'_>) -> Vec<Grid> {
 pub fn stuck(scores: &Scores, labels: Labels<'_>) -> Vec<Grid> {
     let columns = [Column::of("stuck")];
     let is_known = scores.tasks.values().flat_map(|row| row.values()).any(|s| s.stuck.is_some());
-    let name = "Share of frames in which partner or helper had made no progress for 200 frames";
-    if is_known { blocks(scores, labels, name, &columns) } else { Vec::new() }
+    let name = capitalized(Metric::of("stuck").title);
+    if is_known { blocks(scores, labels, &name, &columns) } else { Vec::new() }
 }
 
 /// What else was measured, a table for each of the [`MEASURES`]; nothing where no result has it.
@@ -239,6 +239,12 @@ fn rate_and_improvement(score: &Score) -> String {
 /// Two decimals, or a sign that there is nothing to say.
 pub(crate) fn number(value: Option<f64>) -> String {
     value.map_or(UNDEFINED.to_owned(), rounded)
+}
+
+/// With a capital letter at its head.
+pub(crate) fn capitalized(text: &str) -> String {
+    let head = text.chars().next().map_or(0, char::len_utf8);
+    text[..head].to_uppercase() + &text[head..]
 }
 
 /// So many decimals; what rounds to zero has no sign.

@@ -81,6 +81,28 @@ fn verify_counts_results_and_compares_the_report() {
         || crate::verify::verify_run(run.folder(), run.options(), &helpers, 2, &|_| ()).unwrap();
     assert_eq!(verdict().report, ReportState::Absent);
     assert!(verdict().is_good());
+    // As an older version left it, and with another number than the trace gives.
+    let journal = run.folder().results();
+    let lines = fs::read_to_string(&journal).unwrap();
+    let changed = |change: &dyn Fn(&mut serde_json::Value)| {
+        let line = |line: &str| {
+            let mut result: serde_json::Value = serde_json::from_str(line).unwrap();
+            change(&mut result);
+            result.to_string() + "\n"
+        };
+        fs::write(&journal, lines.lines().map(line).collect::<String>()).unwrap();
+        verdict().mismatches.len()
+    };
+    let measured = |r: &serde_json::Value| r.get("measures").is_some();
+    assert!(lines.lines().any(|l| measured(&serde_json::from_str(l).unwrap())), "{lines}");
+    assert_eq!(changed(&|r| drop(r.as_object_mut().unwrap().remove("measures"))), 0);
+    let n_altered = changed(&|r| {
+        if measured(r) {
+            r["measures"]["partner_failures"] = 0.125.into();
+        }
+    });
+    assert!(n_altered > 0);
+    fs::write(&journal, &lines).unwrap();
     let report = crate::report::Report {
         options: run.options(),
         results: run.results(),

@@ -176,18 +176,7 @@ fn last_action(
 /// The objects and people whose ids an image holds, in the order of ids.
 fn present(ids: &[u16]) -> Vec<EntityId> {
     let mut is_there = [0_u64; 1 << 10];
-    let mut last = EntityId::NOTHING.0;
-    // Neighboring pixels mostly show the same thing.
-    let is_news = |chunk: &[u16], last| chunk.iter().fold(false, |n, id| n | (*id != last));
-    for chunk in ids.chunks(16) {
-        if !is_news(chunk, last) {
-            continue;
-        }
-        for id in chunk {
-            last = *id;
-            is_there[usize::from(*id >> 6)] |= 1 << (id & 63);
-        }
-    }
+    pulp::Arch::new().dispatch(MarkPresent { ids, is_there: &mut is_there });
     let ids_of = |(word, bits): (usize, &u64)| {
         let bits = *bits;
         let set = (0..64_u16).filter(move |k| bits >> k & 1 == 1);
@@ -201,6 +190,34 @@ fn present(ids: &[u16]) -> Vec<EntityId> {
         .flat_map(ids_of)
         .filter(named)
         .collect()
+}
+
+/// Sets the bit of each id of an image, compiled for vectors of each width.
+struct MarkPresent<'a> {
+    ids: &'a [u16],
+    is_there: &'a mut [u64; 1 << 10],
+}
+
+impl pulp::NullaryFnOnce for MarkPresent<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let MarkPresent { ids, is_there } = self;
+        let (chunks, rest) = ids.as_chunks::<32>();
+        let mut mark = |ids: &[u16]| {
+            ids.iter().for_each(|id| is_there[usize::from(id >> 6)] |= 1 << (id & 63));
+        };
+        let mut last = EntityId::NOTHING.0;
+        for chunk in chunks {
+            // Neighboring pixels mostly show the same thing.
+            if chunk.iter().fold(false, |is_news, id| is_news | (*id != last)) {
+                mark(chunk);
+                last = chunk[31];
+            }
+        }
+        mark(rest);
+    }
 }
 
 /// Takes away what wasn't asked for or isn't granted; ids that were taken away.

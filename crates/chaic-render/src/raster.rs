@@ -218,6 +218,18 @@ impl<O: VisibilityId> Target<O> {
         Blocks { stacks, row: row % TILE }
     }
 
+    /// Writes what `of` makes of the inverse depth of each pixel, shape [height, width].
+    #[inline(always)]
+    pub fn copy_inverse_depth(&self, out: &mut [f32], of: impl Fn(&Wide<f32>) -> [f32; LANES]) {
+        copy_rows(&self.inverse_depth, self.stacks_wide, self.width, out, of);
+    }
+
+    /// Writes whose each pixel is, shape [height, width].
+    #[inline(always)]
+    pub fn copy_visibility_ids(&self, out: &mut [O]) {
+        copy_rows(&self.visibility_ids, self.stacks_wide, self.width, out, unchanged::<O>);
+    }
+
     /// The pixels that the rectangle (least u and v, most u and v) touches: first and last columns
     /// and rows.
     fn pixels_of(&self, [u0, v0, u1, v1]: [f32; 4]) -> [(usize, usize); 2] {
@@ -296,6 +308,34 @@ impl<O: VisibilityId> Target<O> {
                 fill_span::<O>(inverse_depth, visibility_ids, row, starts[k], span, &slope, id);
             }
             row += n;
+        }
+    }
+}
+
+#[inline(always)]
+fn unchanged<O: VisibilityId>(block: &O::Block) -> [O; LANES] {
+    **block
+}
+
+/// Writes what `of` makes of each block to the rows of an image, stack by stack.
+#[inline(always)]
+fn copy_rows<B, T: Copy>(
+    stacks: &[Stack<B>],
+    stacks_wide: usize,
+    width: usize,
+    out: &mut [T],
+    of: impl Fn(&B) -> [T; LANES],
+) {
+    let rows_of_stacks = stacks.chunks_exact(stacks_wide.max(1));
+    for (rows, stacks) in out.chunks_mut((TILE * width).max(1)).zip(rows_of_stacks) {
+        for (i, stack) in stacks.iter().enumerate() {
+            for (row, block) in rows.chunks_exact_mut(width).zip(stack) {
+                let (numbers, row) = (of(block), &mut row[LANES * i..]);
+                match row.first_chunk_mut() {
+                    Some(out) => *out = numbers,
+                    None => row.iter_mut().zip(numbers).for_each(|(out, x)| *out = x),
+                }
+            }
         }
     }
 }

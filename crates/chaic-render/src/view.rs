@@ -11,7 +11,7 @@ use chaic_world::World;
 use crate::draw::{Omit, Scratch, draw};
 use crate::frame::Frame;
 use crate::lens::{Lens, reciprocal, seen_depth_m};
-use crate::raster::{LANES, Target};
+use crate::raster::{LANES, Target, Wide};
 use crate::shade::{Drawn, Wanted, shade};
 use crate::sight::limit_vision;
 
@@ -215,38 +215,25 @@ impl pulp::NullaryFnOnce for ReadBack<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let ReadBack { target, mut depth_m, mut ids } = self;
-        for j in 0..target.height {
-            let line = j * target.width..(j + 1) * target.width;
-            if let Some(depth_m) = &mut depth_m {
-                let (whole, rest) = depth_m[line.clone()].as_chunks_mut::<LANES>();
-                let mut blocks = target.inverse_depth(j).iter();
-                for (out, block) in whole.iter_mut().zip(&mut blocks) {
-                    // In a list of its own, which becomes a vector.
-                    let mut depth = [0.0; LANES];
-                    for k in 0..LANES {
-                        depth[k] = seen_depth_m(reciprocal(block[k]));
-                    }
-                    *out = depth;
-                }
-                if let Some(block) = blocks.next() {
-                    for (out, q) in rest.iter_mut().zip(&**block) {
-                        *out = seen_depth_m(reciprocal(*q));
-                    }
-                }
-            }
-            if let Some(ids) = &mut ids {
-                let (whole, rest) = ids[line].as_chunks_mut::<LANES>();
-                let mut blocks = target.visibility_ids(j).iter();
-                for (out, block) in whole.iter_mut().zip(&mut blocks) {
-                    *out = **block;
-                }
-                if let Some(block) = blocks.next() {
-                    rest.copy_from_slice(&block[..rest.len()]);
-                }
-            }
+        let ReadBack { target, depth_m, ids } = self;
+        if let Some(depth_m) = depth_m {
+            target.copy_inverse_depth(depth_m, seen_depths_m);
+        }
+        if let Some(ids) = ids {
+            target.copy_visibility_ids(ids);
         }
     }
+}
+
+/// What an eye sees of a block's inverse depths, metres. A function by name: a closure would be
+/// compiled apart, without this machine's vectors.
+#[inline(always)]
+fn seen_depths_m(inverse_depth: &Wide<f32>) -> [f32; LANES] {
+    let mut depth_m = [0.0; LANES];
+    for k in 0..LANES {
+        depth_m[k] = seen_depth_m(reciprocal(inverse_depth[k]));
+    }
+    depth_m
 }
 
 /// An image of `n` numbers, if it is wanted; what is in it is whatever was there.

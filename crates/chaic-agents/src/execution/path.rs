@@ -17,6 +17,11 @@ const STRAIGHT: u32 = 10;
 const DIAGONAL: u32 = 14;
 /// Cost of a metre of free floor.
 const COST_PER_M: f32 = (FREE * STRAIGHT) as f32 / CELL_M;
+/// Costs that share a bucket in a search for all costs: as many as the least step costs at most.
+const BUCKET_WIDTH: usize = 64;
+/// Buckets used in turn: enough that the dearest step leads to no bucket of an earlier turn.
+const N_BUCKETS: usize = (OCCUPIED * DIAGONAL) as usize / BUCKET_WIDTH + 2;
+const _: () = assert!(BUCKET_WIDTH <= (FREE * STRAIGHT) as usize);
 
 /// Working space of searches, kept so that a search allocates nothing.
 #[derive(Clone, Debug)]
@@ -24,6 +29,8 @@ pub struct Search {
     nodes: Vec<Node>,
     epoch: u32,
     queue: BucketQueue,
+    /// Cells with what a way to them costs, by that cost.
+    buckets: Vec<Vec<(u32, u32)>>,
     /// The queue of straight ways.
     visits: BinaryHeap<Visit>,
     /// The latest straight way: version of the costs, start and end.
@@ -106,6 +113,7 @@ impl Search {
             nodes: vec![Node::default(); n_cells],
             epoch: 0,
             queue: BucketQueue::new(n_cells),
+            buckets: Vec::new(),
             visits: BinaryHeap::new(),
             latest: None,
         }
@@ -179,24 +187,41 @@ pub struct CostField {
 }
 
 impl CostField {
-    /// Dijkstra's algorithm from `here` over everything that is not occupied.
+    /// Dial's form of Dijkstra's algorithm from `here` over everything that is not occupied.
     pub fn from(costs: &CostMap, here: Vec2, search: &mut Search) -> CostField {
-        let mut field = CostField { cost: vec![u32::MAX; costs.grid().n_cells()] };
-        let Some(start) = costs.grid().cell_at(here) else { return field };
-        search.begin(start);
-        while let Some((cost, cell)) = search.queue.pop() {
-            let cell = cell as usize;
-            if cost > search.nodes[cell].best {
-                continue;
+        let mut cost = vec![u32::MAX; costs.grid().n_cells()];
+        let Some(start) = costs.grid().cell_at(here) else { return CostField { cost } };
+        let buckets = &mut search.buckets;
+        buckets.resize_with(N_BUCKETS, Vec::new);
+        cost[start] = 0;
+        buckets[0].push((0, start as u32));
+        let mut n_queued = 1;
+        for bucket in (0..N_BUCKETS).cycle() {
+            if n_queued == 0 {
+                break;
             }
-            field.cost[cell] = cost;
-            for_steps(costs.costs(), costs.grid(), cell, |next, enter, factor| {
-                if enter < OCCUPIED {
-                    search.improve(next, cell, cost.saturating_add(enter * factor), || 0);
+            // Cells of one bucket can't improve each other: no step costs less than its width.
+            let mut cells = std::mem::take(&mut buckets[bucket]);
+            n_queued -= cells.len();
+            for (known, cell) in cells.drain(..) {
+                let cell = cell as usize;
+                if known > cost[cell] {
+                    continue;
                 }
-            });
+                for_steps(costs.costs(), costs.grid(), cell, |next, enter, factor| {
+                    let through = known.saturating_add(enter.saturating_mul(factor));
+                    if enter < OCCUPIED && through < cost[next] {
+                        cost[next] = through;
+                        buckets[through as usize / BUCKET_WIDTH % N_BUCKETS]
+                            .push((through, next as u32));
+                        n_queued += 1;
+                    }
+                });
+            }
+            // Back with it, so that its memory is used again.
+            buckets[bucket] = cells;
         }
-        field
+        CostField { cost }
     }
 
     /// The cost of getting to a cell, if one can.

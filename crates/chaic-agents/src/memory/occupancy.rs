@@ -121,31 +121,42 @@ impl Limits {
         eye: Vec3,
         row: Vec3,
     ) -> [u32; LANES] {
-        let is_near = |d: f32| (d < MAP_RANGE_M) & (d > Camera::NEAR_M);
-        if !d.iter().fold(false, |any, d| any | is_near(*d)) {
-            return [0; LANES];
+        // Plain loops over plain lists, which become vectors: closures would be compiled apart.
+        let mut any_near = false;
+        for d in d {
+            any_near |= (*d < MAP_RANGE_M) & (*d > Camera::NEAR_M);
+        }
+        let mut shown = [0; LANES];
+        if !any_near {
+            return shown;
         }
         let head_m = self.head_m.min(WALL_M);
-        let at = |axis: usize| -> [f32; LANES] {
-            std::array::from_fn(|k| eye[axis] + d[k] * (columns[axis][k] + row[axis]))
-        };
-        let [x, y, z] = [0, 1, 2].map(at);
-        // Masks instead of conditions, which the compiler would make branches of.
-        let mask = |is: bool| u32::from(is).wrapping_neg();
-        let bits: [u32; LANES] = std::array::from_fn(|k| {
-            let floor = mask(y[k] < FLOOR_M) & u32::from(NOW_FLOOR);
-            let firm = mask((y[k] > self.step_over_m) & (y[k] <= head_m)) & u32::from(NOW_OCCUPIED);
-            let high = mask((y[k] > WALL_M) & (y[k] < TOP_M)) & u32::from(NOW_HIGH);
-            let tall = mask((y[k] > TALL_M) & (y[k] < TOP_M)) & u32::from(NOW_TALL);
-            let near = mask((d[k] < self.known_m) & (y[k] < TOP_M)) & u32::from(NOW_NEAR);
-            floor | firm | high | tall | near
-        });
-        let cells: [i32; LANES] = std::array::from_fn(|k| self.grid.cell_or_none(x[k], z[k]));
-        std::array::from_fn(|k| {
-            let counts = is_near(d[k]) & (bits[k] != 0) & (cells[k] >= 0);
-            ((cells[k] as u32).wrapping_mul(SHOWN_CELL) | bits[k]) & mask(counts)
-        })
+        let [xs, ys, zs] = columns;
+        for k in 0..LANES {
+            let d = d[k];
+            let x = eye.x + d * (xs[k] + row.x);
+            let y = eye.y + d * (ys[k] + row.y);
+            let z = eye.z + d * (zs[k] + row.z);
+            // Masks instead of conditions, which the compiler would make branches of.
+            let floor = mask(y < FLOOR_M) & u32::from(NOW_FLOOR);
+            let firm = mask((y > self.step_over_m) & (y <= head_m)) & u32::from(NOW_OCCUPIED);
+            let high = mask((y > WALL_M) & (y < TOP_M)) & u32::from(NOW_HIGH);
+            let tall = mask((y > TALL_M) & (y < TOP_M)) & u32::from(NOW_TALL);
+            let near = mask((d < self.known_m) & (y < TOP_M)) & u32::from(NOW_NEAR);
+            let bits = floor | firm | high | tall | near;
+            let cell = self.grid.cell_or_none(x, z);
+            let is_near = (d < MAP_RANGE_M) & (d > Camera::NEAR_M);
+            let counts = mask(is_near & (bits != 0) & (cell >= 0));
+            shown[k] = ((cell as u32).wrapping_mul(SHOWN_CELL) | bits) & counts;
+        }
+        shown
     }
+}
+
+/// All bits or none.
+#[inline(always)]
+fn mask(is: bool) -> u32 {
+    u32::from(is).wrapping_neg()
 }
 
 /// Every so many-th of a row of pixels.
@@ -350,6 +361,7 @@ impl OccupancyMap {
             known_m,
         };
         self.touched.clear();
+        let mut above = vec![[0; LANES]; padded_width / LANES];
         for (k, row) in (0..height).step_by(stride).enumerate() {
             every(stride, &depth[row * width..][..width], &mut sampled);
             let dynamic = percepts.dynamic_mask.get(k * sampled_width..(k + 1) * sampled_width);
@@ -358,18 +370,23 @@ impl OccupancyMap {
             }
             let mut last = 0;
             let lanes = sampled.as_chunks::<LANES>().0.iter().zip(xs.iter().zip(ys).zip(zs));
-            for (d, ((x, y), z)) in lanes {
+            for ((d, ((x, y), z)), above) in lanes.zip(&mut above) {
                 let shown = limits.shown(d, [x, y, z], rays.eye, rays.rows[row]);
-                // Neighbors mostly show the same: a bit for each that doesn't.
-                let before = |k: usize| if k == 0 { last } else { shown[k - 1] };
-                let before: [u32; LANES] = std::array::from_fn(before);
-                let bit = |k: usize| u32::from(shown[k] != before[k]) << k;
-                let mut changes = (0..LANES).fold(0, |changes, k| changes | bit(k));
+                // Neighbors mostly show the same: a bit for each that differs from the one before
+                // and the one above.
+                let mut before = [last; LANES];
+                before[1..].copy_from_slice(&shown[..LANES - 1]);
+                let mut changes = 0;
+                for k in 0..LANES {
+                    let is_new = (shown[k] != before[k]) & (shown[k] != above[k]);
+                    changes |= u32::from(is_new) << k;
+                }
                 while changes != 0 {
                     self.mark(shown[changes.trailing_zeros() as usize % LANES]);
                     changes &= changes - 1;
                 }
                 last = shown[LANES - 1];
+                *above = shown;
             }
         }
     }

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use chaic_protocol::geom::horizontal_distance;
 use chaic_protocol::{Action, AgentId, ClassId, Frame, Hand, Observation, Outcome, Vec3};
 
-use crate::memory::{Memory, Thing};
+use crate::mapping::Thing;
+use crate::memory::Memory;
 use crate::track::{Intent, TrackId};
 
 /// A thing that is seen this near to where it lay before has not been moved, metres.
@@ -158,7 +159,7 @@ impl SeenBehavior {
     /// Whether a thing in the image is in the watched person's hands, not in somebody else's.
     fn holds(&self, memory: &Memory, thing: &Thing) -> bool {
         let is_held = thing.last_seen == memory.frame && thing.held_until > memory.frame;
-        let from = |p: &crate::memory::Person| {
+        let from = |p: &crate::mapping::Person| {
             horizontal_distance(p.position_in_world, thing.position_in_world)
         };
         let in_view = memory.people.iter().filter(|p| p.is_in_view);

@@ -13,9 +13,11 @@ use chaic_protocol::{
 use crate::execution::follow::{Follow, Follower};
 use crate::execution::navigate::{Destination, Nav, Navigator};
 use crate::execution::recover::Recovery;
-use crate::memory::{Memory, Space};
+use crate::execution::walking::style;
+use crate::mapping::Space;
+use crate::memory::Memory;
 use crate::perception::{GroundTruthIds, Perception as _};
-use crate::rules::{ChildDraws, PlannerRules, Walking};
+use crate::rules::{ChildDraws, PlannerRules};
 use crate::track::{Intent, named};
 
 /// The draws that are escapes if they are the same in every episode: those of the original's first
@@ -178,7 +180,7 @@ impl Episode {
             }
         }
         let last = observation.own.last;
-        if self.memory.rules.walking == Walking::Careful
+        if style(self.memory.rules.walking).recovers()
             && let Some(action) = self.recovery.step(&mut self.memory, last, &mut self.rng)
         {
             return action;

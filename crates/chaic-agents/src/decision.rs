@@ -8,7 +8,8 @@ use chaic_protocol::geom::xz;
 use chaic_protocol::{AgentError, Briefing, ClassId, Frame, Hand, Observation, Role};
 
 use crate::behavior::BehaviorLog;
-use crate::memory::{Memory, Thing};
+use crate::mapping::Thing;
+use crate::memory::Memory;
 use crate::track::{Carried, Hands, TrackId};
 
 /// One object that a plan is about.

@@ -26,6 +26,9 @@ pub mod track;
 pub mod perception;
 pub mod rules;
 
+pub mod mapping;
+pub mod planning;
+
 pub mod memory;
 
 pub mod behavior;

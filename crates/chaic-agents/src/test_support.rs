@@ -11,11 +11,13 @@ use chaic_protocol::{
 };
 
 use crate::execution::navigate::step_m;
-use crate::memory::costs::CostMap;
-use crate::memory::grid::Grid;
-use crate::memory::occupancy::{OccupancyMap, Space};
-use crate::memory::{Memory, People, SemanticMap};
+use crate::mapping::grid::Grid;
+use crate::mapping::occupancy::{OccupancyMap, Space};
+use crate::mapping::{People, SemanticMap};
+use crate::memory::Memory;
 use crate::perception::{GroundTruthIds, Perception as _};
+use crate::planning::cost_model::Seen;
+use crate::planning::costs::CostMap;
 use crate::track::{Carried, Hands, TrackId};
 
 /// How the body moves and reaches: as by the world's rules of the paper.
@@ -46,13 +48,13 @@ impl ToyObject {
     }
 }
 
-struct Solid {
+struct ToyBox {
     entity: EntityId,
     low: Vec3,
     high: Vec3,
 }
 
-impl Solid {
+impl ToyBox {
     /// Depth at which the ray enters it.
     fn hit(&self, eye: Vec3, direction: Vec3) -> Option<f32> {
         let inverse = direction.recip();
@@ -70,7 +72,7 @@ impl Solid {
 /// A room with things in it and one body.
 pub struct Toy {
     room: Rect,
-    solids: Vec<Solid>,
+    solids: Vec<ToyBox>,
     classes: Vec<Option<ClassId>>,
     pose: Pose,
     pub frame: Frame,
@@ -120,7 +122,7 @@ impl Toy {
     }
 
     pub fn add_wall(&mut self, low: [f32; 2], high: [f32; 2]) {
-        self.solids.push(Solid {
+        self.solids.push(ToyBox {
             entity: EntityId::WALL,
             low: Vec3::new(low[0], 0.0, low[1]),
             high: Vec3::new(high[0], 2.8, high[1]),
@@ -131,7 +133,7 @@ impl Toy {
     pub fn add(&mut self, object: ToyObject) -> TrackId {
         let entity = EntityId(self.classes.len() as u16);
         self.classes.push(Some(object.class));
-        self.solids.push(Solid { entity, low: object.low, high: object.high });
+        self.solids.push(ToyBox { entity, low: object.low, high: object.high });
         entity.into()
     }
 
@@ -140,7 +142,7 @@ impl Toy {
         let entity = EntityId::of_agent(agent);
         let (low, high) = (Vec3::new(-0.2, 0.0, -0.2), Vec3::new(0.2, 1.7, 0.2));
         let at = Vec3::new(at[0], 0.0, at[1]);
-        self.solids.push(Solid { entity, low: at + low, high: at + high });
+        self.solids.push(ToyBox { entity, low: at + low, high: at + high });
         entity.into()
     }
 
@@ -497,8 +499,10 @@ impl Plan2d {
     pub fn costs(&self, radius_m: f32) -> CostMap {
         let map = OccupancyMap::of_spaces(self.grid, &self.spaces);
         let mut costs = CostMap::new(self.grid, radius_m);
-        let far = Vec2::splat(1e6);
-        costs.rebuild(&map, &SemanticMap::default(), &People::default(), far, 0);
+        let (things, people) = (SemanticMap::default(), People::default());
+        let (here, now) = (Vec2::splat(1e6), 0);
+        let seen = Seen { map: &map, things: &things, people: &people, berth: None, here, now };
+        costs.rebuild(&seen);
         costs
     }
 }

@@ -28,16 +28,16 @@ mod settings;
 pub mod street;
 pub mod yard;
 
-mod grid;
+mod free_space;
 mod outdoors;
-mod solid;
+mod upright_box;
 
 pub use format::{Episode, EpisodeError, GeneratorInfo, MAX_EPISODE_BYTES, json_schema};
 pub use generate::{GenerateError, Seeds, generate, generate_with};
 pub use settings::Settings;
-pub use solid::{Solid, mm, mm3};
 pub use split::{
     BUNDLED_PER_TASK, Bundled, Split, SplitError, episodes, find_episode, regenerate_bundled,
 };
 pub use standard::{STANDARD_PER_TASK, standard_table};
+pub use upright_box::{UprightBox, mm, mm3};
 pub use validate::{Problem, Walker, out_of_reach, playable, validate, ways_from};

@@ -8,7 +8,7 @@ use chaic_protocol::rng::Stream;
 use chaic_protocol::{ClassId, TaskId, Vec2, Vec3};
 use chaic_world::{Floor, FloorMaterial, Person, Room, RoomKind, Setup, Thing};
 
-use crate::solid::{mm, mm3, plan_bounds, rect_distance};
+use crate::upright_box::{mm, mm3, plan_bounds, rect_distance};
 
 /// How far the ground goes beyond the bounds, metres: nobody sees its edge from eye height.
 const GROUND_M: f32 = 40.0;

@@ -12,7 +12,7 @@ use chaic_world::{Person, Setup, Thing, top_surfaces};
 use crate::Settings;
 use crate::generate::{GenerateError, Seeds, first_valid};
 use crate::outdoors::{self, OutdoorParts, Scenery, ground};
-use crate::solid::{mm, mm3};
+use crate::upright_box::{mm, mm3};
 
 /// Version of this generator; goes up with every change of what it makes.
 pub const VERSION: u32 = 1;

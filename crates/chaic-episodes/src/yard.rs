@@ -14,7 +14,7 @@ use chaic_world::{Person, Setup, Thing};
 use crate::Settings;
 use crate::generate::{FIRST_BUNDLED_SEED, GenerateError, Seeds, first_valid};
 use crate::outdoors::{self, OutdoorParts, Scenery, ground, heading, is_clear};
-use crate::solid::{mm, plan_bounds};
+use crate::upright_box::{mm, plan_bounds};
 
 /// Version of this generator; goes up with every change of what it makes.
 pub const VERSION: u32 = 1;

@@ -73,7 +73,7 @@ pub fn write(still: &FrameExport<'_>, helpers: &dyn Helpers, out: &Path) -> Resu
     save(picture.ok_or_else(no_picture)?.into(), &out.join("ids.png"))?;
     let classes = world.classes();
     let names: BTreeMap<u16, &str> =
-        present.into_iter().map(|id| (id, name_of(EntityId(id), &classes))).collect();
+        present.into_iter().map(|id| (id, EntityId(id).class_name(&classes))).collect();
     save_names(&names, &out.join("ids.json"))?;
     let labels = env.observer().scene().label(world, &view);
     let present: BTreeSet<u8> = labels.classes.iter().copied().collect();
@@ -88,20 +88,6 @@ pub fn write(still: &FrameExport<'_>, helpers: &dyn Helpers, out: &Path) -> Resu
         floor_plan::draw_scene_plan(env.observer().scene(), world, size.max(PLAN_MIN_PX));
     save(from_above.into(), &out.join("plan.png"))?;
     Ok(world.state().frame)
-}
-
-/// What an entity is called, given the classes of things and people.
-pub(crate) fn name_of(entity: EntityId, classes: &[Option<ClassId>]) -> &'static str {
-    match entity {
-        EntityId::NOTHING => "nothing",
-        EntityId::FLOOR => "floor",
-        EntityId::WALL => "wall",
-        EntityId::CEILING => "ceiling",
-        other => {
-            let class = classes.get(usize::from(other.0)).copied().flatten();
-            class.map_or("unknown", |c| c.name())
-        }
-    }
 }
 
 /// Draws the map of how an episode begins.
@@ -121,7 +107,7 @@ fn save_names(names: &BTreeMap<u16, &str>, path: &Path) -> Result<()> {
 }
 
 /// Writes a picture as a whole or not at all; the extension picks the format.
-pub(crate) fn save(picture: DynamicImage, path: &Path) -> Result<()> {
+pub fn save(picture: DynamicImage, path: &Path) -> Result<()> {
     let refused =
         |e: ImageError| EvalError::Picture(format!("can't write {}: {e}", path.display()));
     let mut bytes = Cursor::new(Vec::new());

@@ -31,19 +31,13 @@ pub mod published;
 pub mod report;
 pub mod run;
 
-pub mod fidelity;
-
 pub mod frame_export;
 pub mod replay;
-pub mod scene_file;
 pub mod verify;
 
 pub mod audit;
 
-pub mod bench;
-
 pub mod figure;
-pub mod video;
 
 pub use episode_file::read_episode_file;
 pub use error::{EvalError, Result};

@@ -188,13 +188,13 @@ mod tests {
         }
     }
 
-    /// The README prints the paper's rows by hand.
+    /// docs/results.md prints the paper's rows by hand.
     #[test]
-    fn the_readme_quotes_the_same_figures() {
-        let readme = include_str!("../../../README.md");
+    fn the_page_of_results_quotes_the_same_figures() {
+        let page = include_str!("../../../docs/results.md");
         for row in &PUBLISHED {
             let head = format!("| {}, paper |", row.title);
-            let Some(line) = readme.lines().find(|l| l.starts_with(&head)) else { continue };
+            let Some(line) = page.lines().find(|l| l.starts_with(&head)) else { continue };
             let cells: Vec<&str> = line.trim_matches('|').split('|').skip(1).collect();
             for (task, cell) in TaskId::paper().zip(cells) {
                 let f = row.figures(task).unwrap();
@@ -202,6 +202,6 @@ mod tests {
                 assert_eq!(cell.trim(), format!("{:.2}{ei}", f.tr), "{} in {task}", row.title);
             }
         }
-        assert_eq!(readme.matches(", paper |").count(), 4, "all rows were looked at");
+        assert_eq!(page.matches(", paper |").count(), 4, "all rows were looked at");
     }
 }

@@ -4,7 +4,7 @@
 //! lay in the end, but not where. What was put over the back of a chair lies on its seat then. So
 //! each is laid on the nearest surface of about that height that has room for it.
 
-use chaic_episodes::Solid;
+use chaic_episodes::UprightBox;
 use chaic_protocol::geom::{Rect, math, rotate_yaw, xz};
 use chaic_protocol::{Role, Vec2, Vec3};
 use chaic_world::{Rules, Setup, Surface, Thing, blocks_of, ghosts_of};
@@ -41,11 +41,11 @@ pub(crate) struct Surroundings {
     /// Nothing comes to rest outside of these.
     bounds: Rect,
     surfaces: Vec<Surface>,
-    solids: Vec<(Rect, Solid)>,
+    solids: Vec<(Rect, UprightBox)>,
     /// What can't be seen into, but isn't in anybody's way.
-    hidden: Vec<(Rect, Solid)>,
+    hidden: Vec<(Rect, UprightBox)>,
     /// Furniture seen from above.
-    shadows: Vec<Solid>,
+    shadows: Vec<UprightBox>,
 }
 
 impl Surroundings {
@@ -58,25 +58,25 @@ impl Surroundings {
             hidden: Vec::new(),
             shadows: Vec::new(),
         };
-        all.add_solids(Solid::of_walls(setup));
+        all.add_solids(UprightBox::of_walls(setup));
         // A bicycle is in nobody's way, least of all its rider's.
         let stays = |t: &&Thing| t.class.info().role != Role::Vehicle;
         for thing in setup.things.iter().filter(stays) {
             all.surfaces.extend(tops(thing));
-            all.shadows.extend(Solid::of_thing(thing));
-            all.add_solids(Solid::of_thing(thing));
+            all.shadows.extend(UprightBox::of_thing(thing));
+            all.add_solids(UprightBox::of_thing(thing));
             // Nobody finds what is inside a cushion.
-            all.hidden.extend(ghosts_of(thing).iter().map(Solid::of_block).map(with_bounds));
+            all.hidden.extend(ghosts_of(thing).iter().map(UprightBox::of_block).map(with_bounds));
         }
         all
     }
 
     /// Adds a thing that has come to rest.
     pub fn add(&mut self, thing: &Thing) {
-        self.add_solids(Solid::of_thing(thing));
+        self.add_solids(UprightBox::of_thing(thing));
     }
 
-    fn add_solids(&mut self, solids: Vec<Solid>) {
+    fn add_solids(&mut self, solids: Vec<UprightBox>) {
         self.solids.extend(solids.into_iter().map(with_bounds));
     }
 
@@ -148,7 +148,7 @@ impl Surroundings {
     /// The place nearest to where somebody was put that has room for a body of this radius.
     pub fn free_place(&self, p: Vec2, radius_m: f32, apart: &[(Vec2, f32)]) -> Option<Vec2> {
         let stands = [Rules::paper().step_over_m, 2.0];
-        let blocks: Vec<&Solid> =
+        let blocks: Vec<&UprightBox> =
             self.solids.iter().map(|(_, s)| s).filter(|s| s.spans(stands)).collect();
         around(FALLEN_M, 0.02).map(|offset| p + offset).find(|p| {
             self.bounds.grown(-radius_m).contains(*p)
@@ -162,7 +162,7 @@ impl Surroundings {
         let in_room = rest.rooms.is_empty() || rest.rooms.iter().any(|r| r.contains(p));
         in_room
             && self.bounds.contains(p)
-            && Solid::of_thing(thing).iter().all(|own| {
+            && UprightBox::of_thing(thing).iter().all(|own| {
                 let bounds = own.bounds();
                 let all = self.solids.iter().chain(&self.hidden);
                 let near = all.filter(|(b, _)| b.overlaps(&bounds));
@@ -171,7 +171,7 @@ impl Surroundings {
     }
 }
 
-fn with_bounds(solid: Solid) -> (Rect, Solid) {
+fn with_bounds(solid: UprightBox) -> (Rect, UprightBox) {
     (solid.bounds(), solid)
 }
 

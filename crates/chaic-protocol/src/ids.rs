@@ -34,6 +34,21 @@ impl EntityId {
     /// The first number that names an object.
     pub const FIRST_OBJECT: EntityId = EntityId(16);
 
+    /// The name of its class, or of the part of the structure that it is; `classes` are those of
+    /// people and objects by id.
+    pub fn class_name(self, classes: &[Option<ClassId>]) -> &'static str {
+        match self {
+            EntityId::NOTHING => "nothing",
+            EntityId::FLOOR => "floor",
+            EntityId::WALL => "wall",
+            EntityId::CEILING => "ceiling",
+            other => {
+                let class = classes.get(usize::from(other.0)).copied().flatten();
+                class.map_or("unknown", |class| class.name())
+            }
+        }
+    }
+
     /// The body of an agent; [`EntityId::NOTHING`] for a number from [`AgentId::MAX_AGENTS`] on, which
     /// no episode has.
     pub fn of_agent(agent: AgentId) -> EntityId {

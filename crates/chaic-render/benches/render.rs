@@ -1,13 +1,11 @@
 //! Time to draw one view, on one thread: `cargo bench -p chaic-render`.
 
-#[path = "../tests/scenes/mod.rs"]
-mod scenes;
-
+use chaic_test_kit::scenes;
 use std::hint::black_box;
 
 use chaic_render::{Channels, Scene, View};
+use chaic_test_kit::scenes::camera;
 use criterion::{Criterion, criterion_group, criterion_main};
-use scenes::camera;
 
 fn render(c: &mut Criterion) {
     let house = scenes::world(scenes::house());

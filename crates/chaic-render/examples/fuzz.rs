@@ -5,9 +5,7 @@
 //! It says which seeds break a promise, and ends with exit code 1 if there are any. See
 //! `tests/hostile` for what is promised.
 
-#[path = "../tests/hostile/mod.rs"]
-mod hostile;
-
+use chaic_test_kit::hostile;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 use std::time::Instant;

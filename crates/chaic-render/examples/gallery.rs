@@ -5,9 +5,6 @@
 //! posture, what the helper of each task sees first, by day and in other appearances, and two
 //! hand-made worlds; and it prints how many triangles a furnished house has at each level of detail. docs/gallery.md shows the sheets.
 
-#[path = "../tests/scenes/mod.rs"]
-mod scenes;
-
 use std::path::Path;
 
 use chaic_episodes::{Seeds, generate};
@@ -17,11 +14,12 @@ use chaic_protocol::{AgentId, ClassId, Role, TaskId, Vec3};
 use chaic_render::geometry::Geometry;
 use chaic_render::text::{self, Align};
 use chaic_render::{Appearance, Channels, LEVEL_RADIUS_PX, Scene, View, floor_plan, image_out};
+use chaic_test_kit::scenes;
+use chaic_test_kit::scenes::{camera, posture};
 use chaic_world::{Posture, Setup, Thing, World};
 use image::RgbImage;
 use image::codecs::png::{CompressionType, FilterType as PngFilter, PngEncoder};
 use image::imageops::{FilterType, resize};
-use scenes::{camera, posture};
 
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 

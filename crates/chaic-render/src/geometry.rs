@@ -15,11 +15,11 @@ use crate::mesh::{Mesh, Skin};
 use crate::texture;
 use crate::{Lens, Scene};
 
-pub use crate::mesh::Gloss;
+pub use crate::mesh::{Gloss, unit};
 pub use crate::portals::{PortalGraph, RegionSet};
 pub use crate::shapes::{BodyShape, ShapeName, Shapes};
 pub use crate::solids::{N_LEVELS, level_for};
-pub use crate::texture::Texture;
+pub use crate::texture::{Texture, shown_from_linear};
 
 /// The finest level of detail.
 pub const FINEST: usize = N_LEVELS - 1;

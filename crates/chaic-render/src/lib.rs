@@ -71,7 +71,6 @@ mod texture;
 
 pub mod floor_plan;
 pub mod geometry;
-pub mod gltf_out;
 pub mod image_out;
 pub mod lighting;
 pub mod text;

@@ -133,7 +133,7 @@ impl Place {
 }
 
 /// The vector of length 1, by correctly rounded operations only; up for the zero vector.
-pub(crate) fn unit(v: Vec3) -> Vec3 {
+pub fn unit(v: Vec3) -> Vec3 {
     let l2 = v.x * v.x + v.y * v.y + v.z * v.z;
     if l2 > 1e-30 && l2 < 1e30 { v * (1.0 / l2.sqrt()) } else { Vec3::Y }
 }

@@ -313,10 +313,10 @@ impl PortalGraph {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::view::hostile::{self, Case};
-    use crate::view::scenes::{camera, empty, house, wall, world};
     use crate::{Channels, Scene, View};
     use chaic_protocol::rng::Stream;
+    use chaic_test_kit::hostile::{self, Case};
+    use chaic_test_kit::scenes::{camera, empty, house, wall, world};
     use chaic_world::{Room, RoomKind, Wall};
     use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -433,6 +433,14 @@ mod tests {
         let mut n_walled = 0;
         for seed in 0..300 {
             let Case { setup, state, postures, views, .. } = hostile::case(seed, None);
+            // The kit was built with this crate as a library, whose views are another type.
+            let own_view = |v: &chaic_test_kit::View| View {
+                hide: v.hide,
+                hide_ceiling: v.hide_ceiling,
+                sight: v.sight,
+                ..View::of_camera(v.camera, Channels::ALL)
+            };
+            let views: Vec<View> = views.iter().map(own_view).collect();
             let scene = Scene::new(&setup);
             n_walled += usize::from(!scene.regions().portals.is_empty());
             let with = scene.render_state(&state, &postures, &views);

@@ -268,8 +268,8 @@ pub(crate) fn linear_from_shown(shown: [u8; 3]) -> [f32; 3] {
     shown.map(|s| (f32::from(s) / 255.0) * (f32::from(s) / 255.0))
 }
 
-/// The inverse: 0 to 255, too bright is white.
-pub(crate) fn shown_from_linear(linear: f32) -> u8 {
+/// A color as it is shown, 0 to 255, of linear light: its root; too bright is white.
+pub fn shown_from_linear(linear: f32) -> u8 {
     (255.0 * linear.clamp(0.0, 1.0).sqrt() + 0.5) as u8
 }
 

@@ -252,17 +252,10 @@ fn sized<T: Clone + Default>(
 }
 
 #[cfg(test)]
-#[path = "../tests/hostile/mod.rs"]
-pub(crate) mod hostile;
-#[cfg(test)]
-#[path = "../tests/scenes/mod.rs"]
-pub(crate) mod scenes;
-
-#[cfg(test)]
 mod tests {
-    use super::scenes::{camera, house, street, world};
     use super::*;
     use crate::Scene;
+    use chaic_test_kit::scenes::{camera, house, street, world};
 
     fn looked_at(color: bool) -> Vec<Images> {
         let mut all = Vec::new();

@@ -1,11 +1,9 @@
 //! The promise of this file: whatever numbers stand in a setup, a state or a camera, there is a
 //! picture of the right size, and it is the same each time. `examples/fuzz.rs` tries many more.
 
-mod hostile;
-
 use chaic_protocol::EntityId;
 use chaic_render::{Channels, Scene};
-use hostile::{N_IDS, case, check, check_plan, pools};
+use chaic_test_kit::hostile::{N_IDS, case, check, check_plan, pools};
 
 #[test]
 fn no_input_breaks_a_picture() {

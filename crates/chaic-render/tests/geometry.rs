@@ -1,15 +1,13 @@
 //! The promise of this file: the geometry that other renderers get is what this one draws.
 
-mod scenes;
-
 use std::collections::BTreeSet;
 
 use chaic_protocol::{AgentId, EntityId, Vec3};
 use chaic_render::geometry::{FINEST, Geometry, LitBy, N_LEVELS, Texture, tile};
 use chaic_render::{Channels, Scene, View};
+use chaic_test_kit::scenes::{camera, house, street, world};
 use chaic_world::{Place, Posture, World};
 use glam::Mat3;
-use scenes::{camera, house, street, world};
 
 fn postures(world: &World) -> Vec<Posture> {
     world.setup().agents().map(|agent| world.posture(agent)).collect()

@@ -1,10 +1,8 @@
 //! The promise of this file: pixels don't change unnoticed. When they are meant to, the new digests
 //! are those that the failing test prints.
 
-mod scenes;
-
 use chaic_render::{Appearance, Channels, Scene, View};
-use scenes::{camera, house, street, world};
+use chaic_test_kit::scenes::{camera, house, street, world};
 use xxhash_rust::xxh3::xxh3_64;
 
 #[test]

@@ -1,8 +1,6 @@
 //! The promise of this file: depth and ids are those of the geometry, colors don't disturb them,
 //! nothing depends on threads, and no camera breaks the renderer.
 
-mod scenes;
-
 use chaic_protocol::capability::Persona;
 use chaic_protocol::geom::Camera;
 use chaic_protocol::observation::Images;
@@ -10,8 +8,9 @@ use chaic_protocol::{AgentId, ClassId, EntityId, Vec3};
 use chaic_render::{
     Channels, Labels, MAX_SIDE_PX, Scene, View, WorldViews, floor_plan, image_out, render_batch,
 };
+use chaic_test_kit::scenes;
+use chaic_test_kit::scenes::{camera, empty, posture, thing, wall, world};
 use chaic_world::{Setup, Thing, Wall, World};
-use scenes::{camera, empty, posture, thing, wall, world};
 
 const DEPTH_AND_IDS: Channels = Channels::DEPTH_AND_IDS;
 

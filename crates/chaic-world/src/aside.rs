@@ -68,7 +68,7 @@ impl World {
         let arm = Body { radius_m: 0.5 * CELL_M, low_m: self.rules.step_over_m, high_m };
         let steps = (from.distance(to) / CELL_M).ceil();
         let mut along = (0..=steps as i32).map(|step| from.lerp(to, step as f32 / steps));
-        along.all(|p| self.surroundings.overlap(arm, p, &[], &[]) <= 0.0)
+        along.all(|p| self.block_index.overlap(arm, p, &[], &[]) <= 0.0)
     }
 }
 
@@ -89,7 +89,7 @@ impl FreeSpace {
         let bounds = world.setup.bounds.grown(-radius_m);
         let movable = world.movable_blocks();
         let fits = |p: Vec2| {
-            bounds.contains(p) && world.surroundings.overlap(body, p, &movable, &[]) <= 0.0
+            bounds.contains(p) && world.block_index.overlap(body, p, &movable, &[]) <= 0.0
         };
         let cells = (0..SIDE * SIDE).map(|cell| fits(center(middle, cell)));
         let mut space =

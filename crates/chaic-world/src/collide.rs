@@ -12,7 +12,7 @@ use crate::shape::Block;
 
 /// Fixed boxes, found by where they are.
 #[derive(Clone, Debug)]
-pub(crate) struct Surroundings {
+pub(crate) struct BlockIndex {
     blocks: Vec<Block>,
     bounds: Rect,
     columns: usize,
@@ -56,8 +56,8 @@ const ROUNDS: usize = 4;
 /// An overlap that is as good as none, metres.
 const TOLERANCE_M: f32 = 1e-3;
 
-impl Surroundings {
-    pub fn new(blocks: Vec<Block>, bounds: Rect) -> Surroundings {
+impl BlockIndex {
+    pub fn new(blocks: Vec<Block>, bounds: Rect) -> BlockIndex {
         let bounds = bounds.grown(CELL_M);
         let size = bounds.size();
         let columns = (size.x / CELL_M).ceil().max(1.0) as usize;
@@ -92,7 +92,7 @@ impl Surroundings {
             members.extend(list);
             cells.push((start, members.len() as u32));
         }
-        Surroundings { blocks, bounds, columns, rows, cells, members }
+        BlockIndex { blocks, bounds, columns, rows, cells, members }
     }
 
     /// The boxes that a body at `p` could touch.
@@ -201,16 +201,16 @@ mod tests {
     }
 
     /// A wall along x at z = 0 with a doorway of 1.2 m around x = 0, and a bin 0.48 m wide in it.
-    fn doorway() -> Surroundings {
+    fn doorway() -> BlockIndex {
         let walls = vec![
             block([-2.6, 1.5, 0.0], [2.0, 1.5, 0.06]),
             block([2.6, 1.5, 0.0], [2.0, 1.5, 0.06]),
             block([0.3, 0.28, 0.0], [0.24, 0.28, 0.24]),
         ];
-        Surroundings::new(walls, Rect::new([-5.0, -5.0], [5.0, 5.0]))
+        BlockIndex::new(walls, Rect::new([-5.0, -5.0], [5.0, 5.0]))
     }
 
-    fn walk(s: &Surroundings, body: Body, from: Vec2, direction: Vec2, steps: usize) -> Vec2 {
+    fn walk(s: &BlockIndex, body: Body, from: Vec2, direction: Vec2, steps: usize) -> Vec2 {
         (0..steps).fold(from, |p, _| s.slide(body, p, p + 0.047 * direction, &[], &[]))
     }
 
@@ -245,7 +245,7 @@ mod tests {
 
     #[test]
     fn low_things_are_stepped_over() {
-        let rug = Surroundings::new(
+        let rug = BlockIndex::new(
             vec![block([0.0, 0.05, 0.0], [1.0, 0.05, 1.0])],
             Rect::new([-5.0, -5.0], [5.0, 5.0]),
         );

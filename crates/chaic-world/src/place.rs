@@ -181,7 +181,7 @@ impl World {
     fn stands_free(&self, p: Vec3, radius_m: f32, height_m: f32) -> bool {
         let body = Body { radius_m, low_m: RUG_M, high_m: height_m };
         self.setup.bounds.grown(-radius_m).contains(xz(p))
-            && self.surroundings.overlap(body, xz(p), &self.movable_blocks(), &self.discs()) <= 0.0
+            && self.block_index.overlap(body, xz(p), &self.movable_blocks(), &self.discs()) <= 0.0
     }
 
     /// Lets things go where they are, at the same time.
@@ -206,7 +206,7 @@ impl World {
             nearest.any(|(from, to)| horizontal_distance(from, to) < NEAR_M)
         };
         let mut around: Vec<Obstacle> =
-            self.surroundings.blocks().iter().filter(has_near_point).map(Obstacle::from).collect();
+            self.block_index.blocks().iter().filter(has_near_point).map(Obstacle::from).collect();
         for (i, (other, state)) in self.setup.things.iter().zip(&self.state.things).enumerate() {
             let entity = Setup::entity(i);
             let near = is_near(state.position);

@@ -57,7 +57,7 @@ impl World {
         let outermost_m = probe.half_width_m - probe.half_depth_m;
         (-CYLINDERS / 2..=CYLINDERS / 2).any(|k| {
             let at = xz(middle + aside * (outermost_m * f32::from(k) / f32::from(CYLINDERS / 2)));
-            let near = self.surroundings.near(at).filter(|b| self.is_met(b.entity));
+            let near = self.block_index.near(at).filter(|b| self.is_met(b.entity));
             let disc_met =
                 |d: &&crate::collide::Disc| at.distance(d.center) < d.radius_m + body.radius_m;
             near.chain(&movable).any(|b| body.touches(b, at)) || others.iter().any(|d| disc_met(&d))

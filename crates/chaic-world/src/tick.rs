@@ -232,7 +232,7 @@ impl World {
             let p = xz(to).clamp(self.setup.bounds.min, self.setup.bounds.max);
             return Vec3::new(p.x, from.y, p.y);
         }
-        let p = self.surroundings.slide(
+        let p = self.block_index.slide(
             self.body(agent),
             xz(from),
             xz(to),

@@ -9,7 +9,7 @@ use chaic_protocol::task::GoalApproach;
 use chaic_protocol::{AgentId, EntityId, Hand, ResolvedAction, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::collide::{Body, Disc, Surroundings};
+use crate::collide::{BlockIndex, Body, Disc};
 use crate::event::{Event, EventKind};
 use crate::rules::{ReachTo, Rules};
 use crate::setup::{Person, Setup, SetupError, Thing};
@@ -22,7 +22,7 @@ pub struct World {
     pub(crate) setup: Arc<Setup>,
     pub(crate) rules: Rules,
     /// Walls and things that never move: derived from the setup.
-    pub(crate) surroundings: Arc<Surroundings>,
+    pub(crate) block_index: Arc<BlockIndex>,
     /// Things that can be moved and block bodies: derived from the setup.
     pub(crate) movable_blockers: Arc<[usize]>,
     /// What each person's body can do: derived from the setup.
@@ -78,7 +78,7 @@ impl World {
         let blocks = wall_blocks(&setup)
             .chain(fixed.flat_map(|(i, t)| blocks_at(t, Setup::entity(i), t.position, t.yaw_rad)))
             .collect();
-        let surroundings = Arc::new(Surroundings::new(blocks, setup.bounds));
+        let block_index = Arc::new(BlockIndex::new(blocks, setup.bounds));
         let blocks_bodies = |t: &Thing| {
             !t.fixed && matches!(t.class.info().role, Role::Obstacle | Role::HeavyTarget)
         };
@@ -93,7 +93,7 @@ impl World {
         let capabilities = setup.people.iter().map(Person::capability).collect();
         let events = Vec::new();
         let mut world =
-            World { setup, rules, surroundings, movable_blockers, capabilities, state, events };
+            World { setup, rules, block_index, movable_blockers, capabilities, state, events };
         world.attach_vehicles();
         world.carry_along();
         Ok(world)

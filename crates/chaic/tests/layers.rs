@@ -29,7 +29,18 @@ const ALLOWED: &[Arrows] = &[
     arrows("chaic-protocol", &[], &[]),
     arrows("chaic-world", &["chaic-protocol"], &[]),
     arrows("chaic-episodes", &["chaic-protocol", "chaic-world"], &[]),
-    arrows("chaic-render", &["chaic-protocol", "chaic-world"], &["chaic-episodes"]),
+    arrows(
+        "chaic-render",
+        &["chaic-protocol", "chaic-world"],
+        &["chaic-episodes", "chaic-test-kit"],
+    ),
+    arrows("chaic-video", &[], &[]),
+    arrows(
+        "chaic-gltf",
+        &["chaic-files", "chaic-protocol", "chaic-world", "chaic-episodes", "chaic-render"],
+        &["chaic-test-kit"],
+    ),
+    arrows("chaic-test-kit", &["chaic-protocol", "chaic-world", "chaic-render", "chaic-gltf"], &[]),
     arrows(
         "chaic-render-gpu",
         &["chaic-protocol", "chaic-world", "chaic-render"],
@@ -56,6 +67,26 @@ const ALLOWED: &[Arrows] = &[
             "chaic-render",
             "chaic-agents",
             "chaic-env",
+            "chaic-video",
+        ],
+        &[],
+    ),
+    arrows(
+        "chaic-fidelity",
+        &["chaic-files", "chaic-protocol", "chaic-env", "chaic-eval"],
+        &["chaic-episodes"],
+    ),
+    arrows(
+        "chaic-bench",
+        &[
+            "chaic-files",
+            "chaic-protocol",
+            "chaic-world",
+            "chaic-episodes",
+            "chaic-render",
+            "chaic-gltf",
+            "chaic-env",
+            "chaic-eval",
         ],
         &[],
     ),
@@ -79,7 +110,10 @@ const ALLOWED: &[Arrows] = &[
             "chaic-episodes",
             "chaic-render",
             "chaic-env",
+            "chaic-gltf",
             "chaic-eval",
+            "chaic-bench",
+            "chaic-fidelity",
             "chaic-import",
             "chaic-llm",
             "chaic-subprocess",
@@ -194,6 +228,51 @@ fn no_task_is_known_by_its_name() {
         }
     }
     assert!(n_files > 100, "{n_files} files");
+}
+
+/// The modules of `chaic-agents`, each of which may use only those before it.
+const MIND: [&str; 14] = [
+    "track",
+    "rules",
+    "perception",
+    "mapping",
+    "planning",
+    "memory",
+    "behavior",
+    "decision",
+    "policies",
+    "execution",
+    "child",
+    "mind",
+    "helpers",
+    "partners",
+];
+
+/// The modules that code names as `crate::NAME`.
+fn named_modules(code: &str) -> Vec<&str> {
+    let ends = |c: char| !(c.is_alphanumeric() || c == '_');
+    code.split("crate::").skip(1).filter_map(|rest| rest.split(ends).next()).collect()
+}
+
+#[test]
+fn no_module_of_a_mind_uses_a_later_one() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../chaic-agents/src");
+    let mut files = Vec::new();
+    sources(&folder, &mut files);
+    let rank = |name: &str| MIND.iter().position(|m| *m == name);
+    let mut n_uses = 0;
+    for file in files {
+        let within = file.strip_prefix(&folder).expect("below it");
+        let module = within.iter().next().expect("a name").to_string_lossy();
+        let Some(own) = rank(module.trim_end_matches(".rs")) else { continue };
+        let code = code(&file);
+        for used in named_modules(&code).into_iter().filter_map(rank) {
+            n_uses += 1;
+            let (user, file) = (MIND[own], within.display());
+            assert!(used <= own, "{file}: {user} uses {}, which comes later", MIND[used]);
+        }
+    }
+    assert!(n_uses > 50, "{n_uses} uses were found");
 }
 
 #[test]

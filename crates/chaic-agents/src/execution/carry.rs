@@ -11,7 +11,7 @@ use chaic_protocol::{Action, Vec2, Vec3};
 
 use super::navigate::{Destination, Nav, step_m};
 use crate::memory::Memory;
-use crate::memory::costs::{CostMap, FREE};
+use crate::planning::costs::{CostMap, FREE};
 use crate::track::Intent;
 
 /// Frames of a step and of a turn, about: what a way costs.

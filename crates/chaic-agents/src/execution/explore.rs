@@ -5,8 +5,9 @@ use chaic_protocol::geom::{Rect, xz};
 use chaic_protocol::{Action, Frame, Vec2};
 
 use super::navigate::{Destination, Nav, Navigator, face};
-use super::path::CostField;
-use crate::memory::{Memory, Space};
+use crate::mapping::Space;
+use crate::memory::Memory;
+use crate::planning::path::CostField;
 use crate::track::Intent;
 
 /// Borders shorter than this lead nowhere, cells (0.6 m).

@@ -4,9 +4,9 @@ use chaic_protocol::geom::xz;
 use chaic_protocol::{Action, Briefing, FailureReason, Outcome, Role, Vec2};
 
 use super::navigate::{Destination, Nav, Navigator};
-use crate::memory::semantic::Thing;
+use super::walking::style;
+use crate::mapping::semantic::Thing;
 use crate::memory::{Memory, SETTLE_FRAMES};
-use crate::rules::Walking;
 use crate::track::{Intent, TrackId};
 
 /// The arm reaches farther by so much over what an object lies on than the world lets it, metres:
@@ -66,13 +66,24 @@ impl Interaction {
         track: TrackId,
         within_m: f32,
     ) -> Step {
-        let Some(thing) = memory.things.get(track) else { return Step::GiveUp };
+        if memory.things.get(track).is_none() {
+            return Step::GiveUp;
+        }
         if self.n_tries >= memory.rules.failures.places_tried {
             return self.give_up(memory, track);
         }
-        if memory.rules.walking == Walking::Lattice {
-            return self.step_on_lattice(memory, navigator, track, within_m);
-        }
+        style(memory.rules.walking).approach(self, memory, navigator, track, within_m)
+    }
+
+    /// To where the arm reaches it.
+    pub(super) fn approach_with_care(
+        &mut self,
+        memory: &mut Memory,
+        navigator: &mut Navigator,
+        track: TrackId,
+        within_m: f32,
+    ) -> Step {
+        let Some(thing) = memory.things.get(track) else { return Step::GiveUp };
         let is_near = thing.distance_from(memory.here()) < within_m + 0.5;
         let mut destination = destination_at(thing, within_m);
         destination.avoid.clone_from(&self.tried);
@@ -101,8 +112,8 @@ impl Interaction {
         }
     }
 
-    /// The same where near enough is near enough as the crow flies.
-    fn step_on_lattice(
+    /// To where it is near enough as the crow flies.
+    pub(super) fn approach_on_lattice(
         &mut self,
         memory: &mut Memory,
         navigator: &mut Navigator,

@@ -7,9 +7,10 @@ use chaic_protocol::geom::{wrap_angle, yaw_towards};
 use chaic_protocol::{Action, Vec2, Vec3};
 
 use super::navigate::{Destination, Nav};
-use super::path::Path;
-use crate::memory::lattice_costs::BLOCKED;
-use crate::memory::{CELL_M, Memory, Space};
+use crate::mapping::{CELL_M, Space};
+use crate::memory::Memory;
+use crate::planning::lattice_costs::BLOCKED;
+use crate::planning::path::Path;
 
 /// One heads for the cell that is so many ahead on the way.
 const AHEAD: usize = 5;

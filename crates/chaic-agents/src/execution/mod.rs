@@ -1,8 +1,5 @@
 //! Carrying out plans, one action at a time.
 
-mod bucket_queue;
-pub mod path;
-
 pub mod carry;
 pub mod navigate;
 
@@ -12,6 +9,7 @@ pub mod interact;
 pub mod lattice;
 pub mod recover;
 pub mod sample;
+pub(crate) mod walking;
 
 use chaic_protocol::briefing::Relation;
 use chaic_protocol::geom::xz;
@@ -20,7 +18,7 @@ use chaic_protocol::{Action, Briefing, FailureReason, Frame, Hand, Outcome, Role
 
 use crate::decision::{HandState, Plan};
 use crate::memory::Memory;
-use crate::rules::{Exploration, PlaceChoice, PlanLimits, PlannerRules, Walking};
+use crate::rules::{Exploration, PlaceChoice, PlanLimits, PlannerRules};
 use crate::track::{Intent, TrackId};
 use explore::{Explorer, Found};
 use follow::{Follow, Follower};
@@ -28,6 +26,7 @@ use interact::{Interaction, Step};
 use navigate::Navigator;
 use recover::Recovery;
 use sample::Sampler;
+use walking::style;
 
 /// What the executor says of the plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -138,7 +137,7 @@ impl Executor {
         }
         // Two who carry get free by planning for both.
         let is_pair = s.memory.other_end.is_some();
-        if !is_standing && !is_pair && s.memory.rules.walking == Walking::Careful {
+        if !is_standing && !is_pair && style(s.memory.rules.walking).recovers() {
             if let Some(action) = self.recovery.step(s.memory, s.memory.last, &mut self.rng) {
                 return Progress::Act(action);
             }

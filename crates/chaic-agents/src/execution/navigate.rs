@@ -7,10 +7,10 @@ use chaic_protocol::briefing::Motion;
 use chaic_protocol::geom::{self, wrap_angle, xz};
 use chaic_protocol::{Action, Vec2, Vec3};
 
-use super::path::Goal;
+use super::walking::style;
 use crate::memory::Memory;
-use crate::memory::costs::{CostMap, OCCUPIED};
-use crate::rules::Walking;
+use crate::planning::costs::{CostMap, OCCUPIED};
+use crate::planning::path::Goal;
 use crate::track::Intent;
 
 /// Whoever heads for the target this well walks on, radians (9 degrees). Half a turn is 7.5, so
@@ -184,7 +184,7 @@ pub struct Navigator {
     age: u32,
     is_tight_way: bool,
     /// What lasts between decisions where ways are those of the original.
-    steady: super::lattice::Steadiness,
+    pub(super) steady: super::lattice::Steadiness,
     /// What comes next where two carry furniture.
     joint_way: VecDeque<Intent>,
 }
@@ -198,9 +198,11 @@ impl Navigator {
 
     /// The next action on the way to `destination`.
     pub fn step(&mut self, memory: &mut Memory, destination: &Destination) -> Nav {
-        if memory.rules.walking == Walking::Lattice {
-            return super::lattice::step(memory, destination, &mut self.steady);
-        }
+        style(memory.rules.walking).walk(self, memory, destination)
+    }
+
+    /// The same for a body of its true width.
+    pub(super) fn walk_with_care(&mut self, memory: &mut Memory, destination: &Destination) -> Nav {
         if let Some(nav) = super::carry::step(memory, destination, &mut self.joint_way) {
             return nav;
         }

@@ -8,9 +8,10 @@ use chaic_protocol::{Action, Briefing, Frame, Vec2};
 
 use super::explore::Found;
 use super::navigate::{Destination, Nav, Navigator};
-use super::path::StraightCostField;
-use crate::memory::lattice_costs::FARTHEST;
-use crate::memory::{Memory, Space};
+use crate::mapping::Space;
+use crate::memory::Memory;
+use crate::planning::lattice_costs::FARTHEST;
+use crate::planning::path::StraightCostField;
 
 /// So near to the place one is there, and nearer places are not chosen, metres.
 const THERE_M: f32 = 1.5;

@@ -5,7 +5,8 @@ use chaic_protocol::geom::horizontal_distance;
 use chaic_protocol::{Action, AgentError, Briefing, ClassId, FailureReason, Frame, Outcome, Role};
 
 use crate::decision::{Context, HandState, Plan, Policy, Subject};
-use crate::memory::{Memory, Person};
+use crate::mapping::Person;
+use crate::memory::Memory;
 use crate::rules::Bookkeeping;
 use crate::track::TrackId;
 

@@ -10,7 +10,7 @@ use super::House;
 use super::doors::CLASSES;
 use super::layout::WALL_M;
 use super::room::{BODY_M, foot};
-use crate::solid::{Solid, mm, mm3, plan_bounds, rect_distance};
+use crate::upright_box::{UprightBox, mm, mm3, plan_bounds, rect_distance};
 
 /// From a doorway's middle, metres: half of its width, the widest body and an arm's length.
 const DOOR_CLEAR_M: f32 = 1.5;
@@ -80,9 +80,9 @@ fn has_room(house: &House, thing: &Thing, others: &[Thing]) -> bool {
 }
 
 /// The ground with one thing more on it.
-fn without(house: &House, thing: &Thing) -> (crate::grid::Grid, Vec<bool>) {
+fn without(house: &House, thing: &Thing) -> (crate::free_space::FreeSpace, Vec<bool>) {
     let mut ground = house.ground.clone();
-    Solid::of_thing(thing).iter().for_each(|s| ground.block_rect(&s.bounds(), BODY_M));
+    UprightBox::of_thing(thing).iter().for_each(|s| ground.block_rect(&s.bounds(), BODY_M));
     let door = 0.5 * (house.openings[0].a + house.openings[0].b);
     let walkable = ground.flood(door);
     (ground, walkable)
@@ -95,7 +95,7 @@ fn blocks_nobody(house: &House, thing: &Thing) -> bool {
     let own = plan_bounds(thing).grown(BODY_M + 0.1);
     let cut_off =
         |i: usize| house.walkable[i] && !walkable[i] && !own.contains(house.ground.middle(i));
-    let near = |grid: &crate::grid::Grid, seen: &[bool], t: &Thing| {
+    let near = |grid: &crate::free_space::FreeSpace, seen: &[bool], t: &Thing| {
         let f = foot(t);
         grid.cells_in(f.grown(UP_TO_M))
             .any(|i| seen[i] && rect_distance(&f, grid.middle(i)) <= UP_TO_M)

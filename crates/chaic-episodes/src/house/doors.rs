@@ -6,7 +6,7 @@ use chaic_world::Thing;
 
 use super::House;
 use super::layout::DOOR_M;
-use crate::solid::{Solid, mm, mm3, plan_bounds};
+use crate::upright_box::{UprightBox, mm, mm3, plan_bounds};
 
 /// Free width beside an obstacle, metres: more than the 0.40 of a walker, less than the 0.70 of a
 /// wheelchair, with room for a planner's grid of 0.1 m.
@@ -98,6 +98,6 @@ fn obstacle(house: &House, door: usize, rng: &mut Stream) -> Thing {
     };
     let at = middle + along.abs() * shift;
     thing.position = mm3(Vec3::new(at.x, 0.0, at.y));
-    debug_assert!(Solid::of_thing(&thing).iter().all(|s| s.low_m < 1.0));
+    debug_assert!(UprightBox::of_thing(&thing).iter().all(|s| s.low_m < 1.0));
     thing
 }

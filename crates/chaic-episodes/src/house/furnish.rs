@@ -8,8 +8,8 @@ use super::layout::{Plan, WALL_M, plan};
 use super::room::{BODY_M, RoomPlan};
 use super::{House, decoys, recipes, slots};
 use crate::Settings;
-use crate::grid::Grid;
-use crate::solid::Solid;
+use crate::free_space::FreeSpace;
+use crate::upright_box::UprightBox;
 
 /// Fewest places for small objects on low furniture: 32 objects and 6 containers, with a choice.
 const LEAST_LOW_SLOTS: usize = 46;
@@ -63,7 +63,7 @@ pub(super) fn house(
         is_spanning: plan.doors.iter().map(|d| d.is_spanning).collect(),
         floors,
         furniture,
-        ground: Grid::new(Rect::new([0.0; 2], [0.1; 2])),
+        ground: FreeSpace::new(Rect::new([0.0; 2], [0.1; 2])),
         walkable: Vec::new(),
     };
     survey(&mut house);
@@ -135,10 +135,10 @@ fn furnished(
 
 /// Works out where a wide body can walk.
 fn survey(house: &mut House) {
-    let mut solids: Vec<Solid> = house.walls.iter().map(Solid::of_wall).collect();
-    solids.extend(house.furniture.iter().flat_map(Solid::of_thing));
+    let mut solids: Vec<UprightBox> = house.walls.iter().map(UprightBox::of_wall).collect();
+    solids.extend(house.furniture.iter().flat_map(UprightBox::of_thing));
     solids.retain(|s| s.spans([0.12, 1.75]));
-    house.ground = Grid::around(house.bounds, BODY_M, &solids);
+    house.ground = FreeSpace::around(house.bounds, BODY_M, &solids);
     let door = 0.5 * (house.openings[0].a + house.openings[0].b);
     house.walkable = house.ground.flood(door);
 }

@@ -5,7 +5,7 @@ use chaic_protocol::geom::Rect;
 use chaic_protocol::rng::Stream;
 use chaic_world::{Opening, RoomKind};
 
-use crate::solid::mm;
+use crate::upright_box::mm;
 
 /// Thickness of all walls, metres.
 pub(super) const WALL_M: f32 = 0.12;

@@ -26,8 +26,8 @@ use chaic_protocol::geom::Rect;
 use chaic_world::{Floor, Opening, Room, Setup, Thing, Wall};
 
 use crate::Settings;
+use crate::free_space::FreeSpace;
 use crate::generate::{GenerateError, Seeds, first_valid};
-use crate::grid::Grid;
 
 /// Version of this generator; goes up with every change of what it makes.
 pub const VERSION: u32 = 1;
@@ -54,7 +54,7 @@ pub struct House {
     pub(crate) floors: Vec<Floor>,
     pub(crate) furniture: Vec<Thing>,
     /// Where a wide body can stand.
-    pub(crate) ground: Grid,
+    pub(crate) ground: FreeSpace,
     /// Which of these cells hang together with the doorways.
     pub(crate) walkable: Vec<bool>,
 }

@@ -12,7 +12,7 @@ use super::goods::{Goods, VASES, containers, goods};
 use super::slots::{HighTop, Slot};
 use super::walls::CEILING_M;
 use super::{House, doors, slots};
-use crate::solid::mm;
+use crate::upright_box::mm;
 
 /// Most small objects on high tops (facts S11.2).
 const MOST_HIGH: usize = 15;

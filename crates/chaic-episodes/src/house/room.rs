@@ -9,8 +9,8 @@ use chaic_protocol::{ClassId, Vec2, Vec3};
 use chaic_world::Thing;
 
 use super::layout::{DOOR_M, Door, WALL_M};
-use crate::grid::Grid;
-use crate::solid::{mm, mm3};
+use crate::free_space::FreeSpace;
+use crate::upright_box::{mm, mm3};
 
 /// Room for the widest body and a hand's breadth, metres: a wheelchair has 0.35.
 pub(super) const BODY_M: f32 = 0.40;
@@ -232,7 +232,7 @@ impl RoomPlan {
 
     /// Whether a wide body gets from every doorway to all furniture and has room left.
     fn is_walkable(&self) -> bool {
-        let mut grid = Grid::around(self.inner, BODY_M, []);
+        let mut grid = FreeSpace::around(self.inner, BODY_M, []);
         let empty = grid.free.iter().filter(|f| **f).count();
         self.feet.iter().for_each(|f| grid.block_rect(f, BODY_M));
         let Some(start) = self.door_points.first() else { return false };
@@ -241,7 +241,7 @@ impl RoomPlan {
         let stands = |p: &Vec2| grid.cell(*p).is_some_and(|i| seen[i]);
         let near = |f: &Rect| {
             grid.cells_in(f.grown(UP_TO_M))
-                .any(|i| seen[i] && crate::solid::rect_distance(f, grid.middle(i)) <= UP_TO_M)
+                .any(|i| seen[i] && crate::upright_box::rect_distance(f, grid.middle(i)) <= UP_TO_M)
         };
         left as f32 >= LEAST_FREE * empty as f32
             && self.door_points.iter().all(stands)

@@ -7,7 +7,7 @@ use chaic_world::{Surface, Thing, top_surfaces};
 
 use super::House;
 use super::room::foot;
-use crate::solid::{Solid, mm, mm3, rect_distance};
+use crate::upright_box::{UprightBox, mm, mm3, rect_distance};
 
 /// Furniture on which small things lie in ordinary life (facts S11.2: tables, sofas, chairs).
 const LOW_HOSTS: [&str; 10] = [
@@ -83,15 +83,16 @@ impl Slot {
         let position = mm3(self.surface.center + offset);
         let yaw_rad = mm(chaic_protocol::geom::wrap_angle(self.surface.yaw_rad + turn_rad));
         let thing = Thing::new(class, position, yaw_rad);
-        let solids = Solid::of_thing(&thing);
-        let touches = |other: &Solid, slack: f32| solids.iter().any(|s| s.overlap(other) > slack);
-        let host = Solid::of_thing(&house.furniture[self.host]);
+        let solids = UprightBox::of_thing(&thing);
+        let touches =
+            |other: &UprightBox, slack: f32| solids.iter().any(|s| s.overlap(other) > slack);
+        let host = UprightBox::of_thing(&house.furniture[self.host]);
         let near = |t: &&Thing| xz(t.position).distance(xz(position)) < 0.8;
         let is_clear = !host.iter().any(|h| touches(h, 0.004))
             && !others.iter().filter(near).any(|t| {
                 let apart = 0.5 * (t.size_m().max_element() + thing.size_m().max_element());
                 let close = xz(t.position).distance(xz(position)) < apart + APART_M;
-                close && Solid::of_thing(t).iter().any(|o| touches(o, -APART_M))
+                close && UprightBox::of_thing(t).iter().any(|o| touches(o, -APART_M))
             });
         is_clear.then_some(thing)
     }

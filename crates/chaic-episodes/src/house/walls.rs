@@ -4,7 +4,7 @@ use chaic_protocol::Vec2;
 use chaic_world::Wall;
 
 use super::layout::{DOOR_M, Door, Plan, WALL_M};
-use crate::solid::mm;
+use crate::upright_box::mm;
 
 /// Height of rooms, metres.
 pub(super) const CEILING_M: f32 = 2.9;

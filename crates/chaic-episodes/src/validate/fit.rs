@@ -5,7 +5,7 @@ use chaic_protocol::{Role, Vec3};
 use chaic_world::{Block, Rules, Setup, Surface, Thing, blocks_of, top_surfaces};
 
 use super::{Demand, Problem, TOLERANCE_M, thing_field};
-use crate::solid::{Solid, plan_bounds};
+use crate::upright_box::{UprightBox, plan_bounds};
 
 /// How far from walls people start indoors, metres (paper, "Task Generation").
 const START_CLEARANCE_M: f32 = 0.5;
@@ -14,8 +14,8 @@ const START_CLEARANCE_M: f32 = 0.5;
 const LEANING_M: f32 = 0.3;
 
 pub(super) fn problems(setup: &Setup, demand: Demand) -> Vec<Problem> {
-    let solids: Vec<Vec<Solid>> = setup.things.iter().map(Solid::of_thing).collect();
-    let walls = Solid::of_walls(setup);
+    let solids: Vec<Vec<UprightBox>> = setup.things.iter().map(UprightBox::of_thing).collect();
+    let walls = UprightBox::of_walls(setup);
     let mut found = Vec::new();
     overlaps(setup, demand, &solids, &walls, &mut found);
     support(setup, demand, &mut found);
@@ -24,7 +24,7 @@ pub(super) fn problems(setup: &Setup, demand: Demand) -> Vec<Problem> {
 }
 
 /// The deepest that any box of one list sits in any of another.
-fn deepest(a: &[Solid], b: &[Solid]) -> f32 {
+fn deepest(a: &[UprightBox], b: &[UprightBox]) -> f32 {
     let pairs = a.iter().flat_map(|a| b.iter().map(move |b| a.overlap(b)));
     pairs.fold(f32::MIN, f32::max)
 }
@@ -32,8 +32,8 @@ fn deepest(a: &[Solid], b: &[Solid]) -> f32 {
 fn overlaps(
     setup: &Setup,
     demand: Demand,
-    solids: &[Vec<Solid>],
-    walls: &[Solid],
+    solids: &[Vec<UprightBox>],
+    walls: &[UprightBox],
     found: &mut Vec<Problem>,
 ) {
     let bounds: Vec<_> = setup.things.iter().map(plan_bounds).collect();
@@ -118,8 +118,8 @@ fn all_tops(thing: &Thing) -> Vec<Surface> {
 fn starts(
     setup: &Setup,
     demand: Demand,
-    solids: &[Vec<Solid>],
-    walls: &[Solid],
+    solids: &[Vec<UprightBox>],
+    walls: &[UprightBox],
     found: &mut Vec<Problem>,
 ) {
     let step_over_m = Rules::paper().step_over_m;

@@ -7,8 +7,8 @@ use chaic_protocol::{AgentId, Role, Vec2};
 use chaic_world::{Person, Rules, Setup, Thing};
 
 use super::{Demand, Problem, thing_field};
-use crate::grid::{CELL_M, Grid};
-use crate::solid::Solid;
+use crate::free_space::{CELL_M, FreeSpace};
+use crate::upright_box::UprightBox;
 
 /// How [`out_of_reach`] and [`ways_from`] look for ways.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,8 +26,8 @@ pub struct Walker {
 /// move. Targets, containers, goal places and obstacles are needed.
 pub fn out_of_reach(setup: &Setup, agent: AgentId, walker: Walker) -> Vec<usize> {
     let Some(person) = setup.people.get(agent.index()) else { return Vec::new() };
-    let walls = Solid::of_walls(setup);
-    let see_through: Vec<Solid> = walls.iter().filter(|w| w.low_m < 1.0).copied().collect();
+    let walls = UprightBox::of_walls(setup);
+    let see_through: Vec<UprightBox> = walls.iter().filter(|w| w.low_m < 1.0).copied().collect();
     let (grid, seen) = ground(setup, person, &walls, walker, Obstacles::Gone);
     let mut missed = needed_things(setup);
     missed.retain(|k| !gets_at(&grid, &seen, walker.reach_m, &setup.things[*k], &see_through));
@@ -38,8 +38,8 @@ pub fn out_of_reach(setup: &Setup, agent: AgentId, walker: Walker) -> Vec<usize>
 /// [`Setup::things`], once everything that one hand can take out of the way is gone; infinite where
 /// there is no way.
 pub fn ways_from(setup: &Setup, thing: usize, walker: Walker) -> Vec<f32> {
-    let walls = Solid::of_walls(setup);
-    let see_through: Vec<Solid> = walls.iter().filter(|w| w.low_m < 1.0).copied().collect();
+    let walls = UprightBox::of_walls(setup);
+    let see_through: Vec<UprightBox> = walls.iter().filter(|w| w.low_m < 1.0).copied().collect();
     let height_m = Persona::Adult.capability().height_m;
     let grid = walkable(setup, height_m, &walls, walker, Obstacles::Gone);
     let beside = |k: usize| beside(&grid, walker.reach_m, &setup.things[k], &see_through);
@@ -50,7 +50,7 @@ pub fn ways_from(setup: &Setup, thing: usize, walker: Walker) -> Vec<f32> {
 }
 
 pub(super) fn problems(setup: &Setup, demand: Demand) -> Vec<Problem> {
-    let walls = Solid::of_walls(setup);
+    let walls = UprightBox::of_walls(setup);
     let needed = needed_things(setup);
     let mut found = Vec::new();
     let agents: &[AgentId] = match demand {
@@ -68,7 +68,8 @@ pub(super) fn problems(setup: &Setup, demand: Demand) -> Vec<Problem> {
             found.push(Problem::new(field, format!("leaves the {agent} no room to move")));
             continue;
         }
-        let see_through: Vec<Solid> = walls.iter().filter(|w| w.low_m < 1.0).copied().collect();
+        let see_through: Vec<UprightBox> =
+            walls.iter().filter(|w| w.low_m < 1.0).copied().collect();
         // Something to bring and somewhere to bring it; which of it is enough to play.
         let mut got_at = [false; 2];
         let mut missed = Vec::new();
@@ -95,14 +96,14 @@ pub(super) fn problems(setup: &Setup, demand: Demand) -> Vec<Problem> {
 }
 
 /// Obstacles keep the partner from something where the task is about them, and nowhere else.
-fn obstacle_problem(setup: &Setup, walls: &[Solid]) -> Option<Problem> {
+fn obstacle_problem(setup: &Setup, walls: &[UprightBox]) -> Option<Problem> {
     let is_obstacle = |k: &usize| setup.things[*k].class.info().role == Role::Obstacle;
     (0..setup.things.len()).find(is_obstacle)?;
     let person = setup.people.first()?;
     let reach_m = Rules::paper().arm_reach_m;
     let walker = Walker { radius_m: person.capability().radius_m, reach_m, cell_m: CELL_M };
     let (grid, seen) = ground(setup, person, walls, walker, Obstacles::There);
-    let see_through: Vec<Solid> = walls.iter().filter(|w| w.low_m < 1.0).copied().collect();
+    let see_through: Vec<UprightBox> = walls.iter().filter(|w| w.low_m < 1.0).copied().collect();
     let needed = needed_things(setup).into_iter().filter(|k| !is_obstacle(k));
     let mut missed =
         needed.filter(|k| !gets_at(&grid, &seen, reach_m, &setup.things[*k], &see_through));
@@ -144,10 +145,10 @@ fn needed_things(setup: &Setup) -> Vec<usize> {
 fn ground(
     setup: &Setup,
     person: &Person,
-    walls: &[Solid],
+    walls: &[UprightBox],
     walker: Walker,
     obstacles: Obstacles,
-) -> (Grid, Vec<bool>) {
+) -> (FreeSpace, Vec<bool>) {
     let grid = walkable(setup, person.capability().height_m, walls, walker, obstacles);
     let seen = grid.flood(xz(person.pose.position));
     (grid, seen)
@@ -157,37 +158,45 @@ fn ground(
 fn walkable(
     setup: &Setup,
     height_m: f32,
-    walls: &[Solid],
+    walls: &[UprightBox],
     walker: Walker,
     obstacles: Obstacles,
-) -> Grid {
+) -> FreeSpace {
     let stands = [Rules::paper().step_over_m, height_m];
     let stays = setup.things.iter().filter(|t| {
         let info = t.class.info();
         let is_gone = info.role == Role::Obstacle && obstacles == Obstacles::Gone;
         t.fixed || !(info.is_carriable() || is_gone)
     });
-    let stays = stays.filter(|t| t.class.info().role != Role::Vehicle).flat_map(Solid::of_thing);
-    let solids: Vec<Solid> =
+    let stays =
+        stays.filter(|t| t.class.info().role != Role::Vehicle).flat_map(UprightBox::of_thing);
+    let solids: Vec<UprightBox> =
         stays.chain(walls.iter().copied()).filter(|s| s.spans(stands)).collect();
-    Grid::fine(setup.bounds, walker.cell_m, walker.radius_m, &solids)
+    FreeSpace::fine(setup.bounds, walker.cell_m, walker.radius_m, &solids)
 }
 
-fn gets_at(grid: &Grid, seen: &[bool], reach_m: f32, thing: &Thing, walls: &[Solid]) -> bool {
+fn gets_at(
+    grid: &FreeSpace,
+    seen: &[bool],
+    reach_m: f32,
+    thing: &Thing,
+    walls: &[UprightBox],
+) -> bool {
     beside(grid, reach_m, thing, walls).into_iter().any(|i| seen[i])
 }
 
 /// The free cells from which a thing is within reach, and no wall between.
-fn beside(grid: &Grid, reach_m: f32, thing: &Thing, walls: &[Solid]) -> Vec<usize> {
-    let parts = Solid::of_thing(thing);
-    let is_beside = |part: &Solid, i: &usize| {
+fn beside(grid: &FreeSpace, reach_m: f32, thing: &Thing, walls: &[UprightBox]) -> Vec<usize> {
+    let parts = UprightBox::of_thing(thing);
+    let is_beside = |part: &UprightBox, i: &usize| {
         let from = grid.middle(*i);
         part.distance(from) <= reach_m && sees(from, part.nearest(from), walls)
     };
-    let near = |part: &Solid| grid.cells_in(part.bounds().grown(reach_m)).filter(|i| grid.free[*i]);
+    let near =
+        |part: &UprightBox| grid.cells_in(part.bounds().grown(reach_m)).filter(|i| grid.free[*i]);
     parts.iter().flat_map(|part| near(part).filter(|i| is_beside(part, i))).collect()
 }
 
-fn sees(from: Vec2, to: Vec2, walls: &[Solid]) -> bool {
+fn sees(from: Vec2, to: Vec2, walls: &[UprightBox]) -> bool {
     !walls.iter().any(|w| w.cuts(from, to))
 }

@@ -15,7 +15,7 @@ use image::RgbImage;
 
 use crate::error::{EvalError, Result};
 use crate::run::RunFolder;
-use crate::video::{VideoError, VideoWriter};
+use chaic_video::{VideoError, VideoWriter};
 
 pub use panel::{HEIGHT_PX, WIDTH_PX};
 

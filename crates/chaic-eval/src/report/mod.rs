@@ -2,17 +2,17 @@
 
 mod coverage;
 mod figure;
-mod grid;
 mod labels;
 mod tables;
+mod text_table;
 mod write;
 
 pub use coverage::{coverage, without_trace};
 pub use figure::write_figure;
-pub(crate) use grid::Grid;
 pub use labels::{GrantsFile, Labels, title};
 pub use tables::{additional, counts, intervals, main_result, measures, pairs, resolutions, stuck};
-pub(crate) use tables::{capitalized, interval, number, rounded, shown_interval};
+pub use tables::{capitalized, interval, number, rounded, shown_interval};
+pub use text_table::TextTable;
 pub use write::{Report, differing_files, write_files};
 
 use std::fmt;

@@ -7,8 +7,8 @@ use chaic_protocol::TaskId;
 use crate::metrics::{
     Difference, Interval, MEASURES, Measure, Metric, RunResult, Score, Scores, resolution,
 };
-use crate::report::grid::Grid;
 use crate::report::labels::{Labels, title};
+use crate::report::text_table::TextTable;
 
 /// What stands where there is nothing to say, as in the paper.
 const UNDEFINED: &str = "/";
@@ -52,7 +52,7 @@ impl Column {
 }
 
 /// The paper's main table: TR(EI), IA, and ER while shopping.
-pub fn main_result(scores: &Scores, labels: Labels<'_>) -> Vec<Grid> {
+pub fn main_result(scores: &Scores, labels: Labels<'_>) -> Vec<TextTable> {
     let columns = [
         Column { name: "TR(EI)", in_task: |_| true, cell: Cell::Text(rate_and_improvement) },
         Column::of("ia"),
@@ -63,13 +63,13 @@ pub fn main_result(scores: &Scores, labels: Labels<'_>) -> Vec<Grid> {
 }
 
 /// The paper's additional table: CR, and how uncertain TR is.
-pub fn additional(scores: &Scores, labels: Labels<'_>) -> Vec<Grid> {
+pub fn additional(scores: &Scores, labels: Labels<'_>) -> Vec<TextTable> {
     let columns = ["cr", "tr_se"].map(Column::of);
     blocks(scores, labels, "Completion ratio of the helper, standard error of TR", &columns)
 }
 
 /// For how much of their time partner or helper were stuck; nothing where no result tells.
-pub fn stuck(scores: &Scores, labels: Labels<'_>) -> Vec<Grid> {
+pub fn stuck(scores: &Scores, labels: Labels<'_>) -> Vec<TextTable> {
     let columns = [Column::of("stuck")];
     let is_known = scores.tasks.values().flat_map(|row| row.values()).any(|s| s.stuck.is_some());
     let name = capitalized(Metric::of("stuck").title);
@@ -77,7 +77,7 @@ pub fn stuck(scores: &Scores, labels: Labels<'_>) -> Vec<Grid> {
 }
 
 /// What else was measured, a table for each of the [`MEASURES`]; nothing where no result has it.
-pub fn measures(scores: &Scores, labels: Labels<'_>) -> Vec<Grid> {
+pub fn measures(scores: &Scores, labels: Labels<'_>) -> Vec<TextTable> {
     let tasks = scores.tasks();
     let grid = |measure: &Measure| {
         let of = |task: TaskId, helper: &str| {
@@ -93,7 +93,7 @@ pub fn measures(scores: &Scores, labels: Labels<'_>) -> Vec<Grid> {
         let header = std::iter::once("Helper".to_owned());
         let helpers = scores.helpers();
         let is_known = helpers.iter().any(|h| tasks.iter().any(|t| of(*t, h).is_some()));
-        is_known.then(|| Grid {
+        is_known.then(|| TextTable {
             title: measure.title.to_owned(),
             header: header.chain(tasks.iter().map(|t| t.info().title.to_owned())).collect(),
             rows: helpers.iter().map(row).collect(),
@@ -103,7 +103,7 @@ pub fn measures(scores: &Scores, labels: Labels<'_>) -> Vec<Grid> {
 }
 
 /// The transport rates with their 95 % intervals.
-pub fn intervals(scores: &Scores, labels: Labels<'_>) -> Grid {
+pub fn intervals(scores: &Scores, labels: Labels<'_>) -> TextTable {
     let tasks = scores.tasks();
     let cell = |helper: &String, task: &TaskId| {
         let Some(score) = scores.get(*task, helper) else { return UNDEFINED.to_owned() };
@@ -116,7 +116,7 @@ pub fn intervals(scores: &Scores, labels: Labels<'_>) -> Grid {
         std::iter::once(labels.lines(helper)).chain(cells).collect()
     };
     let header = std::iter::once("TR".to_owned());
-    Grid {
+    TextTable {
         title: "Transport rate with 95 % intervals over environments".to_owned(),
         header: header.chain(tasks.iter().map(|t| t.info().title.to_owned())).collect(),
         rows: scores.helpers().iter().map(row).collect(),
@@ -124,7 +124,7 @@ pub fn intervals(scores: &Scores, labels: Labels<'_>) -> Grid {
 }
 
 /// What the episodes can tell apart, task by task; `None` where no pair of helpers has an interval.
-pub fn resolutions(differences: &[Difference], tasks: &[TaskId]) -> Option<Grid> {
+pub fn resolutions(differences: &[Difference], tasks: &[TaskId]) -> Option<TextTable> {
     let of_task = tasks.iter().map(|t| (t.info().title, Some(*t)));
     let rows = of_task.chain(std::iter::once(("all tasks", None))).filter_map(|(name, task)| {
         let r = resolution(differences, task)?;
@@ -133,7 +133,7 @@ pub fn resolutions(differences: &[Difference], tasks: &[TaskId]) -> Option<Grid>
     });
     let rows: Vec<Vec<String>> = rows.collect();
     let header = ["Task", "environments", "median pair of helpers", "widest pair"];
-    (!rows.is_empty()).then(|| Grid {
+    (!rows.is_empty()).then(|| TextTable {
         title:
             "Smallest difference of TR that can be told from zero (half the 95 % interval of the \
                 paired difference)"
@@ -144,7 +144,7 @@ pub fn resolutions(differences: &[Difference], tasks: &[TaskId]) -> Option<Grid>
 }
 
 /// Differences of TR between helpers, with 95 % intervals; `granted` says what these are granted.
-pub fn pairs(differences: &[Difference], tasks: &[TaskId], granted: Option<&str>) -> Grid {
+pub fn pairs(differences: &[Difference], tasks: &[TaskId], granted: Option<&str>) -> TextTable {
     let header = ["TR difference".to_owned(), "all".to_owned()].into_iter();
     let header = header.chain(tasks.iter().map(|t| t.info().title.to_owned()));
     let row = |d: &Difference| {
@@ -152,7 +152,7 @@ pub fn pairs(differences: &[Difference], tasks: &[TaskId], granted: Option<&str>
         let cells = tasks.iter().map(|t| interval(d.tasks.get(t)));
         [name, interval(d.all.as_ref())].into_iter().chain(cells).collect()
     };
-    Grid {
+    TextTable {
         title: format!(
             "Differences of TR on the same episodes, with 95 % intervals over environments{}",
             granted.map_or(String::new(), |text| format!(". {text}"))
@@ -163,7 +163,7 @@ pub fn pairs(differences: &[Difference], tasks: &[TaskId], granted: Option<&str>
 }
 
 /// What minds counted of their own doings, summed over all episodes; `None` if nobody counted.
-pub fn counts(results: &[RunResult], labels: Labels<'_>) -> Option<Grid> {
+pub fn counts(results: &[RunResult], labels: Labels<'_>) -> Option<TextTable> {
     let mut sums: BTreeMap<&str, BTreeMap<&str, u64>> = BTreeMap::new();
     for result in results {
         for (name, n) in result.summary().into_iter().flat_map(|s| &s.counts) {
@@ -176,14 +176,14 @@ pub fn counts(results: &[RunResult], labels: Labels<'_>) -> Option<Grid> {
         std::iter::once(name.replace('_', " ").replace('.', ": ")).chain(cells).collect()
     };
     let header = std::iter::once("Count".to_owned()).chain(helpers.iter().map(|h| labels.lines(h)));
-    (!sums.is_empty()).then(|| Grid {
+    (!sums.is_empty()).then(|| TextTable {
         title: "What minds counted of their own doings, all episodes".to_owned(),
         header: header.collect(),
         rows: sums.iter().map(row).collect(),
     })
 }
 
-fn blocks(scores: &Scores, labels: Labels<'_>, name: &str, columns: &[Column]) -> Vec<Grid> {
+fn blocks(scores: &Scores, labels: Labels<'_>, name: &str, columns: &[Column]) -> Vec<TextTable> {
     let tasks = scores.tasks();
     let helpers = scores.helpers();
     let grid = |tasks: &[TaskId]| {
@@ -209,13 +209,13 @@ fn blocks(scores: &Scores, labels: Labels<'_>, name: &str, columns: &[Column]) -
             std::iter::once(labels.lines(helper)).chain(shown.iter().map(cell)).collect()
         };
         let rows = helpers.iter().map(row).collect();
-        Grid { title: name.to_owned(), header, rows }
+        TextTable { title: name.to_owned(), header, rows }
     };
     tasks.chunks(TASKS_ABREAST).map(grid).collect()
 }
 
 /// The interval of TR where it says more than that a rate is between 0 and 1.
-pub(crate) fn shown_interval(score: &Score) -> Option<[f64; 2]> {
+pub fn shown_interval(score: &Score) -> Option<[f64; 2]> {
     score.tr_ci.filter(|_| score.environments >= MIN_ENVIRONMENTS)
 }
 
@@ -237,12 +237,12 @@ fn rate_and_improvement(score: &Score) -> String {
 }
 
 /// Two decimals, or a sign that there is nothing to say.
-pub(crate) fn number(value: Option<f64>) -> String {
+pub fn number(value: Option<f64>) -> String {
     value.map_or(UNDEFINED.to_owned(), rounded)
 }
 
 /// With a capital letter at its head.
-pub(crate) fn capitalized(text: &str) -> String {
+pub fn capitalized(text: &str) -> String {
     let head = text.chars().next().map_or(0, char::len_utf8);
     text[..head].to_uppercase() + &text[head..]
 }
@@ -255,12 +255,12 @@ fn fixed(value: f64, decimals: usize) -> String {
 }
 
 /// Two decimals; what rounds to zero has no sign.
-pub(crate) fn rounded(value: f64) -> String {
+pub fn rounded(value: f64) -> String {
     fixed(value, 2)
 }
 
 /// A mean with its interval, or a sign that there is nothing to say.
-pub(crate) fn interval(interval: Option<&Interval>) -> String {
+pub fn interval(interval: Option<&Interval>) -> String {
     match interval {
         None => UNDEFINED.to_owned(),
         Some(i) if i.environments < MIN_ENVIRONMENTS => rounded(i.mean),

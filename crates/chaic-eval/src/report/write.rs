@@ -14,12 +14,12 @@ use crate::metrics::{
 use crate::report::Format;
 use crate::report::coverage::coverage;
 use crate::report::figure::{figure_text, write_figure};
-use crate::report::grid::Grid;
 use crate::report::labels::{GrantsFile, Labels};
 use crate::report::tables::{
     BROKEN, MISSING, additional, counts, intervals, main_result, measures, pairs, resolutions,
     stuck,
 };
+use crate::report::text_table::TextTable;
 use crate::run::{Item, RunFolder, RunGrants, RunOptions, environments};
 
 /// All that a report is made from.
@@ -122,7 +122,7 @@ impl Report<'_> {
         serde_json::to_string_pretty(&file).expect("scores have string keys") + "\n"
     }
 
-    fn grids(&self, scores: &Scores) -> Vec<Grid> {
+    fn grids(&self, scores: &Scores) -> Vec<TextTable> {
         let labels = self.labels();
         let mut grids = main_result(scores, labels);
         grids.extend(additional(scores, labels));

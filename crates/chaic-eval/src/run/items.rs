@@ -136,7 +136,7 @@ fn episode_files(folder: &Path) -> Result<Vec<PathBuf>> {
 }
 
 /// The tasks of the episodes in a folder, in the paper's order.
-pub(crate) fn tasks_of_files(folder: &Path) -> Result<Vec<TaskId>> {
+pub fn tasks_of_files(folder: &Path) -> Result<Vec<TaskId>> {
     let present: BTreeSet<TaskId> = read_files(folder)?.iter().map(Episode::task).collect();
     if present.is_empty() {
         let text = format!("{} holds no episode file (*.json)", folder.display());

@@ -2,7 +2,8 @@
 
 use chaic_agents::behavior::SeenInteraction;
 use chaic_agents::decision::{Context, Plan};
-use chaic_agents::memory::{Memory, Thing};
+use chaic_agents::mapping::Thing;
+use chaic_agents::memory::Memory;
 use chaic_agents::track::Carried;
 use chaic_agents::{Intent, TrackId};
 use chaic_protocol::briefing::Relation;

@@ -109,7 +109,7 @@ mod tests {
 
     use super::*;
     use crate::geometry::FINEST;
-    use crate::view::scenes;
+    use chaic_test_kit::scenes;
 
     #[test]
     fn a_body_stays_within_its_bounds_and_they_are_close() {

@@ -188,7 +188,7 @@ impl World {
         let n = (horizontal_distance(from, to) / SPACING_M).ceil() as u32;
         (1..n).any(|i| {
             let p = from.lerp(to, i as f32 / n as f32);
-            let mut walls = self.surroundings.near(xz(p)).filter(|b| b.entity == EntityId::WALL);
+            let mut walls = self.block_index.near(xz(p)).filter(|b| b.entity == EntityId::WALL);
             walls.any(|b| b.y_range()[0] < self.rules.step_over_m && b.nearest_in_plan(p).1)
         })
     }

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
+use chaic_bench::channels_named;
 use chaic_episodes::house;
-use chaic_eval::bench::channels_named;
 use chaic_render::Channels;
 use chaic_render::geometry::FINEST;
 use clap::{Args, Subcommand, ValueEnum};

@@ -1,11 +1,11 @@
 //! `chaic bench`.
 
 use anyhow::Result;
-use chaic_eval::bench::{
+use chaic_bench::{
     BenchScene, EnvBench, EnvSpeed, Machine, N_VIEWS, RenderBench, RenderSpeed, WorldSpeed,
     measure_world,
 };
-use chaic_eval::scene_file::Written;
+use chaic_gltf::Written;
 use comfy_table::{ContentArrangement, Table, presets};
 use serde::Serialize;
 

@@ -8,10 +8,10 @@ use std::time::Duration;
 use anyhow::{Context as _, Result, anyhow};
 use chaic_env::minds::BuiltIn;
 use chaic_env::rules::differing_rules;
-use chaic_eval::fidelity::{
+use chaic_eval::run::{Access, Progress, Run};
+use chaic_fidelity::{
     ExperimentRequest, Matrix, Part, Sheet, check_document, parts, write_document,
 };
-use chaic_eval::run::{Access, Progress, Run};
 use indicatif::HumanDuration;
 
 use super::eval::{keep_workers_quiet, leave_report};

@@ -1,7 +1,7 @@
 //! `chaic scene`.
 
 use anyhow::Result;
-use chaic_eval::scene_file::{self, SceneOptions, Written};
+use chaic_gltf::{SceneOptions, Written};
 
 use crate::arguments::SceneCommand;
 use crate::exit::Ended;
@@ -13,7 +13,7 @@ pub fn run(command: &SceneCommand) -> Result<Ended> {
     let episode = super::episode(&arguments.episode)?;
     let options =
         SceneOptions { detail: usize::from(arguments.detail), hide_ceiling: arguments.no_ceiling };
-    let Written { instances, triangles } = scene_file::write(&episode, options, &arguments.out)?;
+    let Written { instances, triangles } = chaic_gltf::write(&episode, options, &arguments.out)?;
     let (out, id) = (arguments.out.display(), episode.id());
     say(&format!("{out}: {id} in {instances} nodes with {triangles} triangles\n"))?;
     Ok(Ended::Well)

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::execution::navigate::{Destination, Nav, Navigator};
-use crate::memory::{OccupancyMap, Space};
+use crate::mapping::{OccupancyMap, Space};
 use chaic_protocol::Vec2;
 
 /// Draws the whole place of a situation by where each cell lies.

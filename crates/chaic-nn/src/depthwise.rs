@@ -1,0 +1,199 @@
+//! Depthwise convolutions of stride 1: each channel by a square kernel of its own, with zeros around
+//! the map. Sums run over the kernel, row by row, in chains of fused multiply-adds.
+
+use pulp::{Arch, Simd, WithSimd};
+
+use crate::tensor::Shape;
+
+/// Channels of depthwise convolutions are a multiple of this: whole vectors on every machine.
+pub const CHANNEL_MULTIPLE: usize = 16;
+
+/// Working space: one map with zeros around it.
+#[derive(Clone, Debug, Default)]
+pub struct Padded {
+    data: Vec<f32>,
+}
+
+impl Padded {
+    /// One map of this shape with `border` zeros on each side.
+    fn fill(&mut self, map: &[f32], shape: Shape, border: usize) -> &[f32] {
+        let row = (shape.width + 2 * border) * shape.channels;
+        self.data.clear();
+        self.data.resize((shape.height + 2 * border) * row, 0.0);
+        let own = shape.width * shape.channels;
+        let rows = self.data[border * row..].chunks_exact_mut(row);
+        for (to, from) in rows.zip(map.chunks_exact(own)) {
+            to[border * shape.channels..][..own].copy_from_slice(from);
+        }
+        &self.data
+    }
+}
+
+fn check(shape: Shape, weights: &[f32], side: usize) {
+    assert!(side == 3 || side == 5, "kernels are 3 or 5 wide, not {side}");
+    assert_eq!(weights.len(), side * side * shape.channels, "weights of another shape");
+    assert!(shape.channels.is_multiple_of(CHANNEL_MULTIPLE), "{} channels", shape.channels);
+}
+
+/// Convolves one map, shape [height, width, channels], with weights of shape [side, side, channels].
+///
+/// # Panics
+/// If a slice has another length than its shape, or `side` is neither 3 nor 5.
+pub fn forward(
+    arch: Arch,
+    map: &[f32],
+    shape: Shape,
+    (weights, side): (&[f32], usize),
+    out: &mut [f32],
+    padded: &mut Padded,
+) {
+    check(shape, weights, side);
+    assert_eq!((map.len(), out.len()), (shape.of_one(), shape.of_one()));
+    let map = padded.fill(map, shape, side / 2);
+    arch.dispatch(Forward { map, shape, weights, side, out, is_flipped: false });
+}
+
+/// The gradient by the map of what [`forward`] gave, from that by its result.
+///
+/// # Panics
+/// As [`forward`].
+pub fn backward_map(
+    arch: Arch,
+    gradient: &[f32],
+    shape: Shape,
+    (weights, side): (&[f32], usize),
+    out: &mut [f32],
+    padded: &mut Padded,
+) {
+    check(shape, weights, side);
+    assert_eq!((gradient.len(), out.len()), (shape.of_one(), shape.of_one()));
+    let map = padded.fill(gradient, shape, side / 2);
+    arch.dispatch(Forward { map, shape, weights, side, out, is_flipped: true });
+}
+
+/// Adds the gradient by the weights, from the map and the gradient by the result.
+///
+/// # Panics
+/// As [`forward`].
+pub fn backward_weights(
+    arch: Arch,
+    map: &[f32],
+    gradient: &[f32],
+    shape: Shape,
+    (out, side): (&mut [f32], usize),
+    padded: &mut Padded,
+) {
+    check(shape, out, side);
+    assert_eq!((map.len(), gradient.len()), (shape.of_one(), shape.of_one()));
+    let map = padded.fill(map, shape, side / 2);
+    arch.dispatch(BackwardWeights { map, gradient, shape, out, side });
+}
+
+struct Forward<'a> {
+    /// With zeros around it.
+    map: &'a [f32],
+    shape: Shape,
+    weights: &'a [f32],
+    side: usize,
+    out: &'a mut [f32],
+    /// Whether the kernel is turned by half a circle.
+    is_flipped: bool,
+}
+
+impl WithSimd for Forward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        match self.side {
+            3 => self.run::<S, 3>(simd),
+            _ => self.run::<S, 5>(simd),
+        }
+    }
+}
+
+impl Forward<'_> {
+    #[inline(always)]
+    fn run<S: Simd, const SIDE: usize>(self, simd: S) {
+        let Forward { map, shape: Shape { width, channels, .. }, weights, out, is_flipped, .. } =
+            self;
+        let (weights, _) = S::as_simd_f32s(weights);
+        let (map, _) = S::as_simd_f32s(map);
+        let (out, _) = S::as_mut_simd_f32s(out);
+        let vectors = channels / S::F32_LANES;
+        let row = (width + SIDE - 1) * vectors;
+        for (y, out) in out.chunks_exact_mut(width * vectors).enumerate() {
+            for v in 0..vectors {
+                let mut kernel = [[simd.splat_f32s(0.0); SIDE]; SIDE];
+                for (i, kernel) in kernel.as_flattened_mut().iter_mut().enumerate() {
+                    let tap = if is_flipped { SIDE * SIDE - 1 - i } else { i };
+                    *kernel = weights[tap * vectors + v];
+                }
+                let rows: [&[S::f32s]; SIDE] =
+                    std::array::from_fn(|dy| &map[(y + dy) * row + v..][..row - v]);
+                for x in 0..width {
+                    let mut sum = simd.splat_f32s(0.0);
+                    for dy in 0..SIDE {
+                        for dx in 0..SIDE {
+                            let at = rows[dy][(x + dx) * vectors];
+                            sum = simd.mul_add_f32s(at, kernel[dy][dx], sum);
+                        }
+                    }
+                    out[x * vectors + v] = sum;
+                }
+            }
+        }
+    }
+}
+
+struct BackwardWeights<'a> {
+    /// With zeros around it.
+    map: &'a [f32],
+    gradient: &'a [f32],
+    shape: Shape,
+    out: &'a mut [f32],
+    side: usize,
+}
+
+impl WithSimd for BackwardWeights<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        match self.side {
+            3 => self.run::<S, 3>(simd),
+            _ => self.run::<S, 5>(simd),
+        }
+    }
+}
+
+impl BackwardWeights<'_> {
+    #[inline(always)]
+    fn run<S: Simd, const SIDE: usize>(self, simd: S) {
+        let BackwardWeights { map, gradient, shape: Shape { width, channels, .. }, out, .. } = self;
+        let (out, _) = S::as_mut_simd_f32s(out);
+        let (map, _) = S::as_simd_f32s(map);
+        let (gradient, _) = S::as_simd_f32s(gradient);
+        let vectors = channels / S::F32_LANES;
+        let row = (width + SIDE - 1) * vectors;
+        for (y, gradient) in gradient.chunks_exact(width * vectors).enumerate() {
+            for dy in 0..SIDE {
+                let map = &map[(y + dy) * row..][..row];
+                for v in 0..vectors {
+                    let taps = dy * SIDE * vectors + v;
+                    let mut sums: [S::f32s; SIDE] =
+                        std::array::from_fn(|dx| out[taps + dx * vectors]);
+                    for x in 0..width {
+                        let g = gradient[x * vectors + v];
+                        for (dx, sum) in sums.iter_mut().enumerate() {
+                            *sum = simd.mul_add_f32s(map[(x + dx) * vectors + v], g, *sum);
+                        }
+                    }
+                    for (dx, sum) in sums.into_iter().enumerate() {
+                        out[taps + dx * vectors] = sum;
+                    }
+                }
+            }
+        }
+    }
+}

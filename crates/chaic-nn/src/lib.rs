@@ -1,0 +1,35 @@
+//! Small neural networks on the CPU: training and inference.
+//!
+//! **What it is**: [`network::Network`] lists layers (dense and depthwise convolutions, batch
+//! normalization, sums, nearest upsampling); [`pass::Pass`] runs one forward and backward;
+//! [`adam::Adam`] takes steps. Feature maps are [`tensor::Tensor`]s, shape [n, height, width, channels].
+//!
+//! **What it is not**: it knows no worlds, tasks, losses or data.
+//!
+//! **Invariants**
+//! - The same numbers in give the same bits out on any machine, with vectors of any width: every sum
+//!   has one order, multiplications and additions are fused where a product says so and nowhere else.
+//! - No threads: whoever has several cores runs several passes, and adds gradients in a fixed order.
+
+pub mod simd;
+pub mod tensor;
+
+pub mod conv;
+pub mod depthwise;
+pub mod gemm;
+pub mod norm;
+
+pub mod network;
+
+pub mod pass;
+
+pub mod adam;
+
+#[cfg(test)]
+mod tests;
+
+pub use adam::{Adam, AdamRules};
+pub use conv::Kernel;
+pub use network::{Network, Node, Parameter};
+pub use pass::Pass;
+pub use tensor::{Shape, Tensor};

@@ -1,0 +1,205 @@
+//! Networks as lists of layers, each of which reads feature maps that earlier ones made.
+
+use std::ops::Range;
+
+use chaic_protocol::rng::Stream;
+
+use crate::conv::Kernel;
+use crate::tensor::Shape;
+
+/// Names what a layer makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Node(pub(crate) usize);
+
+/// Numbers that are learned, or statistics of what was seen while learning.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// What it is called in a file.
+    pub name: String,
+    /// How many numbers along each axis.
+    pub shape: Vec<usize>,
+    /// Where its numbers are in the list of all.
+    pub range: Range<usize>,
+    /// Whether weight decay applies: to weights of convolutions.
+    pub decays: bool,
+}
+
+/// A layer. What it reads comes before it; all kernels keep a map's middle where it is.
+#[derive(Clone, Debug)]
+pub(crate) enum Layer {
+    /// What the caller gives.
+    Input,
+    /// A dense convolution, with one number added to each channel if it has a bias.
+    Conv { from: Node, weights: usize, bias: Option<usize>, kernel: Kernel, channels: usize },
+    /// A depthwise convolution.
+    Depthwise { from: Node, weights: usize, side: usize },
+    /// Batch normalization. `running` counts the norms of the network.
+    Norm { from: Node, scale: usize, shift: usize, running: usize },
+    /// The positive part.
+    Relu { from: Node },
+    /// A sum.
+    Add { a: Node, b: Node },
+    /// Each pixel twice in each row and column.
+    Upsample { from: Node },
+}
+
+/// A network without its numbers.
+#[derive(Clone, Debug, Default)]
+pub struct Network {
+    pub(crate) layers: Vec<Layer>,
+    channels: Vec<usize>,
+    /// By how many a side of the input is divided.
+    strides: Vec<usize>,
+    parameters: Vec<Parameter>,
+    /// Channels of each normalization.
+    norms: Vec<(String, usize)>,
+    outputs: Vec<Node>,
+}
+
+impl Network {
+    fn push(&mut self, layer: Layer, channels: usize, stride: usize) -> Node {
+        self.layers.push(layer);
+        self.channels.push(channels);
+        self.strides.push(stride);
+        Node(self.layers.len() - 1)
+    }
+
+    fn parameter(&mut self, name: String, shape: &[usize], decays: bool) -> usize {
+        let begin = self.n_numbers();
+        let range = begin..begin + shape.iter().product::<usize>();
+        self.parameters.push(Parameter { name, shape: shape.to_vec(), range, decays });
+        self.parameters.len() - 1
+    }
+
+    /// What the caller gives, with so many channels.
+    pub fn input(&mut self, channels: usize) -> Node {
+        self.push(Layer::Input, channels, 1)
+    }
+
+    /// A dense convolution.
+    pub fn conv(&mut self, name: &str, from: Node, kernel: Kernel, channels: usize) -> Node {
+        let shape = [kernel.side, kernel.side, self.channels[from.0], channels];
+        let weights = self.parameter(format!("{name}.weight"), &shape, true);
+        let stride = self.strides[from.0] * kernel.stride;
+        self.push(Layer::Conv { from, weights, bias: None, kernel, channels }, channels, stride)
+    }
+
+    /// A matrix for each pixel, with a bias: what a network ends with.
+    pub fn head(&mut self, name: &str, from: Node, channels: usize) -> Node {
+        let shape = [1, 1, self.channels[from.0], channels];
+        let weights = self.parameter(format!("{name}.weight"), &shape, true);
+        let bias = Some(self.parameter(format!("{name}.bias"), &[channels], false));
+        let kernel = Kernel::POINTWISE;
+        let stride = self.strides[from.0];
+        let node =
+            self.push(Layer::Conv { from, weights, bias, kernel, channels }, channels, stride);
+        self.outputs.push(node);
+        node
+    }
+
+    /// A depthwise convolution with a kernel of 3 or 5 to a side.
+    pub fn depthwise(&mut self, name: &str, from: Node, side: usize) -> Node {
+        let channels = self.channels[from.0];
+        let weights = self.parameter(format!("{name}.weight"), &[side, side, channels], true);
+        self.push(Layer::Depthwise { from, weights, side }, channels, self.strides[from.0])
+    }
+
+    /// Batch normalization.
+    pub fn norm(&mut self, name: &str, from: Node) -> Node {
+        let channels = self.channels[from.0];
+        let scale = self.parameter(format!("{name}.scale"), &[channels], false);
+        let shift = self.parameter(format!("{name}.shift"), &[channels], false);
+        let running = self.norms.len();
+        self.norms.push((name.to_owned(), channels));
+        self.push(Layer::Norm { from, scale, shift, running }, channels, self.strides[from.0])
+    }
+
+    /// The positive part.
+    pub fn relu(&mut self, from: Node) -> Node {
+        self.push(Layer::Relu { from }, self.channels[from.0], self.strides[from.0])
+    }
+
+    /// The sum of two nodes of the same shape.
+    ///
+    /// # Panics
+    /// If their shapes differ.
+    pub fn add(&mut self, a: Node, b: Node) -> Node {
+        let of = |n: Node| (self.channels[n.0], self.strides[n.0]);
+        assert_eq!(of(a), of(b), "shapes that are added differ");
+        self.push(Layer::Add { a, b }, self.channels[a.0], self.strides[a.0])
+    }
+
+    /// Each pixel twice in each row and column.
+    ///
+    /// # Panics
+    /// If the node is as large as the input.
+    pub fn upsample(&mut self, from: Node) -> Node {
+        let stride = self.strides[from.0];
+        assert!(stride.is_multiple_of(2), "nothing is larger than the input");
+        self.push(Layer::Upsample { from }, self.channels[from.0], stride / 2)
+    }
+
+    /// Numbers that are learned.
+    pub fn n_numbers(&self) -> usize {
+        self.parameters.last().map_or(0, |p| p.range.end)
+    }
+
+    /// What is learned, in the order of its numbers.
+    pub fn parameters(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    /// Name and channels of each normalization.
+    pub fn norms(&self) -> &[(String, usize)] {
+        &self.norms
+    }
+
+    /// What [`Network::head`] made, in order.
+    pub fn outputs(&self) -> &[Node] {
+        &self.outputs
+    }
+
+    /// Sides of the input are multiples of this.
+    pub fn stride(&self) -> usize {
+        self.strides.iter().copied().max().unwrap_or(1)
+    }
+
+    /// The shape of what a node makes of inputs of this shape.
+    pub fn shape_of(&self, node: Node, input: Shape) -> Shape {
+        let stride = self.strides[node.0];
+        Shape {
+            n: input.n,
+            height: input.height / stride,
+            width: input.width / stride,
+            channels: self.channels[node.0],
+        }
+    }
+
+    /// Numbers to begin to learn from: weights are normal with a variance of 2 over the numbers under
+    /// a kernel (He et al. 2015), of heads a tenth as wide; scales are 1, all else 0.
+    pub fn begin(&self, seed: u64) -> Vec<f32> {
+        let mut numbers = vec![0.0; self.n_numbers()];
+        for (index, parameter) in self.parameters.iter().enumerate() {
+            let values = &mut numbers[parameter.range.clone()];
+            let mut rng = Stream::new(seed, "weights", index as u64);
+            if parameter.name.ends_with(".scale") {
+                values.fill(1.0);
+            } else if parameter.decays {
+                let is_depthwise = parameter.shape.len() == 3;
+                let under: usize =
+                    parameter.shape[..if is_depthwise { 2 } else { 3 }].iter().product();
+                let is_head =
+                    self.parameters.get(index + 1).is_some_and(|p| p.name.ends_with(".bias"));
+                let deviation = (2.0 / under as f32).sqrt() * if is_head { 0.1 } else { 1.0 };
+                values.iter_mut().for_each(|w| *w = deviation * normal(&mut rng));
+            }
+        }
+        numbers
+    }
+}
+
+/// Roughly normal: the sum of twelve even draws, less their mean. Without logarithms, which machines
+/// round each in its own way.
+fn normal(rng: &mut Stream) -> f32 {
+    (0..12).map(|_| rng.unit()).sum::<f32>() - 6.0
+}

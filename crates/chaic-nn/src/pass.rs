@@ -1,0 +1,230 @@
+//! Forward and backward passes through a network while it learns.
+
+use pulp::Arch;
+
+use crate::conv::{self, Patches};
+use crate::depthwise::{self, Padded};
+use crate::network::{Layer, Network, Node};
+use crate::norm::{self, Statistics};
+use crate::tensor::{Shape, Tensor};
+
+/// One pass over a few maps: what each layer made, and the gradient by it. Memory is used again by the
+/// next pass.
+#[derive(Clone, Debug)]
+pub struct Pass {
+    arch: Arch,
+    made: Vec<Tensor>,
+    gradients: Vec<Tensor>,
+    statistics: Vec<Statistics>,
+    patches: Patches,
+    padded: Padded,
+}
+
+impl Pass {
+    /// Working space for a network.
+    pub fn new(network: &Network, arch: Arch) -> Pass {
+        let n = network.layers.len();
+        Pass {
+            arch,
+            made: vec![Tensor::default(); n],
+            gradients: vec![Tensor::default(); n],
+            statistics: vec![Statistics::default(); network.norms().len()],
+            patches: Patches::default(),
+            padded: Padded::default(),
+        }
+    }
+
+    /// What a node made.
+    pub fn made(&self, node: Node) -> &Tensor {
+        &self.made[node.0]
+    }
+
+    /// The gradient of the loss by what a node made, for the caller to write it of outputs.
+    pub fn gradient(&mut self, node: Node) -> &mut Tensor {
+        &mut self.gradients[node.0]
+    }
+
+    /// Mean and variance of what each normalization got.
+    pub fn statistics(&self) -> &[Statistics] {
+        &self.statistics
+    }
+
+    /// Runs all layers on an input, with statistics of these maps.
+    ///
+    /// # Panics
+    /// If a side of the input is no multiple of [`Network::stride`].
+    pub fn forward(&mut self, network: &Network, numbers: &[f32], input: &Tensor) {
+        let Shape { height, width, .. } = input.shape;
+        let stride = network.stride();
+        assert!(
+            height.is_multiple_of(stride) && width.is_multiple_of(stride),
+            "{width} x {height} pixels are no multiple of {stride}"
+        );
+        let of = |parameter: usize| &numbers[network.parameters()[parameter].range.clone()];
+        for (k, layer) in network.layers.iter().enumerate() {
+            let (before, rest) = self.made.split_at_mut(k);
+            let out = &mut rest[0];
+            out.reset(network.shape_of(Node(k), input.shape));
+            match *layer {
+                Layer::Input => out.data.copy_from_slice(&input.data),
+                Layer::Conv { from, weights, bias, kernel, channels } => {
+                    if let Some(bias) = bias {
+                        out.data
+                            .chunks_exact_mut(channels)
+                            .for_each(|p| p.copy_from_slice(of(bias)));
+                    }
+                    let map = &before[from.0];
+                    let out = (&mut out.data[..], channels);
+                    let weights = (of(weights), kernel);
+                    conv::forward(
+                        self.arch,
+                        (&map.data, map.shape),
+                        weights,
+                        out,
+                        &mut self.patches,
+                    );
+                }
+                Layer::Depthwise { from, weights, side } => {
+                    let map = &before[from.0];
+                    let n = map.shape.of_one();
+                    for (map_data, out) in
+                        map.data.chunks_exact(n).zip(out.data.chunks_exact_mut(n))
+                    {
+                        let weights = (of(weights), side);
+                        let padded = &mut self.padded;
+                        depthwise::forward(self.arch, map_data, map.shape, weights, out, padded);
+                    }
+                }
+                Layer::Norm { from, scale, shift, running } => {
+                    let map = &before[from.0];
+                    let statistics = &mut self.statistics[running];
+                    self.arch.dispatch(|| {
+                        *statistics = Statistics::of(&map.data, map.shape);
+                        norm::forward(&map.data, statistics, (of(scale), of(shift)), &mut out.data);
+                    });
+                }
+                Layer::Relu { from } => {
+                    let map = &before[from.0];
+                    out.data.iter_mut().zip(&map.data).for_each(|(out, x)| *out = x.max(0.0));
+                }
+                Layer::Add { a, b } => {
+                    let sum = before[a.0].data.iter().zip(&before[b.0].data);
+                    out.data.iter_mut().zip(sum).for_each(|(out, (a, b))| *out = a + b);
+                }
+                Layer::Upsample { from } => upsample(&before[from.0], out),
+            }
+        }
+    }
+
+    /// Makes the gradient of every output zero, for the caller to write it.
+    pub fn begin_backward(&mut self) {
+        for (gradient, made) in self.gradients.iter_mut().zip(&self.made) {
+            gradient.reset(made.shape);
+        }
+    }
+
+    /// Adds the gradient by all numbers to `by_numbers`, from what was written to those of the outputs.
+    pub fn backward(&mut self, network: &Network, numbers: &[f32], by_numbers: &mut [f32]) {
+        let of = |parameter: usize| network.parameters()[parameter].range.clone();
+        for (k, layer) in network.layers.iter().enumerate().rev() {
+            let (before, rest) = self.gradients.split_at_mut(k);
+            let gradient = &mut rest[0];
+            let channels = gradient.shape.channels;
+            match *layer {
+                Layer::Input => {}
+                Layer::Conv { from, weights, bias, kernel, .. } => {
+                    if let Some(bias) = bias {
+                        let sums = &mut by_numbers[of(bias)];
+                        for pixel in gradient.data.chunks_exact(channels) {
+                            sums.iter_mut().zip(pixel).for_each(|(sum, g)| *sum += g);
+                        }
+                    }
+                    let map = &self.made[from.0];
+                    let g = (&gradient.data[..], channels);
+                    let out = (&mut by_numbers[of(weights)], kernel);
+                    let maps = (&map.data[..], map.shape);
+                    conv::backward_weights(self.arch, maps, out, g, &mut self.patches);
+                    if !matches!(network.layers[from.0], Layer::Input) {
+                        let out = (&mut before[from.0].data[..], map.shape);
+                        let weights = (&numbers[of(weights)], kernel);
+                        conv::backward_map(self.arch, out, weights, g, &mut self.patches);
+                    }
+                }
+                Layer::Depthwise { from, weights, side } => {
+                    let map = &self.made[from.0];
+                    let n = map.shape.of_one();
+                    let out = &mut before[from.0].data;
+                    let mut by_map = vec![0.0; n];
+                    let maps = map.data.chunks_exact(n).zip(gradient.data.chunks_exact(n));
+                    for ((map_data, g), out) in maps.zip(out.chunks_exact_mut(n)) {
+                        let by_weights = (&mut by_numbers[of(weights)], side);
+                        let padded = &mut self.padded;
+                        let shape = map.shape;
+                        depthwise::backward_weights(
+                            self.arch, map_data, g, shape, by_weights, padded,
+                        );
+                        let weights = (&numbers[of(weights)], side);
+                        depthwise::backward_map(self.arch, g, shape, weights, &mut by_map, padded);
+                        out.iter_mut().zip(&by_map).for_each(|(out, g)| *out += g);
+                    }
+                }
+                Layer::Norm { from, scale, shift, running } => {
+                    let map = &self.made[from.0];
+                    let statistics = &self.statistics[running];
+                    let scales = &numbers[of(scale)];
+                    // Scale and shift stand one after the other.
+                    let both = &mut by_numbers[of(scale).start..of(shift).end];
+                    let by = both.split_at_mut(channels);
+                    self.arch.dispatch(|| {
+                        let gradient = &mut gradient.data;
+                        norm::backward(&map.data, map.shape, statistics, scales, gradient, by);
+                    });
+                    add_to(&mut before[from.0].data, &gradient.data);
+                }
+                Layer::Relu { from } => {
+                    let made = &self.made[k].data;
+                    let out = before[from.0].data.iter_mut().zip(gradient.data.iter().zip(made));
+                    out.for_each(|(out, (g, made))| *out += if *made > 0.0 { *g } else { 0.0 });
+                }
+                Layer::Add { a, b } => {
+                    add_to(&mut before[a.0].data, &gradient.data);
+                    add_to(&mut before[b.0].data, &gradient.data);
+                }
+                Layer::Upsample { from } => downsample(gradient, &mut before[from.0]),
+            }
+        }
+    }
+}
+
+fn add_to(to: &mut [f32], from: &[f32]) {
+    to.iter_mut().zip(from).for_each(|(to, from)| *to += from);
+}
+
+fn upsample(map: &Tensor, out: &mut Tensor) {
+    let Shape { width, channels, .. } = map.shape;
+    let rows = map.data.chunks_exact(width * channels);
+    for (row, two) in rows.zip(out.data.chunks_exact_mut(4 * width * channels)) {
+        let (first, second) = two.split_at_mut(2 * width * channels);
+        for (pixel, two) in row.chunks_exact(channels).zip(first.chunks_exact_mut(2 * channels)) {
+            two[..channels].copy_from_slice(pixel);
+            two[channels..].copy_from_slice(pixel);
+        }
+        second.copy_from_slice(first);
+    }
+}
+
+/// Adds the gradient by what [`upsample`] made to that by what it was made of.
+fn downsample(gradient: &Tensor, out: &mut Tensor) {
+    let Shape { width, channels, .. } = out.shape;
+    let rows = out.data.chunks_exact_mut(width * channels);
+    for (row, two) in rows.zip(gradient.data.chunks_exact(4 * width * channels)) {
+        let (first, second) = two.split_at(2 * width * channels);
+        let pairs = first.chunks_exact(2 * channels).zip(second.chunks_exact(2 * channels));
+        for (pixel, (above, below)) in row.chunks_exact_mut(channels).zip(pairs) {
+            for c in 0..channels {
+                let sum = (above[c] + above[channels + c]) + (below[c] + below[channels + c]);
+                pixel[c] += sum;
+            }
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! Promises: gradients are those of finite differences, passes are the same bits at every width, and
+//! a network learns what is put before it.
+
+use chaic_protocol::rng::Stream;
+
+use crate::simd::{widest, widths};
+use crate::{Adam, AdamRules, Kernel, Network, Node, Pass, Shape, Tensor};
+
+/// A network with every kind of layer; its output has half as many rows and columns as its input.
+fn every_layer() -> (Network, Node) {
+    let mut net = Network::default();
+    let input = net.input(3);
+    let down = net.conv("stem", input, Kernel { side: 3, stride: 2 }, 16);
+    let norm = net.norm("stem.norm", down);
+    let half = net.relu(norm);
+    let lower = net.conv("down", half, Kernel { side: 3, stride: 2 }, 16);
+    let wide = net.depthwise("wide", lower, 5);
+    let norm = net.norm("wide.norm", wide);
+    let small = net.depthwise("small", norm, 3);
+    let positive = net.relu(small);
+    let up = net.upsample(positive);
+    let sum = net.add(up, half);
+    let head = net.head("head", sum, 5);
+    (net, head)
+}
+
+fn random(shape: Shape, seed: u64) -> Tensor {
+    let mut rng = Stream::new(seed, "tensor", 0);
+    let data = (0..shape.numbers()).map(|_| rng.range(-1.0, 1.0)).collect();
+    Tensor { shape, data }
+}
+
+const INPUT: Shape = Shape { n: 2, height: 12, width: 8, channels: 3 };
+
+/// The loss: the output times fixed numbers.
+fn loss(net: &Network, head: Node, numbers: &[f32], input: &Tensor, factors: &Tensor) -> f64 {
+    let mut pass = Pass::new(net, widest());
+    pass.forward(net, numbers, input);
+    let made = &pass.made(head).data;
+    made.iter().zip(&factors.data).map(|(x, f)| f64::from(*x) * f64::from(*f)).sum()
+}
+
+fn gradient(net: &Network, head: Node, numbers: &[f32], arch: pulp::Arch) -> Vec<f32> {
+    let mut pass = Pass::new(net, arch);
+    pass.forward(net, numbers, &random(INPUT, 1));
+    pass.begin_backward();
+    let shape = pass.made(head).shape;
+    *pass.gradient(head) = random(shape, 2);
+    let mut by_numbers = vec![0.0; net.n_numbers()];
+    pass.backward(net, numbers, &mut by_numbers);
+    by_numbers
+}
+
+#[test]
+fn gradients_are_those_of_finite_differences() {
+    let (net, head) = every_layer();
+    let mut numbers = net.begin(3);
+    // Nothing at a bend: scales and shifts of their own.
+    let mut rng = Stream::new(4, "scales", 0);
+    for p in net.parameters().iter().filter(|p| !p.decays) {
+        numbers[p.range.clone()].iter_mut().for_each(|x| *x += rng.range(-0.3, 0.3));
+    }
+    let input = random(INPUT, 1);
+    let factors = random(net.shape_of(head, INPUT), 2);
+    let exact = gradient(&net, head, &numbers, widest());
+    for p in net.parameters() {
+        let (mut worst, mut scale) = (0.0_f64, 1e-3_f64);
+        for k in p.range.clone().step_by(p.range.len().div_ceil(12)) {
+            let at = |h: f32| {
+                let mut moved = numbers.clone();
+                moved[k] += h;
+                loss(&net, head, &moved, &input, &factors)
+            };
+            let h = 2e-3;
+            let measured = (at(h) - at(-h)) / (2.0 * f64::from(h));
+            worst = worst.max((measured - f64::from(exact[k])).abs());
+            scale = scale.max(measured.abs());
+        }
+        assert!(worst < 0.03 * scale, "{}: off by {worst} of {scale}", p.name);
+    }
+}
+
+#[test]
+fn passes_are_the_same_bits_at_every_width() {
+    let (net, head) = every_layer();
+    let numbers = net.begin(3);
+    let expected = gradient(&net, head, &numbers, widest());
+    for (name, arch) in widths() {
+        assert!(gradient(&net, head, &numbers, arch) == expected, "{name}");
+    }
+}
+
+/// Which of five stripes of brightness each pixel lies in can be learned in a few steps.
+#[test]
+fn a_network_learns() {
+    let (net, head) = every_layer();
+    let mut numbers = net.begin(5);
+    let (mut adam, rules) = (Adam::new(numbers.len()), AdamRules::default());
+    let mut pass = Pass::new(&net, widest());
+    let mut losses = Vec::new();
+    for step in 0..60 {
+        let input = random(INPUT, 100 + step);
+        pass.forward(&net, &numbers, &input);
+        pass.begin_backward();
+        let made = pass.made(head).clone();
+        let gradient = pass.gradient(head);
+        let mut loss = 0.0;
+        let n = made.shape.pixels() as f32;
+        for y in 0..made.shape.n * made.shape.height {
+            for x in 0..made.shape.width {
+                let at = (y * made.shape.width + x) * 5;
+                let brightness = input.data[(2 * y * INPUT.width + 2 * x) * 3];
+                let stripe = ((brightness + 1.0) * 2.5).clamp(0.0, 4.0) as usize;
+                for c in 0..5 {
+                    let wanted = if c == stripe { 1.0 } else { 0.0 };
+                    let error = made.data[at + c] - wanted;
+                    loss += error * error / n;
+                    gradient.data[at + c] = 2.0 * error / n;
+                }
+            }
+        }
+        losses.push(loss);
+        let mut by_numbers = vec![0.0; numbers.len()];
+        pass.backward(&net, &numbers, &mut by_numbers);
+        adam.step(&rules, 0.01, &net, &mut numbers, &by_numbers);
+    }
+    let (first, last) = (losses[0], losses[55..].iter().sum::<f32>() / 5.0);
+    assert!(last < 0.8 && last < 0.75 * first, "{first} to {last}");
+}

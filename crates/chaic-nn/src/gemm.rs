@@ -7,7 +7,7 @@ use pulp::{Arch, Simd, WithSimd};
 /// first-level cache.
 const INNER_BLOCK: usize = 192;
 /// Rows of the left matrix that are packed at once.
-const ROW_BLOCK: usize = 96;
+const ROW_BLOCK: usize = 64;
 
 /// A matrix in a slice: element (i, j) is `data[i * row_stride + j * column_stride]`.
 #[derive(Clone, Copy, Debug)]
@@ -86,9 +86,8 @@ impl WithSimd for Product<'_> {
     fn with_simd<S: Simd>(self, simd: S) {
         // As many accumulators as registers hold beside a row of the panel and a number of the left.
         match S::F32_LANES {
-            16.. => self.run::<S, 12, 2>(simd),
-            8 => self.run::<S, 6, 2>(simd),
-            _ => self.run::<S, 4, 2>(simd),
+            16.. => self.run::<S, 8, 3>(simd),
+            _ => self.run::<S, 4, 3>(simd),
         }
     }
 }
@@ -104,17 +103,60 @@ impl Product<'_> {
             pack_right(&mut workspace.right, right, (inner, depth), panel);
             for top in (0..left.rows).step_by(ROW_BLOCK) {
                 let height = ROW_BLOCK.min(left.rows - top);
-                pack_left::<ROWS>(&mut workspace.left, left, (top, height), (inner, depth));
+                if left.column_stride != 1 || !height.is_multiple_of(ROWS) {
+                    pack_left::<ROWS>(&mut workspace.left, left, (top, height), (inner, depth));
+                }
                 let out = &mut out[top * n..][..height * n];
                 let panels = workspace.right.chunks_exact(depth * panel);
                 for (k, right) in panels.enumerate() {
-                    let tiles = workspace.left.chunks_exact(depth * ROWS);
-                    for (left, out) in tiles.zip(out.chunks_mut(ROWS * n)) {
-                        tile::<S, ROWS, VECTORS>(simd, left, right, out, (k * panel, n));
+                    let tiles = out.chunks_mut(ROWS * n).enumerate();
+                    for (t, out) in tiles {
+                        let place = (k * panel, n);
+                        let n_rows = ROWS.min(height - t * ROWS);
+                        if left.column_stride == 1 && n_rows == ROWS {
+                            let first = (top + t * ROWS) * left.row_stride + inner;
+                            let rows: [&[f32]; ROWS] = std::array::from_fn(|i| {
+                                &left.data[first + i * left.row_stride..][..depth]
+                            });
+                            tile::<S, ROWS, VECTORS>(simd, Rows(rows), right, out, place);
+                        } else {
+                            let packed = &workspace.left[t * depth * ROWS..][..depth * ROWS];
+                            let packed = Packed(packed.as_chunks::<ROWS>().0);
+                            tile::<S, ROWS, VECTORS>(simd, packed, right, out, place);
+                        }
                     }
                 }
             }
         }
+    }
+}
+
+/// So many rows of the left matrix, column by column.
+trait Left<const ROWS: usize> {
+    fn at(&self, k: usize) -> [f32; ROWS];
+}
+
+/// Rows where they are.
+struct Rows<'a, const ROWS: usize>([&'a [f32]; ROWS]);
+
+impl<const ROWS: usize> Left<ROWS> for Rows<'_, ROWS> {
+    #[inline(always)]
+    fn at(&self, k: usize) -> [f32; ROWS] {
+        let mut column = [0.0; ROWS];
+        for (x, row) in column.iter_mut().zip(&self.0) {
+            *x = row[k];
+        }
+        column
+    }
+}
+
+/// Rows packed by [`pack_left`].
+struct Packed<'a, const ROWS: usize>(&'a [[f32; ROWS]]);
+
+impl<const ROWS: usize> Left<ROWS> for Packed<'_, ROWS> {
+    #[inline(always)]
+    fn at(&self, k: usize) -> [f32; ROWS] {
+        self.0[k]
     }
 }
 
@@ -127,11 +169,13 @@ fn pack_left<const ROWS: usize>(
     (top, height): (usize, usize),
     (inner, depth): (usize, usize),
 ) {
-    packed.clear();
     packed.resize(height.div_ceil(ROWS) * depth * ROWS, 0.0);
     for (tile, packed) in packed.chunks_exact_mut(depth * ROWS).enumerate() {
         let first = top + tile * ROWS;
         let n_rows = ROWS.min(top + height - first);
+        if n_rows < ROWS {
+            packed.fill(0.0);
+        }
         if left.column_stride == 1 {
             for i in 0..n_rows {
                 let row = &left.data[(first + i) * left.row_stride + inner..][..depth];
@@ -163,11 +207,13 @@ fn pack_right(
     (inner, depth): (usize, usize),
     panel: usize,
 ) {
-    packed.clear();
     packed.resize(right.columns.div_ceil(panel) * depth * panel, 0.0);
     for (k, packed) in packed.chunks_exact_mut(depth * panel).enumerate() {
         let first = k * panel;
         let width = panel.min(right.columns - first);
+        if width < panel {
+            packed.fill(0.0);
+        }
         for (i, packed) in packed.chunks_exact_mut(panel).enumerate() {
             let at = (inner + i) * right.row_stride + first * right.column_stride;
             if right.column_stride == 1 {
@@ -185,7 +231,7 @@ fn pack_right(
 #[inline(always)]
 fn tile<S: Simd, const ROWS: usize, const VECTORS: usize>(
     simd: S,
-    left: &[f32],
+    left: impl Left<ROWS>,
     right: &[f32],
     out: &mut [f32],
     (column, n): (usize, usize),
@@ -195,14 +241,18 @@ fn tile<S: Simd, const ROWS: usize, const VECTORS: usize>(
     let mut sums = [[simd.splat_f32s(0.0); VECTORS]; ROWS];
     for (sums, row) in sums.iter_mut().zip(out.chunks_exact(n)) {
         let row = &row[column..][..width];
+        if is_whole {
+            sums.copy_from_slice(S::as_simd_f32s(row).0);
+            continue;
+        }
         for (v, sum) in sums.iter_mut().enumerate() {
             let from = (v * S::F32_LANES).min(width);
             *sum = simd.partial_load_f32s(&row[from..width.min(from + S::F32_LANES)]);
         }
     }
     let (vectors, _) = S::as_simd_f32s(right);
-    let (rows, _) = left.as_chunks::<ROWS>();
-    for (left, right) in rows.iter().zip(vectors.as_chunks::<VECTORS>().0) {
+    for (k, right) in vectors.as_chunks::<VECTORS>().0.iter().enumerate() {
+        let left = left.at(k);
         for i in 0..ROWS {
             let x = simd.splat_f32s(left[i]);
             for v in 0..VECTORS {

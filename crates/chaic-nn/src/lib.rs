@@ -1,6 +1,6 @@
 //! Small neural networks on the CPU: training and inference.
 //!
-//! **What it is**: [`network::Network`] lists layers (dense and depthwise convolutions, batch
+//! **What it is**: [`network::Network`] lists layers (dense and depthwise convolutions, layer
 //! normalization, sums, nearest upsampling); [`pass::Pass`] runs one forward and backward;
 //! [`adam::Adam`] takes steps. Feature maps are [`tensor::Tensor`]s, shape [n, height, width, channels].
 //!
@@ -17,7 +17,7 @@ pub mod tensor;
 pub mod conv;
 pub mod depthwise;
 pub mod gemm;
-pub mod norm;
+mod norm;
 
 pub mod network;
 

@@ -11,7 +11,7 @@ use crate::tensor::Shape;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Node(pub(crate) usize);
 
-/// Numbers that are learned, or statistics of what was seen while learning.
+/// Numbers that are learned.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
     /// What it is called in a file.
@@ -33,8 +33,8 @@ pub(crate) enum Layer {
     Conv { from: Node, weights: usize, bias: Option<usize>, kernel: Kernel, channels: usize },
     /// A depthwise convolution.
     Depthwise { from: Node, weights: usize, side: usize },
-    /// Batch normalization. `running` counts the norms of the network.
-    Norm { from: Node, scale: usize, shift: usize, running: usize },
+    /// Layer normalization of each pixel, of which only the positive part is left if it is `positive`.
+    Norm { from: Node, scale: usize, shift: usize, positive: bool },
     /// The positive part.
     Relu { from: Node },
     /// A sum.
@@ -51,8 +51,6 @@ pub struct Network {
     /// By how many a side of the input is divided.
     strides: Vec<usize>,
     parameters: Vec<Parameter>,
-    /// Channels of each normalization.
-    norms: Vec<(String, usize)>,
     outputs: Vec<Node>,
 }
 
@@ -104,14 +102,23 @@ impl Network {
         self.push(Layer::Depthwise { from, weights, side }, channels, self.strides[from.0])
     }
 
-    /// Batch normalization.
+    /// Layer normalization of each pixel.
     pub fn norm(&mut self, name: &str, from: Node) -> Node {
+        self.any_norm(name, from, false)
+    }
+
+    /// The positive part of a layer normalization.
+    pub fn norm_relu(&mut self, name: &str, from: Node) -> Node {
+        self.any_norm(name, from, true)
+    }
+
+    fn any_norm(&mut self, name: &str, from: Node, positive: bool) -> Node {
         let channels = self.channels[from.0];
+        assert!(channels.is_multiple_of(crate::norm::LANES), "{channels} channels");
         let scale = self.parameter(format!("{name}.scale"), &[channels], false);
         let shift = self.parameter(format!("{name}.shift"), &[channels], false);
-        let running = self.norms.len();
-        self.norms.push((name.to_owned(), channels));
-        self.push(Layer::Norm { from, scale, shift, running }, channels, self.strides[from.0])
+        let layer = Layer::Norm { from, scale, shift, positive };
+        self.push(layer, channels, self.strides[from.0])
     }
 
     /// The positive part.
@@ -147,11 +154,6 @@ impl Network {
     /// What is learned, in the order of its numbers.
     pub fn parameters(&self) -> &[Parameter] {
         &self.parameters
-    }
-
-    /// Name and channels of each normalization.
-    pub fn norms(&self) -> &[(String, usize)] {
-        &self.norms
     }
 
     /// What [`Network::head`] made, in order.

@@ -5,7 +5,7 @@ use pulp::Arch;
 use crate::conv::{self, Patches};
 use crate::depthwise::{self, Padded};
 use crate::network::{Layer, Network, Node};
-use crate::norm::{self, Statistics};
+use crate::norm;
 use crate::tensor::{Shape, Tensor};
 
 /// One pass over a few maps: what each layer made, and the gradient by it. Memory is used again by the
@@ -15,9 +15,10 @@ pub struct Pass {
     arch: Arch,
     made: Vec<Tensor>,
     gradients: Vec<Tensor>,
-    statistics: Vec<Statistics>,
     patches: Patches,
     padded: Padded,
+    /// A gradient by one map.
+    by_map: Vec<f32>,
 }
 
 impl Pass {
@@ -28,9 +29,9 @@ impl Pass {
             arch,
             made: vec![Tensor::default(); n],
             gradients: vec![Tensor::default(); n],
-            statistics: vec![Statistics::default(); network.norms().len()],
             patches: Patches::default(),
             padded: Padded::default(),
+            by_map: Vec::new(),
         }
     }
 
@@ -44,12 +45,7 @@ impl Pass {
         &mut self.gradients[node.0]
     }
 
-    /// Mean and variance of what each normalization got.
-    pub fn statistics(&self) -> &[Statistics] {
-        &self.statistics
-    }
-
-    /// Runs all layers on an input, with statistics of these maps.
+    /// Runs all layers on an input.
     ///
     /// # Panics
     /// If a side of the input is no multiple of [`Network::stride`].
@@ -64,10 +60,13 @@ impl Pass {
         for (k, layer) in network.layers.iter().enumerate() {
             let (before, rest) = self.made.split_at_mut(k);
             let out = &mut rest[0];
-            out.reset(network.shape_of(Node(k), input.shape));
+            out.reshape(network.shape_of(Node(k), input.shape));
             match *layer {
                 Layer::Input => out.data.copy_from_slice(&input.data),
                 Layer::Conv { from, weights, bias, kernel, channels } => {
+                    if bias.is_none() {
+                        out.data.fill(0.0);
+                    }
                     if let Some(bias) = bias {
                         out.data
                             .chunks_exact_mut(channels)
@@ -95,21 +94,19 @@ impl Pass {
                         depthwise::forward(self.arch, map_data, map.shape, weights, out, padded);
                     }
                 }
-                Layer::Norm { from, scale, shift, running } => {
-                    let map = &before[from.0];
-                    let statistics = &mut self.statistics[running];
-                    self.arch.dispatch(|| {
-                        *statistics = Statistics::of(&map.data, map.shape);
-                        norm::forward(&map.data, statistics, (of(scale), of(shift)), &mut out.data);
-                    });
+                Layer::Norm { from, scale, shift, positive } => {
+                    let floor = if positive { 0.0 } else { f32::NEG_INFINITY };
+                    let (scale, shift) = (of(scale), of(shift));
+                    let (map, out) = (&before[from.0].data[..], &mut out.data[..]);
+                    self.arch.dispatch(norm::Forward { map, scale, shift, floor, out });
                 }
                 Layer::Relu { from } => {
                     let map = &before[from.0];
-                    out.data.iter_mut().zip(&map.data).for_each(|(out, x)| *out = x.max(0.0));
+                    self.arch.dispatch(Relu { map: &map.data, out: &mut out.data });
                 }
                 Layer::Add { a, b } => {
-                    let sum = before[a.0].data.iter().zip(&before[b.0].data);
-                    out.data.iter_mut().zip(sum).for_each(|(out, (a, b))| *out = a + b);
+                    out.data.copy_from_slice(&before[a.0].data);
+                    self.arch.dispatch(AddTo { to: &mut out.data, from: &before[b.0].data });
                 }
                 Layer::Upsample { from } => upsample(&before[from.0], out),
             }
@@ -154,7 +151,8 @@ impl Pass {
                     let map = &self.made[from.0];
                     let n = map.shape.of_one();
                     let out = &mut before[from.0].data;
-                    let mut by_map = vec![0.0; n];
+                    self.by_map.resize(n, 0.0);
+                    let by_map = &mut self.by_map;
                     let maps = map.data.chunks_exact(n).zip(gradient.data.chunks_exact(n));
                     for ((map_data, g), out) in maps.zip(out.chunks_exact_mut(n)) {
                         let by_weights = (&mut by_numbers[of(weights)], side);
@@ -164,31 +162,38 @@ impl Pass {
                             self.arch, map_data, g, shape, by_weights, padded,
                         );
                         let weights = (&numbers[of(weights)], side);
-                        depthwise::backward_map(self.arch, g, shape, weights, &mut by_map, padded);
-                        out.iter_mut().zip(&by_map).for_each(|(out, g)| *out += g);
+                        depthwise::backward_map(self.arch, g, shape, weights, by_map, padded);
+                        self.arch.dispatch(AddTo { to: out, from: by_map });
                     }
                 }
-                Layer::Norm { from, scale, shift, running } => {
-                    let map = &self.made[from.0];
-                    let statistics = &self.statistics[running];
-                    let scales = &numbers[of(scale)];
+                Layer::Norm { from, scale, shift, positive } => {
+                    if positive {
+                        let made = &self.made[k].data;
+                        self.arch.dispatch(Mask { gradient: &mut gradient.data, made });
+                    }
                     // Scale and shift stand one after the other.
                     let both = &mut by_numbers[of(scale).start..of(shift).end];
-                    let by = both.split_at_mut(channels);
-                    self.arch.dispatch(|| {
-                        let gradient = &mut gradient.data;
-                        norm::backward(&map.data, map.shape, statistics, scales, gradient, by);
+                    let (by_scale, by_shift) = both.split_at_mut(channels);
+                    self.arch.dispatch(norm::Backward {
+                        map: &self.made[from.0].data,
+                        scale: &numbers[of(scale)],
+                        gradient: &gradient.data,
+                        by_map: &mut before[from.0].data,
+                        by_scale,
+                        by_shift,
                     });
-                    add_to(&mut before[from.0].data, &gradient.data);
                 }
                 Layer::Relu { from } => {
                     let made = &self.made[k].data;
-                    let out = before[from.0].data.iter_mut().zip(gradient.data.iter().zip(made));
-                    out.for_each(|(out, (g, made))| *out += if *made > 0.0 { *g } else { 0.0 });
+                    self.arch.dispatch(Mask { gradient: &mut gradient.data, made });
+                    let to = &mut before[from.0].data;
+                    self.arch.dispatch(AddTo { to, from: &gradient.data });
                 }
                 Layer::Add { a, b } => {
-                    add_to(&mut before[a.0].data, &gradient.data);
-                    add_to(&mut before[b.0].data, &gradient.data);
+                    for node in [a, b] {
+                        let to = &mut before[node.0].data;
+                        self.arch.dispatch(AddTo { to, from: &gradient.data });
+                    }
                 }
                 Layer::Upsample { from } => downsample(gradient, &mut before[from.0]),
             }
@@ -196,8 +201,55 @@ impl Pass {
     }
 }
 
-fn add_to(to: &mut [f32], from: &[f32]) {
-    to.iter_mut().zip(from).for_each(|(to, from)| *to += from);
+// What is done number by number, compiled for the widest vectors.
+
+struct AddTo<'a> {
+    to: &'a mut [f32],
+    from: &'a [f32],
+}
+
+impl pulp::NullaryFnOnce for AddTo<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for (to, from) in self.to.iter_mut().zip(self.from) {
+            *to += from;
+        }
+    }
+}
+
+struct Relu<'a> {
+    map: &'a [f32],
+    out: &'a mut [f32],
+}
+
+impl pulp::NullaryFnOnce for Relu<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for (out, x) in self.out.iter_mut().zip(self.map) {
+            *out = if *x > 0.0 { *x } else { 0.0 };
+        }
+    }
+}
+
+/// Leaves of a gradient what reaches through a positive part.
+struct Mask<'a> {
+    gradient: &'a mut [f32],
+    made: &'a [f32],
+}
+
+impl pulp::NullaryFnOnce for Mask<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for (g, made) in self.gradient.iter_mut().zip(self.made) {
+            *g = if *made > 0.0 { *g } else { 0.0 };
+        }
+    }
 }
 
 fn upsample(map: &Tensor, out: &mut Tensor) {

@@ -47,8 +47,13 @@ impl Tensor {
 
     /// Becomes zeros of this shape, in the memory that it has.
     pub fn reset(&mut self, shape: Shape) {
+        self.reshape(shape);
+        self.data.fill(0.0);
+    }
+
+    /// Gets this shape; its numbers are whatever they were.
+    pub fn reshape(&mut self, shape: Shape) {
         self.shape = shape;
-        self.data.clear();
         self.data.resize(shape.numbers(), 0.0);
     }
 }

@@ -11,8 +11,7 @@ fn every_layer() -> (Network, Node) {
     let mut net = Network::default();
     let input = net.input(3);
     let down = net.conv("stem", input, Kernel { side: 3, stride: 2 }, 16);
-    let norm = net.norm("stem.norm", down);
-    let half = net.relu(norm);
+    let half = net.norm_relu("stem.norm", down);
     let lower = net.conv("down", half, Kernel { side: 3, stride: 2 }, 16);
     let wide = net.depthwise("wide", lower, 5);
     let norm = net.norm("wide.norm", wide);

@@ -35,6 +35,12 @@ const ALLOWED: &[Arrows] = &[
         &["chaic-episodes", "chaic-test-kit"],
     ),
     arrows("chaic-video", &[], &[]),
+    arrows("chaic-nn", &["chaic-protocol"], &[]),
+    arrows(
+        "chaic-vision",
+        &["chaic-protocol", "chaic-world", "chaic-episodes", "chaic-render", "chaic-nn"],
+        &[],
+    ),
     arrows(
         "chaic-gltf",
         &["chaic-files", "chaic-protocol", "chaic-world", "chaic-episodes", "chaic-render"],

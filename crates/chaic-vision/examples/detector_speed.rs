@@ -1,0 +1,28 @@
+//! How long the detector takes: `cargo run --release -p chaic-vision --example detector_speed`.
+use std::time::Instant;
+
+use chaic_nn::simd::widest;
+use chaic_nn::{Pass, Shape, Tensor};
+use chaic_vision::detector::Detector;
+use chaic_vision::features::N_FEATURES;
+
+fn main() {
+    let detector = Detector::new();
+    let net = &detector.network;
+    println!("{} parameters", net.n_numbers());
+    let numbers = net.begin(1);
+    for (n, side) in [(1, 512), (4, 256)] {
+        let shape = Shape { n, height: side, width: side, channels: N_FEATURES };
+        let input = Tensor { shape, data: vec![0.1; shape.numbers()] };
+        let mut pass = Pass::new(net, widest());
+        let mut by = vec![0.0; net.n_numbers()];
+        for _ in 0..3 {
+            let t = Instant::now();
+            pass.forward(net, &numbers, &input);
+            let forward = t.elapsed();
+            pass.begin_backward();
+            pass.backward(net, &numbers, &mut by);
+            println!("{n} x {side}: forward {forward:?}, both {:?}", t.elapsed());
+        }
+    }
+}

@@ -1,0 +1,26 @@
+//! Learned perception: which things are in an image of color and depth, where, and of which classes.
+//!
+//! **What it is**: [`labels`] says what a pixel can be of, [`features`] what the network reads,
+//! [`views`] draws random views of generated episodes with labels, [`detector`] is the network, [`loss`]
+//! what it learns by, [`train`] the loop.
+//!
+//! **What it is not**: it knows no goals, rules or minds.
+//!
+//! **Invariants**
+//! - Nothing of validation, test or standard episodes is seen in training: views come from seeds of
+//!   [`views::Part`]s that don't overlap.
+//! - The same seed and configuration give the same weights, bit for bit, on any machine and number of
+//!   threads.
+
+pub mod labels;
+
+pub mod features;
+pub mod views;
+
+pub mod detector;
+pub mod loss;
+
+pub mod train;
+
+#[cfg(test)]
+mod tests;

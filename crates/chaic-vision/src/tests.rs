@@ -1,0 +1,147 @@
+//! Promises: features of a wall and a floor are those of geometry, gradients of the loss are those of
+//! finite differences, views and training are the same bits each time, and training learns.
+
+use chaic_nn::{Shape, Tensor};
+use chaic_protocol::geom::{Camera, yaw_rotation};
+use chaic_protocol::rng::Stream;
+use chaic_protocol::{EntityId, Vec3};
+
+use crate::features::{Crop, N_FEATURES, features};
+use crate::labels::{BACKGROUND, class_of, label_of, n_labels};
+use crate::loss::{LossRules, Targets, loss};
+use crate::train::{CropRules, Trainer, TrainingRules};
+use crate::views::{Part, ViewRules, Views};
+
+const EYE_M: f32 = 1.5;
+
+fn camera(side: u32) -> Camera {
+    Camera {
+        eye_in_world: Vec3::new(1.0, EYE_M, 2.0),
+        world_from_camera: yaw_rotation(0.7),
+        vertical_fov_rad: Camera::EYE_FOV_RAD,
+        width: side,
+        height: side,
+    }
+}
+
+#[test]
+fn a_wall_faces_the_eye_and_the_floor_upwards() {
+    let (side, wall_m) = (32, 2.0);
+    let camera = camera(side);
+    let focal = camera.focal_px();
+    let depth = |row: u32| {
+        let down = row as f32 + 0.5 - 0.5 * side as f32;
+        if down * wall_m / focal > EYE_M { EYE_M * focal / down } else { wall_m }
+    };
+    let depth_m: Vec<f32> = (0..side * side).map(|k| depth(k / side)).collect();
+    let rgb = vec![255; 3 * depth_m.len()];
+    let mut out = Vec::new();
+    features(&rgb, &depth_m, &camera, Crop::whole(&camera), &mut out);
+    let pixel = |row: usize| &out[(row * side as usize + 9) * N_FEATURES..][..N_FEATURES];
+    let is_near = |a: &[f32], b: [f32; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-3);
+    let (wall, floor) = (pixel(8), pixel(30));
+    assert!(is_near(&wall[5..], [0.0, 0.0, 1.0]), "{wall:?}");
+    assert!(is_near(&floor[5..], [0.0, 1.0, 0.0]), "{floor:?}");
+    assert!((wall[3] - 0.5).abs() < 1e-5 && floor[4].abs() < 1e-3, "{wall:?}, {floor:?}");
+    assert_eq!(wall[..3], [1.0; 3]);
+}
+
+#[test]
+fn labels_name_the_background_and_every_class() {
+    assert_eq!(label_of(None), BACKGROUND);
+    assert_eq!(class_of(BACKGROUND), None);
+    for label in 1..n_labels() as u8 {
+        assert_eq!(label_of(class_of(label)), label);
+    }
+}
+
+#[test]
+fn gradients_of_the_loss_are_those_of_finite_differences() {
+    let mut rng = Stream::new(1, "loss", 0);
+    let shape = |channels| Shape { n: 1, height: 2, width: 3, channels };
+    let mut random = |channels: usize| {
+        let data = (0..6 * channels).map(|_| rng.range(-2.0, 2.0)).collect();
+        Tensor { shape: shape(channels), data }
+    };
+    let (labels, offsets) = (random(n_labels()), random(3));
+    let targets = Targets {
+        labels: vec![0, 3, 7, 3, 0, 9],
+        weights: vec![1.0, 4.0, 0.5, 2.0, 1.0, 0.0],
+        offsets: vec![[0.1, -0.2, 0.3]; 6],
+    };
+    let rules = LossRules::TRAINING;
+    let of = |labels: &Tensor, offsets: &Tensor| {
+        let (mut a, mut b) = (Tensor::zeros(labels.shape), Tensor::zeros(offsets.shape));
+        let loss = loss((labels, offsets), &targets, &rules, (&mut a, &mut b));
+        (loss.labels + f64::from(rules.offset) * loss.offsets, a, b)
+    };
+    let (_, by_labels, by_offsets) = of(&labels, &offsets);
+    let h = 1e-2;
+    for k in (0..labels.data.len()).step_by(5) {
+        let at = |h: f32| {
+            let mut moved = labels.clone();
+            moved.data[k] += h;
+            of(&moved, &offsets).0
+        };
+        let measured = (at(h) - at(-h)) / (2.0 * f64::from(h));
+        let exact = f64::from(by_labels.data[k]);
+        assert!((measured - exact).abs() < 3e-3, "label {k}: {measured} for {exact}");
+    }
+    for k in 0..offsets.data.len() {
+        let at = |h: f32| {
+            let mut moved = offsets.clone();
+            moved.data[k] += h;
+            of(&labels, &moved).0
+        };
+        let measured = (at(h) - at(-h)) / (2.0 * f64::from(h));
+        let exact = f64::from(by_offsets.data[k]);
+        assert!((measured - exact).abs() < 3e-3, "offset {k}: {measured} for {exact}");
+    }
+}
+
+/// Small images and crops.
+fn tiny() -> TrainingRules {
+    let crops = |of_view, side_px| CropRules { views: 2, of_view, side_px, anywhere: 0.3 };
+    TrainingRules {
+        views: ViewRules { size_px: 128, ..ViewRules::TRAINING },
+        crops: [crops(1, 96), crops(2, 64)],
+        warm_up: 2,
+        rate: 5e-3,
+        ..TrainingRules::shipped(400)
+    }
+}
+
+#[test]
+fn views_are_the_same_each_time_and_others_elsewhere() {
+    let draw = |part, index| Views::new(part, tiny().views, 1, index).draw();
+    let (view, again) = (draw(Part::Training, 3), draw(Part::Training, 3));
+    assert!(view.rgb == again.rgb && view.ids == again.ids && view.depth_m == again.depth_m);
+    assert!(draw(Part::Validation, 3).rgb != view.rgb && draw(Part::Training, 4).rgb != view.rgb);
+    let structure = [EntityId::NOTHING, EntityId::FLOOR, EntityId::WALL, EntityId::CEILING];
+    for id in structure {
+        assert_eq!(view.labels[usize::from(id.0)], BACKGROUND);
+    }
+    let of_id = |id: &u16| view.labels.get(usize::from(*id)).is_some();
+    assert!(view.ids.iter().all(of_id), "ids beyond the labels");
+}
+
+#[test]
+fn training_goes_on_from_a_checkpoint_as_if_it_had_not_stopped() {
+    let mut straight = Trainer::new(tiny());
+    straight.step();
+    let checkpoint = straight.checkpoint();
+    let expected = (straight.step(), straight.checkpoint());
+    let mut resumed = Trainer::new(tiny());
+    assert!(!resumed.resume(&checkpoint[..100]) && !resumed.resume(&[]));
+    assert!(resumed.resume(&checkpoint));
+    assert!((resumed.step(), resumed.checkpoint()) == expected);
+}
+
+#[test]
+fn training_learns() {
+    let mut trainer = Trainer::new(tiny());
+    let losses: Vec<f64> = (0..30).map(|_| trainer.step().labels).collect();
+    let mean = |losses: &[f64]| losses.iter().sum::<f64>() / losses.len() as f64;
+    let (first, last) = (mean(&losses[..3]), mean(&losses[27..]));
+    assert!(last < 0.8 * first, "{first} to {last}");
+}

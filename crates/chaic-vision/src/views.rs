@@ -1,0 +1,348 @@
+//! Random views of generated episodes with labels: what the detector learns from, and is held
+//! against.
+
+use std::f32::consts::PI;
+
+use chaic_episodes::{Seeds, Settings, generate_with};
+use chaic_protocol::geom::{Camera, yaw_rotation};
+use chaic_protocol::rng::Stream;
+use chaic_protocol::{ClassId, EntityId, Role, TaskId, Vec2, Vec3};
+use chaic_render::{Appearance, Channels, Scene, View};
+use chaic_world::{Posture, Rules, Setup, Surface, Thing, World, top_surfaces};
+
+use crate::labels::{class_of, label_of};
+
+/// Which episodes views come from. The seeds of parts don't overlap, and lie far beyond those of
+/// the standard split.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// To learn from.
+    Training,
+    /// To choose by.
+    Validation,
+}
+
+impl Part {
+    /// The first seed, and how many there are.
+    fn seeds(self) -> (u64, usize) {
+        match self {
+            Part::Training => (10_000_000, 1_000_000),
+            Part::Validation => (20_000_000, 10_000),
+        }
+    }
+}
+
+/// How views are drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ViewRules {
+    /// Side of images, pixels.
+    pub size_px: u32,
+    /// Share of carriable things that become another class of carriable thing, each equally often.
+    pub swapped: f32,
+    /// So many small things are added to a scene, on tops of furniture and on the ground.
+    pub added: usize,
+    /// Share of added things that are any small thing of the catalogue; the others can be carried.
+    pub decor: f32,
+    /// Share of scenes in light and colors drawn at random.
+    pub varied: f32,
+    /// Share of views that look at one thing; the others look anywhere.
+    pub aimed: f32,
+    /// Share of these that look at something that can be carried.
+    pub aimed_small: f32,
+    /// Distance to the thing that is looked at, metres; near and far ones equally often by their
+    /// logarithm.
+    pub distance_m: [f32; 2],
+}
+
+impl ViewRules {
+    /// What the detector is trained with.
+    pub const TRAINING: ViewRules = ViewRules {
+        size_px: 512,
+        swapped: 0.7,
+        added: 24,
+        decor: 0.2,
+        varied: 0.35,
+        aimed: 0.8,
+        aimed_small: 0.7,
+        distance_m: [0.6, 5.0],
+    };
+}
+
+/// An image with labels.
+#[derive(Clone, Debug)]
+pub struct LabelledView {
+    /// The camera.
+    pub camera: Camera,
+    /// Color, shape [height, width, 3].
+    pub rgb: Vec<u8>,
+    /// Depth in metres, shape [height, width].
+    pub depth_m: Vec<f32>,
+    /// Instance ids, shape [height, width].
+    pub ids: Vec<u16>,
+    /// The label of each id.
+    pub labels: Vec<u8>,
+    /// A thing that the view was aimed at, if any.
+    pub aimed_at: Option<EntityId>,
+}
+
+/// Views of one scene after the other.
+pub struct Views {
+    part: Part,
+    rules: ViewRules,
+    rng: Stream,
+    scene: Option<Place>,
+    /// Views still to be taken of the scene.
+    left: usize,
+}
+
+/// Views of one scene, before the next one.
+const VIEWS_OF_SCENE: usize = 12;
+/// Views that are tried before another thing is looked at.
+const TRIES: usize = 4;
+/// A view with more of this share of pixels nearer than [`TOO_NEAR_M`] stands in something.
+const MOST_NEAR: f32 = 0.1;
+const TOO_NEAR_M: f32 = 0.3;
+/// Things that fewer pixels show aren't aimed at.
+const LEAST_AIMED_PX: usize = 24;
+
+/// Added things are no larger than this, and lie no higher, metres.
+const LARGEST_ADDED_M: f32 = 0.7;
+const HIGHEST_TOP_M: f32 = 2.0;
+
+struct Place {
+    world: World,
+    scene: Scene,
+    labels: Vec<u8>,
+    postures: Vec<Posture>,
+}
+
+impl Views {
+    /// The stream of views of this name.
+    pub fn new(part: Part, rules: ViewRules, seed: u64, index: u64) -> Views {
+        let rng = Stream::new(seed, "views", index);
+        Views { part, rules, rng, scene: None, left: 0 }
+    }
+
+    /// The next one.
+    pub fn draw(&mut self) -> LabelledView {
+        loop {
+            if self.left == 0 {
+                self.scene = self.place();
+                self.left = VIEWS_OF_SCENE;
+            }
+            self.left -= 1;
+            let Some(mut place) = self.scene.take() else {
+                self.left = 0;
+                continue;
+            };
+            let view = (0..TRIES).find_map(|_| self.look(&mut place));
+            self.scene = Some(place);
+            if let Some(view) = view {
+                return view;
+            }
+        }
+    }
+
+    fn place(&mut self) -> Option<Place> {
+        let rng = &mut self.rng;
+        let tasks: Vec<TaskId> = TaskId::all().collect();
+        let task = tasks[rng.below(tasks.len())];
+        let (first, n) = self.part.seeds();
+        let mut seed = || first + rng.below(n) as u64;
+        let seeds = Seeds { place: seed(), episode: seed() };
+        let settings = if rng.chance(0.7) { Settings::STANDARD } else { Settings::PAPER };
+        let usual = generate_with(task, seeds, settings).ok()?;
+        let setup = self.swapped(&usual);
+        let rng = &mut self.rng;
+        let world = World::new(setup, Rules::paper()).ok()?;
+        let appearance = match rng.chance(self.rules.varied) {
+            true => Appearance::Varied { seed: rng.below(1 << 24) as u64 },
+            false => Appearance::Canonical,
+        };
+        let scene = Scene::with_appearance(world.setup(), appearance);
+        let labels = world.classes().into_iter().map(label_of).collect();
+        let postures = world.setup().agents().map(|agent| world.posture(agent)).collect();
+        Some(Place { world, scene, labels, postures })
+    }
+
+    /// The same with other small things where small things lie, and other obstacles and furniture
+    /// where such stand.
+    fn swapped(&mut self, usual: &Setup) -> Setup {
+        let rng = &mut self.rng;
+        let of = |is: &dyn Fn(Role) -> bool| -> Vec<ClassId> {
+            ClassId::all().filter(|c| is(c.info().role)).collect()
+        };
+        let small = of(&|r| matches!(r, Role::Target | Role::Container | Role::Fragile));
+        let obstacles = of(&|r| r == Role::Obstacle);
+        let heavy = of(&|r| r == Role::HeavyTarget);
+        let mut setup = usual.clone();
+        for thing in &mut setup.things {
+            let among = match thing.class.info().role {
+                Role::Target | Role::Container | Role::Fragile => &small,
+                Role::Obstacle => &obstacles,
+                Role::HeavyTarget if !thing.fixed => &heavy,
+                _ => continue,
+            };
+            if rng.chance(self.rules.swapped) {
+                let class = among[rng.below(among.len())];
+                let yaw_rad = rng.range(-PI, PI);
+                let variant = rng.below(256) as u8;
+                *thing = Thing { variant, ..Thing::new(class, thing.position, yaw_rad) };
+            }
+        }
+        let fits = |c: &ClassId| c.info().size_m.into_iter().all(|m| m < LARGEST_ADDED_M);
+        let decor: Vec<ClassId> = of(&|r| r == Role::Furnishing).into_iter().filter(fits).collect();
+        let tops: Vec<Surface> = setup
+            .things
+            .iter()
+            .filter(|t| !t.class.info().is_carriable())
+            .flat_map(top_surfaces)
+            .filter(|top| top.center.y < HIGHEST_TOP_M)
+            .collect();
+        for _ in 0..self.rules.added {
+            let among = if rng.chance(self.rules.decor) { &decor } else { &small };
+            let Some(class) = rng.choose(among).copied() else { continue };
+            let mut within = |m: f32| rng.range(-m, m);
+            let ground = {
+                let half = 0.5 * setup.bounds.size();
+                let middle = setup.bounds.min + half;
+                Vec3::new(middle.x + within(half.x), 0.0, middle.y + within(half.y))
+            };
+            let position = match rng.choose(&tops) {
+                Some(top) if rng.chance(0.7) => {
+                    let at = Vec3::new(
+                        rng.range(-top.half[0], top.half[0]),
+                        0.0,
+                        rng.range(-top.half[1], top.half[1]),
+                    );
+                    top.center + yaw_rotation(top.yaw_rad) * (0.9 * at)
+                }
+                _ => ground,
+            };
+            let yaw_rad = rng.range(-PI, PI);
+            let variant = rng.below(256) as u8;
+            setup.things.push(Thing { variant, ..Thing::new(class, position, yaw_rad) });
+        }
+        setup
+    }
+
+    /// A view of a place; `None` if it shows nothing of what it was aimed at, or stands in something.
+    fn look(&mut self, place: &mut Place) -> Option<LabelledView> {
+        let rng = &mut self.rng;
+        let size = self.rules.size_px;
+        let aimed_at = rng.chance(self.rules.aimed).then(|| {
+            let is_small = rng.chance(self.rules.aimed_small);
+            aim(place, is_small, rng)
+        });
+        let aimed_at = aimed_at.flatten();
+        let eye_m = if rng.chance(0.7) { 1.65 } else { rng.range(1.05, 1.75) };
+        let bounds = place.world.setup().bounds;
+        let (at, yaw_rad) = match aimed_at {
+            Some(entity) => {
+                let [near_m, far_m] = self.rules.distance_m;
+                let far_m = visible_m(place, entity).clamp(1.5 * near_m, far_m);
+                let [near, far] = [near_m, far_m].map(log2);
+                let distance_m = exp2(rng.range(near, far));
+                let way = yaw_rotation(rng.range(-PI, PI)) * Vec3::NEG_Z;
+                let to = target_position(place, entity);
+                let at = to - distance_m * way;
+                let yaw_rad = chaic_protocol::geom::yaw_towards(at, to) + rng.range(-0.6, 0.6);
+                (Vec2::new(at.x, at.z), yaw_rad)
+            }
+            None => {
+                let at = bounds.min + Vec2::new(rng.unit(), rng.unit()) * bounds.size();
+                (at, rng.range(-PI, PI))
+            }
+        };
+        if !bounds.contains(at) {
+            return None;
+        }
+        self.pose_people(place, at);
+        let camera = Camera {
+            eye_in_world: Vec3::new(at.x, eye_m, at.y),
+            world_from_camera: yaw_rotation(yaw_rad),
+            vertical_fov_rad: Camera::EYE_FOV_RAD,
+            width: size,
+            height: size,
+        };
+        let view = View::of_camera(camera, Channels::ALL);
+        let state = place.world.state();
+        let images = place.scene.render_state(state, &place.postures, &[view]).pop()?;
+        let (rgb, depth_m, ids) = (images.rgb?, images.depth_m?, images.ids?);
+        let n_near = depth_m.iter().filter(|d| **d < TOO_NEAR_M).count();
+        let n_aimed = aimed_at.map(|e| ids.iter().filter(|id| **id == e.0).count());
+        if n_near as f32 > MOST_NEAR * depth_m.len() as f32
+            || n_aimed.is_some_and(|n| n < LEAST_AIMED_PX)
+        {
+            return None;
+        }
+        Some(LabelledView { camera, rgb, depth_m, ids, labels: place.labels.clone(), aimed_at })
+    }
+
+    /// Puts everybody somewhere else, some of them before the eye.
+    fn pose_people(&mut self, place: &mut Place, eye: Vec2) {
+        let rng = &mut self.rng;
+        let bounds = place.world.setup().bounds;
+        for posture in &mut place.postures {
+            let at = match rng.chance(0.3) {
+                true => eye + 4.0 * Vec2::new(rng.range(-1.0, 1.0), rng.range(-1.0, 1.0)),
+                false => bounds.min + Vec2::new(rng.unit(), rng.unit()) * bounds.size(),
+            };
+            posture.pose.position = Vec3::new(at.x, 0.0, at.y);
+            posture.pose.yaw_rad = rng.range(-PI, PI);
+            posture.walked_m = rng.range(0.0, 3.0);
+            posture.moving = rng.chance(0.5);
+            posture.bend = if rng.chance(0.2) { rng.unit() } else { 0.0 };
+            posture.stretch = if rng.chance(0.1) { rng.unit() } else { 0.0 };
+        }
+    }
+}
+
+/// A thing of a class, each class that is there equally often: of those that can be carried, or of all
+/// others, people too.
+fn aim(place: &Place, is_small: bool, rng: &mut Stream) -> Option<EntityId> {
+    let fits =
+        |label: u8| class_of(label).is_some_and(|class| class.info().is_carriable() == is_small);
+    let mut by_label: Vec<(u8, EntityId)> = (0..place.labels.len())
+        .map(|k| (place.labels[k], EntityId(k as u16)))
+        .filter(|(label, _)| fits(*label))
+        .collect();
+    by_label.sort();
+    let mut labels: Vec<u8> = by_label.iter().map(|(label, _)| *label).collect();
+    labels.dedup();
+    let label = *rng.choose(&labels)?;
+    let of_it: Vec<EntityId> =
+        by_label.into_iter().filter(|(l, _)| *l == label).map(|(_, e)| e).collect();
+    rng.choose(&of_it).copied()
+}
+
+fn target_position(place: &Place, entity: EntityId) -> Vec3 {
+    match entity.agent() {
+        Some(agent) => place.postures[agent.index()].pose.position,
+        None => {
+            place.world.state().things[usize::from(entity.0 - EntityId::FIRST_OBJECT.0)].position
+        }
+    }
+}
+
+/// About how far off a thing still shows in a hundred pixels of an image of 512, metres.
+fn visible_m(place: &Place, entity: EntityId) -> f32 {
+    let class = place.labels.get(usize::from(entity.0)).and_then(|label| class_of(*label));
+    let mut size_m = class.map_or([1.0; 3], |class| class.info().size_m);
+    size_m.sort_by(f32::total_cmp);
+    40.0 * (size_m[1] * size_m[2]).sqrt()
+}
+
+/// Base-2 logarithm by the bits and a straight line between powers; the same on every machine.
+fn log2(x: f32) -> f32 {
+    let bits = x.to_bits();
+    let exponent = (bits >> 23) as i32 - 127;
+    let mantissa = f32::from_bits(bits & 0x7f_ffff | 127 << 23);
+    exponent as f32 + mantissa - 1.0
+}
+
+/// The inverse.
+fn exp2(x: f32) -> f32 {
+    let whole = x.floor();
+    f32::from_bits(((whole as i32 + 127) as u32) << 23) * (1.0 + x - whole)
+}

@@ -1,5 +1,5 @@
 //! Layer normalization of each pixel: its channels are scaled to mean 0 and variance 1, then by a
-//! learned scale and shift (Ba et al. 2016). No pixel depends on others, so that batches may have any
+//! learned scale and shift ("Layer Normalization", 2016). No pixel depends on others, so that batches may have any
 //! size and images any number.
 
 /// Added to variances.

@@ -3,7 +3,8 @@ use std::fs;
 use std::io::Write as _;
 use std::time::Instant;
 
-use chaic_vision::train::{Trainer, TrainingRules, validate};
+use chaic_vision::evaluate::evaluate;
+use chaic_vision::train::{Trainer, TrainingRules};
 
 fn main() -> std::io::Result<()> {
     let mut arguments = std::env::args().skip(1);
@@ -45,14 +46,9 @@ fn main() -> std::io::Result<()> {
             fs::rename(format!("{checkpoint}.new"), &checkpoint)?;
         }
         if step.is_multiple_of(1000) || step == steps {
-            let v = validate(&trainer.detector, &trainer.average, &rules, 60);
-            let line = format!(
-                "validation at {step}: found {} of {} ({:.3}), background {:.4}",
-                v.found,
-                v.things,
-                v.found as f64 / v.things.max(1) as f64,
-                v.background
-            );
+            let found = evaluate(&trainer.detector, &trainer.average, rules.views, 200, 2);
+            let line =
+                format!("validation at {step}: map50 {:.3}, map {:.3}", found.map50, found.map);
             println!("{line}");
             writeln!(log, "{line}")?;
         }

@@ -2,7 +2,8 @@
 //!
 //! **What it is**: [`labels`] says what a pixel can be of, [`features`] what the network reads,
 //! [`views`] draws random views of generated episodes with labels, [`detector`] is the network, [`loss`]
-//! what it learns by, [`train`] the loop.
+//! what it learns by, [`train`] the loop; [`instances`] makes things of what it says, and
+//! [`average_precision`] tells how good they are.
 //!
 //! **What it is not**: it knows no goals, rules or minds.
 //!
@@ -19,6 +20,11 @@ pub mod views;
 
 pub mod detector;
 pub mod loss;
+
+pub mod instances;
+
+pub mod average_precision;
+pub mod evaluate;
 
 pub mod train;
 

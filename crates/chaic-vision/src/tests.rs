@@ -6,11 +6,15 @@ use chaic_protocol::geom::{Camera, yaw_rotation};
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{EntityId, Vec3};
 
+use crate::average_precision::average_precision;
+use crate::detector::STRIDE;
+use crate::evaluate::{LEAST_PX, compare};
 use crate::features::{Crop, N_FEATURES, features};
+use crate::instances::{InstanceRules, instances};
 use crate::labels::{BACKGROUND, class_of, label_of, n_labels};
 use crate::loss::{LossRules, Targets, loss};
 use crate::train::{CropRules, Trainer, TrainingRules};
-use crate::views::{Part, ViewRules, Views};
+use crate::views::{LabelledView, Part, ViewRules, Views};
 
 const EYE_M: f32 = 1.5;
 
@@ -144,4 +148,35 @@ fn training_learns() {
     let mean = |losses: &[f64]| losses.iter().sum::<f64>() / losses.len() as f64;
     let (first, last) = (mean(&losses[..3]), mean(&losses[27..]));
     assert!(last < 0.8 * first, "{first} to {last}");
+}
+
+/// What a network that makes no mistake would say of a view.
+fn perfect(view: &LabelledView) -> (Tensor, Tensor) {
+    let mut targets = Targets::default();
+    targets.add(view, Crop::whole(&view.camera), &LossRules::TRAINING);
+    let side = view.camera.width as usize / STRIDE;
+    let shape = |channels| Shape { n: 1, height: side, width: side, channels };
+    let mut labels = Tensor::zeros(shape(n_labels()));
+    for (row, label) in labels.data.chunks_exact_mut(n_labels()).zip(&targets.labels) {
+        row[usize::from(*label)] = 10.0;
+    }
+    (labels, Tensor { shape: shape(3), data: targets.offsets.into_flattened() })
+}
+
+#[test]
+fn instances_of_perfect_labels_and_offsets_are_those_that_are_there() {
+    let rules = ViewRules::TRAINING;
+    let images: Vec<_> = (0..16)
+        .map(|k| {
+            let view = Views::new(Part::Validation, rules, 7, k).draw();
+            let (labels, offsets) = perfect(&view);
+            let maps = (&labels, &offsets);
+            let found = instances(maps, &view.depth_m, &view.camera, &InstanceRules::default());
+            compare(&view, &found, LEAST_PX)
+        })
+        .collect();
+    let n_asked = images.iter().flat_map(|i| &i.truths).filter(|t| !t.is_ignored).count();
+    let found = average_precision(&images);
+    println!("{n_asked} instances: {:.3}, {:.3}", found.map50, found.map);
+    assert!(n_asked > 60 && found.map50 > 0.9, "{n_asked}: {found:?}");
 }

@@ -238,8 +238,8 @@ impl Trainer {
         let rate = self.rules.rate_at(step);
         let network = &self.detector.network;
         self.adam.step(&self.rules.adam, rate, network, &mut self.numbers, &first.1);
-        // Faster at the beginning, or the mean would keep what the network began with.
-        let share = AVERAGE_RATE.max(1.0 / (self.adam.steps as f32 + 1.0));
+        // Of the last eighth of the steps, or the mean would keep what the network began with.
+        let share = AVERAGE_RATE.max(8.0 / (self.adam.steps as f32 + 8.0));
         for (mean, x) in self.average.iter_mut().zip(&self.numbers) {
             *mean += share * (x - *mean);
         }

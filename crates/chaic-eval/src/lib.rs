@@ -4,8 +4,7 @@
 //! several threads, keeps a journal and writes a [`trace_file`] of each, [`metrics`] computes the
 //! paper's scores from what was recorded, [`report`] prints them, [`verify`] plays a trace's actions
 //! again and compares, [`replay`] and [`frame_export`] draw what was played, [`audit`] shows that what is
-//! hidden is hidden, [`scene_file`] writes what there is to draw, [`bench`](mod@bench) measures how
-//! fast this machine draws and steps.
+//! hidden is hidden.
 //!
 //! **What it is not**: it holds no rules of the world, and decides for nobody.
 //!

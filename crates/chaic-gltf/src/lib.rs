@@ -1,7 +1,7 @@
 //! Scenes as binary glTF files, for viewers, modelling programs and other renderers.
 //!
 //! **What it is**: the shapes that `chaic-render` draws, encoded as glTF 2.0 by [`glb`], and how an
-//! episode begins as such a file by [`write`].
+//! episode begins as such a file by [`write()`].
 //! **What it is not**: it draws nothing, and reads no glTF.
 
 mod encode;

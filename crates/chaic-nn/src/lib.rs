@@ -24,6 +24,7 @@ pub mod network;
 pub mod pass;
 
 pub mod adam;
+pub mod weights;
 
 #[cfg(test)]
 mod tests;

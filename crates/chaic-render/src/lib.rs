@@ -4,7 +4,7 @@
 //! any number of cameras ([`View`]) see at a moment, [`render_batch`] those of many worlds,
 //! [`Scene::label`] labels what learners see, [`floor_plan::draw`] draws a map for people,
 //! [`image_out`] and [`text`] help to write pictures. [`geometry`] gives the same shapes as plain data,
-//! for other renderers, and [`gltf_out`] as a file.
+//! for other renderers.
 //!
 //! **What it is not**: it changes no state, reads no files, and uses neither GPU nor display.
 //!

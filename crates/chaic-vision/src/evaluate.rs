@@ -29,8 +29,7 @@ pub fn detect(
         Tensor { shape: Shape { n: 1, height, width, channels: N_FEATURES }, ..Tensor::default() };
     features(&view.rgb, &view.depth_m, camera, crop, &mut input.data);
     pass.forward(&detector.network, numbers, &input);
-    let made = (pass.made(detector.labels), pass.made(detector.offsets));
-    instances(made, &view.depth_m, camera, &InstanceRules::default())
+    instances(pass.made(detector.head), &view.depth_m, camera, &InstanceRules::default())
 }
 
 /// What is in a view beside what was seen in it.

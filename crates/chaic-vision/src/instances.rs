@@ -4,7 +4,7 @@
 use chaic_nn::Tensor;
 use chaic_protocol::geom::Camera;
 
-use crate::detector::STRIDE;
+use crate::detector::{N_OFFSETS, STRIDE};
 use crate::labels::{BACKGROUND, half_extents_m};
 
 /// One thing that the detector sees.
@@ -88,14 +88,14 @@ struct Pixel {
 /// # Panics
 /// If shapes don't fit.
 pub fn instances(
-    (labels, offsets): (&Tensor, &Tensor),
+    head: &Tensor,
     depth_m: &[f32],
     camera: &Camera,
     rules: &InstanceRules,
 ) -> Vec<Instance> {
-    let (width, columns) = (camera.width as usize, labels.shape.width);
+    let (width, columns) = (camera.width as usize, head.shape.width);
     let half_extents = half_extents_m();
-    let pixels = read(labels, offsets, depth_m, camera, &half_extents);
+    let pixels = read(head, depth_m, camera, &half_extents);
     let mut parents: Vec<u32> = (0..pixels.len() as u32).collect();
     let belong = |a: &Pixel, b: &Pixel| {
         let half = half_extents[usize::from(a.label)];
@@ -157,17 +157,13 @@ pub fn instances(
     found
 }
 
-fn read(
-    labels: &Tensor,
-    offsets: &Tensor,
-    depth_m: &[f32],
-    camera: &Camera,
-    half_extents: &[f32],
-) -> Vec<Pixel> {
-    let (width, columns) = (camera.width as usize, labels.shape.width);
+fn read(head: &Tensor, depth_m: &[f32], camera: &Camera, half_extents: &[f32]) -> Vec<Pixel> {
+    let (width, columns) = (camera.width as usize, head.shape.width);
+    let n_labels = head.shape.channels - N_OFFSETS;
     let (focal, half) = (camera.focal_px(), 0.5 * width as f32);
-    let rows = labels.data.chunks_exact(labels.shape.channels);
-    let pixel = |(k, (row, offset)): (usize, (&[f32], &[f32]))| {
+    let rows = head.data.chunks_exact(head.shape.channels);
+    let pixel = |(k, numbers): (usize, &[f32])| {
+        let (row, offset) = numbers.split_at(n_labels);
         let (x, y) = (STRIDE * (k % columns), STRIDE * (k / columns));
         let depth = depth_m[y * width + x];
         let (u, v) = (x as f32 + 0.5 - half, y as f32 + 0.5 - half);
@@ -178,7 +174,7 @@ fn read(
         let vote = std::array::from_fn(|axis| point[axis] + scale * offset[axis]);
         Pixel { label: best as u8, probability: 1.0 / sum, point, vote }
     };
-    rows.zip(offsets.data.chunks_exact(3)).enumerate().map(pixel).collect()
+    rows.enumerate().map(pixel).collect()
 }
 
 fn median_vote(pixels: &[Pixel], part: &[usize]) -> [f32; 3] {

@@ -3,7 +3,7 @@
 
 use chaic_nn::Tensor;
 
-use crate::detector::STRIDE;
+use crate::detector::{N_OFFSETS, STRIDE};
 use crate::features::Crop;
 use crate::labels::{BACKGROUND, half_extents_m};
 use crate::views::LabelledView;
@@ -146,22 +146,18 @@ fn ln(x: f32) -> f32 {
     y
 }
 
-/// The loss, with its gradient by both heads.
-pub fn loss(
-    (labels, offsets): (&Tensor, &Tensor),
-    targets: &Targets,
-    rules: &LossRules,
-    (by_labels, by_offsets): (&mut Tensor, &mut Tensor),
-) -> Loss {
-    let n_labels = labels.shape.channels;
+/// The loss of what the head made, with its gradient.
+pub fn loss(head: &Tensor, targets: &Targets, rules: &LossRules, gradient: &mut Tensor) -> Loss {
+    let channels = head.shape.channels;
+    let n_labels = channels - N_OFFSETS;
     let whole: f32 = targets.weights.iter().sum::<f32>().max(1.0);
     let part = 1.0 / whole;
     let mut loss = Loss::default();
     let mut things = 1e-9;
     for (k, label) in targets.labels.iter().enumerate() {
         let weight = targets.weights[k] * part;
-        let row = &labels.data[k * n_labels..][..n_labels];
-        let out = &mut by_labels.data[k * n_labels..][..n_labels];
+        let (row, offset) = head.data[k * channels..][..channels].split_at(n_labels);
+        let (out, gradient) = gradient.data[k * channels..][..channels].split_at_mut(n_labels);
         let most = row.iter().copied().fold(f32::NEG_INFINITY, f32::max);
         let mut sum = 0.0;
         for (out, x) in out.iter_mut().zip(row) {
@@ -175,7 +171,6 @@ pub fn loss(
         let scale = weight / sum;
         out.iter_mut().for_each(|x| *x *= scale);
         out[own] -= weight;
-        let gradient = &mut by_offsets.data[3 * k..][..3];
         gradient.fill(0.0);
         if *label == BACKGROUND {
             continue;
@@ -185,7 +180,7 @@ pub fn loss(
         for (axis, gradient) in gradient.iter_mut().enumerate() {
             // Smooth: a square within 0.1, straight beyond.
             const WITHIN: f32 = 0.1;
-            let error = offsets.data[3 * k + axis] - targets.offsets[k][axis];
+            let error = offset[axis] - targets.offsets[k][axis];
             let size = error.abs();
             let value =
                 if size < WITHIN { 0.5 * size * size / WITHIN } else { size - 0.5 * WITHIN };

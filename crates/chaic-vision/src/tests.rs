@@ -7,7 +7,7 @@ use chaic_protocol::rng::Stream;
 use chaic_protocol::{EntityId, Vec3};
 
 use crate::average_precision::average_precision;
-use crate::detector::STRIDE;
+use crate::detector::{N_OFFSETS, STRIDE};
 use crate::evaluate::{LEAST_PX, compare};
 use crate::features::{Crop, N_FEATURES, features};
 use crate::instances::{InstanceRules, instances};
@@ -62,44 +62,33 @@ fn labels_name_the_background_and_every_class() {
 #[test]
 fn gradients_of_the_loss_are_those_of_finite_differences() {
     let mut rng = Stream::new(1, "loss", 0);
-    let shape = |channels| Shape { n: 1, height: 2, width: 3, channels };
-    let mut random = |channels: usize| {
-        let data = (0..6 * channels).map(|_| rng.range(-2.0, 2.0)).collect();
-        Tensor { shape: shape(channels), data }
-    };
-    let (labels, offsets) = (random(n_labels()), random(3));
+    let channels = n_labels() + N_OFFSETS;
+    let shape = Shape { n: 1, height: 2, width: 3, channels };
+    let data = (0..shape.numbers()).map(|_| rng.range(-2.0, 2.0)).collect();
+    let head = Tensor { shape, data };
     let targets = Targets {
         labels: vec![0, 3, 7, 3, 0, 9],
         weights: vec![1.0, 4.0, 0.5, 2.0, 1.0, 0.0],
         offsets: vec![[0.1, -0.2, 0.3]; 6],
     };
     let rules = LossRules::TRAINING;
-    let of = |labels: &Tensor, offsets: &Tensor| {
-        let (mut a, mut b) = (Tensor::zeros(labels.shape), Tensor::zeros(offsets.shape));
-        let loss = loss((labels, offsets), &targets, &rules, (&mut a, &mut b));
-        (loss.labels + f64::from(rules.offset) * loss.offsets, a, b)
+    let of = |head: &Tensor| {
+        let mut gradient = Tensor::zeros(head.shape);
+        let loss = loss(head, &targets, &rules, &mut gradient);
+        (loss.labels + f64::from(rules.offset) * loss.offsets, gradient)
     };
-    let (_, by_labels, by_offsets) = of(&labels, &offsets);
+    let (_, exact) = of(&head);
     let h = 1e-2;
-    for k in (0..labels.data.len()).step_by(5) {
+    let is_offset = |k: usize| k % channels >= n_labels();
+    for k in (0..head.data.len()).filter(|k| k % 5 == 0 || is_offset(*k)) {
         let at = |h: f32| {
-            let mut moved = labels.clone();
+            let mut moved = head.clone();
             moved.data[k] += h;
-            of(&moved, &offsets).0
+            of(&moved).0
         };
         let measured = (at(h) - at(-h)) / (2.0 * f64::from(h));
-        let exact = f64::from(by_labels.data[k]);
-        assert!((measured - exact).abs() < 3e-3, "label {k}: {measured} for {exact}");
-    }
-    for k in 0..offsets.data.len() {
-        let at = |h: f32| {
-            let mut moved = offsets.clone();
-            moved.data[k] += h;
-            of(&labels, &moved).0
-        };
-        let measured = (at(h) - at(-h)) / (2.0 * f64::from(h));
-        let exact = f64::from(by_offsets.data[k]);
-        assert!((measured - exact).abs() < 3e-3, "offset {k}: {measured} for {exact}");
+        let exact = f64::from(exact.data[k]);
+        assert!((measured - exact).abs() < 3e-3, "{k}: {measured} for {exact}");
     }
 }
 
@@ -151,16 +140,17 @@ fn training_learns() {
 }
 
 /// What a network that makes no mistake would say of a view.
-fn perfect(view: &LabelledView) -> (Tensor, Tensor) {
+fn perfect(view: &LabelledView) -> Tensor {
     let mut targets = Targets::default();
     targets.add(view, Crop::whole(&view.camera), &LossRules::TRAINING);
     let side = view.camera.width as usize / STRIDE;
-    let shape = |channels| Shape { n: 1, height: side, width: side, channels };
-    let mut labels = Tensor::zeros(shape(n_labels()));
-    for (row, label) in labels.data.chunks_exact_mut(n_labels()).zip(&targets.labels) {
-        row[usize::from(*label)] = 10.0;
+    let channels = n_labels() + N_OFFSETS;
+    let mut head = Tensor::zeros(Shape { n: 1, height: side, width: side, channels });
+    for (k, row) in head.data.chunks_exact_mut(channels).enumerate() {
+        row[usize::from(targets.labels[k])] = 10.0;
+        row[n_labels()..].copy_from_slice(&targets.offsets[k]);
     }
-    (labels, Tensor { shape: shape(3), data: targets.offsets.into_flattened() })
+    head
 }
 
 #[test]
@@ -169,9 +159,8 @@ fn instances_of_perfect_labels_and_offsets_are_those_that_are_there() {
     let images: Vec<_> = (0..16)
         .map(|k| {
             let view = Views::new(Part::Validation, rules, 7, k).draw();
-            let (labels, offsets) = perfect(&view);
-            let maps = (&labels, &offsets);
-            let found = instances(maps, &view.depth_m, &view.camera, &InstanceRules::default());
+            let (head, rules) = (perfect(&view), InstanceRules::default());
+            let found = instances(&head, &view.depth_m, &view.camera, &rules);
             compare(&view, &found, LEAST_PX)
         })
         .collect();

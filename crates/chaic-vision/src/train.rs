@@ -269,12 +269,9 @@ fn gradient(
     let network: &Network = &detector.network;
     pass.forward(network, numbers, &batch.input);
     pass.begin_backward();
-    let mut by_labels = std::mem::take(pass.gradient(detector.labels));
-    let mut by_offsets = std::mem::take(pass.gradient(detector.offsets));
-    let made = (pass.made(detector.labels), pass.made(detector.offsets));
-    let loss = loss(made, &batch.targets, rules, (&mut by_labels, &mut by_offsets));
-    *pass.gradient(detector.labels) = by_labels;
-    *pass.gradient(detector.offsets) = by_offsets;
+    let mut by_head = std::mem::take(pass.gradient(detector.head));
+    let loss = loss(pass.made(detector.head), &batch.targets, rules, &mut by_head);
+    *pass.gradient(detector.head) = by_head;
     pass.backward(network, numbers, by);
     loss
 }

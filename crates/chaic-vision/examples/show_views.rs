@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     picture.save(&out)?;
     let (began, mut n_things, mut n_views) = (Instant::now(), vec![0u32; n_labels()], 0);
-    for k in 0..400 {
+    for k in 0..800 {
         let view = Views::new(Part::Training, ViewRules::TRAINING, 2, k).draw();
         let mut sizes = vec![0u32; view.labels.len()];
         for id in &view.ids {

@@ -60,7 +60,7 @@ impl TrainingRules {
             shards: 2,
             crops: [
                 CropRules { views: 4, of_view: 1, side_px: 256, anywhere: 0.4 },
-                CropRules { views: 8, of_view: 2, side_px: 128, anywhere: 0.3 },
+                CropRules { views: 4, of_view: 4, side_px: 128, anywhere: 0.3 },
             ],
             views: ViewRules::TRAINING,
             loss: LossRules::TRAINING,

@@ -8,7 +8,7 @@ use chaic_protocol::geom::{Camera, yaw_rotation};
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{ClassId, EntityId, Role, TaskId, Vec2, Vec3};
 use chaic_render::{Appearance, Channels, Scene, View};
-use chaic_world::{Posture, Rules, Setup, Surface, Thing, World, top_surfaces};
+use chaic_world::{Posture, Rules, Setup, State, Surface, Thing, World, top_surfaces};
 
 use crate::labels::{class_of, label_of};
 
@@ -43,12 +43,22 @@ pub struct ViewRules {
     pub added: usize,
     /// Share of added things that are any small thing of the catalogue; the others can be carried.
     pub decor: f32,
+    /// Share of added things that are any furniture of the catalogue, on the ground or, if they are flat,
+    /// above it.
+    pub large: f32,
+    /// Share of furniture that becomes another class of about its size, and the largest ratio of two
+    /// extents that are about alike.
+    pub refurnished: (f32, f32),
+    /// Share of people who carry something before them, and of views from behind a burden.
+    pub carrying: f32,
+    /// Share of containers with something in them.
+    pub filled: f32,
     /// Share of scenes in light and colors drawn at random.
     pub varied: f32,
     /// Share of views that look at one thing; the others look anywhere.
     pub aimed: f32,
-    /// Share of these that look at something that can be carried.
-    pub aimed_small: f32,
+    /// Share of these that look at something that can be moved.
+    pub aimed_movable: f32,
     /// Distance to the thing that is looked at, metres; near and far ones equally often by their
     /// logarithm.
     pub distance_m: [f32; 2],
@@ -61,9 +71,13 @@ impl ViewRules {
         swapped: 0.7,
         added: 24,
         decor: 0.2,
+        large: 0.06,
+        refurnished: (0.3, 1.8),
+        carrying: 0.4,
+        filled: 0.3,
         varied: 0.35,
         aimed: 0.8,
-        aimed_small: 0.7,
+        aimed_movable: 0.75,
         distance_m: [0.6, 5.0],
     };
 }
@@ -108,6 +122,8 @@ const LEAST_AIMED_PX: usize = 24;
 /// Added things are no larger than this, and lie no higher, metres.
 const LARGEST_ADDED_M: f32 = 0.7;
 const HIGHEST_TOP_M: f32 = 2.0;
+/// What has an extent below this may hang on a wall, metres.
+const FLAT_M: f32 = 0.1;
 
 struct Place {
     world: World,
@@ -175,23 +191,38 @@ impl Views {
         let small = of(&|r| matches!(r, Role::Target | Role::Container | Role::Fragile));
         let obstacles = of(&|r| r == Role::Obstacle);
         let heavy = of(&|r| r == Role::HeavyTarget);
+        let furniture = of(&|r| matches!(r, Role::Furnishing | Role::HeavyTarget));
+        let (refurnished, ratio) = self.rules.refurnished;
         let mut setup = usual.clone();
         for thing in &mut setup.things {
-            let among = match thing.class.info().role {
-                Role::Target | Role::Container | Role::Fragile => &small,
-                Role::Obstacle => &obstacles,
-                Role::HeavyTarget if !thing.fixed => &heavy,
+            let size_m = thing.size_m();
+            let alike = |class: &ClassId| {
+                let extents = class.info().size_m.into_iter().zip(size_m.to_array());
+                extents.into_iter().all(|(a, b)| a.max(b) < ratio * a.min(b))
+            };
+            let of_its_size: Vec<ClassId>;
+            let (among, share) = match thing.class.info().role {
+                Role::Target | Role::Container | Role::Fragile => (&small, self.rules.swapped),
+                Role::Obstacle => (&obstacles, self.rules.swapped),
+                Role::HeavyTarget if !thing.fixed => (&heavy, self.rules.swapped),
+                Role::Furnishing => {
+                    of_its_size = furniture.iter().copied().filter(alike).collect();
+                    (&of_its_size, refurnished)
+                }
                 _ => continue,
             };
-            if rng.chance(self.rules.swapped) {
+            if !among.is_empty() && rng.chance(share) {
                 let class = among[rng.below(among.len())];
-                let yaw_rad = rng.range(-PI, PI);
+                let yaw_rad = match class.info().role {
+                    Role::Furnishing => thing.yaw_rad,
+                    _ => rng.range(-PI, PI),
+                };
                 let variant = rng.below(256) as u8;
                 *thing = Thing { variant, ..Thing::new(class, thing.position, yaw_rad) };
             }
         }
         let fits = |c: &ClassId| c.info().size_m.into_iter().all(|m| m < LARGEST_ADDED_M);
-        let decor: Vec<ClassId> = of(&|r| r == Role::Furnishing).into_iter().filter(fits).collect();
+        let decor: Vec<ClassId> = furniture.iter().copied().filter(fits).collect();
         let tops: Vec<Surface> = setup
             .things
             .iter()
@@ -200,7 +231,12 @@ impl Views {
             .filter(|top| top.center.y < HIGHEST_TOP_M)
             .collect();
         for _ in 0..self.rules.added {
-            let among = if rng.chance(self.rules.decor) { &decor } else { &small };
+            let is_large = rng.chance(self.rules.large);
+            let among = match rng.chance(self.rules.decor) {
+                _ if is_large => &furniture,
+                true => &decor,
+                false => &small,
+            };
             let Some(class) = rng.choose(among).copied() else { continue };
             let mut within = |m: f32| rng.range(-m, m);
             let ground = {
@@ -209,6 +245,10 @@ impl Views {
                 Vec3::new(middle.x + within(half.x), 0.0, middle.y + within(half.y))
             };
             let position = match rng.choose(&tops) {
+                _ if is_large => {
+                    let is_flat = class.info().size_m.into_iter().any(|m| m < FLAT_M);
+                    ground + if is_flat { rng.range(0.0, 1.2) * Vec3::Y } else { Vec3::ZERO }
+                }
                 Some(top) if rng.chance(0.7) => {
                     let at = Vec3::new(
                         rng.range(-top.half[0], top.half[0]),
@@ -231,8 +271,8 @@ impl Views {
         let rng = &mut self.rng;
         let size = self.rules.size_px;
         let aimed_at = rng.chance(self.rules.aimed).then(|| {
-            let is_small = rng.chance(self.rules.aimed_small);
-            aim(place, is_small, rng)
+            let is_movable = rng.chance(self.rules.aimed_movable);
+            aim(place, is_movable, rng)
         });
         let aimed_at = aimed_at.flatten();
         let eye_m = if rng.chance(0.7) { 1.65 } else { rng.range(1.05, 1.75) };
@@ -257,7 +297,10 @@ impl Views {
         if !bounds.contains(at) {
             return None;
         }
+        let mut state = place.world.state().clone();
         self.pose_people(place, at);
+        self.carry(place, (at, yaw_rad), &mut state);
+        self.fill(place, &mut state);
         let camera = Camera {
             eye_in_world: Vec3::new(at.x, eye_m, at.y),
             world_from_camera: yaw_rotation(yaw_rad),
@@ -266,8 +309,7 @@ impl Views {
             height: size,
         };
         let view = View::of_camera(camera, Channels::ALL);
-        let state = place.world.state();
-        let images = place.scene.render_state(state, &place.postures, &[view]).pop()?;
+        let images = place.scene.render_state(&state, &place.postures, &[view]).pop()?;
         let (rgb, depth_m, ids) = (images.rgb?, images.depth_m?, images.ids?);
         let n_near = depth_m.iter().filter(|d| **d < TOO_NEAR_M).count();
         let n_aimed = aimed_at.map(|e| ids.iter().filter(|id| **id == e.0).count());
@@ -296,13 +338,86 @@ impl Views {
             posture.stretch = if rng.chance(0.1) { rng.unit() } else { 0.0 };
         }
     }
+
+    /// Puts things into people's hands, and into those of whoever sees this.
+    fn carry(&mut self, place: &mut Place, (eye, yaw_rad): (Vec2, f32), state: &mut State) {
+        let rng = &mut self.rng;
+        let small = of_roles(place, &[Role::Target, Role::Container, Role::Fragile]);
+        let heavy = of_roles(place, &[Role::HeavyTarget]);
+        let mut own = place.postures.first().copied();
+        if let Some(own) = &mut own {
+            (own.pose.position, own.pose.yaw_rad) = (Vec3::new(eye.x, 0.0, eye.y), yaw_rad);
+            own.height_m = STANDING_M;
+        }
+        for posture in place.postures.iter_mut().chain(&mut own) {
+            posture.arms.iter_mut().for_each(|arm| arm.grips = false);
+            if !rng.chance(self.rules.carrying) {
+                continue;
+            }
+            let turn = yaw_rotation(posture.pose.yaw_rad);
+            if rng.chance(0.15)
+                && let Some(k) = rng.choose(&heavy).copied()
+            {
+                // Before the body, as the world has furniture carried.
+                let depth = place.world.setup().things[k].size_m().z;
+                let ahead = Vec3::new(0.0, 0.45, -(0.3 + 0.5 * depth));
+                state.things[k].position = posture.pose.position + turn * ahead;
+                state.things[k].rotation = turn;
+                continue;
+            }
+            for (side, arm) in [-1.0, 1.0].into_iter().zip(&mut posture.arms) {
+                let Some(k) = rng.choose(&small).copied().filter(|_| rng.chance(0.7)) else {
+                    continue;
+                };
+                // Where hands hold things, in proportion to the body.
+                let h = posture.height_m;
+                arm.hand_in_body = Vec3::new(side * 0.2, 0.57 * h, -0.31 * h);
+                arm.grips = true;
+                let half = 0.5 * place.world.setup().things[k].size_m().y * Vec3::Y;
+                state.things[k].position = posture.pose.position + turn * arm.hand_in_body - half;
+                state.things[k].rotation = turn;
+            }
+        }
+    }
+
+    /// Puts things into containers.
+    fn fill(&mut self, place: &Place, state: &mut State) {
+        let rng = &mut self.rng;
+        let targets = of_roles(place, &[Role::Target, Role::Fragile]);
+        for container in of_roles(place, &[Role::Container]) {
+            if !rng.chance(self.rules.filled) {
+                continue;
+            }
+            let size = place.world.setup().things[container].size_m();
+            let (at, rotation) =
+                (state.things[container].position, state.things[container].rotation);
+            for slot in 0..1 + rng.below(3) {
+                let Some(k) = rng.choose(&targets).copied() else { continue };
+                let aside = 0.22 * (yaw_rotation(2.0 * PI / 3.0 * slot as f32) * Vec3::NEG_Z);
+                let up = (0.12 * size.y).max(0.01);
+                let slot = Vec3::new(aside.x * size.x, up, aside.z * size.z);
+                state.things[k].position = at + rotation * slot;
+                state.things[k].rotation = rotation;
+            }
+        }
+    }
 }
 
-/// A thing of a class, each class that is there equally often: of those that can be carried, or of all
+/// How tall the helper is, metres.
+const STANDING_M: f32 = 1.75;
+
+/// The things of these roles that aren't fixed, by number.
+fn of_roles(place: &Place, roles: &[Role]) -> Vec<usize> {
+    let things = &place.world.setup().things;
+    let fits = |thing: &Thing| !thing.fixed && roles.contains(&thing.class.info().role);
+    (0..things.len()).filter(|k| fits(&things[*k])).collect()
+}
+
+/// A thing of a class, each class that is there equally often: of those that can be moved, or of all
 /// others, people too.
-fn aim(place: &Place, is_small: bool, rng: &mut Stream) -> Option<EntityId> {
+fn aim(place: &Place, is_movable: bool, rng: &mut Stream) -> Option<EntityId> {
     let fits =
-        |label: u8| class_of(label).is_some_and(|class| class.info().is_carriable() == is_small);
+        |label: u8| class_of(label).is_some_and(|class| class.info().is_movable() == is_movable);
     let mut by_label: Vec<(u8, EntityId)> = (0..place.labels.len())
         .map(|k| (place.labels[k], EntityId(k as u16)))
         .filter(|(label, _)| fits(*label))

@@ -4,6 +4,7 @@ use chaic_protocol::Agent;
 use chaic_protocol::observation::Grants;
 
 use crate::mind::Mind;
+use crate::perception::Sight;
 use crate::policies::{Follow, Random, RulePolicy, RuleProfile};
 use crate::rules::PlannerRules;
 
@@ -14,8 +15,8 @@ pub struct HelperInfo {
     pub name: &'static str,
     /// What tables call it.
     pub title: &'static str,
-    /// Makes one that plans by these rules.
-    pub make: fn(PlannerRules) -> Box<dyn Agent>,
+    /// Makes one that plans by these rules and sees by this.
+    pub make: fn(PlannerRules, &dyn Sight) -> Box<dyn Agent>,
     /// What it asks to be granted under these rules.
     pub grants: fn(PlannerRules) -> Grants,
 }
@@ -25,25 +26,25 @@ pub static HELPERS: [HelperInfo; 4] = [
     HelperInfo {
         name: "random",
         title: "Random",
-        make: |rules| Box::new(random(rules)),
+        make: |rules, sight| Box::new(random(rules, sight)),
         grants: planner_grants,
     },
     HelperInfo {
         name: "rhp",
         title: "RHP",
-        make: |rules| Box::new(rhp(rules)),
+        make: |rules, sight| Box::new(rhp(rules, sight)),
         grants: planner_grants,
     },
     HelperInfo {
         name: "oracle",
         title: "Oracle",
-        make: |rules| Box::new(oracle(rules)),
+        make: |rules, sight| Box::new(oracle(rules, sight)),
         grants: |_| Grants::ORACLE,
     },
     HelperInfo {
         name: "follow",
         title: "Follow",
-        make: |rules| Box::new(follow(rules)),
+        make: |rules, sight| Box::new(follow(rules, sight)),
         grants: planner_grants,
     },
 ];
@@ -60,34 +61,35 @@ impl HelperInfo {
 }
 
 /// Any valid plan (paper section 5.2).
-pub fn random(rules: PlannerRules) -> Mind<Random> {
-    Mind::new(Random::default(), rules)
+pub fn random(rules: PlannerRules, sight: &dyn Sight) -> Mind<Random> {
+    Mind::seeing(Random::default(), rules, sight)
 }
 
 /// The rule-based hierarchical planner: like the partner, without knowing its goal.
-pub fn rhp(rules: PlannerRules) -> Mind<RulePolicy> {
-    Mind::new(RulePolicy::new(RuleProfile::RHP), rules)
+pub fn rhp(rules: PlannerRules, sight: &dyn Sight) -> Mind<RulePolicy> {
+    Mind::seeing(RulePolicy::new(RuleProfile::RHP), rules, sight)
 }
 
 /// The same rules with the goal, the progress and the partner's doings known.
-pub fn oracle(rules: PlannerRules) -> Mind<RulePolicy> {
-    Mind::new(RulePolicy::new(RuleProfile::ORACLE), rules)
+pub fn oracle(rules: PlannerRules, sight: &dyn Sight) -> Mind<RulePolicy> {
+    Mind::seeing(RulePolicy::new(RuleProfile::ORACLE), rules, sight)
 }
 
 /// Always beside the partner.
-pub fn follow(rules: PlannerRules) -> Mind<Follow> {
-    Mind::new(Follow::default(), rules)
+pub fn follow(rules: PlannerRules, sight: &dyn Sight) -> Mind<Follow> {
+    Mind::seeing(Follow::default(), rules, sight)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::perception::TrueSight;
 
     #[test]
     fn every_name_has_a_helper_and_only_the_oracle_is_told_the_goal() {
         for info in &HELPERS {
             let name = info.name;
-            assert!((info.make)(PlannerRules::paper()).senses().depth, "{name}");
+            assert!((info.make)(PlannerRules::paper(), &TrueSight).senses().depth, "{name}");
             for rules in [PlannerRules::paper(), PlannerRules::compat()] {
                 let grants = (info.grants)(rules);
                 assert_eq!(grants.goal, name == "oracle");

@@ -15,9 +15,10 @@
 //!   come from [`chaic_protocol::rng::Stream`], there is no clock, and no hash map is iterated.
 //!
 //! ```
+//! use chaic_agents::perception::TrueSight;
 //! use chaic_agents::{HelperInfo, PlannerRules};
 //! let rhp = HelperInfo::named("rhp").expect("it is in the table");
-//! assert!((rhp.make)(PlannerRules::paper()).senses().depth);
+//! assert!((rhp.make)(PlannerRules::paper(), &TrueSight).senses().depth);
 //! assert!((rhp.grants)(PlannerRules::paper()).ids);
 //! ```
 

@@ -7,11 +7,11 @@ use chaic_protocol::capability::Gait;
 use chaic_protocol::geom::{Pose, Rect, horizontal_distance, xz};
 use chaic_protocol::observation::{Grants, OtherEnd};
 use chaic_protocol::{
-    AgentId, Briefing, ClassId, FailureReason, Frame, Observation, Outcome, Vec2, Vec3,
+    AgentId, Briefing, ClassId, FailureReason, Frame, Observation, Outcome, Role, Vec2, Vec3,
 };
 
 use crate::mapping::{OccupancyMap, People, Person, SemanticMap, Thing, hands};
-use crate::perception::Percepts;
+use crate::perception::{Detection, Percepts};
 use crate::planning::cost_model::{Berth, CarefulCosts, CostModel, LatticeCosts, News, Seen};
 use crate::planning::costs::CostMap;
 use crate::planning::path::{CostField, Search};
@@ -168,6 +168,9 @@ impl Memory {
         self.feel(observation, percepts.hands.as_ref());
         self.take_in_grants(observation);
         self.settle(percepts, briefing.grants);
+        if !(briefing.grants.ids || briefing.grants.progress) {
+            self.see_delivered(percepts);
+        }
         if let Some((action, outcome)) = self.last
             && action.subject().is_some()
         {
@@ -179,13 +182,15 @@ impl Memory {
         self.is_stale = true;
     }
 
+    /// What the own hands hold now, by keeping account of what they did last.
+    pub fn account(&self, observation: &Observation) -> Hands {
+        let class_of = |track| self.class_of(track);
+        hands::account(&self.hands, &observation.own, self.last, self.gait, class_of)
+    }
+
     /// What the own hands hold: as told, or by keeping account.
     fn feel(&mut self, observation: &Observation, told: Option<&Hands>) {
-        let class_of = |track| self.classes.get(&track).copied();
-        self.hands = match told {
-            Some(hands) => hands.clone(),
-            None => hands::account(&self.hands, &observation.own, self.last, self.gait, class_of),
-        };
+        self.hands = told.cloned().unwrap_or_else(|| self.account(observation));
         for (track, class) in self.hands.all() {
             self.classes.insert(track, class);
             self.things.mark_absent(track);
@@ -235,6 +240,41 @@ impl Memory {
             self.believed.remove(&track);
             self.delivered.remove(&track);
             self.things.return_to_play(track);
+        }
+    }
+
+    /// Takes what lies on a goal place for delivered: episodes begin with nothing there, and who is
+    /// told of no deliveries sees nothing more of them.
+    fn see_delivered(&mut self, percepts: &Percepts) {
+        /// What lies on a place is no farther from what is seen of it, in plan, metres.
+        const BESIDE_M: f32 = 0.15;
+        /// What lies on a place is not seen lower than its top by more than this, metres.
+        const BELOW_M: f32 = 0.25;
+        let now = self.frame;
+        let lies_on = |place: &Thing, track: TrackId, at: Vec3, bottom_m: f32| {
+            place.track != track
+                && bottom_m > place.top_m.min(self.put_range_m[1]) - BELOW_M
+                && place.distance_from(xz(at)) < BESIDE_M
+        };
+        let goal_places: Vec<&Thing> = self
+            .things
+            .iter()
+            .filter(|t| self.goal_places.contains(&t.class) && t.is_present)
+            .filter(|t| t.top_m + TOP_TOLERANCE_M >= self.goal_place_min_top_m)
+            .collect();
+        let is_there = |seen: &&Detection| {
+            let role = seen.class.info().role;
+            let is_held = self.things.get(seen.track).is_some_and(|t| now < t.held_until);
+            matches!(role, Role::Target | Role::Fragile | Role::HeavyTarget)
+                && !is_held
+                && goal_places
+                    .iter()
+                    .any(|p| lies_on(p, seen.track, seen.position_in_world, seen.bottom_m))
+        };
+        let there: Vec<TrackId> =
+            percepts.detections.iter().filter(is_there).map(|d| d.track).collect();
+        for track in there {
+            self.things.mark_gone(track);
         }
     }
 

@@ -12,7 +12,7 @@ use crate::execution::interact::learn;
 use crate::execution::navigate::face;
 use crate::execution::{Executor, Progress, Situation};
 use crate::memory::Memory;
-use crate::perception::{GroundTruthIds, Perception};
+use crate::perception::{Perception, Sight, TrueSight};
 use crate::rules::PlannerRules;
 use crate::track::{Intent, TrackId, named};
 
@@ -32,6 +32,7 @@ pub struct Mind<P: Policy> {
     behavior: Box<dyn BehaviorModel>,
     policy: P,
     senses: Senses,
+    sees_by: Option<String>,
     rules: PlannerRules,
     episode: Option<Episode>,
 }
@@ -54,8 +55,14 @@ struct Episode {
 impl<P: Policy> Mind<P> {
     /// A mind with perfect segmentation that knows of the others' doings what it is granted.
     pub fn new(policy: P, rules: PlannerRules) -> Mind<P> {
+        Mind::seeing(policy, rules, &TrueSight)
+    }
+
+    /// The same, seeing by something else.
+    pub fn seeing(policy: P, rules: PlannerRules, sight: &dyn Sight) -> Mind<P> {
         let behavior = Box::new(GroundTruthBehavior::default());
-        Mind::with(policy, Box::new(GroundTruthIds), behavior, rules)
+        let mind = Mind::with(policy, sight.perception(), behavior, rules);
+        Mind { sees_by: sight.name(), senses: sight.senses(), ..mind }
     }
 
     /// A mind made of the given parts.
@@ -70,7 +77,7 @@ impl<P: Policy> Mind<P> {
             rules.put_within_m = rules.put_within_m.max(POINT_FROM_M);
         }
         let senses = Senses::DEPTH_AND_IDS;
-        Mind { perception, behavior, policy, senses, rules, episode: None }
+        Mind { perception, behavior, policy, senses, sees_by: None, rules, episode: None }
     }
 
     /// The same mind with other senses: smaller images, or color for a learned perception.
@@ -123,8 +130,14 @@ impl Episode {
         if let Some(goal) = &observation.granted.goal {
             self.briefing.goal.get_or_insert_with(|| goal.clone());
         }
-        let percepts = perception.perceive(observation);
+        if perception.hides_ids() {
+            self.briefing.grants.ids = false;
+        }
         self.memory.last = self.last_intent(observation);
+        perception.feel(&self.memory.account(observation), self.memory.last);
+        let percepts = perception.perceive(observation);
+        let hidden = perception.hides_ids().then(|| observation.without_ids(self.briefing.grants));
+        let observation = hidden.as_ref().unwrap_or(observation);
         self.memory.update(&self.briefing, observation, &percepts);
         let holds: Vec<TrackId> = self.memory.hands.all().map(|(track, _)| track).collect();
         if let Some(last) = self.memory.last {
@@ -246,6 +259,7 @@ impl<P: Policy> Agent for Mind<P> {
     fn reset(&mut self, briefing: &Briefing) {
         self.policy.reset(briefing);
         self.behavior.reset();
+        self.perception.reset(briefing);
         self.episode = Some(Episode::new(briefing, self.rules));
     }
 
@@ -261,6 +275,10 @@ impl<P: Policy> Agent for Mind<P> {
         }
         self.episode = Some(episode);
         Ok(decided?.map_or(pause, |(_, action)| action))
+    }
+
+    fn perception(&self) -> Option<String> {
+        self.sees_by.clone()
     }
 
     fn thought(&self) -> Thought {
@@ -280,6 +298,7 @@ impl<P: Policy> Agent for Mind<P> {
             behavior: self.behavior.fork(),
             policy: self.policy.fork()?,
             senses: self.senses,
+            sees_by: self.sees_by.clone(),
             rules: self.rules,
             episode: self.episode.clone(),
         }))

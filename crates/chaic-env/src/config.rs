@@ -78,6 +78,7 @@ impl EpisodeConfig<'_> {
                     impairments: person.impairments,
                     grants: seat.grants,
                     senses: seat.senses,
+                    perception: seat.mind().and_then(|mind| mind.perception()),
                 })
                 .collect(),
             renderer: "cpu".to_owned(),

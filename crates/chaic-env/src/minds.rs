@@ -1,7 +1,9 @@
 //! Who can be the helper of a run.
 
 use std::path::Path;
+use std::sync::Arc;
 
+use chaic_agents::perception::{Sight, TrueSight};
 use chaic_agents::{HELPERS, HelperInfo, PlannerRules};
 use chaic_protocol::Agent;
 use chaic_protocol::observation::Grants;
@@ -84,8 +86,31 @@ impl Helpers for BuiltIn {
     }
 
     fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper> {
-        let info = HelperInfo::named(name)?;
-        Some(Helper { mind: (info.make)(rules), grants: (info.grants)(rules) })
+        built_in(name, rules, &TrueSight)
+    }
+}
+
+/// The helper of `chaic-agents` of this name, who sees by this.
+pub fn built_in(name: &str, rules: PlannerRules, sight: &dyn Sight) -> Option<Helper> {
+    let info = HelperInfo::named(name)?;
+    let grants = sight.grants((info.grants)(rules));
+    Some(Helper { mind: (info.make)(rules, sight), grants })
+}
+
+/// The helpers of `chaic-agents`, who see by something else than ids from ground truth.
+#[derive(Clone)]
+pub struct Seeing {
+    /// By what.
+    pub sight: Arc<dyn Sight>,
+}
+
+impl Helpers for Seeing {
+    fn names(&self) -> Vec<String> {
+        BuiltIn.names()
+    }
+
+    fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper> {
+        built_in(name, rules, &*self.sight)
     }
 }
 

@@ -291,9 +291,14 @@ impl Check<'_> {
         let mut expected = header_of(config, Minds::of(helper, partner.ok().flatten()))?;
         for (expected, said) in expected.people.iter_mut().zip(&header.people) {
             let recorded = self.recorded_grants(expected.agent, &key.helper);
+            if expected.perception.is_some() == said.perception.is_some() {
+                // Weights may have changed since.
+                expected.perception.clone_from(&said.perception);
+            }
             if is_unknown.get(expected.agent.index()).is_some_and(|unknown| *unknown) {
                 expected.grants = recorded.unwrap_or(said.grants);
                 expected.senses = said.senses;
+                expected.perception.clone_from(&said.perception);
             } else if recorded.is_some_and(|grants| grants != expected.grants) {
                 let problem = format!("run.json says that the {} is granted", expected.agent);
                 return Ok(Some(problem + " something else than such a mind is"));

@@ -112,6 +112,7 @@ impl Matrix {
             partner: None,
             partner_is: None,
             appearance: None,
+            perception: None,
         })
     }
 

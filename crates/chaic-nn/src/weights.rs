@@ -58,6 +58,11 @@ pub fn to_bytes(network: &Network, numbers: &[f32], kind: &str) -> Vec<u8> {
     serialize(views, Some(metadata)).expect("names and shapes are small")
 }
 
+/// Twelve digits that name the content of a file.
+pub fn digest(bytes: &[u8]) -> String {
+    format!("{:012x}", xxhash_rust::xxh3::xxh3_64(bytes) >> 16)
+}
+
 /// The numbers in a file.
 ///
 /// # Errors

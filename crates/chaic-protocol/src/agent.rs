@@ -60,6 +60,12 @@ pub trait Agent: Send {
     /// If it can't; it isn't asked again in this episode.
     fn act(&mut self, observation: &Observation) -> Result<Action, AgentError>;
 
+    /// By what it tells what is in its images, where that is neither granted nor its own affair; for
+    /// the record.
+    fn perception(&self) -> Option<String> {
+        None
+    }
+
     /// What it is thinking, for the record.
     fn thought(&self) -> Thought {
         Thought::default()

@@ -260,4 +260,18 @@ impl Observation {
     pub fn eye(&self) -> Vec3 {
         self.camera.eye_in_world
     }
+
+    /// The same for who is granted the rest of these grants, but no ids.
+    pub fn without_ids(&self, grants: Grants) -> Observation {
+        let mut observation = self.clone();
+        observation.images.ids = None;
+        let granted = &mut observation.granted;
+        granted.classes.clear();
+        granted.removed.clear();
+        if !grants.progress {
+            granted.delivered.clear();
+        }
+        observation.own.hands.iter_mut().flatten().for_each(|held| held.identity = None);
+        observation
+    }
 }

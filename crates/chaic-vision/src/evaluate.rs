@@ -4,6 +4,7 @@ use std::thread;
 
 use chaic_nn::simd::widest;
 use chaic_nn::{Pass, Shape, Tensor};
+use chaic_protocol::geom::Camera;
 
 use crate::average_precision::{AveragePrecision, Detection, Image, Truth, average_precision};
 use crate::detector::Detector;
@@ -22,14 +23,27 @@ pub fn detect(
     view: &LabelledView,
     pass: &mut Pass,
 ) -> Vec<Instance> {
-    let camera = &view.camera;
+    detect_in(detector, numbers, (&view.rgb, &view.depth_m, &view.camera), pass)
+}
+
+/// What a detector sees in an image: color (u8, shape [height, width, 3]), depth (metres, shape
+/// [height, width]) and the camera.
+///
+/// # Panics
+/// If shapes don't fit, or the image's sides are no multiples of the network's stride.
+pub fn detect_in(
+    detector: &Detector,
+    numbers: &[f32],
+    (rgb, depth_m, camera): (&[u8], &[f32], &Camera),
+    pass: &mut Pass,
+) -> Vec<Instance> {
     let crop = Crop::whole(camera);
     let [width, height] = crop.size;
     let mut input =
         Tensor { shape: Shape { n: 1, height, width, channels: N_FEATURES }, ..Tensor::default() };
-    features(&view.rgb, &view.depth_m, camera, crop, &mut input.data);
+    features(rgb, depth_m, camera, crop, &mut input.data);
     pass.forward(&detector.network, numbers, &input);
-    instances(pass.made(detector.head), &view.depth_m, camera, &InstanceRules::default())
+    instances(pass.made(detector.head), depth_m, camera, &InstanceRules::default())
 }
 
 /// What is in a view beside what was seen in it.

@@ -3,7 +3,8 @@
 //! **What it is**: [`labels`] says what a pixel can be of, [`features`] what the network reads,
 //! [`views`] draws random views of generated episodes with labels, [`detector`] is the network, [`loss`]
 //! what it learns by, [`train`] the loop; [`instances`] makes things of what it says, and
-//! [`average_precision`] tells how good they are.
+//! [`average_precision`] tells how good they are. [`tracker`] tells which thing is which over time, and
+//! [`perception`] makes all of it the eyes of a mind; [`noisy`] stands in for it.
 //!
 //! **What it is not**: it knows no goals, rules or minds.
 //!
@@ -27,6 +28,10 @@ pub mod average_precision;
 pub mod evaluate;
 
 pub mod train;
+
+pub mod noisy;
+pub mod perception;
+pub mod tracker;
 
 #[cfg(test)]
 mod tests;

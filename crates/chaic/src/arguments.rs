@@ -147,6 +147,10 @@ pub struct EvalArguments {
     /// draws them from a seed (domain randomization). Changes neither depth nor ids.
     #[arg(long, value_name = "LOOK")]
     pub appearance: Option<Appearance>,
+    /// By what helpers tell what is in their images: gt (usual), ids from ground truth; or learned, the
+    /// detector that comes with chaic, or learned:FILE, other weights of it.
+    #[arg(long, value_name = "KIND")]
+    pub perception: Option<String>,
     #[command(flatten)]
     pub exec: ExecArguments,
     #[command(flatten)]

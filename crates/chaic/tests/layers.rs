@@ -37,11 +37,6 @@ const ALLOWED: &[Arrows] = &[
     arrows("chaic-video", &[], &[]),
     arrows("chaic-nn", &["chaic-protocol"], &[]),
     arrows(
-        "chaic-vision",
-        &["chaic-protocol", "chaic-world", "chaic-episodes", "chaic-render", "chaic-nn"],
-        &[],
-    ),
-    arrows(
         "chaic-gltf",
         &["chaic-files", "chaic-protocol", "chaic-world", "chaic-episodes", "chaic-render"],
         &["chaic-test-kit"],
@@ -58,6 +53,18 @@ const ALLOWED: &[Arrows] = &[
         &[],
     ),
     arrows("chaic-agents", &["chaic-protocol"], &[]),
+    arrows(
+        "chaic-vision",
+        &[
+            "chaic-protocol",
+            "chaic-world",
+            "chaic-episodes",
+            "chaic-render",
+            "chaic-nn",
+            "chaic-agents",
+        ],
+        &[],
+    ),
     arrows(
         "chaic-env",
         &["chaic-protocol", "chaic-world", "chaic-episodes", "chaic-render", "chaic-agents"],
@@ -115,6 +122,8 @@ const ALLOWED: &[Arrows] = &[
             "chaic-protocol",
             "chaic-episodes",
             "chaic-render",
+            "chaic-agents",
+            "chaic-vision",
             "chaic-env",
             "chaic-gltf",
             "chaic-eval",

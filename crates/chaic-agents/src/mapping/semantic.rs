@@ -129,6 +129,7 @@ impl Thing {
             self.footprint.clone_from(&seen.footprint);
             (self.bottom_m, self.top_m) = (seen.bottom_m, seen.top_m);
         }
+        self.class = seen.class;
         self.position_in_world = seen.position_in_world;
         self.last_seen = now;
         self.is_present = true;

@@ -4,7 +4,7 @@ use chaic_protocol::ClassId;
 use chaic_protocol::observation::Grants;
 
 use super::*;
-use crate::perception::Pointing;
+use crate::perception::{GroundTruthIds, Pointing, TrueSight};
 use crate::policies::{RulePolicy, RuleProfile};
 use crate::test_support::{Toy, ToyObject};
 use crate::{helpers, partners};
@@ -77,7 +77,7 @@ fn rhp_clears_the_doorway_and_delivers_what_is_behind() {
     toy.stand([-2.5, 1.0], 0.0);
     let mut briefing = toy.briefing();
     briefing.horizon = 1500;
-    let plans = toy.live(&mut helpers::rhp(crate::PlannerRules::paper()), &briefing);
+    let plans = toy.live(&mut helpers::rhp(crate::PlannerRules::paper(), &TrueSight), &briefing);
     assert!(plans.iter().any(|p| p.contains("obstacle")), "{plans:?}");
     assert!(toy.delivered.contains(&apple), "{plans:?}");
     assert!(!toy.delivered.contains(&bin));
@@ -88,7 +88,8 @@ fn the_same_episode_is_lived_the_same_way_twice() {
     let [a, b] = [0, 1].map(|_| {
         let (mut toy, _) = house();
         let briefing = Briefing { horizon: 800, ..toy.briefing() };
-        let plans = toy.live(&mut helpers::random(crate::PlannerRules::paper()), &briefing);
+        let plans =
+            toy.live(&mut helpers::random(crate::PlannerRules::paper(), &TrueSight), &briefing);
         (plans, toy.here(), toy.frame)
     });
     assert_eq!(a, b);
@@ -122,7 +123,7 @@ fn the_random_helper_chooses_all_valid_plans_equally_often() {
 fn an_unbriefed_or_blind_mind_does_not_panic() {
     let (toy, _) = house();
     let mut observation = toy.observe();
-    let mut mind = helpers::rhp(crate::PlannerRules::paper());
+    let mut mind = helpers::rhp(crate::PlannerRules::paper(), &TrueSight);
     assert_eq!(mind.act(&observation).unwrap(), Action::Wait { frames: PAUSE_FRAMES });
     mind.reset(&toy.briefing());
     observation.images = Default::default();
@@ -187,7 +188,9 @@ fn nobody_gets_stuck_in_a_house_with_narrow_doors_and_tables() {
         toy.radius_m = radius_m;
         let mut briefing = toy.briefing();
         briefing.capability.radius_m = radius_m;
-        let plans = toy.live(&mut helpers::rhp(crate::PlannerRules::paper()), &briefing).join("; ");
+        let plans = toy
+            .live(&mut helpers::rhp(crate::PlannerRules::paper(), &TrueSight), &briefing)
+            .join("; ");
         let n = toy.delivered.len();
         assert!(n >= 6, "{radius_m} m through {door_m} m: only {n} delivered: {plans}");
         assert!(toy.n_blocked <= 10, "bumped {} times: {plans}", toy.n_blocked);
@@ -298,7 +301,7 @@ fn nobody_tries_a_blocked_doorway_over_and_over() {
     toy.stand([-2.5, 0.0], 0.0);
     let mut briefing = toy.briefing();
     (briefing.capability.radius_m, briefing.horizon) = (0.35, 3000);
-    let mut mind = helpers::rhp(crate::PlannerRules::paper());
+    let mut mind = helpers::rhp(crate::PlannerRules::paper(), &TrueSight);
     mind.reset(&briefing);
     // Where it last got farther than half a metre from, and when.
     let (mut from, mut since, mut longest) = (toy.here(), 0, 0);

@@ -115,6 +115,9 @@ pub struct Participant {
     pub grants: Grants,
     /// Which images it looks at.
     pub senses: Senses,
+    /// By what it tells what is in them; absent where that is granted or its author's affair.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub perception: Option<String>,
 }
 
 /// A whole trace in memory.

@@ -24,6 +24,7 @@ fn header() -> Header {
         helper: "rhp".to_owned(),
         partner: None,
         people: vec![Participant {
+            perception: None,
             agent: AgentId::PARTNER,
             persona: Persona::Wheelchair,
             impairments: Impairments::of(Impairment::Tremor),

@@ -26,8 +26,9 @@ pub struct GrantsFile {
     /// The names of the grants.
     pub grants: Vec<String>,
     /// `ground_truth` where ids and classes of what is in the image are given, `own` where they have
-    /// to be found in the image, `none` where there is nobody to perceive.
-    pub perception: &'static str,
+    /// to be found in the image, `none` where there is nobody to perceive; or the name of what finds
+    /// them.
+    pub perception: String,
 }
 
 impl Labels<'_> {
@@ -70,8 +71,9 @@ impl Labels<'_> {
     pub fn helpers_file(&self, helpers: &[String]) -> Option<BTreeMap<String, GrantsFile>> {
         let granted = self.granted?;
         let file = |name: &String| {
-            let grants = granted.helpers.get(name).map(GrantsFile::of);
-            let nobody = GrantsFile { grants: Vec::new(), perception: "none" };
+            let by = granted.perception.get(name);
+            let grants = granted.helpers.get(name).map(|grants| GrantsFile::of(grants, by));
+            let nobody = GrantsFile { grants: Vec::new(), perception: "none".to_owned() };
             (name.clone(), grants.unwrap_or(nobody))
         };
         Some(helpers.iter().map(file).collect())
@@ -79,14 +81,16 @@ impl Labels<'_> {
 
     /// The partner's.
     pub fn partner_file(&self) -> Option<GrantsFile> {
-        self.granted.map(|g| GrantsFile::of(&g.partner))
+        self.granted.map(|g| GrantsFile::of(&g.partner, None))
     }
 
     /// What a helper is granted, in words, kind by kind; `None` for nobody.
     fn grants(&self, helper: &str) -> Option<Vec<String>> {
         let unknown = || vec!["grants not recorded".to_owned()];
-        let granted = self.granted.and_then(|g| g.helpers.get(helper));
-        (helper != NONE).then(|| granted.map_or_else(unknown, words))
+        let grants = self.granted.and_then(|g| g.helpers.get(helper));
+        let by = self.granted.and_then(|g| g.perception.get(helper));
+        let words = |grants| words(grants, by.map(String::as_str));
+        (helper != NONE).then(|| grants.map_or_else(unknown, words))
     }
 
     /// What the partner is granted beyond what every partner is.
@@ -99,8 +103,9 @@ impl Labels<'_> {
 }
 
 impl GrantsFile {
-    fn of(grants: &Grants) -> GrantsFile {
-        let perception = if grants.ids { "ground_truth" } else { "own" };
+    fn of(grants: &Grants, by: Option<&String>) -> GrantsFile {
+        let usual = if grants.ids { "ground_truth" } else { "own" };
+        let perception = by.map_or_else(|| usual.to_owned(), String::clone);
         GrantsFile { grants: names(grants), perception }
     }
 }
@@ -113,11 +118,14 @@ fn names(grants: &Grants) -> Vec<String> {
     names
 }
 
-fn words(grants: &Grants) -> Vec<String> {
+fn words(grants: &Grants, by: Option<&str>) -> Vec<String> {
     let others = names(&Grants { ids: false, ..*grants });
     let ids = grants.ids.then(|| "ids from ground truth".to_owned());
+    // The digits that name the weights are for files.
+    let kind = by.and_then(|by| by.split(' ').next());
+    let own = kind.map(|kind| format!("{kind} perception"));
     let others = (!others.is_empty()).then(|| format!("told {}", told(&others)));
-    let all: Vec<String> = ids.into_iter().chain(others).collect();
+    let all: Vec<String> = ids.into_iter().chain(own).chain(others).collect();
     if all.is_empty() { vec!["own eyes only".to_owned()] } else { all }
 }
 

@@ -51,13 +51,18 @@ fn options() -> RunOptions {
         partner: None,
         partner_is: None,
         appearance: None,
+        perception: None,
     }
 }
 
 /// As `rhp` and `oracle` ask for; the partner as given.
 fn granted(partner: Grants) -> RunGrants {
     let helpers = [("rhp", Grants::IDS), ("oracle", Grants::ORACLE)];
-    RunGrants { helpers: helpers.map(|(name, g)| (name.to_owned(), g)).into(), partner }
+    RunGrants {
+        helpers: helpers.map(|(name, g)| (name.to_owned(), g)).into(),
+        partner,
+        perception: Default::default(),
+    }
 }
 
 fn text(results: &[RunResult], format: Format) -> String {

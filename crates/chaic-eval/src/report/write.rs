@@ -202,7 +202,7 @@ impl Report<'_> {
                 let Some(s) = scores.get(task, &helper) else { continue };
                 let (grants, perception) = granted
                     .get(&helper)
-                    .map_or((String::new(), ""), |g| (g.grants.join("+"), g.perception));
+                    .map_or((String::new(), ""), |g| (g.grants.join("+"), g.perception.as_str()));
                 let numbers = csv_numbers(s);
                 let Score { episodes, environments, broken, incomplete, .. } = s;
                 let _ = writeln!(

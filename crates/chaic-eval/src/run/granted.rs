@@ -18,6 +18,10 @@ pub struct RunGrants {
     pub helpers: BTreeMap<String, Grants>,
     /// The partner's.
     pub partner: Grants,
+    /// By what helpers tell what is in their images, where that is neither granted nor their author's
+    /// affair.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub perception: BTreeMap<String, String>,
 }
 
 impl RunGrants {
@@ -27,13 +31,15 @@ impl RunGrants {
     /// If the options name a helper or partner that isn't there, or a rule.
     pub fn of(options: &RunOptions, helpers: &dyn Helpers) -> Result<RunGrants> {
         let rules = options.rules()?.planner;
-        let mut by_name = BTreeMap::new();
+        let (mut by_name, mut perception) = (BTreeMap::new(), BTreeMap::new());
         for name in &options.helpers {
             let helper = minds::find(helpers, name, rules)?;
-            by_name.extend(helper.map(|h| (name.clone(), h.grants)));
+            let Some(helper) = helper else { continue };
+            by_name.insert(name.clone(), helper.grants);
+            perception.extend(helper.mind.perception().map(|by| (name.clone(), by)));
         }
         let partner = minds::find_partner(helpers, options.partner.as_deref(), None, rules)?;
         let partner = partner.map_or_else(|| partner_grants(rules), |p| p.grants);
-        Ok(RunGrants { helpers: by_name, partner })
+        Ok(RunGrants { helpers: by_name, partner, perception })
     }
 }

@@ -18,7 +18,7 @@ pub use folder::{Access, RunFolder};
 pub use granted::RunGrants;
 pub use items::{Item, planned, tasks_of_files};
 pub use journal::{Journal, read_results};
-pub use options::{RunOptions, RunRequest};
+pub use options::{GROUND_TRUTH, RunOptions, RunRequest};
 pub use worker::{Finished, Progress};
 
 use std::collections::BTreeSet;

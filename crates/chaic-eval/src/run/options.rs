@@ -52,6 +52,10 @@ pub struct RunOptions {
     /// How scenes are lit and colored; absent for the benchmark's own look.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub appearance: Option<String>,
+    /// By what helpers tell what is in their images, as `--perception` has it; absent for ids from
+    /// ground truth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub perception: Option<String>,
 }
 
 fn yes() -> bool {
@@ -93,7 +97,12 @@ pub struct RunRequest {
     pub partner_is: Option<PersonKind>,
     /// `--appearance`.
     pub appearance: Option<Appearance>,
+    /// `--perception`.
+    pub perception: Option<String>,
 }
+
+/// What `--perception` says of ids from ground truth.
+pub const GROUND_TRUTH: &str = "gt";
 
 /// What `split` says where the episodes are files.
 pub const FILES: &str = "files";
@@ -173,6 +182,7 @@ impl RunRequest {
             partner,
             partner_is: self.partner_is,
             appearance: varies.map(|a| a.to_string()),
+            perception: self.perception.clone().filter(|name| name != GROUND_TRUTH),
         };
         options.rules()?;
         options.appearance()?;
@@ -225,6 +235,11 @@ impl RunRequest {
                 "--appearance",
                 self.appearance.map(|a| a.to_string()),
                 recorded.appearance.clone().unwrap_or_else(|| Appearance::Canonical.to_string()),
+            ),
+            (
+                "--perception",
+                self.perception.clone(),
+                recorded.perception.clone().unwrap_or_else(|| GROUND_TRUTH.to_owned()),
             ),
             ("--size", self.size.map(|n| n.to_string()), number(recorded.size)),
             (

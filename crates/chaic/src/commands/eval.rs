@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, anyhow, bail};
-use chaic_env::minds::{BuiltIn, Helpers};
+use chaic_env::minds::{Helpers, Seeing};
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::{Format, Report, write_files};
 use chaic_eval::run::{Access, Run, RunFolder, RunRequest};
 use chaic_llm::Language;
 use chaic_subprocess::Commands;
 
-use super::{bars::RunBars, jobs, llm};
+use super::{bars::RunBars, jobs, llm, sight};
 use crate::arguments::{EvalArguments, ExecArguments, HelperArgument};
 use crate::exit::Ended;
 use crate::interrupt;
@@ -30,9 +30,10 @@ pub fn run(arguments: &EvalArguments) -> Result<Ended> {
     }
     let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
     let language = llm::language(arguments, &path, stop)?;
+    let seeing = Seeing { sight: sight::of_run(arguments, &path)? };
     let others: &dyn Helpers = match &language {
         Some(language) => language,
-        None => &BuiltIn,
+        None => &seeing,
     };
     let commands = Commands::beside(others, arguments.commands(), stop)?;
     if arguments.resume {
@@ -143,6 +144,7 @@ fn given(arguments: &EvalArguments) -> (RunRequest, &'static str) {
         partner,
         partner_is: *partner_is,
         appearance,
+        perception: arguments.perception.clone(),
     };
     if given == RunRequest::default() && !arguments.resume {
         return (RunRequest { first: Some(QUICK_EPISODES), ..given }, "quick");

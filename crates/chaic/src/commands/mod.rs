@@ -11,6 +11,7 @@ pub mod render;
 pub mod replay;
 pub mod report;
 pub mod scene;
+mod sight;
 pub mod verify;
 
 mod bars;

@@ -1,12 +1,12 @@
 //! `chaic verify`.
 
 use anyhow::Result;
-use chaic_env::minds::{BuiltIn, Helpers};
+use chaic_env::minds::{Helpers, Seeing};
 use chaic_eval::run::RunFolder;
 use chaic_eval::verify::{ReportState, Verdict, verify_run};
 use chaic_llm::Language;
 
-use super::{bars, jobs, llm};
+use super::{bars, jobs, llm, sight};
 use crate::arguments::VerifyArguments;
 use crate::exit::Ended;
 use crate::output::{complain, counted, say};
@@ -17,9 +17,10 @@ pub fn run(arguments: &VerifyArguments) -> Result<Ended> {
     let bar = bars::plain(folder.traces()?.len() as u64, "traces");
     let progress = |done: usize| bar.set_position(done as u64);
     let language = Language::recorded(&arguments.run, llm::never())?;
+    let seeing = Seeing { sight: sight::recorded(&options) };
     let helpers: &dyn Helpers = match &language {
         Some(language) => language,
-        None => &BuiltIn,
+        None => &seeing,
     };
     let verdict = verify_run(&folder, &options, helpers, jobs(arguments.jobs), &progress);
     bar.finish_and_clear();

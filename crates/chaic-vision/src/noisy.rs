@@ -1,0 +1,164 @@
+//! A stand-in for the detector: ground truth with faults at measured rates, for fast experiments.
+
+use std::sync::Arc;
+
+use chaic_agents::perception::{Perception, Percepts, Sight};
+use chaic_agents::track::{Hands, Intent, TrackId};
+use chaic_protocol::observation::{Grants, Senses};
+use chaic_protocol::rng::Stream;
+use chaic_protocol::{Briefing, ClassId, Observation, Outcome, Target};
+use serde::{Deserialize, Serialize};
+
+use crate::instances::Instance;
+use crate::labels::label_of;
+use crate::perception::Tracking;
+
+/// How often which fault is made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FaultRates {
+    /// Least pixels with the share of things of so many, up to the next row, that are missed; in the
+    /// order of pixels. Fewer than the first row's are always missed.
+    pub missed: Vec<(u32, f32)>,
+    /// Share of what is found that is taken for another class of about its kind.
+    pub misnamed: f32,
+    /// Things that aren't there, for each image.
+    pub invented: f32,
+    /// Mean score of what is there, and of what isn't or has another name.
+    pub scores: [f32; 2],
+}
+
+impl FaultRates {
+    /// No fault at all.
+    pub fn none() -> FaultRates {
+        FaultRates { missed: vec![(5, 0.0)], misnamed: 0.0, invented: 0.0, scores: [1.0, 0.5] }
+    }
+
+    fn missed(&self, n_pixels: usize) -> f32 {
+        let row = self.missed.iter().rev().find(|(least, _)| n_pixels >= *least as usize);
+        row.map_or(1.0, |(_, share)| *share)
+    }
+}
+
+/// Minds that see by ground truth with faults.
+#[derive(Clone, Debug)]
+pub struct NoisySight {
+    rates: Arc<FaultRates>,
+    name: String,
+}
+
+impl NoisySight {
+    /// With these faults, under this name.
+    pub fn new(rates: FaultRates, name: &str) -> NoisySight {
+        NoisySight { rates: Arc::new(rates), name: format!("noisy {name}") }
+    }
+}
+
+impl Sight for NoisySight {
+    fn name(&self) -> Option<String> {
+        Some(self.name.clone())
+    }
+
+    fn senses(&self) -> Senses {
+        Senses::DEPTH_AND_IDS
+    }
+
+    fn grants(&self, asked: Grants) -> Grants {
+        asked
+    }
+
+    fn perception(&self) -> Box<dyn Perception> {
+        let rates = Arc::clone(&self.rates);
+        Box::new(NoisyPerception { rates, tracking: Tracking::default(), seed: 0 })
+    }
+}
+
+#[derive(Clone, Debug)]
+struct NoisyPerception {
+    rates: Arc<FaultRates>,
+    tracking: Tracking,
+    seed: u64,
+}
+
+impl NoisyPerception {
+    /// The instances in an image with known ids, with faults.
+    fn instances(&self, ids: &[u16], observation: &Observation) -> Vec<Instance> {
+        let mut rng = Stream::new(self.seed, "faults of perception", u64::from(observation.frame));
+        let classes = &observation.granted.classes;
+        let mut pixels: Vec<Vec<u32>> = vec![Vec::new(); classes.len()];
+        let n = classes.last().map_or(0, |(entity, _)| usize::from(entity.0) + 1);
+        let mut row_of = vec![usize::MAX; n];
+        classes.iter().enumerate().for_each(|(k, (entity, _))| row_of[usize::from(entity.0)] = k);
+        for (k, id) in ids.iter().enumerate() {
+            let row = row_of.get(usize::from(*id)).and_then(|row| pixels.get_mut(*row));
+            row.into_iter().for_each(|pixels| pixels.push(k as u32));
+        }
+        let mut found = Vec::new();
+        let [sure, unsure] = self.rates.scores;
+        for ((_, class), pixels) in classes.iter().zip(pixels) {
+            if rng.chance(self.rates.missed(pixels.len())) {
+                continue;
+            }
+            let others: Vec<ClassId> =
+                ClassId::all().filter(|c| c.info().role == class.info().role).collect();
+            let (class, score) = match rng.choose(&others) {
+                Some(other) if rng.chance(self.rates.misnamed) => (*other, unsure),
+                _ => (*class, sure),
+            };
+            let label = label_of(Some(class));
+            found.push(Instance { label, score, pixels, middle: [0.0; 3] });
+        }
+        let (width, height) = (observation.camera.width, observation.camera.height);
+        let classes: Vec<ClassId> = ClassId::all().filter(|c| c.info().is_carriable()).collect();
+        while rng.chance(self.rates.invented / (1.0 + self.rates.invented)) {
+            /// Side of what is invented, pixels.
+            const SIDE: u32 = 12;
+            let Some(class) = rng.choose(&classes) else { break };
+            let [x, y] = [width, height].map(|n| rng.below((n - SIDE) as usize) as u32);
+            let row = |y: u32| (y * width + x..y * width + x + SIDE).collect::<Vec<u32>>();
+            let pixels = (y..y + SIDE).flat_map(row).collect();
+            let label = label_of(Some(*class));
+            found.push(Instance { label, score: unsure, pixels, middle: [0.0; 3] });
+        }
+        found
+    }
+}
+
+impl Perception for NoisyPerception {
+    fn reset(&mut self, briefing: &Briefing) {
+        (self.tracking, self.seed) = (Tracking::new(briefing), briefing.seed);
+    }
+
+    fn feel(&mut self, hands: &Hands, last: Option<(Intent, Outcome)>) {
+        self.tracking.tracker.feel(hands, last);
+    }
+
+    fn perceive(&mut self, observation: &Observation) -> Percepts {
+        self.tracking.last.clear();
+        let images = &observation.images;
+        let n_pixels = observation.camera.width as usize * observation.camera.height as usize;
+        match (&images.ids, &images.depth_m) {
+            (Some(ids), Some(depth_m)) if ids.len() == n_pixels && depth_m.len() == n_pixels => {
+                let found = self.instances(ids, observation);
+                self.tracking.take_in(&found, depth_m, observation)
+            }
+            _ => Percepts::default(),
+        }
+    }
+
+    fn target(&self, track: TrackId) -> Option<Target> {
+        self.tracking.target(track)
+    }
+
+    fn points(&self) -> bool {
+        true
+    }
+
+    fn hides_ids(&self) -> bool {
+        true
+    }
+
+    fn fork(&self) -> Box<dyn Perception> {
+        Box::new(self.clone())
+    }
+}

@@ -1,0 +1,191 @@
+//! The detector as the perception of a mind: from color and depth to things with names of their own.
+
+use std::sync::Arc;
+
+use chaic_agents::perception::{Perception, Percepts, PixelKind, STRIDE, Segments, Sight};
+use chaic_agents::track::{Hands, Intent, TrackId};
+use chaic_nn::simd::widest;
+use chaic_nn::weights::WeightsError;
+use chaic_nn::{Pass, weights};
+use chaic_protocol::geom::Camera;
+use chaic_protocol::observation::{Grants, Senses};
+use chaic_protocol::{Briefing, Observation, Outcome, Target};
+
+use crate::detector::Detector;
+use crate::evaluate::detect_in;
+use crate::instances::Instance;
+use crate::tracker::{Sighting, Tracker, TrackerRules};
+
+/// What files of the detector's weights say that they are.
+pub const DETECTOR_KIND: &str = "chaic detector 1";
+
+/// A trained detector.
+#[derive(Clone, Debug)]
+pub struct TrainedDetector {
+    /// The network.
+    pub detector: Detector,
+    /// Its numbers.
+    pub numbers: Vec<f32>,
+    /// The first digits of the digest of its file, which name it.
+    pub digest: String,
+}
+
+impl TrainedDetector {
+    /// From a safetensors file.
+    ///
+    /// # Errors
+    /// [`WeightsError`] if it isn't a whole file of this network's weights.
+    pub fn from_bytes(bytes: &[u8]) -> Result<TrainedDetector, WeightsError> {
+        let detector = Detector::new();
+        let numbers = weights::from_bytes(&detector.network, bytes, DETECTOR_KIND)?;
+        Ok(TrainedDetector { detector, numbers, digest: weights::digest(bytes) })
+    }
+}
+
+/// Minds that see by a trained detector.
+#[derive(Clone, Debug)]
+pub struct LearnedSight {
+    detector: Arc<TrainedDetector>,
+}
+
+impl LearnedSight {
+    /// By this one.
+    pub fn new(detector: TrainedDetector) -> LearnedSight {
+        LearnedSight { detector: Arc::new(detector) }
+    }
+}
+
+impl Sight for LearnedSight {
+    fn name(&self) -> Option<String> {
+        Some(format!("learned {}", self.detector.digest))
+    }
+
+    fn senses(&self) -> Senses {
+        Senses { rgb: true, ids: false, ..Senses::DEPTH_AND_IDS }
+    }
+
+    fn grants(&self, asked: Grants) -> Grants {
+        Grants { ids: false, ..asked }
+    }
+
+    fn perception(&self) -> Box<dyn Perception> {
+        let pass = Pass::new(&self.detector.detector.network, widest());
+        Box::new(LearnedPerception {
+            detector: Arc::clone(&self.detector),
+            pass,
+            tracking: Tracking::default(),
+        })
+    }
+}
+
+/// Sees by a detector and keeps track of what it saw.
+#[derive(Clone, Debug)]
+struct LearnedPerception {
+    detector: Arc<TrainedDetector>,
+    pass: Pass,
+    tracking: Tracking,
+}
+
+impl Perception for LearnedPerception {
+    fn reset(&mut self, briefing: &Briefing) {
+        self.tracking = Tracking::new(briefing);
+    }
+
+    fn feel(&mut self, hands: &Hands, last: Option<(Intent, Outcome)>) {
+        self.tracking.tracker.feel(hands, last);
+    }
+
+    fn perceive(&mut self, observation: &Observation) -> Percepts {
+        self.tracking.last.clear();
+        let camera = &observation.camera;
+        let images = &observation.images;
+        let (Some(rgb), Some(depth_m)) = (images.rgb.as_ref(), images.depth_m.as_ref()) else {
+            return Percepts::default();
+        };
+        let n_pixels = camera.width as usize * camera.height as usize;
+        let stride = self.detector.detector.network.stride() as u32;
+        let fits = camera.width.is_multiple_of(stride) && camera.height.is_multiple_of(stride);
+        if !fits || rgb.len() != 3 * n_pixels || depth_m.len() != n_pixels {
+            return Percepts::default();
+        }
+        let TrainedDetector { detector, numbers, .. } = &*self.detector;
+        let found = detect_in(detector, numbers, (rgb, depth_m, camera), &mut self.pass);
+        self.tracking.take_in(&found, depth_m, observation)
+    }
+
+    fn target(&self, track: TrackId) -> Option<Target> {
+        self.tracking.target(track)
+    }
+
+    fn points(&self) -> bool {
+        true
+    }
+
+    fn fork(&self) -> Box<dyn Perception> {
+        Box::new(self.clone())
+    }
+}
+
+/// Instances in one image after the other as things with names.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Tracking {
+    pub(crate) tracker: Tracker,
+    /// What the last image showed, and where.
+    pub(crate) last: Vec<(TrackId, [u32; 2])>,
+}
+
+impl Tracking {
+    pub(crate) fn new(briefing: &Briefing) -> Tracking {
+        let tracker = Tracker::new(TrackerRules::default(), briefing);
+        Tracking { tracker, last: Vec::new() }
+    }
+
+    pub(crate) fn take_in(
+        &mut self,
+        found: &[Instance],
+        depth_m: &[f32],
+        observation: &Observation,
+    ) -> Percepts {
+        let camera = &observation.camera;
+        let (of_pixels, sightings) = measure(found, depth_m, camera);
+        let at = (observation.frame, observation.own.pose);
+        let (detections, mut kinds) = self.tracker.update(&sightings, at, (depth_m, camera));
+        kinds.insert(0, PixelKind::Firm);
+        let segments = Segments { of_pixels: &of_pixels, depth_m, camera, kinds: &kinds };
+        let (_, dynamic_mask) = segments.measure();
+        self.last = detections.iter().map(|d| (d.track, d.pixel)).collect();
+        Percepts { detections, dynamic_mask, stride: STRIDE, hands: None }
+    }
+
+    pub(crate) fn target(&self, track: TrackId) -> Option<Target> {
+        let (_, [column, row]) = *self.last.iter().find(|(t, _)| *t == track)?;
+        Some(Target::Pixel { column, row })
+    }
+}
+
+/// The pixels of instances as segments, numbered from 1, and what each of them tells of its thing.
+fn measure(found: &[Instance], depth_m: &[f32], camera: &Camera) -> (Vec<u16>, Vec<Sighting>) {
+    let mut of_pixels = vec![0u16; depth_m.len()];
+    for (k, instance) in found.iter().enumerate() {
+        instance.pixels.iter().for_each(|p| of_pixels[*p as usize] = 1 + k as u16);
+    }
+    let kind = |instance: &Instance| {
+        crate::labels::class_of(instance.label).map_or(PixelKind::Firm, PixelKind::of)
+    };
+    let kinds: Vec<PixelKind> =
+        std::iter::once(PixelKind::Firm).chain(found.iter().map(kind)).collect();
+    let segments = Segments { of_pixels: &of_pixels, depth_m, camera, kinds: &kinds };
+    let (extents, _) = segments.measure();
+    // Those without an extent are too small or too far off: nobody's pixels.
+    let mut number = vec![0u16; found.len() + 1];
+    let mut sightings = Vec::new();
+    for (k, (instance, extent)) in found.iter().zip(extents.into_iter().skip(1)).enumerate() {
+        if let Some(extent) = extent {
+            let Instance { label, score, .. } = *instance;
+            sightings.push(Sighting { label, score, extent });
+            number[k + 1] = sightings.len() as u16;
+        }
+    }
+    of_pixels.iter_mut().for_each(|of| *of = number[usize::from(*of)]);
+    (of_pixels, sightings)
+}

@@ -43,8 +43,9 @@ pub struct TrackerRules {
     pub renamed_m: f32,
     /// What is carried gets so far in a frame, and so far at most before it is taken for another.
     pub carried_m: (f32, f32),
-    /// What was let go of is found no farther than this from there, for so many frames.
-    pub released_m: (f32, Frame),
+    /// What was let go of is found no farther than this from where one stood, in plan: an arm and a
+    /// step.
+    pub released_m: f32,
     /// A detection of a class nearer to another one of it than this part of the largest extent is a
     /// piece of that.
     pub piece_extents: f32,
@@ -62,7 +63,7 @@ impl Default for TrackerRules {
             still_extents: 0.6,
             renamed_m: 0.15,
             carried_m: (0.04, 3.0),
-            released_m: (2.0, 300),
+            released_m: 1.9,
             piece_extents: 0.35,
         }
     }
@@ -92,8 +93,8 @@ struct Track {
     odds: f32,
     /// Whether somebody else had it in hand when it was seen last.
     is_carried: bool,
-    /// When the own hands let go of it.
-    released: Option<Frame>,
+    /// Whether the own hands have let go of it, and it hasn't been seen since.
+    is_released: bool,
 }
 
 /// Associates what is seen with what was seen before, for one episode.
@@ -184,13 +185,12 @@ impl Tracker {
     /// Notes what has left the own hands.
     fn let_go(&mut self, now: Frame, pose: Pose) {
         let holds: Vec<TrackId> = self.hands.all().map(|(track, _)| track).collect();
-        let ahead = pose.to_world(Vec3::new(0.0, 1.0, -0.7));
         let held = std::mem::replace(&mut self.held, holds);
         for track in &mut self.tracks {
             let is_held = self.held.contains(&track.id);
             let is_cleared = self.cleared == Some(track.id);
             if held.contains(&track.id) && !is_held || is_cleared {
-                (track.released, track.position, track.seen_at) = (Some(now), ahead, now);
+                (track.is_released, track.position, track.seen_at) = (true, pose.position, now);
             }
         }
     }
@@ -333,19 +333,14 @@ impl Tracker {
         let size_m = extents_m(track.label);
         let still_m = rules.still_m.max(rules.still_extents * size_m[0].max(size_m[2]));
         let (each_m, most_m) = rules.carried_m;
-        let reach_m = match track.released {
-            Some(then) if now <= then + rules.released_m.1 => {
-                // It may have fallen.
-                let apart_m =
-                    horizontal_distance(track.position, sighting.extent.position_in_world);
-                return (apart_m < rules.released_m.0).then_some(apart_m / still_m);
-            }
-            _ if track.is_carried || in_hand => {
-                let walked_m = still_m + each_m * (now - track.seen_at) as f32;
-                walked_m.min(most_m)
-            }
-            _ => still_m,
-        };
+        if track.is_released {
+            // It may have fallen.
+            let apart_m = horizontal_distance(track.position, sighting.extent.position_in_world);
+            return (apart_m < rules.released_m).then_some(apart_m / still_m);
+        }
+        let walked_m = still_m + each_m * (now - track.seen_at) as f32;
+        let may_be_carried = track.is_carried || in_hand;
+        let reach_m = if may_be_carried { walked_m.min(most_m) } else { still_m };
         // Of two that are near enough, who moved less.
         (apart_m < reach_m).then_some(apart_m / still_m)
     }
@@ -368,7 +363,7 @@ impl Tracker {
             seen_at: now,
             odds: 0.0,
             is_carried: false,
-            released: None,
+            is_released: false,
         });
         self.tracks.len() - 1
     }
@@ -390,7 +385,7 @@ impl Track {
         });
         self.label = most.1;
         self.position = sighting.extent.position_in_world;
-        (self.seen_at, self.is_carried, self.released) = (now, is_carried, None);
+        (self.seen_at, self.is_carried, self.is_released) = (now, is_carried, false);
     }
 }
 

@@ -1,5 +1,7 @@
 //! Dense convolutions, as matrix products of patches and weights.
 
+use std::ops::Range;
+
 use pulp::Arch;
 
 use crate::gemm::{Matrix, Workspace, add_product};
@@ -59,9 +61,35 @@ pub fn forward(
     }
     let n = kernel.out_shape(shape, channels).of_one() / channels;
     for (map, out) in map.chunks_exact(shape.of_one()).zip(out.chunks_exact_mut(n * channels)) {
-        gather(map, shape, kernel, patches);
+        gather(map, shape, kernel, 0..kernel.out_shape(shape, 1).height, patches);
         add_product(arch, out, Matrix::row_major(patches, n, depth), weights, product);
     }
+}
+
+/// Adds the convolution of one map to some rows of the result: those that `rows` names, shape [rows,
+/// out width, out channels].
+///
+/// # Panics
+/// As [`forward`].
+pub(crate) fn forward_rows(
+    arch: Arch,
+    (map, shape): (&[f32], Shape),
+    (weights, kernel): (&[f32], Kernel),
+    (out, channels, rows): (&mut [f32], usize, Range<usize>),
+    space: &mut Patches,
+) {
+    let Patches { patches, product } = space;
+    let depth = kernel.patch(shape.channels);
+    let weights = Matrix::row_major(weights, depth, channels);
+    let n = rows.len() * kernel.out_shape(shape, channels).width;
+    if kernel == Kernel::POINTWISE {
+        let row = shape.width * shape.channels;
+        let map = &map[rows.start * row..rows.end * row];
+        add_product(arch, out, Matrix::row_major(map, n, depth), weights, product);
+        return;
+    }
+    gather(map, shape, kernel, rows, patches);
+    add_product(arch, out, Matrix::row_major(patches, n, depth), weights, product);
 }
 
 /// Adds the gradient by the maps, from that by the result.
@@ -116,21 +144,26 @@ pub fn backward_weights(
     let n = kernel.out_shape(shape, channels).of_one() / channels;
     for (map, gradient) in map.chunks_exact(shape.of_one()).zip(gradient.chunks_exact(n * channels))
     {
-        gather(map, shape, kernel, patches);
+        gather(map, shape, kernel, 0..kernel.out_shape(shape, 1).height, patches);
         let patches = Matrix::row_major(patches, n, depth).transposed();
         add_product(arch, out, patches, Matrix::row_major(gradient, n, channels), product);
     }
 }
 
-/// For each place of the kernel on a map, whether and where each of its rows begins on the map: calls
+/// For each place of the kernel in these rows of the result, whether and where each of its rows begins on the map: calls
 /// `visit` with the index of the run in the patches, and on the map, and its length.
-fn runs(shape: Shape, kernel: Kernel, mut visit: impl FnMut(usize, usize, usize)) {
+fn runs(
+    shape: Shape,
+    kernel: Kernel,
+    rows: Range<usize>,
+    mut visit: impl FnMut(usize, usize, usize),
+) {
     let Shape { height, width, channels, .. } = shape;
     let Kernel { side, stride } = kernel;
     let border = side / 2;
     let out = kernel.out_shape(shape, 1);
     let mut at = 0;
-    for y in 0..out.height {
+    for y in rows {
         for x in 0..out.width {
             let first = (x * stride).saturating_sub(border);
             let last = (x * stride + side - border).min(width);
@@ -148,16 +181,17 @@ fn runs(shape: Shape, kernel: Kernel, mut visit: impl FnMut(usize, usize, usize)
 }
 
 /// The numbers under the kernel at each of its places, shape [places, side, side, channels].
-fn gather(map: &[f32], shape: Shape, kernel: Kernel, patches: &mut Vec<f32>) {
-    let places = kernel.out_shape(shape, 1).of_one();
+fn gather(map: &[f32], shape: Shape, kernel: Kernel, rows: Range<usize>, patches: &mut Vec<f32>) {
+    let places = rows.len() * kernel.out_shape(shape, 1).width;
     patches.clear();
     patches.resize(places * kernel.patch(shape.channels), 0.0);
-    runs(shape, kernel, |to, from, n| patches[to..][..n].copy_from_slice(&map[from..][..n]));
+    runs(shape, kernel, rows, |to, from, n| patches[to..][..n].copy_from_slice(&map[from..][..n]));
 }
 
 /// Adds patches to where [`gather`] takes them from.
 fn scatter(patches: &[f32], shape: Shape, kernel: Kernel, map: &mut [f32]) {
-    runs(shape, kernel, |from, to, n| {
+    let rows = 0..kernel.out_shape(shape, 1).height;
+    runs(shape, kernel, rows, |from, to, n| {
         map[to..][..n].iter_mut().zip(&patches[from..][..n]).for_each(|(to, from)| *to += from);
     });
 }

@@ -1,6 +1,8 @@
 //! Depthwise convolutions of stride 1: each channel by a square kernel of its own, with zeros around
 //! the map. Sums run over the kernel, row by row, in chains of fused multiply-adds.
 
+use std::ops::Range;
+
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::tensor::Shape;
@@ -15,15 +17,21 @@ pub struct Padded {
 }
 
 impl Padded {
-    /// One map of this shape with `border` zeros on each side.
-    fn fill(&mut self, map: &[f32], shape: Shape, border: usize) -> &[f32] {
+    /// Some rows of one map of this shape with those around them as far as `border`, and zeros beyond
+    /// the map.
+    fn fill(&mut self, map: &[f32], shape: Shape, rows: Range<usize>, border: usize) -> &[f32] {
         let row = (shape.width + 2 * border) * shape.channels;
-        self.data.clear();
-        self.data.resize((shape.height + 2 * border) * row, 0.0);
-        let own = shape.width * shape.channels;
-        let rows = self.data[border * row..].chunks_exact_mut(row);
-        for (to, from) in rows.zip(map.chunks_exact(own)) {
-            to[border * shape.channels..][..own].copy_from_slice(from);
+        self.data.resize((rows.len() + 2 * border) * row, 0.0);
+        let (own, edge) = (shape.width * shape.channels, border * shape.channels);
+        for (k, to) in self.data.chunks_exact_mut(row).enumerate() {
+            match (rows.start + k).checked_sub(border).filter(|y| *y < shape.height) {
+                Some(y) => {
+                    to[..edge].fill(0.0);
+                    to[edge..][..own].copy_from_slice(&map[y * own..][..own]);
+                    to[edge + own..].fill(0.0);
+                }
+                None => to.fill(0.0),
+            }
         }
         &self.data
     }
@@ -49,7 +57,24 @@ pub fn forward(
 ) {
     check(shape, weights, side);
     assert_eq!((map.len(), out.len()), (shape.of_one(), shape.of_one()));
-    let map = padded.fill(map, shape, side / 2);
+    let map = padded.fill(map, shape, 0..shape.height, side / 2);
+    arch.dispatch(Forward { map, shape, weights, side, out, is_flipped: false });
+}
+
+/// Some rows of what [`forward`] gives.
+///
+/// # Panics
+/// As [`forward`].
+pub(crate) fn forward_rows(
+    arch: Arch,
+    (map, shape): (&[f32], Shape),
+    (weights, side): (&[f32], usize),
+    (out, rows): (&mut [f32], Range<usize>),
+    padded: &mut Padded,
+) {
+    check(shape, weights, side);
+    assert_eq!(out.len(), rows.len() * shape.width * shape.channels);
+    let map = padded.fill(map, shape, rows, side / 2);
     arch.dispatch(Forward { map, shape, weights, side, out, is_flipped: false });
 }
 
@@ -67,7 +92,7 @@ pub fn backward_map(
 ) {
     check(shape, weights, side);
     assert_eq!((gradient.len(), out.len()), (shape.of_one(), shape.of_one()));
-    let map = padded.fill(gradient, shape, side / 2);
+    let map = padded.fill(gradient, shape, 0..shape.height, side / 2);
     arch.dispatch(Forward { map, shape, weights, side, out, is_flipped: true });
 }
 
@@ -85,7 +110,7 @@ pub fn backward_weights(
 ) {
     check(shape, out, side);
     assert_eq!((map.len(), gradient.len()), (shape.of_one(), shape.of_one()));
-    let map = padded.fill(map, shape, side / 2);
+    let map = padded.fill(map, shape, 0..shape.height, side / 2);
     arch.dispatch(BackwardWeights { map, gradient, shape, out, side });
 }
 

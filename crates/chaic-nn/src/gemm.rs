@@ -85,7 +85,13 @@ impl WithSimd for Product<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         // As many accumulators as registers hold beside a row of the panel and a number of the left.
+        let columns = |vectors: usize| {
+            let panel = vectors * S::F32_LANES;
+            self.right.columns.div_ceil(panel) * panel
+        };
         match S::F32_LANES {
+            // Panels of two vectors where those of three would be empty for a good part.
+            16.. if 5 * columns(2) < 4 * columns(3) => self.run::<S, 8, 2>(simd),
             16.. => self.run::<S, 8, 3>(simd),
             _ => self.run::<S, 4, 3>(simd),
         }

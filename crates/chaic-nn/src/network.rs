@@ -43,6 +43,22 @@ pub(crate) enum Layer {
     Upsample { from: Node },
 }
 
+impl Layer {
+    /// What it reads.
+    pub(crate) fn reads(&self) -> impl Iterator<Item = Node> {
+        let (first, second) = match *self {
+            Layer::Input => (None, None),
+            Layer::Conv { from, .. }
+            | Layer::Depthwise { from, .. }
+            | Layer::Norm { from, .. }
+            | Layer::Relu { from }
+            | Layer::Upsample { from } => (Some(from), None),
+            Layer::Add { a, b } => (Some(a), Some(b)),
+        };
+        first.into_iter().chain(second)
+    }
+}
+
 /// A network without its numbers.
 #[derive(Clone, Debug, Default)]
 pub struct Network {
@@ -164,6 +180,11 @@ impl Network {
     /// Sides of the input are multiples of this.
     pub fn stride(&self) -> usize {
         self.strides.iter().copied().max().unwrap_or(1)
+    }
+
+    /// By how many a side of the input is divided to be a side of what a node makes.
+    pub(crate) fn stride_of(&self, node: Node) -> usize {
+        self.strides[node.0]
     }
 
     /// The shape of what a node makes of inputs of this shape.

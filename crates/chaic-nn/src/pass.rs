@@ -4,6 +4,7 @@ use pulp::Arch;
 
 use crate::conv::{self, Patches};
 use crate::depthwise::{self, Padded};
+use crate::elementwise::{AddTo, Mask, Relu, downsample, upsample};
 use crate::network::{Layer, Network, Node};
 use crate::norm;
 use crate::tensor::{Shape, Tensor};
@@ -108,7 +109,10 @@ impl Pass {
                     out.data.copy_from_slice(&before[a.0].data);
                     self.arch.dispatch(AddTo { to: &mut out.data, from: &before[b.0].data });
                 }
-                Layer::Upsample { from } => upsample(&before[from.0], out),
+                Layer::Upsample { from } => {
+                    let map = &before[from.0];
+                    upsample(&map.data, (map.shape.width, map.shape.channels), &mut out.data);
+                }
             }
         }
     }
@@ -196,86 +200,6 @@ impl Pass {
                     }
                 }
                 Layer::Upsample { from } => downsample(gradient, &mut before[from.0]),
-            }
-        }
-    }
-}
-
-// What is done number by number, compiled for the widest vectors.
-
-struct AddTo<'a> {
-    to: &'a mut [f32],
-    from: &'a [f32],
-}
-
-impl pulp::NullaryFnOnce for AddTo<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        for (to, from) in self.to.iter_mut().zip(self.from) {
-            *to += from;
-        }
-    }
-}
-
-struct Relu<'a> {
-    map: &'a [f32],
-    out: &'a mut [f32],
-}
-
-impl pulp::NullaryFnOnce for Relu<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        for (out, x) in self.out.iter_mut().zip(self.map) {
-            *out = if *x > 0.0 { *x } else { 0.0 };
-        }
-    }
-}
-
-/// Leaves of a gradient what reaches through a positive part.
-struct Mask<'a> {
-    gradient: &'a mut [f32],
-    made: &'a [f32],
-}
-
-impl pulp::NullaryFnOnce for Mask<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        for (g, made) in self.gradient.iter_mut().zip(self.made) {
-            *g = if *made > 0.0 { *g } else { 0.0 };
-        }
-    }
-}
-
-fn upsample(map: &Tensor, out: &mut Tensor) {
-    let Shape { width, channels, .. } = map.shape;
-    let rows = map.data.chunks_exact(width * channels);
-    for (row, two) in rows.zip(out.data.chunks_exact_mut(4 * width * channels)) {
-        let (first, second) = two.split_at_mut(2 * width * channels);
-        for (pixel, two) in row.chunks_exact(channels).zip(first.chunks_exact_mut(2 * channels)) {
-            two[..channels].copy_from_slice(pixel);
-            two[channels..].copy_from_slice(pixel);
-        }
-        second.copy_from_slice(first);
-    }
-}
-
-/// Adds the gradient by what [`upsample`] made to that by what it was made of.
-fn downsample(gradient: &Tensor, out: &mut Tensor) {
-    let Shape { width, channels, .. } = out.shape;
-    let rows = out.data.chunks_exact_mut(width * channels);
-    for (row, two) in rows.zip(gradient.data.chunks_exact(4 * width * channels)) {
-        let (first, second) = two.split_at(2 * width * channels);
-        let pairs = first.chunks_exact(2 * channels).zip(second.chunks_exact(2 * channels));
-        for (pixel, (above, below)) in row.chunks_exact_mut(channels).zip(pairs) {
-            for c in 0..channels {
-                let sum = (above[c] + above[channels + c]) + (below[c] + below[channels + c]);
-                pixel[c] += sum;
             }
         }
     }

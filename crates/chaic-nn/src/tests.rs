@@ -4,7 +4,7 @@
 use chaic_protocol::rng::Stream;
 
 use crate::simd::{widest, widths};
-use crate::{Adam, AdamRules, Kernel, Network, Node, Pass, Shape, Tensor};
+use crate::{Adam, AdamRules, Inference, Kernel, Network, Node, Pass, Shape, Tensor};
 
 /// A network with every kind of layer; its output has half as many rows and columns as its input.
 fn every_layer() -> (Network, Node) {
@@ -125,4 +125,25 @@ fn a_network_learns() {
     }
     let (first, last) = (losses[0], losses[55..].iter().sum::<f32>() / 5.0);
     assert!(last < 0.8 && last < 0.75 * first, "{first} to {last}");
+}
+
+#[test]
+fn inference_makes_the_same_bits_as_a_pass_at_every_width_of_vectors() {
+    let (net, head) = every_layer();
+    let numbers = net.begin(3);
+    // Strips that end within the map, and one that is the whole of it.
+    for (height, width) in [(12, 8), (160, 96), (8, 516)] {
+        let input = random(Shape { n: 1, height, width, channels: 3 }, 1);
+        let mut pass = Pass::new(&net, widest());
+        pass.forward(&net, &numbers, &input);
+        for (name, arch) in widths() {
+            let mut inference = Inference::new(&net, arch);
+            for _ in 0..2 {
+                inference.input(input.shape).copy_from_slice(&input.data);
+                let mut made = Vec::new();
+                inference.run(&net, &numbers, |_, _, strip| made.extend_from_slice(strip));
+                assert!(made == pass.made(head).data, "{height} x {width}, {name}");
+            }
+        }
+    }
 }

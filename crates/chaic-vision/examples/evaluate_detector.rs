@@ -3,7 +3,7 @@
 
 use std::fs;
 
-use chaic_nn::Pass;
+use chaic_nn::Inference;
 use chaic_nn::simd::widest;
 use chaic_vision::evaluate::{detect, evaluate};
 use chaic_vision::labels::class_of;
@@ -28,7 +28,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         println!("{name:24} {ap50:.3} {ap:.3} {n}");
     }
     let Some(out) = arguments.next() else { return Ok(()) };
-    let mut pass = Pass::new(&detector.network, widest());
+    let mut inference = Inference::new(&detector.network, widest());
     let mut picture = RgbImage::new(2048, 1024);
     for n in 0..8u32 {
         let view = Views::new(Part::Validation, canonical, 1, u64::from(n)).draw();
@@ -37,7 +37,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let rgb = &view.rgb[3 * k as usize..][..3];
             picture.put_pixel(x0 + k % 512, y0 + k / 512, Rgb([rgb[0], rgb[1], rgb[2]]));
         }
-        for instance in detect(detector, numbers, &view, &mut pass) {
+        for instance in detect(detector, numbers, &view, &mut inference) {
             let name = class_of(instance.label).map_or("", |class| class.name());
             print!("{name} {:.2}, ", instance.score);
             let hue = |m: u32| (u32::from(instance.label) * m % 200 + 55) as u8;

@@ -3,13 +3,13 @@
 use std::thread;
 
 use chaic_nn::simd::widest;
-use chaic_nn::{Pass, Shape, Tensor};
+use chaic_nn::{Inference, Shape};
 use chaic_protocol::geom::Camera;
 
 use crate::average_precision::{AveragePrecision, Detection, Image, Truth, average_precision};
 use crate::detector::Detector;
 use crate::features::{Crop, N_FEATURES, features};
-use crate::instances::{Instance, InstanceRules, instances};
+use crate::instances::{Instance, InstanceRules, Pixels};
 use crate::labels::BACKGROUND;
 use crate::views::{LabelledView, Part, ViewRules, Views};
 
@@ -21,9 +21,9 @@ pub fn detect(
     detector: &Detector,
     numbers: &[f32],
     view: &LabelledView,
-    pass: &mut Pass,
+    inference: &mut Inference,
 ) -> Vec<Instance> {
-    detect_in(detector, numbers, (&view.rgb, &view.depth_m, &view.camera), pass)
+    detect_in(detector, numbers, (&view.rgb, &view.depth_m, &view.camera), inference)
 }
 
 /// What a detector sees in an image: color (u8, shape [height, width, 3]), depth (metres, shape
@@ -35,15 +35,15 @@ pub fn detect_in(
     detector: &Detector,
     numbers: &[f32],
     (rgb, depth_m, camera): (&[u8], &[f32], &Camera),
-    pass: &mut Pass,
+    inference: &mut Inference,
 ) -> Vec<Instance> {
     let crop = Crop::whole(camera);
     let [width, height] = crop.size;
-    let mut input =
-        Tensor { shape: Shape { n: 1, height, width, channels: N_FEATURES }, ..Tensor::default() };
-    features(rgb, depth_m, camera, crop, &mut input.data);
-    pass.forward(&detector.network, numbers, &input);
-    instances(pass.made(detector.head), depth_m, camera, &InstanceRules::default())
+    let shape = Shape { n: 1, height, width, channels: N_FEATURES };
+    features(rgb, depth_m, camera, crop, inference.input(shape));
+    let mut pixels = Pixels::new(camera);
+    inference.run(&detector.network, numbers, |_, row, strip| pixels.read(row, strip, depth_m));
+    pixels.instances(depth_m, &InstanceRules::default())
 }
 
 /// What is in a view beside what was seen in it.
@@ -88,14 +88,14 @@ pub fn evaluate(
     n_views: usize,
     n_threads: usize,
 ) -> AveragePrecision {
-    let one = |k: usize, pass: &mut Pass| {
+    let one = |k: usize, inference: &mut Inference| {
         let view = Views::new(Part::Validation, rules, 1, k as u64).draw();
-        let found = detect(detector, numbers, &view, pass);
+        let found = detect(detector, numbers, &view, inference);
         compare(&view, &found, LEAST_PX)
     };
     let some = |thread: usize| -> Vec<Image> {
-        let mut pass = Pass::new(&detector.network, widest());
-        (thread..n_views).step_by(n_threads).map(|k| one(k, &mut pass)).collect()
+        let mut inference = Inference::new(&detector.network, widest());
+        (thread..n_views).step_by(n_threads).map(|k| one(k, &mut inference)).collect()
     };
     let some = &some;
     let parts: Vec<Vec<Image>> = thread::scope(|scope| {

@@ -27,13 +27,12 @@ impl Crop {
 ///
 /// # Panics
 /// If the crop or the camera's size don't fit the images.
-pub fn features(rgb: &[u8], depth_m: &[f32], camera: &Camera, crop: Crop, out: &mut Vec<f32>) {
+pub fn features(rgb: &[u8], depth_m: &[f32], camera: &Camera, crop: Crop, out: &mut [f32]) {
     let width = camera.width as usize;
     let [columns, rows] = crop.size;
     let focal = camera.focal_px();
     let up = camera.rotation().transpose().y_axis;
-    out.clear();
-    out.resize(columns * rows * N_FEATURES, 0.0);
+    assert_eq!(out.len(), columns * rows * N_FEATURES, "features have another shape");
     let inverse = |column: usize, row: usize| 1.0 / depth_m[row * width + column];
     for (j, line) in out.chunks_exact_mut(columns * N_FEATURES).enumerate() {
         let row = crop.at[1] + j;

@@ -2,10 +2,12 @@
 //! one middle.
 
 use chaic_nn::Tensor;
+use chaic_nn::simd::widest;
 use chaic_protocol::geom::Camera;
 
 use crate::detector::{N_OFFSETS, STRIDE};
 use crate::labels::{BACKGROUND, half_extents_m};
+use crate::loss::exp;
 
 /// One thing that the detector sees.
 #[derive(Clone, Debug, PartialEq)]
@@ -73,6 +75,7 @@ fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
 }
 
 /// What the network says of one pixel.
+#[derive(Clone, Copy, Debug)]
 struct Pixel {
     label: u8,
     /// Of the label, 0 to 1.
@@ -93,9 +96,52 @@ pub fn instances(
     camera: &Camera,
     rules: &InstanceRules,
 ) -> Vec<Instance> {
-    let (width, columns) = (camera.width as usize, head.shape.width);
-    let half_extents = half_extents_m();
-    let pixels = read(head, depth_m, camera, &half_extents);
+    let mut pixels = Pixels::new(camera);
+    pixels.read(0, &head.data, depth_m);
+    pixels.instances(depth_m, rules)
+}
+
+/// What the network says of the pixels of one image, at its own resolution.
+#[derive(Clone, Debug)]
+pub struct Pixels {
+    camera: Camera,
+    half_extents: Vec<f32>,
+    pixels: Vec<Pixel>,
+}
+
+impl Pixels {
+    /// Nothing yet.
+    pub fn new(camera: &Camera) -> Pixels {
+        Pixels { camera: *camera, half_extents: half_extents_m(), pixels: Vec::new() }
+    }
+
+    /// Takes in some rows, the first of which has this number: what the head made, shape [rows, width,
+    /// channels], and the depth of the whole image.
+    ///
+    /// # Panics
+    /// If shapes don't fit, or rows don't come in order.
+    pub fn read(&mut self, first_row: usize, head: &[f32], depth_m: &[f32]) {
+        let columns = self.camera.width as usize / STRIDE;
+        assert_eq!(self.pixels.len(), first_row * columns, "rows come from top to bottom");
+        read(head, &mut self.pixels, (depth_m, &self.camera), &self.half_extents);
+    }
+
+    /// The instances, surest first.
+    ///
+    /// # Panics
+    /// If shapes don't fit.
+    pub fn instances(&self, depth_m: &[f32], rules: &InstanceRules) -> Vec<Instance> {
+        find(&self.pixels, &self.half_extents, (depth_m, &self.camera), rules)
+    }
+}
+
+fn find(
+    pixels: &[Pixel],
+    half_extents: &[f32],
+    (depth_m, camera): (&[f32], &Camera),
+    rules: &InstanceRules,
+) -> Vec<Instance> {
+    let (width, columns) = (camera.width as usize, camera.width as usize / STRIDE);
     let mut parents: Vec<u32> = (0..pixels.len() as u32).collect();
     let belong = |a: &Pixel, b: &Pixel| {
         let half = half_extents[usize::from(a.label)];
@@ -128,7 +174,7 @@ pub fn instances(
     let mut wholes: Vec<(u8, [f32; 3], Vec<usize>)> = Vec::new();
     for part in parts {
         let label = pixels[part[0]].label;
-        let middle = median_vote(&pixels, &part);
+        let middle = median_vote(pixels, &part);
         let near = rules.join_extents * half_extents[usize::from(label)];
         let same = wholes.iter_mut().find(|w| w.0 == label && distance(w.1, middle) < near);
         match same {
@@ -141,7 +187,7 @@ pub fn instances(
     for (n, (_, _, part)) in wholes.iter().enumerate() {
         part.iter().for_each(|k| owner[*k] = n as u16);
     }
-    let masks = full_masks(&owner, &pixels, columns, depth_m, width, wholes.len());
+    let masks = full_masks(&owner, pixels, columns, depth_m, width, wholes.len());
     let mut found: Vec<Instance> = wholes
         .iter()
         .zip(masks)
@@ -157,24 +203,88 @@ pub fn instances(
     found
 }
 
-fn read(head: &Tensor, depth_m: &[f32], camera: &Camera, half_extents: &[f32]) -> Vec<Pixel> {
-    let (width, columns) = (camera.width as usize, head.shape.width);
-    let n_labels = head.shape.channels - N_OFFSETS;
+fn read(
+    head: &[f32],
+    pixels: &mut Vec<Pixel>,
+    (depth_m, camera): (&[f32], &Camera),
+    half_extents: &[f32],
+) {
+    let (width, columns) = (camera.width as usize, camera.width as usize / STRIDE);
+    let n_labels = half_extents.len();
     let (focal, half) = (camera.focal_px(), 0.5 * width as f32);
-    let rows = head.data.chunks_exact(head.shape.channels);
-    let pixel = |(k, numbers): (usize, &[f32])| {
-        let (row, offset) = numbers.split_at(n_labels);
+    let first = pixels.len();
+    let rows = head.chunks_exact(n_labels + N_OFFSETS);
+    let n = rows.len();
+    let mut best = vec![(BACKGROUND, 0.0); n];
+    widest().dispatch(Classify { head, n_labels, best: &mut best });
+    let pixel = |((k, numbers), (label, probability)): ((usize, &[f32]), (u8, f32))| {
+        let (k, offset) = (first + k, &numbers[n_labels..]);
         let (x, y) = (STRIDE * (k % columns), STRIDE * (k / columns));
         let depth = depth_m[y * width + x];
         let (u, v) = (x as f32 + 0.5 - half, y as f32 + 0.5 - half);
         let point = [u / focal * depth, -v / focal * depth, -depth];
-        let best = (0..row.len()).fold(0, |best, n| if row[n] > row[best] { n } else { best });
-        let sum: f32 = row.iter().map(|x| crate::loss::exp(x - row[best])).sum();
-        let scale = half_extents[best];
+        let scale = half_extents[usize::from(label)];
         let vote = std::array::from_fn(|axis| point[axis] + scale * offset[axis]);
-        Pixel { label: best as u8, probability: 1.0 / sum, point, vote }
+        Pixel { label, probability, point, vote }
     };
-    rows.enumerate().map(pixel).collect()
+    pixels.extend(rows.enumerate().zip(best).map(pixel));
+}
+
+/// The first of the greatest labels of each pixel, and its probability, compiled for the widest vectors.
+struct Classify<'a> {
+    head: &'a [f32],
+    n_labels: usize,
+    best: &'a mut [(u8, f32)],
+}
+
+impl pulp::NullaryFnOnce for Classify<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        /// Sums run in so many lanes, the same with vectors of any width.
+        const LANES: usize = 16;
+        let Classify { head, n_labels, best } = self;
+        for (numbers, best) in head.chunks_exact(n_labels + N_OFFSETS).zip(best) {
+            let row = &numbers[..n_labels];
+            let (chunks, rest) = row.as_chunks::<LANES>();
+            let mut lanes = [f32::NEG_INFINITY; LANES];
+            for chunk in chunks {
+                for k in 0..LANES {
+                    lanes[k] = if chunk[k] > lanes[k] { chunk[k] } else { lanes[k] };
+                }
+            }
+            let mut most = f32::NEG_INFINITY;
+            for x in lanes {
+                most = if x > most { x } else { most };
+            }
+            for x in rest {
+                most = if *x > most { *x } else { most };
+            }
+            let mut label = 0;
+            while label + 1 < n_labels && row[label] < most {
+                label += 1;
+            }
+            best.0 = label as u8;
+            if best.0 == BACKGROUND {
+                continue;
+            }
+            let mut sums = [0.0; LANES];
+            for chunk in chunks {
+                for k in 0..LANES {
+                    sums[k] += exp(chunk[k] - most);
+                }
+            }
+            let mut sum = 0.0;
+            for x in sums {
+                sum += x;
+            }
+            for x in rest {
+                sum += exp(x - most);
+            }
+            best.1 = 1.0 / sum;
+        }
+    }
 }
 
 fn median_vote(pixels: &[Pixel], part: &[usize]) -> [f32; 3] {

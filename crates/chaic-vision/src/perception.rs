@@ -6,7 +6,7 @@ use chaic_agents::perception::{Perception, Percepts, PixelKind, STRIDE, Segments
 use chaic_agents::track::{Hands, Intent, TrackId};
 use chaic_nn::simd::widest;
 use chaic_nn::weights::WeightsError;
-use chaic_nn::{Pass, weights};
+use chaic_nn::{Inference, weights};
 use chaic_protocol::geom::Camera;
 use chaic_protocol::observation::{Grants, Senses};
 use chaic_protocol::{Briefing, Observation, Outcome, Target};
@@ -69,10 +69,10 @@ impl Sight for LearnedSight {
     }
 
     fn perception(&self) -> Box<dyn Perception> {
-        let pass = Pass::new(&self.detector.detector.network, widest());
+        let inference = Inference::new(&self.detector.detector.network, widest());
         Box::new(LearnedPerception {
             detector: Arc::clone(&self.detector),
-            pass,
+            inference,
             tracking: Tracking::default(),
         })
     }
@@ -82,7 +82,7 @@ impl Sight for LearnedSight {
 #[derive(Clone, Debug)]
 struct LearnedPerception {
     detector: Arc<TrainedDetector>,
-    pass: Pass,
+    inference: Inference,
     tracking: Tracking,
 }
 
@@ -109,7 +109,7 @@ impl Perception for LearnedPerception {
             return Percepts::default();
         }
         let TrainedDetector { detector, numbers, .. } = &*self.detector;
-        let found = detect_in(detector, numbers, (rgb, depth_m, camera), &mut self.pass);
+        let found = detect_in(detector, numbers, (rgb, depth_m, camera), &mut self.inference);
         self.tracking.take_in(&found, depth_m, observation)
     }
 

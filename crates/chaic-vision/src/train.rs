@@ -88,10 +88,11 @@ pub struct Batch {
 impl Batch {
     /// Adds a part of an image.
     pub fn add(&mut self, view: &LabelledView, crop: Crop, rules: &LossRules) {
-        let mut data = Vec::new();
-        features(&view.rgb, &view.depth_m, &view.camera, crop, &mut data);
-        self.input.data.extend_from_slice(&data);
         let [width, height] = crop.size;
+        let before = self.input.data.len();
+        self.input.data.resize(before + width * height * N_FEATURES, 0.0);
+        let data = &mut self.input.data[before..];
+        features(&view.rgb, &view.depth_m, &view.camera, crop, data);
         let n = self.input.shape.n + 1;
         self.input.shape = Shape { n, height, width, channels: N_FEATURES };
         self.targets.add(view, crop, rules);

@@ -33,7 +33,7 @@ pub fn features(rgb: &[u8], depth_m: &[f32], camera: &Camera, crop: Crop, out: &
     let focal = camera.focal_px();
     let up = camera.rotation().transpose().y_axis;
     assert_eq!(out.len(), columns * rows * N_FEATURES, "features have another shape");
-    let inverse = |column: usize, row: usize| 1.0 / depth_m[row * width + column];
+    let inverse = |column: usize, row: usize| 1.0 / true_depth(depth_m[row * width + column]);
     for (j, line) in out.chunks_exact_mut(columns * N_FEATURES).enumerate() {
         let row = crop.at[1] + j;
         let (above, below) = (row.saturating_sub(1), (row + 1).min(camera.height as usize - 1));
@@ -53,7 +53,7 @@ pub fn features(rgb: &[u8], depth_m: &[f32], camera: &Camera, crop: Crop, out: &
                 (normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]).sqrt();
             let scale = if length > 0.0 { 1.0 / length } else { 0.0 };
             // Axes of the camera: x to the right, y up, looking along -z.
-            let depth = depth_m[row * width + column];
+            let depth = true_depth(depth_m[row * width + column]);
             let height_m =
                 camera.eye_in_world.y + depth * (up.x * u / focal - up.y * v / focal - up.z);
             let at = 3 * (row * width + column);
@@ -67,4 +67,11 @@ pub fn features(rgb: &[u8], depth_m: &[f32], camera: &Camera, crop: Crop, out: &
             }
         }
     }
+}
+
+/// A depth that an eye can tell, metres: what is none (not a number, say) counts as far away.
+fn true_depth(depth_m: f32) -> f32 {
+    /// Half of [`Camera::NEAR_M`].
+    const LEAST_M: f32 = 0.05;
+    if (LEAST_M..=Camera::FAR_M).contains(&depth_m) { depth_m } else { Camera::FAR_M }
 }

@@ -39,7 +39,7 @@ fn a_wall_faces_the_eye_and_the_floor_upwards() {
     };
     let depth_m: Vec<f32> = (0..side * side).map(|k| depth(k / side)).collect();
     let rgb = vec![255; 3 * depth_m.len()];
-    let mut out = Vec::new();
+    let mut out = vec![0.0; depth_m.len() * N_FEATURES];
     features(&rgb, &depth_m, &camera, Crop::whole(&camera), &mut out);
     let pixel = |row: usize| &out[(row * side as usize + 9) * N_FEATURES..][..N_FEATURES];
     let is_near = |a: &[f32], b: [f32; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-3);

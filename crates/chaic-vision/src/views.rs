@@ -110,7 +110,7 @@ pub struct Views {
 }
 
 /// Views of one scene, before the next one.
-const VIEWS_OF_SCENE: usize = 12;
+const VIEWS_OF_SCENE: usize = 2;
 /// Views that are tried before another thing is looked at.
 const TRIES: usize = 4;
 /// A view with more of this share of pixels nearer than [`TOO_NEAR_M`] stands in something.

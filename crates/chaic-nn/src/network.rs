@@ -90,6 +90,11 @@ impl Network {
         self.push(Layer::Input, channels, 1)
     }
 
+    /// Numbers that no layer uses, kept in the same file as the others.
+    pub fn aside(&mut self, name: &str, n: usize) {
+        self.parameter(name.to_owned(), &[n], false);
+    }
+
     /// A dense convolution.
     pub fn conv(&mut self, name: &str, from: Node, kernel: Kernel, channels: usize) -> Node {
         let shape = [kernel.side, kernel.side, self.channels[from.0], channels];

@@ -4,8 +4,8 @@ use std::time::Instant;
 use chaic_nn::simd::widest;
 use chaic_nn::{Inference, Pass, Shape, Tensor};
 use chaic_vision::detector::Detector;
-use chaic_vision::evaluate::detect;
 use chaic_vision::features::N_FEATURES;
+use chaic_vision::trained::TrainedDetector;
 use chaic_vision::views::{Part, ViewRules, Views};
 
 fn main() {
@@ -22,9 +22,11 @@ fn main() {
         println!("1 x 512: inference {:?}", t.elapsed());
     }
     let view = Views::new(Part::Validation, ViewRules::TRAINING, 1, 0).draw();
+    let trained = TrainedDetector::uncalibrated(&detector, &numbers);
     for _ in 0..5 {
         let t = Instant::now();
-        let found = detect(&detector, &numbers, &view, &mut inference);
+        let image = (&view.rgb[..], &view.depth_m[..], &view.camera);
+        let found = trained.detect(image, &mut inference);
         println!("an image: {:?}, {} instances", t.elapsed(), found.len());
     }
     for (n, side) in [(1, 512), (4, 256)] {

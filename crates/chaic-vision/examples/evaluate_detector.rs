@@ -5,9 +5,10 @@ use std::fs;
 
 use chaic_nn::Inference;
 use chaic_nn::simd::widest;
-use chaic_vision::evaluate::{detect, evaluate};
+use chaic_vision::evaluate::{calibrate, evaluate};
 use chaic_vision::labels::class_of;
 use chaic_vision::train::{Trainer, TrainingRules};
+use chaic_vision::trained::TrainedDetector;
 use chaic_vision::views::{Part, ViewRules, Views};
 use image::{Rgb, RgbImage};
 
@@ -19,16 +20,22 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if !trainer.resume(&fs::read(&checkpoint)?) {
         return Err(format!("{checkpoint} is of another network").into());
     }
+    let mut detector = TrainedDetector::uncalibrated(&trainer.detector, &trainer.average);
+    detector.calibration = calibrate(&detector, n_views, 2);
+    println!("step {}: {:?}", trainer.adam.steps, detector.calibration);
     let canonical = ViewRules { varied: 0.0, ..ViewRules::TRAINING };
-    let (detector, numbers) = (&trainer.detector, &trainer.average);
-    let found = evaluate(detector, numbers, canonical, n_views, 2);
-    println!("step {}: map50 {:.3}, map {:.3}", trainer.adam.steps, found.map50, found.map);
+    for (name, rules) in [("training", ViewRules::TRAINING), ("natural", ViewRules::NATURAL)] {
+        let found = evaluate(&detector, rules, n_views, 2);
+        println!("{name} views: map50 {:.3}, map {:.3}", found.map50, found.map);
+    }
+    let found = evaluate(&detector, canonical, n_views, 2);
+    println!("canonical views: map50 {:.3}, map {:.3}", found.map50, found.map);
     for (label, (ap50, ap, n)) in &found.classes {
         let name = class_of(*label).map_or("", |class| class.name());
         println!("{name:24} {ap50:.3} {ap:.3} {n}");
     }
     let Some(out) = arguments.next() else { return Ok(()) };
-    let mut inference = Inference::new(&detector.network, widest());
+    let mut inference = Inference::new(&trainer.detector.network, widest());
     let mut picture = RgbImage::new(2048, 1024);
     for n in 0..8u32 {
         let view = Views::new(Part::Validation, canonical, 1, u64::from(n)).draw();
@@ -37,7 +44,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let rgb = &view.rgb[3 * k as usize..][..3];
             picture.put_pixel(x0 + k % 512, y0 + k / 512, Rgb([rgb[0], rgb[1], rgb[2]]));
         }
-        for instance in detect(detector, numbers, &view, &mut inference) {
+        let image = (&view.rgb[..], &view.depth_m[..], &view.camera);
+        for instance in detector.detect(image, &mut inference) {
             let name = class_of(instance.label).map_or("", |class| class.name());
             print!("{name} {:.2}, ", instance.score);
             let hue = |m: u32| (u32::from(instance.label) * m % 200 + 55) as u8;

@@ -4,9 +4,12 @@
 use std::error::Error;
 use std::fs;
 
-use chaic_nn::weights;
-use chaic_vision::perception::DETECTOR_KIND;
+use chaic_vision::evaluate::calibrate;
 use chaic_vision::train::{Trainer, TrainingRules};
+use chaic_vision::trained::TrainedDetector;
+
+/// Views that scores are calibrated by.
+const CALIBRATION_VIEWS: usize = 400;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -17,8 +20,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     if !trainer.resume(&fs::read(&checkpoint)?) {
         return Err(format!("{checkpoint} is of another network").into());
     }
-    let network = &trainer.detector.network;
-    fs::write(&file, weights::to_bytes(network, &trainer.average, DETECTOR_KIND))?;
+    let mut detector = TrainedDetector::uncalibrated(&trainer.detector, &trainer.average);
+    detector.calibration = calibrate(&detector, CALIBRATION_VIEWS, 2);
+    fs::write(&file, detector.to_bytes())?;
     println!("{file}: the numbers after step {}", trainer.adam.steps);
     Ok(())
 }

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use chaic_vision::evaluate::evaluate;
 use chaic_vision::train::{Trainer, TrainingRules};
+use chaic_vision::trained::TrainedDetector;
 
 fn main() -> std::io::Result<()> {
     let mut arguments = std::env::args().skip(1);
@@ -46,7 +47,8 @@ fn main() -> std::io::Result<()> {
             fs::rename(format!("{checkpoint}.new"), &checkpoint)?;
         }
         if step.is_multiple_of(1000) || step == steps {
-            let found = evaluate(&trainer.detector, &trainer.average, rules.views, 200, 2);
+            let detector = TrainedDetector::uncalibrated(&trainer.detector, &trainer.average);
+            let found = evaluate(&detector, rules.views, 200, 2);
             let line =
                 format!("validation at {step}: map50 {:.3}, map {:.3}", found.map50, found.map);
             println!("{line}");

@@ -2,49 +2,18 @@
 
 use std::thread;
 
+use chaic_nn::Inference;
 use chaic_nn::simd::widest;
-use chaic_nn::{Inference, Shape};
-use chaic_protocol::geom::Camera;
 
 use crate::average_precision::{AveragePrecision, Detection, Image, Truth, average_precision};
-use crate::detector::Detector;
-use crate::features::{Crop, N_FEATURES, features};
-use crate::instances::{Instance, InstanceRules, Pixels};
+use crate::calibration::{Calibration, Sample, predictors};
+use crate::instances::Instance;
 use crate::labels::BACKGROUND;
+use crate::trained::TrainedDetector;
 use crate::views::{LabelledView, Part, ViewRules, Views};
 
 /// Instances that fewer pixels show are neither asked for nor wrong to find.
 pub const LEAST_PX: u32 = 100;
-
-/// What a detector sees in a view.
-pub fn detect(
-    detector: &Detector,
-    numbers: &[f32],
-    view: &LabelledView,
-    inference: &mut Inference,
-) -> Vec<Instance> {
-    detect_in(detector, numbers, (&view.rgb, &view.depth_m, &view.camera), inference)
-}
-
-/// What a detector sees in an image: color (u8, shape [height, width, 3]), depth (metres, shape
-/// [height, width]) and the camera.
-///
-/// # Panics
-/// If shapes don't fit, or the image's sides are no multiples of the network's stride.
-pub fn detect_in(
-    detector: &Detector,
-    numbers: &[f32],
-    (rgb, depth_m, camera): (&[u8], &[f32], &Camera),
-    inference: &mut Inference,
-) -> Vec<Instance> {
-    let crop = Crop::whole(camera);
-    let [width, height] = crop.size;
-    let shape = Shape { n: 1, height, width, channels: N_FEATURES };
-    features(rgb, depth_m, camera, crop, inference.input(shape));
-    let mut pixels = Pixels::new(camera);
-    inference.run(&detector.network, numbers, |_, row, strip| pixels.read(row, strip, depth_m));
-    pixels.instances(depth_m, &InstanceRules::default())
-}
 
 /// What is in a view beside what was seen in it.
 pub fn compare(view: &LabelledView, found: &[Instance], least_px: u32) -> Image {
@@ -82,28 +51,56 @@ pub fn compare(view: &LabelledView, found: &[Instance], least_px: u32) -> Image 
 
 /// Average precision on the first so many views of the validation part.
 pub fn evaluate(
-    detector: &Detector,
-    numbers: &[f32],
+    detector: &TrainedDetector,
     rules: ViewRules,
     n_views: usize,
     n_threads: usize,
 ) -> AveragePrecision {
-    let one = |k: usize, inference: &mut Inference| {
-        let view = Views::new(Part::Validation, rules, 1, k as u64).draw();
-        let found = detect(detector, numbers, &view, inference);
-        compare(&view, &found, LEAST_PX)
+    let one = |view: &LabelledView, found: &[Instance]| compare(view, found, LEAST_PX);
+    average_precision(&look(detector, (Part::Validation, rules), n_views, n_threads, one))
+}
+
+/// A calibration by what the detector sees in the first so many views of the training part, as a
+/// helper has them.
+pub fn calibrate(detector: &TrainedDetector, n_views: usize, n_threads: usize) -> Calibration {
+    let views = (Part::Training, ViewRules::NATURAL);
+    let samples = look(detector, views, n_views, n_threads, |view, found| samples(view, found));
+    Calibration::fit(&samples.concat())
+}
+
+/// What is known of each detection, and whether it is right.
+pub fn samples(view: &LabelledView, found: &[Instance]) -> Vec<Sample> {
+    let image = compare(view, found, 0);
+    let is_right = |detection: &Detection| {
+        image.truths.iter().zip(&detection.shared).any(|(truth, shared)| {
+            truth.label == detection.label && 3 * shared >= truth.area + detection.area
+        })
     };
-    let some = |thread: usize| -> Vec<Image> {
-        let mut inference = Inference::new(&detector.network, widest());
-        (thread..n_views).step_by(n_threads).map(|k| one(k, &mut inference)).collect()
+    let found = found.iter().zip(&image.detections);
+    found.map(|(f, d)| Sample { predictors: predictors(f), is_right: is_right(d) }).collect()
+}
+
+/// What comes of each of the first so many views, in their order, whatever the number of threads.
+fn look<T: Clone + Send>(
+    detector: &TrainedDetector,
+    (part, rules): (Part, ViewRules),
+    n_views: usize,
+    n_threads: usize,
+    one: impl Fn(&LabelledView, &[Instance]) -> T + Sync,
+) -> Vec<T> {
+    let some = |thread: usize| -> Vec<T> {
+        let mut inference = Inference::new(&detector.detector.network, widest());
+        let mut one = |k: usize| {
+            let view = Views::new(part, rules, 1, k as u64).draw();
+            let image = (&view.rgb[..], &view.depth_m[..], &view.camera);
+            one(&view, &detector.detect(image, &mut inference))
+        };
+        (thread..n_views).step_by(n_threads).map(&mut one).collect()
     };
     let some = &some;
-    let parts: Vec<Vec<Image>> = thread::scope(|scope| {
+    let parts: Vec<Vec<T>> = thread::scope(|scope| {
         let workers: Vec<_> = (0..n_threads).map(|t| scope.spawn(move || some(t))).collect();
         workers.into_iter().map(|w| w.join().expect("it doesn't panic")).collect()
     });
-    // In the order of views, whatever the number of threads.
-    let in_order = |k: usize| parts[k % n_threads][k / n_threads].clone();
-    let images: Vec<Image> = (0..n_views).map(in_order).collect();
-    average_precision(&images)
+    (0..n_views).map(|k| parts[k % n_threads][k / n_threads].clone()).collect()
 }

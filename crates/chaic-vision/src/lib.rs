@@ -2,7 +2,8 @@
 //!
 //! **What it is**: [`labels`] says what a pixel can be of, [`features`] what the network reads,
 //! [`views`] draws random views of generated episodes with labels, [`detector`] is the network, [`loss`]
-//! what it learns by, [`train`] the loop; [`instances`] makes things of what it says, and
+//! what it learns by, [`train`] the loop; [`instances`] makes things of what it says, [`calibration`] tells
+//! how sure each is, [`trained`] is all of it as one file, and
 //! [`average_precision`] tells how good they are. [`tracker`] tells which thing is which over time, and
 //! [`perception`] makes all of it the eyes of a mind; [`noisy`] stands in for it.
 //!
@@ -23,6 +24,9 @@ pub mod detector;
 pub mod loss;
 
 pub mod instances;
+
+pub mod calibration;
+pub mod trained;
 
 pub mod average_precision;
 pub mod evaluate;

@@ -136,7 +136,7 @@ pub(crate) fn exp(x: f32) -> f32 {
 }
 
 /// Natural logarithm of a positive number: the inverse of [`exp`] by Newton's steps.
-fn ln(x: f32) -> f32 {
+pub(crate) fn ln(x: f32) -> f32 {
     let mut y = (x.to_bits() as f32 / 8_388_608.0 - 126.94) * std::f32::consts::LN_2;
     for _ in 0..2 {
         let e = exp(-y.abs());

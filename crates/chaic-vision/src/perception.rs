@@ -4,60 +4,34 @@ use std::sync::Arc;
 
 use chaic_agents::perception::{Perception, Percepts, PixelKind, STRIDE, Segments, Sight};
 use chaic_agents::track::{Hands, Intent, TrackId};
+use chaic_nn::Inference;
 use chaic_nn::simd::widest;
-use chaic_nn::weights::WeightsError;
-use chaic_nn::{Inference, weights};
 use chaic_protocol::geom::Camera;
 use chaic_protocol::observation::{Grants, Senses};
 use chaic_protocol::{Briefing, Observation, Outcome, Target};
 
-use crate::detector::Detector;
-use crate::evaluate::detect_in;
 use crate::instances::Instance;
 use crate::tracker::{Sighting, Tracker, TrackerRules};
-
-/// What files of the detector's weights say that they are.
-pub const DETECTOR_KIND: &str = "chaic detector 1";
-
-/// A trained detector.
-#[derive(Clone, Debug)]
-pub struct TrainedDetector {
-    /// The network.
-    pub detector: Detector,
-    /// Its numbers.
-    pub numbers: Vec<f32>,
-    /// The first digits of the digest of its file, which name it.
-    pub digest: String,
-}
-
-impl TrainedDetector {
-    /// From a safetensors file.
-    ///
-    /// # Errors
-    /// [`WeightsError`] if it isn't a whole file of this network's weights.
-    pub fn from_bytes(bytes: &[u8]) -> Result<TrainedDetector, WeightsError> {
-        let detector = Detector::new();
-        let numbers = weights::from_bytes(&detector.network, bytes, DETECTOR_KIND)?;
-        Ok(TrainedDetector { detector, numbers, digest: weights::digest(bytes) })
-    }
-}
+use crate::trained::TrainedDetector;
 
 /// Minds that see by a trained detector.
 #[derive(Clone, Debug)]
 pub struct LearnedSight {
     detector: Arc<TrainedDetector>,
+    digest: String,
 }
 
 impl LearnedSight {
     /// By this one.
     pub fn new(detector: TrainedDetector) -> LearnedSight {
-        LearnedSight { detector: Arc::new(detector) }
+        let digest = detector.digest();
+        LearnedSight { detector: Arc::new(detector), digest }
     }
 }
 
 impl Sight for LearnedSight {
     fn name(&self) -> Option<String> {
-        Some(format!("learned {}", self.detector.digest))
+        Some(format!("learned {}", self.digest))
     }
 
     fn senses(&self) -> Senses {
@@ -103,13 +77,10 @@ impl Perception for LearnedPerception {
             return Percepts::default();
         };
         let n_pixels = camera.width as usize * camera.height as usize;
-        let stride = self.detector.detector.network.stride() as u32;
-        let fits = camera.width.is_multiple_of(stride) && camera.height.is_multiple_of(stride);
-        if !fits || rgb.len() != 3 * n_pixels || depth_m.len() != n_pixels {
+        if !self.detector.fits(camera) || rgb.len() != 3 * n_pixels || depth_m.len() != n_pixels {
             return Percepts::default();
         }
-        let TrainedDetector { detector, numbers, .. } = &*self.detector;
-        let found = detect_in(detector, numbers, (rgb, depth_m, camera), &mut self.inference);
+        let found = self.detector.detect((rgb, depth_m, camera), &mut self.inference);
         self.tracking.take_in(&found, depth_m, observation)
     }
 

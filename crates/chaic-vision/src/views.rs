@@ -80,6 +80,18 @@ impl ViewRules {
         aimed_movable: 0.75,
         distance_m: [0.6, 5.0],
     };
+
+    /// Places as episodes begin, seen from anywhere; what scores are calibrated by.
+    pub const NATURAL: ViewRules = ViewRules {
+        swapped: 0.0,
+        added: 0,
+        refurnished: (0.0, 1.0),
+        carrying: 0.2,
+        filled: 0.1,
+        varied: 0.0,
+        aimed: 0.3,
+        ..ViewRules::TRAINING
+    };
 }
 
 /// An image with labels.

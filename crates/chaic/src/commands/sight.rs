@@ -8,7 +8,8 @@ use chaic_agents::perception::{Sight, TrueSight};
 
 use chaic_eval::run::{GROUND_TRUTH, RunFolder, RunOptions};
 use chaic_vision::noisy::{FaultRates, NoisySight};
-use chaic_vision::perception::{LearnedSight, TrainedDetector};
+use chaic_vision::perception::LearnedSight;
+use chaic_vision::trained::TrainedDetector;
 
 use crate::arguments::EvalArguments;
 

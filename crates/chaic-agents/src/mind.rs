@@ -61,8 +61,15 @@ impl<P: Policy> Mind<P> {
     /// The same, seeing by something else.
     pub fn seeing(policy: P, rules: PlannerRules, sight: &dyn Sight) -> Mind<P> {
         let behavior = Box::new(GroundTruthBehavior::default());
+        Mind::with(policy, sight.perception(), behavior, rules).with_sight(sight)
+    }
+
+    /// The same mind, seeing by something else; with color if it had that before.
+    pub fn with_sight(self, sight: &dyn Sight) -> Mind<P> {
+        let senses = Senses { rgb: self.senses.rgb || sight.senses().rgb, ..sight.senses() };
+        let Mind { policy, behavior, rules, .. } = self;
         let mind = Mind::with(policy, sight.perception(), behavior, rules);
-        Mind { sees_by: sight.name(), senses: sight.senses(), ..mind }
+        Mind { sees_by: sight.name(), senses, ..mind }
     }
 
     /// A mind made of the given parts.

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use chaic_agents::behavior::{BehaviorModel, GroundTruthBehavior, SeenBehavior};
-use chaic_agents::perception::GroundTruthIds;
+use chaic_agents::perception::{GroundTruthIds, Sight, TrueSight};
 use chaic_agents::{Mind, PlannerRules, partner_grants};
-use chaic_env::minds::{BuiltIn, Helper, Helpers};
+use chaic_env::minds::{BuiltIn, Helper, Helpers, built_in};
 use chaic_env::{EnvError, RunKey};
 use chaic_protocol::AgentId;
 use chaic_protocol::observation::{Grants, Senses};
@@ -63,6 +63,7 @@ pub fn is_language_partner(name: &str) -> bool {
 /// The language helpers of a run, besides all built-in ones.
 pub struct Language {
     session: Arc<Session>,
+    sight: Arc<dyn Sight>,
 }
 
 impl Language {
@@ -100,7 +101,13 @@ impl Language {
     /// # Errors
     /// If a template can't be filled in.
     pub fn with(settings: Settings, source: Source, stop: &'static AtomicBool) -> Result<Language> {
-        Ok(Language { session: Arc::new(Session::new(settings, source, stop)?) })
+        let session = Arc::new(Session::new(settings, source, stop)?);
+        Ok(Language { session, sight: Arc::new(TrueSight) })
+    }
+
+    /// The same, whose helpers see by this.
+    pub fn with_sight(self, sight: Arc<dyn Sight>) -> Language {
+        Language { sight, ..self }
     }
 
     /// Ties it to a run's folder, before anything is played.
@@ -146,16 +153,17 @@ impl Language {
         let is_granted = self.session.settings.asking.behavior == Behavior::Granted;
         let behavior = is_told || is_granted || rules.knows_holding;
         let grants = Grants { behavior, task: is_told, ..Grants::PLANNER };
-        Some(self.mind(kind, key, grants, AgentId::PARTNER, rules))
+        let grants = self.sight.grants(grants);
+        Some(self.mind((kind, key), grants, AgentId::PARTNER, rules, &*self.sight))
     }
 
     fn mind(
         &self,
-        kind: Kind,
-        key: Option<&RunKey>,
+        (kind, key): (Kind, Option<&RunKey>),
         grants: Grants,
         watched: AgentId,
         rules: PlannerRules,
+        sight: &dyn Sight,
     ) -> Helper {
         let session = Arc::clone(&self.session);
         let policy = LanguagePolicy::new(session, key.cloned(), kind.track, kind.looks);
@@ -165,7 +173,7 @@ impl Language {
         };
         let senses = Senses { rgb: kind.looks, ..Senses::DEPTH_AND_IDS };
         let mind = Mind::with(policy, Box::new(GroundTruthIds), behavior, rules);
-        Helper { mind: Box::new(mind.with_senses(senses)), grants }
+        Helper { mind: Box::new(mind.with_senses(senses).with_sight(sight)), grants }
     }
 }
 
@@ -175,12 +183,12 @@ impl Helpers for Language {
     }
 
     fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper> {
-        BuiltIn.make(name, rules).or_else(|| self.helper(name, None, rules))
+        built_in(name, rules, &*self.sight).or_else(|| self.helper(name, None, rules))
     }
 
     fn make_for(&self, key: &RunKey, rules: PlannerRules) -> Option<Helper> {
-        let built_in = BuiltIn.make(&key.helper, rules);
-        built_in.or_else(|| self.helper(&key.helper, Some(key), rules))
+        let usual = built_in(&key.helper, rules, &*self.sight);
+        usual.or_else(|| self.helper(&key.helper, Some(key), rules))
     }
 
     fn partner_names(&self) -> Vec<String> {
@@ -193,7 +201,8 @@ impl Helpers for Language {
 
     fn partner(&self, name: &str, of: Option<&RunKey>, rules: PlannerRules) -> Option<Helper> {
         let kind = PARTNERS.into_iter().find(|k| k.name == name)?;
-        Some(self.mind(kind, of, partner_grants(rules), AgentId::HELPER, rules))
+        let grants = partner_grants(rules);
+        Some(self.mind((kind, of), grants, AgentId::HELPER, rules, &TrueSight))
     }
 
     fn waiting_jobs(&self) -> usize {

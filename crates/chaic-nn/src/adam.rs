@@ -1,9 +1,12 @@
 //! AdamW (Loshchilov and Hutter 2019): steps by running means of gradients, with weight decay apart.
 
+use serde::{Deserialize, Serialize};
+
 use crate::network::Network;
 
 /// How steps are taken.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct AdamRules {
     /// How fast the mean of gradients forgets.
     pub beta1: f32,

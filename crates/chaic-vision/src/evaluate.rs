@@ -1,14 +1,17 @@
 //! How good a detector is on views that nothing was learned from.
 
+use std::collections::BTreeMap;
 use std::thread;
 
 use chaic_nn::Inference;
 use chaic_nn::simd::widest;
+use serde::Serialize;
 
 use crate::average_precision::{AveragePrecision, Detection, Image, Truth, average_precision};
-use crate::calibration::{Calibration, Sample, predictors};
+use crate::calibration::{Calibration, Sample, calibration_error, predictors};
+use crate::failures::Failures;
 use crate::instances::Instance;
-use crate::labels::BACKGROUND;
+use crate::labels::{BACKGROUND, class_of};
 use crate::trained::TrainedDetector;
 use crate::views::{LabelledView, Part, ViewRules, Views};
 
@@ -103,4 +106,60 @@ fn look<T: Clone + Send>(
         workers.into_iter().map(|w| w.join().expect("it doesn't panic")).collect()
     });
     (0..n_views).map(|k| parts[k % n_threads][k / n_threads].clone()).collect()
+}
+
+/// How good a detector is, as a JSON file has it.
+#[derive(Clone, Debug, Serialize)]
+pub struct DetectionReport {
+    /// Views that were looked at.
+    pub views: usize,
+    /// Mean average precision at an overlap of one half, of instances of [`LEAST_PX`] pixels and more.
+    pub map50: f64,
+    /// The same over overlaps from 0.5 to 0.95.
+    pub map: f64,
+    /// Both with smaller instances, by their least number of pixels.
+    pub smaller: BTreeMap<u32, [f64; 2]>,
+    /// How far scores are from the share of detections that are right.
+    pub calibration_error: f64,
+    /// What goes wrong, and how often.
+    pub failures: Failures,
+    /// By class: average precision at one half, over all overlaps, and how many instances there are.
+    pub classes: BTreeMap<&'static str, (f64, f64, usize)>,
+}
+
+/// Smaller instances that are reported beside, pixels.
+const SMALLER_PX: [u32; 2] = [64, 32];
+
+/// How good a detector is on the first so many views.
+pub fn report(
+    detector: &TrainedDetector,
+    views: (Part, ViewRules),
+    n_views: usize,
+    n_threads: usize,
+) -> DetectionReport {
+    let one = |view: &LabelledView, found: &[Instance]| {
+        let images = [LEAST_PX, SMALLER_PX[0], SMALLER_PX[1]].map(|px| compare(view, found, px));
+        let right = samples(view, found).into_iter().map(|s| s.is_right);
+        let said: Vec<(f32, bool)> = found.iter().map(|f| f.score).zip(right).collect();
+        (images, said)
+    };
+    let seen = look(detector, views, n_views, n_threads, one);
+    let (images, said): (Vec<_>, Vec<_>) = seen.into_iter().unzip();
+    let of = |k: usize| images.iter().map(|i| i[k].clone()).collect::<Vec<Image>>();
+    let all = of(0);
+    let found = average_precision(&all);
+    let smaller = SMALLER_PX.iter().zip([of(1), of(2)]).map(|(px, images)| {
+        let found = average_precision(&images);
+        (*px, [found.map50, found.map])
+    });
+    let name = |label: u8| class_of(label).map_or("", |class| class.name());
+    DetectionReport {
+        views: n_views,
+        map50: found.map50,
+        map: found.map,
+        smaller: smaller.collect(),
+        calibration_error: calibration_error(&said.concat()),
+        failures: Failures::of(&all),
+        classes: found.classes.iter().map(|(label, c)| (name(*label), *c)).collect(),
+    }
 }

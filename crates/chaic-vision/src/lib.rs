@@ -2,9 +2,10 @@
 //!
 //! **What it is**: [`labels`] says what a pixel can be of, [`features`] what the network reads,
 //! [`views`] draws random views of generated episodes with labels, [`detector`] is the network, [`loss`]
-//! what it learns by, [`train`] the loop; [`instances`] makes things of what it says, [`calibration`] tells
+//! what it learns by, [`train`] the loop, [`training_run`]
+//! its folder; [`instances`] makes things of what it says, [`calibration`] tells
 //! how sure each is, [`trained`] is all of it as one file, and
-//! [`average_precision`] tells how good they are. [`tracker`] tells which thing is which over time, and
+//! [`average_precision`] tells how good they are and [`failures`] what goes wrong. [`tracker`] tells which thing is which over time, and
 //! [`perception`] makes all of it the eyes of a mind; [`noisy`] stands in for it.
 //!
 //! **What it is not**: it knows no goals, rules or minds.
@@ -30,8 +31,10 @@ pub mod trained;
 
 pub mod average_precision;
 pub mod evaluate;
+pub mod failures;
 
 pub mod train;
+pub mod training_run;
 
 pub mod noisy;
 pub mod perception;

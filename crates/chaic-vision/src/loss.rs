@@ -3,13 +3,16 @@
 
 use chaic_nn::Tensor;
 
+use serde::{Deserialize, Serialize};
+
 use crate::detector::{N_OFFSETS, STRIDE};
 use crate::features::Crop;
 use crate::labels::{BACKGROUND, half_extents_m};
 use crate::views::LabelledView;
 
 /// How much counts.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct LossRules {
     /// A pixel of a thing that so many pixels show counts as much as one of the background; of smaller
     /// things more, of larger ones less.
@@ -28,6 +31,12 @@ impl LossRules {
     /// What the detector is trained with.
     pub const TRAINING: LossRules =
         LossRules { even_px: 8000.0, power: 0.75, weights: [0.5, 40.0], offset: 0.5, least_px: 24 };
+}
+
+impl Default for LossRules {
+    fn default() -> LossRules {
+        LossRules::TRAINING
+    }
 }
 
 /// What the network is to say of a part of an image, at half its resolution.

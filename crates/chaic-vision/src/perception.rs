@@ -123,7 +123,8 @@ impl Tracking {
         let (detections, mut kinds) = self.tracker.update(&sightings, at, (depth_m, camera));
         kinds.insert(0, PixelKind::Firm);
         let segments = Segments { of_pixels: &of_pixels, depth_m, camera, kinds: &kinds };
-        let (_, dynamic_mask) = segments.measure();
+        let (_, mut dynamic_mask) = segments.measure();
+        self.tracker.mask_own(at.1, (depth_m, camera), STRIDE, &mut dynamic_mask);
         self.last = detections.iter().map(|d| (d.track, d.pixel)).collect();
         Percepts { detections, dynamic_mask, stride: STRIDE, hands: None }
     }

@@ -1,19 +1,26 @@
 //! Promises: features of a wall and a floor are those of geometry, gradients of the loss are those of
 //! finite differences, views and training are the same bits each time, and training learns.
 
-use chaic_nn::{Shape, Tensor};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use chaic_nn::simd::widest;
+use chaic_nn::{Inference, Shape, Tensor};
 use chaic_protocol::geom::{Camera, yaw_rotation};
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{EntityId, Vec3};
 
 use crate::average_precision::average_precision;
-use crate::detector::{N_OFFSETS, STRIDE};
+use crate::detector::{Detector, N_OFFSETS, STRIDE};
 use crate::evaluate::{LEAST_PX, compare};
 use crate::features::{Crop, N_FEATURES, features};
 use crate::instances::{InstanceRules, instances};
 use crate::labels::{BACKGROUND, class_of, label_of, n_labels};
 use crate::loss::{LossRules, Targets, loss};
 use crate::train::{CropRules, Trainer, TrainingRules};
+use crate::trained::TrainedDetector;
+use crate::training_run::{
+    CHECKPOINT, CONFIG, Record, TrainingError, TrainingRun, WEIGHTS, read_rules,
+};
 use crate::views::{LabelledView, Part, ViewRules, Views};
 
 const EYE_M: f32 = 1.5;
@@ -128,6 +135,48 @@ fn training_goes_on_from_a_checkpoint_as_if_it_had_not_stopped() {
     assert!(!resumed.resume(&checkpoint[..100]) && !resumed.resume(&[]));
     assert!(resumed.resume(&checkpoint));
     assert!((resumed.step(), resumed.checkpoint()) == expected);
+}
+
+#[test]
+fn a_training_leaves_what_it_takes_to_go_on_and_weights_that_are_read_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("training");
+    let rules = TrainingRules { steps: 1, ..tiny() };
+    let mut run = TrainingRun::begin(&out, rules).unwrap();
+    let stopped = AtomicBool::new(true);
+    assert!(!run.go_on(&stopped, &mut |_| ()).unwrap() && run.extent() == (0, 1));
+    assert!(matches!(TrainingRun::begin(&out, rules), Err(TrainingError::NotEmpty(_))));
+    assert_eq!(read_rules(&out.join(CONFIG)).unwrap(), rules);
+    let mut resumed = TrainingRun::resume(&out).unwrap();
+    let mut told = Vec::new();
+    stopped.store(false, Ordering::Relaxed);
+    assert!(resumed.go_on(&stopped, &mut |record| told.push(*record)).unwrap());
+    assert!(matches!(told[..], [Record::Loss { step: 1, .. }, Record::Validation { step: 1, .. }]));
+    let bytes = std::fs::read(out.join(WEIGHTS)).unwrap();
+    let trained = TrainedDetector::from_bytes(&bytes).unwrap();
+    assert_eq!(trained.to_bytes(), bytes);
+    assert!(TrainedDetector::from_bytes(&bytes[..bytes.len() - 1]).is_err());
+    std::fs::write(out.join(CHECKPOINT), b"short").unwrap();
+    assert!(matches!(TrainingRun::resume(&out), Err(TrainingError::Checkpoint(_))));
+    std::fs::write(out.join(CONFIG), "stepps = 3").unwrap();
+    let error = TrainingRun::resume(&out).err().unwrap().to_string();
+    assert!(error.contains("stepps"), "{error}");
+}
+
+#[test]
+fn images_that_are_none_show_nothing_and_break_nothing() {
+    let detector = Detector::new();
+    let trained = TrainedDetector::uncalibrated(&detector, &detector.network.begin(1));
+    let mut inference = Inference::new(&detector.network, widest());
+    let camera = camera(64);
+    for depth_m in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -1.0, 2.0] {
+        for gray in [0, 255] {
+            let (rgb, depth_m) = (vec![gray; 3 * 64 * 64], vec![depth_m; 64 * 64]);
+            let found = trained.detect((&rgb, &depth_m, &camera), &mut inference);
+            assert!(found.iter().all(|f| f.score.is_finite() && (0.0..=1.0).contains(&f.score)));
+        }
+    }
+    assert!(!trained.fits(&Camera { width: 65, ..camera }));
 }
 
 #[test]

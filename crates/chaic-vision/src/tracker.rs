@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use chaic_agents::perception::{Detection, Extent, PixelKind};
 use chaic_agents::track::{Hands, Intent, TrackId};
 use chaic_protocol::briefing::{Companion, Relation};
-use chaic_protocol::geom::{Camera, Pose, horizontal_distance};
+use chaic_protocol::geom::{Camera, Pose, horizontal_distance, rotate_yaw};
 use chaic_protocol::{
     Action, AgentId, Briefing, ClassId, EntityId, Frame, Hand, Outcome, Vec2, Vec3,
 };
@@ -138,8 +138,9 @@ impl Tracker {
     ) -> (Vec<Detection>, Vec<PixelKind>) {
         self.let_go(now, pose);
         let mut kinds: Vec<PixelKind> = sightings.iter().map(|s| kind_of(s.label)).collect();
+        let own = self.own_boxes();
         for (kind, sighting) in kinds.iter_mut().zip(sightings) {
-            if self.is_own(sighting.extent.position_in_world, pose) {
+            if is_within(&own, sighting.extent.position_in_world, pose) {
                 *kind = PixelKind::Own;
             }
         }
@@ -195,31 +196,59 @@ impl Tracker {
         }
     }
 
-    /// Whether a point is of what the own hands hold.
-    fn is_own(&self, point: Vec3, pose: Pose) -> bool {
+    /// Where what the own hands hold is, in the body's frame: middles and half extents of boxes, metres.
+    fn own_boxes(&self) -> Vec<(Vec3, Vec3)> {
         /// A burden reaches so far beyond what its class says, metres.
         const MARGIN_M: f32 = 0.1;
         /// Half an extent of what is not known, metres.
         const UNKNOWN_M: f32 = 0.25;
-        let body = Pose { position: pose.position, yaw_rad: pose.yaw_rad };
-        let p = chaic_protocol::geom::rotate_yaw(point - body.position, -body.yaw_rad);
         let half = |class: Option<ClassId>| {
             let size = class.map_or([2.0 * UNKNOWN_M; 3], |class| class.info().size_m);
-            Vec3::new(0.5 * size[0].max(size[2]), 0.5 * size[1], 0.5 * size[0].max(size[2]))
+            let across = 0.5 * size[0].max(size[2]);
+            Vec3::new(across, 0.5 * size[1], across) + Vec3::splat(MARGIN_M)
         };
         let h = self.height_m;
         if self.hands.is_joint {
+            // Before the body, at whatever height.
             let half = half(self.hands.held().next().and_then(|held| held.class()));
-            let (near, far) = (-MARGIN_M, 0.3 + 2.0 * half.z + MARGIN_M);
-            return p.x.abs() < half.x + MARGIN_M && -p.z > near && -p.z < far;
+            let middle = Vec3::new(0.0, 0.5 * h, -(0.3 + half.z));
+            return vec![(middle, Vec3::new(half.x, h, half.z + 0.3))];
         }
-        Hand::BOTH.into_iter().any(|hand| {
-            let Some(held) = &self.hands.hands[hand.index()] else { return false };
+        let in_hand = |hand: Hand| {
+            let held = self.hands.hands[hand.index()].as_ref()?;
             let side = if hand == Hand::Left { -1.0 } else { 1.0 };
-            let hand = Vec3::new(side * 0.2, 0.57 * h, -0.31 * h);
-            let within = half(held.class()) + Vec3::splat(MARGIN_M);
-            (p - hand).abs().cmplt(within).all()
-        })
+            // As bodies hold things, in proportion to their height.
+            Some((Vec3::new(side * 0.2, 0.57 * h, -0.31 * h), half(held.class())))
+        };
+        Hand::BOTH.into_iter().filter_map(in_hand).collect()
+    }
+
+    /// Makes a mask true where an image shows what the own hands hold, whatever else it was taken for:
+    /// shape [height / stride, width / stride] rounded up.
+    pub fn mask_own(
+        &self,
+        pose: Pose,
+        (depth_m, camera): (&[f32], &Camera),
+        stride: u32,
+        mask: &mut [bool],
+    ) {
+        let boxes = self.own_boxes();
+        if boxes.is_empty() {
+            return;
+        }
+        let (width, stride) = (camera.width as usize, stride as usize);
+        let farthest_m =
+            boxes.iter().map(|(at, half)| (*at + *half).length().max((*at - *half).length()));
+        let farthest_m = farthest_m.fold(0.0, f32::max);
+        let columns = width.div_ceil(stride);
+        for (k, is_loose) in mask.iter_mut().enumerate() {
+            let (x, y) = (stride * (k % columns), stride * (k / columns));
+            let depth = depth_m[y * width + x];
+            if depth < farthest_m && !*is_loose {
+                let point = camera.unproject(x as u32, y as u32, depth);
+                *is_loose = is_within(&boxes, point, pose);
+            }
+        }
     }
 
     fn see_people(
@@ -395,4 +424,10 @@ fn kind_of(label: u8) -> PixelKind {
 
 fn extents_m(label: u8) -> [f32; 3] {
     class_of(label).map_or([0.0; 3], |class| class.info().size_m)
+}
+
+/// Whether a point of the world is in one of these boxes in the frame of a body.
+fn is_within(boxes: &[(Vec3, Vec3)], point: Vec3, body: Pose) -> bool {
+    let p = rotate_yaw(point - body.position, -body.yaw_rad);
+    boxes.iter().any(|(at, half)| (p - *at).abs().cmplt(*half).all())
 }

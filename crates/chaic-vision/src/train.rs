@@ -5,6 +5,7 @@ use std::thread;
 use chaic_nn::simd::widest;
 use chaic_nn::{Adam, AdamRules, Network, Pass, Shape, Tensor};
 use chaic_protocol::rng::Stream;
+use serde::{Deserialize, Serialize};
 
 use crate::detector::Detector;
 use crate::features::{Crop, N_FEATURES, features};
@@ -13,7 +14,8 @@ use crate::loss::{Loss, LossRules, Targets, loss};
 use crate::views::{LabelledView, Part, ViewRules, Views};
 
 /// Which parts of views are learned from.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct CropRules {
     /// Views of a batch.
     pub views: usize,
@@ -27,7 +29,8 @@ pub struct CropRules {
 }
 
 /// What is trained on, and how.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct TrainingRules {
     /// Of weights and views.
     pub seed: u64,
@@ -47,6 +50,12 @@ pub struct TrainingRules {
     pub loss: LossRules,
     /// How steps are taken.
     pub adam: AdamRules,
+}
+
+impl Default for TrainingRules {
+    fn default() -> TrainingRules {
+        TrainingRules::shipped(30_000)
+    }
 }
 
 impl TrainingRules {

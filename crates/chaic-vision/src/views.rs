@@ -10,6 +10,8 @@ use chaic_protocol::{ClassId, EntityId, Role, TaskId, Vec2, Vec3};
 use chaic_render::{Appearance, Channels, Scene, View};
 use chaic_world::{Posture, Rules, Setup, State, Surface, Thing, World, top_surfaces};
 
+use serde::{Deserialize, Serialize};
+
 use crate::labels::{class_of, label_of};
 
 /// Which episodes views come from. The seeds of parts don't overlap, and lie far beyond those of
@@ -20,6 +22,8 @@ pub enum Part {
     Training,
     /// To choose by.
     Validation,
+    /// To tell how good the one that was chosen is.
+    Test,
 }
 
 impl Part {
@@ -28,12 +32,14 @@ impl Part {
         match self {
             Part::Training => (10_000_000, 1_000_000),
             Part::Validation => (20_000_000, 10_000),
+            Part::Test => (30_000_000, 10_000),
         }
     }
 }
 
 /// How views are drawn.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct ViewRules {
     /// Side of images, pixels.
     pub size_px: u32,
@@ -92,6 +98,12 @@ impl ViewRules {
         aimed: 0.3,
         ..ViewRules::TRAINING
     };
+}
+
+impl Default for ViewRules {
+    fn default() -> ViewRules {
+        ViewRules::TRAINING
+    }
 }
 
 /// An image with labels.

@@ -3,6 +3,7 @@
 mod bench;
 mod exec;
 mod fidelity;
+mod perception;
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -24,6 +25,9 @@ pub use self::exec::{
     ExecArguments, HelperArgument, HelperCheckArguments, HelperCommand, HelperServeArguments,
 };
 pub use self::fidelity::FidelityArguments;
+pub use self::perception::{
+    DetectionArguments, EvalPerceptionCommand, Look, TrainArguments, TrainCommand,
+};
 
 fn partner_is_help() -> String {
     let choices = PersonKind::choices();
@@ -55,6 +59,12 @@ pub enum Command {
     Verify(VerifyArguments),
     /// Play both rule sets and single rules, and write how near that is to the paper's results.
     Fidelity(FidelityArguments),
+    /// Train networks; docs/perception.md.
+    #[command(subcommand)]
+    Train(TrainCommand),
+    /// Tell how good learned perception is on episodes that nothing was learned from.
+    #[command(subcommand)]
+    EvalPerception(EvalPerceptionCommand),
     /// Make a video of a recorded episode.
     Replay(ReplayArguments),
     /// Make pictures of what somebody sees at some frame: RGB, depth, instance ids.

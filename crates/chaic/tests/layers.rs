@@ -56,6 +56,7 @@ const ALLOWED: &[Arrows] = &[
     arrows(
         "chaic-vision",
         &[
+            "chaic-files",
             "chaic-protocol",
             "chaic-world",
             "chaic-episodes",

@@ -1,6 +1,7 @@
 //! `chaic eval`.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, anyhow, bail};
@@ -29,8 +30,9 @@ pub fn run(arguments: &EvalArguments) -> Result<Ended> {
         RunFolder::check_begun(&path)?;
     }
     let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
-    let language = llm::language(arguments, &path, stop)?;
     let seeing = Seeing { sight: sight::of_run(arguments, &path)? };
+    let language = llm::language(arguments, &path, stop)?;
+    let language = language.map(|language| language.with_sight(Arc::clone(&seeing.sight)));
     let others: &dyn Helpers = match &language {
         Some(language) => language,
         None => &seeing,

@@ -7,6 +7,7 @@ pub mod fidelity;
 pub mod helper;
 pub mod import;
 pub mod llm;
+pub mod perception;
 pub mod render;
 pub mod replay;
 pub mod report;

@@ -3,14 +3,16 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result};
 use chaic_agents::perception::{Sight, TrueSight};
 
+use chaic_eval::EvalError;
 use chaic_eval::run::{GROUND_TRUTH, RunFolder, RunOptions};
+use chaic_files::read_bounded;
 use chaic_vision::noisy::{FaultRates, NoisySight};
 use chaic_vision::perception::LearnedSight;
-use chaic_vision::trained::TrainedDetector;
 
+use super::perception::read_detector;
 use crate::arguments::EvalArguments;
 
 /// As said, or as recorded for a run that is gone on with.
@@ -32,20 +34,21 @@ pub fn recorded(options: &RunOptions) -> Arc<dyn Sight> {
 
 fn named_sight(name: &str) -> Result<Arc<dyn Sight>> {
     const LEARNED: &str = "learned:";
+    /// No file of rates is larger, bytes.
+    const MOST_BYTES: u64 = 1 << 20;
     const NOISY: &str = "noisy:";
     if name == GROUND_TRUTH {
         return Ok(Arc::new(TrueSight));
     }
-    let read = |file: &str| std::fs::read(file).with_context(|| format!("can't read {file}"));
     if let Some(file) = name.strip_prefix(LEARNED) {
-        let detector =
-            TrainedDetector::from_bytes(&read(file)?).with_context(|| file.to_owned())?;
-        return Ok(Arc::new(LearnedSight::new(detector)));
+        return Ok(Arc::new(LearnedSight::new(read_detector(Path::new(file))?)));
     }
     if let Some(file) = name.strip_prefix(NOISY) {
-        let rates: FaultRates =
-            serde_json::from_slice(&read(file)?).with_context(|| file.to_owned())?;
+        let rates: FaultRates = serde_json::from_slice(&read_bounded(Path::new(file), MOST_BYTES)?)
+            .with_context(|| file.to_owned())?;
         return Ok(Arc::new(NoisySight::new(rates, file)));
     }
-    bail!("no perception `{name}`; write {GROUND_TRUTH}, {LEARNED}FILE or {NOISY}FILE")
+    let text =
+        format!("no perception `{name}`; write {GROUND_TRUTH}, {LEARNED}FILE or {NOISY}FILE");
+    Err(EvalError::Options(text).into())
 }

@@ -1,5 +1,7 @@
 //! `chaic verify`.
 
+use std::sync::Arc;
+
 use anyhow::Result;
 use chaic_env::minds::{Helpers, Seeing};
 use chaic_eval::run::RunFolder;
@@ -16,8 +18,9 @@ pub fn run(arguments: &VerifyArguments) -> Result<Ended> {
     let (folder, options) = RunFolder::read(&arguments.run)?;
     let bar = bars::plain(folder.traces()?.len() as u64, "traces");
     let progress = |done: usize| bar.set_position(done as u64);
-    let language = Language::recorded(&arguments.run, llm::never())?;
     let seeing = Seeing { sight: sight::recorded(&options) };
+    let language = Language::recorded(&arguments.run, llm::never())?;
+    let language = language.map(|language| language.with_sight(Arc::clone(&seeing.sight)));
     let helpers: &dyn Helpers = match &language {
         Some(language) => language,
         None => &seeing,

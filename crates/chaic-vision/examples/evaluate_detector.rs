@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         return Err(format!("{checkpoint} is of another network").into());
     }
     let mut detector = TrainedDetector::uncalibrated(&trainer.detector, &trainer.average);
-    detector.calibration = calibrate(&detector, n_views, 2);
+    detector.calibration = calibrate(&detector, ViewRules::NATURAL, n_views, 2);
     println!("step {}: {:?}", trainer.adam.steps, detector.calibration);
     let canonical = ViewRules { varied: 0.0, ..ViewRules::TRAINING };
     for (name, rules) in [("training", ViewRules::TRAINING), ("natural", ViewRules::NATURAL)] {

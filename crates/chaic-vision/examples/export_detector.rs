@@ -7,6 +7,7 @@ use std::fs;
 use chaic_vision::evaluate::calibrate;
 use chaic_vision::train::{Trainer, TrainingRules};
 use chaic_vision::trained::TrainedDetector;
+use chaic_vision::views::ViewRules;
 
 /// Views that scores are calibrated by.
 const CALIBRATION_VIEWS: usize = 400;
@@ -21,7 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err(format!("{checkpoint} is of another network").into());
     }
     let mut detector = TrainedDetector::uncalibrated(&trainer.detector, &trainer.average);
-    detector.calibration = calibrate(&detector, CALIBRATION_VIEWS, 2);
+    detector.calibration = calibrate(&detector, ViewRules::NATURAL, CALIBRATION_VIEWS, 2);
     fs::write(&file, detector.to_bytes())?;
     println!("{file}: the numbers after step {}", trainer.adam.steps);
     Ok(())

@@ -85,10 +85,8 @@ fn solve(
 ) -> [f64; N_PREDICTORS] {
     for i in 0..N_PREDICTORS {
         for j in i + 1..N_PREDICTORS {
-            let share = a[j][i] / a[i][i];
-            for k in i..N_PREDICTORS {
-                a[j][k] -= share * a[i][k];
-            }
+            let (share, row) = (a[j][i] / a[i][i], a[i]);
+            a[j].iter_mut().zip(row).for_each(|(x, y)| *x -= share * y);
             b[j] -= share * b[i];
         }
     }

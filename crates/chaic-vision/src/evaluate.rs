@@ -63,11 +63,16 @@ pub fn evaluate(
     average_precision(&look(detector, (Part::Validation, rules), n_views, n_threads, one))
 }
 
-/// A calibration by what the detector sees in the first so many views of the training part, as a
-/// helper has them.
-pub fn calibrate(detector: &TrainedDetector, n_views: usize, n_threads: usize) -> Calibration {
-    let views = (Part::Training, ViewRules::NATURAL);
-    let samples = look(detector, views, n_views, n_threads, |view, found| samples(view, found));
+/// A calibration by what the detector sees in the first so many views of the training part, drawn by
+/// these rules: those that a helper has, [`ViewRules::NATURAL`].
+pub fn calibrate(
+    detector: &TrainedDetector,
+    rules: ViewRules,
+    n_views: usize,
+    n_threads: usize,
+) -> Calibration {
+    let views = (Part::Training, rules);
+    let samples = look(detector, views, n_views, n_threads, samples);
     Calibration::fit(&samples.concat())
 }
 

@@ -431,3 +431,6 @@ fn is_within(boxes: &[(Vec3, Vec3)], point: Vec3, body: Pose) -> bool {
     let p = rotate_yaw(point - body.position, -body.yaw_rad);
     boxes.iter().any(|(at, half)| (p - *at).abs().cmplt(*half).all())
 }
+
+#[cfg(test)]
+mod tests;

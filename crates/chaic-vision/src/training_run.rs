@@ -13,6 +13,7 @@ use crate::evaluate::{calibrate, evaluate};
 use crate::loss::Loss;
 use crate::train::{Trainer, TrainingRules};
 use crate::trained::TrainedDetector;
+use crate::views::ViewRules;
 
 /// What it was begun with.
 pub const CONFIG: &str = "config.toml";
@@ -166,7 +167,9 @@ impl TrainingRun {
                     evaluate(&detector, self.trainer.rules.views, VALIDATION_VIEWS, self.threads);
                 let (map50, map) = (found.map50, found.map);
                 self.record(&Record::Validation { step, map50, map }, tell)?;
-                detector.calibration = calibrate(&detector, CALIBRATION_VIEWS, self.threads);
+                let size_px = self.trainer.rules.views.size_px;
+                let views = ViewRules { size_px, ..ViewRules::NATURAL };
+                detector.calibration = calibrate(&detector, views, CALIBRATION_VIEWS, self.threads);
                 write_whole(&self.folder.join(WEIGHTS), &detector.to_bytes())?;
             }
             if step.is_multiple_of(CHECKPOINT_STEPS) || is_last {

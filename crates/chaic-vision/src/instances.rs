@@ -36,6 +36,9 @@ pub struct InstanceRules {
     /// Parts of one label that point to middles nearer to each other than this are one thing, half
     /// extents.
     pub join_extents: f32,
+    /// Parts of different labels that point to middles nearer to each other than this are one thing, half
+    /// extents of the smaller class; the largest part says what it is.
+    pub rename_extents: f32,
     /// Things of fewer pixels at the network's resolution aren't told.
     pub least_pixels: usize,
 }
@@ -46,7 +49,8 @@ impl Default for InstanceRules {
             gap_m: 0.05,
             gap_extents: 0.5,
             vote_extents: 0.8,
-            join_extents: 0.5,
+            join_extents: 1.0,
+            rename_extents: 0.7,
             least_pixels: 5,
         }
     }
@@ -169,14 +173,21 @@ fn find(
         part_of[k] = part_of[first];
         parts[part_of[k]].push(k);
     }
-    // The largest first, which small ones join.
+    // The largest first, which small ones join: it says what the whole is.
     parts.sort_by_key(|part| (std::cmp::Reverse(part.len()), part[0]));
     let mut wholes: Vec<(u8, [f32; 3], Vec<usize>)> = Vec::new();
     for part in parts {
         let label = pixels[part[0]].label;
         let middle = median_vote(pixels, &part);
         let near = rules.join_extents * half_extents[usize::from(label)];
-        let same = wholes.iter_mut().find(|w| w.0 == label && distance(w.1, middle) < near);
+        let is_it = |other: u8, apart_m: f32| match other == label {
+            true => apart_m < near,
+            false => {
+                let half = half_extents[usize::from(other)].min(half_extents[usize::from(label)]);
+                apart_m < rules.rename_extents * half
+            }
+        };
+        let same = wholes.iter_mut().find(|w| is_it(w.0, distance(w.1, middle)));
         match same {
             Some(whole) => whole.2.extend(part),
             None => wholes.push((label, middle, part)),

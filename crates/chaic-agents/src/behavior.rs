@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use chaic_protocol::geom::horizontal_distance;
+use chaic_protocol::observation::Film;
 use chaic_protocol::{Action, AgentId, ClassId, Frame, Hand, Observation, Outcome, Vec3};
 
 use crate::mapping::Thing;
@@ -54,6 +55,11 @@ impl BehaviorLog {
 pub trait BehaviorModel: Send {
     /// Begins an episode.
     fn reset(&mut self);
+
+    /// The film that it looks at, if it looks at one.
+    fn film(&self) -> Option<Film> {
+        None
+    }
 
     /// Looks at one observation, after the memory has taken it in.
     fn watch(&mut self, observation: &Observation, memory: &Memory);

@@ -3,10 +3,11 @@
 use chaic_protocol::Agent;
 use chaic_protocol::observation::Grants;
 
+use crate::behavior::GroundTruthBehavior;
 use crate::mind::Mind;
-use crate::perception::Sight;
 use crate::policies::{Follow, Random, RulePolicy, RuleProfile};
 use crate::rules::PlannerRules;
+use crate::sight::Sight;
 
 /// A helper as runs and tables know it.
 #[derive(Clone, Copy, Debug)]
@@ -72,7 +73,9 @@ pub fn rhp(rules: PlannerRules, sight: &dyn Sight) -> Mind<RulePolicy> {
 
 /// The same rules with the goal, the progress and the partner's doings known.
 pub fn oracle(rules: PlannerRules, sight: &dyn Sight) -> Mind<RulePolicy> {
-    Mind::seeing(RulePolicy::new(RuleProfile::ORACLE), rules, sight)
+    let behavior = Box::new(GroundTruthBehavior::default());
+    let policy = RulePolicy::new(RuleProfile::ORACLE);
+    Mind::with(policy, sight.perception(), behavior, rules).with_sight(sight)
 }
 
 /// Always beside the partner.
@@ -83,7 +86,7 @@ pub fn follow(rules: PlannerRules, sight: &dyn Sight) -> Mind<Follow> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::perception::TrueSight;
+    use crate::sight::TrueSight;
 
     #[test]
     fn every_name_has_a_helper_and_only_the_oracle_is_told_the_goal() {

@@ -15,7 +15,7 @@
 //!   come from [`chaic_protocol::rng::Stream`], there is no clock, and no hash map is iterated.
 //!
 //! ```
-//! use chaic_agents::perception::TrueSight;
+//! use chaic_agents::sight::TrueSight;
 //! use chaic_agents::{HelperInfo, PlannerRules};
 //! let rhp = HelperInfo::named("rhp").expect("it is in the table");
 //! assert!((rhp.make)(PlannerRules::paper(), &TrueSight).senses().depth);
@@ -33,6 +33,7 @@ pub mod planning;
 pub mod memory;
 
 pub mod behavior;
+pub mod sight;
 
 pub mod decision;
 pub mod policies;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use chaic_protocol::agent::Thought;
 use chaic_protocol::observation::Senses;
-use chaic_protocol::{Action, Agent, AgentError, Briefing, Observation, Outcome, Target};
+use chaic_protocol::{Action, Agent, AgentError, AgentId, Briefing, Observation, Outcome, Target};
 
 use crate::behavior::{BehaviorModel, GroundTruthBehavior};
 use crate::decision::{Context, Plan, Policy, valid_plans};
@@ -12,8 +12,9 @@ use crate::execution::interact::learn;
 use crate::execution::navigate::face;
 use crate::execution::{Executor, Progress, Situation};
 use crate::memory::Memory;
-use crate::perception::{Perception, Sight, TrueSight};
+use crate::perception::Perception;
 use crate::rules::PlannerRules;
+use crate::sight::{Sight, TrueSight};
 use crate::track::{Intent, TrackId, named};
 
 /// So many plans may end without an action within one decision; then one waits for a moment.
@@ -58,9 +59,10 @@ impl<P: Policy> Mind<P> {
         Mind::seeing(policy, rules, &TrueSight)
     }
 
-    /// The same, seeing by something else.
+    /// The same, seeing by something else, which may tell what the partner does, too.
     pub fn seeing(policy: P, rules: PlannerRules, sight: &dyn Sight) -> Mind<P> {
-        let behavior = Box::new(GroundTruthBehavior::default());
+        let told = || Box::new(GroundTruthBehavior::default()) as Box<dyn BehaviorModel>;
+        let behavior = sight.behavior(AgentId::PARTNER).unwrap_or_else(told);
         Mind::with(policy, sight.perception(), behavior, rules).with_sight(sight)
     }
 
@@ -260,7 +262,7 @@ impl<P: Policy> Mind<P> {
 
 impl<P: Policy> Agent for Mind<P> {
     fn senses(&self) -> Senses {
-        self.senses
+        Senses { film: self.behavior.film(), ..self.senses }
     }
 
     fn reset(&mut self, briefing: &Briefing) {

@@ -238,6 +238,7 @@ impl Toy {
             own: SelfState { pose: self.pose, hands, last: self.last, other_end: None },
             camera,
             images: Images { rgb: None, depth_m: Some(depth), ids: Some(ids) },
+            film: Vec::new(),
             granted,
         }
     }

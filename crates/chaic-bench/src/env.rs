@@ -84,7 +84,7 @@ impl EnvBench {
     fn play(&self, progress: &mut dyn FnMut(f32)) -> Result<EnvSpeed> {
         let bundled = self.episodes()?;
         let Channels { rgb, depth, ids } = self.channels;
-        let senses = Senses { image_size: self.size, rgb, depth, ids };
+        let senses = Senses { image_size: self.size, rgb, depth, ids, film: None };
         let env = |k: usize| {
             let helper = Some(Seat::of_caller(Grants::IDS, senses));
             Env::new(self.config(&bundled, k), Minds { helper, partner: None })

@@ -209,6 +209,6 @@ fn layout(envs: &[Env], slots: &[Slot]) -> Result<ImageLayout> {
             seen(other),
         )));
     }
-    let Senses { image_size: size, rgb, depth, ids } = first;
+    let Senses { image_size: size, rgb, depth, ids, film: _ } = first;
     Ok(ImageLayout { slots: slots.len(), size, rgb, depth, ids })
 }

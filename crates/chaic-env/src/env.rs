@@ -1,11 +1,11 @@
 //! An episode under way.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use chaic_protocol::agent::{ChildState, Thought};
-use chaic_protocol::observation::Images;
+use chaic_protocol::observation::{FilmFrame, Images};
 use chaic_protocol::{Action, AgentError, AgentId, Briefing, Frame, Observation, Target};
 use chaic_render::{ImagesMut, Scene};
 use chaic_world::{Setup, World};
@@ -15,12 +15,9 @@ use crate::digest::Digest;
 use crate::error::{EnvError, Result};
 use crate::observer::{Glimpse, Observer, resolve_unseen};
 use crate::reward::{RewardTerms, Standing};
-use crate::run_loop::{Choice, run_loop};
+use crate::run_loop::{Choice, Players, run_loop};
 use crate::seat::{Driver, Minds, Seat, seats};
 use crate::trace::{End, Header, Record};
-
-/// The choices of those who wait; `None` if not all have chosen.
-type Decided<E> = std::result::Result<Option<Vec<Choice>>, E>;
 
 /// Why [`Env::run`] returned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,6 +73,8 @@ struct Turn {
     said: Said,
     /// How things stood when the agent last chose, for callers.
     before: Option<Standing>,
+    /// What the agent has seen between its decisions since the last one.
+    film: VecDeque<FilmFrame>,
     /// Memory for the ids of its next image.
     spare_ids: Vec<u16>,
 }
@@ -219,6 +218,9 @@ impl Env {
         if turn.glimpse.is_none() {
             let looking = [(agent, &self.seats[agent.index()])];
             turn.glimpse = self.observer.observe(&self.world, &looking, &mut self.spare).pop();
+            if let Some(glimpse) = &mut turn.glimpse {
+                glimpse.observation.film = std::mem::take(&mut turn.film).into();
+            }
         }
         turn.glimpse.as_ref().map(|glimpse| &glimpse.observation)
     }
@@ -228,7 +230,9 @@ impl Env {
         let turn = &mut self.turns[agent.index()];
         let ids = std::mem::take(&mut turn.spare_ids);
         let who = (agent, &self.seats[agent.index()]);
-        turn.glimpse = Some(self.observer.observe_into(&self.world, who, images, ids));
+        let mut glimpse = self.observer.observe_into(&self.world, who, images, ids);
+        glimpse.observation.film = std::mem::take(&mut turn.film).into();
+        turn.glimpse = Some(glimpse);
     }
 
     /// What an agent perceived that is waiting and has looked.
@@ -344,39 +348,75 @@ impl Env {
             return Err(error.clone().into());
         }
         let Env { world, seats, observer, turns, spare, broken, .. } = self;
-        let mut flow = Flow::Stopped;
-        let mut decide = |world: &World, waiting: &[AgentId]| -> Decided<E> {
-            let late = until.is_some_and(|f| world.state().frame >= f);
-            if stop.load(Ordering::Relaxed) || late {
-                return Ok(None);
-            }
-            let fresh: Vec<_> =
-                waiting.iter().filter(|a| !turns[a.index()].is_open).copied().collect();
-            let minds: Vec<_> =
-                fresh.iter().filter(|a| seats[a.index()].mind().is_some()).copied().collect();
-            let glimpses = {
-                let looking: Vec<_> = minds.iter().map(|a| (*a, &seats[a.index()])).collect();
-                observer.observe(world, &looking, spare)
-            };
-            for (agent, glimpse) in minds.into_iter().zip(glimpses) {
-                let turn = &mut turns[agent.index()];
-                let chosen = choose(&mut seats[agent.index()], agent, &glimpse, &mut turn.said);
-                turn.choice = chosen.inspect_err(|error| *broken = Some(error.clone()))?;
-                if seats[agent.index()].senses.wants_image() {
-                    spare.push(glimpse.into_images());
-                }
-            }
-            for agent in fresh {
-                turns[agent.index()].is_open = true;
-            }
-            if waiting.iter().any(|a| turns[a.index()].choice.is_none()) {
-                flow = Flow::Waits;
-                return Ok(None);
-            }
-            Ok(Some(waiting.iter().filter_map(|a| turns[a.index()].close()).collect()))
+        let has_film = seats.iter().any(|seat| seat.senses.film.is_some());
+        let flow = Flow::Stopped;
+        let mut table =
+            Table { seats, observer, turns, spare, broken, stop, until, has_film, flow };
+        let has_ended = run_loop(world, &mut table, sink)?;
+        Ok(if has_ended { Flow::Ended } else { table.flow })
+    }
+}
+
+/// Everybody in an episode while it is played.
+struct Table<'a> {
+    seats: &'a mut [Seat],
+    observer: &'a Observer,
+    turns: &'a mut [Turn],
+    spare: &'a mut Vec<Images>,
+    broken: &'a mut Option<AgentError>,
+    stop: &'a AtomicBool,
+    until: Option<Frame>,
+    has_film: bool,
+    /// Why the play stopped.
+    flow: Flow,
+}
+
+impl<E: From<AgentError>> Players<E> for Table<'_> {
+    fn decide(
+        &mut self,
+        world: &World,
+        waiting: &[AgentId],
+    ) -> std::result::Result<Option<Vec<Choice>>, E> {
+        let Table { seats, observer, turns, spare, broken, .. } = self;
+        let late = self.until.is_some_and(|f| world.state().frame >= f);
+        if self.stop.load(Ordering::Relaxed) || late {
+            return Ok(None);
+        }
+        let fresh: Vec<_> = waiting.iter().filter(|a| !turns[a.index()].is_open).copied().collect();
+        let minds: Vec<_> =
+            fresh.iter().filter(|a| seats[a.index()].mind().is_some()).copied().collect();
+        let glimpses = {
+            let looking: Vec<_> = minds.iter().map(|a| (*a, &seats[a.index()])).collect();
+            observer.observe(world, &looking, spare)
         };
-        let has_ended = run_loop(world, &mut decide, sink)?;
-        Ok(if has_ended { Flow::Ended } else { flow })
+        for (agent, mut glimpse) in minds.into_iter().zip(glimpses) {
+            let turn = &mut turns[agent.index()];
+            glimpse.observation.film = std::mem::take(&mut turn.film).into();
+            let chosen = choose(&mut seats[agent.index()], agent, &glimpse, &mut turn.said);
+            turn.choice = chosen.inspect_err(|error| **broken = Some(error.clone()))?;
+            if seats[agent.index()].senses.wants_image() {
+                spare.push(glimpse.into_images());
+            }
+        }
+        for agent in fresh {
+            turns[agent.index()].is_open = true;
+        }
+        if waiting.iter().any(|a| turns[a.index()].choice.is_none()) {
+            self.flow = Flow::Waits;
+            return Ok(None);
+        }
+        Ok(Some(waiting.iter().filter_map(|a| turns[a.index()].close()).collect()))
+    }
+
+    fn look_on(&mut self, world: &World) {
+        if !self.has_film {
+            return;
+        }
+        for (k, (seat, turn)) in self.seats.iter().zip(self.turns.iter_mut()).enumerate() {
+            if let Some(film) = seat.senses.film {
+                self.observer.film(world, AgentId(k as u8), film, &mut turn.film);
+            }
+        }
     }
 }
 

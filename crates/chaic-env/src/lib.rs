@@ -28,7 +28,7 @@
 //!     image_size: Some(64),
 //!     appearance: Appearance::Canonical,
 //! };
-//! let senses = Senses { image_size: 64, rgb: true, depth: true, ids: false };
+//! let senses = Senses { image_size: 64, rgb: true, depth: true, ids: false, film: None };
 //! let helper = Some(Seat::of_caller(Grants::NONE, senses));
 //! let mut env = Env::new(config, Minds { helper, partner: None })?;
 //! let briefing = env.briefing(AgentId::HELPER);
@@ -81,7 +81,7 @@ pub use key::{RunKey, slug};
 pub use observer::{Glimpse, Observer};
 pub use playback::Playback;
 pub use reward::{RewardTerms, RewardWeights};
-pub use run_loop::{Choice, Decide, run_loop};
+pub use run_loop::{Choice, Players, run_loop};
 pub use seat::{Driver, Idle, Minds, Seat, seats, world_seed};
 
 /// The version of the program, as it stands in run folders and traces.

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use chaic_agents::perception::{Sight, TrueSight};
+use chaic_agents::sight::{Sight, TrueSight};
 use chaic_agents::{HELPERS, HelperInfo, PlannerRules};
 use chaic_protocol::Agent;
 use chaic_protocol::observation::Grants;

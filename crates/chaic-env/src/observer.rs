@@ -1,8 +1,9 @@
 //! What agents perceive when they are about to decide, and what they mean when they answer.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
-use chaic_protocol::observation::{Images, Observation, Senses};
+use chaic_protocol::observation::{Film, FilmFrame, Images, Observation, Senses};
 use chaic_protocol::{Action, AgentId, EntityId, ResolvedAction, Target};
 use chaic_render::{Channels, ImagesMut, Scene, View};
 use chaic_world::World;
@@ -103,6 +104,30 @@ impl Observer {
             .collect()
     }
 
+    /// Adds to an agent's film what it sees now, if this is a frame to keep; drops the oldest.
+    pub(crate) fn film(
+        &self,
+        world: &World,
+        agent: AgentId,
+        film: Film,
+        frames: &mut VecDeque<FilmFrame>,
+    ) {
+        let frame = world.state().frame;
+        if film.most == 0 || film.every_frames == 0 || !frame.is_multiple_of(film.every_frames) {
+            return;
+        }
+        let channels = Channels { rgb: true, depth: true, ids: false };
+        let view = View::of_agent(world, agent, film.image_size, channels);
+        let mut images = vec![Images::default()];
+        if frames.len() >= film.most as usize {
+            images.extend(frames.pop_front().map(|old| old.images));
+            images.swap_remove(0);
+        }
+        self.scene.render_into(world, &[view], &mut images);
+        let camera = world.eye(agent, film.image_size);
+        frames.extend(images.pop().map(|images| FilmFrame { frame, camera, images }));
+    }
+
     /// What one agent perceives now, with the images in buffers of the caller's instead of the
     /// observation. `ids` are taken to keep the ids in, which resolve what the agent points at.
     pub(crate) fn observe_into(
@@ -157,6 +182,7 @@ fn observation(
         own: world.own_state(agent, seat.grants, last_action(world, agent, seat)),
         camera: world.eye(agent, seat.senses.image_size),
         images,
+        film: Vec::new(),
         granted: world.granted(agent, seat.grants, in_view),
     }
 }

@@ -20,25 +20,43 @@ pub struct Choice {
     pub child: Option<ChildState>,
 }
 
-/// Chooses for those who wait; `None` to stop.
-pub type Decide<'a, E> = dyn FnMut(&World, &[AgentId]) -> Result<Option<Vec<Choice>>, E> + 'a;
+/// Who chooses for everybody, and looks on meanwhile.
+pub trait Players<E> {
+    /// Chooses for those who wait; `None` to stop.
+    ///
+    /// # Errors
+    /// If it can't.
+    fn decide(&mut self, world: &World, waiting: &[AgentId]) -> Result<Option<Vec<Choice>>, E>;
 
-/// Asks `decide` whenever somebody waits, submits the choices in their order, lets frames pass,
-/// and hands `sink` all that is worth recording, until the episode ends or `decide` returns `None`.
+    /// A frame has passed.
+    fn look_on(&mut self, _: &World) {}
+}
+
+impl<E, F> Players<E> for F
+where
+    F: FnMut(&World, &[AgentId]) -> Result<Option<Vec<Choice>>, E>,
+{
+    fn decide(&mut self, world: &World, waiting: &[AgentId]) -> Result<Option<Vec<Choice>>, E> {
+        self(world, waiting)
+    }
+}
+
+/// Asks the players whenever somebody waits, submits the choices in their order, lets frames pass,
+/// and hands `sink` all that is worth recording, until the episode ends or the players stop.
 ///
 /// All who wait in one frame choose before any of them acts.
 ///
 /// # Errors
-/// Those of `decide` and `sink`.
+/// Those of the players and `sink`.
 pub fn run_loop<E>(
     world: &mut World,
-    decide: &mut Decide<'_, E>,
+    players: &mut dyn Players<E>,
     sink: &mut dyn FnMut(&Record) -> Result<(), E>,
 ) -> Result<bool, E> {
     while !world.is_over() {
         let waiting = world.waiting();
         if !waiting.is_empty() {
-            let Some(choices) = decide(world, &waiting)? else { return Ok(false) };
+            let Some(choices) = players.decide(world, &waiting)? else { return Ok(false) };
             for choice in choices {
                 let state = choice.child;
                 submit(world, choice, sink)?;
@@ -47,7 +65,7 @@ pub fn run_loop<E>(
                 }
             }
         }
-        world.advance();
+        world.advance_watched(&mut |world| players.look_on(world));
         for event in world.drain_events().into_iter().filter(is_recorded) {
             sink(&Record::Event(TraceEvent::new(event, world)))?;
         }

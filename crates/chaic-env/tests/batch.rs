@@ -19,7 +19,7 @@ const SIZE: u32 = 16;
 /// Decisions of each helper.
 const N_DECISIONS: usize = 5;
 
-const ALL: Senses = Senses { image_size: SIZE, rgb: true, depth: true, ids: true };
+const ALL: Senses = Senses { image_size: SIZE, rgb: true, depth: true, ids: true, film: None };
 
 fn bundled() -> Vec<Episode> {
     let of = |task| episodes(&Split::Test, task).map(|e| e.expect("bundled episodes are valid"));

@@ -3,6 +3,7 @@
 //! new environment or in one that was reset.
 
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex};
 
 use chaic_agents::PlannerRules;
 use chaic_env::minds::{BuiltIn, Helper, Helpers as _};
@@ -12,7 +13,7 @@ use chaic_env::{
     Appearance, Env, EnvError, EpisodeConfig, Flow, Idle, Minds, RewardTerms, RewardWeights, Seat,
 };
 use chaic_episodes::{Episode, find_episode};
-use chaic_protocol::observation::{Grants, Senses};
+use chaic_protocol::observation::{Film, Grants, Senses};
 use chaic_protocol::{Action, Agent, AgentError, AgentId, Briefing, Observation, TaskId};
 
 /// Frames that are played.
@@ -317,4 +318,57 @@ fn who_sees_little_is_shown_nothing_that_is_far() {
         }
     }
     assert!(n_far[0] > 10_000 && n_far[1] == 0, "{n_far:?}");
+}
+
+/// A mind that waits, and writes down when the images of its films were taken.
+struct Filming {
+    film: Option<Film>,
+    seen: Arc<Mutex<Vec<Filmed>>>,
+}
+
+/// When a mind was asked, and when the images of its film were taken.
+type Filmed = (u32, Vec<u32>);
+
+impl Agent for Filming {
+    fn senses(&self) -> Senses {
+        Senses { film: self.film, ..Senses::NONE }
+    }
+
+    fn reset(&mut self, _: &Briefing) {}
+
+    fn act(&mut self, observation: &Observation) -> Result<Action, AgentError> {
+        for frame in &observation.film {
+            let n = (frame.camera.width * frame.camera.height) as usize;
+            assert_eq!(frame.images.rgb.as_ref().map(Vec::len), Some(3 * n));
+            assert_eq!(frame.images.depth_m.as_ref().map(Vec::len), Some(n));
+            assert_eq!(frame.images.ids, None, "ids are granted for the own image at most");
+        }
+        let frames = observation.film.iter().map(|frame| frame.frame).collect();
+        self.seen.lock().unwrap().push((observation.frame, frames));
+        Ok(Action::Wait { frames: 20 })
+    }
+}
+
+#[test]
+fn who_asks_for_a_film_gets_it_and_nobody_else() {
+    let episode = of_task(TaskId::Shopping);
+    let play = |film: Option<Film>| {
+        let seen = Arc::<Mutex<Vec<Filmed>>>::default();
+        let mind = Box::new(Filming { film, seen: Arc::clone(&seen) });
+        let helper = Helper { mind, grants: Grants::PARTNER };
+        let mut env = Env::new(config(&episode), Some(helper)).unwrap();
+        env.advance(Some(200)).unwrap();
+        let digest = env.digest();
+        (seen.lock().unwrap().clone(), digest)
+    };
+    let film = Film { image_size: 16, every_frames: 3, most: 5 };
+    let ((with, digest), (without, same)) = (play(Some(film)), play(None));
+    assert_eq!(digest, same, "a film changes nothing");
+    assert!(without.iter().all(|(_, frames)| frames.is_empty()) && without.len() > 5);
+    assert!(with[0].1.is_empty(), "nothing has passed");
+    for pair in with.windows(2) {
+        let (then, now) = (pair[0].0, pair[1].0);
+        let all: Vec<u32> = (then + 1..=now).filter(|frame| frame % 3 == 0).collect();
+        assert_eq!(pair[1].1, all[all.len().saturating_sub(5)..], "from {then} to {now}");
+    }
 }

@@ -32,7 +32,7 @@ struct ColorOnly {
 
 impl Agent for ColorOnly {
     fn senses(&self) -> Senses {
-        Senses { image_size: SIZE, rgb: true, depth: false, ids: false }
+        Senses { image_size: SIZE, rgb: true, depth: false, ids: false, film: None }
     }
 
     fn reset(&mut self, _: &Briefing) {}

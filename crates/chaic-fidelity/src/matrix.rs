@@ -113,6 +113,7 @@ impl Matrix {
             partner_is: None,
             appearance: None,
             perception: None,
+            behavior: None,
         })
     }
 

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use chaic_agents::behavior::{BehaviorModel, GroundTruthBehavior, SeenBehavior};
-use chaic_agents::perception::{GroundTruthIds, Sight, TrueSight};
+use chaic_agents::perception::GroundTruthIds;
+use chaic_agents::sight::{Sight, TrueSight};
 use chaic_agents::{Mind, PlannerRules, partner_grants};
 use chaic_env::minds::{BuiltIn, Helper, Helpers, built_in};
 use chaic_env::{EnvError, RunKey};
@@ -167,9 +168,10 @@ impl Language {
     ) -> Helper {
         let session = Arc::clone(&self.session);
         let policy = LanguagePolicy::new(session, key.cloned(), kind.track, kind.looks);
-        let behavior: Box<dyn BehaviorModel> = match grants.behavior {
+        let seen = || Box::new(SeenBehavior::of(watched)) as Box<dyn BehaviorModel>;
+        let behavior = match grants.behavior {
             true => Box::new(GroundTruthBehavior::default()),
-            false => Box::new(SeenBehavior::of(watched)),
+            false => sight.behavior(watched).unwrap_or_else(seen),
         };
         let senses = Senses { rgb: kind.looks, ..Senses::DEPTH_AND_IDS };
         let mind = Mind::with(policy, Box::new(GroundTruthIds), behavior, rules);

@@ -32,7 +32,12 @@ pub struct Inference {
 
 impl Inference {
     /// Working space for a network.
+    ///
+    /// # Panics
+    /// If the network joins maps or their pixels: that takes a [`Pass`](crate::Pass).
     pub fn new(network: &Network, arch: Arch) -> Inference {
+        let joins = network.layers.iter().any(|layer| matches!(layer, Layer::Join { .. }));
+        assert!(!joins, "maps are joined by passes only");
         let (segments, is_kept) = segments(network);
         Inference {
             arch,
@@ -158,6 +163,7 @@ impl Inference {
                 let map = &before[from.0].data[rows.start * width * channels..];
                 upsample(&map[..rows.len() * width * channels], (width, channels), out);
             }
+            Layer::Join { .. } => unreachable!("there is none"),
         }
     }
 }
@@ -171,7 +177,10 @@ fn segments(network: &Network) -> (Vec<Range<usize>>, Vec<bool>) {
         match *layer {
             Layer::Input | Layer::Norm { .. } | Layer::Relu { .. } | Layer::Add { .. } => {}
             Layer::Conv { kernel, .. } if kernel == Kernel::POINTWISE => {}
-            Layer::Conv { from, .. } | Layer::Depthwise { from, .. } | Layer::Upsample { from } => {
+            Layer::Conv { from, .. }
+            | Layer::Depthwise { from, .. }
+            | Layer::Upsample { from }
+            | Layer::Join { from } => {
                 is_kept[from.0] = true;
             }
         }

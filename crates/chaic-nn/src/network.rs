@@ -41,6 +41,8 @@ pub(crate) enum Layer {
     Add { a: Node, b: Node },
     /// Each pixel twice in each row and column.
     Upsample { from: Node },
+    /// The same numbers, with the pixels of a map, or two maps of one pixel, as one pixel.
+    Join { from: Node },
 }
 
 impl Layer {
@@ -52,29 +54,37 @@ impl Layer {
             | Layer::Depthwise { from, .. }
             | Layer::Norm { from, .. }
             | Layer::Relu { from }
-            | Layer::Upsample { from } => (Some(from), None),
+            | Layer::Upsample { from }
+            | Layer::Join { from } => (Some(from), None),
             Layer::Add { a, b } => (Some(a), Some(b)),
         };
         first.into_iter().chain(second)
     }
 }
 
+/// How large what a layer makes is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Size {
+    channels: usize,
+    /// By how many a side of the input is divided.
+    stride: usize,
+    /// How many maps of the input become one.
+    maps: usize,
+}
+
 /// A network without its numbers.
 #[derive(Clone, Debug, Default)]
 pub struct Network {
     pub(crate) layers: Vec<Layer>,
-    channels: Vec<usize>,
-    /// By how many a side of the input is divided.
-    strides: Vec<usize>,
+    sizes: Vec<Size>,
     parameters: Vec<Parameter>,
     outputs: Vec<Node>,
 }
 
 impl Network {
-    fn push(&mut self, layer: Layer, channels: usize, stride: usize) -> Node {
+    fn push(&mut self, layer: Layer, size: Size) -> Node {
         self.layers.push(layer);
-        self.channels.push(channels);
-        self.strides.push(stride);
+        self.sizes.push(size);
         Node(self.layers.len() - 1)
     }
 
@@ -87,7 +97,7 @@ impl Network {
 
     /// What the caller gives, with so many channels.
     pub fn input(&mut self, channels: usize) -> Node {
-        self.push(Layer::Input, channels, 1)
+        self.push(Layer::Input, Size { channels, stride: 1, maps: 1 })
     }
 
     /// Numbers that no layer uses, kept in the same file as the others.
@@ -97,30 +107,32 @@ impl Network {
 
     /// A dense convolution.
     pub fn conv(&mut self, name: &str, from: Node, kernel: Kernel, channels: usize) -> Node {
-        let shape = [kernel.side, kernel.side, self.channels[from.0], channels];
+        let of = self.sizes[from.0];
+        let shape = [kernel.side, kernel.side, of.channels, channels];
         let weights = self.parameter(format!("{name}.weight"), &shape, true);
-        let stride = self.strides[from.0] * kernel.stride;
-        self.push(Layer::Conv { from, weights, bias: None, kernel, channels }, channels, stride)
+        let size = Size { channels, stride: of.stride * kernel.stride, ..of };
+        self.push(Layer::Conv { from, weights, bias: None, kernel, channels }, size)
     }
 
     /// A matrix for each pixel, with a bias: what a network ends with.
     pub fn head(&mut self, name: &str, from: Node, channels: usize) -> Node {
-        let shape = [1, 1, self.channels[from.0], channels];
+        let of = self.sizes[from.0];
+        let shape = [1, 1, of.channels, channels];
         let weights = self.parameter(format!("{name}.weight"), &shape, true);
         let bias = Some(self.parameter(format!("{name}.bias"), &[channels], false));
         let kernel = Kernel::POINTWISE;
-        let stride = self.strides[from.0];
-        let node =
-            self.push(Layer::Conv { from, weights, bias, kernel, channels }, channels, stride);
+        let size = Size { channels, ..of };
+        let node = self.push(Layer::Conv { from, weights, bias, kernel, channels }, size);
         self.outputs.push(node);
         node
     }
 
     /// A depthwise convolution with a kernel of 3 or 5 to a side.
     pub fn depthwise(&mut self, name: &str, from: Node, side: usize) -> Node {
-        let channels = self.channels[from.0];
-        let weights = self.parameter(format!("{name}.weight"), &[side, side, channels], true);
-        self.push(Layer::Depthwise { from, weights, side }, channels, self.strides[from.0])
+        let size = self.sizes[from.0];
+        let shape = [side, side, size.channels];
+        let weights = self.parameter(format!("{name}.weight"), &shape, true);
+        self.push(Layer::Depthwise { from, weights, side }, size)
     }
 
     /// Layer normalization of each pixel.
@@ -134,17 +146,17 @@ impl Network {
     }
 
     fn any_norm(&mut self, name: &str, from: Node, positive: bool) -> Node {
-        let channels = self.channels[from.0];
+        let size = self.sizes[from.0];
+        let channels = size.channels;
         assert!(channels.is_multiple_of(crate::norm::LANES), "{channels} channels");
         let scale = self.parameter(format!("{name}.scale"), &[channels], false);
         let shift = self.parameter(format!("{name}.shift"), &[channels], false);
-        let layer = Layer::Norm { from, scale, shift, positive };
-        self.push(layer, channels, self.strides[from.0])
+        self.push(Layer::Norm { from, scale, shift, positive }, size)
     }
 
     /// The positive part.
     pub fn relu(&mut self, from: Node) -> Node {
-        self.push(Layer::Relu { from }, self.channels[from.0], self.strides[from.0])
+        self.push(Layer::Relu { from }, self.sizes[from.0])
     }
 
     /// The sum of two nodes of the same shape.
@@ -152,9 +164,9 @@ impl Network {
     /// # Panics
     /// If their shapes differ.
     pub fn add(&mut self, a: Node, b: Node) -> Node {
-        let of = |n: Node| (self.channels[n.0], self.strides[n.0]);
+        let of = |n: Node| self.sizes[n.0];
         assert_eq!(of(a), of(b), "shapes that are added differ");
-        self.push(Layer::Add { a, b }, self.channels[a.0], self.strides[a.0])
+        self.push(Layer::Add { a, b }, of(a))
     }
 
     /// Each pixel twice in each row and column.
@@ -162,9 +174,22 @@ impl Network {
     /// # Panics
     /// If the node is as large as the input.
     pub fn upsample(&mut self, from: Node) -> Node {
-        let stride = self.strides[from.0];
-        assert!(stride.is_multiple_of(2), "nothing is larger than the input");
-        self.push(Layer::Upsample { from }, self.channels[from.0], stride / 2)
+        let size = self.sizes[from.0];
+        assert!(size.stride.is_multiple_of(2), "nothing is larger than the input");
+        self.push(Layer::Upsample { from }, Size { stride: size.stride / 2, ..size })
+    }
+
+    /// Maps of `side` x `side` pixels as one pixel each.
+    pub fn flatten(&mut self, from: Node, side: usize) -> Node {
+        let Size { channels, stride, maps } = self.sizes[from.0];
+        let size = Size { channels: side * side * channels, stride: side * stride, maps };
+        self.push(Layer::Join { from }, size)
+    }
+
+    /// Two maps of one pixel, one after the other in the batch, as one pixel.
+    pub fn pair(&mut self, from: Node) -> Node {
+        let Size { channels, stride, maps } = self.sizes[from.0];
+        self.push(Layer::Join { from }, Size { channels: 2 * channels, stride, maps: 2 * maps })
     }
 
     /// Numbers that are learned.
@@ -184,22 +209,22 @@ impl Network {
 
     /// Sides of the input are multiples of this.
     pub fn stride(&self) -> usize {
-        self.strides.iter().copied().max().unwrap_or(1)
+        self.sizes.iter().map(|size| size.stride).max().unwrap_or(1)
     }
 
     /// By how many a side of the input is divided to be a side of what a node makes.
     pub(crate) fn stride_of(&self, node: Node) -> usize {
-        self.strides[node.0]
+        self.sizes[node.0].stride
     }
 
     /// The shape of what a node makes of inputs of this shape.
     pub fn shape_of(&self, node: Node, input: Shape) -> Shape {
-        let stride = self.strides[node.0];
+        let Size { channels, stride, maps } = self.sizes[node.0];
         Shape {
-            n: input.n,
+            n: input.n / maps,
             height: input.height / stride,
             width: input.width / stride,
-            channels: self.channels[node.0],
+            channels,
         }
     }
 

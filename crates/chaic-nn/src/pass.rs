@@ -49,7 +49,8 @@ impl Pass {
     /// Runs all layers on an input.
     ///
     /// # Panics
-    /// If a side of the input is no multiple of [`Network::stride`].
+    /// If a side of the input is no multiple of [`Network::stride`], or maps that are joined have another
+    /// size than the network says.
     pub fn forward(&mut self, network: &Network, numbers: &[f32], input: &Tensor) {
         let Shape { height, width, .. } = input.shape;
         let stride = network.stride();
@@ -113,6 +114,7 @@ impl Pass {
                     let map = &before[from.0];
                     upsample(&map.data, (map.shape.width, map.shape.channels), &mut out.data);
                 }
+                Layer::Join { from } => out.data.copy_from_slice(&before[from.0].data),
             }
         }
     }
@@ -200,6 +202,10 @@ impl Pass {
                     }
                 }
                 Layer::Upsample { from } => downsample(gradient, &mut before[from.0]),
+                Layer::Join { from } => {
+                    let to = &mut before[from.0].data;
+                    self.arch.dispatch(AddTo { to, from: &gradient.data });
+                }
             }
         }
     }

@@ -23,6 +23,23 @@ fn every_layer() -> (Network, Node) {
     (net, head)
 }
 
+/// A network that makes one number list of two small maps.
+fn joined() -> (Network, Node) {
+    let mut net = Network::default();
+    let input = net.input(3);
+    let down = net.conv("stem", input, Kernel { side: 3, stride: 2 }, 16);
+    let half = net.norm_relu("stem.norm", down);
+    let lower = net.conv("down", half, Kernel { side: 3, stride: 2 }, 16);
+    let flat = net.flatten(lower, 2);
+    let each = net.conv("each", flat, Kernel::POINTWISE, 16);
+    let norm = net.norm_relu("each.norm", each);
+    let pair = net.pair(norm);
+    let head = net.head("head", pair, 5);
+    (net, head)
+}
+
+const SMALL: Shape = Shape { n: 4, height: 8, width: 8, channels: 3 };
+
 fn random(shape: Shape, seed: u64) -> Tensor {
     let mut rng = Stream::new(seed, "tensor", 0);
     let data = (0..shape.numbers()).map(|_| rng.range(-1.0, 1.0)).collect();
@@ -39,9 +56,15 @@ fn loss(net: &Network, head: Node, numbers: &[f32], input: &Tensor, factors: &Te
     made.iter().zip(&factors.data).map(|(x, f)| f64::from(*x) * f64::from(*f)).sum()
 }
 
-fn gradient(net: &Network, head: Node, numbers: &[f32], arch: pulp::Arch) -> Vec<f32> {
+fn gradient(
+    (net, head): &(Network, Node),
+    input: Shape,
+    numbers: &[f32],
+    arch: pulp::Arch,
+) -> Vec<f32> {
+    let head = *head;
     let mut pass = Pass::new(net, arch);
-    pass.forward(net, numbers, &random(INPUT, 1));
+    pass.forward(net, numbers, &random(input, 1));
     pass.begin_backward();
     let shape = pass.made(head).shape;
     *pass.gradient(head) = random(shape, 2);
@@ -52,23 +75,28 @@ fn gradient(net: &Network, head: Node, numbers: &[f32], arch: pulp::Arch) -> Vec
 
 #[test]
 fn gradients_are_those_of_finite_differences() {
-    let (net, head) = every_layer();
+    check_gradients(&every_layer(), INPUT);
+    check_gradients(&joined(), SMALL);
+}
+
+fn check_gradients(of: &(Network, Node), shape: Shape) {
+    let (net, head) = (&of.0, of.1);
     let mut numbers = net.begin(3);
     // Nothing at a bend: scales and shifts of their own.
     let mut rng = Stream::new(4, "scales", 0);
     for p in net.parameters().iter().filter(|p| !p.decays) {
         numbers[p.range.clone()].iter_mut().for_each(|x| *x += rng.range(-0.3, 0.3));
     }
-    let input = random(INPUT, 1);
-    let factors = random(net.shape_of(head, INPUT), 2);
-    let exact = gradient(&net, head, &numbers, widest());
+    let input = random(shape, 1);
+    let factors = random(net.shape_of(head, shape), 2);
+    let exact = gradient(of, shape, &numbers, widest());
     for p in net.parameters() {
         let (mut worst, mut scale) = (0.0_f64, 1e-3_f64);
         for k in p.range.clone().step_by(p.range.len().div_ceil(12)) {
             let at = |h: f32| {
                 let mut moved = numbers.clone();
                 moved[k] += h;
-                loss(&net, head, &moved, &input, &factors)
+                loss(net, head, &moved, &input, &factors)
             };
             let h = 2e-3;
             let measured = (at(h) - at(-h)) / (2.0 * f64::from(h));
@@ -81,11 +109,12 @@ fn gradients_are_those_of_finite_differences() {
 
 #[test]
 fn passes_are_the_same_bits_at_every_width() {
-    let (net, head) = every_layer();
-    let numbers = net.begin(3);
-    let expected = gradient(&net, head, &numbers, widest());
-    for (name, arch) in widths() {
-        assert!(gradient(&net, head, &numbers, arch) == expected, "{name}");
+    for (of, input) in [(every_layer(), INPUT), (joined(), SMALL)] {
+        let numbers = of.0.begin(3);
+        let expected = gradient(&of, input, &numbers, widest());
+        for (name, arch) in widths() {
+            assert!(gradient(&of, input, &numbers, arch) == expected, "{name}");
+        }
     }
 }
 

@@ -19,14 +19,29 @@ pub struct Senses {
     pub depth: bool,
     /// Whether it looks at instance ids (given only if granted).
     pub ids: bool,
+    /// The film that it wants of what it sees between decisions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub film: Option<Film>,
+}
+
+/// Small images of color and depth between decisions, from the same eye.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Film {
+    /// Width and height of its images, pixels.
+    pub image_size: u32,
+    /// An image is taken whenever the number of the frame is a multiple of this.
+    pub every_frames: u32,
+    /// No more images than these last ones.
+    pub most: u32,
 }
 
 impl Senses {
     /// Depth and ids at the benchmark's size: what the rule-based minds look at.
     pub const DEPTH_AND_IDS: Senses =
-        Senses { image_size: 512, rgb: false, depth: true, ids: true };
+        Senses { image_size: 512, rgb: false, depth: true, ids: true, film: None };
     /// No image at all.
-    pub const NONE: Senses = Senses { image_size: 512, rgb: false, depth: false, ids: false };
+    pub const NONE: Senses =
+        Senses { image_size: 512, rgb: false, depth: false, ids: false, film: None };
 
     /// Whether any image must be made.
     pub fn wants_image(&self) -> bool {
@@ -197,6 +212,17 @@ pub struct Images {
     pub ids: Option<Vec<u16>>,
 }
 
+/// An image of a film.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FilmFrame {
+    /// When it was taken.
+    pub frame: Frame,
+    /// The camera that took it.
+    pub camera: Camera,
+    /// Color and depth.
+    pub images: Images,
+}
+
 /// Something an agent did, as an onlooker sees it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SeenAction {
@@ -243,6 +269,8 @@ pub struct Observation {
     pub camera: Camera,
     /// What the eye sees.
     pub images: Images,
+    /// What it saw since the last decision, oldest first, where that was [asked for](Senses::film).
+    pub film: Vec<FilmFrame>,
     /// What was granted beyond that.
     pub granted: Granted,
 }

@@ -8,7 +8,9 @@ use chaic_protocol::observation::Senses;
 use chaic_protocol::{Action, Agent, AgentError, Briefing, Observation};
 
 use crate::commands::Command;
-use crate::message::{IMAGE_SIZES, PROTOCOL, ToEnv, ToMind, cut, observation_frame, plain};
+use crate::message::{
+    IMAGE_SIZES, MAX_FILM, PROTOCOL, ToEnv, ToMind, cut, observation_frame, plain,
+};
 use crate::process::Process;
 
 /// A mind in another process, which is started when an episode begins and ends with it.
@@ -61,6 +63,14 @@ impl SubprocessAgent {
     ) -> Result<Senses, AgentError> {
         let reset = ToMind::Reset { briefing: Box::new(briefing.clone()) };
         match process.ask(plain(&reset), command.limits.start)? {
+            ToEnv::Ready { senses: Senses { film: Some(film), .. } }
+                if !IMAGE_SIZES.contains(&film.image_size) || film.most > MAX_FILM =>
+            {
+                Err(AgentError::Broken(format!(
+                    "`{}` wants a film of {} images of {} pixels, not up to {MAX_FILM} of {IMAGE_SIZES:?}",
+                    command.line, film.most, film.image_size
+                )))
+            }
             ToEnv::Ready { senses } if IMAGE_SIZES.contains(&senses.image_size) => Ok(senses),
             ToEnv::Ready { senses } => Err(AgentError::Broken(format!(
                 "`{}` wants images of {} pixels, not {IMAGE_SIZES:?}",

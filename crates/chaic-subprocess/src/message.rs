@@ -2,7 +2,7 @@
 
 use chaic_protocol::agent::Thought;
 use chaic_protocol::geom::Camera;
-use chaic_protocol::observation::{Granted, Images, SelfState, Senses};
+use chaic_protocol::observation::{FilmFrame, Granted, Images, SelfState, Senses};
 use chaic_protocol::{Action, Briefing, Observation};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -11,6 +11,8 @@ use crate::frame::Frame;
 
 /// Sides of images that a mind may ask for, pixels.
 pub const IMAGE_SIZES: std::ops::RangeInclusive<u32> = 16..=2048;
+/// Most images of a film that a mind may ask for.
+pub const MAX_FILM: u32 = 256;
 /// Longest text of a mind that is kept, bytes: a thought, a problem.
 pub const MAX_TEXT: usize = 2000;
 
@@ -90,12 +92,25 @@ pub struct Seen {
     pub granted: Granted,
     /// Where the images are.
     pub images: Vec<ImageHead>,
+    /// When and from where the images of a film were taken, oldest first; those of the first are called
+    /// `film0.rgb` and `film0.depth_m`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub film: Vec<FilmHead>,
+}
+
+/// When and from where an image of a film was taken.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FilmHead {
+    /// When.
+    pub frame: chaic_protocol::Frame,
+    /// The camera that took it.
+    pub camera: Camera,
 }
 
 /// Where an image lies in the body of its frame: row-major, row 0 at the top, little-endian.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ImageHead {
-    /// `rgb`, `depth_m` or `ids`, as in [`Images`].
+    /// `rgb`, `depth_m` or `ids`, as in [`Images`]; with `film` and a number before it for a film's.
     pub name: String,
     /// `u8`, `f32` or `u16`.
     pub dtype: String,
@@ -120,11 +135,15 @@ pub(crate) fn message<M: DeserializeOwned>(frame: &Frame) -> Result<M, String> {
     })
 }
 
+/// What the names of images of a film begin with: `film0.rgb` is the color of the oldest.
+fn film_prefix(k: usize) -> String {
+    format!("film{k}.")
+}
+
 /// The frame of an observation.
 pub fn observation_frame(observation: &Observation) -> Frame {
-    let Observation { frame, own, camera, images, granted } = observation;
+    let Observation { frame, own, camera, images, film, granted } = observation;
     let (mut heads, mut body) = (Vec::new(), Vec::new());
-    let shape = [camera.height, camera.width];
     let mut add = |name: &str, dtype: &str, shape: &[u32], bytes: &mut dyn Iterator<Item = u8>| {
         let offset = body.len();
         body.extend(bytes);
@@ -136,14 +155,24 @@ pub fn observation_frame(observation: &Observation) -> Frame {
             bytes: body.len() - offset,
         });
     };
-    if let Some(rgb) = &images.rgb {
-        add("rgb", "u8", &[shape[0], shape[1], 3], &mut rgb.iter().copied());
-    }
-    if let Some(depth) = &images.depth_m {
-        add("depth_m", "f32", &shape, &mut depth.iter().flat_map(|d| d.to_le_bytes()));
-    }
-    if let Some(ids) = &images.ids {
-        add("ids", "u16", &shape, &mut ids.iter().flat_map(|id| id.to_le_bytes()));
+    let mut add_all = |prefix: &str, images: &Images, camera: &Camera| {
+        let shape = [camera.height, camera.width];
+        if let Some(rgb) = &images.rgb {
+            let name = format!("{prefix}rgb");
+            add(&name, "u8", &[shape[0], shape[1], 3], &mut rgb.iter().copied());
+        }
+        if let Some(depth) = &images.depth_m {
+            let bytes = &mut depth.iter().flat_map(|d| d.to_le_bytes());
+            add(&format!("{prefix}depth_m"), "f32", &shape, bytes);
+        }
+        if let Some(ids) = &images.ids {
+            let bytes = &mut ids.iter().flat_map(|id| id.to_le_bytes());
+            add(&format!("{prefix}ids"), "u16", &shape, bytes);
+        }
+    };
+    add_all("", images, camera);
+    for (k, of_film) in film.iter().enumerate() {
+        add_all(&film_prefix(k), &of_film.images, &of_film.camera);
     }
     let seen = Seen {
         frame: *frame,
@@ -151,6 +180,7 @@ pub fn observation_frame(observation: &Observation) -> Frame {
         camera: *camera,
         granted: granted.clone(),
         images: heads,
+        film: film.iter().map(|f| FilmHead { frame: f.frame, camera: f.camera }).collect(),
     };
     Frame { body, ..plain(&ToMind::Observe(Box::new(seen))) }
 }
@@ -158,11 +188,23 @@ pub fn observation_frame(observation: &Observation) -> Frame {
 /// The observation in a frame.
 pub(crate) fn observation(seen: Seen, body: &[u8]) -> Result<Observation, String> {
     let mut images = Images::default();
+    let of_film =
+        |FilmHead { frame, camera }| FilmFrame { frame, camera, images: Images::default() };
+    let mut film: Vec<FilmFrame> = seen.film.iter().copied().map(of_film).collect();
     for head in &seen.images {
         let end = head.offset.checked_add(head.bytes);
         let bytes = end.and_then(|end| body.get(head.offset..end));
         let bytes = bytes.ok_or_else(|| format!("the image {} isn't there", head.name))?;
-        match head.name.as_str() {
+        let unknown = || format!("there is no image `{}`", head.name);
+        let (images, name) = match head.name.split_once('.') {
+            None => (&mut images, head.name.as_str()),
+            Some((prefix, name)) => {
+                let number = prefix.strip_prefix("film").and_then(|k| k.parse::<usize>().ok());
+                let of_film = number.and_then(|k| film.get_mut(k)).ok_or_else(unknown)?;
+                (&mut of_film.images, name)
+            }
+        };
+        match name {
             "rgb" => images.rgb = Some(bytes.to_vec()),
             "depth_m" => {
                 let (numbers, _) = bytes.as_chunks::<4>();
@@ -172,9 +214,9 @@ pub(crate) fn observation(seen: Seen, body: &[u8]) -> Result<Observation, String
                 let (numbers, _) = bytes.as_chunks::<2>();
                 images.ids = Some(numbers.iter().map(|b| u16::from_le_bytes(*b)).collect());
             }
-            other => return Err(format!("there is no image `{other}`")),
+            _ => return Err(unknown()),
         }
     }
     let Seen { frame, own, camera, granted, .. } = seen;
-    Ok(Observation { frame, own, camera, images, granted })
+    Ok(Observation { frame, own, camera, images, film, granted })
 }

@@ -20,9 +20,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if !trainer.resume(&fs::read(&checkpoint)?) {
         return Err(format!("{checkpoint} is of another network").into());
     }
-    let mut detector = TrainedDetector::uncalibrated(&trainer.detector, &trainer.average);
+    let mut detector = TrainedDetector::uncalibrated(&trainer.detector, &trainer.learner.average);
     detector.calibration = calibrate(&detector, ViewRules::NATURAL, n_views, 2);
-    println!("step {}: {:?}", trainer.adam.steps, detector.calibration);
+    println!("step {}: {:?}", trainer.learner.adam.steps, detector.calibration);
     let canonical = ViewRules { varied: 0.0, ..ViewRules::TRAINING };
     for (name, rules) in [("training", ViewRules::TRAINING), ("natural", ViewRules::NATURAL)] {
         let found = evaluate(&detector, rules, n_views, 2);

@@ -1,12 +1,13 @@
-//! Learned perception: which things are in an image of color and depth, where, and of which classes.
+//! Learned perception: which things are in an image of color and depth, where, and of which classes; and
+//! what a person in a film does.
 //!
 //! **What it is**: [`labels`] says what a pixel can be of, [`features`] what the network reads,
 //! [`views`] draws random views of generated episodes with labels, [`detector`] is the network, [`loss`]
-//! what it learns by, [`train`] the loop, [`training_run`]
-//! its folder; [`instances`] makes things of what it says, [`calibration`] tells
-//! how sure each is, [`trained`] is all of it as one file, and
-//! [`average_precision`] tells how good they are and [`failures`] what goes wrong. [`tracker`] tells which thing is which over time, and
-//! [`perception`] makes all of it the eyes of a mind; [`noisy`] stands in for it.
+//! what it learns by, [`train`] the loop, [`learner`] the numbers that any loop changes, [`training_run`]
+//! a loop's folder; [`instances`] makes things of what the network says, [`calibration`] tells how sure
+//! each is, [`trained`] is all of it as one file, and [`average_precision`] tells how good they are and
+//! [`failures`] what goes wrong. [`tracker`] tells which thing is which over time, and [`perception`]
+//! makes all of it the eyes of a mind; [`noisy`] stands in for it. [`behavior`] tells what people do.
 //!
 //! **What it is not**: it knows no goals, rules or minds.
 //!
@@ -33,12 +34,15 @@ pub mod average_precision;
 pub mod evaluate;
 pub mod failures;
 
+pub mod learner;
 pub mod train;
 pub mod training_run;
 
 pub mod noisy;
 pub mod perception;
 pub mod tracker;
+
+pub mod behavior;
 
 #[cfg(test)]
 mod tests;

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use chaic_agents::perception::{Perception, Percepts, Sight};
+use chaic_agents::perception::{Perception, Percepts};
+use chaic_agents::sight::Sight;
 use chaic_agents::track::{Hands, Intent, TrackId};
 use chaic_protocol::observation::{Grants, Senses};
 use chaic_protocol::rng::Stream;

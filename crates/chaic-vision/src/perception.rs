@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use chaic_agents::perception::{Perception, Percepts, PixelKind, STRIDE, Segments, Sight};
+use chaic_agents::perception::{Perception, Percepts, PixelKind, STRIDE, Segments};
+use chaic_agents::sight::Sight;
 use chaic_agents::track::{Hands, Intent, TrackId};
 use chaic_nn::Inference;
 use chaic_nn::simd::widest;

@@ -11,7 +11,7 @@ use chaic_protocol::{EntityId, Vec3};
 
 use crate::average_precision::average_precision;
 use crate::detector::{Detector, N_OFFSETS, STRIDE};
-use crate::evaluate::{LEAST_PX, compare};
+use crate::evaluate::{LEAST_PX, compare, report};
 use crate::features::{Crop, N_FEATURES, features};
 use crate::instances::{InstanceRules, instances};
 use crate::labels::{BACKGROUND, class_of, label_of, n_labels};
@@ -19,7 +19,7 @@ use crate::loss::{LossRules, Targets, loss};
 use crate::train::{CropRules, Trainer, TrainingRules};
 use crate::trained::TrainedDetector;
 use crate::training_run::{
-    CHECKPOINT, CONFIG, Record, TrainingError, TrainingRun, WEIGHTS, read_rules,
+    CHECKPOINT, CONFIG, Of, Record, Training as _, TrainingError, TrainingRun, read_rules,
 };
 use crate::views::{LabelledView, Part, ViewRules, Views};
 
@@ -129,12 +129,12 @@ fn views_are_the_same_each_time_and_others_elsewhere() {
 fn training_goes_on_from_a_checkpoint_as_if_it_had_not_stopped() {
     let mut straight = Trainer::new(tiny());
     straight.step();
-    let checkpoint = straight.checkpoint();
-    let expected = (straight.step(), straight.checkpoint());
+    let checkpoint = straight.learner.checkpoint();
+    let expected = (straight.step(), straight.learner.checkpoint());
     let mut resumed = Trainer::new(tiny());
     assert!(!resumed.resume(&checkpoint[..100]) && !resumed.resume(&[]));
     assert!(resumed.resume(&checkpoint));
-    assert!((resumed.step(), resumed.checkpoint()) == expected);
+    assert!((resumed.step(), resumed.learner.checkpoint()) == expected);
 }
 
 #[test]
@@ -142,24 +142,34 @@ fn a_training_leaves_what_it_takes_to_go_on_and_weights_that_are_read_back() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("training");
     let rules = TrainingRules { steps: 1, ..tiny() };
-    let mut run = TrainingRun::begin(&out, rules).unwrap();
+    let quiet = &mut |_: &str| ();
+    let mut run = TrainingRun::<Trainer>::begin(&out, &rules, quiet).unwrap();
     let stopped = AtomicBool::new(true);
     assert!(!run.go_on(&stopped, &mut |_| ()).unwrap() && run.extent() == (0, 1));
-    assert!(matches!(TrainingRun::begin(&out, rules), Err(TrainingError::NotEmpty(_))));
-    assert_eq!(read_rules(&out.join(CONFIG)).unwrap(), rules);
-    let mut resumed = TrainingRun::resume(&out).unwrap();
+    assert!(matches!(
+        TrainingRun::<Trainer>::begin(&out, &rules, quiet),
+        Err(TrainingError::NotEmpty(_))
+    ));
+    assert_eq!(read_rules::<Trainer>(&out.join(CONFIG)).unwrap(), rules);
+    let mut resumed = TrainingRun::<Trainer>::resume(&out, quiet).unwrap();
     let mut told = Vec::new();
     stopped.store(false, Ordering::Relaxed);
-    assert!(resumed.go_on(&stopped, &mut |record| told.push(*record)).unwrap());
-    assert!(matches!(told[..], [Record::Loss { step: 1, .. }, Record::Validation { step: 1, .. }]));
-    let bytes = std::fs::read(out.join(WEIGHTS)).unwrap();
+    assert!(resumed.go_on(&stopped, &mut |record| told.push(record.clone())).unwrap());
+    assert!(matches!(
+        told[..],
+        [Record { of: Of::Loss, step: 1, .. }, Record { of: Of::Validation, step: 1, .. }]
+    ));
+    let bytes = std::fs::read(out.join(Trainer::WEIGHTS)).unwrap();
     let trained = TrainedDetector::from_bytes(&bytes).unwrap();
     assert_eq!(trained.to_bytes(), bytes);
     assert!(TrainedDetector::from_bytes(&bytes[..bytes.len() - 1]).is_err());
     std::fs::write(out.join(CHECKPOINT), b"short").unwrap();
-    assert!(matches!(TrainingRun::resume(&out), Err(TrainingError::Checkpoint(_))));
+    assert!(matches!(
+        TrainingRun::<Trainer>::resume(&out, quiet),
+        Err(TrainingError::Checkpoint(_))
+    ));
     std::fs::write(out.join(CONFIG), "stepps = 3").unwrap();
-    let error = TrainingRun::resume(&out).err().unwrap().to_string();
+    let error = TrainingRun::<Trainer>::resume(&out, quiet).err().unwrap().to_string();
     assert!(error.contains("stepps"), "{error}");
 }
 
@@ -177,6 +187,13 @@ fn images_that_are_none_show_nothing_and_break_nothing() {
         }
     }
     assert!(!trained.fits(&Camera { width: 65, ..camera }));
+}
+
+#[test]
+fn the_detector_that_comes_with_chaic_is_read_and_finds_most_of_what_it_is_shown() {
+    let trained = TrainedDetector::built_in();
+    let found = report(&trained, (Part::Validation, ViewRules::NATURAL), 8, 2);
+    assert!(found.map50 > 0.5, "{}", found.map50);
 }
 
 #[test]

@@ -1,16 +1,17 @@
 //! The training loop of the detector.
 
-use std::thread;
-
-use chaic_nn::simd::widest;
-use chaic_nn::{Adam, AdamRules, Network, Pass, Shape, Tensor};
+use chaic_nn::{AdamRules, Network, Pass, Shape, Tensor};
 use chaic_protocol::rng::Stream;
 use serde::{Deserialize, Serialize};
 
 use crate::detector::Detector;
+use crate::evaluate::{calibrate, evaluate};
 use crate::features::{Crop, N_FEATURES, features};
 use crate::labels::BACKGROUND;
+use crate::learner::{Learner, rate_at};
 use crate::loss::{Loss, LossRules, Targets, loss};
+use crate::trained::TrainedDetector;
+use crate::training_run::{Figures, Training};
 use crate::views::{LabelledView, Part, ViewRules, Views};
 
 /// Which parts of views are learned from.
@@ -79,9 +80,7 @@ impl TrainingRules {
 
     /// The rate of a step.
     pub fn rate_at(&self, step: u64) -> f32 {
-        let rise = ((step + 1) as f32 / self.warm_up as f32).min(1.0);
-        let left = 1.0 - (step as f32 / self.steps as f32).min(1.0);
-        self.rate * rise * (0.01 + 0.99 * left * left)
+        rate_at(step, (self.rate, self.warm_up, self.steps))
     }
 }
 
@@ -168,92 +167,99 @@ pub struct Trainer {
     pub rules: TrainingRules,
     /// The network.
     pub detector: Detector,
-    /// Its numbers.
-    pub numbers: Vec<f32>,
-    /// A slow mean of them, which is what is shipped.
-    pub average: Vec<f32>,
-    /// How steps are taken.
-    pub adam: Adam,
-    passes: Vec<(Pass, Vec<f32>)>,
+    /// What is learned.
+    pub learner: Learner,
 }
-
-/// Share of a step's numbers in the slow mean.
-const AVERAGE_RATE: f32 = 0.002;
 
 impl Trainer {
     /// Before the first step.
     pub fn new(rules: TrainingRules) -> Trainer {
         let detector = Detector::new();
-        let numbers = detector.network.begin(rules.seed);
-        let adam = Adam::new(numbers.len());
-        let pass = || (Pass::new(&detector.network, widest()), vec![0.0; numbers.len()]);
-        let passes = (0..rules.shards).map(|_| pass()).collect();
-        Trainer { rules, average: numbers.clone(), numbers, adam, passes, detector }
-    }
-
-    /// All that is needed to go on, as bytes.
-    pub fn checkpoint(&self) -> Vec<u8> {
-        let lists = [&self.numbers, &self.average, &self.adam.mean, &self.adam.square];
-        let mut bytes = self.adam.steps.to_le_bytes().to_vec();
-        for x in lists.into_iter().flatten() {
-            bytes.extend_from_slice(&x.to_le_bytes());
-        }
-        bytes
+        let learner = Learner::new(&detector.network, rules.seed, rules.shards);
+        Trainer { rules, detector, learner }
     }
 
     /// Goes on from a checkpoint; `false` if it is of another network.
     pub fn resume(&mut self, bytes: &[u8]) -> bool {
-        let n = self.numbers.len();
-        let Some((steps, rest)) = bytes.split_first_chunk::<8>() else { return false };
-        let numbers: Vec<f32> =
-            rest.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
-        if rest.len() != 16 * n {
-            return false;
-        }
-        let list = |k: usize| numbers[k * n..][..n].to_vec();
-        (self.numbers, self.average) = (list(0), list(1));
-        let steps = u64::from_le_bytes(*steps);
-        self.adam = Adam::resumed(&self.rules.adam, steps, list(2), list(3));
-        true
+        self.learner.resume(&self.rules.adam, bytes)
     }
 
     /// Takes a step on fresh views; which ones depends on the seed and the step alone.
     pub fn step(&mut self) -> Loss {
-        let step = self.adam.steps;
-        let Trainer { rules, detector, numbers, passes, .. } = self;
-        let (rules, numbers, detector) = (&*rules, &*numbers, &*detector);
-        let work = |shard: usize, pass: &mut Pass, by: &mut [f32]| {
+        let step = self.learner.adam.steps;
+        let Trainer { rules, detector, learner } = self;
+        let (rules, detector) = (&*rules, &*detector);
+        let work = |shard: usize, numbers: &[f32], pass: &mut Pass, by: &mut [f32]| {
             let index = step * rules.shards as u64 + shard as u64;
             let mut views = Views::new(Part::Training, rules.views, rules.seed, index);
             let mut rng = Stream::new(rules.seed, "crops", index);
             let crops = &rules.crops[index as usize % rules.crops.len()];
             let batch = draw(&mut views, &mut rng, rules, crops);
-            by.fill(0.0);
             gradient(detector, numbers, &batch, &rules.loss, pass, by)
         };
-        let losses: Vec<Loss> = thread::scope(|scope| {
-            let workers: Vec<_> = passes
-                .iter_mut()
-                .enumerate()
-                .map(|(shard, (pass, by))| scope.spawn(move || work(shard, pass, by)))
-                .collect();
-            workers.into_iter().map(|w| w.join().expect("it doesn't panic")).collect()
+        mean_of(&learner.step(&detector.network, (&rules.adam, rules.rate_at(step)), work))
+    }
+}
+
+/// Views of a validation, and those that scores are calibrated by.
+const VALIDATION_VIEWS: usize = 200;
+const CALIBRATION_VIEWS: usize = 400;
+
+impl Training for Trainer {
+    type Rules = TrainingRules;
+    const WEIGHTS: &'static str = "detector.safetensors";
+
+    fn new(rules: &TrainingRules, _: &mut dyn FnMut(&str)) -> Trainer {
+        Trainer::new(*rules)
+    }
+
+    fn check(rules: &TrainingRules) -> Result<(), &'static str> {
+        let crops = rules.crops.iter();
+        let sides_fit = crops.clone().all(|c| {
+            c.side_px.is_multiple_of(32) && (32..=rules.views.size_px as usize).contains(&c.side_px)
         });
-        let part = 1.0 / rules.shards as f32;
-        let (first, rest) = self.passes.split_first_mut().expect("there are shards");
-        for (_, by) in rest {
-            first.1.iter_mut().zip(by.iter()).for_each(|(sum, g)| *sum += g);
+        let is_some = crops.clone().all(|c| c.views > 0 && c.of_view > 0);
+        if !sides_fit || !is_some || rules.shards == 0 || rules.steps == 0 || rules.warm_up == 0 {
+            return Err(
+                "steps, warm_up, shards, views and of_view are at least 1, and side_px is a \
+                 multiple of 32 up to views.size_px",
+            );
         }
-        first.1.iter_mut().for_each(|g| *g *= part);
-        let rate = self.rules.rate_at(step);
-        let network = &self.detector.network;
-        self.adam.step(&self.rules.adam, rate, network, &mut self.numbers, &first.1);
-        // Of the last eighth of the steps, or the mean would keep what the network began with.
-        let share = AVERAGE_RATE.max(8.0 / (self.adam.steps as f32 + 8.0));
-        for (mean, x) in self.average.iter_mut().zip(&self.numbers) {
-            *mean += share * (x - *mean);
-        }
-        mean_of(&losses)
+        Ok(())
+    }
+
+    fn steps(&self) -> u64 {
+        self.rules.steps
+    }
+
+    fn learner(&self) -> &Learner {
+        &self.learner
+    }
+
+    fn resume(&mut self, bytes: &[u8]) -> bool {
+        Trainer::resume(self, bytes)
+    }
+
+    fn step(&mut self) -> Figures {
+        let Loss { labels, offsets, right, right_of_things } = Trainer::step(self);
+        let named = [
+            ("labels", labels),
+            ("offsets", offsets),
+            ("right", right),
+            ("right_of_things", right_of_things),
+        ];
+        named.into_iter().collect()
+    }
+
+    fn validate(&self) -> (Figures, Vec<u8>) {
+        let average = &self.learner.average;
+        let mut detector = TrainedDetector::uncalibrated(&self.detector, average);
+        let (views, threads) = (self.rules.views, self.rules.shards);
+        let found = evaluate(&detector, views, VALIDATION_VIEWS, threads);
+        let natural = ViewRules { size_px: views.size_px, ..ViewRules::NATURAL };
+        detector.calibration = calibrate(&detector, natural, CALIBRATION_VIEWS, threads);
+        let figures = [("map50", found.map50), ("map", found.map)];
+        (figures.into_iter().collect(), detector.to_bytes())
     }
 }
 

@@ -41,6 +41,12 @@ impl TrainedDetector {
         TrainedDetector { detector, numbers, calibration: Calibration::default() }
     }
 
+    /// The one that comes with chaic: weights/README.md says how it was made and how good it is.
+    pub fn built_in() -> TrainedDetector {
+        let bytes = include_bytes!("../weights/detector.safetensors");
+        TrainedDetector::from_bytes(bytes).expect("a test reads it")
+    }
+
     /// From a safetensors file.
     ///
     /// # Errors

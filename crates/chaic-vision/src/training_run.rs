@@ -1,6 +1,7 @@
 //! A training with a folder of its own: what it was begun with, checkpoints, curves and weights. It can
 //! be stopped at any step and gone on with, bit for bit.
 
+use std::collections::BTreeMap;
 use std::fs::{self, OpenOptions};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -8,12 +9,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use chaic_files::{FileError, read_bounded, write_whole};
 use serde::Serialize;
+use serde::de::DeserializeOwned;
 
-use crate::evaluate::{calibrate, evaluate};
-use crate::loss::Loss;
-use crate::train::{Trainer, TrainingRules};
-use crate::trained::TrainedDetector;
-use crate::views::ViewRules;
+use crate::learner::Learner;
 
 /// What it was begun with.
 pub const CONFIG: &str = "config.toml";
@@ -21,16 +19,10 @@ pub const CONFIG: &str = "config.toml";
 pub const CHECKPOINT: &str = "checkpoint.bin";
 /// Losses and validations, a JSON object a line.
 pub const CURVES: &str = "curves.jsonl";
-/// The weights so far, for minds.
-pub const WEIGHTS: &str = "detector.safetensors";
-
 /// Steps between two records of the loss, checkpoints, and validations.
 const RECORD_STEPS: u64 = 20;
 const CHECKPOINT_STEPS: u64 = 250;
 const VALIDATION_STEPS: u64 = 1000;
-/// Views of a validation, and those that scores are calibrated by.
-const VALIDATION_VIEWS: usize = 200;
-const CALIBRATION_VIEWS: usize = 400;
 /// No checkpoint or configuration is larger, bytes.
 const MOST_BYTES: u64 = 1 << 30;
 
@@ -61,57 +53,88 @@ pub enum TrainingError {
     NotANumber(u64),
 }
 
+/// Numbers with their names.
+pub type Figures = BTreeMap<&'static str, f64>;
+
 /// A line of the curves.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[serde(tag = "of", rename_all = "snake_case")]
-pub enum Record {
-    /// Means over the steps since the last one.
-    Loss {
-        /// The last of these steps.
-        step: u64,
-        /// Cross entropy of labels.
-        labels: f64,
-        /// How far offsets are off.
-        offsets: f64,
-        /// Weighted share of pixels with the right label.
-        right: f64,
-        /// Of those of things.
-        right_of_things: f64,
-    },
-    /// On views of the validation part, drawn as those for training.
-    Validation {
-        /// After so many steps.
-        step: u64,
-        /// Mean average precision at an overlap of one half.
-        map50: f64,
-        /// Over overlaps from 0.5 to 0.95.
-        map: f64,
-    },
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Record {
+    /// What the figures are of.
+    pub of: Of,
+    /// After so many steps.
+    pub step: u64,
+    /// The figures: means over the steps since the last record, or those of a validation.
+    #[serde(flatten)]
+    pub figures: Figures,
+}
+
+/// What figures are of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Of {
+    /// What is learned from.
+    Loss,
+    /// What nothing is learned from.
+    Validation,
+}
+
+/// Something that is trained in a folder of its own.
+pub trait Training: Sized {
+    /// What it is begun with: a file in TOML.
+    type Rules: Clone + Default + Serialize + DeserializeOwned;
+    /// The name of the file of weights.
+    const WEIGHTS: &'static str;
+
+    /// Before the first step. `tell` is called while it gets ready, with what has been done.
+    fn new(rules: &Self::Rules, tell: &mut dyn FnMut(&str)) -> Self;
+
+    /// What is wrong with rules by which nothing can be trained.
+    ///
+    /// # Errors
+    /// That, in a sentence.
+    fn check(rules: &Self::Rules) -> Result<(), &'static str>;
+
+    /// Steps in all.
+    fn steps(&self) -> u64;
+
+    /// What is learned.
+    fn learner(&self) -> &Learner;
+
+    /// Goes on from a checkpoint; `false` if it is of another network.
+    fn resume(&mut self, bytes: &[u8]) -> bool;
+
+    /// Takes a step.
+    fn step(&mut self) -> Figures;
+
+    /// How good it is so far on what nothing is learned from, and its weights as a file.
+    fn validate(&self) -> (Figures, Vec<u8>);
 }
 
 /// A training and its folder.
-pub struct TrainingRun {
+pub struct TrainingRun<T> {
     folder: PathBuf,
-    trainer: Trainer,
-    threads: usize,
+    training: T,
 }
 
-impl TrainingRun {
+impl<T: Training> TrainingRun<T> {
     /// A new one.
     ///
     /// # Errors
     /// If the folder isn't empty, or the file system refuses.
-    pub fn begin(folder: &Path, rules: TrainingRules) -> Result<TrainingRun, TrainingError> {
+    pub fn begin(
+        folder: &Path,
+        rules: &T::Rules,
+        tell: &mut dyn FnMut(&str),
+    ) -> Result<TrainingRun<T>, TrainingError> {
         let is_taken = fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
         if is_taken {
             return Err(TrainingError::NotEmpty(folder.to_owned()));
         }
         fs::create_dir_all(folder).map_err(FileError::of("can't make", folder))?;
         let path = folder.join(CONFIG);
-        let text = toml::to_string(&rules).expect("rules are plain data");
+        let text = toml::to_string(rules).expect("rules are plain data");
         write_whole(&path, text.as_bytes())?;
-        let (folder, trainer) = (folder.to_owned(), Trainer::new(rules));
-        let run = TrainingRun { folder, trainer, threads: rules.shards };
+        let run = TrainingRun { folder: folder.to_owned(), training: T::new(rules, tell) };
         run.keep()?;
         Ok(run)
     }
@@ -120,19 +143,27 @@ impl TrainingRun {
     ///
     /// # Errors
     /// If its files can't be read or aren't those of a training.
-    pub fn resume(folder: &Path) -> Result<TrainingRun, TrainingError> {
-        let rules = read_rules(&folder.join(CONFIG))?;
+    pub fn resume(
+        folder: &Path,
+        tell: &mut dyn FnMut(&str),
+    ) -> Result<TrainingRun<T>, TrainingError> {
+        let rules = read_rules::<T>(&folder.join(CONFIG))?;
         let path = folder.join(CHECKPOINT);
-        let mut trainer = Trainer::new(rules);
-        if !trainer.resume(&read_bounded(&path, MOST_BYTES)?) {
+        let bytes = read_bounded(&path, MOST_BYTES)?;
+        let mut training = T::new(&rules, tell);
+        if !training.resume(&bytes) {
             return Err(TrainingError::Checkpoint(path));
         }
-        Ok(TrainingRun { folder: folder.to_owned(), trainer, threads: rules.shards })
+        Ok(TrainingRun { folder: folder.to_owned(), training })
     }
 
     /// Steps taken and steps in all.
     pub fn extent(&self) -> (u64, u64) {
-        (self.trainer.adam.steps, self.trainer.rules.steps)
+        (self.taken(), self.training.steps())
+    }
+
+    fn taken(&self) -> u64 {
+        self.training.learner().adam.steps
     }
 
     /// Takes steps until there are no more or `stop` is raised; whether it came to the end.
@@ -144,33 +175,27 @@ impl TrainingRun {
         stop: &AtomicBool,
         tell: &mut dyn FnMut(&Record),
     ) -> Result<bool, TrainingError> {
-        let mut losses: Vec<Loss> = Vec::new();
-        while self.trainer.adam.steps < self.trainer.rules.steps {
+        let mut told: Vec<Figures> = Vec::new();
+        while self.taken() < self.training.steps() {
             if stop.load(Ordering::Relaxed) {
                 self.keep()?;
                 return Ok(false);
             }
-            let loss = self.trainer.step();
-            let step = self.trainer.adam.steps;
-            if !(loss.labels + loss.offsets).is_finite() {
+            let figures = self.training.step();
+            let step = self.taken();
+            if !figures.values().all(|x| x.is_finite()) {
                 return Err(TrainingError::NotANumber(step));
             }
-            losses.push(loss);
-            let is_last = step == self.trainer.rules.steps;
+            told.push(figures);
+            let is_last = step == self.training.steps();
             if step.is_multiple_of(RECORD_STEPS) || is_last {
-                self.record(&mean(step, &losses), tell)?;
-                losses.clear();
+                self.record(&Record { of: Of::Loss, step, figures: mean(&told) }, tell)?;
+                told.clear();
             }
             if step.is_multiple_of(VALIDATION_STEPS) || is_last {
-                let mut detector = self.detector();
-                let found =
-                    evaluate(&detector, self.trainer.rules.views, VALIDATION_VIEWS, self.threads);
-                let (map50, map) = (found.map50, found.map);
-                self.record(&Record::Validation { step, map50, map }, tell)?;
-                let size_px = self.trainer.rules.views.size_px;
-                let views = ViewRules { size_px, ..ViewRules::NATURAL };
-                detector.calibration = calibrate(&detector, views, CALIBRATION_VIEWS, self.threads);
-                write_whole(&self.folder.join(WEIGHTS), &detector.to_bytes())?;
+                let (figures, weights) = self.training.validate();
+                self.record(&Record { of: Of::Validation, step, figures }, tell)?;
+                write_whole(&self.folder.join(T::WEIGHTS), &weights)?;
             }
             if step.is_multiple_of(CHECKPOINT_STEPS) || is_last {
                 self.keep()?;
@@ -179,13 +204,9 @@ impl TrainingRun {
         Ok(true)
     }
 
-    /// The detector so far: the slow mean of its numbers.
-    fn detector(&self) -> TrainedDetector {
-        TrainedDetector::uncalibrated(&self.trainer.detector, &self.trainer.average)
-    }
-
     fn keep(&self) -> Result<(), TrainingError> {
-        Ok(write_whole(&self.folder.join(CHECKPOINT), &self.trainer.checkpoint())?)
+        let checkpoint = self.training.learner().checkpoint();
+        Ok(write_whole(&self.folder.join(CHECKPOINT), &checkpoint)?)
     }
 
     fn record(&self, record: &Record, tell: &mut dyn FnMut(&Record)) -> Result<(), TrainingError> {
@@ -202,32 +223,21 @@ impl TrainingRun {
 /// The rules in a file; those that it doesn't name are as shipped.
 ///
 /// # Errors
-/// If it can't be read, or names rules that aren't there.
-pub fn read_rules(path: &Path) -> Result<TrainingRules, TrainingError> {
+/// If it can't be read, names rules that aren't there, or nothing can be trained by them.
+pub fn read_rules<T: Training>(path: &Path) -> Result<T::Rules, TrainingError> {
     let bytes = read_bounded(path, MOST_BYTES)?;
     let wrong = |problem: String| TrainingError::Config { path: path.to_owned(), problem };
     let text = std::str::from_utf8(&bytes).map_err(|e| wrong(e.to_string()))?;
-    let rules: TrainingRules = toml::from_str(text).map_err(|e| wrong(e.message().to_owned()))?;
-    let crops = rules.crops.iter();
-    let sides_fit = crops.clone().all(|c| {
-        c.side_px.is_multiple_of(32) && (32..=rules.views.size_px as usize).contains(&c.side_px)
-    });
-    let is_some = crops.clone().all(|c| c.views > 0 && c.of_view > 0);
-    if !sides_fit || !is_some || rules.shards == 0 || rules.steps == 0 || rules.warm_up == 0 {
-        let problem = "steps, warm_up, shards, views and of_view are at least 1, and side_px is a \
-                       multiple of 32 up to views.size_px";
-        return Err(wrong(problem.to_owned()));
-    }
+    let rules: T::Rules = toml::from_str(text).map_err(|e| wrong(e.message().to_owned()))?;
+    T::check(&rules).map_err(|problem| wrong(problem.to_owned()))?;
     Ok(rules)
 }
 
-fn mean(step: u64, losses: &[Loss]) -> Record {
-    let mean = |of: fn(&Loss) -> f64| losses.iter().map(of).sum::<f64>() / losses.len() as f64;
-    Record::Loss {
-        step,
-        labels: mean(|l| l.labels),
-        offsets: mean(|l| l.offsets),
-        right: mean(|l| l.right),
-        right_of_things: mean(|l| l.right_of_things),
+/// The mean of each figure.
+fn mean(told: &[Figures]) -> Figures {
+    let mut sums = Figures::new();
+    for (name, x) in told.iter().flatten() {
+        *sums.entry(name).or_default() += x / told.len() as f64;
     }
+    sums
 }

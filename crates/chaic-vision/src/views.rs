@@ -28,7 +28,7 @@ pub enum Part {
 
 impl Part {
     /// The first seed, and how many there are.
-    fn seeds(self) -> (u64, usize) {
+    pub(crate) fn seeds(self) -> (u64, usize) {
         match self {
             Part::Training => (10_000_000, 1_000_000),
             Part::Validation => (20_000_000, 10_000),
@@ -85,6 +85,21 @@ impl ViewRules {
         aimed: 0.8,
         aimed_movable: 0.75,
         distance_m: [0.6, 5.0],
+    };
+
+    /// Places as episodes begin with other things in them, so that every class of the catalogue occurs;
+    /// what the detector is told to be good at.
+    pub const ALL_CLASSES: ViewRules = ViewRules {
+        added: 4,
+        decor: 0.3,
+        large: 0.1,
+        refurnished: (0.2, 1.8),
+        carrying: 0.2,
+        filled: 0.1,
+        varied: 0.0,
+        aimed: 0.6,
+        aimed_movable: 0.5,
+        ..ViewRules::TRAINING
     };
 
     /// Places as episodes begin, seen from anywhere; what scores are calibrated by.

@@ -147,8 +147,14 @@ impl World {
 
     /// Runs frames until some agent waits to be asked, or the episode ends.
     pub fn advance(&mut self) {
+        self.advance_watched(&mut |_| ());
+    }
+
+    /// The same, with somebody who looks on after each frame.
+    pub fn advance_watched(&mut self, look_on: &mut dyn FnMut(&World)) {
         while !self.state.over && self.state.people.iter().all(|p| p.activity.is_some()) {
             self.tick();
+            look_on(self);
         }
     }
 

@@ -26,7 +26,8 @@ pub use self::exec::{
 };
 pub use self::fidelity::FidelityArguments;
 pub use self::perception::{
-    DetectionArguments, EvalPerceptionCommand, Look, TrainArguments, TrainCommand,
+    BehaviorArguments, DetectionArguments, EvalPerceptionCommand, Look, Scenes, TrainArguments,
+    TrainCommand,
 };
 
 fn partner_is_help() -> String {
@@ -161,6 +162,10 @@ pub struct EvalArguments {
     /// detector that comes with chaic, or learned:FILE, other weights of it.
     #[arg(long, value_name = "KIND")]
     pub perception: Option<String>,
+    /// By what helpers who aren't told the goal tell what their partner does: gt (usual), what they are
+    /// granted and what follows from things in hands; or learned:FILE, a network that watches.
+    #[arg(long, value_name = "KIND")]
+    pub behavior: Option<String>,
     #[command(flatten)]
     pub exec: ExecArguments,
     #[command(flatten)]

@@ -63,6 +63,7 @@ const ALLOWED: &[Arrows] = &[
             "chaic-render",
             "chaic-nn",
             "chaic-agents",
+            "chaic-env",
         ],
         &[],
     ),

@@ -4,8 +4,9 @@ use chaic_protocol::ClassId;
 use chaic_protocol::observation::Grants;
 
 use super::*;
-use crate::perception::{GroundTruthIds, Pointing, TrueSight};
+use crate::perception::{GroundTruthIds, Pointing};
 use crate::policies::{RulePolicy, RuleProfile};
+use crate::sight::TrueSight;
 use crate::test_support::{Toy, ToyObject};
 use crate::{helpers, partners};
 

@@ -1,7 +1,6 @@
 //! What is in the image: detections, and which pixels tell nothing of the room.
 
 mod segments;
-mod sight;
 
 use chaic_protocol::observation::Identity;
 use chaic_protocol::{
@@ -12,7 +11,6 @@ use crate::track::{Carried, Hands, Intent, TrackId};
 
 pub(crate) use segments::Rays;
 pub use segments::{Extent, MIN_PIXELS, PixelKind, STRIDE, Segments};
-pub use sight::{Sight, TrueSight};
 
 /// One thing seen in an image.
 #[derive(Clone, Debug, PartialEq)]

@@ -144,7 +144,7 @@ fn both_told(sides: &[Side; 2]) -> Option<[Seen; 2]> {
 fn difference(a: &Seen, b: &Seen) -> Option<&'static str> {
     let (x, y) = (&a.observation, &b.observation);
     let checks = [
-        ("an image", x.images == y.images),
+        ("an image", x.images == y.images && x.film == y.film),
         (TIME, x.frame == y.frame),
         ("the outcome of the own action", x.own.last == y.own.last),
         ("the own state", x.own == y.own),

@@ -102,9 +102,12 @@ impl Labels<'_> {
     }
 }
 
+/// What files call perception by ids from ground truth.
+const GIVEN: &str = "ground_truth";
+
 impl GrantsFile {
     fn of(grants: &Grants, by: Option<&String>) -> GrantsFile {
-        let usual = if grants.ids { "ground_truth" } else { "own" };
+        let usual = if grants.ids { GIVEN } else { "own" };
         let perception = by.map_or_else(|| usual.to_owned(), String::clone);
         GrantsFile { grants: names(grants), perception }
     }
@@ -122,8 +125,11 @@ fn words(grants: &Grants, by: Option<&str>) -> Vec<String> {
     let others = names(&Grants { ids: false, ..*grants });
     let ids = grants.ids.then(|| "ids from ground truth".to_owned());
     // The digits that name the weights are for files.
-    let kind = by.and_then(|by| by.split(' ').next());
-    let own = kind.map(|kind| format!("{kind} perception"));
+    let parts = by.into_iter().flat_map(|by| by.split(", ")).filter(|part| *part != GIVEN);
+    let own = parts.map(|part| match part.strip_prefix("behavior ") {
+        Some(behavior) => format!("{} behavior", behavior.split(' ').next().unwrap_or_default()),
+        None => format!("{} perception", part.split(' ').next().unwrap_or_default()),
+    });
     let others = (!others.is_empty()).then(|| format!("told {}", told(&others)));
     let all: Vec<String> = ids.into_iter().chain(own).chain(others).collect();
     if all.is_empty() { vec!["own eyes only".to_owned()] } else { all }

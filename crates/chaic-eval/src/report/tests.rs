@@ -52,6 +52,7 @@ fn options() -> RunOptions {
         partner_is: None,
         appearance: None,
         perception: None,
+        behavior: None,
     }
 }
 

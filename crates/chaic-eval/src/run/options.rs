@@ -56,6 +56,9 @@ pub struct RunOptions {
     /// ground truth.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub perception: Option<String>,
+    /// By what helpers tell what others do, as `--behavior` has it; absent for what is granted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub behavior: Option<String>,
 }
 
 fn yes() -> bool {
@@ -99,9 +102,11 @@ pub struct RunRequest {
     pub appearance: Option<Appearance>,
     /// `--perception`.
     pub perception: Option<String>,
+    /// `--behavior`.
+    pub behavior: Option<String>,
 }
 
-/// What `--perception` says of ids from ground truth.
+/// What `--perception` says of ids from ground truth, and `--behavior` of what is granted.
 pub const GROUND_TRUTH: &str = "gt";
 
 /// What `split` says where the episodes are files.
@@ -183,6 +188,7 @@ impl RunRequest {
             partner_is: self.partner_is,
             appearance: varies.map(|a| a.to_string()),
             perception: self.perception.clone().filter(|name| name != GROUND_TRUTH),
+            behavior: self.behavior.clone().filter(|name| name != GROUND_TRUTH),
         };
         options.rules()?;
         options.appearance()?;
@@ -240,6 +246,11 @@ impl RunRequest {
                 "--perception",
                 self.perception.clone(),
                 recorded.perception.clone().unwrap_or_else(|| GROUND_TRUTH.to_owned()),
+            ),
+            (
+                "--behavior",
+                self.behavior.clone(),
+                recorded.behavior.clone().unwrap_or_else(|| GROUND_TRUTH.to_owned()),
             ),
             ("--size", self.size.map(|n| n.to_string()), number(recorded.size)),
             (

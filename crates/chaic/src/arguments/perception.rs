@@ -9,6 +9,8 @@ use clap::{Args, Subcommand, ValueEnum};
 pub enum TrainCommand {
     /// The detector: which things are in an image, and where.
     Detector(TrainArguments),
+    /// The behavior network: what a person in a film does.
+    Behavior(TrainArguments),
 }
 
 /// Of `chaic train`.
@@ -35,6 +37,8 @@ pub struct TrainArguments {
 pub enum EvalPerceptionCommand {
     /// The detector: mean average precision by the COCO definition, failures by cause.
     Detection(DetectionArguments),
+    /// The behavior network, on clips that a following helper filmed: share told right, confusion.
+    Behavior(BehaviorArguments),
 }
 
 /// How views are lit and colored.
@@ -46,12 +50,26 @@ pub enum Look {
     Varied,
 }
 
+/// Which places are looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Scenes {
+    /// As episodes begin.
+    Natural,
+    /// The same with small things and some furniture swapped for others, so that every class occurs.
+    AllClasses,
+    /// As the detector is trained: crowded.
+    Crowded,
+}
+
 /// Of `chaic eval-perception detection`.
 #[derive(Debug, Args)]
 pub struct DetectionArguments {
-    /// The weights, a safetensors file.
+    /// The weights, a safetensors file; usual: those that come with chaic.
     #[arg(long, value_name = "FILE")]
-    pub weights: PathBuf,
+    pub weights: Option<PathBuf>,
+    /// Places that are looked at.
+    #[arg(long, value_enum, default_value_t = Scenes::AllClasses)]
+    pub scenes: Scenes,
     /// Views that are looked at, from environments that nothing was learned from.
     #[arg(long, value_name = "N", default_value_t = 2000)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=100_000))]
@@ -63,6 +81,35 @@ pub struct DetectionArguments {
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
     /// Views at a time; changes no figure. Usual: one for each core.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
+}
+
+/// Of `chaic eval-perception behavior`.
+#[derive(Debug, Args)]
+pub struct BehaviorArguments {
+    /// The weights, a safetensors file.
+    #[arg(long, value_name = "FILE")]
+    pub weights: PathBuf,
+    /// Clips of each behavior at most.
+    #[arg(long, value_name = "N", default_value_t = 100)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub clips: u32,
+    /// Episodes that are played for them at most.
+    #[arg(long, value_name = "N", default_value_t = 200)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub episodes: u32,
+    /// By what the helper who films knows the partner in its images: gt, learned, learned:FILE or
+    /// noisy:FILE.
+    #[arg(long, value_name = "KIND", default_value = "learned")]
+    pub perception: String,
+    /// Light and colors.
+    #[arg(long, value_enum, default_value_t = Look::Canonical)]
+    pub look: Look,
+    /// Write all figures into a JSON file, too.
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    /// Episodes at a time; changes no figure. Usual: one for each core.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
 }

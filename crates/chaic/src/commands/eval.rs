@@ -147,6 +147,7 @@ fn given(arguments: &EvalArguments) -> (RunRequest, &'static str) {
         partner_is: *partner_is,
         appearance,
         perception: arguments.perception.clone(),
+        behavior: arguments.behavior.clone(),
     };
     if given == RunRequest::default() && !arguments.resume {
         return (RunRequest { first: Some(QUICK_EPISODES), ..given }, "quick");

@@ -4,43 +4,65 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context as _, Result};
-use chaic_agents::perception::{Sight, TrueSight};
+use chaic_agents::sight::{Sight, TrueSight};
 
 use chaic_eval::EvalError;
 use chaic_eval::run::{GROUND_TRUTH, RunFolder, RunOptions};
 use chaic_files::read_bounded;
+use chaic_vision::behavior::recognize::Recognizing;
 use chaic_vision::noisy::{FaultRates, NoisySight};
 use chaic_vision::perception::LearnedSight;
+use chaic_vision::trained::TrainedDetector;
 
-use super::perception::read_detector;
+use super::perception::{read_behavior, read_detector};
 use crate::arguments::EvalArguments;
 
 /// As said, or as recorded for a run that is gone on with.
 pub fn of_run(arguments: &EvalArguments, path: &Path) -> Result<Arc<dyn Sight>> {
-    let recorded = || RunFolder::read(path).ok().and_then(|(_, options)| options.perception);
-    let named = match &arguments.perception {
-        None if arguments.resume => recorded(),
-        named => named.clone(),
+    let recorded = RunFolder::read(path).ok().filter(|_| arguments.resume).map(|(_, o)| o);
+    let (perception, behavior) =
+        recorded.map_or((None, None), |options| (options.perception, options.behavior));
+    let perception = arguments.perception.clone().or(perception);
+    let behavior = arguments.behavior.clone().or(behavior);
+    of_names(perception.as_deref(), behavior.as_deref())
+}
+
+/// By what one sees, and tells what others do.
+fn of_names(perception: Option<&str>, behavior: Option<&str>) -> Result<Arc<dyn Sight>> {
+    const LEARNED: &str = "learned:";
+    let sight = named_sight(perception.unwrap_or(GROUND_TRUTH))?;
+    let Some(name) = behavior.filter(|name| *name != GROUND_TRUTH) else { return Ok(sight) };
+    let Some(file) = name.strip_prefix(LEARNED) else {
+        let text = format!("no behavior `{name}`; write {GROUND_TRUTH} or {LEARNED}FILE");
+        return Err(EvalError::Options(text).into());
     };
-    named.map_or_else(|| Ok(Arc::new(TrueSight) as Arc<dyn Sight>), |name| named_sight(&name))
+    let trained = Arc::new(read_behavior(Path::new(file))?);
+    Ok(Arc::new(Recognizing { sight, trained }))
 }
 
 /// That of a run which has been played. Weights that are gone don't matter: minds aren't asked again,
 /// only what they ask for is looked at.
 pub fn recorded(options: &RunOptions) -> Arc<dyn Sight> {
-    let named = options.perception.as_deref().and_then(|name| named_sight(name).ok());
-    named.unwrap_or_else(|| Arc::new(TrueSight))
+    let of = of_names(options.perception.as_deref(), options.behavior.as_deref());
+    of.unwrap_or_else(|_| Arc::new(TrueSight))
 }
 
-fn named_sight(name: &str) -> Result<Arc<dyn Sight>> {
-    const LEARNED: &str = "learned:";
+/// The sight of this name.
+///
+/// # Errors
+/// If there is none, or its file can't be read.
+pub fn named_sight(name: &str) -> Result<Arc<dyn Sight>> {
+    const LEARNED: &str = "learned";
     /// No file of rates is larger, bytes.
     const MOST_BYTES: u64 = 1 << 20;
     const NOISY: &str = "noisy:";
     if name == GROUND_TRUTH {
         return Ok(Arc::new(TrueSight));
     }
-    if let Some(file) = name.strip_prefix(LEARNED) {
+    if name == LEARNED {
+        return Ok(Arc::new(LearnedSight::new(TrainedDetector::built_in())));
+    }
+    if let Some(file) = name.strip_prefix(LEARNED).and_then(|rest| rest.strip_prefix(':')) {
         return Ok(Arc::new(LearnedSight::new(read_detector(Path::new(file))?)));
     }
     if let Some(file) = name.strip_prefix(NOISY) {
@@ -48,7 +70,8 @@ fn named_sight(name: &str) -> Result<Arc<dyn Sight>> {
             .with_context(|| file.to_owned())?;
         return Ok(Arc::new(NoisySight::new(rates, file)));
     }
-    let text =
-        format!("no perception `{name}`; write {GROUND_TRUTH}, {LEARNED}FILE or {NOISY}FILE");
+    let text = format!(
+        "no perception `{name}`; write {GROUND_TRUTH}, {LEARNED}, {LEARNED}:FILE or {NOISY}FILE"
+    );
     Err(EvalError::Options(text).into())
 }

@@ -72,3 +72,39 @@ fn noisy_perception_is_recorded_and_unknown_ones_are_refused() {
         assert_eq!(error.lines().count(), 1, "{error}");
     }
 }
+
+/// A clip or two of one episode: it learns nothing.
+const TINY_BEHAVIOR: &str = "
+steps = 1
+warm_up = 1
+clips = 1
+[collect]
+of_each = 1
+episodes = 1
+";
+
+#[test]
+fn weights_of_a_behavior_training_are_what_helpers_recognize_by() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    fs::write(dir.join("tiny.toml"), TINY_BEHAVIOR).unwrap();
+    well(dir, &["train", "behavior", "--config", "tiny.toml", "--out", "training"]);
+    let weights = "training/behavior.safetensors";
+    let evaluate = ["eval-perception", "behavior", "--weights", weights, "--perception", "gt"];
+    let few = ["--episodes", "1", "--clips", "2", "--json", "report.json"];
+    well(dir, &[&evaluate[..], &few].concat());
+    let report = fs::read(dir.join("report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_slice(&report).unwrap();
+    assert!(report["top1"].is_f64() && report["confusion"].is_object(), "{report}");
+    let behavior = format!("learned:{weights}");
+    well(dir, &[&EVAL[..], &["--behavior", &behavior, "--out", "run"]].concat());
+    let scores = fs::read_to_string(dir.join("run/scores.json")).unwrap();
+    assert!(scores.contains("ground_truth, behavior learned "), "{scores}");
+    let report = fs::read_to_string(dir.join("run/report.md")).unwrap();
+    assert!(report.contains("ids from ground truth, learned behavior"), "{report}");
+    well(dir, &["verify", "run"]);
+    for nonsense in ["perfect", "learned:nowhere"] {
+        let error = ill(dir, &[&EVAL[..], &["--behavior", nonsense]].concat());
+        assert_eq!(error.lines().count(), 1, "{error}");
+    }
+}

@@ -2,7 +2,10 @@
 
 use chaic_protocol::observation::{Grants, Senses};
 
-use super::{GroundTruthIds, Perception};
+use chaic_protocol::AgentId;
+
+use crate::behavior::BehaviorModel;
+use crate::perception::{GroundTruthIds, Perception};
 
 /// A kind of perception: what it is called, what it asks for, and where minds get it from.
 pub trait Sight: Send + Sync {
@@ -18,6 +21,12 @@ pub trait Sight: Send + Sync {
 
     /// A fresh one for one mind.
     fn perception(&self) -> Box<dyn Perception>;
+
+    /// What tells a mind what this person does, if it isn't what the mind has anyway: grants, or what
+    /// follows from tracks.
+    fn behavior(&self, _watched: AgentId) -> Option<Box<dyn BehaviorModel>> {
+        None
+    }
 }
 
 /// [`GroundTruthIds`].

@@ -1,0 +1,271 @@
+//! Clips with labels: helpers who follow partners through generated episodes, and what the world says
+//! that the partners did (paper, appendix on action recognition).
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+
+use chaic_agents::Mind;
+use chaic_agents::behavior::{BehaviorLog, BehaviorModel};
+use chaic_agents::memory::Memory;
+use chaic_agents::policies::Follow;
+use chaic_agents::sight::Sight;
+use chaic_env::minds::Helper;
+use chaic_env::rules::{RuleSet, RuleSetName};
+use chaic_env::trace::Record;
+use chaic_env::{Appearance, Env, EpisodeConfig};
+use chaic_episodes::find_episode;
+use chaic_protocol::observation::{Film, Grants};
+use chaic_protocol::rng::Stream;
+use chaic_protocol::{Action, AgentError, AgentId, Frame, Observation, TaskId};
+use chaic_world::EventKind;
+use serde::{Deserialize, Serialize};
+
+use super::Behavior;
+use super::clip::{CROPS, Clip, SLACK};
+use super::crop::{Crop, FILM, Watcher};
+use crate::views::Part;
+
+/// How clips are made.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CollectRules {
+    /// Picks the episodes.
+    pub seed: u64,
+    /// So many clips of each behavior at most, and as many mixed ones.
+    pub of_each: usize,
+    /// Episodes are played until there are that many, but no more than these.
+    pub episodes: usize,
+    /// Share of episodes in light and colors drawn at random.
+    pub varied: f32,
+}
+
+impl Default for CollectRules {
+    fn default() -> CollectRules {
+        CollectRules { seed: 1, of_each: 900, episodes: 1000, varied: 0.35 }
+    }
+}
+
+/// The least share of crops that must show the person (paper: 20 % of an action's observations).
+const LEAST_SEEN: f32 = 0.2;
+/// Crops between two clips of somebody who moves.
+const MOVING_STEP: usize = 24;
+/// What has ended this long before the end of a clip is not told of it any more, frames.
+const FORGOTTEN_FRAMES: Frame = 24;
+/// Episodes that are played before it is asked whether there are enough clips.
+const ROUND: usize = 16;
+/// How often episodes of a task are played: failed put-ons and put-ins are rare elsewhere.
+const TASKS: [(TaskId, usize); 12] = [
+    (TaskId::NoConstraint, 1),
+    (TaskId::LowTarget, 1),
+    (TaskId::Obstacle, 1),
+    (TaskId::HighTarget, 2),
+    (TaskId::HighGoal, 8),
+    (TaskId::HighContainer, 2),
+    (TaskId::Shopping, 2),
+    (TaskId::MovingHouse, 2),
+    (TaskId::OneHanded, 1),
+    (TaskId::LowVision, 1),
+    (TaskId::Tires, 1),
+    (TaskId::Tremor, 1),
+];
+
+/// Clips of a part's episodes, in the order in which they were made.
+///
+/// The same clips come of the same rules on any number of threads. `tell` is called with the number of
+/// episodes that were played, and how many clips there are of each behavior, mixed ones last.
+pub fn collect(
+    part: Part,
+    rules: &CollectRules,
+    sight: &dyn Sight,
+    n_threads: usize,
+    tell: &mut dyn FnMut(usize, &[usize; 7]),
+) -> Vec<Clip> {
+    let mut clips: Vec<Clip> = Vec::new();
+    let mut counts = [0; 7];
+    for first in (0..rules.episodes).step_by(ROUND) {
+        let indices = first..(first + ROUND).min(rules.episodes);
+        let n = indices.len();
+        let some = |thread: usize| -> Vec<Vec<Clip>> {
+            let mine = indices.clone().skip(thread).step_by(n_threads);
+            mine.map(|index| of_episode(part, rules, sight, index as u64)).collect()
+        };
+        let some = &some;
+        let parts: Vec<Vec<Vec<Clip>>> = thread::scope(|scope| {
+            let workers: Vec<_> = (0..n_threads).map(|t| scope.spawn(move || some(t))).collect();
+            workers.into_iter().map(|w| w.join().expect("it doesn't panic")).collect()
+        });
+        let mut parts: Vec<_> = parts.into_iter().map(Vec::into_iter).collect();
+        for clip in (0..n).filter_map(|k| parts[k % n_threads].next()).flatten() {
+            let kind = if clip.is_mixed { counts.len() - 1 } else { clip.label.index() };
+            if counts[kind] < rules.of_each {
+                counts[kind] += 1;
+                clips.push(clip);
+            }
+        }
+        tell(first + n, &counts);
+        if counts.iter().all(|n| *n >= rules.of_each) {
+            break;
+        }
+    }
+    clips
+}
+
+/// Clips of one episode.
+fn of_episode(part: Part, rules: &CollectRules, sight: &dyn Sight, index: u64) -> Vec<Clip> {
+    let mut rng = Stream::new(rules.seed, "behavior", index);
+    let among: Vec<TaskId> =
+        TASKS.into_iter().flat_map(|(task, n)| std::iter::repeat_n(task, n)).collect();
+    let task = among[rng.below(among.len())];
+    let (first, n) = part.seeds();
+    let word = if rng.chance(0.7) { "gen-standard" } else { "gen" };
+    let id = format!("{task}/{word}/{}", first + rng.below(n) as u64);
+    let appearance = match rng.chance(rules.varied) {
+        true => Appearance::Varied { seed: rng.below(1 << 24) as u64 },
+        false => Appearance::Canonical,
+    };
+    // A seed of which nothing can be made is left out.
+    let Ok(episode) = find_episode(&id) else { return Vec::new() };
+    let rule_set = RuleSet::named(RuleSetName::Paper);
+    let config = EpisodeConfig {
+        episode: &episode,
+        seed: 0,
+        rules: rule_set,
+        helper: "follow",
+        partner: None,
+        image_size: None,
+        appearance,
+    };
+    let recorder = Recorder::default();
+    let crops = Arc::clone(&recorder.crops);
+    let mind =
+        Mind::with(Follow::default(), sight.perception(), Box::new(recorder), rule_set.planner);
+    let mind = Box::new(mind.with_sight(sight));
+    let helper = Helper { mind, grants: sight.grants(Grants::PLANNER) };
+    let Ok(mut env) = Env::new(config, Some(helper)) else { return Vec::new() };
+    let mut doings = Doings::default();
+    let stop = std::sync::atomic::AtomicBool::new(false);
+    let played = env.run(&stop, None, &mut |record| -> Result<(), AgentError> {
+        doings.note(record);
+        Ok(())
+    });
+    if played.is_err() {
+        return Vec::new();
+    }
+    let crops = crops.lock().unwrap_or_else(PoisonError::into_inner);
+    doings.clips(&crops)
+}
+
+/// Keeps the crops of the partner.
+#[derive(Clone, Debug)]
+struct Recorder {
+    watcher: Watcher,
+    crops: Arc<Mutex<Vec<Crop>>>,
+    log: BehaviorLog,
+}
+
+impl Default for Recorder {
+    fn default() -> Recorder {
+        Recorder {
+            watcher: Watcher::of(AgentId::PARTNER),
+            crops: Arc::default(),
+            log: BehaviorLog::default(),
+        }
+    }
+}
+
+impl BehaviorModel for Recorder {
+    fn reset(&mut self) {
+        self.watcher = Watcher::of(AgentId::PARTNER);
+    }
+
+    fn film(&self) -> Option<Film> {
+        Some(FILM)
+    }
+
+    fn watch(&mut self, observation: &Observation, memory: &Memory) {
+        let crops = self.watcher.watch(observation, memory);
+        self.crops.lock().unwrap_or_else(PoisonError::into_inner).extend(crops);
+    }
+
+    fn log(&self) -> &BehaviorLog {
+        &self.log
+    }
+
+    fn fork(&self) -> Box<dyn BehaviorModel> {
+        Box::new(self.clone())
+    }
+}
+
+/// Something that the partner did besides moving about.
+#[derive(Clone, Copy, Debug)]
+struct Doing {
+    began: Frame,
+    ended: Frame,
+    behavior: Option<Behavior>,
+}
+
+/// All of that in one episode.
+#[derive(Debug, Default)]
+struct Doings {
+    done: Vec<Doing>,
+    began: Option<Frame>,
+}
+
+impl Doings {
+    fn note(&mut self, record: &Record) {
+        match record {
+            Record::Decision(d) if d.agent == AgentId::PARTNER => {
+                let moves = d.action.is_locomotion() || matches!(d.action, Action::Wait { .. });
+                self.began = (!moves).then_some(d.frame);
+            }
+            Record::Event(told) => {
+                if let EventKind::Ended { agent: AgentId::PARTNER, action, outcome } =
+                    &told.event.kind
+                    && let Some(began) = self.began.take()
+                {
+                    let behavior = Behavior::of(action, *outcome);
+                    self.done.push(Doing { began, ended: told.event.frame, behavior });
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Clips of these crops.
+    fn clips(&self, crops: &[Crop]) -> Vec<Clip> {
+        let ended = self.done.iter().filter_map(|doing| {
+            let label = doing.behavior?;
+            let end = crops.partition_point(|crop| crop.frame < doing.ended);
+            let clip = cut(crops, (end + 1).checked_sub(CROPS)?, (label, false))?;
+            let last = clip.crops[CROPS + SLACK - 1].frame;
+            let is_next =
+                |d: &&Doing| (doing.ended + 1..=last).contains(&d.ended) && d.behavior.is_some();
+            (self.done.iter().find(is_next).is_none()).then_some(clip)
+        });
+        let moving = (0..crops.len()).step_by(MOVING_STEP).filter_map(|first| {
+            let frames =
+                [0, CROPS - 1, CROPS + SLACK - 1].map(|k| Some(crops.get(first + k)?.frame));
+            let [Some(begin), Some(end), Some(last)] = frames else { return None };
+            let mut is_mixed = false;
+            for doing in &self.done {
+                let is_beside = doing.ended < begin || doing.began > last;
+                let is_told = (end.saturating_sub(FORGOTTEN_FRAMES)..=last).contains(&doing.ended);
+                if is_told {
+                    return None;
+                }
+                is_mixed |= !is_beside;
+            }
+            cut(crops, first, (Behavior::Moving, is_mixed))
+        });
+        ended.chain(moving).collect()
+    }
+}
+
+/// The clip that begins with this crop, if it is whole and shows the person.
+fn cut(crops: &[Crop], first: usize, (label, is_mixed): (Behavior, bool)) -> Option<Clip> {
+    let crops = crops.get(first..first + CROPS + SLACK)?;
+    let is_whole = crops.windows(2).all(|pair| pair[1].frame == pair[0].frame + FILM.every_frames);
+    let n_seen = crops[..CROPS].iter().filter(|crop| !crop.is_blank()).count();
+    let is_seen = n_seen as f32 >= LEAST_SEEN * CROPS as f32;
+    (is_whole && is_seen).then(|| Clip { label, is_mixed, crops: crops.to_vec() })
+}

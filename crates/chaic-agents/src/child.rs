@@ -246,7 +246,7 @@ impl Agent for Child {
             Some(ChildBehavior::GotoGuardian) => "go back",
             Some(ChildBehavior::Follow) | None => "come along",
         };
-        Thought { plan: plan.to_owned(), mood: None }
+        Thought { plan: plan.to_owned(), ..Thought::default() }
     }
 
     fn child_state(&self) -> Option<ChildState> {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use chaic_protocol::agent::Thought;
+use chaic_protocol::agent::{Believed, Thought};
 use chaic_protocol::observation::Senses;
 use chaic_protocol::{Action, Agent, AgentError, AgentId, Briefing, Observation, Outcome, Target};
 
@@ -11,6 +11,7 @@ use crate::decision::{Context, Plan, Policy, valid_plans};
 use crate::execution::interact::learn;
 use crate::execution::navigate::face;
 use crate::execution::{Executor, Progress, Situation};
+use crate::mapping::Thing;
 use crate::memory::Memory;
 use crate::perception::Perception;
 use crate::rules::PlannerRules;
@@ -227,6 +228,31 @@ impl Episode {
 }
 
 impl<P: Policy> Mind<P> {
+    /// What it remembers, if it was told by something learned.
+    fn learned(&self) -> Option<&Memory> {
+        let episode = self.episode.as_ref().filter(|_| self.sees_by.is_some())?;
+        Some(&episode.memory)
+    }
+
+    /// What it noticed last that somebody did, in words.
+    fn noticed(&self, memory: &Memory) -> Option<String> {
+        let last = self.behavior.log().actions.last()?;
+        let name = |track: TrackId| match memory.things.get(track) {
+            Some(thing) => format!("{} {track}", thing.class.info().label),
+            None => track.to_string(),
+        };
+        let done = match last.action {
+            Action::PickUp { object, .. } => format!("picks up {}", name(object)),
+            Action::PutIn => "puts something into a container".to_owned(),
+            Action::PutOn { place, .. } => format!("puts something on {}", name(place)),
+            Action::RemoveObstacle { obstacle, .. } => format!("removes {}", name(obstacle)),
+            _ => return None,
+        };
+        let in_vain = matches!(last.outcome, Some(Outcome::Failure(_)));
+        let in_vain = if in_vain { " in vain" } else { "" };
+        Some(format!("frame {}: {} {done}{in_vain}", last.frame, last.agent))
+    }
+
     /// What to do next, as it is meant and as it is named; `None` for a pause. Where nothing that the
     /// policy chooses can be done, one looks around elsewhere, from where it may be possible.
     fn decide(&mut self, episode: &mut Episode) -> Result<Option<(Intent, Action)>, AgentError> {
@@ -258,6 +284,17 @@ impl<P: Policy> Mind<P> {
             Progress::Done | Progress::Failed => None,
         })
     }
+}
+
+/// What is believed to be in sight.
+fn sees(memory: &Memory) -> Vec<Believed> {
+    let in_sight = memory.things.iter().filter(|t| t.last_seen == memory.frame && t.is_present);
+    let believed = |thing: &Thing| Believed {
+        number: thing.track.0,
+        class: thing.class,
+        at_cm: thing.position_in_world.to_array().map(|m| (100.0 * m) as i32),
+    };
+    in_sight.map(believed).collect()
 }
 
 impl<P: Policy> Agent for Mind<P> {
@@ -294,6 +331,8 @@ impl<P: Policy> Agent for Mind<P> {
         Thought {
             plan: self.plan().map_or_else(|| "think".to_owned(), |plan| plan.to_string()),
             mood: self.policy.mood(),
+            noticed: self.learned().and_then(|memory| self.noticed(memory)),
+            sees: self.learned().map(sees).unwrap_or_default(),
         }
     }
 

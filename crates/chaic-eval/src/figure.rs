@@ -31,7 +31,7 @@ pub const MAX_TASKS: usize = 24;
 
 /// Colors that stay apart for color-blind readers (Okabe and Ito 2008), darkest pair first
 /// and black last because a black bar draws the eye.
-const PALETTE: [RGBColor; 8] = [
+pub(crate) const PALETTE: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(230, 159, 0),
     RGBColor(0, 158, 115),
@@ -42,12 +42,12 @@ const PALETTE: [RGBColor; 8] = [
     RGBColor(40, 40, 40),
 ];
 
-const INK: RGBColor = RGBColor(30, 30, 30);
+pub(crate) const INK: RGBColor = RGBColor(30, 30, 30);
 const FAINT_INK: RGBColor = RGBColor(110, 110, 110);
-const GRID: RGBColor = RGBColor(222, 222, 222);
+pub(crate) const GRID: RGBColor = RGBColor(222, 222, 222);
 
 /// In SVG the reader's own; in PNG, and to measure text, the font registered below.
-const FONT: &str = "sans-serif";
+pub(crate) const FONT: &str = "sans-serif";
 const TEXT_PX: i32 = 19;
 const NOTE_PX: i32 = 16;
 
@@ -226,6 +226,11 @@ static FONT_IS_REGISTERED: LazyLock<()> = LazyLock::new(|| {
         .unwrap_or_else(|_| unreachable!("the font is part of the program"));
 });
 
+/// Announces [`FONT`], which has to be done before anything is drawn.
+pub(crate) fn register_font() {
+    LazyLock::force(&FONT_IS_REGISTERED);
+}
+
 /// Where a figure is drawn; all constants are in pixels of a scale of 1.
 struct Canvas<DB: DrawingBackend> {
     root: DrawingArea<DB, Shift>,
@@ -234,7 +239,7 @@ struct Canvas<DB: DrawingBackend> {
 
 impl<DB: DrawingBackend> Canvas<DB> {
     fn draw(&self, bars: &Bars) -> Result<(), DrawError<DB>> {
-        LazyLock::force(&FONT_IS_REGISTERED);
+        register_font();
         self.root.fill(&WHITE)?;
         let legend_px = self.legend(bars)?;
         let mut chart = ChartBuilder::on(&self.root)

@@ -36,6 +36,7 @@ pub mod verify;
 
 pub mod audit;
 
+pub mod curves;
 pub mod figure;
 
 pub use episode_file::read_episode_file;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Action, Briefing, Observation, observation::Senses};
+use crate::{Action, Briefing, ClassId, Observation, observation::Senses};
 
 /// What a mind says of itself for the record: shown in replays, never read by rules or scores.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -14,6 +14,23 @@ pub struct Thought {
     /// A short word for its state if it has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mood: Option<String>,
+    /// What it noticed last that somebody did, in words, if it tells that from what it sees.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noticed: Option<String>,
+    /// What it believes to see now, if it tells that from color and depth.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sees: Vec<Believed>,
+}
+
+/// A thing as a mind has it: not necessarily what is there.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Believed {
+    /// The mind's own number for it.
+    pub number: u32,
+    /// What it takes it for.
+    pub class: ClassId,
+    /// Where, in the world, centimetres.
+    pub at_cm: [i32; 3],
 }
 
 /// What the child who comes along is doing, by its own decision. The original's emergency rate asks

@@ -36,12 +36,14 @@ pub struct Film {
 }
 
 impl Senses {
+    /// Side of the benchmark's images, pixels (paper section 5).
+    pub const IMAGE_SIZE: u32 = 512;
     /// Depth and ids at the benchmark's size: what the rule-based minds look at.
     pub const DEPTH_AND_IDS: Senses =
-        Senses { image_size: 512, rgb: false, depth: true, ids: true, film: None };
+        Senses { image_size: Senses::IMAGE_SIZE, rgb: false, depth: true, ids: true, film: None };
     /// No image at all.
     pub const NONE: Senses =
-        Senses { image_size: 512, rgb: false, depth: false, ids: false, film: None };
+        Senses { image_size: Senses::IMAGE_SIZE, rgb: false, depth: false, ids: false, film: None };
 
     /// Whether any image must be made.
     pub fn wants_image(&self) -> bool {

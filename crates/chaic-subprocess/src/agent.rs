@@ -9,7 +9,7 @@ use chaic_protocol::{Action, Agent, AgentError, Briefing, Observation};
 
 use crate::commands::Command;
 use crate::message::{
-    IMAGE_SIZES, MAX_FILM, PROTOCOL, ToEnv, ToMind, cut, observation_frame, plain,
+    IMAGE_SIZES, MAX_FILM, MAX_SEES, PROTOCOL, ToEnv, ToMind, cut, observation_frame, plain,
 };
 use crate::process::Process;
 
@@ -23,7 +23,7 @@ pub struct SubprocessAgent {
 enum State {
     Idle,
     Running {
-        process: Process,
+        process: Box<Process>,
         senses: Senses,
         thought: Thought,
     },
@@ -89,9 +89,14 @@ impl SubprocessAgent {
         match process.ask(observation_frame(observation), command.limits.decision)? {
             ToEnv::Act { action, thought } => Ok((
                 action,
-                thought.map(|Thought { plan, mood }| Thought {
-                    plan: cut(&plan),
-                    mood: mood.as_deref().map(cut),
+                thought.map(|Thought { plan, mood, noticed, mut sees }| {
+                    sees.truncate(MAX_SEES);
+                    Thought {
+                        plan: cut(&plan),
+                        mood: mood.as_deref().map(cut),
+                        noticed: noticed.as_deref().map(cut),
+                        sees,
+                    }
                 }),
             )),
             other => Err(unexpected(command, "observe", &other)),
@@ -127,6 +132,7 @@ impl Agent for SubprocessAgent {
             });
         self.state = match begun {
             Ok((process, senses)) => {
+                let process = Box::new(process);
                 State::Running { process, senses, thought: Thought::default() }
             }
             Err(error) => State::Lost(error),

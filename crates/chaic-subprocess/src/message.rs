@@ -15,6 +15,8 @@ pub const IMAGE_SIZES: std::ops::RangeInclusive<u32> = 16..=2048;
 pub const MAX_FILM: u32 = 256;
 /// Longest text of a mind that is kept, bytes: a thought, a problem.
 pub const MAX_TEXT: usize = 2000;
+/// Most things that a thought may say are in sight; more aren't kept.
+pub const MAX_SEES: usize = 256;
 
 /// The beginning of a text that may be of any length.
 pub(crate) fn cut(text: &str) -> String {

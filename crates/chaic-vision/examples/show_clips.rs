@@ -3,19 +3,22 @@
 use chaic_agents::sight::TrueSight;
 use chaic_vision::behavior::Behavior;
 use chaic_vision::behavior::clip::CROPS;
-use chaic_vision::behavior::collect::{CollectRules, collect};
+use chaic_vision::behavior::collect::{CollectRules, Collector, collect};
 use chaic_vision::behavior::crop::SIDE;
 use chaic_vision::views::Part;
 
-fn main() -> image::ImageResult<()> {
+fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let of_each = arguments.next().and_then(|n| n.parse().ok()).unwrap_or(4);
     let out = arguments.next().unwrap_or_else(|| "clips.png".to_owned());
     let rules = CollectRules { of_each, episodes: 64, ..CollectRules::default() };
+    let (part, sight) = (Part::Training, &TrueSight);
+    let collector = Collector { part, rules: &rules, sight, n_threads: 2, folder: None };
     let began = std::time::Instant::now();
-    let mut clips = collect(Part::Training, &rules, &TrueSight, 2, &mut |n, counts| {
+    let mut clips = collect(&collector, &mut |n, counts| {
         println!("{n} episodes, {:.0} s: {counts:?}", began.elapsed().as_secs_f64());
-    });
+        true
+    })?;
     clips.sort_by_key(|clip| (clip.is_mixed, clip.label));
     println!("{:?}, then mixed, from top to bottom", Behavior::ALL);
     let shown = CROPS / 2;
@@ -28,5 +31,5 @@ fn main() -> image::ImageResult<()> {
             }
         }
     }
-    sheet.save(out)
+    Ok(sheet.save(out)?)
 }

@@ -1,25 +1,27 @@
 //! How good a detector is on views that nothing was learned from.
 
 use std::collections::BTreeMap;
-use std::thread;
 
-use chaic_nn::Inference;
-use chaic_nn::simd::widest;
 use serde::Serialize;
 
-use crate::average_precision::{AveragePrecision, Detection, Image, Truth, average_precision};
+use crate::average_precision::{
+    Areas, AveragePrecision, Detection, Image, Truth, average_precision,
+};
 use crate::calibration::{Calibration, Sample, calibration_error, predictors};
 use crate::failures::Failures;
 use crate::instances::Instance;
 use crate::labels::{BACKGROUND, class_of};
+use crate::noisy::FaultRates;
+use crate::parallel::in_order;
 use crate::trained::TrainedDetector;
 use crate::views::{LabelledView, Part, ViewRules, Views};
 
 /// Instances that fewer pixels show are neither asked for nor wrong to find.
 pub const LEAST_PX: u32 = 100;
+const ASKED: Areas = LEAST_PX..=u32::MAX;
 
 /// What is in a view beside what was seen in it.
-pub fn compare(view: &LabelledView, found: &[Instance], least_px: u32) -> Image {
+pub fn compare(view: &LabelledView, found: &[Instance]) -> Image {
     let mut areas = vec![0u32; view.labels.len()];
     for id in &view.ids {
         if let Some(area) = areas.get_mut(usize::from(*id)) {
@@ -30,11 +32,7 @@ pub fn compare(view: &LabelledView, found: &[Instance], least_px: u32) -> Image 
         (0..areas.len()).filter(|id| areas[*id] > 0 && view.labels[*id] != BACKGROUND).collect();
     let mut index = vec![usize::MAX; areas.len()];
     there.iter().enumerate().for_each(|(k, id)| index[*id] = k);
-    let truth = |id: &usize| Truth {
-        label: view.labels[*id],
-        area: areas[*id],
-        is_ignored: areas[*id] < least_px,
-    };
+    let truth = |id: &usize| Truth { label: view.labels[*id], area: areas[*id] };
     let detection = |instance: &Instance| {
         let mut shared = vec![0; there.len()];
         for k in &instance.pixels {
@@ -59,8 +57,11 @@ pub fn evaluate(
     n_views: usize,
     n_threads: usize,
 ) -> AveragePrecision {
-    let one = |view: &LabelledView, found: &[Instance]| compare(view, found, LEAST_PX);
-    average_precision(&look(detector, (Part::Validation, rules), n_views, n_threads, one))
+    let views = (Part::Validation, rules);
+    average_precision(
+        &look(detector, views, n_views, n_threads, |_, view, found| compare(view, found)),
+        &ASKED,
+    )
 }
 
 /// A calibration by what the detector sees in the first so many views of the training part, drawn by
@@ -72,13 +73,14 @@ pub fn calibrate(
     n_threads: usize,
 ) -> Calibration {
     let views = (Part::Training, rules);
-    let samples = look(detector, views, n_views, n_threads, samples);
+    let of_view =
+        |_, view: &LabelledView, found: &[Instance]| samples(found, &compare(view, found));
+    let samples = look(detector, views, n_views, n_threads, of_view);
     Calibration::fit(&samples.concat())
 }
 
 /// What is known of each detection, and whether it is right.
-pub fn samples(view: &LabelledView, found: &[Instance]) -> Vec<Sample> {
-    let image = compare(view, found, 0);
+fn samples(found: &[Instance], image: &Image) -> Vec<Sample> {
     let is_right = |detection: &Detection| {
         image.truths.iter().zip(&detection.shared).any(|(truth, shared)| {
             truth.label == detection.label && 3 * shared >= truth.area + detection.area
@@ -89,28 +91,23 @@ pub fn samples(view: &LabelledView, found: &[Instance]) -> Vec<Sample> {
 }
 
 /// What comes of each of the first so many views, in their order, whatever the number of threads.
-fn look<T: Clone + Send>(
+fn look<T: Send>(
     detector: &TrainedDetector,
     (part, rules): (Part, ViewRules),
     n_views: usize,
     n_threads: usize,
-    one: impl Fn(&LabelledView, &[Instance]) -> T + Sync,
+    one: impl Fn(usize, &LabelledView, &[Instance]) -> T + Sync + Send,
 ) -> Vec<T> {
-    let some = |thread: usize| -> Vec<T> {
-        let mut inference = Inference::new(&detector.detector.network, widest());
-        let mut one = |k: usize| {
+    in_order(
+        0..n_views,
+        n_threads,
+        || detector.inference(),
+        |inference, k| {
             let view = Views::new(part, rules, 1, k as u64).draw();
             let image = (&view.rgb[..], &view.depth_m[..], &view.camera);
-            one(&view, &detector.detect(image, &mut inference))
-        };
-        (thread..n_views).step_by(n_threads).map(&mut one).collect()
-    };
-    let some = &some;
-    let parts: Vec<Vec<T>> = thread::scope(|scope| {
-        let workers: Vec<_> = (0..n_threads).map(|t| scope.spawn(move || some(t))).collect();
-        workers.into_iter().map(|w| w.join().expect("it doesn't panic")).collect()
-    });
-    (0..n_views).map(|k| parts[k % n_threads][k / n_threads].clone()).collect()
+            one(k, &view, &detector.detect(image, inference))
+        },
+    )
 }
 
 /// How good a detector is, as a JSON file has it.
@@ -124,47 +121,69 @@ pub struct DetectionReport {
     pub map: f64,
     /// Both with smaller instances, by their least number of pixels.
     pub smaller: BTreeMap<u32, [f64; 2]>,
+    /// Both for instances of some sizes alone.
+    pub sizes: BTreeMap<&'static str, [f64; 2]>,
+    /// `map50` over the classes of which there are at least [`ENOUGH`] instances, and how many these are.
+    pub map50_of_frequent: (f64, usize),
     /// How far scores are from the share of detections that are right.
     pub calibration_error: f64,
     /// What goes wrong, and how often.
     pub failures: Failures,
+    /// The same as ground truth is degraded by it.
+    pub fault_rates: FaultRates,
     /// By class: average precision at one half, over all overlaps, and how many instances there are.
     pub classes: BTreeMap<&'static str, (f64, f64, usize)>,
 }
 
 /// Smaller instances that are reported beside, pixels.
 const SMALLER_PX: [u32; 2] = [64, 32];
+/// Sizes by COCO's names, from [`LEAST_PX`] on.
+const SIZES: [(&str, Areas); 3] = [
+    ("small", LEAST_PX..=32 * 32),
+    ("medium", 32 * 32 + 1..=96 * 96),
+    ("large", 96 * 96 + 1..=u32::MAX),
+];
+/// The average precision of a class of which there are fewer instances says little.
+pub const ENOUGH: usize = 50;
 
-/// How good a detector is on the first so many views.
-pub fn report(
+/// How good a detector is on the first so many views, and what `also` makes of each of them, by its
+/// number, and of what was found in it.
+pub fn report<A: Send>(
     detector: &TrainedDetector,
     views: (Part, ViewRules),
     n_views: usize,
     n_threads: usize,
-) -> DetectionReport {
-    let one = |view: &LabelledView, found: &[Instance]| {
-        let images = [LEAST_PX, SMALLER_PX[0], SMALLER_PX[1]].map(|px| compare(view, found, px));
-        let right = samples(view, found).into_iter().map(|s| s.is_right);
+    also: impl Fn(usize, &LabelledView, &[Instance]) -> A + Sync + Send,
+) -> (DetectionReport, Vec<A>) {
+    let one = |k: usize, view: &LabelledView, found: &[Instance]| {
+        let image = compare(view, found);
+        let right = samples(found, &image).into_iter().map(|s| s.is_right);
         let said: Vec<(f32, bool)> = found.iter().map(|f| f.score).zip(right).collect();
-        (images, said)
+        (image, (said, also(k, view, found)))
     };
     let seen = look(detector, views, n_views, n_threads, one);
-    let (images, said): (Vec<_>, Vec<_>) = seen.into_iter().unzip();
-    let of = |k: usize| images.iter().map(|i| i[k].clone()).collect::<Vec<Image>>();
-    let all = of(0);
-    let found = average_precision(&all);
-    let smaller = SMALLER_PX.iter().zip([of(1), of(2)]).map(|(px, images)| {
-        let found = average_precision(&images);
-        (*px, [found.map50, found.map])
-    });
+    let (images, beside): (Vec<Image>, Vec<_>) = seen.into_iter().unzip();
+    let (said, also): (Vec<_>, Vec<A>) = beside.into_iter().unzip();
+    let found = average_precision(&images, &ASKED);
+    let of = |areas: &Areas| {
+        let found = average_precision(&images, areas);
+        [found.map50, found.map]
+    };
     let name = |label: u8| class_of(label).map_or("", |class| class.name());
-    DetectionReport {
+    let frequent = found.classes.values().filter(|(_, _, n)| *n >= ENOUGH);
+    let frequent: Vec<f64> = frequent.map(|(ap50, _, _)| *ap50).collect();
+    let n_frequent = frequent.len();
+    let report = DetectionReport {
         views: n_views,
         map50: found.map50,
         map: found.map,
-        smaller: smaller.collect(),
+        smaller: SMALLER_PX.iter().map(|px| (*px, of(&(*px..=u32::MAX)))).collect(),
+        sizes: SIZES.iter().map(|(name, areas)| (*name, of(areas))).collect(),
+        map50_of_frequent: (frequent.iter().sum::<f64>() / n_frequent.max(1) as f64, n_frequent),
         calibration_error: calibration_error(&said.concat()),
-        failures: Failures::of(&all),
+        failures: Failures::of(&images, &ASKED),
+        fault_rates: FaultRates::measured(&images),
         classes: found.classes.iter().map(|(label, c)| (name(*label), *c)).collect(),
-    }
+    };
+    (report, also)
 }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::average_precision::{Detection, Image, Truth};
+use crate::average_precision::{Areas, Detection, Image, Truth};
 
 /// A detection counts as told from this score on.
 pub const TOLD_SCORE: f32 = 0.5;
@@ -35,18 +35,19 @@ fn overlap(truth: &Truth, detection: &Detection, shared: u32) -> f64 {
 }
 
 impl Failures {
-    /// Of all images.
-    pub fn of(images: &[Image]) -> Failures {
+    /// Of all images; what has so many pixels is asked for.
+    pub fn of(images: &[Image], areas: &Areas) -> Failures {
         let mut sum = Failures::default();
-        images.iter().for_each(|image| sum.add(image));
+        images.iter().for_each(|image| sum.add(image, areas));
         sum
     }
 
-    fn add(&mut self, image: &Image) {
+    fn add(&mut self, image: &Image, areas: &Areas) {
         let told: Vec<&Detection> =
             image.detections.iter().filter(|d| d.score >= TOLD_SCORE).collect();
         let mut is_used = vec![false; told.len()];
         for (t, truth) in image.truths.iter().enumerate() {
+            let is_asked = areas.contains(&truth.area);
             let best = |of_class: bool| {
                 let fits = |d: &&(usize, &&Detection)| (d.1.label == truth.label) == of_class;
                 let all = told.iter().enumerate();
@@ -57,10 +58,10 @@ impl Failures {
             let (same, other) = (best(true), best(false));
             if let Some((_, k)) = same.filter(|(o, _)| *o >= GOOD_OVERLAP) {
                 is_used[k] = true;
-                self.found += u32::from(!truth.is_ignored);
+                self.found += u32::from(is_asked);
                 continue;
             }
-            if truth.is_ignored {
+            if !is_asked {
                 continue;
             }
             let covers_another = |k: usize| {
@@ -79,7 +80,9 @@ impl Failures {
             *cause += 1;
             by.into_iter().for_each(|k| is_used[k] = true);
         }
-        for (detection, _) in told.iter().zip(is_used).filter(|(_, is_used)| !is_used) {
+        let unused =
+            told.iter().zip(is_used).filter(|(d, is_used)| !is_used && areas.contains(&d.area));
+        for (detection, _) in unused {
             let mut same = image.truths.iter().zip(&detection.shared);
             let of_its_class = |(truth, shared): (&Truth, &u32)| {
                 truth.label == detection.label && 2 * shared > detection.area
@@ -98,7 +101,7 @@ mod tests {
 
     #[test]
     fn each_failure_has_its_cause() {
-        let truth = |label| Truth { label, area: 100, is_ignored: false };
+        let truth = |label| Truth { label, area: 100 };
         let detection = |label, area, shared: &[u32]| Detection {
             label,
             score: 0.9,
@@ -124,7 +127,7 @@ mod tests {
             split: 1,
             nothing_there: 1,
         };
-        let found = Failures::of(&[Image { truths, detections }]);
+        let found = Failures::of(&[Image { truths, detections }], &(50..=u32::MAX));
         assert_eq!(found, expected);
     }
 }

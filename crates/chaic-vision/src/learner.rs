@@ -30,6 +30,12 @@ impl Learner {
         Learner { average: numbers.clone(), numbers, adam, passes }
     }
 
+    /// Takes these numbers before the first step.
+    pub fn begin_with(&mut self, numbers: Vec<f32>) {
+        self.average.clone_from(&numbers);
+        self.numbers = numbers;
+    }
+
     /// All that is needed to go on, as bytes.
     pub fn checkpoint(&self) -> Vec<u8> {
         let lists = [&self.numbers, &self.average, &self.adam.mean, &self.adam.square];

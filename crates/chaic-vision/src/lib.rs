@@ -6,7 +6,7 @@
 //! what it learns by, [`train`] the loop, [`learner`] the numbers that any loop changes, [`training_run`]
 //! a loop's folder; [`instances`] makes things of what the network says, [`calibration`] tells how sure
 //! each is, [`trained`] is all of it as one file, and [`average_precision`] tells how good they are and
-//! [`failures`] what goes wrong. [`tracker`] tells which thing is which over time, and [`perception`]
+//! [`failures`] what goes wrong; [`coco`] writes views as data sets. [`tracker`] tells which thing is which over time, and [`perception`]
 //! makes all of it the eyes of a mind; [`noisy`] stands in for it. [`behavior`] tells what people do.
 //!
 //! **What it is not**: it knows no goals, rules or minds.
@@ -18,6 +18,7 @@
 //!   threads.
 
 pub mod labels;
+mod parallel;
 
 pub mod features;
 pub mod views;
@@ -31,6 +32,7 @@ pub mod calibration;
 pub mod trained;
 
 pub mod average_precision;
+pub mod coco;
 pub mod evaluate;
 pub mod failures;
 

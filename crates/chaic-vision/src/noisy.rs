@@ -10,6 +10,8 @@ use chaic_protocol::rng::Stream;
 use chaic_protocol::{Briefing, ClassId, Observation, Outcome, Target};
 use serde::{Deserialize, Serialize};
 
+use crate::average_precision::{Detection, Image};
+use crate::failures::TOLD_SCORE;
 use crate::instances::Instance;
 use crate::labels::label_of;
 use crate::perception::Tracking;
@@ -33,6 +35,46 @@ impl FaultRates {
     /// No fault at all.
     pub fn none() -> FaultRates {
         FaultRates { missed: vec![(5, 0.0)], misnamed: 0.0, invented: 0.0, scores: [1.0, 0.5] }
+    }
+
+    /// Those of a detector, by what it told in images.
+    pub fn measured(images: &[Image]) -> FaultRates {
+        /// Rows of [`FaultRates::missed`], pixels.
+        const LEAST_PX: [u32; 6] = [24, 64, 100, 400, 1000, 5000];
+        let share = |n: usize, of: usize| n as f32 / of.max(1) as f32;
+        let mut by_size = [[0usize; 2]; LEAST_PX.len()];
+        let (mut n_found, mut n_misnamed, mut n_invented) = (0, 0, 0);
+        let mut scores = [(0.0f32, 0usize); 2];
+        for image in images {
+            let told: Vec<_> = image.detections.iter().filter(|d| d.score >= TOLD_SCORE).collect();
+            for (t, truth) in image.truths.iter().enumerate() {
+                let Some(row) = LEAST_PX.iter().rposition(|px| truth.area >= *px) else { continue };
+                let overlaps = |d: &&&Detection| 3 * d.shared[t] >= truth.area + d.area;
+                let mut covering: Vec<_> = told.iter().filter(overlaps).collect();
+                covering.sort_by_key(|d| d.label != truth.label);
+                by_size[row][1] += 1;
+                by_size[row][0] += usize::from(covering.is_empty());
+                let Some(best) = covering.first() else { continue };
+                let is_misnamed = best.label != truth.label;
+                n_found += 1;
+                n_misnamed += usize::from(is_misnamed);
+                let (sum, n) = &mut scores[usize::from(is_misnamed)];
+                (*sum, *n) = (*sum + best.score, *n + 1);
+            }
+            let invented = told.iter().filter(|d| d.shared.iter().all(|s| 5 * s < d.area));
+            for detection in invented {
+                n_invented += 1;
+                let (sum, n) = &mut scores[1];
+                (*sum, *n) = (*sum + detection.score, *n + 1);
+            }
+        }
+        let rows = LEAST_PX.into_iter().zip(by_size);
+        FaultRates {
+            missed: rows.map(|(px, [missed, all])| (px, share(missed, all))).collect(),
+            misnamed: share(n_misnamed, n_found),
+            invented: share(n_invented, images.len()),
+            scores: scores.map(|(sum, n)| if n == 0 { TOLD_SCORE } else { sum / n as f32 }),
+        }
     }
 
     fn missed(&self, n_pixels: usize) -> f32 {

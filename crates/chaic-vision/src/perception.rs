@@ -6,7 +6,6 @@ use chaic_agents::perception::{Perception, Percepts, PixelKind, STRIDE, Segments
 use chaic_agents::sight::Sight;
 use chaic_agents::track::{Hands, Intent, TrackId};
 use chaic_nn::Inference;
-use chaic_nn::simd::widest;
 use chaic_protocol::geom::Camera;
 use chaic_protocol::observation::{Grants, Senses};
 use chaic_protocol::{Briefing, Observation, Outcome, Target};
@@ -44,7 +43,7 @@ impl Sight for LearnedSight {
     }
 
     fn perception(&self) -> Box<dyn Perception> {
-        let inference = Inference::new(&self.detector.detector.network, widest());
+        let inference = self.detector.inference();
         Box::new(LearnedPerception {
             detector: Arc::clone(&self.detector),
             inference,

@@ -142,8 +142,8 @@ fn a_training_leaves_what_it_takes_to_go_on_and_weights_that_are_read_back() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("training");
     let rules = TrainingRules { steps: 1, ..tiny() };
-    let quiet = &mut |_: &str| ();
-    let mut run = TrainingRun::<Trainer>::begin(&out, &rules, quiet).unwrap();
+    let quiet = &mut |_: &str| true;
+    let mut run = TrainingRun::<Trainer>::begin(&out, &rules, quiet).unwrap().unwrap();
     let stopped = AtomicBool::new(true);
     assert!(!run.go_on(&stopped, &mut |_| ()).unwrap() && run.extent() == (0, 1));
     assert!(matches!(
@@ -151,7 +151,7 @@ fn a_training_leaves_what_it_takes_to_go_on_and_weights_that_are_read_back() {
         Err(TrainingError::NotEmpty(_))
     ));
     assert_eq!(read_rules::<Trainer>(&out.join(CONFIG)).unwrap(), rules);
-    let mut resumed = TrainingRun::<Trainer>::resume(&out, quiet).unwrap();
+    let mut resumed = TrainingRun::<Trainer>::resume(&out, quiet).unwrap().unwrap();
     let mut told = Vec::new();
     stopped.store(false, Ordering::Relaxed);
     assert!(resumed.go_on(&stopped, &mut |record| told.push(record.clone())).unwrap());
@@ -192,7 +192,8 @@ fn images_that_are_none_show_nothing_and_break_nothing() {
 #[test]
 fn the_detector_that_comes_with_chaic_is_read_and_finds_most_of_what_it_is_shown() {
     let trained = TrainedDetector::built_in();
-    let found = report(&trained, (Part::Validation, ViewRules::NATURAL), 8, 2);
+    let natural = (Part::Validation, ViewRules::NATURAL);
+    let (found, _) = report(&trained, natural, 8, 2, |_, _, _| ());
     assert!(found.map50 > 0.5, "{}", found.map50);
 }
 
@@ -227,11 +228,12 @@ fn instances_of_perfect_labels_and_offsets_are_those_that_are_there() {
             let view = Views::new(Part::Validation, rules, 7, k).draw();
             let (head, rules) = (perfect(&view), InstanceRules::default());
             let found = instances(&head, &view.depth_m, &view.camera, &rules);
-            compare(&view, &found, LEAST_PX)
+            compare(&view, &found)
         })
         .collect();
-    let n_asked = images.iter().flat_map(|i| &i.truths).filter(|t| !t.is_ignored).count();
-    let found = average_precision(&images);
+    let asked = LEAST_PX..=u32::MAX;
+    let n_asked = images.iter().flat_map(|i| &i.truths).filter(|t| asked.contains(&t.area)).count();
+    let found = average_precision(&images, &asked);
     println!("{n_asked} instances: {:.3}, {:.3}", found.map50, found.map);
     assert!(n_asked > 60 && found.map50 > 0.9, "{n_asked}: {found:?}");
 }

@@ -1,5 +1,8 @@
 //! The training loop of the detector.
 
+use std::path::Path;
+
+use chaic_nn::weights::WeightsError;
 use chaic_nn::{AdamRules, Network, Pass, Shape, Tensor};
 use chaic_protocol::rng::Stream;
 use serde::{Deserialize, Serialize};
@@ -11,7 +14,7 @@ use crate::labels::BACKGROUND;
 use crate::learner::{Learner, rate_at};
 use crate::loss::{Loss, LossRules, Targets, loss};
 use crate::trained::TrainedDetector;
-use crate::training_run::{Figures, Training};
+use crate::training_run::{Figures, Training, TrainingError, figures};
 use crate::views::{LabelledView, Part, ViewRules, Views};
 
 /// Which parts of views are learned from.
@@ -209,8 +212,12 @@ impl Training for Trainer {
     type Rules = TrainingRules;
     const WEIGHTS: &'static str = "detector.safetensors";
 
-    fn new(rules: &TrainingRules, _: &mut dyn FnMut(&str)) -> Trainer {
-        Trainer::new(*rules)
+    fn new(
+        rules: &TrainingRules,
+        _: &Path,
+        _: &mut dyn FnMut(&str) -> bool,
+    ) -> Result<Option<Trainer>, TrainingError> {
+        Ok(Some(Trainer::new(*rules)))
     }
 
     fn check(rules: &TrainingRules) -> Result<(), &'static str> {
@@ -236,19 +243,23 @@ impl Training for Trainer {
         &self.learner
     }
 
+    fn begin_with(&mut self, weights: &[u8]) -> Result<(), WeightsError> {
+        self.learner.begin_with(TrainedDetector::from_bytes(weights)?.numbers);
+        Ok(())
+    }
+
     fn resume(&mut self, bytes: &[u8]) -> bool {
         Trainer::resume(self, bytes)
     }
 
     fn step(&mut self) -> Figures {
         let Loss { labels, offsets, right, right_of_things } = Trainer::step(self);
-        let named = [
+        figures([
             ("labels", labels),
             ("offsets", offsets),
             ("right", right),
             ("right_of_things", right_of_things),
-        ];
-        named.into_iter().collect()
+        ])
     }
 
     fn validate(&self) -> (Figures, Vec<u8>) {
@@ -258,8 +269,7 @@ impl Training for Trainer {
         let found = evaluate(&detector, views, VALIDATION_VIEWS, threads);
         let natural = ViewRules { size_px: views.size_px, ..ViewRules::NATURAL };
         detector.calibration = calibrate(&detector, natural, CALIBRATION_VIEWS, threads);
-        let figures = [("map50", found.map50), ("map", found.map)];
-        (figures.into_iter().collect(), detector.to_bytes())
+        (figures([("map50", found.map50), ("map", found.map)]), detector.to_bytes())
     }
 }
 

@@ -1,7 +1,9 @@
 //! A detector that has learned: its numbers, how its scores are made, and the file of both.
 
+pub use chaic_nn::Inference;
+use chaic_nn::simd::widest;
 use chaic_nn::weights::WeightsError;
-use chaic_nn::{Inference, Network, Shape, weights};
+use chaic_nn::{Network, Shape, weights};
 use chaic_protocol::ClassId;
 use chaic_protocol::geom::Camera;
 
@@ -69,6 +71,11 @@ impl TrainedDetector {
     /// The first digits of the digest of its file, which name it.
     pub fn digest(&self) -> String {
         weights::digest(&self.to_bytes())
+    }
+
+    /// Working space for looking at images.
+    pub fn inference(&self) -> Inference {
+        Inference::new(&self.detector.network, widest())
     }
 
     /// Whether it can look at images of this camera: sides are multiples of the network's stride.

@@ -8,9 +8,11 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use chaic_files::{FileError, read_bounded, write_whole};
-use serde::Serialize;
+use chaic_nn::weights::WeightsError;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 
+use crate::behavior::store::StoreError;
 use crate::learner::Learner;
 
 /// What it was begun with.
@@ -32,6 +34,9 @@ pub enum TrainingError {
     /// The file system refuses.
     #[error(transparent)]
     File(#[from] FileError),
+    /// What it is to learn from can't be kept or read.
+    #[error(transparent)]
+    Clips(#[from] StoreError),
     /// There is something already.
     #[error("{0} isn't empty; go on with it by --resume, or choose another --out")]
     NotEmpty(PathBuf),
@@ -42,6 +47,14 @@ pub enum TrainingError {
         path: PathBuf,
         /// What is wrong.
         problem: String,
+    },
+    /// The weights to begin with are none of this network.
+    #[error("{path}: {problem}")]
+    Weights {
+        /// Where.
+        path: PathBuf,
+        /// What is wrong.
+        problem: WeightsError,
     },
     /// The checkpoint is cut off or of another network.
     #[error("{0} is no checkpoint of this network")]
@@ -54,10 +67,10 @@ pub enum TrainingError {
 }
 
 /// Numbers with their names.
-pub type Figures = BTreeMap<&'static str, f64>;
+pub type Figures = BTreeMap<String, f64>;
 
 /// A line of the curves.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// What the figures are of.
     pub of: Of,
@@ -69,7 +82,7 @@ pub struct Record {
 }
 
 /// What figures are of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Of {
     /// What is learned from.
@@ -85,8 +98,16 @@ pub trait Training: Sized {
     /// The name of the file of weights.
     const WEIGHTS: &'static str;
 
-    /// Before the first step. `tell` is called while it gets ready, with what has been done.
-    fn new(rules: &Self::Rules, tell: &mut dyn FnMut(&str)) -> Self;
+    /// Before the first step; `None` if it was stopped before it was ready. `go_on` is asked now and then
+    /// while it gets ready, with what has been done, which is kept in the folder.
+    ///
+    /// # Errors
+    /// If it can't be kept or read.
+    fn new(
+        rules: &Self::Rules,
+        folder: &Path,
+        go_on: &mut dyn FnMut(&str) -> bool,
+    ) -> Result<Option<Self>, TrainingError>;
 
     /// What is wrong with rules by which nothing can be trained.
     ///
@@ -99,6 +120,12 @@ pub trait Training: Sized {
 
     /// What is learned.
     fn learner(&self) -> &Learner;
+
+    /// Takes the numbers of a file of weights in place of random ones.
+    ///
+    /// # Errors
+    /// If it isn't one of this network.
+    fn begin_with(&mut self, weights: &[u8]) -> Result<(), WeightsError>;
 
     /// Goes on from a checkpoint; `false` if it is of another network.
     fn resume(&mut self, bytes: &[u8]) -> bool;
@@ -117,15 +144,15 @@ pub struct TrainingRun<T> {
 }
 
 impl<T: Training> TrainingRun<T> {
-    /// A new one.
+    /// A new one; `None` if `go_on` says no before the first step.
     ///
     /// # Errors
     /// If the folder isn't empty, or the file system refuses.
     pub fn begin(
         folder: &Path,
         rules: &T::Rules,
-        tell: &mut dyn FnMut(&str),
-    ) -> Result<TrainingRun<T>, TrainingError> {
+        go_on: &mut dyn FnMut(&str) -> bool,
+    ) -> Result<Option<TrainingRun<T>>, TrainingError> {
         let is_taken = fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
         if is_taken {
             return Err(TrainingError::NotEmpty(folder.to_owned()));
@@ -134,27 +161,40 @@ impl<T: Training> TrainingRun<T> {
         let path = folder.join(CONFIG);
         let text = toml::to_string(rules).expect("rules are plain data");
         write_whole(&path, text.as_bytes())?;
-        let run = TrainingRun { folder: folder.to_owned(), training: T::new(rules, tell) };
+        let Some(training) = T::new(rules, folder, go_on)? else { return Ok(None) };
+        let run = TrainingRun { folder: folder.to_owned(), training };
         run.keep()?;
-        Ok(run)
+        Ok(Some(run))
     }
 
-    /// One that was begun.
+    /// One that was begun; `None` if `go_on` says no before it is ready.
     ///
     /// # Errors
     /// If its files can't be read or aren't those of a training.
     pub fn resume(
         folder: &Path,
-        tell: &mut dyn FnMut(&str),
-    ) -> Result<TrainingRun<T>, TrainingError> {
+        go_on: &mut dyn FnMut(&str) -> bool,
+    ) -> Result<Option<TrainingRun<T>>, TrainingError> {
         let rules = read_rules::<T>(&folder.join(CONFIG))?;
         let path = folder.join(CHECKPOINT);
-        let bytes = read_bounded(&path, MOST_BYTES)?;
-        let mut training = T::new(&rules, tell);
-        if !training.resume(&bytes) {
+        // Without one it was stopped before its first step.
+        let bytes = path.exists().then(|| read_bounded(&path, MOST_BYTES)).transpose()?;
+        let Some(mut training) = T::new(&rules, folder, go_on)? else { return Ok(None) };
+        if bytes.is_some_and(|bytes| !training.resume(&bytes)) {
             return Err(TrainingError::Checkpoint(path));
         }
-        Ok(TrainingRun { folder: folder.to_owned(), training })
+        Ok(Some(TrainingRun { folder: folder.to_owned(), training }))
+    }
+
+    /// Before the first step: takes the numbers in a file of weights in place of random ones.
+    ///
+    /// # Errors
+    /// If it can't be read, or isn't one of this network; the folder stays.
+    pub fn begin_with(&mut self, path: &Path) -> Result<(), TrainingError> {
+        let bytes = read_bounded(path, MOST_BYTES)?;
+        let wrong = |problem| TrainingError::Weights { path: path.to_owned(), problem };
+        self.training.begin_with(&bytes).map_err(wrong)?;
+        self.keep()
     }
 
     /// Steps taken and steps in all.
@@ -233,11 +273,16 @@ pub fn read_rules<T: Training>(path: &Path) -> Result<T::Rules, TrainingError> {
     Ok(rules)
 }
 
+/// Figures of these names.
+pub fn figures<const N: usize>(named: [(&str, f64); N]) -> Figures {
+    named.into_iter().map(|(name, x)| (name.to_owned(), x)).collect()
+}
+
 /// The mean of each figure.
 fn mean(told: &[Figures]) -> Figures {
     let mut sums = Figures::new();
     for (name, x) in told.iter().flatten() {
-        *sums.entry(name).or_default() += x / told.len() as f64;
+        *sums.entry(name.clone()).or_default() += x / told.len() as f64;
     }
     sums
 }

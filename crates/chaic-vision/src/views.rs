@@ -55,6 +55,8 @@ pub struct ViewRules {
     /// Share of furniture that becomes another class of about its size, and the largest ratio of two
     /// extents that are about alike.
     pub refurnished: (f32, f32),
+    /// Share of scenes in which a class of the catalogue, each equally often, is put and looked at.
+    pub wanted: f32,
     /// Share of people who carry something before them, and of views from behind a burden.
     pub carrying: f32,
     /// Share of containers with something in them.
@@ -79,6 +81,7 @@ impl ViewRules {
         decor: 0.2,
         large: 0.06,
         refurnished: (0.3, 1.8),
+        wanted: 0.5,
         carrying: 0.4,
         filled: 0.3,
         varied: 0.35,
@@ -87,13 +90,14 @@ impl ViewRules {
         distance_m: [0.6, 5.0],
     };
 
-    /// Places as episodes begin with other things in them, so that every class of the catalogue occurs;
-    /// what the detector is told to be good at.
+    /// Places as episodes begin with other things in them, so that every class of the catalogue is looked
+    /// at about equally often; what the detector is told to be good at.
     pub const ALL_CLASSES: ViewRules = ViewRules {
         added: 4,
         decor: 0.3,
         large: 0.1,
         refurnished: (0.2, 1.8),
+        wanted: 1.0,
         carrying: 0.2,
         filled: 0.1,
         varied: 0.0,
@@ -107,6 +111,7 @@ impl ViewRules {
         swapped: 0.0,
         added: 0,
         refurnished: (0.0, 1.0),
+        wanted: 0.0,
         carrying: 0.2,
         filled: 0.1,
         varied: 0.0,
@@ -164,11 +169,16 @@ const HIGHEST_TOP_M: f32 = 2.0;
 /// What has an extent below this may hang on a wall, metres.
 const FLAT_M: f32 = 0.1;
 
+/// Places that are tried for large things.
+const LARGE_PLACES: usize = 12;
+
 struct Place {
     world: World,
     scene: Scene,
     labels: Vec<u8>,
     postures: Vec<Posture>,
+    /// The label that views are aimed at.
+    wanted: Option<u8>,
 }
 
 impl Views {
@@ -207,7 +217,10 @@ impl Views {
         let seeds = Seeds { place: seed(), episode: seed() };
         let settings = if rng.chance(0.7) { Settings::STANDARD } else { Settings::PAPER };
         let usual = generate_with(task, seeds, settings).ok()?;
-        let setup = self.swapped(&usual);
+        let rng = &mut self.rng;
+        let classes: Vec<ClassId> = ClassId::all().collect();
+        let wanted = rng.chance(self.rules.wanted).then(|| classes[rng.below(classes.len())]);
+        let setup = self.swapped(&usual, wanted);
         let rng = &mut self.rng;
         let world = World::new(setup, Rules::paper()).ok()?;
         let appearance = match rng.chance(self.rules.varied) {
@@ -217,12 +230,13 @@ impl Views {
         let scene = Scene::with_appearance(world.setup(), appearance);
         let labels = world.classes().into_iter().map(label_of).collect();
         let postures = world.setup().agents().map(|agent| world.posture(agent)).collect();
-        Some(Place { world, scene, labels, postures })
+        let wanted = wanted.map(|class| label_of(Some(class)));
+        Some(Place { world, scene, labels, postures, wanted })
     }
 
-    /// The same with other small things where small things lie, and other obstacles and furniture
-    /// where such stand.
-    fn swapped(&mut self, usual: &Setup) -> Setup {
+    /// The same with other small things where small things lie, other obstacles and furniture where such
+    /// stand, and more things; one of the class that is wanted among them, if it can be put anywhere.
+    fn swapped(&mut self, usual: &Setup, wanted: Option<ClassId>) -> Setup {
         let rng = &mut self.rng;
         let of = |is: &dyn Fn(Role) -> bool| -> Vec<ClassId> {
             ClassId::all().filter(|c| is(c.info().role)).collect()
@@ -260,8 +274,21 @@ impl Views {
                 *thing = Thing { variant, ..Thing::new(class, thing.position, yaw_rad) };
             }
         }
-        let fits = |c: &ClassId| c.info().size_m.into_iter().all(|m| m < LARGEST_ADDED_M);
-        let decor: Vec<ClassId> = furniture.iter().copied().filter(fits).collect();
+        let is_small = |c: &ClassId| c.info().size_m.into_iter().all(|m| m < LARGEST_ADDED_M);
+        let decor: Vec<ClassId> = furniture.iter().copied().filter(is_small).collect();
+        let mut added: Vec<ClassId> = Vec::new();
+        let is_a_thing = |c: &ClassId| {
+            [&small, &obstacles, &furniture].into_iter().any(|classes| classes.contains(c))
+        };
+        added.extend(wanted.filter(is_a_thing));
+        for _ in 0..self.rules.added {
+            let among = match rng.chance(self.rules.large) {
+                true => &furniture,
+                false if rng.chance(self.rules.decor) => &decor,
+                false => &small,
+            };
+            added.extend(rng.choose(among));
+        }
         let tops: Vec<Surface> = setup
             .things
             .iter()
@@ -269,24 +296,12 @@ impl Views {
             .flat_map(top_surfaces)
             .filter(|top| top.center.y < HIGHEST_TOP_M)
             .collect();
-        for _ in 0..self.rules.added {
-            let is_large = rng.chance(self.rules.large);
-            let among = match rng.chance(self.rules.decor) {
-                _ if is_large => &furniture,
-                true => &decor,
-                false => &small,
-            };
-            let Some(class) = rng.choose(among).copied() else { continue };
-            let mut within = |m: f32| rng.range(-m, m);
-            let ground = {
-                let half = 0.5 * setup.bounds.size();
-                let middle = setup.bounds.min + half;
-                Vec3::new(middle.x + within(half.x), 0.0, middle.y + within(half.y))
-            };
+        for class in added {
             let position = match rng.choose(&tops) {
-                _ if is_large => {
+                _ if !is_small(&class) => {
                     let is_flat = class.info().size_m.into_iter().any(|m| m < FLAT_M);
-                    ground + if is_flat { rng.range(0.0, 1.2) * Vec3::Y } else { Vec3::ZERO }
+                    let above_m = if is_flat { rng.range(0.0, 1.2) } else { 0.0 };
+                    clear_place(&setup, rng) + above_m * Vec3::Y
                 }
                 Some(top) if rng.chance(0.7) => {
                     let at = Vec3::new(
@@ -296,7 +311,7 @@ impl Views {
                     );
                     top.center + yaw_rotation(top.yaw_rad) * (0.9 * at)
                 }
-                _ => ground,
+                _ => ground(&setup, rng),
             };
             let yaw_rad = rng.range(-PI, PI);
             let variant = rng.below(256) as u8;
@@ -311,7 +326,8 @@ impl Views {
         let size = self.rules.size_px;
         let aimed_at = rng.chance(self.rules.aimed).then(|| {
             let is_movable = rng.chance(self.rules.aimed_movable);
-            aim(place, is_movable, rng)
+            let of_class = place.wanted.and_then(|label| one_of(place, label, rng));
+            of_class.or_else(|| aim(place, is_movable, rng))
         });
         let aimed_at = aimed_at.flatten();
         let eye_m = if rng.chance(0.7) { 1.65 } else { rng.range(1.05, 1.75) };
@@ -465,9 +481,36 @@ fn aim(place: &Place, is_movable: bool, rng: &mut Stream) -> Option<EntityId> {
     let mut labels: Vec<u8> = by_label.iter().map(|(label, _)| *label).collect();
     labels.dedup();
     let label = *rng.choose(&labels)?;
-    let of_it: Vec<EntityId> =
-        by_label.into_iter().filter(|(l, _)| *l == label).map(|(_, e)| e).collect();
+    one_of(place, label, rng)
+}
+
+/// A thing or person of this label.
+fn one_of(place: &Place, label: u8, rng: &mut Stream) -> Option<EntityId> {
+    let of_it: Vec<EntityId> = (0..place.labels.len())
+        .filter(|k| place.labels[*k] == label)
+        .map(|k| EntityId(k as u16))
+        .collect();
     rng.choose(&of_it).copied()
+}
+
+/// Anywhere on the ground.
+fn ground(setup: &Setup, rng: &mut Stream) -> Vec3 {
+    let at = setup.bounds.min + Vec2::new(rng.unit(), rng.unit()) * setup.bounds.size();
+    Vec3::new(at.x, 0.0, at.y)
+}
+
+/// The one of some places on the ground that is farthest from all other things.
+fn clear_place(setup: &Setup, rng: &mut Stream) -> Vec3 {
+    let clearance_m = |at: Vec3| {
+        let apart_m = setup.things.iter().map(|thing| {
+            let apart = (thing.position - at).abs() - 0.5 * thing.size_m();
+            apart.x.max(apart.z)
+        });
+        apart_m.fold(f32::INFINITY, f32::min)
+    };
+    let places: Vec<Vec3> = (0..LARGE_PLACES).map(|_| ground(setup, rng)).collect();
+    let clearest = places.into_iter().max_by(|a, b| clearance_m(*a).total_cmp(&clearance_m(*b)));
+    clearest.unwrap_or(Vec3::ZERO)
 }
 
 fn target_position(place: &Place, entity: EntityId) -> Vec3 {

@@ -15,7 +15,7 @@ use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::Format;
 use chaic_protocol::capability::PersonKind;
 use chaic_protocol::{AgentId, TaskId};
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub use self::bench::{
     BenchCommand, BenchFormat, EnvBenchArguments, LookedAt, RenderBenchArguments,
@@ -26,9 +26,13 @@ pub use self::exec::{
 };
 pub use self::fidelity::FidelityArguments;
 pub use self::perception::{
-    BehaviorArguments, DetectionArguments, EvalPerceptionCommand, Look, Scenes, TrainArguments,
-    TrainCommand,
+    BehaviorArguments, ClipArguments, CollectBehaviorArguments, CollectCommand,
+    CollectDetectionArguments, DetectionArguments, EvalPerceptionCommand, Look, Of, Scenes,
+    TrainArguments, TrainCommand,
 };
+
+/// What networks that are trained here are called.
+pub const LEARNED: &str = "learned";
 
 fn partner_is_help() -> String {
     let choices = PersonKind::choices();
@@ -60,6 +64,9 @@ pub enum Command {
     Verify(VerifyArguments),
     /// Play both rule sets and single rules, and write how near that is to the paper's results.
     Fidelity(FidelityArguments),
+    /// Write what networks learn from into files; docs/perception.md.
+    #[command(subcommand)]
+    Collect(CollectCommand),
     /// Train networks; docs/perception.md.
     #[command(subcommand)]
     Train(TrainCommand),
@@ -158,12 +165,17 @@ pub struct EvalArguments {
     /// draws them from a seed (domain randomization). Changes neither depth nor ids.
     #[arg(long, value_name = "LOOK")]
     pub appearance: Option<Appearance>,
+    /// What helpers may know: told (usual), what each is granted; or hidden, nothing but pixels and the
+    /// own body: --perception learned --behavior learned, and no helper that is told the constraint.
+    #[arg(long, value_enum)]
+    pub track: Option<Track>,
     /// By what helpers tell what is in their images: gt (usual), ids from ground truth; or learned, the
     /// detector that comes with chaic, or learned:FILE, other weights of it.
     #[arg(long, value_name = "KIND")]
     pub perception: Option<String>,
     /// By what helpers who aren't told the goal tell what their partner does: gt (usual), what they are
-    /// granted and what follows from things in hands; or learned:FILE, a network that watches.
+    /// granted and what follows from things in hands; or learned, the network that comes with chaic and
+    /// watches, or learned:FILE, other weights of it.
     #[arg(long, value_name = "KIND")]
     pub behavior: Option<String>,
     #[command(flatten)]
@@ -181,7 +193,30 @@ pub struct EvalArguments {
     pub no_traces: bool,
 }
 
+/// What helpers may know.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Track {
+    /// What each is granted.
+    Told,
+    /// Nothing but pixels and the own body.
+    Hidden,
+}
+
 impl EvalArguments {
+    /// By what helpers see, as it was given or as the track has it.
+    pub fn perception(&self) -> Option<String> {
+        self.perception.clone().or_else(|| self.learned())
+    }
+
+    /// By what they recognize what others do, as it was given or as the track has it.
+    pub fn behavior(&self) -> Option<String> {
+        self.behavior.clone().or_else(|| self.learned())
+    }
+
+    fn learned(&self) -> Option<String> {
+        (self.track == Some(Track::Hidden)).then(|| LEARNED.to_owned())
+    }
+
     /// The names of the helpers that were given.
     pub fn helper_names(&self) -> Option<Vec<String>> {
         let given = self.helper.as_ref()?;
@@ -310,6 +345,10 @@ pub struct ReplayArguments {
     /// Draw every N-th frame; 30 frames are a second of walking.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
     pub every: u32,
+    /// Draw over what the helper sees what a detector finds in it: the one by which the run's helpers
+    /// saw, or else the one that comes with chaic.
+    #[arg(long)]
+    pub masks: bool,
 }
 
 /// `chaic render`.

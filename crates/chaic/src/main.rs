@@ -22,6 +22,7 @@ fn main() -> ExitCode {
         Command::Report(arguments) => commands::report::run(&arguments),
         Command::Verify(arguments) => commands::verify::run(&arguments),
         Command::Fidelity(arguments) => commands::fidelity::run(&arguments),
+        Command::Collect(command) => commands::collect::collect(&command),
         Command::Train(command) => commands::perception::train(&command),
         Command::EvalPerception(command) => commands::perception::evaluate(&command),
         Command::Replay(arguments) => commands::replay::run(&arguments),

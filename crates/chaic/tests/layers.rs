@@ -65,7 +65,7 @@ const ALLOWED: &[Arrows] = &[
             "chaic-agents",
             "chaic-env",
         ],
-        &[],
+        &["chaic-eval"],
     ),
     arrows(
         "chaic-env",

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use chaic_protocol::agent::{ChildState, Thought};
+use chaic_protocol::agent::{Believed, ChildState, Thought};
 use chaic_protocol::capability::Impairment;
 use chaic_protocol::{Action, AgentId, ClassId, EntityId, FailureReason, Hand, Outcome};
 use chaic_world::{Event, EventKind};
@@ -44,7 +44,12 @@ fn records() -> Vec<Record> {
         let (agent, digest) = (AgentId::HELPER, Digest(0xdead_beef));
         Record::Decision(Decision { frame, agent, action, digest, thought })
     };
-    let thought = Thought { plan: "go to \"apple\" #31\n".to_owned(), mood: Some("x".to_owned()) };
+    let thought = Thought {
+        plan: "go to \"apple\" #31\n".to_owned(),
+        mood: Some("x".to_owned()),
+        noticed: Some("partner picked up apple #31".to_owned()),
+        sees: vec![Believed { number: 31, class: ClassId::named("apple"), at_cm: [120, 80, -35] }],
+    };
     let failed = Outcome::Failure(FailureReason::OutOfReach);
     vec![
         decision(0, pick, Some(thought)),

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use chaic_env::trace::Trace;
 use chaic_env::{Playback, slug};
 use chaic_episodes::Episode;
+use chaic_protocol::geom::Camera;
 use chaic_protocol::{Action, AgentId, EntityId, Frame, Outcome, ResolvedAction, TaskId};
 use chaic_render::{Channels, Scene, View, floor_plan};
 use chaic_world::{EventKind, World};
@@ -28,6 +29,16 @@ pub struct ReplayOptions {
     pub every: u32,
 }
 
+/// What a detector finds in an image, to be drawn over it.
+pub trait Masks {
+    /// The pixels and the label of each thing in an image of color (shape [height, width, 3]) and depth
+    /// (metres, shape [height, width]).
+    fn find(&mut self, rgb: &[u8], depth_m: &[f32], camera: &Camera) -> Vec<(u8, Vec<u32>)>;
+
+    /// The side of the images that it looks at, pixels.
+    fn image_size(&self) -> u32;
+}
+
 /// What one agent is doing, in words.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Caption {
@@ -37,6 +48,8 @@ pub struct Caption {
     pub action: String,
     /// What it plans.
     pub plan: String,
+    /// What it noticed last of the others, if it tells that from what it sees.
+    pub noticed: Option<String>,
 }
 
 /// Which helper's trace is taken if none is named; one that isn't listed comes first.
@@ -87,7 +100,8 @@ pub fn find_trace(
     })
 }
 
-/// Draws a trace as a video. `progress` hears of every frame of the episode, and says whether to go
+/// Draws a trace as a video, with masks over what the helper sees if there are any; what it believes to
+/// see is drawn where the trace has it. `progress` hears of every frame of the episode, and says whether to go
 /// on. Returns how many pictures it has; `None` if it was broken off, which leaves no video.
 ///
 /// # Errors
@@ -97,6 +111,7 @@ pub fn write(
     trace: &Trace,
     episode: &Episode,
     options: ReplayOptions,
+    mut masks: Option<&mut (dyn Masks + '_)>,
     out: &Path,
     progress: &mut dyn FnMut(Frame) -> ControlFlow<()>,
 ) -> Result<Option<u32>> {
@@ -116,7 +131,7 @@ pub fn write(
         }
         let is_last = !replay.step()?;
         if frame.is_multiple_of(every) || is_last {
-            video.push(&replay.picture()).map_err(bad)?;
+            video.push(&replay.picture(masks.as_deref_mut())).map_err(bad)?;
         }
         if is_last {
             break;
@@ -163,23 +178,43 @@ impl<'a> Replay<'a> {
         Ok(true)
     }
 
-    /// The picture of this moment.
-    pub fn picture(&self) -> RgbImage {
+    /// The picture of this moment, with these masks over what the helper sees.
+    pub fn picture(&self, masks: Option<&mut (dyn Masks + '_)>) -> RgbImage {
         let eyes = [AgentId::PARTNER, AgentId::HELPER];
         let present = eyes.iter().filter(|a| a.index() < self.playback.thoughts().len());
-        let view =
-            |agent: &AgentId| View::of_agent(self.world(), *agent, panel::EYE_PX, Channels::RGB);
+        let view = |agent: &AgentId| match &masks {
+            Some(masks) if *agent == AgentId::HELPER => {
+                let channels = Channels { depth: true, ..Channels::RGB };
+                View::of_agent(self.world(), *agent, masks.image_size(), channels)
+            }
+            _ => View::of_agent(self.world(), *agent, panel::EYE_PX, Channels::RGB),
+        };
         let views: Vec<View> = present.map(view).collect();
-        let (images, map) = rayon::join(
+        let (mut images, map) = rayon::join(
             || self.scene.render(self.world(), &views),
             || floor_plan::draw_scene_plan(&self.scene, self.world(), panel::MAP_PX),
         );
+        let helper = AgentId::HELPER.index();
+        if let (Some(masks), Some(images), Some(view)) =
+            (masks, images.get_mut(helper), views.get(helper))
+            && let (Some(rgb), Some(depth_m)) = (&mut images.rgb, &images.depth_m)
+        {
+            for (label, pixels) in masks.find(rgb, depth_m, &view.camera) {
+                panel::tint(rgb, &pixels, label);
+            }
+        }
+        let believed: Vec<Vec<panel::Mark>> = views
+            .iter()
+            .zip(self.playback.thoughts())
+            .map(|(view, thought)| panel::marks(&thought.sees, &view.camera))
+            .collect();
         let captions: Vec<Caption> =
             self.world().setup().agents().map(|a| self.caption(a)).collect();
         panel::compose(&panel::Contents {
             header: self.playback.header(),
             world: self.world(),
             eyes: &images,
+            believed: &believed,
             map: &map,
             captions: &captions,
             news: &self.news,
@@ -202,7 +237,8 @@ impl<'a> Replay<'a> {
             AgentId::HELPER => format!("{agent} ({})", self.playback.header().helper),
             _ => agent.to_string(),
         };
-        Caption { who, action, plan: format!("{}{mood}", thought.plan) }
+        let noticed = thought.noticed.clone();
+        Caption { who, action, plan: format!("{}{mood}", thought.plan), noticed }
     }
 
     fn words(&self, action: &ResolvedAction) -> String {

@@ -1,6 +1,9 @@
 //! One picture of a replay: what both see, the map, and what is done and planned.
 
 use chaic_env::trace::Header;
+use chaic_protocol::Vec3;
+use chaic_protocol::agent::Believed;
+use chaic_protocol::geom::Camera;
 use chaic_protocol::observation::Images;
 use chaic_render::text::{self, Align};
 use chaic_world::World;
@@ -38,6 +41,8 @@ pub(super) struct Contents<'a> {
     pub world: &'a World,
     /// What partner and helper see.
     pub eyes: &'a [Images],
+    /// What each of them believes to see.
+    pub believed: &'a [Vec<Mark>],
     pub map: &'a RgbImage,
     pub captions: &'a [Caption],
     /// What happened last, newest last.
@@ -49,15 +54,79 @@ pub(super) fn compose(contents: &Contents<'_>) -> RgbImage {
     head(&mut image, contents);
     for (k, eye) in contents.eyes.iter().enumerate() {
         let x = MARGIN_PX + k as u32 * (EYE_PX + MARGIN_PX);
-        let picture = eye.rgb.clone().and_then(|b| RgbImage::from_raw(EYE_PX, EYE_PX, b));
-        if let Some(picture) = picture {
-            imageops::replace(&mut image, &picture, i64::from(x), i64::from(HEAD_PX));
+        let side = eye.rgb.as_ref().map_or(0, |rgb| (rgb.len() / 3).isqrt() as u32);
+        let picture = eye.rgb.clone().and_then(|b| RgbImage::from_raw(side, side, b));
+        let Some(mut picture) = picture else { continue };
+        if side != EYE_PX {
+            picture = imageops::resize(&picture, EYE_PX, EYE_PX, imageops::FilterType::Triangle);
         }
+        for mark in contents.believed.get(k).into_iter().flatten() {
+            draw_mark(&mut picture, mark);
+        }
+        imageops::replace(&mut image, &picture, i64::from(x), i64::from(HEAD_PX));
     }
     let below = map(&mut image, contents.map);
     captions(&mut image, contents);
     news(&mut image, below, contents.news);
     image
+}
+
+/// Something that is written where somebody believes to see it.
+pub(super) struct Mark {
+    /// Where, as shares of the image's sides, from the left and the top.
+    at: [f32; 2],
+    words: String,
+    color: [u8; 3],
+}
+
+/// A color for a label: the same in all pictures, light enough to read over dark.
+fn color_of(label: u8) -> [u8; 3] {
+    [37u32, 91, 143].map(|m| (u32::from(label) * m % 160 + 95) as u8)
+}
+
+/// Colors pixels of an image by a label.
+pub(super) fn tint(rgb: &mut [u8], pixels: &[u32], label: u8) {
+    let color = color_of(label);
+    for k in pixels {
+        for (c, of_label) in rgb[3 * *k as usize..][..3].iter_mut().zip(color) {
+            *c = *c / 2 + of_label / 2;
+        }
+    }
+}
+
+/// What is believed to be in sight, where this camera has it.
+pub(super) fn marks(believed: &[Believed], camera: &Camera) -> Vec<Mark> {
+    let mark = |thing: &Believed| {
+        let [x, y, z] = thing.at_cm.map(|cm| 0.01 * cm as f32);
+        let (at, _) = camera.project(Vec3::new(x, y, z))?;
+        let at = [at.x / camera.width as f32, at.y / camera.height as f32];
+        let words = format!("{} {}", thing.class.info().label, thing.number);
+        // Labels of pixels count the background as 0.
+        let color = color_of(thing.class.index() as u8 + 1);
+        at.iter().all(|x| (0.0..1.0).contains(x)).then_some(Mark { at, words, color })
+    };
+    believed.iter().filter_map(mark).collect()
+}
+
+fn draw_mark(image: &mut RgbImage, Mark { at, words, color }: &Mark) {
+    /// Half the side of the dot, pixels.
+    const DOT_PX: u32 = 2;
+    const WORDS_PX: f32 = 12.0;
+    let side = image.width();
+    let [x, y] = at.map(|share| (share * side as f32) as u32);
+    let (left, top) = (x.saturating_sub(DOT_PX), y.saturating_sub(DOT_PX));
+    for (i, j) in (top..(y + DOT_PX).min(side))
+        .flat_map(|j| (left..(x + DOT_PX).min(side)).map(move |i| (i, j)))
+    {
+        image.put_pixel(i, j, Rgb(*color));
+    }
+    let from = (x + 2 * DOT_PX) as f32;
+    let is_beside = from + text::width(words, WORDS_PX) < side as f32;
+    let (from, align) = if is_beside { (from, Align::Left) } else { (left as f32, Align::Right) };
+    let y = (y as f32 - 0.5 * WORDS_PX).clamp(0.0, side as f32 - WORDS_PX);
+    // A dark edge, since what is behind may be light.
+    text::draw(image, (from + 1.0, y + 1.0), WORDS_PX, INK, align, words);
+    text::draw(image, (from, y), WORDS_PX, *color, align, words);
 }
 
 fn head(image: &mut RgbImage, Contents { header, world, .. }: &Contents<'_>) {
@@ -122,7 +191,9 @@ fn captions(image: &mut RgbImage, Contents { captions, .. }: &Contents<'_>) {
         let x = (MARGIN_PX + k as u32 * (EYE_PX + MARGIN_PX)) as f32;
         text::draw(image, (x, top), LINE_PX, INK, Align::Left, &caption.who);
         lines(image, x, top + 24.0, &caption.action, INK);
-        lines(image, x, top + 70.0, &caption.plan, FAINT);
+        let noticed = caption.noticed.as_ref().map(|noticed| format!("saw {noticed}"));
+        let plan = [caption.plan.clone()].into_iter().chain(noticed).collect::<Vec<_>>().join("; ");
+        lines(image, x, top + 70.0, &plan, FAINT);
     }
     let left = MARGIN_PX as f32;
     if let Some(child) = captions.get(2) {

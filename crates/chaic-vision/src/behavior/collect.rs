@@ -2,7 +2,6 @@
 //! that the partners did (paper, appendix on action recognition).
 
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread;
 
 use chaic_agents::Mind;
 use chaic_agents::behavior::{BehaviorLog, BehaviorModel};
@@ -23,6 +22,8 @@ use serde::{Deserialize, Serialize};
 use super::Behavior;
 use super::clip::{CROPS, Clip, SLACK};
 use super::crop::{Crop, FILM, Watcher};
+use super::store::{ClipFolder, StoreError};
+use crate::parallel::in_order;
 use crate::views::Part;
 
 /// How clips are made.
@@ -69,45 +70,61 @@ const TASKS: [(TaskId, usize); 12] = [
     (TaskId::Tremor, 1),
 ];
 
-/// Clips of a part's episodes, in the order in which they were made.
+/// How many clips there are of each behavior, mixed ones last.
+pub type Counts = [usize; Behavior::ALL.len() + 1];
+
+/// By whom and where clips are made.
+#[derive(Clone, Copy)]
+pub struct Collector<'a> {
+    /// Whose episodes are played.
+    pub part: Part,
+    /// How.
+    pub rules: &'a CollectRules,
+    /// By what the helpers who film see.
+    pub sight: &'a dyn Sight,
+    /// Episodes at a time; changes no clip.
+    pub n_threads: usize,
+    /// Where clips are kept, and found again, if anywhere.
+    pub folder: Option<&'a ClipFolder>,
+}
+
+/// The clips, in the order in which they were made; those so far if `go_on`, which is called with the
+/// number of episodes that were played, says no.
 ///
-/// The same clips come of the same rules on any number of threads. `tell` is called with the number of
-/// episodes that were played, and how many clips there are of each behavior, mixed ones last.
+/// # Errors
+/// If the folder can't be read or written.
 pub fn collect(
-    part: Part,
-    rules: &CollectRules,
-    sight: &dyn Sight,
-    n_threads: usize,
-    tell: &mut dyn FnMut(usize, &[usize; 7]),
-) -> Vec<Clip> {
-    let mut clips: Vec<Clip> = Vec::new();
-    let mut counts = [0; 7];
+    collector: &Collector<'_>,
+    go_on: &mut dyn FnMut(usize, &Counts) -> bool,
+) -> Result<Vec<Clip>, StoreError> {
+    let Collector { part, rules, sight, n_threads, folder } = *collector;
+    let (mut clips, mut counts): (Vec<Clip>, Counts) = Default::default();
     for first in (0..rules.episodes).step_by(ROUND) {
-        let indices = first..(first + ROUND).min(rules.episodes);
-        let n = indices.len();
-        let some = |thread: usize| -> Vec<Vec<Clip>> {
-            let mine = indices.clone().skip(thread).step_by(n_threads);
-            mine.map(|index| of_episode(part, rules, sight, index as u64)).collect()
-        };
-        let some = &some;
-        let parts: Vec<Vec<Vec<Clip>>> = thread::scope(|scope| {
-            let workers: Vec<_> = (0..n_threads).map(|t| scope.spawn(move || some(t))).collect();
-            workers.into_iter().map(|w| w.join().expect("it doesn't panic")).collect()
+        let is_enough = counts.iter().all(|n| *n >= rules.of_each);
+        if is_enough || !go_on(first, &counts) {
+            return Ok(clips);
+        }
+        let kept = folder.map_or(Ok(None), |folder| folder.read(first))?;
+        let is_new = kept.is_none();
+        let mut made = kept.unwrap_or_else(|| {
+            let indices = first..(first + ROUND).min(rules.episodes);
+            let one = |(): &mut (), index: usize| of_episode(part, rules, sight, index as u64);
+            let made = in_order(indices, n_threads, || (), one);
+            made.into_iter().flatten().collect()
         });
-        let mut parts: Vec<_> = parts.into_iter().map(Vec::into_iter).collect();
-        for clip in (0..n).filter_map(|k| parts[k % n_threads].next()).flatten() {
+        made.retain(|clip| {
             let kind = if clip.is_mixed { counts.len() - 1 } else { clip.label.index() };
-            if counts[kind] < rules.of_each {
-                counts[kind] += 1;
-                clips.push(clip);
-            }
+            counts[kind] += 1;
+            counts[kind] <= rules.of_each
+        });
+        counts.iter_mut().for_each(|n| *n = (*n).min(rules.of_each));
+        if let Some(folder) = folder.filter(|_| is_new) {
+            folder.write(first, &made)?;
         }
-        tell(first + n, &counts);
-        if counts.iter().all(|n| *n >= rules.of_each) {
-            break;
-        }
+        clips.extend(made);
     }
-    clips
+    go_on(rules.episodes, &counts);
+    Ok(clips)
 }
 
 /// Clips of one episode.

@@ -3,7 +3,7 @@
 //!
 //! [`crop`] cuts a person out of a film, [`clip`] is a row of such crops and what a network reads of it,
 //! [`network`] that network; [`collect`] makes clips with labels by having helpers follow partners,
-//! [`train`] learns from them and [`report`] tells how well; [`recognize`] is the mind's model of others.
+//! [`store`] keeps them, [`train`] learns from them and [`report`] tells how well; [`recognize`] is the mind's model of others.
 
 pub mod clip;
 pub mod collect;
@@ -11,6 +11,7 @@ pub mod crop;
 pub mod network;
 pub mod recognize;
 pub mod report;
+pub mod store;
 pub mod train;
 
 #[cfg(test)]

@@ -81,6 +81,12 @@ fn of_file(network: &BehaviorNetwork) -> Network {
 }
 
 impl TrainedBehavior {
+    /// The one that comes with chaic: weights/README.md says how it was made and how good it is.
+    pub fn built_in() -> TrainedBehavior {
+        let bytes = include_bytes!("../../weights/behavior.safetensors");
+        TrainedBehavior::from_bytes(bytes).expect("a test reads it")
+    }
+
     /// From a safetensors file.
     ///
     /// # Errors

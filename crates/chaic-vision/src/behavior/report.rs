@@ -1,13 +1,13 @@
 //! How well behaviors are told.
 
 use std::collections::BTreeMap;
-use std::thread;
 
 use serde::Serialize;
 
 use super::Behavior;
 use super::clip::{Clip, SLACK};
 use super::network::{Outputs, TrainedBehavior, softmax};
+use crate::parallel::in_order;
 
 const N: usize = Behavior::ALL.len();
 
@@ -32,17 +32,12 @@ pub struct BehaviorReport {
 
 /// The outputs for each clip, in their order; where a clip is read from changes from one to the next.
 pub fn outputs_of(trained: &TrainedBehavior, clips: &[Clip], n_threads: usize) -> Vec<Outputs> {
-    let some = |thread: usize| -> Vec<Outputs> {
-        let mut pass = trained.pass();
-        let mut one = |k: usize| trained.outputs(&clips[k].crops, k % (SLACK + 1), &mut pass);
-        (thread..clips.len()).step_by(n_threads).map(&mut one).collect()
-    };
-    let some = &some;
-    let parts: Vec<Vec<Outputs>> = thread::scope(|scope| {
-        let workers: Vec<_> = (0..n_threads).map(|t| scope.spawn(move || some(t))).collect();
-        workers.into_iter().map(|w| w.join().expect("it doesn't panic")).collect()
-    });
-    (0..clips.len()).map(|k| parts[k % n_threads][k / n_threads]).collect()
+    in_order(
+        0..clips.len(),
+        n_threads,
+        || trained.pass(),
+        |pass, k| trained.outputs(&clips[k].crops, k % (SLACK + 1), pass),
+    )
 }
 
 /// The likeliest behavior, and its probability.

@@ -10,10 +10,11 @@ use chaic_protocol::observation::{FilmFrame, Images};
 
 use super::Behavior;
 use super::clip::{CROPS, Clip, SLACK};
-use super::collect::{CollectRules, collect};
+use super::collect::{CollectRules, Collector, collect};
 use super::crop::{Crop, FILM, SIDE};
 use super::network::{TrainedBehavior, softmax};
 use super::report::{calibrate, outputs_of, report};
+use super::store::ClipFolder;
 use super::train::{BehaviorRules, BehaviorTrainer};
 use crate::views::Part;
 
@@ -59,9 +60,17 @@ fn few() -> CollectRules {
 
 #[test]
 fn clips_are_whole_show_the_person_and_are_the_same_on_any_number_of_threads() {
-    let clips = |threads| collect(Part::Training, &few(), &TrueSight, threads, &mut |_, _| ());
-    let one = clips(1);
-    assert!(one == clips(2), "clips differ between one thread and two");
+    let dir = tempfile::tempdir().unwrap();
+    let rules = few();
+    let folder = ClipFolder::open(dir.path(), Part::Training, &rules).unwrap();
+    let clips = |n_threads, folder| {
+        let collector =
+            Collector { part: Part::Training, rules: &rules, sight: &TrueSight, n_threads, folder };
+        collect(&collector, &mut |_, _| true).unwrap()
+    };
+    let one = clips(1, None);
+    assert!(one == clips(2, Some(&folder)), "clips differ between one thread and two");
+    assert!(one == clips(2, Some(&folder)), "clips differ when they are read again");
     let labels: BTreeSet<Behavior> = one.iter().map(|clip| clip.label).collect();
     assert!(labels.contains(&Behavior::PickedUp) && labels.contains(&Behavior::Moving));
     for clip in &one {

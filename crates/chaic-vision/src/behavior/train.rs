@@ -1,5 +1,8 @@
 //! The training loop of the behavior network.
 
+use std::path::Path;
+
+use chaic_nn::weights::WeightsError;
 use chaic_nn::{AdamRules, Pass, Tensor};
 use chaic_protocol::rng::Stream;
 use serde::{Deserialize, Serialize};
@@ -8,12 +11,13 @@ use chaic_agents::sight::TrueSight;
 
 use super::Behavior;
 use super::clip::{Clip, Look, read};
-use super::collect::{CollectRules, collect};
+use super::collect::{CollectRules, Collector, collect};
 use super::network::{BehaviorNetwork, Outputs, TrainedBehavior, softmax};
 use super::report::{calibrate, outputs_of, report};
+use super::store::{ClipFolder, StoreError};
 use crate::learner::{Learner, rate_at};
 use crate::loss::ln;
-use crate::training_run::{Figures, Training};
+use crate::training_run::{Figures, Training, TrainingError, figures};
 use crate::views::Part;
 
 /// Threads that play episodes and look at clips; what comes of it doesn't depend on them.
@@ -152,16 +156,32 @@ impl Training for BehaviorTraining {
     type Rules = BehaviorRules;
     const WEIGHTS: &'static str = "behavior.safetensors";
 
-    fn new(rules: &BehaviorRules, tell: &mut dyn FnMut(&str)) -> BehaviorTraining {
-        let mut clips = |part: Part, of_each: usize| {
+    fn new(
+        rules: &BehaviorRules,
+        folder: &Path,
+        go_on: &mut dyn FnMut(&str) -> bool,
+    ) -> Result<Option<BehaviorTraining>, TrainingError> {
+        let clips = |part: Part, go_on: &mut dyn FnMut(&str) -> bool| {
+            let of_each = match part {
+                Part::Training => rules.collect.of_each,
+                _ => rules.collect.of_each.min(VALIDATION_CLIPS),
+            };
             let rules = CollectRules { of_each, ..rules.collect };
-            collect(part, &rules, &TrueSight, THREADS, &mut |n, counts| {
-                tell(&format!("{n} episodes of {part:?}, clips: {counts:?}"));
-            })
+            let name = format!("{part:?}").to_lowercase();
+            let folder = ClipFolder::open(&folder.join("clips").join(&name), part, &rules)?;
+            let (sight, folder) = (&TrueSight, Some(&folder));
+            let collector = Collector { part, rules: &rules, sight, n_threads: THREADS, folder };
+            let mut is_whole = true;
+            let clips = collect(&collector, &mut |n, counts| {
+                is_whole = go_on(&format!("{n} {name} episodes, clips {counts:?}"));
+                is_whole
+            })?;
+            Ok::<_, StoreError>(is_whole.then_some(clips))
         };
-        let validation = clips(Part::Validation, rules.collect.of_each.min(VALIDATION_CLIPS));
-        let trainer = BehaviorTrainer::new(*rules, clips(Part::Training, rules.collect.of_each));
-        BehaviorTraining { trainer, validation }
+        let Some(validation) = clips(Part::Validation, go_on)? else { return Ok(None) };
+        let Some(training) = clips(Part::Training, go_on)? else { return Ok(None) };
+        let trainer = BehaviorTrainer::new(*rules, training);
+        Ok(Some(BehaviorTraining { trainer, validation }))
     }
 
     fn check(rules: &BehaviorRules) -> Result<(), &'static str> {
@@ -183,13 +203,18 @@ impl Training for BehaviorTraining {
         &self.trainer.learner
     }
 
+    fn begin_with(&mut self, weights: &[u8]) -> Result<(), WeightsError> {
+        self.trainer.learner.begin_with(TrainedBehavior::from_bytes(weights)?.numbers);
+        Ok(())
+    }
+
     fn resume(&mut self, bytes: &[u8]) -> bool {
         self.trainer.resume(bytes)
     }
 
     fn step(&mut self) -> Figures {
         let BehaviorLoss { loss, right } = self.trainer.step();
-        [("loss", loss), ("right", right)].into_iter().collect()
+        figures([("loss", loss), ("right", right)])
     }
 
     fn validate(&self) -> (Figures, Vec<u8>) {
@@ -197,12 +222,12 @@ impl Training for BehaviorTraining {
         let outputs = outputs_of(&trained, &self.validation, THREADS);
         trained.sharpness = calibrate(&self.validation, &outputs);
         let found = report(&trained, &self.validation, THREADS);
-        let figures = [
+        let figures = figures([
             ("top1", found.top1),
             ("balanced", found.balanced),
             ("mixed_as_moving", found.mixed_as_moving),
-        ];
-        (figures.into_iter().collect(), trained.to_bytes())
+        ]);
+        (figures, trained.to_bytes())
     }
 }
 

@@ -23,6 +23,9 @@ pub struct TrainArguments {
     /// config.toml of any training.
     #[arg(long, value_name = "FILE", conflicts_with = "resume")]
     pub config: Option<PathBuf>,
+    /// Begin with these weights, a safetensors file, in place of random ones.
+    #[arg(long, value_name = "FILE", conflicts_with = "resume")]
+    pub weights: Option<PathBuf>,
     /// Steps in all, by which the rate is planned.
     #[arg(long, value_name = "N", conflicts_with = "resume")]
     #[arg(value_parser = clap::value_parser!(u64).range(1..))]
@@ -30,6 +33,84 @@ pub struct TrainArguments {
     /// Go on with the training in --out, from its last checkpoint.
     #[arg(long)]
     pub resume: bool,
+}
+
+/// What to collect.
+#[derive(Debug, Subcommand)]
+pub enum CollectCommand {
+    /// Views with what is in them: COCO annotations, color and 16-bit depth.
+    Detection(CollectDetectionArguments),
+    /// Clips of what partners do, with labels: safetensors files.
+    Behavior(CollectBehaviorArguments),
+}
+
+/// Whose environments are seen; those of evaluation are left to it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Of {
+    /// What is learned from.
+    Training,
+    /// What is chosen by.
+    Validation,
+}
+
+/// Of `chaic collect detection`.
+#[derive(Debug, Args)]
+pub struct CollectDetectionArguments {
+    /// An empty folder: images, depth, annotations.json, statistics.json.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// How many views.
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=999_999))]
+    pub views: u32,
+    /// Environments.
+    #[arg(long, value_enum, default_value_t = Of::Training)]
+    pub of: Of,
+    /// Places that are looked at.
+    #[arg(long, value_enum, default_value_t = Scenes::Crowded)]
+    pub scenes: Scenes,
+    /// Light and colors; usual: as for training, a third of the scenes varied.
+    #[arg(long, value_enum)]
+    pub look: Option<Look>,
+    /// Views at a time; changes no view. Usual: one for each core.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
+}
+
+/// Of `chaic collect behavior`.
+#[derive(Debug, Args)]
+pub struct CollectBehaviorArguments {
+    /// A folder of its own; if it has clips by the same rules, these are gone on with.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Environments.
+    #[arg(long, value_enum, default_value_t = Of::Training)]
+    pub of: Of,
+    #[command(flatten)]
+    pub clips: ClipArguments,
+}
+
+/// How clips are made.
+#[derive(Debug, Args)]
+pub struct ClipArguments {
+    /// Clips of each behavior at most.
+    #[arg(long, value_name = "N", default_value_t = 100)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub clips: u32,
+    /// Episodes that are played for them at most.
+    #[arg(long, value_name = "N", default_value_t = 200)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub episodes: u32,
+    /// By what the helper who films knows the partner in its images: gt, learned, learned:FILE or
+    /// noisy:FILE.
+    #[arg(long, value_name = "KIND", default_value = "learned")]
+    pub perception: String,
+    /// Light and colors.
+    #[arg(long, value_enum, default_value_t = Look::Canonical)]
+    pub look: Look,
+    /// Episodes at a time; changes no clip. Usual: one for each core.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
 }
 
 /// What to evaluate.
@@ -71,7 +152,7 @@ pub struct DetectionArguments {
     #[arg(long, value_enum, default_value_t = Scenes::AllClasses)]
     pub scenes: Scenes,
     /// Views that are looked at, from environments that nothing was learned from.
-    #[arg(long, value_name = "N", default_value_t = 2000)]
+    #[arg(long, value_name = "N", default_value_t = 4000)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub views: u32,
     /// Light and colors.
@@ -80,6 +161,12 @@ pub struct DetectionArguments {
     /// Write all figures into a JSON file, too.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
+    /// Write the rates of faults into a JSON file, for `chaic eval --perception noisy:FILE`.
+    #[arg(long, value_name = "FILE")]
+    pub faults: Option<PathBuf>,
+    /// Write annotations.json and detections.json into a folder, which pycocotools reads.
+    #[arg(long, value_name = "DIR")]
+    pub coco: Option<PathBuf>,
     /// Views at a time; changes no figure. Usual: one for each core.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
@@ -91,25 +178,9 @@ pub struct BehaviorArguments {
     /// The weights, a safetensors file.
     #[arg(long, value_name = "FILE")]
     pub weights: PathBuf,
-    /// Clips of each behavior at most.
-    #[arg(long, value_name = "N", default_value_t = 100)]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..=10_000))]
-    pub clips: u32,
-    /// Episodes that are played for them at most.
-    #[arg(long, value_name = "N", default_value_t = 200)]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    pub episodes: u32,
-    /// By what the helper who films knows the partner in its images: gt, learned, learned:FILE or
-    /// noisy:FILE.
-    #[arg(long, value_name = "KIND", default_value = "learned")]
-    pub perception: String,
-    /// Light and colors.
-    #[arg(long, value_enum, default_value_t = Look::Canonical)]
-    pub look: Look,
+    #[command(flatten)]
+    pub clips: ClipArguments,
     /// Write all figures into a JSON file, too.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
-    /// Episodes at a time; changes no figure. Usual: one for each core.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    pub jobs: Option<u16>,
 }

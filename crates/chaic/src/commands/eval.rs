@@ -10,10 +10,11 @@ use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::{Format, Report, write_files};
 use chaic_eval::run::{Access, Run, RunFolder, RunRequest};
 use chaic_llm::Language;
+use chaic_llm::language::is_told_constraint;
 use chaic_subprocess::Commands;
 
 use super::{bars::RunBars, jobs, llm, sight};
-use crate::arguments::{EvalArguments, ExecArguments, HelperArgument};
+use crate::arguments::{EvalArguments, ExecArguments, HelperArgument, Track};
 use crate::exit::Ended;
 use crate::interrupt;
 use crate::output::{complain, counted, quoted, quoted_path, say};
@@ -24,6 +25,11 @@ const QUICK_EPISODES: u32 = 2;
 /// Plays a benchmark.
 pub fn run(arguments: &EvalArguments) -> Result<Ended> {
     let (given, name) = given(arguments);
+    if let (Some(Track::Hidden), Some(names)) = (arguments.track, arguments.helper_names())
+        && let Some(name) = names.iter().find(|name| is_told_constraint(name))
+    {
+        bail!("{name} is told the constraint; it has no place in the hidden track");
+    }
     let path = arguments.out.clone().map_or_else(|| free_folder(name), Ok)?;
     let access = if arguments.resume { Access::Resume } else { Access::Begin };
     if arguments.resume {
@@ -146,8 +152,8 @@ fn given(arguments: &EvalArguments) -> (RunRequest, &'static str) {
         partner,
         partner_is: *partner_is,
         appearance,
-        perception: arguments.perception.clone(),
-        behavior: arguments.behavior.clone(),
+        perception: arguments.perception(),
+        behavior: arguments.behavior(),
     };
     if given == RunRequest::default() && !arguments.resume {
         return (RunRequest { first: Some(QUICK_EPISODES), ..given }, "quick");

@@ -1,6 +1,7 @@
 //! The commands, one a file.
 
 pub mod bench;
+pub mod collect;
 pub mod episodes;
 pub mod eval;
 pub mod fidelity;

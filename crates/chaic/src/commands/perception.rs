@@ -1,26 +1,31 @@
 //! `chaic train` and `chaic eval-perception`.
 
+use std::collections::BTreeMap;
+use std::fs;
 use std::path::Path;
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use anyhow::{Context as _, Result};
-use chaic_files::{read_bounded, write_whole};
+use chaic_eval::curves::{Curve, draw};
+use chaic_files::{FileError, read_bounded, write_whole};
 use chaic_vision::behavior::Behavior;
-use chaic_vision::behavior::collect::{CollectRules, collect};
 use chaic_vision::behavior::network::TrainedBehavior;
 use chaic_vision::behavior::report::report as behavior_report;
 use chaic_vision::behavior::train::BehaviorTraining;
-use chaic_vision::evaluate::{DetectionReport, LEAST_PX, report};
+use chaic_vision::coco::{ANNOTATIONS, DETECTIONS, annotate, annotations_json, results};
+use chaic_vision::evaluate::{DetectionReport, ENOUGH, LEAST_PX, report};
+use chaic_vision::instances::Instance;
 use chaic_vision::train::Trainer;
 use chaic_vision::trained::TrainedDetector;
-use chaic_vision::training_run::{Of, Training, TrainingRun, read_rules};
-use chaic_vision::views::{Part, ViewRules};
+use chaic_vision::training_run::{CURVES, Of, Record, Training, TrainingRun, read_rules};
+use chaic_vision::views::{LabelledView, Part};
 use serde::Serialize;
 
+use super::collect::{play, view_rules};
 use super::{bars, jobs};
 use crate::arguments::{
-    BehaviorArguments, DetectionArguments, EvalPerceptionCommand, Look, Scenes, TrainArguments,
-    TrainCommand,
+    BehaviorArguments, DetectionArguments, EvalPerceptionCommand, TrainArguments, TrainCommand,
 };
 use crate::exit::Ended;
 use crate::interrupt;
@@ -28,6 +33,8 @@ use crate::output::{complain, quoted_path, say};
 
 /// No weights are larger, bytes.
 const MOST_BYTES: u64 = 1 << 28;
+/// The picture of a training's curves.
+const CURVES_PICTURE: &str = "curves.svg";
 
 /// Trains.
 pub fn train(command: &TrainCommand) -> Result<Ended> {
@@ -53,8 +60,20 @@ fn train_one<T: Training>(
     set_steps: impl FnOnce(&mut T::Rules, u64),
 ) -> Result<Ended> {
     let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
+    let out = quoted_path(&arguments.out);
+    let how_to_go_on = format!("go on with: chaic train {name} --resume --out {out}");
     let bar = bars::plain(0, "steps");
-    let mut run = open::<T>(arguments, set_steps, &mut |done| bar.set_message(done.to_owned()))?;
+    let mut go_on = |done: &str| {
+        bar.set_message(done.to_owned());
+        if bar.is_hidden() {
+            complain(done);
+        }
+        !stop.load(Ordering::Relaxed)
+    };
+    let Some(mut run) = open::<T>(arguments, set_steps, &mut go_on)? else {
+        complain(&format!("stopped before the first step; {how_to_go_on}"));
+        return Ok(Ended::Interrupted);
+    };
     let (done, steps) = run.extent();
     bar.set_length(steps);
     bar.set_position(done);
@@ -71,15 +90,17 @@ fn train_one<T: Training>(
             Of::Validation => bar.suspend(|| {
                 let s = began.elapsed().as_secs();
                 complain(&format!("step {}, {s} s: {figures}", record.step));
+                // The figures are in the curves' file; a picture of them is no more than that.
+                if let Err(e) = draw_curves(&arguments.out) {
+                    complain(&format!("{e:#}"));
+                }
             }),
         }
     });
     bar.finish_and_clear();
-    let out = quoted_path(&arguments.out);
     if !is_whole? {
         let (done, steps) = run.extent();
-        complain(&format!("stopped after {done} of {steps} steps"));
-        complain(&format!("go on with: chaic train {name} --resume --out {out}"));
+        complain(&format!("stopped after {done} of {steps} steps; {how_to_go_on}"));
         return Ok(Ended::Interrupted);
     }
     let weights = quoted_path(&arguments.out.join(T::WEIGHTS));
@@ -91,17 +112,40 @@ fn train_one<T: Training>(
 fn open<T: Training>(
     arguments: &TrainArguments,
     set_steps: impl FnOnce(&mut T::Rules, u64),
-    tell: &mut dyn FnMut(&str),
-) -> Result<TrainingRun<T>> {
+    go_on: &mut dyn FnMut(&str) -> bool,
+) -> Result<Option<TrainingRun<T>>> {
     if arguments.resume {
-        return Ok(TrainingRun::resume(&arguments.out, tell)?);
+        return Ok(TrainingRun::resume(&arguments.out, go_on)?);
     }
     let rules = arguments.config.as_deref().map(read_rules::<T>).transpose()?;
     let mut rules = rules.unwrap_or_default();
     if let Some(steps) = arguments.steps {
         set_steps(&mut rules, steps);
     }
-    Ok(TrainingRun::begin(&arguments.out, &rules, tell)?)
+    let mut run = TrainingRun::begin(&arguments.out, &rules, go_on)?;
+    if let (Some(run), Some(weights)) = (&mut run, &arguments.weights) {
+        run.begin_with(weights)?;
+    }
+    Ok(run)
+}
+
+/// Draws the curves of a training into its folder.
+fn draw_curves(folder: &Path) -> Result<()> {
+    let text = String::from_utf8(read_bounded(&folder.join(CURVES), MOST_BYTES)?)?;
+    let mut curves: BTreeMap<(Of, String), Vec<(f64, f64)>> = BTreeMap::new();
+    for record in text.lines().filter_map(|line| serde_json::from_str::<Record>(line).ok()) {
+        for (name, y) in record.figures {
+            curves.entry((record.of, name)).or_default().push((record.step as f64, y));
+        }
+    }
+    let curves: Vec<Curve> = curves
+        .into_iter()
+        .map(|((of, name), points)| {
+            let of = if of == Of::Loss { "learned from" } else { "validation" };
+            Curve { title: format!("{name}, {of}"), points }
+        })
+        .collect();
+    Ok(draw(&curves, "steps", &folder.join(CURVES_PICTURE))?)
 }
 
 /// Tells how good perception is.
@@ -117,35 +161,32 @@ fn evaluate_detection(arguments: &DetectionArguments) -> Result<Ended> {
         Some(path) => read_detector(path)?,
         None => TrainedDetector::built_in(),
     };
-    let varied = if arguments.look == Look::Varied { 1.0 } else { 0.0 };
-    let rules = match arguments.scenes {
-        Scenes::Natural => ViewRules::NATURAL,
-        Scenes::AllClasses => ViewRules::ALL_CLASSES,
-        Scenes::Crowded => ViewRules::TRAINING,
+    let views = (Part::Test, view_rules(arguments.scenes, Some(arguments.look)));
+    let also = |k: usize, view: &LabelledView, found: &[Instance]| {
+        let wanted = arguments.coco.is_some();
+        wanted.then(|| (annotate(k, view), results(k, view, found)))
     };
-    let rules = ViewRules { varied, ..rules };
     let n_views = arguments.views as usize;
-    let found = report(&detector, (Part::Test, rules), n_views, jobs(arguments.jobs));
+    let (found, files) = report(&detector, views, n_views, jobs(arguments.jobs), also);
     say(&text(&found, arguments))?;
+    if let Some(folder) = &arguments.coco {
+        let (annotated, results): (Vec<_>, Vec<_>) = files.into_iter().flatten().unzip();
+        fs::create_dir_all(folder).map_err(FileError::of("make", folder))?;
+        let of = format!("{:?} views of chaic, {:?} look", arguments.scenes, arguments.look);
+        write_whole(&folder.join(ANNOTATIONS), &annotations_json(&annotated, &of))?;
+        let results = serde_json::to_vec(&results.concat()).expect("plain data");
+        write_whole(&folder.join(DETECTIONS), &results)?;
+    }
+    write_json(arguments.faults.as_deref(), &found.fault_rates)?;
     write_json(arguments.json.as_deref(), &found)
 }
 
 fn evaluate_behavior(arguments: &BehaviorArguments) -> Result<Ended> {
     let trained = read_behavior(&arguments.weights)?;
-    let sight = super::sight::named_sight(&arguments.perception)?;
-    let rules = CollectRules {
-        of_each: arguments.clips as usize,
-        episodes: arguments.episodes as usize,
-        varied: if arguments.look == Look::Varied { 1.0 } else { 0.0 },
-        ..CollectRules::default()
+    let Some(clips) = play(&arguments.clips, Part::Test, None)? else {
+        return Ok(Ended::Interrupted);
     };
-    let n_threads = jobs(arguments.jobs);
-    let bar = bars::plain(u64::from(arguments.episodes), "episodes");
-    let clips = collect(Part::Test, &rules, &*sight, n_threads, &mut |n, _| {
-        bar.set_position(n as u64);
-    });
-    bar.finish_and_clear();
-    let found = behavior_report(&trained, &clips, n_threads);
+    let found = behavior_report(&trained, &clips, jobs(arguments.clips.jobs));
     let mut text = format!("{:18}", "");
     for told in Behavior::ALL {
         text += &format!(" {:>17}", told.name());
@@ -163,8 +204,8 @@ fn evaluate_behavior(arguments: &BehaviorArguments) -> Result<Ended> {
          top1 {:.3} +- {:.3}; mean of classes {:.3}; calibration error {:.3}\n\
          of clips in which something goes on but has not just ended, told as moving: {:.3}\n",
         found.clips,
-        arguments.perception,
-        arguments.look,
+        arguments.clips.perception,
+        arguments.clips.look,
         found.top1,
         found.interval,
         found.balanced,
@@ -200,7 +241,17 @@ fn text(found: &DetectionReport, arguments: &DetectionArguments) -> String {
     for (name, (ap50, ap, n)) in &found.classes {
         text += &format!("{name:24} {ap50:6.3} {ap:6.3} {n:9}\n");
     }
-    let DetectionReport { views, map50, map, smaller, calibration_error, failures, .. } = found;
+    let DetectionReport {
+        views,
+        map50,
+        map,
+        smaller,
+        sizes,
+        map50_of_frequent,
+        calibration_error,
+        failures,
+        ..
+    } = found;
     text += &format!(
         "\n{views} {:?} views, {:?} look, instances of {LEAST_PX} pixels and more: map50 {map50:.3}, map \
          {map:.3}\n",
@@ -209,7 +260,14 @@ fn text(found: &DetectionReport, arguments: &DetectionArguments) -> String {
     for (px, [map50, map]) in smaller {
         text += &format!("with those of {px} and more: map50 {map50:.3}, map {map:.3}\n");
     }
-    text += &format!("calibration error of scores: {calibration_error:.3}\n");
+    for (size, [map50, map]) in sizes {
+        text += &format!("of {size} instances: map50 {map50:.3}, map {map:.3}\n");
+    }
+    let (of_frequent, n_frequent) = map50_of_frequent;
+    text += &format!(
+        "over the {n_frequent} classes of {ENOUGH} instances and more: map50 {of_frequent:.3}\n\
+         calibration error of scores: {calibration_error:.3}\n"
+    );
     text += &format!(
         "at a score of one half, found {}, poor mask {}, wrong class {}, merged {}, missed {}; told \
          besides: pieces {}, nothing there {}\n",

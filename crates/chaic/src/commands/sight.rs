@@ -9,35 +9,44 @@ use chaic_agents::sight::{Sight, TrueSight};
 use chaic_eval::EvalError;
 use chaic_eval::run::{GROUND_TRUTH, RunFolder, RunOptions};
 use chaic_files::read_bounded;
+use chaic_vision::behavior::network::TrainedBehavior;
 use chaic_vision::behavior::recognize::Recognizing;
 use chaic_vision::noisy::{FaultRates, NoisySight};
 use chaic_vision::perception::LearnedSight;
 use chaic_vision::trained::TrainedDetector;
 
 use super::perception::{read_behavior, read_detector};
-use crate::arguments::EvalArguments;
+use crate::arguments::{EvalArguments, LEARNED};
 
 /// As said, or as recorded for a run that is gone on with.
 pub fn of_run(arguments: &EvalArguments, path: &Path) -> Result<Arc<dyn Sight>> {
     let recorded = RunFolder::read(path).ok().filter(|_| arguments.resume).map(|(_, o)| o);
     let (perception, behavior) =
         recorded.map_or((None, None), |options| (options.perception, options.behavior));
-    let perception = arguments.perception.clone().or(perception);
-    let behavior = arguments.behavior.clone().or(behavior);
+    let perception = arguments.perception().or(perception);
+    let behavior = arguments.behavior().or(behavior);
     of_names(perception.as_deref(), behavior.as_deref())
+}
+
+/// The file of weights in the name of a network, `learned:FILE`.
+pub fn weights_of(name: &str) -> Option<&Path> {
+    name.strip_prefix(LEARNED)?.strip_prefix(':').map(Path::new)
 }
 
 /// By what one sees, and tells what others do.
 fn of_names(perception: Option<&str>, behavior: Option<&str>) -> Result<Arc<dyn Sight>> {
-    const LEARNED: &str = "learned:";
     let sight = named_sight(perception.unwrap_or(GROUND_TRUTH))?;
     let Some(name) = behavior.filter(|name| *name != GROUND_TRUTH) else { return Ok(sight) };
-    let Some(file) = name.strip_prefix(LEARNED) else {
-        let text = format!("no behavior `{name}`; write {GROUND_TRUTH} or {LEARNED}FILE");
-        return Err(EvalError::Options(text).into());
+    let trained = match weights_of(name) {
+        Some(file) => read_behavior(file)?,
+        None if name == LEARNED => TrainedBehavior::built_in(),
+        None => {
+            let text =
+                format!("no behavior `{name}`; write {GROUND_TRUTH}, {LEARNED} or {LEARNED}:FILE");
+            return Err(EvalError::Options(text).into());
+        }
     };
-    let trained = Arc::new(read_behavior(Path::new(file))?);
-    Ok(Arc::new(Recognizing { sight, trained }))
+    Ok(Arc::new(Recognizing { sight, trained: Arc::new(trained) }))
 }
 
 /// That of a run which has been played. Weights that are gone don't matter: minds aren't asked again,
@@ -52,7 +61,6 @@ pub fn recorded(options: &RunOptions) -> Arc<dyn Sight> {
 /// # Errors
 /// If there is none, or its file can't be read.
 pub fn named_sight(name: &str) -> Result<Arc<dyn Sight>> {
-    const LEARNED: &str = "learned";
     /// No file of rates is larger, bytes.
     const MOST_BYTES: u64 = 1 << 20;
     const NOISY: &str = "noisy:";
@@ -62,8 +70,8 @@ pub fn named_sight(name: &str) -> Result<Arc<dyn Sight>> {
     if name == LEARNED {
         return Ok(Arc::new(LearnedSight::new(TrainedDetector::built_in())));
     }
-    if let Some(file) = name.strip_prefix(LEARNED).and_then(|rest| rest.strip_prefix(':')) {
-        return Ok(Arc::new(LearnedSight::new(read_detector(Path::new(file))?)));
+    if let Some(file) = weights_of(name) {
+        return Ok(Arc::new(LearnedSight::new(read_detector(file)?)));
     }
     if let Some(file) = name.strip_prefix(NOISY) {
         let rates: FaultRates = serde_json::from_slice(&read_bounded(Path::new(file), MOST_BYTES)?)

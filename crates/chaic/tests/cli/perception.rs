@@ -39,10 +39,22 @@ fn weights_of_a_training_are_what_helpers_see_by() {
     assert!(ill(dir, &train).contains("--resume"));
     let weights = "training/detector.safetensors";
     let evaluate = ["eval-perception", "detection", "--weights", weights, "--views", "2"];
-    well(dir, &[&evaluate[..], &["--json", "report.json"]].concat());
+    let files = ["--json", "report.json", "--coco", "coco", "--faults", "faults.json"];
+    well(dir, &[&evaluate[..], &files].concat());
     let report = fs::read(dir.join("report.json")).unwrap();
     let report: serde_json::Value = serde_json::from_slice(&report).unwrap();
     assert!(report["map50"].is_f64() && report["map"].is_f64(), "{report}");
+    for file in ["annotations.json", "detections.json"] {
+        let coco = fs::read(dir.join("coco").join(file)).unwrap();
+        serde_json::from_slice::<serde_json::Value>(&coco).unwrap();
+    }
+    let curves = fs::read_to_string(dir.join("training/curves.svg")).unwrap();
+    assert!(curves.contains("map50, validation"), "{curves}");
+    let noisy = ["--perception", "noisy:faults.json", "--out", "noisy"];
+    well(dir, &[&EVAL[..], &noisy].concat());
+    // Another training may begin with these weights.
+    let again = ["train", "detector", "--config", "tiny.toml", "--out", "again", "--weights"];
+    well(dir, &[&again[..], &[weights]].concat());
     // By untrained eyes nothing much is delivered; but the run is whole and says by what it saw.
     let sight = format!("learned:{weights}");
     well(dir, &[&EVAL[..], &["--perception", &sight, "--out", "run"]].concat());
@@ -107,4 +119,57 @@ fn weights_of_a_behavior_training_are_what_helpers_recognize_by() {
         let error = ill(dir, &[&EVAL[..], &["--behavior", nonsense]].concat());
         assert_eq!(error.lines().count(), 1, "{error}");
     }
+}
+
+#[test]
+fn the_hidden_track_is_pixels_alone_and_replays_show_what_was_seen() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    well(dir, &[&EVAL[..], &["--track", "hidden", "--out", "run"]].concat());
+    let scores = fs::read_to_string(dir.join("run/scores.json")).unwrap();
+    let scores: serde_json::Value = serde_json::from_str(&scores).unwrap();
+    let by = scores["helpers"]["rhp"]["perception"].as_str().unwrap();
+    assert!(by.starts_with("learned ") && by.contains("behavior learned "), "{by}");
+    assert!(dir.join("run/traces/high_goal/rhp").is_dir());
+    let replay = ["replay", "run", "high_goal/test/00", "--every", "900", "--out", "a.gif"];
+    well(dir, &[&replay[..], &["--fps", "5", "--masks"]].concat());
+    assert!(fs::metadata(dir.join("a.gif")).unwrap().len() > 10_000);
+    let told = ["eval", "--track", "hidden", "--helper", "llm-told", "--out", "told"];
+    assert!(ill(dir, &told).contains("told the constraint"));
+}
+
+#[test]
+fn data_sets_are_whole_and_collected_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let collect = ["collect", "detection", "--views", "3", "--out", "views"];
+    well(dir, &collect);
+    assert!(ill(dir, &collect).contains("isn't empty"));
+    let read = |file: &str| fs::read(dir.join("views").join(file)).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&read("annotations.json")).unwrap();
+    let images = json["images"].as_array().unwrap();
+    let annotations = json["annotations"].as_array().unwrap();
+    assert!(images.len() == 3 && annotations.len() > 3, "{}", annotations.len());
+    for image in images {
+        let name = image["file_name"].as_str().unwrap();
+        let color = image::load_from_memory(&read(&format!("images/{name}"))).unwrap();
+        let depth = image::load_from_memory(&read(&format!("depth/{name}"))).unwrap();
+        assert_eq!((color.width(), color.color()), (512, image::ColorType::Rgb8));
+        assert_eq!((depth.height(), depth.color()), (512, image::ColorType::L16));
+        assert!(depth.into_luma16().pixels().any(|p| p.0[0] > 500), "nothing is farther off");
+    }
+    let statistics: serde_json::Value = serde_json::from_slice(&read("statistics.json")).unwrap();
+    let counted = |sizes: &serde_json::Value| -> u64 {
+        sizes.as_array().unwrap().iter().filter_map(serde_json::Value::as_u64).sum()
+    };
+    let all: u64 = statistics.as_object().unwrap().values().map(counted).sum();
+    assert_eq!(all, annotations.len() as u64);
+
+    let clips = ["collect", "behavior", "--perception", "gt", "--episodes", "1", "--out", "clips"];
+    well(dir, &[&clips[..], &["--clips", "2"]].concat());
+    let file = dir.join("clips/clips-000000.safetensors");
+    let written = fs::metadata(&file).unwrap().modified().unwrap();
+    well(dir, &[&clips[..], &["--clips", "2"]].concat());
+    assert_eq!(fs::metadata(&file).unwrap().modified().unwrap(), written, "it was made again");
+    assert!(ill(dir, &[&clips[..], &["--clips", "3"]].concat()).contains("by other rules"));
 }

@@ -1,0 +1,81 @@
+"""Average precision by pycocotools beside chaic's own, on the same files.
+
+    pip install pycocotools==2.0.11
+    chaic eval-perception detection --views 200 --json report.json --coco coco
+    python3 benches/pycocotools/compare.py coco report.json
+
+Exit code 1 if any figure differs by more than the rounding of sums.
+"""
+
+import contextlib
+import io
+import json
+import sys
+
+import numpy as np
+from pycocotools.coco import COCO
+from pycocotools.cocoeval import COCOeval
+
+# Pixels of instances that are asked for, as chaic's report has them.
+LEAST_PX = 100
+SMALLER_PX = [64, 32]
+SIZES = {"small": [100, 1024], "medium": [1025, 9216], "large": [9217, 1e10]}
+# Sums in another order.
+ROUNDING = 1e-9
+
+
+def quietly(make):
+    with contextlib.redirect_stdout(io.StringIO()):
+        return make()
+
+
+def main(folder: str, report_path: str) -> int:
+    with open(report_path) as file:
+        report = json.load(file)
+    truth = quietly(lambda: COCO(f"{folder}/annotations.json"))
+    found = quietly(lambda: truth.loadRes(f"{folder}/detections.json"))
+    ranges = {"report": [LEAST_PX, 1e10], **{str(px): [px, 1e10] for px in SMALLER_PX}, **SIZES}
+    evaluation = COCOeval(truth, found, "segm")
+    evaluation.params.areaRng = list(ranges.values())
+    evaluation.params.areaRngLbl = list(ranges)
+    evaluation.params.maxDets = [100]
+    quietly(evaluation.evaluate)
+    quietly(evaluation.accumulate)
+    # Shape [overlaps, recalls, classes, areas, detections]; -1 where nothing of a class is asked for.
+    precision = evaluation.eval["precision"][:, :, :, :, 0]
+
+    def mean(values):
+        return float(np.mean(values[values > -1])) if (values > -1).any() else 0.0
+
+    names = {c["id"]: c["name"] for c in truth.dataset["categories"]}
+    rows = []
+    for k, name in enumerate(ranges):
+        ours = {
+            "report": [report["map50"], report["map"]],
+            **report["smaller"],
+            **report["sizes"],
+        }[name]
+        rows.append((f"map50 {name}", mean(precision[0, :, :, k]), ours[0]))
+        rows.append((f"map {name}", mean(precision[:, :, :, k]), ours[1]))
+    for k, category in enumerate(evaluation.params.catIds):
+        ours = report["classes"].get(names[category])
+        of_class = precision[:, :, k, 0]
+        if (ours is None) != bool((of_class == -1).all()):
+            print(f"{names[category]}: there for one and not for the other")
+            return 1
+        if ours is not None:
+            rows.append((f"AP50 {names[category]}", mean(of_class[0]), ours[0]))
+            rows.append((f"AP {names[category]}", mean(of_class), ours[1]))
+    worst = 0.0
+    print(f"{'':32} {'pycocotools':>11} {'chaic':>8}")
+    for name, theirs, ours in rows:
+        worst = max(worst, abs(theirs - ours))
+        print(f"{name:32} {theirs:11.6f} {ours:8.6f}")
+    print(f"largest difference {worst:.1e}")
+    return int(worst > ROUNDING)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 3:
+        sys.exit(__doc__)
+    sys.exit(main(sys.argv[1], sys.argv[2]))

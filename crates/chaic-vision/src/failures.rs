@@ -127,7 +127,7 @@ mod tests {
             split: 1,
             nothing_there: 1,
         };
-        let found = Failures::of(&[Image { truths, detections }], &(50..=u32::MAX));
+        let found = Failures::of(&[Image { truths, detections }], &(5..=u32::MAX));
         assert_eq!(found, expected);
     }
 }

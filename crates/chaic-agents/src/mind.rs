@@ -290,7 +290,7 @@ impl<P: Policy> Mind<P> {
 fn sees(memory: &Memory) -> Vec<Believed> {
     let in_sight = memory.things.iter().filter(|t| t.last_seen == memory.frame && t.is_present);
     let believed = |thing: &Thing| Believed {
-        number: thing.track.0,
+        name: thing.track.to_string(),
         class: thing.class,
         at_cm: thing.position_in_world.to_array().map(|m| (100.0 * m) as i32),
     };

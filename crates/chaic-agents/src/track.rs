@@ -16,9 +16,19 @@ impl From<EntityId> for TrackId {
     }
 }
 
+impl TrackId {
+    /// The first of the names that perception gives by itself, beyond those of entities, which a grant
+    /// may tell.
+    pub const FIRST_OWN: TrackId = TrackId(1 << 20);
+}
+
+/// `#31` is an entity, `t31` a track that perception keeps by itself.
 impl fmt::Display for TrackId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "#{}", self.0)
+        match self.0.checked_sub(TrackId::FIRST_OWN.0) {
+            Some(n) => write!(f, "t{n}"),
+            None => write!(f, "#{}", self.0),
+        }
     }
 }
 

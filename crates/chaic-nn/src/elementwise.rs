@@ -19,6 +19,24 @@ impl pulp::NullaryFnOnce for AddTo<'_> {
     }
 }
 
+/// The sum of two lists.
+pub(crate) struct Sum<'a> {
+    pub a: &'a [f32],
+    pub b: &'a [f32],
+    pub out: &'a mut [f32],
+}
+
+impl pulp::NullaryFnOnce for Sum<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for ((out, a), b) in self.out.iter_mut().zip(self.a).zip(self.b) {
+            *out = a + b;
+        }
+    }
+}
+
 /// The positive part.
 pub(crate) struct Relu<'a> {
     pub map: &'a [f32],

@@ -9,7 +9,7 @@ use pulp::Arch;
 
 use crate::conv::{self, Kernel, Patches};
 use crate::depthwise::{self, Padded};
-use crate::elementwise::{AddTo, Relu, upsample};
+use crate::elementwise::{Relu, Sum, upsample};
 use crate::network::{Layer, Network, Node};
 use crate::norm;
 use crate::tensor::{Shape, Tensor};
@@ -154,8 +154,7 @@ impl Inference {
             }
             Layer::Relu { from } => arch.dispatch(Relu { map: beside(from), out }),
             Layer::Add { a, b } => {
-                out.copy_from_slice(beside(a));
-                arch.dispatch(AddTo { to: out, from: beside(b) });
+                arch.dispatch(Sum { a: beside(a), b: beside(b), out });
             }
             Layer::Upsample { from } => {
                 let Shape { width, channels, .. } = before[from.0].shape;

@@ -22,15 +22,31 @@ pub struct Thought {
     pub sees: Vec<Believed>,
 }
 
-/// A thing as a mind has it: not necessarily what is there.
+/// A thing as a mind has it: not necessarily what is there. Written as a list of its fields, since traces
+/// have many.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "BelievedFields", into = "BelievedFields")]
 pub struct Believed {
-    /// The mind's own number for it.
-    pub number: u32,
+    /// The mind's own name for it, for example `t13`.
+    pub name: String,
     /// What it takes it for.
     pub class: ClassId,
     /// Where, in the world, centimetres.
     pub at_cm: [i32; 3],
+}
+
+type BelievedFields = (String, ClassId, [i32; 3]);
+
+impl From<BelievedFields> for Believed {
+    fn from((name, class, at_cm): BelievedFields) -> Believed {
+        Believed { name, class, at_cm }
+    }
+}
+
+impl From<Believed> for BelievedFields {
+    fn from(Believed { name, class, at_cm }: Believed) -> BelievedFields {
+        (name, class, at_cm)
+    }
 }
 
 /// What the child who comes along is doing, by its own decision. The original's emergency rate asks

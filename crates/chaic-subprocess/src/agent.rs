@@ -91,6 +91,7 @@ impl SubprocessAgent {
                 action,
                 thought.map(|Thought { plan, mood, noticed, mut sees }| {
                     sees.truncate(MAX_SEES);
+                    sees.iter_mut().for_each(|thing| thing.name = cut(&thing.name));
                     Thought {
                         plan: cut(&plan),
                         mood: mood.as_deref().map(cut),

@@ -16,9 +16,6 @@ use chaic_protocol::{
 
 use crate::labels::class_of;
 
-/// Tracks have numbers from here on, beyond those of entities, which a grant may tell.
-const FIRST_TRACK: u32 = 1 << 20;
-
 /// What is told of what is seen, and what is taken for the same thing. Lengths in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackerRules {
@@ -385,7 +382,7 @@ impl Tracker {
 
     fn begin(&mut self, sighting: &Sighting, now: Frame) -> usize {
         self.tracks.push(Track {
-            id: TrackId(FIRST_TRACK + self.tracks.len() as u32),
+            id: TrackId(TrackId::FIRST_OWN.0 + self.tracks.len() as u32),
             evidence: BTreeMap::new(),
             label: sighting.label,
             position: sighting.extent.position_in_world,

@@ -48,7 +48,11 @@ fn records() -> Vec<Record> {
         plan: "go to \"apple\" #31\n".to_owned(),
         mood: Some("x".to_owned()),
         noticed: Some("partner picked up apple #31".to_owned()),
-        sees: vec![Believed { number: 31, class: ClassId::named("apple"), at_cm: [120, 80, -35] }],
+        sees: vec![Believed {
+            name: "t31".to_owned(),
+            class: ClassId::named("apple"),
+            at_cm: [120, 80, -35],
+        }],
     };
     let failed = Outcome::Failure(FailureReason::OutOfReach);
     vec![

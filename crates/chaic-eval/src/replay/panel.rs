@@ -100,7 +100,7 @@ pub(super) fn marks(believed: &[Believed], camera: &Camera) -> Vec<Mark> {
         let [x, y, z] = thing.at_cm.map(|cm| 0.01 * cm as f32);
         let (at, _) = camera.project(Vec3::new(x, y, z))?;
         let at = [at.x / camera.width as f32, at.y / camera.height as f32];
-        let words = format!("{} {}", thing.class.info().label, thing.number);
+        let words = format!("{} {}", thing.class.info().label, thing.name);
         // Labels of pixels count the background as 0.
         let color = color_of(thing.class.index() as u8 + 1);
         at.iter().all(|x| (0.0..1.0).contains(x)).then_some(Mark { at, words, color })

@@ -175,9 +175,9 @@ pub struct DetectionArguments {
 /// Of `chaic eval-perception behavior`.
 #[derive(Debug, Args)]
 pub struct BehaviorArguments {
-    /// The weights, a safetensors file.
+    /// The weights, a safetensors file; usual: those that come with chaic.
     #[arg(long, value_name = "FILE")]
-    pub weights: PathBuf,
+    pub weights: Option<PathBuf>,
     #[command(flatten)]
     pub clips: ClipArguments,
     /// Write all figures into a JSON file, too.

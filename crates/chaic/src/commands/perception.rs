@@ -182,7 +182,10 @@ fn evaluate_detection(arguments: &DetectionArguments) -> Result<Ended> {
 }
 
 fn evaluate_behavior(arguments: &BehaviorArguments) -> Result<Ended> {
-    let trained = read_behavior(&arguments.weights)?;
+    let trained = match &arguments.weights {
+        Some(path) => read_behavior(path)?,
+        None => TrainedBehavior::built_in(),
+    };
     let Some(clips) = play(&arguments.clips, Part::Test, None)? else {
         return Ok(Ended::Interrupted);
     };

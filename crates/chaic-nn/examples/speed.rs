@@ -5,7 +5,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use chaic_nn::conv::{self, Patches};
-use chaic_nn::depthwise::{self, Padded};
+use chaic_nn::depthwise::{self, Padded, Zeros};
 use chaic_nn::gemm::{Matrix, Workspace, add_product};
 use chaic_nn::simd::widest;
 use chaic_nn::{Kernel, Shape};
@@ -48,9 +48,9 @@ fn main() {
         let (map, mut out) = (vec![0.5; shape.of_one()], vec![0.0; shape.of_one()]);
         let mut weights = vec![0.1; side * side * channels];
         let gmac = 1e-9 * (shape.of_one() * side * side) as f64;
-        let mut padded = Padded::default();
+        let (mut padded, mut zeros) = (Padded::default(), Zeros::default());
         let s = least_s(|| {
-            depthwise::forward(arch, &map, shape, (&weights, side), &mut out, &mut padded);
+            depthwise::forward(arch, (&map, shape), (&weights, side), &mut out, &mut zeros);
         });
         report(&format!("depthwise {side}x{side}, {height}x{height}x{channels}"), gmac, s);
         let s = least_s(|| {
@@ -65,7 +65,7 @@ fn main() {
     let (weights, mut out) = (vec![0.1; kernel.patch(8) * 32], vec![0.0; 65536 * 32]);
     let mut patches = Patches::default();
     let s = least_s(|| {
-        conv::forward(arch, (&map, shape), (&weights, kernel), (&mut out, 32), &mut patches);
+        conv::forward(arch, (&map, shape), (&weights, None, kernel), (&mut out, 32), &mut patches);
     });
     report("dense 3x3 stride 2, 512x512x8 to 32", 1e-9 * (65536 * 72 * 32) as f64, s);
 }

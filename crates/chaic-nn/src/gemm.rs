@@ -1,6 +1,8 @@
 //! Matrix products, the same bits on any machine: each number of the result is a chain of fused
 //! multiply-adds in the order of the inner dimension, whatever the vectors' width and the blocks.
 
+use std::ops::Range;
+
 use pulp::{Arch, Simd, WithSimd};
 
 /// Columns of the left matrix that are packed at once, so that a panel of the right one stays in the
@@ -46,11 +48,125 @@ impl<'a> Matrix<'a> {
     }
 }
 
+/// What the sums of a product begin with.
+#[derive(Clone, Copy, Debug)]
+pub enum Begin<'a> {
+    /// What the result holds already.
+    Result,
+    /// Zero.
+    Zero,
+    /// A number for each column.
+    Row(&'a [f32]),
+}
+
+/// A right matrix in the order in which products read it: blocks of rows; in each, panels of columns, as
+/// wide as a few vectors of one machine; shape [blocks, panels, rows of the block, columns of a panel],
+/// with zeros beyond the last column.
+#[derive(Clone, Debug, Default)]
+pub struct Panels {
+    columns: usize,
+    width: usize,
+    /// The rows of each block.
+    blocks: Vec<Range<usize>>,
+    data: Vec<f32>,
+}
+
+impl Panels {
+    /// Takes in a matrix, whose rows come in runs of so many: a block has whole runs, or a part of one.
+    ///
+    /// # Panics
+    /// If the rows are no multiple of a run.
+    pub fn pack(&mut self, arch: Arch, right: Matrix<'_>, run: usize) {
+        assert!(run > 0 && right.rows.is_multiple_of(run), "{} rows in runs of {run}", right.rows);
+        arch.dispatch(Pack { panels: self, right, run });
+    }
+
+    /// Columns of the matrix.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// The rows of each block, and its panels one after the other.
+    pub(crate) fn blocks(&self) -> impl Iterator<Item = (Range<usize>, &[f32])> {
+        let row = self.columns.next_multiple_of(self.width.max(1));
+        self.blocks
+            .iter()
+            .map(move |rows| (rows.clone(), &self.data[rows.start * row..rows.end * row]))
+    }
+
+    /// How many columns a panel has.
+    pub(crate) fn width(&self) -> usize {
+        self.width
+    }
+}
+
+struct Pack<'a> {
+    panels: &'a mut Panels,
+    right: Matrix<'a>,
+    run: usize,
+}
+
+impl WithSimd for Pack<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Pack { panels: Panels { columns, width, blocks, data }, right, run } = self;
+        *columns = right.columns;
+        *width = panel_vectors(S::F32_LANES, right.columns) * S::F32_LANES;
+        let row = right.columns.next_multiple_of(*width);
+        data.resize(right.rows * row, 0.0);
+        blocks.clear();
+        blocks.extend(in_blocks(right.rows, run));
+        for block in blocks.iter() {
+            let packed = &mut data[block.start * row..block.end * row];
+            pack_right(packed, right, (block.start, block.len()), *width);
+        }
+    }
+}
+
+/// Rows in blocks: some whole runs each, or even parts of one.
+fn in_blocks(rows: usize, run: usize) -> impl Iterator<Item = Range<usize>> {
+    let whole = run * (INNER_BLOCK / run).max(1);
+    let step = if whole > INNER_BLOCK { run.div_ceil(run.div_ceil(INNER_BLOCK)) } else { whole };
+    (0..rows).step_by(whole).flat_map(move |start| {
+        let end = rows.min(start + whole);
+        (start..end).step_by(step).map(move |from| from..end.min(from + step))
+    })
+}
+
+/// How many vectors wide panels are: as many as leave registers for a row of the panel and a number of
+/// the left matrix beside the sums.
+#[inline(always)]
+fn panel_vectors(lanes: usize, columns: usize) -> usize {
+    let padded = |vectors: usize| columns.next_multiple_of(vectors * lanes);
+    match lanes {
+        // Panels of two vectors where those of three would be empty for a good part.
+        16.. if 9 * padded(2) <= 8 * padded(3) => 2,
+        _ => 3,
+    }
+}
+
+/// What can be done in tiles of so many rows and vectors.
+pub(crate) trait Tiled {
+    fn run<S: Simd, const ROWS: usize, const VECTORS: usize>(self, simd: S);
+}
+
+/// Runs tiles of the size that this machine and these panels ask for.
+#[inline(always)]
+pub(crate) fn in_tiles<S: Simd>(simd: S, panels: &Panels, work: impl Tiled) {
+    match S::F32_LANES {
+        16.. if panels.width == 2 * S::F32_LANES => work.run::<S, 8, 2>(simd),
+        16.. => work.run::<S, 8, 3>(simd),
+        _ => work.run::<S, 4, 3>(simd),
+    }
+}
+
 /// Working space of products, kept so that they allocate nothing.
 #[derive(Clone, Debug, Default)]
 pub struct Workspace {
     left: Vec<f32>,
-    right: Vec<f32>,
+    right: Panels,
 }
 
 /// Adds `left` times `right` to `out`, which is row by row, shape [left.rows, right.columns].
@@ -69,14 +185,16 @@ pub fn add_product(
     if out.is_empty() || left.columns == 0 {
         return;
     }
-    arch.dispatch(Product { out, left, right, workspace });
+    let Workspace { left: packed, right: panels } = workspace;
+    panels.pack(arch, right, right.rows);
+    arch.dispatch(Product { out, left, panels, packed });
 }
 
 struct Product<'a> {
     out: &'a mut [f32],
     left: Matrix<'a>,
-    right: Matrix<'a>,
-    workspace: &'a mut Workspace,
+    panels: &'a Panels,
+    packed: &'a mut Vec<f32>,
 }
 
 impl WithSimd for Product<'_> {
@@ -84,52 +202,40 @@ impl WithSimd for Product<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        // As many accumulators as registers hold beside a row of the panel and a number of the left.
-        let columns = |vectors: usize| {
-            let panel = vectors * S::F32_LANES;
-            self.right.columns.div_ceil(panel) * panel
-        };
-        match S::F32_LANES {
-            // Panels of two vectors where those of three would be empty for a good part.
-            16.. if 5 * columns(2) < 4 * columns(3) => self.run::<S, 8, 2>(simd),
-            16.. => self.run::<S, 8, 3>(simd),
-            _ => self.run::<S, 4, 3>(simd),
-        }
+        in_tiles(simd, self.panels, self);
     }
 }
 
-impl Product<'_> {
+impl Tiled for Product<'_> {
     #[inline(always)]
     fn run<S: Simd, const ROWS: usize, const VECTORS: usize>(self, simd: S) {
-        let Product { out, left, right, workspace } = self;
-        let panel = VECTORS * S::F32_LANES;
-        let n = right.columns;
-        for inner in (0..left.columns).step_by(INNER_BLOCK) {
-            let depth = INNER_BLOCK.min(left.columns - inner);
-            pack_right(&mut workspace.right, right, (inner, depth), panel);
+        let Product { out, left, panels, packed } = self;
+        let n = panels.columns;
+        for (inner, block) in panels.blocks() {
+            let (inner, depth) = (inner.start, inner.len());
             for top in (0..left.rows).step_by(ROW_BLOCK) {
                 let height = ROW_BLOCK.min(left.rows - top);
-                if left.column_stride != 1 || !height.is_multiple_of(ROWS) {
-                    pack_left::<ROWS>(&mut workspace.left, left, (top, height), (inner, depth));
+                if left.column_stride != 1 {
+                    pack_left::<ROWS>(packed, left, (top, height), (inner, depth));
                 }
                 let out = &mut out[top * n..][..height * n];
-                let panels = workspace.right.chunks_exact(depth * panel);
-                for (k, right) in panels.enumerate() {
-                    let tiles = out.chunks_mut(ROWS * n).enumerate();
-                    for (t, out) in tiles {
-                        let place = (k * panel, n);
-                        let n_rows = ROWS.min(height - t * ROWS);
-                        if left.column_stride == 1 && n_rows == ROWS {
-                            let first = (top + t * ROWS) * left.row_stride + inner;
-                            let rows: [&[f32]; ROWS] = std::array::from_fn(|i| {
-                                &left.data[first + i * left.row_stride..][..depth]
-                            });
-                            tile::<S, ROWS, VECTORS>(simd, Rows(rows), right, out, place);
+                for (k, right) in block.chunks_exact(depth * panels.width).enumerate() {
+                    for (t, out) in out.chunks_mut(ROWS * n).enumerate() {
+                        let place = (k * panels.width, n);
+                        let mut sums = begin::<S, ROWS, VECTORS>(simd, Begin::Result, out, place);
+                        if left.column_stride == 1 {
+                            let mut rows: [&[f32]; ROWS] = [&[]; ROWS];
+                            for (i, to) in rows.iter_mut().enumerate() {
+                                let row = (top + t * ROWS + i).min(left.rows - 1);
+                                *to = &left.data[row * left.row_stride + inner..][..depth];
+                            }
+                            sums = add::<S, ROWS, VECTORS>(simd, sums, Rows(rows), right);
                         } else {
-                            let packed = &workspace.left[t * depth * ROWS..][..depth * ROWS];
+                            let packed = &packed[t * depth * ROWS..][..depth * ROWS];
                             let packed = Packed(packed.as_chunks::<ROWS>().0);
-                            tile::<S, ROWS, VECTORS>(simd, packed, right, out, place);
+                            sums = add::<S, ROWS, VECTORS>(simd, sums, packed, right);
                         }
+                        end::<S, ROWS, VECTORS>(simd, sums, out, place);
                     }
                 }
             }
@@ -138,12 +244,12 @@ impl Product<'_> {
 }
 
 /// So many rows of the left matrix, column by column.
-trait Left<const ROWS: usize> {
+pub(crate) trait Left<const ROWS: usize> {
     fn at(&self, k: usize) -> [f32; ROWS];
 }
 
 /// Rows where they are.
-struct Rows<'a, const ROWS: usize>([&'a [f32]; ROWS]);
+pub(crate) struct Rows<'a, const ROWS: usize>(pub [&'a [f32]; ROWS]);
 
 impl<const ROWS: usize> Left<ROWS> for Rows<'_, ROWS> {
     #[inline(always)]
@@ -207,13 +313,7 @@ fn pack_left<const ROWS: usize>(
 /// Packs `depth` rows, panel by panel of so many columns: shape [panels, depth, panel], with zeros
 /// beyond the last column.
 #[inline(always)]
-fn pack_right(
-    packed: &mut Vec<f32>,
-    right: Matrix<'_>,
-    (inner, depth): (usize, usize),
-    panel: usize,
-) {
-    packed.resize(right.columns.div_ceil(panel) * depth * panel, 0.0);
+fn pack_right(packed: &mut [f32], right: Matrix<'_>, (inner, depth): (usize, usize), panel: usize) {
     for (k, packed) in packed.chunks_exact_mut(depth * panel).enumerate() {
         let first = k * panel;
         let width = panel.min(right.columns - first);
@@ -232,30 +332,55 @@ fn pack_right(
     }
 }
 
-/// Adds the product of a packed tile and a packed panel to the rows `out` of the result, from a
-/// column on, which are `n` numbers long.
+/// The sums of a tile as they begin. `out` has its rows, of `n` numbers each, fewer than `ROWS` at the
+/// end of a matrix; the tile begins at a column.
 #[inline(always)]
-fn tile<S: Simd, const ROWS: usize, const VECTORS: usize>(
+pub(crate) fn begin<S: Simd, const ROWS: usize, const VECTORS: usize>(
     simd: S,
-    left: impl Left<ROWS>,
-    right: &[f32],
-    out: &mut [f32],
+    begin: Begin<'_>,
+    out: &[f32],
     (column, n): (usize, usize),
-) {
+) -> [[S::f32s; VECTORS]; ROWS] {
     let width = (VECTORS * S::F32_LANES).min(n - column);
-    let is_whole = width == VECTORS * S::F32_LANES;
     let mut sums = [[simd.splat_f32s(0.0); VECTORS]; ROWS];
-    for (sums, row) in sums.iter_mut().zip(out.chunks_exact(n)) {
-        let row = &row[column..][..width];
-        if is_whole {
-            sums.copy_from_slice(S::as_simd_f32s(row).0);
-            continue;
-        }
-        for (v, sum) in sums.iter_mut().enumerate() {
-            let from = (v * S::F32_LANES).min(width);
-            *sum = simd.partial_load_f32s(&row[from..width.min(from + S::F32_LANES)]);
+    match begin {
+        Begin::Zero => {}
+        Begin::Row(row) => sums = [load::<S, VECTORS>(simd, &row[column..][..width]); ROWS],
+        Begin::Result => {
+            for (i, sums) in sums.iter_mut().enumerate() {
+                if let Some(row) = out.get(i * n + column..i * n + column + width) {
+                    *sums = load::<S, VECTORS>(simd, row);
+                }
+            }
         }
     }
+    sums
+}
+
+/// Vectors of these numbers, with zeros beyond the last.
+#[inline(always)]
+fn load<S: Simd, const VECTORS: usize>(simd: S, row: &[f32]) -> [S::f32s; VECTORS] {
+    let mut sums = [simd.splat_f32s(0.0); VECTORS];
+    if row.len() == VECTORS * S::F32_LANES {
+        sums.copy_from_slice(S::as_simd_f32s(row).0);
+    } else {
+        for (v, sum) in sums.iter_mut().enumerate() {
+            let from = (v * S::F32_LANES).min(row.len());
+            *sum = simd.partial_load_f32s(&row[from..row.len().min(from + S::F32_LANES)]);
+        }
+    }
+    sums
+}
+
+/// The sums of a tile with the product of some rows and a panel, which has as many rows as those have
+/// columns. By value, so that they stay in registers.
+#[inline(always)]
+pub(crate) fn add<S: Simd, const ROWS: usize, const VECTORS: usize>(
+    simd: S,
+    mut sums: [[S::f32s; VECTORS]; ROWS],
+    left: impl Left<ROWS>,
+    right: &[f32],
+) -> [[S::f32s; VECTORS]; ROWS] {
     let (vectors, _) = S::as_simd_f32s(right);
     for (k, right) in vectors.as_chunks::<VECTORS>().0.iter().enumerate() {
         let left = left.at(k);
@@ -266,9 +391,21 @@ fn tile<S: Simd, const ROWS: usize, const VECTORS: usize>(
             }
         }
     }
-    for (sums, row) in sums.iter().zip(out.chunks_exact_mut(n)) {
-        let row = &mut row[column..][..width];
-        if is_whole {
+    sums
+}
+
+/// Writes the sums of a tile to where [`begin`] took them from.
+#[inline(always)]
+pub(crate) fn end<S: Simd, const ROWS: usize, const VECTORS: usize>(
+    simd: S,
+    sums: [[S::f32s; VECTORS]; ROWS],
+    out: &mut [f32],
+    (column, n): (usize, usize),
+) {
+    let width = (VECTORS * S::F32_LANES).min(n - column);
+    for (i, sums) in sums.iter().enumerate() {
+        let Some(row) = out.get_mut(i * n + column..i * n + column + width) else { continue };
+        if width == VECTORS * S::F32_LANES {
             let (row, _) = S::as_mut_simd_f32s(row);
             row.copy_from_slice(sums);
         } else {

@@ -7,45 +7,59 @@ use std::ops::Range;
 
 use pulp::Arch;
 
-use crate::conv::{self, Kernel, Patches};
-use crate::depthwise::{self, Padded};
+use crate::conv::{self, Kernel, STRIP_PIXELS};
+use crate::depthwise::{self, Zeros};
 use crate::elementwise::{Relu, Sum, upsample};
+use crate::gemm::Panels;
 use crate::network::{Layer, Network, Node};
 use crate::norm;
 use crate::tensor::{Shape, Tensor};
-
-/// Pixels of a strip, about: of a layer's map of 48 channels they take 100 KB.
-const STRIP_PIXELS: usize = 512;
 
 /// One forward pass after the other over one map each.
 #[derive(Clone, Debug)]
 pub struct Inference {
     arch: Arch,
+    network: Network,
+    numbers: Vec<f32>,
+    /// The weights of dense convolutions, of which other layers have none.
+    weights: Vec<Panels>,
     segments: Vec<Range<usize>>,
     /// Whether the whole of what a layer makes is kept.
     is_kept: Vec<bool>,
     /// What layers make: all of it, or the present strip.
     made: Vec<Tensor>,
-    patches: Patches,
-    padded: Padded,
+    edges: Vec<f32>,
+    zeros: Zeros,
 }
 
 impl Inference {
-    /// Working space for a network.
+    /// Of a network with these numbers.
     ///
     /// # Panics
-    /// If the network joins maps or their pixels: that takes a [`Pass`](crate::Pass).
-    pub fn new(network: &Network, arch: Arch) -> Inference {
+    /// If the network joins maps or their pixels (that takes a [`Pass`](crate::Pass)), or has another
+    /// count of numbers.
+    pub fn new(network: &Network, numbers: &[f32], arch: Arch) -> Inference {
         let joins = network.layers.iter().any(|layer| matches!(layer, Layer::Join { .. }));
         assert!(!joins, "maps are joined by passes only");
+        assert_eq!(numbers.len(), network.n_numbers(), "numbers of another network");
         let (segments, is_kept) = segments(network);
+        let mut packed = vec![Panels::default(); network.layers.len()];
+        for (layer, packed) in network.layers.iter().zip(&mut packed) {
+            if let Layer::Conv { from, weights, kernel, channels, .. } = *layer {
+                let weights = &numbers[network.parameters()[weights].range.clone()];
+                conv::pack(arch, (weights, kernel), (network.channels_of(from), channels), packed);
+            }
+        }
         Inference {
             arch,
+            network: network.clone(),
+            numbers: numbers.to_vec(),
+            weights: packed,
             segments,
             is_kept,
             made: vec![Tensor::default(); network.layers.len()],
-            patches: Patches::default(),
-            padded: Padded::default(),
+            edges: Vec::new(),
+            zeros: Zeros::default(),
         }
     }
 
@@ -60,14 +74,9 @@ impl Inference {
     ///
     /// # Panics
     /// If the input is more than one map, or a side of it is no multiple of [`Network::stride`].
-    pub fn run(
-        &mut self,
-        network: &Network,
-        numbers: &[f32],
-        mut take: impl FnMut(Node, usize, &[f32]),
-    ) {
+    pub fn run(&mut self, mut take: impl FnMut(Node, usize, &[f32])) {
         let input = self.made[0].shape;
-        let stride = network.stride();
+        let stride = self.network.stride();
         assert_eq!(input.n, 1, "one map at a time");
         assert!(
             input.height.is_multiple_of(stride) && input.width.is_multiple_of(stride),
@@ -76,18 +85,18 @@ impl Inference {
             input.height
         );
         for segment in self.segments.clone() {
-            let whole = network.shape_of(Node(segment.start), input);
+            let whole = self.network.shape_of(Node(segment.start), input);
             for layer in segment.clone().filter(|layer| self.is_kept[*layer]) {
-                self.made[layer].reshape(network.shape_of(Node(layer), input));
+                self.made[layer].reshape(self.network.shape_of(Node(layer), input));
             }
             // Even, so that what is twice as large begins with a whole row.
             let strip = (STRIP_PIXELS / whole.width).next_multiple_of(2).max(2);
             for top in (0..whole.height).step_by(strip) {
                 let rows = top..(top + strip).min(whole.height);
                 for layer in segment.clone() {
-                    let shape = network.shape_of(Node(layer), input);
-                    self.make(network, numbers, layer, (shape, rows.clone()));
-                    if network.outputs().contains(&Node(layer)) {
+                    let shape = self.network.shape_of(Node(layer), input);
+                    self.make(layer, (shape, rows.clone()));
+                    if self.network.outputs().contains(&Node(layer)) {
                         let first = if self.is_kept[layer] { top } else { 0 };
                         let row = shape.width * shape.channels;
                         take(
@@ -102,14 +111,10 @@ impl Inference {
     }
 
     /// Some rows of what a layer makes.
-    fn make(
-        &mut self,
-        network: &Network,
-        numbers: &[f32],
-        layer: usize,
-        (shape, rows): (Shape, Range<usize>),
-    ) {
-        let Inference { arch, is_kept, made, patches, padded, .. } = self;
+    fn make(&mut self, layer: usize, (shape, rows): (Shape, Range<usize>)) {
+        let Inference {
+            arch, network, numbers, weights: packed, is_kept, made, edges, zeros, ..
+        } = self;
         let of = |parameter: usize| &numbers[network.parameters()[parameter].range.clone()];
         let (before, rest) = made.split_at_mut(layer);
         let row = shape.width * shape.channels;
@@ -127,25 +132,26 @@ impl Inference {
         };
         match network.layers[layer] {
             Layer::Input => unreachable!("the caller writes it"),
-            Layer::Conv { from, weights, bias, kernel, channels } => {
-                match bias {
-                    Some(bias) => {
-                        out.chunks_exact_mut(channels).for_each(|p| p.copy_from_slice(of(bias)));
+            Layer::Conv { from, bias, kernel, .. } => {
+                let weights = (&packed[layer], bias.map(of), kernel);
+                // Without neighbors, all pixels of the strip are one row.
+                let (map, shape, rows) = match kernel {
+                    Kernel::POINTWISE => {
+                        let map = beside(from);
+                        let channels = before[from.0].shape.channels;
+                        (
+                            map,
+                            Shape { n: 1, height: 1, width: map.len() / channels, channels },
+                            0..1,
+                        )
                     }
-                    None => out.fill(0.0),
-                }
-                let map = &before[from.0];
-                let weights = (of(weights), kernel);
-                // Without neighbors, rows of a strip will do.
-                let (map, shape, rows) = match is_kept[from.0] {
-                    true => (&map.data[..], map.shape, rows),
-                    false => (&map.data[..], map.shape, 0..rows.len()),
+                    _ => (&before[from.0].data[..], before[from.0].shape, rows),
                 };
-                conv::forward_rows(*arch, (map, shape), weights, (out, channels, rows), patches);
+                conv::forward_rows(*arch, (map, shape), weights, (out, rows), edges);
             }
             Layer::Depthwise { from, weights, side } => {
                 let map = (&before[from.0].data[..], before[from.0].shape);
-                depthwise::forward_rows(*arch, map, (of(weights), side), (out, rows), padded);
+                depthwise::forward_rows(*arch, map, (of(weights), side), (out, rows), zeros);
             }
             Layer::Norm { from, scale, shift, positive } => {
                 let floor = if positive { 0.0 } else { f32::NEG_INFINITY };

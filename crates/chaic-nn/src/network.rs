@@ -217,6 +217,11 @@ impl Network {
         self.sizes[node.0].stride
     }
 
+    /// Channels of what a node makes.
+    pub(crate) fn channels_of(&self, node: Node) -> usize {
+        self.sizes[node.0].channels
+    }
+
     /// The shape of what a node makes of inputs of this shape.
     pub fn shape_of(&self, node: Node, input: Shape) -> Shape {
         let Size { channels, stride, maps } = self.sizes[node.0];

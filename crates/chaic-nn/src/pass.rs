@@ -3,7 +3,7 @@
 use pulp::Arch;
 
 use crate::conv::{self, Patches};
-use crate::depthwise::{self, Padded};
+use crate::depthwise::{self, Padded, Zeros};
 use crate::elementwise::{AddTo, Mask, Relu, downsample, upsample};
 use crate::network::{Layer, Network, Node};
 use crate::norm;
@@ -18,6 +18,7 @@ pub struct Pass {
     gradients: Vec<Tensor>,
     patches: Patches,
     padded: Padded,
+    zeros: Zeros,
     /// A gradient by one map.
     by_map: Vec<f32>,
 }
@@ -32,6 +33,7 @@ impl Pass {
             gradients: vec![Tensor::default(); n],
             patches: Patches::default(),
             padded: Padded::default(),
+            zeros: Zeros::default(),
             by_map: Vec::new(),
         }
     }
@@ -66,17 +68,9 @@ impl Pass {
             match *layer {
                 Layer::Input => out.data.copy_from_slice(&input.data),
                 Layer::Conv { from, weights, bias, kernel, channels } => {
-                    if bias.is_none() {
-                        out.data.fill(0.0);
-                    }
-                    if let Some(bias) = bias {
-                        out.data
-                            .chunks_exact_mut(channels)
-                            .for_each(|p| p.copy_from_slice(of(bias)));
-                    }
                     let map = &before[from.0];
                     let out = (&mut out.data[..], channels);
-                    let weights = (of(weights), kernel);
+                    let weights = (of(weights), bias.map(of), kernel);
                     conv::forward(
                         self.arch,
                         (&map.data, map.shape),
@@ -91,9 +85,8 @@ impl Pass {
                     for (map_data, out) in
                         map.data.chunks_exact(n).zip(out.data.chunks_exact_mut(n))
                     {
-                        let weights = (of(weights), side);
-                        let padded = &mut self.padded;
-                        depthwise::forward(self.arch, map_data, map.shape, weights, out, padded);
+                        let (weights, map) = ((of(weights), side), (map_data, map.shape));
+                        depthwise::forward(self.arch, map, weights, out, &mut self.zeros);
                     }
                 }
                 Layer::Norm { from, scale, shift, positive } => {
@@ -168,7 +161,8 @@ impl Pass {
                             self.arch, map_data, g, shape, by_weights, padded,
                         );
                         let weights = (&numbers[of(weights)], side);
-                        depthwise::backward_map(self.arch, g, shape, weights, by_map, padded);
+                        let zeros = &mut self.zeros;
+                        depthwise::backward_map(self.arch, (g, shape), weights, by_map, zeros);
                         self.arch.dispatch(AddTo { to: out, from: by_map });
                     }
                 }

@@ -166,11 +166,11 @@ fn inference_makes_the_same_bits_as_a_pass_at_every_width_of_vectors() {
         let mut pass = Pass::new(&net, widest());
         pass.forward(&net, &numbers, &input);
         for (name, arch) in widths() {
-            let mut inference = Inference::new(&net, arch);
+            let mut inference = Inference::new(&net, &numbers, arch);
             for _ in 0..2 {
                 inference.input(input.shape).copy_from_slice(&input.data);
                 let mut made = Vec::new();
-                inference.run(&net, &numbers, |_, _, strip| made.extend_from_slice(strip));
+                inference.run(|_, _, strip| made.extend_from_slice(strip));
                 assert!(made == pass.made(head).data, "{height} x {width}, {name}");
             }
         }

@@ -1,4 +1,5 @@
-//! How long the detector takes: `cargo run --release -p chaic-vision --example detector_speed`.
+//! How long the detector takes on one core: the least of some runs, and the median.
+//! `cargo run --release -p chaic-vision --example detector_speed`.
 use std::time::Instant;
 
 use chaic_nn::simd::widest;
@@ -8,39 +9,50 @@ use chaic_vision::features::N_FEATURES;
 use chaic_vision::trained::TrainedDetector;
 use chaic_vision::views::{Part, ViewRules, Views};
 
+fn report(what: &str, n: usize, mut work: impl FnMut()) {
+    let mut times: Vec<f64> = (0..n)
+        .map(|_| {
+            let began = Instant::now();
+            work();
+            1e3 * began.elapsed().as_secs_f64()
+        })
+        .collect();
+    times.sort_by(f64::total_cmp);
+    println!("{what:40} {:7.1} ms, median {:7.1} ms", times[0], times[n / 2]);
+}
+
 fn main() {
     let detector = Detector::new();
     let net = &detector.network;
     println!("{} parameters", net.n_numbers());
     let numbers = net.begin(1);
     let shape = Shape { n: 1, height: 512, width: 512, channels: N_FEATURES };
-    let mut inference = Inference::new(net, widest());
-    for _ in 0..5 {
-        let t = Instant::now();
+    let mut inference = Inference::new(net, &numbers, widest());
+    report("the network, 512x512", 30, || {
         inference.input(shape).fill(0.1);
-        inference.run(net, &numbers, |_, _, _| ());
-        println!("1 x 512: inference {:?}", t.elapsed());
-    }
-    let view = Views::new(Part::Validation, ViewRules::TRAINING, 1, 0).draw();
-    let trained = TrainedDetector::uncalibrated(&detector, &numbers);
-    for _ in 0..5 {
-        let t = Instant::now();
-        let image = (&view.rgb[..], &view.depth_m[..], &view.camera);
-        let found = trained.detect(image, &mut inference);
-        println!("an image: {:?}, {} instances", t.elapsed(), found.len());
+        inference.run(|_, _, _| ());
+    });
+    let trained = TrainedDetector::built_in();
+    let mut inference = trained.inference();
+    let mut views = Views::new(Part::Validation, ViewRules::NATURAL, 1, 0);
+    for _ in 0..3 {
+        let view = views.draw();
+        let n = trained.detect((&view.rgb, &view.depth_m, &view.camera), &mut inference).len();
+        report(&format!("an image, {n} instances"), 20, || {
+            trained.detect((&view.rgb, &view.depth_m, &view.camera), &mut inference);
+        });
     }
     for (n, side) in [(1, 512), (4, 256)] {
         let shape = Shape { n, height: side, width: side, channels: N_FEATURES };
         let input = Tensor { shape, data: vec![0.1; shape.numbers()] };
         let mut pass = Pass::new(net, widest());
         let mut by = vec![0.0; net.n_numbers()];
-        for _ in 0..3 {
-            let t = Instant::now();
+        report(&format!("forward pass, {n} of {side}x{side}"), 5, || {
             pass.forward(net, &numbers, &input);
-            let forward = t.elapsed();
+        });
+        report(&format!("backward pass, {n} of {side}x{side}"), 5, || {
             pass.begin_backward();
             pass.backward(net, &numbers, &mut by);
-            println!("{n} x {side}: forward {forward:?}, both {:?}", t.elapsed());
-        }
+        });
     }
 }

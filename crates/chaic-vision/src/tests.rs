@@ -177,7 +177,7 @@ fn a_training_leaves_what_it_takes_to_go_on_and_weights_that_are_read_back() {
 fn images_that_are_none_show_nothing_and_break_nothing() {
     let detector = Detector::new();
     let trained = TrainedDetector::uncalibrated(&detector, &detector.network.begin(1));
-    let mut inference = Inference::new(&detector.network, widest());
+    let mut inference = trained.inference();
     let camera = camera(64);
     for depth_m in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -1.0, 2.0] {
         for gray in [0, 255] {

@@ -75,7 +75,7 @@ impl TrainedDetector {
 
     /// Working space for looking at images.
     pub fn inference(&self) -> Inference {
-        Inference::new(&self.detector.network, widest())
+        Inference::new(&self.detector.network, &self.numbers, widest())
     }
 
     /// Whether it can look at images of this camera: sides are multiples of the network's stride.
@@ -100,7 +100,7 @@ impl TrainedDetector {
         features(rgb, depth_m, camera, crop, inference.input(shape));
         let mut pixels = Pixels::new(camera);
         let take = |_, row: usize, strip: &[f32]| pixels.read(row, strip, depth_m);
-        inference.run(&self.detector.network, &self.numbers, take);
+        inference.run(take);
         let mut found = pixels.instances(depth_m, &InstanceRules::default());
         for instance in &mut found {
             instance.score = self.calibration.probability(&predictors(instance));

@@ -1,7 +1,5 @@
 //! Exit codes; `docs/exit-codes.md` has the same table for users.
 
-use std::process::ExitCode;
-
 use chaic_env::EnvError;
 use chaic_episodes::SplitError;
 use chaic_eval::EvalError;
@@ -28,18 +26,19 @@ pub enum Ended {
     Interrupted,
 }
 
-impl From<Ended> for ExitCode {
-    fn from(ended: Ended) -> ExitCode {
-        ExitCode::from(match ended {
+impl Ended {
+    /// Its code.
+    pub fn code(self) -> u8 {
+        match self {
             Ended::Well => OK,
             Ended::WithFindings => FAILED,
             Ended::Interrupted => INTERRUPTED,
-        })
+        }
     }
 }
 
 /// The code of an error.
-pub fn of(error: &anyhow::Error) -> ExitCode {
+pub fn of(error: &anyhow::Error) -> u8 {
     let of_env = match error.downcast_ref() {
         Some(EvalError::Env(inner)) => Some(inner),
         _ => error.downcast_ref(),
@@ -54,5 +53,5 @@ pub fn of(error: &anyhow::Error) -> ExitCode {
         || of_minds.is_some_and(|inner| inner.is::<Refusal>())
         || error.downcast_ref().is_some_and(EvalError::is_usage)
         || error.is::<SplitError>();
-    ExitCode::from(if is_usage { USAGE } else { FAILED })
+    if is_usage { USAGE } else { FAILED }
 }

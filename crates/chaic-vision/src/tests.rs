@@ -3,8 +3,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use chaic_nn::simd::widest;
-use chaic_nn::{Inference, Shape, Tensor};
+use chaic_nn::{Shape, Tensor};
 use chaic_protocol::geom::{Camera, yaw_rotation};
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{EntityId, Vec3};

@@ -7,7 +7,7 @@ use chaic_nn::{AdamRules, Network, Pass, Shape, Tensor};
 use chaic_protocol::rng::Stream;
 use serde::{Deserialize, Serialize};
 
-use crate::detector::Detector;
+use crate::detector::{Blocks, Detector};
 use crate::evaluate::{calibrate, evaluate};
 use crate::features::{Crop, N_FEATURES, features};
 use crate::labels::BACKGROUND;
@@ -46,6 +46,8 @@ pub struct TrainingRules {
     pub warm_up: u64,
     /// Parts of a batch that are worked on side by side; their gradients are added in order.
     pub shards: usize,
+    /// The network's blocks; weights of others than the usual ones are read by trainings only.
+    pub blocks: Blocks,
     /// Crops of each part: parts take turns.
     pub crops: [CropRules; 2],
     /// How views are drawn.
@@ -71,6 +73,7 @@ impl TrainingRules {
             rate: 2e-3,
             warm_up: 200,
             shards: 2,
+            blocks: Blocks::Depthwise,
             crops: [
                 CropRules { views: 4, of_view: 1, side_px: 256, anywhere: 0.4 },
                 CropRules { views: 4, of_view: 4, side_px: 128, anywhere: 0.3 },
@@ -177,7 +180,7 @@ pub struct Trainer {
 impl Trainer {
     /// Before the first step.
     pub fn new(rules: TrainingRules) -> Trainer {
-        let detector = Detector::new();
+        let detector = Detector::of(rules.blocks);
         let learner = Learner::new(&detector.network, rules.seed, rules.shards);
         Trainer { rules, detector, learner }
     }
@@ -244,7 +247,8 @@ impl Training for Trainer {
     }
 
     fn begin_with(&mut self, weights: &[u8]) -> Result<(), WeightsError> {
-        self.learner.begin_with(TrainedDetector::from_bytes(weights)?.numbers);
+        let trained = TrainedDetector::of_bytes(self.detector.clone(), weights)?;
+        self.learner.begin_with(trained.numbers);
         Ok(())
     }
 

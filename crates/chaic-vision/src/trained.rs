@@ -54,7 +54,14 @@ impl TrainedDetector {
     /// # Errors
     /// [`WeightsError`] if it isn't a whole file of this network's weights.
     pub fn from_bytes(bytes: &[u8]) -> Result<TrainedDetector, WeightsError> {
-        let detector = Detector::new();
+        TrainedDetector::of_bytes(Detector::new(), bytes)
+    }
+
+    /// The same of another network.
+    ///
+    /// # Errors
+    /// As [`TrainedDetector::from_bytes`].
+    pub fn of_bytes(detector: Detector, bytes: &[u8]) -> Result<TrainedDetector, WeightsError> {
         let mut numbers = weights::from_bytes(&of_file(&detector), bytes, &kind())?;
         let factors = numbers.split_off(detector.network.n_numbers());
         let factors = factors.try_into().expect("the network ends with so many");

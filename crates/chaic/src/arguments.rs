@@ -165,8 +165,9 @@ pub struct EvalArguments {
     /// draws them from a seed (domain randomization). Changes neither depth nor ids.
     #[arg(long, value_name = "LOOK")]
     pub appearance: Option<Appearance>,
-    /// What helpers may know: told (usual), what each is granted; or hidden, nothing but pixels and the
-    /// own body: --perception learned --behavior learned, and no helper that is told the constraint.
+    /// What helpers may know: told (usual), what each is granted; or hidden, no ids, and nothing of what
+    /// the partner does but by pixels: --perception learned --behavior learned, and no helper that is
+    /// told the constraint.
     #[arg(long, value_enum)]
     pub track: Option<Track>,
     /// By what helpers tell what is in their images: gt (usual), ids from ground truth; or learned, the
@@ -198,7 +199,7 @@ pub struct EvalArguments {
 pub enum Track {
     /// What each is granted.
     Told,
-    /// Nothing but pixels and the own body.
+    /// No ids, and nothing of what the partner does but by pixels.
     Hidden,
 }
 

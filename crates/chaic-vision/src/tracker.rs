@@ -51,8 +51,10 @@ pub struct TrackerRules {
 impl Default for TrackerRules {
     fn default() -> TrackerRules {
         TrackerRules {
-            least_score: 0.4,
-            first_odds: (6.0, 0.7),
+            // Of sixteen episodes of RHP (`gen-standard:5000..5002`, `--track hidden`): it delivers 54 things
+            // by 0.2 and 0.45, 33 by 0.4 and 0.7, 50 by 0.1 and 0.25, and 91 by ids.
+            least_score: 0.2,
+            first_odds: (6.0, 0.45),
             odds: (1.0, 0.5),
             odds_within: (-1.5, 4.0),
             told_odds: 0.3,

@@ -24,6 +24,8 @@ use super::clip::{CROPS, Clip, SLACK};
 use super::crop::{Crop, FILM, Watcher};
 use super::store::{ClipFolder, StoreError};
 use crate::parallel::in_order;
+use crate::perception::LearnedSight;
+use crate::trained::TrainedDetector;
 use crate::views::Part;
 
 /// How clips are made.
@@ -38,11 +40,14 @@ pub struct CollectRules {
     pub episodes: usize,
     /// Share of episodes in light and colors drawn at random.
     pub varied: f32,
+    /// Share of episodes that are filmed by helpers who see by the detector that comes with chaic: who
+    /// learns from those alone who know where their partner is can't tell much from crops that miss it.
+    pub learned: f32,
 }
 
 impl Default for CollectRules {
     fn default() -> CollectRules {
-        CollectRules { seed: 1, of_each: 900, episodes: 1000, varied: 0.35 }
+        CollectRules { seed: 1, of_each: 900, episodes: 1000, varied: 0.35, learned: 0.0 }
     }
 }
 
@@ -80,7 +85,7 @@ pub struct Collector<'a> {
     pub part: Part,
     /// How.
     pub rules: &'a CollectRules,
-    /// By what the helpers who film see.
+    /// By what the helpers who film see, but for the share of [`CollectRules::learned`].
     pub sight: &'a dyn Sight,
     /// Episodes at a time; changes no clip.
     pub n_threads: usize,
@@ -99,6 +104,13 @@ pub fn collect(
 ) -> Result<Vec<Clip>, StoreError> {
     let Collector { part, rules, sight, n_threads, folder } = *collector;
     let (mut clips, mut counts): (Vec<Clip>, Counts) = Default::default();
+    let learned = (rules.learned > 0.0).then(|| LearnedSight::new(TrainedDetector::built_in()));
+    let sight_of = |index: usize| match &learned {
+        Some(learned) if Stream::new(rules.seed, "film", index as u64).chance(rules.learned) => {
+            learned
+        }
+        _ => sight,
+    };
     for first in (0..rules.episodes).step_by(ROUND) {
         let is_enough = counts.iter().all(|n| *n >= rules.of_each);
         if is_enough || !go_on(first, &counts) {
@@ -108,7 +120,8 @@ pub fn collect(
         let is_new = kept.is_none();
         let mut made = kept.unwrap_or_else(|| {
             let indices = first..(first + ROUND).min(rules.episodes);
-            let one = |(): &mut (), index: usize| of_episode(part, rules, sight, index as u64);
+            let one =
+                |(): &mut (), index: usize| of_episode(part, rules, sight_of(index), index as u64);
             let made = in_order(indices, n_threads, || (), one);
             made.into_iter().flatten().collect()
         });

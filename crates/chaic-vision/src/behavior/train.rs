@@ -145,6 +145,8 @@ impl BehaviorTrainer {
 
 /// Clips of a validation, of each behavior.
 const VALIDATION_CLIPS: usize = 60;
+/// One of so many episodes is for validation.
+const VALIDATION_PART: usize = 4;
 
 /// A behavior network while it learns, with clips to validate it by.
 pub struct BehaviorTraining {
@@ -162,11 +164,12 @@ impl Training for BehaviorTraining {
         go_on: &mut dyn FnMut(&str) -> bool,
     ) -> Result<Option<BehaviorTraining>, TrainingError> {
         let clips = |part: Part, go_on: &mut dyn FnMut(&str) -> bool| {
-            let of_each = match part {
-                Part::Training => rules.collect.of_each,
-                _ => rules.collect.of_each.min(VALIDATION_CLIPS),
+            let CollectRules { of_each, episodes, .. } = rules.collect;
+            let (of_each, episodes) = match part {
+                Part::Training => (of_each, episodes),
+                _ => (of_each.min(VALIDATION_CLIPS), episodes.div_ceil(VALIDATION_PART)),
             };
-            let rules = CollectRules { of_each, ..rules.collect };
+            let rules = CollectRules { of_each, episodes, ..rules.collect };
             let name = format!("{part:?}").to_lowercase();
             let folder = ClipFolder::open(&folder.join("clips").join(&name), part, &rules)?;
             let (sight, folder) = (&TrueSight, Some(&folder));

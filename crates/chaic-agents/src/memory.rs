@@ -18,6 +18,8 @@ use crate::planning::path::{CostField, Search};
 use crate::rules::{Exploration, FailureRules, PlannerRules, Walking};
 use crate::track::{Hands, Intent, TrackId};
 
+pub mod egocentric;
+
 /// A top may look this much lower than it is, metres.
 const TOP_TOLERANCE_M: f32 = 0.1;
 /// From this near to a thing it counts as reached when distances are estimated, metres.

@@ -110,6 +110,11 @@ impl<P: Policy> Mind<P> {
     pub fn policy(&self) -> &P {
         &self.policy
     }
+
+    /// Its policy, for those who tell it what to choose.
+    pub fn policy_mut(&mut self) -> &mut P {
+        &mut self.policy
+    }
 }
 
 impl Episode {
@@ -253,6 +258,29 @@ impl<P: Policy> Mind<P> {
         Some(format!("frame {}: {} {done}{in_vain}", last.frame, last.agent))
     }
 
+    /// Perceives and remembers: the first half of [`Agent::act`].
+    pub fn attend(&mut self, observation: &Observation) {
+        let Some(episode) = &mut self.episode else { return };
+        episode.take_in(observation, self.perception.as_mut());
+        self.behavior.watch(observation, &episode.memory);
+        self.policy.look(observation);
+    }
+
+    /// Decides and acts by what it has [attended](Mind::attend) to: the second half of [`Agent::act`].
+    ///
+    /// # Errors
+    /// The policy's, if it can't choose. All else is as it was, and this may be called again.
+    pub fn proceed(&mut self) -> Result<Action, AgentError> {
+        let pause = Action::Wait { frames: PAUSE_FRAMES };
+        let Some(mut episode) = self.episode.take() else { return Ok(pause) };
+        let decided = self.decide(&mut episode);
+        if let Ok(sent) = &decided {
+            episode.sent = *sent;
+        }
+        self.episode = Some(episode);
+        Ok(decided?.map_or(pause, |(_, action)| action))
+    }
+
     /// What to do next, as it is meant and as it is named; `None` for a pause. Where nothing that the
     /// policy chooses can be done, one looks around elsewhere, from where it may be possible.
     fn decide(&mut self, episode: &mut Episode) -> Result<Option<(Intent, Action)>, AgentError> {
@@ -310,17 +338,8 @@ impl<P: Policy> Agent for Mind<P> {
     }
 
     fn act(&mut self, observation: &Observation) -> Result<Action, AgentError> {
-        let pause = Action::Wait { frames: PAUSE_FRAMES };
-        let Some(mut episode) = self.episode.take() else { return Ok(pause) };
-        episode.take_in(observation, self.perception.as_mut());
-        self.behavior.watch(observation, &episode.memory);
-        self.policy.look(observation);
-        let decided = self.decide(&mut episode);
-        if let Ok(sent) = &decided {
-            episode.sent = *sent;
-        }
-        self.episode = Some(episode);
-        Ok(decided?.map_or(pause, |(_, action)| action))
+        self.attend(observation);
+        self.proceed()
     }
 
     fn perception(&self) -> Option<String> {

@@ -6,7 +6,7 @@ use chaic_render::ImagesMut;
 use rayon::prelude::*;
 
 use crate::config::EpisodeConfig;
-use crate::env::{Env, Flow};
+use crate::env::{Env, EnvSnapshot, Flow};
 use crate::error::{EnvError, Result};
 
 /// One seat of the caller's in a batch.
@@ -114,19 +114,39 @@ impl EnvBatch {
     /// Begins another episode in one of the environments, see [`Env::reset`].
     ///
     /// # Errors
-    /// Those of [`Env::reset`], and [`EnvError::Batch`] if the batch has no such environment or its
-    /// images would have another size.
+    /// As [`EnvBatch::reset_many`].
     pub fn reset(&mut self, env: usize, config: EpisodeConfig<'_>) -> Result<()> {
-        let (n, size) = (self.envs.len(), self.layout.size);
-        let Some(env) = self.envs.get_mut(env) else {
-            return Err(EnvError::Batch(format!("there is no environment {env} of {n}")));
-        };
-        match config.image_size.filter(|other| *other != size) {
-            Some(other) => Err(EnvError::Batch(format!(
-                "images of {other} pixels don't go with a batch of {size} pixels"
-            ))),
-            None => env.reset(config),
+        self.reset_many(vec![(env, config)])
+    }
+
+    /// Begins other episodes in some of the environments, on all cores; where one is named twice, the
+    /// later of the two.
+    ///
+    /// # Errors
+    /// Those of [`Env::reset`], and [`EnvError::Batch`] if the batch has no such environment: none is
+    /// reset then.
+    pub fn reset_many(&mut self, work: Vec<(usize, EpisodeConfig<'_>)>) -> Result<()> {
+        let n = self.envs.len();
+        let mut configs: Vec<Option<EpisodeConfig<'_>>> = (0..n).map(|_| None).collect();
+        for (env, config) in work {
+            let Some(of_env) = configs.get_mut(env) else {
+                return Err(EnvError::Batch(format!("there is no environment {env} of {n}")));
+            };
+            *of_env = Some(config);
         }
+        let work = self.envs.par_iter_mut().zip(configs);
+        work.filter_map(|(env, config)| Some((env, config?)))
+            .try_for_each(|(env, config)| env.reset(config))
+    }
+
+    /// Goes back (or on) to a snapshot of one of the environments, see [`Env::restore`].
+    ///
+    /// # Errors
+    /// Those of [`Env::restore`], and [`EnvError::Batch`] if the batch has no such environment.
+    pub fn restore(&mut self, env: usize, snapshot: &EnvSnapshot) -> Result<()> {
+        let n = self.envs.len();
+        let none = || EnvError::Batch(format!("there is no environment {env} of {n}"));
+        self.envs.get_mut(env).ok_or_else(none)?.restore(snapshot)
     }
 
     /// Plays all environments on, each as [`Env::advance`] does; what came of each, in their order.

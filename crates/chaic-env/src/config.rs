@@ -26,7 +26,7 @@ pub struct EpisodeConfig<'a> {
     pub helper: &'a str,
     /// Name of the partner's mind, for the record; `None` for the rule-based one.
     pub partner: Option<&'a str>,
-    /// Side of everybody's images, pixels; `None` for what each mind asks for.
+    /// Side of all minds' images, pixels; `None` for what each asks for. The caller's seats have their own.
     pub image_size: Option<u32>,
     /// How all that is seen is lit and colored.
     pub appearance: Appearance,

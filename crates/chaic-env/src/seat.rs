@@ -54,8 +54,8 @@ impl Seat {
         if let Driver::Mind(mind) = &mut self.driver {
             mind.reset(&world.briefing(agent, self.grants));
             self.senses = mind.senses();
+            self.senses.image_size = image_size.unwrap_or(self.senses.image_size);
         }
-        self.senses.image_size = image_size.unwrap_or(self.senses.image_size);
     }
 
     /// Its mind, if it has one.

@@ -190,9 +190,14 @@ fn what_does_not_fit_is_refused() {
     assert!(matches!(refused, Err(EnvError::Buffer { image: "ids", expected: 0, .. })));
     let short = ImagesMut { rgb: Some(&mut buffers.rgb[1..]), ..ImagesMut::default() };
     assert!(matches!(batch.observe(short), Err(EnvError::Buffer { image: "color", .. })));
-    let mut config = config(&bundled, 3);
-    config.image_size = Some(32);
-    assert!(batch.reset(0, config).is_err() && batch.reset(1, config).is_err());
-    config.image_size = Some(SIZE);
+    let config = config(&bundled, 3);
+    let before = batch.envs()[0].digest();
+    assert!(batch.reset_many(vec![(0, config), (1, config)]).is_err(), "there is but one");
+    assert_eq!(batch.envs()[0].digest(), before, "none is reset then");
     assert!(batch.reset(0, config).is_ok());
+    let snapshot = batch.envs()[0].snapshot().unwrap();
+    batch.advance(Some(60));
+    assert!(batch.restore(1, &snapshot).is_err());
+    batch.restore(0, &snapshot).unwrap();
+    assert_eq!(batch.envs()[0].world().state().frame, 0);
 }

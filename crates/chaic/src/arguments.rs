@@ -13,6 +13,7 @@ use chaic_env::rules::RuleSetName;
 use chaic_episodes::Split;
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::Format;
+use chaic_eval::run::Shard;
 use chaic_protocol::capability::PersonKind;
 use chaic_protocol::{AgentId, TaskId};
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -57,6 +58,8 @@ pub struct Arguments {
 pub enum Command {
     /// Play a benchmark; without options a small, complete one of about two minutes.
     Eval(Box<EvalArguments>),
+    /// Join the shards of a run.
+    Merge(MergeArguments),
     /// Print the scores of a run, computed anew from its results or traces.
     Report(ReportArguments),
     /// Play the recorded actions of a run again, count its results and compare its report; exit code
@@ -192,6 +195,21 @@ pub struct EvalArguments {
     /// Keep results only: little room, but nothing to verify or to replay.
     #[arg(long)]
     pub no_traces: bool,
+    /// Play one of several shares of the run, for example 2/4: every fourth episode run from the second
+    /// on. Each goes into an --out of its own; `chaic merge` joins them.
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<Shard>,
+}
+
+/// `chaic merge`.
+#[derive(Debug, Args)]
+pub struct MergeArguments {
+    /// The folders of the shards.
+    #[arg(required = true)]
+    pub runs: Vec<PathBuf>,
+    /// A new folder for the whole run.
+    #[arg(long)]
+    pub out: PathBuf,
 }
 
 /// What helpers may know.

@@ -31,6 +31,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     };
     let ended = match command {
         Command::Eval(arguments) => commands::eval::run(&arguments),
+        Command::Merge(arguments) => commands::merge::run(&arguments),
         Command::Report(arguments) => commands::report::run(&arguments),
         Command::Verify(arguments) => commands::verify::run(&arguments),
         Command::Fidelity(arguments) => commands::fidelity::run(&arguments),

@@ -137,6 +137,21 @@ const ALLOWED: &[Arrows] = &[
         ],
         &["chaic-llm-standin"],
     ),
+    arrows(
+        "chaic-python",
+        &[
+            "chaic",
+            "chaic-protocol",
+            "chaic-world",
+            "chaic-episodes",
+            "chaic-render",
+            "chaic-agents",
+            "chaic-env",
+            "chaic-eval",
+            "chaic-vision",
+        ],
+        &[],
+    ),
     // What a user writes: a helper, and the one call that evaluates it.
     arrows("minimal-helper", &["chaic-protocol", "chaic-env", "chaic-eval"], &[]),
 ];

@@ -24,9 +24,9 @@ const LOCK: &str = ".lock";
 /// Copies of episode files.
 pub(super) const EPISODES: &str = "episodes";
 /// What helpers that ask language models record; `chaic-llm` writes it.
-const RECORDS: &str = "llm";
+pub(super) const RECORDS: &str = "llm";
 /// The commands of helpers that run in other processes; `chaic-subprocess` writes it.
-const COMMANDS: &str = "commands.json";
+pub(super) const COMMANDS: &str = "commands.json";
 /// What lies there before the first question is asked.
 const RECORDS_OF_BEGINNING: [&str; 3] = ["settings.json", "settings.json.tmp", "templates"];
 

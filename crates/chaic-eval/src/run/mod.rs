@@ -11,6 +11,7 @@ mod granted;
 mod items;
 mod journal;
 mod options;
+mod shard;
 mod worker;
 
 pub use environment::environments;
@@ -18,7 +19,8 @@ pub use folder::{Access, RunFolder};
 pub use granted::RunGrants;
 pub use items::{Item, planned, tasks_of_files};
 pub use journal::{Journal, read_results};
-pub use options::{GROUND_TRUTH, RunOptions, RunRequest};
+pub use options::{GROUND_TRUTH, MAX_IMAGE_SIZE, MIN_IMAGE_SIZE, RunOptions, RunRequest};
+pub use shard::{Shard, merge};
 pub use worker::{Finished, Progress};
 
 use std::collections::BTreeSet;
@@ -143,13 +145,10 @@ impl Run {
         Ok(())
     }
 
-    /// Plays what is missing, and again what broke down, on `jobs` threads, and on some more what
-    /// [waits](Helpers::waits). `progress` hears of everything in the calling thread.
-    ///
-    /// Returns whether all has been played; otherwise `stop` was raised.
+    /// Plays all that is missing, see [`Run::play_shard`].
     ///
     /// # Errors
-    /// If a file can't be read or written. What was finished before is kept.
+    /// As [`Run::play_shard`].
     pub fn play(
         &mut self,
         jobs: usize,
@@ -157,10 +156,29 @@ impl Run {
         stop: &AtomicBool,
         progress: &mut dyn FnMut(&Progress),
     ) -> Result<bool> {
+        self.play_shard(Shard::WHOLE, jobs, helpers, stop, progress)
+    }
+
+    /// Plays what is missing in a shard, and again what broke down, on `jobs` threads, and on some more what
+    /// [waits](Helpers::waits). `progress` hears of everything in the calling thread.
+    ///
+    /// Returns whether all has been played; otherwise `stop` was raised.
+    ///
+    /// # Errors
+    /// If a file can't be read or written. What was finished before is kept.
+    pub fn play_shard(
+        &mut self,
+        shard: Shard,
+        jobs: usize,
+        helpers: &dyn Helpers,
+        stop: &AtomicBool,
+        progress: &mut dyn FnMut(&Progress),
+    ) -> Result<bool> {
         let is_done = |r: &&RunResult| r.summary().is_some();
         let done: BTreeSet<&RunKey> = self.results.iter().filter(is_done).map(|r| &r.key).collect();
+        let of_shard = self.items.iter().enumerate().filter(|(k, _)| shard.has(*k));
         let missing: Vec<Item> =
-            self.items.iter().filter(|i| !done.contains(&i.key)).cloned().collect();
+            of_shard.map(|(_, item)| item).filter(|i| !done.contains(&i.key)).cloned().collect();
         let (journal, results) = (&mut self.journal, &mut self.results);
         let crew = worker::Crew { folder: &self.folder, options: &self.options, helpers, stop };
         crew.play(&missing, jobs.max(1), progress, &mut |result| {

@@ -4,6 +4,7 @@ mod beginning;
 mod verifying;
 
 use std::fs;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use chaic_agents::PlannerRules;
@@ -143,6 +144,59 @@ fn sorted(results: &[RunResult]) -> Vec<RunResult> {
     let mut results = results.to_vec();
     results.sort_by(|a, b| a.key.cmp(&b.key));
     results
+}
+
+#[test]
+fn shards_make_the_run_that_one_machine_makes() {
+    let (dir, files) = (tempfile::tempdir().unwrap(), episode_files(&[TaskId::Obstacle], 2));
+    let (given, helpers) = (given(&files, &["none", "turner"]), TestHelpers::new());
+    let open = |name: &str, given: &RunRequest| {
+        Run::open(&dir.path().join(name), Access::Begin, given, &helpers).unwrap().0
+    };
+    let mut whole = open("whole", &given);
+    assert!(play(&mut whole, 1, &helpers));
+    let parts: Vec<PathBuf> = (1..=3)
+        .map(|number| {
+            let name = format!("part{number}");
+            let mut part = open(&name, &given);
+            let shard = Shard::new(number, 3).unwrap();
+            assert!(part.play_shard(shard, 1, &helpers, &helpers.stop, &mut |_| ()).unwrap());
+            assert!(part.extent().finished < whole.extent().total);
+            dir.path().join(name)
+        })
+        .collect();
+    let merged = merge(&dir.path().join("merged"), &parts).unwrap();
+    assert_eq!(sorted(merged.results()), sorted(whole.results()));
+    let read = |run: &Run, name: &str| fs::read(run.folder().join(name)).unwrap();
+    assert_eq!(read(&merged, "run.json"), read(&whole, "run.json"));
+    let lines = |run: &Run| {
+        let text = String::from_utf8(read(run, "results.jsonl")).unwrap();
+        text.lines().map(str::to_owned).collect::<BTreeSet<_>>()
+    };
+    assert_eq!(lines(&merged), lines(&whole));
+    let traces = |run: &Run| {
+        let files = run.folder().traces().unwrap();
+        files.iter().map(|path| fs::read(path).unwrap()).collect::<Vec<_>>()
+    };
+    assert_eq!(traces(&merged), traces(&whole));
+    assert!(merge(&dir.path().join("merged"), &parts).is_err(), "something lies there");
+
+    let mut other = open("other", &RunRequest { seeds: Some(1), ..given.clone() });
+    play(&mut other, 1, &helpers);
+    let mixed = [parts[0].clone(), dir.path().join("other")];
+    let refused = merge(&dir.path().join("mixed"), &mixed).unwrap_err().to_string();
+    assert!(refused.contains("different runs"), "{refused}");
+    assert!(!dir.path().join("mixed").exists());
+}
+
+#[test]
+fn shards_are_read_as_they_are_written() {
+    assert_eq!("2/4".parse::<Shard>().unwrap().to_string(), "2/4");
+    for wrong in ["0/4", "5/4", "2", "2/0", "-1/3", "a/b"] {
+        assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
+    }
+    let shards: Vec<Shard> = (1..=3).map(|k| Shard::new(k, 3).unwrap()).collect();
+    assert!((0..20).all(|k| shards.iter().filter(|shard| shard.has(k)).count() == 1));
 }
 
 #[test]

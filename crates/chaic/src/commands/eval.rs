@@ -8,7 +8,7 @@ use anyhow::{Context as _, Result, anyhow, bail};
 use chaic_env::minds::{Helpers, Seeing};
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::{Format, Report, write_files};
-use chaic_eval::run::{Access, Run, RunFolder, RunRequest};
+use chaic_eval::run::{Access, Run, RunFolder, RunRequest, Shard};
 use chaic_llm::Language;
 use chaic_llm::language::is_told_constraint;
 use chaic_subprocess::Commands;
@@ -76,7 +76,8 @@ pub fn run(arguments: &EvalArguments) -> Result<Ended> {
     if let Some(language) = &language {
         language.listen(Box::new(bars.voice()));
     }
-    let played = run.play(jobs, helpers, stop, &mut |progress| bars.show(progress));
+    let shard = arguments.shard.unwrap_or(Shard::WHOLE);
+    let played = run.play_shard(shard, jobs, helpers, stop, &mut |progress| bars.show(progress));
     bars.clear();
     let is_whole = played.map_err(|e| anyhow!("{e:#}\n{}", how_to_resume(&path, arguments)))?;
     if let Some(problem) = language.as_ref().and_then(Language::problem) {
@@ -88,6 +89,16 @@ pub fn run(arguments: &EvalArguments) -> Result<Ended> {
         complain(&format!("stopped after {done} of {}", counted(extent.total, "episode run")));
         complain(&how_to_resume(&path, arguments));
         return Ok(Ended::Interrupted);
+    }
+    let extent = run.extent();
+    if extent.finished < extent.total {
+        complain(&format!(
+            "shard {shard} is played: {} of {}; join it with the others by: chaic merge --out WHOLE {} ...",
+            extent.finished,
+            counted(extent.total, "episode run"),
+            quoted_path(&path),
+        ));
+        return Ok(if extent.errors > 0 { Ended::WithFindings } else { Ended::Well });
     }
     finish(&run, began)
 }
@@ -173,7 +184,8 @@ fn free_folder(name: &str) -> Result<PathBuf> {
 fn how_to_resume(path: &Path, arguments: &EvalArguments) -> String {
     let language = llm::to_resume(&arguments.language);
     let helpers = exec_to_resume(arguments);
-    format!("go on with: chaic eval --resume --out {}{helpers}{language}", quoted_path(path))
+    let shard = arguments.shard.map_or_else(String::new, |shard| format!(" --shard {shard}"));
+    format!("go on with: chaic eval --resume --out {}{shard}{helpers}{language}", quoted_path(path))
 }
 
 /// What an agent says when it breaks down is shown and noted by the run; the usual message would

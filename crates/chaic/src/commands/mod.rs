@@ -8,6 +8,7 @@ pub mod fidelity;
 pub mod helper;
 pub mod import;
 pub mod llm;
+pub mod merge;
 pub mod perception;
 pub mod render;
 pub mod replay;

@@ -264,7 +264,7 @@ class HelperEnv(gymnasium.Env[Any, Any]):
             "events": self._events,
             "action_mask": self._mask(),
             "tr": done / total if total else 0.0,
-            "episode": self._name,
+            "episode_id": self._name,
         }
 
     def render(self) -> Any:

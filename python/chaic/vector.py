@@ -188,7 +188,7 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
             "frame": self.batch.frames().astype(np.int64),
             "kind_mask": self._mask.astype(np.int8),
             "tr": tr,
-            "episode": np.array(self._names, dtype=object),
+            "episode_id": np.array(self._names, dtype=object),
         }
         return infos | {f"_{name}": everyone for name in infos}
 

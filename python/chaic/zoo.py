@@ -107,7 +107,7 @@ class _Pair:
             "frame": world.frame,
             "action_mask": spaces.primitive_mask(kinds, self.image_size),
             "tr": score["done"] / score["total"] if score["total"] else 0.0,
-            "episode": world.episode.id,
+            "episode_id": world.episode.id,
         }
 
 

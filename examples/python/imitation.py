@@ -1,0 +1,105 @@
+"""Imitation of the oracle: what it chooses to do is exported, and a network learns to choose as it does.
+
+    pip install '.[gym]' torch
+    python examples/python/imitation.py --episodes 4 --out runs/imitation
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import nn
+
+import chaic
+
+SIZE = 64
+
+
+def kind_of(action: Any) -> int:
+    """Which of ``chaic.ACTIONS`` it is."""
+    if isinstance(action, str):
+        return chaic.ACTIONS.index(action)
+    ((name, fields),) = action.items()
+    hand = fields.get("hand") if isinstance(fields, dict) else None
+    return chaic.ACTIONS.index(name if hand is None else f"{name}_{hand}")
+
+
+def export(name: str, path: Path) -> None:
+    """Lets the oracle play an episode; what it saw, small, and what it did."""
+    oracle = chaic.Mind("oracle")
+    world = chaic.World(
+        chaic.Episode(name), images=["rgb", "depth", "ids"], image_size=512, grants=oracle.grants
+    )
+    oracle.reset(world.briefing())
+    depth, own, kinds = [], [], []
+    while world.advance() == "waits":
+        seen = world.observe()
+        action = oracle.act(seen)
+        assert seen.depth is not None
+        step = 512 // SIZE
+        depth.append(seen.depth[step // 2 :: step, step // 2 :: step].astype(np.float16))
+        own.append(world.own()[0])
+        kinds.append(kind_of(action))
+        world.submit(action)
+    np.savez_compressed(path, depth=depth, own=own, kind=kinds)
+
+
+class Imitator(nn.Module):
+    """From depth and own state to a kind of action."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.eye = nn.Sequential(
+            nn.Conv2d(1, 16, 5, 2), nn.ReLU(), nn.Conv2d(16, 32, 3, 2), nn.ReLU(),
+            nn.Conv2d(32, 32, 3, 2), nn.ReLU(), nn.Flatten(), nn.LazyLinear(64), nn.ReLU(),
+        )
+        self.head = nn.Linear(64 + len(chaic.OWN), len(chaic.ACTIONS))
+
+    def forward(self, depth: torch.Tensor, own: torch.Tensor) -> torch.Tensor:
+        """A number for each kind."""
+        seen = self.eye(depth[:, None].clamp(0, 10) / 10)
+        return self.head(torch.cat([seen, own], 1))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--episodes", type=int, default=4)
+    parser.add_argument("--epochs", type=int, default=10)
+    parser.add_argument("--out", type=Path, default=Path("runs/imitation"))
+    arguments = parser.parse_args()
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    torch.manual_seed(0)
+    names = chaic.episode_ids("train", "no_constraint")[: arguments.episodes]
+    files = [arguments.out / f"{k}.npz" for k in range(len(names))]
+    for name, path in zip(names, files, strict=True):
+        if not path.exists():
+            export(name, path)
+    played = [np.load(path) for path in files]
+    depth, own, kind = (
+        torch.from_numpy(np.concatenate([p[part] for p in played])) for part in ("depth", "own", "kind")
+    )
+    print(f"{len(kind)} decisions of {len(names)} episodes")
+    model, n = Imitator(), len(kind)
+    held_out = torch.arange(n) >= n - len(played[-1]["kind"])
+    model(depth[:1].float(), own[:1])
+    optimizer = torch.optim.Adam(model.parameters(), 1e-3)
+    for epoch in range(arguments.epochs):
+        for part in torch.randperm(int((~held_out).sum())).split(64):
+            loss = nn.functional.cross_entropy(model(depth[part].float(), own[part]), kind[part])
+            optimizer.zero_grad()
+            loss.backward()
+            optimizer.step()
+        with torch.no_grad():
+            told = model(depth[held_out].float(), own[held_out]).argmax(1)
+            right = (told == kind[held_out]).float().mean()
+            usual = (kind[held_out] == kind[~held_out].mode().values).float().mean()
+        print(f"epoch {epoch + 1}: {right:.3f} of the last episode chosen as the oracle did ({usual:.3f} by the usual kind)")
+    torch.save(model.state_dict(), arguments.out / "imitator.pt")
+
+
+if __name__ == "__main__":
+    main()

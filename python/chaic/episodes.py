@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -67,3 +68,14 @@ class EpisodeSource:
         """Any episode, and a seed for its world."""
         name = self.ids[int(rng.integers(len(self.ids)))]
         return self.named(name), int(rng.integers(SEEDS))
+
+    def choose(
+        self, rng: np.random.Generator, options: Mapping[str, Any] | None
+    ) -> tuple[Episode, int]:
+        """The episode and seed that the options of a reset name, where they do; as ``draw`` otherwise."""
+        episode, seed = self.draw(rng)
+        if options is not None and "episode" in options:
+            episode, seed = self.named(options["episode"]), 0
+        if options is not None and "seed" in options:
+            seed = int(options["seed"])
+        return episode, seed

@@ -134,11 +134,7 @@ class HelperEnv(gymnasium.Env[Any, Any]):
     ) -> tuple[Obs, Info]:
         """Begins an episode: drawn from the split, or ``options["episode"]`` with ``options["seed"]``."""
         super().reset(seed=seed)
-        episode, world_seed = self.source.draw(self.np_random)
-        if options is not None and "episode" in options:
-            episode, world_seed = self.source.named(options["episode"]), 0
-        if options is not None and "seed" in options:
-            world_seed = int(options["seed"])
+        episode, world_seed = self.source.choose(self.np_random, options)
         if self.world is None:
             self.world = World(episode, world_seed, **self._options)
         else:

@@ -67,11 +67,7 @@ class _Pair:
     def begin(self, seed: int | None, options: dict[str, Any] | None) -> None:
         if seed is not None:
             self._rng = np.random.default_rng(seed)
-        episode, world_seed = self.source.draw(self._rng)
-        if options is not None and "episode" in options:
-            episode, world_seed = self.source.named(options["episode"]), 0
-        if options is not None and "seed" in options:
-            world_seed = int(options["seed"])
+        episode, world_seed = self.source.choose(self._rng, options)
         if self._world is None:
             self._world = World(episode, world_seed, **self._options)
         else:
@@ -111,13 +107,8 @@ class _Pair:
         }
 
 
-class PairEnv(AECEnv[str, Obs, Any]):
-    """Partner and helper, asked one after the other as their actions end.
-
-    Who has made ``max_cycles`` choices is truncated when it is asked again, and stands still from then on.
-    """
-
-    metadata = {"name": "chaic_v0", "render_modes": ["rgb_array"], "is_parallelizable": False}
+class _Interface:
+    """What both interfaces are made with, and have alike."""
 
     def __init__(
         self,
@@ -161,6 +152,24 @@ class PairEnv(AECEnv[str, Obs, Any]):
     def world(self) -> World:
         """The world."""
         return self._pair.world
+
+    def render(self) -> Any:
+        """What the helper sees, uint8 [512, 512, 3]."""
+        if self.render_mode != "rgb_array":
+            return None
+        return self.world.render(1, image_size=PICTURE_SIZE)["rgb"]
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+class PairEnv(_Interface, AECEnv[str, Obs, Any]):
+    """Partner and helper, asked one after the other as their actions end.
+
+    Who has made ``max_cycles`` choices is truncated when it is asked again, and stands still from then on.
+    """
+
+    metadata = {"name": "chaic_v0", "render_modes": ["rgb_array"], "is_parallelizable": False}
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
         """Begins an episode, as ``chaic.gym.HelperEnv`` does."""
@@ -236,65 +245,14 @@ class PairEnv(AECEnv[str, Obs, Any]):
         self._go_on()
         self._accumulate_rewards()
 
-    def render(self) -> Any:
-        """What the helper sees, uint8 [512, 512, 3]."""
-        if self.render_mode != "rgb_array":
-            return None
-        return self.world.render(1, image_size=PICTURE_SIZE)["rgb"]
 
-    def close(self) -> None:
-        """Nothing is open."""
-
-
-class PairParallelEnv(ParallelEnv[str, Obs, Any]):
+class PairParallelEnv(_Interface, ParallelEnv[str, Obs, Any]):
     """Partner and helper in step; whoever is busy waits until it is asked again.
 
     A step plays on until at least one of them is asked. ``max_cycles`` is a number of steps.
     """
 
     metadata = {"name": "chaic_parallel_v0", "render_modes": ["rgb_array"]}
-
-    def __init__(
-        self,
-        task: str | Sequence[str] | None = None,
-        *,
-        split: str | None = None,
-        observation: Sequence[str] = spaces.USUAL,
-        image_size: int = 128,
-        grants: Sequence[str] = (),
-        rules: str = "paper",
-        set: Sequence[str] = (),
-        appearance: str = "canonical",
-        reward: Mapping[str, float] | None = None,
-        max_cycles: int | None = None,
-        render_mode: str | None = None,
-    ) -> None:
-        self._pair = _Pair(
-            task, split, observation, image_size, grants, rules, set, appearance, reward
-        )
-        self.max_cycles = max_cycles
-        self.render_mode = render_mode
-        self.possible_agents = list(AGENTS)
-        self.agents: list[str] = []
-        self.observation_spaces: dict[str, gymnasium.Space[Any]] = {
-            a: self._pair.observation_space() for a in AGENTS
-        }
-        self.action_spaces: dict[str, gymnasium.Space[Any]] = {
-            a: spaces.primitive_space(image_size) for a in AGENTS
-        }
-
-    def observation_space(self, agent: str) -> gymnasium.Space[Any]:
-        """The space of what an agent perceives."""
-        return self.observation_spaces[agent]
-
-    def action_space(self, agent: str) -> gymnasium.Space[Any]:
-        """The space of what an agent can do."""
-        return self.action_spaces[agent]
-
-    @property
-    def world(self) -> World:
-        """The world."""
-        return self._pair.world
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -340,15 +298,6 @@ class PairParallelEnv(ParallelEnv[str, Obs, Any]):
         if over or cut:
             self.agents = []
         return dict(self._last), rewards, terminations, truncations, self._infos(asked)
-
-    def render(self) -> Any:
-        """What the helper sees, uint8 [512, 512, 3]."""
-        if self.render_mode != "rgb_array":
-            return None
-        return self.world.render(1, image_size=PICTURE_SIZE)["rgb"]
-
-    def close(self) -> None:
-        """Nothing is open."""
 
 
 def env(task: str | Sequence[str] | None = None, **options: Any) -> PairEnv:

@@ -1,5 +1,9 @@
 """The interfaces of Gymnasium."""
 
+import os
+import signal
+import time
+
 import gymnasium
 import numpy as np
 import pytest
@@ -152,3 +156,44 @@ def test_mistakes_with_vectors_are_told():
             vector.step(wrong)
     with pytest.raises(ValueError):
         make(0)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system doesn't fork")
+@pytest.mark.filterwarnings("ignore:This process .* is multi-threaded")
+def test_a_forked_process_goes_on():
+    vector = make(2)
+    vector.reset(seed=0)
+    wait = np.tile([chaic.ACTIONS.index("wait"), 0, 0], (2, 1))
+    vector.step(wait)
+    child = os.fork()
+    if child == 0:
+        vector.step(wait)
+        make(2).reset(seed=1)
+        try:
+            chaic.evaluate({"nobody": object}, quiet=True)
+        except RuntimeError as error:
+            os._exit(0 if "spawn" in str(error) else 1)
+        os._exit(2)
+    deadline = time.monotonic() + 60
+    while (ended := os.waitpid(child, os.WNOHANG)) == (0, 0):
+        if time.monotonic() > deadline:
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+            pytest.fail("the child hangs")
+        time.sleep(0.05)
+    assert ended[1] == 0
+
+
+def test_environments_in_processes_of_their_own():
+    for context in ("spawn", "fork"):
+        envs = gymnasium.make_vec(
+            IDS["obstacle"],
+            num_envs=2,
+            vectorization_mode="async",
+            vector_kwargs={"context": context},
+            image_size=32,
+        )
+        observation, _ = envs.reset(seed=0)
+        envs.step(np.zeros((2, 3), np.int64))
+        envs.close()
+        assert observation["rgb"].shape == (2, 32, 32, 3)

@@ -24,6 +24,7 @@ use crate::action::of_object;
 use crate::error::{failure, mistake};
 use crate::observation::{Briefing, Observation};
 use crate::options::{grants, senses, sight};
+use crate::threads::refuse_fork;
 
 /// Longest traceback that is kept, characters: what comes last tells most.
 const MAX_TRACEBACK: usize = 4000;
@@ -218,6 +219,7 @@ pub fn evaluate(
     go_on: &Bound<'_, PyAny>,
     options: &Bound<'_, PyDict>,
 ) -> PyResult<Option<String>> {
+    refuse_fork()?;
     let wrong = |error: pythonize::PythonizeError| PyTypeError::new_err(error.to_string());
     let keywords: Keywords = depythonize(options).map_err(wrong)?;
     let names: Vec<String> = helpers.iter().map(|(name, _)| name.clone()).collect();

@@ -14,6 +14,7 @@ use crate::episode::Episode;
 use crate::error::{failure, mistake, no_such, of_env, poisoned};
 use crate::observation::Briefing;
 use crate::options::Options;
+use crate::threads::beside;
 use crate::world::score;
 
 /// Worlds that are stepped together on all cores. The caller's seats are numbered through all worlds, in the
@@ -55,13 +56,13 @@ impl Batch {
             .map(|(episode, seed)| Ok((Arc::clone(&episode.get().0), seed, options.minds()?)))
             .collect();
         let work = work?;
-        let envs = py.detach(|| {
+        let envs = beside(py, || {
             let made: chaic_env::Result<Vec<Env>> = work
                 .into_par_iter()
                 .map(|(episode, seed, minds)| Env::new(options.config(&episode, seed), minds))
                 .collect();
             EnvBatch::new(made?)
-        });
+        })?;
         let envs = Mutex::new(envs.map_err(|error| of_env(&error))?);
         Ok(Batch { envs, options })
     }
@@ -96,14 +97,14 @@ impl Batch {
             .zip(episodes.iter().zip(&seeds))
             .map(|(world, (episode, seed))| (*world, options.config(episode, *seed)))
             .collect();
-        py.detach(|| envs.reset_many(configs)).map_err(|error| of_env(&error))
+        beside(py, || envs.reset_many(configs))?.map_err(|error| of_env(&error))
     }
 
     /// Plays all worlds on until a choice of the caller's is needed or they end: 0 for each that waits, 1 for each
     /// that has ended.
     fn advance<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u8>>> {
         let envs = self.envs()?;
-        let flows = py.detach(|| envs.advance(None));
+        let flows = beside(py, || envs.advance(None))?;
         let flows: Result<Vec<u8>, _> = flows
             .into_iter()
             .map(|flow| flow.map(|flow| if flow == Flow::Waits { WAITS } else { ENDED }))
@@ -129,7 +130,7 @@ impl Batch {
             ids: ids.as_mut().map(|a| a.as_slice_mut()).transpose().map_err(gaps)?,
         };
         let envs = self.envs()?;
-        py.detach(|| envs.observe(images)).map_err(|error| of_env(&error))
+        beside(py, || envs.observe(images))?.map_err(|error| of_env(&error))
     }
 
     /// Writes what those who looked know of themselves: numbers (`OWN`, float32 [slots, 12]), and which of

@@ -9,7 +9,8 @@
 //! **Invariants**
 //! - A user's mistake is a `ValueError`, `TypeError` or `IndexError` with one sentence; nothing panics.
 //! - An object that one thread works with tells another one so (`RuntimeError`), in place of waiting.
-//! - The module draws no random numbers and keeps no state of its own.
+//! - A forked process has threads of its own (`threads`), or is told to be spawned.
+//! - The module draws no random numbers and keeps no state of its own but those threads.
 
 mod action;
 mod agent;
@@ -19,6 +20,7 @@ mod error;
 mod mind;
 mod observation;
 mod options;
+mod threads;
 mod world;
 
 use std::ffi::OsString;
@@ -52,6 +54,7 @@ mod _chaic {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        super::threads::remember_process();
         module.add("__version__", chaic_env::CHAIC_VERSION)?;
         module.add("ACTIONS", super::action::ACTIONS)?;
         module.add("OWN", super::action::OWN)?;

@@ -19,6 +19,7 @@ use crate::episode::{Episode, encode_png};
 use crate::error::{failure, mistake, of_env, poisoned};
 use crate::observation::{Briefing, Observation, arrays, plain};
 use crate::options::{Options, senses};
+use crate::threads::beside;
 
 /// What an agent knows of itself as numbers, and which actions its hands don't rule out.
 type OwnArrays<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<bool>>);
@@ -94,7 +95,7 @@ impl World {
         let options = Options::new(options)?;
         let episode = Arc::clone(&episode.get().0);
         let minds = options.minds()?;
-        let env = py.detach(|| Env::new(options.config(&episode, seed), minds));
+        let env = beside(py, || Env::new(options.config(&episode, seed), minds))?;
         let env = Mutex::new(env.map_err(|error| of_env(&error))?);
         Ok(World { env, options, episode, events: Vec::new() })
     }
@@ -111,7 +112,7 @@ impl World {
         let World { env, options, .. } = self;
         let env = env.get_mut().map_err(poisoned)?;
         let config = options.config(&episode, seed);
-        py.detach(|| env.reset(config)).map_err(|error| of_env(&error))?;
+        beside(py, || env.reset(config))?.map_err(|error| of_env(&error))?;
         self.episode = episode;
         self.events.clear();
         Ok(())
@@ -147,14 +148,14 @@ impl World {
     fn advance(&mut self, py: Python<'_>, until: Option<u32>) -> PyResult<&'static str> {
         let World { env, events, .. } = self;
         let env = env.get_mut().map_err(poisoned)?;
-        let flow = py.detach(|| {
+        let flow = beside(py, || {
             env.run(&AtomicBool::new(false), until, &mut |record| -> Result<(), AgentError> {
                 if let Record::Event(told) = record {
                     events.push(told.event);
                 }
                 Ok(())
             })
-        });
+        })?;
         flow.map(name_of).map_err(failure)
     }
 
@@ -175,7 +176,7 @@ impl World {
     fn observe(&mut self, py: Python<'_>, agent: u8) -> PyResult<Observation> {
         let id = self.agent(agent)?;
         let env = self.env()?;
-        let seen = py.detach(|| env.observe(id).cloned());
+        let seen = beside(py, || env.observe(id).cloned())?;
         seen.map(Observation).ok_or_else(|| failure(not_waiting(agent)))
     }
 
@@ -189,7 +190,7 @@ impl World {
             Err(_) => action::of_object(action)?,
         };
         let env = self.env()?;
-        match py.detach(|| env.submit(id, action)) {
+        match beside(py, || env.submit(id, action))? {
             true => Ok(()),
             false => Err(failure(not_waiting(agent))),
         }
@@ -222,7 +223,7 @@ impl World {
         let id = self.agent(agent)?;
         let env = self.env()?;
         let horizon = env.world().setup().horizon.max(1) as f32;
-        let seen = py.detach(|| env.observe(id).map(|seen| (seen.frame, seen.own.clone())));
+        let seen = beside(py, || env.observe(id).map(|seen| (seen.frame, seen.own.clone())))?;
         let (frame, own) = seen.ok_or_else(|| failure(not_waiting(agent)))?;
         let numbers = action::own_numbers(&own, frame as f32 / horizon);
         Ok((PyArray1::from_slice(py, &numbers), PyArray1::from_slice(py, &action::mask(&own))))
@@ -295,7 +296,7 @@ impl World {
             None => View::of_agent(env.world(), id, image_size, channels),
         };
         let (scene, world) = (env.observer().scene(), env.world());
-        let mut drawn = py.detach(|| scene.render(world, std::slice::from_ref(&view)));
+        let mut drawn = beside(py, || scene.render(world, std::slice::from_ref(&view)))?;
         let drawn = drawn.pop().unwrap_or_default();
         let (rgb, depth, ids) = arrays(py, &drawn, &view.camera)?;
         let named = PyDict::new(py);
@@ -319,7 +320,7 @@ impl World {
         }
         let env = self.env()?;
         let (scene, world) = (env.observer().scene(), env.world());
-        let picture = py.detach(|| floor_plan::draw_scene_plan(scene, world, width));
+        let picture = beside(py, || floor_plan::draw_scene_plan(scene, world, width))?;
         let shape = [picture.height() as usize, picture.width() as usize, 3];
         PyArray1::from_vec(py, picture.into_raw()).reshape(shape)
     }

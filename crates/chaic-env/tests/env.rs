@@ -76,9 +76,11 @@ fn a_mind_that_the_caller_asks_does_as_one_that_sits_inside() {
         // What it wants to perceive is known once it is briefed.
         let probe = Env::new(config(&episode), Some(rhp())).unwrap();
         mind.reset(&probe.briefing(AgentId::HELPER));
-        let seat = Seat::of_caller(grants, mind.senses());
+        let config = config(&episode);
+        let image_size = config.image_size.unwrap();
+        let seat = Seat::of_caller(grants, Senses { image_size, ..mind.senses() });
         let minds = Minds { helper: Some(seat), partner: None };
-        let mut env = Env::new(config(&episode), minds).unwrap();
+        let mut env = Env::new(config, minds).unwrap();
         let mut records = Vec::new();
         while run(&mut env, UNTIL, &mut records) == Flow::Waits {
             assert_eq!(env.waiting().collect::<Vec<_>>(), [AgentId::HELPER]);

@@ -143,7 +143,11 @@ fn limited(at: &Path, limits: &str, arguments: &[&str]) -> std::process::Output 
     let mut shell = Command::new("sh");
     shell.current_dir(at).args(["-c", &script]).arg(cargo_bin!("chaic")).args(arguments);
     let out = shell.stdin(Stdio::null()).output().expect("there is a shell");
-    assert!(!text(&out.stderr).contains("panicked"), "{arguments:?}: {}", text(&out.stderr));
+    // The standard library panics in a new thread, before its work begins, where its stack just fits and the one
+    // for its signals doesn't.
+    let said = text(&out.stderr);
+    let is_ours = said.contains("panicked") && !said.contains("alternative stack");
+    assert!(!is_ours, "{arguments:?}: {said}");
     out
 }
 

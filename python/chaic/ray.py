@@ -6,6 +6,7 @@ shared. A shard whose worker is lost is played again by another one.
 
 from __future__ import annotations
 
+import importlib
 import io
 import os
 import shutil
@@ -61,8 +62,7 @@ def evaluate(
     its worker is lost or it raises. The folder ``out`` equals the one of a run on one machine but for the order of the
     lines in results.jsonl.
     """
-    import ray
-
+    ray: Any = importlib.import_module("ray")
     if not ray.is_initialized():
         ray.init()
     if shards is None:

@@ -94,6 +94,16 @@ def matrix(rotation):
     )
 
 
+def write_obj(mesh, path):
+    """Writes a mesh as Wavefront OBJ; the path as text, as PyBullet wants it."""
+    lines = ["v %.6f %.6f %.6f" % tuple(p) for p in mesh.positions]
+    lines += ["vn %.4f %.4f %.4f" % tuple(n) for n in mesh.normals]
+    corner = "{0}//{0}".format
+    lines += ["f " + " ".join(corner(k + 1) for k in t) for t in mesh.triangles]
+    path.write_text("\n".join(lines) + "\n")
+    return str(path)
+
+
 def _camera(c):
     direction = {k: np.array(c[k]) for k in ("eye", "right", "up", "forward")}
     return Camera(

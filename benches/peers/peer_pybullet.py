@@ -17,7 +17,7 @@ def main():
     scene = glb.load(args.folder)
     pybullet.connect(pybullet.DIRECT)
     with tempfile.TemporaryDirectory() as folder:
-        files = [write_obj(mesh, Path(folder) / f"{k}.obj") for k, mesh in enumerate(scene.meshes)]
+        files = [glb.write_obj(mesh, Path(folder) / f"{k}.obj") for k, mesh in enumerate(scene.meshes)]
         for part in scene.parts:
             shape = pybullet.createVisualShape(
                 pybullet.GEOM_MESH, fileName=files[part.mesh], rgbaColor=[*part.srgb, 1.0]
@@ -54,15 +54,6 @@ def matrices_of(camera):
         np.degrees(camera.fov_rad), camera.width / camera.height, camera.near_m, camera.far_m
     )
     return view, projection
-
-
-def write_obj(mesh, path):
-    lines = ["v %.6f %.6f %.6f" % tuple(p) for p in mesh.positions]
-    lines += ["vn %.4f %.4f %.4f" % tuple(n) for n in mesh.normals]
-    corner = "{0}//{0}".format
-    lines += ["f " + " ".join(corner(k + 1) for k in t) for t in mesh.triangles]
-    path.write_text("\n".join(lines) + "\n")
-    return str(path)
 
 
 main()

@@ -29,6 +29,7 @@ from chaic._chaic import (
     tasks,
 )
 from chaic.episodes import EpisodeSource
+from chaic.pictures import camera, render, show
 from chaic.registry import register as _register
 from chaic.runs import Helper, Run, evaluate, merge
 
@@ -51,11 +52,14 @@ __all__ = [
     "Snapshot",
     "World",
     "__version__",
+    "camera",
     "classes",
     "encode_png",
     "episode_ids",
     "evaluate",
     "merge",
+    "render",
+    "show",
     "tasks",
 ]
 

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from chaic import _chaic
 from chaic._chaic import Briefing, Observation
 from chaic.episodes import tasks_named
+from chaic.watchdog import Watchdog, Watched
 
 
 class Helper(Protocol):
@@ -65,6 +67,7 @@ def evaluate(
     resume: bool = False,
     shard: str | None = None,
     quiet: bool = False,
+    limit_s: float = 600.0,
     **options: Any,
 ) -> Run:
     """Plays a benchmark with a helper of yours into the folder ``out``, and gives the run.
@@ -77,15 +80,18 @@ def evaluate(
     and ``chaic replay`` read it.
 
     A helper that raises an exception gets zero for that episode, with the traceback in results.jsonl, and the run goes
-    on. ``KeyboardInterrupt`` stops it; ``resume=True`` goes on with it.
+    on. So does one that thinks for longer than ``limit_s`` seconds about one action: ``TimeoutError`` is raised in it. That
+    stops Python code but no call into C; helpers who may hang there are better run as processes of their own
+    (docs/subprocess-helpers.md). ``KeyboardInterrupt`` stops it; ``resume=True`` goes on with it.
     """
     makers = _makers(helper)
     wants = {_wants(maker) for maker in makers.values()} or {((), ("rgb", "depth"), 512)}
     if len(wants) > 1:
         raise ValueError("helpers of one run are granted and see alike; give each a run of its own")
     ((grants, images, image_size),) = wants
+    watchdog = Watchdog(limit_s)
     helpers: list[tuple[str, Maker | None]] = [(name, None) for name in beside]
-    helpers += makers.items()
+    helpers += [(name, partial(Watched, maker, watchdog)) for name, maker in makers.items()]
     if not helpers:
         raise ValueError("name a helper, or some beside")
     options |= {"split": None if "episodes" in options else split, "first": first, "seeds": seeds}
@@ -103,18 +109,19 @@ def evaluate(
         return True
 
     path = Path(out)
-    report = _chaic.evaluate(
-        helpers,
-        path,
-        granted=list(grants),
-        images=list(images),
-        image_size=image_size,
-        jobs=jobs or os.cpu_count() or 1,
-        resume=resume,
-        shard=shard,
-        go_on=told,
-        options=options,
-    )
+    with watchdog:
+        report = _chaic.evaluate(
+            helpers,
+            path,
+            granted=list(grants),
+            images=list(images),
+            image_size=image_size,
+            jobs=jobs or os.cpu_count() or 1,
+            resume=resume,
+            shard=shard,
+            go_on=told,
+            options=options,
+        )
     if report is None:
         raise KeyboardInterrupt("the run was stopped; resume=True goes on with it")
     if not quiet:

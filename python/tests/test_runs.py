@@ -1,6 +1,7 @@
 """Benchmarks with helpers written in Python."""
 
 import json
+import time
 
 import numpy as np
 import pytest
@@ -86,6 +87,28 @@ def test_a_helper_that_raises_gets_zero_and_the_run_goes_on(tmp_path):
     assert "no such weights" in results["unborn"]["message"]
     assert "done" in results["fine"]
     assert chaic.Run(tmp_path / "run").records()["broke_down"].sum() == 3
+
+
+def test_a_helper_that_hangs_gets_zero_and_the_run_goes_on(tmp_path):
+    class Lost(Turner):
+        def act(self, observation):
+            while True:
+                pass
+
+    class Undecided(Turner):
+        def reset(self, briefing):
+            while True:
+                time.sleep(0.01)
+
+    makers = {"lost": Lost, "undecided": Undecided, "fine": Turner}
+    run = chaic.evaluate(makers, out=tmp_path / "run", limit_s=1.0, **ONE)
+    results = {r["helper"]: r for r in run.results()}
+    assert "act took longer than 1 s" in results["lost"]["message"]
+    assert "reset took longer than 1 s" in results["undecided"]["message"]
+    assert "test_runs.py" in results["lost"]["message"], "it is told where"
+    assert "done" in results["fine"]
+    with pytest.raises(ValueError):
+        chaic.evaluate(Turner, out=tmp_path / "other", limit_s=0.0, **ONE)
 
 
 def test_a_run_that_was_interrupted_goes_on(tmp_path):

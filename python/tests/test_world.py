@@ -3,6 +3,7 @@
 import json
 import pickle
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -84,6 +85,39 @@ def test_onlookers_see_from_any_camera(episode):
     assert world.render(camera=camera)["rgb"].shape == (30, 40, 3)
     assert world.plan(200).shape[1] == 200
     assert world._repr_png_()[:4] == b"\x89PNG"
+
+
+@pytest.mark.parametrize("yaw", np.linspace(0.1, 6.2, 9))
+@pytest.mark.parametrize("up_m", [-1.0, 0.0, 1.5])
+def test_a_camera_looks_at_the_point_it_is_told_to(yaw, up_m):
+    eye, away = np.array([1.0, 1.4, -2.0]), np.array([np.sin(yaw), up_m, np.cos(yaw)])
+    x, y, z, w = chaic.camera(eye, eye + away)["world_from_camera"]
+    # The camera's axis is -z, and its image stands upright.
+    axis = [-2 * (x * z + y * w), -2 * (y * z - x * w), -(1 - 2 * (x * x + y * y))]
+    assert np.allclose(axis, away / np.linalg.norm(away))
+    assert abs(2 * (x * y + z * w)) < 1e-9 and 1 - 2 * (x * x + z * z) > 0
+
+
+def test_episodes_are_drawn_from_cameras_of_ones_own(episode):
+    world = chaic.World(episode, grants=["ids"], images=["ids"])
+    world.advance()
+    there = np.array(world.observe(1).own["pose"]["position"])
+    # From above the helper's head, a little aside.
+    camera = chaic.camera(there + [0.3, 1.0, 0.0], there, width=65, height=65)
+    ids = chaic.render(episode, camera=camera, images=["ids"])["ids"]
+    assert ids[32, 32] in np.unique(world.render(camera=camera, images=["ids"])["ids"])
+    assert chaic.render(world, camera=camera)["rgb"].shape == (65, 65, 3)
+    with pytest.raises(ValueError, match="none above the other"):
+        chaic.camera([0, 2, 0], [0, 0, 0])
+
+
+def test_places_are_shown_in_the_browser(episode, monkeypatch):
+    opened = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    episode.show()
+    chaic.World(episode).show()
+    assert all("data:image/png" in Path(url.removeprefix("file://")).read_text() for url in opened)
+    assert len(opened) == 2
 
 
 def test_episodes_are_read_changed_and_checked(episode):

@@ -20,8 +20,10 @@ pub struct EnvBench {
     pub tasks: Vec<TaskId>,
     /// How many environments are stepped together.
     pub envs: usize,
-    /// Side of everybody's images, pixels.
+    /// Side of the helpers' images, pixels.
     pub size: u32,
+    /// Side of the partners' images, pixels.
+    pub minds_size: u32,
     /// What the helpers look at.
     pub channels: Channels,
     /// Threads.
@@ -35,8 +37,10 @@ pub struct EnvBench {
 pub struct EnvSpeed {
     /// How many are stepped together.
     pub envs: usize,
-    /// Side of everybody's images, pixels.
+    /// Side of the helpers' images, pixels.
     pub size: u32,
+    /// Side of the partners' images, pixels.
+    pub minds_size: u32,
     /// What the helpers look at, in words.
     pub channels: String,
     /// Threads.
@@ -126,6 +130,7 @@ impl EnvBench {
         Ok(EnvSpeed {
             envs: self.envs,
             size: self.size,
+            minds_size: self.minds_size,
             channels: super::render::name_of(self.channels),
             threads: self.threads,
             steps,
@@ -159,7 +164,7 @@ impl EnvBench {
             rules: RuleSet::PAPER,
             helper: "bench",
             partner: None,
-            image_size: Some(self.size),
+            image_size: Some(self.minds_size),
             appearance: Appearance::Canonical,
         }
     }
@@ -194,6 +199,7 @@ mod tests {
             tasks: TaskId::paper().collect(),
             envs: 8,
             size: 32,
+            minds_size: 32,
             channels: Channels::ALL,
             threads: 2,
             seconds: 0.5,

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 pub use env::{EnvBench, EnvSpeed};
 pub use machine::Machine;
-pub use render::{RenderBench, RenderSpeed, channels_named};
+pub use render::{RenderBench, RenderSpeed, channels_named, channels_or_none};
 pub use scene::{BenchScene, N_VIEWS};
 pub use world::{WorldSpeed, measure_world};
 

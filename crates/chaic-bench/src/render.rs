@@ -113,7 +113,21 @@ impl RenderBench<'_> {
 pub(super) fn name_of(channels: Channels) -> String {
     let all = [("rgb", channels.rgb), ("depth", channels.depth), ("ids", channels.ids)];
     let names: Vec<&str> = all.into_iter().filter(|(_, on)| *on).map(|(name, _)| name).collect();
-    names.join("+")
+    if names.is_empty() { NONE.into() } else { names.join("+") }
+}
+
+/// No channel.
+const NONE: &str = "none";
+
+/// As [`channels_named`], or no channel at all: `none`.
+///
+/// # Errors
+/// Says which names there are.
+pub fn channels_or_none(text: &str) -> std::result::Result<Channels, String> {
+    match text {
+        NONE => Ok(Channels { rgb: false, depth: false, ids: false }),
+        _ => channels_named(text),
+    }
 }
 
 /// The channels of a name like `rgb+depth+ids`.

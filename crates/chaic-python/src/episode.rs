@@ -85,6 +85,12 @@ impl Episode {
         Episode::from_json(py, &text)
     }
 
+    /// Shows the place from above: in a notebook in its cell, elsewhere in the browser.
+    fn show(slf: Bound<'_, Self>) -> PyResult<()> {
+        slf.py().import("chaic.pictures")?.call_method1("show", (slf,))?;
+        Ok(())
+    }
+
     /// The picture that notebooks show.
     fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         encode_png(py, self.plan(py, 640)?.readonly())

@@ -325,6 +325,12 @@ impl World {
         PyArray1::from_vec(py, picture.into_raw()).reshape(shape)
     }
 
+    /// Shows the world from above: in a notebook in its cell, elsewhere in the browser.
+    fn show(slf: Bound<'_, Self>) -> PyResult<()> {
+        slf.py().import("chaic.pictures")?.call_method1("show", (slf,))?;
+        Ok(())
+    }
+
     /// The picture that notebooks show: all from above.
     fn _repr_png_<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         encode_png(py, self.plan(py, 640)?.readonly())

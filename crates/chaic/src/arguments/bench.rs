@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use chaic_bench::channels_named;
+use chaic_bench::{channels_named, channels_or_none};
 use chaic_episodes::house;
 use chaic_render::Channels;
 use chaic_render::geometry::FINEST;
@@ -116,11 +116,14 @@ pub struct EnvBenchArguments {
     /// How many environments are stepped together.
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..=8192))]
     pub envs: u16,
-    /// Side of everybody's images, pixels.
+    /// Side of the helpers' images, pixels.
     #[arg(long, value_name = "PIXELS", default_value_t = 128, value_parser = clap::value_parser!(u32).range(16..=1024))]
     pub size: u32,
-    /// What the helpers look at: rgb, depth and ids, joined by +.
-    #[arg(long, value_name = "NAMES", default_value = "rgb+depth", value_parser = channels_named)]
+    /// Side of the partners' images, pixels.
+    #[arg(long, value_name = "PIXELS", default_value_t = 128, value_parser = clap::value_parser!(u32).range(16..=1024))]
+    pub minds_size: u32,
+    /// What the helpers look at: rgb, depth and ids, joined by +; or none, their own state alone.
+    #[arg(long, value_name = "NAMES", default_value = "rgb+depth", value_parser = channels_or_none)]
     pub channels: Channels,
     /// Threads.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]

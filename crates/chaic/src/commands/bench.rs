@@ -120,6 +120,7 @@ fn env(arguments: &EnvBenchArguments) -> Result<Ended> {
         tasks: arguments.task.0.clone(),
         envs: usize::from(arguments.envs),
         size: arguments.size,
+        minds_size: arguments.minds_size,
         channels: arguments.channels,
         threads: usize::from(arguments.threads),
         seconds: arguments.measuring.seconds,
@@ -129,12 +130,12 @@ fn env(arguments: &EnvBenchArguments) -> Result<Ended> {
 }
 
 fn env_text(speed: &EnvSpeed) -> String {
-    let EnvSpeed { envs, size, channels, threads, episodes, .. } = speed;
+    let EnvSpeed { envs, size, minds_size, channels, threads, episodes, .. } = speed;
     let (steps, frames) = (speed.steps_per_second, speed.frames_per_second);
     let threads = crate::output::counted(*threads, "thread");
     format!(
-        "{envs} environments, {channels}, {size} x {size}, {threads}: {steps:.0} decisions of the \
-         helpers a second, {frames:.0} frames a second; {episodes} episodes ended\n{}",
+        "{envs} environments, {channels}, {size} x {size}, partners {minds_size} x {minds_size}, \
+         {threads}: {steps:.0} decisions of the helpers a second, {frames:.0} frames a second; {episodes} episodes ended\n{}",
         machine_text(&speed.machine)
     )
 }

@@ -1,0 +1,89 @@
+"""Pictures of places, from cameras that stand anywhere."""
+
+from __future__ import annotations
+
+import base64
+import sys
+import tempfile
+import webbrowser
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaic._chaic import Episode, World
+
+
+def camera(
+    eye: Sequence[float],
+    look_at: Sequence[float],
+    *,
+    vertical_fov_deg: float = 60.0,
+    width: int = 512,
+    height: int = 512,
+) -> dict[str, Any]:
+    """A pinhole camera at ``eye`` that looks at a point, as ``World.render`` wants it; both in the world, metres, y up.
+
+    Raises ``ValueError`` if the direction to look in cannot be told: both are the same, or one above the other.
+    """
+    at = np.asarray(eye, np.float64)
+    forward = np.asarray(look_at, np.float64) - at
+    right = np.cross(forward, [0.0, 1.0, 0.0])
+    if at.shape != (3,) or not np.linalg.norm(right) > 1e-6:
+        raise ValueError(f"a camera at {eye} cannot look at {look_at}: give two points, none above the other")
+    forward, right = forward / np.linalg.norm(forward), right / np.linalg.norm(right)
+    return {
+        "eye_in_world": at.tolist(),
+        "world_from_camera": _quaternion(np.column_stack([right, np.cross(right, forward), -forward])),
+        "vertical_fov_rad": float(np.radians(vertical_fov_deg)),
+        "width": width,
+        "height": height,
+    }
+
+
+def _quaternion(r: NDArray[np.float64]) -> list[float]:
+    """The quaternion x, y, z, w of a rotation matrix: its largest component first, for the sake of accuracy."""
+    squares = np.array([1 + 2 * r[k, k] - np.trace(r) for k in range(3)] + [1 + np.trace(r)])
+    k = int(np.argmax(squares))
+    q = np.empty(4)
+    q[k] = np.sqrt(squares[k])
+    for i in range(3):
+        j, m = (i + 1) % 3, (i + 2) % 3
+        difference, total = r[m, j] - r[j, m], r[m, j] + r[j, m]
+        if k == 3:
+            q[i] = difference / q[k]
+        elif k == i:
+            q[3] = difference / q[k]
+        elif k == j:
+            q[m] = total / q[k]
+        else:
+            q[j] = total / q[k]
+    return (0.5 * q).tolist()
+
+
+def render(
+    of: Episode | World,
+    *,
+    agent: int | None = None,
+    camera: Mapping[str, Any] | None = None,
+    image_size: int = 512,
+    images: Sequence[str] = ("rgb",),
+) -> dict[str, NDArray[Any]]:
+    """What an agent (0 the partner, 1 the helper) or a ``camera`` sees of a world, or of an episode at its beginning."""
+    world = of if isinstance(of, World) else World(of)
+    return world.render(agent=agent, camera=camera, image_size=image_size, images=images)
+
+
+def show(of: Episode | World) -> None:
+    """Shows a place from above: in a notebook in its cell, elsewhere in the browser."""
+    png = of._repr_png_()
+    if "ipykernel" in sys.modules:
+        from IPython.display import Image, display
+
+        display(Image(png))
+        return
+    page = Path(tempfile.mkdtemp(prefix="chaic-")) / "place.html"
+    page.write_text(f'<img src="data:image/png;base64,{base64.b64encode(png).decode()}">')
+    webbrowser.open(page.as_uri())

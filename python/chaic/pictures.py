@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import importlib
 import sys
 import tempfile
 import webbrowser
@@ -60,7 +61,7 @@ def _quaternion(r: NDArray[np.float64]) -> list[float]:
             q[m] = total / q[k]
         else:
             q[j] = total / q[k]
-    return (0.5 * q).tolist()
+    return [0.5 * float(component) for component in q]
 
 
 def render(
@@ -80,9 +81,8 @@ def show(of: Episode | World) -> None:
     """Shows a place from above: in a notebook in its cell, elsewhere in the browser."""
     png = of._repr_png_()
     if "ipykernel" in sys.modules:
-        from IPython.display import Image, display
-
-        display(Image(png))
+        notebook: Any = importlib.import_module("IPython.display")
+        notebook.display(notebook.Image(png))
         return
     page = Path(tempfile.mkdtemp(prefix="chaic-")) / "place.html"
     page.write_text(f'<img src="data:image/png;base64,{base64.b64encode(png).decode()}">')

@@ -114,6 +114,27 @@ impl Helpers for Seeing {
     }
 }
 
+/// Refuses what is no name for another helper; `example` is how one is named, like `mine=exec:COMMAND`.
+///
+/// # Errors
+/// Says what is wrong, in a sentence.
+pub fn check_new_name(
+    name: &str,
+    taken: &[String],
+    example: &str,
+) -> std::result::Result<(), String> {
+    let is_name = |c: char| c.is_ascii_alphanumeric() || "_-".contains(c);
+    if name.is_empty() || name.len() > 40 || !name.chars().all(is_name) {
+        return Err(format!("`{name}` is no name for a helper; use letters, digits, _ and -"));
+    }
+    if name == NONE || taken.iter().any(|t| t == name) {
+        return Err(format!(
+            "there is a helper `{name}` already; name this one, for example {example}"
+        ));
+    }
+    Ok(())
+}
+
 /// The helper of this name; `None` for [`NONE`].
 ///
 /// # Errors

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use chaic_agents::PlannerRules;
-use chaic_env::minds::{Helper, Helpers};
+use chaic_env::minds::{Helper, Helpers, check_new_name};
 use chaic_env::{EnvError, RunKey};
 use chaic_protocol::observation::Grants;
 use serde::{Deserialize, Serialize};
@@ -99,21 +99,8 @@ impl<'a> Commands<'a> {
         stop: &'static AtomicBool,
     ) -> chaic_env::Result<Commands<'a>> {
         let mut taken = others.names();
-        taken.push(chaic_env::minds::NONE.to_owned());
         for Command { name, .. } in &commands {
-            let is_name = |c: char| c.is_ascii_alphanumeric() || "_-".contains(c);
-            if name.is_empty() || name.len() > 40 || !name.chars().all(is_name) {
-                let text =
-                    format!("`{name}` is no name for a helper; use letters, digits, _ and -");
-                return Err(Refusal(text).into());
-            }
-            if taken.contains(name) {
-                let text = format!(
-                    "there is a helper `{name}` already; name this one, for example \
-                     mine=exec:COMMAND"
-                );
-                return Err(Refusal(text).into());
-            }
+            check_new_name(name, &taken, "mine=exec:COMMAND").map_err(Refusal)?;
             taken.push(name.clone());
         }
         let commands = commands.into_iter().map(Arc::new).collect();

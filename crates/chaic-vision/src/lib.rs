@@ -3,8 +3,7 @@
 //!
 //! **What it is**: [`labels`] says what a pixel can be of, [`features`] what the network reads,
 //! [`views`] draws random views of generated episodes with labels, [`detector`] is the network, [`loss`]
-//! what it learns by, [`train`] the loop, [`learner`] the numbers that any loop changes, [`training_run`]
-//! a loop's folder; [`instances`] makes things of what the network says, [`calibration`] tells how sure
+//! what it learns by, [`train`] the loop; [`instances`] makes things of what the network says, [`calibration`] tells how sure
 //! each is, [`trained`] is all of it as one file, and [`average_precision`] tells how good they are and
 //! [`failures`] what goes wrong; [`coco`] writes views as data sets. [`tracker`] tells which thing is which over time, and [`perception`]
 //! makes all of it the eyes of a mind; [`noisy`] stands in for it. [`behavior`] tells what people do.
@@ -36,9 +35,7 @@ pub mod coco;
 pub mod evaluate;
 pub mod failures;
 
-pub mod learner;
 pub mod train;
-pub mod training_run;
 
 pub mod noisy;
 pub mod perception;

@@ -17,10 +17,10 @@ use crate::labels::{BACKGROUND, class_of, label_of, n_labels};
 use crate::loss::{LossRules, Targets, loss};
 use crate::train::{CropRules, Trainer, TrainingRules};
 use crate::trained::TrainedDetector;
-use crate::training_run::{
+use crate::views::{LabelledView, Part, ViewRules, Views};
+use chaic_training::{
     CHECKPOINT, CONFIG, Of, Record, Training as _, TrainingError, TrainingRun, read_rules,
 };
-use crate::views::{LabelledView, Part, ViewRules, Views};
 
 const EYE_M: f32 = 1.5;
 

@@ -5,16 +5,15 @@ use std::path::Path;
 use chaic_nn::weights::WeightsError;
 use chaic_nn::{AdamRules, Network, Pass, Shape, Tensor};
 use chaic_protocol::rng::Stream;
+use chaic_training::{Figures, Learner, Training, TrainingError, figures, rate_at};
 use serde::{Deserialize, Serialize};
 
 use crate::detector::{Blocks, Detector};
 use crate::evaluate::{calibrate, evaluate};
 use crate::features::{Crop, N_FEATURES, features};
 use crate::labels::BACKGROUND;
-use crate::learner::{Learner, rate_at};
 use crate::loss::{Loss, LossRules, Targets, loss};
 use crate::trained::TrainedDetector;
-use crate::training_run::{Figures, Training, TrainingError, figures};
 use crate::views::{LabelledView, Part, ViewRules, Views};
 
 /// Which parts of views are learned from.
@@ -242,8 +241,12 @@ impl Training for Trainer {
         self.rules.steps
     }
 
-    fn learner(&self) -> &Learner {
-        &self.learner
+    fn taken(&self) -> u64 {
+        self.learner.adam.steps
+    }
+
+    fn checkpoint(&self) -> Vec<u8> {
+        self.learner.checkpoint()
     }
 
     fn begin_with(&mut self, weights: &[u8]) -> Result<(), WeightsError> {

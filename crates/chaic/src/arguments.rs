@@ -6,7 +6,7 @@ mod fidelity;
 mod perception;
 
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use chaic_env::Appearance;
 use chaic_env::rules::RuleSetName;
@@ -70,7 +70,7 @@ pub enum Command {
     /// Write what networks learn from into files; docs/perception.md.
     #[command(subcommand)]
     Collect(CollectCommand),
-    /// Train networks; docs/perception.md.
+    /// Train networks; docs/perception.md, docs/learning.md.
     #[command(subcommand)]
     Train(TrainCommand),
     /// Tell how good learned perception is on episodes that nothing was learned from.
@@ -132,7 +132,8 @@ pub struct EvalArguments {
     #[arg(long, value_name = "NAMES", value_parser = tasks)]
     pub task: Option<Tasks>,
     /// Helpers, separated by commas: none, random, rhp, oracle, follow; llm, llm-told, vlm, vlm-told. Or
-    /// one in another process, exec:COMMAND or NAME=exec:COMMAND. May be given often.
+    /// one in another process, exec:COMMAND or NAME=exec:COMMAND, or a policy of `chaic train ppo`,
+    /// NAME=policy:FILE. May be given often.
     #[arg(long, value_name = "NAMES", value_parser = exec::helper)]
     pub helper: Option<Vec<HelperArgument>>,
     /// Episodes: test, train, standard, gen:A..B or gen-standard:A..B.
@@ -245,10 +246,18 @@ impl EvalArguments {
     /// The helpers in other processes.
     pub fn commands(&self) -> Vec<chaic_subprocess::Command> {
         let command = |argument: &HelperArgument| match argument {
-            HelperArgument::Names(_) => None,
+            HelperArgument::Names(_) | HelperArgument::Policy { .. } => None,
             HelperArgument::Exec { name, line } => Some(self.exec.command(name, line)),
         };
         self.helper.iter().flatten().filter_map(command).collect()
+    }
+
+    /// The policies: names and files of weights.
+    pub fn policies(&self) -> impl Iterator<Item = (&str, &Path)> {
+        self.helper.iter().flatten().filter_map(|argument| match argument {
+            HelperArgument::Policy { name, file } => Some((name.as_str(), file.as_path())),
+            _ => None,
+        })
     }
 }
 

@@ -5,6 +5,7 @@ use std::path::Path;
 use chaic_nn::weights::WeightsError;
 use chaic_nn::{AdamRules, Pass, Tensor};
 use chaic_protocol::rng::Stream;
+use chaic_training::{Figures, Learner, Training, TrainingError, figures, rate_at};
 use serde::{Deserialize, Serialize};
 
 use chaic_agents::sight::TrueSight;
@@ -15,9 +16,7 @@ use super::collect::{CollectRules, Collector, collect};
 use super::network::{BehaviorNetwork, Outputs, TrainedBehavior, softmax};
 use super::report::{calibrate, outputs_of, report};
 use super::store::{ClipFolder, StoreError};
-use crate::learner::{Learner, rate_at};
 use crate::loss::ln;
-use crate::training_run::{Figures, Training, TrainingError, figures};
 use crate::views::Part;
 
 /// Threads that play episodes and look at clips; what comes of it doesn't depend on them.
@@ -181,8 +180,13 @@ impl Training for BehaviorTraining {
             })?;
             Ok::<_, StoreError>(is_whole.then_some(clips))
         };
-        let Some(validation) = clips(Part::Validation, go_on)? else { return Ok(None) };
-        let Some(training) = clips(Part::Training, go_on)? else { return Ok(None) };
+        let Some(validation) = clips(Part::Validation, go_on).map_err(TrainingError::of_data)?
+        else {
+            return Ok(None);
+        };
+        let Some(training) = clips(Part::Training, go_on).map_err(TrainingError::of_data)? else {
+            return Ok(None);
+        };
         let trainer = BehaviorTrainer::new(*rules, training);
         Ok(Some(BehaviorTraining { trainer, validation }))
     }
@@ -202,8 +206,12 @@ impl Training for BehaviorTraining {
         self.trainer.rules.steps
     }
 
-    fn learner(&self) -> &Learner {
-        &self.trainer.learner
+    fn taken(&self) -> u64 {
+        self.trainer.learner.adam.steps
+    }
+
+    fn checkpoint(&self) -> Vec<u8> {
+        self.trainer.learner.checkpoint()
     }
 
     fn begin_with(&mut self, weights: &[u8]) -> Result<(), WeightsError> {

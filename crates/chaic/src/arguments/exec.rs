@@ -1,5 +1,6 @@
 //! Helpers in other processes: what stands behind `--helper`, and `chaic helper`.
 
+use std::path::PathBuf;
 use std::time::Duration;
 
 use chaic_env::rules::RuleSetName;
@@ -9,6 +10,8 @@ use clap::{Args, Subcommand};
 
 /// What a command is called that has no name of its own.
 const USUAL_NAME: &str = "exec";
+/// What a policy is called that has no name of its own.
+const USUAL_POLICY: &str = "policy";
 
 /// One value of `--helper`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -22,6 +25,13 @@ pub enum HelperArgument {
         /// For `sh -c`.
         line: String,
     },
+    /// `policy:FILE` or `NAME=policy:FILE`.
+    Policy {
+        /// What it is called.
+        name: String,
+        /// Its weights.
+        file: PathBuf,
+    },
 }
 
 impl HelperArgument {
@@ -29,20 +39,26 @@ impl HelperArgument {
     pub fn names(&self) -> Vec<String> {
         match self {
             HelperArgument::Names(names) => names.clone(),
-            HelperArgument::Exec { name, .. } => vec![name.clone()],
+            HelperArgument::Exec { name, .. } | HelperArgument::Policy { name, .. } => {
+                vec![name.clone()]
+            }
         }
     }
 }
 
+/// The name and the rest of `KIND:REST` or `NAME=KIND:REST`.
+fn of_kind<'a>(text: &'a str, kind: &str, usual: &'a str) -> Option<(&'a str, &'a str)> {
+    let named = text.split_once(&format!("={kind}")).filter(|(name, _)| !name.contains([',', ':']));
+    named.or_else(|| Some((usual, text.strip_prefix(kind)?)))
+}
+
 /// Reads one value of `--helper`.
 pub fn helper(text: &str) -> Result<HelperArgument, String> {
-    let named = text.split_once("=exec:").filter(|(name, _)| !name.contains([',', ':']));
-    let (name, line) = match (named, text.strip_prefix("exec:")) {
-        (Some((name, line)), _) => (name, line),
-        (None, Some(line)) => (USUAL_NAME, line),
-        (None, None) => {
-            return Ok(HelperArgument::Names(text.split(',').map(str::to_owned).collect()));
-        }
+    if let Some((name, file)) = of_kind(text, "policy:", USUAL_POLICY) {
+        return Ok(HelperArgument::Policy { name: name.to_owned(), file: file.into() });
+    }
+    let Some((name, line)) = of_kind(text, "exec:", USUAL_NAME) else {
+        return Ok(HelperArgument::Names(text.split(',').map(str::to_owned).collect()));
     };
     if line.trim().is_empty() {
         return Err(

@@ -11,6 +11,10 @@ pub enum TrainCommand {
     Detector(TrainArguments),
     /// The behavior network: what a person in a film does.
     Behavior(TrainArguments),
+    /// A helper's policy, which chooses plans, by proximal policy optimization.
+    Ppo(TrainArguments),
+    /// The same policy by what a teacher would choose.
+    Clone(TrainArguments),
 }
 
 /// Of `chaic train`.
@@ -19,8 +23,8 @@ pub struct TrainArguments {
     /// The training's folder: configuration, checkpoint, curves, weights.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// A TOML file with what differs from the shipped detector's training; what it can name is in the
-    /// config.toml of any training.
+    /// A TOML file with what differs from the usual training; what it can name is in the config.toml of
+    /// any training.
     #[arg(long, value_name = "FILE", conflicts_with = "resume")]
     pub config: Option<PathBuf>,
     /// Begin with these weights, a safetensors file, in place of random ones.

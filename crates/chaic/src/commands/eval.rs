@@ -9,6 +9,7 @@ use chaic_env::minds::{Helpers, Seeing};
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::{Format, Report, write_files};
 use chaic_eval::run::{Access, Run, RunFolder, RunRequest, Shard};
+use chaic_learn::helpers::{NamedPolicy, Policies};
 use chaic_llm::Language;
 use chaic_llm::language::is_told_constraint;
 use chaic_subprocess::Commands;
@@ -43,7 +44,10 @@ pub fn run(arguments: &EvalArguments) -> Result<Ended> {
         Some(language) => language,
         None => &seeing,
     };
-    let commands = Commands::beside(others, arguments.commands(), stop)?;
+    let policies: chaic_env::Result<Vec<NamedPolicy>> =
+        arguments.policies().map(|(name, file)| NamedPolicy::read(name, file)).collect();
+    let policies = Policies::beside(others, policies?, Arc::clone(&seeing.sight))?;
+    let commands = Commands::beside(&policies, arguments.commands(), stop)?;
     if arguments.resume {
         commands.check_begun(&path)?;
     }
@@ -200,16 +204,19 @@ pub(super) fn keep_workers_quiet() {
     }));
 }
 
-/// What is to be said again where helpers run in other processes: a run's folder decides neither
-/// which command is run nor what it may take.
+/// What is to be said again where helpers run in other processes or come from files: a run's folder
+/// decides neither which command is run nor what it may take, and has no weights.
 fn exec_to_resume(arguments: &EvalArguments) -> String {
-    if arguments.commands().is_empty() {
+    if arguments.commands().is_empty() && arguments.policies().next().is_none() {
         return String::new();
     }
     let given = arguments.helper.iter().flatten().map(|helper| match helper {
         HelperArgument::Names(names) => format!(" --helper {}", quoted(&names.join(","))),
         HelperArgument::Exec { name, line } => {
             format!(" --helper {}", quoted(&format!("{name}=exec:{line}")))
+        }
+        HelperArgument::Policy { name, file } => {
+            format!(" --helper {}", quoted(&format!("{name}=policy:{}", file.display())))
         }
     });
     let ExecArguments {

@@ -15,6 +15,7 @@ pub mod replay;
 pub mod report;
 pub mod scene;
 mod sight;
+pub mod train;
 pub mod verify;
 
 mod bars;

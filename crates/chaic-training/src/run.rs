@@ -2,6 +2,7 @@
 //! be stopped at any step and gone on with, bit for bit.
 
 use std::collections::BTreeMap;
+use std::error::Error;
 use std::fs::{self, OpenOptions};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -12,19 +13,12 @@ use chaic_nn::weights::WeightsError;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::behavior::store::StoreError;
-use crate::learner::Learner;
-
 /// What it was begun with.
 pub const CONFIG: &str = "config.toml";
 /// All that is needed to go on.
 pub const CHECKPOINT: &str = "checkpoint.bin";
 /// Losses and validations, a JSON object a line.
 pub const CURVES: &str = "curves.jsonl";
-/// Steps between two records of the loss, checkpoints, and validations.
-const RECORD_STEPS: u64 = 20;
-const CHECKPOINT_STEPS: u64 = 250;
-const VALIDATION_STEPS: u64 = 1000;
 /// No checkpoint or configuration is larger, bytes.
 const MOST_BYTES: u64 = 1 << 30;
 
@@ -36,7 +30,7 @@ pub enum TrainingError {
     File(#[from] FileError),
     /// What it is to learn from can't be kept or read.
     #[error(transparent)]
-    Clips(#[from] StoreError),
+    Data(Box<dyn Error + Send + Sync>),
     /// There is something already.
     #[error("{0} isn't empty; go on with it by --resume, or choose another --out")]
     NotEmpty(PathBuf),
@@ -64,6 +58,13 @@ pub enum TrainingError {
         "the loss of step {0} is not a number; the last checkpoint is kept, try a lower rate from there"
     )]
     NotANumber(u64),
+}
+
+impl TrainingError {
+    /// For what it is to learn from.
+    pub fn of_data(problem: impl Error + Send + Sync + 'static) -> TrainingError {
+        TrainingError::Data(Box::new(problem))
+    }
 }
 
 /// Numbers with their names.
@@ -97,6 +98,12 @@ pub trait Training: Sized {
     type Rules: Clone + Default + Serialize + DeserializeOwned;
     /// The name of the file of weights.
     const WEIGHTS: &'static str;
+    /// Steps between two records of the loss.
+    const RECORD_STEPS: u64 = 20;
+    /// Steps between two checkpoints.
+    const CHECKPOINT_STEPS: u64 = 250;
+    /// Steps between two validations.
+    const VALIDATION_STEPS: u64 = 1000;
 
     /// Before the first step; `None` if it was stopped before it was ready. `go_on` is asked now and then
     /// while it gets ready, with what has been done, which is kept in the folder.
@@ -118,8 +125,11 @@ pub trait Training: Sized {
     /// Steps in all.
     fn steps(&self) -> u64;
 
-    /// What is learned.
-    fn learner(&self) -> &Learner;
+    /// Steps taken.
+    fn taken(&self) -> u64;
+
+    /// All that is needed to go on.
+    fn checkpoint(&self) -> Vec<u8>;
 
     /// Takes the numbers of a file of weights in place of random ones.
     ///
@@ -203,7 +213,7 @@ impl<T: Training> TrainingRun<T> {
     }
 
     fn taken(&self) -> u64 {
-        self.training.learner().adam.steps
+        self.training.taken()
     }
 
     /// Takes steps until there are no more or `stop` is raised; whether it came to the end.
@@ -228,16 +238,16 @@ impl<T: Training> TrainingRun<T> {
             }
             told.push(figures);
             let is_last = step == self.training.steps();
-            if step.is_multiple_of(RECORD_STEPS) || is_last {
+            if step.is_multiple_of(T::RECORD_STEPS) || is_last {
                 self.record(&Record { of: Of::Loss, step, figures: mean(&told) }, tell)?;
                 told.clear();
             }
-            if step.is_multiple_of(VALIDATION_STEPS) || is_last {
+            if step.is_multiple_of(T::VALIDATION_STEPS) || is_last {
                 let (figures, weights) = self.training.validate();
                 self.record(&Record { of: Of::Validation, step, figures }, tell)?;
                 write_whole(&self.folder.join(T::WEIGHTS), &weights)?;
             }
-            if step.is_multiple_of(CHECKPOINT_STEPS) || is_last {
+            if step.is_multiple_of(T::CHECKPOINT_STEPS) || is_last {
                 self.keep()?;
             }
         }
@@ -245,7 +255,7 @@ impl<T: Training> TrainingRun<T> {
     }
 
     fn keep(&self) -> Result<(), TrainingError> {
-        let checkpoint = self.training.learner().checkpoint();
+        let checkpoint = self.training.checkpoint();
         Ok(write_whole(&self.folder.join(CHECKPOINT), &checkpoint)?)
     }
 

@@ -30,6 +30,11 @@ impl Learner {
         Learner { average: numbers.clone(), numbers, adam, passes }
     }
 
+    /// Parts of a batch that are worked on side by side.
+    pub fn shards(&self) -> usize {
+        self.passes.len()
+    }
+
     /// Takes these numbers before the first step.
     pub fn begin_with(&mut self, numbers: Vec<f32>) {
         self.average.clone_from(&numbers);

@@ -1,0 +1,240 @@
+//! The network: a logit for each of the choices that there are, and the value of the state.
+//!
+//! The number of choices differs from decision to decision, and their order means nothing, so each is read by
+//! itself, beside the state (as in pointer networks, Vinyals et al. 2015).
+
+use chaic_nn::simd::widest;
+use chaic_nn::{Kernel, Network, Node, Pass, Shape, Tensor};
+use chaic_protocol::geom::math;
+
+/// What is known when a choice is made.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Decision {
+    /// Numbers of the state.
+    pub state: Vec<f32>,
+    /// Numbers of the choices, one after the other, as many of each.
+    pub choices: Vec<f32>,
+    /// How many choices there are.
+    pub n_choices: usize,
+}
+
+/// What a network says of a decision.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Said {
+    /// The logarithm of each choice's probability.
+    pub log_probabilities: Vec<f32>,
+    /// The return that is expected.
+    pub value: f32,
+}
+
+impl Said {
+    /// What is said where there is no doubt, of one of so many choices.
+    pub fn certain(n: usize, choice: usize) -> Said {
+        let log_probabilities =
+            (0..n).map(|k| if k == choice { 0.0 } else { f32::NEG_INFINITY }).collect();
+        Said { log_probabilities, value: 0.0 }
+    }
+
+    /// The entropy of the choices, nats.
+    pub fn entropy(&self) -> f32 {
+        -self.log_probabilities.iter().map(|l| l * math::exp(*l)).sum::<f32>()
+    }
+
+    /// The choice that a number in 0..1 falls on.
+    pub fn sample(&self, unit: f32) -> usize {
+        let mut left = unit;
+        for (k, l) in self.log_probabilities.iter().enumerate() {
+            left -= math::exp(*l);
+            if left < 0.0 {
+                return k;
+            }
+        }
+        self.most_likely()
+    }
+
+    /// The likeliest choice, of equal ones the first.
+    pub fn most_likely(&self) -> usize {
+        let mut best = 0;
+        for (k, l) in self.log_probabilities.iter().enumerate() {
+            if *l > self.log_probabilities[best] {
+                best = k;
+            }
+        }
+        best
+    }
+}
+
+/// The gradient of a loss by what a network says of a decision.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BySaid {
+    /// By each choice's logit.
+    pub logits: Vec<f32>,
+    /// By the value.
+    pub value: f32,
+}
+
+/// A network without its numbers.
+#[derive(Clone, Debug)]
+pub struct ActorCritic {
+    /// Its layers: two of the same width for logits, and two for values, which share nothing.
+    pub network: Network,
+    logit: Node,
+    value: Node,
+    n_state: usize,
+    n_choice: usize,
+}
+
+impl ActorCritic {
+    /// One for so many numbers of a state and of each choice, with layers of this width.
+    pub fn new(n_state: usize, n_choice: usize, width: usize) -> ActorCritic {
+        let mut network = Network::default();
+        let input = network.input(n_state + n_choice);
+        let mut trunk = |name: &str| {
+            let mut at = input;
+            for layer in 0..2 {
+                let name = format!("{name}{layer}");
+                at = network.conv(&name, at, Kernel::POINTWISE, width);
+                at = network.norm_relu(&format!("{name}.norm"), at);
+            }
+            network.head(&format!("{name}.head"), at, 1)
+        };
+        let (logit, value) = (trunk("actor"), trunk("critic"));
+        ActorCritic { network, logit, value, n_state, n_choice }
+    }
+
+    /// Working space.
+    pub fn pass(&self) -> Pass {
+        Pass::new(&self.network, widest())
+    }
+
+    /// Rows to read: for each decision one of the state alone, whose value counts, and one for each choice.
+    fn rows<'a>(&self, decisions: impl Iterator<Item = &'a Decision> + Clone) -> Tensor {
+        let n = decisions.clone().map(|d| d.n_choices + 1).sum();
+        let channels = self.n_state + self.n_choice;
+        let mut tensor = Tensor::zeros(Shape { n, height: 1, width: 1, channels });
+        let mut rows = tensor.data.chunks_exact_mut(channels);
+        for decision in decisions {
+            for k in 0..=decision.n_choices {
+                let Some(row) = rows.next() else { return tensor };
+                let (state, choice) = row.split_at_mut(self.n_state);
+                state.copy_from_slice(&decision.state);
+                if k > 0 {
+                    let from = (k - 1) * self.n_choice;
+                    choice.copy_from_slice(&decision.choices[from..from + self.n_choice]);
+                }
+            }
+        }
+        tensor
+    }
+
+    /// What it says of decisions.
+    pub fn forward<'a>(
+        &self,
+        numbers: &[f32],
+        decisions: impl Iterator<Item = &'a Decision> + Clone,
+        pass: &mut Pass,
+    ) -> Vec<Said> {
+        pass.forward(&self.network, numbers, &self.rows(decisions.clone()));
+        let (logits, values) = (&pass.made(self.logit).data, &pass.made(self.value).data);
+        let mut row = 0;
+        let mut said = Vec::new();
+        for decision in decisions {
+            let logits = &logits[row + 1..][..decision.n_choices];
+            said.push(Said { log_probabilities: log_softmax(logits), value: values[row] });
+            row += decision.n_choices + 1;
+        }
+        said
+    }
+
+    /// Adds the gradient by all numbers, from that by what was last said, to `by_numbers`.
+    pub fn backward(
+        &self,
+        numbers: &[f32],
+        by: &[BySaid],
+        pass: &mut Pass,
+        by_numbers: &mut [f32],
+    ) {
+        pass.begin_backward();
+        let mut row = 0;
+        for by in by {
+            pass.gradient(self.value).data[row] = by.value;
+            let to = &mut pass.gradient(self.logit).data[row + 1..][..by.logits.len()];
+            to.copy_from_slice(&by.logits);
+            row += by.logits.len() + 1;
+        }
+        pass.backward(&self.network, numbers, by_numbers);
+    }
+}
+
+/// Logarithms of the probabilities that logits stand for.
+fn log_softmax(logits: &[f32]) -> Vec<f32> {
+    let most = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let sum: f32 = logits.iter().map(|l| math::exp(l - most)).sum();
+    let log_sum = most + math::ln(sum);
+    logits.iter().map(|l| l - log_sum).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chaic_protocol::rng::Stream;
+
+    fn decisions() -> Vec<Decision> {
+        let mut rng = Stream::new(3, "decisions", 0);
+        (1..4)
+            .map(|n_choices| Decision {
+                state: (0..3).map(|_| rng.unit()).collect(),
+                choices: (0..2 * n_choices).map(|_| rng.unit()).collect(),
+                n_choices,
+            })
+            .collect()
+    }
+
+    #[test]
+    fn probabilities_of_all_choices_sum_to_one_and_are_sampled_as_such() {
+        let model = ActorCritic::new(3, 2, 16);
+        let numbers = model.network.begin(1);
+        for said in model.forward(&numbers, decisions().iter(), &mut model.pass()) {
+            let sum: f32 = said.log_probabilities.iter().map(|l| math::exp(*l)).sum();
+            assert!((sum - 1.0).abs() < 1e-5);
+            let n = 1000;
+            let share = (0..n).filter(|k| said.sample(*k as f32 / n as f32) == 0).count() as f32;
+            assert!((share / n as f32 - math::exp(said.log_probabilities[0])).abs() < 2e-3);
+        }
+    }
+
+    #[test]
+    fn the_gradient_is_that_of_the_numbers() {
+        let model = ActorCritic::new(3, 2, 16);
+        let numbers = model.network.begin(1);
+        let decisions = decisions();
+        // Some loss: the log probability of each first choice, and half the square of the value.
+        let loss = |numbers: &[f32]| -> f64 {
+            let said = model.forward(numbers, decisions.iter(), &mut model.pass());
+            said.iter().map(|s| f64::from(s.log_probabilities[0] + 0.5 * s.value * s.value)).sum()
+        };
+        let mut pass = model.pass();
+        let said = model.forward(&numbers, decisions.iter(), &mut pass);
+        let by: Vec<BySaid> = said
+            .iter()
+            .map(|s| BySaid {
+                logits: (0..s.log_probabilities.len())
+                    .map(|k| f32::from(u8::from(k == 0)) - math::exp(s.log_probabilities[k]))
+                    .collect(),
+                value: s.value,
+            })
+            .collect();
+        let mut gradient = vec![0.0; numbers.len()];
+        model.backward(&numbers, &by, &mut pass, &mut gradient);
+        let mut rng = Stream::new(1, "direction", 0);
+        let direction: Vec<f32> = numbers.iter().map(|_| rng.unit() - 0.5).collect();
+        let along: f64 =
+            gradient.iter().zip(&direction).map(|(g, d)| f64::from(*g) * f64::from(*d)).sum();
+        let step = 2e-3;
+        let moved = |by: f32| -> Vec<f32> {
+            numbers.iter().zip(&direction).map(|(x, d)| x + by * d).collect()
+        };
+        let slope = (loss(&moved(step)) - loss(&moved(-step))) / f64::from(2.0 * step);
+        assert!((slope - along).abs() < 0.05 * along.abs(), "{slope} {along}");
+    }
+}

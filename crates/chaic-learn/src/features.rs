@@ -1,0 +1,310 @@
+//! What a choice between plans is seen as: numbers of the state, and of each plan. All of it follows from what the
+//! helper's own mind remembers and was told; distances are scaled so that most numbers lie between 0 and 1.
+
+use chaic_agents::decision::{Context, HandState, Plan, Subject};
+use chaic_agents::mapping::Thing;
+use chaic_agents::memory::Memory;
+use chaic_protocol::briefing::Relation;
+use chaic_protocol::catalogue::TargetSet;
+use chaic_protocol::geom::{horizontal_distance, math, xz};
+use chaic_protocol::{ClassId, Role, Vec3};
+
+use crate::actor_critic::Decision;
+
+/// Sets that targets come from.
+const SETS: [TargetSet; 8] = [
+    TargetSet::Fruit,
+    TargetSet::Bread,
+    TargetSet::Work,
+    TargetSet::School,
+    TargetSet::ShopFruit,
+    TargetSet::ShopBakery,
+    TargetSet::ShopDrinks,
+    TargetSet::Furniture,
+];
+
+/// Numbers of the state, before one for each set: what of it the partner is believed to have taken.
+pub const STATE: [&str; 27] = [
+    "time_left",
+    "horizon",
+    "free_hands",
+    "has_container",
+    "targets_in_hand",
+    "can_take_target",
+    "can_take_container",
+    "can_put_in",
+    "can_deliver",
+    "goal_is_known",
+    "goal_way",
+    "known_targets",
+    "known_containers",
+    "known_obstacles",
+    "is_explored",
+    "size_of_place",
+    "partner_was_seen",
+    "partner_is_fresh",
+    "partner_is_in_view",
+    "partner_distance",
+    "partner_holds",
+    "partner_took",
+    "has_child",
+    "child_is_fresh",
+    "child_is_away",
+    "delivered",
+    "moves_furniture",
+];
+
+/// Numbers of a plan, before one for each set: whether the thing that it is about belongs to it.
+pub const PLAN: [&str; 31] = [
+    "explore",
+    "pick_up",
+    "pick_container",
+    "put_in",
+    "deliver",
+    "remove_obstacle",
+    "lift_with",
+    "follow_partner",
+    "follow_child",
+    "turn_around",
+    "wait",
+    "is_as_before",
+    "is_nearest_of_kind",
+    "way",
+    "way_on_to_goal",
+    "time_to_spare",
+    "height",
+    "mass",
+    "is_too_heavy",
+    "is_fragile",
+    "is_container",
+    "partner_distance",
+    "partner_is_nearer",
+    "partner_way_to_goal",
+    "alike_known",
+    "partner_took_class",
+    "partner_took_set",
+    "partner_took_other_set",
+    "failures",
+    "age",
+    "decisions_of_kind",
+];
+
+/// How many numbers a state has.
+pub const N_STATE: usize = STATE.len() + SETS.len();
+/// How many numbers a plan has.
+pub const N_PLAN: usize = PLAN.len() + SETS.len();
+/// How many kinds of plans there are.
+pub const N_KINDS: usize = 11;
+
+/// What one divides by, metres, frames and kilograms.
+const FAR_M: f32 = 20.0;
+const FRESH_FRAMES: f32 = 120.0;
+const LONG_FRAMES: f32 = 3000.0;
+const HEAVY_KG: f32 = 20.0;
+/// How far a body walks in a frame, roughly, metres (1.5 m/s with turning).
+const M_PER_FRAME: f32 = 0.04;
+
+/// Which kind of plan it is, and the thing that it is about.
+pub fn kind_and_subject(plan: &Plan) -> (usize, Option<&Subject>) {
+    match plan {
+        Plan::Explore => (0, None),
+        Plan::PickUp(it) => (1, Some(it)),
+        Plan::PickContainer(it) => (2, Some(it)),
+        Plan::PutIn => (3, None),
+        Plan::Deliver => (4, None),
+        Plan::RemoveObstacle(it) => (5, Some(it)),
+        Plan::LiftWith(it) => (6, Some(it)),
+        Plan::FollowPartner => (7, None),
+        Plan::FollowChild => (8, None),
+        Plan::TurnAround => (9, None),
+        Plan::Wait => (10, None),
+    }
+}
+
+/// What a policy remembers of its own choices.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Choices {
+    /// The latest.
+    pub last: Option<Plan>,
+    /// How often each kind was chosen.
+    pub n_of_kind: [u32; N_KINDS],
+}
+
+impl Choices {
+    /// Notes a choice.
+    pub fn note(&mut self, plan: Plan) {
+        self.n_of_kind[kind_and_subject(&plan).0] += 1;
+        self.last = Some(plan);
+    }
+}
+
+fn flag(is_so: bool) -> f32 {
+    f32::from(u8::from(is_so))
+}
+
+/// A share that rises from 0 to 1 as `x` grows to `most`.
+fn share(x: f32, most: f32) -> f32 {
+    (x / most).clamp(0.0, 1.0)
+}
+
+/// How fresh what happened so many frames ago is, 1 to 0.
+fn fresh(age: u32) -> f32 {
+    math::exp(-(age as f32) / FRESH_FRAMES)
+}
+
+/// What is believed to have been taken by the partner: what it was seen to take or hold, and what isn't where it
+/// was and was not taken by oneself.
+fn taken_by_partner(context: &Context<'_>) -> Vec<ClassId> {
+    let Context { memory, behavior, .. } = context;
+    let mut tracks: Vec<_> = behavior.partner_took.clone();
+    let own = |t: &Thing| {
+        memory.history.iter().any(|done| done.action.subject() == Some(t.track))
+            || memory.hands.all().any(|(track, _)| track == t.track)
+    };
+    let targets = memory.things.iter().filter(|t| {
+        context.briefing.possible_targets.contains(&t.class)
+            && (!t.is_present || t.held_until > memory.frame)
+            && !own(t)
+    });
+    tracks.extend(targets.map(|t| (t.track, t.class)));
+    tracks.sort_unstable();
+    tracks.dedup_by_key(|(track, _)| *track);
+    tracks.into_iter().map(|(_, class)| class).collect()
+}
+
+/// What all plans of a decision are seen by.
+struct Scene<'a> {
+    memory: &'a Memory,
+    choices: &'a Choices,
+    time_left_frames: f32,
+    strength_kg: f32,
+    partner: Option<Vec3>,
+    goal: Option<(Vec3, f32)>,
+    taken: Vec<ClassId>,
+    available: Vec<ClassId>,
+}
+
+/// What is known when one of these plans is to be chosen.
+pub fn decision(context: &Context<'_>, valid: &[Plan], choices: &Choices) -> Decision {
+    let Context { briefing, memory, behavior, is_explored } = *context;
+    let hands = HandState::of(&memory.hands, briefing);
+    let taken = taken_by_partner(context);
+    let available: Vec<ClassId> =
+        memory.things.iter().filter(|t| t.is_available(memory.frame)).map(|t| t.class).collect();
+    let known = |of: &[ClassId]| available.iter().filter(|c| of.contains(c)).count() as f32;
+    let goal = memory.goal_places().first().map(|(place, way)| (place.position_in_world, *way));
+    let partner = memory.companion(briefing, Relation::Partner);
+    let child = memory.companion(briefing, Relation::Child);
+    let here = memory.pose.position;
+    let time_left_frames = briefing.horizon.saturating_sub(memory.frame) as f32;
+    let n_free = memory.hands.hands.iter().filter(|h| h.is_none()).count();
+    let size = briefing.bounds.size();
+    let moves = briefing.possible_targets.iter().any(|c| c.info().role == Role::HeavyTarget);
+    let numbers: [f32; STATE.len()] = [
+        time_left_frames / briefing.horizon.max(1) as f32,
+        briefing.horizon as f32 / LONG_FRAMES,
+        n_free as f32 / 2.0,
+        flag(hands.has_container),
+        share(hands.targets.len() as f32, 4.0),
+        flag(hands.can_take_target),
+        flag(hands.can_take_container),
+        flag(hands.can_put_in),
+        flag(hands.to_deliver.is_some()),
+        flag(goal.is_some()),
+        goal.map_or(1.0, |(_, way)| share(way, FAR_M)),
+        share(known(&briefing.possible_targets), 10.0),
+        share(known(&briefing.containers), 3.0),
+        share(known(&briefing.obstacles), 4.0),
+        flag(is_explored),
+        share((size.x * size.y).max(0.0).sqrt(), 40.0),
+        flag(partner.is_some()),
+        partner.map_or(0.0, |p| fresh(memory.frame - p.frame)),
+        flag(partner.is_some_and(|p| p.is_in_view)),
+        partner.map_or(1.0, |p| share(horizontal_distance(here, p.position_in_world), FAR_M)),
+        share(behavior.partner_holds.len() as f32, 3.0),
+        share(taken.len() as f32, 6.0),
+        flag(briefing.companion(Relation::Child).is_some()),
+        child.map_or(0.0, |c| fresh(memory.frame - c.frame)),
+        flag(memory.child_is_away(briefing)),
+        share(memory.delivered.len() as f32, 10.0),
+        flag(moves),
+    ];
+    let mut state = numbers.to_vec();
+    state.extend(SETS.iter().map(|set| {
+        share(taken.iter().filter(|c| c.info().sets.contains(set)).count() as f32, 3.0)
+    }));
+    let scene = Scene {
+        memory,
+        choices,
+        time_left_frames,
+        strength_kg: briefing.capability.strength_kg,
+        partner: partner.map(|p| p.position_in_world),
+        goal,
+        taken,
+        available,
+    };
+    let mut seen = [false; N_KINDS];
+    let mut numbers = Vec::with_capacity(valid.len() * N_PLAN);
+    for plan in valid {
+        let is_first = !std::mem::replace(&mut seen[kind_and_subject(plan).0], true);
+        scene.push_plan(plan, is_first, &mut numbers);
+    }
+    Decision { state, choices: numbers, n_choices: valid.len() }
+}
+
+impl Scene<'_> {
+    fn push_plan(&self, plan: &Plan, is_first_of_kind: bool, to: &mut Vec<f32>) {
+        let (kind, subject) = kind_and_subject(plan);
+        let begin = to.len();
+        to.extend((0..N_KINDS).map(|k| flag(k == kind)));
+        to.push(flag(self.choices.last == Some(*plan)));
+        to.push(flag(is_first_of_kind));
+        let thing = subject.and_then(|it| self.memory.things.get(it.track));
+        let at = match plan {
+            Plan::Deliver => self.goal.map(|(at, _)| at),
+            Plan::FollowPartner => self.partner,
+            _ => thing.map(|t| t.position_in_world),
+        };
+        let here = self.memory.pose.position;
+        let way_m = match (plan, thing) {
+            (Plan::Deliver, _) => self.goal.map(|(_, way)| way),
+            (_, Some(thing)) => self.memory.way_to(thing),
+            _ => at.map(|at| horizontal_distance(here, at)),
+        };
+        let between =
+            |a: Option<Vec3>, b: Option<Vec3>| a.zip(b).map(|(a, b)| horizontal_distance(a, b));
+        let goal = self.goal.map(|(at, _)| at);
+        let on_m = if thing.is_some() { between(at, goal) } else { None };
+        let in_all_m = way_m.unwrap_or(0.0) + on_m.unwrap_or(0.0);
+        to.push(way_m.map_or(0.0, |m| share(m, FAR_M)));
+        to.push(on_m.map_or(0.0, |m| share(m, FAR_M)));
+        let to_spare = self.time_left_frames - in_all_m / M_PER_FRAME;
+        to.push((to_spare / LONG_FRAMES).clamp(-1.0, 1.0));
+        let info = subject.map(|it| it.class.info());
+        to.push(thing.map_or(0.0, |t| share(t.position_in_world.y, 2.0)));
+        to.push(info.map_or(0.0, |i| share(i.mass_kg, HEAVY_KG)));
+        to.push(flag(info.is_some_and(|i| i.mass_kg > self.strength_kg)));
+        to.push(flag(info.is_some_and(|i| i.role == Role::Fragile)));
+        to.push(flag(info.is_some_and(|i| i.role == Role::Container)));
+        let partner_m = thing.and_then(|t| self.partner.map(|p| t.distance_from(xz(p))));
+        to.push(partner_m.map_or(0.0, |m| share(m, FAR_M)));
+        to.push(flag(partner_m.zip(way_m).is_some_and(|(of_partner, own)| of_partner < own)));
+        to.push(between(self.partner, goal).map_or(0.0, |m| share(m, FAR_M)));
+        let class = subject.map(|it| it.class);
+        let alike = self.available.iter().filter(|c| Some(**c) == class).count();
+        to.push(share(alike as f32, 4.0));
+        let is_alike = |other: &&ClassId| {
+            info.is_some_and(|i| i.sets.iter().any(|set| other.info().sets.contains(set)))
+        };
+        let of_set = self.taken.iter().filter(is_alike).count();
+        to.push(share(self.taken.iter().filter(|c| Some(**c) == class).count() as f32, 3.0));
+        to.push(share(of_set as f32, 3.0));
+        let of_others = if info.is_some() { self.taken.len() - of_set } else { 0 };
+        to.push(share(of_others as f32, 3.0));
+        to.push(thing.map_or(0.0, |t| share(t.failures as f32, 3.0)));
+        to.push(thing.map_or(0.0, |t| share((self.memory.frame - t.last_seen) as f32, 1000.0)));
+        to.push(share(self.choices.n_of_kind[kind] as f32, 20.0));
+        to.extend(SETS.iter().map(|set| flag(info.is_some_and(|i| i.sets.contains(set)))));
+        debug_assert_eq!(to.len() - begin, N_PLAN);
+    }
+}

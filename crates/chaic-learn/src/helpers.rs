@@ -1,0 +1,157 @@
+//! Trained policies as helpers of a run, by name.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use chaic_agents::sight::Sight;
+use chaic_agents::{Mind, PlannerRules};
+use chaic_env::minds::{Helper, Helpers, check_new_name};
+use chaic_env::{EnvError, RunKey};
+use chaic_files::{read_bounded, write_whole};
+use chaic_nn::weights;
+use chaic_protocol::observation::Grants;
+use serde::{Deserialize, Serialize};
+
+use crate::policy::{Choosing, LearnedPolicy, Trained};
+use crate::train::from_bytes;
+
+/// The file with the policies of a run.
+pub const FILE: &str = "policies.json";
+/// Neither that file nor one of weights is larger, bytes.
+const MOST_BYTES: u64 = 1 << 28;
+
+/// A policy under a name of its own.
+pub struct NamedPolicy {
+    name: String,
+    digest: String,
+    trained: Arc<Trained>,
+}
+
+/// What a run's folder tells of it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Recorded {
+    name: String,
+    weights: String,
+}
+
+/// Why a policy can't be a helper.
+#[derive(Debug, thiserror::Error)]
+enum Refusal {
+    #[error("{0}")]
+    Name(String),
+    #[error("{}: {problem}", path.display())]
+    Weights { path: PathBuf, problem: weights::WeightsError },
+    #[error(
+        "{} was begun with other weights for `{name}`; give the same file again, or choose another --out",
+        run.display()
+    )]
+    Other { run: PathBuf, name: String },
+}
+
+impl From<Refusal> for EnvError {
+    fn from(refusal: Refusal) -> EnvError {
+        EnvError::Minds(refusal.into())
+    }
+}
+
+impl NamedPolicy {
+    /// The policy in a file of weights.
+    ///
+    /// # Errors
+    /// If it can't be read or isn't one.
+    pub fn read(name: &str, path: &Path) -> chaic_env::Result<NamedPolicy> {
+        let bytes = read_bounded(path, MOST_BYTES).map_err(|e| EnvError::Minds(e.into()))?;
+        let wrong = |problem| Refusal::Weights { path: path.to_owned(), problem };
+        let trained = Arc::new(from_bytes(&bytes).map_err(wrong)?);
+        Ok(NamedPolicy { name: name.to_owned(), digest: weights::digest(&bytes), trained })
+    }
+}
+
+/// Policies, besides the helpers of elsewhere.
+pub struct Policies<'a> {
+    policies: Vec<NamedPolicy>,
+    others: &'a dyn Helpers,
+    sight: Arc<dyn Sight>,
+}
+
+impl<'a> Policies<'a> {
+    /// Adds policies, which see by this, to the helpers of elsewhere.
+    ///
+    /// # Errors
+    /// If a name is none, or is taken.
+    pub fn beside(
+        others: &'a dyn Helpers,
+        policies: Vec<NamedPolicy>,
+        sight: Arc<dyn Sight>,
+    ) -> chaic_env::Result<Policies<'a>> {
+        let mut taken = others.names();
+        for NamedPolicy { name, .. } in &policies {
+            check_new_name(name, &taken, "mine=policy:FILE").map_err(Refusal::Name)?;
+            taken.push(name.clone());
+        }
+        Ok(Policies { policies, others, sight })
+    }
+
+    fn recorded(&self) -> Vec<Recorded> {
+        let recorded =
+            |p: &NamedPolicy| Recorded { name: p.name.clone(), weights: p.digest.clone() };
+        self.policies.iter().map(recorded).collect()
+    }
+}
+
+impl Helpers for Policies<'_> {
+    fn names(&self) -> Vec<String> {
+        let own = self.policies.iter().map(|p| p.name.clone());
+        self.others.names().into_iter().chain(own).collect()
+    }
+
+    fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper> {
+        let Some(own) = self.policies.iter().find(|p| p.name == name) else {
+            return self.others.make(name, rules);
+        };
+        let policy = LearnedPolicy::new(Arc::clone(&own.trained), Choosing::Sampled, None);
+        let mind = Box::new(Mind::seeing(policy, rules, &*self.sight));
+        Some(Helper { mind, grants: self.sight.grants(Grants::PLANNER) })
+    }
+
+    fn make_for(&self, key: &RunKey, rules: PlannerRules) -> Option<Helper> {
+        let is_own = self.policies.iter().any(|p| p.name == key.helper);
+        if is_own { self.make(&key.helper, rules) } else { self.others.make_for(key, rules) }
+    }
+
+    fn attach(&self, run: &Path) -> chaic_env::Result<()> {
+        self.others.attach(run)?;
+        let (path, own) = (run.join(FILE), self.recorded());
+        let minds = |problem: chaic_files::FileError| EnvError::Minds(problem.into());
+        if path.exists() {
+            let bytes = read_bounded(&path, MOST_BYTES).map_err(minds)?;
+            let begun: Vec<Recorded> = serde_json::from_slice(&bytes)
+                .map_err(|e| EnvError::Minds(format!("{}: {e}", path.display()).into()))?;
+            if let Some(other) = begun.into_iter().find(|b| !own.contains(b)) {
+                return Err(Refusal::Other { run: run.to_owned(), name: other.name }.into());
+            }
+        }
+        if own.is_empty() {
+            return Ok(());
+        }
+        let text = serde_json::to_vec_pretty(&own).expect("names and digests are JSON");
+        write_whole(&path, &text).map_err(minds)
+    }
+
+    fn partner_names(&self) -> Vec<String> {
+        self.others.partner_names()
+    }
+
+    fn partner(&self, name: &str, of: Option<&RunKey>, rules: PlannerRules) -> Option<Helper> {
+        self.others.partner(name, of, rules)
+    }
+
+    fn waiting_jobs(&self) -> usize {
+        self.others.waiting_jobs()
+    }
+
+    fn waits(&self, name: &str) -> bool {
+        self.others.waits(name)
+    }
+}

@@ -1,0 +1,123 @@
+//! A network that drives a mind.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use chaic_agents::decision::{Context, Plan, Policy};
+use chaic_nn::Pass;
+use chaic_protocol::rng::Stream;
+use chaic_protocol::{AgentError, Briefing, Frame};
+
+use crate::actor_critic::{ActorCritic, Decision, Said};
+use crate::features::{Choices, decision};
+
+/// A network with its numbers.
+#[derive(Clone, Debug)]
+pub struct Trained {
+    /// The network.
+    pub model: ActorCritic,
+    /// Its numbers.
+    pub numbers: Vec<f32>,
+}
+
+/// How choices are made of probabilities.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Choosing {
+    /// By chance, as likely as the network says.
+    Sampled,
+    /// Always the likeliest.
+    Likeliest,
+}
+
+/// A choice that was made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Noted {
+    /// When.
+    pub frame: Frame,
+    /// What was known.
+    pub decision: Decision,
+    /// Which choice.
+    pub choice: usize,
+    /// What the network said.
+    pub said: Said,
+}
+
+/// Choices of one episode, for those who learn from them.
+pub type Notes = Arc<Mutex<Vec<Noted>>>;
+
+/// After so many frames a plan under way is thought over (as RHP does).
+const RECONSIDER_FRAMES: Frame = 150;
+
+/// Chooses plans as a network says.
+#[derive(Clone)]
+pub struct LearnedPolicy {
+    trained: Arc<Trained>,
+    choosing: Choosing,
+    notes: Option<Notes>,
+    pass: Pass,
+    rng: Stream,
+    choices: Choices,
+    last_frame: Frame,
+}
+
+impl LearnedPolicy {
+    /// One that notes its choices, if somebody wants to know them.
+    pub fn new(trained: Arc<Trained>, choosing: Choosing, notes: Option<Notes>) -> LearnedPolicy {
+        let pass = trained.model.pass();
+        let rng = Stream::new(0, "plans", 0);
+        LearnedPolicy {
+            trained,
+            choosing,
+            notes,
+            pass,
+            rng,
+            choices: Choices::default(),
+            last_frame: 0,
+        }
+    }
+
+    /// Takes note of a choice that was made at this frame.
+    pub(crate) fn note(&mut self, plan: Plan, frame: Frame) {
+        self.choices.note(plan);
+        self.last_frame = frame;
+    }
+}
+
+impl Policy for LearnedPolicy {
+    fn reset(&mut self, briefing: &Briefing) {
+        self.rng = Stream::new(briefing.seed, "learned policy", 0);
+        self.choices = Choices::default();
+        self.last_frame = 0;
+    }
+
+    fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
+        let decision = decision(context, valid, &self.choices);
+        let Trained { model, numbers } = &*self.trained;
+        let said = model.forward(numbers, std::iter::once(&decision), &mut self.pass).remove(0);
+        let choice = match self.choosing {
+            Choosing::Sampled => said.sample(self.rng.unit()),
+            Choosing::Likeliest => said.most_likely(),
+        };
+        let plan = valid[choice];
+        self.note(plan, context.memory.frame);
+        if let Some(notes) = &self.notes {
+            let noted = Noted { frame: context.memory.frame, decision, choice, said };
+            notes.lock().unwrap_or_else(PoisonError::into_inner).push(noted);
+        }
+        Ok(plan)
+    }
+
+    fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, is_news: bool) -> bool {
+        let is_bound = matches!(current, Plan::Deliver | Plan::PutIn | Plan::LiftWith(_));
+        !is_bound && (is_news || context.memory.frame >= self.last_frame + RECONSIDER_FRAMES)
+    }
+
+    fn counts(&self) -> BTreeMap<String, u64> {
+        let n = self.choices.n_of_kind.iter().map(|n| u64::from(*n)).sum();
+        BTreeMap::from([("choices".to_owned(), n)])
+    }
+
+    fn fork(&self) -> Option<LearnedPolicy> {
+        self.notes.is_none().then(|| self.clone())
+    }
+}

@@ -1,0 +1,250 @@
+//! Episodes that are played by a network, and what came of its choices.
+
+use std::sync::{Arc, PoisonError};
+
+use chaic_agents::Mind;
+use chaic_agents::decision::Policy;
+use chaic_agents::sight::Sight;
+use chaic_env::minds::{Helper, NONE};
+use chaic_env::rules::RuleSet;
+use chaic_env::{Env, EnvError, EpisodeConfig, Flow, Minds};
+use chaic_episodes::{Episode, SplitError, find_episode};
+use chaic_protocol::briefing::Goal;
+use chaic_protocol::geom::math;
+use chaic_protocol::observation::Grants;
+use chaic_protocol::rng::Stream;
+use chaic_protocol::{AgentError, AgentId, Frame};
+use chaic_render::Appearance;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::cloning::{Lesson, Teacher, driver};
+use crate::policy::{Choosing, LearnedPolicy, Noted, Notes, Trained};
+use crate::ppo::{Trajectory, Transition};
+
+/// Why an episode can't be played.
+#[derive(Debug, thiserror::Error)]
+pub enum RolloutError {
+    /// There is no such episode.
+    #[error(transparent)]
+    Episode(#[from] SplitError),
+    /// It can't become a world.
+    #[error(transparent)]
+    Env(#[from] EnvError),
+    /// A mind broke down.
+    #[error("a mind broke down: {0}")]
+    Mind(#[from] AgentError),
+}
+
+/// How episodes are played.
+#[derive(Clone, Copy)]
+pub struct RolloutRules<'a> {
+    /// By what the helper sees.
+    pub sight: &'a dyn Sight,
+    /// Side of all images, pixels.
+    pub image_size: u32,
+    /// How choices are made.
+    pub choosing: Choosing,
+    /// What is rewarded.
+    pub rewards: Rewards,
+}
+
+/// What is rewarded: facts of the world that no helper is told.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Rewards {
+    /// For everything that is wanted, by whomever it is delivered.
+    pub team: f32,
+    /// For everything that is wanted, where the helper itself delivers it: less of the partner's luck is in it.
+    pub own: f32,
+}
+
+impl Default for Rewards {
+    fn default() -> Rewards {
+        Rewards { team: 5.0, own: 5.0 }
+    }
+}
+
+impl RolloutRules<'_> {
+    /// What has been done so far is worth.
+    fn worth(&self, env: &Env) -> f32 {
+        let Rewards { team, own } = self.rewards;
+        let world = env.world();
+        let (_, total) = world.progress();
+        let by_helper: f64 = world
+            .state()
+            .things
+            .iter()
+            .zip(&world.setup().things)
+            .filter(|(thing, _)| thing.delivered_by == Some(AgentId::HELPER))
+            .filter(|(_, thing)| world.setup().goal.wanted(thing.class) > 0)
+            .map(|(_, thing)| world.worth(thing.class))
+            .sum();
+        team * share_done(env) as f32 + own * (by_helper / total.max(f64::MIN_POSITIVE)) as f32
+    }
+}
+
+/// What came of an episode.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Played {
+    /// Its choices and rewards; durations are frames.
+    pub trajectory: Trajectory,
+    /// Transport rate.
+    pub tr: f64,
+    /// Frames that passed.
+    pub frames: Frame,
+}
+
+/// An episode that was played.
+struct Recording {
+    noted: Vec<Noted>,
+    /// What had been worth how much at which frame, whenever somebody decided.
+    worth: Vec<(Frame, f32)>,
+    tr: f64,
+    frames: Frame,
+}
+
+impl Recording {
+    /// What had been done when a frame began.
+    fn worth_at(&self, frame: Frame) -> f32 {
+        let k = self.worth.partition_point(|(f, _)| *f < frame);
+        self.worth.get(k).or(self.worth.last()).map_or(0.0, |(_, worth)| *worth)
+    }
+
+    /// When each choice's time was over.
+    fn ends(&self) -> impl Iterator<Item = Frame> + '_ {
+        self.noted.iter().skip(1).map(|n| n.frame).chain([self.frames])
+    }
+}
+
+/// Plays an episode with a helper whose policy is made for its goal.
+fn record<P: Policy>(
+    (id, seed): (&str, u32),
+    rules: &RolloutRules<'_>,
+    make: impl FnOnce(&Goal, Notes) -> P,
+) -> Result<Recording, RolloutError> {
+    let episode = find_episode(id)?;
+    let notes = Notes::default();
+    let policy = make(&episode.setup().goal, Arc::clone(&notes));
+    let mind = Mind::seeing(policy, RuleSet::PAPER.planner, rules.sight);
+    let helper = Helper { mind: Box::new(mind), grants: rules.sight.grants(Grants::PLANNER) };
+    let minds = Minds::of(Some(helper), None);
+    let mut env = Env::new(config(&episode, seed, "learner", rules.image_size), minds)?;
+    let mut worth = Vec::new();
+    loop {
+        let frame = env.world().state().frame;
+        worth.push((frame, rules.worth(&env)));
+        if env.advance(Some(frame + 1))? == Flow::Ended {
+            break;
+        }
+    }
+    let frames = env.world().state().frame;
+    worth.push((frames, rules.worth(&env)));
+    let noted = std::mem::take(&mut *notes.lock().unwrap_or_else(PoisonError::into_inner));
+    Ok(Recording { noted, worth, tr: share_done(&env), frames })
+}
+
+fn config<'a>(
+    episode: &'a Episode,
+    seed: u32,
+    helper: &'a str,
+    image_size: u32,
+) -> EpisodeConfig<'a> {
+    EpisodeConfig {
+        episode,
+        seed,
+        rules: RuleSet::PAPER,
+        helper,
+        partner: None,
+        image_size: Some(image_size),
+        appearance: Appearance::Canonical,
+    }
+}
+
+/// Plays an episode with a network as the helper.
+///
+/// # Errors
+/// [`RolloutError`]
+pub fn play(
+    id: &str,
+    seed: u32,
+    trained: &Arc<Trained>,
+    rules: &RolloutRules<'_>,
+) -> Result<Played, RolloutError> {
+    let recording = record((id, seed), rules, |_, notes| {
+        LearnedPolicy::new(Arc::clone(trained), rules.choosing, Some(notes))
+    })?;
+    let transitions = recording.noted.iter().zip(recording.ends()).map(|(noted, end)| Transition {
+        choice: noted.choice,
+        log_probability: noted.said.log_probabilities[noted.choice],
+        value: noted.said.value,
+        reward: recording.worth_at(end) - recording.worth_at(noted.frame),
+        duration: (end - noted.frame) as f32,
+        decision: noted.decision.clone(),
+    });
+    let trajectory = Trajectory { transitions: transitions.collect(), value_after: 0.0 };
+    Ok(Played { trajectory, tr: recording.tr, frames: recording.frames })
+}
+
+/// Plays an episode with a teacher at hand, who drives the helper itself or lets the network do so: what it taught,
+/// and the transport rate. Returns are discounted by this for each frame.
+///
+/// # Errors
+/// [`RolloutError`]
+pub fn play_taught(
+    (id, seed): (&str, u32),
+    trained: &Arc<Trained>,
+    rules: &RolloutRules<'_>,
+    (mixed, discount): (f32, f32),
+) -> Result<(Vec<Lesson>, f64), RolloutError> {
+    let learner = || LearnedPolicy::new(Arc::clone(trained), Choosing::Sampled, None);
+    let recording = record((id, seed), rules, |goal, notes| {
+        let mut rng = Stream::new(u64::from(seed), id, 0);
+        let driver = driver(mixed, &mut rng, learner);
+        Teacher::new(goal.clone(), driver, learner(), notes)
+    })?;
+    let ends: Vec<Frame> = recording.ends().collect();
+    let mut following = 0.0;
+    let mut lessons: Vec<Lesson> = recording
+        .noted
+        .iter()
+        .zip(&ends)
+        .rev()
+        .map(|(noted, end)| {
+            let reward = recording.worth_at(*end) - recording.worth_at(noted.frame);
+            following = reward + math::powf(discount, (end - noted.frame) as f32) * following;
+            Lesson { decision: noted.decision.clone(), choice: noted.choice, target: following }
+        })
+        .collect();
+    lessons.reverse();
+    Ok((lessons, recording.tr))
+}
+
+fn share_done(env: &Env) -> f64 {
+    let (done, total) = env.world().progress();
+    if total > 0.0 { done / total } else { 0.0 }
+}
+
+/// Plays episodes side by side on all cores; what comes of each depends on nothing but itself.
+///
+/// # Errors
+/// The first one's that couldn't be played.
+pub fn play_all(
+    ids: &[(String, u32)],
+    trained: &Arc<Trained>,
+    rules: &RolloutRules<'_>,
+) -> Result<Vec<Played>, RolloutError> {
+    ids.par_iter().map(|(id, seed)| play(id, *seed, trained, rules)).collect()
+}
+
+/// Transport rate of the partner alone.
+///
+/// # Errors
+/// [`RolloutError`]
+pub fn play_alone(id: &str, seed: u32, image_size: u32) -> Result<f64, RolloutError> {
+    let episode = find_episode(id)?;
+    let config = config(&episode, seed, NONE, image_size);
+    let mut env = Env::new(config, Minds { helper: None, partner: None })?;
+    env.advance(None)?;
+    Ok(share_done(&env))
+}

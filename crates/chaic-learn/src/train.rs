@@ -1,0 +1,406 @@
+//! The loops: episodes are played, and the network learns from them.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use chaic_agents::sight::TrueSight;
+use chaic_nn::AdamRules;
+use chaic_nn::weights::{self, WeightsError};
+use chaic_protocol::TaskId;
+use chaic_protocol::rng::Stream;
+use chaic_training::{Figures, Learner, Training, TrainingError, figures, rate_at};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::actor_critic::ActorCritic;
+use crate::cloning::{Learned, Lesson, imitate};
+use crate::features::{N_PLAN, N_STATE};
+use crate::policy::{Choosing, Trained};
+use crate::ppo::{PpoRules, Told, improve};
+use crate::rollout::{Played, Rewards, RolloutRules, play_all, play_taught};
+
+/// Seeds of generated episodes to learn from, and to validate by: none of any split, and none that perception
+/// was trained on.
+const TRAINING_SEEDS: (u64, usize) = (40_000_000, 1_000_000);
+const VALIDATION_SEEDS: u64 = 50_000_000;
+
+/// What files of weights say that they are.
+const KIND: &str = "chaic plan policy 1";
+/// Width of the network's layers.
+const WIDTH: usize = 96;
+
+/// The network that chooses plans.
+pub fn network() -> ActorCritic {
+    ActorCritic::new(N_STATE, N_PLAN, WIDTH)
+}
+
+/// The network in a file of weights.
+///
+/// # Errors
+/// [`WeightsError`] if it isn't a whole file of such a network.
+pub fn from_bytes(bytes: &[u8]) -> Result<Trained, WeightsError> {
+    let model = network();
+    let numbers = weights::from_bytes(&model.network, bytes, KIND)?;
+    Ok(Trained { model, numbers })
+}
+
+/// Which episodes are played, and how.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PlayRules {
+    /// Episodes of each iteration.
+    pub episodes: usize,
+    /// The tasks whose episodes are played, by turns.
+    pub tasks: Vec<TaskId>,
+    /// Side of everybody's images while training, pixels.
+    pub image_size: u32,
+    /// Episodes of each task that validations play.
+    pub validation_episodes: usize,
+    /// What is rewarded.
+    pub rewards: Rewards,
+}
+
+impl Default for PlayRules {
+    fn default() -> PlayRules {
+        PlayRules {
+            episodes: 32,
+            tasks: TaskId::paper().collect(),
+            image_size: 128,
+            validation_episodes: 3,
+            rewards: Rewards::default(),
+        }
+    }
+}
+
+impl PlayRules {
+    fn check(&self) -> Result<(), &'static str> {
+        if self.episodes.min(self.tasks.len()).min(self.validation_episodes) == 0 {
+            return Err(
+                "play.episodes and play.validation_episodes are at least 1, and there is a task",
+            );
+        }
+        if !(16..=1024).contains(&self.image_size) {
+            return Err("play.image_size is 16 to 1024");
+        }
+        Ok(())
+    }
+
+    fn rollout(&self, choosing: Choosing) -> RolloutRules<'static> {
+        let PlayRules { image_size, rewards, .. } = *self;
+        RolloutRules { sight: &TrueSight, image_size, choosing, rewards }
+    }
+
+    /// The episodes of an iteration.
+    fn episodes_of(&self, seed: u64, iteration: u64) -> Vec<(String, u32)> {
+        let (first, n) = TRAINING_SEEDS;
+        (0..self.episodes as u64)
+            .map(|k| {
+                let index = iteration * self.episodes as u64 + k;
+                let task = self.tasks[index as usize % self.tasks.len()];
+                let drawn = Stream::new(seed, "episodes", index).below(n) as u64;
+                (format!("{}/gen/{}", task.name(), first + drawn), 0)
+            })
+            .collect()
+    }
+
+    /// Transport rates on episodes that nothing is learned from.
+    fn validate(&self, trained: &Arc<Trained>) -> Figures {
+        let seeds = || VALIDATION_SEEDS..VALIDATION_SEEDS + self.validation_episodes as u64;
+        let ids: Vec<(String, u32)> = self
+            .tasks
+            .iter()
+            .flat_map(|task| seeds().map(|seed| (format!("{}/gen/{seed}", task.name()), 0)))
+            .collect();
+        let ways = [("tr_sampled", Choosing::Sampled), ("tr_likeliest", Choosing::Likeliest)];
+        let tr = |choosing| {
+            let played = play_all(&ids, trained, &self.rollout(choosing));
+            mean_tr(&played.expect("generated episodes can be played"))
+        };
+        figures(ways.map(|(name, choosing)| (name, tr(choosing))))
+    }
+}
+
+fn mean_tr(played: &[Played]) -> f64 {
+    played.iter().map(|p| p.tr).sum::<f64>() / played.len().max(1) as f64
+}
+
+/// A network while it learns, with the iterations so far.
+struct Learning {
+    model: ActorCritic,
+    learner: Learner,
+    iterations: u64,
+}
+
+impl Learning {
+    fn new(seed: u64, shards: usize) -> Learning {
+        let model = network();
+        let learner = Learner::new(&model.network, seed, shards);
+        Learning { model, learner, iterations: 0 }
+    }
+
+    fn trained(&self) -> Arc<Trained> {
+        Arc::new(Trained { model: self.model.clone(), numbers: self.learner.numbers.clone() })
+    }
+
+    fn weights(&self) -> Vec<u8> {
+        weights::to_bytes(&self.model.network, &self.learner.numbers, KIND)
+    }
+
+    fn checkpoint(&self) -> Vec<u8> {
+        let mut bytes = self.iterations.to_le_bytes().to_vec();
+        bytes.extend(self.learner.checkpoint());
+        bytes
+    }
+
+    fn resume(&mut self, adam: &AdamRules, bytes: &[u8]) -> bool {
+        let Some((iterations, rest)) = bytes.split_first_chunk::<8>() else { return false };
+        self.iterations = u64::from_le_bytes(*iterations);
+        self.learner.resume(adam, rest)
+    }
+}
+
+/// What proximal policy optimization is trained on, and how.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PolicyRules {
+    /// Of weights, episodes and batches.
+    pub seed: u64,
+    /// Iterations in all.
+    pub iterations: u64,
+    /// What is played.
+    pub play: PlayRules,
+    /// How it learns; the discount is of a frame.
+    pub ppo: PpoRules,
+}
+
+impl Default for PolicyRules {
+    fn default() -> PolicyRules {
+        PolicyRules {
+            seed: 1,
+            iterations: 600,
+            play: PlayRules::default(),
+            ppo: PpoRules {
+                discount: 0.9995,
+                trace: 0.98,
+                entropy: 0.01,
+                epochs: 4,
+                batch: 512,
+                rate: 1e-3,
+                rate_falls: true,
+                divergence: 0.02,
+                ..PpoRules::default()
+            },
+        }
+    }
+}
+
+/// A policy that learns from what comes of its choices.
+pub struct PolicyTraining {
+    rules: PolicyRules,
+    learning: Learning,
+}
+
+impl Training for PolicyTraining {
+    type Rules = PolicyRules;
+    const WEIGHTS: &'static str = "policy.safetensors";
+    const RECORD_STEPS: u64 = 1;
+    const CHECKPOINT_STEPS: u64 = 5;
+    const VALIDATION_STEPS: u64 = 25;
+
+    fn new(
+        rules: &PolicyRules,
+        _: &Path,
+        _: &mut dyn FnMut(&str) -> bool,
+    ) -> Result<Option<PolicyTraining>, TrainingError> {
+        let learning = Learning::new(rules.seed, rules.ppo.shards);
+        Ok(Some(PolicyTraining { rules: rules.clone(), learning }))
+    }
+
+    fn check(rules: &PolicyRules) -> Result<(), &'static str> {
+        let PpoRules { epochs, batch, shards, .. } = rules.ppo;
+        if epochs.min(batch).min(shards) == 0 || rules.iterations == 0 {
+            return Err("iterations, ppo.epochs, ppo.batch and ppo.shards are at least 1");
+        }
+        rules.play.check()
+    }
+
+    fn steps(&self) -> u64 {
+        self.rules.iterations
+    }
+
+    fn taken(&self) -> u64 {
+        self.learning.iterations
+    }
+
+    fn checkpoint(&self) -> Vec<u8> {
+        self.learning.checkpoint()
+    }
+
+    fn begin_with(&mut self, weights: &[u8]) -> Result<(), WeightsError> {
+        self.learning.learner.begin_with(from_bytes(weights)?.numbers);
+        Ok(())
+    }
+
+    fn resume(&mut self, bytes: &[u8]) -> bool {
+        self.learning.resume(&self.rules.ppo.adam, bytes)
+    }
+
+    fn step(&mut self) -> Figures {
+        let PolicyTraining { rules, learning } = self;
+        let ids = rules.play.episodes_of(rules.seed, learning.iterations);
+        let rollout = rules.play.rollout(Choosing::Sampled);
+        let played = play_all(&ids, &learning.trained(), &rollout);
+        let played = played.expect("generated episodes can be played");
+        let tr = mean_tr(&played);
+        let frames = played.iter().map(|p| f64::from(p.frames)).sum();
+        let trajectories: Vec<_> = played.into_iter().map(|p| p.trajectory).collect();
+        let decisions: usize = trajectories.iter().map(|t| t.transitions.len()).sum();
+        let rest = 1.0 - learning.iterations as f32 / rules.iterations as f32;
+        let named = (rules.seed, learning.iterations, rest);
+        let Learning { model, learner, iterations } = learning;
+        let told = improve(&rules.ppo, model, learner, &trajectories, named);
+        *iterations += 1;
+        let Told { objective, value_loss, entropy, divergence, clipped, explained_variance } = told;
+        figures([
+            ("tr", tr),
+            ("frames", frames),
+            ("decisions", decisions as f64),
+            ("objective", objective),
+            ("value_loss", value_loss),
+            ("entropy", entropy),
+            ("divergence", divergence),
+            ("clipped", clipped),
+            ("explained_variance", explained_variance),
+        ])
+    }
+
+    fn validate(&self) -> (Figures, Vec<u8>) {
+        (self.rules.play.validate(&self.learning.trained()), self.learning.weights())
+    }
+}
+
+/// What cloning is trained on, and how.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CloneRules {
+    /// Of weights, episodes and batches.
+    pub seed: u64,
+    /// Iterations in all.
+    pub iterations: u64,
+    /// What is played.
+    pub play: PlayRules,
+    /// Share of episodes that the learner drives while the teacher says what it would do.
+    pub mixed: f32,
+    /// How much less a reward counts that comes a frame later, for values.
+    pub discount: f32,
+    /// Lessons of each step.
+    pub batch: usize,
+    /// Highest rate of steps.
+    pub rate: f32,
+    /// Parts of a batch that are worked on side by side.
+    pub shards: usize,
+    /// How steps are taken.
+    pub adam: AdamRules,
+}
+
+impl Default for CloneRules {
+    fn default() -> CloneRules {
+        CloneRules {
+            seed: 1,
+            iterations: 100,
+            play: PlayRules::default(),
+            mixed: 0.5,
+            discount: 0.9995,
+            batch: 64,
+            rate: 2e-3,
+            shards: 2,
+            adam: AdamRules {
+                beta2: 0.999,
+                weight_decay: 0.0,
+                clip_norm: 1.0,
+                ..AdamRules::default()
+            },
+        }
+    }
+}
+
+/// A policy that learns from a teacher.
+pub struct CloneTraining {
+    rules: CloneRules,
+    learning: Learning,
+}
+
+impl Training for CloneTraining {
+    type Rules = CloneRules;
+    const WEIGHTS: &'static str = "policy.safetensors";
+    const RECORD_STEPS: u64 = 1;
+    const CHECKPOINT_STEPS: u64 = 5;
+    const VALIDATION_STEPS: u64 = 25;
+
+    fn new(
+        rules: &CloneRules,
+        _: &Path,
+        _: &mut dyn FnMut(&str) -> bool,
+    ) -> Result<Option<CloneTraining>, TrainingError> {
+        let learning = Learning::new(rules.seed, rules.shards);
+        Ok(Some(CloneTraining { rules: rules.clone(), learning }))
+    }
+
+    fn check(rules: &CloneRules) -> Result<(), &'static str> {
+        if rules.batch.min(rules.shards) == 0 || rules.iterations == 0 {
+            return Err("iterations, batch and shards are at least 1");
+        }
+        rules.play.check()
+    }
+
+    fn steps(&self) -> u64 {
+        self.rules.iterations
+    }
+
+    fn taken(&self) -> u64 {
+        self.learning.iterations
+    }
+
+    fn checkpoint(&self) -> Vec<u8> {
+        self.learning.checkpoint()
+    }
+
+    fn begin_with(&mut self, weights: &[u8]) -> Result<(), WeightsError> {
+        self.learning.learner.begin_with(from_bytes(weights)?.numbers);
+        Ok(())
+    }
+
+    fn resume(&mut self, bytes: &[u8]) -> bool {
+        self.learning.resume(&self.rules.adam, bytes)
+    }
+
+    fn step(&mut self) -> Figures {
+        let CloneTraining { rules, learning } = self;
+        let ids = rules.play.episodes_of(rules.seed, learning.iterations);
+        let (rollout, trained) = (rules.play.rollout(Choosing::Sampled), learning.trained());
+        let taught = |(id, seed): &(String, u32)| {
+            play_taught((id, *seed), &trained, &rollout, (rules.mixed, rules.discount))
+        };
+        let taught: Result<Vec<_>, _> = ids.par_iter().map(taught).collect();
+        let taught = taught.expect("generated episodes can be played");
+        let tr = taught.iter().map(|(_, tr)| tr).sum::<f64>() / taught.len().max(1) as f64;
+        let lessons: Vec<Lesson> = taught.into_iter().flat_map(|(lessons, _)| lessons).collect();
+        let rate = rate_at(learning.iterations, (rules.rate, 1, rules.iterations));
+        let Learning { model, learner, iterations } = learning;
+        let how = (&rules.adam, rate, rules.batch);
+        let learned = imitate(how, model, learner, &lessons, (rules.seed, *iterations));
+        *iterations += 1;
+        let Learned { loss, agreement, value_loss } = learned;
+        figures([
+            ("tr", tr),
+            ("lessons", lessons.len() as f64),
+            ("loss", loss),
+            ("agreement", agreement),
+            ("value_loss", value_loss),
+        ])
+    }
+
+    fn validate(&self) -> (Figures, Vec<u8>) {
+        (self.rules.play.validate(&self.learning.trained()), self.learning.weights())
+    }
+}

@@ -1,0 +1,118 @@
+//! Promises: what a policy is told lies within bounds; the same seed gives the same weights, whether or not a
+//! training was interrupted; bad files are told in one line.
+
+use std::fs;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use chaic_agents::sight::TrueSight;
+use chaic_env::minds::{BuiltIn, Helpers as _};
+use chaic_learn::features::{N_PLAN, N_STATE};
+use chaic_learn::helpers::{NamedPolicy, Policies};
+use chaic_learn::policy::{Choosing, Trained};
+use chaic_learn::rollout::{Rewards, RolloutRules, play};
+use chaic_learn::train::{CloneRules, CloneTraining, PlayRules, PolicyRules, PolicyTraining, network};
+use chaic_protocol::TaskId;
+use chaic_training::{CHECKPOINT, Training, TrainingError, TrainingRun};
+
+fn small() -> PlayRules {
+    PlayRules {
+        episodes: 2,
+        tasks: vec![TaskId::LowTarget, TaskId::MovingHouse],
+        image_size: 32,
+        validation_episodes: 1,
+        ..PlayRules::default()
+    }
+}
+
+/// The checkpoint after all steps, with a pause before the last one or without.
+fn trained<T: Training>(rules: &T::Rules, folder: &Path, pauses: bool) -> Vec<u8> {
+    let mut go_on = |_: &str| true;
+    let mut run = TrainingRun::<T>::begin(folder, rules, &mut go_on).unwrap().unwrap();
+    let stop = AtomicBool::new(false);
+    if pauses {
+        let is_whole = run.go_on(&stop, &mut |_| {
+            stop.store(true, std::sync::atomic::Ordering::Relaxed);
+        });
+        assert!(!is_whole.unwrap());
+        drop(run);
+        stop.store(false, std::sync::atomic::Ordering::Relaxed);
+        run = TrainingRun::<T>::resume(folder, &mut go_on).unwrap().unwrap();
+        assert_eq!(run.extent(), (1, 2));
+    }
+    assert!(run.go_on(&stop, &mut |_| {}).unwrap());
+    fs::read(folder.join(CHECKPOINT)).unwrap()
+}
+
+#[test]
+fn a_training_that_was_interrupted_ends_with_the_same_bits() {
+    let folder = tempfile::tempdir().unwrap();
+    let policy = PolicyRules { iterations: 2, play: small(), ..PolicyRules::default() };
+    let [whole, paused] = [false, true].map(|pauses| {
+        let folder = folder.path().join(format!("policy {pauses}"));
+        trained::<PolicyTraining>(&policy, &folder, pauses)
+    });
+    assert!(whole == paused);
+    let clone = CloneRules { iterations: 2, play: small(), ..CloneRules::default() };
+    let [whole, paused] = [false, true].map(|pauses| {
+        let folder = folder.path().join(format!("clone {pauses}"));
+        trained::<CloneTraining>(&clone, &folder, pauses)
+    });
+    assert!(whole == paused);
+    // What was trained is a helper of a run.
+    let weights = folder.path().join("policy true").join(PolicyTraining::WEIGHTS);
+    let read = NamedPolicy::read("mine", &weights).unwrap();
+    let helpers = Policies::beside(&BuiltIn, vec![read], Arc::new(TrueSight)).unwrap();
+    assert!(helpers.names().contains(&"mine".to_owned()));
+    assert!(helpers.make("mine", chaic_agents::PlannerRules::paper()).is_some());
+    // A checkpoint that was cut off.
+    let folder = folder.path().join("policy true");
+    fs::write(folder.join(CHECKPOINT), &whole[..whole.len() / 2]).unwrap();
+    let refused = TrainingRun::<PolicyTraining>::resume(&folder, &mut |_| true);
+    assert!(matches!(refused, Err(TrainingError::Checkpoint(_))));
+}
+
+#[test]
+fn what_a_policy_is_told_lies_within_bounds() {
+    let model = network();
+    let numbers = model.network.begin(1);
+    let trained = Arc::new(Trained { model, numbers });
+    let rules = RolloutRules {
+        sight: &TrueSight,
+        image_size: 64,
+        choosing: Choosing::Sampled,
+        rewards: Rewards { team: 1.0, own: 0.0 },
+    };
+    for id in ["shopping/gen/40000001", "obstacle/gen/40000001"] {
+        let played = play(id, 0, &trained, &rules).unwrap();
+        let mut reward = 0.0;
+        let mut frames = 0.0;
+        for transition in &played.trajectory.transitions {
+            let decision = &transition.decision;
+            assert_eq!(decision.state.len(), N_STATE);
+            assert_eq!(decision.choices.len(), decision.n_choices * N_PLAN);
+            let all = decision.state.iter().chain(&decision.choices);
+            assert!(all.clone().all(|x| (-1.0..=1.0).contains(x)), "{all:?}");
+            reward += f64::from(transition.reward);
+            frames += f64::from(transition.duration);
+        }
+        // What is rewarded is what is scored, but for what the partner did before the first choice.
+        assert!(reward <= played.tr + 1e-6 && reward >= 0.0, "{reward} of {}", played.tr);
+        assert!(frames <= f64::from(played.frames));
+        let first = played.trajectory.transitions.len() > 5;
+        assert!(first && (played.tr - reward).abs() < 1e-4, "{reward} of {}", played.tr);
+    }
+}
+
+#[test]
+fn weights_of_something_else_are_refused_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("other.safetensors");
+    for bytes in [&b""[..], b"not a file of weights", include_bytes!("training.rs")] {
+        fs::write(&file, bytes).unwrap();
+        let problem = NamedPolicy::read("mine", &file).err().unwrap().to_string();
+        assert!(problem.contains("other.safetensors") && !problem.contains('\n'), "{problem}");
+    }
+    assert!(NamedPolicy::read("mine", &folder.path().join("missing")).is_err());
+}

@@ -79,6 +79,49 @@ impl fmt::Display for Plan {
 }
 
 impl Plan {
+    /// What kinds of plans there are called, by [`Plan::kind`].
+    pub const KINDS: [&str; 11] = [
+        "explore",
+        "pick_up",
+        "pick_container",
+        "put_in",
+        "deliver",
+        "remove_obstacle",
+        "lift_with",
+        "follow_partner",
+        "follow_child",
+        "turn_around",
+        "wait",
+    ];
+
+    /// Its place in [`Plan::KINDS`].
+    pub fn kind(&self) -> usize {
+        match self {
+            Plan::Explore => 0,
+            Plan::PickUp(_) => 1,
+            Plan::PickContainer(_) => 2,
+            Plan::PutIn => 3,
+            Plan::Deliver => 4,
+            Plan::RemoveObstacle(_) => 5,
+            Plan::LiftWith(_) => 6,
+            Plan::FollowPartner => 7,
+            Plan::FollowChild => 8,
+            Plan::TurnAround => 9,
+            Plan::Wait => 10,
+        }
+    }
+
+    /// What it is about, if it is about one thing.
+    pub fn subject(&self) -> Option<Subject> {
+        match self {
+            Plan::PickUp(it)
+            | Plan::PickContainer(it)
+            | Plan::RemoveObstacle(it)
+            | Plan::LiftWith(it) => Some(*it),
+            _ => None,
+        }
+    }
+
     /// Whether a plan under way should make room for this one, when both come from the same
     /// policy: nothing is dropped for more of the same, a walk to an object for another, or
     /// anything for having nothing to do.

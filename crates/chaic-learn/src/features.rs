@@ -1,7 +1,7 @@
 //! What a choice between plans is seen as: numbers of the state, and of each plan. All of it follows from what the
 //! helper's own mind remembers and was told; distances are scaled so that most numbers lie between 0 and 1.
 
-use chaic_agents::decision::{Context, HandState, Plan, Subject};
+use chaic_agents::decision::{Context, HandState, Plan};
 use chaic_agents::mapping::Thing;
 use chaic_agents::memory::Memory;
 use chaic_protocol::briefing::Relation;
@@ -54,19 +54,9 @@ pub const STATE: [&str; 27] = [
     "moves_furniture",
 ];
 
-/// Numbers of a plan, before one for each set: whether the thing that it is about belongs to it.
-pub const PLAN: [&str; 31] = [
-    "explore",
-    "pick_up",
-    "pick_container",
-    "put_in",
-    "deliver",
-    "remove_obstacle",
-    "lift_with",
-    "follow_partner",
-    "follow_child",
-    "turn_around",
-    "wait",
+/// Numbers of a plan, after one for each of [`Plan::KINDS`] and before one for each set: whether the thing that it
+/// is about belongs to it.
+pub const PLAN: [&str; 20] = [
     "is_as_before",
     "is_nearest_of_kind",
     "way",
@@ -92,9 +82,9 @@ pub const PLAN: [&str; 31] = [
 /// How many numbers a state has.
 pub const N_STATE: usize = STATE.len() + SETS.len();
 /// How many numbers a plan has.
-pub const N_PLAN: usize = PLAN.len() + SETS.len();
+pub const N_PLAN: usize = N_KINDS + PLAN.len() + SETS.len();
 /// How many kinds of plans there are.
-pub const N_KINDS: usize = 11;
+const N_KINDS: usize = Plan::KINDS.len();
 
 /// What one divides by, metres, frames and kilograms.
 const FAR_M: f32 = 20.0;
@@ -103,23 +93,6 @@ const LONG_FRAMES: f32 = 3000.0;
 const HEAVY_KG: f32 = 20.0;
 /// How far a body walks in a frame, roughly, metres (1.5 m/s with turning).
 const M_PER_FRAME: f32 = 0.04;
-
-/// Which kind of plan it is, and the thing that it is about.
-pub fn kind_and_subject(plan: &Plan) -> (usize, Option<&Subject>) {
-    match plan {
-        Plan::Explore => (0, None),
-        Plan::PickUp(it) => (1, Some(it)),
-        Plan::PickContainer(it) => (2, Some(it)),
-        Plan::PutIn => (3, None),
-        Plan::Deliver => (4, None),
-        Plan::RemoveObstacle(it) => (5, Some(it)),
-        Plan::LiftWith(it) => (6, Some(it)),
-        Plan::FollowPartner => (7, None),
-        Plan::FollowChild => (8, None),
-        Plan::TurnAround => (9, None),
-        Plan::Wait => (10, None),
-    }
-}
 
 /// What a policy remembers of its own choices.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -133,7 +106,7 @@ pub struct Choices {
 impl Choices {
     /// Notes a choice.
     pub fn note(&mut self, plan: Plan) {
-        self.n_of_kind[kind_and_subject(&plan).0] += 1;
+        self.n_of_kind[plan.kind()] += 1;
         self.last = Some(plan);
     }
 }
@@ -246,7 +219,7 @@ pub fn decision(context: &Context<'_>, valid: &[Plan], choices: &Choices) -> Dec
     let mut seen = [false; N_KINDS];
     let mut numbers = Vec::with_capacity(valid.len() * N_PLAN);
     for plan in valid {
-        let is_first = !std::mem::replace(&mut seen[kind_and_subject(plan).0], true);
+        let is_first = !std::mem::replace(&mut seen[plan.kind()], true);
         scene.push_plan(plan, is_first, &mut numbers);
     }
     Decision { state, choices: numbers, n_choices: valid.len() }
@@ -254,7 +227,7 @@ pub fn decision(context: &Context<'_>, valid: &[Plan], choices: &Choices) -> Dec
 
 impl Scene<'_> {
     fn push_plan(&self, plan: &Plan, is_first_of_kind: bool, to: &mut Vec<f32>) {
-        let (kind, subject) = kind_and_subject(plan);
+        let (kind, subject) = (plan.kind(), plan.subject());
         let begin = to.len();
         to.extend((0..N_KINDS).map(|k| flag(k == kind)));
         to.push(flag(self.choices.last == Some(*plan)));

@@ -10,6 +10,7 @@ use chaic_protocol::TaskId;
 use chaic_protocol::rng::Stream;
 use chaic_training::{Figures, Learner, Training, TrainingError, figures, rate_at};
 use rayon::prelude::*;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::actor_critic::ActorCritic;
@@ -125,7 +126,7 @@ fn mean_tr(played: &[Played]) -> f64 {
 }
 
 /// A network while it learns, with the iterations so far.
-struct Learning {
+pub struct Learning {
     model: ActorCritic,
     learner: Learner,
     iterations: u64,
@@ -159,10 +160,96 @@ impl Learning {
     }
 }
 
-/// What proximal policy optimization is trained on, and how.
+/// A way to learn, with all that it depends on.
+pub trait Method: Clone + Default + Serialize + DeserializeOwned {
+    /// What is wrong with it.
+    ///
+    /// # Errors
+    /// That, in a sentence.
+    fn check(&self) -> Result<(), &'static str>;
+
+    /// Of weights, episodes and batches.
+    fn seed(&self) -> u64;
+
+    /// Iterations in all.
+    fn iterations(&self) -> u64;
+
+    /// What is played.
+    fn play(&self) -> &PlayRules;
+
+    /// Parts of a batch that are worked on side by side, and how steps are taken.
+    fn steps(&self) -> (usize, &AdamRules);
+
+    /// An iteration.
+    fn learn(&self, learning: &mut Learning) -> Figures;
+}
+
+/// A policy that is trained in a folder of its own.
+pub struct PolicyTraining<M> {
+    method: M,
+    learning: Learning,
+}
+
+impl<M: Method> Training for PolicyTraining<M> {
+    type Rules = M;
+    const WEIGHTS: &'static str = "policy.safetensors";
+    const RECORD_STEPS: u64 = 1;
+    const CHECKPOINT_STEPS: u64 = 5;
+    const VALIDATION_STEPS: u64 = 25;
+
+    fn new(
+        method: &M,
+        _: &Path,
+        _: &mut dyn FnMut(&str) -> bool,
+    ) -> Result<Option<PolicyTraining<M>>, TrainingError> {
+        let learning = Learning::new(method.seed(), method.steps().0);
+        Ok(Some(PolicyTraining { method: method.clone(), learning }))
+    }
+
+    fn check(method: &M) -> Result<(), &'static str> {
+        if method.iterations() == 0 {
+            return Err("there is at least one iteration");
+        }
+        method.play().check()?;
+        method.check()
+    }
+
+    fn steps(&self) -> u64 {
+        self.method.iterations()
+    }
+
+    fn taken(&self) -> u64 {
+        self.learning.iterations
+    }
+
+    fn checkpoint(&self) -> Vec<u8> {
+        self.learning.checkpoint()
+    }
+
+    fn begin_with(&mut self, weights: &[u8]) -> Result<(), WeightsError> {
+        self.learning.learner.begin_with(from_bytes(weights)?.numbers);
+        Ok(())
+    }
+
+    fn resume(&mut self, bytes: &[u8]) -> bool {
+        self.learning.resume(self.method.steps().1, bytes)
+    }
+
+    fn step(&mut self) -> Figures {
+        let figures = self.method.learn(&mut self.learning);
+        self.learning.iterations += 1;
+        figures
+    }
+
+    fn validate(&self) -> (Figures, Vec<u8>) {
+        (self.method.play().validate(&self.learning.trained()), self.learning.weights())
+    }
+}
+
+/// Learning from what comes of choices, by proximal policy optimization.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct PolicyRules {
+pub struct Reinforcement {
     /// Of weights, episodes and batches.
     pub seed: u64,
     /// Iterations in all.
@@ -173,9 +260,9 @@ pub struct PolicyRules {
     pub ppo: PpoRules,
 }
 
-impl Default for PolicyRules {
-    fn default() -> PolicyRules {
-        PolicyRules {
+impl Default for Reinforcement {
+    fn default() -> Reinforcement {
+        Reinforcement {
             seed: 1,
             iterations: 600,
             play: PlayRules::default(),
@@ -194,72 +281,44 @@ impl Default for PolicyRules {
     }
 }
 
-/// A policy that learns from what comes of its choices.
-pub struct PolicyTraining {
-    rules: PolicyRules,
-    learning: Learning,
-}
-
-impl Training for PolicyTraining {
-    type Rules = PolicyRules;
-    const WEIGHTS: &'static str = "policy.safetensors";
-    const RECORD_STEPS: u64 = 1;
-    const CHECKPOINT_STEPS: u64 = 5;
-    const VALIDATION_STEPS: u64 = 25;
-
-    fn new(
-        rules: &PolicyRules,
-        _: &Path,
-        _: &mut dyn FnMut(&str) -> bool,
-    ) -> Result<Option<PolicyTraining>, TrainingError> {
-        let learning = Learning::new(rules.seed, rules.ppo.shards);
-        Ok(Some(PolicyTraining { rules: rules.clone(), learning }))
-    }
-
-    fn check(rules: &PolicyRules) -> Result<(), &'static str> {
-        let PpoRules { epochs, batch, shards, .. } = rules.ppo;
-        if epochs.min(batch).min(shards) == 0 || rules.iterations == 0 {
-            return Err("iterations, ppo.epochs, ppo.batch and ppo.shards are at least 1");
+impl Method for Reinforcement {
+    fn check(&self) -> Result<(), &'static str> {
+        let PpoRules { epochs, batch, shards, .. } = self.ppo;
+        if epochs.min(batch).min(shards) == 0 {
+            return Err("ppo.epochs, ppo.batch and ppo.shards are at least 1");
         }
-        rules.play.check()
-    }
-
-    fn steps(&self) -> u64 {
-        self.rules.iterations
-    }
-
-    fn taken(&self) -> u64 {
-        self.learning.iterations
-    }
-
-    fn checkpoint(&self) -> Vec<u8> {
-        self.learning.checkpoint()
-    }
-
-    fn begin_with(&mut self, weights: &[u8]) -> Result<(), WeightsError> {
-        self.learning.learner.begin_with(from_bytes(weights)?.numbers);
         Ok(())
     }
 
-    fn resume(&mut self, bytes: &[u8]) -> bool {
-        self.learning.resume(&self.rules.ppo.adam, bytes)
+    fn seed(&self) -> u64 {
+        self.seed
     }
 
-    fn step(&mut self) -> Figures {
-        let PolicyTraining { rules, learning } = self;
-        let ids = rules.play.episodes_of(rules.seed, learning.iterations);
-        let rollout = rules.play.rollout(Choosing::Sampled);
+    fn iterations(&self) -> u64 {
+        self.iterations
+    }
+
+    fn play(&self) -> &PlayRules {
+        &self.play
+    }
+
+    fn steps(&self) -> (usize, &AdamRules) {
+        (self.ppo.shards, &self.ppo.adam)
+    }
+
+    fn learn(&self, learning: &mut Learning) -> Figures {
+        let ids = self.play.episodes_of(self.seed, learning.iterations);
+        let rollout = self.play.rollout(Choosing::Sampled);
         let played = play_all(&ids, &learning.trained(), &rollout);
         let played = played.expect("generated episodes can be played");
         let tr = mean_tr(&played);
         let frames = played.iter().map(|p| f64::from(p.frames)).sum();
         let trajectories: Vec<_> = played.into_iter().map(|p| p.trajectory).collect();
         let decisions: usize = trajectories.iter().map(|t| t.transitions.len()).sum();
-        let rest = 1.0 - learning.iterations as f32 / rules.iterations as f32;
-        let named = (rules.seed, learning.iterations, rest);
-        let Learning { model, learner, iterations } = learning;
-        let told = improve(&rules.ppo, model, learner, &trajectories, named);
-        *iterations += 1;
+        let rest = 1.0 - learning.iterations as f32 / self.iterations as f32;
+        let named = (self.seed, learning.iterations, rest);
+        let Learning { model, learner, .. } = learning;
+        let told = improve(&self.ppo, model, learner, &trajectories, named);
         let Told { objective, value_loss, entropy, divergence, clipped, explained_variance } = told;
         figures([
             ("tr", tr),
@@ -273,16 +332,12 @@ impl Training for PolicyTraining {
             ("explained_variance", explained_variance),
         ])
     }
-
-    fn validate(&self) -> (Figures, Vec<u8>) {
-        (self.rules.play.validate(&self.learning.trained()), self.learning.weights())
-    }
 }
 
-/// What cloning is trained on, and how.
+/// Learning from a teacher.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct CloneRules {
+pub struct Cloning {
     /// Of weights, episodes and batches.
     pub seed: u64,
     /// Iterations in all.
@@ -303,9 +358,9 @@ pub struct CloneRules {
     pub adam: AdamRules,
 }
 
-impl Default for CloneRules {
-    fn default() -> CloneRules {
-        CloneRules {
+impl Default for Cloning {
+    fn default() -> Cloning {
+        Cloning {
             seed: 1,
             iterations: 100,
             play: PlayRules::default(),
@@ -324,72 +379,45 @@ impl Default for CloneRules {
     }
 }
 
-/// A policy that learns from a teacher.
-pub struct CloneTraining {
-    rules: CloneRules,
-    learning: Learning,
-}
-
-impl Training for CloneTraining {
-    type Rules = CloneRules;
-    const WEIGHTS: &'static str = "policy.safetensors";
-    const RECORD_STEPS: u64 = 1;
-    const CHECKPOINT_STEPS: u64 = 5;
-    const VALIDATION_STEPS: u64 = 25;
-
-    fn new(
-        rules: &CloneRules,
-        _: &Path,
-        _: &mut dyn FnMut(&str) -> bool,
-    ) -> Result<Option<CloneTraining>, TrainingError> {
-        let learning = Learning::new(rules.seed, rules.shards);
-        Ok(Some(CloneTraining { rules: rules.clone(), learning }))
-    }
-
-    fn check(rules: &CloneRules) -> Result<(), &'static str> {
-        if rules.batch.min(rules.shards) == 0 || rules.iterations == 0 {
-            return Err("iterations, batch and shards are at least 1");
+impl Method for Cloning {
+    fn check(&self) -> Result<(), &'static str> {
+        if self.batch.min(self.shards) == 0 {
+            Err("batch and shards are at least 1")
+        } else {
+            Ok(())
         }
-        rules.play.check()
     }
 
-    fn steps(&self) -> u64 {
-        self.rules.iterations
+    fn seed(&self) -> u64 {
+        self.seed
     }
 
-    fn taken(&self) -> u64 {
-        self.learning.iterations
+    fn iterations(&self) -> u64 {
+        self.iterations
     }
 
-    fn checkpoint(&self) -> Vec<u8> {
-        self.learning.checkpoint()
+    fn play(&self) -> &PlayRules {
+        &self.play
     }
 
-    fn begin_with(&mut self, weights: &[u8]) -> Result<(), WeightsError> {
-        self.learning.learner.begin_with(from_bytes(weights)?.numbers);
-        Ok(())
+    fn steps(&self) -> (usize, &AdamRules) {
+        (self.shards, &self.adam)
     }
 
-    fn resume(&mut self, bytes: &[u8]) -> bool {
-        self.learning.resume(&self.rules.adam, bytes)
-    }
-
-    fn step(&mut self) -> Figures {
-        let CloneTraining { rules, learning } = self;
-        let ids = rules.play.episodes_of(rules.seed, learning.iterations);
-        let (rollout, trained) = (rules.play.rollout(Choosing::Sampled), learning.trained());
+    fn learn(&self, learning: &mut Learning) -> Figures {
+        let ids = self.play.episodes_of(self.seed, learning.iterations);
+        let (rollout, trained) = (self.play.rollout(Choosing::Sampled), learning.trained());
         let taught = |(id, seed): &(String, u32)| {
-            play_taught((id, *seed), &trained, &rollout, (rules.mixed, rules.discount))
+            play_taught((id, *seed), &trained, &rollout, (self.mixed, self.discount))
         };
         let taught: Result<Vec<_>, _> = ids.par_iter().map(taught).collect();
         let taught = taught.expect("generated episodes can be played");
         let tr = taught.iter().map(|(_, tr)| tr).sum::<f64>() / taught.len().max(1) as f64;
         let lessons: Vec<Lesson> = taught.into_iter().flat_map(|(lessons, _)| lessons).collect();
-        let rate = rate_at(learning.iterations, (rules.rate, 1, rules.iterations));
+        let rate = rate_at(learning.iterations, (self.rate, 1, self.iterations));
+        let how = (&self.adam, rate, self.batch);
         let Learning { model, learner, iterations } = learning;
-        let how = (&rules.adam, rate, rules.batch);
-        let learned = imitate(how, model, learner, &lessons, (rules.seed, *iterations));
-        *iterations += 1;
+        let learned = imitate(how, model, learner, &lessons, (self.seed, *iterations));
         let Learned { loss, agreement, value_loss } = learned;
         figures([
             ("tr", tr),
@@ -398,9 +426,5 @@ impl Training for CloneTraining {
             ("agreement", agreement),
             ("value_loss", value_loss),
         ])
-    }
-
-    fn validate(&self) -> (Figures, Vec<u8>) {
-        (self.rules.play.validate(&self.learning.trained()), self.learning.weights())
     }
 }

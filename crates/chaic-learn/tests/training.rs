@@ -12,7 +12,7 @@ use chaic_learn::features::{N_PLAN, N_STATE};
 use chaic_learn::helpers::{NamedPolicy, Policies};
 use chaic_learn::policy::{Choosing, Trained};
 use chaic_learn::rollout::{Rewards, RolloutRules, play};
-use chaic_learn::train::{CloneRules, CloneTraining, PlayRules, PolicyRules, PolicyTraining, network};
+use chaic_learn::train::{Cloning, PlayRules, PolicyTraining, Reinforcement, network};
 use chaic_protocol::TaskId;
 use chaic_training::{CHECKPOINT, Training, TrainingError, TrainingRun};
 
@@ -48,20 +48,20 @@ fn trained<T: Training>(rules: &T::Rules, folder: &Path, pauses: bool) -> Vec<u8
 #[test]
 fn a_training_that_was_interrupted_ends_with_the_same_bits() {
     let folder = tempfile::tempdir().unwrap();
-    let policy = PolicyRules { iterations: 2, play: small(), ..PolicyRules::default() };
+    let policy = Reinforcement { iterations: 2, play: small(), ..Reinforcement::default() };
     let [whole, paused] = [false, true].map(|pauses| {
         let folder = folder.path().join(format!("policy {pauses}"));
-        trained::<PolicyTraining>(&policy, &folder, pauses)
+        trained::<PolicyTraining<Reinforcement>>(&policy, &folder, pauses)
     });
     assert!(whole == paused);
-    let clone = CloneRules { iterations: 2, play: small(), ..CloneRules::default() };
+    let clone = Cloning { iterations: 2, play: small(), ..Cloning::default() };
     let [whole, paused] = [false, true].map(|pauses| {
         let folder = folder.path().join(format!("clone {pauses}"));
-        trained::<CloneTraining>(&clone, &folder, pauses)
+        trained::<PolicyTraining<Cloning>>(&clone, &folder, pauses)
     });
     assert!(whole == paused);
     // What was trained is a helper of a run.
-    let weights = folder.path().join("policy true").join(PolicyTraining::WEIGHTS);
+    let weights = folder.path().join("policy true").join(PolicyTraining::<Reinforcement>::WEIGHTS);
     let read = NamedPolicy::read("mine", &weights).unwrap();
     let helpers = Policies::beside(&BuiltIn, vec![read], Arc::new(TrueSight)).unwrap();
     assert!(helpers.names().contains(&"mine".to_owned()));
@@ -69,7 +69,7 @@ fn a_training_that_was_interrupted_ends_with_the_same_bits() {
     // A checkpoint that was cut off.
     let folder = folder.path().join("policy true");
     fs::write(folder.join(CHECKPOINT), &whole[..whole.len() / 2]).unwrap();
-    let refused = TrainingRun::<PolicyTraining>::resume(&folder, &mut |_| true);
+    let refused = TrainingRun::<PolicyTraining<Reinforcement>>::resume(&folder, &mut |_| true);
     assert!(matches!(refused, Err(TrainingError::Checkpoint(_))));
 }
 

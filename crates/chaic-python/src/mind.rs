@@ -87,46 +87,30 @@ impl Mind {
     }
 }
 
-/// What a plan's numbers are: which kind it is, and of the thing that it is about the class (its number, or -1), and
-/// the place in the own body's frame, metres to the right and ahead (0 if it is about none).
-pub const PLAN: [&str; 14] = [
-    "explore",
-    "pick_up",
-    "pick_container",
-    "put_in",
-    "deliver",
-    "remove_obstacle",
-    "lift_with",
-    "follow_partner",
-    "follow_child",
-    "turn_around",
-    "wait",
-    "class",
-    "right_m",
-    "ahead_m",
-];
+/// What a plan's numbers are: which kind it is (`Plan::KINDS`), and of the thing that it is about the class (its
+/// number, or -1), and the place in the own body's frame, metres to the right and ahead (0 if it is about none).
+pub const PLAN: [&str; N_KINDS + 3] = {
+    let mut names = ["class"; N_KINDS + 3];
+    let mut k = 0;
+    while k < N_KINDS {
+        names[k] = Plan::KINDS[k];
+        k += 1;
+    }
+    names[N_KINDS + 1] = "right_m";
+    names[N_KINDS + 2] = "ahead_m";
+    names
+};
+const N_KINDS: usize = Plan::KINDS.len();
 
 fn plan_numbers(plan: &Plan, memory: &Memory) -> [f32; PLAN.len()] {
-    let (kind, subject) = match plan {
-        Plan::Explore => (0, None),
-        Plan::PickUp(it) => (1, Some(it)),
-        Plan::PickContainer(it) => (2, Some(it)),
-        Plan::PutIn => (3, None),
-        Plan::Deliver => (4, None),
-        Plan::RemoveObstacle(it) => (5, Some(it)),
-        Plan::LiftWith(it) => (6, Some(it)),
-        Plan::FollowPartner => (7, None),
-        Plan::FollowChild => (8, None),
-        Plan::TurnAround => (9, None),
-        Plan::Wait => (10, None),
-    };
+    let subject = plan.subject();
     let mut numbers = [0.0; PLAN.len()];
-    numbers[kind] = 1.0;
-    numbers[11] = subject.map_or(-1.0, |it| it.class.index() as f32);
+    numbers[plan.kind()] = 1.0;
+    numbers[N_KINDS] = subject.map_or(-1.0, |it| it.class.index() as f32);
     if let Some(thing) = subject.and_then(|it| memory.things.get(it.track)) {
         let pose = memory.pose;
         let in_body = rotate_yaw(thing.position_in_world - pose.position, -pose.yaw_rad);
-        [numbers[12], numbers[13]] = [in_body.x, -in_body.z];
+        [numbers[N_KINDS + 1], numbers[N_KINDS + 2]] = [in_body.x, -in_body.z];
     }
     numbers
 }

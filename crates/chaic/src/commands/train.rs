@@ -8,7 +8,7 @@ use std::time::Instant;
 use anyhow::{Context as _, Result};
 use chaic_eval::curves::{Curve, draw};
 use chaic_files::read_bounded;
-use chaic_learn::train::{CloneTraining, PolicyTraining};
+use chaic_learn::train::{Cloning, PolicyTraining, Reinforcement};
 use chaic_training::{CURVES, Of, Record, Training, TrainingRun, read_rules};
 use chaic_vision::behavior::train::BehaviorTraining;
 use chaic_vision::train::Trainer;
@@ -42,16 +42,22 @@ pub fn train(command: &TrainCommand) -> Result<Ended> {
                 rules.steps = steps;
             })
         }
-        TrainCommand::Ppo(arguments) => {
-            train_one::<PolicyTraining>("ppo", EVALUATE_POLICY, arguments, |rules, steps| {
+        TrainCommand::Ppo(arguments) => train_one::<PolicyTraining<Reinforcement>>(
+            "ppo",
+            EVALUATE_POLICY,
+            arguments,
+            |rules, steps| {
                 rules.iterations = steps;
-            })
-        }
-        TrainCommand::Clone(arguments) => {
-            train_one::<CloneTraining>("clone", EVALUATE_POLICY, arguments, |rules, steps| {
+            },
+        ),
+        TrainCommand::Clone(arguments) => train_one::<PolicyTraining<Cloning>>(
+            "clone",
+            EVALUATE_POLICY,
+            arguments,
+            |rules, steps| {
                 rules.iterations = steps;
-            })
-        }
+            },
+        ),
     }
 }
 

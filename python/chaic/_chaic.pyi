@@ -121,6 +121,7 @@ class World:
         minds_image_size: int | None = None,
         appearance: str = "canonical",
         perception: str = "gt",
+        behavior: str = "gt",
     ) -> Self: ...
     def reset(self, episode: Episode | None = None, seed: int = 0) -> None:
         """Begins another episode, or this one anew."""
@@ -204,6 +205,7 @@ class Batch:
         minds_image_size: int | None = None,
         appearance: str = "canonical",
         perception: str = "gt",
+        behavior: str = "gt",
     ) -> Self: ...
     @property
     def slots(self) -> list[tuple[int, int]]:
@@ -248,7 +250,7 @@ class Batch:
 @final
 class Mind:
     """A built-in helper, asked from Python: what it would do with an observation."""
-    def __new__(cls, name: str, perception: str = "gt") -> Self: ...
+    def __new__(cls, name: str, perception: str = "gt", behavior: str = "gt") -> Self: ...
     @property
     def grants(self) -> list[str]:
         """The grants that it needs."""
@@ -264,7 +266,9 @@ class Mind:
 @final
 class Planner:
     """Perception, memory and execution of the built-in helpers, with the choice of plans left to the caller."""
-    def __new__(cls, perception: str = "gt", image_size: int = 512) -> Self: ...
+    def __new__(
+        cls, perception: str = "gt", image_size: int = 512, behavior: str = "gt"
+    ) -> Self: ...
     @property
     def grants(self) -> list[str]:
         """The grants that it needs."""

@@ -40,6 +40,11 @@ def test_ppo_on_vectors(tmp_path):
     assert "4096 decisions" in run("ppo_vector.py", "--steps", "4096", cwd=tmp_path)
 
 
+def test_ppo_of_torchrl_on_plans(tmp_path):
+    pytest.importorskip("torchrl")
+    assert "learned from 512 plans" in run("ppo_torchrl.py", "--steps", "512", cwd=tmp_path)
+
+
 def test_imitation(tmp_path):
     pytest.importorskip("torch")
     told = run("imitation.py", "--episodes", "2", "--epochs", "3", cwd=tmp_path)

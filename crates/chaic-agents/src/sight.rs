@@ -7,6 +7,9 @@ use chaic_protocol::AgentId;
 use crate::behavior::BehaviorModel;
 use crate::perception::{GroundTruthIds, Perception};
 
+/// What [`TrueSight`], which has no name in traces, is called where one is chosen by name.
+pub const GROUND_TRUTH: &str = "gt";
+
 /// A kind of perception: what it is called, what it asks for, and where minds get it from.
 pub trait Sight: Send + Sync {
     /// Its name in traces and reports, with which somebody else can see the same; `None` for ids from

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use chaic_agents::PlannerRules;
-use chaic_agents::sight::Sight;
+use chaic_agents::sight::GROUND_TRUTH;
 use chaic_env::RunKey;
 use chaic_env::minds::{Helper, Helpers, NONE, Seeing};
 use chaic_eval::EvalError;
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::{Format, Report, write_files};
-use chaic_eval::run::{Access, GROUND_TRUTH, Progress, Run, RunRequest, Shard};
+use chaic_eval::run::{Access, Progress, Run, RunRequest, Shard};
 use chaic_protocol::observation::{Grants, Senses};
 use chaic_protocol::{Action, Agent, AgentError};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyTypeError};
@@ -153,6 +153,7 @@ struct Keywords {
     set: Vec<String>,
     traces: Option<bool>,
     perception: Option<String>,
+    behavior: Option<String>,
 }
 
 impl Keywords {
@@ -170,6 +171,7 @@ impl Keywords {
             set: self.set,
             no_traces: self.traces == Some(false),
             perception: self.perception.filter(|name| name != GROUND_TRUTH),
+            behavior: self.behavior.filter(|name| name != GROUND_TRUTH),
             ..RunRequest::default()
         })
     }
@@ -223,7 +225,8 @@ pub fn evaluate(
     let wrong = |error: pythonize::PythonizeError| PyTypeError::new_err(error.to_string());
     let keywords: Keywords = depythonize(options).map_err(wrong)?;
     let names: Vec<String> = helpers.iter().map(|(name, _)| name.clone()).collect();
-    let seen_by: Arc<dyn Sight> = sight(keywords.perception.as_deref().unwrap_or(GROUND_TRUTH))?;
+    let or_true = |name: &Option<String>| name.clone().unwrap_or_else(|| GROUND_TRUTH.to_owned());
+    let seen_by = sight(&or_true(&keywords.perception), &or_true(&keywords.behavior))?;
     let built_in = Seeing { sight: seen_by };
     let own: Vec<_> = helpers.into_iter().filter_map(|(name, make)| Some((name, make?))).collect();
     let taken = |name: &String| name == NONE || built_in.names().contains(name);

@@ -40,11 +40,13 @@ pub struct Mind {
 
 #[pymethods]
 impl Mind {
-    /// The helper of this name, like `"rhp"`, which sees by ground truth (`"gt"`) or the detector (`"learned"`).
+    /// The helper of this name, like `"rhp"`, which sees by ground truth (`"gt"`), the detector (`"learned"`,
+    /// `"learned:FILE"`) or with faults (`"noisy:FILE"`), and tells what others do by what it is granted (`"gt"`) or
+    /// the behavior network (`"learned"`, `"learned:FILE"`).
     #[new]
-    #[pyo3(signature = (name, perception="gt"))]
-    fn new(name: &str, perception: &str) -> PyResult<Mind> {
-        let helpers = minds::Seeing { sight: sight(perception)? };
+    #[pyo3(signature = (name, perception="gt", behavior="gt"))]
+    fn new(name: &str, perception: &str, behavior: &str) -> PyResult<Mind> {
+        let helpers = minds::Seeing { sight: sight(perception, behavior)? };
         let found = minds::find(&helpers, name, planner_rules()).map_err(|e| of_env(&e))?;
         let Some(Helper { mind, grants }) = found else {
             return Err(mistake("\"none\" is nobody"));
@@ -141,12 +143,12 @@ impl Planner {
 
 #[pymethods]
 impl Planner {
-    /// One that sees by ground truth (`"gt"`, which needs the grant `"ids"`) or the detector (`"learned"`), by images
-    /// of this size.
+    /// One that sees by images of this size, `perception` and `behavior` being as `Mind` has them. Ids from ground
+    /// truth (`"gt"`) need the grant `"ids"`.
     #[new]
-    #[pyo3(signature = (perception="gt", image_size=512))]
-    fn new(perception: &str, image_size: u32) -> PyResult<Planner> {
-        let sight = sight(perception)?;
+    #[pyo3(signature = (perception="gt", image_size=512, behavior="gt"))]
+    fn new(perception: &str, image_size: u32, behavior: &str) -> PyResult<Planner> {
+        let sight = sight(perception, behavior)?;
         crate::options::senses(&[], image_size)?;
         let mind = PlanMind::seeing(External::default(), planner_rules(), &*sight);
         let senses = Senses { image_size, ..mind.senses() };

@@ -2,20 +2,19 @@
 
 use std::sync::Arc;
 
-use chaic_agents::sight::{Sight, TrueSight};
+use chaic_agents::sight::{GROUND_TRUTH, Sight};
 use chaic_env::rules::{RuleSet, RuleSetName};
 use chaic_env::{Appearance, EpisodeConfig, Minds, Seat, minds};
 use chaic_eval::run::{MAX_IMAGE_SIZE, MIN_IMAGE_SIZE};
 use chaic_protocol::observation::{Grants, Senses};
-use chaic_vision::perception::LearnedSight;
-use chaic_vision::trained::TrainedDetector;
+use chaic_vision::sights::{SightError, named};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use pythonize::depythonize;
 use serde::Deserialize;
 
-use crate::error::{mistake, of_env};
+use crate::error::{failure, mistake, of_env};
 
 /// What a seat of the caller's is called where minds are named.
 pub const CALLER: &str = "caller";
@@ -34,6 +33,7 @@ struct Keywords {
     minds_image_size: Option<u32>,
     appearance: String,
     perception: String,
+    behavior: String,
 }
 
 impl Default for Keywords {
@@ -48,7 +48,8 @@ impl Default for Keywords {
             image_size: 128,
             minds_image_size: None,
             appearance: "canonical".to_owned(),
-            perception: "gt".to_owned(),
+            perception: GROUND_TRUTH.to_owned(),
+            behavior: GROUND_TRUTH.to_owned(),
         }
     }
 }
@@ -83,7 +84,7 @@ impl Options {
             senses: senses(&keywords.images, keywords.image_size)?,
             grants: grants(&keywords.grants)?,
             appearance: keywords.appearance.parse().map_err(mistake)?,
-            sight: sight(&keywords.perception)?,
+            sight: sight(&keywords.perception, &keywords.behavior)?,
             helper: keywords.helper,
             partner: keywords.partner,
             minds_image_size: keywords.minds_image_size,
@@ -141,16 +142,15 @@ impl Options {
     }
 }
 
-/// The sight of this name.
+/// By what somebody sees, and tells what others do, as `--perception` and `--behavior` name it.
 ///
 /// # Errors
-/// `ValueError` if there is none.
-pub fn sight(name: &str) -> PyResult<Arc<dyn Sight>> {
-    match name {
-        "gt" => Ok(Arc::new(TrueSight)),
-        "learned" => Ok(Arc::new(LearnedSight::new(TrainedDetector::built_in()))),
-        _ => Err(mistake(format!("no perception {name:?}; write \"gt\" or \"learned\""))),
-    }
+/// `ValueError` if there is no such thing, `RuntimeError` if its file can't be read.
+pub fn sight(perception: &str, behavior: &str) -> PyResult<Arc<dyn Sight>> {
+    named(perception, behavior).map_err(|problem| match problem {
+        SightError::File(_) => failure(problem),
+        _ => mistake(problem),
+    })
 }
 
 /// The grants of these names.

@@ -83,7 +83,7 @@ impl World {
     /// built-in helper or `"none"`; `"rules"` for the task's own partner), `rules`, `set`, `grants` (docs/grants.md)
     /// and `images` (of `"rgb"`, `"depth"`, `"ids"`) and `image_size` of the caller's seats, `minds_image_size` of all others (as in
     /// scored runs unless said), `appearance`,
-    /// `perception` of a built-in helper (`"gt"` or `"learned"`).
+    /// `perception` and `behavior` of a built-in helper as `Mind` has them.
     #[new]
     #[pyo3(signature = (episode, seed=0, **options))]
     fn new(

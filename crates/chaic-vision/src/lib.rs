@@ -6,7 +6,7 @@
 //! what it learns by, [`train`] the loop; [`instances`] makes things of what the network says, [`calibration`] tells how sure
 //! each is, [`trained`] is all of it as one file, and [`average_precision`] tells how good they are and
 //! [`failures`] what goes wrong; [`coco`] writes views as data sets. [`tracker`] tells which thing is which over time, and [`perception`]
-//! makes all of it the eyes of a mind; [`noisy`] stands in for it. [`behavior`] tells what people do.
+//! makes all of it the eyes of a mind; [`noisy`] stands in for it. [`behavior`] tells what people do; [`sights`] has all of these by name.
 //!
 //! **What it is not**: it knows no goals, rules or minds.
 //!
@@ -39,6 +39,7 @@ pub mod train;
 
 pub mod noisy;
 pub mod perception;
+pub mod sights;
 pub mod tracker;
 
 pub mod behavior;

@@ -16,6 +16,7 @@ use chaic_eval::report::Format;
 use chaic_eval::run::Shard;
 use chaic_protocol::capability::PersonKind;
 use chaic_protocol::{AgentId, TaskId};
+use chaic_vision::sights::LEARNED;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub use self::bench::{
@@ -31,9 +32,6 @@ pub use self::perception::{
     CollectDetectionArguments, DetectionArguments, EvalPerceptionCommand, Look, Of, Scenes,
     TrainArguments, TrainCommand,
 };
-
-/// What networks that are trained here are called.
-pub const LEARNED: &str = "learned";
 
 fn partner_is_help() -> String {
     let choices = PersonKind::choices();

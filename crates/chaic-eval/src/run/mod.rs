@@ -19,7 +19,7 @@ pub use folder::{Access, RunFolder};
 pub use granted::RunGrants;
 pub use items::{Item, planned, tasks_of_files};
 pub use journal::{Journal, read_results};
-pub use options::{GROUND_TRUTH, MAX_IMAGE_SIZE, MIN_IMAGE_SIZE, RunOptions, RunRequest};
+pub use options::{MAX_IMAGE_SIZE, MIN_IMAGE_SIZE, RunOptions, RunRequest};
 pub use shard::{Shard, merge};
 pub use worker::{Finished, Progress};
 

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use chaic_agents::sight::GROUND_TRUTH;
 use chaic_env::Digest;
 use chaic_env::minds::RULES;
 use chaic_env::rules::{RuleSet, RuleSetName};
@@ -105,9 +106,6 @@ pub struct RunRequest {
     /// `--behavior`.
     pub behavior: Option<String>,
 }
-
-/// What `--perception` says of ids from ground truth, and `--behavior` of what is granted.
-pub const GROUND_TRUTH: &str = "gt";
 
 /// What `split` says where the episodes are files.
 pub const FILES: &str = "files";

@@ -120,7 +120,7 @@ pub(super) fn play(
     folder: Option<&ClipFolder>,
 ) -> Result<Option<Vec<Clip>>> {
     let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
-    let sight = super::sight::named_sight(&arguments.perception)?;
+    let sight = super::sight::of_names(Some(&arguments.perception), None)?;
     let bar = bars::plain(u64::from(arguments.episodes), "episodes");
     let (rules, n_threads) = (clip_rules(arguments), jobs(arguments.jobs));
     let collector = Collector { part, rules: &rules, sight: &*sight, n_threads, folder };

@@ -122,8 +122,9 @@ pub fn language(
 /// Who names nobody known hears of all names, also of those that ask a language model.
 fn check_names(arguments: &EvalArguments) -> Result<(), EnvError> {
     let known: Vec<String> = [NONE.to_owned()].into_iter().chain(helper_names()).collect();
-    let known_here = arguments.commands().into_iter().map(|c| c.name).chain(known.clone());
-    let known_here: Vec<String> = known_here.collect();
+    let own = arguments.commands().into_iter().map(|c| c.name);
+    let own = own.chain(arguments.policies().map(|(name, _)| name.to_owned()));
+    let known_here: Vec<String> = own.chain(known.clone()).collect();
     let mut helpers = arguments.helper_names().into_iter().flatten();
     if let Some(name) = helpers.find(|name| !known_here.contains(name)) {
         return Err(EnvError::UnknownHelper { name, known });

@@ -3,14 +3,15 @@
 use std::fs;
 use std::path::Path;
 
-use anyhow::{Context as _, Result};
-use chaic_files::{FileError, read_bounded, write_whole};
+use anyhow::Result;
+use chaic_files::{FileError, write_whole};
 use chaic_vision::behavior::Behavior;
 use chaic_vision::behavior::network::TrainedBehavior;
 use chaic_vision::behavior::report::report as behavior_report;
 use chaic_vision::coco::{ANNOTATIONS, DETECTIONS, annotate, annotations_json, results};
 use chaic_vision::evaluate::{DetectionReport, ENOUGH, LEAST_PX, report};
 use chaic_vision::instances::Instance;
+use chaic_vision::sights::{read_behavior, read_detector};
 use chaic_vision::trained::TrainedDetector;
 use chaic_vision::views::{LabelledView, Part};
 use serde::Serialize;
@@ -20,9 +21,6 @@ use super::jobs;
 use crate::arguments::{BehaviorArguments, DetectionArguments, EvalPerceptionCommand};
 use crate::exit::Ended;
 use crate::output::say;
-
-/// No weights are larger, bytes.
-const MOST_BYTES: u64 = 1 << 28;
 
 /// Tells how good perception is.
 pub fn evaluate(command: &EvalPerceptionCommand) -> Result<Ended> {
@@ -101,18 +99,6 @@ fn write_json(path: Option<&Path>, found: &impl Serialize) -> Result<Ended> {
         write_whole(path, json.as_bytes())?;
     }
     Ok(Ended::Well)
-}
-
-/// The behavior network in a file.
-pub(super) fn read_behavior(path: &Path) -> Result<TrainedBehavior> {
-    let bytes = read_bounded(path, MOST_BYTES)?;
-    TrainedBehavior::from_bytes(&bytes).with_context(|| path.display().to_string())
-}
-
-/// The detector in a file.
-pub(super) fn read_detector(path: &Path) -> Result<TrainedDetector> {
-    let bytes = read_bounded(path, MOST_BYTES)?;
-    TrainedDetector::from_bytes(&bytes).with_context(|| path.display().to_string())
 }
 
 fn text(found: &DetectionReport, arguments: &DetectionArguments) -> String {

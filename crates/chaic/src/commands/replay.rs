@@ -15,9 +15,9 @@ use chaic_llm::Language;
 use chaic_protocol::geom::Camera;
 use chaic_protocol::observation::Senses;
 use chaic_vision::failures::TOLD_SCORE;
+use chaic_vision::sights::{read_detector, weights_of};
 use chaic_vision::trained::{Inference, TrainedDetector};
 
-use super::perception::read_detector;
 use super::{bars, llm, sight};
 use crate::arguments::ReplayArguments;
 use crate::exit::Ended;
@@ -76,8 +76,8 @@ pub fn run(arguments: &ReplayArguments) -> Result<Ended> {
 
 /// The detector by which the run's helpers saw, if it is known and still there.
 fn detector_of(options: &RunOptions) -> Result<TrainedDetector> {
-    match options.perception.as_deref().and_then(sight::weights_of) {
-        Some(file) => read_detector(file),
+    match options.perception.as_deref().and_then(weights_of) {
+        Some(file) => Ok(read_detector(file)?),
         None => Ok(TrainedDetector::built_in()),
     }
 }

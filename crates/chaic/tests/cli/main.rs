@@ -10,6 +10,7 @@ use assert_cmd::cargo::cargo_bin;
 mod files;
 mod interrupted;
 mod language;
+mod learning;
 mod perception;
 mod pictures;
 mod splits;

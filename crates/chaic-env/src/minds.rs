@@ -53,26 +53,31 @@ pub trait Helpers: Sync {
         Ok(())
     }
 
+    /// The helpers beside which these stand, for those who add some: what follows is asked of them.
+    fn others(&self) -> Option<&dyn Helpers> {
+        None
+    }
+
     /// The names of minds that may drive the partner in place of the rule-based ones.
     fn partner_names(&self) -> Vec<String> {
-        Vec::new()
+        self.others().map_or_else(Vec::new, Helpers::partner_names)
     }
 
     /// A mind of this name for the partner; of one episode run, or only to know what it asks for.
-    fn partner(&self, _name: &str, _of: Option<&RunKey>, _rules: PlannerRules) -> Option<Helper> {
-        None
+    fn partner(&self, name: &str, of: Option<&RunKey>, rules: PlannerRules) -> Option<Helper> {
+        self.others()?.partner(name, of, rules)
     }
 
     /// How many episode runs with minds that [wait](Helpers::waits) are played at a time, besides
     /// those of the jobs.
     fn waiting_jobs(&self) -> usize {
-        0
+        self.others().map_or(0, Helpers::waiting_jobs)
     }
 
     /// Whether minds of this name (or the partner's) spend their time waiting for somebody else's
     /// computer, so that others had better be played meanwhile.
-    fn waits(&self, _name: &str) -> bool {
-        false
+    fn waits(&self, name: &str) -> bool {
+        self.others().is_some_and(|others| others.waits(name))
     }
 }
 

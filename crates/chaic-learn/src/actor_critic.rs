@@ -4,8 +4,9 @@
 //! itself, beside the state (as in pointer networks, Vinyals et al. 2015).
 
 use chaic_nn::simd::widest;
-use chaic_nn::{Kernel, Network, Node, Pass, Shape, Tensor};
+use chaic_nn::{AdamRules, Kernel, Network, Node, Pass, Shape, Tensor};
 use chaic_protocol::geom::math;
+use chaic_training::Learner;
 
 /// What is known when a choice is made.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -28,13 +29,6 @@ pub struct Said {
 }
 
 impl Said {
-    /// What is said where there is no doubt, of one of so many choices.
-    pub fn certain(n: usize, choice: usize) -> Said {
-        let log_probabilities =
-            (0..n).map(|k| if k == choice { 0.0 } else { f32::NEG_INFINITY }).collect();
-        Said { log_probabilities, value: 0.0 }
-    }
-
     /// The entropy of the choices, nats.
     pub fn entropy(&self) -> f32 {
         -self.log_probabilities.iter().map(|l| l * math::exp(*l)).sum::<f32>()
@@ -164,6 +158,39 @@ impl ActorCritic {
         }
         pass.backward(&self.network, numbers, by_numbers);
     }
+}
+
+/// Takes a step along the mean gradient of a batch of samples, whose parts are worked on side by side. `gradient` gives
+/// that of one sample, times the share of it that is its third argument, and adds what it was like to the fourth;
+/// that is given back for each part.
+pub fn step<S: Sync, T: Default + Send>(
+    model: &ActorCritic,
+    (learner, adam, rate): (&mut Learner, &AdamRules, f32),
+    batch: &[&S],
+    decision_of: impl Fn(&S) -> &Decision + Sync,
+    gradient: impl Fn(&S, &Said, f32, &mut T) -> BySaid + Sync,
+) -> Vec<T> {
+    let n_parts = learner.shards();
+    let of_part = batch.len().div_ceil(n_parts);
+    // The learner takes the mean over parts.
+    let share = n_parts as f32 / batch.len() as f32;
+    let work = |k: usize, numbers: &[f32], pass: &mut Pass, by: &mut [f32]| {
+        let from = (k * of_part).min(batch.len());
+        let samples = &batch[from..(from + of_part).min(batch.len())];
+        let mut told = T::default();
+        if samples.is_empty() {
+            return told;
+        }
+        let said = model.forward(numbers, samples.iter().map(|s| decision_of(s)), pass);
+        let by_said: Vec<BySaid> = samples
+            .iter()
+            .zip(&said)
+            .map(|(s, said)| gradient(s, said, share, &mut told))
+            .collect();
+        model.backward(numbers, &by_said, pass, by);
+        told
+    };
+    learner.step(&model.network, (adam, rate), work)
 }
 
 /// Logarithms of the probabilities that logits stand for.

@@ -7,14 +7,14 @@ use std::sync::PoisonError;
 
 use chaic_agents::decision::{Context, Plan, Policy};
 use chaic_agents::policies::{RulePolicy, RuleProfile};
-use chaic_nn::{AdamRules, Pass};
+use chaic_nn::AdamRules;
 use chaic_protocol::briefing::Goal;
 use chaic_protocol::geom::math;
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{AgentError, Briefing};
 use chaic_training::Learner;
 
-use crate::actor_critic::{ActorCritic, BySaid, Decision, Said};
+use crate::actor_critic::{ActorCritic, BySaid, Decision, Said, step};
 use crate::features::{Choices, decision};
 use crate::policy::{LearnedPolicy, Noted, Notes};
 
@@ -33,22 +33,19 @@ pub struct Teacher {
     driver: Driver,
     notes: Notes,
     choices: Choices,
-    /// Asked when to think again, so that teacher and learner decide at the same moments.
-    clock: LearnedPolicy,
 }
 
 impl Teacher {
-    /// A teacher who knows this goal; `clock` decides when a choice is due.
-    pub fn new(goal: Goal, driver: Driver, clock: LearnedPolicy, notes: Notes) -> Teacher {
+    /// A teacher who knows this goal.
+    pub fn new(goal: Goal, driver: Driver, notes: Notes) -> Teacher {
         let rules = RulePolicy::new(RuleProfile::ORACLE);
-        Teacher { rules, goal, driver, notes, choices: Choices::default(), clock }
+        Teacher { rules, goal, driver, notes, choices: Choices::default() }
     }
 }
 
 impl Policy for Teacher {
     fn reset(&mut self, briefing: &Briefing) {
         Policy::reset(&mut self.rules, briefing);
-        self.clock.reset(briefing);
         self.choices = Choices::default();
         if let Driver::Learner(learner) = &mut self.driver {
             learner.reset(briefing);
@@ -64,23 +61,19 @@ impl Policy for Teacher {
             Driver::Teacher => taught,
             Driver::Learner(learner) => learner.choose(context, valid)?,
         };
-        self.clock.note(plan, context.memory.frame);
-        self.choices.note(plan);
+        let frame = context.memory.frame;
+        self.choices.note(plan, frame);
         // What isn't among the choices, like waiting, can't be learned.
         if let Some(choice) = valid.iter().position(|plan| *plan == taught) {
-            let noted = Noted {
-                frame: context.memory.frame,
-                decision,
-                choice,
-                said: Said::certain(valid.len(), choice),
-            };
+            let noted = Noted { frame, decision, choice, log_probability: 0.0, value: 0.0 };
             self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(noted);
         }
         Ok(plan)
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, is_news: bool) -> bool {
-        self.clock.reconsiders(context, current, is_news)
+        // When the learner would, so that both decide at the same moments.
+        self.choices.is_due(context.memory.frame, current, is_news)
     }
 }
 
@@ -118,33 +111,9 @@ pub fn imitate(
     Stream::new(seed, "lessons", iteration).shuffle(&mut order);
     let mut sum = Learned::default();
     for batch in order.chunks(batch) {
-        let n_shards = learner.shards();
-        let of_shard = batch.len().div_ceil(n_shards);
-        let work = |shard: usize, numbers: &[f32], pass: &mut Pass, by: &mut [f32]| {
-            let from = (shard * of_shard).min(batch.len());
-            let chosen = &batch[from..(from + of_shard).min(batch.len())];
-            let part = n_shards as f32 / batch.len() as f32;
-            let lessons = || chosen.iter().map(|k| &lessons[*k]);
-            let said = model.forward(numbers, lessons().map(|l| &l.decision), pass);
-            let mut learned = Learned::default();
-            let mut by_said = Vec::with_capacity(chosen.len());
-            for (lesson, said) in lessons().zip(&said) {
-                let error = said.value - lesson.target;
-                learned.loss -= f64::from(said.log_probabilities[lesson.choice]);
-                learned.agreement += f64::from(u8::from(said.most_likely() == lesson.choice));
-                learned.value_loss += f64::from(0.5 * error * error);
-                let logits =
-                    said.log_probabilities.iter().enumerate().map(|(k, l)| {
-                        part * (math::exp(*l) - f32::from(u8::from(k == lesson.choice)))
-                    });
-                by_said.push(BySaid { logits: logits.collect(), value: 0.5 * part * error });
-            }
-            if !chosen.is_empty() {
-                model.backward(numbers, &by_said, pass, by);
-            }
-            learned
-        };
-        for learned in learner.step(&model.network, (adam, rate), work) {
+        let batch: Vec<&Lesson> = batch.iter().map(|k| &lessons[*k]).collect();
+        let parts = step(model, (&mut *learner, adam, rate), &batch, |l| &l.decision, gradient);
+        for learned in parts {
             sum.loss += learned.loss;
             sum.agreement += learned.agreement;
             sum.value_loss += learned.value_loss;
@@ -152,6 +121,18 @@ pub fn imitate(
     }
     let n = lessons.len().max(1) as f64;
     Learned { loss: sum.loss / n, agreement: sum.agreement / n, value_loss: sum.value_loss / n }
+}
+
+/// The gradient of the loss of one lesson; adds what it was like to `learned`.
+fn gradient(lesson: &Lesson, said: &Said, share: f32, learned: &mut Learned) -> BySaid {
+    let error = said.value - lesson.target;
+    learned.loss -= f64::from(said.log_probabilities[lesson.choice]);
+    learned.agreement += f64::from(u8::from(said.most_likely() == lesson.choice));
+    learned.value_loss += f64::from(0.5 * error * error);
+    let taught = |k: usize| f32::from(u8::from(k == lesson.choice));
+    let logits = said.log_probabilities.iter().enumerate();
+    let logits = logits.map(|(k, l)| share * (math::exp(*l) - taught(k))).collect();
+    BySaid { logits, value: 0.5 * share * error }
 }
 
 /// The driver of an episode: the learner in a share of them.

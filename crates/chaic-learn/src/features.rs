@@ -7,7 +7,7 @@ use chaic_agents::memory::Memory;
 use chaic_protocol::briefing::Relation;
 use chaic_protocol::catalogue::TargetSet;
 use chaic_protocol::geom::{horizontal_distance, math, xz};
-use chaic_protocol::{ClassId, Role, Vec3};
+use chaic_protocol::{ClassId, Frame, Role, Vec3};
 
 use crate::actor_critic::Decision;
 
@@ -91,23 +91,35 @@ const FAR_M: f32 = 20.0;
 const FRESH_FRAMES: f32 = 120.0;
 const LONG_FRAMES: f32 = 3000.0;
 const HEAVY_KG: f32 = 20.0;
-/// How far a body walks in a frame, roughly, metres (1.5 m/s with turning).
+/// How far a body gets in a frame, roughly, metres: a measure for the time to spare, no more.
 const M_PER_FRAME: f32 = 0.04;
+
+/// A plan under way is thought over after so many frames, if nothing came up before.
+const RECONSIDER_FRAMES: Frame = 150;
 
 /// What a policy remembers of its own choices.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Choices {
     /// The latest.
     pub last: Option<Plan>,
+    /// When that was.
+    pub last_frame: Frame,
     /// How often each kind was chosen.
     pub n_of_kind: [u32; N_KINDS],
 }
 
 impl Choices {
-    /// Notes a choice.
-    pub fn note(&mut self, plan: Plan) {
+    /// Notes a choice that is made at this frame.
+    pub fn note(&mut self, plan: Plan, frame: Frame) {
         self.n_of_kind[plan.kind()] += 1;
         self.last = Some(plan);
+        self.last_frame = frame;
+    }
+
+    /// Whether another one is due at this frame although `current` is not finished.
+    pub fn is_due(&self, frame: Frame, current: &Plan, is_news: bool) -> bool {
+        let is_bound = matches!(current, Plan::Deliver | Plan::PutIn | Plan::LiftWith(_));
+        !is_bound && (is_news || frame >= self.last_frame + RECONSIDER_FRAMES)
     }
 }
 

@@ -139,19 +139,7 @@ impl Helpers for Policies<'_> {
         write_whole(&path, &text).map_err(minds)
     }
 
-    fn partner_names(&self) -> Vec<String> {
-        self.others.partner_names()
-    }
-
-    fn partner(&self, name: &str, of: Option<&RunKey>, rules: PlannerRules) -> Option<Helper> {
-        self.others.partner(name, of, rules)
-    }
-
-    fn waiting_jobs(&self) -> usize {
-        self.others.waiting_jobs()
-    }
-
-    fn waits(&self, name: &str) -> bool {
-        self.others.waits(name)
+    fn others(&self) -> Option<&dyn Helpers> {
+        Some(self.others)
     }
 }

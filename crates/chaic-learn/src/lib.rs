@@ -2,7 +2,8 @@
 //!
 //! **What it is**: [`features`] says what a choice is seen as, [`actor_critic`] is the network that
 //! chooses and values, [`policy`] lets it drive a mind and keeps what happened, [`rollout`] plays episodes with
-//! it, [`helpers`] makes it a helper of a run; [`ppo`] makes it better by what came of them (proximal policy optimization), [`cloning`] learns from a teacher, and [`train`] has the loops.
+//! it, [`helpers`] makes it a helper of a run; [`ppo`] makes it better by what came of them (proximal policy
+//! optimization), [`cloning`] learns from a teacher, and [`train`] has the loops.
 //! [`toy`] has tasks whose best return is known, for tests of the learner itself.
 //!
 //! **What it is not**: it knows no rules of tasks and no pixels. Perception, memory and the carrying out of plans

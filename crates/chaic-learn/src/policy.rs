@@ -8,7 +8,7 @@ use chaic_nn::Pass;
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{AgentError, Briefing, Frame};
 
-use crate::actor_critic::{ActorCritic, Decision, Said};
+use crate::actor_critic::{ActorCritic, Decision};
 use crate::features::{Choices, decision};
 
 /// A network with its numbers.
@@ -38,15 +38,14 @@ pub struct Noted {
     pub decision: Decision,
     /// Which choice.
     pub choice: usize,
-    /// What the network said.
-    pub said: Said,
+    /// The logarithm of its probability.
+    pub log_probability: f32,
+    /// The return that was expected.
+    pub value: f32,
 }
 
 /// Choices of one episode, for those who learn from them.
 pub type Notes = Arc<Mutex<Vec<Noted>>>;
-
-/// After so many frames a plan under way is thought over (as RHP does).
-const RECONSIDER_FRAMES: Frame = 150;
 
 /// Chooses plans as a network says.
 #[derive(Clone)]
@@ -57,7 +56,6 @@ pub struct LearnedPolicy {
     pass: Pass,
     rng: Stream,
     choices: Choices,
-    last_frame: Frame,
 }
 
 impl LearnedPolicy {
@@ -65,21 +63,7 @@ impl LearnedPolicy {
     pub fn new(trained: Arc<Trained>, choosing: Choosing, notes: Option<Notes>) -> LearnedPolicy {
         let pass = trained.model.pass();
         let rng = Stream::new(0, "plans", 0);
-        LearnedPolicy {
-            trained,
-            choosing,
-            notes,
-            pass,
-            rng,
-            choices: Choices::default(),
-            last_frame: 0,
-        }
-    }
-
-    /// Takes note of a choice that was made at this frame.
-    pub(crate) fn note(&mut self, plan: Plan, frame: Frame) {
-        self.choices.note(plan);
-        self.last_frame = frame;
+        LearnedPolicy { trained, choosing, notes, pass, rng, choices: Choices::default() }
     }
 }
 
@@ -87,7 +71,6 @@ impl Policy for LearnedPolicy {
     fn reset(&mut self, briefing: &Briefing) {
         self.rng = Stream::new(briefing.seed, "learned policy", 0);
         self.choices = Choices::default();
-        self.last_frame = 0;
     }
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
@@ -99,17 +82,18 @@ impl Policy for LearnedPolicy {
             Choosing::Likeliest => said.most_likely(),
         };
         let plan = valid[choice];
-        self.note(plan, context.memory.frame);
+        let frame = context.memory.frame;
+        self.choices.note(plan, frame);
         if let Some(notes) = &self.notes {
-            let noted = Noted { frame: context.memory.frame, decision, choice, said };
+            let log_probability = said.log_probabilities[choice];
+            let noted = Noted { frame, decision, choice, log_probability, value: said.value };
             notes.lock().unwrap_or_else(PoisonError::into_inner).push(noted);
         }
         Ok(plan)
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, is_news: bool) -> bool {
-        let is_bound = matches!(current, Plan::Deliver | Plan::PutIn | Plan::LiftWith(_));
-        !is_bound && (is_news || context.memory.frame >= self.last_frame + RECONSIDER_FRAMES)
+        self.choices.is_due(context.memory.frame, current, is_news)
     }
 
     fn counts(&self) -> BTreeMap<String, u64> {

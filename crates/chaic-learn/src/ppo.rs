@@ -1,12 +1,12 @@
 //! Proximal policy optimization (Schulman et al. 2017), for decisions that last differently long.
 
-use chaic_nn::{AdamRules, Pass};
+use chaic_nn::AdamRules;
 use chaic_protocol::geom::math;
 use chaic_protocol::rng::Stream;
 use chaic_training::Learner;
 use serde::{Deserialize, Serialize};
 
-use crate::actor_critic::{ActorCritic, BySaid, Decision, Said};
+use crate::actor_critic::{ActorCritic, BySaid, Decision, Said, step};
 
 /// How it learns. What Stable-Baselines3 calls a number is said in brackets.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -165,26 +165,12 @@ pub fn improve(
         let index = iteration * rules.epochs as u64 + epoch as u64;
         Stream::new(seed, "batches", index).shuffle(&mut order);
         for batch in order.chunks(rules.batch) {
-            let of_shard = batch.len().div_ceil(rules.shards);
-            let work = |shard: usize, numbers: &[f32], pass: &mut Pass, by: &mut [f32]| {
-                let from = (shard * of_shard).min(batch.len());
-                let chosen = &batch[from..(from + of_shard).min(batch.len())];
-                // The learner takes the mean over shards.
-                let part = rules.shards as f32 / batch.len() as f32;
-                let samples = || chosen.iter().map(|k| &samples[*k]);
-                if chosen.is_empty() {
-                    return Told::default();
-                }
-                let decisions = samples().map(|s| &s.transition.decision);
-                let said = model.forward(numbers, decisions, pass);
-                let (mut told, mut by_said) = (Told::default(), Vec::with_capacity(chosen.len()));
-                for (sample, said) in samples().zip(&said) {
-                    by_said.push(gradient(rules, sample, said, part, &mut told));
-                }
-                model.backward(numbers, &by_said, pass, by);
-                told
+            let batch: Vec<&Sample<'_>> = batch.iter().map(|k| &samples[*k]).collect();
+            let how = (&mut *learner, &rules.adam, rate);
+            let by = |s: &Sample<'_>, said: &Said, share, told: &mut Told| {
+                gradient(rules, s, said, share, told)
             };
-            let parts = learner.step(&model.network, (&rules.adam, rate), work);
+            let parts = step(model, how, &batch, |s| &s.transition.decision, by);
             let mean =
                 |of: fn(&Told) -> f64| parts.iter().map(of).sum::<f64>() / batch.len() as f64;
             let divergence = mean(|t| t.divergence);

@@ -5,10 +5,10 @@ use std::sync::{Arc, PoisonError};
 use chaic_agents::Mind;
 use chaic_agents::decision::Policy;
 use chaic_agents::sight::Sight;
-use chaic_env::minds::{Helper, NONE};
+use chaic_env::minds::Helper;
 use chaic_env::rules::RuleSet;
 use chaic_env::{Env, EnvError, EpisodeConfig, Flow, Minds};
-use chaic_episodes::{Episode, SplitError, find_episode};
+use chaic_episodes::{SplitError, find_episode};
 use chaic_protocol::briefing::Goal;
 use chaic_protocol::geom::math;
 use chaic_protocol::observation::Grants;
@@ -129,7 +129,16 @@ fn record<P: Policy>(
     let mind = Mind::seeing(policy, RuleSet::PAPER.planner, rules.sight);
     let helper = Helper { mind: Box::new(mind), grants: rules.sight.grants(Grants::PLANNER) };
     let minds = Minds::of(Some(helper), None);
-    let mut env = Env::new(config(&episode, seed, "learner", rules.image_size), minds)?;
+    let config = EpisodeConfig {
+        episode: &episode,
+        seed,
+        rules: RuleSet::PAPER,
+        helper: "learner",
+        partner: None,
+        image_size: Some(rules.image_size),
+        appearance: Appearance::Canonical,
+    };
+    let mut env = Env::new(config, minds)?;
     let mut worth = Vec::new();
     loop {
         let frame = env.world().state().frame;
@@ -142,23 +151,6 @@ fn record<P: Policy>(
     worth.push((frames, rules.worth(&env)));
     let noted = std::mem::take(&mut *notes.lock().unwrap_or_else(PoisonError::into_inner));
     Ok(Recording { noted, worth, tr: share_done(&env), frames })
-}
-
-fn config<'a>(
-    episode: &'a Episode,
-    seed: u32,
-    helper: &'a str,
-    image_size: u32,
-) -> EpisodeConfig<'a> {
-    EpisodeConfig {
-        episode,
-        seed,
-        rules: RuleSet::PAPER,
-        helper,
-        partner: None,
-        image_size: Some(image_size),
-        appearance: Appearance::Canonical,
-    }
 }
 
 /// Plays an episode with a network as the helper.
@@ -176,8 +168,8 @@ pub fn play(
     })?;
     let transitions = recording.noted.iter().zip(recording.ends()).map(|(noted, end)| Transition {
         choice: noted.choice,
-        log_probability: noted.said.log_probabilities[noted.choice],
-        value: noted.said.value,
+        log_probability: noted.log_probability,
+        value: noted.value,
         reward: recording.worth_at(end) - recording.worth_at(noted.frame),
         duration: (end - noted.frame) as f32,
         decision: noted.decision.clone(),
@@ -201,7 +193,7 @@ pub fn play_taught(
     let recording = record((id, seed), rules, |goal, notes| {
         let mut rng = Stream::new(u64::from(seed), id, 0);
         let driver = driver(mixed, &mut rng, learner);
-        Teacher::new(goal.clone(), driver, learner(), notes)
+        Teacher::new(goal.clone(), driver, notes)
     })?;
     let ends: Vec<Frame> = recording.ends().collect();
     let mut following = 0.0;
@@ -235,16 +227,4 @@ pub fn play_all(
     rules: &RolloutRules<'_>,
 ) -> Result<Vec<Played>, RolloutError> {
     ids.par_iter().map(|(id, seed)| play(id, *seed, trained, rules)).collect()
-}
-
-/// Transport rate of the partner alone.
-///
-/// # Errors
-/// [`RolloutError`]
-pub fn play_alone(id: &str, seed: u32, image_size: u32) -> Result<f64, RolloutError> {
-    let episode = find_episode(id)?;
-    let config = config(&episode, seed, NONE, image_size);
-    let mut env = Env::new(config, Minds { helper: None, partner: None })?;
-    env.advance(None)?;
-    Ok(share_done(&env))
 }

@@ -173,20 +173,24 @@ mod tests {
     use crate::ppo::{PpoRules, improve};
     use chaic_training::Learner;
 
-    /// The mean return of the last iteration.
-    fn learn<T: Toy>(rules: &PpoRules, iterations: u64, n_decisions: usize) -> f32 {
+    /// What is played after so many iterations of so many decisions.
+    fn learn<T: Toy>(
+        rules: &PpoRules,
+        iterations: u64,
+        n_decisions: usize,
+    ) -> (Vec<Trajectory>, Vec<f32>) {
         let model = network::<T>(32);
         let mut learner = Learner::new(&model.network, 1, rules.shards);
-        let mut last = 0.0;
-        for iteration in 0..iterations {
+        let played = |iteration: u64, learner: &Learner| {
             let mut rng = Stream::new(1, "toy", iteration);
-            let (trajectories, returns) =
-                play::<T>(&model, &learner.numbers, n_decisions, &mut rng);
-            last = returns.iter().sum::<f32>() / returns.len().max(1) as f32;
+            play::<T>(&model, &learner.numbers, n_decisions, &mut rng)
+        };
+        for iteration in 0..iterations {
+            let (trajectories, _) = played(iteration, &learner);
             let rest = 1.0 - iteration as f32 / iterations as f32;
             improve(rules, &model, &mut learner, &trajectories, (1, iteration, rest));
         }
-        last
+        played(iterations, &learner)
     }
 
     #[test]
@@ -200,7 +204,8 @@ mod tests {
             rate_falls: true,
             ..PpoRules::default()
         };
-        let got = learn::<CartPole>(&rules, 25, 2048);
+        let (_, returns) = learn::<CartPole>(&rules, 25, 2048);
+        let got = returns.iter().sum::<f32>() / returns.len() as f32;
         assert!(got > 475.0, "{got}");
     }
 
@@ -214,16 +219,7 @@ mod tests {
             rate_falls: true,
             ..PpoRules::default()
         };
-        let model = network::<Maze>(32);
-        let mut learner = Learner::new(&model.network, 1, rules.shards);
-        for iteration in 0..30 {
-            let mut rng = Stream::new(1, "maze", iteration);
-            let (trajectories, _) = play::<Maze>(&model, &learner.numbers, 1024, &mut rng);
-            let rest = 1.0 - iteration as f32 / 30.0;
-            improve(&rules, &model, &mut learner, &trajectories, (1, iteration, rest));
-        }
-        let (trajectories, _) =
-            play::<Maze>(&model, &learner.numbers, 1024, &mut Stream::new(2, "maze", 0));
+        let (trajectories, _) = learn::<Maze>(&rules, 30, 1024);
         let ended = &trajectories[..trajectories.len() - 1];
         let steps = ended.iter().map(|t| t.transitions.len()).sum::<usize>() as f32;
         let mean = steps / ended.len() as f32;

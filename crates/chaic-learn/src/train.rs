@@ -160,6 +160,21 @@ impl Learning {
     }
 }
 
+/// What all ways to learn have.
+#[derive(Clone, Copy, Debug)]
+pub struct Course<'a> {
+    /// Of weights, episodes and batches.
+    pub seed: u64,
+    /// Iterations in all.
+    pub iterations: u64,
+    /// What is played.
+    pub play: &'a PlayRules,
+    /// Parts of a batch that are worked on side by side.
+    pub shards: usize,
+    /// How steps are taken.
+    pub adam: &'a AdamRules,
+}
+
 /// A way to learn, with all that it depends on.
 pub trait Method: Clone + Default + Serialize + DeserializeOwned {
     /// What is wrong with it.
@@ -168,17 +183,8 @@ pub trait Method: Clone + Default + Serialize + DeserializeOwned {
     /// That, in a sentence.
     fn check(&self) -> Result<(), &'static str>;
 
-    /// Of weights, episodes and batches.
-    fn seed(&self) -> u64;
-
-    /// Iterations in all.
-    fn iterations(&self) -> u64;
-
-    /// What is played.
-    fn play(&self) -> &PlayRules;
-
-    /// Parts of a batch that are worked on side by side, and how steps are taken.
-    fn steps(&self) -> (usize, &AdamRules);
+    /// What all ways to learn have.
+    fn course(&self) -> Course<'_>;
 
     /// An iteration.
     fn learn(&self, learning: &mut Learning) -> Figures;
@@ -202,20 +208,22 @@ impl<M: Method> Training for PolicyTraining<M> {
         _: &Path,
         _: &mut dyn FnMut(&str) -> bool,
     ) -> Result<Option<PolicyTraining<M>>, TrainingError> {
-        let learning = Learning::new(method.seed(), method.steps().0);
+        let Course { seed, shards, .. } = method.course();
+        let learning = Learning::new(seed, shards);
         Ok(Some(PolicyTraining { method: method.clone(), learning }))
     }
 
     fn check(method: &M) -> Result<(), &'static str> {
-        if method.iterations() == 0 {
+        let Course { iterations, play, .. } = method.course();
+        if iterations == 0 {
             return Err("there is at least one iteration");
         }
-        method.play().check()?;
+        play.check()?;
         method.check()
     }
 
     fn steps(&self) -> u64 {
-        self.method.iterations()
+        self.method.course().iterations
     }
 
     fn taken(&self) -> u64 {
@@ -232,7 +240,7 @@ impl<M: Method> Training for PolicyTraining<M> {
     }
 
     fn resume(&mut self, bytes: &[u8]) -> bool {
-        self.learning.resume(self.method.steps().1, bytes)
+        self.learning.resume(self.method.course().adam, bytes)
     }
 
     fn step(&mut self) -> Figures {
@@ -242,7 +250,7 @@ impl<M: Method> Training for PolicyTraining<M> {
     }
 
     fn validate(&self) -> (Figures, Vec<u8>) {
-        (self.method.play().validate(&self.learning.trained()), self.learning.weights())
+        (self.method.course().play.validate(&self.learning.trained()), self.learning.weights())
     }
 }
 
@@ -290,20 +298,10 @@ impl Method for Reinforcement {
         Ok(())
     }
 
-    fn seed(&self) -> u64 {
-        self.seed
-    }
-
-    fn iterations(&self) -> u64 {
-        self.iterations
-    }
-
-    fn play(&self) -> &PlayRules {
-        &self.play
-    }
-
-    fn steps(&self) -> (usize, &AdamRules) {
-        (self.ppo.shards, &self.ppo.adam)
+    fn course(&self) -> Course<'_> {
+        let Reinforcement { seed, iterations, play, .. } = self;
+        let (shards, adam) = (self.ppo.shards, &self.ppo.adam);
+        Course { seed: *seed, iterations: *iterations, play, shards, adam }
     }
 
     fn learn(&self, learning: &mut Learning) -> Figures {
@@ -388,20 +386,10 @@ impl Method for Cloning {
         }
     }
 
-    fn seed(&self) -> u64 {
-        self.seed
-    }
-
-    fn iterations(&self) -> u64 {
-        self.iterations
-    }
-
-    fn play(&self) -> &PlayRules {
-        &self.play
-    }
-
-    fn steps(&self) -> (usize, &AdamRules) {
-        (self.shards, &self.adam)
+    fn course(&self) -> Course<'_> {
+        let Cloning { seed, iterations, play, .. } = self;
+        let (shards, adam) = (self.shards, &self.adam);
+        Course { seed: *seed, iterations: *iterations, play, shards, adam }
     }
 
     fn learn(&self, learning: &mut Learning) -> Figures {

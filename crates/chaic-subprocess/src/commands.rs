@@ -175,19 +175,7 @@ impl Helpers for Commands<'_> {
         chaic_files::write_whole(&run.join(FILE), &text).map_err(io)
     }
 
-    fn partner_names(&self) -> Vec<String> {
-        self.others.partner_names()
-    }
-
-    fn partner(&self, name: &str, of: Option<&RunKey>, rules: PlannerRules) -> Option<Helper> {
-        self.others.partner(name, of, rules)
-    }
-
-    fn waiting_jobs(&self) -> usize {
-        self.others.waiting_jobs()
-    }
-
-    fn waits(&self, name: &str) -> bool {
-        self.others.waits(name)
+    fn others(&self) -> Option<&dyn Helpers> {
+        Some(self.others)
     }
 }

@@ -80,7 +80,7 @@ pub use error::{EnvError, Result};
 pub use key::{RunKey, slug};
 pub use observer::{Glimpse, Observer};
 pub use playback::Playback;
-pub use reward::{RewardTerms, RewardWeights};
+pub use reward::{RewardTerms, RewardWeights, Totals};
 pub use run_loop::{Choice, Players, run_loop};
 pub use seat::{Driver, Idle, Minds, Seat, seats, world_seed};
 

@@ -67,6 +67,45 @@ impl RewardTerms {
     }
 }
 
+/// Totals of what can be rewarded, as an episode stands for an agent: what it earns between two moments is by how
+/// much they differ.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Totals {
+    /// Share of all that is wanted which is delivered, by whomever: 0 to 1.
+    pub delivered: f64,
+    /// Share of it that the agent itself has delivered.
+    pub own: f64,
+    /// Share of it that the agent holds, in its hands or in a container there.
+    pub held: f64,
+    /// Share of the frames of the whole episode in which the child was away from its guardian.
+    pub emergency: f64,
+    /// The agent's way to its next delivery, metres, in straight lines; 0 if there is nothing to deliver.
+    pub way_m: f64,
+}
+
+impl Totals {
+    /// Those of a world.
+    pub fn of(world: &World, agent: AgentId) -> Totals {
+        let (setup, state) = (world.setup(), world.state());
+        let (done, total) = world.progress();
+        let share = |worth: f64| if total > 0.0 { worth / total } else { 0.0 };
+        let n_things = setup.things.len();
+        let worth = |is_counted: &dyn Fn(usize) -> bool| -> f64 {
+            let wanted = |k: &usize| setup.goal.wanted(setup.things[*k].class) > 0;
+            let counted = (0..n_things).filter(wanted).filter(|k| is_counted(*k));
+            counted.map(|k| world.worth(setup.things[k].class)).sum()
+        };
+        let ways = (0..n_things).filter_map(|k| way_m(world, agent, k));
+        Totals {
+            delivered: share(done),
+            own: share(worth(&|k| state.things[k].delivered_by == Some(agent))),
+            held: share(worth(&|k| holder(world, k) == Some(agent))),
+            emergency: f64::from(state.child_away_frames) / f64::from(setup.horizon.max(1)),
+            way_m: ways.min_by(f32::total_cmp).map_or(0.0, f64::from),
+        }
+    }
+}
+
 /// How an episode stands for an agent.
 #[derive(Clone, Debug)]
 pub(crate) struct Standing {

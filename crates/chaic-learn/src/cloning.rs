@@ -53,7 +53,9 @@ impl Policy for Teacher {
     }
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
-        let decision = decision(context, valid, &self.choices);
+        let is_under_way = self.choices.is_under_way();
+        let offered = self.choices.offered(valid);
+        let decision = decision(context, &offered, &self.choices);
         let mut told = context.briefing.clone();
         told.goal = Some(self.goal.clone());
         let taught = self.rules.choose(&Context { briefing: &told, ..*context }, valid)?;
@@ -63,8 +65,11 @@ impl Policy for Teacher {
         };
         let frame = context.memory.frame;
         self.choices.note(plan, frame);
+        // What makes no room for what is under way comes to going on with it.
+        let goes_on = if is_under_way { Some(0) } else { None };
+        let choice = offered.iter().position(|plan| *plan == taught).or(goes_on);
         // What isn't among the choices, like waiting, can't be learned.
-        if let Some(choice) = valid.iter().position(|plan| *plan == taught) {
+        if let Some(choice) = choice.filter(|_| offered.len() > 1) {
             let noted = Noted { frame, decision, choice, log_probability: 0.0, value: 0.0 };
             self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(noted);
         }
@@ -72,6 +77,9 @@ impl Policy for Teacher {
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, is_news: bool) -> bool {
+        if let Driver::Learner(learner) = &mut self.driver {
+            learner.reconsiders(context, current, is_news);
+        }
         // When the learner would, so that both decide at the same moments.
         self.choices.is_due(context.memory.frame, current, is_news)
     }

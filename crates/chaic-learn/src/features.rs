@@ -4,6 +4,7 @@
 use chaic_agents::decision::{Context, HandState, Plan};
 use chaic_agents::mapping::Thing;
 use chaic_agents::memory::Memory;
+use chaic_agents::track::TrackId;
 use chaic_protocol::briefing::Relation;
 use chaic_protocol::catalogue::TargetSet;
 use chaic_protocol::geom::{horizontal_distance, math, xz};
@@ -23,8 +24,9 @@ const SETS: [TargetSet; 8] = [
     TargetSet::Furniture,
 ];
 
-/// Numbers of the state, before one for each set: what of it the partner is believed to have taken.
-pub const STATE: [&str; 27] = [
+/// Numbers of the state, before two for each set: what of it the partner is believed to have taken, and what can be
+/// taken.
+pub const STATE: [&str; 30] = [
     "time_left",
     "horizon",
     "free_hands",
@@ -40,6 +42,7 @@ pub const STATE: [&str; 27] = [
     "known_containers",
     "known_obstacles",
     "is_explored",
+    "unexplored",
     "size_of_place",
     "partner_was_seen",
     "partner_is_fresh",
@@ -47,6 +50,8 @@ pub const STATE: [&str; 27] = [
     "partner_distance",
     "partner_holds",
     "partner_took",
+    "partner_failed",
+    "partner_failed_height",
     "has_child",
     "child_is_fresh",
     "child_is_away",
@@ -56,7 +61,7 @@ pub const STATE: [&str; 27] = [
 
 /// Numbers of a plan, after one for each of [`Plan::KINDS`] and before one for each set: whether the thing that it
 /// is about belongs to it.
-pub const PLAN: [&str; 20] = [
+pub const PLAN: [&str; 22] = [
     "is_as_before",
     "is_nearest_of_kind",
     "way",
@@ -74,13 +79,15 @@ pub const PLAN: [&str; 20] = [
     "partner_took_class",
     "partner_took_set",
     "partner_took_other_set",
+    "partner_failed",
+    "partner_failed_class",
     "failures",
     "age",
     "decisions_of_kind",
 ];
 
 /// How many numbers a state has.
-pub const N_STATE: usize = STATE.len() + SETS.len();
+pub const N_STATE: usize = STATE.len() + 2 * SETS.len();
 /// How many numbers a plan has.
 pub const N_PLAN: usize = N_KINDS + PLAN.len() + SETS.len();
 /// How many kinds of plans there are.
@@ -106,20 +113,39 @@ pub struct Choices {
     pub last_frame: Frame,
     /// How often each kind was chosen.
     pub n_of_kind: [u32; N_KINDS],
+    /// The plan under way that is being thought over.
+    under_way: Option<Plan>,
 }
 
 impl Choices {
     /// Notes a choice that is made at this frame.
     pub fn note(&mut self, plan: Plan, frame: Frame) {
-        self.n_of_kind[plan.kind()] += 1;
+        if self.under_way.take() != Some(plan) {
+            self.n_of_kind[plan.kind()] += 1;
+        }
         self.last = Some(plan);
         self.last_frame = frame;
     }
 
     /// Whether another one is due at this frame although `current` is not finished.
-    pub fn is_due(&self, frame: Frame, current: &Plan, is_news: bool) -> bool {
+    pub fn is_due(&mut self, frame: Frame, current: &Plan, is_news: bool) -> bool {
         let is_bound = matches!(current, Plan::Deliver | Plan::PutIn | Plan::LiftWith(_));
-        !is_bound && (is_news || frame >= self.last_frame + RECONSIDER_FRAMES)
+        let is_due = !is_bound && (is_news || frame >= self.last_frame + RECONSIDER_FRAMES);
+        self.under_way = is_due.then_some(*current);
+        is_due
+    }
+
+    /// Whether the next choice is about a plan that is under way.
+    pub fn is_under_way(&self) -> bool {
+        self.under_way.is_some()
+    }
+
+    /// What there is to choose from, of the plans that are valid: where a plan is under way, to go on with it or one that
+    /// [supersedes](Plan::supersedes) it. Never empty.
+    pub fn offered(&self, valid: &[Plan]) -> Vec<Plan> {
+        let Some(current) = self.under_way else { return valid.to_vec() };
+        let others = valid.iter().filter(|plan| plan.supersedes(&current));
+        std::iter::once(&current).chain(others).copied().collect()
     }
 }
 
@@ -157,6 +183,23 @@ fn taken_by_partner(context: &Context<'_>) -> Vec<ClassId> {
     tracks.into_iter().map(|(_, class)| class).collect()
 }
 
+/// What the partner was noticed to take in vain, with its class if that is known.
+fn failed_by_partner(context: &Context<'_>) -> Vec<(TrackId, Option<ClassId>)> {
+    let Context { briefing, memory, behavior, .. } = context;
+    let partner = briefing.companion(Relation::Partner);
+    let failed = behavior.actions.iter().filter(|seen| {
+        Some(seen.agent) == partner && seen.outcome.is_some_and(|o| !o.is_success())
+    });
+    let class = |track| memory.things.get(track).map(|t| t.class);
+    failed.filter_map(|seen| seen.action.subject()).map(|track| (track, class(track))).collect()
+}
+
+/// Share of the place that is still to be explored.
+fn unexplored(memory: &Memory) -> f32 {
+    let n = memory.map.grid().n_cells();
+    (0..n).filter(|cell| memory.map.is_unexplored(*cell)).count() as f32 / n.max(1) as f32
+}
+
 /// What all plans of a decision are seen by.
 struct Scene<'a> {
     memory: &'a Memory,
@@ -166,6 +209,7 @@ struct Scene<'a> {
     partner: Option<Vec3>,
     goal: Option<(Vec3, f32)>,
     taken: Vec<ClassId>,
+    failed: Vec<(TrackId, Option<ClassId>)>,
     available: Vec<ClassId>,
 }
 
@@ -174,6 +218,9 @@ pub fn decision(context: &Context<'_>, valid: &[Plan], choices: &Choices) -> Dec
     let Context { briefing, memory, behavior, is_explored } = *context;
     let hands = HandState::of(&memory.hands, briefing);
     let taken = taken_by_partner(context);
+    let failed = failed_by_partner(context);
+    let failed_at = failed.iter().filter_map(|(track, _)| memory.things.get(*track));
+    let failed_height = failed_at.last().map_or(0.0, |t| share(t.position_in_world.y, 2.0));
     let available: Vec<ClassId> =
         memory.things.iter().filter(|t| t.is_available(memory.frame)).map(|t| t.class).collect();
     let known = |of: &[ClassId]| available.iter().filter(|c| of.contains(c)).count() as f32;
@@ -201,6 +248,7 @@ pub fn decision(context: &Context<'_>, valid: &[Plan], choices: &Choices) -> Dec
         share(known(&briefing.containers), 3.0),
         share(known(&briefing.obstacles), 4.0),
         flag(is_explored),
+        unexplored(memory),
         share((size.x * size.y).max(0.0).sqrt(), 40.0),
         flag(partner.is_some()),
         partner.map_or(0.0, |p| fresh(memory.frame - p.frame)),
@@ -208,6 +256,8 @@ pub fn decision(context: &Context<'_>, valid: &[Plan], choices: &Choices) -> Dec
         partner.map_or(1.0, |p| share(horizontal_distance(here, p.position_in_world), FAR_M)),
         share(behavior.partner_holds.len() as f32, 3.0),
         share(taken.len() as f32, 6.0),
+        share(failed.len() as f32, 4.0),
+        failed_height,
         flag(briefing.companion(Relation::Child).is_some()),
         child.map_or(0.0, |c| fresh(memory.frame - c.frame)),
         flag(memory.child_is_away(briefing)),
@@ -215,9 +265,10 @@ pub fn decision(context: &Context<'_>, valid: &[Plan], choices: &Choices) -> Dec
         flag(moves),
     ];
     let mut state = numbers.to_vec();
-    state.extend(SETS.iter().map(|set| {
-        share(taken.iter().filter(|c| c.info().sets.contains(set)).count() as f32, 3.0)
-    }));
+    for (classes, most) in [(&taken, 3.0), (&available, 5.0)] {
+        let of = |set| classes.iter().filter(|c| c.info().sets.contains(set)).count();
+        state.extend(SETS.iter().map(|set| share(of(set) as f32, most)));
+    }
     let scene = Scene {
         memory,
         choices,
@@ -226,6 +277,7 @@ pub fn decision(context: &Context<'_>, valid: &[Plan], choices: &Choices) -> Dec
         partner: partner.map(|p| p.position_in_world),
         goal,
         taken,
+        failed,
         available,
     };
     let mut seen = [false; N_KINDS];
@@ -286,6 +338,12 @@ impl Scene<'_> {
         to.push(share(of_set as f32, 3.0));
         let of_others = if info.is_some() { self.taken.len() - of_set } else { 0 };
         to.push(share(of_others as f32, 3.0));
+        let track = subject.map(|it| it.track);
+        let n_it = self.failed.iter().filter(|(failed, _)| Some(*failed) == track).count();
+        let is_class = |of: Option<ClassId>| of.is_some() && of == class;
+        let n_class = self.failed.iter().filter(|(_, of)| is_class(*of)).count();
+        to.push(share(n_it as f32, 3.0));
+        to.push(share(n_class as f32, 3.0));
         to.push(thing.map_or(0.0, |t| share(t.failures as f32, 3.0)));
         to.push(thing.map_or(0.0, |t| share((self.memory.frame - t.last_seen) as f32, 1000.0)));
         to.push(share(self.choices.n_of_kind[kind] as f32, 20.0));

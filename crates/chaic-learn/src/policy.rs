@@ -74,15 +74,20 @@ impl Policy for LearnedPolicy {
     }
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
-        let decision = decision(context, valid, &self.choices);
+        let offered = self.choices.offered(valid);
+        let frame = context.memory.frame;
+        if let [only] = offered[..] {
+            self.choices.note(only, frame);
+            return Ok(only);
+        }
+        let decision = decision(context, &offered, &self.choices);
         let Trained { model, numbers } = &*self.trained;
         let said = model.forward(numbers, std::iter::once(&decision), &mut self.pass).remove(0);
         let choice = match self.choosing {
             Choosing::Sampled => said.sample(self.rng.unit()),
             Choosing::Likeliest => said.most_likely(),
         };
-        let plan = valid[choice];
-        let frame = context.memory.frame;
+        let plan = offered[choice];
         self.choices.note(plan, frame);
         if let Some(notes) = &self.notes {
             let log_probability = said.log_probabilities[choice];

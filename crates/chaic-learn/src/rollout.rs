@@ -13,14 +13,14 @@ use chaic_protocol::briefing::Goal;
 use chaic_protocol::geom::math;
 use chaic_protocol::observation::Grants;
 use chaic_protocol::rng::Stream;
-use chaic_protocol::{AgentError, AgentId, Frame};
+use chaic_protocol::{AgentError, Frame};
 use chaic_render::Appearance;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use crate::cloning::{Lesson, Teacher, driver};
 use crate::policy::{Choosing, LearnedPolicy, Noted, Notes, Trained};
 use crate::ppo::{Trajectory, Transition};
+use crate::rewards::{Account, Rewards};
 
 /// Why an episode can't be played.
 #[derive(Debug, thiserror::Error)]
@@ -49,41 +49,6 @@ pub struct RolloutRules<'a> {
     pub rewards: Rewards,
 }
 
-/// What is rewarded: facts of the world that no helper is told.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Rewards {
-    /// For everything that is wanted, by whomever it is delivered.
-    pub team: f32,
-    /// For everything that is wanted, where the helper itself delivers it: less of the partner's luck is in it.
-    pub own: f32,
-}
-
-impl Default for Rewards {
-    fn default() -> Rewards {
-        Rewards { team: 5.0, own: 5.0 }
-    }
-}
-
-impl RolloutRules<'_> {
-    /// What has been done so far is worth.
-    fn worth(&self, env: &Env) -> f32 {
-        let Rewards { team, own } = self.rewards;
-        let world = env.world();
-        let (_, total) = world.progress();
-        let by_helper: f64 = world
-            .state()
-            .things
-            .iter()
-            .zip(&world.setup().things)
-            .filter(|(thing, _)| thing.delivered_by == Some(AgentId::HELPER))
-            .filter(|(_, thing)| world.setup().goal.wanted(thing.class) > 0)
-            .map(|(_, thing)| world.worth(thing.class))
-            .sum();
-        team * share_done(env) as f32 + own * (by_helper / total.max(f64::MIN_POSITIVE)) as f32
-    }
-}
-
 /// What came of an episode.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Played {
@@ -98,17 +63,17 @@ pub struct Played {
 /// An episode that was played.
 struct Recording {
     noted: Vec<Noted>,
-    /// What had been worth how much at which frame, whenever somebody decided.
-    worth: Vec<(Frame, f32)>,
+    /// What had been earned at which frame, whenever somebody decided.
+    earned: Vec<(Frame, f32)>,
     tr: f64,
     frames: Frame,
 }
 
 impl Recording {
-    /// What had been done when a frame began.
-    fn worth_at(&self, frame: Frame) -> f32 {
-        let k = self.worth.partition_point(|(f, _)| *f < frame);
-        self.worth.get(k).or(self.worth.last()).map_or(0.0, |(_, worth)| *worth)
+    /// What had been earned when a frame began.
+    fn earned_at(&self, frame: Frame) -> f32 {
+        let k = self.earned.partition_point(|(f, _)| *f < frame);
+        self.earned.get(k).or(self.earned.last()).map_or(0.0, |(_, earned)| *earned)
     }
 
     /// When each choice's time was over.
@@ -139,18 +104,21 @@ fn record<P: Policy>(
         appearance: Appearance::Canonical,
     };
     let mut env = Env::new(config, minds)?;
-    let mut worth = Vec::new();
+    let mut account = Account::new(rules.rewards);
+    let mut earned = Vec::new();
     loop {
         let frame = env.world().state().frame;
-        worth.push((frame, rules.worth(&env)));
+        earned.push((frame, account.earned(env.world())));
         if env.advance(Some(frame + 1))? == Flow::Ended {
             break;
         }
     }
     let frames = env.world().state().frame;
-    worth.push((frames, rules.worth(&env)));
+    earned.push((frames, account.earned(env.world())));
     let noted = std::mem::take(&mut *notes.lock().unwrap_or_else(PoisonError::into_inner));
-    Ok(Recording { noted, worth, tr: share_done(&env), frames })
+    let (done, total) = env.world().progress();
+    let tr = if total > 0.0 { done / total } else { 0.0 };
+    Ok(Recording { noted, earned, tr, frames })
 }
 
 /// Plays an episode with a network as the helper.
@@ -170,7 +138,7 @@ pub fn play(
         choice: noted.choice,
         log_probability: noted.log_probability,
         value: noted.value,
-        reward: recording.worth_at(end) - recording.worth_at(noted.frame),
+        reward: recording.earned_at(end) - recording.earned_at(noted.frame),
         duration: (end - noted.frame) as f32,
         decision: noted.decision.clone(),
     });
@@ -203,18 +171,13 @@ pub fn play_taught(
         .zip(&ends)
         .rev()
         .map(|(noted, end)| {
-            let reward = recording.worth_at(*end) - recording.worth_at(noted.frame);
+            let reward = recording.earned_at(*end) - recording.earned_at(noted.frame);
             following = reward + math::powf(discount, (end - noted.frame) as f32) * following;
             Lesson { decision: noted.decision.clone(), choice: noted.choice, target: following }
         })
         .collect();
     lessons.reverse();
     Ok((lessons, recording.tr))
-}
-
-fn share_done(env: &Env) -> f64 {
-    let (done, total) = env.world().progress();
-    if total > 0.0 { done / total } else { 0.0 }
 }
 
 /// Plays episodes side by side on all cores; what comes of each depends on nothing but itself.

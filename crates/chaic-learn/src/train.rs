@@ -3,22 +3,24 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use chaic_agents::sight::TrueSight;
+use chaic_agents::sight::{GROUND_TRUTH, Sight};
 use chaic_nn::AdamRules;
 use chaic_nn::weights::{self, WeightsError};
 use chaic_protocol::TaskId;
 use chaic_protocol::rng::Stream;
 use chaic_training::{Figures, Learner, Training, TrainingError, figures, rate_at};
+use chaic_vision::sights::{self, SightError};
 use rayon::prelude::*;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::actor_critic::ActorCritic;
+use crate::actor_critic::{ActorCritic, Decision};
 use crate::cloning::{Learned, Lesson, imitate};
 use crate::features::{N_PLAN, N_STATE};
 use crate::policy::{Choosing, Trained};
 use crate::ppo::{PpoRules, Told, improve};
-use crate::rollout::{Played, Rewards, RolloutRules, play_all, play_taught};
+use crate::rewards::Rewards;
+use crate::rollout::{Played, RolloutRules, play_all, play_taught};
 
 /// Seeds of generated episodes to learn from, and to validate by: none of any split, and none that perception
 /// was trained on.
@@ -26,7 +28,7 @@ const TRAINING_SEEDS: (u64, usize) = (40_000_000, 1_000_000);
 const VALIDATION_SEEDS: u64 = 50_000_000;
 
 /// What files of weights say that they are.
-const KIND: &str = "chaic plan policy 1";
+const KIND: &str = "chaic plan policy 2";
 /// Width of the network's layers.
 const WIDTH: usize = 96;
 
@@ -55,6 +57,12 @@ pub struct PlayRules {
     pub tasks: Vec<TaskId>,
     /// Side of everybody's images while training, pixels.
     pub image_size: u32,
+    /// By what the helper sees, and tells what its partner does: as `chaic eval` names it.
+    pub perception: String,
+    /// See `perception`.
+    pub behavior: String,
+    /// Whether the network's inputs are normalized by their mean and spread so far.
+    pub normalize: bool,
     /// Episodes of each task that validations play.
     pub validation_episodes: usize,
     /// What is rewarded.
@@ -67,6 +75,9 @@ impl Default for PlayRules {
             episodes: 32,
             tasks: TaskId::paper().collect(),
             image_size: 128,
+            perception: GROUND_TRUTH.to_owned(),
+            behavior: GROUND_TRUTH.to_owned(),
+            normalize: false,
             validation_episodes: 3,
             rewards: Rewards::default(),
         }
@@ -74,21 +85,25 @@ impl Default for PlayRules {
 }
 
 impl PlayRules {
-    fn check(&self) -> Result<(), &'static str> {
+    fn check(&self) -> Result<(), String> {
         if self.episodes.min(self.tasks.len()).min(self.validation_episodes) == 0 {
-            return Err(
-                "play.episodes and play.validation_episodes are at least 1, and there is a task",
-            );
+            let least =
+                "play.episodes and play.validation_episodes are at least 1, and there is a task";
+            return Err(least.to_owned());
         }
         if !(16..=1024).contains(&self.image_size) {
-            return Err("play.image_size is 16 to 1024");
+            return Err("play.image_size is 16 to 1024".to_owned());
         }
-        Ok(())
+        self.sight().map(|_| ()).map_err(|e| e.to_string())
     }
 
-    fn rollout(&self, choosing: Choosing) -> RolloutRules<'static> {
+    fn sight(&self) -> Result<Arc<dyn Sight>, SightError> {
+        sights::named(&self.perception, &self.behavior)
+    }
+
+    fn rollout<'a>(&self, sight: &'a dyn Sight, choosing: Choosing) -> RolloutRules<'a> {
         let PlayRules { image_size, rewards, .. } = *self;
-        RolloutRules { sight: &TrueSight, image_size, choosing, rewards }
+        RolloutRules { sight, image_size, choosing, rewards }
     }
 
     /// The episodes of an iteration.
@@ -105,7 +120,7 @@ impl PlayRules {
     }
 
     /// Transport rates on episodes that nothing is learned from.
-    fn validate(&self, trained: &Arc<Trained>) -> Figures {
+    fn validate(&self, sight: &dyn Sight, trained: &Arc<Trained>) -> Figures {
         let seeds = || VALIDATION_SEEDS..VALIDATION_SEEDS + self.validation_episodes as u64;
         let ids: Vec<(String, u32)> = self
             .tasks
@@ -114,7 +129,7 @@ impl PlayRules {
             .collect();
         let ways = [("tr_sampled", Choosing::Sampled), ("tr_likeliest", Choosing::Likeliest)];
         let tr = |choosing| {
-            let played = play_all(&ids, trained, &self.rollout(choosing));
+            let played = play_all(&ids, trained, &self.rollout(sight, choosing));
             mean_tr(&played.expect("generated episodes can be played"))
         };
         figures(ways.map(|(name, choosing)| (name, tr(choosing))))
@@ -141,6 +156,11 @@ impl Learning {
 
     fn trained(&self) -> Arc<Trained> {
         Arc::new(Trained { model: self.model.clone(), numbers: self.learner.numbers.clone() })
+    }
+
+    /// Takes decisions into what inputs are normalized by.
+    fn normalize_by<'a>(&mut self, decisions: impl Iterator<Item = &'a Decision> + Clone) {
+        self.model.normalize_by(&mut self.learner.numbers, decisions);
     }
 
     fn weights(&self) -> Vec<u8> {
@@ -181,18 +201,19 @@ pub trait Method: Clone + Default + Serialize + DeserializeOwned {
     ///
     /// # Errors
     /// That, in a sentence.
-    fn check(&self) -> Result<(), &'static str>;
+    fn check(&self) -> Result<(), String>;
 
     /// What all ways to learn have.
     fn course(&self) -> Course<'_>;
 
-    /// An iteration.
-    fn learn(&self, learning: &mut Learning) -> Figures;
+    /// An iteration of a helper who sees by this.
+    fn learn(&self, sight: &dyn Sight, learning: &mut Learning) -> Figures;
 }
 
 /// A policy that is trained in a folder of its own.
 pub struct PolicyTraining<M> {
     method: M,
+    sight: Arc<dyn Sight>,
     learning: Learning,
 }
 
@@ -208,15 +229,16 @@ impl<M: Method> Training for PolicyTraining<M> {
         _: &Path,
         _: &mut dyn FnMut(&str) -> bool,
     ) -> Result<Option<PolicyTraining<M>>, TrainingError> {
-        let Course { seed, shards, .. } = method.course();
+        let Course { seed, shards, play, .. } = method.course();
+        let sight = play.sight().map_err(TrainingError::of_data)?;
         let learning = Learning::new(seed, shards);
-        Ok(Some(PolicyTraining { method: method.clone(), learning }))
+        Ok(Some(PolicyTraining { method: method.clone(), sight, learning }))
     }
 
-    fn check(method: &M) -> Result<(), &'static str> {
+    fn check(method: &M) -> Result<(), String> {
         let Course { iterations, play, .. } = method.course();
         if iterations == 0 {
-            return Err("there is at least one iteration");
+            return Err("there is at least one iteration".to_owned());
         }
         play.check()?;
         method.check()
@@ -244,13 +266,15 @@ impl<M: Method> Training for PolicyTraining<M> {
     }
 
     fn step(&mut self) -> Figures {
-        let figures = self.method.learn(&mut self.learning);
+        let figures = self.method.learn(&*self.sight, &mut self.learning);
         self.learning.iterations += 1;
         figures
     }
 
     fn validate(&self) -> (Figures, Vec<u8>) {
-        (self.method.course().play.validate(&self.learning.trained()), self.learning.weights())
+        let trained = self.learning.trained();
+        let figures = self.method.course().play.validate(&*self.sight, &trained);
+        (figures, self.learning.weights())
     }
 }
 
@@ -290,10 +314,10 @@ impl Default for Reinforcement {
 }
 
 impl Method for Reinforcement {
-    fn check(&self) -> Result<(), &'static str> {
+    fn check(&self) -> Result<(), String> {
         let PpoRules { epochs, batch, shards, .. } = self.ppo;
         if epochs.min(batch).min(shards) == 0 {
-            return Err("ppo.epochs, ppo.batch and ppo.shards are at least 1");
+            return Err("ppo.epochs, ppo.batch and ppo.shards are at least 1".to_owned());
         }
         Ok(())
     }
@@ -304,9 +328,9 @@ impl Method for Reinforcement {
         Course { seed: *seed, iterations: *iterations, play, shards, adam }
     }
 
-    fn learn(&self, learning: &mut Learning) -> Figures {
+    fn learn(&self, sight: &dyn Sight, learning: &mut Learning) -> Figures {
         let ids = self.play.episodes_of(self.seed, learning.iterations);
-        let rollout = self.play.rollout(Choosing::Sampled);
+        let rollout = self.play.rollout(sight, Choosing::Sampled);
         let played = play_all(&ids, &learning.trained(), &rollout);
         let played = played.expect("generated episodes can be played");
         let tr = mean_tr(&played);
@@ -317,6 +341,10 @@ impl Method for Reinforcement {
         let named = (self.seed, learning.iterations, rest);
         let Learning { model, learner, .. } = learning;
         let told = improve(&self.ppo, model, learner, &trajectories, named);
+        if self.play.normalize {
+            let all = trajectories.iter().flat_map(|t| &t.transitions);
+            learning.normalize_by(all.map(|t| &t.decision));
+        }
         let Told { objective, value_loss, entropy, divergence, clipped, explained_variance } = told;
         figures([
             ("tr", tr),
@@ -378,9 +406,9 @@ impl Default for Cloning {
 }
 
 impl Method for Cloning {
-    fn check(&self) -> Result<(), &'static str> {
+    fn check(&self) -> Result<(), String> {
         if self.batch.min(self.shards) == 0 {
-            Err("batch and shards are at least 1")
+            Err("batch and shards are at least 1".to_owned())
         } else {
             Ok(())
         }
@@ -392,9 +420,9 @@ impl Method for Cloning {
         Course { seed: *seed, iterations: *iterations, play, shards, adam }
     }
 
-    fn learn(&self, learning: &mut Learning) -> Figures {
+    fn learn(&self, sight: &dyn Sight, learning: &mut Learning) -> Figures {
         let ids = self.play.episodes_of(self.seed, learning.iterations);
-        let (rollout, trained) = (self.play.rollout(Choosing::Sampled), learning.trained());
+        let (rollout, trained) = (self.play.rollout(sight, Choosing::Sampled), learning.trained());
         let taught = |(id, seed): &(String, u32)| {
             play_taught((id, *seed), &trained, &rollout, (self.mixed, self.discount))
         };
@@ -406,6 +434,9 @@ impl Method for Cloning {
         let how = (&self.adam, rate, self.batch);
         let Learning { model, learner, iterations } = learning;
         let learned = imitate(how, model, learner, &lessons, (self.seed, *iterations));
+        if self.play.normalize {
+            learning.normalize_by(lessons.iter().map(|l| &l.decision));
+        }
         let Learned { loss, agreement, value_loss } = learned;
         figures([
             ("tr", tr),

@@ -11,7 +11,8 @@ use chaic_env::minds::{BuiltIn, Helpers as _};
 use chaic_learn::features::{N_PLAN, N_STATE};
 use chaic_learn::helpers::{NamedPolicy, Policies};
 use chaic_learn::policy::{Choosing, Trained};
-use chaic_learn::rollout::{Rewards, RolloutRules, play};
+use chaic_learn::rewards::Rewards;
+use chaic_learn::rollout::{RolloutRules, play};
 use chaic_learn::train::{Cloning, PlayRules, PolicyTraining, Reinforcement, network};
 use chaic_protocol::TaskId;
 use chaic_training::{CHECKPOINT, Training, TrainingError, TrainingRun};
@@ -82,7 +83,7 @@ fn what_a_policy_is_told_lies_within_bounds() {
         sight: &TrueSight,
         image_size: 64,
         choosing: Choosing::Sampled,
-        rewards: Rewards { team: 1.0, own: 0.0 },
+        rewards: Rewards { team: 1.0, own: 0.0, held: 0.0, emergency: 0.0, ..Rewards::default() },
     };
     for id in ["shopping/gen/40000001", "obstacle/gen/40000001"] {
         let played = play(id, 0, &trained, &rules).unwrap();

@@ -41,7 +41,7 @@ pub struct Mind {
 #[pymethods]
 impl Mind {
     /// The helper of this name, like `"rhp"`, which sees by ground truth (`"gt"`), the detector (`"learned"`,
-    /// `"learned:FILE"`) or with faults (`"noisy:FILE"`), and tells what others do by what it is granted (`"gt"`) or
+    /// `"learned:FILE"`) or with faults (`"noisy"`, `"noisy:FILE"`), and tells what others do by what it is granted (`"gt"`) or
     /// the behavior network (`"learned"`, `"learned:FILE"`).
     #[new]
     #[pyo3(signature = (name, perception="gt", behavior="gt"))]

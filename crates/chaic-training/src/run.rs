@@ -120,7 +120,7 @@ pub trait Training: Sized {
     ///
     /// # Errors
     /// That, in a sentence.
-    fn check(rules: &Self::Rules) -> Result<(), &'static str>;
+    fn check(rules: &Self::Rules) -> Result<(), String>;
 
     /// Steps in all.
     fn steps(&self) -> u64;
@@ -279,7 +279,7 @@ pub fn read_rules<T: Training>(path: &Path) -> Result<T::Rules, TrainingError> {
     let wrong = |problem: String| TrainingError::Config { path: path.to_owned(), problem };
     let text = std::str::from_utf8(&bytes).map_err(|e| wrong(e.to_string()))?;
     let rules: T::Rules = toml::from_str(text).map_err(|e| wrong(e.message().to_owned()))?;
-    T::check(&rules).map_err(|problem| wrong(problem.to_owned()))?;
+    T::check(&rules).map_err(wrong)?;
     Ok(rules)
 }
 

@@ -16,12 +16,16 @@ use crate::instances::Instance;
 use crate::labels::label_of;
 use crate::perception::Tracking;
 
+/// Pixels of the images that rates are measured on.
+const MEASURED_PX: usize = 512 * 512;
+
 /// How often which fault is made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FaultRates {
-    /// Least pixels with the share of things of so many, up to the next row, that are missed; in the
-    /// order of pixels. Fewer than the first row's are always missed.
+    /// Least pixels of 512x512 with the share of things of so many, up to the next row, that are missed; in
+    /// the order of pixels. Fewer than the first row's are always missed. In smaller images things count as
+    /// many pixels as they would have there.
     pub missed: Vec<(u32, f32)>,
     /// Share of what is found that is taken for another class of about its kind.
     pub misnamed: f32,
@@ -35,6 +39,12 @@ impl FaultRates {
     /// No fault at all.
     pub fn none() -> FaultRates {
         FaultRates { missed: vec![(5, 0.0)], misnamed: 0.0, invented: 0.0, scores: [1.0, 0.5] }
+    }
+
+    /// Those of the shipped detector (crates/chaic-vision/weights).
+    pub fn built_in() -> FaultRates {
+        let text = include_bytes!("../weights/faults.json");
+        serde_json::from_slice(text).expect("a test reads it")
     }
 
     /// Those of a detector, by what it told in images.
@@ -77,7 +87,9 @@ impl FaultRates {
         }
     }
 
-    fn missed(&self, n_pixels: usize) -> f32 {
+    /// The share that is missed of things of so many pixels in an image of so many.
+    fn missed(&self, n_pixels: usize, of: usize) -> f32 {
+        let n_pixels = n_pixels * MEASURED_PX / of;
         let row = self.missed.iter().rev().find(|(least, _)| n_pixels >= *least as usize);
         row.map_or(1.0, |(_, share)| *share)
     }
@@ -92,8 +104,8 @@ pub struct NoisySight {
 
 impl NoisySight {
     /// With these faults, under this name.
-    pub fn new(rates: FaultRates, name: &str) -> NoisySight {
-        NoisySight { rates: Arc::new(rates), name: format!("noisy {name}") }
+    pub fn new(rates: FaultRates, name: String) -> NoisySight {
+        NoisySight { rates: Arc::new(rates), name }
     }
 }
 
@@ -139,7 +151,7 @@ impl NoisyPerception {
         let mut found = Vec::new();
         let [sure, unsure] = self.rates.scores;
         for ((_, class), pixels) in classes.iter().zip(pixels) {
-            if rng.chance(self.rates.missed(pixels.len())) {
+            if rng.chance(self.rates.missed(pixels.len(), ids.len())) {
                 continue;
             }
             let others: Vec<ClassId> =

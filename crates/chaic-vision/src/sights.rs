@@ -15,8 +15,8 @@ use crate::trained::TrainedDetector;
 
 /// Networks; with `:FILE`, those of other weights.
 pub const LEARNED: &str = "learned";
-/// Before the name of a file of rates.
-const NOISY: &str = "noisy:";
+/// Ground truth with the faults of the shipped detector; with `:FILE`, with those of a file of rates.
+pub const NOISY: &str = "noisy";
 
 /// No file of weights or rates is larger, bytes.
 const MOST_BYTES: u64 = 1 << 28;
@@ -100,7 +100,10 @@ fn seeing(name: &str) -> Result<Arc<dyn Sight>, SightError> {
     if let Some(file) = weights_of(name) {
         return Ok(Arc::new(LearnedSight::new(read_detector(file)?)));
     }
-    if let Some(file) = name.strip_prefix(NOISY) {
+    if name == NOISY {
+        return Ok(Arc::new(NoisySight::new(FaultRates::built_in(), NOISY.to_owned())));
+    }
+    if let Some(file) = name.strip_prefix(NOISY).and_then(|rest| rest.strip_prefix(':')) {
         let path = Path::new(file);
         let wrong = |e: serde_json::Error| SightError::Rates {
             path: path.to_owned(),
@@ -108,9 +111,9 @@ fn seeing(name: &str) -> Result<Arc<dyn Sight>, SightError> {
         };
         let rates: FaultRates =
             serde_json::from_slice(&read_bounded(path, MOST_BYTES)?).map_err(wrong)?;
-        return Ok(Arc::new(NoisySight::new(rates, file)));
+        return Ok(Arc::new(NoisySight::new(rates, format!("{NOISY} {file}"))));
     }
     Err(SightError::Unknown(format!(
-        "no perception `{name}`; write {GROUND_TRUTH}, {LEARNED}, {LEARNED}:FILE or {NOISY}FILE"
+        "no perception `{name}`; write {GROUND_TRUTH}, {LEARNED}, {LEARNED}:FILE, {NOISY} or {NOISY}:FILE"
     )))
 }

@@ -222,7 +222,7 @@ impl Training for Trainer {
         Ok(Some(Trainer::new(*rules)))
     }
 
-    fn check(rules: &TrainingRules) -> Result<(), &'static str> {
+    fn check(rules: &TrainingRules) -> Result<(), String> {
         let crops = rules.crops.iter();
         let sides_fit = crops.clone().all(|c| {
             c.side_px.is_multiple_of(32) && (32..=rules.views.size_px as usize).contains(&c.side_px)
@@ -231,7 +231,8 @@ impl Training for Trainer {
         if !sides_fit || !is_some || rules.shards == 0 || rules.steps == 0 || rules.warm_up == 0 {
             return Err(
                 "steps, warm_up, shards, views and of_view are at least 1, and side_px is a \
-                 multiple of 32 up to views.size_px",
+                 multiple of 32 up to views.size_px"
+                    .to_owned(),
             );
         }
         Ok(())

@@ -191,12 +191,13 @@ impl Training for BehaviorTraining {
         Ok(Some(BehaviorTraining { trainer, validation }))
     }
 
-    fn check(rules: &BehaviorRules) -> Result<(), &'static str> {
+    fn check(rules: &BehaviorRules) -> Result<(), String> {
         let least = rules.shards.min(rules.clips).min(rules.collect.of_each);
         if least == 0 || rules.collect.episodes == 0 || rules.steps == 0 || rules.warm_up == 0 {
             return Err(
                 "steps, warm_up, shards, clips, collect.of_each and collect.episodes are at \
-                        least 1",
+                        least 1"
+                    .to_owned(),
             );
         }
         Ok(())

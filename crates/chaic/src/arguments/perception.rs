@@ -105,8 +105,8 @@ pub struct ClipArguments {
     #[arg(long, value_name = "N", default_value_t = 200)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub episodes: u32,
-    /// By what the helper who films knows the partner in its images: gt, learned, learned:FILE or
-    /// noisy:FILE.
+    /// By what the helper who films knows the partner in its images: gt, learned, learned:FILE,
+    /// noisy or noisy:FILE.
     #[arg(long, value_name = "KIND", default_value = "learned")]
     pub perception: String,
     /// Light and colors.

@@ -79,6 +79,7 @@ fn noisy_perception_is_recorded_and_unknown_ones_are_refused() {
     well(dir, &[&EVAL[..], &["--perception", "noisy:rates.json", "--out", "run"]].concat());
     assert!(fs::read_to_string(dir.join("run/run.json")).unwrap().contains("noisy:rates.json"));
     well(dir, &["verify", "run"]);
+    well(dir, &[&EVAL[..], &["--perception", "noisy", "--out", "as the detector"]].concat());
     for nonsense in ["perfect", "learned:", "noisy:nowhere"] {
         let error = ill(dir, &[&EVAL[..], &["--perception", nonsense]].concat());
         assert_eq!(error.lines().count(), 1, "{error}");
@@ -115,6 +116,7 @@ fn weights_of_a_behavior_training_are_what_helpers_recognize_by() {
     let report = fs::read_to_string(dir.join("run/report.md")).unwrap();
     assert!(report.contains("ids from ground truth, learned behavior"), "{report}");
     well(dir, &["verify", "run"]);
+    well(dir, &[&EVAL[..], &["--perception", "noisy", "--out", "as the detector"]].concat());
     for nonsense in ["perfect", "learned:nowhere"] {
         let error = ill(dir, &[&EVAL[..], &["--behavior", nonsense]].concat());
         assert_eq!(error.lines().count(), 1, "{error}");

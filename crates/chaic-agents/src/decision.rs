@@ -229,8 +229,8 @@ pub trait Policy: Send + 'static {
         false
     }
 
-    /// Sees what its mind sees, before each action; for those who look at pictures themselves.
-    fn look(&mut self, _observation: &Observation) {}
+    /// Sees what its mind sees, before each action; for those who look at pictures, or at what changes, themselves.
+    fn look(&mut self, _observation: &Observation, _memory: &Memory, _behavior: &BehaviorLog) {}
 
     /// For how many frames its body stands still before the plan just chosen is begun.
     fn thinking_frames(&self) -> Frame {

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use chaic_protocol::agent::{Believed, Thought};
-use chaic_protocol::observation::Senses;
+use chaic_protocol::observation::{Grants, Senses};
 use chaic_protocol::{Action, Agent, AgentError, AgentId, Briefing, Observation, Outcome, Target};
 
-use crate::behavior::{BehaviorModel, GroundTruthBehavior};
+use crate::behavior::{BehaviorModel, GroundTruthBehavior, SeenBehavior};
 use crate::decision::{Context, Plan, Policy, valid_plans};
 use crate::execution::interact::learn;
 use crate::execution::navigate::face;
@@ -39,6 +39,15 @@ pub struct Mind<P: Policy> {
     episode: Option<Episode>,
 }
 
+/// By what a mind tells what this person does: by what is granted, else by what `sight` tells, else by what follows
+/// from its own memory.
+pub fn watcher(watched: AgentId, grants: Grants, sight: &dyn Sight) -> Box<dyn BehaviorModel> {
+    if grants.behavior {
+        return Box::new(GroundTruthBehavior::default());
+    }
+    sight.behavior(watched).unwrap_or_else(|| Box::new(SeenBehavior::of(watched)))
+}
+
 /// What lasts for one episode.
 #[derive(Clone)]
 struct Episode {
@@ -64,6 +73,18 @@ impl<P: Policy> Mind<P> {
     pub fn seeing(policy: P, rules: PlannerRules, sight: &dyn Sight) -> Mind<P> {
         let told = || Box::new(GroundTruthBehavior::default()) as Box<dyn BehaviorModel>;
         let behavior = sight.behavior(AgentId::PARTNER).unwrap_or_else(told);
+        Mind::with(policy, sight.perception(), behavior, rules).with_sight(sight)
+    }
+
+    /// One that watches this person: by what is granted, else by what `sight` tells, else by what follows from its own
+    /// memory.
+    pub fn watching(
+        policy: P,
+        rules: PlannerRules,
+        sight: &dyn Sight,
+        (watched, grants): (AgentId, Grants),
+    ) -> Mind<P> {
+        let behavior = watcher(watched, grants, sight);
         Mind::with(policy, sight.perception(), behavior, rules).with_sight(sight)
     }
 
@@ -263,7 +284,7 @@ impl<P: Policy> Mind<P> {
         let Some(episode) = &mut self.episode else { return };
         episode.take_in(observation, self.perception.as_mut());
         self.behavior.watch(observation, &episode.memory);
-        self.policy.look(observation);
+        self.policy.look(observation, &episode.memory, self.behavior.log());
     }
 
     /// Decides and acts by what it has [attended](Mind::attend) to: the second half of [`Agent::act`].

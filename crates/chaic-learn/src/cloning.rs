@@ -14,7 +14,7 @@ use chaic_protocol::rng::Stream;
 use chaic_protocol::{AgentError, Briefing};
 use chaic_training::Learner;
 
-use crate::actor_critic::{ActorCritic, BySaid, Decision, Said, step};
+use crate::choice_network::{BySaid, ChoiceNetwork, Decision, Said, step};
 use crate::features::{Choices, decision};
 use crate::policy::{LearnedPolicy, Noted, Notes};
 
@@ -110,7 +110,7 @@ pub struct Learned {
 /// Looks at each lesson once, in an order of the iteration's own.
 pub fn imitate(
     (adam, rate, batch): (&AdamRules, f32, usize),
-    model: &ActorCritic,
+    model: &ChoiceNetwork,
     learner: &mut Learner,
     lessons: &[Lesson],
     (seed, iteration): (u64, u64),
@@ -133,14 +133,14 @@ pub fn imitate(
 
 /// The gradient of the loss of one lesson; adds what it was like to `learned`.
 fn gradient(lesson: &Lesson, said: &Said, share: f32, learned: &mut Learned) -> BySaid {
-    let error = said.value - lesson.target;
+    let error = said.value() - lesson.target;
     learned.loss -= f64::from(said.log_probabilities[lesson.choice]);
     learned.agreement += f64::from(u8::from(said.most_likely() == lesson.choice));
     learned.value_loss += f64::from(0.5 * error * error);
     let taught = |k: usize| f32::from(u8::from(k == lesson.choice));
     let logits = said.log_probabilities.iter().enumerate();
     let logits = logits.map(|(k, l)| share * (math::exp(*l) - taught(k))).collect();
-    BySaid { logits, value: 0.5 * share * error }
+    BySaid { logits, of_state: vec![0.5 * share * error] }
 }
 
 /// The driver of an episode: the learner in a share of them.

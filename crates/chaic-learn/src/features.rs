@@ -10,7 +10,7 @@ use chaic_protocol::catalogue::TargetSet;
 use chaic_protocol::geom::{horizontal_distance, math, xz};
 use chaic_protocol::{ClassId, Frame, Role, Vec3};
 
-use crate::actor_critic::Decision;
+use crate::choice_network::Decision;
 
 /// Sets that targets come from.
 const SETS: [TargetSet; 8] = [

@@ -3,16 +3,15 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use chaic_agents::PlannerRules;
 use chaic_agents::sight::Sight;
-use chaic_agents::{Mind, PlannerRules};
 use chaic_env::minds::{Helper, Helpers, check_new_name};
 use chaic_env::{EnvError, RunKey};
 use chaic_files::{read_bounded, write_whole};
 use chaic_nn::weights;
-use chaic_protocol::observation::Grants;
 use serde::{Deserialize, Serialize};
 
-use crate::policy::{Choosing, LearnedPolicy, Trained};
+use crate::policy::{Choosing, LearnedPolicy, Trained, drive};
 use crate::train::from_bytes;
 
 /// The file with the policies of a run.
@@ -111,8 +110,7 @@ impl Helpers for Policies<'_> {
             return self.others.make(name, rules);
         };
         let policy = LearnedPolicy::new(Arc::clone(&own.trained), Choosing::Sampled, None);
-        let mind = Box::new(Mind::seeing(policy, rules, &*self.sight));
-        Some(Helper { mind, grants: self.sight.grants(Grants::PLANNER) })
+        Some(drive(policy, rules, &*self.sight))
     }
 
     fn make_for(&self, key: &RunKey, rules: PlannerRules) -> Option<Helper> {

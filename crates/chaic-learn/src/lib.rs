@@ -1,6 +1,6 @@
 //! Helpers that learn to choose plans, and how they learn.
 //!
-//! **What it is**: [`features`] says what a choice is seen as, [`actor_critic`] is the network that
+//! **What it is**: [`features`] says what a choice is seen as, [`choice_network`] is the network that
 //! chooses and values, [`policy`] lets it drive a mind and keeps what happened, [`rollout`] plays episodes with
 //! it, [`rewards`] says what came of them, [`helpers`] makes it a helper of a run; [`ppo`] makes it better by what came of them (proximal policy
 //! optimization), [`cloning`] learns from a teacher, and [`train`] has the loops.
@@ -16,7 +16,7 @@
 
 pub mod features;
 
-pub mod actor_critic;
+pub mod choice_network;
 pub mod ppo;
 
 pub mod cloning;

@@ -4,18 +4,30 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use chaic_agents::decision::{Context, Plan, Policy};
+use chaic_agents::sight::Sight;
+use chaic_agents::{Mind, PlannerRules};
+use chaic_env::minds::Helper;
 use chaic_nn::Pass;
+use chaic_protocol::observation::Grants;
 use chaic_protocol::rng::Stream;
-use chaic_protocol::{AgentError, Briefing, Frame};
+use chaic_protocol::{AgentError, AgentId, Briefing, Frame};
 
-use crate::actor_critic::{ActorCritic, Decision};
+use crate::choice_network::{ChoiceNetwork, Decision};
 use crate::features::{Choices, decision};
+
+/// A helper whose mind this policy drives: it is granted what the paper's helpers are, as far as `sight` needs that,
+/// and watches its partner by what it sees.
+pub fn drive<P: Policy>(policy: P, rules: PlannerRules, sight: &dyn Sight) -> Helper {
+    let grants = sight.grants(Grants::PLANNER);
+    let mind = Mind::watching(policy, rules, sight, (AgentId::PARTNER, grants));
+    Helper { mind: Box::new(mind), grants }
+}
 
 /// A network with its numbers.
 #[derive(Clone, Debug)]
 pub struct Trained {
     /// The network.
-    pub model: ActorCritic,
+    pub model: ChoiceNetwork,
     /// Its numbers.
     pub numbers: Vec<f32>,
 }
@@ -91,7 +103,7 @@ impl Policy for LearnedPolicy {
         self.choices.note(plan, frame);
         if let Some(notes) = &self.notes {
             let log_probability = said.log_probabilities[choice];
-            let noted = Noted { frame, decision, choice, log_probability, value: said.value };
+            let noted = Noted { frame, decision, choice, log_probability, value: said.value() };
             notes.lock().unwrap_or_else(PoisonError::into_inner).push(noted);
         }
         Ok(plan)

@@ -6,7 +6,7 @@ use chaic_protocol::rng::Stream;
 use chaic_training::Learner;
 use serde::{Deserialize, Serialize};
 
-use crate::actor_critic::{ActorCritic, BySaid, Decision, Said, step};
+use crate::choice_network::{BySaid, ChoiceNetwork, Decision, Said, step};
 
 /// How it learns. What Stable-Baselines3 calls a number is said in brackets.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -144,7 +144,7 @@ pub fn advantages(rules: &PpoRules, trajectory: &Trajectory) -> Vec<f32> {
 /// is the share of the training that is left.
 pub fn improve(
     rules: &PpoRules,
-    model: &ActorCritic,
+    model: &ChoiceNetwork,
     learner: &mut Learner,
     trajectories: &[Trajectory],
     (seed, iteration, rest): (u64, u64, f32),
@@ -218,8 +218,8 @@ fn gradient(
         part * (by_choice * by_log_probability + rules.entropy * p * (l + entropy))
     });
     let logits = logits.collect();
-    let error = said.value - target;
-    let moved = said.value - transition.value;
+    let error = said.value() - target;
+    let moved = said.value() - transition.value;
     // Where the value has moved as far as it may and the error is no larger there, it stays.
     let limited = transition.value + moved.clamp(-rules.clip_value, rules.clip_value) - target;
     let stays = rules.clip_value > 0.0 && limited * limited > error * error;
@@ -229,7 +229,7 @@ fn gradient(
     told.entropy += f64::from(entropy);
     told.divergence += f64::from(ratio - 1.0 - change);
     told.clipped += f64::from(u8::from((ratio - 1.0).abs() > rules.clip));
-    BySaid { logits, value }
+    BySaid { logits, of_state: vec![value] }
 }
 
 /// Gives advantages a mean of 0 and a variance of 1.
@@ -292,8 +292,10 @@ mod tests {
         let rules = PpoRules::default();
         let mut transition = transition(0.0, 0.0, 1.0);
         transition.log_probability = math::ln(0.5);
-        let said =
-            |p: f32| Said { log_probabilities: vec![math::ln(p), math::ln(1.0 - p)], value: 0.0 };
+        let said = |p: f32| Said {
+            log_probabilities: vec![math::ln(p), math::ln(1.0 - p)],
+            of_state: vec![0.0],
+        };
         let by = |p: f32, advantage: f32| {
             let sample = Sample { transition: &transition, advantage, target: 0.0 };
             gradient(&rules, &sample, &said(p), 1.0, &mut Told::default()).logits[0]

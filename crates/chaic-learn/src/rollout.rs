@@ -2,23 +2,20 @@
 
 use std::sync::{Arc, PoisonError};
 
-use chaic_agents::Mind;
 use chaic_agents::decision::Policy;
 use chaic_agents::sight::Sight;
-use chaic_env::minds::Helper;
 use chaic_env::rules::RuleSet;
 use chaic_env::{Env, EnvError, EpisodeConfig, Flow, Minds};
 use chaic_episodes::{SplitError, find_episode};
 use chaic_protocol::briefing::Goal;
 use chaic_protocol::geom::math;
-use chaic_protocol::observation::Grants;
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{AgentError, Frame};
 use chaic_render::Appearance;
 use rayon::prelude::*;
 
 use crate::cloning::{Lesson, Teacher, driver};
-use crate::policy::{Choosing, LearnedPolicy, Noted, Notes, Trained};
+use crate::policy::{Choosing, LearnedPolicy, Noted, Notes, Trained, drive};
 use crate::ppo::{Trajectory, Transition};
 use crate::rewards::{Account, Rewards};
 
@@ -91,8 +88,7 @@ fn record<P: Policy>(
     let episode = find_episode(id)?;
     let notes = Notes::default();
     let policy = make(&episode.setup().goal, Arc::clone(&notes));
-    let mind = Mind::seeing(policy, RuleSet::PAPER.planner, rules.sight);
-    let helper = Helper { mind: Box::new(mind), grants: rules.sight.grants(Grants::PLANNER) };
+    let helper = drive(policy, RuleSet::PAPER.planner, rules.sight);
     let minds = Minds::of(Some(helper), None);
     let config = EpisodeConfig {
         episode: &episode,

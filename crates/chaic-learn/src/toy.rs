@@ -3,7 +3,7 @@
 use chaic_protocol::geom::math;
 use chaic_protocol::rng::Stream;
 
-use crate::actor_critic::{ActorCritic, Decision};
+use crate::choice_network::{ChoiceNetwork, Decision};
 use crate::ppo::{Trajectory, Transition};
 
 /// A task with a few actions, all of them allowed.
@@ -117,14 +117,14 @@ impl Toy for Maze {
 }
 
 /// A network for a toy.
-pub fn network<T: Toy>(width: usize) -> ActorCritic {
-    ActorCritic::new(T::N_STATE, T::N_ACTIONS, width)
+pub fn network<T: Toy>(width: usize) -> ChoiceNetwork {
+    ChoiceNetwork::new((T::N_STATE, T::N_ACTIONS), width, 1)
 }
 
 /// Plays episodes until there are so many decisions; what was got in each that came to its end. The last one may be
 /// cut off.
 pub fn play<T: Toy>(
-    model: &ActorCritic,
+    model: &ChoiceNetwork,
     numbers: &[f32],
     n_decisions: usize,
     rng: &mut Stream,
@@ -151,7 +151,7 @@ pub fn play<T: Toy>(
                 decision,
                 choice,
                 log_probability: said.log_probabilities[choice],
-                value: said.value,
+                value: said.value(),
                 reward,
                 duration: 1.0,
             });

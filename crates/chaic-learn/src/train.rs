@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::actor_critic::{ActorCritic, Decision};
+use crate::choice_network::{ChoiceNetwork, Decision};
 use crate::cloning::{Learned, Lesson, imitate};
 use crate::features::{N_PLAN, N_STATE};
 use crate::policy::{Choosing, Trained};
@@ -33,8 +33,8 @@ const KIND: &str = "chaic plan policy 2";
 const WIDTH: usize = 96;
 
 /// The network that chooses plans.
-pub fn network() -> ActorCritic {
-    ActorCritic::new(N_STATE, N_PLAN, WIDTH)
+pub fn network() -> ChoiceNetwork {
+    ChoiceNetwork::new((N_STATE, N_PLAN), WIDTH, 1)
 }
 
 /// The network in a file of weights.
@@ -142,7 +142,7 @@ fn mean_tr(played: &[Played]) -> f64 {
 
 /// A network while it learns, with the iterations so far.
 pub struct Learning {
-    model: ActorCritic,
+    model: ChoiceNetwork,
     learner: Learner,
     iterations: u64,
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use chaic_agents::behavior::{BehaviorModel, GroundTruthBehavior, SeenBehavior};
+use chaic_agents::mind::watcher;
 use chaic_agents::perception::GroundTruthIds;
 use chaic_agents::sight::{Sight, TrueSight};
 use chaic_agents::{Mind, PlannerRules, partner_grants};
@@ -173,11 +173,7 @@ impl Language {
     ) -> Helper {
         let session = Arc::clone(&self.session);
         let policy = LanguagePolicy::new(session, key.cloned(), kind.track, kind.looks);
-        let seen = || Box::new(SeenBehavior::of(watched)) as Box<dyn BehaviorModel>;
-        let behavior = match grants.behavior {
-            true => Box::new(GroundTruthBehavior::default()),
-            false => sight.behavior(watched).unwrap_or_else(seen),
-        };
+        let behavior = watcher(watched, grants, sight);
         let senses = Senses { rgb: kind.looks, ..Senses::DEPTH_AND_IDS };
         let mind = Mind::with(policy, Box::new(GroundTruthIds), behavior, rules);
         Helper { mind: Box::new(mind.with_senses(senses).with_sight(sight)), grants }

@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use chaic_agents::behavior::BehaviorLog;
 use chaic_agents::decision::{Context, Plan, Policy};
+use chaic_agents::memory::Memory;
 use chaic_agents::policies::{RulePolicy, RuleProfile};
 use chaic_env::RunKey;
 use chaic_protocol::capability::Gait;
@@ -377,7 +379,7 @@ impl Policy for LanguagePolicy {
         Ok(plan)
     }
 
-    fn look(&mut self, observation: &Observation) {
+    fn look(&mut self, observation: &Observation, _: &Memory, _: &BehaviorLog) {
         if self.looks {
             self.album.see(observation, self.session.settings.asking.images);
         }

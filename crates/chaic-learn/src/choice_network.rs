@@ -1,4 +1,4 @@
-//! The network: a logit for each of the choices that there are, and the value of the state.
+//! The network: a logit for each of the choices that there are, and numbers of the state, like its value.
 //!
 //! The number of choices differs from decision to decision, and their order means nothing, so each is read by
 //! itself, beside the state (as in pointer networks, Vinyals et al. 2015).
@@ -26,11 +26,16 @@ pub struct Decision {
 pub struct Said {
     /// The logarithm of each choice's probability.
     pub log_probabilities: Vec<f32>,
-    /// The return that is expected.
-    pub value: f32,
+    /// What it says of the state, choices apart: of a policy, the return that is expected.
+    pub of_state: Vec<f32>,
 }
 
 impl Said {
+    /// The return that a policy expects.
+    pub fn value(&self) -> f32 {
+        self.of_state[0]
+    }
+
     /// The entropy of the choices, nats.
     pub fn entropy(&self) -> f32 {
         -self.log_probabilities.iter().map(|l| l * math::exp(*l)).sum::<f32>()
@@ -65,17 +70,18 @@ impl Said {
 pub struct BySaid {
     /// By each choice's logit.
     pub logits: Vec<f32>,
-    /// By the value.
-    pub value: f32,
+    /// By what it says of the state.
+    pub of_state: Vec<f32>,
 }
 
 /// A network without its numbers.
 #[derive(Clone, Debug)]
-pub struct ActorCritic {
-    /// Its layers: two of the same width for logits, and two for values, which share nothing.
+pub struct ChoiceNetwork {
+    /// Its layers: two of the same width for logits, and two for what it says of the state, which share nothing.
     pub network: Network,
     logit: Node,
-    value: Node,
+    of_state: Node,
+    n_outputs: usize,
     n_state: usize,
     n_choice: usize,
     normalizer: Normalizer,
@@ -145,23 +151,28 @@ impl Normalizer {
     }
 }
 
-impl ActorCritic {
-    /// One for so many numbers of a state and of each choice, with layers of this width.
-    pub fn new(n_state: usize, n_choice: usize, width: usize) -> ActorCritic {
+impl ChoiceNetwork {
+    /// One for so many numbers of a state and of each choice, with layers of this width, that says so many numbers of
+    /// the state.
+    pub fn new(
+        (n_state, n_choice): (usize, usize),
+        width: usize,
+        n_outputs: usize,
+    ) -> ChoiceNetwork {
         let mut network = Network::default();
         let input = network.input(n_state + n_choice);
-        let mut trunk = |name: &str| {
+        let mut trunk = |name: &str, n_outputs: usize| {
             let mut at = input;
             for layer in 0..2 {
                 let name = format!("{name}{layer}");
                 at = network.conv(&name, at, Kernel::POINTWISE, width);
                 at = network.norm_relu(&format!("{name}.norm"), at);
             }
-            network.head(&format!("{name}.head"), at, 1)
+            network.head(&format!("{name}.head"), at, n_outputs)
         };
-        let (logit, value) = (trunk("actor"), trunk("critic"));
+        let (logit, of_state) = (trunk("choices", 1), trunk("state", n_outputs));
         let normalizer = Normalizer::new(&mut network, n_state + n_choice);
-        ActorCritic { network, logit, value, n_state, n_choice, normalizer }
+        ChoiceNetwork { network, logit, of_state, n_outputs, n_state, n_choice, normalizer }
     }
 
     /// Takes decisions into the mean and the spread by which the inputs of those to come are normalized: until then
@@ -216,12 +227,13 @@ impl ActorCritic {
         pass: &mut Pass,
     ) -> Vec<Said> {
         pass.forward(&self.network, numbers, &self.rows(numbers, decisions.clone()));
-        let (logits, values) = (&pass.made(self.logit).data, &pass.made(self.value).data);
+        let (logits, outputs) = (&pass.made(self.logit).data, &pass.made(self.of_state).data);
         let mut row = 0;
         let mut said = Vec::new();
         for decision in decisions {
             let logits = &logits[row + 1..][..decision.n_choices];
-            said.push(Said { log_probabilities: log_softmax(logits), value: values[row] });
+            let of_state = outputs[row * self.n_outputs..][..self.n_outputs].to_vec();
+            said.push(Said { log_probabilities: log_softmax(logits), of_state });
             row += decision.n_choices + 1;
         }
         said
@@ -238,7 +250,8 @@ impl ActorCritic {
         pass.begin_backward();
         let mut row = 0;
         for by in by {
-            pass.gradient(self.value).data[row] = by.value;
+            let to = &mut pass.gradient(self.of_state).data[row * self.n_outputs..];
+            to[..self.n_outputs].copy_from_slice(&by.of_state);
             let to = &mut pass.gradient(self.logit).data[row + 1..][..by.logits.len()];
             to.copy_from_slice(&by.logits);
             row += by.logits.len() + 1;
@@ -251,7 +264,7 @@ impl ActorCritic {
 /// that of one sample, times the share of it that is its third argument, and adds what it was like to the fourth;
 /// that is given back for each part.
 pub fn step<S: Sync, T: Default + Send>(
-    model: &ActorCritic,
+    model: &ChoiceNetwork,
     (learner, adam, rate): (&mut Learner, &AdamRules, f32),
     batch: &[&S],
     decision_of: impl Fn(&S) -> &Decision + Sync,
@@ -281,7 +294,7 @@ pub fn step<S: Sync, T: Default + Send>(
 }
 
 /// Logarithms of the probabilities that logits stand for.
-fn log_softmax(logits: &[f32]) -> Vec<f32> {
+pub(crate) fn log_softmax(logits: &[f32]) -> Vec<f32> {
     let most = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
     let sum: f32 = logits.iter().map(|l| math::exp(l - most)).sum();
     let log_sum = most + math::ln(sum);
@@ -306,7 +319,7 @@ mod tests {
 
     #[test]
     fn probabilities_of_all_choices_sum_to_one_and_are_sampled_as_such() {
-        let model = ActorCritic::new(3, 2, 16);
+        let model = ChoiceNetwork::new((3, 2), 16, 1);
         let numbers = model.network.begin(1);
         for said in model.forward(&numbers, decisions().iter(), &mut model.pass()) {
             let sum: f32 = said.log_probabilities.iter().map(|l| math::exp(*l)).sum();
@@ -319,7 +332,7 @@ mod tests {
 
     #[test]
     fn inputs_are_normalized_by_all_that_was_taken_in() {
-        let model = ActorCritic::new(3, 2, 16);
+        let model = ChoiceNetwork::new((3, 2), 16, 1);
         let mut numbers = model.network.begin(1);
         let all: Vec<Decision> = decisions()
             .into_iter()
@@ -344,13 +357,15 @@ mod tests {
 
     #[test]
     fn the_gradient_is_that_of_the_numbers() {
-        let model = ActorCritic::new(3, 2, 16);
+        let model = ChoiceNetwork::new((3, 2), 16, 1);
         let numbers = model.network.begin(1);
         let decisions = decisions();
         // Some loss: the log probability of each first choice, and half the square of the value.
         let loss = |numbers: &[f32]| -> f64 {
             let said = model.forward(numbers, decisions.iter(), &mut model.pass());
-            said.iter().map(|s| f64::from(s.log_probabilities[0] + 0.5 * s.value * s.value)).sum()
+            said.iter()
+                .map(|s| f64::from(s.log_probabilities[0] + 0.5 * s.value() * s.value()))
+                .sum()
         };
         let mut pass = model.pass();
         let said = model.forward(&numbers, decisions.iter(), &mut pass);
@@ -360,7 +375,7 @@ mod tests {
                 logits: (0..s.log_probabilities.len())
                     .map(|k| f32::from(u8::from(k == 0)) - math::exp(s.log_probabilities[k]))
                     .collect(),
-                value: s.value,
+                of_state: s.of_state.clone(),
             })
             .collect();
         let mut gradient = vec![0.0; numbers.len()];

@@ -13,30 +13,19 @@ use crate::rules::PlannerRules;
 /// What a partner is granted: perfect segmentation and its own goal.
 pub const PARTNER_GRANTS: Grants = Grants::PARTNER;
 
-/// The constrained person indoors: adult, child or in a wheelchair. Obstacles are left to others
-/// (paper section 5.1.1).
-pub fn constrained(rules: PlannerRules) -> Mind<RulePolicy> {
-    Mind::new(RulePolicy::new(RuleProfile::PARTNER), rules)
-}
-
-/// The person with the bicycle: fills the basket, then delivers it.
-pub fn rider(rules: PlannerRules) -> Mind<RulePolicy> {
-    Mind::new(RulePolicy::new(RuleProfile::RIDER), rules)
-}
-
-/// The frail person who moves house: takes the nearest furniture, and tries again when it is too
-/// heavy. With furniture the rules of time come to "carry what you hold to the truck".
-pub fn frail(rules: PlannerRules) -> Mind<RulePolicy> {
-    Mind::new(RulePolicy::new(RuleProfile::PARTNER), rules)
+/// The policy of a task's partner.
+///
+/// The constrained person indoors is an adult, a child or in a wheelchair, and leaves obstacles to others (paper section
+/// 5.1.1). The rider fills the basket, then delivers it. The frail person takes the nearest furniture, and tries again when
+/// it is too heavy: with furniture the rules of time come to "carry what you hold to the truck".
+pub fn policy(persona: Persona, scene: SceneKind) -> RulePolicy {
+    let is_rider = persona == Persona::Rider || scene == SceneKind::Street;
+    RulePolicy::new(if is_rider { RuleProfile::RIDER } else { RuleProfile::PARTNER })
 }
 
 /// The mind of a task's partner.
 pub fn partner(persona: Persona, scene: SceneKind, rules: PlannerRules) -> Box<dyn Agent> {
-    match (persona, scene) {
-        (Persona::Rider, _) | (_, SceneKind::Street) => Box::new(rider(rules)),
-        (Persona::Frail, _) | (_, SceneKind::Yard) => Box::new(frail(rules)),
-        _ => Box::new(constrained(rules)),
-    }
+    Box::new(Mind::new(policy(persona, scene), rules))
 }
 
 /// What the mind of a task's partner is granted.

@@ -13,7 +13,7 @@ use chaic_protocol::{ClassId, Frame, Role, Vec3};
 use crate::choice_network::Decision;
 
 /// Sets that targets come from.
-const SETS: [TargetSet; 8] = [
+pub(crate) const SETS: [TargetSet; 8] = [
     TargetSet::Fruit,
     TargetSet::Bread,
     TargetSet::Work,
@@ -149,17 +149,17 @@ impl Choices {
     }
 }
 
-fn flag(is_so: bool) -> f32 {
+pub(crate) fn flag(is_so: bool) -> f32 {
     f32::from(u8::from(is_so))
 }
 
 /// A share that rises from 0 to 1 as `x` grows to `most`.
-fn share(x: f32, most: f32) -> f32 {
+pub(crate) fn share(x: f32, most: f32) -> f32 {
     (x / most).clamp(0.0, 1.0)
 }
 
 /// How fresh what happened so many frames ago is, 1 to 0.
-fn fresh(age: u32) -> f32 {
+pub(crate) fn fresh(age: u32) -> f32 {
     math::exp(-(age as f32) / FRESH_FRAMES)
 }
 

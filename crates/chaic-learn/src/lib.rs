@@ -2,7 +2,7 @@
 //!
 //! **What it is**: [`features`] says what a choice is seen as, [`choice_network`] is the network that
 //! chooses and values, [`policy`] lets it drive a mind and keeps what happened, [`rollout`] plays episodes with
-//! it, [`rewards`] says what came of them, [`helpers`] makes it a helper of a run; [`ppo`] makes it better by what came of them (proximal policy
+//! it, [`rewards`] says what came of them, [`opponent`] tells what the partner is about, [`helpers`] makes it a helper of a run; [`ppo`] makes it better by what came of them (proximal policy
 //! optimization), [`cloning`] learns from a teacher, and [`train`] has the loops.
 //! [`toy`] has tasks whose best return is known, for tests of the learner itself.
 //!
@@ -23,6 +23,8 @@ pub mod cloning;
 pub mod policy;
 pub mod rewards;
 pub mod rollout;
+
+pub mod opponent;
 
 pub mod helpers;
 

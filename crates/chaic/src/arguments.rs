@@ -3,6 +3,7 @@
 mod bench;
 mod exec;
 mod fidelity;
+mod opponent;
 mod perception;
 
 use std::ops::Range;
@@ -27,6 +28,7 @@ pub use self::exec::{
     ExecArguments, HelperArgument, HelperCheckArguments, HelperCommand, HelperServeArguments,
 };
 pub use self::fidelity::FidelityArguments;
+pub use self::opponent::{CollectOpponentArguments, OpponentArguments, WindowArguments};
 pub use self::perception::{
     BehaviorArguments, ClipArguments, CollectBehaviorArguments, CollectCommand,
     CollectDetectionArguments, DetectionArguments, EvalPerceptionCommand, Look, Of, Scenes,
@@ -74,6 +76,8 @@ pub enum Command {
     /// Tell how good learned perception is on episodes that nothing was learned from.
     #[command(subcommand)]
     EvalPerception(EvalPerceptionCommand),
+    /// Tell how good an opponent model is on episodes that nothing was learned from; docs/learning.md.
+    EvalOpponent(OpponentArguments),
     /// Make a video of a recorded episode.
     Replay(ReplayArguments),
     /// Make pictures of what somebody sees at some frame: RGB, depth, instance ids.

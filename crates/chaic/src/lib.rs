@@ -38,6 +38,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Collect(command) => commands::collect::collect(&command),
         Command::Train(command) => commands::train::train(&command),
         Command::EvalPerception(command) => commands::perception::evaluate(&command),
+        Command::EvalOpponent(arguments) => commands::opponent::evaluate(&arguments),
         Command::Replay(arguments) => commands::replay::run(&arguments),
         Command::Render(arguments) => commands::render::run(&arguments),
         Command::Episodes(command) => commands::episodes::run(&command),

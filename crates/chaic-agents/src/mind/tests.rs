@@ -1,7 +1,9 @@
 //! Whole minds in a toy house: they get things delivered, and never get stuck.
 
 use chaic_protocol::ClassId;
+use chaic_protocol::capability::Persona;
 use chaic_protocol::observation::Grants;
+use chaic_protocol::task::SceneKind;
 
 use super::*;
 use crate::perception::{GroundTruthIds, Pointing};
@@ -9,6 +11,11 @@ use crate::policies::{RulePolicy, RuleProfile};
 use crate::sight::TrueSight;
 use crate::test_support::{Toy, ToyObject};
 use crate::{helpers, partners};
+
+/// The mind of a partner of this kind.
+fn mind_of(persona: Persona) -> Mind<RulePolicy> {
+    Mind::new(partners::policy(persona, SceneKind::House), PlannerRules::paper())
+}
 
 /// Three rooms side by side with doors of 1.2 m, furniture, a bed and fruit; and the fruit.
 fn house() -> (Toy, usize) {
@@ -40,7 +47,7 @@ fn the_partner_delivers_all_that_is_wanted_with_time_to_spare() {
     let (mut toy, n) = house();
     let mut briefing = toy.briefing();
     briefing.goal = Toy::goal(&[("apple", 3), ("banana", 2)]);
-    let plans = toy.live(&mut partners::constrained(crate::PlannerRules::paper()), &briefing);
+    let plans = toy.live(&mut mind_of(Persona::Adult), &briefing);
     let story = plans.join("; ");
     assert!(
         toy.delivered.len() >= n,
@@ -212,7 +219,7 @@ fn the_frail_person_brings_furniture_to_the_truck() {
     briefing.containers.clear();
     briefing.goal_places = vec![ClassId::named("truck")];
     briefing.goal = Toy::goal(&[("drawer", 2)]);
-    let plans = toy.live(&mut partners::frail(crate::PlannerRules::paper()), &briefing);
+    let plans = toy.live(&mut mind_of(Persona::Frail), &briefing);
     assert_eq!(toy.delivered.len(), 2, "{plans:?}");
 }
 
@@ -228,7 +235,7 @@ fn the_rider_fills_the_basket_before_delivering_it() {
     toy.stand([-5.0, 0.0], 0.0);
     let mut briefing = toy.briefing();
     briefing.goal = Toy::goal(&[("apple", 4)]);
-    let plans = toy.live(&mut partners::rider(crate::PlannerRules::paper()), &briefing);
+    let plans = toy.live(&mut mind_of(Persona::Rider), &briefing);
     assert_eq!(toy.delivered.len(), 4, "{plans:?}");
     assert_eq!(plans.iter().filter(|p| p.starts_with("bring")).count(), 2, "{plans:?}");
 }

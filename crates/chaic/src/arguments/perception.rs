@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 
+use super::opponent::CollectOpponentArguments;
+
 /// What to train.
 #[derive(Debug, Subcommand)]
 pub enum TrainCommand {
@@ -15,6 +17,8 @@ pub enum TrainCommand {
     Ppo(TrainArguments),
     /// The same policy by what a teacher would choose.
     Clone(TrainArguments),
+    /// The opponent model: what a partner is about, and what it can't do.
+    Opponent(TrainArguments),
 }
 
 /// Of `chaic train`.
@@ -46,6 +50,8 @@ pub enum CollectCommand {
     Detection(CollectDetectionArguments),
     /// Clips of what partners do, with labels: safetensors files.
     Behavior(CollectBehaviorArguments),
+    /// Windows of what helpers saw of their partner, with what it was about: a safetensors file.
+    Opponent(CollectOpponentArguments),
 }
 
 /// Whose environments are seen; those of evaluation are left to it.

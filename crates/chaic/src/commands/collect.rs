@@ -25,6 +25,7 @@ pub fn collect(command: &CollectCommand) -> Result<Ended> {
     match command {
         CollectCommand::Detection(arguments) => detection(arguments),
         CollectCommand::Behavior(arguments) => behavior(arguments),
+        CollectCommand::Opponent(arguments) => super::opponent::collect_windows(arguments),
     }
 }
 

@@ -9,6 +9,7 @@ pub mod helper;
 pub mod import;
 pub mod llm;
 pub mod merge;
+pub mod opponent;
 pub mod perception;
 pub mod render;
 pub mod replay;

@@ -93,7 +93,7 @@ fn evaluate_behavior(arguments: &BehaviorArguments) -> Result<Ended> {
     write_json(arguments.json.as_deref(), &found)
 }
 
-fn write_json(path: Option<&Path>, found: &impl Serialize) -> Result<Ended> {
+pub(super) fn write_json(path: Option<&Path>, found: &impl Serialize) -> Result<Ended> {
     if let Some(path) = path {
         let json = serde_json::to_string_pretty(found).expect("a report is plain data") + "\n";
         write_whole(path, json.as_bytes())?;

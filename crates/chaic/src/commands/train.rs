@@ -8,6 +8,7 @@ use std::time::Instant;
 use anyhow::{Context as _, Result};
 use chaic_eval::curves::{Curve, draw};
 use chaic_files::read_bounded;
+use chaic_learn::opponent::train::OpponentTraining;
 use chaic_learn::train::{Cloning, PolicyTraining, Reinforcement};
 use chaic_training::{CURVES, Of, Record, Training, TrainingRun, read_rules};
 use chaic_vision::behavior::train::BehaviorTraining;
@@ -42,6 +43,14 @@ pub fn train(command: &TrainCommand) -> Result<Ended> {
                 rules.steps = steps;
             })
         }
+        TrainCommand::Opponent(arguments) => train_one::<OpponentTraining>(
+            "opponent",
+            "chaic eval-opponent --weights FILE",
+            arguments,
+            |rules, steps| {
+                rules.steps = steps;
+            },
+        ),
         TrainCommand::Ppo(arguments) => train_one::<PolicyTraining<Reinforcement>>(
             "ppo",
             EVALUATE_POLICY,

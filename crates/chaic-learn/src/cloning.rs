@@ -3,19 +3,22 @@
 //! The teacher follows the oracle's rules and is told the goal, but sees, remembers and is granted no more than the
 //! helper that learns: so that what it does can be told from what the helper knows, as far as it can.
 
-use std::sync::PoisonError;
+use std::sync::{Arc, PoisonError};
 
+use chaic_agents::behavior::BehaviorLog;
 use chaic_agents::decision::{Context, Plan, Policy};
+use chaic_agents::memory::Memory;
 use chaic_agents::policies::{RulePolicy, RuleProfile};
 use chaic_nn::AdamRules;
 use chaic_protocol::briefing::Goal;
 use chaic_protocol::geom::math;
 use chaic_protocol::rng::Stream;
-use chaic_protocol::{AgentError, Briefing};
+use chaic_protocol::{AgentError, Briefing, Observation};
 use chaic_training::Learner;
 
 use crate::choice_network::{BySaid, ChoiceNetwork, Decision, Said, step};
-use crate::features::{Choices, decision};
+use crate::features::Features;
+use crate::opponent::network::OpponentModel;
 use crate::policy::{LearnedPolicy, Noted, Notes};
 
 /// Who drives the mind whose choices the teacher tells.
@@ -32,30 +35,35 @@ pub struct Teacher {
     goal: Goal,
     driver: Driver,
     notes: Notes,
-    choices: Choices,
+    features: Features,
 }
 
 impl Teacher {
-    /// A teacher who knows this goal.
-    pub fn new(goal: Goal, driver: Driver, notes: Notes) -> Teacher {
+    /// A teacher who knows this goal, of those who learn with what this opponent model tells, if there is one.
+    pub fn new(
+        goal: Goal,
+        driver: Driver,
+        opponent: Option<Arc<OpponentModel>>,
+        notes: Notes,
+    ) -> Teacher {
         let rules = RulePolicy::new(RuleProfile::ORACLE);
-        Teacher { rules, goal, driver, notes, choices: Choices::default() }
+        Teacher { rules, goal, driver, notes, features: Features::new(opponent) }
     }
 }
 
 impl Policy for Teacher {
     fn reset(&mut self, briefing: &Briefing) {
         Policy::reset(&mut self.rules, briefing);
-        self.choices = Choices::default();
+        self.features.reset(briefing);
         if let Driver::Learner(learner) = &mut self.driver {
             learner.reset(briefing);
         }
     }
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
-        let is_under_way = self.choices.is_under_way();
-        let offered = self.choices.offered(valid);
-        let decision = decision(context, &offered, &self.choices);
+        let is_under_way = self.features.choices.is_under_way();
+        let offered = self.features.choices.offered(valid);
+        let decision = self.features.decision(context, &offered);
         let mut told = context.briefing.clone();
         told.goal = Some(self.goal.clone());
         let taught = self.rules.choose(&Context { briefing: &told, ..*context }, valid)?;
@@ -64,7 +72,7 @@ impl Policy for Teacher {
             Driver::Learner(learner) => learner.choose(context, valid)?,
         };
         let frame = context.memory.frame;
-        self.choices.note(plan, frame);
+        self.features.choices.note(plan, frame);
         // What makes no room for what is under way comes to going on with it.
         let goes_on = if is_under_way { Some(0) } else { None };
         let choice = offered.iter().position(|plan| *plan == taught).or(goes_on);
@@ -81,7 +89,14 @@ impl Policy for Teacher {
             learner.reconsiders(context, current, is_news);
         }
         // When the learner would, so that both decide at the same moments.
-        self.choices.is_due(context.memory.frame, current, is_news)
+        self.features.choices.is_due(context.memory.frame, current, is_news)
+    }
+
+    fn look(&mut self, observation: &Observation, memory: &Memory, behavior: &BehaviorLog) {
+        self.features.look(memory);
+        if let Driver::Learner(learner) = &mut self.driver {
+            learner.look(observation, memory, behavior);
+        }
     }
 }
 

@@ -1,28 +1,22 @@
 //! What a choice between plans is seen as: numbers of the state, and of each plan. All of it follows from what the
 //! helper's own mind remembers and was told; distances are scaled so that most numbers lie between 0 and 1.
 
+use std::sync::Arc;
+
 use chaic_agents::decision::{Context, HandState, Plan};
 use chaic_agents::mapping::Thing;
 use chaic_agents::memory::Memory;
 use chaic_agents::track::TrackId;
+use chaic_nn::Pass;
 use chaic_protocol::briefing::Relation;
-use chaic_protocol::catalogue::TargetSet;
-use chaic_protocol::geom::{horizontal_distance, math, xz};
-use chaic_protocol::{ClassId, Frame, Role, Vec3};
+use chaic_protocol::geom::{horizontal_distance, xz};
+use chaic_protocol::{Briefing, ClassId, Frame, Role, Vec3};
 
 use crate::choice_network::Decision;
-
-/// Sets that targets come from.
-pub(crate) const SETS: [TargetSet; 8] = [
-    TargetSet::Fruit,
-    TargetSet::Bread,
-    TargetSet::Work,
-    TargetSet::School,
-    TargetSet::ShopFruit,
-    TargetSet::ShopBakery,
-    TargetSet::ShopDrinks,
-    TargetSet::Furniture,
-];
+use crate::opponent::network::{N_GOALS, Opinion, OpponentModel};
+use crate::opponent::window::Window;
+use crate::opponent::{Goal, N_LIMITS};
+use crate::scales::{SETS, flag, fresh, share};
 
 /// Numbers of the state, before two for each set: what of it the partner is believed to have taken, and what can be
 /// taken.
@@ -90,12 +84,16 @@ pub const PLAN: [&str; 22] = [
 pub const N_STATE: usize = STATE.len() + 2 * SETS.len();
 /// How many numbers a plan has.
 pub const N_PLAN: usize = N_KINDS + PLAN.len() + SETS.len();
+/// How many more numbers a state has where an opponent model tells of the partner: its goal and its limits.
+pub const N_STATE_OF_OPPONENT: usize = N_GOALS + N_LIMITS;
+/// How many more numbers a plan has then: how likely its class is what the partner is after, by itself and times how
+/// likely it is about to take something.
+pub const N_PLAN_OF_OPPONENT: usize = 2;
 /// How many kinds of plans there are.
 const N_KINDS: usize = Plan::KINDS.len();
 
 /// What one divides by, metres, frames and kilograms.
 const FAR_M: f32 = 20.0;
-const FRESH_FRAMES: f32 = 120.0;
 const LONG_FRAMES: f32 = 3000.0;
 const HEAVY_KG: f32 = 20.0;
 /// How far a body gets in a frame, roughly, metres: a measure for the time to spare, no more.
@@ -149,20 +147,6 @@ impl Choices {
     }
 }
 
-pub(crate) fn flag(is_so: bool) -> f32 {
-    f32::from(u8::from(is_so))
-}
-
-/// A share that rises from 0 to 1 as `x` grows to `most`.
-pub(crate) fn share(x: f32, most: f32) -> f32 {
-    (x / most).clamp(0.0, 1.0)
-}
-
-/// How fresh what happened so many frames ago is, 1 to 0.
-pub(crate) fn fresh(age: u32) -> f32 {
-    math::exp(-(age as f32) / FRESH_FRAMES)
-}
-
 /// What is believed to have been taken by the partner: what it was seen to take or hold, and what isn't where it
 /// was and was not taken by oneself.
 fn taken_by_partner(context: &Context<'_>) -> Vec<ClassId> {
@@ -200,6 +184,74 @@ fn unexplored(memory: &Memory) -> f32 {
     (0..n).filter(|cell| memory.map.is_unexplored(*cell)).count() as f32 / n.max(1) as f32
 }
 
+/// What a policy reads, besides what its mind remembers.
+#[derive(Clone)]
+pub struct Features {
+    /// What it chose so far.
+    pub choices: Choices,
+    opponent: Option<Watch>,
+}
+
+/// An opponent model that looks on.
+#[derive(Clone)]
+struct Watch {
+    model: Arc<OpponentModel>,
+    pass: Pass,
+    window: Window,
+    briefing: Option<Briefing>,
+}
+
+impl Features {
+    /// With what this opponent model tells, if there is one.
+    pub fn new(opponent: Option<Arc<OpponentModel>>) -> Features {
+        let watch = |model: Arc<OpponentModel>| Watch {
+            pass: model.pass(),
+            model,
+            window: Window::default(),
+            briefing: None,
+        };
+        Features { choices: Choices::default(), opponent: opponent.map(watch) }
+    }
+
+    /// Begins an episode.
+    pub fn reset(&mut self, briefing: &Briefing) {
+        self.choices = Choices::default();
+        if let Some(watch) = &mut self.opponent {
+            watch.window.reset(briefing);
+            watch.briefing = Some(briefing.clone());
+        }
+    }
+
+    /// Takes in an observation, after the memory has.
+    pub fn look(&mut self, memory: &Memory) {
+        if let Some(Watch { window, briefing: Some(briefing), .. }) = &mut self.opponent {
+            window.look(memory, briefing);
+        }
+    }
+
+    /// What is known when one of these plans is to be chosen.
+    pub fn decision(&mut self, context: &Context<'_>, offered: &[Plan]) -> Decision {
+        let mut seen = decision(context, offered, &self.choices);
+        let Some(Watch { model, pass, window, .. }) = &mut self.opponent else { return seen };
+        let read = window.decision(context.memory, context.briefing, context.behavior);
+        let Opinion { goals, targets, limits } = model.opinion(&read, pass);
+        seen.state.extend(goals);
+        seen.state.extend(limits);
+        let rows = seen.choices.chunks_exact(N_PLAN).zip(offered);
+        let likely = |plan: &Plan| {
+            let class = plan.subject()?.class;
+            window.classes().iter().position(|c| *c == class).map(|k| targets[k])
+        };
+        seen.choices = rows
+            .flat_map(|(row, plan)| {
+                let p = likely(plan).unwrap_or(0.0);
+                row.iter().copied().chain([p, p * goals[Goal::Pick.index()]])
+            })
+            .collect();
+        seen
+    }
+}
+
 /// What all plans of a decision are seen by.
 struct Scene<'a> {
     memory: &'a Memory,
@@ -213,8 +265,8 @@ struct Scene<'a> {
     available: Vec<ClassId>,
 }
 
-/// What is known when one of these plans is to be chosen.
-pub fn decision(context: &Context<'_>, valid: &[Plan], choices: &Choices) -> Decision {
+/// What is known when one of these plans is to be chosen, of the partner's mind apart.
+fn decision(context: &Context<'_>, valid: &[Plan], choices: &Choices) -> Decision {
     let Context { briefing, memory, behavior, is_explored } = *context;
     let hands = HandState::of(&memory.hands, briefing);
     let taken = taken_by_partner(context);

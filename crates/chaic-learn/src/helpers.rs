@@ -62,7 +62,8 @@ impl NamedPolicy {
     pub fn read(name: &str, path: &Path) -> chaic_env::Result<NamedPolicy> {
         let bytes = read_bounded(path, MOST_BYTES).map_err(|e| EnvError::Minds(e.into()))?;
         let wrong = |problem| Refusal::Weights { path: path.to_owned(), problem };
-        let trained = Arc::new(from_bytes(&bytes).map_err(wrong)?);
+        let (_, trained) = from_bytes(&bytes).map_err(wrong)?;
+        let trained = Arc::new(trained);
         Ok(NamedPolicy { name: name.to_owned(), digest: weights::digest(&bytes), trained })
     }
 }

@@ -14,17 +14,18 @@
 //!   episode.
 //! - The same configuration and seed give the same weights, bit for bit, on any machine and number of threads.
 
-pub mod features;
-
 pub mod choice_network;
+pub mod scales;
+
+pub mod opponent;
+
+pub mod features;
 pub mod ppo;
 
 pub mod cloning;
 pub mod policy;
 pub mod rewards;
 pub mod rollout;
-
-pub mod opponent;
 
 pub mod helpers;
 

@@ -3,17 +3,20 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use chaic_agents::behavior::BehaviorLog;
 use chaic_agents::decision::{Context, Plan, Policy};
+use chaic_agents::memory::Memory;
 use chaic_agents::sight::Sight;
 use chaic_agents::{Mind, PlannerRules};
 use chaic_env::minds::Helper;
 use chaic_nn::Pass;
 use chaic_protocol::observation::Grants;
 use chaic_protocol::rng::Stream;
-use chaic_protocol::{AgentError, AgentId, Briefing, Frame};
+use chaic_protocol::{AgentError, AgentId, Briefing, Frame, Observation};
 
 use crate::choice_network::{ChoiceNetwork, Decision};
-use crate::features::{Choices, decision};
+use crate::features::Features;
+use crate::opponent::network::OpponentModel;
 
 /// A helper whose mind this policy drives: it is granted what the paper's helpers are, as far as `sight` needs that,
 /// and watches its partner by what it sees.
@@ -30,6 +33,8 @@ pub struct Trained {
     pub model: ChoiceNetwork,
     /// Its numbers.
     pub numbers: Vec<f32>,
+    /// The opponent model that tells it of its partner, if it needs one.
+    pub opponent: Option<Arc<OpponentModel>>,
 }
 
 /// How choices are made of probabilities.
@@ -67,7 +72,7 @@ pub struct LearnedPolicy {
     notes: Option<Notes>,
     pass: Pass,
     rng: Stream,
-    choices: Choices,
+    features: Features,
 }
 
 impl LearnedPolicy {
@@ -75,32 +80,33 @@ impl LearnedPolicy {
     pub fn new(trained: Arc<Trained>, choosing: Choosing, notes: Option<Notes>) -> LearnedPolicy {
         let pass = trained.model.pass();
         let rng = Stream::new(0, "plans", 0);
-        LearnedPolicy { trained, choosing, notes, pass, rng, choices: Choices::default() }
+        let features = Features::new(trained.opponent.clone());
+        LearnedPolicy { trained, choosing, notes, pass, rng, features }
     }
 }
 
 impl Policy for LearnedPolicy {
     fn reset(&mut self, briefing: &Briefing) {
         self.rng = Stream::new(briefing.seed, "learned policy", 0);
-        self.choices = Choices::default();
+        self.features.reset(briefing);
     }
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
-        let offered = self.choices.offered(valid);
+        let offered = self.features.choices.offered(valid);
         let frame = context.memory.frame;
         if let [only] = offered[..] {
-            self.choices.note(only, frame);
+            self.features.choices.note(only, frame);
             return Ok(only);
         }
-        let decision = decision(context, &offered, &self.choices);
-        let Trained { model, numbers } = &*self.trained;
+        let decision = self.features.decision(context, &offered);
+        let Trained { model, numbers, .. } = &*self.trained;
         let said = model.forward(numbers, std::iter::once(&decision), &mut self.pass).remove(0);
         let choice = match self.choosing {
             Choosing::Sampled => said.sample(self.rng.unit()),
             Choosing::Likeliest => said.most_likely(),
         };
         let plan = offered[choice];
-        self.choices.note(plan, frame);
+        self.features.choices.note(plan, frame);
         if let Some(notes) = &self.notes {
             let log_probability = said.log_probabilities[choice];
             let noted = Noted { frame, decision, choice, log_probability, value: said.value() };
@@ -110,11 +116,15 @@ impl Policy for LearnedPolicy {
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, is_news: bool) -> bool {
-        self.choices.is_due(context.memory.frame, current, is_news)
+        self.features.choices.is_due(context.memory.frame, current, is_news)
+    }
+
+    fn look(&mut self, _: &Observation, memory: &Memory, _: &BehaviorLog) {
+        self.features.look(memory);
     }
 
     fn counts(&self) -> BTreeMap<String, u64> {
-        let n = self.choices.n_of_kind.iter().map(|n| u64::from(*n)).sum();
+        let n = self.features.choices.n_of_kind.iter().map(|n| u64::from(*n)).sum();
         BTreeMap::from([("choices".to_owned(), n)])
     }
 

@@ -157,7 +157,7 @@ pub fn play_taught(
     let recording = record((id, seed), rules, |goal, notes| {
         let mut rng = Stream::new(u64::from(seed), id, 0);
         let driver = driver(mixed, &mut rng, learner);
-        Teacher::new(goal.clone(), driver, notes)
+        Teacher::new(goal.clone(), driver, trained.opponent.clone(), notes)
     })?;
     let ends: Vec<Frame> = recording.ends().collect();
     let mut following = 0.0;

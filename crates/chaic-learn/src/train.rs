@@ -1,9 +1,11 @@
 //! The loops: episodes are played, and the network learns from them.
 
-use std::path::Path;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use chaic_agents::sight::{GROUND_TRUTH, Sight};
+use chaic_files::read_bounded;
 use chaic_nn::AdamRules;
 use chaic_nn::weights::{self, WeightsError};
 use chaic_protocol::TaskId;
@@ -16,7 +18,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::choice_network::{ChoiceNetwork, Decision};
 use crate::cloning::{Learned, Lesson, imitate};
-use crate::features::{N_PLAN, N_STATE};
+use crate::features::{N_PLAN, N_PLAN_OF_OPPONENT, N_STATE, N_STATE_OF_OPPONENT};
+use crate::opponent::{self, network::OpponentModel};
 use crate::policy::{Choosing, Trained};
 use crate::ppo::{PpoRules, Told, improve};
 use crate::rewards::Rewards;
@@ -29,22 +32,73 @@ const VALIDATION_SEEDS: u64 = 50_000_000;
 
 /// What files of weights say that they are.
 const KIND: &str = "chaic plan policy 2";
+/// The same of those with an opponent model.
+const KIND_WITH_OPPONENT: &str = "chaic plan policy with opponent model 1";
+/// What the numbers of the opponent model are called among a policy's.
+const OPPONENT: &str = "opponent";
+/// No file of weights is larger, bytes.
+const MOST_BYTES: u64 = 1 << 28;
 /// Width of the network's layers.
 const WIDTH: usize = 96;
 
-/// The network that chooses plans.
-pub fn network() -> ChoiceNetwork {
-    ChoiceNetwork::new((N_STATE, N_PLAN), WIDTH, 1)
+/// Which network chooses plans.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// By what its mind remembers.
+    Plain,
+    /// By what an opponent model tells of the partner, too (Smart-Help).
+    WithOpponent,
+}
+
+impl Kind {
+    /// The network, whose numbers include those of the opponent model: they belong together.
+    pub fn network(self) -> ChoiceNetwork {
+        if self == Kind::Plain {
+            return ChoiceNetwork::new((N_STATE, N_PLAN), WIDTH, 1);
+        }
+        let inputs = (N_STATE + N_STATE_OF_OPPONENT, N_PLAN + N_PLAN_OF_OPPONENT);
+        let mut model = ChoiceNetwork::new(inputs, WIDTH, 1);
+        model.network.aside(OPPONENT, opponent::network::network().network.n_numbers());
+        model
+    }
+
+    fn name(self) -> &'static str {
+        if self == Kind::Plain { KIND } else { KIND_WITH_OPPONENT }
+    }
+
+    /// A network of this kind that plays by these numbers.
+    pub fn trained(self, model: &ChoiceNetwork, numbers: Vec<f32>) -> Trained {
+        let of_opponent = |model: &ChoiceNetwork| {
+            let range = opponent_range(model);
+            Arc::new(OpponentModel::new(numbers[range].to_vec()))
+        };
+        let opponent = (self == Kind::WithOpponent).then(|| of_opponent(model));
+        Trained { model: model.clone(), numbers, opponent }
+    }
+}
+
+/// Where the opponent model's numbers are.
+fn opponent_range(model: &ChoiceNetwork) -> Range<usize> {
+    let found = model.network.parameters().iter().find(|p| p.name == OPPONENT);
+    found.expect("it is of the kind that has one").range.clone()
 }
 
 /// The network in a file of weights.
 ///
 /// # Errors
 /// [`WeightsError`] if it isn't a whole file of such a network.
-pub fn from_bytes(bytes: &[u8]) -> Result<Trained, WeightsError> {
-    let model = network();
-    let numbers = weights::from_bytes(&model.network, bytes, KIND)?;
-    Ok(Trained { model, numbers })
+pub fn from_bytes(bytes: &[u8]) -> Result<(Kind, Trained), WeightsError> {
+    let read = |kind: Kind| {
+        let model = kind.network();
+        let numbers = weights::from_bytes(&model.network, bytes, kind.name())?;
+        Ok((kind, kind.trained(&model, numbers)))
+    };
+    match read(Kind::Plain) {
+        Err(WeightsError::Kind { found, .. }) if found == KIND_WITH_OPPONENT => {
+            read(Kind::WithOpponent)
+        }
+        read => read,
+    }
 }
 
 /// Which episodes are played, and how.
@@ -61,6 +115,9 @@ pub struct PlayRules {
     pub perception: String,
     /// See `perception`.
     pub behavior: String,
+    /// The weights of the opponent model that tells the policy of its partner (`chaic train opponent`), if there
+    /// is to be one.
+    pub opponent: Option<PathBuf>,
     /// Whether the network's inputs are normalized by their mean and spread so far.
     pub normalize: bool,
     /// Episodes of each task that validations play.
@@ -77,6 +134,7 @@ impl Default for PlayRules {
             image_size: 128,
             perception: GROUND_TRUTH.to_owned(),
             behavior: GROUND_TRUTH.to_owned(),
+            opponent: None,
             normalize: false,
             validation_episodes: 3,
             rewards: Rewards::default(),
@@ -94,7 +152,17 @@ impl PlayRules {
         if !(16..=1024).contains(&self.image_size) {
             return Err("play.image_size is 16 to 1024".to_owned());
         }
-        self.sight().map(|_| ()).map_err(|e| e.to_string())
+        self.sight().map_err(|e| e.to_string())?;
+        self.read_opponent().map_err(|e| e.to_string())?;
+        Ok(())
+    }
+
+    fn read_opponent(&self) -> Result<Option<OpponentModel>, TrainingError> {
+        let read = |path: &PathBuf| {
+            let wrong = |problem| TrainingError::Weights { path: path.clone(), problem };
+            OpponentModel::from_bytes(&read_bounded(path, MOST_BYTES)?).map_err(wrong)
+        };
+        self.opponent.as_ref().map(read).transpose()
     }
 
     fn sight(&self) -> Result<Arc<dyn Sight>, SightError> {
@@ -142,20 +210,25 @@ fn mean_tr(played: &[Played]) -> f64 {
 
 /// A network while it learns, with the iterations so far.
 pub struct Learning {
+    kind: Kind,
     model: ChoiceNetwork,
     learner: Learner,
     iterations: u64,
 }
 
 impl Learning {
-    fn new(seed: u64, shards: usize) -> Learning {
-        let model = network();
-        let learner = Learner::new(&model.network, seed, shards);
-        Learning { model, learner, iterations: 0 }
+    fn new(seed: u64, shards: usize, opponent: Option<&OpponentModel>) -> Learning {
+        let kind = if opponent.is_some() { Kind::WithOpponent } else { Kind::Plain };
+        let model = kind.network();
+        let mut learner = Learner::new(&model.network, seed, shards);
+        if let Some(opponent) = opponent {
+            learner.numbers[opponent_range(&model)].copy_from_slice(opponent.numbers());
+        }
+        Learning { kind, model, learner, iterations: 0 }
     }
 
     fn trained(&self) -> Arc<Trained> {
-        Arc::new(Trained { model: self.model.clone(), numbers: self.learner.numbers.clone() })
+        Arc::new(self.kind.trained(&self.model, self.learner.numbers.clone()))
     }
 
     /// Takes decisions into what inputs are normalized by.
@@ -164,7 +237,7 @@ impl Learning {
     }
 
     fn weights(&self) -> Vec<u8> {
-        weights::to_bytes(&self.model.network, &self.learner.numbers, KIND)
+        weights::to_bytes(&self.model.network, &self.learner.numbers, self.kind.name())
     }
 
     fn checkpoint(&self) -> Vec<u8> {
@@ -231,7 +304,8 @@ impl<M: Method> Training for PolicyTraining<M> {
     ) -> Result<Option<PolicyTraining<M>>, TrainingError> {
         let Course { seed, shards, play, .. } = method.course();
         let sight = play.sight().map_err(TrainingError::of_data)?;
-        let learning = Learning::new(seed, shards);
+        let opponent = play.read_opponent()?;
+        let learning = Learning::new(seed, shards, opponent.as_ref());
         Ok(Some(PolicyTraining { method: method.clone(), sight, learning }))
     }
 
@@ -257,7 +331,8 @@ impl<M: Method> Training for PolicyTraining<M> {
     }
 
     fn begin_with(&mut self, weights: &[u8]) -> Result<(), WeightsError> {
-        self.learning.learner.begin_with(from_bytes(weights)?.numbers);
+        let Learning { kind, model, learner, .. } = &mut self.learning;
+        learner.begin_with(weights::from_bytes(&model.network, weights, kind.name())?);
         Ok(())
     }
 
@@ -432,7 +507,7 @@ impl Method for Cloning {
         let lessons: Vec<Lesson> = taught.into_iter().flat_map(|(lessons, _)| lessons).collect();
         let rate = rate_at(learning.iterations, (self.rate, 1, self.iterations));
         let how = (&self.adam, rate, self.batch);
-        let Learning { model, learner, iterations } = learning;
+        let Learning { model, learner, iterations, .. } = learning;
         let learned = imitate(how, model, learner, &lessons, (self.seed, *iterations));
         if self.play.normalize {
             learning.normalize_by(lessons.iter().map(|l| &l.decision));

@@ -10,10 +10,12 @@ use chaic_agents::sight::TrueSight;
 use chaic_env::minds::{BuiltIn, Helpers as _};
 use chaic_learn::features::{N_PLAN, N_STATE};
 use chaic_learn::helpers::{NamedPolicy, Policies};
-use chaic_learn::policy::{Choosing, Trained};
+use chaic_learn::opponent;
+use chaic_learn::policy::Choosing;
 use chaic_learn::rewards::Rewards;
 use chaic_learn::rollout::{RolloutRules, play};
-use chaic_learn::train::{Cloning, PlayRules, PolicyTraining, Reinforcement, network};
+use chaic_learn::train::{Cloning, Kind, PlayRules, PolicyTraining, Reinforcement, from_bytes};
+use chaic_nn::weights;
 use chaic_protocol::TaskId;
 use chaic_training::{CHECKPOINT, Training, TrainingError, TrainingRun};
 
@@ -75,10 +77,37 @@ fn a_training_that_was_interrupted_ends_with_the_same_bits() {
 }
 
 #[test]
+fn a_policy_carries_its_opponent_model_along() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("opponent.safetensors");
+    let network = opponent::network::network().network;
+    let numbers = network.begin(7);
+    fs::write(&file, weights::to_bytes(&network, &numbers, opponent::network::KIND)).unwrap();
+    let play = PlayRules { opponent: Some(file.clone()), ..small() };
+    let rules = Reinforcement { iterations: 2, play, ..Reinforcement::default() };
+    let [whole, paused] = [false, true].map(|pauses| {
+        let folder = folder.path().join(format!("policy {pauses}"));
+        trained::<PolicyTraining<Reinforcement>>(&rules, &folder, pauses)
+    });
+    assert!(whole == paused);
+    let weights = PolicyTraining::<Reinforcement>::WEIGHTS;
+    let bytes = fs::read(folder.path().join("policy true").join(weights)).unwrap();
+    let (kind, policy) = from_bytes(&bytes).unwrap();
+    assert_eq!(kind, Kind::WithOpponent);
+    assert_eq!(policy.opponent.unwrap().numbers(), numbers);
+    // What isn't there, or is another network, is told before anything is written.
+    for (bytes, word) in [(&b"nothing"[..], "no weights"), (&bytes, "plan policy")] {
+        fs::write(&file, bytes).unwrap();
+        let problem = PolicyTraining::<Reinforcement>::check(&rules).unwrap_err();
+        assert!(problem.contains("opponent.safetensors") && problem.contains(word), "{problem}");
+    }
+}
+
+#[test]
 fn what_a_policy_is_told_lies_within_bounds() {
-    let model = network();
+    let model = Kind::Plain.network();
     let numbers = model.network.begin(1);
-    let trained = Arc::new(Trained { model, numbers });
+    let trained = Arc::new(Kind::Plain.trained(&model, numbers));
     let rules = RolloutRules {
         sight: &TrueSight,
         image_size: 64,

@@ -13,7 +13,7 @@ use chaic_protocol::{Action, AgentId, Briefing, ClassId, Frame, Role, Vec3};
 
 use super::is_pickable;
 use crate::choice_network::Decision;
-use crate::features::{SETS, flag, fresh, share};
+use crate::scales::{SETS, flag, fresh, share};
 
 /// Observations of a window (paper, appendix on learning).
 pub const LENGTH: usize = 5;

@@ -73,7 +73,7 @@ pub const LIMITS: [&str; N_LIMITS] =
 
 /// What a body can't do, as numbers between 0 (constrained) and 1 (not): how high it reaches from 1.5 to 3 m, how low
 /// from 0.25 m to the ground, how strong it is from 100 to 600 kg, whether it has no bicycle and no wheelchair. The
-/// scales are the original's (facts 6).
+/// scales are those of the original's own data.
 pub fn limits_of(body: &Capability) -> [f32; N_LIMITS] {
     let [low_m, high_m] = body.pick_range_m;
     let flag = |is_so: bool| f32::from(u8::from(is_so));

@@ -2,6 +2,7 @@
 
 mod bench;
 mod exec;
+mod export;
 mod fidelity;
 mod opponent;
 mod perception;
@@ -27,6 +28,7 @@ pub use self::bench::{
 pub use self::exec::{
     ExecArguments, HelperArgument, HelperCheckArguments, HelperCommand, HelperServeArguments,
 };
+pub use self::export::{ExportCommand, LeRobotArguments};
 pub use self::fidelity::FidelityArguments;
 pub use self::opponent::{CollectOpponentArguments, OpponentArguments, WindowArguments};
 pub use self::perception::{
@@ -80,6 +82,9 @@ pub enum Command {
     EvalOpponent(OpponentArguments),
     /// Make a video of a recorded episode.
     Replay(ReplayArguments),
+    /// Write recorded episodes as a data set that other programs read; docs/learning.md.
+    #[command(subcommand)]
+    Export(ExportCommand),
     /// Make pictures of what somebody sees at some frame: RGB, depth, instance ids.
     Render(RenderArguments),
     /// List, show, make and check episodes.

@@ -39,6 +39,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Train(command) => commands::train::train(&command),
         Command::EvalPerception(command) => commands::perception::evaluate(&command),
         Command::EvalOpponent(arguments) => commands::opponent::evaluate(&arguments),
+        Command::Export(command) => commands::export::export(&command),
         Command::Replay(arguments) => commands::replay::run(&arguments),
         Command::Render(arguments) => commands::render::run(&arguments),
         Command::Episodes(command) => commands::episodes::run(&command),

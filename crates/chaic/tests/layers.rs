@@ -105,6 +105,19 @@ const ALLOWED: &[Arrows] = &[
         &[],
     ),
     arrows(
+        "chaic-export",
+        &[
+            "chaic-files",
+            "chaic-protocol",
+            "chaic-world",
+            "chaic-episodes",
+            "chaic-render",
+            "chaic-env",
+            "chaic-video",
+        ],
+        &[],
+    ),
+    arrows(
         "chaic-fidelity",
         &["chaic-files", "chaic-protocol", "chaic-env", "chaic-eval"],
         &["chaic-episodes"],
@@ -148,6 +161,7 @@ const ALLOWED: &[Arrows] = &[
             "chaic-gltf",
             "chaic-eval",
             "chaic-bench",
+            "chaic-export",
             "chaic-fidelity",
             "chaic-import",
             "chaic-training",

@@ -349,8 +349,8 @@ impl<P: Policy> Policy for Watching<P> {
 /// No file of windows is larger, bytes.
 const MOST_BYTES: u64 = 1 << 33;
 
-/// Writes windows as a safetensors file: `state` [n, 44], `choices` [all choices, 31] one window after the other,
-/// `n_choices` [n], `goal` [n] by [`Goal::index`], `target` [n] as a choice or -1, `limits` [n, 5], `episode` [n].
+/// Writes windows as a safetensors file, a row each: `state` (44 numbers), `n_choices`, `goal` (by [`Goal::index`]),
+/// `target` (a choice, or -1), `limits` (5), `episode`; and `choices` (31 numbers), those of one window after the other.
 ///
 /// # Errors
 /// If the file system refuses.
@@ -389,7 +389,7 @@ pub fn write(path: &Path, samples: &[Sample]) -> Result<(), FileError> {
     write_whole(path, &bytes)
 }
 
-/// Reads windows that [`write`] wrote.
+/// Reads windows that [`write()`] wrote.
 ///
 /// # Errors
 /// If the file can't be read, or isn't one.

@@ -4,6 +4,7 @@ pub mod bench;
 pub mod collect;
 pub mod episodes;
 pub mod eval;
+pub mod export;
 pub mod fidelity;
 pub mod helper;
 pub mod import;

@@ -1,8 +1,40 @@
-//! Promise: a policy that was trained is a helper of a run, whose traces verify; mistakes are told in one line.
+//! Promise: a policy that was trained is a helper of a run, whose traces verify and become data sets; mistakes are told
+//! in one line.
 
 use std::fs;
 
 use super::{ill, well};
+
+#[test]
+fn an_opponent_model_tells_a_policy_of_its_partner() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let few = ["--of-each", "20", "--episodes", "1", "--image-size", "32"];
+    let collected = well(at, &[&["collect", "opponent", "--out", "w"][..], &few].concat());
+    assert!(collected.contains("pick"), "{collected}");
+    let small = "steps = 2\nwarm_up = 1\nvalidation_of_each = 5\nwindows = \"w\"\n\
+                 [collect]\nepisodes = 1\nimage_size = 32\n";
+    fs::write(at.join("model.toml"), small).expect("it is written");
+    well(at, &["train", "opponent", "--config", "model.toml", "--out", "o"]);
+    let weights = "o/opponent.safetensors";
+    let told = well(at, &[&["eval-opponent", "--weights", weights][..], &few].concat());
+    assert!(told.contains("goal accuracy") && told.contains("no_wheelchair"), "{told}");
+    assert!(ill(at, &["eval-opponent", "--weights", "w"]).contains('w'));
+    let policy = "iterations = 1\n[play]\nepisodes = 1\nvalidation_episodes = 1\nimage_size = 16\n\
+                  tasks = [\"low_target\"]\nopponent = \"o/opponent.safetensors\"\n";
+    fs::write(at.join("policy.toml"), policy).expect("it is written");
+    well(at, &["train", "ppo", "--config", "policy.toml", "--out", "p"]);
+    // The model is within the policy's weights.
+    fs::remove_file(at.join(weights)).expect("it is there");
+    let helper = "smart=policy:p/policy.safetensors";
+    let eval = ["eval", "--task", "moving_house", "--first", "1", "--out", "run"];
+    well(at, &[&eval[..], &["--helper", helper]].concat());
+    // What was played becomes a data set.
+    let exported = well(at, &["export", "lerobot", "run", "--out", "set", "--every", "30"]);
+    assert!(exported.contains("1 episode"), "{exported}");
+    assert!(ill(at, &["export", "lerobot", "run", "--out", "set"]).contains("isn't empty"));
+    assert!(ill(at, &["export", "lerobot", "p", "--out", "x"]).contains("is no run"));
+}
 
 #[test]
 fn a_trained_policy_is_a_helper() {

@@ -39,7 +39,10 @@ impl Inference {
     /// If the network joins maps or their pixels (that takes a [`Pass`](crate::Pass)), or has another
     /// count of numbers.
     pub fn new(network: &Network, numbers: &[f32], arch: Arch) -> Inference {
-        let joins = network.layers.iter().any(|layer| matches!(layer, Layer::Join { .. }));
+        let joins = network
+            .layers
+            .iter()
+            .any(|layer| matches!(layer, Layer::Join { .. } | Layer::Concat { .. }));
         assert!(!joins, "maps are joined by passes only");
         assert_eq!(numbers.len(), network.n_numbers(), "numbers of another network");
         let (segments, is_kept) = segments(network);
@@ -131,7 +134,7 @@ impl Inference {
             &map.data[first..][..rows.len() * row]
         };
         match network.layers[layer] {
-            Layer::Input => unreachable!("the caller writes it"),
+            Layer::Input { .. } => unreachable!("the caller writes it"),
             Layer::Conv { from, bias, kernel, .. } => {
                 let weights = (&packed[layer], bias.map(of), kernel);
                 // Without neighbors, all pixels of the strip are one row.
@@ -168,7 +171,7 @@ impl Inference {
                 let map = &before[from.0].data[rows.start * width * channels..];
                 upsample(&map[..rows.len() * width * channels], (width, channels), out);
             }
-            Layer::Join { .. } => unreachable!("there is none"),
+            Layer::Join { .. } | Layer::Concat { .. } => unreachable!("there is none"),
         }
     }
 }
@@ -180,7 +183,11 @@ fn segments(network: &Network) -> (Vec<Range<usize>>, Vec<bool>) {
     // What is looked at from other pixels.
     for layer in layers {
         match *layer {
-            Layer::Input | Layer::Norm { .. } | Layer::Relu { .. } | Layer::Add { .. } => {}
+            Layer::Input { .. }
+            | Layer::Norm { .. }
+            | Layer::Relu { .. }
+            | Layer::Add { .. }
+            | Layer::Concat { .. } => {}
             Layer::Conv { kernel, .. } if kernel == Kernel::POINTWISE => {}
             Layer::Conv { from, .. }
             | Layer::Depthwise { from, .. }

@@ -27,8 +27,8 @@ pub struct Parameter {
 /// A layer. What it reads comes before it; all kernels keep a map's middle where it is.
 #[derive(Clone, Debug)]
 pub(crate) enum Layer {
-    /// What the caller gives.
-    Input,
+    /// What the caller gives, by its place among the inputs.
+    Input { which: usize },
     /// A dense convolution, with one number added to each channel if it has a bias.
     Conv { from: Node, weights: usize, bias: Option<usize>, kernel: Kernel, channels: usize },
     /// A depthwise convolution.
@@ -43,20 +43,22 @@ pub(crate) enum Layer {
     Upsample { from: Node },
     /// The same numbers, with the pixels of a map, or two maps of one pixel, as one pixel.
     Join { from: Node },
+    /// The channels of two maps, one after the other.
+    Concat { a: Node, b: Node },
 }
 
 impl Layer {
     /// What it reads.
     pub(crate) fn reads(&self) -> impl Iterator<Item = Node> {
         let (first, second) = match *self {
-            Layer::Input => (None, None),
+            Layer::Input { .. } => (None, None),
             Layer::Conv { from, .. }
             | Layer::Depthwise { from, .. }
             | Layer::Norm { from, .. }
             | Layer::Relu { from }
             | Layer::Upsample { from }
             | Layer::Join { from } => (Some(from), None),
-            Layer::Add { a, b } => (Some(a), Some(b)),
+            Layer::Add { a, b } | Layer::Concat { a, b } => (Some(a), Some(b)),
         };
         first.into_iter().chain(second)
     }
@@ -79,6 +81,7 @@ pub struct Network {
     sizes: Vec<Size>,
     parameters: Vec<Parameter>,
     outputs: Vec<Node>,
+    n_inputs: usize,
 }
 
 impl Network {
@@ -95,9 +98,16 @@ impl Network {
         self.parameters.len() - 1
     }
 
-    /// What the caller gives, with so many channels.
+    /// What the caller gives, with so many channels: the first thing in a network.
     pub fn input(&mut self, channels: usize) -> Node {
-        self.push(Layer::Input, Size { channels, stride: 1, maps: 1 })
+        self.side_input(channels, 1)
+    }
+
+    /// What the caller gives besides, with sides that are those of the first input divided by `stride`.
+    pub fn side_input(&mut self, channels: usize, stride: usize) -> Node {
+        let which = self.n_inputs;
+        self.n_inputs += 1;
+        self.push(Layer::Input { which }, Size { channels, stride, maps: 1 })
     }
 
     /// Numbers that no layer uses, kept in the same file as the others.
@@ -169,6 +179,21 @@ impl Network {
         self.push(Layer::Add { a, b }, of(a))
     }
 
+    /// The channels of two nodes, one after the other.
+    ///
+    /// # Panics
+    /// If they aren't maps of the same size.
+    pub fn concat(&mut self, a: Node, b: Node) -> Node {
+        let [of_a, of_b] = [a, b].map(|n| self.sizes[n.0]);
+        let channels = of_a.channels + of_b.channels;
+        assert_eq!(
+            (of_a.stride, of_a.maps),
+            (of_b.stride, of_b.maps),
+            "maps that are joined differ"
+        );
+        self.push(Layer::Concat { a, b }, Size { channels, ..of_a })
+    }
+
     /// Each pixel twice in each row and column.
     ///
     /// # Panics
@@ -190,6 +215,12 @@ impl Network {
     pub fn pair(&mut self, from: Node) -> Node {
         let Size { channels, stride, maps } = self.sizes[from.0];
         self.push(Layer::Join { from }, Size { channels: 2 * channels, stride, maps: 2 * maps })
+    }
+
+    /// The shapes of all inputs, the first being this one.
+    pub fn input_shapes(&self, first: Shape) -> Vec<Shape> {
+        let is_input = |k: &usize| matches!(self.layers[*k], Layer::Input { .. });
+        (0..self.layers.len()).filter(is_input).map(|k| self.shape_of(Node(k), first)).collect()
     }
 
     /// Numbers that are learned.

@@ -51,9 +51,18 @@ impl Pass {
     /// Runs all layers on an input.
     ///
     /// # Panics
-    /// If a side of the input is no multiple of [`Network::stride`], or maps that are joined have another
-    /// size than the network says.
+    /// As [`Pass::forward_all`].
     pub fn forward(&mut self, network: &Network, numbers: &[f32], input: &Tensor) {
+        self.forward_all(network, numbers, &[input]);
+    }
+
+    /// Runs all layers on the inputs of a network, in the order in which it was given them.
+    ///
+    /// # Panics
+    /// If there are fewer inputs than the network has, a side of the first is no multiple of [`Network::stride`], another
+    /// has another shape than that makes, or maps that are joined have another size than the network says.
+    pub fn forward_all(&mut self, network: &Network, numbers: &[f32], inputs: &[&Tensor]) {
+        let input = inputs[0];
         let Shape { height, width, .. } = input.shape;
         let stride = network.stride();
         assert!(
@@ -66,7 +75,7 @@ impl Pass {
             let out = &mut rest[0];
             out.reshape(network.shape_of(Node(k), input.shape));
             match *layer {
-                Layer::Input => out.data.copy_from_slice(&input.data),
+                Layer::Input { which } => out.data.copy_from_slice(&inputs[which].data),
                 Layer::Conv { from, weights, bias, kernel, channels } => {
                     let map = &before[from.0];
                     let out = (&mut out.data[..], channels);
@@ -108,6 +117,18 @@ impl Pass {
                     upsample(&map.data, (map.shape.width, map.shape.channels), &mut out.data);
                 }
                 Layer::Join { from } => out.data.copy_from_slice(&before[from.0].data),
+                Layer::Concat { a, b } => {
+                    let [a, b] = [a, b].map(|node| &before[node.0]);
+                    let of_both = a.data.chunks_exact(a.shape.channels);
+                    let of_both = of_both.zip(b.data.chunks_exact(b.shape.channels));
+                    for (pixel, (a, b)) in
+                        out.data.chunks_exact_mut(out.shape.channels).zip(of_both)
+                    {
+                        let (to_a, to_b) = pixel.split_at_mut(a.len());
+                        to_a.copy_from_slice(a);
+                        to_b.copy_from_slice(b);
+                    }
+                }
             }
         }
     }
@@ -127,7 +148,7 @@ impl Pass {
             let gradient = &mut rest[0];
             let channels = gradient.shape.channels;
             match *layer {
-                Layer::Input => {}
+                Layer::Input { .. } => {}
                 Layer::Conv { from, weights, bias, kernel, .. } => {
                     if let Some(bias) = bias {
                         let sums = &mut by_numbers[of(bias)];
@@ -140,7 +161,7 @@ impl Pass {
                     let out = (&mut by_numbers[of(weights)], kernel);
                     let maps = (&map.data[..], map.shape);
                     conv::backward_weights(self.arch, maps, out, g, &mut self.patches);
-                    if !matches!(network.layers[from.0], Layer::Input) {
+                    if !matches!(network.layers[from.0], Layer::Input { .. }) {
                         let out = (&mut before[from.0].data[..], map.shape);
                         let weights = (&numbers[of(weights)], kernel);
                         conv::backward_map(self.arch, out, weights, g, &mut self.patches);
@@ -193,6 +214,15 @@ impl Pass {
                     for node in [a, b] {
                         let to = &mut before[node.0].data;
                         self.arch.dispatch(AddTo { to, from: &gradient.data });
+                    }
+                }
+                Layer::Concat { a, b } => {
+                    let n_a = self.made[a.0].shape.channels;
+                    for (node, range) in [(a, 0..n_a), (b, n_a..channels)] {
+                        let to = before[node.0].data.chunks_exact_mut(range.len());
+                        for (to, pixel) in to.zip(gradient.data.chunks_exact(channels)) {
+                            to.iter_mut().zip(&pixel[range.clone()]).for_each(|(to, g)| *to += g);
+                        }
                     }
                 }
                 Layer::Upsample { from } => downsample(gradient, &mut before[from.0]),

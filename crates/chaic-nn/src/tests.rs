@@ -38,6 +38,24 @@ fn joined() -> (Network, Node) {
     (net, head)
 }
 
+/// A network that reads a map, a smaller one, and a few numbers.
+fn of_several() -> (Network, Node) {
+    let mut net = Network::default();
+    let map = net.input(3);
+    let small_map = net.side_input(2, 2);
+    let few = net.side_input(5, 8);
+    let down = net.conv("stem", map, Kernel { side: 3, stride: 2 }, 16);
+    let half = net.norm_relu("stem.norm", down);
+    let both = net.concat(half, small_map);
+    let lower = net.conv("down", both, Kernel { side: 3, stride: 2 }, 16);
+    let flat = net.flatten(lower, 2);
+    let all = net.concat(flat, few);
+    let dense = net.conv("dense", all, Kernel::POINTWISE, 16);
+    let norm = net.norm_relu("dense.norm", dense);
+    let head = net.head("head", norm, 5);
+    (net, head)
+}
+
 const SMALL: Shape = Shape { n: 4, height: 8, width: 8, channels: 3 };
 
 fn random(shape: Shape, seed: u64) -> Tensor {
@@ -48,10 +66,16 @@ fn random(shape: Shape, seed: u64) -> Tensor {
 
 const INPUT: Shape = Shape { n: 2, height: 12, width: 8, channels: 3 };
 
+/// What a network reads, the first input being of this shape.
+fn inputs(net: &Network, first: Shape) -> Vec<Tensor> {
+    let shapes = net.input_shapes(first);
+    shapes.into_iter().enumerate().map(|(k, shape)| random(shape, 1 + 10 * k as u64)).collect()
+}
+
 /// The loss: the output times fixed numbers.
-fn loss(net: &Network, head: Node, numbers: &[f32], input: &Tensor, factors: &Tensor) -> f64 {
+fn loss(net: &Network, head: Node, numbers: &[f32], inputs: &[Tensor], factors: &Tensor) -> f64 {
     let mut pass = Pass::new(net, widest());
-    pass.forward(net, numbers, input);
+    pass.forward_all(net, numbers, &inputs.iter().collect::<Vec<_>>());
     let made = &pass.made(head).data;
     made.iter().zip(&factors.data).map(|(x, f)| f64::from(*x) * f64::from(*f)).sum()
 }
@@ -64,7 +88,8 @@ fn gradient(
 ) -> Vec<f32> {
     let head = *head;
     let mut pass = Pass::new(net, arch);
-    pass.forward(net, numbers, &random(input, 1));
+    let inputs = inputs(net, input);
+    pass.forward_all(net, numbers, &inputs.iter().collect::<Vec<_>>());
     pass.begin_backward();
     let shape = pass.made(head).shape;
     *pass.gradient(head) = random(shape, 2);
@@ -77,6 +102,7 @@ fn gradient(
 fn gradients_are_those_of_finite_differences() {
     check_gradients(&every_layer(), INPUT);
     check_gradients(&joined(), SMALL);
+    check_gradients(&of_several(), SMALL);
 }
 
 fn check_gradients(of: &(Network, Node), shape: Shape) {
@@ -87,7 +113,7 @@ fn check_gradients(of: &(Network, Node), shape: Shape) {
     for p in net.parameters().iter().filter(|p| !p.decays) {
         numbers[p.range.clone()].iter_mut().for_each(|x| *x += rng.range(-0.3, 0.3));
     }
-    let input = random(shape, 1);
+    let inputs = inputs(net, shape);
     let factors = random(net.shape_of(head, shape), 2);
     let exact = gradient(of, shape, &numbers, widest());
     for p in net.parameters() {
@@ -96,7 +122,7 @@ fn check_gradients(of: &(Network, Node), shape: Shape) {
             let at = |h: f32| {
                 let mut moved = numbers.clone();
                 moved[k] += h;
-                loss(net, head, &moved, &input, &factors)
+                loss(net, head, &moved, &inputs, &factors)
             };
             let h = 2e-3;
             let measured = (at(h) - at(-h)) / (2.0 * f64::from(h));
@@ -109,7 +135,7 @@ fn check_gradients(of: &(Network, Node), shape: Shape) {
 
 #[test]
 fn passes_are_the_same_bits_at_every_width() {
-    for (of, input) in [(every_layer(), INPUT), (joined(), SMALL)] {
+    for (of, input) in [(every_layer(), INPUT), (joined(), SMALL), (of_several(), SMALL)] {
         let numbers = of.0.begin(3);
         let expected = gradient(&of, input, &numbers, widest());
         for (name, arch) in widths() {

@@ -20,6 +20,7 @@ use chaic_protocol::rng::Stream;
 use chaic_protocol::{AgentError, AgentId, Briefing, Observation, TaskId};
 use chaic_render::Appearance;
 use chaic_vision::sights::{self, SightError};
+pub use chaic_vision::views::Part;
 use chaic_world::Person;
 use rayon::prelude::*;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
@@ -45,25 +46,12 @@ pub struct Sample {
     pub episode: u32,
 }
 
-/// Whose episodes windows are of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
-    /// Those that are learned from.
-    Training,
-    /// Those by which choices are made.
-    Validation,
-    /// Those that nothing else is done with.
-    Test,
-}
-
-impl Part {
-    /// The seed of the first episode: none of any split, nor of those that policies and perception learn from.
-    fn first_seed(self) -> u64 {
-        match self {
-            Part::Training => 42_000_000,
-            Part::Validation => 52_000_000,
-            Part::Test => 62_000_000,
-        }
+/// The seed of a part's first episode: none of any split, nor of those that policies and perception learn from.
+fn first_seed(part: Part) -> u64 {
+    match part {
+        Part::Training => 42_000_000,
+        Part::Validation => 52_000_000,
+        Part::Test => 62_000_000,
     }
 }
 
@@ -198,7 +186,7 @@ fn of_episode(
     index: u32,
 ) -> Result<Vec<Sample>, CollectError> {
     let task = rules.tasks[index as usize % rules.tasks.len()];
-    let seed = part.first_seed() + u64::from(index);
+    let seed = first_seed(part) + u64::from(index);
     let id = format!("{}/gen/{seed}", task.name());
     let episode = find_episode(&id).map_err(RolloutError::from)?;
     let setup = episode.setup();

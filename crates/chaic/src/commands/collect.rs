@@ -29,7 +29,8 @@ pub fn collect(command: &CollectCommand) -> Result<Ended> {
     }
 }
 
-fn part(of: Of) -> Part {
+/// The part of all environments that is meant.
+pub(super) fn part(of: Of) -> Part {
     match of {
         Of::Training => Part::Training,
         Of::Validation => Part::Validation,

@@ -11,8 +11,9 @@ use chaic_learn::opponent::network::OpponentModel;
 use chaic_learn::opponent::report::Report;
 
 use super::bars;
+use super::collect::part;
 use super::perception::write_json;
-use crate::arguments::{CollectOpponentArguments, Of, OpponentArguments, WindowArguments};
+use crate::arguments::{CollectOpponentArguments, OpponentArguments, WindowArguments};
 use crate::exit::Ended;
 use crate::interrupt;
 use crate::output::{complain, quoted_path, say};
@@ -22,11 +23,9 @@ const MOST_BYTES: u64 = 1 << 28;
 
 /// Writes windows into a file.
 pub fn collect_windows(arguments: &CollectOpponentArguments) -> Result<Ended> {
-    let part = match arguments.of {
-        Of::Training => Part::Training,
-        Of::Validation => Part::Validation,
+    let Some(samples) = play(&arguments.windows, part(arguments.of))? else {
+        return Ok(Ended::Interrupted);
     };
-    let Some(samples) = play(&arguments.windows, part)? else { return Ok(Ended::Interrupted) };
     write(&arguments.out, &samples)?;
     for goal in Goal::ALL {
         let n = samples.iter().filter(|s| s.goal == goal).count();

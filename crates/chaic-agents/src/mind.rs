@@ -127,6 +127,11 @@ impl<P: Policy> Mind<P> {
         self.episode.as_ref().map(|e| &e.memory)
     }
 
+    /// How an action points at a thing that it remembers; `None` if it isn't in view.
+    pub fn target(&self, track: TrackId) -> Option<Target> {
+        self.perception.target(track)
+    }
+
     /// Its policy.
     pub fn policy(&self) -> &P {
         &self.policy

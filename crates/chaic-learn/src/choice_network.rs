@@ -6,9 +6,9 @@
 use std::ops::Range;
 
 use chaic_nn::simd::widest;
-use chaic_nn::{AdamRules, Kernel, Network, Node, Pass, Shape, Tensor};
-use chaic_protocol::geom::math;
-use chaic_training::Learner;
+use chaic_nn::{Kernel, Network, Node, Pass, Shape, Tensor};
+
+use crate::actor_critic::{ActorCritic, BySaid, Said, log_softmax};
 
 /// What is known when a choice is made.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -19,59 +19,6 @@ pub struct Decision {
     pub choices: Vec<f32>,
     /// How many choices there are.
     pub n_choices: usize,
-}
-
-/// What a network says of a decision.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Said {
-    /// The logarithm of each choice's probability.
-    pub log_probabilities: Vec<f32>,
-    /// What it says of the state, choices apart: of a policy, the return that is expected.
-    pub of_state: Vec<f32>,
-}
-
-impl Said {
-    /// The return that a policy expects.
-    pub fn value(&self) -> f32 {
-        self.of_state[0]
-    }
-
-    /// The entropy of the choices, nats.
-    pub fn entropy(&self) -> f32 {
-        -self.log_probabilities.iter().map(|l| l * math::exp(*l)).sum::<f32>()
-    }
-
-    /// The choice that a number in 0..1 falls on.
-    pub fn sample(&self, unit: f32) -> usize {
-        let mut left = unit;
-        for (k, l) in self.log_probabilities.iter().enumerate() {
-            left -= math::exp(*l);
-            if left < 0.0 {
-                return k;
-            }
-        }
-        self.most_likely()
-    }
-
-    /// The likeliest choice, of equal ones the first.
-    pub fn most_likely(&self) -> usize {
-        let mut best = 0;
-        for (k, l) in self.log_probabilities.iter().enumerate() {
-            if *l > self.log_probabilities[best] {
-                best = k;
-            }
-        }
-        best
-    }
-}
-
-/// The gradient of a loss by what a network says of a decision.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct BySaid {
-    /// By each choice's logit.
-    pub logits: Vec<f32>,
-    /// By what it says of the state.
-    pub of_state: Vec<f32>,
 }
 
 /// A network without its numbers.
@@ -218,9 +165,16 @@ impl ChoiceNetwork {
         }
         tensor
     }
+}
 
-    /// What it says of decisions.
-    pub fn forward<'a>(
+impl ActorCritic for ChoiceNetwork {
+    type Seen = Decision;
+
+    fn network(&self) -> &Network {
+        &self.network
+    }
+
+    fn forward<'a>(
         &self,
         numbers: &[f32],
         decisions: impl Iterator<Item = &'a Decision> + Clone,
@@ -239,14 +193,7 @@ impl ChoiceNetwork {
         said
     }
 
-    /// Adds the gradient by all numbers, from that by what was last said, to `by_numbers`.
-    pub fn backward(
-        &self,
-        numbers: &[f32],
-        by: &[BySaid],
-        pass: &mut Pass,
-        by_numbers: &mut [f32],
-    ) {
+    fn backward(&self, numbers: &[f32], by: &[BySaid], pass: &mut Pass, by_numbers: &mut [f32]) {
         pass.begin_backward();
         let mut row = 0;
         for by in by {
@@ -260,50 +207,10 @@ impl ChoiceNetwork {
     }
 }
 
-/// Takes a step along the mean gradient of a batch of samples, whose parts are worked on side by side. `gradient` gives
-/// that of one sample, times the share of it that is its third argument, and adds what it was like to the fourth;
-/// that is given back for each part.
-pub fn step<S: Sync, T: Default + Send>(
-    model: &ChoiceNetwork,
-    (learner, adam, rate): (&mut Learner, &AdamRules, f32),
-    batch: &[&S],
-    decision_of: impl Fn(&S) -> &Decision + Sync,
-    gradient: impl Fn(&S, &Said, f32, &mut T) -> BySaid + Sync,
-) -> Vec<T> {
-    let n_parts = learner.shards();
-    let of_part = batch.len().div_ceil(n_parts);
-    // The learner takes the mean over parts.
-    let share = n_parts as f32 / batch.len() as f32;
-    let work = |k: usize, numbers: &[f32], pass: &mut Pass, by: &mut [f32]| {
-        let from = (k * of_part).min(batch.len());
-        let samples = &batch[from..(from + of_part).min(batch.len())];
-        let mut told = T::default();
-        if samples.is_empty() {
-            return told;
-        }
-        let said = model.forward(numbers, samples.iter().map(|s| decision_of(s)), pass);
-        let by_said: Vec<BySaid> = samples
-            .iter()
-            .zip(&said)
-            .map(|(s, said)| gradient(s, said, share, &mut told))
-            .collect();
-        model.backward(numbers, &by_said, pass, by);
-        told
-    };
-    learner.step(&model.network, (adam, rate), work)
-}
-
-/// Logarithms of the probabilities that logits stand for.
-pub(crate) fn log_softmax(logits: &[f32]) -> Vec<f32> {
-    let most = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-    let sum: f32 = logits.iter().map(|l| math::exp(l - most)).sum();
-    let log_sum = most + math::ln(sum);
-    logits.iter().map(|l| l - log_sum).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use chaic_protocol::geom::math;
     use chaic_protocol::rng::Stream;
 
     fn decisions() -> Vec<Decision> {

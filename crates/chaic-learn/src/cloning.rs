@@ -16,7 +16,8 @@ use chaic_protocol::rng::Stream;
 use chaic_protocol::{AgentError, Briefing, Observation};
 use chaic_training::Learner;
 
-use crate::choice_network::{BySaid, ChoiceNetwork, Decision, Said, step};
+use crate::actor_critic::{BySaid, Said, step};
+use crate::choice_network::{ChoiceNetwork, Decision};
 use crate::features::Features;
 use crate::opponent::network::OpponentModel;
 use crate::policy::{LearnedPolicy, Noted, Notes};

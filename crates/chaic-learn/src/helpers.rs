@@ -8,10 +8,11 @@ use chaic_agents::sight::Sight;
 use chaic_env::minds::{Helper, Helpers, check_new_name};
 use chaic_env::{EnvError, RunKey};
 use chaic_files::{read_bounded, write_whole};
-use chaic_nn::weights;
+use chaic_nn::weights::{self, WeightsError};
 use serde::{Deserialize, Serialize};
 
 use crate::policy::{Choosing, LearnedPolicy, Trained, drive};
+use crate::primitive::helper::{KIND, PrimitiveHelper, TrainedPrimitive};
 use crate::train::from_bytes;
 
 /// The file with the policies of a run.
@@ -23,7 +24,37 @@ const MOST_BYTES: u64 = 1 << 28;
 pub struct NamedPolicy {
     name: String,
     digest: String,
-    trained: Arc<Trained>,
+    trained: Loaded,
+}
+
+/// What a file of weights has.
+enum Loaded {
+    /// A policy that chooses plans.
+    Plans(Arc<Trained>),
+    /// One that chooses single actions.
+    Actions(Arc<TrainedPrimitive>),
+}
+
+impl Loaded {
+    fn from_bytes(bytes: &[u8]) -> Result<Loaded, WeightsError> {
+        match from_bytes(bytes) {
+            Ok((_, trained)) => Ok(Loaded::Plans(Arc::new(trained))),
+            Err(WeightsError::Kind { found, .. }) if found == KIND => {
+                Ok(Loaded::Actions(Arc::new(TrainedPrimitive::from_bytes(bytes)?)))
+            }
+            Err(problem) => Err(problem),
+        }
+    }
+
+    fn helper(&self, rules: PlannerRules, sight: &dyn Sight) -> Helper {
+        match self {
+            Loaded::Plans(trained) => {
+                let policy = LearnedPolicy::new(Arc::clone(trained), Choosing::Sampled, None);
+                drive(policy, rules, sight)
+            }
+            Loaded::Actions(trained) => PrimitiveHelper::helper(Arc::clone(trained), rules, sight),
+        }
+    }
 }
 
 /// What a run's folder tells of it.
@@ -40,7 +71,7 @@ enum Refusal {
     #[error("{0}")]
     Name(String),
     #[error("{}: {problem}", path.display())]
-    Weights { path: PathBuf, problem: weights::WeightsError },
+    Weights { path: PathBuf, problem: WeightsError },
     #[error(
         "{} was begun with other weights for `{name}`; give the same file again, or choose another --out",
         run.display()
@@ -62,8 +93,7 @@ impl NamedPolicy {
     pub fn read(name: &str, path: &Path) -> chaic_env::Result<NamedPolicy> {
         let bytes = read_bounded(path, MOST_BYTES).map_err(|e| EnvError::Minds(e.into()))?;
         let wrong = |problem| Refusal::Weights { path: path.to_owned(), problem };
-        let (_, trained) = from_bytes(&bytes).map_err(wrong)?;
-        let trained = Arc::new(trained);
+        let trained = Loaded::from_bytes(&bytes).map_err(wrong)?;
         Ok(NamedPolicy { name: name.to_owned(), digest: weights::digest(&bytes), trained })
     }
 }
@@ -110,8 +140,7 @@ impl Helpers for Policies<'_> {
         let Some(own) = self.policies.iter().find(|p| p.name == name) else {
             return self.others.make(name, rules);
         };
-        let policy = LearnedPolicy::new(Arc::clone(&own.trained), Choosing::Sampled, None);
-        Some(drive(policy, rules, &*self.sight))
+        Some(own.trained.helper(rules, &*self.sight))
     }
 
     fn make_for(&self, key: &RunKey, rules: PlannerRules) -> Option<Helper> {

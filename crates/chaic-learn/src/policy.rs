@@ -14,6 +14,7 @@ use chaic_protocol::observation::Grants;
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{AgentError, AgentId, Briefing, Frame, Observation};
 
+use crate::actor_critic::ActorCritic as _;
 use crate::choice_network::{ChoiceNetwork, Decision};
 use crate::features::Features;
 use crate::opponent::network::OpponentModel;

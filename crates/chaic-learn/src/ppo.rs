@@ -6,7 +6,8 @@ use chaic_protocol::rng::Stream;
 use chaic_training::Learner;
 use serde::{Deserialize, Serialize};
 
-use crate::choice_network::{BySaid, ChoiceNetwork, Decision, Said, step};
+use crate::actor_critic::{ActorCritic, BySaid, Said, step};
+use crate::choice_network::Decision;
 
 /// How it learns. What Stable-Baselines3 calls a number is said in brackets.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -70,9 +71,9 @@ impl Default for PpoRules {
 
 /// A decision and what came of it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Transition {
+pub struct Transition<S = Decision> {
     /// What was known.
-    pub decision: Decision,
+    pub decision: S,
     /// Which choice was made.
     pub choice: usize,
     /// The logarithm of its probability then.
@@ -86,17 +87,23 @@ pub struct Transition {
 }
 
 /// The decisions of one episode, in order.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Trajectory {
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trajectory<S = Decision> {
     /// The decisions.
-    pub transitions: Vec<Transition>,
+    pub transitions: Vec<Transition<S>>,
     /// The return that is expected after the last one: 0 where nothing comes after it.
     pub value_after: f32,
 }
 
+impl<S> Default for Trajectory<S> {
+    fn default() -> Trajectory<S> {
+        Trajectory { transitions: Vec::new(), value_after: 0.0 }
+    }
+}
+
 /// A decision to learn from.
-struct Sample<'a> {
-    transition: &'a Transition,
+struct Sample<'a, S> {
+    transition: &'a Transition<S>,
     advantage: f32,
     /// What the value should have been.
     target: f32,
@@ -121,7 +128,7 @@ pub struct Told {
 
 /// Advantages by generalized estimation (Schulman et al. 2016), where a decision that lasts `d` units of time
 /// discounts what follows by the `d`th power.
-pub fn advantages(rules: &PpoRules, trajectory: &Trajectory) -> Vec<f32> {
+pub fn advantages<S>(rules: &PpoRules, trajectory: &Trajectory<S>) -> Vec<f32> {
     let mut next_value = trajectory.value_after;
     let mut next_advantage = 0.0;
     let mut reversed: Vec<f32> = trajectory
@@ -142,14 +149,14 @@ pub fn advantages(rules: &PpoRules, trajectory: &Trajectory) -> Vec<f32> {
 
 /// Makes a policy better by what came of it. `iteration` names the order in which decisions are looked at; `rest`
 /// is the share of the training that is left.
-pub fn improve(
+pub fn improve<M: ActorCritic>(
     rules: &PpoRules,
-    model: &ChoiceNetwork,
+    model: &M,
     learner: &mut Learner,
-    trajectories: &[Trajectory],
+    trajectories: &[Trajectory<M::Seen>],
     (seed, iteration, rest): (u64, u64, f32),
 ) -> Told {
-    let mut samples: Vec<Sample<'_>> = Vec::new();
+    let mut samples: Vec<Sample<'_, M::Seen>> = Vec::new();
     for trajectory in trajectories {
         let advantages = advantages(rules, trajectory);
         samples.extend(trajectory.transitions.iter().zip(advantages).map(|(t, advantage)| {
@@ -165,9 +172,9 @@ pub fn improve(
         let index = iteration * rules.epochs as u64 + epoch as u64;
         Stream::new(seed, "batches", index).shuffle(&mut order);
         for batch in order.chunks(rules.batch) {
-            let batch: Vec<&Sample<'_>> = batch.iter().map(|k| &samples[*k]).collect();
+            let batch: Vec<&Sample<'_, M::Seen>> = batch.iter().map(|k| &samples[*k]).collect();
             let how = (&mut *learner, &rules.adam, rate);
-            let by = |s: &Sample<'_>, said: &Said, share, told: &mut Told| {
+            let by = |s: &Sample<'_, M::Seen>, said: &Said, share, told: &mut Told| {
                 gradient(rules, s, said, share, told)
             };
             let parts = step(model, how, &batch, |s| &s.transition.decision, by);
@@ -198,9 +205,9 @@ pub fn improve(
 }
 
 /// The gradient of the loss of one decision; adds what it was like to `told`.
-fn gradient(
+fn gradient<S>(
     rules: &PpoRules,
-    sample: &Sample<'_>,
+    sample: &Sample<'_, S>,
     said: &Said,
     part: f32,
     told: &mut Told,
@@ -233,7 +240,7 @@ fn gradient(
 }
 
 /// Gives advantages a mean of 0 and a variance of 1.
-fn normalize(samples: &mut [Sample<'_>]) {
+fn normalize<S>(samples: &mut [Sample<'_, S>]) {
     let n = samples.len().max(1) as f64;
     let mean = samples.iter().map(|s| f64::from(s.advantage)).sum::<f64>() / n;
     let variance = samples.iter().map(|s| square(f64::from(s.advantage) - mean)).sum::<f64>() / n;
@@ -247,9 +254,9 @@ fn square(x: f64) -> f64 {
     x * x
 }
 
-fn explained_variance(samples: &[Sample<'_>]) -> f64 {
+fn explained_variance<S>(samples: &[Sample<'_, S>]) -> f64 {
     let n = samples.len().max(1) as f64;
-    let variance = |of: &dyn Fn(&Sample<'_>) -> f64| {
+    let variance = |of: &dyn Fn(&Sample<'_, S>) -> f64| {
         let mean = samples.iter().map(of).sum::<f64>() / n;
         samples.iter().map(|s| square(of(s) - mean)).sum::<f64>() / n
     };

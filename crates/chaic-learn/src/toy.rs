@@ -3,6 +3,7 @@
 use chaic_protocol::geom::math;
 use chaic_protocol::rng::Stream;
 
+use crate::actor_critic::ActorCritic as _;
 use crate::choice_network::{ChoiceNetwork, Decision};
 use crate::ppo::{Trajectory, Transition};
 

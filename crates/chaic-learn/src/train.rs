@@ -27,8 +27,8 @@ use crate::rollout::{Played, RolloutRules, play_all, play_taught};
 
 /// Seeds of generated episodes to learn from, and to validate by: none of any split, and none that perception
 /// was trained on.
-const TRAINING_SEEDS: (u64, usize) = (40_000_000, 1_000_000);
-const VALIDATION_SEEDS: u64 = 50_000_000;
+pub(crate) const TRAINING_SEEDS: (u64, usize) = (40_000_000, 1_000_000);
+pub(crate) const VALIDATION_SEEDS: u64 = 50_000_000;
 
 /// What files of weights say that they are.
 const KIND: &str = "chaic plan policy 2";

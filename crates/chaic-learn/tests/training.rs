@@ -12,6 +12,8 @@ use chaic_learn::features::{N_PLAN, N_STATE};
 use chaic_learn::helpers::{NamedPolicy, Policies};
 use chaic_learn::opponent;
 use chaic_learn::policy::Choosing;
+use chaic_learn::ppo::PpoRules;
+use chaic_learn::primitive::train::{PrimitiveRules, PrimitiveTraining};
 use chaic_learn::rewards::Rewards;
 use chaic_learn::rollout::{RolloutRules, play};
 use chaic_learn::train::{Cloning, Kind, PlayRules, PolicyTraining, Reinforcement, from_bytes};
@@ -74,6 +76,42 @@ fn a_training_that_was_interrupted_ends_with_the_same_bits() {
     fs::write(folder.join(CHECKPOINT), &whole[..whole.len() / 2]).unwrap();
     let refused = TrainingRun::<PolicyTraining<Reinforcement>>::resume(&folder, &mut |_| true);
     assert!(matches!(refused, Err(TrainingError::Checkpoint(_))));
+}
+
+#[test]
+fn single_actions_are_learned_with_the_same_bits_after_a_pause() {
+    // Updates end within episodes, and episodes within updates.
+    let rules = PrimitiveRules {
+        updates: 2,
+        envs: 2,
+        rollout: 150,
+        tasks: vec![TaskId::MovingHouse],
+        validation_episodes: 1,
+        ppo: PpoRules { batch: 50, epochs: 1, shards: 2, ..PpoRules::default() },
+        ..PrimitiveRules::default()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let checkpoints = [false, true].map(|pauses| {
+        let out = folder.path().join(format!("{pauses}"));
+        let mut go_on = |_: &str| true;
+        let stop = AtomicBool::new(false);
+        let mut run =
+            TrainingRun::<PrimitiveTraining>::begin(&out, &rules, &mut go_on).unwrap().unwrap();
+        if pauses {
+            let mut one = PrimitiveTraining::new(&rules, &out, &mut go_on).unwrap().unwrap();
+            one.step();
+            fs::write(out.join(CHECKPOINT), one.checkpoint()).unwrap();
+            run = TrainingRun::resume(&out, &mut go_on).unwrap().unwrap();
+            assert_eq!(run.extent(), (1, 2));
+        }
+        assert!(run.go_on(&stop, &mut |_| {}).unwrap());
+        fs::read(out.join(CHECKPOINT)).unwrap()
+    });
+    assert!(checkpoints[0] == checkpoints[1]);
+    let weights = folder.path().join("true").join(PrimitiveTraining::WEIGHTS);
+    let read = NamedPolicy::read("mine", &weights).unwrap();
+    let helpers = Policies::beside(&BuiltIn, vec![read], Arc::new(TrueSight)).unwrap();
+    assert!(helpers.make("mine", chaic_agents::PlannerRules::paper()).is_some());
 }
 
 #[test]

@@ -6,7 +6,8 @@ use chaic_protocol::geom::math;
 
 use super::window::{N_CLASS, N_STATE};
 use super::{Goal, N_LIMITS};
-use crate::choice_network::{ChoiceNetwork, Decision, Said, log_softmax};
+use crate::actor_critic::{ActorCritic as _, Said, log_softmax};
+use crate::choice_network::{ChoiceNetwork, Decision};
 
 /// How many kinds of goals there are.
 pub const N_GOALS: usize = Goal::ALL.len();

@@ -14,7 +14,8 @@ use super::collect::{CollectRules, Part, Sample, collect, read, write};
 use super::network::{Heads, KIND, N_GOALS, OpponentModel, network};
 use super::report::Report;
 use super::{Goal, N_LIMITS};
-use crate::choice_network::{BySaid, ChoiceNetwork, Said, step};
+use crate::actor_critic::{BySaid, Said, step};
+use crate::choice_network::ChoiceNetwork;
 
 /// How it is trained.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

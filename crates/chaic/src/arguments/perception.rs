@@ -17,6 +17,8 @@ pub enum TrainCommand {
     Ppo(TrainArguments),
     /// The same policy by what a teacher would choose.
     Clone(TrainArguments),
+    /// A helper's policy of single actions, from images: the paper's way.
+    Primitive(TrainArguments),
     /// The opponent model: what a partner is about, and what it can't do.
     Opponent(TrainArguments),
 }

@@ -9,6 +9,7 @@ use anyhow::{Context as _, Result};
 use chaic_eval::curves::{Curve, draw};
 use chaic_files::read_bounded;
 use chaic_learn::opponent::train::OpponentTraining;
+use chaic_learn::primitive::train::PrimitiveTraining;
 use chaic_learn::train::{Cloning, PolicyTraining, Reinforcement};
 use chaic_training::{CURVES, Of, Record, Training, TrainingRun, read_rules};
 use chaic_vision::behavior::train::BehaviorTraining;
@@ -57,6 +58,14 @@ pub fn train(command: &TrainCommand) -> Result<Ended> {
             arguments,
             |rules, steps| {
                 rules.iterations = steps;
+            },
+        ),
+        TrainCommand::Primitive(arguments) => train_one::<PrimitiveTraining>(
+            "primitive",
+            EVALUATE_POLICY,
+            arguments,
+            |rules, steps| {
+                rules.updates = steps;
             },
         ),
         TrainCommand::Clone(arguments) => train_one::<PolicyTraining<Cloning>>(

@@ -16,6 +16,11 @@ pub struct PrimitiveNetwork {
     value: Node,
 }
 
+/// Side of the patches of an image that become one pixel of the first map, whose products are then large enough to
+/// be quick (as in vision transformers, Dosovitskiy et al. 2021).
+const PATCH: usize = 4;
+/// Patches along a side.
+const PATCHES: usize = IMAGE_SIDE / PATCH;
 const DOWN: Kernel = Kernel { side: 3, stride: 2 };
 /// How much the sides of an image's last map are divided by.
 const LAST_SIDE: usize = 8;
@@ -27,12 +32,12 @@ const N_SHARED: usize = 64;
 impl Default for PrimitiveNetwork {
     fn default() -> PrimitiveNetwork {
         let mut net = Network::default();
-        let image = net.input(IMAGE_CHANNELS);
-        let map = net.side_input(MAP_CHANNELS, IMAGE_SIDE / MAP.side);
-        let state = net.side_input(N_STATE, IMAGE_SIDE);
-        let mut of_image = image;
-        for (k, channels) in [16, 16, 32, 32].into_iter().enumerate() {
-            of_image = layer(&mut net, &format!("image{k}"), of_image, DOWN, channels);
+        let image = net.input(PATCH * PATCH * IMAGE_CHANNELS);
+        let map = net.side_input(MAP_CHANNELS, PATCHES / MAP.side);
+        let state = net.side_input(N_STATE, PATCHES);
+        let mut of_image = layer(&mut net, "image.patches", image, Kernel::POINTWISE, 32);
+        for k in 0..2 {
+            of_image = layer(&mut net, &format!("image{k}"), of_image, DOWN, 32);
         }
         let mut of_map = map;
         for (k, channels) in [16, 32].into_iter().enumerate() {
@@ -59,6 +64,17 @@ fn layer(net: &mut Network, name: &str, from: Node, kernel: Kernel, channels: us
     net.norm_relu(&format!("{name}.norm"), made)
 }
 
+/// The bytes of an image, patch by patch.
+fn in_patches(image: &[u8]) -> impl Iterator<Item = u8> + '_ {
+    let row_of_patch = PATCH * IMAGE_CHANNELS;
+    (0..PATCHES * PATCHES * PATCH).flat_map(move |k| {
+        let (patch, row) = (k / PATCH, k % PATCH);
+        let (y, x) = (patch / PATCHES * PATCH + row, patch % PATCHES * PATCH);
+        let begin = (y * IMAGE_SIDE + x) * IMAGE_CHANNELS;
+        image[begin..begin + row_of_patch].iter().copied()
+    })
+}
+
 impl PrimitiveNetwork {
     /// Working space.
     pub fn pass(&self) -> Pass {
@@ -80,13 +96,22 @@ impl ActorCritic for PrimitiveNetwork {
         pass: &mut Pass,
     ) -> Vec<Said> {
         let n = seen.clone().count();
+        let bytes = seen.clone().flat_map(|s| in_patches(&s.image));
+        let image = Tensor {
+            shape: Shape {
+                n,
+                height: PATCHES,
+                width: PATCHES,
+                channels: PATCH * PATCH * IMAGE_CHANNELS,
+            },
+            data: bytes.map(|byte| f32::from(byte) / 255.0).collect(),
+        };
         let tensor =
             |side: usize, channels: usize, of: &dyn Fn(&'a Seen) -> &'a [u8], scale: f32| {
                 let shape = Shape { n, height: side, width: side, channels };
                 let data = seen.clone().flat_map(of).map(|byte| scale * f32::from(*byte)).collect();
                 Tensor { shape, data }
             };
-        let image = tensor(IMAGE_SIDE, IMAGE_CHANNELS, &|s| &s.image, 1.0 / 255.0);
         let map = tensor(MAP.side, MAP_CHANNELS, &|s| &s.map, 1.0);
         let state = tensor(1, N_STATE, &|s| &s.state, 1.0 / 255.0);
         pass.forward_all(&self.network, numbers, &[&image, &map, &state]);

@@ -50,6 +50,9 @@ pub struct Command {
     pub grants: Grants,
     /// What it may take.
     pub limits: Limits,
+    /// Names of environment variables that it inherits beyond
+    /// [`ALLOWED_VARIABLES`](crate::environment::ALLOWED_VARIABLES).
+    pub environment: Vec<String>,
 }
 
 /// What was asked for that can't be, and what to do.
@@ -69,6 +72,9 @@ impl From<Refusal> for EnvError {
 struct Recorded {
     name: String,
     command: String,
+    /// Names of added environment variables, never their values.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    environment: Vec<String>,
 }
 
 /// The file with the commands of a run, for readers: nothing in it is ever run.
@@ -126,18 +132,22 @@ impl<'a> Commands<'a> {
         let own = self.recorded();
         match begun.iter().find(|recorded| !own.contains(recorded)) {
             None => Ok(()),
-            Some(Recorded { name, command }) => Err(Refusal(format!(
-                "{} was begun with the command {name}=exec:{command}; a command is only run if you \
+            Some(Recorded { name, command, environment }) => Err(Refusal(format!(
+                "{} was begun with the command {name}=exec:{command}{}; a command is only run if you \
                  name it: give all of --helper again, or choose another --out",
-                run.display()
+                run.display(),
+                environment.iter().map(|e| format!(" --exec-env {e}")).collect::<String>(),
             ))
             .into()),
         }
     }
 
     fn recorded(&self) -> Vec<Recorded> {
-        let recorded =
-            |c: &Arc<Command>| Recorded { name: c.name.clone(), command: c.line.clone() };
+        let recorded = |c: &Arc<Command>| Recorded {
+            name: c.name.clone(),
+            command: c.line.clone(),
+            environment: c.environment.clone(),
+        };
         self.commands.iter().map(recorded).collect()
     }
 }

@@ -13,11 +13,13 @@
 //! - A process that is silent, broken, greedy or talks nonsense ends its own episode, by a message
 //!   that says what it did, and never hangs or ends a run.
 //! - No process outlives its episode, nor does what it started, unless that leaves its process group.
+//! - A process inherits environment variables of an allow-list only, so no API keys.
 //! - A command is run because the user named it, never because a run's folder did.
 
 pub mod agent;
 pub mod commands;
 pub mod conformance;
+pub mod environment;
 pub mod frame;
 pub mod message;
 pub mod serve;

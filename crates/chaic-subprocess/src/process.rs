@@ -12,6 +12,7 @@ use chaic_protocol::AgentError;
 use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
 
 use crate::commands::Command;
+use crate::environment::inherited;
 use crate::frame::Frame;
 use crate::message::{ToEnv, ToMind, cut, message, plain};
 
@@ -42,6 +43,7 @@ impl Process {
         let mut starting = std::process::Command::new("sh");
         starting.arg("-c").arg(script(command));
         starting.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        starting.env_clear().envs(inherited(&command.environment));
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut starting, 0);
         let failed = |e: std::io::Error| AgentError::Broken(format!("sh can't be started: {e}"));

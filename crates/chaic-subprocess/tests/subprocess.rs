@@ -31,7 +31,13 @@ fn command(line: &str) -> Command {
         decision: Duration::from_secs(20),
         ..Limits::default()
     };
-    Command { name: "exec".to_owned(), line: line.to_owned(), grants: Grants::PLANNER, limits }
+    Command {
+        name: "exec".to_owned(),
+        line: line.to_owned(),
+        grants: Grants::PLANNER,
+        limits,
+        environment: Vec::new(),
+    }
 }
 
 fn root() -> &'static Path {

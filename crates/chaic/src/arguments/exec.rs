@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use chaic_env::rules::RuleSetName;
 use chaic_protocol::observation::Grants;
+use chaic_subprocess::environment::check_name;
 use chaic_subprocess::{Command, Limits};
 use clap::{Args, Subcommand};
 
@@ -87,6 +88,10 @@ pub struct ExecArguments {
     /// Memory for each of its processes, MiB, on Linux. Usual: 8192.
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1 << 30), help_heading = "Helpers in other processes")]
     pub exec_memory_mib: Option<u64>,
+    /// Environment variable that helpers of exec:COMMAND inherit besides the allow-list (PATH, HOME, ..;
+    /// docs/subprocess-helpers.md); may be given often. Only its name is recorded.
+    #[arg(long, value_name = "NAME", value_parser = variable, help_heading = "Helpers in other processes")]
+    pub exec_env: Vec<String>,
 }
 
 impl ExecArguments {
@@ -103,6 +108,7 @@ impl ExecArguments {
                 episode: self.exec_episode_s.unwrap_or(usual.episode),
                 memory_mib: self.exec_memory_mib.unwrap_or(usual.memory_mib),
             },
+            environment: self.exec_env.clone(),
         }
     }
 }
@@ -142,6 +148,10 @@ fn grants(text: &str) -> Result<Grants, String> {
         let all: Vec<_> = Grants::NONE.named().iter().map(|(name, _)| *name).collect();
         format!("no grant `{name}`; the grants are {}", all.join(", "))
     })
+}
+
+fn variable(text: &str) -> Result<String, String> {
+    check_name(text).map(|()| text.to_owned())
 }
 
 fn seconds(text: &str) -> Result<Duration, String> {

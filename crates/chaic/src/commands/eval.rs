@@ -225,6 +225,7 @@ fn exec_to_resume(arguments: &EvalArguments) -> String {
         exec_start_s,
         exec_episode_s,
         exec_memory_mib,
+        exec_env,
     } = &arguments.exec;
     let granted = exec_grants.iter().map(|grants| {
         let names = grants.named().into_iter().filter(|(_, is_given)| *is_given);
@@ -236,5 +237,6 @@ fn exec_to_resume(arguments: &EvalArguments) -> String {
         time.map(|time| format!(" --exec-{name}-s {}", time.as_secs_f64()))
     });
     let memory = exec_memory_mib.iter().map(|mib| format!(" --exec-memory-mib {mib}"));
-    given.chain(granted).chain(times).chain(memory).collect()
+    let variables = exec_env.iter().map(|name| format!(" --exec-env {}", quoted(name)));
+    given.chain(granted).chain(times).chain(memory).chain(variables).collect()
 }

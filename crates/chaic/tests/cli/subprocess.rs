@@ -4,7 +4,7 @@ use std::fs;
 
 use assert_cmd::cargo::cargo_bin;
 
-use super::{chaic, ill, text, well, workshop};
+use super::{chaic, command, ill, text, well, workshop};
 
 #[test]
 fn a_served_helper_gets_the_row_of_the_one_within() {
@@ -63,6 +63,42 @@ fn a_helper_that_breaks_gets_zero_and_says_why() {
     assert!(said.contains("is gone; it complained: no weights"), "{said}");
     let results = fs::read_to_string(dir.path().join("run/results.jsonl")).expect("it is there");
     assert_eq!(results.lines().filter(|l| l.contains("no weights")).count(), 2, "{results}");
+}
+
+/// The helper prints its environment as its last words, which the run keeps.
+#[test]
+fn a_helper_inherits_no_keys_but_what_the_user_names() {
+    let dir = workshop();
+    let play = ["eval", "--episodes", "short", "--size", "48", "--no-traces"];
+    let telling = ["--helper", "exec:env >&2; exit 1"];
+    let environment = |extra: &[&str], out: &str| {
+        let all: Vec<&str> = play.iter().chain(&telling).chain(extra).copied().collect();
+        let mut command = command(dir.path(), &all);
+        command.args(["--out", out]);
+        let keys = ["OPENAI_API_KEY", "MY_LLM_KEY", "HF_TOKEN", "AWS_SECRET_ACCESS_KEY"];
+        command.envs(keys.map(|name| (name, "sesame-open")));
+        command.envs([("LC_ALL", "C"), ("OMP_NUM_THREADS", "3"), ("WEIGHTS_AT", "/weights")]);
+        let ended = command.output().expect("the command starts");
+        assert_eq!(ended.status.code(), Some(1), "{}", text(&ended.stderr));
+        fs::read_to_string(dir.path().join(out).join("results.jsonl")).expect("it is there")
+    };
+    let bare = environment(&[], "bare");
+    for allowed in ["PATH=", "LC_ALL=C", "OMP_NUM_THREADS=3"] {
+        assert!(bare.contains(allowed), "{allowed}: {bare}");
+    }
+    let is_key = |word: &&str| bare.to_uppercase().contains(word);
+    let found = ["_KEY", "TOKEN", "SECRET", "SESAME"].into_iter().find(is_key);
+    assert_eq!(found, None, "{bare}");
+    assert!(!bare.contains("WEIGHTS_AT"), "{bare}");
+
+    let named = environment(&["--exec-env", "WEIGHTS_AT", "--exec-env", "UNSET"], "named");
+    assert!(named.contains("WEIGHTS_AT=/weights") && !named.contains("sesame"), "{named}");
+    let commands = dir.path().join("named/commands.json");
+    let recorded = fs::read_to_string(commands).expect("it is there");
+    assert!(recorded.contains("WEIGHTS_AT") && !recorded.contains("/weights"), "{recorded}");
+    let resume = ["eval", "--resume", "--out", "named", telling[0], telling[1]];
+    assert!(ill(dir.path(), &resume).contains("--exec-env WEIGHTS_AT"));
+    assert_eq!(chaic(dir.path(), &["eval", "--exec-env", "A=b"]).status.code(), Some(2));
 }
 
 #[test]

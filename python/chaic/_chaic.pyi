@@ -312,8 +312,12 @@ def episode_ids(split: str, task: str) -> list[str]:
     `gen-standard:A..B`."""
 def encode_png(rgb: NDArray[np.uint8]) -> bytes:
     """A picture as the bytes of a PNG file; color, uint8 [height, width, 3]."""
-def run_command(arguments: Sequence[str]) -> int:
-    """Runs the command `chaic` with these arguments, the first of which is its name; its exit code."""
+def run_command(arguments: Sequence[str], launcher: Sequence[str]) -> int:
+    """Runs the command `chaic` with these arguments, the first of which is its name; returns its exit code.
+    `launcher` is a program with arguments that passes its further arguments to `run_sandbox_stage`."""
+def run_sandbox_stage(arguments: Sequence[str]) -> int | None:
+    """Runs a stage of a sandbox with these arguments, the first of which is a program's name; returns the exit
+    code, or `None` if they are not those of a stage."""
 def evaluate(
     helpers: Sequence[tuple[str, Callable[[], Any] | None]],
     out: str | PathLike[str],

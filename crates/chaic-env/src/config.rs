@@ -79,6 +79,7 @@ impl EpisodeConfig<'_> {
                     grants: seat.grants,
                     senses: seat.senses,
                     perception: seat.mind().and_then(|mind| mind.perception()),
+                    isolation: seat.mind().and_then(|mind| mind.isolation()),
                 })
                 .collect(),
             renderer: "cpu".to_owned(),

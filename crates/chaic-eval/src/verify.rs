@@ -299,6 +299,12 @@ impl Check<'_> {
                 expected.grants = recorded.unwrap_or(said.grants);
                 expected.senses = said.senses;
                 expected.perception.clone_from(&said.perception);
+                if expected.agent == AgentId::HELPER {
+                    // What the machine of the run enforced stands in run.json.
+                    let granted = self.granted.as_ref();
+                    expected.isolation =
+                        granted.and_then(|g| g.isolation.get(&key.helper)).cloned();
+                }
             } else if recorded.is_some_and(|grants| grants != expected.grants) {
                 let problem = format!("run.json says that the {} is granted", expected.agent);
                 return Ok(Some(problem + " something else than such a mind is"));

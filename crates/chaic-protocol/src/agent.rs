@@ -99,6 +99,12 @@ pub trait Agent: Send {
         None
     }
 
+    /// How the process of this mind is confined, such as `sandbox` or `trusted`; for the record. `None` for a
+    /// mind within this process.
+    fn isolation(&self) -> Option<String> {
+        None
+    }
+
     /// What it is thinking, for the record.
     fn thought(&self) -> Thought {
         Thought::default()

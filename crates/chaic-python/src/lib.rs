@@ -25,12 +25,21 @@ mod world;
 
 use std::ffi::OsString;
 
+use chaic_sandbox::{Launcher, run_stage};
 use pyo3::prelude::*;
 
-/// Runs the command `chaic` with these arguments, the first of which is its name; its exit code.
+/// Runs the command `chaic` with these arguments, the first of which is its name; returns its exit code.
+/// `launcher` is a program with arguments that passes its further arguments to `run_sandbox_stage`.
 #[pyfunction]
-fn run_command(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
-    py.detach(|| chaic::run(arguments))
+fn run_command(py: Python<'_>, arguments: Vec<OsString>, launcher: Vec<OsString>) -> u8 {
+    py.detach(|| chaic::run(arguments, &Launcher::new(launcher)))
+}
+
+/// Runs a stage of a sandbox with these arguments, the first of which is a program's name; returns the exit
+/// code, or `None` if they are not those of a stage.
+#[pyfunction]
+fn run_sandbox_stage(arguments: Vec<OsString>) -> Option<u8> {
+    run_stage(arguments)
 }
 
 #[pymodule]
@@ -48,9 +57,9 @@ mod _chaic {
     #[pymodule_export]
     use super::observation::{Briefing, Observation};
     #[pymodule_export]
-    use super::run_command;
-    #[pymodule_export]
     use super::world::{Snapshot, World};
+    #[pymodule_export]
+    use super::{run_command, run_sandbox_stage};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 use chaic_protocol::agent::Thought;
 use chaic_protocol::observation::Senses;
 use chaic_protocol::{Action, Agent, AgentError, Briefing, Observation};
+use chaic_sandbox::Isolation;
 
 use crate::commands::Command;
 use crate::message::{
@@ -150,6 +151,11 @@ impl Agent for SubprocessAgent {
                 Ok(action)
             }
         }
+    }
+
+    fn isolation(&self) -> Option<String> {
+        let confinement = self.command.confinement.as_ref();
+        Some(confinement.map_or(Isolation::Trusted, |c| c.isolation().clone()).to_string())
     }
 
     fn thought(&self) -> Thought {

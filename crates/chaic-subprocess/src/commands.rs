@@ -12,6 +12,7 @@ use chaic_protocol::observation::Grants;
 use serde::{Deserialize, Serialize};
 
 use crate::agent::SubprocessAgent;
+use crate::confinement::Confinement;
 
 /// What a process may take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,8 +23,12 @@ pub struct Limits {
     pub decision: Duration,
     /// For all that it is waited for in an episode.
     pub episode: Duration,
-    /// Memory that it and each of its children may hold, MiB; where the system bounds that (Linux).
+    /// Memory of all of its processes together, MiB. Without a sandbox, memory of each (Linux).
     pub memory_mib: u64,
+    /// Files that its processes can write, held in memory, MiB; in a sandbox.
+    pub scratch_mib: u64,
+    /// Processes and threads at one time; in a sandbox.
+    pub max_tasks: u32,
 }
 
 impl Default for Limits {
@@ -35,6 +40,10 @@ impl Default for Limits {
             decision: Duration::from_secs(30),
             episode: Duration::from_secs(3600),
             memory_mib: 8192,
+            // An eighth of the memory: room for caches and logs.
+            scratch_mib: 1024,
+            // Sixteen workers of a numerical library with a thread for each of 32 cores.
+            max_tasks: 512,
         }
     }
 }
@@ -53,6 +62,8 @@ pub struct Command {
     /// Names of environment variables that it inherits beyond
     /// [`ALLOWED_VARIABLES`](crate::environment::ALLOWED_VARIABLES).
     pub environment: Vec<String>,
+    /// How its processes are confined; `None` for plain processes, which this program starts itself.
+    pub confinement: Option<Confinement>,
 }
 
 /// What was asked for that can't be, and what to do.

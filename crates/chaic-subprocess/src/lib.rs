@@ -12,19 +12,24 @@
 //! - What goes over the pipe is the agent's briefing and its observations, and nothing else.
 //! - A process that is silent, broken, greedy or talks nonsense ends its own episode, by a message
 //!   that says what it did, and never hangs or ends a run.
-//! - No process outlives its episode, nor does what it started, unless that leaves its process group.
+//! - A command runs in a sandbox (`chaic-sandbox`) unless its user trusts it, and the record says which.
+//! - No process outlives its episode. On Linux nothing that it started does, either; elsewhere, what left its
+//!   process group may.
 //! - A process inherits environment variables of an allow-list only, so no API keys.
 //! - A command is run because the user named it, never because a run's folder did.
 
 pub mod agent;
 pub mod commands;
+pub mod confinement;
 pub mod conformance;
 pub mod environment;
 pub mod frame;
 pub mod message;
 pub mod serve;
 
+mod pipe;
 mod process;
 
 pub use agent::SubprocessAgent;
 pub use commands::{Command, Commands, Limits, Refusal};
+pub use confinement::{Confinement, ConfinementOptions};

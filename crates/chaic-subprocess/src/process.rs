@@ -1,20 +1,24 @@
 //! A process with pipes, deadlines and limits.
 
-use std::io::Read;
-use std::process::{Child, ChildStdin, Stdio};
+use std::io::{Read, Write};
+use std::process::{Child, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use chaic_protocol::AgentError;
+use chaic_sandbox::Isolation;
 #[cfg(unix)]
-use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
+use rustix::process::{
+    Pid, Signal, WaitId, WaitIdOptions, kill_process, kill_process_group, waitid,
+};
 
 use crate::commands::Command;
 use crate::environment::inherited;
 use crate::frame::Frame;
 use crate::message::{ToEnv, ToMind, cut, message, plain};
+use crate::pipe::Pipe;
 
 /// How often one who waits looks whether it is to stop.
 const LOOK: Duration = Duration::from_millis(50);
@@ -32,6 +36,8 @@ pub(crate) struct Process {
     /// Closed once all of its complaints are there.
     no_more_errors: Receiver<()>,
     command: Arc<Command>,
+    /// Raised when nobody reads or writes its pipes any more: their threads end then.
+    is_over: Arc<AtomicBool>,
     /// How long it has been waited for, in all.
     waited: Duration,
     stop: &'static AtomicBool,
@@ -40,19 +46,24 @@ pub(crate) struct Process {
 impl Process {
     /// Starts the command.
     pub fn start(command: &Arc<Command>, stop: &'static AtomicBool) -> Result<Process, AgentError> {
-        let mut starting = std::process::Command::new("sh");
-        starting.arg("-c").arg(script(command));
+        let mut starting = starting(command);
         starting.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         starting.env_clear().envs(inherited(&command.environment));
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut starting, 0);
-        let failed = |e: std::io::Error| AgentError::Broken(format!("sh can't be started: {e}"));
+        let failed =
+            |e: std::io::Error| AgentError::Broken(format!("a process can't be started: {e}"));
         let mut child = starting.spawn().map_err(failed)?;
         let (stdin, stdout, stderr) =
             (child.stdin.take(), child.stdout.take(), child.stderr.take());
         let (Some(stdin), Some(stdout), Some(stderr)) = (stdin, stdout, stderr) else {
             return Err(AgentError::Broken("a process without pipes".to_owned()));
         };
+        let is_over = Arc::new(AtomicBool::new(false));
+        let piped = |e: std::io::Error| AgentError::Broken(format!("its pipes can't be used: {e}"));
+        let stdin = Pipe::new(stdin, &is_over).map_err(piped)?;
+        let stdout = Pipe::new(stdout, &is_over).map_err(piped)?;
+        let stderr = Pipe::new(stderr, &is_over).map_err(piped)?;
         let errors = Arc::new(Mutex::new(Vec::new()));
         let kept = Arc::clone(&errors);
         let (until, no_more_errors) = channel();
@@ -67,6 +78,7 @@ impl Process {
             errors,
             no_more_errors,
             command: Arc::clone(command),
+            is_over,
             waited: Duration::ZERO,
             stop,
         })
@@ -135,11 +147,28 @@ impl Process {
     fn kill(&mut self) {
         self.to = None;
         #[cfg(unix)]
+        if self.command.confinement.as_ref().is_some_and(|c| c.is_watched()) {
+            self.ask_to_end();
+        }
+        #[cfg(unix)]
         if let Some(group) = self.pid() {
             // It may be gone already.
             let _ = kill_process_group(group, Signal::KILL);
         }
         let _ = self.child.kill();
+    }
+
+    /// Asks the stage that watches the command to end it with all that it has started, and waits for that.
+    #[cfg(unix)]
+    fn ask_to_end(&mut self) {
+        if let Some(pid) = self.pid() {
+            // It may be gone already.
+            let _ = kill_process(pid, Signal::TERM);
+        }
+        let began = Instant::now();
+        while !self.has_ended() && began.elapsed() < GRACE {
+            std::thread::sleep(LOOK / 50);
+        }
     }
 
     /// Closes its standard input, having told it to end or not; whether it ended within this time.
@@ -154,7 +183,7 @@ impl Process {
             if self.has_ended() {
                 return true;
             }
-            std::thread::sleep(LOOK / 10);
+            std::thread::sleep(LOOK / 50);
         }
         false
     }
@@ -177,17 +206,33 @@ impl Drop for Process {
         self.close(true, GRACE);
         self.kill();
         let _ = self.child.wait();
+        self.is_over.store(true, Ordering::Relaxed);
     }
 }
 
-/// The command under its limit of memory.
+/// The process that runs a command, in its sandbox if it has one.
+fn starting(command: &Command) -> std::process::Command {
+    match &command.confinement {
+        Some(confinement) if confinement.is_watched() => match confinement.isolation() {
+            Isolation::Trusted => confinement.command(&script(command)),
+            Isolation::Sandboxed(_) => confinement.command(&command.line),
+        },
+        _ => {
+            let mut shell = std::process::Command::new("sh");
+            shell.arg("-c").arg(script(command));
+            shell
+        }
+    }
+}
+
+/// The command under its limit of memory for each process.
 fn script(command: &Command) -> String {
     let kib = command.limits.memory_mib.saturating_mul(1024);
     format!("ulimit -d {kib} || exit 125\n{}", command.line)
 }
 
 /// A thread that writes, so that a process that doesn't read holds nobody up.
-fn writer(mut stdin: ChildStdin) -> Sender<Frame> {
+fn writer(mut stdin: impl Write + Send + 'static) -> Sender<Frame> {
     let (to, frames) = channel::<Frame>();
     std::thread::spawn(move || {
         for frame in frames {

@@ -37,6 +37,7 @@ fn command(line: &str) -> Command {
         grants: Grants::PLANNER,
         limits,
         environment: Vec::new(),
+        confinement: None,
     }
 }
 

@@ -14,13 +14,15 @@ mod output;
 
 use std::ffi::OsString;
 
+use chaic_sandbox::Launcher;
 use clap::Parser as _;
 
 use crate::arguments::{Arguments, Command};
 
-/// Runs the command with these arguments, the first of which is its name, and gives its exit code
+/// Runs the command with these arguments, the first of which is its name, and returns its exit code
 /// (docs/exit-codes.md). It takes Ctrl-C for itself, so that a process should do it once and end.
-pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+/// `launcher` starts the sandboxes of helpers in other processes.
+pub fn run(arguments: impl IntoIterator<Item = OsString>, launcher: &Launcher) -> u8 {
     let command = match Arguments::try_parse_from(arguments) {
         Ok(Arguments { command }) => command,
         Err(refusal) => {
@@ -30,7 +32,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         }
     };
     let ended = match command {
-        Command::Eval(arguments) => commands::eval::run(&arguments),
+        Command::Eval(arguments) => commands::eval::run(&arguments, launcher),
         Command::Merge(arguments) => commands::merge::run(&arguments),
         Command::Report(arguments) => commands::report::run(&arguments),
         Command::Verify(arguments) => commands::verify::run(&arguments),
@@ -46,7 +48,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Scene(command) => commands::scene::run(&command),
         Command::Bench(command) => commands::bench::run(&command),
         Command::Import(command) => commands::import::run(&command),
-        Command::Helper(command) => commands::helper::run(&command),
+        Command::Helper(command) => commands::helper::run(&command, launcher),
         Command::Llm(command) => commands::llm::run(&command),
     };
     match ended {

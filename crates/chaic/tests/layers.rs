@@ -26,6 +26,7 @@ const fn arrows(
 /// The map. ARCHITECTURE.md says why.
 const ALLOWED: &[Arrows] = &[
     arrows("chaic-files", &[], &[]),
+    arrows("chaic-sandbox", &[], &[]),
     arrows("chaic-protocol", &[], &[]),
     arrows("chaic-world", &["chaic-protocol"], &[]),
     arrows("chaic-episodes", &["chaic-protocol", "chaic-world"], &[]),
@@ -144,7 +145,14 @@ const ALLOWED: &[Arrows] = &[
     ),
     arrows(
         "chaic-subprocess",
-        &["chaic-files", "chaic-protocol", "chaic-episodes", "chaic-agents", "chaic-env"],
+        &[
+            "chaic-files",
+            "chaic-sandbox",
+            "chaic-protocol",
+            "chaic-episodes",
+            "chaic-agents",
+            "chaic-env",
+        ],
         &[],
     ),
     arrows("chaic-import", &["chaic-protocol", "chaic-world", "chaic-episodes"], &["chaic-render"]),
@@ -167,6 +175,7 @@ const ALLOWED: &[Arrows] = &[
             "chaic-training",
             "chaic-learn",
             "chaic-llm",
+            "chaic-sandbox",
             "chaic-subprocess",
         ],
         &["chaic-llm-standin"],
@@ -175,6 +184,7 @@ const ALLOWED: &[Arrows] = &[
         "chaic-python",
         &[
             "chaic",
+            "chaic-sandbox",
             "chaic-protocol",
             "chaic-world",
             "chaic-episodes",

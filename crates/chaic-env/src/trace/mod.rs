@@ -118,6 +118,9 @@ pub struct Participant {
     /// By what it tells what is in them; absent where that is granted or its author's affair.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub perception: Option<String>,
+    /// How the process of its mind is confined, such as `sandbox`; absent for a mind within this process.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub isolation: Option<String>,
 }
 
 /// A whole trace in memory.

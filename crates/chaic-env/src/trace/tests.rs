@@ -25,6 +25,7 @@ fn header() -> Header {
         partner: None,
         people: vec![Participant {
             perception: None,
+            isolation: None,
             agent: AgentId::PARTNER,
             persona: Persona::Wheelchair,
             impairments: Impairments::of(Impairment::Tremor),

@@ -29,6 +29,9 @@ pub struct GrantsFile {
     /// to be found in the image, `none` where there is nobody to perceive; or the name of what finds
     /// them.
     pub perception: String,
+    /// How the helper's process is confined; absent for helpers within this process.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub isolation: Option<String>,
 }
 
 impl Labels<'_> {
@@ -73,8 +76,10 @@ impl Labels<'_> {
         let file = |name: &String| {
             let by = granted.perception.get(name);
             let grants = granted.helpers.get(name).map(|grants| GrantsFile::of(grants, by));
-            let nobody = GrantsFile { grants: Vec::new(), perception: "none".to_owned() };
-            (name.clone(), grants.unwrap_or(nobody))
+            let perception = "none".to_owned();
+            let nobody = GrantsFile { grants: Vec::new(), perception, isolation: None };
+            let isolation = granted.isolation.get(name).cloned();
+            (name.clone(), GrantsFile { isolation, ..grants.unwrap_or(nobody) })
         };
         Some(helpers.iter().map(file).collect())
     }
@@ -89,8 +94,14 @@ impl Labels<'_> {
         let unknown = || vec!["grants not recorded".to_owned()];
         let grants = self.granted.and_then(|g| g.helpers.get(helper));
         let by = self.granted.and_then(|g| g.perception.get(helper));
+        let confined = self.granted.and_then(|g| g.isolation.get(helper));
+        let confined = confined.map(|how| match how.as_str() {
+            "trusted" => "trusted process".to_owned(),
+            how => format!("process in a {how}"),
+        });
         let words = |grants| words(grants, by.map(String::as_str));
-        (helper != NONE).then(|| grants.map_or_else(unknown, words))
+        let all = || grants.map_or_else(unknown, words).into_iter().chain(confined).collect();
+        (helper != NONE).then(all)
     }
 
     /// What the partner is granted beyond what every partner is.
@@ -109,7 +120,7 @@ impl GrantsFile {
     fn of(grants: &Grants, by: Option<&String>) -> GrantsFile {
         let usual = if grants.ids { GIVEN } else { "own" };
         let perception = by.map_or_else(|| usual.to_owned(), String::clone);
-        GrantsFile { grants: names(grants), perception }
+        GrantsFile { grants: names(grants), perception, isolation: None }
     }
 }
 

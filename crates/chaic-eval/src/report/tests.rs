@@ -63,6 +63,7 @@ fn granted(partner: Grants) -> RunGrants {
         helpers: helpers.map(|(name, g)| (name.to_owned(), g)).into(),
         partner,
         perception: Default::default(),
+        isolation: Default::default(),
     }
 }
 

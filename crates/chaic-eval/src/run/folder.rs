@@ -185,10 +185,18 @@ impl RunFolder {
 
     /// Refuses to go on with a run whose helpers would be granted something else from now on.
     pub(crate) fn check_grants(&self, now: &RunGrants) -> Result<()> {
-        if self.granted()?.is_none_or(|then| then == *now) {
-            return Ok(());
-        }
         let path = self.path.join("run.json");
+        let Some(then) = self.granted()?.filter(|then| then != now) else { return Ok(()) };
+        for (name, confined) in &then.isolation {
+            let other = now.isolation.get(name).filter(|other| *other != confined);
+            if let Some(other) = other {
+                return Err(EvalError::Options(format!(
+                    "{name} runs as `{other}` now, but {} says `{confined}`; give --exec-trust as before, \
+                     or begin a new run",
+                    path.display()
+                )));
+            }
+        }
         Err(EvalError::Options(format!(
             "helpers or partner are granted something else than {} says; begin a new run",
             path.display()

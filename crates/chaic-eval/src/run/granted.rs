@@ -22,6 +22,9 @@ pub struct RunGrants {
     /// affair.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub perception: BTreeMap<String, String>,
+    /// How the processes of helpers are confined, such as `sandbox`; without helpers of this process.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub isolation: BTreeMap<String, String>,
 }
 
 impl RunGrants {
@@ -32,14 +35,16 @@ impl RunGrants {
     pub fn of(options: &RunOptions, helpers: &dyn Helpers) -> Result<RunGrants> {
         let rules = options.rules()?.planner;
         let (mut by_name, mut perception) = (BTreeMap::new(), BTreeMap::new());
+        let mut isolation = BTreeMap::new();
         for name in &options.helpers {
             let helper = minds::find(helpers, name, rules)?;
             let Some(helper) = helper else { continue };
             by_name.insert(name.clone(), helper.grants);
             perception.extend(helper.mind.perception().map(|by| (name.clone(), by)));
+            isolation.extend(helper.mind.isolation().map(|by| (name.clone(), by)));
         }
         let partner = minds::find_partner(helpers, options.partner.as_deref(), None, rules)?;
         let partner = partner.map_or_else(|| partner_grants(rules), |p| p.grants);
-        Ok(RunGrants { helpers: by_name, partner, perception })
+        Ok(RunGrants { helpers: by_name, partner, perception, isolation })
     }
 }

@@ -5,9 +5,12 @@ use std::time::Duration;
 
 use chaic_env::rules::RuleSetName;
 use chaic_protocol::observation::Grants;
+use chaic_sandbox::Launcher;
 use chaic_subprocess::environment::check_name;
-use chaic_subprocess::{Command, Limits};
+use chaic_subprocess::{Command, Confinement, ConfinementOptions, Limits, Refusal};
 use clap::{Args, Subcommand};
+
+use crate::output::complain;
 
 /// What a command is called that has no name of its own.
 const USUAL_NAME: &str = "exec";
@@ -85,13 +88,20 @@ pub struct ExecArguments {
     /// Longest time that an episode waits for it in all, seconds. Usual: 3600.
     #[arg(long, value_name = "S", value_parser = seconds, help_heading = "Helpers in other processes")]
     pub exec_episode_s: Option<Duration>,
-    /// Memory for each of its processes, MiB, on Linux. Usual: 8192.
+    /// Memory for all of its processes together, MiB; with --exec-trust for each of them. Default: 8192.
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1 << 30), help_heading = "Helpers in other processes")]
     pub exec_memory_mib: Option<u64>,
     /// Environment variable that helpers of exec:COMMAND inherit besides the allow-list (PATH, HOME, ..;
     /// docs/subprocess-helpers.md); may be given often. Only its name is recorded.
     #[arg(long, value_name = "NAME", value_parser = variable, help_heading = "Helpers in other processes")]
     pub exec_env: Vec<String>,
+    /// Let helpers of exec:COMMAND read a file or folder, besides the system's folders, the installations
+    /// of programs and the files that COMMAND names; may be given often.
+    #[arg(long, value_name = "PATH", help_heading = "Helpers in other processes")]
+    pub exec_read: Vec<PathBuf>,
+    /// Run helpers of exec:COMMAND without a sandbox, with all rights of your user.
+    #[arg(long, conflicts_with = "exec_read", help_heading = "Helpers in other processes")]
+    pub exec_trust: bool,
 }
 
 impl ExecArguments {
@@ -107,9 +117,37 @@ impl ExecArguments {
                 decision: self.exec_decision_s.unwrap_or(usual.decision),
                 episode: self.exec_episode_s.unwrap_or(usual.episode),
                 memory_mib: self.exec_memory_mib.unwrap_or(usual.memory_mib),
+                ..usual
             },
             environment: self.exec_env.clone(),
+            confinement: None,
         }
+    }
+
+    /// Confines a command as the options say, and warns of parts of the sandbox that are missing.
+    ///
+    /// # Errors
+    /// If a path to read is not there, or a part is missing where the sandbox must be complete.
+    pub fn confine(
+        &self,
+        command: &mut Command,
+        launcher: &Launcher,
+        masked: &[PathBuf],
+        must_be_complete: bool,
+    ) -> Result<(), Refusal> {
+        let options = ConfinementOptions {
+            is_trusted: self.exec_trust,
+            readable: self.exec_read.clone(),
+            masked: masked.to_vec(),
+            must_be_complete,
+        };
+        let Command { name, line, limits, .. } = &*command;
+        let confinement = Confinement::new(launcher, line, limits, &options)?;
+        if let Some(missing) = confinement.warning() {
+            complain(&format!("warning: {name} runs in {missing}"));
+        }
+        command.confinement = Some(confinement);
+        Ok(())
     }
 }
 

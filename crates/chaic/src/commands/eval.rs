@@ -12,7 +12,8 @@ use chaic_eval::run::{Access, Run, RunFolder, RunRequest, Shard};
 use chaic_learn::helpers::{NamedPolicy, Policies};
 use chaic_llm::Language;
 use chaic_llm::language::is_told_constraint;
-use chaic_subprocess::Commands;
+use chaic_sandbox::Launcher;
+use chaic_subprocess::{Command, Commands};
 
 use super::{bars::RunBars, jobs, llm, sight};
 use crate::arguments::{EvalArguments, ExecArguments, HelperArgument, Track};
@@ -24,7 +25,7 @@ use crate::output::{complain, counted, quoted, quoted_path, say};
 const QUICK_EPISODES: u32 = 2;
 
 /// Plays a benchmark.
-pub fn run(arguments: &EvalArguments) -> Result<Ended> {
+pub fn run(arguments: &EvalArguments, launcher: &Launcher) -> Result<Ended> {
     let (given, name) = given(arguments);
     if let (Some(Track::Hidden), Some(names)) = (arguments.track, arguments.helper_names())
         && let Some(name) = names.iter().find(|name| is_told_constraint(name))
@@ -47,7 +48,7 @@ pub fn run(arguments: &EvalArguments) -> Result<Ended> {
     let policies: chaic_env::Result<Vec<NamedPolicy>> =
         arguments.policies().map(|(name, file)| NamedPolicy::read(name, file)).collect();
     let policies = Policies::beside(others, policies?, Arc::clone(&seeing.sight))?;
-    let commands = Commands::beside(&policies, arguments.commands(), stop)?;
+    let commands = Commands::beside(&policies, confined(arguments, &path, launcher)?, stop)?;
     if arguments.resume {
         commands.check_begun(&path)?;
     }
@@ -105,6 +106,16 @@ pub fn run(arguments: &EvalArguments) -> Result<Ended> {
         return Ok(if extent.errors > 0 { Ended::WithFindings } else { Ended::Well });
     }
     finish(&run, began)
+}
+
+/// The helpers in other processes, each in its sandbox. The run's own folder is empty for them.
+fn confined(arguments: &EvalArguments, run: &Path, launcher: &Launcher) -> Result<Vec<Command>> {
+    let must_be_complete = arguments.track == Some(Track::Hidden);
+    let mut commands = arguments.commands();
+    for command in &mut commands {
+        arguments.exec.confine(command, launcher, &[run.to_owned()], must_be_complete)?;
+    }
+    Ok(commands)
 }
 
 fn finish(run: &Run, began: Instant) -> Result<Ended> {
@@ -226,6 +237,8 @@ fn exec_to_resume(arguments: &EvalArguments) -> String {
         exec_episode_s,
         exec_memory_mib,
         exec_env,
+        exec_read,
+        exec_trust,
     } = &arguments.exec;
     let granted = exec_grants.iter().map(|grants| {
         let names = grants.named().into_iter().filter(|(_, is_given)| *is_given);
@@ -238,5 +251,8 @@ fn exec_to_resume(arguments: &EvalArguments) -> String {
     });
     let memory = exec_memory_mib.iter().map(|mib| format!(" --exec-memory-mib {mib}"));
     let variables = exec_env.iter().map(|name| format!(" --exec-env {}", quoted(name)));
-    given.chain(granted).chain(times).chain(memory).chain(variables).collect()
+    let readable = exec_read.iter().map(|path| format!(" --exec-read {}", quoted_path(path)));
+    let trust = exec_trust.then(|| " --exec-trust".to_owned());
+    let sandbox = readable.chain(trust);
+    given.chain(granted).chain(times).chain(memory).chain(variables).chain(sandbox).collect()
 }

@@ -7,6 +7,7 @@ use std::sync::atomic::Ordering;
 use anyhow::{Context as _, Result};
 use chaic_env::minds::{BuiltIn, Helpers as _, find};
 use chaic_env::rules::RuleSet;
+use chaic_sandbox::Launcher;
 use chaic_subprocess::conformance::{Check, check};
 use chaic_subprocess::serve::serve;
 
@@ -16,16 +17,18 @@ use crate::interrupt;
 use crate::output::{counted, say};
 
 /// Looks after helpers in other processes.
-pub fn run(command: &HelperCommand) -> Result<Ended> {
+pub fn run(command: &HelperCommand, launcher: &Launcher) -> Result<Ended> {
     match command {
-        HelperCommand::Check(arguments) => checked(arguments),
+        HelperCommand::Check(arguments) => checked(arguments, launcher),
         HelperCommand::Serve(arguments) => served(arguments),
     }
 }
 
-fn checked(arguments: &HelperCheckArguments) -> Result<Ended> {
+fn checked(arguments: &HelperCheckArguments, launcher: &Launcher) -> Result<Ended> {
     let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
-    let command = Arc::new(arguments.exec.command("exec", &arguments.line));
+    let mut command = arguments.exec.command("exec", &arguments.line);
+    arguments.exec.confine(&mut command, launcher, &[], false)?;
+    let command = Arc::new(command);
     let mut printed = Ok(());
     let mut print = |check: &Check| {
         if stop.load(Ordering::Relaxed) {

@@ -1,0 +1,216 @@
+//! What a sandboxed command may read and use.
+
+use std::env;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+/// What a sandboxed command may read and use. All paths are absolute.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Policy {
+    /// Working folder of the command. A private empty folder takes its place, unless it is readable.
+    pub start_folder: PathBuf,
+    /// Files and folders outside the system folders that the command can read, at the same paths.
+    pub readable: Vec<PathBuf>,
+    /// Folders that stay empty for the command even inside readable ones.
+    pub masked: Vec<PathBuf>,
+    /// Memory of all processes together, MiB: anonymous and shared pages.
+    pub memory_mib: u64,
+    /// Size of all files that the command can write, in memory, MiB.
+    pub scratch_mib: u64,
+    /// Processes and threads at one time.
+    pub max_tasks: u32,
+}
+
+/// Why a path cannot be made readable.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PolicyError {
+    /// The path does not exist, or cannot be reached.
+    #[error("--exec-read {path}: {reason}", path = path.display())]
+    Unreadable {
+        /// The path as given.
+        path: PathBuf,
+        /// The refusal of the system.
+        reason: String,
+    },
+    /// The whole file system would be readable.
+    #[error("--exec-read / opens every file to the command; name folders, or use --exec-trust")]
+    Root,
+}
+
+impl Policy {
+    /// Adds a file or folder that the user names, with the target of a link.
+    ///
+    /// # Errors
+    /// If it does not exist or is the root folder.
+    pub fn add_readable(&mut self, path: &Path) -> Result<(), PolicyError> {
+        let refuse = |e: std::io::Error| PolicyError::Unreadable {
+            path: path.to_owned(),
+            reason: e.to_string(),
+        };
+        let absolute = std::path::absolute(path).map_err(refuse)?;
+        let target = absolute.canonicalize().map_err(refuse)?;
+        if target == Path::new("/") {
+            return Err(PolicyError::Root);
+        }
+        self.add(absolute);
+        self.add(target);
+        Ok(())
+    }
+
+    /// Adds what a command line names: files, with their folders, and the installation folders of programs.
+    /// A folder above the start folder, a masked folder or the home folder is never added.
+    pub fn add_named_by(&mut self, line: &str) {
+        for word in words_of(line) {
+            let file = self.start_folder.join(&word);
+            if file.is_file() {
+                self.add_file(&file);
+            } else if !word.contains('/') {
+                let folders = program_folders(&word);
+                folders.into_iter().for_each(|folder| self.add_unless_too_wide(folder));
+            }
+        }
+    }
+
+    fn add_file(&mut self, file: &Path) {
+        let Ok(target) = file.canonicalize() else { return };
+        let of_the_machine = ["/etc", "/proc", "/sys", "/dev", "/run", "/var", "/boot"];
+        if of_the_machine.iter().any(|folder| target.starts_with(folder)) {
+            return;
+        }
+        for path in [file.to_owned(), target] {
+            if let Some(folder) = path.parent() {
+                self.add_unless_too_wide(folder.to_owned());
+            }
+            if !self.is_readable(&path) && !is_system(&path) {
+                self.add(path);
+            }
+        }
+    }
+
+    fn add_unless_too_wide(&mut self, folder: PathBuf) {
+        if !self.is_too_wide(&folder) && !is_system(&folder) {
+            self.add(folder);
+        }
+    }
+
+    /// Returns whether a folder is an ancestor of the start folder, of a masked folder or of the home folder.
+    fn is_too_wide(&self, folder: &Path) -> bool {
+        let home = env::home_dir();
+        let kept = self.masked.iter().chain(home.as_ref()).chain([&self.start_folder]);
+        folder == Path::new("/") || kept.into_iter().any(|kept| kept.starts_with(folder))
+    }
+
+    fn add(&mut self, path: PathBuf) {
+        if !self.readable.contains(&path) {
+            self.readable.push(path);
+        }
+    }
+
+    /// Returns whether a path is readable because it lies under a readable one.
+    pub fn is_readable(&self, path: &Path) -> bool {
+        self.readable.iter().any(|readable| path.starts_with(readable))
+    }
+}
+
+/// Splits a command line at white space and shell operators, without quotes: good enough to find the paths
+/// in it.
+pub fn words_of(line: &str) -> Vec<String> {
+    let is_separator = |c: char| c.is_whitespace() || ";|&()<>=`".contains(c);
+    let unquoted = |word: &str| word.trim_matches(['"', '\'']).to_owned();
+    line.split(is_separator).map(unquoted).filter(|word| !word.is_empty()).collect()
+}
+
+/// Returns the installation folders of a program of the search path: the parent of each `bin` or `shims`
+/// folder that holds the program or the target of its link. Empty for programs of the system folders.
+pub fn program_folders(program: &str) -> Vec<PathBuf> {
+    let path = env::var_os("PATH").unwrap_or_else(OsString::new);
+    let found = env::split_paths(&path).map(|folder| folder.join(program)).find(|p| p.is_file());
+    let Some(found) = found else { return Vec::new() };
+    let target = found.canonicalize().unwrap_or_else(|_| found.clone());
+    let of = |path: &Path| {
+        let bin = path.parent()?;
+        let is_bin = bin.ends_with("bin") || bin.ends_with("shims");
+        Some(if is_bin { bin.parent()? } else { bin }.to_owned())
+    };
+    [of(&found), of(&target)].into_iter().flatten().filter(|path| !is_system(path)).collect()
+}
+
+/// Folders of the operating system that every sandboxed command can read.
+pub(crate) const SYSTEM_FOLDERS: &[&str] =
+    &["/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32", "/nix/store", "/gnu/store"];
+
+/// Files below `/etc` that programs need and that hold no secrets.
+pub(crate) const SYSTEM_FILES: &[&str] = &[
+    "/etc/ld.so.cache",
+    "/etc/ld.so.conf",
+    "/etc/ld.so.conf.d",
+    "/etc/alternatives",
+    "/etc/localtime",
+    "/etc/timezone",
+    "/etc/mime.types",
+];
+
+/// Devices that every sandboxed command can use.
+pub(crate) const DEVICES: &[&str] =
+    &["/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom"];
+
+/// Returns whether a path lies in a system folder, or is the root folder.
+fn is_system(path: &Path) -> bool {
+    path == Path::new("/") || SYSTEM_FOLDERS.iter().any(|system| path.starts_with(system))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn policy(start_folder: &Path) -> Policy {
+        Policy {
+            start_folder: start_folder.to_owned(),
+            readable: Vec::new(),
+            masked: Vec::new(),
+            memory_mib: 1,
+            scratch_mib: 1,
+            max_tasks: 1,
+        }
+    }
+
+    #[test]
+    fn a_named_script_is_readable_with_its_folder_but_not_the_start_folder() {
+        let top = tempfile::tempdir().unwrap();
+        let top = top.path().canonicalize().unwrap();
+        std::fs::create_dir(top.join("mine")).unwrap();
+        std::fs::write(top.join("mine/helper.py"), "").unwrap();
+        std::fs::write(top.join("beside.py"), "").unwrap();
+        let mut policy = policy(&top);
+        policy.add_named_by("sh mine/helper.py --flag; ./beside.py");
+        assert!(policy.is_readable(&top.join("mine/other.py")));
+        assert!(
+            policy.is_readable(&top.join("beside.py"))
+                || policy.is_readable(&top.join("./beside.py"))
+        );
+        assert!(!policy.is_readable(&top.join("runs")), "{policy:?}");
+    }
+
+    #[test]
+    fn a_folder_above_a_masked_one_is_not_added_by_a_word() {
+        let top = tempfile::tempdir().unwrap();
+        let top = top.path().canonicalize().unwrap();
+        for folder in ["work", "runs", "runs/one"] {
+            std::fs::create_dir(top.join(folder)).unwrap();
+        }
+        let mut policy = policy(&top.join("work"));
+        policy.masked.push(top.join("runs/one"));
+        policy.add_named_by(&format!("cat {}", top.join("runs").display()));
+        assert!(!policy.is_readable(&top.join("runs/two")));
+    }
+
+    #[test]
+    fn the_root_folder_and_missing_paths_are_refused() {
+        let mut policy = policy(Path::new("/tmp"));
+        assert_eq!(policy.add_readable(Path::new("/")), Err(PolicyError::Root));
+        let error = policy.add_readable(Path::new("/nowhere/at/all")).unwrap_err().to_string();
+        assert!(error.contains("--exec-read /nowhere/at/all"), "{error}");
+    }
+}

@@ -1,0 +1,21 @@
+//! Promise: what a hostile command tries in the sandbox does not succeed.
+//!
+//! Each attack of [`list`] runs in the sandbox, where none may succeed, and trusted, where those must succeed that
+//! docs/threat-model.md lists: an attack that never succeeds proves nothing. The program is its own test
+//! runner, because it is also the stage of the sandbox.
+
+#[cfg(target_os = "linux")]
+mod list;
+#[cfg(target_os = "linux")]
+mod runner;
+
+#[cfg(target_os = "linux")]
+fn main() -> std::process::ExitCode {
+    if let Some(status) = chaic_sandbox::run_stage(std::env::args_os()) {
+        return status.into();
+    }
+    runner::main()
+}
+
+#[cfg(not(target_os = "linux"))]
+fn main() {}

@@ -328,6 +328,7 @@ def evaluate(
     jobs: int,
     resume: bool,
     shard: str | None,
+    isolation: Mapping[str, Any] | None,
     go_on: Callable[[str, str, int, float | None], bool],
     options: Mapping[str, Any],
 ) -> str | None:
@@ -335,6 +336,10 @@ def evaluate(
     was stopped (`go_on` returned false).
 
     `helpers` are names with what makes a fresh helper for each episode, or `None` for a built-in one; `granted` and
-    (`images`, `image_size`) are what the own ones get."""
+    (`images`, `image_size`) are what the own ones get. `isolation` has how to run these in processes of
+    their own."""
+def serve(make: Callable[[], Any], images: Sequence[str], image_size: int, output: int) -> None:
+    """Serves fresh helpers of `make` on the standard input and the descriptor `output`, until the input is
+    closed."""
 def merge(out: str | PathLike[str], runs: Sequence[str | PathLike[str]]) -> str:
     """Joins the shards of a run in a new folder; its report."""

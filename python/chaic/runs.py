@@ -17,8 +17,9 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from chaic import _chaic
+from chaic import _chaic, _isolated
 from chaic._chaic import Briefing, Observation
+from chaic._sandbox import launcher
 from chaic.episodes import tasks_named
 from chaic.watchdog import Watchdog, Watched
 
@@ -68,6 +69,8 @@ def evaluate(
     shard: str | None = None,
     quiet: bool = False,
     limit_s: float = 600.0,
+    isolate: bool = False,
+    read: Sequence[str | os.PathLike[str]] = (),
     **options: Any,
 ) -> Run:
     """Plays a benchmark with a helper of yours into the folder ``out``, and gives the run.
@@ -82,7 +85,14 @@ def evaluate(
     A helper that raises an exception gets zero for that episode, with the traceback in results.jsonl, and the run goes
     on. So does one that thinks for longer than ``limit_s`` seconds about one action: ``TimeoutError`` is raised in it. That
     stops Python code but no call into C; helpers who may hang there are better run as processes of their own
-    (docs/subprocess-helpers.md). ``KeyboardInterrupt`` stops it; ``resume=True`` goes on with it.
+    (docs/subprocess-helpers.md).
+
+    ``isolate=True`` runs the helpers in processes of their own, in the sandbox of docs/threat-model.md: they see their
+    briefings and observations, installed packages, the file that defines them, and what ``read`` names. The process
+    serves one episode after the other. The helper must be defined at the top of a file, so that it can be imported there.
+    Without it a helper has all rights of this process, and the run records it as ``trusted``.
+
+    ``KeyboardInterrupt`` stops it; ``resume=True`` goes on with it.
     """
     makers = _makers(helper)
     wants = {_wants(maker) for maker in makers.values()} or {((), ("rgb", "depth"), 512)}
@@ -97,6 +107,9 @@ def evaluate(
     options |= {"split": None if "episodes" in options else split, "first": first, "seeds": seeds}
     if tasks is not None:
         options["tasks"] = tasks_named(tasks)
+    if read and not isolate:
+        raise ValueError("read names what isolated helpers may read; give isolate=True with it")
+    isolation = _isolation(makers, images, image_size, read, limit_s) if isolate else None
     options = {name: value for name, value in options.items() if value is not None}
     finished = 0
 
@@ -119,6 +132,7 @@ def evaluate(
             jobs=jobs or os.cpu_count() or 1,
             resume=resume,
             shard=shard,
+            isolation=isolation,
             go_on=told,
             options=options,
         )
@@ -150,6 +164,26 @@ def _makers(helper: Maker | Mapping[str, Maker] | None) -> dict[str, Maker]:
         if not callable(maker):
             raise TypeError(f"{name}: {maker!r} makes no helper; give a class or a function")
     return makers
+
+
+def _isolation(
+    makers: Mapping[str, Maker],
+    images: Sequence[str],
+    image_size: int,
+    read: Sequence[str | os.PathLike[str]],
+    limit_s: float,
+) -> dict[str, Any]:
+    readable = {str(Path(path).absolute()) for path in read}
+    for maker in makers.values():
+        readable.update(_isolated.readable(maker))
+    return {
+        "commands": [
+            _isolated.command_line(maker, images, image_size) for maker in makers.values()
+        ],
+        "readable": sorted(readable),
+        "launcher": launcher(),
+        "decision_s": limit_s,
+    }
 
 
 def _wants(maker: Maker) -> tuple[tuple[str, ...], tuple[str, ...], int]:

@@ -1,7 +1,6 @@
 //! Python objects as the minds of a run.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use chaic_agents::PlannerRules;
@@ -14,6 +13,7 @@ use chaic_eval::report::{Format, Report, write_files};
 use chaic_eval::run::{Access, Progress, Run, RunRequest, Shard};
 use chaic_protocol::observation::{Grants, Senses};
 use chaic_protocol::{Action, Agent, AgentError};
+use chaic_sandbox::Isolation;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -22,6 +22,7 @@ use serde::Deserialize;
 
 use crate::action::of_object;
 use crate::error::{failure, mistake};
+use crate::isolated::{IsolatedHelper, IsolationOptions};
 use crate::observation::{Briefing, Observation};
 use crate::options::{grants, senses, sight};
 use crate::threads::refuse_fork;
@@ -30,16 +31,23 @@ use crate::threads::refuse_fork;
 const MAX_TRACEBACK: usize = 4000;
 
 /// A Python object with `reset(briefing)` and `act(observation)`.
-struct PyAgent {
+pub struct PyAgent {
     object: Py<PyAny>,
     senses: Senses,
     /// Why it couldn't be briefed, if it couldn't.
     broken: Option<AgentError>,
-    stop: Arc<AtomicBool>,
+    stop: &'static AtomicBool,
+}
+
+impl PyAgent {
+    /// A mind that is the Python object; Ctrl-C in it raises `stop`.
+    pub fn new(object: Py<PyAny>, senses: Senses, stop: &'static AtomicBool) -> PyAgent {
+        PyAgent { object, senses, broken: None, stop }
+    }
 }
 
 /// What a Python exception comes to: Ctrl-C stops the run, all else is a breakdown of the mind.
-fn breakdown(py: Python<'_>, error: &PyErr, stop: &AtomicBool) -> AgentError {
+pub fn breakdown(py: Python<'_>, error: &PyErr, stop: &AtomicBool) -> AgentError {
     if error.is_instance_of::<PyKeyboardInterrupt>(py) {
         stop.store(true, Ordering::Relaxed);
         return AgentError::Halted("stopped".to_owned());
@@ -59,7 +67,7 @@ impl Agent for PyAgent {
         self.broken = Python::attach(|py| {
             let briefing = Briefing(briefing.clone());
             let told = self.object.call_method1(py, "reset", (briefing,));
-            told.err().map(|error| breakdown(py, &error, &self.stop))
+            told.err().map(|error| breakdown(py, &error, self.stop))
         });
     }
 
@@ -71,8 +79,12 @@ impl Agent for PyAgent {
         Python::attach(|py| {
             let chosen = self.object.bind(py).call_method1("act", (observation,));
             let action = chosen.and_then(|chosen| of_object(&chosen));
-            action.map_err(|error| breakdown(py, &error, &self.stop))
+            action.map_err(|error| breakdown(py, &error, self.stop))
         })
+    }
+
+    fn isolation(&self) -> Option<String> {
+        Some(Isolation::Trusted.to_string())
     }
 }
 
@@ -83,13 +95,21 @@ struct PyHelpers {
     own: Vec<(String, Py<PyAny>)>,
     grants: Grants,
     senses: Senses,
+    /// The own helpers' processes, in their order; empty for helpers within this process.
+    isolated: Vec<IsolatedHelper>,
     /// Stops the run.
-    stop: Arc<AtomicBool>,
+    stop: &'static AtomicBool,
 }
 
 impl PyHelpers {
     fn is_own(&self, name: &str) -> Option<&Py<PyAny>> {
         self.own.iter().find(|(own, _)| own == name).map(|(_, make)| make)
+    }
+
+    fn isolated(&self, name: &str) -> Option<Helper> {
+        let helpers = self.own.iter().zip(&self.isolated);
+        let (_, helper) = helpers.into_iter().find(|((own, _), _)| own == name)?;
+        Some(Helper { mind: helper.mind(self.stop), grants: self.grants })
     }
 }
 
@@ -106,6 +126,10 @@ impl Agent for Unmade {
     fn act(&mut self, _: &chaic_protocol::Observation) -> Result<Action, AgentError> {
         Err(self.0.clone())
     }
+
+    fn isolation(&self) -> Option<String> {
+        Some(Isolation::Trusted.to_string())
+    }
 }
 
 impl Helpers for PyHelpers {
@@ -116,6 +140,9 @@ impl Helpers for PyHelpers {
 
     /// Only to know what it is granted and asks for: nothing of Python's is made.
     fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper> {
+        if let Some(helper) = self.isolated(name) {
+            return Some(helper);
+        }
         match self.is_own(name) {
             None => self.built_in.make(name, rules),
             Some(_) => {
@@ -126,14 +153,12 @@ impl Helpers for PyHelpers {
     }
 
     fn make_for(&self, key: &RunKey, rules: PlannerRules) -> Option<Helper> {
-        let Some(make) = self.is_own(&key.helper) else { return self.make(&key.helper, rules) };
+        let make = self.is_own(&key.helper).filter(|_| self.isolated.is_empty());
+        let Some(make) = make else { return self.make(&key.helper, rules) };
         let made =
-            Python::attach(|py| make.call0(py).map_err(|error| breakdown(py, &error, &self.stop)));
+            Python::attach(|py| make.call0(py).map_err(|error| breakdown(py, &error, self.stop)));
         let mind: Box<dyn Agent> = match made {
-            Ok(object) => {
-                let (senses, stop) = (self.senses, Arc::clone(&self.stop));
-                Box::new(PyAgent { object, senses, broken: None, stop })
-            }
+            Ok(object) => Box::new(PyAgent::new(object, self.senses, self.stop)),
             Err(error) => Box::new(Unmade(error)),
         };
         Some(Helper { mind, grants: self.grants })
@@ -204,9 +229,10 @@ pub fn merge(py: Python<'_>, out: PathBuf, runs: Vec<PathBuf>) -> PyResult<Strin
 /// was stopped (`go_on` returned false).
 ///
 /// `helpers` are names with what makes a fresh helper for each episode, or `None` for a built-in one; `granted` and
-/// (`images`, `image_size`) are what the own ones get.
+/// (`images`, `image_size`) are what the own ones get. `isolation` has how to run these in processes of
+/// their own.
 #[pyfunction]
-#[pyo3(signature = (helpers, out, *, granted, images, image_size, jobs, resume, shard, go_on, options))]
+#[pyo3(signature = (helpers, out, *, granted, images, image_size, jobs, resume, shard, isolation, go_on, options))]
 #[allow(clippy::too_many_arguments)]
 pub fn evaluate(
     py: Python<'_>,
@@ -218,6 +244,7 @@ pub fn evaluate(
     jobs: usize,
     resume: bool,
     shard: Option<&str>,
+    isolation: Option<&Bound<'_, PyDict>>,
     go_on: &Bound<'_, PyAny>,
     options: &Bound<'_, PyDict>,
 ) -> PyResult<Option<String>> {
@@ -235,9 +262,17 @@ pub fn evaluate(
     }
     let grants = grants(&granted)?;
     let senses = senses(&images, image_size)?;
+    let is_hidden = false;
     let request = keywords.request(names)?;
-    let stop = Arc::new(AtomicBool::new(false));
-    let helpers = PyHelpers { built_in, own, grants, senses, stop: Arc::clone(&stop) };
+    // Threads of the run may outlive this call: the flag is one byte for good.
+    let stop: &'static AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
+    let isolation: Option<IsolationOptions> =
+        isolation.map(|options| depythonize(options)).transpose().map_err(wrong)?;
+    let own_names: Vec<String> = own.iter().map(|(name, _)| name.clone()).collect();
+    let isolated = isolation.map_or(Ok(Vec::new()), |options| {
+        IsolatedHelper::all(&options, &own_names, grants, &out, is_hidden)
+    })?;
+    let helpers = PyHelpers { built_in, own, grants, senses, isolated, stop };
     let shard = shard.map_or(Ok(Shard::WHOLE), |shard| shard.parse().map_err(mistake))?;
     let access = if resume { Access::Resume } else { Access::Begin };
     let go_on = go_on.clone().unbind();
@@ -261,7 +296,7 @@ pub fn evaluate(
                 }
             }
         };
-        let is_whole = run.play_shard(shard, jobs, &helpers, &stop, &mut tell)?;
+        let is_whole = run.play_shard(shard, jobs, &helpers, stop, &mut tell)?;
         if !is_whole {
             return Ok(None);
         }

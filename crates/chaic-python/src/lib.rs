@@ -17,6 +17,7 @@ mod agent;
 mod batch;
 mod episode;
 mod error;
+mod isolated;
 mod mind;
 mod observation;
 mod options;
@@ -52,6 +53,8 @@ mod _chaic {
     use super::batch::Batch;
     #[pymodule_export]
     use super::episode::{Episode, classes, encode_png, episode_ids, tasks};
+    #[pymodule_export]
+    use super::isolated::serve;
     #[pymodule_export]
     use super::mind::{Detector, Mind, Planner};
     #[pymodule_export]

@@ -12,11 +12,13 @@ use crate::commands::Command;
 use crate::message::{
     IMAGE_SIZES, MAX_FILM, MAX_SEES, PROTOCOL, ToEnv, ToMind, cut, observation_frame, plain,
 };
+use crate::pool::Pool;
 use crate::process::Process;
 
-/// A mind in another process, which is started when an episode begins and ends with it.
+/// A mind in another process. The process ends with its episode, or serves the next one from a [`Pool`].
 pub struct SubprocessAgent {
     command: Arc<Command>,
+    pool: Option<Arc<Pool>>,
     stop: &'static AtomicBool,
     state: State,
 }
@@ -35,7 +37,32 @@ enum State {
 impl SubprocessAgent {
     /// A mind that runs this command for each of its episodes. `stop` raised ends its waiting.
     pub fn new(command: Arc<Command>, stop: &'static AtomicBool) -> SubprocessAgent {
-        SubprocessAgent { command, stop, state: State::Idle }
+        SubprocessAgent { command, pool: None, stop, state: State::Idle }
+    }
+
+    /// A mind whose process comes from a pool and goes back there, unless it failed.
+    pub fn pooled(
+        command: Arc<Command>,
+        pool: Arc<Pool>,
+        stop: &'static AtomicBool,
+    ) -> SubprocessAgent {
+        SubprocessAgent { command, pool: Some(pool), stop, state: State::Idle }
+    }
+
+    /// Ends the episode: the process goes back to the pool, or ends.
+    fn finish(&mut self) {
+        let state = std::mem::replace(&mut self.state, State::Idle);
+        if let (Some(pool), State::Running { process, .. }) = (&self.pool, state) {
+            pool.put(*process);
+        }
+    }
+
+    /// Takes a process from the pool, or starts one.
+    fn process(&self) -> Result<Process, AgentError> {
+        if let Some(process) = self.pool.as_ref().and_then(|pool| pool.take()) {
+            return Ok(process);
+        }
+        SubprocessAgent::start(&self.command, self.stop).map(|(process, _)| process)
     }
 
     /// Starts a process and makes its acquaintance; what it calls itself.
@@ -50,7 +77,7 @@ impl SubprocessAgent {
             ToEnv::Hello { protocol: PROTOCOL, name } => Ok((process, name)),
             ToEnv::Hello { protocol, .. } => Err(AgentError::Broken(format!(
                 "`{}` speaks version {protocol} of the protocol, this chaic speaks {PROTOCOL}",
-                command.line
+                command.label()
             ))),
             other => Err(unexpected(command, "hello", &other)),
         }
@@ -113,7 +140,7 @@ fn unexpected(command: &Command, asked: &str, answer: &ToEnv) -> AgentError {
         ToEnv::Act { .. } => "act",
         ToEnv::Failed { .. } => "failed",
     };
-    AgentError::Broken(format!("`{}` answered `{asked}` with `{kind}`", command.line))
+    AgentError::Broken(format!("`{}` answered `{asked}` with `{kind}`", command.label()))
 }
 
 impl Agent for SubprocessAgent {
@@ -125,13 +152,12 @@ impl Agent for SubprocessAgent {
     }
 
     fn reset(&mut self, briefing: &Briefing) {
-        // The process of the last episode ends before another one begins.
-        self.state = State::Idle;
-        let begun =
-            SubprocessAgent::start(&self.command, self.stop).and_then(|(mut process, _)| {
-                let senses = SubprocessAgent::brief(&mut process, &self.command, briefing)?;
-                Ok((process, senses))
-            });
+        // The process of the last episode is free or gone before another one begins.
+        self.finish();
+        let begun = self.process().and_then(|mut process| {
+            let senses = SubprocessAgent::brief(&mut process, &self.command, briefing)?;
+            Ok((process, senses))
+        });
         self.state = match begun {
             Ok((process, senses)) => {
                 let process = Box::new(process);
@@ -146,9 +172,16 @@ impl Agent for SubprocessAgent {
             State::Idle => Err(AgentError::Broken("a mind that was not briefed".to_owned())),
             State::Lost(error) => Err(error.clone()),
             State::Running { process, thought, .. } => {
-                let (action, thinks) = SubprocessAgent::ask(process, &self.command, observation)?;
-                *thought = thinks.unwrap_or_default();
-                Ok(action)
+                match SubprocessAgent::ask(process, &self.command, observation) {
+                    Ok((action, thinks)) => {
+                        *thought = thinks.unwrap_or_default();
+                        Ok(action)
+                    }
+                    Err(error) => {
+                        self.state = State::Lost(error.clone());
+                        Err(error)
+                    }
+                }
             }
         }
     }
@@ -163,5 +196,11 @@ impl Agent for SubprocessAgent {
             State::Running { thought, .. } => thought.clone(),
             State::Idle | State::Lost(_) => Thought::default(),
         }
+    }
+}
+
+impl Drop for SubprocessAgent {
+    fn drop(&mut self) {
+        self.finish();
     }
 }

@@ -66,6 +66,15 @@ pub struct Command {
     pub confinement: Option<Confinement>,
 }
 
+impl Command {
+    /// Returns how messages call the command: its line, or its name if the line is long.
+    pub(crate) fn label(&self) -> &str {
+        /// Longer lines hide what a message says of them.
+        const LONGEST: usize = 2000;
+        if self.line.len() > LONGEST { &self.name } else { &self.line }
+    }
+}
+
 /// What was asked for that can't be, and what to do.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]

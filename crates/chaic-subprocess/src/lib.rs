@@ -28,8 +28,10 @@ pub mod message;
 pub mod serve;
 
 mod pipe;
+pub mod pool;
 mod process;
 
 pub use agent::SubprocessAgent;
 pub use commands::{Command, Commands, Limits, Refusal};
 pub use confinement::{Confinement, ConfinementOptions};
+pub use pool::Pool;

@@ -135,7 +135,7 @@ impl Process {
         let errors = self.errors.lock().unwrap_or_else(PoisonError::into_inner);
         let said = String::from_utf8_lossy(&errors).trim().to_owned();
         let said = if said.is_empty() { String::new() } else { format!("; it complained: {said}") };
-        AgentError::Broken(format!("`{}` {what}{said}", self.command.line))
+        AgentError::Broken(format!("`{}` {what}{said}", self.command.label()))
     }
 
     /// Its number, which is that of its process group too.
@@ -188,15 +188,20 @@ impl Process {
         false
     }
 
+    /// Forgets how long it was waited for in the last episode.
+    pub fn begin_episode(&mut self) {
+        self.waited = Duration::ZERO;
+    }
+
     /// Whether it has ended; its number isn't given to another process yet.
     #[cfg(unix)]
-    fn has_ended(&mut self) -> bool {
+    pub fn has_ended(&mut self) -> bool {
         let looks = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
         self.pid().is_none_or(|pid| !matches!(waitid(WaitId::Pid(pid), looks), Ok(None)))
     }
 
     #[cfg(not(unix))]
-    fn has_ended(&mut self) -> bool {
+    pub fn has_ended(&mut self) -> bool {
         !matches!(self.child.try_wait(), Ok(None))
     }
 }

@@ -185,6 +185,7 @@ const ALLOWED: &[Arrows] = &[
         &[
             "chaic",
             "chaic-sandbox",
+            "chaic-subprocess",
             "chaic-protocol",
             "chaic-world",
             "chaic-episodes",

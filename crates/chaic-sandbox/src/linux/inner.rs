@@ -61,8 +61,9 @@ pub(super) fn run(request: &Request) -> Setup<u8> {
         let refusal = std::io::Error::other(lost.reason.clone());
         return Err(SetupError { step: format!("enforce {}", lost.part.name()), refusal });
     }
-    std::env::set_current_dir(&policy.start_folder)
-        .map_err(SetupError::of(format!("enter {}", policy.start_folder.display())))?;
+    let start = Some(&policy.start_folder).filter(|folder| folder.is_dir()).unwrap_or(&home);
+    std::env::set_current_dir(start)
+        .map_err(SetupError::of(format!("enter {}", start.display())))?;
     let Some(line) = &request.line else {
         let report = serde_json::to_vec(&Isolation::Sandboxed(missing)).unwrap_or_default();
         std::io::stdout().write_all(&report).map_err(SetupError::of("report"))?;

@@ -53,11 +53,14 @@ pub(super) fn build(policy: &Policy) -> Setup<Vec<PathBuf>> {
     let mut root = Root { writable: Vec::new() };
     root.add_system()?;
     root.add_devices()?;
-    if !policy.is_readable(&policy.start_folder) {
-        root.add_private(&policy.start_folder)?;
-    }
     if !policy.is_readable(Path::new("/tmp")) {
         root.add_private(Path::new("/tmp"))?;
+    }
+    // The root itself and folders of the kernel are what they are.
+    let is_replaced =
+        !["/", "/dev", "/proc", "/sys", "/etc"].map(Path::new).contains(&&*policy.start_folder);
+    if is_replaced && !policy.is_readable(&policy.start_folder) {
+        root.add_private(&policy.start_folder)?;
     }
     root.add_readable(policy)?;
     for masked in &policy.masked {

@@ -392,10 +392,10 @@ if ctypes.get_errno() in (0, errno.EFAULT): success()
         "open a file by its handle, past all folders",
         "h = ctypes.create_string_buffer(struct.pack('Ii', 128, 0) + bytes(128), 136)\nm = ctypes.c_int()\nif libc.name_to_handle_at(-100, ctypes.c_char_p(b'/usr'), h, ctypes.byref(m), 0) < 0: sys.exit()\nfd = os.open('/usr', 0)\nif libc.open_by_handle_at(fd, h, 0) >= 0: success()",
     ),
-    root(
+    word(
         "raise-limits",
         "raise the limits of the own process",
-        "import resource\nresource.setrlimit(resource.RLIMIT_NOFILE, (1 << 19, 1 << 19))\nresource.setrlimit(resource.RLIMIT_DATA, (-1, -1))\nsuccess()",
+        "import resource\nresource.setrlimit(resource.RLIMIT_CORE, (1 << 20, 1 << 20))\nsuccess()",
     ),
     root(
         "raise-priority",

@@ -98,6 +98,7 @@ fn attacked(names: &[String]) -> ExitCode {
             wrong.push(format!("{name} {} with trust", word(trusted)));
         }
     }
+    wrong.extend(undocumented());
     if let Isolation::Sandboxed(missing) = &isolation
         && !missing.is_empty()
     {
@@ -111,6 +112,20 @@ fn attacked(names: &[String]) -> ExitCode {
     }
     wrong.iter().for_each(|problem| println!("FAILED: {problem}"));
     if wrong.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// Returns attacks without a row in docs/threat-model.md, and rows without an attack.
+fn undocumented() -> Vec<String> {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/threat-model.md");
+    let page = fs::read_to_string(page).expect("the page is there");
+    let row = |attack: &Attack| format!("| `{}` | {} |", attack.name, attack.aim);
+    let missing = ATTACKS.iter().filter(|attack| !page.contains(&row(attack)));
+    let mut wrong: Vec<String> = missing.map(|a| format!("no row for {}", a.name)).collect();
+    let is_row = |line: &&str| line.ends_with("| succeeds |") || line.ends_with("| fails |");
+    if page.lines().filter(is_row).count() != ATTACKS.len() {
+        wrong.push("docs/threat-model.md has rows without an attack".to_owned());
+    }
+    wrong
 }
 
 /// A caller with secrets, and everything that an attack may aim at.
@@ -211,7 +226,7 @@ impl Target {
             ("HOME_FILE", self.at("home/notes").display().to_string()),
             ("SECRET", self.secret.clone()),
             ("ABSTRACT", self.secret.clone()),
-            ("NAME", "attacks".to_owned()),
+            ("NAME", "--attacked".to_owned()),
             ("SURVIVOR", survivor.to_owned()),
         ];
         let mut text = PRELUDE.to_owned();

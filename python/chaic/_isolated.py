@@ -1,0 +1,96 @@
+"""Helpers in processes of their own: how such a process is started, and what it runs."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import pickle
+import shlex
+import sys
+import types
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from chaic import _chaic
+
+_CODE = "import sys, json; sys.path[:] = json.loads(sys.argv[2]); from chaic._isolated import main; main(sys.argv[1])"
+
+
+def command_line(maker: Callable[[], Any], images: Sequence[str], image_size: int) -> str:
+    """Returns the shell command of a process that serves fresh helpers of ``maker``.
+
+    ``ValueError`` if another process cannot find ``maker``: classes and functions must be defined in a file.
+    """
+    main_file = _main_file()
+    try:
+        pickled = pickle.dumps(maker)
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise ValueError(f"{_UNREACHABLE}: {error}") from None
+    if b"__main__" in pickled and main_file is None:
+        raise ValueError(_UNREACHABLE)
+    task = {
+        "main": main_file,
+        "maker": base64.b64encode(pickled).decode(),
+        "images": list(images),
+        "image_size": image_size,
+    }
+    path = [str(Path(entry).absolute()) for entry in sys.path]
+    words = [sys.executable, "-c", _CODE, json.dumps(task), json.dumps(path)]
+    return "exec " + shlex.join(words)
+
+
+_UNREACHABLE = (
+    "isolate=True needs a helper that another process can import: a class or function at the top of a file"
+)
+
+
+def readable(maker: Callable[[], Any]) -> list[str]:
+    """Returns the files and folders that the process needs: the interpreter, installed packages, the helper's file.
+
+    Folders of ``sys.path`` that contain the current folder are left out, but for the helper's own file or package.
+    """
+    here = Path.cwd()
+    found = {sys.prefix, sys.base_prefix, sys.exec_prefix, str(Path(__file__).parent)}
+    for entry in sys.path:
+        folder = Path(entry).absolute()
+        if folder.exists() and not here.is_relative_to(folder):
+            found.add(str(folder))
+    module = sys.modules.get(getattr(maker, "__module__", None) or "")
+    file = getattr(module, "__file__", None) or _main_file()
+    if file is not None:
+        package = "." in module.__name__ if module is not None else False
+        path = Path(file).absolute()
+        found.add(str(path.parent if package and not here.is_relative_to(path.parent) else path))
+    main_file = _main_file()
+    if main_file is not None:
+        found.add(main_file)
+    return sorted(found)
+
+
+def _main_file() -> str | None:
+    file = getattr(sys.modules["__main__"], "__file__", None)
+    return None if file is None else str(Path(file).absolute())
+
+
+def main(text: str) -> None:
+    """Serves helpers on standard input and output until the pipe is closed."""
+    task = json.loads(text)
+    # What a helper prints must not come between the messages.
+    output = os.dup(1)
+    os.dup2(2, 1)
+    maker = _maker(task)
+    _chaic.serve(maker, task["images"], task["image_size"], output)
+
+
+def _maker(task: dict[str, Any]) -> Any:
+    pickled = base64.b64decode(task["maker"])
+    if b"__main__" in pickled:
+        # As multiprocessing does: the script runs under another name, so that its main part is left out.
+        script = types.ModuleType("__mp_main__")
+        script.__file__ = task["main"]
+        code = compile(Path(task["main"]).read_text(), task["main"], "exec")
+        sys.modules["__main__"] = sys.modules["__mp_main__"] = script
+        exec(code, script.__dict__)
+    return pickle.loads(pickled)

@@ -129,7 +129,8 @@ impl Env {
         let scene = Scene::with_appearance(world.setup(), config.appearance);
         let observer = Observer::new(Arc::new(scene));
         let turns = seats.iter().map(|_| Turn::default()).collect();
-        Env { world, seats, filled, observer, header, turns, spare: Vec::new(), broken: None }
+        let broken = refused_senses(&seats);
+        Env { world, seats, filled, observer, header, turns, spare: Vec::new(), broken }
     }
 
     /// Begins another episode with the same minds and callers, and with the rule-based partner and
@@ -319,7 +320,7 @@ impl Env {
         self.seats = fork(&snapshot.seats)?;
         self.world = snapshot.world.clone();
         self.turns.clone_from(&snapshot.turns);
-        self.broken = None;
+        self.broken = refused_senses(&self.seats);
         Ok(())
     }
 
@@ -424,6 +425,15 @@ fn check_seats(config: &EpisodeConfig<'_>, setup: &Setup, seats: usize) -> Resul
     let people = setup.people.len();
     let id = || config.episode.id().to_owned();
     if people == seats { Ok(()) } else { Err(EnvError::Seats { id: id(), people, seats }) }
+}
+
+/// Returns why the episode can't be played where a seat asks for observations out of bounds.
+fn refused_senses(seats: &[Seat]) -> Option<AgentError> {
+    let refused = |(k, seat): (usize, &Seat)| {
+        let problem = seat.senses.check().err()?;
+        Some(AgentError::Broken(format!("the {} {problem}", AgentId(k as u8))))
+    };
+    seats.iter().enumerate().find_map(refused)
 }
 
 fn fork(seats: &[Seat]) -> Result<Vec<Seat>> {

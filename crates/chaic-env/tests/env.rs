@@ -374,3 +374,18 @@ fn who_asks_for_a_film_gets_it_and_nobody_else() {
         assert_eq!(pair[1].1, all[all.len().saturating_sub(5)..], "from {then} to {now}");
     }
 }
+
+#[test]
+fn a_film_larger_than_an_observation_may_be_is_refused_before_the_first_image() {
+    let episode = of_task(TaskId::Shopping);
+    let seen = Arc::<Mutex<Vec<Filmed>>>::default();
+    let film = Some(Film { image_size: 2048, every_frames: 1, most: 256 });
+    let mind = Box::new(Filming { film, seen: Arc::clone(&seen) });
+    let mut env = Env::new(config(&episode), Some(Helper { mind, grants: Grants::NONE })).unwrap();
+    for _ in 0..2 {
+        let problem = env.advance(None).unwrap_err().to_string();
+        assert!(problem.contains("7168 MiB") && problem.contains("at most 64 MiB"), "{problem}");
+    }
+    assert!(seen.lock().unwrap().is_empty(), "the mind is not asked");
+    assert_eq!(env.world().state().frame, 0);
+}

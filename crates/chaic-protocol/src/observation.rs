@@ -1,5 +1,7 @@
 //! What an agent perceives when it is asked.
 
+use std::ops::RangeInclusive;
+
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -45,10 +47,87 @@ impl Senses {
     pub const NONE: Senses =
         Senses { image_size: Senses::IMAGE_SIZE, rgb: false, depth: false, ids: false, film: None };
 
+    /// Sides of images that an agent may ask for, pixels.
+    pub const IMAGE_SIZES: RangeInclusive<u32> = 16..=2048;
+    /// Most film images that an agent may ask for in one observation.
+    pub const MAX_FILM_FRAMES: u32 = 256;
+    /// Largest pixel data of one observation, bytes (64 MiB): color, depth and ids of 2,048 pixels,
+    /// and a film of 256 images of 128 pixels.
+    pub const MAX_OBSERVATION_BYTES: u64 = 64 << 20;
+
     /// Whether any image must be made.
     pub fn wants_image(&self) -> bool {
         self.rgb || self.depth || self.ids
     }
+
+    /// Returns the pixel data of the largest observation, bytes: images, and a full film.
+    pub fn max_observation_bytes(&self) -> u64 {
+        self.image_bytes().saturating_add(self.film.map_or(0, |film| film.max_bytes()))
+    }
+
+    fn image_bytes(&self) -> u64 {
+        let channels = [(self.rgb, 3), (self.depth, 4), (self.ids, 2)];
+        let bytes_per_pixel = channels.iter().map(|(wanted, n)| u64::from(*wanted) * n).sum();
+        square_bytes(self.image_size, bytes_per_pixel)
+    }
+
+    /// Checks sides of images and length of the film.
+    ///
+    /// # Errors
+    /// One line with the requested and the allowed numbers, to be read after the agent's name.
+    pub fn check_counts(&self) -> Result<(), String> {
+        let sizes = Senses::IMAGE_SIZES;
+        let (min, max) = (sizes.start(), sizes.end());
+        let sides = [Some(self.image_size), self.film.map(|film| film.image_size)];
+        let is_wrong = |side: &u32| !sizes.contains(side);
+        if let Some(side) = sides.into_iter().flatten().find(is_wrong) {
+            return Err(format!("asks for images of {side} pixels; a side has {min} to {max}"));
+        }
+        if let Some(n) = self.film.map(|film| film.most).filter(|n| *n > Senses::MAX_FILM_FRAMES) {
+            let max = Senses::MAX_FILM_FRAMES;
+            return Err(format!("asks for a film of {n} images; a film holds at most {max}"));
+        }
+        Ok(())
+    }
+
+    /// Checks sides of images, length of the film and size of the largest observation.
+    ///
+    /// # Errors
+    /// One line with the requested and the allowed numbers, to be read after the agent's name.
+    pub fn check(&self) -> Result<(), String> {
+        self.check_counts()?;
+        let Some(film) = self.film else { return Ok(()) };
+        if self.max_observation_bytes() > Senses::MAX_OBSERVATION_BYTES {
+            return Err(format!(
+                "asks for up to {} MiB an observation (images of {} pixels: {} MiB, film of {} images \
+                 of {} pixels: {} MiB); an observation holds at most {} MiB; ask for fewer or smaller \
+                 film images",
+                mib(self.max_observation_bytes()),
+                self.image_size,
+                mib(self.image_bytes()),
+                film.most,
+                film.image_size,
+                mib(film.max_bytes()),
+                mib(Senses::MAX_OBSERVATION_BYTES),
+            ));
+        }
+        Ok(())
+    }
+}
+
+impl Film {
+    /// Returns the pixel data of a full film in color and depth, bytes.
+    pub fn max_bytes(&self) -> u64 {
+        square_bytes(self.image_size, 3 + 4).saturating_mul(u64::from(self.most))
+    }
+}
+
+fn square_bytes(side: u32, bytes_per_pixel: u64) -> u64 {
+    (u64::from(side) * u64::from(side)).saturating_mul(bytes_per_pixel)
+}
+
+fn mib(bytes: u64) -> u64 {
+    bytes.div_ceil(1 << 20)
 }
 
 /// What an agent is given beyond its own images and state. Written into every trace.
@@ -85,7 +164,7 @@ fn is_false(b: &bool) -> bool {
 }
 
 impl Grants {
-    /// Nothing beyond own images and state: the `hidden` track proper.
+    /// Nothing beyond own images and state.
     pub const NONE: Grants = Grants {
         ids: false,
         goal_place: false,
@@ -94,6 +173,16 @@ impl Grants {
         behavior: false,
         positions: false,
         task: false,
+    };
+    /// Every grant.
+    pub const ALL: Grants = Grants {
+        ids: true,
+        goal_place: true,
+        goal: true,
+        progress: true,
+        behavior: true,
+        positions: true,
+        task: true,
     };
     /// Perfect segmentation of the own image, nothing else.
     pub const IDS: Grants = Grants { ids: true, ..Grants::NONE };
@@ -117,6 +206,12 @@ impl Grants {
     /// Every grant by its name, in the order of docs/grants.md, and whether it is given.
     pub fn named(mut self) -> [(&'static str, bool); 7] {
         Grants::FIELDS.map(|(name, field)| (name, *field(&mut self)))
+    }
+
+    /// Returns the names of the grants that `allowed` doesn't have.
+    pub fn names_beyond(self, allowed: Grants) -> Vec<&'static str> {
+        let pairs = self.named().into_iter().zip(allowed.named());
+        pairs.filter(|((_, has), (_, may))| *has && !may).map(|((name, _), _)| name).collect()
     }
 
     /// The grants of these names.
@@ -303,5 +398,36 @@ impl Observation {
         }
         observation.own.hands.iter_mut().flatten().for_each(|held| held.identity = None);
         observation
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Color, depth and ids, with a film of `most` images.
+    fn senses(image_size: u32, film_size: u32, most: u32) -> Senses {
+        let film = Some(Film { image_size: film_size, every_frames: 3, most });
+        Senses { image_size, rgb: true, depth: true, ids: true, film }
+    }
+
+    #[test]
+    fn the_largest_observation_is_bounded() {
+        let full = senses(2048, 128, 256);
+        assert_eq!(full.max_observation_bytes(), Senses::MAX_OBSERVATION_BYTES);
+        assert_eq!(full.check(), Ok(()));
+        let problem = senses(2048, 129, 256).check().unwrap_err();
+        assert!(
+            problem.contains("up to 65 MiB") && problem.contains("at most 64 MiB"),
+            "{problem}"
+        );
+        let problem = senses(512, 2048, 256).check().unwrap_err();
+        assert!(problem.contains("256 images of 2048 pixels: 7168 MiB"), "{problem}");
+        assert_eq!(senses(16, 2048, 2).check(), Ok(()));
+        for wrong in [senses(15, 16, 1), senses(2049, 16, 1), senses(16, u32::MAX, 1)] {
+            assert!(wrong.check().unwrap_err().contains("16 to 2048"), "{wrong:?}");
+        }
+        assert!(senses(16, 16, 257).check().unwrap_err().contains("at most 256"));
+        assert_eq!(senses(u32::MAX, u32::MAX, u32::MAX).max_observation_bytes(), u64::MAX);
     }
 }

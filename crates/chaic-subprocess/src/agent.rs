@@ -9,9 +9,7 @@ use chaic_protocol::{Action, Agent, AgentError, Briefing, Observation};
 use chaic_sandbox::Isolation;
 
 use crate::commands::Command;
-use crate::message::{
-    IMAGE_SIZES, MAX_FILM, MAX_SEES, PROTOCOL, ToEnv, ToMind, cut, observation_frame, plain,
-};
+use crate::message::{MAX_SEES, PROTOCOL, ToEnv, ToMind, cut, observation_frame, plain};
 use crate::pool::Pool;
 use crate::process::Process;
 
@@ -91,19 +89,10 @@ impl SubprocessAgent {
     ) -> Result<Senses, AgentError> {
         let reset = ToMind::Reset { briefing: Box::new(briefing.clone()) };
         match process.ask(plain(&reset), command.limits.start)? {
-            ToEnv::Ready { senses: Senses { film: Some(film), .. } }
-                if !IMAGE_SIZES.contains(&film.image_size) || film.most > MAX_FILM =>
-            {
-                Err(AgentError::Broken(format!(
-                    "`{}` wants a film of {} images of {} pixels, not up to {MAX_FILM} of {IMAGE_SIZES:?}",
-                    command.line, film.most, film.image_size
-                )))
+            ToEnv::Ready { senses } => {
+                let refused = |text| AgentError::Broken(format!("`{}` {text}", command.label()));
+                senses.check_counts().map(|()| senses).map_err(refused)
             }
-            ToEnv::Ready { senses } if IMAGE_SIZES.contains(&senses.image_size) => Ok(senses),
-            ToEnv::Ready { senses } => Err(AgentError::Broken(format!(
-                "`{}` wants images of {} pixels, not {IMAGE_SIZES:?}",
-                command.line, senses.image_size
-            ))),
             other => Err(unexpected(command, "reset", &other)),
         }
     }

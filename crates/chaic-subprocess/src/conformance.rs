@@ -103,7 +103,8 @@ impl Trial<'_> {
 
     fn senses(&self) -> Result<(), String> {
         let env = env(TaskId::NoConstraint, Senses::NONE, self.command)?;
-        self.brief(&mut self.start()?, &env.briefing(AgentId::HELPER)).map(drop)
+        let senses = self.brief(&mut self.start()?, &env.briefing(AgentId::HELPER))?;
+        senses.check().map_err(|problem| format!("it {problem}"))
     }
 
     fn brief(&self, process: &mut Process, briefing: &Briefing) -> Result<Senses, String> {

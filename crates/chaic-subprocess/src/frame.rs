@@ -11,10 +11,12 @@
 
 use std::io::{self, Read, Write};
 
+use chaic_protocol::observation::Senses;
+
 /// Longest head, bytes: the longest that was seen is a fiftieth of it.
 pub const MAX_HEAD: usize = 1 << 20;
-/// Longest body, bytes: all images of a side of 2,048 pixels.
-pub const MAX_BODY: usize = 2048 * 2048 * (3 + 4 + 2);
+/// Longest body, bytes: all images of the largest observation.
+pub const MAX_BODY: usize = Senses::MAX_OBSERVATION_BYTES as usize;
 
 /// One frame.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -29,17 +31,29 @@ impl Frame {
     /// Writes it, and flushes.
     ///
     /// # Errors
-    /// If the pipe is closed.
-    ///
-    /// # Panics
-    /// If it is longer than frames may be.
+    /// If the frame is longer than [`MAX_HEAD`] or [`MAX_BODY`], in which case nothing is written; if
+    /// the pipe is closed.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
-        assert!(self.head.len() <= MAX_HEAD && self.body.len() <= MAX_BODY, "a frame too long");
+        self.check().map_err(|text| io::Error::new(io::ErrorKind::InvalidInput, text))?;
         out.write_all(&(self.head.len() as u32).to_le_bytes())?;
         out.write_all(&(self.body.len() as u32).to_le_bytes())?;
         out.write_all(&self.head)?;
         out.write_all(&self.body)?;
         out.flush()
+    }
+
+    /// Checks the lengths of head and body.
+    ///
+    /// # Errors
+    /// One line with the lengths and their bounds.
+    pub fn check(&self) -> Result<(), String> {
+        let (head, body) = (self.head.len(), self.body.len());
+        if head > MAX_HEAD || body > MAX_BODY {
+            return Err(format!(
+                "a message of {head} and {body} bytes; head and body hold at most {MAX_HEAD} and {MAX_BODY}"
+            ));
+        }
+        Ok(())
     }
 
     /// Reads the next one; `None` if the pipe was closed before it.
@@ -106,6 +120,20 @@ mod tests {
             assert!(Frame::read(&mut &bytes[..cut], 3).is_err(), "cut after {cut} bytes");
         }
         assert!(Frame::read(&mut &bytes[..], 2).is_err(), "a body that is too long");
+    }
+
+    #[test]
+    fn a_frame_that_is_too_long_is_refused_and_not_written() {
+        for frame in [
+            Frame { head: vec![b' '; MAX_HEAD + 1], body: Vec::new() },
+            Frame { head: Vec::new(), body: vec![0; MAX_BODY + 1] },
+        ] {
+            let mut written = Vec::new();
+            let error = frame.write(&mut written).unwrap_err();
+            assert_eq!(error.kind(), io::ErrorKind::InvalidInput);
+            assert!(error.to_string().contains("at most 1048576 and 67108864"), "{error}");
+            assert!(written.is_empty());
+        }
     }
 
     #[test]

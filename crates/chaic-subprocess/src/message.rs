@@ -9,10 +9,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::frame::Frame;
 
-/// Sides of images that a mind may ask for, pixels.
-pub const IMAGE_SIZES: std::ops::RangeInclusive<u32> = 16..=2048;
-/// Most images of a film that a mind may ask for.
-pub const MAX_FILM: u32 = 256;
 /// Longest text of a mind that is kept, bytes: a thought, a problem.
 pub const MAX_TEXT: usize = 2000;
 /// Most things that a thought may say are in sight; more aren't kept.

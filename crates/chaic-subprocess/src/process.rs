@@ -91,6 +91,7 @@ impl Process {
             Ok(Err(text)) => return Err(self.broken(&text)),
             Err(_) => {}
         }
+        frame.check().map_err(|text| self.broken(&format!("can't be sent {text}")))?;
         // If the pipe is closed, the answer says why.
         let sent = self.to.as_ref().map(|to| to.send(frame));
         let began = Instant::now();

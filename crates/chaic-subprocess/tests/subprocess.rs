@@ -101,6 +101,40 @@ read()
     format!("python3 -c \"{python}{then}\"")
 }
 
+/// The same, with a film of 256 images of this side.
+fn filming(then: &str, film_size: u32) -> String {
+    let film = format!("'film': {{'image_size': {film_size}, 'every_frames': 1, 'most': 256}}");
+    speaks_then(then).replace("'ids': True", &format!("'ids': True, {film}"))
+}
+
+#[test]
+fn an_observation_that_fits_no_message_is_refused_when_it_is_asked_for() {
+    let failure = |line: &str, image_size: Option<u32>| {
+        let command = Arc::new(command(line));
+        let mind = Box::new(SubprocessAgent::new(command, never()));
+        let helper = Some(Helper { mind, grants: Grants::PLANNER });
+        let episode = find_episode("no_constraint/train/01").unwrap();
+        let config = EpisodeConfig { image_size, ..config(&episode) };
+        match Env::new(config, helper).unwrap().advance(Some(100)) {
+            Err(AgentError::Broken(text)) => text,
+            other => panic!("{other:?}"),
+        }
+    };
+    let began = Instant::now();
+    let text = failure(&filming("", 2048), None);
+    for said in ["the helper asks for up to 7169 MiB", "at most 64 MiB", "smaller film images"] {
+        assert!(text.contains(said), "{said}: {text}");
+    }
+    assert!(began.elapsed() < Duration::from_secs(20), "no film is taken");
+    // Images of this size and the film fit alone, but not together.
+    let large =
+        filming("raise ValueError('asked')", 128).replace("'image_size': 64", "'image_size': 2048");
+    let larger = large.replace("'image_size': 128", "'image_size': 130");
+    assert!(failure(&larger, None).contains("up to 65 MiB"));
+    assert!(failure(&larger, Some(64)).contains("ValueError: asked"));
+    assert!(failure(&filming("", 130), Some(2048)).contains("up to 65 MiB"));
+}
+
 #[test]
 fn a_served_mind_does_as_one_within() {
     for task in [TaskId::HighGoal, TaskId::Shopping] {
@@ -196,6 +230,7 @@ fn the_conformance_suite_finds_what_does_not_keep_to_it() {
     assert_eq!(found("true"), ["it starts and says hello in this version of the protocol"]);
     let huge = speaks_then("").replace("'image_size': 64", "'image_size': 64000");
     assert_eq!(found(&huge), ["it is briefed, and wants images that there are"]);
+    assert_eq!(found(&filming("", 2048)), ["it is briefed, and wants images that there are"]);
     let once = speaks_then(act);
     assert_eq!(found(&once), ["it decides in an episode of each task, in time"]);
     // Decides by the clock, and stays when it is told to go.
@@ -245,7 +280,7 @@ fn whatever_a_process_does_wrong_is_said() {
         assert!(text.contains(said) && text.len() < 6000, "{then}: {text}");
     }
     let huge = speaks_then("").replace("'image_size': 64", "'image_size': 64000");
-    assert!(short(&huge).contains("wants images of 64000 pixels"));
+    assert!(short(&huge).contains("asks for images of 64000 pixels"));
     let old = speaks_then("").replace("'protocol': 1", "'protocol': 7");
     assert!(short(&old).contains("speaks version 7"));
 }
@@ -339,7 +374,7 @@ fn a_run_goes_on_with_the_commands_it_began_with() {
 fn the_python_helper_delivers_something() {
     let line = python_helper();
     let mut n_delivered = 0;
-    for k in 0..3 {
+    for k in 0..6 {
         let episode = find_episode(&format!("low_target/train/0{k}")).unwrap();
         let mind = SubprocessAgent::new(Arc::new(command(&line)), never());
         let helper = Some(Helper { mind: Box::new(mind), grants: Grants::PLANNER });
@@ -348,5 +383,5 @@ fn the_python_helper_delivers_something() {
         let things = env.world().state().things.iter();
         n_delivered += things.filter(|t| t.delivered_by == Some(AgentId::HELPER)).count();
     }
-    assert!(n_delivered > 0, "nothing in three episodes");
+    assert!(n_delivered > 0, "nothing in six episodes");
 }

@@ -52,7 +52,7 @@ impl EpisodeConfig<'_> {
     /// Briefs everybody.
     pub(crate) fn brief(&self, world: &World, seats: &mut [Seat]) {
         for (agent, seat) in world.setup().agents().zip(seats) {
-            seat.begin(agent, world, self.image_size);
+            seat.begin(agent, world, self);
         }
     }
 

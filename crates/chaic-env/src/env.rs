@@ -198,7 +198,7 @@ impl Env {
     /// What the agent in this seat is told at the beginning.
     pub fn briefing(&self, agent: AgentId) -> Briefing {
         let grants = self.seats[agent.index()].grants;
-        self.world.briefing(agent, grants)
+        self.world.briefing(agent, grants, self.header.seed)
     }
 
     /// The agents whose choices are the caller's and needed now.

@@ -6,6 +6,7 @@ use chaic_protocol::rng::Stream;
 use chaic_protocol::{Action, Agent, AgentError, AgentId, Briefing, Observation, ResolvedAction};
 use chaic_world::{Setup, World};
 
+use crate::config::EpisodeConfig;
 use crate::minds::Helper;
 
 /// Who decides for a seat.
@@ -49,12 +50,12 @@ impl Seat {
     }
 
     /// Briefs a mind and asks what it wants to perceive.
-    pub(crate) fn begin(&mut self, agent: AgentId, world: &World, image_size: Option<u32>) {
+    pub(crate) fn begin(&mut self, agent: AgentId, world: &World, config: &EpisodeConfig<'_>) {
         self.submitted = None;
         if let Driver::Mind(mind) = &mut self.driver {
-            mind.reset(&world.briefing(agent, self.grants));
+            mind.reset(&world.briefing(agent, self.grants, config.seed));
             self.senses = mind.senses();
-            self.senses.image_size = image_size.unwrap_or(self.senses.image_size);
+            self.senses.image_size = config.image_size.unwrap_or(self.senses.image_size);
         }
     }
 

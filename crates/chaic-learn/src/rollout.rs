@@ -5,7 +5,7 @@ use std::sync::{Arc, PoisonError};
 use chaic_agents::decision::Policy;
 use chaic_agents::sight::Sight;
 use chaic_env::rules::RuleSet;
-use chaic_env::{Env, EnvError, EpisodeConfig, Flow, Minds};
+use chaic_env::{Env, EnvError, EpisodeConfig, Flow, Minds, seeded_by_episode};
 use chaic_episodes::{SplitError, find_episode};
 use chaic_protocol::briefing::Goal;
 use chaic_protocol::geom::math;
@@ -89,7 +89,6 @@ fn record<P: Policy>(
     let notes = Notes::default();
     let policy = make(&episode.setup().goal, Arc::clone(&notes));
     let helper = drive(policy, RuleSet::PAPER.planner, rules.sight);
-    let minds = Minds::of(Some(helper), None);
     let config = EpisodeConfig {
         episode: &episode,
         seed,
@@ -99,6 +98,7 @@ fn record<P: Policy>(
         image_size: Some(rules.image_size),
         appearance: Appearance::Canonical,
     };
+    let minds = Minds::of(Some(seeded_by_episode(helper, &config)), None);
     let mut env = Env::new(config, minds)?;
     let mut account = Account::new(rules.rewards);
     let mut earned = Vec::new();

@@ -75,7 +75,8 @@ pub struct Briefing {
     pub motion: Motion,
     /// The other people.
     pub companions: Vec<Companion>,
-    /// Seed of the reader's own random streams; differs between agents of one episode.
+    /// Seed of the reader's own random streams; differs between agents of one episode. A helper's
+    /// derives from the run's seed and the seat alone and is the same in all episodes of a run.
     pub seed: u64,
     /// Frames until the episode ends.
     pub horizon: Frame,

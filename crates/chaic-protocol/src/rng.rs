@@ -49,6 +49,11 @@ impl Stream {
         ((u128::from(self.0.next_u64()) * n as u128) >> 64) as usize
     }
 
+    /// Draws a seed for further streams, from which this stream's own seed can't be read off.
+    pub fn seed(&mut self) -> u64 {
+        (0..4).fold(0, |seed, _| seed << 16 | self.below(1 << 16) as u64)
+    }
+
     /// One element, or `None` of an empty slice.
     pub fn choose<'a, T>(&mut self, items: &'a [T]) -> Option<&'a T> {
         if items.is_empty() { None } else { Some(&items[self.below(items.len())]) }

@@ -47,4 +47,5 @@ pub use state::{
     Activity, JointCarry, LastProgress, PROGRESS_M, PersonState, Phase, Place, STUCK_AFTER_FRAMES,
     State, Step, ThingState,
 };
+pub use view::episode_stream;
 pub use world::{Snapshot, SnapshotError, SubmitError, World};

@@ -19,7 +19,8 @@ use crate::world::World;
 
 impl World {
     /// What an agent is told before the episode. Only `grants` lets anything of the goal in.
-    pub fn briefing(&self, me: AgentId, grants: Grants) -> Briefing {
+    /// `run_seed` is the number of the run's seed, from which the seed of a helper derives.
+    pub fn briefing(&self, me: AgentId, grants: Grants, run_seed: u32) -> Briefing {
         let scene = self.setup.task.info().scene;
         let classes =
             |wanted: &dyn Fn(ClassId) -> bool| ClassId::all().filter(|c| wanted(*c)).collect();
@@ -37,7 +38,7 @@ impl World {
             companions: others
                 .map(|agent| Companion { agent, relation: relation(agent) })
                 .collect(),
-            seed: mix(self.setup.seed, me),
+            seed: self.agent_seed(me, run_seed),
             horizon: self.setup.horizon,
             bounds: self.setup.bounds,
             possible_targets: classes(&|c| {
@@ -58,6 +59,15 @@ impl World {
             grants,
             goal: grants.goal.then(|| self.setup.goal.clone()),
             told: grants.task.then(|| self.told()),
+        }
+    }
+
+    /// Returns the seed of an agent's own random streams. Partner and child draw from the episode.
+    /// The seed of a helper derives from the run's seed and the seat alone, so that it names no episode.
+    fn agent_seed(&self, agent: AgentId, run_seed: u32) -> u64 {
+        match agent {
+            AgentId::PARTNER | AgentId::CHILD => episode_stream(self.setup.seed, agent).seed(),
+            _ => Stream::new(u64::from(run_seed), "helper", u64::from(agent.0)).seed(),
         }
     }
 
@@ -323,8 +333,7 @@ fn is_possible_target(class: ClassId, scene: SceneKind) -> bool {
     in_sets || (scene == SceneKind::House && info.role == Role::Fragile)
 }
 
-/// A seed of an agent's own, from which the world's seed can't be read off.
-fn mix(seed: u64, agent: AgentId) -> u64 {
-    let mut stream = Stream::new(seed, "agent", u64::from(agent.0));
-    (0..4).fold(0, |s, _| s << 16 | stream.below(1 << 16) as u64)
+/// Random stream of an agent in the world of this seed. It identifies the episode.
+pub fn episode_stream(world_seed: u64, agent: AgentId) -> Stream {
+    Stream::new(world_seed, "agent", u64::from(agent.0))
 }

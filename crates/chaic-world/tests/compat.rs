@@ -142,7 +142,7 @@ fn vases_are_wanted_but_nobody_may_go_for_them() {
     let vase = ClassId::named("vase");
     let offered = |rules| {
         let w = with(rules, hall(vec![], vec![person(Persona::Child, 0.0, 0.0)]));
-        w.briefing(A, Grants::PARTNER).possible_targets.contains(&vase)
+        w.briefing(A, Grants::PARTNER, 0).possible_targets.contains(&vase)
     };
     assert!(offered(PAPER) && !offered(Rules { fragile_targets: false, ..PAPER }));
 }
@@ -172,7 +172,7 @@ fn containers_are_of_no_use_beside_a_wheelchair() {
     let offered = |containers_with_wheelchair, persona| {
         let people = vec![person(persona, 0.0, 0.0), person(Persona::Helper, 2.0, 0.0)];
         let w = with(Rules { containers_with_wheelchair, ..PAPER }, hall(vec![], people));
-        [A, B].map(|agent| !w.briefing(agent, Grants::NONE).containers.is_empty())
+        [A, B].map(|agent| !w.briefing(agent, Grants::NONE, 0).containers.is_empty())
     };
     assert_eq!(offered(true, Persona::Wheelchair), [true, true]);
     assert_eq!(offered(false, Persona::Wheelchair), [false, false]);

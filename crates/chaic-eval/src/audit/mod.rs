@@ -9,6 +9,7 @@
 //! **What it is not**: it judges no helper. Its own agent, the [`Prober`], tries whatever an agent
 //! may try, to learn what it should not.
 
+pub mod opening;
 mod prober;
 mod secret;
 mod spy;

@@ -12,7 +12,7 @@ use chaic_agents::policies::{Random, RulePolicy, RuleProfile};
 use chaic_agents::sight::{GROUND_TRUTH, Sight};
 use chaic_env::minds::Helper;
 use chaic_env::rules::RuleSet;
-use chaic_env::{Env, EpisodeConfig, Minds};
+use chaic_env::{Env, EpisodeConfig, Minds, seeded_by_episode};
 use chaic_episodes::find_episode;
 use chaic_files::{FileError, read_bounded, write_whole};
 use chaic_protocol::observation::Grants;
@@ -218,7 +218,7 @@ fn of_episode(
         image_size: Some(rules.image_size),
         appearance: Appearance::Canonical,
     };
-    let minds = Minds::of(Some(helper), Some(partner));
+    let minds = Minds::of(Some(seeded_by_episode(helper, &config)), Some(partner));
     let mut env = Env::new(config, minds).map_err(RolloutError::from)?;
     env.advance(None).map_err(RolloutError::from)?;
     let mut samples = std::mem::take(&mut *notes.lock().unwrap_or_else(PoisonError::into_inner));

@@ -4,8 +4,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use chaic_agents::sight::{GROUND_TRUTH, Sight};
+use chaic_env::minds::Helper;
 use chaic_env::rules::RuleSet;
-use chaic_env::{Env, EpisodeConfig, Flow, Minds, RewardWeights, Seat};
+use chaic_env::{Env, EpisodeConfig, Flow, Minds, RewardWeights, Seat, seeded_by_episode};
 use chaic_episodes::find_episode;
 use chaic_nn::Pass;
 use chaic_nn::weights::{self, WeightsError};
@@ -369,7 +370,7 @@ impl Training for PrimitiveTraining {
         let tr = |id: &String| {
             let helper =
                 PrimitiveHelper::helper(Arc::clone(&trained), RuleSet::PAPER.planner, &**sight);
-            play(id, rules.image_size, Minds::of(Some(helper), None))
+            play(id, rules.image_size, helper)
         };
         let tr: Result<Vec<f64>, RolloutError> = ids.par_iter().map(tr).collect();
         let tr = tr.expect("generated episodes can be played");
@@ -385,7 +386,7 @@ fn take_number(bytes: &mut &[u8]) -> Option<u64> {
 }
 
 /// The transport rate of an episode.
-fn play(id: &str, image_size: u32, minds: Minds) -> Result<f64, RolloutError> {
+fn play(id: &str, image_size: u32, helper: Helper) -> Result<f64, RolloutError> {
     let episode = find_episode(id)?;
     let config = EpisodeConfig {
         episode: &episode,
@@ -396,7 +397,7 @@ fn play(id: &str, image_size: u32, minds: Minds) -> Result<f64, RolloutError> {
         image_size: Some(image_size),
         appearance: Appearance::Canonical,
     };
-    let mut env = Env::new(config, minds)?;
+    let mut env = Env::new(config, Some(seeded_by_episode(helper, &config)))?;
     env.advance(None)?;
     let (done, total) = env.world().progress();
     Ok(if total > 0.0 { done / total } else { 0.0 })

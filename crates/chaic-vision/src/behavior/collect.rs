@@ -11,7 +11,7 @@ use chaic_agents::sight::Sight;
 use chaic_env::minds::Helper;
 use chaic_env::rules::{RuleSet, RuleSetName};
 use chaic_env::trace::Record;
-use chaic_env::{Appearance, Env, EpisodeConfig};
+use chaic_env::{Appearance, Env, EpisodeConfig, seeded_by_episode};
 use chaic_episodes::find_episode;
 use chaic_protocol::observation::{Film, Grants};
 use chaic_protocol::rng::Stream;
@@ -171,6 +171,7 @@ fn of_episode(part: Part, rules: &CollectRules, sight: &dyn Sight, index: u64) -
         Mind::with(Follow::default(), sight.perception(), Box::new(recorder), rule_set.planner);
     let mind = Box::new(mind.with_sight(sight));
     let helper = Helper { mind, grants: sight.grants(Grants::PLANNER) };
+    let helper = seeded_by_episode(helper, &config);
     let Ok(mut env) = Env::new(config, Some(helper)) else { return Vec::new() };
     let mut doings = Doings::default();
     let stop = std::sync::atomic::AtomicBool::new(false);

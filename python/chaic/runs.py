@@ -79,7 +79,8 @@ def evaluate(
     name; they are to be granted alike. ``beside`` names built-in helpers to be compared with: ``"none"`` is
     what EI is counted against. ``jobs`` episodes are played at a time (usual: one a core); helpers
     of all of them share Python's lock. Further options are those of ``chaic eval``: ``episodes``, ``rules``,
-    ``set``, ``traces``, ``perception``, ``behavior``. The folder is like that of ``chaic eval``, so that ``chaic report``, ``chaic verify``
+    ``set``, ``traces``, ``perception``, ``behavior``, ``track``. With ``track="hidden"`` a class with other grants than
+    ``goal_place`` is refused. The folder is like that of ``chaic eval``, so that ``chaic report``, ``chaic verify``
     and ``chaic replay`` read it.
 
     A helper that raises an exception gets zero for that episode, with the traceback in results.jsonl, and the run goes

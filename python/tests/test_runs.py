@@ -138,6 +138,17 @@ def test_mistakes_are_told(tmp_path):
     assert not out.exists()
 
 
+def test_the_hidden_track_refuses_grants_and_is_recorded(tmp_path):
+    with pytest.raises(RuntimeError, match="`mine` is granted ids, which the hidden track refuses"):
+        chaic.evaluate({"mine": Rhp}, track="hidden", out=tmp_path / "run", **ONE)
+    with pytest.raises(RuntimeError, match="hidden track needs --perception learned"):
+        chaic.evaluate(Turner, track="hidden", perception="gt", out=tmp_path / "run", **ONE)
+    assert not (tmp_path / "run" / "run.json").exists()
+    run = chaic.evaluate(Turner, track="hidden", out=tmp_path / "run", **ONE)
+    assert run.options["track"] == "hidden"
+    run.verify()
+
+
 def test_records_are_plain_numbers(tmp_path):
     run = chaic.evaluate(Turner, out=tmp_path / "run", **ONE)
     records = run.records()

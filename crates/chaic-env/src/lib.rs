@@ -71,6 +71,7 @@ pub mod rules;
 mod run_loop;
 mod seat;
 pub mod trace;
+mod track;
 
 pub use batch::{EnvBatch, ImageLayout, Slot};
 pub use chaic_render::{Appearance, ImagesMut};
@@ -85,6 +86,7 @@ pub use reseeded::seeded_by_episode;
 pub use reward::{RewardTerms, RewardWeights, Totals};
 pub use run_loop::{Choice, Players, run_loop};
 pub use seat::{Driver, Idle, Minds, Seat, seats, world_seed};
+pub use track::{Track, TrackInfo};
 
 /// The version of the program, as it stands in run folders and traces.
 pub const CHAIC_VERSION: &str = env!("CARGO_PKG_VERSION");

@@ -101,6 +101,7 @@ pub fn verify_run(
     let keys: Vec<RunKey> = planned.iter().map(|item| item.key.clone()).collect();
     let rules = options.rules()?;
     let granted = folder.granted()?;
+    let refused = granted.as_ref().and_then(|granted| granted.check_track(options).err());
     let check =
         Check { folder, options, rules, granted, helpers, planned: &keys, results: &results };
     let checked = check.files(&paths, jobs, progress)?;
@@ -119,6 +120,12 @@ pub fn verify_run(
         });
     }
     verdict.add_missing(folder, &results);
+    verdict.mismatches.extend(refused.map(|problem| Mismatch {
+        path: folder.join("run.json"),
+        frame: 0,
+        agent: None,
+        problem: problem.to_string(),
+    }));
     verdict.mismatches.sort_by(|a, b| a.path.cmp(&b.path));
     Ok(verdict)
 }
@@ -309,6 +316,11 @@ impl Check<'_> {
                 let problem = format!("run.json says that the {} is granted", expected.agent);
                 return Ok(Some(problem + " something else than such a mind is"));
             }
+        }
+        let helper = header.people.iter().find(|person| person.agent == AgentId::HELPER);
+        let grants = helper.map_or(Grants::NONE, |helper| helper.grants);
+        if let Err(problem) = self.options.track.check_grants(&key.helper, grants) {
+            return Ok(Some(problem));
         }
         let expected = Header { chaic: header.chaic.clone(), ..expected };
         let said = serde_json::to_value(header).expect("a header is plain data");

@@ -114,6 +114,7 @@ impl Matrix {
             appearance: None,
             perception: None,
             behavior: None,
+            track: None,
         })
     }
 

@@ -56,11 +56,6 @@ pub fn is_language_helper(name: &str) -> bool {
     HELPERS.iter().any(|k| k.name == name)
 }
 
-/// Whether the helper of this name is told the partner's constraint.
-pub fn is_told_constraint(name: &str) -> bool {
-    HELPERS.iter().any(|k| k.name == name && k.track == Track::Told)
-}
-
 /// Whether a partner of this name asks a language model.
 pub fn is_language_partner(name: &str) -> bool {
     PARTNERS.iter().any(|k| k.name == name)

@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use chaic_agents::PlannerRules;
 use chaic_agents::sight::GROUND_TRUTH;
-use chaic_env::RunKey;
 use chaic_env::minds::{Helper, Helpers, NONE, Seeing};
+use chaic_env::{RunKey, Track};
 use chaic_eval::EvalError;
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::{Format, Report, write_files};
@@ -179,6 +179,7 @@ struct Keywords {
     traces: Option<bool>,
     perception: Option<String>,
     behavior: Option<String>,
+    track: Option<Track>,
 }
 
 impl Keywords {
@@ -197,6 +198,7 @@ impl Keywords {
             no_traces: self.traces == Some(false),
             perception: self.perception.filter(|name| name != GROUND_TRUTH),
             behavior: self.behavior.filter(|name| name != GROUND_TRUTH),
+            track: self.track,
             ..RunRequest::default()
         })
     }
@@ -250,7 +252,10 @@ pub fn evaluate(
 ) -> PyResult<Option<String>> {
     refuse_fork()?;
     let wrong = |error: pythonize::PythonizeError| PyTypeError::new_err(error.to_string());
-    let keywords: Keywords = depythonize(options).map_err(wrong)?;
+    let mut keywords: Keywords = depythonize(options).map_err(wrong)?;
+    let track = keywords.track.unwrap_or_default();
+    keywords.perception = track.sight_or(keywords.perception);
+    keywords.behavior = track.sight_or(keywords.behavior);
     let names: Vec<String> = helpers.iter().map(|(name, _)| name.clone()).collect();
     let or_true = |name: &Option<String>| name.clone().unwrap_or_else(|| GROUND_TRUTH.to_owned());
     let seen_by = sight(&or_true(&keywords.perception), &or_true(&keywords.behavior))?;
@@ -262,7 +267,6 @@ pub fn evaluate(
     }
     let grants = grants(&granted)?;
     let senses = senses(&images, image_size)?;
-    let is_hidden = false;
     let request = keywords.request(names)?;
     // Threads of the run may outlive this call: the flag is one byte for good.
     let stop: &'static AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
@@ -270,7 +274,7 @@ pub fn evaluate(
         isolation.map(|options| depythonize(options)).transpose().map_err(wrong)?;
     let own_names: Vec<String> = own.iter().map(|(name, _)| name.clone()).collect();
     let isolated = isolation.map_or(Ok(Vec::new()), |options| {
-        IsolatedHelper::all(&options, &own_names, grants, &out, is_hidden)
+        IsolatedHelper::all(&options, &own_names, grants, &out)
     })?;
     let helpers = PyHelpers { built_in, own, grants, senses, isolated, stop };
     let shard = shard.map_or(Ok(Shard::WHOLE), |shard| shard.parse().map_err(mistake))?;

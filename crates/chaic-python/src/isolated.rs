@@ -46,14 +46,12 @@ impl IsolatedHelper {
         names: &[String],
         grants: Grants,
         run: &Path,
-        must_be_complete: bool,
     ) -> PyResult<Vec<IsolatedHelper>> {
         let launcher = Launcher::new(options.launcher.clone());
         let confinement = ConfinementOptions {
             is_trusted: false,
             readable: options.readable.clone(),
             masked: vec![run.to_owned()],
-            must_be_complete,
         };
         let decision = Duration::try_from_secs_f64(options.decision_s).map_err(mistake)?;
         let usual = Limits::default();

@@ -15,8 +15,6 @@ pub struct ConfinementOptions {
     pub readable: Vec<PathBuf>,
     /// Folders that stay empty for commands, such as that of the run.
     pub masked: Vec<PathBuf>,
-    /// Refuses a sandbox with a missing part.
-    pub must_be_complete: bool,
 }
 
 /// The confinement of one command, the same for each of its processes.
@@ -31,8 +29,7 @@ impl Confinement {
     /// Decides what a command line can read and finds out what the system enforces.
     ///
     /// # Errors
-    /// [`Refusal`] if a path is not there, the launcher cannot be started, or a part is missing where the
-    /// sandbox must be complete.
+    /// [`Refusal`] if a path is not there or the launcher cannot be started.
     pub fn new(
         launcher: &Launcher,
         line: &str,
@@ -58,12 +55,6 @@ impl Confinement {
         options.readable.iter().try_for_each(|p| policy.add_readable(p)).map_err(|e| refuse(&e))?;
         policy.add_named_by(line);
         let isolation = launcher.probe(&policy).map_err(|e| refuse(&e))?;
-        if options.must_be_complete && !isolation.is_complete() {
-            return Err(Refusal(format!(
-                "this track needs the whole sandbox, but here is {}; give --exec-trust if you trust `{line}`",
-                in_words(&isolation)
-            )));
-        }
         Ok(Confinement { launcher: launcher.clone(), policy, isolation })
     }
 

@@ -10,16 +10,15 @@ mod perception;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use chaic_env::Appearance;
 use chaic_env::rules::RuleSetName;
+use chaic_env::{Appearance, Track};
 use chaic_episodes::Split;
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::Format;
 use chaic_eval::run::Shard;
 use chaic_protocol::capability::PersonKind;
 use chaic_protocol::{AgentId, TaskId};
-use chaic_vision::sights::LEARNED;
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
 
 pub use self::bench::{
     BenchCommand, BenchFormat, EnvBenchArguments, LookedAt, RenderBenchArguments,
@@ -176,10 +175,10 @@ pub struct EvalArguments {
     /// draws them from a seed (domain randomization). Changes neither depth nor ids.
     #[arg(long, value_name = "LOOK")]
     pub appearance: Option<Appearance>,
-    /// What helpers may know: told (usual), what each is granted; or hidden, no ids, and nothing of what
-    /// the partner does but by pixels: --perception learned --behavior learned, and no helper that is
-    /// told the constraint.
-    #[arg(long, value_enum)]
+    /// Bound on what helpers of all kinds may be granted: told (default), any grants; or hidden, pixels,
+    /// the own body and goal_place only, with --perception learned --behavior learned and no rules that
+    /// disclose hidden state; docs/grants.md.
+    #[arg(long, value_name = "NAME")]
     pub track: Option<Track>,
     /// By what helpers tell what is in their images: gt (usual), ids from ground truth; or learned, the
     /// detector that comes with chaic, or learned:FILE, other weights of it.
@@ -220,28 +219,21 @@ pub struct MergeArguments {
     pub out: PathBuf,
 }
 
-/// What helpers may know.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Track {
-    /// What each is granted.
-    Told,
-    /// No ids, and nothing of what the partner does but by pixels.
-    Hidden,
-}
-
 impl EvalArguments {
     /// By what helpers see, as it was given or as the track has it.
     pub fn perception(&self) -> Option<String> {
-        self.perception.clone().or_else(|| self.learned())
+        self.sight_or(self.perception.clone())
     }
 
     /// By what they recognize what others do, as it was given or as the track has it.
     pub fn behavior(&self) -> Option<String> {
-        self.behavior.clone().or_else(|| self.learned())
+        self.sight_or(self.behavior.clone())
     }
 
-    fn learned(&self) -> Option<String> {
-        (self.track == Some(Track::Hidden)).then(|| LEARNED.to_owned())
+    /// A run that goes on has recorded its own.
+    fn sight_or(&self, given: Option<String>) -> Option<String> {
+        let track = self.track.filter(|_| !self.resume).unwrap_or_default();
+        track.sight_or(given)
     }
 
     /// The names of the helpers that were given.

@@ -53,6 +53,7 @@ fn options() -> RunOptions {
         appearance: None,
         perception: None,
         behavior: None,
+        track: chaic_env::Track::Told,
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use chaic_env::{CHAIC_VERSION, RunKey};
+use chaic_env::{CHAIC_VERSION, RunKey, Track};
 use chaic_files::read_bounded;
 use serde::Serialize;
 
@@ -92,6 +92,8 @@ impl Report<'_> {
             #[serde(skip_serializing_if = "Vec::is_empty")]
             missing: Vec<&'a RunKey>,
             #[serde(skip_serializing_if = "Option::is_none")]
+            track: Option<Track>,
+            #[serde(skip_serializing_if = "Option::is_none")]
             helpers: Option<BTreeMap<String, GrantsFile>>,
             #[serde(skip_serializing_if = "Option::is_none")]
             partner: Option<GrantsFile>,
@@ -118,7 +120,8 @@ impl Report<'_> {
         let (labels, scores) = (self.labels(), self.scores());
         let helpers = labels.helpers_file(&self.options.helpers);
         let partner = labels.partner_file();
-        let file = File { episode_runs, incomplete, missing, helpers, partner, scores };
+        let track = Some(self.options.track).filter(|track| *track != Track::default());
+        let file = File { episode_runs, incomplete, missing, track, helpers, partner, scores };
         serde_json::to_string_pretty(&file).expect("scores have string keys") + "\n"
     }
 
@@ -172,8 +175,11 @@ impl Report<'_> {
 
     /// What was played, by what.
     fn heading(&self) -> String {
-        let RunOptions { split, first, seeds, size, rules, set, partner, partner_is, .. } =
-            self.options;
+        let RunOptions {
+            split, first, seeds, size, rules, set, partner, partner_is, track, ..
+        } = self.options;
+        let track =
+            if *track == Track::default() { String::new() } else { format!(" Track: `{track}`.") };
         let episodes = first.map_or("all".to_owned(), |n| format!("first {n}"));
         let size = size.map_or("as each mind asks for".to_owned(), |px| format!("{px} pixels"));
         let played_by = match set[..] {
@@ -185,7 +191,7 @@ impl Report<'_> {
         let person = partner_is.map_or(String::new(), |k| format!(" The partner is `{k}`."));
         format!(
             "# chaic run\n\nchaic {CHAIC_VERSION}, rules `{played_by}`, formulas `{}`. Split `{split}`, \
-             {episodes} episodes of each task, seeds per episode: {seeds}. Images: {size}.{driven}{person}\n\n",
+             {episodes} episodes of each task, seeds per episode: {seeds}. Images: {size}.{driven}{person}{track}\n\n",
             self.formulas,
         )
     }
@@ -232,6 +238,13 @@ impl Report<'_> {
         }
         if !self.played(&self.plan()).missing().is_empty() {
             let _ = writeln!(text, "{MISSING} Incomplete: episode runs are missing.");
+        }
+        if self.options.track != Track::default() {
+            let _ = writeln!(
+                text,
+                "Track {}, which bounds the grants of all helpers.",
+                self.options.track
+            );
         }
         let _ = writeln!(text, "{} episode runs.", self.results.len());
         text

@@ -7,7 +7,7 @@ use chaic_env::minds::{self, Helpers};
 use chaic_protocol::observation::Grants;
 use serde::{Deserialize, Serialize};
 
-use crate::error::Result;
+use crate::error::{EvalError, Result};
 use crate::run::options::RunOptions;
 
 /// The grants of a run. Every trace has them too; a run without traces is labeled by these.
@@ -31,7 +31,8 @@ impl RunGrants {
     /// What these helpers ask for in a run with these options.
     ///
     /// # Errors
-    /// If the options name a helper or partner that isn't there, or a rule.
+    /// If the options name a helper or partner that isn't there, or a rule; if the track refuses what a
+    /// helper is granted.
     pub fn of(options: &RunOptions, helpers: &dyn Helpers) -> Result<RunGrants> {
         let rules = options.rules()?.planner;
         let (mut by_name, mut perception) = (BTreeMap::new(), BTreeMap::new());
@@ -45,6 +46,27 @@ impl RunGrants {
         }
         let partner = minds::find_partner(helpers, options.partner.as_deref(), None, rules)?;
         let partner = partner.map_or_else(|| partner_grants(rules), |p| p.grants);
-        Ok(RunGrants { helpers: by_name, partner, perception, isolation })
+        let granted = RunGrants { helpers: by_name, partner, perception, isolation };
+        granted.check_track(options)?;
+        Ok(granted)
+    }
+
+    /// Checks that the run's track allows all grants of helpers and how they are confined, the perception and
+    /// the rules.
+    ///
+    /// # Errors
+    /// [`EvalError::Options`] with the first that it refuses.
+    pub fn check_track(&self, options: &RunOptions) -> Result<()> {
+        let RunOptions { track, perception, behavior, .. } = options;
+        let checked = self
+            .helpers
+            .iter()
+            .try_for_each(|(name, grants)| {
+                track.check_grants(name, *grants)?;
+                track.check_isolation(name, self.isolation.get(name).map(String::as_str))
+            })
+            .and_then(|()| track.check_sight(perception.as_deref(), behavior.as_deref()));
+        let rules = options.rules()?;
+        checked.and_then(|()| track.check_rules(&rules)).map_err(EvalError::Options)
     }
 }

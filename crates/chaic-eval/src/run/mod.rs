@@ -29,7 +29,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use chaic_env::RunKey;
-use chaic_env::minds::{self, Helpers, NONE};
+use chaic_env::minds::{Helpers, NONE};
 use chaic_env::trace::Warning;
 use chaic_episodes::Episode;
 
@@ -252,10 +252,7 @@ fn resume(
 }
 
 fn check(options: &RunOptions, helpers: &dyn Helpers) -> Result<()> {
-    let rules = options.rules()?.planner;
-    minds::find_partner(helpers, options.partner.as_deref(), None, rules)?;
-    options.helpers.iter().try_for_each(|name| minds::find(helpers, name, rules).map(|_| ()))?;
-    Ok(())
+    RunGrants::of(options, helpers).map(drop)
 }
 
 /// The names that may stand behind `--helper`.

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use chaic_agents::sight::GROUND_TRUTH;
-use chaic_env::Digest;
 use chaic_env::minds::RULES;
 use chaic_env::rules::{RuleSet, RuleSetName};
+use chaic_env::{Digest, Track};
 use chaic_episodes::Split;
 use chaic_protocol::TaskId;
 use chaic_protocol::capability::PersonKind;
@@ -60,6 +60,15 @@ pub struct RunOptions {
     /// By what helpers tell what others do, as `--behavior` has it; absent for what is granted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub behavior: Option<String>,
+    /// What helpers may be granted; absent for any grants.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub track: Track,
+}
+
+// `skip_serializing_if` hands over a reference.
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_default(track: &Track) -> bool {
+    *track == Track::default()
 }
 
 fn yes() -> bool {
@@ -105,6 +114,8 @@ pub struct RunRequest {
     pub perception: Option<String>,
     /// `--behavior`.
     pub behavior: Option<String>,
+    /// `--track`.
+    pub track: Option<Track>,
 }
 
 /// What `split` says where the episodes are files.
@@ -187,6 +198,7 @@ impl RunRequest {
             appearance: varies.map(|a| a.to_string()),
             perception: self.perception.clone().filter(|name| name != GROUND_TRUTH),
             behavior: self.behavior.clone().filter(|name| name != GROUND_TRUTH),
+            track: self.track.unwrap_or_default(),
         };
         options.rules()?;
         options.appearance()?;
@@ -250,6 +262,7 @@ impl RunRequest {
                 self.behavior.clone(),
                 recorded.behavior.clone().unwrap_or_else(|| GROUND_TRUTH.to_owned()),
             ),
+            ("--track", self.track.map(|t| t.to_string()), recorded.track.to_string()),
             ("--size", self.size.map(|n| n.to_string()), number(recorded.size)),
             (
                 "--no-traces",

@@ -209,6 +209,10 @@ impl Crew<'_> {
         let episode = self.folder.episode(key)?;
         let rules = self.options.rules()?;
         let helper = minds::find_for(self.helpers, key, rules.planner)?;
+        if let Some(helper) = &helper {
+            let checked = self.options.track.check_grants(&key.helper, helper.grants);
+            checked.map_err(EvalError::Options)?;
+        }
         let name = self.options.partner.as_deref();
         let partner = minds::find_partner(self.helpers, name, Some(key), rules.planner)?;
         let config = EpisodeConfig {

@@ -127,19 +127,17 @@ impl ExecArguments {
     /// Confines a command as the options say, and warns of parts of the sandbox that are missing.
     ///
     /// # Errors
-    /// If a path to read is not there, or a part is missing where the sandbox must be complete.
+    /// If a path to read is not there, or the sandbox cannot be started.
     pub fn confine(
         &self,
         command: &mut Command,
         launcher: &Launcher,
         masked: &[PathBuf],
-        must_be_complete: bool,
     ) -> Result<(), Refusal> {
         let options = ConfinementOptions {
             is_trusted: self.exec_trust,
             readable: self.exec_read.clone(),
             masked: masked.to_vec(),
-            must_be_complete,
         };
         let Command { name, line, limits, .. } = &*command;
         let confinement = Confinement::new(launcher, line, limits, &options)?;

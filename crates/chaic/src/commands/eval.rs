@@ -11,12 +11,11 @@ use chaic_eval::report::{Format, Report, write_files};
 use chaic_eval::run::{Access, Run, RunFolder, RunRequest, Shard};
 use chaic_learn::helpers::{NamedPolicy, Policies};
 use chaic_llm::Language;
-use chaic_llm::language::is_told_constraint;
 use chaic_sandbox::Launcher;
 use chaic_subprocess::{Command, Commands};
 
 use super::{bars::RunBars, jobs, llm, sight};
-use crate::arguments::{EvalArguments, ExecArguments, HelperArgument, Track};
+use crate::arguments::{EvalArguments, ExecArguments, HelperArgument};
 use crate::exit::Ended;
 use crate::interrupt;
 use crate::output::{complain, counted, quoted, quoted_path, say};
@@ -27,11 +26,6 @@ const QUICK_EPISODES: u32 = 2;
 /// Plays a benchmark.
 pub fn run(arguments: &EvalArguments, launcher: &Launcher) -> Result<Ended> {
     let (given, name) = given(arguments);
-    if let (Some(Track::Hidden), Some(names)) = (arguments.track, arguments.helper_names())
-        && let Some(name) = names.iter().find(|name| is_told_constraint(name))
-    {
-        bail!("{name} is told the constraint; it has no place in the hidden track");
-    }
     let path = arguments.out.clone().map_or_else(|| free_folder(name), Ok)?;
     let access = if arguments.resume { Access::Resume } else { Access::Begin };
     if arguments.resume {
@@ -110,10 +104,9 @@ pub fn run(arguments: &EvalArguments, launcher: &Launcher) -> Result<Ended> {
 
 /// The helpers in other processes, each in its sandbox. The run's own folder is empty for them.
 fn confined(arguments: &EvalArguments, run: &Path, launcher: &Launcher) -> Result<Vec<Command>> {
-    let must_be_complete = arguments.track == Some(Track::Hidden);
     let mut commands = arguments.commands();
     for command in &mut commands {
-        arguments.exec.confine(command, launcher, &[run.to_owned()], must_be_complete)?;
+        arguments.exec.confine(command, launcher, &[run.to_owned()])?;
     }
     Ok(commands)
 }
@@ -180,6 +173,7 @@ fn given(arguments: &EvalArguments) -> (RunRequest, &'static str) {
         appearance,
         perception: arguments.perception(),
         behavior: arguments.behavior(),
+        track: arguments.track,
     };
     if given == RunRequest::default() && !arguments.resume {
         return (RunRequest { first: Some(QUICK_EPISODES), ..given }, "quick");

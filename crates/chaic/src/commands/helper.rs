@@ -27,7 +27,7 @@ pub fn run(command: &HelperCommand, launcher: &Launcher) -> Result<Ended> {
 fn checked(arguments: &HelperCheckArguments, launcher: &Launcher) -> Result<Ended> {
     let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
     let mut command = arguments.exec.command("exec", &arguments.line);
-    arguments.exec.confine(&mut command, launcher, &[], false)?;
+    arguments.exec.confine(&mut command, launcher, &[])?;
     let command = Arc::new(command);
     let mut printed = Ok(());
     let mut print = |check: &Check| {

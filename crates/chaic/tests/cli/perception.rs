@@ -3,7 +3,7 @@
 
 use std::fs;
 
-use super::{ill, well};
+use super::{chaic, ill, text, well};
 
 /// An episode with small images.
 const EVAL: [&str; 9] =
@@ -136,8 +136,59 @@ fn the_hidden_track_is_pixels_alone_and_replays_show_what_was_seen() {
     let replay = ["replay", "run", "high_goal/test/00", "--every", "900", "--out", "a.gif"];
     well(dir, &[&replay[..], &["--fps", "5", "--masks"]].concat());
     assert!(fs::metadata(dir.join("a.gif")).unwrap().len() > 10_000);
-    let told = ["eval", "--track", "hidden", "--helper", "llm-told", "--out", "told"];
-    assert!(ill(dir, &told).contains("told the constraint"));
+    assert_eq!(scores["track"], "hidden");
+    let report = fs::read_to_string(dir.join("run/report.md")).unwrap();
+    assert!(report.contains("Track: `hidden`."), "{report}");
+    assert!(well(dir, &["report", "run"]).contains("Track hidden"));
+    well(dir, &["verify", "run"]);
+    well(dir, &["eval", "--resume", "--track", "hidden", "--out", "run"]);
+    let error = ill(dir, &["eval", "--resume", "--track", "told", "--out", "run"]);
+    assert!(error.contains("--track"), "{error}");
+    well(dir, &["merge", "--out", "merged", "run"]);
+    let merged = fs::read_to_string(dir.join("merged/run.json")).unwrap();
+    assert!(merged.contains("\"track\": \"hidden\""), "{merged}");
+    // A trace that says of more grants than the track allows.
+    let trace = dir.join("run/traces/high_goal/rhp/test-00-s0.jsonl");
+    let text = fs::read_to_string(&trace).unwrap();
+    let (head, rest) = text.split_once('\n').unwrap();
+    let mut header: serde_json::Value = serde_json::from_str(head).unwrap();
+    header["people"][1]["grants"]["behavior"] = true.into();
+    fs::write(&trace, format!("{header}\n{rest}")).unwrap();
+    let error = ill(dir, &["verify", "run"]);
+    assert!(error.contains("is granted behavior, which the hidden track refuses"), "{error}");
+}
+
+#[test]
+fn the_hidden_track_refuses_by_grant_whatever_helper_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let refused = |arguments: &[&str]| {
+        let play = ["eval", "--track", "hidden", "--out", "run", "--task", "high_goal"];
+        let out = chaic(dir, &[&play[..], arguments].concat());
+        assert_eq!(out.status.code(), Some(2), "{arguments:?}");
+        let error = text(&out.stderr);
+        assert_eq!(error.lines().count(), 1, "{error}");
+        assert!(!dir.join("run/run.json").exists());
+        error
+    };
+    for grant in ["ids", "goal", "progress", "behavior", "positions", "task"] {
+        let error = refused(&["--helper", "mine=exec:true", "--exec-grants", grant]);
+        let said = format!("`mine` is granted {grant}, which the hidden track refuses");
+        assert!(error.contains(&said), "{error}");
+    }
+    let error = refused(&["--helper", "none,rhp,oracle"]);
+    assert!(error.contains("`oracle` is granted goal, progress, behavior"), "{error}");
+    let endpoint = ["--endpoint", "http://127.0.0.1:9/v1", "--model", "none", "--llm-key-env", ""];
+    let error = refused(&[&["--helper", "llm-told"], &endpoint[..]].concat());
+    assert!(error.contains("`llm-told` is granted task"), "{error}");
+    for sight in [["--perception", "gt"], ["--behavior", "gt"]] {
+        let error = refused(&[&["--helper", "mine=exec:true"], &sight[..]].concat());
+        assert!(error.contains("hidden track needs"), "{error}");
+    }
+    let error = refused(&["--helper", "mine=exec:true", "--rules", "compat"]);
+    assert!(error.contains("--set world.joint_lift=paper"), "{error}");
+    let error = refused(&["--helper", "rhp", "--set", "planner.knows_holding=true"]);
+    assert!(error.contains("planner.knows_holding"), "{error}");
 }
 
 #[test]

@@ -232,6 +232,20 @@ mod tests {
     }
 
     #[test]
+    fn the_hidden_track_needs_the_whole_sandbox_or_trust() {
+        let partial = Some("sandbox without landlock");
+        assert_eq!(Track::Told.check_isolation("mine", partial), Ok(()));
+        for whole in [None, Some("sandbox"), Some("trusted")] {
+            assert_eq!(Track::Hidden.check_isolation("mine", whole), Ok(()));
+        }
+        let refused = Track::Hidden.check_isolation("mine", partial).unwrap_err();
+        assert!(
+            refused.contains("without landlock") && refused.contains("--exec-trust"),
+            "{refused}"
+        );
+    }
+
+    #[test]
     fn a_track_is_read_as_it_is_written() {
         for track in Track::ALL {
             assert_eq!(track.to_string().parse(), Ok(track));

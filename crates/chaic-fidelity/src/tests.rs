@@ -148,8 +148,12 @@ fn states(plan: &Experiment) -> Vec<PartState> {
         let planned = results.iter().map(|r| r.key.clone()).collect();
         let helpers = [("rhp", Grants::IDS), ("oracle", Grants::ORACLE)];
         let helpers = helpers.map(|(name, grants)| (name.to_owned(), grants)).into();
-        let granted =
-            Some(RunGrants { helpers, partner: Grants::PARTNER, perception: Default::default() });
+        let granted = Some(RunGrants {
+            helpers,
+            partner: Grants::PARTNER,
+            perception: Default::default(),
+            isolation: Default::default(),
+        });
         PartState { part, planned, results, environments: Environments::default(), granted }
     };
     plan.parts().into_iter().map(state).collect()

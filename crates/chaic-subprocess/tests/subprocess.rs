@@ -18,7 +18,7 @@ use chaic_protocol::{Action, Agent, AgentError, AgentId, Briefing, TaskId};
 use chaic_subprocess::conformance::check;
 use chaic_subprocess::frame::Frame;
 use chaic_subprocess::serve::serve;
-use chaic_subprocess::{Command, Commands, Limits, SubprocessAgent};
+use chaic_subprocess::{Command, Commands, Limits, Pool, SubprocessAgent};
 
 fn never() -> &'static AtomicBool {
     static NEVER: AtomicBool = AtomicBool::new(false);
@@ -384,4 +384,73 @@ fn the_python_helper_delivers_something() {
         n_delivered += things.filter(|t| t.delivered_by == Some(AgentId::HELPER)).count();
     }
     assert!(n_delivered > 0, "nothing in six episodes");
+}
+
+/// Open descriptors and threads of this process.
+#[cfg(target_os = "linux")]
+fn held() -> (usize, usize) {
+    let count = |folder: &str| std::fs::read_dir(folder).expect("it is there").count();
+    (count("/proc/self/fd"), count("/proc/self/task"))
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_detached_grandchild_holds_nothing_of_ours() {
+    let mark = "43210.75";
+    let line = speaks_then("say({'type': 'act', 'action': 'turn_left'})");
+    // It keeps the pipes open after its episode.
+    let line = format!("setsid sleep {mark} & {line}");
+    let episodes = || {
+        for _ in 0..4 {
+            let mut mind = SubprocessAgent::new(Arc::new(command(&line)), never());
+            mind.reset(&briefing(TaskId::NoConstraint));
+        }
+        // The threads look every 50 ms whether their pipe is given up.
+        std::thread::sleep(Duration::from_millis(500));
+    };
+    episodes();
+    let before = held();
+    (0..3).for_each(|_| episodes());
+    let after = held();
+    let _ = Shell::new("pkill").args(["-f", &format!("sleep {mark}")]).status();
+    // Other tests of this process start and end meanwhile; twelve leaks would be 24 of each.
+    assert!(after.0 < before.0 + 20 && after.1 < before.1 + 20, "{before:?}, then {after:?}");
+}
+
+#[test]
+fn a_pooled_process_serves_several_episodes_and_a_failed_one_is_replaced() {
+    let pool = Arc::new(Pool::default());
+    let dir = tempfile::tempdir().unwrap();
+    let log = dir.path().join("starts");
+    let line = format!("echo start >> '{}'; {}", log.display(), python_helper());
+    let starts = || std::fs::read_to_string(&log).unwrap().lines().count();
+    let mut play = |line: &str| {
+        let command = Arc::new(command(line));
+        let mind = SubprocessAgent::pooled(command, Arc::clone(&pool), never());
+        let helper = Some(Helper { mind: Box::new(mind), grants: Grants::PLANNER });
+        let episode = find_episode("no_constraint/train/01").unwrap();
+        let mut env = Env::new(config(&episode), helper).unwrap();
+        let mut records = Vec::new();
+        let mut sink = |record: &chaic_env::trace::Record| {
+            records.push(record.to_line());
+            Ok::<(), AgentError>(())
+        };
+        let flow = env.run(never(), Some(200), &mut sink);
+        (flow, records)
+    };
+    let first = play(&line);
+    let second = play(&line);
+    assert_eq!(first, second, "it begins anew");
+    assert_eq!(starts(), 1);
+    // A process that breaks down does not come back.
+    let pool_of_broken = Arc::new(Pool::default());
+    for _ in 0..2 {
+        let broken = format!("echo start >> '{}'; {}", log.display(), speaks_then("sys.exit(0)"));
+        let command = Arc::new(command(&broken));
+        let mind = SubprocessAgent::pooled(command, Arc::clone(&pool_of_broken), never());
+        let helper = Some(Helper { mind: Box::new(mind), grants: Grants::PLANNER });
+        let episode = find_episode("no_constraint/train/01").unwrap();
+        assert!(Env::new(config(&episode), helper).unwrap().advance(Some(100)).is_err());
+    }
+    assert!(starts() >= 3, "{}", starts());
 }

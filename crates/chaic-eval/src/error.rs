@@ -36,6 +36,15 @@ pub enum EvalError {
         /// The folder.
         path: PathBuf,
     },
+    /// A merge was interrupted before it was complete.
+    #[error(
+        "{path} holds an interrupted merge; run the same `chaic merge` again, or choose another --out",
+        path = path.display()
+    )]
+    StoppedMerge {
+        /// The folder.
+        path: PathBuf,
+    },
     /// `run.json` is not what the run wrote.
     #[error(
         "{path} was changed after the run began: its options don't fit their digest; undo the \
@@ -111,6 +120,18 @@ pub enum EvalError {
         wanted: String,
         /// What there is instead.
         known: String,
+    },
+    /// A finished episode run has no trace.
+    #[error(
+        "{path} has no trace of {episode} with {helper} and seed {seed}, which is finished; play it again \
+         by chaic eval --resume --out {path}",
+        path = path.display(), episode = key.episode, helper = key.helper, seed = key.seed
+    )]
+    Untraced {
+        /// The run's folder.
+        path: PathBuf,
+        /// The episode run.
+        key: RunKey,
     },
     /// A run was told to keep no traces.
     #[error(

@@ -5,18 +5,43 @@ use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use chaic_env::trace::{Header, MAX_TRACE_BYTES, Record, Trace, Warning, parse};
-use chaic_files::read_bounded;
+use chaic_files::{create_fresh, make_folders_below, read_below, read_bounded};
 
 use crate::error::{EvalError, Result};
 
 /// Reads a trace up to its last whole record, and says so where that isn't all.
 ///
 /// # Errors
-/// If the file can't be read at all, has no whole header, or is of another format or version.
+/// If the file is a link or no regular file, can't be read at all, has no whole header, or is of another
+/// format or version.
 pub fn read(path: &Path) -> Result<(Trace, Vec<Warning>)> {
     // One byte more than the limit tells a file at the limit from a longer one.
     let bytes = read_bounded(path, MAX_TRACE_BYTES + 1)?;
     Ok(parse(&bytes, path)?)
+}
+
+/// Returns the bytes of a trace below the folder of its run, to be [parsed](parse).
+///
+/// # Errors
+/// If the file can't be read, is no regular file, or is reached through a link inside the run.
+pub(crate) fn bytes(run: &Path, path: &Path) -> Result<Vec<u8>> {
+    Ok(read_below(run, path, MAX_TRACE_BYTES + 1)?)
+}
+
+/// Compares a file with the output of [`Writer`] for the trace that was parsed from it. Returns the number of
+/// the first line that differs, from 1; `None` if all bytes are equal.
+pub(crate) fn first_foreign_line(trace: &Trace, bytes: &[u8]) -> Option<usize> {
+    let mut lines = bytes.split_inclusive(|b| *b == b'\n');
+    let header = std::iter::once(trace.header.to_line());
+    let written = header.chain(trace.records.iter().map(Record::to_line));
+    let mut n = 0;
+    for line in written {
+        n += 1;
+        if lines.next().and_then(|l| l.strip_suffix(b"\n")) != Some(line.as_bytes()) {
+            return Some(n);
+        }
+    }
+    lines.next().map(|_| n + 1)
 }
 
 /// Appends records to a trace file.
@@ -28,16 +53,15 @@ pub struct Writer {
 }
 
 impl Writer {
-    /// Begins the trace at `path`; folders are made as needed, an older partial trace is replaced.
+    /// Begins the trace at `path` below the folder `run`. Creates missing folders, and replaces an older
+    /// partial trace.
     ///
     /// # Errors
-    /// If the file system refuses.
-    pub fn create(path: &Path, header: &Header) -> Result<Writer> {
-        if let Some(folder) = path.parent() {
-            fs::create_dir_all(folder).map_err(EvalError::io("make the folder", folder))?;
-        }
+    /// If a folder between `run` and the trace is a link, or the file system refuses.
+    pub fn create(run: &Path, path: &Path, header: &Header) -> Result<Writer> {
+        make_folders_below(run, path.parent().unwrap_or(run))?;
         let partial = partial_path(path);
-        let file = File::create(&partial).map_err(EvalError::io("create", &partial))?;
+        let file = create_fresh(&partial).map_err(EvalError::io("create", &partial))?;
         let mut writer = Writer { file: BufWriter::new(file), partial, path: path.to_owned() };
         writer.line(&header.to_line())?;
         Ok(writer)
@@ -104,7 +128,7 @@ mod tests {
         let header = header_of(config, None).unwrap();
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a/b/t.jsonl");
-        let writer = Writer::create(&path, &header).unwrap();
+        let writer = Writer::create(dir.path(), &path, &header).unwrap();
         assert!(!path.exists());
         writer.finish().unwrap();
         let (trace, warnings) = read(&path).unwrap();

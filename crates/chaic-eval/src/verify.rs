@@ -1,10 +1,12 @@
 //! Playing a trace's actions again, to see whether they lead where the trace says.
 
 mod coverage;
+mod folder_check;
 
 pub use coverage::{Coverage, ReportState};
+pub use folder_check::Finding;
 
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -12,7 +14,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use chaic_env::minds::{self, BuiltIn, Helpers};
 use chaic_env::rules::RuleSet;
-use chaic_env::trace::{Decision, Header, Record, Trace, Warning};
+use chaic_env::trace::{Decision, Header, Record, Trace, Warning, parse};
 use chaic_env::{Choice, EnvError, EpisodeConfig, Minds, RunKey, header_of, run_loop, world_of};
 use chaic_protocol::agent::ChildState;
 use chaic_protocol::observation::Grants;
@@ -21,8 +23,10 @@ use chaic_world::World;
 
 use crate::error::{EvalError, Result};
 use crate::metrics::{Ending, RunResult, tally};
-use crate::run::{RunFolder, RunGrants, RunOptions, planned, read_results};
+use crate::run::{RunFolder, RunGrants, RunOptions, planned, read_journal};
 use crate::trace_file;
+
+use folder_check::FolderCheck;
 
 /// The first place where a trace and its re-simulation differ.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,6 +60,8 @@ pub struct Verdict {
     pub decisions: usize,
     /// The first difference of each trace that doesn't, by path.
     pub mismatches: Vec<Mismatch>,
+    /// Other problems in the run's folder.
+    pub findings: Vec<Finding>,
     /// Files that could only be read in part.
     pub warnings: Vec<Warning>,
     /// How many episode runs have results.
@@ -65,18 +71,21 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Whether the run is whole, and all that it says is so.
+    /// Returns whether the run is complete, and every check was made and passed.
     pub fn is_good(&self) -> bool {
-        let is_altered =
-            matches!(&self.report, ReportState::Compared { altered } if !altered.is_empty());
-        self.mismatches.is_empty() && self.coverage.is_whole() && !is_altered
+        self.mismatches.is_empty()
+            && self.findings.is_empty()
+            && self.warnings.is_empty()
+            && self.coverage.is_whole()
+            && self.report.is_good()
     }
 }
 
 /// Re-simulates every trace of a run on `jobs` threads, and compares all that is recorded: who
 /// took part by which rules, digests at each decision, events, the end, and the line of
-/// `results.jsonl`. A trace that can't be checked counts as one that differs. Then it counts the
-/// results, and compares the report with what they give.
+/// `results.jsonl`. A trace that can't be checked counts as one that differs. Every finished result needs a
+/// trace and every trace a finished result. Other entries among the traces are findings: links, special
+/// files, unfinished and unplanned traces. Then it counts the results, and compares the report with them.
 ///
 /// `options` are the run's, `helpers` those that played; what a helper asked for isn't checked
 /// if its name is unknown.
@@ -94,23 +103,40 @@ pub fn verify_run(
     if !options.traces {
         return Err(EvalError::NoTraces { path: folder.path().to_owned() });
     }
-    let paths = folder.traces()?;
     // Where its episodes are gone, every trace says so.
-    let planned = planned(folder, options).unwrap_or_default();
-    let (results, warnings) = read_results(&folder.results(), &planned)?;
+    let plan = planned(folder, options);
+    let gone = plan.as_ref().err().map(|e| format!("the run's episodes can't be read: {e}"));
+    let planned = plan.unwrap_or_default();
+    let journal = read_journal(&folder.results(), &planned)?;
+    let results = journal.results;
     let keys: Vec<RunKey> = planned.iter().map(|item| item.key.clone()).collect();
-    let rules = options.rules()?;
+    let found = FolderCheck { folder, options, planned: &keys, results: &results }
+        .run(&journal.repeated)?;
+    let paths = found.traces;
     let granted = folder.granted()?;
     let refused = granted.as_ref().and_then(|granted| granted.check_track(options).err());
-    let check =
-        Check { folder, options, rules, granted, helpers, planned: &keys, results: &results };
+    let check = Check {
+        rules: options.rules()?,
+        granted,
+        chaic: folder.version()?,
+        planned: keys.iter().collect(),
+        finished: finished(&results),
+        has_measures: results.iter().any(has_measures),
+        folder,
+        options,
+        helpers,
+    };
     let checked = check.files(&paths, jobs, progress)?;
     let mut verdict = Verdict {
-        warnings,
+        findings: found.findings,
+        mismatches: found.missing,
+        warnings: journal.warnings,
         coverage: Coverage::of(&planned, &results),
         report: ReportState::of(folder, options, &planned, &results)?,
         ..Verdict::default()
     };
+    let unreadable = gone.map(|problem| Finding { path: folder.episode_files(), problem });
+    verdict.findings.extend(unreadable);
     for (path, one) in paths.iter().zip(checked) {
         verdict.add(match one {
             Ok(one) => one,
@@ -119,7 +145,7 @@ pub fn verify_run(
             Err(error) => One::unreadable(path, &error),
         });
     }
-    verdict.add_missing(folder, &results);
+    verdict.compare_counts(folder, check.finished.len());
     verdict.mismatches.extend(refused.map(|problem| Mismatch {
         path: folder.join("run.json"),
         frame: 0,
@@ -142,10 +168,28 @@ pub fn verify_trace(
     trace: &Trace,
     path: &Path,
 ) -> Result<Option<Mismatch>> {
-    let rules = options.rules()?;
-    let granted = folder.granted()?;
-    Check { folder, options, rules, granted, helpers, planned: &[], results: &[] }
-        .trace(trace, path)
+    let check = Check {
+        folder,
+        options,
+        rules: options.rules()?,
+        granted: folder.granted()?,
+        chaic: folder.version()?,
+        helpers,
+        planned: BTreeSet::new(),
+        finished: BTreeMap::new(),
+        has_measures: false,
+    };
+    check.trace(trace, path)
+}
+
+/// Returns the results of episode runs that were played to their end.
+fn finished(results: &[RunResult]) -> BTreeMap<&RunKey, &RunResult> {
+    results.iter().filter(|r| r.summary().is_some()).map(|r| (&r.key, r)).collect()
+}
+
+/// Returns whether a result has further measures, which older versions did not write.
+fn has_measures(result: &RunResult) -> bool {
+    result.summary().is_some_and(|s| !s.measures.is_empty())
 }
 
 /// What verifying one trace found.
@@ -163,14 +207,13 @@ impl Verdict {
         self.warnings.extend(one.warnings);
     }
 
-    /// A result without its trace can't be checked, which is no agreement.
-    fn add_missing(&mut self, folder: &RunFolder, results: &[RunResult]) {
-        for result in results.iter().filter(|r| r.summary().is_some()) {
-            let path = folder.trace(&result.key);
-            if !path.exists() {
-                let problem = "results.jsonl has this run, but its trace is missing".to_owned();
-                self.mismatches.push(Mismatch { path, frame: 0, agent: None, problem });
-            }
+    /// Adds a finding if the number of verified traces differs from the number of finished results and no
+    /// other check explains it.
+    fn compare_counts(&mut self, folder: &RunFolder, n_finished: usize) {
+        let n = self.agreeing;
+        if self.mismatches.is_empty() && self.findings.is_empty() && n != n_finished {
+            let problem = format!("{n_finished} results are finished, but {n} traces agree");
+            self.findings.push(Finding { path: folder.results(), problem });
         }
     }
 }
@@ -191,9 +234,14 @@ struct Check<'a> {
     /// What `run.json` says of grants.
     granted: Option<RunGrants>,
     helpers: &'a dyn Helpers,
+    /// Version of chaic in `run.json`.
+    chaic: Option<String>,
     /// All that the run plays; empty where nobody knows.
-    planned: &'a [RunKey],
-    results: &'a [RunResult],
+    planned: BTreeSet<&'a RunKey>,
+    /// Results of episode runs that were played to their end.
+    finished: BTreeMap<&'a RunKey, &'a RunResult>,
+    /// True if any result has further measures.
+    has_measures: bool,
 }
 
 impl Check<'_> {
@@ -231,20 +279,46 @@ impl Check<'_> {
     }
 
     fn file(&self, path: &Path) -> Result<One> {
-        let (trace, warnings) = trace_file::read(path)?;
+        let bytes = trace_file::bytes(self.folder.path(), path)?;
+        let (trace, warnings) = parse(&bytes, path)?;
         let mut mismatch = self.trace(&trace, path)?;
         if mismatch.is_none() {
-            let key = trace.header.key();
-            let mut recorded = self.results.iter().filter(|r| r.summary().is_some());
-            let recorded = recorded.find(|r| r.key == key).map(without_counts);
-            let found = tally(&trace).map(|found| as_known_to(recorded.as_ref(), found));
-            if recorded.is_some() && recorded != found {
-                let frame = trace.end().map_or(0, |e| e.frame);
-                let problem = "results.jsonl says something else of this run".to_owned();
-                mismatch = Some(Mismatch { path: path.to_owned(), frame, agent: None, problem });
-            }
+            let problem = foreign_line(&trace, &bytes).or_else(|| self.result_problem(&trace));
+            let frame = trace.end().map_or(0, |e| e.frame);
+            let at_end = |problem| Mismatch { path: path.to_owned(), frame, agent: None, problem };
+            mismatch = problem.map(at_end);
         }
         Ok(One { decisions: trace.decisions().count(), mismatch, warnings })
+    }
+
+    /// Compares the result in `results.jsonl` with the one that a trace gives; returns the problem.
+    fn result_problem(&self, trace: &Trace) -> Option<String> {
+        let Some(recorded) = self.finished.get(&trace.header.key()) else {
+            return Some("results.jsonl has no finished result of this run".to_owned());
+        };
+        let found = tally(trace).map(|found| match self.has_measures {
+            true => found,
+            false => without_measures(found),
+        });
+        if found.as_ref() != Some(&without_counts(recorded)) {
+            return Some("results.jsonl says something else of this run".to_owned());
+        }
+        let name = self.counts_of_mute_mind(recorded)?;
+        Some(format!("results.jsonl has the count {name}, but a built-in mind counts nothing"))
+    }
+
+    /// Returns the name of the first count that is attributed to a built-in mind. Built-in minds count
+    /// nothing, and traces hold no counts to compare with.
+    fn counts_of_mute_mind<'r>(&self, recorded: &'r RunResult) -> Option<&'r String> {
+        let is_mute = |name: &str| match name.split('.').next() {
+            Some("helper") => {
+                minds::find(&BuiltIn, &recorded.key.helper, self.rules.planner).is_ok()
+            }
+            Some("partner") => self.options.partner.is_none(),
+            _ => true,
+        };
+        let mut counts = recorded.summary().into_iter().flat_map(|s| s.counts.keys());
+        counts.find(|name| is_mute(name))
     }
 
     fn trace(&self, trace: &Trace, path: &Path) -> Result<Option<Mismatch>> {
@@ -252,7 +326,8 @@ impl Check<'_> {
             let path = path.to_owned();
             return Ok(Some(Mismatch { path, frame: 0, agent: None, problem }));
         }
-        let mut world = world_of(&trace.header, &self.folder.episode(&trace.header.key())?)?;
+        let mut world =
+            world_of(&trace.header, &self.folder.episode(self.options, &trace.header.key())?)?;
         verify(trace, &mut world, path)
     }
 
@@ -266,6 +341,14 @@ impl Check<'_> {
         }
     }
 
+    /// Compares the helper's perception in a trace with the one in `run.json`; returns the problem.
+    fn perception_problem(&self, header: &Header) -> Option<String> {
+        let granted = self.granted.as_ref()?;
+        let helper = header.people.iter().find(|p| p.agent == AgentId::HELPER)?;
+        let is_same = granted.perception.get(&header.helper) == helper.perception.as_ref();
+        (!is_same).then(|| "run.json names another perception of the helper".to_owned())
+    }
+
     /// What the first line of a trace says that isn't so.
     fn header_problem(&self, header: &Header, path: &Path) -> Result<Option<String>> {
         let key = header.key();
@@ -275,7 +358,10 @@ impl Check<'_> {
         if !self.planned.is_empty() && !self.planned.contains(&key) {
             return Ok(Some("this run doesn't play that episode run".to_owned()));
         }
-        let episode = self.folder.episode(&key)?;
+        if self.chaic.as_ref().is_some_and(|chaic| *chaic != header.chaic) {
+            return Ok(Some("run.json names another version of chaic".to_owned()));
+        }
+        let episode = self.folder.episode(self.options, &key)?;
         let rules = self.rules.planner;
         let helper = minds::find(self.helpers, &key.helper, rules).ok();
         let name = self.options.partner.as_deref();
@@ -296,30 +382,10 @@ impl Check<'_> {
             None => minds::find(&BuiltIn, "random", rules)?,
         };
         let mut expected = header_of(config, Minds::of(helper, partner.ok().flatten()))?;
-        for (expected, said) in expected.people.iter_mut().zip(&header.people) {
-            let recorded = self.recorded_grants(expected.agent, &key.helper);
-            if expected.perception.is_some() == said.perception.is_some() {
-                // Weights may have changed since.
-                expected.perception.clone_from(&said.perception);
-            }
-            if is_unknown.get(expected.agent.index()).is_some_and(|unknown| *unknown) {
-                expected.grants = recorded.unwrap_or(said.grants);
-                expected.senses = said.senses;
-                expected.perception.clone_from(&said.perception);
-                if expected.agent == AgentId::HELPER {
-                    // What the machine of the run enforced stands in run.json.
-                    let granted = self.granted.as_ref();
-                    expected.isolation =
-                        granted.and_then(|g| g.isolation.get(&key.helper)).cloned();
-                }
-            } else if recorded.is_some_and(|grants| grants != expected.grants) {
-                let problem = format!("run.json says that the {} is granted", expected.agent);
-                return Ok(Some(problem + " something else than such a mind is"));
-            }
+        if let Some(problem) = self.grants_problem(&mut expected, header, is_unknown) {
+            return Ok(Some(problem));
         }
-        let helper = header.people.iter().find(|person| person.agent == AgentId::HELPER);
-        let grants = helper.map_or(Grants::NONE, |helper| helper.grants);
-        if let Err(problem) = self.options.track.check_grants(&key.helper, grants) {
+        if let Some(problem) = self.perception_problem(header) {
             return Ok(Some(problem));
         }
         let expected = Header { chaic: header.chaic.clone(), ..expected };
@@ -336,18 +402,59 @@ impl Check<'_> {
         let problem = || format!("the first line is not what this run has: {}", wrong.join(", "));
         Ok((!wrong.is_empty()).then(problem))
     }
+
+    /// Returns what the people of a header are granted that `run.json` or the track does not allow. Copies to
+    /// the expected header what only the author of an unknown mind knows.
+    fn grants_problem(
+        &self,
+        expected: &mut Header,
+        header: &Header,
+        is_unknown: [bool; 2],
+    ) -> Option<String> {
+        for (expected, said) in expected.people.iter_mut().zip(&header.people) {
+            let recorded = self.recorded_grants(expected.agent, &header.helper);
+            if expected.perception.is_some() == said.perception.is_some() {
+                // Weights may have changed since.
+                expected.perception.clone_from(&said.perception);
+            }
+            if is_unknown.get(expected.agent.index()).is_some_and(|unknown| *unknown) {
+                expected.grants = recorded.unwrap_or(said.grants);
+                expected.senses = said.senses;
+                expected.perception.clone_from(&said.perception);
+                if expected.agent == AgentId::HELPER {
+                    // What the machine of the run enforced stands in run.json.
+                    let granted = self.granted.as_ref();
+                    expected.isolation =
+                        granted.and_then(|g| g.isolation.get(&header.helper)).cloned();
+                }
+            } else if recorded.is_some_and(|grants| grants != expected.grants) {
+                let problem = format!("run.json says that the {} is granted", expected.agent);
+                return Some(problem + " something else than such a mind is");
+            }
+        }
+        let helper = header.people.iter().find(|person| person.agent == AgentId::HELPER);
+        let grants = helper.map_or(Grants::NONE, |helper| helper.grants);
+        self.options.track.check_grants(&header.helper, grants).err()
+    }
 }
 
 fn numbered(paths: &[PathBuf], k: usize) -> Option<(usize, &PathBuf)> {
     paths.get(k).map(|path| (k, path))
 }
 
-/// A result as the version that recorded another could tell it: older ones had no measures.
-fn as_known_to(recorded: Option<&RunResult>, mut found: RunResult) -> RunResult {
-    let has_none = recorded.and_then(RunResult::summary).is_some_and(|s| s.measures.is_empty());
-    if let Ending::Done(summary) = &mut found.ending
-        && has_none
-    {
+/// Returns a problem if a trace has other bytes than chaic writes for its records.
+fn foreign_line(trace: &Trace, bytes: &[u8]) -> Option<String> {
+    let line = trace_file::first_foreign_line(trace, bytes)?;
+    Some(if line > trace.records.len() + 1 && trace.end().is_some() {
+        format!("line {line} follows the end of the trace")
+    } else {
+        format!("line {line} differs from the form that chaic writes")
+    })
+}
+
+/// Removes the further measures, which older versions of chaic did not write.
+fn without_measures(mut found: RunResult) -> RunResult {
+    if let Ending::Done(summary) = &mut found.ending {
         summary.measures.clear();
     }
     found

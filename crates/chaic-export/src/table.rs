@@ -1,9 +1,9 @@
 //! Tables as Parquet files.
 
-use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
+use chaic_files::create_fresh;
 use parquet::basic::{Compression, ConvertedType, LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{BoolType, ByteArray, ByteArrayType, FloatType, Int64Type};
 use parquet::errors::{ParquetError, Result};
@@ -122,7 +122,7 @@ pub fn write(path: &Path, columns: &[(&str, Column)], entries: &[(&str, String)]
         .set_created_by("chaic".to_owned())
         .set_key_value_metadata(Some(entries))
         .build();
-    let file = File::create(path).map_err(|e| ParquetError::External(Box::new(e)))?;
+    let file = create_fresh(path).map_err(|e| ParquetError::External(Box::new(e)))?;
     let mut writer = SerializedFileWriter::new(file, schema, Arc::new(properties))?;
     let mut group = writer.next_row_group()?;
     for (_, column) in columns {

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use chaic_env::CHAIC_VERSION;
-use chaic_files::write_whole;
+use chaic_files::{read_user_file, write_whole};
 use chaic_protocol::TaskId;
 
 use crate::experiment::Experiment;
@@ -18,6 +18,9 @@ use chaic_eval::metrics::{Ending, Played, Scores};
 use chaic_eval::published::published;
 use chaic_eval::report::{coverage, shown_interval};
 use chaic_eval::{EvalError, Result};
+
+/// Longest document that is read, bytes: a hundred times a usual one.
+const MAX_DOCUMENT_BYTES: u64 = 16 << 20;
 
 /// Before what is written by hand.
 pub const CAUSES_BEGIN: &str =
@@ -101,7 +104,8 @@ fn causes_of(path: &Path) -> Result<String> {
     if !path.exists() {
         return Ok("\n".to_owned());
     }
-    let text = fs::read_to_string(path).map_err(EvalError::io("read", path))?;
+    let bytes = read_user_file(path, MAX_DOCUMENT_BYTES)?;
+    let text = String::from_utf8_lossy(&bytes);
     let after = text.split_once(CAUSES_BEGIN).map(|(_, after)| after);
     let between = after.and_then(|a| a.split_once(CAUSES_END)).map(|(between, _)| between);
     between.map(|b| b.strip_prefix('\n').unwrap_or(b).to_owned()).ok_or_else(|| {

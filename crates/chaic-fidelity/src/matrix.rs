@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use chaic_env::minds::Helpers;
 use chaic_env::{CHAIC_VERSION, EnvError, RunKey};
-use chaic_files::{UNFINISHED, write_whole};
+use chaic_files::{EntryKind, UNFINISHED, kind, read_bounded, write_whole};
 use chaic_protocol::{Frame, TaskId};
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +20,8 @@ use chaic_eval::{EvalError, Result};
 const FORMAT: &str = "chaic-fidelity";
 const VERSION: u32 = 1;
 const FILE: &str = "fidelity.json";
+/// Longest plan that is read, bytes: a thousand times a usual one.
+const MAX_FILE_BYTES: u64 = 1 << 20;
 
 /// All runs below one folder.
 #[derive(Clone, Debug)]
@@ -127,7 +129,7 @@ impl Matrix {
     /// the user names.
     fn episodes(&self) -> Result<PathBuf> {
         let mut runs = self.plan.parts().into_iter().map(|p| self.folder(&p));
-        let copies = runs.find(|run| run.join("run.json").exists()).map(|r| r.join("episodes"));
+        let copies = runs.find(|run| RunFolder::is_run(run)).map(|r| r.join("episodes"));
         copies.or_else(|| self.episodes.clone()).ok_or_else(|| {
             let text = "no run has begun yet; give the folder with episode files by --episodes";
             EvalError::Options(text.to_owned())
@@ -144,12 +146,12 @@ impl Matrix {
 
 fn read(path: &Path) -> Result<Experiment> {
     let file = path.join(FILE);
-    if !file.exists() {
+    if kind(&file)? == EntryKind::Missing {
         let (path, text) = (path.display(), "give the folder that `chaic fidelity --out` wrote");
         return Err(EvalError::Options(format!("{path} has no {FILE}; {text}")));
     }
-    let text = std::fs::read_to_string(&file).map_err(EvalError::io("read", &file))?;
-    let read: PlanFile = serde_json::from_str(&text).map_err(|e| EnvError::Unreadable {
+    let bytes = read_bounded(&file, MAX_FILE_BYTES)?;
+    let read: PlanFile = serde_json::from_slice(&bytes).map_err(|e| EnvError::Unreadable {
         path: file.clone(),
         line: e.line(),
         problem: e.to_string(),
@@ -171,7 +173,7 @@ fn read(path: &Path) -> Result<Experiment> {
 /// If no run has begun, or one can't be read.
 pub fn parts(matrix: &Matrix) -> Result<Vec<PartState>> {
     let parts = matrix.plan.parts();
-    let begun = |part: &Part| matrix.folder(part).join("run.json").exists();
+    let begun = |part: &Part| RunFolder::is_run(&matrix.folder(part));
     let Some(first) = parts.iter().find(|p| begun(p)) else {
         let text = format!("{} has no run yet; begin them first", matrix.path.display());
         return Err(EvalError::Options(text));

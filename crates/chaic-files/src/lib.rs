@@ -1,10 +1,22 @@
 //! Files that are whole or absent, and reads that never wait for a writer.
 //!
 //! **What it is not**: it knows nothing of what is in the files.
+//!
+//! **Invariant**: only regular files are read, and each read has a limit. Links are followed only in paths
+//! that a user named, never inside a folder of chaic, for reading as for writing.
+
+mod kind;
+mod open;
+
+pub use kind::{Entry, EntryKind, is_file_below, kind, kind_below, walk};
+pub use open::{
+    create_fresh, make_folders_below, open_file, open_or_create, open_to_append, read_below,
+    read_bounded, read_user_file,
+};
 
 use std::ffi::OsString;
-use std::fs::{self, File};
-use std::io::{self, Read as _, Write as _};
+use std::fs;
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 /// The operating system refused something.
@@ -33,14 +45,15 @@ pub type Result<T> = std::result::Result<T, FileError>;
 /// What [`write_whole`] appends to the name of a file that is not whole yet.
 pub const UNFINISHED: &str = ".tmp";
 
-/// Writes a file as a whole or not at all: to a name beside it, which then becomes its own.
+/// Writes a file as a whole or not at all: to a name beside it, which then becomes its own. A link of either
+/// name is replaced, not followed.
 ///
 /// # Errors
 /// If the file system refuses; nothing new is left then, as far as it can be removed.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     let beside = with_suffix(path, UNFINISHED);
     let write = || -> io::Result<()> {
-        let mut file = File::create(&beside)?;
+        let mut file = create_fresh(&beside)?;
         file.write_all(bytes)?;
         file.sync_all()?;
         fs::rename(&beside, path)
@@ -50,23 +63,6 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
         let _ = fs::remove_file(&beside);
         FileError::of("write", path)(refusal)
     })
-}
-
-/// At most the first `limit` bytes of a regular file. Whoever opens a pipe waits for its writer, so
-/// nothing but a regular file is opened.
-///
-/// # Errors
-/// If it is no regular file, or the file system refuses.
-pub fn read_bounded(path: &Path, limit: u64) -> Result<Vec<u8>> {
-    let kind = fs::metadata(path).map_err(FileError::of("open", path))?.file_type();
-    if !kind.is_file() {
-        let what = if kind.is_dir() { "it is a folder" } else { "it is no regular file" };
-        return Err(FileError::of("read", path)(io::Error::other(what)));
-    }
-    let mut bytes = Vec::new();
-    let file = File::open(path).map_err(FileError::of("open", path))?;
-    file.take(limit).read_to_end(&mut bytes).map_err(FileError::of("read", path))?;
-    Ok(bytes)
 }
 
 /// What lies in a folder, in the order of names.
@@ -104,20 +100,5 @@ mod tests {
         let error = write_whole(&taken, b"third").unwrap_err().to_string();
         assert!(error.contains("can't write") && error.contains("taken"), "{error}");
         assert_eq!(entries(dir.path()).unwrap(), [path, taken]);
-    }
-
-    #[test]
-    fn only_regular_files_are_read_and_not_beyond_the_limit() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("a.txt");
-        fs::write(&path, "0123456789").unwrap();
-        assert_eq!(read_bounded(&path, 4).unwrap(), b"0123");
-        let error = read_bounded(dir.path(), 4).unwrap_err().to_string();
-        assert!(error.contains("it is a folder"), "{error}");
-        #[cfg(unix)]
-        {
-            let error = read_bounded(Path::new("/dev/null"), 4).unwrap_err().to_string();
-            assert!(error.contains("can't read /dev/null: it is no regular file"), "{error}");
-        }
     }
 }

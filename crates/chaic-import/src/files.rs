@@ -1,9 +1,8 @@
 //! Files of JSON from elsewhere.
 
-use std::fs;
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
+use chaic_files::read_user_file;
 use serde::de::DeserializeOwned;
 
 use crate::ImportError;
@@ -27,15 +26,15 @@ pub(crate) fn read<T: DeserializeOwned>(path: &Path) -> Result<T, ImportError> {
 
 /// The text of a file.
 pub(crate) fn text(path: &Path) -> Result<String, ImportError> {
-    let fail = |e: std::io::Error| ImportError::unreadable(path, format!("can't be read: {e}"));
-    let mut text = String::new();
-    let file = fs::File::open(path).map_err(fail)?;
-    let n = file.take(MAX_BYTES + 1).read_to_string(&mut text).map_err(fail)?;
-    if n as u64 > MAX_BYTES {
+    let fail = |problem: &dyn std::fmt::Display| {
+        ImportError::unreadable(path, format!("can't be read: {problem}"))
+    };
+    let bytes = read_user_file(path, MAX_BYTES + 1).map_err(|e| fail(&e.refusal))?;
+    if bytes.len() as u64 > MAX_BYTES {
         let problem = format!("has more than {MAX_BYTES} bytes");
         return Err(ImportError::unreadable(path, problem));
     }
-    Ok(text)
+    String::from_utf8(bytes).map_err(|e| fail(&e))
 }
 
 /// The first of some folders that is there.

@@ -7,7 +7,7 @@ use chaic_agents::PlannerRules;
 use chaic_agents::sight::Sight;
 use chaic_env::minds::{Helper, Helpers, check_new_name};
 use chaic_env::{EnvError, RunKey};
-use chaic_files::{read_bounded, write_whole};
+use chaic_files::{read_bounded, read_user_file, write_whole};
 use chaic_nn::weights::{self, WeightsError};
 use serde::{Deserialize, Serialize};
 
@@ -91,7 +91,7 @@ impl NamedPolicy {
     /// # Errors
     /// If it can't be read or isn't one.
     pub fn read(name: &str, path: &Path) -> chaic_env::Result<NamedPolicy> {
-        let bytes = read_bounded(path, MOST_BYTES).map_err(|e| EnvError::Minds(e.into()))?;
+        let bytes = read_user_file(path, MOST_BYTES).map_err(|e| EnvError::Minds(e.into()))?;
         let wrong = |problem| Refusal::Weights { path: path.to_owned(), problem };
         let trained = Loaded::from_bytes(&bytes).map_err(wrong)?;
         Ok(NamedPolicy { name: name.to_owned(), digest: weights::digest(&bytes), trained })

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use chaic_agents::sight::{GROUND_TRUTH, Sight};
-use chaic_files::read_bounded;
+use chaic_files::read_user_file;
 use chaic_nn::AdamRules;
 use chaic_nn::weights::{self, WeightsError};
 use chaic_protocol::TaskId;
@@ -160,7 +160,7 @@ impl PlayRules {
     fn read_opponent(&self) -> Result<Option<OpponentModel>, TrainingError> {
         let read = |path: &PathBuf| {
             let wrong = |problem| TrainingError::Weights { path: path.clone(), problem };
-            OpponentModel::from_bytes(&read_bounded(path, MOST_BYTES)?).map_err(wrong)
+            OpponentModel::from_bytes(&read_user_file(path, MOST_BYTES)?).map_err(wrong)
         };
         self.opponent.as_ref().map(read).transpose()
     }

@@ -37,7 +37,7 @@ impl Thread {
         let mut thread = Thread::default();
         let Some(run) = session.run() else { return thread };
         if let Source::Replay(from) = &session.source {
-            match Record::read(&record::path(from, key, agent)) {
+            match Record::read(from, &record::path(from, key, agent)) {
                 Ok(record) => {
                     let exchanges = record.entries.into_iter().filter_map(|entry| match entry {
                         Entry::Exchange(exchange) => Some(*exchange),
@@ -49,7 +49,7 @@ impl Thread {
             }
         }
         let head = Head::new(key, agent, &session.settings.asking.model);
-        match Recorder::open(&record::path(run, key, agent), &head) {
+        match Recorder::open(run, &record::path(run, key, agent), &head) {
             Ok(recorder) => thread.recorder = Some(recorder),
             Err(error) => session.halt(error.to_string()),
         }

@@ -3,11 +3,12 @@
 //! What is there already when an episode is played (because the run was cut short) is used again
 //! as long as the questions are the same: nothing that was answered is asked twice.
 
-use std::fs::{self, File};
-use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
+use std::fs::File;
+use std::io::{Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 use chaic_env::{RunKey, slug};
+use chaic_files::{EntryKind, kind_below, make_folders_below, open_or_create, read_below, walk};
 use chaic_protocol::AgentId;
 use serde::{Deserialize, Serialize};
 
@@ -86,15 +87,13 @@ pub struct Record {
 }
 
 impl Record {
-    /// Reads a record up to its last whole line.
+    /// Reads a record below the folder of its run up to its last complete line.
     ///
     /// # Errors
-    /// If it can't be read, is something else, or is damaged before its last line.
-    pub fn read(path: &Path) -> Result<Record> {
-        let mut bytes = Vec::new();
-        let file = File::open(path).map_err(LlmError::io("open", path))?;
-        let read = file.take(MAX_RECORD_BYTES + 1).read_to_end(&mut bytes);
-        read.map_err(LlmError::io("read", path))?;
+    /// If it can't be read, is no regular file or behind a link, is something else, or is damaged before its
+    /// last line.
+    pub fn read(run: &Path, path: &Path) -> Result<Record> {
+        let bytes = read_below(run, path, MAX_RECORD_BYTES + 1)?;
         let wrong = |line: usize, problem: String| LlmError::Unreadable {
             path: path.to_owned(),
             line,
@@ -154,25 +153,23 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Begins a record, or goes on with the one that is there if it is of the same mind.
+    /// Begins a record below the folder of a run, or continues an existing record of the same mind.
     ///
     /// # Errors
-    /// If the file system refuses.
-    pub fn open(path: &Path, head: &Head) -> Result<Recorder> {
-        if let Some(folder) = path.parent() {
-            fs::create_dir_all(folder).map_err(LlmError::io("make the folder", folder))?;
-        }
-        let before = match path.exists().then(|| Record::read(path)) {
-            Some(Ok(record)) if record.head == *head => Some(record),
+    /// If it is a link or no regular file, or the file system refuses.
+    pub fn open(run: &Path, path: &Path, head: &Head) -> Result<Recorder> {
+        make_folders_below(run, path.parent().unwrap_or(run))?;
+        let before = match kind_below(run, path)? {
+            EntryKind::Missing => None,
             // Damaged or of something else: of no use, and replaced.
-            _ => None,
+            _ => Record::read(run, path).ok().filter(|record| record.head == *head),
         };
         let is_new = before.is_none();
         let refused = || LlmError::io("write", path);
-        let options = File::options().create(true).truncate(is_new).write(true).open(path);
-        let mut file = options.map_err(refused())?;
+        let mut file = open_or_create(path)?;
         let first = serde_json::to_string(head).expect("a head has string keys") + "\n";
         if is_new {
+            file.set_len(0).map_err(refused())?;
             file.write_all(first.as_bytes()).map_err(refused())?;
         }
         let before = before.unwrap_or_else(|| Record {
@@ -212,34 +209,21 @@ impl Recorder {
     }
 }
 
-/// Every record of a run, in the order of their paths.
+/// Returns the paths of all records of a run, sorted. Links are left out.
 ///
 /// # Errors
 /// If the file system refuses.
 pub fn all(run: &Path) -> Result<Vec<PathBuf>> {
-    fn walk(folder: &Path, depth: u32, found: &mut Vec<PathBuf>) -> Result<()> {
-        let refused = || LlmError::io("list", folder);
-        for entry in fs::read_dir(folder).map_err(refused())? {
-            let path = entry.map_err(refused())?.path();
-            if path.is_dir() && depth > 0 {
-                walk(&path, depth - 1, found)?;
-            } else if path.extension().is_some_and(|e| e == "jsonl") {
-                found.push(path);
-            }
-        }
-        Ok(())
-    }
-    let mut found = Vec::new();
-    let folder = folder(run);
-    if folder.exists() {
-        walk(&folder, 2, &mut found)?;
-    }
-    found.sort();
-    Ok(found)
+    let is_record = |entry: &chaic_files::Entry| {
+        entry.kind == EntryKind::File && entry.path.extension().is_some_and(|e| e == "jsonl")
+    };
+    Ok(walk(&folder(run), 2)?.into_iter().filter(is_record).map(|entry| entry.path).collect())
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use chaic_protocol::TaskId;
 
     use super::*;
@@ -276,20 +260,22 @@ mod tests {
     }
 
     fn write(path: &Path, entries: &[Entry]) {
-        let mut recorder = Recorder::open(path, &head()).unwrap();
+        let run = path.parent().unwrap();
+        let mut recorder = Recorder::open(run, path, &head()).unwrap();
         entries.iter().for_each(|e| recorder.push(e.clone()).unwrap());
     }
 
     #[test]
     fn what_was_answered_is_known_again_until_something_differs() {
         let dir = tempfile::tempdir().unwrap();
+        fs::create_dir(dir.path().join("a")).unwrap();
         let path = dir.path().join("a/r.jsonl");
         let whole = [exchange("one"), decided(1), exchange("two"), decided(2)];
         write(&path, &whole);
         let bytes = fs::read(&path).unwrap();
-        assert_eq!(Record::read(&path).unwrap().entries, whole);
+        assert_eq!(Record::read(dir.path(), &path).unwrap().entries, whole);
 
-        let mut again = Recorder::open(&path, &head()).unwrap();
+        let mut again = Recorder::open(dir.path(), &path, &head()).unwrap();
         assert!(again.known(&ask("other")).is_none());
         assert!(again.known(&ask("one")).is_some());
         again.push(exchange("one")).unwrap();
@@ -304,7 +290,7 @@ mod tests {
         );
 
         write(&path, &[exchange("one"), decided(1), exchange("three")]);
-        let other = Record::read(&path).unwrap().entries;
+        let other = Record::read(dir.path(), &path).unwrap().entries;
         assert_eq!(other, [exchange("one"), decided(1), exchange("three")]);
     }
 
@@ -315,13 +301,13 @@ mod tests {
         write(&path, &[exchange("one"), decided(1), exchange("two")]);
         let whole = fs::read_to_string(&path).unwrap();
         fs::write(&path, &whole[..whole.len() - 9]).unwrap();
-        assert_eq!(Record::read(&path).unwrap().entries, [exchange("one"), decided(1)]);
+        assert_eq!(Record::read(dir.path(), &path).unwrap().entries, [exchange("one"), decided(1)]);
         // Going on after a torn line cuts it off.
         write(&path, &[exchange("one"), decided(1), exchange("two")]);
         assert_eq!(fs::read_to_string(&path).unwrap(), whole);
 
         fs::write(&path, whole.replacen("one", "0ne", 1)).unwrap();
-        let said = Record::read(&path).unwrap_err().to_string();
+        let said = Record::read(dir.path(), &path).unwrap_err().to_string();
         assert!(said.contains("line 2") && said.contains("question"), "{said}");
     }
 
@@ -331,6 +317,26 @@ mod tests {
         let path = dir.path().join("r.jsonl");
         fs::write(&path, "{}\n").unwrap();
         write(&path, &[decided(1)]);
-        assert_eq!(Record::read(&path).unwrap().entries, [decided(1)]);
+        assert_eq!(Record::read(dir.path(), &path).unwrap().entries, [decided(1)]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn no_record_is_read_or_written_through_a_link() {
+        use std::os::unix::fs::symlink;
+        let dir = tempfile::tempdir().unwrap();
+        let (run, own) = (dir.path().join("run"), dir.path().join("own.jsonl"));
+        fs::create_dir_all(run.join("llm/a")).unwrap();
+        fs::write(&own, "dear").unwrap();
+        symlink(&own, run.join("llm/a/r.jsonl")).unwrap();
+        symlink(run.join("llm/a"), run.join("llm/b")).unwrap();
+        for name in ["llm/a/r.jsonl", "llm/b/r.jsonl", "llm/b/new.jsonl"] {
+            let path = run.join(name);
+            let said = Recorder::open(&run, &path, &head()).unwrap_err().to_string();
+            assert!(said.contains("it is a link"), "{said}");
+            assert!(Record::read(&run, &path).is_err(), "{name}");
+        }
+        assert_eq!(fs::read(&own).unwrap(), b"dear");
+        assert_eq!(all(&run).unwrap(), [] as [PathBuf; 0]);
     }
 }

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, OnceLock};
 
 use chaic_env::CHAIC_VERSION;
-use chaic_files::write_whole;
+use chaic_files::{EntryKind, kind_below, make_folders_below, read_below, write_whole};
 use serde::{Deserialize, Serialize};
 
 use crate::endpoint::Client;
@@ -56,6 +56,8 @@ const FORMAT: &str = "chaic-llm-settings";
 const VERSION: u32 = 1;
 /// The file of the recorded settings.
 const FILE: &str = "settings.json";
+/// Longest file of settings that is read, bytes: a thousand times a usual one.
+const MAX_FILE_BYTES: u64 = 1 << 20;
 
 /// What a run records of its settings; there is no key in it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -95,11 +97,13 @@ impl Session {
     /// If they differ, or the file system refuses.
     pub fn attach(&self, run: &Path) -> Result<()> {
         let folder = record::folder(run);
-        fs::create_dir_all(&folder).map_err(LlmError::io("make the folder", &folder))?;
+        fs::create_dir_all(run).map_err(LlmError::io("make the folder", run))?;
+        make_folders_below(run, &folder)?;
         let ours = self.recorded();
         match read_recorded(run)? {
             Some(theirs) => compare(run, &theirs, &ours)?,
             None => {
+                make_folders_below(run, &folder.join("templates"))?;
                 self.templates.write(&folder.join("templates"))?;
                 let text = serde_json::to_string_pretty(&ours).expect("settings have string keys");
                 let path = folder.join(FILE);
@@ -193,6 +197,10 @@ impl Session {
 pub fn settings_of(run: &Path) -> Result<Option<Settings>> {
     let Some(recorded) = read_recorded(run)? else { return Ok(None) };
     let templates = record::folder(run).join("templates");
+    if kind_below(run, &templates)? == EntryKind::Link {
+        let problem = "it is a link; put the folder itself there";
+        return Err(LlmError::io("read", &templates)(std::io::Error::other(problem)));
+    }
     Ok(Some(Settings {
         asking: Asking { templates: Some(templates), ..recorded.asking },
         endpoint: recorded.endpoint.unwrap_or_default(),
@@ -204,13 +212,13 @@ pub fn settings_of(run: &Path) -> Result<Option<Settings>> {
 
 fn read_recorded(run: &Path) -> Result<Option<Recorded>> {
     let path = record::folder(run).join(FILE);
-    if !path.exists() {
+    if kind_below(run, &path)? == EntryKind::Missing {
         return Ok(None);
     }
-    let text = fs::read_to_string(&path).map_err(LlmError::io("read", &path))?;
+    let bytes = read_below(run, &path, MAX_FILE_BYTES)?;
     let wrong = |line, problem| LlmError::Unreadable { path: path.clone(), line, problem };
     let recorded: Recorded =
-        serde_json::from_str(&text).map_err(|e| wrong(e.line(), e.to_string()))?;
+        serde_json::from_slice(&bytes).map_err(|e| wrong(e.line(), e.to_string()))?;
     if recorded.format != FORMAT || recorded.version != VERSION {
         let found = format!("{} version {}", recorded.format, recorded.version);
         return Err(wrong(1, format!("is of {found}, expected {FORMAT} version {VERSION}")));
@@ -244,7 +252,7 @@ fn spent_before(run: &Path, price: &Price) -> Result<Spent> {
     let mut spent = Spent::default();
     for path in record::all(run)? {
         // A damaged record is replaced when its episode is played again.
-        let Ok(record) = Record::read(&path) else { continue };
+        let Ok(record) = Record::read(run, &path) else { continue };
         for entry in record.entries {
             if let Entry::Exchange(exchange) = entry {
                 spent.add(Spent::of(exchange.requests(), exchange.usage(), price));

@@ -2,9 +2,9 @@
 
 mod check;
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
+use chaic_files::read_user_file;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{LlmError, Result};
@@ -295,11 +295,12 @@ impl Settings {
     /// # Errors
     /// If it can't be read, isn't TOML, or has a field that isn't known.
     pub fn read(path: &Path) -> Result<Settings> {
-        let text = fs::read_to_string(path).map_err(LlmError::io("read", path))?;
         let wrong = |problem: String| LlmError::Config { path: path.to_owned(), problem };
-        if text.len() > MAX_CONFIG_BYTES {
+        let bytes = read_user_file(path, MAX_CONFIG_BYTES as u64 + 1)?;
+        if bytes.len() > MAX_CONFIG_BYTES {
             return Err(wrong(format!("is longer than {MAX_CONFIG_BYTES} bytes")));
         }
+        let text = String::from_utf8(bytes).map_err(|e| wrong(e.to_string()))?;
         let mut settings: Settings =
             toml::from_str(&text).map_err(|e| wrong(e.to_string().trim().to_owned()))?;
         // TOML has no null: it is what nan and inf become on their way to JSON.
@@ -338,6 +339,8 @@ fn holds_null(value: &serde_json::Value) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     pub(super) fn good() -> Settings {

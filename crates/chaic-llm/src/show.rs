@@ -6,6 +6,7 @@ use std::path::Path;
 
 use chaic_env::RunKey;
 use chaic_env::trace::{self, Trace};
+use chaic_files::{EntryKind, kind_below};
 use chaic_protocol::{AgentId, Frame};
 use serde_json::Value;
 
@@ -34,10 +35,10 @@ pub fn text(
     detail: Detail,
 ) -> Result<String> {
     let path = record::path(run, key, agent);
-    if !path.exists() {
+    if kind_below(run, &path)? == EntryKind::Missing {
         return Err(LlmError::NoRecord { path });
     }
-    let record = Record::read(&path)?;
+    let record = Record::read(run, &path)?;
     let head = &record.head;
     let mut text = format!(
         "{} with helper {}, seed {}: the {agent}'s decisions by {}\n",

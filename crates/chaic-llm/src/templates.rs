@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use chaic_files::write_whole;
+use chaic_files::{read_bounded, write_whole};
 use minijinja::syntax::SyntaxConfig;
 use minijinja::value::{Serde, Value};
 use minijinja::{Environment, UndefinedBehavior};
@@ -218,11 +218,11 @@ fn read(path: &Path, name: &str) -> Result<String> {
         let known: Vec<&str> = BUILT_IN.iter().map(|(n, _)| *n).collect();
         return Err(wrong(format!("no template has this name; they are {}", known.join(", "))));
     }
-    let size = fs::metadata(path).map_err(LlmError::io("read", path))?.len();
-    if size > MAX_TEMPLATE_BYTES {
+    let bytes = read_bounded(path, MAX_TEMPLATE_BYTES + 1)?;
+    if bytes.len() as u64 > MAX_TEMPLATE_BYTES {
         return Err(wrong(format!("is longer than {MAX_TEMPLATE_BYTES} bytes")));
     }
-    fs::read_to_string(path).map_err(LlmError::io("read", path))
+    String::from_utf8(bytes).map_err(|e| wrong(e.to_string()))
 }
 
 #[cfg(test)]

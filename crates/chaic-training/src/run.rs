@@ -3,12 +3,12 @@
 
 use std::collections::BTreeMap;
 use std::error::Error;
-use std::fs::{self, OpenOptions};
+use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use chaic_files::{FileError, read_bounded, write_whole};
+use chaic_files::{FileError, open_to_append, read_bounded, read_user_file, write_whole};
 use chaic_nn::weights::WeightsError;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -185,7 +185,8 @@ impl<T: Training> TrainingRun<T> {
         folder: &Path,
         go_on: &mut dyn FnMut(&str) -> bool,
     ) -> Result<Option<TrainingRun<T>>, TrainingError> {
-        let rules = read_rules::<T>(&folder.join(CONFIG))?;
+        let path = folder.join(CONFIG);
+        let rules = parse_rules::<T>(&path, &read_bounded(&path, MOST_BYTES)?)?;
         let path = folder.join(CHECKPOINT);
         // Without one it was stopped before its first step.
         let bytes = path.exists().then(|| read_bounded(&path, MOST_BYTES)).transpose()?;
@@ -201,7 +202,7 @@ impl<T: Training> TrainingRun<T> {
     /// # Errors
     /// If it can't be read, or isn't one of this network; the folder stays.
     pub fn begin_with(&mut self, path: &Path) -> Result<(), TrainingError> {
-        let bytes = read_bounded(path, MOST_BYTES)?;
+        let bytes = read_user_file(path, MOST_BYTES)?;
         let wrong = |problem| TrainingError::Weights { path: path.to_owned(), problem };
         self.training.begin_with(&bytes).map_err(wrong)?;
         self.keep()
@@ -262,22 +263,24 @@ impl<T: Training> TrainingRun<T> {
     fn record(&self, record: &Record, tell: &mut dyn FnMut(&Record)) -> Result<(), TrainingError> {
         let path = self.folder.join(CURVES);
         let line = serde_json::to_string(record).expect("a record is plain data") + "\n";
-        let file = OpenOptions::new().create(true).append(true).open(&path);
-        let written = file.and_then(|mut file| file.write_all(line.as_bytes()));
+        let written = open_to_append(&path)?.write_all(line.as_bytes());
         written.map_err(FileError::of("can't write", &path))?;
         tell(record);
         Ok(())
     }
 }
 
-/// The rules in a file; those that it doesn't name are as shipped.
+/// Reads rules from a file that a user named. Rules that it does not name have their defaults.
 ///
 /// # Errors
 /// If it can't be read, names rules that aren't there, or nothing can be trained by them.
 pub fn read_rules<T: Training>(path: &Path) -> Result<T::Rules, TrainingError> {
-    let bytes = read_bounded(path, MOST_BYTES)?;
+    parse_rules::<T>(path, &read_user_file(path, MOST_BYTES)?)
+}
+
+fn parse_rules<T: Training>(path: &Path, bytes: &[u8]) -> Result<T::Rules, TrainingError> {
     let wrong = |problem: String| TrainingError::Config { path: path.to_owned(), problem };
-    let text = std::str::from_utf8(&bytes).map_err(|e| wrong(e.to_string()))?;
+    let text = std::str::from_utf8(bytes).map_err(|e| wrong(e.to_string()))?;
     let rules: T::Rules = toml::from_str(text).map_err(|e| wrong(e.message().to_owned()))?;
     T::check(&rules).map_err(wrong)?;
     Ok(rules)

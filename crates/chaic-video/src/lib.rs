@@ -138,6 +138,14 @@ impl Provisional {
     }
 }
 
+/// Creates an empty file, in place of an older file or link of this name. Links are not followed.
+fn create_fresh(path: &Path) -> io::Result<File> {
+    match fs::remove_file(path) {
+        Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
+        _ => File::options().write(true).create_new(true).open(path),
+    }
+}
+
 impl Drop for Provisional {
     fn drop(&mut self) {
         if !self.is_kept {
@@ -189,7 +197,7 @@ impl VideoWriter {
             return Err(VideoError::FrameRate { fps, max });
         }
         let provisional = Provisional::beside(path);
-        let sink = File::create(&provisional.path)
+        let sink = create_fresh(&provisional.path)
             .map_err(SinkError::Io)
             .and_then(|file| Sink::open(format, BufWriter::new(file), width, height, fps))
             .map_err(|error| error.at(path, 0))?;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use chaic_agents::sight::{GROUND_TRUTH, Sight, TrueSight};
-use chaic_files::{FileError, read_bounded};
+use chaic_files::{FileError, read_user_file};
 use chaic_nn::weights::WeightsError;
 
 use crate::behavior::network::TrainedBehavior;
@@ -59,7 +59,7 @@ pub fn weights_of(name: &str) -> Option<&Path> {
 /// If it can't be read or is none.
 pub fn read_detector(path: &Path) -> Result<TrainedDetector, SightError> {
     let wrong = |problem| SightError::Weights { path: path.to_owned(), problem };
-    TrainedDetector::from_bytes(&read_bounded(path, MOST_BYTES)?).map_err(wrong)
+    TrainedDetector::from_bytes(&read_user_file(path, MOST_BYTES)?).map_err(wrong)
 }
 
 /// The behavior network in a file.
@@ -68,7 +68,7 @@ pub fn read_detector(path: &Path) -> Result<TrainedDetector, SightError> {
 /// If it can't be read or is none.
 pub fn read_behavior(path: &Path) -> Result<TrainedBehavior, SightError> {
     let wrong = |problem| SightError::Weights { path: path.to_owned(), problem };
-    TrainedBehavior::from_bytes(&read_bounded(path, MOST_BYTES)?).map_err(wrong)
+    TrainedBehavior::from_bytes(&read_user_file(path, MOST_BYTES)?).map_err(wrong)
 }
 
 /// By what one sees, and tells what others do.
@@ -110,7 +110,7 @@ fn seeing(name: &str) -> Result<Arc<dyn Sight>, SightError> {
             problem: e.to_string(),
         };
         let rates: FaultRates =
-            serde_json::from_slice(&read_bounded(path, MOST_BYTES)?).map_err(wrong)?;
+            serde_json::from_slice(&read_user_file(path, MOST_BYTES)?).map_err(wrong)?;
         return Ok(Arc::new(NoisySight::new(rates, format!("{NOISY} {file}"))));
     }
     Err(SightError::Unknown(format!(

@@ -155,7 +155,11 @@ const ALLOWED: &[Arrows] = &[
         ],
         &[],
     ),
-    arrows("chaic-import", &["chaic-protocol", "chaic-world", "chaic-episodes"], &["chaic-render"]),
+    arrows(
+        "chaic-import",
+        &["chaic-files", "chaic-protocol", "chaic-world", "chaic-episodes"],
+        &["chaic-render"],
+    ),
     arrows(
         "chaic",
         &[

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use chaic_env::{CHAIC_VERSION, RunKey, Track};
-use chaic_files::read_bounded;
+use chaic_files::{EntryKind, kind, read_bounded};
 use serde::Serialize;
 
 use crate::error::Result;
@@ -21,6 +21,9 @@ use crate::report::tables::{
 };
 use crate::report::text_table::TextTable;
 use crate::run::{Item, RunFolder, RunGrants, RunOptions, environments};
+
+/// File name of the figure as PNG.
+const PICTURE: &str = "figure.png";
 
 /// All that a report is made from.
 #[derive(Clone, Copy, Debug)]
@@ -298,30 +301,31 @@ pub fn write_files(folder: &RunFolder, report: &Report<'_>) -> Result<()> {
     for (name, text) in report.texts() {
         folder.write(name, text.as_bytes())?;
     }
-    write_figure(&report.scores(), report.labels(), &folder.join("figure.png"))
+    write_figure(&report.scores(), report.labels(), &folder.join(PICTURE))
 }
 
-/// The files of a run's report that are not as [`write_files`] writes them; `None` if there is no
-/// report. Pictures are left out, as their bytes may depend on the machine.
+/// Compares the files of a report with what [`write_files`] writes. Returns the names of missing files and
+/// of differing files. Of the PNG only the kind of file is checked: its bytes may depend on the machine.
 ///
 /// # Errors
 /// If a file can't be read.
 pub fn differing_files(
     folder: &RunFolder,
     report: &Report<'_>,
-) -> Result<Option<Vec<&'static str>>> {
-    let mut found = report.texts();
-    found.retain(|(name, _)| folder.join(name).exists());
-    if found.is_empty() {
-        return Ok(None);
-    }
-    let mut differing = Vec::new();
-    for (name, text) in found {
-        // One byte more tells a longer file from an equal one.
-        let bytes = read_bounded(&folder.join(name), text.len() as u64 + 1)?;
-        if bytes != text.as_bytes() {
-            differing.push(name);
+) -> Result<(Vec<&'static str>, Vec<&'static str>)> {
+    let (mut missing, mut altered) = (Vec::new(), Vec::new());
+    for (name, text) in report.texts() {
+        let path = folder.join(name);
+        match kind(&path)? {
+            EntryKind::Missing => missing.push(name),
+            // One byte more tells a longer file from an equal one.
+            EntryKind::File if read_bounded(&path, text.len() as u64 + 1)? == text.as_bytes() => {}
+            _ => altered.push(name),
         }
     }
-    Ok(Some(differing))
+    let picture = kind(&folder.join(PICTURE))?;
+    if ![EntryKind::Missing, EntryKind::File].contains(&picture) {
+        altered.push(PICTURE);
+    }
+    Ok((missing, altered))
 }

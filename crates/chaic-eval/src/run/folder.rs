@@ -3,14 +3,19 @@
 use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 
+use chaic_env::trace::{Trace, Warning};
 use chaic_env::{CHAIC_VERSION, Digest, EnvError, RunKey, slug};
-use chaic_episodes::{Episode, find_episode};
-use chaic_files::{UNFINISHED, entries, read_bounded, write_whole};
+use chaic_episodes::{Episode, MAX_EPISODE_BYTES, find_episode};
+use chaic_files::{
+    Entry, EntryKind, UNFINISHED, entries, is_file_below, kind, kind_below, open_or_create,
+    read_below, read_bounded, walk, write_whole,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{EvalError, Result};
 use crate::run::granted::RunGrants;
-use crate::run::options::RunOptions;
+use crate::run::options::{FILES, RunOptions};
+use crate::trace_file;
 
 const FORMAT: &str = "chaic-run";
 /// 2: with the digest of the options.
@@ -27,6 +32,18 @@ pub(super) const EPISODES: &str = "episodes";
 pub(super) const RECORDS: &str = "llm";
 /// The commands of helpers that run in other processes; `chaic-subprocess` writes it.
 pub(super) const COMMANDS: &str = "commands.json";
+/// Digests of trained policies that play as helpers; `chaic-learn` writes it.
+pub(super) const POLICIES: &str = "policies.json";
+/// Folder of the traces.
+const TRACES: &str = "traces";
+/// Levels of folders below [`TRACES`]: one per task, one per helper.
+const TRACE_DEPTH: u32 = 2;
+/// File name of the journal.
+const RESULTS: &str = "results.jsonl";
+/// File names of a report.
+const REPORT: [&str; 4] = ["scores.json", "report.md", "figure.svg", "figure.png"];
+/// Marker file of a merge in progress. It is removed after `run.json` is written.
+const MERGING: &str = ".merging";
 /// What lies there before the first question is asked.
 const RECORDS_OF_BEGINNING: [&str; 3] = ["settings.json", "settings.json.tmp", "templates"];
 
@@ -37,6 +54,8 @@ pub enum Access {
     Begin,
     /// What is there is gone on with; nothing there is a beginning.
     Resume,
+    /// The folder must be new, empty, or left by an interrupted merge, whose files are removed.
+    Merge,
 }
 
 /// The folder of a run.
@@ -61,6 +80,13 @@ struct RunFile {
     granted: Option<RunGrants>,
 }
 
+impl RunFile {
+    /// Returns the text of the file.
+    fn to_text(&self) -> String {
+        serde_json::to_string_pretty(self).expect("options have string keys") + "\n"
+    }
+}
+
 /// What lies in a folder that is to become a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Contents {
@@ -68,6 +94,8 @@ enum Contents {
     Nothing,
     /// What a run leaves that is stopped before its `run.json` is written.
     Beginning,
+    /// Files of a merge that was interrupted before its `run.json` was written.
+    StoppedMerge,
     /// A run.
     Run,
     /// Something that no run has left.
@@ -76,13 +104,16 @@ enum Contents {
 
 impl Contents {
     fn of(path: &Path) -> Result<Contents> {
-        if path.join(RUN_FILE).exists() {
+        if RunFolder::is_run(path) {
             return Ok(Contents::Run);
         }
         let found = if path.exists() { entries(path)? } else { Vec::new() };
         let is_locked = found.iter().any(|p| name(p) == LOCK);
-        let rest: Vec<&PathBuf> = found.iter().filter(|p| name(p) != LOCK).collect();
+        let is_merge = found.iter().any(|p| name(p) == MERGING);
+        let rest: Vec<&PathBuf> =
+            found.iter().filter(|p| ![LOCK, MERGING].contains(&name(p))).collect();
         Ok(match rest[..] {
+            _ if is_merge && rest.iter().all(|p| is_of_merge(p)) => Contents::StoppedMerge,
             [] => Contents::Nothing,
             _ if is_locked && rest.iter().all(|p| is_of_beginning(p)) => Contents::Beginning,
             _ => Contents::Other,
@@ -93,16 +124,29 @@ impl Contents {
 /// Whether a run writes this before its `run.json`.
 fn is_of_beginning(path: &Path) -> bool {
     let all = |folder: &Path, is_known: &dyn Fn(&str) -> bool| {
-        entries(folder).is_ok_and(|found| found.iter().all(|p| is_known(name(p))))
+        kind(folder).is_ok_and(|kind| kind == EntryKind::Folder)
+            && entries(folder).is_ok_and(|found| found.iter().all(|p| is_known(name(p))))
     };
     match name(path) {
         EPISODES => {
             all(path, &|file| file.strip_suffix(UNFINISHED).unwrap_or(file).ends_with(".json"))
         }
         RECORDS => all(path, &|file| RECORDS_OF_BEGINNING.contains(&file)),
-        COMMANDS => true,
-        file => [RUN_FILE, COMMANDS].map(Some).contains(&file.strip_suffix(UNFINISHED)),
+        COMMANDS | POLICIES => true,
+        file => [RUN_FILE, COMMANDS, POLICIES].map(Some).contains(&file.strip_suffix(UNFINISHED)),
     }
+}
+
+/// Returns whether a merge writes a file or folder of this name before its `run.json`.
+fn is_of_merge(path: &Path) -> bool {
+    let whole = name(path).strip_suffix(UNFINISHED).unwrap_or(name(path));
+    [EPISODES, TRACES, COMMANDS, POLICIES, RESULTS, RUN_FILE].contains(&whole)
+        || REPORT.contains(&whole)
+}
+
+/// Returns whether an entry of this name exists, even if it is a dangling link.
+fn has_entry(path: &Path) -> bool {
+    kind(path).is_ok_and(|kind| kind != EntryKind::Missing)
 }
 
 /// The name of a file; empty where it is no text, as no file of a run is named.
@@ -113,18 +157,20 @@ fn name(path: &Path) -> &str {
 impl RunFolder {
     /// Whether there is a run to go on with or to read.
     pub fn is_run(path: &Path) -> bool {
-        path.join(RUN_FILE).exists()
+        has_entry(&path.join(RUN_FILE))
     }
 
     /// Refuses a folder in which no run can be resumed.
     ///
     /// # Errors
-    /// [`EvalError::NotBegun`] if a run was stopped there before it began, [`EvalError::NotARun`]
-    /// for any other folder without a run.
+    /// [`EvalError::NotBegun`] if a run was stopped there before it began,
+    /// [`EvalError::StoppedMerge`] if a merge was, [`EvalError::NotARun`] for any other folder
+    /// without a run.
     pub fn check_begun(path: &Path) -> Result<()> {
         match Contents::of(path)? {
             Contents::Run => Ok(()),
-            Contents::Nothing | Contents::Beginning if path.join(LOCK).exists() => {
+            Contents::StoppedMerge => Err(EvalError::StoppedMerge { path: path.to_owned() }),
+            Contents::Nothing | Contents::Beginning if has_entry(&path.join(LOCK)) => {
                 Err(EvalError::NotBegun { path: path.to_owned() })
             }
             _ => Err(EvalError::NotARun { path: path.to_owned() }),
@@ -140,7 +186,7 @@ impl RunFolder {
     pub fn lock(path: &Path, access: Access) -> Result<(RunFolder, Option<RunOptions>)> {
         if let Err(refusal) = check_access(path, access) {
             // Whoever is at work here says more than that something lies here.
-            if path.join(LOCK).exists() {
+            if has_entry(&path.join(LOCK)) {
                 take_lock(path)?;
             }
             return Err(refusal);
@@ -154,6 +200,8 @@ impl RunFolder {
             folder.clear_beginning()?;
             return Ok((folder, None));
         };
+        // Left by a merge that was killed after its last step; without effect if it can not be removed.
+        let _ = fs::remove_file(folder.join(MERGING));
         if file.chaic != CHAIC_VERSION {
             return Err(EvalError::Env(EnvError::OtherVersion {
                 path: folder.join(RUN_FILE),
@@ -208,6 +256,21 @@ impl RunFolder {
         Ok(self.recorded()?.map(|file| file.chaic).filter(|chaic| chaic != CHAIC_VERSION))
     }
 
+    /// Returns the version of chaic in `run.json`.
+    ///
+    /// # Errors
+    /// If `run.json` can't be read.
+    pub(crate) fn version(&self) -> Result<Option<String>> {
+        Ok(self.recorded()?.map(|file| file.chaic))
+    }
+
+    /// Returns whether `run.json` equals its own content written again, byte by byte. Additional or repeated
+    /// fields make it differ.
+    pub(crate) fn has_canonical_run_file(&self) -> Result<bool> {
+        let bytes = read_bounded(&self.join(RUN_FILE), MAX_RUN_FILE_BYTES)?;
+        Ok(self.recorded()?.is_some_and(|file| file.to_text().into_bytes() == bytes))
+    }
+
     /// The folder itself.
     pub fn path(&self) -> &Path {
         &self.path
@@ -220,28 +283,47 @@ impl RunFolder {
 
     /// Its journal.
     pub fn results(&self) -> PathBuf {
-        self.path.join("results.jsonl")
+        self.path.join(RESULTS)
     }
 
     /// The trace of an episode run.
     pub fn trace(&self, key: &RunKey) -> PathBuf {
         let name = format!("{}-s{}.jsonl", slug(key.task, &key.episode), key.seed);
-        self.path.join("traces").join(key.task.name()).join(&key.helper).join(name)
+        self.path.join(TRACES).join(key.task.name()).join(&key.helper).join(name)
     }
 
-    /// Every whole trace, in the order of their paths.
+    /// Returns whether an episode run has a trace: a regular file, reached without a link inside the run.
+    pub fn has_trace(&self, key: &RunKey) -> bool {
+        is_file_below(&self.path, &self.trace(key))
+    }
+
+    /// Returns the kind of directory entry at the path of a trace.
+    pub(crate) fn kind_of_trace(&self, key: &RunKey) -> Result<EntryKind> {
+        Ok(kind_below(&self.path, &self.trace(key))?)
+    }
+
+    /// Returns the paths of all complete traces, sorted. Links and files in linked folders are left out.
     ///
     /// # Errors
     /// If the file system refuses.
     pub fn traces(&self) -> Result<Vec<PathBuf>> {
-        let mut found = Vec::new();
-        let root = self.path.join("traces");
-        if root.exists() {
-            walk(&root, 3, &mut found)?;
-        }
-        found.retain(|p| p.extension().is_some_and(|e| e == "jsonl"));
-        found.sort();
-        Ok(found)
+        let is_trace = |e: &Entry| {
+            e.kind == EntryKind::File && e.path.extension().is_some_and(|e| e == "jsonl")
+        };
+        Ok(self.trace_entries()?.into_iter().filter(is_trace).map(|e| e.path).collect())
+    }
+
+    /// Lists all entries below the folder of the traces.
+    pub(crate) fn trace_entries(&self) -> Result<Vec<Entry>> {
+        Ok(walk(&self.path.join(TRACES), TRACE_DEPTH)?)
+    }
+
+    /// Reads a trace of this run up to its last complete record. Warnings describe what is left out.
+    ///
+    /// # Errors
+    /// If it is reached through a link or is no regular file; otherwise those of [`trace_file::read`].
+    pub fn read_trace(&self, path: &Path) -> Result<(Trace, Vec<Warning>)> {
+        Ok(chaic_env::trace::parse(&trace_file::bytes(&self.path, path)?, path)?)
     }
 
     /// The folder with copies of episode files.
@@ -249,17 +331,28 @@ impl RunFolder {
         self.path.join(EPISODES)
     }
 
-    /// The episode of this id: the run's own copy, or one of those that every chaic has.
+    /// Returns the episode of this id. A run with the split `files` uses its own copies; any other run uses
+    /// the bundled or generated episodes and ignores files in its folder.
     ///
     /// # Errors
     /// If there is none, or its file is damaged.
-    pub fn episode(&self, key: &RunKey) -> Result<Episode> {
-        let copy = self.episode_copy(key.task, &key.episode);
-        if copy.exists() {
-            let bytes = crate::read_episode_file(&copy)?;
-            return Ok(Episode::parse(&bytes, &copy.display().to_string())?);
+    pub fn episode(&self, options: &RunOptions, key: &RunKey) -> Result<Episode> {
+        if options.split != FILES {
+            return Ok(find_episode(&key.episode)?);
         }
-        Ok(find_episode(&key.episode)?)
+        self.read_copy(&self.episode_copy(key.task, &key.episode))
+    }
+
+    /// Reads one of the run's copies of episodes.
+    pub(crate) fn read_copy(&self, copy: &Path) -> Result<Episode> {
+        let bytes = self.copy_bytes(copy)?;
+        Ok(Episode::parse(&bytes, &copy.display().to_string())?)
+    }
+
+    /// Returns the bytes of one of the run's copies of episodes.
+    pub(crate) fn copy_bytes(&self, copy: &Path) -> Result<Vec<u8>> {
+        // One byte more than the limit, so that the parser reports a longer file.
+        Ok(read_below(&self.path, copy, MAX_EPISODE_BYTES as u64 + 1)?)
     }
 
     pub(crate) fn episode_copy(&self, task: chaic_protocol::TaskId, id: &str) -> PathBuf {
@@ -276,16 +369,31 @@ impl RunFolder {
             options: options.clone(),
             granted: Some(granted.clone()),
         };
-        let text = serde_json::to_string_pretty(&file).expect("options have string keys") + "\n";
-        self.write(RUN_FILE, text.as_bytes())
+        self.write(RUN_FILE, file.to_text().as_bytes())
     }
 
-    /// Removes what [`Contents::Beginning`] consists of, but the lock.
+    /// Creates the marker file of a merge.
+    pub(crate) fn begin_merge(&self) -> Result<()> {
+        let marker = self.join(MERGING);
+        open_or_create(&marker)?;
+        Ok(())
+    }
+
+    /// Removes the marker file of a merge.
+    pub(crate) fn end_merge(&self) -> Result<()> {
+        let marker = self.join(MERGING);
+        fs::remove_file(&marker).map_err(EvalError::io("remove", &marker))
+    }
+
+    /// Removes the files of [`Contents::Beginning`] or [`Contents::StoppedMerge`] except the lock and the
+    /// marker: without the marker, a clearing that is interrupted could not be continued.
     fn clear_beginning(&self) -> Result<()> {
         let leftovers = entries(&self.path)?;
-        for path in leftovers.iter().filter(|p| name(p) != LOCK) {
-            let removed =
-                if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+        for path in leftovers.iter().filter(|p| ![LOCK, MERGING].contains(&name(p))) {
+            let removed = match kind(path)? {
+                EntryKind::Folder => fs::remove_dir_all(path),
+                _ => fs::remove_file(path),
+            };
             removed.map_err(EvalError::io("remove", path))?;
         }
         Ok(())
@@ -301,7 +409,7 @@ impl RunFolder {
 
     fn recorded(&self) -> Result<Option<RunFile>> {
         let path = self.path.join(RUN_FILE);
-        if !path.exists() {
+        if kind(&path)? == EntryKind::Missing {
             return Ok(None);
         }
         let text = read_bounded(&path, MAX_RUN_FILE_BYTES)?;
@@ -336,8 +444,11 @@ impl RunFolder {
 /// Whether a folder may be begun in or gone on with.
 fn check_access(path: &Path, access: Access) -> Result<()> {
     match (Contents::of(path)?, access) {
-        (Contents::Run | Contents::Other, Access::Begin) => {
+        (Contents::Run | Contents::Other, Access::Begin | Access::Merge) => {
             Err(EvalError::NotEmpty { path: path.to_owned() })
+        }
+        (Contents::StoppedMerge, Access::Begin | Access::Resume) => {
+            Err(EvalError::StoppedMerge { path: path.to_owned() })
         }
         (Contents::Other, Access::Resume) => Err(EvalError::NotARun { path: path.to_owned() }),
         _ => Ok(()),
@@ -347,22 +458,10 @@ fn check_access(path: &Path, access: Access) -> Result<()> {
 fn take_lock(path: &Path) -> Result<File> {
     let name = path.join(LOCK);
     let refused = || EvalError::io("lock", &name);
-    let file = File::options().create(true).truncate(false).write(true).open(&name);
-    let file = file.map_err(refused())?;
+    let file = open_or_create(&name)?;
     match file.try_lock() {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => Err(EvalError::Locked { path: path.to_owned() }),
         Err(TryLockError::Error(e)) => Err(refused()(e)),
     }
-}
-
-fn walk(folder: &Path, depth: u32, found: &mut Vec<PathBuf>) -> Result<()> {
-    for entry in entries(folder)? {
-        if entry.is_dir() && depth > 0 {
-            walk(&entry, depth - 1, found)?;
-        } else if entry.is_file() {
-            found.push(entry);
-        }
-    }
-    Ok(())
 }

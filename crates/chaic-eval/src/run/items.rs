@@ -1,12 +1,11 @@
 //! The episode runs that a run consists of.
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use chaic_env::{RunKey, slug};
 use chaic_episodes::{Episode, Split, find_episode};
-use chaic_files::{entries, write_whole};
+use chaic_files::{entries, make_folders_below, write_whole};
 use chaic_protocol::task::Origin;
 use chaic_protocol::{Frame, TaskId};
 
@@ -33,8 +32,13 @@ pub struct Item {
 /// # Errors
 /// If the options name no episodes, or the run's copies of episode files can't be read.
 pub fn planned(folder: &RunFolder, options: &RunOptions) -> Result<Vec<Item>> {
-    let own = if options.split == FILES { read_files(&folder.episode_files())? } else { vec![] };
+    let own = if options.split == FILES { read_copies(folder)? } else { vec![] };
     plan(options, &own)
+}
+
+/// Reads the run's copies of episodes, sorted by id.
+fn read_copies(folder: &RunFolder) -> Result<Vec<Episode>> {
+    parse_files(&folder.episode_files(), &|path| folder.copy_bytes(path))
 }
 
 /// The same for a run whose episodes are not copied yet.
@@ -117,11 +121,15 @@ fn episodes(
     Ok((0..n).map(entry).collect())
 }
 
-/// The episodes in a folder's `.json` files, in the order of their ids.
+/// Reads the `.json` files of a folder that a user named, sorted by id.
 fn read_files(folder: &Path) -> Result<Vec<Episode>> {
+    parse_files(folder, &read_episode_file)
+}
+
+fn parse_files(folder: &Path, read: &dyn Fn(&Path) -> Result<Vec<u8>>) -> Result<Vec<Episode>> {
     let mut episodes = Vec::new();
     for path in episode_files(folder)? {
-        let bytes = read_episode_file(&path)?;
+        let bytes = read(&path)?;
         episodes.push(Episode::parse(&bytes, &path.display().to_string())?);
     }
     episodes.sort_by(|a, b| a.id().cmp(b.id()));
@@ -152,11 +160,11 @@ pub(super) fn check_episode_files(
     options: &RunOptions,
     folder: &RunFolder,
 ) -> Result<()> {
-    if same_files(source, &folder.episode_files())? {
+    if same_files(source, folder)? {
         return Ok(());
     }
     let named = read_with_partner(source, options)?;
-    let copies = read_files(&folder.episode_files())?;
+    let copies = read_copies(folder)?;
     let other = named.iter().find(|e| !copies.contains(e));
     let Some(other) = other.or_else(|| copies.iter().find(|e| !named.contains(e))) else {
         return Ok(());
@@ -170,9 +178,10 @@ pub(super) fn check_episode_files(
     )))
 }
 
-/// Whether two folders hold the same episode files, byte by byte: quicker than to read them.
-fn same_files(a: &Path, b: &Path) -> Result<bool> {
-    let (a, b) = (episode_files(a)?, episode_files(b)?);
+/// Compares the episode files of a folder with those of the run byte by byte, which is faster than parsing
+/// them.
+fn same_files(source: &Path, folder: &RunFolder) -> Result<bool> {
+    let (a, b) = (episode_files(source)?, episode_files(&folder.episode_files())?);
     let names = |files: &[PathBuf]| -> Vec<_> {
         files.iter().filter_map(|p| p.file_name().map(ToOwned::to_owned)).collect()
     };
@@ -180,7 +189,7 @@ fn same_files(a: &Path, b: &Path) -> Result<bool> {
         return Ok(false);
     }
     for (a, b) in a.iter().zip(&b) {
-        if read_episode_file(a)? != read_episode_file(b)? {
+        if read_episode_file(a)? != folder.copy_bytes(b)? {
             return Ok(false);
         }
     }
@@ -218,8 +227,7 @@ pub(super) fn read_source(source: &Path, options: &RunOptions) -> Result<Vec<Epi
 
 /// Copies episodes into the run, which then needs nothing from elsewhere.
 pub(super) fn copy_episodes(episodes: &[Episode], folder: &RunFolder) -> Result<()> {
-    let to = folder.episode_files();
-    fs::create_dir_all(&to).map_err(EvalError::io("make the folder", &to))?;
+    make_folders_below(folder.path(), &folder.episode_files())?;
     for episode in episodes {
         let copy = folder.episode_copy(episode.task(), episode.id());
         write_whole(&copy, episode.to_json().as_bytes())?;

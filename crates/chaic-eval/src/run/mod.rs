@@ -12,13 +12,16 @@ mod items;
 mod journal;
 mod options;
 mod shard;
+mod unique_names;
 mod worker;
 
 pub use environment::environments;
 pub use folder::{Access, RunFolder};
 pub use granted::RunGrants;
 pub use items::{Item, planned, tasks_of_files};
+pub(crate) use journal::read_journal;
 pub use journal::{Journal, read_results};
+pub(crate) use options::FILES;
 pub use options::{MAX_IMAGE_SIZE, MIN_IMAGE_SIZE, RunOptions, RunRequest};
 pub use shard::{Shard, merge};
 pub use worker::{Finished, Progress};
@@ -46,6 +49,9 @@ pub struct Run {
     journal: Journal,
     items: Vec<Item>,
     results: Vec<RunResult>,
+    /// Finished results whose traces are missing. Their episode runs count as missing and are played again;
+    /// their lines stay in the journal until then.
+    untraced: Vec<RunResult>,
 }
 
 /// How far a run has come.
@@ -81,8 +87,24 @@ impl Run {
             // It was removed between the first look and the lock.
             (None, None) => return Err(EvalError::NotARun { path: path.to_owned() }),
         };
-        let (journal, results, warnings) = Journal::open(&folder.results(), &items)?;
-        Ok((Run { folder, options, granted, journal, items, results }, warnings))
+        let (mut journal, results, warnings) = Journal::open(&folder.results(), &items)?;
+        journal.compact(results.iter())?;
+        let is_traced =
+            |r: &RunResult| !options.traces || r.summary().is_none() || folder.has_trace(&r.key);
+        let (results, untraced) = results.into_iter().partition(is_traced);
+        Ok((Run { folder, options, granted, journal, items, results, untraced }, warnings))
+    }
+
+    /// Returns a one-line note about finished episode runs that are played again because their traces are
+    /// missing; `None` if there are none.
+    pub fn untraced_note(&self) -> Option<String> {
+        let RunKey { helper, episode, seed, .. } = &self.untraced.first()?.key;
+        Some(format!(
+            "traces of {} of {} finished episode runs are missing; they are played again, first {episode} \
+             with {helper} and seed {seed}",
+            self.untraced.len(),
+            self.untraced.len() + self.results.iter().filter(|r| r.summary().is_some()).count(),
+        ))
     }
 
     /// The folder.
@@ -180,13 +202,20 @@ impl Run {
         let missing: Vec<Item> =
             of_shard.map(|(_, item)| item).filter(|i| !done.contains(&i.key)).cloned().collect();
         let (journal, results) = (&mut self.journal, &mut self.results);
+        let untraced = &mut self.untraced;
         let crew = worker::Crew { folder: &self.folder, options: &self.options, helpers, stop };
-        crew.play(&missing, jobs.max(1), progress, &mut |result| {
+        let played = crew.play(&missing, jobs.max(1), progress, &mut |result| {
+            if untraced.iter().any(|r| r.key == result.key) {
+                journal.expect_repetition();
+            }
             journal.append(result)?;
+            untraced.retain(|r| r.key != result.key);
             results.retain(|r| r.key != result.key);
             results.push(result.clone());
             Ok(())
-        })
+        });
+        self.journal.compact(self.results.iter().chain(&self.untraced))?;
+        played
     }
 }
 

@@ -3,19 +3,24 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use chaic_env::RunKey;
-use chaic_files::entries;
+use std::io::Write as _;
 
-use super::folder::{COMMANDS, RECORDS};
+use chaic_env::RunKey;
+use chaic_env::trace::MAX_TRACE_BYTES;
+use chaic_files::{
+    EntryKind, FileError, create_fresh, entries, kind, make_folders_below, read_below,
+};
+
+use super::folder::{COMMANDS, EPISODES, POLICIES, RECORDS};
 use super::items::planned;
-use super::journal::{Journal, read_results};
+use super::journal::{Journal, line_of, read_results};
 use super::{Access, Run, RunFolder};
 use crate::error::{EvalError, Result};
-use crate::metrics::RunResult;
+use crate::metrics::{FormulaSet, RunResult};
+use crate::report::{Report, write_files};
 
 /// Every so manieth episode run of a run, from one of them on. Its folder says nothing of it: it holds a part of the
 /// whole run, and can be gone on with as that.
@@ -57,12 +62,15 @@ impl FromStr for Shard {
     }
 }
 
-/// Joins shards of one run, or any parts of it, in a new folder. Its files are those of the run played at
-/// once, but for the order of the lines in the journal, which is that of the plan here.
+/// Joins shards of one run, or any parts of it, in a new folder, and writes the report. The files equal those
+/// of a run played on one machine, except that the lines of the journal are in the order of the plan.
+///
+/// `run.json` is written last. After an interruption, the folder is either a complete run, or the same merge
+/// can be repeated.
 ///
 /// # Errors
 /// If they are parts of different runs, tell of an episode run differently, or have helpers that ask language
-/// models; if files can't be read or written.
+/// models; if a finished episode run has no trace; if files can't be read or written.
 pub fn merge(out: &Path, parts: &[PathBuf]) -> Result<Run> {
     let Some(first) = parts.first() else {
         return Err(EvalError::Options("name the runs to be joined".to_owned()));
@@ -79,7 +87,7 @@ pub fn merge(out: &Path, parts: &[PathBuf]) -> Result<Run> {
                 part.display(),
             )));
         }
-        if folder.join(RECORDS).exists() {
+        if kind(&folder.join(RECORDS))? != EntryKind::Missing {
             return Err(EvalError::Options(format!(
                 "{} has helpers that ask language models, whose records can't be joined; play such a \
                  run in one folder",
@@ -91,30 +99,45 @@ pub fn merge(out: &Path, parts: &[PathBuf]) -> Result<Run> {
         EvalError::Options(format!("{} was begun by an older chaic", first.display()))
     })?;
     let items = planned(&source, &options)?;
-    let results = results(parts, &items.iter().map(|item| &item.key).collect::<Vec<_>>())?;
+    let order: Vec<&RunKey> = items.iter().map(|item| &item.key).collect();
+    let from_parts = results(parts, &order)?;
+    let is_traced = |result: &RunResult| options.traces && result.summary().is_some();
+    for (result, part) in from_parts.iter().filter(|(result, _)| is_traced(result)) {
+        check_trace(&RunFolder::read(part)?.0, &result.key)?;
+    }
 
-    let (folder, _) = RunFolder::lock(out, Access::Begin)?;
-    if source.episode_files().exists() {
-        copy_all(&source.episode_files(), &folder.episode_files())?;
-    }
-    if source.join(COMMANDS).exists() {
-        copy(&source.join(COMMANDS), &folder.join(COMMANDS))?;
-    }
-    for (result, part) in &results {
-        let traced = options.traces && result.summary().is_some();
-        if traced {
-            let (part, _) = RunFolder::read(part)?;
-            copy(&part.trace(&result.key), &folder.trace(&result.key))?;
+    let (folder, _) = RunFolder::lock(out, Access::Merge)?;
+    folder.begin_merge()?;
+    copy_episodes(&source, &folder)?;
+    for name in [COMMANDS, POLICIES] {
+        if kind(&source.join(name))? != EntryKind::Missing {
+            copy((&source, &source.join(name)), (&folder, &folder.join(name)))?;
         }
     }
-    let line = |result: &RunResult| {
-        serde_json::to_string(result).expect("a result has string keys") + "\n"
-    };
-    let lines: String = results.iter().map(|(result, _)| line(result)).collect();
+    for (result, part) in from_parts.iter().filter(|(result, _)| is_traced(result)) {
+        let (part, _) = RunFolder::read(part)?;
+        copy((&part, &part.trace(&result.key)), (&folder, &folder.trace(&result.key)))?;
+    }
+    let results: Vec<RunResult> = from_parts.into_iter().map(|(result, _)| result).collect();
+    let lines: String = results.iter().map(|result| line_of(result) + "\n").collect();
     folder.write("results.jsonl", lines.as_bytes())?;
+    if !results.is_empty() {
+        let (granted, formulas) = (Some(&granted), FormulaSet::Paper);
+        let (options, results, planned) = (&options, &results, &items);
+        write_files(&folder, &Report { options, results, planned, granted, formulas })?;
+    }
     folder.write_options(&options, &granted)?;
+    folder.end_merge()?;
     let (journal, results, _) = Journal::open(&folder.results(), &items)?;
-    Ok(Run { folder, options, granted, journal, items, results })
+    Ok(Run { folder, options, granted, journal, items, results, untraced: Vec::new() })
+}
+
+/// Fails if a part has no trace of a finished episode run.
+fn check_trace(part: &RunFolder, key: &RunKey) -> Result<()> {
+    if part.has_trace(key) {
+        return Ok(());
+    }
+    Err(EvalError::Untraced { path: part.path().to_owned(), key: key.clone() })
 }
 
 /// The results of all parts in the order of the plan, with the part that each is from. Where one part has
@@ -145,17 +168,29 @@ fn results<'p>(parts: &'p [PathBuf], order: &[&RunKey]) -> Result<Vec<(RunResult
     Ok(order.iter().filter_map(|key| found.remove(key)).collect())
 }
 
-fn copy_all(from: &Path, to: &Path) -> Result<()> {
-    for file in entries(from)? {
+/// Copies the episode files of a run.
+fn copy_episodes(source: &RunFolder, folder: &RunFolder) -> Result<()> {
+    let copies = source.join(EPISODES);
+    if kind(&copies)? == EntryKind::Missing {
+        return Ok(());
+    }
+    for file in entries(&copies)? {
         let name = file.file_name().unwrap_or_default();
-        copy(&file, &to.join(name))?;
+        copy((source, &file), (folder, &folder.join(EPISODES).join(name)))?;
     }
     Ok(())
 }
 
-fn copy(from: &Path, to: &Path) -> Result<()> {
-    let folder = to.parent().unwrap_or(to);
-    fs::create_dir_all(folder).map_err(EvalError::io("make the folder", folder))?;
-    fs::copy(from, to).map_err(EvalError::io("copy", from))?;
-    Ok(())
+/// Copies a regular file from one run to another. It does not sync: an interrupted merge is repeated as a
+/// whole.
+fn copy((source, from): (&RunFolder, &Path), (folder, to): (&RunFolder, &Path)) -> Result<()> {
+    // Traces have the highest limit of all files of a run.
+    let bytes = read_below(source.path(), from, MAX_TRACE_BYTES + 1)?;
+    if bytes.len() as u64 > MAX_TRACE_BYTES {
+        let problem = format!("it is longer than {MAX_TRACE_BYTES} bytes, no file of a run is");
+        return Err(FileError::of("copy", from)(std::io::Error::other(problem)).into());
+    }
+    make_folders_below(folder.path(), to.parent().unwrap_or(folder.path()))?;
+    let written = create_fresh(to).and_then(|mut file| file.write_all(&bytes));
+    Ok(written.map_err(FileError::of("write", to))?)
 }

@@ -1,6 +1,8 @@
 //! A run survives whatever happens to it, and is the same however it was played.
 
 mod beginning;
+mod forging;
+mod merging;
 mod verifying;
 
 use std::fs;
@@ -519,7 +521,7 @@ fn a_replay_of_an_altered_trace_stops_at_the_first_wrong_digest() {
     assert!(play(&mut run, 1, &helpers));
     let path = run.folder().traces().unwrap().remove(0);
     let whole = crate::trace_file::read(&path).unwrap().0;
-    let episode = run.folder().episode(&whole.header.key()).unwrap();
+    let episode = run.folder().episode(run.options(), &whole.header.key()).unwrap();
     let replayed = |trace: &chaic_env::trace::Trace| {
         let mut replay = crate::replay::Replay::new(trace, &episode)?;
         while replay.step()? {}

@@ -23,6 +23,10 @@ use crate::trace_file::Writer;
 /// A worker tells of its frames every so many decisions.
 const NEWS_EVERY: u32 = 32;
 
+/// Maximum length of a recorded error message, bytes: far more than a traceback, and short enough for a
+/// line of the journal.
+const MAX_MESSAGE_BYTES: usize = 1 << 20;
+
 /// What happens during a run.
 #[derive(Clone, Debug)]
 pub enum Progress {
@@ -186,6 +190,7 @@ impl Crew<'_> {
             Err(panic) => (None, Some(text_of(panic.as_ref()).to_owned())),
         };
         if let Some(text) = broken {
+            let text = shortened(text, MAX_MESSAGE_BYTES);
             let ending = Ending::Error { message: format!("the episode broke down: {text}") };
             if let Some(writer) = writer.take() {
                 writer.discard();
@@ -206,7 +211,7 @@ impl Crew<'_> {
         writer: &mut Option<Writer>,
         at: &mut dyn FnMut(Frame),
     ) -> Result<Option<RunResult>> {
-        let episode = self.folder.episode(key)?;
+        let episode = self.folder.episode(self.options, key)?;
         let rules = self.options.rules()?;
         let helper = minds::find_for(self.helpers, key, rules.planner)?;
         if let Some(helper) = &helper {
@@ -226,7 +231,8 @@ impl Crew<'_> {
         };
         let mut env = Env::new(config, Minds::of(helper, partner))?;
         if self.options.traces {
-            *writer = Some(Writer::create(&self.folder.trace(key), env.header())?);
+            let path = self.folder.trace(key);
+            *writer = Some(Writer::create(self.folder.path(), &path, env.header())?);
         }
         let mut tally = Tally::new(env.header());
         let (mut result, mut decisions) = (None, 0);
@@ -272,6 +278,12 @@ impl<'i> Queues<'i> {
     fn waiting(&self) -> Option<&'i Item> {
         self.waiting.get(self.next[1].fetch_add(1, Ordering::Relaxed)).copied()
     }
+}
+
+/// Truncates a text to at most `max_bytes`.
+fn shortened(mut text: String, max_bytes: usize) -> String {
+    text.truncate(text.floor_char_boundary(max_bytes));
+    text
 }
 
 /// What a panic said.

@@ -60,14 +60,16 @@ impl fmt::Display for Coverage {
 /// What comparing the report's files with the results found.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum ReportState {
-    /// There is none.
+    /// No comparison was made.
     #[default]
-    Absent,
+    Unchecked,
     /// This version of chaic began the run, so it writes another report.
     OfOtherVersion(String),
-    /// These of its files are not what the results give.
+    /// The files were compared with the results.
     Compared {
-        /// Their names; none of a good report.
+        /// Names of missing files.
+        missing: Vec<&'static str>,
+        /// Names of files with other content, and of entries that are not regular files.
         altered: Vec<&'static str>,
     },
 }
@@ -84,7 +86,12 @@ impl ReportState {
         }
         let (granted, formulas) = (folder.granted()?, FormulaSet::Paper);
         let report = Report { options, results, planned, granted: granted.as_ref(), formulas };
-        let altered = differing_files(folder, &report)?;
-        Ok(altered.map_or(ReportState::Absent, |altered| ReportState::Compared { altered }))
+        let (missing, altered) = differing_files(folder, &report)?;
+        Ok(ReportState::Compared { missing, altered })
+    }
+
+    /// Returns whether the report was compared and equals what the results give.
+    pub fn is_good(&self) -> bool {
+        matches!(self, ReportState::Compared { missing, altered } if missing.is_empty() && altered.is_empty())
     }
 }

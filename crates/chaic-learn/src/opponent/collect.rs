@@ -14,7 +14,7 @@ use chaic_env::minds::Helper;
 use chaic_env::rules::RuleSet;
 use chaic_env::{Env, EpisodeConfig, Minds, seeded_by_episode};
 use chaic_episodes::find_episode;
-use chaic_files::{FileError, read_bounded, write_whole};
+use chaic_files::{FileError, read_bounded, read_user_file, write_whole};
 use chaic_protocol::observation::Grants;
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{AgentError, AgentId, Briefing, Observation, TaskId};
@@ -377,13 +377,24 @@ pub fn write(path: &Path, samples: &[Sample]) -> Result<(), FileError> {
     write_whole(path, &bytes)
 }
 
-/// Reads windows that [`write()`] wrote.
+/// Reads windows that [`write()`] wrote into the folder of a training.
+///
+/// # Errors
+/// If the file is a link, can't be read, or isn't one.
+pub fn read(path: &Path) -> Result<Vec<Sample>, CollectError> {
+    parsed(path, &read_bounded(path, MOST_BYTES)?)
+}
+
+/// Reads windows from a file that a user named, which may be a link.
 ///
 /// # Errors
 /// If the file can't be read, or isn't one.
-pub fn read(path: &Path) -> Result<Vec<Sample>, CollectError> {
-    let bytes = read_bounded(path, MOST_BYTES)?;
-    parse(&bytes).map_err(|problem| CollectError::Format { path: path.to_owned(), problem })
+pub fn read_given(path: &Path) -> Result<Vec<Sample>, CollectError> {
+    parsed(path, &read_user_file(path, MOST_BYTES)?)
+}
+
+fn parsed(path: &Path, bytes: &[u8]) -> Result<Vec<Sample>, CollectError> {
+    parse(bytes).map_err(|problem| CollectError::Format { path: path.to_owned(), problem })
 }
 
 fn parse(bytes: &[u8]) -> Result<Vec<Sample>, String> {

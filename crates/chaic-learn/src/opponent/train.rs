@@ -1,8 +1,8 @@
 //! Learning the opponent model from windows.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
+use chaic_files::{EntryKind, kind};
 use chaic_nn::AdamRules;
 use chaic_nn::weights::{self, WeightsError};
 use chaic_protocol::geom::math;
@@ -10,7 +10,7 @@ use chaic_protocol::rng::Stream;
 use chaic_training::{Figures, Learner, Training, TrainingError, figures, rate_at};
 use serde::{Deserialize, Serialize};
 
-use super::collect::{CollectRules, Part, Sample, collect, read, write};
+use super::collect::{CollectRules, Part, Sample, collect, read, read_given, write};
 use super::network::{Heads, KIND, N_GOALS, OpponentModel, network};
 use super::report::Report;
 use super::{Goal, N_LIMITS};
@@ -103,11 +103,12 @@ impl Training for OpponentTraining {
         for (part, name) in WINDOWS {
             let path = folder.join(name);
             let given = rules.windows.as_ref().filter(|_| part == Part::Training);
-            let kept = given
-                .cloned()
-                .or_else(|| fs::exists(&path).is_ok_and(|is| is).then(|| path.clone()));
-            if let Some(kept) = kept {
-                windows.push(read(&kept).map_err(TrainingError::of_data)?);
+            if let Some(given) = given {
+                windows.push(read_given(given).map_err(TrainingError::of_data)?);
+                continue;
+            }
+            if kind(&path)? != EntryKind::Missing {
+                windows.push(read(&path).map_err(TrainingError::of_data)?);
                 continue;
             }
             let of_each = match part {

@@ -51,6 +51,9 @@ pub fn run(arguments: &EvalArguments, launcher: &Launcher) -> Result<Ended> {
     for warning in warnings {
         complain(&format!("warning: {warning}; that episode is played again"));
     }
+    if let Some(note) = run.untraced_note() {
+        complain(&format!("warning: {note}"));
+    }
     keep_workers_quiet();
     let extent = run.extent();
     let (tasks, names) = (&run.options().tasks, &run.options().helpers);
@@ -134,11 +137,16 @@ fn finish(run: &Run, began: Instant) -> Result<Ended> {
 
 /// Writes report and figures into the run's folder, and returns the report for a terminal.
 pub(super) fn leave_report(run: &Run) -> Result<String> {
-    let (folder, options, planned) = (run.folder(), run.options(), run.planned());
-    let (results, granted, formulas) = (run.results(), Some(run.granted()), FormulaSet::Paper);
-    let report = Report { options, results, planned, granted, formulas };
-    write_files(folder, &report)?;
+    let report = report_of(run);
+    write_files(run.folder(), &report)?;
     Ok(report.text(Format::Table))
+}
+
+/// Returns the report of a run.
+pub(super) fn report_of(run: &Run) -> Report<'_> {
+    let (options, planned) = (run.options(), run.planned());
+    let (results, granted, formulas) = (run.results(), Some(run.granted()), FormulaSet::Paper);
+    Report { options, results, planned, granted, formulas }
 }
 
 /// What is asked for, and the name of a folder for it. Nothing said at all is the small benchmark.

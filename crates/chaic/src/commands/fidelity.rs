@@ -116,6 +116,9 @@ fn open(matrix: &Matrix, part: &Part) -> Result<Run> {
     for warning in warnings {
         complain(&format!("warning: {warning}; that episode is played again"));
     }
+    if let Some(note) = run.untraced_note() {
+        complain(&format!("warning: {note}"));
+    }
     Ok(run)
 }
 

@@ -9,7 +9,6 @@ use chaic_env::minds::{NONE, RULES};
 use chaic_eval::EvalError;
 use chaic_eval::replay::find_trace;
 use chaic_eval::run::RunFolder;
-use chaic_eval::trace_file;
 use chaic_llm::language::{
     Language, helper_names, is_language_helper, is_language_partner, partner_names,
 };
@@ -70,7 +69,7 @@ fn shown(
     let usual = options.helpers.iter().find(asked).map(String::as_str);
     let helper = helper.or(usual).context("no helper of this run asked a language model")?;
     let path = find_trace(&folder, episode, Some(helper), seed)?;
-    let (trace, warnings) = trace_file::read(&path)?;
+    let (trace, warnings) = folder.read_trace(&path)?;
     for warning in warnings {
         complain(&format!("warning: {warning}"));
     }

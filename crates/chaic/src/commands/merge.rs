@@ -1,9 +1,10 @@
 //! `chaic merge`.
 
 use anyhow::Result;
+use chaic_eval::report::Format;
 use chaic_eval::run::merge;
 
-use super::eval::leave_report;
+use super::eval::report_of;
 use crate::arguments::MergeArguments;
 use crate::exit::Ended;
 use crate::output::{complain, counted, say};
@@ -21,7 +22,8 @@ pub fn run(arguments: &MergeArguments) -> Result<Ended> {
         ));
     }
     if extent.finished > 0 {
-        say(&leave_report(&run)?)?;
+        // The merge has written it already.
+        say(&report_of(&run).text(Format::Table))?;
     }
     Ok(if missing > 0 || extent.errors > 0 { Ended::WithFindings } else { Ended::Well })
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result};
-use chaic_files::read_bounded;
+use chaic_files::read_user_file;
 use chaic_learn::opponent::Goal;
 use chaic_learn::opponent::collect::{CollectRules, Part, Sample, collect, write};
 use chaic_learn::opponent::network::OpponentModel;
@@ -47,7 +47,7 @@ pub fn evaluate(arguments: &OpponentArguments) -> Result<Ended> {
 }
 
 fn read_model(path: &Path) -> Result<OpponentModel> {
-    let bytes = read_bounded(path, MOST_BYTES)?;
+    let bytes = read_user_file(path, MOST_BYTES)?;
     OpponentModel::from_bytes(&bytes).with_context(|| path.display().to_string())
 }
 

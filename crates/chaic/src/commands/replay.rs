@@ -9,7 +9,6 @@ use chaic_env::minds::{Helpers, Seeing};
 use chaic_eval::EvalError;
 use chaic_eval::replay::{self, Masks, ReplayOptions};
 use chaic_eval::run::{RunFolder, RunOptions};
-use chaic_eval::trace_file;
 use chaic_eval::verify::verify_trace;
 use chaic_llm::Language;
 use chaic_protocol::geom::Camera;
@@ -32,8 +31,8 @@ pub fn run(arguments: &ReplayArguments) -> Result<Ended> {
         return Err(EvalError::NoTraces { path: folder.path().to_owned() }.into());
     }
     let path = replay::find_trace(&folder, episode, helper.as_deref(), *seed)?;
-    let (trace, warnings) = trace_file::read(&path)?;
-    for warning in warnings {
+    let (trace, warnings) = folder.read_trace(&path)?;
+    for warning in &warnings {
         complain(&format!("warning: {warning}"));
     }
     let seeing = Seeing { sight: sight::recorded(&options) };
@@ -44,7 +43,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<Ended> {
         bail!("the trace was altered, so no video is made: {difference}");
     }
     let key = trace.header.key();
-    let episode = folder.episode(&key)?;
+    let episode = folder.episode(&options, &key)?;
     let bar = bars::plain(trace.end().map_or(0, |e| u64::from(e.frame)), "frames");
     let video = ReplayOptions { fps: *fps, every: *every };
     let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
@@ -71,7 +70,8 @@ pub fn run(arguments: &ReplayArguments) -> Result<Ended> {
         key.episode,
         key.helper
     ))?;
-    Ok(Ended::Well)
+    // The video of a cut-off trace shows only the part that is left.
+    Ok(if warnings.is_empty() { Ended::Well } else { Ended::WithFindings })
 }
 
 /// The detector by which the run's helpers saw, if it is known and still there.

@@ -5,7 +5,6 @@ use chaic_eval::EvalError;
 use chaic_eval::metrics::{RunResult, tally};
 use chaic_eval::report::{Format, Report, without_trace, write_figure};
 use chaic_eval::run::{Item, RunFolder, planned, read_results};
-use chaic_eval::trace_file;
 
 use crate::arguments::ReportArguments;
 use crate::exit::Ended;
@@ -57,7 +56,7 @@ fn from_journal(folder: &RunFolder, planned: &[Item]) -> Result<Vec<RunResult>> 
 fn from_traces(folder: &RunFolder, planned: &[Item]) -> Result<Vec<RunResult>> {
     let mut results = Vec::new();
     for path in folder.traces()? {
-        let (trace, warnings) = trace_file::read(&path)?;
+        let (trace, warnings) = folder.read_trace(&path)?;
         for warning in warnings {
             complain(&format!("warning: {warning}"));
         }

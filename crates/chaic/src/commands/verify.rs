@@ -34,7 +34,10 @@ pub fn run(arguments: &VerifyArguments) -> Result<Ended> {
     for mismatch in &verdict.mismatches {
         say(&format!("DIFFERS {mismatch}\n"))?;
     }
-    if verdict.agreeing + verdict.mismatches.len() == 0 {
+    for finding in &verdict.findings {
+        say(&format!("FOUND {finding}\n"))?;
+    }
+    if verdict.agreeing + verdict.mismatches.len() + verdict.findings.len() == 0 {
         anyhow::bail!("{} has no trace to verify", arguments.run.display());
     }
     say(&(summary(&verdict) + "\n"))?;
@@ -44,6 +47,10 @@ pub fn run(arguments: &VerifyArguments) -> Result<Ended> {
 /// What was found in the run, its traces and its report, a line each.
 fn summary(verdict: &Verdict) -> String {
     let (agreeing, n) = (verdict.agreeing, verdict.mismatches.len());
+    let others = match verdict.findings.len() {
+        0 => String::new(),
+        n => format!("\nother findings in the folder: {n}"),
+    };
     let traces = if n > 0 {
         format!("traces that differ: {n} of {}", n + agreeing)
     } else {
@@ -51,22 +58,27 @@ fn summary(verdict: &Verdict) -> String {
         format!("{traces} with {}: all digests agree", counted(decisions, "decision"))
     };
     let report = match &verdict.report {
-        ReportState::Absent => "there is no report yet".to_owned(),
-        ReportState::OfOtherVersion(chaic) => {
-            format!("the report is not checked, as chaic {chaic} began the run")
-        }
-        ReportState::Compared { altered } if altered.is_empty() => {
+        ReportState::Unchecked => "the report is not checked".to_owned(),
+        ReportState::OfOtherVersion(chaic) => format!(
+            "the report is NOT CHECKED, as chaic {chaic} began the run; verify it with that version"
+        ),
+        state @ ReportState::Compared { .. } if state.is_good() => {
             "the report is what the results give".to_owned()
         }
-        ReportState::Compared { altered } => {
-            let names = altered.join(", ");
-            format!("ALTERED {names}: the results give something else")
-        }
+        ReportState::Compared { missing, altered } => [
+            (missing, "MISSING", "write the report by chaic eval --resume"),
+            (altered, "ALTERED", "the results give something else"),
+        ]
+        .into_iter()
+        .filter(|(names, _, _)| !names.is_empty())
+        .map(|(names, what, why)| format!("{what} {}: {why}", names.join(", ")))
+        .collect::<Vec<_>>()
+        .join("\n"),
     };
     // Where its episodes are gone, nobody knows how many there should be.
     let coverage = match &verdict.coverage {
         coverage if coverage.planned > 0 => format!("{coverage}\n"),
         _ => String::new(),
     };
-    format!("{coverage}{traces}\n{report}")
+    format!("{coverage}{traces}{others}\n{report}")
 }

@@ -13,6 +13,7 @@ mod language;
 mod learning;
 mod perception;
 mod pictures;
+mod run_folders;
 mod sandbox;
 mod splits;
 mod subprocess;

@@ -1,0 +1,536 @@
+//! Promise: `chaic verify` fails on a run whose folder was forged. Each row of the tables is an attack. Unless an
+//! attack is on the report, the report is written again afterwards, so that it does not give the attack away.
+
+use super::*;
+use crate::report::{Report, write_files};
+
+/// The attacked trace and its folder.
+const TRACE: &str = "traces/low_target/turner/short-0-s0.jsonl";
+const TRACES_OF_HELPER: &str = "traces/low_target/turner";
+
+/// Plays two tasks with two helpers and writes the report.
+fn whole_run(path: &Path, source: &tempfile::TempDir, helpers: &TestHelpers) {
+    let given = RunRequest { seeds: None, ..given(source, &["none", "turner"]) };
+    let (mut run, _) = Run::open(path, Access::Begin, &given, helpers).unwrap();
+    assert!(play(&mut run, 2, helpers));
+    drop(run);
+    write_report(path);
+}
+
+/// Writes the report of the results, if they can be read.
+fn write_report(path: &Path) {
+    let Ok((folder, options)) = RunFolder::read(path) else { return };
+    let planned = planned(&folder, &options).unwrap_or_default();
+    let Ok((results, _)) = read_results(&folder.results(), &planned) else { return };
+    let granted = folder.granted().unwrap();
+    let (results, planned, formulas) = (&results, &planned, crate::metrics::FormulaSet::Paper);
+    let report =
+        Report { options: &options, results, planned, granted: granted.as_ref(), formulas };
+    write_files(&folder, &report).unwrap();
+}
+
+/// Verifies a run and returns the problems, one per line.
+fn problems(path: &Path, helpers: &TestHelpers) -> String {
+    let verdict = RunFolder::read(path).and_then(|(folder, options)| {
+        crate::verify::verify_run(&folder, &options, helpers, 1, &|_| ())
+    });
+    let verdict = match verdict {
+        Ok(verdict) => verdict,
+        Err(error) => return error.to_string(),
+    };
+    let mismatches = verdict.mismatches.iter().map(ToString::to_string);
+    let findings = verdict.findings.iter().map(ToString::to_string);
+    let warnings = verdict.warnings.iter().map(ToString::to_string);
+    let mut said: Vec<String> = mismatches.chain(findings).chain(warnings).collect();
+    if !verdict.report.is_good() {
+        said.push(format!("{:?}", verdict.report));
+    }
+    if !verdict.coverage.is_whole() {
+        said.push(verdict.coverage.to_string());
+    }
+    assert_eq!(said.is_empty(), verdict.is_good(), "{said:?}");
+    said.join("\n")
+}
+
+fn copy_folder(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for entry in chaic_files::entries(from).unwrap() {
+        let copy = to.join(entry.file_name().unwrap());
+        if entry.is_dir() {
+            copy_folder(&entry, &copy);
+        } else {
+            fs::copy(&entry, copy).unwrap();
+        }
+    }
+}
+
+/// Changes a text file.
+fn change(path: PathBuf, change: impl FnOnce(&str) -> String) {
+    let text = fs::read_to_string(&path).unwrap();
+    let changed = change(&text);
+    assert!(changed != text, "nothing is changed in {}", path.display());
+    fs::write(path, changed).unwrap();
+}
+
+fn replace(path: PathBuf, from: &str, to: &str) {
+    change(path, |text| text.replacen(from, to, 1));
+}
+
+fn add(path: PathBuf, bytes: &[u8]) {
+    let text = fs::read(&path).unwrap();
+    fs::write(path, [&text, bytes].concat()).unwrap();
+}
+
+/// Changes the result of the attacked episode run.
+fn forge(run: &Path, forgery: impl Fn(&mut serde_json::Value)) {
+    change(run.join("results.jsonl"), |text| {
+        let line = |line: &str| {
+            let mut result: serde_json::Value = serde_json::from_str(line).unwrap();
+            if result["task"] == "low_target" && result["helper"] == "turner" {
+                forgery(&mut result);
+            }
+            result.to_string() + "\n"
+        };
+        text.lines().map(line).collect()
+    });
+}
+
+/// Sets the attacked result to full marks.
+fn win(run: &Path) {
+    forge(run, |result| result["done"] = result["total"].clone());
+}
+
+/// Returns the journal line of the attacked episode run.
+fn line_of_attacked(run: &Path) -> String {
+    let text = fs::read_to_string(run.join("results.jsonl")).unwrap();
+    let is_it = |l: &&str| l.contains("\"low_target\"") && l.contains("\"turner\"");
+    text.lines().find(is_it).unwrap().to_owned() + "\n"
+}
+
+fn last_line(path: &Path) -> String {
+    fs::read_to_string(path).unwrap().lines().last().unwrap().to_owned() + "\n"
+}
+
+/// Whether the report is written again after an attack.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum AfterAttack {
+    Anew,
+    Left,
+}
+use AfterAttack::{Anew, Left};
+
+type Attack = (&'static str, AfterAttack, &'static str, fn(&Path));
+
+/// Attacks that work on any system.
+const ATTACKS: &[Attack] = &[
+    ("better result", Anew, "something else of this run", win),
+    ("trace is a folder", Anew, "its trace is not a regular file: it is a folder", |run| {
+        win(run);
+        fs::remove_file(run.join(TRACE)).unwrap();
+        fs::create_dir(run.join(TRACE)).unwrap();
+    }),
+    ("no trace", Anew, "its trace is missing", |run| {
+        win(run);
+        fs::remove_file(run.join(TRACE)).unwrap();
+    }),
+    ("no traces at all", Anew, "its trace is missing", |run| {
+        fs::remove_dir_all(run.join("traces")).unwrap();
+    }),
+    ("traces is a file", Anew, "traces: it is not a trace", |run| {
+        fs::remove_dir_all(run.join("traces")).unwrap();
+        fs::write(run.join("traces"), "").unwrap();
+    }),
+    ("empty trace", Anew, "can't be checked", |run| fs::write(run.join(TRACE), "").unwrap()),
+    ("trace without its end", Anew, "the episode's end is missing", |run| {
+        let end = last_line(&run.join(TRACE));
+        replace(run.join(TRACE), &end, "");
+    }),
+    ("better end", Anew, "played again it is", |run| {
+        win(run);
+        replace(run.join(TRACE), "\"done\":0.0", "\"done\":8.0");
+    }),
+    ("second end", Anew, "follows the end of the trace", |run| {
+        add(run.join(TRACE), last_line(&run.join(TRACE)).as_bytes());
+    }),
+    ("better second end", Anew, "follows the end of the trace", |run| {
+        let end = last_line(&run.join(TRACE)).replacen("\"done\":0.0", "\"done\":1.0", 1);
+        add(run.join(TRACE), end.as_bytes());
+    }),
+    ("record behind the end", Anew, "follows the end of the trace", |run| {
+        add(run.join(TRACE), b"{\"frame\":90,\"event\":\"over\",\"complete\":true}\n");
+    }),
+    ("torn record behind the end", Anew, "follows the end of the trace", |run| {
+        add(run.join(TRACE), b"[90,0,");
+    }),
+    ("no UTF-8 behind the end", Anew, "follows the end of the trace", |run| {
+        add(run.join(TRACE), b"\xff\xfe\n");
+    }),
+    ("very long line behind the end", Anew, "follows the end of the trace", |run| {
+        add(run.join(TRACE), &vec![b' '; 9 << 20]);
+    }),
+    ("empty line in a trace", Anew, "line 2", |run| replace(run.join(TRACE), "\n", "\n\n")),
+    ("other line breaks", Anew, "differs from the form that chaic writes", |run| {
+        change(run.join(TRACE), |text| text.replace('\n', "\r\n"));
+    }),
+    ("field more in the header", Anew, "line 1 differs from the form that chaic writes", |run| {
+        replace(run.join(TRACE), "{\"format\"", "{\"note\":1,\"format\"");
+    }),
+    ("field twice in the header", Anew, "duplicate field", |run| {
+        replace(run.join(TRACE), "{\"format\"", "{\"seed\":0,\"format\"");
+    }),
+    ("field more in an event", Anew, "differs from the form that chaic writes", |run| {
+        replace(run.join(TRACE), "{\"frame\"", "{\"note\":1,\"frame\"");
+    }),
+    ("field more beside the end", Anew, "differs from the form that chaic writes", |run| {
+        change(run.join(TRACE), |text| text.replacen("}}\n", "},\"note\":1}\n", 1));
+    }),
+    ("entry more in a decision", Anew, "trailing", |run| {
+        change(run.join(TRACE), |text| {
+            let second = text.lines().nth(1).unwrap();
+            text.replacen(second, &second.replace(']', ",null,7]"), 1)
+        });
+    }),
+    ("other version of chaic in a trace", Anew, "another version of chaic", |run| {
+        let now = format!("\"chaic\":\"{}\"", chaic_env::CHAIC_VERSION);
+        replace(run.join(TRACE), &now, "\"chaic\":\"0.0.9\"");
+    }),
+    ("trace of another seed", Anew, "doesn't play that episode run", |run| {
+        let other = run.join(TRACE.replace("-s0", "-s1"));
+        fs::copy(run.join(TRACE), other).unwrap();
+    }),
+    ("trace of another helper", Anew, "doesn't play that episode run", |run| {
+        fs::create_dir_all(run.join("traces/low_target/oracle")).unwrap();
+        fs::copy(run.join(TRACE), run.join(TRACE.replace("turner", "oracle"))).unwrap();
+    }),
+    ("trace of another task", Anew, "doesn't play that episode run", |run| {
+        copy_folder(&run.join("traces/low_target"), &run.join("traces/tremor"));
+    }),
+    ("path in other case", Anew, "doesn't play that episode run", |run| {
+        fs::create_dir_all(run.join("traces/low_target/Turner")).unwrap();
+        fs::copy(run.join(TRACE), run.join(TRACE.replace("turner", "Turner"))).unwrap();
+    }),
+    ("extension in other case", Anew, "it is not a trace of this run", |run| {
+        fs::copy(run.join(TRACE), run.join(TRACE.replace(".jsonl", ".JSONL"))).unwrap();
+    }),
+    ("trace in place of another", Anew, "that of another episode run", |run| {
+        fs::copy(run.join(TRACE), run.join(TRACE.replace("low_target", "shopping"))).unwrap();
+    }),
+    ("unfinished trace", Anew, "it is an unfinished trace", |run| {
+        fs::write(run.join(format!("{TRACE}.partial")), "").unwrap();
+    }),
+    ("stray file among traces", Anew, "it is not a trace of this run", |run| {
+        fs::write(run.join("traces/letter.txt"), "dear").unwrap();
+    }),
+    ("folder below a helper's", Anew, "it is not a trace: it is a folder", |run| {
+        copy_folder(&run.join("traces/shopping"), &run.join(TRACES_OF_HELPER).join("more"));
+    }),
+    ("result without its run", Anew, "which this run doesn't play", |run| {
+        let line = line_of_attacked(run).replace("\"seed\":0", "\"seed\":7");
+        add(run.join("results.jsonl"), line.as_bytes());
+    }),
+    ("trace without its result", Anew, "no finished result of this run", |run| {
+        replace(run.join("results.jsonl"), &line_of_attacked(run), "");
+    }),
+    ("bad result called broken", Anew, "no finished result of this run", |run| {
+        forge(run, |result| {
+            let mut broken = serde_json::json!({"status": "error", "message": "no luck"});
+            for name in RunKey::FIELDS {
+                broken[name] = result[name].clone();
+            }
+            *result = broken;
+        });
+    }),
+    ("result twice", Anew, "is a second result of low_target/short/0", |run| {
+        add(run.join("results.jsonl"), line_of_attacked(run).as_bytes());
+    }),
+    ("better result before the good one", Anew, "is a second result", |run| {
+        let good = line_of_attacked(run);
+        win(run);
+        add(run.join("results.jsonl"), good.as_bytes());
+    }),
+    ("better result behind the good one", Anew, "is a second result", |run| {
+        let good = line_of_attacked(run);
+        win(run);
+        let forged = line_of_attacked(run);
+        replace(run.join("results.jsonl"), &forged, &good);
+        add(run.join("results.jsonl"), forged.as_bytes());
+    }),
+    ("field more in a result", Anew, "unknown field `note`", |run| {
+        forge(run, |result| result["note"] = 1.into());
+    }),
+    ("field twice in a result", Anew, "the field `done` occurs twice", |run| {
+        replace(run.join("results.jsonl"), "\"done\":", "\"done\":9.0,\"done\":");
+    }),
+    ("count of a helper that counts nothing", Anew, "a built-in mind counts nothing", |run| {
+        replace(run.join("results.jsonl"), "\"digest\"", "\"counts\":{\"partner.x\":1},\"digest\"");
+    }),
+    ("measures of one result less", Anew, "something else of this run", |run| {
+        forge(run, |result| drop(result.as_object_mut().unwrap().remove("measures")));
+    }),
+    ("torn result behind the others", Anew, "is cut off", |run| {
+        add(run.join("results.jsonl"), b"{\"task\":\"low_target\"");
+    }),
+    ("no UTF-8 in results", Anew, "results.jsonl: line 5", |run| {
+        add(run.join("results.jsonl"), b"\xff\xfe\n");
+    }),
+    ("very long result", Anew, "line 5: is longer than", |run| {
+        add(run.join("results.jsonl"), &vec![b' '; 9 << 20]);
+    }),
+    ("results are a folder", Left, "results.jsonl: it is a folder", |run| {
+        fs::remove_file(run.join("results.jsonl")).unwrap();
+        fs::create_dir(run.join("results.jsonl")).unwrap();
+    }),
+    ("no scores", Left, "missing: [\"scores.json\"]", |run| {
+        fs::remove_file(run.join("scores.json")).unwrap();
+    }),
+    ("no report", Left, "missing: [\"report.md\"]", |run| {
+        fs::remove_file(run.join("report.md")).unwrap();
+    }),
+    ("no figure", Left, "missing: [\"figure.svg\"]", |run| {
+        fs::remove_file(run.join("figure.svg")).unwrap();
+    }),
+    ("better scores", Left, "altered: [\"scores.json\"]", |run| {
+        replace(run.join("scores.json"), "0.0", "1.0");
+    }),
+    ("report is a folder", Left, "altered: [\"report.md\"]", |run| {
+        fs::remove_file(run.join("report.md")).unwrap();
+        fs::create_dir(run.join("report.md")).unwrap();
+    }),
+    ("no episodes", Anew, "episodes", |run| fs::remove_dir_all(run.join("episodes")).unwrap()),
+    ("easier episode", Anew, "not what this run has: setup", |run| {
+        let copy = run.join("episodes/low_target-short-0.json");
+        replace(copy, "\"horizon\": 90", "\"horizon\": 91");
+    }),
+    ("episode under another name", Anew, "under another name", |run| {
+        let copy = run.join("episodes/low_target-short-0.json");
+        fs::copy(&copy, run.join("episodes/a.json")).unwrap();
+    }),
+    ("field more in run.json", Anew, "run.json: its form differs", |run| {
+        replace(run.join("run.json"), "\"format\"", "\"note\": 1,\n  \"format\"");
+    }),
+    ("no grants in run.json", Anew, "it lacks the grants of helpers", |run| {
+        change(run.join("run.json"), |text| {
+            let mut file: serde_json::Value = serde_json::from_str(text).unwrap();
+            file.as_object_mut().unwrap().remove("granted");
+            serde_json::to_string_pretty(&file).unwrap() + "\n"
+        });
+    }),
+    (
+        "grants of nobody in run.json",
+        Anew,
+        "its grants are not those of the helpers that play",
+        |run| {
+            replace(run.join("run.json"), "\"turner\": {", "\"turnip\": {");
+        },
+    ),
+    ("other version in run.json", Anew, "OfOtherVersion", |run| {
+        replace(run.join("run.json"), chaic_env::CHAIC_VERSION, "0.0.9");
+    }),
+];
+
+fn check_attacks(attacks: &[Attack]) {
+    let source = episode_files(&[TaskId::LowTarget, TaskId::Shopping], 1);
+    let (dir, helpers) = (tempfile::tempdir().unwrap(), TestHelpers::new());
+    let good = dir.path().join("good");
+    whole_run(&good, &source, &helpers);
+    assert_eq!(problems(&good, &helpers), "");
+    copy_folder(&good, &dir.path().join("copy"));
+    assert_eq!(problems(&dir.path().join("copy"), &helpers), "", "a copy is as good");
+    let mut passed = Vec::new();
+    for (k, (name, report, words, attack)) in attacks.iter().enumerate() {
+        let run = dir.path().join(k.to_string());
+        copy_folder(&good, &run);
+        attack(&run);
+        if *report == Anew {
+            write_report(&run);
+        }
+        let said = problems(&run, &helpers);
+        if !said.contains(words) {
+            passed.push(format!("{name}: expected {words:?}, verify said {said:?}"));
+        }
+    }
+    assert!(passed.is_empty(), "{}", passed.join("\n"));
+}
+
+#[test]
+fn no_forged_run_is_passed() {
+    assert!(ATTACKS.len() >= 25, "the issue asks for so many");
+    check_attacks(ATTACKS);
+}
+
+#[cfg(unix)]
+mod special_files {
+    use std::os::unix::fs::symlink;
+
+    use super::*;
+
+    /// Moves an entry out of the run and puts a link in its place.
+    fn link(run: &Path, name: &str) {
+        let moved = run.with_extension("moved");
+        fs::rename(run.join(name), &moved).unwrap();
+        symlink(&moved, run.join(name)).unwrap();
+    }
+
+    fn pipe(path: PathBuf) {
+        let _ = fs::remove_file(&path);
+        assert!(std::process::Command::new("mkfifo").arg(path).status().unwrap().success());
+    }
+
+    fn endless(path: PathBuf) {
+        fs::remove_file(&path).unwrap();
+        symlink("/dev/zero", path).unwrap();
+    }
+
+    const ATTACKS: &[Attack] = &[
+        (
+            "trace is a pipe",
+            Anew,
+            "its trace is not a regular file: it is no regular file",
+            |run| {
+                win(run);
+                pipe(run.join(TRACE));
+            },
+        ),
+        (
+            "trace leads to /dev/zero",
+            Anew,
+            "its trace is not a regular file: it is a link",
+            |run| {
+                win(run);
+                endless(run.join(TRACE));
+            },
+        ),
+        ("trace is a link", Anew, "its trace is not a regular file: it is a link", |run| {
+            link(run, TRACE)
+        }),
+        (
+            "trace is a dangling link",
+            Anew,
+            "its trace is not a regular file: it is a link",
+            |run| {
+                fs::remove_file(run.join(TRACE)).unwrap();
+                symlink("nowhere", run.join(TRACE)).unwrap();
+            },
+        ),
+        ("helper's folder is a link", Anew, "lies in a linked folder", |run| {
+            link(run, TRACES_OF_HELPER);
+        }),
+        ("task's folder is a link", Anew, "lies in a linked folder", |run| {
+            link(run, "traces/low_target");
+        }),
+        ("traces is a link", Anew, "lies in a linked folder", |run| link(run, "traces")),
+        ("pipe among traces", Anew, "it is not a trace: it is no regular file", |run| {
+            pipe(run.join(TRACES_OF_HELPER).join("short-0-s1.jsonl"));
+        }),
+        ("link among traces", Anew, "it is not a trace: it is a link", |run| {
+            symlink("short-0-s0.jsonl", run.join(TRACES_OF_HELPER).join("short-0-s1.jsonl"))
+                .unwrap();
+        }),
+        ("trace is a hard link to another", Anew, "that of another episode run", |run| {
+            let other = run.join(TRACE.replace("low_target", "shopping"));
+            fs::remove_file(&other).unwrap();
+            fs::hard_link(run.join(TRACE), other).unwrap();
+        }),
+        ("results are a pipe", Left, "results.jsonl: it is no regular file", |run| {
+            pipe(run.join("results.jsonl"));
+        }),
+        ("results lead to /dev/zero", Left, "results.jsonl: it is a link", |run| {
+            endless(run.join("results.jsonl"));
+        }),
+        ("results are a link", Left, "results.jsonl: it is a link", |run| {
+            link(run, "results.jsonl");
+        }),
+        ("run.json is a link", Left, "run.json: it is a link", |run| link(run, "run.json")),
+        ("run.json is a pipe", Left, "run.json: it is no regular file", |run| {
+            pipe(run.join("run.json"));
+        }),
+        ("scores are a link", Left, "altered: [\"scores.json\"]", |run| link(run, "scores.json")),
+        ("report is a pipe", Left, "altered: [\"report.md\"]", |run| pipe(run.join("report.md"))),
+        ("picture is a link", Left, "altered: [\"figure.png\"]", |run| link(run, "figure.png")),
+        ("episodes is a link", Anew, "episodes", |run| link(run, "episodes")),
+        ("an episode is a link", Anew, "episodes", |run| {
+            link(run, "episodes/low_target-short-0.json");
+        }),
+        ("an episode is a pipe", Anew, "episodes", |run| {
+            pipe(run.join("episodes/low_target-short-0.json"));
+        }),
+    ];
+
+    #[test]
+    fn no_link_or_special_file_is_passed() {
+        check_attacks(ATTACKS);
+    }
+
+    #[test]
+    fn a_run_that_a_user_names_by_a_link_is_passed() {
+        let source = episode_files(&[TaskId::LowTarget, TaskId::Shopping], 1);
+        let (dir, helpers) = (tempfile::tempdir().unwrap(), TestHelpers::new());
+        whole_run(&dir.path().join("good"), &source, &helpers);
+        symlink("good", dir.path().join("named")).unwrap();
+        assert_eq!(problems(&dir.path().join("named"), &helpers), "");
+    }
+
+    #[test]
+    fn going_on_reads_and_writes_nothing_through_links() {
+        let source = episode_files(&[TaskId::LowTarget, TaskId::Shopping], 1);
+        let (dir, helpers) = (tempfile::tempdir().unwrap(), TestHelpers::new());
+        let good = dir.path().join("good");
+        whole_run(&good, &source, &helpers);
+        let resume = |path: &Path| {
+            let (mut run, _) = Run::open(path, Access::Resume, &RunRequest::default(), &helpers)?;
+            run.play(1, &helpers, &helpers.stop, &mut |_| ())
+        };
+        for (k, name) in
+            ["results.jsonl", ".lock", "run.json", "traces", "traces/low_target", "episodes"]
+                .iter()
+                .enumerate()
+        {
+            let run = dir.path().join(k.to_string());
+            copy_folder(&good, &run);
+            // The episode run is played again, so its trace is written.
+            fs::remove_file(run.join(TRACE)).unwrap();
+            link(&run, name);
+            let moved = run.with_extension("moved");
+            if *name == "results.jsonl" {
+                // A torn record, which resuming cuts off.
+                add(moved.clone(), b"{\"task");
+            }
+            let before = walked(&moved);
+            let error = resume(&run).unwrap_err().to_string();
+            assert!(error.contains("it is a link"), "{name}: {error}");
+            assert_eq!(walked(&moved), before, "{name}");
+        }
+    }
+
+    /// Lists paths, kinds and lengths of all entries below a path.
+    fn walked(path: &Path) -> Vec<(chaic_files::Entry, u64)> {
+        let found = chaic_files::walk(path, 9).unwrap().into_iter();
+        found.map(|e| (e.clone(), fs::symlink_metadata(&e.path).unwrap().len())).collect()
+    }
+}
+
+/// A run of a split ignores episode files in its folder.
+#[test]
+fn files_planted_in_a_run_of_a_split_are_not_played() {
+    let (dir, helpers) = (tempfile::tempdir().unwrap(), TestHelpers::new());
+    let given = RunRequest {
+        episodes: None,
+        split: Some(chaic_episodes::Split::Test),
+        tasks: Some(vec![TaskId::LowTarget]),
+        first: Some(1),
+        ..given(&dir, &["turner"])
+    };
+    let (run, _) = Run::open(&dir.path().join("run"), Access::Begin, &given, &helpers).unwrap();
+    let key = &run.planned()[0].key;
+    let bundled = run.folder().episode(run.options(), key).unwrap();
+    let mut setup = bundled.clone().into_setup();
+    setup.horizon = HORIZON;
+    let easier = Episode::new(bundled.id(), "test", None, setup).unwrap();
+    let copy = run.folder().episode_copy(key.task, &key.episode);
+    fs::create_dir_all(copy.parent().unwrap()).unwrap();
+    fs::write(&copy, easier.to_json()).unwrap();
+    assert!(run.folder().episode(run.options(), key).unwrap() == bundled);
+    drop(run);
+    let said = problems(&dir.path().join("run"), &helpers);
+    assert!(said.contains("this run plays the split test, which has no episode files"), "{said}");
+}

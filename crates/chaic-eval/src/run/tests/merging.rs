@@ -1,0 +1,237 @@
+//! Promise: after a merge is killed at any moment, the folder is a complete run, or the same merge can be repeated.
+//! (Issue 35: leftover `*.tmp` files blocked both merge and resume.)
+
+use super::*;
+
+/// Plays two shards of a run; returns their parent folder and paths.
+fn shards(helpers: &TestHelpers) -> (tempfile::TempDir, Vec<PathBuf>) {
+    let files = episode_files(&[TaskId::Obstacle], 2);
+    let dir = tempfile::tempdir().unwrap();
+    let parts = (1..=2).map(|number| {
+        let path = dir.path().join(format!("part{number}"));
+        let given = given(&files, &["none", "turner"]);
+        let (mut part, _) = Run::open(&path, Access::Begin, &given, helpers).unwrap();
+        let shard = Shard::new(number, 2).unwrap();
+        assert!(part.play_shard(shard, 1, helpers, &helpers.stop, &mut |_| ()).unwrap());
+        path
+    });
+    let parts = parts.collect();
+    (dir, parts)
+}
+
+/// Returns names and contents of all files below a folder.
+fn files_below(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let found = chaic_files::walk(folder, 9).unwrap().into_iter();
+    let name = |path: &Path| path.strip_prefix(folder).unwrap().to_str().unwrap().to_owned();
+    found.map(|e| (name(&e.path), fs::read(&e.path).unwrap())).collect()
+}
+
+/// Sorts the files of a merged run by the order in which they are written.
+fn in_order(files: &[(String, Vec<u8>)]) -> Vec<(String, Vec<u8>)> {
+    let order = ["episodes/", "traces/", "results.jsonl", "scores.json", "report.md", "figure.svg"];
+    let order = order.into_iter().chain(["figure.png", "run.json"]);
+    let of = |first: &'static str| files.iter().filter(move |(name, _)| name.starts_with(first));
+    let written: Vec<_> = order.flat_map(of).cloned().collect();
+    assert_eq!(written.len() + 1, files.len(), "all but the lock: {files:?}");
+    written
+}
+
+fn write(folder: &Path, name: &str, bytes: &[u8]) {
+    let path = folder.join(name);
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn a_merge_that_was_stopped_at_any_step_begins_again_or_is_whole() {
+    let helpers = TestHelpers::new();
+    let (dir, parts) = shards(&helpers);
+    let reference = dir.path().join("reference");
+    drop(merge(&reference, &parts).unwrap());
+    let whole = files_below(&reference);
+    assert!(!reference.join(".merging").exists());
+    let steps = in_order(&whole);
+    for n_done in 0..=steps.len() {
+        for leaves_unfinished in [false, true] {
+            let out = dir.path().join(format!("{n_done}-{leaves_unfinished}"));
+            for name in [".lock", ".merging"] {
+                write(&out, name, b"");
+            }
+            for (name, bytes) in &steps[..n_done] {
+                write(&out, name, bytes);
+            }
+            if let Some((name, bytes)) = steps.get(n_done).filter(|_| leaves_unfinished) {
+                let half = &bytes[..bytes.len() / 2];
+                match name.contains('/') {
+                    true => write(&out, name, half),
+                    false => write(&out, &format!("{name}.tmp"), half),
+                }
+            }
+            if n_done == steps.len() {
+                let (folder, options) = RunFolder::read(&out).unwrap();
+                let verdict = crate::verify::verify_run(&folder, &options, &helpers, 1, &|_| ());
+                assert!(verdict.unwrap().is_good(), "only the mark is left");
+                let given = RunRequest::default();
+                drop(Run::open(&out, Access::Resume, &given, &helpers).unwrap());
+            } else {
+                for access in [Access::Begin, Access::Resume] {
+                    let error = RunFolder::lock(&out, access).unwrap_err();
+                    assert!(matches!(error, EvalError::StoppedMerge { .. }), "{n_done}: {error}");
+                }
+                let error = RunFolder::check_begun(&out).unwrap_err();
+                assert!(error.to_string().contains("run the same `chaic merge` again"), "{error}");
+                drop(merge(&out, &parts).unwrap());
+            }
+            assert_eq!(files_below(&out), whole, "{n_done} {leaves_unfinished}");
+        }
+    }
+    // Before the first step.
+    for (k, names) in [&[][..], &[".lock"]].iter().enumerate() {
+        let out = dir.path().join(format!("first{k}"));
+        fs::create_dir(&out).unwrap();
+        names.iter().for_each(|name| write(&out, name, b""));
+        drop(merge(&out, &parts).unwrap());
+        assert_eq!(files_below(&out), whole);
+    }
+}
+
+#[test]
+fn a_merge_that_is_cleared_away_in_any_order_begins_again() {
+    let helpers = TestHelpers::new();
+    let (dir, parts) = shards(&helpers);
+    let reference = dir.path().join("reference");
+    drop(merge(&reference, &parts).unwrap());
+    let whole = files_below(&reference);
+    let left = [
+        "episodes/a.json",
+        "traces/x/y/z.jsonl",
+        "results.jsonl.tmp",
+        "scores.json",
+        "run.json.tmp",
+    ];
+    for subset in 0..1_u32 << left.len() {
+        let out = dir.path().join(subset.to_string());
+        write(&out, ".lock", b"");
+        write(&out, ".merging", b"");
+        for (_, name) in left.iter().enumerate().filter(|(k, _)| subset >> k & 1 == 1) {
+            write(&out, name, b"{ torn");
+        }
+        drop(merge(&out, &parts).unwrap());
+        assert_eq!(files_below(&out), whole, "{subset}");
+    }
+}
+
+#[test]
+fn a_merge_removes_nothing_that_no_merge_has_left() {
+    let helpers = TestHelpers::new();
+    let (dir, parts) = shards(&helpers);
+    let cases: [&[&str]; 4] = [
+        &["letter.txt"],
+        &[".lock", "results.jsonl"],
+        &[".lock", ".merging", "letter.txt"],
+        &[".lock", ".merging", "run.json"],
+    ];
+    for (k, names) in cases.iter().enumerate() {
+        let out = dir.path().join(k.to_string());
+        names.iter().for_each(|name| write(&out, name, b"dear"));
+        let before = files_below(&out);
+        let error = merge(&out, &parts).unwrap_err();
+        assert!(matches!(error, EvalError::NotEmpty { .. }), "{names:?}: {error}");
+        let kept = |(name, _): &(String, Vec<u8>)| name != ".lock";
+        assert!(files_below(&out).iter().filter(|f| kept(f)).eq(before.iter().filter(|f| kept(f))));
+    }
+}
+
+#[test]
+fn a_merge_copies_regular_files_only_and_no_result_without_its_trace() {
+    let helpers = TestHelpers::new();
+    let (dir, parts) = shards(&helpers);
+    let folder = RunFolder::read(&parts[1]).unwrap().0;
+    let trace = folder.traces().unwrap().remove(0);
+    let bytes = fs::read(&trace).unwrap();
+    let refused = |name: &str| {
+        let out = dir.path().join(name);
+        let error = merge(&out, &parts).unwrap_err().to_string();
+        assert!(error.contains("has no trace of obstacle/short/"), "{error}");
+        assert!(error.contains("chaic eval --resume --out"), "{error}");
+        assert!(!out.exists());
+    };
+    fs::remove_file(&trace).unwrap();
+    refused("missing");
+    fs::create_dir(&trace).unwrap();
+    refused("folder");
+    fs::remove_dir(&trace).unwrap();
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("/etc/passwd", &trace).unwrap();
+        refused("link");
+        fs::remove_file(&trace).unwrap();
+        assert!(std::process::Command::new("mkfifo").arg(&trace).status().unwrap().success());
+        refused("pipe");
+        fs::remove_file(&trace).unwrap();
+    }
+    fs::write(&trace, bytes).unwrap();
+    #[cfg(unix)]
+    {
+        let copy = chaic_files::entries(&parts[0].join("episodes")).unwrap().remove(0);
+        fs::rename(&copy, dir.path().join("moved")).unwrap();
+        std::os::unix::fs::symlink(dir.path().join("moved"), &copy).unwrap();
+        let error = merge(&dir.path().join("linked"), &parts).unwrap_err().to_string();
+        assert!(error.contains("it is a link"), "{error}");
+        assert!(!dir.path().join("linked").exists());
+        fs::remove_file(&copy).unwrap();
+        fs::rename(dir.path().join("moved"), &copy).unwrap();
+    }
+    drop(merge(&dir.path().join("good"), &parts).unwrap());
+}
+
+#[test]
+fn results_whose_traces_are_gone_are_played_again() {
+    let files = episode_files(&[TaskId::LowTarget, TaskId::Shopping], 1);
+    let dir = tempfile::tempdir().unwrap();
+    let (path, helpers) = (dir.path().join("run"), TestHelpers::new());
+    let given = given(&files, &["none", "turner"]);
+    let (mut run, _) = Run::open(&path, Access::Begin, &given, &helpers).unwrap();
+    assert!(play(&mut run, 1, &helpers));
+    assert_eq!(run.untraced_note(), None);
+    drop(run);
+    let whole = files_below(&path);
+    let traces = RunFolder::read(&path).unwrap().0.traces().unwrap();
+    let journal = path.join("results.jsonl");
+    let sorted_lines = |text: &str| {
+        let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+        lines.sort();
+        lines
+    };
+    let before = fs::read_to_string(&journal).unwrap();
+    for gone in [&traces[..1], &traces[2..5], &traces[..]] {
+        gone.iter().for_each(|trace| fs::remove_file(trace).unwrap());
+        let (mut run, _) =
+            Run::open(&path, Access::Resume, &RunRequest::default(), &helpers).unwrap();
+        let n = gone.len();
+        assert_eq!(run.extent(), Extent { total: 8, finished: 8 - n, errors: 0 });
+        let note = run.untraced_note().unwrap();
+        assert!(
+            note.starts_with(&format!("traces of {n} of 8 finished episode runs are missing")),
+            "{note}"
+        );
+        // The old results stay until the episodes have been played again.
+        assert_eq!(fs::read_to_string(&journal).unwrap().len(), before.len());
+        assert!(play(&mut run, 2, &helpers));
+        assert_eq!(run.untraced_note(), None);
+        drop(run);
+        let after = fs::read_to_string(&journal).unwrap();
+        assert_eq!(sorted_lines(&after), sorted_lines(&before));
+        let but_results = |files: &[(String, Vec<u8>)]| {
+            let mut files = files.to_vec();
+            files.retain(|(name, _)| name != "results.jsonl");
+            files
+        };
+        assert!(but_results(&files_below(&path)) == but_results(&whole), "the same bits");
+    }
+    // Killed after the last result was appended, before the journal was rewritten.
+    let twice = before.lines().next().unwrap().to_owned() + "\n";
+    fs::write(&journal, before.clone() + &twice).unwrap();
+    drop(Run::open(&path, Access::Resume, &RunRequest::default(), &helpers).unwrap());
+    assert_eq!(sorted_lines(&fs::read_to_string(&journal).unwrap()), sorted_lines(&before));
+}

@@ -1,4 +1,4 @@
-//! Files that are whole or absent, and reads that never wait for a writer.
+//! Files that are whole or absent, reads that never wait for a writer, and locks on folders.
 //!
 //! **What it is not**: it knows nothing of what is in the files.
 //!
@@ -14,10 +14,14 @@ pub use open::{
     read_bounded, read_user_file,
 };
 
+mod lock;
+
 use std::ffi::OsString;
 use std::fs;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
+
+pub use lock::{FolderLock, LOCK, LockError};
 
 /// The operating system refused something.
 #[derive(Debug, thiserror::Error)]

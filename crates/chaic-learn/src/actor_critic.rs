@@ -98,7 +98,7 @@ pub fn step<M: ActorCritic, S: Sync, T: Default + Send>(
         let samples = &batch[from..(from + of_part).min(batch.len())];
         let mut told = T::default();
         if samples.is_empty() {
-            return told;
+            return Some(told);
         }
         let said = model.forward(numbers, samples.iter().map(|s| seen_of(s)), pass);
         let by_said: Vec<BySaid> = samples
@@ -107,9 +107,9 @@ pub fn step<M: ActorCritic, S: Sync, T: Default + Send>(
             .map(|(s, said)| gradient(s, said, share, &mut told))
             .collect();
         model.backward(numbers, &by_said, pass, by);
-        told
+        Some(told)
     };
-    learner.step(model.network(), (adam, rate), work)
+    learner.step(model.network(), (adam, rate), work).expect("no shard stops")
 }
 
 /// Logarithms of the probabilities that logits stand for.

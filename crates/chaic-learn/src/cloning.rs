@@ -3,6 +3,7 @@
 //! The teacher follows the oracle's rules and is told the goal, but sees, remembers and is granted no more than the
 //! helper that learns: so that what it does can be told from what the helper knows, as far as it can.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, PoisonError};
 
 use chaic_agents::behavior::BehaviorLog;
@@ -123,18 +124,23 @@ pub struct Learned {
     pub value_loss: f64,
 }
 
-/// Looks at each lesson once, in an order of the iteration's own.
+/// Looks at each lesson once, in an order of the iteration's own. Returns `None` if `stop` is raised meanwhile;
+/// some steps may have been taken then.
 pub fn imitate(
     (adam, rate, batch): (&AdamRules, f32, usize),
     model: &ChoiceNetwork,
     learner: &mut Learner,
     lessons: &[Lesson],
     (seed, iteration): (u64, u64),
-) -> Learned {
+    stop: &AtomicBool,
+) -> Option<Learned> {
     let mut order: Vec<usize> = (0..lessons.len()).collect();
     Stream::new(seed, "lessons", iteration).shuffle(&mut order);
     let mut sum = Learned::default();
     for batch in order.chunks(batch) {
+        if stop.load(Ordering::Relaxed) {
+            return None;
+        }
         let batch: Vec<&Lesson> = batch.iter().map(|k| &lessons[*k]).collect();
         let parts = step(model, (&mut *learner, adam, rate), &batch, |l| &l.decision, gradient);
         for learned in parts {
@@ -144,7 +150,8 @@ pub fn imitate(
         }
     }
     let n = lessons.len().max(1) as f64;
-    Learned { loss: sum.loss / n, agreement: sum.agreement / n, value_loss: sum.value_loss / n }
+    let (loss, agreement) = (sum.loss / n, sum.agreement / n);
+    Some(Learned { loss, agreement, value_loss: sum.value_loss / n })
 }
 
 /// The gradient of the loss of one lesson; adds what it was like to `learned`.

@@ -26,6 +26,7 @@ pub mod opponent;
 pub mod features;
 
 pub mod cloning;
+pub mod play_rules;
 pub mod policy;
 pub mod rewards;
 pub mod rollout;

@@ -1,9 +1,12 @@
 //! Proximal policy optimization (Schulman et al. 2017), for decisions that last differently long.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use chaic_nn::AdamRules;
 use chaic_protocol::geom::math;
 use chaic_protocol::rng::Stream;
 use chaic_training::Learner;
+use chaic_training::bounds::{ADAM, Bound, BoundTable, RATE, SHARDS, SHARE, integer, real};
 use serde::{Deserialize, Serialize};
 
 use crate::actor_critic::{ActorCritic, BySaid, Said, step};
@@ -68,6 +71,29 @@ impl Default for PpoRules {
         }
     }
 }
+
+/// Returns the bounds of [`PpoRules`] for batches of at most this many decisions.
+pub(crate) const fn ppo_bounds(max_batch: i64) -> [(&'static str, Bound); 12] {
+    [
+        ("discount", SHARE),
+        ("trace", SHARE),
+        // Without room for change nothing is learned; beyond 1 probabilities may fall to 0 at once.
+        ("clip", real(1e-3, 1.0)),
+        ("clip_value", real(0.0, 1e6)),
+        ("entropy", real(0.0, 100.0)),
+        ("value", real(0.0, 100.0)),
+        ("epochs", integer(1, 1000)),
+        ("batch", integer(1, max_batch)),
+        ("rate", RATE),
+        ("shards", SHARDS),
+        ("divergence", real(0.0, 100.0)),
+        ("adam", ADAM),
+    ]
+}
+/// Bounds of [`PpoRules`] where decisions are lists of plans.
+pub(crate) const PPO_BOUNDS: BoundTable = &ppo_bounds(MAX_BATCH);
+/// Largest number of decisions, lessons or windows of an optimizer step: a pass over them takes about a second.
+pub(crate) const MAX_BATCH: i64 = 1 << 14;
 
 /// A decision and what came of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -148,14 +174,16 @@ pub fn advantages<S>(rules: &PpoRules, trajectory: &Trajectory<S>) -> Vec<f32> {
 }
 
 /// Makes a policy better by what came of it. `iteration` names the order in which decisions are looked at; `rest`
-/// is the share of the training that is left.
+/// is the share of the training that is left. Returns `None` if `stop` is raised meanwhile; some steps may have
+/// been taken then.
 pub fn improve<M: ActorCritic>(
     rules: &PpoRules,
     model: &M,
     learner: &mut Learner,
     trajectories: &[Trajectory<M::Seen>],
     (seed, iteration, rest): (u64, u64, f32),
-) -> Told {
+    stop: &AtomicBool,
+) -> Option<Told> {
     let mut samples: Vec<Sample<'_, M::Seen>> = Vec::new();
     for trajectory in trajectories {
         let advantages = advantages(rules, trajectory);
@@ -172,6 +200,9 @@ pub fn improve<M: ActorCritic>(
         let index = iteration * rules.epochs as u64 + epoch as u64;
         Stream::new(seed, "batches", index).shuffle(&mut order);
         for batch in order.chunks(rules.batch) {
+            if stop.load(Ordering::Relaxed) {
+                return None;
+            }
             let batch: Vec<&Sample<'_, M::Seen>> = batch.iter().map(|k| &samples[*k]).collect();
             let how = (&mut *learner, &rules.adam, rate);
             let by = |s: &Sample<'_, M::Seen>, said: &Said, share, told: &mut Told| {
@@ -194,14 +225,14 @@ pub fn improve<M: ActorCritic>(
     }
     let n = f64::max(n_batches, 1.0);
     let Told { objective, value_loss, entropy, divergence, clipped, explained_variance } = told;
-    Told {
+    Some(Told {
         objective: objective / n,
         value_loss: value_loss / n,
         entropy: entropy / n,
         divergence: divergence / n,
         clipped: clipped / n,
         explained_variance,
-    }
+    })
 }
 
 /// The gradient of the loss of one decision; adds what it was like to `told`.

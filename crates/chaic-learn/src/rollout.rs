@@ -1,5 +1,6 @@
 //! Episodes that are played by a network, and what came of its choices.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, PoisonError};
 
 use chaic_agents::decision::Policy;
@@ -44,6 +45,8 @@ pub struct RolloutRules<'a> {
     pub choosing: Choosing,
     /// What is rewarded.
     pub rewards: Rewards,
+    /// Flag that stops the play; what was played so far comes to nothing.
+    pub stop: &'a AtomicBool,
 }
 
 /// What came of an episode.
@@ -79,12 +82,12 @@ impl Recording {
     }
 }
 
-/// Plays an episode with a helper whose policy is made for its goal.
+/// Plays an episode with a helper whose policy is made for its goal; `None` if it was stopped.
 fn record<P: Policy>(
     (id, seed): (&str, u32),
     rules: &RolloutRules<'_>,
     make: impl FnOnce(&Goal, Notes) -> P,
-) -> Result<Recording, RolloutError> {
+) -> Result<Option<Recording>, RolloutError> {
     let episode = find_episode(id)?;
     let notes = Notes::default();
     let policy = make(&episode.setup().goal, Arc::clone(&notes));
@@ -103,6 +106,9 @@ fn record<P: Policy>(
     let mut account = Account::new(rules.rewards);
     let mut earned = Vec::new();
     loop {
+        if rules.stop.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
         let frame = env.world().state().frame;
         earned.push((frame, account.earned(env.world())));
         if env.advance(Some(frame + 1))? == Flow::Ended {
@@ -114,10 +120,10 @@ fn record<P: Policy>(
     let noted = std::mem::take(&mut *notes.lock().unwrap_or_else(PoisonError::into_inner));
     let (done, total) = env.world().progress();
     let tr = if total > 0.0 { done / total } else { 0.0 };
-    Ok(Recording { noted, earned, tr, frames })
+    Ok(Some(Recording { noted, earned, tr, frames }))
 }
 
-/// Plays an episode with a network as the helper.
+/// Plays an episode with a network as the helper; `None` if it was stopped.
 ///
 /// # Errors
 /// [`RolloutError`]
@@ -126,10 +132,11 @@ pub fn play(
     seed: u32,
     trained: &Arc<Trained>,
     rules: &RolloutRules<'_>,
-) -> Result<Played, RolloutError> {
+) -> Result<Option<Played>, RolloutError> {
     let recording = record((id, seed), rules, |_, notes| {
         LearnedPolicy::new(Arc::clone(trained), rules.choosing, Some(notes))
     })?;
+    let Some(recording) = recording else { return Ok(None) };
     let transitions = recording.noted.iter().zip(recording.ends()).map(|(noted, end)| Transition {
         choice: noted.choice,
         log_probability: noted.log_probability,
@@ -139,11 +146,11 @@ pub fn play(
         decision: noted.decision.clone(),
     });
     let trajectory = Trajectory { transitions: transitions.collect(), value_after: 0.0 };
-    Ok(Played { trajectory, tr: recording.tr, frames: recording.frames })
+    Ok(Some(Played { trajectory, tr: recording.tr, frames: recording.frames }))
 }
 
 /// Plays an episode with a teacher at hand, who drives the helper itself or lets the network do so: what it taught,
-/// and the transport rate. Returns are discounted by this for each frame.
+/// and the transport rate; `None` if it was stopped. Returns are discounted by this for each frame.
 ///
 /// # Errors
 /// [`RolloutError`]
@@ -152,13 +159,14 @@ pub fn play_taught(
     trained: &Arc<Trained>,
     rules: &RolloutRules<'_>,
     (mixed, discount): (f32, f32),
-) -> Result<(Vec<Lesson>, f64), RolloutError> {
+) -> Result<Option<(Vec<Lesson>, f64)>, RolloutError> {
     let learner = || LearnedPolicy::new(Arc::clone(trained), Choosing::Sampled, None);
     let recording = record((id, seed), rules, |goal, notes| {
         let mut rng = Stream::new(u64::from(seed), id, 0);
         let driver = driver(mixed, &mut rng, learner);
         Teacher::new(goal.clone(), driver, trained.opponent.clone(), notes)
     })?;
+    let Some(recording) = recording else { return Ok(None) };
     let ends: Vec<Frame> = recording.ends().collect();
     let mut following = 0.0;
     let mut lessons: Vec<Lesson> = recording
@@ -173,10 +181,11 @@ pub fn play_taught(
         })
         .collect();
     lessons.reverse();
-    Ok((lessons, recording.tr))
+    Ok(Some((lessons, recording.tr)))
 }
 
-/// Plays episodes side by side on all cores; what comes of each depends on nothing but itself.
+/// Plays episodes side by side on all cores; what comes of each depends on nothing but itself. Returns `None` if
+/// they were stopped.
 ///
 /// # Errors
 /// The first one's that couldn't be played.
@@ -184,6 +193,8 @@ pub fn play_all(
     ids: &[(String, u32)],
     trained: &Arc<Trained>,
     rules: &RolloutRules<'_>,
-) -> Result<Vec<Played>, RolloutError> {
-    ids.par_iter().map(|(id, seed)| play(id, *seed, trained, rules)).collect()
+) -> Result<Option<Vec<Played>>, RolloutError> {
+    let played: Result<Vec<Option<Played>>, RolloutError> =
+        ids.par_iter().map(|(id, seed)| play(id, *seed, trained, rules)).collect();
+    Ok(played?.into_iter().collect())
 }

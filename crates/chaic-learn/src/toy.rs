@@ -173,6 +173,7 @@ mod tests {
     use super::*;
     use crate::ppo::{PpoRules, improve};
     use chaic_training::Learner;
+    use std::sync::atomic::AtomicBool;
 
     /// What is played after so many iterations of so many decisions.
     fn learn<T: Toy>(
@@ -189,7 +190,8 @@ mod tests {
         for iteration in 0..iterations {
             let (trajectories, _) = played(iteration, &learner);
             let rest = 1.0 - iteration as f32 / iterations as f32;
-            improve(rules, &model, &mut learner, &trajectories, (1, iteration, rest));
+            let (named, never) = ((1, iteration, rest), AtomicBool::new(false));
+            improve(rules, &model, &mut learner, &trajectories, named, &never).unwrap();
         }
         played(iterations, &learner)
     }

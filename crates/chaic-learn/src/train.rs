@@ -1,17 +1,17 @@
 //! The loops: episodes are played, and the network learns from them.
 
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
-use chaic_agents::sight::{GROUND_TRUTH, Sight};
-use chaic_files::read_user_file;
-use chaic_nn::AdamRules;
+use chaic_agents::sight::Sight;
 use chaic_nn::weights::{self, WeightsError};
-use chaic_protocol::TaskId;
-use chaic_protocol::rng::Stream;
-use chaic_training::{Figures, Learner, Training, TrainingError, figures, rate_at};
-use chaic_vision::sights::{self, SightError};
+use chaic_nn::{AdamRules, Network};
+use chaic_training::bounds::{ADAM, Bound, BoundTable, RATE, SEED, SHARDS, SHARE, STEPS, integer};
+use chaic_training::{
+    Checkpoint, CheckpointError, Figures, Learner, Training, TrainingError, figures, rate_at,
+};
 use rayon::prelude::*;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -20,15 +20,12 @@ use crate::choice_network::{ChoiceNetwork, Decision};
 use crate::cloning::{Learned, Lesson, imitate};
 use crate::features::{N_PLAN, N_PLAN_OF_OPPONENT, N_STATE, N_STATE_OF_OPPONENT};
 use crate::opponent::{self, network::OpponentModel};
+use crate::play_rules::{PLAY_BOUNDS, mean_tr};
 use crate::policy::{Choosing, Trained};
-use crate::ppo::{PpoRules, Told, improve};
-use crate::rewards::Rewards;
-use crate::rollout::{Played, RolloutRules, play_all, play_taught};
+use crate::ppo::{MAX_BATCH, PPO_BOUNDS, PpoRules, Told, improve};
+use crate::rollout::{play_all, play_taught};
 
-/// Seeds of generated episodes to learn from, and to validate by: none of any split, and none that perception
-/// was trained on.
-pub(crate) const TRAINING_SEEDS: (u64, usize) = (40_000_000, 1_000_000);
-pub(crate) const VALIDATION_SEEDS: u64 = 50_000_000;
+pub use crate::play_rules::PlayRules;
 
 /// What files of weights say that they are.
 const KIND: &str = "chaic plan policy 2";
@@ -36,8 +33,6 @@ const KIND: &str = "chaic plan policy 2";
 const KIND_WITH_OPPONENT: &str = "chaic plan policy with opponent model 1";
 /// What the numbers of the opponent model are called among a policy's.
 const OPPONENT: &str = "opponent";
-/// No file of weights is larger, bytes.
-const MOST_BYTES: u64 = 1 << 28;
 /// Width of the network's layers.
 const WIDTH: usize = 96;
 
@@ -101,112 +96,8 @@ pub fn from_bytes(bytes: &[u8]) -> Result<(Kind, Trained), WeightsError> {
     }
 }
 
-/// Which episodes are played, and how.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct PlayRules {
-    /// Episodes of each iteration.
-    pub episodes: usize,
-    /// The tasks whose episodes are played, by turns.
-    pub tasks: Vec<TaskId>,
-    /// Side of everybody's images while training, pixels.
-    pub image_size: u32,
-    /// By what the helper sees, and tells what its partner does: as `chaic eval` names it.
-    pub perception: String,
-    /// See `perception`.
-    pub behavior: String,
-    /// The weights of the opponent model that tells the policy of its partner (`chaic train opponent`), if there
-    /// is to be one.
-    pub opponent: Option<PathBuf>,
-    /// Whether the network's inputs are normalized by their mean and spread so far.
-    pub normalize: bool,
-    /// Episodes of each task that validations play.
-    pub validation_episodes: usize,
-    /// What is rewarded.
-    pub rewards: Rewards,
-}
-
-impl Default for PlayRules {
-    fn default() -> PlayRules {
-        PlayRules {
-            episodes: 32,
-            tasks: TaskId::paper().collect(),
-            image_size: 128,
-            perception: GROUND_TRUTH.to_owned(),
-            behavior: GROUND_TRUTH.to_owned(),
-            opponent: None,
-            normalize: false,
-            validation_episodes: 3,
-            rewards: Rewards::default(),
-        }
-    }
-}
-
-impl PlayRules {
-    fn check(&self) -> Result<(), String> {
-        if self.episodes.min(self.tasks.len()).min(self.validation_episodes) == 0 {
-            let least =
-                "play.episodes and play.validation_episodes are at least 1, and there is a task";
-            return Err(least.to_owned());
-        }
-        if !(16..=1024).contains(&self.image_size) {
-            return Err("play.image_size is 16 to 1024".to_owned());
-        }
-        self.sight().map_err(|e| e.to_string())?;
-        self.read_opponent().map_err(|e| e.to_string())?;
-        Ok(())
-    }
-
-    fn read_opponent(&self) -> Result<Option<OpponentModel>, TrainingError> {
-        let read = |path: &PathBuf| {
-            let wrong = |problem| TrainingError::Weights { path: path.clone(), problem };
-            OpponentModel::from_bytes(&read_user_file(path, MOST_BYTES)?).map_err(wrong)
-        };
-        self.opponent.as_ref().map(read).transpose()
-    }
-
-    fn sight(&self) -> Result<Arc<dyn Sight>, SightError> {
-        sights::named(&self.perception, &self.behavior)
-    }
-
-    fn rollout<'a>(&self, sight: &'a dyn Sight, choosing: Choosing) -> RolloutRules<'a> {
-        let PlayRules { image_size, rewards, .. } = *self;
-        RolloutRules { sight, image_size, choosing, rewards }
-    }
-
-    /// The episodes of an iteration.
-    fn episodes_of(&self, seed: u64, iteration: u64) -> Vec<(String, u32)> {
-        let (first, n) = TRAINING_SEEDS;
-        (0..self.episodes as u64)
-            .map(|k| {
-                let index = iteration * self.episodes as u64 + k;
-                let task = self.tasks[index as usize % self.tasks.len()];
-                let drawn = Stream::new(seed, "episodes", index).below(n) as u64;
-                (format!("{}/gen/{}", task.name(), first + drawn), 0)
-            })
-            .collect()
-    }
-
-    /// Transport rates on episodes that nothing is learned from.
-    fn validate(&self, sight: &dyn Sight, trained: &Arc<Trained>) -> Figures {
-        let seeds = || VALIDATION_SEEDS..VALIDATION_SEEDS + self.validation_episodes as u64;
-        let ids: Vec<(String, u32)> = self
-            .tasks
-            .iter()
-            .flat_map(|task| seeds().map(|seed| (format!("{}/gen/{seed}", task.name()), 0)))
-            .collect();
-        let ways = [("tr_sampled", Choosing::Sampled), ("tr_likeliest", Choosing::Likeliest)];
-        let tr = |choosing| {
-            let played = play_all(&ids, trained, &self.rollout(sight, choosing));
-            mean_tr(&played.expect("generated episodes can be played"))
-        };
-        figures(ways.map(|(name, choosing)| (name, tr(choosing))))
-    }
-}
-
-fn mean_tr(played: &[Played]) -> f64 {
-    played.iter().map(|p| p.tr).sum::<f64>() / played.len().max(1) as f64
-}
+/// Section of a checkpoint.
+const ITERATIONS: &str = "policy.iterations";
 
 /// A network while it learns, with the iterations so far.
 pub struct Learning {
@@ -236,20 +127,22 @@ impl Learning {
         self.model.normalize_by(&mut self.learner.numbers, decisions);
     }
 
-    fn weights(&self) -> Vec<u8> {
+    fn weights(&self) -> Result<Vec<u8>, WeightsError> {
         weights::to_bytes(&self.model.network, &self.learner.numbers, self.kind.name())
     }
 
-    fn checkpoint(&self) -> Vec<u8> {
-        let mut bytes = self.iterations.to_le_bytes().to_vec();
-        bytes.extend(self.learner.checkpoint());
-        bytes
+    fn checkpoint(&self) -> Checkpoint {
+        let mut checkpoint = Checkpoint::default();
+        checkpoint.insert_integers(ITERATIONS, vec![self.iterations]);
+        self.learner.save(&mut checkpoint);
+        checkpoint
     }
 
-    fn resume(&mut self, adam: &AdamRules, bytes: &[u8]) -> bool {
-        let Some((iterations, rest)) = bytes.split_first_chunk::<8>() else { return false };
-        self.iterations = u64::from_le_bytes(*iterations);
-        self.learner.resume(adam, rest)
+    fn resume(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        let iterations = checkpoint.integer(ITERATIONS)?;
+        self.learner.load(checkpoint)?;
+        self.iterations = iterations;
+        Ok(())
     }
 }
 
@@ -264,23 +157,25 @@ pub struct Course<'a> {
     pub play: &'a PlayRules,
     /// Parts of a batch that are worked on side by side.
     pub shards: usize,
-    /// How steps are taken.
-    pub adam: &'a AdamRules,
 }
 
 /// A way to learn, with all that it depends on.
 pub trait Method: Clone + Default + Serialize + DeserializeOwned {
-    /// What is wrong with it.
-    ///
-    /// # Errors
-    /// That, in a sentence.
-    fn check(&self) -> Result<(), String>;
+    /// Name of the training, as `chaic train` takes it.
+    const KIND: &'static str;
+    /// Bounds of every number.
+    const BOUNDS: BoundTable;
 
     /// What all ways to learn have.
     fn course(&self) -> Course<'_>;
 
-    /// An iteration of a helper who sees by this.
-    fn learn(&self, sight: &dyn Sight, learning: &mut Learning) -> Figures;
+    /// Does an iteration of a helper who sees by this; `None` if `stop` is raised meanwhile.
+    fn learn(
+        &self,
+        sight: &dyn Sight,
+        learning: &mut Learning,
+        stop: &AtomicBool,
+    ) -> Option<Figures>;
 }
 
 /// A policy that is trained in a folder of its own.
@@ -292,6 +187,8 @@ pub struct PolicyTraining<M> {
 
 impl<M: Method> Training for PolicyTraining<M> {
     type Rules = M;
+    const KIND: &'static str = M::KIND;
+    const BOUNDS: BoundTable = M::BOUNDS;
     const WEIGHTS: &'static str = "policy.safetensors";
     const RECORD_STEPS: u64 = 1;
     const CHECKPOINT_STEPS: u64 = 5;
@@ -300,7 +197,8 @@ impl<M: Method> Training for PolicyTraining<M> {
     fn new(
         method: &M,
         _: &Path,
-        _: &mut dyn FnMut(&str) -> bool,
+        _: &mut dyn FnMut(&str),
+        _: &AtomicBool,
     ) -> Result<Option<PolicyTraining<M>>, TrainingError> {
         let Course { seed, shards, play, .. } = method.course();
         let sight = play.sight().map_err(TrainingError::of_data)?;
@@ -310,12 +208,17 @@ impl<M: Method> Training for PolicyTraining<M> {
     }
 
     fn check(method: &M) -> Result<(), String> {
-        let Course { iterations, play, .. } = method.course();
-        if iterations == 0 {
-            return Err("there is at least one iteration".to_owned());
-        }
-        play.check()?;
-        method.check()
+        method.course().play.check()
+    }
+
+    fn read_weights(method: &M, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
+        let has_opponent = method.course().play.opponent.is_some();
+        let kind = if has_opponent { Kind::WithOpponent } else { Kind::Plain };
+        weights::from_bytes(&kind.network().network, weights, kind.name())
+    }
+
+    fn network(&self) -> &Network {
+        &self.learning.model.network
     }
 
     fn steps(&self) -> u64 {
@@ -326,30 +229,37 @@ impl<M: Method> Training for PolicyTraining<M> {
         self.learning.iterations
     }
 
-    fn checkpoint(&self) -> Vec<u8> {
+    fn checkpoint(&self) -> Checkpoint {
         self.learning.checkpoint()
     }
 
-    fn begin_with(&mut self, weights: &[u8]) -> Result<(), WeightsError> {
-        let Learning { kind, model, learner, .. } = &mut self.learning;
-        learner.begin_with(weights::from_bytes(&model.network, weights, kind.name())?);
-        Ok(())
+    fn begin_with(&mut self, numbers: Vec<f32>) {
+        self.learning.learner.begin_with(numbers);
     }
 
-    fn resume(&mut self, bytes: &[u8]) -> bool {
-        self.learning.resume(self.method.course().adam, bytes)
+    fn resume(
+        &mut self,
+        checkpoint: &Checkpoint,
+        _: &AtomicBool,
+    ) -> Result<Option<()>, CheckpointError> {
+        self.learning.resume(checkpoint).map(Some)
     }
 
-    fn step(&mut self) -> Figures {
-        let figures = self.method.learn(&*self.sight, &mut self.learning);
-        self.learning.iterations += 1;
+    fn step(&mut self, stop: &AtomicBool) -> Option<Figures> {
+        let before = self.learning.learner.state();
+        let figures = self.method.learn(&*self.sight, &mut self.learning, stop);
+        match figures {
+            Some(_) => self.learning.iterations += 1,
+            None => self.learning.learner.set_state(before),
+        }
         figures
     }
 
-    fn validate(&self) -> (Figures, Vec<u8>) {
+    fn validate(&self, stop: &AtomicBool) -> Result<Option<(Figures, Vec<u8>)>, WeightsError> {
+        let weights = self.learning.weights()?;
         let trained = self.learning.trained();
-        let figures = self.method.course().play.validate(&*self.sight, &trained);
-        (figures, self.learning.weights())
+        let figures = self.method.course().play.validate(&*self.sight, &trained, stop);
+        Ok(figures.map(|figures| (figures, weights)))
     }
 }
 
@@ -389,25 +299,29 @@ impl Default for Reinforcement {
 }
 
 impl Method for Reinforcement {
-    fn check(&self) -> Result<(), String> {
-        let PpoRules { epochs, batch, shards, .. } = self.ppo;
-        if epochs.min(batch).min(shards) == 0 {
-            return Err("ppo.epochs, ppo.batch and ppo.shards are at least 1".to_owned());
-        }
-        Ok(())
-    }
+    const KIND: &'static str = "ppo";
+    const BOUNDS: BoundTable = &[
+        ("seed", SEED),
+        ("iterations", STEPS),
+        ("play", Bound::Table(PLAY_BOUNDS)),
+        ("ppo", Bound::Table(PPO_BOUNDS)),
+    ];
 
     fn course(&self) -> Course<'_> {
         let Reinforcement { seed, iterations, play, .. } = self;
-        let (shards, adam) = (self.ppo.shards, &self.ppo.adam);
-        Course { seed: *seed, iterations: *iterations, play, shards, adam }
+        Course { seed: *seed, iterations: *iterations, play, shards: self.ppo.shards }
     }
 
-    fn learn(&self, sight: &dyn Sight, learning: &mut Learning) -> Figures {
+    fn learn(
+        &self,
+        sight: &dyn Sight,
+        learning: &mut Learning,
+        stop: &AtomicBool,
+    ) -> Option<Figures> {
         let ids = self.play.episodes_of(self.seed, learning.iterations);
-        let rollout = self.play.rollout(sight, Choosing::Sampled);
+        let rollout = self.play.rollout(sight, Choosing::Sampled, stop);
         let played = play_all(&ids, &learning.trained(), &rollout);
-        let played = played.expect("generated episodes can be played");
+        let played = played.expect("generated episodes can be played")?;
         let tr = mean_tr(&played);
         let frames = played.iter().map(|p| f64::from(p.frames)).sum();
         let trajectories: Vec<_> = played.into_iter().map(|p| p.trajectory).collect();
@@ -415,13 +329,13 @@ impl Method for Reinforcement {
         let rest = 1.0 - learning.iterations as f32 / self.iterations as f32;
         let named = (self.seed, learning.iterations, rest);
         let Learning { model, learner, .. } = learning;
-        let told = improve(&self.ppo, model, learner, &trajectories, named);
+        let told = improve(&self.ppo, model, learner, &trajectories, named, stop)?;
         if self.play.normalize {
             let all = trajectories.iter().flat_map(|t| &t.transitions);
             learning.normalize_by(all.map(|t| &t.decision));
         }
         let Told { objective, value_loss, entropy, divergence, clipped, explained_variance } = told;
-        figures([
+        Some(figures([
             ("tr", tr),
             ("frames", frames),
             ("decisions", decisions as f64),
@@ -431,7 +345,7 @@ impl Method for Reinforcement {
             ("divergence", divergence),
             ("clipped", clipped),
             ("explained_variance", explained_variance),
-        ])
+        ]))
     }
 }
 
@@ -481,44 +395,55 @@ impl Default for Cloning {
 }
 
 impl Method for Cloning {
-    fn check(&self) -> Result<(), String> {
-        if self.batch.min(self.shards) == 0 {
-            Err("batch and shards are at least 1".to_owned())
-        } else {
-            Ok(())
-        }
-    }
+    const KIND: &'static str = "clone";
+    const BOUNDS: BoundTable = &[
+        ("seed", SEED),
+        ("iterations", STEPS),
+        ("play", Bound::Table(PLAY_BOUNDS)),
+        ("mixed", SHARE),
+        ("discount", SHARE),
+        ("batch", integer(1, MAX_BATCH)),
+        ("rate", RATE),
+        ("shards", SHARDS),
+        ("adam", ADAM),
+    ];
 
     fn course(&self) -> Course<'_> {
-        let Cloning { seed, iterations, play, .. } = self;
-        let (shards, adam) = (self.shards, &self.adam);
-        Course { seed: *seed, iterations: *iterations, play, shards, adam }
+        let Cloning { seed, iterations, play, shards, .. } = self;
+        Course { seed: *seed, iterations: *iterations, play, shards: *shards }
     }
 
-    fn learn(&self, sight: &dyn Sight, learning: &mut Learning) -> Figures {
+    fn learn(
+        &self,
+        sight: &dyn Sight,
+        learning: &mut Learning,
+        stop: &AtomicBool,
+    ) -> Option<Figures> {
         let ids = self.play.episodes_of(self.seed, learning.iterations);
-        let (rollout, trained) = (self.play.rollout(sight, Choosing::Sampled), learning.trained());
+        let rollout = self.play.rollout(sight, Choosing::Sampled, stop);
+        let trained = learning.trained();
         let taught = |(id, seed): &(String, u32)| {
             play_taught((id, *seed), &trained, &rollout, (self.mixed, self.discount))
         };
         let taught: Result<Vec<_>, _> = ids.par_iter().map(taught).collect();
         let taught = taught.expect("generated episodes can be played");
+        let taught: Vec<_> = taught.into_iter().collect::<Option<_>>()?;
         let tr = taught.iter().map(|(_, tr)| tr).sum::<f64>() / taught.len().max(1) as f64;
         let lessons: Vec<Lesson> = taught.into_iter().flat_map(|(lessons, _)| lessons).collect();
         let rate = rate_at(learning.iterations, (self.rate, 1, self.iterations));
         let how = (&self.adam, rate, self.batch);
         let Learning { model, learner, iterations, .. } = learning;
-        let learned = imitate(how, model, learner, &lessons, (self.seed, *iterations));
+        let learned = imitate(how, model, learner, &lessons, (self.seed, *iterations), stop)?;
         if self.play.normalize {
             learning.normalize_by(lessons.iter().map(|l| &l.decision));
         }
         let Learned { loss, agreement, value_loss } = learned;
-        figures([
+        Some(figures([
             ("tr", tr),
             ("lessons", lessons.len() as f64),
             ("loss", loss),
             ("agreement", agreement),
             ("value_loss", value_loss),
-        ])
+        ]))
     }
 }

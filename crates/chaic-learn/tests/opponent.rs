@@ -13,7 +13,10 @@ use chaic_learn::opponent::window::{N_CLASS, N_STATE};
 use chaic_learn::opponent::{Goal, N_LIMITS, limits_of};
 use chaic_protocol::TaskId;
 use chaic_protocol::capability::Persona;
-use chaic_training::{CHECKPOINT, CURVES, TrainingRun};
+use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoints};
+use chaic_training::{CHECKPOINT, CONFIG, CURVES, Training, TrainingError, TrainingRun};
+
+static NEVER: AtomicBool = AtomicBool::new(false);
 
 fn few() -> CollectRules {
     CollectRules {
@@ -28,7 +31,7 @@ fn few() -> CollectRules {
 
 #[test]
 fn windows_are_within_bounds_and_survive_being_written() {
-    let samples = collect(Part::Test, &few(), &mut |_| true).unwrap().unwrap();
+    let samples = collect(Part::Test, &few(), &mut |_| (), &NEVER).unwrap().unwrap();
     assert!(samples.iter().any(|s| s.goal == Goal::Unknown));
     assert!(samples.iter().any(|s| s.target.is_some()));
     for sample in &samples {
@@ -41,7 +44,7 @@ fn windows_are_within_bounds_and_survive_being_written() {
         assert_eq!(is_seen, sample.goal != Goal::Unknown, "{sample:?}");
         assert!(sample.limits.iter().all(|x| (0.0..=1.0).contains(x)));
     }
-    assert!(samples == collect(Part::Test, &few(), &mut |_| true).unwrap().unwrap());
+    assert!(samples == collect(Part::Test, &few(), &mut |_| (), &NEVER).unwrap().unwrap());
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("windows.safetensors");
     write(&path, &samples).unwrap();
@@ -74,18 +77,19 @@ fn the_model_learns_and_a_pause_changes_no_bit() {
         ..OpponentRules::default()
     };
     let folder = tempfile::tempdir().unwrap();
-    let mut go_on = |_: &str| true;
+    let mut quiet = |_: &str| ();
     let stop = AtomicBool::new(false);
     let checkpoints = [false, true].map(|pauses| {
         let out = folder.path().join(format!("{pauses}"));
-        let mut run =
-            TrainingRun::<OpponentTraining>::begin(&out, &rules, &mut go_on).unwrap().unwrap();
+        let begun = TrainingRun::<OpponentTraining>::begin(&out, &rules, None, &mut quiet, &stop);
+        let mut run = begun.unwrap().unwrap();
         if pauses {
             // It is asked before the first step, which is not taken then.
             stop.store(true, Ordering::Relaxed);
             assert!(!run.go_on(&stop, &mut |_| {}).unwrap());
             stop.store(false, Ordering::Relaxed);
-            run = TrainingRun::resume(&out, &mut go_on).unwrap().unwrap();
+            drop(run);
+            run = TrainingRun::resume(&out, &mut quiet, &stop).unwrap().unwrap();
         }
         assert!(run.go_on(&stop, &mut |_| {}).unwrap());
         fs::read(out.join(CHECKPOINT)).unwrap()
@@ -97,8 +101,9 @@ fn the_model_learns_and_a_pause_changes_no_bit() {
     // What it learned from, it tells better than it began with.
     let samples = read(&out.join("windows.safetensors")).unwrap();
     let bytes = fs::read(out.join("opponent.safetensors")).unwrap();
-    let learned = Report::of(&OpponentModel::from_bytes(&bytes).unwrap(), &samples);
-    let begun = Report::of(&OpponentModel::new(network().network.begin(1)), &samples);
+    let learned = Report::of(&OpponentModel::from_bytes(&bytes).unwrap(), &samples, &NEVER);
+    let begun = Report::of(&OpponentModel::new(network().network.begin(1)), &samples, &NEVER);
+    let (learned, begun) = (learned.unwrap(), begun.unwrap());
     assert!(learned.goal_accuracy.mean > begun.goal_accuracy.mean + 0.3, "{learned:?} {begun:?}");
     assert!(learned.limits_error.mean < begun.limits_error.mean, "{learned:?} {begun:?}");
 }
@@ -119,11 +124,45 @@ fn reports_count_each_goal_as_much() {
     // All windows are alike, so one goal is told of all of them.
     let mut samples: Vec<Sample> = (0..9).map(|k| sample(Goal::Unknown, k)).collect();
     samples.push(sample(Goal::Pick, 9));
-    let report = Report::of(&OpponentModel::new(network().network.begin(1)), &samples);
+    let report = Report::of(&OpponentModel::new(network().network.begin(1)), &samples, &NEVER);
+    let report = report.unwrap();
     let column = |k: usize| report.confusion.iter().map(|row| row[k]).sum::<usize>();
     let told = (0..Goal::ALL.len()).find(|k| column(*k) == 10).unwrap();
     let is_right = [Goal::Unknown, Goal::Pick].iter().any(|goal| goal.index() == told);
     let accuracy = if is_right { 0.5 } else { 0.0 };
     assert!((report.goal_accuracy.mean - accuracy).abs() < 1e-9, "{report:?}");
     assert_eq!((report.goal_accuracy.n, report.target_accuracy.n), (10, 1));
+}
+
+#[test]
+fn damaged_checkpoints_and_numbers_out_of_bounds_are_refused() {
+    let rules = OpponentRules {
+        steps: 60,
+        validation_of_each: 10,
+        collect: CollectRules { episodes: 1, ..few() },
+        ..OpponentRules::default()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let training = OpponentTraining::new(&rules, folder.path(), &mut |_| (), &NEVER);
+    let mut training = training.unwrap().unwrap();
+    refuses_damaged_checkpoints(&mut training);
+    bounds_every_number::<OpponentTraining>();
+    let raised = AtomicBool::new(true);
+    assert!(training.validate(&raised).unwrap().is_none());
+    assert!(collect(Part::Test, &few(), &mut |_| (), &raised).unwrap().is_none());
+}
+
+#[test]
+fn windows_that_cannot_be_read_are_refused_before_the_folder_is_made() {
+    let folder = tempfile::tempdir().unwrap();
+    let (out, empty) = (folder.path().join("out"), folder.path().join("empty"));
+    write(&empty, &[]).unwrap();
+    for (windows, word) in [(folder.path().join("missing"), "missing"), (empty, "no windows")] {
+        let rules = OpponentRules { windows: Some(windows), ..OpponentRules::default() };
+        let begun = TrainingRun::<OpponentTraining>::begin(&out, &rules, None, &mut |_| (), &NEVER);
+        let error = begun.err().unwrap();
+        assert!(matches!(error, TrainingError::Rules(_)), "{error}");
+        assert!(error.to_string().contains(word), "{error}");
+        assert!(!out.join(CONFIG).exists() && !out.exists());
+    }
 }

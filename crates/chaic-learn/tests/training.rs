@@ -4,7 +4,8 @@
 use std::fs;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use chaic_agents::sight::TrueSight;
 use chaic_env::minds::{BuiltIn, Helpers as _};
@@ -19,7 +20,11 @@ use chaic_learn::rollout::{RolloutRules, play};
 use chaic_learn::train::{Cloning, Kind, PlayRules, PolicyTraining, Reinforcement, from_bytes};
 use chaic_nn::weights;
 use chaic_protocol::TaskId;
-use chaic_training::{CHECKPOINT, Training, TrainingError, TrainingRun};
+use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoints};
+use chaic_training::run::checkpoint_bytes;
+use chaic_training::{CHECKPOINT, Training, TrainingError, TrainingRun, parse_rules};
+
+static NEVER: AtomicBool = AtomicBool::new(false);
 
 fn small() -> PlayRules {
     PlayRules {
@@ -33,9 +38,9 @@ fn small() -> PlayRules {
 
 /// The checkpoint after all steps, with a pause before the last one or without.
 fn trained<T: Training>(rules: &T::Rules, folder: &Path, pauses: bool) -> Vec<u8> {
-    let mut go_on = |_: &str| true;
-    let mut run = TrainingRun::<T>::begin(folder, rules, &mut go_on).unwrap().unwrap();
+    let mut quiet = |_: &str| ();
     let stop = AtomicBool::new(false);
+    let mut run = TrainingRun::<T>::begin(folder, rules, None, &mut quiet, &stop).unwrap().unwrap();
     if pauses {
         let is_whole = run.go_on(&stop, &mut |_| {
             stop.store(true, std::sync::atomic::Ordering::Relaxed);
@@ -43,7 +48,7 @@ fn trained<T: Training>(rules: &T::Rules, folder: &Path, pauses: bool) -> Vec<u8
         assert!(!is_whole.unwrap());
         drop(run);
         stop.store(false, std::sync::atomic::Ordering::Relaxed);
-        run = TrainingRun::<T>::resume(folder, &mut go_on).unwrap().unwrap();
+        run = TrainingRun::<T>::resume(folder, &mut quiet, &stop).unwrap().unwrap();
         assert_eq!(run.extent(), (1, 2));
     }
     assert!(run.go_on(&stop, &mut |_| {}).unwrap());
@@ -74,14 +79,84 @@ fn a_training_that_was_interrupted_ends_with_the_same_bits() {
     // A checkpoint that was cut off.
     let folder = folder.path().join("policy true");
     fs::write(folder.join(CHECKPOINT), &whole[..whole.len() / 2]).unwrap();
-    let refused = TrainingRun::<PolicyTraining<Reinforcement>>::resume(&folder, &mut |_| true);
-    assert!(matches!(refused, Err(TrainingError::Checkpoint(_))));
+    let refused =
+        TrainingRun::<PolicyTraining<Reinforcement>>::resume(&folder, &mut |_| (), &NEVER);
+    assert!(matches!(refused, Err(TrainingError::Checkpoint { .. })));
 }
 
 #[test]
-fn single_actions_are_learned_with_the_same_bits_after_a_pause() {
-    // Updates end within episodes, and episodes within updates.
-    let rules = PrimitiveRules {
+fn damaged_checkpoints_and_numbers_out_of_bounds_are_refused() {
+    fn check<T: Training>(rules: &T::Rules) {
+        let folder = tempfile::tempdir().unwrap();
+        let training = T::new(rules, folder.path(), &mut |_| (), &NEVER);
+        refuses_damaged_checkpoints(&mut training.unwrap().unwrap());
+        bounds_every_number::<T>();
+    }
+    let policy = Reinforcement { play: small(), ..Reinforcement::default() };
+    check::<PolicyTraining<Reinforcement>>(&policy);
+    check::<PolicyTraining<Cloning>>(&Cloning { play: small(), ..Cloning::default() });
+    check::<PrimitiveTraining>(&PrimitiveRules { envs: 2, ..PrimitiveRules::default() });
+}
+
+#[test]
+fn what_memory_cannot_hold_is_refused_by_name() {
+    for (text, names) in [
+        ("envs = 1024\nimage_size = 512", ["envs", "image_size"]),
+        ("envs = 1024\nrollout = 1024", ["envs", "rollout"]),
+    ] {
+        let problem = parse_rules::<PrimitiveTraining>(text).unwrap_err();
+        assert!(names.iter().all(|name| problem.contains(name)), "{problem}");
+    }
+}
+
+/// Raises the flag after a while, as a signal may at any moment.
+fn raised_after(delay: Duration) -> Arc<AtomicBool> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let raised = Arc::clone(&stop);
+    std::thread::spawn(move || {
+        std::thread::sleep(delay);
+        raised.store(true, Ordering::Relaxed);
+    });
+    stop
+}
+
+#[test]
+fn steps_that_are_stopped_anywhere_change_nothing() {
+    fn check<T: Training>(rules: &T::Rules) {
+        let folder = tempfile::tempdir().unwrap();
+        let new = || T::new(rules, folder.path(), &mut |_| (), &NEVER).unwrap().unwrap();
+        let (mut whole, mut stopped) = (new(), new());
+        let before = stopped.checkpoint();
+        let mut n_stopped = 0;
+        for delay_ms in [0, 20, 60, 120, 200] {
+            let stop = raised_after(Duration::from_millis(delay_ms));
+            if stopped.step(&stop).is_some() {
+                // It was done before the flag was raised.
+                stopped = new();
+                continue;
+            }
+            n_stopped += 1;
+            assert!(stopped.checkpoint() == before, "{} after {delay_ms} ms", T::KIND);
+        }
+        assert!(n_stopped > 0, "{}", T::KIND);
+        assert!(whole.step(&NEVER) == stopped.step(&NEVER) && taken(&whole) == 1);
+        assert!(whole.checkpoint() == stopped.checkpoint(), "{}", T::KIND);
+        let raised = AtomicBool::new(true);
+        assert!(stopped.validate(&raised).unwrap().is_none());
+        assert!(T::new(rules, folder.path(), &mut |_| (), &raised).is_ok());
+    }
+    fn taken<T: Training>(training: &T) -> u64 {
+        training.taken()
+    }
+    let policy = Reinforcement { play: small(), ..Reinforcement::default() };
+    check::<PolicyTraining<Reinforcement>>(&policy);
+    check::<PolicyTraining<Cloning>>(&Cloning { play: small(), ..Cloning::default() });
+    check::<PrimitiveTraining>(&primitive());
+}
+
+/// Updates end within episodes, and episodes within updates.
+fn primitive() -> PrimitiveRules {
+    PrimitiveRules {
         updates: 2,
         envs: 2,
         rollout: 150,
@@ -89,22 +164,29 @@ fn single_actions_are_learned_with_the_same_bits_after_a_pause() {
         validation_episodes: 1,
         ppo: PpoRules { batch: 50, epochs: 1, shards: 2, ..PpoRules::default() },
         ..PrimitiveRules::default()
-    };
+    }
+}
+
+#[test]
+fn single_actions_are_learned_with_the_same_bits_after_a_pause() {
+    let rules = primitive();
     let folder = tempfile::tempdir().unwrap();
     let checkpoints = [false, true].map(|pauses| {
         let out = folder.path().join(format!("{pauses}"));
-        let mut go_on = |_: &str| true;
-        let stop = AtomicBool::new(false);
-        let mut run =
-            TrainingRun::<PrimitiveTraining>::begin(&out, &rules, &mut go_on).unwrap().unwrap();
+        let mut quiet = |_: &str| ();
+        let begun = TrainingRun::<PrimitiveTraining>::begin(&out, &rules, None, &mut quiet, &NEVER);
+        let mut run = begun.unwrap().unwrap();
         if pauses {
-            let mut one = PrimitiveTraining::new(&rules, &out, &mut go_on).unwrap().unwrap();
-            one.step();
-            fs::write(out.join(CHECKPOINT), one.checkpoint()).unwrap();
-            run = TrainingRun::resume(&out, &mut go_on).unwrap().unwrap();
+            drop(run);
+            let one = PrimitiveTraining::new(&rules, &out, &mut quiet, &NEVER);
+            let mut one = one.unwrap().unwrap();
+            let figures = one.step(&NEVER).unwrap();
+            let bytes = checkpoint_bytes(&one, &[figures]).unwrap();
+            fs::write(out.join(CHECKPOINT), bytes).unwrap();
+            run = TrainingRun::resume(&out, &mut quiet, &NEVER).unwrap().unwrap();
             assert_eq!(run.extent(), (1, 2));
         }
-        assert!(run.go_on(&stop, &mut |_| {}).unwrap());
+        assert!(run.go_on(&NEVER, &mut |_| {}).unwrap());
         fs::read(out.join(CHECKPOINT)).unwrap()
     });
     assert!(checkpoints[0] == checkpoints[1]);
@@ -120,7 +202,8 @@ fn a_policy_carries_its_opponent_model_along() {
     let file = folder.path().join("opponent.safetensors");
     let network = opponent::network::network().network;
     let numbers = network.begin(7);
-    fs::write(&file, weights::to_bytes(&network, &numbers, opponent::network::KIND)).unwrap();
+    let bytes = weights::to_bytes(&network, &numbers, opponent::network::KIND).unwrap();
+    fs::write(&file, bytes).unwrap();
     let play = PlayRules { opponent: Some(file.clone()), ..small() };
     let rules = Reinforcement { iterations: 2, play, ..Reinforcement::default() };
     let [whole, paused] = [false, true].map(|pauses| {
@@ -151,9 +234,10 @@ fn what_a_policy_is_told_lies_within_bounds() {
         image_size: 64,
         choosing: Choosing::Sampled,
         rewards: Rewards { team: 1.0, own: 0.0, held: 0.0, emergency: 0.0, ..Rewards::default() },
+        stop: &NEVER,
     };
     for id in ["shopping/gen/40000001", "obstacle/gen/40000001"] {
-        let played = play(id, 0, &trained, &rules).unwrap();
+        let played = play(id, 0, &trained, &rules).unwrap().unwrap();
         let mut reward = 0.0;
         let mut frames = 0.0;
         for transition in &played.trajectory.transitions {

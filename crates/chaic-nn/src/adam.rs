@@ -35,8 +35,8 @@ pub struct Adam {
     pub mean: Vec<f32>,
     /// Running mean of their squares.
     pub square: Vec<f32>,
-    /// `beta1` and `beta2` to the power of `steps`.
-    powers: [f64; 2],
+    /// `beta1` and `beta2` to the power of `steps`: below 1 after the first step.
+    pub powers: [f64; 2],
 }
 
 impl Adam {
@@ -48,12 +48,6 @@ impl Adam {
             square: vec![0.0; n_numbers],
             powers: [1.0; 2],
         }
-    }
-
-    /// As after so many steps.
-    pub fn resumed(rules: &AdamRules, steps: u64, mean: Vec<f32>, square: Vec<f32>) -> Adam {
-        let power = |beta: f32| (0..steps).fold(1.0, |p, _| p * f64::from(beta));
-        Adam { steps, mean, square, powers: [power(rules.beta1), power(rules.beta2)] }
     }
 
     /// Takes a step, and tells the length of the gradient before it was shortened.

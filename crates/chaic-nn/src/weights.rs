@@ -44,8 +44,20 @@ pub enum WeightsError {
     NotFinite(String),
 }
 
-/// The numbers as a file. `kind` names what they are of, its version included.
-pub fn to_bytes(network: &Network, numbers: &[f32], kind: &str) -> Vec<u8> {
+/// Returns the numbers as a file. `kind` names what they are of, its version included.
+///
+/// # Errors
+/// [`WeightsError::NotFinite`] if a number is not finite.
+pub fn to_bytes(network: &Network, numbers: &[f32], kind: &str) -> Result<Vec<u8>, WeightsError> {
+    let is_finite = |p: &&crate::Parameter| numbers[p.range.clone()].iter().all(|x| x.is_finite());
+    if let Some(parameter) = network.parameters().iter().find(|p| !is_finite(p)) {
+        return Err(WeightsError::NotFinite(parameter.name.clone()));
+    }
+    Ok(encode(network, numbers, kind))
+}
+
+/// Returns the numbers as a file, whether they are finite or not.
+fn encode(network: &Network, numbers: &[f32], kind: &str) -> Vec<u8> {
     let bytes: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
     let view = |p: &crate::Parameter| {
         let data = &bytes[4 * p.range.start..4 * p.range.end];
@@ -61,6 +73,11 @@ pub fn to_bytes(network: &Network, numbers: &[f32], kind: &str) -> Vec<u8> {
 /// Twelve digits that name the content of a file.
 pub fn digest(bytes: &[u8]) -> String {
     format!("{:012x}", xxhash_rust::xxh3::xxh3_64(bytes) >> 16)
+}
+
+/// Returns the digest of the file that these numbers make, whether they are finite or not.
+pub fn digest_of(network: &Network, numbers: &[f32], kind: &str) -> String {
+    digest(&encode(network, numbers, kind))
 }
 
 /// The numbers in a file.
@@ -122,16 +139,16 @@ mod tests {
     fn what_is_written_is_read_back() {
         let net = network(16);
         let numbers = net.begin(1);
-        let bytes = to_bytes(&net, &numbers, "test 1");
+        let bytes = to_bytes(&net, &numbers, "test 1").unwrap();
         assert_eq!(from_bytes(&net, &bytes, "test 1"), Ok(numbers.clone()));
-        assert_eq!(bytes, to_bytes(&net, &numbers, "test 1"), "the same bytes each time");
+        assert_eq!(Ok(bytes), to_bytes(&net, &numbers, "test 1"), "the same bytes each time");
     }
 
     #[test]
     fn files_that_dont_fit_are_refused_in_one_line() {
         let net = network(16);
         let mut numbers = net.begin(1);
-        let bytes = to_bytes(&net, &numbers, "test 1");
+        let bytes = to_bytes(&net, &numbers, "test 1").unwrap();
         for n in (0..bytes.len()).step_by(7) {
             let error = from_bytes(&net, &bytes[..n], "test 1").expect_err("it is cut off");
             assert!(!error.to_string().contains('\n'), "{error}");
@@ -144,10 +161,14 @@ mod tests {
         longer.head("more", input, 2);
         let missing = from_bytes(&longer, &bytes, "test 1");
         assert_eq!(missing, Err(WeightsError::Missing("more.weight".to_owned())));
-        let more = to_bytes(&longer, &longer.begin(1), "test 1");
+        let more = to_bytes(&longer, &longer.begin(1), "test 1").unwrap();
         assert!(matches!(from_bytes(&net, &more, "test 1"), Err(WeightsError::Unknown(_))));
-        numbers[5] = f32::NAN;
-        let bad = from_bytes(&net, &to_bytes(&net, &numbers, "test 1"), "test 1");
-        assert_eq!(bad, Err(WeightsError::NotFinite("conv.weight".to_owned())));
+        for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            numbers[5] = value;
+            let bad = WeightsError::NotFinite("conv.weight".to_owned());
+            let read = from_bytes(&net, &encode(&net, &numbers, "test 1"), "test 1");
+            assert_eq!(read, Err(bad.clone()));
+            assert_eq!(to_bytes(&net, &numbers, "test 1"), Err(bad), "nor are they written");
+        }
     }
 }

@@ -5,8 +5,20 @@ use std::thread;
 use chaic_nn::simd::widest;
 use chaic_nn::{Adam, AdamRules, Network, Pass};
 
+use crate::checkpoint::{Checkpoint, CheckpointError};
+
 /// Share of a step's numbers in the slow mean.
 const AVERAGE_RATE: f32 = 0.002;
+
+/// Sections of a checkpoint.
+const PARAMETERS: &str = "learner.parameters";
+const AVERAGE: &str = "learner.average";
+const EXP_AVG: &str = "adam.exp_avg";
+const EXP_AVG_SQ: &str = "adam.exp_avg_sq";
+const OPTIMIZER_STEPS: &str = "adam.steps";
+const BETA_POWERS: &str = "adam.beta_powers";
+/// Largest number of optimizer steps in a checkpoint: what a training reaches in years, and far from overflow.
+const MAX_OPTIMIZER_STEPS: u64 = 1 << 48;
 
 /// What is learned, and all that is needed to go on.
 pub struct Learner {
@@ -18,6 +30,14 @@ pub struct Learner {
     pub adam: Adam,
     /// Of each part of a batch: working space, and the gradient.
     passes: Vec<(Pass, Vec<f32>)>,
+}
+
+/// State of weights and optimizer at one step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LearnerState {
+    numbers: Vec<f32>,
+    average: Vec<f32>,
+    adam: Adam,
 }
 
 impl Learner {
@@ -41,42 +61,68 @@ impl Learner {
         self.numbers = numbers;
     }
 
-    /// All that is needed to go on, as bytes.
-    pub fn checkpoint(&self) -> Vec<u8> {
-        let lists = [&self.numbers, &self.average, &self.adam.mean, &self.adam.square];
-        let mut bytes = self.adam.steps.to_le_bytes().to_vec();
-        for x in lists.into_iter().flatten() {
-            bytes.extend_from_slice(&x.to_le_bytes());
-        }
-        bytes
+    /// Returns a copy of the state of weights and optimizer, for [`Learner::set_state`].
+    pub fn state(&self) -> LearnerState {
+        let (numbers, average) = (self.numbers.clone(), self.average.clone());
+        LearnerState { numbers, average, adam: self.adam.clone() }
     }
 
-    /// Goes on from a checkpoint; `false` if it is of another network.
-    pub fn resume(&mut self, rules: &AdamRules, bytes: &[u8]) -> bool {
-        let n = self.numbers.len();
-        let Some((steps, rest)) = bytes.split_first_chunk::<8>() else { return false };
-        let numbers: Vec<f32> =
-            rest.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
-        if rest.len() != 16 * n {
-            return false;
-        }
-        let list = |k: usize| numbers[k * n..][..n].to_vec();
-        (self.numbers, self.average) = (list(0), list(1));
-        let steps = u64::from_le_bytes(*steps);
-        self.adam = Adam::resumed(rules, steps, list(2), list(3));
-        true
+    /// Goes back to a state of the same network.
+    pub fn set_state(&mut self, state: LearnerState) {
+        let LearnerState { numbers, average, adam } = state;
+        (self.numbers, self.average, self.adam) = (numbers, average, adam);
     }
 
-    /// Takes a step along the mean of the gradients that `work` adds to zeros for each part of the
-    /// batch; tells what `work` tells.
+    /// Adds the state of weights and optimizer to a checkpoint.
+    pub fn save(&self, checkpoint: &mut Checkpoint) {
+        checkpoint.insert_floats(PARAMETERS, self.numbers.clone());
+        checkpoint.insert_floats(AVERAGE, self.average.clone());
+        checkpoint.insert_floats(EXP_AVG, self.adam.mean.clone());
+        checkpoint.insert_floats(EXP_AVG_SQ, self.adam.square.clone());
+        checkpoint.insert_integers(OPTIMIZER_STEPS, vec![self.adam.steps]);
+        checkpoint.insert_doubles(BETA_POWERS, self.adam.powers.to_vec());
+    }
+
+    /// Restores the state of weights and optimizer from a checkpoint; on an error nothing changes.
+    ///
+    /// # Errors
+    /// [`CheckpointError::Section`] if a section is missing, has another length, or holds what no optimizer
+    /// reaches.
+    pub fn load(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        let floats = |name: &str| checkpoint.floats(name, self.numbers.len()).map(<[f32]>::to_vec);
+        let (numbers, average) = (floats(PARAMETERS)?, floats(AVERAGE)?);
+        let (mean, square) = (floats(EXP_AVG)?, floats(EXP_AVG_SQ)?);
+        if square.iter().any(|x| *x < 0.0) {
+            return Err(CheckpointError::section(EXP_AVG_SQ, "has a negative value"));
+        }
+        let steps = checkpoint.integer(OPTIMIZER_STEPS)?;
+        if steps > MAX_OPTIMIZER_STEPS {
+            return Err(CheckpointError::section(OPTIMIZER_STEPS, format!("is {steps}")));
+        }
+        let powers: Option<[f64; 2]> = checkpoint.doubles(BETA_POWERS)?.try_into().ok();
+        let is_reached = |powers: &[f64; 2]| match steps {
+            0 => *powers == [1.0; 2],
+            _ => powers.iter().all(|p| (0.0..1.0).contains(p)),
+        };
+        let Some(powers) = powers.filter(is_reached) else {
+            return Err(CheckpointError::section(BETA_POWERS, "has impossible values"));
+        };
+        (self.numbers, self.average) = (numbers, average);
+        self.adam = Adam { steps, mean, square, powers };
+        Ok(())
+    }
+
+    /// Applies one optimizer step along the mean of the gradients that `work` adds to zeros, one for each shard
+    /// of the batch; returns the results of `work`. Returns `None` and changes nothing if `work` returns `None`
+    /// for any shard.
     pub fn step<L: Send>(
         &mut self,
         network: &Network,
         (rules, rate): (&AdamRules, f32),
-        work: impl Fn(usize, &[f32], &mut Pass, &mut [f32]) -> L + Sync,
-    ) -> Vec<L> {
+        work: impl Fn(usize, &[f32], &mut Pass, &mut [f32]) -> Option<L> + Sync,
+    ) -> Option<Vec<L>> {
         let (numbers, work) = (&self.numbers[..], &work);
-        let told: Vec<L> = thread::scope(|scope| {
+        let results: Option<Vec<L>> = thread::scope(|scope| {
             let workers: Vec<_> = self
                 .passes
                 .iter_mut()
@@ -88,8 +134,12 @@ impl Learner {
                     })
                 })
                 .collect();
-            workers.into_iter().map(|w| w.join().expect("it doesn't panic")).collect()
+            // All are joined, whatever the first one returned.
+            let results: Vec<Option<L>> =
+                workers.into_iter().map(|w| w.join().expect("it doesn't panic")).collect();
+            results.into_iter().collect()
         });
+        let results = results?;
         let part = 1.0 / self.passes.len() as f32;
         let (first, rest) = self.passes.split_first_mut().expect("there are parts");
         for (_, by) in rest {
@@ -102,7 +152,7 @@ impl Learner {
         for (mean, x) in self.average.iter_mut().zip(&self.numbers) {
             *mean += share * (x - *mean);
         }
-        told
+        Some(results)
     }
 }
 

@@ -1,26 +1,38 @@
 //! A training with a folder of its own: what it was begun with, checkpoints, curves and weights. It can
 //! be stopped at any step and gone on with, bit for bit.
 
-use std::collections::BTreeMap;
 use std::error::Error;
 use std::fs;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use chaic_files::{FileError, open_to_append, read_bounded, read_user_file, write_whole};
+use chaic_files::{
+    FileError, FolderLock, LOCK, LockError, UNFINISHED, entries, read_bounded, read_user_file,
+    write_whole,
+};
+use chaic_nn::Network;
 use chaic_nn::weights::WeightsError;
+use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
+
+use crate::bounds::BoundTable;
+use crate::checkpoint::{Checkpoint, CheckpointError, Identity};
+use crate::config::{check_rules, config_text, read_own_rules};
+use crate::curves::{self, Figures, Of, Position, Record};
 
 /// What it was begun with.
 pub const CONFIG: &str = "config.toml";
 /// All that is needed to go on.
 pub const CHECKPOINT: &str = "checkpoint.bin";
-/// Losses and validations, a JSON object a line.
-pub const CURVES: &str = "curves.jsonl";
-/// No checkpoint or configuration is larger, bytes.
-const MOST_BYTES: u64 = 1 << 30;
+/// Copy of the weights that it was begun with, if any.
+pub const INITIAL_WEIGHTS: &str = "initial.safetensors";
+/// Largest checkpoint or file of weights that is read, bytes: a hundred times that of the largest network.
+const MAX_BYTES: u64 = 1 << 30;
+
+/// Sections that every checkpoint has besides those of its training.
+const FIGURE_NAMES: &str = "run.figure_names";
+const FIGURES: &str = "run.figures";
+const VALIDATION_IS_DUE: &str = "run.validation_is_due";
 
 /// Why a training can't begin or go on.
 #[derive(Debug, thiserror::Error)]
@@ -50,9 +62,33 @@ pub enum TrainingError {
         /// What is wrong.
         problem: WeightsError,
     },
-    /// The checkpoint is cut off or of another network.
-    #[error("{0} is no checkpoint of this network")]
-    Checkpoint(PathBuf),
+    /// The configuration that was given can't be used.
+    #[error("this configuration can't be used: {0}")]
+    Rules(String),
+    /// Another process trains in the folder.
+    #[error("{path} is in use by another `chaic train`; wait for it or choose another --out", path = .0.display())]
+    Locked(PathBuf),
+    /// The checkpoint is damaged or of another training.
+    #[error("{path} {problem}", path = path.display())]
+    Checkpoint {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: CheckpointError,
+    },
+    /// There is no checkpoint where there must be one.
+    #[error("{path} is missing, but the training has taken steps; begin a new one", path = .0.display())]
+    NoCheckpoint(PathBuf),
+    /// A weight or a moment of the optimizer is not finite.
+    #[error(
+        "after step {step}, {problem}; the last checkpoint is kept, try a lower rate from there"
+    )]
+    NotFinite {
+        /// Steps taken.
+        step: u64,
+        /// Which one.
+        problem: String,
+    },
     /// The loss is no number any more.
     #[error(
         "the loss of step {0} is not a number; the last checkpoint is kept, try a lower rate from there"
@@ -67,35 +103,26 @@ impl TrainingError {
     }
 }
 
-/// Numbers with their names.
-pub type Figures = BTreeMap<String, f64>;
-
-/// A line of the curves.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Record {
-    /// What the figures are of.
-    pub of: Of,
-    /// After so many steps.
-    pub step: u64,
-    /// The figures: means over the steps since the last record, or those of a validation.
-    #[serde(flatten)]
-    pub figures: Figures,
-}
-
-/// What figures are of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Of {
-    /// What is learned from.
-    Loss,
-    /// What nothing is learned from.
-    Validation,
+impl From<LockError> for TrainingError {
+    fn from(error: LockError) -> TrainingError {
+        match error {
+            LockError::Held(path) => TrainingError::Locked(path),
+            LockError::File(refused) => refused.into(),
+        }
+    }
 }
 
 /// Something that is trained in a folder of its own.
+///
+/// Long work gets a `stop` flag, which it checks at least once a second; where it was raised, the work returns
+/// `None` and leaves the training as it was.
 pub trait Training: Sized {
     /// What it is begun with: a file in TOML.
     type Rules: Clone + Default + Serialize + DeserializeOwned;
+    /// Name of the training, as `chaic train` takes it. A checkpoint of another name is refused.
+    const KIND: &'static str;
+    /// Bounds of every number in the rules.
+    const BOUNDS: BoundTable;
     /// The name of the file of weights.
     const WEIGHTS: &'static str;
     /// Steps between two records of the loss.
@@ -105,22 +132,32 @@ pub trait Training: Sized {
     /// Steps between two validations.
     const VALIDATION_STEPS: u64 = 1000;
 
-    /// Before the first step; `None` if it was stopped before it was ready. `go_on` is asked now and then
-    /// while it gets ready, with what has been done, which is kept in the folder.
+    /// Prepares the training for its first step; `None` if it was stopped meanwhile. `progress` is called with
+    /// what has been done, which is kept in the folder.
     ///
     /// # Errors
-    /// If it can't be kept or read.
+    /// If data can't be kept or read.
     fn new(
         rules: &Self::Rules,
         folder: &Path,
-        go_on: &mut dyn FnMut(&str) -> bool,
+        progress: &mut dyn FnMut(&str),
+        stop: &AtomicBool,
     ) -> Result<Option<Self>, TrainingError>;
 
-    /// What is wrong with rules by which nothing can be trained.
+    /// Checks what bounds of single numbers can't say, and the inputs that the rules name.
     ///
     /// # Errors
-    /// That, in a sentence.
+    /// One line that says what is wrong.
     fn check(rules: &Self::Rules) -> Result<(), String>;
+
+    /// Returns the numbers in a file of weights that a training by these rules can begin with.
+    ///
+    /// # Errors
+    /// If it isn't one of this network, or a number is not finite.
+    fn read_weights(rules: &Self::Rules, weights: &[u8]) -> Result<Vec<f32>, WeightsError>;
+
+    /// The network that is trained.
+    fn network(&self) -> &Network;
 
     /// Steps in all.
     fn steps(&self) -> u64;
@@ -128,84 +165,183 @@ pub trait Training: Sized {
     /// Steps taken.
     fn taken(&self) -> u64;
 
-    /// All that is needed to go on.
-    fn checkpoint(&self) -> Vec<u8>;
+    /// Returns all that is needed to go on.
+    fn checkpoint(&self) -> Checkpoint;
 
-    /// Takes the numbers of a file of weights in place of random ones.
+    /// Takes these numbers, of [`Training::read_weights`], in place of random ones.
+    fn begin_with(&mut self, numbers: Vec<f32>);
+
+    /// Goes on from a checkpoint; `None` if it was stopped meanwhile.
     ///
     /// # Errors
-    /// If it isn't one of this network.
-    fn begin_with(&mut self, weights: &[u8]) -> Result<(), WeightsError>;
+    /// If a section doesn't fit this training.
+    fn resume(
+        &mut self,
+        checkpoint: &Checkpoint,
+        stop: &AtomicBool,
+    ) -> Result<Option<()>, CheckpointError>;
 
-    /// Goes on from a checkpoint; `false` if it is of another network.
-    fn resume(&mut self, bytes: &[u8]) -> bool;
+    /// Takes a step; `None` if it was stopped meanwhile, and the step not taken.
+    fn step(&mut self, stop: &AtomicBool) -> Option<Figures>;
 
-    /// Takes a step.
-    fn step(&mut self) -> Figures;
-
-    /// How good it is so far on what nothing is learned from, and its weights as a file.
-    fn validate(&self) -> (Figures, Vec<u8>);
+    /// Returns how good it is so far on what nothing is learned from, and its weights as a file; `None` if it
+    /// was stopped meanwhile.
+    ///
+    /// # Errors
+    /// If a weight is not finite.
+    fn validate(&self, stop: &AtomicBool) -> Result<Option<(Figures, Vec<u8>)>, WeightsError>;
 }
 
-/// A training and its folder.
+/// A training and its folder, which is locked meanwhile.
 pub struct TrainingRun<T> {
     folder: PathBuf,
     training: T,
+    /// Figures of the steps since the last record.
+    unrecorded: Vec<Figures>,
+    /// Whether the validation of the last step is still to be done.
+    validation_is_due: bool,
+    _lock: FolderLock,
+}
+
+/// Returns the checkpoint file of a training with the figures of its steps since the last record.
+///
+/// # Errors
+/// If a number is not finite.
+pub fn checkpoint_bytes<T: Training>(
+    training: &T,
+    unrecorded: &[Figures],
+) -> Result<Vec<u8>, CheckpointError> {
+    let mut checkpoint = training.checkpoint();
+    insert_progress(&mut checkpoint, unrecorded, false);
+    checkpoint.to_bytes(&identity(training))
+}
+
+/// Goes on with a training from a checkpoint file; `None` if it was stopped meanwhile.
+///
+/// # Errors
+/// If the file is damaged or of another training.
+pub fn restore<T: Training>(
+    training: &mut T,
+    bytes: &[u8],
+    stop: &AtomicBool,
+) -> Result<Option<Checkpoint>, CheckpointError> {
+    let checkpoint = Checkpoint::from_bytes(bytes, &identity(training))?;
+    if training.resume(&checkpoint, stop)?.is_none() {
+        return Ok(None);
+    }
+    let (taken, steps) = (training.taken(), training.steps());
+    if taken > steps {
+        let problem = format!("has {taken} steps taken, of {steps} in {CONFIG}");
+        return Err(CheckpointError::section("steps", problem));
+    }
+    Ok(Some(checkpoint))
+}
+
+pub(crate) fn identity<T: Training>(training: &T) -> Identity {
+    Identity::new(T::KIND, training.network())
+}
+
+fn insert_progress(checkpoint: &mut Checkpoint, unrecorded: &[Figures], validation_is_due: bool) {
+    let names: Vec<&str> = unrecorded.iter().take(1).flat_map(|f| f.keys().map(|k| &**k)).collect();
+    checkpoint.insert_bytes(FIGURE_NAMES, names.join("\n").into_bytes());
+    let values = unrecorded.iter().flat_map(|figures| figures.values().copied());
+    checkpoint.insert_doubles(FIGURES, values.collect());
+    checkpoint.insert_integers(VALIDATION_IS_DUE, vec![u64::from(validation_is_due)]);
+}
+
+/// Returns the figures since the last record, and whether a validation is due.
+fn progress_of(checkpoint: &Checkpoint) -> Result<(Vec<Figures>, bool), CheckpointError> {
+    let names = std::str::from_utf8(checkpoint.bytes(FIGURE_NAMES)?)
+        .map_err(|_| CheckpointError::section(FIGURE_NAMES, "is no text"))?;
+    let names: Vec<&str> = names.split('\n').collect();
+    let values = checkpoint.doubles(FIGURES)?;
+    if !values.len().is_multiple_of(names.len()) {
+        return Err(CheckpointError::section(FIGURES, "does not fit the names of figures"));
+    }
+    let of_step = |values: &[f64]| {
+        names.iter().map(|name| (*name).to_owned()).zip(values.iter().copied()).collect()
+    };
+    let unrecorded = values.chunks_exact(names.len()).map(of_step).collect();
+    let validation_is_due = checkpoint.integer(VALIDATION_IS_DUE)?;
+    Ok((unrecorded, validation_is_due != 0))
 }
 
 impl<T: Training> TrainingRun<T> {
-    /// A new one; `None` if `go_on` says no before the first step.
+    /// Begins a training, with the weights in a file or with random ones; `None` if it was stopped before the
+    /// first step. `progress` is called with what has been done.
     ///
     /// # Errors
-    /// If the folder isn't empty, or the file system refuses.
+    /// If rules or weights can't be used, the folder is in use or not empty, or the file system refuses. The
+    /// folder then holds no training to resume.
     pub fn begin(
         folder: &Path,
         rules: &T::Rules,
-        go_on: &mut dyn FnMut(&str) -> bool,
+        weights: Option<&Path>,
+        progress: &mut dyn FnMut(&str),
+        stop: &AtomicBool,
     ) -> Result<Option<TrainingRun<T>>, TrainingError> {
-        let is_taken = fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
-        if is_taken {
-            return Err(TrainingError::NotEmpty(folder.to_owned()));
-        }
+        check_rules::<T>(rules).map_err(TrainingError::Rules)?;
+        let read = |path| read_weights::<T>(rules, path, read_user_file(path, MAX_BYTES)?);
+        let weights = weights.map(read).transpose()?;
+        check_is_empty(folder)?;
+        let is_new = !folder.exists();
         fs::create_dir_all(folder).map_err(FileError::of("can't make", folder))?;
-        let path = folder.join(CONFIG);
-        let text = toml::to_string(rules).expect("rules are plain data");
-        write_whole(&path, text.as_bytes())?;
-        let Some(training) = T::new(rules, folder, go_on)? else { return Ok(None) };
-        let run = TrainingRun { folder: folder.to_owned(), training };
-        run.keep()?;
-        Ok(Some(run))
+        let lock = FolderLock::take(folder)?;
+        // Another process may have begun between the first look and the lock.
+        check_is_empty(folder)?;
+        let begun = begin_locked::<T>(folder, rules, weights, progress, stop);
+        if begun.is_err() {
+            clear(folder, is_new);
+        }
+        Ok(begun?.map(|training| TrainingRun {
+            folder: folder.to_owned(),
+            training,
+            unrecorded: Vec::new(),
+            validation_is_due: false,
+            _lock: lock,
+        }))
     }
 
-    /// One that was begun; `None` if `go_on` says no before it is ready.
+    /// Goes on with a training that was begun; `None` if it was stopped before it was ready.
     ///
     /// # Errors
-    /// If its files can't be read or aren't those of a training.
+    /// If its files can't be read, are damaged or aren't those of a training, or the folder is in use.
     pub fn resume(
         folder: &Path,
-        go_on: &mut dyn FnMut(&str) -> bool,
+        progress: &mut dyn FnMut(&str),
+        stop: &AtomicBool,
     ) -> Result<Option<TrainingRun<T>>, TrainingError> {
-        let path = folder.join(CONFIG);
-        let rules = parse_rules::<T>(&path, &read_bounded(&path, MOST_BYTES)?)?;
+        // A folder without a configuration gets no lock file.
+        let rules = read_own_rules::<T>(&folder.join(CONFIG))?;
+        let lock = FolderLock::take(folder)?;
         let path = folder.join(CHECKPOINT);
-        // Without one it was stopped before its first step.
-        let bytes = path.exists().then(|| read_bounded(&path, MOST_BYTES)).transpose()?;
-        let Some(mut training) = T::new(&rules, folder, go_on)? else { return Ok(None) };
-        if bytes.is_some_and(|bytes| !training.resume(&bytes)) {
-            return Err(TrainingError::Checkpoint(path));
+        // Without one it was stopped before its first step. A link that leads nowhere is one that is lost.
+        let has_checkpoint = fs::symlink_metadata(&path).is_ok();
+        let bytes = has_checkpoint.then(|| read_bounded(&path, MAX_BYTES)).transpose()?;
+        if bytes.is_none() && curves::is_begun(folder) {
+            return Err(TrainingError::NoCheckpoint(path));
         }
-        Ok(Some(TrainingRun { folder: folder.to_owned(), training }))
-    }
-
-    /// Before the first step: takes the numbers in a file of weights in place of random ones.
-    ///
-    /// # Errors
-    /// If it can't be read, or isn't one of this network; the folder stays.
-    pub fn begin_with(&mut self, path: &Path) -> Result<(), TrainingError> {
-        let bytes = read_user_file(path, MOST_BYTES)?;
-        let wrong = |problem| TrainingError::Weights { path: path.to_owned(), problem };
-        self.training.begin_with(&bytes).map_err(wrong)?;
-        self.keep()
+        let Some(mut training) = T::new(&rules, folder, progress, stop)? else { return Ok(None) };
+        let (mut unrecorded, mut validation_is_due) = (Vec::new(), false);
+        match bytes {
+            Some(bytes) => {
+                let wrong = |problem| TrainingError::Checkpoint { path: path.clone(), problem };
+                let restored = restore(&mut training, &bytes, stop).map_err(wrong)?;
+                let Some(checkpoint) = restored else { return Ok(None) };
+                (unrecorded, validation_is_due) = progress_of(&checkpoint).map_err(wrong)?;
+            }
+            None => {
+                let initial = folder.join(INITIAL_WEIGHTS);
+                if initial.exists() {
+                    let bytes = read_bounded(&initial, MAX_BYTES)?;
+                    training.begin_with(read_weights::<T>(&rules, &initial, bytes)?.numbers);
+                }
+            }
+        }
+        let of = if validation_is_due { Of::Loss } else { Of::Validation };
+        curves::cut_back(folder, Some(Position { step: training.taken(), of }))?;
+        let folder = folder.to_owned();
+        Ok(Some(TrainingRun { folder, training, unrecorded, validation_is_due, _lock: lock }))
     }
 
     /// Steps taken and steps in all.
@@ -217,85 +353,157 @@ impl<T: Training> TrainingRun<T> {
         self.training.taken()
     }
 
-    /// Takes steps until there are no more or `stop` is raised; whether it came to the end.
+    /// Takes steps until there are no more or `stop` is raised; returns whether it came to the end.
     ///
     /// # Errors
-    /// If the file system refuses, or the loss is no number; the last checkpoint stays.
+    /// If the file system refuses, or the loss or a weight is no number; the last checkpoint stays.
     pub fn go_on(
         &mut self,
         stop: &AtomicBool,
-        tell: &mut dyn FnMut(&Record),
+        report: &mut dyn FnMut(&Record),
     ) -> Result<bool, TrainingError> {
-        let mut told: Vec<Figures> = Vec::new();
-        while self.taken() < self.training.steps() {
-            if stop.load(Ordering::Relaxed) {
+        while self.validation_is_due || self.taken() < self.training.steps() {
+            let is_done = !stop.load(Ordering::Relaxed)
+                && (self.validation_is_due || self.step(stop, report)?)
+                && (!self.validation_is_due || self.validate(stop, report)?);
+            if !is_done {
                 self.keep()?;
                 return Ok(false);
             }
-            let figures = self.training.step();
             let step = self.taken();
-            if !figures.values().all(|x| x.is_finite()) {
-                return Err(TrainingError::NotANumber(step));
-            }
-            told.push(figures);
-            let is_last = step == self.training.steps();
-            if step.is_multiple_of(T::RECORD_STEPS) || is_last {
-                self.record(&Record { of: Of::Loss, step, figures: mean(&told) }, tell)?;
-                told.clear();
-            }
-            if step.is_multiple_of(T::VALIDATION_STEPS) || is_last {
-                let (figures, weights) = self.training.validate();
-                self.record(&Record { of: Of::Validation, step, figures }, tell)?;
-                write_whole(&self.folder.join(T::WEIGHTS), &weights)?;
-            }
-            if step.is_multiple_of(T::CHECKPOINT_STEPS) || is_last {
+            if step.is_multiple_of(T::CHECKPOINT_STEPS) || step == self.training.steps() {
                 self.keep()?;
             }
         }
         Ok(true)
     }
 
-    fn keep(&self) -> Result<(), TrainingError> {
-        let checkpoint = self.training.checkpoint();
-        Ok(write_whole(&self.folder.join(CHECKPOINT), &checkpoint)?)
+    /// Takes a step and records the loss if that is due; returns whether the step was taken.
+    fn step(
+        &mut self,
+        stop: &AtomicBool,
+        report: &mut dyn FnMut(&Record),
+    ) -> Result<bool, TrainingError> {
+        let Some(figures) = self.training.step(stop) else { return Ok(false) };
+        let step = self.taken();
+        if !figures.values().all(|x| x.is_finite()) {
+            return Err(TrainingError::NotANumber(step));
+        }
+        self.unrecorded.push(figures);
+        let is_last = step == self.training.steps();
+        if step.is_multiple_of(T::RECORD_STEPS) || is_last {
+            let figures = curves::mean(&self.unrecorded);
+            self.unrecorded.clear();
+            self.record(&Record { of: Of::Loss, step, figures }, report)?;
+        }
+        self.validation_is_due = step.is_multiple_of(T::VALIDATION_STEPS) || is_last;
+        Ok(true)
     }
 
-    fn record(&self, record: &Record, tell: &mut dyn FnMut(&Record)) -> Result<(), TrainingError> {
-        let path = self.folder.join(CURVES);
-        let line = serde_json::to_string(record).expect("a record is plain data") + "\n";
-        let written = open_to_append(&path)?.write_all(line.as_bytes());
-        written.map_err(FileError::of("can't write", &path))?;
-        tell(record);
+    /// Validates, records that and writes the weights; returns whether it was done.
+    fn validate(
+        &mut self,
+        stop: &AtomicBool,
+        report: &mut dyn FnMut(&Record),
+    ) -> Result<bool, TrainingError> {
+        let step = self.taken();
+        let not_finite =
+            |problem: WeightsError| TrainingError::NotFinite { step, problem: problem.to_string() };
+        let validated = self.training.validate(stop).map_err(not_finite)?;
+        let Some((figures, weights)) = validated else { return Ok(false) };
+        self.record(&Record { of: Of::Validation, step, figures }, report)?;
+        write_whole(&self.folder.join(T::WEIGHTS), &weights)?;
+        self.validation_is_due = false;
+        Ok(true)
+    }
+
+    fn keep(&self) -> Result<(), TrainingError> {
+        let mut checkpoint = self.training.checkpoint();
+        insert_progress(&mut checkpoint, &self.unrecorded, self.validation_is_due);
+        let step = self.taken();
+        let bytes = checkpoint
+            .to_bytes(&identity(&self.training))
+            .map_err(|problem| TrainingError::NotFinite { step, problem: problem.to_string() })?;
+        Ok(write_whole(&self.folder.join(CHECKPOINT), &bytes)?)
+    }
+
+    fn record(
+        &self,
+        record: &Record,
+        report: &mut dyn FnMut(&Record),
+    ) -> Result<(), TrainingError> {
+        curves::append(&self.folder, record)?;
+        report(record);
         Ok(())
     }
 }
 
-/// Reads rules from a file that a user named. Rules that it does not name have their defaults.
-///
-/// # Errors
-/// If it can't be read, names rules that aren't there, or nothing can be trained by them.
-pub fn read_rules<T: Training>(path: &Path) -> Result<T::Rules, TrainingError> {
-    parse_rules::<T>(path, &read_user_file(path, MOST_BYTES)?)
+/// A file of weights that was read and checked.
+struct InitialWeights {
+    bytes: Vec<u8>,
+    numbers: Vec<f32>,
 }
 
-fn parse_rules<T: Training>(path: &Path, bytes: &[u8]) -> Result<T::Rules, TrainingError> {
-    let wrong = |problem: String| TrainingError::Config { path: path.to_owned(), problem };
-    let text = std::str::from_utf8(bytes).map_err(|e| wrong(e.to_string()))?;
-    let rules: T::Rules = toml::from_str(text).map_err(|e| wrong(e.message().to_owned()))?;
-    T::check(&rules).map_err(wrong)?;
-    Ok(rules)
+fn read_weights<T: Training>(
+    rules: &T::Rules,
+    path: &Path,
+    bytes: Vec<u8>,
+) -> Result<InitialWeights, TrainingError> {
+    let wrong = |problem| TrainingError::Weights { path: path.to_owned(), problem };
+    let numbers = T::read_weights(rules, &bytes).map_err(wrong)?;
+    Ok(InitialWeights { bytes, numbers })
 }
 
-/// Figures of these names.
-pub fn figures<const N: usize>(named: [(&str, f64); N]) -> Figures {
-    named.into_iter().map(|(name, x)| (name.to_owned(), x)).collect()
-}
-
-/// The mean of each figure.
-fn mean(told: &[Figures]) -> Figures {
-    let mut sums = Figures::new();
-    for (name, x) in told.iter().flatten() {
-        *sums.entry(name.clone()).or_default() += x / told.len() as f64;
+/// Begins a training in a folder that is locked and empty.
+fn begin_locked<T: Training>(
+    folder: &Path,
+    rules: &T::Rules,
+    weights: Option<InitialWeights>,
+    progress: &mut dyn FnMut(&str),
+    stop: &AtomicBool,
+) -> Result<Option<T>, TrainingError> {
+    if let Some(weights) = &weights {
+        // For a training that is stopped before its first checkpoint.
+        write_whole(&folder.join(INITIAL_WEIGHTS), &weights.bytes)?;
     }
-    sums
+    // Its presence makes the folder a training, so it is written last.
+    write_whole(&folder.join(CONFIG), config_text::<T>(rules).as_bytes())?;
+    let Some(mut training) = T::new(rules, folder, progress, stop)? else { return Ok(None) };
+    if let Some(weights) = weights {
+        training.begin_with(weights.numbers);
+    }
+    let wrong = |problem| TrainingError::Checkpoint { path: folder.join(CHECKPOINT), problem };
+    let bytes = checkpoint_bytes(&training, &[]).map_err(wrong)?;
+    write_whole(&folder.join(CHECKPOINT), &bytes)?;
+    Ok(Some(training))
+}
+
+/// Refuses a folder with anything but what a training leaves that was killed before it began.
+fn check_is_empty(folder: &Path) -> Result<(), TrainingError> {
+    if !folder.exists() {
+        return Ok(());
+    }
+    let leftovers = [LOCK, INITIAL_WEIGHTS].map(str::to_owned);
+    let unfinished = [INITIAL_WEIGHTS, CONFIG].map(|name| format!("{name}{UNFINISHED}"));
+    let is_leftover = |path: &PathBuf| {
+        let name = path.file_name().and_then(|name| name.to_str());
+        leftovers.iter().chain(&unfinished).any(|leftover| Some(leftover.as_str()) == name)
+    };
+    match entries(folder)?.iter().all(is_leftover) {
+        true => Ok(()),
+        false => Err(TrainingError::NotEmpty(folder.to_owned())),
+    }
+}
+
+/// Removes what makes a folder a training, after its beginning failed; the folder too if it is new and holds
+/// nothing else.
+fn clear(folder: &Path, is_new: bool) {
+    // The failure is what is reported; what cannot be removed stays.
+    for name in [CONFIG, INITIAL_WEIGHTS, CHECKPOINT] {
+        let _ = fs::remove_file(folder.join(name));
+    }
+    if is_new {
+        let _ = fs::remove_file(folder.join(LOCK));
+        let _ = fs::remove_dir(folder);
+    }
 }

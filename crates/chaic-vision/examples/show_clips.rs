@@ -1,9 +1,11 @@
 //! Clips with labels as pictures, a row each: `cargo run --release -p chaic-vision --example show_clips
 //! -- CLIPS OUT.png`.
+use std::sync::atomic::AtomicBool;
+
 use chaic_agents::sight::TrueSight;
 use chaic_vision::behavior::Behavior;
 use chaic_vision::behavior::clip::CROPS;
-use chaic_vision::behavior::collect::{CollectRules, Collector, collect};
+use chaic_vision::behavior::collect::{CollectRules, Collector, Counts, collect};
 use chaic_vision::behavior::crop::SIDE;
 use chaic_vision::views::Part;
 
@@ -15,10 +17,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (part, sight) = (Part::Training, &TrueSight);
     let collector = Collector { part, rules: &rules, sight, n_threads: 2, folder: None };
     let began = std::time::Instant::now();
-    let mut clips = collect(&collector, &mut |n, counts| {
+    let mut progress = |n: usize, counts: &Counts| {
         println!("{n} episodes, {:.0} s: {counts:?}", began.elapsed().as_secs_f64());
-        true
-    })?;
+    };
+    let clips = collect(&collector, &mut progress, &AtomicBool::new(false))?;
+    let mut clips = clips.expect("nobody stops it");
     clips.sort_by_key(|clip| (clip.is_mixed, clip.label));
     println!("{:?}, then mixed, from top to bottom", Behavior::ALL);
     let shown = CROPS / 2;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io::Cursor;
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 use chaic_files::{FileError, write_whole};
 use chaic_protocol::ClassId;
@@ -247,8 +248,8 @@ fn write_images(folder: &Path, view: &LabelledView, entry: &Entry) -> Result<(),
     Ok(())
 }
 
-/// So many views are drawn before it is told how far it is.
-const ROUND: usize = 64;
+/// Views that are drawn before `go_on` is asked: about a second of work for one thread.
+const ROUND: usize = 16;
 
 /// Writes a data set of the first so many views into a folder: images, depth, annotations, and how often
 /// each class is shown. `go_on` is asked with the number of views that are done; the set of these is
@@ -275,8 +276,10 @@ pub fn collect(
             let annotated = annotate(k, &view);
             write_images(folder, &view, &annotated.entry).map(|()| annotated)
         };
+        let never = AtomicBool::new(false);
+        let drawn = in_order(numbers, n_threads, &never, || (), one);
         let drawn: Result<Vec<Annotated>, FileError> =
-            in_order(numbers, n_threads, || (), one).into_iter().collect();
+            drawn.expect("nobody raises the flag").into_iter().collect();
         views.extend(drawn?);
     }
     let of = format!("{part:?} views of chaic");

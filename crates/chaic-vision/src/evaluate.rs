@@ -1,6 +1,7 @@
 //! How good a detector is on views that nothing was learned from.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::AtomicBool;
 
 use serde::Serialize;
 
@@ -50,33 +51,34 @@ pub fn compare(view: &LabelledView, found: &[Instance]) -> Image {
     }
 }
 
-/// Average precision on the first so many views of the validation part.
+/// Returns the average precision on the first views of the validation part; `None` if `stop` is raised meanwhile.
 pub fn evaluate(
     detector: &TrainedDetector,
     rules: ViewRules,
     n_views: usize,
     n_threads: usize,
-) -> AveragePrecision {
+    stop: &AtomicBool,
+) -> Option<AveragePrecision> {
     let views = (Part::Validation, rules);
-    average_precision(
-        &look(detector, views, n_views, n_threads, |_, view, found| compare(view, found)),
-        &ASKED,
-    )
+    let images =
+        look(detector, views, n_views, n_threads, stop, |_, view, found| compare(view, found))?;
+    Some(average_precision(&images, &ASKED))
 }
 
 /// A calibration by what the detector sees in the first so many views of the training part, drawn by
-/// these rules: those that a helper has, [`ViewRules::NATURAL`].
+/// these rules: those that a helper has, [`ViewRules::NATURAL`]. Returns `None` if `stop` is raised meanwhile.
 pub fn calibrate(
     detector: &TrainedDetector,
     rules: ViewRules,
     n_views: usize,
     n_threads: usize,
-) -> Calibration {
+    stop: &AtomicBool,
+) -> Option<Calibration> {
     let views = (Part::Training, rules);
     let of_view =
         |_, view: &LabelledView, found: &[Instance]| samples(found, &compare(view, found));
-    let samples = look(detector, views, n_views, n_threads, of_view);
-    Calibration::fit(&samples.concat())
+    let samples = look(detector, views, n_views, n_threads, stop, of_view)?;
+    Some(Calibration::fit(&samples.concat()))
 }
 
 /// What is known of each detection, and whether it is right.
@@ -90,17 +92,20 @@ fn samples(found: &[Instance], image: &Image) -> Vec<Sample> {
     found.map(|(f, d)| Sample { predictors: predictors(f), is_right: is_right(d) }).collect()
 }
 
-/// What comes of each of the first so many views, in their order, whatever the number of threads.
+/// What comes of each of the first so many views, in their order, whatever the number of threads; `None` if `stop`
+/// is raised meanwhile.
 fn look<T: Send>(
     detector: &TrainedDetector,
     (part, rules): (Part, ViewRules),
     n_views: usize,
     n_threads: usize,
+    stop: &AtomicBool,
     one: impl Fn(usize, &LabelledView, &[Instance]) -> T + Sync + Send,
-) -> Vec<T> {
+) -> Option<Vec<T>> {
     in_order(
         0..n_views,
         n_threads,
+        stop,
         || detector.inference(),
         |inference, k| {
             let view = Views::new(part, rules, 1, k as u64).draw();
@@ -161,7 +166,9 @@ pub fn report<A: Send>(
         let said: Vec<(f32, bool)> = found.iter().map(|f| f.score).zip(right).collect();
         (image, (said, also(k, view, found)))
     };
-    let seen = look(detector, views, n_views, n_threads, one);
+    let never = AtomicBool::new(false);
+    let seen = look(detector, views, n_views, n_threads, &never, one);
+    let seen = seen.expect("nobody raises the flag");
     let (images, beside): (Vec<Image>, Vec<_>) = seen.into_iter().unzip();
     let (said, also): (Vec<_>, Vec<A>) = beside.into_iter().unzip();
     let found = average_precision(&images, &ASKED);

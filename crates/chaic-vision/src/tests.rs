@@ -18,8 +18,10 @@ use crate::loss::{LossRules, Targets, loss};
 use crate::train::{CropRules, Trainer, TrainingRules};
 use crate::trained::TrainedDetector;
 use crate::views::{LabelledView, Part, ViewRules, Views};
+use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoints};
 use chaic_training::{
-    CHECKPOINT, CONFIG, Of, Record, Training as _, TrainingError, TrainingRun, read_rules,
+    CHECKPOINT, CONFIG, Checkpoint, Of, Record, Training as _, TrainingError, TrainingRun,
+    parse_rules, read_rules,
 };
 
 const EYE_M: f32 = 1.5;
@@ -124,16 +126,53 @@ fn views_are_the_same_each_time_and_others_elsewhere() {
     assert!(view.ids.iter().all(of_id), "ids beyond the labels");
 }
 
+static NEVER: AtomicBool = AtomicBool::new(false);
+
 #[test]
 fn training_goes_on_from_a_checkpoint_as_if_it_had_not_stopped() {
     let mut straight = Trainer::new(tiny());
-    straight.step();
-    let checkpoint = straight.learner.checkpoint();
-    let expected = (straight.step(), straight.learner.checkpoint());
+    straight.step(&NEVER);
+    let checkpoint = straight.checkpoint();
+    let expected = (straight.step(&NEVER), straight.checkpoint());
     let mut resumed = Trainer::new(tiny());
-    assert!(!resumed.resume(&checkpoint[..100]) && !resumed.resume(&[]));
-    assert!(resumed.resume(&checkpoint));
-    assert!((resumed.step(), resumed.learner.checkpoint()) == expected);
+    assert!(resumed.resume(&Checkpoint::default(), &NEVER).is_err());
+    assert_eq!(resumed.resume(&checkpoint, &NEVER), Ok(Some(())));
+    assert!((resumed.step(&NEVER), resumed.checkpoint()) == expected);
+}
+
+#[test]
+fn damaged_checkpoints_and_numbers_out_of_bounds_are_refused() {
+    refuses_damaged_checkpoints(&mut Trainer::new(tiny()));
+    bounds_every_number::<Trainer>();
+}
+
+#[test]
+fn configurations_whose_keys_contradict_each_other_are_refused() {
+    for (text, problem) in [
+        ("[views]\nsize_px = 500", "multiple of 32"),
+        ("[views]\ndistance_m = [3.0, 4.0]", "distance_m"),
+        ("[loss]\nweights = [2.0, 1.0]", "weights"),
+        ("[views]\nsize_px = 128", "side_px"),
+        ("shards = 200", "shards"),
+    ] {
+        let refused = parse_rules::<Trainer>(text).unwrap_err();
+        assert!(refused.contains(problem), "{refused}");
+    }
+}
+
+#[test]
+fn a_raised_flag_stops_steps_and_validations_which_change_nothing() {
+    let raised = AtomicBool::new(true);
+    let mut trainer = Trainer::new(tiny());
+    let before = trainer.checkpoint();
+    assert!(trainer.step(&raised).is_none() && trainer.checkpoint() == before);
+    assert!(trainer.validate(&raised).unwrap().is_none());
+    trainer.learner.average[7] = f32::NAN;
+    assert!(
+        TrainedDetector::uncalibrated(&trainer.detector, &trainer.learner.average)
+            .to_bytes()
+            .is_err()
+    );
 }
 
 #[test]
@@ -141,16 +180,18 @@ fn a_training_leaves_what_it_takes_to_go_on_and_weights_that_are_read_back() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("training");
     let rules = TrainingRules { steps: 1, ..tiny() };
-    let quiet = &mut |_: &str| true;
-    let mut run = TrainingRun::<Trainer>::begin(&out, &rules, quiet).unwrap().unwrap();
+    let quiet = &mut |_: &str| ();
+    let mut run =
+        TrainingRun::<Trainer>::begin(&out, &rules, None, quiet, &NEVER).unwrap().unwrap();
     let stopped = AtomicBool::new(true);
     assert!(!run.go_on(&stopped, &mut |_| ()).unwrap() && run.extent() == (0, 1));
     assert!(matches!(
-        TrainingRun::<Trainer>::begin(&out, &rules, quiet),
+        TrainingRun::<Trainer>::begin(&out, &rules, None, quiet, &NEVER),
         Err(TrainingError::NotEmpty(_))
     ));
     assert_eq!(read_rules::<Trainer>(&out.join(CONFIG)).unwrap(), rules);
-    let mut resumed = TrainingRun::<Trainer>::resume(&out, quiet).unwrap().unwrap();
+    drop(run);
+    let mut resumed = TrainingRun::<Trainer>::resume(&out, quiet, &NEVER).unwrap().unwrap();
     let mut told = Vec::new();
     stopped.store(false, Ordering::Relaxed);
     assert!(resumed.go_on(&stopped, &mut |record| told.push(record.clone())).unwrap());
@@ -160,15 +201,16 @@ fn a_training_leaves_what_it_takes_to_go_on_and_weights_that_are_read_back() {
     ));
     let bytes = std::fs::read(out.join(Trainer::WEIGHTS)).unwrap();
     let trained = TrainedDetector::from_bytes(&bytes).unwrap();
-    assert_eq!(trained.to_bytes(), bytes);
+    assert_eq!(trained.to_bytes().as_ref(), Ok(&bytes));
+    drop(resumed);
     assert!(TrainedDetector::from_bytes(&bytes[..bytes.len() - 1]).is_err());
     std::fs::write(out.join(CHECKPOINT), b"short").unwrap();
     assert!(matches!(
-        TrainingRun::<Trainer>::resume(&out, quiet),
-        Err(TrainingError::Checkpoint(_))
+        TrainingRun::<Trainer>::resume(&out, quiet, &NEVER),
+        Err(TrainingError::Checkpoint { .. })
     ));
     std::fs::write(out.join(CONFIG), "stepps = 3").unwrap();
-    let error = TrainingRun::<Trainer>::resume(&out, quiet).err().unwrap().to_string();
+    let error = TrainingRun::<Trainer>::resume(&out, quiet, &NEVER).err().unwrap().to_string();
     assert!(error.contains("stepps"), "{error}");
 }
 
@@ -199,7 +241,7 @@ fn the_detector_that_comes_with_chaic_is_read_and_finds_most_of_what_it_is_shown
 #[test]
 fn training_learns() {
     let mut trainer = Trainer::new(tiny());
-    let losses: Vec<f64> = (0..30).map(|_| trainer.step().labels).collect();
+    let losses: Vec<f64> = (0..30).map(|_| trainer.step(&NEVER).unwrap().labels).collect();
     let mean = |losses: &[f64]| losses.iter().sum::<f64>() / losses.len() as f64;
     let (first, last) = (mean(&losses[..3]), mean(&losses[27..]));
     assert!(last < 0.8 * first, "{first} to {last}");

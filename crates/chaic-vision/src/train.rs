@@ -1,11 +1,17 @@
 //! The training loop of the detector.
 
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 use chaic_nn::weights::WeightsError;
 use chaic_nn::{AdamRules, Network, Pass, Shape, Tensor};
 use chaic_protocol::rng::Stream;
-use chaic_training::{Figures, Learner, Training, TrainingError, figures, rate_at};
+use chaic_training::bounds::{
+    ADAM, Bound, BoundTable, RATE, SEED, SHARDS, SHARE, STEPS, integer, real,
+};
+use chaic_training::{
+    Checkpoint, CheckpointError, Figures, Learner, Training, TrainingError, figures, rate_at,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::detector::{Blocks, Detector};
@@ -112,12 +118,18 @@ impl Batch {
     }
 }
 
-/// Crops of fresh views.
-fn draw(views: &mut Views, rng: &mut Stream, rules: &TrainingRules, crops: &CropRules) -> Batch {
+/// Draws crops of fresh views; `None` if `stop` is raised meanwhile.
+fn draw(
+    views: &mut Views,
+    rng: &mut Stream,
+    rules: &TrainingRules,
+    crops: &CropRules,
+    stop: &AtomicBool,
+) -> Option<Batch> {
     let mut batch = Batch::default();
     let side = crops.side_px;
     for _ in 0..crops.views {
-        let view = views.draw();
+        let view = views.draw_unless(stop)?;
         let size = view.camera.width as usize;
         for k in 0..crops.of_view {
             let aimed = view.aimed_at.filter(|_| k == 0).map(|e| e.0);
@@ -143,7 +155,7 @@ fn draw(views: &mut Views, rng: &mut Stream, rules: &TrainingRules, crops: &Crop
             batch.add(&view, Crop { at, size: [side, side] }, &rules.loss);
         }
     }
-    batch
+    Some(batch)
 }
 
 /// Something that shows, each class equally often.
@@ -184,13 +196,9 @@ impl Trainer {
         Trainer { rules, detector, learner }
     }
 
-    /// Goes on from a checkpoint; `false` if it is of another network.
-    pub fn resume(&mut self, bytes: &[u8]) -> bool {
-        self.learner.resume(&self.rules.adam, bytes)
-    }
-
-    /// Takes a step on fresh views; which ones depends on the seed and the step alone.
-    pub fn step(&mut self) -> Loss {
+    /// Takes a step on fresh views; which ones depends on the seed and the step alone. Returns `None`, and takes
+    /// no step, if `stop` is raised meanwhile.
+    pub fn step(&mut self, stop: &AtomicBool) -> Option<Loss> {
         let step = self.learner.adam.steps;
         let Trainer { rules, detector, learner } = self;
         let (rules, detector) = (&*rules, &*detector);
@@ -199,10 +207,11 @@ impl Trainer {
             let mut views = Views::new(Part::Training, rules.views, rules.seed, index);
             let mut rng = Stream::new(rules.seed, "crops", index);
             let crops = &rules.crops[index as usize % rules.crops.len()];
-            let batch = draw(&mut views, &mut rng, rules, crops);
-            gradient(detector, numbers, &batch, &rules.loss, pass, by)
+            let batch = draw(&mut views, &mut rng, rules, crops, stop)?;
+            Some(gradient(detector, numbers, &batch, &rules.loss, pass, by))
         };
-        mean_of(&learner.step(&detector.network, (&rules.adam, rules.rate_at(step)), work))
+        let losses = learner.step(&detector.network, (&rules.adam, rules.rate_at(step)), work)?;
+        Some(mean_of(&losses))
     }
 }
 
@@ -210,32 +219,110 @@ impl Trainer {
 const VALIDATION_VIEWS: usize = 200;
 const CALIBRATION_VIEWS: usize = 400;
 
+/// Largest number of pixels of crops that the shards work on at once. A pixel takes about MEMORY_PER_PX bytes in
+/// a pass, so that a training stays below 16 GiB.
+const MAX_CROP_PX: usize = 1 << 23;
+/// Largest number of pixels of crops of one shard, which bounds how long a pass takes that can't be stopped.
+const MAX_SHARD_PX: usize = 1 << 20;
+
+const CROP_BOUNDS: BoundTable = &[
+    ("views", integer(1, 256)),
+    ("of_view", integer(1, 256)),
+    ("side_px", integer(32, 1024)),
+    ("anywhere", SHARE),
+];
+
+/// A view of more added things than this shows little else.
+const VIEW_BOUNDS: BoundTable = &[
+    ("size_px", integer(32, 1024)),
+    ("swapped", SHARE),
+    ("added", integer(0, 200)),
+    ("decor", SHARE),
+    ("large", SHARE),
+    ("refurnished", Bound::List(&[SHARE, real(1.0, 10.0)])),
+    ("wanted", SHARE),
+    ("carrying", SHARE),
+    ("filled", SHARE),
+    ("varied", SHARE),
+    ("aimed", SHARE),
+    ("aimed_movable", SHARE),
+    ("distance_m", Bound::List(&[real(0.3, 3.0), real(0.5, 20.0)])),
+];
+
+const LOSS_BOUNDS: BoundTable = &[
+    ("even_px", real(1.0, 1e6)),
+    ("power", real(0.0, 1.0)),
+    ("weights", real(1e-3, 1e3)),
+    ("offset", real(0.0, 100.0)),
+    ("least_px", integer(1, 1 << 16)),
+];
+
+impl CropRules {
+    /// Checks one set of crops of views of this size.
+    fn check(&self, views: &ViewRules, shards: usize) -> Result<(), String> {
+        if !self.side_px.is_multiple_of(32) || self.side_px > views.size_px as usize {
+            return Err(
+                "crops.side_px must be a multiple of 32, from 32 to views.size_px".to_owned()
+            );
+        }
+        let of_shard = self.views * self.of_view * self.side_px * self.side_px;
+        if of_shard > MAX_SHARD_PX || shards * of_shard > MAX_CROP_PX {
+            return Err(format!(
+                "crops.views times crops.of_view times the square of crops.side_px is {of_shard} pixels; it must \
+                 be from 1 to {MAX_SHARD_PX}, and times shards, which is {shards}, up to {MAX_CROP_PX}"
+            ));
+        }
+        Ok(())
+    }
+}
+
 impl Training for Trainer {
     type Rules = TrainingRules;
+    const KIND: &'static str = "detector";
     const WEIGHTS: &'static str = "detector.safetensors";
+    const BOUNDS: BoundTable = &[
+        ("seed", SEED),
+        ("steps", STEPS),
+        ("rate", RATE),
+        ("warm_up", STEPS),
+        ("shards", SHARDS),
+        ("crops", Bound::Table(CROP_BOUNDS)),
+        ("views", Bound::Table(VIEW_BOUNDS)),
+        ("loss", Bound::Table(LOSS_BOUNDS)),
+        ("adam", ADAM),
+    ];
 
     fn new(
         rules: &TrainingRules,
         _: &Path,
-        _: &mut dyn FnMut(&str) -> bool,
+        _: &mut dyn FnMut(&str),
+        _: &AtomicBool,
     ) -> Result<Option<Trainer>, TrainingError> {
         Ok(Some(Trainer::new(*rules)))
     }
 
     fn check(rules: &TrainingRules) -> Result<(), String> {
-        let crops = rules.crops.iter();
-        let sides_fit = crops.clone().all(|c| {
-            c.side_px.is_multiple_of(32) && (32..=rules.views.size_px as usize).contains(&c.side_px)
-        });
-        let is_some = crops.clone().all(|c| c.views > 0 && c.of_view > 0);
-        if !sides_fit || !is_some || rules.shards == 0 || rules.steps == 0 || rules.warm_up == 0 {
-            return Err(
-                "steps, warm_up, shards, views and of_view are at least 1, and side_px is a \
-                 multiple of 32 up to views.size_px"
-                    .to_owned(),
-            );
+        let TrainingRules { views, loss, shards, .. } = rules;
+        if !views.size_px.is_multiple_of(32) {
+            return Err("views.size_px must be a multiple of 32, from 32 to 1024".to_owned());
         }
-        Ok(())
+        let [near_m, far_m] = views.distance_m;
+        if far_m < 1.5 * near_m {
+            return Err("views.distance_m must be from near to far, the second at least 1.5 times the first"
+                .to_owned());
+        }
+        if loss.weights[0] > loss.weights[1] {
+            return Err("loss.weights must be from least to most".to_owned());
+        }
+        rules.crops.iter().try_for_each(|crops| crops.check(views, *shards))
+    }
+
+    fn read_weights(rules: &TrainingRules, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
+        Ok(TrainedDetector::of_bytes(Detector::of(rules.blocks), weights)?.numbers)
+    }
+
+    fn network(&self) -> &Network {
+        &self.detector.network
     }
 
     fn steps(&self) -> u64 {
@@ -246,38 +333,46 @@ impl Training for Trainer {
         self.learner.adam.steps
     }
 
-    fn checkpoint(&self) -> Vec<u8> {
-        self.learner.checkpoint()
+    fn checkpoint(&self) -> Checkpoint {
+        let mut checkpoint = Checkpoint::default();
+        self.learner.save(&mut checkpoint);
+        checkpoint
     }
 
-    fn begin_with(&mut self, weights: &[u8]) -> Result<(), WeightsError> {
-        let trained = TrainedDetector::of_bytes(self.detector.clone(), weights)?;
-        self.learner.begin_with(trained.numbers);
-        Ok(())
+    fn begin_with(&mut self, numbers: Vec<f32>) {
+        self.learner.begin_with(numbers);
     }
 
-    fn resume(&mut self, bytes: &[u8]) -> bool {
-        Trainer::resume(self, bytes)
+    fn resume(
+        &mut self,
+        checkpoint: &Checkpoint,
+        _: &AtomicBool,
+    ) -> Result<Option<()>, CheckpointError> {
+        self.learner.load(checkpoint).map(Some)
     }
 
-    fn step(&mut self) -> Figures {
-        let Loss { labels, offsets, right, right_of_things } = Trainer::step(self);
-        figures([
+    fn step(&mut self, stop: &AtomicBool) -> Option<Figures> {
+        let Loss { labels, offsets, right, right_of_things } = Trainer::step(self, stop)?;
+        Some(figures([
             ("labels", labels),
             ("offsets", offsets),
             ("right", right),
             ("right_of_things", right_of_things),
-        ])
+        ]))
     }
 
-    fn validate(&self) -> (Figures, Vec<u8>) {
+    fn validate(&self, stop: &AtomicBool) -> Result<Option<(Figures, Vec<u8>)>, WeightsError> {
         let average = &self.learner.average;
         let mut detector = TrainedDetector::uncalibrated(&self.detector, average);
         let (views, threads) = (self.rules.views, self.rules.shards);
-        let found = evaluate(&detector, views, VALIDATION_VIEWS, threads);
+        let found = evaluate(&detector, views, VALIDATION_VIEWS, threads, stop);
         let natural = ViewRules { size_px: views.size_px, ..ViewRules::NATURAL };
-        detector.calibration = calibrate(&detector, natural, CALIBRATION_VIEWS, threads);
-        (figures([("map50", found.map50), ("map", found.map)]), detector.to_bytes())
+        let Some(found) = found else { return Ok(None) };
+        let calibration = calibrate(&detector, natural, CALIBRATION_VIEWS, threads, stop);
+        let Some(calibration) = calibration else { return Ok(None) };
+        detector.calibration = calibration;
+        let figures = figures([("map50", found.map50), ("map", found.map)]);
+        Ok(Some((figures, detector.to_bytes()?)))
     }
 }
 

@@ -68,16 +68,21 @@ impl TrainedDetector {
         Ok(TrainedDetector { detector, numbers, calibration: Calibration { factors } })
     }
 
-    /// As a safetensors file.
-    pub fn to_bytes(&self) -> Vec<u8> {
-        let numbers: Vec<f32> =
-            self.numbers.iter().chain(&self.calibration.factors).copied().collect();
-        weights::to_bytes(&of_file(&self.detector), &numbers, &kind())
+    /// Returns it as a safetensors file.
+    ///
+    /// # Errors
+    /// If a number is not finite.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, WeightsError> {
+        weights::to_bytes(&of_file(&self.detector), &self.all_numbers(), &kind())
+    }
+
+    fn all_numbers(&self) -> Vec<f32> {
+        self.numbers.iter().chain(&self.calibration.factors).copied().collect()
     }
 
     /// The first digits of the digest of its file, which name it.
     pub fn digest(&self) -> String {
-        weights::digest(&self.to_bytes())
+        weights::digest_of(&of_file(&self.detector), &self.all_numbers(), &kind())
     }
 
     /// Working space for looking at images.

@@ -2,6 +2,7 @@
 //! against.
 
 use std::f32::consts::PI;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use chaic_episodes::{Seeds, Settings, generate_with};
 use chaic_protocol::geom::{Camera, yaw_rotation};
@@ -190,7 +191,15 @@ impl Views {
 
     /// The next one.
     pub fn draw(&mut self) -> LabelledView {
+        self.draw_unless(&AtomicBool::new(false)).expect("nobody raises the flag")
+    }
+
+    /// Returns the next one; `None` if `stop` is raised meanwhile.
+    pub fn draw_unless(&mut self, stop: &AtomicBool) -> Option<LabelledView> {
         loop {
+            if stop.load(Ordering::Relaxed) {
+                return None;
+            }
             if self.left == 0 {
                 self.scene = self.place();
                 self.left = VIEWS_OF_SCENE;
@@ -202,7 +211,7 @@ impl Views {
             };
             let view = (0..TRIES).find_map(|_| self.look(&mut place));
             self.scene = Some(place);
-            if let Some(view) = view {
+            if view.is_some() {
                 return view;
             }
         }

@@ -6,6 +6,7 @@ mod export;
 mod fidelity;
 mod opponent;
 mod perception;
+mod ranges;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -148,8 +149,8 @@ pub struct EvalArguments {
     /// Play the episode files (*.json) of this folder instead of a split.
     #[arg(long, value_name = "DIR")]
     pub episodes: Option<PathBuf>,
-    /// Only the first N episodes of each task.
-    #[arg(long, value_name = "N")]
+    /// Only the first N episodes of each task, 1 to 1000000.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(ranges::FIRST))]
     pub first: Option<u32>,
     /// paper (usual), or compat for what the original's code does.
     #[arg(long, value_name = "NAME")]
@@ -157,14 +158,14 @@ pub struct EvalArguments {
     /// Set one rule otherwise; may be given often. VALUE may be paper or compat.
     #[arg(long, value_name = "NAME=VALUE")]
     pub set: Vec<String>,
-    /// Play each episode with N seeds; the first is the episode's own.
-    #[arg(long, value_name = "N")]
+    /// Play each episode with N seeds, 1 to 10000; the first is the episode's own.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(ranges::SEEDS))]
     pub seeds: Option<u32>,
-    /// Side of all images in pixels, instead of what each agent asks for (512).
-    #[arg(long, value_name = "PIXELS")]
+    /// Side of all images in pixels, 16 to 2048, instead of what each agent asks for (512).
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(ranges::RUN_SIZE))]
     pub size: Option<u32>,
-    /// Episodes at a time; changes no result. Usual: one for each core.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    /// Episodes at a time, 1 to 1024; changes no result. Usual: one for each core.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(ranges::JOBS))]
     pub jobs: Option<u16>,
     #[arg(long, value_name = "KIND", help = partner_is_help())]
     pub partner_is: Option<PersonKind>,
@@ -304,8 +305,8 @@ pub enum LlmCommand {
         /// With which helper. Usual: the first that asked a language model.
         #[arg(long, value_name = "NAME")]
         helper: Option<String>,
-        /// With which of the run's seeds. Usual: the lowest.
-        #[arg(long, value_name = "K")]
+        /// With which of the run's seeds, 0 to 9999. Usual: the lowest.
+        #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(ranges::SEED))]
         seed: Option<u32>,
         /// Whose decisions: helper or partner.
         #[arg(long, default_value = "helper", value_parser = agent)]
@@ -345,8 +346,8 @@ pub struct ReportArguments {
 pub struct VerifyArguments {
     /// The run's folder.
     pub run: PathBuf,
-    /// Traces at a time. Usual: one for each core.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    /// Traces at a time, 1 to 1024. Usual: one for each core.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(ranges::JOBS))]
     pub jobs: Option<u16>,
 }
 
@@ -363,14 +364,14 @@ pub struct ReplayArguments {
     /// With which helper. Usual: rhp if the run has it.
     #[arg(long, value_name = "NAME")]
     pub helper: Option<String>,
-    /// With which of the run's seeds. Usual: the lowest.
-    #[arg(long, value_name = "K")]
+    /// With which of the run's seeds, 0 to 9999. Usual: the lowest.
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(ranges::SEED))]
     pub seed: Option<u32>,
-    /// Pictures a second.
-    #[arg(long, default_value_t = 30)]
+    /// Pictures a second, 1 to 240.
+    #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u32).range(ranges::FPS))]
     pub fps: u32,
-    /// Draw every N-th frame; 30 frames are a second of walking.
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
+    /// Draw every N-th frame, 1 to 10000; 30 frames are a second of walking.
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(ranges::EVERY))]
     pub every: u32,
     /// Draw over what the helper sees what a detector finds in it: the one by which the run's helpers
     /// saw, or else the one that comes with chaic.
@@ -386,21 +387,21 @@ pub struct RenderArguments {
     /// Whose eyes: partner, helper or child.
     #[arg(long, default_value = "helper", value_parser = agent)]
     pub agent: AgentId,
-    /// The frame; the first one from it on in which somebody decides is shown.
-    #[arg(long, default_value_t = 0)]
+    /// The frame, 0 to 1000000; the first one from it on in which somebody decides is shown.
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(ranges::FRAME))]
     pub frame: u32,
     /// Folder for rgb.png, depth.png (16 bit, millimetres), ids.png (16 bit) and ids.json, classes.png
     /// and classes.json, normals.png (in the world), and plan.png.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Side of the images, pixels.
+    /// Side of the images, 16 to 4096 pixels.
     #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(16..=4096))]
     pub size: u32,
     /// The helper that takes part.
     #[arg(long, default_value = "rhp")]
     pub helper: String,
-    /// The seed.
-    #[arg(long, default_value_t = 0)]
+    /// The seed, 0 to 9999.
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(ranges::SEED))]
     pub seed: u32,
     /// paper, or compat for what the original's code does.
     #[arg(long, value_name = "NAME", default_value = "paper")]
@@ -432,7 +433,7 @@ pub enum EpisodesCommand {
         /// The picture, .png.
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
-        /// Its width, pixels.
+        /// Its width, 64 to 8192 pixels.
         #[arg(long, default_value_t = 1200, value_parser = clap::value_parser!(u32).range(64..=8192))]
         width: u32,
     },
@@ -509,3 +510,6 @@ pub enum ListFormat {
     /// JSON.
     Json,
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,14 +1,13 @@
 //! The folder of a run: where what lies, and who may write.
 
-use std::fs::{self, File, TryLockError};
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use chaic_env::trace::{Trace, Warning};
 use chaic_env::{CHAIC_VERSION, Digest, EnvError, RunKey, slug};
 use chaic_episodes::{Episode, MAX_EPISODE_BYTES, find_episode};
 use chaic_files::{
-    Entry, EntryKind, UNFINISHED, entries, is_file_below, kind, kind_below, open_or_create,
-    read_below, read_bounded, walk, write_whole,
+    Entry, EntryKind, FolderLock, LOCK, LockError, UNFINISHED, entries, is_file_below, kind, kind_below, read_below, read_bounded, walk, write_whole,
 };
 use serde::{Deserialize, Serialize};
 
@@ -24,8 +23,6 @@ const VERSION: u32 = 2;
 const MAX_RUN_FILE_BYTES: u64 = 1 << 20;
 /// Its presence makes a folder a run, so it is written after all that a run needs.
 const RUN_FILE: &str = "run.json";
-/// The first file that a run writes; whoever holds its lock may write the others.
-const LOCK: &str = ".lock";
 /// Copies of episode files.
 pub(super) const EPISODES: &str = "episodes";
 /// What helpers that ask language models record; `chaic-llm` writes it.
@@ -63,7 +60,7 @@ pub enum Access {
 pub struct RunFolder {
     path: PathBuf,
     /// Held as long as this exists, if the folder was opened for writing.
-    _lock: Option<File>,
+    _lock: Option<FolderLock>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -455,13 +452,9 @@ fn check_access(path: &Path, access: Access) -> Result<()> {
     }
 }
 
-fn take_lock(path: &Path) -> Result<File> {
-    let name = path.join(LOCK);
-    let refused = || EvalError::io("lock", &name);
-    let file = open_or_create(&name)?;
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(EvalError::Locked { path: path.to_owned() }),
-        Err(TryLockError::Error(e)) => Err(refused()(e)),
-    }
+fn take_lock(path: &Path) -> Result<FolderLock> {
+    FolderLock::take(path).map_err(|error| match error {
+        LockError::Held(path) => EvalError::Locked { path },
+        LockError::File(refused) => refused.into(),
+    })
 }

@@ -102,16 +102,14 @@ fn episodes(
             let (id, horizon) = (e.id().to_owned(), e.setup().horizon);
             Entry { id, horizon, environment: environment(e) }
         };
-        return Ok(own.iter().filter(|e| e.task() == task).take(limit).map(entry).collect());
+        let of_task = || own.iter().filter(|e| e.task() == task).take(limit);
+        check_number(of_task().count(), at_most, task)?;
+        return Ok(of_task().map(entry).collect());
     }
     let split: Split = options.split.parse()?;
     let horizon = task.info().horizon;
     let n = split.len_of(task).min(limit);
-    if n > at_most {
-        let text =
-            format!("{n} episodes of {task} are too many for one run; give --first or fewer seeds");
-        return Err(EvalError::Options(text));
-    }
+    check_number(n, at_most, task)?;
     let partner = options.partner_is.map_or_else(String::new, |kind| format!("/{kind}"));
     let entry = |k: usize| Entry {
         id: split.episode_id(task, k) + &partner,
@@ -119,6 +117,16 @@ fn episodes(
         environment: split.environment(task, k as u64),
     };
     Ok((0..n).map(entry).collect())
+}
+
+/// Refuses more episodes of a task than a run has room for.
+fn check_number(n: usize, at_most: usize, task: TaskId) -> Result<()> {
+    if n > at_most {
+        let text =
+            format!("{n} episodes of {task} are too many for one run; give --first or fewer seeds");
+        return Err(EvalError::Options(text));
+    }
+    Ok(())
 }
 
 /// Reads the `.json` files of a folder that a user named, sorted by id.

@@ -1,6 +1,7 @@
 //! Windows of generated episodes, with what was true of the partner.
 
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use chaic_agents::Mind;
@@ -19,6 +20,7 @@ use chaic_protocol::observation::Grants;
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{AgentError, AgentId, Briefing, Observation, TaskId};
 use chaic_render::Appearance;
+use chaic_training::bounds::{BoundTable, integer};
 use chaic_vision::sights::{self, SightError};
 pub use chaic_vision::views::Part;
 use chaic_world::Person;
@@ -54,6 +56,17 @@ fn first_seed(part: Part) -> u64 {
         Part::Test => 62_000_000,
     }
 }
+
+/// Largest number of windows of each goal. A window takes about 1.5 kB, so that all take 8 GB.
+pub const MAX_WINDOWS: u32 = 1_000_000;
+/// Largest number of episodes that windows are made of.
+pub const MAX_EPISODES: u32 = 100_000;
+/// Bounds of [`CollectRules`].
+pub const COLLECT_BOUNDS: BoundTable = &[
+    ("of_each", integer(1, MAX_WINDOWS as i64)),
+    ("episodes", integer(1, MAX_EPISODES as i64)),
+    ("image_size", integer(16, 1024)),
+];
 
 /// Which windows are made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -95,11 +108,8 @@ impl CollectRules {
     /// # Errors
     /// That, in a sentence.
     pub fn check(&self) -> Result<(), String> {
-        if self.of_each.min(self.episodes).min(self.tasks.len()) == 0 {
-            return Err("of_each and episodes are at least 1, and there is a task".to_owned());
-        }
-        if !(16..=1024).contains(&self.image_size) {
-            return Err("image_size is 16 to 1024".to_owned());
+        if self.tasks.is_empty() {
+            return Err("`collect.tasks` names no task".to_owned());
         }
         self.sight().map(|_| ()).map_err(|e| e.to_string())
     }
@@ -117,14 +127,16 @@ const OF_EPISODE: usize = 40;
 const ROUND: usize = 32;
 
 /// The windows, in an order that doesn't depend on threads, balanced: no goal has more than the rules say, or than
-/// twice as many as the rarest but one. `None` if `go_on`, which is called with what has been done, says no.
+/// twice as many as the rarest but one. Returns `None` if `stop` is raised meanwhile. `progress` is called with what has
+/// been done.
 ///
 /// # Errors
 /// If nobody can see so, or an episode can't be played.
 pub fn collect(
     part: Part,
     rules: &CollectRules,
-    go_on: &mut dyn FnMut(&str) -> bool,
+    progress: &mut dyn FnMut(&str),
+    stop: &AtomicBool,
 ) -> Result<Option<Vec<Sample>>, CollectError> {
     let sight = rules.sight()?;
     let mut samples: Vec<Sample> = Vec::new();
@@ -132,9 +144,7 @@ pub fn collect(
     for first in (0..rules.episodes).step_by(ROUND) {
         let told: Vec<String> =
             Goal::ALL.iter().zip(counts).map(|(goal, n)| format!("{} {n}", goal.name())).collect();
-        if !go_on(&format!("{first} episodes, windows: {}", told.join(", "))) {
-            return Ok(None);
-        }
+        progress(&format!("{first} episodes, windows: {}", told.join(", ")));
         // Nobody stands still as long as others walk: waiting stays rare.
         let is_enough = |goal: &&Goal| **goal != Goal::Wait && counts[goal.index()] < rules.of_each;
         if Goal::ALL.iter().find(is_enough).is_none() {
@@ -143,8 +153,11 @@ pub fn collect(
         let round: Result<Vec<Vec<Sample>>, CollectError> = (first
             ..(first + ROUND).min(rules.episodes))
             .into_par_iter()
-            .map(|index| of_episode(part, rules, &*sight, index as u32))
+            .map(|index| of_episode(part, rules, &*sight, index as u32, stop))
             .collect();
+        if stop.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
         for sample in round?.into_iter().flatten() {
             let count = &mut counts[sample.goal.index()];
             if *count < rules.of_each {
@@ -168,6 +181,9 @@ pub enum CollectError {
     /// The file system refuses.
     #[error(transparent)]
     File(#[from] FileError),
+    /// There is nothing to learn from.
+    #[error("there are no windows; play more episodes")]
+    Empty,
     /// A file is no file of windows.
     #[error("{path}: {problem}")]
     Format {
@@ -178,12 +194,13 @@ pub enum CollectError {
     },
 }
 
-/// The windows of one episode, thinned out.
+/// Returns the windows of one episode, thinned out; some of them if `stop` is raised meanwhile.
 fn of_episode(
     part: Part,
     rules: &CollectRules,
     sight: &dyn Sight,
     index: u32,
+    stop: &AtomicBool,
 ) -> Result<Vec<Sample>, CollectError> {
     let task = rules.tasks[index as usize % rules.tasks.len()];
     let seed = first_seed(part) + u64::from(index);
@@ -220,7 +237,7 @@ fn of_episode(
     };
     let minds = Minds::of(Some(seeded_by_episode(helper, &config)), Some(partner));
     let mut env = Env::new(config, minds).map_err(RolloutError::from)?;
-    env.advance(None).map_err(RolloutError::from)?;
+    env.run(stop, None, &mut |_| Ok::<(), AgentError>(())).map_err(RolloutError::from)?;
     let mut samples = std::mem::take(&mut *notes.lock().unwrap_or_else(PoisonError::into_inner));
     // Any of them, as the goals of an episode's beginning are not those of its end.
     Stream::new(seed, "windows", 0).shuffle(&mut samples);
@@ -418,6 +435,9 @@ fn parse(bytes: &[u8]) -> Result<Vec<Sample>, String> {
     };
     let (state, choices) = (f32s("state", N_STATE)?, f32s("choices", N_CLASS)?);
     let limits = f32s("limits", N_LIMITS)?;
+    if !state.iter().chain(&choices).chain(&limits).all(|x| x.is_finite()) {
+        return Err("it has a number that is not finite".to_owned());
+    }
     let [n_choices, goals] = [i32s("n_choices")?, i32s("goal")?];
     let [targets, episodes] = [i32s("target")?, i32s("episode")?];
     let n = n_choices.len();

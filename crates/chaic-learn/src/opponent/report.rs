@@ -1,6 +1,7 @@
 //! How good an opponent model is.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::Serialize;
 
@@ -40,8 +41,8 @@ pub struct Report {
 const N_BINS: usize = 10;
 
 impl Report {
-    /// That of a model.
-    pub fn of(model: &OpponentModel, samples: &[Sample]) -> Report {
+    /// Returns that of a model; `None` if `stop` is raised meanwhile.
+    pub fn of(model: &OpponentModel, samples: &[Sample], stop: &AtomicBool) -> Option<Report> {
         let mut pass = model.pass();
         let mut confusion = [[0; N_GOALS]; N_GOALS];
         let (mut goals, mut targets, mut errors) = (Vec::new(), Vec::new(), Vec::new());
@@ -51,6 +52,9 @@ impl Report {
         samples.iter().for_each(|s| counts[s.goal.index()] += 1.0);
         let n_goals = counts.iter().filter(|n| **n > 0.0).count() as f64;
         for sample in samples {
+            if stop.load(Ordering::Relaxed) {
+                return None;
+            }
             let opinion = model.opinion(&sample.window, &mut pass);
             let told = best(&opinion.goals);
             let goal = sample.goal.index();
@@ -74,14 +78,14 @@ impl Report {
             errors.push((sample.episode, sum));
         }
         let off = bins.iter().map(|(_, sure, right)| f64::abs(sure - right)).sum::<f64>();
-        Report {
+        Some(Report {
             goal_accuracy: mean(&goals),
             target_accuracy: mean(&targets),
             limits_error: mean(&errors),
             error_of_limit: LIMITS.into_iter().zip(of_limit).collect(),
             confusion,
             calibration_error: off / samples.len().max(1) as f64,
-        }
+        })
     }
 
     /// The report in words.

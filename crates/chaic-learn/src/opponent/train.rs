@@ -1,21 +1,28 @@
 //! Learning the opponent model from windows.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 use chaic_files::{EntryKind, kind};
-use chaic_nn::AdamRules;
 use chaic_nn::weights::{self, WeightsError};
+use chaic_nn::{AdamRules, Network};
 use chaic_protocol::geom::math;
 use chaic_protocol::rng::Stream;
-use chaic_training::{Figures, Learner, Training, TrainingError, figures, rate_at};
+use chaic_training::bounds::{ADAM, Bound, BoundTable, RATE, SEED, SHARDS, STEPS, integer, real};
+use chaic_training::{
+    Checkpoint, CheckpointError, Figures, Learner, Training, TrainingError, figures, rate_at,
+};
 use serde::{Deserialize, Serialize};
 
-use super::collect::{CollectRules, Part, Sample, collect, read, read_given, write};
+use super::collect::{
+    COLLECT_BOUNDS, CollectError, CollectRules, Part, Sample, collect, read, read_given, write,
+};
 use super::network::{Heads, KIND, N_GOALS, OpponentModel, network};
 use super::report::Report;
 use super::{Goal, N_LIMITS};
 use crate::actor_critic::{BySaid, Said, step};
 use crate::choice_network::ChoiceNetwork;
+use crate::ppo::MAX_BATCH;
 
 /// How it is trained.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -87,17 +94,58 @@ pub struct OpponentTraining {
     validation: Vec<Sample>,
 }
 
+/// Section of a checkpoint.
+const STEPS_TAKEN: &str = "opponent.steps";
+
+impl OpponentTraining {
+    /// Returns a training on these windows before its first step.
+    ///
+    /// # Errors
+    /// If there are no windows.
+    fn with_windows(
+        rules: &OpponentRules,
+        samples: Vec<Sample>,
+        validation: Vec<Sample>,
+    ) -> Result<OpponentTraining, TrainingError> {
+        let mut of_goal = vec![Vec::new(); Goal::ALL.len()];
+        samples.iter().enumerate().for_each(|(k, s)| of_goal[s.goal.index()].push(k));
+        of_goal.retain(|of| !of.is_empty());
+        if of_goal.is_empty() {
+            return Err(TrainingError::of_data(CollectError::Empty));
+        }
+        let network = network();
+        let learner = Learner::new(&network.network, rules.seed, rules.shards);
+        let rules = rules.clone();
+        Ok(OpponentTraining { rules, network, learner, steps: 0, samples, of_goal, validation })
+    }
+}
+
 impl Training for OpponentTraining {
     type Rules = OpponentRules;
+    const KIND: &'static str = "opponent";
     const WEIGHTS: &'static str = "opponent.safetensors";
     const RECORD_STEPS: u64 = 100;
     const CHECKPOINT_STEPS: u64 = 1000;
     const VALIDATION_STEPS: u64 = 1000;
+    const BOUNDS: BoundTable = &[
+        ("seed", SEED),
+        ("steps", STEPS),
+        ("warm_up", STEPS),
+        ("batch", integer(1, MAX_BATCH)),
+        ("rate", RATE),
+        ("target", real(0.0, 100.0)),
+        ("limits", real(0.0, 100.0)),
+        ("shards", SHARDS),
+        ("validation_of_each", integer(1, 100_000)),
+        ("adam", ADAM),
+        ("collect", Bound::Table(COLLECT_BOUNDS)),
+    ];
 
     fn new(
         rules: &OpponentRules,
         folder: &Path,
-        go_on: &mut dyn FnMut(&str) -> bool,
+        progress: &mut dyn FnMut(&str),
+        stop: &AtomicBool,
     ) -> Result<Option<OpponentTraining>, TrainingError> {
         let mut windows = Vec::new();
         for (part, name) in WINDOWS {
@@ -116,30 +164,31 @@ impl Training for OpponentTraining {
                 _ => rules.validation_of_each,
             };
             let collected = CollectRules { of_each, ..rules.collect.clone() };
-            let made = collect(part, &collected, go_on).map_err(TrainingError::of_data)?;
+            let made = collect(part, &collected, progress, stop).map_err(TrainingError::of_data)?;
             let Some(made) = made else { return Ok(None) };
             write(&path, &made)?;
             windows.push(made);
         }
         let (validation, samples) = (windows.remove(1), windows.remove(0));
-        let mut of_goal = vec![Vec::new(); Goal::ALL.len()];
-        samples.iter().enumerate().for_each(|(k, s)| of_goal[s.goal.index()].push(k));
-        of_goal.retain(|of| !of.is_empty());
-        let network = network();
-        let learner = Learner::new(&network.network, rules.seed, rules.shards);
-        let rules = rules.clone();
-        let training =
-            OpponentTraining { rules, network, learner, steps: 0, samples, of_goal, validation };
-        Ok((!training.of_goal.is_empty()).then_some(training))
+        OpponentTraining::with_windows(rules, samples, validation).map(Some)
     }
 
     fn check(rules: &OpponentRules) -> Result<(), String> {
-        let OpponentRules { batch, shards, validation_of_each, .. } = *rules;
-        if batch.min(shards).min(validation_of_each) == 0 || rules.steps.min(rules.warm_up) == 0 {
-            let least = "steps, warm_up, batch, shards and validation_of_each are at least 1";
-            return Err(least.to_owned());
+        if let Some(path) = &rules.windows {
+            let windows = read(path).map_err(|e| e.to_string())?;
+            if windows.is_empty() {
+                return Err(format!("{}: {}", path.display(), CollectError::Empty));
+            }
         }
         rules.collect.check()
+    }
+
+    fn read_weights(_: &OpponentRules, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
+        Ok(OpponentModel::from_bytes(weights)?.numbers().to_vec())
+    }
+
+    fn network(&self) -> &Network {
+        &self.network.network
     }
 
     fn steps(&self) -> u64 {
@@ -150,24 +199,29 @@ impl Training for OpponentTraining {
         self.steps
     }
 
-    fn checkpoint(&self) -> Vec<u8> {
-        let mut bytes = self.steps.to_le_bytes().to_vec();
-        bytes.extend(self.learner.checkpoint());
-        bytes
+    fn checkpoint(&self) -> Checkpoint {
+        let mut checkpoint = Checkpoint::default();
+        checkpoint.insert_integers(STEPS_TAKEN, vec![self.steps]);
+        self.learner.save(&mut checkpoint);
+        checkpoint
     }
 
-    fn begin_with(&mut self, weights: &[u8]) -> Result<(), WeightsError> {
-        self.learner.begin_with(OpponentModel::from_bytes(weights)?.numbers().to_vec());
-        Ok(())
+    fn begin_with(&mut self, numbers: Vec<f32>) {
+        self.learner.begin_with(numbers);
     }
 
-    fn resume(&mut self, bytes: &[u8]) -> bool {
-        let Some((steps, rest)) = bytes.split_first_chunk::<8>() else { return false };
-        self.steps = u64::from_le_bytes(*steps);
-        self.learner.resume(&self.rules.adam, rest)
+    fn resume(
+        &mut self,
+        checkpoint: &Checkpoint,
+        _: &AtomicBool,
+    ) -> Result<Option<()>, CheckpointError> {
+        let steps = checkpoint.integer(STEPS_TAKEN)?;
+        self.learner.load(checkpoint)?;
+        self.steps = steps;
+        Ok(Some(()))
     }
 
-    fn step(&mut self) -> Figures {
+    fn step(&mut self, _: &AtomicBool) -> Option<Figures> {
         let OpponentTraining { rules, network, learner, samples, of_goal, .. } = self;
         let mut rng = Stream::new(rules.seed, "windows of a step", self.steps);
         let mut draw = || {
@@ -182,22 +236,24 @@ impl Training for OpponentTraining {
         let parts = step(network, (learner, &rules.adam, rate), &batch, |s| &s.window, by);
         self.steps += 1;
         let mean = |of: fn(&Told) -> f64| parts.iter().map(of).sum::<f64>() / batch.len() as f64;
-        figures([
+        Some(figures([
             ("goal", mean(|t| t.goal)),
             ("target", mean(|t| t.target)),
             ("limits", mean(|t| t.limits)),
-        ])
+        ]))
     }
 
-    fn validate(&self) -> (Figures, Vec<u8>) {
+    fn validate(&self, stop: &AtomicBool) -> Result<Option<(Figures, Vec<u8>)>, WeightsError> {
         let numbers = &self.learner.average;
-        let report = Report::of(&OpponentModel::new(numbers.clone()), &self.validation);
+        let weights = weights::to_bytes(&self.network.network, numbers, KIND)?;
+        let report = Report::of(&OpponentModel::new(numbers.clone()), &self.validation, stop);
+        let Some(report) = report else { return Ok(None) };
         let figures = figures([
             ("goal_accuracy", report.goal_accuracy.mean),
             ("target_accuracy", report.target_accuracy.mean),
             ("limits_error", report.limits_error.mean),
         ]);
-        (figures, weights::to_bytes(&self.network.network, numbers, KIND))
+        Ok(Some((figures, weights)))
     }
 }
 

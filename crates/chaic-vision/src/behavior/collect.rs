@@ -1,6 +1,7 @@
 //! Clips with labels: helpers who follow partners through generated episodes, and what the world says
 //! that the partners did (paper, appendix on action recognition).
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use chaic_agents::Mind;
@@ -11,11 +12,12 @@ use chaic_agents::sight::Sight;
 use chaic_env::minds::Helper;
 use chaic_env::rules::{RuleSet, RuleSetName};
 use chaic_env::trace::Record;
-use chaic_env::{Appearance, Env, EpisodeConfig, seeded_by_episode};
+use chaic_env::{Appearance, Env, EpisodeConfig, Flow, seeded_by_episode};
 use chaic_episodes::find_episode;
 use chaic_protocol::observation::{Film, Grants};
 use chaic_protocol::rng::Stream;
 use chaic_protocol::{Action, AgentError, AgentId, Frame, Observation, TaskId};
+use chaic_training::bounds::{BoundTable, SEED, SHARE, integer};
 use chaic_world::EventKind;
 use serde::{Deserialize, Serialize};
 
@@ -50,6 +52,19 @@ impl Default for CollectRules {
         CollectRules { seed: 1, of_each: 900, episodes: 1000, varied: 0.35, learned: 0.0 }
     }
 }
+
+/// Bounds of [`CollectRules`].
+pub const COLLECT_BOUNDS: BoundTable = &[
+    ("seed", SEED),
+    ("of_each", integer(1, MAX_CLIPS as i64)),
+    ("episodes", integer(1, MAX_EPISODES as i64)),
+    ("varied", SHARE),
+    ("learned", SHARE),
+];
+/// Largest number of clips of each behavior, and of mixed ones. A clip takes 0.33 MB, so that all take 12 GB.
+pub const MAX_CLIPS: u32 = 5_000;
+/// Largest number of episodes that clips are made of.
+pub const MAX_EPISODES: u32 = 100_000;
 
 /// The least share of crops that must show the person (paper: 20 % of an action's observations).
 const LEAST_SEEN: f32 = 0.2;
@@ -93,15 +108,16 @@ pub struct Collector<'a> {
     pub folder: Option<&'a ClipFolder>,
 }
 
-/// The clips, in the order in which they were made; those so far if `go_on`, which is called with the
-/// number of episodes that were played, says no.
+/// Returns the clips, in the order in which they were made; `None` if `stop` is raised meanwhile. `progress` is
+/// called with the number of episodes that were played.
 ///
 /// # Errors
 /// If the folder can't be read or written.
 pub fn collect(
     collector: &Collector<'_>,
-    go_on: &mut dyn FnMut(usize, &Counts) -> bool,
-) -> Result<Vec<Clip>, StoreError> {
+    progress: &mut dyn FnMut(usize, &Counts),
+    stop: &AtomicBool,
+) -> Result<Option<Vec<Clip>>, StoreError> {
     let Collector { part, rules, sight, n_threads, folder } = *collector;
     let (mut clips, mut counts): (Vec<Clip>, Counts) = Default::default();
     let learned = (rules.learned > 0.0).then(|| LearnedSight::new(TrainedDetector::built_in()));
@@ -112,19 +128,22 @@ pub fn collect(
         _ => sight,
     };
     for first in (0..rules.episodes).step_by(ROUND) {
-        let is_enough = counts.iter().all(|n| *n >= rules.of_each);
-        if is_enough || !go_on(first, &counts) {
-            return Ok(clips);
+        if counts.iter().all(|n| *n >= rules.of_each) {
+            return Ok(Some(clips));
         }
+        progress(first, &counts);
         let kept = folder.map_or(Ok(None), |folder| folder.read(first))?;
         let is_new = kept.is_none();
-        let mut made = kept.unwrap_or_else(|| {
+        let play = || {
             let indices = first..(first + ROUND).min(rules.episodes);
-            let one =
-                |(): &mut (), index: usize| of_episode(part, rules, sight_of(index), index as u64);
-            let made = in_order(indices, n_threads, || (), one);
-            made.into_iter().flatten().collect()
-        });
+            let one = |(): &mut (), index: usize| {
+                of_episode(part, rules, sight_of(index), index as u64, stop)
+            };
+            let made = in_order(indices, n_threads, stop, || (), one)?;
+            // A round in which an episode was stopped is played again.
+            (!stop.load(Ordering::Relaxed)).then(|| made.into_iter().flatten().collect())
+        };
+        let Some(mut made) = kept.or_else(play) else { return Ok(None) };
         made.retain(|clip| {
             let kind = if clip.is_mixed { counts.len() - 1 } else { clip.label.index() };
             counts[kind] += 1;
@@ -136,12 +155,18 @@ pub fn collect(
         }
         clips.extend(made);
     }
-    go_on(rules.episodes, &counts);
-    Ok(clips)
+    progress(rules.episodes, &counts);
+    Ok(Some(clips))
 }
 
-/// Clips of one episode.
-fn of_episode(part: Part, rules: &CollectRules, sight: &dyn Sight, index: u64) -> Vec<Clip> {
+/// Returns the clips of one episode; none if `stop` is raised meanwhile.
+fn of_episode(
+    part: Part,
+    rules: &CollectRules,
+    sight: &dyn Sight,
+    index: u64,
+    stop: &AtomicBool,
+) -> Vec<Clip> {
     let mut rng = Stream::new(rules.seed, "behavior", index);
     let among: Vec<TaskId> =
         TASKS.into_iter().flat_map(|(task, n)| std::iter::repeat_n(task, n)).collect();
@@ -174,12 +199,11 @@ fn of_episode(part: Part, rules: &CollectRules, sight: &dyn Sight, index: u64) -
     let helper = seeded_by_episode(helper, &config);
     let Ok(mut env) = Env::new(config, Some(helper)) else { return Vec::new() };
     let mut doings = Doings::default();
-    let stop = std::sync::atomic::AtomicBool::new(false);
-    let played = env.run(&stop, None, &mut |record| -> Result<(), AgentError> {
+    let played = env.run(stop, None, &mut |record| -> Result<(), AgentError> {
         doings.note(record);
         Ok(())
     });
-    if played.is_err() {
+    if !matches!(played, Ok(Flow::Ended)) {
         return Vec::new();
     }
     let crops = crops.lock().unwrap_or_else(PoisonError::into_inner);

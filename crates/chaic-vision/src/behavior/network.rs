@@ -98,16 +98,21 @@ impl TrainedBehavior {
         Ok(TrainedBehavior { network, numbers, sharpness })
     }
 
-    /// As a safetensors file.
-    pub fn to_bytes(&self) -> Vec<u8> {
-        let mut numbers = self.numbers.clone();
-        numbers.push(self.sharpness);
-        weights::to_bytes(&of_file(&self.network), &numbers, KIND)
+    /// Returns it as a safetensors file.
+    ///
+    /// # Errors
+    /// If a number is not finite.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, WeightsError> {
+        weights::to_bytes(&of_file(&self.network), &self.all_numbers(), KIND)
+    }
+
+    fn all_numbers(&self) -> Vec<f32> {
+        self.numbers.iter().chain([&self.sharpness]).copied().collect()
     }
 
     /// The first digits of the digest of its file, which name it.
     pub fn digest(&self) -> String {
-        weights::digest(&self.to_bytes())
+        weights::digest_of(&of_file(&self.network), &self.all_numbers(), KIND)
     }
 
     /// Working space.

@@ -1,6 +1,7 @@
 //! How well behaviors are told.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::AtomicBool;
 
 use serde::Serialize;
 
@@ -30,11 +31,18 @@ pub struct BehaviorReport {
     pub confusion: BTreeMap<&'static str, BTreeMap<&'static str, usize>>,
 }
 
-/// The outputs for each clip, in their order; where a clip is read from changes from one to the next.
-pub fn outputs_of(trained: &TrainedBehavior, clips: &[Clip], n_threads: usize) -> Vec<Outputs> {
+/// Returns the outputs for each clip, in their order; where a clip is read from changes from one to the next.
+/// Returns `None` if `stop` is raised meanwhile.
+pub fn outputs_of(
+    trained: &TrainedBehavior,
+    clips: &[Clip],
+    n_threads: usize,
+    stop: &AtomicBool,
+) -> Option<Vec<Outputs>> {
     in_order(
         0..clips.len(),
         n_threads,
+        stop,
         || trained.pass(),
         |pass, k| trained.outputs(&clips[k].crops, k % (SLACK + 1), pass),
     )
@@ -47,9 +55,14 @@ pub fn likeliest(probabilities: &Outputs) -> (Behavior, f32) {
     best.map_or((Behavior::Moving, 0.0), |best| (best, sure(&best)))
 }
 
-/// How good a network is on these clips.
-pub fn report(trained: &TrainedBehavior, clips: &[Clip], n_threads: usize) -> BehaviorReport {
-    let outputs = outputs_of(trained, clips, n_threads);
+/// Returns how good a network is on these clips; `None` if `stop` is raised meanwhile.
+pub fn report(
+    trained: &TrainedBehavior,
+    clips: &[Clip],
+    n_threads: usize,
+    stop: &AtomicBool,
+) -> Option<BehaviorReport> {
+    let outputs = outputs_of(trained, clips, n_threads, stop)?;
     let told: Vec<(Behavior, f32)> =
         outputs.iter().map(|o| likeliest(&trained.probabilities(o))).collect();
     let mut counts = [[0usize; N]; N];
@@ -71,7 +84,7 @@ pub fn report(trained: &TrainedBehavior, clips: &[Clip], n_threads: usize) -> Be
         rows.map(|(k, row)| row[k] as f64 / row.iter().sum::<usize>() as f64).collect();
     let named =
         |row: &[usize; N]| Behavior::ALL.map(Behavior::name).into_iter().zip(*row).collect();
-    BehaviorReport {
+    Some(BehaviorReport {
         clips: said.len(),
         top1,
         interval: 1.96 * (top1 * (1.0 - top1) / n).sqrt(),
@@ -79,7 +92,7 @@ pub fn report(trained: &TrainedBehavior, clips: &[Clip], n_threads: usize) -> Be
         calibration_error: crate::calibration::calibration_error(&said),
         mixed_as_moving: mixed_right as f64 / mixed.max(1) as f64,
         confusion: Behavior::ALL.iter().map(|b| (b.name(), named(&counts[b.index()]))).collect(),
-    }
+    })
 }
 
 /// The sharpness by which the probability of what was right is greatest, by golden-section steps.

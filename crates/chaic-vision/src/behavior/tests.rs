@@ -2,21 +2,26 @@
 //! learns and is read back.
 
 use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use chaic_agents::sight::TrueSight;
 use chaic_protocol::Vec3;
 use chaic_protocol::geom::{Camera, yaw_rotation};
 use chaic_protocol::observation::{FilmFrame, Images};
+use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoints};
+use chaic_training::{Checkpoint, Training as _, parse_rules};
 
 use super::Behavior;
 use super::clip::{CROPS, Clip, SLACK};
-use super::collect::{CollectRules, Collector, collect};
+use super::collect::{CollectRules, Collector, Counts, collect};
 use super::crop::{Crop, FILM, SIDE};
 use super::network::{TrainedBehavior, softmax};
 use super::report::{calibrate, outputs_of, report};
 use super::store::ClipFolder;
-use super::train::{BehaviorRules, BehaviorTrainer};
+use super::train::{BehaviorRules, BehaviorTrainer, BehaviorTraining};
 use crate::views::Part;
+
+static NEVER: AtomicBool = AtomicBool::new(false);
 
 /// A film of a wall with a red column of 0.3 m before it, so many metres ahead.
 fn film(distance_m: f32) -> FilmFrame {
@@ -66,11 +71,24 @@ fn clips_are_whole_show_the_person_and_are_the_same_on_any_number_of_threads() {
     let clips = |n_threads, folder| {
         let collector =
             Collector { part: Part::Training, rules: &rules, sight: &TrueSight, n_threads, folder };
-        collect(&collector, &mut |_, _| true).unwrap()
+        collect(&collector, &mut |_, _| (), &NEVER).unwrap().unwrap()
     };
     let one = clips(1, None);
     assert!(one == clips(2, Some(&folder)), "clips differ between one thread and two");
     assert!(one == clips(2, Some(&folder)), "clips differ when they are read again");
+    // A flag that is raised while the first round is played leaves nothing behind.
+    let (other, stop) = (tempfile::tempdir().unwrap(), AtomicBool::new(false));
+    let folder = ClipFolder::open(other.path(), Part::Training, &rules).unwrap();
+    let collector = Collector {
+        part: Part::Training,
+        rules: &rules,
+        sight: &TrueSight,
+        n_threads: 2,
+        folder: Some(&folder),
+    };
+    let mut raise = |_, _: &Counts| stop.store(true, Ordering::Relaxed);
+    assert!(collect(&collector, &mut raise, &stop).unwrap().is_none());
+    assert!(folder.read(0).unwrap().is_none());
     let labels: BTreeSet<Behavior> = one.iter().map(|clip| clip.label).collect();
     assert!(labels.contains(&Behavior::PickedUp) && labels.contains(&Behavior::Moving));
     for clip in &one {
@@ -104,22 +122,28 @@ fn the_network_learns_goes_on_from_a_checkpoint_and_is_read_back() {
     let rules = BehaviorRules { steps: 40, clips: 2, warm_up: 5, ..BehaviorRules::default() };
     let mut trainer = BehaviorTrainer::new(rules, made_up());
     let first = trainer.step().loss;
-    let checkpoint = trainer.learner.checkpoint();
+    let checkpoint = |trainer: &BehaviorTrainer| {
+        let mut checkpoint = Checkpoint::default();
+        trainer.learner.save(&mut checkpoint);
+        checkpoint
+    };
     let mut resumed = BehaviorTrainer::new(rules, made_up());
-    assert!(!resumed.resume(&checkpoint[1..]) && resumed.resume(&checkpoint));
+    assert!(resumed.learner.load(&Checkpoint::default()).is_err());
+    resumed.learner.load(&checkpoint(&trainer)).unwrap();
     assert_eq!(trainer.step(), resumed.step());
-    assert!(trainer.learner.checkpoint() == resumed.learner.checkpoint());
+    assert!(checkpoint(&trainer) == checkpoint(&resumed));
     let last = (0..38).map(|_| trainer.step().loss).last().unwrap();
     assert!(last < 0.5 * first, "{first} to {last}");
 
     let mut trained = trainer.trained();
     trained.sharpness = 1.5;
-    let read = TrainedBehavior::from_bytes(&trained.to_bytes()).unwrap();
+    let bytes = trained.to_bytes().unwrap();
+    let read = TrainedBehavior::from_bytes(&bytes).unwrap();
     assert!(read.numbers == trained.numbers && read.sharpness == 1.5);
-    assert!(TrainedBehavior::from_bytes(&trained.to_bytes()[..100]).is_err());
-    let outputs = outputs_of(&read, &made_up(), 1);
-    assert_eq!(outputs, outputs_of(&read, &made_up(), 2));
-    let found = report(&read, &made_up(), 1);
+    assert!(TrainedBehavior::from_bytes(&bytes[..100]).is_err());
+    let outputs = outputs_of(&read, &made_up(), 1, &NEVER).unwrap();
+    assert_eq!(Some(&outputs), outputs_of(&read, &made_up(), 2, &NEVER).as_ref());
+    let found = report(&read, &made_up(), 1, &NEVER).unwrap();
     assert_eq!((found.clips, found.confusion["put in"].values().sum::<usize>()), (2, 1));
     assert!(softmax(&outputs[0]).iter().sum::<f32>() > 0.999);
 }
@@ -132,4 +156,14 @@ fn calibration_makes_who_is_too_sure_less_sure() {
     assert!(calibrate(&clips, &[sure, sure]) < 0.3);
     let modest = [0.5, 0.0, 0.0, 0.0, 0.0, 0.0];
     assert!(calibrate(&clips[..1], &[modest]) > 3.0, "always right, and hardly sure");
+}
+
+#[test]
+fn damaged_checkpoints_and_numbers_out_of_bounds_are_refused() {
+    let rules = BehaviorRules { steps: 40, clips: 2, ..BehaviorRules::default() };
+    let mut training = BehaviorTraining::with_clips(rules, made_up(), made_up());
+    refuses_damaged_checkpoints(&mut training);
+    bounds_every_number::<BehaviorTraining>();
+    assert!(parse_rules::<BehaviorTraining>("shards = 256\nclips = 60").is_err());
+    assert!(training.validate(&AtomicBool::new(true)).unwrap().is_none());
 }

@@ -1,21 +1,25 @@
 //! The training loop of the behavior network.
 
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 use chaic_nn::weights::WeightsError;
-use chaic_nn::{AdamRules, Pass, Tensor};
+use chaic_nn::{AdamRules, Network, Pass, Tensor};
 use chaic_protocol::rng::Stream;
-use chaic_training::{Figures, Learner, Training, TrainingError, figures, rate_at};
+use chaic_training::bounds::{ADAM, Bound, BoundTable, RATE, SEED, SHARDS, SHARE, STEPS, integer};
+use chaic_training::{
+    Checkpoint, CheckpointError, Figures, Learner, Training, TrainingError, figures, rate_at,
+};
 use serde::{Deserialize, Serialize};
 
 use chaic_agents::sight::TrueSight;
 
 use super::Behavior;
 use super::clip::{Clip, Look, read};
-use super::collect::{CollectRules, Collector, collect};
+use super::collect::{COLLECT_BOUNDS, CollectRules, Collector, Counts, collect};
 use super::network::{BehaviorNetwork, Outputs, TrainedBehavior, softmax};
 use super::report::{calibrate, outputs_of, report};
-use super::store::{ClipFolder, StoreError};
+use super::store::ClipFolder;
 use crate::loss::ln;
 use crate::views::Part;
 
@@ -99,11 +103,6 @@ impl BehaviorTrainer {
         BehaviorTrainer { rules, network, learner, clips: sorted }
     }
 
-    /// Goes on from a checkpoint; `false` if it is of another network.
-    pub fn resume(&mut self, bytes: &[u8]) -> bool {
-        self.learner.resume(&self.rules.adam, bytes)
-    }
-
     /// The network so far: the slow mean of its numbers.
     pub fn trained(&self) -> TrainedBehavior {
         let numbers = self.learner.average.clone();
@@ -132,10 +131,11 @@ impl BehaviorTrainer {
             let by_head = &mut pass.gradient(network.head).data;
             let told = loss(&made, &chosen, rules.smoothing, by_head);
             pass.backward(&network.network, numbers, by);
-            told
+            Some(told)
         };
         let rate = rate_at(step, (rules.rate, rules.warm_up, rules.steps));
         let told = learner.step(&network.network, (&rules.adam, rate), work);
+        let told = told.expect("no shard stops");
         let mean =
             |of: fn(&BehaviorLoss) -> f64| told.iter().map(of).sum::<f64>() / told.len() as f64;
         BehaviorLoss { loss: mean(|l| l.loss), right: mean(|l| l.right) }
@@ -147,22 +147,50 @@ const VALIDATION_CLIPS: usize = 60;
 /// One of so many episodes is for validation.
 const VALIDATION_PART: usize = 4;
 
+/// Largest number of clips that the shards work on at once: about 16 GiB of memory.
+const MAX_BATCH_CLIPS: usize = 1024;
+
 /// A behavior network while it learns, with clips to validate it by.
 pub struct BehaviorTraining {
     trainer: BehaviorTrainer,
     validation: Vec<Clip>,
 }
 
+impl BehaviorTraining {
+    /// Returns a training on these clips before its first step.
+    pub(crate) fn with_clips(
+        rules: BehaviorRules,
+        training: Vec<Clip>,
+        validation: Vec<Clip>,
+    ) -> BehaviorTraining {
+        BehaviorTraining { trainer: BehaviorTrainer::new(rules, training), validation }
+    }
+}
+
 impl Training for BehaviorTraining {
     type Rules = BehaviorRules;
+    const KIND: &'static str = "behavior";
     const WEIGHTS: &'static str = "behavior.safetensors";
+    const BOUNDS: BoundTable = &[
+        ("seed", SEED),
+        ("steps", STEPS),
+        ("rate", RATE),
+        ("warm_up", STEPS),
+        ("shards", SHARDS),
+        ("clips", integer(1, 256)),
+        ("mixed", SHARE),
+        ("smoothing", SHARE),
+        ("collect", Bound::Table(COLLECT_BOUNDS)),
+        ("adam", ADAM),
+    ];
 
     fn new(
         rules: &BehaviorRules,
         folder: &Path,
-        go_on: &mut dyn FnMut(&str) -> bool,
+        progress: &mut dyn FnMut(&str),
+        stop: &AtomicBool,
     ) -> Result<Option<BehaviorTraining>, TrainingError> {
-        let clips = |part: Part, go_on: &mut dyn FnMut(&str) -> bool| {
+        let mut clips = |part: Part| {
             let CollectRules { of_each, episodes, .. } = rules.collect;
             let (of_each, episodes) = match part {
                 Part::Training => (of_each, episodes),
@@ -173,34 +201,34 @@ impl Training for BehaviorTraining {
             let folder = ClipFolder::open(&folder.join("clips").join(&name), part, &rules)?;
             let (sight, folder) = (&TrueSight, Some(&folder));
             let collector = Collector { part, rules: &rules, sight, n_threads: THREADS, folder };
-            let mut is_whole = true;
-            let clips = collect(&collector, &mut |n, counts| {
-                is_whole = go_on(&format!("{n} {name} episodes, clips {counts:?}"));
-                is_whole
-            })?;
-            Ok::<_, StoreError>(is_whole.then_some(clips))
+            let mut told = |n: usize, counts: &Counts| {
+                progress(&format!("{n} {name} episodes, clips {counts:?}"));
+            };
+            collect(&collector, &mut told, stop)
         };
-        let Some(validation) = clips(Part::Validation, go_on).map_err(TrainingError::of_data)?
-        else {
-            return Ok(None);
-        };
-        let Some(training) = clips(Part::Training, go_on).map_err(TrainingError::of_data)? else {
-            return Ok(None);
-        };
-        let trainer = BehaviorTrainer::new(*rules, training);
-        Ok(Some(BehaviorTraining { trainer, validation }))
+        let validation = clips(Part::Validation).map_err(TrainingError::of_data)?;
+        let Some(validation) = validation else { return Ok(None) };
+        let training = clips(Part::Training).map_err(TrainingError::of_data)?;
+        let Some(training) = training else { return Ok(None) };
+        Ok(Some(BehaviorTraining::with_clips(*rules, training, validation)))
     }
 
     fn check(rules: &BehaviorRules) -> Result<(), String> {
-        let least = rules.shards.min(rules.clips).min(rules.collect.of_each);
-        if least == 0 || rules.collect.episodes == 0 || rules.steps == 0 || rules.warm_up == 0 {
-            return Err(
-                "steps, warm_up, shards, clips, collect.of_each and collect.episodes are at \
-                        least 1"
-                    .to_owned(),
-            );
+        let batch = rules.shards * rules.clips;
+        if batch > MAX_BATCH_CLIPS {
+            return Err(format!(
+                "shards times clips is {batch}; it must be from 1 to {MAX_BATCH_CLIPS}"
+            ));
         }
         Ok(())
+    }
+
+    fn read_weights(_: &BehaviorRules, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
+        Ok(TrainedBehavior::from_bytes(weights)?.numbers)
+    }
+
+    fn network(&self) -> &Network {
+        &self.trainer.network.network
     }
 
     fn steps(&self) -> u64 {
@@ -211,35 +239,43 @@ impl Training for BehaviorTraining {
         self.trainer.learner.adam.steps
     }
 
-    fn checkpoint(&self) -> Vec<u8> {
-        self.trainer.learner.checkpoint()
+    fn checkpoint(&self) -> Checkpoint {
+        let mut checkpoint = Checkpoint::default();
+        self.trainer.learner.save(&mut checkpoint);
+        checkpoint
     }
 
-    fn begin_with(&mut self, weights: &[u8]) -> Result<(), WeightsError> {
-        self.trainer.learner.begin_with(TrainedBehavior::from_bytes(weights)?.numbers);
-        Ok(())
+    fn begin_with(&mut self, numbers: Vec<f32>) {
+        self.trainer.learner.begin_with(numbers);
     }
 
-    fn resume(&mut self, bytes: &[u8]) -> bool {
-        self.trainer.resume(bytes)
+    fn resume(
+        &mut self,
+        checkpoint: &Checkpoint,
+        _: &AtomicBool,
+    ) -> Result<Option<()>, CheckpointError> {
+        self.trainer.learner.load(checkpoint).map(Some)
     }
 
-    fn step(&mut self) -> Figures {
+    fn step(&mut self, _: &AtomicBool) -> Option<Figures> {
+        // A step of the largest batch takes seconds.
         let BehaviorLoss { loss, right } = self.trainer.step();
-        figures([("loss", loss), ("right", right)])
+        Some(figures([("loss", loss), ("right", right)]))
     }
 
-    fn validate(&self) -> (Figures, Vec<u8>) {
+    fn validate(&self, stop: &AtomicBool) -> Result<Option<(Figures, Vec<u8>)>, WeightsError> {
         let mut trained = self.trainer.trained();
-        let outputs = outputs_of(&trained, &self.validation, THREADS);
+        let outputs = outputs_of(&trained, &self.validation, THREADS, stop);
+        let Some(outputs) = outputs else { return Ok(None) };
         trained.sharpness = calibrate(&self.validation, &outputs);
-        let found = report(&trained, &self.validation, THREADS);
+        let found = report(&trained, &self.validation, THREADS, stop);
+        let Some(found) = found else { return Ok(None) };
         let figures = figures([
             ("top1", found.top1),
             ("balanced", found.balanced),
             ("mixed_as_moving", found.mixed_as_moving),
         ]);
-        (figures, trained.to_bytes())
+        Ok(Some((figures, trained.to_bytes()?)))
     }
 }
 

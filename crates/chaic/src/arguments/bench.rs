@@ -64,13 +64,14 @@ pub struct LookedAt {
     /// house: eight rooms with 150 things, seen from 16 places.
     #[arg(long, value_name = "NAME", default_value = "house", conflicts_with = "episode")]
     pub scene: SceneName,
-    /// Up to so many things in the house, if there is room for them.
-    #[arg(long, value_name = "N", default_value_t = house::N_THINGS, conflicts_with = "episode")]
-    pub things: usize,
+    /// Up to so many things in the house, 0 to 1000, if there is room for them.
+    #[arg(long, value_name = "N", default_value_t = house::N_THINGS as u64, conflicts_with = "episode")]
+    #[arg(value_parser = clap::value_parser!(u64).range(super::ranges::THINGS))]
+    pub things: u64,
     /// The beginning of this episode instead: an id, for example shopping/test/00, or a file.
     #[arg(long, value_name = "EPISODE")]
     pub episode: Option<String>,
-    /// Side of the images, pixels.
+    /// Side of the images, 16 to 4096 pixels.
     #[arg(long, value_name = "PIXELS", default_value_t = 512, value_parser = clap::value_parser!(u32).range(16..=4096))]
     pub size: u32,
 }
@@ -90,7 +91,7 @@ pub struct RenderBenchArguments {
     /// Which images: rgb, depth and ids, joined by +.
     #[arg(long, value_name = "NAMES", default_value = "rgb+depth+ids", value_parser = channels_named)]
     pub channels: Channels,
-    /// Threads that draw, each its own pictures.
+    /// Threads that draw, each its own pictures, 1 to 1024.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: u16,
     #[command(flatten)]
@@ -113,19 +114,19 @@ pub struct EnvBenchArguments {
     /// Tasks, separated by commas, or `all`: their bundled training episodes, by turns.
     #[arg(long, value_name = "NAMES", value_parser = tasks, default_value = "all")]
     pub task: Tasks,
-    /// How many environments are stepped together.
+    /// How many environments are stepped together, 1 to 8192.
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..=8192))]
     pub envs: u16,
-    /// Side of the helpers' images, pixels.
+    /// Side of the helpers' images, 16 to 1024 pixels.
     #[arg(long, value_name = "PIXELS", default_value_t = 128, value_parser = clap::value_parser!(u32).range(16..=1024))]
     pub size: u32,
-    /// Side of the partners' images, pixels.
+    /// Side of the partners' images, 16 to 1024 pixels.
     #[arg(long, value_name = "PIXELS", default_value_t = 128, value_parser = clap::value_parser!(u32).range(16..=1024))]
     pub minds_size: u32,
     /// What the helpers look at: rgb, depth and ids, joined by +; or none, their own state alone.
     #[arg(long, value_name = "NAMES", default_value = "rgb+depth", value_parser = channels_or_none)]
     pub channels: Channels,
-    /// Threads.
+    /// Threads, 1 to 1024.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: u16,
     #[command(flatten)]
@@ -135,7 +136,7 @@ pub struct EnvBenchArguments {
 /// How it is measured and printed.
 #[derive(Args, Debug)]
 pub struct Measuring {
-    /// Measure for this long, of each task.
+    /// Measure for this long, 0.001 to 3600 seconds, of each task.
     #[arg(long, value_name = "S", default_value_t = 5.0, value_parser = seconds)]
     pub seconds: f32,
     /// text or json.

@@ -29,11 +29,11 @@ pub struct LeRobotArguments {
     /// Episodes of this task alone.
     #[arg(long, value_name = "TASK")]
     pub task: Option<TaskId>,
-    /// Every how many frames one moment is written; a divisor of 30, which are a second.
+    /// Every how many frames one moment is written, 1 to 30; a divisor of 30, which are a second.
     #[arg(long, value_name = "N", default_value_t = 6)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=30))]
     pub every: u32,
-    /// Side of pictures, pixels; an even number.
+    /// Side of pictures, 16 to 1024 pixels; an even number.
     #[arg(long, value_name = "N", default_value_t = 256)]
     #[arg(value_parser = clap::value_parser!(u32).range(16..=1024))]
     pub image_size: u32,

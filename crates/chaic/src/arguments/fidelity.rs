@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Tasks, tasks};
+use super::{Tasks, ranges, tasks};
 
 /// `chaic fidelity`.
 #[derive(Args, Debug)]
@@ -22,11 +22,11 @@ pub struct FidelityArguments {
     /// none,random,rhp,oracle.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub helper: Option<Vec<String>>,
-    /// Only the first N episodes of each task.
-    #[arg(long, value_name = "N")]
+    /// Only the first N episodes of each task, 1 to 1000000.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(ranges::FIRST))]
     pub first: Option<u32>,
-    /// Play both rule sets with N seeds of each episode. Usual: 5.
-    #[arg(long, value_name = "N")]
+    /// Play both rule sets with N seeds of each episode, 1 to 10000. Usual: 5.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(ranges::SEEDS))]
     pub seeds: Option<u32>,
     /// Rules to switch one at a time from compat to paper, separated by commas, or `all` that
     /// differ (usual).
@@ -38,14 +38,14 @@ pub struct FidelityArguments {
     /// Helpers of the switches, separated by commas. Usual: none,rhp.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub switch_helper: Option<Vec<String>>,
-    /// Play switches with N seeds of each episode, at most --seeds. Usual: 1.
-    #[arg(long, value_name = "N")]
+    /// Play switches with N seeds of each episode, 1 to 10000, at most --seeds. Usual: 1.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(ranges::SEEDS))]
     pub switch_seeds: Option<u32>,
-    /// Side of all images in pixels, instead of what each agent asks for (512).
-    #[arg(long, value_name = "PIXELS")]
+    /// Side of all images in pixels, 16 to 2048, instead of what each agent asks for (512).
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(ranges::RUN_SIZE))]
     pub size: Option<u32>,
-    /// Episodes at a time; changes no result. Usual: one for each core.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    /// Episodes at a time, 1 to 1024; changes no result. Usual: one for each core.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(ranges::JOBS))]
     pub jobs: Option<u16>,
     /// Go on in --out with what is recorded there; --switch adds switches and plays only these.
     #[arg(long)]

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::Of;
+use super::{Of, ranges};
 
 /// Of `chaic collect opponent`.
 #[derive(Debug, Args)]
@@ -35,13 +35,13 @@ pub struct OpponentArguments {
 /// How windows are made.
 #[derive(Debug, Args)]
 pub struct WindowArguments {
-    /// Windows of each goal at most.
+    /// Windows of each goal at most, 1 to 1000000.
     #[arg(long, value_name = "N", default_value_t = 1000)]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(value_parser = clap::value_parser!(u32).range(ranges::WINDOWS))]
     pub of_each: u32,
-    /// Episodes that are played for them at most.
+    /// Episodes that are played for them at most, 1 to 100000.
     #[arg(long, value_name = "N", default_value_t = 200)]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(value_parser = clap::value_parser!(u32).range(ranges::EPISODES))]
     pub episodes: u32,
     /// By what the helper sees: gt, learned, learned:FILE, noisy or noisy:FILE.
     #[arg(long, value_name = "KIND", default_value = "gt")]
@@ -53,7 +53,7 @@ pub struct WindowArguments {
     /// Grant it what its partner does, as in the paper.
     #[arg(long)]
     pub granted: bool,
-    /// Side of everybody's images, pixels.
+    /// Side of everybody's images, 16 to 1024 pixels.
     #[arg(long, value_name = "N", default_value_t = 128)]
     #[arg(value_parser = clap::value_parser!(u32).range(16..=1024))]
     pub image_size: u32,

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand, ValueEnum};
 
 use super::opponent::CollectOpponentArguments;
+use super::ranges;
 
 /// What to train.
 #[derive(Debug, Subcommand)]
@@ -36,9 +37,9 @@ pub struct TrainArguments {
     /// Begin with these weights, a safetensors file, in place of random ones.
     #[arg(long, value_name = "FILE", conflicts_with = "resume")]
     pub weights: Option<PathBuf>,
-    /// Steps in all, by which the rate is planned.
+    /// Steps in all, 1 to 1000000000, by which the rate is planned.
     #[arg(long, value_name = "N", conflicts_with = "resume")]
-    #[arg(value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(value_parser = clap::value_parser!(u64).range(ranges::STEPS))]
     pub steps: Option<u64>,
     /// Go on with the training in --out, from its last checkpoint.
     #[arg(long)]
@@ -71,7 +72,7 @@ pub struct CollectDetectionArguments {
     /// An empty folder: images, depth, annotations.json, statistics.json.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// How many views.
+    /// How many views, 1 to 999999.
     #[arg(long, value_name = "N", default_value_t = 1000)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=999_999))]
     pub views: u32,
@@ -84,8 +85,8 @@ pub struct CollectDetectionArguments {
     /// Light and colors; usual: as for training, a third of the scenes varied.
     #[arg(long, value_enum)]
     pub look: Option<Look>,
-    /// Views at a time; changes no view. Usual: one for each core.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    /// Views at a time, 1 to 1024; changes no view. Usual: one for each core.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(ranges::JOBS))]
     pub jobs: Option<u16>,
 }
 
@@ -105,13 +106,13 @@ pub struct CollectBehaviorArguments {
 /// How clips are made.
 #[derive(Debug, Args)]
 pub struct ClipArguments {
-    /// Clips of each behavior at most.
+    /// Clips of each behavior at most, 1 to 5000.
     #[arg(long, value_name = "N", default_value_t = 100)]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(value_parser = clap::value_parser!(u32).range(ranges::CLIPS))]
     pub clips: u32,
-    /// Episodes that are played for them at most.
+    /// Episodes that are played for them at most, 1 to 100000.
     #[arg(long, value_name = "N", default_value_t = 200)]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(value_parser = clap::value_parser!(u32).range(ranges::EPISODES))]
     pub episodes: u32,
     /// By what the helper who films knows the partner in its images: gt, learned, learned:FILE,
     /// noisy or noisy:FILE.
@@ -120,8 +121,8 @@ pub struct ClipArguments {
     /// Light and colors.
     #[arg(long, value_enum, default_value_t = Look::Canonical)]
     pub look: Look,
-    /// Episodes at a time; changes no clip. Usual: one for each core.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    /// Episodes at a time, 1 to 1024; changes no clip. Usual: one for each core.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(ranges::JOBS))]
     pub jobs: Option<u16>,
 }
 
@@ -163,7 +164,7 @@ pub struct DetectionArguments {
     /// Places that are looked at.
     #[arg(long, value_enum, default_value_t = Scenes::AllClasses)]
     pub scenes: Scenes,
-    /// Views that are looked at, from environments that nothing was learned from.
+    /// Views that are looked at, 1 to 100000, from environments that nothing was learned from.
     #[arg(long, value_name = "N", default_value_t = 4000)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub views: u32,
@@ -179,8 +180,8 @@ pub struct DetectionArguments {
     /// Write annotations.json and detections.json into a folder, which pycocotools reads.
     #[arg(long, value_name = "DIR")]
     pub coco: Option<PathBuf>,
-    /// Views at a time; changes no figure. Usual: one for each core.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    /// Views at a time, 1 to 1024; changes no figure. Usual: one for each core.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(ranges::JOBS))]
     pub jobs: Option<u16>,
 }
 

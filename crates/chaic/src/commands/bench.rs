@@ -30,7 +30,7 @@ pub fn run(command: &BenchCommand) -> Result<Ended> {
 fn looked_at(wanted: &LookedAt) -> Result<BenchScene> {
     match (&wanted.episode, wanted.scene) {
         (Some(episode), _) => Ok(BenchScene::episode(&super::episode(episode)?, wanted.size)?),
-        (None, SceneName::House) => Ok(BenchScene::house(wanted.things, wanted.size)?),
+        (None, SceneName::House) => Ok(BenchScene::house(wanted.things as usize, wanted.size)?),
     }
 }
 

@@ -1,7 +1,7 @@
 //! `chaic collect`: what networks learn from, as files.
 
 use std::fs;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context as _, Result, bail};
 use chaic_vision::behavior::Behavior;
@@ -89,7 +89,8 @@ fn detection(arguments: &CollectDetectionArguments) -> Result<Ended> {
 fn behavior(arguments: &CollectBehaviorArguments) -> Result<Ended> {
     let rules = clip_rules(&arguments.clips);
     let folder = ClipFolder::open(&arguments.out, part(arguments.of), &rules)?;
-    let clips = play(&arguments.clips, part(arguments.of), Some(&folder))?;
+    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
+    let clips = play(&arguments.clips, part(arguments.of), Some(&folder), stop)?;
     let Some(clips) = clips else {
         complain("stopped; the same command goes on");
         return Ok(Ended::Interrupted);
@@ -120,19 +121,13 @@ pub(super) fn play(
     arguments: &ClipArguments,
     part: Part,
     folder: Option<&ClipFolder>,
+    stop: &AtomicBool,
 ) -> Result<Option<Vec<Clip>>> {
-    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
     let sight = super::sight::of_names(Some(&arguments.perception), None)?;
     let bar = bars::plain(u64::from(arguments.episodes), "episodes");
     let (rules, n_threads) = (clip_rules(arguments), jobs(arguments.jobs));
     let collector = Collector { part, rules: &rules, sight: &*sight, n_threads, folder };
-    let mut is_whole = true;
-    let clips = collect_clips(&collector, &mut |n, _| {
-        bar.set_position(n as u64);
-        is_whole = !stop.load(Ordering::Relaxed);
-        is_whole
-    });
+    let clips = collect_clips(&collector, &mut |n, _| bar.set_position(n as u64), stop);
     bar.finish_and_clear();
-    let clips = clips?;
-    Ok(is_whole.then_some(clips))
+    Ok(clips?)
 }

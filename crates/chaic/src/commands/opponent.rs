@@ -1,7 +1,7 @@
 //! `chaic collect opponent` and `chaic eval-opponent`.
 
 use std::path::Path;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context as _, Result};
 use chaic_files::read_user_file;
@@ -23,7 +23,8 @@ const MOST_BYTES: u64 = 1 << 28;
 
 /// Writes windows into a file.
 pub fn collect_windows(arguments: &CollectOpponentArguments) -> Result<Ended> {
-    let Some(samples) = play(&arguments.windows, part(arguments.of))? else {
+    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
+    let Some(samples) = play(&arguments.windows, part(arguments.of), stop)? else {
         return Ok(Ended::Interrupted);
     };
     write(&arguments.out, &samples)?;
@@ -38,10 +39,10 @@ pub fn collect_windows(arguments: &CollectOpponentArguments) -> Result<Ended> {
 /// Tells how good an opponent model is on episodes that nothing was learned from.
 pub fn evaluate(arguments: &OpponentArguments) -> Result<Ended> {
     let model = read_model(&arguments.weights)?;
-    let Some(samples) = play(&arguments.windows, Part::Test)? else {
-        return Ok(Ended::Interrupted);
-    };
-    let report = Report::of(&model, &samples);
+    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
+    let samples = play(&arguments.windows, Part::Test, stop)?;
+    let report = samples.and_then(|samples| Report::of(&model, &samples, stop));
+    let Some(report) = report else { return Ok(Ended::Interrupted) };
     say(&report.text())?;
     write_json(arguments.json.as_deref(), &report)
 }
@@ -52,7 +53,7 @@ fn read_model(path: &Path) -> Result<OpponentModel> {
 }
 
 /// Windows of episodes of this part; `None` if it was stopped.
-fn play(arguments: &WindowArguments, part: Part) -> Result<Option<Vec<Sample>>> {
+fn play(arguments: &WindowArguments, part: Part, stop: &AtomicBool) -> Result<Option<Vec<Sample>>> {
     let rules = CollectRules {
         of_each: arguments.of_each as usize,
         episodes: arguments.episodes as usize,
@@ -62,15 +63,14 @@ fn play(arguments: &WindowArguments, part: Part) -> Result<Option<Vec<Sample>>> 
         granted: arguments.granted,
         ..CollectRules::default()
     };
-    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
     let bar = bars::plain(u64::from(arguments.episodes), "episodes");
-    let samples = collect(part, &rules, &mut |done| {
+    let mut progress = |done: &str| {
         bar.set_message(done.to_owned());
         if bar.is_hidden() {
             complain(done);
         }
-        !stop.load(Ordering::Relaxed)
-    });
+    };
+    let samples = collect(part, &rules, &mut progress, stop);
     bar.finish_and_clear();
     let samples = samples?;
     if samples.is_none() {

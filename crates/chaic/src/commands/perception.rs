@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{Context as _, Result};
 use chaic_files::{FileError, write_whole};
 use chaic_vision::behavior::Behavior;
 use chaic_vision::behavior::network::TrainedBehavior;
@@ -20,6 +20,7 @@ use super::collect::{play, view_rules};
 use super::jobs;
 use crate::arguments::{BehaviorArguments, DetectionArguments, EvalPerceptionCommand};
 use crate::exit::Ended;
+use crate::interrupt;
 use crate::output::say;
 
 /// Tells how good perception is.
@@ -60,10 +61,11 @@ fn evaluate_behavior(arguments: &BehaviorArguments) -> Result<Ended> {
         Some(path) => read_behavior(path)?,
         None => TrainedBehavior::built_in(),
     };
-    let Some(clips) = play(&arguments.clips, Part::Test, None)? else {
-        return Ok(Ended::Interrupted);
-    };
-    let found = behavior_report(&trained, &clips, jobs(arguments.clips.jobs));
+    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
+    let clips = play(&arguments.clips, Part::Test, None, stop)?;
+    let n_threads = jobs(arguments.clips.jobs);
+    let found = clips.and_then(|clips| behavior_report(&trained, &clips, n_threads, stop));
+    let Some(found) = found else { return Ok(Ended::Interrupted) };
     let mut text = format!("{:18}", "");
     for told in Behavior::ALL {
         text += &format!(" {:>17}", told.name());

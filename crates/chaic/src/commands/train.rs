@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use anyhow::{Context as _, Result};
@@ -34,18 +34,17 @@ pub fn train(command: &TrainCommand) -> Result<Ended> {
     match command {
         TrainCommand::Detector(arguments) => {
             let evaluate = "chaic eval-perception detection --weights FILE";
-            train_one::<Trainer>("detector", evaluate, arguments, |rules, steps| {
+            train_one::<Trainer>(evaluate, arguments, |rules, steps| {
                 rules.steps = steps;
             })
         }
         TrainCommand::Behavior(arguments) => {
             let evaluate = "chaic eval-perception behavior --weights FILE";
-            train_one::<BehaviorTraining>("behavior", evaluate, arguments, |rules, steps| {
+            train_one::<BehaviorTraining>(evaluate, arguments, |rules, steps| {
                 rules.steps = steps;
             })
         }
         TrainCommand::Opponent(arguments) => train_one::<OpponentTraining>(
-            "opponent",
             "chaic eval-opponent --weights FILE",
             arguments,
             |rules, steps| {
@@ -53,51 +52,42 @@ pub fn train(command: &TrainCommand) -> Result<Ended> {
             },
         ),
         TrainCommand::Ppo(arguments) => train_one::<PolicyTraining<Reinforcement>>(
-            "ppo",
             EVALUATE_POLICY,
             arguments,
             |rules, steps| {
                 rules.iterations = steps;
             },
         ),
-        TrainCommand::Primitive(arguments) => train_one::<PrimitiveTraining>(
-            "primitive",
-            EVALUATE_POLICY,
-            arguments,
-            |rules, steps| {
+        TrainCommand::Primitive(arguments) => {
+            train_one::<PrimitiveTraining>(EVALUATE_POLICY, arguments, |rules, steps| {
                 rules.updates = steps;
-            },
-        ),
-        TrainCommand::Clone(arguments) => train_one::<PolicyTraining<Cloning>>(
-            "clone",
-            EVALUATE_POLICY,
-            arguments,
-            |rules, steps| {
+            })
+        }
+        TrainCommand::Clone(arguments) => {
+            train_one::<PolicyTraining<Cloning>>(EVALUATE_POLICY, arguments, |rules, steps| {
                 rules.iterations = steps;
-            },
-        ),
+            })
+        }
     }
 }
 
-/// Trains what `chaic train` calls by this name; `evaluate`, FILE being the weights, tells how good it is.
+/// Trains; `evaluate`, FILE being the weights, tells how good it is.
 fn train_one<T: Training>(
-    name: &str,
     evaluate: &str,
     arguments: &TrainArguments,
     set_steps: impl FnOnce(&mut T::Rules, u64),
 ) -> Result<Ended> {
     let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
     let out = quoted_path(&arguments.out);
-    let how_to_go_on = format!("go on with: chaic train {name} --resume --out {out}");
+    let how_to_go_on = format!("go on with: chaic train {} --resume --out {out}", T::KIND);
     let bar = bars::plain(0, "steps");
-    let mut go_on = |done: &str| {
+    let mut progress = |done: &str| {
         bar.set_message(done.to_owned());
         if bar.is_hidden() {
             complain(done);
         }
-        !stop.load(Ordering::Relaxed)
     };
-    let Some(mut run) = open::<T>(arguments, set_steps, &mut go_on)? else {
+    let Some(mut run) = open::<T>(arguments, set_steps, &mut progress, stop)? else {
         complain(&format!("stopped before the first step; {how_to_go_on}"));
         return Ok(Ended::Interrupted);
     };
@@ -139,21 +129,19 @@ fn train_one<T: Training>(
 fn open<T: Training>(
     arguments: &TrainArguments,
     set_steps: impl FnOnce(&mut T::Rules, u64),
-    go_on: &mut dyn FnMut(&str) -> bool,
+    progress: &mut dyn FnMut(&str),
+    stop: &AtomicBool,
 ) -> Result<Option<TrainingRun<T>>> {
     if arguments.resume {
-        return Ok(TrainingRun::resume(&arguments.out, go_on)?);
+        return Ok(TrainingRun::resume(&arguments.out, progress, stop)?);
     }
     let rules = arguments.config.as_deref().map(read_rules::<T>).transpose()?;
     let mut rules = rules.unwrap_or_default();
     if let Some(steps) = arguments.steps {
         set_steps(&mut rules, steps);
     }
-    let mut run = TrainingRun::begin(&arguments.out, &rules, go_on)?;
-    if let (Some(run), Some(weights)) = (&mut run, &arguments.weights) {
-        run.begin_with(weights)?;
-    }
-    Ok(run)
+    let weights = arguments.weights.as_deref();
+    Ok(TrainingRun::begin(&arguments.out, &rules, weights, progress, stop)?)
 }
 
 /// Draws the curves of a training into its folder.

@@ -1,0 +1,402 @@
+//! The checkpoint file: one format for every training.
+//!
+//! | bytes | content |
+//! |---|---|
+//! | 0 to 15 | the magic string [`MAGIC`] |
+//! | 16 to 19 | format version, u32, little-endian |
+//! | 20 to 35 | xxh3-128 digest of all other bytes, little-endian |
+//! | 36 to the end | postcard: kind of the training, fingerprint of the network, named sections |
+//!
+//! Reading checks the digest first, so that a flipped bit, a cut or an appended byte is found before anything
+//! is decoded. The digest finds damage; it is no protection against a forger. Later versions keep the first
+//! 36 bytes as they are.
+
+use std::collections::BTreeMap;
+
+use chaic_nn::Network;
+use serde::{Deserialize, Serialize};
+use xxhash_rust::xxh3::{Xxh3, xxh3_128};
+
+/// First bytes of a checkpoint file.
+pub const MAGIC: &[u8; 16] = b"chaic checkpoint";
+/// Version of the format. Version 1 had neither magic string nor digest.
+pub const VERSION: u32 = 2;
+
+const VERSION_AT: usize = MAGIC.len();
+const DIGEST_AT: usize = VERSION_AT + 4;
+const BODY_AT: usize = DIGEST_AT + 16;
+
+/// Reason why a checkpoint cannot be written or read.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CheckpointError {
+    /// The file is not what was written.
+    #[error(
+        "is damaged: {0}; begin a new training, --weights takes the weights of the last validation"
+    )]
+    Damaged(String),
+    /// The file has a format that this version does not read.
+    #[error(
+        "has format version {found}, expected {VERSION}; begin a new training, --weights takes its weights"
+    )]
+    Version {
+        /// Version in the file.
+        found: u32,
+    },
+    /// The file belongs to another kind of training.
+    #[error("is of `chaic train {found}`, expected `chaic train {expected}`")]
+    Kind {
+        /// Kind in the file.
+        found: String,
+        /// Kind of this training.
+        expected: String,
+    },
+    /// The file belongs to another network.
+    #[error("is of another network than this configuration and this version of chaic have")]
+    Network,
+    /// A section does not fit the training.
+    #[error("does not fit this training: section `{section}` {problem}")]
+    Section {
+        /// Name of the section.
+        section: String,
+        /// What is wrong, as a predicate.
+        problem: String,
+    },
+}
+
+impl CheckpointError {
+    /// Error of one section; `problem` is a predicate, such as "has 3 values, expected 4".
+    pub fn section(section: &str, problem: impl Into<String>) -> CheckpointError {
+        CheckpointError::Section { section: section.to_owned(), problem: problem.into() }
+    }
+}
+
+/// The training that a checkpoint belongs to.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Identity {
+    /// Name of the training, as `chaic train` takes it.
+    pub kind: String,
+    /// Digest of names and shapes of the network's parameters.
+    pub network: u128,
+}
+
+impl Identity {
+    /// Returns the identity of a training of this kind and network.
+    pub fn new(kind: &str, network: &Network) -> Identity {
+        let layout: Vec<(&str, &[usize])> =
+            network.parameters().iter().map(|p| (p.name.as_str(), &p.shape[..])).collect();
+        let layout = postcard::to_stdvec(&layout).expect("names and shapes are plain data");
+        Identity { kind: kind.to_owned(), network: xxh3_128(&layout) }
+    }
+}
+
+/// Values of one section.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) enum Section {
+    Integers(Vec<u64>),
+    Floats(Vec<f32>),
+    Doubles(Vec<f64>),
+    Bytes(Vec<u8>),
+}
+
+impl Section {
+    fn is_finite(&self) -> bool {
+        match self {
+            Section::Floats(values) => values.iter().all(|x| x.is_finite()),
+            Section::Doubles(values) => values.iter().all(|x| x.is_finite()),
+            Section::Integers(_) | Section::Bytes(_) => true,
+        }
+    }
+}
+
+/// State of a training as named sections.
+///
+/// ```
+/// use chaic_nn::Network;
+/// use chaic_training::checkpoint::{Checkpoint, Identity};
+///
+/// let identity = Identity::new("detector", &Network::default());
+/// let mut checkpoint = Checkpoint::default();
+/// checkpoint.insert_integers("steps", vec![12]);
+/// let bytes = checkpoint.to_bytes(&identity).unwrap();
+/// assert_eq!(Checkpoint::from_bytes(&bytes, &identity), Ok(checkpoint));
+/// assert!(Checkpoint::from_bytes(&bytes[1..], &identity).is_err());
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Checkpoint {
+    pub(crate) sections: BTreeMap<String, Section>,
+}
+
+impl Checkpoint {
+    /// Adds a section of integers.
+    pub fn insert_integers(&mut self, name: &str, values: Vec<u64>) {
+        self.sections.insert(name.to_owned(), Section::Integers(values));
+    }
+
+    /// Adds a section of single-precision numbers, such as weights.
+    pub fn insert_floats(&mut self, name: &str, values: Vec<f32>) {
+        self.sections.insert(name.to_owned(), Section::Floats(values));
+    }
+
+    /// Adds a section of double-precision numbers.
+    pub fn insert_doubles(&mut self, name: &str, values: Vec<f64>) {
+        self.sections.insert(name.to_owned(), Section::Doubles(values));
+    }
+
+    /// Adds a section of bytes.
+    pub fn insert_bytes(&mut self, name: &str, values: Vec<u8>) {
+        self.sections.insert(name.to_owned(), Section::Bytes(values));
+    }
+
+    /// Returns the integer of a section of one.
+    ///
+    /// # Errors
+    /// [`CheckpointError::Section`] if there is no such section.
+    pub fn integer(&self, name: &str) -> Result<u64, CheckpointError> {
+        Ok(self.integers(name, 1)?[0])
+    }
+
+    /// Returns a section of exactly `n` integers.
+    ///
+    /// # Errors
+    /// [`CheckpointError::Section`] if there is no such section.
+    pub fn integers(&self, name: &str, n: usize) -> Result<&[u64], CheckpointError> {
+        match self.sections.get(name) {
+            Some(Section::Integers(values)) if values.len() == n => Ok(values),
+            Some(Section::Integers(values)) => Err(wrong_length(name, values.len(), n)),
+            other => Err(not_a_section(name, "integers", other)),
+        }
+    }
+
+    /// Returns a section of exactly `n` finite single-precision numbers.
+    ///
+    /// # Errors
+    /// [`CheckpointError::Section`] if there is no such section.
+    pub fn floats(&self, name: &str, n: usize) -> Result<&[f32], CheckpointError> {
+        match self.sections.get(name) {
+            Some(Section::Floats(values)) if values.len() == n => Ok(values),
+            Some(Section::Floats(values)) => Err(wrong_length(name, values.len(), n)),
+            other => Err(not_a_section(name, "single-precision numbers", other)),
+        }
+    }
+
+    /// Returns a section of any number of finite double-precision numbers.
+    ///
+    /// # Errors
+    /// [`CheckpointError::Section`] if there is no such section.
+    pub fn doubles(&self, name: &str) -> Result<&[f64], CheckpointError> {
+        match self.sections.get(name) {
+            Some(Section::Doubles(values)) => Ok(values),
+            other => Err(not_a_section(name, "double-precision numbers", other)),
+        }
+    }
+
+    /// Returns a section of bytes.
+    ///
+    /// # Errors
+    /// [`CheckpointError::Section`] if there is no such section.
+    pub fn bytes(&self, name: &str) -> Result<&[u8], CheckpointError> {
+        match self.sections.get(name) {
+            Some(Section::Bytes(values)) => Ok(values),
+            other => Err(not_a_section(name, "bytes", other)),
+        }
+    }
+
+    /// Returns the content of a checkpoint file.
+    ///
+    /// # Errors
+    /// [`CheckpointError::Section`] if a number is not finite.
+    pub fn to_bytes(&self, identity: &Identity) -> Result<Vec<u8>, CheckpointError> {
+        self.check_finite()?;
+        Ok(self.encode(identity))
+    }
+
+    /// Reads the content of a checkpoint file of this training.
+    ///
+    /// # Errors
+    /// Any [`CheckpointError`]. Memory in use stays within a small multiple of the file's size.
+    pub fn from_bytes(bytes: &[u8], identity: &Identity) -> Result<Checkpoint, CheckpointError> {
+        let damaged = |problem: &str| CheckpointError::Damaged(problem.to_owned());
+        let Some((head, body)) = bytes.split_at_checked(BODY_AT) else {
+            return Err(damaged("it is cut off, or of format version 1, which is no longer read"));
+        };
+        if digest(&head[..DIGEST_AT], body).to_le_bytes() != head[DIGEST_AT..] {
+            return Err(damaged(match head.starts_with(MAGIC) {
+                true => "its digest does not match its content",
+                false => {
+                    "it does not begin as a checkpoint does; format version 1 is no longer read"
+                }
+            }));
+        }
+        let version = u32::from_le_bytes(head[VERSION_AT..DIGEST_AT].try_into().expect("4 bytes"));
+        if !head.starts_with(MAGIC) || version != VERSION {
+            return Err(CheckpointError::Version { found: version });
+        }
+        // Every length is checked against the bytes that are left before they are taken.
+        let decoded: Result<((Identity, BTreeMap<String, Section>), &[u8]), _> =
+            postcard::take_from_bytes(body);
+        let Ok(((found, sections), [])) = decoded else {
+            return Err(damaged("its sections cannot be read"));
+        };
+        if found.kind != identity.kind {
+            let expected = identity.kind.clone();
+            return Err(CheckpointError::Kind { found: found.kind, expected });
+        }
+        if found.network != identity.network {
+            return Err(CheckpointError::Network);
+        }
+        let checkpoint = Checkpoint { sections };
+        checkpoint.check_finite()?;
+        Ok(checkpoint)
+    }
+
+    fn check_finite(&self) -> Result<(), CheckpointError> {
+        match self.sections.iter().find(|(_, section)| !section.is_finite()) {
+            Some((name, _)) => {
+                Err(CheckpointError::section(name, "has a value that is not finite"))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Returns the content of a checkpoint file, whatever the values.
+    pub(crate) fn encode(&self, identity: &Identity) -> Vec<u8> {
+        let body = postcard::to_stdvec(&(identity, &self.sections));
+        with_head(&body.expect("sections are plain data"))
+    }
+}
+
+/// Returns a file with this body and a head that fits it.
+pub(crate) fn with_head(body: &[u8]) -> Vec<u8> {
+    let mut bytes = MAGIC.to_vec();
+    bytes.extend(VERSION.to_le_bytes());
+    let digest = digest(&bytes, body);
+    bytes.extend(digest.to_le_bytes());
+    bytes.extend(body);
+    bytes
+}
+
+fn digest(head: &[u8], body: &[u8]) -> u128 {
+    let mut hasher = Xxh3::new();
+    hasher.update(head);
+    hasher.update(body);
+    hasher.digest128()
+}
+
+fn wrong_length(name: &str, found: usize, expected: usize) -> CheckpointError {
+    CheckpointError::section(name, format!("has {found} values, expected {expected}"))
+}
+
+fn not_a_section(name: &str, expected: &str, found: Option<&Section>) -> CheckpointError {
+    let problem = if found.is_some() { "does not hold" } else { "is missing; it holds" };
+    CheckpointError::section(name, format!("{problem} {expected}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn identity() -> Identity {
+        let mut network = Network::default();
+        network.aside("numbers", 3);
+        Identity::new("test", &network)
+    }
+
+    fn small() -> Checkpoint {
+        let mut checkpoint = Checkpoint::default();
+        checkpoint.insert_integers("steps", vec![7, u64::MAX]);
+        checkpoint.insert_floats("parameters", vec![1.0, -2.5, 0.0]);
+        checkpoint.insert_doubles("powers", vec![0.5]);
+        checkpoint.insert_bytes("choices", vec![1, 2, 3]);
+        checkpoint
+    }
+
+    #[test]
+    fn a_checkpoint_is_read_as_it_was_written() {
+        let bytes = small().to_bytes(&identity()).unwrap();
+        let read = Checkpoint::from_bytes(&bytes, &identity()).unwrap();
+        assert_eq!(read, small());
+        assert_eq!(read.integers("steps", 2), Ok(&[7, u64::MAX][..]));
+        assert_eq!(read.floats("parameters", 3), Ok(&[1.0, -2.5, 0.0][..]));
+        assert!(read.floats("parameters", 4).is_err() && read.floats("steps", 2).is_err());
+        assert!(read.integer("steps").is_err() && read.bytes("missing").is_err());
+        assert_eq!(bytes, small().to_bytes(&identity()).unwrap());
+    }
+
+    #[test]
+    fn every_flipped_bit_cut_and_addition_is_called_damage() {
+        let bytes = small().to_bytes(&identity()).unwrap();
+        let is_damaged = |bytes: &[u8]| {
+            let error = Checkpoint::from_bytes(bytes, &identity()).unwrap_err();
+            assert!(matches!(error, CheckpointError::Damaged(_)), "{error}");
+            assert!(error.to_string().starts_with("is damaged: "), "{error}");
+        };
+        for bit in 0..8 * bytes.len() {
+            let mut flipped = bytes.clone();
+            flipped[bit / 8] ^= 1 << (bit % 8);
+            is_damaged(&flipped);
+        }
+        (0..bytes.len()).for_each(|n| is_damaged(&bytes[..n]));
+        for more in [&[0][..], &[255; 40]] {
+            is_damaged(&[&bytes[..], more].concat());
+        }
+    }
+
+    #[test]
+    fn other_trainings_versions_and_numbers_that_are_not_finite_are_refused() {
+        let bytes = small().to_bytes(&identity()).unwrap();
+        let other = Identity { kind: "other".to_owned(), ..identity() };
+        let error = Checkpoint::from_bytes(&bytes, &other).unwrap_err().to_string();
+        assert_eq!(error, "is of `chaic train test`, expected `chaic train other`");
+        let other = Identity { network: 1, ..identity() };
+        assert_eq!(Checkpoint::from_bytes(&bytes, &other), Err(CheckpointError::Network));
+        let mut next = bytes.clone();
+        next[VERSION_AT] = 3;
+        let fitting = digest(&next[..DIGEST_AT], &next[BODY_AT..]).to_le_bytes();
+        next[DIGEST_AT..BODY_AT].copy_from_slice(&fitting);
+        let error = Checkpoint::from_bytes(&next, &identity()).unwrap_err();
+        assert_eq!(error, CheckpointError::Version { found: 3 });
+        for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let mut checkpoint = small();
+            checkpoint.insert_floats("parameters", vec![1.0, value, 0.0]);
+            let refused = checkpoint.to_bytes(&identity()).unwrap_err();
+            assert!(refused.to_string().contains("`parameters` has a value that is not finite"));
+            let encoded = checkpoint.encode(&identity());
+            assert_eq!(Checkpoint::from_bytes(&encoded, &identity()), Err(refused));
+        }
+    }
+
+    /// Returns 2^63 as postcard writes lengths.
+    fn huge() -> Vec<u8> {
+        postcard::to_stdvec(&(1u64 << 63)).unwrap()
+    }
+
+    #[test]
+    fn lengths_beyond_the_file_are_refused_before_memory_is_taken() {
+        // Each body ends with a length of 2^63: of the kind, of the map, of a name, of each type of section.
+        let head = postcard::to_stdvec(&identity()).unwrap();
+        let section = |variant: u8| [&head[..], &[1, 1, b's', variant], &huge()].concat();
+        let mut bodies = vec![huge(), [&head[..], &huge()].concat()];
+        bodies.push([&head[..], &[1], &huge()].concat());
+        bodies.extend((0..4).map(section));
+        // One that goes on with a megabyte, so that the first values are there.
+        bodies.extend((0..4).map(|variant| [section(variant), vec![0; 1 << 20]].concat()));
+        for body in bodies {
+            let error = Checkpoint::from_bytes(&with_head(&body), &identity()).unwrap_err();
+            assert!(matches!(error, CheckpointError::Damaged(_)), "{error}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn bytes_of_any_kind_are_read_or_refused(bytes: Vec<u8>, tail: Vec<u8>, at: usize) {
+            let _ = Checkpoint::from_bytes(&bytes, &identity());
+            // The same as the body of a file whose digest fits, alone and in place of the end of a valid one.
+            let _ = Checkpoint::from_bytes(&with_head(&bytes), &identity());
+            let valid = small().encode(&identity());
+            let body = &valid[BODY_AT..];
+            let altered = [&body[..at % body.len()], &tail].concat();
+            let _ = Checkpoint::from_bytes(&with_head(&altered), &identity());
+        }
+    }
+}

@@ -1,0 +1,215 @@
+//! Tests that every training passes: each crate with trainings calls them from its own tests.
+//!
+//! They panic where a training breaks a promise, and say which.
+
+use std::sync::atomic::AtomicBool;
+
+use toml::{Table, Value};
+
+use crate::bounds;
+use crate::checkpoint::{Checkpoint, CheckpointError, Section};
+use crate::config::{config_text, parse_rules};
+use crate::run::{Training, checkpoint_bytes, identity, restore};
+
+/// Checkpoints of at most this many bits have each of them flipped.
+const EVERY_BIT: usize = 20_000;
+/// Bits that are flipped in larger ones, besides those of the first bytes.
+const SAMPLED_BITS: usize = 160;
+/// First bytes of larger ones in which each bit is flipped: head, identity and first section.
+const HEAD_BYTES: usize = 160;
+
+/// Asserts that a training refuses every damaged checkpoint, and every one with impossible values.
+///
+/// # Panics
+/// If it accepts one, or calls damage something else.
+pub fn refuses_damaged_checkpoints<T: Training>(training: &mut T) {
+    let bytes = checkpoint_bytes(training, &[]).expect("the checkpoint can be written");
+    let stop = AtomicBool::new(false);
+    let mut is_damaged = |bytes: &[u8], what: &str| match restore(training, bytes, &stop) {
+        Err(CheckpointError::Damaged(_)) => {}
+        Err(error) => panic!("{what}: {error}"),
+        Ok(_) => panic!("a checkpoint with {what} is accepted"),
+    };
+    for bit in sampled_bits(8 * bytes.len()) {
+        let mut flipped = bytes.clone();
+        flipped[bit / 8] ^= 1 << (bit % 8);
+        is_damaged(&flipped, &format!("bit {bit} flipped"));
+    }
+    for n in [0, 1, 15, 16, 35, 36, 40, bytes.len() / 2, bytes.len() - 1] {
+        is_damaged(&bytes[..n], &format!("{n} bytes left"));
+    }
+    is_damaged(&[&bytes[..], &[0]].concat(), "a byte more");
+    let identity = identity(training);
+    for (what, altered) in alterations(&training.checkpoint()) {
+        let restored = restore(training, &altered.encode(&identity), &stop);
+        assert!(restored.is_err(), "a checkpoint with {what} is accepted");
+    }
+}
+
+fn sampled_bits(n_bits: usize) -> Vec<usize> {
+    if n_bits <= EVERY_BIT {
+        return (0..n_bits).collect();
+    }
+    let step = n_bits / SAMPLED_BITS;
+    // An odd step visits all bits of a byte.
+    (0..8 * HEAD_BYTES).chain((0..n_bits).step_by(step | 1)).collect()
+}
+
+/// Returns checkpoints that differ from a valid one by a value, a length or a section, with what differs.
+fn alterations(whole: &Checkpoint) -> Vec<(String, Checkpoint)> {
+    let mut found = Vec::new();
+    let mut add = |what: String, name: &str, section: Option<Section>| {
+        let mut altered = whole.clone();
+        match section {
+            Some(section) => altered.sections.insert(name.to_owned(), section),
+            None => altered.sections.remove(name),
+        };
+        found.push((format!("{what} in `{name}`"), altered));
+    };
+    for (name, section) in &whole.sections {
+        add("nothing".to_owned(), name, None);
+        add("another type".to_owned(), name, Some(other_type(section)));
+        add("one value more".to_owned(), name, Some(longer(section)));
+        let n = len(section);
+        for at in [0, n / 3, n / 2, n.saturating_sub(1)].into_iter().filter(|at| *at < n) {
+            for (what, section) in hostile_values(section, at) {
+                add(format!("{what} at {at}"), name, Some(section));
+            }
+        }
+    }
+    found
+}
+
+fn len(section: &Section) -> usize {
+    match section {
+        Section::Integers(values) => values.len(),
+        Section::Floats(values) => values.len(),
+        Section::Doubles(values) => values.len(),
+        Section::Bytes(values) => values.len(),
+    }
+}
+
+fn other_type(section: &Section) -> Section {
+    match section {
+        Section::Integers(_) => Section::Floats(vec![0.0; len(section)]),
+        _ => Section::Integers(vec![0; len(section)]),
+    }
+}
+
+fn longer(section: &Section) -> Section {
+    let mut section = section.clone();
+    match &mut section {
+        Section::Integers(values) => values.push(0),
+        Section::Floats(values) => values.push(0.0),
+        Section::Doubles(values) => values.push(0.0),
+        Section::Bytes(values) => values.push(0),
+    }
+    section
+}
+
+fn hostile_values(section: &Section, at: usize) -> Vec<(String, Section)> {
+    let mut altered = Vec::new();
+    match section {
+        Section::Integers(values) => {
+            for value in [1 << 63, u64::MAX] {
+                let mut values = values.clone();
+                values[at] = value;
+                altered.push((value.to_string(), Section::Integers(values)));
+            }
+        }
+        Section::Floats(values) => {
+            for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+                let mut values = values.clone();
+                values[at] = value;
+                altered.push((value.to_string(), Section::Floats(values)));
+            }
+        }
+        Section::Doubles(values) => {
+            for value in [f64::NAN, f64::INFINITY, -1.0, 2.0] {
+                let mut values = values.clone();
+                values[at] = value;
+                altered.push((value.to_string(), Section::Doubles(values)));
+            }
+        }
+        // Any byte may be one that the training has written.
+        Section::Bytes(_) => {}
+    }
+    altered
+}
+
+/// Asserts that every number in the configuration of a training has bounds, that a written configuration states
+/// them, and that whatever a number is set to is accepted within bounds or refused by name.
+///
+/// # Panics
+/// If a number has no bounds, or a refusal doesn't name key and bounds.
+pub fn bounds_every_number<T: Training>() {
+    let rules = T::Rules::default();
+    let table = Table::try_from(&rules).expect("defaults are plain data");
+    assert_eq!(bounds::unbounded(&table, T::BOUNDS), [""; 0], "numbers without bounds");
+    let text = config_text::<T>(&rules);
+    parse_rules::<T>(&text).unwrap_or_else(|e| panic!("defaults are refused: {e}"));
+    let mut leaves = Vec::new();
+    numbers(&Value::Table(table.clone()), &mut Vec::new(), &mut leaves);
+    assert!(leaves.len() > 5, "{leaves:?}");
+    let stated = text.lines().filter(|line| line.contains("  # ")).count();
+    let lines = text.lines().filter(|line| is_number_line(line)).count();
+    assert_eq!(stated, lines, "bounds are missing in {text}");
+    for leaf in leaves {
+        let mut n_refused = 0;
+        for hostile in hostile_numbers() {
+            let mut root = Value::Table(table.clone());
+            set(&mut root, &leaf, hostile.clone());
+            let text = toml::to_string(&root).expect("numbers are plain data");
+            let key = leaf.iter().rev().find(|step| step.parse::<usize>().is_err());
+            let key = key.expect("a number has a key");
+            if let Err(problem) = parse_rules::<T>(&text) {
+                n_refused += 1;
+                let names = problem.contains(key.as_str()) && problem.contains(" to ");
+                assert!(names, "{} = {hostile}: {problem}", leaf.join("."));
+                assert!(!problem.contains('\n'), "{problem}");
+            }
+        }
+        // Not-a-number, infinity and 1e308 are nothing that any key takes.
+        assert!(n_refused >= 3, "{} takes {} hostile values", leaf.join("."), n_refused);
+    }
+}
+
+fn hostile_numbers() -> Vec<Value> {
+    let reals = [f64::NAN, f64::INFINITY, -1.0, 1e308, -1e308, 1e-308, 2.5].map(Value::Float);
+    let integers = [-1, 0, 1 << 32, i64::MAX, i64::MIN].map(Value::Integer);
+    reals.into_iter().chain(integers).collect()
+}
+
+fn is_number_line(line: &str) -> bool {
+    let value = line.split_once(" = ").map_or("", |(_, value)| value.trim_start_matches('['));
+    value.starts_with(|c: char| c.is_ascii_digit() || c == '-')
+}
+
+/// Collects the paths of all numbers, by keys and places in lists.
+fn numbers(value: &Value, path: &mut Vec<String>, found: &mut Vec<Vec<String>>) {
+    let mut inner = |step: String, value: &Value| {
+        path.push(step);
+        numbers(value, path, found);
+        path.pop();
+    };
+    match value {
+        Value::Table(table) => table.iter().for_each(|(key, value)| inner(key.clone(), value)),
+        Value::Array(values) => {
+            values.iter().enumerate().for_each(|(k, value)| inner(k.to_string(), value));
+        }
+        Value::Integer(_) | Value::Float(_) => found.push(path.clone()),
+        _ => {}
+    }
+}
+
+fn set(value: &mut Value, path: &[String], to: Value) {
+    let Some((first, rest)) = path.split_first() else {
+        *value = to;
+        return;
+    };
+    let inner = match value {
+        Value::Array(values) => first.parse().ok().and_then(|k: usize| values.get_mut(k)),
+        value => value.get_mut(first.as_str()),
+    };
+    set(inner.expect("the path is one of the table's"), rest, to);
+}

@@ -339,7 +339,6 @@ def evaluate(
     (`images`, `image_size`) are what the own ones get. `isolation` has how to run these in processes of
     their own."""
 def serve(make: Callable[[], Any], images: Sequence[str], image_size: int, output: int) -> None:
-    """Serves fresh helpers of `make` on the standard input and the descriptor `output`, until the input is
-    closed."""
+    """Serves fresh helpers of `make` on the standard input and the descriptor `output`, until the input is closed."""
 def merge(out: str | PathLike[str], runs: Sequence[str | PathLike[str]]) -> str:
     """Joins the shards of a run in a new folder; its report."""

@@ -42,7 +42,9 @@ fn print(openings: &[&Opening]) {
         "  {n} openings: {seeds} seeds, {briefings} briefings, {with_own} with the own state, \
          {with_images} with images"
     );
-    let labels: [(&str, fn(&Opening) -> String); 2] =
+    type Label = fn(&Opening) -> String;
+    type Fields = fn(&Opening) -> &BTreeMap<String, String>;
+    let labels: [(&str, Label); 2] =
         [("task", |o| o.task.to_string()), ("partner", |o| o.partner.to_string())];
     for (name, label) in labels {
         let found = predict(openings, label);
@@ -53,8 +55,7 @@ fn print(openings: &[&Opening]) {
             found.z()
         );
     }
-    let parts: [(&str, fn(&Opening) -> &BTreeMap<String, String>); 2] =
-        [("briefing", |o| &o.briefing), ("own", |o| &o.own)];
+    let parts: [(&str, Fields); 2] = [("briefing", |o| &o.briefing), ("own", |o| &o.own)];
     for (part, of) in parts {
         for (field, values) in varying_fields(openings, of) {
             let value = |o: &Opening| of(o).get(&field).cloned();

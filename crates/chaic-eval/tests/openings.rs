@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use chaic_episodes::{Split, episodes};
 use chaic_eval::audit::opening::{Opening, distinct, predict, varying_fields};
 use chaic_protocol::TaskId;
+use chaic_protocol::geom::math;
 use chaic_protocol::observation::{Grants, Senses};
 use chaic_protocol::task::SceneKind;
 
@@ -91,7 +92,7 @@ fn a_start_pose_tells_neither_task_nor_partner() {
         for opening in all {
             let [x, z, sin, cos] = opening.pose;
             let whole = |v: f64, unit: f64| ((v / unit) - (v / unit).round()).abs() < 1e-2;
-            let turns = sin.atan2(cos).to_degrees();
+            let turns = f64::from(math::atan2(sin as f32, cos as f32).to_degrees());
             assert!(whole(x, 1e-3) && whole(z, 1e-3) && whole(turns, 15.0), "{:?}", opening.pose);
         }
     }

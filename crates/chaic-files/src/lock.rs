@@ -1,7 +1,6 @@
 //! Exclusive locks on folders.
 
-use std::fs::{self, File, TryLockError};
-use std::io;
+use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
 use crate::{FileError, open_or_create};
@@ -47,6 +46,8 @@ impl FolderLock {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]

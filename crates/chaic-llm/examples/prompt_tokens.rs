@@ -14,8 +14,9 @@ fn main() -> chaic_llm::Result<()> {
     ];
     println!("task               helper    questions  mean  longest  estimate/longest");
     let mut rows: Vec<(String, String, Vec<[usize; 2]>)> = Vec::new();
-    for path in record::all(Path::new(&run))? {
-        let record = Record::read(&path)?;
+    let run = Path::new(&run);
+    for path in record::all(run)? {
+        let record = Record::read(run, &path)?;
         let key = (record.head.of.task.to_string(), record.head.of.helper.clone());
         let counts = record.entries.iter().filter_map(|entry| match entry {
             Entry::Exchange(exchange) => {

@@ -28,7 +28,7 @@ pub struct IsolationOptions {
     /// Files and folders that the processes can read.
     readable: Vec<PathBuf>,
     /// Program and arguments that start a stage of the sandbox.
-    launcher: Vec<OsString>,
+    launcher: Vec<String>,
     /// Time limit of a decision, seconds.
     decision_s: f64,
 }
@@ -47,7 +47,7 @@ impl IsolatedHelper {
         grants: Grants,
         run: &Path,
     ) -> PyResult<Vec<IsolatedHelper>> {
-        let launcher = Launcher::new(options.launcher.clone());
+        let launcher = Launcher::new(options.launcher.iter().map(OsString::from));
         let confinement = ConfinementOptions {
             is_trusted: false,
             readable: options.readable.clone(),

@@ -1,7 +1,6 @@
 //! What a sandboxed command may read and use.
 
 use std::env;
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -125,7 +124,7 @@ pub fn words_of(line: &str) -> Vec<String> {
 /// Returns the installation folders of a program of the search path: the parent of each `bin` or `shims`
 /// folder that holds the program or the target of its link. Empty for programs of the system folders.
 pub fn program_folders(program: &str) -> Vec<PathBuf> {
-    let path = env::var_os("PATH").unwrap_or_else(OsString::new);
+    let path = env::var_os("PATH").unwrap_or_default();
     let found = env::split_paths(&path).map(|folder| folder.join(program)).find(|p| p.is_file());
     let Some(found) = found else { return Vec::new() };
     let target = found.canonicalize().unwrap_or_else(|_| found.clone());

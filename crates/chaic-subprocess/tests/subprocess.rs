@@ -424,7 +424,7 @@ fn a_pooled_process_serves_several_episodes_and_a_failed_one_is_replaced() {
     let log = dir.path().join("starts");
     let line = format!("echo start >> '{}'; {}", log.display(), python_helper());
     let starts = || std::fs::read_to_string(&log).unwrap().lines().count();
-    let mut play = |line: &str| {
+    let play = |line: &str| {
         let command = Arc::new(command(line));
         let mind = SubprocessAgent::pooled(command, Arc::clone(&pool), never());
         let helper = Some(Helper { mind: Box::new(mind), grants: Grants::PLANNER });

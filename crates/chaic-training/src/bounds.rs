@@ -201,10 +201,10 @@ fn collect_unbounded(value: &Value, bound: Option<Bound>, path: &str, found: &mu
         (Value::Array(values), bound) => {
             values.iter().for_each(|value| collect_unbounded(value, bound, path, found));
         }
-        (Value::Integer(_) | Value::Float(_), bound) => {
-            if bound.and_then(|bound| bound.allows(value)).is_none() {
-                found.push(path.to_owned());
-            }
+        (Value::Integer(_) | Value::Float(_), bound)
+            if bound.and_then(|bound| bound.allows(value)).is_none() =>
+        {
+            found.push(path.to_owned());
         }
         _ => {}
     }

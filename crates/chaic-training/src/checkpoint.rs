@@ -232,9 +232,8 @@ impl Checkpoint {
             return Err(CheckpointError::Version { found: version });
         }
         // Every length is checked against the bytes that are left before they are taken.
-        let decoded: Result<((Identity, BTreeMap<String, Section>), &[u8]), _> =
-            postcard::take_from_bytes(body);
-        let Ok(((found, sections), [])) = decoded else {
+        type Body = (Identity, BTreeMap<String, Section>);
+        let Ok(((found, sections), [])) = postcard::take_from_bytes::<Body>(body) else {
             return Err(damaged("its sections cannot be read"));
         };
         if found.kind != identity.kind {

@@ -97,6 +97,11 @@ pub enum TrainingError {
 }
 
 impl TrainingError {
+    /// Returns whether what was asked for can't be, by its configuration alone.
+    pub fn is_usage(&self) -> bool {
+        matches!(self, TrainingError::Config { .. } | TrainingError::Rules(_))
+    }
+
     /// For what it is to learn from.
     pub fn of_data(problem: impl Error + Send + Sync + 'static) -> TrainingError {
         TrainingError::Data(Box::new(problem))
@@ -283,7 +288,13 @@ impl<T: Training> TrainingRun<T> {
         check_rules::<T>(rules).map_err(TrainingError::Rules)?;
         let read = |path| read_weights::<T>(rules, path, read_user_file(path, MAX_BYTES)?);
         let weights = weights.map(read).transpose()?;
-        check_is_empty(folder)?;
+        if let Err(refusal) = check_is_empty(folder) {
+            // Who trains here says more than that something lies here.
+            if folder.join(LOCK).exists() {
+                FolderLock::take(folder)?;
+            }
+            return Err(refusal);
+        }
         let is_new = !folder.exists();
         fs::create_dir_all(folder).map_err(FileError::of("can't make", folder))?;
         let lock = FolderLock::take(folder)?;

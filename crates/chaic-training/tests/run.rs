@@ -246,6 +246,10 @@ fn one_process_trains_in_a_folder() {
     let error = resume(dir.path()).err().unwrap();
     assert!(matches!(error, TrainingError::Locked(_)), "{error}");
     assert!(error.to_string().contains("in use by another `chaic train`"));
+    let never = AtomicBool::new(false);
+    let begun =
+        TrainingRun::<Toy>::begin(dir.path(), &ToyRules::default(), None, &mut |_| (), &never);
+    assert!(matches!(begun, Err(TrainingError::Locked(_))));
     drop(run);
     resume(dir.path()).unwrap();
 }

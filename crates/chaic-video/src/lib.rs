@@ -141,7 +141,7 @@ impl Provisional {
 /// Creates an empty file, in place of an older file or link of this name. Links are not followed.
 fn create_fresh(path: &Path) -> io::Result<File> {
     match fs::remove_file(path) {
-        Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
+        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
         _ => File::options().write(true).create_new(true).open(path),
     }
 }

@@ -185,12 +185,11 @@ fn a_training_leaves_what_it_takes_to_go_on_and_weights_that_are_read_back() {
         TrainingRun::<Trainer>::begin(&out, &rules, None, quiet, &NEVER).unwrap().unwrap();
     let stopped = AtomicBool::new(true);
     assert!(!run.go_on(&stopped, &mut |_| ()).unwrap() && run.extent() == (0, 1));
-    assert!(matches!(
-        TrainingRun::<Trainer>::begin(&out, &rules, None, quiet, &NEVER),
-        Err(TrainingError::NotEmpty(_))
-    ));
-    assert_eq!(read_rules::<Trainer>(&out.join(CONFIG)).unwrap(), rules);
+    let mut again = || TrainingRun::<Trainer>::begin(&out, &rules, None, quiet, &NEVER);
+    assert!(matches!(again(), Err(TrainingError::Locked(_))));
     drop(run);
+    assert!(matches!(again(), Err(TrainingError::NotEmpty(_))));
+    assert_eq!(read_rules::<Trainer>(&out.join(CONFIG)).unwrap(), rules);
     let mut resumed = TrainingRun::<Trainer>::resume(&out, quiet, &NEVER).unwrap().unwrap();
     let mut told = Vec::new();
     stopped.store(false, Ordering::Relaxed);

@@ -5,6 +5,7 @@ use chaic_episodes::SplitError;
 use chaic_eval::EvalError;
 use chaic_llm::error::LlmError;
 use chaic_subprocess::Refusal;
+use chaic_training::TrainingError;
 
 /// As intended.
 pub const OK: u8 = 0;
@@ -52,6 +53,8 @@ pub fn of(error: &anyhow::Error) -> u8 {
         || of_llm.is_some_and(LlmError::is_usage)
         || of_minds.is_some_and(|inner| inner.is::<Refusal>())
         || error.downcast_ref().is_some_and(EvalError::is_usage)
+        || error.downcast_ref().is_some_and(TrainingError::is_usage)
+        || error.is::<Refusal>()
         || error.is::<SplitError>();
     if is_usage { USAGE } else { FAILED }
 }

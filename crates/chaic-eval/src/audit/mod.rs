@@ -24,7 +24,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use chaic_agents::{PlannerRules, partners};
 use chaic_env::minds::Helper;
 use chaic_env::rules::RuleSet;
-use chaic_env::{Env, EpisodeConfig, Idle, Minds, Seat, seats};
+use chaic_env::{Env, EpisodeConfig, Idle, Minds, Seat, seats, seeded_by_episode};
 use chaic_episodes::Episode;
 use chaic_protocol::geom::horizontal_distance;
 use chaic_protocol::observation::Observation;
@@ -247,7 +247,9 @@ impl Side {
             image_size: Some(image_size),
             appearance: chaic_render::Appearance::Canonical,
         };
-        let people = people(pair, episode.setup(), rules.planner, make(), &log);
+        // Probers that draw the same numbers in all episodes would try less.
+        let helper = seeded_by_episode(make(), &config);
+        let people = people(pair, episode.setup(), rules.planner, helper, &log);
         Ok(Side { env: Env::with_seats(config, people)?, log })
     }
 

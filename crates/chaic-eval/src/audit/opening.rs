@@ -10,6 +10,7 @@ use chaic_env::rules::RuleSet;
 use chaic_env::{Digest, Env, EpisodeConfig, Minds, Seat};
 use chaic_episodes::Episode;
 use chaic_protocol::capability::PersonKind;
+use chaic_protocol::geom::math;
 use chaic_protocol::observation::{Grants, Senses};
 use chaic_protocol::rng::Stream;
 use chaic_protocol::task::SceneKind;
@@ -64,7 +65,8 @@ impl Opening {
         let briefing = env.briefing(AgentId::HELPER);
         let seen = env.observe(AgentId::HELPER).expect("all agents decide at the beginning");
         let (own, images) = (&seen.own, &seen.images);
-        let (sin, cos) = f64::from(own.pose.yaw_rad).sin_cos();
+        let yaw_rad = own.pose.yaw_rad;
+        let (sin, cos) = (f64::from(math::sin(yaw_rad)), f64::from(math::cos(yaw_rad)));
         let at = own.pose.position;
         let depth = images.depth_m.iter().flatten().flat_map(|d| d.to_le_bytes());
         let pixels: Vec<u8> = images.rgb.iter().flatten().copied().chain(depth).collect();
@@ -140,7 +142,7 @@ impl Prediction {
             })
             .collect();
         let chance = permuted.iter().sum::<f64>() / f64::from(PERMUTATIONS);
-        let squares: f64 = permuted.iter().map(|a| (a - chance).powi(2)).sum();
+        let squares: f64 = permuted.iter().map(|a| (a - chance) * (a - chance)).sum();
         let deviation = (squares / f64::from(PERMUTATIONS - 1)).sqrt();
         Prediction { accuracy, chance, deviation }
     }
@@ -185,11 +187,13 @@ pub fn predict(openings: &[&Opening], label: impl Fn(&Opening) -> String) -> Pre
     let n = openings.len();
     let scales: [f64; 4] = std::array::from_fn(|k| {
         let mean = openings.iter().map(|o| o.pose[k]).sum::<f64>() / n as f64;
-        let variance = openings.iter().map(|o| (o.pose[k] - mean).powi(2)).sum::<f64>() / n as f64;
+        let squares = openings.iter().map(|o| (o.pose[k] - mean) * (o.pose[k] - mean));
+        let variance = squares.sum::<f64>() / n as f64;
         1.0 / variance.sqrt().max(1e-9)
     });
     let distance = |a: &Opening, b: &Opening| -> f64 {
-        (0..4).map(|k| ((a.pose[k] - b.pose[k]) * scales[k]).powi(2)).sum()
+        let scaled = (0..4).map(|k| (a.pose[k] - b.pose[k]) * scales[k]);
+        scaled.map(|x| x * x).sum()
     };
     let nearest = |i: usize| {
         let mut others: Vec<usize> = other_fold(i, n).collect();

@@ -7,7 +7,8 @@ use chaic_env::trace::{Trace, Warning};
 use chaic_env::{CHAIC_VERSION, Digest, EnvError, RunKey, slug};
 use chaic_episodes::{Episode, MAX_EPISODE_BYTES, find_episode};
 use chaic_files::{
-    Entry, EntryKind, FolderLock, LOCK, LockError, UNFINISHED, entries, is_file_below, kind, kind_below, read_below, read_bounded, walk, write_whole,
+    Entry, EntryKind, FolderLock, LOCK, LockError, UNFINISHED, entries, is_file_below, kind,
+    kind_below, open_or_create, read_below, read_bounded, walk, write_whole,
 };
 use serde::{Deserialize, Serialize};
 

@@ -292,9 +292,10 @@ fn replay(
 
 /// Largest number of decisions between two updates. One is kept in 74 kB, so that all take 5 GB.
 const MAX_DECISIONS: usize = 1 << 16;
-/// Largest number of pixels of one eye in all environments, each of which has two eyes.
+/// Largest number of pixels of one eye in all environments. Each takes 25 bytes, so that all take 2 GB; beside them an
+/// environment takes 4 MB.
 const MAX_EYE_PX: usize = 1 << 26;
-/// Largest number of decisions of an optimizer step: a pass over their images takes about a second.
+/// Largest number of decisions of an optimizer step. A pass over their images takes a second, and can't be stopped.
 const MAX_BATCH: i64 = 512;
 
 /// Sections of a checkpoint.

@@ -68,8 +68,9 @@ impl Bench {
 
     /// All records of a run.
     pub fn records(&self, name: &str) -> Vec<Record> {
-        let paths = record::all(&self.path(name)).unwrap();
-        paths.iter().map(|p| Record::read(p).unwrap()).collect()
+        let run = self.path(name);
+        let paths = record::all(&run).unwrap();
+        paths.iter().map(|p| Record::read(&run, p).unwrap()).collect()
     }
 }
 

@@ -66,7 +66,9 @@ pub(super) fn run(request: &Request) -> Setup<u8> {
         .map_err(SetupError::of(format!("enter {}", start.display())))?;
     let Some(line) = &request.line else {
         let report = serde_json::to_vec(&Isolation::Sandboxed(missing)).unwrap_or_default();
-        std::io::stdout().write_all(&report).map_err(SetupError::of("report"))?;
+        let mut out = std::io::stdout();
+        // An interpreter that runs this stage does not flush it at its end.
+        out.write_all(&report).and_then(|()| out.flush()).map_err(SetupError::of("report"))?;
         return Ok(0);
     };
     let mut shell = Command::new("/bin/sh");

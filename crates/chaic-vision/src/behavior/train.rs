@@ -147,8 +147,11 @@ const VALIDATION_CLIPS: usize = 60;
 /// One of so many episodes is for validation.
 const VALIDATION_PART: usize = 4;
 
-/// Largest number of clips that the shards work on at once: about 16 GiB of memory.
-const MAX_BATCH_CLIPS: usize = 1024;
+/// Largest number of clips that the shards work on at once. Each takes 17 MB, so that all take 9 GB.
+const MAX_BATCH_CLIPS: usize = 512;
+
+/// Largest number of clips of one shard. A pass over them takes 1.5 s, and can't be stopped.
+const MAX_SHARD_CLIPS: i64 = 64;
 
 /// A behavior network while it learns, with clips to validate it by.
 pub struct BehaviorTraining {
@@ -177,7 +180,7 @@ impl Training for BehaviorTraining {
         ("rate", RATE),
         ("warm_up", STEPS),
         ("shards", SHARDS),
-        ("clips", integer(1, 256)),
+        ("clips", integer(1, MAX_SHARD_CLIPS)),
         ("mixed", SHARE),
         ("smoothing", SHARE),
         ("collect", Bound::Table(COLLECT_BOUNDS)),
@@ -258,7 +261,7 @@ impl Training for BehaviorTraining {
     }
 
     fn step(&mut self, _: &AtomicBool) -> Option<Figures> {
-        // A step of the largest batch takes seconds.
+        // MAX_SHARD_CLIPS bounds how long it takes.
         let BehaviorLoss { loss, right } = self.trainer.step();
         Some(figures([("loss", loss), ("right", right)]))
     }

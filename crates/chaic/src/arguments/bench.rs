@@ -25,7 +25,7 @@ pub struct ExportArguments {
     /// The file, .glb.
     #[arg(long, value_name = "FILE", value_parser = glb_file)]
     pub out: PathBuf,
-    /// Level of detail, from 0 (coarsest) to 6 (finest).
+    /// Level of detail, 0 to 6, from coarsest to finest.
     #[arg(long, value_name = "LEVEL", default_value_t = FINEST as u8,
         value_parser = clap::value_parser!(u8).range(0..=FINEST as i64))]
     pub detail: u8,

@@ -45,11 +45,13 @@ fn check(root: &Command, command: &Command, path: &[String]) -> usize {
             let refused = refusal(root, path, name, value);
             assert!(refused.contains("invalid value"), "{what}: {value}: {refused}");
         }
-        let refused = refusal(root, path, name, "-1");
-        let range = refused.split_once(" is not in ").and_then(|(_, rest)| {
+        let range = ["-1", "18446744073709551615"].iter().find_map(|value| {
+            let refused = refusal(root, path, name, value);
+            let (_, rest) = refused.split_once(" is not in ")?;
             let (lower, upper) = rest.lines().next()?.split_once("..=")?;
             Some(format!("{lower} to {upper}"))
         });
+        // Seconds have a parser of their own.
         let range = range.unwrap_or_else(|| "0.001 to 3600".to_owned());
         assert!(help.contains(&range), "{what} lacks {range}");
         n_checked += 1;

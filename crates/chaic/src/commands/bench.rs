@@ -5,6 +5,7 @@ use chaic_bench::{
     BenchScene, EnvBench, EnvSpeed, Machine, N_VIEWS, RenderBench, RenderSpeed, WorldSpeed,
     measure_world,
 };
+use chaic_eval::EvalError;
 use chaic_gltf::Written;
 use comfy_table::{ContentArrangement, Table, presets};
 use serde::Serialize;
@@ -114,7 +115,25 @@ fn world_text(speeds: &[WorldSpeed]) -> String {
     table.trim_fmt() + "\n" + &machine
 }
 
+/// Largest number of pixels that helpers and partners of all environments see at once. Each takes 25 bytes, so that
+/// all take 7 GB.
+const MAX_EYE_PX: u64 = 1 << 28;
+
+/// Refuses more images than memory holds.
+fn check_images(arguments: &EnvBenchArguments) -> Result<(), EvalError> {
+    let [helper, partner] =
+        [arguments.size, arguments.minds_size].map(|side| u64::from(side).pow(2));
+    let px = u64::from(arguments.envs) * (helper + partner);
+    if px <= MAX_EYE_PX {
+        return Ok(());
+    }
+    Err(EvalError::Options(format!(
+        "--envs times the pixels of --size and --minds-size is {px}, at most {MAX_EYE_PX} fit into memory; give less"
+    )))
+}
+
 fn env(arguments: &EnvBenchArguments) -> Result<Ended> {
+    check_images(arguments)?;
     warn_of_slow_build();
     let bench = EnvBench {
         tasks: arguments.task.0.clone(),

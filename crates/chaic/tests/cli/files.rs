@@ -214,7 +214,7 @@ fn exit_codes_are_those_of_the_table() {
         (&["render", "obstacle/test/99", "--out", "x"], 2, "obstacle/test/99"),
         (&[&usage[..], &["--helper", "nobody"]].concat(), 2, "follow, llm, llm-told, vlm"),
         (&[&usage[..], &["--partner", "nobody"]].concat(), 2, "the partners are rules, llm, vlm"),
-        (&[&usage[..], &["--seeds", "0"]].concat(), 2, "at least 1"),
+        (&[&usage[..], &["--seeds", "0"]].concat(), 2, "0 is not in 1..="),
         (&["eval", "--nonsense"], 2, "--nonsense"),
     ] {
         let out = chaic(at, arguments);

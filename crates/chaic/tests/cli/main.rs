@@ -17,6 +17,7 @@ mod run_folders;
 mod sandbox;
 mod splits;
 mod subprocess;
+mod training;
 
 /// Frames of the episodes of these tests.
 const FRAMES: u32 = 80;
@@ -344,8 +345,8 @@ fn errors_are_clear() {
         (&["eval", "--task", "lunch", "--out", "r"][..], "unknown task `lunch`"),
         (&["eval", "--helper", "nobody", "--out", "r"], "unknown helper `nobody`"),
         (&["eval", "--split", "gen:5..5", "--out", "r"], "no split `gen:5..5`"),
-        (&["eval", "--size", "5", "--out", "r"], "--size is 5"),
-        (&["eval", "--seeds", "0", "--out", "r"], "at least 1"),
+        (&["eval", "--size", "5", "--out", "r"], "5 is not in 16..=2048"),
+        (&["eval", "--seeds", "0", "--out", "r"], "0 is not in 1..="),
         (&["eval", "--appearance", "dusk", "--out", "r"], APPEARANCES),
         (&["render", "shopping/test/00", "--appearance", "varied:x", "--out", "r"], APPEARANCES),
         (&["eval", "--rules", "mine", "--out", "r"], "they are paper and compat"),

@@ -40,11 +40,12 @@ fn a_helper_sees_neither_the_run_nor_the_start_folder() {
             assert!(!results.contains(secret), "{secret}: {results}");
         }
     }
-    let trusted =
-        spy.replace("cat run/run.json", "head -c 60 run/run.json").replace("run short", "short");
-    chaic(dir.path(), &play(&trusted, "open", &["--exec-trust"]));
+    let trusted = "exec:{ head -c 200 open/run.json; ls short; } >&2; exit 1";
+    chaic(dir.path(), &play(trusted, "open", &["--exec-trust"]));
     let results = fs::read_to_string(dir.path().join("open/results.jsonl")).expect("it is there");
-    assert!(results.contains("--episodes"), "{results}");
+    for secret in ["renderer", "no_constraint"] {
+        assert!(results.contains(secret), "{secret}: {results}");
+    }
 }
 
 #[test]

@@ -1,0 +1,133 @@
+"""Helpers in processes of their own, in the sandbox of docs/threat-model.md."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+import chaic
+
+ONE = {"tasks": "low_target", "split": "train", "first": 1, "jobs": 2, "quiet": True}
+
+# The helpers stand in a file of their own, since another process must import them.
+HELPERS = """
+import json, os
+from pathlib import Path
+
+HOME = str(Path.home())
+
+class Turner:
+    images = ("depth",)
+    image_size = 64
+
+    def reset(self, briefing):
+        self.n = 0
+
+    def act(self, observation):
+        self.n += 1
+        return "turn_left" if self.n % 2 else {"wait": {"frames": 30}}
+
+class Spy(Turner):
+    def reset(self, briefing):
+        found = {"pid": os.getpid(), "environment": sorted(os.environ)}
+        for name, path in [("processes", "/proc"), ("home", HOME)]:
+            try:
+                found[name] = os.listdir(path)
+            except OSError:
+                found[name] = []
+        raise RuntimeError("FOUND " + json.dumps(found))
+
+class Counter(Turner):
+    served = 0
+
+    def reset(self, briefing):
+        super().reset(briefing)
+        Counter.served += 1
+
+    def act(self, observation):
+        print("text on the standard output is no message")
+        if Counter.served > 1:
+            raise RuntimeError(f"served {Counter.served}")
+        return super().act(observation)
+
+class Waiter(Turner):
+    def __init__(self, frames):
+        self.frames = frames
+
+    def act(self, observation):
+        return {"wait": {"frames": self.frames}}
+"""
+
+
+@pytest.fixture
+def helpers(tmp_path, monkeypatch):
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    (folder / "isolated_helpers.py").write_text(HELPERS)
+    monkeypatch.syspath_prepend(folder)
+    monkeypatch.delitem(sys.modules, "isolated_helpers", raising=False)
+    import isolated_helpers
+
+    yield isolated_helpers
+    del sys.modules["isolated_helpers"]
+
+
+def isolation_of(run):
+    return json.loads((run.path / "run.json").read_text())["granted"]["isolation"]
+
+
+def test_isolated_helpers_play_as_others_do(tmp_path, helpers):
+    own = chaic.evaluate(helpers.Turner, out=tmp_path / "own", **ONE)
+    isolated = chaic.evaluate(helpers.Turner, isolate=True, out=tmp_path / "isolated", **ONE)
+    assert isolation_of(own) == {"turner": "trusted"}
+    assert isolation_of(isolated)["turner"].startswith("sandbox")
+    assert own.records().tolist() == isolated.records().tolist()
+    isolated.verify()
+    trace = next((isolated.path / "traces").rglob("*.jsonl"))
+    assert '"isolation":"sandbox' in trace.read_text().splitlines()[0]
+
+
+def test_makers_with_arguments_reach_the_process(tmp_path, helpers):
+    maker = {"waiter": partial(helpers.Waiter, 50)}
+    run = chaic.evaluate(maker, isolate=True, out=tmp_path / "run", **ONE)
+    assert not run.records()["broke_down"].any()
+
+
+def test_an_isolated_helper_sees_neither_caller_nor_home(tmp_path, helpers, monkeypatch):
+    monkeypatch.setenv("CHAIC_TEST_API_KEY", "sesame")
+    run = chaic.evaluate(helpers.Spy, isolate=True, out=tmp_path / "run", **ONE)
+    (result,) = run.results()
+    said = next(text for text in result.values() if "FOUND " in str(text))
+    found, _ = json.JSONDecoder().raw_decode(said.split("FOUND ")[-1])
+    assert "CHAIC_TEST_API_KEY" not in found["environment"]
+    if isolation_of(run)["spy"] == "sandbox":
+        assert found["pid"] < 100
+        assert str(os.getpid()) not in found["processes"]
+        # The installation of Python may lie there.
+        assert len(found["home"]) < len(os.listdir(Path.home()))
+
+
+def test_a_process_serves_one_episode_after_the_other(tmp_path, helpers):
+    two = {**ONE, "first": 2, "jobs": 1}
+    run = chaic.evaluate(helpers.Counter, isolate=True, out=tmp_path / "run", **two)
+    broken = run.records()["broke_down"]
+    assert broken.sum() == 1
+    assert "served 2" in json.dumps(run.results())
+
+
+def test_what_no_other_process_can_import_is_refused(tmp_path, helpers):
+    class Local(helpers.Turner):
+        pass
+
+    with pytest.raises(ValueError, match="at the top of a file"):
+        chaic.evaluate(Local, isolate=True, out=tmp_path / "run", **ONE)
+    with pytest.raises(ValueError, match="isolate=True"):
+        chaic.evaluate(helpers.Turner, read=["."], out=tmp_path / "run", **ONE)
+    with pytest.raises(ValueError, match="exec-read"):
+        chaic.evaluate(helpers.Turner, isolate=True, read=["nowhere"], out=tmp_path / "run", **ONE)
+    assert not (tmp_path / "run").exists()

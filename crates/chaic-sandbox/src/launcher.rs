@@ -37,29 +37,29 @@ pub(crate) enum Stage {
     Inner,
 }
 
-/// How much a stage takes from the command.
+/// Strength of a sandbox.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum Mode {
     /// Nothing: the outer stage only watches, and ends what the command leaves behind.
     Trusted,
-    /// What a process can give up itself, within the caller's file system.
+    /// The command runs in the caller's file system, with the rights that a process can give up itself.
     Process,
     /// Everything, with namespaces and a root folder of its own.
     Namespaces,
 }
 
-/// What a stage is asked to do: the JSON text of its second argument.
+/// Task of a stage: the JSON text of its second argument.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Request {
     /// The stage.
     pub stage: Stage,
     /// The program and arguments that start a stage.
     pub launcher: Vec<OsString>,
-    /// What the command may use.
+    /// Rights of the command.
     pub policy: Policy,
     /// Parts that must be enforced, or the command does not start.
     pub required: Vec<Part>,
-    /// How much to take from the command.
+    /// Strength of the sandbox.
     pub mode: Mode,
     /// Process that started the outer stage; it ends with that one.
     pub parent: u32,
@@ -69,7 +69,7 @@ pub(crate) struct Request {
     pub scratch: Option<PathBuf>,
 }
 
-/// How to start the stages of a sandbox: a program that calls [`run_stage`] first.
+/// Program that starts the stages of a sandbox: it calls [`run_stage`] first.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Launcher {
     program: Vec<OsString>,

@@ -1,4 +1,4 @@
-//! What a sandboxed command may read and use.
+//! Read and use rights of a sandboxed command.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -141,6 +141,7 @@ pub(crate) const SYSTEM_FOLDERS: &[&str] =
     &["/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32", "/nix/store", "/gnu/store"];
 
 /// Files below `/etc` that programs need and that hold no secrets.
+#[cfg(target_os = "linux")]
 pub(crate) const SYSTEM_FILES: &[&str] = &[
     "/etc/ld.so.cache",
     "/etc/ld.so.conf",
@@ -152,6 +153,7 @@ pub(crate) const SYSTEM_FILES: &[&str] = &[
 ];
 
 /// Devices that every sandboxed command can use.
+#[cfg(target_os = "linux")]
 pub(crate) const DEVICES: &[&str] =
     &["/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom"];
 

@@ -1,7 +1,7 @@
 //! Environment variables of helper processes: an allow-list, and names that the user adds.
 //!
 //! The environment of the `chaic` process may hold API keys of language models and other credentials.
-//! A helper process therefore starts with an empty environment, to which [`inherited`] adds only
+//! A helper process therefore starts with an empty environment, to which chaic adds only
 //! variables of [`ALLOWED_VARIABLES`] and variables that the user names.
 
 use std::ffi::OsString;

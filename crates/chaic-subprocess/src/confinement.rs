@@ -1,6 +1,6 @@
 //! How the process of a helper is confined: in a sandbox, or trusted by its user.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use chaic_sandbox::{Isolation, Launcher, Part, Policy};
 
@@ -39,7 +39,12 @@ impl Confinement {
         let refuse = |problem: &dyn std::fmt::Display| Refusal(problem.to_string());
         let start_folder = std::env::current_dir().map_err(|e| refuse(&e))?;
         let absolute = |path: &PathBuf| std::path::absolute(path).map_err(|e| refuse(&e));
-        let masked: Result<_, _> = options.masked.iter().map(absolute).collect();
+        let masked: Result<Vec<PathBuf>, _> = options.masked.iter().map(absolute).collect();
+        // A command reaches a masked folder by its real name too.
+        let masked = masked.map(|paths| {
+            let real: Vec<PathBuf> = paths.iter().map(|path| resolved(path)).collect();
+            [paths, real].concat()
+        });
         let mut policy = Policy {
             start_folder,
             readable: Vec::new(),
@@ -80,6 +85,14 @@ impl Confinement {
     }
 }
 
+/// Resolves links in an absolute path of which the last parts may not exist yet.
+fn resolved(path: &Path) -> PathBuf {
+    let found =
+        path.ancestors().find_map(|ancestor| Some((ancestor, ancestor.canonicalize().ok()?)));
+    let Some((ancestor, real)) = found else { return path.to_owned() };
+    path.strip_prefix(ancestor).map_or(real.clone(), |rest| real.join(rest))
+}
+
 fn in_words(isolation: &Isolation) -> String {
     let Isolation::Sandboxed(missing) = isolation else { return isolation.to_string() };
     let reasons: Vec<String> = missing
@@ -90,4 +103,19 @@ fn in_words(isolation: &Isolation) -> String {
         return format!("no sandbox ({})", reasons.first().map_or("", String::as_str));
     }
     format!("a {isolation} ({})", reasons.join("; "))
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_behind_a_link_is_masked_by_its_real_name() {
+        let top = tempfile::tempdir().unwrap();
+        let top = top.path().canonicalize().unwrap();
+        std::fs::create_dir(top.join("real")).unwrap();
+        std::os::unix::fs::symlink(top.join("real"), top.join("link")).unwrap();
+        assert_eq!(resolved(&top.join("link/runs/new")), top.join("real/runs/new"));
+        assert_eq!(resolved(&top.join("link")), top.join("real"));
+    }
 }

@@ -118,6 +118,15 @@ fn a_helper_reads_what_its_line_names_and_what_the_user_adds() {
         assert!(!bare.contains("weights-are-here"), "{bare}");
     }
     assert!(said("more", &["--exec-read", "data"]).contains("weights-are-here"));
+    // The run's own folder stays empty, also where a readable folder holds it.
+    #[cfg(unix)]
+    std::os::unix::fs::symlink("data", dir.path().join("alias")).expect("there is room");
+    let spy = "exec:cat data/run/run.json data/weights >&2; exit 1";
+    chaic(dir.path(), &play(spy, "alias/run", &["--exec-read", "data"]));
+    let run = dir.path().join("data/run");
+    let said = fs::read_to_string(run.join("results.jsonl")).expect("it is there");
+    assert!(said.contains("weights-are-here"), "{said}");
+    assert!(!is_whole(&run) || !said.contains("renderer"), "{said}");
     for (path, problem) in [("nowhere", "--exec-read nowhere"), ("/", "--exec-trust")] {
         let out = chaic(dir.path(), &play(line, "none", &["--exec-read", path]));
         assert_eq!(out.status.code(), Some(2), "{path}: {}", text(&out.stderr));

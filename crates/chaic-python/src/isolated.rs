@@ -60,7 +60,6 @@ impl IsolatedHelper {
             let confined = Confinement::new(&launcher, line, &limits, &confinement);
             let command = Command {
                 name: name.clone(),
-                // What it runs is no name for people.
                 line: line.clone(),
                 grants,
                 limits,

@@ -75,11 +75,6 @@ impl Isolation {
         let is_there = |part: &Part| missing.iter().all(|m| m.part != *part);
         Part::ALL.into_iter().filter(is_there).collect()
     }
-
-    /// Returns whether every part is enforced.
-    pub fn is_complete(&self) -> bool {
-        matches!(self, Isolation::Sandboxed(missing) if missing.is_empty())
-    }
 }
 
 impl fmt::Display for Isolation {

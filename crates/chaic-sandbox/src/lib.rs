@@ -26,4 +26,4 @@ mod policy;
 
 pub use isolation::{Isolation, MissingPart, Part};
 pub use launcher::{Launcher, STAGE_ARGUMENT, SandboxError, run_stage};
-pub use policy::{Policy, PolicyError, program_folders, words_of};
+pub use policy::{Policy, PolicyError};

@@ -115,7 +115,7 @@ impl Policy {
 
 /// Splits a command line at white space and shell operators, without quotes: good enough to find the paths
 /// in it.
-pub fn words_of(line: &str) -> Vec<String> {
+fn words_of(line: &str) -> Vec<String> {
     let is_separator = |c: char| c.is_whitespace() || ";|&()<>=`".contains(c);
     let unquoted = |word: &str| word.trim_matches(['"', '\'']).to_owned();
     line.split(is_separator).map(unquoted).filter(|word| !word.is_empty()).collect()
@@ -123,7 +123,7 @@ pub fn words_of(line: &str) -> Vec<String> {
 
 /// Returns the installation folders of a program of the search path: the parent of each `bin` or `shims`
 /// folder that holds the program or the target of its link. Empty for programs of the system folders.
-pub fn program_folders(program: &str) -> Vec<PathBuf> {
+fn program_folders(program: &str) -> Vec<PathBuf> {
     let path = env::var_os("PATH").unwrap_or_default();
     let found = env::split_paths(&path).map(|folder| folder.join(program)).find(|p| p.is_file());
     let Some(found) = found else { return Vec::new() };

@@ -374,7 +374,7 @@ fn a_run_goes_on_with_the_commands_it_began_with() {
 fn the_python_helper_delivers_something() {
     let line = python_helper();
     let mut n_delivered = 0;
-    for k in 0..6 {
+    for k in 3..6 {
         let episode = find_episode(&format!("low_target/train/0{k}")).unwrap();
         let mind = SubprocessAgent::new(Arc::new(command(&line)), never());
         let helper = Some(Helper { mind: Box::new(mind), grants: Grants::PLANNER });
@@ -383,7 +383,7 @@ fn the_python_helper_delivers_something() {
         let things = env.world().state().things.iter();
         n_delivered += things.filter(|t| t.delivered_by == Some(AgentId::HELPER)).count();
     }
-    assert!(n_delivered > 0, "nothing in six episodes");
+    assert!(n_delivered > 0, "nothing in three episodes");
 }
 
 /// Open descriptors and threads of this process.

@@ -156,7 +156,7 @@ impl Target {
         let open = fs::File::open(at("run/secret")).expect("it is there");
         // Without the flag that closes it on exec.
         let inherited = rustix::io::dup(&open).expect("there are descriptors");
-        let policy = Policy {
+        let mut policy = Policy {
             start_folder: at("start"),
             readable: vec![at("readable")],
             masked: vec![at("run")],
@@ -164,7 +164,6 @@ impl Target {
             scratch_mib: 48,
             max_tasks: 64,
         };
-        let mut policy = policy;
         policy.add_named_by("python3");
         let launcher = Launcher::this_program();
         let held = (tcp, udp, local, hidden, open, inherited);

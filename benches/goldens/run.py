@@ -4,7 +4,7 @@
     benches/goldens/run.py [--install] [TARGET..]
 
 Builds `chaic-goldens` for each target, runs it, and compares what it prints with
-`crates/chaic-goldens/goldens.txt`. Targets, all by default:
+`crates/dev/chaic-goldens/goldens.txt`. Targets, all by default:
 
     x86-64        this machine's own build (the tests run each width of vectors besides)
     x86-64-v3     the same compiled for AVX2 and fused multiply-add throughout
@@ -25,7 +25,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-TABLE = ROOT / "crates/chaic-goldens/goldens.txt"
+TABLE = ROOT / "crates/dev/chaic-goldens/goldens.txt"
 TARGET_DIR = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
 SYSROOT = "/usr/aarch64-linux-gnu"
 

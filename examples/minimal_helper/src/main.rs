@@ -8,18 +8,18 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::Result;
+use chaic_core::geom::{horizontal_distance, wrap_angle, yaw_towards};
+use chaic_core::observation::{Grants, Identity, Senses};
+use chaic_core::rng::Stream;
+use chaic_core::{
+    Action, Agent, AgentError, Briefing, ClassId, EntityId, Hand, Observation, Outcome, Target,
+    TaskId, Vec3,
+};
 use chaic_env::minds::{Helper, Helpers};
 use chaic_env::rules::PlannerRules;
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::{Format, Report};
 use chaic_eval::run::{Access, Run, RunRequest};
-use chaic_protocol::geom::{horizontal_distance, wrap_angle, yaw_towards};
-use chaic_protocol::observation::{Grants, Identity, Senses};
-use chaic_protocol::rng::Stream;
-use chaic_protocol::{
-    Action, Agent, AgentError, Briefing, ClassId, EntityId, Hand, Observation, Outcome, Target,
-    TaskId, Vec3,
-};
 
 /// How near to walk before taking or putting, metres.
 const NEAR_M: f32 = 1.3;

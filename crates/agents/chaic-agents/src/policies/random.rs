@@ -1,0 +1,107 @@
+//! Any valid plan, all equally likely.
+
+use chaic_core::briefing::Relation;
+use chaic_core::rng::Stream;
+use chaic_core::{AgentError, Briefing};
+
+use crate::decision::{Context, Plan, Policy};
+use crate::rules::RandomDraw;
+
+/// Chooses uniformly among the valid plans (the paper's random helper).
+#[derive(Clone, Debug)]
+pub struct Random {
+    rng: Stream,
+}
+
+impl Default for Random {
+    fn default() -> Random {
+        Random { rng: Stream::new(0, "random policy", 0) }
+    }
+}
+
+impl Policy for Random {
+    fn reset(&mut self, briefing: &Briefing) {
+        self.rng = Stream::new(briefing.seed, "random policy", 0);
+    }
+
+    fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
+        Ok(self.decide(context, valid))
+    }
+
+    fn fork(&self) -> Option<Random> {
+        Some(self.clone())
+    }
+}
+
+impl Random {
+    /// A plan drawn from the valid ones.
+    pub fn decide(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
+        let drawn = match context.memory.rules.random_draw {
+            RandomDraw::Plans => self.rng.choose(valid).copied(),
+            RandomDraw::KindsFirst => self.choose_kind(context, valid),
+        };
+        drawn.unwrap_or(Plan::Explore)
+    }
+
+    /// Draws a kind of plan, then a plan of that kind.
+    fn choose_kind(&mut self, context: &Context<'_>, valid: &[Plan]) -> Option<Plan> {
+        let mut kinds: Vec<Plan> = Vec::new();
+        for plan in valid {
+            if !kinds.iter().any(|k| is_same_kind(k, plan)) {
+                kinds.push(*plan);
+            }
+        }
+        // To follow somebody whose place nobody knows is to explore (facts A2.1).
+        let followed =
+            [(Relation::Partner, Plan::FollowPartner), (Relation::Child, Plan::FollowChild)];
+        for (relation, follow) in followed {
+            if context.briefing.companion(relation).is_some() && !kinds.contains(&follow) {
+                kinds.push(Plan::Explore);
+            }
+        }
+        let kind = *self.rng.choose(&kinds)?;
+        let of_kind: Vec<Plan> = valid.iter().copied().filter(|p| is_same_kind(p, &kind)).collect();
+        self.rng.choose(&of_kind).copied()
+    }
+}
+
+fn is_same_kind(a: &Plan, b: &Plan) -> bool {
+    std::mem::discriminant(a) == std::mem::discriminant(b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::PlannerRules;
+    use crate::TrackId;
+    use crate::behavior::BehaviorLog;
+    use crate::decision::Subject;
+    use crate::memory::Memory;
+    use crate::test_support::Toy;
+    use chaic_core::ClassId;
+
+    #[test]
+    fn drawing_kinds_first_gives_ten_objects_no_more_weight_than_one_plan() {
+        let briefing = Toy::room(4.0, 4.0).briefing();
+        let subject = |n| Subject { track: TrackId(n), class: ClassId::named("apple") };
+        let mut valid = vec![Plan::Explore, Plan::TurnAround, Plan::FollowPartner];
+        valid.extend((20..29).map(|n| Plan::PickUp(subject(n))));
+        for (draw, expected) in [(RandomDraw::Plans, 900), (RandomDraw::KindsFirst, 300)] {
+            let rules = PlannerRules { random_draw: draw, ..PlannerRules::paper() };
+            let memory = Memory::new(&briefing, rules);
+            let behavior = BehaviorLog::default();
+            let context = Context {
+                briefing: &briefing,
+                memory: &memory,
+                behavior: &behavior,
+                is_explored: false,
+            };
+            let mut random = Random::default();
+            let n = (0..1200)
+                .filter(|_| matches!(random.decide(&context, &valid), Plan::PickUp(_)))
+                .count();
+            // Standard deviation 15.
+            assert!(n.abs_diff(expected) < 75, "{n}, expected about {expected}");
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! Rules of what one makes of the others: the partner, the child, and what they hold.
+
+use super::*;
+use crate::helpers::HelperInfo;
+use crate::partners::partner_grants;
+use crate::test_support::identity;
+use chaic_core::briefing::{Companion, Relation};
+use chaic_core::geom::Pose;
+use chaic_core::observation::OtherEnd;
+use chaic_core::{AgentId, Frame, Vec2, Vec3};
+
+fn pose(x: f32, z: f32) -> Pose {
+    Pose { position: Vec3::new(x, 0.0, z), yaw_rad: 0.0 }
+}
+
+#[test]
+fn what_is_between_somebodys_hands_is_held_or_like_any_object() {
+    for sees_holding in [true, false] {
+        let mut toy = Toy::room(8.0, 8.0);
+        let apple = toy.add(ToyObject::new("apple", [0.0, 1.0, -2.5], [0.2, 0.2, 0.2]));
+        toy.stand([0.0, 0.0], 0.0);
+        let briefing = toy.briefing();
+        let mut memory = Memory::new(&briefing, PlannerRules { sees_holding, ..PAPER });
+        let mut observation = toy.observe();
+        observation.granted.poses = vec![(AgentId::PARTNER, pose(0.0, -2.9))];
+        memory.update(&briefing, &observation, &GroundTruthIds.perceive(&observation));
+        let seen = memory.things.get(apple).expect("seen");
+        assert_eq!(seen.is_available(toy.frame), !sees_holding);
+    }
+}
+
+#[test]
+fn what_the_other_holds_is_told_to_everybody_or_to_the_oracle_alone() {
+    for knows_holding in [false, true] {
+        let rules = PlannerRules { knows_holding, ..PAPER };
+        assert_eq!(partner_grants(rules).behavior, knows_holding);
+        let grants = |name: &str| (HelperInfo::named(name).expect("it is built in").grants)(rules);
+        for helper in ["random", "rhp", "follow"] {
+            assert_eq!(grants(helper).behavior, knows_holding, "{helper}");
+        }
+        assert!(grants("oracle").behavior);
+    }
+}
+
+#[test]
+fn what_one_is_told_the_other_holds_is_left_alone_for_as_long_as_the_rules_say() {
+    for held_frames in [PAPER.held_frames, PlannerRules::compat().held_frames] {
+        let rules = PlannerRules { held_frames, ..PAPER };
+        let (mut memory, briefing, apple) = memory_of("apple", rules);
+        let mut observation = Toy::room(8.0, 8.0).observe();
+        observation.images = Default::default();
+        observation.frame = 10;
+        observation.granted.partner_hands =
+            Some([Some(identity("apple", apple.0 as u16, &[])), None]);
+        memory.update(&briefing, &observation, &GroundTruthIds.perceive(&observation));
+        let thing = memory.things.get(apple).expect("seen");
+        let until = 10 + held_frames;
+        assert!(!thing.is_available(until - 1) && thing.is_available(until));
+    }
+}
+
+#[test]
+fn lifting_together_is_a_plan_or_just_happens() {
+    let piano = Plan::LiftWith(subject("piano", 30));
+    for (lifts_together, expected) in [(true, piano), (false, Plan::Explore)] {
+        let mut s = Situated::new(PlannerRules { lifts_together, ..PAPER });
+        s.valid.push(piano);
+        assert_eq!(s.choose_as(RuleProfile::RHP), expected);
+    }
+}
+
+/// A helper who looks after a child and its guardian.
+fn minder(rules: PlannerRules) -> Situated {
+    let mut s = Situated::new(rules);
+    s.briefing.companions.push(Companion { agent: AgentId::CHILD, relation: Relation::Child });
+    s
+}
+
+/// Guardian and child are seen, far from each other; the child is beside the helper.
+fn see_both(s: &mut Situated, frame: Frame) {
+    see_apart(s, frame, 9.5);
+}
+
+/// Guardian and child are seen so far apart; the child is beside the helper.
+fn see_apart(s: &mut Situated, frame: Frame, apart_m: f32) {
+    let mut observation = Toy::room(4.0, 4.0).observe();
+    observation.images = Default::default();
+    observation.frame = frame;
+    observation.granted.poses =
+        vec![(AgentId::PARTNER, pose(0.0, apart_m - 1.5)), (AgentId::CHILD, pose(0.0, -1.5))];
+    s.memory.update(&s.briefing, &observation, &GroundTruthIds.perceive(&observation));
+}
+
+#[test]
+fn a_child_unseen_for_long_is_looked_for() {
+    for child_unseen_frames in
+        [PAPER.child_unseen_frames, PlannerRules::compat().child_unseen_frames]
+    {
+        let mut s = minder(PlannerRules { child_unseen_frames, ..PAPER });
+        let chosen = [0, 1].map(|late| {
+            s.memory.frame = child_unseen_frames + late;
+            s.choose_as(RuleProfile::RHP)
+        });
+        assert_eq!(chosen, [Plan::Explore, Plan::TurnAround]);
+    }
+}
+
+#[test]
+fn a_child_that_one_stood_beside_is_trusted_to_come_back_or_not() {
+    for (trusts_child, expected) in [(true, Plan::Explore), (false, Plan::FollowChild)] {
+        let mut s = minder(PlannerRules { trusts_child, looks_around_first: false, ..PAPER });
+        let mut rhp = RulePolicy::new(RuleProfile::RHP);
+        let chosen = [100, 140].map(|frame| {
+            see_both(&mut s, frame);
+            s.ask_of(&mut rhp, |rules, context| rules.decide(context, &s.valid))
+        });
+        assert_eq!(chosen, [Plan::FollowChild, expected]);
+    }
+}
+
+#[test]
+fn one_stays_with_the_child_for_a_moment_or_for_as_long_as_it_is_there() {
+    for trusts_child in [true, false] {
+        let mut s = minder(PlannerRules { trusts_child, ..PAPER });
+        let mut executor = Executor::new(&s.briefing);
+        see_both(&mut s, 100);
+        let first = s.begin(&mut executor, Plan::FollowChild);
+        assert!(matches!(first, Progress::Act(_)), "{first:?}");
+        see_both(&mut s, 140);
+        let then = s.go_on(&mut executor, Plan::FollowChild);
+        assert_eq!(then == Progress::Done, trusts_child, "{then:?}");
+        assert_eq!(matches!(then, Progress::Act(_)), !trusts_child, "{then:?}");
+    }
+}
+
+#[test]
+fn who_does_not_trust_the_child_leaves_it_a_while_after_it_was_last_away() {
+    let mut s = minder(PlannerRules { trusts_child: false, ..PAPER });
+    let mut executor = Executor::new(&s.briefing);
+    let mut at = |frame, apart_m| {
+        see_apart(&mut s, frame, apart_m);
+        match frame {
+            100 => s.begin(&mut executor, Plan::FollowChild),
+            _ => s.go_on(&mut executor, Plan::FollowChild),
+        }
+    };
+    for (frame, apart_m) in [(100, 9.5), (390, 9.5), (400, 1.0), (690, 1.0)] {
+        let progress = at(frame, apart_m);
+        assert!(matches!(progress, Progress::Act(_)), "{frame}: {progress:?}");
+    }
+    assert_eq!(at(691, 1.0), Progress::Failed, "300 frames after 390");
+}
+
+#[test]
+fn a_turn_around_ends_when_both_are_found_or_goes_on() {
+    for (stops_turning_when_found, n) in [(false, PAPER.around_turns), (true, 0)] {
+        let mut s = minder(PlannerRules { stops_turning_when_found, ..PAPER });
+        see_both(&mut s, 100);
+        assert_eq!(s.n_turns_around(), n);
+    }
+}
+
+#[test]
+fn a_child_that_is_away_is_followed_by_who_minds_it_and_by_nobody_else() {
+    for (minds_child, expected) in [(true, Plan::FollowChild), (false, Plan::Explore)] {
+        let mut s = minder(PlannerRules { minds_child, looks_around_first: false, ..PAPER });
+        see_both(&mut s, 100);
+        assert_eq!(s.choose_as(RuleProfile::RHP), expected);
+        // The partner's rules have none for the child in any case.
+        assert_eq!(s.choose_as(RuleProfile::PARTNER), Plan::Explore);
+    }
+}
+
+#[test]
+fn who_carries_along_is_not_in_the_leaders_way() {
+    for walking in [Walking::Careful, Walking::Lattice] {
+        let cost_there = |leads: bool| {
+            let mut s = Situated::new(PlannerRules { walking, ..PAPER });
+            let mut observation = Toy::room(4.0, 4.0).observe();
+            observation.images = Default::default();
+            observation.granted.poses = vec![(AgentId::PARTNER, pose(0.0, -1.2))];
+            observation.own.other_end = leads.then_some(OtherEnd {
+                agent: AgentId::PARTNER,
+                position_in_body: Vec3::new(0.0, 0.0, -1.2),
+            });
+            s.memory.update(&s.briefing, &observation, &GroundTruthIds.perceive(&observation));
+            s.memory.refresh();
+            let cell = s.memory.map.grid().cell_at(Vec2::new(0.0, -1.2)).expect("inside");
+            s.memory.costs().cost(cell)
+        };
+        assert!(cost_there(false) > cost_there(true), "{walking:?}");
+    }
+}

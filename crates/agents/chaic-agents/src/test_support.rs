@@ -1,0 +1,509 @@
+//! A toy world for tests: boxes in a room, a tiny ray caster, and one body that walks, picks up
+//! and puts down without ever failing by chance.
+
+use chaic_core::briefing::{Companion, Goal, Motion, Relation};
+use chaic_core::capability::Persona;
+use chaic_core::geom::{Camera, Pose, Rect, forward, wrap_angle, xz, yaw_rotation};
+use chaic_core::observation::{Granted, Grants, Held, Identity, Images, SelfState};
+use chaic_core::{
+    Action, Agent, AgentId, Briefing, ClassId, EntityId, FailureReason, Frame, Hand, Observation,
+    Outcome, Role, Target, Vec2, Vec3,
+};
+
+use crate::execution::navigate::step_m;
+use crate::mapping::grid::Grid;
+use crate::mapping::occupancy::{OccupancyMap, Space};
+use crate::mapping::{People, SemanticMap};
+use crate::memory::Memory;
+use crate::perception::{GroundTruthIds, Perception as _};
+use crate::planning::cost_model::Seen;
+use crate::planning::costs::CostMap;
+use crate::track::{Carried, Hands, TrackId};
+
+/// How the body moves and reaches: as by the world's rules of the paper.
+pub const MOTION: Motion = Motion {
+    turn_rad: std::f32::consts::PI / 12.0,
+    stride_m: 0.4,
+    step_over_m: 0.12,
+    arm_reach_m: 0.7,
+    reach_limit_m: 2.0,
+};
+
+/// A thing of the toy world: an upright box of a class.
+pub struct ToyObject {
+    class: ClassId,
+    low: Vec3,
+    high: Vec3,
+}
+
+impl ToyObject {
+    /// `at` is the middle of its bottom; `size` its extents.
+    pub fn new(class: &str, at: [f32; 3], size: [f32; 3]) -> ToyObject {
+        let (at, half) = (Vec3::from(at), 0.5 * Vec3::new(size[0], 0.0, size[2]));
+        ToyObject {
+            class: ClassId::named(class),
+            low: at - half,
+            high: at + half + Vec3::new(0.0, size[1], 0.0),
+        }
+    }
+}
+
+struct ToyBox {
+    entity: EntityId,
+    low: Vec3,
+    high: Vec3,
+}
+
+impl ToyBox {
+    /// Depth at which the ray enters it.
+    fn hit(&self, eye: Vec3, direction: Vec3) -> Option<f32> {
+        let inverse = direction.recip();
+        let (a, b) = ((self.low - eye) * inverse, (self.high - eye) * inverse);
+        let enter = a.min(b).max_element();
+        let leave = a.max(b).min_element();
+        (enter <= leave && enter > 0.0).then_some(enter)
+    }
+
+    fn distance_from(&self, p: Vec2) -> f32 {
+        p.distance(p.clamp(xz(self.low), xz(self.high)))
+    }
+}
+
+/// A room with things in it and one body.
+pub struct Toy {
+    room: Rect,
+    solids: Vec<ToyBox>,
+    classes: Vec<Option<ClassId>>,
+    pose: Pose,
+    pub frame: Frame,
+    hands: [Option<Identity>; 2],
+    pub grants_ids: bool,
+    pub delivered: Vec<TrackId>,
+    last: Option<(Action, Outcome)>,
+    pub size: u32,
+    pub radius_m: f32,
+    pub n_blocked: u32,
+}
+
+impl Toy {
+    /// An empty room around the origin, `width` along x, `depth` along z.
+    pub fn room(width: f32, depth: f32) -> Toy {
+        let (w, d) = (0.5 * width, 0.5 * depth);
+        let room = Rect::new([-w, -d], [w, d]);
+        let mut toy = Toy {
+            room,
+            solids: Vec::new(),
+            classes: vec![None; 16],
+            pose: Pose::default(),
+            frame: 0,
+            hands: [None, None],
+            grants_ids: true,
+            delivered: Vec::new(),
+            last: None,
+            size: 128,
+            radius_m: 0.2,
+            n_blocked: 0,
+        };
+        toy.classes[8] = ClassId::by_name("person");
+        toy.classes[9] = ClassId::by_name("person");
+        toy.add_wall([-w - 0.1, -d - 0.1], [w + 0.1, -d]);
+        toy.add_wall([-w - 0.1, d], [w + 0.1, d + 0.1]);
+        toy.add_wall([-w - 0.1, -d], [-w, d]);
+        toy.add_wall([w, -d], [w + 0.1, d]);
+        toy
+    }
+
+    pub fn bounds(&self) -> Rect {
+        self.room
+    }
+
+    pub fn pixels(&self) -> u32 {
+        self.size * self.size
+    }
+
+    pub fn add_wall(&mut self, low: [f32; 2], high: [f32; 2]) {
+        self.solids.push(ToyBox {
+            entity: EntityId::WALL,
+            low: Vec3::new(low[0], 0.0, low[1]),
+            high: Vec3::new(high[0], 2.8, high[1]),
+        });
+    }
+
+    /// Adds a thing; minds with perfect perception know it by the track that is returned.
+    pub fn add(&mut self, object: ToyObject) -> TrackId {
+        let entity = EntityId(self.classes.len() as u16);
+        self.classes.push(Some(object.class));
+        self.solids.push(ToyBox { entity, low: object.low, high: object.high });
+        entity.into()
+    }
+
+    /// Somebody who stands there.
+    pub fn add_person(&mut self, agent: AgentId, at: [f32; 2]) -> TrackId {
+        let entity = EntityId::of_agent(agent);
+        let (low, high) = (Vec3::new(-0.2, 0.0, -0.2), Vec3::new(0.2, 1.7, 0.2));
+        let at = Vec3::new(at[0], 0.0, at[1]);
+        self.solids.push(ToyBox { entity, low: at + low, high: at + high });
+        entity.into()
+    }
+
+    /// Whether everything is at least so far from a point.
+    pub fn is_clear(&self, p: Vec2, least_m: f32) -> bool {
+        self.solids.iter().all(|s| s.distance_from(p) >= least_m)
+    }
+
+    pub fn remove(&mut self, track: TrackId) {
+        let entity = EntityId(track.0 as u16);
+        self.solids.retain(|s| s.entity != entity);
+    }
+
+    pub fn stand(&mut self, at: [f32; 2], yaw_rad: f32) {
+        self.pose = Pose { position: Vec3::new(at[0], 0.0, at[1]), yaw_rad };
+    }
+
+    pub fn here(&self) -> Vec2 {
+        xz(self.pose.position)
+    }
+
+    pub fn class(&self, track: TrackId) -> ClassId {
+        self.classes[track.0 as usize].expect("an object has a class")
+    }
+
+    /// Puts something into a hand, without taking it out of the picture.
+    pub fn hold(&mut self, hand: usize, track: TrackId) {
+        let (entity, class) = (EntityId(track.0 as u16), self.class(track));
+        self.hands[hand] = Some(Identity { entity, class, contents: Vec::new() });
+    }
+
+    pub fn briefing(&self) -> Briefing {
+        let classes = |names: &[&str]| names.iter().map(|n| ClassId::named(n)).collect();
+        Briefing {
+            me: AgentId::HELPER,
+            capability: Persona::Helper.capability(),
+            motion: MOTION,
+            companions: vec![Companion { agent: AgentId::PARTNER, relation: Relation::Partner }],
+            seed: 1,
+            horizon: 3000,
+            bounds: self.room,
+            possible_targets: classes(&["apple", "banana", "orange"]),
+            containers: classes(&["wicker_basket"]),
+            obstacles: classes(&["trashbin"]),
+            goal_places: vec![ClassId::named("bed")],
+            goal_place_min_top_m: 0.0,
+            container_capacity: 3,
+            grants: Grants::IDS,
+            goal: None,
+            told: None,
+        }
+    }
+
+    pub fn goal(wanted: &[(&str, u32)]) -> Option<Goal> {
+        Some(Goal { targets: wanted.iter().map(|(c, n)| (ClassId::named(c), *n)).collect() })
+    }
+
+    pub fn observe(&self) -> Observation {
+        let camera = Camera {
+            eye_in_world: self.pose.position + Vec3::new(0.0, 1.65, 0.0),
+            world_from_camera: yaw_rotation(self.pose.yaw_rad),
+            vertical_fov_rad: Camera::EYE_FOV_RAD,
+            width: self.size,
+            height: self.size,
+        };
+        let n = self.pixels() as usize;
+        let (mut depth, mut ids) = (Vec::with_capacity(n), Vec::with_capacity(n));
+        for row in 0..self.size {
+            for column in 0..self.size {
+                let direction = camera.unproject(column, row, 1.0) - camera.eye_in_world;
+                let (d, id) = self.cast(camera.eye_in_world, direction);
+                depth.push(d);
+                ids.push(id.0);
+            }
+        }
+        let is_joint = matches!(&self.hands, [Some(l), Some(r)] if l.entity == r.entity);
+        let felt = |it: &Identity| Held {
+            n_contents: it.contents.len() as u32,
+            in_both_hands: is_joint,
+            identity: self.grants_ids.then(|| it.clone()),
+        };
+        let hands = [0, 1].map(|k| self.hands[k].as_ref().map(felt));
+        let in_view = |e: &EntityId| ids.contains(&e.0);
+        let all = (0..self.classes.len()).map(|i| EntityId(i as u16));
+        let class = |e: EntityId| Some((e, self.classes[usize::from(e.0)]?));
+        let granted = Granted {
+            classes: all.filter(in_view).filter_map(class).collect(),
+            delivered: self.delivered.iter().filter_map(|t| class(EntityId(t.0 as u16))).collect(),
+            ..Granted::default()
+        };
+        Observation {
+            frame: self.frame,
+            own: SelfState { pose: self.pose, hands, last: self.last, other_end: None },
+            camera,
+            images: Images { rgb: None, depth_m: Some(depth), ids: Some(ids) },
+            film: Vec::new(),
+            granted,
+        }
+    }
+
+    /// What an action names: an entity, or what a pixel of the present view shows.
+    fn resolve(&self, target: Target) -> EntityId {
+        let ids = || self.observe().images.ids.expect("a toy always shows ids");
+        match target {
+            Target::Entity(entity) => entity,
+            Target::Pixel { column, row } => EntityId(ids()[(row * self.size + column) as usize]),
+        }
+    }
+
+    fn cast(&self, eye: Vec3, direction: Vec3) -> (f32, EntityId) {
+        let mut best = (Camera::FAR_M, EntityId::NOTHING);
+        if direction.y < 0.0 {
+            best = (-eye.y / direction.y, EntityId::FLOOR);
+        }
+        for solid in &self.solids {
+            if let Some(d) = solid.hit(eye, direction)
+                && d < best.0
+            {
+                best = (d, solid.entity);
+            }
+        }
+        best
+    }
+
+    fn is_free(&self, p: Vec2) -> bool {
+        self.solids.iter().all(|s| {
+            let is_small =
+                s.entity.is_object() && self.class(s.entity.into()).info().is_carriable();
+            is_small || s.high.y < 0.12 || s.distance_from(p) >= self.radius_m
+        })
+    }
+
+    /// Walks `way`, sliding along what is in the way; how far it got.
+    fn walk(&mut self, way: Vec2) -> f32 {
+        let start = self.here();
+        for _ in 0..10 {
+            let (here, step) = (self.here(), 0.1 * way);
+            let slides = [step, Vec2::new(step.x, 0.0), Vec2::new(0.0, step.y)];
+            if let Some(s) = slides.iter().find(|s| self.is_free(here + **s)) {
+                self.pose.position += Vec3::new(s.x, 0.0, s.y);
+            }
+        }
+        self.here().distance(start)
+    }
+
+    /// Steps up to a thing; whether the arm reaches it.
+    fn step_up(&mut self, entity: EntityId) -> Result<(), FailureReason> {
+        let solid = |t: &Toy| t.solids.iter().position(|s| s.entity == entity);
+        let i = solid(self).ok_or(FailureReason::OutOfReach)?;
+        let target = 0.5 * (xz(self.solids[i].low) + xz(self.solids[i].high));
+        let half = 0.5 * xz(self.solids[i].high - self.solids[i].low).max_element();
+        if self.here().distance(target) > 3.0 + half {
+            return Err(FailureReason::OutOfReach);
+        }
+        for _ in 0..60 {
+            if self.solids[i].distance_from(self.here()) <= MOTION.arm_reach_m {
+                return Ok(());
+            }
+            let ahead = (target - self.here()).normalize_or_zero();
+            if !self.is_free(self.here() + 0.05 * ahead) {
+                return Err(FailureReason::Blocked);
+            }
+            self.pose.position += 0.05 * Vec3::new(ahead.x, 0.0, ahead.y);
+        }
+        Err(FailureReason::Blocked)
+    }
+
+    pub fn apply(&mut self, action: Action) -> Outcome {
+        let (frames, result) = match action {
+            Action::TurnLeft => (2, self.turn(1.0)),
+            Action::TurnRight => (2, self.turn(-1.0)),
+            Action::Wait { frames } => (frames.max(1), Ok(())),
+            Action::MoveForward => {
+                let got = self.walk(step_m(&MOTION) * xz(forward(self.pose.yaw_rad)));
+                self.n_blocked += u32::from(got < 0.1);
+                (10, if got < 0.1 { Err(FailureReason::Blocked) } else { Ok(()) })
+            }
+            Action::PickUp { object, hand } => (40, self.pick_up(self.resolve(object), hand)),
+            Action::RemoveObstacle { obstacle, .. } => {
+                let obstacle = self.resolve(obstacle);
+                let result = self.step_up(obstacle);
+                if result.is_ok() {
+                    self.remove(obstacle.into());
+                }
+                (60, result)
+            }
+            Action::PutIn => (20, self.put_in()),
+            Action::PutOn { place, hand } => (40, self.put_on(self.resolve(place), hand)),
+        };
+        self.frame += frames;
+        let outcome = result.map_or_else(Outcome::Failure, |()| Outcome::Success);
+        self.last = Some((action, outcome));
+        outcome
+    }
+
+    fn turn(&mut self, sign: f32) -> Result<(), FailureReason> {
+        self.pose.yaw_rad = wrap_angle(self.pose.yaw_rad + sign * MOTION.turn_rad);
+        Ok(())
+    }
+
+    fn pick_up(&mut self, object: EntityId, hand: Hand) -> Result<(), FailureReason> {
+        let class = self.class(object.into());
+        if let Some(bike) = self.hands[0].as_ref().filter(|h| h.class.name() == "bike") {
+            if bike.contents.len() >= 3 {
+                return Err(FailureReason::Full);
+            }
+        } else if self.hands[hand.index()].is_some() {
+            return Err(FailureReason::HandFull);
+        }
+        self.step_up(object)?;
+        self.remove(object.into());
+        match self.hands[0].as_mut().filter(|h| h.class.name() == "bike") {
+            Some(bike) => bike.contents.push((object, class)),
+            None if class.info().role == Role::HeavyTarget => {
+                self.hold(0, object.into());
+                self.hold(1, object.into());
+            }
+            None => self.hold(hand.index(), object.into()),
+        }
+        Ok(())
+    }
+
+    fn put_in(&mut self) -> Result<(), FailureReason> {
+        let container = |h: &Option<Identity>| {
+            h.as_ref()
+                .is_some_and(|h| h.class.info().role == Role::Container && h.contents.len() < 3)
+        };
+        let i = self.hands.iter().position(container);
+        let i = i.ok_or(FailureReason::NotContainerAndTarget)?;
+        let held = self.hands[1 - i].take().ok_or(FailureReason::NotContainerAndTarget)?;
+        let container = self.hands[i].as_mut().expect("just found");
+        container.contents.push((held.entity, held.class));
+        Ok(())
+    }
+
+    fn put_on(&mut self, place: EntityId, hand: Hand) -> Result<(), FailureReason> {
+        if self.hands[hand.index()].is_none() {
+            return Err(FailureReason::HandEmpty);
+        }
+        self.step_up(place)?;
+        if let Some(bike) = self.hands[0].as_mut().filter(|h| h.class.name() == "bike") {
+            self.delivered.extend(bike.contents.drain(..).map(|(e, _)| TrackId::from(e)));
+            return Ok(());
+        }
+        let held = self.hands[hand.index()].take().expect("just looked");
+        if held.class.info().role == Role::HeavyTarget {
+            self.hands = [None, None];
+        }
+        self.delivered.push(held.entity.into());
+        self.delivered.extend(held.contents.iter().map(|(e, _)| TrackId::from(*e)));
+        Ok(())
+    }
+
+    /// Lets a mind live in this world until `horizon`; its plans, each once per change.
+    pub fn live(&mut self, mind: &mut dyn Agent, briefing: &Briefing) -> Vec<String> {
+        mind.reset(briefing);
+        let mut plans = Vec::new();
+        while self.frame < briefing.horizon {
+            let action = mind.act(&self.observe()).expect("rules decide");
+            let plan = mind.thought().plan;
+            if plans.last() != Some(&plan) {
+                plans.push(plan);
+            }
+            self.apply(action);
+            if let Some(goal) = &briefing.goal
+                && self.delivered.iter().filter(|e| goal.wanted(self.class(**e)) > 0).count()
+                    >= goal.total() as usize
+            {
+                break;
+            }
+        }
+        plans
+    }
+}
+
+/// A toy world and a memory of it, for tests of single parts.
+pub struct ToyRun {
+    pub toy: Toy,
+    briefing: Briefing,
+    memory: Option<Memory>,
+}
+
+impl ToyRun {
+    pub fn new(toy: Toy) -> ToyRun {
+        let briefing = toy.briefing();
+        ToyRun { toy, memory: Some(Memory::new(&briefing, crate::PlannerRules::paper())), briefing }
+    }
+
+    /// The memory after another look.
+    pub fn look(&mut self) -> Memory {
+        let observation = self.toy.observe();
+        let percepts = GroundTruthIds.perceive(&observation);
+        let mut memory = self.memory.take().expect("given back after each look");
+        memory.update(&self.briefing, &observation, &percepts);
+        memory
+    }
+
+    pub fn keep(&mut self, memory: Memory) {
+        self.memory = Some(memory);
+    }
+
+    pub fn act(&mut self, action: crate::Intent, memory: Memory) {
+        self.keep(memory);
+        let target = |track| GroundTruthIds.target(track);
+        self.toy.apply(crate::track::named(action, target).expect("everything has a name"));
+    }
+}
+
+/// Something in a hand, with contents numbered from 90.
+pub fn identity(class: &str, entity: u16, contents: &[&str]) -> Identity {
+    let contents = contents.iter().zip(90..);
+    Identity {
+        entity: EntityId(entity),
+        class: ClassId::named(class),
+        contents: contents.map(|(c, e)| (EntityId(e), ClassId::named(c))).collect(),
+    }
+}
+
+/// The same as a mind knows it.
+pub fn carried(class: &str, track: u16, contents: &[&str]) -> Carried {
+    let it = identity(class, track, contents);
+    Carried {
+        what: Some((it.entity.into(), it.class)),
+        n_contents: it.contents.len() as u32,
+        contents: it.contents.into_iter().map(|(e, class)| (e.into(), class)).collect(),
+    }
+}
+
+/// Hands that hold these.
+pub fn hands(hands: [Option<Carried>; 2]) -> Hands {
+    Hands { hands, is_joint: false }
+}
+
+/// A drawn plan: `.` free, `#` wall, `?` unknown.
+pub struct Plan2d {
+    grid: Grid,
+    spaces: Vec<Space>,
+}
+
+impl Plan2d {
+    pub fn parse(text: &str) -> Plan2d {
+        let rows: Vec<&str> = text.lines().map(str::trim).collect();
+        let spaces: Vec<Space> = rows
+            .iter()
+            .flat_map(|row| row.chars())
+            .map(|c| match c {
+                '.' => Space::Free,
+                '#' => Space::Wall,
+                _ => Space::Unknown,
+            })
+            .collect();
+        Plan2d { grid: Grid::of_cells(rows[0].len(), rows.len()), spaces }
+    }
+
+    pub fn costs(&self, radius_m: f32) -> CostMap {
+        let map = OccupancyMap::of_spaces(self.grid, &self.spaces);
+        let mut costs = CostMap::new(self.grid, radius_m);
+        let (things, people) = (SemanticMap::default(), People::default());
+        let (here, now) = (Vec2::splat(1e6), 0);
+        let seen = Seen { map: &map, things: &things, people: &people, berth: None, here, now };
+        costs.rebuild(&seen);
+        costs
+    }
+}

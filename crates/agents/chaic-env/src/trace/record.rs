@@ -1,0 +1,198 @@
+//! One line of a trace.
+
+use std::fmt;
+
+use chaic_core::agent::{ChildState, Thought};
+use chaic_core::{Action, AgentId, ClassId, Frame, ResolvedAction};
+use chaic_world::{Event, EventKind, World};
+use serde::de::{Error as _, SeqAccess, Visitor};
+use serde::ser::SerializeTuple as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use crate::digest::Digest;
+
+/// Something that happened.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Record {
+    /// An agent decided.
+    Decision(Decision),
+    /// The child does something else from its decision before this on.
+    Child(ChildRecord),
+    /// The world tells.
+    Event(TraceEvent),
+    /// The episode is over.
+    End(End),
+}
+
+/// An agent's decision. Written as `[frame, agent, action, digest]`, with the thought as a fifth
+/// entry where it differs from this agent's last one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Decision {
+    /// When.
+    pub frame: Frame,
+    /// Who.
+    pub agent: AgentId,
+    /// What, its target resolved to an entity.
+    pub action: ResolvedAction,
+    /// Digest of the world's state right before the action was submitted.
+    pub digest: Digest,
+    /// What it thought, if that changed.
+    pub thought: Option<Thought>,
+}
+
+/// What the child has decided to do. Its mind says so, not the world: a trace that is played again
+/// takes it over as it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChildRecord {
+    /// When.
+    pub frame: Frame,
+    /// What it does from now on.
+    pub state: ChildState,
+}
+
+/// An event, with what metrics need to know of its object.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TraceEvent {
+    /// The event.
+    #[serde(flatten)]
+    pub event: Event,
+    /// Class of what was delivered.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub class: Option<ClassId>,
+}
+
+/// How the episode ended.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct End {
+    /// Frames that passed.
+    pub frame: Frame,
+    /// What is done of what was wanted: objects, or kilograms when moving house.
+    pub done: f64,
+    /// All that was wanted.
+    pub total: f64,
+    /// Whether everything wanted was delivered.
+    pub complete: bool,
+    /// Frames in which the child was away.
+    pub away_frames: u32,
+    /// Frames in which the partner or the helper had made no progress for 200 frames.
+    pub stuck_frames: u32,
+    /// Digest of the last state.
+    pub digest: Digest,
+}
+
+/// Whether a trace keeps an event. What began follows from the decisions, and so does a step,
+/// turn or wait that ended well.
+pub fn is_recorded(event: &Event) -> bool {
+    match &event.kind {
+        EventKind::Began { .. } => false,
+        EventKind::Ended { action, outcome, .. } => {
+            !outcome.is_success() || action.subject().is_some() || *action == Action::PutIn
+        }
+        _ => true,
+    }
+}
+
+impl TraceEvent {
+    /// The event as a trace of this world has it.
+    pub fn new(event: Event, world: &World) -> TraceEvent {
+        let class = match event.kind {
+            EventKind::Delivered { object, .. } => world.setup().thing(object).map(|t| t.class),
+            _ => None,
+        };
+        TraceEvent { event, class }
+    }
+}
+
+impl End {
+    /// The end of an episode as the world stands.
+    pub fn of(world: &World) -> End {
+        let (done, total) = world.progress();
+        End {
+            frame: world.state().frame,
+            done,
+            total,
+            complete: world.is_complete(),
+            away_frames: world.state().child_away_frames,
+            stuck_frames: world.state().stuck_frames,
+            digest: Digest(world.digest()),
+        }
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+struct EndLine {
+    end: End,
+}
+
+#[derive(Serialize, Deserialize)]
+struct ChildLine {
+    child: ChildRecord,
+}
+
+impl Record {
+    /// The line without its line break.
+    pub fn to_line(&self) -> String {
+        let text = match self {
+            Record::Decision(decision) => serde_json::to_string(decision),
+            Record::Child(child) => serde_json::to_string(&ChildLine { child: *child }),
+            Record::Event(event) => serde_json::to_string(event),
+            Record::End(end) => serde_json::to_string(&EndLine { end: end.clone() }),
+        };
+        text.expect("records have string keys and finite numbers")
+    }
+
+    /// Reads a line.
+    pub fn from_line(line: &str) -> Result<Record, serde_json::Error> {
+        if line.starts_with('[') {
+            return serde_json::from_str(line).map(Record::Decision);
+        }
+        if line.starts_with("{\"end\"") {
+            return serde_json::from_str(line).map(|l: EndLine| Record::End(l.end));
+        }
+        if line.starts_with("{\"child\"") {
+            return serde_json::from_str(line).map(|l: ChildLine| Record::Child(l.child));
+        }
+        serde_json::from_str(line).map(Record::Event)
+    }
+}
+
+impl Serialize for Decision {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut tuple = serializer.serialize_tuple(4 + usize::from(self.thought.is_some()))?;
+        tuple.serialize_element(&self.frame)?;
+        tuple.serialize_element(&self.agent)?;
+        tuple.serialize_element(&self.action)?;
+        tuple.serialize_element(&self.digest)?;
+        if let Some(thought) = &self.thought {
+            tuple.serialize_element(thought)?;
+        }
+        tuple.end()
+    }
+}
+
+impl<'de> Deserialize<'de> for Decision {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Decision, D::Error> {
+        struct Entries;
+        impl<'de> Visitor<'de> for Entries {
+            type Value = Decision;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("[frame, agent, action, digest] or the same with a thought")
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Decision, A::Error> {
+                let missing = |name| A::Error::custom(format!("the {name} is missing"));
+                Ok(Decision {
+                    frame: seq.next_element()?.ok_or_else(|| missing("frame"))?,
+                    agent: seq.next_element()?.ok_or_else(|| missing("agent"))?,
+                    action: seq.next_element()?.ok_or_else(|| missing("action"))?,
+                    digest: seq.next_element()?.ok_or_else(|| missing("digest"))?,
+                    thought: seq.next_element()?,
+                })
+            }
+        }
+        deserializer.deserialize_seq(Entries)
+    }
+}

@@ -1,0 +1,352 @@
+//! PromptContext from a mind's memory.
+
+use chaic_agents::behavior::SeenInteraction;
+use chaic_agents::decision::{Context, Plan};
+use chaic_agents::mapping::Thing;
+use chaic_agents::memory::Memory;
+use chaic_agents::track::Carried;
+use chaic_agents::{Intent, TrackId};
+use chaic_core::briefing::Relation;
+use chaic_core::capability::{Capability, Gait, Impairments, PersonKind, Persona};
+use chaic_core::geom::{horizontal_distance, xz};
+use chaic_core::{Action, AgentId, ClassId, Frame, Outcome, Role};
+
+use super::hands::put_away;
+use super::{
+    Body, Count, GoalPlace, Interaction, Length, Map, Other, Own, PlanFacts, ProgressFacts,
+    PromptContext, ThingFacts, ToldFacts, plain, plan_text,
+};
+use crate::templates::Track;
+
+/// The child is away from its guardian beyond this, metres (docs/metrics.md, emergency rate).
+const AWAY_M: f32 = 3.5;
+/// Sightings older than this aren't compared, frames.
+const FRESH_FRAMES: Frame = 150;
+/// Goal places that are listed.
+const MAX_GOAL_PLACES: usize = 3;
+/// Walking as it is, turns included, takes longer than the way at full speed by this factor.
+const WALK_FACTOR: f32 = 1.5;
+
+impl PromptContext {
+    /// What a mind with this memory may say, and which of `plans` are listed: those of one kind
+    /// come nearest first.
+    pub fn of(
+        track: Track,
+        context: &Context<'_>,
+        plans: &[Plan],
+        last_plan: Option<Plan>,
+        images: usize,
+        length: Length,
+    ) -> (PromptContext, Vec<Plan>) {
+        let Context { briefing, memory, .. } = *context;
+        let listed = shorten(plans, length.plans_of_a_kind);
+        let labels = |classes: &[ClassId]| {
+            let mut names: Vec<String> = classes.iter().map(|c| plain(c.info().label)).collect();
+            names.dedup();
+            let mut seen = std::collections::BTreeSet::new();
+            names.retain(|n| seen.insert(n.clone()));
+            names
+        };
+        let speed = briefing.capability.speed_m_per_frame.max(1e-3);
+        let wanted = briefing.goal.iter().filter(|_| track == Track::Partner);
+        let facts = PromptContext {
+            track,
+            goal_place: labels(&briefing.goal_places).join(" or "),
+            targets: labels(&briefing.possible_targets),
+            containers: labels(&briefing.containers),
+            obstacles: labels(&briefing.obstacles),
+            capacity: briefing.container_capacity,
+            moving: briefing.possible_targets.iter().any(|c| c.info().role == Role::HeavyTarget),
+            child: briefing.companion(Relation::Child).is_some(),
+            helped: briefing.companion(Relation::Partner).is_some(),
+            images,
+            horizon: briefing.horizon,
+            frames_per_10_m: (10.0 / speed / 10.0).round() as u32 * 10,
+            me: body(&briefing.capability),
+            told: briefing.told.filter(|_| track == Track::Told).map(|told| ToldFacts {
+                task: told.task.name(),
+                partner: person(told.partner),
+                reach: reach(&told.partner.capability()),
+                strength_kg: told.partner.capability().strength_kg as u32,
+            }),
+            wanted: wanted
+                .flat_map(|goal| &goal.targets)
+                .map(|(class, n)| Count { name: plain(class.info().label), count: *n })
+                .collect(),
+            own: own(context, last_plan, length),
+            others: others(context, length),
+            progress: progress(context),
+            map: map(context, length),
+            plans: listed.iter().map(|p| plan_facts(memory, p)).collect(),
+            plans_left_out: plans.len() - listed.len(),
+        };
+        (facts, listed)
+    }
+}
+
+/// So many plans of each kind that is about an object: the nearest.
+pub(super) fn shorten(plans: &[Plan], of_a_kind: usize) -> Vec<Plan> {
+    let mut kept: Vec<Plan> = Vec::new();
+    for plan in plans {
+        let is_same = |p: &&Plan| std::mem::discriminant(*p) == std::mem::discriminant(plan);
+        if kept.iter().filter(is_same).count() < of_a_kind {
+            kept.push(*plan);
+        }
+    }
+    kept
+}
+
+pub(super) fn metres(x: f32) -> String {
+    let text = format!("{x:.1}");
+    if text == "-0.0" { "0.0".to_owned() } else { text }
+}
+
+fn named(track: TrackId, class: Option<ClassId>) -> String {
+    let label = class.map_or("something".to_owned(), |c| plain(c.info().label));
+    format!("{label} {track}")
+}
+
+pub(super) fn reach(capability: &Capability) -> Option<[String; 2]> {
+    let [low, high] = capability.pick_range_m;
+    let is_limited = capability.pick_range_m != Persona::Adult.capability().pick_range_m;
+    let height = |m: f32| format!("{m:.2}").trim_end_matches('0').trim_end_matches('.').to_owned();
+    is_limited.then(|| [height(low), height(high)])
+}
+
+pub(super) fn body(capability: &Capability) -> Body {
+    let height_m = capability.height_m;
+    let kind = match capability.gait {
+        Gait::Roll => "a person in a wheelchair".to_owned(),
+        Gait::WalkBike => "a person who walks a bicycle".to_owned(),
+        Gait::Walk => format!("a person of {height_m:.2} m"),
+    };
+    Body {
+        kind: impaired(kind, Impairments::seen_in(capability)),
+        reach: reach(capability),
+        strength_kg: capability.strength_kg as u32,
+        docks: capability.docking_frames > 0,
+        rolls: capability.gait == Gait::Roll,
+    }
+}
+
+pub(super) fn person(kind: PersonKind) -> String {
+    let PersonKind { persona, impairments } = kind;
+    let height_m = persona.capability().height_m;
+    let plainly = match persona {
+        Persona::Adult | Persona::Helper if impairments.is_empty() => {
+            "an adult without any constraint".to_owned()
+        }
+        Persona::Adult | Persona::Helper => "an adult".to_owned(),
+        Persona::Child => format!("a child of {height_m:.1} m who walks at half your speed"),
+        Persona::Wheelchair => "a person in a wheelchair".to_owned(),
+        Persona::Rider => {
+            "a person who walks a bicycle with a basket, at half your speed, with a child along"
+                .to_owned()
+        }
+        Persona::Frail => "a frail person".to_owned(),
+    };
+    impaired(plainly, impairments)
+}
+
+/// Somebody with what impairs it.
+fn impaired(who: String, impairments: Impairments) -> String {
+    let sentence = |text: String, about: &str| format!("{text} and who {about}");
+    let mut abouts = impairments.iter().map(|i| i.info().about);
+    let Some(first) = abouts.next() else { return who };
+    abouts.fold(format!("{who} who {first}"), sentence)
+}
+
+fn holding(held: &Carried) -> String {
+    let name = held.what.map_or("something".to_owned(), |(t, class)| named(t, Some(class)));
+    let mut inside: Vec<String> = held.contents.iter().map(|(t, c)| named(*t, Some(*c))).collect();
+    inside.resize(held.n_contents as usize, "something".to_owned());
+    let role = held.class().map(|class| class.info().role);
+    let is_holder = matches!(role, Some(Role::Container | Role::Vehicle));
+    match (is_holder, inside.is_empty()) {
+        (true, true) => format!("{name} with nothing in it"),
+        (true, false) => format!("{name} with {} in it", inside.join(", ")),
+        (false, _) => name,
+    }
+}
+
+fn own(context: &Context<'_>, last_plan: Option<Plan>, length: Length) -> Own {
+    let Context { memory, briefing, .. } = *context;
+    let (hands, usable) = (&memory.hands, briefing.capability.hands.all().iter());
+    let here = memory.here();
+    let interactions: Vec<Interaction> = memory
+        .history
+        .iter()
+        .zip(put_away(&memory.history, |track| memory.class_of(track)))
+        .map(|(done, put)| interaction(memory, done.frame, done.action, Some(done.outcome), put))
+        .collect();
+    let left_out = interactions.len().saturating_sub(length.interactions);
+    Own {
+        x: metres(here.x),
+        z: metres(here.y),
+        hands: hands.held().map(holding).collect(),
+        free_hands: usable.filter(|h| hands.hands[h.index()].is_none()).count(),
+        history: interactions[left_out..].to_vec(),
+        history_left_out: left_out,
+        plan: last_plan.map(|p| plan_text(&p)),
+    }
+}
+
+/// A interaction; `put` is what it put away, where that is known.
+fn interaction(
+    memory: &Memory,
+    frame: Frame,
+    action: Intent,
+    outcome: Option<Outcome>,
+    put: Option<TrackId>,
+) -> Interaction {
+    let name = |track| named(track, memory.class_of(track));
+    let put = put.map_or("something".to_owned(), name);
+    let what = match action {
+        Action::PickUp { object, .. } => format!("pick up {}", name(object)),
+        Action::PutOn { place, .. } => format!("put {put} on {}", name(place)),
+        Action::RemoveObstacle { obstacle, .. } => format!("clear away {}", name(obstacle)),
+        Action::PutIn => format!("put {put} into a container"),
+        Action::Wait { .. } => "wait".to_owned(),
+        Action::MoveForward | Action::TurnLeft | Action::TurnRight => "walk".to_owned(),
+    };
+    let outcome = outcome.map(|outcome| match outcome {
+        Outcome::Success => "done".to_owned(),
+        Outcome::Failure(reason) => format!("failed ({reason})"),
+    });
+    Interaction { frame, what, outcome }
+}
+
+fn others(context: &Context<'_>, length: Length) -> Vec<Other> {
+    let Context { briefing, memory, behavior, .. } = *context;
+    let partner = briefing.companion(Relation::Partner);
+    let guardian = partner.and_then(|p| memory.people.get(p));
+    let other = |companion: &chaic_core::briefing::Companion| {
+        let who = match (companion.relation, briefing.me) {
+            (Relation::Child, _) => "the child",
+            (Relation::Guardian, _) => "the child's guardian",
+            (Relation::Partner, AgentId::PARTNER) => "your helper",
+            (Relation::Partner, _) => "your partner",
+        };
+        let is_partner = Some(companion.agent) == partner;
+        let seen = memory.people.get(companion.agent);
+        let apart = seen.zip(guardian).filter(|(child, guardian)| {
+            let fresh = |f: Frame| f + FRESH_FRAMES > memory.frame;
+            companion.relation == Relation::Child && fresh(child.frame) && fresh(guardian.frame)
+        });
+        let apart = apart
+            .map(|(c, g)| horizontal_distance(c.position_in_world, g.position_in_world))
+            .filter(|m| *m > AWAY_M);
+        let took = |list: &[(TrackId, ClassId)]| -> Vec<String> {
+            let skip = list.len().saturating_sub(2 * length.interactions);
+            list[skip..].iter().map(|(e, c)| named(*e, Some(*c))).collect()
+        };
+        let is_told_by_taking = |seen: &&SeenInteraction| {
+            matches!(seen.action, Action::PickUp { object, .. } if seen.outcome == Some(Outcome::Success)
+                && behavior.partner_took.iter().any(|(e, _)| *e == object))
+        };
+        let actions: Vec<Interaction> = behavior
+            .actions
+            .iter()
+            .filter(|a| a.agent == companion.agent)
+            .filter(|a| !(is_partner && is_told_by_taking(a)))
+            .map(|a| interaction(memory, a.frame, a.action, a.outcome, None))
+            .collect();
+        let left_out = actions.len().saturating_sub(length.interactions);
+        let at = seen.map(|p| xz(p.position_in_world)).unwrap_or_default();
+        Other {
+            who,
+            seen: seen.is_some(),
+            in_view: seen.is_some_and(|p| p.is_in_view),
+            frames_ago: seen.map_or(0, |p| memory.frame.saturating_sub(p.frame)),
+            x: metres(at.x),
+            z: metres(at.y),
+            distance_m: metres(at.distance(memory.here())),
+            away_m: apart.map(metres),
+            took: if is_partner { took(&behavior.partner_took) } else { Vec::new() },
+            holds: if is_partner { took(&behavior.partner_holds) } else { Vec::new() },
+            actions: actions[left_out..].to_vec(),
+            actions_left_out: left_out,
+        }
+    };
+    briefing.companions.iter().map(other).collect()
+}
+
+fn progress(context: &Context<'_>) -> ProgressFacts {
+    let Context { briefing, memory, .. } = *context;
+    let speed = briefing.capability.speed_m_per_frame.max(1e-3);
+    let mut delivered: Vec<Count> = Vec::new();
+    for class in memory.delivered.iter().filter_map(|e| memory.class_of(*e)) {
+        let name = plain(class.info().label);
+        match delivered.iter_mut().find(|c| c.name == name) {
+            Some(count) => count.count += 1,
+            None => delivered.push(Count { name, count: 1 }),
+        }
+    }
+    let place = |(thing, way_m): &(&Thing, f32)| GoalPlace {
+        name: named(thing.track, Some(thing.class)),
+        x: metres(thing.position_in_world.x),
+        z: metres(thing.position_in_world.z),
+        way_m: metres(*way_m),
+        frames: (WALK_FACTOR * way_m / speed / 10.0).round() as u32 * 10,
+    };
+    let places = memory.goal_places();
+    ProgressFacts {
+        frame: memory.frame,
+        goal_places: places.iter().take(MAX_GOAL_PLACES).map(place).collect(),
+        delivered,
+    }
+}
+
+fn map(context: &Context<'_>, length: Length) -> Map {
+    let Context { briefing, memory, is_explored, .. } = *context;
+    let kind = |class: ClassId| match () {
+        () if briefing.possible_targets.contains(&class) => Some(None),
+        () if briefing.containers.contains(&class) => Some(Some("container")),
+        () if briefing.obstacles.contains(&class) => Some(Some("obstacle")),
+        () => None,
+    };
+    let here = memory.here();
+    let mut things: Vec<(f32, &Thing)> = memory
+        .things
+        .iter()
+        .filter(|t| t.is_present && !t.is_gone && kind(t.class).is_some())
+        .map(|t| (memory.way_to(t).unwrap_or_else(|| 2.0 * t.distance_from(here)), t))
+        .collect();
+    things.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let left_out = things.len().saturating_sub(length.things);
+    things.truncate(length.things);
+    let facts = |(_, thing): &(f32, &Thing)| {
+        let info = thing.class.info();
+        let note = if memory.frame < thing.held_until {
+            Some("in somebody's hands".to_owned())
+        } else if memory.frame < thing.ignore_until {
+            Some("you tried in vain lately".to_owned())
+        } else if info.role == Role::Fragile {
+            Some("fragile".to_owned())
+        } else if info.role == Role::HeavyTarget {
+            Some(format!("{} kg", info.mass_kg))
+        } else {
+            None
+        };
+        ThingFacts {
+            kind: kind(thing.class).flatten(),
+            name: named(thing.track, Some(thing.class)),
+            x: metres(thing.position_in_world.x),
+            z: metres(thing.position_in_world.z),
+            top_m: metres(thing.top_m),
+            note,
+        }
+    };
+    Map { things: things.iter().map(facts).collect(), left_out, explored: is_explored }
+}
+
+fn plan_facts(memory: &Memory, plan: &Plan) -> PlanFacts {
+    let subject = match plan {
+        Plan::PickUp(s) | Plan::PickContainer(s) | Plan::RemoveObstacle(s) | Plan::LiftWith(s) => {
+            memory.things.get(s.track).and_then(|t| memory.way_to(t))
+        }
+        Plan::Deliver => memory.goal_places().first().map(|(_, way_m)| *way_m),
+        _ => None,
+    };
+    PlanFacts { text: plan_text(plan), way_m: subject.map(metres) }
+}

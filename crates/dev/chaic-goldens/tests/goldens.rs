@@ -1,0 +1,41 @@
+//! Promise: states and pixels don't change unnoticed, and are the same bits at every width of vectors
+//! that this machine has. Where a change is meant, `cargo run -p chaic-goldens -- --update` writes the
+//! new table, to be read like code. `benches/goldens/run.py` compares other processors.
+
+use chaic_core::TaskId;
+use chaic_goldens::script::Script;
+use chaic_goldens::{GOLDENS, first_difference, table};
+use chaic_render::with_each_width;
+use chaic_world::{Rules, World};
+
+#[test]
+fn every_width_of_vectors_computes_the_committed_table() {
+    let mut widths = Vec::new();
+    with_each_width(|width| {
+        let found = table().expect("the bundled episodes can be played");
+        if let Some([here, committed]) = first_difference(&found, GOLDENS) {
+            panic!("{width}: first difference\n  here      {here}\n  committed {committed}");
+        }
+        widths.push(width.to_owned());
+    });
+    assert!(widths.contains(&"scalar".to_owned()), "{widths:?}");
+    #[cfg(target_arch = "x86_64")]
+    assert_eq!(widths.len() > 1, std::is_x86_feature_detected!("avx2"), "{widths:?}");
+}
+
+#[test]
+fn the_script_takes_stows_lets_go_lifts_and_delivers() {
+    // Removing obstacles is no part of it: they stand behind walls, and it walks straight ahead.
+    let mut done = [0; 5];
+    for task in TaskId::paper() {
+        let episode = chaic_episodes::episodes(&chaic_episodes::Split::Test, task).next();
+        let setup = episode.expect("bundled").expect("readable").into_setup();
+        let mut world = World::new(setup, Rules::paper()).expect("valid");
+        let mut script = Script::new(&world);
+        script.play(&mut world, 2900);
+        let c = script.happened();
+        let counts = [c.taken, c.stowed, c.released, c.lifted, c.delivered];
+        done = std::array::from_fn(|i| done[i] + counts[i]);
+    }
+    assert!(done.iter().all(|n| *n > 0), "taken, stowed, released, lifted, delivered: {done:?}");
+}

@@ -1,0 +1,54 @@
+//! Many worlds at once: `cargo run --release -p chaic-eval --example worlds -- 1000 128`.
+//!
+//! Makes so many generated episodes of all tasks, draws what the helper of each sees (color, depth
+//! and ids, of this side in pixels) in batches for ten seconds, and prints pictures a second and the
+//! most memory that was used.
+
+use std::time::{Duration, Instant};
+
+use chaic_core::{AgentId, TaskId};
+use chaic_episodes::{Split, episodes};
+use chaic_render::{Channels, Scene, View, WorldViews, render_batch};
+use chaic_world::{Rules, World};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let mut number = |usual| arguments.next().map_or(Ok(usual), |text| text.parse::<u32>());
+    let (n, size) = (number(1000)?, number(128)?);
+    let n_tasks = TaskId::paper().count() as u64;
+    let mut worlds = Vec::new();
+    for task in TaskId::paper() {
+        for episode in episodes(&Split::Generated(0..u64::from(n).div_ceil(n_tasks)), task) {
+            let setup = episode?.setup().clone();
+            worlds.push(World::new(setup, Rules::paper()).map_err(|problem| format!("{problem}"))?);
+        }
+    }
+    worlds.truncate(n as usize);
+    let scenes: Vec<Scene> = worlds.iter().map(|world| Scene::new(world.setup())).collect();
+    let helper = AgentId::HELPER;
+    let views: Vec<[View; 1]> = worlds
+        .iter()
+        .map(|world| [View::of_eye(helper, world.eye(helper, size), Channels::ALL)])
+        .collect();
+    let batch: Vec<WorldViews> = worlds
+        .iter()
+        .zip(&scenes)
+        .zip(&views)
+        .map(|((world, scene), views)| WorldViews { scene, world, views })
+        .collect();
+    let mut images = Vec::new();
+    // The first round makes textures and meshes.
+    render_batch(&batch, &mut images);
+    let (start, mut n_rounds) = (Instant::now(), 0);
+    while start.elapsed() < Duration::from_secs(10) {
+        render_batch(&batch, &mut images);
+        n_rounds += 1;
+    }
+    let rate = (n_rounds * batch.len()) as f64 / start.elapsed().as_secs_f64();
+    println!("{} worlds, {size} x {size}: {rate:.0} pictures a second", batch.len());
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    if let Some(most) = status.lines().find_map(|line| line.strip_prefix("VmHWM:")) {
+        println!("most memory used: {}", most.trim());
+    }
+    Ok(())
+}

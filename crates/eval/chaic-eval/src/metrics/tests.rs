@@ -1,0 +1,349 @@
+//! Scores against tables worked by hand.
+
+use chaic_core::{AgentId, ClassId, EntityId, TaskId};
+use chaic_env::{Digest, RunKey};
+
+use super::*;
+
+struct Case<'a> {
+    task: TaskId,
+    helper: &'a str,
+    episode: &'a str,
+    seed: u32,
+    done: f64,
+    total: f64,
+    deliveries: Vec<Delivery>,
+    away: Option<u32>,
+}
+
+fn case<'a>(helper: &'a str, episode: &'a str, done: f64, total: f64) -> Case<'a> {
+    let task = TaskId::LowTarget;
+    Case { task, helper, episode, seed: 0, done, total, deliveries: Vec::new(), away: None }
+}
+
+fn result(c: Case<'_>) -> RunResult {
+    let (helper, episode) = (c.helper.to_owned(), c.episode.to_owned());
+    RunResult {
+        key: RunKey { task: c.task, helper, episode, seed: c.seed },
+        ending: Ending::Done(Summary {
+            frames: 1000,
+            done: c.done,
+            total: c.total,
+            away_frames: c.away,
+            stuck_frames: None,
+            escape_frames: c.away,
+            deliveries: c.deliveries,
+            digest: Digest(0),
+            counts: Default::default(),
+            measures: Default::default(),
+        }),
+    }
+}
+
+fn delivery(by: AgentId, class: &str, counted: bool) -> Delivery {
+    Delivery {
+        frame: 1,
+        object: EntityId(40),
+        class: ClassId::named(class),
+        by,
+        counted,
+        together: false,
+        handed: false,
+    }
+}
+
+fn close(a: Option<f64>, b: f64) {
+    assert!((a.unwrap() - b).abs() < 1e-9, "{a:?} is not {b}");
+}
+
+/// Resamples leave the third digit of a standard error to chance.
+fn close_by_resampling(a: Option<f64>, b: f64) {
+    assert!((a.unwrap() - b).abs() < 0.02 * b.abs(), "{a:?} is not {b}");
+}
+
+/// As much as is known of a run where nothing else is: every episode is an environment.
+fn in_houses(results: &[RunResult], environments: &Environments, f: Formulas) -> Scores {
+    Scores::of(Played { results, planned: &[], environments }, &f)
+}
+
+fn scores_of(results: &[RunResult], f: Formulas) -> Scores {
+    in_houses(results, &Environments::default(), f)
+}
+
+fn error(helper: &str, episode: &str, seed: u32) -> RunResult {
+    let (task, helper, episode) = (TaskId::LowTarget, helper.to_owned(), episode.to_owned());
+    let key = RunKey { task, helper, episode, seed };
+    RunResult { key, ending: Ending::Error { message: "boom".to_owned() } }
+}
+
+/// Episodes e1, e2, ... in these houses.
+fn houses(names: &[&str]) -> Environments {
+    let pair = |(k, house): (usize, &&str)| (format!("e{}", k + 1), (*house).to_owned());
+    Environments::new(names.iter().enumerate().map(pair))
+}
+
+#[test]
+fn transport_rate_and_efficiency_improvement() {
+    // Alone: e1 2/10 and 4/10 (two seeds), e2 0/8, e3 3/6. Team: e1 6/10 and 6/10, e2 0/8, e3 2/6.
+    let mut results = vec![
+        result(case("none", "e1", 2.0, 10.0)),
+        result(Case { seed: 1, ..case("none", "e1", 4.0, 10.0) }),
+        result(case("none", "e2", 0.0, 8.0)),
+        result(case("none", "e3", 3.0, 6.0)),
+        result(case("rhp", "e1", 6.0, 10.0)),
+        result(Case { seed: 1, ..case("rhp", "e1", 6.0, 10.0) }),
+        result(case("rhp", "e2", 0.0, 8.0)),
+        result(case("rhp", "e3", 2.0, 6.0)),
+    ];
+    let scores = scores_of(&results, Formulas::PAPER);
+    let (alone, team) = (
+        scores.get(TaskId::LowTarget, "none").unwrap(),
+        scores.get(TaskId::LowTarget, "rhp").unwrap(),
+    );
+    close(Some(alone.tr), (0.2 + 0.4 + 0.0 + 0.5) / 4.0);
+    close(Some(team.tr), (0.6 + 0.6 + 0.0 + 1.0 / 3.0) / 4.0);
+    assert_eq!(
+        (alone.episodes, alone.ei, alone.cr, alone.ia, alone.er),
+        (4, None, None, None, None)
+    );
+    // e1: (0.6 - 0.3) / 0.6 = 1/2; e2: both 0, so 0; e3: (1/3 - 1/2) / (1/2) = -1/3.
+    close(team.ei, (0.5 + 0.0 - 1.0 / 3.0) / 3.0);
+    // Means of episodes 0.6, 0, 1/3: deviation 0.3006..., over the root of 3.
+    let m = (0.6 + 1.0 / 3.0) / 3.0;
+    let ss: f64 = [0.6, 0.0, 1.0 / 3.0].iter().map(|v: &f64| (v - m) * (v - m)).sum();
+    // Seeds weigh by their number: 4 runs in 3 environments, so not quite the textbook's.
+    assert!((team.tr_se.unwrap() / ((ss / 2.0).sqrt() / 3f64.sqrt()) - 1.0).abs() < 0.2);
+    assert_eq!((team.environments, team.broken, team.incomplete), (3, 0, false));
+
+    // By the scripts: e1 (6 - 3) / 6; e2 0 / max(0, 0, 1); e3 (2 - 3) / 3. Same here, as rates and
+    // counts of one episode are proportional and nothing is below one object.
+    close(
+        scores_of(&results, Formulas::ORIGINAL).get(TaskId::LowTarget, "rhp").unwrap().ei,
+        0.5 / 9.0,
+    );
+    // The floor: half an object on the mean, alone nothing, is 0.5 / 1 there and 1 in the paper.
+    results = vec![
+        result(case("none", "e1", 0.0, 10.0)),
+        result(case("rhp", "e1", 1.0, 10.0)),
+        result(Case { seed: 1, ..case("rhp", "e1", 0.0, 10.0) }),
+    ];
+    let ei = |f| scores_of(&results, f).get(TaskId::LowTarget, "rhp").unwrap().ei;
+    close(ei(Formulas::ORIGINAL), 0.5);
+    close(ei(Formulas::PAPER), 1.0);
+    let se = |f| scores_of(&results, f).get(TaskId::LowTarget, "rhp").unwrap().tr_se;
+    assert_eq!(se(Formulas::PAPER), None, "one episode has no standard error");
+    close(se(Formulas::ORIGINAL), 0.05);
+}
+
+#[test]
+fn accuracy_and_completion_are_pooled_and_containers_are_means() {
+    let (p, h) = (AgentId::PARTNER, AgentId::HELPER);
+    let one = Case {
+        deliveries: vec![
+            delivery(h, "apple", true),
+            delivery(h, "apple", false),
+            delivery(h, "wicker_basket", false),
+            delivery(p, "apple", true),
+            Delivery { handed: true, ..delivery(p, "apple", true) },
+        ],
+        ..case("rhp", "e1", 3.0, 3.0)
+    };
+    let two = Case { deliveries: vec![delivery(h, "bread", false)], ..case("rhp", "e2", 0.0, 3.0) };
+    let results = [result(one), result(two)];
+    let score = |f| scores_of(&results, f).get(TaskId::LowTarget, "rhp").unwrap().clone();
+    close(score(Formulas::PAPER).ia, 1.0 / 3.0);
+    close(score(Formulas::PAPER).cr, 1.0 / 3.0);
+    close(score(Formulas::ORIGINAL).cr, 2.0 / 3.0);
+    assert_eq!(score(Formulas::PAPER).ei, None, "there is nothing to compare with");
+}
+
+#[test]
+fn moving_house_weighs_and_credits_joint_carrying() {
+    let heavy: Vec<ClassId> =
+        ClassId::all().filter(|c| c.info().role == chaic_core::Role::HeavyTarget).collect();
+    let mass = |c: ClassId| f64::from(c.info().mass_kg);
+    let (a, b) = (heavy[0], heavy[1]);
+    let by_partner =
+        |class, together| Delivery { class, together, ..delivery(AgentId::PARTNER, "apple", true) };
+    let run = Case {
+        task: TaskId::MovingHouse,
+        deliveries: vec![by_partner(a, true), by_partner(b, false)],
+        ..case("rhp", "e1", mass(a) + mass(b), 2.0 * (mass(a) + mass(b)))
+    };
+    let scores = scores_of(&[result(run)], Formulas::PAPER);
+    let score = scores.get(TaskId::MovingHouse, "rhp").unwrap();
+    close(score.cr, mass(a) / (mass(a) + mass(b)));
+    close(Some(score.tr), 0.5);
+}
+
+#[test]
+fn emergencies_are_pooled_over_frames() {
+    let run = |episode, away| {
+        result(Case { task: TaskId::Shopping, away: Some(away), ..case("rhp", episode, 1.0, 4.0) })
+    };
+    let scores = scores_of(&[run("e1", 100), run("e2", 500)], Formulas::PAPER);
+    close(scores.get(TaskId::Shopping, "rhp").unwrap().er, 0.3);
+}
+
+/// Four episodes of two helpers: 0.1, 0.2, 0.3 and 0.4 against twice that.
+fn pairs() -> Vec<RunResult> {
+    let done = |helper, factor: f64| {
+        (1..5).map(move |k| {
+            let episode = ["e1", "e2", "e3", "e4"][k - 1];
+            result(case(helper, episode, k as f64 * factor, 10.0))
+        })
+    };
+    done("none", 1.0).chain(done("rhp", 2.0)).collect()
+}
+
+#[test]
+fn differences_are_paired_and_as_sure_as_their_houses() {
+    let (results, names) = (pairs(), ["none".to_owned(), "rhp".to_owned()]);
+    let of = |environments: &Environments| {
+        let played = Played { results: &results, planned: &[], environments };
+        let mut found = differences(played, &names);
+        assert_eq!(found.len(), 1);
+        found.pop().unwrap()
+    };
+    // 0.1, 0.2, 0.3, 0.4: mean 0.25, deviation 0.129099, over the root of 4; t(3) is 3.182.
+    let apart = of(&Environments::default());
+    assert_eq!((apart.helper.as_str(), apart.baseline.as_str()), ("rhp", "none"));
+    let all = apart.all.unwrap();
+    close(Some(all.mean), 0.25);
+    close_by_resampling(Some(all.half()), 3.182 * 0.129099 / 2.0);
+    assert_eq!(apart.tasks[&TaskId::LowTarget], all, "there is but one task");
+    // Two houses of means 0.15 and 0.35: deviation 0.141421, over the root of 2; t(1) is 12.706.
+    let shared = of(&houses(&["a", "a", "b", "b"])).all.unwrap();
+    close(Some(shared.mean), 0.25);
+    close_by_resampling(Some(shared.half()), 12.706 * 0.1);
+    assert_eq!((shared.environments, shared.df), (2, 1));
+    assert_eq!(of(&houses(&["a", "a", "a", "a"])).all, None);
+    let r = resolution(&[of(&houses(&["a", "a", "b", "b"]))], None).unwrap();
+    assert_eq!((r.environments, r.median, r.largest), (2, shared.half(), shared.half()));
+    assert_eq!(resolution(&[], None), None);
+}
+
+#[test]
+fn intervals_of_rates_stay_within_what_a_rate_can_be() {
+    let scores = in_houses(&pairs(), &houses(&["a", "a", "b", "b"]), Formulas::PAPER);
+    let score = scores.get(TaskId::LowTarget, "rhp").unwrap();
+    assert_eq!(score.tr_ci, Some([0.0, 1.0]), "0.5 with 12.706 * 0.2 to both sides");
+    close_by_resampling(score.tr_se, 0.2);
+    // EI is 1/2 in every episode.
+    close(score.ei_ci.map(|[low, _]| low), 0.5);
+    close(score.ei_ci.map(|[_, high]| high), 0.5);
+    assert_eq!(score.environments, 2);
+}
+
+#[test]
+fn broken_runs_count_as_zero_and_order_does_not_matter() {
+    let useful = Case {
+        deliveries: vec![
+            delivery(AgentId::HELPER, "apple", true),
+            delivery(AgentId::PARTNER, "apple", true),
+        ],
+        ..case("rhp", "e1", 8.0, 10.0)
+    };
+    let mut results = vec![
+        result(case("none", "e1", 4.0, 10.0)),
+        result(case("none", "e2", 4.0, 10.0)),
+        result(useful),
+        error("rhp", "e2", 0),
+    ];
+    let scores = scores_of(&results, Formulas::PAPER);
+    let score = scores.get(TaskId::LowTarget, "rhp").unwrap();
+    assert_eq!((score.episodes, score.broken), (2, 1));
+    // 0.8 and nothing; (0.8 - 0.4) / 0.8 and (0 - 0.4) / 0.4.
+    close(Some(score.tr), 0.4);
+    close(score.ei, (0.5 - 1.0) / 2.0);
+    // All of one run and nothing of the other; half and nothing.
+    close(score.ia, 0.5);
+    close(score.cr, 0.25);
+    results.reverse();
+    assert_eq!(scores, scores_of(&results, Formulas::PAPER));
+    let names = ["none".to_owned(), "rhp".to_owned()];
+    let environments = Environments::default();
+    let played = Played { results: &results, planned: &[], environments: &environments };
+    close(differences(played, &names)[0].all.map(|i| i.mean), (0.4 - 0.4) / 2.0);
+    // Nobody gains from a run without helper that broke down: that episode isn't compared.
+    results.retain(|r| r.key.helper != "none" || r.key.episode != "e2");
+    results.push(error("none", "e2", 0));
+    let scores = scores_of(&results, Formulas::PAPER);
+    close(scores.get(TaskId::LowTarget, "rhp").unwrap().ei, 0.5);
+    close(scores.get(TaskId::LowTarget, "none").map(|s| s.tr), 0.2);
+    let all_broken = scores_of(&[error("rhp", "e1", 0)], Formulas::PAPER);
+    let score = all_broken.get(TaskId::LowTarget, "rhp").unwrap();
+    assert_eq!((score.tr, score.ia, score.cr, score.stuck), (0.0, Some(0.0), Some(0.0), None));
+}
+
+#[test]
+fn a_shopping_run_that_breaks_down_is_one_long_emergency() {
+    let shopping =
+        |r: RunResult| RunResult { key: RunKey { task: TaskId::Shopping, ..r.key }, ..r };
+    let played = result(Case { away: Some(100), ..case("rhp", "e1", 1.0, 4.0) });
+    let results = [played, error("rhp", "e2", 0)].map(shopping);
+    let scores = scores_of(&results, Formulas::PAPER);
+    close(scores.get(TaskId::Shopping, "rhp").unwrap().er, (0.1 + 1.0) / 2.0);
+}
+
+#[test]
+fn frames_stuck_are_pooled_over_those_who_counted_them() {
+    let stuck = |episode, frames| {
+        let mut result = result(case("rhp", episode, 1.0, 4.0));
+        if let Ending::Done(summary) = &mut result.ending {
+            summary.stuck_frames = frames;
+        }
+        result
+    };
+    let results = [stuck("e1", Some(30)), stuck("e2", Some(0)), stuck("e3", None)];
+    let scores = scores_of(&results, Formulas::PAPER);
+    close(scores.get(TaskId::LowTarget, "rhp").unwrap().stuck, 30.0 / 2000.0);
+}
+
+#[test]
+fn missing_runs_are_named_and_mark_their_rows() {
+    let (results, environments) = (pairs(), Environments::default());
+    let mut planned: Vec<RunKey> = results.iter().map(|r| r.key.clone()).collect();
+    let more = (0..30).map(|seed| error("rhp", "e5", seed).key);
+    planned.extend(more.chain([error("oracle", "e1", 0).key]));
+    let played = Played { results: &results, planned: &planned, environments: &environments };
+    let scores = Scores::of(played, &Formulas::PAPER);
+    let row = scores.get(TaskId::LowTarget, "rhp").unwrap();
+    assert_eq!((row.incomplete, row.missing.len()), (true, MAX_NAMED));
+    assert_eq!(row.missing[0], "e5 seed 0");
+    assert!(!scores.get(TaskId::LowTarget, "none").unwrap().incomplete);
+    assert!(scores.is_unplayed(TaskId::LowTarget, "oracle"));
+    assert_eq!(scores.helpers(), ["none", "rhp", "oracle"]);
+}
+
+#[test]
+fn results_and_scores_read_back() {
+    let text = serde_json::to_string(&result(Case {
+        deliveries: vec![delivery(AgentId::HELPER, "apple", true)],
+        ..case("rhp", "low_target/test/01", 0.1 + 0.2, 3.0)
+    }))
+    .unwrap();
+    let back: RunResult = serde_json::from_str(&text).unwrap();
+    assert_eq!(serde_json::to_string(&back).unwrap(), text);
+    let scores = scores_of(&[back], Formulas::PAPER);
+    let json = serde_json::to_value(&scores).unwrap();
+    let score = &json["tasks"]["low_target"]["rhp"];
+    let keys: Vec<&str> = score.as_object().unwrap().keys().map(String::as_str).collect();
+    let expected = [
+        "broken",
+        "cr",
+        "ei",
+        "ei_ci",
+        "environments",
+        "episodes",
+        "er",
+        "ia",
+        "incomplete",
+        "stuck",
+        "tr",
+        "tr_ci",
+        "tr_se",
+    ];
+    assert_eq!(keys, expected, "{json}");
+    assert!(score["ei"].is_null() && score["episodes"] == 1);
+}

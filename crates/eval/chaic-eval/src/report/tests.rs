@@ -1,0 +1,203 @@
+//! Reports say what the scores say, in every format.
+
+use chaic_core::TaskId;
+use chaic_core::observation::Grants;
+use chaic_env::rules::RuleSetName;
+use chaic_env::{Digest, RunKey};
+
+use super::*;
+use crate::metrics::{Ending, FormulaSet, RunResult, Summary};
+use crate::run::{Item, RunGrants, RunOptions};
+
+fn results() -> Vec<RunResult> {
+    let mut results = Vec::new();
+    for task in TaskId::paper() {
+        for (helper, done) in [("oracle", 3.0), ("none", 1.0), ("rhp", 2.0)] {
+            for k in 0..2 {
+                let episode = format!("{task}/test/0{k}");
+                let away_frames = (task == TaskId::Shopping && helper != "none").then_some(250);
+                results.push(RunResult {
+                    key: RunKey { task, helper: helper.to_owned(), episode, seed: 0 },
+                    ending: Ending::Done(Summary {
+                        frames: 1000,
+                        done: done + f64::from(k),
+                        total: 10.0,
+                        away_frames,
+                        stuck_frames: None,
+                        escape_frames: away_frames,
+                        deliveries: Vec::new(),
+                        digest: Digest(0),
+                        counts: Default::default(),
+                        measures: Default::default(),
+                    }),
+                });
+            }
+        }
+    }
+    results
+}
+
+fn options() -> RunOptions {
+    RunOptions {
+        tasks: TaskId::paper().collect(),
+        helpers: vec!["none".into(), "rhp".into(), "oracle".into()],
+        split: "test".into(),
+        first: Some(2),
+        seeds: 1,
+        size: None,
+        rules: RuleSetName::Paper,
+        set: vec![],
+        traces: true,
+        partner: None,
+        partner_is: None,
+        appearance: None,
+        perception: None,
+        behavior: None,
+        track: chaic_env::Track::Told,
+    }
+}
+
+/// As `rhp` and `oracle` ask for; the partner as given.
+fn granted(partner: Grants) -> RunGrants {
+    let helpers = [("rhp", Grants::IDS), ("oracle", Grants::ORACLE)];
+    RunGrants {
+        helpers: helpers.map(|(name, g)| (name.to_owned(), g)).into(),
+        partner,
+        perception: Default::default(),
+        isolation: Default::default(),
+    }
+}
+
+fn text(results: &[RunResult], format: Format) -> String {
+    text_with(results, Some(&granted(Grants::PARTNER)), format)
+}
+
+fn text_with(results: &[RunResult], granted: Option<&RunGrants>, format: Format) -> String {
+    let item =
+        |r: RunResult| Item { environment: r.key.episode.clone(), key: r.key, horizon: 1000 };
+    let planned: Vec<Item> = self::results().into_iter().map(item).collect();
+    let formulas = FormulaSet::Paper;
+    Report { options: &options(), results, planned: &planned, granted, formulas }.text(format)
+}
+
+#[test]
+fn an_unfinished_run_says_so() {
+    let whole = results();
+    let md = text(&whole, Format::Markdown);
+    assert!(!md.contains("Unfinished") && !md.contains("Unequal"), "{md}");
+    // RHP lacks one episode of the obstacle task, and all of shopping.
+    let some = |r: &&RunResult| {
+        let (k, is_rhp) = (&r.key, r.key.helper == "rhp");
+        !(is_rhp && (k.task == TaskId::Shopping || k.episode == "obstacle/test/01"))
+    };
+    let part: Vec<RunResult> = whole.iter().filter(some).cloned().collect();
+    for format in [Format::Table, Format::Markdown] {
+        let text = text(&part, format);
+        let missing =
+            "Unfinished: 3 of 48 episode runs are missing (RHP 3); all numbers are of those";
+        assert!(text.contains(missing), "{text}");
+        assert!(text.contains("in obstacle the rows rest on different"), "{text}");
+        assert!(text.contains("(w/o on 2, Oracle on 2, RHP on 1)"), "{text}");
+        assert!(text.contains("Missing: obstacle/test/01 with rhp, seed 0; shopping"), "{text}");
+        assert!(text.contains("0.20(0.50)?"), "the row with one missing is marked: {text}");
+        assert!(text.contains("? Incomplete: episode runs are missing."), "{text}");
+        assert!(!text.contains("in shopping the rows"), "absent is not unequal: {text}");
+    }
+    let json: serde_json::Value = serde_json::from_str(&text(&part, Format::Json)).unwrap();
+    let runs = serde_json::json!({"planned": 48, "scored": 45, "broken": 0, "missing": 3});
+    assert_eq!(json["episode_runs"], runs);
+    assert_eq!(json["incomplete"], true);
+    assert_eq!(json["missing"].as_array().unwrap().len(), 3);
+    let row = &json["tasks"]["obstacle"]["rhp"];
+    assert_eq!(row["incomplete"], true);
+    assert_eq!(row["missing"], serde_json::json!(["obstacle/test/01 seed 0"]));
+    assert_eq!(json["tasks"]["obstacle"]["none"]["incomplete"], false);
+}
+
+#[test]
+fn the_table_has_the_papers_layout() {
+    let table = text(&results(), Format::Table);
+    let lines: Vec<&str> = table.lines().collect();
+    let row = |name: &str| *lines.iter().find(|l| l.contains(name)).unwrap();
+    assert!(row("High container").contains("No constraint"), "{table}");
+    // Alone 1 and 2 of 10, with RHP 2 and 3: EI is the mean of 1/2 and 1/3.
+    assert!(row("RHP").contains("0.25(0.42)") && row("w/o").contains("0.15 "), "{table}");
+    let shopping = *lines.iter().filter(|l| l.contains("Oracle")).nth(1).unwrap();
+    assert!(shopping.contains("0.25"), "the emergency rate is there: {table}");
+    assert!(lines.iter().all(|l| l.chars().count() <= 120), "{table}");
+}
+
+#[test]
+fn every_format_has_every_task_and_helper() {
+    let results = results();
+    let csv = text(&results, Format::Csv);
+    assert_eq!(csv.lines().count(), 1 + 8 * 3);
+    let row = csv.lines().find(|l| l.starts_with("shopping,rhp,")).unwrap();
+    assert!(row.starts_with("shopping,rhp,ids,ground_truth,0.250000,0.04999"), "{row}");
+    assert!(row.ends_with(",,,0.250000,,2,2,0,false"), "{row}");
+    assert!(row.contains(",0.416667,"), "{row}");
+    let json: serde_json::Value = serde_json::from_str(&text(&results, Format::Json)).unwrap();
+    assert_eq!(json["tasks"].as_object().unwrap().len(), 8);
+    assert_eq!(json["tasks"]["obstacle"]["none"]["ei"], serde_json::Value::Null);
+    let md = text(&results, Format::Markdown);
+    assert!(md.contains("| RHP - w/o | 0.10 [0.10, 0.10] |"), "{md}");
+    // Houses of all indoor tasks, and two streets and two yards.
+    assert!(md.contains("| all tasks | 16 | 0.00 | 0.00 |"), "{md}");
+}
+
+#[test]
+fn what_was_granted_stands_in_every_format() {
+    let results = results();
+    for format in [Format::Table, Format::Markdown] {
+        let text = text(&results, format);
+        let tables = text.matches("ids from ground truth").count();
+        assert!(tables >= 2 * 4, "both helpers in each of four tables: {text}");
+        assert!(!text.contains("partner is told more"), "{text}");
+    }
+    let all = "**Granted: RHP: ids from ground truth; Oracle: ids from ground truth, told behavior, \
+               goal, goal place, progress.**";
+    assert!(text(&results, Format::Markdown).contains(all));
+    let json: serde_json::Value = serde_json::from_str(&text(&results, Format::Json)).unwrap();
+    let oracle = ["behavior", "goal", "goal_place", "ids", "progress"];
+    assert_eq!(
+        json["helpers"],
+        serde_json::json!({
+            "none": {"grants": [], "perception": "none"},
+            "rhp": {"grants": ["ids"], "perception": "ground_truth"},
+            "oracle": {"grants": oracle, "perception": "ground_truth"},
+        })
+    );
+    assert_eq!(json["partner"]["grants"], serde_json::json!(["goal", "goal_place", "ids"]));
+    let own =
+        RunGrants { helpers: [("rhp".to_owned(), Grants::NONE)].into(), ..granted(Grants::ORACLE) };
+    let md = text_with(&results, Some(&own), Format::Markdown);
+    let said = "RHP: own eyes only; Oracle: grants not recorded; the partner is told more than usual: \
+                behavior, progress.";
+    assert!(md.contains(said), "{md}");
+    let json = text_with(&results, Some(&own), Format::Json);
+    assert!(json.contains("\"perception\": \"own\""), "{json}");
+    let unknown = text_with(&results, None, Format::Table);
+    assert!(unknown.contains("grants not recorded"), "{unknown}");
+}
+
+#[test]
+fn names_of_helpers_promise_no_more_than_there_is() {
+    for helper in ["llm", "llm-told"] {
+        assert!(!title(helper).contains("BM"), "no model of behavior sees failures");
+    }
+}
+
+#[test]
+fn what_broke_down_is_named() {
+    let mut results = results();
+    let message = "the episode broke down: boom".to_owned();
+    results[0].ending = Ending::Error { message };
+    for format in [Format::Table, Format::Markdown] {
+        let text = text(&results, format);
+        let said = "Broke down, counts as zero: no_constraint/test/00 with oracle (seed 0): the";
+        assert!(text.contains(said), "{text}");
+        // 0 and 4 of 10 in the place of 3 and 4.
+        assert!(text.contains("0.20(") && text.contains(")*"), "{text}");
+        assert!(text.contains("* Episode runs broke down; they count as zero."), "{text}");
+    }
+}

@@ -1,0 +1,122 @@
+//! Promises: a recorded episode becomes tables that a reader of Parquet reads, a row each moment, whose rewards sum up to
+//! the transport rate; what was broken off is a whole data set of fewer episodes; mistakes are told before anything is
+//! written.
+
+use std::fs::{self, File};
+use std::path::Path;
+
+use chaic_core::{AgentError, AgentId};
+use chaic_env::minds::{BuiltIn, find};
+use chaic_env::rules::RuleSet;
+use chaic_env::trace::{Record, Trace};
+use chaic_env::{Appearance, Env, EpisodeConfig, Flow};
+use chaic_episodes::{Episode, find_episode};
+use chaic_export::lerobot::{ExportError, LeRobotOptions, LeRobotWriter};
+use parquet::file::reader::{FileReader as _, SerializedFileReader};
+use parquet::record::{Field, Row};
+
+const OPTIONS: LeRobotOptions =
+    LeRobotOptions { agent: AgentId::HELPER, every: 30, image_size: 32 };
+
+/// An episode of moving house, which is the shortest, with RHP.
+fn recorded() -> (Episode, Trace) {
+    let episode = find_episode("moving_house/gen/40000001").unwrap();
+    let config = EpisodeConfig {
+        episode: &episode,
+        seed: 0,
+        rules: RuleSet::PAPER,
+        helper: "rhp",
+        partner: None,
+        image_size: Some(64),
+        appearance: Appearance::Canonical,
+    };
+    let helper = find(&BuiltIn, "rhp", RuleSet::PAPER.planner).unwrap();
+    let mut env = Env::new(config, helper).unwrap();
+    let header = env.header().clone();
+    let mut records = Vec::new();
+    let mut sink = |record: &Record| {
+        records.push(record.clone());
+        Ok::<(), AgentError>(())
+    };
+    let flow = env.run(&false.into(), None, &mut sink).unwrap();
+    assert_eq!(flow, Flow::Ended);
+    (episode, Trace { header, records })
+}
+
+fn rows(path: &Path) -> Vec<Row> {
+    let reader = SerializedFileReader::new(File::open(path).unwrap()).unwrap();
+    reader.get_row_iter(None).unwrap().map(|row| row.unwrap()).collect()
+}
+
+fn field<'a>(row: &'a Row, name: &str) -> &'a Field {
+    row.get_column_iter().find(|(n, _)| *n == name).map(|(_, field)| field).unwrap()
+}
+
+fn long(row: &Row, name: &str) -> i64 {
+    match field(row, name) {
+        Field::Long(x) => *x,
+        other => panic!("{name} is {other}"),
+    }
+}
+
+#[test]
+fn an_episode_becomes_a_table_and_a_film() {
+    let (episode, trace) = recorded();
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("set");
+    let mut writer = LeRobotWriter::create(&out, OPTIONS).unwrap();
+    for _ in 0..2 {
+        assert!(writer.add(&trace, &episode, &mut || true).unwrap());
+    }
+    // The third is broken off.
+    let mut asked = 0;
+    let mut go_on = || {
+        asked += 1;
+        asked < 5
+    };
+    assert!(!writer.add(&trace, &episode, &mut go_on).unwrap());
+    let n = writer.finish().unwrap();
+    let end = trace.end().unwrap();
+    let moments = rows(&out.join("data/chunk-000/file-001.parquet"));
+    assert_eq!(moments.len(), (end.frame as usize).div_ceil(30));
+    assert_eq!(n, 2 * moments.len());
+    let mut got = 0.0;
+    for (k, row) in moments.iter().enumerate() {
+        assert_eq!(long(row, "frame_index"), k as i64);
+        assert_eq!(long(row, "episode_index"), 1);
+        assert_eq!(long(row, "index"), (moments.len() + k) as i64);
+        let Field::Float(reward) = field(row, "next.reward") else { panic!("{row}") };
+        got += f64::from(*reward);
+        let Field::ListInternal(state) = field(row, "observation.state") else { panic!("{row}") };
+        assert_eq!(state.elements().len(), 9);
+        let is_last = k + 1 == moments.len();
+        assert_eq!(field(row, "next.done"), &Field::Bool(is_last));
+    }
+    assert!((got - end.done / end.total).abs() < 1e-6, "{got}");
+    assert!(moments.iter().any(|row| field(row, "plan") == &Field::Str("explore".to_owned())));
+    let episodes = rows(&out.join("meta/episodes/chunk-000/file-000.parquet"));
+    assert_eq!(episodes.len(), 2);
+    assert_eq!(long(&episodes[1], "dataset_from_index"), moments.len() as i64);
+    assert_eq!(long(&episodes[1], "length"), moments.len() as i64);
+    assert_eq!(rows(&out.join("meta/tasks.parquet")).len(), 1);
+    let film = out.join("videos/observation.images.ego/chunk-000/file-001.mp4");
+    assert!(fs::metadata(film).unwrap().len() > 1000);
+    let info: serde_json::Value =
+        serde_json::from_slice(&fs::read(out.join("meta/info.json")).unwrap()).unwrap();
+    assert_eq!((&info["total_frames"], &info["fps"]), (&n.into(), &1.into()));
+    let stats: serde_json::Value =
+        serde_json::from_slice(&fs::read(out.join("meta/stats.json")).unwrap()).unwrap();
+    assert_eq!(stats["observation.state"]["mean"].as_array().unwrap().len(), 9);
+}
+
+#[test]
+fn mistakes_are_told_before_anything_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("something"), "").unwrap();
+    let refused = LeRobotWriter::create(folder.path(), OPTIONS);
+    assert!(matches!(refused, Err(ExportError::NotEmpty(_))));
+    let out = folder.path().join("set");
+    let refused = LeRobotWriter::create(&out, LeRobotOptions { every: 7, ..OPTIONS });
+    assert!(matches!(refused, Err(ExportError::Rate(7))));
+    assert!(!out.exists());
+}

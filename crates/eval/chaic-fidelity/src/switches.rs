@@ -1,0 +1,158 @@
+//! What a single rule moves: the original's rules against the same with that rule as the paper
+//! has it.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use chaic_core::TaskId;
+use chaic_env::RunKey;
+use chaic_env::rules::rule_values;
+
+use crate::matrix::PartState;
+use chaic_eval::Result;
+use chaic_eval::metrics::{Interval, Played, RunResult, differences};
+use chaic_eval::report::{TextTable, interval, title};
+
+/// How many rules are named for a task.
+const MOST: usize = 3;
+
+/// What a switch moves the transport rate of a helper by, on the same episodes and seeds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Change {
+    /// The rule.
+    pub rule: String,
+    /// The helper.
+    pub helper: String,
+    /// Rate with the switch less rate without, by task.
+    pub tasks: BTreeMap<TaskId, Interval>,
+    /// The same over the episodes of all tasks.
+    pub all: Option<Interval>,
+}
+
+/// The change of a helper's rates from `base` to `switched`, over the episode runs that both played
+/// to their end.
+pub fn change(rule: &str, base: Played<'_>, switched: &[RunResult], helper: &str) -> Change {
+    const NAMES: [&str; 2] = ["base", "switched"];
+    let keys = |results: &[RunResult]| -> BTreeSet<RunKey> {
+        let scored = results.iter().filter(|r| r.key.helper == helper && r.summary().is_some());
+        scored.map(|r| r.key.clone()).collect()
+    };
+    let both: BTreeSet<RunKey> =
+        keys(base.results).intersection(&keys(switched)).cloned().collect();
+    let mut named = Vec::new();
+    for (name, results) in NAMES.iter().zip([base.results, switched]) {
+        for result in results.iter().filter(|r| both.contains(&r.key)) {
+            let mut result = result.clone();
+            result.key.helper = (*name).to_owned();
+            named.push(result);
+        }
+    }
+    let named = Played { results: &named, planned: &[], ..base };
+    let found = differences(named, &NAMES.map(str::to_owned)).pop();
+    let (tasks, all) = found.map_or((BTreeMap::new(), None), |d| (d.tasks, d.all));
+    Change { rule: rule.to_owned(), helper: helper.to_owned(), tasks, all }
+}
+
+fn excludes_zero(i: &Interval) -> bool {
+    i.low > 0.0 || i.high < 0.0
+}
+
+/// The part of the document about switches; `base` is the run by the original's rules.
+pub(super) fn section(
+    base: &PartState,
+    switches: &[&PartState],
+    tasks: &[TaskId],
+) -> Result<String> {
+    let Some(first) = switches.first() else { return Ok(String::new()) };
+    let (helpers, seeds) = (&first.part.helpers, first.part.seeds);
+    let seeds = if seeds == 1 { "the first seed".to_owned() } else { format!("{seeds} seeds") };
+    let mut text = format!(
+        "## One rule at a time\n\nThe rules `compat` with one rule set as `paper` has it, on the same \
+         episodes with {seeds}: by how much that moves TR, with the 95 % interval of the paired \
+         change over environments. Sorted by the size of the change over all tasks; **bold** where the \
+         interval excludes zero. `0` means that not one episode's rate changed.\n\n"
+    );
+    let mut changes: BTreeMap<&str, Vec<Change>> = BTreeMap::new();
+    for helper in helpers {
+        let of = |s: &&PartState| {
+            let rule = s.part.switch.as_deref().unwrap_or("");
+            change(rule, base.played(), &s.results, helper)
+        };
+        let mut list: Vec<Change> = switches.iter().map(of).collect();
+        list.sort_by(|a, b| size(b.all.as_ref()).total_cmp(&size(a.all.as_ref())));
+        text += &table(helper, &list, tasks)?.to_markdown();
+        text.push('\n');
+        changes.insert(helper, list);
+    }
+    text += &chance(&changes);
+    text += &most(helpers, &changes, tasks).to_markdown();
+    text.push('\n');
+    Ok(text)
+}
+
+fn size(interval: Option<&Interval>) -> f64 {
+    interval.map_or(0.0, |i| i.mean.abs())
+}
+
+fn table(helper: &str, changes: &[Change], tasks: &[TaskId]) -> Result<TextTable> {
+    let header = ["Rule".to_owned(), "compat to paper".to_owned(), "all".to_owned()].into_iter();
+    let mut rows = Vec::new();
+    for c in changes {
+        let (paper, compat) = rule_values(&c.rule)?;
+        let mut row = vec![format!("`{}`", c.rule), format!("{compat} to {paper}")];
+        row.push(cell(c.all.as_ref()));
+        row.extend(tasks.iter().map(|t| cell(c.tasks.get(t))));
+        rows.push(row);
+    }
+    Ok(TextTable {
+        title: format!("Change of TR, {}", title(helper)),
+        header: header.chain(tasks.iter().map(|t| t.info().title.to_owned())).collect(),
+        rows,
+    })
+}
+
+fn cell(change: Option<&Interval>) -> String {
+    match change {
+        Some(i) if i.mean == 0.0 && i.low == i.high => "0".to_owned(),
+        Some(i) if excludes_zero(i) => format!("**{}**", interval(change)),
+        _ => interval(change),
+    }
+}
+
+/// How many of the marked cells chance alone would mark.
+fn chance(changes: &BTreeMap<&str, Vec<Change>>) -> String {
+    let tested = |i: &&Interval| i.low < i.high;
+    let cells = || changes.values().flatten().flat_map(|c| c.tasks.values()).filter(tested);
+    let (n, marked) = (cells().count(), cells().filter(|i| excludes_zero(i)).count());
+    format!(
+        "Of {n} changes in a single task that aren't zero, {marked} are marked; chance alone would \
+         mark about {:.0}. A rule that moves nothing by itself may still matter together with \
+         others.\n\n",
+        n as f64 * 0.05
+    )
+}
+
+fn most(helpers: &[String], changes: &BTreeMap<&str, Vec<Change>>, tasks: &[TaskId]) -> TextTable {
+    let row = |task: &TaskId| {
+        let of = |helper: &String| {
+            let list = changes.get(helper.as_str()).into_iter().flatten();
+            let mut beyond: Vec<(&str, &Interval)> =
+                list.filter_map(|c| Some((c.rule.as_str(), c.tasks.get(task)?))).collect();
+            beyond.retain(|(_, i)| excludes_zero(i));
+            beyond.sort_by(|a, b| b.1.mean.abs().total_cmp(&a.1.mean.abs()));
+            let named = beyond.iter().take(MOST).map(|(r, i)| format!("`{r}` {:+.2}", i.mean));
+            let named: Vec<String> = named.collect();
+            if named.is_empty() {
+                "nothing beyond its interval".to_owned()
+            } else {
+                named.join(", ")
+            }
+        };
+        std::iter::once(task.info().title.to_owned()).chain(helpers.iter().map(of)).collect()
+    };
+    let header = std::iter::once("Task".to_owned()).chain(helpers.iter().map(|h| title(h)));
+    TextTable {
+        title: format!("What moves a task most: the {MOST} largest changes beyond their intervals"),
+        header: header.collect(),
+        rows: tasks.iter().map(row).collect(),
+    }
+}

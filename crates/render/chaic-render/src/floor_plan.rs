@@ -1,0 +1,331 @@
+//! A map of a world for people: seen from straight above without ceilings, with names.
+
+use chaic_core::geom::Rect;
+use chaic_core::{AgentId, EntityId, Role, Vec2, Vec3};
+use chaic_world::{Place, RoomKind, Wall, World};
+use image::{Rgb, RgbImage};
+
+use crate::draw::{Omit, Scratch, draw as draw_scene};
+use crate::lens::Lens;
+use crate::people::Body;
+use crate::scene::Scene;
+use crate::shade::{Drawn, Wanted, shade};
+use crate::text::{self, Align, blend};
+use crate::view::with_scratch;
+
+/// Height of the eye that looks down, metres: above every roof and tree.
+const EYE_M: f32 = 60.0;
+const INK: [u8; 3] = [30, 32, 38];
+const PAPER: [u8; 3] = [250, 250, 248];
+const TARGET: [u8; 3] = [214, 40, 120];
+const GOAL: [u8; 3] = [20, 150, 70];
+const CONTAINER: [u8; 3] = [230, 140, 20];
+const OBSTACLE: [u8; 3] = [120, 60, 200];
+/// Colors of partner, helper and child; others are as the child.
+const PEOPLE: [[u8; 3]; 3] = [[208, 64, 40], [16, 136, 140], [214, 160, 10]];
+
+/// The map of a world as it stands, `width_px` wide (between 64 and [`crate::MAX_SIDE_PX`]), with
+/// a legend below: rooms with their names, walls dark, wanted things ringed, containers and
+/// obstacles marked, the goal place framed, people with their facing.
+pub fn draw(world: &World, width_px: u32) -> RgbImage {
+    draw_scene_plan(&Scene::new(world.setup()), world, width_px)
+}
+
+/// The same with a scene that is already there.
+pub fn draw_scene_plan(scene: &Scene, world: &World, width_px: u32) -> RgbImage {
+    let width = width_px.clamp(64, crate::MAX_SIDE_PX);
+    let area = seen_area(world);
+    let size = area.size();
+    let px_per_m = width as f32 / size.x;
+    let height = ((size.y * px_per_m) as u32).clamp(1, crate::MAX_SIDE_PX);
+    let map = Map { area, px_per_m };
+    let mut image = base(scene, world, &map, width, height);
+    tint_rooms(&mut image, world, &map);
+    mark_things(&mut image, world, &map);
+    mark_people(&mut image, world, &map);
+    name_rooms(&mut image, world, &map);
+    with_legend(&image, world)
+}
+
+/// From metres to pixels.
+struct Map {
+    area: Rect,
+    px_per_m: f32,
+}
+
+impl Map {
+    fn px(&self, p: Vec3) -> Vec2 {
+        self.flat(Vec2::new(p.x, p.z))
+    }
+
+    fn flat(&self, p: Vec2) -> Vec2 {
+        (p - self.area.min) * self.px_per_m
+    }
+
+    /// The point (x, z) that a pixel shows.
+    fn plan(&self, px: Vec2) -> Vec2 {
+        self.area.min + px / self.px_per_m
+    }
+}
+
+fn seen_area(world: &World) -> Rect {
+    let setup = world.setup();
+    let mut area = setup.bounds;
+    for wall in &setup.walls {
+        area.min = area.min.min(wall.a).min(wall.b);
+        area.max = area.max.max(wall.a).max(wall.b);
+    }
+    area.grown(0.3)
+}
+
+fn base(scene: &Scene, world: &World, map: &Map, width: u32, height: u32) -> RgbImage {
+    let center = map.area.center();
+    let eye = Vec3::new(center.x, EYE_M, center.y);
+    let lens = Lens::plan(eye, map.px_per_m, width as usize, height as usize);
+    let bodies: Vec<Body> = Vec::new();
+    let frame = scene.frame(world.state(), &bodies, true);
+    let mut rgb = vec![0; 3 * width as usize * height as usize];
+    with_scratch(|scratch| {
+        let Scratch { target, work, canvas, .. } = scratch;
+        draw_scene(&frame, &lens, Omit { body: None, ceiling: true }, target, work);
+        let wanted = Wanted { rgb: &mut rgb, depth_m: None, ids: None };
+        shade(&frame, &lens, &Drawn::of(work), target, canvas, wanted);
+    });
+    RgbImage::from_raw(width, height, rgb).unwrap_or_else(|| RgbImage::new(width, height))
+}
+
+fn room_color(kind: RoomKind) -> [u8; 3] {
+    match kind {
+        RoomKind::Kitchen => [240, 190, 90],
+        RoomKind::LivingRoom => [120, 190, 120],
+        RoomKind::Bedroom => [130, 150, 230],
+        RoomKind::Office => [190, 140, 210],
+        RoomKind::Bathroom => [110, 200, 220],
+        RoomKind::Corridor => [200, 200, 200],
+        RoomKind::Outdoors => [170, 200, 150],
+    }
+}
+
+fn room_name(kind: RoomKind) -> &'static str {
+    match kind {
+        RoomKind::Kitchen => "kitchen",
+        RoomKind::LivingRoom => "living room",
+        RoomKind::Bedroom => "bedroom",
+        RoomKind::Office => "office",
+        RoomKind::Bathroom => "bathroom",
+        RoomKind::Corridor => "corridor",
+        RoomKind::Outdoors => "outdoors",
+    }
+}
+
+fn tint_rooms(image: &mut RgbImage, world: &World, map: &Map) {
+    for room in &world.setup().rooms {
+        if room.kind == RoomKind::Outdoors {
+            continue;
+        }
+        let (a, b) = (map.flat(room.rect.min), map.flat(room.rect.max));
+        let walls: Vec<&Wall> =
+            world.setup().walls.iter().filter(|w| touches(w, &room.rect)).collect();
+        for_pixels(image, a, b, |at, pixel| {
+            // Walls stay dark; all else is lighter than in a room, for what is drawn on it.
+            if !walls.iter().any(|w| covers(w, map.plan(at))) {
+                blend(pixel, [255; 3], 0.16);
+                blend(pixel, room_color(room.kind), 0.2);
+            }
+        });
+    }
+}
+
+fn touches(wall: &Wall, rect: &Rect) -> bool {
+    let around = Rect { min: wall.a.min(wall.b), max: wall.a.max(wall.b) };
+    around.grown(wall.thickness_m).overlaps(rect)
+}
+
+/// Whether a wall stands on a point.
+fn covers(wall: &Wall, p: Vec2) -> bool {
+    let along = wall.b - wall.a;
+    let t = ((p - wall.a).dot(along) / along.length_squared().max(1e-6)).clamp(0.0, 1.0);
+    p.distance(wall.a + along * t) <= 0.5 * wall.thickness_m
+}
+
+fn name_rooms(image: &mut RgbImage, world: &World, map: &Map) {
+    for room in &world.setup().rooms {
+        let (a, b) = (map.flat(room.rect.min), map.flat(room.rect.max));
+        let name = room_name(room.kind);
+        let fits = (b.x - a.x) / text::width(name, 1.0).max(4.0) * 0.8;
+        let size = (0.022 * image.width() as f32).min(fits * 1.0).clamp(9.0, 26.0);
+        if text::width(name, size) > (b.x - a.x).max(20.0) || (b.y - a.y) < size {
+            continue;
+        }
+        let at = (0.5 * (a.x + b.x), a.y + 0.10 * (b.y - a.y));
+        for (dx, dy) in [(-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)] {
+            text::draw(image, (at.0 + dx, at.1 + dy), size, PAPER, Align::Center, name);
+        }
+        text::draw(image, at, size, INK, Align::Center, name);
+    }
+}
+
+/// How a thing is marked, if it is.
+fn mark_of(world: &World, entity: EntityId) -> Option<[u8; 3]> {
+    let setup = world.setup();
+    let thing = setup.thing(entity)?;
+    let state = &world.state().things[setup.thing_index(entity)?];
+    if state.place == Place::Broken {
+        return None;
+    }
+    if setup.goal.wanted(thing.class) > 0 {
+        return Some(TARGET);
+    }
+    match thing.class.info().role {
+        Role::Container if !thing.fixed => Some(CONTAINER),
+        Role::Obstacle if !thing.fixed => Some(OBSTACLE),
+        _ => None,
+    }
+}
+
+fn mark_things(image: &mut RgbImage, world: &World, map: &Map) {
+    let setup = world.setup();
+    let thick = (0.0028 * image.width() as f32).max(1.5);
+    for entity in &setup.goal_places {
+        let Some(k) = setup.thing_index(*entity) else { continue };
+        let (thing, state) = (&setup.things[k], &world.state().things[k]);
+        let half = 0.5 * thing.size_m() + 0.08;
+        let corner = |x: f32, z: f32| {
+            map.px(state.position + state.rotation * Vec3::new(x * half.x, 0.0, z * half.z))
+        };
+        let ring = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+        for i in 0..4 {
+            line(image, ring[i], ring[(i + 1) % 4], 1.4 * thick, GOAL);
+        }
+    }
+    for (k, entity) in setup.entities().enumerate() {
+        let Some(color) = mark_of(world, entity) else { continue };
+        let size = setup.things[k].size_m();
+        let radius = (0.6 * size.x.max(size.z) * map.px_per_m)
+            .clamp(2.5 * thick, 0.08 * image.width() as f32);
+        let done = world.state().things[k].delivered.is_some();
+        circle(
+            image,
+            map.px(world.state().things[k].position),
+            radius,
+            thick,
+            if done { GOAL } else { color },
+        );
+    }
+}
+
+fn person_color(agent: AgentId) -> [u8; 3] {
+    PEOPLE[agent.index().min(PEOPLE.len() - 1)]
+}
+
+fn mark_people(image: &mut RgbImage, world: &World, map: &Map) {
+    for agent in world.setup().agents() {
+        let pose = world.state().people[agent.index()].pose;
+        let radius = (0.26 * map.px_per_m).max(0.009 * image.width() as f32);
+        let (at, color) = (map.px(pose.position), person_color(agent));
+        let ahead = pose.forward();
+        let nose = at + Vec2::new(ahead.x, ahead.z) * (1.9 * radius);
+        let side = Vec2::new(-ahead.z, ahead.x) * (0.62 * radius);
+        let base = at + Vec2::new(ahead.x, ahead.z) * (0.75 * radius);
+        triangle(image, [nose, base + side, base - side], INK);
+        disk(image, at, radius * 1.16, PAPER);
+        disk(image, at, radius, color);
+        let letter = &agent.word()[..1];
+        let size = 1.5 * radius;
+        text::draw(image, (at.x, at.y - 0.58 * size), size, PAPER, Align::Center, letter);
+    }
+}
+
+fn with_legend(map: &RgbImage, world: &World) -> RgbImage {
+    let size = (0.017 * map.width() as f32).clamp(9.0, 22.0);
+    let pad = 0.7 * size;
+    let mut entries: Vec<([u8; 3], String, bool)> = world
+        .setup()
+        .agents()
+        .map(|agent| (person_color(agent), agent.word().to_owned(), true))
+        .collect();
+    let targets = &world.setup().goal.targets;
+    let wanted: Vec<String> =
+        targets.iter().map(|(c, n)| format!("{n} {}", c.info().label)).collect();
+    entries.push((TARGET, format!("wanted: {}", wanted.join(", ")), false));
+    entries.push((GOAL, "goal place, delivered".to_owned(), false));
+    for (color, word, role) in
+        [(CONTAINER, "container", Role::Container), (OBSTACLE, "obstacle", Role::Obstacle)]
+    {
+        if world.setup().things.iter().any(|t| t.class.info().role == role) {
+            entries.push((color, word.to_owned(), false));
+        }
+    }
+    // Entries flow into lines.
+    let (mut x, mut y) = (pad, 0.0);
+    let mut placed = Vec::new();
+    for (color, word, filled) in entries {
+        let wide = text::width(&word, size) + 2.6 * size;
+        if x + wide > map.width() as f32 && x > pad {
+            (x, y) = (pad, y + 1.6 * size);
+        }
+        placed.push((x, y, color, word, filled));
+        x += wide;
+    }
+    let high = (y + 2.6 * size) as u32;
+    let mut out = RgbImage::from_pixel(map.width(), map.height() + high, Rgb(PAPER));
+    image::imageops::replace(&mut out, map, 0, 0);
+    let top = map.height() as f32 + 0.5 * size;
+    for (x, y, color, word, filled) in placed {
+        let dot = Vec2::new(x + 0.5 * size, top + y + 0.6 * size);
+        if filled {
+            disk(&mut out, dot, 0.5 * size, color);
+        } else {
+            circle(&mut out, dot, 0.45 * size, 0.22 * size, color);
+        }
+        text::draw(&mut out, (x + 1.4 * size, top + y), size, INK, Align::Left, &word);
+    }
+    out
+}
+
+/// Calls `paint` for the pixels between two corners, with their centers.
+fn for_pixels(image: &mut RgbImage, a: Vec2, b: Vec2, mut paint: impl FnMut(Vec2, &mut [u8; 3])) {
+    let clip = |x: f32, n: u32| x.clamp(0.0, n as f32) as u32;
+    let (low, high) = (a.min(b), a.max(b));
+    for y in clip(low.y, image.height())..clip(high.y + 1.0, image.height()) {
+        for x in clip(low.x, image.width())..clip(high.x + 1.0, image.width()) {
+            paint(Vec2::new(x as f32 + 0.5, y as f32 + 0.5), &mut image.get_pixel_mut(x, y).0);
+        }
+    }
+}
+
+fn disk(image: &mut RgbImage, at: Vec2, radius: f32, color: [u8; 3]) {
+    for_pixels(image, at - radius - 1.0, at + radius + 1.0, |p, pixel| {
+        blend(pixel, color, radius + 0.5 - (p - at).length_squared().sqrt());
+    });
+}
+
+fn circle(image: &mut RgbImage, at: Vec2, radius: f32, thick: f32, color: [u8; 3]) {
+    let reach = radius + thick + 1.0;
+    for_pixels(image, at - reach, at + reach, |p, pixel| {
+        let off = ((p - at).length_squared().sqrt() - radius).abs();
+        blend(pixel, color, 0.5 * thick + 0.5 - off);
+    });
+}
+
+fn line(image: &mut RgbImage, a: Vec2, b: Vec2, thick: f32, color: [u8; 3]) {
+    let reach = Vec2::splat(thick + 1.0);
+    let along = b - a;
+    let l2 = along.length_squared().max(1e-6);
+    for_pixels(image, a.min(b) - reach, a.max(b) + reach, |p, pixel| {
+        let t = ((p - a).dot(along) / l2).clamp(0.0, 1.0);
+        let off = (p - a - along * t).length_squared().sqrt();
+        blend(pixel, color, 0.5 * thick + 0.5 - off);
+    });
+}
+
+fn triangle(image: &mut RgbImage, [a, b, c]: [Vec2; 3], color: [u8; 3]) {
+    let side = |p: Vec2, q: Vec2, r: Vec2| (q - p).perp_dot(r - p);
+    let turn = side(a, b, c);
+    for_pixels(image, a.min(b).min(c), a.max(b).max(c), |p, pixel| {
+        if side(a, b, p) * turn >= 0.0 && side(b, c, p) * turn >= 0.0 && side(c, a, p) * turn >= 0.0
+        {
+            *pixel = color;
+        }
+    });
+}

@@ -1,0 +1,247 @@
+//! What a building is made of: floors, walls with their windows and door frames, ceilings with a
+//! lamp in each room.
+//!
+//! Walls stop bodies where their boxes say; boards, frames and panes stand out from them by a few
+//! centimetres at most and are only looked at.
+
+use chaic_core::catalogue::Finish;
+use chaic_core::geom::Rect;
+use chaic_core::{EntityId, Vec3};
+use chaic_world::{FloorMaterial, Room, RoomKind, Setup};
+use glam::Mat3;
+
+use crate::mesh::{self, Mesh, Skin};
+use crate::texture::Texture;
+
+mod joinery;
+mod walls;
+
+pub(crate) use walls::Line;
+
+/// Every mesh of the building, in the world's frame.
+pub(crate) fn of(setup: &Setup) -> Vec<(EntityId, Mesh)> {
+    let mut structure = Vec::new();
+    for (rect, material, color) in floor_pieces(setup) {
+        structure.push((EntityId::FLOOR, floor_mesh(&rect, material, color)));
+    }
+    let papers = walls::papers(setup);
+    for wall in &setup.walls {
+        structure.push((EntityId::WALL, walls::mesh(setup, wall, &papers)));
+    }
+    for opening in setup.openings.iter().take(MAX_PIECES) {
+        let meshes = joinery::door_frame(setup, opening).into_iter().flatten();
+        let meshes = meshes.filter(|m| !m.triangles.is_empty());
+        structure.extend(meshes.map(|m| (EntityId::WALL, m)));
+    }
+    if let Some(height) = setup.ceiling_m {
+        for rect in ceiling_pieces(setup) {
+            structure.push((EntityId::CEILING, ceiling_mesh(&rect, height)));
+        }
+        for room in indoors(setup).take(MAX_PIECES) {
+            structure.push((EntityId::CEILING, joinery::lamp(room, height)));
+        }
+    }
+    structure
+}
+
+fn indoors(setup: &Setup) -> impl Iterator<Item = &Room> {
+    setup.rooms.iter().filter(|r| r.kind != RoomKind::Outdoors)
+}
+
+/// More pieces of floor or ceiling than any street or house needs; bounds the work on odd input.
+const MAX_PIECES: usize = 4096;
+
+/// The floors without overlaps: where two overlap, the later one lies on top.
+fn floor_pieces(setup: &Setup) -> Vec<(Rect, FloorMaterial, [u8; 3])> {
+    let mut pieces: Vec<(Rect, FloorMaterial, [u8; 3])> = Vec::new();
+    for floor in setup.floors.iter().take(MAX_PIECES) {
+        let mut left = Vec::new();
+        for (rect, material, color) in pieces.drain(..) {
+            without(&rect, &floor.rect, |piece| left.push((piece, material, color)));
+        }
+        left.push((floor.rect, floor.material, floor.color));
+        left.truncate(MAX_PIECES);
+        pieces = left;
+    }
+    pieces
+}
+
+/// The ceilings of rooms, and what is left between them and the outermost walls: doorways and
+/// alcoves belong to no room.
+fn ceiling_pieces(setup: &Setup) -> Vec<Rect> {
+    /// Rooms end at the faces of walls; their ceilings go on into these, metres.
+    const INTO_WALL_M: f32 = 0.15;
+    let rooms = setup.rooms.iter().filter(|r| r.kind != RoomKind::Outdoors);
+    let mut pieces: Vec<Rect> = rooms.map(|r| r.rect.grown(INTO_WALL_M)).collect();
+    let ends = setup.walls.iter().flat_map(|w| [w.a, w.b]);
+    let house = ends.fold(setup.bounds, |r, p| Rect { min: r.min.min(p), max: r.max.max(p) });
+    let mut between = vec![house];
+    for room in &pieces {
+        let mut left = Vec::new();
+        for rect in between {
+            without(&rect, room, |piece| left.push(piece));
+        }
+        left.truncate(MAX_PIECES);
+        between = left;
+    }
+    // They overlap the ceilings of rooms by a millimetre, so that no pixel falls between them.
+    pieces.extend(between.iter().map(|r| r.grown(0.001)));
+    pieces
+}
+
+/// The parts of `rect` outside of `hole`.
+fn without(rect: &Rect, hole: &Rect, mut keep: impl FnMut(Rect)) {
+    let (low, high) = (rect.min.max(hole.min), rect.max.min(hole.max));
+    if low.x >= high.x || low.y >= high.y {
+        keep(*rect);
+        return;
+    }
+    let mut keep_some = |x0: f32, z0: f32, x1: f32, z1: f32| {
+        if x1 > x0 && z1 > z0 {
+            keep(Rect::new([x0, z0], [x1, z1]));
+        }
+    };
+    keep_some(rect.min.x, rect.min.y, low.x, rect.max.y);
+    keep_some(high.x, rect.min.y, rect.max.x, rect.max.y);
+    keep_some(low.x, rect.min.y, high.x, low.y);
+    keep_some(low.x, high.y, high.x, rect.max.y);
+}
+
+fn floor_mesh(rect: &Rect, material: FloorMaterial, color: [u8; 3]) -> Mesh {
+    // Neighbors overlap by a millimetre, so that no pixel falls between them.
+    let rect = rect.grown(0.001);
+    let mut mesh = Mesh::default();
+    let mut skin = Skin::new(color, Finish::Matte);
+    skin.texture = match material {
+        FloorMaterial::Wood => Texture::Planks,
+        FloorMaterial::Tiles => Texture::Tiles,
+        FloorMaterial::Carpet => Texture::Carpet,
+        FloorMaterial::Asphalt => Texture::Asphalt,
+        FloorMaterial::Pavement => Texture::Pavement,
+        FloorMaterial::Grass => Texture::Grass,
+    };
+    if matches!(material, FloorMaterial::Wood | FloorMaterial::Tiles) {
+        skin.gloss = mesh::Gloss::Satin;
+    }
+    // Planks run along the longer side.
+    if rect.size().y > rect.size().x {
+        skin.axes = Mat3::from_cols(Vec3::Z, Vec3::Y, Vec3::X);
+    }
+    mesh.skin(skin);
+    level_quad(&mut mesh, &rect, 0.0, false);
+    mesh.finish()
+}
+
+fn ceiling_mesh(rect: &Rect, height_m: f32) -> Mesh {
+    let mut mesh = Mesh::default();
+    mesh.skin(Skin::new([244, 243, 240], Finish::Matte));
+    level_quad(&mut mesh, rect, height_m, true);
+    mesh.finish()
+}
+
+fn level_quad(mesh: &mut Mesh, rect: &Rect, y: f32, downwards: bool) {
+    let (a, b) = (rect.min, rect.max);
+    let ring = [(a.x, a.y), (a.x, b.y), (b.x, b.y), (b.x, a.y)];
+    let mut vertices = ring.map(|(x, z)| mesh.vertex(Vec3::new(x, y, z), Vec3::Y));
+    if downwards {
+        vertices.reverse();
+    }
+    mesh.quad(vertices, false);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chaic_core::briefing::Goal;
+    use chaic_core::{Frame, TaskId, Vec2};
+    use chaic_world::{Opening, Wall};
+
+    /// Two rooms and a wall of 0.5 m between them with a doorway 0.9 m wide; an alcove is beside
+    /// the second.
+    fn two_rooms() -> Setup {
+        let room = |rect| Room { kind: RoomKind::Office, rect };
+        let wall = |a: [f32; 2], b: [f32; 2], [bottom_m, top_m]: [f32; 2]| Wall {
+            a: a.into(),
+            b: b.into(),
+            thickness_m: 0.5,
+            bottom_m,
+            top_m,
+            color: [230; 3],
+        };
+        Setup {
+            task: TaskId::NoConstraint,
+            seed: 0,
+            horizon: Frame::default(),
+            bounds: Rect::new([0.0, 0.0], [5.0, 4.0]),
+            ceiling_m: Some(3.0),
+            rooms: vec![
+                room(Rect::new([0.0, 0.0], [2.0, 4.0])),
+                room(Rect::new([2.5, 0.0], [5.0, 2.0])),
+            ],
+            // Boxes are half a thickness longer at either end.
+            walls: vec![
+                wall([2.25, 0.25], [2.25, 0.35], [0.0, 3.0]),
+                wall([2.25, 1.75], [2.25, 3.75], [0.0, 3.0]),
+                wall([2.25, 0.85], [2.25, 1.25], [2.1, 3.0]),
+                wall([0.25, -0.25], [4.75, -0.25], [0.0, 3.0]),
+            ],
+            openings: vec![Opening {
+                a: Vec2::new(2.25, 0.6),
+                b: Vec2::new(2.25, 1.5),
+                rooms: [0, 1],
+            }],
+            floors: Vec::new(),
+            things: Vec::new(),
+            people: Vec::new(),
+            goal: Goal { targets: Vec::new() },
+            goal_places: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn there_is_a_ceiling_over_every_room_and_doorway() {
+        let pieces = ceiling_pieces(&two_rooms());
+        for i in 0..50 {
+            for k in 0..40 {
+                let p = 0.1 * Vec2::new(i as f32 + 0.5, k as f32 + 0.5);
+                assert!(pieces.iter().any(|r| r.contains(p)), "none above {p}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_door_frame_leaves_the_way_free() {
+        let setup = two_rooms();
+        let [sides, above] = joinery::door_frame(&setup, &setup.openings[0]).expect("a frame");
+        for p in &sides.positions {
+            assert!(p.z < 0.61 || p.z > 1.49, "{p} stands in the way");
+        }
+        for p in sides.positions.iter().chain(&above.positions) {
+            assert!((p.x - 2.25).abs() < 0.28, "{p} is far off the wall");
+            assert!((0.5..1.6).contains(&p.z), "{p} is far off the doorway");
+        }
+        assert!(above.min.y > 2.0);
+    }
+
+    #[test]
+    fn windows_are_in_outer_walls_and_stand_out_little() {
+        let setup = two_rooms();
+        let papers = walls::papers(&setup);
+        let has_window: Vec<bool> = setup
+            .walls
+            .iter()
+            .map(|w| {
+                let mesh = walls::mesh(&setup, w, &papers);
+                let line = walls::Line::of(w);
+                for p in &mesh.positions {
+                    let d = Vec2::new(p.x, p.z) - line.middle;
+                    let off = (d.y * line.axis.x - d.x * line.axis.y).abs();
+                    assert!(off < line.half.y + 0.08, "{p}");
+                }
+                mesh.skins.iter().any(|skin| skin.gloss == mesh::Gloss::Pane)
+            })
+            .collect();
+        // The other walls are inner ones; one of them is beside an alcove.
+        assert_eq!(has_window, [false, false, false, true]);
+    }
+}

@@ -1,0 +1,57 @@
+//! Frames per second of the world alone, two agents acting at random:
+//! `cargo bench -p chaic-episodes --bench world`. One iteration is a whole episode.
+
+use std::hint::black_box;
+
+use chaic_core::rng::Stream;
+use chaic_core::{Action, EntityId, Hand, ResolvedAction};
+use chaic_episodes::find_episode;
+use chaic_world::{Rules, Setup, World};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+
+/// Half of all actions are steps, a quarter turns; the rest are interactions with things of the episode.
+fn any_action(rng: &mut Stream, n_things: usize) -> ResolvedAction {
+    let hand = if rng.chance(0.5) { Hand::Left } else { Hand::Right };
+    let thing = |rng: &mut Stream| -> EntityId { Setup::entity(rng.below(n_things)) };
+    match rng.below(16) {
+        0..8 => Action::MoveForward,
+        8..10 => Action::TurnLeft,
+        10..12 => Action::TurnRight,
+        12 => Action::PickUp { object: thing(rng), hand },
+        13 => Action::PutOn { place: thing(rng), hand },
+        14 => Action::RemoveObstacle { obstacle: thing(rng), hand },
+        _ => Action::PutIn,
+    }
+}
+
+/// Plays to the end; returns how often somebody acted.
+fn play(mut world: World) -> u64 {
+    let mut rng = Stream::new(7, "bench", 0);
+    let n_things = world.setup().things.len();
+    let mut n_actions = 0;
+    while !world.is_over() {
+        for agent in world.waiting() {
+            world.submit(agent, any_action(&mut rng, n_things)).expect("the agent is free");
+            n_actions += 1;
+        }
+        world.advance();
+        world.drain_events();
+    }
+    n_actions
+}
+
+fn frames(c: &mut Criterion) {
+    let mut group = c.benchmark_group("frames");
+    for id in ["no_constraint/test/00", "obstacle/test/00", "moving_house/test/00"] {
+        let episode = find_episode(id).expect("it is bundled");
+        let mut setup = episode.setup().clone();
+        setup.people.truncate(2);
+        group.throughput(Throughput::Elements(u64::from(setup.horizon)));
+        let world = World::new(setup, Rules::paper()).expect("bundled episodes are valid");
+        group.bench_function(id, |b| b.iter(|| black_box(play(world.clone()))));
+    }
+    group.finish();
+}
+
+criterion_group!(benches, frames);
+criterion_main!(benches);

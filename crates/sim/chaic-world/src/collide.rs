@@ -1,0 +1,254 @@
+//! How upright bodies get past each other and past what stands around.
+//!
+//! A body is an upright cylinder, everything else an upright box or another cylinder, so that all
+//! of it happens in plan. A frame's step is shorter than any body is wide: the body is moved and
+//! then pushed out of what it would overlap, which lets it slide along what it meets at an angle
+//! and stops it head on.
+
+use chaic_core::geom::{Rect, xz};
+use chaic_core::{Vec2, Vec3};
+
+use crate::shape::Block;
+
+/// Fixed boxes, found by where they are.
+#[derive(Clone, Debug)]
+pub(crate) struct BlockIndex {
+    blocks: Vec<Block>,
+    bounds: Rect,
+    columns: usize,
+    rows: usize,
+    /// Per cell, the range of `members` that touch it.
+    cells: Vec<(u32, u32)>,
+    members: Vec<u32>,
+}
+
+/// A cylinder to stay clear of: another person.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Disc {
+    pub center: Vec2,
+    pub radius_m: f32,
+}
+
+/// An upright cylinder that moves.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Body {
+    pub radius_m: f32,
+    /// Lower things are stepped over.
+    pub low_m: f32,
+    pub high_m: f32,
+}
+
+impl Body {
+    /// Whether this body, standing at `p`, touches a box.
+    pub fn touches(&self, block: &Block, p: Vec2) -> bool {
+        let [low, high] = block.y_range();
+        let (nearest, inside) = block.nearest_in_plan(Vec3::new(p.x, 0.0, p.y));
+        high > self.low_m
+            && low < self.high_m
+            && (inside || p.distance(xz(nearest)) < self.radius_m)
+    }
+}
+
+/// Side of a grid cell, metres: a body and its step touch at most four.
+const CELL_M: f32 = 1.0;
+/// How often overlaps are pushed apart; corners need two, slits a few more.
+const ROUNDS: usize = 4;
+/// An overlap that is as good as none, metres.
+const TOLERANCE_M: f32 = 1e-3;
+
+impl BlockIndex {
+    pub fn new(blocks: Vec<Block>, bounds: Rect) -> BlockIndex {
+        let bounds = bounds.grown(CELL_M);
+        let size = bounds.size();
+        let columns = (size.x / CELL_M).ceil().max(1.0) as usize;
+        let rows = (size.y / CELL_M).ceil().max(1.0) as usize;
+        let mut lists = vec![Vec::new(); columns * rows];
+        // Bodies reach up to a metre beyond their middle (`Setup::check`).
+        let margin = 1.0;
+        for (i, block) in blocks.iter().enumerate() {
+            let (c, r) = (xz(block.center), block.plan_radius() + margin);
+            let cell = |v: f32, low: f32, n: usize| {
+                (((v - low) / CELL_M).floor().max(0.0) as usize).min(n - 1)
+            };
+            let columns_touched =
+                cell(c.x - r, bounds.min.x, columns)..=cell(c.x + r, bounds.min.x, columns);
+            let rows_touched =
+                cell(c.y - r, bounds.min.y, rows)..=cell(c.y + r, bounds.min.y, rows);
+            for row in rows_touched {
+                for column in columns_touched.clone() {
+                    let middle =
+                        bounds.min + Vec2::new(column as f32 + 0.5, row as f32 + 0.5) * CELL_M;
+                    let (nearest, _) = block.nearest_in_plan(Vec3::new(middle.x, 0.0, middle.y));
+                    if xz(nearest).distance(middle) <= 0.71 * CELL_M + margin {
+                        lists[row * columns + column].push(i as u32);
+                    }
+                }
+            }
+        }
+        let mut cells = Vec::with_capacity(lists.len());
+        let mut members = Vec::new();
+        for list in lists {
+            let start = members.len() as u32;
+            members.extend(list);
+            cells.push((start, members.len() as u32));
+        }
+        BlockIndex { blocks, bounds, columns, rows, cells, members }
+    }
+
+    /// The boxes that a body at `p` could touch.
+    pub fn near(&self, p: Vec2) -> impl Iterator<Item = &Block> {
+        let cell = ((p - self.bounds.min) / CELL_M).floor();
+        let column = (cell.x.max(0.0) as usize).min(self.columns - 1);
+        let row = (cell.y.max(0.0) as usize).min(self.rows - 1);
+        let (start, end) = self.cells[row * self.columns + column];
+        self.members[start as usize..end as usize].iter().map(|i| &self.blocks[*i as usize])
+    }
+
+    /// All boxes.
+    pub fn blocks(&self) -> &[Block] {
+        &self.blocks
+    }
+
+    /// Where a body ends up that wants to go from `from` to `to`, a step of less than its radius.
+    pub fn slide(
+        &self,
+        body: Body,
+        from: Vec2,
+        to: Vec2,
+        movable: &[Block],
+        people: &[Disc],
+    ) -> Vec2 {
+        let inner = self.bounds.grown(-CELL_M);
+        let mut p = to.clamp(inner.min, inner.max);
+        for _ in 0..ROUNDS {
+            let (pushed, overlap) = self.push_out(body, p, movable, people);
+            if overlap <= TOLERANCE_M {
+                return p;
+            }
+            p = pushed.clamp(inner.min, inner.max);
+        }
+        let left = self.push_out(body, p, movable, people).1;
+        // Wedged: stay, unless staying is the tighter spot.
+        if left <= TOLERANCE_M || left < self.push_out(body, from, movable, people).1 {
+            p
+        } else {
+            from
+        }
+    }
+
+    /// How deep a body at `p` is in what it touches, metres.
+    pub fn overlap(&self, body: Body, p: Vec2, movable: &[Block], people: &[Disc]) -> f32 {
+        self.push_out(body, p, movable, people).1
+    }
+
+    /// The position pushed out of everything in turn, and the deepest overlap found on the way.
+    fn push_out(&self, body: Body, p: Vec2, movable: &[Block], people: &[Disc]) -> (Vec2, f32) {
+        let mut at = p;
+        let mut deepest: f32 = 0.0;
+        for block in self.near(p).chain(movable) {
+            let [low, high] = block.y_range();
+            if high <= body.low_m || low >= body.high_m {
+                continue;
+            }
+            let (nearest, inside) = block.nearest_in_plan(Vec3::new(at.x, 0.0, at.y));
+            let away = at - xz(nearest);
+            let distance = away.length();
+            if inside {
+                let (out, depth) = way_out(block, at);
+                deepest = deepest.max(depth + body.radius_m);
+                at += out * (depth + body.radius_m);
+            } else if distance < body.radius_m {
+                deepest = deepest.max(body.radius_m - distance);
+                at += away * ((body.radius_m - distance) / distance);
+            }
+        }
+        for disc in people {
+            let away = at - disc.center;
+            let (distance, least) = (away.length(), body.radius_m + disc.radius_m);
+            if distance < least {
+                deepest = deepest.max(least - distance);
+                let direction = if distance > 1e-6 { away / distance } else { Vec2::X };
+                at += direction * (least - distance);
+            }
+        }
+        (at, deepest)
+    }
+}
+
+/// The shortest way out of a box for a point inside it: direction and distance.
+fn way_out(block: &Block, p: Vec2) -> (Vec2, f32) {
+    let d = Vec3::new(p.x - block.center.x, 0.0, p.y - block.center.z);
+    let local = chaic_core::geom::rotate_yaw(d, -block.yaw_rad);
+    let (dx, dz) = (block.half.x - local.x.abs(), block.half.z - local.z.abs());
+    let direction = if dx < dz {
+        Vec3::new(if local.x < 0.0 { -1.0 } else { 1.0 }, 0.0, 0.0)
+    } else {
+        Vec3::new(0.0, 0.0, if local.z < 0.0 { -1.0 } else { 1.0 })
+    };
+    (xz(chaic_core::geom::rotate_yaw(direction, block.yaw_rad)), dx.min(dz))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chaic_core::EntityId;
+
+    const WALKER: Body = Body { radius_m: 0.2, low_m: 0.12, high_m: 1.75 };
+    const WHEELCHAIR: Body = Body { radius_m: 0.35, low_m: 0.12, high_m: 1.35 };
+
+    fn block(center: [f32; 3], half: [f32; 3]) -> Block {
+        Block { center: center.into(), half: half.into(), yaw_rad: 0.0, entity: EntityId::WALL }
+    }
+
+    /// A wall along x at z = 0 with a doorway of 1.2 m around x = 0, and a bin 0.48 m wide in it.
+    fn doorway() -> BlockIndex {
+        let walls = vec![
+            block([-2.6, 1.5, 0.0], [2.0, 1.5, 0.06]),
+            block([2.6, 1.5, 0.0], [2.0, 1.5, 0.06]),
+            block([0.3, 0.28, 0.0], [0.24, 0.28, 0.24]),
+        ];
+        BlockIndex::new(walls, Rect::new([-5.0, -5.0], [5.0, 5.0]))
+    }
+
+    fn walk(s: &BlockIndex, body: Body, from: Vec2, direction: Vec2, steps: usize) -> Vec2 {
+        (0..steps).fold(from, |p, _| s.slide(body, p, p + 0.047 * direction, &[], &[]))
+    }
+
+    #[test]
+    fn a_half_closed_doorway_stops_a_wheelchair_and_lets_a_walker_through() {
+        let s = doorway();
+        let from = Vec2::new(-0.25, 2.0);
+        assert!(walk(&s, WALKER, from, Vec2::NEG_Y, 80).y < -1.0);
+        assert!(walk(&s, WHEELCHAIR, from, Vec2::NEG_Y, 80).y > 0.2);
+    }
+
+    #[test]
+    fn a_wall_stops_head_on_and_lets_slide_along() {
+        let s = doorway();
+        let p = walk(&s, WALKER, Vec2::new(2.0, 1.0), Vec2::NEG_Y, 100);
+        assert!((p.y - 0.26).abs() < 2e-3 && (p.x - 2.0).abs() < 1e-3, "{p}");
+        let p = walk(&s, WALKER, Vec2::new(2.0, 0.3), Vec2::new(0.8, -0.6), 40);
+        assert!(p.x > 3.2 && p.y > 0.25, "{p}");
+    }
+
+    #[test]
+    fn nobody_walks_through_a_person_or_out_of_bounds() {
+        let s = doorway();
+        let other = Disc { center: Vec2::new(0.0, 2.0), radius_m: 0.2 };
+        let mut p = Vec2::new(0.0, 3.0);
+        for _ in 0..60 {
+            p = s.slide(WALKER, p, p + Vec2::new(0.0, -0.047), &[], &[other]);
+            assert!(p.distance(other.center) > 0.398, "{p}");
+        }
+        assert!(walk(&s, WALKER, Vec2::new(4.0, 3.0), Vec2::X, 200).x <= 5.0);
+    }
+
+    #[test]
+    fn low_things_are_stepped_over() {
+        let rug = BlockIndex::new(
+            vec![block([0.0, 0.05, 0.0], [1.0, 0.05, 1.0])],
+            Rect::new([-5.0, -5.0], [5.0, 5.0]),
+        );
+        assert!(walk(&rug, WALKER, Vec2::new(0.0, 2.0), Vec2::NEG_Y, 100).y < -2.0);
+    }
+}

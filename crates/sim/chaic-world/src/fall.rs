@@ -1,0 +1,208 @@
+//! How things that were let go come to rest.
+//!
+//! The whole fall is worked out when it begins, by a small rigid-body simulation of what begins to
+//! fall at that moment among what stands near it, and then played back frame by frame. So physics
+//! is a pure function, the state stays plain data, and a frame in which nothing falls costs nothing.
+
+use chaic_core::{EntityId, Quat, Vec3};
+use rapier3d::prelude::*;
+
+use crate::shape::Block;
+
+/// What falls.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Falling {
+    pub entity: EntityId,
+    /// Middle of its bottom, metres.
+    pub position: Vec3,
+    pub rotation: Quat,
+    /// Extents, metres.
+    pub size: Vec3,
+    pub mass_kg: f32,
+}
+
+/// A box that doesn't move meanwhile.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Obstacle {
+    pub center: Vec3,
+    pub half: Vec3,
+    pub rotation: Quat,
+    pub entity: EntityId,
+}
+
+impl From<&Block> for Obstacle {
+    fn from(block: &Block) -> Obstacle {
+        Obstacle {
+            center: block.center,
+            half: block.half,
+            rotation: chaic_core::geom::yaw_rotation(block.yaw_rad),
+            entity: block.entity,
+        }
+    }
+}
+
+/// Where it goes.
+#[derive(Clone, Debug)]
+pub(crate) struct Fall {
+    /// Position and rotation after each frame, first to last; never empty.
+    pub path: Vec<(Vec3, Quat)>,
+    /// What it lies on in the end, if not the ground.
+    pub on: Option<EntityId>,
+}
+
+/// Longest fall, frames: from 3 m it takes 78, the rest is for rolling and sliding.
+const MAX_FRAMES: usize = 240;
+/// Slower than this for [`STILL_FRAMES`] is at rest, m/s (the original: 1 mm a frame).
+const STILL_M_PER_S: f32 = 0.03;
+const STILL_FRAMES: usize = 4;
+/// Sliding friction of household things on wood or cloth.
+const FRICTION: f32 = 0.8;
+
+/// Lets things fall together among `obstacles` above the ground at y = 0, until all lie still.
+pub(crate) fn fall(things: &[Falling], obstacles: &[Obstacle], step_s: f32) -> Vec<Fall> {
+    let mut world = PhysicsWorld::new();
+    world.gravity = Vector::new(0.0, -9.81, 0.0);
+    world.integration_parameters.dt = step_s;
+    for o in obstacles {
+        let collider = ColliderBuilder::cuboid(o.half.x, o.half.y, o.half.z)
+            .position(rapier3d::math::Pose::from_parts(o.center, o.rotation))
+            .friction(FRICTION)
+            .user_data(u128::from(o.entity.0));
+        world.colliders.insert(collider);
+    }
+    world.colliders.insert(
+        ColliderBuilder::halfspace(rapier3d::na::Unit::new_unchecked(Vector::Y))
+            .friction(FRICTION)
+            .user_data(u128::from(EntityId::FLOOR.0)),
+    );
+    let bodies: Vec<(RigidBodyHandle, ColliderHandle)> =
+        things.iter().map(|thing| add(&mut world, thing)).collect();
+    let mut falls = vec![Fall { path: Vec::new(), on: None }; things.len()];
+    let mut still = 0;
+    for _ in 0..MAX_FRAMES {
+        world.step();
+        let mut is_still = true;
+        for ((body, collider), (thing, fall)) in bodies.iter().zip(things.iter().zip(&mut falls)) {
+            let b = &world.bodies[*body];
+            let rotation = *b.rotation();
+            let bottom = b.translation() - rotation * (Vec3::Y * (0.5 * thing.size.y));
+            fall.path.push((bottom, rotation));
+            let touches = world.contact_pairs_with(*collider).any(|p| p.has_any_active_contact());
+            let slow =
+                b.linvel().length() < STILL_M_PER_S && b.angvel().length() < 10.0 * STILL_M_PER_S;
+            is_still &= touches && slow;
+        }
+        still = if is_still { still + 1 } else { 0 };
+        if still >= STILL_FRAMES {
+            break;
+        }
+    }
+    for ((_, collider), fall) in bodies.iter().zip(&mut falls) {
+        fall.on = support(&world, *collider);
+    }
+    falls
+}
+
+fn add(world: &mut PhysicsWorld, thing: &Falling) -> (RigidBodyHandle, ColliderHandle) {
+    let half = 0.5 * thing.size;
+    let center = thing.position + thing.rotation * (Vec3::Y * half.y);
+    let body = world.bodies.insert(
+        RigidBodyBuilder::dynamic()
+            .pose(rapier3d::math::Pose::from_parts(center, thing.rotation))
+            .angular_damping(2.0)
+            .linear_damping(0.1)
+            .can_sleep(false)
+            .ccd_enabled(true),
+    );
+    let collider = world.colliders.insert_with_parent(
+        ColliderBuilder::cuboid(half.x, half.y, half.z)
+            .friction(FRICTION)
+            .mass(thing.mass_kg.max(0.01))
+            .user_data(u128::from(thing.entity.0)),
+        body,
+        &mut world.bodies,
+    );
+    (body, collider)
+}
+
+/// What carries the fallen thing: among what touches it, the one touched lowest.
+fn support(world: &PhysicsWorld, collider: ColliderHandle) -> Option<EntityId> {
+    let mut lowest: Option<(f32, u16)> = None;
+    for pair in world.contact_pairs_with(collider).filter(|p| p.has_any_active_contact()) {
+        let (other, own_is_first) = if pair.collider1 == collider {
+            (pair.collider2, true)
+        } else {
+            (pair.collider1, false)
+        };
+        let entity = world.colliders[other].user_data as u16;
+        let own_pose = world.colliders[collider].position();
+        for manifold in pair.manifolds() {
+            for point in &manifold.points {
+                let local = if own_is_first { point.local_p1 } else { point.local_p2 };
+                let local = Vec3::from_array([local.x, local.y, local.z]);
+                let y = (own_pose.rotation * local + own_pose.translation).y;
+                if lowest.is_none_or(|(best, e)| (y, entity) < (best, e)) {
+                    lowest = Some((y, entity));
+                }
+            }
+        }
+    }
+    lowest.map(|(_, e)| EntityId(e)).filter(|e| e.is_object())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn apple_at(position: Vec3) -> Falling {
+        let (entity, size) = (EntityId(21), Vec3::splat(0.1));
+        Falling { entity, position, rotation: Quat::IDENTITY, size, mass_kg: 0.2 }
+    }
+
+    fn fall_alone(thing: Falling, obstacles: &[Obstacle]) -> Fall {
+        super::fall(&[thing], obstacles, 0.01).remove(0)
+    }
+
+    #[test]
+    fn what_falls_together_ends_up_beside_or_upon_each_other() {
+        let other = Falling { entity: EntityId(22), ..apple_at(Vec3::new(0.12, 1.1, 0.01)) };
+        let falls = super::fall(&[apple_at(Vec3::new(0.1, 0.95, 0.0)), other], &[table()], 0.01);
+        let ends = falls.iter().map(|fall| fall.path.last().unwrap().0).collect::<Vec<_>>();
+        assert!(ends[0].distance(ends[1]) > 0.09, "{ends:?} are in each other");
+        assert!(falls.iter().all(|fall| fall.on.is_some()), "both lie on something");
+        assert_eq!(falls[0].path.len(), falls[1].path.len());
+    }
+
+    fn table() -> Obstacle {
+        Obstacle {
+            center: Vec3::new(0.0, 0.375, 0.0),
+            half: Vec3::new(0.6, 0.375, 0.4),
+            rotation: Quat::IDENTITY,
+            entity: EntityId(20),
+        }
+    }
+
+    #[test]
+    fn a_drop_lands_on_what_is_below_it() {
+        let fall = fall_alone(apple_at(Vec3::new(0.1, 0.95, 0.0)), &[table()]);
+        let (end, _) = *fall.path.last().unwrap();
+        assert!((end.y - 0.75).abs() < 0.01, "{end}");
+        assert_eq!(fall.on, Some(EntityId(20)));
+        // 0.2 m at 9.81 m/s^2 takes 0.202 s, 20 frames, and a few more to lie still.
+        assert!((20..60).contains(&fall.path.len()), "{} frames", fall.path.len());
+    }
+
+    #[test]
+    fn a_drop_beside_it_lands_on_the_ground() {
+        let fall = fall_alone(apple_at(Vec3::new(1.0, 0.95, 0.0)), &[table()]);
+        let (end, _) = *fall.path.last().unwrap();
+        assert!(end.y.abs() < 0.01, "{end}");
+        assert_eq!(fall.on, None);
+    }
+
+    #[test]
+    fn the_same_fall_has_the_same_bits() {
+        let run = || fall_alone(apple_at(Vec3::new(0.58, 0.9, 0.02)), &[table()]).path;
+        assert_eq!(run(), run());
+    }
+}

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes docs/language-prompts.md: a prompt of each task, one that tells more, one of a partner, a record.
+"""Makes docs/reference/language-prompts.md: a prompt of each task, one that tells more, one of a partner, a record.
 
 Plays the first test episode of each task with the stand-in for a language model, and takes of each run
 the longest of the later prompts, in which most has happened.
@@ -19,7 +19,7 @@ import sys
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 from programs import ROOT, programs, serving  # noqa: E402
 
-PAGE = ROOT / "docs/language-prompts.md"
+PAGE = ROOT / "docs/reference/language-prompts.md"
 TITLES = {
     "no_constraint": "No constraint",
     "high_target": "High target",

@@ -163,7 +163,7 @@ class World:
     def score(self) -> dict[str, Any]:
         """The score so far: `frame`, `done`, `total`, `complete`; TR is `done / total`."""
     def take_events(self) -> list[dict[str, Any]]:
-        """What happened since this was last asked (docs/trace.md)."""
+        """What happened since this was last asked (docs/reference/trace.md)."""
     def digest(self) -> str:
         """A number that differs between different states of the world, and is the same for equal ones."""
     def snapshot(self) -> Snapshot:

@@ -241,7 +241,7 @@ class Run:
         return found
 
     def results(self) -> list[dict[str, Any]]:
-        """All that is known of each episode run (docs/trace.md), in the order of their keys."""
+        """All that is known of each episode run (docs/reference/trace.md), in the order of their keys."""
         path = self.path / "results.jsonl"
         if not path.exists():
             return []

@@ -242,7 +242,7 @@ impl World {
         score(py, self.env()?)
     }
 
-    /// What happened since this was last asked (docs/trace.md).
+    /// What happened since this was last asked (docs/reference/trace.md).
     fn take_events<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let events = PyList::empty(py);
         for event in std::mem::take(&mut self.events) {

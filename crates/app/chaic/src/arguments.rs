@@ -47,7 +47,7 @@ fn partner_is_help() -> String {
 #[command(name = "chaic", version, arg_required_else_help = true)]
 #[command(
     after_help = "Exit codes: 0 well, 1 failed or found something wrong, 2 can't be asked for, \
-                        130 Ctrl-C; docs/exit-codes.md."
+                        130 Ctrl-C; docs/reference/exit-codes.md."
 )]
 pub struct Arguments {
     /// What to do.
@@ -93,7 +93,7 @@ pub enum Command {
     /// Write a scene for other programs.
     #[command(subcommand)]
     Scene(SceneCommand),
-    /// Measure what this machine reaches; docs/performance.md.
+    /// Measure what this machine reaches; docs/contributing/performance.md.
     #[command(subcommand)]
     Bench(BenchCommand),
     /// Turn episodes from elsewhere into episode files.

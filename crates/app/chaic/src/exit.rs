@@ -1,4 +1,4 @@
-//! Exit codes; `docs/exit-codes.md` has the same table for users.
+//! Exit codes; `docs/reference/exit-codes.md` has the same table for users.
 
 use chaic_env::EnvError;
 use chaic_episodes::SplitError;

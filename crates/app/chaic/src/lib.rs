@@ -20,7 +20,7 @@ use clap::Parser as _;
 use crate::arguments::{Arguments, Command};
 
 /// Runs the command with these arguments, the first of which is its name, and returns its exit code
-/// (docs/exit-codes.md). It takes Ctrl-C for itself, so that a process should do it once and end.
+/// (docs/reference/exit-codes.md). It takes Ctrl-C for itself, so that a process should do it once and end.
 /// `launcher` starts the sandboxes of helpers in other processes.
 pub fn run(arguments: impl IntoIterator<Item = OsString>, launcher: &Launcher) -> u8 {
     let command = match Arguments::try_parse_from(arguments) {

@@ -1,12 +1,12 @@
 //! Promise: who reads "facts" and a section's number in a comment finds that section in
-//! `docs/original-facts.md`. It has caught numbers that were sections of two documents at once.
+//! `docs/reference/original-facts.md`. It has caught numbers that were sections of two documents at once.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The page that is cited.
-const PAGE: &str = "docs/original-facts.md";
+const PAGE: &str = "docs/reference/original-facts.md";
 /// Where citations are looked for.
 const FOLDERS: [&str; 4] = ["benches", "crates", "docs", "examples"];
 /// What a sentence may put between "facts" and the number.

@@ -15,9 +15,9 @@
 //! - A run folder is readable after a crash at any moment; at most the episodes under way are
 //!   lost.
 
-/// The examples of docs/extending.md, so that they are compiled and run with the tests.
+/// The examples of docs/contributing/extending.md, so that they are compiled and run with the tests.
 #[cfg(doctest)]
-#[doc = include_str!("../../../../docs/extending.md")]
+#[doc = include_str!("../../../../docs/contributing/extending.md")]
 struct Extending;
 
 mod episode_file;

@@ -222,7 +222,7 @@ fn what_is_missing_is_said_first() {
 #[test]
 fn what_was_written_by_hand_is_kept() {
     let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("docs/fidelity.md");
+    let path = dir.path().join("docs/reference/fidelity.md");
     let plan = plan();
     let parts = states(&plan);
     let write = || write_document(Sheet { plan: &plan, parts: &parts }, &path);

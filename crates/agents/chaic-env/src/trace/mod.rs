@@ -1,7 +1,7 @@
 //! What happened in one episode, as lines that are only ever appended.
 //!
 //! A trace is JSON lines: a [`Header`], then [`Record`]s in the order in which they happened, the
-//! last of which is an [`End`]. `docs/trace.md` describes the format for other programs.
+//! last of which is an [`End`]. `docs/reference/trace.md` describes the format for other programs.
 
 mod parse;
 mod record;

@@ -2,7 +2,7 @@
 //!
 //! A run folder holds `run.json` (what is played), `results.jsonl` (a line for each finished
 //! episode run), `traces/`, copies of episode files in `episodes/`, and, once finished, the
-//! report. `docs/trace.md` describes them.
+//! report. `docs/reference/trace.md` describes them.
 
 mod environment;
 mod estimate;

@@ -1,4 +1,4 @@
-"""The programs that commands of these folders run: those in the folder BIN, or built here."""
+"""Programs for the scripts of these folders: from the folder BIN, or built here."""
 
 import contextlib
 import os
@@ -10,7 +10,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 
 
 def programs():
-    """Paths of chaic and of the stand-in for a language model."""
+    """Returns the paths of chaic and of the stand-in for a language model."""
     names = ("chaic", "chaic-llm-standin")
     if folder := os.environ.get("BIN"):
         return [pathlib.Path(folder).resolve() / name for name in names]
@@ -21,7 +21,7 @@ def programs():
 
 @contextlib.contextmanager
 def serving(standin, *options):
-    """Runs the stand-in, and gives its address."""
+    """Runs the stand-in and yields its address."""
     command = [standin, "--port", "0", *options]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:

@@ -1,4 +1,4 @@
-"""Copies the docstrings of the package's Rust part into its type stubs, for editors that read nothing else.
+"""Copies the docstrings of the native module into its type stubs, for editors that read only stubs.
 
     python python/stub_docs.py [--check]
 """
@@ -15,12 +15,12 @@ from chaic import _chaic
 STUBS = Path(__file__).parent / "chaic" / "_chaic.pyi"
 
 
-def documented(text: str) -> str:
-    """The stubs with the docstrings that there are now, in place of any others."""
+def with_docstrings(text: str) -> str:
+    """Returns the stubs with their docstrings replaced by those of the installed module."""
     lines = text.splitlines()
-    # From the last to the first, so that numbers of lines above stay as they are.
-    for node, what in reversed(list(_definitions(ast.parse(text)))):
-        doc = (what.__doc__ or "").strip()
+    # The order from last to first keeps the line numbers of earlier definitions valid.
+    for node, item in reversed(list(_definitions(ast.parse(text)))):
+        doc = (item.__doc__ or "").strip()
         body = node.body[0]
         has_doc = isinstance(body, ast.Expr) and isinstance(getattr(body.value, "value", None), str)
         if has_doc:
@@ -51,7 +51,7 @@ def documented(text: str) -> str:
 
 
 def _definitions(tree: ast.Module) -> Any:
-    """Classes, functions and methods of the stubs, each with what it is when the package runs."""
+    """Yields the classes, functions and methods of the stubs with their runtime objects."""
     for node in tree.body:
         if isinstance(node, ast.ClassDef):
             owner = getattr(_chaic, node.name)
@@ -65,10 +65,11 @@ def _definitions(tree: ast.Module) -> Any:
 
 def main() -> None:
     text = STUBS.read_text()
-    fresh = documented(text)
+    updated = with_docstrings(text)
     if sys.argv[1:] == ["--check"]:
-        sys.exit(f"{STUBS.name} is older than the docstrings: run python/stub_docs.py" if fresh != text else 0)
-    STUBS.write_text(fresh)
+        problem = f"{STUBS.name} differs from the docstrings of the module; run python/stub_docs.py"
+        sys.exit(problem if updated != text else 0)
+    STUBS.write_text(updated)
 
 
 if __name__ == "__main__":

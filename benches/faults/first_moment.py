@@ -1,20 +1,18 @@
 #!/usr/bin/env python3
-"""Kills a run at every system call of its first moment, and plays it again.
+"""Kills a run at every system call of its first moment, and completes it.
 
-A first run is traced: its main thread's system calls from the first that names the run's folder
-to the end, or to the first --seconds of it. For each of them another run is killed as it enters the
-call. Then the run is resumed if its folder is a run, and else begun again by the same command. At
-the end all files must be those of a run that nobody disturbed, byte by byte (but for the order of lines in
-`results.jsonl`). Prints a line for each
-failure and the counts, and exits with 1 if there was a failure.
+The script traces the system calls of a first run's main thread, from the first call that names the
+run's folder, for --seconds. For each call it kills another run at the entry of that call. It then
+resumes the run if its folder holds run.json, and otherwise starts it again. All files must equal
+those of an undisturbed run byte by byte, except for the order of lines in `results.jsonl`. Prints a
+line for each failure and the counts; the exit status is 1 after a failure.
 
 usage: benches/faults/first_moment.py [--out DIR] [--seconds 1] [--every 1] [--model]
 
---model plays a helper that asks the stand-in for a language model, which adds settings and templates
-to what a beginning writes. Needs Linux and strace (Debian: apt-get install strace).
+--model plays a language helper on the stand-in, so the run also writes settings and templates. Needs Linux and strace (Debian: apt-get install strace).
 
 Environment:
-  BIN   folder of built programs (usual: built by cargo build --release)
+  BIN   folder of built programs (default: built by cargo build --release)
 """
 
 import argparse
@@ -29,7 +27,7 @@ import sys
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 from programs import ROOT, programs, serving  # noqa: E402
 
-# Enough for some decisions of everybody, and no more.
+# Enough for a few decisions of each agent.
 FRAMES = 40
 TASKS = ("no_constraint", "shopping")
 CALL = re.compile(r"^(\d+) +(\d+\.\d+) (\w+)\(")
@@ -38,9 +36,9 @@ CALL = re.compile(r"^(\d+) +(\d+\.\d+) (\w+)\(")
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--out", type=pathlib.Path, default=ROOT / "target/first_moment")
-    parser.add_argument("--seconds", type=float, default=1.0, help="of the traced run")
-    parser.add_argument("--every", type=int, default=1, help="kill at every N-th call only")
-    parser.add_argument("--model", action="store_true", help="with a language helper")
+    parser.add_argument("--seconds", type=float, default=1.0, help="traced duration")
+    parser.add_argument("--every", type=int, default=1, help="kill only at every N-th call")
+    parser.add_argument("--model", action="store_true", help="play a language helper")
     return parser.parse_args()
 
 
@@ -54,10 +52,10 @@ def short_episodes(chaic, folder):
         path.write_text(json.dumps(episode))
 
 
-def calls_of(log, folder, seconds):
-    """The main thread's calls as (name, how many of this name so far), from the first that names
-    the folder on."""
-    counts, calls, main, begin = collections.Counter(), [], None, None
+def main_thread_calls(log, folder, seconds):
+    """Returns the main thread's calls from the first that names the folder, as (name, count of this
+    name so far)."""
+    counts, calls, main, start = collections.Counter(), [], None, None
     for line in log.read_text(errors="replace").splitlines():
         if not (match := CALL.match(line)):
             continue
@@ -66,22 +64,22 @@ def calls_of(log, folder, seconds):
         if thread != main:
             continue
         counts[name] += 1
-        if begin is None and f'{folder.name}' in line and name != "execve":
-            begin = time
-        if begin is not None and time - begin <= seconds:
+        if start is None and folder.name in line and name != "execve":
+            start = time
+        if start is not None and time - start <= seconds:
             calls.append((name, counts[name]))
     return calls
 
 
 def files(folder):
-    """All that a run leaves, but the lock and what the language model was asked. Results stand in the
-    order of their ending, which is nobody's promise, so their lines are sorted."""
+    """Returns the files of a run by path, without the lock and the language model's records. Sorts the
+    lines of results.jsonl, whose order is not specified."""
     paths = (p for p in folder.rglob("*") if p.is_file() and p.name != ".lock")
     found = {str(p.relative_to(folder)): p.read_bytes() for p in paths}
     if results := found.get("results.jsonl"):
         found["results.jsonl"] = b"".join(sorted(results.splitlines(keepends=True)))
-    is_asked = re.compile(r"llm/(?!settings|templates)").match
-    return {name: data for name, data in found.items() if not is_asked(name)}
+    is_model_record = re.compile(r"llm/(?!settings|templates)").match
+    return {name: data for name, data in found.items() if not is_model_record(name)}
 
 
 def differences(a, b):
@@ -92,14 +90,13 @@ def run(command):
     return subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
 
 
-def again(chaic, begin, asked, folder):
-    """Plays what was killed to its end; gives what is wrong, if anything is."""
+def complete(chaic, start, model_options, folder):
+    """Completes a killed run; returns an error message, or None."""
     is_run = (folder / "run.json").exists()
-    resume = [chaic, "eval", "--resume", *asked, "--out", folder]
-    command = resume if is_run else begin
-    ended = run(command)
+    resume = [chaic, "eval", "--resume", *model_options, "--out", folder]
+    ended = run(resume if is_run else start)
     if ended.returncode != 0:
-        how = "resumed" if is_run else "begun again"
+        how = "resumed" if is_run else "started again"
         return f"{how}: exit code {ended.returncode}: {ended.stderr.strip()}"
     return None
 
@@ -116,28 +113,28 @@ def main():
         return kill_everywhere(args, chaic, ["--endpoint", address, "--model", "standin"])
 
 
-def kill_everywhere(args, chaic, asked):
+def kill_everywhere(args, chaic, model_options):
     folder = args.out / "run"
-    helper = "llm" if asked else "none"
+    helper = "llm" if model_options else "none"
     eval_ = [chaic, "eval", "--episodes", args.out / "episodes", "--helper", helper, "--jobs", "1"]
-    begin = [*eval_, "--size", "16", *asked, "--out", folder]
+    start = [*eval_, "--size", "16", *model_options, "--out", folder]
     log = args.out / "calls.log"
-    traced = run(["strace", "-f", "-ttt", "-o", log, *begin])
+    traced = run(["strace", "-f", "-ttt", "-o", log, *start])
     if traced.returncode != 0:
-        sys.exit(f"the first run fails: {traced.stderr}")
+        sys.exit(f"the first run failed: {traced.stderr}")
     expected = files(folder)
-    calls = calls_of(log, folder, args.seconds)[:: args.every]
+    calls = main_thread_calls(log, folder, args.seconds)[:: args.every]
     failures, killed, states = 0, 0, collections.Counter()
     for name, k in calls:
         shutil.rmtree(folder, ignore_errors=True)
         kill = f"inject={name}:signal=KILL:when={k}"
-        ended = run(["strace", "-f", "-o", "/dev/null", "-e", kill, *begin])
+        ended = run(["strace", "-f", "-o", "/dev/null", "-e", kill, *start])
         killed += ended.returncode in (-9, 137)
         state = "nothing" if not folder.exists() else "before run.json"
         states["run.json" if (folder / "run.json").exists() else state] += 1
-        problem = again(chaic, begin, asked, folder)
+        problem = complete(chaic, start, model_options, folder)
         if not problem and (changed := differences(files(folder), expected)):
-            problem = f"not the same: {', '.join(changed)}"
+            problem = f"different files: {', '.join(changed)}"
         if problem:
             failures += 1
             print(f"killed at {name} {k}: {problem}", flush=True)

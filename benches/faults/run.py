@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Plays the whole benchmark with a language helper whose endpoint fails in one way, for each way.
+"""Plays the benchmark with a language helper on a faulty endpoint, once for each kind of fault.
 
-Of the requests of a run 30 % fail. An episode is lost if it has no score at the end. Prints a
-table, and exits with 1 if an episode was lost. The endpoint is the stand-in, whose scores are not
-a language model's.
+30 % of the requests of a run fail. An episode without a score is lost. Prints a table; the exit
+status is 1 if an episode was lost. The endpoint is the stand-in, so scores say nothing about
+language models.
 
 usage: benches/faults/run.py [--out DIR] [--rate 0.3] [--helper llm] [--first N] [KIND ...]
 
 Environment:
-  BIN   folder of built programs (usual: built by cargo build --release)
+  BIN   folder of built programs (default: built by cargo build --release)
 """
 
 import argparse
@@ -23,7 +23,7 @@ from programs import ROOT, programs, serving  # noqa: E402
 
 KINDS = """refused reset timeout slow-drip 429-with-wait 429 500 503 empty truncated wrong-schema
 plan-not-listed huge invalid-utf8""".split()
-# Patience is short, as the stand-in answers at once; all else is as usual.
+# Short timeouts, since the stand-in answers at once; other settings have their defaults.
 CONFIG = """
 [endpoint]
 timeout_secs = 0.3
@@ -41,21 +41,21 @@ def arguments():
     parser.add_argument("--out", type=pathlib.Path, default=ROOT / "target/faults")
     parser.add_argument("--rate", type=float, default=0.3)
     parser.add_argument("--helper", default="llm")
-    parser.add_argument("--first", type=int, help="only the first N episodes of each task")
+    parser.add_argument("--n-episodes", type=int, help="number of episodes of each task")
     return parser.parse_args()
 
 
 def play(chaic, standin, args, kind):
-    """Plays a run under one fault; gives the results of its episodes."""
+    """Plays a run under one kind of fault; returns the results of its episodes."""
     out = args.out / kind
-    config = args.out / "patience.toml"
+    config = args.out / "timeouts.toml"
     config.write_text(CONFIG)
     faulty = [] if kind == "none" else ["--fault", f"{kind}={args.rate}"]
     with serving(standin, "--stall-ms", "2000", *faulty) as address:
         command = [chaic, "eval", "--split", "test", "--helper", args.helper, "--jobs", "8"]
         command += ["--llm-config", config, "--endpoint", address, "--model", "standin"]
         command += ["--no-traces", "--out", out]
-        command += ["--first", str(args.first)] if args.first else []
+        command += ["--n-episodes", str(args.first)] if args.first else []
         with open(args.out / f"{kind}.log", "w") as log:
             subprocess.run(command, stdout=log, stderr=log, check=False)
     lines = (out / "results.jsonl").read_text().splitlines()
@@ -71,9 +71,9 @@ def main():
     print("|---|---|---|---|---|---|---|")
     lost = 0
     for kind in args.kinds:
-        begin = time.monotonic()
+        start = time.monotonic()
         results = play(chaic, standin, args, kind)
-        minutes = (time.monotonic() - begin) / 60.0
+        minutes = (time.monotonic() - start) / 60.0
         scored = sum(r["status"] == "done" for r in results)
         lost += expected - scored
         counts = [r["counts"] for r in results]

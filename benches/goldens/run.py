@@ -1,19 +1,18 @@
 #!/usr/bin/env python3
-"""Whether other processors compute the same worlds and pictures to the bit.
+"""Checks that other processors compute bit-identical worlds and images.
 
     benches/goldens/run.py [--install] [TARGET..]
 
-Builds `chaic-goldens` for each target, runs it, and compares what it prints with
+Builds `chaic-goldens` for each target, runs it, and compares its output with
 `crates/dev/chaic-goldens/goldens.txt`. Targets, all by default:
 
-    x86-64        this machine's own build (the tests run each width of vectors besides)
-    x86-64-v3     the same compiled for AVX2 and fused multiply-add throughout
+    x86-64        a native build (tests cover each vector width)
+    x86-64-v3     compiled for AVX2 and fused multiply-add
     aarch64       Debian's cross compiler and qemu-user
     wasm32        Node and its WASI
 
-`--install` fetches the standard library of a target with `rustup target add`, and does nothing else
-to the machine. Exit status: 0 if all are equal, 1 if one differs or fails, 3 if something is missing,
-which is named.
+`--install` adds the standard library of a target with `rustup target add`. Exit status: 0 if all
+are equal, 1 if one differs or fails, 3 if a named prerequisite is missing.
 """
 
 import argparse
@@ -32,10 +31,10 @@ SYSROOT = "/usr/aarch64-linux-gnu"
 
 @dataclass
 class Target:
-    """How to build for a processor, and how to run what comes of it."""
+    """Build and run settings of a processor."""
 
     triple: str
-    programs: dict[str, str] = field(default_factory=dict)  # needed program: where to get it
+    programs: dict[str, str] = field(default_factory=dict)  # required program: how to install it
     environment: dict[str, str] = field(default_factory=dict)
     runner: list[str] = field(default_factory=list)
     suffix: str = ""
@@ -66,34 +65,34 @@ TARGETS = {
 
 
 def missing(target: Target, install: bool) -> list[str]:
-    """What has to be there and isn't, with how to get it."""
-    lacks = [f"{name} ({how})" for name, how in target.programs.items() if not shutil.which(name)]
+    """Returns the missing prerequisites and how to install them."""
+    missing_items = [f"{name} ({how})" for name, how in target.programs.items() if not shutil.which(name)]
     out = subprocess.run(["rustc", "--print", "target-libdir", "--target", target.triple],
                          capture_output=True, text=True, cwd=ROOT)
     has_library = out.returncode == 0 and Path(out.stdout.strip()).is_dir()
     if not has_library and install:
         has_library = subprocess.run(["rustup", "target", "add", target.triple], cwd=ROOT).returncode == 0
     if not has_library:
-        lacks.append(f"Rust's library for it (rustup target add {target.triple}, or --install)")
-    return lacks
+        missing_items.append(f"Rust's standard library (rustup target add {target.triple}, or --install)")
+    return missing_items
 
 
-def table_of(name: str, target: Target) -> str:
-    """What the program prints on this target."""
+def print_goldens(name: str, target: Target) -> str:
+    """Returns the output of the program on this target."""
     folder = TARGET_DIR / "goldens" / name
     environment = os.environ | target.environment | {"CARGO_TARGET_DIR": str(folder)}
     build = ["cargo", "build", "--locked", "--quiet", "-p", "chaic-goldens", "--target", target.triple]
     subprocess.run(build, check=True, cwd=ROOT, env=environment)
     program = folder / target.triple / "debug" / f"chaic-goldens{target.suffix}"
     run = subprocess.run([*target.runner, str(program)], stdout=subprocess.PIPE, text=True)
-    # 1 means that it differs, which is said here.
+    # Exit status 1 means a difference, which the caller reports.
     if run.returncode not in (0, 1) or not run.stdout:
         raise subprocess.CalledProcessError(run.returncode, run.args)
     return run.stdout
 
 
 def differing(found: str, expected: str) -> list[str]:
-    """The lines of the table that aren't the committed ones."""
+    """Returns the lines that differ from the committed ones."""
     a, b = found.splitlines(), expected.splitlines()
     lines = [f"    {x}\n    committed: {y}" for x, y in zip(a, b) if x != y]
     return lines + ([f"    {len(a)} lines, committed: {len(b)}"] if len(a) != len(b) else [])
@@ -102,32 +101,32 @@ def differing(found: str, expected: str) -> list[str]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("targets", nargs="*", metavar="TARGET", help=", ".join(TARGETS))
-    parser.add_argument("--install", action="store_true", help="fetch Rust's library for a target")
+    parser.add_argument("--install", action="store_true", help="add Rust's standard library of a target")
     options = parser.parse_args()
     unknown = [t for t in options.targets if t not in TARGETS]
     if unknown:
-        parser.error(f"no target {unknown[0]}; they are {', '.join(TARGETS)}")
+        parser.error(f"unknown target {unknown[0]}; use {', '.join(TARGETS)}")
     expected = TABLE.read_text()
-    verdicts = {}
+    outcomes = {}
     for name in options.targets or TARGETS:
         target = TARGETS[name]
-        if lacks := missing(target, options.install):
-            verdicts[name] = "MISSING " + "; ".join(lacks)
+        if missing_items := missing(target, options.install):
+            outcomes[name] = "MISSING " + "; ".join(missing_items)
             continue
         print(f"== {name}: building and running", flush=True)
         try:
-            lines = differing(table_of(name, target), expected)
+            lines = differing(print_goldens(name, target), expected)
         except subprocess.CalledProcessError as problem:
-            verdicts[name] = f"FAILED {problem}"
+            outcomes[name] = f"FAILED {problem}"
             continue
-        verdicts[name] = f"DIFFERS in {len(lines)} lines" if lines else "equal"
+        outcomes[name] = f"DIFFERS in {len(lines)} lines" if lines else "equal"
         print("\n".join(lines), end="\n" if lines else "")
     print(f"\n{len(expected.splitlines())} lines of {TABLE.relative_to(ROOT)}:")
-    for name, verdict in verdicts.items():
-        print(f"  {name:<12}{verdict}")
-    if any(v.startswith(("DIFFERS", "FAILED")) for v in verdicts.values()):
+    for name, outcome in outcomes.items():
+        print(f"  {name:<12}{outcome}")
+    if any(v.startswith(("DIFFERS", "FAILED")) for v in outcomes.values()):
         return 1
-    return 3 if any(v.startswith("MISSING") for v in verdicts.values()) else 0
+    return 3 if any(v.startswith("MISSING") for v in outcomes.values()) else 0
 
 
 if __name__ == "__main__":

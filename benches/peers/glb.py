@@ -1,4 +1,4 @@
-"""Reads what `chaic bench scene` writes: the scene's parts, and the cameras."""
+"""Reads the scene and the cameras that `chaic bench scene` writes."""
 
 import json
 import struct
@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass
 class Mesh:
-    """Triangles of one colour, in their object's frame, metres, y up."""
+    """Triangles of one color, in the object's frame, metres, y up."""
 
     positions: np.ndarray  # float32 [n, 3]
     normals: np.ndarray  # float32 [n, 3]
@@ -19,7 +19,7 @@ class Mesh:
 
 @dataclass
 class Part:
-    """A mesh somewhere in the world."""
+    """A mesh with a pose in the world."""
 
     entity: int
     mesh: int  # index in Scene.meshes
@@ -29,13 +29,13 @@ class Part:
 
     @property
     def srgb(self):
-        """The colour as most programs want it, 0 to 1."""
+        """Color in sRGB, 0 to 1."""
         return tuple(12.92 * c if c <= 0.0031308 else 1.055 * c ** (1 / 2.4) - 0.055 for c in self.color)
 
 
 @dataclass
 class Camera:
-    """Directions are unit vectors in the world."""
+    """A camera; directions are unit vectors in the world frame."""
 
     eye: np.ndarray
     right: np.ndarray
@@ -56,7 +56,7 @@ class Scene:
 
 
 def load(folder):
-    """The scene and its cameras from the folder of `chaic bench scene --out`."""
+    """Returns the scene and its cameras from the folder of `chaic bench scene --out`."""
     folder = Path(folder)
     root, blob = _chunks((folder / "scene.glb").read_bytes())
     meshes, index_of, parts = [], {}, []
@@ -83,7 +83,7 @@ def load(folder):
 
 
 def matrix(rotation):
-    """The rotation matrix of a quaternion x, y, z, w."""
+    """Returns the rotation matrix of a quaternion x, y, z, w."""
     x, y, z, w = rotation
     return np.array(
         [
@@ -95,11 +95,11 @@ def matrix(rotation):
 
 
 def write_obj(mesh, path):
-    """Writes a mesh as Wavefront OBJ; the path as text, as PyBullet wants it."""
+    """Writes a mesh as Wavefront OBJ and returns the path as text, which PyBullet requires."""
     lines = ["v %.6f %.6f %.6f" % tuple(p) for p in mesh.positions]
     lines += ["vn %.4f %.4f %.4f" % tuple(n) for n in mesh.normals]
-    corner = "{0}//{0}".format
-    lines += ["f " + " ".join(corner(k + 1) for k in t) for t in mesh.triangles]
+    vertex = "{0}//{0}".format
+    lines += ["f " + " ".join(vertex(k + 1) for k in t) for t in mesh.triangles]
     path.write_text("\n".join(lines) + "\n")
     return str(path)
 
@@ -118,7 +118,7 @@ def _camera(c):
 
 def _chunks(data):
     magic, version, _ = struct.unpack_from("<4sII", data)
-    assert (magic, version) == (b"glTF", 2), "no binary glTF 2.0"
+    assert (magic, version) == (b"glTF", 2), "not a binary glTF 2.0 file"
     at, found = 12, {}
     while at < len(data):
         length, kind = struct.unpack_from("<I4s", data, at)

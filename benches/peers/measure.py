@@ -1,4 +1,4 @@
-"""What all peers share: their options, how they are timed, and what they print."""
+"""Options, timing and output of all peers."""
 
 import argparse
 import json
@@ -10,14 +10,14 @@ from PIL import Image
 
 def options():
     parser = argparse.ArgumentParser()
-    parser.add_argument("folder", type=Path, help="what `chaic bench scene --out` wrote")
-    parser.add_argument("--seconds", type=float, default=10.0, help="measure at least so long")
+    parser.add_argument("folder", type=Path, help="folder of `chaic bench scene --out`")
+    parser.add_argument("--seconds", type=float, default=10.0, help="minimum duration")
     return parser.parse_args()
 
 
 def measure(name, channels, version, draw, cameras, seconds):
-    """Draws all cameras in turn until the time is up, after one round that doesn't count, and
-    prints what a picture cost. `draw` takes a camera's index."""
+    """Draws all cameras in turn for `seconds`, after one warm-up round, and prints the time per image.
+    `draw` takes the index of a camera."""
     for k in range(len(cameras)):
         draw(k)
     frames, wall, cpu = 0, time.perf_counter(), time.process_time()
@@ -43,5 +43,5 @@ def measure(name, channels, version, draw, cameras, seconds):
 
 
 def save(rgb, folder, name):
-    """Keeps what the first camera sees, to be looked at: uint8 [height, width, 3]."""
+    """Saves an image of the first camera for inspection: uint8 [height, width, 3]."""
     Image.fromarray(rgb).save(folder / f"{name}.png")

@@ -1,5 +1,5 @@
-"""Embree, Intel's ray tracer, through Open3D: one ray a pixel for depth, ids and normals, then the
-simplest shading there is, in NumPy. The rays are made beforehand and not counted."""
+"""Embree, Intel's ray tracer, through Open3D: one ray per pixel for depth, ids and normals, then minimal
+shading in NumPy. The rays are made before the measurement."""
 
 import numpy as np
 import open3d
@@ -20,14 +20,14 @@ def main():
         traced.add_triangles(Tensor(positions.astype(np.float32)), Tensor(mesh.triangles.copy()))
         colors.append(part.srgb)
         entities.append(part.entity)
-    # What no ray meets has the largest id of all.
+    # Rays without a hit have the largest id.
     colors = np.array(colors + [(0.7, 0.8, 0.9)], np.float32)
     entities = np.array(entities + [0], np.uint16)
-    rays = [Tensor(rays_of(camera)) for camera in scene.cameras]
+    rays = [Tensor(pixel_rays(camera)) for camera in scene.cameras]
     light = np.array([0.3, 0.9, 0.3], np.float32)
 
     def depth_and_ids(k):
-        # Rays are as long as the camera's axis is one: distances along them are depths.
+        # Ray directions have length 1 along the camera's axis, so hit distances are depths.
         hits = traced.cast_rays(rays[k], nthreads=1)
         ids = np.minimum(hits["geometry_ids"].numpy(), len(colors) - 1)
         return hits, hits["t_hit"].numpy(), entities[ids], ids
@@ -44,8 +44,8 @@ def main():
         measure(title, channels, open3d.__version__, draw, scene.cameras, args.seconds)
 
 
-def rays_of(camera):
-    """float32 [height, width, 6]: origin and direction of each pixel's ray."""
+def pixel_rays(camera):
+    """Returns the origin and direction of each pixel's ray: float32 [height, width, 6]."""
     focal = 0.5 * camera.height / np.tan(0.5 * camera.fov_rad)
     x = (np.arange(camera.width) + 0.5 - 0.5 * camera.width) / focal
     y = -(np.arange(camera.height) + 0.5 - 0.5 * camera.height) / focal

@@ -1,4 +1,4 @@
-"""MuJoCo with OpenGL on the CPU (Mesa's llvmpipe): a pass each for RGB, depth and ids."""
+"""MuJoCo with OpenGL on the CPU (Mesa's llvmpipe): one pass each for RGB, depth and ids."""
 
 import mujoco
 import numpy as np
@@ -21,14 +21,14 @@ def main():
         return renderer.render()
 
     def all_channels(k):
-        picture = rgb(k)
+        image = rgb(k)
         renderer.enable_depth_rendering()
         depth = renderer.render()
         renderer.disable_depth_rendering()
         renderer.enable_segmentation_rendering()
         ids = renderer.render()
         renderer.disable_segmentation_rendering()
-        return picture, depth, ids
+        return image, depth, ids
 
     save(rgb(0), args.folder, "mujoco")
     for channels, draw in [("rgb+depth+ids", all_channels), ("rgb", rgb)]:

@@ -25,7 +25,7 @@ def main():
             pybullet.createMultiBody(
                 baseVisualShapeIndex=shape, basePosition=part.origin, baseOrientation=part.rotation
             )
-    matrices = [matrices_of(camera) for camera in scene.cameras]
+    matrices = [camera_matrices(camera) for camera in scene.cameras]
     for shadow, name in [(0, "pybullet"), (1, "pybullet-shadow")]:
 
         def draw(k, shadow=shadow):
@@ -46,7 +46,7 @@ def main():
         measure(title, "rgb+depth+ids", version("pybullet"), draw, scene.cameras, args.seconds)
 
 
-def matrices_of(camera):
+def camera_matrices(camera):
     view = pybullet.computeViewMatrix(
         camera.eye.tolist(), (camera.eye + camera.forward).tolist(), camera.up.tolist()
     )

@@ -1,16 +1,16 @@
 #!/bin/sh
-# Draws the same scene from the same cameras with chaic and with other renderers that need no GPU,
-# one after the other, each on one and the same core, and prints what a picture costs in processor
-# time. A peer that can't be installed or started is named with the reason.
+# Draws the same scene from the same cameras with chaic and with other CPU renderers, one after the
+# other on the same core, and prints the CPU time per image. If a peer cannot be installed or
+# started, the table gives the reason.
 #
-# usage: benches/peers/run.sh [SIZE] [SECONDS]        (usual: 512 pixels, 10 seconds each)
+# usage: benches/peers/run.sh [SIZE] [SECONDS]        (default: 512 pixels, 10 seconds each)
 #
 # Environment:
-#   OUT      folder for everything that is made (usual: target/peers)
-#   CHAIC    the program to measure (usual: built by cargo build --release)
-#   PYTHON   the interpreter to make the environment with (usual: python3)
-#   CORE     the core to use (usual: 0)
-#   MUJOCO_GL  egl or osmesa (usual: egl; Debian: libegl1 libgl1-mesa-dri, or libosmesa6)
+#   OUT      output folder (default: target/peers)
+#   CHAIC    program to measure (default: built by cargo build --release)
+#   PYTHON   Python interpreter of the virtual environment (default: python3)
+#   CORE     core to use (default: 0)
+#   MUJOCO_GL  egl or osmesa (default: egl; Debian: libegl1 libgl1-mesa-dri, or libosmesa6)
 set -eu
 
 SIZE=${1:-512}
@@ -41,7 +41,7 @@ VENV=$OUT/venv
 [ -d "$VENV" ] || "$PYTHON" -m venv "$VENV"
 
 export PYTHONDONTWRITEBYTECODE=1
-# One thread each: Mesa's rasteriser, OpenMP and BLAS start more on their own.
+# One thread each: Mesa's rasterizer, OpenMP and BLAS start more by default.
 export LP_NUM_THREADS=1 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 export MUJOCO_GL=${MUJOCO_GL:-egl} LIBGL_ALWAYS_SOFTWARE=1
 

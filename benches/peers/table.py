@@ -1,4 +1,4 @@
-"""Prints what the peers measured beside what chaic did: `table.py FOLDER`."""
+"""Prints the measurements of the peers and of chaic as a table: `table.py FOLDER`."""
 
 import json
 import sys
@@ -15,11 +15,11 @@ def main():
         ours[speed["channels"]] = cost
         rows.append(("chaic", speed["channels"], speed["machine"]["chaic"], cost))
     for path in sorted(folder.glob("peer-*.jsonl")):
-        # PyBullet also says when it was built.
+        # PyBullet also prints its build date.
         for line in filter(lambda line: line.startswith("{"), path.read_text().splitlines()):
             speed = json.loads(line)
             rows.append((speed["name"], speed["channels"], speed["version"], speed["cpu_ms_per_frame"]))
-    print("| renderer | images | version | processor ms a frame | times ours |")
+    print("| renderer | images | version | CPU ms a frame | ratio to chaic |")
     print("|---|---|---|---:|---:|")
     for name, channels, version, cost in rows:
         ratio = f"{cost / ours[channels]:.1f}" if channels in ours else ""

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Makes docs/reference/language-prompts.md: a prompt of each task, one that tells more, one of a partner, a record.
+"""Writes docs/reference/language-prompts.md: prompts of all tasks, of `llm-told` and of a partner, and a record.
 
-Plays the first test episode of each task with the stand-in for a language model, and takes of each run
-the longest of the later prompts, in which most has happened.
+Plays the first test episode of each task with the stand-in for a language model and takes the
+longest prompt of each run, which has the longest history.
 
 usage: benches/prompts/run.py [--out DIR]
 
 Environment:
-  BIN   folder of built programs (usual: built by cargo build --release)
+  BIN   folder of built programs (default: built by cargo build --release)
 """
 
 import argparse
@@ -32,24 +32,24 @@ TITLES = {
 }
 HEAD = """# Prompts and a transcript
 
-The prompt of one moment of each task, as a model gets it with `--helper llm`, one with `--helper llm-told` and
-one for a partner; then a whole record. **The answers are a scripted stand-in's, not a language model's**: they
-show the form, nothing else. This page is made by `benches/prompts/run.py`. By hand:
+One prompt of each task with `--helper llm`, one with `--helper llm-told`, one for a partner, and a record of an episode.
+**The answers are a scripted stand-in's, not a language model's**: they show only the form. `benches/prompts/run.py`
+writes this page. By hand:
 
 ```sh
 cargo run -p chaic-llm-standin &
-chaic eval --first 1 --helper llm,llm-told --endpoint http://127.0.0.1:8808/v1 --model standin --out runs/prompts
-chaic eval --task low_target --first 1 --helper none --partner llm \\
+chaic eval --n-episodes 1 --helper llm,llm-told --endpoint http://127.0.0.1:8808/v1 --model standin --out runs/prompts
+chaic eval --task low_target --n-episodes 1 --helper none --partner llm \\
     --endpoint http://127.0.0.1:8808/v1 --model standin --out runs/partner
 chaic llm show runs/prompts high_target/test/00        # and so on
 ```
 
-Pictures for `vlm` come with the same text and the sentence of `images.txt`.
+`vlm` gets the same text, the sentence of `images.txt` and images.
 """
 
 
 def longest_question(shown):
-    """Frame, prompt and answer of the longest prompt in the output of `chaic llm show`."""
+    """Returns frame, prompt and answer of the longest prompt in the output of `chaic llm show`."""
     asked = re.compile(
         r"^=== frame (\d+): asked.*?\n--- to the model\n(.*?)\n--- answer .*?\n(.*?)\n>>>", re.M | re.S
     )
@@ -85,7 +85,7 @@ def main():
             "helpers": ["--helper", "llm,llm-told"],
             "partner": ["--task", "low_target", "--helper", "none", "--partner", "llm"],
         }.items():
-            command = [chaic, "eval", "--first", "1", *options, *model, "--out", out / run]
+            command = [chaic, "eval", "--n-episodes", "1", *options, *model, "--out", out / run]
             subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     page = [HEAD]
     for task, title in TITLES.items():

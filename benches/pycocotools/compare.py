@@ -1,10 +1,10 @@
-"""Average precision by pycocotools beside chaic's own, on the same files.
+"""Compares average precision by pycocotools and by chaic on the same files.
 
     pip install pycocotools==2.0.11
-    chaic eval-perception detection --views 200 --json report.json --coco coco
+    chaic eval detection --views 200 --json report.json --coco coco
     python3 benches/pycocotools/compare.py coco report.json
 
-Exit code 1 if any figure differs by more than the rounding of sums.
+The exit code is 1 if a value differs by more than rounding.
 """
 
 import contextlib
@@ -16,32 +16,32 @@ import numpy as np
 from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
 
-# Pixels of instances that are asked for, as chaic's report has them.
-LEAST_PX = 100
-SMALLER_PX = [64, 32]
+# Minimum instance areas in pixels, as in chaic's report.
+MIN_PX = 100
+SMALLER_MIN_PX = [64, 32]
 SIZES = {"small": [100, 1024], "medium": [1025, 9216], "large": [9217, 1e10]}
-# Sums in another order.
+# Tolerance for sums in another order.
 ROUNDING = 1e-9
 
 
-def quietly(make):
+def without_output(function):
     with contextlib.redirect_stdout(io.StringIO()):
-        return make()
+        return function()
 
 
 def main(folder: str, report_path: str) -> int:
     with open(report_path) as file:
         report = json.load(file)
-    truth = quietly(lambda: COCO(f"{folder}/annotations.json"))
-    found = quietly(lambda: truth.loadRes(f"{folder}/detections.json"))
-    ranges = {"report": [LEAST_PX, 1e10], **{str(px): [px, 1e10] for px in SMALLER_PX}, **SIZES}
+    truth = without_output(lambda: COCO(f"{folder}/annotations.json"))
+    found = without_output(lambda: truth.loadRes(f"{folder}/detections.json"))
+    ranges = {"report": [MIN_PX, 1e10], **{str(px): [px, 1e10] for px in SMALLER_MIN_PX}, **SIZES}
     evaluation = COCOeval(truth, found, "segm")
     evaluation.params.areaRng = list(ranges.values())
     evaluation.params.areaRngLbl = list(ranges)
     evaluation.params.maxDets = [100]
-    quietly(evaluation.evaluate)
-    quietly(evaluation.accumulate)
-    # Shape [overlaps, recalls, classes, areas, detections]; -1 where nothing of a class is asked for.
+    without_output(evaluation.evaluate)
+    without_output(evaluation.accumulate)
+    # Shape [IoU thresholds, recalls, classes, areas, max detections]; -1 for a class without instances.
     precision = evaluation.eval["precision"][:, :, :, :, 0]
 
     def mean(values):
@@ -61,7 +61,7 @@ def main(folder: str, report_path: str) -> int:
         ours = report["classes"].get(names[category])
         of_class = precision[:, :, k, 0]
         if (ours is None) != bool((of_class == -1).all()):
-            print(f"{names[category]}: there for one and not for the other")
+            print(f"{names[category]}: present in only one of the two")
             return 1
         if ours is not None:
             rows.append((f"AP50 {names[category]}", mean(of_class[0]), ours[0]))

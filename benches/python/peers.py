@@ -1,13 +1,13 @@
-"""How fast chaic, PyBullet and ManiSkill's CPU back end step with 128x128 color and depth, all on the same cores, one
-after the other.
+"""Measures steps per second of chaic, PyBullet and ManiSkill's CPU backend with 128x128 color and depth, one after the
+other on the same cores.
 
     python benches/python/peers.py [--seconds 15] [--processes 2]
 
-What a step is differs, and each has its own way to use several cores: chaic steps 64 worlds, each with a person who
-sees, remembers and plans; a step is an action of the helper, several frames long. PyBullet gets the triangles of one of
-chaic's houses, a body pushed about at random in it and no person; a step is one frame. ManiSkill gets its own table-top
-task, PickCube, the lightest of its tasks with a camera; a step is one frame of a twentieth of a second. The latter two
-run one world in each of several processes. Whoever is not installed is named, and the rest goes on.
+A step and the use of several cores differ. chaic steps 64 worlds, each with a simulated person who sees, remembers and
+plans; a step is an action of the helper and takes several frames. PyBullet gets the triangles of one of chaic's houses
+and a randomly pushed body, without a person; a step is one frame. ManiSkill gets PickCube, its lightest task with a
+camera; a step is one frame of 1/20 s. PyBullet and ManiSkill run one world in each of several processes. A package that
+is not installed is reported; the others are still measured.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ SCENE = "high_target/train/00"
 
 
 def rate(step: Callable[[], int], seconds: float) -> float:
-    """Steps a second, after some that do not count."""
+    """Returns the steps per second after a warm-up."""
     for _ in range(3):
         step()
-    done, began = 0, time.perf_counter()
-    while time.perf_counter() - began < seconds:
+    done, start = 0, time.perf_counter()
+    while time.perf_counter() - start < seconds:
         done += step()
-    return done / (time.perf_counter() - began)
+    return done / (time.perf_counter() - start)
 
 
 def chaic(seconds: float) -> float:
@@ -44,7 +44,7 @@ def chaic(seconds: float) -> float:
 
     worlds = 64
     env = HelperVectorEnv(
-        None, worlds, observation=("rgb", "depth", "own"), image_size=SIZE, minds_image_size=SIZE, autoreset_mode="SameStep"
+        None, worlds, observation=("rgb", "depth", "own"), image_size=SIZE, partner_image_size=SIZE, autoreset_mode="SameStep"
     )
     env.reset(seed=0)
     rng = np.random.default_rng(0)
@@ -124,7 +124,7 @@ def maniskill(seconds: float) -> float:
 
 
 def in_processes(work: Callable[..., float], processes: int, *arguments: object) -> float:
-    """All of them together."""
+    """Returns the total rate of `processes` processes."""
     with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
         return sum(future.result() for future in [pool.submit(work, *arguments) for _ in range(processes)])
 
@@ -145,7 +145,7 @@ def main() -> None:
             ("pybullet", "PyBullet, TinyRenderer", f"that house, {n} processes", lambda: in_processes(pybullet, n, seconds, scene)),
             ("mani_skill", "ManiSkill, CPU", f"PickCube-v1, {n} processes", lambda: in_processes(maniskill, n, seconds)),
         ]
-        print("| | version | worlds | steps a second | chaic is faster by |\n|---|---|---|---:|---:|")
+        print("| | version | worlds | steps a second | speedup of chaic |\n|---|---|---|---:|---:|")
         ours = 0.0
         for package_name, name, worlds, measured in peers:
             try:

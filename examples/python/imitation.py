@@ -1,4 +1,4 @@
-"""Imitation of the oracle: what it chooses to do is exported, and a network learns to choose as it does.
+"""Imitation learning: exports decisions of the oracle, and trains a network to predict the kind of its actions.
 
     pip install '.[gym]' torch
     python examples/python/imitation.py --episodes 4 --out runs/imitation
@@ -20,7 +20,7 @@ SIZE = 64
 
 
 def kind_of(action: Any) -> int:
-    """Which of ``chaic.ACTIONS`` it is."""
+    """Returns the index of an action in ``chaic.ACTIONS``."""
     if isinstance(action, str):
         return chaic.ACTIONS.index(action)
     ((name, fields),) = action.items()
@@ -29,19 +29,19 @@ def kind_of(action: Any) -> int:
 
 
 def export(name: str, path: Path) -> None:
-    """Lets the oracle play an episode; what it saw, small, and what it did."""
-    oracle = chaic.Mind("oracle")
+    """Plays an episode with the oracle and writes its downsampled depth, its own state and its actions."""
+    oracle = chaic.PlanningAgent("oracle")
     world = chaic.World(
         chaic.Episode(name), images=["rgb", "depth", "ids"], image_size=512, grants=oracle.grants
     )
     oracle.reset(world.briefing())
     depth, own, kinds = [], [], []
-    while world.advance() == "waits":
-        seen = world.observe()
-        action = oracle.act(seen)
-        assert seen.depth is not None
+    while world.advance() == "needs_action":
+        observation = world.observe()
+        action = oracle.act(observation)
+        assert observation.depth is not None
         step = 512 // SIZE
-        depth.append(seen.depth[step // 2 :: step, step // 2 :: step].astype(np.float16))
+        depth.append(observation.depth[step // 2 :: step, step // 2 :: step].astype(np.float16))
         own.append(world.own()[0])
         kinds.append(kind_of(action))
         world.submit(action)
@@ -49,20 +49,20 @@ def export(name: str, path: Path) -> None:
 
 
 class Imitator(nn.Module):
-    """From depth and own state to a kind of action."""
+    """Predicts the kind of action from depth and own state."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.eye = nn.Sequential(
+        self.encoder = nn.Sequential(
             nn.Conv2d(1, 16, 5, 2), nn.ReLU(), nn.Conv2d(16, 32, 3, 2), nn.ReLU(),
             nn.Conv2d(32, 32, 3, 2), nn.ReLU(), nn.Flatten(), nn.LazyLinear(64), nn.ReLU(),
         )
-        self.head = nn.Linear(64 + len(chaic.OWN), len(chaic.ACTIONS))
+        self.head = nn.Linear(64 + len(chaic.PROPRIOCEPTION), len(chaic.ACTIONS))
 
     def forward(self, depth: torch.Tensor, own: torch.Tensor) -> torch.Tensor:
-        """A number for each kind."""
-        seen = self.eye(depth[:, None].clamp(0, 10) / 10)
-        return self.head(torch.cat([seen, own], 1))
+        """Returns a logit for each kind."""
+        features = self.encoder(depth[:, None].clamp(0, 10) / 10)
+        return self.head(torch.cat([features, own], 1))
 
 
 def main() -> None:
@@ -94,10 +94,10 @@ def main() -> None:
             loss.backward()
             optimizer.step()
         with torch.no_grad():
-            told = model(depth[held_out].float(), own[held_out]).argmax(1)
-            right = (told == kind[held_out]).float().mean()
-            usual = (kind[held_out] == kind[~held_out].mode().values).float().mean()
-        print(f"epoch {epoch + 1}: {right:.3f} of the last episode chosen as the oracle did ({usual:.3f} by the usual kind)")
+            predicted = model(depth[held_out].float(), own[held_out]).argmax(1)
+            accuracy = (predicted == kind[held_out]).float().mean()
+            baseline = (kind[held_out] == kind[~held_out].mode().values).float().mean()
+        print(f"epoch {epoch + 1}: accuracy {accuracy:.3f} on the last episode (most frequent kind: {baseline:.3f})")
     torch.save(model.state_dict(), arguments.out / "imitator.pt")
 
 

@@ -1,9 +1,9 @@
-"""A helper that asks a language model which plan to follow, at any endpoint that speaks OpenAI's protocol.
+"""A helper that asks a language model which plan to execute, at any OpenAI-compatible endpoint.
 
     OPENAI_API_KEY=... python examples/python/language_helper.py --endpoint http://localhost:8080/v1 --model NAME
 
-chaic has language helpers of its own, with prompts, budgets and records (docs/language-helpers.md); this one is a
-beginning for those who want another.
+chaic has language helpers with prompts, budgets and records (docs/language-helpers.md); this one is a minimal starting
+point.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from typing import Any
 
 import chaic
 
-PROMPT = """You help somebody who carries things to a goal, and see only what you have seen so far.
-You remember: {things}.
+PROMPT = """You help a person who carries objects to a goal. You know only what you have seen.
+You remember: {objects}.
 What do you do next? Answer with the number of one of these plans.
 {plans}"""
 
 
 class LanguageHelper:
-    """Chooses plans by asking; chaic's planner perceives, remembers and carries them out."""
+    """Asks a model for each plan; chaic's planner perceives, remembers and executes."""
 
     endpoint = ""
     model = ""
@@ -35,21 +35,21 @@ class LanguageHelper:
         self.planner = chaic.Planner()
 
     def reset(self, briefing: chaic.Briefing) -> None:
-        """Begins an episode."""
+        """Starts an episode."""
         self.planner.reset(briefing)
 
     def act(self, observation: chaic.Observation) -> Any:
-        """The next action of the plan that is followed, asking for another one when it has come to an end."""
+        """Returns the next action; asks for a new plan when the current one has ended."""
         action = self.planner.attend(observation)
         while action is None:
             action = self.planner.choose(self.ask(self.planner.plans()))
         return action
 
     def ask(self, plans: list[str]) -> int:
-        """Which plan the model names; the first if it names none."""
-        seen = sorted({thing["class"] for thing in self.planner.things() if thing["is_present"]})
+        """Returns the index of the model's plan, or 0 if its answer has no valid number."""
+        remembered = {thing["class"] for thing in self.planner.things() if thing["is_present"]}
         numbered = "\n".join(f"{k}: {plan}" for k, plan in enumerate(plans))
-        prompt = PROMPT.format(things=", ".join(seen) or "nothing", plans=numbered)
+        prompt = PROMPT.format(objects=", ".join(sorted(remembered)) or "nothing", plans=numbered)
         body = {"model": self.model, "messages": [{"role": "user", "content": prompt}], "temperature": 0}
         request = urllib.request.Request(
             f"{self.endpoint}/chat/completions",
@@ -74,7 +74,7 @@ def main() -> None:
     arguments = parser.parse_args()
     LanguageHelper.endpoint, LanguageHelper.model = arguments.endpoint, arguments.model
     chaic.evaluate(
-        LanguageHelper, tasks=arguments.task, split="train", first=1, out=arguments.out, jobs=4
+        LanguageHelper, tasks=arguments.task, split="train", n_episodes=1, out=arguments.out, jobs=4
     )
 
 

@@ -1,4 +1,4 @@
-"""PPO of Stable-Baselines3, the paper's own choice, on one task.
+"""PPO with Stable-Baselines3, as in the paper, on one task.
 
     pip install '.[rl]'
     python examples/python/ppo_sb3.py --task high_target --steps 20000 --out ppo.zip
@@ -20,7 +20,7 @@ from chaic.registry import IDS
 
 
 class Learnable(gymnasium.ObservationWrapper[Any, Any, Any]):
-    """What the networks of Stable-Baselines3 take as they are: color, and depth as a gray image."""
+    """Converts depth to a gray image, which the networks of Stable-Baselines3 accept."""
 
     def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
         super().__init__(env)
@@ -30,7 +30,7 @@ class Learnable(gymnasium.ObservationWrapper[Any, Any, Any]):
         self.observation_space = gymnasium.spaces.Dict(spaces)
 
     def observation(self, observation: Any) -> Any:
-        """Depth up to 10 m as a byte."""
+        """Scales depth from 0 to 10 m to a byte."""
         depth = np.clip(observation["depth"] * 25.5, 0, 255).astype(np.uint8)
         return observation | {"depth": depth[..., None]}
 
@@ -42,7 +42,7 @@ def main() -> None:
     parser.add_argument("--envs", type=int, default=8)
     parser.add_argument("--out", default="ppo.zip")
     arguments = parser.parse_args()
-    options = {"image_size": 64, "minds_image_size": 128}
+    options = {"image_size": 64, "partner_image_size": 128}
     envs = make_vec_env(
         IDS[arguments.task],
         n_envs=arguments.envs,

@@ -1,4 +1,4 @@
-"""PPO by TorchRL on plans: which of those that chaic's planner offers, carried out by it.
+"""PPO with TorchRL on plans: the policy chooses among the plans of chaic's planner, which executes them.
 
     pip install '.[gym]' torch torchrl
     python examples/python/ppo_torchrl.py --steps 20000
@@ -25,7 +25,7 @@ ROLLOUT, EPOCHS, MINIBATCH = 256, 4, 64
 
 
 class Flat(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Own state and plans as one vector, with the mask of the plans that are offered."""
+    """Flattens own state and plans into one vector, with the mask of the offered plans."""
 
     def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
         super().__init__(env)
@@ -42,7 +42,7 @@ class Flat(gymnasium.Wrapper[Any, Any, Any, Any]):
     def _flat(self, observation: dict[str, Any], info: dict[str, Any]) -> dict[str, Any]:
         parts = [np.asarray(part, np.float32).ravel() for part in observation.values()]
         mask = np.asarray(info["action_mask"], np.int8)
-        # When it is over nothing is offered, and nothing is chosen.
+        # A finished episode offers no plan; an all-zero mask would be invalid.
         return {"observation": np.concatenate(parts), "action_mask": mask if mask.any() else mask + 1}
 
     def reset(self, **options: Any) -> tuple[Any, dict[str, Any]]:
@@ -55,29 +55,29 @@ class Flat(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 
 def network(inputs: int, outputs: int) -> nn.Module:
-    """Two layers."""
+    """Returns an MLP with two hidden layers."""
     return nn.Sequential(nn.Linear(inputs, 128), nn.Tanh(), nn.Linear(128, 128), nn.Tanh(), nn.Linear(128, outputs))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--task", default="LowTarget")
-    parser.add_argument("--steps", type=int, default=20_000, help="plans in all")
+    parser.add_argument("--steps", type=int, default=20_000, help="total number of plans")
     arguments = parser.parse_args()
     torch.manual_seed(0)
     flat = Flat(
-        gymnasium.make(f"chaic/{arguments.task}-v0", observation="own", action="plan", minds_image_size=128)
+        gymnasium.make(f"chaic/{arguments.task}-v0", observation="own", action="plan", partner_image_size=128)
     )
     size = flat.observation_space["observation"].shape[0]  # type: ignore[index]
     n = int(flat.env.action_space.n)  # type: ignore[attr-defined]
     env = GymWrapper(flat, categorical_action_encoding=True)
     env.set_seed(0)
-    said = TensorDictSequential(
+    logits_and_mask = TensorDictSequential(
         TensorDictModule(network(size, n), in_keys=["observation"], out_keys=["logits"]),
         TensorDictModule(lambda mask: mask.bool(), in_keys=["action_mask"], out_keys=["mask"]),
     )
     actor = ProbabilisticActor(
-        said,
+        logits_and_mask,
         in_keys=["logits", "mask"],
         spec=env.action_spec,
         distribution_class=MaskedCategorical,
@@ -101,8 +101,8 @@ def main() -> None:
                 nn.utils.clip_grad_norm_(loss.parameters(), 0.5)
                 optimizer.step()
         reward = played["next", "reward"].mean().item()
-        print(f"{taken} plans, reward of a plan {reward:.4f}", flush=True)
-    print(f"chaic {chaic.__version__}: learned from {taken} plans")
+        print(f"{taken} plans, mean reward {reward:.4f}", flush=True)
+    print(f"chaic {chaic.__version__}: trained on {taken} plans")
 
 
 if __name__ == "__main__":

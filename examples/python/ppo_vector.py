@@ -1,4 +1,4 @@
-"""PPO in one file (after CleanRL's, Huang et al. 2022) on chaic's vector environment: own state alone, all eight tasks.
+"""PPO in one file (after CleanRL, Huang et al. 2022) on the vector environment: own state only, all eight tasks.
 
     pip install '.[gym]' torch
     python examples/python/ppo_vector.py --steps 200000
@@ -22,7 +22,7 @@ GAMMA_PER_FRAME, LAMBDA, CLIP, ENTROPY = 0.9995, 0.95, 0.2, 0.01
 
 
 class Policy(nn.Module):
-    """A kind of action, and one of eight by eight places to point at."""
+    """Chooses a kind of action and one of eight by eight image cells as its target."""
 
     def __init__(self, inputs: int, kinds: int, cells: int) -> None:
         super().__init__()
@@ -33,7 +33,7 @@ class Policy(nn.Module):
     def forward(
         self, own: torch.Tensor, mask: torch.Tensor
     ) -> tuple[list[Categorical], torch.Tensor]:
-        """Distributions of kind, column and row, and the value."""
+        """Returns the distributions of kind, column and row, and the value."""
         hidden = self.body(own)
         kinds, columns, rows = (head(hidden) for head in self.heads)
         kinds = kinds.masked_fill(~mask, -1e9)
@@ -41,13 +41,13 @@ class Policy(nn.Module):
 
 
 def log_prob(heads: list[Categorical], actions: torch.Tensor) -> torch.Tensor:
-    """Of whole actions, shape [n, 3]."""
+    """Returns the log-probability of complete actions, shape [n, 3]."""
     return torch.stack([h.log_prob(a) for h, a in zip(heads, actions.T, strict=True)]).sum(0)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--steps", type=int, default=200_000, help="decisions of helpers in all")
+    parser.add_argument("--steps", type=int, default=200_000, help="total number of decisions")
     arguments = parser.parse_args()
     torch.manual_seed(0)
     size, cells = 64, 8
@@ -57,11 +57,11 @@ def main() -> None:
         vectorization_mode="vector_entry_point",
         observation="own",
         image_size=size,
-        minds_image_size=128,
+        partner_image_size=128,
         autoreset_mode="SameStep",
         copy=True,
     )
-    policy = Policy(len(chaic.OWN), len(chaic.ACTIONS), cells)
+    policy = Policy(len(chaic.PROPRIOCEPTION), len(chaic.ACTIONS), cells)
     optimizer = torch.optim.Adam(policy.parameters(), 3e-4, eps=1e-5)
     observation, infos = envs.reset(seed=0)
     began, decisions, scores = time.perf_counter(), 0, [0.0]
@@ -81,7 +81,7 @@ def main() -> None:
             ended = terminated | truncated
             if ended.any():
                 scores += infos["final_info"]["tr"][ended].tolist()
-            # A decision takes as many frames as it takes, and is discounted by them.
+            # Decisions differ in duration, so the discount is per frame.
             discount = np.where(ended, 0.0, GAMMA_PER_FRAME ** infos["frames"])
             for name, values in [
                 ("own", own),

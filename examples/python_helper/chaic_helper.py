@@ -1,12 +1,12 @@
-"""The protocol between chaic and a helper in a process of its own, version 1.
+"""Protocol between chaic and a helper process, version 2.
 
-Nothing but the standard library is needed. Copy this file beside your helper, and call `serve`
-with an object that has `senses`, `reset` and `act`:
+Requires the standard library only. Copy this file beside your helper, and call `serve` with an object
+that has `sensors`, `reset` and `act`:
 
     chaic eval --helper "exec:python3 my_helper.py"
     chaic helper check "python3 my_helper.py"
 
-docs/subprocess-helpers.md says what each message holds.
+docs/subprocess-helpers.md defines all messages.
 """
 
 import array
@@ -16,13 +16,13 @@ import struct
 import sys
 import traceback
 
-PROTOCOL = 1
+PROTOCOL = 2
 TYPES = {"u8": "B", "u16": "H", "f32": "f"}
 
 
 class Images:
-    """What the eye sees: `rgb`, `depth_m` and `ids`, each a flat array in rows from the top, or
-    None. With NumPy: `numpy.asarray(images.depth_m).reshape(height, width)`."""
+    """Images `rgb`, `depth_m` and `ids`: flat arrays in rows from the top, or None.
+    With NumPy: `numpy.asarray(images.depth_m).reshape(height, width)`."""
 
     def __init__(self, heads, body):
         self.rgb = self.depth_m = self.ids = None
@@ -35,16 +35,16 @@ class Images:
 
 
 def serve(helper, name):
-    """Answers on standard input and output until chaic closes them. `helper` has
+    """Serves a helper on standard input and output until chaic closes them. `helper` has
 
-    - `senses`: what it wants to see, for example
+    - `sensors`: the requested images, for example
       `{"image_size": 128, "rgb": False, "depth": True, "ids": False}`;
-    - `reset(briefing)`: an episode begins;
-    - `act(seen, images)`: the next action, for example `"move_forward"` or
+    - `reset(briefing)`: starts an episode;
+    - `act(observation, images)`: returns the next action, for example `"move_forward"` or
       `{"pick_up": {"object": {"pixel": {"column": 3, "row": 70}}, "hand": "left"}}`.
     """
     pipe_in, pipe_out = sys.stdin.buffer, os.fdopen(os.dup(sys.stdout.fileno()), "wb")
-    # What the helper prints must not come between the frames.
+    # Output of the helper must not mix with the frames.
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     while True:
         lengths = pipe_in.read(8)
@@ -59,7 +59,7 @@ def serve(helper, name):
                 answer = {"type": "hello", "protocol": PROTOCOL, "name": name}
             elif kind == "reset":
                 helper.reset(message["briefing"])
-                answer = {"type": "ready", "senses": helper.senses}
+                answer = {"type": "ready", "sensors": helper.sensors}
             elif kind == "observe":
                 action = helper.act(message, Images(message["images"], body))
                 answer = {"type": "act", "action": action}

@@ -1,8 +1,8 @@
-"""A helper in Python: it walks to the nearest possible target in sight, takes it, looks for the goal
-place, and puts it there. It knows no map and makes no plans.
+"""A helper without map or plans: it walks to the nearest visible target, picks it up, looks for the goal
+place, and puts it there.
 
     chaic eval --helper none --helper "exec:python3 examples/python_helper/helper.py" \
-        --exec-grants ids,goal_place --task no_constraint,low_target --first 4
+        --exec-grants ids,goal_place --task no_constraint,low_target --n-episodes 4
 """
 
 import math
@@ -10,34 +10,34 @@ import random
 
 from chaic_helper import serve
 
-NEAR_M = 1.2  # How near to walk before taking or putting, metres.
-BLOCKED_M = 0.6  # Something this near straight ahead is in the way, metres.
-SIZE = 64  # Side of the images that it asks for, pixels; `chaic eval --size` may give others.
+NEAR_M = 1.2  # Distance from which it picks up or puts on, metres.
+BLOCKED_M = 0.6  # Depth ahead below which the path is blocked, metres.
+SIZE = 64  # Requested image size, pixels; `chaic eval --size` overrides it.
 
 
 class Walker:
-    senses = {"image_size": SIZE, "rgb": False, "depth": True, "ids": True}
+    sensors = {"image_size": SIZE, "rgb": False, "depth": True, "ids": True}
 
     def reset(self, briefing):
         self.briefing = briefing
-        # The same episode must lead to the same decisions: draw by the briefing's seed.
+        # Runs must be repeatable, so random draws use the seed of the briefing.
         self.random = random.Random(briefing["seed"])
         self.given_up = set()
         self.aimed_at = None
         self.turns_left = 0
 
-    def act(self, seen, images):
-        self.size = seen["camera"]["width"]
-        last = seen["own"]["last"]
+    def act(self, observation, images):
+        self.size = observation["camera"]["width"]
+        last = observation["proprioception"]["last"]
         if last is not None and last[1] != "success":
-            # A step against something, or a thing out of reach: turn away from it.
+            # The step was blocked, or the object was out of reach: turn away.
             self.turns_left = self.random.randrange(2, 6)
             if self.aimed_at is not None:
                 self.given_up.add(self.aimed_at)
         self.aimed_at = None
-        hands = [hand for hand in seen["own"]["hands"] if hand is not None]
+        hands = [hand for hand in observation["proprioception"]["hands"] if hand is not None]
         wanted = self.briefing["goal_places" if hands else "possible_targets"]
-        found = self.nearest(seen, images, wanted, hands)
+        found = self.nearest(observation, images, wanted, hands)
         if found is not None and found[0] < NEAR_M:
             _, pixel, entity = found
             self.turns_left = 0
@@ -59,18 +59,18 @@ class Walker:
         return "move_forward"
 
     def ahead_m(self, images):
-        """Depth of the nearest thing that a body would walk into, metres."""
+        """Returns the smallest depth in the center of the image, metres."""
         size = self.size
         middle = range(size // 2 - size // 16, size // 2 + size // 16)
         return min(images.depth_m[size * row + column] for row in middle for column in middle)
 
-    def nearest(self, seen, images, wanted, hands):
-        """Distance in metres, pixel and id of the nearest thing in sight of a wanted class."""
+    def nearest(self, observation, images, wanted, hands):
+        """Returns distance (metres), pixel and id of the nearest visible object of a wanted class."""
         held = {hand["identity"]["entity"] for hand in hands if hand["identity"]}
-        classes = dict(seen["granted"]["classes"])
+        classes = dict(observation["granted"]["classes"])
         ids = {e for e, c in classes.items() if c in wanted and e not in held | self.given_up}
         size = self.size
-        focal = size / 2 / math.tan(seen["camera"]["vertical_fov_rad"] / 2)
+        focal = size / 2 / math.tan(observation["camera"]["vertical_fov_rad"] / 2)
         best = None
         for pixel, entity in enumerate(images.ids or ()):
             if entity in ids:

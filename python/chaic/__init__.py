@@ -1,25 +1,29 @@
-"""chaic: constrained human-AI cooperation, simulated, from Python.
+"""chaic: simulator and benchmark for constrained human-AI cooperation.
 
-``import chaic`` tells Gymnasium of its environments: ``gymnasium.make("chaic/HighTarget-v0")``. ``World`` is one episode under way, ``Batch`` many of them on all cores, ``evaluate`` a whole benchmark with helpers of
-your own; ``chaic.gym``, ``chaic.vector`` and ``chaic.zoo`` are the interfaces of Gymnasium and PettingZoo, and ``chaic.ray`` plays benchmarks on a cluster;
-they are imported when they are needed.
+``import chaic`` registers its environments with Gymnasium: ``gymnasium.make("chaic/HighTarget-v0")``. ``World`` is one
+running episode, ``Batch`` holds many worlds that run on all cores, and ``evaluate`` plays a benchmark with Python helpers.
+``chaic.gym``, ``chaic.vector`` and ``chaic.zoo`` contain the Gymnasium and PettingZoo environments, and ``chaic.ray`` plays
+benchmarks on a Ray cluster. Import these modules when you need them.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
+from chaic import _chaic, _deprecated
 from chaic._chaic import (
     ACTIONS,
     MAP,
-    OWN,
     PLAN,
+    PROPRIOCEPTION,
     REWARD,
     Batch,
     Briefing,
     Detector,
     Episode,
-    Mind,
     Observation,
     Planner,
+    PlanningAgent,
     Snapshot,
     World,
     __version__,
@@ -36,8 +40,8 @@ from chaic.runs import Helper, Run, evaluate, merge
 __all__ = [
     "ACTIONS",
     "MAP",
-    "OWN",
     "PLAN",
+    "PROPRIOCEPTION",
     "REWARD",
     "Batch",
     "Briefing",
@@ -45,9 +49,9 @@ __all__ = [
     "Episode",
     "EpisodeSource",
     "Helper",
-    "Mind",
     "Observation",
     "Planner",
+    "PlanningAgent",
     "Run",
     "Snapshot",
     "World",
@@ -62,5 +66,17 @@ __all__ = [
     "show",
     "tasks",
 ]
+
+_RENAMED = {"OWN": "PROPRIOCEPTION", "Mind": "PlanningAgent"}
+
+
+def __getattr__(name: str) -> Any:
+    """Returns the value of an old name, with a ``DeprecationWarning``."""
+    new = _RENAMED.get(name)
+    if new is None:
+        raise AttributeError(f"module 'chaic' has no attribute {name!r}")
+    _deprecated.warn(f"chaic.{name}", f"chaic.{new}")
+    return getattr(_chaic, new)
+
 
 _register()

@@ -1,4 +1,4 @@
-"""The command ``chaic``: the same code as the program's."""
+"""The command ``chaic``; it runs the same code as the Rust program."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from chaic._sandbox import launcher
 
 
 def main() -> int:
-    """Runs the command with the arguments of this process; its exit code."""
-    # The command takes Ctrl-C for itself.
+    """Runs the command with the arguments of this process and returns its exit code."""
+    # The command handles Ctrl-C itself.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     return run_command(["chaic", *sys.argv[1:]], launcher())
 

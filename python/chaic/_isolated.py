@@ -1,4 +1,4 @@
-"""Helpers in processes of their own: how such a process is started, and what it runs."""
+"""Helpers in separate processes: the command line and the main function of such a process."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ _CODE = "import sys, json; sys.path[:] = json.loads(sys.argv[2]); from chaic._is
 
 
 def command_line(maker: Callable[[], Any], images: Sequence[str], image_size: int) -> str:
-    """Returns the shell command of a process that serves fresh helpers of ``maker``.
+    """Returns the shell command of a process that serves helpers that ``maker`` creates.
 
-    ``ValueError`` if another process cannot find ``maker``: classes and functions must be defined in a file.
+    Raises ``ValueError`` if another process cannot import ``maker``: it must be defined in a file.
     """
     main_file = _main_file()
     try:
@@ -42,14 +42,14 @@ def command_line(maker: Callable[[], Any], images: Sequence[str], image_size: in
 
 
 _UNREACHABLE = (
-    "isolate=True needs a helper that another process can import: a class or function at the top of a file"
+    "isolate=True needs a helper that another process can import: a class or function at the top level of a file"
 )
 
 
 def readable(maker: Callable[[], Any]) -> list[str]:
     """Returns the files and folders that the process needs: the interpreter, installed packages, the helper's file.
 
-    Folders of ``sys.path`` that contain the current folder are left out, but for the helper's own file or package.
+    Folders of ``sys.path`` that contain the current folder are left out, except for the helper's own file or package.
     """
     here = Path.cwd()
     found = {sys.prefix, sys.base_prefix, sys.exec_prefix, str(Path(__file__).parent)}
@@ -77,7 +77,7 @@ def _main_file() -> str | None:
 def main(text: str) -> None:
     """Serves helpers on standard input and output until the pipe is closed."""
     task = json.loads(text)
-    # What a helper prints must not come between the messages.
+    # Output of the helper must not mix with the messages.
     output = os.dup(1)
     os.dup2(2, 1)
     maker = _maker(task)
@@ -87,7 +87,7 @@ def main(text: str) -> None:
 def _maker(task: dict[str, Any]) -> Any:
     pickled = base64.b64decode(task["maker"])
     if b"__main__" in pickled:
-        # As multiprocessing does: the script runs under another name, so that its main part is left out.
+        # As in multiprocessing, the script runs under another name, so its main part is skipped.
         script = types.ModuleType("__mp_main__")
         script.__file__ = task["main"]
         code = compile(Path(task["main"]).read_text(), task["main"], "exec")

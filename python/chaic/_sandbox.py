@@ -1,4 +1,4 @@
-"""How sandboxes of helper processes start from a Python interpreter."""
+"""Start of the sandboxes of helper processes from a Python interpreter."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import sys
 
 from chaic import _chaic
 
-# The extension module alone: importing the package takes ten times as long, and a sandbox is started for each episode.
+# Loads the extension module only: the import of the package takes ten times as long, and each episode starts a sandbox.
 _STAGE = """
 import sys
 from importlib.machinery import ExtensionFileLoader

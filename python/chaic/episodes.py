@@ -1,4 +1,4 @@
-"""Which episode is played next."""
+"""Selection of episodes."""
 
 from __future__ import annotations
 
@@ -7,75 +7,81 @@ from typing import Any
 
 import numpy as np
 
+from chaic import _deprecated
 from chaic._chaic import Episode, episode_ids, tasks
 
-#: Episodes that are kept once they were read: of a bundled split all, of a generated one the last ones.
-MOST_KEPT = 256
+#: Maximum number of cached episodes; enough for all episodes of a bundled split.
+MAX_CACHED = 256
 
-#: What is trained on where no training episodes come with chaic.
-OTHERS = "gen:0..1000"
+#: Training split of tasks without bundled training episodes.
+FALLBACK_SPLIT = "gen:0..1000"
 
-#: Worlds are played with seeds below this.
-SEEDS = 2**31
+#: Seeds of worlds are below this number.
+N_SEEDS = 2**31
 
 
-def tasks_named(task: str | Sequence[str] | None) -> list[str]:
-    """The tasks of a name, of several, or (``None``) the paper's eight.
+def task_names(task: str | Sequence[str] | None) -> list[str]:
+    """Returns the names of one task, of several, or (``None``) of the paper's eight.
 
-    Raises ``ValueError`` if there is no such task.
+    Raises ``ValueError`` for an unknown task.
     """
     known = tasks()
     if task is None:
         return known[:8]
-    named = [task] if isinstance(task, str) else list(task)
-    for name in named:
+    names = [task] if isinstance(task, str) else list(task)
+    for name in names:
         if name not in known:
-            raise ValueError(f"no task {name!r}; there are {', '.join(known)}")
-    if not named:
+            raise ValueError(f"unknown task {name!r}; the tasks are {', '.join(known)}")
+    if not names:
         raise ValueError("name at least one task")
-    return named
+    return names
 
 
 class EpisodeSource:
-    """Episodes of some tasks of a split, drawn at random or by name."""
+    """Episodes of a split of some tasks, drawn at random or selected by id."""
 
     def __init__(self, task: str | Sequence[str] | None = None, split: str | None = None) -> None:
-        """Episodes of a split; of ``None`` the training episodes that come with chaic, or generated ones (``OTHERS``)
-        of tasks that have none."""
-        #: The names of all episodes.
+        """Selects a split. ``None`` means the bundled training episodes, and generated ones (``FALLBACK_SPLIT``) for
+        tasks without any."""
+        #: Ids of all episodes.
         self.ids: list[str] = []
-        for name in tasks_named(task):
+        for name in task_names(task):
             found = episode_ids("train" if split is None else split, name)
-            self.ids += episode_ids(OTHERS, name) if split is None and not found else found
+            self.ids += episode_ids(FALLBACK_SPLIT, name) if split is None and not found else found
         if not self.ids:
             raise ValueError(f"the split {split!r} has no episodes of these tasks")
-        self._kept: dict[str, Episode] = {}
+        self._cache: dict[str, Episode] = {}
 
     def __len__(self) -> int:
         return len(self.ids)
 
-    def named(self, name: str) -> Episode:
-        """The episode of a name, whether or not it is in the split."""
-        episode = self._kept.get(name)
+    def get(self, episode_id: str) -> Episode:
+        """Returns the episode with this id, which may be outside the split."""
+        episode = self._cache.get(episode_id)
         if episode is None:
-            episode = Episode(name)
-            while len(self._kept) >= MOST_KEPT:
-                del self._kept[next(iter(self._kept))]
-            self._kept[name] = episode
+            episode = Episode(episode_id)
+            while len(self._cache) >= MAX_CACHED:
+                del self._cache[next(iter(self._cache))]
+            self._cache[episode_id] = episode
         return episode
 
+    def named(self, name: str) -> Episode:
+        """Returns ``get(name)``; deprecated."""
+        _deprecated.warn("EpisodeSource.named", "EpisodeSource.get")
+        return self.get(name)
+
     def draw(self, rng: np.random.Generator) -> tuple[Episode, int]:
-        """Any episode, and a seed for its world."""
-        name = self.ids[int(rng.integers(len(self.ids)))]
-        return self.named(name), int(rng.integers(SEEDS))
+        """Draws an episode and a seed for its world."""
+        episode_id = self.ids[int(rng.integers(len(self.ids)))]
+        return self.get(episode_id), int(rng.integers(N_SEEDS))
 
     def choose(
         self, rng: np.random.Generator, options: Mapping[str, Any] | None
     ) -> tuple[Episode, int]:
-        """The episode and seed that the options of a reset name, where they do; as ``draw`` otherwise."""
+        """Returns the episode and seed in the options of a reset; draws those that the options do not contain."""
         episode, seed = self.draw(rng)
         if options is not None and "episode" in options:
-            episode, seed = self.named(options["episode"]), 0
+            episode, seed = self.get(options["episode"]), 0
         if options is not None and "seed" in options:
             seed = int(options["seed"])
         return episode, seed

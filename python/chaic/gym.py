@@ -1,8 +1,8 @@
-"""The helper as a Gymnasium environment: the partner, and a child if there is one, are chaic's own minds.
+"""Gymnasium environment of the helper; chaic simulates the partner and the child.
 
-A step is one decision. It takes as many frames as it takes (``info["frames"]``, 30 to a second), and the partner goes on
-meanwhile: a semi-Markov decision process, for which a discount per frame is ``gamma ** info["frames"]``. ``info["action_mask"]``
-is a mask for ``action_space.sample``: what the hands, or the plans that are offered, allow.
+A step is one decision. It takes ``info["frames"]`` frames, 30 per second, while the partner continues. The environment is
+thus a semi-Markov decision process; use ``gamma ** info["frames"]`` to discount per frame. ``info["action_mask"]`` is a mask
+for ``action_space.sample``: the actions that the hands allow, or the offered plans.
 """
 
 from __future__ import annotations
@@ -14,52 +14,46 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from chaic import spaces
-from chaic._chaic import ACTIONS, REWARD, Planner, World
+from chaic import _deprecated, spaces
+from chaic._chaic import ACTIONS, REWARD, Planner, World, weigh_reward
 from chaic.episodes import EpisodeSource
 
-#: The helper's number among the agents of a world.
+#: Agent id of the helper in a world.
 HELPER = 1
-#: Who chooses a plan that isn't offered stands still for so long, and pays for an invalid action.
+#: Duration of the wait after the choice of a plan that is not offered; it also costs the penalty of an invalid action.
 INVALID_PLAN_FRAMES = 30
-#: Side of the picture of ``render``, pixels.
+#: Width and height of the picture of ``render``, pixels.
 PICTURE_SIZE = 512
 
 Obs = dict[str, NDArray[Any]]
 Info = dict[str, Any]
 
 
-def reward_of(terms: Mapping[str, Any] | None, weights: Mapping[str, float]) -> float:
-    """The reward of what came of an action, as ``World.reward`` has it."""
-    if terms is None:
-        return 0.0
-    return float(
-        weights["delivered"] * terms["delivered"]
-        + weights["approached_per_m"] * terms["approached_m"]
-        - (weights["invalid"] if terms["is_invalid"] else 0.0)
-    )
-
-
-def checked_weights(given: Mapping[str, float] | None) -> dict[str, float]:
-    """The usual weights of a reward, with some given otherwise; ``ValueError`` for terms that there aren't."""
+def reward_weights(changes: Mapping[str, float] | None) -> dict[str, float]:
+    """Returns the default reward weights with these changes. Raises ``ValueError`` for an unknown term."""
+    changed = dict(changes or {})
+    _deprecated.rename_keys(changed, {"approached_per_m": "progress_per_m"})
     weights = dict(REWARD)
-    for name, weight in (given or {}).items():
+    for name, weight in changed.items():
         if name not in weights:
-            raise ValueError(f"no term of the reward is {name!r}; there are {', '.join(weights)}")
+            raise ValueError(f"unknown reward term {name!r}; the terms are {', '.join(weights)}")
         weights[name] = float(weight)
     return weights
 
 
 class HelperEnv(gymnasium.Env[Any, Any]):
-    """One helper beside the partner of a task.
+    """Environment of one helper and the simulated partner of a task.
 
-    ``task`` is a task, several, or ``None`` for the paper's eight. ``observation`` names the parts of an observation:
-    ``rgb`` (uint8), ``depth`` (float32 metres), ``own`` (``chaic.OWN``), ``map`` (``chaic.MAP``, what the helper
-    remembers of what it saw), and ``ids`` (needs the grant). ``action`` is ``"primitive"``, a kind of action and a pixel,
-    or ``"plan"``, one of the plans that are offered (``observation["plans"]``, ``info["action_mask"]``), carried out by
-    chaic's planner. ``perception`` is by what planner and map tell what is in an image: ``"gt"``, which takes
-    the grant ``ids``, or ``"learned"``. ``minds_image_size`` is the side of the partner's own images: with smaller ones than
-    scored runs have (``None``) it sees less, and worlds are faster. What is granted stands in ``grants``.
+    - ``task``: a task, several, or ``None`` for the paper's eight.
+    - ``observation``: any of ``rgb`` (uint8), ``depth`` (float32 metres), ``own`` (proprioception,
+      ``chaic.PROPRIOCEPTION``), ``map`` (egocentric map of the memory, ``chaic.MAP``), and ``ids`` (needs the grant).
+    - ``action``: ``"primitive"`` is a kind of action and a pixel. ``"plan"`` is the index of an offered plan
+      (``observation["plans"]``, ``info["action_mask"]``), which chaic's planner executes.
+    - ``perception`` of planner and map: ``"gt"``, which adds the grant ``ids``, or ``"learned"``.
+    - ``partner_image_size``: width and height of the partner's images, pixels; ``None`` for those of scored runs. A smaller
+      size is faster and reduces what the partner sees. ``minds_image_size`` is its deprecated name.
+
+    The attribute ``grants`` lists all grants.
     """
 
     metadata = {"render_modes": ["rgb_array", "human", "ansi"], "render_fps": 3}
@@ -69,7 +63,7 @@ class HelperEnv(gymnasium.Env[Any, Any]):
         task: str | Sequence[str] | None = None,
         *,
         split: str | None = None,
-        observation: Sequence[str] = spaces.USUAL,
+        observation: Sequence[str] = spaces.DEFAULT_PARTS,
         action: str = "primitive",
         image_size: int = 128,
         grants: Sequence[str] = (),
@@ -77,26 +71,29 @@ class HelperEnv(gymnasium.Env[Any, Any]):
         rules: str = "paper",
         set: Sequence[str] = (),
         appearance: str = "canonical",
-        minds_image_size: int | None = None,
+        partner_image_size: int | None = None,
         reward: Mapping[str, float] | None = None,
         render_mode: str | None = None,
+        minds_image_size: int | None = None,
     ) -> None:
+        partner_image_size = _deprecated.partner_image_size(partner_image_size, minds_image_size)
         if action not in ("primitive", "plan"):
-            raise ValueError(f'action is "primitive" or "plan", not {action!r}')
+            raise ValueError(f'action is {action!r}, expected "primitive" or "plan"')
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(f"no render mode {render_mode!r}")
-        self.parts = spaces.checked_parts(observation)
-        self.by_plans = action == "plan"
+            modes = ", ".join(self.metadata["render_modes"])
+            raise ValueError(f"unknown render mode {render_mode!r}; the modes are {modes}")
+        self.parts = spaces.parse_parts(observation)
+        self._uses_plans = action == "plan"
         self.render_mode = render_mode
-        self.weights = checked_weights(reward)
+        self.weights = reward_weights(reward)
         self.source = EpisodeSource(task, split)
-        images = spaces.images_of(self.parts)
+        images = spaces.image_parts(self.parts)
         self._planner: Planner | None = None
-        if self.by_plans or "map" in self.parts:
+        if self._uses_plans or "map" in self.parts:
             self._planner = Planner(perception, image_size)
             images = sorted({*images, *self._planner.images})
             grants = sorted({*grants, *self._planner.grants})
-        #: What the helper is granted (docs/grants.md).
+        #: Grants of the helper (docs/grants.md).
         self.grants = tuple(grants)
         self._options: dict[str, Any] = {
             "images": images,
@@ -105,68 +102,68 @@ class HelperEnv(gymnasium.Env[Any, Any]):
             "rules": rules,
             "set": list(set),
             "appearance": appearance,
-            "minds_image_size": minds_image_size,
+            "partner_image_size": partner_image_size,
         }
-        self.observation_space = spaces.observation_space(self.parts, image_size, self.by_plans)
+        self.observation_space = spaces.observation_space(self.parts, image_size, self._uses_plans)
         self.action_space = (
-            spaces.plan_space() if self.by_plans else spaces.primitive_space(image_size)
+            spaces.plan_space() if self._uses_plans else spaces.primitive_space(image_size)
         )
-        #: The world, from the first reset on.
+        #: World; ``None`` before the first reset.
         self.world: World | None = None
-        self._is_asked = False
-        self._name = ""
-        #: What was perceived at the last decision, which is the observation of the end, too.
+        self._needs_action = False
+        self._episode_id = ""
+        #: Observation at the last decision; also the final observation of an episode.
         self._last: Obs = {}
-        #: The next action of the plan that is followed.
-        self._next: Any = None
-        #: How many kinds of actions, columns and rows there are, and which kinds can be now.
+        #: Next action of the current plan.
+        self._next_action: Any = None
+        #: Numbers of kinds of actions, columns and rows, and the mask of the possible kinds.
         self._bounds = (len(ACTIONS), image_size, image_size)
-        self._kinds: NDArray[np.bool_] = np.zeros(len(ACTIONS), bool)
-        self._pixels = np.ones(image_size, np.int8)
-        self._has_images = bool(spaces.images_of(self.parts))
+        self._kind_mask: NDArray[np.bool_] = np.zeros(len(ACTIONS), bool)
+        self._pixel_mask = np.ones(image_size, np.int8)
+        self._has_images = bool(spaces.image_parts(self.parts))
         self._events: list[dict[str, Any]] = []
         self._window: Any = None
-        # Mistakes in the options are told now, not at the first reset.
-        World(self.source.named(self.source.ids[0]), 0, **self._options)
+        # Invalid options raise an error here, not in the first reset.
+        World(self.source.get(self.source.ids[0]), 0, **self._options)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Obs, Info]:
-        """Begins an episode: drawn from the split, or ``options["episode"]`` with ``options["seed"]``."""
+        """Starts an episode: one drawn from the split, or ``options["episode"]`` with ``options["seed"]``."""
         super().reset(seed=seed)
         episode, world_seed = self.source.choose(self.np_random, options)
         if self.world is None:
             self.world = World(episode, world_seed, **self._options)
         else:
             self.world.reset(episode, world_seed)
-        self._name = episode.id
+        self._episode_id = episode.id
         if self._planner is not None:
             self._planner.reset(self.world.briefing(HELPER))
-        self._is_asked = self.world.advance() == "waits"
-        self._attend()
-        if self.by_plans:
-            self._follow(0.0)
+        self._needs_action = self.world.advance() == "needs_action"
+        self._update_planner()
+        if self._uses_plans:
+            self._execute_plan(0.0)
         return self._observe(), self._info(0)
 
     def step(self, action: Any) -> tuple[Obs, float, bool, bool, Info]:
-        """Carries out one decision, and plays on until the next one."""
+        """Executes one decision and advances to the next one."""
         world = self.world
         if world is None:
             raise gymnasium.error.ResetNeeded("reset the environment before its first step")
-        if not self._is_asked:
+        if not self._needs_action:
             raise gymnasium.error.ResetNeeded("the episode is over; reset the environment")
         before = world.frame
-        if self.by_plans:
+        if self._uses_plans:
             reward = self._step_plan(action)
         else:
-            reward = self._act(spaces.checked_row(action, self._bounds))
+            reward = self._act(spaces.parse_row(action, self._bounds))
         if self.render_mode == "human":
             self.render()
         done, total = world.progress()
         complete = done >= total
-        over = not self._is_asked
+        ended = not self._needs_action
         info = self._info(world.frame - before)
-        return self._observe(), reward, over and complete, over and not complete, info
+        return self._observe(), reward, ended and complete, ended and not complete, info
 
     def _step_plan(self, action: Any) -> float:
         assert self._planner is not None
@@ -176,47 +173,42 @@ class HelperEnv(gymnasium.Env[Any, Any]):
         if not self.action_space.contains(index):
             raise ValueError(f"{action!r} is not in {self.action_space}")
         if index < len(self._planner.plans()):
-            self._next = self._planner.choose(index)
-            return self._follow(0.0)
-        self._next = {"wait": {"frames": INVALID_PLAN_FRAMES}}
-        return self._follow(-self.weights["invalid"])
+            self._next_action = self._planner.choose(index)
+            return self._execute_plan(0.0)
+        self._next_action = {"wait": {"frames": INVALID_PLAN_FRAMES}}
+        return self._execute_plan(-self.weights["invalid"])
 
-    def _follow(self, reward: float) -> float:
-        """Acts by the plan that is followed until a choice is due or the episode ends; the reward."""
-        while self._is_asked and self._next is not None:
-            reward += self._act(self._next)
+    def _execute_plan(self, reward: float) -> float:
+        """Executes the current plan until the next choice or the end of the episode; returns the reward."""
+        while self._needs_action and self._next_action is not None:
+            reward += self._act(self._next_action)
         return reward
 
     def _act(self, action: Any) -> float:
-        """Acts once and plays on until the helper is asked again; the reward."""
+        """Executes one action and advances until the helper needs the next one; returns the reward."""
         assert self.world is not None
-        self._is_asked, delivered, approached_m, is_invalid = self.world.step(action)
-        self._attend()
-        weights = self.weights
-        return (
-            weights["delivered"] * delivered
-            + weights["approached_per_m"] * approached_m
-            - (weights["invalid"] if is_invalid else 0.0)
-        )
+        self._needs_action, delivered, progress_m, is_invalid = self.world.step(action)
+        self._update_planner()
+        return weigh_reward(delivered, progress_m, is_invalid, self.weights)
 
-    def _attend(self) -> None:
-        """Lets the planner see what the helper sees."""
-        if self._planner is None or not self._is_asked:
+    def _update_planner(self) -> None:
+        """Passes the helper's observation to the planner."""
+        if self._planner is None or not self._needs_action:
             return
         assert self.world is not None
-        seen = self.world.observe(HELPER)
-        if self.by_plans:
-            self._next = self._planner.attend(seen)
+        observation = self.world.observe(HELPER)
+        if self._uses_plans:
+            self._next_action = self._planner.attend(observation)
         else:
-            self._planner.look(seen)
+            self._planner.look(observation)
 
     def _observe(self) -> Obs:
         world = self.world
         assert world is not None
-        if not self._is_asked:
+        if not self._needs_action:
             return {part: array.copy() for part, array in self._last.items()}
-        own, self._kinds = world.own(HELPER)
-        seen = world.observe(HELPER) if self._has_images else None
+        own, self._kind_mask = world.own(HELPER)
+        observation = world.observe(HELPER) if self._has_images else None
         out: Obs = {}
         for part in self.parts:
             if part == "own":
@@ -225,29 +217,29 @@ class HelperEnv(gymnasium.Env[Any, Any]):
                 assert self._planner is not None
                 out["map"] = self._planner.semantic_map(spaces.MAP_SIDE, spaces.MAP_CELL_M)
             else:
-                out[part] = getattr(seen, part)
-        if self.by_plans:
+                out[part] = getattr(observation, part)
+        if self._uses_plans:
             assert self._planner is not None
-            numbers = self._planner.plan_numbers()[: spaces.MOST_PLANS]
-            plans = np.zeros((spaces.MOST_PLANS, numbers.shape[1]), np.float32)
-            plans[: len(numbers)] = numbers
+            vectors = self._planner.plan_numbers()[: spaces.MAX_PLANS]
+            plans = np.zeros((spaces.MAX_PLANS, vectors.shape[1]), np.float32)
+            plans[: len(vectors)] = vectors
             out["plans"] = plans
         self._last = out
         return out
 
     def action_masks(self) -> NDArray[np.bool_]:
-        """What can be chosen now, as maskable PPO of sb3-contrib asks for it: plans, or kinds of actions and (all) columns
-        and rows, one after the other."""
+        """Returns the mask of valid actions for MaskablePPO of sb3-contrib: plans, or the concatenation of kinds of
+        actions, columns and rows."""
         mask = self._mask()
         return np.concatenate(mask if isinstance(mask, tuple) else (mask,)).astype(bool)
 
     def _mask(self) -> Any:
-        if self.by_plans:
+        if self._uses_plans:
             assert self._planner is not None
-            plans = len(self._planner.plans()) if self._is_asked else 0
-            return (np.arange(spaces.MOST_PLANS) < plans).astype(np.int8)
-        kinds = self._kinds if self._is_asked else np.zeros(len(ACTIONS), bool)
-        return kinds.astype(np.int8), self._pixels.copy(), self._pixels.copy()
+            n_plans = len(self._planner.plans()) if self._needs_action else 0
+            return (np.arange(spaces.MAX_PLANS) < n_plans).astype(np.int8)
+        kinds = self._kind_mask if self._needs_action else np.zeros(len(ACTIONS), bool)
+        return kinds.astype(np.int8), self._pixel_mask.copy(), self._pixel_mask.copy()
 
     def _info(self, frames: int) -> Info:
         world = self.world
@@ -260,11 +252,11 @@ class HelperEnv(gymnasium.Env[Any, Any]):
             "events": self._events,
             "action_mask": self._mask(),
             "tr": done / total if total else 0.0,
-            "episode_id": self._name,
+            "episode_id": self._episode_id,
         }
 
     def render(self) -> Any:
-        """What the helper sees now: a picture, a window, or words."""
+        """Returns the helper's view as an array or the state as text, or shows the view in a window, by ``render_mode``."""
         if self.render_mode is None or self.world is None:
             return None
         if self.render_mode == "ansi":
@@ -295,14 +287,14 @@ class HelperEnv(gymnasium.Env[Any, Any]):
         if self._window is None:
             pygame.init()
             self._window = pygame.display.set_mode((PICTURE_SIZE, PICTURE_SIZE))
-            pygame.display.set_caption("chaic: what the helper sees")
+            pygame.display.set_caption("chaic: view of the helper")
         pygame.event.pump()
         surface = pygame.surfarray.make_surface(picture.swapaxes(0, 1))
         self._window.blit(surface, (0, 0))
         pygame.display.flip()
 
     def close(self) -> None:
-        """Closes the window, if there is one."""
+        """Closes the window, if one is open."""
         if self._window is not None:
             import pygame
 

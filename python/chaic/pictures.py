@@ -1,4 +1,4 @@
-"""Pictures of places, from cameras that stand anywhere."""
+"""Pictures of episodes and worlds, from any camera."""
 
 from __future__ import annotations
 
@@ -25,15 +25,17 @@ def camera(
     width: int = 512,
     height: int = 512,
 ) -> dict[str, Any]:
-    """A pinhole camera at ``eye`` that looks at a point, as ``World.render`` wants it; both in the world, metres, y up.
+    """Returns a pinhole camera for ``World.render``. ``eye`` and ``look_at`` are points in the world, metres, y up.
 
-    Raises ``ValueError`` if the direction to look in cannot be told: both are the same, or one above the other.
+    Raises ``ValueError`` if the viewing direction is undefined or vertical.
     """
     at = np.asarray(eye, np.float64)
     forward = np.asarray(look_at, np.float64) - at
     right = np.cross(forward, [0.0, 1.0, 0.0])
     if at.shape != (3,) or not np.linalg.norm(right) > 1e-6:
-        raise ValueError(f"a camera at {eye} cannot look at {look_at}: give two points, none above the other")
+        raise ValueError(
+            f"a camera at {eye} cannot look at {look_at}: give two points that differ in x or z"
+        )
     forward, right = forward / np.linalg.norm(forward), right / np.linalg.norm(right)
     return {
         "eye_in_world": at.tolist(),
@@ -45,7 +47,7 @@ def camera(
 
 
 def _quaternion(r: NDArray[np.float64]) -> list[float]:
-    """The quaternion x, y, z, w of a rotation matrix: its largest component first, for the sake of accuracy."""
+    """Returns the quaternion x, y, z, w of a rotation matrix. It starts from the largest component for accuracy."""
     squares = np.array([1 + 2 * r[k, k] - np.trace(r) for k in range(3)] + [1 + np.trace(r)])
     k = int(np.argmax(squares))
     q = np.empty(4)
@@ -72,13 +74,13 @@ def render(
     image_size: int = 512,
     images: Sequence[str] = ("rgb",),
 ) -> dict[str, NDArray[Any]]:
-    """What an agent (0 the partner, 1 the helper) or a ``camera`` sees of a world, or of an episode at its beginning."""
+    """Renders the view of an agent (0 the partner, 1 the helper) or of a ``camera``, for a world or the start of an episode."""
     world = of if isinstance(of, World) else World(of)
     return world.render(agent=agent, camera=camera, image_size=image_size, images=images)
 
 
 def show(of: Episode | World) -> None:
-    """Shows a place from above: in a notebook in its cell, elsewhere in the browser."""
+    """Shows the top view in the notebook or the browser."""
     png = of._repr_png_()
     if "ipykernel" in sys.modules:
         notebook: Any = importlib.import_module("IPython.display")

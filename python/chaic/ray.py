@@ -1,7 +1,7 @@
-"""Benchmarks on a Ray cluster: shards of episode runs, joined in one folder.
+"""Benchmark runs on a Ray cluster: each Ray task plays one shard, and the shards are merged in one folder.
 
-Each task of Ray's plays one shard into a folder of its own and sends its files back, so that no file system need be
-shared. A shard whose worker is lost is played again by another one.
+A task returns the files of its shard, so the cluster needs no shared file system. If a worker is lost, another one repeats
+its shard.
 """
 
 from __future__ import annotations
@@ -16,10 +16,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from chaic.runs import Maker, Run, evaluate as evaluate_here, merge
+from chaic import _deprecated
+from chaic.runs import RENAMED_OPTIONS, Maker, Run, evaluate as evaluate_locally, merge
 
 
-def _packed(folder: Path) -> bytes:
+def _pack(folder: Path) -> bytes:
+    """Returns the files of a folder as an archive."""
     buffer = io.BytesIO()
     with tarfile.open(fileobj=buffer, mode="w:gz") as archive:
         archive.add(folder, arcname=".")
@@ -27,7 +29,7 @@ def _packed(folder: Path) -> bytes:
 
 
 def _unpack(data: bytes, folder: Path) -> None:
-    """Into a new folder, which appears as a whole or not at all."""
+    """Unpacks an archive into a new folder, which appears only when it is complete."""
     unfinished = folder.with_name(folder.name + ".unfinished")
     shutil.rmtree(unfinished, ignore_errors=True)
     with tarfile.open(fileobj=io.BytesIO(data)) as archive:
@@ -38,11 +40,11 @@ def _unpack(data: bytes, folder: Path) -> None:
 def _play(
     helper: Maker | Mapping[str, Maker] | None, shard: str, jobs: int, options: Mapping[str, Any]
 ) -> bytes:
-    """Plays a shard on the machine where this runs; the files of its folder."""
+    """Plays a shard on this machine and returns the files of its folder."""
     with tempfile.TemporaryDirectory(prefix="chaic-shard-") as folder:
         out = Path(folder) / "run"
-        evaluate_here(helper, out=out, jobs=jobs, shard=shard, quiet=True, **options)
-        return _packed(out)
+        evaluate_locally(helper, out=out, jobs=jobs, shard=shard, quiet=True, **options)
+        return _pack(out)
 
 
 def evaluate(
@@ -52,16 +54,19 @@ def evaluate(
     shards: int | None = None,
     jobs: int = 1,
     tries: int = 3,
-    beside: Sequence[str] = (),
+    baselines: Sequence[str] = (),
     **options: Any,
 ) -> Run:
-    """Plays a benchmark as ``chaic.evaluate`` does, its shards as tasks of Ray's of ``jobs`` cores each.
+    """Plays a benchmark as ``chaic.evaluate`` does, with its shards as Ray tasks of ``jobs`` cores each.
 
-    ``shards`` is usually four times as many as the cluster plays at a time. What is played is kept in ``out`` + ``.shards``: who calls
-    this again after an interruption plays the rest. A shard is tried ``tries`` times before the run fails, whether
-    its worker is lost or it raises. The folder ``out`` equals the one of a run on one machine but for the order of the
-    lines in results.jsonl.
+    ``shards`` defaults to four times the number of shards that the cluster plays in parallel. Finished shards stay in ``out``
+    + ``.shards``; a call after an interruption plays the missing ones. The run fails after ``tries`` failures of a shard,
+    which are exceptions and lost workers. The folder ``out`` equals that of a run on one machine, except for the order of
+    lines in results.jsonl. ``first`` and ``beside`` are deprecated names of ``n_episodes`` and ``baselines``.
     """
+    if baselines:
+        options["baselines"] = tuple(baselines)
+    _deprecated.rename_keys(options, RENAMED_OPTIONS)
     ray: Any = importlib.import_module("ray")
     if not ray.is_initialized():
         ray.init()
@@ -71,26 +76,25 @@ def evaluate(
     parts = Path(f"{out}.shards")
     parts.mkdir(parents=True, exist_ok=True)
     remote = ray.remote(num_cpus=jobs, max_retries=0)(_play)
-    given = {"beside": tuple(beside), **options}
-    left = {k: tries for k in range(1, shards + 1) if not (parts / f"{k}-of-{shards}").is_dir()}
+    remaining_tries = {k: tries for k in range(1, shards + 1) if not (parts / f"{k}-of-{shards}").is_dir()}
     pending: dict[Any, int] = {}
-    while left or pending:
-        for k in [k for k in left if k not in pending.values()]:
-            pending[remote.remote(helper, f"{k}/{shards}", jobs, given)] = k
+    while remaining_tries or pending:
+        for k in [k for k in remaining_tries if k not in pending.values()]:
+            pending[remote.remote(helper, f"{k}/{shards}", jobs, options)] = k
         done, _ = ray.wait(list(pending), num_returns=1)
         for reference in done:
             k = pending.pop(reference)
             try:
                 data = ray.get(reference)
             except (ray.exceptions.RayError, OSError) as error:
-                left[k] -= 1
-                if left[k] == 0:
+                remaining_tries[k] -= 1
+                if remaining_tries[k] == 0:
                     for other in pending:
                         ray.cancel(other, force=True)
                     raise RuntimeError(f"shard {k} of {shards} failed {tries} times") from error
             else:
                 _unpack(data, parts / f"{k}-of-{shards}")
-                del left[k]
+                del remaining_tries[k]
     run = merge(out, [parts / f"{k}-of-{shards}" for k in range(1, shards + 1)], quiet=True)
     shutil.rmtree(parts)
     return run

@@ -1,8 +1,8 @@
-"""Names for Gymnasium: one of each task, and one of all."""
+"""Environment ids for Gymnasium: one for each task, and one for all tasks of the paper."""
 
 from __future__ import annotations
 
-#: What environments are called, by task.
+#: Environment ids by task.
 IDS = {
     "no_constraint": "chaic/NoConstraint-v0",
     "high_target": "chaic/HighTarget-v0",
@@ -18,12 +18,12 @@ IDS = {
     "tremor": "chaic/Tremor-v0",
 }
 
-#: Of all eight tasks of the paper.
+#: Environment id for the paper's eight tasks.
 ALL = "chaic/All-v0"
 
 
 def register() -> None:
-    """Tells Gymnasium of them, if it is there; ``import chaic`` does this."""
+    """Registers the ids if Gymnasium is installed; ``import chaic`` calls this."""
     try:
         import gymnasium
     except ImportError:

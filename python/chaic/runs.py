@@ -1,4 +1,4 @@
-"""Whole benchmarks: helpers written in Python, and what came of a run."""
+"""Benchmark runs with Python helpers, and access to their results."""
 
 from __future__ import annotations
 
@@ -17,18 +17,17 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from chaic import _chaic, _isolated
+from chaic import _chaic, _deprecated, _isolated
 from chaic._chaic import Briefing, Observation
 from chaic._sandbox import launcher
-from chaic.episodes import tasks_named
-from chaic.watchdog import Watchdog, Watched
+from chaic.episodes import task_names
+from chaic.watchdog import TimeLimitedHelper, Watchdog
 
 
 class Helper(Protocol):
-    """What a helper is: a fresh one is made for each episode, briefed once, and asked whenever its action has ended.
+    """Interface of a helper. Each episode has a new helper, which acts whenever its previous action has ended.
 
-    The class says by attributes what it is granted (docs/grants.md) and which images it wants; those that it doesn't
-    have are as here.
+    Class attributes request grants (docs/grants.md) and images; this class defines the defaults.
     """
 
     grants: ClassVar[Sequence[str]] = ()
@@ -36,14 +35,18 @@ class Helper(Protocol):
     image_size: ClassVar[int] = 512
 
     def reset(self, briefing: Briefing) -> None:
-        """Begins an episode."""
+        """Starts an episode."""
 
     def act(self, observation: Observation) -> Any:
-        """What to do next: a string or dictionary as in docs/subprocess-helpers.md."""
+        """Returns the next action: a string or dictionary as in docs/subprocess-helpers.md."""
 
 
-#: Makes a fresh helper.
+#: Callable that creates a helper.
 Maker = Callable[[], Any]
+
+
+#: Deprecated options of ``evaluate``, with their new names.
+RENAMED_OPTIONS = {"first": "n_episodes", "beside": "baselines"}
 
 
 def _name_of(maker: Maker) -> str:
@@ -51,7 +54,7 @@ def _name_of(maker: Maker) -> str:
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
 
 
-def _say(text: str) -> None:
+def _print(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
@@ -60,9 +63,9 @@ def evaluate(
     *,
     tasks: str | Sequence[str] | None = None,
     split: str = "test",
-    first: int | None = None,
+    n_episodes: int | None = None,
     seeds: int | None = None,
-    beside: Sequence[str] = (),
+    baselines: Sequence[str] = (),
     out: str | os.PathLike[str] = "runs/python",
     jobs: int | None = None,
     resume: bool = False,
@@ -73,53 +76,59 @@ def evaluate(
     read: Sequence[str | os.PathLike[str]] = (),
     **options: Any,
 ) -> Run:
-    """Plays a benchmark with a helper of yours into the folder ``out``, and gives the run.
+    """Plays a benchmark with Python helpers into the folder ``out``, and returns the run.
 
-    ``helper`` is a class (``Helper``) or another callable that makes a fresh helper for each episode, or several by
-    name; they are to be granted alike. ``beside`` names built-in helpers to be compared with: ``"none"`` is
-    what EI is counted against. ``jobs`` episodes are played at a time (usual: one a core); helpers
-    of all of them share Python's lock. Further options are those of ``chaic eval``: ``episodes``, ``rules``,
-    ``set``, ``traces``, ``perception``, ``behavior``, ``track``. With ``track="hidden"`` a class with other grants than
-    ``goal_place`` is refused. The folder is like that of ``chaic eval``, so that ``chaic report``, ``chaic verify``
-    and ``chaic replay`` read it.
+    ``helper`` is a class (``Helper``) or another callable that creates a helper for each episode, or several of them by
+    name; all must request the same grants and images. ``n_episodes`` limits the episodes of each task. ``baselines`` names
+    built-in helpers for comparison; EI needs ``"none"``. ``jobs`` episodes run in parallel (default: one per core); their
+    Python helpers share the interpreter lock. Further options are those of ``chaic eval``: ``episodes``, ``rules``, ``set``,
+    ``traces``, ``perception``, ``behavior``, ``track``. ``track="hidden"`` refuses all grants except ``goal_place``.
+    ``chaic report``, ``chaic verify`` and ``chaic replay`` read the folder.
 
-    A helper that raises an exception gets zero for that episode, with the traceback in results.jsonl, and the run goes
-    on. So does one that thinks for longer than ``limit_s`` seconds about one action: ``TimeoutError`` is raised in it. That
-    stops Python code but no call into C; helpers who may hang there are better run as processes of their own
-    (docs/subprocess-helpers.md).
+    A helper that raises an exception scores zero for that episode, with the traceback in results.jsonl, and the run
+    continues. The same holds for one that needs more than ``limit_s`` seconds for one action: ``TimeoutError`` is raised in
+    it. That stops Python code, but a call into C only when it returns. A helper that may hang there should be a separate
+    process (docs/subprocess-helpers.md).
 
-    ``isolate=True`` runs the helpers in processes of their own, in the sandbox of docs/threat-model.md: they see their
-    briefings and observations, installed packages, the file that defines them, and what ``read`` names. The process
-    serves one episode after the other. The helper must be defined at the top of a file, so that it can be imported there.
-    Without it a helper has all rights of this process, and the run records it as ``trusted``.
+    ``isolate=True`` runs the helpers in separate processes in the sandbox of docs/threat-model.md. There a helper reads its
+    briefings and observations, installed packages, the file that defines it, and the paths in ``read``. Each process serves
+    one episode after the other. The helper must be defined at the top level of a file, so that the process can import it.
+    Without isolation a helper has all rights of this process, and the run records it as ``trusted``.
 
-    ``KeyboardInterrupt`` stops it; ``resume=True`` goes on with it.
+    ``KeyboardInterrupt`` stops the run; ``resume=True`` continues it. ``first`` and ``beside`` are deprecated names of
+    ``n_episodes`` and ``baselines``.
     """
+    given = {"n_episodes": n_episodes, "baselines": tuple(baselines) or None}
+    options |= {name: value for name, value in given.items() if value is not None}
+    _deprecated.rename_keys(options, RENAMED_OPTIONS)
+    baselines = options.pop("baselines", ())
     makers = _makers(helper)
-    wants = {_wants(maker) for maker in makers.values()} or {((), ("rgb", "depth"), 512)}
-    if len(wants) > 1:
-        raise ValueError("helpers of one run are granted and see alike; give each a run of its own")
-    ((grants, images, image_size),) = wants
+    requirements = {_requirements(maker) for maker in makers.values()}
+    if len(requirements) > 1:
+        raise ValueError(
+            "the helpers of one run must request the same grants and images; evaluate them in separate runs"
+        )
+    grants, images, image_size = next(iter(requirements), _requirements(Helper))
     watchdog = Watchdog(limit_s)
-    helpers: list[tuple[str, Maker | None]] = [(name, None) for name in beside]
-    helpers += [(name, partial(Watched, maker, watchdog)) for name, maker in makers.items()]
+    helpers: list[tuple[str, Maker | None]] = [(name, None) for name in baselines]
+    helpers += [(name, partial(TimeLimitedHelper, maker, watchdog)) for name, maker in makers.items()]
     if not helpers:
-        raise ValueError("name a helper, or some beside")
-    options |= {"split": None if "episodes" in options else split, "first": first, "seeds": seeds}
+        raise ValueError("give a helper or baselines")
+    options |= {"split": None if "episodes" in options else split, "seeds": seeds}
     if tasks is not None:
-        options["tasks"] = tasks_named(tasks)
+        options["tasks"] = task_names(tasks)
     if read and not isolate:
-        raise ValueError("read names what isolated helpers may read; give isolate=True with it")
+        raise ValueError("read applies to isolated helpers only; give isolate=True with it")
     isolation = _isolation(makers, images, image_size, read, limit_s) if isolate else None
     options = {name: value for name, value in options.items() if value is not None}
-    finished = 0
+    n_finished = 0
 
-    def told(name: str, episode: str, seed: int, tr: float | None) -> bool:
-        nonlocal finished
-        finished += 1
+    def on_result(name: str, episode: str, seed: int, tr: float | None) -> bool:
+        nonlocal n_finished
+        n_finished += 1
         if not quiet:
-            scored = "broke down" if tr is None else f"TR {tr:.2f}"
-            _say(f"{finished}: {name}, {episode}, seed {seed}: {scored}")
+            score = "failed" if tr is None else f"TR {tr:.2f}"
+            _print(f"{n_finished}: {name}, {episode}, seed {seed}: {score}")
         return True
 
     path = Path(out)
@@ -134,23 +143,23 @@ def evaluate(
             resume=resume,
             shard=shard,
             isolation=isolation,
-            go_on=told,
+            on_result=on_result,
             options=options,
         )
     if report is None:
-        raise KeyboardInterrupt("the run was stopped; resume=True goes on with it")
+        raise KeyboardInterrupt("the run was stopped; resume=True continues it")
     if not quiet:
-        _say(report)
+        _print(report)
     return Run(path)
 
 
 def merge(
     out: str | os.PathLike[str], runs: Sequence[str | os.PathLike[str]], *, quiet: bool = False
 ) -> Run:
-    """Joins the shards of a run in the new folder ``out``, as ``chaic merge`` does."""
+    """Merges the shards of a run in the new folder ``out``, as ``chaic merge`` does."""
     report = _chaic.merge(Path(out), [Path(run) for run in runs])
     if not quiet:
-        _say(report)
+        _print(report)
     return Run(out)
 
 
@@ -163,7 +172,7 @@ def _makers(helper: Maker | Mapping[str, Maker] | None) -> dict[str, Maker]:
         makers = {_name_of(helper): helper}
     for name, maker in makers.items():
         if not callable(maker):
-            raise TypeError(f"{name}: {maker!r} makes no helper; give a class or a function")
+            raise TypeError(f"{name}: {maker!r} is not callable; give a class or a function that creates a helper")
     return makers
 
 
@@ -187,7 +196,7 @@ def _isolation(
     }
 
 
-def _wants(maker: Maker) -> tuple[tuple[str, ...], tuple[str, ...], int]:
+def _requirements(maker: Maker) -> tuple[tuple[str, ...], tuple[str, ...], int]:
     return (
         tuple(getattr(maker, "grants", Helper.grants)),
         tuple(getattr(maker, "images", Helper.images)),
@@ -196,10 +205,10 @@ def _wants(maker: Maker) -> tuple[tuple[str, ...], tuple[str, ...], int]:
 
 
 class Replay:
-    """A video of an episode, which notebooks show."""
+    """Video of an episode; notebooks show it."""
 
     def __init__(self, path: Path) -> None:
-        #: The file.
+        #: Video file.
         self.path = path
 
     def _repr_html_(self) -> str:
@@ -211,9 +220,9 @@ class Replay:
 
 
 class Run:
-    """A run's folder, with what came of it."""
+    """Folder of a run, with its results."""
 
-    #: The columns of ``records``.
+    #: Columns of ``records``.
     DTYPE = np.dtype(
         [
             ("helper", "U64"),
@@ -229,19 +238,19 @@ class Run:
     )
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        #: The folder.
+        #: Folder of the run.
         self.path = Path(path)
         if not (self.path / "run.json").is_file():
-            raise FileNotFoundError(f"{self.path} is no run: there is no run.json")
+            raise FileNotFoundError(f"{self.path} is not a run: it has no run.json")
 
     @property
     def options(self) -> dict[str, Any]:
-        """What is played, by the names of run.json."""
+        """Options of the run, with the names of run.json."""
         found: dict[str, Any] = json.loads((self.path / "run.json").read_text())["options"]
         return found
 
     def results(self) -> list[dict[str, Any]]:
-        """All that is known of each episode run (docs/reference/trace.md), in the order of their keys."""
+        """Returns the results of all episode runs (docs/reference/trace.md), in the order of their keys."""
         path = self.path / "results.jsonl"
         if not path.exists():
             return []
@@ -250,7 +259,7 @@ class Run:
         return [by_key[key] for key in sorted(by_key)]
 
     def records(self) -> NDArray[Any]:
-        """One record an episode run, in the order of their keys."""
+        """Returns one record per episode run, in the order of their keys."""
         results = self.results()
         records = np.zeros(len(results), self.DTYPE)
         for record, result in zip(records, results, strict=True):
@@ -270,27 +279,27 @@ class Run:
         return records
 
     def frame(self) -> Any:
-        """The records as a pandas DataFrame."""
+        """Returns the records as a pandas DataFrame."""
         import pandas
 
         return pandas.DataFrame(self.records())
 
     def report(self, format: str = "table") -> str:
-        """The scores, as ``chaic report`` prints them."""
+        """Returns the scores, as ``chaic report`` prints them."""
         return _command("report", str(self.path), "--format", format)
 
     def verify(self) -> str:
-        """Plays the recorded actions again; ``RuntimeError`` if anything comes out otherwise."""
+        """Replays the recorded actions and returns the summary. Raises ``RuntimeError`` on any difference."""
         return _command("verify", str(self.path))
 
     def replay(
         self, episode: str, *, helper: str | None = None, out: str | os.PathLike[str] | None = None
     ) -> Replay:
-        """A video of an episode; in a file of its own if ``out`` is not given."""
+        """Renders a video of an episode, to a temporary file by default."""
         if out is None:
             out = Path(tempfile.mkdtemp(prefix="chaic-replay-")) / "replay.mp4"
-        given = ["--helper", helper] if helper is not None else []
-        _command("replay", str(self.path), episode, *given, "--out", str(out))
+        arguments = ["--helper", helper] if helper is not None else []
+        _command("replay", str(self.path), episode, *arguments, "--out", str(out))
         return Replay(Path(out))
 
     def _repr_html_(self) -> str:
@@ -301,7 +310,7 @@ class Run:
 
 
 def _command(*arguments: str) -> str:
-    """What the command prints; ``RuntimeError`` with its complaint if it fails."""
+    """Runs the command and returns its output. Raises ``RuntimeError`` with its error message if it fails."""
     call = [sys.executable, "-m", "chaic", *arguments]
     done = subprocess.run(call, capture_output=True, text=True, check=False)
     if done.returncode != 0:

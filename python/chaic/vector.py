@@ -1,4 +1,4 @@
-"""Many helpers side by side: one call steps all worlds on all cores and draws all waiting eyes in one batch."""
+"""Vector environment of helpers: one call steps all worlds on all cores and renders all observations in one batch."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from chaic import spaces
-from chaic._chaic import ACTIONS, OWN, Batch, Episode
+from chaic import _deprecated, spaces
+from chaic._chaic import ACTIONS, PROPRIOCEPTION, Batch, Episode
 from chaic.episodes import EpisodeSource
-from chaic.gym import checked_weights
+from chaic.gym import reward_weights
 
 Arrays = dict[str, NDArray[Any]]
 
-#: Parts of an observation that a vector environment has.
+#: Parts of an observation that a vector environment supports.
 PARTS = ("rgb", "depth", "ids", "own")
 
 
 class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
-    """Helpers of ``num_envs`` worlds, each with its partner inside; options as ``chaic.gym.HelperEnv``.
+    """Helpers in ``num_envs`` worlds, each with its simulated partner; options as in ``chaic.gym.HelperEnv``.
 
-    When an episode ends, the last observation is what was perceived at the last decision. The arrays of an observation are written anew by each step; ``copy=True`` gives each step arrays of its own.
-    ``out`` are arrays to write into, by part of the observation: NumPy's, or anything with DLPack or the buffer
-    protocol.
+    The final observation of an episode is that of the last decision. Each step overwrites the arrays of the observation;
+    ``copy=True`` returns new arrays. ``out`` maps parts of the observation to arrays to write into: NumPy arrays, or objects
+    with DLPack or the buffer protocol.
     """
 
     metadata = {"render_modes": ["rgb_array"], "autoreset_mode": AutoresetMode.NEXT_STEP}
@@ -38,40 +38,44 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
         num_envs: int = 1,
         *,
         split: str | None = None,
-        observation: Sequence[str] = spaces.USUAL,
+        observation: Sequence[str] = spaces.DEFAULT_PARTS,
         image_size: int = 128,
         grants: Sequence[str] = (),
         rules: str = "paper",
         set: Sequence[str] = (),
         appearance: str = "canonical",
-        minds_image_size: int | None = None,
+        partner_image_size: int | None = None,
         reward: Mapping[str, float] | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         copy: bool = False,
         out: Mapping[str, Any] | None = None,
         render_mode: str | None = None,
+        minds_image_size: int | None = None,
     ) -> None:
+        partner_image_size = _deprecated.partner_image_size(partner_image_size, minds_image_size)
         if num_envs < 1:
-            raise ValueError(f"num_envs is at least 1, not {num_envs}")
-        self.parts = spaces.checked_parts(observation)
+            raise ValueError(f"num_envs is {num_envs}, expected at least 1")
+        self.parts = spaces.parse_parts(observation)
         for part in self.parts:
             if part not in PARTS:
-                raise ValueError(f"a vector environment has no {part!r}; it has {', '.join(PARTS)}")
+                raise ValueError(
+                    f"a vector environment has no part {part!r}; the parts are {', '.join(PARTS)}"
+                )
         self.num_envs = num_envs
         self.render_mode = render_mode
-        self.weights = checked_weights(reward)
+        self.weights = reward_weights(reward)
         self.source = EpisodeSource(task, split)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.copy = copy
         self._options: dict[str, Any] = {
-            "images": spaces.images_of(self.parts),
+            "images": spaces.image_parts(self.parts),
             "image_size": image_size,
             "grants": list(grants),
             "rules": rules,
             "set": list(set),
             "appearance": appearance,
-            "minds_image_size": minds_image_size,
+            "partner_image_size": partner_image_size,
         }
         self._single = spaces.observation_space(self.parts, image_size)
         self._actions = spaces.primitive_space(image_size)
@@ -79,33 +83,33 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
         self.single_action_space = self._actions
         self.observation_space = batch_space(self._single, num_envs)
         self.action_space = batch_space(self._actions, num_envs)
-        self._arrays = self._arrays_for(out or {})
+        self._arrays = self._create_arrays(out or {})
         self._mask = np.ones((num_envs, len(ACTIONS)), bool)
-        #: The worlds, from the first reset on.
+        #: Worlds; ``None`` before the first reset.
         self.batch: Batch | None = None
         self._rngs: list[np.random.Generator] = []
-        self._names: list[str] = [""] * num_envs
-        #: Whether each world's episode is over.
-        self._over = np.zeros(num_envs, bool)
+        self._episode_ids: list[str] = [""] * num_envs
+        #: Mask of the worlds whose episode has ended.
+        self._ended = np.zeros(num_envs, bool)
 
-    def _arrays_for(self, out: Mapping[str, Any]) -> Arrays:
+    def _create_arrays(self, out: Mapping[str, Any]) -> Arrays:
         arrays: Arrays = {}
         for part, space in self._single.spaces.items():
             shape = (self.num_envs, *(space.shape or ()))
-            given = out.get(part)
-            array = np.zeros(shape, space.dtype) if given is None else _shared(given)
+            target = out.get(part)
+            array = np.zeros(shape, space.dtype) if target is None else _as_array(target)
             if array.shape != shape or array.dtype != space.dtype:
                 raise ValueError(
                     f"out[{part!r}] is {array.dtype} {array.shape}, expected {space.dtype} {shape}"
                 )
             if not array.flags.writeable or not array.flags.c_contiguous:
-                raise ValueError(f"out[{part!r}] is to be writable and C-contiguous")
+                raise ValueError(f"out[{part!r}] must be writable and C-contiguous")
             arrays[part] = array
         for part in out:
             if part not in arrays:
                 raise ValueError(f"the observation has no part {part!r}")
-        # What is known of oneself tells which actions are possible, asked for or not.
-        self._own = arrays.get("own", np.zeros((self.num_envs, len(OWN)), np.float32))
+        # The batch writes proprioception together with the action mask, even if it is not part of the observation.
+        self._proprioception = arrays.get("own", np.zeros((self.num_envs, len(PROPRIOCEPTION)), np.float32))
         return arrays
 
     def reset(
@@ -114,7 +118,7 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Arrays, dict[str, Any]]:
-        """Begins episodes in all worlds, or in those of ``options["reset_mask"]``."""
+        """Starts episodes in all worlds, or in those of ``options["reset_mask"]``."""
         mask = np.ones(self.num_envs, bool)
         if options is not None and "reset_mask" in options:
             mask = np.asarray(options["reset_mask"], bool)
@@ -123,14 +127,14 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
         self._seed(seed, mask)
         if self.batch is None:
             if not mask.all():
-                raise ValueError("the first reset is of all worlds")
+                raise ValueError("the first reset must include all worlds")
             drawn = [self.source.draw(rng) for rng in self._rngs]
             episodes, seeds = [episode for episode, _ in drawn], [seed for _, seed in drawn]
             self.batch = Batch(episodes, seeds, **self._options)
-            self._names = [episode.id for episode in episodes]
+            self._episode_ids = [episode.id for episode in episodes]
         else:
-            self._begin(np.flatnonzero(mask))
-        self._over[mask] = False
+            self._start_episodes(np.flatnonzero(mask))
+        self._ended[mask] = False
         self._advance()
         return self._observe(), self._infos(np.zeros(self.num_envs, np.int64))
 
@@ -151,8 +155,8 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
             if one is not None and mask[k]:
                 self._rngs[k] = np.random.default_rng(one)
 
-    def _begin(self, worlds: NDArray[np.int64]) -> None:
-        """Draws an episode for each of these worlds and begins it."""
+    def _start_episodes(self, worlds: NDArray[np.int64]) -> None:
+        """Draws an episode for each of these worlds and starts it."""
         assert self.batch is not None
         if len(worlds) == 0:
             return
@@ -160,20 +164,20 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
         seeds: list[int] = []
         for k in worlds:
             episode, seed = self.source.draw(self._rngs[k])
-            self._names[k] = episode.id
+            self._episode_ids[k] = episode.id
             episodes.append(episode)
             seeds.append(seed)
         self.batch.reset([int(k) for k in worlds], episodes, seeds)
 
     def _advance(self) -> None:
         assert self.batch is not None
-        self._over |= self.batch.advance() == 1
+        self._ended |= self.batch.advance() == 1
 
     def _observe(self) -> Arrays:
         assert self.batch is not None
-        images = {part: self._arrays[part] for part in spaces.images_of(self.parts)}
+        images = {part: self._arrays[part] for part in spaces.image_parts(self.parts)}
         self.batch.observe(**images)
-        self.batch.own(self._own, self._mask)
+        self.batch.own(self._proprioception, self._mask)
         if self.copy:
             return {part: array.copy() for part, array in self._arrays.items()}
         return dict(self._arrays)
@@ -182,52 +186,47 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
         assert self.batch is not None
         done, total = self.batch.progress().T
         tr = np.divide(done, total, out=np.zeros_like(done), where=total > 0)
-        everyone = np.ones(self.num_envs, bool)
+        all_worlds = np.ones(self.num_envs, bool)
         infos: dict[str, Any] = {
             "frames": frames,
             "frame": self.batch.frames().astype(np.int64),
             "kind_mask": self._mask.astype(np.int8),
             "tr": tr,
-            "episode_id": np.array(self._names, dtype=object),
+            "episode_id": np.array(self._episode_ids, dtype=object),
         }
-        return infos | {f"_{name}": everyone for name in infos}
+        return infos | {f"_{name}": all_worlds for name in infos}
 
     def step(
         self, actions: Any
     ) -> tuple[
         Arrays, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]
     ]:
-        """Carries out one decision in each world, and plays all on until the next one."""
+        """Executes one decision in each world and advances all worlds to the next one."""
         if self.batch is None:
             raise gymnasium.error.ResetNeeded("reset the environment before its first step")
-        rows = self._checked(actions)
-        over_before = self._over.copy()
+        rows = self._parse_actions(actions)
+        ended_before = self._ended.copy()
         next_step = self.autoreset_mode == AutoresetMode.NEXT_STEP
-        if over_before.any() and self.autoreset_mode == AutoresetMode.DISABLED:
-            raise gymnasium.error.ResetNeeded("an episode is over; reset it by options reset_mask")
+        if ended_before.any() and self.autoreset_mode == AutoresetMode.DISABLED:
+            raise gymnasium.error.ResetNeeded("an episode is over; reset it with options['reset_mask']")
         before = self.batch.frames().astype(np.int64)
-        if next_step and over_before.any():
-            # A world that has ended begins anew by this step; its action isn't looked at.
-            worlds = np.flatnonzero(over_before)
-            self._begin(worlds)
-            self._over[worlds] = False
+        if next_step and ended_before.any():
+            # This step starts a new episode in the worlds that have ended and ignores their actions.
+            worlds = np.flatnonzero(ended_before)
+            self._start_episodes(worlds)
+            self._ended[worlds] = False
             before[worlds] = 0
         self.batch.submit(rows)
         self._advance()
         frames = self.batch.frames().astype(np.int64) - before
-        terms = self.batch.rewards()
-        rewards: NDArray[np.float64] = (
-            self.weights["delivered"] * terms[:, 0]
-            + self.weights["approached_per_m"] * terms[:, 1]
-            - self.weights["invalid"] * terms[:, 2]
-        )
-        ended = self._over & ~over_before if next_step else self._over.copy()
+        rewards = self.batch.rewards(self.weights)
+        ended = self._ended & ~ended_before if next_step else self._ended.copy()
         done, total = self.batch.progress().T
         terminations = ended & (done >= total)
         truncations = ended & ~terminations
         if next_step:
-            rewards[over_before] = 0.0
-            frames[over_before] = 0
+            rewards[ended_before] = 0.0
+            frames[ended_before] = 0
         if self.autoreset_mode == AutoresetMode.SAME_STEP and ended.any():
             return self._same_step(ended, frames, rewards, terminations, truncations)
         return self._observe(), rewards, terminations, truncations, self._infos(frames)
@@ -242,14 +241,14 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
     ) -> tuple[
         Arrays, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]
     ]:
-        """Begins the worlds that have ended anew; how they ended stands in ``info``."""
+        """Starts new episodes in the worlds that have ended; the infos contain the final observations and infos."""
         last = self._infos(frames)
         worlds = np.flatnonzero(ended)
         final_obs = np.full(self.num_envs, None, dtype=object)
         for k in worlds:
             final_obs[k] = {part: array[k].copy() for part, array in self._arrays.items()}
-        self._begin(worlds)
-        self._over[worlds] = False
+        self._start_episodes(worlds)
+        self._ended[worlds] = False
         self._advance()
         observation = self._observe()
         infos = self._infos(frames)
@@ -259,29 +258,29 @@ class HelperVectorEnv(VectorEnv[Arrays, Any, Any]):
         infos["final_info"], infos["_final_info"] = final_info, ended
         return observation, rewards, terminations, truncations, infos
 
-    def _checked(self, actions: Any) -> NDArray[np.int64]:
+    def _parse_actions(self, actions: Any) -> NDArray[np.int64]:
         rows = np.asarray(actions)
         shape = (self.num_envs, 3)
         if rows.shape != shape or rows.dtype.kind not in "iu":
             raise ValueError(f"actions are {rows.dtype} {rows.shape}, expected integers {shape}")
         high = self._actions.nvec
         if (rows < 0).any() or (rows >= high).any():
-            raise ValueError(f"some action is not in {self._actions}")
+            raise ValueError(f"an action is not in {self._actions}")
         return np.ascontiguousarray(rows, np.int64)
 
     def render(self) -> Any:
-        """What each helper sees now, as it sees it."""
+        """Returns the current color image of each helper."""
         if self.render_mode == "rgb_array" and "rgb" in self._arrays:
             return tuple(self._arrays["rgb"])
         return None
 
 
-def _shared(given: Any) -> NDArray[Any]:
-    """An array over the memory of something else, or what is an array already."""
-    if isinstance(given, np.ndarray):
-        return given
-    if hasattr(given, "__dlpack__"):
-        return np.from_dlpack(given)
-    return np.asarray(memoryview(given))
+def _as_array(target: Any) -> NDArray[Any]:
+    """Returns an array that shares the memory of ``target``."""
+    if isinstance(target, np.ndarray):
+        return target
+    if hasattr(target, "__dlpack__"):
+        return np.from_dlpack(target)
+    return np.asarray(memoryview(target))
 
 

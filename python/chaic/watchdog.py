@@ -1,4 +1,4 @@
-"""A limit to how long a helper may think: who hangs gets an exception, and the run goes on."""
+"""Time limit for calls of Python helpers: a helper that exceeds it gets an exception, and the run continues."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from typing import Any
 
 from chaic._chaic import Briefing, Observation
 
-#: How often it is looked whether somebody thinks for too long, seconds.
-_LOOK_S = 0.1
+#: Interval of the checks, seconds.
+_INTERVAL_S = 0.1
 
 
 def _raise_in(thread: int, error: type[BaseException] | None) -> None:
-    """Lets a thread raise an exception when it runs Python code next; ``None`` takes that back."""
-    what = None if error is None else ctypes.py_object(error)
-    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), what)
+    """Raises an exception in a thread when it next runs Python code; ``None`` cancels a pending one."""
+    exception = None if error is None else ctypes.py_object(error)
+    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), exception)
 
 
 class Watchdog:
-    """Raises ``TimeoutError`` in threads that stay in ``limit`` for too long.
+    """Raises ``TimeoutError`` in threads that exceed the time limit inside ``limit``.
 
     Python code can be stopped anywhere, a call into C (a sleep, a download, a matrix product) only when it returns.
     """
 
     def __init__(self, limit_s: float) -> None:
         if not limit_s > 0:
-            raise ValueError(f"a limit of {limit_s} s leaves no time to think; give more than 0")
+            raise ValueError(f"limit_s is {limit_s}, expected more than 0 seconds")
         self._limit_s = limit_s
-        self._until: dict[int, float] = {}
+        self._deadlines: dict[int, float] = {}
         self._lock = threading.Lock()
         self._done = threading.Event()
 
@@ -43,46 +43,46 @@ class Watchdog:
         self._done.set()
 
     def _watch(self) -> None:
-        while not self._done.wait(_LOOK_S):
+        while not self._done.wait(_INTERVAL_S):
             now = time.monotonic()
             with self._lock:
-                for thread in [thread for thread, until in self._until.items() if now > until]:
-                    del self._until[thread]
+                for thread in [thread for thread, deadline in self._deadlines.items() if now > deadline]:
+                    del self._deadlines[thread]
                     _raise_in(thread, TimeoutError)
 
     @contextmanager
-    def limit(self, what: str) -> Generator[None]:
-        """Within it, this thread may stay for so long."""
+    def limit(self, call: str) -> Generator[None]:
+        """Applies the time limit to this thread inside the context; ``call`` names the call in the error."""
         thread = threading.get_ident()
         with self._lock:
-            self._until[thread] = time.monotonic() + self._limit_s
+            self._deadlines[thread] = time.monotonic() + self._limit_s
         try:
             yield
         except TimeoutError as error:
             if not error.args:
-                error.args = (f"{what} took longer than {self._limit_s:g} s",)
+                error.args = (f"{call} took longer than {self._limit_s:g} s",)
             raise
         finally:
             with self._lock:
-                if self._until.pop(thread, None) is None:
-                    # It may not have been raised yet, and there is nothing left to be stopped.
+                if self._deadlines.pop(thread, None) is None:
+                    # The exception may still be pending although the call has returned.
                     _raise_in(thread, None)
 
 
-class Watched:
-    """A helper whose every thought is limited."""
+class TimeLimitedHelper:
+    """Helper whose calls have a time limit."""
 
-    def __init__(self, make: Callable[[], Any], watchdog: Watchdog) -> None:
+    def __init__(self, maker: Callable[[], Any], watchdog: Watchdog) -> None:
         self._watchdog = watchdog
-        with watchdog.limit("making the helper"):
-            self._helper = make()
+        with watchdog.limit("the creation of the helper"):
+            self._helper = maker()
 
     def reset(self, briefing: Briefing) -> None:
-        """Briefs the helper."""
+        """Starts an episode."""
         with self._watchdog.limit("reset"):
             self._helper.reset(briefing)
 
     def act(self, observation: Observation) -> Any:
-        """Asks the helper."""
+        """Returns the next action of the helper."""
         with self._watchdog.limit("act"):
             return self._helper.act(observation)

@@ -1,8 +1,8 @@
-"""Partner and helper as a PettingZoo environment: either of them, or both, can be learners or people.
+"""PettingZoo environments of partner and helper; learners or people can control either of them.
 
-``env`` is an AEC environment, which is exactly chaic's clock: the agent whose action has ended is next. ``parallel_env`` is
-for algorithms that step all agents at once; its waiting rule: whoever is still busy with an earlier action perceives
-what it perceived last (``info["asked"]`` is 0), and its choice isn't looked at.
+``env`` is an AEC environment, which matches chaic's timing: the agent whose action has ended is next. ``parallel_env`` is for
+algorithms that step all agents at once. There an agent whose earlier action has not ended keeps its last observation, its
+``info["needs_action"]`` is 0, and its new action is ignored.
 """
 
 from __future__ import annotations
@@ -15,17 +15,27 @@ import numpy as np
 from numpy.typing import NDArray
 from pettingzoo import AECEnv, ParallelEnv
 
-from chaic import spaces
-from chaic._chaic import ACTIONS, World
+from chaic import _deprecated, spaces
+from chaic._chaic import ACTIONS, World, weigh_reward
 from chaic.episodes import EpisodeSource
-from chaic.gym import PICTURE_SIZE, Obs, checked_weights, reward_of
+from chaic.gym import PICTURE_SIZE, Obs, reward_weights
 
-#: The agents, in the order of their numbers in a world.
+#: Names of the agents, in the order of their ids in a world.
 AGENTS: tuple[str, ...] = ("partner", "helper")
 
 
+class _Info(dict[str, Any]):
+    """Info of an agent; accepts the deprecated key ``asked``."""
+
+    def __missing__(self, key: str) -> Any:
+        if key != "asked":
+            raise KeyError(key)
+        _deprecated.warn('info["asked"]', 'info["needs_action"]')
+        return self["needs_action"]
+
+
 class _Pair:
-    """A world with both seats the caller's: what both interfaces share."""
+    """World with two agents of the caller; both environments use it."""
 
     def __init__(
         self,
@@ -39,15 +49,15 @@ class _Pair:
         appearance: str,
         reward: Mapping[str, float] | None,
     ) -> None:
-        self.parts = spaces.checked_parts(observation)
+        self.parts = spaces.parse_parts(observation)
         if "map" in self.parts:
-            raise ValueError("an environment of two agents has no map")
-        self.weights = checked_weights(reward)
+            raise ValueError("an environment with two agents has no part 'map'")
+        self.weights = reward_weights(reward)
         self.source = EpisodeSource(task, split)
         self.image_size = image_size
         self._options: dict[str, Any] = {
             "partner": "caller",
-            "images": spaces.images_of(self.parts),
+            "images": spaces.image_parts(self.parts),
             "image_size": image_size,
             "grants": list(grants),
             "rules": rules,
@@ -56,7 +66,7 @@ class _Pair:
         }
         self._world: World | None = None
         self._rng = np.random.default_rng()
-        World(self.source.named(self.source.ids[0]), 0, **self._options)
+        World(self.source.get(self.source.ids[0]), 0, **self._options)
 
     @property
     def world(self) -> World:
@@ -64,7 +74,7 @@ class _Pair:
             raise gymnasium.error.ResetNeeded("reset the environment before its first step")
         return self._world
 
-    def begin(self, seed: int | None, options: dict[str, Any] | None) -> None:
+    def start_episode(self, seed: int | None, options: dict[str, Any] | None) -> None:
         if seed is not None:
             self._rng = np.random.default_rng(seed)
         episode, world_seed = self.source.choose(self._rng, options)
@@ -74,13 +84,13 @@ class _Pair:
             self._world.reset(episode, world_seed)
 
     def observe(self, agent: int) -> Obs:
-        seen = self.world.observe(agent)
+        observation = self.world.observe(agent)
         return {
-            part: self.world.own(agent)[0] if part == "own" else getattr(seen, part)
+            part: self.world.own(agent)[0] if part == "own" else getattr(observation, part)
             for part in self.parts
         }
 
-    def blank(self) -> Obs:
+    def zero_observation(self) -> Obs:
         space = self.observation_space()
         return {name: np.zeros(s.shape or (), s.dtype) for name, s in space.spaces.items()}
 
@@ -89,33 +99,34 @@ class _Pair:
 
     def submit(self, agent: int, action: Any) -> None:
         bounds = (len(ACTIONS), self.image_size, self.image_size)
-        self.world.submit(spaces.checked_row(action, bounds), agent)
+        self.world.submit(spaces.parse_row(action, bounds), agent)
 
     def reward(self, agent: int) -> float:
-        return reward_of(self.world.reward(agent), self.weights)
+        terms = self.world.reward(agent)
+        return 0.0 if terms is None else weigh_reward(**terms, weights=self.weights)
 
-    def info(self, agent: int, asked: bool) -> dict[str, Any]:
+    def info(self, agent: int, needs_action: bool) -> dict[str, Any]:
         world = self.world
         score = world.score()
-        kinds: NDArray[Any] = world.own(agent)[1] if asked else np.zeros(len(ACTIONS), bool)
-        return {
-            "asked": int(asked),
-            "frame": world.frame,
-            "action_mask": spaces.primitive_mask(kinds, self.image_size),
-            "tr": score["done"] / score["total"] if score["total"] else 0.0,
-            "episode_id": world.episode.id,
-        }
+        kinds: NDArray[Any] = world.own(agent)[1] if needs_action else np.zeros(len(ACTIONS), bool)
+        return _Info(
+            needs_action=int(needs_action),
+            frame=world.frame,
+            action_mask=spaces.primitive_mask(kinds, self.image_size),
+            tr=score["done"] / score["total"] if score["total"] else 0.0,
+            episode_id=world.episode.id,
+        )
 
 
-class _Interface:
-    """What both interfaces are made with, and have alike."""
+class _PairBase:
+    """Options, spaces and rendering of both environments."""
 
     def __init__(
         self,
         task: str | Sequence[str] | None = None,
         *,
         split: str | None = None,
-        observation: Sequence[str] = spaces.USUAL,
+        observation: Sequence[str] = spaces.DEFAULT_PARTS,
         image_size: int = 128,
         grants: Sequence[str] = (),
         rules: str = "paper",
@@ -141,115 +152,115 @@ class _Interface:
         }
 
     def observation_space(self, agent: str) -> gymnasium.Space[Any]:
-        """The space of what an agent perceives."""
+        """Returns the observation space of an agent."""
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> gymnasium.Space[Any]:
-        """The space of what an agent can do."""
+        """Returns the action space of an agent."""
         return self.action_spaces[agent]
 
     @property
     def world(self) -> World:
-        """The world."""
+        """World of both agents."""
         return self._pair.world
 
     def render(self) -> Any:
-        """What the helper sees, uint8 [512, 512, 3]."""
+        """Renders the helper's view, uint8 [512, 512, 3]."""
         if self.render_mode != "rgb_array":
             return None
         return self.world.render(1, image_size=PICTURE_SIZE)["rgb"]
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Does nothing; the environment holds no resources."""
 
 
-class PairEnv(_Interface, AECEnv[str, Obs, Any]):
-    """Partner and helper, asked one after the other as their actions end.
+class PairEnv(_PairBase, AECEnv[str, Obs, Any]):
+    """AEC environment of partner and helper: the agent whose action has ended is next.
 
-    Who has made ``max_cycles`` choices is truncated when it is asked again, and stands still from then on.
+    An agent that has submitted ``max_cycles`` actions is truncated when it needs the next one, and waits from then on.
     """
 
     metadata = {"name": "chaic_v0", "render_modes": ["rgb_array"], "is_parallelizable": False}
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
-        """Begins an episode, as ``chaic.gym.HelperEnv`` does."""
-        self._pair.begin(seed, options)
+        """Starts an episode, as ``chaic.gym.HelperEnv`` does."""
+        self._pair.start_episode(seed, options)
         self.agents = list(AGENTS)
         self.rewards = dict.fromkeys(AGENTS, 0.0)
         self._cumulative_rewards = dict.fromkeys(AGENTS, 0.0)
         self.terminations = dict.fromkeys(AGENTS, False)
         self.truncations = dict.fromkeys(AGENTS, False)
-        self._last = {agent: self._pair.blank() for agent in AGENTS}
-        self._choices = dict.fromkeys(AGENTS, 0)
+        self._last = {agent: self._pair.zero_observation() for agent in AGENTS}
+        self._n_actions = dict.fromkeys(AGENTS, 0)
         self.infos: dict[str, dict[str, Any]] = {agent: {} for agent in AGENTS}
-        self._go_on()
+        self._advance()
 
-    def _go_on(self) -> None:
-        """Plays until somebody is asked who takes part, and chooses whom; or to the end."""
-        asked = self._asked()
-        while not asked:
-            if self.world.advance() != "waits":
+    def _advance(self) -> None:
+        """Advances until an active agent needs an action, and selects it; or until the episode ends."""
+        waiting = self._waiting()
+        while not waiting:
+            if self.world.advance() != "needs_action":
                 self._finish()
                 return
-            asked = self._asked()
-            for agent in asked:
-                self._ask(agent)
-        self.agent_selection = asked[0]
+            waiting = self._waiting()
+            for agent in waiting:
+                self._update(agent)
+        self.agent_selection = waiting[0]
 
-    def _asked(self) -> list[str]:
-        """Who is asked now and takes part; those who don't any more stand still."""
+    def _waiting(self) -> list[str]:
+        """Returns the active agents that need an action; submits a wait for agents that are no longer active."""
         world = self.world
         waiting = world.waiting()
-        for number in waiting:
-            if AGENTS[number] not in self.agents:
-                world.submit({"wait": {"frames": max(1, world.horizon - world.frame)}}, number)
-        return [AGENTS[number] for number in waiting if AGENTS[number] in self.agents]
+        for agent_id in waiting:
+            if AGENTS[agent_id] not in self.agents:
+                world.submit({"wait": {"frames": max(1, world.horizon - world.frame)}}, agent_id)
+        return [AGENTS[agent_id] for agent_id in waiting if AGENTS[agent_id] in self.agents]
 
-    def _ask(self, agent: str) -> None:
-        """Gives an agent what has come of its last choice, and what it perceives."""
-        number = AGENTS.index(agent)
-        self.rewards[agent] = self._pair.reward(number)
-        self._last[agent] = self._pair.observe(number)
-        self.infos[agent] = self._pair.info(number, True)
-        if self.max_cycles is not None and self._choices[agent] >= self.max_cycles:
+    def _update(self, agent: str) -> None:
+        """Stores the reward of an agent's last action and its new observation."""
+        agent_id = AGENTS.index(agent)
+        self.rewards[agent] = self._pair.reward(agent_id)
+        self._last[agent] = self._pair.observe(agent_id)
+        self.infos[agent] = self._pair.info(agent_id, True)
+        if self.max_cycles is not None and self._n_actions[agent] >= self.max_cycles:
             self.truncations[agent] = True
 
     def _finish(self) -> None:
-        """The episode is over for everybody."""
+        """Ends the episode for all agents."""
         complete = bool(self.world.score()["complete"])
         for agent in self.agents:
-            number = AGENTS.index(agent)
-            self.rewards[agent] = self._pair.reward(number)
-            self.infos[agent] = self._pair.info(number, False)
+            agent_id = AGENTS.index(agent)
+            self.rewards[agent] = self._pair.reward(agent_id)
+            self.infos[agent] = self._pair.info(agent_id, False)
             self.terminations[agent], self.truncations[agent] = complete, not complete
         self.agent_selection = self.agents[0]
 
     def observe(self, agent: str) -> Obs:
-        """What an agent perceived when it was last asked."""
+        """Returns the observation of an agent when it last needed an action."""
         return self._last[agent]
 
     def step(self, action: Any) -> None:
-        """The choice of the agent that is asked; ``None`` for one that takes part no longer."""
+        """Submits the action of the selected agent; ``None`` for an agent that has ended."""
         if not self.agents:
             return
         agent = self.agent_selection
         if self.terminations[agent] or self.truncations[agent]:
             self._was_dead_step(action)
             if self.agents and not self.world.is_over:
-                self._go_on()
+                self._advance()
             return
         self._pair.submit(AGENTS.index(agent), action)
-        self._choices[agent] += 1
+        self._n_actions[agent] += 1
         self._cumulative_rewards[agent] = 0.0
         self._clear_rewards()
-        self._go_on()
+        self._advance()
         self._accumulate_rewards()
 
 
-class PairParallelEnv(_Interface, ParallelEnv[str, Obs, Any]):
-    """Partner and helper in step; whoever is busy waits until it is asked again.
+class PairParallelEnv(_PairBase, ParallelEnv[str, Obs, Any]):
+    """Parallel environment of partner and helper; actions of a busy agent are ignored.
 
-    A step plays on until at least one of them is asked. ``max_cycles`` is a number of steps.
+    A step advances until at least one agent needs an action. ``max_cycles`` is a number of steps.
     """
 
     metadata = {"name": "chaic_parallel_v0", "render_modes": ["rgb_array"]}
@@ -257,54 +268,54 @@ class PairParallelEnv(_Interface, ParallelEnv[str, Obs, Any]):
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Obs], dict[str, Any]]:
-        """Begins an episode, as ``chaic.gym.HelperEnv`` does."""
-        self._pair.begin(seed, options)
+        """Starts an episode, as ``chaic.gym.HelperEnv`` does."""
+        self._pair.start_episode(seed, options)
         self.agents = list(AGENTS)
-        self._last = {agent: self._pair.blank() for agent in AGENTS}
+        self._last = {agent: self._pair.zero_observation() for agent in AGENTS}
         self._steps = 0
-        asked = self._go_on()
-        return dict(self._last), self._infos(asked)
+        waiting = self._advance()
+        return dict(self._last), self._infos(waiting)
 
-    def _go_on(self) -> list[int]:
-        """Plays on, and lets those look who are asked; nobody is at the end."""
-        asked = self.world.waiting() if self.world.advance() == "waits" else []
-        for number in asked:
-            self._last[AGENTS[number]] = self._pair.observe(number)
-        return asked
+    def _advance(self) -> list[int]:
+        """Advances, observes for the agents that need an action, and returns their ids; none at the end."""
+        waiting = self.world.waiting() if self.world.advance() == "needs_action" else []
+        for agent_id in waiting:
+            self._last[AGENTS[agent_id]] = self._pair.observe(agent_id)
+        return waiting
 
-    def _infos(self, asked: Sequence[int]) -> dict[str, Any]:
-        return {a: self._pair.info(k, k in asked) for k, a in enumerate(AGENTS)}
+    def _infos(self, waiting: Sequence[int]) -> dict[str, Any]:
+        return {a: self._pair.info(k, k in waiting) for k, a in enumerate(AGENTS)}
 
     def step(
         self, actions: dict[str, Any]
     ) -> tuple[
         dict[str, Obs], dict[str, float], dict[str, bool], dict[str, bool], dict[str, Any]
     ]:
-        """Everybody's choices; those of busy agents aren't looked at."""
+        """Submits the actions of all agents and advances; actions of busy agents are ignored."""
         if not self.agents:
             return {}, {}, {}, {}, {}
-        for number in self.world.waiting():
-            self._pair.submit(number, actions[AGENTS[number]])
-        asked = self._go_on()
+        for agent_id in self.world.waiting():
+            self._pair.submit(agent_id, actions[AGENTS[agent_id]])
+        waiting = self._advance()
         self._steps += 1
-        over = not asked
+        ended = not waiting
         complete = bool(self.world.score()["complete"])
-        cut = self.max_cycles is not None and self._steps >= self.max_cycles
-        settled = range(len(AGENTS)) if over else asked
+        is_cut = self.max_cycles is not None and self._steps >= self.max_cycles
+        rewarded = range(len(AGENTS)) if ended else waiting
         rewards = dict.fromkeys(AGENTS, 0.0)
-        rewards |= {AGENTS[number]: self._pair.reward(number) for number in settled}
-        terminations = dict.fromkeys(AGENTS, over and complete)
-        truncations = dict.fromkeys(AGENTS, not (over and complete) and (over or cut))
-        if over or cut:
+        rewards |= {AGENTS[agent_id]: self._pair.reward(agent_id) for agent_id in rewarded}
+        terminations = dict.fromkeys(AGENTS, ended and complete)
+        truncations = dict.fromkeys(AGENTS, not (ended and complete) and (ended or is_cut))
+        if ended or is_cut:
             self.agents = []
-        return dict(self._last), rewards, terminations, truncations, self._infos(asked)
+        return dict(self._last), rewards, terminations, truncations, self._infos(waiting)
 
 
 def env(task: str | Sequence[str] | None = None, **options: Any) -> PairEnv:
-    """Partner and helper of a task, asked as their actions end; options as ``chaic.gym.HelperEnv``."""
+    """Returns the AEC environment of a task; options as in ``chaic.gym.HelperEnv``."""
     return PairEnv(task, **options)
 
 
 def parallel_env(task: str | Sequence[str] | None = None, **options: Any) -> PairParallelEnv:
-    """The same in step."""
+    """Returns the parallel environment of a task; options as in ``env``."""
     return PairParallelEnv(task, **options)

@@ -1,4 +1,4 @@
-"""The examples run, and the notebook."""
+"""The examples and the notebook run without errors."""
 
 import http.server
 import json
@@ -19,13 +19,13 @@ def run(name: str, *arguments: str, cwd: Path) -> str:
     return done.stdout
 
 
-def test_ppo_of_stable_baselines(tmp_path):
+def test_ppo_with_stable_baselines(tmp_path):
     pytest.importorskip("stable_baselines3")
     assert "return of two" in run("ppo_sb3.py", "--steps", "64", "--envs", "2", cwd=tmp_path)
     assert (tmp_path / "ppo.zip").exists()
 
 
-def test_stable_baselines_finds_nothing_wrong():
+def test_the_stable_baselines_checker_passes():
     env_checker = pytest.importorskip("stable_baselines3.common.env_checker")
     import gymnasium
 
@@ -35,24 +35,24 @@ def test_stable_baselines_finds_nothing_wrong():
     env_checker.check_env(Learnable(gymnasium.make("chaic/HighTarget-v0", image_size=64)))
 
 
-def test_ppo_on_vectors(tmp_path):
+def test_ppo_on_the_vector_environment(tmp_path):
     pytest.importorskip("torch")
     assert "4096 decisions" in run("ppo_vector.py", "--steps", "4096", cwd=tmp_path)
 
 
-def test_ppo_of_torchrl_on_plans(tmp_path):
+def test_ppo_with_torchrl_on_plans(tmp_path):
     pytest.importorskip("torchrl")
-    assert "learned from 512 plans" in run("ppo_torchrl.py", "--steps", "512", cwd=tmp_path)
+    assert "trained on 512 plans" in run("ppo_torchrl.py", "--steps", "512", cwd=tmp_path)
 
 
-def test_imitation(tmp_path):
+def test_imitation_of_the_oracle(tmp_path):
     pytest.importorskip("torch")
-    told = run("imitation.py", "--episodes", "2", "--epochs", "3", cwd=tmp_path)
-    assert "epoch 3" in told
+    output = run("imitation.py", "--episodes", "2", "--epochs", "3", cwd=tmp_path)
+    assert "epoch 3" in output
 
 
-class Answers(http.server.BaseHTTPRequestHandler):
-    """An endpoint that names the last plan."""
+class LastPlanHandler(http.server.BaseHTTPRequestHandler):
+    """Endpoint that always chooses the last plan."""
 
     def do_POST(self):
         body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
@@ -67,8 +67,8 @@ class Answers(http.server.BaseHTTPRequestHandler):
         pass
 
 
-def test_a_helper_that_asks_a_language_model(tmp_path):
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Answers)
+def test_the_language_model_helper(tmp_path):
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), LastPlanHandler)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     endpoint = f"http://127.0.0.1:{server.server_port}/v1"
     run("language_helper.py", "--endpoint", endpoint, "--model", "m", cwd=tmp_path)
@@ -76,7 +76,7 @@ def test_a_helper_that_asks_a_language_model(tmp_path):
     assert json.loads(results)["status"] == "done"
 
 
-def test_the_notebook(tmp_path):
+def test_the_notebook_runs(tmp_path):
     nbclient = pytest.importorskip("nbclient")
     nbformat = pytest.importorskip("nbformat")
     notebook = nbformat.read(ROOT / "examples" / "python" / "quickstart.ipynb", as_version=4)

@@ -1,4 +1,4 @@
-"""Long lives: many episodes in one process, and many worlds in one batch."""
+"""Memory of many episodes in one process, and a batch of many worlds."""
 
 import resource
 import sys
@@ -16,22 +16,22 @@ def resident_mib() -> float:
         return int(file.read().split()[1]) * resource.getpagesize() / 2**20
 
 
-def test_memory_stays_as_it_is():
-    env = HelperEnv(None, observation=("rgb", "own"), image_size=32, minds_image_size=32)
+def test_memory_does_not_grow_over_resets():
+    env = HelperEnv(None, observation=("rgb", "own"), image_size=32, partner_image_size=32)
     rng = np.random.default_rng(0)
     before = 0.0
     for k in range(RESETS):
         env.reset(seed=k)
         env.step(rng.integers(0, [11, 32, 32]))
         if k == RESETS // 10:
-            # All episodes have been read, and memory for the largest was got.
+            # The cache now contains all episodes, and buffers have their final size.
             before = resident_mib()
         if k % 1000 == 0:
             print(k, round(resident_mib()), "MiB", file=sys.stderr)
     assert resident_mib() < 1.05 * before
 
 
-def test_a_thousand_worlds_in_one_batch():
+def test_a_batch_runs_a_thousand_worlds():
     names = [name for task in chaic.tasks()[:8] for name in chaic.episode_ids("train", task)]
     episodes = {name: chaic.Episode(name) for name in names}
     drawn = [episodes[names[k % len(names)]] for k in range(1000)]

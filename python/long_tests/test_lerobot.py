@@ -1,6 +1,6 @@
-"""What `chaic export lerobot` writes is read by LeRobot itself.
+"""LeRobot reads the data sets of `chaic export lerobot`.
 
-LeRobot 0.4 with PyAV is needed beside the package: `pip install lerobot==0.4.0`.
+The test needs LeRobot 0.4 with PyAV: `pip install lerobot==0.4.0`.
 """
 
 import subprocess
@@ -17,9 +17,9 @@ FPS = 30 // EVERY
 
 
 def decode(path, timestamps, tolerance_s, backend=None):
-    """Pictures of a film by PyAV: the decoders that LeRobot prefers need libraries of the system."""
-    with av.open(str(path)) as film:
-        pictures = [(float(p.time), p.to_ndarray(format="rgb24")) for p in film.decode(video=0)]
+    """Decodes video frames with PyAV; LeRobot's default decoders need system libraries."""
+    with av.open(str(path)) as video:
+        pictures = [(float(p.time), p.to_ndarray(format="rgb24")) for p in video.decode(video=0)]
     found = []
     for wanted in timestamps:
         at, picture = min(pictures, key=lambda p: abs(p[0] - wanted))

@@ -1,4 +1,4 @@
-"""A run on Ray is the run that one machine makes, whatever becomes of its workers."""
+"""A run on Ray equals the run of one machine, also after the loss of a worker."""
 
 import os
 from pathlib import Path
@@ -34,18 +34,18 @@ def files(folder: Path) -> dict[str, bytes]:
     return found
 
 
-def test_a_worker_that_is_killed_costs_nothing(tmp_path):
+def test_the_loss_of_a_worker_does_not_change_the_run(tmp_path):
     import chaic.ray
 
     killed = tmp_path / "killed"
     os.environ[KILLED] = str(killed)
     ray.init(num_cpus=4, runtime_env={"env_vars": {KILLED: str(killed)}}, log_to_driver=False)
-    played = {"tasks": ["low_target", "shopping"], "split": "train", "first": 2, "beside": ["none"]}
+    options = {"tasks": ["low_target", "shopping"], "split": "train", "n_episodes": 2, "baselines": ["none"]}
     try:
-        chaic.ray.evaluate(Turner, out=tmp_path / "ray", shards=4, **played)
+        chaic.ray.evaluate(Turner, out=tmp_path / "ray", shards=4, **options)
     finally:
         ray.shutdown()
-    assert killed.exists(), "one was killed in the middle"
-    chaic.evaluate(Turner, out=tmp_path / "one", jobs=1, quiet=True, **played)
+    assert killed.exists(), "a worker was killed during its shard"
+    chaic.evaluate(Turner, out=tmp_path / "one", jobs=1, quiet=True, **options)
     assert files(tmp_path / "ray") == files(tmp_path / "one")
     assert not (tmp_path / "ray.shards").exists()

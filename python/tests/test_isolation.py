@@ -1,4 +1,4 @@
-"""Helpers in processes of their own, in the sandbox of docs/threat-model.md."""
+"""Helpers in separate processes, in the sandbox of docs/threat-model.md."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ import pytest
 
 import chaic
 
-ONE = {"tasks": "low_target", "split": "train", "first": 1, "jobs": 2, "quiet": True}
+OPTIONS = {"tasks": "low_target", "split": "train", "n_episodes": 1, "jobs": 2, "quiet": True}
 
-# The helpers stand in a file of their own, since another process must import them.
+# Another process must import the helpers, so a test fixture writes them to a separate file.
 HELPERS = """
 import json, os
 from pathlib import Path
@@ -50,7 +50,7 @@ class Counter(Turner):
         Counter.served += 1
 
     def act(self, observation):
-        print("text on the standard output is no message")
+        print("text on standard output is not a message")
         if Counter.served > 1:
             raise RuntimeError(f"served {Counter.served}")
         return super().act(observation)
@@ -81,53 +81,53 @@ def isolation_of(run):
     return json.loads((run.path / "run.json").read_text())["granted"]["isolation"]
 
 
-def test_isolated_helpers_play_as_others_do(tmp_path, helpers):
-    own = chaic.evaluate(helpers.Turner, out=tmp_path / "own", **ONE)
-    isolated = chaic.evaluate(helpers.Turner, isolate=True, out=tmp_path / "isolated", **ONE)
-    assert isolation_of(own) == {"turner": "trusted"}
+def test_isolated_helpers_act_like_helpers_in_process(tmp_path, helpers):
+    in_process = chaic.evaluate(helpers.Turner, out=tmp_path / "in_process", **OPTIONS)
+    isolated = chaic.evaluate(helpers.Turner, isolate=True, out=tmp_path / "isolated", **OPTIONS)
+    assert isolation_of(in_process) == {"turner": "trusted"}
     assert isolation_of(isolated)["turner"].startswith("sandbox")
-    assert own.records().tolist() == isolated.records().tolist()
+    assert in_process.records().tolist() == isolated.records().tolist()
     isolated.verify()
     trace = next((isolated.path / "traces").rglob("*.jsonl"))
     assert '"isolation":"sandbox' in trace.read_text().splitlines()[0]
 
 
-def test_makers_with_arguments_reach_the_process(tmp_path, helpers):
+def test_helper_arguments_reach_the_process(tmp_path, helpers):
     maker = {"waiter": partial(helpers.Waiter, 50)}
-    run = chaic.evaluate(maker, isolate=True, out=tmp_path / "run", **ONE)
+    run = chaic.evaluate(maker, isolate=True, out=tmp_path / "run", **OPTIONS)
     assert not run.records()["broke_down"].any()
 
 
-def test_an_isolated_helper_sees_neither_caller_nor_home(tmp_path, helpers, monkeypatch):
+def test_an_isolated_helper_cannot_read_caller_or_home(tmp_path, helpers, monkeypatch):
     monkeypatch.setenv("CHAIC_TEST_API_KEY", "sesame")
-    run = chaic.evaluate(helpers.Spy, isolate=True, out=tmp_path / "run", **ONE)
+    run = chaic.evaluate(helpers.Spy, isolate=True, out=tmp_path / "run", **OPTIONS)
     (result,) = run.results()
-    said = next(text for text in result.values() if "FOUND " in str(text))
-    found, _ = json.JSONDecoder().raw_decode(said.split("FOUND ")[-1])
+    message = next(text for text in result.values() if "FOUND " in str(text))
+    found, _ = json.JSONDecoder().raw_decode(message.split("FOUND ")[-1])
     assert "CHAIC_TEST_API_KEY" not in found["environment"]
     if isolation_of(run)["spy"] == "sandbox":
         assert found["pid"] < 100
         assert str(os.getpid()) not in found["processes"]
-        # The installation of Python may lie there.
+        # The Python installation may be in the home folder.
         assert len(found["home"]) < len(os.listdir(Path.home()))
 
 
-def test_a_process_serves_one_episode_after_the_other(tmp_path, helpers):
-    two = {**ONE, "first": 2, "jobs": 1}
+def test_a_process_serves_several_episodes(tmp_path, helpers):
+    two = {**OPTIONS, "n_episodes": 2, "jobs": 1}
     run = chaic.evaluate(helpers.Counter, isolate=True, out=tmp_path / "run", **two)
     broken = run.records()["broke_down"]
     assert broken.sum() == 1
     assert "served 2" in json.dumps(run.results())
 
 
-def test_what_no_other_process_can_import_is_refused(tmp_path, helpers):
+def test_a_helper_that_cannot_be_imported_is_refused(tmp_path, helpers):
     class Local(helpers.Turner):
         pass
 
-    with pytest.raises(ValueError, match="at the top of a file"):
-        chaic.evaluate(Local, isolate=True, out=tmp_path / "run", **ONE)
+    with pytest.raises(ValueError, match="at the top level of a file"):
+        chaic.evaluate(Local, isolate=True, out=tmp_path / "run", **OPTIONS)
     with pytest.raises(ValueError, match="isolate=True"):
-        chaic.evaluate(helpers.Turner, read=["."], out=tmp_path / "run", **ONE)
+        chaic.evaluate(helpers.Turner, read=["."], out=tmp_path / "run", **OPTIONS)
     with pytest.raises(ValueError, match="exec-read"):
-        chaic.evaluate(helpers.Turner, isolate=True, read=["nowhere"], out=tmp_path / "run", **ONE)
+        chaic.evaluate(helpers.Turner, isolate=True, read=["nowhere"], out=tmp_path / "run", **OPTIONS)
     assert not (tmp_path / "run").exists()

@@ -1,4 +1,4 @@
-"""Benchmarks with helpers written in Python."""
+"""Benchmark runs with Python helpers."""
 
 import json
 import time
@@ -8,11 +8,11 @@ import pytest
 
 import chaic
 
-ONE = {"tasks": "low_target", "split": "train", "first": 1, "jobs": 2, "quiet": True}
+OPTIONS = {"tasks": "low_target", "split": "train", "n_episodes": 1, "jobs": 2, "quiet": True}
 
 
 class Turner:
-    """Turns, and never helps."""
+    """Turns and waits; never helps."""
 
     images = ("depth",)
     image_size = 64
@@ -28,23 +28,23 @@ class Turner:
 
 
 class Rhp:
-    """The built-in helper, asked from Python."""
+    """Calls the built-in helper from Python."""
 
     def __init__(self) -> None:
-        self.mind = chaic.Mind("rhp")
+        self.agent = chaic.PlanningAgent("rhp")
 
-    grants = tuple(chaic.Mind("rhp").grants)
+    grants = tuple(chaic.PlanningAgent("rhp").grants)
     images = ("depth", "ids")
 
     def reset(self, briefing: chaic.Briefing) -> None:
-        self.mind.reset(briefing)
+        self.agent.reset(briefing)
 
     def act(self, observation: chaic.Observation):
-        return self.mind.act(observation)
+        return self.agent.act(observation)
 
 
-def test_a_helper_of_ones_own_is_scored_and_verified(tmp_path):
-    run = chaic.evaluate(Turner, beside=["none"], out=tmp_path / "run", **ONE)
+def test_a_python_helper_is_scored_and_verified(tmp_path):
+    run = chaic.evaluate(Turner, baselines=["none"], out=tmp_path / "run", **OPTIONS)
     records = run.records()
     assert records["helper"].tolist() == ["none", "turner"]
     assert not records["broke_down"].any() and (records["total"] > 0).all()
@@ -53,84 +53,84 @@ def test_a_helper_of_ones_own_is_scored_and_verified(tmp_path):
     assert "turner" in (tmp_path / "run" / "report.md").read_text()
     run.verify()
     with pytest.raises(RuntimeError):
-        chaic.evaluate(Turner, out=tmp_path / "run", **ONE)
+        chaic.evaluate(Turner, out=tmp_path / "run", **OPTIONS)
 
 
-def test_the_same_helper_from_python_and_from_rust_plays_the_same(tmp_path):
-    run = chaic.evaluate({"mine": Rhp}, beside=["rhp"], out=tmp_path / "run", **ONE)
+def test_a_built_in_helper_acts_alike_from_python_and_rust(tmp_path):
+    run = chaic.evaluate({"mine": Rhp}, baselines=["rhp"], out=tmp_path / "run", **OPTIONS)
     mine, rhp = run.results()
     assert (mine["helper"], rhp["helper"]) == ("mine", "rhp")
     assert mine["digest"] == rhp["digest"] and mine["deliveries"] == rhp["deliveries"]
 
 
-def test_a_helper_that_raises_gets_zero_and_the_run_goes_on(tmp_path):
-    class Clumsy(Turner):
+def test_a_helper_that_raises_scores_zero_and_the_run_continues(tmp_path):
+    class FailsLater(Turner):
         def act(self, observation):
             if observation.frame > 200:
-                raise KeyError("lost the plot")
+                raise KeyError("test error")
             return super().act(observation)
 
-    class Nonsense(Turner):
+    class InvalidAction(Turner):
         def act(self, observation):
             return {"fly": "away"}
 
-    class Unborn(Turner):
+    class FailsInInit(Turner):
         def __init__(self):
             raise OSError("no such weights")
 
-    makers = {"clumsy": Clumsy, "nonsense": Nonsense, "unborn": Unborn, "fine": Turner}
-    chaic.evaluate(makers, out=tmp_path / "run", **ONE)
+    makers = {"fails_later": FailsLater, "invalid_action": InvalidAction, "fails_in_init": FailsInInit, "fine": Turner}
+    chaic.evaluate(makers, out=tmp_path / "run", **OPTIONS)
     results = {r["helper"]: r for r in chaic.Run(tmp_path / "run").results()}
-    assert "lost the plot" in results["clumsy"]["message"]
-    assert "test_runs.py" in results["clumsy"]["message"], "the traceback is kept"
-    assert "no action" in results["nonsense"]["message"]
-    assert "no such weights" in results["unborn"]["message"]
+    assert "test error" in results["fails_later"]["message"]
+    assert "test_runs.py" in results["fails_later"]["message"], "the message contains the traceback"
+    assert "no action" in results["invalid_action"]["message"]
+    assert "no such weights" in results["fails_in_init"]["message"]
     assert "done" in results["fine"]
     assert chaic.Run(tmp_path / "run").records()["broke_down"].sum() == 3
 
 
-def test_a_helper_that_hangs_gets_zero_and_the_run_goes_on(tmp_path):
-    class Lost(Turner):
+def test_a_helper_that_hangs_scores_zero_and_the_run_continues(tmp_path):
+    class HangsInAct(Turner):
         def act(self, observation):
             while True:
                 pass
 
-    class Undecided(Turner):
+    class HangsInReset(Turner):
         def reset(self, briefing):
             while True:
                 time.sleep(0.01)
 
-    makers = {"lost": Lost, "undecided": Undecided, "fine": Turner}
-    run = chaic.evaluate(makers, out=tmp_path / "run", limit_s=1.0, **ONE)
+    makers = {"hangs_in_act": HangsInAct, "hangs_in_reset": HangsInReset, "fine": Turner}
+    run = chaic.evaluate(makers, out=tmp_path / "run", limit_s=1.0, **OPTIONS)
     results = {r["helper"]: r for r in run.results()}
-    assert "act took longer than 1 s" in results["lost"]["message"]
-    assert "reset took longer than 1 s" in results["undecided"]["message"]
-    assert "test_runs.py" in results["lost"]["message"], "it is told where"
+    assert "act took longer than 1 s" in results["hangs_in_act"]["message"]
+    assert "reset took longer than 1 s" in results["hangs_in_reset"]["message"]
+    assert "test_runs.py" in results["hangs_in_act"]["message"], "the message contains the traceback"
     assert "done" in results["fine"]
     with pytest.raises(ValueError):
-        chaic.evaluate(Turner, out=tmp_path / "other", limit_s=0.0, **ONE)
+        chaic.evaluate(Turner, out=tmp_path / "other", limit_s=0.0, **OPTIONS)
 
 
-def test_a_run_that_was_interrupted_goes_on(tmp_path):
-    class Impatient(Turner):
+def test_an_interrupted_run_can_be_resumed(tmp_path):
+    class Interrupts(Turner):
         def act(self, observation):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        chaic.evaluate({"turner": Impatient}, out=tmp_path / "run", **ONE)
-    run = chaic.evaluate(Turner, out=tmp_path / "run", resume=True, **ONE)
+        chaic.evaluate({"turner": Interrupts}, out=tmp_path / "run", **OPTIONS)
+    run = chaic.evaluate(Turner, out=tmp_path / "run", resume=True, **OPTIONS)
     assert len(run.results()) == 1
 
 
-def test_mistakes_are_told(tmp_path):
+def test_invalid_arguments_are_refused(tmp_path):
     out = tmp_path / "run"
     for kind, call in [
-        (ValueError, lambda: chaic.evaluate(out=out, **ONE)),
-        (TypeError, lambda: chaic.evaluate({"mine": 3}, out=out, **ONE)),
-        (ValueError, lambda: chaic.evaluate({"rhp": Turner}, out=out, **ONE)),
-        (ValueError, lambda: chaic.evaluate({"a": Turner, "b": Rhp}, out=out, **ONE)),
-        (ValueError, lambda: chaic.evaluate(Turner, out=out, **{**ONE, "tasks": "flying"})),
-        (TypeError, lambda: chaic.evaluate(Turner, out=out, colour="red", **ONE)),
+        (ValueError, lambda: chaic.evaluate(out=out, **OPTIONS)),
+        (TypeError, lambda: chaic.evaluate({"mine": 3}, out=out, **OPTIONS)),
+        (ValueError, lambda: chaic.evaluate({"rhp": Turner}, out=out, **OPTIONS)),
+        (ValueError, lambda: chaic.evaluate({"a": Turner, "b": Rhp}, out=out, **OPTIONS)),
+        (ValueError, lambda: chaic.evaluate(Turner, out=out, **{**OPTIONS, "tasks": "flying"})),
+        (TypeError, lambda: chaic.evaluate(Turner, out=out, colour="red", **OPTIONS)),
         (FileNotFoundError, lambda: chaic.Run(tmp_path / "nothing")),
     ]:
         with pytest.raises(kind):
@@ -140,18 +140,30 @@ def test_mistakes_are_told(tmp_path):
 
 def test_the_hidden_track_refuses_grants_and_is_recorded(tmp_path):
     with pytest.raises(RuntimeError, match="`mine` is granted ids, which the hidden track refuses"):
-        chaic.evaluate({"mine": Rhp}, track="hidden", out=tmp_path / "run", **ONE)
+        chaic.evaluate({"mine": Rhp}, track="hidden", out=tmp_path / "run", **OPTIONS)
     with pytest.raises(RuntimeError, match="hidden track needs --perception learned"):
-        chaic.evaluate(Turner, track="hidden", perception="gt", out=tmp_path / "run", **ONE)
+        chaic.evaluate(Turner, track="hidden", perception="gt", out=tmp_path / "run", **OPTIONS)
     assert not (tmp_path / "run" / "run.json").exists()
-    run = chaic.evaluate(Turner, track="hidden", out=tmp_path / "run", **ONE)
+    run = chaic.evaluate(Turner, track="hidden", out=tmp_path / "run", **OPTIONS)
     assert run.options["track"] == "hidden"
     run.verify()
 
 
-def test_records_are_plain_numbers(tmp_path):
-    run = chaic.evaluate(Turner, out=tmp_path / "run", **ONE)
+def test_records_match_results(tmp_path):
+    run = chaic.evaluate(Turner, out=tmp_path / "run", **OPTIONS)
     records = run.records()
     assert records.dtype == chaic.Run.DTYPE and np.isfinite(records["tr"]).all()
     lines = (tmp_path / "run" / "results.jsonl").read_text().splitlines()
     assert json.loads(lines[0])["done"] == records["done"][0]
+
+
+def test_old_option_names_warn(tmp_path):
+    old = {name: value for name, value in OPTIONS.items() if name != "n_episodes"}
+    with pytest.warns(DeprecationWarning, match="n_episodes"):
+        run = chaic.evaluate(Turner, first=1, out=tmp_path / "run", **old)
+    assert len(run.results()) == 1
+    with pytest.warns(DeprecationWarning, match="baselines"):
+        run = chaic.evaluate(beside=["none"], out=tmp_path / "none", **OPTIONS)
+    assert run.options["helpers"] == ["none"]
+    with pytest.raises(TypeError, match="n_episodes"):
+        chaic.evaluate(Turner, first=1, out=tmp_path / "other", **OPTIONS)

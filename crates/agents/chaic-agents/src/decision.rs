@@ -1,29 +1,29 @@
-//! What to do next: the plans, which of them are valid, and who chooses.
+//! Decisions: the plans, their preconditions, and the policy interface.
 
 use std::collections::BTreeMap;
 use std::fmt;
 
-use chaic_core::briefing::Relation;
-use chaic_core::geom::xz;
+use chaic_core::briefing::CompanionRole;
+use chaic_core::geom::to_xz;
 use chaic_core::{AgentError, Briefing, ClassId, Frame, Hand, Observation, Role};
 
 use crate::behavior::BehaviorLog;
-use crate::mapping::Thing;
+use crate::mapping::MappedObject;
 use crate::memory::Memory;
 use crate::track::{Carried, Hands, TrackId};
 
-/// One object that a plan is about.
+/// Object that a plan refers to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Subject {
-    /// Which one.
+    /// Track of the object.
     pub track: TrackId,
-    /// Its class.
+    /// Class of the object.
     pub class: ClassId,
 }
 
 impl Subject {
-    fn of(thing: &Thing) -> Subject {
-        Subject { track: thing.track, class: thing.class }
+    fn from_object(object: &MappedObject) -> Subject {
+        Subject { track: object.track, class: object.class }
     }
 }
 
@@ -33,28 +33,28 @@ impl fmt::Display for Subject {
     }
 }
 
-/// A subgoal that takes many actions.
+/// Subgoal that takes many actions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Plan {
-    /// Find out more of the place.
+    /// Explore unknown parts of the map.
     Explore,
-    /// Take a target.
+    /// Pick up a target.
     PickUp(Subject),
-    /// Take a container.
+    /// Pick up a container.
     PickContainer(Subject),
     /// Put the target in one hand into the container in the other.
     PutIn,
-    /// Bring what is carried to the goal place.
+    /// Bring the carried objects to the goal place.
     Deliver,
-    /// Clear an obstacle away.
+    /// Remove an obstacle.
     RemoveObstacle(Subject),
-    /// Lift a piece of furniture together with the partner who is at it.
+    /// Lift a piece of furniture together with the partner beside it.
     LiftWith(Subject),
     /// Stay near the partner.
     FollowPartner,
     /// Go to the child.
     FollowChild,
-    /// Look all around.
+    /// Turn through a full circle to look around.
     TurnAround,
     /// Stand still for a moment.
     Wait,
@@ -79,7 +79,7 @@ impl fmt::Display for Plan {
 }
 
 impl Plan {
-    /// What kinds of plans there are called, by [`Plan::kind`].
+    /// Names of the plan kinds, indexed by [`Plan::kind`].
     pub const KINDS: [&str; 11] = [
         "explore",
         "pick_up",
@@ -94,7 +94,7 @@ impl Plan {
         "wait",
     ];
 
-    /// Its place in [`Plan::KINDS`].
+    /// Index of the plan's kind in [`Plan::KINDS`].
     pub fn kind(&self) -> usize {
         match self {
             Plan::Explore => 0,
@@ -111,7 +111,7 @@ impl Plan {
         }
     }
 
-    /// What it is about, if it is about one thing.
+    /// Returns the object that the plan refers to, if it has exactly one.
     pub fn subject(&self) -> Option<Subject> {
         match self {
             Plan::PickUp(it)
@@ -122,45 +122,46 @@ impl Plan {
         }
     }
 
-    /// Whether a plan under way should make room for this one, when both come from the same
-    /// policy: nothing is dropped for more of the same, a walk to an object for another, or
-    /// anything for having nothing to do.
+    /// Returns whether this plan replaces `current`, when both come from the same policy.
+    ///
+    /// A plan is never replaced by one of the same kind, or by an idle plan (explore, follow,
+    /// wait). A walk to one object is not replaced by a walk to another.
     pub fn supersedes(&self, current: &Plan) -> bool {
         let is_pick = |p: &Plan| matches!(p, Plan::PickUp(_) | Plan::PickContainer(_));
         let is_idle = matches!(self, Plan::Explore | Plan::FollowPartner | Plan::Wait);
-        let same = std::mem::discriminant(self) == std::mem::discriminant(current);
-        !(same || is_idle || is_pick(current) && is_pick(self))
+        let is_same_kind = std::mem::discriminant(self) == std::mem::discriminant(current);
+        !(is_same_kind || is_idle || is_pick(current) && is_pick(self))
     }
 }
 
-/// What the hands hold, as far as decisions care.
+/// Load of the hands, as far as decisions depend on it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HandState {
-    /// A hand with nothing in it.
+    /// An empty hand, if any.
     pub free_hand: Option<Hand>,
-    /// Whether a container is in hand.
+    /// True if a hand holds a container.
     pub has_container: bool,
-    /// Possible targets carried, those in containers and baskets included.
+    /// Possible targets carried, including those in containers and baskets.
     pub targets: Vec<(TrackId, ClassId)>,
-    /// Whether another target can be taken.
+    /// True if another target can be picked up.
     pub can_take_target: bool,
-    /// Whether a container can be taken.
+    /// True if a container can be picked up.
     pub can_take_container: bool,
-    /// Whether one hand holds a target and the other a container with room.
+    /// True if one hand holds a target and the other a container with room.
     pub can_put_in: bool,
-    /// A hand that holds something to bring to the goal place.
+    /// A hand that holds something to deliver.
     pub to_deliver: Option<Hand>,
 }
 
 impl HandState {
-    /// What these hands of the briefing's reader carry.
-    pub fn of(hands: &Hands, briefing: &Briefing) -> HandState {
+    /// Computes the state of these hands for the agent with this briefing.
+    pub fn new(hands: &Hands, briefing: &Briefing) -> HandState {
         let capacity = briefing.container_capacity;
         let is_target = |class: ClassId| briefing.possible_targets.contains(&class);
         let role = |held: &Carried| held.class().map(|c| c.info().role);
         let is_container = |held: &Carried| role(held) == Some(Role::Container);
         let basket = hands.held().find(|h| role(h) == Some(Role::Vehicle));
-        let is_moving =
+        let moves_furniture =
             briefing.possible_targets.iter().any(|c| c.info().role == Role::HeavyTarget);
         let body = &briefing.capability;
         let is_free = |h: &Hand| hands.hands[h.index()].is_none();
@@ -173,11 +174,12 @@ impl HandState {
         });
         let can_take_target = match basket {
             Some(basket) => basket.n_contents < capacity,
-            None if is_moving => body.lifts_furniture && hands.held().next().is_none(),
+            None if moves_furniture => body.lifts_furniture && hands.held().next().is_none(),
             None => free_hand.is_some(),
         };
-        // What nobody knows is got rid of at the goal place, too.
-        let carries = |h: &Carried| h.what.is_none() || h.all().any(|(_, class)| is_target(class));
+        // An unidentified object is delivered too, to free the hand.
+        let carries =
+            |h: &Carried| h.object.is_none() || h.all().any(|(_, class)| is_target(class));
         HandState {
             free_hand,
             has_container,
@@ -195,59 +197,60 @@ impl HandState {
     }
 }
 
-/// All that a decision may rest on.
+/// Inputs of a decision.
 #[derive(Clone, Copy, Debug)]
 pub struct Context<'a> {
-    /// What the mind was told.
+    /// Briefing of the agent.
     pub briefing: &'a Briefing,
-    /// What it remembers; distances are up to date when a choice is asked for.
+    /// The agent's memory; path lengths are up to date when a choice is requested.
     pub memory: &'a Memory,
-    /// What it knows of the others' doings.
+    /// Known actions of the other agents.
     pub behavior: &'a BehaviorLog,
-    /// Whether everything that can be got to has been explored.
+    /// True if all reachable space has been explored.
     pub is_explored: bool,
 }
 
 /// Chooses among valid plans.
 pub trait Policy: Send + 'static {
-    /// Begins an episode.
+    /// Starts an episode.
     fn reset(&mut self, briefing: &Briefing);
 
-    /// The plan to follow next. `valid` is never empty, and holds the plans of one kind nearest
-    /// first.
+    /// Returns the plan to execute next. `valid` is never empty; plans of one kind are sorted by
+    /// distance, nearest first.
     ///
     /// # Errors
-    /// If it can't choose; its mind decides nothing then.
+    /// If the policy cannot choose; the agent then takes no decision.
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError>;
 
-    /// Whether to choose anew although `current` is not finished. `is_news` says that something
-    /// has come up since the last choice. The new choice is taken if it [supersedes] the current
-    /// plan.
+    /// Returns whether to call `choose` although `current` is unfinished. `has_changed` is true if
+    /// the map has changed in a relevant way since the last choice. The new choice is adopted only
+    /// if it [supersedes] the current plan.
     ///
     /// [supersedes]: Plan::supersedes
-    fn reconsiders(&mut self, _context: &Context<'_>, _current: &Plan, _is_news: bool) -> bool {
+    fn reconsiders(&mut self, _context: &Context<'_>, _current: &Plan, _has_changed: bool) -> bool {
         false
     }
 
-    /// Sees what its mind sees, before each action; for those who look at pictures, or at what changes, themselves.
-    fn look(&mut self, _observation: &Observation, _memory: &Memory, _behavior: &BehaviorLog) {}
+    /// Receives each observation before the action. Needed by policies that use images or changes
+    /// over time.
+    fn observe(&mut self, _observation: &Observation, _memory: &Memory, _behavior: &BehaviorLog) {}
 
-    /// For how many frames its body stands still before the plan just chosen is begun.
+    /// Number of frames that the body waits before it starts the chosen plan.
     fn thinking_frames(&self) -> Frame {
         0
     }
 
-    /// A short word for its state, if it has one.
-    fn mood(&self) -> Option<String> {
+    /// Short label of the policy's state for traces, if it has one.
+    fn status(&self) -> Option<String> {
         None
     }
 
-    /// What it counted in this episode, by name.
-    fn counts(&self) -> BTreeMap<String, u64> {
+    /// Counters of this episode, by name.
+    fn counters(&self) -> BTreeMap<String, u64> {
         BTreeMap::new()
     }
 
-    /// A copy that goes on as this one would; `None` if it can't be copied.
+    /// Returns a copy that continues identically, or `None` if the policy cannot be copied.
     fn fork(&self) -> Option<Self>
     where
         Self: Sized,
@@ -256,9 +259,9 @@ pub trait Policy: Send + 'static {
     }
 }
 
-/// Every plan that can be begun now, those of one kind nearest first. Never empty.
+/// Returns all plans that can be started now, plans of one kind sorted by distance. Never empty.
 pub fn valid_plans(memory: &Memory, briefing: &Briefing) -> Vec<Plan> {
-    let hands = HandState::of(&memory.hands, briefing);
+    let hands = HandState::new(&memory.hands, briefing);
     let mut plans = vec![Plan::Explore];
     if hands.can_put_in {
         plans.push(Plan::PutIn);
@@ -276,49 +279,49 @@ pub fn valid_plans(memory: &Memory, briefing: &Briefing) -> Vec<Plan> {
         plans.extend(reachable(memory, &briefing.obstacles).map(Plan::RemoveObstacle));
     }
     if briefing.capability.lifts_furniture && memory.hands.held().next().is_none() {
-        plans.extend(pieces_at_partner(memory, briefing).map(Plan::LiftWith));
+        plans.extend(furniture_at_partner(memory, briefing).map(Plan::LiftWith));
     }
-    if memory.companion(briefing, Relation::Partner).is_some() {
+    if memory.companion(briefing, CompanionRole::Partner).is_some() {
         plans.push(Plan::FollowPartner);
     }
-    if memory.companion(briefing, Relation::Child).is_some() {
+    if memory.companion(briefing, CompanionRole::Child).is_some() {
         plans.push(Plan::FollowChild);
     }
     plans.push(Plan::TurnAround);
     plans
 }
 
-/// Available things of these classes that one can get to, nearest first.
+/// Returns the available and reachable objects of these classes, nearest first.
 fn reachable<'a>(
     memory: &'a Memory,
     classes: &[ClassId],
 ) -> impl Iterator<Item = Subject> + use<'a> {
-    let mut found: Vec<(f32, &Thing)> = memory
-        .things
+    let mut found: Vec<(f32, &MappedObject)> = memory
+        .objects
         .iter()
         .filter(|t| classes.contains(&t.class) && t.is_available(memory.frame))
-        .filter_map(|t| Some((memory.way_to(t)?, t)))
+        .filter_map(|t| Some((memory.path_length_to(t)?, t)))
         .collect();
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    found.into_iter().map(|(_, t)| Subject::of(t))
+    found.into_iter().map(|(_, t)| Subject::from_object(t))
 }
 
-/// Furniture that the partner stands at.
-fn pieces_at_partner<'a>(
+/// Returns the furniture that the partner stands beside.
+fn furniture_at_partner<'a>(
     memory: &'a Memory,
     briefing: &Briefing,
 ) -> impl Iterator<Item = Subject> + use<'a> {
     let rules = memory.rules.lifting;
     let partner = memory
-        .companion(briefing, Relation::Partner)
+        .companion(briefing, CompanionRole::Partner)
         .filter(|p| p.frame + rules.at_piece_frames > memory.frame)
-        .map(|p| xz(p.position_in_world));
+        .map(|p| to_xz(p.position_in_world));
     memory
-        .things
+        .objects
         .iter()
         .filter(|t| t.class.info().role == Role::HeavyTarget && t.is_available(memory.frame))
         .filter(move |t| partner.is_some_and(|p| t.distance_from(p) < rules.at_piece_m))
-        .map(Subject::of)
+        .map(Subject::from_object)
 }
 
 #[cfg(test)]
@@ -331,12 +334,12 @@ mod tests {
     }
 
     #[test]
-    fn what_hands_allow() {
+    fn hands_determine_the_possible_actions() {
         let apple = || Some(carried("apple", 30, &[]));
         let basket =
             |n: usize| Some(carried("wicker_basket", 31, &["apple", "apple", "apple"][..n]));
         let bike = |n: usize| Some(carried("bike", 32, &["apple", "apple", "apple"][..n]));
-        // Hands; can take a target, take a container, put in; has something to deliver.
+        // Hands; whether they can pick up a target, pick up a container, put in, and deliver.
         for (held, expected) in [
             ([None, None], [true, true, false, false]),
             ([apple(), None], [true, true, false, true]),
@@ -350,7 +353,7 @@ mod tests {
             ([bike(2), None], [true, false, false, true]),
             ([bike(3), None], [false, false, false, true]),
         ] {
-            let hands = HandState::of(&hands(held.clone()), &briefing());
+            let hands = HandState::new(&hands(held.clone()), &briefing());
             let got = [
                 hands.can_take_target,
                 hands.can_take_container,
@@ -362,13 +365,13 @@ mod tests {
     }
 
     #[test]
-    fn plans_read_as_sentences() {
+    fn plans_are_formatted_as_sentences() {
         let it = Subject { track: TrackId(31), class: ClassId::named("apple") };
         assert_eq!(Plan::PickUp(it).to_string(), "go to apple #31 and pick it up");
     }
 
     #[test]
-    fn a_walk_to_an_object_is_not_dropped_for_another_but_for_an_obstacle() {
+    fn a_walk_to_an_object_is_replaced_for_an_obstacle_but_not_for_another_object() {
         let it = |n| Subject { track: TrackId(n), class: ClassId::named("apple") };
         let current = Plan::PickUp(it(30));
         assert!(!Plan::PickUp(it(31)).supersedes(&current));

@@ -1,24 +1,24 @@
-//! The rule-based helpers, by name.
+//! Rule-based helpers by name.
 
 use chaic_core::Agent;
 use chaic_core::observation::Grants;
 
 use crate::behavior::GroundTruthBehavior;
-use crate::mind::Mind;
-use crate::policies::{Follow, Random, RulePolicy, RuleProfile};
+use crate::perception_factory::PerceptionFactory;
+use crate::planning_agent::PlanningAgent;
+use crate::policies::{FollowPolicy, RandomPolicy, RulePolicy, RuleProfile};
 use crate::rules::PlannerRules;
-use crate::sight::Sight;
 
-/// A helper as runs and tables know it.
+/// Table entry of a built-in helper.
 #[derive(Clone, Copy, Debug)]
 pub struct HelperInfo {
-    /// Its name in commands and files.
+    /// Name in commands and files.
     pub name: &'static str,
-    /// What tables call it.
+    /// Title in result tables.
     pub title: &'static str,
-    /// Makes one that plans by these rules and sees by this.
-    pub make: fn(PlannerRules, &dyn Sight) -> Box<dyn Agent>,
-    /// What it asks to be granted under these rules.
+    /// Constructs the helper with these planner rules and this perception.
+    pub make: fn(PlannerRules, &dyn PerceptionFactory) -> Box<dyn Agent>,
+    /// Returns the grants that the helper requests under these rules.
     pub grants: fn(PlannerRules) -> Grants,
 }
 
@@ -27,25 +27,25 @@ pub static HELPERS: [HelperInfo; 4] = [
     HelperInfo {
         name: "random",
         title: "Random",
-        make: |rules, sight| Box::new(random(rules, sight)),
+        make: |rules, factory| Box::new(random(rules, factory)),
         grants: planner_grants,
     },
     HelperInfo {
         name: "rhp",
         title: "RHP",
-        make: |rules, sight| Box::new(rhp(rules, sight)),
+        make: |rules, factory| Box::new(rhp(rules, factory)),
         grants: planner_grants,
     },
     HelperInfo {
         name: "oracle",
         title: "Oracle",
-        make: |rules, sight| Box::new(oracle(rules, sight)),
+        make: |rules, factory| Box::new(oracle(rules, factory)),
         grants: |_| Grants::ORACLE,
     },
     HelperInfo {
         name: "follow",
         title: "Follow",
-        make: |rules, sight| Box::new(follow(rules, sight)),
+        make: |rules, factory| Box::new(follow(rules, factory)),
         grants: planner_grants,
     },
 ];
@@ -55,52 +55,57 @@ fn planner_grants(rules: PlannerRules) -> Grants {
 }
 
 impl HelperInfo {
-    /// The helper of this name.
-    pub fn named(name: &str) -> Option<&'static HelperInfo> {
+    /// Returns the helper with this name.
+    pub fn find_helper(name: &str) -> Option<&'static HelperInfo> {
         HELPERS.iter().find(|helper| helper.name == name)
     }
 }
 
-/// Any valid plan (paper section 5.2).
-pub fn random(rules: PlannerRules, sight: &dyn Sight) -> Mind<Random> {
-    Mind::seeing(Random::default(), rules, sight)
+/// Constructs the random helper: any valid plan with equal probability (paper section 5.2).
+pub fn random(rules: PlannerRules, factory: &dyn PerceptionFactory) -> PlanningAgent<RandomPolicy> {
+    PlanningAgent::with_perception(RandomPolicy::default(), rules, factory)
 }
 
-/// The rule-based hierarchical planner: like the partner, without knowing its goal.
-pub fn rhp(rules: PlannerRules, sight: &dyn Sight) -> Mind<RulePolicy> {
-    Mind::seeing(RulePolicy::new(RuleProfile::RHP), rules, sight)
+/// Constructs the rule-based hierarchical planner (RHP): the partner's rules without knowledge of
+/// its goal.
+pub fn rhp(rules: PlannerRules, factory: &dyn PerceptionFactory) -> PlanningAgent<RulePolicy> {
+    PlanningAgent::with_perception(RulePolicy::new(RuleProfile::RHP), rules, factory)
 }
 
-/// The same rules with the goal, the progress and the partner's doings known.
-pub fn oracle(rules: PlannerRules, sight: &dyn Sight) -> Mind<RulePolicy> {
+/// Constructs the oracle: RHP's rules with the goal, the progress and the partner's actions
+/// granted.
+pub fn oracle(rules: PlannerRules, factory: &dyn PerceptionFactory) -> PlanningAgent<RulePolicy> {
     let behavior = Box::new(GroundTruthBehavior::default());
     let policy = RulePolicy::new(RuleProfile::ORACLE);
-    Mind::with(policy, sight.perception(), behavior, rules).with_sight(sight)
+    PlanningAgent::with(policy, factory.perception(), behavior, rules).replace_perception(factory)
 }
 
-/// Always beside the partner.
-pub fn follow(rules: PlannerRules, sight: &dyn Sight) -> Mind<Follow> {
-    Mind::seeing(Follow::default(), rules, sight)
+/// Constructs the helper that always stays near the partner.
+pub fn follow(rules: PlannerRules, factory: &dyn PerceptionFactory) -> PlanningAgent<FollowPolicy> {
+    PlanningAgent::with_perception(FollowPolicy::default(), rules, factory)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sight::TrueSight;
+    use crate::perception_factory::GroundTruthPerceptionFactory;
 
     #[test]
-    fn every_name_has_a_helper_and_only_the_oracle_is_told_the_goal() {
+    fn every_name_has_a_helper_and_only_the_oracle_is_granted_the_goal() {
         for info in &HELPERS {
             let name = info.name;
-            assert!((info.make)(PlannerRules::paper(), &TrueSight).senses().depth, "{name}");
+            assert!(
+                (info.make)(PlannerRules::paper(), &GroundTruthPerceptionFactory).sensors().depth,
+                "{name}"
+            );
             for rules in [PlannerRules::paper(), PlannerRules::compat()] {
                 let grants = (info.grants)(rules);
                 assert_eq!(grants.goal, name == "oracle");
                 assert!(grants.ids);
                 assert_eq!(grants.behavior, name == "oracle" || rules.knows_holding);
             }
-            assert_eq!(HelperInfo::named(name).map(|h| h.title), Some(info.title));
+            assert_eq!(HelperInfo::find_helper(name).map(|h| h.title), Some(info.title));
         }
-        assert!(HelperInfo::named("nobody").is_none());
+        assert!(HelperInfo::find_helper("unknown").is_none());
     }
 }

@@ -1,24 +1,25 @@
-//! All minds: the simulated people and the rule-based helpers.
+//! Agents: the simulated people and the rule-based helpers.
 //!
-//! **What it is**: one [`mind::Mind`] joins [`perception`] (what is in the image), [`memory`]
-//! (where everything is), [`behavior`] (what the others do), [`decision`] (what to do next, by a
-//! [`decision::Policy`]) and [`execution`] (how to do it, action by action). [`partners`] are part
-//! of the benchmark's definition; [`helpers`] are what is measured. Both are the same kind of
-//! thing with different data.
+//! **What it is**: a [`PlanningAgent`] joins five parts. [`perception`] detects objects, [`memory`]
+//! maps them, and [`behavior`] tracks the actions of other agents. A [`decision::Policy`] chooses
+//! the next plan, and [`execution`] turns it into actions. [`partners`] are part of the benchmark's
+//! definition; [`helpers`] are the agents under evaluation. Both are the same type with different
+//! data.
 //!
-//! **What it is not**: it holds no state of a world and makes no pixels; it never depends on
+//! **What it is not**: it holds no world state and renders nothing; it never depends on
 //! `chaic-world` or `chaic-render`.
 //!
 //! **Invariants**
-//! - A mind knows its briefing, its observations and what was granted; nothing else reaches it.
-//! - The same briefing and observations lead to the same actions on every machine: random numbers
-//!   come from [`chaic_core::rng::Stream`], there is no clock, and no hash map is iterated.
+//! - An agent's only inputs are its briefing, its observations and its grants.
+//! - The same briefing and observations lead to the same actions on every machine. Random numbers
+//!   come from [`chaic_core::rng::RngStream`], nothing reads a clock, and no hash map is iterated.
 //!
 //! ```
-//! use chaic_agents::sight::TrueSight;
+//! use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
 //! use chaic_agents::{HelperInfo, PlannerRules};
-//! let rhp = HelperInfo::named("rhp").expect("it is in the table");
-//! assert!((rhp.make)(PlannerRules::paper(), &TrueSight).senses().depth);
+//! let rhp = HelperInfo::find_helper("rhp").expect("it is in the table");
+//! let agent = (rhp.make)(PlannerRules::paper(), &GroundTruthPerceptionFactory);
+//! assert!(agent.sensors().depth);
 //! assert!((rhp.grants)(PlannerRules::paper()).ids);
 //! ```
 
@@ -33,14 +34,14 @@ pub mod planning;
 pub mod memory;
 
 pub mod behavior;
-pub mod sight;
+pub mod perception_factory;
 
 pub mod decision;
 pub mod policies;
 
 pub mod execution;
 
-pub mod mind;
+pub mod planning_agent;
 
 pub mod helpers;
 pub mod partners;
@@ -51,7 +52,7 @@ mod child;
 mod test_support;
 
 pub use helpers::{HELPERS, HelperInfo};
-pub use mind::Mind;
 pub use partners::{child, partner, partner_grants};
+pub use planning_agent::PlanningAgent;
 pub use rules::PlannerRules;
 pub use track::{Intent, TrackId};

@@ -1,16 +1,17 @@
-//! What is where, by what was seen: floor and walls, things, people, and what the own hands hold.
+//! Maps built from observations: occupancy, objects, people, and the agent's own hands.
 //!
-//! **What it is**: maps that take in detections and depth images one by one, on one lattice.
-//! **What it is not**: it plans nothing and knows no rules; what a way costs is [`crate::planning`]'s.
+//! **What it is**: maps on one shared grid that integrate detections and depth images.
+//! **What it is not**: it plans nothing and knows no rules; path costs belong to
+//! [`crate::planning`].
 
-pub mod bumps;
+pub mod collision_memory;
 pub mod grid;
-pub mod hands;
+pub mod held_objects;
 pub mod occupancy;
 pub mod people;
 pub mod semantic;
 
 pub use grid::{CELL_M, Grid};
-pub use occupancy::{OccupancyMap, Space};
-pub use people::{People, Person};
-pub use semantic::{SemanticMap, Thing};
+pub use occupancy::{CellOccupancy, OccupancyMap};
+pub use people::{PersonMap, TrackedPerson};
+pub use semantic::{MappedObject, SemanticMap};

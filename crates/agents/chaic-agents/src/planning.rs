@@ -1,11 +1,16 @@
-//! Ways over the maps: what each cell costs, and the cheapest way to a goal or to everywhere.
+//! Path planning: cell costs, and shortest paths to a goal or to all cells.
 //!
-//! **What it is**: cost maps and searches over what [`crate::mapping`] knows.
-//! **What it is not**: it walks nowhere and remembers nothing but its working space; how a way is
-//! followed is [`crate::execution`]'s.
+//! **What it is**: cost maps and searches over the maps of [`crate::mapping`].
+//! **What it is not**: it executes nothing, and keeps no state but cached results and working
+//! memory. [`crate::execution`] follows the paths.
+
+pub mod cost_map;
+pub mod cost_model;
+
+pub mod careful_costs;
 
 mod bucket_queue;
-pub mod cost_model;
-pub mod costs;
-pub mod lattice_costs;
 pub mod path;
+mod search_nodes;
+
+pub mod compat;

@@ -1,6 +1,6 @@
-//! By which rules minds plan. Like the world's rules they are data: every difference between the
-//! paper's planners and the original's code is a value here, read where it matters.
-//! `docs/rules.md` lists every field with its reason.
+//! Planner rules. Like the world's rules they are data: every difference between the paper's
+//! planners and the original's code is a field, read where it matters. `docs/rules.md` lists every
+//! field with its reason.
 
 mod groups;
 
@@ -10,155 +10,155 @@ use serde::{Deserialize, Serialize};
 
 pub use groups::{ChildRules, FailureRules, LiftingRules, PeopleRules, PlanLimits, TimeRules};
 
-/// How ways are planned and walked.
+/// Navigation: path planning and path following.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Walking {
-    /// A body of its true width keeps clear of things, stands where the arm reaches, and gets free
+    /// Ours: a body of its true radius avoids obstacles, stops where the arm reaches, and recovers
     /// when stuck.
     Careful,
-    /// The original's: 4-connected ways over soft costs, from which nothing is quite impassable;
-    /// near enough is near enough as the crow flies; one goes to where an object was when the plan
-    /// began; nothing is ever stuck, but obstacles keep the person in the wheelchair turning on
-    /// the spot (facts A1.5, A1.6, A2.1).
+    /// The original's: 4-connected paths over soft costs with no impassable cells. Arrival is by
+    /// straight-line distance, and the goal is the object's position when the plan began. There is
+    /// no stuck recovery, but obstacles keep the person in the wheelchair turning on the spot
+    /// (facts A1.5, A1.6, A2.1).
     Lattice,
 }
 
-/// Where one goes to find out more.
+/// Exploration strategy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Exploration {
-    /// To the nearest border of the known (paper section 5.1.1).
+    /// The nearest frontier (paper section 5.1.1).
     Frontier,
-    /// To the cheapest of some hundred random cells within the unknown (facts A1.10).
+    /// The cheapest of about a hundred random cells in unknown space (facts A1.10).
     Sampled,
 }
 
-/// How one keeps track of what is still wanted.
+/// Bookkeeping of the objects that are still needed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Bookkeeping {
-    /// What is wanted less what is delivered or held, by anybody.
+    /// The objects of the goal without those delivered or held by any agent.
     Exact,
-    /// The partner drops a class of which one is wanted after its own first pick, and no other
-    /// class ever; helpers who know the goal never drop any (facts A2.2).
+    /// The partner drops a class of which one object is needed after its own first pick, and no
+    /// other class ever. Helpers that know the goal never drop any (facts A2.2).
     FirstPick,
 }
 
-/// Which of several goal places one goes to.
+/// Choice among several goal places.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PlaceChoice {
     /// The nearest.
     Nearest,
-    /// Any (facts A2.1).
+    /// A random one (facts A2.1).
     Random,
 }
 
-/// What a random helper draws from.
+/// Distribution of the random helper's plans.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RandomDraw {
-    /// From all valid plans.
+    /// Uniform over all valid plans.
     Plans,
-    /// From the kinds of valid plans, then from those of that kind (facts A2.2).
+    /// Uniform over the kinds of valid plans, then over the plans of that kind (facts A2.2).
     KindsFirst,
 }
 
-/// When the child runs away.
+/// Source of the draws by which the child runs away.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ChildDraws {
-    /// By the episode's own luck.
+    /// The episode's random stream.
     Seeded,
-    /// By the same draws in each episode, of which the 6th, 14th and 26th are escapes (facts A2.4).
+    /// The same draws in each episode: the 6th, 14th and 26th are escapes (facts A2.4).
     Constant,
 }
 
-/// The rules of all minds.
+/// Rules of all agents.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlannerRules {
-    /// How ways are planned and walked.
+    /// Path planning and path following.
     pub walking: Walking,
-    /// Where one goes to find out more.
+    /// Exploration strategy.
     pub exploration: Exploration,
-    /// Whether everybody begins by looking all around.
+    /// True if every agent first looks around.
     pub looks_around_first: bool,
-    /// Whether a plan under way is left when a better one comes up.
+    /// True if a plan is replaced when a better one becomes valid.
     pub reconsiders: bool,
-    /// Whether one weighs whether there is time to fetch an object, or to reach the goal place.
+    /// True if decisions consider the time to fetch an object or to reach the goal place.
     pub weighs_time: bool,
-    /// Whether one delivers as soon as nothing is left to find, rather than when time runs out.
+    /// True if agents deliver as soon as nothing is left to find, rather than when time runs out.
     pub delivers_when_done: bool,
-    /// A container is fetched for at least so many objects still wanted.
+    /// Minimum number of objects still needed for which a container is fetched.
     pub min_for_container: u32,
-    /// How one keeps track of what is still wanted.
+    /// Bookkeeping of the objects that are still needed.
     pub bookkeeping: Bookkeeping,
-    /// Which of several goal places one goes to.
+    /// Choice among several goal places.
     pub place_choice: PlaceChoice,
-    /// How near to go before an object is picked up, metres (the world steps up from 3 m).
+    /// Distance from which an object is picked up, meters (the world steps up from 3 m).
     pub pick_within_m: f32,
-    /// How near to go before something is put on a goal place, metres.
+    /// Distance from which an object is put on a goal place, meters.
     pub put_within_m: f32,
-    /// Whether an object is left alone after any failed attempt, not only one beyond one's limits.
+    /// True if an object is ignored after any failed attempt, not only after one beyond the agent's
+    /// limits.
     pub any_failure_counts: bool,
-    /// How long a goal place is forgotten after a failed put-on, frames.
+    /// Time for which a goal place is ignored after a failed put-on, frames.
     pub goal_blackout_frames: Frame,
-    /// How long something that somebody else was seen, told or found to hold is left alone,
-    /// frames.
+    /// Time for which an object is avoided after another agent was observed to hold it, frames.
     pub held_frames: Frame,
-    /// Whether an object is forgotten whose place is seen empty.
+    /// True if an object is forgotten when its position is seen empty.
     pub forgets_missing: bool,
-    /// Whether one sees that something is in another's hands.
+    /// True if agents see that an object is in another agent's hands.
     pub sees_holding: bool,
-    /// Whether partner and rule-based helpers are told what the other holds while it is in view.
+    /// True if partner and rule-based helpers know what the other holds while it is in view.
     pub knows_holding: bool,
-    /// Whether rule-based helpers perceive people at all: the original's detector has no class for
-    /// them, and its result replaces what the environment would tell (facts A5).
+    /// True if rule-based helpers perceive people at all. The original's detector has no class for
+    /// people, and its result replaces the environment's data (facts A5).
     pub helpers_see_people: bool,
-    /// How far helpers without perfect segmentation know the place they look at, metres: it moves
+    /// Range in which helpers without perfect segmentation mark cells as known, meters. It affects
     /// what is left to explore.
     pub helper_known_range_m: f32,
-    /// Whether helpers lift together with the partner on purpose.
+    /// True if helpers plan to lift together with the partner.
     pub lifts_together: bool,
-    /// What a random helper draws from.
+    /// Distribution of the random helper's plans.
     pub random_draw: RandomDraw,
-    /// Turns of looking all around.
+    /// Number of turns to look around.
     pub around_turns: u32,
-    /// Whether looking around ends as soon as partner and child have both been seen.
+    /// True if looking around ends as soon as partner and child have both been seen.
     pub stops_turning_when_found: bool,
-    /// Whether helpers with the child's rules heed them at all; without them one sees what they are
-    /// worth (ours).
+    /// True if helpers with rules for the child apply them; the ablation shows their benefit
+    /// (ours).
     pub minds_child: bool,
-    /// Child or guardian unseen for so long is looked for, frames.
+    /// Time after which an unseen child or guardian is searched for, frames.
     pub child_unseen_frames: Frame,
-    /// Whether a helper stays with the child only until it turns back, rather than for the time of
-    /// following after it was last seen away.
+    /// True if a helper stays with the child only until it turns back, rather than for a fixed time
+    /// after it was last seen away.
     pub trusts_child: bool,
-    /// When the child runs away.
+    /// Source of the draws by which the child runs away.
     pub child_draws: ChildDraws,
-    /// How time is weighed, and when a plan is looked at again.
+    /// Time budgeting and replanning.
     #[serde(default)]
     pub time: TimeRules,
-    /// How long a plan lasts at most.
+    /// Time limits of plans.
     #[serde(default)]
     pub limits: PlanLimits,
-    /// What is made of failed attempts.
+    /// Consequences of failed attempts.
     #[serde(default)]
     pub failures: FailureRules,
-    /// When one lifts furniture together with the partner.
+    /// Lifting furniture together with the partner.
     #[serde(default)]
     pub lifting: LiftingRules,
-    /// How near one stays to people, and what is made of the child.
+    /// Distances to people, and tracking of the child.
     #[serde(default)]
     pub people: PeopleRules,
-    /// What the child itself does.
+    /// Behavior of the child itself.
     #[serde(default)]
     pub child: ChildRules,
 }
 
 impl PlannerRules {
-    /// The paper's planners.
+    /// Returns the rules of the paper's planners.
     pub const fn paper() -> PlannerRules {
         PlannerRules {
             walking: Walking::Careful,
@@ -197,7 +197,7 @@ impl PlannerRules {
         }
     }
 
-    /// What the original's released planners do.
+    /// Returns the rules of the original's released planners.
     pub const fn compat() -> PlannerRules {
         PlannerRules {
             walking: Walking::Lattice,
@@ -236,13 +236,13 @@ impl PlannerRules {
         }
     }
 
-    /// Whether a mind with this briefing perceives people. Whoever knows the goal has perfect
-    /// segmentation in the original too; the child knows everybody's place.
+    /// Returns whether an agent with this briefing perceives people. In the original, too, agents
+    /// that know the goal have perfect segmentation; the child knows the positions of all agents.
     pub(crate) fn sees_people(&self, briefing: &Briefing) -> bool {
         self.helpers_see_people || has_perfect_eyes(briefing)
     }
 
-    /// How far this mind knows the place it looks at, metres.
+    /// Range in which this agent marks cells as known, meters.
     pub(crate) fn known_range_m(&self, briefing: &Briefing) -> f32 {
         let perfect = PlannerRules::paper().helper_known_range_m;
         if has_perfect_eyes(briefing) { perfect } else { self.helper_known_range_m }

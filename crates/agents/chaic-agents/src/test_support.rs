@@ -1,26 +1,27 @@
-//! A toy world for tests: boxes in a room, a tiny ray caster, and one body that walks, picks up
-//! and puts down without ever failing by chance.
+//! Toy world for tests: boxes in a room, a small ray caster, and one body whose actions never fail
+//! at random.
 
-use chaic_core::briefing::{Companion, Goal, Motion, Relation};
+use chaic_core::briefing::{Companion, CompanionRole, Goal, Motion};
 use chaic_core::capability::Persona;
-use chaic_core::geom::{Camera, Pose, Rect, forward, wrap_angle, xz, yaw_rotation};
-use chaic_core::observation::{Granted, Grants, Held, Identity, Images, SelfState};
+use chaic_core::geom::{Camera, Pose, Rect, forward, to_xz, wrap_angle, yaw_rotation};
+use chaic_core::observation::{Granted, Grants, Held, HeldIdentity, Images, Proprioception};
 use chaic_core::{
     Action, Agent, AgentId, Briefing, ClassId, EntityId, FailureReason, Frame, Hand, Observation,
     Outcome, Role, Target, Vec2, Vec3,
 };
 
-use crate::execution::navigate::step_m;
+use crate::execution::steering::step_length_m;
 use crate::mapping::grid::Grid;
-use crate::mapping::occupancy::{OccupancyMap, Space};
-use crate::mapping::{People, SemanticMap};
+use crate::mapping::occupancy::{CellOccupancy, OccupancyMap};
+use crate::mapping::{PersonMap, SemanticMap};
 use crate::memory::Memory;
 use crate::perception::{GroundTruthIds, Perception as _};
-use crate::planning::cost_model::Seen;
-use crate::planning::costs::CostMap;
+use crate::planning::careful_costs::CarefulCosts;
+use crate::planning::cost_map::CostMap;
+use crate::planning::cost_model::{CostInputs, CostModel as _};
 use crate::track::{Carried, Hands, TrackId};
 
-/// How the body moves and reaches: as by the world's rules of the paper.
+/// Motion parameters: those of the paper's world rules.
 pub const MOTION: Motion = Motion {
     turn_rad: std::f32::consts::PI / 12.0,
     stride_m: 0.4,
@@ -29,7 +30,7 @@ pub const MOTION: Motion = Motion {
     reach_limit_m: 2.0,
 };
 
-/// A thing of the toy world: an upright box of a class.
+/// Object of the toy world: an upright box with a class.
 pub struct ToyObject {
     class: ClassId,
     low: Vec3,
@@ -37,7 +38,7 @@ pub struct ToyObject {
 }
 
 impl ToyObject {
-    /// `at` is the middle of its bottom; `size` its extents.
+    /// Creates a box; `at` is the center of its bottom, `size` its extents.
     pub fn new(class: &str, at: [f32; 3], size: [f32; 3]) -> ToyObject {
         let (at, half) = (Vec3::from(at), 0.5 * Vec3::new(size[0], 0.0, size[2]));
         ToyObject {
@@ -55,7 +56,7 @@ struct ToyBox {
 }
 
 impl ToyBox {
-    /// Depth at which the ray enters it.
+    /// Returns the depth at which the ray enters the box.
     fn hit(&self, eye: Vec3, direction: Vec3) -> Option<f32> {
         let inverse = direction.recip();
         let (a, b) = ((self.low - eye) * inverse, (self.high - eye) * inverse);
@@ -65,18 +66,18 @@ impl ToyBox {
     }
 
     fn distance_from(&self, p: Vec2) -> f32 {
-        p.distance(p.clamp(xz(self.low), xz(self.high)))
+        p.distance(p.clamp(to_xz(self.low), to_xz(self.high)))
     }
 }
 
-/// A room with things in it and one body.
+/// Room with objects and one body.
 pub struct Toy {
     room: Rect,
     solids: Vec<ToyBox>,
     classes: Vec<Option<ClassId>>,
     pose: Pose,
     pub frame: Frame,
-    hands: [Option<Identity>; 2],
+    hands: [Option<HeldIdentity>; 2],
     pub grants_ids: bool,
     pub delivered: Vec<TrackId>,
     last: Option<(Action, Outcome)>,
@@ -86,7 +87,7 @@ pub struct Toy {
 }
 
 impl Toy {
-    /// An empty room around the origin, `width` along x, `depth` along z.
+    /// Creates an empty room around the origin, `width` along x, `depth` along z.
     pub fn room(width: f32, depth: f32) -> Toy {
         let (w, d) = (0.5 * width, 0.5 * depth);
         let room = Rect::new([-w, -d], [w, d]);
@@ -104,8 +105,8 @@ impl Toy {
             radius_m: 0.2,
             n_blocked: 0,
         };
-        toy.classes[8] = ClassId::by_name("person");
-        toy.classes[9] = ClassId::by_name("person");
+        toy.classes[8] = ClassId::from_name("person");
+        toy.classes[9] = ClassId::from_name("person");
         toy.add_wall([-w - 0.1, -d - 0.1], [w + 0.1, -d]);
         toy.add_wall([-w - 0.1, d], [w + 0.1, d + 0.1]);
         toy.add_wall([-w - 0.1, -d], [-w, d]);
@@ -129,7 +130,7 @@ impl Toy {
         });
     }
 
-    /// Adds a thing; minds with perfect perception know it by the track that is returned.
+    /// Adds an object; returns its track for agents with perfect perception.
     pub fn add(&mut self, object: ToyObject) -> TrackId {
         let entity = EntityId(self.classes.len() as u16);
         self.classes.push(Some(object.class));
@@ -137,18 +138,18 @@ impl Toy {
         entity.into()
     }
 
-    /// Somebody who stands there.
+    /// Adds a standing person.
     pub fn add_person(&mut self, agent: AgentId, at: [f32; 2]) -> TrackId {
-        let entity = EntityId::of_agent(agent);
+        let entity = EntityId::from_agent(agent);
         let (low, high) = (Vec3::new(-0.2, 0.0, -0.2), Vec3::new(0.2, 1.7, 0.2));
         let at = Vec3::new(at[0], 0.0, at[1]);
         self.solids.push(ToyBox { entity, low: at + low, high: at + high });
         entity.into()
     }
 
-    /// Whether everything is at least so far from a point.
-    pub fn is_clear(&self, p: Vec2, least_m: f32) -> bool {
-        self.solids.iter().all(|s| s.distance_from(p) >= least_m)
+    /// Returns whether all objects are at least this far from a point.
+    pub fn is_clear(&self, p: Vec2, min_m: f32) -> bool {
+        self.solids.iter().all(|s| s.distance_from(p) >= min_m)
     }
 
     pub fn remove(&mut self, track: TrackId) {
@@ -161,17 +162,17 @@ impl Toy {
     }
 
     pub fn here(&self) -> Vec2 {
-        xz(self.pose.position)
+        to_xz(self.pose.position)
     }
 
     pub fn class(&self, track: TrackId) -> ClassId {
         self.classes[track.0 as usize].expect("an object has a class")
     }
 
-    /// Puts something into a hand, without taking it out of the picture.
+    /// Puts an object into a hand without removing its box.
     pub fn hold(&mut self, hand: usize, track: TrackId) {
         let (entity, class) = (EntityId(track.0 as u16), self.class(track));
-        self.hands[hand] = Some(Identity { entity, class, contents: Vec::new() });
+        self.hands[hand] = Some(HeldIdentity { entity, class, contents: Vec::new() });
     }
 
     pub fn briefing(&self) -> Briefing {
@@ -180,7 +181,7 @@ impl Toy {
             me: AgentId::HELPER,
             capability: Persona::Helper.capability(),
             motion: MOTION,
-            companions: vec![Companion { agent: AgentId::PARTNER, relation: Relation::Partner }],
+            companions: vec![Companion { agent: AgentId::PARTNER, role: CompanionRole::Partner }],
             seed: 1,
             horizon: 3000,
             bounds: self.room,
@@ -192,7 +193,7 @@ impl Toy {
             container_capacity: 3,
             grants: Grants::IDS,
             goal: None,
-            told: None,
+            disclosure: None,
         }
     }
 
@@ -219,12 +220,12 @@ impl Toy {
             }
         }
         let is_joint = matches!(&self.hands, [Some(l), Some(r)] if l.entity == r.entity);
-        let felt = |it: &Identity| Held {
-            n_contents: it.contents.len() as u32,
+        let sensed = |held: &HeldIdentity| Held {
+            n_contents: held.contents.len() as u32,
             in_both_hands: is_joint,
-            identity: self.grants_ids.then(|| it.clone()),
+            identity: self.grants_ids.then(|| held.clone()),
         };
-        let hands = [0, 1].map(|k| self.hands[k].as_ref().map(felt));
+        let hands = [0, 1].map(|k| self.hands[k].as_ref().map(sensed));
         let in_view = |e: &EntityId| ids.contains(&e.0);
         let all = (0..self.classes.len()).map(|i| EntityId(i as u16));
         let class = |e: EntityId| Some((e, self.classes[usize::from(e.0)]?));
@@ -235,17 +236,22 @@ impl Toy {
         };
         Observation {
             frame: self.frame,
-            own: SelfState { pose: self.pose, hands, last: self.last, other_end: None },
+            proprioception: Proprioception {
+                pose: self.pose,
+                hands,
+                last: self.last,
+                other_end: None,
+            },
             camera,
             images: Images { rgb: None, depth_m: Some(depth), ids: Some(ids) },
-            film: Vec::new(),
+            frame_history: Vec::new(),
             granted,
         }
     }
 
-    /// What an action names: an entity, or what a pixel of the present view shows.
+    /// Returns the entity that a target names: directly, or by a pixel of the current image.
     fn resolve(&self, target: Target) -> EntityId {
-        let ids = || self.observe().images.ids.expect("a toy always shows ids");
+        let ids = || self.observe().images.ids.expect("the toy world always renders ids");
         match target {
             Target::Entity(entity) => entity,
             Target::Pixel { column, row } => EntityId(ids()[(row * self.size + column) as usize]),
@@ -275,11 +281,11 @@ impl Toy {
         })
     }
 
-    /// Walks `way`, sliding along what is in the way; how far it got.
-    fn walk(&mut self, way: Vec2) -> f32 {
+    /// Moves the body, sliding along obstacles; returns the distance.
+    fn walk(&mut self, offset: Vec2) -> f32 {
         let start = self.here();
         for _ in 0..10 {
-            let (here, step) = (self.here(), 0.1 * way);
+            let (here, step) = (self.here(), 0.1 * offset);
             let slides = [step, Vec2::new(step.x, 0.0), Vec2::new(0.0, step.y)];
             if let Some(s) = slides.iter().find(|s| self.is_free(here + **s)) {
                 self.pose.position += Vec3::new(s.x, 0.0, s.y);
@@ -288,12 +294,12 @@ impl Toy {
         self.here().distance(start)
     }
 
-    /// Steps up to a thing; whether the arm reaches it.
+    /// Steps up to an object until the arm reaches it.
     fn step_up(&mut self, entity: EntityId) -> Result<(), FailureReason> {
         let solid = |t: &Toy| t.solids.iter().position(|s| s.entity == entity);
         let i = solid(self).ok_or(FailureReason::OutOfReach)?;
-        let target = 0.5 * (xz(self.solids[i].low) + xz(self.solids[i].high));
-        let half = 0.5 * xz(self.solids[i].high - self.solids[i].low).max_element();
+        let target = 0.5 * (to_xz(self.solids[i].low) + to_xz(self.solids[i].high));
+        let half = 0.5 * to_xz(self.solids[i].high - self.solids[i].low).max_element();
         if self.here().distance(target) > 3.0 + half {
             return Err(FailureReason::OutOfReach);
         }
@@ -316,9 +322,10 @@ impl Toy {
             Action::TurnRight => (2, self.turn(-1.0)),
             Action::Wait { frames } => (frames.max(1), Ok(())),
             Action::MoveForward => {
-                let got = self.walk(step_m(&MOTION) * xz(forward(self.pose.yaw_rad)));
-                self.n_blocked += u32::from(got < 0.1);
-                (10, if got < 0.1 { Err(FailureReason::Blocked) } else { Ok(()) })
+                let distance_m =
+                    self.walk(step_length_m(&MOTION) * to_xz(forward(self.pose.yaw_rad)));
+                self.n_blocked += u32::from(distance_m < 0.1);
+                (10, if distance_m < 0.1 { Err(FailureReason::Blocked) } else { Ok(()) })
             }
             Action::PickUp { object, hand } => (40, self.pick_up(self.resolve(object), hand)),
             Action::RemoveObstacle { obstacle, .. } => {
@@ -366,14 +373,14 @@ impl Toy {
     }
 
     fn put_in(&mut self) -> Result<(), FailureReason> {
-        let container = |h: &Option<Identity>| {
+        let container = |h: &Option<HeldIdentity>| {
             h.as_ref()
                 .is_some_and(|h| h.class.info().role == Role::Container && h.contents.len() < 3)
         };
         let i = self.hands.iter().position(container);
         let i = i.ok_or(FailureReason::NotContainerAndTarget)?;
         let held = self.hands[1 - i].take().ok_or(FailureReason::NotContainerAndTarget)?;
-        let container = self.hands[i].as_mut().expect("just found");
+        let container = self.hands[i].as_mut().expect("found above");
         container.contents.push((held.entity, held.class));
         Ok(())
     }
@@ -387,7 +394,7 @@ impl Toy {
             self.delivered.extend(bike.contents.drain(..).map(|(e, _)| TrackId::from(e)));
             return Ok(());
         }
-        let held = self.hands[hand.index()].take().expect("just looked");
+        let held = self.hands[hand.index()].take().expect("checked above");
         if held.class.info().role == Role::HeavyTarget {
             self.hands = [None, None];
         }
@@ -396,19 +403,19 @@ impl Toy {
         Ok(())
     }
 
-    /// Lets a mind live in this world until `horizon`; its plans, each once per change.
-    pub fn live(&mut self, mind: &mut dyn Agent, briefing: &Briefing) -> Vec<String> {
-        mind.reset(briefing);
+    /// Runs an agent in this world until the horizon; returns its plans without repetitions.
+    pub fn run(&mut self, agent: &mut dyn Agent, briefing: &Briefing) -> Vec<String> {
+        agent.reset(briefing);
         let mut plans = Vec::new();
         while self.frame < briefing.horizon {
-            let action = mind.act(&self.observe()).expect("rules decide");
-            let plan = mind.thought().plan;
+            let action = agent.act(&self.observe()).expect("rule-based agents do not fail");
+            let plan = agent.thought().plan;
             if plans.last() != Some(&plan) {
                 plans.push(plan);
             }
             self.apply(action);
             if let Some(goal) = &briefing.goal
-                && self.delivered.iter().filter(|e| goal.wanted(self.class(**e)) > 0).count()
+                && self.delivered.iter().filter(|e| goal.count(self.class(**e)) > 0).count()
                     >= goal.total() as usize
             {
                 break;
@@ -418,7 +425,7 @@ impl Toy {
     }
 }
 
-/// A toy world and a memory of it, for tests of single parts.
+/// Toy world with a memory of it, for tests of single parts.
 pub struct ToyRun {
     pub toy: Toy,
     briefing: Briefing,
@@ -431,79 +438,86 @@ impl ToyRun {
         ToyRun { toy, memory: Some(Memory::new(&briefing, crate::PlannerRules::paper())), briefing }
     }
 
-    /// The memory after another look.
-    pub fn look(&mut self) -> Memory {
+    /// Returns the memory, updated with another observation.
+    pub fn observe(&mut self) -> Memory {
         let observation = self.toy.observe();
         let percepts = GroundTruthIds.perceive(&observation);
-        let mut memory = self.memory.take().expect("given back after each look");
+        let mut memory = self.memory.take().expect("returned after each observation");
         memory.update(&self.briefing, &observation, &percepts);
         memory
     }
 
-    pub fn keep(&mut self, memory: Memory) {
+    pub fn put_back(&mut self, memory: Memory) {
         self.memory = Some(memory);
     }
 
     pub fn act(&mut self, action: crate::Intent, memory: Memory) {
-        self.keep(memory);
+        self.put_back(memory);
         let target = |track| GroundTruthIds.target(track);
-        self.toy.apply(crate::track::named(action, target).expect("everything has a name"));
+        self.toy
+            .apply(crate::track::resolve_target(action, target).expect("every track has a target"));
     }
 }
 
-/// Something in a hand, with contents numbered from 90.
-pub fn identity(class: &str, entity: u16, contents: &[&str]) -> Identity {
+/// Creates a held object, with contents numbered from 90.
+pub fn identity(class: &str, entity: u16, contents: &[&str]) -> HeldIdentity {
     let contents = contents.iter().zip(90..);
-    Identity {
+    HeldIdentity {
         entity: EntityId(entity),
         class: ClassId::named(class),
         contents: contents.map(|(c, e)| (EntityId(e), ClassId::named(c))).collect(),
     }
 }
 
-/// The same as a mind knows it.
+/// The same object as known by the agent.
 pub fn carried(class: &str, track: u16, contents: &[&str]) -> Carried {
-    let it = identity(class, track, contents);
+    let held = identity(class, track, contents);
     Carried {
-        what: Some((it.entity.into(), it.class)),
-        n_contents: it.contents.len() as u32,
-        contents: it.contents.into_iter().map(|(e, class)| (e.into(), class)).collect(),
+        object: Some((held.entity.into(), held.class)),
+        n_contents: held.contents.len() as u32,
+        contents: held.contents.into_iter().map(|(e, class)| (e.into(), class)).collect(),
     }
 }
 
-/// Hands that hold these.
+/// Creates hands that hold these objects.
 pub fn hands(hands: [Option<Carried>; 2]) -> Hands {
     Hands { hands, is_joint: false }
 }
 
-/// A drawn plan: `.` free, `#` wall, `?` unknown.
-pub struct Plan2d {
+/// Map drawn in text: `.` free, `#` wall, `?` unknown.
+pub struct DrawnMap {
     grid: Grid,
-    spaces: Vec<Space>,
+    cells: Vec<CellOccupancy>,
 }
 
-impl Plan2d {
-    pub fn parse(text: &str) -> Plan2d {
+impl DrawnMap {
+    pub fn parse(text: &str) -> DrawnMap {
         let rows: Vec<&str> = text.lines().map(str::trim).collect();
-        let spaces: Vec<Space> = rows
+        let cells: Vec<CellOccupancy> = rows
             .iter()
             .flat_map(|row| row.chars())
             .map(|c| match c {
-                '.' => Space::Free,
-                '#' => Space::Wall,
-                _ => Space::Unknown,
+                '.' => CellOccupancy::Free,
+                '#' => CellOccupancy::Wall,
+                _ => CellOccupancy::Unknown,
             })
             .collect();
-        Plan2d { grid: Grid::of_cells(rows[0].len(), rows.len()), spaces }
+        DrawnMap { grid: Grid::with_size(rows[0].len(), rows.len()), cells }
     }
 
     pub fn costs(&self, radius_m: f32) -> CostMap {
-        let map = OccupancyMap::of_spaces(self.grid, &self.spaces);
+        let map = OccupancyMap::from_cells(self.grid, &self.cells);
         let mut costs = CostMap::new(self.grid, radius_m);
-        let (things, people) = (SemanticMap::default(), People::default());
-        let (here, now) = (Vec2::splat(1e6), 0);
-        let seen = Seen { map: &map, things: &things, people: &people, berth: None, here, now };
-        costs.rebuild(&seen);
+        let (objects, people) = (SemanticMap::default(), PersonMap::default());
+        let inputs = CostInputs {
+            map: &map,
+            objects: &objects,
+            people: &people,
+            inflation: None,
+            position: Vec2::splat(1e6),
+            now: 0,
+        };
+        CarefulCosts.recompute(&mut costs, &inputs);
         costs
     }
 }

@@ -1,15 +1,15 @@
-//! How a mind names things: by tracks of its own, never by what the world calls them.
+//! Tracks: an agent's own names for objects, independent of the world's entity ids.
 
 use std::fmt;
 
 use chaic_core::{Action, ClassId, EntityId, Target};
 
-/// Names one thing within a mind: the same number means the same thing, as far as perception can
-/// tell, for one episode.
+/// Identifies an object within one agent's episode. As far as perception can tell, the same id
+/// always means the same object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct TrackId(pub u32);
 
-/// With ground truth, tracks and entities are the same, one to one.
+/// With ground truth, tracks and entities correspond one to one.
 impl From<EntityId> for TrackId {
     fn from(entity: EntityId) -> TrackId {
         TrackId(u32::from(entity.0))
@@ -17,12 +17,11 @@ impl From<EntityId> for TrackId {
 }
 
 impl TrackId {
-    /// The first of the names that perception gives by itself, beyond those of entities, which a grant
-    /// may tell.
+    /// First id that a perception assigns itself. Smaller ids are entity ids, which may be granted.
     pub const FIRST_OWN: TrackId = TrackId(1 << 20);
 }
 
-/// `#31` is an entity, `t31` a track that perception keeps by itself.
+/// Formats an entity as `#31`, and a track assigned by perception as `t31`.
 impl fmt::Display for TrackId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0.checked_sub(TrackId::FIRST_OWN.0) {
@@ -32,11 +31,14 @@ impl fmt::Display for TrackId {
     }
 }
 
-/// An action as a mind means it, about a track.
+/// Action whose target is a track.
 pub type Intent = Action<TrackId>;
 
-/// The action by which an intent is carried out; `None` if what it is about can't be named now.
-pub fn named(intent: Intent, target: impl Fn(TrackId) -> Option<Target>) -> Option<Action> {
+/// Converts an intent to an action; `None` if its target cannot be named now.
+pub fn resolve_target(
+    intent: Intent,
+    target: impl Fn(TrackId) -> Option<Target>,
+) -> Option<Action> {
     let subject = intent.subject().map(target);
     if subject == Some(None) {
         return None;
@@ -45,53 +47,53 @@ pub fn named(intent: Intent, target: impl Fn(TrackId) -> Option<Target>) -> Opti
     Some(intent.map(|_| subject.flatten().unwrap_or(nothing)))
 }
 
-/// What a hand holds, as far as its owner knows.
+/// Object in a hand, as far as its owner knows.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Carried {
-    /// Which thing; `None` if the owner did not see what it took.
-    pub what: Option<(TrackId, ClassId)>,
-    /// What is in it, in the order it was put in, as far as is known.
+    /// The object; `None` if its owner did not see what it picked up.
+    pub object: Option<(TrackId, ClassId)>,
+    /// Known contents, in the order in which they were put in.
     pub contents: Vec<(TrackId, ClassId)>,
-    /// How many things are in it, as the hand feels.
+    /// Number of objects inside, as sensed by the hand.
     pub n_contents: u32,
 }
 
 impl Carried {
-    /// Its class, if it is known.
+    /// Class of the object, if known.
     pub fn class(&self) -> Option<ClassId> {
-        self.what.map(|(_, class)| class)
+        self.object.map(|(_, class)| class)
     }
 
-    /// It and all that is in it, as far as known.
+    /// Returns the object and all its known contents.
     pub fn all(&self) -> impl Iterator<Item = (TrackId, ClassId)> {
-        self.what.into_iter().chain(self.contents.iter().copied())
+        self.object.into_iter().chain(self.contents.iter().copied())
     }
 }
 
-/// What the two hands hold, left and right; furniture is in both.
+/// Objects held by the two hands, left and right. Furniture is in both.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Hands {
-    /// By hand.
+    /// Objects by hand.
     pub hands: [Option<Carried>; 2],
-    /// Whether both hold one thing.
+    /// True if both hands hold the same object.
     pub is_joint: bool,
 }
 
 impl Hands {
-    /// The distinct things held.
+    /// Returns the distinct objects held.
     pub fn held(&self) -> impl Iterator<Item = &Carried> {
         let [left, right] = &self.hands;
         let is_joint = self.is_joint;
         left.iter().chain(right.iter().filter(move |_| !is_joint))
     }
 
-    /// Everything held, contents included, as far as known.
+    /// Returns all objects held, including known contents.
     pub fn all(&self) -> impl Iterator<Item = (TrackId, ClassId)> {
         self.held().flat_map(Carried::all)
     }
 
-    /// Whether a hand holds this thing itself.
+    /// Returns whether a hand holds this object itself.
     pub fn holds(&self, track: TrackId) -> bool {
-        self.held().any(|c| c.what.is_some_and(|(t, _)| t == track))
+        self.held().any(|c| c.object.is_some_and(|(t, _)| t == track))
     }
 }

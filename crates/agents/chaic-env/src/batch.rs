@@ -1,49 +1,48 @@
-//! Many episodes side by side.
+//! Parallel environments.
 
-use chaic_core::observation::{Observation, Senses};
+use chaic_core::observation::{Observation, SensorConfig};
 use chaic_core::{Action, AgentError, AgentId, Frame};
 use chaic_render::ImagesMut;
 use rayon::prelude::*;
 
 use crate::config::EpisodeConfig;
-use crate::env::{Env, EnvSnapshot, Flow};
+use crate::env::{AdvanceOutcome, Env, EnvSnapshot};
 use crate::error::{EnvError, Result};
 
-/// One seat of the caller's in a batch.
+/// Address of an external agent in a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Slot {
-    /// Which environment of the batch.
+pub struct SlotId {
+    /// Index of the environment.
     pub env: usize,
-    /// Who sits there.
+    /// Agent in it.
     pub agent: AgentId,
 }
 
-/// How the images of a batch lie in the caller's buffers: row-major, one image after the other in the
-/// order of [`EnvBatch::slots`].
+/// Layout of a batch's images in the caller's buffers: row-major, in the order of [`EnvBatch::slots`].
 ///
-/// Shapes: color [slots, size, size, 3] of u8, depth [slots, size, size] of f32 metres, ids
-/// [slots, size, size] of u16; each present or absent as the senses and grants of the seats have it.
+/// Shapes: color u8 [slots, size, size, 3], depth f32 meters [slots, size, size], ids u16
+/// [slots, size, size]. Each is present if the sensors and grants of the slots have it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageLayout {
-    /// How many slots there are.
+    /// Number of slots.
     pub slots: usize,
     /// Side of each image, pixels.
     pub size: u32,
-    /// Whether there is color.
+    /// True if color is present.
     pub rgb: bool,
-    /// Whether there is depth.
+    /// True if depth is present.
     pub depth: bool,
-    /// Whether there are instance ids.
+    /// True if instance ids are present.
     pub ids: bool,
 }
 
 impl ImageLayout {
-    /// Pixels of one image.
+    /// Returns the number of pixels of one image.
     pub fn pixels(&self) -> usize {
         self.size as usize * self.size as usize
     }
 
-    /// How many numbers the buffers for color, depth and ids have; 0 for those that are absent.
+    /// Returns the lengths of the buffers for color, depth and ids; 0 for absent ones.
     ///
     /// ```
     /// use chaic_env::ImageLayout;
@@ -52,8 +51,8 @@ impl ImageLayout {
     /// ```
     pub fn lengths(&self) -> [usize; 3] {
         let n = self.slots * self.pixels();
-        let of = |wanted: bool, per_pixel| if wanted { per_pixel * n } else { 0 };
-        [of(self.rgb, 3), of(self.depth, 1), of(self.ids, 1)]
+        let len = |is_present: bool, per_pixel| if is_present { per_pixel * n } else { 0 };
+        [len(self.rgb, 3), len(self.depth, 1), len(self.ids, 1)]
     }
 
     fn check(&self, images: &ImagesMut<'_>) -> Result<()> {
@@ -70,48 +69,48 @@ impl ImageLayout {
     }
 }
 
-/// Environments that are stepped together on all cores, with the images of all who wait written into
-/// buffers of the caller's. What happens in one depends neither on the others nor on how many there
-/// are.
+/// Environments that run in parallel on all cores and write the images of all waiting agents into the
+/// caller's buffers.
 ///
-/// All seats of the caller's see alike: same size, same kinds of images.
+/// Each environment is independent of the others and of their number. All external agents have the same
+/// image size and kinds of images.
 pub struct EnvBatch {
     envs: Vec<Env>,
-    slots: Vec<Slot>,
+    slots: Vec<SlotId>,
     layout: ImageLayout,
 }
 
 impl EnvBatch {
-    /// Joins environments.
+    /// Creates a batch.
     ///
     /// # Errors
-    /// [`EnvError::Batch`] if the caller has no seat in them, or its seats see differently.
+    /// [`EnvError::Batch`] if there is no external agent, or if external agents have different sensors.
     pub fn new(envs: Vec<Env>) -> Result<EnvBatch> {
-        let slots: Vec<Slot> = envs
+        let slots: Vec<SlotId> = envs
             .iter()
             .enumerate()
-            .flat_map(|(env, e)| e.callers().map(move |agent| Slot { env, agent }))
+            .flat_map(|(env, e)| e.external_agents().map(move |agent| SlotId { env, agent }))
             .collect();
         let layout = layout(&envs, &slots)?;
         Ok(EnvBatch { envs, slots, layout })
     }
 
-    /// The caller's seats, in the order of environments and agents.
-    pub fn slots(&self) -> &[Slot] {
+    /// Returns the external agents, in the order of environments and agents.
+    pub fn slots(&self) -> &[SlotId] {
         &self.slots
     }
 
-    /// How images lie in the caller's buffers.
+    /// Returns the layout of images in the caller's buffers.
     pub fn layout(&self) -> ImageLayout {
         self.layout
     }
 
-    /// The environments.
+    /// Returns the environments.
     pub fn envs(&self) -> &[Env] {
         &self.envs
     }
 
-    /// Begins another episode in one of the environments, see [`Env::reset`].
+    /// Starts another episode in one environment, see [`Env::reset`].
     ///
     /// # Errors
     /// As [`EnvBatch::reset_many`].
@@ -119,58 +118,60 @@ impl EnvBatch {
         self.reset_many(vec![(env, config)])
     }
 
-    /// Begins other episodes in some of the environments, on all cores; where one is named twice, the
-    /// later of the two.
+    /// Starts other episodes in some environments, on all cores. Of two episodes for one environment the
+    /// later counts.
     ///
     /// # Errors
-    /// Those of [`Env::reset`], and [`EnvError::Batch`] if the batch has no such environment: none is
-    /// reset then.
+    /// Those of [`Env::reset`], and [`EnvError::Batch`] if the batch has no such environment; no
+    /// environment is reset then.
     pub fn reset_many(&mut self, work: Vec<(usize, EpisodeConfig<'_>)>) -> Result<()> {
         let n = self.envs.len();
         let mut configs: Vec<Option<EpisodeConfig<'_>>> = (0..n).map(|_| None).collect();
         for (env, config) in work {
-            let Some(of_env) = configs.get_mut(env) else {
+            let Some(slot) = configs.get_mut(env) else {
                 return Err(EnvError::Batch(format!("there is no environment {env} of {n}")));
             };
-            *of_env = Some(config);
+            *slot = Some(config);
         }
         let work = self.envs.par_iter_mut().zip(configs);
         work.filter_map(|(env, config)| Some((env, config?)))
             .try_for_each(|(env, config)| env.reset(config))
     }
 
-    /// Goes back (or on) to a snapshot of one of the environments, see [`Env::restore`].
+    /// Restores a snapshot in one environment, see [`Env::restore`].
     ///
     /// # Errors
     /// Those of [`Env::restore`], and [`EnvError::Batch`] if the batch has no such environment.
     pub fn restore(&mut self, env: usize, snapshot: &EnvSnapshot) -> Result<()> {
         let n = self.envs.len();
-        let none = || EnvError::Batch(format!("there is no environment {env} of {n}"));
-        self.envs.get_mut(env).ok_or_else(none)?.restore(snapshot)
+        let missing = || EnvError::Batch(format!("there is no environment {env} of {n}"));
+        self.envs.get_mut(env).ok_or_else(missing)?.restore(snapshot)
     }
 
-    /// Plays all environments on, each as [`Env::advance`] does; what came of each, in their order.
-    pub fn advance(&mut self, until: Option<Frame>) -> Vec<std::result::Result<Flow, AgentError>> {
+    /// Runs all environments as [`Env::advance`] does, and returns their outcomes in order.
+    pub fn advance(
+        &mut self,
+        until: Option<Frame>,
+    ) -> Vec<std::result::Result<AdvanceOutcome, AgentError>> {
         self.envs.par_iter_mut().map(|env| env.advance(until)).collect()
     }
 
-    /// Lets all who wait look: their images are made on all cores and written into the caller's
-    /// buffers, whose parts for the others stay as they are. The indices of those who looked, into
-    /// [`EnvBatch::slots`].
+    /// Renders the images of all waiting agents on all cores into the caller's buffers. Other parts of
+    /// the buffers do not change. Returns the indices of the waiting agents in [`EnvBatch::slots`].
     ///
     /// # Errors
-    /// [`EnvError::Buffer`] if a buffer doesn't have the length that the [layout](EnvBatch::layout)
-    /// says, or is absent where it says that there is one; nothing is written then.
+    /// [`EnvError::Buffer`] if the length of a buffer differs from the [layout](EnvBatch::layout);
+    /// nothing is written then.
     pub fn observe(&mut self, images: ImagesMut<'_>) -> Result<Vec<usize>> {
         self.layout.check(&images)?;
         let n = self.layout.pixels();
         let ImagesMut { mut rgb, mut depth_m, mut ids } = images;
-        let mut rest = &self.slots[..];
+        let mut remaining = &self.slots[..];
         let mut work = Vec::with_capacity(self.envs.len());
         for env in &mut self.envs {
-            let (own, later) = rest.split_at(env.callers().count());
-            rest = later;
-            let images: Vec<ImagesMut<'_>> = own
+            let (env_slots, others) = remaining.split_at(env.external_agents().count());
+            remaining = others;
+            let images: Vec<ImagesMut<'_>> = env_slots
                 .iter()
                 .map(|_| ImagesMut {
                     rgb: take(&mut rgb, 3 * n),
@@ -178,7 +179,7 @@ impl EnvBatch {
                     ids: take(&mut ids, n),
                 })
                 .collect();
-            work.push((env, own, images));
+            work.push((env, env_slots, images));
         }
         work.into_par_iter().for_each(|(env, slots, images)| {
             for (slot, images) in slots.iter().zip(images) {
@@ -187,48 +188,49 @@ impl EnvBatch {
                 }
             }
         });
-        let is_waiting = |slot: &Slot| self.envs[slot.env].is_waiting(slot.agent);
+        let is_waiting = |slot: &SlotId| self.envs[slot.env].is_waiting(slot.agent);
         Ok((0..self.slots.len()).filter(|k| is_waiting(&self.slots[*k])).collect())
     }
 
-    /// What the agent of a slot perceived when it last [looked](EnvBatch::observe), without the
-    /// images; `None` if it doesn't wait.
+    /// Returns the last [rendered](EnvBatch::observe) observation of a slot, without images; `None` if the
+    /// agent does not wait.
     pub fn observation(&self, slot: usize) -> Option<&Observation> {
-        let Slot { env, agent } = *self.slots.get(slot)?;
+        let SlotId { env, agent } = *self.slots.get(slot)?;
         self.envs[env].observed(agent)
     }
 
-    /// The caller's choice for the agent of a slot, see [`Env::submit`].
+    /// Sets the next action of a slot, see [`Env::submit`].
     pub fn submit(&mut self, slot: usize, action: Action) -> bool {
-        let Some(Slot { env, agent }) = self.slots.get(slot).copied() else { return false };
+        let Some(SlotId { env, agent }) = self.slots.get(slot).copied() else { return false };
         self.envs[env].submit(agent, action)
     }
 }
 
-/// The next `n` numbers of a buffer, if there is one.
+/// Takes the next `n` elements of a buffer, if there is one.
 fn take<'a, T>(buffer: &mut Option<&'a mut [T]>, n: usize) -> Option<&'a mut [T]> {
-    let (now, later) = buffer.take()?.split_at_mut(n);
-    *buffer = Some(later);
-    Some(now)
+    let (taken, remaining) = buffer.take()?.split_at_mut(n);
+    *buffer = Some(remaining);
+    Some(taken)
 }
 
-fn layout(envs: &[Env], slots: &[Slot]) -> Result<ImageLayout> {
-    let seen = |slot: &Slot| {
-        let seat = &envs[slot.env].seats()[slot.agent.index()];
-        let ids = seat.senses.ids && seat.grants.ids;
-        Senses { ids, ..seat.senses }
+fn layout(envs: &[Env], slots: &[SlotId]) -> Result<ImageLayout> {
+    let sensors = |id: &SlotId| {
+        let slot = &envs[id.env].slots()[id.agent.index()];
+        let ids = slot.sensors.ids && slot.grants.ids;
+        SensorConfig { ids, ..slot.sensors }
     };
-    let first = slots.first().map(seen).ok_or_else(|| {
-        EnvError::Batch("no environment of the batch has a seat for the caller".to_owned())
+    let first = slots.first().map(sensors).ok_or_else(|| {
+        EnvError::Batch("no environment of the batch has an external agent".to_owned())
     })?;
-    if let Some(other) = slots.iter().find(|slot| seen(slot) != first) {
+    if let Some(other) = slots.iter().find(|slot| sensors(slot) != first) {
         return Err(EnvError::Batch(format!(
-            "the {} of environment {} sees {:?}, others see {first:?}; in a batch all see alike",
+            "the {} of environment {} has sensors {:?}, others have {first:?}; use the same sensors in \
+             all environments of a batch",
             other.agent,
             other.env,
-            seen(other),
+            sensors(other),
         )));
     }
-    let Senses { image_size: size, rgb, depth, ids, film: _ } = first;
+    let SensorConfig { image_size: size, rgb, depth, ids, frame_history: _ } = first;
     Ok(ImageLayout { slots: slots.len(), size, rgb, depth, ids })
 }

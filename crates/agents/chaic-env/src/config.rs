@@ -1,4 +1,4 @@
-//! How an episode begins: what is played, and the world and header that follow from it.
+//! Configuration of an episode, and the world and trace header that follow from it.
 
 use std::sync::Arc;
 
@@ -7,34 +7,49 @@ use chaic_render::Appearance;
 use chaic_world::{Rules, Setup, World};
 
 use crate::CHAIC_VERSION;
+use crate::agent_slot::{AgentSlot, EpisodeAgents, agent_slots, world_seed};
 use crate::digest::Digest;
 use crate::error::{EnvError, Result};
 use crate::rules::RuleSet;
-use crate::seat::{Minds, Seat, seats, world_seed};
 use crate::trace::{FORMAT, Header, Participant, VERSION};
 
-/// What is played, apart from the minds.
+/// Configuration of an episode without its agents.
 #[derive(Clone, Copy, Debug)]
 pub struct EpisodeConfig<'a> {
-    /// The episode.
+    /// Episode.
     pub episode: &'a Episode,
-    /// Which of the run's seeds.
+    /// Index of the run's seed; 0 is the episode's own.
     pub seed: u32,
-    /// The rules.
+    /// Rules of the world and of the planners.
     pub rules: RuleSet,
-    /// Name of the helper, for the record.
+    /// Name of the helper, for the trace.
     pub helper: &'a str,
-    /// Name of the partner's mind, for the record; `None` for the rule-based one.
+    /// Name of the agent that replaces the rule-based partner, for the trace.
     pub partner: Option<&'a str>,
-    /// Side of all minds' images, pixels; `None` for what each asks for. The caller's seats have their own.
+    /// Side of the images of all agents in the environment, pixels; `None` for what each requests.
+    /// External agents have their own.
     pub image_size: Option<u32>,
-    /// How all that is seen is lit and colored.
+    /// Lighting and colors.
     pub appearance: Appearance,
 }
 
-impl EpisodeConfig<'_> {
-    /// The setup as it is played: with its seed, and without helper and child where the partner is
-    /// alone (facts A8: the original's runs without helper have no child either).
+impl<'a> EpisodeConfig<'a> {
+    /// Creates the default configuration: seed 0, the paper's rules, the rule-based partner, the images
+    /// that each agent requests and the canonical appearance.
+    pub fn new(episode: &'a Episode, helper: &'a str) -> EpisodeConfig<'a> {
+        EpisodeConfig {
+            episode,
+            seed: 0,
+            rules: RuleSet::PAPER,
+            helper,
+            partner: None,
+            image_size: None,
+            appearance: Appearance::Canonical,
+        }
+    }
+
+    /// Returns the setup with the world's seed. Without a helper there is no child either, as in the
+    /// original's runs without helper (facts A8).
     pub(crate) fn setup(&self, has_helper: bool) -> Arc<Setup> {
         let mut setup = self.episode.setup().clone();
         setup.seed = world_seed(setup.seed, self.seed);
@@ -44,21 +59,21 @@ impl EpisodeConfig<'_> {
         Arc::new(setup)
     }
 
-    /// The world at its beginning.
+    /// Creates the world in its initial state.
     pub(crate) fn world(&self, setup: &Arc<Setup>) -> Result<World> {
         new_world(setup, self.rules.world, self.episode.id())
     }
 
-    /// Briefs everybody.
-    pub(crate) fn brief(&self, world: &World, seats: &mut [Seat]) {
-        for (agent, seat) in world.setup().agents().zip(seats) {
-            seat.begin(agent, world, self);
+    /// Briefs all agents.
+    pub(crate) fn brief(&self, world: &World, slots: &mut [AgentSlot]) {
+        for (agent, slot) in world.setup().agents().zip(slots) {
+            slot.reset(agent, world, self.seed, self.image_size);
         }
     }
 
-    /// What stands at the head of the trace.
-    pub(crate) fn header(&self, setup: &Setup, seats: &[Seat]) -> Header {
-        let people = setup.agents().zip(&setup.people).zip(seats);
+    /// Creates the header of the trace.
+    pub(crate) fn header(&self, setup: &Setup, slots: &[AgentSlot]) -> Header {
+        let people = setup.agents().zip(&setup.people).zip(slots);
         Header {
             format: FORMAT.to_owned(),
             version: VERSION,
@@ -72,14 +87,14 @@ impl EpisodeConfig<'_> {
             helper: self.helper.to_owned(),
             partner: self.partner.map(str::to_owned),
             people: people
-                .map(|((agent, person), seat)| Participant {
+                .map(|((agent, person), slot)| Participant {
                     agent,
                     persona: person.persona,
                     impairments: person.impairments,
-                    grants: seat.grants,
-                    senses: seat.senses,
-                    perception: seat.mind().and_then(|mind| mind.perception()),
-                    isolation: seat.mind().and_then(|mind| mind.isolation()),
+                    grants: slot.grants,
+                    sensors: slot.sensors,
+                    perception: slot.agent().and_then(|agent| agent.perception()),
+                    isolation: slot.agent().and_then(|agent| agent.isolation()),
                 })
                 .collect(),
             renderer: "cpu".to_owned(),
@@ -88,28 +103,28 @@ impl EpisodeConfig<'_> {
     }
 }
 
-/// What stands at the head of the trace, without playing.
+/// Returns the trace header of an episode without running it.
 ///
 /// # Errors
-/// If the setup can't become a world.
-pub fn header_of(config: EpisodeConfig<'_>, minds: impl Into<Minds>) -> Result<Header> {
-    let minds = minds.into();
-    let setup = config.setup(minds.helper.is_some());
-    let mut seats = seats(&setup, minds, config.rules.planner);
-    config.brief(&config.world(&setup)?, &mut seats);
-    Ok(config.header(&setup, &seats))
+/// [`EnvError::Setup`] if the setup is invalid.
+pub fn trace_header(config: EpisodeConfig<'_>, agents: impl Into<EpisodeAgents>) -> Result<Header> {
+    let agents = agents.into();
+    let setup = config.setup(agents.helper.is_some());
+    let mut slots = agent_slots(&setup, agents, config.rules.planner);
+    config.brief(&config.world(&setup)?, &mut slots);
+    Ok(config.header(&setup, &slots))
 }
 
 fn new_world(setup: &Arc<Setup>, rules: Rules, id: &str) -> Result<World> {
-    let refused = |problem| EnvError::Setup { id: id.to_owned(), problem };
-    World::new(Arc::clone(setup), rules).map_err(refused)
+    let invalid = |problem| EnvError::Setup { id: id.to_owned(), problem };
+    World::new(Arc::clone(setup), rules).map_err(invalid)
 }
 
-/// The world of a trace at its beginning, from the episode that it was played on.
+/// Creates the initial world of a trace from its episode.
 ///
 /// # Errors
-/// If the episode isn't the one that was played.
-pub fn world_of(header: &Header, episode: &Episode) -> Result<World> {
+/// [`EnvError::OtherEpisode`] if the trace is of another episode.
+pub(crate) fn world_from_header(header: &Header, episode: &Episode) -> Result<World> {
     let digest = Digest::of_setup(episode.setup());
     if digest != header.setup {
         return Err(EnvError::OtherEpisode {

@@ -1,4 +1,4 @@
-//! Digests of states and setups, as they are written.
+//! Digests of states and setups.
 
 use std::fmt;
 
@@ -10,13 +10,13 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 pub struct Digest(pub u64);
 
 impl Digest {
-    /// The digest of how an episode begins.
+    /// Returns the digest of a setup.
     pub fn of_setup(setup: &Setup) -> Digest {
-        let bytes = serde_json::to_vec(setup).expect("a setup has no maps and no failing parts");
+        let bytes = serde_json::to_vec(setup).expect("a setup serializes to JSON");
         Digest::of_bytes(&bytes)
     }
 
-    /// The digest of bytes: XXH3 64.
+    /// Returns the XXH3 64 digest of bytes.
     pub fn of_bytes(bytes: &[u8]) -> Digest {
         Digest(xxhash_rust::xxh3::xxh3_64(bytes))
     }
@@ -44,7 +44,7 @@ impl<'de> Deserialize<'de> for Digest {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Digest, D::Error> {
         let text = <std::borrow::Cow<'de, str>>::deserialize(deserializer)?;
         let value = (text.len() == 16).then(|| u64::from_str_radix(&text, 16).ok()).flatten();
-        let expected = || de::Error::custom(format!("`{text}` is no digest of 16 hex digits"));
-        value.map(Digest).ok_or_else(expected)
+        let invalid = || de::Error::custom(format!("`{text}` is not a digest of 16 hex digits"));
+        value.map(Digest).ok_or_else(invalid)
     }
 }

@@ -1,207 +1,227 @@
-//! An episode under way.
+//! Episode environment: a world, its agents and the loop between them.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use chaic_core::agent::{ChildState, Thought};
-use chaic_core::observation::{FilmFrame, Images};
+use chaic_core::observation::{HistoryFrame, Images};
 use chaic_core::{Action, AgentError, AgentId, Briefing, Frame, Observation, Target};
 use chaic_render::{ImagesMut, Scene};
 use chaic_world::{Setup, World};
 
+use crate::agent_slot::{AgentSlot, Driver, EpisodeAgents, agent_slots};
 use crate::config::EpisodeConfig;
 use crate::digest::Digest;
 use crate::error::{EnvError, Result};
-use crate::observer::{Glimpse, Observer, resolve_unseen};
-use crate::reward::{RewardTerms, Standing};
-use crate::run_loop::{Choice, Players, run_loop};
-use crate::seat::{Driver, Minds, Seat, seats};
+use crate::observer::{ObservationRenderer, RenderedObservation, resolve_unseen};
+use crate::reward::{RewardTerms, RewardTracker};
+use crate::step::{self, ChosenAction, submit_all};
 use crate::trace::{End, Header, Record};
 
-/// Why [`Env::run`] returned.
+/// Reason why [`Env::run`] returned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Flow {
+pub enum AdvanceOutcome {
     /// The episode ended.
     Ended,
-    /// It was told to stop, or has come to the frame until which it was to run.
+    /// The stop flag was set, or the requested frame was reached.
     Stopped,
-    /// The caller's choice is needed, see [`Env::waiting`].
-    Waits,
+    /// An external agent needs an action, see [`Env::waiting`].
+    NeedsAction,
 }
 
-/// An episode under way, with everybody in it.
+/// A running episode: the world and the agents in it.
 pub struct Env {
     world: World,
-    seats: Vec<Seat>,
-    filled: Filled,
-    observer: Observer,
+    slots: Vec<AgentSlot>,
+    supplied: SuppliedSlots,
+    renderer: ObservationRenderer,
     header: Header,
     turns: Vec<Turn>,
-    /// Images that nobody looks at any more.
-    spare: Vec<Images>,
-    /// Why a mind couldn't decide, if one couldn't: nobody is asked again then.
-    broken: Option<AgentError>,
+    /// Image buffers for reuse.
+    spare_images: Vec<Images>,
+    /// Error of an agent; no agent is asked again after it.
+    failure: Option<AgentError>,
 }
 
-/// All of an episode as it stood, minds included; see [`Env::snapshot`]. It lives in memory only: minds
-/// are no data. What can be kept on a disk is the world's [`Snapshot`](chaic_world::Snapshot).
+/// Copy of a running episode with its agents; see [`Env::snapshot`].
+///
+/// It can't be serialized. To store a world, use its [`Snapshot`](chaic_world::Snapshot).
 pub struct EnvSnapshot {
     world: World,
-    seats: Vec<Seat>,
+    slots: Vec<AgentSlot>,
     turns: Vec<Turn>,
     header: Header,
-    filled: Filled,
+    supplied: SuppliedSlots,
 }
 
-/// Which seats the caller filled; all others are for the rule-based minds of an episode.
+/// Slots that the caller supplied; the others hold the default rule-based agents of the episode.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Filled {
+enum SuppliedSlots {
     Some { helper: bool, partner: bool },
     All,
 }
 
-/// The turn of an agent whose action has ended, until all who wait have chosen.
-#[derive(Clone, Default)]
+/// State of an agent between two actions, and data that it keeps during the episode.
+#[derive(Clone)]
 struct Turn {
-    /// Whether it has begun.
+    /// True if the agent's action has ended and the next one has not begun.
     is_open: bool,
-    /// What the agent perceives, once it has looked.
-    glimpse: Option<Glimpse>,
-    choice: Option<Choice>,
-    /// What it last said of itself.
-    said: Said,
-    /// How things stood when the agent last chose, for callers.
-    before: Option<Standing>,
-    /// What the agent has seen between its decisions since the last one.
-    film: VecDeque<FilmFrame>,
-    /// Memory for the ids of its next image.
+    /// Observation of this turn, once it is rendered.
+    rendered: Option<RenderedObservation>,
+    /// Next action.
+    choice: Option<ChosenAction>,
+    /// Thought and child state as last recorded.
+    recorded: RecordedState,
+    /// Reward state, for external agents.
+    rewards: RewardTracker,
+    /// Images since the last decision, oldest first.
+    frame_history: VecDeque<HistoryFrame>,
+    /// Id buffer for reuse.
     spare_ids: Vec<u16>,
 }
 
 impl Turn {
-    /// Ends the turn with the agent's choice.
-    fn close(&mut self) -> Option<Choice> {
+    fn new(agent: AgentId) -> Turn {
+        Turn {
+            is_open: false,
+            rendered: None,
+            choice: None,
+            recorded: RecordedState::default(),
+            rewards: RewardTracker::new(agent),
+            frame_history: VecDeque::new(),
+            spare_ids: Vec::new(),
+        }
+    }
+
+    /// Ends the turn and returns the agent's next action.
+    fn close(&mut self) -> Option<ChosenAction> {
         self.is_open = false;
-        if let Some(ids) = self.glimpse.take().and_then(|glimpse| glimpse.hidden_ids) {
+        if let Some(ids) = self.rendered.take().and_then(|rendered| rendered.hidden_ids) {
             self.spare_ids = ids;
         }
         self.choice.take()
     }
 }
 
-/// What a mind says of itself.
+/// State that an agent reports for the trace.
 #[derive(Clone, Default, PartialEq)]
-struct Said {
+struct RecordedState {
     thought: Option<Thought>,
     child: Option<ChildState>,
 }
 
 impl Env {
-    /// Begins an episode and briefs everybody.
+    /// Creates an episode and briefs all agents.
     ///
     /// # Errors
-    /// If the setup can't become a world.
-    pub fn new(config: EpisodeConfig<'_>, minds: impl Into<Minds>) -> Result<Env> {
-        let minds = minds.into();
-        let filled =
-            Filled::Some { helper: minds.helper.is_some(), partner: minds.partner.is_some() };
-        let setup = config.setup(minds.helper.is_some());
+    /// [`EnvError::Setup`] if the setup is invalid.
+    pub fn new(config: EpisodeConfig<'_>, agents: impl Into<EpisodeAgents>) -> Result<Env> {
+        let agents = agents.into();
+        let (helper, partner) = (agents.helper.is_some(), agents.partner.is_some());
+        let supplied = SuppliedSlots::Some { helper, partner };
+        let setup = config.setup(helper);
         let world = config.world(&setup)?;
-        let seats = seats(&setup, minds, config.rules.planner);
-        Ok(Env::begin(config, world, seats, filled))
+        let slots = agent_slots(&setup, agents, config.rules.planner);
+        Ok(Env::start(config, world, slots, supplied))
     }
 
-    /// The same with all seats filled by the caller: scripted partners, other minds for the child.
+    /// Creates an episode in which the caller supplies all slots, for scripted partners or children.
     ///
     /// # Errors
-    /// If the setup can't become a world, or has another number of people.
-    pub fn with_seats(config: EpisodeConfig<'_>, seats: Vec<Seat>) -> Result<Env> {
+    /// [`EnvError::Setup`] if the setup is invalid, [`EnvError::SlotCount`] if it has another number of
+    /// people.
+    pub fn with_slots(config: EpisodeConfig<'_>, slots: Vec<AgentSlot>) -> Result<Env> {
         let setup = config.setup(true);
-        check_seats(&config, &setup, seats.len())?;
+        check_slot_count(&config, &setup, slots.len())?;
         let world = config.world(&setup)?;
-        Ok(Env::begin(config, world, seats, Filled::All))
+        Ok(Env::start(config, world, slots, SuppliedSlots::All))
     }
 
-    fn begin(config: EpisodeConfig<'_>, world: World, mut seats: Vec<Seat>, filled: Filled) -> Env {
-        config.brief(&world, &mut seats);
-        let header = config.header(world.setup(), &seats);
+    fn start(
+        config: EpisodeConfig<'_>,
+        world: World,
+        mut slots: Vec<AgentSlot>,
+        supplied: SuppliedSlots,
+    ) -> Env {
+        config.brief(&world, &mut slots);
+        let header = config.header(world.setup(), &slots);
         let scene = Scene::with_appearance(world.setup(), config.appearance);
-        let observer = Observer::new(Arc::new(scene));
-        let turns = seats.iter().map(|_| Turn::default()).collect();
-        let broken = refused_senses(&seats);
-        Env { world, seats, filled, observer, header, turns, spare: Vec::new(), broken }
+        let renderer = ObservationRenderer::new(Arc::new(scene));
+        let turns = (0..slots.len()).map(|k| Turn::new(AgentId(k as u8))).collect();
+        let failure = check_sensors(&slots);
+        Env { world, slots, supplied, renderer, header, turns, spare_images: Vec::new(), failure }
     }
 
-    /// Begins another episode with the same minds and callers, and with the rule-based partner and
-    /// child that belong to it; for learners that play one episode after the other.
+    /// Starts another episode with the agents that the caller supplied, and with its own rule-based
+    /// partner and child.
     ///
     /// # Errors
-    /// If the setup can't become a world, or has another number of people than all seats that the
-    /// caller filled. The environment is as it was then.
+    /// [`EnvError::Setup`] if the setup is invalid, [`EnvError::SlotCount`] if the caller supplied all
+    /// slots and their number differs. The environment does not change then.
     pub fn reset(&mut self, config: EpisodeConfig<'_>) -> Result<()> {
-        let setup = config.setup(self.seats.len() > 1);
-        if self.filled == Filled::All {
-            check_seats(&config, &setup, self.seats.len())?;
+        let setup = config.setup(self.slots.len() > 1);
+        if self.supplied == SuppliedSlots::All {
+            check_slot_count(&config, &setup, self.slots.len())?;
         }
         let world = config.world(&setup)?;
-        let mut old = std::mem::take(&mut self.seats);
-        let seats = match self.filled {
-            Filled::All => old,
-            Filled::Some { helper, partner } => {
+        let mut old = std::mem::take(&mut self.slots);
+        let slots = match self.supplied {
+            SuppliedSlots::All => old,
+            SuppliedSlots::Some { helper, partner } => {
                 let helper = helper.then(|| old.swap_remove(AgentId::HELPER.index()));
                 let partner = partner.then(|| old.swap_remove(AgentId::PARTNER.index()));
-                seats(&setup, Minds { helper, partner }, config.rules.planner)
+                agent_slots(&setup, EpisodeAgents { helper, partner }, config.rules.planner)
             }
         };
-        *self = Env::begin(config, world, seats, self.filled);
+        *self = Env::start(config, world, slots, self.supplied);
         Ok(())
     }
 
-    /// What stands at the head of its trace.
+    /// Returns the header of the episode's trace.
     pub fn header(&self) -> &Header {
         &self.header
     }
 
-    /// The world as it stands.
+    /// Returns the world in its current state.
     pub fn world(&self) -> &World {
         &self.world
     }
 
-    /// What everybody sees with.
-    pub fn observer(&self) -> &Observer {
-        &self.observer
+    /// Returns the renderer of all observations.
+    pub fn renderer(&self) -> &ObservationRenderer {
+        &self.renderer
     }
 
-    /// What the minds counted of their own doings, by agent and name.
+    /// Returns the counters of all agents, keyed by `agent.counter`.
     pub fn counts(&self) -> BTreeMap<String, u64> {
-        let minds = self.seats.iter().enumerate().filter_map(|(k, seat)| Some((k, seat.mind()?)));
-        minds
-            .flat_map(|(k, mind)| {
-                let agent = AgentId(k as u8);
-                mind.counts().into_iter().map(move |(name, n)| (format!("{agent}.{name}"), n))
+        let slots = self.slots.iter().enumerate();
+        slots
+            .filter_map(|(k, slot)| Some((AgentId(k as u8), slot.agent()?)))
+            .flat_map(|(id, agent)| {
+                agent.counters().into_iter().map(move |(name, n)| (format!("{id}.{name}"), n))
             })
             .collect()
     }
 
-    /// Everybody's seats, by agent.
-    pub fn seats(&self) -> &[Seat] {
-        &self.seats
+    /// Returns the slots of all agents, by agent id.
+    pub fn slots(&self) -> &[AgentSlot] {
+        &self.slots
     }
 
-    /// The agents whose seats the caller drives.
-    pub(crate) fn callers(&self) -> impl Iterator<Item = AgentId> + '_ {
-        let seats = self.seats.iter().enumerate();
-        seats.filter(|(_, seat)| seat.mind().is_none()).map(|(k, _)| AgentId(k as u8))
+    /// Returns the agents that the caller controls.
+    pub(crate) fn external_agents(&self) -> impl Iterator<Item = AgentId> + '_ {
+        let slots = self.slots.iter().enumerate();
+        slots.filter(|(_, slot)| slot.agent().is_none()).map(|(k, _)| AgentId(k as u8))
     }
 
-    /// What the agent in this seat is told at the beginning.
+    /// Returns the briefing of an agent.
     pub fn briefing(&self, agent: AgentId) -> Briefing {
-        let grants = self.seats[agent.index()].grants;
+        let grants = self.slots[agent.index()].grants;
         self.world.briefing(agent, grants, self.header.seed)
     }
 
-    /// The agents whose choices are the caller's and needed now.
+    /// Returns the external agents that need an action now.
     pub fn waiting(&self) -> impl Iterator<Item = AgentId> + '_ {
         let turns = self.turns.iter().enumerate();
         turns
@@ -209,255 +229,261 @@ impl Env {
             .map(|(k, _)| AgentId(k as u8))
     }
 
-    /// What an agent that is [waiting](Env::waiting) perceives; `None` for anybody else. Images are
-    /// made at the first call of a turn.
+    /// Returns the observation of a [waiting](Env::waiting) agent; `None` for other agents.
+    ///
+    /// The first call of a turn renders the images.
     pub fn observe(&mut self, agent: AgentId) -> Option<&Observation> {
         if !self.is_waiting(agent) {
             return None;
         }
         let turn = &mut self.turns[agent.index()];
-        if turn.glimpse.is_none() {
-            let looking = [(agent, &self.seats[agent.index()])];
-            turn.glimpse = self.observer.observe(&self.world, &looking, &mut self.spare).pop();
-            if let Some(glimpse) = &mut turn.glimpse {
-                glimpse.observation.film = std::mem::take(&mut turn.film).into();
+        if turn.rendered.is_none() {
+            let observers = [(agent, &self.slots[agent.index()])];
+            turn.rendered =
+                self.renderer.observe(&self.world, &observers, &mut self.spare_images).pop();
+            if let Some(rendered) = &mut turn.rendered {
+                rendered.observation.frame_history = std::mem::take(&mut turn.frame_history).into();
             }
         }
-        turn.glimpse.as_ref().map(|glimpse| &glimpse.observation)
+        turn.rendered.as_ref().map(|rendered| &rendered.observation)
     }
 
-    /// The same with the images in buffers of the caller's, in place of the observation's own.
+    /// Renders the observation of an agent with its images in the caller's buffers.
     pub(crate) fn observe_into(&mut self, agent: AgentId, images: ImagesMut<'_>) {
         let turn = &mut self.turns[agent.index()];
         let ids = std::mem::take(&mut turn.spare_ids);
-        let who = (agent, &self.seats[agent.index()]);
-        let mut glimpse = self.observer.observe_into(&self.world, who, images, ids);
-        glimpse.observation.film = std::mem::take(&mut turn.film).into();
-        turn.glimpse = Some(glimpse);
+        let slot = &self.slots[agent.index()];
+        let mut rendered = self.renderer.observe_into(&self.world, agent, slot, images, ids);
+        rendered.observation.frame_history = std::mem::take(&mut turn.frame_history).into();
+        turn.rendered = Some(rendered);
     }
 
-    /// What an agent perceived that is waiting and has looked.
+    /// Returns the rendered observation of a waiting agent.
     pub(crate) fn observed(&self, agent: AgentId) -> Option<&Observation> {
-        let glimpse = self.turns[agent.index()].glimpse.as_ref();
-        glimpse.filter(|_| self.is_waiting(agent)).map(|glimpse| &glimpse.observation)
+        let rendered = self.turns[agent.index()].rendered.as_ref();
+        rendered.filter(|_| self.is_waiting(agent)).map(|rendered| &rendered.observation)
     }
 
     pub(crate) fn is_waiting(&self, agent: AgentId) -> bool {
         self.waiting().any(|a| a == agent)
     }
 
-    /// The caller's choice for an agent that is [waiting](Env::waiting); it acts once all have
-    /// chosen. Returns false, and changes nothing, if the agent isn't waiting.
+    /// Sets the next action of a [waiting](Env::waiting) agent. It starts once all agents have chosen.
+    ///
+    /// Returns false, and changes nothing, if the agent is not waiting.
     pub fn submit(&mut self, agent: AgentId, action: Action) -> bool {
-        let points = matches!(action.subject(), Some(Target::Pixel { .. }));
-        if !self.is_waiting(agent) || (points && self.observe(agent).is_none()) {
+        let has_pixel = matches!(action.subject(), Some(Target::Pixel { .. }));
+        if !self.is_waiting(agent) || (has_pixel && self.observe(agent).is_none()) {
             return false;
         }
         let turn = &mut self.turns[agent.index()];
-        let seat = &mut self.seats[agent.index()];
-        let resolved = match &turn.glimpse {
-            Some(glimpse) => glimpse.resolve(action),
-            None => resolve_unseen(seat, action),
+        let slot = &mut self.slots[agent.index()];
+        let resolved = match &turn.rendered {
+            Some(rendered) => rendered.resolve(action),
+            None => resolve_unseen(slot, action),
         };
-        seat.submitted = Some((action, resolved));
-        turn.choice = Some(Choice { agent, action: resolved, thought: None, child: None });
-        turn.before = Some(Standing::of(&self.world, agent));
+        slot.submitted = Some((action, resolved));
+        turn.choice = Some(ChosenAction { agent, action: resolved, thought: None, child: None });
+        turn.rewards.begin_action(&self.world);
         true
     }
 
-    /// What has come of the action that the caller last chose for an agent, until now: the terms of
-    /// a reward. `None` before the first choice.
+    /// Returns the reward terms of the last submitted action of an agent, up to now.
+    ///
+    /// `None` before the first action.
     pub fn reward(&self, agent: AgentId) -> Option<RewardTerms> {
         let turn = self.turns.get(agent.index())?;
-        let terms = RewardTerms::between(turn.before.as_ref()?, &self.world, agent);
-        // What is chosen but waits for others has come to nothing yet.
-        let is_begun = turn.choice.is_none();
-        Some(RewardTerms { is_invalid: terms.is_invalid && is_begun, ..terms })
+        let terms = turn.rewards.action_terms(&self.world)?;
+        // An action that waits for other agents has not begun.
+        let has_begun = turn.choice.is_none();
+        Some(RewardTerms { is_invalid: terms.is_invalid && has_begun, ..terms })
     }
 
-    /// How the episode would be scored if it ended now.
+    /// Returns the score of the episode if it ended now.
     pub fn score(&self) -> End {
-        End::of(&self.world)
+        End::new(&self.world)
     }
 
-    /// A number that differs between different states of the world, and is the same for equal ones.
+    /// Returns the digest of the world's state.
     pub fn digest(&self) -> Digest {
         Digest(self.world.digest())
     }
 
-    /// All of the episode as it stands, minds included, to go on from later or more than once.
+    /// Copies the episode with its agents.
     ///
     /// # Errors
-    /// [`EnvError::NoFork`] if a mind can't be copied: one that lives in another process, or asks a
-    /// language model.
+    /// [`EnvError::NoFork`] if an agent can't be copied, such as one in another process or one that
+    /// queries a language model.
     pub fn snapshot(&self) -> Result<EnvSnapshot> {
         Ok(EnvSnapshot {
             world: self.world.clone(),
-            seats: fork(&self.seats)?,
+            slots: fork(&self.slots)?,
             turns: self.turns.clone(),
             header: self.header.clone(),
-            filled: self.filled,
+            supplied: self.supplied,
         })
     }
 
-    /// Goes back (or on) to a snapshot of the same episode. What follows is what followed then,
-    /// where the same is chosen.
+    /// Replaces the state by a snapshot of the same episode. The same actions then lead to the same
+    /// states.
     ///
     /// # Errors
-    /// [`EnvError::OtherSnapshot`] if the snapshot is of another episode, seed, rules or minds. The
-    /// environment is as it was then.
+    /// [`EnvError::OtherSnapshot`] if the snapshot is of another episode, seed, rule set or set of
+    /// agents. The environment does not change then.
     pub fn restore(&mut self, snapshot: &EnvSnapshot) -> Result<()> {
-        let drivers = |seats: &[Seat]| seats.iter().map(|s| s.mind().is_some()).collect::<Vec<_>>();
+        let has_agent =
+            |slots: &[AgentSlot]| slots.iter().map(|s| s.agent().is_some()).collect::<Vec<_>>();
         if snapshot.header != self.header
-            || snapshot.filled != self.filled
-            || drivers(&snapshot.seats) != drivers(&self.seats)
+            || snapshot.supplied != self.supplied
+            || has_agent(&snapshot.slots) != has_agent(&self.slots)
         {
             return Err(EnvError::OtherSnapshot {
                 id: self.header.episode.clone(),
-                of: snapshot.header.episode.clone(),
+                snapshot_of: snapshot.header.episode.clone(),
             });
         }
-        self.seats = fork(&snapshot.seats)?;
+        self.slots = fork(&snapshot.slots)?;
         self.world = snapshot.world.clone();
         self.turns.clone_from(&snapshot.turns);
-        self.broken = refused_senses(&self.seats);
+        self.failure = check_sensors(&self.slots);
         Ok(())
     }
 
-    /// Plays on without keeping records: until a choice of the caller's is needed or the episode
-    /// ends, or to the first frame in which somebody decides at or after `until`.
+    /// Runs the episode as [`Env::run`] does, without records.
     ///
     /// # Errors
-    /// If a mind can't decide.
-    pub fn advance(&mut self, until: Option<Frame>) -> std::result::Result<Flow, AgentError> {
+    /// If an agent can't decide.
+    pub fn advance(
+        &mut self,
+        until: Option<Frame>,
+    ) -> std::result::Result<AdvanceOutcome, AgentError> {
         self.run(&AtomicBool::new(false), until, &mut |_| Ok(()))
     }
 
-    /// Plays until a choice of the caller's is needed or the episode ends, or to the first frame in
-    /// which somebody decides at or after `until`. Every record is handed to `sink`, whose error
-    /// ends the play.
+    /// Runs the episode until an external agent needs an action, the episode ends, or an agent waits in
+    /// a frame at or after `until`.
+    ///
+    /// Passes every record to `sink`.
     ///
     /// # Errors
-    /// Those of `sink`, and of a mind that can't decide.
+    /// The first error of `sink` or of an agent.
     pub fn run<E: From<AgentError>>(
         &mut self,
         stop: &AtomicBool,
         until: Option<Frame>,
         sink: &mut dyn FnMut(&Record) -> std::result::Result<(), E>,
-    ) -> std::result::Result<Flow, E> {
-        if let Some(error) = &self.broken {
+    ) -> std::result::Result<AdvanceOutcome, E> {
+        if let Some(error) = &self.failure {
             return Err(error.clone().into());
         }
-        let Env { world, seats, observer, turns, spare, broken, .. } = self;
-        let has_film = seats.iter().any(|seat| seat.senses.film.is_some());
-        let flow = Flow::Stopped;
-        let mut table =
-            Table { seats, observer, turns, spare, broken, stop, until, has_film, flow };
-        let has_ended = run_loop(world, &mut table, sink)?;
-        Ok(if has_ended { Flow::Ended } else { table.flow })
-    }
-}
-
-/// Everybody in an episode while it is played.
-struct Table<'a> {
-    seats: &'a mut [Seat],
-    observer: &'a Observer,
-    turns: &'a mut [Turn],
-    spare: &'a mut Vec<Images>,
-    broken: &'a mut Option<AgentError>,
-    stop: &'a AtomicBool,
-    until: Option<Frame>,
-    has_film: bool,
-    /// Why the play stopped.
-    flow: Flow,
-}
-
-impl<E: From<AgentError>> Players<E> for Table<'_> {
-    fn decide(
-        &mut self,
-        world: &World,
-        waiting: &[AgentId],
-    ) -> std::result::Result<Option<Vec<Choice>>, E> {
-        let Table { seats, observer, turns, spare, broken, .. } = self;
-        let late = self.until.is_some_and(|f| world.state().frame >= f);
-        if self.stop.load(Ordering::Relaxed) || late {
-            return Ok(None);
+        while !self.world.is_over() {
+            let waiting = self.world.waiting();
+            if !waiting.is_empty() {
+                let is_late = until.is_some_and(|frame| self.world.state().frame >= frame);
+                if is_late || stop.load(Ordering::Relaxed) {
+                    return Ok(AdvanceOutcome::Stopped);
+                }
+                self.open_turns(&waiting)?;
+                if waiting.iter().any(|a| self.turns[a.index()].choice.is_none()) {
+                    return Ok(AdvanceOutcome::NeedsAction);
+                }
+                let choices =
+                    waiting.iter().filter_map(|a| self.turns[a.index()].close()).collect();
+                submit_all(&mut self.world, choices, sink)?;
+            }
+            self.run_frames(sink)?;
         }
-        let fresh: Vec<_> = waiting.iter().filter(|a| !turns[a.index()].is_open).copied().collect();
-        let minds: Vec<_> =
-            fresh.iter().filter(|a| seats[a.index()].mind().is_some()).copied().collect();
-        let glimpses = {
-            let looking: Vec<_> = minds.iter().map(|a| (*a, &seats[a.index()])).collect();
-            observer.observe(world, &looking, spare)
+        sink(&Record::End(End::new(&self.world)))?;
+        Ok(AdvanceOutcome::Ended)
+    }
+
+    /// Opens the turns of the waiting agents that have none yet. Agents in the environment choose here;
+    /// the turns of external agents stay open without an action.
+    fn open_turns(&mut self, waiting: &[AgentId]) -> std::result::Result<(), AgentError> {
+        let Env { world, slots, renderer, turns, spare_images, failure, .. } = self;
+        let new: Vec<_> = waiting.iter().filter(|a| !turns[a.index()].is_open).copied().collect();
+        let agents: Vec<_> =
+            new.iter().filter(|a| slots[a.index()].agent().is_some()).copied().collect();
+        let observations = {
+            let observers: Vec<_> = agents.iter().map(|a| (*a, &slots[a.index()])).collect();
+            renderer.observe(world, &observers, spare_images)
         };
-        for (agent, mut glimpse) in minds.into_iter().zip(glimpses) {
+        for (agent, mut rendered) in agents.into_iter().zip(observations) {
             let turn = &mut turns[agent.index()];
-            glimpse.observation.film = std::mem::take(&mut turn.film).into();
-            let chosen = choose(&mut seats[agent.index()], agent, &glimpse, &mut turn.said);
-            turn.choice = chosen.inspect_err(|error| **broken = Some(error.clone()))?;
-            if seats[agent.index()].senses.wants_image() {
-                spare.push(glimpse.into_images());
+            rendered.observation.frame_history = std::mem::take(&mut turn.frame_history).into();
+            let chosen = choose(&mut slots[agent.index()], agent, &rendered, &mut turn.recorded);
+            turn.choice = chosen.inspect_err(|error| *failure = Some(error.clone()))?;
+            if slots[agent.index()].sensors.wants_image() {
+                spare_images.push(rendered.into_images());
             }
         }
-        for agent in fresh {
+        for agent in new {
             turns[agent.index()].is_open = true;
         }
-        if waiting.iter().any(|a| turns[a.index()].choice.is_none()) {
-            self.flow = Flow::Waits;
-            return Ok(None);
-        }
-        Ok(Some(waiting.iter().filter_map(|a| turns[a.index()].close()).collect()))
+        Ok(())
     }
 
-    fn look_on(&mut self, world: &World) {
-        if !self.has_film {
-            return;
-        }
-        for (k, (seat, turn)) in self.seats.iter().zip(self.turns.iter_mut()).enumerate() {
-            if let Some(film) = seat.senses.film {
-                self.observer.film(world, AgentId(k as u8), film, &mut turn.film);
+    /// Runs frames until an agent waits or the episode ends, and records frame histories.
+    fn run_frames<E>(
+        &mut self,
+        sink: &mut dyn FnMut(&Record) -> std::result::Result<(), E>,
+    ) -> std::result::Result<(), E> {
+        let Env { world, slots, renderer, turns, .. } = self;
+        let on_frame = &mut |world: &World| {
+            for (k, (slot, turn)) in slots.iter().zip(turns.iter_mut()).enumerate() {
+                if let Some(history) = slot.sensors.frame_history {
+                    renderer.record_history(
+                        world,
+                        AgentId(k as u8),
+                        history,
+                        &mut turn.frame_history,
+                    );
+                }
             }
-        }
+        };
+        step::advance(world, on_frame, sink)
     }
 }
 
-fn check_seats(config: &EpisodeConfig<'_>, setup: &Setup, seats: usize) -> Result<()> {
+fn check_slot_count(config: &EpisodeConfig<'_>, setup: &Setup, slots: usize) -> Result<()> {
     let people = setup.people.len();
-    let id = || config.episode.id().to_owned();
-    if people == seats { Ok(()) } else { Err(EnvError::Seats { id: id(), people, seats }) }
+    if people == slots {
+        return Ok(());
+    }
+    Err(EnvError::SlotCount { id: config.episode.id().to_owned(), people, slots })
 }
 
-/// Returns why the episode can't be played where a seat asks for observations out of bounds.
-fn refused_senses(seats: &[Seat]) -> Option<AgentError> {
-    let refused = |(k, seat): (usize, &Seat)| {
-        let problem = seat.senses.check().err()?;
+/// Returns an error if an agent requests observations that exceed their bounds.
+fn check_sensors(slots: &[AgentSlot]) -> Option<AgentError> {
+    let check = |(k, slot): (usize, &AgentSlot)| {
+        let problem = slot.sensors.check().err()?;
         Some(AgentError::Broken(format!("the {} {problem}", AgentId(k as u8))))
     };
-    seats.iter().enumerate().find_map(refused)
+    slots.iter().enumerate().find_map(check)
 }
 
-fn fork(seats: &[Seat]) -> Result<Vec<Seat>> {
-    let fork = |(k, seat): (usize, &Seat)| {
+fn fork(slots: &[AgentSlot]) -> Result<Vec<AgentSlot>> {
+    let fork = |(k, slot): (usize, &AgentSlot)| {
         let agent = AgentId(k as u8);
-        seat.fork().ok_or(EnvError::NoFork { agent })
+        slot.fork().ok_or(EnvError::NoFork { agent })
     };
-    seats.iter().enumerate().map(fork).collect()
+    slots.iter().enumerate().map(fork).collect()
 }
 
-/// What the mind of a seat chooses; `None` if the caller drives it.
+/// Asks the agent of a slot for its next action; `None` if the caller controls it.
 fn choose(
-    seat: &mut Seat,
-    agent: AgentId,
-    glimpse: &Glimpse,
-    said: &mut Said,
-) -> std::result::Result<Option<Choice>, AgentError> {
-    let Driver::Mind(mind) = &mut seat.driver else { return Ok(None) };
-    let meant = mind.act(&glimpse.observation)?;
-    let action = glimpse.resolve(meant);
-    seat.submitted = Some((meant, action));
-    let says = Said { thought: Some(mind.thought()), child: mind.child_state() };
-    let thought = says.thought.clone().filter(|_| says.thought != said.thought);
-    let child = says.child.filter(|_| says.child != said.child);
-    *said = says;
-    Ok(Some(Choice { agent, action, thought, child }))
+    slot: &mut AgentSlot,
+    id: AgentId,
+    rendered: &RenderedObservation,
+    recorded: &mut RecordedState,
+) -> std::result::Result<Option<ChosenAction>, AgentError> {
+    let Driver::Agent(agent) = &mut slot.driver else { return Ok(None) };
+    let chosen = agent.act(&rendered.observation)?;
+    let action = rendered.resolve(chosen);
+    slot.submitted = Some((chosen, action));
+    let state = RecordedState { thought: Some(agent.thought()), child: agent.child_state() };
+    let thought = state.thought.clone().filter(|_| state.thought != recorded.thought);
+    let child = state.child.filter(|_| state.child != recorded.child);
+    *recorded = state;
+    Ok(Some(ChosenAction { agent: id, action, thought, child }))
 }

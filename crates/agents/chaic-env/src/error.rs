@@ -1,147 +1,145 @@
-//! What can go wrong, with what it went wrong with, and what to do.
+//! Errors of the crate.
 
 use std::path::PathBuf;
 
 use chaic_core::{AgentId, Frame};
 use chaic_world::SetupError;
 
-/// The result of anything in this crate.
+/// Result type of this crate.
 pub type Result<T> = std::result::Result<T, EnvError>;
 
-/// What can go wrong.
+/// Error of this crate.
 #[derive(Debug, thiserror::Error)]
 pub enum EnvError {
-    /// A setup can't become a world.
-    #[error("the setup of {id} makes no world: {problem}")]
+    /// A setup is invalid.
+    #[error("the setup of {id} is invalid: {problem}")]
     Setup {
-        /// The episode.
+        /// Episode id.
         id: String,
-        /// Why.
+        /// Problem.
         problem: SetupError,
     },
-    /// There are seats for more or fewer people than an episode has.
-    #[error("{id} has {people} people, not {seats}")]
-    Seats {
-        /// The episode.
+    /// The number of agent slots differs from the number of people.
+    #[error("{id} has {people} people, not {slots}")]
+    SlotCount {
+        /// Episode id.
         id: String,
-        /// How many people it has.
+        /// Number of people.
         people: usize,
-        /// How many seats there are.
-        seats: usize,
+        /// Number of slots.
+        slots: usize,
     },
-    /// A mind can't be copied.
-    #[error("the mind of the {agent} can't be copied, so that there is no snapshot of the episode")]
+    /// An agent can't be copied.
+    #[error("the agent of the {agent} can't be copied, so the episode has no snapshots")]
     NoFork {
-        /// Whose mind.
+        /// Agent id.
         agent: AgentId,
     },
-    /// A snapshot is of another episode, or of other minds, rules or seeds.
-    #[error("a snapshot of {of} doesn't fit {id} with these minds, rules and seed")]
+    /// A snapshot is of another episode, agents, rules or seed.
+    #[error("a snapshot of {snapshot_of} doesn't fit {id} with these agents, rules and seed")]
     OtherSnapshot {
-        /// The episode under way.
+        /// Running episode.
         id: String,
-        /// The episode of the snapshot.
-        of: String,
+        /// Episode of the snapshot.
+        snapshot_of: String,
     },
-    /// Environments can't be stepped together.
+    /// Environments can't form a batch, or the batch lacks an environment.
     #[error("{0}")]
     Batch(String),
-    /// A buffer for images has another length than its images.
-    #[error("the buffer for {image} has {found} numbers, it needs {expected}")]
+    /// An image buffer has the wrong length.
+    #[error("the buffer for {image} has {found} elements, expected {expected}")]
     Buffer {
-        /// Which image.
+        /// Kind of image.
         image: &'static str,
-        /// How many numbers it has.
+        /// Number of elements.
         found: usize,
-        /// How many it needs.
+        /// Required number of elements.
         expected: usize,
     },
-    /// A trace was played on another episode.
+    /// A trace is of another version of the episode.
     #[error(
-        "the episode {id} has digest {found}, the trace was played on {expected}; it needs the \
-         chaic that wrote it"
+        "the episode {id} has digest {found}, the trace has {expected}; use the chaic that wrote the trace"
     )]
     OtherEpisode {
-        /// The episode.
+        /// Episode id.
         id: String,
-        /// Digest of the episode as it is.
+        /// Digest of the episode.
         found: String,
-        /// Digest of the episode that was played.
+        /// Digest in the trace.
         expected: String,
     },
-    /// A trace doesn't fit the world that it was played in.
+    /// A trace contradicts the re-simulated world.
     #[error("{episode} at frame {frame}: {problem}; the trace was altered")]
     Altered {
-        /// The episode.
+        /// Episode id.
         episode: String,
-        /// The frame up to which it fits.
+        /// Frame of the first difference.
         frame: Frame,
-        /// What doesn't fit.
+        /// Difference.
         problem: String,
     },
     /// No helper has this name.
     #[error("unknown helper `{name}`; the helpers are {known}", known = known.join(", "))]
     UnknownHelper {
-        /// The name.
+        /// Name.
         name: String,
-        /// All names.
+        /// Known names.
         known: Vec<String>,
     },
-    /// No mind for the partner has this name.
+    /// No partner has this name.
     #[error("unknown partner `{name}`; the partners are {known}", known = known.join(", "))]
     UnknownPartner {
-        /// The name.
+        /// Name.
         name: String,
-        /// All names.
+        /// Known names.
         known: Vec<String>,
     },
-    /// Minds from elsewhere can't take part.
+    /// A helper registry of another crate fails.
     #[error("{0}")]
-    Minds(Box<dyn std::error::Error + Send + Sync>),
+    Registry(Box<dyn std::error::Error + Send + Sync>),
     /// No rule has this name.
     #[error("no rule `{name}`; the rules are {known}", known = known.join(", "))]
     UnknownRule {
-        /// The name.
+        /// Name.
         name: String,
-        /// All names.
+        /// Known names.
         known: Vec<String>,
     },
-    /// A rule can't be set so.
+    /// A rule setting is invalid.
     #[error("--set {setting}: {problem}")]
     Rule {
-        /// What was asked for.
+        /// Setting.
         setting: String,
-        /// What is wrong with it.
+        /// Problem.
         problem: String,
     },
-    /// A file is of another version or format.
+    /// A file has another version or format.
     #[error(
-        "{path} is of {found}, this program (chaic {chaic}) reads {expected}; use the chaic that \
-         wrote it",
+        "{path} is {found}, this program (chaic {chaic}) reads {expected}; use the chaic that wrote it",
         path = path.display(), chaic = crate::CHAIC_VERSION
     )]
     OtherVersion {
-        /// The file.
+        /// File.
         path: PathBuf,
-        /// What it says it is.
+        /// Format and version of the file.
         found: String,
-        /// What was expected.
+        /// Supported format and version.
         expected: String,
     },
-    /// A file can't be understood.
+    /// A file can't be parsed.
     #[error("{path}: line {line}: {problem}", path = path.display())]
     Unreadable {
-        /// The file.
+        /// File.
         path: PathBuf,
-        /// The line, from 1.
+        /// Line, from 1.
         line: usize,
-        /// What is wrong.
+        /// Problem.
         problem: String,
     },
 }
 
 impl EnvError {
-    /// Whether it is about what the caller asked for, rather than what came of it.
+    /// Returns whether the caller's arguments caused the error.
     pub fn is_usage(&self) -> bool {
         use EnvError::{Rule, UnknownHelper, UnknownPartner, UnknownRule};
         matches!(

@@ -1,35 +1,35 @@
-//! What one episode run is called.
+//! Keys of episode runs.
 
 use chaic_core::TaskId;
 use serde::{Deserialize, Serialize};
 
-/// Names one episode run within a run of many. Their order is that of reports.
+/// Key of one episode run within a run. Keys are ordered as in reports.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct RunKey {
-    /// The task.
+    /// Task.
     pub task: TaskId,
-    /// The helper.
+    /// Helper name.
     pub helper: String,
-    /// The episode's id.
+    /// Episode id.
     pub episode: String,
-    /// Which of the run's seeds.
+    /// Index of the run's seed.
     pub seed: u32,
 }
 
 impl RunKey {
-    /// The names of its fields, as they are written.
+    /// Field names in files.
     pub const FIELDS: [&str; 4] = ["task", "helper", "episode", "seed"];
 }
 
-/// A name for files that belong to an episode: its id without the task, `/` and `:` as `-`.
+/// Returns the file name of an episode: its id without the task, with `-` for `/` and `:`.
 ///
 /// ```
 /// use chaic_core::TaskId;
 /// assert_eq!(chaic_env::slug(TaskId::Obstacle, "obstacle/test/07"), "test-07");
 /// ```
 pub fn slug(task: TaskId, id: &str) -> String {
-    let rest = id.strip_prefix(task.name()).and_then(|r| r.strip_prefix('/')).unwrap_or(id);
-    let safe = |c: char| if c.is_ascii_alphanumeric() || "._-".contains(c) { c } else { '-' };
-    // No name becomes hidden, or one of the two special ones.
-    rest.trim_start_matches('.').chars().map(safe).collect()
+    let name = id.strip_prefix(task.name()).and_then(|r| r.strip_prefix('/')).unwrap_or(id);
+    let replace = |c: char| if c.is_ascii_alphanumeric() || "._-".contains(c) { c } else { '-' };
+    // A leading dot would make a file hidden, or name `.` or `..`.
+    name.trim_start_matches('.').chars().map(replace).collect()
 }

@@ -1,42 +1,43 @@
-//! What agents perceive when they are about to decide, and what they mean when they answer.
+//! Rendering of observations, and resolution of the pixels in actions.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use chaic_core::observation::{Film, FilmFrame, Images, Observation, Senses};
+use chaic_core::observation::{FrameHistorySpec, HistoryFrame, Images, Observation, SensorConfig};
 use chaic_core::{Action, AgentId, EntityId, ResolvedAction, Target};
 use chaic_render::{Channels, ImagesMut, Scene, View};
 use chaic_world::World;
 
-use crate::seat::Seat;
+use crate::agent_slot::AgentSlot;
 
-/// The eyes of everybody in an episode.
+/// Renders the observations of all agents of an episode.
 #[derive(Clone)]
-pub struct Observer {
+pub struct ObservationRenderer {
     scene: Arc<Scene>,
 }
 
-/// What an agent perceives, with what only the environment knows of its image.
+/// An observation, with the ids of its image that only the environment has.
 #[derive(Clone, Debug)]
-pub struct Glimpse {
-    /// What the agent is given.
+pub struct RenderedObservation {
+    /// Observation for the agent.
     pub observation: Observation,
-    /// Instance ids of its image, u16, shape [height, width], where the agent itself isn't given
-    /// them; they resolve the pixels that it points at.
+    /// Instance ids of its image, u16, shape [height, width], if the observation lacks them. They resolve
+    /// the pixels in actions.
     pub(crate) hidden_ids: Option<Vec<u16>>,
+    /// True if actions may name entities, which needs the grant of ids.
     may_name_entities: bool,
 }
 
-impl Glimpse {
-    /// Its images, for their memory.
+impl RenderedObservation {
+    /// Returns the images, to reuse their buffers.
     pub(crate) fn into_images(self) -> Images {
         let mut images = self.observation.images;
         images.ids = images.ids.or(self.hidden_ids);
         images
     }
 
-    /// The action with its target resolved to what the pixel shows, or to the entity where ids are
-    /// granted; anything else names [`EntityId::NOTHING`].
+    /// Resolves the target of an action: a pixel to the entity that it shows, an entity to itself if ids
+    /// are granted, anything else to [`EntityId::NOTHING`].
     pub fn resolve(&self, action: Action) -> ResolvedAction {
         resolve(action, self.may_name_entities, |column, row| self.at_pixel(column, row))
     }
@@ -51,9 +52,9 @@ impl Glimpse {
     }
 }
 
-/// The action of an agent that has not looked: it can point at nothing.
-pub(crate) fn resolve_unseen(seat: &Seat, action: Action) -> ResolvedAction {
-    resolve(action, seat.grants.ids, |_, _| EntityId::NOTHING)
+/// Resolves the action of an agent without a rendered observation; pixels resolve to nothing.
+pub(crate) fn resolve_unseen(slot: &AgentSlot, action: Action) -> ResolvedAction {
+    resolve(action, slot.grants.ids, |_, _| EntityId::NOTHING)
 }
 
 fn resolve(
@@ -68,78 +69,81 @@ fn resolve(
     })
 }
 
-impl Observer {
-    /// The eyes for a world with these shapes.
-    pub fn new(scene: Arc<Scene>) -> Observer {
-        Observer { scene }
+impl ObservationRenderer {
+    /// Creates a renderer of a scene.
+    pub fn new(scene: Arc<Scene>) -> ObservationRenderer {
+        ObservationRenderer { scene }
     }
 
-    /// The shapes that are seen.
+    /// Returns the rendered scene.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// What these agents perceive now: images are made for all of them at once, and only those
-    /// that are wanted. Memory of `spare` images is used again.
+    /// Renders the observations of agents in one batch. Only requested images are rendered; buffers of
+    /// `spare` images are reused.
     pub fn observe(
         &self,
         world: &World,
-        who: &[(AgentId, &Seat)],
+        agents: &[(AgentId, &AgentSlot)],
         spare: &mut Vec<Images>,
-    ) -> Vec<Glimpse> {
-        let looking = who.iter().filter(|(_, a)| a.senses.wants_image());
+    ) -> Vec<RenderedObservation> {
+        let with_image = agents.iter().filter(|(_, slot)| slot.sensors.wants_image());
         let views: Vec<View> =
-            looking.map(|(agent, seat)| view_of(world, *agent, seat.senses)).collect();
+            with_image.map(|(agent, slot)| view(world, *agent, slot.sensors)).collect();
         let mut images = spare.split_off(spare.len().saturating_sub(views.len()));
         if !views.is_empty() {
             self.scene.render_into(world, &views, &mut images);
         }
         let mut images = images.into_iter();
-        who.iter()
-            .map(|(agent, seat)| {
-                let images = if seat.senses.wants_image() { images.next() } else { None }
+        agents
+            .iter()
+            .map(|(agent, slot)| {
+                let images = if slot.sensors.wants_image() { images.next() } else { None }
                     .unwrap_or_default();
-                glimpse(world, *agent, seat, images)
+                rendered_observation(world, *agent, slot, images)
             })
             .collect()
     }
 
-    /// Adds to an agent's film what it sees now, if this is a frame to keep; drops the oldest.
-    pub(crate) fn film(
+    /// Appends the current image to an agent's frame history, if its schedule has this frame. Drops the
+    /// oldest image of a full history.
+    pub(crate) fn record_history(
         &self,
         world: &World,
         agent: AgentId,
-        film: Film,
-        frames: &mut VecDeque<FilmFrame>,
+        spec: FrameHistorySpec,
+        history: &mut VecDeque<HistoryFrame>,
     ) {
         let frame = world.state().frame;
-        if film.most == 0 || film.every_frames == 0 || !frame.is_multiple_of(film.every_frames) {
+        if spec.max_len == 0 || spec.every_frames == 0 || !frame.is_multiple_of(spec.every_frames) {
             return;
         }
         let channels = Channels { rgb: true, depth: true, ids: false };
-        let view = View::of_agent(world, agent, film.image_size, channels);
+        let view = View::from_agent(world, agent, spec.image_size, channels);
         let mut images = vec![Images::default()];
-        if frames.len() >= film.most as usize {
-            images.extend(frames.pop_front().map(|old| old.images));
+        if history.len() >= spec.max_len as usize {
+            images.extend(history.pop_front().map(|old| old.images));
             images.swap_remove(0);
         }
         self.scene.render_into(world, &[view], &mut images);
-        let camera = world.eye(agent, film.image_size);
-        frames.extend(images.pop().map(|images| FilmFrame { frame, camera, images }));
+        let camera = world.camera(agent, spec.image_size);
+        history.extend(images.pop().map(|images| HistoryFrame { frame, camera, images }));
     }
 
-    /// What one agent perceives now, with the images in buffers of the caller's instead of the
-    /// observation. `ids` are taken to keep the ids in, which resolve what the agent points at.
+    /// Renders the observation of one agent with its images in the caller's buffers. The buffer `ids`
+    /// becomes the id image that resolves pixels in actions.
     pub(crate) fn observe_into(
         &self,
         world: &World,
-        (agent, seat): (AgentId, &Seat),
+        agent: AgentId,
+        slot: &AgentSlot,
         images: ImagesMut<'_>,
         mut ids: Vec<u16>,
-    ) -> Glimpse {
-        let view = view_of(world, agent, seat.senses);
+    ) -> RenderedObservation {
+        let view = view(world, agent, slot.sensors);
         let ImagesMut { rgb, depth_m, ids: ids_out } = images;
-        if seat.senses.wants_image() {
+        if slot.sensors.wants_image() {
             ids.resize(view.camera.width as usize * view.camera.height as usize, 0);
             let images = ImagesMut { rgb, depth_m, ids: Some(&mut ids) };
             self.scene.render_view_into(world, &view, images);
@@ -147,81 +151,87 @@ impl Observer {
         if let Some(out) = ids_out {
             out.copy_from_slice(&ids);
         }
-        let in_view = present(&ids);
-        Glimpse {
-            observation: observation(world, agent, seat, &in_view, Images::default()),
+        let in_view = visible_entities(&ids);
+        RenderedObservation {
+            observation: observation(world, agent, slot, &in_view, Images::default()),
             hidden_ids: Some(ids),
-            may_name_entities: seat.grants.ids,
+            may_name_entities: slot.grants.ids,
         }
     }
 }
 
-/// The camera of an agent's eye. Ids are always made: they resolve what is pointed at, and tell what
-/// is in view.
-fn view_of(world: &World, agent: AgentId, senses: Senses) -> View {
-    let channels = Channels { ids: true, ..Channels::from(senses) };
-    View::of_agent(world, agent, senses.image_size, channels)
+/// Returns the view of an agent's camera. Ids are always rendered: they resolve pixels in actions and
+/// determine the visible entities.
+fn view(world: &World, agent: AgentId, sensors: SensorConfig) -> View {
+    let channels = Channels { ids: true, ..Channels::from(sensors) };
+    View::from_agent(world, agent, sensors.image_size, channels)
 }
 
-fn glimpse(world: &World, agent: AgentId, seat: &Seat, mut images: Images) -> Glimpse {
-    let in_view = images.ids.as_deref().map_or(Vec::new(), present);
-    let hidden_ids = strip(&mut images, seat.senses, seat.grants.ids);
-    let observation = observation(world, agent, seat, &in_view, images);
-    Glimpse { observation, hidden_ids, may_name_entities: seat.grants.ids }
+fn rendered_observation(
+    world: &World,
+    agent: AgentId,
+    slot: &AgentSlot,
+    mut images: Images,
+) -> RenderedObservation {
+    let in_view = images.ids.as_deref().map_or(Vec::new(), visible_entities);
+    let hidden_ids = strip(&mut images, slot.sensors, slot.grants.ids);
+    let observation = observation(world, agent, slot, &in_view, images);
+    RenderedObservation { observation, hidden_ids, may_name_entities: slot.grants.ids }
 }
 
 fn observation(
     world: &World,
     agent: AgentId,
-    seat: &Seat,
+    slot: &AgentSlot,
     in_view: &[EntityId],
     images: Images,
 ) -> Observation {
     Observation {
         frame: world.state().frame,
-        own: world.own_state(agent, seat.grants, last_action(world, agent, seat)),
-        camera: world.eye(agent, seat.senses.image_size),
+        proprioception: world.proprioception(agent, slot.grants, last_action(world, agent, slot)),
+        camera: world.camera(agent, slot.sensors.image_size),
         images,
-        film: Vec::new(),
-        granted: world.granted(agent, seat.grants, in_view),
+        frame_history: Vec::new(),
+        granted: world.granted(agent, slot.grants, in_view),
     }
 }
 
-/// The last action of an agent with its outcome, in the agent's own words.
+/// Returns the last action of an agent as the agent submitted it, with its outcome.
 fn last_action(
     world: &World,
     agent: AgentId,
-    seat: &Seat,
+    slot: &AgentSlot,
 ) -> Option<(Action, chaic_core::Outcome)> {
     let (done, outcome) = world.last_action(agent)?;
-    let meant = seat.submitted.filter(|(_, resolved)| *resolved == done).map(|(meant, _)| meant);
-    let told = || seat.grants.ids.then(|| done.map(Target::Entity));
-    Some((meant.or_else(told)?, outcome))
+    let submitted =
+        slot.submitted.filter(|(_, resolved)| *resolved == done).map(|(action, _)| action);
+    let resolved = || slot.grants.ids.then(|| done.map(Target::Entity));
+    Some((submitted.or_else(resolved)?, outcome))
 }
 
-/// The objects and people whose ids an image holds, in the order of ids.
-fn present(ids: &[u16]) -> Vec<EntityId> {
-    let mut is_there = [0_u64; 1 << 10];
-    pulp::Arch::new().dispatch(MarkPresent { ids, is_there: &mut is_there });
+/// Returns the objects and people in an id image, in the order of ids.
+fn visible_entities(ids: &[u16]) -> Vec<EntityId> {
+    let mut is_present = [0_u64; 1 << 10];
+    pulp::Arch::new().dispatch(MarkPresent { ids, is_present: &mut is_present });
     let ids_of = |(word, bits): (usize, &u64)| {
         let bits = *bits;
         let set = (0..64_u16).filter(move |k| bits >> k & 1 == 1);
         set.map(move |k| EntityId(64 * word as u16 + k))
     };
-    let named = |e: &EntityId| e.is_object() || e.agent().is_some();
-    is_there
+    let is_object_or_agent = |e: &EntityId| e.is_object() || e.agent().is_some();
+    is_present
         .iter()
         .enumerate()
         .filter(|(_, bits)| **bits != 0)
         .flat_map(ids_of)
-        .filter(named)
+        .filter(is_object_or_agent)
         .collect()
 }
 
-/// Sets the bit of each id of an image, compiled for vectors of each width.
+/// Sets the bit of each id of an image; compiled for each SIMD width.
 struct MarkPresent<'a> {
     ids: &'a [u16],
-    is_there: &'a mut [u64; 1 << 10],
+    is_present: &'a mut [u64; 1 << 10],
 }
 
 impl pulp::NullaryFnOnce for MarkPresent<'_> {
@@ -229,30 +239,30 @@ impl pulp::NullaryFnOnce for MarkPresent<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let MarkPresent { ids, is_there } = self;
-        let (chunks, rest) = ids.as_chunks::<32>();
+        let MarkPresent { ids, is_present } = self;
+        let (chunks, remainder) = ids.as_chunks::<32>();
         let mut mark = |ids: &[u16]| {
-            ids.iter().for_each(|id| is_there[usize::from(id >> 6)] |= 1 << (id & 63));
+            ids.iter().for_each(|id| is_present[usize::from(id >> 6)] |= 1 << (id & 63));
         };
         let mut last = EntityId::NOTHING.0;
         for chunk in chunks {
-            // Neighboring pixels mostly show the same thing.
-            if chunk.iter().fold(false, |is_news, id| is_news | (*id != last)) {
+            // Neighboring pixels mostly show the same entity.
+            if chunk.iter().fold(false, |differs, id| differs | (*id != last)) {
                 mark(chunk);
                 last = chunk[31];
             }
         }
-        mark(rest);
+        mark(remainder);
     }
 }
 
-/// Takes away what wasn't asked for or isn't granted; ids that were taken away.
-fn strip(images: &mut Images, senses: Senses, may_have_ids: bool) -> Option<Vec<u16>> {
-    if !senses.rgb {
+/// Removes images that are not requested or not granted; returns the removed ids.
+fn strip(images: &mut Images, sensors: SensorConfig, may_have_ids: bool) -> Option<Vec<u16>> {
+    if !sensors.rgb {
         images.rgb = None;
     }
-    if !senses.depth {
+    if !sensors.depth {
         images.depth_m = None;
     }
-    if senses.ids && may_have_ids { None } else { images.ids.take() }
+    if sensors.ids && may_have_ids { None } else { images.ids.take() }
 }

@@ -1,36 +1,36 @@
-//! Helpers whose random streams differ from episode to episode, for training and data collection.
+//! Helpers with a different random stream in each episode, for training and data collection.
 
 use std::collections::BTreeMap;
 
 use chaic_core::agent::{ChildState, Thought};
-use chaic_core::observation::Senses;
+use chaic_core::observation::SensorConfig;
 use chaic_core::{Action, Agent, AgentError, AgentId, Briefing, Observation};
 use chaic_world::episode_stream;
 
+use crate::agent_slot::world_seed;
 use crate::config::EpisodeConfig;
-use crate::minds::Helper;
-use crate::seat::world_seed;
+use crate::helper_registry::Helper;
 
-/// An agent with another seed in its briefing.
+/// Agent whose briefing has another seed.
 struct Reseeded {
     agent: Box<dyn Agent>,
     seed: u64,
 }
 
-/// Returns the helper with a seed that differs between episodes, in place of the briefing's.
+/// Returns the helper with a seed per episode in place of the briefing's seed.
 ///
-/// The seed in a helper's briefing is the same in all episodes of a run, so that a policy that samples
-/// its actions would draw the same numbers in each. Trainings and collections of data use this
-/// function. Scored runs must not: the seed identifies the episode.
+/// The seed in a helper's briefing is the same in all episodes of a run, so a policy that samples its
+/// actions would draw the same numbers in each. Training and data collection use this function. Scored
+/// runs must not: the seed identifies the episode.
 pub fn seeded_by_episode(helper: Helper, config: &EpisodeConfig<'_>) -> Helper {
-    let of_world = world_seed(config.episode.setup().seed, config.seed);
-    let seed = episode_stream(of_world, AgentId::HELPER).seed();
-    Helper { mind: Box::new(Reseeded { agent: helper.mind, seed }), grants: helper.grants }
+    let seed_of_world = world_seed(config.episode.setup().seed, config.seed);
+    let seed = episode_stream(seed_of_world, AgentId::HELPER).seed();
+    Helper { agent: Box::new(Reseeded { agent: helper.agent, seed }), grants: helper.grants }
 }
 
 impl Agent for Reseeded {
-    fn senses(&self) -> Senses {
-        self.agent.senses()
+    fn sensors(&self) -> SensorConfig {
+        self.agent.sensors()
     }
 
     fn reset(&mut self, briefing: &Briefing) {
@@ -53,8 +53,8 @@ impl Agent for Reseeded {
         self.agent.child_state()
     }
 
-    fn counts(&self) -> BTreeMap<String, u64> {
-        self.agent.counts()
+    fn counters(&self) -> BTreeMap<String, u64> {
+        self.agent.counters()
     }
 
     fn fork(&self) -> Option<Box<dyn Agent>> {

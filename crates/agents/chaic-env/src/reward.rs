@@ -1,160 +1,247 @@
-//! What a learner is rewarded for.
+//! Rewards for training. They are ground truth that no agent observes.
 
-use chaic_core::AgentId;
 use chaic_core::geom::horizontal_distance;
-use chaic_world::{Place, World};
+use chaic_core::{AgentId, Frame};
+use chaic_world::{ObjectLocation, World};
 use serde::{Deserialize, Serialize};
 
-/// What came of one action of an agent, in the terms of the paper's reward: "a linear combination of
-/// transported objects and distance to the nearest target object. A penalty is also applied for each
-/// invalid action" (paper, appendix, "RL Baseline").
+/// Weights of the terms of a reward; 0 disables a term.
 ///
-/// These are facts of the world that no helper is told: they are for training.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct RewardTerms {
-    /// Share of all that is wanted which was delivered meanwhile, by whomever: 0 to 1.
-    pub delivered: f64,
-    /// By how much shorter the agent's way to its next delivery has become, metres: in a straight
-    /// line to the target for which that way is shortest and from there to the goal place. Targets that
-    /// somebody took, dropped or delivered meanwhile are left out, so that what others do neither
-    /// rewards nor punishes, and going to and fro earns nothing.
-    pub approached_m: f64,
-    /// Whether the action has ended and failed.
-    pub is_invalid: bool,
-}
-
-/// How much each term counts. The paper doesn't tell its own.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// A reward per action has the terms of [`RewardTerms`], a cumulative reward those of
+/// [`RewardTracker::cumulative`]. The paper rewards transported objects and the distance to the nearest
+/// target, and penalizes invalid actions (appendix, "RL Baseline"). It does not state its weights.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RewardWeights {
-    /// For everything that is wanted.
+    /// Delivery of all wanted objects, by any agent.
     pub delivered: f64,
-    /// For each metre.
-    pub approached_per_m: f64,
-    /// Taken off for an invalid action.
+    /// Delivery of all wanted objects by the agent itself; varies less with the partner's behavior.
+    pub own_delivered: f64,
+    /// Holding all wanted objects; taken back on delivery, on a drop and at the end of the episode.
+    pub held: f64,
+    /// Penalty per meter of remaining distance to the next delivery.
+    pub remaining_per_m: f64,
+    /// Reward per meter of progress to the next delivery during an action.
+    pub progress_per_m: f64,
+    /// Penalty per failed action of the agent other than steps, turns and waits.
+    pub failed: f64,
+    /// Penalty per failed action of any kind.
     pub invalid: f64,
+    /// Penalty for a child that is away from its guardian during the whole episode.
+    pub emergency: f64,
 }
 
 impl RewardWeights {
-    /// Ours, but for the penalty: 0.1 for each invalid action is the only reward in the original's
-    /// code (facts S2.4). A target of ten delivered is worth as much as 20 metres of approach: about
-    /// the way of one delivery in a house.
-    pub const STANDARD: RewardWeights =
-        RewardWeights { delivered: 10.0, approached_per_m: 0.05, invalid: 0.1 };
+    /// No reward.
+    pub const NONE: RewardWeights = RewardWeights {
+        delivered: 0.0,
+        own_delivered: 0.0,
+        held: 0.0,
+        remaining_per_m: 0.0,
+        progress_per_m: 0.0,
+        failed: 0.0,
+        invalid: 0.0,
+        emergency: 0.0,
+    };
+    /// Default weights per action.
+    ///
+    /// The penalty of 0.1 per invalid action is the only reward in the original code (facts S2.4). One
+    /// delivered object of ten counts as much as 20 meters of progress, about one delivery in a house.
+    pub const STANDARD: RewardWeights = RewardWeights {
+        delivered: 10.0,
+        progress_per_m: 0.05,
+        invalid: 0.1,
+        ..RewardWeights::NONE
+    };
+    /// Default weights of a cumulative reward, for policies that choose plans.
+    pub const CUMULATIVE: RewardWeights = RewardWeights {
+        delivered: 5.0,
+        own_delivered: 5.0,
+        held: 2.0,
+        emergency: 0.5,
+        ..RewardWeights::NONE
+    };
+}
+
+/// Terms of the reward for one action.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RewardTerms {
+    /// Fraction of all wanted objects that was delivered since the start of the action, by any agent,
+    /// 0 to 1.
+    pub delivered: f64,
+    /// Decrease of the remaining distance to the next delivery, meters: in straight lines to the best
+    /// target and from there to the goal place. Targets that were taken, dropped or delivered during the
+    /// action do not count, so other agents' actions have no effect and going back and forth earns nothing.
+    pub progress_m: f64,
+    /// True if the action has ended and failed.
+    pub is_invalid: bool,
 }
 
 impl RewardTerms {
-    /// The reward.
+    /// Returns the weighted sum of the terms.
     pub fn weigh(&self, weights: &RewardWeights) -> f64 {
-        weights.delivered * self.delivered + weights.approached_per_m * self.approached_m
+        weights.delivered * self.delivered + weights.progress_per_m * self.progress_m
             - if self.is_invalid { weights.invalid } else { 0.0 }
     }
+}
 
-    /// What has come of an action that was begun as things stood `before`.
-    pub(crate) fn between(before: &Standing, world: &World, agent: AgentId) -> RewardTerms {
-        let person = world.state().people.get(agent.index());
-        let is_under_way = person.is_none_or(|p| p.activity.is_some());
-        let now = Standing::of(world, agent);
-        let both = || before.ways_m.iter().zip(&now.ways_m).filter_map(|(a, b)| (*a).zip(*b));
-        let shortest = |ways: &mut dyn Iterator<Item = f32>| ways.min_by(f32::total_cmp);
+/// Reward state of one agent in an episode.
+#[derive(Clone, Debug)]
+pub struct RewardTracker {
+    agent: AgentId,
+    /// State when the agent last chose an action.
+    action_start: Option<ActionStart>,
+    /// Failed actions other than steps, turns and waits.
+    n_failed: u32,
+    /// End of the last counted action.
+    last_interaction: Option<Frame>,
+}
+
+impl RewardTracker {
+    /// Creates the state at the start of an episode.
+    pub fn new(agent: AgentId) -> RewardTracker {
+        RewardTracker { agent, action_start: None, n_failed: 0, last_interaction: None }
+    }
+
+    /// Returns the reward accumulated since the start of the episode.
+    ///
+    /// The reward between two frames is the difference of their cumulative rewards. The method counts
+    /// failed actions, so call it in every frame in which an agent decides.
+    pub fn cumulative(&mut self, world: &World, weights: &RewardWeights) -> f32 {
+        let interaction =
+            world.state().agents.get(self.agent.index()).and_then(|agent| agent.last_interaction);
+        if let Some((frame, _, outcome)) = interaction
+            && self.last_interaction != Some(frame)
+        {
+            self.last_interaction = Some(frame);
+            self.n_failed += u32::from(!outcome.is_success());
+        }
+        let totals = RewardTotals::new(world, self.agent);
+        // Holding an object or being near one is worth nothing at the end of the episode.
+        let (held, remaining_per_m) = if world.is_over() {
+            (0.0, 0.0)
+        } else {
+            (weights.held as f32, weights.remaining_per_m as f32)
+        };
+        weights.delivered as f32 * totals.delivered as f32
+            + weights.own_delivered as f32 * totals.own_delivered as f32
+            + held * totals.held as f32
+            - remaining_per_m * totals.remaining_m as f32
+            - weights.failed as f32 * self.n_failed as f32
+            - weights.emergency as f32 * totals.emergency as f32
+    }
+
+    /// Stores the state at the start of an action.
+    pub(crate) fn begin_action(&mut self, world: &World) {
+        self.action_start = Some(ActionStart::new(world, self.agent));
+    }
+
+    /// Returns the terms of the last action up to now; `None` before the first one.
+    pub(crate) fn action_terms(&self, world: &World) -> Option<RewardTerms> {
+        let start = self.action_start.as_ref()?;
+        let agent_state = world.state().agents.get(self.agent.index());
+        let is_under_way = agent_state.is_none_or(|agent| agent.activity.is_some());
+        let now = ActionStart::new(world, self.agent);
+        let both =
+            || start.remaining_m.iter().zip(&now.remaining_m).filter_map(|(a, b)| (*a).zip(*b));
+        let shortest = |distances: &mut dyn Iterator<Item = f32>| distances.min_by(f32::total_cmp);
         let before_m = shortest(&mut both().map(|(a, _)| a));
         let now_m = shortest(&mut both().map(|(_, b)| b));
-        RewardTerms {
-            delivered: now.done - before.done,
-            approached_m: before_m.zip(now_m).map_or(0.0, |(a, b)| f64::from(a - b)),
+        Some(RewardTerms {
+            delivered: now.delivered - start.delivered,
+            progress_m: before_m.zip(now_m).map_or(0.0, |(a, b)| f64::from(a - b)),
             is_invalid: !is_under_way
-                && world.last_action(agent).is_some_and(|(_, outcome)| !outcome.is_success()),
-        }
+                && world.last_action(self.agent).is_some_and(|(_, outcome)| !outcome.is_success()),
+        })
     }
 }
 
-/// Totals of what can be rewarded, as an episode stands for an agent: what it earns between two moments is by how
-/// much they differ.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Totals {
-    /// Share of all that is wanted which is delivered, by whomever: 0 to 1.
-    pub delivered: f64,
-    /// Share of it that the agent itself has delivered.
-    pub own: f64,
-    /// Share of it that the agent holds, in its hands or in a container there.
-    pub held: f64,
-    /// Share of the frames of the whole episode in which the child was away from its guardian.
-    pub emergency: f64,
-    /// The agent's way to its next delivery, metres, in straight lines; 0 if there is nothing to deliver.
-    pub way_m: f64,
+/// Terms of a cumulative reward.
+struct RewardTotals {
+    /// Fraction of all wanted objects that is delivered, 0 to 1.
+    delivered: f64,
+    /// Fraction that the agent itself delivered.
+    own_delivered: f64,
+    /// Fraction that the agent holds, in its hands or in a held container.
+    held: f64,
+    /// Fraction of the episode's frames in which the child was away from its guardian.
+    emergency: f64,
+    /// Distance to the next delivery in straight lines, meters; 0 without a deliverable object.
+    remaining_m: f64,
 }
 
-impl Totals {
-    /// Those of a world.
-    pub fn of(world: &World, agent: AgentId) -> Totals {
+impl RewardTotals {
+    fn new(world: &World, agent: AgentId) -> RewardTotals {
         let (setup, state) = (world.setup(), world.state());
         let (done, total) = world.progress();
-        let share = |worth: f64| if total > 0.0 { worth / total } else { 0.0 };
-        let n_things = setup.things.len();
-        let worth = |is_counted: &dyn Fn(usize) -> bool| -> f64 {
-            let wanted = |k: &usize| setup.goal.wanted(setup.things[*k].class) > 0;
-            let counted = (0..n_things).filter(wanted).filter(|k| is_counted(*k));
-            counted.map(|k| world.worth(setup.things[k].class)).sum()
+        let fraction = |amount: f64| if total > 0.0 { amount / total } else { 0.0 };
+        let n_objects = setup.things.len();
+        let amount = |is_counted: &dyn Fn(usize) -> bool| -> f64 {
+            let wanted = |k: &usize| setup.goal.count(setup.things[*k].class) > 0;
+            let counted = (0..n_objects).filter(wanted).filter(|k| is_counted(*k));
+            counted.map(|k| world.target_value(setup.things[k].class)).sum()
         };
-        let ways = (0..n_things).filter_map(|k| way_m(world, agent, k));
-        Totals {
-            delivered: share(done),
-            own: share(worth(&|k| state.things[k].delivered_by == Some(agent))),
-            held: share(worth(&|k| holder(world, k) == Some(agent))),
+        let distances = (0..n_objects).filter_map(|k| remaining_distance_m(world, agent, k));
+        RewardTotals {
+            delivered: fraction(done),
+            own_delivered: fraction(amount(&|k| state.objects[k].delivered_by == Some(agent))),
+            held: fraction(amount(&|k| holder(world, k) == Some(agent))),
             emergency: f64::from(state.child_away_frames) / f64::from(setup.horizon.max(1)),
-            way_m: ways.min_by(f32::total_cmp).map_or(0.0, f64::from),
+            remaining_m: distances.min_by(f32::total_cmp).map_or(0.0, f64::from),
         }
     }
 }
 
-/// How an episode stands for an agent.
+/// State at the start of an action.
 #[derive(Clone, Debug)]
-pub(crate) struct Standing {
-    /// Share of what is wanted that is delivered.
-    done: f64,
-    /// The agent's way by each thing to a goal place, metres; `None` for what it can't deliver now.
-    ways_m: Vec<Option<f32>>,
+struct ActionStart {
+    /// Fraction of all wanted objects that is delivered.
+    delivered: f64,
+    /// Remaining distance by way of each object, meters; `None` for objects that the agent can't deliver.
+    remaining_m: Vec<Option<f32>>,
 }
 
-impl Standing {
-    pub(crate) fn of(world: &World, agent: AgentId) -> Standing {
+impl ActionStart {
+    fn new(world: &World, agent: AgentId) -> ActionStart {
         let (done, total) = world.progress();
-        let n_things = world.setup().things.len();
-        Standing {
-            done: if total > 0.0 { done / total } else { 0.0 },
-            ways_m: (0..n_things).map(|k| way_m(world, agent, k)).collect(),
+        let n_objects = world.setup().things.len();
+        ActionStart {
+            delivered: if total > 0.0 { done / total } else { 0.0 },
+            remaining_m: (0..n_objects).map(|k| remaining_distance_m(world, agent, k)).collect(),
         }
     }
 }
 
-/// The length of an agent's way by a target to the nearest goal place, in straight lines; the way to
-/// the goal place alone if the agent carries it.
-fn way_m(world: &World, agent: AgentId, index: usize) -> Option<f32> {
+/// Returns the straight-line distance from an agent by way of a target to the nearest goal place, meters.
+///
+/// A carried target counts the distance to the goal place only. `None` if the agent can't deliver the
+/// object.
+fn remaining_distance_m(world: &World, agent: AgentId, index: usize) -> Option<f32> {
     let (setup, state) = (world.setup(), world.state());
-    let (class, thing) = (setup.things[index].class, &state.things[index]);
+    let (class, object) = (setup.things[index].class, &state.objects[index]);
     let wanted = setup.goal.targets.iter().find(|(c, _)| *c == class).map_or(0, |(_, n)| *n);
-    let is_gone = thing.delivered.is_some() || thing.place == Place::Broken;
+    let is_gone = object.delivered.is_some() || object.location == ObjectLocation::Broken;
     if is_gone || world.n_delivered(class) >= wanted {
         return None;
     }
-    let here = state.people.get(agent.index())?.pose.position;
+    let position = state.agents.get(agent.index())?.pose.position;
     let to_goal_m = |from| {
         let goals = setup.goal_places.iter().filter_map(|goal| setup.thing_index(*goal));
-        let ways = goals.map(|k| horizontal_distance(from, state.things[k].position));
-        ways.min_by(f32::total_cmp)
+        let distances = goals.map(|k| horizontal_distance(from, state.objects[k].position));
+        distances.min_by(f32::total_cmp)
     };
     match holder(world, index) {
-        Some(by) if by == agent => to_goal_m(here),
+        Some(by) if by == agent => to_goal_m(position),
         Some(_) => None,
-        None => Some(horizontal_distance(here, thing.position) + to_goal_m(thing.position)?),
+        None => Some(horizontal_distance(position, object.position) + to_goal_m(object.position)?),
     }
 }
 
-/// Who holds a thing, or the container that it is in.
+/// Returns the agent that holds an object or its container.
 fn holder(world: &World, index: usize) -> Option<AgentId> {
     let state = world.state();
-    let outer = match state.things[index].place {
-        Place::Inside { container, .. } => world.setup().thing_index(container)?,
+    let outer = match state.objects[index].location {
+        ObjectLocation::Inside { container, .. } => world.setup().thing_index(container)?,
         _ => index,
     };
-    state.things[outer].holder()
+    state.objects[outer].holder()
 }

@@ -1,5 +1,4 @@
-//! The rules that a run is played by: the world's and the planners' together, by name, with single
-//! rules set otherwise for experiments.
+//! Rules of a run: those of the world and of the planners, as named sets with overrides of single rules.
 
 use std::fmt;
 use std::str::FromStr;
@@ -11,13 +10,13 @@ use serde_json::Value;
 
 use crate::error::{EnvError, Result};
 
-/// Names a rule set.
+/// Name of a rule set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RuleSetName {
-    /// What the paper says and means.
+    /// Rules of the paper.
     Paper,
-    /// What the original's released code does.
+    /// Rules of the original's released code.
     Compat,
 }
 
@@ -25,27 +24,27 @@ pub enum RuleSetName {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RuleSet {
-    /// Which set it is, or began as.
+    /// Set, before overrides.
     pub name: RuleSetName,
-    /// By which the world goes on.
+    /// Rules of the world.
     pub world: Rules,
-    /// By which minds plan.
+    /// Rules of the planners.
     pub planner: PlannerRules,
 }
 
 impl RuleSet {
-    /// The paper's.
+    /// Rules of the paper.
     pub const PAPER: RuleSet =
         RuleSet { name: RuleSetName::Paper, world: Rules::paper(), planner: PlannerRules::paper() };
 
-    /// The original code's.
+    /// Rules of the original code.
     pub const COMPAT: RuleSet = RuleSet {
         name: RuleSetName::Compat,
         world: Rules::compat(),
         planner: PlannerRules::compat(),
     };
 
-    /// The set of this name.
+    /// Returns the set of this name.
     pub const fn named(name: RuleSetName) -> RuleSet {
         match name {
             RuleSetName::Paper => RuleSet::PAPER,
@@ -53,11 +52,11 @@ impl RuleSet {
         }
     }
 
-    /// The same with one rule set otherwise by `NAME=VALUE`, for example
-    /// `world.dropped_counts=true`; a VALUE of `paper` or `compat` takes that set's.
+    /// Returns the set with one rule changed by `NAME=VALUE`, such as `world.dropped_counts=true`. The
+    /// values `paper` and `compat` copy the rule of that set.
     ///
     /// # Errors
-    /// [`EnvError::Rule`] that lists all names, or says what is wrong with the value.
+    /// [`EnvError::Rule`] with all names, or with the problem of the value.
     ///
     /// ```
     /// use chaic_env::rules::RuleSet;
@@ -76,30 +75,30 @@ impl RuleSet {
         let old = old.ok_or_else(|| {
             wrong(format!("no rule `{name}`; the rules are {}", rule_names().join(", ")))
         })?;
-        let of_set = text.parse().ok().map(|set| RuleSet::named(set).to_value());
-        let new = match of_set.as_ref().and_then(|set| set.pointer(&pointer)) {
+        let named_set = text.parse().ok().map(|set| RuleSet::named(set).to_value());
+        let new = match named_set.as_ref().and_then(|set| set.pointer(&pointer)) {
             Some(value) => value.clone(),
             None if old.is_string() => Value::String(text.to_owned()),
             None => serde_json::from_str(text).map_err(|_| wrong(expected(old)))?,
         };
         let hint = expected(old);
-        if let Some(place) = all.pointer_mut(&pointer) {
-            *place = new;
+        if let Some(value) = all.pointer_mut(&pointer) {
+            *value = new;
         }
-        let made: RuleSet =
+        let changed: RuleSet =
             serde_json::from_value(all).map_err(|e| wrong(format!("{hint}: {e}")))?;
-        made.check_motion().map_err(wrong)?;
-        Ok(made)
+        changed.check_motion().map_err(wrong)?;
+        Ok(changed)
     }
 
-    /// Planners divide by the length of a turn and of a step.
+    /// Checks the lengths of a turn and of a step; planners divide by them.
     fn check_motion(&self) -> std::result::Result<(), String> {
         let Rules { turn_rad, stride_m, .. } = self.world;
-        for (name, value, most) in
+        for (name, value, max) in
             [("turn_rad", turn_rad, std::f32::consts::PI), ("stride_m", stride_m, 10.0)]
         {
-            if !(0.01..=most).contains(&value) {
-                return Err(format!("`world.{name}` is from 0.01 to {most:.2}"));
+            if !(0.01..=max).contains(&value) {
+                return Err(format!("`world.{name}` is from 0.01 to {max:.2}"));
             }
         }
         Ok(())
@@ -114,7 +113,7 @@ fn expected(old: &Value) -> String {
     format!("expected paper, compat or a value like {old}")
 }
 
-/// The names of all single rules, as `--set` takes them.
+/// Returns the names of all rules, as `--set` takes them.
 pub fn rule_names() -> Vec<String> {
     fn collect(prefix: &str, value: &Value, names: &mut Vec<String>) {
         match value {
@@ -134,7 +133,7 @@ pub fn rule_names() -> Vec<String> {
     names
 }
 
-/// The names of the rules in which the two sets differ.
+/// Returns the names of the rules that differ between the two sets.
 pub fn differing_rules() -> Vec<String> {
     let (paper, compat) = (RuleSet::PAPER.to_value(), RuleSet::COMPAT.to_value());
     let differs = |name: &String| {
@@ -144,22 +143,22 @@ pub fn differing_rules() -> Vec<String> {
     rule_names().into_iter().filter(differs).collect()
 }
 
-/// The value of a single rule in both sets, paper's first, as `--set` would take it.
+/// Returns the value of a rule in both sets, the paper's first, as `--set` takes it.
 ///
 /// # Errors
-/// [`EnvError::Rule`] that lists all names.
+/// [`EnvError::UnknownRule`] with all names.
 pub fn rule_values(name: &str) -> Result<(String, String)> {
     let pointer = format!("/{}", name.replace('.', "/"));
-    let of = |set: RuleSet| {
+    let value_in = |set: RuleSet| {
         let value = set.to_value().pointer(&pointer).filter(|v| !v.is_object()).cloned();
         value.map(|v| match &v {
             Value::String(text) => text.clone(),
-            // Rules are single precision: without the digits that only a double has.
+            // Rules have single precision: print no digits of a double.
             Value::Number(n) if n.is_f64() => format!("{:?}", n.as_f64().unwrap_or(0.0) as f32),
             other => other.to_string(),
         })
     };
-    let values = of(RuleSet::PAPER).zip(of(RuleSet::COMPAT)).filter(|_| name != "name");
+    let values = value_in(RuleSet::PAPER).zip(value_in(RuleSet::COMPAT)).filter(|_| name != "name");
     values.ok_or_else(|| {
         let known = rule_names();
         EnvError::UnknownRule { name: name.to_owned(), known }
@@ -167,7 +166,7 @@ pub fn rule_values(name: &str) -> Result<(String, String)> {
 }
 
 impl RuleSetName {
-    /// The name in commands.
+    /// Returns the name on the command line.
     pub fn as_str(self) -> &'static str {
         match self {
             RuleSetName::Paper => "paper",

@@ -24,7 +24,7 @@ pub enum Track {
     Hidden,
 }
 
-/// What a track allows and requires.
+/// Bounds and requirements of a track.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TrackInfo {
     /// Name in commands and files.
@@ -33,24 +33,24 @@ pub struct TrackInfo {
     pub allowed: Grants,
     /// Perception and behavior recognition that helpers must use, with or without a file of weights
     /// (`learned`, `learned:FILE`); `None` for any.
-    pub sight: Option<&'static str>,
-    /// Whether rules are allowed that disclose what no grant gives.
+    pub perception: Option<&'static str>,
+    /// True if rules are allowed that disclose information without a grant.
     pub allows_disclosing_rules: bool,
-    /// Whether helpers in other processes may run in a sandbox with a missing part.
+    /// True if helpers in other processes may run in a sandbox that lacks a part.
     pub allows_partial_sandbox: bool,
 }
 
 const TOLD: TrackInfo = TrackInfo {
     name: "told",
     allowed: Grants::ALL,
-    sight: None,
+    perception: None,
     allows_disclosing_rules: true,
     allows_partial_sandbox: true,
 };
 const HIDDEN: TrackInfo = TrackInfo {
     name: "hidden",
     allowed: Grants { goal_place: true, ..Grants::NONE },
-    sight: Some("learned"),
+    perception: Some("learned"),
     allows_disclosing_rules: false,
     allows_partial_sandbox: false,
 };
@@ -120,12 +120,12 @@ impl Track {
     ///
     /// # Errors
     /// One line with the option, its value and the track.
-    pub fn check_sight(
+    pub fn check_perception(
         self,
         perception: Option<&str>,
         behavior: Option<&str>,
     ) -> Result<(), String> {
-        let TrackInfo { name, sight: Some(required), .. } = self.info() else { return Ok(()) };
+        let TrackInfo { name, perception: Some(required), .. } = self.info() else { return Ok(()) };
         for (option, given) in [("--perception", perception), ("--behavior", behavior)] {
             let kind = given.map(|given| given.split_once(':').map_or(given, |(kind, _)| kind));
             if kind != Some(required) {
@@ -161,8 +161,8 @@ impl Track {
 
     /// Returns the perception or behavior recognition to play by: the given one, or the one that the
     /// track requires.
-    pub fn sight_or(self, given: Option<String>) -> Option<String> {
-        given.or_else(|| self.info().sight.map(str::to_owned))
+    pub fn perception_or(self, given: Option<String>) -> Option<String> {
+        given.or_else(|| self.info().perception.map(str::to_owned))
     }
 }
 
@@ -188,7 +188,7 @@ mod tests {
     #[test]
     fn the_hidden_track_refuses_each_grant_but_the_goal_place() {
         for (name, _) in Grants::NONE.named() {
-            let grants = Grants::of_names([name]).unwrap();
+            let grants = Grants::from_names([name]).unwrap();
             assert_eq!(Track::Told.check_grants("mine", grants), Ok(()));
             let checked = Track::Hidden.check_grants("mine", grants);
             if name == "goal_place" {
@@ -196,8 +196,8 @@ mod tests {
                 continue;
             }
             let refused = checked.unwrap_err();
-            for said in ["`mine`", name, "hidden track", "allows goal_place"] {
-                assert!(refused.contains(said), "{said}: {refused}");
+            for expected in ["`mine`", name, "hidden track", "allows goal_place"] {
+                assert!(refused.contains(expected), "{expected}: {refused}");
             }
         }
         let refused = Track::Hidden.check_grants("mine", Grants::ALL).unwrap_err();
@@ -206,14 +206,14 @@ mod tests {
 
     #[test]
     fn the_hidden_track_needs_learned_perception_and_behavior() {
-        let check = |perception, behavior| Track::Hidden.check_sight(perception, behavior);
+        let check = |perception, behavior| Track::Hidden.check_perception(perception, behavior);
         assert_eq!(check(Some("learned"), Some("learned:mine.safetensors")), Ok(()));
         for (perception, behavior) in
             [(None, Some("learned")), (Some("learned"), Some("gt")), (Some("learnedly"), None)]
         {
             assert!(check(perception, behavior).unwrap_err().contains("hidden track needs"));
         }
-        assert_eq!(Track::Told.check_sight(None, None), Ok(()));
+        assert_eq!(Track::Told.check_perception(None, None), Ok(()));
     }
 
     #[test]
@@ -228,7 +228,7 @@ mod tests {
             assert!(Track::Hidden.check_rules(&rules).unwrap_err().contains(name));
             rules = rules.with(&setting).unwrap();
         }
-        assert_eq!(Track::Hidden.check_rules(&rules), Ok(()), "all that was named is enough");
+        assert_eq!(Track::Hidden.check_rules(&rules), Ok(()), "all named settings suffice");
     }
 
     #[test]

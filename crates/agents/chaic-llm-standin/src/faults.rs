@@ -1,4 +1,4 @@
-//! All the ways in which endpoints fail.
+//! Faults of endpoints.
 
 use std::io::{self, Write as _};
 use std::net::TcpStream;
@@ -11,46 +11,46 @@ use crate::completion;
 use crate::http::{head, write_response};
 use crate::script::Question;
 
-/// Bytes of a much too long answer.
-const HUGE: usize = 10 << 20;
-/// Between two bytes of a slow answer.
-const DRIP: Duration = Duration::from_millis(20);
+/// Length of an oversized answer, bytes.
+const HUGE_LEN: usize = 10 << 20;
+/// Interval between two bytes of a slow answer.
+const DRIP_INTERVAL: Duration = Duration::from_millis(20);
 
-/// A way to fail.
+/// Kind of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FaultKind {
-    /// The connection breaks, and for a moment nobody listens.
+    /// The connection is reset, and new connections are refused for a moment.
     Refused,
-    /// The connection breaks.
+    /// The connection is reset.
     Reset,
-    /// Nothing comes.
+    /// There is no response.
     Timeout,
-    /// An answer comes byte by byte.
+    /// The response arrives byte by byte.
     SlowDrip,
-    /// Too many requests, with the time to wait.
+    /// Status 429 with a `retry-after` header.
     TooManyWithWait,
-    /// Too many requests.
+    /// Status 429.
     TooMany,
     /// Status 500.
     Internal,
     /// Status 503.
     Unavailable,
-    /// No body.
+    /// Empty body.
     Empty,
-    /// JSON that breaks off.
+    /// Truncated JSON.
     Truncated,
-    /// JSON that is no completion.
+    /// JSON that is not a completion.
     WrongSchema,
-    /// A plan that isn't in the list.
+    /// A plan that is not in the list.
     PlanNotListed,
-    /// Ten mebibytes.
+    /// A body of ten mebibytes.
     Huge,
-    /// Bytes that are no UTF-8.
+    /// Bytes that are not UTF-8.
     InvalidUtf8,
 }
 
 impl FaultKind {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [FaultKind; 14] = [
         FaultKind::Refused,
         FaultKind::Reset,
@@ -68,7 +68,7 @@ impl FaultKind {
         FaultKind::InvalidUtf8,
     ];
 
-    /// Its name.
+    /// Returns the name in commands.
     pub fn name(self) -> &'static str {
         match self {
             FaultKind::Refused => "refused",
@@ -88,31 +88,31 @@ impl FaultKind {
         }
     }
 
-    /// Fails; whether the connection stays open.
-    pub(crate) fn perform(
+    /// Sends a faulty response; returns whether the connection stays open.
+    pub(crate) fn send(
         self,
         stream: &mut TcpStream,
         question: &Question,
         stall: Duration,
     ) -> io::Result<bool> {
-        let whole = || completion(question, &question.answer()).to_string();
+        let complete = || completion(question, &question.answer()).to_string();
         match self {
-            // Done before anything is read.
+            // Handled before the request is read.
             FaultKind::Refused | FaultKind::Reset => Ok(false),
             FaultKind::Timeout => {
                 std::thread::sleep(stall);
                 Ok(false)
             }
             FaultKind::SlowDrip => {
-                let body = whole();
+                let body = complete();
                 stream.write_all(head(200, &[], body.len()).as_bytes())?;
-                let began = Instant::now();
+                let start = Instant::now();
                 for byte in body.as_bytes() {
-                    if began.elapsed() > stall {
+                    if start.elapsed() > stall {
                         break;
                     }
                     stream.write_all(&[*byte])?;
-                    std::thread::sleep(DRIP);
+                    std::thread::sleep(DRIP_INTERVAL);
                 }
                 Ok(false)
             }
@@ -120,13 +120,13 @@ impl FaultKind {
                 write_response(stream, 429, &[("retry-after", "1")], b"{\"error\":{}}")
             }
             FaultKind::TooMany => write_response(stream, 429, &[], b"slow down"),
-            FaultKind::Internal => write_response(stream, 500, &[], b"<h1>oh dear</h1>"),
+            FaultKind::Internal => write_response(stream, 500, &[], b"<h1>internal error</h1>"),
             FaultKind::Unavailable => write_response(stream, 503, &[], b""),
             FaultKind::Empty => write_response(stream, 200, &[], b""),
             FaultKind::Truncated => {
-                let body = whole();
+                let body = complete();
                 let part = &body.as_bytes()[..body.len() / 2];
-                // Every other one also promises more than comes.
+                // Bodies of odd length also have a content length that is too large.
                 if body.len() % 2 == 0 {
                     return write_response(stream, 200, &[], part);
                 }
@@ -139,17 +139,17 @@ impl FaultKind {
                 write_response(stream, 200, &[], body.to_string().as_bytes())
             }
             FaultKind::PlanNotListed => {
-                let text = question.form(9999, "There is a plan that nobody listed.");
+                let text = question.format_answer(9999, "There is a plan that nobody listed.");
                 let body = completion(question, &text).to_string();
                 write_response(stream, 200, &[], body.as_bytes())
             }
             FaultKind::Huge => {
-                let body = completion(question, &"x".repeat(HUGE)).to_string();
-                // The client may have had enough before the end.
+                let body = completion(question, &"x".repeat(HUGE_LEN)).to_string();
+                // The client may close the connection before the end.
                 write_response(stream, 200, &[], body.as_bytes()).map(|_| false)
             }
             FaultKind::InvalidUtf8 => {
-                let mut body = whole().into_bytes();
+                let mut body = complete().into_bytes();
                 let middle = body.len() / 2;
                 body[middle] = 0xff;
                 write_response(stream, 200, &[], &body)
@@ -165,35 +165,35 @@ impl FromStr for FaultKind {
         let found = FaultKind::ALL.into_iter().find(|k| k.name() == text);
         found.ok_or_else(|| {
             let names = FaultKind::ALL.map(FaultKind::name).join(", ");
-            format!("no fault `{text}`; they are {names}")
+            format!("unknown fault `{text}`; expected one of {names}")
         })
     }
 }
 
-/// What luck has in store for one request.
+/// Random draw for one request.
 #[derive(Clone, Copy, Debug)]
 pub struct Draw {
-    /// Of the whole server.
+    /// Seed of the server.
     pub seed: u64,
-    /// Of the request.
-    pub number: u64,
+    /// Index of the request.
+    pub index: u64,
 }
 
 impl Draw {
-    /// How the request fails, if it does.
+    /// Returns the fault of the request, if any.
     pub fn fault(self, faults: &[(FaultKind, f64)]) -> Option<FaultKind> {
-        let mut at = self.unit();
+        let mut remaining = self.unit();
         faults.iter().find_map(|(kind, rate)| {
-            let hit = at < *rate;
-            at -= rate;
-            hit.then_some(*kind)
+            let is_hit = remaining < *rate;
+            remaining -= rate;
+            is_hit.then_some(*kind)
         })
     }
 
-    /// A number in [0, 1): splitmix64.
+    /// Returns a number in [0, 1) by splitmix64.
     fn unit(self) -> f64 {
         let mut z =
-            self.seed.wrapping_add(self.number.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+            self.seed.wrapping_add(self.index.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
@@ -205,10 +205,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn faults_come_as_often_as_asked_for() {
+    fn faults_occur_at_their_rates() {
         let faults = [(FaultKind::Reset, 0.2), (FaultKind::Empty, 0.1)];
         let drawn: Vec<_> =
-            (0..10_000).map(|number| Draw { seed: 1, number }.fault(&faults)).collect();
+            (0..10_000).map(|index| Draw { seed: 1, index }.fault(&faults)).collect();
         let n = |kind| drawn.iter().filter(|d| **d == kind).count();
         assert!((1_900..2_100).contains(&n(Some(FaultKind::Reset))));
         assert!((900..1_100).contains(&n(Some(FaultKind::Empty))));

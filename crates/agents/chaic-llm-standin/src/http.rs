@@ -1,19 +1,19 @@
-//! As much of HTTP/1.1 as a test server needs; `httparse` reads the heads.
+//! Minimal HTTP/1.1 for a test server; `httparse` parses the heads.
 
 use std::io::{self, Read as _, Write as _};
 use std::net::TcpStream;
 
-/// Longest head, bytes.
+/// Maximum length of a request head, bytes.
 const MAX_HEAD: usize = 64 << 10;
-/// Longest body, bytes: ten pictures and more.
+/// Maximum length of a request body, bytes: more than ten images.
 const MAX_BODY: usize = 64 << 20;
 
-/// A request.
+/// An HTTP request.
 pub struct Request {
-    /// Its path, with what comes after a `?`.
+    /// Path with its query.
     pub path: String,
     headers: Vec<(String, String)>,
-    /// Its body.
+    /// Request body.
     pub body: Vec<u8>,
 }
 
@@ -22,27 +22,27 @@ impl Request {
         self.headers.iter().find(|(n, _)| n == name).map(|(_, v)| v.as_str())
     }
 
-    /// The key that it brings.
+    /// Returns the API key of the request.
     pub fn key(&self) -> Option<&str> {
         let bearer = self.header("authorization").and_then(|v| v.strip_prefix("Bearer "));
         bearer.or_else(|| self.header("api-key"))
     }
 }
 
-fn broken(what: &str) -> io::Error {
-    io::Error::new(io::ErrorKind::InvalidData, what)
+fn invalid(problem: &str) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, problem)
 }
 
-/// The next request; `None` where the client has hung up.
+/// Reads the next request; `None` if the client closed the connection.
 pub fn read_request(stream: &mut TcpStream) -> io::Result<Option<Request>> {
     let mut bytes = Vec::new();
     let mut chunk = [0; 8192];
     loop {
         if let Some((mut request, head)) = parse(&bytes)? {
             let length = request.header("content-length").map_or(Ok(0), str::parse);
-            let length: usize = length.map_err(|_| broken("a length that is no number"))?;
+            let length: usize = length.map_err(|_| invalid("content-length is not a number"))?;
             if length > MAX_BODY {
-                return Err(broken("the body is too long"));
+                return Err(invalid("the body is too long"));
             }
             request.body = bytes.split_off(head);
             while request.body.len() < length {
@@ -55,7 +55,7 @@ pub fn read_request(stream: &mut TcpStream) -> io::Result<Option<Request>> {
             return Ok(Some(request));
         }
         if bytes.len() > MAX_HEAD {
-            return Err(broken("the head is too long"));
+            return Err(invalid("the head is too long"));
         }
         let n = stream.read(&mut chunk)?;
         if n == 0 {
@@ -65,11 +65,11 @@ pub fn read_request(stream: &mut TcpStream) -> io::Result<Option<Request>> {
     }
 }
 
-/// The head, if it is whole, and where it ends.
+/// Parses a request head; returns it with its length in bytes, or `None` if it is incomplete.
 fn parse(bytes: &[u8]) -> io::Result<Option<(Request, usize)>> {
     let mut headers = [httparse::EMPTY_HEADER; 64];
     let mut head = httparse::Request::new(&mut headers);
-    match head.parse(bytes).map_err(|_| broken("no HTTP"))? {
+    match head.parse(bytes).map_err(|_| invalid("not HTTP"))? {
         httparse::Status::Partial => Ok(None),
         httparse::Status::Complete(end) => {
             let text = |v: &[u8]| String::from_utf8_lossy(v).into_owned();
@@ -94,7 +94,7 @@ pub fn write_response(
     Ok(true)
 }
 
-/// A response's head.
+/// Returns the head of a response.
 pub fn head(status: u16, headers: &[(&str, &str)], length: usize) -> String {
     let reason = match status {
         200 => "OK",

@@ -1,15 +1,15 @@
-//! A stand-in for a language model's endpoint: a small server on this machine that answers the
-//! protocol of chat completions by a script.
+//! Local server in place of a language model endpoint. It implements the chat completions protocol
+//! with scripted answers.
 //!
-//! **What it is**: something to try the pipeline on, and to test it against: it reads the text of
-//! the prompt it is sent and picks a plan by a few rules, and it fails in all the ways in which
-//! endpoints fail, as often as one likes. `cargo run -p chaic-llm-standin` starts it.
+//! **What it is**: a test endpoint for the pipeline. It selects a plan from the text of the prompt
+//! by fixed rules, and injects all kinds of endpoint failures at configurable rates. `cargo run -p
+//! chaic-llm-standin` starts it.
 //!
-//! **What it is not**: a language model. **Scores that are reached with it are not a language
-//! model's, and say nothing of any.** It knows nothing of chaic but the text it is sent.
+//! **What it is not**: a language model. **Scores reached with it are not those of a language
+//! model.** It knows nothing of chaic except the text of the prompt.
 //!
 //! **Invariants**
-//! - It listens on this machine only.
+//! - It listens on the local machine only.
 //! - The same requests in the same order get the same answers and faults.
 
 pub mod faults;
@@ -31,37 +31,37 @@ use faults::{Draw, FaultKind};
 use http::{Request, read_request, write_response};
 use script::Question;
 
-/// For how long nobody listens after a fault of the kind `refused`.
-const DEAF: Duration = Duration::from_millis(20);
+/// Time without a listener after a [`FaultKind::Refused`].
+const REFUSAL_TIME: Duration = Duration::from_millis(20);
 
-/// How it answers a question that it isn't failing.
-pub enum Manner {
-    /// By its script.
+/// Source of answers to requests without a fault.
+pub enum ResponseMode {
+    /// The script.
     Script,
-    /// As the caller says.
-    Say(Box<dyn Fn(&Question) -> String + Send + Sync>),
+    /// A function of the caller.
+    Function(Box<dyn Fn(&Question) -> String + Send + Sync>),
 }
 
-/// What the server does.
+/// Options of a server.
 pub struct Options {
-    /// The port; 0 for any that is free.
+    /// Port; 0 for any free port.
     pub port: u16,
-    /// How often it fails in which way.
+    /// Fault kinds and their rates, 0 to 1.
     pub faults: Vec<(FaultKind, f64)>,
-    /// Which requests fail.
+    /// Seed that selects the requests that fail.
     pub seed: u64,
-    /// How long each answer takes.
+    /// Time per response.
     pub latency: Duration,
-    /// How long it stalls where it fails by being slow.
+    /// Delay of timeout and slow-drip faults.
     pub stall: Duration,
-    /// The key that it asks for.
+    /// Required API key, if any.
     pub key: Option<String>,
-    /// Whether it refuses JSON schemas, as some servers do.
+    /// True if it rejects JSON schemas, as some servers do.
     pub refuses_schema: bool,
-    /// The address that it sends everybody on to, with their request.
+    /// Target of redirects; the server then redirects all completion requests.
     pub redirects_to: Option<String>,
-    /// How it answers.
-    pub manner: Manner,
+    /// Source of answers.
+    pub response_mode: ResponseMode,
 }
 
 impl Default for Options {
@@ -75,31 +75,31 @@ impl Default for Options {
             key: None,
             refuses_schema: false,
             redirects_to: None,
-            manner: Manner::Script,
+            response_mode: ResponseMode::Script,
         }
     }
 }
 
-/// What the server has seen and done.
+/// Counters of the server.
 #[derive(Clone, Debug, Default)]
-pub struct Seen {
-    /// Requests for a completion.
+pub struct ServerStats {
+    /// Number of completion requests.
     pub requests: usize,
-    /// Requests that were answered as they should be.
+    /// Number of requests that were answered without a fault.
     pub answered: usize,
-    /// Faults by their names.
+    /// Numbers of faults by name.
     pub faults: BTreeMap<&'static str, usize>,
-    /// Pictures that came with questions.
-    pub pictures: usize,
-    /// Questions with a JSON schema.
+    /// Number of images in requests.
+    pub images: usize,
+    /// Number of requests with a JSON schema.
     pub with_schema: usize,
-    /// Most requests at a time.
-    pub most_in_flight: usize,
-    /// The last question's text.
+    /// Maximum number of concurrent requests.
+    pub max_in_flight: usize,
+    /// Text of the last request.
     pub last_text: String,
 }
 
-/// A running server; it ends with this value.
+/// A running server; dropping it stops the server.
 pub struct StandIn {
     address: SocketAddr,
     shared: Arc<Shared>,
@@ -108,45 +108,45 @@ pub struct StandIn {
 
 struct Shared {
     options: Options,
-    seen: Mutex<Seen>,
+    stats: Mutex<ServerStats>,
     in_flight: AtomicUsize,
-    drawn: AtomicUsize,
-    is_over: AtomicBool,
-    is_deaf: AtomicBool,
+    n_drawn: AtomicUsize,
+    is_stopped: AtomicBool,
+    is_refusing: AtomicBool,
 }
 
 impl StandIn {
     /// Starts a server.
     ///
     /// # Errors
-    /// If the port can't be had.
+    /// If the port is not available.
     pub fn start(options: Options) -> io::Result<StandIn> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, options.port))?;
         let address = listener.local_addr()?;
         let shared = Arc::new(Shared {
             options,
-            seen: Mutex::default(),
+            stats: Mutex::default(),
             in_flight: AtomicUsize::new(0),
-            drawn: AtomicUsize::new(0),
-            is_over: AtomicBool::new(false),
-            is_deaf: AtomicBool::new(false),
+            n_drawn: AtomicUsize::new(0),
+            is_stopped: AtomicBool::new(false),
+            is_refusing: AtomicBool::new(false),
         });
         let for_thread = Arc::clone(&shared);
         let thread = std::thread::spawn(move || listen(listener, address, &for_thread));
         Ok(StandIn { address, shared, listener: Some(thread) })
     }
 
-    /// The base of its address.
+    /// Returns the base URL.
     pub fn url(&self) -> String {
         format!("http://{}/v1", self.address)
     }
 
-    /// What it has seen and done so far.
-    pub fn seen(&self) -> Seen {
-        self.shared.seen().clone()
+    /// Returns the counters so far.
+    pub fn stats(&self) -> ServerStats {
+        self.shared.stats().clone()
     }
 
-    /// Waits until it ends, which it doesn't by itself.
+    /// Serves until the process ends.
     pub fn serve(mut self) {
         if let Some(thread) = self.listener.take() {
             let _ = thread.join();
@@ -156,8 +156,8 @@ impl StandIn {
 
 impl Drop for StandIn {
     fn drop(&mut self) {
-        self.shared.is_over.store(true, Ordering::SeqCst);
-        // Wakes the listener; it may be deaf just now, and wakes then by itself.
+        self.shared.is_stopped.store(true, Ordering::SeqCst);
+        // Wakes the listener. While it is not listening, it wakes after a short delay.
         let _ = TcpStream::connect(self.address);
         if let Some(thread) = self.listener.take() {
             let _ = thread.join();
@@ -166,56 +166,56 @@ impl Drop for StandIn {
 }
 
 impl Shared {
-    fn seen(&self) -> MutexGuard<'_, Seen> {
-        self.seen.lock().unwrap_or_else(|e| e.into_inner())
+    fn stats(&self) -> MutexGuard<'_, ServerStats> {
+        self.stats.lock().unwrap_or_else(|e| e.into_inner())
     }
 }
 
 fn listen(listener: TcpListener, address: SocketAddr, shared: &Arc<Shared>) {
     let mut listener = Some(listener);
-    while !shared.is_over.load(Ordering::SeqCst) {
-        if shared.is_deaf.swap(false, Ordering::SeqCst) {
-            // Nobody listens for a moment: connections are refused.
+    while !shared.is_stopped.load(Ordering::SeqCst) {
+        if shared.is_refusing.swap(false, Ordering::SeqCst) {
+            // Connections are refused until the port is bound again.
             drop(listener.take());
-            std::thread::sleep(DEAF);
+            std::thread::sleep(REFUSAL_TIME);
         }
         if listener.is_none() {
             match TcpListener::bind(address) {
-                Ok(again) => listener = Some(again),
-                Err(_) => std::thread::sleep(DEAF),
+                Ok(bound) => listener = Some(bound),
+                Err(_) => std::thread::sleep(REFUSAL_TIME),
             }
         }
         let Some(open) = &listener else { continue };
-        // Whoever ended it while nobody listened has knocked in vain and won't again.
-        if shared.is_over.load(Ordering::SeqCst) {
+        // A stop request while the port was closed did not reach the listener.
+        if shared.is_stopped.load(Ordering::SeqCst) {
             return;
         }
         let Ok((stream, _)) = open.accept() else { continue };
         let shared = Arc::clone(shared);
         std::thread::spawn(move || {
-            // Whoever hangs up has nothing to be told.
-            let _ = converse(stream, &shared);
+            // Errors of a connection concern the client only.
+            let _ = serve_connection(stream, &shared);
         });
     }
 }
 
-fn converse(mut stream: TcpStream, shared: &Shared) -> io::Result<()> {
+fn serve_connection(mut stream: TcpStream, shared: &Shared) -> io::Result<()> {
     stream.set_nodelay(true)?;
-    // Nobody holds a connection open for ever.
+    // Closes idle connections.
     stream.set_read_timeout(Some(Duration::from_secs(60)))?;
-    while !shared.is_over.load(Ordering::SeqCst) {
-        // Luck is drawn when something comes, and is not read yet.
+    while !shared.is_stopped.load(Ordering::SeqCst) {
+        // The fault is drawn when data arrives, before it is read.
         if stream.peek(&mut [0])? == 0 {
             return Ok(());
         }
         let draw = shared.draw();
         if draw == Some(FaultKind::Reset) || draw == Some(FaultKind::Refused) {
-            shared.break_off(&stream, draw);
+            shared.reset(&stream, draw);
             return Ok(());
         }
         let Some(request) = read_request(&mut stream)? else { return Ok(()) };
         let now = shared.in_flight.fetch_add(1, Ordering::SeqCst) + 1;
-        shared.seen().most_in_flight.max_with(now);
+        shared.record_in_flight(now);
         let result = shared.answer(&mut stream, &request, draw);
         shared.in_flight.fetch_sub(1, Ordering::SeqCst);
         if !result? {
@@ -225,40 +225,34 @@ fn converse(mut stream: TcpStream, shared: &Shared) -> io::Result<()> {
     Ok(())
 }
 
-/// Raises a number to another.
-trait MaxWith {
-    fn max_with(&mut self, other: usize);
-}
-
-impl MaxWith for usize {
-    fn max_with(&mut self, other: usize) {
-        *self = (*self).max(other);
-    }
-}
-
 impl Shared {
-    /// How the next request fails, if it does.
+    /// Returns the fault of the next request, if any.
     fn draw(&self) -> Option<FaultKind> {
-        let number = self.drawn.fetch_add(1, Ordering::SeqCst) as u64;
-        Draw { seed: self.options.seed, number }.fault(&self.options.faults)
+        let index = self.n_drawn.fetch_add(1, Ordering::SeqCst) as u64;
+        Draw { seed: self.options.seed, index }.fault(&self.options.faults)
+    }
+
+    fn record_in_flight(&self, n: usize) {
+        let mut stats = self.stats();
+        stats.max_in_flight = stats.max_in_flight.max(n);
     }
 
     fn count(&self, kind: FaultKind) {
-        *self.seen().faults.entry(kind.name()).or_default() += 1;
+        *self.stats().faults.entry(kind.name()).or_default() += 1;
     }
 
-    /// What is left unread resets the connection when it is closed.
-    fn break_off(&self, stream: &TcpStream, draw: Option<FaultKind>) {
-        self.seen().requests += 1;
+    /// Drops the connection. Closing a socket with unread data resets the connection.
+    fn reset(&self, stream: &TcpStream, draw: Option<FaultKind>) {
+        self.stats().requests += 1;
         draw.into_iter().for_each(|kind| self.count(kind));
         if draw == Some(FaultKind::Refused) {
-            self.is_deaf.store(true, Ordering::SeqCst);
-            // Wakes the listener, which is deaf from then on.
+            self.is_refusing.store(true, Ordering::SeqCst);
+            // Wakes the listener, which closes the port.
             let _ = stream.local_addr().and_then(TcpStream::connect);
         }
     }
 
-    /// Answers a request; whether the connection stays open.
+    /// Answers a request; returns whether the connection stays open.
     fn answer(
         &self,
         stream: &mut TcpStream,
@@ -273,17 +267,17 @@ impl Shared {
                 if is_models { (200, models) } else { (404, error("no such path")) };
             return write_response(stream, status, &[], body.to_string().as_bytes());
         }
-        self.seen().requests += 1;
+        self.stats().requests += 1;
         if let Some(address) = &self.options.redirects_to {
-            // The status by which clients send the same again.
+            // Status 307 makes clients repeat the request with its body.
             return write_response(stream, 307, &[("location", address)], b"");
         }
         if let Some(key) = &self.options.key
             && request.key() != Some(key.as_str())
         {
-            // As real ones do: it says which key it was given.
-            let said = format!("Incorrect API key provided: {}", request.key().unwrap_or(""));
-            return write_response(stream, 401, &[], error(&said).to_string().as_bytes());
+            // Like real endpoints, the error message contains the rejected key.
+            let message = format!("Incorrect API key provided: {}", request.key().unwrap_or(""));
+            return write_response(stream, 401, &[], error(&message).to_string().as_bytes());
         }
         let question = match Question::parse(&request.body) {
             Ok(question) => question,
@@ -292,32 +286,32 @@ impl Shared {
             }
         };
         {
-            let mut seen = self.seen();
-            seen.pictures += question.pictures;
-            seen.with_schema += usize::from(question.schema_of.is_some());
-            seen.last_text.clone_from(&question.text);
+            let mut stats = self.stats();
+            stats.images += question.images;
+            stats.with_schema += usize::from(question.n_schema_plans.is_some());
+            stats.last_text.clone_from(&question.text);
         }
-        if self.options.refuses_schema && question.schema_of.is_some() {
-            let said = error("response_format of type json_schema is not supported");
-            return write_response(stream, 400, &[], said.to_string().as_bytes());
+        if self.options.refuses_schema && question.n_schema_plans.is_some() {
+            let body = error("response_format of type json_schema is not supported");
+            return write_response(stream, 400, &[], body.to_string().as_bytes());
         }
         if let Some(kind) = draw {
             self.count(kind);
-            return kind.perform(stream, &question, self.options.stall);
+            return kind.send(stream, &question, self.options.stall);
         }
         std::thread::sleep(self.options.latency);
-        let text = match &self.options.manner {
-            Manner::Script => question.answer(),
-            Manner::Say(say) => say(&question),
+        let text = match &self.options.response_mode {
+            ResponseMode::Script => question.answer(),
+            ResponseMode::Function(answer) => answer(&question),
         };
-        self.seen().answered += 1;
+        self.stats().answered += 1;
         write_response(stream, 200, &[], completion(&question, &text).to_string().as_bytes())
     }
 }
 
-/// A completion that says this.
+/// Returns a completion with this text.
 fn completion(question: &Question, text: &str) -> Value {
-    // A token is about four letters; nobody should take these numbers for more.
+    // Estimate of four characters per token.
     let (prompt, answer) = (question.text.len() / 4, text.len() / 4);
     json!({
         "id": "standin",
@@ -345,12 +339,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_ends_at_once_even_while_nobody_listens() {
+    fn a_server_stops_at_once_while_it_refuses_connections() {
         let standin = StandIn::start(Options::default()).expect("a port");
-        standin.shared.is_deaf.store(true, Ordering::SeqCst);
-        // The listener takes note with the next connection, and is deaf when it is told to end.
+        standin.shared.is_refusing.store(true, Ordering::SeqCst);
+        // The listener closes the port with the next connection, so it is closed when the server is
+        // dropped.
         drop(TcpStream::connect(standin.address));
-        std::thread::sleep(DEAF / 2);
+        std::thread::sleep(REFUSAL_TIME / 2);
         let (done, ended) = std::sync::mpsc::channel();
         std::thread::spawn(move || {
             drop(standin);

@@ -1,5 +1,5 @@
-//! Starts a stand-in for a language model's endpoint on this machine, to try the pipeline with. Its
-//! scores are not a language model's.
+//! Starts a scripted server in place of a language model endpoint, for tests of the pipeline. Its
+//! scores are not those of a language model.
 
 use std::process::ExitCode;
 use std::time::Duration;
@@ -8,36 +8,36 @@ use chaic_llm_standin::faults::FaultKind;
 use chaic_llm_standin::{Options, StandIn};
 use clap::Parser;
 
-/// A scripted stand-in for a language model's endpoint. Scores reached with it are NOT a language
-/// model's, and say nothing of any.
+/// A scripted server in place of a language model endpoint. Scores reached with it are NOT those of
+/// a language model.
 #[derive(Debug, Parser)]
 #[command(name = "chaic-llm-standin", version)]
 struct Arguments {
-    /// The port on this machine.
+    /// Local port.
     #[arg(long, default_value_t = 8808)]
     port: u16,
-    /// How long each answer takes, milliseconds.
+    /// Time per response, milliseconds.
     #[arg(long, default_value_t = 0)]
     latency_ms: u64,
-    /// A way to fail, and how often, for example 429=0.3; may be given often.
+    /// Fault kind and its rate, for example 429=0.3; can be repeated.
     #[arg(long, value_name = "KIND=RATE", value_parser = fault)]
     fault: Vec<(FaultKind, f64)>,
-    /// How long it stalls where it fails by being slow, milliseconds.
+    /// Delay of timeout and slow-drip faults, milliseconds.
     #[arg(long, default_value_t = 200_000)]
     stall_ms: u64,
-    /// Which requests fail.
+    /// Seed that selects the requests that fail.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Refuse JSON schemas, as some servers do.
+    /// Reject JSON schemas, as some servers do.
     #[arg(long)]
     refuse_schema: bool,
 }
 
 fn fault(text: &str) -> Result<(FaultKind, f64), String> {
     let (kind, rate) = text.split_once('=').ok_or("write KIND=RATE, for example 429=0.3")?;
-    let rate: f64 = rate.parse().map_err(|_| format!("no rate `{rate}`; write 0 to 1"))?;
+    let rate: f64 = rate.parse().map_err(|_| format!("invalid rate `{rate}`; write 0 to 1"))?;
     if !(0.0..=1.0).contains(&rate) {
-        return Err(format!("no rate `{rate}`; write 0 to 1"));
+        return Err(format!("invalid rate `{rate}`; write 0 to 1"));
     }
     Ok((kind.parse()?, rate))
 }
@@ -56,8 +56,8 @@ fn main() -> ExitCode {
     match StandIn::start(options) {
         Ok(standin) => {
             println!(
-                "a stand-in, not a language model, answers at {url}\n\
-                 try: chaic eval --task no_constraint --first 1 --helper none,llm \
+                "a stand-in (not a language model) listens at {url}\n\
+                 try: chaic eval --task no_constraint --n-episodes 1 --helper none,llm \
                  --endpoint {url} --model standin",
                 url = standin.url()
             );
@@ -65,7 +65,7 @@ fn main() -> ExitCode {
             ExitCode::SUCCESS
         }
         Err(error) => {
-            eprintln!("error: can't listen on port {port}: {error}; choose another by --port");
+            eprintln!("error: can't listen on port {port}: {error}; choose another with --port");
             ExitCode::FAILURE
         }
     }

@@ -1,28 +1,28 @@
-//! The script: reads a question's text, and picks a plan by a few rules. No model of any kind.
+//! Script that answers a prompt: it selects a plan by fixed rules, without a model.
 
 use serde_json::{Value, json};
 
-/// What was asked.
+/// Content of a chat request.
 #[derive(Clone, Debug, Default)]
 pub struct Question {
-    /// All that the user said, in order.
+    /// All user messages in order.
     pub text: String,
-    /// What the user said last.
+    /// Last user message.
     pub last: String,
-    /// Of how many plans one is to be named by JSON schema; `None` for a text.
-    pub schema_of: Option<usize>,
-    /// Pictures that came with it.
-    pub pictures: usize,
+    /// Number of plans in the JSON schema of the answer; `None` for a plain-text answer.
+    pub n_schema_plans: Option<usize>,
+    /// Number of images in the messages.
+    pub images: usize,
 }
 
 impl Question {
-    /// Reads a request's body.
+    /// Parses the body of a request.
     ///
     /// # Errors
-    /// If it is no chat.
+    /// If it is not a chat request.
     pub fn parse(body: &[u8]) -> Result<Question, String> {
         let value: Value = serde_json::from_slice(body).map_err(|e| e.to_string())?;
-        let messages = value["messages"].as_array().ok_or("there are no messages")?;
+        let messages = value["messages"].as_array().ok_or("the request has no messages")?;
         let mut question = Question::default();
         for message in messages.iter().filter(|m| m["role"] == "user") {
             let mut text = message["content"].as_str().unwrap_or_default().to_owned();
@@ -30,9 +30,9 @@ impl Question {
                 text += part["text"].as_str().unwrap_or_default();
                 if let Some(url) = part["image_url"]["url"].as_str() {
                     if !url.starts_with("data:image/") {
-                        return Err("a picture isn't encoded in the message".to_owned());
+                        return Err("an image isn't encoded in the message".to_owned());
                     }
-                    question.pictures += 1;
+                    question.images += 1;
                 }
             }
             question.text += &text;
@@ -40,11 +40,11 @@ impl Question {
             question.last = text;
         }
         let schema = &value["response_format"]["json_schema"]["schema"]["properties"]["plan"];
-        question.schema_of = schema["enum"].as_array().map(Vec::len);
+        question.n_schema_plans = schema["enum"].as_array().map(Vec::len);
         Ok(question)
     }
 
-    /// The plans that are listed last, in order.
+    /// Returns the plans of the last list in the prompt, in order.
     pub fn plans(&self) -> Vec<&str> {
         let mut plans: Vec<&str> = Vec::new();
         for line in self.text.lines() {
@@ -58,39 +58,39 @@ impl Question {
         plans
     }
 
-    /// The answer of the script.
+    /// Returns the answer of the script.
     pub fn answer(&self) -> String {
-        let (number, why) = self.choose();
-        self.form(number, &format!("This is a stand-in, not a language model. {why}"))
+        let (number, reason) = self.choose();
+        self.format_answer(number, &format!("This is a stand-in, not a language model. {reason}"))
     }
 
-    /// A plan's number in the form that was asked for.
-    pub fn form(&self, number: usize, why: &str) -> String {
-        match self.schema_of {
-            Some(_) => json!({ "reasoning": why, "plan": number }).to_string(),
-            None => format!("{why}\nPlan: {number}"),
+    /// Formats a plan's number as the request demands.
+    pub fn format_answer(&self, number: usize, reason: &str) -> String {
+        match self.n_schema_plans {
+            Some(_) => json!({ "reasoning": reason, "plan": number }).to_string(),
+            None => format!("{reason}\nPlan: {number}"),
         }
     }
 
-    /// A plan's number, from 1, and why.
+    /// Returns the selected plan's number, from 1, and the reason.
     pub fn choose(&self) -> (usize, &'static str) {
         let plans = self.plans();
         let find = |words: &str| plans.iter().position(|p| p.contains(words)).map(|i| i + 1);
         let is_away = self.text.contains("away from your partner");
         let is_full = self.text.contains("You have no free hand");
-        let (passed, all) = self.frames().unwrap_or((0, 1));
+        let (frame, n_frames) = self.frames().unwrap_or((0, 1));
         let deliver = find("bring what is carried");
-        let first = [
+        let rules = [
             (find("follow the child").filter(|_| is_away), "The child has run away."),
             (find("put what one hand holds"), "That frees a hand."),
             (deliver.filter(|_| is_full), "Both hands are full."),
-            (deliver.filter(|_| 4 * (all - passed.min(all)) < all), "Time is short."),
+            (deliver.filter(|_| 4 * (n_frames - frame.min(n_frames)) < n_frames), "Time is short."),
             (find("remove the obstacle"), "It may be in the partner's way."),
             (find("together with the partner"), "Two lift more than one."),
-            (find("go to container").filter(|_| 2 * passed < all), "It carries three things."),
-            (self.wanted(&plans), "The partner took the same kind of thing."),
+            (find("go to container").filter(|_| 2 * frame < n_frames), "It carries three things."),
+            (self.find_wanted(&plans), "The partner took the same kind of thing."),
             (
-                find("and pick it up").filter(|_| 5 * passed > all),
+                find("and pick it up").filter(|_| 5 * frame > n_frames),
                 "Something is better than nothing.",
             ),
             (find("follow the partner").filter(|_| !self.knows_partner()), "What does it want?"),
@@ -102,18 +102,18 @@ impl Question {
             (find("explore"), "There is more to see."),
             (find("turn around"), "There is more to see."),
         ];
-        first
+        rules
             .into_iter()
-            .find_map(|(number, why)| number.map(|n| (n, why)))
+            .find_map(|(number, reason)| number.map(|n| (n, reason)))
             .unwrap_or((plans.len().max(1), "Nothing else is left."))
     }
 
-    /// The first plan about a thing that is called like one that the partner took, or that is
-    /// asked for.
-    fn wanted(&self, plans: &[&str]) -> Option<usize> {
+    /// Returns the first plan for an object of a class that the partner took or that the prompt
+    /// asks for.
+    fn find_wanted(&self, plans: &[&str]) -> Option<usize> {
         let line = |start: &str| self.text.lines().find_map(|l| l.trim().strip_prefix(start));
-        let took = line("Has been seen to take: ").or_else(|| line("Wanted: "))?;
-        let names: Vec<String> = took
+        let taken = line("Has been seen to take: ").or_else(|| line("Wanted: "))?;
+        let names: Vec<String> = taken
             .trim_end_matches('.')
             .split(", ")
             .map(|n| n.split(" #").next().unwrap_or(n))
@@ -128,7 +128,7 @@ impl Question {
         self.text.contains("Has been seen to take:") || self.text.contains("Wanted:")
     }
 
-    /// Frames that have passed, and all.
+    /// Returns the current frame and the number of frames from the prompt.
     fn frames(&self) -> Option<(u64, u64)> {
         let line = self.text.lines().find(|l| l.contains("frames have passed"))?;
         let mut numbers = line.split_whitespace().filter_map(|w| w.parse().ok());
@@ -145,13 +145,13 @@ mod tests {
     }
 
     #[test]
-    fn the_last_list_counts() {
+    fn the_last_list_of_plans_is_used() {
         let text = "1. a\n2. b\nand then\n1. explore\n2. turn around\n 3.5 m\n3. wait";
         assert_eq!(question(text).plans(), ["explore", "turn around", "wait"]);
     }
 
     #[test]
-    fn it_picks_sensibly() {
+    fn the_script_prefers_wanted_objects() {
         let plans =
             "1. explore\n2. go to bread #30 and pick it up\n3. go to apple #31 and pick it up";
         for (before, number) in [
@@ -168,15 +168,15 @@ mod tests {
     }
 
     #[test]
-    fn answers_have_the_form_that_was_asked_for() {
+    fn answers_have_the_requested_format() {
         let body = json!({
             "messages": [{ "role": "user", "content": "1. explore\n2. wait" }],
             "response_format": { "type": "json_schema", "json_schema": { "schema": {
                 "properties": { "plan": { "enum": [1, 2] } } } } },
         });
-        let asked = Question::parse(body.to_string().as_bytes()).expect("it is a chat");
-        assert_eq!(asked.schema_of, Some(2));
-        let answer: Value = serde_json::from_str(&asked.answer()).expect("it is JSON");
+        let request = Question::parse(body.to_string().as_bytes()).expect("it is a chat");
+        assert_eq!(request.n_schema_plans, Some(2));
+        let answer: Value = serde_json::from_str(&request.answer()).expect("it is JSON");
         assert_eq!(answer["plan"], json!(1));
         assert!(answer["reasoning"].as_str().is_some_and(|r| r.contains("not a language model")));
         assert!(question("1. explore").answer().ends_with("\nPlan: 1"));

@@ -1,9 +1,9 @@
-//! How long the questions of a run are, by two real tokenizers and by the estimate that prompts are
-//! kept short with: `cargo run --release -p chaic-llm --example prompt_tokens -- RUN`.
+//! Compares the token counts of a run's prompts by two tokenizers with the estimate: `cargo run
+//! --release -p chaic-llm --example prompt_tokens -- RUN`.
 
 use std::path::Path;
 
-use chaic_llm::record::{self, Entry, Record};
+use chaic_llm::record::{self, DecisionLog, RecordEntry};
 use chaic_llm::tokens;
 
 fn main() -> chaic_llm::Result<()> {
@@ -16,17 +16,17 @@ fn main() -> chaic_llm::Result<()> {
     let mut rows: Vec<(String, String, Vec<[usize; 2]>)> = Vec::new();
     let run = Path::new(&run);
     for path in record::all(run)? {
-        let record = Record::read(run, &path)?;
-        let key = (record.head.of.task.to_string(), record.head.of.helper.clone());
+        let record = DecisionLog::read(run, &path)?;
+        let key = (record.header.key.task.to_string(), record.header.key.helper.clone());
         let counts = record.entries.iter().filter_map(|entry| match entry {
-            Entry::Exchange(exchange) => {
-                let said: Vec<&str> =
-                    exchange.ask.messages.iter().map(|m| m.text.as_str()).collect();
-                let said = said.join("\n");
-                let real = vocabularies.iter().map(|(_, v)| v.count_ordinary(&said)).max()?;
-                Some([real, tokens::estimate(&said)])
+            RecordEntry::Exchange(exchange) => {
+                let text: Vec<&str> =
+                    exchange.request.messages.iter().map(|m| m.text.as_str()).collect();
+                let text = text.join("\n");
+                let real = vocabularies.iter().map(|(_, v)| v.count_ordinary(&text)).max()?;
+                Some([real, tokens::estimate(&text)])
             }
-            Entry::Decided(_) => None,
+            RecordEntry::Decision(_) => None,
         });
         let counts: Vec<[usize; 2]> = counts.collect();
         match rows.iter_mut().find(|(task, helper, _)| (task, helper) == (&key.0, &key.1)) {

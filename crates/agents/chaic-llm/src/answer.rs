@@ -1,18 +1,18 @@
-//! What an answer says: the number of a listed plan, or nothing of use.
+//! Parsing of answers: the number of a listed plan, or an error.
 //!
-//! Whatever an answer holds, all that leaves this module is an index into the list of plans.
+//! The only output of this module is an index into the list of plans, whatever the answer contains.
 
 use serde::Deserialize;
 
-/// So much of an answer's end is looked at, bytes; and the same of its beginning.
-const MAX_LOOKED_AT: usize = 16 << 10;
+/// Bytes that are parsed at each end of an answer.
+const MAX_PARSED: usize = 16 << 10;
 
-/// What an answer says.
+/// Parsed answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Choice {
-    /// Which plan, from 0.
+    /// Index of the plan, from 0.
     pub index: usize,
-    /// Whether the answer wasn't quite in the form that was asked for.
+    /// True if the answer deviated from the requested form.
     pub lenient: bool,
 }
 
@@ -24,12 +24,12 @@ struct Strict {
     reasoning: Option<String>,
 }
 
-/// Reads an answer: strictly in the form that was asked for (JSON, or a last line `Plan: N`), else
-/// leniently: JSON within other text, a number in words, or the text of exactly one plan.
+/// Parses an answer: strictly in the requested form (JSON, or a last line `Plan: N`), else
+/// leniently: JSON within text, a number in words, or the text of exactly one plan.
 ///
 /// # Errors
-/// In words, if it names no plan of the list, or several.
-pub fn read(answer: &str, plans: &[String], by_schema: bool) -> Result<Choice, String> {
+/// A description of the problem, if the answer names no listed plan, or several.
+pub fn parse(answer: &str, plans: &[String], by_schema: bool) -> Result<Choice, String> {
     let n = plans.len();
     let answer = answer.trim();
     if answer.is_empty() {
@@ -38,7 +38,7 @@ pub fn read(answer: &str, plans: &[String], by_schema: bool) -> Result<Choice, S
     let strict = if by_schema { whole_json(answer) } else { last_line(answer) };
     let (number, lenient) = match strict {
         Some(number) => (Some(number), false),
-        None => (leniently(&ends(answer), plans), true),
+        None => (parse_lenient(&ends(answer), plans), true),
     };
     match number {
         Some(number) if (1..=n).contains(&number) => Ok(Choice { index: number - 1, lenient }),
@@ -51,15 +51,15 @@ fn whole_json(answer: &str) -> Option<usize> {
     serde_json::from_str::<Strict>(answer).ok().map(|s| s.plan)
 }
 
-/// `Plan: N` as the last line.
+/// Parses `Plan: N` as the last line.
 fn last_line(answer: &str) -> Option<usize> {
     let line = answer.lines().rev().map(str::trim).find(|l| !l.is_empty())?;
     line.strip_prefix("Plan:")?.trim().parse().ok()
 }
 
-/// The beginning and the end of a long answer.
+/// Returns the start and the end of a long answer.
 fn ends(answer: &str) -> String {
-    if answer.len() <= 2 * MAX_LOOKED_AT {
+    if answer.len() <= 2 * MAX_PARSED {
         return answer.to_owned();
     }
     let floor = |mut i: usize| {
@@ -68,23 +68,23 @@ fn ends(answer: &str) -> String {
         }
         i
     };
-    let (head, tail) = (floor(MAX_LOOKED_AT), floor(answer.len() - MAX_LOOKED_AT));
+    let (head, tail) = (floor(MAX_PARSED), floor(answer.len() - MAX_PARSED));
     format!("{}\n{}", &answer[..head], &answer[tail..])
 }
 
-fn leniently(answer: &str, plans: &[String]) -> Option<usize> {
+fn parse_lenient(answer: &str, plans: &[String]) -> Option<usize> {
     json_within(answer)
-        .or_else(|| after_word(answer, "plan"))
+        .or_else(|| number_after(answer, "plan"))
         .or_else(|| bare_number(answer))
         .or_else(|| {
-            ["option", "choice", "answer", "choose"].iter().find_map(|w| after_word(answer, w))
+            ["option", "choice", "answer", "choose"].iter().find_map(|w| number_after(answer, w))
         })
-        .or_else(|| text_of_one(answer, plans))
+        .or_else(|| plan_by_text(answer, plans))
 }
 
-/// The last JSON object within the text that has a plan.
+/// Parses the last JSON object within the text that names a plan.
 fn json_within(answer: &str) -> Option<usize> {
-    /// More opening braces than this are no answer.
+    /// Maximum number of opening braces that are tried.
     const MAX_BRACES: usize = 200;
     #[derive(Deserialize)]
     #[serde(untagged)]
@@ -107,26 +107,26 @@ fn json_within(answer: &str) -> Option<usize> {
     })
 }
 
-/// The number that follows the last occurrence of a word, with nothing but a few signs between.
-fn after_word(answer: &str, word: &str) -> Option<usize> {
+/// Parses the number after the last occurrence of a word, with only a few signs in between.
+fn number_after(answer: &str, word: &str) -> Option<usize> {
     let lower = answer.to_ascii_lowercase();
     lower.rmatch_indices(word).find_map(|(at, _)| {
         let before = lower[..at].chars().next_back();
         if before.is_some_and(char::is_alphanumeric) {
             return None;
         }
-        let rest =
+        let remainder =
             lower[at + word.len()..].trim_start_matches(|c: char| " :=#*_`\"'([\t".contains(c));
-        let rest = rest.strip_prefix("number").unwrap_or(rest);
-        leading_number(rest.trim_start_matches(|c: char| " :=#*_`\"'([\t".contains(c)))
+        let remainder = remainder.strip_prefix("number").unwrap_or(remainder);
+        leading_number(remainder.trim_start_matches(|c: char| " :=#*_`\"'([\t".contains(c)))
     })
 }
 
-/// The answer is a number and nothing but a few signs.
+/// Parses an answer that is a number with only a few signs around it.
 fn bare_number(answer: &str) -> Option<usize> {
     let core = answer.trim_matches(|c: char| !c.is_ascii_digit());
-    let rest: String = answer.replacen(core, "", 1);
-    (core.len() <= 4 && !rest.chars().any(char::is_alphanumeric)).then(|| core.parse().ok())?
+    let remainder: String = answer.replacen(core, "", 1);
+    (core.len() <= 4 && !remainder.chars().any(char::is_alphanumeric)).then(|| core.parse().ok())?
 }
 
 fn leading_number(text: &str) -> Option<usize> {
@@ -134,21 +134,20 @@ fn leading_number(text: &str) -> Option<usize> {
     let end = text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len());
     let is_fraction = text[end..]
         .strip_prefix('.')
-        .is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()));
+        .is_some_and(|remainder| remainder.starts_with(|c: char| c.is_ascii_digit()));
     if is_fraction { None } else { text[..end].parse().ok() }
 }
 
-/// The number of the one plan whose text is in the answer; of plans whose texts contain each
-/// other, the longest counts.
-fn text_of_one(answer: &str, plans: &[String]) -> Option<usize> {
-    let mut rest = answer.to_lowercase();
+/// Finds the one plan whose text is in the answer; if texts contain each other, the longest counts.
+fn plan_by_text(answer: &str, plans: &[String]) -> Option<usize> {
+    let mut remainder = answer.to_lowercase();
     let mut order: Vec<usize> = (0..plans.len()).collect();
     order.sort_by_key(|i| std::cmp::Reverse(plans[*i].len()));
     let mut found = Vec::new();
     for i in order {
         let text = plans[i].to_lowercase();
-        if !text.is_empty() && rest.contains(&text) {
-            rest = rest.replace(&text, "|");
+        if !text.is_empty() && remainder.contains(&text) {
+            remainder = remainder.replace(&text, "|");
             found.push(i + 1);
         }
     }
@@ -169,8 +168,8 @@ mod tests {
     }
 
     #[test]
-    fn what_answers_say() {
-        // Answer, by schema; number and whether leniently, or 0 for nothing of use.
+    fn answers_are_parsed() {
+        // Answer, whether by schema, number or 0 for an error, whether leniently.
         for (answer, by_schema, number, lenient) in [
             (r#"{"reasoning": "apples", "plan": 3}"#, true, 3, false),
             (r#"{"plan": 3}"#, true, 3, false),
@@ -196,7 +195,7 @@ mod tests {
             ("no idea", false, 0, false),
             ("the plane 3 leaves", false, 0, false),
         ] {
-            let read = read(answer, &plans(), by_schema);
+            let read = parse(answer, &plans(), by_schema);
             match (number, read) {
                 (0, read) => assert!(read.is_err(), "{answer}: {read:?}"),
                 (n, read) => {
@@ -207,9 +206,9 @@ mod tests {
     }
 
     #[test]
-    fn a_huge_answer_is_read_at_its_ends_only() {
+    fn only_the_ends_of_a_huge_answer_are_parsed() {
         let huge = format!("{}\nPlan: 3", "{ é".repeat(3_000_000));
-        assert_eq!(read(&huge, &plans(), true), Ok(Choice { index: 2, lenient: true }));
-        assert!(read(&"{".repeat(10 << 20), &plans(), true).is_err());
+        assert_eq!(parse(&huge, &plans(), true), Ok(Choice { index: 2, lenient: true }));
+        assert!(parse(&"{".repeat(10 << 20), &plans(), true).is_err());
     }
 }

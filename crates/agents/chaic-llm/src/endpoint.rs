@@ -1,4 +1,4 @@
-//! Sending one question once.
+//! One request to an endpoint, without retries.
 
 mod wire;
 
@@ -11,38 +11,38 @@ use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
 use crate::error::Result;
-use crate::exchange::{Ask, ContentHash, Fault, FaultKind, Reply, Role, Usage};
+use crate::exchange::{ChatRequest, ContentHash, Fault, FaultKind, Reply, Role, Usage};
 use crate::key::Key;
-use crate::settings::{Asking, Kind, PictureFormat, Settings};
+use crate::settings::{EndpointKind, ImageEncoding, PromptSettings, Settings};
 use crate::tokens;
 use wire::{Response, Wire};
 
-/// So much of what an endpoint says of an error is kept, characters.
+/// Maximum length of a stored error description, characters.
 const MAX_DETAIL: usize = 300;
-/// Tokens that a picture is taken for where the endpoint doesn't say (two tiles of 512 pixels and
-/// their base in the first vision models' counting).
-const PICTURE_TOKENS: u64 = 425;
+/// Estimated tokens of an image if the endpoint reports none (two tiles of 512 pixels and their
+/// base in the first vision models).
+const IMAGE_TOKENS: u64 = 425;
 
-/// Encoded pictures by their hashes.
-pub type PicturesByHash = BTreeMap<ContentHash, Vec<u8>>;
+/// Encoded images by hash.
+pub type ImagesByHash = BTreeMap<ContentHash, Vec<u8>>;
 
-/// A request that didn't bring an answer.
+/// Failed request.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Failure {
-    /// What went wrong.
+    /// Cause.
     pub fault: Fault,
-    /// Whether it may go well the next time.
-    pub may_pass: bool,
-    /// For how long the endpoint asks to wait.
+    /// True if a retry may succeed.
+    pub is_retryable: bool,
+    /// Wait that the endpoint requests.
     pub retry_after: Option<Duration>,
 }
 
-/// Why there is no reply.
+/// Reason for a missing reply.
 #[derive(Clone, Debug, PartialEq)]
 pub enum NoReply {
     /// The request failed.
     Failed(Failure),
-    /// Nobody waits for it any more.
+    /// The caller stopped waiting.
     Abandoned,
 }
 
@@ -52,16 +52,16 @@ impl From<Failure> for NoReply {
     }
 }
 
-/// A way to an endpoint.
+/// Client of an endpoint.
 pub struct Client {
     wire: Arc<Wire>,
-    kind: Kind,
+    kind: EndpointKind,
     key: Key,
-    asking: Asking,
+    asking: PromptSettings,
 }
 
 impl Client {
-    /// A way to the endpoint of these settings. Nothing is sent yet.
+    /// Creates a client of the endpoint in the settings, without sending a request.
     ///
     /// # Errors
     /// If the key is missing.
@@ -70,57 +70,59 @@ impl Client {
         Ok(Client::with_key(settings, key))
     }
 
-    /// The same with a key that is known already.
+    /// Creates a client with a known key.
     pub fn with_key(settings: &Settings, key: Key) -> Client {
         let wire = Arc::new(Wire::new(settings, key.clone()));
         Client { wire, kind: settings.endpoint.kind, key, asking: settings.asking.clone() }
     }
 
-    /// What the question's tokens are at most, for the budget.
-    pub fn worst(&self, ask: &Ask) -> Usage {
-        let text: usize = ask.messages.iter().map(|m| tokens::estimate(&m.text)).sum();
-        let images: usize = ask.messages.iter().map(|m| m.images.len()).sum();
-        let prompt = text as u64 + images as u64 * PICTURE_TOKENS;
+    /// Returns the maximum usage of a request, for the budget.
+    pub fn max_usage(&self, request: &ChatRequest) -> Usage {
+        let text: usize = request.messages.iter().map(|m| tokens::estimate(&m.text)).sum();
+        let images: usize = request.messages.iter().map(|m| m.images.len()).sum();
+        let prompt = text as u64 + images as u64 * IMAGE_TOKENS;
         Usage { prompt, answer: u64::from(self.asking.answer_tokens), estimated: true }
     }
 
-    /// Asks once. Who waits looks now and then whether to go on waiting; an answer that is on its way
-    /// still has a moment to arrive then, as it is paid for.
+    /// Sends a request once. `is_abandoned` is polled during the wait; after it returns true, an
+    /// answer in transit has a grace period, since it is paid for.
     ///
     /// # Errors
-    /// Whatever goes wrong on the way, or with what comes back; or nobody waits any more.
+    /// A failed request, an invalid answer, or an abandoned wait.
     pub fn send(
         &self,
-        ask: &Ask,
-        pictures: &PicturesByHash,
-        is_given_up: &dyn Fn() -> bool,
+        request: &ChatRequest,
+        images_by_hash: &ImagesByHash,
+        is_abandoned: &dyn Fn() -> bool,
     ) -> std::result::Result<Reply, NoReply> {
-        let body = self.body(ask, pictures).to_string();
+        let body = self.body(request, images_by_hash).to_string();
         let Response { status, retry_after, body, latency } =
-            wire::post(&self.wire, body, is_given_up)?;
+            wire::post(&self.wire, body, is_abandoned)?;
         if !(200..300).contains(&status) {
-            let said = body.map_or(String::new(), |b| String::from_utf8_lossy(&b).into_owned());
-            return Err(self.refusal(status, &said, retry_after, ask).into());
+            let description =
+                body.map_or(String::new(), |b| String::from_utf8_lossy(&b).into_owned());
+            return Err(self.refusal(status, &description, retry_after, request).into());
         }
-        Ok(self.reply(ask, body?, latency)?)
+        Ok(self.reply(request, body?, latency)?)
     }
 
-    /// The request as the endpoint gets it.
-    fn body(&self, ask: &Ask, pictures: &PicturesByHash) -> Value {
+    /// Returns the request body.
+    fn body(&self, request: &ChatRequest, images_by_hash: &ImagesByHash) -> Value {
         let mut body = Map::new();
-        if self.kind == Kind::Openai {
-            body.insert("model".to_owned(), json!(ask.model));
+        if self.kind == EndpointKind::Openai {
+            body.insert("model".to_owned(), json!(request.model));
         }
-        let messages: Vec<Value> = ask.messages.iter().map(|m| self.message(m, pictures)).collect();
+        let messages: Vec<Value> =
+            request.messages.iter().map(|m| self.message(m, images_by_hash)).collect();
         body.insert("messages".to_owned(), Value::Array(messages));
-        let Asking { temperature, top_p, seed, answer_tokens, answer_tokens_field, .. } =
+        let PromptSettings { temperature, top_p, seed, answer_tokens, answer_tokens_field, .. } =
             &self.asking;
         let optional = [
             ("temperature", temperature.map(|x| json!(x))),
             ("top_p", top_p.map(|x| json!(x))),
             ("seed", seed.map(|s| json!(s))),
             (answer_tokens_field.as_str(), Some(json!(answer_tokens))),
-            ("response_format", ask.schema_of.map(schema)),
+            ("response_format", request.n_schema_plans.map(schema)),
         ];
         for (name, value) in optional {
             if let Some(value) = value {
@@ -132,7 +134,7 @@ impl Client {
         Value::Object(body)
     }
 
-    fn message(&self, message: &crate::exchange::Message, pictures: &PicturesByHash) -> Value {
+    fn message(&self, message: &crate::exchange::Message, images_by_hash: &ImagesByHash) -> Value {
         let role = match message.role {
             Role::User => "user",
             Role::Assistant => "assistant",
@@ -141,13 +143,15 @@ impl Client {
             return json!({ "role": role, "content": message.text });
         }
         let kind = match self.asking.images.format {
-            PictureFormat::Png => "image/png",
-            PictureFormat::Jpeg => "image/jpeg",
+            ImageEncoding::Png => "image/png",
+            ImageEncoding::Jpeg => "image/jpeg",
         };
         let encode = |bytes: &Vec<u8>| base64::engine::general_purpose::STANDARD.encode(bytes);
         let image = |hash: &ContentHash| {
-            let url =
-                format!("data:{kind};base64,{}", pictures.get(hash).map_or(String::new(), encode));
+            let url = format!(
+                "data:{kind};base64,{}",
+                images_by_hash.get(hash).map_or(String::new(), encode)
+            );
             json!({ "type": "image_url", "image_url": { "url": url } })
         };
         let text = json!({ "type": "text", "text": message.text });
@@ -159,35 +163,36 @@ impl Client {
     fn refusal(
         &self,
         status: u16,
-        said: &str,
+        text: &str,
         retry_after: Option<Duration>,
-        ask: &Ask,
+        request: &ChatRequest,
     ) -> Failure {
-        // What is said of a wrong key may repeat part of it.
+        // The description of a key error may repeat part of the key.
         let is_about_key = matches!(status, 401 | 403);
-        let said: String = if is_about_key { String::new() } else { summary(said) };
-        let said = self.key.mask(said);
+        let text = if is_about_key { String::new() } else { summary(text) };
+        let text = self.key.mask(text);
         let about_schema =
-            ["response_format", "json_schema", "schema"].iter().any(|w| said.contains(w));
-        let refuses_schema = matches!(status, 400 | 422) && ask.schema_of.is_some() && about_schema;
-        let colon = if said.is_empty() { "" } else { ": " };
+            ["response_format", "json_schema", "schema"].iter().any(|w| text.contains(w));
+        let refuses_schema =
+            matches!(status, 400 | 422) && request.n_schema_plans.is_some() && about_schema;
+        let colon = if text.is_empty() { "" } else { ": " };
         let hint = match status {
             401 | 403 => "; is the key right?",
             404 => "; are address and model right?",
             300..=399 => "; give the address that it redirects to",
             _ => "",
         };
-        let detail = format!("the endpoint answers with status {status}{colon}{said}{hint}");
+        let detail = format!("the endpoint answers with status {status}{colon}{text}{hint}");
         let kind = if refuses_schema { FaultKind::Schema } else { FaultKind::Status };
         let fault = Fault { kind, status: Some(status), detail };
-        let may_pass = matches!(status, 408 | 409 | 425 | 429) || status >= 500;
-        Failure { fault, may_pass, retry_after }
+        let is_retryable = matches!(status, 408 | 409 | 425 | 429) || status >= 500;
+        Failure { fault, is_retryable, retry_after }
     }
 
-    /// What an answer's bytes say.
+    /// Parses the bytes of an answer.
     fn reply(
         &self,
-        ask: &Ask,
+        request: &ChatRequest,
         bytes: Vec<u8>,
         latency: Duration,
     ) -> std::result::Result<Reply, Failure> {
@@ -195,31 +200,39 @@ impl Client {
             return Err(failure(FaultKind::Empty, "the answer is empty".to_owned()));
         }
         let text = String::from_utf8(bytes)
-            .map_err(|_| failure(FaultKind::NotText, "the answer is no UTF-8".to_owned()))?;
+            .map_err(|_| failure(FaultKind::NotText, "the answer is not UTF-8".to_owned()))?;
         let value: Value = serde_json::from_str(&text).map_err(|e| {
             failure(
                 FaultKind::NotJson,
-                format!("the answer is no whole JSON (line {}, column {})", e.line(), e.column()),
+                format!(
+                    "the answer is not complete JSON (line {}, column {})",
+                    e.line(),
+                    e.column()
+                ),
             )
         })?;
-        let wrong = |what: &str| {
-            failure(FaultKind::WrongShape, format!("the answer is no chat completion: {what}"))
+        let wrong = |problem: &str| {
+            failure(
+                FaultKind::WrongShape,
+                format!("the answer is not a chat completion: {problem}"),
+            )
         };
         let completion: Completion =
             serde_json::from_value(value).map_err(|e| wrong(&summary(&e.to_string())))?;
         let choice = completion.choices.into_iter().next().ok_or_else(|| wrong("no choice"))?;
-        let text = said(&choice.message.content).or(choice.message.refusal).unwrap_or_default();
+        let text =
+            message_text(&choice.message.content).or(choice.message.refusal).unwrap_or_default();
         let text = self.key.mask(text);
         let usage = match completion.usage.as_ref().and_then(usage_of) {
             Some(usage) => usage,
-            None => Usage { answer: tokens::estimate(&text) as u64, ..self.worst(ask) },
+            None => Usage { answer: tokens::estimate(&text) as u64, ..self.max_usage(request) },
         };
         let finish = choice.finish_reason.map(|reason| self.key.mask(summary(&reason)));
         Ok(Reply::Answer { text, finish, usage, latency_ms: latency.as_millis() as u64 })
     }
 }
 
-/// What is read of an answer; everything else is left alone.
+/// Fields of an answer that are read; all others are ignored.
 #[derive(Deserialize)]
 struct Completion {
     choices: Vec<CompletionChoice>,
@@ -242,23 +255,23 @@ struct CompletionMessage {
     refusal: Option<String>,
 }
 
-/// A message's text: as such, or in parts.
-fn said(content: &Value) -> Option<String> {
+/// Returns the text of a message, given as a string or in parts.
+fn message_text(content: &Value) -> Option<String> {
     let part = |part: &Value| part["text"].as_str().map(str::to_owned);
     let parts = content.as_array().map(|parts| parts.iter().filter_map(part).collect());
     content.as_str().map(str::to_owned).or(parts)
 }
 
-/// What an endpoint says a request took, if that makes sense.
+/// Returns the reported usage if it is plausible.
 fn usage_of(usage: &Value) -> Option<Usage> {
-    /// More than any request has.
+    /// Upper limit of a plausible token count.
     const MAX_TOKENS: u64 = 1_000_000_000;
     let tokens = |name: &str| usage[name].as_u64().map(|n| n.min(MAX_TOKENS));
     let (prompt, answer) = (tokens("prompt_tokens")?, tokens("completion_tokens").unwrap_or(0));
     Some(Usage { prompt, answer, estimated: false })
 }
 
-/// The form of an answer that names one of `n` plans.
+/// Returns the JSON schema of an answer that names one of `n` plans.
 fn schema(n: usize) -> Value {
     let numbers: Vec<usize> = (1..=n).collect();
     json!({
@@ -281,12 +294,12 @@ fn schema(n: usize) -> Value {
 
 fn failure(kind: FaultKind, detail: String) -> Failure {
     let fault = Fault { kind, status: None, detail };
-    Failure { fault, may_pass: true, retry_after: None }
+    Failure { fault, is_retryable: true, retry_after: None }
 }
 
-/// The beginning of what somebody else said, as one line.
-fn summary(said: &str) -> String {
-    let line = said.split_whitespace().collect::<Vec<_>>().join(" ");
+/// Returns the start of a foreign text as one line.
+fn summary(text: &str) -> String {
+    let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
     let clean: String = line.chars().filter(|c| !c.is_control()).take(MAX_DETAIL).collect();
     clean
 }
@@ -295,7 +308,7 @@ fn summary(said: &str) -> String {
 mod tests {
     use super::*;
 
-    pub(super) fn settings(url: &str, kind: Kind) -> Settings {
+    pub(super) fn settings(url: &str, kind: EndpointKind) -> Settings {
         let mut settings = Settings::default();
         (settings.endpoint.url, settings.endpoint.kind) = (url.to_owned(), kind);
         settings.asking.model = "m".to_owned();
@@ -303,38 +316,38 @@ mod tests {
     }
 
     #[test]
-    fn what_endpoints_say_in_their_own_ways_is_understood() {
-        assert_eq!(said(&json!("yes")), Some("yes".to_owned()));
+    fn all_known_forms_of_contents_and_usage_are_parsed() {
+        assert_eq!(message_text(&json!("yes")), Some("yes".to_owned()));
         let parts = json!([{ "type": "text", "text": "y" }, { "text": "es" }]);
-        assert_eq!(said(&parts), Some("yes".to_owned()));
-        assert_eq!((said(&json!(null)), said(&json!({}))), (None, None));
+        assert_eq!(message_text(&parts), Some("yes".to_owned()));
+        assert_eq!((message_text(&json!(null)), message_text(&json!({}))), (None, None));
         let usage = json!({ "prompt_tokens": u64::MAX, "completion_tokens": -1 });
-        let counted = usage_of(&usage).expect("it counts prompts");
+        let counted = usage_of(&usage).expect("the prompt tokens are counted");
         assert_eq!((counted.prompt, counted.answer), (1_000_000_000, 0));
         assert_eq!(usage_of(&json!({ "prompt_tokens": "many" })), None);
     }
 
     #[test]
-    fn a_request_has_what_the_settings_say() {
-        let mut settings = settings("http://h/v1", Kind::Openai);
+    fn a_request_has_the_fields_of_the_settings() {
+        let mut settings = settings("http://h/v1", EndpointKind::Openai);
         settings.asking.answer_tokens_field = "max_completion_tokens".to_owned();
         settings.asking.extra.insert("think".to_owned(), json!(false));
         settings.asking.omit = vec!["top_p".to_owned()];
         let client = Client::with_key(&settings, Key::new(""));
-        let picture = ContentHash::of(b"x");
+        let image = ContentHash::new(b"x");
         let message = crate::exchange::Message {
             role: Role::User,
             text: "hello".to_owned(),
-            images: vec![picture],
+            images: vec![image],
         };
-        let ask = Ask {
+        let request = ChatRequest {
             model: "m".to_owned(),
             purpose: crate::exchange::Purpose::Decide,
             messages: vec![message],
-            schema_of: Some(2),
+            n_schema_plans: Some(2),
         };
-        let pictures = PicturesByHash::from([(picture, b"x".to_vec())]);
-        let body = client.body(&ask, &pictures);
+        let images_by_hash = ImagesByHash::from([(image, b"x".to_vec())]);
+        let body = client.body(&request, &images_by_hash);
         assert_eq!((&body["temperature"], body.get("top_p")), (&json!(0.7), None));
         assert_eq!((&body["max_completion_tokens"], &body["think"]), (&json!(512), &json!(false)));
         let numbers =

@@ -1,121 +1,124 @@
-//! What can go wrong before or beside the asking, with what it went wrong with, and what to do.
+//! Errors outside of requests: what failed, on what, and what to do.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
 use chaic_files::FileError;
 
-/// The result of anything in this crate.
+/// Result type of this crate.
 pub type Result<T> = std::result::Result<T, LlmError>;
 
-/// What can go wrong. No message ever holds a key.
+/// Error of this crate. No message contains a key.
 #[derive(Debug, thiserror::Error)]
 pub enum LlmError {
-    /// The operating system refused something.
+    /// The operating system refused an operation.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A setting can't be what it is.
+    /// A setting is out of bounds.
     #[error("{field} is {found}, expected {expected}")]
     Setting {
-        /// Its name in the configuration file.
+        /// Name in the configuration file.
         field: &'static str,
-        /// What it says.
+        /// Given value.
         found: String,
-        /// What it may say.
+        /// Expected values.
         expected: String,
     },
-    /// A configuration file can't be understood.
+    /// The configuration file is invalid.
     #[error("{path}: {problem}", path = path.display())]
     Config {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong, and where.
+        /// Cause and position.
         problem: String,
     },
-    /// The environment variable of the key isn't set.
+    /// The environment variable of the key is unset.
     #[error(
         "the environment variable {variable} holds no key; set it, or name another one by \
-         endpoint.key_env (\"\" for an endpoint that asks for none)"
+         endpoint.key_env (\"\" for an endpoint that needs none)"
     )]
     NoKey {
-        /// Its name.
+        /// Name of the variable.
         variable: String,
     },
     /// The endpoint gives no answer.
     #[error("{problem}")]
     Endpoint {
-        /// Why.
+        /// Cause.
         problem: String,
     },
-    /// A template can't be filled in.
+    /// A template is invalid.
     #[error("template {name}: {problem}")]
     Template {
-        /// Its file.
+        /// File name.
         name: String,
-        /// What is wrong, and in which line.
+        /// Cause and line.
         problem: String,
     },
-    /// A run is gone on with otherwise than it was begun.
+    /// A run is resumed with other settings.
     #[error(
-        "{path} was begun with {field} {recorded}, not {given}; go on as it was begun, or choose \
-         another --out",
+        "{path} was started with {field} {recorded}, not {given}; resume with the same value, or \
+         choose another --out",
         path = path.display()
     )]
     SettingDiffers {
-        /// The run's folder.
+        /// Run folder.
         path: PathBuf,
-        /// The setting.
+        /// Name of the setting.
         field: String,
-        /// Its value in the run.
+        /// Value in the run.
         recorded: String,
-        /// Its value now.
+        /// Current value.
         given: String,
     },
-    /// A run is gone on with, and nobody but its folder says whom to ask.
+    /// A run is resumed, and only its folder names the endpoint.
     #[error(
-        "{path} was begun with the endpoint {url} and {key}; a run's folder doesn't decide who is \
-         sent questions and keys: name the endpoint by --endpoint{and_key}",
+        "{path} was started with the endpoint {url} and {key}; a run folder doesn't select where \
+         requests and keys are sent: name the endpoint by --endpoint{and_key}",
         path = path.display(),
         key = if key_env.is_empty() { "no key".to_owned() } else { format!("the key in {key_env}") },
         and_key = if *is_key_named { "" } else { ", and the key's variable by --llm-key-env" },
     )]
     NotNamed {
-        /// The run's folder.
+        /// Run folder.
         path: PathBuf,
-        /// The recorded address.
+        /// Recorded address.
         url: String,
-        /// The recorded environment variable of the key; empty for none.
+        /// Recorded environment variable of the key; empty for none.
         key_env: String,
-        /// Whether the user has named a variable, or the usual one is the recorded one.
+        /// True if the user named a variable, or the recorded one is the default.
         is_key_named: bool,
     },
     /// A run has no record of a language model.
     #[error("{path} holds no record of a language model", path = path.display())]
     NoRecord {
-        /// Where it was looked for.
+        /// Expected path.
         path: PathBuf,
     },
-    /// A record can't be understood.
+    /// A record is invalid.
     #[error("{path}: line {line}: {problem}", path = path.display())]
     Unreadable {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The line, from 1.
+        /// Line, from 1.
         line: usize,
-        /// What is wrong.
+        /// Cause.
         problem: String,
     },
 }
 
 impl LlmError {
-    /// Whether it is about what the caller asked for, rather than what came of it.
+    /// Returns whether the error concerns the caller's request rather than its execution.
     pub fn is_usage(&self) -> bool {
-        matches!(self, LlmError::Setting { .. } | LlmError::SettingDiffers { .. })
+        matches!(
+            self,
+            LlmError::Config { .. } | LlmError::Setting { .. } | LlmError::SettingDiffers { .. }
+        )
     }
 
-    /// For `map_err` on what the operating system may refuse.
+    /// Creates a conversion for `map_err` on file system errors.
     pub fn io(what: &'static str, path: &Path) -> impl FnOnce(io::Error) -> LlmError + use<> {
-        let refused = FileError::of(what, path);
-        move |refusal| refused(refusal).into()
+        let convert = FileError::context(what, path);
+        move |refusal| convert(refusal).into()
     }
 }

@@ -1,4 +1,4 @@
-//! One question and its answer, as they are recorded.
+//! Recorded request and reply.
 
 use std::fmt;
 use std::str::FromStr;
@@ -7,13 +7,13 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 use chaic_core::Frame;
 
-/// A digest of content: XXH3, 128 bits, 32 hexadecimal digits. It finds damage, not forgery.
+/// Content digest: XXH3, 128 bits, 32 hexadecimal digits. It detects damage, not forgery.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ContentHash(u128);
 
 impl ContentHash {
-    /// Of these bytes.
-    pub fn of(bytes: &[u8]) -> ContentHash {
+    /// Computes the digest of bytes.
+    pub fn new(bytes: &[u8]) -> ContentHash {
         ContentHash(xxhash_rust::xxh3::xxh3_128(bytes))
     }
 }
@@ -35,7 +35,7 @@ impl FromStr for ContentHash {
 
     fn from_str(text: &str) -> Result<ContentHash, String> {
         let value = (text.len() == 32).then(|| u128::from_str_radix(text, 16).ok()).flatten();
-        value.map(ContentHash).ok_or_else(|| format!("`{text}` is no hash of 32 hex digits"))
+        value.map(ContentHash).ok_or_else(|| format!("`{text}` is not a hash of 32 hex digits"))
     }
 }
 
@@ -51,7 +51,7 @@ impl<'de> Deserialize<'de> for ContentHash {
     }
 }
 
-/// Who speaks in a message.
+/// Author of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
@@ -61,92 +61,92 @@ pub enum Role {
     Assistant,
 }
 
-/// One message of a question.
+/// Message of a request.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Message {
-    /// Who speaks.
+    /// Author.
     pub role: Role,
-    /// What is said.
+    /// Text.
     pub text: String,
-    /// Hashes of the encoded pictures that come with it, oldest first.
+    /// Hashes of the attached encoded images, oldest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub images: Vec<ContentHash>,
 }
 
-/// Why the model is asked.
+/// Purpose of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Purpose {
-    /// For reasoning and choice.
+    /// Reasoning and choice.
     Decide,
-    /// For reasoning alone.
+    /// Reasoning only.
     Think,
-    /// For the choice after the reasoning.
+    /// Choice after the reasoning.
     Choose,
-    /// Again, with what was wrong with the answer.
+    /// Repetition with a description of the problem.
     Again,
 }
 
-/// A question: all that the answer depends on.
+/// Request: all inputs of the answer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Ask {
-    /// The model.
+pub struct ChatRequest {
+    /// Name of the model.
     pub model: String,
-    /// Why it is asked.
+    /// Purpose.
     pub purpose: Purpose,
-    /// What is said, in order.
+    /// Messages, in order.
     pub messages: Vec<Message>,
-    /// Of how many plans one is to be named by JSON schema; absent for a text.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub schema_of: Option<usize>,
+    /// Number of plans in the JSON schema; absent for a text answer.
+    #[serde(rename = "schema_of", default, skip_serializing_if = "Option::is_none")]
+    pub n_schema_plans: Option<usize>,
 }
 
-impl Ask {
-    /// Its hash: with the recorded settings, the same question.
+impl ChatRequest {
+    /// Returns the digest, which identifies the request under the recorded settings.
     pub fn hash(&self) -> ContentHash {
-        let bytes = serde_json::to_vec(self).expect("a question has no maps and no failing parts");
-        ContentHash::of(&bytes)
+        let bytes = serde_json::to_vec(self).expect("a request has string keys");
+        ContentHash::new(&bytes)
     }
 }
 
-/// What kind of thing went wrong with a request.
+/// Kind of a failed request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FaultKind {
-    /// No connection, or it broke off.
+    /// No connection, or it was interrupted.
     Connection,
-    /// It took too long.
+    /// The time limit was exceeded.
     Timeout,
-    /// The endpoint answered with a status that is no success.
+    /// The endpoint returned an error status.
     Status,
-    /// It refused the JSON schema.
+    /// The endpoint refused the JSON schema.
     Schema,
-    /// The answer was empty.
+    /// The answer is empty.
     Empty,
-    /// The answer was longer than the limit.
+    /// The answer exceeds the limit.
     TooLong,
-    /// The answer was no text.
+    /// The answer is not UTF-8 text.
     NotText,
-    /// The answer was no JSON, or cut off.
+    /// The answer is not valid JSON, or truncated.
     NotJson,
-    /// The answer's JSON wasn't that of a chat completion.
+    /// The answer is not a chat completion.
     WrongShape,
-    /// Nothing was sent, because the budget is spent.
+    /// The budget is spent; no request was sent.
     Budget,
 }
 
-/// What went wrong with a request.
+/// Failed request.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fault {
-    /// What kind of thing.
+    /// Kind.
     pub kind: FaultKind,
-    /// The endpoint's status, if it gave one.
+    /// Status code, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub status: Option<u16>,
-    /// In words.
+    /// Description.
     pub detail: String,
 }
 
@@ -156,92 +156,94 @@ impl fmt::Display for Fault {
     }
 }
 
-/// How many tokens a request took.
+/// Tokens of a request.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Usage {
-    /// Of the prompt.
+    /// Tokens of the prompt.
     pub prompt: u64,
-    /// Of the answer.
+    /// Tokens of the answer.
     pub answer: u64,
-    /// Whether the endpoint didn't say, so that they are estimated.
+    /// True if the counts are estimates, because the endpoint reports none.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub estimated: bool,
 }
 
-/// What came back in the end.
+/// Final reply of a request.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Reply {
-    /// An answer, whatever it says.
+    /// Answer with any content.
     Answer {
-        /// What it says.
+        /// Text.
         text: String,
-        /// Why it ends, in the endpoint's words.
+        /// Reason of its end, as reported.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         finish: Option<String>,
-        /// What it took.
+        /// Tokens.
         usage: Usage,
-        /// How long the model took, milliseconds; repeated requests and waits not counted.
+        /// Latency of the successful request, milliseconds, without retries and waits.
         latency_ms: u64,
     },
-    /// None.
+    /// No answer.
     Failed(Fault),
 }
 
 impl Reply {
-    /// The hash of what came back.
+    /// Returns the digest of the reply.
     pub fn hash(&self) -> ContentHash {
-        let bytes = serde_json::to_vec(self).expect("a reply has no maps and no failing parts");
-        ContentHash::of(&bytes)
+        let bytes = serde_json::to_vec(self).expect("a reply has string keys");
+        ContentHash::new(&bytes)
     }
 }
 
-/// A question with what came back.
+/// Request with its reply.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Exchange {
-    /// When in the episode.
+    /// Frame of the decision.
     pub frame: Frame,
-    /// Hash of the question.
-    pub ask_hash: ContentHash,
-    /// The question.
-    pub ask: Ask,
-    /// What went wrong before, request by request.
+    /// Digest of the request.
+    #[serde(rename = "ask_hash")]
+    pub request_hash: ContentHash,
+    /// Request.
+    #[serde(rename = "ask")]
+    pub request: ChatRequest,
+    /// Faults of the attempts, in order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<Fault>,
-    /// Hash of the reply.
+    /// Digest of the reply.
     pub reply_hash: ContentHash,
-    /// What came back in the end.
+    /// Final reply.
     pub reply: Reply,
 }
 
 impl Exchange {
-    /// Of a question and its reply.
-    pub fn new(frame: Frame, ask: Ask, faults: Vec<Fault>, reply: Reply) -> Exchange {
-        let (ask_hash, reply_hash) = (ask.hash(), reply.hash());
-        Exchange { frame, ask_hash, ask, faults, reply_hash, reply }
+    /// Creates an exchange with its digests.
+    pub fn new(frame: Frame, request: ChatRequest, faults: Vec<Fault>, reply: Reply) -> Exchange {
+        let (request_hash, reply_hash) = (request.hash(), reply.hash());
+        Exchange { frame, request_hash, request, faults, reply_hash, reply }
     }
 
-    /// What is damaged, if something is.
+    /// Returns a description of damage, if any.
     pub fn damage(&self) -> Option<&'static str> {
-        if self.ask.hash() != self.ask_hash {
-            return Some("the question isn't the one that was hashed");
+        if self.request.hash() != self.request_hash {
+            return Some("the request differs from its hash");
         }
-        (self.reply.hash() != self.reply_hash).then_some("the reply isn't the one that was hashed")
+        (self.reply.hash() != self.reply_hash).then_some("the reply differs from its hash")
     }
 
-    /// How many requests were sent.
+    /// Returns the number of requests sent.
     pub fn requests(&self) -> u64 {
         let last = match &self.reply {
             Reply::Answer { .. } => 1,
-            // The last of the faults is the reply.
+            // The last fault is the reply.
             Reply::Failed(_) => 0,
         };
         self.faults.len() as u64 + last
     }
 
-    /// What it took.
+    /// Returns the tokens of the reply.
     pub fn usage(&self) -> Usage {
         match &self.reply {
             Reply::Answer { usage, .. } => *usage,
@@ -250,56 +252,57 @@ impl Exchange {
     }
 }
 
-/// Who made a decision.
+/// Source of a decision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum By {
+pub enum DecisionSource {
     /// The model.
     Model,
-    /// The fallback: what the model said was of no use.
+    /// The fallback, after an invalid answer.
     FallbackInvalid,
-    /// The fallback: the model couldn't be asked.
+    /// The fallback, after failed requests.
     FallbackFault,
-    /// The fallback: the budget is spent.
+    /// The fallback, with a spent budget.
     FallbackBudget,
-    /// Nobody: there was only one plan.
+    /// No choice: a single plan was valid.
     OnlyPlan,
 }
 
-/// What was decided.
+/// Recorded decision.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Decided {
-    /// When in the episode.
+pub struct DecisionRecord {
+    /// Frame of the decision.
     pub frame: Frame,
-    /// Which of the listed plans, from 1; absent if it is none of them (a fallback's).
+    /// Number of the listed plan, from 1; absent for a fallback plan outside of the list.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub number: Option<usize>,
-    /// It in words.
+    /// Plan in words.
     pub plan: String,
-    /// By whom.
-    pub by: By,
-    /// Whether the answer had to be read leniently.
+    /// Source.
+    #[serde(rename = "by")]
+    pub source: DecisionSource,
+    /// True if the answer was parsed leniently.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub lenient: bool,
-    /// Estimated tokens of the prompt; absent if there was none.
+    /// Estimated tokens of the prompt; absent without a prompt.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prompt_tokens: Option<usize>,
-    /// How much the prompt was shortened, 0 for not at all.
+    /// Level of shortening of the prompt, 0 for none.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub shortened: usize,
     /// Frames that passed for thinking.
-    #[serde(default, skip_serializing_if = "is_no_frame")]
+    #[serde(default, skip_serializing_if = "is_zero_frames")]
     pub thinking_frames: Frame,
 }
 
-// `skip_serializing_if` hands over a reference.
+// `skip_serializing_if` passes a reference.
 #[allow(clippy::trivially_copy_pass_by_ref)]
 fn is_zero(n: &usize) -> bool {
     *n == 0
 }
 
 #[allow(clippy::trivially_copy_pass_by_ref)]
-fn is_no_frame(n: &Frame) -> bool {
+fn is_zero_frames(n: &Frame) -> bool {
     *n == 0
 }

@@ -1,20 +1,20 @@
-//! The key of an endpoint, which nobody gets to see.
+//! Secret key of an endpoint.
 
 use std::fmt;
 
 use crate::error::{LlmError, Result};
 
-/// What stands in a text where the key stood.
+/// Replacement of the key in texts.
 const MASK: &str = "[key]";
-/// A key shorter than this would mask words of ordinary text.
+/// Minimum length of a masked key; a shorter one could mask ordinary words.
 const MIN_MASKED: usize = 8;
 
-/// An endpoint's key. It can't be printed or serialized; only a request's header gets it.
+/// Key of an endpoint. It cannot be printed or serialized; only the request header contains it.
 #[derive(Clone)]
 pub struct Key(Option<String>);
 
 impl Key {
-    /// The key in this environment variable; none for an empty name.
+    /// Reads the key from an environment variable; no key for an empty name.
     ///
     /// # Errors
     /// [`LlmError::NoKey`] if the variable is unset or empty.
@@ -29,17 +29,17 @@ impl Key {
         }
     }
 
-    /// A key that is known already, for tests and other programs.
+    /// Creates a key from a known value, for tests and other programs.
     pub fn new(value: &str) -> Key {
         Key((!value.is_empty()).then(|| value.to_owned()))
     }
 
-    /// For the request's header alone.
+    /// Returns the key for the request header.
     pub(crate) fn expose(&self) -> Option<&str> {
         self.0.as_deref()
     }
 
-    /// A text from outside without the key, should an endpoint repeat it.
+    /// Replaces the key in a foreign text, in case an endpoint repeats it.
     pub fn mask(&self, text: String) -> String {
         match self.expose() {
             Some(key) if key.len() >= MIN_MASKED && text.contains(key) => text.replace(key, MASK),
@@ -59,11 +59,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_key_is_never_printed_and_is_masked_in_what_comes_back() {
+    fn a_key_is_never_printed_and_is_masked_in_answers() {
         let key = Key::new("sk-very-secret");
         assert!(!format!("{key:?} {:#?}", Some(&key)).contains("secret"));
-        let said = key.mask("Incorrect API key sk-very-secret!".to_owned());
-        assert_eq!(said, "Incorrect API key [key]!");
+        let masked = key.mask("Incorrect API key sk-very-secret!".to_owned());
+        assert_eq!(masked, "Incorrect API key [key]!");
         assert!(Key::from_env("CHAIC_NO_SUCH_VARIABLE").is_err());
         assert!(Key::from_env("").is_ok_and(|k| k.expose().is_none()));
     }

@@ -1,4 +1,4 @@
-//! Who lets a language model choose among the valid plans.
+//! Policy that lets a language model choose among the valid plans.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -12,43 +12,45 @@ use chaic_core::{AgentError, Briefing, Frame, Observation};
 use chaic_env::RunKey;
 
 use crate::answer;
-use crate::asker::{Asker, Halted, Thread};
-use crate::endpoint::PicturesByHash;
+use crate::client::{Conversation, Halted, LlmClient};
+use crate::endpoint::ImagesByHash;
 use crate::exchange::{
-    Ask, By, Decided, Exchange, FaultKind, Message, Purpose, Reply, Role, Usage,
+    ChatRequest, DecisionRecord, DecisionSource, Exchange, FaultKind, Message, Purpose, Reply,
+    Role, Usage,
 };
-use crate::pictures::Album;
+use crate::images::RecentImages;
 use crate::prompt_context::{LENGTHS, PromptContext};
+use crate::prompt_track::PromptTrack;
 use crate::session::Session;
-use crate::settings::{Asking, Fallback, Form, Steps};
-use crate::templates::{Question, Track};
+use crate::settings::{AnswerForm, Fallback, PromptSettings, PromptSteps};
+use crate::templates::Question;
 use crate::tokens;
 
-/// So much of an answer of no use is repeated to the model, characters.
-const REPEATED: usize = 300;
-/// Tokens that asking again takes, about: what is repeated, and the reason.
-const AGAIN_TOKENS: usize = 200;
+/// Maximum length of an invalid answer that is repeated to the model, characters.
+const MAX_REPEATED: usize = 300;
+/// Estimated tokens of a repetition: the answer and the reason.
+const REPETITION_TOKENS: usize = 200;
 
-/// Lets a language model choose; held to the listed plans, whatever it says.
+/// Policy of a language model; its result is always a listed plan.
 pub struct LanguagePolicy {
     session: Arc<Session>,
     key: Option<RunKey>,
-    track: Track,
-    looks: bool,
+    track: PromptTrack,
+    has_images: bool,
     rules: RulePolicy,
-    thread: Thread,
+    conversation: Conversation,
     by_schema: bool,
-    album: Album,
+    recent_images: RecentImages,
     last_plan: Option<Plan>,
-    /// Plans that were begun in this frame and ended at once.
+    /// Plans that were started in this frame and ended at once.
     tried: (Frame, Vec<Plan>),
     wait_until: Frame,
     thinking_frames: Frame,
-    fell_back: bool,
+    used_fallback: bool,
     counts: BTreeMap<String, u64>,
 }
 
-/// A prompt with what it lists.
+/// Prompt with its listed plans.
 struct Prompt {
     facts: PromptContext,
     plans: Vec<Plan>,
@@ -58,37 +60,42 @@ struct Prompt {
     shortened: usize,
 }
 
-/// What came of asking.
+/// Result of a request.
 enum Outcome {
-    /// A plan, by its place in the list.
+    /// Index of the plan in the list.
     Chosen { index: usize, lenient: bool },
-    /// Nothing of use.
-    Failed(By),
+    /// No valid choice.
+    Failed(DecisionSource),
 }
 
 impl LanguagePolicy {
-    /// For one episode run; without a key only to know what it asks for. `looks` is whether
-    /// pictures go with the questions.
-    pub fn new(session: Arc<Session>, key: Option<RunKey>, track: Track, looks: bool) -> Self {
+    /// Creates the policy for one episode run; without a run key it only describes its sensors.
+    /// `has_images` selects requests with images.
+    pub fn new(
+        session: Arc<Session>,
+        key: Option<RunKey>,
+        track: PromptTrack,
+        has_images: bool,
+    ) -> Self {
         LanguagePolicy {
             session,
             key,
             track,
-            looks,
+            has_images,
             rules: RulePolicy::new(RuleProfile::RHP),
-            thread: Thread::default(),
+            conversation: Conversation::default(),
             by_schema: false,
-            album: Album::default(),
+            recent_images: RecentImages::default(),
             last_plan: None,
             tried: (0, Vec::new()),
             wait_until: 0,
             thinking_frames: 0,
-            fell_back: false,
+            used_fallback: false,
             counts: BTreeMap::new(),
         }
     }
 
-    fn asking(&self) -> &Asking {
+    fn asking(&self) -> &PromptSettings {
         &self.session.settings.asking
     }
 
@@ -98,27 +105,28 @@ impl LanguagePolicy {
         }
     }
 
-    /// The plans that may be listed: valid ones that were not tried in this very moment. Obstacles
-    /// are left to others by whoever is the partner (paper section 5.1.1).
-    fn menu(&mut self, now: Frame, valid: &[Plan]) -> Vec<Plan> {
+    /// Returns the plans to list: valid ones that were not tried in this frame. Partners leave
+    /// obstacles to others (paper, section 5.1.1).
+    fn listed_plans(&mut self, now: Frame, valid: &[Plan]) -> Vec<Plan> {
         if self.tried.0 != now {
             self.tried = (now, Vec::new());
         }
         let is_open = |plan: &&Plan| {
-            let is_theirs = matches!(plan, Plan::RemoveObstacle(_)) && self.track == Track::Partner;
-            !is_theirs && !self.tried.1.contains(plan) && **plan != Plan::Wait
+            let is_left_to_helper =
+                matches!(plan, Plan::RemoveObstacle(_)) && self.track == PromptTrack::Partner;
+            !is_left_to_helper && !self.tried.1.contains(plan) && **plan != Plan::Wait
         };
         valid.iter().filter(is_open).copied().chain([Plan::Wait]).collect()
     }
 
-    fn decide(&mut self, context: &Context<'_>, menu: &[Plan]) -> Result<Plan, Halted> {
+    fn decide(&mut self, context: &Context<'_>, listed: &[Plan]) -> Result<Plan, Halted> {
         let frame = context.memory.frame;
-        if let [only] = menu {
-            self.note(frame, *only, Some(1), By::OnlyPlan, None, false)?;
+        if let [only] = listed {
+            self.record(frame, *only, Some(1), DecisionSource::OnlyPlan, None, false)?;
             return Ok(*only);
         }
         let mut latency_ms = 0;
-        let (prompt, outcome) = self.ask(context, menu, &mut latency_ms)?;
+        let (prompt, outcome) = self.ask(context, listed, &mut latency_ms)?;
         let seconds = latency_ms as f32 / 1000.0;
         let left = context.briefing.horizon.saturating_sub(frame);
         self.thinking_frames =
@@ -126,65 +134,74 @@ impl LanguagePolicy {
         match outcome {
             Outcome::Chosen { index, lenient } => {
                 let plan = prompt.plans[index];
-                self.note(frame, plan, Some(index + 1), By::Model, Some(&prompt), lenient)?;
+                self.record(
+                    frame,
+                    plan,
+                    Some(index + 1),
+                    DecisionSource::Model,
+                    Some(&prompt),
+                    lenient,
+                )?;
                 Ok(plan)
             }
-            Outcome::Failed(by) => {
-                let plan = self.fall_back(context, menu);
+            Outcome::Failed(source) => {
+                let plan = self.fall_back(context, listed);
                 let number = prompt.plans.iter().position(|p| *p == plan).map(|i| i + 1);
-                self.note(frame, plan, number, by, Some(&prompt), false)?;
+                self.record(frame, plan, number, source, Some(&prompt), false)?;
                 Ok(plan)
             }
         }
     }
 
-    /// Asks, and once more if the answer is of no use.
+    /// Sends a request, and repeats it once after an invalid answer.
     fn ask(
         &mut self,
         context: &Context<'_>,
-        menu: &[Plan],
+        listed: &[Plan],
         latency_ms: &mut u64,
     ) -> Result<(Prompt, Outcome), Halted> {
         let frame = context.memory.frame;
-        let (hashes, pictures) = match self.looks {
-            true => self.album.encoded(self.asking().images),
+        let (hashes, images) = match self.has_images {
+            true => self.recent_images.encoded(self.asking().images),
             false => Default::default(),
         };
-        let mut prompt = self.prompt(context, menu)?;
+        let mut prompt = self.prompt(context, listed)?;
         let message =
             |role, text: &str| Message { role, text: text.to_owned(), images: Vec::new() };
         let first =
             |text: &str| vec![Message { images: hashes.clone(), ..message(Role::User, text) }];
         let mut messages = first(&prompt.text);
         let mut purpose = Purpose::Decide;
-        if self.asking().steps == Steps::Two {
-            let exchange = self.exchange(frame, Purpose::Think, &messages, None, &pictures)?;
+        if self.asking().steps == PromptSteps::Two {
+            let exchange = self.exchange(frame, Purpose::Think, &messages, None, &images)?;
             let Reply::Answer { text, latency_ms: ms, .. } = exchange.reply else {
-                return Ok((prompt, Outcome::Failed(failed_by(&exchange))));
+                return Ok((prompt, Outcome::Failed(failure_source(&exchange))));
             };
             *latency_ms += ms;
             messages.push(message(Role::Assistant, &text));
-            let choose = self.fill(self.session.templates.choose(&prompt.facts))?;
+            let choose = self.or_halt(self.session.templates.choose(&prompt.facts))?;
             messages.push(message(Role::User, &choose));
             purpose = Purpose::Choose;
         }
         loop {
-            let schema_of = self.by_schema.then_some(prompt.plans.len());
-            let exchange = self.exchange(frame, purpose, &messages, schema_of, &pictures)?;
+            let n_schema_plans = self.by_schema.then_some(prompt.plans.len());
+            let exchange = self.exchange(frame, purpose, &messages, n_schema_plans, &images)?;
             let text = match &exchange.reply {
                 Reply::Answer { text, latency_ms: ms, .. } => {
                     *latency_ms += ms;
                     text
                 }
                 Reply::Failed(fault) if fault.kind == FaultKind::Schema => {
-                    self.without_schema(&fault.detail)?;
-                    prompt = self.prompt(context, menu)?;
+                    self.disable_schema(&fault.detail)?;
+                    prompt = self.prompt(context, listed)?;
                     messages = first(&prompt.text);
                     continue;
                 }
-                Reply::Failed(_) => return Ok((prompt, Outcome::Failed(failed_by(&exchange)))),
+                Reply::Failed(_) => {
+                    return Ok((prompt, Outcome::Failed(failure_source(&exchange))));
+                }
             };
-            let problem = match answer::read(text, &prompt.texts, self.by_schema) {
+            let problem = match answer::parse(text, &prompt.texts, self.by_schema) {
                 Ok(answer::Choice { index, lenient }) => {
                     return Ok((prompt, Outcome::Chosen { index, lenient }));
                 }
@@ -192,15 +209,15 @@ impl LanguagePolicy {
             };
             self.count("invalid_answers", 1);
             if purpose == Purpose::Again {
-                return Ok((prompt, Outcome::Failed(By::FallbackInvalid)));
+                return Ok((prompt, Outcome::Failed(DecisionSource::FallbackInvalid)));
             }
             purpose = Purpose::Again;
-            let repeated: String = text.chars().take(REPEATED).collect();
-            // An empty message is refused by some endpoints.
+            let repeated: String = text.chars().take(MAX_REPEATED).collect();
+            // Some endpoints refuse empty messages.
             let repeated = if repeated.trim().is_empty() { "(nothing)" } else { &repeated };
             messages.push(message(Role::Assistant, repeated));
-            let again = self.session.templates.again(&prompt.facts, &problem, self.by_schema);
-            messages.push(message(Role::User, &self.fill(again)?));
+            let repeat = self.session.templates.repeat(&prompt.facts, &problem, self.by_schema);
+            messages.push(message(Role::User, &self.or_halt(repeat)?));
         }
     }
 
@@ -209,12 +226,13 @@ impl LanguagePolicy {
         frame: Frame,
         purpose: Purpose,
         messages: &[Message],
-        schema_of: Option<usize>,
-        pictures: &PicturesByHash,
+        n_schema_plans: Option<usize>,
+        images: &ImagesByHash,
     ) -> Result<Exchange, Halted> {
         let model = self.asking().model.clone();
-        let ask = Ask { model, purpose, messages: messages.to_vec(), schema_of };
-        let exchange = Asker::new(&self.session, &mut self.thread).ask(frame, ask, pictures)?;
+        let request = ChatRequest { model, purpose, messages: messages.to_vec(), n_schema_plans };
+        let exchange = LlmClient::new(&self.session, &mut self.conversation)
+            .request(frame, request, images)?;
         let usage = exchange.usage();
         let Usage { prompt, answer, estimated } = usage;
         let cost_millionths = self.session.settings.price.millionths(usage).round() as u64;
@@ -234,9 +252,9 @@ impl LanguagePolicy {
         Ok(exchange)
     }
 
-    /// The endpoint refuses a JSON schema: texts from now on, if the settings allow.
-    fn without_schema(&mut self, detail: &str) -> Result<(), Halted> {
-        if self.asking().form == Form::Schema {
+    /// Switches to text answers after the endpoint refused a JSON schema, if the settings allow.
+    fn disable_schema(&mut self, detail: &str) -> Result<(), Halted> {
+        if self.asking().form == AnswerForm::Schema {
             let hint = "set asking.form to \"auto\" or \"text\"";
             self.session.halt(format!("the endpoint refuses a JSON schema ({detail}); {hint}"));
             return Err(Halted);
@@ -245,23 +263,23 @@ impl LanguagePolicy {
         Ok(())
     }
 
-    /// The longest prompt that the settings allow.
-    fn prompt(&self, context: &Context<'_>, menu: &[Plan]) -> Result<Prompt, Halted> {
+    /// Returns the longest prompt within the settings' limit.
+    fn prompt(&self, context: &Context<'_>, listed: &[Plan]) -> Result<Prompt, Halted> {
         let asking = self.asking();
         let question = match (asking.steps, self.by_schema) {
-            (Steps::Two, _) => Question::Think,
-            (Steps::One, true) => Question::Schema,
-            (Steps::One, false) => Question::Text,
+            (PromptSteps::Two, _) => Question::Think,
+            (PromptSteps::One, true) => Question::Schema,
+            (PromptSteps::One, false) => Question::Text,
         };
-        let images = if self.looks { self.album.count() } else { 0 };
+        let images = if self.has_images { self.recent_images.count() } else { 0 };
         let mut shortest = None;
         for (shortened, length) in LENGTHS.into_iter().enumerate() {
             let (facts, plans) =
-                PromptContext::of(self.track, context, menu, self.last_plan, images, length);
-            let text = self.fill(self.session.templates.prompt(&facts, question))?;
-            let mut tokens = tokens::estimate(&text) + AGAIN_TOKENS;
-            if asking.steps == Steps::Two {
-                let choose = self.fill(self.session.templates.choose(&facts))?;
+                PromptContext::new(self.track, context, listed, self.last_plan, images, length);
+            let text = self.or_halt(self.session.templates.prompt(&facts, question))?;
+            let mut tokens = tokens::estimate(&text) + REPETITION_TOKENS;
+            if asking.steps == PromptSteps::Two {
+                let choose = self.or_halt(self.session.templates.choose(&facts))?;
                 tokens += asking.answer_tokens as usize + tokens::estimate(&choose);
             }
             let texts = facts.plans.iter().map(|p| p.text.clone()).collect();
@@ -274,89 +292,93 @@ impl LanguagePolicy {
         Ok(shortest.expect("there is at least one length"))
     }
 
-    fn fill(&self, filled: crate::error::Result<String>) -> Result<String, Halted> {
+    fn or_halt(&self, filled: crate::error::Result<String>) -> Result<String, Halted> {
         filled.map_err(|error| {
             self.session.halt(error.to_string());
             Halted
         })
     }
 
-    /// What is done where the model doesn't decide.
-    fn fall_back(&mut self, context: &Context<'_>, menu: &[Plan]) -> Plan {
-        let first_of = |plans: &[Plan]| plans.iter().copied().find(|p| menu.contains(p));
+    /// Chooses a plan without the model.
+    fn fall_back(&mut self, context: &Context<'_>, listed: &[Plan]) -> Plan {
+        let first_of = |plans: &[Plan]| plans.iter().copied().find(|p| listed.contains(p));
         let chosen = match self.asking().fallback {
             Fallback::Wait => Some(Plan::Wait),
             Fallback::Explore => None,
-            Fallback::Rules => Some(self.rules.decide(context, menu)),
+            Fallback::Rules => Some(self.rules.decide(context, listed)),
         };
-        let usual = [Plan::Explore, Plan::TurnAround, Plan::Wait];
-        chosen.filter(|p| menu.contains(p)).or_else(|| first_of(&usual)).unwrap_or(Plan::Wait)
+        let alternatives = [Plan::Explore, Plan::TurnAround, Plan::Wait];
+        chosen
+            .filter(|p| listed.contains(p))
+            .or_else(|| first_of(&alternatives))
+            .unwrap_or(Plan::Wait)
     }
 
-    fn note(
+    fn record(
         &mut self,
         frame: Frame,
         plan: Plan,
         number: Option<usize>,
-        by: By,
+        source: DecisionSource,
         prompt: Option<&Prompt>,
         lenient: bool,
     ) -> Result<(), Halted> {
-        self.fell_back = !matches!(by, By::Model | By::OnlyPlan);
+        self.used_fallback = !matches!(source, DecisionSource::Model | DecisionSource::OnlyPlan);
         let shortened = prompt.map_or(0, |p| p.shortened);
-        let is_over = prompt.is_some_and(|p| p.tokens > self.asking().prompt_tokens as usize);
+        let is_too_long = prompt.is_some_and(|p| p.tokens > self.asking().prompt_tokens as usize);
         for (name, n) in [
             ("decisions", 1),
-            ("decided_by_model", u64::from(by == By::Model)),
-            ("fallback_invalid", u64::from(by == By::FallbackInvalid)),
-            ("fallback_fault", u64::from(by == By::FallbackFault)),
-            ("fallback_budget", u64::from(by == By::FallbackBudget)),
-            ("only_plan", u64::from(by == By::OnlyPlan)),
+            ("decided_by_model", u64::from(source == DecisionSource::Model)),
+            ("fallback_invalid", u64::from(source == DecisionSource::FallbackInvalid)),
+            ("fallback_fault", u64::from(source == DecisionSource::FallbackFault)),
+            ("fallback_budget", u64::from(source == DecisionSource::FallbackBudget)),
+            ("only_plan", u64::from(source == DecisionSource::OnlyPlan)),
             ("read_leniently", u64::from(lenient)),
             ("shortened_prompts", u64::from(shortened > 0)),
-            ("overlong_prompts", u64::from(is_over)),
+            ("overlong_prompts", u64::from(is_too_long)),
             ("thinking_frames", u64::from(self.thinking_frames)),
         ] {
             self.count(name, n);
         }
-        let decided = Decided {
+        let decided = DecisionRecord {
             frame,
             number,
             plan: crate::prompt_context::plan_text(&plan),
-            by,
+            source,
             lenient,
             prompt_tokens: prompt.map(|p| p.tokens),
             shortened,
             thinking_frames: self.thinking_frames,
         };
-        self.thread.note(&self.session, decided)
+        self.conversation.record(&self.session, decided)
     }
 }
 
-fn failed_by(exchange: &Exchange) -> By {
+fn failure_source(exchange: &Exchange) -> DecisionSource {
     match &exchange.reply {
-        Reply::Failed(fault) if fault.kind == FaultKind::Budget => By::FallbackBudget,
-        _ => By::FallbackFault,
+        Reply::Failed(fault) if fault.kind == FaultKind::Budget => DecisionSource::FallbackBudget,
+        _ => DecisionSource::FallbackFault,
     }
 }
 
 impl Policy for LanguagePolicy {
     fn reset(&mut self, briefing: &Briefing) {
         let profile = match (self.track, briefing.capability.gait) {
-            (Track::Partner, Gait::WalkBike) => RuleProfile::RIDER,
-            (Track::Partner, _) => RuleProfile::PARTNER,
-            (Track::Hidden | Track::Told, _) => RuleProfile::RHP,
+            (PromptTrack::Partner, Gait::WalkBike) => RuleProfile::RIDER,
+            (PromptTrack::Partner, _) => RuleProfile::PARTNER,
+            (PromptTrack::Hidden | PromptTrack::Told, _) => RuleProfile::RHP,
         };
         self.rules = RulePolicy::new(profile);
         self.rules.reset(briefing);
-        self.thread = match &self.key {
-            Some(key) => Thread::open(&self.session, key, briefing.me),
-            None => Thread::default(),
+        self.conversation = match &self.key {
+            Some(key) => Conversation::open(&self.session, key, briefing.me),
+            None => Conversation::default(),
         };
-        self.by_schema = self.asking().form != Form::Text && self.asking().steps == Steps::One;
-        self.album.clear();
+        self.by_schema =
+            self.asking().form != AnswerForm::Text && self.asking().steps == PromptSteps::One;
+        self.recent_images.clear();
         (self.last_plan, self.tried) = (None, (0, Vec::new()));
-        (self.wait_until, self.thinking_frames, self.fell_back) = (0, 0, false);
+        (self.wait_until, self.thinking_frames, self.used_fallback) = (0, 0, false);
         self.counts.clear();
     }
 
@@ -366,10 +388,10 @@ impl Policy for LanguagePolicy {
         if now < self.wait_until {
             return Ok(Plan::Wait);
         }
-        let menu = self.menu(now, valid);
-        let plan = self.decide(context, &menu).map_err(|Halted| {
-            let why = self.session.problem();
-            AgentError::Halted(why.unwrap_or_else(|| "its user stops the run".to_owned()))
+        let listed = self.listed_plans(now, valid);
+        let plan = self.decide(context, &listed).map_err(|Halted| {
+            let problem = self.session.problem();
+            AgentError::Halted(problem.unwrap_or_else(|| "the user stopped the run".to_owned()))
         })?;
         self.tried.1.push(plan);
         self.last_plan = Some(plan);
@@ -379,9 +401,9 @@ impl Policy for LanguagePolicy {
         Ok(plan)
     }
 
-    fn look(&mut self, observation: &Observation, _: &Memory, _: &BehaviorLog) {
-        if self.looks {
-            self.album.see(observation, self.session.settings.asking.images);
+    fn observe(&mut self, observation: &Observation, _: &Memory, _: &BehaviorLog) {
+        if self.has_images {
+            self.recent_images.push(observation, self.session.settings.asking.images);
         }
     }
 
@@ -389,11 +411,11 @@ impl Policy for LanguagePolicy {
         self.thinking_frames
     }
 
-    fn mood(&self) -> Option<String> {
-        self.fell_back.then(|| "fallback".to_owned())
+    fn status(&self) -> Option<String> {
+        self.used_fallback.then(|| "fallback".to_owned())
     }
 
-    fn counts(&self) -> BTreeMap<String, u64> {
+    fn counters(&self) -> BTreeMap<String, u64> {
         self.counts.clone()
     }
 }

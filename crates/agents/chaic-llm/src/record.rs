@@ -1,7 +1,7 @@
-//! The record of one mind in one episode: a file of JSON lines that is only ever appended to.
+//! Record of one agent in one episode run: an append-only file of JSON lines.
 //!
-//! What is there already when an episode is played (because the run was cut short) is used again
-//! as long as the questions are the same: nothing that was answered is asked twice.
+//! When an interrupted episode is played again, existing entries are reused as long as the requests
+//! are equal, so that no answered request is sent twice.
 
 use std::fs::File;
 use std::io::{Seek as _, SeekFrom, Write as _};
@@ -9,90 +9,92 @@ use std::path::{Path, PathBuf};
 
 use chaic_core::AgentId;
 use chaic_env::{RunKey, slug};
-use chaic_files::{EntryKind, kind_below, make_folders_below, open_or_create, read_below, walk};
+use chaic_files::{EntryKind, create_folders_below, kind_below, open_or_create, read_below, walk};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{LlmError, Result};
-use crate::exchange::{Ask, Decided, Exchange};
+use crate::exchange::{ChatRequest, DecisionRecord, Exchange};
 
-/// What the first line says.
+/// Format name in the first line.
 pub const FORMAT: &str = "chaic-llm";
-/// The version of the format.
+/// Version of the format.
 pub const VERSION: u32 = 1;
-/// Longest record that is read, bytes: a hundred times a usual one.
+/// Maximum size of a record, bytes: a hundred times a typical one.
 const MAX_RECORD_BYTES: u64 = 256 << 20;
 
-/// The folder of a run's records.
+/// Returns the folder of a run's records.
 pub fn folder(run: &Path) -> PathBuf {
     run.join("llm")
 }
 
-/// The record of one mind in one episode run.
+/// Returns the path of the record of one agent in one episode run.
 pub fn path(run: &Path, key: &RunKey, agent: AgentId) -> PathBuf {
     let name = format!("{}-s{}.{agent}.jsonl", slug(key.task, &key.episode), key.seed);
     folder(run).join(key.task.name()).join(&key.helper).join(name)
 }
 
-/// The first line.
+/// First line of a record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Head {
+pub struct RecordHeader {
     /// Always [`FORMAT`].
     pub format: String,
     /// Always [`VERSION`].
     pub version: u32,
-    /// The episode run.
-    pub of: RunKey,
-    /// Whose mind.
+    /// Episode run.
+    #[serde(rename = "of")]
+    pub key: RunKey,
+    /// Agent.
     pub agent: AgentId,
-    /// The model.
+    /// Model.
     pub model: String,
 }
 
-impl Head {
-    /// Of a mind in an episode run.
-    pub fn new(key: &RunKey, agent: AgentId, model: &str) -> Head {
+impl RecordHeader {
+    /// Creates the header for an agent in an episode run.
+    pub fn new(key: &RunKey, agent: AgentId, model: &str) -> RecordHeader {
         let (format, model) = (FORMAT.to_owned(), model.to_owned());
-        Head { format, version: VERSION, of: key.clone(), agent, model }
+        RecordHeader { format, version: VERSION, key: key.clone(), agent, model }
     }
 }
 
-/// A further line.
+/// Further line of a record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Entry {
-    /// The model was asked.
+pub enum RecordEntry {
+    /// Request and reply.
     Exchange(Box<Exchange>),
-    /// Something was decided.
-    Decided(Decided),
+    /// Decision.
+    #[serde(rename = "decided")]
+    Decision(DecisionRecord),
 }
 
-impl Entry {
+impl RecordEntry {
     fn to_line(&self) -> String {
         serde_json::to_string(self).expect("an entry has string keys and finite numbers") + "\n"
     }
 }
 
-/// A whole record in memory.
+/// Complete record in memory.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Record {
-    /// Whose.
-    pub head: Head,
-    /// What happened, in order.
-    pub entries: Vec<Entry>,
-    /// Where each entry ends, bytes from the beginning.
+pub struct DecisionLog {
+    /// Header.
+    pub header: RecordHeader,
+    /// Entries, in order.
+    pub entries: Vec<RecordEntry>,
+    /// End of each entry, bytes from the start of the file.
     ends: Vec<u64>,
-    /// Where the first line ends.
-    head_end: u64,
+    /// End of the first line, bytes.
+    header_end: u64,
 }
 
-impl Record {
-    /// Reads a record below the folder of its run up to its last complete line.
+impl DecisionLog {
+    /// Reads a record in a run folder, up to its last complete line.
     ///
     /// # Errors
-    /// If it can't be read, is no regular file or behind a link, is something else, or is damaged before its
-    /// last line.
-    pub fn read(run: &Path, path: &Path) -> Result<Record> {
+    /// If it cannot be read, is no regular file or behind a link, has another format, or is damaged
+    /// before its last line.
+    pub fn read(run: &Path, path: &Path) -> Result<DecisionLog> {
         let bytes = read_below(run, path, MAX_RECORD_BYTES + 1)?;
         let wrong = |line: usize, problem: String| LlmError::Unreadable {
             path: path.to_owned(),
@@ -104,14 +106,16 @@ impl Record {
         }
         let mut lines = bytes.split_inclusive(|b| *b == b'\n').enumerate();
         let first = lines.next().and_then(|(_, l)| l.strip_suffix(b"\n"));
-        let first = first.ok_or_else(|| wrong(1, "has no whole first line".to_owned()))?;
-        let head: Head = serde_json::from_slice(first).map_err(|e| wrong(1, e.to_string()))?;
-        if head.format != FORMAT || head.version != VERSION {
-            let found = format!("{} version {}", head.format, head.version);
+        let first = first.ok_or_else(|| wrong(1, "has no complete first line".to_owned()))?;
+        let header: RecordHeader =
+            serde_json::from_slice(first).map_err(|e| wrong(1, e.to_string()))?;
+        if header.format != FORMAT || header.version != VERSION {
+            let found = format!("{} version {}", header.format, header.version);
             return Err(wrong(1, format!("is of {found}, expected {FORMAT} version {VERSION}")));
         }
         let mut end = first.len() as u64 + 1;
-        let mut record = Record { head, entries: Vec::new(), ends: Vec::new(), head_end: end };
+        let mut record =
+            DecisionLog { header, entries: Vec::new(), ends: Vec::new(), header_end: end };
         for (k, line) in lines {
             end += line.len() as u64;
             let is_last = end == bytes.len() as u64;
@@ -128,79 +132,80 @@ impl Record {
     }
 }
 
-fn parse(line: &[u8]) -> std::result::Result<Entry, String> {
+fn parse(line: &[u8]) -> std::result::Result<RecordEntry, String> {
     let line = line.strip_suffix(b"\n").ok_or("is cut off")?;
-    let entry: Entry = serde_json::from_slice(line).map_err(|e| e.to_string())?;
+    let entry: RecordEntry = serde_json::from_slice(line).map_err(|e| e.to_string())?;
     match &entry {
-        Entry::Exchange(exchange) if exchange.damage().is_some() => {
+        RecordEntry::Exchange(exchange) if exchange.damage().is_some() => {
             Err(exchange.damage().unwrap_or_default().to_owned())
         }
         _ => Ok(entry),
     }
 }
 
-/// A record that is being written.
+/// Record open for writing.
 #[derive(Debug)]
-pub struct Recorder {
+pub struct DecisionLogWriter {
     path: PathBuf,
     file: File,
-    /// What was there before.
-    before: Record,
-    /// How much of it has come true again.
+    /// Entries from before.
+    before: DecisionLog,
+    /// Number of these entries that were reused.
     used: usize,
-    /// Whether what follows in the file is to be cut off before writing.
-    is_behind: bool,
+    /// True if the rest of the file must be truncated before a write.
+    must_truncate: bool,
 }
 
-impl Recorder {
-    /// Begins a record below the folder of a run, or continues an existing record of the same mind.
+impl DecisionLogWriter {
+    /// Creates a record in a run folder, or continues an existing record of the same agent.
     ///
     /// # Errors
-    /// If it is a link or no regular file, or the file system refuses.
-    pub fn open(run: &Path, path: &Path, head: &Head) -> Result<Recorder> {
-        make_folders_below(run, path.parent().unwrap_or(run))?;
+    /// If it is a link or no regular file, or cannot be written.
+    pub fn open(run: &Path, path: &Path, header: &RecordHeader) -> Result<DecisionLogWriter> {
+        create_folders_below(run, path.parent().unwrap_or(run))?;
         let before = match kind_below(run, path)? {
             EntryKind::Missing => None,
-            // Damaged or of something else: of no use, and replaced.
-            _ => Record::read(run, path).ok().filter(|record| record.head == *head),
+            // A damaged record, or one of another agent, is replaced.
+            _ => DecisionLog::read(run, path).ok().filter(|record| record.header == *header),
         };
         let is_new = before.is_none();
         let refused = || LlmError::io("write", path);
         let mut file = open_or_create(path)?;
-        let first = serde_json::to_string(head).expect("a head has string keys") + "\n";
+        let first = serde_json::to_string(header).expect("a header has string keys") + "\n";
         if is_new {
             file.set_len(0).map_err(refused())?;
             file.write_all(first.as_bytes()).map_err(refused())?;
         }
-        let before = before.unwrap_or_else(|| Record {
-            head: head.clone(),
+        let before = before.unwrap_or_else(|| DecisionLog {
+            header: header.clone(),
             entries: Vec::new(),
             ends: Vec::new(),
-            head_end: first.len() as u64,
+            header_end: first.len() as u64,
         });
-        Ok(Recorder { path: path.to_owned(), file, before, used: 0, is_behind: true })
+        Ok(DecisionLogWriter { path: path.to_owned(), file, before, used: 0, must_truncate: true })
     }
 
-    /// The exchange that was recorded for this question at this point, if the record is still
-    /// ahead.
-    pub fn known(&mut self, ask: &Ask) -> Option<Exchange> {
-        let Entry::Exchange(exchange) = self.before.entries.get(self.used)? else { return None };
-        (exchange.ask_hash == ask.hash()).then(|| (**exchange).clone())
+    /// Returns the recorded exchange of this request, if the record has it at this position.
+    pub fn recorded_exchange(&mut self, request: &ChatRequest) -> Option<Exchange> {
+        let RecordEntry::Exchange(exchange) = self.before.entries.get(self.used)? else {
+            return None;
+        };
+        (exchange.request_hash == request.hash()).then(|| (**exchange).clone())
     }
 
-    /// Appends an entry, unless it stands there already.
+    /// Appends an entry, unless the record has it at this position.
     ///
     /// # Errors
-    /// If the file system refuses.
-    pub fn push(&mut self, entry: Entry) -> Result<()> {
+    /// If the file cannot be written.
+    pub fn push(&mut self, entry: RecordEntry) -> Result<()> {
         if self.before.entries.get(self.used) == Some(&entry) {
             self.used += 1;
             return Ok(());
         }
         let refused = || LlmError::io("write", &self.path);
-        if std::mem::take(&mut self.is_behind) {
+        if std::mem::take(&mut self.must_truncate) {
             let end = self.used.checked_sub(1).and_then(|k| self.before.ends.get(k));
-            let end = end.copied().unwrap_or(self.before.head_end);
+            let end = end.copied().unwrap_or(self.before.header_end);
             self.file.set_len(end).map_err(refused())?;
             self.file.seek(SeekFrom::Start(end)).map_err(refused())?;
             self.before.entries.truncate(self.used);
@@ -209,10 +214,10 @@ impl Recorder {
     }
 }
 
-/// Returns the paths of all records of a run, sorted. Links are left out.
+/// Returns the paths of all records of a run, sorted, without links.
 ///
 /// # Errors
-/// If the file system refuses.
+/// If the folder cannot be read.
 pub fn all(run: &Path) -> Result<Vec<PathBuf>> {
     let is_record = |entry: &chaic_files::Entry| {
         entry.kind == EntryKind::File && entry.path.extension().is_some_and(|e| e == "jsonl")
@@ -227,25 +232,30 @@ mod tests {
     use chaic_core::TaskId;
 
     use super::*;
-    use crate::exchange::{By, Fault, FaultKind, Message, Purpose, Reply, Role};
+    use crate::exchange::{DecisionSource, Fault, FaultKind, Message, Purpose, Reply, Role};
 
-    fn ask(text: &str) -> Ask {
+    fn request(text: &str) -> ChatRequest {
         let message = Message { role: Role::User, text: text.to_owned(), images: Vec::new() };
         let (model, messages) = ("m".to_owned(), vec![message]);
-        Ask { model, purpose: Purpose::Decide, messages, schema_of: Some(3) }
+        ChatRequest { model, purpose: Purpose::Decide, messages, n_schema_plans: Some(3) }
     }
 
-    fn exchange(text: &str) -> Entry {
+    fn exchange(text: &str) -> RecordEntry {
         let fault = Fault { kind: FaultKind::Empty, status: None, detail: "empty".to_owned() };
-        Entry::Exchange(Box::new(Exchange::new(7, ask(text), vec![], Reply::Failed(fault))))
+        RecordEntry::Exchange(Box::new(Exchange::new(
+            7,
+            request(text),
+            vec![],
+            Reply::Failed(fault),
+        )))
     }
 
-    fn decided(frame: u32) -> Entry {
-        Entry::Decided(Decided {
+    fn decided(frame: u32) -> RecordEntry {
+        RecordEntry::Decision(DecisionRecord {
             frame,
             number: Some(1),
             plan: "explore".to_owned(),
-            by: By::Model,
+            source: DecisionSource::Model,
             lenient: false,
             prompt_tokens: None,
             shortened: 0,
@@ -253,71 +263,70 @@ mod tests {
         })
     }
 
-    fn head() -> Head {
+    fn header() -> RecordHeader {
         let (task, helper) = (TaskId::Obstacle, "llm".to_owned());
         let key = RunKey { task, helper, episode: "obstacle/test/00".to_owned(), seed: 0 };
-        Head::new(&key, AgentId::HELPER, "m")
+        RecordHeader::new(&key, AgentId::HELPER, "m")
     }
 
-    fn write(path: &Path, entries: &[Entry]) {
+    fn write(path: &Path, entries: &[RecordEntry]) {
         let run = path.parent().unwrap();
-        let mut recorder = Recorder::open(run, path, &head()).unwrap();
+        let mut recorder = DecisionLogWriter::open(run, path, &header()).unwrap();
         entries.iter().for_each(|e| recorder.push(e.clone()).unwrap());
     }
 
     #[test]
-    fn what_was_answered_is_known_again_until_something_differs() {
+    fn recorded_exchanges_are_reused_until_an_entry_differs() {
         let dir = tempfile::tempdir().unwrap();
         fs::create_dir(dir.path().join("a")).unwrap();
         let path = dir.path().join("a/r.jsonl");
         let whole = [exchange("one"), decided(1), exchange("two"), decided(2)];
         write(&path, &whole);
         let bytes = fs::read(&path).unwrap();
-        assert_eq!(Record::read(dir.path(), &path).unwrap().entries, whole);
+        assert_eq!(DecisionLog::read(dir.path(), &path).unwrap().entries, whole);
 
-        let mut again = Recorder::open(dir.path(), &path, &head()).unwrap();
-        assert!(again.known(&ask("other")).is_none());
-        assert!(again.known(&ask("one")).is_some());
+        let mut again = DecisionLogWriter::open(dir.path(), &path, &header()).unwrap();
+        assert!(again.recorded_exchange(&request("other")).is_none());
+        assert!(again.recorded_exchange(&request("one")).is_some());
         again.push(exchange("one")).unwrap();
-        assert!(again.known(&ask("two")).is_none(), "first comes the decision");
+        assert!(again.recorded_exchange(&request("two")).is_none(), "the decision comes first");
         again.push(decided(1)).unwrap();
-        assert!(again.known(&ask("two")).is_some());
+        assert!(again.recorded_exchange(&request("two")).is_some());
         drop(again);
-        assert_eq!(
-            fs::read(&path).unwrap(),
-            bytes,
-            "as long as nothing differs nothing is written"
-        );
+        assert_eq!(fs::read(&path).unwrap(), bytes, "equal entries are not written again");
 
         write(&path, &[exchange("one"), decided(1), exchange("three")]);
-        let other = Record::read(dir.path(), &path).unwrap().entries;
+        let other = DecisionLog::read(dir.path(), &path).unwrap().entries;
         assert_eq!(other, [exchange("one"), decided(1), exchange("three")]);
     }
 
     #[test]
-    fn a_torn_line_is_left_out_and_a_changed_one_is_found() {
+    fn a_torn_last_line_is_ignored_and_a_changed_line_is_refused() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("r.jsonl");
         write(&path, &[exchange("one"), decided(1), exchange("two")]);
         let whole = fs::read_to_string(&path).unwrap();
         fs::write(&path, &whole[..whole.len() - 9]).unwrap();
-        assert_eq!(Record::read(dir.path(), &path).unwrap().entries, [exchange("one"), decided(1)]);
-        // Going on after a torn line cuts it off.
+        assert_eq!(
+            DecisionLog::read(dir.path(), &path).unwrap().entries,
+            [exchange("one"), decided(1)]
+        );
+        // Continuing truncates a torn last line.
         write(&path, &[exchange("one"), decided(1), exchange("two")]);
         assert_eq!(fs::read_to_string(&path).unwrap(), whole);
 
         fs::write(&path, whole.replacen("one", "0ne", 1)).unwrap();
-        let said = Record::read(dir.path(), &path).unwrap_err().to_string();
-        assert!(said.contains("line 2") && said.contains("question"), "{said}");
+        let error = DecisionLog::read(dir.path(), &path).unwrap_err().to_string();
+        assert!(error.contains("line 2") && error.contains("request differs"), "{error}");
     }
 
     #[test]
-    fn a_record_of_something_else_is_replaced() {
+    fn an_invalid_record_is_replaced() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("r.jsonl");
         fs::write(&path, "{}\n").unwrap();
         write(&path, &[decided(1)]);
-        assert_eq!(Record::read(dir.path(), &path).unwrap().entries, [decided(1)]);
+        assert_eq!(DecisionLog::read(dir.path(), &path).unwrap().entries, [decided(1)]);
     }
 
     #[cfg(unix)]
@@ -325,18 +334,18 @@ mod tests {
     fn no_record_is_read_or_written_through_a_link() {
         use std::os::unix::fs::symlink;
         let dir = tempfile::tempdir().unwrap();
-        let (run, own) = (dir.path().join("run"), dir.path().join("own.jsonl"));
+        let (run, outside) = (dir.path().join("run"), dir.path().join("outside.jsonl"));
         fs::create_dir_all(run.join("llm/a")).unwrap();
-        fs::write(&own, "dear").unwrap();
-        symlink(&own, run.join("llm/a/r.jsonl")).unwrap();
+        fs::write(&outside, "unchanged").unwrap();
+        symlink(&outside, run.join("llm/a/r.jsonl")).unwrap();
         symlink(run.join("llm/a"), run.join("llm/b")).unwrap();
         for name in ["llm/a/r.jsonl", "llm/b/r.jsonl", "llm/b/new.jsonl"] {
             let path = run.join(name);
-            let said = Recorder::open(&run, &path, &head()).unwrap_err().to_string();
-            assert!(said.contains("it is a link"), "{said}");
-            assert!(Record::read(&run, &path).is_err(), "{name}");
+            let error = DecisionLogWriter::open(&run, &path, &header()).unwrap_err().to_string();
+            assert!(error.contains("it is a link"), "{error}");
+            assert!(DecisionLog::read(&run, &path).is_err(), "{name}");
         }
-        assert_eq!(fs::read(&own).unwrap(), b"dear");
+        assert_eq!(fs::read(&outside).unwrap(), b"unchanged");
         assert_eq!(all(&run).unwrap(), [] as [PathBuf; 0]);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, SystemTime};
 
-/// How long a `Retry-After` asks to wait.
+/// Parses a `Retry-After` header into a wait.
 pub(crate) fn retry_after(value: &str) -> Option<Duration> {
     if let Ok(secs) = value.trim().parse::<f64>() {
         return Duration::try_from_secs_f64(secs).ok();
@@ -25,7 +25,7 @@ mod tests {
         assert_eq!(
             retry_after("Sun, 06 Nov 1994 08:49:37 GMT"),
             Some(Duration::ZERO),
-            "it is past"
+            "a date in the past"
         );
         let far = retry_after("Fri, 31 Dec 9999 23:59:59 GMT").expect("a date");
         assert!(far > Duration::from_secs(1_000_000_000), "{far:?}");

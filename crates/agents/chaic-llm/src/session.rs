@@ -1,4 +1,4 @@
-//! What all minds of a run share: settings, templates, the way to the endpoint, and the budget.
+//! State shared by all agents of a run: settings, templates, endpoint and budget.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,70 +6,69 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, OnceLock};
 
 use chaic_env::CHAIC_VERSION;
-use chaic_files::{EntryKind, kind_below, make_folders_below, read_below, write_whole};
+use chaic_files::{EntryKind, create_folders_below, kind_below, read_below, write_atomically};
 use serde::{Deserialize, Serialize};
 
 use crate::endpoint::Client;
 use crate::error::{LlmError, Result};
 use crate::exchange::{ContentHash, Fault};
-use crate::gate::{Gate, Spent};
-use crate::record::{self, Entry, Record};
-use crate::settings::{Asking, Budget, Endpoint, Faults, Price, Settings};
+use crate::rate_limiter::{RateLimiter, Spent};
+use crate::record::{self, DecisionLog, RecordEntry};
+use crate::settings::{Budget, Endpoint, Faults, Price, PromptSettings, Settings};
 use crate::templates::Templates;
 
-/// Where answers come from.
+/// Source of answers.
 pub enum Source {
-    /// From an endpoint.
+    /// An endpoint.
     Live(Box<Client>),
-    /// From the record of another run, in this folder.
+    /// The record of another run, in this folder.
     Replay(PathBuf),
-    /// From nowhere: only to know what minds ask for.
+    /// None: the agents only describe their sensors.
     Offline,
 }
 
-/// What all minds of a run share.
+/// State shared by all agents of a run.
 pub struct Session {
-    /// How the model is asked.
+    /// Settings.
     pub settings: Settings,
-    /// The prompts.
+    /// Templates of prompts.
     pub templates: Templates,
-    /// Where answers come from.
+    /// Source of answers.
     pub source: Source,
-    /// Raised to stop the run; by the session itself when it is to pause.
+    /// Stop flag of the run; a pause sets it, too.
     pub stop: &'static AtomicBool,
     problem: Mutex<Option<String>>,
     listener: OnceLock<Listener>,
-    /// Requests that failed since the last that didn't. Begins so that the very first failure is
-    /// told.
+    /// Consecutive failed requests. The initial value makes the first failure visible to the user.
     failures: AtomicU32,
-    run: OnceLock<(PathBuf, Gate)>,
+    run: OnceLock<(PathBuf, RateLimiter)>,
 }
 
-/// Hears what a user should know while the run goes on.
+/// Receiver of messages to the user.
 pub type Listener = Box<dyn Fn(&str) + Send + Sync>;
 
-/// The user is told when so many requests in a row have failed. Ours: with the usual waits a few
-/// seconds of an endpoint that is gone, and rare where three in ten requests fail.
-const TOLD_AFTER: u32 = 4;
+/// Number of consecutive failed requests after which the user is notified. Chosen so that an
+/// unreachable endpoint is reported after a few seconds, and 30 % failures rarely are.
+const NOTIFY_AFTER: u32 = 4;
 
 const FORMAT: &str = "chaic-llm-settings";
 const VERSION: u32 = 1;
-/// The file of the recorded settings.
+/// File of the recorded settings.
 const FILE: &str = "settings.json";
-/// Longest file of settings that is read, bytes: a thousand times a usual one.
+/// Maximum size of that file, bytes: a thousand times a typical one.
 const MAX_FILE_BYTES: u64 = 1 << 20;
 
-/// What a run records of its settings; there is no key in it.
+/// Recorded settings of a run, without the key.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Recorded {
     format: String,
     version: u32,
     chaic: String,
-    /// All that moves results. The templates are beside this file.
-    asking: Asking,
-    /// Hash of all templates.
+    /// Settings that affect results. The templates are beside this file.
+    asking: PromptSettings,
+    /// Digest of all templates.
     templates: ContentHash,
-    /// For the record only: may change while a run is gone on with. Absent for a replay.
+    /// Endpoint, for information only; it may change on resume. Absent for a replay.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     endpoint: Option<Endpoint>,
     faults: Faults,
@@ -78,43 +77,45 @@ struct Recorded {
 }
 
 impl Session {
-    /// A session of these settings.
+    /// Creates a session.
     ///
     /// # Errors
-    /// If settings are out of bounds, or templates can't be filled in.
+    /// If settings are out of bounds, or a template is invalid.
     pub fn new(settings: Settings, source: Source, stop: &'static AtomicBool) -> Result<Session> {
         settings.check_bounds()?;
         let templates = Templates::load(settings.asking.templates.as_deref())?;
         let (problem, listener, run) = (Mutex::new(None), OnceLock::new(), OnceLock::new());
-        let failures = AtomicU32::new(TOLD_AFTER - 1);
+        let failures = AtomicU32::new(NOTIFY_AFTER - 1);
         Ok(Session { settings, templates, source, stop, problem, listener, failures, run })
     }
 
-    /// Ties the session to a run's folder: the settings are recorded there, or held against those
-    /// that are.
+    /// Binds the session to a run folder: records the settings, or compares them with the recorded
+    /// ones.
     ///
     /// # Errors
-    /// If they differ, or the file system refuses.
+    /// If they differ, or a file cannot be written.
     pub fn attach(&self, run: &Path) -> Result<()> {
         let folder = record::folder(run);
-        fs::create_dir_all(run).map_err(LlmError::io("make the folder", run))?;
-        make_folders_below(run, &folder)?;
-        let ours = self.recorded();
+        fs::create_dir_all(run).map_err(LlmError::io("create the folder", run))?;
+        create_folders_below(run, &folder)?;
+        let current = self.recorded();
         match read_recorded(run)? {
-            Some(theirs) => compare(run, &theirs, &ours)?,
+            Some(recorded) => compare(run, &recorded, &current)?,
             None => {
-                make_folders_below(run, &folder.join("templates"))?;
+                create_folders_below(run, &folder.join("templates"))?;
                 self.templates.write(&folder.join("templates"))?;
-                let text = serde_json::to_string_pretty(&ours).expect("settings have string keys");
+                let text =
+                    serde_json::to_string_pretty(&current).expect("settings have string keys");
                 let path = folder.join(FILE);
-                // The last: until it is there whole, nothing is recorded.
-                write_whole(&path, (text + "\n").as_bytes())?;
+                // Written last: it marks a complete record of the settings.
+                write_atomically(&path, (text + "\n").as_bytes())?;
             }
         }
-        let before = spent_before(run, &self.settings.price)?;
-        let gate = Gate::new(self.settings.budget, self.settings.endpoint.in_flight, before);
-        // Whoever attaches twice goes on with the first.
-        let _ = self.run.set((run.to_owned(), gate));
+        let earlier = spent_before(run, &self.settings.price)?;
+        let limiter =
+            RateLimiter::new(self.settings.budget, self.settings.endpoint.in_flight, earlier);
+        // A second call keeps the first folder.
+        let _ = self.run.set((run.to_owned(), limiter));
         Ok(())
     }
 
@@ -125,7 +126,7 @@ impl Session {
             format: FORMAT.to_owned(),
             version: VERSION,
             chaic: CHAIC_VERSION.to_owned(),
-            asking: Asking { templates: None, ..self.settings.asking.clone() },
+            asking: PromptSettings { templates: None, ..self.settings.asking.clone() },
             templates: self.templates.hash(),
             endpoint,
             faults: self.settings.faults,
@@ -134,66 +135,66 @@ impl Session {
         }
     }
 
-    /// The run's folder, once it is known.
+    /// Returns the run folder, once it is known.
     pub fn run(&self) -> Option<&Path> {
         self.run.get().map(|(path, _)| path.as_path())
     }
 
-    /// The gate of the run, once its folder is known.
-    pub fn gate(&self) -> Option<&Gate> {
-        self.run.get().map(|(_, gate)| gate)
+    /// Returns the limiter of the run, once its folder is known.
+    pub fn limiter(&self) -> Option<&RateLimiter> {
+        self.run.get().map(|(_, limiter)| limiter)
     }
 
-    /// Tells this listener what a user should know while the run goes on; the first one holds.
+    /// Sets the receiver of messages to the user; later calls have no effect.
     pub fn listen(&self, listener: Listener) {
         let _ = self.listener.set(listener);
     }
 
-    /// A request was answered.
-    pub fn answered(&self) {
+    /// Resets the count of failed requests after an answer.
+    pub fn record_answer(&self) {
         self.failures.store(0, Ordering::Relaxed);
     }
 
-    /// A request failed and the run goes on. The user hears of it if nothing was answered before, and
-    /// whenever several in a row have failed.
-    pub fn failed(&self, fault: &Fault) {
+    /// Counts a failed request after which the run continues. The user is notified if no request
+    /// was answered before, and after several consecutive failures.
+    pub fn record_failure(&self, fault: &Fault) {
         let n = self.failures.fetch_add(1, Ordering::Relaxed).saturating_add(1);
-        if let (TOLD_AFTER, Some(listener)) = (n, self.listener.get()) {
+        if let (NOTIFY_AFTER, Some(listener)) = (n, self.listener.get()) {
             let attempts = self.settings.faults.attempts;
             listener(&format!(
-                "the model can't be asked just now: {fault}; each question is tried up to \
+                "the model cannot be reached at the moment: {fault}; each request is tried up to \
                  {attempts} times"
             ));
         }
     }
 
-    /// Stops the run for a reason that its user should know; the first one holds, and none does if
-    /// the user has stopped the run before.
-    pub fn halt(&self, why: String) {
-        // Held until both are set: who sees the flag sees the reason.
+    /// Stops the run with a reason for the user. The first reason is kept; an interruption by the
+    /// user has none.
+    pub fn halt(&self, reason: String) {
+        // The lock is held until flag and reason are both set.
         let mut problem = self.problem.lock().unwrap_or_else(|e| e.into_inner());
         if !self.stop.swap(true, Ordering::SeqCst) {
-            problem.get_or_insert(why);
+            problem.get_or_insert(reason);
         }
     }
 
-    /// Whether the run is to stop and the session isn't the reason. Then nobody waits for answers;
-    /// where it is, those that are on their way are waited for, as they count in the budget.
+    /// Returns whether the run must stop for another reason than a pause of the session. Only then
+    /// are requests in flight abandoned, since they count in the budget.
     pub fn is_interrupted(&self) -> bool {
         self.stop.load(Ordering::SeqCst) && self.problem().is_none()
     }
 
-    /// Why the session stopped the run, if it did.
+    /// Returns the reason for which the session stopped the run, if it did.
     pub fn problem(&self) -> Option<String> {
         self.problem.lock().unwrap_or_else(|e| e.into_inner()).clone()
     }
 }
 
-/// The settings that a run was begun with, with its own copies of the templates; `None` if no
-/// language model took part.
+/// Reads the settings of a run, with its copies of the templates; `None` if the run used no
+/// language model.
 ///
 /// # Errors
-/// If the file is there and can't be read.
+/// If the file exists and cannot be read.
 pub fn settings_of(run: &Path) -> Result<Option<Settings>> {
     let Some(recorded) = read_recorded(run)? else { return Ok(None) };
     let templates = record::folder(run).join("templates");
@@ -202,7 +203,7 @@ pub fn settings_of(run: &Path) -> Result<Option<Settings>> {
         return Err(LlmError::io("read", &templates)(std::io::Error::other(problem)));
     }
     Ok(Some(Settings {
-        asking: Asking { templates: Some(templates), ..recorded.asking },
+        asking: PromptSettings { templates: Some(templates), ..recorded.asking },
         endpoint: recorded.endpoint.unwrap_or_default(),
         faults: recorded.faults,
         budget: recorded.budget,
@@ -226,36 +227,36 @@ fn read_recorded(run: &Path) -> Result<Option<Recorded>> {
     Ok(Some(recorded))
 }
 
-fn compare(run: &Path, theirs: &Recorded, ours: &Recorded) -> Result<()> {
+fn compare(run: &Path, recorded: &Recorded, current: &Recorded) -> Result<()> {
     let differs = |field: &str, recorded: String, given: String| {
         let (path, field) = (run.to_owned(), field.to_owned());
         Err(LlmError::SettingDiffers { path, field, recorded, given })
     };
     let value = |r: &Recorded| serde_json::to_value(&r.asking).expect("settings have string keys");
-    let (theirs_value, ours_value) = (value(theirs), value(ours));
-    for (name, recorded) in theirs_value.as_object().into_iter().flatten() {
-        let given = &ours_value[name];
-        if recorded != given {
+    let (recorded_value, current_value) = (value(recorded), value(current));
+    for (name, old) in recorded_value.as_object().into_iter().flatten() {
+        let given = &current_value[name];
+        if old != given {
             let field = format!("asking.{name}");
-            return differs(&field, recorded.to_string(), given.to_string());
+            return differs(&field, old.to_string(), given.to_string());
         }
     }
-    if theirs.templates != ours.templates {
-        let (recorded, given) = (theirs.templates.to_string(), ours.templates.to_string());
-        return differs("templates", recorded, given);
+    if recorded.templates != current.templates {
+        let (old, given) = (recorded.templates.to_string(), current.templates.to_string());
+        return differs("templates", old, given);
     }
     Ok(())
 }
 
-/// What a run's records say has been spent.
+/// Sums up the spending in a run's records.
 fn spent_before(run: &Path, price: &Price) -> Result<Spent> {
     let mut spent = Spent::default();
     for path in record::all(run)? {
         // A damaged record is replaced when its episode is played again.
-        let Ok(record) = Record::read(run, &path) else { continue };
+        let Ok(record) = DecisionLog::read(run, &path) else { continue };
         for entry in record.entries {
-            if let Entry::Exchange(exchange) = entry {
-                spent.add(Spent::of(exchange.requests(), exchange.usage(), price));
+            if let RecordEntry::Exchange(exchange) = entry {
+                spent.add(Spent::new(exchange.requests(), exchange.usage(), price));
             }
         }
     }
@@ -285,8 +286,8 @@ mod tests {
         let stopped = session();
         stopped.stop.store(true, Ordering::SeqCst);
         assert!(stopped.is_interrupted());
-        stopped.halt("the model can't be asked".to_owned());
-        assert!(stopped.is_interrupted(), "the user was first");
+        stopped.halt("the model cannot be reached".to_owned());
+        assert!(stopped.is_interrupted(), "the user stopped the run first");
         assert_eq!(stopped.problem(), None);
     }
 }

@@ -1,4 +1,4 @@
-//! How a language model is asked: what a configuration file says.
+//! Settings of language helpers: the configuration file.
 
 mod check;
 
@@ -10,240 +10,240 @@ use serde::{Deserialize, Serialize};
 use crate::error::{LlmError, Result};
 use crate::exchange::Usage;
 
-/// Largest configuration file that is read, bytes.
+/// Maximum size of a configuration file, bytes.
 const MAX_CONFIG_BYTES: usize = 1 << 20;
 
-/// All settings. Those of [`Asking`] move results: a run is gone on with and played again by the
-/// same ones only. The others are about how to get at the model, and may change.
+/// All settings. [`PromptSettings`] affect results and must stay equal when a run is resumed or
+/// replayed; the others may change.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// What is asked, and what becomes of the answer.
-    pub asking: Asking,
-    /// Whom to ask.
+    /// Requests and the use of answers.
+    pub asking: PromptSettings,
+    /// Endpoint.
     pub endpoint: Endpoint,
-    /// What to do when the endpoint fails.
+    /// Handling of failures.
     pub faults: Faults,
-    /// What may be spent.
+    /// Budget.
     pub budget: Budget,
-    /// What tokens cost.
+    /// Prices of tokens.
     pub price: Price,
 }
 
-/// What is asked, and what becomes of the answer: all that moves results.
+/// Requests and the use of answers: all settings that affect results.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Asking {
-    /// The model, as the endpoint calls it (for Azure: the deployment).
+pub struct PromptSettings {
+    /// Name of the model at the endpoint (for Azure: the deployment).
     pub model: String,
-    /// A folder with templates in place of the built-in ones; files that are missing are built in.
+    /// Folder of templates that replace built-in ones; missing files are built in.
     pub templates: Option<PathBuf>,
-    /// In how many steps the model answers.
-    pub steps: Steps,
-    /// In which form.
-    pub form: Form,
-    /// Randomness of the answer; absent for the endpoint's own.
+    /// Number of requests per decision.
+    pub steps: PromptSteps,
+    /// Form of answers.
+    pub form: AnswerForm,
+    /// Sampling temperature; absent for the endpoint's default.
     pub temperature: Option<f64>,
-    /// Part of the probability that is sampled from; absent for the endpoint's own.
+    /// Nucleus sampling probability; absent for the endpoint's default.
     pub top_p: Option<f64>,
-    /// Seed of the sampling, for endpoints that know one.
+    /// Seed of sampling, for endpoints that support it.
     pub seed: Option<u64>,
-    /// Tokens that an answer may have.
+    /// Maximum tokens of an answer.
     pub answer_tokens: u32,
     /// Name of that limit in a request: `max_tokens`, or `max_completion_tokens` for newer models.
     pub answer_tokens_field: String,
-    /// Tokens that a prompt may have, images not counted, by [`crate::tokens::estimate`].
+    /// Maximum tokens of a prompt without images, by [`crate::tokens::estimate`].
     pub prompt_tokens: u32,
-    /// Fields that are not sent, for models that refuse them: `temperature`, say.
+    /// Fields to omit for models that refuse them, for example `temperature`.
     pub omit: Vec<String>,
-    /// Further fields of every request, for what this program doesn't know.
+    /// Additional fields of each request.
     pub extra: serde_json::Map<String, serde_json::Value>,
-    /// What the helper knows of its partner's doings.
-    pub behavior: Behavior,
-    /// Who decides where the model doesn't.
+    /// Source of the partner's observed interactions.
+    pub behavior: BehaviorSource,
+    /// Policy for decisions without the model.
     pub fallback: Fallback,
-    /// Frames that pass for each second that the model takes to answer.
+    /// Frames that pass per second of latency.
     pub frames_per_second: f32,
-    /// How long a chosen wait lasts, frames.
+    /// Duration of a chosen wait, frames.
     pub wait_frames: u32,
-    /// Pictures for `vlm`.
-    pub images: Pictures,
+    /// Images of `vlm`.
+    pub images: ImageSettings,
 }
 
-/// In how many steps the model answers.
+/// Number of requests per decision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Steps {
+pub enum PromptSteps {
     /// Reasoning and choice in one answer.
     #[default]
     One,
-    /// First the reasoning, then, asked again, the choice (facts A3.4).
+    /// Reasoning first, then a second request for the choice (facts A3.4).
     Two,
 }
 
-/// In which form the choice comes.
+/// Form of the choice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Form {
-    /// By JSON schema; as text from the moment on when the endpoint refuses a schema.
+pub enum AnswerForm {
+    /// JSON schema; text after the endpoint refused a schema.
     #[default]
     Auto,
-    /// By JSON schema.
+    /// JSON schema.
     Schema,
-    /// As text that ends with a line `Plan: N`.
+    /// Text that ends with a line `Plan: N`.
     Text,
 }
 
-/// What the helper knows of its partner's doings.
+/// Source of the partner's observed interactions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Behavior {
-    /// What its own eyes tell; the `told` variants are granted them.
+pub enum BehaviorSource {
+    /// The helper's own perception; the `told` variants have a grant.
     #[default]
     Track,
-    /// Perfect recognition while the partner is in view: a grant that every trace names.
+    /// Ground truth while the partner is visible: a grant that every trace names.
     Granted,
 }
 
-/// Who decides where the model doesn't.
+/// Policy for decisions without the model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fallback {
-    /// Explores, as the original does; turns around where that can't be begun.
+    /// Explores, as the original does; turns around if exploring is impossible.
     #[default]
     Explore,
-    /// The rule-based planner (for a partner: its own rules).
+    /// The rule-based planner, or for a partner its own rules.
     Rules,
     /// Waits.
     Wait,
 }
 
-/// Pictures for `vlm`.
+/// Images of `vlm`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Pictures {
-    /// How many: the last ones that the helper has looked at (paper: 10).
+pub struct ImageSettings {
+    /// Number of most recent images (paper: 10).
     pub count: usize,
-    /// Their side, pixels; at most that of the helper's own images.
+    /// Side, pixels; at most that of the helper's own images.
     pub size: u32,
-    /// `png` or `jpeg`.
-    pub format: PictureFormat,
+    /// Encoding.
+    pub format: ImageEncoding,
 }
 
-/// How pictures are encoded.
+/// Encoding of images.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum PictureFormat {
-    /// Without loss, as the original does.
+pub enum ImageEncoding {
+    /// Lossless, as in the original.
     #[default]
     Png,
-    /// Smaller, at quality 85.
+    /// Lossy, at quality 85.
     Jpeg,
 }
 
-/// Whom to ask.
+/// Endpoint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Endpoint {
-    /// The base of its address, for example `http://127.0.0.1:8000/v1`.
+    /// Base of its address, for example `http://127.0.0.1:8000/v1`.
     pub url: String,
-    /// Which dialect it speaks.
-    pub kind: Kind,
-    /// Azure's version of the protocol.
+    /// Protocol.
+    pub kind: EndpointKind,
+    /// Azure's protocol version.
     pub api_version: String,
-    /// The environment variable that holds the key; empty if none is asked for. Absent for
-    /// `OPENAI_API_KEY` (Azure: `AZURE_OPENAI_API_KEY`), or no key on this machine itself.
+    /// Environment variable of the key; empty for no key. The default is `OPENAI_API_KEY` (Azure:
+    /// `AZURE_OPENAI_API_KEY`), or no key on the same machine.
     pub key_env: Option<String>,
-    /// Requests at a time.
+    /// Maximum number of concurrent requests.
     pub in_flight: usize,
-    /// Longest answer that is read, bytes.
+    /// Maximum size of an answer, bytes.
     pub max_answer_bytes: u64,
-    /// How long one request may take, seconds.
+    /// Time limit of a request, seconds.
     pub timeout_secs: f32,
-    /// Whether plain http to another machine is fine: everybody on the way can read questions and
-    /// key.
+    /// True if plain http to another machine is allowed, which exposes requests and key to the
+    /// network.
     pub allow_http: bool,
 }
 
-/// Which dialect an endpoint speaks.
+/// Protocol of an endpoint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Kind {
-    /// `URL/chat/completions`, the key as bearer: hosted services, vLLM, llama.cpp, Ollama.
+pub enum EndpointKind {
+    /// `URL/chat/completions` with a bearer key: hosted services, vLLM, llama.cpp, Ollama.
     #[default]
     Openai,
-    /// `URL/openai/deployments/MODEL/chat/completions?api-version=...`, the key as `api-key`.
+    /// `URL/openai/deployments/MODEL/chat/completions?api-version=...` with an `api-key` header.
     Azure,
 }
 
-/// What to do when the endpoint fails.
+/// Handling of failed requests.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Faults {
-    /// How often a request is sent before it counts as failed.
+    /// Attempts before a request counts as failed.
     pub attempts: u32,
-    /// How long to wait after the first failure, seconds; twice as long after each further one.
+    /// Wait after the first failure, seconds; doubles after each further one.
     pub first_wait_secs: f32,
-    /// The longest wait, also where the endpoint names one, seconds.
+    /// Maximum wait, which also limits the endpoint's `Retry-After`, seconds.
     pub longest_wait_secs: f32,
-    /// What becomes of the run then.
-    pub then: Then,
+    /// Consequence for the run.
+    pub then: FaultAction,
 }
 
-/// What becomes of a run when the model can't be asked.
+/// Consequence of an unavailable model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Then {
-    /// It stops, and can be gone on with; nothing that was answered is asked again.
+pub enum FaultAction {
+    /// The run stops and can be resumed; answered requests are not sent again.
     #[default]
     Pause,
-    /// The fallback decides, and it counts.
+    /// The fallback decides, and reports count it.
     Fallback,
 }
 
-/// What may be spent in a run, all its sessions together; overrun by at most one request.
+/// Budget of a run over all its sessions; exceeded by one request at most.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Budget {
-    /// Requests, repeated ones included.
+    /// Maximum requests, retries included.
     pub requests: Option<u64>,
-    /// Tokens, those of prompts and of answers together.
+    /// Maximum tokens of prompts and answers together.
     pub tokens: Option<u64>,
-    /// Money, in the currency of the price table.
+    /// Maximum cost, in the currency of the prices.
     pub money: Option<f64>,
-    /// Minutes since this session began.
+    /// Maximum minutes of a session.
     pub minutes: Option<f64>,
-    /// What becomes of the run when one of them is spent.
-    pub then: Then,
+    /// Consequence of a spent budget.
+    pub then: FaultAction,
 }
 
-/// What tokens cost.
+/// Prices of tokens.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Price {
-    /// A million tokens of prompts.
+    /// Price of a million prompt tokens.
     pub prompt_per_million: f64,
-    /// A million tokens of answers.
+    /// Price of a million answer tokens.
     pub answer_per_million: f64,
-    /// In which currency, for reports.
+    /// Currency, for reports.
     pub currency: String,
 }
 
 impl Price {
-    /// What this usage costs, in millionths of the currency.
+    /// Returns the cost of this usage, in millionths of the currency.
     pub fn millionths(&self, usage: Usage) -> f64 {
         usage.prompt as f64 * self.prompt_per_million
             + usage.answer as f64 * self.answer_per_million
     }
 }
 
-impl Default for Asking {
-    fn default() -> Asking {
-        Asking {
+impl Default for PromptSettings {
+    fn default() -> PromptSettings {
+        PromptSettings {
             model: String::new(),
             templates: None,
-            steps: Steps::One,
-            form: Form::Auto,
+            steps: PromptSteps::One,
+            form: AnswerForm::Auto,
             // Facts A3.4.
             temperature: Some(0.7),
             top_p: Some(1.0),
@@ -253,18 +253,18 @@ impl Default for Asking {
             prompt_tokens: 4000,
             omit: Vec::new(),
             extra: serde_json::Map::new(),
-            behavior: Behavior::Track,
+            behavior: BehaviorSource::Track,
             fallback: Fallback::Explore,
             frames_per_second: 0.0,
             wait_frames: 50,
-            images: Pictures::default(),
+            images: ImageSettings::default(),
         }
     }
 }
 
-impl Default for Pictures {
-    fn default() -> Pictures {
-        Pictures { count: 10, size: 512, format: PictureFormat::Png }
+impl Default for ImageSettings {
+    fn default() -> ImageSettings {
+        ImageSettings { count: 10, size: 512, format: ImageEncoding::Png }
     }
 }
 
@@ -272,7 +272,7 @@ impl Default for Endpoint {
     fn default() -> Endpoint {
         Endpoint {
             url: String::new(),
-            kind: Kind::Openai,
+            kind: EndpointKind::Openai,
             api_version: "2024-10-21".to_owned(),
             key_env: None,
             in_flight: 16,
@@ -285,7 +285,12 @@ impl Default for Endpoint {
 
 impl Default for Faults {
     fn default() -> Faults {
-        Faults { attempts: 8, first_wait_secs: 1.0, longest_wait_secs: 60.0, then: Then::Pause }
+        Faults {
+            attempts: 8,
+            first_wait_secs: 1.0,
+            longest_wait_secs: 60.0,
+            then: FaultAction::Pause,
+        }
     }
 }
 
@@ -293,7 +298,7 @@ impl Settings {
     /// Reads a configuration file.
     ///
     /// # Errors
-    /// If it can't be read, isn't TOML, or has a field that isn't known.
+    /// If it cannot be read, is not TOML, or has an unknown field.
     pub fn read(path: &Path) -> Result<Settings> {
         let wrong = |problem: String| LlmError::Config { path: path.to_owned(), problem };
         let bytes = read_user_file(path, MAX_CONFIG_BYTES as u64 + 1)?;
@@ -302,38 +307,49 @@ impl Settings {
         }
         let text = String::from_utf8(bytes).map_err(|e| wrong(e.to_string()))?;
         let mut settings: Settings =
-            toml::from_str(&text).map_err(|e| wrong(e.to_string().trim().to_owned()))?;
-        // TOML has no null: it is what nan and inf become on their way to JSON.
-        if let Some((name, _)) = settings.asking.extra.iter().find(|(_, value)| holds_null(value)) {
+            toml::from_str(&text).map_err(|e| wrong(message_with_line(&text, &e)))?;
+        // TOML has no null; nan and inf become null in JSON.
+        if let Some((name, _)) =
+            settings.asking.extra.iter().find(|(_, value)| contains_null(value))
+        {
             return Err(wrong(format!("asking.extra.{name} is no finite number")));
         }
         if let Some(folder) = &mut settings.asking.templates
             && folder.is_relative()
         {
-            // Beside the file that names it.
+            // Relative to the configuration file.
             *folder = path.parent().unwrap_or(Path::new("")).join(&folder);
         }
         Ok(settings)
     }
 
-    /// The environment variable that holds the key; empty for none.
+    /// Returns the environment variable of the key; empty for none.
     pub fn key_env(&self) -> String {
-        let usual = match self.endpoint.kind {
-            Kind::Azure => "AZURE_OPENAI_API_KEY",
-            Kind::Openai if self.endpoint.is_local() => "",
-            Kind::Openai => "OPENAI_API_KEY",
+        let default = match self.endpoint.kind {
+            EndpointKind::Azure => "AZURE_OPENAI_API_KEY",
+            EndpointKind::Openai if self.endpoint.is_local() => "",
+            EndpointKind::Openai => "OPENAI_API_KEY",
         };
-        self.endpoint.key_env.clone().unwrap_or_else(|| usual.to_owned())
+        self.endpoint.key_env.clone().unwrap_or_else(|| default.to_owned())
     }
 }
 
-fn holds_null(value: &serde_json::Value) -> bool {
+fn contains_null(value: &serde_json::Value) -> bool {
     use serde_json::Value;
     match value {
         Value::Null => true,
-        Value::Array(values) => values.iter().any(holds_null),
-        Value::Object(fields) => fields.values().any(holds_null),
+        Value::Array(values) => values.iter().any(contains_null),
+        Value::Object(fields) => fields.values().any(contains_null),
         _ => false,
+    }
+}
+
+/// Formats an error of the TOML parser on one line, with the number of the line in the file.
+fn message_with_line(text: &str, error: &toml::de::Error) -> String {
+    let message = error.message().replace('\n', " ");
+    match error.span().and_then(|span| text.get(..span.start)) {
+        Some(before) => format!("line {}: {message}", before.matches('\n').count() + 1),
+        None => message,
     }
 }
 
@@ -343,7 +359,7 @@ mod tests {
 
     use super::*;
 
-    pub(super) fn good() -> Settings {
+    pub(super) fn valid_settings() -> Settings {
         let mut settings = Settings::default();
         settings.asking.model = "m".to_owned();
         settings.endpoint.url = "http://127.0.0.1:8000/v1".to_owned();
@@ -351,21 +367,21 @@ mod tests {
     }
 
     #[test]
-    fn a_key_is_asked_for_where_it_is_usual() {
-        let mut settings = good();
+    fn the_default_key_variable_depends_on_the_endpoint() {
+        let mut settings = valid_settings();
         assert_eq!(settings.key_env(), "");
         settings.endpoint.url = "https://api.example.org/v1".to_owned();
         assert_eq!(settings.key_env(), "OPENAI_API_KEY");
         settings.endpoint.url = "https://localhost.example.org/v1".to_owned();
         assert_eq!(settings.key_env(), "OPENAI_API_KEY");
-        settings.endpoint.kind = Kind::Azure;
+        settings.endpoint.kind = EndpointKind::Azure;
         assert_eq!(settings.key_env(), "AZURE_OPENAI_API_KEY");
         settings.endpoint.key_env = Some("MINE".to_owned());
         assert_eq!(settings.key_env(), "MINE");
     }
 
     #[test]
-    fn a_file_may_say_little_and_nothing_unknown() {
+    fn missing_fields_have_defaults_and_unknown_fields_are_refused() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("llm.toml");
         fs::write(&path, "[asking]\nmodel = \"m\"\ntemplates = \"mine\"\n[budget]\nrequests = 5\n")
@@ -374,12 +390,12 @@ mod tests {
         assert_eq!(settings.asking.templates, Some(dir.path().join("mine")));
         assert_eq!((settings.budget.requests, settings.asking.answer_tokens), (Some(5), 512));
         fs::write(&path, "[asking]\nmodel_name = \"m\"\n").unwrap();
-        let said = Settings::read(&path).unwrap_err().to_string();
-        assert!(said.contains("model_name") && said.contains("llm.toml"), "{said}");
+        let error = Settings::read(&path).unwrap_err().to_string();
+        assert!(error.contains("model_name") && error.contains("llm.toml"), "{error}");
         for text in ["top_k = nan", "deep = { list = [1.0, inf] }"] {
             fs::write(&path, format!("[asking.extra]\n{text}\n")).unwrap();
-            let said = Settings::read(&path).unwrap_err().to_string();
-            assert!(said.contains("is no finite number"), "{said}");
+            let error = Settings::read(&path).unwrap_err().to_string();
+            assert!(error.contains("is no finite number"), "{error}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Printing a record: what was asked and answered, beside what happened.
+//! Text output of a record, beside the events of the trace.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -11,22 +11,22 @@ use chaic_files::{EntryKind, kind_below};
 use serde_json::Value;
 
 use crate::error::{LlmError, Result};
-use crate::exchange::{By, Decided, Exchange, Purpose, Reply, Role};
-use crate::record::{self, Entry, Record};
+use crate::exchange::{DecisionRecord, DecisionSource, Exchange, Purpose, Reply, Role};
+use crate::record::{self, DecisionLog, RecordEntry};
 
-/// How much is printed.
+/// Level of detail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Detail {
-    /// Prompts, answers, choices, and what happened.
+    /// Prompts, answers, choices and events.
     Full,
-    /// The same without prompts.
+    /// Answers, choices and events.
     Brief,
 }
 
-/// The record of one mind in one episode run as text, beside what the trace says happened.
+/// Formats the record of one agent in one episode run, with the events of its trace.
 ///
 /// # Errors
-/// If there is no record, or it can't be read.
+/// If there is no record, or it cannot be read.
 pub fn text(
     run: &Path,
     key: &RunKey,
@@ -38,30 +38,30 @@ pub fn text(
     if kind_below(run, &path)? == EntryKind::Missing {
         return Err(LlmError::NoRecord { path });
     }
-    let record = Record::read(run, &path)?;
-    let head = &record.head;
+    let record = DecisionLog::read(run, &path)?;
+    let header = &record.header;
     let mut text = format!(
         "{} with helper {}, seed {}: the {agent}'s decisions by {}\n",
-        key.episode, key.helper, key.seed, head.model
+        key.episode, key.helper, key.seed, header.model
     );
     let frames: Vec<Frame> = record
         .entries
         .iter()
         .filter_map(|e| match e {
-            Entry::Decided(decided) => Some(decided.frame),
-            Entry::Exchange(_) => None,
+            RecordEntry::Decision(decided) => Some(decided.frame),
+            RecordEntry::Exchange(_) => None,
         })
         .collect();
     let mut n = 0;
     for entry in &record.entries {
         match entry {
-            Entry::Exchange(exchange) => write_exchange(&mut text, exchange, detail),
-            Entry::Decided(decided) => {
+            RecordEntry::Exchange(exchange) => write_exchange(&mut text, exchange, detail),
+            RecordEntry::Decision(decided) => {
                 n += 1;
-                write_decided(&mut text, decided);
+                write_decision(&mut text, decided);
                 let until = frames.get(n).copied();
                 if let Some(trace) = trace {
-                    write_happened(&mut text, trace, decided.frame, until);
+                    write_events(&mut text, trace, decided.frame, until);
                 }
             }
         }
@@ -71,18 +71,18 @@ pub fn text(
 }
 
 fn write_exchange(text: &mut String, exchange: &Exchange, detail: Detail) {
-    let purpose = match exchange.ask.purpose {
+    let purpose = match exchange.request.purpose {
         Purpose::Decide => "asked",
         Purpose::Think => "asked to reason",
         Purpose::Choose => "asked to choose",
         Purpose::Again => "asked again",
     };
-    let _ = writeln!(text, "\n=== frame {}: {purpose}, {}", exchange.frame, exchange.ask_hash);
-    let said = exchange.ask.messages.last();
-    match (detail, exchange.ask.purpose) {
+    let _ = writeln!(text, "\n=== frame {}: {purpose}, {}", exchange.frame, exchange.request_hash);
+    let last_message = exchange.request.messages.last();
+    match (detail, exchange.request.purpose) {
         (Detail::Full, Purpose::Decide | Purpose::Think) => {
-            for message in &exchange.ask.messages {
-                let who = match message.role {
+            for message in &exchange.request.messages {
+                let author = match message.role {
                     Role::User => "to the model",
                     Role::Assistant => "by the model",
                 };
@@ -90,12 +90,12 @@ fn write_exchange(text: &mut String, exchange: &Exchange, detail: Detail) {
                     0 => String::new(),
                     n => format!(", with {n} pictures"),
                 };
-                let _ = writeln!(text, "--- {who}{pictures}\n{}", message.text);
+                let _ = writeln!(text, "--- {author}{pictures}\n{}", message.text);
             }
         }
-        // What came before stands above.
+        // Earlier messages are printed above.
         (_, Purpose::Choose | Purpose::Again) => {
-            let _ = writeln!(text, "--- to the model\n{}", said.map_or("", |m| &m.text));
+            let _ = writeln!(text, "--- to the model\n{}", last_message.map_or("", |m| &m.text));
         }
         (Detail::Brief, _) => {}
     }
@@ -114,22 +114,22 @@ fn write_exchange(text: &mut String, exchange: &Exchange, detail: Detail) {
     }
 }
 
-fn write_decided(text: &mut String, decided: &Decided) {
-    let by = match decided.by {
-        By::Model => "by the model",
-        By::FallbackInvalid => "by the fallback: no answer was of use",
-        By::FallbackFault => "by the fallback: the model couldn't be asked",
-        By::FallbackBudget => "by the fallback: the budget is spent",
-        By::OnlyPlan => "the only plan",
+fn write_decision(text: &mut String, decided: &DecisionRecord) {
+    let by = match decided.source {
+        DecisionSource::Model => "by the model",
+        DecisionSource::FallbackInvalid => "by the fallback: no answer was of use",
+        DecisionSource::FallbackFault => "by the fallback: the model couldn't be asked",
+        DecisionSource::FallbackBudget => "by the fallback: the budget is spent",
+        DecisionSource::OnlyPlan => "the only plan",
     };
     let number = decided.number.map_or(String::new(), |n| format!("plan {n}, "));
     let lenient = if decided.lenient { ", read leniently" } else { "" };
-    let Decided { frame, plan, .. } = decided;
+    let DecisionRecord { frame, plan, .. } = decided;
     let _ = writeln!(text, ">>> frame {frame}: {plan} ({number}{by}{lenient})");
 }
 
-/// The events of the trace from one decision to the next.
-fn write_happened(text: &mut String, trace: &Trace, from: Frame, until: Option<Frame>) {
+/// Appends the events of the trace between two decisions.
+fn write_events(text: &mut String, trace: &Trace, from: Frame, until: Option<Frame>) {
     let events = trace.records.iter().filter_map(|r| match r {
         trace::Record::Event(event) => Some(event),
         _ => None,
@@ -141,13 +141,13 @@ fn write_happened(text: &mut String, trace: &Trace, from: Frame, until: Option<F
     }
 }
 
-/// An event in words: its frame and name, then its fields.
+/// Formats an event: frame, name, then its fields.
 fn event_text(event: &Value) -> String {
     let field = |name: &str, value: &Value| {
         let person =
             value.as_u64().filter(|_| ["agent", "by", "leader", "follower"].contains(&name));
-        let thing = value.as_u64().filter(|_| ["object", "container", "on"].contains(&name));
-        match (person, thing, value) {
+        let object = value.as_u64().filter(|_| ["object", "container", "on"].contains(&name));
+        match (person, object, value) {
             (Some(n), _, _) => format!("{name} {}", AgentId(n as u8)),
             (_, Some(n), _) => format!("{name} #{n}"),
             (_, _, Value::String(text)) => format!("{name} {text}"),
@@ -159,27 +159,28 @@ fn event_text(event: &Value) -> String {
         .filter(|(name, value)| !["frame", "event"].contains(&name.as_str()) && !value.is_null())
         .map(|(name, value)| field(name, value))
         .collect();
-    let word = event["event"].as_str().unwrap_or("event").replace('_', " ");
-    format!("frame {}: {word}, {}", event["frame"], fields.join(", "))
+    let name = event["event"].as_str().unwrap_or("event").replace('_', " ");
+    format!("frame {}: {name}, {}", event["frame"], fields.join(", "))
 }
 
-fn write_counts(text: &mut String, record: &Record) {
+fn write_counts(text: &mut String, record: &DecisionLog) {
     let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
     let mut add = |name, n: u64| *counts.entry(name).or_default() += n;
     for entry in &record.entries {
         match entry {
-            Entry::Exchange(exchange) => {
+            RecordEntry::Exchange(exchange) => {
                 add("questions", 1);
                 add("requests", exchange.requests());
                 add("faults", exchange.faults.len() as u64);
-                add("asked again", u64::from(exchange.ask.purpose == Purpose::Again));
+                add("asked again", u64::from(exchange.request.purpose == Purpose::Again));
                 add("prompt tokens", exchange.usage().prompt);
                 add("answer tokens", exchange.usage().answer);
             }
-            Entry::Decided(decided) => {
+            RecordEntry::Decision(decided) => {
                 add("decisions", 1);
-                add("decided by the model", u64::from(decided.by == By::Model));
-                let is_fallback = !matches!(decided.by, By::Model | By::OnlyPlan);
+                add("decided by the model", u64::from(decided.source == DecisionSource::Model));
+                let is_fallback =
+                    !matches!(decided.source, DecisionSource::Model | DecisionSource::OnlyPlan);
                 add("decided by the fallback", u64::from(is_fallback));
                 add("read leniently", u64::from(decided.lenient));
                 add("shortened prompts", u64::from(decided.shortened > 0));

@@ -1,10 +1,10 @@
-//! The texts of prompts: templates in files that users may edit.
+//! Templates of prompts, in files that users may edit.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use chaic_files::{read_bounded, write_whole};
+use chaic_files::{read_bounded, write_atomically};
 use minijinja::syntax::SyntaxConfig;
 use minijinja::value::{Serde, Value};
 use minijinja::{Environment, UndefinedBehavior};
@@ -13,10 +13,11 @@ use serde::Serialize;
 use crate::error::{LlmError, Result};
 use crate::exchange::ContentHash;
 use crate::prompt_context::PromptContext;
+use crate::prompt_track::PromptTrack;
 
-/// Longest template that is read, bytes.
+/// Maximum size of a template, bytes.
 const MAX_TEMPLATE_BYTES: u64 = 1 << 20;
-/// Steps that filling in one template may take: a thousand times what the built-in ones need.
+/// Maximum steps of one template: a thousand times those of the built-in ones.
 const FUEL: u64 = 2_000_000;
 
 macro_rules! built_in {
@@ -25,7 +26,7 @@ macro_rules! built_in {
     };
 }
 
-/// The built-in templates: file name and text.
+/// Built-in templates: file name and text.
 pub const BUILT_IN: &[(&str, &str)] = built_in![
     "task.txt",
     "task_told.txt",
@@ -43,26 +44,14 @@ pub const BUILT_IN: &[(&str, &str)] = built_in![
     "images.txt",
 ];
 
-/// Whose prompt it is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Track {
-    /// A helper that is told neither goal nor constraint.
-    Hidden,
-    /// A helper that is told what the original's are.
-    Told,
-    /// The partner.
-    Partner,
-}
-
-/// What is asked for at the end of a prompt.
+/// Request at the end of a prompt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Question {
     /// Reasoning and choice as JSON.
     Schema,
     /// Reasoning and choice as text.
     Text,
-    /// Reasoning alone.
+    /// Reasoning only.
     Think,
 }
 
@@ -74,17 +63,17 @@ pub struct Templates {
 }
 
 impl Templates {
-    /// The built-in templates, those in `folder` in their place.
+    /// Loads the built-in templates, replaced by those in `folder`.
     ///
     /// # Errors
-    /// If one can't be read, has a name that isn't known, or can't be filled in.
+    /// If a template cannot be read, has an unknown name, or is invalid.
     pub fn load(folder: Option<&Path>) -> Result<Templates> {
         let mut texts: BTreeMap<String, String> =
             BUILT_IN.iter().map(|(n, t)| ((*n).to_owned(), (*t).to_owned())).collect();
         if let Some(folder) = folder {
-            let refused = || LlmError::io("list", folder);
-            for entry in fs::read_dir(folder).map_err(refused())? {
-                let path = entry.map_err(refused())?.path();
+            let convert = || LlmError::io("list", folder);
+            for entry in fs::read_dir(folder).map_err(convert())? {
+                let path = entry.map_err(convert())?.path();
                 let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
                 if path.extension().is_some_and(|e| e == "txt") {
                     texts.insert(name.clone(), read(&path, &name)?);
@@ -92,38 +81,38 @@ impl Templates {
             }
         }
         let templates = Templates { environment: environment(&texts)?, texts };
-        templates.try_all()?;
+        templates.render_samples()?;
         Ok(templates)
     }
 
     /// Writes all templates into a folder.
     ///
     /// # Errors
-    /// If the file system refuses.
+    /// If a file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<()> {
-        fs::create_dir_all(folder).map_err(LlmError::io("make the folder", folder))?;
+        fs::create_dir_all(folder).map_err(LlmError::io("create the folder", folder))?;
         for (name, text) in &self.texts {
             let path = folder.join(name);
-            write_whole(&path, text.as_bytes())?;
+            write_atomically(&path, text.as_bytes())?;
         }
         Ok(())
     }
 
-    /// The hash of all of them.
+    /// Returns the digest of all templates.
     pub fn hash(&self) -> ContentHash {
         let all = serde_json::to_vec(&self.texts).expect("texts have string keys");
-        ContentHash::of(&all)
+        ContentHash::new(&all)
     }
 
-    /// The prompt: six parts, and what is asked for.
+    /// Renders a prompt: six parts and the request.
     ///
     /// # Errors
-    /// If a template can't be filled in.
+    /// If a template is invalid.
     pub fn prompt(&self, facts: &PromptContext, question: Question) -> Result<String> {
         let task = match facts.track {
-            Track::Hidden => "task.txt",
-            Track::Told => "task_told.txt",
-            Track::Partner => "task_partner.txt",
+            PromptTrack::Hidden => "task.txt",
+            PromptTrack::Told => "task_told.txt",
+            PromptTrack::Partner => "task_partner.txt",
         };
         let ask = match question {
             Question::Schema => "ask_schema.txt",
@@ -140,53 +129,53 @@ impl Templates {
         ];
         let mut text = String::new();
         for (title, name) in parts {
-            text += &format!("## {title}\n{}\n\n", self.fill(name, facts)?);
+            text += &format!("## {title}\n{}\n\n", self.render(name, facts)?);
         }
         if facts.images > 0 {
-            text += &format!("{}\n\n", self.fill("images.txt", facts)?);
+            text += &format!("{}\n\n", self.render("images.txt", facts)?);
         }
-        text += &self.fill(ask, facts)?;
+        text += &self.render(ask, facts)?;
         Ok(text)
     }
 
-    /// The second step of two.
+    /// Renders the second of two requests.
     ///
     /// # Errors
-    /// If the template can't be filled in.
+    /// If the template is invalid.
     pub fn choose(&self, facts: &PromptContext) -> Result<String> {
-        self.fill("ask_choose.txt", facts)
+        self.render("ask_choose.txt", facts)
     }
 
-    /// What is said after an answer of no use.
+    /// Renders the reply to an invalid answer.
     ///
     /// # Errors
-    /// If the template can't be filled in.
-    pub fn again(&self, facts: &PromptContext, problem: &str, schema: bool) -> Result<String> {
+    /// If the template is invalid.
+    pub fn repeat(&self, facts: &PromptContext, problem: &str, schema: bool) -> Result<String> {
         #[derive(Serialize)]
-        struct Again<'a> {
+        struct Repeat<'a> {
             #[serde(flatten)]
             facts: &'a PromptContext,
             problem: &'a str,
             schema: bool,
         }
-        self.fill("ask_again.txt", &Again { facts, problem, schema })
+        self.render("ask_again.txt", &Repeat { facts, problem, schema })
     }
 
-    fn fill<T: Serialize>(&self, name: &str, facts: &T) -> Result<String> {
+    fn render<T: Serialize>(&self, name: &str, facts: &T) -> Result<String> {
         let wrong = |e: minijinja::Error| wrong(name, &e);
         let template = self.environment.get_template(name).map_err(wrong)?;
         let text = template.render(Value::from(Serde(facts))).map_err(wrong)?;
         Ok(text.trim().to_owned())
     }
 
-    /// Fills in everything once, so that a mistake is found before the first episode.
-    fn try_all(&self) -> Result<()> {
+    /// Renders all templates once, so that errors appear before the first episode.
+    fn render_samples(&self) -> Result<()> {
         for facts in PromptContext::samples() {
             for question in [Question::Schema, Question::Text, Question::Think] {
                 self.prompt(&facts, question)?;
             }
             self.choose(&facts)?;
-            self.again(&facts, "because", true)?;
+            self.repeat(&facts, "because", true)?;
         }
         Ok(())
     }
@@ -194,9 +183,9 @@ impl Templates {
 
 fn environment(texts: &BTreeMap<String, String>) -> Result<Environment<'static>> {
     let mut environment = Environment::new();
-    // Before the first template: these hold for what is added later only.
+    // Set before adding templates: the syntax applies to later ones only.
     let syntax = SyntaxConfig::builder().trim_blocks(true).lstrip_blocks(true).build();
-    environment.set_syntax(syntax.expect("nothing contradicts itself"));
+    environment.set_syntax(syntax.expect("the syntax is valid"));
     environment.set_undefined_behavior(UndefinedBehavior::Strict);
     environment.set_auto_escape_callback(|_| minijinja::AutoEscape::None);
     environment.set_fuel(Some(FUEL));
@@ -230,7 +219,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_built_in_ones_can_be_filled_in_and_have_all_six_parts() {
+    fn built_in_templates_render_with_all_six_parts() {
         let templates = Templates::load(None).unwrap();
         for facts in PromptContext::samples() {
             let prompt = templates.prompt(&facts, Question::Schema).unwrap();
@@ -242,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn a_users_template_takes_the_place_of_a_built_in_one() {
+    fn a_user_template_replaces_a_built_in_one() {
         let dir = tempfile::tempdir().unwrap();
         fs::write(dir.path().join("ask_text.txt"), "Say a number, {{ track }}.").unwrap();
         let templates = Templates::load(Some(dir.path())).unwrap();
@@ -257,8 +246,8 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_found_before_anything_is_asked() {
-        for (name, text, words) in [
+    fn template_errors_are_found_on_loading() {
+        for (name, text, expected) in [
             ("map.txt", "one\n{{ nonsense }}", "map.txt: line 2"),
             ("map.txt", "{% for x in map.things %}", "map.txt"),
             ("plan.txt", "x", "plans.txt"),
@@ -270,8 +259,8 @@ mod tests {
         ] {
             let dir = tempfile::tempdir().unwrap();
             fs::write(dir.path().join(name), text).unwrap();
-            let said = Templates::load(Some(dir.path())).unwrap_err().to_string();
-            assert!(said.contains(words), "{said}");
+            let error = Templates::load(Some(dir.path())).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
         }
     }
 }

@@ -1,8 +1,8 @@
-//! How many tokens a text has, without any model's vocabulary.
+//! Token estimate of a text, without a model's vocabulary.
 
-/// Tokens that a text has at most, about: a little more than the common vocabularies make of it
-/// (tests hold it against two real tokenizers). Words are cut into pieces of six letters, digits
-/// of which three make a token, and everything else counts by itself.
+/// Estimates the tokens of a text, slightly above the counts of common vocabularies (tests compare
+/// two tokenizers). Words count one token per six letters, digits one per three, all other
+/// characters one each.
 pub fn estimate(text: &str) -> usize {
     const LETTERS: usize = 6;
     const DIGITS: usize = 3;
@@ -17,7 +17,7 @@ pub fn estimate(text: &str) -> usize {
     let close = |kind: Kind, run: usize| match kind {
         Kind::Letters => run.div_ceil(LETTERS),
         Kind::Digits => run.div_ceil(DIGITS),
-        // A space belongs to the word after it.
+        // A space belongs to the following word.
         Kind::Space => run / 2,
         Kind::Other => run,
     };
@@ -32,7 +32,7 @@ pub fn estimate(text: &str) -> usize {
             tokens += close(last, run);
             (run, last) = (0, kind);
         }
-        // A letter of another script may take several tokens.
+        // A non-ASCII letter may take several tokens.
         run += if c.is_ascii() { 1 } else { 2 };
     }
     tokens + close(last, run)
@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_it_counts() {
+    fn letters_digits_spaces_and_other_characters_are_counted() {
         for (text, tokens) in
             [("", 0), ("explore", 2), ("go to apple", 3), ("#31", 2), ("(3.25, -1)", 8), ("é", 2)]
         {

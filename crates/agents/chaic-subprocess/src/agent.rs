@@ -1,21 +1,23 @@
-//! A mind whose decisions are made in another process.
+//! Agent whose decisions are made in another process.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use chaic_core::agent::Thought;
-use chaic_core::observation::Senses;
+use chaic_core::observation::SensorConfig;
 use chaic_core::{Action, Agent, AgentError, Briefing, Observation};
 use chaic_sandbox::Isolation;
 
-use crate::commands::Command;
-use crate::message::{MAX_SEES, PROTOCOL, ToEnv, ToMind, cut, observation_frame, plain};
+use crate::message::{
+    MAX_PERCEIVED, PROTOCOL, RequestMessage, ResponseMessage, cut, observation_frame, plain,
+};
 use crate::pool::Pool;
-use crate::process::Process;
+use crate::process::HelperProcess;
+use crate::program::HelperProgram;
 
-/// A mind in another process. The process ends with its episode, or serves the next one from a [`Pool`].
+/// Agent in another process. The process ends with its episode, or serves the next one from a [`Pool`].
 pub struct SubprocessAgent {
-    command: Arc<Command>,
+    command: Arc<HelperProgram>,
     pool: Option<Arc<Pool>>,
     stop: &'static AtomicBool,
     state: State,
@@ -24,30 +26,30 @@ pub struct SubprocessAgent {
 enum State {
     Idle,
     Running {
-        process: Box<Process>,
-        senses: Senses,
+        process: Box<HelperProcess>,
+        sensors: SensorConfig,
         thought: Thought,
     },
-    /// It couldn't be started or briefed.
-    Lost(AgentError),
+    /// The process failed.
+    Failed(AgentError),
 }
 
 impl SubprocessAgent {
-    /// A mind that runs this command for each of its episodes. `stop` raised ends its waiting.
-    pub fn new(command: Arc<Command>, stop: &'static AtomicBool) -> SubprocessAgent {
+    /// Creates an agent that starts the command for each episode. Setting `stop` ends all waiting.
+    pub fn new(command: Arc<HelperProgram>, stop: &'static AtomicBool) -> SubprocessAgent {
         SubprocessAgent { command, pool: None, stop, state: State::Idle }
     }
 
-    /// A mind whose process comes from a pool and goes back there, unless it failed.
+    /// Creates an agent whose process comes from a pool and returns there unless it failed.
     pub fn pooled(
-        command: Arc<Command>,
+        command: Arc<HelperProgram>,
         pool: Arc<Pool>,
         stop: &'static AtomicBool,
     ) -> SubprocessAgent {
         SubprocessAgent { command, pool: Some(pool), stop, state: State::Idle }
     }
 
-    /// Ends the episode: the process goes back to the pool, or ends.
+    /// Ends the episode: returns the process to the pool, or ends it.
     fn finish(&mut self) {
         let state = std::mem::replace(&mut self.state, State::Idle);
         if let (Some(pool), State::Running { process, .. }) = (&self.pool, state) {
@@ -56,64 +58,68 @@ impl SubprocessAgent {
     }
 
     /// Takes a process from the pool, or starts one.
-    fn process(&self) -> Result<Process, AgentError> {
+    fn process(&self) -> Result<HelperProcess, AgentError> {
         if let Some(process) = self.pool.as_ref().and_then(|pool| pool.take()) {
             return Ok(process);
         }
         SubprocessAgent::start(&self.command, self.stop).map(|(process, _)| process)
     }
 
-    /// Starts a process and makes its acquaintance; what it calls itself.
+    /// Starts a process and exchanges `hello`; returns the process and its name.
     pub(crate) fn start(
-        command: &Arc<Command>,
+        command: &Arc<HelperProgram>,
         stop: &'static AtomicBool,
-    ) -> Result<(Process, String), AgentError> {
-        let mut process = Process::start(command, stop)?;
-        let hello =
-            ToMind::Hello { protocol: PROTOCOL, chaic: chaic_env::CHAIC_VERSION.to_owned() };
+    ) -> Result<(HelperProcess, String), AgentError> {
+        let mut process = HelperProcess::start(command, stop)?;
+        let hello = RequestMessage::Hello {
+            protocol: PROTOCOL,
+            chaic: chaic_env::CHAIC_VERSION.to_owned(),
+        };
         match process.ask(plain(&hello), command.limits.start)? {
-            ToEnv::Hello { protocol: PROTOCOL, name } => Ok((process, name)),
-            ToEnv::Hello { protocol, .. } => Err(AgentError::Broken(format!(
-                "`{}` speaks version {protocol} of the protocol, this chaic speaks {PROTOCOL}",
+            ResponseMessage::Hello { protocol: PROTOCOL, name } => Ok((process, name)),
+            ResponseMessage::Hello { protocol, .. } => Err(AgentError::Broken(format!(
+                "`{}` speaks version {protocol} of the protocol, this chaic speaks version {PROTOCOL}; \
+                 update the helper as docs/subprocess-helpers.md describes",
                 command.label()
             ))),
             other => Err(unexpected(command, "hello", &other)),
         }
     }
 
-    /// Briefs a process; what it wants to perceive.
+    /// Briefs a process; returns the sensors that it requests.
     pub(crate) fn brief(
-        process: &mut Process,
-        command: &Command,
+        process: &mut HelperProcess,
+        command: &HelperProgram,
         briefing: &Briefing,
-    ) -> Result<Senses, AgentError> {
-        let reset = ToMind::Reset { briefing: Box::new(briefing.clone()) };
+    ) -> Result<SensorConfig, AgentError> {
+        let reset = RequestMessage::Reset { briefing: Box::new(briefing.clone()) };
         match process.ask(plain(&reset), command.limits.start)? {
-            ToEnv::Ready { senses } => {
+            ResponseMessage::Ready { sensors } => {
+                let sensors = SensorConfig::from(sensors);
                 let refused = |text| AgentError::Broken(format!("`{}` {text}", command.label()));
-                senses.check_counts().map(|()| senses).map_err(refused)
+                sensors.check_counts().map(|()| sensors).map_err(refused)
             }
             other => Err(unexpected(command, "reset", &other)),
         }
     }
 
-    /// Shows a process what its agent sees; what it answers.
+    /// Sends an observation to a process; returns its action and thought.
     pub(crate) fn ask(
-        process: &mut Process,
-        command: &Command,
+        process: &mut HelperProcess,
+        command: &HelperProgram,
         observation: &Observation,
     ) -> Result<(Action, Option<Thought>), AgentError> {
         match process.ask(observation_frame(observation), command.limits.decision)? {
-            ToEnv::Act { action, thought } => Ok((
+            ResponseMessage::Act { action, thought } => Ok((
                 action,
-                thought.map(|Thought { plan, mood, noticed, mut sees }| {
-                    sees.truncate(MAX_SEES);
-                    sees.iter_mut().for_each(|thing| thing.name = cut(&thing.name));
+                thought.map(|Thought { plan, mode, last_observed, mut perceived }| {
+                    perceived.truncate(MAX_PERCEIVED);
+                    perceived.iter_mut().for_each(|object| object.name = cut(&object.name));
                     Thought {
                         plan: cut(&plan),
-                        mood: mood.as_deref().map(cut),
-                        noticed: noticed.as_deref().map(cut),
-                        sees,
+                        mode: mode.as_deref().map(cut),
+                        last_observed: last_observed.as_deref().map(cut),
+                        perceived,
                     }
                 }),
             )),
@@ -122,52 +128,52 @@ impl SubprocessAgent {
     }
 }
 
-fn unexpected(command: &Command, asked: &str, answer: &ToEnv) -> AgentError {
+fn unexpected(command: &HelperProgram, request: &str, answer: &ResponseMessage) -> AgentError {
     let kind = match answer {
-        ToEnv::Hello { .. } => "hello",
-        ToEnv::Ready { .. } => "ready",
-        ToEnv::Act { .. } => "act",
-        ToEnv::Failed { .. } => "failed",
+        ResponseMessage::Hello { .. } => "hello",
+        ResponseMessage::Ready { .. } => "ready",
+        ResponseMessage::Act { .. } => "act",
+        ResponseMessage::Failed { .. } => "failed",
     };
-    AgentError::Broken(format!("`{}` answered `{asked}` with `{kind}`", command.label()))
+    AgentError::Broken(format!("`{}` answered `{request}` with `{kind}`", command.label()))
 }
 
 impl Agent for SubprocessAgent {
-    fn senses(&self) -> Senses {
+    fn sensors(&self) -> SensorConfig {
         match &self.state {
-            State::Running { senses, .. } => *senses,
-            State::Idle | State::Lost(_) => Senses::NONE,
+            State::Running { sensors, .. } => *sensors,
+            State::Idle | State::Failed(_) => SensorConfig::NONE,
         }
     }
 
     fn reset(&mut self, briefing: &Briefing) {
-        // The process of the last episode is free or gone before another one begins.
+        // Release the process of the last episode before the next one starts.
         self.finish();
-        let begun = self.process().and_then(|mut process| {
-            let senses = SubprocessAgent::brief(&mut process, &self.command, briefing)?;
-            Ok((process, senses))
+        let briefed = self.process().and_then(|mut process| {
+            let sensors = SubprocessAgent::brief(&mut process, &self.command, briefing)?;
+            Ok((process, sensors))
         });
-        self.state = match begun {
-            Ok((process, senses)) => {
+        self.state = match briefed {
+            Ok((process, sensors)) => {
                 let process = Box::new(process);
-                State::Running { process, senses, thought: Thought::default() }
+                State::Running { process, sensors, thought: Thought::default() }
             }
-            Err(error) => State::Lost(error),
+            Err(error) => State::Failed(error),
         };
     }
 
     fn act(&mut self, observation: &Observation) -> Result<Action, AgentError> {
         match &mut self.state {
-            State::Idle => Err(AgentError::Broken("a mind that was not briefed".to_owned())),
-            State::Lost(error) => Err(error.clone()),
+            State::Idle => Err(AgentError::Broken("the agent was not briefed".to_owned())),
+            State::Failed(error) => Err(error.clone()),
             State::Running { process, thought, .. } => {
                 match SubprocessAgent::ask(process, &self.command, observation) {
-                    Ok((action, thinks)) => {
-                        *thought = thinks.unwrap_or_default();
+                    Ok((action, new_thought)) => {
+                        *thought = new_thought.unwrap_or_default();
                         Ok(action)
                     }
                     Err(error) => {
-                        self.state = State::Lost(error.clone());
+                        self.state = State::Failed(error.clone());
                         Err(error)
                     }
                 }
@@ -183,7 +189,7 @@ impl Agent for SubprocessAgent {
     fn thought(&self) -> Thought {
         match &self.state {
             State::Running { thought, .. } => thought.clone(),
-            State::Idle | State::Lost(_) => Thought::default(),
+            State::Idle | State::Failed(_) => Thought::default(),
         }
     }
 }

@@ -1,17 +1,17 @@
-//! How the process of a helper is confined: in a sandbox, or trusted by its user.
+//! Confinement of a helper's process: a sandbox, or the trust of its user.
 
 use std::path::{Path, PathBuf};
 
-use chaic_sandbox::{Isolation, Launcher, Part, Policy};
+use chaic_sandbox::{Isolation, IsolationPart, Launcher, Policy};
 
-use crate::commands::{Limits, Refusal};
+use crate::limits::{Limits, Refusal};
 
-/// What a user chooses about the confinement of commands.
+/// User's options for the confinement of commands.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ConfinementOptions {
-    /// Runs commands with all rights of the user.
+    /// True to run commands with all rights of the user.
     pub is_trusted: bool,
-    /// Files and folders that commands can read besides the system folders and what their lines name.
+    /// Files and folders that commands can read in addition to system folders and paths in their lines.
     pub readable: Vec<PathBuf>,
     /// Folders that stay empty for commands, such as that of the run.
     pub masked: Vec<PathBuf>,
@@ -26,10 +26,10 @@ pub struct Confinement {
 }
 
 impl Confinement {
-    /// Decides what a command line can read and finds out what the system enforces.
+    /// Determines the paths that a command line can read and the parts that the system enforces.
     ///
     /// # Errors
-    /// [`Refusal`] if a path is not there or the launcher cannot be started.
+    /// [`Refusal`] if a path is missing or the launcher does not start.
     pub fn new(
         launcher: &Launcher,
         line: &str,
@@ -40,9 +40,9 @@ impl Confinement {
         let start_folder = std::env::current_dir().map_err(|e| refuse(&e))?;
         let absolute = |path: &PathBuf| std::path::absolute(path).map_err(|e| refuse(&e));
         let masked: Result<Vec<PathBuf>, _> = options.masked.iter().map(absolute).collect();
-        // A command reaches a masked folder by its real name too.
+        // A command can reach a masked folder by its real path too.
         let masked = masked.map(|paths| {
-            let real: Vec<PathBuf> = paths.iter().map(|path| resolved(path)).collect();
+            let real: Vec<PathBuf> = paths.iter().map(|path| resolve_links(path)).collect();
             [paths, real].concat()
         });
         let mut policy = Policy {
@@ -58,48 +58,48 @@ impl Confinement {
             return Ok(Confinement { launcher: launcher.clone(), policy, isolation });
         }
         options.readable.iter().try_for_each(|p| policy.add_readable(p)).map_err(|e| refuse(&e))?;
-        policy.add_named_by(line);
+        policy.add_from_command_line(line);
         let isolation = launcher.probe(&policy).map_err(|e| refuse(&e))?;
         Ok(Confinement { launcher: launcher.clone(), policy, isolation })
     }
 
-    /// Returns what the system enforces.
+    /// Returns the enforced isolation.
     pub fn isolation(&self) -> &Isolation {
         &self.isolation
     }
 
-    /// Returns the missing parts in words, for a warning; `None` if there are none, or by the user's choice.
+    /// Returns a warning about missing parts; `None` if none is missing or the user trusts the command.
     pub fn warning(&self) -> Option<String> {
         let Isolation::Sandboxed(missing) = &self.isolation else { return None };
-        (!missing.is_empty()).then(|| in_words(&self.isolation))
+        (!missing.is_empty()).then(|| describe(&self.isolation))
     }
 
-    /// Returns whether a stage of the sandbox watches the process and ends all that it leaves behind.
-    pub(crate) fn is_watched(&self) -> bool {
+    /// Returns whether a sandbox stage supervises the process and ends its descendants.
+    pub(crate) fn is_supervised(&self) -> bool {
         cfg!(target_os = "linux")
     }
 
-    /// Returns the process that runs a command line.
+    /// Returns the process builder of a command line.
     pub(crate) fn command(&self, line: &str) -> std::process::Command {
         self.launcher.command(&self.policy, &self.isolation, line)
     }
 }
 
-/// Resolves links in an absolute path of which the last parts may not exist yet.
-fn resolved(path: &Path) -> PathBuf {
+/// Resolves links in an absolute path whose last parts may not exist yet.
+fn resolve_links(path: &Path) -> PathBuf {
     let found =
         path.ancestors().find_map(|ancestor| Some((ancestor, ancestor.canonicalize().ok()?)));
     let Some((ancestor, real)) = found else { return path.to_owned() };
-    path.strip_prefix(ancestor).map_or(real.clone(), |rest| real.join(rest))
+    path.strip_prefix(ancestor).map_or(real.clone(), |suffix| real.join(suffix))
 }
 
-fn in_words(isolation: &Isolation) -> String {
+fn describe(isolation: &Isolation) -> String {
     let Isolation::Sandboxed(missing) = isolation else { return isolation.to_string() };
     let reasons: Vec<String> = missing
         .iter()
         .map(|m| format!("{}: {}", m.part.name(), m.reason.trim_start_matches("chaic sandbox: ")))
         .collect();
-    if missing.len() == Part::ALL.len() {
+    if missing.len() == IsolationPart::ALL.len() {
         return format!("no sandbox ({})", reasons.first().map_or("", String::as_str));
     }
     format!("a {isolation} ({})", reasons.join("; "))
@@ -115,7 +115,7 @@ mod tests {
         let top = top.path().canonicalize().unwrap();
         std::fs::create_dir(top.join("real")).unwrap();
         std::os::unix::fs::symlink(top.join("real"), top.join("link")).unwrap();
-        assert_eq!(resolved(&top.join("link/runs/new")), top.join("real/runs/new"));
-        assert_eq!(resolved(&top.join("link")), top.join("real"));
+        assert_eq!(resolve_links(&top.join("link/runs/new")), top.join("real/runs/new"));
+        assert_eq!(resolve_links(&top.join("link")), top.join("real"));
     }
 }

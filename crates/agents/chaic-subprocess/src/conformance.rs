@@ -1,88 +1,92 @@
-//! Whether a process keeps to the protocol: tried on real episodes, one promise after the other.
+//! Conformance test of a helper process against the protocol, on training episodes.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-use chaic_core::observation::Senses;
+use chaic_core::observation::SensorConfig;
 use chaic_core::{Action, AgentId, Briefing, TaskId};
-use chaic_env::rules::RuleSet;
-use chaic_env::{Appearance, Env, EpisodeConfig, Flow, Minds, Seat};
+use chaic_env::{AdvanceOutcome, AgentSlot, Env, EpisodeAgents, EpisodeConfig};
 use chaic_episodes::find_episode;
 
 use crate::agent::SubprocessAgent;
-use crate::commands::Command;
-use crate::process::Process;
+use crate::process::HelperProcess;
+use crate::program::HelperProgram;
 
-/// Decisions in each episode that is tried.
+/// Decisions in each test episode.
 const N_DECISIONS: usize = 12;
-/// A process that is told to end does so within this time.
-const END_WITHIN: Duration = Duration::from_secs(2);
+/// Time in which a process must exit after `bye`.
+const EXIT_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// One promise of the protocol, and whether it was kept.
+/// Result of testing one requirement of the protocol.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Check {
-    /// The promise.
-    pub promise: &'static str,
-    /// What happened instead, if it wasn't kept.
-    pub kept: Result<(), String>,
+    /// Requirement.
+    pub requirement: &'static str,
+    /// Problem, if the process violates the requirement.
+    pub result: Result<(), String>,
 }
 
-/// Tries a command, and tells `each` what it finds as it goes. What can't be tried because something
-/// before it failed is left out. `stop` raised ends it; what was tried then says nothing.
+/// Tests a command and passes each result to `report`.
+///
+/// Requirements that an earlier failure makes untestable are left out. Setting `stop` ends the test; its
+/// results are then meaningless.
 pub fn check(
-    command: &Arc<Command>,
+    command: &Arc<HelperProgram>,
     stop: &'static AtomicBool,
-    each: &mut dyn FnMut(&Check),
+    report: &mut dyn FnMut(&Check),
 ) -> Vec<Check> {
     let mut checks = Vec::new();
-    let mut note = |promise, kept: Result<(), String>| {
-        let is_kept = kept.is_ok();
-        let check = Check { promise, kept };
-        each(&check);
+    let mut add = |requirement, result: Result<(), String>| {
+        let is_met = result.is_ok();
+        let check = Check { requirement, result };
+        report(&check);
         checks.push(check);
-        is_kept
+        is_met
     };
-    let trial = Trial { command, stop };
-    if !note("it starts and says hello in this version of the protocol", trial.hello())
-        || !note("it is briefed, and wants images that there are", trial.senses())
+    let tester = Tester { command, stop };
+    if !add("it starts and says hello in this version of the protocol", tester.hello())
+        || !add("it accepts a briefing and requests valid images", tester.sensors())
     {
         return checks;
     }
     let first = TaskId::paper().next().unwrap_or(TaskId::NoConstraint);
-    let mut played = Vec::new();
+    let mut first_actions = Vec::new();
     let all = TaskId::paper().try_for_each(|task| {
-        let actions = trial.fresh(task)?;
+        let actions = tester.run_new(task)?;
         if task == first {
-            played = actions;
+            first_actions = actions;
         }
         Ok(())
     });
-    if !note("it decides in an episode of each task, in time", all) {
+    if !add("it decides in an episode of each task, in time", all) {
         return checks;
     }
-    note(
-        "the same briefing and observations make it decide the same",
-        trial.fresh(first).and_then(|again| same(&played, &again)),
+    add(
+        "it decides the same for the same briefing and observations",
+        tester.run_new(first).and_then(|again| same(&first_actions, &again)),
     );
-    note(
-        "a second briefing begins anew, within the same process",
-        trial.twice(first).and_then(|again| same(&played, &again)),
+    add(
+        "it starts again after a second briefing in the same process",
+        tester.run_reused(first).and_then(|again| same(&first_actions, &again)),
     );
-    note("it ends when it is told to", trial.ends(true));
-    note("it ends when its standard input is closed", trial.ends(false));
+    add("it exits after `bye`", tester.exits(true));
+    add("it exits when its standard input is closed", tester.exits(false));
     checks
 }
 
-struct Trial<'a> {
-    command: &'a Arc<Command>,
+/// Tests of one command.
+struct Tester<'a> {
+    command: &'a Arc<HelperProgram>,
     stop: &'static AtomicBool,
 }
 
+/// Returns an error as text.
 fn text(problem: impl ToString) -> String {
     problem.to_string()
 }
 
+/// Compares the actions of two runs of one episode.
 fn same(once: &[Action], again: &[Action]) -> Result<(), String> {
     match once.iter().zip(again).position(|(a, b)| a != b) {
         None if once.len() == again.len() => Ok(()),
@@ -91,8 +95,8 @@ fn same(once: &[Action], again: &[Action]) -> Result<(), String> {
     }
 }
 
-impl Trial<'_> {
-    fn start(&self) -> Result<Process, String> {
+impl Tester<'_> {
+    fn start(&self) -> Result<HelperProcess, String> {
         SubprocessAgent::start(self.command, self.stop).map(|(process, _)| process).map_err(text)
     }
 
@@ -101,35 +105,44 @@ impl Trial<'_> {
         if name.is_empty() { Err("it has no name".to_owned()) } else { Ok(()) }
     }
 
-    fn senses(&self) -> Result<(), String> {
-        let env = env(TaskId::NoConstraint, Senses::NONE, self.command)?;
-        let senses = self.brief(&mut self.start()?, &env.briefing(AgentId::HELPER))?;
-        senses.check().map_err(|problem| format!("it {problem}"))
+    fn sensors(&self) -> Result<(), String> {
+        let env = env(TaskId::NoConstraint, SensorConfig::NONE, self.command)?;
+        let sensors = self.brief(&mut self.start()?, &env.briefing(AgentId::HELPER))?;
+        sensors.check().map_err(|problem| format!("it {problem}"))
     }
 
-    fn brief(&self, process: &mut Process, briefing: &Briefing) -> Result<Senses, String> {
+    fn brief(
+        &self,
+        process: &mut HelperProcess,
+        briefing: &Briefing,
+    ) -> Result<SensorConfig, String> {
         SubprocessAgent::brief(process, self.command, briefing).map_err(text)
     }
 
-    fn fresh(&self, task: TaskId) -> Result<Vec<Action>, String> {
-        self.play(&mut self.start()?, task, N_DECISIONS)
+    fn run_new(&self, task: TaskId) -> Result<Vec<Action>, String> {
+        self.run(&mut self.start()?, task, N_DECISIONS)
     }
 
-    fn twice(&self, task: TaskId) -> Result<Vec<Action>, String> {
+    fn run_reused(&self, task: TaskId) -> Result<Vec<Action>, String> {
         let mut process = self.start()?;
-        self.play(&mut process, TaskId::MovingHouse, N_DECISIONS / 2)?;
-        self.play(&mut process, task, N_DECISIONS)
+        self.run(&mut process, TaskId::MovingHouse, N_DECISIONS / 2)?;
+        self.run(&mut process, task, N_DECISIONS)
     }
 
-    /// Plays an episode by the process's decisions.
-    fn play(&self, process: &mut Process, task: TaskId, n: usize) -> Result<Vec<Action>, String> {
-        let unseeing = env(task, Senses::NONE, self.command)?;
-        let senses = self.brief(process, &unseeing.briefing(AgentId::HELPER))?;
-        let mut env = env(task, senses, self.command)?;
+    /// Runs an episode with the process as the helper; returns its first `n` actions.
+    fn run(
+        &self,
+        process: &mut HelperProcess,
+        task: TaskId,
+        n: usize,
+    ) -> Result<Vec<Action>, String> {
+        let blind = env(task, SensorConfig::NONE, self.command)?;
+        let sensors = self.brief(process, &blind.briefing(AgentId::HELPER))?;
+        let mut env = env(task, sensors, self.command)?;
         let mut actions = Vec::new();
-        while actions.len() < n && env.advance(None).map_err(text)? == Flow::Waits {
-            let seen = env.observe(AgentId::HELPER).ok_or("nobody waits")?;
-            let (action, _) = SubprocessAgent::ask(process, self.command, seen)
+        while actions.len() < n && env.advance(None).map_err(text)? == AdvanceOutcome::NeedsAction {
+            let observation = env.observe(AgentId::HELPER).ok_or("the helper does not wait")?;
+            let (action, _) = SubprocessAgent::ask(process, self.command, observation)
                 .map_err(|problem| format!("{task}, decision {}: {problem}", actions.len()))?;
             env.submit(AgentId::HELPER, action);
             actions.push(action);
@@ -137,28 +150,20 @@ impl Trial<'_> {
         Ok(actions)
     }
 
-    fn ends(&self, told: bool) -> Result<(), String> {
+    fn exits(&self, send_bye: bool) -> Result<(), String> {
         let mut process = self.start()?;
-        let began = Instant::now();
-        if process.close(told, 2 * END_WITHIN) && began.elapsed() <= END_WITHIN {
+        let start = Instant::now();
+        if process.close(send_bye, 2 * EXIT_TIMEOUT) && start.elapsed() <= EXIT_TIMEOUT {
             return Ok(());
         }
-        Err(format!("it was there after {} s still", END_WITHIN.as_secs()))
+        Err(format!("it was still running after {} s", EXIT_TIMEOUT.as_secs()))
     }
 }
 
-/// An episode with a seat for the process.
-fn env(task: TaskId, senses: Senses, command: &Command) -> Result<Env, String> {
+/// Creates an episode with an external helper.
+fn env(task: TaskId, sensors: SensorConfig, command: &HelperProgram) -> Result<Env, String> {
     let episode = find_episode(&format!("{task}/train/00")).map_err(text)?;
-    let config = EpisodeConfig {
-        episode: &episode,
-        seed: 0,
-        rules: RuleSet::PAPER,
-        helper: &command.name,
-        partner: None,
-        image_size: None,
-        appearance: Appearance::Canonical,
-    };
-    let helper = Some(Seat::of_caller(command.grants, senses));
-    Env::new(config, Minds { helper, partner: None }).map_err(text)
+    let config = EpisodeConfig::new(&episode, &command.name);
+    let helper = Some(AgentSlot::external(command.grants, sensors));
+    Env::new(config, EpisodeAgents { helper, partner: None }).map_err(text)
 }

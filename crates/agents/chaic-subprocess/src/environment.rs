@@ -9,7 +9,7 @@ use std::ffi::OsString;
 /// An environment variable that each helper process inherits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AllowedVariable {
-    /// Name of the variable; a final `*` stands for any rest.
+    /// Name of the variable; a final `*` matches any suffix.
     pub name: &'static str,
     /// Reason why a helper needs it.
     pub reason: &'static str,
@@ -86,7 +86,10 @@ pub(crate) fn inherited(added: &[String]) -> Vec<(OsString, OsString)> {
 /// One line that says what a name may hold.
 pub fn check_name(name: &str) -> Result<(), String> {
     if name.is_empty() || name.contains(|c: char| c == '=' || c.is_control()) {
-        return Err(format!("no variable `{}`; write a name such as HF_HOME", name.escape_debug()));
+        return Err(format!(
+            "invalid variable name `{}`; write a name such as HF_HOME",
+            name.escape_debug()
+        ));
     }
     Ok(())
 }
@@ -98,8 +101,8 @@ mod tests {
     #[test]
     fn names_of_credentials_are_not_allowed() {
         let credentials = ["OPENAI_API_KEY", "HF_TOKEN", "AWS_SECRET_ACCESS_KEY", "HTTPS_PROXY"];
-        let others = ["SSH_AUTH_SOCK", "PATH_TO_KEY", "LC", "PYTHONSTARTUP", "LD_PRELOAD", ""];
-        for name in credentials.into_iter().chain(others) {
+        let not_allowed = ["SSH_AUTH_SOCK", "PATH_TO_KEY", "LC", "PYTHONSTARTUP", "LD_PRELOAD", ""];
+        for name in credentials.into_iter().chain(not_allowed) {
             assert!(!is_allowed(name), "{name}");
         }
         for name in ["PATH", "LC_ALL", "VIRTUAL_ENV"] {
@@ -114,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_holds_no_value() {
+    fn a_variable_name_has_no_value() {
         for wrong in ["", "A=b", "A\0", "A\n"] {
             assert!(check_name(wrong).unwrap_err().contains("write a name"), "{wrong:?}");
         }

@@ -1,38 +1,38 @@
-//! Frames of bytes on a pipe: a head of JSON, and images behind it.
+//! Framing of messages on a pipe: a JSON head, then images.
 //!
-//! A frame is, without anything in between:
+//! A frame is the concatenation of:
 //!
-//! | bytes | what |
+//! | bytes | content |
 //! |---|---|
 //! | 4 | length of the head, u32, little-endian |
 //! | 4 | length of the body, u32, little-endian |
 //! | .. | head: one JSON object, UTF-8 |
-//! | .. | body: raw images, see [`crate::message::ImageHead`] |
+//! | .. | body: raw images, see [`crate::message::ImageHeader`] |
 
 use std::io::{self, Read, Write};
 
-use chaic_core::observation::Senses;
+use chaic_core::observation::SensorConfig;
 
-/// Longest head, bytes: the longest that was seen is a fiftieth of it.
+/// Longest head, bytes: 50 times the longest observed one.
 pub const MAX_HEAD: usize = 1 << 20;
-/// Longest body, bytes: all images of the largest observation.
-pub const MAX_BODY: usize = Senses::MAX_OBSERVATION_BYTES as usize;
+/// Longest body, bytes: the images of the largest observation.
+pub const MAX_BODY: usize = SensorConfig::MAX_OBSERVATION_BYTES as usize;
 
 /// One frame.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Frame {
+pub struct MessageFrame {
     /// JSON.
     pub head: Vec<u8>,
     /// Images.
     pub body: Vec<u8>,
 }
 
-impl Frame {
-    /// Writes it, and flushes.
+impl MessageFrame {
+    /// Writes the frame and flushes.
     ///
     /// # Errors
-    /// If the frame is longer than [`MAX_HEAD`] or [`MAX_BODY`], in which case nothing is written; if
-    /// the pipe is closed.
+    /// If head or body exceed [`MAX_HEAD`] or [`MAX_BODY`] (nothing is written then), or if the pipe is
+    /// closed.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         self.check().map_err(|text| io::Error::new(io::ErrorKind::InvalidInput, text))?;
         out.write_all(&(self.head.len() as u32).to_le_bytes())?;
@@ -45,7 +45,7 @@ impl Frame {
     /// Checks the lengths of head and body.
     ///
     /// # Errors
-    /// One line with the lengths and their bounds.
+    /// One line with the lengths and their limits.
     pub fn check(&self) -> Result<(), String> {
         let (head, body) = (self.head.len(), self.body.len());
         if head > MAX_HEAD || body > MAX_BODY {
@@ -56,12 +56,12 @@ impl Frame {
         Ok(())
     }
 
-    /// Reads the next one; `None` if the pipe was closed before it.
+    /// Reads the next frame; `None` if the pipe was closed before it.
     ///
     /// # Errors
-    /// If the pipe is closed within a frame, or a length is out of bounds: [`MAX_HEAD`], and
-    /// `max_body`, which is [`MAX_BODY`] for minds and 0 for the environment.
-    pub fn read(from: &mut dyn Read, max_body: usize) -> io::Result<Option<Frame>> {
+    /// If the pipe is closed within a frame, or if a length exceeds [`MAX_HEAD`] or `max_body`, which is
+    /// [`MAX_BODY`] for helpers and 0 for chaic.
+    pub fn read(from: &mut dyn Read, max_body: usize) -> io::Result<Option<MessageFrame>> {
         let mut lengths = [0; 8];
         let n = read_up_to(from, &mut lengths)?;
         if n == 0 {
@@ -77,19 +77,19 @@ impl Frame {
         let (head, body) = (length(0), length(4));
         if head > MAX_HEAD || body > max_body {
             let text = format!(
-                "a frame of {head} and {body} bytes, more than {MAX_HEAD} and {max_body}; is \
-                 something else printed on the standard output?"
+                "a frame of {head} and {body} bytes, more than {MAX_HEAD} and {max_body}; does the helper \
+                 print to the standard output?"
             );
             return Err(io::Error::new(io::ErrorKind::InvalidData, text));
         }
-        let mut frame = Frame { head: vec![0; head], body: vec![0; body] };
+        let mut frame = MessageFrame { head: vec![0; head], body: vec![0; body] };
         from.read_exact(&mut frame.head)?;
         from.read_exact(&mut frame.body)?;
         Ok(Some(frame))
     }
 }
 
-/// Reads until the buffer is full or the pipe is closed.
+/// Reads until the buffer is full or the pipe is closed; returns the number of bytes.
 fn read_up_to(from: &mut dyn Read, buffer: &mut [u8]) -> io::Result<usize> {
     let mut n = 0;
     while n < buffer.len() {
@@ -109,24 +109,24 @@ mod tests {
 
     #[test]
     fn a_frame_is_read_as_it_was_written() {
-        let frame = Frame { head: b"{\"type\":\"bye\"}".to_vec(), body: vec![0, 255, 10] };
+        let frame = MessageFrame { head: b"{\"type\":\"bye\"}".to_vec(), body: vec![0, 255, 10] };
         let mut bytes = Vec::new();
         frame.write(&mut bytes).unwrap();
         assert_eq!(bytes[..8], [14, 0, 0, 0, 3, 0, 0, 0]);
         let mut pipe = &bytes[..];
-        assert_eq!(Frame::read(&mut pipe, 3).unwrap(), Some(frame));
-        assert_eq!(Frame::read(&mut pipe, 3).unwrap(), None);
+        assert_eq!(MessageFrame::read(&mut pipe, 3).unwrap(), Some(frame));
+        assert_eq!(MessageFrame::read(&mut pipe, 3).unwrap(), None);
         for cut in 1..bytes.len() {
-            assert!(Frame::read(&mut &bytes[..cut], 3).is_err(), "cut after {cut} bytes");
+            assert!(MessageFrame::read(&mut &bytes[..cut], 3).is_err(), "cut after {cut} bytes");
         }
-        assert!(Frame::read(&mut &bytes[..], 2).is_err(), "a body that is too long");
+        assert!(MessageFrame::read(&mut &bytes[..], 2).is_err(), "a body that is too long");
     }
 
     #[test]
     fn a_frame_that_is_too_long_is_refused_and_not_written() {
         for frame in [
-            Frame { head: vec![b' '; MAX_HEAD + 1], body: Vec::new() },
-            Frame { head: Vec::new(), body: vec![0; MAX_BODY + 1] },
+            MessageFrame { head: vec![b' '; MAX_HEAD + 1], body: Vec::new() },
+            MessageFrame { head: Vec::new(), body: vec![0; MAX_BODY + 1] },
         ] {
             let mut written = Vec::new();
             let error = frame.write(&mut written).unwrap_err();
@@ -137,9 +137,9 @@ mod tests {
     }
 
     #[test]
-    fn text_on_the_pipe_is_no_frame() {
-        let error =
-            Frame::read(&mut &b"Hello world, I am loading weights"[..], MAX_BODY).unwrap_err();
+    fn text_on_the_pipe_is_not_a_frame() {
+        let error = MessageFrame::read(&mut &b"Hello world, I am loading weights"[..], MAX_BODY)
+            .unwrap_err();
         assert!(error.to_string().contains("standard output"), "{error}");
     }
 }

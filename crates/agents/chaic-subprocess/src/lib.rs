@@ -1,22 +1,22 @@
-//! Minds in another process: `chaic eval --helper exec:COMMAND`.
+//! Helpers in other processes: `chaic eval --helper exec:COMMAND`.
 //!
-//! **What it is**: a [`SubprocessAgent`] starts a command for each episode, sends it what its agent is
-//! told and perceives, and takes its actions. [`message`] says what is sent, [`frame`] how it is cut
-//! into frames on standard input and output; docs/subprocess-helpers.md describes both for those who
-//! write such a helper in another language. [`commands`] hands a run its helpers, [`serve`] lets any
-//! mind of ours be such a process, [`conformance`] tries what a process does.
+//! **What it is**: a [`SubprocessAgent`] starts a command for each episode, sends it the briefing and the
+//! observations of its agent, and receives actions. [`message`] defines the messages, [`frame`] their
+//! framing on standard input and output; docs/subprocess-helpers.md describes both for authors of
+//! helpers in other languages. [`commands`] provides the helpers of a run, [`serve`] turns any
+//! agent into such a process, and [`conformance`] tests a process against the protocol.
 //!
-//! **What it is not**: it knows no world, no ids that weren't granted, and decides nothing.
+//! **What it is not**: it knows no world, passes on no ids without a grant, and makes no decisions.
 //!
 //! **Invariants**
-//! - What goes over the pipe is the agent's briefing and its observations, and nothing else.
-//! - A process that is silent, broken, greedy or talks nonsense ends its own episode, by a message
-//!   that says what it did, and never hangs or ends a run.
-//! - A command runs in a sandbox (`chaic-sandbox`) unless its user trusts it, and the record says which.
-//! - No process outlives its episode. On Linux nothing that it started does, either; elsewhere, what left its
-//!   process group may.
-//! - A process inherits environment variables of an allow-list only, so no API keys.
-//! - A command is run because the user named it, never because a run's folder did.
+//! - The pipe carries the agent's briefing and observations only.
+//! - A process that times out, fails, exceeds a limit or violates the protocol ends its own episode with a
+//!   message. It never blocks or ends a run.
+//! - A command runs in a sandbox (`chaic-sandbox`) unless its user trusts it, and traces record which.
+//! - No process outlives its episode. On Linux this includes all its descendants; elsewhere, descendants
+//!   that left its process group may remain.
+//! - A process inherits environment variables of an allow-list only, and so no API keys.
+//! - A command runs because the user named it, never because a run folder does.
 
 pub mod agent;
 pub mod commands;
@@ -25,13 +25,17 @@ pub mod conformance;
 pub mod environment;
 pub mod frame;
 pub mod message;
+pub mod pool;
 pub mod serve;
 
+mod limits;
 mod pipe;
-pub mod pool;
 mod process;
+mod program;
 
 pub use agent::SubprocessAgent;
-pub use commands::{Command, Commands, Limits, Refusal};
+pub use commands::CommandRegistry;
 pub use confinement::{Confinement, ConfinementOptions};
+pub use limits::{Limits, Refusal};
 pub use pool::Pool;
+pub use program::HelperProgram;

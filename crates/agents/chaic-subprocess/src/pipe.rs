@@ -1,10 +1,10 @@
-//! Pipes that can be given up while another process holds their other end open.
+//! Pipes that can be abandoned while another process keeps their other end open.
 
 use std::io::{self, Read, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// This program's end of a pipe. Reads and writes wait for the other side, until the pipe is given up.
+/// This program's end of a pipe. Reads and writes block until the pipe is abandoned.
 pub(crate) struct Pipe<F> {
     file: F,
     is_over: Arc<AtomicBool>,
@@ -12,25 +12,25 @@ pub(crate) struct Pipe<F> {
 
 #[cfg(unix)]
 impl<F: std::os::fd::AsFd> Pipe<F> {
-    /// Takes over one end of a pipe; `is_over` raised ends all waiting.
+    /// Wraps one end of a pipe. Setting `is_over` ends all waiting.
     ///
     /// # Errors
-    /// If the system refuses calls that do not wait.
+    /// If the system refuses non-blocking mode.
     pub fn new(file: F, is_over: &Arc<AtomicBool>) -> io::Result<Pipe<F>> {
         use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
         fcntl_setfl(&file, fcntl_getfl(&file)? | OFlags::NONBLOCK)?;
         Ok(Pipe { file, is_over: Arc::clone(is_over) })
     }
 
-    /// Repeats a call that does not wait until it has something to say.
-    fn patiently(
+    /// Repeats a non-blocking call until it completes.
+    fn retry(
         &mut self,
         ready: rustix::event::PollFlags,
         mut call: impl FnMut(&mut F) -> io::Result<usize>,
     ) -> io::Result<usize> {
         use rustix::event::{PollFd, Timespec, poll};
-        /// Time between two looks whether the pipe is given up: 50 ms.
-        const LOOK: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
+        /// Polling period of `is_over`: 50 ms.
+        const POLL_PERIOD: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
         loop {
             match call(&mut self.file) {
                 Err(e) if e.kind() == io::ErrorKind::WouldBlock => {}
@@ -39,7 +39,7 @@ impl<F: std::os::fd::AsFd> Pipe<F> {
             if self.is_over.load(Ordering::Relaxed) {
                 return Err(io::ErrorKind::BrokenPipe.into());
             }
-            match poll(&mut [PollFd::new(&self.file, ready)], Some(&LOOK)) {
+            match poll(&mut [PollFd::new(&self.file, ready)], Some(&POLL_PERIOD)) {
                 Ok(_) | Err(rustix::io::Errno::INTR) => {}
                 Err(e) => return Err(e.into()),
             }
@@ -50,14 +50,14 @@ impl<F: std::os::fd::AsFd> Pipe<F> {
 #[cfg(unix)]
 impl<F: Read + std::os::fd::AsFd> Read for Pipe<F> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        self.patiently(rustix::event::PollFlags::IN, |file| file.read(buffer))
+        self.retry(rustix::event::PollFlags::IN, |file| file.read(buffer))
     }
 }
 
 #[cfg(unix)]
 impl<F: Write + std::os::fd::AsFd> Write for Pipe<F> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.patiently(rustix::event::PollFlags::OUT, |file| file.write(bytes))
+        self.retry(rustix::event::PollFlags::OUT, |file| file.write(bytes))
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -67,12 +67,12 @@ impl<F: Write + std::os::fd::AsFd> Write for Pipe<F> {
 
 #[cfg(not(unix))]
 impl<F> Pipe<F> {
-    /// Takes over one end of a pipe. Waiting for the other side cannot be ended on this system.
+    /// Wraps one end of a pipe. Blocking calls can't be interrupted on this system.
     pub fn new(file: F, is_over: &Arc<AtomicBool>) -> io::Result<Pipe<F>> {
         Ok(Pipe { file, is_over: Arc::clone(is_over) })
     }
 
-    /// Returns an error once the pipe is given up.
+    /// Returns an error once the pipe is abandoned.
     fn check(&self) -> io::Result<()> {
         match self.is_over.load(Ordering::Relaxed) {
             true => Err(io::ErrorKind::BrokenPipe.into()),

@@ -1,19 +1,18 @@
-//! Processes that serve one episode after the other, for commands that are slow to start.
+//! Pool of processes that serve several episodes, for commands that start slowly.
 
 use std::sync::{Mutex, PoisonError};
 
-use crate::process::Process;
+use crate::process::HelperProcess;
 
-/// Processes of one command that wait for their next episode. They begin anew at each briefing, as the protocol
-/// asks of every helper.
+/// Idle processes of one command. Each starts a new episode at its next briefing, as the protocol requires.
 #[derive(Default)]
 pub struct Pool {
-    idle: Mutex<Vec<Process>>,
+    idle: Mutex<Vec<HelperProcess>>,
 }
 
 impl Pool {
-    /// Takes a process that still runs.
-    pub(crate) fn take(&self) -> Option<Process> {
+    /// Takes an idle process that still runs.
+    pub(crate) fn take(&self) -> Option<HelperProcess> {
         let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
         while let Some(mut process) = idle.pop() {
             if !process.has_ended() {
@@ -23,9 +22,9 @@ impl Pool {
         None
     }
 
-    /// Keeps a process that answered everything in its episode.
-    pub(crate) fn put(&self, mut process: Process) {
-        process.begin_episode();
+    /// Returns a process that did not fail in its episode.
+    pub(crate) fn put(&self, mut process: HelperProcess) {
+        process.reset_waiting_time();
         self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(process);
     }
 }

@@ -1,4 +1,4 @@
-//! A process with pipes, deadlines and limits.
+//! Helper process with pipes, time limits and resource limits.
 
 use std::io::{Read, Write};
 use std::process::{Child, Stdio};
@@ -14,69 +14,74 @@ use rustix::process::{
     Pid, Signal, WaitId, WaitIdOptions, kill_process, kill_process_group, waitid,
 };
 
-use crate::commands::Command;
 use crate::environment::inherited;
-use crate::frame::Frame;
-use crate::message::{ToEnv, ToMind, cut, message, plain};
+use crate::frame::MessageFrame;
+use crate::message::{RequestMessage, ResponseMessage, cut, message, plain};
 use crate::pipe::Pipe;
+use crate::program::HelperProgram;
 
-/// How often one who waits looks whether it is to stop.
-const LOOK: Duration = Duration::from_millis(50);
-/// How long a process may take to end by itself when it is told to.
-const GRACE: Duration = Duration::from_secs(2);
-/// How much of what it said last on its standard error is kept, bytes.
-const KEPT_ERRORS: usize = 2000;
+/// Polling period of the stop flag while waiting.
+const POLL_PERIOD: Duration = Duration::from_millis(50);
+/// Time in which a process must exit after `bye` or a termination signal.
+const EXIT_TIMEOUT: Duration = Duration::from_secs(2);
+/// Length of the kept end of standard error, bytes.
+const STDERR_LEN: usize = 2000;
 
 /// A running command.
-pub(crate) struct Process {
+pub(crate) struct HelperProcess {
     child: Child,
-    to: Option<Sender<Frame>>,
-    from: Receiver<Result<Frame, String>>,
-    errors: Arc<Mutex<Vec<u8>>>,
-    /// Closed once all of its complaints are there.
-    no_more_errors: Receiver<()>,
-    command: Arc<Command>,
-    /// Raised when nobody reads or writes its pipes any more: their threads end then.
+    requests: Option<Sender<MessageFrame>>,
+    responses: Receiver<Result<MessageFrame, String>>,
+    /// End of standard error.
+    stderr: Arc<Mutex<Vec<u8>>>,
+    /// Closed once standard error is read to its end.
+    stderr_end: Receiver<()>,
+    command: Arc<HelperProgram>,
+    /// Set when the pipes are abandoned; their threads end then.
     is_over: Arc<AtomicBool>,
-    /// How long it has been waited for, in all.
+    /// Total waiting time in this episode.
     waited: Duration,
     stop: &'static AtomicBool,
 }
 
-impl Process {
+impl HelperProcess {
     /// Starts the command.
-    pub fn start(command: &Arc<Command>, stop: &'static AtomicBool) -> Result<Process, AgentError> {
-        let mut starting = starting(command);
-        starting.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        starting.env_clear().envs(inherited(&command.environment));
+    pub fn start(
+        command: &Arc<HelperProgram>,
+        stop: &'static AtomicBool,
+    ) -> Result<HelperProcess, AgentError> {
+        let mut builder = process_builder(command);
+        builder.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        builder.env_clear().envs(inherited(&command.environment));
         #[cfg(unix)]
-        std::os::unix::process::CommandExt::process_group(&mut starting, 0);
+        std::os::unix::process::CommandExt::process_group(&mut builder, 0);
         let failed =
             |e: std::io::Error| AgentError::Broken(format!("a process can't be started: {e}"));
-        let mut child = starting.spawn().map_err(failed)?;
+        let mut child = builder.spawn().map_err(failed)?;
         let (stdin, stdout, stderr) =
             (child.stdin.take(), child.stdout.take(), child.stderr.take());
         let (Some(stdin), Some(stdout), Some(stderr)) = (stdin, stdout, stderr) else {
-            return Err(AgentError::Broken("a process without pipes".to_owned()));
+            return Err(AgentError::Broken("the process has no pipes".to_owned()));
         };
         let is_over = Arc::new(AtomicBool::new(false));
-        let piped = |e: std::io::Error| AgentError::Broken(format!("its pipes can't be used: {e}"));
-        let stdin = Pipe::new(stdin, &is_over).map_err(piped)?;
-        let stdout = Pipe::new(stdout, &is_over).map_err(piped)?;
-        let stderr = Pipe::new(stderr, &is_over).map_err(piped)?;
-        let errors = Arc::new(Mutex::new(Vec::new()));
-        let kept = Arc::clone(&errors);
-        let (until, no_more_errors) = channel();
+        let pipe_error =
+            |e: std::io::Error| AgentError::Broken(format!("a pipe can't be set up: {e}"));
+        let stdin = Pipe::new(stdin, &is_over).map_err(pipe_error)?;
+        let stdout = Pipe::new(stdout, &is_over).map_err(pipe_error)?;
+        let stderr_pipe = Pipe::new(stderr, &is_over).map_err(pipe_error)?;
+        let stderr = Arc::new(Mutex::new(Vec::new()));
+        let kept = Arc::clone(&stderr);
+        let (end, stderr_end) = channel();
         std::thread::spawn(move || {
-            keep_errors(stderr, &kept);
-            drop(until);
+            keep_stderr(stderr_pipe, &kept);
+            drop(end);
         });
-        Ok(Process {
+        Ok(HelperProcess {
             child,
-            to: Some(writer(stdin)),
-            from: reader(stdout),
-            errors,
-            no_more_errors,
+            requests: Some(writer(stdin)),
+            responses: reader(stdout),
+            stderr,
+            stderr_end,
             command: Arc::clone(command),
             is_over,
             waited: Duration::ZERO,
@@ -84,121 +89,130 @@ impl Process {
         })
     }
 
-    /// Sends a frame, and waits for the answer.
-    pub fn ask(&mut self, frame: Frame, within: Duration) -> Result<ToEnv, AgentError> {
-        match self.from.try_recv() {
-            Ok(Ok(_)) => return Err(self.broken("spoke without being asked")),
+    /// Sends a frame and waits for the answer.
+    pub fn ask(
+        &mut self,
+        frame: MessageFrame,
+        within: Duration,
+    ) -> Result<ResponseMessage, AgentError> {
+        match self.responses.try_recv() {
+            Ok(Ok(_)) => return Err(self.broken("sent a message without being asked")),
             Ok(Err(text)) => return Err(self.broken(&text)),
             Err(_) => {}
         }
         frame.check().map_err(|text| self.broken(&format!("can't be sent {text}")))?;
         // If the pipe is closed, the answer says why.
-        let sent = self.to.as_ref().map(|to| to.send(frame));
-        let began = Instant::now();
+        let sent = self.requests.as_ref().map(|requests| requests.send(frame));
+        let start = Instant::now();
         let left = self.command.limits.episode.saturating_sub(self.waited);
         let answer = match sent {
             Some(_) => self.wait(within.min(left), left < within),
-            None => Err(self.broken("was ended")),
+            None => Err(self.broken("has no open standard input")),
         };
-        self.waited += began.elapsed();
+        self.waited += start.elapsed();
         match message(&answer?).map_err(|text| self.broken(&format!("sent {text}")))? {
-            ToEnv::Failed { problem } => Err(self.broken(&format!("said: {}", cut(&problem)))),
+            ResponseMessage::Failed { problem } => {
+                Err(self.broken(&format!("failed: {}", cut(&problem))))
+            }
             answer => Ok(answer),
         }
     }
 
-    fn wait(&mut self, within: Duration, is_last: bool) -> Result<Frame, AgentError> {
-        let began = Instant::now();
+    /// Waits for a frame. `is_last` is true if the limit is the remaining time of the episode.
+    fn wait(&mut self, within: Duration, is_last: bool) -> Result<MessageFrame, AgentError> {
+        let start = Instant::now();
         loop {
             if self.stop.load(Ordering::Relaxed) {
                 return Err(AgentError::Halted("the run stops".to_owned()));
             }
-            let left = within.saturating_sub(began.elapsed());
-            match self.from.recv_timeout(left.min(LOOK)) {
+            let left = within.saturating_sub(start.elapsed());
+            match self.responses.recv_timeout(left.min(POLL_PERIOD)) {
                 Ok(Ok(frame)) => return Ok(frame),
                 Ok(Err(text)) => return Err(self.broken(&text)),
-                Err(RecvTimeoutError::Timeout) if left > LOOK => {}
+                Err(RecvTimeoutError::Timeout) if left > POLL_PERIOD => {}
                 Err(RecvTimeoutError::Timeout) => {
                     let text = format!("gave no answer within {} s", within.as_secs_f32());
                     let used_up = ", which used up the time of the episode";
                     return Err(self.broken(&(text + if is_last { used_up } else { "" })));
                 }
-                Err(RecvTimeoutError::Disconnected) => return Err(self.broken("is gone")),
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(self.broken("exited before its answer"));
+                }
             }
         }
     }
 
-    /// What it did, with what it complained of last.
-    fn broken(&mut self, what: &str) -> AgentError {
+    /// Ends the process and returns an error with the end of its standard error.
+    fn broken(&mut self, problem: &str) -> AgentError {
         self.kill();
-        // All of its complaints are there once its pipe is closed, unless somebody holds it open.
-        let _ = self.no_more_errors.recv_timeout(Duration::from_secs(1));
-        let errors = self.errors.lock().unwrap_or_else(PoisonError::into_inner);
-        let said = String::from_utf8_lossy(&errors).trim().to_owned();
-        let said = if said.is_empty() { String::new() } else { format!("; it complained: {said}") };
-        AgentError::Broken(format!("`{}` {what}{said}", self.command.label()))
+        // Standard error ends with the process, unless a descendant keeps it open.
+        let _ = self.stderr_end.recv_timeout(Duration::from_secs(1));
+        let stderr = self.stderr.lock().unwrap_or_else(PoisonError::into_inner);
+        let text = String::from_utf8_lossy(&stderr).trim().to_owned();
+        let text = if text.is_empty() { text } else { format!("; standard error: {text}") };
+        AgentError::Broken(format!("`{}` {problem}{text}", self.command.label()))
     }
 
-    /// Its number, which is that of its process group too.
+    /// Returns its process id, which is the id of its process group too.
     #[cfg(unix)]
     fn pid(&self) -> Option<Pid> {
         i32::try_from(self.child.id()).ok().and_then(Pid::from_raw)
     }
 
     fn kill(&mut self) {
-        self.to = None;
+        self.requests = None;
         #[cfg(unix)]
-        if self.command.confinement.as_ref().is_some_and(|c| c.is_watched()) {
-            self.ask_to_end();
+        if self.command.confinement.as_ref().is_some_and(|c| c.is_supervised()) {
+            self.terminate();
         }
         #[cfg(unix)]
         if let Some(group) = self.pid() {
-            // It may be gone already.
+            // It may have ended already.
             let _ = kill_process_group(group, Signal::KILL);
         }
         let _ = self.child.kill();
     }
 
-    /// Asks the stage that watches the command to end it with all that it has started, and waits for that.
+    /// Asks the supervising stage to end the command with its descendants, and waits for it.
     #[cfg(unix)]
-    fn ask_to_end(&mut self) {
+    fn terminate(&mut self) {
         if let Some(pid) = self.pid() {
-            // It may be gone already.
+            // It may have ended already.
             let _ = kill_process(pid, Signal::TERM);
         }
-        let began = Instant::now();
-        while !self.has_ended() && began.elapsed() < GRACE {
-            std::thread::sleep(LOOK / 50);
+        let start = Instant::now();
+        while !self.has_ended() && start.elapsed() < EXIT_TIMEOUT {
+            std::thread::sleep(POLL_PERIOD / 50);
         }
     }
 
-    /// Closes its standard input, having told it to end or not; whether it ended within this time.
-    pub fn close(&mut self, told: bool, within: Duration) -> bool {
-        let Some(to) = self.to.take() else { return false };
-        if told {
-            let _ = to.send(plain(&ToMind::Bye));
+    /// Closes its standard input, after `bye` if `send_bye`. Returns whether it ends within this time.
+    pub fn close(&mut self, send_bye: bool, within: Duration) -> bool {
+        let Some(requests) = self.requests.take() else { return false };
+        if send_bye {
+            let _ = requests.send(plain(&RequestMessage::Bye));
         }
-        drop(to);
-        let began = Instant::now();
-        while began.elapsed() < within && !self.stop.load(Ordering::Relaxed) {
+        drop(requests);
+        let start = Instant::now();
+        while start.elapsed() < within && !self.stop.load(Ordering::Relaxed) {
             if self.has_ended() {
                 return true;
             }
-            std::thread::sleep(LOOK / 50);
+            std::thread::sleep(POLL_PERIOD / 50);
         }
         false
     }
 
-    /// Forgets how long it was waited for in the last episode.
-    pub fn begin_episode(&mut self) {
+    /// Resets the waiting time for a new episode.
+    pub fn reset_waiting_time(&mut self) {
         self.waited = Duration::ZERO;
     }
 
-    /// Whether it has ended; its number isn't given to another process yet.
+    /// Returns whether it has ended. Its process id is not reused yet.
     #[cfg(unix)]
     pub fn has_ended(&mut self) -> bool {
-        let looks = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
-        self.pid().is_none_or(|pid| !matches!(waitid(WaitId::Pid(pid), looks), Ok(None)))
+        let options = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
+        self.pid().is_none_or(|pid| !matches!(waitid(WaitId::Pid(pid), options), Ok(None)))
     }
 
     #[cfg(not(unix))]
@@ -207,19 +221,19 @@ impl Process {
     }
 }
 
-impl Drop for Process {
+impl Drop for HelperProcess {
     fn drop(&mut self) {
-        self.close(true, GRACE);
+        self.close(true, EXIT_TIMEOUT);
         self.kill();
         let _ = self.child.wait();
         self.is_over.store(true, Ordering::Relaxed);
     }
 }
 
-/// The process that runs a command, in its sandbox if it has one.
-fn starting(command: &Command) -> std::process::Command {
+/// Returns the process builder of a command, in its sandbox if it has one.
+fn process_builder(command: &HelperProgram) -> std::process::Command {
     match &command.confinement {
-        Some(confinement) if confinement.is_watched() => match confinement.isolation() {
+        Some(confinement) if confinement.is_supervised() => match confinement.isolation() {
             Isolation::Trusted => confinement.command(&script(command)),
             Isolation::Sandboxed(_) => confinement.command(&command.line),
         },
@@ -231,15 +245,15 @@ fn starting(command: &Command) -> std::process::Command {
     }
 }
 
-/// The command under its limit of memory for each process.
-fn script(command: &Command) -> String {
+/// Returns a shell script that runs the command with its memory limit per process.
+fn script(command: &HelperProgram) -> String {
     let kib = command.limits.memory_mib.saturating_mul(1024);
     format!("ulimit -d {kib} || exit 125\n{}", command.line)
 }
 
-/// A thread that writes, so that a process that doesn't read holds nobody up.
-fn writer(mut stdin: impl Write + Send + 'static) -> Sender<Frame> {
-    let (to, frames) = channel::<Frame>();
+/// Starts a thread that writes frames, so that a process that does not read blocks no caller.
+fn writer(mut stdin: impl Write + Send + 'static) -> Sender<MessageFrame> {
+    let (sender, frames) = channel::<MessageFrame>();
     std::thread::spawn(move || {
         for frame in frames {
             if frame.write(&mut stdin).is_err() {
@@ -247,16 +261,16 @@ fn writer(mut stdin: impl Write + Send + 'static) -> Sender<Frame> {
             }
         }
     });
-    to
+    sender
 }
 
-/// A thread that reads frames until the pipe is closed.
-fn reader(mut stdout: impl Read + Send + 'static) -> Receiver<Result<Frame, String>> {
-    // No more than one answer is ever due.
+/// Starts a thread that reads frames until the pipe is closed.
+fn reader(mut stdout: impl Read + Send + 'static) -> Receiver<Result<MessageFrame, String>> {
+    // At most one answer is due at a time.
     let (sender, frames) = sync_channel(1);
     std::thread::spawn(move || {
         loop {
-            let read = match Frame::read(&mut stdout, 0) {
+            let read = match MessageFrame::read(&mut stdout, 0) {
                 Ok(Some(frame)) => Ok(frame),
                 Ok(None) => return,
                 Err(e) => Err(format!("sent {e}")),
@@ -270,12 +284,13 @@ fn reader(mut stdout: impl Read + Send + 'static) -> Receiver<Result<Frame, Stri
     frames
 }
 
-fn keep_errors(mut stderr: impl Read, kept: &Mutex<Vec<u8>>) {
+/// Reads standard error to its end and keeps the last [`STDERR_LEN`] bytes.
+fn keep_stderr(mut stderr: impl Read, kept: &Mutex<Vec<u8>>) {
     let mut buffer = [0; 1024];
     while let Ok(n @ 1..) = stderr.read(&mut buffer) {
         let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
         kept.extend_from_slice(&buffer[..n]);
-        let too_many = kept.len().saturating_sub(KEPT_ERRORS);
-        kept.drain(..too_many);
+        let excess = kept.len().saturating_sub(STDERR_LEN);
+        kept.drain(..excess);
     }
 }

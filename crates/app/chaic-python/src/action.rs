@@ -1,14 +1,13 @@
-//! Actions as Python has them: rows of numbers for learners, strings and dictionaries for everybody else.
+//! Actions in Python: rows of integers for learners, and strings or dictionaries.
 
-use chaic_core::observation::SelfState;
+use chaic_core::observation::Proprioception;
 use chaic_core::{Action, Hand, Outcome, Target};
 use pyo3::prelude::*;
 use pythonize::{depythonize, pythonize};
 
 use crate::error::mistake;
 
-/// The kinds of actions that rows of numbers name by their index. Those of a hand and a thing point at a pixel of
-/// the image last seen.
+/// Kinds of actions; rows refer to them by index. Actions of a hand on an object take a pixel of the last image.
 pub const ACTIONS: [&str; 11] = [
     "move_forward",
     "turn_left",
@@ -23,20 +22,20 @@ pub const ACTIONS: [&str; 11] = [
     "wait",
 ];
 
-/// How long a wait of a row is, frames: a turn takes about as long.
+/// Duration of a wait in a row, frames; about that of a turn.
 const WAIT_FRAMES: u32 = 10;
 
-/// The action of a row: kind, column and row of the pixel.
+/// Parses a row: kind, and column and row of the pixel.
 ///
 /// # Errors
-/// `ValueError` if there is no such kind, or a pixel is negative. Pixels beyond the image show nothing.
-pub fn of_row([kind, column, row]: [i64; 3]) -> PyResult<Action> {
+/// `ValueError` for an unknown kind or a negative pixel. Pixels outside the image resolve to nothing.
+pub fn from_row([kind, column, row]: [i64; 3]) -> PyResult<Action> {
     let pixel = || {
-        let of = |x: i64| {
+        let coordinate = |x: i64| {
             u32::try_from(x)
-                .map_err(|_| mistake(format!("no pixel is at column {column}, row {row}")))
+                .map_err(|_| mistake(format!("there is no pixel at column {column}, row {row}")))
         };
-        Ok::<_, PyErr>(Target::Pixel { column: of(column)?, row: of(row)? })
+        Ok::<_, PyErr>(Target::Pixel { column: coordinate(column)?, row: coordinate(row)? })
     };
     Ok(match kind {
         0 => Action::MoveForward,
@@ -52,18 +51,18 @@ pub fn of_row([kind, column, row]: [i64; 3]) -> PyResult<Action> {
         10 => Action::Wait { frames: WAIT_FRAMES },
         other => {
             let n = ACTIONS.len();
-            return Err(mistake(format!("no action is number {other}; there are {n}")));
+            return Err(mistake(format!("there is no action {other} of {n}")));
         }
     })
 }
 
-/// The action of a string or a dictionary, written as in docs/subprocess-helpers.md.
+/// Parses a string or dictionary as in docs/subprocess-helpers.md.
 ///
 /// # Errors
-/// `ValueError` if it is none.
-pub fn of_object(object: &Bound<'_, PyAny>) -> PyResult<Action> {
+/// `ValueError` if it is not an action.
+pub fn from_object(object: &Bound<'_, PyAny>) -> PyResult<Action> {
     let action: Action = depythonize(object).map_err(|error| {
-        mistake(format!("{} is no action: {error}", crate::error::shown(object)))
+        mistake(format!("{} is no action: {error}", crate::error::short_repr(object)))
     })?;
     match action {
         Action::Wait { frames: 0 } => Err(mistake("a wait takes at least 1 frame")),
@@ -71,55 +70,58 @@ pub fn of_object(object: &Bound<'_, PyAny>) -> PyResult<Action> {
     }
 }
 
-/// The same the other way round.
+/// Converts an action to a string or dictionary.
 pub fn to_object<'py>(py: Python<'py>, action: &Action) -> PyResult<Bound<'py, PyAny>> {
     Ok(pythonize(py, action)?)
 }
 
-/// Which kinds of actions the own hands don't rule out, in the order of [`ACTIONS`].
-pub fn mask(own: &SelfState) -> [bool; ACTIONS.len()] {
-    let [left, right] = [0, 1].map(|hand| own.hands[hand].is_some());
-    let is_two_handed = own.hands[0].as_ref().is_some_and(|held| held.in_both_hands);
-    let in_both = left && right && !is_two_handed;
-    [true, true, true, !left, !right, in_both, left, right, !left, !right, true]
+/// Returns a mask of the kinds of actions that the hands allow, in the order of [`ACTIONS`].
+pub fn mask(proprioception: &Proprioception) -> [bool; ACTIONS.len()] {
+    let [left, right] = [0, 1].map(|hand| proprioception.hands[hand].is_some());
+    let is_two_handed = proprioception.hands[0].as_ref().is_some_and(|held| held.in_both_hands);
+    let can_put_in = left && right && !is_two_handed;
+    [true, true, true, !left, !right, can_put_in, left, right, !left, !right, true]
 }
 
-/// What an agent knows of itself, as numbers; their names in [`OWN`].
-pub fn own_numbers(own: &SelfState, part_of_time: f32) -> [f32; OWN.len()] {
+/// Returns proprioception as a vector; [`PROPRIOCEPTION`] names its elements.
+pub fn proprioception_values(
+    proprioception: &Proprioception,
+    elapsed_fraction: f32,
+) -> [f32; PROPRIOCEPTION.len()] {
     use chaic_core::geom::math;
     let held = |hand: usize| {
-        let held = own.hands[hand].as_ref();
+        let held = proprioception.hands[hand].as_ref();
         let n_contents = held.map_or(0, |held| held.n_contents);
         [f32::from(u8::from(held.is_some())), n_contents as f32]
     };
     let ([left, left_n], [right, right_n]) = (held(0), held(1));
-    let (succeeded, failed) = match own.last {
+    let (has_succeeded, has_failed) = match proprioception.last {
         Some((_, Outcome::Success)) => (1.0, 0.0),
         Some(_) => (0.0, 1.0),
         None => (0.0, 0.0),
     };
-    let is_two_handed = own.hands[0].as_ref().is_some_and(|held| held.in_both_hands);
-    let pose = own.pose;
+    let is_two_handed = proprioception.hands[0].as_ref().is_some_and(|held| held.in_both_hands);
+    let pose = proprioception.pose;
     [
         pose.position.x,
         pose.position.z,
         math::sin(pose.yaw_rad),
         math::cos(pose.yaw_rad),
-        part_of_time,
+        elapsed_fraction,
         left,
         left_n,
         right,
         right_n,
         f32::from(u8::from(is_two_handed)),
-        succeeded,
-        failed,
+        has_succeeded,
+        has_failed,
     ]
 }
 
-/// What [`own_numbers`] has: the place in the world in metres, the direction of the eye, the part of the episode
-/// that has passed, for each hand whether it holds something and how many things are in that, whether one thing
-/// is in both hands, and whether the last action ended well or failed.
-pub const OWN: [&str; 12] = [
+/// Elements of [`proprioception_values`]: position in the world (meters), direction of view, elapsed fraction of the
+/// episode; for each hand, whether it holds an object and how many objects are in that one; whether both hands hold
+/// one object; and whether the last action succeeded or failed.
+pub const PROPRIOCEPTION: [&str; 12] = [
     "x_m",
     "z_m",
     "sin_yaw",

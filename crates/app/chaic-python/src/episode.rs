@@ -1,4 +1,4 @@
-//! Episodes: where they come from, and what they are.
+//! Episodes in Python.
 
 use std::io::Cursor;
 use std::sync::Arc;
@@ -17,14 +17,14 @@ use pyo3::types::{PyBytes, PyDict};
 
 use crate::error::{failure, mistake};
 
-/// An episode: a place, what lies there, who takes part, and what the partner wants.
+/// An episode: a scene, its objects and people, and the partner's goal.
 #[pyclass(frozen, module = "chaic._chaic", skip_from_py_object)]
 #[derive(Clone)]
 pub struct Episode(pub Arc<chaic_episodes::Episode>);
 
 #[pymethods]
 impl Episode {
-    /// The episode of this name, like `high_target/train/03` or `low_target/standard/007`; the name
+    /// Loads an episode by id, such as `high_target/train/03` or `low_target/standard/007`; an id such as
     /// `obstacle/gen/123` generates it.
     #[new]
     fn new(py: Python<'_>, id: &str) -> PyResult<Episode> {
@@ -32,31 +32,31 @@ impl Episode {
         Ok(Episode(Arc::new(episode)))
     }
 
-    /// The episode of a file's text (docs/episodes.md), checked as the file is.
+    /// Parses and checks the text of an episode file (docs/episodes.md).
     #[staticmethod]
     fn from_json(py: Python<'_>, text: &str) -> PyResult<Episode> {
         let episode = py.detach(|| chaic_episodes::Episode::parse(text.as_bytes(), "the text"));
         Ok(Episode(Arc::new(episode.map_err(mistake)?)))
     }
 
-    /// As the text of a file.
+    /// Returns the text of an episode file.
     fn to_json(&self, py: Python<'_>) -> String {
         py.detach(|| self.0.to_json())
     }
 
-    /// Its name.
+    /// Episode id.
     #[getter]
     fn id(&self) -> &str {
         self.0.id()
     }
 
-    /// The name of its task.
+    /// Task name.
     #[getter]
     fn task(&self) -> &'static str {
         self.0.task().name()
     }
 
-    /// Seen from above, uint8 [height, width, 3].
+    /// Draws the top view, uint8 [height, width, 3].
     #[pyo3(signature = (width=640))]
     fn plan<'py>(&self, py: Python<'py>, width: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
         if !(16..=8192).contains(&width) {
@@ -71,27 +71,26 @@ impl Episode {
         PyArray1::from_vec(py, picture.into_raw()).reshape(shape)
     }
 
-    /// As the dictionary that its file is written from (docs/episodes.md), to be changed and read again by
-    /// `from_dict`.
+    /// Returns the content of an episode file (docs/episodes.md); `from_dict` reads it.
     fn as_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         py.import("json")?.call_method1("loads", (self.0.to_json_line(),))
     }
 
-    /// The episode of such a dictionary, checked as a file is. One that was changed has no `generator`: that
-    /// would promise what its generator keeps.
+    /// Parses and checks the content of an episode file. Remove `generator` from a changed episode: the field
+    /// states which generator made it.
     #[staticmethod]
     fn from_dict(py: Python<'_>, fields: &Bound<'_, PyDict>) -> PyResult<Episode> {
         let text: String = py.import("json")?.call_method1("dumps", (fields,))?.extract()?;
         Episode::from_json(py, &text)
     }
 
-    /// Shows the place from above: in a notebook in its cell, elsewhere in the browser.
+    /// Shows the top view in the notebook or the browser.
     fn show(slf: Bound<'_, Self>) -> PyResult<()> {
         slf.py().import("chaic.pictures")?.call_method1("show", (slf,))?;
         Ok(())
     }
 
-    /// The picture that notebooks show.
+    /// Returns the picture for notebooks, as PNG.
     fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         encode_png(py, self.plan(py, 640)?.readonly())
     }
@@ -106,7 +105,7 @@ impl Episode {
     }
 }
 
-/// A picture as the bytes of a PNG file; color, uint8 [height, width, 3].
+/// Encodes a color image, uint8 [height, width, 3], as PNG.
 #[pyfunction]
 pub fn encode_png<'py>(
     py: Python<'py>,
@@ -123,7 +122,7 @@ pub fn encode_png<'py>(
     Ok(PyBytes::new(py, bytes.get_ref()))
 }
 
-/// The names of the episodes of a task in a split: `train`, `test`, `standard`, `gen:A..B` or
+/// Returns the episode ids of a task in a split: `train`, `test`, `standard`, `gen:A..B` or
 /// `gen-standard:A..B`.
 #[pyfunction]
 pub fn episode_ids(split: &str, task: &str) -> PyResult<Vec<String>> {
@@ -132,13 +131,13 @@ pub fn episode_ids(split: &str, task: &str) -> PyResult<Vec<String>> {
     Ok((0..split.len_of(task)).map(|k| split.episode_id(task, k)).collect())
 }
 
-/// The names of all tasks, the paper's eight first.
+/// Returns the names of all tasks, the paper's eight first.
 #[pyfunction]
 pub fn tasks() -> Vec<&'static str> {
     TaskId::all().map(TaskId::name).collect()
 }
 
-/// The names of all classes of the catalogue, in the order of their numbers.
+/// Returns the names of all classes of the catalogue, by class index.
 #[pyfunction]
 pub fn classes() -> Vec<&'static str> {
     ClassId::all().map(|class| class.info().name).collect()

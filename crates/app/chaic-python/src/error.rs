@@ -1,43 +1,52 @@
-//! Which Python exception tells of which error.
+//! Conversion of errors to Python exceptions.
 
 use std::fmt::Display;
 
 use chaic_env::EnvError;
-use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyAttributeError, PyIndexError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
-/// A mistake in what was asked for.
+/// Returns a `ValueError` for invalid arguments.
 pub fn mistake(error: impl Display) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
-/// A number that names nothing.
+/// Returns an `IndexError` for an index `k` of `n` items.
 pub fn no_such(what: &str, k: usize, n: usize) -> PyErr {
     PyIndexError::new_err(format!("there is no {what} {k} of {n}"))
 }
 
-/// Something that can't be done now, or failed by itself.
+/// Returns an `AttributeError` for an unknown attribute of a class. `renamed` lists old names with their new ones.
+pub fn no_attribute(class: &str, name: &str, renamed: &[(&str, &str)]) -> PyErr {
+    let new_name = renamed.iter().find(|(old, _)| *old == name).map(|(_, new)| *new);
+    PyAttributeError::new_err(match new_name {
+        Some(new_name) => format!("{class}.{name} was renamed; use {class}.{new_name}"),
+        None => format!("{class} has no attribute {name:?}"),
+    })
+}
+
+/// Returns a `RuntimeError` for a failure or an invalid state.
 pub fn failure(error: impl Display) -> PyErr {
     PyRuntimeError::new_err(error.to_string())
 }
 
-/// An error of an environment.
-pub fn of_env(error: &EnvError) -> PyErr {
+/// Converts an error of an environment.
+pub fn from_env(error: &EnvError) -> PyErr {
     if error.is_usage() { mistake(error) } else { failure(error) }
 }
 
-/// An object of which a thread broke down.
+/// Returns a `RuntimeError` for an object in which a call panicked.
 pub fn poisoned<T>(_: T) -> PyErr {
-    failure("an earlier call broke down; make a new object")
+    failure("an earlier call panicked; create a new object")
 }
 
-/// The beginning of how Python shows an object.
-pub fn shown(object: &Bound<'_, PyAny>) -> String {
-    const MOST: usize = 120;
-    let text = object.repr().map_or_else(|_| "it".to_owned(), |text| text.to_string());
-    if text.chars().count() <= MOST {
+/// Returns the start of the `repr` of an object.
+pub fn short_repr(object: &Bound<'_, PyAny>) -> String {
+    const MAX_CHARS: usize = 120;
+    let text = object.repr().map_or_else(|_| "the object".to_owned(), |text| text.to_string());
+    if text.chars().count() <= MAX_CHARS {
         text
     } else {
-        text.chars().take(MOST).collect::<String>() + "..."
+        text.chars().take(MAX_CHARS).collect::<String>() + "..."
     }
 }

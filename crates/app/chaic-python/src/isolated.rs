@@ -1,4 +1,4 @@
-//! Python helpers in processes of their own, in the sandbox of `chaic-subprocess`.
+//! Python helpers in sandboxed processes (`chaic-subprocess`).
 
 use std::ffi::OsString;
 use std::fs::File;
@@ -7,19 +7,21 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use chaic_core::observation::{Grants, Senses};
+use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::{Action, Agent, AgentError};
 use chaic_sandbox::Launcher;
 use chaic_subprocess::serve::serve as serve_agent;
-use chaic_subprocess::{Command, Confinement, ConfinementOptions, Limits, Pool, SubprocessAgent};
+use chaic_subprocess::{
+    Confinement, ConfinementOptions, HelperProgram, Limits, Pool, SubprocessAgent,
+};
 use pyo3::prelude::*;
 use serde::Deserialize;
 
-use crate::agent::{PyAgent, breakdown};
+use crate::agent::{PyAgent, agent_error};
 use crate::error::{failure, mistake};
-use crate::options::senses;
+use crate::options::sensors;
 
-/// How to isolate the helpers of a run, as Python gives it.
+/// Isolation of a run's helpers, from Python.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct IsolationOptions {
@@ -33,15 +35,15 @@ pub struct IsolationOptions {
     decision_s: f64,
 }
 
-/// A helper whose processes run in the sandbox and serve one episode after the other.
+/// Helper with sandboxed processes that each serve several episodes.
 pub struct IsolatedHelper {
-    command: Arc<Command>,
+    command: Arc<HelperProgram>,
     pool: Arc<Pool>,
 }
 
 impl IsolatedHelper {
-    /// Confines each helper.
-    pub fn all(
+    /// Creates all helpers of a run.
+    pub fn create_all(
         options: &IsolationOptions,
         names: &[String],
         grants: Grants,
@@ -54,11 +56,11 @@ impl IsolatedHelper {
             masked: vec![run.to_owned()],
         };
         let decision = Duration::try_from_secs_f64(options.decision_s).map_err(mistake)?;
-        let usual = Limits::default();
-        let limits = Limits { decision, episode: usual.episode.max(decision), ..usual };
-        let confine = |(name, line): (&String, &String)| {
+        let default = Limits::default();
+        let limits = Limits { decision, episode: default.episode.max(decision), ..default };
+        let create = |(name, line): (&String, &String)| {
             let confined = Confinement::new(&launcher, line, &limits, &confinement);
-            let command = Command {
+            let command = HelperProgram {
                 name: name.clone(),
                 line: line.clone(),
                 grants,
@@ -68,33 +70,34 @@ impl IsolatedHelper {
             };
             Ok(IsolatedHelper { command: Arc::new(command), pool: Arc::default() })
         };
-        names.iter().zip(&options.commands).map(confine).collect()
+        names.iter().zip(&options.commands).map(create).collect()
     }
 
-    /// A mind for one episode.
-    pub fn mind(&self, stop: &'static AtomicBool) -> Box<dyn Agent> {
+    /// Returns an agent for one episode.
+    pub fn agent(&self, stop: &'static AtomicBool) -> Box<dyn Agent> {
         let (command, pool) = (Arc::clone(&self.command), Arc::clone(&self.pool));
         Box::new(SubprocessAgent::pooled(command, pool, stop))
     }
 }
 
-/// A fresh helper for each briefing.
+/// Agent that creates a new Python helper for each briefing.
 struct FreshAgent {
-    make: Py<PyAny>,
-    senses: Senses,
+    maker: Py<PyAny>,
+    sensors: SensorConfig,
     agent: Result<PyAgent, AgentError>,
 }
 
 impl Agent for FreshAgent {
-    fn senses(&self) -> Senses {
-        self.senses
+    fn sensors(&self) -> SensorConfig {
+        self.sensors
     }
 
     fn reset(&mut self, briefing: &chaic_core::Briefing) {
         let stop: &'static AtomicBool = &NEVER;
-        let made =
-            Python::attach(|py| self.make.call0(py).map_err(|error| breakdown(py, &error, stop)));
-        self.agent = made.map(|object| PyAgent::new(object, self.senses, stop));
+        let created = Python::attach(|py| {
+            self.maker.call0(py).map_err(|error| agent_error(py, &error, stop))
+        });
+        self.agent = created.map(|object| PyAgent::new(object, self.sensors, stop));
         if let Ok(agent) = &mut self.agent {
             agent.reset(briefing);
         }
@@ -105,24 +108,24 @@ impl Agent for FreshAgent {
     }
 }
 
-/// The process of a helper ends with its pipe.
+/// Stop flag that is never set: the process of a helper ends with its pipe.
 static NEVER: AtomicBool = AtomicBool::new(false);
 
-/// Serves fresh helpers of `make` on the standard input and the descriptor `output`, until the input is closed.
+/// Serves helpers that `maker` creates on standard input and the descriptor `output`, until the input is closed.
 #[pyfunction]
 pub fn serve(
     py: Python<'_>,
-    make: Py<PyAny>,
+    maker: Py<PyAny>,
     images: Vec<String>,
     image_size: u32,
     output: u32,
 ) -> PyResult<()> {
-    let senses = senses(&images, image_size)?;
+    let sensors = sensors(&images, image_size)?;
     let path = format!("/dev/fd/{output}");
     let mut output = File::options().write(true).open(path).map_err(failure)?;
-    let agent = Err(AgentError::Broken("a mind that was not briefed".to_owned()));
-    let mut mind = FreshAgent { make, senses, agent };
+    let agent = Err(AgentError::Broken("the agent was not briefed".to_owned()));
+    let mut agent = FreshAgent { maker, sensors, agent };
     let served =
-        py.detach(|| serve_agent("python", &mut mind, &mut std::io::stdin().lock(), &mut output));
+        py.detach(|| serve_agent("python", &mut agent, &mut std::io::stdin().lock(), &mut output));
     served.map_err(failure)
 }

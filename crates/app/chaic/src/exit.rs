@@ -7,51 +7,61 @@ use chaic_llm::error::LlmError;
 use chaic_subprocess::Refusal;
 use chaic_training::TrainingError;
 
-/// As intended.
+/// Success.
 pub const OK: u8 = 0;
-/// It failed, or it found something wrong and said what.
+/// The command failed, or found a problem and reported it.
 pub const FAILED: u8 = 1;
-/// What was asked for can't be; the parser of the command line ends with the same.
+/// Invalid request; the parser of the command line exits with the same code.
 pub const USAGE: u8 = 2;
-/// Ended by Ctrl-C: 128 + 2, the number of SIGINT, as shells have it.
+/// Ended by Ctrl-C: 128 + 2, the number of SIGINT, as in shells.
 pub const INTERRUPTED: u8 = 130;
 
-/// How a command ended without an error.
+/// End of a command that returned no error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ended {
-    /// As intended.
-    Well,
-    /// It found something wrong, and has said what.
-    WithFindings,
-    /// By Ctrl-C.
+pub enum ExitStatus {
+    /// The command succeeded.
+    Success,
+    /// The command found a problem and reported it.
+    Findings,
+    /// Ctrl-C ended the command.
     Interrupted,
 }
 
-impl Ended {
-    /// Its code.
+impl ExitStatus {
+    /// Returns [`ExitStatus::Success`], or [`ExitStatus::Findings`] if there are any.
+    pub fn from_findings(has_findings: bool) -> ExitStatus {
+        if has_findings { ExitStatus::Findings } else { ExitStatus::Success }
+    }
+
+    /// Returns the exit code.
     pub fn code(self) -> u8 {
         match self {
-            Ended::Well => OK,
-            Ended::WithFindings => FAILED,
-            Ended::Interrupted => INTERRUPTED,
+            ExitStatus::Success => OK,
+            ExitStatus::Findings => FAILED,
+            ExitStatus::Interrupted => INTERRUPTED,
         }
     }
 }
 
-/// The code of an error.
-pub fn of(error: &anyhow::Error) -> u8 {
-    let of_env = match error.downcast_ref() {
+/// Returns the error of `chaic-env` that this error is or wraps.
+pub fn env_error(error: &anyhow::Error) -> Option<&EnvError> {
+    match error.downcast_ref() {
         Some(EvalError::Env(inner)) => Some(inner),
         _ => error.downcast_ref(),
-    };
-    let of_minds = match of_env {
-        Some(EnvError::Minds(inner)) => Some(inner),
+    }
+}
+
+/// Returns the exit code of an error.
+pub fn code_of(error: &anyhow::Error) -> u8 {
+    let env = env_error(error);
+    let mind = match env {
+        Some(EnvError::Registry(inner)) => Some(inner),
         _ => None,
     };
-    let of_llm = of_minds.map_or_else(|| error.downcast_ref(), |inner| inner.downcast_ref());
-    let is_usage = of_env.is_some_and(EnvError::is_usage)
-        || of_llm.is_some_and(LlmError::is_usage)
-        || of_minds.is_some_and(|inner| inner.is::<Refusal>())
+    let llm = mind.map_or_else(|| error.downcast_ref(), |inner| inner.downcast_ref());
+    let is_usage = env.is_some_and(EnvError::is_usage)
+        || llm.is_some_and(LlmError::is_usage)
+        || mind.is_some_and(|inner| inner.is::<Refusal>())
         || error.downcast_ref().is_some_and(EvalError::is_usage)
         || error.downcast_ref().is_some_and(TrainingError::is_usage)
         || error.is::<Refusal>()

@@ -1,23 +1,26 @@
-//! Ctrl-C: the first asks to finish, the second ends at once.
+//! Ctrl-C: the first asks the command to stop, the second ends the process.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::exit;
-use crate::output::complain;
+use anyhow::{Context as _, Result};
 
-/// Raised by the first Ctrl-C.
+use crate::exit;
+use crate::output::print_error;
+
+/// Set by the first Ctrl-C.
 static STOP: AtomicBool = AtomicBool::new(false);
 
-/// The flag that the first Ctrl-C raises. Call it once.
+/// Installs the handler and returns the flag that the first Ctrl-C sets. Call it once.
 ///
 /// # Errors
 /// If the system refuses the handler.
-pub fn stop_flag() -> Result<&'static AtomicBool, ctrlc::Error> {
+pub fn stop_flag() -> Result<&'static AtomicBool> {
     ctrlc::set_handler(|| {
         if STOP.swap(true, Ordering::SeqCst) {
             std::process::exit(exit::INTERRUPTED.into());
         }
-        complain("stopping; press Ctrl-C again to stop at once");
-    })?;
+        print_error("stopping; press Ctrl-C again to stop at once");
+    })
+    .context("can't listen for Ctrl-C")?;
     Ok(&STOP)
 }

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use chaic_sandbox::{Launcher, run_stage};
 
 fn main() -> ExitCode {
-    // This program is also what sandboxes of helpers in other processes start.
+    // Sandboxes of helper processes start this program again.
     if let Some(status) = run_stage(std::env::args_os()) {
         return ExitCode::from(status);
     }

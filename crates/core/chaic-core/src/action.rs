@@ -1,4 +1,4 @@
-//! What an agent may do, and how it can end.
+//! Actions of agents and their outcomes.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::ids::EntityId;
 
-/// One of two hands.
+/// Left or right hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Hand {
@@ -20,7 +20,7 @@ impl Hand {
     /// Left, then right.
     pub const BOTH: [Hand; 2] = [Hand::Left, Hand::Right];
 
-    /// Its place in per-hand arrays: left 0, right 1.
+    /// Returns the index in per-hand arrays: left 0, right 1.
     pub fn index(self) -> usize {
         match self {
             Hand::Left => 0,
@@ -28,7 +28,7 @@ impl Hand {
         }
     }
 
-    /// The other one.
+    /// Returns the opposite hand.
     pub fn other(self) -> Hand {
         match self {
             Hand::Left => Hand::Right,
@@ -37,74 +37,75 @@ impl Hand {
     }
 }
 
-/// How an agent names the thing that an action is about.
+/// Reference of an agent to the object of an action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Target {
-    /// Whatever this pixel of the agent's own last image shows; column 0 is at the left, row 0 at
-    /// the top. The environment resolves it against ids that the agent never gets. Without an
-    /// image, outside of it, or where it shows no object, the action fails as
-    /// [`FailureReason::OutOfReach`].
+    /// Object at this pixel of the agent's last image; column 0 is at the left, row 0 at the top.
+    /// The environment resolves it against an id image that the agent never receives. The action
+    /// fails with [`FailureReason::OutOfReach`] without an image, outside of it, or where it shows
+    /// no object.
     Pixel {
         /// Column, 0 to width - 1.
         column: u32,
         /// Row, 0 to height - 1.
         row: u32,
     },
-    /// An entity, for agents that are granted ids. Without the grant it names nothing.
+    /// Entity id, for agents with granted ids. Without the grant it refers to nothing.
     Entity(EntityId),
 }
 
-/// An action about an entity of the world: what the world runs and a trace records.
+/// An action with entity ids, as the world runs it and a trace records it.
 pub type ResolvedAction = Action<EntityId>;
 
-/// What an agent decides to do next. An action takes frames; its agent is asked again when it
-/// ends (paper section 3.3, "Action Space").
+/// Action of an agent. It takes one or more frames; the agent decides again when it ends (paper
+/// section 3.3, "Action Space").
 ///
-/// `T` is how its object is named: a [`Target`] by agents, an [`EntityId`] in the world, a track
-/// of its own within a mind.
+/// `T` is the type of the object reference: a [`Target`] for agents, an [`EntityId`] in the world,
+/// and a track id inside an agent with its own tracker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Action<T = Target> {
-    /// A step of about 0.42 m ahead.
+    /// Moves about 0.42 m forward.
     MoveForward,
-    /// 15 degrees to the left.
+    /// Turns 15 degrees to the left.
     TurnLeft,
-    /// 15 degrees to the right.
+    /// Turns 15 degrees to the right.
     TurnRight,
-    /// Step up to an object and take it. Heavy furniture takes both hands, and is lifted together
-    /// if another agent has chosen to pick up the same piece and both stand at it.
+    /// Approaches an object and picks it up. Heavy furniture requires both hands. Two agents lift
+    /// it together if both have chosen to pick it up and stand at it.
     PickUp {
-        /// What to take.
+        /// Object to pick up.
         object: T,
-        /// The hand to take it with.
+        /// Hand to use.
         hand: Hand,
     },
-    /// Put the object in one hand into the container in the other.
+    /// Puts the object in one hand into the container in the other.
     PutIn,
-    /// Step up to a place and put on it what the hand holds.
+    /// Approaches a place and puts the held object on it.
     PutOn {
-        /// Where to put it: a goal place or any other thing with a top.
+        /// Goal place, or any other object with a supporting surface.
         place: T,
-        /// The hand to empty; a rider's basket and furniture go as a whole, whatever the hand.
+        /// Hand to empty. The contents of a rider's basket, or furniture, are put down with either
+        /// hand.
         hand: Hand,
     },
-    /// Step up to an obstacle, lift it and put it aside.
+    /// Approaches an obstacle, lifts it and sets it aside.
     RemoveObstacle {
-        /// What to remove.
+        /// Obstacle to remove.
         obstacle: T,
-        /// The hand to take it with.
+        /// Hand to use.
         hand: Hand,
     },
-    /// Stand still.
+    /// Stands still.
     Wait {
-        /// For how many frames; at least 1.
+        /// Number of frames; at least 1.
         frames: u32,
     },
 }
 
 impl<T: Copy> Action<T> {
-    /// The object or place the action is about.
+    /// Returns the object or place of the action.
     pub fn subject(&self) -> Option<T> {
         match *self {
             Action::PickUp { object, .. } => Some(object),
@@ -114,56 +115,55 @@ impl<T: Copy> Action<T> {
         }
     }
 
-    /// The same action with its object named in another way.
-    pub fn map<U>(self, name: impl FnOnce(T) -> U) -> Action<U> {
+    /// Returns the same action with a converted object reference.
+    pub fn map<U>(self, convert: impl FnOnce(T) -> U) -> Action<U> {
         match self {
             Action::MoveForward => Action::MoveForward,
             Action::TurnLeft => Action::TurnLeft,
             Action::TurnRight => Action::TurnRight,
-            Action::PickUp { object, hand } => Action::PickUp { object: name(object), hand },
+            Action::PickUp { object, hand } => Action::PickUp { object: convert(object), hand },
             Action::PutIn => Action::PutIn,
-            Action::PutOn { place, hand } => Action::PutOn { place: name(place), hand },
+            Action::PutOn { place, hand } => Action::PutOn { place: convert(place), hand },
             Action::RemoveObstacle { obstacle, hand } => {
-                Action::RemoveObstacle { obstacle: name(obstacle), hand }
+                Action::RemoveObstacle { obstacle: convert(obstacle), hand }
             }
             Action::Wait { frames } => Action::Wait { frames },
         }
     }
 
-    /// Whether it only changes where the agent stands or looks.
+    /// Returns whether the action only moves or turns the agent.
     pub fn is_locomotion(&self) -> bool {
         matches!(self, Action::MoveForward | Action::TurnLeft | Action::TurnRight)
     }
 }
 
-/// Why an action failed.
+/// Reason of a failed action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FailureReason {
-    /// Something solid is in the way.
+    /// A solid object blocks the way.
     Blocked,
-    /// Nothing to do this with is within reach and sight: too far away to step up to, behind a wall,
-    /// no longer there, or never there at all. One reason for all of these, so that no failure
-    /// tells of what can't be seen.
+    /// The object is not accessible: too far for an approach, behind a wall, no longer present, or
+    /// nonexistent. All these cases have one reason, so that a failure reveals nothing hidden.
     OutOfReach,
-    /// Beyond the height or strength of this person, and this attempt did not succeed; or nothing
-    /// that this person can do at all.
+    /// Beyond the height range or strength of this person, and the attempt did not succeed; or an
+    /// action that this person cannot perform.
     BeyondLimits,
     /// The fragile object broke.
     Broke,
-    /// The hand (or, for furniture, a hand) is full.
+    /// The hand is full; for furniture, either hand.
     HandFull,
     /// The hand is empty.
     HandEmpty,
-    /// Somebody else holds the object.
+    /// Another agent holds the object.
     HeldByOther,
     /// The object is already delivered, or lost.
     OutOfPlay,
-    /// Nobody can do this with the object, which is within reach.
+    /// The object is within reach, but does not permit this action.
     Impossible,
     /// The container or basket is full.
     Full,
-    /// No container in one hand and target in the other.
+    /// The hands do not hold a container and a target.
     NotContainerAndTarget,
 }
 
@@ -185,18 +185,18 @@ impl fmt::Display for FailureReason {
     }
 }
 
-/// How an action ended.
+/// Outcome of an action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// As intended.
+    /// The action succeeded.
     Success,
-    /// Not as intended.
+    /// The action failed.
     Failure(FailureReason),
 }
 
 impl Outcome {
-    /// Whether it ended as intended.
+    /// Returns whether the action succeeded.
     pub fn is_success(self) -> bool {
         self == Outcome::Success
     }

@@ -1,6 +1,6 @@
-//! Frames of reference, and the arithmetic that is the same on every machine.
+//! Coordinate frames, and arithmetic that is bit-identical on every machine.
 //!
-//! One convention holds everywhere: **right-handed, y up, metres, radians**.
+//! One convention holds everywhere: **right-handed, y up, meters, radians**.
 //!
 //! ```text
 //!            +y (up)
@@ -12,35 +12,35 @@
 //!          +z (behind at yaw 0)
 //! ```
 //!
-//! A camera looks along its own -z with +x right and +y up, as in OpenGL and glTF. Images have
-//! row 0 at the top and column 0 at the left. Plan views draw +x to the right and -z upwards, so
-//! an agent at yaw 0 looks up the page.
+//! A camera looks along its own -z with +x right and +y up, as in OpenGL and glTF. Images have row
+//! 0 at the top and column 0 at the left. Plan views draw +x to the right and -z upwards, so an
+//! agent at yaw 0 faces the top of the page.
 
 use glam::{Mat3, Quat, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 /// Transcendental functions from one pure-Rust library, so that every machine computes the same
-/// bits. The standard library's versions call whatever the platform brings.
+/// bits. The functions of the standard library depend on the platform.
 pub mod math {
     pub use libm::{
         acosf as acos, asinf as asin, atan2f as atan2, cosf as cos, expf as exp, hypotf as hypot,
         logf as ln, powf, sinf as sin, tanf as tan,
     };
 
-    /// From here to twice as much, floats are the whole numbers.
-    const WHOLE: f32 = 8_388_608.0;
+    /// From this value to twice this value, the representable f32 are exactly the integers.
+    const INTEGERS_FROM: f32 = 8_388_608.0;
 
-    /// The greatest whole number not above `x`, for 0 <= `x` <= 2^22; any number for any other `x`.
-    /// Without the checks of a conversion, so that it suits loops over pixels.
+    /// Returns the floor of `x` for 0 <= `x` <= 2^22, and an unspecified number for any other `x`.
+    /// It omits the range checks of a conversion, for loops over pixels.
     #[inline]
     pub fn floor_small(x: f32) -> i32 {
-        let shifted = x + WHOLE;
-        let nearest = shifted.to_bits().wrapping_sub(WHOLE.to_bits()) as i32;
-        nearest.wrapping_sub(i32::from(shifted - WHOLE > x))
+        let shifted = x + INTEGERS_FROM;
+        let nearest = shifted.to_bits().wrapping_sub(INTEGERS_FROM.to_bits()) as i32;
+        nearest.wrapping_sub(i32::from(shifted - INTEGERS_FROM > x))
     }
 }
 
-/// The horizontal unit vector that yaw `yaw_rad` looks along.
+/// Returns the horizontal unit vector in the direction of yaw `yaw_rad`.
 ///
 /// ```
 /// use chaic_core::geom::forward;
@@ -51,18 +51,18 @@ pub fn forward(yaw_rad: f32) -> Vec3 {
     Vec3::new(-math::sin(yaw_rad), 0.0, -math::cos(yaw_rad))
 }
 
-/// The horizontal unit vector to the right of yaw `yaw_rad`.
+/// Returns the horizontal unit vector to the right of yaw `yaw_rad`.
 pub fn right(yaw_rad: f32) -> Vec3 {
     Vec3::new(math::cos(yaw_rad), 0.0, -math::sin(yaw_rad))
 }
 
-/// The yaw that looks from `from` to `to` (heights are ignored); 0 where both coincide.
+/// Returns the yaw that looks from `from` to `to` (heights are ignored); 0 if both coincide.
 pub fn yaw_towards(from: Vec3, to: Vec3) -> f32 {
     let d = to - from;
     if d.x == 0.0 && d.z == 0.0 { 0.0 } else { math::atan2(-d.x, -d.z) }
 }
 
-/// The same angle in (-pi, pi].
+/// Returns the equivalent angle in (-pi, pi].
 pub fn wrap_angle(rad: f32) -> f32 {
     use std::f32::consts::{PI, TAU};
     let mut a = rad % TAU;
@@ -74,51 +74,51 @@ pub fn wrap_angle(rad: f32) -> f32 {
     a
 }
 
-/// The rotation that turns an upright object to `yaw_rad`.
+/// Returns the rotation of an upright object by `yaw_rad`.
 pub fn yaw_rotation(yaw_rad: f32) -> Quat {
     let half = 0.5 * yaw_rad;
     Quat::from_xyzw(0.0, math::sin(half), 0.0, math::cos(half))
 }
 
-/// The rotation that lifts the gaze of a level eye by `pitch_rad`.
+/// Returns the rotation that raises a level gaze by `pitch_rad`.
 pub fn pitch_rotation(pitch_rad: f32) -> Quat {
     let half = 0.5 * pitch_rad;
     Quat::from_xyzw(math::sin(half), 0.0, 0.0, math::cos(half))
 }
 
-/// Rotates `v` about the vertical by `yaw_rad`.
+/// Rotates `v` about the vertical axis by `yaw_rad`.
 pub fn rotate_yaw(v: Vec3, yaw_rad: f32) -> Vec3 {
     let (s, c) = (math::sin(yaw_rad), math::cos(yaw_rad));
     Vec3::new(c * v.x + s * v.z, v.y, -s * v.x + c * v.z)
 }
 
-/// The horizontal part (x, z) of a point.
-pub fn xz(v: Vec3) -> Vec2 {
+/// Returns the horizontal components (x, z) of a point.
+pub fn to_xz(v: Vec3) -> Vec2 {
     Vec2::new(v.x, v.z)
 }
 
-/// Distance of two points in plan, heights ignored.
+/// Returns the distance of two points in plan.
 pub fn horizontal_distance(a: Vec3, b: Vec3) -> f32 {
-    xz(a).distance(xz(b))
+    to_xz(a).distance(to_xz(b))
 }
 
-/// Where somebody stands and looks: feet on the ground at `position`, facing `yaw_rad`.
+/// Pose of an agent: feet on the ground at `position`, facing `yaw_rad`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Pose {
-    /// Position of the feet in the world, metres.
+    /// Position of the feet in the world, meters.
     #[schemars(with = "[f32; 3]")]
     pub position: Vec3,
-    /// Facing, radians; see the module's figure.
+    /// Yaw, radians; see the figure of the module.
     pub yaw_rad: f32,
 }
 
 impl Pose {
-    /// The unit vector that this pose looks along.
+    /// Returns the unit vector in the direction of this pose.
     pub fn forward(&self) -> Vec3 {
         forward(self.yaw_rad)
     }
 
-    /// A point given in this pose's own frame (x right, y up, -z ahead), in the world.
+    /// Converts a point from the frame of this pose (x right, y up, -z forward) to the world.
     pub fn to_world(&self, point_in_body: Vec3) -> Vec3 {
         self.position + rotate_yaw(point_in_body, self.yaw_rad)
     }
@@ -127,41 +127,41 @@ impl Pose {
 /// An axis-aligned rectangle in plan.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Rect {
-    /// Smallest x and z, metres.
+    /// Smallest x and z, meters.
     #[schemars(with = "[f32; 2]")]
     pub min: Vec2,
-    /// Largest x and z, metres.
+    /// Largest x and z, meters.
     #[schemars(with = "[f32; 2]")]
     pub max: Vec2,
 }
 
 impl Rect {
-    /// The rectangle that spans two corners given as `[x, z]`.
+    /// Creates the rectangle between two corners given as `[x, z]`.
     pub fn new(min: [f32; 2], max: [f32; 2]) -> Rect {
         Rect { min: Vec2::from(min), max: Vec2::from(max) }
     }
 
-    /// Whether the point (x, z) lies in it, borders included.
+    /// Returns whether the point (x, z) is inside, borders included.
     pub fn contains(&self, p: Vec2) -> bool {
         p.x >= self.min.x && p.x <= self.max.x && p.y >= self.min.y && p.y <= self.max.y
     }
 
-    /// The rectangle with every side moved outwards by `margin_m` (inwards if negative).
-    pub fn grown(&self, margin_m: f32) -> Rect {
+    /// Returns the rectangle with every side moved outwards by `margin_m` (inwards if negative).
+    pub fn expanded(&self, margin_m: f32) -> Rect {
         Rect { min: self.min - margin_m, max: self.max + margin_m }
     }
 
-    /// Extent along x and z, metres.
+    /// Returns the extent along x and z, meters.
     pub fn size(&self) -> Vec2 {
         self.max - self.min
     }
 
-    /// Its middle (x, z).
+    /// Returns the center (x, z).
     pub fn center(&self) -> Vec2 {
         0.5 * (self.min + self.max)
     }
 
-    /// Whether two rectangles share any point.
+    /// Returns whether two rectangles have a common point.
     pub fn overlaps(&self, other: &Rect) -> bool {
         self.min.x <= other.max.x
             && other.min.x <= self.max.x
@@ -173,11 +173,11 @@ impl Rect {
 /// A pinhole camera at a pose in the world.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
-    /// Position of the eye in the world, metres.
+    /// Position of the camera in the world, meters.
     pub eye_in_world: Vec3,
-    /// Rotates directions from camera to world.
+    /// Rotation from camera to world.
     pub world_from_camera: Quat,
-    /// Full vertical angle of view, radians; pixels are square.
+    /// Full vertical field of view, radians; pixels are square.
     pub vertical_fov_rad: f32,
     /// Image width, pixels.
     pub width: u32,
@@ -186,20 +186,20 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// Full angle of view of an agent's eye, 90 degrees (facts S10.3).
+    /// Full field of view of an agent's camera, 90 degrees (facts S10.3).
     pub const EYE_FOV_RAD: f32 = std::f32::consts::FRAC_PI_2;
-    /// Nothing nearer than this is seen, metres (original: 0.1).
+    /// Distance of the near plane, meters (original: 0.1).
     pub const NEAR_M: f32 = 0.1;
-    /// Depth of a pixel that shows nothing, and the farthest that is drawn, metres (original: 100).
+    /// Distance of the far plane and depth of empty pixels, meters (original: 100).
     pub const FAR_M: f32 = 100.0;
 
-    /// Focal length in pixels.
+    /// Returns the focal length, pixels.
     pub fn focal_px(&self) -> f32 {
         0.5 * self.height as f32 / math::tan(0.5 * self.vertical_fov_rad)
     }
 
-    /// The world point that pixel center (`column`, `row`) shows at `depth_m` along the camera's
-    /// axis.
+    /// Returns the world point at pixel center (`column`, `row`) and depth `depth_m` along the
+    /// camera's axis.
     pub fn unproject(&self, column: u32, row: u32, depth_m: f32) -> Vec3 {
         let f = self.focal_px();
         let x = (column as f32 + 0.5 - 0.5 * self.width as f32) / f;
@@ -207,7 +207,8 @@ impl Camera {
         self.eye_in_world + self.world_from_camera * (Vec3::new(x, y, -1.0) * depth_m)
     }
 
-    /// Continuous pixel coordinates and depth of a world point; `None` behind the near plane.
+    /// Returns the continuous pixel coordinates and the depth of a world point; `None` for points
+    /// closer than the near plane.
     pub fn project(&self, p_in_world: Vec3) -> Option<(Vec2, f32)> {
         let p = self.world_from_camera.inverse() * (p_in_world - self.eye_in_world);
         let depth = -p.z;
@@ -220,7 +221,7 @@ impl Camera {
         Some((Vec2::new(u, v), depth))
     }
 
-    /// The rotation part as a matrix, for loops over pixels.
+    /// Returns the rotation as a matrix, for loops over pixels.
     pub fn rotation(&self) -> Mat3 {
         Mat3::from_quat(self.world_from_camera)
     }
@@ -232,7 +233,7 @@ mod tests {
     use std::f32::consts::{FRAC_PI_2, PI};
 
     #[test]
-    fn small_numbers_are_rounded_as_by_the_library() {
+    fn floor_small_matches_the_library() {
         let steps = (0..40_000).map(|k| k as f32 * 0.0625);
         let near = (1..2000).flat_map(|k| [(k as f32).next_down(), (k as f32).next_up()]);
         for x in steps.chain(near).chain([f32::MIN_POSITIVE, 0.5, 1e-7, 4_194_303.5, 4_194_304.0]) {
@@ -259,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn projecting_undoes_unprojecting() {
+    fn project_inverts_unproject() {
         let camera = Camera {
             eye_in_world: Vec3::new(1.0, 1.6, -2.0),
             world_from_camera: yaw_rotation(0.7),

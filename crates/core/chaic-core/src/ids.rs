@@ -1,4 +1,5 @@
-//! Handles. What they refer to is in the world; agents only ever see the numbers.
+//! Ids of entities, agents and object classes. The world resolves them; agents see only the
+//! numbers.
 
 use std::fmt;
 
@@ -7,12 +8,12 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 use crate::catalogue::{self, ClassInfo};
 
-/// A count of frames since the episode began; a walking second has 30.
+/// Number of frames since the start of the episode; 30 frames are one second of walking.
 pub type Frame = u32;
 
-/// Names one thing of an episode, and is the value of its pixels in an id image.
+/// Id of an entity of an episode, and the value of its pixels in an id image.
 ///
-/// The low numbers are structure and people, the same in every episode; objects begin at
+/// Low numbers are structure and people and are the same in every episode. Objects start at
 /// [`EntityId::FIRST_OBJECT`].
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
@@ -25,16 +26,16 @@ impl EntityId {
     pub const NOTHING: EntityId = EntityId(0);
     /// Floors and the ground.
     pub const FLOOR: EntityId = EntityId(1);
-    /// Walls, window panes included.
+    /// Walls, including window panes.
     pub const WALL: EntityId = EntityId(2);
     /// Ceilings and roofs.
     pub const CEILING: EntityId = EntityId(3);
-    /// The body of agent 0; agent k is this plus k.
+    /// Body of agent 0; the body of agent k is this plus k.
     pub const FIRST_PERSON: EntityId = EntityId(8);
-    /// The first number that names an object.
+    /// First id of an object.
     pub const FIRST_OBJECT: EntityId = EntityId(16);
 
-    /// The name of its class, or of the part of the structure that it is; `classes` are those of
+    /// Returns the name of the class, or of the structural element. `classes` holds the classes of
     /// people and objects by id.
     pub fn class_name(self, classes: &[Option<ClassId>]) -> &'static str {
         match self {
@@ -49,9 +50,9 @@ impl EntityId {
         }
     }
 
-    /// The body of an agent; [`EntityId::NOTHING`] for a number from [`AgentId::MAX_AGENTS`] on, which
-    /// no episode has.
-    pub fn of_agent(agent: AgentId) -> EntityId {
+    /// Returns the body of an agent, or [`EntityId::NOTHING`] for an index that is not below
+    /// [`AgentId::MAX_AGENTS`].
+    pub fn from_agent(agent: AgentId) -> EntityId {
         if agent.index() < AgentId::MAX_AGENTS {
             EntityId(EntityId::FIRST_PERSON.0 + u16::from(agent.0))
         } else {
@@ -59,14 +60,14 @@ impl EntityId {
         }
     }
 
-    /// The agent whose body this is.
+    /// Returns the agent with this body.
     pub fn agent(self) -> Option<AgentId> {
         (EntityId::FIRST_PERSON..EntityId::FIRST_OBJECT)
             .contains(&self)
             .then(|| AgentId((self.0 - EntityId::FIRST_PERSON.0) as u8))
     }
 
-    /// Whether it names an object rather than structure or a person.
+    /// Returns whether the id is an object rather than structure or a person.
     pub fn is_object(self) -> bool {
         self >= EntityId::FIRST_OBJECT
     }
@@ -78,7 +79,7 @@ impl fmt::Display for EntityId {
     }
 }
 
-/// Names one agent of an episode.
+/// Id of an agent of an episode.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
 )]
@@ -86,22 +87,22 @@ impl fmt::Display for EntityId {
 pub struct AgentId(pub u8);
 
 impl AgentId {
-    /// The constrained person.
+    /// The partner: the person with the constraint.
     pub const PARTNER: AgentId = AgentId(0);
     /// The helper.
     pub const HELPER: AgentId = AgentId(1);
-    /// The child who comes along while shopping.
+    /// The child in the shopping task.
     pub const CHILD: AgentId = AgentId(2);
-    /// Most agents of one episode: so many numbers are there for their bodies.
+    /// Maximum number of agents in an episode, given by the id range of bodies.
     pub const MAX_AGENTS: usize = (EntityId::FIRST_OBJECT.0 - EntityId::FIRST_PERSON.0) as usize;
 
-    /// Its place in per-agent arrays.
+    /// Returns the index in per-agent arrays.
     pub fn index(self) -> usize {
         usize::from(self.0)
     }
 
-    /// The word that people read for this agent.
-    pub fn word(self) -> &'static str {
+    /// Returns the role name for display.
+    pub fn role_name(self) -> &'static str {
         match self {
             AgentId::PARTNER => "partner",
             AgentId::HELPER => "helper",
@@ -113,11 +114,11 @@ impl AgentId {
 
 impl fmt::Display for AgentId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.word())
+        f.write_str(self.role_name())
     }
 }
 
-/// Names one class of the catalogue. Written in files as the class's name.
+/// Id of a class of the catalogue. It is serialized as the name of the class.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ClassId(u8);
 
@@ -127,35 +128,35 @@ impl ClassId {
         ClassId(index as u8)
     }
 
-    /// The class of this name, if the catalogue has one.
-    pub fn by_name(name: &str) -> Option<ClassId> {
+    /// Returns the class with this name.
+    pub fn from_name(name: &str) -> Option<ClassId> {
         catalogue::CLASSES.iter().position(|c| c.name == name).map(ClassId::from_index)
     }
 
-    /// The class of this name, which must exist.
+    /// Returns the class with this name, which must exist.
     ///
     /// # Panics
-    /// If the catalogue has no such class: for names written in code, not for input.
+    /// If the catalogue has no such class: for names in code, not for input.
     pub fn named(name: &str) -> ClassId {
-        ClassId::by_name(name).unwrap_or_else(|| panic!("the catalogue has no class `{name}`"))
+        ClassId::from_name(name).unwrap_or_else(|| panic!("the catalogue has no class `{name}`"))
     }
 
-    /// Every class, in the catalogue's order.
+    /// Returns all classes in the order of the catalogue.
     pub fn all() -> impl Iterator<Item = ClassId> {
         (0..catalogue::CLASSES.len()).map(ClassId::from_index)
     }
 
-    /// Its place in the catalogue.
+    /// Returns the index in the catalogue.
     pub fn index(self) -> usize {
         usize::from(self.0)
     }
 
-    /// What the catalogue says of it.
+    /// Returns the entry in the catalogue.
     pub fn info(self) -> &'static ClassInfo {
         &catalogue::CLASSES[self.index()]
     }
 
-    /// Its name.
+    /// Returns the name.
     pub fn name(self) -> &'static str {
         self.info().name
     }
@@ -182,8 +183,8 @@ impl Serialize for ClassId {
 impl<'de> Deserialize<'de> for ClassId {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<ClassId, D::Error> {
         let name = <std::borrow::Cow<'de, str>>::deserialize(deserializer)?;
-        ClassId::by_name(&name).ok_or_else(|| {
-            de::Error::custom(format!("unknown class `{name}`, expected a name of the catalogue"))
+        ClassId::from_name(&name).ok_or_else(|| {
+            de::Error::custom(format!("unknown class `{name}`, expected a name in the catalogue"))
         })
     }
 }
@@ -197,7 +198,7 @@ impl JsonSchema for ClassId {
         let names: Vec<&str> = catalogue::CLASSES.iter().map(|c| c.name).collect();
         schemars::json_schema!({
             "type": "string",
-            "description": "The name of a class of the catalogue",
+            "description": "Name of a class in the catalogue",
             "enum": names,
         })
     }
@@ -208,10 +209,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bodies_are_nothing_else() {
+    fn bodies_of_agents_have_their_own_ids() {
         for number in 0..=u8::MAX {
             let agent = AgentId(number);
-            let body = EntityId::of_agent(agent);
+            let body = EntityId::from_agent(agent);
             let has_one = agent.index() < AgentId::MAX_AGENTS;
             assert_eq!(body.agent(), has_one.then_some(agent), "{number}");
             assert_eq!(body == EntityId::NOTHING, !has_one, "{number}");

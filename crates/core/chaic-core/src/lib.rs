@@ -1,24 +1,24 @@
-//! What a mind and the world say to each other.
+//! Shared types of agents and worlds.
 //!
-//! **What it is**: the vocabulary that every room of chaic shares. Frames of reference
-//! ([`geom`]), handles ([`ids`]), the catalogue of object classes ([`catalogue`]), what bodies
-//! can do ([`capability`]), the tasks ([`task`]), what an agent may do ([`action`]), what it
-//! is told before ([`briefing`]) and during an episode ([`observation`]), the [`agent::Agent`]
-//! trait, and the named random streams ([`rng`]).
+//! **What it is**: the data types that all crates of chaic use.
+//! - Scene: coordinate frames ([`geom`]), ids ([`ids`]), the [`catalogue`] of object classes.
+//! - People and tasks: body capabilities ([`capability`]), the tasks ([`task`]).
+//! - Agents: the [`agent::Agent`] trait, actions ([`action`]), the [`briefing`] before an episode,
+//!   and the [`observation`] during it.
+//! - Random numbers: named streams ([`rng`]).
 //!
-//! **What it is not**: it holds no state of a world, reads no files and makes no pixels.
+//! **What it is not**: it holds no world state, reads no files and renders no images.
 //!
 //! **Invariants**
-//! - Every type here is plain data; nothing in it can reach a world.
-//! - What a helper may not know is a separate type ([`observation::Granted`]) that the runner
-//!   fills on request and writes into the trace. An agent can't obtain it otherwise.
+//! - Every type here is plain data and cannot access a world.
+//! - Hidden information is in a separate type ([`observation::Granted`]). The runner fills it on
+//!   request and writes it into the trace; an agent cannot obtain it otherwise.
 
 pub mod geom;
 pub mod ids;
 
 pub mod capability;
 pub mod catalogue;
-mod impairment;
 pub mod task;
 
 pub mod action;

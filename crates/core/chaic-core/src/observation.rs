@@ -1,4 +1,4 @@
-//! What an agent perceives when it is asked.
+//! Observations of agents.
 
 use std::ops::RangeInclusive;
 
@@ -6,63 +6,75 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::action::{Action, Outcome, ResolvedAction};
-use crate::briefing::Goal;
 use crate::geom::{Camera, Pose};
 use crate::ids::{AgentId, ClassId, EntityId, Frame};
+use crate::task::Goal;
 
-/// Which images an agent wants, and how large.
+/// Requested image channels and sizes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Senses {
-    /// Width and height of its images, pixels; 512 in the benchmark.
+pub struct SensorConfig {
+    /// Width and height of the images, pixels; 512 in the benchmark.
     pub image_size: u32,
-    /// Whether it looks at color.
+    /// True if the agent uses color.
     pub rgb: bool,
-    /// Whether it looks at depth.
+    /// True if the agent uses depth.
     pub depth: bool,
-    /// Whether it looks at instance ids (given only if granted).
+    /// True if the agent uses instance ids (provided only if granted).
     pub ids: bool,
-    /// The film that it wants of what it sees between decisions.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub film: Option<Film>,
+    /// Requested image history between decisions.
+    #[serde(alias = "film", default, skip_serializing_if = "Option::is_none")]
+    pub frame_history: Option<FrameHistorySpec>,
 }
 
-/// Small images of color and depth between decisions, from the same eye.
+/// Small color and depth images between decisions, from the same camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Film {
-    /// Width and height of its images, pixels.
+pub struct FrameHistorySpec {
+    /// Width and height of the images, pixels.
     pub image_size: u32,
-    /// An image is taken whenever the number of the frame is a multiple of this.
+    /// Interval: an image is taken in every frame whose number is a multiple of this.
     pub every_frames: u32,
-    /// No more images than these last ones.
-    pub most: u32,
+    /// Maximum number of images; older ones are dropped.
+    #[serde(alias = "most")]
+    pub max_len: u32,
 }
 
-impl Senses {
-    /// Side of the benchmark's images, pixels (paper section 5).
+impl SensorConfig {
+    /// Side length of the benchmark's images, pixels (paper section 5).
     pub const IMAGE_SIZE: u32 = 512;
-    /// Depth and ids at the benchmark's size: what the rule-based minds look at.
-    pub const DEPTH_AND_IDS: Senses =
-        Senses { image_size: Senses::IMAGE_SIZE, rgb: false, depth: true, ids: true, film: None };
-    /// No image at all.
-    pub const NONE: Senses =
-        Senses { image_size: Senses::IMAGE_SIZE, rgb: false, depth: false, ids: false, film: None };
+    /// Depth and ids at the benchmark's size, for the rule-based agents.
+    pub const DEPTH_AND_IDS: SensorConfig = SensorConfig {
+        image_size: SensorConfig::IMAGE_SIZE,
+        rgb: false,
+        depth: true,
+        ids: true,
+        frame_history: None,
+    };
+    /// No image.
+    pub const NONE: SensorConfig = SensorConfig {
+        image_size: SensorConfig::IMAGE_SIZE,
+        rgb: false,
+        depth: false,
+        ids: false,
+        frame_history: None,
+    };
 
-    /// Sides of images that an agent may ask for, pixels.
+    /// Permitted side lengths of images, pixels.
     pub const IMAGE_SIZES: RangeInclusive<u32> = 16..=2048;
-    /// Most film images that an agent may ask for in one observation.
-    pub const MAX_FILM_FRAMES: u32 = 256;
-    /// Largest pixel data of one observation, bytes (64 MiB): color, depth and ids of 2,048 pixels,
-    /// and a film of 256 images of 128 pixels.
+    /// Maximum number of history images in one observation.
+    pub const MAX_HISTORY_FRAMES: u32 = 256;
+    /// Maximum pixel data of one observation, bytes (64 MiB): color, depth and ids of 2,048 pixels,
+    /// and a history of 256 images of 128 pixels.
     pub const MAX_OBSERVATION_BYTES: u64 = 64 << 20;
 
-    /// Whether any image must be made.
+    /// Returns whether any image channel is requested.
     pub fn wants_image(&self) -> bool {
         self.rgb || self.depth || self.ids
     }
 
-    /// Returns the pixel data of the largest observation, bytes: images, and a full film.
+    /// Returns the size of the largest observation's pixel data, bytes: images and a full history.
     pub fn max_observation_bytes(&self) -> u64 {
-        self.image_bytes().saturating_add(self.film.map_or(0, |film| film.max_bytes()))
+        self.image_bytes()
+            .saturating_add(self.frame_history.map_or(0, |history| history.max_bytes()))
     }
 
     fn image_bytes(&self) -> u64 {
@@ -71,54 +83,58 @@ impl Senses {
         square_bytes(self.image_size, bytes_per_pixel)
     }
 
-    /// Checks sides of images and length of the film.
+    /// Checks image sizes and the length of the history.
     ///
     /// # Errors
-    /// One line with the requested and the allowed numbers, to be read after the agent's name.
+    /// One line with the requested and the permitted values, to follow the agent's name.
     pub fn check_counts(&self) -> Result<(), String> {
-        let sizes = Senses::IMAGE_SIZES;
+        let sizes = SensorConfig::IMAGE_SIZES;
         let (min, max) = (sizes.start(), sizes.end());
-        let sides = [Some(self.image_size), self.film.map(|film| film.image_size)];
+        let sides = [Some(self.image_size), self.frame_history.map(|history| history.image_size)];
         let is_wrong = |side: &u32| !sizes.contains(side);
         if let Some(side) = sides.into_iter().flatten().find(is_wrong) {
             return Err(format!("asks for images of {side} pixels; a side has {min} to {max}"));
         }
-        if let Some(n) = self.film.map(|film| film.most).filter(|n| *n > Senses::MAX_FILM_FRAMES) {
-            let max = Senses::MAX_FILM_FRAMES;
-            return Err(format!("asks for a film of {n} images; a film holds at most {max}"));
+        if let Some(n) = self
+            .frame_history
+            .map(|history| history.max_len)
+            .filter(|n| *n > SensorConfig::MAX_HISTORY_FRAMES)
+        {
+            let max = SensorConfig::MAX_HISTORY_FRAMES;
+            return Err(format!("asks for a frame history of {n} images; it holds at most {max}"));
         }
         Ok(())
     }
 
-    /// Checks sides of images, length of the film and size of the largest observation.
+    /// Checks image sizes, the length of the history and the size of the largest observation.
     ///
     /// # Errors
-    /// One line with the requested and the allowed numbers, to be read after the agent's name.
+    /// One line with the requested and the permitted values, to follow the agent's name.
     pub fn check(&self) -> Result<(), String> {
         self.check_counts()?;
-        let Some(film) = self.film else { return Ok(()) };
-        if self.max_observation_bytes() > Senses::MAX_OBSERVATION_BYTES {
+        let Some(history) = self.frame_history else { return Ok(()) };
+        if self.max_observation_bytes() > SensorConfig::MAX_OBSERVATION_BYTES {
             return Err(format!(
-                "asks for up to {} MiB an observation (images of {} pixels: {} MiB, film of {} images \
-                 of {} pixels: {} MiB); an observation holds at most {} MiB; ask for fewer or smaller \
-                 film images",
+                "asks for up to {} MiB an observation (images of {} pixels: {} MiB, history of {} \
+                 images of {} pixels: {} MiB); an observation holds at most {} MiB; ask for fewer or \
+                 smaller history images",
                 mib(self.max_observation_bytes()),
                 self.image_size,
                 mib(self.image_bytes()),
-                film.most,
-                film.image_size,
-                mib(film.max_bytes()),
-                mib(Senses::MAX_OBSERVATION_BYTES),
+                history.max_len,
+                history.image_size,
+                mib(history.max_bytes()),
+                mib(SensorConfig::MAX_OBSERVATION_BYTES),
             ));
         }
         Ok(())
     }
 }
 
-impl Film {
-    /// Returns the pixel data of a full film in color and depth, bytes.
+impl FrameHistorySpec {
+    /// Returns the size of a full history's color and depth data, bytes.
     pub fn max_bytes(&self) -> u64 {
-        square_bytes(self.image_size, 3 + 4).saturating_mul(u64::from(self.most))
+        square_bytes(self.image_size, 3 + 4).saturating_mul(u64::from(self.max_len))
     }
 }
 
@@ -130,31 +146,32 @@ fn mib(bytes: u64) -> u64 {
     bytes.div_ceil(1 << 20)
 }
 
-/// What an agent is given beyond its own images and state. Written into every trace.
+/// Information that an agent receives in addition to its images and proprioception. Recorded in
+/// every trace.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Grants {
-    /// Instance ids of its own image, with the classes of the ids in that image; which thing each
-    /// hand holds; which things in the image are delivered. Perfect segmentation and association,
-    /// and nothing of what is not in the image.
+    /// Instance ids of the agent's own image with their classes, the identities of held objects,
+    /// and the delivered objects in the image. It is perfect segmentation and association, without
+    /// information about anything outside the image.
     pub ids: bool,
-    /// The class of the goal place. The paper's prompts and the original's planners have it; it is
-    /// no part of the hidden goal.
+    /// Class of the goal place. The paper's prompts and the original's planners have it; it is not
+    /// part of the hidden goal.
     #[serde(default)]
     pub goal_place: bool,
-    /// The partner's goal, and the least height of the goal place's top.
+    /// The partner's goal, and the minimum top height of the goal place.
     pub goal: bool,
-    /// What has been delivered, wherever the agent is.
+    /// All deliveries, independent of the agent's position.
     pub progress: bool,
-    /// The partner's actions and holdings while the partner is in the image.
+    /// The partner's actions and held objects while the partner is in the image.
     pub behavior: bool,
-    /// Where everybody is.
+    /// Positions of all agents.
     pub positions: bool,
-    /// Which task it is and what kind of person the partner is: what the original's prompts tell.
+    /// Task and kind of person of the partner, which the original's prompts contain.
     #[serde(default, skip_serializing_if = "is_false")]
     pub task: bool,
 }
 
-/// Where a grant stands.
+/// Accessor of a grant.
 type GrantField = fn(&mut Grants) -> &mut bool;
 
 // `skip_serializing_if` hands over a reference.
@@ -164,7 +181,7 @@ fn is_false(b: &bool) -> bool {
 }
 
 impl Grants {
-    /// Nothing beyond own images and state.
+    /// No additional information.
     pub const NONE: Grants = Grants {
         ids: false,
         goal_place: false,
@@ -184,15 +201,15 @@ impl Grants {
         positions: true,
         task: true,
     };
-    /// Perfect segmentation of the own image, nothing else.
+    /// Perfect segmentation of the agent's own image only.
     pub const IDS: Grants = Grants { ids: true, ..Grants::NONE };
-    /// What the paper's planners stand on: perfect segmentation and the goal place.
+    /// Grants of the paper's planners: perfect segmentation and the goal place.
     pub const PLANNER: Grants = Grants { goal_place: true, ..Grants::IDS };
-    /// What a partner has: perfect segmentation, the goal place and its own goal.
+    /// Grants of a partner: perfect segmentation, the goal place and its own goal.
     pub const PARTNER: Grants = Grants { goal: true, ..Grants::PLANNER };
-    /// What the paper's oracle has.
+    /// Grants of the paper's oracle.
     pub const ORACLE: Grants = Grants { progress: true, behavior: true, ..Grants::PARTNER };
-    /// Every grant by its name, in the order of docs/grants.md, with where it stands.
+    /// Name and accessor of every grant, in the order of docs/grants.md.
     const FIELDS: [(&'static str, GrantField); 7] = [
         ("ids", |grants| &mut grants.ids),
         ("goal_place", |grants| &mut grants.goal_place),
@@ -203,28 +220,28 @@ impl Grants {
         ("task", |grants| &mut grants.task),
     ];
 
-    /// Every grant by its name, in the order of docs/grants.md, and whether it is given.
+    /// Returns the name of every grant and whether it is set, in the order of docs/grants.md.
     pub fn named(mut self) -> [(&'static str, bool); 7] {
         Grants::FIELDS.map(|(name, field)| (name, *field(&mut self)))
     }
 
-    /// Returns the names of the grants that `allowed` doesn't have.
+    /// Returns the names of the grants that `allowed` does not contain.
     pub fn names_beyond(self, allowed: Grants) -> Vec<&'static str> {
         let pairs = self.named().into_iter().zip(allowed.named());
         pairs.filter(|((_, has), (_, may))| *has && !may).map(|((name, _), _)| name).collect()
     }
 
-    /// The grants of these names.
+    /// Returns the grants with these names.
     ///
     /// # Errors
-    /// The first name that is no grant's.
+    /// The first unknown name.
     ///
     /// ```
     /// use chaic_core::observation::Grants;
-    /// assert_eq!(Grants::of_names(["goal_place", "ids"]), Ok(Grants::PLANNER));
-    /// assert_eq!(Grants::of_names(["gold"]), Err("gold".to_owned()));
+    /// assert_eq!(Grants::from_names(["goal_place", "ids"]), Ok(Grants::PLANNER));
+    /// assert_eq!(Grants::from_names(["gold"]), Err("gold".to_owned()));
     /// ```
-    pub fn of_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Grants, String> {
+    pub fn from_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Grants, String> {
         let mut grants = Grants::NONE;
         for name in names {
             let known = Grants::FIELDS.iter().find(|(known, _)| *known == name);
@@ -234,61 +251,62 @@ impl Grants {
         Ok(grants)
     }
 
-    /// What the child has.
+    /// Grants of the child.
     pub const CHILD: Grants = Grants { positions: true, ..Grants::IDS };
 }
 
-/// Something in a hand, as the hand feels it.
+/// A held object, as the hand senses it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Held {
-    /// How many things are in it; 0 for anything but containers and vehicles.
+    /// Number of contained objects; 0 for all but containers and vehicles.
     pub n_contents: u32,
-    /// Whether both hands hold this one thing: furniture.
+    /// True if both hands hold this object: furniture.
     pub in_both_hands: bool,
-    /// Which thing it is; only where ids are granted. Otherwise an agent knows what it saw itself
-    /// take.
-    pub identity: Option<Identity>,
+    /// Identity of the object, with the grant of ids. Otherwise the agent only knows what it saw
+    /// itself take.
+    pub identity: Option<HeldIdentity>,
 }
 
-/// Which thing something is, with what it contains.
+/// Identity of a held object, with its contents.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Identity {
-    /// The object.
+pub struct HeldIdentity {
+    /// Id of the object.
     pub entity: EntityId,
-    /// Its class.
+    /// Class of the object.
     pub class: ClassId,
-    /// What is in it, in the order it was put in; empty for anything but containers and vehicles.
+    /// Contents in the order of insertion; empty for all but containers and vehicles.
     pub contents: Vec<(EntityId, ClassId)>,
 }
 
-/// Who holds the other end of the furniture that an agent leads with, as its hands tell it.
+/// Second carrier of the furniture that an agent leads with, as its hands sense it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct OtherEnd {
-    /// Who.
+pub struct JointCarrier {
+    /// Id of the second carrier.
     pub agent: AgentId,
-    /// Where, in the own body's frame, metres; it stays so until the furniture is put down.
+    /// Position in the frame of the leader's body, meters; constant until the furniture is put
+    /// down.
     pub position_in_body: Vec3,
 }
 
-/// What an agent knows of itself.
+/// Proprioception of an agent.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SelfState {
-    /// Where it stands and looks.
+pub struct Proprioception {
+    /// Pose of the agent.
     pub pose: Pose,
-    /// What the left and the right hand hold. A rider's left hand holds the bicycle, whose
-    /// contents are the basket's. Furniture is held by both: it appears in both.
+    /// Objects in the left and the right hand. A rider's left hand holds the bicycle, whose
+    /// contents are those of the basket. Furniture appears in both hands.
     pub hands: [Option<Held>; 2],
-    /// The action that has just ended, its object named as the agent named it, with its outcome.
-    /// `None` at the start, and after an action that another one's choice replaced by a joint lift
-    /// (original's rules), unless ids are granted.
+    /// Action that has just ended, in terms of the agent's own object reference, with its outcome.
+    /// `None` at the start. Also `None` after an action that another agent's choice replaced by a
+    /// joint lift (rules of the original), unless ids are granted.
     pub last: Option<(Action, Outcome)>,
-    /// Who carries along, for the one who leads.
+    /// Second carrier, for the leader of a joint carry.
     #[serde(default)]
-    pub other_end: Option<OtherEnd>,
+    pub other_end: Option<JointCarrier>,
 }
 
-impl SelfState {
-    /// The distinct things held.
+impl Proprioception {
+    /// Returns the distinct held objects.
     pub fn held(&self) -> impl Iterator<Item = &Held> {
         let [left, right] = &self.hands;
         let same = left.as_ref().is_some_and(|l| l.in_both_hands);
@@ -296,84 +314,85 @@ impl SelfState {
     }
 }
 
-/// Images from one eye. Buffers are row-major, row 0 at the top; those not asked for or not
-/// granted are absent.
+/// Images from one camera. Buffers are row-major, row 0 at the top. Channels that are not requested
+/// or not granted are absent.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Images {
-    /// RGB, u8, shape [height, width, 3], as screens show it: 255 times the root of linear light.
+    /// RGB, u8, shape [height, width, 3], display-encoded: 255 times the square root of linear
+    /// light.
     pub rgb: Option<Vec<u8>>,
-    /// Depth along the camera's axis, f32 metres, shape [height, width]; [`Camera::FAR_M`] where
-    /// there is nothing, 0 where eyes of low vision make out nothing.
+    /// Depth along the camera's axis, f32 meters, shape [height, width]. [`Camera::FAR_M`] where
+    /// the image shows nothing, and 0 where low vision hides the content.
     pub depth_m: Option<Vec<f32>>,
     /// Instance ids ([`EntityId`]), u16, shape [height, width].
     pub ids: Option<Vec<u16>>,
 }
 
-/// An image of a film.
+/// An image of the history.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FilmFrame {
-    /// When it was taken.
+pub struct HistoryFrame {
+    /// Frame at which it was taken.
     pub frame: Frame,
-    /// The camera that took it.
+    /// Camera that took it.
     pub camera: Camera,
     /// Color and depth.
     pub images: Images,
 }
 
-/// Something an agent did, as an onlooker sees it.
+/// Action of an agent as another agent observes it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SeenAction {
-    /// Who did it.
+pub struct ObservedAction {
+    /// The acting agent.
     pub agent: AgentId,
-    /// When it ended (or began, if under way).
+    /// Frame of its end, or of its start while in progress.
     pub frame: Frame,
-    /// What it was.
+    /// The action.
     pub action: ResolvedAction,
-    /// How it ended; `None` while under way.
+    /// Outcome; `None` while in progress.
     pub outcome: Option<Outcome>,
 }
 
-/// What was granted beyond the own image and state; every field is empty without its grant.
+/// Granted information; every field is empty without its grant.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Granted {
-    /// `ids`: the class of each object and person in the own image, in the order of ids. Structure
-    /// has none.
+    /// `ids`: class of each object and person in the agent's own image, in the order of ids.
+    /// Structure is not listed.
     pub classes: Vec<(EntityId, ClassId)>,
-    /// `ids`: what is delivered among the things in the own image; `progress`: all that is
-    /// delivered, wanted or not, wherever the agent is. In the order of ids.
+    /// `ids`: delivered objects in the agent's own image. `progress`: all delivered objects,
+    /// targets or not, at any place. In the order of ids.
     pub delivered: Vec<(EntityId, ClassId)>,
-    /// `ids`: the obstacles that have been removed, where the rules tell everybody of them (the
-    /// original's do).
+    /// `ids`: removed obstacles, if the rules announce them to all agents, as the original's do.
     pub removed: Vec<EntityId>,
-    /// `goal`: what the partner wants.
+    /// `goal`: goal of the partner.
     pub goal: Option<Goal>,
-    /// `behavior`: what the others did last other than moving about, if they are in the image.
-    pub behavior: Vec<SeenAction>,
-    /// `behavior`: what the partner (for the partner: the helper) holds, if in the image.
-    pub partner_hands: Option<[Option<Identity>; 2]>,
-    /// `positions`: where everybody is, by agent.
+    /// `behavior`: last interaction of each other agent in the image.
+    pub behavior: Vec<ObservedAction>,
+    /// `behavior`: held objects of the partner (for the partner: of the helper), if in the image.
+    pub partner_hands: Option<[Option<HeldIdentity>; 2]>,
+    /// `positions`: pose of each agent.
     pub poses: Vec<(AgentId, Pose)>,
 }
 
-/// What an agent perceives when its action has ended (paper section 3.3, "Observation Space").
+/// Observation of an agent when its action has ended (paper section 3.3, "Observation Space").
 #[derive(Clone, Debug, PartialEq)]
 pub struct Observation {
-    /// Frames since the episode began.
+    /// Number of frames since the start of the episode.
     pub frame: Frame,
-    /// What the agent knows of itself.
-    pub own: SelfState,
-    /// The camera that took the images.
+    /// Proprioception.
+    pub proprioception: Proprioception,
+    /// Camera that took the images.
     pub camera: Camera,
-    /// What the eye sees.
+    /// Images of the camera.
     pub images: Images,
-    /// What it saw since the last decision, oldest first, where that was [asked for](Senses::film).
-    pub film: Vec<FilmFrame>,
-    /// What was granted beyond that.
+    /// Image history since the last decision, oldest first, if
+    /// [requested](SensorConfig::frame_history).
+    pub frame_history: Vec<HistoryFrame>,
+    /// Granted information.
     pub granted: Granted,
 }
 
 impl Granted {
-    /// The class of an id of the own image; needs the grant of ids.
+    /// Returns the class of an id in the agent's own image; requires the grant of ids.
     pub fn class_of(&self, entity: EntityId) -> Option<ClassId> {
         let at = self.classes.binary_search_by_key(&entity, |(e, _)| *e).ok()?;
         Some(self.classes[at].1)
@@ -381,12 +400,12 @@ impl Granted {
 }
 
 impl Observation {
-    /// Position of the eye in the world, metres.
+    /// Returns the position of the camera in the world, meters.
     pub fn eye(&self) -> Vec3 {
         self.camera.eye_in_world
     }
 
-    /// The same for who is granted the rest of these grants, but no ids.
+    /// Returns the observation of an agent with these grants except ids.
     pub fn without_ids(&self, grants: Grants) -> Observation {
         let mut observation = self.clone();
         observation.images.ids = None;
@@ -396,7 +415,7 @@ impl Observation {
         if !grants.progress {
             granted.delivered.clear();
         }
-        observation.own.hands.iter_mut().flatten().for_each(|held| held.identity = None);
+        observation.proprioception.hands.iter_mut().flatten().for_each(|held| held.identity = None);
         observation
     }
 }
@@ -405,29 +424,30 @@ impl Observation {
 mod tests {
     use super::*;
 
-    /// Color, depth and ids, with a film of `most` images.
-    fn senses(image_size: u32, film_size: u32, most: u32) -> Senses {
-        let film = Some(Film { image_size: film_size, every_frames: 3, most });
-        Senses { image_size, rgb: true, depth: true, ids: true, film }
+    /// Color, depth and ids, with a history of `max_len` images.
+    fn sensors(image_size: u32, history_image_size: u32, max_len: u32) -> SensorConfig {
+        let history =
+            Some(FrameHistorySpec { image_size: history_image_size, every_frames: 3, max_len });
+        SensorConfig { image_size, rgb: true, depth: true, ids: true, frame_history: history }
     }
 
     #[test]
     fn the_largest_observation_is_bounded() {
-        let full = senses(2048, 128, 256);
-        assert_eq!(full.max_observation_bytes(), Senses::MAX_OBSERVATION_BYTES);
+        let full = sensors(2048, 128, 256);
+        assert_eq!(full.max_observation_bytes(), SensorConfig::MAX_OBSERVATION_BYTES);
         assert_eq!(full.check(), Ok(()));
-        let problem = senses(2048, 129, 256).check().unwrap_err();
+        let problem = sensors(2048, 129, 256).check().unwrap_err();
         assert!(
             problem.contains("up to 65 MiB") && problem.contains("at most 64 MiB"),
             "{problem}"
         );
-        let problem = senses(512, 2048, 256).check().unwrap_err();
+        let problem = sensors(512, 2048, 256).check().unwrap_err();
         assert!(problem.contains("256 images of 2048 pixels: 7168 MiB"), "{problem}");
-        assert_eq!(senses(16, 2048, 2).check(), Ok(()));
-        for wrong in [senses(15, 16, 1), senses(2049, 16, 1), senses(16, u32::MAX, 1)] {
+        assert_eq!(sensors(16, 2048, 2).check(), Ok(()));
+        for wrong in [sensors(15, 16, 1), sensors(2049, 16, 1), sensors(16, u32::MAX, 1)] {
             assert!(wrong.check().unwrap_err().contains("16 to 2048"), "{wrong:?}");
         }
-        assert!(senses(16, 16, 257).check().unwrap_err().contains("at most 256"));
-        assert_eq!(senses(u32::MAX, u32::MAX, u32::MAX).max_observation_bytes(), u64::MAX);
+        assert!(sensors(16, 16, 257).check().unwrap_err().contains("at most 256"));
+        assert_eq!(sensors(u32::MAX, u32::MAX, u32::MAX).max_observation_bytes(), u64::MAX);
     }
 }

@@ -1,4 +1,5 @@
-//! The eight tasks of the challenge (paper, table 1), further ones, and what is public about each.
+//! Tasks: the eight of the challenge (paper, table 1), additional ones, and their public
+//! properties.
 
 use std::fmt;
 use std::str::FromStr;
@@ -10,7 +11,7 @@ use crate::capability::{Impairment, Impairments, PersonKind, Persona};
 use crate::catalogue::TargetSet;
 use crate::ids::{ClassId, Frame};
 
-/// Names a task, everywhere and in this spelling.
+/// Id of a task; its snake-case name is used in all files and commands.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
 )]
@@ -22,36 +23,36 @@ pub enum TaskId {
     LowTarget,
     /// Obstacles in doorways, partner in a wheelchair.
     Obstacle,
-    /// Targets on cabinets and refrigerators, partner a child.
+    /// Targets on cabinets and refrigerators, child as partner.
     HighTarget,
-    /// The goal place is high, partner a child.
+    /// High goal place, child as partner.
     HighGoal,
-    /// Containers are high, partner a child.
+    /// Containers in high places, child as partner.
     HighContainer,
     /// Shopping in a street with a bicycle and a child.
     Shopping,
-    /// Furniture onto a truck with a frail partner.
+    /// Loading furniture onto a truck with a frail partner.
     MovingHouse,
     /// A partner with one arm in a sling (ours).
     OneHanded,
-    /// A partner who sees two metres far (ours).
+    /// A partner who sees only 2 m far (ours).
     LowVision,
     /// A partner who tires (ours).
     Tires,
-    /// A partner whose hands tremble (ours).
+    /// A partner with trembling hands (ours).
     Tremor,
 }
 
-/// Where a task comes from.
+/// Source of a task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Origin {
-    /// The paper's table 1, under the original's word for it.
+    /// The paper's table 1, with the original's name of the task.
     Paper(&'static str),
-    /// Ours: there are no published results, and neither bundled nor standard episodes.
-    Ours,
+    /// A task of chaic, without published results and without bundled or standard episodes.
+    Chaic,
 }
 
-/// Where a task happens.
+/// Kind of scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SceneKind {
@@ -59,64 +60,84 @@ pub enum SceneKind {
     House,
     /// A street with six shops.
     Street,
-    /// The yard before a house, with a truck.
+    /// The yard in front of a house, with a truck.
     Yard,
 }
 
-/// What an object of the goal counts for.
+/// Value of a delivered target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Worth {
-    /// Each as much as any other.
+pub enum TargetValue {
+    /// 1 for each object.
     Count,
-    /// Its mass in kilograms (facts S5.4).
+    /// Mass in kilograms (facts S5.4).
     Mass,
 }
 
-impl Worth {
-    /// What one object of a class counts for.
-    pub fn of(self, class: ClassId) -> f64 {
+impl TargetValue {
+    /// Returns the value of one object of a class.
+    pub fn value(self, class: ClassId) -> f64 {
         match self {
-            Worth::Count => 1.0,
-            Worth::Mass => f64::from(class.info().mass_kg),
+            TargetValue::Count => 1.0,
+            TargetValue::Mass => f64::from(class.info().mass_kg),
         }
     }
 
-    /// The unit of sums of it; empty for a mere number.
+    /// Returns the unit of the values; empty for counts.
     pub fn unit(self) -> &'static str {
         match self {
-            Worth::Count => "",
-            Worth::Mass => "kg",
+            TargetValue::Count => "",
+            TargetValue::Mass => "kg",
         }
     }
 }
 
-/// How high the top of a goal place must be.
+/// Required number of objects of each class at the goal place.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Goal {
+    /// Classes with their required numbers, each class once, in the order of the catalogue.
+    pub targets: Vec<(ClassId, u32)>,
+}
+
+impl Goal {
+    /// Returns the required number of this class.
+    pub fn count(&self, class: ClassId) -> u32 {
+        self.targets.iter().find(|(c, _)| *c == class).map_or(0, |(_, n)| *n)
+    }
+
+    /// Returns the total number of required objects.
+    pub fn total(&self) -> u32 {
+        self.targets.iter().map(|(_, n)| n).sum()
+    }
+}
+
+/// Minimum height of a goal place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GoalTop {
-    /// As it is.
+    /// No minimum.
     Any,
-    /// As high as the rules' `high_goal_min_top_m` at least.
+    /// At least the rules' `high_goal_min_top_m`.
     High,
 }
 
-/// To which point of a goal place one brings things.
+/// Target point of an approach to the goal place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GoalApproach {
-    /// As to any other thing.
-    Usual,
-    /// The nearest point, by all rules: nobody walks into the middle of a truck (facts S9.4).
+    /// The same as for any other object.
+    Default,
+    /// The nearest point under all rules, because the center of a truck is not accessible (facts
+    /// S9.4).
     NearestPoint,
 }
 
-/// How the things of a house lie, so that the partner's constraint matters: what its generator and
-/// the validator go by. Streets and yards have one arrangement only.
+/// Arrangement of objects in a house that makes the partner's constraint relevant. The generator
+/// and the validator use it. Streets and yards have one arrangement only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arrangement {
-    /// Wherever there is room.
-    Usual,
-    /// Some targets on high tops, among them fragile ones (paper, appendix on task generation).
+    /// Objects anywhere with enough space.
+    Default,
+    /// Some targets on high tops, including fragile ones (paper, appendix on task generation).
     HighTargets,
-    /// The containers on high tops.
+    /// Containers on high tops.
     HighContainers,
     /// Half of the targets on the floor.
     LowTargets,
@@ -124,39 +145,38 @@ pub enum Arrangement {
     Obstacles,
 }
 
-/// What is fixed for a task: all that tells it from the others. Nothing but this table knows tasks by
-/// their names.
+/// Properties of a task. Only this table depends on the identity of tasks.
 #[derive(Clone, Copy, Debug)]
 pub struct TaskInfo {
-    /// The task.
+    /// Id of the task.
     pub id: TaskId,
     /// Name in commands, files and tables.
     pub name: &'static str,
     /// Column title in tables.
     pub title: &'static str,
-    /// Where it comes from.
+    /// Source of the task.
     pub origin: Origin,
-    /// Where it happens.
+    /// Kind of scene.
     pub scene: SceneKind,
-    /// Who the partner is.
+    /// Kind of person of the partner.
     pub partner: PersonKind,
-    /// Whether a child comes along.
+    /// True if a child takes part.
     pub has_child: bool,
-    /// Frames until the episode ends (paper section 3.3.2).
+    /// Number of frames until the episode ends (paper section 3.3.2).
     pub horizon: Frame,
-    /// The target sets that the goal is drawn from.
+    /// Target sets from which the goal is drawn.
     pub sets: &'static [TargetSet],
-    /// Names of the classes that the goal place has in episodes of the paper's shape (paper, appendix on
-    /// task generation; the high goal places are those of the original's episodes). With decoys, all
-    /// indoor tasks have one of the house's.
+    /// Class names of the goal place in episodes of the paper's shape (paper, appendix on task
+    /// generation). The high goal places are those of the original's episodes. With decoys, all
+    /// indoor tasks use one of the house's goal places.
     pub goal_places: &'static [&'static str],
-    /// What an object of the goal counts for.
-    pub worth: Worth,
-    /// How high the goal place must be.
+    /// Value of a delivered target.
+    pub target_value: TargetValue,
+    /// Minimum height of the goal place.
     pub goal_top: GoalTop,
-    /// To which point of the goal place one brings things.
+    /// Target point of an approach to the goal place.
     pub goal_approach: GoalApproach,
-    /// How things lie.
+    /// Arrangement of objects.
     pub arrangement: Arrangement,
 }
 
@@ -183,47 +203,47 @@ const fn indoor(
         horizon: 3000,
         sets: INDOOR,
         goal_places,
-        worth: Worth::Count,
+        target_value: TargetValue::Count,
         goal_top: GoalTop::Any,
-        goal_approach: GoalApproach::Usual,
+        goal_approach: GoalApproach::Default,
         arrangement,
     }
 }
 
-const fn only(persona: Persona) -> PersonKind {
+const fn unimpaired(persona: Persona) -> PersonKind {
     PersonKind { persona, impairments: Impairments::NONE }
 }
 
-/// A task like the paper's without constraint, but for what impairs the partner.
+/// Returns a task like the paper's task without constraint, but with an impaired partner.
 const fn impaired(
     id: TaskId,
     name: &'static str,
     title: &'static str,
     impairment: Impairment,
 ) -> TaskInfo {
-    let impairments = Impairments::of(impairment);
+    let impairments = Impairments::new(impairment);
     let partner = PersonKind { persona: Persona::Adult, impairments };
-    indoor(id, name, title, Origin::Ours, partner, Arrangement::Usual)
+    indoor(id, name, title, Origin::Chaic, partner, Arrangement::Default)
 }
 
 const BED: &[&str] = &["bed"];
 
-/// All tasks: the paper's in the order of its result table, then ours.
+/// Table of all tasks: the paper's in the order of its result table, then ours.
 pub static TASKS: [TaskInfo; 12] = [
     indoor(
         TaskId::NoConstraint,
         "no_constraint",
         "No constraint",
         Origin::Paper("normal"),
-        only(Persona::Adult),
-        Arrangement::Usual,
+        unimpaired(Persona::Adult),
+        Arrangement::Default,
     ),
     indoor(
         TaskId::HighTarget,
         "high_target",
         "High target",
         Origin::Paper("highthing"),
-        only(Persona::Child),
+        unimpaired(Persona::Child),
         Arrangement::HighTargets,
     ),
     indoor(
@@ -231,7 +251,7 @@ pub static TASKS: [TaskInfo; 12] = [
         "high_container",
         "High container",
         Origin::Paper("highcontainer"),
-        only(Persona::Child),
+        unimpaired(Persona::Child),
         Arrangement::HighContainers,
     ),
     TaskInfo {
@@ -242,8 +262,8 @@ pub static TASKS: [TaskInfo; 12] = [
             "high_goal",
             "High goal",
             Origin::Paper("highgoalplace"),
-            only(Persona::Child),
-            Arrangement::Usual,
+            unimpaired(Persona::Child),
+            Arrangement::Default,
         )
     },
     indoor(
@@ -251,7 +271,7 @@ pub static TASKS: [TaskInfo; 12] = [
         "low_target",
         "Low target",
         Origin::Paper("lowthing"),
-        only(Persona::Wheelchair),
+        unimpaired(Persona::Wheelchair),
         Arrangement::LowTargets,
     ),
     indoor(
@@ -259,7 +279,7 @@ pub static TASKS: [TaskInfo; 12] = [
         "obstacle",
         "Obstacle",
         Origin::Paper("wheelchair"),
-        only(Persona::Wheelchair),
+        unimpaired(Persona::Wheelchair),
         Arrangement::Obstacles,
     ),
     TaskInfo {
@@ -268,15 +288,15 @@ pub static TASKS: [TaskInfo; 12] = [
         title: "Shopping",
         origin: Origin::Paper("outdoor_shopping"),
         scene: SceneKind::Street,
-        partner: only(Persona::Rider),
+        partner: unimpaired(Persona::Rider),
         has_child: true,
         horizon: 3000,
         sets: &[TargetSet::ShopFruit, TargetSet::ShopBakery, TargetSet::ShopDrinks],
         goal_places: &["fire_hydrant"],
-        worth: Worth::Count,
+        target_value: TargetValue::Count,
         goal_top: GoalTop::Any,
-        goal_approach: GoalApproach::Usual,
-        arrangement: Arrangement::Usual,
+        goal_approach: GoalApproach::Default,
+        arrangement: Arrangement::Default,
     },
     TaskInfo {
         id: TaskId::MovingHouse,
@@ -284,15 +304,15 @@ pub static TASKS: [TaskInfo; 12] = [
         title: "Moving house",
         origin: Origin::Paper("outdoor_furniture"),
         scene: SceneKind::Yard,
-        partner: only(Persona::Frail),
+        partner: unimpaired(Persona::Frail),
         has_child: false,
         horizon: 1500,
         sets: &[TargetSet::Furniture],
         goal_places: &["truck"],
-        worth: Worth::Mass,
+        target_value: TargetValue::Mass,
         goal_top: GoalTop::Any,
         goal_approach: GoalApproach::NearestPoint,
-        arrangement: Arrangement::Usual,
+        arrangement: Arrangement::Default,
     },
     impaired(TaskId::OneHanded, "one_handed", "One-handed", Impairment::OneHanded),
     impaired(TaskId::LowVision, "low_vision", "Low vision", Impairment::LowVision),
@@ -301,36 +321,36 @@ pub static TASKS: [TaskInfo; 12] = [
 ];
 
 impl TaskId {
-    /// All tasks: the paper's, then ours.
+    /// Returns all tasks: the paper's, then ours.
     pub fn all() -> impl Iterator<Item = TaskId> {
         TASKS.iter().map(|t| t.id)
     }
 
-    /// The benchmark's eight tasks, in the order of the paper's result table.
+    /// Returns the eight tasks of the benchmark, in the order of the paper's result table.
     pub fn paper() -> impl Iterator<Item = TaskId> {
-        TASKS.iter().filter(|t| t.origin != Origin::Ours).map(|t| t.id)
+        TASKS.iter().filter(|t| t.origin != Origin::Chaic).map(|t| t.id)
     }
 
-    /// The tasks beyond the paper's.
-    pub fn ours() -> impl Iterator<Item = TaskId> {
-        TASKS.iter().filter(|t| t.origin == Origin::Ours).map(|t| t.id)
+    /// Returns the tasks that are not in the paper.
+    pub fn chaic() -> impl Iterator<Item = TaskId> {
+        TASKS.iter().filter(|t| t.origin == Origin::Chaic).map(|t| t.id)
     }
 
-    /// What is fixed for this task.
+    /// Returns the properties of the task.
     pub fn info(self) -> &'static TaskInfo {
         TASKS.iter().find(|t| t.id == self).expect("the table lists every task")
     }
 
-    /// Its name.
+    /// Returns the name.
     pub fn name(self) -> &'static str {
         self.info().name
     }
 
-    /// The original's word for it, if it is the paper's.
+    /// Returns the original's name of the task, if it is in the paper.
     pub fn original_name(self) -> Option<&'static str> {
         match self.info().origin {
             Origin::Paper(name) => Some(name),
-            Origin::Ours => None,
+            Origin::Chaic => None,
         }
     }
 }
@@ -342,15 +362,15 @@ impl fmt::Display for TaskId {
 }
 
 impl SceneKind {
-    /// Classes that the goal place may have in some task of this kind of scene, in the catalogue's
-    /// order.
+    /// Returns the classes of goal places in the tasks of this kind of scene, in the order of the
+    /// catalogue.
     pub fn goal_places(self) -> Vec<ClassId> {
         let tasks = || TASKS.iter().filter(|t| t.scene == self);
         ClassId::all().filter(|c| tasks().any(|t| t.goal_places.contains(&c.name()))).collect()
     }
 }
 
-/// No task has this name.
+/// A name that is not a task.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownTask(pub String);
 
@@ -380,14 +400,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_papers_tasks_come_first() {
-        let ids: Vec<TaskId> = TaskId::paper().chain(TaskId::ours()).collect();
+    fn the_tasks_of_the_paper_come_first() {
+        let ids: Vec<TaskId> = TaskId::paper().chain(TaskId::chaic()).collect();
         assert_eq!(ids, TaskId::all().collect::<Vec<_>>());
         assert_eq!(TaskId::paper().count(), 8);
     }
 
     #[test]
-    fn names_in_files_and_in_the_table_agree() {
+    fn serialized_names_match_the_table() {
         for task in TaskId::all() {
             assert_eq!(serde_json::to_string(&task).unwrap(), format!("\"{}\"", task.name()));
             assert_eq!(task.name().parse(), Ok(task));

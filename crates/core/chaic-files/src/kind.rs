@@ -1,4 +1,4 @@
-//! Kinds of directory entries, told apart without following links.
+//! Kinds of directory entries, determined without following links.
 
 use std::fmt;
 use std::fs::{self, FileType};
@@ -7,7 +7,7 @@ use std::path::{Component, Path, PathBuf};
 
 use crate::{FileError, Result};
 
-/// Kind of a directory entry. A link is a kind of its own, whatever it leads to.
+/// Kind of a directory entry. A link is a separate kind, independent of its target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum EntryKind {
     /// There is no entry of this name.
@@ -23,7 +23,7 @@ pub enum EntryKind {
 }
 
 impl EntryKind {
-    pub(crate) fn of(file_type: FileType) -> EntryKind {
+    pub(crate) fn from_file_type(file_type: FileType) -> EntryKind {
         match file_type {
             t if t.is_symlink() => EntryKind::Link,
             t if t.is_file() => EntryKind::File,
@@ -45,25 +45,25 @@ impl fmt::Display for EntryKind {
     }
 }
 
-/// Returns the kind of an entry. Links in the folders that lead to it are followed.
+/// Returns the kind of an entry. Links in its parent folders are followed.
 ///
 /// # Errors
-/// If the file system refuses for another reason than that there is no such entry.
+/// If the file system refuses for another reason than a missing entry.
 pub fn kind(path: &Path) -> Result<EntryKind> {
     match fs::symlink_metadata(path) {
-        Ok(metadata) => Ok(EntryKind::of(metadata.file_type())),
+        Ok(metadata) => Ok(EntryKind::from_file_type(metadata.file_type())),
         Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
             Ok(EntryKind::Missing)
         }
-        Err(e) => Err(FileError::of("open", path)(e)),
+        Err(e) => Err(FileError::context("open", path)(e)),
     }
 }
 
-/// Returns the kind of an entry below `root`: [`EntryKind::Link`] if it is a link or a folder between
-/// `root` and the entry is one. `root` itself may be a link.
+/// Returns the kind of an entry below `root`. It is [`EntryKind::Link`] if the entry, or a folder
+/// between `root` and the entry, is a link. `root` itself may be a link.
 ///
 /// # Errors
-/// If `path` does not begin with `root` or goes up, or the file system refuses.
+/// If `path` does not begin with `root` or contains `..`, or the file system refuses.
 pub fn kind_below(root: &Path, path: &Path) -> Result<EntryKind> {
     let mut at = root.to_owned();
     let mut found = EntryKind::Folder;
@@ -79,17 +79,17 @@ pub fn kind_below(root: &Path, path: &Path) -> Result<EntryKind> {
     Ok(found)
 }
 
-/// Returns whether `path` is a regular file below `root` that is reached without a link. Returns false on
-/// errors.
+/// Returns whether `path` is a regular file below `root` without a link in between. Returns false
+/// on errors.
 pub fn is_file_below(root: &Path, path: &Path) -> bool {
     kind_below(root, path).is_ok_and(|kind| kind == EntryKind::File)
 }
 
-/// Returns the names that lead from `root` to `path`.
+/// Returns the path components from `root` to `path`.
 pub(crate) fn names_below<'p>(root: &Path, path: &'p Path) -> Result<Vec<&'p std::ffi::OsStr>> {
     let outside = || {
         let problem = format!("it does not lie below {}", root.display());
-        FileError::of("open", path)(io::Error::new(ErrorKind::InvalidInput, problem))
+        FileError::context("open", path)(io::Error::new(ErrorKind::InvalidInput, problem))
     };
     let below = path.strip_prefix(root).map_err(|_| outside())?;
     let name = |component| match component {
@@ -99,19 +99,20 @@ pub(crate) fn names_below<'p>(root: &Path, path: &'p Path) -> Result<Vec<&'p std
     below.components().map(name).collect()
 }
 
-/// Directory entry that [`walk`] found.
+/// Directory entry found by [`walk`].
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Entry {
-    /// Its path, which begins with the folder that was searched.
+    /// Path, which begins with the searched folder.
     pub path: PathBuf,
-    /// Its kind.
+    /// Kind of the entry.
     pub kind: EntryKind,
 }
 
-/// Lists the entries below a folder, sorted by path. Enters folders down to `depth` levels below `folder`, and
-/// lists only the deeper ones. Links are listed and not followed.
+/// Lists the entries below a folder, sorted by path. Enters folders down to `depth` levels below
+/// `folder`, and lists deeper ones without entering them. Links are listed and not followed.
 ///
-/// The list is empty if `folder` is missing. If `folder` is not a folder, the list holds only itself.
+/// The list is empty if `folder` is missing. If `folder` is not a folder, the list contains only
+/// `folder`.
 ///
 /// # Errors
 /// If the file system refuses.
@@ -130,10 +131,10 @@ fn enter(path: &Path, kind: EntryKind, depth: u32, found: &mut Vec<Entry>) -> Re
         found.push(Entry { path: path.to_owned(), kind });
         return Ok(());
     }
-    let refused = || FileError::of("list", path);
-    for entry in fs::read_dir(path).map_err(refused())? {
-        let entry = entry.map_err(refused())?;
-        let kind = EntryKind::of(entry.file_type().map_err(refused())?);
+    let error = || FileError::context("list", path);
+    for entry in fs::read_dir(path).map_err(error())? {
+        let entry = entry.map_err(error())?;
+        let kind = EntryKind::from_file_type(entry.file_type().map_err(error())?);
         enter(&entry.path(), kind, depth - 1, found)?;
     }
     Ok(())
@@ -151,23 +152,23 @@ mod tests {
         for file in ["x", "a/x", "a/b/x", "a/b/c/x"] {
             fs::write(at.join(file), "").unwrap();
         }
-        let listed = |depth| {
+        let list = |depth| {
             let found = walk(at, depth).unwrap().into_iter();
             let name =
                 |e: Entry| (e.path.strip_prefix(at).unwrap().to_str().unwrap().to_owned(), e.kind);
             found.map(name).collect::<Vec<_>>()
         };
         let file = |name: &str| (name.to_owned(), EntryKind::File);
-        assert_eq!(listed(0), [("a".to_owned(), EntryKind::Folder), file("x")]);
+        assert_eq!(list(0), [("a".to_owned(), EntryKind::Folder), file("x")]);
         let all = ["a/b/c/x", "a/b/x", "a/x", "x"].map(file);
-        assert_eq!(listed(3), all);
+        assert_eq!(list(3), all);
         assert_eq!(walk(&at.join("nowhere"), 3).unwrap(), []);
         assert_eq!(walk(&at.join("x"), 3).unwrap().len(), 1);
     }
 
     #[cfg(unix)]
     #[test]
-    fn links_are_seen_on_the_way_and_at_the_end() {
+    fn links_are_found_in_parent_folders_and_at_the_end() {
         use std::os::unix::fs::symlink;
         let dir = tempfile::tempdir().unwrap();
         let root = dir.path().join("root");
@@ -183,7 +184,7 @@ mod tests {
         assert_eq!(below("a/b/x/z"), EntryKind::Missing);
         assert_eq!(below("a/y"), EntryKind::Link);
         assert_eq!(below("linked/b/x"), EntryKind::Link);
-        // The folder that a user names may be a link.
+        // The root folder itself may be a link.
         let named = dir.path().join("whole");
         assert!(is_file_below(&named, &named.join("a/b/x")));
         assert!(kind_below(&root, &root.join("../root/a")).is_err());

@@ -1,17 +1,17 @@
-//! Files that are whole or absent, reads that never wait for a writer, and locks on folders.
+//! Atomic file writes, reads that never block on a writer, and locks on folders.
 //!
-//! **What it is not**: it knows nothing of what is in the files.
+//! **What it is not**: it knows no file formats.
 //!
-//! **Invariant**: only regular files are read, and each read has a limit. Links are followed only in paths
-//! that a user named, never inside a folder of chaic, for reading as for writing.
+//! **Invariant**: only regular files are read, and each read has a limit. Links are followed only
+//! in paths from a user, never inside a folder of chaic, for reads and writes alike.
 
 mod kind;
 mod open;
 
 pub use kind::{Entry, EntryKind, is_file_below, kind, kind_below, walk};
 pub use open::{
-    create_fresh, make_folders_below, open_file, open_or_create, open_to_append, read_below,
-    read_bounded, read_user_file,
+    create_folders_below, create_or_replace, open_file, open_for_append, open_or_create,
+    read_below, read_bounded, read_user_file,
 };
 
 mod lock;
@@ -23,64 +23,67 @@ use std::path::{Path, PathBuf};
 
 pub use lock::{FolderLock, LOCK, LockError};
 
-/// The operating system refused something.
+/// A file operation that the operating system refused.
 #[derive(Debug, thiserror::Error)]
-#[error("can't {what} {path}: {refusal}", path = path.display())]
+#[error("can't {operation} {path}: {error}", path = path.display())]
 pub struct FileError {
-    /// What was tried, for example `write`.
-    pub what: &'static str,
-    /// With which file or folder.
+    /// The operation, for example `write`.
+    pub operation: &'static str,
+    /// The file or folder.
     pub path: PathBuf,
-    /// The refusal.
-    pub refusal: io::Error,
+    /// Error of the operating system.
+    pub error: io::Error,
 }
 
 impl FileError {
-    /// For `map_err` on what the operating system may refuse.
-    pub fn of(what: &'static str, path: &Path) -> impl FnOnce(io::Error) -> FileError + use<> {
+    /// Returns a function for `map_err` that adds the operation and the path to an error.
+    pub fn context(
+        operation: &'static str,
+        path: &Path,
+    ) -> impl FnOnce(io::Error) -> FileError + use<> {
         let path = path.to_owned();
-        move |refusal| FileError { what, path, refusal }
+        move |error| FileError { operation, path, error }
     }
 }
 
-/// The result of anything in this crate.
+/// Result of the functions of this crate.
 pub type Result<T> = std::result::Result<T, FileError>;
 
-/// What [`write_whole`] appends to the name of a file that is not whole yet.
-pub const UNFINISHED: &str = ".tmp";
+/// Suffix of the temporary file of [`write_atomically`].
+pub const TEMPORARY_SUFFIX: &str = ".tmp";
 
-/// Writes a file as a whole or not at all: to a name beside it, which then becomes its own. A link of either
-/// name is replaced, not followed.
+/// Writes a file atomically: to a temporary file in the same folder, which is then renamed. A link
+/// with either name is replaced, not followed.
 ///
 /// # Errors
-/// If the file system refuses; nothing new is left then, as far as it can be removed.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
-    let beside = with_suffix(path, UNFINISHED);
+/// If the file system refuses. The temporary file is then removed if possible.
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+    let temporary = with_suffix(path, TEMPORARY_SUFFIX);
     let write = || -> io::Result<()> {
-        let mut file = create_fresh(&beside)?;
+        let mut file = create_or_replace(&temporary)?;
         file.write_all(bytes)?;
         file.sync_all()?;
-        fs::rename(&beside, path)
+        fs::rename(&temporary, path)
     };
-    write().map_err(|refusal| {
-        // Its name says what it is where it cannot be removed.
-        let _ = fs::remove_file(&beside);
-        FileError::of("write", path)(refusal)
+    write().map_err(|error| {
+        // If the removal fails too, the suffix marks the file as temporary.
+        let _ = fs::remove_file(&temporary);
+        FileError::context("write", path)(error)
     })
 }
 
-/// What lies in a folder, in the order of names.
+/// Returns the entries of a folder, sorted by name.
 ///
 /// # Errors
 /// If the file system refuses.
 pub fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     let list = fs::read_dir(folder).and_then(|d| d.map(|e| e.map(|e| e.path())).collect());
-    let mut entries: Vec<PathBuf> = list.map_err(FileError::of("list", folder))?;
+    let mut entries: Vec<PathBuf> = list.map_err(FileError::context("list", folder))?;
     entries.sort();
     Ok(entries)
 }
 
-/// The path with its file name made longer.
+/// Returns the path with a suffix added to its file name.
 pub fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     let mut name: OsString = path.file_name().unwrap_or_default().to_owned();
     name.push(suffix);
@@ -92,17 +95,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_is_replaced_as_a_whole_or_stays() {
+    fn a_file_is_replaced_atomically_or_unchanged() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.txt");
-        write_whole(&path, b"first").unwrap();
-        write_whole(&path, b"second").unwrap();
+        write_atomically(&path, b"first").unwrap();
+        write_atomically(&path, b"second").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"second");
-        // A folder in its place refuses the last step.
-        let taken = dir.path().join("taken");
-        fs::create_dir_all(taken.join("inside")).unwrap();
-        let error = write_whole(&taken, b"third").unwrap_err().to_string();
-        assert!(error.contains("can't write") && error.contains("taken"), "{error}");
-        assert_eq!(entries(dir.path()).unwrap(), [path, taken]);
+        // A folder in its place makes the rename fail.
+        let folder = dir.path().join("folder");
+        fs::create_dir_all(folder.join("inside")).unwrap();
+        let error = write_atomically(&folder, b"third").unwrap_err().to_string();
+        assert!(error.contains("can't write") && error.contains("folder"), "{error}");
+        assert_eq!(entries(dir.path()).unwrap(), [path, folder]);
     }
 }

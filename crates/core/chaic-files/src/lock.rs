@@ -8,38 +8,39 @@ use crate::{FileError, open_or_create};
 /// Name of the lock file in a locked folder.
 pub const LOCK: &str = ".lock";
 
-/// An exclusive lock on a folder, held until it is dropped or the process ends.
+/// Exclusive lock on a folder, held until it is dropped or the process ends.
 ///
-/// The lock is the operating system's, on the file [`LOCK`], so a killed process leaves none behind.
+/// The operating system holds the lock on the file [`LOCK`], so a killed process leaves no lock
+/// behind.
 #[derive(Debug)]
 pub struct FolderLock {
     _file: File,
 }
 
-/// Reason why a folder cannot be locked.
+/// A folder that cannot be locked.
 #[derive(Debug, thiserror::Error)]
 pub enum LockError {
-    /// Another process, or another part of this one, holds the lock.
+    /// Another process, or another part of this process, holds the lock.
     #[error("{path} is in use by another process; wait until it ends, or choose another folder", path = .0.display())]
     Held(PathBuf),
-    /// The operating system refused.
+    /// The operating system refused the access.
     #[error(transparent)]
     File(#[from] FileError),
 }
 
 impl FolderLock {
-    /// Locks an existing folder; creates its lock file if there is none.
+    /// Locks an existing folder; creates its lock file if it is missing.
     ///
     /// # Errors
-    /// [`LockError::Held`] if the lock is taken; [`LockError::File`] if the lock file cannot be opened or is
-    /// no regular file.
-    pub fn take(folder: &Path) -> Result<FolderLock, LockError> {
+    /// [`LockError::Held`] if the lock is taken; [`LockError::File`] if the lock file cannot be
+    /// opened or is no regular file.
+    pub fn acquire(folder: &Path) -> Result<FolderLock, LockError> {
         let path = folder.join(LOCK);
         let file = open_or_create(&path)?;
         match file.try_lock() {
             Ok(()) => Ok(FolderLock { _file: file }),
             Err(TryLockError::WouldBlock) => Err(LockError::Held(folder.to_owned())),
-            Err(TryLockError::Error(refusal)) => Err(FileError::of("lock", &path)(refusal).into()),
+            Err(TryLockError::Error(error)) => Err(FileError::context("lock", &path)(error).into()),
         }
     }
 }
@@ -53,25 +54,25 @@ mod tests {
     #[test]
     fn a_folder_is_locked_once_until_the_lock_is_dropped() {
         let dir = tempfile::tempdir().unwrap();
-        let lock = FolderLock::take(dir.path()).unwrap();
-        let error = FolderLock::take(dir.path()).unwrap_err();
+        let lock = FolderLock::acquire(dir.path()).unwrap();
+        let error = FolderLock::acquire(dir.path()).unwrap_err();
         assert!(matches!(error, LockError::Held(_)) && error.to_string().contains("in use"));
         drop(lock);
-        FolderLock::take(dir.path()).unwrap();
+        FolderLock::acquire(dir.path()).unwrap();
     }
 
     #[test]
     fn a_lock_file_that_is_a_link_or_a_folder_is_refused() {
         let dir = tempfile::tempdir().unwrap();
         fs::create_dir(dir.path().join(LOCK)).unwrap();
-        assert!(matches!(FolderLock::take(dir.path()), Err(LockError::File(_))));
+        assert!(matches!(FolderLock::acquire(dir.path()), Err(LockError::File(_))));
         fs::remove_dir(dir.path().join(LOCK)).unwrap();
         #[cfg(unix)]
         {
             let target = dir.path().join("target");
             fs::write(&target, "kept").unwrap();
             std::os::unix::fs::symlink(&target, dir.path().join(LOCK)).unwrap();
-            assert!(matches!(FolderLock::take(dir.path()), Err(LockError::File(_))));
+            assert!(matches!(FolderLock::acquire(dir.path()), Err(LockError::File(_))));
             assert_eq!(fs::read(&target).unwrap(), b"kept");
         }
     }

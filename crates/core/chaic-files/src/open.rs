@@ -1,7 +1,7 @@
-//! Opening files without following links and without waiting.
+//! Opens files without following links and without blocking.
 //!
-//! Files inside the folders of runs and trainings are opened without following links. A file that a user
-//! names on the command line may be a link to a regular file.
+//! Files inside run and training folders are opened without following links. A file from the
+//! command line may be a link to a regular file.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Read as _};
@@ -18,28 +18,28 @@ pub fn read_bounded(path: &Path, limit: u64) -> Result<Vec<u8>> {
     read(open_file(path)?, path, limit)
 }
 
-/// Reads at most the first `limit` bytes of a file that a user named: a regular file, or a link to one.
+/// Reads at most the first `limit` bytes of a file from the user: a regular file, or a link to one.
 ///
 /// # Errors
 /// If it is no regular file, or the file system refuses.
 pub fn read_user_file(path: &Path, limit: u64) -> Result<Vec<u8>> {
-    let metadata = fs::metadata(path).map_err(FileError::of("open", path))?;
-    check_regular(path, EntryKind::of(metadata.file_type()))?;
+    let metadata = fs::metadata(path).map_err(FileError::context("open", path))?;
+    check_regular(path, EntryKind::from_file_type(metadata.file_type()))?;
     let mut options = File::options();
-    let file = without_waiting(&mut options, false).read(true).open(path);
-    let file = check_opened(file.map_err(FileError::of("open", path))?, path)?;
+    let file = without_blocking(&mut options, false).read(true).open(path);
+    let file = check_opened(file.map_err(FileError::context("open", path))?, path)?;
     read(file, path, limit)
 }
 
-/// Reads at most the first `limit` bytes of a regular file below `root`, reached without a link.
+/// Reads at most the first `limit` bytes of a regular file below `root` without a link in between.
 ///
 /// # Errors
-/// If it or a folder between `root` and it is a link, if it is no regular file, or the file system
-/// refuses.
+/// If it, or a folder between `root` and it, is a link; if it is not a regular file; or the file
+/// system refuses.
 pub fn read_below(root: &Path, path: &Path, limit: u64) -> Result<Vec<u8>> {
     let names = names_below(root, path)?;
     check_regular(path, kind_below(root, path)?)?;
-    let file = open_names(root, &names).map_err(FileError::of("open", path))?;
+    let file = open_names(root, &names).map_err(FileError::context("open", path))?;
     read(check_opened(file, path)?, path, limit)
 }
 
@@ -50,15 +50,15 @@ pub fn read_below(root: &Path, path: &Path, limit: u64) -> Result<Vec<u8>> {
 pub fn open_file(path: &Path) -> Result<File> {
     check_regular(path, kind(path)?)?;
     let mut options = File::options();
-    let file = without_waiting(&mut options, true).read(true).open(path);
-    check_opened(file.map_err(FileError::of("open", path))?, path)
+    let file = without_blocking(&mut options, true).read(true).open(path);
+    check_opened(file.map_err(FileError::context("open", path))?, path)
 }
 
 /// Opens a file for appending; creates it if there is none.
 ///
 /// # Errors
 /// If it is a link or no regular file, or the file system refuses.
-pub fn open_to_append(path: &Path) -> Result<File> {
+pub fn open_for_append(path: &Path) -> Result<File> {
     open_to_write(path, File::options().append(true))
 }
 
@@ -75,35 +75,35 @@ fn open_to_write(path: &Path, options: &mut OpenOptions) -> Result<File> {
     if found != EntryKind::Missing {
         check_regular(path, found)?;
     }
-    let file = without_waiting(options, true).create(true).open(path);
-    check_opened(file.map_err(FileError::of("open", path))?, path)
+    let file = without_blocking(options, true).create(true).open(path);
+    check_opened(file.map_err(FileError::context("open", path))?, path)
 }
 
-/// Creates an empty file, in place of an older file or link of this name. Links are not followed.
+/// Creates an empty file and replaces an existing file or link of this name. Links are not
+/// followed.
 ///
 /// # Errors
-/// If a folder has its name, or the file system refuses.
-pub fn create_fresh(path: &Path) -> io::Result<File> {
+/// If a folder has this name, or the file system refuses.
+pub fn create_or_replace(path: &Path) -> io::Result<File> {
     match fs::remove_file(path) {
         Err(e) if e.kind() != ErrorKind::NotFound => return Err(e),
         _ => {}
     }
-    // `create_new` is O_EXCL, which refuses a link that was planted since.
+    // `create_new` is O_EXCL, which refuses a link that was created in the meantime.
     File::options().write(true).create_new(true).open(path)
 }
 
-/// Makes the folders from `root` down to `folder` that are missing. `root` must be there, and may be a
-/// link.
+/// Creates the missing folders from `root` down to `folder`. `root` must exist, and may be a link.
 ///
 /// # Errors
-/// If one of them is a link or no folder, or the file system refuses.
-pub fn make_folders_below(root: &Path, folder: &Path) -> Result<()> {
+/// If one of them is a link or not a folder, or the file system refuses.
+pub fn create_folders_below(root: &Path, folder: &Path) -> Result<()> {
     let mut at = root.to_owned();
     for name in names_below(root, folder)? {
         at.push(name);
         match fs::create_dir(&at) {
             Err(e) if e.kind() != ErrorKind::AlreadyExists => {
-                return Err(FileError::of("make the folder", &at)(e));
+                return Err(FileError::context("create the folder", &at)(e));
             }
             _ => {}
         }
@@ -112,14 +112,15 @@ pub fn make_folders_below(root: &Path, folder: &Path) -> Result<()> {
             EntryKind::Link => "it is a link; put the folder itself there",
             _ => "it is no folder",
         };
-        return Err(FileError::of("write into", &at)(io::Error::other(problem)));
+        return Err(FileError::context("write into", &at)(io::Error::other(problem)));
     }
     Ok(())
 }
 
-/// Adds the flags for opening without waiting and, if `refuses_links`, without following a final link.
+/// Adds the flags for opening without blocking and, if `refuses_links`, without following a final
+/// link.
 #[cfg(unix)]
-fn without_waiting(options: &mut OpenOptions, refuses_links: bool) -> &mut OpenOptions {
+fn without_blocking(options: &mut OpenOptions, refuses_links: bool) -> &mut OpenOptions {
     use rustix::fs::OFlags;
     use std::os::unix::fs::OpenOptionsExt as _;
     let no_link = if refuses_links { OFlags::NOFOLLOW } else { OFlags::empty() };
@@ -127,14 +128,14 @@ fn without_waiting(options: &mut OpenOptions, refuses_links: bool) -> &mut OpenO
     options.custom_flags(flags.bits().cast_signed())
 }
 
-/// Other systems have no such flags: only the checks before and after opening remain.
+/// Other systems have no such flags; only the checks before and after opening remain.
 #[cfg(not(unix))]
-fn without_waiting(options: &mut OpenOptions, _refuses_links: bool) -> &mut OpenOptions {
+fn without_blocking(options: &mut OpenOptions, _refuses_links: bool) -> &mut OpenOptions {
     options
 }
 
-/// Opens a file below a folder name by name without following links, including links planted after an
-/// earlier check.
+/// Opens a file below a folder component by component without following links, including links
+/// created after an earlier check.
 #[cfg(unix)]
 fn open_names(root: &Path, names: &[&std::ffi::OsStr]) -> io::Result<File> {
     use rustix::fs::{Mode, OFlags, open, openat};
@@ -160,24 +161,24 @@ fn check_regular(path: &Path, found: EntryKind) -> Result<()> {
     match found {
         EntryKind::File => Ok(()),
         EntryKind::Missing => {
-            let refusal = fs::symlink_metadata(path).err();
-            let refusal = refusal.unwrap_or_else(|| io::Error::from(ErrorKind::NotFound));
-            Err(FileError::of("open", path)(refusal))
+            let error = fs::symlink_metadata(path).err();
+            let error = error.unwrap_or_else(|| io::Error::from(ErrorKind::NotFound));
+            Err(FileError::context("open", path)(error))
         }
-        other => Err(FileError::of("read", path)(io::Error::other(other.to_string()))),
+        other => Err(FileError::context("read", path)(io::Error::other(other.to_string()))),
     }
 }
 
-/// Checks the opened file, which may be another one than was checked before opening.
+/// Checks the opened file, because it may differ from the one checked before opening.
 fn check_opened(file: File, path: &Path) -> Result<File> {
-    let metadata = file.metadata().map_err(FileError::of("open", path))?;
-    check_regular(path, EntryKind::of(metadata.file_type()))?;
+    let metadata = file.metadata().map_err(FileError::context("open", path))?;
+    check_regular(path, EntryKind::from_file_type(metadata.file_type()))?;
     Ok(file)
 }
 
 fn read(file: File, path: &Path, limit: u64) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    file.take(limit).read_to_end(&mut bytes).map_err(FileError::of("read", path))?;
+    file.take(limit).read_to_end(&mut bytes).map_err(FileError::context("read", path))?;
     Ok(bytes)
 }
 

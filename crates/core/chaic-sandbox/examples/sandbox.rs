@@ -1,5 +1,5 @@
-//! Runs a shell command in the sandbox: `cargo run -p chaic-sandbox --example sandbox -- 'id; ls /'`.
-//! With `--probe`, prints what this system enforces; with `--bench N`, milliseconds of N starts.
+//! Runs a shell command in the sandbox: `cargo run -p chaic-sandbox --example sandbox -- 'id; ls
+//! /'`. `--probe` prints the enforced parts; `--bench N` measures N starts, in milliseconds.
 
 use std::process::{Command, ExitCode, Stdio};
 use std::time::Instant;
@@ -28,12 +28,12 @@ fn main() -> ExitCode {
         }
         [flag, n] if flag == "--bench" => {
             let n: u32 = n.parse().expect("a number");
-            let time = |make: &dyn Fn() -> Command| {
-                let began = Instant::now();
+            let time = |new_command: &dyn Fn() -> Command| {
+                let start = Instant::now();
                 for _ in 0..n {
-                    make().stdin(Stdio::null()).status().expect("it starts");
+                    new_command().stdin(Stdio::null()).status().expect("the command starts");
                 }
-                began.elapsed().as_secs_f64() * 1000.0 / f64::from(n)
+                start.elapsed().as_secs_f64() * 1000.0 / f64::from(n)
             };
             let plain = || {
                 let mut shell = Command::new("sh");
@@ -45,7 +45,7 @@ fn main() -> ExitCode {
             ExitCode::SUCCESS
         }
         [line] => {
-            policy.add_named_by(line);
+            policy.add_from_command_line(line);
             let status = launcher.command(&policy, &isolation, line).status();
             let code = status.expect("the program starts").code();
             u8::try_from(code.unwrap_or(1)).unwrap_or(1).into()

@@ -1,36 +1,36 @@
-//! Read and use rights of a sandboxed command.
+//! Access rights of a sandboxed command.
 
 use std::env;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-/// What a sandboxed command may read and use. All paths are absolute.
+/// Access rights and limits of a sandboxed command. All paths are absolute.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Policy {
-    /// Working folder of the command. A private empty folder takes its place, unless it is readable.
+    /// Working folder of the command. A private empty folder replaces it, unless it is readable.
     pub start_folder: PathBuf,
-    /// Files and folders outside the system folders that the command can read, at the same paths.
+    /// Readable files and folders outside the system folders, at the same paths.
     pub readable: Vec<PathBuf>,
-    /// Folders that stay empty for the command even inside readable ones.
+    /// Folders that appear empty to the command even inside readable ones.
     pub masked: Vec<PathBuf>,
-    /// Memory of all processes together, MiB: anonymous and shared pages.
+    /// Memory of all processes, MiB: anonymous and shared pages.
     pub memory_mib: u64,
-    /// Size of all files that the command can write, in memory, MiB.
+    /// Total size of all files that the command can write, in memory, MiB.
     pub scratch_mib: u64,
-    /// Processes and threads at one time.
+    /// Maximum number of processes and threads at one time.
     pub max_tasks: u32,
 }
 
-/// Why a path cannot be made readable.
+/// A path that cannot be made readable.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PolicyError {
-    /// The path does not exist, or cannot be reached.
+    /// The path does not exist or is not accessible.
     #[error("--exec-read {path}: {reason}", path = path.display())]
     Unreadable {
         /// The path as given.
         path: PathBuf,
-        /// The refusal of the system.
+        /// Error of the system.
         reason: String,
     },
     /// The whole file system would be readable.
@@ -39,7 +39,7 @@ pub enum PolicyError {
 }
 
 impl Policy {
-    /// Adds a file or folder that the user names, with the target of a link.
+    /// Adds a file or folder from the user, and the target if it is a link.
     ///
     /// # Errors
     /// If it does not exist or is the root folder.
@@ -58,10 +58,11 @@ impl Policy {
         Ok(())
     }
 
-    /// Adds what a command line names: files, with their folders, and the installation folders of programs.
-    /// A folder above the start folder, a masked folder or the home folder is never added.
-    pub fn add_named_by(&mut self, line: &str) {
-        for word in words_of(line) {
+    /// Adds the files in a command line with their folders, and the installation folders of its
+    /// programs. Never adds a folder that contains the start folder, a masked folder or the home
+    /// folder.
+    pub fn add_from_command_line(&mut self, line: &str) {
+        for word in split_words(line) {
             let file = self.start_folder.join(&word);
             if file.is_file() {
                 self.add_file(&file);
@@ -74,8 +75,8 @@ impl Policy {
 
     fn add_file(&mut self, file: &Path) {
         let Ok(target) = file.canonicalize() else { return };
-        let of_the_machine = ["/etc", "/proc", "/sys", "/dev", "/run", "/var", "/boot"];
-        if of_the_machine.iter().any(|folder| target.starts_with(folder)) {
+        let machine_folders = ["/etc", "/proc", "/sys", "/dev", "/run", "/var", "/boot"];
+        if machine_folders.iter().any(|folder| target.starts_with(folder)) {
             return;
         }
         for path in [file.to_owned(), target] {
@@ -94,11 +95,11 @@ impl Policy {
         }
     }
 
-    /// Returns whether a folder is an ancestor of the start folder, of a masked folder or of the home folder.
+    /// Returns whether a folder contains the start folder, a masked folder or the home folder.
     fn is_too_wide(&self, folder: &Path) -> bool {
         let home = env::home_dir();
-        let kept = self.masked.iter().chain(home.as_ref()).chain([&self.start_folder]);
-        folder == Path::new("/") || kept.into_iter().any(|kept| kept.starts_with(folder))
+        let protected = self.masked.iter().chain(home.as_ref()).chain([&self.start_folder]);
+        folder == Path::new("/") || protected.into_iter().any(|path| path.starts_with(folder))
     }
 
     fn add(&mut self, path: PathBuf) {
@@ -107,40 +108,45 @@ impl Policy {
         }
     }
 
-    /// Returns whether a path is readable because it lies under a readable one.
+    /// Returns whether a path is readable or lies inside a readable folder.
     pub fn is_readable(&self, path: &Path) -> bool {
         self.readable.iter().any(|readable| path.starts_with(readable))
     }
 }
 
-/// Splits a command line at white space and shell operators, without quotes: good enough to find the paths
-/// in it.
-fn words_of(line: &str) -> Vec<String> {
+/// Splits a command line at white space and shell operators, without handling quotes. It is
+/// sufficient to find the paths.
+fn split_words(line: &str) -> Vec<String> {
     let is_separator = |c: char| c.is_whitespace() || ";|&()<>=`".contains(c);
     let unquoted = |word: &str| word.trim_matches(['"', '\'']).to_owned();
     line.split(is_separator).map(unquoted).filter(|word| !word.is_empty()).collect()
 }
 
-/// Returns the installation folders of a program of the search path: the parent of each `bin` or `shims`
-/// folder that holds the program or the target of its link. Empty for programs of the system folders.
+/// Returns the installation folders of a program on the search path: the parent of each `bin` or
+/// `shims` folder that contains the program or the target of its link. Empty for programs in system
+/// folders.
 fn program_folders(program: &str) -> Vec<PathBuf> {
     let path = env::var_os("PATH").unwrap_or_default();
     let found = env::split_paths(&path).map(|folder| folder.join(program)).find(|p| p.is_file());
     let Some(found) = found else { return Vec::new() };
     let target = found.canonicalize().unwrap_or_else(|_| found.clone());
-    let of = |path: &Path| {
+    let installation = |path: &Path| {
         let bin = path.parent()?;
         let is_bin = bin.ends_with("bin") || bin.ends_with("shims");
         Some(if is_bin { bin.parent()? } else { bin }.to_owned())
     };
-    [of(&found), of(&target)].into_iter().flatten().filter(|path| !is_system(path)).collect()
+    [installation(&found), installation(&target)]
+        .into_iter()
+        .flatten()
+        .filter(|path| !is_system(path))
+        .collect()
 }
 
 /// Folders of the operating system that every sandboxed command can read.
 pub(crate) const SYSTEM_FOLDERS: &[&str] =
     &["/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32", "/nix/store", "/gnu/store"];
 
-/// Files below `/etc` that programs need and that hold no secrets.
+/// Files below `/etc` that programs need and that contain no secrets.
 #[cfg(target_os = "linux")]
 pub(crate) const SYSTEM_FILES: &[&str] = &[
     "/etc/ld.so.cache",
@@ -157,7 +163,7 @@ pub(crate) const SYSTEM_FILES: &[&str] = &[
 pub(crate) const DEVICES: &[&str] =
     &["/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom"];
 
-/// Returns whether a path lies in a system folder, or is the root folder.
+/// Returns whether a path is inside a system folder, or is the root folder.
 fn is_system(path: &Path) -> bool {
     path == Path::new("/") || SYSTEM_FOLDERS.iter().any(|system| path.starts_with(system))
 }
@@ -185,7 +191,7 @@ mod tests {
         std::fs::write(top.join("mine/helper.py"), "").unwrap();
         std::fs::write(top.join("beside.py"), "").unwrap();
         let mut policy = policy(&top);
-        policy.add_named_by("sh mine/helper.py --flag; ./beside.py");
+        policy.add_from_command_line("sh mine/helper.py --flag; ./beside.py");
         assert!(policy.is_readable(&top.join("mine/other.py")));
         assert!(
             policy.is_readable(&top.join("beside.py"))
@@ -195,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_above_a_masked_one_is_not_added_by_a_word() {
+    fn a_folder_that_contains_a_masked_one_is_not_added() {
         let top = tempfile::tempdir().unwrap();
         let top = top.path().canonicalize().unwrap();
         for folder in ["work", "runs", "runs/one"] {
@@ -203,7 +209,7 @@ mod tests {
         }
         let mut policy = policy(&top.join("work"));
         policy.masked.push(top.join("runs/one"));
-        policy.add_named_by(&format!("cat {}", top.join("runs").display()));
+        policy.add_from_command_line(&format!("cat {}", top.join("runs").display()));
         assert!(!policy.is_readable(&top.join("runs/two")));
     }
 

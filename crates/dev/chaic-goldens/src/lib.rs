@@ -1,13 +1,13 @@
-//! What every machine must compute to the bit.
+//! Reference results that every machine must reproduce bit by bit.
 //!
-//! **What it is**: a scripted run of each task ([`script`]), and a [`table`] with size and digest of
-//! the world's state on the way, and of the helper's first and last picture.
+//! **What it is**: a scripted run of each task ([`script`]), and a [`table`] with size and digest
+//! of world states during the run, and of the helper's first and last image.
 //!
-//! **What it is not**: no benchmark, no mind; who acts in the script sees the state of the world.
+//! **What it is not**: a benchmark or an agent; the script reads the state of the world.
 //!
 //! **Invariants**
 //! - The table depends on the version of the program only.
-//! - It needs no file, no clock, no thread and no C, so that it builds wherever Rust does.
+//! - It uses no files, clock, threads or C code, so that it builds for all of Rust's targets.
 
 pub mod script;
 
@@ -22,32 +22,32 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use crate::script::Script;
 
-/// The table as it is committed.
+/// The committed table.
 pub const GOLDENS: &str = include_str!("../goldens.txt");
-/// Frames at which states are compared: early, to see where a difference begins, and late
-/// (moving house ends before that).
+/// Frames at which states are compared: early ones locate the begin of a difference (moving house
+/// ends before the last).
 const FRAMES: [u32; 3] = [100, 300, 2900];
-/// Side of the pictures, pixels; odd, so that rows end within a block of the widest vectors.
+/// Side of images, pixels; odd, so that rows end within a block of the widest vectors.
 const SIDE_PX: u32 = 203;
 
-/// Why there is no table.
+/// Error when the table is computed.
 #[derive(Debug, thiserror::Error)]
 pub enum GoldenError {
     /// A task has no test episode.
-    #[error("there is no test episode of {0}")]
+    #[error("{0} has no test episode")]
     NoEpisode(TaskId),
-    /// The bundled episodes can't be read.
+    /// The bundled episodes cannot be read.
     #[error(transparent)]
     Split(#[from] SplitError),
-    /// An episode can't become a world.
-    #[error("{0} can't be played: {1}")]
+    /// An episode is not a valid world.
+    #[error("{0} cannot be played: {1}")]
     Setup(String, SetupError),
 }
 
-/// The table: for each task a line for each frame of `FRAMES` and for two pictures.
+/// Computes the table: for each task a line for each frame of `FRAMES` and for two images.
 ///
 /// # Errors
-/// If a task's first test episode can't be played.
+/// If a task's first test episode cannot be played.
 pub fn table() -> Result<String, GoldenError> {
     let mut table = String::new();
     for task in TaskId::paper() {
@@ -66,18 +66,18 @@ pub fn table() -> Result<String, GoldenError> {
                 let _ = writeln!(table, "{task} frame {frame}: {size} bytes {digest:016x}");
             }
             if frame == 0 || frame == FRAMES[FRAMES.len() - 1] {
-                let _ = writeln!(table, "{task} frame {frame}: {}", picture(&scene, &world));
+                let _ = writeln!(table, "{task} frame {frame}: {}", image(&scene, &world));
             }
         }
-        let _ = writeln!(table, "{task} did: {}", script.counts());
+        let _ = writeln!(table, "{task} did: {}", script.counts_text());
     }
     Ok(table)
 }
 
-/// Digests of what the helper sees.
-fn picture(scene: &Scene, world: &World) -> String {
-    let camera = world.eye(AgentId::HELPER, SIDE_PX);
-    let view = View::of_eye(AgentId::HELPER, camera, Channels::ALL);
+/// Returns digests of the helper's image.
+fn image(scene: &Scene, world: &World) -> String {
+    let camera = world.camera(AgentId::HELPER, SIDE_PX);
+    let view = View::from_eye(AgentId::HELPER, camera, Channels::ALL);
     let images = scene.render(world, &[view]).into_iter().next().unwrap_or_default();
     let Images { rgb, depth_m, ids } = images;
     let depth: Vec<u8> = depth_m.iter().flatten().flat_map(|d| d.to_bits().to_le_bytes()).collect();
@@ -86,7 +86,7 @@ fn picture(scene: &Scene, world: &World) -> String {
     format!("{SIDE_PX} px rgb {rgb:016x} depth {depth:016x} ids {ids:016x}")
 }
 
-/// The first line in which two tables differ, of both.
+/// Returns the first pair of lines in which two tables differ.
 pub fn first_difference<'a>(found: &'a str, expected: &'a str) -> Option<[&'a str; 2]> {
     let (mut a, mut b) = (found.lines(), expected.lines());
     loop {

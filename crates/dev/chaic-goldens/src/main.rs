@@ -1,5 +1,5 @@
-//! Prints the table of this machine, and fails where it differs from the committed one:
-//! `cargo run -p chaic-goldens`; `-- --update` writes it to where it is committed.
+//! Prints the table of this machine, and fails if it differs from the committed one: `cargo run -p
+//! chaic-goldens`. With `-- --update` it overwrites the committed table.
 
 use std::process::ExitCode;
 

@@ -1,6 +1,6 @@
-//! Promise: states and pixels don't change unnoticed, and are the same bits at every width of vectors
-//! that this machine has. Where a change is meant, `cargo run -p chaic-goldens -- --update` writes the
-//! new table, to be read like code. `benches/goldens/run.py` compares other processors.
+//! States and pixels do not change unnoticed, and are bitwise equal at every SIMD width of this
+//! machine. After an intended change, `cargo run -p chaic-goldens -- --update` writes the new
+//! table, which is reviewed like code. `benches/goldens/run.py` compares other processors.
 
 use chaic_core::TaskId;
 use chaic_goldens::script::Script;
@@ -9,7 +9,7 @@ use chaic_render::with_each_width;
 use chaic_world::{Rules, World};
 
 #[test]
-fn every_width_of_vectors_computes_the_committed_table() {
+fn every_simd_width_computes_the_committed_table() {
     let mut widths = Vec::new();
     with_each_width(|width| {
         let found = table().expect("the bundled episodes can be played");
@@ -24,8 +24,9 @@ fn every_width_of_vectors_computes_the_committed_table() {
 }
 
 #[test]
-fn the_script_takes_stows_lets_go_lifts_and_delivers() {
-    // Removing obstacles is no part of it: they stand behind walls, and it walks straight ahead.
+fn the_script_covers_all_interactions_except_obstacles() {
+    // Removing obstacles is not covered: they stand behind walls, and the script walks straight
+    // ahead.
     let mut done = [0; 5];
     for task in TaskId::paper() {
         let episode = chaic_episodes::episodes(&chaic_episodes::Split::Test, task).next();
@@ -33,7 +34,7 @@ fn the_script_takes_stows_lets_go_lifts_and_delivers() {
         let mut world = World::new(setup, Rules::paper()).expect("valid");
         let mut script = Script::new(&world);
         script.play(&mut world, 2900);
-        let c = script.happened();
+        let c = script.event_counts();
         let counts = [c.taken, c.stowed, c.released, c.lifted, c.delivered];
         done = std::array::from_fn(|i| done[i] + counts[i]);
     }

@@ -1,47 +1,47 @@
-//! Random and hostile setups, states and cameras, and what must hold of their pictures; shared by
-//! the fuzz test and the fuzz example.
+//! Random and hostile setups, states and cameras, with checks of their images; used by the fuzz
+//! test and the fuzz example.
 
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 use chaic_core::briefing::Goal;
-use chaic_core::capability::{Gait, IMPAIRMENTS, Persona, Sight};
+use chaic_core::capability::{Eyesight, Gait, IMPAIRMENTS, Persona};
 use chaic_core::geom::{Camera, Pose, Rect, yaw_rotation};
 use chaic_core::observation::Images;
-use chaic_core::rng::Stream;
+use chaic_core::rng::RngStream;
 use chaic_core::{AgentId, ClassId, EntityId, Frame, Quat, TaskId, Vec2, Vec3};
 use chaic_render::geometry::FINEST;
 use chaic_render::{Appearance, Channels, MAX_SIDE_PX, Scene, View, floor_plan};
 use chaic_world::{
-    Arm, Floor, FloorMaterial, Opening, Person, PersonState, Place, Posture, Room, RoomKind, Rules,
-    Setup, State, Thing, ThingState, Wall, World,
+    AgentSpec, AgentState, Arm, Floor, FloorMaterial, ObjectLocation, ObjectSpec, ObjectState,
+    Opening, Posture, Room, RoomKind, Rules, Setup, State, Wall, World,
 };
 use rayon::ThreadPool;
 
-/// Somewhere to look at, and who looks.
+/// A scene with views.
 pub struct Case {
-    /// The setup, which need not make a world.
+    /// Setup, which may be invalid.
     pub setup: Setup,
-    /// Where everything is.
+    /// Positions of all objects and people.
     pub state: State,
-    /// How everybody stands.
+    /// Postures of all people.
     pub postures: Vec<Posture>,
-    /// Who looks.
+    /// Views to render.
     pub views: Vec<View>,
-    /// How it is lit and colored.
+    /// Light and colors.
     pub appearance: Appearance,
 }
 
-/// Most things that ids can name.
+/// Maximum number of objects that have ids.
 pub const N_IDS: usize = (u16::MAX - EntityId::FIRST_OBJECT.0) as usize + 1;
 
-/// Draws numbers, of which so many are hostile.
-struct Draw {
-    rng: Stream,
+/// Generator of random values, a fraction of which are hostile.
+struct InputGenerator {
+    rng: RngStream,
     hostile: f32,
 }
 
-impl Draw {
-    /// A number about as far from 0 as this, or one that nobody expects.
+impl InputGenerator {
+    /// Draws a number of at most this magnitude, or a hostile one.
     fn number(&mut self, reach: f32) -> f32 {
         self.between(-reach, reach)
     }
@@ -71,15 +71,15 @@ impl Draw {
         self.rng.range(low, high)
     }
 
-    fn up_to(&mut self, most: usize) -> usize {
-        self.rng.below(most + 1)
+    fn int_up_to(&mut self, max: usize) -> usize {
+        self.rng.below(max + 1)
     }
 
     fn chance(&mut self, p: f32) -> bool {
         self.rng.chance(p)
     }
 
-    fn one<T: Copy>(&mut self, items: &[T]) -> T {
+    fn pick<T: Copy>(&mut self, items: &[T]) -> T {
         items[self.rng.below(items.len())]
     }
 
@@ -92,10 +92,10 @@ impl Draw {
     }
 
     fn color(&mut self) -> [u8; 3] {
-        [0; 3].map(|_: u8| self.up_to(255) as u8)
+        [0; 3].map(|_: u8| self.int_up_to(255) as u8)
     }
 
-    /// A rectangle; hostile ones have swapped corners or no area.
+    /// Draws a rectangle; hostile ones have swapped corners or no area.
     fn rect(&mut self, reach: f32) -> Rect {
         let (a, b) = (self.flat(reach), self.flat(reach));
         if self.chance(self.hostile) {
@@ -117,18 +117,19 @@ impl Draw {
 
     fn setup(&mut self, n_things: usize) -> Setup {
         let reach = 12.0;
-        let (n_rooms, n_walls, n_floors) = (self.up_to(6), self.up_to(8), self.up_to(5));
+        let (n_rooms, n_walls, n_floors) =
+            (self.int_up_to(6), self.int_up_to(8), self.int_up_to(5));
         let bounds = self.rect(reach);
         let ceiling_m = if self.chance(0.6) { Some(self.between(2.0, 4.0)) } else { None };
         let rooms: Vec<Room> = (0..n_rooms).map(|_| self.room(reach)).collect();
         let walls: Vec<Wall> = (0..n_walls).map(|_| self.wall(reach)).collect();
-        let openings = (0..self.up_to(3)).map(|_| self.opening(&walls, n_rooms)).collect();
+        let openings = (0..self.int_up_to(3)).map(|_| self.opening(&walls, n_rooms)).collect();
         let floors = (0..n_floors).map(|_| self.floor(reach)).collect();
-        let things = (0..n_things).map(|_| self.thing(reach)).collect();
-        let people = (0..self.up_to(3)).map(|_| self.person(reach)).collect();
+        let things = (0..n_things).map(|_| self.object(reach)).collect();
+        let people = (0..self.int_up_to(3)).map(|_| self.person(reach)).collect();
         Setup {
             task: TaskId::NoConstraint,
-            seed: self.up_to(1 << 20) as u64,
+            seed: self.int_up_to(1 << 20) as u64,
             horizon: 100,
             bounds,
             ceiling_m,
@@ -146,12 +147,12 @@ impl Draw {
     fn room(&mut self, reach: f32) -> Room {
         use RoomKind::{Bathroom, Bedroom, Corridor, Kitchen, LivingRoom, Office, Outdoors};
         let kinds = [Kitchen, LivingRoom, Bedroom, Office, Bathroom, Corridor, Outdoors];
-        Room { kind: self.one(&kinds), rect: self.rect(reach) }
+        Room { kind: self.pick(&kinds), rect: self.rect(reach) }
     }
 
     fn wall(&mut self, reach: f32) -> Wall {
         let a = self.flat(reach);
-        let b = match self.up_to(4) {
+        let b = match self.int_up_to(4) {
             0 => Vec2::new(a.x, self.number(reach)),
             1 => Vec2::new(self.number(reach), a.y),
             2 if self.hostile > 0.0 => a,
@@ -167,40 +168,39 @@ impl Draw {
         }
     }
 
-    /// An opening between two walls' ends, or anywhere.
+    /// Draws an opening next to a wall's end, or anywhere.
     fn opening(&mut self, walls: &[Wall], n_rooms: usize) -> Opening {
         let (mut a, mut b) = (self.flat(8.0), self.flat(8.0));
         if !walls.is_empty() && self.chance(0.7) {
-            let wall = self.one(walls);
+            let wall = self.pick(walls);
             (a, b) = (wall.b, wall.b + 0.1 * (wall.b - wall.a));
         }
-        let most = if self.hostile > 0.0 { 9 } else { n_rooms };
-        Opening { a, b, rooms: [0; 2].map(|_: u32| self.up_to(most) as u32) }
+        let max = if self.hostile > 0.0 { 9 } else { n_rooms };
+        Opening { a, b, rooms: [0; 2].map(|_: u32| self.int_up_to(max) as u32) }
     }
 
     fn floor(&mut self, reach: f32) -> Floor {
         use FloorMaterial::{Asphalt, Carpet, Grass, Pavement, Tiles, Wood};
-        let material = self.one(&[Asphalt, Carpet, Grass, Pavement, Tiles, Wood]);
+        let material = self.pick(&[Asphalt, Carpet, Grass, Pavement, Tiles, Wood]);
         Floor { rect: self.rect(reach), material, color: self.color() }
     }
 
-    fn thing(&mut self, reach: f32) -> Thing {
+    fn object(&mut self, reach: f32) -> ObjectSpec {
         let class = ClassId::all().nth(self.rng.below(ClassId::all().count()));
-        let class = class.expect("it is below their number");
-        let scale = match self.up_to(9) {
+        let class = class.expect("the index is below the number of classes");
+        let scale = match self.int_up_to(9) {
             0 => [0.0; 3].map(|_: f32| self.between(0.2, 5.0)),
-            1 if self.hostile > 0.0 => {
-                [0.0; 3].map(|_: f32| self.one(&[0.0, 1e-9, -1.0, 1.0, 300.0, 1e6, 1e20, f32::NAN]))
-            }
+            1 if self.hostile > 0.0 => [0.0; 3]
+                .map(|_: f32| self.pick(&[0.0, 1e-9, -1.0, 1.0, 300.0, 1e6, 1e20, f32::NAN])),
             _ => [1.0; 3],
         };
-        Thing {
+        ObjectSpec {
             class,
             position: self.point(reach),
             yaw_rad: self.number(PI),
             scale,
             seat_m: if self.chance(0.1) { Some(self.between(0.1, 1.0)) } else { None },
-            variant: self.up_to(255) as u8,
+            variant: self.int_up_to(255) as u8,
             fixed: self.chance(0.5),
         }
     }
@@ -212,22 +212,26 @@ impl Draw {
 
     fn persona(&mut self) -> Persona {
         use Persona::{Adult, Child, Frail, Helper, Rider, Wheelchair};
-        self.one(&[Adult, Child, Frail, Helper, Rider, Wheelchair])
+        self.pick(&[Adult, Child, Frail, Helper, Rider, Wheelchair])
     }
 
-    fn person(&mut self, reach: f32) -> Person {
-        let look = self.up_to(255) as u8;
-        Person::new(self.persona(), self.pose(reach), look)
+    fn person(&mut self, reach: f32) -> AgentSpec {
+        let appearance = self.int_up_to(255) as u8;
+        AgentSpec::new(self.persona(), self.pose(reach), appearance)
     }
 
     fn state(&mut self, setup: &Setup) -> State {
-        let mut things: Vec<ThingState> = setup
+        let mut things: Vec<ObjectState> = setup
             .things
             .iter()
-            .map(|thing| ThingState {
-                position: if self.chance(0.3) { self.point(12.0) } else { thing.position },
+            .map(|object| ObjectState {
+                position: if self.chance(0.3) { self.point(12.0) } else { object.position },
                 rotation: self.turn(),
-                place: if self.chance(0.05) { Place::Broken } else { Place::Resting { on: None } },
+                location: if self.chance(0.05) {
+                    ObjectLocation::Broken
+                } else {
+                    ObjectLocation::Resting { on: None }
+                },
                 delivered: None,
                 delivered_by: None,
                 last_holder: None,
@@ -235,16 +239,16 @@ impl Draw {
             })
             .collect();
         if self.chance(self.hostile) {
-            // A recording of another episode: more things or fewer.
-            things.truncate(self.up_to(things.len()));
-            let more = self.up_to(3);
+            // A recording of another episode has more or fewer objects.
+            things.truncate(self.int_up_to(things.len()));
+            let more = self.int_up_to(3);
             things.extend(things.first().cloned().into_iter().cycle().take(more));
         }
-        let people = setup.people.iter().map(|person| PersonState::at(person.pose));
+        let people = setup.people.iter().map(|person| AgentState::new(person.pose));
         State {
-            frame: self.one(&[0, 7, 1000, Frame::MAX]),
-            things,
-            people: people.collect(),
+            frame: self.pick(&[0, 7, 1000, Frame::MAX]),
+            objects: things,
+            agents: people.collect(),
             joint: None,
             child_away_frames: 0,
             stuck_frames: 0,
@@ -257,8 +261,8 @@ impl Draw {
     fn posture(&mut self) -> Posture {
         let persona = self.persona();
         let arms = [-1.0, 1.0].map(|side: f32| {
-            let usual = Vec3::new(0.24 * side, self.between(0.3, 1.9), self.between(-0.6, 0.3));
-            let hand_in_body = if self.chance(self.hostile) { self.point(3.0) } else { usual };
+            let default = Vec3::new(0.24 * side, self.between(0.3, 1.9), self.between(-0.6, 0.3));
+            let hand_in_body = if self.chance(self.hostile) { self.point(3.0) } else { default };
             Arm { hand_in_body, grips: self.chance(0.3) }
         });
         let impairments =
@@ -267,9 +271,9 @@ impl Draw {
             persona,
             impairments,
             fatigue: self.between(-0.5, 1.5),
-            gait: self.one(&[Gait::Walk, Gait::Roll, Gait::WalkBike]),
+            gait: self.pick(&[Gait::Walk, Gait::Roll, Gait::WalkBike]),
             height_m: self.between(0.9, 2.1),
-            look: self.up_to(255) as u8,
+            appearance: self.int_up_to(255) as u8,
             pose: self.pose(8.0),
             moving: self.chance(0.5),
             walked_m: self.between(0.0, 1000.0),
@@ -281,41 +285,43 @@ impl Draw {
     }
 
     fn side(&mut self) -> u32 {
-        match self.up_to(19) {
-            0 => self.one(&[0, 1, MAX_SIDE_PX + 1, u32::MAX]),
+        match self.int_up_to(19) {
+            0 => self.pick(&[0, 1, MAX_SIDE_PX + 1, u32::MAX]),
             1 => 300,
             2 => 128,
-            _ => self.up_to(70) as u32,
+            _ => self.int_up_to(70) as u32,
         }
     }
 
     fn view(&mut self, setup: &Setup) -> View {
         let (mut width, mut height) = (self.side(), self.side());
-        match self.up_to(99) {
+        match self.int_up_to(99) {
             0 => (width, height) = (MAX_SIDE_PX, 1),
             1 => (width, height) = (1, MAX_SIDE_PX),
             2..30 => (width, height) = (17, 3),
             _ => {}
         }
-        let eye_in_world = match self.up_to(5) {
-            // In the middle of a thing or of a wall, or right on a corner.
+        let eye_in_world = match self.int_up_to(5) {
+            // Inside an object or a wall, or exactly on a corner.
             0 if !setup.things.is_empty() => {
-                let thing = self.one(&setup.things);
-                thing.position + Vec3::new(0.0, 0.5 * thing.size_m().y, 0.0)
+                let object = self.pick(&setup.things);
+                object.position + Vec3::new(0.0, 0.5 * object.size_m().y, 0.0)
             }
             1 if !setup.walls.is_empty() => {
-                let wall = self.one(&setup.walls);
+                let wall = self.pick(&setup.walls);
                 let p = if self.chance(0.5) { wall.a } else { 0.5 * (wall.a + wall.b) };
                 Vec3::new(p.x, self.between(0.0, 3.0), p.y)
             }
-            2 => Vec3::new(self.number(12.0), self.one(&[0.0, 2.5, -3.0, 40.0]), self.number(12.0)),
+            2 => {
+                Vec3::new(self.number(12.0), self.pick(&[0.0, 2.5, -3.0, 40.0]), self.number(12.0))
+            }
             _ => self.point(12.0),
         };
-        let pitch = self.one(&[0.0, -0.3, 0.4, FRAC_PI_2, -FRAC_PI_2]);
+        let pitch = self.pick(&[0.0, -0.3, 0.4, FRAC_PI_2, -FRAC_PI_2]);
         let [s, c] = [(0.5f32 * pitch), (0.5 * pitch)];
         let [s, c] = [chaic_core::geom::math::sin(s), chaic_core::geom::math::cos(c)];
         let level = if self.chance(0.3) {
-            yaw_rotation(self.one(&[0.0, FRAC_PI_2, PI, -FRAC_PI_2]))
+            yaw_rotation(self.pick(&[0.0, FRAC_PI_2, PI, -FRAC_PI_2]))
         } else {
             self.turn()
         };
@@ -330,14 +336,14 @@ impl Draw {
                 height,
             },
             channels: Channels { rgb, depth, ids },
-            hide: if self.chance(0.4) { Some(AgentId(self.up_to(4) as u8)) } else { None },
+            hide: if self.chance(0.4) { Some(AgentId(self.int_up_to(4) as u8)) } else { None },
             hide_ceiling: self.chance(0.2),
             sight: if self.chance(0.1) { Some(self.sight()) } else { None },
         }
     }
 
-    fn sight(&mut self) -> Sight {
-        Sight {
+    fn sight(&mut self) -> Eyesight {
+        Eyesight {
             range_m: self.between(0.1, 20.0),
             blur_rad: self.between(0.0, 0.2),
             field_rad: self.between(0.01, std::f32::consts::PI),
@@ -346,32 +352,34 @@ impl Draw {
     }
 
     fn appearance(&mut self) -> Appearance {
-        match self.up_to(3) {
+        match self.int_up_to(3) {
             0 => Appearance::Canonical,
             1 => Appearance::Evening,
-            _ => Appearance::Varied { seed: self.up_to(1 << 20) as u64 },
+            _ => Appearance::Varied { seed: self.int_up_to(1 << 20) as u64 },
         }
     }
 }
 
-/// The case of a seed, the same on every machine. A third of all have only numbers that an episode
-/// could have, a third a few hostile ones, a third many.
+/// Generates the case of a seed, the same on every machine. One third of the cases has valid
+/// numbers only, one third a few hostile ones, one third many.
 pub fn case(seed: u64, n_things: Option<usize>) -> Case {
     let hostile = [0.0, 0.02, 0.25][(seed % 3) as usize];
-    let mut draw = Draw { rng: Stream::new(seed, "fuzz of pictures", 0), hostile };
-    let n_things = n_things.unwrap_or_else(|| draw.up_to(24));
-    let setup = draw.setup(n_things);
-    let state = draw.state(&setup);
-    let n_postures = if draw.chance(0.1) { draw.up_to(12) } else { setup.people.len() };
-    let postures = (0..n_postures).map(|_| draw.posture()).collect();
-    let views = (0..1 + draw.up_to(4)).map(|_| draw.view(&setup)).collect();
-    Case { setup, state, postures, views, appearance: draw.appearance() }
+    let mut generator =
+        InputGenerator { rng: RngStream::new(seed, "fuzz of pictures", 0), hostile };
+    let n_things = n_things.unwrap_or_else(|| generator.int_up_to(24));
+    let setup = generator.setup(n_things);
+    let state = generator.state(&setup);
+    let n_postures =
+        if generator.chance(0.1) { generator.int_up_to(12) } else { setup.people.len() };
+    let postures = (0..n_postures).map(|_| generator.posture()).collect();
+    let views = (0..1 + generator.int_up_to(4)).map(|_| generator.view(&setup)).collect();
+    Case { setup, state, postures, views, appearance: generator.appearance() }
 }
 
-/// Draws a case in several ways and holds the pictures to what is promised.
+/// Renders a case in several ways and checks the images.
 ///
 /// # Panics
-/// If a promise is broken.
+/// Panics if a check fails.
 pub fn check(case: &Case, [one, three]: &[ThreadPool; 2]) {
     let Case { setup, state, postures, views, appearance } = case;
     let draw = |appearance, views: &[View]| {
@@ -382,54 +390,61 @@ pub fn check(case: &Case, [one, three]: &[ThreadPool; 2]) {
     for (view, images) in views.iter().zip(&images) {
         check_view(case, view, images);
     }
-    assert!(three.install(|| draw(*appearance, views)) == images, "threads change the bits");
-    // Once more with a scene that has drawn before, each view for itself, and with all channels.
+    assert!(
+        three.install(|| draw(*appearance, views)) == images,
+        "the number of threads changes the image"
+    );
+    // Render again with a scene that has rendered before, each view separately, and with all
+    // channels.
     let scene = Scene::with_appearance(setup, *appearance);
     for (view, expected) in views.iter().zip(&images) {
         let alone = scene.render_state(state, postures, &[*view]);
-        assert!(alone == [expected.clone()], "{view:?}: alone it is other bits");
+        assert!(alone == [expected.clone()], "{view:?}: the view alone has another image");
         let all = View { channels: Channels::ALL, ..*view };
         let all = &scene.render_state(state, postures, &[all])[0];
-        for (wanted, is_same, channel) in [
+        for (requested, is_same, channel) in [
             (view.channels.rgb, all.rgb == expected.rgb, "rgb"),
             (view.channels.depth, all.depth_m == expected.depth_m, "depth"),
             (view.channels.ids, all.ids == expected.ids, "ids"),
         ] {
-            assert!(!wanted || is_same, "{view:?}: other channels disturb {channel}");
+            assert!(!requested || is_same, "{view:?}: other channels change {channel}");
         }
     }
     check_geometry(case, &scene);
-    let usual = draw(Appearance::Canonical, views);
-    for (a, b) in usual.iter().zip(&images) {
-        assert!(a.depth_m == b.depth_m && a.ids == b.ids, "{appearance} is more than color");
+    let default = draw(Appearance::Canonical, views);
+    for (a, b) in default.iter().zip(&images) {
+        assert!(a.depth_m == b.depth_m && a.ids == b.ids, "{appearance} changes more than color");
     }
 }
 
-/// The same shapes as plain data, and as a file.
+/// Checks the exported geometry.
 fn check_geometry(case: &Case, scene: &Scene) {
-    let level = case.state.things.len() % (FINEST + 1);
+    let level = case.state.objects.len() % (FINEST + 1);
     let geometry = scene.geometry(&case.state, &case.postures, level);
     for mesh in &geometry.meshes {
         let n = mesh.positions.len();
         assert_eq!(n, mesh.normals.len());
         for triangle in &mesh.triangles {
             let is_there = triangle.vertices.iter().all(|c| (*c as usize) < n);
-            assert!(is_there, "{triangle:?} of a mesh with {n} corners");
-            assert!(usize::from(triangle.skin) < mesh.skins.len(), "{triangle:?} has no skin");
+            assert!(is_there, "{triangle:?} of a mesh with {n} vertices");
+            assert!(
+                usize::from(triangle.material) < mesh.materials.len(),
+                "{triangle:?} has no material"
+            );
         }
     }
     let n = geometry.meshes.len();
-    assert!(geometry.instances.iter().all(|i| (i.mesh as usize) < n), "a mesh is missing");
-    let cameras: Vec<(String, Camera)> =
-        case.views.iter().map(|v| ("eye".to_owned(), v.camera)).collect();
-    assert!(chaic_gltf::glb(&geometry, &|_| "thing", &cameras).starts_with(b"glTF"));
+    assert!(
+        geometry.instances.iter().all(|i| (i.mesh as usize) < n),
+        "an instance refers to a missing mesh"
+    );
 }
 
 fn check_view(case: &Case, view: &View, images: &Images) {
     let Camera { width, height, .. } = view.camera;
     let Channels { rgb, depth, ids } = view.channels;
     if width > MAX_SIDE_PX || height > MAX_SIDE_PX {
-        assert!(*images == Images::default(), "{width} x {height} is too large");
+        assert!(*images == Images::default(), "an image of {width} x {height} exceeds the limit");
         return;
     }
     let n = width as usize * height as usize;
@@ -437,10 +452,10 @@ fn check_view(case: &Case, view: &View, images: &Images) {
     assert_eq!(images.depth_m.as_ref().map(Vec::len), depth.then_some(n));
     assert_eq!(images.ids.as_ref().map(Vec::len), ids.then_some(n));
     for d in images.depth_m.iter().flatten() {
-        // The nearest plane, but for rounding.
+        // Tolerance for rounding at the near plane.
         let is_seen = *d >= 0.999 * Camera::NEAR_M && *d <= Camera::FAR_M;
-        let is_sound = is_seen || (*d == 0.0 && view.sight.is_some());
-        assert!(is_sound, "{view:?}: a depth of {d} m");
+        let is_valid = is_seen || (*d == 0.0 && view.sight.is_some());
+        assert!(is_valid, "{view:?}: a depth of {d} m");
     }
     for id in images.ids.iter().flatten() {
         let id = EntityId(*id);
@@ -449,50 +464,50 @@ fn check_view(case: &Case, view: &View, images: &Images) {
             EntityId::CEILING => case.setup.ceiling_m.is_some() && !view.hide_ceiling,
             id if id.is_object() => {
                 let k = usize::from(id.0 - EntityId::FIRST_OBJECT.0);
-                k < case.setup.things.len().min(case.state.things.len())
+                k < case.setup.things.len().min(case.state.objects.len())
             }
             id => {
                 let k = usize::from(id.0.saturating_sub(EntityId::FIRST_PERSON.0));
                 let is_person = id.0 >= EntityId::FIRST_PERSON.0 && k < case.postures.len();
-                is_person && view.hide.map(EntityId::of_agent) != Some(id)
+                is_person && view.hide.map(EntityId::from_agent) != Some(id)
             }
         };
-        assert!(exists, "{view:?}: there is no {id}");
+        assert!(exists, "{view:?}: {id} does not exist");
     }
     if let (Some(depth), Some(ids)) = (&images.depth_m, &images.ids) {
-        let unseen = |d: f32| d == Camera::FAR_M || (d == 0.0 && view.sight.is_some());
-        let sky = |(d, id): (&f32, &u16)| EntityId(*id) != EntityId::NOTHING || unseen(*d);
-        assert!(depth.iter().zip(ids).all(sky), "{view:?}: nothing is near");
+        let is_background = |d: f32| d == Camera::FAR_M || (d == 0.0 && view.sight.is_some());
+        let sky = |(d, id): (&f32, &u16)| EntityId(*id) != EntityId::NOTHING || is_background(*d);
+        assert!(depth.iter().zip(ids).all(sky), "{view:?}: empty pixels must be at the far plane");
     }
 }
 
-/// Draws plans of worlds, and sees that each has its size and comes out the same twice. Returns
-/// whether there is such a world.
+/// Draws a floor plan, and checks its size and that it is reproducible. Returns whether the random
+/// setup is a valid world.
 ///
 /// # Panics
-/// If a promise is broken.
+/// Panics if a check fails.
 pub fn check_plan(seed: u64) -> bool {
     let hostile = [0.0, 0.01][(seed % 2) as usize];
-    let mut draw = Draw { rng: Stream::new(seed, "fuzz of plans", 0), hostile };
-    let n_things = 1 + draw.up_to(12);
-    let mut setup = draw.setup(n_things);
+    let mut generator = InputGenerator { rng: RngStream::new(seed, "fuzz of plans", 0), hostile };
+    let n_things = 1 + generator.int_up_to(12);
+    let mut setup = generator.setup(n_things);
     setup.things[0].fixed = true;
     if setup.people.is_empty() {
-        setup.people.push(draw.person(8.0));
+        setup.people.push(generator.person(8.0));
     }
     let n_rooms = setup.rooms.len() as u32;
     setup.openings.retain(|o| o.rooms.iter().all(|k| *k < n_rooms));
-    let width = draw.one(&[0, 1, 63, 64, 65, 100, 300]);
-    let appearance = draw.appearance();
+    let width = generator.pick(&[0, 1, 63, 64, 65, 100, 300]);
+    let appearance = generator.appearance();
     let Ok(world) = World::new(setup, Rules::paper()) else { return false };
     let scene = Scene::with_appearance(world.setup(), appearance);
-    let picture = floor_plan::draw_scene_plan(&scene, &world, width);
-    assert_eq!(picture.width(), width.clamp(64, MAX_SIDE_PX));
-    assert!(picture == floor_plan::draw_scene_plan(&scene, &world, width));
+    let image = floor_plan::draw_scene_plan(&scene, &world, width);
+    assert_eq!(image.width(), width.clamp(64, MAX_SIDE_PX));
+    assert!(image == floor_plan::draw_scene_plan(&scene, &world, width));
     true
 }
 
-/// Pools of one and of three threads.
+/// Returns pools with one and with three threads.
 pub fn pools() -> [ThreadPool; 2] {
     [1, 3].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("threads"))
 }

@@ -1,7 +1,7 @@
-//! What tests, benches and examples of several crates share: hand-made worlds to look at
-//! ([`scenes`]), and random and hostile ones with what must hold of their pictures ([`hostile`]).
+//! Common parts of tests, benches and examples of several crates: handmade worlds ([`scenes`]), and
+//! random and hostile inputs with checks of their images ([`hostile`]).
 //!
-//! **What it is not**: part of any program; nothing depends on it but tests, benches and examples.
+//! **What it is not**: part of a program; only tests, benches and examples depend on it.
 
 pub mod hostile;
 pub mod scenes;

@@ -1,18 +1,18 @@
-//! Hand-made worlds to look at, shared by tests, benches and examples.
+//! Handmade worlds for tests, benches and examples.
 
 use chaic_core::briefing::Goal;
 use chaic_core::capability::{Gait, Impairments, Persona};
 use chaic_core::geom::{Camera, Pose, Rect, yaw_rotation};
 use chaic_core::{ClassId, Quat, TaskId, Vec2, Vec3};
 use chaic_world::{
-    Arm, Floor, FloorMaterial, Opening, Person, Posture, Room, RoomKind, Rules, Setup, Thing, Wall,
-    World,
+    AgentSpec, Arm, Floor, FloorMaterial, ObjectSpec, Opening, Posture, Room, RoomKind, Rules,
+    Setup, Wall, World,
 };
 use std::f32::consts::{FRAC_PI_2, PI};
 
-/// A setup of nothing but a floor of 20 by 20 m, one person far off, and a table as goal.
+/// Returns a setup with a floor of 20 by 20 m, one distant person, and a table as goal.
 pub fn empty() -> Setup {
-    let table = Thing { fixed: true, ..thing("table", 9.0, 9.0, 0.0) };
+    let table = ObjectSpec { fixed: true, ..object("table", 9.0, 9.0, 0.0) };
     Setup {
         task: TaskId::NoConstraint,
         seed: 1,
@@ -30,34 +30,34 @@ pub fn empty() -> Setup {
     }
 }
 
-/// The world of a setup that is sound, by the paper's rules.
+/// Creates the world of a valid setup, with the paper's rules.
 pub fn world(setup: Setup) -> World {
-    World::new(setup, Rules::paper()).expect("the hand-made setup is sound")
+    World::new(setup, Rules::paper()).expect("the handmade setup is valid")
 }
 
-/// A thing of a class on the ground, metres and radians.
-pub fn thing(class: &str, x: f32, z: f32, yaw_rad: f32) -> Thing {
-    Thing::new(ClassId::named(class), Vec3::new(x, 0.0, z), yaw_rad)
+/// Returns an object of a class on the ground, meters and radians.
+pub fn object(class: &str, x: f32, z: f32, yaw_rad: f32) -> ObjectSpec {
+    ObjectSpec::new(ClassId::named(class), Vec3::new(x, 0.0, z), yaw_rad)
 }
 
-/// Somebody on the ground, metres and radians.
-pub fn person(persona: Persona, x: f32, z: f32, yaw_rad: f32) -> Person {
+/// Returns a person on the ground, meters and radians.
+pub fn person(persona: Persona, x: f32, z: f32, yaw_rad: f32) -> AgentSpec {
     let pose = Pose { position: Vec3::new(x, 0.0, z), yaw_rad };
-    Person::new(persona, pose, 0)
+    AgentSpec::new(persona, pose, 0)
 }
 
-/// A floor between two corners (x, z), metres.
+/// Returns a floor between two corners (x, z), meters.
 pub fn floor(min: [f32; 2], max: [f32; 2], material: FloorMaterial, color: [u8; 3]) -> Floor {
     Floor { rect: Rect::new(min, max), material, color }
 }
 
-/// A wall between two points (x, z), metres.
+/// Returns a wall between two points (x, z), meters.
 pub fn wall(a: [f32; 2], b: [f32; 2]) -> Wall {
     let (a, b) = (Vec2::from(a), Vec2::from(b));
     Wall { a, b, thickness_m: 0.12, bottom_m: 0.0, top_m: 2.8, color: [232, 226, 214] }
 }
 
-/// A level camera at (x, y, z) looking along `yaw_rad`, pitched up by `pitch_rad`.
+/// Returns a camera at (x, y, z) that faces `yaw_rad`, pitched up by `pitch_rad`.
 pub fn camera(eye: [f32; 3], yaw_rad: f32, pitch_rad: f32, width: u32, height: u32) -> Camera {
     use chaic_core::geom::math::{cos, sin};
     let pitch = Quat::from_xyzw(sin(0.5 * pitch_rad), 0.0, 0.0, cos(0.5 * pitch_rad));
@@ -70,10 +70,10 @@ pub fn camera(eye: [f32; 3], yaw_rad: f32, pitch_rad: f32, width: u32, height: u
     }
 }
 
-/// A posture at rest.
+/// Returns a posture at rest.
 pub fn posture(persona: Persona, x: f32, z: f32, yaw_rad: f32) -> Posture {
     let c = persona.capability();
-    let rest = |side: f32| match c.gait {
+    let resting_hand = |side: f32| match c.gait {
         Gait::Roll => Vec3::new(0.33 * side, 0.62, 0.0),
         _ => Vec3::new(0.24 * side, 0.43 * c.height_m, 0.0),
     };
@@ -83,11 +83,11 @@ pub fn posture(persona: Persona, x: f32, z: f32, yaw_rad: f32) -> Posture {
         fatigue: 0.0,
         gait: c.gait,
         height_m: c.height_m,
-        look: 0,
+        appearance: 0,
         pose: Pose { position: Vec3::new(x, 0.0, z), yaw_rad },
         moving: false,
         walked_m: 0.0,
-        arms: [-1.0, 1.0].map(|side| Arm { hand_in_body: rest(side), grips: false }),
+        arms: [-1.0, 1.0].map(|side| Arm { hand_in_body: resting_hand(side), grips: false }),
         bend: 0.0,
         stretch: 0.0,
         failing: false,
@@ -96,7 +96,7 @@ pub fn posture(persona: Persona, x: f32, z: f32, yaw_rad: f32) -> Posture {
 
 const SIDE: f32 = 4.5;
 
-/// A house of eight rooms, four by two, with about 150 things.
+/// Returns a house of eight rooms, four by two, with about 150 objects.
 pub fn house() -> Setup {
     use RoomKind::{Bathroom, Bedroom, Corridor, Kitchen, LivingRoom, Office};
     let mut setup = empty();
@@ -154,7 +154,7 @@ fn walls_of_house(setup: &mut Setup) {
 fn furnish(setup: &mut Setup, kind: RoomKind, x: f32, z: f32) {
     use RoomKind::{Bathroom, Bedroom, Kitchen, LivingRoom, Office};
     let mut put = |class: &str, dx: f32, y: f32, dz: f32, yaw_rad: f32| {
-        let mut t = thing(class, x + dx, z + dz, yaw_rad);
+        let mut t = object(class, x + dx, z + dz, yaw_rad);
         t.position.y = y;
         t.variant = (dx * 10.0) as u8;
         setup.things.push(t);
@@ -220,7 +220,7 @@ fn furnish(setup: &mut Setup, kind: RoomKind, x: f32, z: f32) {
     }
 }
 
-/// A bit of street: shops, a bike, a child, trees.
+/// Returns a part of a street: shops, a bicycle, a child, trees.
 pub fn street() -> Setup {
     let mut setup = empty();
     setup.task = TaskId::Shopping;
@@ -232,10 +232,12 @@ pub fn street() -> Setup {
     ];
     setup.things.clear();
     for (k, x) in [-12.0, -4.0, 4.0, 12.0].into_iter().enumerate() {
-        setup.things.push(thing("tent", x, -7.0, PI));
-        setup.things.push(thing("tree", x + 4.0, -10.0, 0.0));
-        setup.things.push(thing("house_front", x, -13.5, PI));
-        setup.things.push(Thing { variant: k as u8, ..thing("street_lamp", x + 3.0, -4.6, 0.0) });
+        setup.things.push(object("tent", x, -7.0, PI));
+        setup.things.push(object("tree", x + 4.0, -10.0, 0.0));
+        setup.things.push(object("house_front", x, -13.5, PI));
+        setup
+            .things
+            .push(ObjectSpec { variant: k as u8, ..object("street_lamp", x + 3.0, -4.6, 0.0) });
     }
     for (class, x, z, yaw) in [
         ("bench", 1.0, -5.0, PI),
@@ -246,7 +248,7 @@ pub fn street() -> Setup {
         ("bike", 0.9, 1.2, 0.0),
         ("wood_basket", 2.2, -4.8, 0.3),
     ] {
-        setup.things.push(thing(class, x, z, yaw));
+        setup.things.push(object(class, x, z, yaw));
     }
     setup.things[0].fixed = true;
     setup.goal_places = vec![Setup::entity(0)];

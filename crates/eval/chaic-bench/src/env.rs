@@ -1,55 +1,57 @@
-//! How fast environments are stepped: worlds, partners and what the helpers see, all together.
+//! Throughput of environments: worlds, partners and the helpers' observations together.
 
 use chaic_core::action::Hand;
-use chaic_core::observation::{Grants, Senses};
-use chaic_core::rng::Stream;
+use chaic_core::observation::{Grants, SensorConfig};
+use chaic_core::rng::RngStream;
 use chaic_core::{Action, Target, TaskId};
-use chaic_env::rules::RuleSet;
-use chaic_env::{Env, EnvBatch, EpisodeConfig, Flow, ImagesMut, Minds, Seat};
+use chaic_env::{
+    AdvanceOutcome, AgentSlot, Env, EnvBatch, EpisodeAgents, EpisodeConfig, ImagesMut,
+};
 use chaic_episodes::{Episode, Split, episodes};
-use chaic_render::{Appearance, Channels};
+use chaic_render::Channels;
 use serde::Serialize;
 
-use super::{Clock, Machine};
+use super::{Machine, Stopwatch};
 use chaic_eval::{EvalError, Result};
 
-/// What is measured.
+/// Configuration of an environment benchmark.
 #[derive(Clone, Debug)]
 pub struct EnvBench {
-    /// The tasks, by turns.
+    /// Tasks, used in turn.
     pub tasks: Vec<TaskId>,
-    /// How many environments are stepped together.
+    /// Number of environments that are stepped together.
     pub envs: usize,
     /// Side of the helpers' images, pixels.
     pub size: u32,
     /// Side of the partners' images, pixels.
-    pub minds_size: u32,
-    /// What the helpers look at.
+    pub partner_size: u32,
+    /// Channels of the helpers' images.
     pub channels: Channels,
-    /// Threads.
+    /// Number of threads.
     pub threads: usize,
-    /// Least time of measuring, seconds.
+    /// Minimum duration, seconds.
     pub seconds: f32,
 }
 
-/// How fast environments are.
+/// Result of an environment benchmark.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EnvSpeed {
-    /// How many are stepped together.
+    /// Number of environments that are stepped together.
     pub envs: usize,
     /// Side of the helpers' images, pixels.
     pub size: u32,
     /// Side of the partners' images, pixels.
-    pub minds_size: u32,
-    /// What the helpers look at, in words.
+    #[serde(rename = "minds_size")]
+    pub partner_size: u32,
+    /// Channels of the helpers' images, for example `rgb+depth`.
     pub channels: String,
-    /// Threads.
+    /// Number of threads.
     pub threads: usize,
-    /// Decisions of the helpers.
+    /// Number of the helpers' decisions.
     pub steps: u64,
-    /// Frames that passed, of all environments.
+    /// Number of frames of all environments.
     pub frames: u64,
-    /// Episodes that ended and were followed by another one.
+    /// Number of episodes that ended and were replaced by another.
     pub episodes: u64,
     /// Wall time, seconds.
     pub seconds: f64,
@@ -57,30 +59,31 @@ pub struct EnvSpeed {
     pub steps_per_second: f64,
     /// Frames per second of wall time.
     pub frames_per_second: f64,
-    /// Which machine and build.
+    /// Machine and build.
     pub machine: Machine,
 }
 
 impl EnvBench {
-    /// Lets helpers act at random beside the rule-based partners in training episodes. `progress` is
-    /// told how much of the time has passed, 0 to 1.
+    /// Runs helpers with random actions and rule-based partners in training episodes. `progress`
+    /// receives the fraction of the duration that has passed, 0 to 1.
     ///
     /// # Errors
-    /// If episodes can't be had, or threads.
+    /// If episodes cannot be read or threads cannot be started.
     pub fn measure(&self, progress: &mut dyn FnMut(f32)) -> Result<EnvSpeed> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build();
-        let pool = pool.map_err(|problem| EvalError::Options(format!("no threads: {problem}")))?;
-        // Progress bars aren't shared between threads.
-        let (sender, passed) = std::sync::mpsc::channel();
+        let pool =
+            pool.map_err(|problem| EvalError::Options(format!("cannot start threads: {problem}")))?;
+        // Progress bars cannot be shared between threads.
+        let (sender, receiver) = std::sync::mpsc::channel();
         std::thread::scope(|scope| {
             let work = scope.spawn(move || {
                 pool.install(|| {
-                    self.play(&mut |part| {
-                        let _ = sender.send(part);
+                    self.play(&mut |fraction| {
+                        let _ = sender.send(fraction);
                     })
                 })
             });
-            passed.iter().for_each(progress);
+            receiver.iter().for_each(progress);
             work.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
         })
     }
@@ -88,30 +91,30 @@ impl EnvBench {
     fn play(&self, progress: &mut dyn FnMut(f32)) -> Result<EnvSpeed> {
         let bundled = self.episodes()?;
         let Channels { rgb, depth, ids } = self.channels;
-        let senses = Senses { image_size: self.size, rgb, depth, ids, film: None };
+        let sensors = SensorConfig { image_size: self.size, rgb, depth, ids, frame_history: None };
         let env = |k: usize| {
-            let helper = Some(Seat::of_caller(Grants::IDS, senses));
-            Env::new(self.config(&bundled, k), Minds { helper, partner: None })
+            let helper = Some(AgentSlot::external(Grants::IDS, sensors));
+            Env::new(self.config(&bundled, k), EpisodeAgents { helper, partner: None })
         };
         let envs: std::result::Result<Vec<Env>, _> = (0..self.envs).map(env).collect();
         let mut batch = EnvBatch::new(envs?)?;
         let [n_rgb, n_depth, n_ids] = batch.layout().lengths();
         let (mut rgb, mut depth_m, mut ids) = (vec![0; n_rgb], vec![0.0; n_depth], vec![0; n_ids]);
-        let mut luck = Stream::new(0, "bench env", 0);
-        let (mut steps, mut frames, mut n_ended, mut passed) = (0, 0, 0, 0.0);
-        let clock = Clock::start();
-        while passed < 1.0 {
+        let mut rng = RngStream::new(0, "bench env", 0);
+        let (mut steps, mut frames, mut n_ended, mut fraction) = (0, 0, 0, 0.0);
+        let clock = Stopwatch::start();
+        while fraction < 1.0 {
             let before: u64 = n_frames(&batch);
-            let flows = batch.advance(None);
+            let outcomes = batch.advance(None);
             frames += n_frames(&batch) - before;
-            for (k, flow) in flows.into_iter().enumerate() {
-                match flow {
-                    Ok(Flow::Waits) => {}
-                    Ok(Flow::Ended | Flow::Stopped) => {
+            for (k, outcome) in outcomes.into_iter().enumerate() {
+                match outcome {
+                    Ok(AdvanceOutcome::NeedsAction) => {}
+                    Ok(AdvanceOutcome::Ended | AdvanceOutcome::Stopped) => {
                         n_ended += 1;
                         batch.reset(k, self.config(&bundled, self.envs + n_ended))?;
                     }
-                    Err(broken) => return Err(EvalError::Options(broken.to_string())),
+                    Err(error) => return Err(EvalError::Options(error.to_string())),
                 }
             }
             let buffers = ImagesMut {
@@ -120,18 +123,18 @@ impl EnvBench {
                 ids: (n_ids > 0).then_some(&mut ids),
             };
             for slot in batch.observe(buffers)? {
-                batch.submit(slot, random_action(self.size, &mut luck));
+                batch.submit(slot, random_action(self.size, &mut rng));
                 steps += 1;
             }
-            passed = clock.elapsed().as_secs_f32() / self.seconds;
-            progress(passed.min(1.0));
+            fraction = clock.elapsed().as_secs_f32() / self.seconds;
+            progress(fraction.min(1.0));
         }
         let seconds = clock.elapsed().as_secs_f64();
         Ok(EnvSpeed {
             envs: self.envs,
             size: self.size,
-            minds_size: self.minds_size,
-            channels: super::render::name_of(self.channels),
+            partner_size: self.partner_size,
+            channels: super::render::channel_names(self.channels),
             threads: self.threads,
             steps,
             frames,
@@ -139,7 +142,7 @@ impl EnvBench {
             seconds,
             steps_per_second: steps as f64 / seconds,
             frames_per_second: frames as f64 / seconds,
-            machine: Machine::this(),
+            machine: Machine::current(),
         })
     }
 
@@ -150,22 +153,18 @@ impl EnvBench {
                 all.push(episode?);
             }
         }
-        // Tasks by turns.
-        let n_each = (all.len() / self.tasks.len().max(1)).max(1);
+        // Order the episodes by tasks in turn.
+        let n_per_task = (all.len() / self.tasks.len().max(1)).max(1);
         let mut order: Vec<usize> = (0..all.len()).collect();
-        order.sort_by_key(|k| (k % n_each, k / n_each));
+        order.sort_by_key(|k| (k % n_per_task, k / n_per_task));
         Ok(order.into_iter().map(|k| all[k].clone()).collect())
     }
 
     fn config<'a>(&self, bundled: &'a [Episode], number: usize) -> EpisodeConfig<'a> {
         EpisodeConfig {
-            episode: &bundled[number % bundled.len()],
             seed: (number / bundled.len()) as u32,
-            rules: RuleSet::PAPER,
-            helper: "bench",
-            partner: None,
-            image_size: Some(self.minds_size),
-            appearance: Appearance::Canonical,
+            image_size: Some(self.partner_size),
+            ..EpisodeConfig::new(&bundled[number % bundled.len()], "bench")
         }
     }
 }
@@ -174,12 +173,12 @@ fn n_frames(batch: &EnvBatch) -> u64 {
     batch.envs().iter().map(|env| u64::from(env.world().state().frame)).sum()
 }
 
-/// The mix of the world's bench, with pixels for targets.
-fn random_action(size: u32, luck: &mut Stream) -> Action {
-    let hand = if luck.chance(0.5) { Hand::Left } else { Hand::Right };
-    let mut pixel = || luck.below(size as usize) as u32;
+/// Draws from the same distribution as the world benchmark, with pixels as targets.
+fn random_action(size: u32, rng: &mut RngStream) -> Action {
+    let hand = if rng.chance(0.5) { Hand::Left } else { Hand::Right };
+    let mut pixel = || rng.below(size as usize) as u32;
     let target = Target::Pixel { column: pixel(), row: pixel() };
-    match luck.below(16) {
+    match rng.below(16) {
         0..8 => Action::MoveForward,
         8..10 => Action::TurnLeft,
         10..12 => Action::TurnRight,
@@ -199,14 +198,15 @@ mod tests {
             tasks: TaskId::paper().collect(),
             envs: 8,
             size: 32,
-            minds_size: 32,
+            partner_size: 32,
             channels: Channels::ALL,
             threads: 2,
             seconds: 0.5,
         };
-        let mut parts = Vec::new();
-        let speed = bench.measure(&mut |part| parts.push(part)).expect("bundled episodes");
+        let mut fractions = Vec::new();
+        let speed =
+            bench.measure(&mut |fraction| fractions.push(fraction)).expect("bundled episodes");
         assert!(speed.steps >= 8 && speed.frames > 0, "{speed:?}");
-        assert_eq!(parts.last(), Some(&1.0));
+        assert_eq!(fractions.last(), Some(&1.0));
     }
 }

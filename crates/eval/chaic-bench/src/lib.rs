@@ -1,6 +1,7 @@
-//! How fast this machine draws and steps. Nothing measured here reaches a trace or a score.
+//! Benchmarks of rendering and stepping on this machine. Results never reach a trace or a score.
 
 mod env;
+mod gpu;
 mod machine;
 mod render;
 mod scene;
@@ -9,29 +10,30 @@ mod world;
 use std::time::{Duration, Instant};
 
 pub use env::{EnvBench, EnvSpeed};
+pub use gpu::{GpuBench, GpuSpeed};
 pub use machine::Machine;
-pub use render::{RenderBench, RenderSpeed, channels_named, channels_or_none};
+pub use render::{RenderBench, RenderSpeed, parse_channels, parse_channels_or_none};
 pub use scene::{BenchScene, N_VIEWS};
 pub use world::{WorldSpeed, measure_world};
 
-/// Wall and processor time since it was made.
-struct Clock {
-    began: Instant,
-    cpu_began: Option<Duration>,
+/// Wall and CPU time since construction.
+struct Stopwatch {
+    start: Instant,
+    cpu_start: Option<Duration>,
 }
 
-impl Clock {
-    fn start() -> Clock {
-        Clock { began: Instant::now(), cpu_began: cpu_time() }
+impl Stopwatch {
+    fn start() -> Stopwatch {
+        Stopwatch { start: Instant::now(), cpu_start: cpu_time() }
     }
 
     fn elapsed(&self) -> Duration {
-        self.began.elapsed()
+        self.start.elapsed()
     }
 
-    /// Processor time of all threads; `None` where the system doesn't tell.
+    /// Returns the CPU time of all threads; `None` if the system does not provide it.
     fn cpu(&self) -> Option<Duration> {
-        cpu_time()?.checked_sub(self.cpu_began?)
+        cpu_time()?.checked_sub(self.cpu_start?)
     }
 }
 
@@ -46,7 +48,7 @@ fn cpu_time() -> Option<Duration> {
     None
 }
 
-/// Milliseconds of a part of so many.
+/// Returns the mean duration of `n` items, milliseconds.
 fn ms_each(whole: Duration, n: u64) -> f64 {
     1e3 * whole.as_secs_f64() / n as f64
 }

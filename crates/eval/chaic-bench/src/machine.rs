@@ -1,29 +1,29 @@
-//! What a figure was measured on.
+//! Machine and build of a measurement.
 
 use serde::Serialize;
 
-/// The machine and the build.
+/// Machine and build.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Machine {
-    /// The processor's name; empty where the system doesn't tell.
+    /// Name of the CPU; empty if unknown.
     pub cpu: String,
-    /// How many threads it runs at a time.
+    /// Number of threads that run at a time.
     pub cores: usize,
     /// Operating system and architecture.
     pub platform: String,
-    /// Which of the instructions beyond the architecture's least the program was built for.
+    /// Instruction set extensions that the program was compiled for.
     pub target_features: Vec<&'static str>,
-    /// Which of these the processor has.
+    /// Instruction set extensions of the CPU.
     pub cpu_features: Vec<&'static str>,
     /// Version of the program.
     pub chaic: &'static str,
-    /// Whether it is an optimized build.
+    /// True for an optimized build.
     pub optimized: bool,
 }
 
 impl Machine {
-    /// This one.
-    pub fn this() -> Machine {
+    /// Returns the current machine and build.
+    pub fn current() -> Machine {
         Machine {
             cpu: cpu_name(),
             cores: std::thread::available_parallelism().map_or(1, usize::from),
@@ -36,14 +36,14 @@ impl Machine {
     }
 }
 
-/// Linux tells it in a file; elsewhere it stays unknown.
+/// Reads the CPU name on Linux; other systems return an empty name.
 fn cpu_name() -> String {
     let Ok(text) = std::fs::read_to_string("/proc/cpuinfo") else { return String::new() };
     let line = text.lines().find(|l| l.starts_with("model name"));
     line.and_then(|l| l.split_once(':')).map_or(String::new(), |(_, name)| name.trim().to_owned())
 }
 
-macro_rules! built_for {
+macro_rules! enabled_features {
     ($($feature:literal),*) => {{
         let all = [$(($feature, cfg!(target_feature = $feature))),*];
         all.into_iter().filter(|(_, has)| *has).map(|(name, _)| name).collect()
@@ -51,7 +51,7 @@ macro_rules! built_for {
 }
 
 fn target_features() -> Vec<&'static str> {
-    built_for!("sse4.2", "avx", "avx2", "fma", "avx512f", "neon", "sve")
+    enabled_features!("sse4.2", "avx", "avx2", "fma", "avx512f", "neon", "sve")
 }
 
 #[cfg(target_arch = "x86_64")]

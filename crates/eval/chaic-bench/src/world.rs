@@ -1,75 +1,76 @@
-//! How fast worlds are stepped.
+//! Throughput of world stepping.
 
 use std::time::Duration;
 
 use chaic_core::action::Hand;
-use chaic_core::rng::Stream;
+use chaic_core::rng::RngStream;
 use chaic_core::{Action, ResolvedAction, TaskId};
 use chaic_env::EnvError;
 use chaic_episodes::{Split, episodes};
 use chaic_world::{Rules, Setup, World};
 use serde::Serialize;
 
-use super::{Clock, Machine};
+use super::{Machine, Stopwatch};
 use chaic_eval::{EvalError, Result};
 
-/// How fast the world of a task is.
+/// Result of a world benchmark.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WorldSpeed {
-    /// The task.
+    /// Task of the episode.
     pub task: TaskId,
-    /// The episode that was played, over and over.
+    /// Name of the episode, which is played repeatedly.
     pub episode: String,
-    /// People who acted.
+    /// Number of people who acted.
     pub agents: usize,
-    /// Things in the world.
+    /// Number of objects in the world.
     pub things: usize,
-    /// Frames that passed.
+    /// Number of frames.
     pub frames: u64,
-    /// Actions that were chosen.
+    /// Number of actions.
     pub actions: u64,
     /// Wall time, seconds.
     pub seconds: f64,
-    /// Processor time, seconds.
+    /// CPU time, seconds.
     pub cpu_seconds: Option<f64>,
     /// Frames per second of wall time; 30 are a second of walking.
     pub frames_per_second: f64,
-    /// The same of processor time.
+    /// Frames per second of CPU time.
     pub frames_per_cpu_second: Option<f64>,
-    /// Which machine and build.
+    /// Machine and build.
     pub machine: Machine,
 }
 
-/// Lets partner and helper act at random in the first test episode of a task, on one thread, for at
-/// least so many seconds. Nothing is drawn. `progress` is told how much of the time has passed, 0 to 1.
+/// Runs the first test episode of a task with random actions of partner and helper, on one thread,
+/// for at least `seconds`. Nothing is rendered. `progress` receives the fraction of the duration
+/// that has passed, 0 to 1.
 ///
 /// # Errors
-/// If the episode can't be had.
+/// If the episode cannot be read.
 pub fn measure_world(
     task: TaskId,
     seconds: f32,
     progress: &mut dyn FnMut(f32),
 ) -> Result<WorldSpeed> {
-    /// Rounds of decisions between two looks at the clock.
+    /// Number of rounds of decisions between two readings of the clock.
     const ROUNDS: u32 = 200;
     let episode = episodes(&Split::Test, task).next();
-    let episode = episode
-        .ok_or_else(|| EvalError::Options(format!("there is no test episode of {task}")))??;
-    let refused = |problem| EnvError::Setup { id: episode.id().to_owned(), problem };
+    let episode =
+        episode.ok_or_else(|| EvalError::Options(format!("{task} has no test episode")))??;
+    let error = |problem| EnvError::Setup { id: episode.id().to_owned(), problem };
     let mut setup = episode.setup().clone();
     setup.people.truncate(2);
-    let begin = World::new(setup, Rules::paper()).map_err(refused)?;
-    let mut world = begin.clone();
-    let mut luck = Stream::new(episode.seed(), "bench world", 0);
-    let (mut frames, mut actions, mut passed) = (0, 0, 0.0);
-    let clock = Clock::start();
-    while passed < 1.0 {
+    let initial = World::new(setup, Rules::paper()).map_err(error)?;
+    let mut world = initial.clone();
+    let mut rng = RngStream::new(episode.seed(), "bench world", 0);
+    let (mut frames, mut actions, mut fraction) = (0, 0, 0.0);
+    let clock = Stopwatch::start();
+    while fraction < 1.0 {
         for _ in 0..ROUNDS {
             if world.is_over() {
-                world = begin.clone();
+                world = initial.clone();
             }
             for agent in world.waiting() {
-                let action = random_action(world.setup(), &mut luck);
+                let action = random_action(world.setup(), &mut rng);
                 world.submit(agent, action).expect("the agent waits");
                 actions += 1;
             }
@@ -78,38 +79,38 @@ pub fn measure_world(
             frames += u64::from(world.state().frame - before);
             world.drain_events();
         }
-        passed = clock.elapsed().as_secs_f32() / seconds;
-        progress(passed.min(1.0));
+        fraction = clock.elapsed().as_secs_f32() / seconds;
+        progress(fraction.min(1.0));
     }
     let (wall, cpu) =
         (clock.elapsed().as_secs_f64(), clock.cpu().as_ref().map(Duration::as_secs_f64));
     Ok(WorldSpeed {
         task,
         episode: episode.id().to_owned(),
-        agents: begin.setup().people.len(),
-        things: begin.setup().things.len(),
+        agents: initial.setup().people.len(),
+        things: initial.setup().things.len(),
         frames,
         actions,
         seconds: wall,
         cpu_seconds: cpu,
         frames_per_second: frames as f64 / wall,
         frames_per_cpu_second: cpu.map(|cpu| frames as f64 / cpu),
-        machine: Machine::this(),
+        machine: Machine::current(),
     })
 }
 
-/// The mix of `benches/world.rs` of `chaic-episodes`: half of all actions are steps, a quarter turns;
-/// the rest are interactions with things of the episode.
-fn random_action(setup: &Setup, luck: &mut Stream) -> ResolvedAction {
-    let hand = if luck.chance(0.5) { Hand::Left } else { Hand::Right };
-    let thing = |luck: &mut Stream| Setup::entity(luck.below(setup.things.len()));
-    match luck.below(16) {
+/// Draws from the same distribution as `benches/world.rs` of `chaic-episodes`: half of all actions
+/// are steps, a quarter turns, and the others interactions with objects of the episode.
+fn random_action(setup: &Setup, rng: &mut RngStream) -> ResolvedAction {
+    let hand = if rng.chance(0.5) { Hand::Left } else { Hand::Right };
+    let object = |rng: &mut RngStream| Setup::entity(rng.below(setup.things.len()));
+    match rng.below(16) {
         0..8 => Action::MoveForward,
         8..10 => Action::TurnLeft,
         10..12 => Action::TurnRight,
-        12 => Action::PickUp { object: thing(luck), hand },
-        13 => Action::PutOn { place: thing(luck), hand },
-        14 => Action::RemoveObstacle { obstacle: thing(luck), hand },
+        12 => Action::PickUp { object: object(rng), hand },
+        13 => Action::PutOn { place: object(rng), hand },
+        14 => Action::RemoveObstacle { obstacle: object(rng), hand },
         _ => Action::PutIn,
     }
 }
@@ -119,7 +120,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_task_has_a_world_to_step() {
+    fn every_task_can_be_measured() {
         for task in TaskId::paper() {
             let speed = measure_world(task, 0.001, &mut |_| {}).expect("bundled");
             assert!(speed.agents == 2 && speed.frames >= speed.actions / 4, "{speed:?}");

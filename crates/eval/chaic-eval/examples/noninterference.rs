@@ -1,10 +1,13 @@
-//! Is what is hidden hidden? `cargo run --release -p chaic-eval --example noninterference -- 10000`.
+//! Non-interference test on many episodes: `cargo run --release -p chaic-eval --example
+//! noninterference -- 10000`.
 //!
-//! Plays so many pairs of generated episodes (outside every named split) that differ in the
-//! partner's goal or constraint alone, watched by each built-in helper and by a prober that tries
-//! every action on every target, by both rule sets, with a partner that acts; `-- 10000 4000` leaves
-//! the first 4,000 out. Prints what each observer was told without being able to see or feel it;
-//! exits with 1 if there is anything.
+//! Plays pairs of generated episodes (outside every named split) that differ only in the partner's
+//! goal or constraint, with an acting partner and both rule sets. Observers are the built-in
+//! helpers, and probe agents that try every action on every target. The first argument is the
+//! number of pairs; `-- 10000 4000` skips the first 4,000.
+//!
+//! Prints information that an observer received without being able to see or touch its cause; exits
+//! with 1 if there is any.
 
 use std::process::ExitCode;
 use std::sync::Mutex;
@@ -12,34 +15,46 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use chaic_core::TaskId;
 use chaic_core::observation::Grants;
-use chaic_env::minds::{BuiltIn, Helper, Helpers as _};
+use chaic_env::helper_registry::{BuiltInHelpers, Helper, HelperRegistry as _};
 use chaic_env::rules::RuleSet;
 use chaic_episodes::{Episode, Split, episodes};
-use chaic_eval::audit::{Pair, Partner, Prober, Secret, compare};
+use chaic_eval::audit::{Pair, PartnerMode, ProbeAgent, Secret, compare};
 
-/// The first of the generated seeds that are looked at.
+/// First generated seed.
 const FIRST_SEED: u64 = 500_000;
-/// Long enough for the partner to take and deliver, frames.
+/// Number of frames: enough for the partner to take and deliver.
 const FRAMES: u32 = 1500;
 /// Side of the images, pixels.
 const IMAGE_SIZE: u32 = 64;
-/// Who watches, by turns: seven, so that all meet all eight tasks.
-const OBSERVERS: [&str; 7] =
-    ["rhp", "random", "follow", "blind prober", "seeing prober", "pointing prober", "rhp"];
+/// Observers in turn: seven, so that each meets all eight tasks.
+const OBSERVERS: [&str; 7] = [
+    "rhp",
+    "random",
+    "follow",
+    "blind probe agent",
+    "seeing probe agent",
+    "pointing probe agent",
+    "rhp",
+];
 
 fn observer(name: &str, episode: &Episode, rules: &RuleSet) -> Helper {
-    let n_things = episode.setup().things.len();
-    let prober = |sees, grants| Helper { mind: Box::new(Prober::new(sees, n_things)), grants };
+    let n_objects = episode.setup().things.len();
+    let probe = |has_camera, grants| Helper {
+        agent: Box::new(ProbeAgent::new(has_camera, n_objects)),
+        grants,
+    };
     match name {
-        "blind prober" => prober(false, Grants::IDS),
-        "seeing prober" => prober(true, Grants::IDS),
-        "pointing prober" => prober(true, Grants::NONE),
-        name => BuiltIn.make(name, rules.planner).expect("it is a built-in helper"),
+        "blind probe agent" => probe(false, Grants::IDS),
+        "seeing probe agent" => probe(true, Grants::IDS),
+        "pointing probe agent" => probe(true, Grants::NONE),
+        name => BuiltInHelpers.make(name, rules.planner).expect("it is a built-in helper"),
     }
 }
 
-/// The k-th pair: how many observations were the same, and what was found.
-fn one(k: usize) -> Result<(usize, Option<String>), Box<dyn std::error::Error + Send + Sync>> {
+/// Compares pair `k`; returns the number of equal observations and the violation, if any.
+fn compare_pair(
+    k: usize,
+) -> Result<(usize, Option<String>), Box<dyn std::error::Error + Send + Sync>> {
     let tasks: Vec<TaskId> = TaskId::paper().collect();
     let (task, round) = (tasks[k % tasks.len()], k / tasks.len());
     let seed = FIRST_SEED + round as u64;
@@ -48,18 +63,18 @@ fn one(k: usize) -> Result<(usize, Option<String>), Box<dyn std::error::Error + 
     let (rules_name, rules) =
         [("paper", RuleSet::PAPER), ("compat", RuleSet::COMPAT)][round / 2 % 2];
     let secret = Secret::ALL[round % 2];
-    let (partner, frames, image_size) = (Partner::Acts, FRAMES, IMAGE_SIZE);
+    let (partner, frames, image_size) = (PartnerMode::Acts, FRAMES, IMAGE_SIZE);
     let pair = Pair { episode: &episode, secret, partner, rules, frames, image_size };
-    let verdict = compare(&pair, &|| observer(name, &episode, &rules), None)?;
+    let result = compare(&pair, &|| observer(name, &episode, &rules), None)?;
     let text = |f| format!("{}, {name}, {secret:?}, {rules_name}: {f}", episode.id());
-    Ok((verdict.compared, verdict.finding.map(text)))
+    Ok((result.compared, result.violation.map(text)))
 }
 
 fn main() -> ExitCode {
     let argument = |k: usize| std::env::args().nth(k).and_then(|text| text.parse().ok());
     let (n, first): (usize, usize) = (argument(1).unwrap_or(200), argument(2).unwrap_or(0));
     let next = AtomicUsize::new(first);
-    let (compared, findings) = (AtomicUsize::new(0), Mutex::new(vec![]));
+    let (compared, violations) = (AtomicUsize::new(0), Mutex::new(vec![]));
     let jobs = std::thread::available_parallelism().map_or(1, usize::from);
     std::thread::scope(|scope| {
         for _ in 0..jobs {
@@ -69,16 +84,16 @@ fn main() -> ExitCode {
                     if k >= n {
                         break;
                     }
-                    let finding = match one(k) {
-                        Ok((same, finding)) => {
-                            compared.fetch_add(same, Ordering::Relaxed);
-                            finding
+                    let violation = match compare_pair(k) {
+                        Ok((n_equal, violation)) => {
+                            compared.fetch_add(n_equal, Ordering::Relaxed);
+                            violation
                         }
                         Err(error) => Some(format!("pair {k} can't be played: {error}")),
                     };
-                    if let Some(finding) = finding {
-                        eprintln!("{finding}");
-                        findings.lock().unwrap_or_else(|e| e.into_inner()).push(finding);
+                    if let Some(violation) = violation {
+                        eprintln!("{violation}");
+                        violations.lock().unwrap_or_else(|e| e.into_inner()).push(violation);
                     }
                     if (k + 1).is_multiple_of(500) {
                         eprintln!("{} of {n} pairs", k + 1);
@@ -87,9 +102,9 @@ fn main() -> ExitCode {
             });
         }
     });
-    let findings = findings.into_inner().unwrap_or_else(|e| e.into_inner());
+    let violations = violations.into_inner().unwrap_or_else(|e| e.into_inner());
     let compared = compared.into_inner();
     let n = n.saturating_sub(first);
-    println!("{n} pairs, {compared} observations the same, {} findings", findings.len());
-    ExitCode::from(u8::from(!findings.is_empty()))
+    println!("{n} pairs, {compared} equal observations, {} violations", violations.len());
+    ExitCode::from(u8::from(!violations.is_empty()))
 }

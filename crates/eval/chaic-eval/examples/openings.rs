@@ -1,45 +1,54 @@
-//! What a helper's first knowledge identifies: `cargo run --release -p chaic-eval --example openings -- 100`.
+//! Information in a helper's first observation: `cargo run --release -p chaic-eval --example
+//! openings -- 100`.
 //!
-//! Takes the briefing and the first observation of a helper without grants, and of one with the grants
-//! of planners, in all test episodes and in so many generated episodes of each task. Prints, for each
-//! kind of scene, how many openings differ, which fields vary, and how well they predict the task and
-//! the kind of partner.
+//! Collects the briefing and the first observation of a helper without grants, and of one with the
+//! grants of planners. Uses all test episodes, and as many generated episodes of each task as the
+//! argument says. For each scene kind, prints how many openings differ, which fields vary, and how
+//! well they predict the task and the partner's kind.
 
 use std::collections::BTreeMap;
 
 use chaic_core::TaskId;
-use chaic_core::observation::{Grants, Senses};
+use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::task::{Origin, SceneKind};
 use chaic_episodes::{Split, episodes};
 use chaic_eval::audit::opening::{Opening, distinct, predict, predict_by_value, varying_fields};
 use rayon::prelude::*;
 
-/// First of the generated seeds that are looked at; no named split has them.
+/// First generated seed; no named split has it.
 const FIRST_SEED: u64 = 600_000;
 /// Side of the images, pixels.
 const IMAGE_SIZE: u32 = 64;
 
 fn openings(split: &Split, grants: Grants) -> Vec<Opening> {
-    let senses = Senses { image_size: IMAGE_SIZE, rgb: true, depth: true, ids: false, film: None };
+    let sensors = SensorConfig {
+        image_size: IMAGE_SIZE,
+        rgb: true,
+        depth: true,
+        ids: false,
+        frame_history: None,
+    };
     let tasks: Vec<TaskId> = match split {
         Split::Generated(_) | Split::GeneratedStandard(_) => TaskId::all().collect(),
         _ => TaskId::paper().collect(),
     };
-    let of_task = |task: &TaskId| -> Vec<Opening> {
+    let task_openings = |task: &TaskId| -> Vec<Opening> {
         let all = episodes(split, *task).filter_map(Result::ok);
-        all.filter_map(|episode| Opening::of(&episode, grants, senses).ok()).collect()
+        all.filter_map(|episode| Opening::new(&episode, grants, sensors).ok()).collect()
     };
-    tasks.par_iter().flat_map(of_task).collect()
+    tasks.par_iter().flat_map(task_openings).collect()
 }
 
 fn print(openings: &[&Opening]) {
     let n = openings.len();
     let briefings = distinct(openings, |o| o.briefing.clone());
     let seeds = distinct(openings, |o| o.briefing.get("seed").cloned());
-    let with_own = distinct(openings, |o| (o.briefing.clone(), o.own.clone()));
-    let with_images = distinct(openings, |o| (o.briefing.clone(), o.own.clone(), o.images));
+    let with_proprioception =
+        distinct(openings, |o| (o.briefing.clone(), o.proprioception.clone()));
+    let with_images =
+        distinct(openings, |o| (o.briefing.clone(), o.proprioception.clone(), o.images));
     println!(
-        "  {n} openings: {seeds} seeds, {briefings} briefings, {with_own} with the own state, \
+        "  {n} openings: {seeds} seeds, {briefings} briefings, {with_proprioception} with proprioception, \
          {with_images} with images"
     );
     type Label = fn(&Opening) -> String;
@@ -55,15 +64,16 @@ fn print(openings: &[&Opening]) {
             found.z()
         );
     }
-    let parts: [(&str, Fields); 2] = [("briefing", |o| &o.briefing), ("own", |o| &o.own)];
-    for (part, of) in parts {
-        for (field, values) in varying_fields(openings, of) {
-            let value = |o: &Opening| of(o).get(&field).cloned();
-            let by = labels.map(|(name, label)| {
+    let parts: [(&str, Fields); 2] =
+        [("briefing", |o| &o.briefing), ("proprioception", |o| &o.proprioception)];
+    for (part, fields) in parts {
+        for (field, values) in varying_fields(openings, fields) {
+            let value = |o: &Opening| fields(o).get(&field).cloned();
+            let accuracies = labels.map(|(name, label)| {
                 let found = predict_by_value(openings, value, label);
                 format!("{name} {:.3} (z = {:.1})", found.accuracy, found.z())
             });
-            println!("  {part}.{field}: {values} values; {}", by.join(", "));
+            println!("  {part}.{field}: {values} values; {}", accuracies.join(", "));
         }
     }
 }
@@ -78,14 +88,15 @@ fn main() {
             println!("{split}, {name}");
             let all = openings(&split, grants);
             for scene in [SceneKind::House, SceneKind::Street, SceneKind::Yard] {
-                let papers =
-                    |o: &&Opening| o.scene == scene && o.task.info().origin != Origin::Ours;
+                let is_paper_task =
+                    |o: &&Opening| o.scene == scene && o.task.info().origin != Origin::Chaic;
                 println!(" {scene:?}, the paper's tasks");
-                print(&all.iter().filter(papers).collect::<Vec<_>>());
-                let of_scene: Vec<&Opening> = all.iter().filter(|o| o.scene == scene).collect();
-                if of_scene.len() > all.iter().filter(papers).count() {
+                print(&all.iter().filter(is_paper_task).collect::<Vec<_>>());
+                let scene_openings: Vec<&Opening> =
+                    all.iter().filter(|o| o.scene == scene).collect();
+                if scene_openings.len() > all.iter().filter(is_paper_task).count() {
                     println!(" {scene:?}, all tasks");
-                    print(&of_scene);
+                    print(&scene_openings);
                 }
             }
         }

@@ -1,40 +1,31 @@
-//! Whether helpers stand in the expected order, no helper < RHP < oracle, with a wide margin:
-//! `cargo run --release -p chaic-eval --example order`.
+//! Checks the expected order of helpers, no helper < RHP < oracle, with a margin: `cargo run
+//! --release -p chaic-eval --example order`.
 //!
-//! Plays the first bundled training episodes of each task with each of them, and fails (exit 1) where
-//! the mean transport rates over all tasks lie nearer than [`MARGIN`]. It prints 0.30, 0.57 and 0.74: the
-//! margin is a fifth and a third of the distances, so that only a broken helper or world fails.
+//! Plays the first bundled training episodes of each task with each helper. Fails (exit 1) if mean
+//! transport rates over all tasks differ by less than [`MARGIN`]. It prints 0.30, 0.57 and 0.74:
+//! the margin is a fifth and a third of the distances, so that only a broken helper or world fails.
 
 use std::process::ExitCode;
 
 use chaic_agents::PlannerRules;
 use chaic_core::TaskId;
-use chaic_env::minds::{BuiltIn, Helpers as _};
-use chaic_env::rules::RuleSet;
-use chaic_env::{Appearance, Env, EpisodeConfig};
+use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry as _};
+use chaic_env::{Env, EpisodeConfig};
 use chaic_episodes::{Episode, Split, episodes};
 use chaic_eval::Result;
 use rayon::prelude::*;
 
-/// Least difference of the mean transport rates of two neighbors.
+/// Minimum difference of the mean transport rates of two neighbors.
 const MARGIN: f64 = 0.05;
-/// Episodes of each task.
+/// Number of episodes per task.
 const EPISODES: usize = 3;
-/// In the expected order.
+/// Helpers in the expected order.
 const HELPERS: [&str; 3] = ["none", "rhp", "oracle"];
 
-/// Part of what was wanted that is delivered at the end.
+/// Plays an episode; returns the delivered fraction of the goal.
 fn transport_rate(episode: &Episode, helper: &str) -> Result<f64> {
-    let config = EpisodeConfig {
-        episode,
-        seed: 0,
-        rules: RuleSet::PAPER,
-        helper,
-        partner: None,
-        image_size: Some(256),
-        appearance: Appearance::Canonical,
-    };
-    let mut env = Env::new(config, BuiltIn.make(helper, PlannerRules::paper()))?;
+    let config = EpisodeConfig { image_size: Some(256), ..EpisodeConfig::new(episode, helper) };
+    let mut env = Env::new(config, BuiltInHelpers.make(helper, PlannerRules::paper()))?;
     env.advance(None)?;
     let (done, total) = env.world().progress();
     Ok(done / total)
@@ -55,6 +46,6 @@ fn main() -> Result<ExitCode> {
     if is_in_order {
         return Ok(ExitCode::SUCCESS);
     }
-    eprintln!("error: {} don't lie {MARGIN} apart each", HELPERS.join(" < "));
+    eprintln!("error: transport rates are not {} with a margin of {MARGIN}", HELPERS.join(" < "));
     Ok(ExitCode::FAILURE)
 }

@@ -1,8 +1,9 @@
-//! Many worlds at once: `cargo run --release -p chaic-eval --example worlds -- 1000 128`.
+//! Rendering throughput of many worlds: `cargo run --release -p chaic-eval --example worlds -- 1000
+//! 128`.
 //!
-//! Makes so many generated episodes of all tasks, draws what the helper of each sees (color, depth
-//! and ids, of this side in pixels) in batches for ten seconds, and prints pictures a second and the
-//! most memory that was used.
+//! Generates episodes of all tasks and renders the helpers' views (color, depth and ids) in batches
+//! for ten seconds. The arguments are the number of worlds and the side of the images in pixels.
+//! Prints images per second and the peak memory.
 
 use std::time::{Duration, Instant};
 
@@ -13,7 +14,7 @@ use chaic_world::{Rules, World};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
-    let mut number = |usual| arguments.next().map_or(Ok(usual), |text| text.parse::<u32>());
+    let mut number = |default| arguments.next().map_or(Ok(default), |text| text.parse::<u32>());
     let (n, size) = (number(1000)?, number(128)?);
     let n_tasks = TaskId::paper().count() as u64;
     let mut worlds = Vec::new();
@@ -28,7 +29,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let helper = AgentId::HELPER;
     let views: Vec<[View; 1]> = worlds
         .iter()
-        .map(|world| [View::of_eye(helper, world.eye(helper, size), Channels::ALL)])
+        .map(|world| [View::from_eye(helper, world.camera(helper, size), Channels::ALL)])
         .collect();
     let batch: Vec<WorldViews> = worlds
         .iter()
@@ -37,7 +38,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .map(|((world, scene), views)| WorldViews { scene, world, views })
         .collect();
     let mut images = Vec::new();
-    // The first round makes textures and meshes.
+    // The first round creates textures and meshes.
     render_batch(&batch, &mut images);
     let (start, mut n_rounds) = (Instant::now(), 0);
     while start.elapsed() < Duration::from_secs(10) {
@@ -45,10 +46,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         n_rounds += 1;
     }
     let rate = (n_rounds * batch.len()) as f64 / start.elapsed().as_secs_f64();
-    println!("{} worlds, {size} x {size}: {rate:.0} pictures a second", batch.len());
+    println!("{} worlds, {size} x {size}: {rate:.0} images per second", batch.len());
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    if let Some(most) = status.lines().find_map(|line| line.strip_prefix("VmHWM:")) {
-        println!("most memory used: {}", most.trim());
+    if let Some(peak) = status.lines().find_map(|line| line.strip_prefix("VmHWM:")) {
+        println!("peak memory: {}", peak.trim());
     }
     Ok(())
 }

@@ -1,35 +1,35 @@
-//! Curves over time, each in a panel of its own, as SVG.
+//! Line charts as SVG, one panel per curve.
 
 use std::path::Path;
 
-use chaic_files::write_whole;
+use chaic_files::write_atomically;
 use plotters::prelude::*;
 
 use crate::figure::{FONT, FigureError, GRID, INK, PALETTE, register_font};
 
-/// Panels beside each other, and the size of one.
+/// Number of panels per row, and the size of a panel.
 const COLUMNS: usize = 2;
 const PANEL_PX: (u32, u32) = (700, 280);
 const TEXT_PX: i32 = 15;
-/// Room for what is written beside the axes.
+/// Space for axis labels.
 const LABELS_PX: i32 = 56;
 
-/// So many points are drawn as such.
-const FEW_POINTS: usize = 40;
+/// Maximum number of points that are drawn with markers.
+const MAX_MARKED_POINTS: usize = 40;
 
-/// A row of points.
+/// A named series of points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
-    /// Written above it.
+    /// Caption above the panel.
     pub title: String,
-    /// From left to right.
+    /// Points in the order in which they are connected.
     pub points: Vec<(f64, f64)>,
 }
 
-/// Draws each curve over the same `x_title`.
+/// Draws each curve in its own panel; all panels share the `x_title`.
 ///
 /// # Errors
-/// [`FigureError`] if it can't be drawn or written.
+/// [`FigureError`] if the chart can't be drawn or written.
 pub fn draw(curves: &[Curve], x_title: &str, out: &Path) -> Result<(), FigureError> {
     register_font();
     let rows = curves.len().div_ceil(COLUMNS).max(1);
@@ -37,27 +37,28 @@ pub fn draw(curves: &[Curve], x_title: &str, out: &Path) -> Result<(), FigureErr
     let mut text = String::new();
     {
         let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
-        panels(&root, curves, (rows, x_title))
+        draw_panels(&root, curves, rows, x_title)
             .map_err(|e| FigureError::Draw { source: e.to_string().into() })?;
     }
-    Ok(write_whole(out, text.as_bytes())?)
+    Ok(write_atomically(out, text.as_bytes())?)
 }
 
-/// From the least to the most, never empty.
+/// Returns the range from the minimum to the maximum. The range is never empty.
 fn range(values: impl Iterator<Item = f64> + Clone) -> std::ops::Range<f64> {
-    let least = values.clone().fold(f64::INFINITY, f64::min);
-    let most = values.fold(f64::NEG_INFINITY, f64::max);
-    match least < most {
-        true => least..most,
-        false if least.is_finite() => least - 0.5..least + 0.5,
+    let min = values.clone().fold(f64::INFINITY, f64::min);
+    let max = values.fold(f64::NEG_INFINITY, f64::max);
+    match min < max {
+        true => min..max,
+        false if min.is_finite() => min - 0.5..min + 0.5,
         false => 0.0..1.0,
     }
 }
 
-fn panels<DB: DrawingBackend>(
+fn draw_panels<DB: DrawingBackend>(
     root: &DrawingArea<DB, plotters::coord::Shift>,
     curves: &[Curve],
-    (rows, x_title): (usize, &str),
+    rows: usize,
+    x_title: &str,
 ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
     root.fill(&WHITE)?;
     for (k, (curve, panel)) in curves.iter().zip(root.split_evenly((rows, COLUMNS))).enumerate() {
@@ -80,8 +81,8 @@ fn panels<DB: DrawingBackend>(
             .axis_style(INK)
             .draw()?;
         let color = PALETTE[k % PALETTE.len()];
-        // Few points would hardly show as a line.
-        let size = if curve.points.len() <= FEW_POINTS { 4 } else { 0 };
+        // A line of few points is hard to see without markers.
+        let size = if curve.points.len() <= MAX_MARKED_POINTS { 4 } else { 0 };
         let style = color.stroke_width(2).filled();
         chart.draw_series(LineSeries::new(finite.copied(), style).point_size(size))?;
     }

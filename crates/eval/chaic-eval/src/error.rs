@@ -1,4 +1,4 @@
-//! What can go wrong, with what it went wrong with, and what to do.
+//! Errors of evaluation.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -8,31 +8,31 @@ use chaic_env::{EnvError, RunKey};
 use chaic_episodes::{EpisodeError, SplitError};
 use chaic_files::FileError;
 
-/// The result of anything in this crate.
+/// Result with an [`EvalError`].
 pub type Result<T> = std::result::Result<T, EvalError>;
 
-/// What can go wrong.
+/// Error of evaluation.
 #[derive(Debug, thiserror::Error)]
 pub enum EvalError {
-    /// The operating system refused something.
+    /// An I/O operation failed.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A folder isn't a run.
+    /// A folder is not a run.
     #[error(
-        "{path} is no run: it has no run.json; give the folder that `chaic eval --out` wrote",
+        "{path} is not a run: it has no run.json; give the folder that `chaic eval --out` wrote",
         path = path.display()
     )]
     NotARun {
         /// The folder.
         path: PathBuf,
     },
-    /// A run was stopped before it began.
+    /// A run was stopped before its `run.json` was written.
     #[error(
-        "a run in {path} was stopped before anything was recorded, so there is nothing to go on \
-         with; give its command again without --resume",
+        "the run in {path} was stopped before its run.json was written, so it can't be resumed; \
+         give its command again without --resume",
         path = path.display()
     )]
-    NotBegun {
+    NotStarted {
         /// The folder.
         path: PathBuf,
     },
@@ -41,13 +41,13 @@ pub enum EvalError {
         "{path} holds an interrupted merge; run the same `chaic merge` again, or choose another --out",
         path = path.display()
     )]
-    StoppedMerge {
+    InterruptedMerge {
         /// The folder.
         path: PathBuf,
     },
-    /// `run.json` is not what the run wrote.
+    /// `run.json` was changed by hand.
     #[error(
-        "{path} was changed after the run began: its options don't fit their digest; undo the \
+        "{path} was changed after the run started: its options don't match their digest; undo the \
          change, or play with other options in another --out",
         path = path.display()
     )]
@@ -64,9 +64,9 @@ pub enum EvalError {
         /// The run's folder.
         path: PathBuf,
     },
-    /// The folder for a new run has something in it.
+    /// The folder for a new run is not empty.
     #[error(
-        "{path} exists and isn't empty; choose another --out, or go on with a run there by --resume",
+        "{path} exists and isn't empty; choose another --out, or resume its run with --resume",
         path = path.display()
     )]
     NotEmpty {
@@ -75,56 +75,56 @@ pub enum EvalError {
     },
     /// A run can't be resumed with other options.
     #[error(
-        "{path} was begun with {option} {recorded}, not {given}; leave {option} away to go on, or \
+        "{path} was started with {option} {recorded}, not {given}; omit {option} to resume it, or \
          choose another --out",
         path = path.display()
     )]
     OptionDiffers {
         /// The run's folder.
         path: PathBuf,
-        /// The option.
+        /// Name of the option.
         option: &'static str,
-        /// Its value in the run.
+        /// Value in the run.
         recorded: String,
-        /// Its value now.
+        /// Requested value.
         given: String,
     },
-    /// Another build of the same version began a run.
+    /// Another build of the same version started a run.
     #[error(
-        "{path}: {episode} with {helper} and seed {seed} comes out otherwise than it did, so another \
-         build of chaic {chaic} began this; go on with that one, or begin anew in another --out",
+        "{path}: {episode} with {helper} and seed {seed} gives another result than before, so another \
+         build of chaic {chaic} started this run; resume with that build, or choose another --out",
         path = path.display(), episode = key.episode, helper = key.helper, seed = key.seed,
         chaic = chaic_env::CHAIC_VERSION
     )]
-    OtherCode {
+    OtherBuild {
         /// The run's folder.
         path: PathBuf,
-        /// The episode run that was played again.
+        /// The episode run that gave another result.
         key: RunKey,
     },
     /// An episode can't be played.
     #[error(transparent)]
     Env(#[from] EnvError),
-    /// A mind can't decide.
+    /// An agent failed.
     #[error(transparent)]
     Agent(#[from] AgentError),
-    /// Options make no run.
+    /// Options are invalid or contradictory.
     #[error("{0}")]
     Options(String),
-    /// There is no such trace in a run.
+    /// The run has no such trace.
     #[error("{path} has no trace of {wanted}; it has {known}", path = path.display())]
     NoTrace {
         /// The run's folder.
         path: PathBuf,
-        /// What was asked for.
+        /// Description of the requested trace.
         wanted: String,
-        /// What there is instead.
+        /// Description of the existing traces.
         known: String,
     },
     /// A finished episode run has no trace.
     #[error(
         "{path} has no trace of {episode} with {helper} and seed {seed}, which is finished; play it again \
-         by chaic eval --resume --out {path}",
+         with chaic eval --resume --out {path}",
         path = path.display(), episode = key.episode, helper = key.helper, seed = key.seed
     )]
     Untraced {
@@ -133,45 +133,42 @@ pub enum EvalError {
         /// The episode run.
         key: RunKey,
     },
-    /// A run was told to keep no traces.
+    /// A run was played without traces.
     #[error(
-        "{path} was played with --no-traces, so there is nothing to verify, replay or score anew; \
-         play it again without that option",
+        "{path} was played with --no-traces, so it can't be verified, replayed or scored again; \
+         play it without that option",
         path = path.display()
     )]
     NoTraces {
         /// The run's folder.
         path: PathBuf,
     },
-    /// The system gives no more threads.
+    /// The operating system refused to start a thread.
     #[error(
-        "can't start thread {n} of {wanted}: {refusal}; choose fewer --jobs, or let the system \
+        "can't start thread {n} of {wanted}: {error}; choose fewer --jobs, or let the system \
          allow more threads and memory"
     )]
     NoThread {
-        /// The thread, from 1.
+        /// Index of the thread, from 1.
         n: usize,
-        /// How many are wanted.
+        /// Number of requested threads.
         wanted: usize,
-        /// The refusal.
-        refusal: io::Error,
+        /// Error of the operating system.
+        error: io::Error,
     },
-    /// There is no such episode.
+    /// The episode does not exist.
     #[error(transparent)]
     Split(#[from] SplitError),
-    /// An episode file is wrong.
+    /// An episode file is invalid.
     #[error(transparent)]
     Episode(#[from] EpisodeError),
-    /// A trace's actions don't lead where the trace says.
+    /// An image or video can't be created.
     #[error("{0}")]
-    Difference(String),
-    /// A picture or video can't be made.
-    #[error("{0}")]
-    Picture(String),
+    Image(String),
 }
 
 impl EvalError {
-    /// Whether it is about what the caller asked for, rather than what came of it.
+    /// Returns whether the caller's request caused the error.
     pub fn is_usage(&self) -> bool {
         match self {
             EvalError::Options(_) | EvalError::OptionDiffers { .. } | EvalError::Split(_) => true,
@@ -180,9 +177,9 @@ impl EvalError {
         }
     }
 
-    /// For `map_err` on what the operating system may refuse.
-    pub fn io(what: &'static str, path: &Path) -> impl FnOnce(io::Error) -> EvalError + use<> {
-        let refused = FileError::of(what, path);
-        move |refusal| refused(refusal).into()
+    /// Returns a function that converts an I/O error, for `map_err`.
+    pub fn io(operation: &'static str, path: &Path) -> impl FnOnce(io::Error) -> EvalError + use<> {
+        let convert = FileError::context(operation, path);
+        move |error| convert(error).into()
     }
 }

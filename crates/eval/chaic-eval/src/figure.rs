@@ -1,7 +1,7 @@
 //! Figures of results, as SVG or PNG.
 //!
-//! A figure takes plain labels and numbers, not scores, so that the numbers of the paper and
-//! those of a run can stand side by side.
+//! A figure takes labels and plain numbers instead of scores, so that published numbers can be
+//! drawn next to those of a run.
 
 use std::error::Error;
 use std::io::Cursor;
@@ -9,7 +9,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use chaic_files::{FileError, write_whole};
+use chaic_files::{FileError, write_atomically};
 use image::{ImageFormat, RgbImage, imageops};
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
@@ -17,20 +17,20 @@ use plotters::prelude::*;
 use plotters::style::FontStyle;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-/// File name extensions that a figure can have.
+/// Supported file extensions.
 pub const EXTENSIONS: &[&str] = &["svg", "png"];
 
-/// Width and height of a figure.
+/// Width and height of a figure, pixels.
 pub const SIZE_PX: (u32, u32) = (1400, 600);
 
-/// Most helpers in one figure: eight colors and a light shade of each.
+/// Maximum number of helpers in one figure: eight colors and a light shade of each.
 pub const MAX_HELPERS: usize = 2 * PALETTE.len();
 
-/// Most tasks in one figure; more would not leave a bar three pixels.
+/// Maximum number of tasks in one figure; with more, bars are narrower than three pixels.
 pub const MAX_TASKS: usize = 24;
 
-/// Colors that stay apart for color-blind readers (Okabe and Ito 2008), darkest pair first
-/// and black last because a black bar draws the eye.
+/// Colors that color-blind readers can distinguish (Okabe and Ito 2008). The pair with the most
+/// contrast is first. Black is last because black bars attract attention.
 pub(crate) const PALETTE: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(230, 159, 0),
@@ -46,25 +46,25 @@ pub(crate) const INK: RGBColor = RGBColor(30, 30, 30);
 const FAINT_INK: RGBColor = RGBColor(110, 110, 110);
 pub(crate) const GRID: RGBColor = RGBColor(222, 222, 222);
 
-/// In SVG the reader's own; in PNG, and to measure text, the font registered below.
+/// Viewers of SVG use their own font. PNG and text measurements use the font registered below.
 pub(crate) const FONT: &str = "sans-serif";
 const TEXT_PX: i32 = 19;
 const NOTE_PX: i32 = 16;
 
-/// PNG is drawn this much larger and shrunk: glyphs stand at whole pixels, and at their final
-/// size some would touch.
+/// PNG is drawn larger by this factor and then reduced. Glyphs are placed at whole pixels, and at
+/// the final size some would touch.
 const PNG_OVERSAMPLING: u32 = 3;
 
-/// From the left and right edge of the figure to the plot, and from the bottom.
+/// Distances of the plot from the left, right and bottom edge of the figure.
 const LEFT_PX: i32 = 84;
 const RIGHT_PX: i32 = 20;
 const BOTTOM_PX: i32 = 44;
-/// From the left edge of the figure to the name of the axis.
-const AXIS_NAME_PX: i32 = 12;
+/// Distance of the axis title from the left edge of the figure.
+const AXIS_TITLE_PX: i32 = 12;
 const LEGEND_ROW_PX: i32 = 30;
-/// Room between legend and plot.
-const HEADROOM_PX: i32 = 26;
-/// Part of a task's width that its bars take.
+/// Space between legend and plot.
+const LEGEND_GAP_PX: i32 = 26;
+/// Fraction of a task's width that its bars occupy.
 const GROUP_WIDTH: f64 = 0.82;
 
 /// A mean with its 95 % interval.
@@ -72,9 +72,9 @@ const GROUP_WIDTH: f64 = 0.82;
 pub struct Bar {
     /// Height of the bar, 0 to 1.
     pub mean: f64,
-    /// The ends of the whisker, 0 to 1 with the mean between them; `None` for no whisker.
+    /// Ends of the whisker, 0 to 1 with the mean between them; `None` for no whisker.
     pub interval: Option<[f64; 2]>,
-    /// Where a dot stands for somebody else's mean, 0 to 1.
+    /// Reference value that is drawn as a dot, 0 to 1.
     pub dot: Option<f64>,
 }
 
@@ -83,7 +83,7 @@ pub struct Bar {
 pub struct HelperBars {
     /// Name in the legend.
     pub helper: String,
-    /// One entry a task; without a value the place stays empty.
+    /// One entry per task; `None` leaves a gap.
     pub values: Vec<Option<Bar>>,
 }
 
@@ -92,65 +92,69 @@ pub struct HelperBars {
 pub struct Bars {
     /// Titles of the tasks, from left to right.
     pub tasks: Vec<String>,
-    /// The helpers, from left to right within each task.
+    /// Helpers, from left to right within each task.
     pub helpers: Vec<HelperBars>,
-    /// Whose means the dots are; without dots `None`.
+    /// Legend text of the dots; `None` without dots.
     pub dots: Option<String>,
 }
 
-/// Why a figure could not be drawn.
+/// Error while drawing a figure.
 #[derive(Debug, thiserror::Error)]
 pub enum FigureError {
-    /// The extension names no format.
-    #[error("cannot draw a figure of this kind, use one of {}: {path:?}", EXTENSIONS.join(", "))]
+    /// The file extension is not supported.
+    #[error("can't draw a figure with this extension, use one of {}: {path:?}", EXTENSIONS.join(", "))]
     UnsupportedExtension {
-        /// The file asked for.
+        /// Path of the figure.
         path: PathBuf,
     },
-    /// There is nothing to draw, or too much for one figure.
+    /// The number of tasks or helpers is out of range.
     #[error(
-        "cannot draw {n_tasks} tasks and {n_helpers} helpers, \
+        "can't draw {n_tasks} tasks and {n_helpers} helpers, \
          choose 1 to {MAX_TASKS} tasks and 1 to {MAX_HELPERS} helpers"
     )]
     Count {
-        /// Tasks given.
+        /// Number of tasks.
         n_tasks: usize,
-        /// Helpers given.
+        /// Number of helpers.
         n_helpers: usize,
     },
-    /// A helper has not one entry for each task.
+    /// A helper does not have one entry per task.
     #[error("expected {expected} values, one for each task, got {got} from helper `{helper}`")]
     Shape {
-        /// Whose values.
+        /// Name of the helper.
         helper: String,
         /// Number of tasks.
         expected: usize,
         /// Number of values.
         got: usize,
     },
-    /// A mean, a dot or an end of an interval outside 0 to 1, or an interval without its mean.
-    #[error("cannot draw {bar:?} of helper `{helper}` in task `{task}`, a rate is 0 to 1")]
+    /// A mean, a dot or an end of an interval is outside 0 to 1, or an interval does not contain
+    /// its mean.
+    #[error("can't draw {bar:?} of helper `{helper}` in task `{task}`, a rate is 0 to 1")]
     Value {
-        /// Whose value.
+        /// Name of the helper.
         helper: String,
-        /// In which task.
+        /// Title of the task.
         task: String,
-        /// The value.
+        /// The invalid value.
         bar: Bar,
     },
-    /// The library refused to draw.
-    #[error("cannot draw the figure: {source}")]
+    /// The plotting library failed.
+    #[error("can't draw the figure: {source}")]
     Draw {
-        /// What the library said.
+        /// Error of the library.
         source: DynError,
     },
-    /// The file could not be written.
+    /// The file can't be written.
     #[error(transparent)]
     Write(#[from] FileError),
 }
 
 /// Draws the transport rate of each helper in each task as grouped bars with whiskers for 95 %
-/// intervals; the extension of `out` picks SVG or PNG.
+/// intervals. The extension of `out` selects SVG or PNG.
+///
+/// # Errors
+/// [`FigureError`] if the values or the extension are invalid, or the file can't be written.
 pub fn transport_rate(bars: &Bars, out: &Path) -> Result<(), FigureError> {
     bars.check()?;
     let extension = out.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
@@ -160,10 +164,13 @@ pub fn transport_rate(bars: &Bars, out: &Path) -> Result<(), FigureError> {
         _ => return Err(FigureError::UnsupportedExtension { path: out.to_owned() }),
     };
     let bytes = drawn.map_err(|source| FigureError::Draw { source })?;
-    Ok(write_whole(out, &bytes)?)
+    Ok(write_atomically(out, &bytes)?)
 }
 
-/// The text of the SVG file that [`transport_rate`] writes.
+/// Returns the text of the SVG file that [`transport_rate`] writes.
+///
+/// # Errors
+/// [`FigureError`] if the values are invalid.
 pub fn svg_text(bars: &Bars) -> Result<String, FigureError> {
     bars.check()?;
     draw_svg(bars).map_err(|source| FigureError::Draw { source })
@@ -185,8 +192,8 @@ impl Bars {
                 let [low, high] = bar.interval.unwrap_or([bar.mean; 2]);
                 let all = [bar.mean, low, high, bar.dot.unwrap_or(0.0)];
                 let is_ordered = low <= bar.mean && bar.mean <= high;
-                let drawable = is_ordered && all.iter().all(|v| (0.0..=1.0).contains(v));
-                if !drawable {
+                let is_drawable = is_ordered && all.iter().all(|v| (0.0..=1.0).contains(v));
+                if !is_drawable {
                     let (helper, task) = (helper.clone(), task.clone());
                     return Err(FigureError::Value { helper, task, bar });
                 }
@@ -207,7 +214,7 @@ fn draw_svg(bars: &Bars) -> Result<String, DynError> {
     Ok(text)
 }
 
-/// The bytes of a PNG file.
+/// Returns the bytes of a PNG file.
 fn draw_png(bars: &Bars) -> Result<Vec<u8>, DynError> {
     let scale = PNG_OVERSAMPLING;
     let size = (SIZE_PX.0 * scale, SIZE_PX.1 * scale);
@@ -220,18 +227,18 @@ fn draw_png(bars: &Bars) -> Result<Vec<u8>, DynError> {
     Ok(bytes.into_inner())
 }
 
-/// Without a system font library the fonts that may be drawn have to be announced.
+/// Without a system font library, plotters requires that fonts are registered.
 static FONT_IS_REGISTERED: LazyLock<()> = LazyLock::new(|| {
     plotters::style::register_font(FONT, FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT)
         .unwrap_or_else(|_| unreachable!("the font is part of the program"));
 });
 
-/// Announces [`FONT`], which has to be done before anything is drawn.
+/// Registers [`FONT`]; required before drawing.
 pub(crate) fn register_font() {
     LazyLock::force(&FONT_IS_REGISTERED);
 }
 
-/// Where a figure is drawn; all constants are in pixels of a scale of 1.
+/// Drawing area of a figure; all constants are in pixels at scale 1.
 struct Canvas<DB: DrawingBackend> {
     root: DrawingArea<DB, Shift>,
     scale: i32,
@@ -241,21 +248,21 @@ impl<DB: DrawingBackend> Canvas<DB> {
     fn draw(&self, bars: &Bars) -> Result<(), DrawError<DB>> {
         register_font();
         self.root.fill(&WHITE)?;
-        let legend_px = self.legend(bars)?;
+        let legend_px = self.draw_legend(bars)?;
         let mut chart = ChartBuilder::on(&self.root)
-            .margin_top((legend_px + HEADROOM_PX) * self.scale)
+            .margin_top((legend_px + LEGEND_GAP_PX) * self.scale)
             .margin_right(RIGHT_PX * self.scale)
-            .margin_left(AXIS_NAME_PX * self.scale)
+            .margin_left(AXIS_TITLE_PX * self.scale)
             .x_label_area_size(BOTTOM_PX * self.scale)
-            .y_label_area_size((LEFT_PX - AXIS_NAME_PX) * self.scale)
+            .y_label_area_size((LEFT_PX - AXIS_TITLE_PX) * self.scale)
             .build_cartesian_2d(0.0..bars.tasks.len() as f64, 0.0..1.0)?;
-        self.axes(&bars.tasks, &mut chart)?;
-        self.groups(bars, &chart)?;
+        self.draw_axes(&bars.tasks, &mut chart)?;
+        self.draw_groups(bars, &chart)?;
         self.root.present()
     }
 
-    /// Draws the helpers' names in rows at the top; returns the height.
-    fn legend(&self, bars: &Bars) -> Result<i32, DrawError<DB>> {
+    /// Draws the helpers' names in rows at the top; returns the height in pixels.
+    fn draw_legend(&self, bars: &Bars) -> Result<i32, DrawError<DB>> {
         const SWATCH_PX: i32 = 18;
         const GAP_PX: i32 = 8;
         const ENTRY_GAP_PX: i32 = 22;
@@ -263,30 +270,30 @@ impl<DB: DrawingBackend> Canvas<DB> {
         let (mut x, mut y) = (LEFT_PX, LEGEND_ROW_PX);
         for (index, HelperBars { helper, .. }) in bars.helpers.iter().enumerate() {
             let style = self.text_style(TEXT_PX, INK, HPos::Left, VPos::Center);
-            // The reader's font may be a tenth wider than the one measured.
+            // The viewer's font may be wider than the measured one by a tenth.
             let text_px = self.text_width_px(helper, &style)? * 11 / 10;
             let width = SWATCH_PX + GAP_PX + text_px;
             if x > LEFT_PX && x + width > right {
                 (x, y) = (LEFT_PX, y + LEGEND_ROW_PX);
             }
             let corners = [(x, y - SWATCH_PX / 2), (x + SWATCH_PX, y + SWATCH_PX / 2)];
-            let swatch = Rectangle::new(corners.map(|c| self.at(c)), color(index).filled());
+            let swatch = Rectangle::new(corners.map(|c| self.scaled(c)), color(index).filled());
             self.root.draw(&swatch)?;
-            let at = self.at((x + SWATCH_PX + GAP_PX, y));
+            let at = self.scaled((x + SWATCH_PX + GAP_PX, y));
             self.root.draw(&Text::new(helper.clone(), at, style))?;
             x += width + ENTRY_GAP_PX;
         }
-        let dots = bars.dots.as_ref().map_or(String::new(), |whose| format!("; dots: {whose}"));
+        let dots = bars.dots.as_ref().map_or(String::new(), |text| format!("; dots: {text}"));
         let note = format!("whiskers: 95 % intervals over environments{dots}");
         let style = self.text_style(NOTE_PX, FAINT_INK, HPos::Right, VPos::Center);
         if x + self.text_width_px(&note, &style)? > right {
             y += LEGEND_ROW_PX;
         }
-        self.root.draw(&Text::new(note, self.at((right, y)), style))?;
+        self.root.draw(&Text::new(note, self.scaled((right, y)), style))?;
         Ok(y + LEGEND_ROW_PX / 2)
     }
 
-    fn axes(&self, tasks: &[String], chart: &mut Chart<'_, DB>) -> Result<(), DrawError<DB>> {
+    fn draw_axes(&self, tasks: &[String], chart: &mut Chart<'_, DB>) -> Result<(), DrawError<DB>> {
         let text = |size_px| self.text_style(size_px, INK, HPos::Left, VPos::Top);
         chart
             .configure_mesh()
@@ -311,19 +318,19 @@ impl<DB: DrawingBackend> Canvas<DB> {
         Ok(())
     }
 
-    fn groups(&self, bars: &Bars, chart: &Chart<'_, DB>) -> Result<(), DrawError<DB>> {
+    fn draw_groups(&self, bars: &Bars, chart: &Chart<'_, DB>) -> Result<(), DrawError<DB>> {
         let width = GROUP_WIDTH / bars.helpers.len() as f64;
         for (index, HelperBars { values, .. }) in bars.helpers.iter().enumerate() {
             for (task, bar) in values.iter().enumerate() {
                 let Some(bar) = bar else { continue };
                 let left = task as f64 + (1.0 - GROUP_WIDTH) / 2.0 + index as f64 * width;
-                self.bar(*bar, left..left + width, color(index), chart)?;
+                self.draw_bar(*bar, left..left + width, color(index), chart)?;
             }
         }
         Ok(())
     }
 
-    fn bar(
+    fn draw_bar(
         &self,
         bar: Bar,
         x: Range<f64>,
@@ -332,12 +339,13 @@ impl<DB: DrawingBackend> Canvas<DB> {
     ) -> Result<(), DrawError<DB>> {
         let (left, bottom) = chart.backend_coord(&(x.start, 0.0));
         let (right, top) = chart.backend_coord(&(x.end, bar.mean));
-        // One pixel between neighbors, and two of height, so that zero differs from no value.
+        // One pixel between neighbors, and at least two pixels of height, so that zero differs from
+        // a missing value.
         let right = (right - self.scale).max(left + 1);
         let corners = [(left, top.min(bottom - 2 * self.scale)), (right, bottom)];
         self.root.draw(&Rectangle::new(corners, color.filled()))?;
         if let Some(ends) = bar.interval {
-            self.whisker(ends, x.start, [left, right], chart)?;
+            self.draw_whisker(ends, x.start, [left, right], chart)?;
         }
         let Some(dot) = bar.dot else { return Ok(()) };
         let at = ((left + right) / 2, chart.backend_coord(&(x.start, dot)).1);
@@ -346,7 +354,7 @@ impl<DB: DrawingBackend> Canvas<DB> {
         self.root.draw(&Circle::new(at, radius, self.stroke(INK)))
     }
 
-    fn whisker(
+    fn draw_whisker(
         &self,
         ends: [f64; 2],
         x: f64,
@@ -366,8 +374,8 @@ impl<DB: DrawingBackend> Canvas<DB> {
         Ok(())
     }
 
-    fn at(&self, (x, y): (i32, i32)) -> (i32, i32) {
-        (x * self.scale, y * self.scale)
+    fn scaled(&self, point: (i32, i32)) -> (i32, i32) {
+        (point.0 * self.scale, point.1 * self.scale)
     }
 
     fn stroke(&self, color: RGBColor) -> ShapeStyle {

@@ -1,21 +1,21 @@
-//! Runs, metrics, reports and replays.
+//! Evaluation: runs, metrics, reports, verification and replays.
 //!
-//! **What it is**: what becomes of episodes that `chaic-env` plays. [`run`] plays whole benchmarks on
-//! several threads, keeps a journal and writes a [`trace_file`] of each, [`metrics`] computes the
-//! paper's scores from what was recorded, [`report`] prints them, [`verify`] plays a trace's actions
-//! again and compares, [`replay`] and [`frame_export`] draw what was played, [`audit`] shows that what is
-//! hidden is hidden.
+//! **What it is**: everything around the episodes that `chaic-env` plays. [`run`] plays whole
+//! benchmarks on several threads, keeps a journal and writes a [`trace_file`] per episode run.
+//! [`metrics`] computes the paper's scores from the records, and [`report`] prints them. [`verify`]
+//! re-simulates traces and compares the records. [`replay`] and [`frame_export`] render episodes.
+//! [`audit`] tests that hidden state does not influence agents.
 //!
-//! **What it is not**: it holds no rules of the world, and decides for nobody.
+//! **What it is not**: it holds no rules of the world and makes no decisions for agents.
 //!
 //! **Invariants**
-//! - A score depends on episodes, seeds, helper and rules only: not on the number of workers, not
-//!   on the clock, not on whether a run was interrupted.
+//! - A score depends on episodes, seeds, helper and rules only. It does not depend on the number of
+//!   workers, the clock, or interruptions of the run.
 //! - Metrics read records and never step a world.
-//! - A run folder is readable after a crash at any moment; at most the episodes under way are
-//!   lost.
+//! - A run folder is readable after a crash at any moment. A crash loses at most the episodes that
+//!   were being played.
 
-/// The examples of docs/contributing/extending.md, so that they are compiled and run with the tests.
+/// Examples of docs/contributing/extending.md, compiled and run as documentation tests.
 #[cfg(doctest)]
 #[doc = include_str!("../../../../docs/contributing/extending.md")]
 struct Extending;

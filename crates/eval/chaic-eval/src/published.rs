@@ -1,20 +1,20 @@
-//! What the paper reports: the figures that everything here is held against.
+//! Scores that the paper reports.
 //!
-//! Sources, by field: TR, EI, IA and ER of the planning helpers stand in the paper's table
-//! "Quantitative results on CHAIC benchmark" (section 5, `tab:main_results`), CR and the standard
-//! error of TR in "Additional results on CHAIC benchmark" (appendix, `tab:appendix_results`), TR
-//! and EI of the learning helpers in "Quantitative results of learning-based agents" (appendix,
+//! Sources: TR, EI, IA and ER of the planning helpers are in the paper's table "Quantitative
+//! results on CHAIC benchmark" (section 5, `tab:main_results`). CR and the standard error of TR are
+//! in "Additional results on CHAIC benchmark" (appendix, `tab:appendix_results`). TR and EI of the
+//! learning helpers are in "Quantitative results of learning-based agents" (appendix,
 //! `tab:rl_results`). All are means over the original's test split, to two decimals.
 //!
-//! The table of the learning helpers repeats the row without helper with 0.38, 0.27 and 0.08 in
-//! high container, high goal and obstacle, where the main table has 0.37, 0.28 and 0.07; the main
-//! table's are kept here.
+//! The table of the learning helpers repeats the row without helper. It has 0.38, 0.27 and 0.08 in
+//! high container, high goal and obstacle; the main table has 0.37, 0.28 and 0.07. This file has
+//! the values of the main table.
 
 use chaic_core::TaskId;
 
-/// What the paper reports of one helper in one task. What it doesn't report is `None`.
+/// Published scores of one helper in one task; `None` for scores that the paper does not report.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Figures {
+pub struct PublishedScores {
     /// Transport rate, 0 to 1.
     pub tr: f64,
     /// Efficiency improvement over no helper.
@@ -29,27 +29,27 @@ pub struct Figures {
     pub tr_se: Option<f64>,
 }
 
-/// A row of the paper's tables. Arrays are in the order of the tasks ([`TaskId::all`]), which is
-/// that of the paper.
+/// A row of the paper's tables. Arrays are in the order of [`TaskId::all`], which is the paper's
+/// order.
 #[derive(Clone, Copy, Debug)]
-pub struct Published {
-    /// The helper's name in commands, or, where chaic has none, of the same kind.
+pub struct PublishedHelper {
+    /// Name of the helper in commands, or of a helper of the same kind if chaic does not have it.
     pub helper: &'static str,
-    /// What the paper calls it.
+    /// Name in the paper.
     pub title: &'static str,
     tr: [f64; 8],
     ei: Option<[f64; 8]>,
-    /// Not of the last task, moving house.
+    /// All tasks except the last one, moving house.
     ia: Option<[f64; 7]>,
-    /// Shopping's.
+    /// Shopping only.
     er: Option<f64>,
     cr: Option<[f64; 8]>,
     tr_se: Option<[f64; 8]>,
 }
 
-/// All rows, in the paper's order; the learning helpers last.
-pub static PUBLISHED: [Published; 8] = [
-    Published {
+/// All rows in the paper's order; the learning helpers are last.
+pub static PUBLISHED: [PublishedHelper; 8] = [
+    PublishedHelper {
         helper: "none",
         title: "w/o",
         tr: [0.53, 0.30, 0.37, 0.28, 0.51, 0.07, 0.37, 0.17],
@@ -59,7 +59,7 @@ pub static PUBLISHED: [Published; 8] = [
         cr: None,
         tr_se: Some([0.03, 0.02, 0.03, 0.05, 0.03, 0.04, 0.02, 0.04]),
     },
-    Published {
+    PublishedHelper {
         helper: "random",
         title: "Random",
         tr: [0.52, 0.27, 0.36, 0.33, 0.50, 0.21, 0.39, 0.48],
@@ -69,7 +69,7 @@ pub static PUBLISHED: [Published; 8] = [
         cr: Some([0.09, 0.10, 0.12, 0.06, 0.09, 0.09, 0.07, 0.73]),
         tr_se: Some([0.04, 0.03, 0.03, 0.04, 0.04, 0.04, 0.02, 0.05]),
     },
-    Published {
+    PublishedHelper {
         helper: "rhp",
         title: "RHP",
         tr: [0.64, 0.35, 0.45, 0.35, 0.66, 0.44, 0.49, 0.65],
@@ -79,7 +79,7 @@ pub static PUBLISHED: [Published; 8] = [
         cr: Some([0.15, 0.43, 0.29, 0.39, 0.36, 0.19, 0.34, 0.74]),
         tr_se: Some([0.02, 0.04, 0.03, 0.05, 0.03, 0.04, 0.02, 0.04]),
     },
-    Published {
+    PublishedHelper {
         helper: "vlm",
         title: "VLM (GPT-4o)",
         tr: [0.63, 0.33, 0.43, 0.26, 0.69, 0.40, 0.50, 0.70],
@@ -89,7 +89,7 @@ pub static PUBLISHED: [Published; 8] = [
         cr: Some([0.13, 0.08, 0.34, 0.18, 0.39, 0.17, 0.34, 0.82]),
         tr_se: Some([0.03, 0.02, 0.04, 0.05, 0.02, 0.03, 0.03, 0.05]),
     },
-    Published {
+    PublishedHelper {
         helper: "llm_bm",
         title: "LLM (GPT-4) + BM",
         tr: [0.65, 0.38, 0.49, 0.36, 0.70, 0.42, 0.58, 0.69],
@@ -99,7 +99,7 @@ pub static PUBLISHED: [Published; 8] = [
         cr: Some([0.22, 0.30, 0.30, 0.35, 0.38, 0.45, 0.46, 0.78]),
         tr_se: Some([0.03, 0.03, 0.03, 0.04, 0.03, 0.05, 0.03, 0.05]),
     },
-    Published {
+    PublishedHelper {
         helper: "oracle",
         title: "Oracle",
         tr: [0.77, 0.49, 0.69, 0.61, 0.82, 0.60, 0.61, 0.76],
@@ -109,7 +109,7 @@ pub static PUBLISHED: [Published; 8] = [
         cr: Some([0.51, 0.64, 0.66, 0.73, 0.59, 0.38, 0.45, 0.77]),
         tr_se: Some([0.03, 0.04, 0.03, 0.04, 0.03, 0.03, 0.03, 0.04]),
     },
-    Published {
+    PublishedHelper {
         helper: "rl",
         title: "RL",
         tr: [0.45, 0.26, 0.28, 0.25, 0.43, 0.11, 0.32, 0.67],
@@ -119,7 +119,7 @@ pub static PUBLISHED: [Published; 8] = [
         cr: None,
         tr_se: None,
     },
-    Published {
+    PublishedHelper {
         helper: "smart_help",
         title: "Smart-Help",
         tr: [0.46, 0.24, 0.26, 0.31, 0.49, 0.13, 0.32, 0.57],
@@ -131,11 +131,11 @@ pub static PUBLISHED: [Published; 8] = [
     },
 ];
 
-impl Published {
-    /// What the paper reports of this helper in a task; `None` for a task that is not the paper's.
-    pub fn figures(&self, task: TaskId) -> Option<Figures> {
+impl PublishedHelper {
+    /// Returns the published scores in a task; `None` for a task that is not in the paper.
+    pub fn scores(&self, task: TaskId) -> Option<PublishedScores> {
         let k = TaskId::paper().position(|t| t == task)?;
-        Some(Figures {
+        Some(PublishedScores {
             tr: self.tr[k],
             ei: self.ei.map(|row| row[k]),
             ia: self.ia.and_then(|row| row.get(k).copied()),
@@ -146,8 +146,8 @@ impl Published {
     }
 }
 
-/// The paper's row of the helper of this name.
-pub fn published(helper: &str) -> Option<&'static Published> {
+/// Returns the paper's row of a helper.
+pub fn published(helper: &str) -> Option<&'static PublishedHelper> {
     PUBLISHED.iter().find(|row| row.helper == helper)
 }
 
@@ -156,29 +156,30 @@ mod tests {
     use super::*;
 
     #[test]
-    fn figures_are_those_of_the_paper() {
-        let of = |helper: &str, task| published(helper).unwrap().figures(task).unwrap();
-        let oracle = of("oracle", TaskId::Shopping);
+    fn scores_are_those_of_the_paper() {
+        let scores = |helper: &str, task| published(helper).unwrap().scores(task).unwrap();
+        let oracle = scores("oracle", TaskId::Shopping);
         assert_eq!((oracle.tr, oracle.ei), (0.61, Some(0.39)));
         assert_eq!((oracle.ia, oracle.er), (Some(0.87), Some(0.17)));
-        let vlm = of("vlm", TaskId::HighGoal);
+        let vlm = scores("vlm", TaskId::HighGoal);
         assert_eq!((vlm.tr, vlm.ei, vlm.ia), (0.26, Some(-0.20), Some(0.33)));
-        let random = of("random", TaskId::Obstacle);
+        let random = scores("random", TaskId::Obstacle);
         assert_eq!((random.tr, random.ei, random.er), (0.21, Some(0.56), None));
-        let moving = of("rhp", TaskId::MovingHouse);
+        let moving = scores("rhp", TaskId::MovingHouse);
         assert_eq!((moving.tr, moving.ia, moving.cr), (0.65, None, Some(0.74)));
-        assert_eq!(of("none", TaskId::HighGoal).tr_se, Some(0.05));
-        assert_eq!(of("smart_help", TaskId::Obstacle).tr, 0.13);
-        assert!(published("nobody").is_none());
+        assert_eq!(scores("none", TaskId::HighGoal).tr_se, Some(0.05));
+        assert_eq!(scores("smart_help", TaskId::Obstacle).tr, 0.13);
+        assert!(published("unknown").is_none());
     }
 
-    /// EI is no function of the means of TR, but has their sign wherever these differ by much.
+    /// EI is not a function of the mean TR values, but has the sign of their difference where that
+    /// is large.
     #[test]
     fn transport_rates_and_improvements_agree() {
         let alone = published("none").unwrap();
         for row in &PUBLISHED {
             for task in TaskId::paper() {
-                let (f, without) = (row.figures(task).unwrap(), alone.figures(task).unwrap().tr);
+                let (f, without) = (row.scores(task).unwrap(), alone.scores(task).unwrap().tr);
                 let Some(ei) = f.ei else { continue };
                 if (f.tr - without).abs() > 0.05 {
                     assert_eq!(ei > 0.0, f.tr > without, "{} in {task}", row.title);
@@ -188,20 +189,20 @@ mod tests {
         }
     }
 
-    /// docs/results.md prints the paper's rows by hand.
+    /// docs/results.md repeats the paper's rows.
     #[test]
-    fn the_page_of_results_quotes_the_same_figures() {
+    fn the_results_page_has_the_same_scores() {
         let page = include_str!("../../../../docs/results.md");
         for row in &PUBLISHED {
             let head = format!("| {}, paper |", row.title);
             let Some(line) = page.lines().find(|l| l.starts_with(&head)) else { continue };
             let cells: Vec<&str> = line.trim_matches('|').split('|').skip(1).collect();
             for (task, cell) in TaskId::paper().zip(cells) {
-                let f = row.figures(task).unwrap();
+                let f = row.scores(task).unwrap();
                 let ei = f.ei.map_or(String::new(), |ei| format!(" ({ei:.2})"));
                 assert_eq!(cell.trim(), format!("{:.2}{ei}", f.tr), "{} in {task}", row.title);
             }
         }
-        assert_eq!(page.matches(", paper |").count(), 4, "all rows were looked at");
+        assert_eq!(page.matches(", paper |").count(), 4, "all rows were compared");
     }
 }

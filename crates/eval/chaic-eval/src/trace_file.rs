@@ -1,26 +1,26 @@
-//! Files of traces: written to `NAME.partial`, which becomes `NAME` when the trace is whole.
+//! Trace files. A trace is written to `NAME.partial` and renamed to `NAME` when it is complete.
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
-use chaic_env::trace::{Header, MAX_TRACE_BYTES, Record, Trace, Warning, parse};
-use chaic_files::{create_fresh, make_folders_below, read_below, read_bounded};
+use chaic_env::trace::{Header, MAX_TRACE_BYTES, Record, Trace, TraceWarning, parse};
+use chaic_files::{create_folders_below, create_or_replace, read_below, read_bounded};
 
 use crate::error::{EvalError, Result};
 
-/// Reads a trace up to its last whole record, and says so where that isn't all.
+/// Reads a trace up to its last complete record. Warnings describe what is left out.
 ///
 /// # Errors
-/// If the file is a link or no regular file, can't be read at all, has no whole header, or is of another
+/// If the file is a link or no regular file, can't be read, has no complete header, or has another
 /// format or version.
-pub fn read(path: &Path) -> Result<(Trace, Vec<Warning>)> {
-    // One byte more than the limit tells a file at the limit from a longer one.
+pub fn read(path: &Path) -> Result<(Trace, Vec<TraceWarning>)> {
+    // One byte more than the limit distinguishes a file at the limit from a longer one.
     let bytes = read_bounded(path, MAX_TRACE_BYTES + 1)?;
     Ok(parse(&bytes, path)?)
 }
 
-/// Returns the bytes of a trace below the folder of its run, to be [parsed](parse).
+/// Returns the bytes of a trace below the folder of its run; [`parse`] parses them.
 ///
 /// # Errors
 /// If the file can't be read, is no regular file, or is reached through a link inside the run.
@@ -28,14 +28,13 @@ pub(crate) fn bytes(run: &Path, path: &Path) -> Result<Vec<u8>> {
     Ok(read_below(run, path, MAX_TRACE_BYTES + 1)?)
 }
 
-/// Compares a file with the output of [`Writer`] for the trace that was parsed from it. Returns the number of
-/// the first line that differs, from 1; `None` if all bytes are equal.
-pub(crate) fn first_foreign_line(trace: &Trace, bytes: &[u8]) -> Option<usize> {
+/// Compares a file with the output of [`TraceWriter`], in the trace's version of the format, for the
+/// trace that was parsed from it.
+/// Returns the number of the first line that differs, from 1; `None` if all bytes are equal.
+pub(crate) fn first_differing_line(trace: &Trace, bytes: &[u8]) -> Option<usize> {
     let mut lines = bytes.split_inclusive(|b| *b == b'\n');
-    let header = std::iter::once(trace.header.to_line());
-    let written = header.chain(trace.records.iter().map(Record::to_line));
     let mut n = 0;
-    for line in written {
+    for line in trace.lines() {
         n += 1;
         if lines.next().and_then(|l| l.strip_suffix(b"\n")) != Some(line.as_bytes()) {
             return Some(n);
@@ -44,25 +43,25 @@ pub(crate) fn first_foreign_line(trace: &Trace, bytes: &[u8]) -> Option<usize> {
     lines.next().map(|_| n + 1)
 }
 
-/// Appends records to a trace file.
+/// Writer of a trace file.
 #[derive(Debug)]
-pub struct Writer {
+pub struct TraceWriter {
     file: BufWriter<File>,
     partial: PathBuf,
     path: PathBuf,
 }
 
-impl Writer {
-    /// Begins the trace at `path` below the folder `run`. Creates missing folders, and replaces an older
-    /// partial trace.
+impl TraceWriter {
+    /// Creates the trace at `path` below the folder `run` and writes the header. Creates missing
+    /// folders, and replaces an older partial trace.
     ///
     /// # Errors
-    /// If a folder between `run` and the trace is a link, or the file system refuses.
-    pub fn create(run: &Path, path: &Path, header: &Header) -> Result<Writer> {
-        make_folders_below(run, path.parent().unwrap_or(run))?;
+    /// If a folder between `run` and the trace is a link, or an I/O operation fails.
+    pub fn create(run: &Path, path: &Path, header: &Header) -> Result<TraceWriter> {
+        create_folders_below(run, path.parent().unwrap_or(run))?;
         let partial = partial_path(path);
-        let file = create_fresh(&partial).map_err(EvalError::io("create", &partial))?;
-        let mut writer = Writer { file: BufWriter::new(file), partial, path: path.to_owned() };
+        let file = create_or_replace(&partial).map_err(EvalError::io("create", &partial))?;
+        let mut writer = TraceWriter { file: BufWriter::new(file), partial, path: path.to_owned() };
         writer.line(&header.to_line())?;
         Ok(writer)
     }
@@ -70,25 +69,26 @@ impl Writer {
     /// Appends a record.
     ///
     /// # Errors
-    /// If the file system refuses.
+    /// If the file can't be written.
     pub fn write(&mut self, record: &Record) -> Result<()> {
         self.line(&record.to_line())
     }
 
-    /// Ends the trace, makes sure that it is on the disk, and gives it its name.
+    /// Syncs the trace to disk and renames it to its final name.
     ///
     /// # Errors
-    /// If the file system refuses; what was written stays under the partial name.
+    /// If an I/O operation fails; the records stay in the partial file.
     pub fn finish(self) -> Result<()> {
-        let refused = EvalError::io("write", &self.partial);
+        let convert = EvalError::io("write", &self.partial);
         let file = self.file.into_inner().map_err(|e| e.into_error());
-        file.and_then(|f| f.sync_all()).map_err(refused)?;
+        file.and_then(|f| f.sync_all()).map_err(convert)?;
         fs::rename(&self.partial, &self.path).map_err(EvalError::io("rename", &self.partial))
     }
 
-    /// Gives the trace up and removes what was written.
+    /// Removes the partial trace.
     pub fn discard(self) {
-        // A leftover is harmless: the next writer replaces it, and readers ignore the name.
+        // A file that remains is harmless: the next writer replaces it, and readers ignore its
+        // name.
         let _ = fs::remove_file(&self.partial);
     }
 
@@ -107,32 +107,23 @@ fn partial_path(path: &Path) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
-    use chaic_env::rules::RuleSet;
-    use chaic_env::{Appearance, EpisodeConfig, header_of};
+    use chaic_env::{EpisodeConfig, trace_header};
     use chaic_episodes::find_episode;
 
     use super::*;
 
     #[test]
-    fn a_trace_has_its_name_only_when_it_is_whole() {
+    fn a_trace_has_its_final_name_only_when_it_is_complete() {
         let episode = find_episode("shopping/test/01").unwrap();
-        let config = EpisodeConfig {
-            episode: &episode,
-            seed: 0,
-            rules: RuleSet::PAPER,
-            helper: "none",
-            partner: None,
-            image_size: None,
-            appearance: Appearance::Canonical,
-        };
-        let header = header_of(config, None).unwrap();
+        let config = EpisodeConfig::new(&episode, "none");
+        let header = trace_header(config, None).unwrap();
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a/b/t.jsonl");
-        let writer = Writer::create(dir.path(), &path, &header).unwrap();
+        let writer = TraceWriter::create(dir.path(), &path, &header).unwrap();
         assert!(!path.exists());
         writer.finish().unwrap();
         let (trace, warnings) = read(&path).unwrap();
         assert_eq!((trace.header, trace.records.len()), (header, 0));
-        assert_eq!(warnings, [Warning::NoEnd { path, records: 0 }]);
+        assert_eq!(warnings, [TraceWarning::NoEnd { path, records: 0 }]);
     }
 }

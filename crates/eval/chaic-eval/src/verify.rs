@@ -1,4 +1,4 @@
-//! Playing a trace's actions again, to see whether they lead where the trace says.
+//! Verification: re-simulates the actions of traces and compares the records.
 
 mod coverage;
 mod folder_check;
@@ -6,38 +6,38 @@ mod folder_check;
 pub use coverage::{Coverage, ReportState};
 pub use folder_check::Finding;
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use chaic_core::agent::ChildState;
 use chaic_core::observation::Grants;
 use chaic_core::{AgentId, Frame};
-use chaic_env::minds::{self, BuiltIn, Helpers};
+use chaic_env::helper_registry::{self, BuiltInHelpers, HelperRegistry};
 use chaic_env::rules::RuleSet;
-use chaic_env::trace::{Decision, Header, Record, Trace, Warning, parse};
-use chaic_env::{Choice, EnvError, EpisodeConfig, Minds, RunKey, header_of, run_loop, world_of};
+use chaic_env::trace::{Decision, End, Header, Record, Trace, TraceWarning, parse};
+use chaic_env::{EnvError, EpisodeAgents, EpisodeConfig, Playback, RunKey, trace_header};
+use chaic_episodes::Episode;
 use chaic_world::World;
 
 use crate::error::{EvalError, Result};
-use crate::metrics::{Ending, RunResult, tally};
+use crate::metrics::{RunResult, RunStatus, tally};
 use crate::run::{RunFolder, RunGrants, RunOptions, planned, read_journal};
 use crate::trace_file;
 
 use folder_check::FolderCheck;
 
-/// The first place where a trace and its re-simulation differ.
+/// First difference between a trace and its re-simulation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mismatch {
-    /// The trace.
+    /// Path of the trace.
     pub path: PathBuf,
-    /// When.
+    /// Frame of the difference.
     pub frame: Frame,
-    /// Whose decision, if it is one.
+    /// Agent of the differing decision, if it is one.
     pub agent: Option<AgentId>,
-    /// What the trace says, and what comes out.
+    /// Recorded and re-simulated values.
     pub problem: String,
 }
 
@@ -51,124 +51,126 @@ impl fmt::Display for Mismatch {
     }
 }
 
-/// What verifying a run found.
+/// Result of verifying a run.
 #[derive(Clone, Debug, Default)]
-pub struct Verdict {
-    /// How many traces agree.
+pub struct VerificationReport {
+    /// Number of traces without a difference.
     pub agreeing: usize,
-    /// How many decisions they hold.
+    /// Number of decisions in all traces.
     pub decisions: usize,
-    /// The first difference of each trace that doesn't, by path.
+    /// First difference of each differing trace, by path.
     pub mismatches: Vec<Mismatch>,
     /// Other problems in the run's folder.
     pub findings: Vec<Finding>,
     /// Files that could only be read in part.
-    pub warnings: Vec<Warning>,
-    /// How many episode runs have results.
+    pub warnings: Vec<TraceWarning>,
+    /// Numbers of planned, missing and failed episode runs.
     pub coverage: Coverage,
-    /// Whether the report is what the results give.
+    /// Comparison of the report with the results.
     pub report: ReportState,
 }
 
-impl Verdict {
+impl VerificationReport {
     /// Returns whether the run is complete, and every check was made and passed.
     pub fn is_good(&self) -> bool {
         self.mismatches.is_empty()
             && self.findings.is_empty()
             && self.warnings.is_empty()
-            && self.coverage.is_whole()
+            && self.coverage.is_complete()
             && self.report.is_good()
     }
 }
 
-/// Re-simulates every trace of a run on `jobs` threads, and compares all that is recorded: who
-/// took part by which rules, digests at each decision, events, the end, and the line of
-/// `results.jsonl`. A trace that can't be checked counts as one that differs. Every finished result needs a
-/// trace and every trace a finished result. Other entries among the traces are findings: links, special
-/// files, unfinished and unplanned traces. Then it counts the results, and compares the report with them.
+/// Re-simulates every trace of a run on `jobs` threads and compares all records: header, digests at
+/// each decision, events, the end, and the line in `results.jsonl`.
 ///
-/// `options` are the run's, `helpers` those that played; what a helper asked for isn't checked
-/// if its name is unknown.
+/// A trace that can't be checked counts as a mismatch. Every finished result needs a trace, and
+/// every trace a finished result. Other entries in the folder of traces are findings: links,
+/// special files, unfinished and unplanned traces. Also counts the results, and compares the report
+/// with them.
+///
+/// `options` are those of the run, `helpers` those that played. For an unknown helper, its
+/// requested grants and sensors are not checked.
 ///
 /// # Errors
-/// If the run's own files can't be read, it was played without traces, or a trace is of another
-/// version of the format; if the system gives no thread for a job.
+/// If the run's own files can't be read, it was played without traces, or a trace has another
+/// format version; if a thread can't be started.
 pub fn verify_run(
     folder: &RunFolder,
     options: &RunOptions,
-    helpers: &dyn Helpers,
+    helpers: &dyn HelperRegistry,
     jobs: usize,
     progress: &(dyn Fn(usize) + Sync),
-) -> Result<Verdict> {
+) -> Result<VerificationReport> {
     if !options.traces {
         return Err(EvalError::NoTraces { path: folder.path().to_owned() });
     }
-    // Where its episodes are gone, every trace says so.
+    // Without episodes, every trace has an error.
     let plan = planned(folder, options);
-    let gone = plan.as_ref().err().map(|e| format!("the run's episodes can't be read: {e}"));
+    let plan_problem =
+        plan.as_ref().err().map(|e| format!("the run's episodes can't be read: {e}"));
     let planned = plan.unwrap_or_default();
     let journal = read_journal(&folder.results(), &planned)?;
     let results = journal.results;
-    let keys: Vec<RunKey> = planned.iter().map(|item| item.key.clone()).collect();
-    let found = FolderCheck { folder, options, planned: &keys, results: &results }
+    let keys: Vec<RunKey> = planned.iter().map(|job| job.key.clone()).collect();
+    let contents = FolderCheck { folder, options, planned: &keys, results: &results }
         .run(&journal.repeated)?;
-    let paths = found.traces;
+    let paths = contents.traces;
     let granted = folder.granted()?;
-    let refused = granted.as_ref().and_then(|granted| granted.check_track(options).err());
-    let check = Check {
+    let violation = granted.as_ref().and_then(|granted| granted.check_track(options).err());
+    let verifier = TraceVerifier {
         rules: options.rules()?,
         granted,
         chaic: folder.version()?,
         planned: keys.iter().collect(),
         finished: finished(&results),
-        has_measures: results.iter().any(has_measures),
+        has_diagnostics: results.iter().any(has_diagnostics),
         folder,
         options,
         helpers,
     };
-    let checked = check.files(&paths, jobs, progress)?;
-    let mut verdict = Verdict {
-        findings: found.findings,
-        mismatches: found.missing,
+    let checked = verifier.check_all(&paths, jobs, progress)?;
+    let mut report = VerificationReport {
+        findings: contents.findings,
+        mismatches: contents.missing,
         warnings: journal.warnings,
-        coverage: Coverage::of(&planned, &results),
-        report: ReportState::of(folder, options, &planned, &results)?,
-        ..Verdict::default()
+        coverage: Coverage::new(&planned, &results),
+        report: ReportState::compare(folder, options, &planned, &results)?,
+        ..VerificationReport::default()
     };
-    let unreadable = gone.map(|problem| Finding { path: folder.episode_files(), problem });
-    verdict.findings.extend(unreadable);
-    for (path, one) in paths.iter().zip(checked) {
-        verdict.add(match one {
-            Ok(one) => one,
-            // It concerns the whole run, so once is enough.
+    let unreadable = plan_problem.map(|problem| Finding { path: folder.episode_files(), problem });
+    report.findings.extend(unreadable);
+    for (path, checked) in paths.iter().zip(checked) {
+        report.add(match checked {
+            Ok(result) => result,
+            // The error concerns the whole run, so it is reported once.
             Err(error @ EvalError::Env(EnvError::OtherVersion { .. })) => return Err(error),
-            Err(error) => One::unreadable(path, &error),
+            Err(error) => TraceResult::unreadable(path, &error),
         });
     }
-    verdict.compare_counts(folder, check.finished.len());
-    verdict.mismatches.extend(refused.map(|problem| Mismatch {
+    report.compare_counts(folder, verifier.finished.len());
+    report.mismatches.extend(violation.map(|problem| Mismatch {
         path: folder.join("run.json"),
         frame: 0,
         agent: None,
         problem: problem.to_string(),
     }));
-    verdict.mismatches.sort_by(|a, b| a.path.cmp(&b.path));
-    Ok(verdict)
+    report.mismatches.sort_by(|a, b| a.path.cmp(&b.path));
+    Ok(report)
 }
 
-/// Whether a single trace of a run says what playing its actions again gives: its first line, and
-/// every record. Returns the first difference.
+/// Verifies the header and the records of a single trace; returns the first difference.
 ///
 /// # Errors
-/// If the run's episode can't be read or isn't the one that was played.
+/// If the run's episode can't be read or is not the one of the trace.
 pub fn verify_trace(
     folder: &RunFolder,
     options: &RunOptions,
-    helpers: &dyn Helpers,
+    helpers: &dyn HelperRegistry,
     trace: &Trace,
     path: &Path,
 ) -> Result<Option<Mismatch>> {
-    let check = Check {
+    let verifier = TraceVerifier {
         folder,
         options,
         rules: options.rules()?,
@@ -177,9 +179,9 @@ pub fn verify_trace(
         helpers,
         planned: BTreeSet::new(),
         finished: BTreeMap::new(),
-        has_measures: false,
+        has_diagnostics: false,
     };
-    check.trace(trace, path)
+    verifier.check_trace(trace, path)
 }
 
 /// Returns the results of episode runs that were played to their end.
@@ -187,28 +189,28 @@ fn finished(results: &[RunResult]) -> BTreeMap<&RunKey, &RunResult> {
     results.iter().filter(|r| r.summary().is_some()).map(|r| (&r.key, r)).collect()
 }
 
-/// Returns whether a result has further measures, which older versions did not write.
-fn has_measures(result: &RunResult) -> bool {
-    result.summary().is_some_and(|s| !s.measures.is_empty())
+/// Returns whether a result has diagnostic metrics; older versions did not write them.
+fn has_diagnostics(result: &RunResult) -> bool {
+    result.summary().is_some_and(|s| !s.diagnostics.is_empty())
 }
 
-/// What verifying one trace found.
-struct One {
+/// Result of verifying one trace.
+struct TraceResult {
     decisions: usize,
     mismatch: Option<Mismatch>,
-    warnings: Vec<Warning>,
+    warnings: Vec<TraceWarning>,
 }
 
-impl Verdict {
-    fn add(&mut self, one: One) {
-        self.decisions += one.decisions;
-        self.agreeing += usize::from(one.mismatch.is_none());
-        self.mismatches.extend(one.mismatch);
-        self.warnings.extend(one.warnings);
+impl VerificationReport {
+    fn add(&mut self, result: TraceResult) {
+        self.decisions += result.decisions;
+        self.agreeing += usize::from(result.mismatch.is_none());
+        self.mismatches.extend(result.mismatch);
+        self.warnings.extend(result.warnings);
     }
 
-    /// Adds a finding if the number of verified traces differs from the number of finished results and no
-    /// other check explains it.
+    /// Adds a finding if the numbers of verified traces and finished results differ and no other
+    /// check explains it.
     fn compare_counts(&mut self, folder: &RunFolder, n_finished: usize) {
         let n = self.agreeing;
         if self.mismatches.is_empty() && self.findings.is_empty() && n != n_finished {
@@ -218,120 +220,124 @@ impl Verdict {
     }
 }
 
-impl One {
-    fn unreadable(path: &Path, error: &EvalError) -> One {
+impl TraceResult {
+    fn unreadable(path: &Path, error: &EvalError) -> TraceResult {
         let problem = format!("can't be checked: {error}");
         let mismatch = Mismatch { path: path.to_owned(), frame: 0, agent: None, problem };
-        One { decisions: 0, mismatch: Some(mismatch), warnings: Vec::new() }
+        TraceResult { decisions: 0, mismatch: Some(mismatch), warnings: Vec::new() }
     }
 }
 
-/// What a trace is held against.
-struct Check<'a> {
+/// Data that a trace is compared with.
+struct TraceVerifier<'a> {
     folder: &'a RunFolder,
     options: &'a RunOptions,
     rules: RuleSet,
-    /// What `run.json` says of grants.
+    /// Grants in `run.json`.
     granted: Option<RunGrants>,
-    helpers: &'a dyn Helpers,
+    helpers: &'a dyn HelperRegistry,
     /// Version of chaic in `run.json`.
     chaic: Option<String>,
-    /// All that the run plays; empty where nobody knows.
+    /// All planned episode runs; empty if the plan is unknown.
     planned: BTreeSet<&'a RunKey>,
     /// Results of episode runs that were played to their end.
     finished: BTreeMap<&'a RunKey, &'a RunResult>,
-    /// True if any result has further measures.
-    has_measures: bool,
+    /// True if any result has diagnostic metrics.
+    has_diagnostics: bool,
 }
 
-impl Check<'_> {
-    /// All traces on `jobs` threads, in their order.
-    fn files(
+impl TraceVerifier<'_> {
+    /// Checks all traces on `jobs` threads; returns the results in the order of the traces.
+    fn check_all(
         &self,
         paths: &[PathBuf],
         jobs: usize,
         progress: &(dyn Fn(usize) + Sync),
-    ) -> Result<Vec<Result<One>>> {
+    ) -> Result<Vec<Result<TraceResult>>> {
         let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let wanted = jobs.clamp(1, paths.len().max(1));
         let checked = Mutex::new(Vec::with_capacity(paths.len()));
         let work = || {
-            while let Some((k, path)) = numbered(paths, next.fetch_add(1, Ordering::Relaxed)) {
-                let one = self.file(path);
-                checked.lock().unwrap_or_else(|e| e.into_inner()).push((k, one));
+            loop {
+                let k = next.fetch_add(1, Ordering::Relaxed);
+                let Some(path) = paths.get(k) else { break };
+                let result = self.check_file(path);
+                checked.lock().unwrap_or_else(|e| e.into_inner()).push((k, result));
                 progress(done.fetch_add(1, Ordering::Relaxed) + 1);
             }
         };
         std::thread::scope(|scope| {
             for n in 1..=wanted {
                 let spawned = std::thread::Builder::new().spawn_scoped(scope, work);
-                if let Err(refusal) = spawned {
-                    // Those that run already end with the traces that they have begun.
+                if let Err(error) = spawned {
+                    // Threads that run already finish their current traces.
                     next.store(paths.len(), Ordering::Relaxed);
-                    return Err(EvalError::NoThread { n, wanted, refusal });
+                    return Err(EvalError::NoThread { n, wanted, error });
                 }
             }
             Ok(())
         })?;
         let mut checked = checked.into_inner().unwrap_or_else(|e| e.into_inner());
         checked.sort_by_key(|(k, _)| *k);
-        Ok(checked.into_iter().map(|(_, one)| one).collect())
+        Ok(checked.into_iter().map(|(_, result)| result).collect())
     }
 
-    fn file(&self, path: &Path) -> Result<One> {
+    fn check_file(&self, path: &Path) -> Result<TraceResult> {
         let bytes = trace_file::bytes(self.folder.path(), path)?;
         let (trace, warnings) = parse(&bytes, path)?;
-        let mut mismatch = self.trace(&trace, path)?;
+        let mut mismatch = self.check_trace(&trace, path)?;
         if mismatch.is_none() {
-            let problem = foreign_line(&trace, &bytes).or_else(|| self.result_problem(&trace));
+            let problem = format_problem(&trace, &bytes).or_else(|| self.result_problem(&trace));
             let frame = trace.end().map_or(0, |e| e.frame);
             let at_end = |problem| Mismatch { path: path.to_owned(), frame, agent: None, problem };
             mismatch = problem.map(at_end);
         }
-        Ok(One { decisions: trace.decisions().count(), mismatch, warnings })
+        Ok(TraceResult { decisions: trace.decisions().count(), mismatch, warnings })
     }
 
-    /// Compares the result in `results.jsonl` with the one that a trace gives; returns the problem.
+    /// Compares the result in `results.jsonl` with the one of the trace; returns the problem.
     fn result_problem(&self, trace: &Trace) -> Option<String> {
         let Some(recorded) = self.finished.get(&trace.header.key()) else {
             return Some("results.jsonl has no finished result of this run".to_owned());
         };
-        let found = tally(trace).map(|found| match self.has_measures {
+        let found = tally(trace).map(|found| match self.has_diagnostics {
             true => found,
-            false => without_measures(found),
+            false => without_diagnostics(found),
         });
         if found.as_ref() != Some(&without_counts(recorded)) {
-            return Some("results.jsonl says something else of this run".to_owned());
+            return Some(
+                "the result in results.jsonl differs from the one of the trace".to_owned(),
+            );
         }
-        let name = self.counts_of_mute_mind(recorded)?;
-        Some(format!("results.jsonl has the count {name}, but a built-in mind counts nothing"))
+        let name = self.counter_of_built_in_agent(recorded)?;
+        Some(format!("results.jsonl has the count {name}, but built-in agents have no counters"))
     }
 
-    /// Returns the name of the first count that is attributed to a built-in mind. Built-in minds count
-    /// nothing, and traces hold no counts to compare with.
-    fn counts_of_mute_mind<'r>(&self, recorded: &'r RunResult) -> Option<&'r String> {
-        let is_mute = |name: &str| match name.split('.').next() {
+    /// Returns the name of the first counter that is attributed to a built-in agent. Built-in
+    /// agents have no counters, and traces hold none to compare with.
+    fn counter_of_built_in_agent<'r>(&self, recorded: &'r RunResult) -> Option<&'r String> {
+        let is_built_in = |name: &str| match name.split('.').next() {
             Some("helper") => {
-                minds::find(&BuiltIn, &recorded.key.helper, self.rules.planner).is_ok()
+                helper_registry::find(&BuiltInHelpers, &recorded.key.helper, self.rules.planner)
+                    .is_ok()
             }
             Some("partner") => self.options.partner.is_none(),
             _ => true,
         };
         let mut counts = recorded.summary().into_iter().flat_map(|s| s.counts.keys());
-        counts.find(|name| is_mute(name))
+        counts.find(|name| is_built_in(name))
     }
 
-    fn trace(&self, trace: &Trace, path: &Path) -> Result<Option<Mismatch>> {
+    fn check_trace(&self, trace: &Trace, path: &Path) -> Result<Option<Mismatch>> {
         if let Some(problem) = self.header_problem(&trace.header, path)? {
             let path = path.to_owned();
             return Ok(Some(Mismatch { path, frame: 0, agent: None, problem }));
         }
-        let mut world =
-            world_of(&trace.header, &self.folder.episode(self.options, &trace.header.key())?)?;
-        verify(trace, &mut world, path)
+        let episode = self.folder.episode(self.options, &trace.header.key())?;
+        verify(trace, &episode, path)
     }
 
-    /// What `run.json` says that an agent is granted.
+    /// Returns the grants of an agent in `run.json`.
     fn recorded_grants(&self, agent: AgentId, helper: &str) -> Option<Grants> {
         let granted = self.granted.as_ref()?;
         match agent {
@@ -349,11 +355,11 @@ impl Check<'_> {
         (!is_same).then(|| "run.json names another perception of the helper".to_owned())
     }
 
-    /// What the first line of a trace says that isn't so.
+    /// Compares the header of a trace with the expected one; returns the problem.
     fn header_problem(&self, header: &Header, path: &Path) -> Result<Option<String>> {
         let key = header.key();
         if self.folder.trace(&key) != path {
-            return Ok(Some("the first line is that of another episode run".to_owned()));
+            return Ok(Some("the first line is the one of another episode run".to_owned()));
         }
         if !self.planned.is_empty() && !self.planned.contains(&key) {
             return Ok(Some("this run doesn't play that episode run".to_owned()));
@@ -363,73 +369,78 @@ impl Check<'_> {
         }
         let episode = self.folder.episode(self.options, &key)?;
         let rules = self.rules.planner;
-        let helper = minds::find(self.helpers, &key.helper, rules).ok();
+        let helper = helper_registry::find(self.helpers, &key.helper, rules).ok();
         let name = self.options.partner.as_deref();
-        let partner = minds::find_partner(self.helpers, name, None, rules);
+        let partner = helper_registry::find_partner(self.helpers, name, None, rules);
         let config = EpisodeConfig {
-            episode: &episode,
             seed: header.seed,
             rules: self.rules,
-            helper: &key.helper,
             partner: name,
             image_size: self.options.size,
             appearance: self.options.appearance()?,
+            ..EpisodeConfig::new(&episode, &key.helper)
         };
-        // A mind that only its author has: what it asked for is its own affair.
+        // For unknown helpers, the requested grants and sensors can't be checked.
         let is_unknown = [partner.is_err(), helper.is_none()];
         let helper = match helper {
             Some(helper) => helper,
-            None => minds::find(&BuiltIn, "random", rules)?,
+            None => helper_registry::find(&BuiltInHelpers, "random", rules)?,
         };
-        let mut expected = header_of(config, Minds::of(helper, partner.ok().flatten()))?;
+        let mut expected =
+            trace_header(config, EpisodeAgents::new(helper, partner.ok().flatten()))?;
         if let Some(problem) = self.grants_problem(&mut expected, header, is_unknown) {
             return Ok(Some(problem));
         }
         if let Some(problem) = self.perception_problem(header) {
             return Ok(Some(problem));
         }
-        let expected = Header { chaic: header.chaic.clone(), ..expected };
-        let said = serde_json::to_value(header).expect("a header is plain data");
-        let comes = serde_json::to_value(&expected).expect("a header is plain data");
-        // What is absent in one of them is null in the comparison.
-        let fields = [&said, &comes].map(|header| header.as_object().into_iter().flatten());
+        let expected = Header { chaic: header.chaic.clone(), version: header.version, ..expected };
+        let recorded = serde_json::to_value(header).expect("a header is plain data");
+        let expected = serde_json::to_value(&expected).expect("a header is plain data");
+        // A field that is absent in one of them is null in the comparison.
+        let fields = [&recorded, &expected].map(|header| header.as_object().into_iter().flatten());
         let names: BTreeSet<&String> = fields.into_iter().flatten().map(|(name, _)| name).collect();
-        let wrong: Vec<&str> = names
+        let differing: Vec<&str> = names
             .into_iter()
-            .filter(|name| said[*name] != comes[*name])
+            .filter(|name| recorded[*name] != expected[*name])
             .map(String::as_str)
             .collect();
-        let problem = || format!("the first line is not what this run has: {}", wrong.join(", "));
-        Ok((!wrong.is_empty()).then(problem))
+        let problem = || {
+            let names = differing.join(", ");
+            format!("the first line differs from the one that this run writes: {names}")
+        };
+        Ok((!differing.is_empty()).then(problem))
     }
 
-    /// Returns what the people of a header are granted that `run.json` or the track does not allow. Copies to
-    /// the expected header what only the author of an unknown mind knows.
+    /// Checks the grants in a header against `run.json` and the track; returns the problem. Copies
+    /// to the expected header what can't be determined for an unknown helper.
     fn grants_problem(
         &self,
         expected: &mut Header,
         header: &Header,
         is_unknown: [bool; 2],
     ) -> Option<String> {
-        for (expected, said) in expected.people.iter_mut().zip(&header.people) {
+        for (expected, actual) in expected.people.iter_mut().zip(&header.people) {
             let recorded = self.recorded_grants(expected.agent, &header.helper);
-            if expected.perception.is_some() == said.perception.is_some() {
-                // Weights may have changed since.
-                expected.perception.clone_from(&said.perception);
+            if expected.perception.is_some() == actual.perception.is_some() {
+                // The weights may have changed since.
+                expected.perception.clone_from(&actual.perception);
             }
             if is_unknown.get(expected.agent.index()).is_some_and(|unknown| *unknown) {
-                expected.grants = recorded.unwrap_or(said.grants);
-                expected.senses = said.senses;
-                expected.perception.clone_from(&said.perception);
+                expected.grants = recorded.unwrap_or(actual.grants);
+                expected.sensors = actual.sensors;
+                expected.perception.clone_from(&actual.perception);
                 if expected.agent == AgentId::HELPER {
-                    // What the machine of the run enforced stands in run.json.
+                    // The isolation was determined by the machine of the run, so `run.json` has it.
                     let granted = self.granted.as_ref();
                     expected.isolation =
                         granted.and_then(|g| g.isolation.get(&header.helper)).cloned();
                 }
             } else if recorded.is_some_and(|grants| grants != expected.grants) {
-                let problem = format!("run.json says that the {} is granted", expected.agent);
-                return Some(problem + " something else than such a mind is");
+                return Some(format!(
+                    "the grants of the {} in run.json are not those that such an agent requests",
+                    expected.agent
+                ));
             }
         }
         let helper = header.people.iter().find(|person| person.agent == AgentId::HELPER);
@@ -438,13 +449,9 @@ impl Check<'_> {
     }
 }
 
-fn numbered(paths: &[PathBuf], k: usize) -> Option<(usize, &PathBuf)> {
-    paths.get(k).map(|path| (k, path))
-}
-
 /// Returns a problem if a trace has other bytes than chaic writes for its records.
-fn foreign_line(trace: &Trace, bytes: &[u8]) -> Option<String> {
-    let line = trace_file::first_foreign_line(trace, bytes)?;
+fn format_problem(trace: &Trace, bytes: &[u8]) -> Option<String> {
+    let line = trace_file::first_differing_line(trace, bytes)?;
     Some(if line > trace.records.len() + 1 && trace.end().is_some() {
         format!("line {line} follows the end of the trace")
     } else {
@@ -452,99 +459,66 @@ fn foreign_line(trace: &Trace, bytes: &[u8]) -> Option<String> {
     })
 }
 
-/// Removes the further measures, which older versions of chaic did not write.
-fn without_measures(mut found: RunResult) -> RunResult {
-    if let Ending::Done(summary) = &mut found.ending {
-        summary.measures.clear();
+/// Removes diagnostic metrics, which older versions of chaic did not write.
+fn without_diagnostics(mut found: RunResult) -> RunResult {
+    if let RunStatus::Done(summary) = &mut found.status {
+        summary.diagnostics.clear();
     }
     found
 }
 
-/// A result as a trace can tell it.
+/// Removes agents' counters, which traces do not contain.
 fn without_counts(result: &RunResult) -> RunResult {
     let mut result = result.clone();
-    if let Ending::Done(summary) = &mut result.ending {
+    if let RunStatus::Done(summary) = &mut result.status {
         summary.counts.clear();
     }
     result
 }
 
-/// Plays the actions of a trace in its world, and finds the first record that comes out different.
+/// Re-simulates the decisions of a trace; returns the first record that comes out different.
 ///
 /// # Errors
-/// None of its own; those of a broken world.
-pub fn verify(trace: &Trace, world: &mut World, path: &Path) -> Result<Option<Mismatch>> {
-    let mut decisions: VecDeque<(&Decision, Option<ChildState>)> = decisions_of(trace);
+/// If the episode is not the one of the trace.
+pub fn verify(trace: &Trace, episode: &Episode, path: &Path) -> Result<Option<Mismatch>> {
+    let mut playback = Playback::new(trace, episode)?;
     let mut recorded = trace.records.iter();
-    let mut found = None;
-    let mut last: Option<Decision> = None;
-    let mut decide = |world: &World, waiting: &[AgentId]| {
-        let mut choices = Vec::new();
-        let frame = world.state().frame;
-        while let Some((d, child)) = decisions.front() {
-            let is_now = d.frame == frame
-                && waiting.contains(&d.agent)
-                && !choices.iter().any(|c: &Choice| c.agent == d.agent);
-            if !is_now {
-                break;
-            }
-            let Decision { agent, action, ref thought, .. } = **d;
-            choices.push(Choice { agent, action, thought: thought.clone(), child: *child });
-            decisions.pop_front();
+    let mut last_decision: Option<Decision> = None;
+    let mut compare = |simulated: Record| {
+        let expected = recorded.next();
+        if expected != Some(&simulated) {
+            return Some(mismatch(path, expected, &simulated, last_decision.as_ref()));
         }
-        // Everybody who waited in this frame has decided, if the trace goes so far.
-        Ok((!choices.is_empty()).then_some(choices))
+        if let Record::Decision(decision) = simulated {
+            last_decision = Some(decision);
+        }
+        None
     };
-    let played = run_loop(world, &mut decide, &mut |record| {
-        let said = recorded.next();
-        if said == Some(record) {
-            if let Record::Decision(decision) = record {
-                last = Some(decision.clone());
-            }
-            return Ok(());
-        }
-        found = Some(mismatch(path, said, record, last.as_ref()));
-        Err(EvalError::Difference(String::new()))
-    });
-    match played {
-        Err(EvalError::Difference(_)) => Ok(found),
-        Err(error) => Err(error),
-        Ok(has_ended) => Ok(leftover(path, has_ended, recorded.next(), world)),
-    }
-}
-
-/// The decisions of a trace, each with what the child does from it on if the trace says so.
-fn decisions_of(trace: &Trace) -> VecDeque<(&Decision, Option<ChildState>)> {
-    let mut decisions: VecDeque<(&Decision, Option<ChildState>)> = VecDeque::new();
-    for record in &trace.records {
-        match record {
-            Record::Decision(decision) => decisions.push_back((decision, None)),
-            Record::Child(child) => {
-                if let Some((_, state)) = decisions.back_mut() {
-                    *state = Some(child.state);
-                }
-            }
-            Record::Event(_) | Record::End(_) => {}
+    while let Some(records) = playback.next_records() {
+        if let Some(mismatch) = records.into_iter().find_map(&mut compare) {
+            return Ok(Some(mismatch));
         }
     }
-    decisions
+    let world = playback.world();
+    if world.is_over()
+        && let Some(mismatch) = compare(Record::End(End::new(world)))
+    {
+        return Ok(Some(mismatch));
+    }
+    Ok(extra_record(path, recorded.next(), world))
 }
 
-/// What the trace says that never came out.
-fn leftover(
-    path: &Path,
-    has_ended: bool,
-    next: Option<&Record>,
-    world: &World,
-) -> Option<Mismatch> {
-    let frame = world.state().frame;
+/// Returns a problem if the trace has more records than the re-simulation.
+fn extra_record(path: &Path, next: Option<&Record>, world: &World) -> Option<Mismatch> {
+    let (frame, has_ended) = (world.state().frame, world.is_over());
     let (agent, problem) = match (has_ended, next) {
         (_, Some(Record::Decision(d))) => {
-            let waits = if has_ended { "the episode is over" } else { "somebody else waits" };
-            (Some(d.agent), format!("the trace has a decision at frame {}, but {waits}", d.frame))
+            let reason =
+                if has_ended { "the episode is over" } else { "another agent decides next" };
+            (Some(d.agent), format!("the trace has a decision at frame {}, but {reason}", d.frame))
         }
-        (_, Some(other)) => (None, format!("the trace goes on with {}", other.to_line())),
-        // The trace stops early: a warning says so already, and all that it says is true.
+        (_, Some(other)) => (None, format!("the trace continues with {}", other.to_line())),
+        // The trace stops early. A warning reports that, and all its records are correct.
         (_, None) => return None,
     };
     Some(Mismatch { path: path.to_owned(), frame, agent, problem })
@@ -552,34 +526,40 @@ fn leftover(
 
 fn mismatch(
     path: &Path,
-    said: Option<&Record>,
-    comes: &Record,
-    last: Option<&Decision>,
+    recorded: Option<&Record>,
+    simulated: &Record,
+    last_decision: Option<&Decision>,
 ) -> Mismatch {
-    let place = |record: &Record| match record {
+    let position = |record: &Record| match record {
         Record::Decision(d) => (d.frame, Some(d.agent)),
         Record::Child(c) => (c.frame, Some(AgentId::CHILD)),
         Record::Event(e) => (e.event.frame, None),
         Record::End(e) => (e.frame, None),
     };
-    let (frame, agent) = place(comes);
-    let problem = match (said, comes) {
+    let (frame, agent) = position(simulated);
+    let problem = match (recorded, simulated) {
         (Some(Record::Decision(a)), Record::Decision(b)) if a.digest != b.digest => {
             format!(
-                "the state's digest is {} in the trace, {} when played again",
+                "the state's digest is {} in the trace, {} in the re-simulation",
                 a.digest, b.digest
             )
         }
-        (Some(said), comes) => {
-            format!("the trace says {}, played again it is {}", said.to_line(), comes.to_line())
+        (Some(recorded), simulated) => {
+            format!(
+                "the trace has {}, the re-simulation has {}",
+                recorded.to_line(),
+                simulated.to_line()
+            )
         }
-        (None, comes) => format!("the trace ends, played again there is {}", comes.to_line()),
+        (None, simulated) => {
+            format!("the trace ends, the re-simulation has {}", simulated.to_line())
+        }
     };
-    // A changed action shows in the state that it leads to.
-    let before = last.map_or(String::new(), |d| {
+    // A changed action shows in the digest of a later state.
+    let context = last_decision.map_or(String::new(), |d| {
         let action = serde_json::to_string(&d.action).expect("an action has string keys");
         format!("; the decision before it is the {}'s {action} at frame {}", d.agent, d.frame)
     });
-    let problem = problem + &before;
+    let problem = problem + &context;
     Mismatch { path: path.to_owned(), frame, agent, problem }
 }

@@ -1,4 +1,5 @@
-//! Version 3 of LeRobot's data sets: a table of frames and a film for each episode, and tables of episodes and tasks.
+//! Export to version 3 of the LeRobot data set format: a table of frames and a video per episode,
+//! and tables of episodes and tasks.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,7 +8,7 @@ use chaic_core::{Action, AgentId, EntityId, Frame, Hand, ResolvedAction};
 use chaic_env::trace::{Decision, Trace};
 use chaic_env::{EnvError, Playback};
 use chaic_episodes::Episode;
-use chaic_files::{FileError, write_whole};
+use chaic_files::{FileError, write_atomically};
 use chaic_render::{Channels, Scene, View};
 use chaic_video::{VideoError, VideoWriter};
 use chaic_world::World;
@@ -17,14 +18,14 @@ use serde_json::{Value, json};
 
 use crate::table::{self, Column};
 
-/// Frames of an episode that count as a second: the usual rate of replays. The world itself knows no seconds.
+/// Frames per second of the export, as in replays. The world itself has no unit of seconds.
 pub const FRAMES_PER_S: u32 = 30;
-/// The name of the film in tables.
-const FILM: &str = "observation.images.ego";
-/// Files in a folder of data or films.
+/// Key of the video in tables.
+const VIDEO_KEY: &str = "observation.images.ego";
+/// Number of files in a folder of data or videos.
 const CHUNK: usize = 1000;
 
-/// What the numbers of a state are.
+/// Components of the state vector.
 pub const STATE: [&str; 9] = [
     "x_m",
     "z_m",
@@ -37,10 +38,10 @@ pub const STATE: [&str; 9] = [
     "time",
 ];
 
-/// What the numbers of an action are.
+/// Components of the action vector.
 pub const ACTION: [&str; 3] = ["kind", "hand", "class"];
 
-/// What kinds of actions are called, by the first number of an action.
+/// Names of action kinds, indexed by the first component of the action vector.
 pub const KINDS: [&str; 8] = [
     "move_forward",
     "turn_left",
@@ -52,95 +53,97 @@ pub const KINDS: [&str; 8] = [
     "wait",
 ];
 
-/// Why a data set can't be written.
+/// Error when a data set is exported.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
-    /// The trace doesn't fit its episode.
+    /// The trace does not match its episode.
     #[error(transparent)]
     Env(#[from] EnvError),
-    /// The file system refuses.
+    /// A file cannot be written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A table can't be written.
+    /// A table cannot be written.
     #[error("{path}: {problem}")]
     Table {
-        /// Where.
+        /// Path of the table.
         path: PathBuf,
-        /// What is wrong.
+        /// Error of the Parquet library.
         problem: ParquetError,
     },
-    /// A film can't be written.
+    /// A video cannot be written.
     #[error(transparent)]
-    Film(#[from] VideoError),
-    /// There is something already.
+    Video(#[from] VideoError),
+    /// The folder is not empty.
     #[error("{0} isn't empty; choose another --out")]
     NotEmpty(PathBuf),
-    /// Frames don't make a whole number of pictures a second.
-    #[error("every {0} frames is no whole number of times a second; {FRAMES_PER_S} frames are one")]
+    /// The sampling interval does not give a whole number of images per second.
+    #[error(
+        "an interval of {0} frames does not divide a second of {FRAMES_PER_S} frames; choose a divisor of {FRAMES_PER_S}"
+    )]
     Rate(u32),
-    /// Nobody of this kind was there.
+    /// The episode has no such agent.
     #[error("{0} has no {1}")]
-    Nobody(String, AgentId),
+    NoAgent(String, AgentId),
 }
 
-/// What is written of each episode.
+/// Options of the export.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LeRobotOptions {
-    /// Whose eyes and actions.
+    /// Agent whose observations and actions are exported.
     pub agent: AgentId,
-    /// Every how many frames, a divisor of [`FRAMES_PER_S`].
+    /// Sampling interval in frames, a divisor of [`FRAMES_PER_S`].
     pub every: u32,
-    /// Side of pictures, pixels.
+    /// Side of images, pixels.
     pub image_size: u32,
 }
 
-/// A data set that is being written.
+/// Writer of a data set.
 pub struct LeRobotWriter {
     folder: PathBuf,
     options: LeRobotOptions,
     tasks: Vec<String>,
-    episodes: Vec<Written>,
+    episodes: Vec<EpisodeEntry>,
     n_frames: usize,
-    numbers: [Summary; 5],
-    colors: [Summary; 3],
+    statistics: [ColumnStatistics; 5],
+    colors: [ColumnStatistics; 3],
 }
 
-/// An episode that was written.
-struct Written {
+/// Index entry of an exported episode.
+struct EpisodeEntry {
     task: usize,
     first: usize,
     n_frames: usize,
 }
 
-/// The smallest, the largest, the mean and the spread of numbers, of each column of a feature.
+/// Running minimum, maximum, sum and sum of squares of each column of a feature.
 #[derive(Clone, Debug, Default)]
-struct Summary {
+struct ColumnStatistics {
     n: f64,
     columns: Vec<[f64; 4]>,
 }
 
-impl Summary {
+impl ColumnStatistics {
     fn add(&mut self, row: &[f64]) {
         if self.columns.is_empty() {
             self.columns = vec![[f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0]; row.len()];
         }
         self.n += 1.0;
-        for ([least, most, sum, squares], x) in self.columns.iter_mut().zip(row) {
-            (*least, *most) = (least.min(*x), most.max(*x));
+        for ([min, max, sum, squares], x) in self.columns.iter_mut().zip(row) {
+            (*min, *max) = (min.min(*x), max.max(*x));
             (*sum, *squares) = (*sum + x, *squares + x * x);
         }
     }
 
-    fn figures(&self) -> [Vec<f64>; 4] {
+    fn min_max_mean_std(&self) -> [Vec<f64>; 4] {
         let mean = |c: &[f64; 4]| c[2] / self.n.max(1.0);
-        let spread = |c: &[f64; 4]| (c[3] / self.n.max(1.0) - mean(c) * mean(c)).max(0.0).sqrt();
-        let of = |f: &dyn Fn(&[f64; 4]) -> f64| self.columns.iter().map(f).collect();
-        [of(&|c| c[0]), of(&|c| c[1]), of(&mean), of(&spread)]
+        let std = |c: &[f64; 4]| (c[3] / self.n.max(1.0) - mean(c) * mean(c)).max(0.0).sqrt();
+        let per_column = |f: &dyn Fn(&[f64; 4]) -> f64| self.columns.iter().map(f).collect();
+        [per_column(&|c| c[0]), per_column(&|c| c[1]), per_column(&mean), per_column(&std)]
     }
 }
 
-/// The features that have numbers, with how many.
-const NUMBERS: [(&str, usize); 5] = [
+/// Numeric features with their number of columns.
+const NUMERIC_FEATURES: [(&str, usize); 5] = [
     ("observation.state", STATE.len()),
     ("action", ACTION.len()),
     ("next.reward", 1),
@@ -148,8 +151,8 @@ const NUMBERS: [(&str, usize); 5] = [
     ("frame_index", 1),
 ];
 
-/// One moment.
-struct Moment {
+/// One sampled frame.
+struct SampledFrame {
     state: [f32; STATE.len()],
     action: [f32; ACTION.len()],
     plan: String,
@@ -157,10 +160,10 @@ struct Moment {
 }
 
 impl LeRobotWriter {
-    /// A new one in an empty folder.
+    /// Creates a data set in an empty folder.
     ///
     /// # Errors
-    /// If the folder isn't empty or can't be made, or the options make no whole rate.
+    /// If the folder is not empty or cannot be created, or the sampling interval is invalid.
     pub fn create(folder: &Path, options: LeRobotOptions) -> Result<LeRobotWriter, ExportError> {
         if options.every == 0 || !FRAMES_PER_S.is_multiple_of(options.every) {
             return Err(ExportError::Rate(options.every));
@@ -168,91 +171,92 @@ impl LeRobotWriter {
         if fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) {
             return Err(ExportError::NotEmpty(folder.to_owned()));
         }
-        fs::create_dir_all(folder).map_err(FileError::of("can't make", folder))?;
+        fs::create_dir_all(folder).map_err(FileError::context("make", folder))?;
         Ok(LeRobotWriter {
             folder: folder.to_owned(),
             options,
             tasks: Vec::new(),
             episodes: Vec::new(),
             n_frames: 0,
-            numbers: Default::default(),
+            statistics: Default::default(),
             colors: Default::default(),
         })
     }
 
-    /// Pictures a second.
+    /// Returns the number of images per second.
     fn fps(&self) -> u32 {
         FRAMES_PER_S / self.options.every
     }
 
-    /// A file of an episode, in folders that are there.
-    fn file(&self, of: &str, episode: usize, extension: &str) -> Result<PathBuf, ExportError> {
+    /// Returns the path of an episode's file, and creates its folders.
+    fn file(&self, kind: &str, episode: usize, extension: &str) -> Result<PathBuf, ExportError> {
         let (chunk, file) = (episode / CHUNK, episode % CHUNK);
-        let folder = self.folder.join(of).join(format!("chunk-{chunk:03}"));
-        fs::create_dir_all(&folder).map_err(FileError::of("can't make", &folder))?;
+        let folder = self.folder.join(kind).join(format!("chunk-{chunk:03}"));
+        fs::create_dir_all(&folder).map_err(FileError::context("make", &folder))?;
         Ok(folder.join(format!("file-{file:03}.{extension}")))
     }
 
-    /// Adds an episode; `false` if `go_on`, which is asked at each picture, said no: then it is left away.
+    /// Adds an episode. `should_continue` is called before each image; if it returns false, the
+    /// episode is discarded and the result is `false`.
     ///
     /// # Errors
-    /// If the trace doesn't fit the episode, nobody is there whose eyes one could see by, or a file can't be
+    /// If the trace does not match the episode, the episode has no such agent, or a file cannot be
     /// written.
     pub fn add(
         &mut self,
         trace: &Trace,
         episode: &Episode,
-        go_on: &mut dyn FnMut() -> bool,
+        should_continue: &mut dyn FnMut() -> bool,
     ) -> Result<bool, ExportError> {
         let LeRobotOptions { agent, every, image_size } = self.options;
         let index = self.episodes.len();
-        let film = self.file(&format!("videos/{FILM}"), index, "mp4")?;
-        let mut video = VideoWriter::create(&film, image_size, image_size, self.fps())?;
+        let video_path = self.file(&format!("videos/{VIDEO_KEY}"), index, "mp4")?;
+        let mut video = VideoWriter::create(&video_path, image_size, image_size, self.fps())?;
         let mut playback = Playback::new(trace, episode)?;
         if agent.index() >= playback.world().setup().people.len() {
-            return Err(ExportError::Nobody(trace.header.episode.clone(), agent));
+            return Err(ExportError::NoAgent(trace.header.episode.clone(), agent));
         }
         let setup = playback.world().setup();
         let scene = Scene::with_appearance(setup, trace.header.appearance);
         let decisions: Vec<&Decision> = trace.decisions().filter(|d| d.agent == agent).collect();
         let end = trace.end().map_or(Frame::MAX, |end| end.frame);
-        let mut moments = Vec::new();
+        let mut samples = Vec::new();
         loop {
             let frame = playback.world().state().frame;
-            // Nothing is done any more in the last one.
-            let is_wanted = frame.is_multiple_of(every) && frame < end;
-            if is_wanted {
-                if !go_on() {
+            // No action follows the last frame.
+            let is_sampled = frame.is_multiple_of(every) && frame < end;
+            if is_sampled {
+                if !should_continue() {
                     drop(video);
                     return Ok(false);
                 }
-                let picture = look(&scene, playback.world(), agent, image_size);
-                self.take_colors(&picture);
-                video.push(&picture)?;
+                let image = render_view(&scene, playback.world(), agent, image_size);
+                self.add_colors(&image);
+                video.push(&image)?;
             }
             let world = playback.world();
-            let state = is_wanted.then(|| (state_of(world, agent), share_done(world)));
+            let state = is_sampled.then(|| (encode_state(world, agent), fraction_done(world)));
             let has_more = playback.step()?.is_some();
             if let Some((state, done)) = state {
-                let under_way = decisions.iter().rev().find(|d| d.frame <= frame);
-                let action = under_way.map(|d| d.action);
+                let current = decisions.iter().rev().find(|d| d.frame <= frame);
+                let action = current.map(|d| d.action);
                 let plan = playback.thoughts().get(agent.index()).map(|t| t.plan.clone());
-                let action = action_of(playback.world(), action);
-                moments.push(Moment { state, action, plan: plan.unwrap_or_default(), done });
+                let action = encode_action(playback.world(), action);
+                samples.push(SampledFrame { state, action, plan: plan.unwrap_or_default(), done });
             }
             if !has_more {
                 break;
             }
         }
         video.finish()?;
-        let done = share_done(playback.world());
-        self.write_episode(&trace.header.task.info().title.to_lowercase(), &moments, done)?;
+        let done = fraction_done(playback.world());
+        self.write_episode(&trace.header.task.info().title.to_lowercase(), &samples, done)?;
         Ok(true)
     }
 
-    /// Takes a picture into the summary of colors: every fourth pixel of every fourth row.
-    fn take_colors(&mut self, picture: &RgbImage) {
-        for (x, y, pixel) in picture.enumerate_pixels() {
+    /// Adds an image to the color statistics: every fourth pixel of every fourth row.
+    fn add_colors(&mut self, image: &RgbImage) {
+        for (x, y, pixel) in image.enumerate_pixels() {
             if x % 4 == 0 && y % 4 == 0 {
                 for (summary, value) in self.colors.iter_mut().zip(pixel.0) {
                     summary.add(&[f64::from(value) / 255.0]);
@@ -264,7 +268,7 @@ impl LeRobotWriter {
     fn write_episode(
         &mut self,
         task: &str,
-        moments: &[Moment],
+        samples: &[SampledFrame],
         done: f64,
     ) -> Result<(), ExportError> {
         let known = self.tasks.iter().position(|t| t == task);
@@ -272,28 +276,28 @@ impl LeRobotWriter {
             self.tasks.push(task.to_owned());
             self.tasks.len() - 1
         });
-        let (index, first, n) = (self.episodes.len(), self.n_frames, moments.len());
+        let (index, first, n) = (self.episodes.len(), self.n_frames, samples.len());
         let fps = f64::from(self.fps());
-        let afterwards = moments.iter().skip(1).map(|m| m.done).chain([done]);
+        let next_done = samples.iter().skip(1).map(|s| s.done).chain([done]);
         let rewards: Vec<f32> =
-            moments.iter().zip(afterwards).map(|(m, after)| (after - m.done) as f32).collect();
-        for (k, (moment, reward)) in moments.iter().zip(&rewards).enumerate() {
-            let wide = |row: &[f32]| row.iter().map(|x| f64::from(*x)).collect::<Vec<f64>>();
-            self.numbers[0].add(&wide(&moment.state));
-            self.numbers[1].add(&wide(&moment.action));
-            self.numbers[2].add(&[f64::from(*reward)]);
-            self.numbers[3].add(&[k as f64 / fps]);
-            self.numbers[4].add(&[k as f64]);
+            samples.iter().zip(next_done).map(|(s, next)| (next - s.done) as f32).collect();
+        for (k, (sample, reward)) in samples.iter().zip(&rewards).enumerate() {
+            let to_f64 = |row: &[f32]| row.iter().map(|x| f64::from(*x)).collect::<Vec<f64>>();
+            self.statistics[0].add(&to_f64(&sample.state));
+            self.statistics[1].add(&to_f64(&sample.action));
+            self.statistics[2].add(&[f64::from(*reward)]);
+            self.statistics[3].add(&[k as f64 / fps]);
+            self.statistics[4].add(&[k as f64]);
         }
-        let rows = |width: usize, of: &dyn Fn(&Moment) -> Vec<f32>| Column::F32Rows {
+        let rows = |width: usize, vector: &dyn Fn(&SampledFrame) -> Vec<f32>| Column::F32Rows {
             width,
-            numbers: moments.iter().flat_map(of).collect(),
+            elements: samples.iter().flat_map(vector).collect(),
         };
-        let each = |of: &dyn Fn(usize) -> i64| Column::I64((0..n).map(of).collect());
+        let each = |value: &dyn Fn(usize) -> i64| Column::I64((0..n).map(value).collect());
         let columns = [
-            ("observation.state", rows(STATE.len(), &|m| m.state.to_vec())),
-            ("action", rows(ACTION.len(), &|m| m.action.to_vec())),
-            ("plan", Column::Text(moments.iter().map(|m| m.plan.clone()).collect())),
+            ("observation.state", rows(STATE.len(), &|s| s.state.to_vec())),
+            ("action", rows(ACTION.len(), &|s| s.action.to_vec())),
+            ("plan", Column::Text(samples.iter().map(|s| s.plan.clone()).collect())),
             ("next.reward", Column::F32(rewards)),
             ("next.done", Column::Bool((0..n).map(|k| k + 1 == n).collect())),
             ("timestamp", Column::F32((0..n).map(|k| (k as f64 / fps) as f32).collect())),
@@ -304,19 +308,19 @@ impl LeRobotWriter {
         ];
         let path = self.file("data", index, "parquet")?;
         write_table(&path, &columns, &[])?;
-        self.episodes.push(Written { task: task_index, first, n_frames: n });
+        self.episodes.push(EpisodeEntry { task: task_index, first, n_frames: n });
         self.n_frames += n;
         Ok(())
     }
 
-    /// Writes what makes a data set of the episodes so far; how many frames it has.
+    /// Writes the metadata of all episodes so far; returns the number of frames.
     ///
     /// # Errors
-    /// If a file can't be written.
+    /// If a file cannot be written.
     pub fn finish(self) -> Result<usize, ExportError> {
         let meta = self.folder.join("meta");
-        fs::create_dir_all(&meta).map_err(FileError::of("can't make", &meta))?;
-        // Readers take the names of tasks for the table's index.
+        fs::create_dir_all(&meta).map_err(FileError::context("make", &meta))?;
+        // Readers use the names of tasks as the table's index.
         let pandas = json!({
             "index_columns": ["task"],
             "column_indexes": [],
@@ -335,8 +339,9 @@ impl LeRobotWriter {
         write_table(&meta.join("tasks.parquet"), &tasks, &[("pandas", pandas.to_string())])?;
         self.write_episodes()?;
         let json = |name: &str, value: &Value| {
-            let text = serde_json::to_string_pretty(value).expect("plain data") + "\n";
-            write_whole(&meta.join(name), text.as_bytes())
+            let text =
+                serde_json::to_string_pretty(value).expect("the value has string keys") + "\n";
+            write_atomically(&meta.join(name), text.as_bytes())
         };
         json("stats.json", &self.stats())?;
         json("info.json", &self.info())?;
@@ -346,14 +351,14 @@ impl LeRobotWriter {
     fn write_episodes(&self) -> Result<(), ExportError> {
         let fps = f64::from(self.fps());
         let n = self.episodes.len();
-        let each = |of: &dyn Fn(usize, &Written) -> i64| {
-            Column::I64(self.episodes.iter().enumerate().map(|(k, e)| of(k, e)).collect())
+        let each = |value: &dyn Fn(usize, &EpisodeEntry) -> i64| {
+            Column::I64(self.episodes.iter().enumerate().map(|(k, e)| value(k, e)).collect())
         };
-        let seconds = |of: &dyn Fn(&Written) -> f64| {
-            Column::F32(self.episodes.iter().map(|e| of(e) as f32).collect())
+        let seconds = |value: &dyn Fn(&EpisodeEntry) -> f64| {
+            Column::F32(self.episodes.iter().map(|e| value(e) as f32).collect())
         };
-        let task = |e: &Written| vec![self.tasks[e.task].clone()];
-        let name = |what: &str| format!("videos/{FILM}/{what}");
+        let task = |e: &EpisodeEntry| vec![self.tasks[e.task].clone()];
+        let name = |column: &str| format!("videos/{VIDEO_KEY}/{column}");
         let [chunk, file, from, to] =
             ["chunk_index", "file_index", "from_timestamp", "to_timestamp"].map(name);
         let columns = [
@@ -376,21 +381,23 @@ impl LeRobotWriter {
     }
 
     fn stats(&self) -> Value {
-        let of = |summary: &Summary| {
-            let [min, max, mean, std] = summary.figures();
+        let to_json = |summary: &ColumnStatistics| {
+            let [min, max, mean, std] = summary.min_max_mean_std();
             json!({"min": min, "max": max, "mean": mean, "std": std, "count": [summary.n]})
         };
-        let named =
-            NUMBERS.iter().zip(&self.numbers).map(|((name, _), s)| ((*name).to_owned(), of(s)));
+        let named = NUMERIC_FEATURES
+            .iter()
+            .zip(&self.statistics)
+            .map(|((name, _), s)| ((*name).to_owned(), to_json(s)));
         let mut stats: serde_json::Map<String, Value> = named.collect();
-        let figure = |k: usize| {
-            let channels = self.colors.iter().map(|s| json!([s.figures()[k]]));
+        let statistic = |k: usize| {
+            let channels = self.colors.iter().map(|s| json!([s.min_max_mean_std()[k]]));
             Value::Array(channels.collect())
         };
-        let [min, max, mean, std] = [0, 1, 2, 3].map(figure);
+        let [min, max, mean, std] = [0, 1, 2, 3].map(statistic);
         let count = [self.colors[0].n];
-        let of_film = json!({"min": min, "max": max, "mean": mean, "std": std, "count": count});
-        stats.insert(FILM.to_owned(), of_film);
+        let video_stats = json!({"min": min, "max": max, "mean": mean, "std": std, "count": count});
+        stats.insert(VIDEO_KEY.to_owned(), video_stats);
         Value::Object(stats)
     }
 
@@ -411,7 +418,7 @@ impl LeRobotWriter {
             "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
             "video_path": "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4",
             "features": {
-                (FILM): {
+                (VIDEO_KEY): {
                     "dtype": "video",
                     "shape": [size, size, 3],
                     "names": ["height", "width", "channels"],
@@ -446,32 +453,32 @@ fn write_table(
     columns: &[(&str, Column)],
     entries: &[(&str, String)],
 ) -> Result<(), ExportError> {
-    let wrong = |problem| ExportError::Table { path: path.to_owned(), problem };
-    table::write(path, columns, entries).map_err(wrong)
+    let convert = |problem| ExportError::Table { path: path.to_owned(), problem };
+    table::write(path, columns, entries).map_err(convert)
 }
 
-/// What an agent sees.
-fn look(scene: &Scene, world: &World, agent: AgentId, size: u32) -> RgbImage {
-    let view = View::of_agent(world, agent, size, Channels::RGB);
+/// Renders the view of an agent.
+fn render_view(scene: &Scene, world: &World, agent: AgentId, size: u32) -> RgbImage {
+    let view = View::from_agent(world, agent, size, Channels::RGB);
     let rgb = scene.render(world, &[view]).pop().and_then(|images| images.rgb);
-    let rgb = rgb.expect("color was asked for");
-    RgbImage::from_raw(size, size, rgb).expect("as many pixels as were asked for")
+    let rgb = rgb.expect("color was requested");
+    RgbImage::from_raw(size, size, rgb).expect("as many pixels as were requested")
 }
 
-/// The number of the class of a thing, by the catalogue's order; -1 for none.
-fn class_of(world: &World, entity: Option<EntityId>) -> f32 {
+/// Returns the index of an object's class in the catalogue; -1 for none.
+fn class_index(world: &World, entity: Option<EntityId>) -> f32 {
     let setup = world.setup();
-    let index = entity.and_then(|it| setup.thing_index(it));
+    let index = entity.and_then(|entity| setup.thing_index(entity));
     index.map_or(-1.0, |k| setup.things[k].class.index() as f32)
 }
 
-fn state_of(world: &World, agent: AgentId) -> [f32; STATE.len()] {
+fn encode_state(world: &World, agent: AgentId) -> [f32; STATE.len()] {
     let (setup, state) = (world.setup(), world.state());
-    let person = &state.people[agent.index()];
+    let person = &state.agents[agent.index()];
     let [left, right] = person.hands;
     let n_in = |held: Option<EntityId>| {
-        let inside = state.things.iter().filter(|thing| match thing.place {
-            chaic_world::Place::Inside { container, .. } => Some(container) == held,
+        let inside = state.objects.iter().filter(|object| match object.location {
+            chaic_world::ObjectLocation::Inside { container, .. } => Some(container) == held,
             _ => false,
         });
         inside.count() as f32
@@ -484,16 +491,16 @@ fn state_of(world: &World, agent: AgentId) -> [f32; STATE.len()] {
         at.z,
         heading.x,
         heading.z,
-        class_of(world, left),
-        class_of(world, right),
+        class_index(world, left),
+        class_index(world, right),
         n_in(left),
         n_in(right),
         time,
     ]
 }
 
-/// An action as numbers: its kind, the hand (0 left, 1 right, -1 none) and the class of what it is about.
-fn action_of(world: &World, action: Option<ResolvedAction>) -> [f32; ACTION.len()] {
+/// Encodes an action: its kind, the hand (0 left, 1 right, -1 none) and the class of its object.
+fn encode_action(world: &World, action: Option<ResolvedAction>) -> [f32; ACTION.len()] {
     let Some(action) = action else { return [7.0, -1.0, -1.0] };
     let (kind, hand) = match action {
         Action::MoveForward => (0.0, None),
@@ -506,10 +513,10 @@ fn action_of(world: &World, action: Option<ResolvedAction>) -> [f32; ACTION.len(
         Action::Wait { .. } => (7.0, None),
     };
     let hand = hand.map_or(-1.0, |hand: Hand| hand.index() as f32);
-    [kind, hand, class_of(world, action.subject())]
+    [kind, hand, class_index(world, action.subject())]
 }
 
-fn share_done(world: &World) -> f64 {
+fn fraction_done(world: &World) -> f64 {
     let (done, total) = world.progress();
     if total > 0.0 { done / total } else { 0.0 }
 }

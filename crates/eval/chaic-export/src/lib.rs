@@ -1,11 +1,11 @@
-//! Recorded runs as data sets that other programs read.
+//! Export of recorded runs to data set formats of other programs.
 //!
-//! **What it is**: [`lerobot`] writes what an agent of recorded episodes saw and did, in version 3 of LeRobot's format;
-//! [`table`] writes Parquet files.
+//! **What it is**: [`lerobot`] exports the observations and actions of an agent from recorded
+//! episodes, in version 3 of the LeRobot format. [`table`] writes Parquet files.
 //!
-//! **What it is not**: it plays nothing but traces, and learns nothing.
+//! **What it is not**: it plays no episodes other than traces, and trains no models.
 //!
-//! **Invariant**: what is written is a whole data set of the episodes so far, whenever it is broken off.
+//! **Invariant**: after an interruption, the data set is complete for the episodes exported so far.
 
 pub mod lerobot;
 pub mod table;

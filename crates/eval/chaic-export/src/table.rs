@@ -1,9 +1,9 @@
-//! Tables as Parquet files.
+//! Parquet tables.
 
 use std::path::Path;
 use std::sync::Arc;
 
-use chaic_files::create_fresh;
+use chaic_files::create_or_replace;
 use parquet::basic::{Compression, ConvertedType, LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{BoolType, ByteArray, ByteArrayType, FloatType, Int64Type};
 use parquet::errors::{ParquetError, Result};
@@ -12,30 +12,30 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::types::{Type, TypePtr};
 
-/// The values of a column, a row each.
+/// Values of a column, one per row.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Column {
-    /// Whole numbers.
+    /// Integers.
     I64(Vec<i64>),
-    /// Numbers.
+    /// Floating-point numbers.
     F32(Vec<f32>),
-    /// As many numbers in each row: one row after the other.
+    /// Lists of equal length per row, in row-major order.
     F32Rows {
-        /// How many in each row.
+        /// Length of each list.
         width: usize,
-        /// All numbers.
-        numbers: Vec<f32>,
+        /// Elements of all lists.
+        elements: Vec<f32>,
     },
-    /// Yes or no.
+    /// Booleans.
     Bool(Vec<bool>),
-    /// Text.
+    /// Strings.
     Text(Vec<String>),
-    /// One text or more in each row.
+    /// Non-empty lists of strings, one list per row.
     TextRows(Vec<Vec<String>>),
 }
 
 impl Column {
-    fn physical(&self) -> Physical {
+    fn physical_type(&self) -> Physical {
         match self {
             Column::I64(_) => Physical::INT64,
             Column::F32(_) | Column::F32Rows { .. } => Physical::FLOAT,
@@ -51,7 +51,7 @@ impl Column {
     fn schema(&self, name: &str) -> Result<TypePtr> {
         let is_list = matches!(self, Column::F32Rows { .. } | Column::TextRows(_));
         let primitive = |name: &str| {
-            let builder = Type::primitive_type_builder(name, self.physical())
+            let builder = Type::primitive_type_builder(name, self.physical_type())
                 .with_repetition(Repetition::REQUIRED);
             if !self.is_text() {
                 return builder.build();
@@ -84,10 +84,10 @@ impl Column {
                 let values: Vec<ByteArray> = values.iter().map(text).collect();
                 writer.typed::<ByteArrayType>().write_batch(&values, None, None)?
             }
-            Column::F32Rows { width, numbers } => {
-                let (defined, repeated) = levels(numbers.chunks(*width).map(<[f32]>::len));
+            Column::F32Rows { width, elements } => {
+                let (defined, repeated) = levels(elements.chunks(*width).map(<[f32]>::len));
                 let typed = writer.typed::<FloatType>();
-                typed.write_batch(numbers, Some(&defined), Some(&repeated))?
+                typed.write_batch(elements, Some(&defined), Some(&repeated))?
             }
             Column::TextRows(rows) => {
                 let values: Vec<ByteArray> = rows.iter().flatten().map(text).collect();
@@ -100,16 +100,16 @@ impl Column {
     }
 }
 
-/// The levels of definition and repetition of lists of these lengths, none of them empty.
+/// Returns the definition and repetition levels of non-empty lists with these lengths.
 fn levels(lengths: impl Iterator<Item = usize>) -> (Vec<i16>, Vec<i16>) {
     let repeated: Vec<i16> = lengths.flat_map(|n| (0..n).map(|k| i16::from(k > 0))).collect();
     (vec![1; repeated.len()], repeated)
 }
 
-/// Writes columns of as many rows each, with entries for whoever reads the file.
+/// Writes columns of equal length, with metadata entries.
 ///
 /// # Errors
-/// If the file system refuses.
+/// If the file cannot be written.
 pub fn write(path: &Path, columns: &[(&str, Column)], entries: &[(&str, String)]) -> Result<()> {
     let fields: Result<Vec<TypePtr>> = columns.iter().map(|(name, c)| c.schema(name)).collect();
     let schema = Arc::new(Type::group_type_builder("schema").with_fields(fields?).build()?);
@@ -122,7 +122,7 @@ pub fn write(path: &Path, columns: &[(&str, Column)], entries: &[(&str, String)]
         .set_created_by("chaic".to_owned())
         .set_key_value_metadata(Some(entries))
         .build();
-    let file = create_fresh(path).map_err(|e| ParquetError::External(Box::new(e)))?;
+    let file = create_or_replace(path).map_err(|e| ParquetError::External(Box::new(e)))?;
     let mut writer = SerializedFileWriter::new(file, schema, Arc::new(properties))?;
     let mut group = writer.next_row_group()?;
     for (_, column) in columns {

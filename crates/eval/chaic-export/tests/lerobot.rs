@@ -1,15 +1,15 @@
-//! Promises: a recorded episode becomes tables that a reader of Parquet reads, a row each moment, whose rewards sum up to
-//! the transport rate; what was broken off is a whole data set of fewer episodes; mistakes are told before anything is
-//! written.
+//! A recorded episode is exported to Parquet tables with one row per sampled frame, and the rewards
+//! sum up to the transport rate. An interrupted export is a complete data set of fewer episodes.
+//! Invalid options are reported before any file is written.
 
 use std::fs::{self, File};
 use std::path::Path;
 
 use chaic_core::{AgentError, AgentId};
-use chaic_env::minds::{BuiltIn, find};
+use chaic_env::helper_registry::{BuiltInHelpers, find};
 use chaic_env::rules::RuleSet;
 use chaic_env::trace::{Record, Trace};
-use chaic_env::{Appearance, Env, EpisodeConfig, Flow};
+use chaic_env::{AdvanceOutcome, Env, EpisodeConfig};
 use chaic_episodes::{Episode, find_episode};
 use chaic_export::lerobot::{ExportError, LeRobotOptions, LeRobotWriter};
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
@@ -18,19 +18,11 @@ use parquet::record::{Field, Row};
 const OPTIONS: LeRobotOptions =
     LeRobotOptions { agent: AgentId::HELPER, every: 30, image_size: 32 };
 
-/// An episode of moving house, which is the shortest, with RHP.
+/// Records an episode of moving house, the shortest task, with RHP.
 fn recorded() -> (Episode, Trace) {
     let episode = find_episode("moving_house/gen/40000001").unwrap();
-    let config = EpisodeConfig {
-        episode: &episode,
-        seed: 0,
-        rules: RuleSet::PAPER,
-        helper: "rhp",
-        partner: None,
-        image_size: Some(64),
-        appearance: Appearance::Canonical,
-    };
-    let helper = find(&BuiltIn, "rhp", RuleSet::PAPER.planner).unwrap();
+    let config = EpisodeConfig { image_size: Some(64), ..EpisodeConfig::new(&episode, "rhp") };
+    let helper = find(&BuiltInHelpers, "rhp", RuleSet::PAPER.planner).unwrap();
     let mut env = Env::new(config, helper).unwrap();
     let header = env.header().clone();
     let mut records = Vec::new();
@@ -38,8 +30,8 @@ fn recorded() -> (Episode, Trace) {
         records.push(record.clone());
         Ok::<(), AgentError>(())
     };
-    let flow = env.run(&false.into(), None, &mut sink).unwrap();
-    assert_eq!(flow, Flow::Ended);
+    let outcome = env.run(&false.into(), None, &mut sink).unwrap();
+    assert_eq!(outcome, AdvanceOutcome::Ended);
     (episode, Trace { header, records })
 }
 
@@ -60,7 +52,7 @@ fn long(row: &Row, name: &str) -> i64 {
 }
 
 #[test]
-fn an_episode_becomes_a_table_and_a_film() {
+fn an_episode_is_exported_as_a_table_and_a_video() {
     let (episode, trace) = recorded();
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("set");
@@ -68,39 +60,39 @@ fn an_episode_becomes_a_table_and_a_film() {
     for _ in 0..2 {
         assert!(writer.add(&trace, &episode, &mut || true).unwrap());
     }
-    // The third is broken off.
-    let mut asked = 0;
-    let mut go_on = || {
-        asked += 1;
-        asked < 5
+    // The third episode is interrupted.
+    let mut n_calls = 0;
+    let mut should_continue = || {
+        n_calls += 1;
+        n_calls < 5
     };
-    assert!(!writer.add(&trace, &episode, &mut go_on).unwrap());
+    assert!(!writer.add(&trace, &episode, &mut should_continue).unwrap());
     let n = writer.finish().unwrap();
     let end = trace.end().unwrap();
-    let moments = rows(&out.join("data/chunk-000/file-001.parquet"));
-    assert_eq!(moments.len(), (end.frame as usize).div_ceil(30));
-    assert_eq!(n, 2 * moments.len());
-    let mut got = 0.0;
-    for (k, row) in moments.iter().enumerate() {
+    let samples = rows(&out.join("data/chunk-000/file-001.parquet"));
+    assert_eq!(samples.len(), (end.frame as usize).div_ceil(30));
+    assert_eq!(n, 2 * samples.len());
+    let mut total_reward = 0.0;
+    for (k, row) in samples.iter().enumerate() {
         assert_eq!(long(row, "frame_index"), k as i64);
         assert_eq!(long(row, "episode_index"), 1);
-        assert_eq!(long(row, "index"), (moments.len() + k) as i64);
+        assert_eq!(long(row, "index"), (samples.len() + k) as i64);
         let Field::Float(reward) = field(row, "next.reward") else { panic!("{row}") };
-        got += f64::from(*reward);
+        total_reward += f64::from(*reward);
         let Field::ListInternal(state) = field(row, "observation.state") else { panic!("{row}") };
         assert_eq!(state.elements().len(), 9);
-        let is_last = k + 1 == moments.len();
+        let is_last = k + 1 == samples.len();
         assert_eq!(field(row, "next.done"), &Field::Bool(is_last));
     }
-    assert!((got - end.done / end.total).abs() < 1e-6, "{got}");
-    assert!(moments.iter().any(|row| field(row, "plan") == &Field::Str("explore".to_owned())));
+    assert!((total_reward - end.done / end.total).abs() < 1e-6, "{total_reward}");
+    assert!(samples.iter().any(|row| field(row, "plan") == &Field::Str("explore".to_owned())));
     let episodes = rows(&out.join("meta/episodes/chunk-000/file-000.parquet"));
     assert_eq!(episodes.len(), 2);
-    assert_eq!(long(&episodes[1], "dataset_from_index"), moments.len() as i64);
-    assert_eq!(long(&episodes[1], "length"), moments.len() as i64);
+    assert_eq!(long(&episodes[1], "dataset_from_index"), samples.len() as i64);
+    assert_eq!(long(&episodes[1], "length"), samples.len() as i64);
     assert_eq!(rows(&out.join("meta/tasks.parquet")).len(), 1);
-    let film = out.join("videos/observation.images.ego/chunk-000/file-001.mp4");
-    assert!(fs::metadata(film).unwrap().len() > 1000);
+    let video_path = out.join("videos/observation.images.ego/chunk-000/file-001.mp4");
+    assert!(fs::metadata(video_path).unwrap().len() > 1000);
     let info: serde_json::Value =
         serde_json::from_slice(&fs::read(out.join("meta/info.json")).unwrap()).unwrap();
     assert_eq!((&info["total_frames"], &info["fps"]), (&n.into(), &1.into()));
@@ -110,13 +102,13 @@ fn an_episode_becomes_a_table_and_a_film() {
 }
 
 #[test]
-fn mistakes_are_told_before_anything_is_written() {
+fn invalid_options_are_reported_before_files_are_written() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("something"), "").unwrap();
-    let refused = LeRobotWriter::create(folder.path(), OPTIONS);
-    assert!(matches!(refused, Err(ExportError::NotEmpty(_))));
+    let error = LeRobotWriter::create(folder.path(), OPTIONS);
+    assert!(matches!(error, Err(ExportError::NotEmpty(_))));
     let out = folder.path().join("set");
-    let refused = LeRobotWriter::create(&out, LeRobotOptions { every: 7, ..OPTIONS });
-    assert!(matches!(refused, Err(ExportError::Rate(7))));
+    let error = LeRobotWriter::create(&out, LeRobotOptions { every: 7, ..OPTIONS });
+    assert!(matches!(error, Err(ExportError::Rate(7))));
     assert!(!out.exists());
 }

@@ -1,4 +1,4 @@
-//! The document as a whole: what was done, what came out, and what is written by hand.
+//! Markdown document with method, results and the handwritten causes.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -7,89 +7,91 @@ use std::path::{Path, PathBuf};
 
 use chaic_core::TaskId;
 use chaic_env::CHAIC_VERSION;
-use chaic_files::{read_user_file, write_whole};
+use chaic_files::{read_user_file, write_atomically};
 
 use crate::experiment::Experiment;
 use crate::matrix::PartState;
 use crate::sections::{RuleSection, formulas};
 use crate::switches;
 use chaic_eval::figure::{Bar, Bars, FigureError, HelperBars, transport_rate};
-use chaic_eval::metrics::{Ending, Played, Scores};
+use chaic_eval::metrics::{PlayedEpisodes, RunStatus, Scores};
 use chaic_eval::published::published;
 use chaic_eval::report::{coverage, shown_interval};
 use chaic_eval::{EvalError, Result};
 
-/// Longest document that is read, bytes: a hundred times a usual one.
+/// Largest document that is read, bytes: a hundred times the typical size.
 const MAX_DOCUMENT_BYTES: u64 = 16 << 20;
 
-/// Before what is written by hand.
+/// Mark before the handwritten section.
 pub const CAUSES_BEGIN: &str =
     "<!-- causes: written by hand, kept when the document is made again -->";
-/// After it.
+/// Mark after the handwritten section.
 pub const CAUSES_END: &str = "<!-- end of causes -->";
 
-/// All that a document is made from.
+/// Inputs of a document.
 #[derive(Clone, Copy, Debug)]
-pub struct Sheet<'a> {
-    /// What is played.
+pub struct ReportInputs<'a> {
+    /// Experiment that was planned.
     pub plan: &'a Experiment,
-    /// What came out so far.
+    /// Results so far.
     pub parts: &'a [PartState],
 }
 
-/// Writes the document to `path`, and its figures to `images/` beside it. What stands between
-/// [`CAUSES_BEGIN`] and [`CAUSES_END`] of a document that is there is kept.
+/// Writes the document to `path`, and its figures to `images/` beside it. The text between
+/// [`CAUSES_BEGIN`] and [`CAUSES_END`] of an existing document is kept.
 ///
 /// # Errors
-/// If something else is there, there is nothing to write, or the file system refuses.
-pub fn write_document(sheet: Sheet<'_>, path: &Path) -> Result<()> {
-    let causes = causes_of(path)?;
+/// If another file exists at the path, there are no results, or a file cannot be written.
+pub fn write_document(inputs: ReportInputs<'_>, path: &Path) -> Result<()> {
+    let causes = read_causes(path)?;
     let stem = path.file_stem().map_or("fidelity".into(), |s| s.to_string_lossy());
     let folder = path.parent().map_or(PathBuf::new(), Path::to_owned).join("images");
     fs::create_dir_all(&folder).map_err(EvalError::io("make the folder", &folder))?;
-    for part in sheet.rule_sets() {
-        let bars = sheet.bars(part);
+    for part in inputs.rule_sets() {
+        let bars = inputs.bars(part);
         let file = folder.join(figure_name(&stem, part));
         transport_rate(&bars, &file).map_err(|e| match e {
-            FigureError::Write(refusal) => refusal.into(),
-            other => EvalError::Picture(other.to_string()),
+            FigureError::Write(error) => error.into(),
+            other => EvalError::Image(other.to_string()),
         })?;
     }
-    let text = document(sheet, &stem, &causes)?;
-    Ok(write_whole(path, text.as_bytes())?)
+    let text = document(inputs, &stem, &causes)?;
+    Ok(write_atomically(path, text.as_bytes())?)
 }
 
-/// Whether a document could be written to `path`, for whoever would play for hours before.
+/// Checks whether a document can be written to `path`, before hours of computation.
 ///
 /// # Errors
-/// If something else is there, or it can't be read.
+/// If another file exists at the path, or it cannot be read.
 pub fn check_document(path: &Path) -> Result<()> {
-    causes_of(path).map(|_| ())
+    read_causes(path).map(|_| ())
 }
 
-/// The text of the document; `stem` names its figures, `causes` is what was written by hand.
+/// Returns the text of the document. `stem` is the prefix of figure names, `causes` the handwritten
+/// section.
 ///
 /// # Errors
-/// If neither rule set has any result yet.
-pub fn document(sheet: Sheet<'_>, stem: &str, causes: &str) -> Result<String> {
-    let plan = sheet.plan;
-    let shown: Vec<&PartState> = sheet.rule_sets().collect();
+/// If neither rule set has results.
+pub fn document(inputs: ReportInputs<'_>, stem: &str, causes: &str) -> Result<String> {
+    let plan = inputs.plan;
+    let shown: Vec<&PartState> = inputs.rule_sets().collect();
     if shown.is_empty() {
-        let text = "no episode run has finished yet, so there is nothing to write about";
+        let text = "no episode run has finished yet, so there are no results to report";
         return Err(EvalError::Options(text.to_owned()));
     }
-    let mut text = String::from("# How near chaic comes to the published results\n\n");
-    text += &sheet.state();
-    text += &sheet.method();
+    let mut text = String::from("# Comparison with the published results\n\n");
+    text += &inputs.state();
+    text += &inputs.method();
     for part in shown {
         let (rules, played, labels) = (part.part.rules, part.played(), part.labels());
         let (tasks, helpers) = (plan.tasks.as_slice(), plan.helpers.as_slice());
         let section = RuleSection { rules, played, labels, tasks, helpers };
         text += &section.markdown(&format!("images/{}", figure_name(stem, part)));
     }
-    if let Some(base) = sheet.base() {
-        let begun: Vec<&PartState> = sheet.switches().filter(|s| !s.results.is_empty()).collect();
-        text += &switches::section(base, &begun, &plan.tasks)?;
+    if let Some(base) = inputs.base() {
+        let started: Vec<&PartState> =
+            inputs.switches().filter(|s| !s.results.is_empty()).collect();
+        text += &switches::section(base, &started, &plan.tasks)?;
     }
     let _ = write!(text, "## Causes\n\n{CAUSES_BEGIN}\n{causes}{CAUSES_END}\n");
     Ok(text)
@@ -99,8 +101,8 @@ fn figure_name(stem: &str, part: &PartState) -> String {
     format!("{stem}-{}.svg", part.part.name)
 }
 
-/// What a document has between its marks; a line break where there is no document yet.
-fn causes_of(path: &Path) -> Result<String> {
+/// Returns the handwritten section of a document; a line break if the document does not exist.
+fn read_causes(path: &Path) -> Result<String> {
     if !path.exists() {
         return Ok("\n".to_owned());
     }
@@ -110,21 +112,21 @@ fn causes_of(path: &Path) -> Result<String> {
     let between = after.and_then(|a| a.split_once(CAUSES_END)).map(|(between, _)| between);
     between.map(|b| b.strip_prefix('\n').unwrap_or(b).to_owned()).ok_or_else(|| {
         EvalError::Options(format!(
-            "{} exists and is no document of this kind: it lacks the lines `{CAUSES_BEGIN}` and \
+            "{} exists and is not a document of this kind: it lacks the lines `{CAUSES_BEGIN}` and \
              `{CAUSES_END}`; choose another file",
             path.display()
         ))
     })
 }
 
-impl<'a> Sheet<'a> {
-    /// The runs of whole rule sets that have results.
+impl<'a> ReportInputs<'a> {
+    /// Returns the runs of whole rule sets that have results.
     fn rule_sets(self) -> impl Iterator<Item = &'a PartState> {
         let has_results = |p: &&PartState| p.results.iter().any(|r| r.summary().is_some());
         self.parts.iter().filter(|p| p.part.switch.is_none()).filter(has_results)
     }
 
-    /// The run that switches are compared with.
+    /// Returns the run that switches are compared with.
     fn base(self) -> Option<&'a PartState> {
         self.rule_sets().find(|p| p.part.rules == chaic_env::rules::RuleSetName::Compat)
     }
@@ -133,7 +135,7 @@ impl<'a> Sheet<'a> {
         self.parts.iter().filter(|p| p.part.switch.is_some())
     }
 
-    /// What isn't there; nothing if all is.
+    /// Returns notes on missing and failed runs; empty if all runs are complete.
     fn state(self) -> String {
         let planned: usize = self.parts.iter().map(|p| p.planned.len()).sum();
         let missing: usize = self.parts.iter().map(|p| p.missing().len()).sum();
@@ -142,7 +144,7 @@ impl<'a> Sheet<'a> {
             let _ = writeln!(
                 text,
                 "**This document is unfinished: {missing} of {planned} episode runs are missing.** \
-                 Its tables are over what is there.\n"
+                 Its tables cover the finished runs only.\n"
             );
             for part in self.parts.iter().filter(|p| !p.missing().is_empty()) {
                 let (name, n) = (&part.part.name, part.missing().len());
@@ -151,18 +153,18 @@ impl<'a> Sheet<'a> {
             text.push('\n');
         }
         for part in self.parts {
-            // What is missing altogether has just been said.
-            for note in coverage(Played { planned: &[], ..part.played() }) {
+            // Missing runs are listed above.
+            for note in coverage(PlayedEpisodes { planned: &[], ..part.played() }) {
                 let _ = writeln!(text, "**{}: {note}**\n", part.part.name);
             }
         }
-        let broken: usize = self.parts.iter().map(PartState::n_broken).sum();
-        if broken > 0 {
-            let _ = writeln!(text, "**{broken} episode runs broke down and count as zero:**\n");
+        let n_failed: usize = self.parts.iter().map(PartState::n_failed).sum();
+        if n_failed > 0 {
+            let _ = writeln!(text, "**{n_failed} episode runs failed and count as zero:**\n");
             for (part, result) in
                 self.parts.iter().flat_map(|p| p.results.iter().map(move |r| (p, r)))
             {
-                if let Ending::Error { message } = &result.ending {
+                if let RunStatus::Error { message } = &result.status {
                     let (name, k) = (&part.part.name, &result.key);
                     let _ = writeln!(
                         text,
@@ -184,27 +186,27 @@ impl<'a> Sheet<'a> {
         let played: usize = self.parts.iter().map(|p| p.results.len()).sum();
         let (n, tasks, seeds) = (episodes.len(), plan.tasks.len(), plan.seeds);
         let mut text = format!(
-            "Made by chaic {CHAIC_VERSION} with\n\n```sh\n{}\n```\n\nwhich also writes this file \
-             (`--doc FILE`); nothing but the last section is written by hand. Episodes: {n}, tasks: {tasks}, seeds of each \
-             episode: {seeds}, episode runs in all: {played}. The published figures are those \
-             of the paper's tables of quantitative and additional results \
+            "Made by chaic {CHAIC_VERSION} with\n\n```sh\n{}\n```\n\nThe command also writes this file \
+             (`--doc FILE`). Only the last section is written by hand. Episodes: {n}, tasks: \
+             {tasks}, seeds per episode: {seeds}, episode runs: {played}. The published figures are \
+             those of the paper's tables of quantitative and additional results \
              (`chaic_eval::published`).\n\n",
             plan.command()
         );
-        // TASK/KIND/NUMBER
+        // Episode ids have the form TASK/KIND/NUMBER.
         let kinds: BTreeSet<&str> =
             episodes.iter().map(|(_, id)| id.split('/').nth(1).unwrap_or(id)).collect();
         text += &match kinds.into_iter().collect::<Vec<_>>()[..] {
-            ["original-train"] => "EPISODES are the original's training episodes as `chaic import \
-                original --split train` makes them ([import.md](import.md)). **The published figures \
-                are over the original's test split, these over its training split**: other floor \
-                plans and other goals by the same generator. Equal figures are not to be expected \
-                even of the original itself; how far apart two such sets of episodes may lie by \
-                chance is computed below."
+            ["original-train"] => "EPISODES are the original's training episodes as produced by \
+                `chaic import original --split train` ([import.md](../import.md)). **The published \
+                figures are over the original's test split, these over its training split**, which \
+                has other floor plans and goals from the same generator. Even the original would \
+                not reproduce the figures exactly; the difference that chance explains is computed \
+                below."
                 .to_owned(),
             ref other => format!(
                 "EPISODES are of the kind {}. **The published figures are over the original's test \
-                 split, these are not**, so they are comparable in kind only.",
+                 split, these are not**, so the comparison is only qualitative.",
                 other.join(", ")
             ),
         };
@@ -219,12 +221,12 @@ impl<'a> Sheet<'a> {
     }
 
     fn bars(self, part: &PartState) -> Bars {
-        let scores = Scores::of(part.played(), &formulas(part.part.rules));
+        let scores = Scores::new(part.played(), &formulas(part.part.rules));
         let tasks = &self.plan.tasks;
         let bars = |helper: &String| {
             let bar = |task: &TaskId| {
                 let score = scores.get(*task, helper)?;
-                let dot = published(helper).and_then(|row| Some(row.figures(*task)?.tr));
+                let dot = published(helper).and_then(|row| Some(row.scores(*task)?.tr));
                 Some(Bar { mean: score.tr, interval: shown_interval(score), dot })
             };
             let helper_title = part.labels().title(helper);

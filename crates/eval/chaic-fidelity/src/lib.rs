@@ -1,10 +1,9 @@
-//! How near one comes to the paper's published results, and what moves them.
+//! Comparison with the paper's published results, and the effect of single rules.
 //!
-//! A [`Experiment`] says which runs are played below one folder: both rule sets with all helpers, then
-//! the original's rules with one rule at a time set as the paper has it (a *switch*). Each is an
-//! ordinary run folder. [`parts()`] reads them all, [`document()`] writes what they say as Markdown
-//! with figures; nothing in it comes from anywhere but those folders and
-//! [`published`](chaic_eval::published::published).
+//! An [`Experiment`] defines runs below one folder: both rule sets with all helpers, then the
+//! original's rules with one rule at a time set to the paper's value (a *switch*). Each is an
+//! ordinary run folder. [`parts()`] reads them all. [`document()`] reports them as Markdown with
+//! figures. Its only sources are those folders and [`published`](chaic_eval::published::published).
 
 mod compare;
 mod document;
@@ -16,8 +15,10 @@ mod switches;
 pub use compare::{
     Distance, Inversion, Order, PUBLISHED_EPISODES, TaskRate, distance, order, task_rate,
 };
-pub use document::{CAUSES_BEGIN, CAUSES_END, Sheet, check_document, document, write_document};
-pub use experiment::{Experiment, ExperimentRequest, Part};
+pub use document::{
+    CAUSES_BEGIN, CAUSES_END, ReportInputs, check_document, document, write_document,
+};
+pub use experiment::{Experiment, ExperimentPart, ExperimentRequest};
 pub use matrix::{Matrix, PartState, parts};
 pub use switches::{Change, change};
 

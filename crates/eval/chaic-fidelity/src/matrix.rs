@@ -1,50 +1,50 @@
-//! The runs of a plan in their folders, and how far they have come.
+//! Folders of an experiment's runs, and their progress.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use chaic_core::{Frame, TaskId};
-use chaic_env::minds::Helpers;
+use chaic_env::helper_registry::HelperRegistry;
 use chaic_env::{CHAIC_VERSION, EnvError, RunKey};
-use chaic_files::{EntryKind, UNFINISHED, kind, read_bounded, write_whole};
+use chaic_files::{EntryKind, TEMPORARY_SUFFIX, kind, read_bounded, write_atomically};
 use serde::{Deserialize, Serialize};
 
-use crate::experiment::{Experiment, ExperimentRequest, Part};
-use chaic_eval::metrics::{Environments, Played, RunResult};
+use crate::experiment::{Experiment, ExperimentPart, ExperimentRequest};
+use chaic_eval::metrics::{Environments, PlayedEpisodes, RunResult};
 use chaic_eval::report::Labels;
 use chaic_eval::run::{
-    Item, RunFolder, RunGrants, RunRequest, environments, planned, read_results,
+    EpisodeJob, RunFolder, RunGrants, RunRequest, environments, planned, read_results,
 };
 use chaic_eval::{EvalError, Result};
 
 const FORMAT: &str = "chaic-fidelity";
 const VERSION: u32 = 1;
 const FILE: &str = "fidelity.json";
-/// Longest plan that is read, bytes: a thousand times a usual one.
+/// Largest plan that is read, bytes: a thousand times the typical size.
 const MAX_FILE_BYTES: u64 = 1 << 20;
 
 /// All runs below one folder.
 #[derive(Clone, Debug)]
 pub struct Matrix {
-    /// The folder.
+    /// Path of the folder.
     pub path: PathBuf,
-    /// What is played there.
+    /// Plan of the runs.
     pub plan: Experiment,
     episodes: Option<PathBuf>,
 }
 
-/// How far one of the runs has come.
+/// Progress of one run.
 #[derive(Clone, Debug)]
 pub struct PartState {
-    /// Which.
-    pub part: Part,
-    /// All its episode runs.
+    /// Definition of the run.
+    pub part: ExperimentPart,
+    /// Keys of all its episode runs.
     pub planned: Vec<RunKey>,
-    /// Their results so far.
+    /// Results so far.
     pub results: Vec<RunResult>,
-    /// Where the episodes take place.
+    /// Environments of the episodes.
     pub environments: Environments,
-    /// What everybody is granted; `None` where the part hasn't begun.
+    /// Granted information; `None` if the run has not started.
     pub granted: Option<RunGrants>,
 }
 
@@ -57,22 +57,26 @@ struct PlanFile {
 }
 
 impl Matrix {
-    /// Begins a matrix in a new or empty folder.
+    /// Creates an experiment in a new or empty folder.
     ///
     /// # Errors
-    /// If there is something in the folder, or the options make no matrix.
-    pub fn begin(path: &Path, wanted: &ExperimentRequest, helpers: &dyn Helpers) -> Result<Matrix> {
-        // What a matrix leaves that is stopped in its first moment is nothing.
-        let unfinished = format!("{FILE}{UNFINISHED}");
+    /// If the folder is not empty, or the options are invalid.
+    pub fn create(
+        path: &Path,
+        request: &ExperimentRequest,
+        helpers: &dyn HelperRegistry,
+    ) -> Result<Matrix> {
+        // An experiment that was interrupted while it was created leaves only this file.
+        let unfinished = format!("{FILE}{TEMPORARY_SUFFIX}");
         let mut entries = std::fs::read_dir(path).into_iter().flatten().flatten();
         if entries.any(|e| e.file_name() != *unfinished) {
             return Err(EvalError::NotEmpty { path: path.to_owned() });
         }
-        let episodes = wanted.episodes.clone().ok_or_else(|| {
+        let episodes = request.episodes.clone().ok_or_else(|| {
             EvalError::Options("give the folder with episode files by --episodes".to_owned())
         })?;
         let matrix =
-            Matrix { path: path.to_owned(), plan: wanted.begin(&episodes)?, episodes: None };
+            Matrix { path: path.to_owned(), plan: request.new_plan(&episodes)?, episodes: None };
         matrix.plan.check_names(&episodes, helpers)?;
         let matrix = Matrix { episodes: Some(episodes), ..matrix };
         std::fs::create_dir_all(path).map_err(EvalError::io("make the folder", path))?;
@@ -80,25 +84,25 @@ impl Matrix {
         Ok(matrix)
     }
 
-    /// Goes on with the matrix of a folder. Switches may be added, nothing else changed.
+    /// Resumes the experiment in a folder. Switches may be added; other options must not change.
     ///
     /// # Errors
-    /// If there is none, or it was begun with other options.
-    pub fn resume(path: &Path, wanted: &ExperimentRequest) -> Result<Matrix> {
+    /// If there is no experiment, or it was created with other options.
+    pub fn resume(path: &Path, request: &ExperimentRequest) -> Result<Matrix> {
         let recorded = read(path)?;
-        let plan = wanted.resume(&recorded, path)?;
-        let matrix = Matrix { path: path.to_owned(), plan, episodes: wanted.episodes.clone() };
+        let plan = request.resumed_plan(&recorded, path)?;
+        let matrix = Matrix { path: path.to_owned(), plan, episodes: request.episodes.clone() };
         if matrix.plan != recorded {
             matrix.write()?;
         }
         Ok(matrix)
     }
 
-    /// What is to be played for a part.
+    /// Returns the run request of a part.
     ///
     /// # Errors
-    /// If nobody says where the episodes are.
-    pub fn given(&self, part: &Part) -> Result<RunRequest> {
+    /// If the folder of episodes is unknown.
+    pub fn run_request(&self, part: &ExperimentPart) -> Result<RunRequest> {
         let Experiment { tasks, first, size, .. } = &self.plan;
         Ok(RunRequest {
             tasks: Some(tasks.clone()),
@@ -120,18 +124,18 @@ impl Matrix {
         })
     }
 
-    /// The folder of a part.
-    pub fn folder(&self, part: &Part) -> PathBuf {
+    /// Returns the folder of a part.
+    pub fn folder(&self, part: &ExperimentPart) -> PathBuf {
         self.path.join(&part.name)
     }
 
-    /// The copies that the first run made, so that all runs play the same; before it, those that
-    /// the user names.
+    /// Returns the episodes that the first run copied, so that all runs use the same; before it,
+    /// those of the option.
     fn episodes(&self) -> Result<PathBuf> {
         let mut runs = self.plan.parts().into_iter().map(|p| self.folder(&p));
         let copies = runs.find(|run| RunFolder::is_run(run)).map(|r| r.join("episodes"));
         copies.or_else(|| self.episodes.clone()).ok_or_else(|| {
-            let text = "no run has begun yet; give the folder with episode files by --episodes";
+            let text = "no run has started yet; give the folder with episode files by --episodes";
             EvalError::Options(text.to_owned())
         })
     }
@@ -140,7 +144,7 @@ impl Matrix {
         let (format, chaic) = (FORMAT.to_owned(), CHAIC_VERSION.to_owned());
         let file = PlanFile { format, version: VERSION, chaic, plan: self.plan.clone() };
         let text = serde_json::to_string_pretty(&file).expect("a plan has string keys") + "\n";
-        Ok(write_whole(&self.path.join(FILE), text.as_bytes())?)
+        Ok(write_atomically(&self.path.join(FILE), text.as_bytes())?)
     }
 }
 
@@ -156,8 +160,9 @@ fn read(path: &Path) -> Result<Experiment> {
         line: e.line(),
         problem: e.to_string(),
     })?;
-    let is_ours = read.format == FORMAT && read.version == VERSION && read.chaic == CHAIC_VERSION;
-    if !is_ours {
+    let is_compatible =
+        read.format == FORMAT && read.version == VERSION && read.chaic == CHAIC_VERSION;
+    if !is_compatible {
         return Err(EvalError::Env(EnvError::OtherVersion {
             path: file,
             found: format!("{} version {} (chaic {})", read.format, read.version, read.chaic),
@@ -167,15 +172,15 @@ fn read(path: &Path) -> Result<Experiment> {
     Ok(read.plan)
 }
 
-/// How far all runs of a matrix have come. Runs that have not begun are planned too.
+/// Reads the progress of all runs. Runs that have not started are included.
 ///
 /// # Errors
-/// If no run has begun, or one can't be read.
+/// If no run has started, or one cannot be read.
 pub fn parts(matrix: &Matrix) -> Result<Vec<PartState>> {
     let parts = matrix.plan.parts();
-    let begun = |part: &Part| RunFolder::is_run(&matrix.folder(part));
-    let Some(first) = parts.iter().find(|p| begun(p)) else {
-        let text = format!("{} has no run yet; begin them first", matrix.path.display());
+    let has_started = |part: &ExperimentPart| RunFolder::is_run(&matrix.folder(part));
+    let Some(first) = parts.iter().find(|p| has_started(p)) else {
+        let text = format!("{} has no run yet; start the runs first", matrix.path.display());
         return Err(EvalError::Options(text));
     };
     let (folder, options) = RunFolder::read(&matrix.folder(first))?;
@@ -183,23 +188,23 @@ pub fn parts(matrix: &Matrix) -> Result<Vec<PartState>> {
     let environments = environments(&planned);
     let episodes: BTreeMap<(TaskId, String), (Frame, String)> = planned
         .into_iter()
-        .map(|i| ((i.key.task, i.key.episode), (i.horizon, i.environment)))
+        .map(|job| ((job.key.task, job.key.episode), (job.horizon, job.environment)))
         .collect();
-    let state = |part: Part| {
-        let mut items = Vec::new();
+    let state = |part: ExperimentPart| {
+        let mut jobs = Vec::new();
         for ((task, episode), (horizon, environment)) in &episodes {
             for (helper, seed) in
                 part.helpers.iter().flat_map(|h| (0..part.seeds).map(move |s| (h, s)))
             {
                 let (task, episode, helper) = (*task, episode.clone(), helper.clone());
                 let key = RunKey { task, helper, episode, seed };
-                items.push(Item { key, horizon: *horizon, environment: environment.clone() });
+                jobs.push(EpisodeJob { key, horizon: *horizon, environment: environment.clone() });
             }
         }
-        let (results, _) = read_results(&matrix.folder(&part).join("results.jsonl"), &items)?;
-        let mut planned: Vec<RunKey> = items.into_iter().map(|i| i.key).collect();
+        let (results, _) = read_results(&matrix.folder(&part).join("results.jsonl"), &jobs)?;
+        let mut planned: Vec<RunKey> = jobs.into_iter().map(|job| job.key).collect();
         planned.sort();
-        let granted = match begun(&part) {
+        let granted = match has_started(&part) {
             true => RunFolder::read(&matrix.folder(&part))?.0.granted()?,
             false => None,
         };
@@ -209,24 +214,24 @@ pub fn parts(matrix: &Matrix) -> Result<Vec<PartState>> {
 }
 
 impl PartState {
-    /// What its scores are made from.
-    pub fn played(&self) -> Played<'_> {
+    /// Returns the results that scores are computed from.
+    pub fn played(&self) -> PlayedEpisodes<'_> {
         let PartState { planned, results, environments, .. } = self;
-        Played { results, planned, environments }
+        PlayedEpisodes { results, planned, environments }
     }
 
-    /// What its rows are called.
+    /// Returns the labels of its rows.
     pub fn labels(&self) -> Labels<'_> {
         Labels { granted: self.granted.as_ref() }
     }
 
-    /// The episode runs without a result.
+    /// Returns the episode runs without a result.
     pub fn missing(&self) -> Vec<&RunKey> {
         self.played().missing()
     }
 
-    /// The results that broke down.
-    pub fn n_broken(&self) -> usize {
+    /// Returns the number of failed results.
+    pub fn n_failed(&self) -> usize {
         self.results.iter().filter(|r| r.summary().is_none()).count()
     }
 }

@@ -1,30 +1,30 @@
-//! What the document says of one rule set.
+//! Section of the document about one rule set.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use chaic_core::TaskId;
-use chaic_env::minds::NONE;
+use chaic_env::helper_registry::NONE;
 use chaic_env::rules::RuleSetName;
 
 use crate::compare::{
     Distance, Inversion, Order, PUBLISHED_EPISODES, TaskRate, distance, order, task_rate,
 };
-use chaic_eval::metrics::{Formulas, Metric, Played, Scores, Spread, differences};
+use chaic_eval::metrics::{Formulas, Metric, PlayedEpisodes, Scores, Spread, differences};
 use chaic_eval::published::published;
 use chaic_eval::report::{Labels, TextTable, capitalized, interval, number, rounded, title};
 
-/// The results of one rule set.
+/// Results of one rule set.
 pub(super) struct RuleSection<'a> {
     pub rules: RuleSetName,
-    pub played: Played<'a>,
+    pub played: PlayedEpisodes<'a>,
     pub labels: Labels<'a>,
     pub tasks: &'a [TaskId],
     pub helpers: &'a [String],
 }
 
-/// The formulas that a rule set is scored by: the paper's by the paper's, the original's by those
-/// of its scripts; standard errors are always over environments.
+/// Returns the formulas of a rule set's scores: the paper's, or those of the original's scripts.
+/// Standard errors are always over environments.
 pub(super) fn formulas(rules: RuleSetName) -> Formulas {
     match rules {
         RuleSetName::Paper => Formulas::PAPER,
@@ -33,18 +33,18 @@ pub(super) fn formulas(rules: RuleSetName) -> Formulas {
 }
 
 impl RuleSection<'_> {
-    /// The whole section; `figure` is where its figure lies.
+    /// Returns the section as Markdown; `figure` is the path of its figure.
     pub fn markdown(&self, figure: &str) -> String {
         let name = match self.rules {
-            RuleSetName::Paper => "By the paper's rules (`paper`)",
-            RuleSetName::Compat => "By the rules of the original's code (`compat`)",
+            RuleSetName::Paper => "Rules of the paper (`paper`)",
+            RuleSetName::Compat => "Rules of the original's code (`compat`)",
         };
         let scored = match self.rules {
             RuleSetName::Paper => "Scored by the paper's formulas.",
             RuleSetName::Compat => {
-                "Scored by the formulas of the original's scripts, where these differ from the \
-                 paper's (EI, CR, ER; see [metrics.md](metrics.md)); standard errors are over \
-                 environments, as everywhere here."
+                "Scored by the formulas of the original's scripts where they differ from the \
+                 paper's (EI, CR, ER; see [metrics.md](../metrics.md)). Standard errors are over \
+                 environments throughout."
             }
         };
         let mut text = format!(
@@ -54,11 +54,11 @@ impl RuleSection<'_> {
         text += &self.distances();
         text += &self.orders();
         text += &self.gains();
-        text += &self.others();
+        text += &self.other_metrics();
         text
     }
 
-    /// The rates of a helper in all tasks that have any.
+    /// Returns the rates of a helper in all tasks with results.
     fn task_rates(&self, helper: &str) -> Vec<TaskRate> {
         self.tasks.iter().filter_map(|t| task_rate(self.played, *t, helper)).collect()
     }
@@ -85,28 +85,28 @@ impl RuleSection<'_> {
             }
         }
         let title = "Transport rate, measured and published".to_owned();
-        let grid = TextTable { title, header: self.header("TR"), rows };
+        let text_table = TextTable { title, header: self.header("TR"), rows };
         format!(
-            "{}\nBehind ± stands half the 95 % interval of chaic's mean over environments ({}; cluster \
-             bootstrap with Student's t, see [metrics.md](metrics.md)). **Bold**: the difference is \
-             more than chance explains in 95 of 100 cases between these episodes and \
-             {PUBLISHED_EPISODES} others with the same spread and as many in one environment, played \
-             once. The paper's helpers perceive by a trained Mask R-CNN; what chaic's are granted \
-             stands behind their names.\n\n",
-            grid.to_markdown(),
+            "{}\n± is half the 95 % interval of chaic's mean over environments ({}; cluster bootstrap \
+             with Student's t, see [metrics.md](../metrics.md)). **Bold**: the difference exceeds the \
+             95 % limit of chance for a comparison of these episodes with {PUBLISHED_EPISODES} \
+             others of the same variance and as many per environment, played once. The paper's \
+             helpers perceive by a trained Mask R-CNN; the information granted to chaic's helpers \
+             follows their names.\n\n",
+            text_table.to_markdown(),
             self.environments(),
         )
     }
 
-    /// How many environments the episodes of each task take place in.
+    /// Lists the number of environments of each task's episodes.
     fn environments(&self) -> String {
-        let of = |t: &TaskId| {
+        let count = |t: &TaskId| {
             let results = self.played.results.iter().filter(|r| r.key.task == *t);
-            let places: BTreeSet<&str> =
-                results.map(|r| self.played.environments.of(&r.key.episode)).collect();
-            format!("{}: {}", t.info().title.to_lowercase(), places.len())
+            let environments: BTreeSet<&str> =
+                results.map(|r| self.played.environments.get(&r.key.episode)).collect();
+            format!("{}: {}", t.info().title.to_lowercase(), environments.len())
         };
-        self.tasks.iter().map(of).collect::<Vec<_>>().join(", ")
+        self.tasks.iter().map(count).collect::<Vec<_>>().join(", ")
     }
 
     fn distances(&self) -> String {
@@ -117,7 +117,7 @@ impl RuleSection<'_> {
                 rounded(d.by_chance),
                 rounded(d.chance_sd),
                 rounded(d.bias),
-                format!("{} of {}", d.beyond, d.tasks),
+                format!("{} of {}", d.significant, d.tasks),
             ],
         };
         let known = self.helpers.iter().filter(|h| published(h).is_some());
@@ -127,20 +127,20 @@ impl RuleSection<'_> {
         };
         let header =
             ["Helper", "MAD", "MAD by chance", "its deviation", "mean difference", "beyond chance"];
-        let grid = TextTable {
+        let text_table = TextTable {
             title: "Mean absolute difference (MAD) of TR over the tasks".to_owned(),
             header: header.map(str::to_owned).to_vec(),
             rows: known.map(row).collect(),
         };
         format!(
-            "{}\nBy chance: what the MAD would be on average, and its standard deviation, if chaic's \
-             figures and the published ones were means over episodes of the same kind, chaic's own and \
-             {PUBLISHED_EPISODES} others played once, with the spread over environments and seeds \
-             that chaic's show (the mean absolute value of a normal is 0.80 of its standard deviation). \
-             What the MAD exceeds that by is not sampling. Tasks in one house are taken as independent, so \
-             the deviation is at least that. Beyond chance: tasks in bold above; of \
-             eight, chance gives 0.4.\n\n",
-            grid.to_markdown()
+            "{}\nMAD by chance: expected MAD, and its standard deviation, if chaic's figures and the \
+             published ones were means over episodes of the same kind. These are chaic's own and \
+             {PUBLISHED_EPISODES} others played once, with the variance over environments and seeds \
+             of chaic's results. The mean absolute value of a normal distribution is 0.80 of its \
+             standard deviation. A larger MAD is not explained by sampling. Tasks in one house are \
+             treated as independent, so the deviation is a lower bound. Beyond chance: tasks in bold \
+             above; chance alone gives 0.4 of eight.\n\n",
+            text_table.to_markdown()
         )
     }
 
@@ -159,7 +159,7 @@ impl RuleSection<'_> {
         };
         let header =
             ["Task", "published", "chaic", "pairs kept", "inverted, with chaic's difference"];
-        let grid = TextTable {
+        let text_table = TextTable {
             title: "Order of the helpers by TR".to_owned(),
             header: header.map(str::to_owned).to_vec(),
             rows: orders.iter().map(row).collect(),
@@ -169,23 +169,22 @@ impl RuleSection<'_> {
             (compared.clone().count(), compared.clone().filter(|(_, o)| o.is_preserved()));
         let by_chance =
             compared.clone().filter(|(_, o)| !o.is_preserved() && o.is_within_intervals());
-        let (pairs, turned) =
+        let (pairs, n_inverted) =
             compared.clone().fold((0, 0), |(p, i), (_, o)| (p + o.pairs, i + o.inverted.len()));
-        let mut text = grid.to_markdown();
+        let mut text = text_table.to_markdown();
         let _ = writeln!(
             text,
             "\nThe published order of the helpers is kept in {} of {n} tasks; in {} more all inverted \
-             pairs are within their intervals. Of {pairs} pairs {} are kept. Helpers whose published \
-             rates are equal may stand either way and make no pair; two that are equal here count as \
-             inverted.\n",
+             pairs are within their intervals. Of {pairs} pairs {} are kept. Pairs with equal \
+             published rates are not counted; pairs with equal measured rates count as inverted.\n",
             kept.count(),
             by_chance.count(),
-            pairs - turned
+            pairs - n_inverted
         );
         text
     }
 
-    /// The helpers from the highest rate to the lowest.
+    /// Lists the helpers in descending order of their rates.
     fn ranking(&self, task: TaskId, as_published: bool) -> String {
         let rate = |h: &String| {
             let rate = task_rate(self.played, task, h)?;
@@ -215,7 +214,7 @@ impl RuleSection<'_> {
             let all = interval(found.all.as_ref());
             rows.push([name, all].into_iter().chain(cells).collect::<Vec<String>>());
             let gain = |t: TaskId| {
-                let tr = |h: &str| published(h).and_then(|row| Some(row.figures(t)?.tr));
+                let tr = |h: &str| published(h).and_then(|row| Some(row.scores(t)?.tr));
                 Some(tr(helper)? - tr(NONE)?)
             };
             let gains: Vec<Option<f64>> = self.tasks.iter().map(|t| gain(*t)).collect();
@@ -228,29 +227,30 @@ impl RuleSection<'_> {
         }
         let mut header = self.header("TR difference");
         header.insert(1, "all".to_owned());
-        let title = "What a helper adds to no helper on the same episodes, with 95 % intervals over environments";
+        let title =
+            "Gain over no helper on the same episodes, with 95 % intervals over environments";
         TextTable { title: title.to_owned(), header, rows }.to_markdown() + "\n"
     }
 
-    /// EI, IA, CR, ER and the standard error of TR beside the paper's.
-    fn others(&self) -> String {
-        let metrics = ["ei", "ia", "cr", "er", "tr_se"].map(Metric::of);
-        let scores = Scores::of(self.played, &formulas(self.rules));
+    /// Returns EI, IA, CR, ER and the standard error of TR beside the paper's.
+    fn other_metrics(&self) -> String {
+        let metrics = ["ei", "ia", "cr", "er", "tr_se"].map(Metric::from_key);
+        let scores = Scores::new(self.played, &formulas(self.rules));
         let mut rows = Vec::new();
         for metric in metrics {
             for helper in self.helpers {
                 let cell = |task: &TaskId| {
-                    let ours = scores.get(*task, helper).and_then(metric.value);
-                    let figures = published(helper).and_then(|row| row.figures(*task));
-                    let papers = figures.as_ref().and_then(metric.published);
-                    match (ours, papers) {
+                    let measured = scores.get(*task, helper).and_then(|score| metric.value(score));
+                    let published = published(helper).and_then(|row| row.scores(*task));
+                    let published = published.as_ref().and_then(|scores| metric.published(scores));
+                    match (measured, published) {
                         (None, None) => "/".to_owned(),
-                        _ => format!("{} ({})", number(ours), number(papers)),
+                        _ => format!("{} ({})", number(measured), number(published)),
                     }
                 };
                 let cells: Vec<String> = self.tasks.iter().map(cell).collect();
-                // Without helper only the standard error is defined; the emergency rate is
-                // shopping's alone.
+                // Without helper only the standard error is defined, and the emergency rate exists
+                // for shopping only.
                 if cells.iter().any(|c| c != "/") {
                     let name = format!("{}, {}", metric.name, title(helper));
                     rows.push(std::iter::once(name).chain(cells).collect());
@@ -258,7 +258,7 @@ impl RuleSection<'_> {
             }
         }
         let titles = metrics.map(|m| format!("{} ({})", m.title, m.name)).join(", ");
-        let title = capitalized(&titles) + ": chaic's, the paper's in brackets";
+        let title = capitalized(&titles) + ": chaic (paper in brackets)";
         TextTable { title, header: self.header("Metric"), rows }.to_markdown() + "\n"
     }
 }
@@ -270,7 +270,7 @@ fn difference(rate: &TaskRate) -> String {
     format!("{mark}{}{mark}{half}", signed(difference))
 }
 
-/// Two decimals with their sign; what rounds to zero has none.
+/// Formats with two decimals and a sign; values that round to zero have none.
 fn signed(value: f64) -> String {
     let text = format!("{value:+.2}");
     if text.ends_with("0.00") { "0.00".to_owned() } else { text }

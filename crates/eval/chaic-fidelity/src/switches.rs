@@ -1,5 +1,5 @@
-//! What a single rule moves: the original's rules against the same with that rule as the paper
-//! has it.
+//! Effect of a single rule: the original's rules compared with the same rules after one is set to
+//! the paper's value.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,28 +9,33 @@ use chaic_env::rules::rule_values;
 
 use crate::matrix::PartState;
 use chaic_eval::Result;
-use chaic_eval::metrics::{Interval, Played, RunResult, differences};
+use chaic_eval::metrics::{Interval, PlayedEpisodes, RunResult, differences};
 use chaic_eval::report::{TextTable, interval, title};
 
-/// How many rules are named for a task.
-const MOST: usize = 3;
+/// Number of rules listed per task.
+const MAX_NAMED: usize = 3;
 
-/// What a switch moves the transport rate of a helper by, on the same episodes and seeds.
+/// Change of a helper's transport rate by a switch, on the same episodes and seeds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
-    /// The rule.
+    /// Name of the rule.
     pub rule: String,
-    /// The helper.
+    /// Name of the helper.
     pub helper: String,
-    /// Rate with the switch less rate without, by task.
+    /// Rate with the switch minus rate without, by task.
     pub tasks: BTreeMap<TaskId, Interval>,
-    /// The same over the episodes of all tasks.
+    /// Change over the episodes of all tasks.
     pub all: Option<Interval>,
 }
 
-/// The change of a helper's rates from `base` to `switched`, over the episode runs that both played
-/// to their end.
-pub fn change(rule: &str, base: Played<'_>, switched: &[RunResult], helper: &str) -> Change {
+/// Returns the change of a helper's rates from `base` to `switched`, over the episode runs that
+/// both completed.
+pub fn change(
+    rule: &str,
+    base: PlayedEpisodes<'_>,
+    switched: &[RunResult],
+    helper: &str,
+) -> Change {
     const NAMES: [&str; 2] = ["base", "switched"];
     let keys = |results: &[RunResult]| -> BTreeSet<RunKey> {
         let scored = results.iter().filter(|r| r.key.helper == helper && r.summary().is_some());
@@ -46,7 +51,7 @@ pub fn change(rule: &str, base: Played<'_>, switched: &[RunResult], helper: &str
             named.push(result);
         }
     }
-    let named = Played { results: &named, planned: &[], ..base };
+    let named = PlayedEpisodes { results: &named, planned: &[], ..base };
     let found = differences(named, &NAMES.map(str::to_owned)).pop();
     let (tasks, all) = found.map_or((BTreeMap::new(), None), |d| (d.tasks, d.all));
     Change { rule: rule.to_owned(), helper: helper.to_owned(), tasks, all }
@@ -56,7 +61,7 @@ fn excludes_zero(i: &Interval) -> bool {
     i.low > 0.0 || i.high < 0.0
 }
 
-/// The part of the document about switches; `base` is the run by the original's rules.
+/// Returns the section about switches; `base` is the run with the original's rules.
 pub(super) fn section(
     base: &PartState,
     switches: &[&PartState],
@@ -66,30 +71,30 @@ pub(super) fn section(
     let (helpers, seeds) = (&first.part.helpers, first.part.seeds);
     let seeds = if seeds == 1 { "the first seed".to_owned() } else { format!("{seeds} seeds") };
     let mut text = format!(
-        "## One rule at a time\n\nThe rules `compat` with one rule set as `paper` has it, on the same \
-         episodes with {seeds}: by how much that moves TR, with the 95 % interval of the paired \
-         change over environments. Sorted by the size of the change over all tasks; **bold** where the \
-         interval excludes zero. `0` means that not one episode's rate changed.\n\n"
+        "## One rule at a time\n\nChange of TR when one rule of `compat` is set to the value of `paper`, on \
+         the same episodes with {seeds}, with the 95 % interval of the paired change over \
+         environments. Sorted by the magnitude of the change over all tasks. **Bold**: the interval \
+         excludes zero. `0`: no episode's rate changed.\n\n"
     );
     let mut changes: BTreeMap<&str, Vec<Change>> = BTreeMap::new();
     for helper in helpers {
-        let of = |s: &&PartState| {
+        let compare = |s: &&PartState| {
             let rule = s.part.switch.as_deref().unwrap_or("");
             change(rule, base.played(), &s.results, helper)
         };
-        let mut list: Vec<Change> = switches.iter().map(of).collect();
-        list.sort_by(|a, b| size(b.all.as_ref()).total_cmp(&size(a.all.as_ref())));
+        let mut list: Vec<Change> = switches.iter().map(compare).collect();
+        list.sort_by(|a, b| magnitude(b.all.as_ref()).total_cmp(&magnitude(a.all.as_ref())));
         text += &table(helper, &list, tasks)?.to_markdown();
         text.push('\n');
         changes.insert(helper, list);
     }
     text += &chance(&changes);
-    text += &most(helpers, &changes, tasks).to_markdown();
+    text += &largest_changes(helpers, &changes, tasks).to_markdown();
     text.push('\n');
     Ok(text)
 }
 
-fn size(interval: Option<&Interval>) -> f64 {
+fn magnitude(interval: Option<&Interval>) -> f64 {
     interval.map_or(0.0, |i| i.mean.abs())
 }
 
@@ -118,40 +123,40 @@ fn cell(change: Option<&Interval>) -> String {
     }
 }
 
-/// How many of the marked cells chance alone would mark.
+/// Reports how many marked cells chance alone would give.
 fn chance(changes: &BTreeMap<&str, Vec<Change>>) -> String {
-    let tested = |i: &&Interval| i.low < i.high;
-    let cells = || changes.values().flatten().flat_map(|c| c.tasks.values()).filter(tested);
+    let is_nonzero = |i: &&Interval| i.low < i.high;
+    let cells = || changes.values().flatten().flat_map(|c| c.tasks.values()).filter(is_nonzero);
     let (n, marked) = (cells().count(), cells().filter(|i| excludes_zero(i)).count());
     format!(
-        "Of {n} changes in a single task that aren't zero, {marked} are marked; chance alone would \
-         mark about {:.0}. A rule that moves nothing by itself may still matter together with \
-         others.\n\n",
+        "Of {n} nonzero changes in single tasks, {marked} are marked; chance alone would mark \
+         about {:.0}. A rule without effect may still matter in combination with others.\n\n",
         n as f64 * 0.05
     )
 }
 
-fn most(helpers: &[String], changes: &BTreeMap<&str, Vec<Change>>, tasks: &[TaskId]) -> TextTable {
+fn largest_changes(
+    helpers: &[String],
+    changes: &BTreeMap<&str, Vec<Change>>,
+    tasks: &[TaskId],
+) -> TextTable {
     let row = |task: &TaskId| {
-        let of = |helper: &String| {
+        let largest = |helper: &String| {
             let list = changes.get(helper.as_str()).into_iter().flatten();
-            let mut beyond: Vec<(&str, &Interval)> =
+            let mut significant: Vec<(&str, &Interval)> =
                 list.filter_map(|c| Some((c.rule.as_str(), c.tasks.get(task)?))).collect();
-            beyond.retain(|(_, i)| excludes_zero(i));
-            beyond.sort_by(|a, b| b.1.mean.abs().total_cmp(&a.1.mean.abs()));
-            let named = beyond.iter().take(MOST).map(|(r, i)| format!("`{r}` {:+.2}", i.mean));
+            significant.retain(|(_, i)| excludes_zero(i));
+            significant.sort_by(|a, b| b.1.mean.abs().total_cmp(&a.1.mean.abs()));
+            let named =
+                significant.iter().take(MAX_NAMED).map(|(r, i)| format!("`{r}` {:+.2}", i.mean));
             let named: Vec<String> = named.collect();
-            if named.is_empty() {
-                "nothing beyond its interval".to_owned()
-            } else {
-                named.join(", ")
-            }
+            if named.is_empty() { "none".to_owned() } else { named.join(", ") }
         };
-        std::iter::once(task.info().title.to_owned()).chain(helpers.iter().map(of)).collect()
+        std::iter::once(task.info().title.to_owned()).chain(helpers.iter().map(largest)).collect()
     };
     let header = std::iter::once("Task".to_owned()).chain(helpers.iter().map(|h| title(h)));
     TextTable {
-        title: format!("What moves a task most: the {MOST} largest changes beyond their intervals"),
+        title: format!("The {MAX_NAMED} largest changes of each task whose intervals exclude zero"),
         header: header.collect(),
         rows: tasks.iter().map(row).collect(),
     }

@@ -1,16 +1,16 @@
-//! The document says what its numbers say: worked by hand on two episodes.
+//! The document's numbers equal those of a handmade example of two episodes.
 
 use std::fs;
 
 use chaic_core::TaskId;
 use chaic_core::observation::Grants;
-use chaic_env::minds::BuiltIn;
+use chaic_env::helper_registry::BuiltInHelpers;
 use chaic_env::rules::{RuleSetName, differing_rules};
 use chaic_env::{Digest, RunKey};
 
 use super::*;
 use chaic_eval::EvalError;
-use chaic_eval::metrics::{Ending, Environments, Played, RunResult, Summary};
+use chaic_eval::metrics::{Environments, PlayedEpisodes, RunResult, RunStatus, Summary};
 use chaic_eval::run::RunGrants;
 
 const LOW: TaskId = TaskId::LowTarget;
@@ -19,7 +19,7 @@ fn run(task: TaskId, helper: &str, episode: u32, seed: u32, done: f64) -> RunRes
     let episode = format!("{task}/original-train/0{episode}");
     RunResult {
         key: RunKey { task, helper: helper.to_owned(), episode, seed },
-        ending: Ending::Done(Summary {
+        status: RunStatus::Done(Summary {
             frames: 3000,
             done,
             total: 10.0,
@@ -29,18 +29,18 @@ fn run(task: TaskId, helper: &str, episode: u32, seed: u32, done: f64) -> RunRes
             deliveries: Vec::new(),
             digest: Digest(0),
             counts: Default::default(),
-            measures: Default::default(),
+            diagnostics: Default::default(),
         }),
     }
 }
 
-/// Two episodes with two seeds each: episode 0 with both seeds, then episode 1.
+/// Returns two episodes with two seeds each: episode 0 with both seeds, then episode 1.
 fn runs(task: TaskId, helper: &str, done: [f64; 4]) -> Vec<RunResult> {
     let at = [(0, 0), (0, 1), (1, 0), (1, 1)];
     at.iter().zip(done).map(|((e, s), d)| run(task, helper, *e, *s, d)).collect()
 }
 
-/// Low target: w/o 0.4 (published 0.51), RHP 0.4 (0.66), oracle 0.8 (0.82).
+/// Results in low target: w/o 0.4 (published 0.51), RHP 0.4 (0.66), oracle 0.8 (0.82).
 fn low() -> Vec<RunResult> {
     let mut all = runs(LOW, "none", [4.0, 6.0, 2.0, 4.0]);
     all.extend(runs(LOW, "rhp", [5.0, 5.0, 3.0, 3.0]));
@@ -48,48 +48,53 @@ fn low() -> Vec<RunResult> {
     all
 }
 
-fn near(a: f64, b: f64) {
-    // Resamples leave the fourth digit of a standard error to chance.
+fn assert_close(a: f64, b: f64) {
+    // The fourth digit of a standard error depends on the random resamples.
     assert!((a - b).abs() < 1e-4, "{a} is not {b}");
 }
 
 #[test]
-fn rates_and_what_chance_explains() {
+fn rates_and_chance_equal_the_handmade_example() {
     let environments = Environments::default();
-    let of = |results: &[RunResult], task, helper: &str| {
-        task_rate(Played { results, planned: &[], environments: &environments }, task, helper)
+    let rate = |results: &[RunResult], task, helper: &str| {
+        task_rate(
+            PlayedEpisodes { results, planned: &[], environments: &environments },
+            task,
+            helper,
+        )
     };
-    let none = of(&low(), LOW, "none").unwrap();
-    near(none.tr, 0.4);
-    // Means 0.5 and 0.3; each seed alone 0.4 and 0.2, or 0.6 and 0.4: all deviate by 0.02^0.5.
-    near(none.interval.unwrap().se, (0.02f64 / 2.0).sqrt());
-    near(none.se_once.unwrap(), (0.02f64 / 2.0).sqrt());
-    near(none.difference().unwrap(), -0.11);
-    near(none.chance_se().unwrap(), (0.02f64 / 2.0 + 0.02 / 12.0).sqrt());
+    let none = rate(&low(), LOW, "none").unwrap();
+    assert_close(none.tr, 0.4);
+    // Means 0.5 and 0.3; each seed alone 0.4 and 0.2, or 0.6 and 0.4: the standard deviation is
+    // always 0.02^0.5.
+    assert_close(none.interval.unwrap().se, (0.02f64 / 2.0).sqrt());
+    assert_close(none.se_once.unwrap(), (0.02f64 / 2.0).sqrt());
+    assert_close(none.difference().unwrap(), -0.11);
+    assert_close(none.chance_se().unwrap(), (0.02f64 / 2.0 + 0.02 / 12.0).sqrt());
     assert!(!none.is_beyond_chance());
     // Obstacle: always 1 of 10 (published 0.07), so chance explains nothing.
     let obstacle = runs(TaskId::Obstacle, "none", [1.0; 4]);
-    let obstacle = of(&obstacle, TaskId::Obstacle, "none").unwrap();
+    let obstacle = rate(&obstacle, TaskId::Obstacle, "none").unwrap();
     assert!(obstacle.is_beyond_chance());
     let d = distance(&[none, obstacle]).unwrap();
-    near(d.mad, 0.07);
-    near(d.bias, -0.04);
+    assert_close(d.mad, 0.07);
+    assert_close(d.bias, -0.04);
     // Half of 0.108012 * 0.797885, and half of 0.108012 * (1 - 0.636620)^0.5.
-    near(d.by_chance, 0.043090);
-    near(d.chance_sd, 0.032556);
-    assert_eq!((d.tasks, d.beyond), (2, 1));
-    assert!(of(&low(), LOW, "random").is_none());
+    assert_close(d.by_chance, 0.043090);
+    assert_close(d.chance_sd, 0.032556);
+    assert_eq!((d.tasks, d.significant), (2, 1));
+    assert!(rate(&low(), LOW, "random").is_none());
     let unpublished = runs(LOW, "follow", [1.0; 4]);
-    assert_eq!(distance(&[of(&unpublished, LOW, "follow").unwrap()]), None);
+    assert_eq!(distance(&[rate(&unpublished, LOW, "follow").unwrap()]), None);
 }
 
 fn order_of(results: &[RunResult], helpers: &[String]) -> Order {
     let environments = Environments::default();
-    order(Played { results, planned: &[], environments: &environments }, LOW, helpers)
+    order(PlayedEpisodes { results, planned: &[], environments: &environments }, LOW, helpers)
 }
 
 #[test]
-fn orders_are_kept_pair_by_pair() {
+fn inversions_are_counted_by_pairs() {
     let helpers = ["none", "rhp", "oracle"].map(str::to_owned);
     let equal = order_of(&low(), &helpers);
     assert_eq!((equal.pairs, equal.inverted.len()), (3, 1));
@@ -101,7 +106,7 @@ fn orders_are_kept_pair_by_pair() {
     results.retain(|r| r.key.helper != "rhp");
     results.extend(runs(LOW, "rhp", [4.0, 4.0, 2.0, 2.0]));
     let worse = order_of(&results, &helpers);
-    near(worse.inverted[0].interval.unwrap().mean, -0.1);
+    assert_close(worse.inverted[0].interval.unwrap().mean, -0.1);
     assert!(!worse.is_within_intervals());
     // The paper has w/o at 0.51 and Random at 0.50; Random above is an inversion.
     let mut results = low();
@@ -112,14 +117,14 @@ fn orders_are_kept_pair_by_pair() {
 }
 
 #[test]
-fn a_switch_is_compared_on_what_both_played() {
-    // One seed only: 4 and 2 become 6 and 4. The second seed of the base doesn't count.
+fn a_switch_is_compared_on_common_episode_runs() {
+    // One seed only: 4 and 2 become 6 and 4. The second seed of the base is ignored.
     let switched = [run(LOW, "none", 0, 0, 6.0), run(LOW, "none", 1, 0, 4.0)];
     let (low, environments) = (low(), Environments::default());
-    let base = Played { results: &low, planned: &[], environments: &environments };
+    let base = PlayedEpisodes { results: &low, planned: &[], environments: &environments };
     let change = change("world.blocking", base, &switched, "none");
-    near(change.tasks[&LOW].mean, 0.2);
-    near(change.all.unwrap().low, 0.2);
+    assert_close(change.tasks[&LOW].mean, 0.2);
+    assert_close(change.all.unwrap().low, 0.2);
     let untouched = super::change("world.blocking", base, &low, "oracle");
     assert_eq!((untouched.tasks[&LOW].low, untouched.tasks[&LOW].high), (0.0, 0.0));
     assert!(super::change("world.blocking", base, &switched, "rhp").all.is_none());
@@ -138,9 +143,9 @@ fn plan() -> Experiment {
     }
 }
 
-/// All parts, whole.
+/// Returns all parts, complete.
 fn states(plan: &Experiment) -> Vec<PartState> {
-    let state = |part: Part| {
+    let state = |part: ExperimentPart| {
         let results = match part.switch {
             None => low(),
             Some(_) => vec![run(LOW, "none", 0, 0, 6.0), run(LOW, "none", 1, 0, 4.0)],
@@ -160,10 +165,11 @@ fn states(plan: &Experiment) -> Vec<PartState> {
 }
 
 #[test]
-fn the_document_has_the_worked_numbers() {
+fn the_document_equals_the_handmade_example() {
     let plan = plan();
     let parts = states(&plan);
-    let text = document(Sheet { plan: &plan, parts: &parts }, "fidelity", "Because.\n").unwrap();
+    let text =
+        document(ReportInputs { plan: &plan, parts: &parts }, "fidelity", "Because.\n").unwrap();
     for line in [
         "--seeds 2 --helper none,rhp,oracle --task low_target --switch world.blocking \
          --switch-seeds 1 --switch-helper none\n",
@@ -192,14 +198,14 @@ fn the_document_has_the_worked_numbers() {
 }
 
 #[test]
-fn what_is_missing_is_said_first() {
+fn missing_runs_are_listed_first() {
     let plan = plan();
     let mut parts = states(&plan);
     parts[1].results.clear();
     parts[0].results.remove(4);
-    parts[0].results[0].ending = Ending::Error { message: "out of ideas".to_owned() };
+    parts[0].results[0].status = RunStatus::Error { message: "out of ideas".to_owned() };
     parts[2].results.pop();
-    let text = document(Sheet { plan: &plan, parts: &parts }, "fidelity", "").unwrap();
+    let text = document(ReportInputs { plan: &plan, parts: &parts }, "fidelity", "").unwrap();
     let (top, _) = text.split_once("Made by").unwrap();
     for line in [
         "unfinished: 14 of 26 episode runs are missing",
@@ -208,96 +214,109 @@ fn what_is_missing_is_said_first() {
         "- `switch/world.blocking`: 1 of 2 are missing",
         "compat: Unequal: in low target the rows rest on different episode runs (w/o on 4, Oracle on \
          4, RHP on 3)",
-        "1 episode runs broke down and count as zero",
+        "1 episode runs failed and count as zero",
         "`compat`: low_target/original-train/00 with none, seed 0: out of ideas",
     ] {
         assert!(top.contains(line), "{line}\nis missing in\n{top}");
     }
-    assert!(!text.contains("## By the paper's rules"), "{text}");
+    assert!(!text.contains("## Rules of the paper"), "{text}");
     parts.iter_mut().for_each(|p| p.results.clear());
-    let nothing = document(Sheet { plan: &plan, parts: &parts }, "fidelity", "");
+    let nothing = document(ReportInputs { plan: &plan, parts: &parts }, "fidelity", "");
     assert!(nothing.unwrap_err().to_string().contains("no episode run has finished"));
 }
 
 #[test]
-fn what_was_written_by_hand_is_kept() {
+fn the_handwritten_section_is_kept() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("docs/reference/fidelity.md");
     let plan = plan();
     let parts = states(&plan);
-    let write = || write_document(Sheet { plan: &plan, parts: &parts }, &path);
+    let write = || write_document(ReportInputs { plan: &plan, parts: &parts }, &path);
     write().unwrap();
     let empty = fs::read_to_string(&path).unwrap();
-    let svg = fs::read_to_string(dir.path().join("docs/images/fidelity-paper.svg")).unwrap();
+    let svg =
+        fs::read_to_string(dir.path().join("docs/reference/images/fidelity-paper.svg")).unwrap();
     assert!(svg.contains("dots: published") && svg.contains("<circle"), "{svg}");
     let by_hand = empty.replace(CAUSES_BEGIN, &format!("{CAUSES_BEGIN}\n\nIt was the chair.\n"));
     fs::write(&path, &by_hand).unwrap();
     write().unwrap();
     assert_eq!(fs::read_to_string(&path).unwrap(), by_hand);
-    // Anything else isn't overwritten.
+    // Other files are not overwritten.
     fs::write(&path, "# A letter\n").unwrap();
-    assert!(write().unwrap_err().to_string().contains("no document of this kind"));
+    assert!(write().unwrap_err().to_string().contains("not a document of this kind"));
     assert_eq!(fs::read_to_string(&path).unwrap(), "# A letter\n");
 }
 
 #[test]
-fn plans_that_answer_nothing_are_refused() {
+fn invalid_plans_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let files = dir.path().join("episodes");
     fs::create_dir(&files).unwrap();
     let episode = chaic_episodes::find_episode("low_target/test/00").unwrap();
     fs::write(files.join("a.json"), episode.to_json()).unwrap();
     let out = dir.path().join("out");
-    let usual = ExperimentRequest { episodes: Some(files), ..ExperimentRequest::default() };
+    let default_request =
+        ExperimentRequest { episodes: Some(files), ..ExperimentRequest::default() };
     let list = |names: &[&str]| Some(names.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>());
-    for (wanted, said) in [
-        (ExperimentRequest { helpers: list(&["rhp"]), ..usual.clone() }, "--helper needs `none`"),
+    for (request, message) in [
         (
-            ExperimentRequest { helpers: list(&["none", "nobody"]), ..usual.clone() },
+            ExperimentRequest { helpers: list(&["rhp"]), ..default_request.clone() },
+            "--helper needs `none`",
+        ),
+        (
+            ExperimentRequest { helpers: list(&["none", "nobody"]), ..default_request.clone() },
             "unknown helper `nobody`",
         ),
         (
-            ExperimentRequest { switch_helpers: list(&["follow"]), ..usual.clone() },
+            ExperimentRequest { switch_helpers: list(&["follow"]), ..default_request.clone() },
             "--switch-helper follow",
         ),
-        (ExperimentRequest { switch_seeds: Some(6), ..usual.clone() }, "1 to 5"),
-        (ExperimentRequest { seeds: Some(0), ..usual.clone() }, "at least 1"),
+        (ExperimentRequest { switch_seeds: Some(6), ..default_request.clone() }, "1 to 5"),
+        (ExperimentRequest { seeds: Some(0), ..default_request.clone() }, "at least 1"),
         (
-            ExperimentRequest { switches: list(&["world.gravity"]), ..usual.clone() },
+            ExperimentRequest { switches: list(&["world.gravity"]), ..default_request.clone() },
             "no rule `world.gravity`",
         ),
         (
-            ExperimentRequest { switches: list(&["world.stride_m"]), ..usual.clone() },
+            ExperimentRequest { switches: list(&["world.stride_m"]), ..default_request.clone() },
             "is 0.4 in both",
         ),
         (
-            ExperimentRequest { tasks: Some(vec![TaskId::Obstacle]), ..usual.clone() },
+            ExperimentRequest { tasks: Some(vec![TaskId::Obstacle]), ..default_request.clone() },
             "has no episode of obstacle; it has those of low_target",
         ),
         (ExperimentRequest::default(), "--episodes"),
     ] {
-        let error = Matrix::begin(&out, &wanted, &BuiltIn).unwrap_err().to_string();
-        assert!(error.contains(said), "{said}: {error}");
-        assert!(!out.exists(), "{said}: nothing is left behind");
+        let error = Matrix::create(&out, &request, &BuiltInHelpers).unwrap_err().to_string();
+        assert!(error.contains(message), "{message}: {error}");
+        assert!(!out.exists(), "{message}: nothing is written");
     }
-    assert!(Matrix::resume(&out, &usual).unwrap_err().to_string().contains("fidelity.json"));
+    assert!(
+        Matrix::resume(&out, &default_request).unwrap_err().to_string().contains("fidelity.json")
+    );
 
     let two = list(&["planner.walking", "world.blocking"]);
-    let begun =
-        Matrix::begin(&out, &ExperimentRequest { switches: two, ..usual.clone() }, &BuiltIn)
-            .unwrap();
-    let names: Vec<String> = begun.plan.parts().into_iter().map(|p| p.name).collect();
+    let matrix = Matrix::create(
+        &out,
+        &ExperimentRequest { switches: two, ..default_request.clone() },
+        &BuiltInHelpers,
+    )
+    .unwrap();
+    let names: Vec<String> = matrix.plan.parts().into_iter().map(|p| p.name).collect();
     let mut in_order: Vec<String> = differing_rules();
     in_order.retain(|r| r == "planner.walking" || r == "world.blocking");
     assert_eq!(names[..2], ["compat", "paper"]);
     let folders: Vec<String> = in_order.iter().map(|rule| format!("switch/{rule}")).collect();
     assert_eq!(names[2..], folders);
-    let given = begun.given(&begun.plan.parts()[2]).unwrap();
+    let given = matrix.run_request(&matrix.plan.parts()[2]).unwrap();
     assert!(given.no_traces && given.rules == Some(RuleSetName::Compat), "{given:?}");
     assert_eq!(given.set, [format!("{}=paper", in_order[0])]);
-    assert!(matches!(Matrix::begin(&out, &usual, &BuiltIn), Err(EvalError::NotEmpty { .. })));
-    // Nothing has run yet; switches may be added, the rest stays.
-    assert!(parts(&begun).unwrap_err().to_string().contains("has no run yet"));
+    assert!(matches!(
+        Matrix::create(&out, &default_request, &BuiltInHelpers),
+        Err(EvalError::NotEmpty { .. })
+    ));
+    // No run has started; switches may be added, other options must not change.
+    assert!(parts(&matrix).unwrap_err().to_string().contains("has no run yet"));
     let more =
         ExperimentRequest { switches: list(&["world.reach_to"]), ..ExperimentRequest::default() };
     assert_eq!(Matrix::resume(&out, &more).unwrap().plan.switches.len(), 3);

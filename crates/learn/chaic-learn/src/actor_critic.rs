@@ -1,68 +1,75 @@
-//! Networks that choose and value, whatever they read, and the steps in which they learn.
+//! Interface of actor-critic networks, and their data-parallel optimizer step.
 
 use chaic_core::geom::math;
-use chaic_nn::{AdamRules, Network, Pass};
+use chaic_nn::{AdamWConfig, Network, Pass};
 use chaic_training::Learner;
 
-/// A network that gives each of some choices a logit, and says numbers of the state, like its value.
+/// Network with a logit per action and outputs of the state, such as its value.
 pub trait ActorCritic: Sync {
-    /// What it reads.
-    type Seen: Sync;
+    /// Input of the network.
+    type Observation: Sync;
 
-    /// Its layers and the numbers that are learned.
+    /// Returns layers and parameter layout.
     fn network(&self) -> &Network;
 
-    /// What it says of what was seen.
+    /// Evaluates a batch of observations.
     fn forward<'a>(
         &self,
-        numbers: &[f32],
-        seen: impl Iterator<Item = &'a Self::Seen> + Clone,
+        parameters: &[f32],
+        observations: impl Iterator<Item = &'a Self::Observation> + Clone,
         pass: &mut Pass,
-    ) -> Vec<Said>
+    ) -> Vec<ActorCriticOutput>
     where
-        Self::Seen: 'a;
+        Self::Observation: 'a;
 
-    /// Adds the gradient by all numbers, from that by what was last said, to `by_numbers`.
-    fn backward(&self, numbers: &[f32], by: &[BySaid], pass: &mut Pass, by_numbers: &mut [f32]);
+    /// Backpropagates `grad_outputs` of the last forward pass and accumulates parameter gradients
+    /// into `grad_parameters`.
+    fn backward(
+        &self,
+        parameters: &[f32],
+        grad_outputs: &[OutputGrad],
+        pass: &mut Pass,
+        grad_parameters: &mut [f32],
+    );
 }
 
-/// What a network says of a decision.
+/// Outputs for one observation.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Said {
-    /// The logarithm of each choice's probability.
-    pub log_probabilities: Vec<f32>,
-    /// What it says of the state, choices apart: of a policy, the return that is expected.
-    pub of_state: Vec<f32>,
+pub struct ActorCriticOutput {
+    /// Log-probability of each action.
+    pub log_probs: Vec<f32>,
+    /// Outputs of the state head; those of a policy are the value estimate alone.
+    pub values: Vec<f32>,
 }
 
-impl Said {
-    /// The return that a policy expects.
+impl ActorCriticOutput {
+    /// Returns the value estimate.
     pub fn value(&self) -> f32 {
-        self.of_state[0]
+        self.values[0]
     }
 
-    /// The entropy of the choices, nats.
+    /// Returns the entropy of the action distribution, nats.
     pub fn entropy(&self) -> f32 {
-        -self.log_probabilities.iter().map(|l| l * math::exp(*l)).sum::<f32>()
+        -self.log_probs.iter().map(|l| l * math::exp(*l)).sum::<f32>()
     }
 
-    /// The choice that a number in 0..1 falls on.
+    /// Samples an action from the distribution, given a uniform number in 0..1.
     pub fn sample(&self, unit: f32) -> usize {
-        let mut left = unit;
-        for (k, l) in self.log_probabilities.iter().enumerate() {
-            left -= math::exp(*l);
-            if left < 0.0 {
+        let mut remaining = unit;
+        for (k, l) in self.log_probs.iter().enumerate() {
+            remaining -= math::exp(*l);
+            if remaining < 0.0 {
                 return k;
             }
         }
-        self.most_likely()
+        self.argmax()
     }
 
-    /// The likeliest choice, of equal ones the first.
-    pub fn most_likely(&self) -> usize {
+    /// Returns the most probable action, the first of equal ones.
+    pub fn argmax(&self) -> usize {
         let mut best = 0;
-        for (k, l) in self.log_probabilities.iter().enumerate() {
-            if *l > self.log_probabilities[best] {
+        for (k, l) in self.log_probs.iter().enumerate() {
+            if *l > self.log_probs[best] {
                 best = k;
             }
         }
@@ -70,52 +77,59 @@ impl Said {
     }
 }
 
-/// The gradient of a loss by what a network says of a decision.
+/// Gradient of a loss with respect to the outputs for one observation.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct BySaid {
-    /// By each choice's logit.
+pub struct OutputGrad {
+    /// Gradient with respect to the logits.
     pub logits: Vec<f32>,
-    /// By what it says of the state.
-    pub of_state: Vec<f32>,
+    /// Gradient with respect to the outputs of the state head.
+    pub values: Vec<f32>,
 }
 
-/// Takes a step along the mean gradient of a batch of samples, whose parts are worked on side by side. `gradient` gives
-/// that of one sample, times the share of it that is its third argument, and adds what it was like to the fourth;
-/// that is given back for each part.
-pub fn step<M: ActorCritic, S: Sync, T: Default + Send>(
+/// Takes one data-parallel optimizer step along the mean gradient of a batch.
+///
+/// `gradient(sample, output, weight, stats)` returns the output gradient of one sample times
+/// `weight`, and adds its statistics to `stats`. Returns the statistics of each shard.
+pub fn optimizer_step<M: ActorCritic, S: Sync, T: Default + Send>(
     model: &M,
-    (learner, adam, rate): (&mut Learner, &AdamRules, f32),
+    learner: &mut Learner,
+    adam: &AdamWConfig,
+    learning_rate: f32,
     batch: &[&S],
-    seen_of: impl Fn(&S) -> &M::Seen + Sync,
-    gradient: impl Fn(&S, &Said, f32, &mut T) -> BySaid + Sync,
+    observation_of: impl Fn(&S) -> &M::Observation + Sync,
+    gradient: impl Fn(&S, &ActorCriticOutput, f32, &mut T) -> OutputGrad + Sync,
 ) -> Vec<T> {
-    let n_parts = learner.shards();
-    let of_part = batch.len().div_ceil(n_parts);
-    // The learner takes the mean over parts.
-    let share = n_parts as f32 / batch.len() as f32;
-    let work = |k: usize, numbers: &[f32], pass: &mut Pass, by: &mut [f32]| {
-        let from = (k * of_part).min(batch.len());
-        let samples = &batch[from..(from + of_part).min(batch.len())];
-        let mut told = T::default();
-        if samples.is_empty() {
-            return Some(told);
-        }
-        let said = model.forward(numbers, samples.iter().map(|s| seen_of(s)), pass);
-        let by_said: Vec<BySaid> = samples
-            .iter()
-            .zip(&said)
-            .map(|(s, said)| gradient(s, said, share, &mut told))
-            .collect();
-        model.backward(numbers, &by_said, pass, by);
-        Some(told)
-    };
-    learner.step(model.network(), (adam, rate), work).expect("no shard stops")
+    let n_shards = learner.n_shards();
+    let shard_size = batch.len().div_ceil(n_shards);
+    // The learner averages over shards.
+    let weight = n_shards as f32 / batch.len() as f32;
+    let shard_gradient =
+        |k: usize, parameters: &[f32], pass: &mut Pass, grad_parameters: &mut [f32]| {
+            let start = (k * shard_size).min(batch.len());
+            let samples = &batch[start..(start + shard_size).min(batch.len())];
+            let mut stats = T::default();
+            if samples.is_empty() {
+                return Some(stats);
+            }
+            let outputs =
+                model.forward(parameters, samples.iter().map(|s| observation_of(s)), pass);
+            let grad_outputs: Vec<OutputGrad> = samples
+                .iter()
+                .zip(&outputs)
+                .map(|(sample, output)| gradient(sample, output, weight, &mut stats))
+                .collect();
+            model.backward(parameters, &grad_outputs, pass, grad_parameters);
+            Some(stats)
+        };
+    learner
+        .step(model.network(), adam, learning_rate, shard_gradient)
+        .expect("no shard returns None")
 }
 
-/// Logarithms of the probabilities that logits stand for.
+/// Returns the log-probabilities of a softmax over logits.
 pub fn log_softmax(logits: &[f32]) -> Vec<f32> {
-    let most = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-    let sum: f32 = logits.iter().map(|l| math::exp(l - most)).sum();
-    let log_sum = most + math::ln(sum);
+    let max = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let sum: f32 = logits.iter().map(|l| math::exp(l - max)).sum();
+    let log_sum = max + math::ln(sum);
     logits.iter().map(|l| l - log_sum).collect()
 }

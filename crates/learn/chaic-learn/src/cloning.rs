@@ -1,7 +1,7 @@
-//! Learning from a teacher (behavior cloning), and from what it says of one's own mistakes (DAgger, Ross et al. 2011).
+//! Behavior cloning with an expert that labels the learner's states (DAgger, Ross et al. 2011).
 //!
-//! The teacher follows the oracle's rules and is told the goal, but sees, remembers and is granted no more than the
-//! helper that learns: so that what it does can be told from what the helper knows, as far as it can.
+//! The expert follows the oracle's rules and knows the goal. It has the observations, memory and
+//! grants of the learner, so most of its choices are predictable from what the learner knows.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, PoisonError};
@@ -12,161 +12,200 @@ use chaic_agents::memory::Memory;
 use chaic_agents::policies::{RulePolicy, RuleProfile};
 use chaic_core::briefing::Goal;
 use chaic_core::geom::math;
-use chaic_core::rng::Stream;
+use chaic_core::rng::RngStream;
 use chaic_core::{AgentError, Briefing, Observation};
-use chaic_nn::AdamRules;
+use chaic_nn::AdamWConfig;
 use chaic_training::Learner;
 
-use crate::actor_critic::{BySaid, Said, step};
-use crate::choice_network::{ChoiceNetwork, Decision};
-use crate::features::Features;
+use crate::actor_critic::{ActorCriticOutput, OutputGrad, optimizer_step};
+use crate::candidate_scorer::{CandidateScorer, CandidateSet};
+use crate::features::FeatureEncoder;
 use crate::opponent::network::OpponentModel;
-use crate::policy::{LearnedPolicy, Noted, Notes};
+use crate::policy::{LearnedPolicy, StepLog, StepRecord};
 
-/// Who drives the mind whose choices the teacher tells.
-pub enum Driver {
-    /// The teacher itself.
-    Teacher,
-    /// Who learns from it.
+/// Policy that drives the agent during a rollout.
+pub enum RolloutActor {
+    /// The expert.
+    Expert,
+    /// The learner; the expert labels its states.
     Learner(Box<LearnedPolicy>),
 }
 
-/// Notes what the teacher would choose.
-pub struct Teacher {
-    rules: RulePolicy,
+/// Policy that records the expert's choices.
+pub struct ExpertPolicy {
+    rule_policy: RulePolicy,
     goal: Goal,
-    driver: Driver,
-    notes: Notes,
-    features: Features,
+    actor: RolloutActor,
+    log: StepLog,
+    features: FeatureEncoder,
 }
 
-impl Teacher {
-    /// A teacher who knows this goal, of those who learn with what this opponent model tells, if there is one.
+impl ExpertPolicy {
+    /// Creates an expert that knows this goal. The recorded features include the predictions of the
+    /// opponent model, if there is one.
     pub fn new(
         goal: Goal,
-        driver: Driver,
+        actor: RolloutActor,
         opponent: Option<Arc<OpponentModel>>,
-        notes: Notes,
-    ) -> Teacher {
-        let rules = RulePolicy::new(RuleProfile::ORACLE);
-        Teacher { rules, goal, driver, notes, features: Features::new(opponent) }
+        log: StepLog,
+    ) -> ExpertPolicy {
+        let rule_policy = RulePolicy::new(RuleProfile::ORACLE);
+        ExpertPolicy { rule_policy, goal, actor, log, features: FeatureEncoder::new(opponent) }
     }
 }
 
-impl Policy for Teacher {
+impl Policy for ExpertPolicy {
     fn reset(&mut self, briefing: &Briefing) {
-        Policy::reset(&mut self.rules, briefing);
+        Policy::reset(&mut self.rule_policy, briefing);
         self.features.reset(briefing);
-        if let Driver::Learner(learner) = &mut self.driver {
+        if let RolloutActor::Learner(learner) = &mut self.actor {
             learner.reset(briefing);
         }
     }
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
-        let is_under_way = self.features.choices.is_under_way();
-        let offered = self.features.choices.offered(valid);
-        let decision = self.features.decision(context, &offered);
-        let mut told = context.briefing.clone();
-        told.goal = Some(self.goal.clone());
-        let taught = self.rules.choose(&Context { briefing: &told, ..*context }, valid)?;
-        let plan = match &mut self.driver {
-            Driver::Teacher => taught,
-            Driver::Learner(learner) => learner.choose(context, valid)?,
+        let is_reconsidering = self.features.history.is_reconsidering();
+        let candidates = self.features.history.candidates(valid);
+        let decision = self.features.encode(context, &candidates);
+        let mut briefing = context.briefing.clone();
+        briefing.goal = Some(self.goal.clone());
+        let expert_plan =
+            self.rule_policy.choose(&Context { briefing: &briefing, ..*context }, valid)?;
+        let plan = match &mut self.actor {
+            RolloutActor::Expert => expert_plan,
+            RolloutActor::Learner(learner) => learner.choose(context, valid)?,
         };
         let frame = context.memory.frame;
-        self.features.choices.note(plan, frame);
-        // What makes no room for what is under way comes to going on with it.
-        let goes_on = if is_under_way { Some(0) } else { None };
-        let choice = offered.iter().position(|plan| *plan == taught).or(goes_on);
-        // What isn't among the choices, like waiting, can't be learned.
-        if let Some(choice) = choice.filter(|_| offered.len() > 1) {
-            let noted = Noted { frame, decision, choice, log_probability: 0.0, value: 0.0 };
-            self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(noted);
+        self.features.history.record(plan, frame);
+        // If the expert's plan does not supersede the current one, the label is to continue.
+        let continue_action = if is_reconsidering { Some(0) } else { None };
+        let action = candidates.iter().position(|plan| *plan == expert_plan).or(continue_action);
+        // Plans outside the candidates, such as waiting, cannot be learned.
+        if let Some(action) = action.filter(|_| candidates.len() > 1) {
+            let record =
+                StepRecord { frame, observation: decision, action, log_prob: 0.0, value: 0.0 };
+            self.log.lock().unwrap_or_else(PoisonError::into_inner).push(record);
         }
         Ok(plan)
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, is_news: bool) -> bool {
-        if let Driver::Learner(learner) = &mut self.driver {
+        if let RolloutActor::Learner(learner) = &mut self.actor {
             learner.reconsiders(context, current, is_news);
         }
-        // When the learner would, so that both decide at the same moments.
-        self.features.choices.is_due(context.memory.frame, current, is_news)
+        // At the frames at which the learner would decide.
+        self.features.history.is_due(context.memory.frame, current, is_news)
     }
 
-    fn look(&mut self, observation: &Observation, memory: &Memory, behavior: &BehaviorLog) {
-        self.features.look(memory);
-        if let Driver::Learner(learner) = &mut self.driver {
-            learner.look(observation, memory, behavior);
+    fn observe(&mut self, observation: &Observation, memory: &Memory, behavior: &BehaviorLog) {
+        self.features.observe(memory);
+        if let RolloutActor::Learner(learner) = &mut self.actor {
+            learner.observe(observation, memory, behavior);
         }
     }
 }
 
-/// A choice that the teacher told, and the return that followed.
+/// Choice of the expert with the return that followed.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Lesson {
-    /// What was known.
-    pub decision: Decision,
-    /// What the teacher chose.
-    pub choice: usize,
-    /// The return from there on.
-    pub target: f32,
+pub struct Demonstration {
+    /// Features of the decision.
+    pub observation: CandidateSet,
+    /// Index of the expert's choice.
+    pub action: usize,
+    /// Discounted return from this decision on.
+    pub value_target: f32,
 }
 
-/// What learning lessons was like.
+/// Metrics of one epoch of behavior cloning.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Learned {
-    /// Mean cross entropy of the teacher's choices, nats.
+pub struct CloningMetrics {
+    /// Mean cross entropy of the expert's choices, nats.
     pub loss: f64,
-    /// Share of them that the network would have made.
+    /// Fraction of the expert's choices that the network ranks first.
     pub agreement: f64,
-    /// Mean squared error of values, halved.
+    /// Mean of half the squared value error.
     pub value_loss: f64,
 }
 
-/// Looks at each lesson once, in an order of the iteration's own. Returns `None` if `stop` is raised meanwhile;
-/// some steps may have been taken then.
-pub fn imitate(
-    (adam, rate, batch): (&AdamRules, f32, usize),
-    model: &ChoiceNetwork,
+/// Settings of one epoch of behavior cloning.
+#[derive(Clone, Copy, Debug)]
+pub struct EpochConfig<'a> {
+    /// Optimizer.
+    pub adam: &'a AdamWConfig,
+    /// Learning rate.
+    pub learning_rate: f32,
+    /// Demonstrations per optimizer step.
+    pub batch_size: usize,
+    /// Seed of the shuffle.
+    pub seed: u64,
+    /// Index of the epoch, which selects the shuffle.
+    pub iteration: u64,
+}
+
+/// Trains one epoch of behavior cloning; `iteration` seeds the shuffle. Returns `None` if `stop` is
+/// raised; some steps may have been taken.
+pub fn train_epoch(
+    config: &EpochConfig<'_>,
+    model: &CandidateScorer,
     learner: &mut Learner,
-    lessons: &[Lesson],
-    (seed, iteration): (u64, u64),
+    demonstrations: &[Demonstration],
     stop: &AtomicBool,
-) -> Option<Learned> {
-    let mut order: Vec<usize> = (0..lessons.len()).collect();
-    Stream::new(seed, "lessons", iteration).shuffle(&mut order);
-    let mut sum = Learned::default();
-    for batch in order.chunks(batch) {
+) -> Option<CloningMetrics> {
+    let EpochConfig { adam, learning_rate, batch_size, seed, iteration } = *config;
+    let mut order: Vec<usize> = (0..demonstrations.len()).collect();
+    RngStream::new(seed, "lessons", iteration).shuffle(&mut order);
+    let mut sum = CloningMetrics::default();
+    for batch in order.chunks(batch_size) {
         if stop.load(Ordering::Relaxed) {
             return None;
         }
-        let batch: Vec<&Lesson> = batch.iter().map(|k| &lessons[*k]).collect();
-        let parts = step(model, (&mut *learner, adam, rate), &batch, |l| &l.decision, gradient);
-        for learned in parts {
-            sum.loss += learned.loss;
-            sum.agreement += learned.agreement;
-            sum.value_loss += learned.value_loss;
+        let batch: Vec<&Demonstration> = batch.iter().map(|k| &demonstrations[*k]).collect();
+        let shards = optimizer_step(
+            model,
+            learner,
+            adam,
+            learning_rate,
+            &batch,
+            |demonstration| &demonstration.observation,
+            gradient,
+        );
+        for stats in shards {
+            sum.loss += stats.loss;
+            sum.agreement += stats.agreement;
+            sum.value_loss += stats.value_loss;
         }
     }
-    let n = lessons.len().max(1) as f64;
+    let n = demonstrations.len().max(1) as f64;
     let (loss, agreement) = (sum.loss / n, sum.agreement / n);
-    Some(Learned { loss, agreement, value_loss: sum.value_loss / n })
+    Some(CloningMetrics { loss, agreement, value_loss: sum.value_loss / n })
 }
 
-/// The gradient of the loss of one lesson; adds what it was like to `learned`.
-fn gradient(lesson: &Lesson, said: &Said, share: f32, learned: &mut Learned) -> BySaid {
-    let error = said.value() - lesson.target;
-    learned.loss -= f64::from(said.log_probabilities[lesson.choice]);
-    learned.agreement += f64::from(u8::from(said.most_likely() == lesson.choice));
-    learned.value_loss += f64::from(0.5 * error * error);
-    let taught = |k: usize| f32::from(u8::from(k == lesson.choice));
-    let logits = said.log_probabilities.iter().enumerate();
-    let logits = logits.map(|(k, l)| share * (math::exp(*l) - taught(k))).collect();
-    BySaid { logits, of_state: vec![0.5 * share * error] }
+/// Returns the gradient of the loss of one demonstration times `weight`, and adds its metrics.
+fn gradient(
+    demonstration: &Demonstration,
+    output: &ActorCriticOutput,
+    weight: f32,
+    metrics: &mut CloningMetrics,
+) -> OutputGrad {
+    let error = output.value() - demonstration.value_target;
+    metrics.loss -= f64::from(output.log_probs[demonstration.action]);
+    metrics.agreement += f64::from(u8::from(output.argmax() == demonstration.action));
+    metrics.value_loss += f64::from(0.5 * error * error);
+    let label = |k: usize| f32::from(u8::from(k == demonstration.action));
+    let logits = output.log_probs.iter().enumerate();
+    let logits = logits.map(|(k, l)| weight * (math::exp(*l) - label(k))).collect();
+    OutputGrad { logits, values: vec![0.5 * weight * error] }
 }
 
-/// The driver of an episode: the learner in a share of them.
-pub fn driver(mixed: f32, rng: &mut Stream, learner: impl FnOnce() -> LearnedPolicy) -> Driver {
-    if rng.chance(mixed) { Driver::Learner(Box::new(learner())) } else { Driver::Teacher }
+/// Draws the actor of an episode: the learner with probability `learner_fraction`, else the expert.
+pub fn sample_actor(
+    learner_fraction: f32,
+    rng: &mut RngStream,
+    learner: impl FnOnce() -> LearnedPolicy,
+) -> RolloutActor {
+    if rng.chance(learner_fraction) {
+        RolloutActor::Learner(Box::new(learner()))
+    } else {
+        RolloutActor::Expert
+    }
 }

@@ -1,173 +1,178 @@
-//! Trained policies as helpers of a run, by name.
+//! Trained policies as named helpers of a run.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use chaic_agents::PlannerRules;
-use chaic_agents::sight::Sight;
-use chaic_env::minds::{Helper, Helpers, check_new_name};
+use chaic_agents::perception_factory::PerceptionFactory;
+use chaic_env::helper_registry::{Helper, HelperRegistry, check_new_name};
 use chaic_env::{EnvError, RunKey};
-use chaic_files::{read_bounded, read_user_file, write_whole};
+use chaic_files::{read_bounded, read_user_file, write_atomically};
 use chaic_nn::weights::{self, WeightsError};
 use serde::{Deserialize, Serialize};
 
-use crate::policy::{Choosing, LearnedPolicy, Trained, drive};
-use crate::primitive::helper::{KIND, PrimitiveHelper, TrainedPrimitive};
+use crate::policy::{ActionSelection, LearnedPolicy, PolicyWeights, policy_helper};
+use crate::primitive::helper::{KIND, PrimitiveHelper, PrimitiveWeights};
 use crate::train::from_bytes;
 
-/// The file with the policies of a run.
+/// File in a run's folder that lists its policies.
 pub const FILE: &str = "policies.json";
-/// Neither that file nor one of weights is larger, bytes.
-const MOST_BYTES: u64 = 1 << 28;
+/// Maximum size of that file and of a weights file, bytes.
+const MAX_BYTES: u64 = 1 << 28;
 
-/// A policy under a name of its own.
+/// Policy with a helper name.
 pub struct NamedPolicy {
     name: String,
     digest: String,
-    trained: Loaded,
+    weights: LoadedWeights,
 }
 
-/// What a file of weights has.
-enum Loaded {
-    /// A policy that chooses plans.
-    Plans(Arc<Trained>),
-    /// One that chooses single actions.
-    Actions(Arc<TrainedPrimitive>),
+/// Content of a weights file.
+enum LoadedWeights {
+    /// Policy that chooses plans.
+    Plans(Arc<PolicyWeights>),
+    /// Policy that chooses primitive actions.
+    Actions(Arc<PrimitiveWeights>),
 }
 
-impl Loaded {
-    fn from_bytes(bytes: &[u8]) -> Result<Loaded, WeightsError> {
+impl LoadedWeights {
+    fn from_bytes(bytes: &[u8]) -> Result<LoadedWeights, WeightsError> {
         match from_bytes(bytes) {
-            Ok((_, trained)) => Ok(Loaded::Plans(Arc::new(trained))),
+            Ok((_, weights)) => Ok(LoadedWeights::Plans(Arc::new(weights))),
             Err(WeightsError::Kind { found, .. }) if found == KIND => {
-                Ok(Loaded::Actions(Arc::new(TrainedPrimitive::from_bytes(bytes)?)))
+                Ok(LoadedWeights::Actions(Arc::new(PrimitiveWeights::from_bytes(bytes)?)))
             }
             Err(problem) => Err(problem),
         }
     }
 
-    fn helper(&self, rules: PlannerRules, sight: &dyn Sight) -> Helper {
+    fn helper(&self, rules: PlannerRules, perception: &dyn PerceptionFactory) -> Helper {
         match self {
-            Loaded::Plans(trained) => {
-                let policy = LearnedPolicy::new(Arc::clone(trained), Choosing::Sampled, None);
-                drive(policy, rules, sight)
+            LoadedWeights::Plans(weights) => {
+                let policy = LearnedPolicy::new(Arc::clone(weights), ActionSelection::Sample, None);
+                policy_helper(policy, rules, perception)
             }
-            Loaded::Actions(trained) => PrimitiveHelper::helper(Arc::clone(trained), rules, sight),
+            LoadedWeights::Actions(weights) => {
+                PrimitiveHelper::create(Arc::clone(weights), rules, perception)
+            }
         }
     }
 }
 
-/// What a run's folder tells of it.
+/// Entry of a run's list of policies.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Recorded {
+struct PolicyRecord {
     name: String,
     weights: String,
 }
 
-/// Why a policy can't be a helper.
+/// Reason why a policy cannot be a helper.
 #[derive(Debug, thiserror::Error)]
-enum Refusal {
+enum PolicyError {
     #[error("{0}")]
     Name(String),
     #[error("{}: {problem}", path.display())]
     Weights { path: PathBuf, problem: WeightsError },
     #[error(
-        "{} was begun with other weights for `{name}`; give the same file again, or choose another --out",
+        "{} was started with other weights for `{name}`; give the same file or choose another --out",
         run.display()
     )]
-    Other { run: PathBuf, name: String },
+    OtherWeights { run: PathBuf, name: String },
 }
 
-impl From<Refusal> for EnvError {
-    fn from(refusal: Refusal) -> EnvError {
-        EnvError::Minds(refusal.into())
+impl From<PolicyError> for EnvError {
+    fn from(error: PolicyError) -> EnvError {
+        EnvError::Registry(error.into())
     }
 }
 
 impl NamedPolicy {
-    /// The policy in a file of weights.
+    /// Reads a policy from a weights file.
     ///
     /// # Errors
-    /// If it can't be read or isn't one.
+    /// If the file cannot be read or holds no policy.
     pub fn read(name: &str, path: &Path) -> chaic_env::Result<NamedPolicy> {
-        let bytes = read_user_file(path, MOST_BYTES).map_err(|e| EnvError::Minds(e.into()))?;
-        let wrong = |problem| Refusal::Weights { path: path.to_owned(), problem };
-        let trained = Loaded::from_bytes(&bytes).map_err(wrong)?;
-        Ok(NamedPolicy { name: name.to_owned(), digest: weights::digest(&bytes), trained })
+        let bytes = read_user_file(path, MAX_BYTES).map_err(|e| EnvError::Registry(e.into()))?;
+        let weights_error = |problem| PolicyError::Weights { path: path.to_owned(), problem };
+        let weights = LoadedWeights::from_bytes(&bytes).map_err(weights_error)?;
+        Ok(NamedPolicy { name: name.to_owned(), digest: weights::digest(&bytes), weights })
     }
 }
 
-/// Policies, besides the helpers of elsewhere.
-pub struct Policies<'a> {
+/// Registry of policies, with another registry as fallback.
+pub struct PolicyRegistry<'a> {
     policies: Vec<NamedPolicy>,
-    others: &'a dyn Helpers,
-    sight: Arc<dyn Sight>,
+    fallback: &'a dyn HelperRegistry,
+    perception: Arc<dyn PerceptionFactory>,
 }
 
-impl<'a> Policies<'a> {
-    /// Adds policies, which see by this, to the helpers of elsewhere.
+impl<'a> PolicyRegistry<'a> {
+    /// Adds policies with this perception to the helpers of another registry.
     ///
     /// # Errors
-    /// If a name is none, or is taken.
-    pub fn beside(
-        others: &'a dyn Helpers,
+    /// If a name is invalid or taken.
+    pub fn with_fallback(
+        fallback: &'a dyn HelperRegistry,
         policies: Vec<NamedPolicy>,
-        sight: Arc<dyn Sight>,
-    ) -> chaic_env::Result<Policies<'a>> {
-        let mut taken = others.names();
+        perception: Arc<dyn PerceptionFactory>,
+    ) -> chaic_env::Result<PolicyRegistry<'a>> {
+        let mut taken = fallback.names();
         for NamedPolicy { name, .. } in &policies {
-            check_new_name(name, &taken, "mine=policy:FILE").map_err(Refusal::Name)?;
+            check_new_name(name, &taken, "mine=policy:FILE").map_err(PolicyError::Name)?;
             taken.push(name.clone());
         }
-        Ok(Policies { policies, others, sight })
+        Ok(PolicyRegistry { policies, fallback, perception })
     }
 
-    fn recorded(&self) -> Vec<Recorded> {
-        let recorded =
-            |p: &NamedPolicy| Recorded { name: p.name.clone(), weights: p.digest.clone() };
-        self.policies.iter().map(recorded).collect()
+    fn records(&self) -> Vec<PolicyRecord> {
+        let record =
+            |p: &NamedPolicy| PolicyRecord { name: p.name.clone(), weights: p.digest.clone() };
+        self.policies.iter().map(record).collect()
     }
 }
 
-impl Helpers for Policies<'_> {
+impl HelperRegistry for PolicyRegistry<'_> {
     fn names(&self) -> Vec<String> {
-        let own = self.policies.iter().map(|p| p.name.clone());
-        self.others.names().into_iter().chain(own).collect()
+        let policies = self.policies.iter().map(|p| p.name.clone());
+        self.fallback.names().into_iter().chain(policies).collect()
     }
 
     fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper> {
-        let Some(own) = self.policies.iter().find(|p| p.name == name) else {
-            return self.others.make(name, rules);
+        let Some(policy) = self.policies.iter().find(|p| p.name == name) else {
+            return self.fallback.make(name, rules);
         };
-        Some(own.trained.helper(rules, &*self.sight))
+        Some(policy.weights.helper(rules, &*self.perception))
     }
 
     fn make_for(&self, key: &RunKey, rules: PlannerRules) -> Option<Helper> {
-        let is_own = self.policies.iter().any(|p| p.name == key.helper);
-        if is_own { self.make(&key.helper, rules) } else { self.others.make_for(key, rules) }
+        let is_policy = self.policies.iter().any(|p| p.name == key.helper);
+        if is_policy { self.make(&key.helper, rules) } else { self.fallback.make_for(key, rules) }
     }
 
-    fn attach(&self, run: &Path) -> chaic_env::Result<()> {
-        self.others.attach(run)?;
-        let (path, own) = (run.join(FILE), self.recorded());
-        let minds = |problem: chaic_files::FileError| EnvError::Minds(problem.into());
+    fn attach_run(&self, run: &Path) -> chaic_env::Result<()> {
+        self.fallback.attach_run(run)?;
+        let (path, records) = (run.join(FILE), self.records());
+        let registry_error = |problem: chaic_files::FileError| EnvError::Registry(problem.into());
         if path.exists() {
-            let bytes = read_bounded(&path, MOST_BYTES).map_err(minds)?;
-            let begun: Vec<Recorded> = serde_json::from_slice(&bytes)
-                .map_err(|e| EnvError::Minds(format!("{}: {e}", path.display()).into()))?;
-            if let Some(other) = begun.into_iter().find(|b| !own.contains(b)) {
-                return Err(Refusal::Other { run: run.to_owned(), name: other.name }.into());
+            let bytes = read_bounded(&path, MAX_BYTES).map_err(registry_error)?;
+            let earlier: Vec<PolicyRecord> = serde_json::from_slice(&bytes)
+                .map_err(|e| EnvError::Registry(format!("{}: {e}", path.display()).into()))?;
+            if let Some(changed) = earlier.into_iter().find(|r| !records.contains(r)) {
+                return Err(
+                    PolicyError::OtherWeights { run: run.to_owned(), name: changed.name }.into()
+                );
             }
         }
-        if own.is_empty() {
+        if records.is_empty() {
             return Ok(());
         }
-        let text = serde_json::to_vec_pretty(&own).expect("names and digests are JSON");
-        write_whole(&path, &text).map_err(minds)
+        let text =
+            serde_json::to_vec_pretty(&records).expect("names and digests serialize to JSON");
+        write_atomically(&path, &text).map_err(registry_error)
     }
 
-    fn others(&self) -> Option<&dyn Helpers> {
-        Some(self.others)
+    fn fallback(&self) -> Option<&dyn HelperRegistry> {
+        Some(self.fallback)
     }
 }

@@ -1,4 +1,4 @@
-//! A network that drives a mind.
+//! Policy that chooses plans by a network.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -6,130 +6,144 @@ use std::sync::{Arc, Mutex, PoisonError};
 use chaic_agents::behavior::BehaviorLog;
 use chaic_agents::decision::{Context, Plan, Policy};
 use chaic_agents::memory::Memory;
-use chaic_agents::sight::Sight;
-use chaic_agents::{Mind, PlannerRules};
+use chaic_agents::perception_factory::PerceptionFactory;
+use chaic_agents::{PlannerRules, PlanningAgent};
 use chaic_core::observation::Grants;
-use chaic_core::rng::Stream;
+use chaic_core::rng::RngStream;
 use chaic_core::{AgentError, AgentId, Briefing, Frame, Observation};
-use chaic_env::minds::Helper;
+use chaic_env::helper_registry::Helper;
 use chaic_nn::Pass;
 
 use crate::actor_critic::ActorCritic as _;
-use crate::choice_network::{ChoiceNetwork, Decision};
-use crate::features::Features;
+use crate::candidate_scorer::{CandidateScorer, CandidateSet};
+use crate::features::FeatureEncoder;
 use crate::opponent::network::OpponentModel;
 
-/// A helper whose mind this policy drives: it is granted what the paper's helpers are, as far as `sight` needs that,
-/// and watches its partner by what it sees.
-pub fn drive<P: Policy>(policy: P, rules: PlannerRules, sight: &dyn Sight) -> Helper {
-    let grants = sight.grants(Grants::PLANNER);
-    let mind = Mind::watching(policy, rules, sight, (AgentId::PARTNER, grants));
-    Helper { mind: Box::new(mind), grants }
+/// Creates a helper with this policy and the grants of the paper's helpers, as far as the
+/// perception needs them. It observes its partner through its perception.
+pub fn policy_helper<P: Policy>(
+    policy: P,
+    rules: PlannerRules,
+    perception: &dyn PerceptionFactory,
+) -> Helper {
+    let grants = perception.grants(Grants::PLANNER);
+    let agent = PlanningAgent::with_watched(policy, rules, perception, AgentId::PARTNER, grants);
+    Helper { agent: Box::new(agent), grants }
 }
 
-/// A network with its numbers.
+/// Network with parameter values.
 #[derive(Clone, Debug)]
-pub struct Trained {
-    /// The network.
-    pub model: ChoiceNetwork,
-    /// Its numbers.
-    pub numbers: Vec<f32>,
-    /// The opponent model that tells it of its partner, if it needs one.
+pub struct PolicyWeights {
+    /// Network architecture.
+    pub model: CandidateScorer,
+    /// Parameters.
+    pub parameters: Vec<f32>,
+    /// Opponent model whose predictions are inputs, if the network needs one.
     pub opponent: Option<Arc<OpponentModel>>,
 }
 
-/// How choices are made of probabilities.
+/// Selection of an action from a distribution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Choosing {
-    /// By chance, as likely as the network says.
-    Sampled,
-    /// Always the likeliest.
-    Likeliest,
+pub enum ActionSelection {
+    /// Sampled from the distribution.
+    Sample,
+    /// Most probable action.
+    Greedy,
 }
 
-/// A choice that was made.
+/// Recorded decision.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Noted {
-    /// When.
+pub struct StepRecord {
+    /// Frame of the decision.
     pub frame: Frame,
-    /// What was known.
-    pub decision: Decision,
-    /// Which choice.
-    pub choice: usize,
-    /// The logarithm of its probability.
-    pub log_probability: f32,
-    /// The return that was expected.
+    /// Features of the decision.
+    pub observation: CandidateSet,
+    /// Index of the chosen candidate.
+    pub action: usize,
+    /// Log-probability of the chosen candidate.
+    pub log_prob: f32,
+    /// Value estimate.
     pub value: f32,
 }
 
-/// Choices of one episode, for those who learn from them.
-pub type Notes = Arc<Mutex<Vec<Noted>>>;
+/// Recorded decisions of one episode.
+pub type StepLog = Arc<Mutex<Vec<StepRecord>>>;
 
-/// Chooses plans as a network says.
+/// Chooses plans by a network.
 #[derive(Clone)]
 pub struct LearnedPolicy {
-    trained: Arc<Trained>,
-    choosing: Choosing,
-    notes: Option<Notes>,
+    weights: Arc<PolicyWeights>,
+    selection: ActionSelection,
+    log: Option<StepLog>,
     pass: Pass,
-    rng: Stream,
-    features: Features,
+    rng: RngStream,
+    features: FeatureEncoder,
 }
 
 impl LearnedPolicy {
-    /// One that notes its choices, if somebody wants to know them.
-    pub fn new(trained: Arc<Trained>, choosing: Choosing, notes: Option<Notes>) -> LearnedPolicy {
-        let pass = trained.model.pass();
-        let rng = Stream::new(0, "plans", 0);
-        let features = Features::new(trained.opponent.clone());
-        LearnedPolicy { trained, choosing, notes, pass, rng, features }
+    /// Creates a policy that records its decisions in `log`, if given.
+    pub fn new(
+        weights: Arc<PolicyWeights>,
+        selection: ActionSelection,
+        log: Option<StepLog>,
+    ) -> LearnedPolicy {
+        let pass = weights.model.pass();
+        let rng = RngStream::new(0, "plans", 0);
+        let features = FeatureEncoder::new(weights.opponent.clone());
+        LearnedPolicy { weights, selection, log, pass, rng, features }
     }
 }
 
 impl Policy for LearnedPolicy {
     fn reset(&mut self, briefing: &Briefing) {
-        self.rng = Stream::new(briefing.seed, "learned policy", 0);
+        self.rng = RngStream::new(briefing.seed, "learned policy", 0);
         self.features.reset(briefing);
     }
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
-        let offered = self.features.choices.offered(valid);
+        let candidates = self.features.history.candidates(valid);
         let frame = context.memory.frame;
-        if let [only] = offered[..] {
-            self.features.choices.note(only, frame);
-            return Ok(only);
+        if let [single] = candidates[..] {
+            self.features.history.record(single, frame);
+            return Ok(single);
         }
-        let decision = self.features.decision(context, &offered);
-        let Trained { model, numbers, .. } = &*self.trained;
-        let said = model.forward(numbers, std::iter::once(&decision), &mut self.pass).remove(0);
-        let choice = match self.choosing {
-            Choosing::Sampled => said.sample(self.rng.unit()),
-            Choosing::Likeliest => said.most_likely(),
+        let observation = self.features.encode(context, &candidates);
+        let PolicyWeights { model, parameters, .. } = &*self.weights;
+        let output =
+            model.forward(parameters, std::iter::once(&observation), &mut self.pass).remove(0);
+        let action = match self.selection {
+            ActionSelection::Sample => output.sample(self.rng.unit()),
+            ActionSelection::Greedy => output.argmax(),
         };
-        let plan = offered[choice];
-        self.features.choices.note(plan, frame);
-        if let Some(notes) = &self.notes {
-            let log_probability = said.log_probabilities[choice];
-            let noted = Noted { frame, decision, choice, log_probability, value: said.value() };
-            notes.lock().unwrap_or_else(PoisonError::into_inner).push(noted);
+        let plan = candidates[action];
+        self.features.history.record(plan, frame);
+        if let Some(log) = &self.log {
+            let record = StepRecord {
+                frame,
+                observation,
+                action,
+                log_prob: output.log_probs[action],
+                value: output.value(),
+            };
+            log.lock().unwrap_or_else(PoisonError::into_inner).push(record);
         }
         Ok(plan)
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, is_news: bool) -> bool {
-        self.features.choices.is_due(context.memory.frame, current, is_news)
+        self.features.history.is_due(context.memory.frame, current, is_news)
     }
 
-    fn look(&mut self, _: &Observation, memory: &Memory, _: &BehaviorLog) {
-        self.features.look(memory);
+    fn observe(&mut self, _: &Observation, memory: &Memory, _: &BehaviorLog) {
+        self.features.observe(memory);
     }
 
-    fn counts(&self) -> BTreeMap<String, u64> {
-        let n = self.features.choices.n_of_kind.iter().map(|n| u64::from(*n)).sum();
+    fn counters(&self) -> BTreeMap<String, u64> {
+        let n = self.features.history.n_chosen_by_kind.iter().map(|n| u64::from(*n)).sum();
         BTreeMap::from([("choices".to_owned(), n)])
     }
 
     fn fork(&self) -> Option<LearnedPolicy> {
-        self.notes.is_none().then(|| self.clone())
+        self.log.is_none().then(|| self.clone())
     }
 }

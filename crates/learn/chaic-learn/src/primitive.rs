@@ -1,23 +1,22 @@
-//! Helpers that learn to choose single actions from images: the paper's RL baseline (appendix on learning).
+//! Policies of primitive actions from images: the paper's RL baseline (appendix on learning).
 //!
-//! [`seen`] is what they read, [`network`] what they are, [`helper`] lets them act, and [`train`] learns by proximal policy
-//! optimization, by the paper's numbers or with larger batches.
+//! [`observation`] is the input, [`network`] the network, [`helper`] the agent, and [`train`] the
+//! training by proximal policy optimization, with the paper's hyperparameters by default.
 
 pub mod network;
-pub mod seen;
+pub mod observation;
 
 pub mod helper;
 pub mod train;
 
-use chaic_agents::Mind;
+use chaic_agents::PlanningAgent;
 use chaic_agents::decision::HandState;
-use chaic_agents::mapping::Thing;
+use chaic_agents::mapping::MappedObject;
 use chaic_agents::memory::Memory;
-use chaic_agents::policies::External;
+use chaic_agents::policies::ExternalPolicy;
 use chaic_core::{Action, Briefing, ClassId, Hand, Target};
 
-/// What there is to choose from. The paper doesn't say what its helper's actions point at; ours at the nearest
-/// thing of a kind that is in view.
+/// Actions. The paper does not state their targets; ours are the nearest visible objects of a kind.
 pub const ACTIONS: [&str; 9] = [
     "move_forward",
     "turn_left",
@@ -30,41 +29,44 @@ pub const ACTIONS: [&str; 9] = [
     "wait",
 ];
 
-/// How long a wait is, and an action that can't be begun, frames: about as long as a turn.
+/// Duration of a wait, and of an action that cannot begin, frames: about that of a turn.
 const WAIT_FRAMES: u32 = 10;
 
-/// The pause in place of an action that can't be begun.
+/// Wait that replaces an action that cannot begin.
 pub(crate) const PAUSE: Action = Action::Wait { frames: WAIT_FRAMES };
 
-/// An action of [`ACTIONS`] as a mind that only looks means it; `None` if there is nothing in view that it could be
-/// about, or no hand for it.
-pub(crate) fn action_of(
-    choice: usize,
-    mind: &Mind<External>,
+/// Returns an action of [`ACTIONS`] with its target; `None` if no visible object or no hand fits.
+pub(crate) fn resolve_action(
+    action_index: usize,
+    agent: &PlanningAgent<ExternalPolicy>,
     briefing: &Briefing,
 ) -> Option<Action> {
-    let memory = mind.memory()?;
-    let hands = HandState::of(&memory.hands, briefing);
-    let free = hands.free_hand;
-    let at = |classes: &[ClassId]| in_view(memory, classes).find_map(|t| mind.target(t.track));
-    Some(match choice {
+    let memory = agent.memory()?;
+    let hands = HandState::new(&memory.hands, briefing);
+    let free_hand = hands.free_hand;
+    let nearest_visible =
+        |classes: &[ClassId]| visible_objects(memory, classes).find_map(|t| agent.target(t.track));
+    Some(match action_index {
         0 => Action::MoveForward,
         1 => Action::TurnLeft,
         2 => Action::TurnRight,
         3 => {
             let hand = hand_for_target(&hands)?;
-            Action::PickUp { object: at(&briefing.possible_targets)?, hand }
+            Action::PickUp { object: nearest_visible(&briefing.possible_targets)?, hand }
         }
-        4 => Action::PickUp { object: at(&briefing.containers)?, hand: free? },
+        4 => Action::PickUp { object: nearest_visible(&briefing.containers)?, hand: free_hand? },
         5 if hands.can_put_in => Action::PutIn,
-        6 => put_on(at(&briefing.goal_places)?, &hands)?,
-        7 => Action::RemoveObstacle { obstacle: at(&briefing.obstacles)?, hand: free? },
+        6 => put_on(nearest_visible(&briefing.goal_places)?, &hands)?,
+        7 => Action::RemoveObstacle {
+            obstacle: nearest_visible(&briefing.obstacles)?,
+            hand: free_hand?,
+        },
         8 => PAUSE,
         _ => return None,
     })
 }
 
-/// The hand that takes a target: a free one, or where a basket is filled, any.
+/// Returns the hand that takes a target: a free one, or any if the target goes into a basket.
 fn hand_for_target(hands: &HandState) -> Option<Hand> {
     hands.can_take_target.then_some(hands.free_hand.unwrap_or(Hand::Left))
 }
@@ -73,12 +75,17 @@ fn put_on(place: Target, hands: &HandState) -> Option<Action> {
     Some(Action::PutOn { place, hand: hands.to_deliver? })
 }
 
-/// Things of these classes that are in view and can be taken or used, nearest first.
-fn in_view<'a>(memory: &'a Memory, classes: &[ClassId]) -> impl Iterator<Item = &'a Thing> {
-    let is_there = |t: &&Thing| {
+/// Returns visible and available objects of these classes, nearest first.
+fn visible_objects<'a>(
+    memory: &'a Memory,
+    classes: &[ClassId],
+) -> impl Iterator<Item = &'a MappedObject> {
+    let is_available = |t: &&MappedObject| {
         classes.contains(&t.class) && t.last_seen == memory.frame && t.held_until <= memory.frame
     };
-    let mut found: Vec<&Thing> = memory.things.iter().filter(is_there).collect();
-    found.sort_by(|a, b| a.distance_from(memory.here()).total_cmp(&b.distance_from(memory.here())));
-    found.into_iter()
+    let mut objects: Vec<&MappedObject> = memory.objects.iter().filter(is_available).collect();
+    objects.sort_by(|a, b| {
+        a.distance_from(memory.position()).total_cmp(&b.distance_from(memory.position()))
+    });
+    objects.into_iter()
 }

@@ -1,200 +1,212 @@
-//! Episodes that are played by a network, and what came of its choices.
+//! Episodes that a network plays, with the rewards of its decisions.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, PoisonError};
 
 use chaic_agents::decision::Policy;
-use chaic_agents::sight::Sight;
+use chaic_agents::perception_factory::PerceptionFactory;
 use chaic_core::briefing::Goal;
 use chaic_core::geom::math;
-use chaic_core::rng::Stream;
-use chaic_core::{AgentError, Frame};
+use chaic_core::rng::RngStream;
+use chaic_core::{AgentError, AgentId, Frame};
 use chaic_env::rules::RuleSet;
-use chaic_env::{Env, EnvError, EpisodeConfig, Flow, Minds, seeded_by_episode};
+use chaic_env::{
+    AdvanceOutcome, Env, EnvError, EpisodeAgents, EpisodeConfig, RewardTracker, RewardWeights,
+    seeded_by_episode,
+};
 use chaic_episodes::{SplitError, find_episode};
-use chaic_render::Appearance;
 use rayon::prelude::*;
 
-use crate::cloning::{Lesson, Teacher, driver};
-use crate::policy::{Choosing, LearnedPolicy, Noted, Notes, Trained, drive};
+use crate::cloning::{Demonstration, ExpertPolicy, sample_actor};
+use crate::policy::{
+    ActionSelection, LearnedPolicy, PolicyWeights, StepLog, StepRecord, policy_helper,
+};
 use crate::ppo::{Trajectory, Transition};
-use crate::rewards::{Account, Rewards};
 
-/// Why an episode can't be played.
+/// Reason why an episode cannot be played.
 #[derive(Debug, thiserror::Error)]
 pub enum RolloutError {
-    /// There is no such episode.
+    /// The episode does not exist.
     #[error(transparent)]
     Episode(#[from] SplitError),
-    /// It can't become a world.
+    /// The environment cannot be created.
     #[error(transparent)]
     Env(#[from] EnvError),
-    /// A mind broke down.
-    #[error("a mind broke down: {0}")]
-    Mind(#[from] AgentError),
+    /// An agent failed.
+    #[error("an agent failed: {0}")]
+    Agent(#[from] AgentError),
 }
 
-/// How episodes are played.
+/// Settings of a rollout.
 #[derive(Clone, Copy)]
-pub struct RolloutRules<'a> {
-    /// By what the helper sees.
-    pub sight: &'a dyn Sight,
-    /// Side of all images, pixels.
+pub struct RolloutContext<'a> {
+    /// Perception of the helper.
+    pub perception: &'a dyn PerceptionFactory,
+    /// Width and height of all images, pixels.
     pub image_size: u32,
-    /// How choices are made.
-    pub choosing: Choosing,
-    /// What is rewarded.
-    pub rewards: Rewards,
-    /// Flag that stops the play; what was played so far comes to nothing.
+    /// Selection of actions.
+    pub selection: ActionSelection,
+    /// Weights of the reward terms.
+    pub rewards: RewardWeights,
+    /// Stop flag; a stopped rollout returns nothing.
     pub stop: &'a AtomicBool,
 }
 
-/// What came of an episode.
+/// Result of an episode.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Played {
-    /// Its choices and rewards; durations are frames.
+pub struct EpisodeResult {
+    /// Decisions with rewards; durations are frames.
     pub trajectory: Trajectory,
     /// Transport rate.
     pub tr: f64,
-    /// Frames that passed.
+    /// Length of the episode, frames.
     pub frames: Frame,
 }
 
-/// An episode that was played.
-struct Recording {
-    noted: Vec<Noted>,
-    /// What had been earned at which frame, whenever somebody decided.
-    earned: Vec<(Frame, f32)>,
+/// Recording of a played episode.
+struct EpisodeRecording {
+    records: Vec<StepRecord>,
+    /// Cumulative reward at each frame at which an agent decided.
+    cumulative_rewards: Vec<(Frame, f32)>,
     tr: f64,
     frames: Frame,
 }
 
-impl Recording {
-    /// What had been earned when a frame began.
-    fn earned_at(&self, frame: Frame) -> f32 {
-        let k = self.earned.partition_point(|(f, _)| *f < frame);
-        self.earned.get(k).or(self.earned.last()).map_or(0.0, |(_, earned)| *earned)
+impl EpisodeRecording {
+    /// Returns the cumulative reward at the start of a frame.
+    fn reward_at(&self, frame: Frame) -> f32 {
+        let k = self.cumulative_rewards.partition_point(|(f, _)| *f < frame);
+        self.cumulative_rewards
+            .get(k)
+            .or(self.cumulative_rewards.last())
+            .map_or(0.0, |(_, reward)| *reward)
     }
 
-    /// When each choice's time was over.
+    /// Returns the end frame of each decision.
     fn ends(&self) -> impl Iterator<Item = Frame> + '_ {
-        self.noted.iter().skip(1).map(|n| n.frame).chain([self.frames])
+        self.records.iter().skip(1).map(|record| record.frame).chain([self.frames])
     }
 }
 
-/// Plays an episode with a helper whose policy is made for its goal; `None` if it was stopped.
-fn record<P: Policy>(
-    (id, seed): (&str, u32),
-    rules: &RolloutRules<'_>,
-    make: impl FnOnce(&Goal, Notes) -> P,
-) -> Result<Option<Recording>, RolloutError> {
+/// Plays an episode with the policy that `make_policy` creates for its goal; `None` if it was
+/// stopped.
+fn record_episode<P: Policy>(
+    id: &str,
+    seed: u32,
+    context: &RolloutContext<'_>,
+    make_policy: impl FnOnce(&Goal, StepLog) -> P,
+) -> Result<Option<EpisodeRecording>, RolloutError> {
     let episode = find_episode(id)?;
-    let notes = Notes::default();
-    let policy = make(&episode.setup().goal, Arc::clone(&notes));
-    let helper = drive(policy, RuleSet::PAPER.planner, rules.sight);
+    let log = StepLog::default();
+    let policy = make_policy(&episode.setup().goal, Arc::clone(&log));
+    let helper = policy_helper(policy, RuleSet::PAPER.planner, context.perception);
     let config = EpisodeConfig {
-        episode: &episode,
         seed,
-        rules: RuleSet::PAPER,
-        helper: "learner",
-        partner: None,
-        image_size: Some(rules.image_size),
-        appearance: Appearance::Canonical,
+        image_size: Some(context.image_size),
+        ..EpisodeConfig::new(&episode, "learner")
     };
-    let minds = Minds::of(Some(seeded_by_episode(helper, &config)), None);
-    let mut env = Env::new(config, minds)?;
-    let mut account = Account::new(rules.rewards);
-    let mut earned = Vec::new();
+    let agents = EpisodeAgents::new(Some(seeded_by_episode(helper, &config)), None);
+    let mut env = Env::new(config, agents)?;
+    let mut tracker = RewardTracker::new(AgentId::HELPER);
+    let mut cumulative_rewards = Vec::new();
     loop {
-        if rules.stop.load(Ordering::Relaxed) {
+        if context.stop.load(Ordering::Relaxed) {
             return Ok(None);
         }
         let frame = env.world().state().frame;
-        earned.push((frame, account.earned(env.world())));
-        if env.advance(Some(frame + 1))? == Flow::Ended {
+        cumulative_rewards.push((frame, tracker.cumulative(env.world(), &context.rewards)));
+        if env.advance(Some(frame + 1))? == AdvanceOutcome::Ended {
             break;
         }
     }
     let frames = env.world().state().frame;
-    earned.push((frames, account.earned(env.world())));
-    let noted = std::mem::take(&mut *notes.lock().unwrap_or_else(PoisonError::into_inner));
+    cumulative_rewards.push((frames, tracker.cumulative(env.world(), &context.rewards)));
+    let records = std::mem::take(&mut *log.lock().unwrap_or_else(PoisonError::into_inner));
     let (done, total) = env.world().progress();
     let tr = if total > 0.0 { done / total } else { 0.0 };
-    Ok(Some(Recording { noted, earned, tr, frames }))
+    Ok(Some(EpisodeRecording { records, cumulative_rewards, tr, frames }))
 }
 
 /// Plays an episode with a network as the helper; `None` if it was stopped.
 ///
 /// # Errors
 /// [`RolloutError`]
-pub fn play(
+pub fn rollout(
     id: &str,
     seed: u32,
-    trained: &Arc<Trained>,
-    rules: &RolloutRules<'_>,
-) -> Result<Option<Played>, RolloutError> {
-    let recording = record((id, seed), rules, |_, notes| {
-        LearnedPolicy::new(Arc::clone(trained), rules.choosing, Some(notes))
+    weights: &Arc<PolicyWeights>,
+    context: &RolloutContext<'_>,
+) -> Result<Option<EpisodeResult>, RolloutError> {
+    let recording = record_episode(id, seed, context, |_, log| {
+        LearnedPolicy::new(Arc::clone(weights), context.selection, Some(log))
     })?;
     let Some(recording) = recording else { return Ok(None) };
-    let transitions = recording.noted.iter().zip(recording.ends()).map(|(noted, end)| Transition {
-        choice: noted.choice,
-        log_probability: noted.log_probability,
-        value: noted.value,
-        reward: recording.earned_at(end) - recording.earned_at(noted.frame),
-        duration: (end - noted.frame) as f32,
-        decision: noted.decision.clone(),
-    });
-    let trajectory = Trajectory { transitions: transitions.collect(), value_after: 0.0 };
-    Ok(Some(Played { trajectory, tr: recording.tr, frames: recording.frames }))
+    let transitions =
+        recording.records.iter().zip(recording.ends()).map(|(record, end)| Transition {
+            action: record.action,
+            log_prob: record.log_prob,
+            value: record.value,
+            reward: recording.reward_at(end) - recording.reward_at(record.frame),
+            duration: (end - record.frame) as f32,
+            observation: record.observation.clone(),
+        });
+    let trajectory = Trajectory { transitions: transitions.collect(), bootstrap_value: 0.0 };
+    Ok(Some(EpisodeResult { trajectory, tr: recording.tr, frames: recording.frames }))
 }
 
-/// Plays an episode with a teacher at hand, who drives the helper itself or lets the network do so: what it taught,
-/// and the transport rate; `None` if it was stopped. Returns are discounted by this for each frame.
+/// Plays an episode in which the expert labels the decisions, driven by the expert or, with
+/// probability `learner_fraction`, by the network. Returns the demonstrations and the transport
+/// rate; `None` if it was stopped. `gamma` is the discount per frame.
 ///
 /// # Errors
 /// [`RolloutError`]
-pub fn play_taught(
-    (id, seed): (&str, u32),
-    trained: &Arc<Trained>,
-    rules: &RolloutRules<'_>,
-    (mixed, discount): (f32, f32),
-) -> Result<Option<(Vec<Lesson>, f64)>, RolloutError> {
-    let learner = || LearnedPolicy::new(Arc::clone(trained), Choosing::Sampled, None);
-    let recording = record((id, seed), rules, |goal, notes| {
-        let mut rng = Stream::new(u64::from(seed), id, 0);
-        let driver = driver(mixed, &mut rng, learner);
-        Teacher::new(goal.clone(), driver, trained.opponent.clone(), notes)
+pub fn rollout_with_expert(
+    id: &str,
+    seed: u32,
+    weights: &Arc<PolicyWeights>,
+    context: &RolloutContext<'_>,
+    learner_fraction: f32,
+    gamma: f32,
+) -> Result<Option<(Vec<Demonstration>, f64)>, RolloutError> {
+    let learner = || LearnedPolicy::new(Arc::clone(weights), ActionSelection::Sample, None);
+    let recording = record_episode(id, seed, context, |goal, log| {
+        let mut rng = RngStream::new(u64::from(seed), id, 0);
+        let actor = sample_actor(learner_fraction, &mut rng, learner);
+        ExpertPolicy::new(goal.clone(), actor, weights.opponent.clone(), log)
     })?;
     let Some(recording) = recording else { return Ok(None) };
     let ends: Vec<Frame> = recording.ends().collect();
-    let mut following = 0.0;
-    let mut lessons: Vec<Lesson> = recording
-        .noted
+    let mut value_target = 0.0;
+    let mut demonstrations: Vec<Demonstration> = recording
+        .records
         .iter()
         .zip(&ends)
         .rev()
-        .map(|(noted, end)| {
-            let reward = recording.earned_at(*end) - recording.earned_at(noted.frame);
-            following = reward + math::powf(discount, (end - noted.frame) as f32) * following;
-            Lesson { decision: noted.decision.clone(), choice: noted.choice, target: following }
+        .map(|(record, end)| {
+            let reward = recording.reward_at(*end) - recording.reward_at(record.frame);
+            value_target = reward + math::powf(gamma, (end - record.frame) as f32) * value_target;
+            Demonstration {
+                observation: record.observation.clone(),
+                action: record.action,
+                value_target,
+            }
         })
         .collect();
-    lessons.reverse();
-    Ok(Some((lessons, recording.tr)))
+    demonstrations.reverse();
+    Ok(Some((demonstrations, recording.tr)))
 }
 
-/// Plays episodes side by side on all cores; what comes of each depends on nothing but itself. Returns `None` if
-/// they were stopped.
+/// Plays episodes in parallel; results do not depend on the number of threads. Returns `None` if it
+/// was stopped.
 ///
 /// # Errors
-/// The first one's that couldn't be played.
-pub fn play_all(
+/// The first episode's that cannot be played.
+pub fn rollout_all(
     ids: &[(String, u32)],
-    trained: &Arc<Trained>,
-    rules: &RolloutRules<'_>,
-) -> Result<Option<Vec<Played>>, RolloutError> {
-    let played: Result<Vec<Option<Played>>, RolloutError> =
-        ids.par_iter().map(|(id, seed)| play(id, *seed, trained, rules)).collect();
-    Ok(played?.into_iter().collect())
+    weights: &Arc<PolicyWeights>,
+    context: &RolloutContext<'_>,
+) -> Result<Option<Vec<EpisodeResult>>, RolloutError> {
+    let results: Result<Vec<Option<EpisodeResult>>, RolloutError> =
+        ids.par_iter().map(|(id, seed)| rollout(id, *seed, weights, context)).collect();
+    Ok(results?.into_iter().collect())
 }

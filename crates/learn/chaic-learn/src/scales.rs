@@ -1,10 +1,10 @@
-//! How quantities become numbers that a network reads, most of them between 0 and 1.
+//! Scaling of quantities to network inputs, mostly between 0 and 1.
 
 use chaic_core::catalogue::TargetSet;
 use chaic_core::geom::math;
 
-/// Sets that targets come from.
-pub const SETS: [TargetSet; 8] = [
+/// Sets of target classes.
+pub const TARGET_SETS: [TargetSet; 8] = [
     TargetSet::Fruit,
     TargetSet::Bread,
     TargetSet::Work,
@@ -15,20 +15,20 @@ pub const SETS: [TargetSet; 8] = [
     TargetSet::Furniture,
 ];
 
-/// What happened so many frames ago is fresh by 1/e.
-const FRESH_FRAMES: f32 = 120.0;
+/// Frames after which [`recency`] falls to 1/e.
+const RECENCY_FRAMES: f32 = 120.0;
 
-/// 1 for yes.
-pub fn flag(is_so: bool) -> f32 {
-    f32::from(u8::from(is_so))
+/// Returns 1 for true and 0 for false.
+pub fn flag(condition: bool) -> f32 {
+    f32::from(u8::from(condition))
 }
 
-/// A share that rises from 0 to 1 as `x` grows to `most`.
-pub fn share(x: f32, most: f32) -> f32 {
-    (x / most).clamp(0.0, 1.0)
+/// Returns `x / max`, clamped to 0..1.
+pub fn normalize_clamped(x: f32, max: f32) -> f32 {
+    (x / max).clamp(0.0, 1.0)
 }
 
-/// How fresh what happened so many frames ago is, 1 to 0.
-pub fn fresh(age: u32) -> f32 {
-    math::exp(-(age as f32) / FRESH_FRAMES)
+/// Returns the recency of an event of this age in frames: 1 for now, falling exponentially to 0.
+pub fn recency(age_frames: u32) -> f32 {
+    math::exp(-(age_frames as f32) / RECENCY_FRAMES)
 }

@@ -1,96 +1,101 @@
-//! The loops: episodes are played, and the network learns from them.
+//! Trainers of policies that choose plans.
 
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use chaic_agents::sight::Sight;
+use chaic_agents::perception_factory::PerceptionFactory;
 use chaic_nn::weights::{self, WeightsError};
-use chaic_nn::{AdamRules, Network};
-use chaic_training::bounds::{ADAM, Bound, BoundTable, RATE, SEED, SHARDS, SHARE, STEPS, integer};
+use chaic_nn::{AdamWConfig, Network};
+use chaic_training::bounds::{
+    ADAM, Bound, BoundTable, FRACTION, LEARNING_RATE, SEED, SHARDS, STEPS, integer,
+};
 use chaic_training::{
-    Checkpoint, CheckpointError, Figures, Learner, Training, TrainingError, figures, rate_at,
+    Checkpoint, CheckpointError, Learner, Metrics, Trainer, TrainingError, learning_rate_at,
+    metrics,
 };
 use rayon::prelude::*;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::choice_network::{ChoiceNetwork, Decision};
-use crate::cloning::{Learned, Lesson, imitate};
-use crate::features::{N_PLAN, N_PLAN_OF_OPPONENT, N_STATE, N_STATE_OF_OPPONENT};
+use crate::candidate_scorer::{CandidateScorer, CandidateSet};
+use crate::cloning::{CloningMetrics, Demonstration, EpochConfig, train_epoch};
+use crate::features::{N_OPPONENT_PLAN, N_OPPONENT_STATE, N_PLAN, N_STATE};
 use crate::opponent::{self, network::OpponentModel};
-use crate::play_rules::{PLAY_BOUNDS, mean_tr};
-use crate::policy::{Choosing, Trained};
-use crate::ppo::{MAX_BATCH, PPO_BOUNDS, PpoRules, Told, improve};
-use crate::rollout::{play_all, play_taught};
+use crate::policy::{ActionSelection, PolicyWeights};
+use crate::ppo::{MAX_BATCH, PPO_BOUNDS, PpoConfig, PpoMetrics, Schedule, update};
+use crate::rollout::{rollout_all, rollout_with_expert};
+use crate::rollout_config::{ROLLOUT_BOUNDS, mean_tr};
 
-pub use crate::play_rules::PlayRules;
+pub use crate::rollout_config::RolloutConfig;
 
-/// What files of weights say that they are.
+/// Kind in weights files of policies without opponent model.
 const KIND: &str = "chaic plan policy 2";
-/// The same of those with an opponent model.
+/// Kind in weights files of policies with opponent model.
 const KIND_WITH_OPPONENT: &str = "chaic plan policy with opponent model 1";
-/// What the numbers of the opponent model are called among a policy's.
+/// Name of the opponent model's parameters among those of a policy.
 const OPPONENT: &str = "opponent";
-/// Width of the network's layers.
+/// Width of the hidden layers.
 const WIDTH: usize = 96;
 
-/// Which network chooses plans.
+/// Kind of network that chooses plans.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// By what its mind remembers.
-    Plain,
-    /// By what an opponent model tells of the partner, too (Smart-Help).
+pub enum PolicyKind {
+    /// Reads features of the memory.
+    WithoutOpponent,
+    /// Reads predictions of an opponent model as well (Smart-Help).
     WithOpponent,
 }
 
-impl Kind {
-    /// The network, whose numbers include those of the opponent model: they belong together.
-    pub fn network(self) -> ChoiceNetwork {
-        if self == Kind::Plain {
-            return ChoiceNetwork::new((N_STATE, N_PLAN), WIDTH, 1);
+impl PolicyKind {
+    /// Creates the network architecture. Its parameters include those of the opponent model.
+    pub fn network(self) -> CandidateScorer {
+        if self == PolicyKind::WithoutOpponent {
+            return CandidateScorer::new(N_STATE, N_PLAN, WIDTH, 1);
         }
-        let inputs = (N_STATE + N_STATE_OF_OPPONENT, N_PLAN + N_PLAN_OF_OPPONENT);
-        let mut model = ChoiceNetwork::new(inputs, WIDTH, 1);
-        model.network.aside(OPPONENT, opponent::network::network().network.n_numbers());
+        let (n_state, n_plan) = (N_STATE + N_OPPONENT_STATE, N_PLAN + N_OPPONENT_PLAN);
+        let mut model = CandidateScorer::new(n_state, n_plan, WIDTH, 1);
+        model
+            .network
+            .extra_parameters(OPPONENT, opponent::network::network().network.n_parameters());
         model
     }
 
     fn name(self) -> &'static str {
-        if self == Kind::Plain { KIND } else { KIND_WITH_OPPONENT }
+        if self == PolicyKind::WithoutOpponent { KIND } else { KIND_WITH_OPPONENT }
     }
 
-    /// A network of this kind that plays by these numbers.
-    pub fn trained(self, model: &ChoiceNetwork, numbers: Vec<f32>) -> Trained {
-        let of_opponent = |model: &ChoiceNetwork| {
+    /// Combines a network of this kind with parameters.
+    pub fn weights_from(self, model: &CandidateScorer, parameters: Vec<f32>) -> PolicyWeights {
+        let opponent_model = |model: &CandidateScorer| {
             let range = opponent_range(model);
-            Arc::new(OpponentModel::new(numbers[range].to_vec()))
+            Arc::new(OpponentModel::new(parameters[range].to_vec()))
         };
-        let opponent = (self == Kind::WithOpponent).then(|| of_opponent(model));
-        Trained { model: model.clone(), numbers, opponent }
+        let opponent = (self == PolicyKind::WithOpponent).then(|| opponent_model(model));
+        PolicyWeights { model: model.clone(), parameters, opponent }
     }
 }
 
-/// Where the opponent model's numbers are.
-fn opponent_range(model: &ChoiceNetwork) -> Range<usize> {
+/// Returns the range of the opponent model's parameters.
+fn opponent_range(model: &CandidateScorer) -> Range<usize> {
     let found = model.network.parameters().iter().find(|p| p.name == OPPONENT);
-    found.expect("it is of the kind that has one").range.clone()
+    found.expect("the network has an opponent model").range.clone()
 }
 
-/// The network in a file of weights.
+/// Parses a weights file of either kind.
 ///
 /// # Errors
-/// [`WeightsError`] if it isn't a whole file of such a network.
-pub fn from_bytes(bytes: &[u8]) -> Result<(Kind, Trained), WeightsError> {
-    let read = |kind: Kind| {
+/// [`WeightsError`] if the file is incomplete or belongs to another network.
+pub fn from_bytes(bytes: &[u8]) -> Result<(PolicyKind, PolicyWeights), WeightsError> {
+    let read = |kind: PolicyKind| {
         let model = kind.network();
-        let numbers = weights::from_bytes(&model.network, bytes, kind.name())?;
-        Ok((kind, kind.trained(&model, numbers)))
+        let parameters = weights::from_bytes(&model.network, bytes, kind.name())?;
+        Ok((kind, kind.weights_from(&model, parameters)))
     };
-    match read(Kind::Plain) {
+    match read(PolicyKind::WithoutOpponent) {
         Err(WeightsError::Kind { found, .. }) if found == KIND_WITH_OPPONENT => {
-            read(Kind::WithOpponent)
+            read(PolicyKind::WithOpponent)
         }
         read => read,
     }
@@ -99,142 +104,139 @@ pub fn from_bytes(bytes: &[u8]) -> Result<(Kind, Trained), WeightsError> {
 /// Section of a checkpoint.
 const ITERATIONS: &str = "policy.iterations";
 
-/// A network while it learns, with the iterations so far.
-pub struct Learning {
-    kind: Kind,
-    model: ChoiceNetwork,
+/// Network and learner with the number of iterations so far.
+pub struct TrainState {
+    kind: PolicyKind,
+    model: CandidateScorer,
     learner: Learner,
     iterations: u64,
 }
 
-impl Learning {
-    fn new(seed: u64, shards: usize, opponent: Option<&OpponentModel>) -> Learning {
-        let kind = if opponent.is_some() { Kind::WithOpponent } else { Kind::Plain };
+impl TrainState {
+    fn new(seed: u64, shards: usize, opponent: Option<&OpponentModel>) -> TrainState {
+        let kind =
+            if opponent.is_some() { PolicyKind::WithOpponent } else { PolicyKind::WithoutOpponent };
         let model = kind.network();
         let mut learner = Learner::new(&model.network, seed, shards);
         if let Some(opponent) = opponent {
-            learner.numbers[opponent_range(&model)].copy_from_slice(opponent.numbers());
+            learner.parameters[opponent_range(&model)].copy_from_slice(opponent.parameters());
         }
-        Learning { kind, model, learner, iterations: 0 }
+        TrainState { kind, model, learner, iterations: 0 }
     }
 
-    fn trained(&self) -> Arc<Trained> {
-        Arc::new(self.kind.trained(&self.model, self.learner.numbers.clone()))
+    fn policy_weights(&self) -> Arc<PolicyWeights> {
+        Arc::new(self.kind.weights_from(&self.model, self.learner.parameters.clone()))
     }
 
-    /// Takes decisions into what inputs are normalized by.
-    fn normalize_by<'a>(&mut self, decisions: impl Iterator<Item = &'a Decision> + Clone) {
-        self.model.normalize_by(&mut self.learner.numbers, decisions);
+    /// Updates the statistics that normalize the network's inputs.
+    fn update_normalizer<'a>(&mut self, decisions: impl Iterator<Item = &'a CandidateSet> + Clone) {
+        self.model.update_normalizer(&mut self.learner.parameters, decisions);
     }
 
     fn weights(&self) -> Result<Vec<u8>, WeightsError> {
-        weights::to_bytes(&self.model.network, &self.learner.numbers, self.kind.name())
+        weights::to_bytes(&self.model.network, &self.learner.parameters, self.kind.name())
     }
 
     fn checkpoint(&self) -> Checkpoint {
-        let mut checkpoint = Checkpoint::default();
-        checkpoint.insert_integers(ITERATIONS, vec![self.iterations]);
-        self.learner.save(&mut checkpoint);
-        checkpoint
+        self.learner.checkpoint(ITERATIONS, self.iterations)
     }
 
     fn resume(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        let iterations = checkpoint.integer(ITERATIONS)?;
-        self.learner.load(checkpoint)?;
-        self.iterations = iterations;
+        self.iterations = self.learner.restore(checkpoint, ITERATIONS)?;
         Ok(())
     }
 }
 
-/// What all ways to learn have.
+/// Settings that all algorithms share.
 #[derive(Clone, Copy, Debug)]
-pub struct Course<'a> {
-    /// Of weights, episodes and batches.
+pub struct TrainingSpec<'a> {
+    /// Seed of weights, episodes and batches.
     pub seed: u64,
-    /// Iterations in all.
+    /// Total number of iterations.
     pub iterations: u64,
-    /// What is played.
-    pub play: &'a PlayRules,
-    /// Parts of a batch that are worked on side by side.
+    /// Configuration of rollouts.
+    pub rollout: &'a RolloutConfig,
+    /// Shards of a batch, which run in parallel.
     pub shards: usize,
 }
 
-/// A way to learn, with all that it depends on.
-pub trait Method: Clone + Default + Serialize + DeserializeOwned {
-    /// Name of the training, as `chaic train` takes it.
+/// Training algorithm with its configuration.
+pub trait Algorithm: Clone + Default + Serialize + DeserializeOwned {
+    /// Name of the training, as in `chaic train NAME`.
     const KIND: &'static str;
     /// Bounds of every number.
     const BOUNDS: BoundTable;
 
-    /// What all ways to learn have.
-    fn course(&self) -> Course<'_>;
+    /// Returns the settings that all algorithms share.
+    fn spec(&self) -> TrainingSpec<'_>;
 
-    /// Does an iteration of a helper who sees by this; `None` if `stop` is raised meanwhile.
-    fn learn(
+    /// Runs one iteration with this perception; `None` if `stop` is raised.
+    fn iterate(
         &self,
-        sight: &dyn Sight,
-        learning: &mut Learning,
+        perception: &dyn PerceptionFactory,
+        state: &mut TrainState,
         stop: &AtomicBool,
-    ) -> Option<Figures>;
+    ) -> Option<Metrics>;
 }
 
-/// A policy that is trained in a folder of its own.
-pub struct PolicyTraining<M> {
-    method: M,
-    sight: Arc<dyn Sight>,
-    learning: Learning,
+/// Trainer of a policy that chooses plans.
+pub struct PolicyTrainer<A> {
+    config: A,
+    perception: Arc<dyn PerceptionFactory>,
+    state: TrainState,
 }
 
-impl<M: Method> Training for PolicyTraining<M> {
-    type Rules = M;
-    const KIND: &'static str = M::KIND;
-    const BOUNDS: BoundTable = M::BOUNDS;
+impl<A: Algorithm> Trainer for PolicyTrainer<A> {
+    type Config = A;
+    const KIND: &'static str = A::KIND;
+    const BOUNDS: BoundTable = A::BOUNDS;
     const WEIGHTS: &'static str = "policy.safetensors";
     const RECORD_STEPS: u64 = 1;
     const CHECKPOINT_STEPS: u64 = 5;
     const VALIDATION_STEPS: u64 = 25;
 
     fn new(
-        method: &M,
+        config: &A,
         _: &Path,
         _: &mut dyn FnMut(&str),
         _: &AtomicBool,
-    ) -> Result<Option<PolicyTraining<M>>, TrainingError> {
-        let Course { seed, shards, play, .. } = method.course();
-        let sight = play.sight().map_err(TrainingError::of_data)?;
-        let opponent = play.read_opponent()?;
-        let learning = Learning::new(seed, shards, opponent.as_ref());
-        Ok(Some(PolicyTraining { method: method.clone(), sight, learning }))
+    ) -> Result<Option<PolicyTrainer<A>>, TrainingError> {
+        let TrainingSpec { seed, shards, rollout, .. } = config.spec();
+        let perception = rollout.perception_factory().map_err(TrainingError::from_data)?;
+        let opponent = rollout.read_opponent()?;
+        let state = TrainState::new(seed, shards, opponent.as_ref());
+        Ok(Some(PolicyTrainer { config: config.clone(), perception, state }))
     }
 
-    fn check(method: &M) -> Result<(), String> {
-        method.course().play.check()
+    fn check(config: &A) -> Result<(), String> {
+        config.spec().rollout.check()
     }
 
-    fn read_weights(method: &M, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
-        let has_opponent = method.course().play.opponent.is_some();
-        let kind = if has_opponent { Kind::WithOpponent } else { Kind::Plain };
+    fn read_weights(config: &A, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
+        let has_opponent = config.spec().rollout.opponent.is_some();
+        let kind =
+            if has_opponent { PolicyKind::WithOpponent } else { PolicyKind::WithoutOpponent };
         weights::from_bytes(&kind.network().network, weights, kind.name())
     }
 
     fn network(&self) -> &Network {
-        &self.learning.model.network
+        &self.state.model.network
     }
 
-    fn steps(&self) -> u64 {
-        self.method.course().iterations
+    fn total_steps(&self) -> u64 {
+        self.config.spec().iterations
     }
 
-    fn taken(&self) -> u64 {
-        self.learning.iterations
+    fn steps_done(&self) -> u64 {
+        self.state.iterations
     }
 
     fn checkpoint(&self) -> Checkpoint {
-        self.learning.checkpoint()
+        self.state.checkpoint()
     }
 
-    fn begin_with(&mut self, numbers: Vec<f32>) {
-        self.learning.learner.begin_with(numbers);
+    fn load_parameters(&mut self, parameters: Vec<f32>) {
+        self.state.learner.load_parameters(parameters);
     }
 
     fn resume(
@@ -242,205 +244,227 @@ impl<M: Method> Training for PolicyTraining<M> {
         checkpoint: &Checkpoint,
         _: &AtomicBool,
     ) -> Result<Option<()>, CheckpointError> {
-        self.learning.resume(checkpoint).map(Some)
+        self.state.resume(checkpoint).map(Some)
     }
 
-    fn step(&mut self, stop: &AtomicBool) -> Option<Figures> {
-        let before = self.learning.learner.state();
-        let figures = self.method.learn(&*self.sight, &mut self.learning, stop);
-        match figures {
-            Some(_) => self.learning.iterations += 1,
-            None => self.learning.learner.set_state(before),
+    fn step(&mut self, stop: &AtomicBool) -> Option<Metrics> {
+        let before = self.state.learner.state();
+        let metrics = self.config.iterate(&*self.perception, &mut self.state, stop);
+        match metrics {
+            Some(_) => self.state.iterations += 1,
+            None => self.state.learner.set_state(before),
         }
-        figures
+        metrics
     }
 
-    fn validate(&self, stop: &AtomicBool) -> Result<Option<(Figures, Vec<u8>)>, WeightsError> {
-        let weights = self.learning.weights()?;
-        let trained = self.learning.trained();
-        let figures = self.method.course().play.validate(&*self.sight, &trained, stop);
-        Ok(figures.map(|figures| (figures, weights)))
+    fn validate(&self, stop: &AtomicBool) -> Result<Option<(Metrics, Vec<u8>)>, WeightsError> {
+        let bytes = self.state.weights()?;
+        let weights = self.state.policy_weights();
+        let metrics = self.config.spec().rollout.validate(&*self.perception, &weights, stop);
+        Ok(metrics.map(|metrics| (metrics, bytes)))
     }
 }
 
-/// Learning from what comes of choices, by proximal policy optimization.
+/// Configuration of `chaic train ppo`: reinforcement learning by PPO.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Reinforcement {
-    /// Of weights, episodes and batches.
+pub struct PpoTrainingConfig {
+    /// Seed of weights, episodes and batches.
     pub seed: u64,
-    /// Iterations in all.
+    /// Total number of iterations.
     pub iterations: u64,
-    /// What is played.
-    pub play: PlayRules,
-    /// How it learns; the discount is of a frame.
-    pub ppo: PpoRules,
+    /// Rollouts.
+    #[serde(alias = "play")]
+    pub rollout: RolloutConfig,
+    /// PPO hyperparameters; the time unit of `gamma` is a frame.
+    pub ppo: PpoConfig,
 }
 
-impl Default for Reinforcement {
-    fn default() -> Reinforcement {
-        Reinforcement {
+impl Default for PpoTrainingConfig {
+    fn default() -> PpoTrainingConfig {
+        PpoTrainingConfig {
             seed: 1,
             iterations: 600,
-            play: PlayRules::default(),
-            ppo: PpoRules {
-                discount: 0.9995,
-                trace: 0.98,
-                entropy: 0.01,
-                epochs: 4,
-                batch: 512,
-                rate: 1e-3,
-                rate_falls: true,
-                divergence: 0.02,
-                ..PpoRules::default()
+            rollout: RolloutConfig::default(),
+            ppo: PpoConfig {
+                gamma: 0.9995,
+                gae_lambda: 0.98,
+                ent_coef: 0.01,
+                n_epochs: 4,
+                batch_size: 512,
+                learning_rate: 1e-3,
+                anneal_lr: true,
+                target_kl: 0.02,
+                ..PpoConfig::default()
             },
         }
     }
 }
 
-impl Method for Reinforcement {
+impl Algorithm for PpoTrainingConfig {
     const KIND: &'static str = "ppo";
     const BOUNDS: BoundTable = &[
         ("seed", SEED),
         ("iterations", STEPS),
-        ("play", Bound::Table(PLAY_BOUNDS)),
+        ("rollout", Bound::Table(ROLLOUT_BOUNDS)),
         ("ppo", Bound::Table(PPO_BOUNDS)),
     ];
 
-    fn course(&self) -> Course<'_> {
-        let Reinforcement { seed, iterations, play, .. } = self;
-        Course { seed: *seed, iterations: *iterations, play, shards: self.ppo.shards }
+    fn spec(&self) -> TrainingSpec<'_> {
+        let PpoTrainingConfig { seed, iterations, rollout, .. } = self;
+        TrainingSpec { seed: *seed, iterations: *iterations, rollout, shards: self.ppo.shards }
     }
 
-    fn learn(
+    fn iterate(
         &self,
-        sight: &dyn Sight,
-        learning: &mut Learning,
+        perception: &dyn PerceptionFactory,
+        state: &mut TrainState,
         stop: &AtomicBool,
-    ) -> Option<Figures> {
-        let ids = self.play.episodes_of(self.seed, learning.iterations);
-        let rollout = self.play.rollout(sight, Choosing::Sampled, stop);
-        let played = play_all(&ids, &learning.trained(), &rollout);
-        let played = played.expect("generated episodes can be played")?;
-        let tr = mean_tr(&played);
-        let frames = played.iter().map(|p| f64::from(p.frames)).sum();
-        let trajectories: Vec<_> = played.into_iter().map(|p| p.trajectory).collect();
+    ) -> Option<Metrics> {
+        let ids = self.rollout.sample_episodes(self.seed, state.iterations);
+        let context = self.rollout.context(perception, ActionSelection::Sample, stop);
+        let results = rollout_all(&ids, &state.policy_weights(), &context);
+        let results = results.expect("generated episodes can be played")?;
+        let tr = mean_tr(&results);
+        let frames = results.iter().map(|result| f64::from(result.frames)).sum();
+        let trajectories: Vec<_> = results.into_iter().map(|result| result.trajectory).collect();
         let decisions: usize = trajectories.iter().map(|t| t.transitions.len()).sum();
-        let rest = 1.0 - learning.iterations as f32 / self.iterations as f32;
-        let named = (self.seed, learning.iterations, rest);
-        let Learning { model, learner, .. } = learning;
-        let told = improve(&self.ppo, model, learner, &trajectories, named, stop)?;
-        if self.play.normalize {
-            let all = trajectories.iter().flat_map(|t| &t.transitions);
-            learning.normalize_by(all.map(|t| &t.decision));
+        let progress_remaining = 1.0 - state.iterations as f32 / self.iterations as f32;
+        let TrainState { model, learner, iterations, .. } = state;
+        let schedule = Schedule { seed: self.seed, iteration: *iterations, progress_remaining };
+        let stats = update(&self.ppo, model, learner, &trajectories, schedule, stop)?;
+        if self.rollout.normalize {
+            let transitions = trajectories.iter().flat_map(|t| &t.transitions);
+            state.update_normalizer(transitions.map(|t| &t.observation));
         }
-        let Told { objective, value_loss, entropy, divergence, clipped, explained_variance } = told;
-        Some(figures([
+        let PpoMetrics {
+            policy_loss,
+            value_loss,
+            entropy,
+            approx_kl,
+            clip_fraction,
+            explained_variance,
+        } = stats;
+        Some(metrics([
             ("tr", tr),
             ("frames", frames),
             ("decisions", decisions as f64),
-            ("objective", objective),
+            ("policy_loss", policy_loss),
             ("value_loss", value_loss),
             ("entropy", entropy),
-            ("divergence", divergence),
-            ("clipped", clipped),
+            ("approx_kl", approx_kl),
+            ("clip_fraction", clip_fraction),
             ("explained_variance", explained_variance),
         ]))
     }
 }
 
-/// Learning from a teacher.
+/// Configuration of `chaic train clone`: behavior cloning of an expert.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Cloning {
-    /// Of weights, episodes and batches.
+pub struct CloningConfig {
+    /// Seed of weights, episodes and batches.
     pub seed: u64,
-    /// Iterations in all.
+    /// Total number of iterations.
     pub iterations: u64,
-    /// What is played.
-    pub play: PlayRules,
-    /// Share of episodes that the learner drives while the teacher says what it would do.
-    pub mixed: f32,
-    /// How much less a reward counts that comes a frame later, for values.
-    pub discount: f32,
-    /// Lessons of each step.
-    pub batch: usize,
-    /// Highest rate of steps.
-    pub rate: f32,
-    /// Parts of a batch that are worked on side by side.
+    /// Rollouts.
+    #[serde(alias = "play")]
+    pub rollout: RolloutConfig,
+    /// Fraction of episodes that the learner drives while the expert labels its states (DAgger).
+    #[serde(alias = "mixed")]
+    pub learner_fraction: f32,
+    /// Discount factor per frame of the returns that the value head regresses.
+    #[serde(alias = "discount")]
+    pub gamma: f32,
+    /// Demonstrations per optimizer step.
+    #[serde(alias = "batch")]
+    pub batch_size: usize,
+    /// Maximum learning rate.
+    #[serde(alias = "rate")]
+    pub learning_rate: f32,
+    /// Shards of a batch, which run in parallel.
     pub shards: usize,
-    /// How steps are taken.
-    pub adam: AdamRules,
+    /// Optimizer.
+    pub adam: AdamWConfig,
 }
 
-impl Default for Cloning {
-    fn default() -> Cloning {
-        Cloning {
+impl Default for CloningConfig {
+    fn default() -> CloningConfig {
+        CloningConfig {
             seed: 1,
             iterations: 100,
-            play: PlayRules::default(),
-            mixed: 0.5,
-            discount: 0.9995,
-            batch: 64,
-            rate: 2e-3,
+            rollout: RolloutConfig::default(),
+            learner_fraction: 0.5,
+            gamma: 0.9995,
+            batch_size: 64,
+            learning_rate: 2e-3,
             shards: 2,
-            adam: AdamRules {
+            adam: AdamWConfig {
                 beta2: 0.999,
                 weight_decay: 0.0,
-                clip_norm: 1.0,
-                ..AdamRules::default()
+                max_grad_norm: 1.0,
+                ..AdamWConfig::default()
             },
         }
     }
 }
 
-impl Method for Cloning {
+impl Algorithm for CloningConfig {
     const KIND: &'static str = "clone";
     const BOUNDS: BoundTable = &[
         ("seed", SEED),
         ("iterations", STEPS),
-        ("play", Bound::Table(PLAY_BOUNDS)),
-        ("mixed", SHARE),
-        ("discount", SHARE),
-        ("batch", integer(1, MAX_BATCH)),
-        ("rate", RATE),
+        ("rollout", Bound::Table(ROLLOUT_BOUNDS)),
+        ("learner_fraction", FRACTION),
+        ("gamma", FRACTION),
+        ("batch_size", integer(1, MAX_BATCH)),
+        ("learning_rate", LEARNING_RATE),
         ("shards", SHARDS),
         ("adam", ADAM),
     ];
 
-    fn course(&self) -> Course<'_> {
-        let Cloning { seed, iterations, play, shards, .. } = self;
-        Course { seed: *seed, iterations: *iterations, play, shards: *shards }
+    fn spec(&self) -> TrainingSpec<'_> {
+        let CloningConfig { seed, iterations, rollout, shards, .. } = self;
+        TrainingSpec { seed: *seed, iterations: *iterations, rollout, shards: *shards }
     }
 
-    fn learn(
+    fn iterate(
         &self,
-        sight: &dyn Sight,
-        learning: &mut Learning,
+        perception: &dyn PerceptionFactory,
+        state: &mut TrainState,
         stop: &AtomicBool,
-    ) -> Option<Figures> {
-        let ids = self.play.episodes_of(self.seed, learning.iterations);
-        let rollout = self.play.rollout(sight, Choosing::Sampled, stop);
-        let trained = learning.trained();
-        let taught = |(id, seed): &(String, u32)| {
-            play_taught((id, *seed), &trained, &rollout, (self.mixed, self.discount))
+    ) -> Option<Metrics> {
+        let ids = self.rollout.sample_episodes(self.seed, state.iterations);
+        let context = self.rollout.context(perception, ActionSelection::Sample, stop);
+        let weights = state.policy_weights();
+        let rollout = |(id, seed): &(String, u32)| {
+            let (fraction, gamma) = (self.learner_fraction, self.gamma);
+            rollout_with_expert(id, *seed, &weights, &context, fraction, gamma)
         };
-        let taught: Result<Vec<_>, _> = ids.par_iter().map(taught).collect();
-        let taught = taught.expect("generated episodes can be played");
-        let taught: Vec<_> = taught.into_iter().collect::<Option<_>>()?;
-        let tr = taught.iter().map(|(_, tr)| tr).sum::<f64>() / taught.len().max(1) as f64;
-        let lessons: Vec<Lesson> = taught.into_iter().flat_map(|(lessons, _)| lessons).collect();
-        let rate = rate_at(learning.iterations, (self.rate, 1, self.iterations));
-        let how = (&self.adam, rate, self.batch);
-        let Learning { model, learner, iterations, .. } = learning;
-        let learned = imitate(how, model, learner, &lessons, (self.seed, *iterations), stop)?;
-        if self.play.normalize {
-            learning.normalize_by(lessons.iter().map(|l| &l.decision));
+        let labeled: Result<Vec<_>, _> = ids.par_iter().map(rollout).collect();
+        let labeled = labeled.expect("generated episodes can be played");
+        let labeled: Vec<_> = labeled.into_iter().collect::<Option<_>>()?;
+        let tr = labeled.iter().map(|(_, tr)| tr).sum::<f64>() / labeled.len().max(1) as f64;
+        let demonstrations: Vec<Demonstration> =
+            labeled.into_iter().flat_map(|(demonstrations, _)| demonstrations).collect();
+        let learning_rate =
+            learning_rate_at(state.iterations, self.learning_rate, 1, self.iterations);
+        let TrainState { model, learner, iterations, .. } = state;
+        let epoch = EpochConfig {
+            adam: &self.adam,
+            learning_rate,
+            batch_size: self.batch_size,
+            seed: self.seed,
+            iteration: *iterations,
+        };
+        let stats = train_epoch(&epoch, model, learner, &demonstrations, stop)?;
+        if self.rollout.normalize {
+            state.update_normalizer(demonstrations.iter().map(|d| &d.observation));
         }
-        let Learned { loss, agreement, value_loss } = learned;
-        Some(figures([
+        let CloningMetrics { loss, agreement, value_loss } = stats;
+        Some(metrics([
             ("tr", tr),
-            ("lessons", lessons.len() as f64),
+            ("demonstrations", demonstrations.len() as f64),
             ("loss", loss),
             ("agreement", agreement),
             ("value_loss", value_loss),

@@ -1,41 +1,41 @@
-//! Depthwise convolutions of stride 1: each channel by a square kernel of its own, with zeros around
-//! the map. Sums run over the kernel, row by row, in chains of fused multiply-adds.
+//! Depthwise convolutions of stride 1 with zero padding: each channel has its own square kernel.
+//! Sums are chains of fused multiply-adds over the kernel, row by row.
 
 use std::ops::Range;
 
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::tensor::Shape;
+use crate::tensor::{Shape, TensorView};
 
-/// Channels of depthwise convolutions are a multiple of this: whole vectors on every machine.
+/// Divisor of the number of channels: whole vectors on every machine.
 pub const CHANNEL_MULTIPLE: usize = 16;
 
-/// A row of zeros, for what lies above and below a map.
+/// Row of zeros, read above and below a map.
 #[derive(Clone, Debug, Default)]
 pub struct Zeros(Vec<f32>);
 
 impl Zeros {
-    fn of(&mut self, shape: Shape) -> &[f32] {
+    fn row(&mut self, shape: Shape) -> &[f32] {
         self.0.resize(shape.width * shape.channels, 0.0);
         &self.0
     }
 }
 
-/// Working space: one map with zeros around it.
+/// Buffer for one map with zero padding.
 #[derive(Clone, Debug, Default)]
 pub struct Padded(Vec<f32>);
 
 impl Padded {
     fn fill(&mut self, map: &[f32], shape: Shape, border: usize) -> &[f32] {
-        let row = (shape.width + 2 * border) * shape.channels;
-        self.0.resize((shape.height + 2 * border) * row, 0.0);
-        let (own, edge) = (shape.width * shape.channels, border * shape.channels);
-        for (k, to) in self.0.chunks_exact_mut(row).enumerate() {
+        let padded_row_len = (shape.width + 2 * border) * shape.channels;
+        self.0.resize((shape.height + 2 * border) * padded_row_len, 0.0);
+        let (row_len, edge) = (shape.width * shape.channels, border * shape.channels);
+        for (k, to) in self.0.chunks_exact_mut(padded_row_len).enumerate() {
             match k.checked_sub(border).filter(|y| *y < shape.height) {
                 Some(y) => {
                     to[..edge].fill(0.0);
-                    to[edge..][..own].copy_from_slice(&map[y * own..][..own]);
-                    to[edge + own..].fill(0.0);
+                    to[edge..][..row_len].copy_from_slice(&map[y * row_len..][..row_len]);
+                    to[edge + row_len..].fill(0.0);
                 }
                 None => to.fill(0.0),
             }
@@ -44,90 +44,100 @@ impl Padded {
     }
 }
 
-fn check(shape: Shape, weights: &[f32], side: usize) {
-    assert!(side == 3 || side == 5, "kernels are 3 or 5 wide, not {side}");
-    assert_eq!(weights.len(), side * side * shape.channels, "weights of another shape");
+fn check(shape: Shape, weights: &[f32], kernel_size: usize) {
+    assert!(kernel_size == 3 || kernel_size == 5, "kernel size {kernel_size} is neither 3 nor 5");
+    let n = kernel_size * kernel_size * shape.channels;
+    assert_eq!(weights.len(), n, "the weights have the wrong length");
     assert!(shape.channels.is_multiple_of(CHANNEL_MULTIPLE), "{} channels", shape.channels);
 }
 
-/// Convolves one map, shape [height, width, channels], with weights of shape [side, side, channels].
+/// Convolves one map with weights of shape [kernel size, kernel size, channels].
 ///
 /// # Panics
-/// If a slice has another length than its shape, or `side` is neither 3 nor 5.
+/// If a slice does not have the length of its shape, or the kernel size is neither 3 nor 5.
 pub fn forward(
     arch: Arch,
-    (map, shape): (&[f32], Shape),
-    weights: (&[f32], usize),
+    map: TensorView<'_>,
+    weights: &[f32],
+    kernel_size: usize,
     out: &mut [f32],
     zeros: &mut Zeros,
 ) {
-    forward_rows(arch, (map, shape), weights, (out, 0..shape.height), zeros);
+    forward_rows(arch, map, weights, kernel_size, out, 0..map.shape.height, zeros);
 }
 
-/// Some rows of what [`forward`] gives.
+/// Computes some rows of the output of [`forward`].
 ///
 /// # Panics
 /// As [`forward`].
 pub(crate) fn forward_rows(
     arch: Arch,
-    (map, shape): (&[f32], Shape),
-    (weights, side): (&[f32], usize),
-    (out, rows): (&mut [f32], Range<usize>),
+    map: TensorView<'_>,
+    weights: &[f32],
+    kernel_size: usize,
+    out: &mut [f32],
+    rows: Range<usize>,
     zeros: &mut Zeros,
 ) {
-    check(shape, weights, side);
-    assert_eq!(map.len(), shape.of_one());
+    let TensorView { data: map, shape } = map;
+    check(shape, weights, kernel_size);
+    assert_eq!(map.len(), shape.len_per_item());
     assert_eq!(out.len(), rows.len() * shape.width * shape.channels);
-    let zeros = zeros.of(shape);
-    arch.dispatch(Forward { map, shape, weights, side, out, rows, zeros, is_flipped: false });
+    let zeros = zeros.row(shape);
+    let is_flipped = false;
+    arch.dispatch(Forward { map, shape, weights, kernel_size, out, rows, zeros, is_flipped });
 }
 
-/// The gradient by the map of what [`forward`] gave, from that by its result.
+/// Writes the gradient of the input, given the gradient of the output.
 ///
 /// # Panics
 /// As [`forward`].
-pub fn backward_map(
+pub fn backward_input(
     arch: Arch,
-    (gradient, shape): (&[f32], Shape),
-    (weights, side): (&[f32], usize),
-    out: &mut [f32],
+    grad_output: TensorView<'_>,
+    weights: &[f32],
+    kernel_size: usize,
+    grad_input: &mut [f32],
     zeros: &mut Zeros,
 ) {
-    check(shape, weights, side);
-    assert_eq!((gradient.len(), out.len()), (shape.of_one(), shape.of_one()));
-    let (map, rows, zeros) = (gradient, 0..shape.height, zeros.of(shape));
-    arch.dispatch(Forward { map, shape, weights, side, out, rows, zeros, is_flipped: true });
+    let TensorView { data: map, shape } = grad_output;
+    check(shape, weights, kernel_size);
+    assert_eq!((map.len(), grad_input.len()), (shape.len_per_item(), shape.len_per_item()));
+    let (out, rows, zeros) = (grad_input, 0..shape.height, zeros.row(shape));
+    let is_flipped = true;
+    arch.dispatch(Forward { map, shape, weights, kernel_size, out, rows, zeros, is_flipped });
 }
 
-/// Adds the gradient by the weights, from the map and the gradient by the result.
+/// Adds the gradient of the weights, given the input and the gradient of the output.
 ///
 /// # Panics
 /// As [`forward`].
 pub fn backward_weights(
     arch: Arch,
-    map: &[f32],
-    gradient: &[f32],
-    shape: Shape,
-    (out, side): (&mut [f32], usize),
+    input: TensorView<'_>,
+    grad_output: &[f32],
+    grad_weights: &mut [f32],
+    kernel_size: usize,
     padded: &mut Padded,
 ) {
-    check(shape, out, side);
-    assert_eq!((map.len(), gradient.len()), (shape.of_one(), shape.of_one()));
-    let map = padded.fill(map, shape, side / 2);
-    arch.dispatch(BackwardWeights { map, gradient, shape, out, side });
+    let TensorView { data: map, shape } = input;
+    check(shape, grad_weights, kernel_size);
+    assert_eq!((map.len(), grad_output.len()), (shape.len_per_item(), shape.len_per_item()));
+    let map = padded.fill(map, shape, kernel_size / 2);
+    arch.dispatch(BackwardWeights { map, grad_output, shape, grad_weights, kernel_size });
 }
 
 struct Forward<'a> {
     map: &'a [f32],
     shape: Shape,
     weights: &'a [f32],
-    side: usize,
+    kernel_size: usize,
     out: &'a mut [f32],
-    /// Of the result, those that `out` has.
+    /// Output rows that `out` holds.
     rows: Range<usize>,
     /// One row.
     zeros: &'a [f32],
-    /// Whether the kernel is turned by half a circle.
+    /// True if the kernel is rotated by 180 degrees, as in the backward pass.
     is_flipped: bool,
 }
 
@@ -136,7 +146,7 @@ impl WithSimd for Forward<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        match self.side {
+        match self.kernel_size {
             3 => self.run::<S, 3>(simd),
             _ => self.run::<S, 5>(simd),
         }
@@ -145,7 +155,7 @@ impl WithSimd for Forward<'_> {
 
 impl Forward<'_> {
     #[inline(always)]
-    fn run<S: Simd, const SIDE: usize>(self, simd: S) {
+    fn run<S: Simd, const SIZE: usize>(self, simd: S) {
         let Forward { map, shape, weights, out, rows, zeros, is_flipped, .. } = self;
         let Shape { height, width, channels, .. } = shape;
         let (weights, _) = S::as_simd_f32s(weights);
@@ -153,26 +163,26 @@ impl Forward<'_> {
         let (zeros, _) = S::as_simd_f32s(zeros);
         let (out, _) = S::as_mut_simd_f32s(out);
         let vectors = channels / S::F32_LANES;
-        let (row, border) = (width * vectors, SIDE / 2);
+        let (row, border) = (width * vectors, SIZE / 2);
         for (y, out) in rows.zip(out.chunks_exact_mut(row)) {
             for v in 0..vectors {
-                let mut kernel = [[simd.splat_f32s(0.0); SIDE]; SIDE];
+                let mut kernel = [[simd.splat_f32s(0.0); SIZE]; SIZE];
                 for (i, kernel) in kernel.as_flattened_mut().iter_mut().enumerate() {
-                    let tap = if is_flipped { SIDE * SIDE - 1 - i } else { i };
+                    let tap = if is_flipped { SIZE * SIZE - 1 - i } else { i };
                     *kernel = weights[tap * vectors + v];
                 }
-                let rows: [&[S::f32s]; SIDE] = std::array::from_fn(|dy| {
+                let rows: [&[S::f32s]; SIZE] = std::array::from_fn(|dy| {
                     match (y + dy).checked_sub(border).filter(|y| *y < height) {
                         Some(y) => &map[y * row + v..][..row - v],
                         None => &zeros[v..],
                     }
                 });
-                // Where the kernel lies on the map from left to right.
+                // Output columns at which the kernel lies inside the map.
                 let inner = border.min(width)..width.saturating_sub(border).max(border.min(width));
                 for x in inner.clone() {
                     let mut sum = simd.splat_f32s(0.0);
-                    for dy in 0..SIDE {
-                        for dx in 0..SIDE {
+                    for dy in 0..SIZE {
+                        for dx in 0..SIZE {
                             let at = rows[dy][(x + dx - border) * vectors];
                             sum = simd.mul_add_f32s(at, kernel[dy][dx], sum);
                         }
@@ -181,8 +191,8 @@ impl Forward<'_> {
                 }
                 for x in (0..inner.start).chain(inner.end..width) {
                     let mut sum = simd.splat_f32s(0.0);
-                    for dy in 0..SIDE {
-                        for dx in border.saturating_sub(x)..SIDE.min(width + border - x) {
+                    for dy in 0..SIZE {
+                        for dx in border.saturating_sub(x)..SIZE.min(width + border - x) {
                             let at = rows[dy][(x + dx - border) * vectors];
                             sum = simd.mul_add_f32s(at, kernel[dy][dx], sum);
                         }
@@ -195,12 +205,12 @@ impl Forward<'_> {
 }
 
 struct BackwardWeights<'a> {
-    /// With zeros around it.
+    /// Input with zero padding.
     map: &'a [f32],
-    gradient: &'a [f32],
+    grad_output: &'a [f32],
     shape: Shape,
-    out: &'a mut [f32],
-    side: usize,
+    grad_weights: &'a mut [f32],
+    kernel_size: usize,
 }
 
 impl WithSimd for BackwardWeights<'_> {
@@ -208,7 +218,7 @@ impl WithSimd for BackwardWeights<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        match self.side {
+        match self.kernel_size {
             3 => self.run::<S, 3>(simd),
             _ => self.run::<S, 5>(simd),
         }
@@ -217,22 +227,23 @@ impl WithSimd for BackwardWeights<'_> {
 
 impl BackwardWeights<'_> {
     #[inline(always)]
-    fn run<S: Simd, const SIDE: usize>(self, simd: S) {
-        let BackwardWeights { map, gradient, shape: Shape { width, channels, .. }, out, .. } = self;
-        let (out, _) = S::as_mut_simd_f32s(out);
+    fn run<S: Simd, const SIZE: usize>(self, simd: S) {
+        let BackwardWeights { map, grad_output, shape, grad_weights, .. } = self;
+        let Shape { width, channels, .. } = shape;
+        let (out, _) = S::as_mut_simd_f32s(grad_weights);
         let (map, _) = S::as_simd_f32s(map);
-        let (gradient, _) = S::as_simd_f32s(gradient);
+        let (grad_output, _) = S::as_simd_f32s(grad_output);
         let vectors = channels / S::F32_LANES;
-        let row = (width + SIDE - 1) * vectors;
-        for (y, gradient) in gradient.chunks_exact(width * vectors).enumerate() {
-            for dy in 0..SIDE {
+        let row = (width + SIZE - 1) * vectors;
+        for (y, grad_row) in grad_output.chunks_exact(width * vectors).enumerate() {
+            for dy in 0..SIZE {
                 let map = &map[(y + dy) * row..][..row];
                 for v in 0..vectors {
-                    let taps = dy * SIDE * vectors + v;
-                    let mut sums: [S::f32s; SIDE] =
+                    let taps = dy * SIZE * vectors + v;
+                    let mut sums: [S::f32s; SIZE] =
                         std::array::from_fn(|dx| out[taps + dx * vectors]);
                     for x in 0..width {
-                        let g = gradient[x * vectors + v];
+                        let g = grad_row[x * vectors + v];
                         for (dx, sum) in sums.iter_mut().enumerate() {
                             *sum = simd.mul_add_f32s(map[(x + dx) * vectors + v], g, *sum);
                         }

@@ -1,38 +1,37 @@
-//! Matrix products, the same bits on any machine: each number of the result is a chain of fused
-//! multiply-adds in the order of the inner dimension, whatever the vectors' width and the blocks.
+//! Matrix products with equal bits on any machine. Each output element is a chain of fused
+//! multiply-adds in order of the inner dimension, for any vector width and block size.
 
 use std::ops::Range;
 
 use pulp::{Arch, Simd, WithSimd};
 
-/// Columns of the left matrix that are packed at once, so that a panel of the right one stays in the
-/// first-level cache.
+/// Columns of the left matrix per block, so that a panel of the right matrix stays in the L1 cache.
 const INNER_BLOCK: usize = 192;
-/// Rows of the left matrix that are packed at once.
+/// Rows of the left matrix that are packed together.
 const ROW_BLOCK: usize = 64;
 
-/// A matrix in a slice: element (i, j) is `data[i * row_stride + j * column_stride]`.
+/// Strided view of a matrix: element (i, j) is `data[i * row_stride + j * column_stride]`.
 #[derive(Clone, Copy, Debug)]
 pub struct Matrix<'a> {
-    /// Its numbers, others between them perhaps.
+    /// Elements; strides may skip some.
     pub data: &'a [f32],
-    /// How many rows.
+    /// Number of rows.
     pub rows: usize,
-    /// How many columns.
+    /// Number of columns.
     pub columns: usize,
-    /// From a row to the next.
+    /// Distance between rows, elements.
     pub row_stride: usize,
-    /// From a column to the next.
+    /// Distance between columns, elements.
     pub column_stride: usize,
 }
 
 impl<'a> Matrix<'a> {
-    /// Row by row, shape [rows, columns].
+    /// Creates a view of a row-major matrix, shape [rows, columns].
     pub fn row_major(data: &'a [f32], rows: usize, columns: usize) -> Matrix<'a> {
         Matrix { data, rows, columns, row_stride: columns, column_stride: 1 }
     }
 
-    /// With rows for columns.
+    /// Returns the transposed view.
     pub fn transposed(self) -> Matrix<'a> {
         Matrix {
             rows: self.columns,
@@ -48,45 +47,50 @@ impl<'a> Matrix<'a> {
     }
 }
 
-/// What the sums of a product begin with.
+/// Initial value of the accumulators.
 #[derive(Clone, Copy, Debug)]
-pub enum Begin<'a> {
-    /// What the result holds already.
-    Result,
+pub enum Accumulate<'a> {
+    /// Current content of the output.
+    Output,
     /// Zero.
     Zero,
-    /// A number for each column.
+    /// One value per column (bias).
     Row(&'a [f32]),
 }
 
-/// A right matrix in the order in which products read it: blocks of rows; in each, panels of columns, as
-/// wide as a few vectors of one machine; shape [blocks, panels, rows of the block, columns of a panel],
-/// with zeros beyond the last column.
+/// Right matrix in the order in which products read it: blocks of rows, each divided into panels of
+/// columns. Shape [blocks, panels, rows of the block, columns of a panel], with zeros beyond the
+/// last column. The panel width depends on the machine's vectors.
 #[derive(Clone, Debug, Default)]
-pub struct Panels {
+pub struct PackedMatrix {
     columns: usize,
     width: usize,
-    /// The rows of each block.
+    /// Row ranges of the blocks.
     blocks: Vec<Range<usize>>,
     data: Vec<f32>,
 }
 
-impl Panels {
-    /// Takes in a matrix, whose rows come in runs of so many: a block has whole runs, or a part of one.
+impl PackedMatrix {
+    /// Packs a matrix. Its rows form groups of `group_len`; a block holds whole groups or a part of
+    /// one.
     ///
     /// # Panics
-    /// If the rows are no multiple of a run.
-    pub fn pack(&mut self, arch: Arch, right: Matrix<'_>, run: usize) {
-        assert!(run > 0 && right.rows.is_multiple_of(run), "{} rows in runs of {run}", right.rows);
-        arch.dispatch(Pack { panels: self, right, run });
+    /// If the number of rows is not a multiple of `group_len`.
+    pub fn pack(&mut self, arch: Arch, right: Matrix<'_>, group_len: usize) {
+        assert!(
+            group_len > 0 && right.rows.is_multiple_of(group_len),
+            "{} rows in groups of {group_len}",
+            right.rows
+        );
+        arch.dispatch(Pack { panels: self, right, group_len });
     }
 
-    /// Columns of the matrix.
+    /// Returns the number of columns of the matrix.
     pub fn columns(&self) -> usize {
         self.columns
     }
 
-    /// The rows of each block, and its panels one after the other.
+    /// Returns the row range of each block with its panels.
     pub(crate) fn blocks(&self) -> impl Iterator<Item = (Range<usize>, &[f32])> {
         let row = self.columns.next_multiple_of(self.width.max(1));
         self.blocks
@@ -94,16 +98,16 @@ impl Panels {
             .map(move |rows| (rows.clone(), &self.data[rows.start * row..rows.end * row]))
     }
 
-    /// How many columns a panel has.
+    /// Returns the number of columns of a panel.
     pub(crate) fn width(&self) -> usize {
         self.width
     }
 }
 
 struct Pack<'a> {
-    panels: &'a mut Panels,
+    panels: &'a mut PackedMatrix,
     right: Matrix<'a>,
-    run: usize,
+    group_len: usize,
 }
 
 impl WithSimd for Pack<'_> {
@@ -111,69 +115,73 @@ impl WithSimd for Pack<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let Pack { panels: Panels { columns, width, blocks, data }, right, run } = self;
+        let Pack { panels: PackedMatrix { columns, width, blocks, data }, right, group_len } = self;
         *columns = right.columns;
         *width = panel_vectors(S::F32_LANES, right.columns) * S::F32_LANES;
         let row = right.columns.next_multiple_of(*width);
         data.resize(right.rows * row, 0.0);
         blocks.clear();
-        blocks.extend(in_blocks(right.rows, run));
+        blocks.extend(split_in_blocks(right.rows, group_len));
         for block in blocks.iter() {
             let packed = &mut data[block.start * row..block.end * row];
-            pack_right(packed, right, (block.start, block.len()), *width);
+            pack_right(packed, right, block.clone(), *width);
         }
     }
 }
 
-/// Rows in blocks: some whole runs each, or even parts of one.
-fn in_blocks(rows: usize, run: usize) -> impl Iterator<Item = Range<usize>> {
-    let whole = run * (INNER_BLOCK / run).max(1);
-    let step = if whole > INNER_BLOCK { run.div_ceil(run.div_ceil(INNER_BLOCK)) } else { whole };
-    (0..rows).step_by(whole).flat_map(move |start| {
-        let end = rows.min(start + whole);
+/// Splits rows into blocks of whole groups, or of equal parts of one group.
+fn split_in_blocks(rows: usize, group_len: usize) -> impl Iterator<Item = Range<usize>> {
+    let block = group_len * (INNER_BLOCK / group_len).max(1);
+    let step = if block > INNER_BLOCK {
+        group_len.div_ceil(group_len.div_ceil(INNER_BLOCK))
+    } else {
+        block
+    };
+    (0..rows).step_by(block).flat_map(move |start| {
+        let end = rows.min(start + block);
         (start..end).step_by(step).map(move |from| from..end.min(from + step))
     })
 }
 
-/// How many vectors wide panels are: as many as leave registers for a row of the panel and a number of
-/// the left matrix beside the sums.
+/// Returns the number of vectors in a row of a panel. It leaves registers for one panel row and one
+/// left element beside the accumulators.
 #[inline(always)]
 fn panel_vectors(lanes: usize, columns: usize) -> usize {
     let padded = |vectors: usize| columns.next_multiple_of(vectors * lanes);
     match lanes {
-        // Panels of two vectors where those of three would be empty for a good part.
+        // Panels of two vectors if a large part of panels of three would be padding.
         16.. if 9 * padded(2) <= 8 * padded(3) => 2,
         _ => 3,
     }
 }
 
-/// What can be done in tiles of so many rows and vectors.
-pub(crate) trait Tiled {
+/// Operation on tiles of `ROWS` rows and `VECTORS` vectors.
+pub(crate) trait TileKernel {
     fn run<S: Simd, const ROWS: usize, const VECTORS: usize>(self, simd: S);
 }
 
-/// Runs tiles of the size that this machine and these panels ask for.
+/// Runs an operation with the tile size for this machine and these panels.
 #[inline(always)]
-pub(crate) fn in_tiles<S: Simd>(simd: S, panels: &Panels, work: impl Tiled) {
+pub(crate) fn run_in_tiles<S: Simd>(simd: S, panels: &PackedMatrix, kernel: impl TileKernel) {
     match S::F32_LANES {
-        16.. if panels.width == 2 * S::F32_LANES => work.run::<S, 8, 2>(simd),
-        16.. => work.run::<S, 8, 3>(simd),
-        _ => work.run::<S, 4, 3>(simd),
+        16.. if panels.width == 2 * S::F32_LANES => kernel.run::<S, 8, 2>(simd),
+        16.. => kernel.run::<S, 8, 3>(simd),
+        _ => kernel.run::<S, 4, 3>(simd),
     }
 }
 
-/// Working space of products, kept so that they allocate nothing.
+/// Reusable buffers of matrix products.
 #[derive(Clone, Debug, Default)]
 pub struct Workspace {
     left: Vec<f32>,
-    right: Panels,
+    right: PackedMatrix,
 }
 
-/// Adds `left` times `right` to `out`, which is row by row, shape [left.rows, right.columns].
+/// Computes `out += left * right`; `out` is row-major, shape [left.rows, right.columns].
 ///
 /// # Panics
-/// If the shapes don't fit, or a slice is too short for its shape.
-pub fn add_product(
+/// If the shapes do not match, or a slice is too short for its shape.
+pub fn gemm(
     arch: Arch,
     out: &mut [f32],
     left: Matrix<'_>,
@@ -181,7 +189,7 @@ pub fn add_product(
     workspace: &mut Workspace,
 ) {
     assert_eq!(left.columns, right.rows, "inner dimensions differ");
-    assert_eq!(out.len(), left.rows * right.columns, "the result has another shape");
+    assert_eq!(out.len(), left.rows * right.columns, "the output has the wrong length");
     if out.is_empty() || left.columns == 0 {
         return;
     }
@@ -193,7 +201,7 @@ pub fn add_product(
 struct Product<'a> {
     out: &'a mut [f32],
     left: Matrix<'a>,
-    panels: &'a Panels,
+    panels: &'a PackedMatrix,
     packed: &'a mut Vec<f32>,
 }
 
@@ -202,40 +210,41 @@ impl WithSimd for Product<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        in_tiles(simd, self.panels, self);
+        run_in_tiles(simd, self.panels, self);
     }
 }
 
-impl Tiled for Product<'_> {
+impl TileKernel for Product<'_> {
     #[inline(always)]
     fn run<S: Simd, const ROWS: usize, const VECTORS: usize>(self, simd: S) {
         let Product { out, left, panels, packed } = self;
         let n = panels.columns;
         for (inner, block) in panels.blocks() {
-            let (inner, depth) = (inner.start, inner.len());
+            let depth = inner.len();
             for top in (0..left.rows).step_by(ROW_BLOCK) {
                 let height = ROW_BLOCK.min(left.rows - top);
                 if left.column_stride != 1 {
-                    pack_left::<ROWS>(packed, left, (top, height), (inner, depth));
+                    pack_left::<ROWS>(packed, left, top..top + height, inner.clone());
                 }
                 let out = &mut out[top * n..][..height * n];
                 for (k, right) in block.chunks_exact(depth * panels.width).enumerate() {
                     for (t, out) in out.chunks_mut(ROWS * n).enumerate() {
-                        let place = (k * panels.width, n);
-                        let mut sums = begin::<S, ROWS, VECTORS>(simd, Begin::Result, out, place);
+                        let column = k * panels.width;
+                        let mut sums =
+                            load_tile::<S, ROWS, VECTORS>(simd, Accumulate::Output, out, column, n);
                         if left.column_stride == 1 {
                             let mut rows: [&[f32]; ROWS] = [&[]; ROWS];
                             for (i, to) in rows.iter_mut().enumerate() {
                                 let row = (top + t * ROWS + i).min(left.rows - 1);
-                                *to = &left.data[row * left.row_stride + inner..][..depth];
+                                *to = &left.data[row * left.row_stride + inner.start..][..depth];
                             }
-                            sums = add::<S, ROWS, VECTORS>(simd, sums, Rows(rows), right);
+                            sums = multiply_add::<S, ROWS, VECTORS>(simd, sums, Rows(rows), right);
                         } else {
                             let packed = &packed[t * depth * ROWS..][..depth * ROWS];
                             let packed = Packed(packed.as_chunks::<ROWS>().0);
-                            sums = add::<S, ROWS, VECTORS>(simd, sums, packed, right);
+                            sums = multiply_add::<S, ROWS, VECTORS>(simd, sums, packed, right);
                         }
-                        end::<S, ROWS, VECTORS>(simd, sums, out, place);
+                        store_tile::<S, ROWS, VECTORS>(simd, sums, out, column, n);
                     }
                 }
             }
@@ -243,12 +252,12 @@ impl Tiled for Product<'_> {
     }
 }
 
-/// So many rows of the left matrix, column by column.
+/// Tile of the left matrix, read column by column.
 pub(crate) trait Left<const ROWS: usize> {
     fn at(&self, k: usize) -> [f32; ROWS];
 }
 
-/// Rows where they are.
+/// Rows at their original place.
 pub(crate) struct Rows<'a, const ROWS: usize>(pub [&'a [f32]; ROWS]);
 
 impl<const ROWS: usize> Left<ROWS> for Rows<'_, ROWS> {
@@ -272,56 +281,57 @@ impl<const ROWS: usize> Left<ROWS> for Packed<'_, ROWS> {
     }
 }
 
-/// Packs `depth` columns of so many rows, tile by tile of `ROWS`: shape [tiles, depth, ROWS], with
+/// Packs a block of the left matrix in tiles of `ROWS` rows: shape [tiles, columns, ROWS], with
 /// zeros beyond the last row.
 #[inline(always)]
 fn pack_left<const ROWS: usize>(
     packed: &mut Vec<f32>,
     left: Matrix<'_>,
-    (top, height): (usize, usize),
-    (inner, depth): (usize, usize),
+    rows: Range<usize>,
+    columns: Range<usize>,
 ) {
-    packed.resize(height.div_ceil(ROWS) * depth * ROWS, 0.0);
+    let depth = columns.len();
+    packed.resize(rows.len().div_ceil(ROWS) * depth * ROWS, 0.0);
     for (tile, packed) in packed.chunks_exact_mut(depth * ROWS).enumerate() {
-        let first = top + tile * ROWS;
-        let n_rows = ROWS.min(top + height - first);
+        let first = rows.start + tile * ROWS;
+        let n_rows = ROWS.min(rows.end - first);
         if n_rows < ROWS {
             packed.fill(0.0);
         }
         if left.column_stride == 1 {
             for i in 0..n_rows {
-                let row = &left.data[(first + i) * left.row_stride + inner..][..depth];
+                let row = &left.data[(first + i) * left.row_stride + columns.start..][..depth];
                 for (packed, x) in packed.as_chunks_mut::<ROWS>().0.iter_mut().zip(row) {
                     packed[i] = *x;
                 }
             }
         } else if left.row_stride == 1 && n_rows == ROWS {
             for (k, packed) in packed.as_chunks_mut::<ROWS>().0.iter_mut().enumerate() {
-                let column = &left.data[(inner + k) * left.column_stride + first..];
+                let column = &left.data[(columns.start + k) * left.column_stride + first..];
                 packed.copy_from_slice(&column[..ROWS]);
             }
         } else {
             for (k, packed) in packed.as_chunks_mut::<ROWS>().0.iter_mut().enumerate() {
                 for (i, packed) in packed.iter_mut().take(n_rows).enumerate() {
-                    *packed = left.at(first + i, inner + k);
+                    *packed = left.at(first + i, columns.start + k);
                 }
             }
         }
     }
 }
 
-/// Packs `depth` rows, panel by panel of so many columns: shape [panels, depth, panel], with zeros
-/// beyond the last column.
+/// Packs rows of the right matrix in panels: shape [panels, rows, panel columns], with zeros beyond
+/// the last column.
 #[inline(always)]
-fn pack_right(packed: &mut [f32], right: Matrix<'_>, (inner, depth): (usize, usize), panel: usize) {
-    for (k, packed) in packed.chunks_exact_mut(depth * panel).enumerate() {
+fn pack_right(packed: &mut [f32], right: Matrix<'_>, rows: Range<usize>, panel: usize) {
+    for (k, packed) in packed.chunks_exact_mut(rows.len() * panel).enumerate() {
         let first = k * panel;
         let width = panel.min(right.columns - first);
         if width < panel {
             packed.fill(0.0);
         }
         for (i, packed) in packed.chunks_exact_mut(panel).enumerate() {
-            let at = (inner + i) * right.row_stride + first * right.column_stride;
+            let at = (rows.start + i) * right.row_stride + first * right.column_stride;
             if right.column_stride == 1 {
                 packed[..width].copy_from_slice(&right.data[at..][..width]);
             } else {
@@ -332,21 +342,22 @@ fn pack_right(packed: &mut [f32], right: Matrix<'_>, (inner, depth): (usize, usi
     }
 }
 
-/// The sums of a tile as they begin. `out` has its rows, of `n` numbers each, fewer than `ROWS` at the
-/// end of a matrix; the tile begins at a column.
+/// Loads the accumulators of a tile that starts at a column. `out` holds its rows of `n` elements
+/// each, at most `ROWS`.
 #[inline(always)]
-pub(crate) fn begin<S: Simd, const ROWS: usize, const VECTORS: usize>(
+pub(crate) fn load_tile<S: Simd, const ROWS: usize, const VECTORS: usize>(
     simd: S,
-    begin: Begin<'_>,
+    init: Accumulate<'_>,
     out: &[f32],
-    (column, n): (usize, usize),
+    column: usize,
+    n: usize,
 ) -> [[S::f32s; VECTORS]; ROWS] {
     let width = (VECTORS * S::F32_LANES).min(n - column);
     let mut sums = [[simd.splat_f32s(0.0); VECTORS]; ROWS];
-    match begin {
-        Begin::Zero => {}
-        Begin::Row(row) => sums = [load::<S, VECTORS>(simd, &row[column..][..width]); ROWS],
-        Begin::Result => {
+    match init {
+        Accumulate::Zero => {}
+        Accumulate::Row(row) => sums = [load::<S, VECTORS>(simd, &row[column..][..width]); ROWS],
+        Accumulate::Output => {
             for (i, sums) in sums.iter_mut().enumerate() {
                 if let Some(row) = out.get(i * n + column..i * n + column + width) {
                     *sums = load::<S, VECTORS>(simd, row);
@@ -357,7 +368,7 @@ pub(crate) fn begin<S: Simd, const ROWS: usize, const VECTORS: usize>(
     sums
 }
 
-/// Vectors of these numbers, with zeros beyond the last.
+/// Loads vectors from a slice, with zeros beyond its end.
 #[inline(always)]
 fn load<S: Simd, const VECTORS: usize>(simd: S, row: &[f32]) -> [S::f32s; VECTORS] {
     let mut sums = [simd.splat_f32s(0.0); VECTORS];
@@ -372,10 +383,10 @@ fn load<S: Simd, const VECTORS: usize>(simd: S, row: &[f32]) -> [S::f32s; VECTOR
     sums
 }
 
-/// The sums of a tile with the product of some rows and a panel, which has as many rows as those have
-/// columns. By value, so that they stay in registers.
+/// Adds the product of a left tile and a panel to the accumulators. They are passed by value, so
+/// that they stay in registers.
 #[inline(always)]
-pub(crate) fn add<S: Simd, const ROWS: usize, const VECTORS: usize>(
+pub(crate) fn multiply_add<S: Simd, const ROWS: usize, const VECTORS: usize>(
     simd: S,
     mut sums: [[S::f32s; VECTORS]; ROWS],
     left: impl Left<ROWS>,
@@ -394,13 +405,14 @@ pub(crate) fn add<S: Simd, const ROWS: usize, const VECTORS: usize>(
     sums
 }
 
-/// Writes the sums of a tile to where [`begin`] took them from.
+/// Stores the accumulators of a tile; the counterpart of [`load_tile`].
 #[inline(always)]
-pub(crate) fn end<S: Simd, const ROWS: usize, const VECTORS: usize>(
+pub(crate) fn store_tile<S: Simd, const ROWS: usize, const VECTORS: usize>(
     simd: S,
     sums: [[S::f32s; VECTORS]; ROWS],
     out: &mut [f32],
-    (column, n): (usize, usize),
+    column: usize,
+    n: usize,
 ) {
     let width = (VECTORS * S::F32_LANES).min(n - column);
     for (i, sums) in sums.iter().enumerate() {
@@ -422,10 +434,10 @@ pub(crate) fn end<S: Simd, const ROWS: usize, const VECTORS: usize>(
 mod tests {
     use super::*;
     use crate::simd::widths;
-    use chaic_core::rng::Stream;
+    use chaic_core::rng::RngStream;
 
-    /// The definition.
-    fn by_hand(out: &mut [f32], left: Matrix<'_>, right: Matrix<'_>) {
+    /// Reference implementation.
+    fn reference(out: &mut [f32], left: Matrix<'_>, right: Matrix<'_>) {
         for (i, row) in out.chunks_exact_mut(right.columns).enumerate() {
             for (j, sum) in row.iter_mut().enumerate() {
                 for k in 0..left.columns {
@@ -436,22 +448,22 @@ mod tests {
     }
 
     #[test]
-    fn products_are_the_same_bits_as_by_hand_at_every_width_and_layout() {
-        let mut rng = Stream::new(1, "gemm", 0);
+    fn products_are_bit_identical_to_the_reference_at_every_width_and_layout() {
+        let mut rng = RngStream::new(1, "gemm", 0);
         let sizes =
             [(1, 1, 1), (13, 7, 33), (96, 193, 32), (100, 400, 50), (5, 25, 224), (31, 3, 1)];
         for (m, k, n) in sizes {
-            let mut numbers =
+            let mut random =
                 |n: usize| -> Vec<f32> { (0..n).map(|_| rng.range(-1.0, 1.0)).collect() };
-            let (a, b, c) = (numbers(m * k), numbers(k * n), numbers(m * n));
+            let (a, b, c) = (random(m * k), random(k * n), random(m * n));
             let lefts = [Matrix::row_major(&a, m, k), Matrix::row_major(&a, k, m).transposed()];
             let rights = [Matrix::row_major(&b, k, n), Matrix::row_major(&b, n, k).transposed()];
             for (left, right) in lefts.into_iter().flat_map(|l| rights.map(|r| (l, r))) {
                 let mut expected = c.clone();
-                by_hand(&mut expected, left, right);
+                reference(&mut expected, left, right);
                 for (name, arch) in widths() {
                     let mut out = c.clone();
-                    add_product(arch, &mut out, left, right, &mut Workspace::default());
+                    gemm(arch, &mut out, left, right, &mut Workspace::default());
                     assert!(out == expected, "{m} x {k} x {n}, {name}");
                 }
             }

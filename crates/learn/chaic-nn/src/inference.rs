@@ -1,186 +1,180 @@
-//! Forward passes for who learns nothing: only what later layers look at from elsewhere is kept, all
-//! else is made strip by strip in the second-level cache. The same bits as [`Pass`] makes.
-//!
-//! [`Pass`]: crate::Pass
+//! Forward passes for inference. Only outputs that later layers read at other pixels are kept. All
+//! others are computed in strips that fit into the L2 cache. Results are bit-identical to those of
+//! [`Pass`](crate::Pass).
 
 use std::ops::Range;
 
 use pulp::Arch;
 
-use crate::conv::{self, Kernel, STRIP_PIXELS};
+use crate::conv::{self, ForwardRows, Kernel, STRIP_PIXELS};
 use crate::depthwise::{self, Zeros};
 use crate::elementwise::{Relu, Sum, upsample};
-use crate::gemm::Panels;
+use crate::gemm::PackedMatrix;
 use crate::network::{Layer, Network, Node};
 use crate::norm;
-use crate::tensor::{Shape, Tensor};
+use crate::tensor::{Shape, Tensor, TensorView};
 
-/// One forward pass after the other over one map each.
+/// Runs a network on one map after another.
 #[derive(Clone, Debug)]
 pub struct Inference {
     arch: Arch,
     network: Network,
-    numbers: Vec<f32>,
-    /// The weights of dense convolutions, of which other layers have none.
-    weights: Vec<Panels>,
+    parameters: Vec<f32>,
+    /// Packed weights of dense convolutions; empty for other layers.
+    weights: Vec<PackedMatrix>,
     segments: Vec<Range<usize>>,
-    /// Whether the whole of what a layer makes is kept.
+    /// True for layers whose complete output is kept.
     is_kept: Vec<bool>,
-    /// What layers make: all of it, or the present strip.
-    made: Vec<Tensor>,
+    /// Outputs of the layers: complete, or the current strip.
+    activations: Vec<Tensor>,
     edges: Vec<f32>,
     zeros: Zeros,
 }
 
 impl Inference {
-    /// Of a network with these numbers.
+    /// Creates an inference engine for a network with these parameters.
     ///
     /// # Panics
-    /// If the network joins maps or their pixels (that takes a [`Pass`](crate::Pass)), or has another
-    /// count of numbers.
-    pub fn new(network: &Network, numbers: &[f32], arch: Arch) -> Inference {
-        let joins = network
+    /// If the network concatenates or reshapes maps, which only a [`Pass`](crate::Pass) supports,
+    /// or the number of parameters differs.
+    pub fn new(network: &Network, parameters: &[f32], arch: Arch) -> Inference {
+        let has_unsupported = network
             .layers
             .iter()
-            .any(|layer| matches!(layer, Layer::Join { .. } | Layer::Concat { .. }));
-        assert!(!joins, "maps are joined by passes only");
-        assert_eq!(numbers.len(), network.n_numbers(), "numbers of another network");
+            .any(|layer| matches!(layer, Layer::Reshape { .. } | Layer::Concat { .. }));
+        assert!(!has_unsupported, "inference does not support reshapes and concatenations");
+        assert_eq!(parameters.len(), network.n_parameters(), "wrong number of parameters");
         let (segments, is_kept) = segments(network);
-        let mut packed = vec![Panels::default(); network.layers.len()];
+        let mut packed = vec![PackedMatrix::default(); network.layers.len()];
         for (layer, packed) in network.layers.iter().zip(&mut packed) {
-            if let Layer::Conv { from, weights, kernel, channels, .. } = *layer {
-                let weights = &numbers[network.parameters()[weights].range.clone()];
-                conv::pack(arch, (weights, kernel), (network.channels_of(from), channels), packed);
+            if let Layer::Conv { from, weights, kernel, .. } = *layer {
+                let weights = &parameters[network.parameters()[weights].range.clone()];
+                conv::pack(arch, weights, kernel, network.channels_of(from), packed);
             }
         }
         Inference {
             arch,
             network: network.clone(),
-            numbers: numbers.to_vec(),
+            parameters: parameters.to_vec(),
             weights: packed,
             segments,
             is_kept,
-            made: vec![Tensor::default(); network.layers.len()],
+            activations: vec![Tensor::default(); network.layers.len()],
             edges: Vec::new(),
             zeros: Zeros::default(),
         }
     }
 
-    /// Where the input goes: a map of this shape, to be written before [`Inference::run`].
+    /// Returns the input buffer for a map of this shape, to be written before [`Inference::run`].
     pub fn input(&mut self, shape: Shape) -> &mut [f32] {
-        self.made[0].reshape(shape);
-        &mut self.made[0].data
+        self.activations[0].reshape(shape);
+        &mut self.activations[0].data
     }
 
-    /// Runs all layers on the input. `take` is called with each strip of each output, from top to bottom:
-    /// the output, the number of its first row, and its rows, shape [rows, width, channels].
+    /// Runs all layers on the input. `on_strip(output, first row, rows)` is called for each strip
+    /// of each output, from top to bottom; rows have shape [rows, width, channels].
     ///
     /// # Panics
-    /// If the input is more than one map, or a side of it is no multiple of [`Network::stride`].
-    pub fn run(&mut self, mut take: impl FnMut(Node, usize, &[f32])) {
-        let input = self.made[0].shape;
+    /// If the input has several maps, or its width or height is not a multiple of
+    /// [`Network::stride`].
+    pub fn run(&mut self, mut on_strip: impl FnMut(Node, usize, &[f32])) {
+        let input = self.activations[0].shape;
         let stride = self.network.stride();
-        assert_eq!(input.n, 1, "one map at a time");
+        assert_eq!(input.n, 1, "the input must be one map");
         assert!(
             input.height.is_multiple_of(stride) && input.width.is_multiple_of(stride),
-            "{} x {} pixels are no multiple of {stride}",
+            "{} x {} pixels are not multiples of {stride}",
             input.width,
             input.height
         );
         for segment in self.segments.clone() {
-            let whole = self.network.shape_of(Node(segment.start), input);
+            let shape = self.network.shape_of(Node(segment.start), input);
             for layer in segment.clone().filter(|layer| self.is_kept[*layer]) {
-                self.made[layer].reshape(self.network.shape_of(Node(layer), input));
+                self.activations[layer].reshape(self.network.shape_of(Node(layer), input));
             }
-            // Even, so that what is twice as large begins with a whole row.
-            let strip = (STRIP_PIXELS / whole.width).next_multiple_of(2).max(2);
-            for top in (0..whole.height).step_by(strip) {
-                let rows = top..(top + strip).min(whole.height);
+            // An even height: an upsampled strip starts at a full input row.
+            let strip = (STRIP_PIXELS / shape.width).next_multiple_of(2).max(2);
+            for top in (0..shape.height).step_by(strip) {
+                let rows = top..(top + strip).min(shape.height);
                 for layer in segment.clone() {
                     let shape = self.network.shape_of(Node(layer), input);
-                    self.make(layer, (shape, rows.clone()));
+                    self.compute(layer, shape, rows.clone());
                     if self.network.outputs().contains(&Node(layer)) {
                         let first = if self.is_kept[layer] { top } else { 0 };
                         let row = shape.width * shape.channels;
-                        take(
-                            Node(layer),
-                            top,
-                            &self.made[layer].data[first * row..][..rows.len() * row],
-                        );
+                        let output = &self.activations[layer].data[first * row..];
+                        on_strip(Node(layer), top, &output[..rows.len() * row]);
                     }
                 }
             }
         }
     }
 
-    /// Some rows of what a layer makes.
-    fn make(&mut self, layer: usize, (shape, rows): (Shape, Range<usize>)) {
-        let Inference {
-            arch, network, numbers, weights: packed, is_kept, made, edges, zeros, ..
-        } = self;
-        let of = |parameter: usize| &numbers[network.parameters()[parameter].range.clone()];
-        let (before, rest) = made.split_at_mut(layer);
+    /// Computes some rows of a layer's output.
+    fn compute(&mut self, layer: usize, shape: Shape, rows: Range<usize>) {
+        let Inference { arch, network, parameters, activations, is_kept, edges, zeros, .. } = self;
+        let arch = *arch;
+        let values = |parameter: usize| &parameters[network.parameters()[parameter].range.clone()];
+        let (earlier, later) = activations.split_at_mut(layer);
         let row = shape.width * shape.channels;
         if !is_kept[layer] {
-            rest[0].reshape(Shape { height: rows.len(), ..shape });
+            later[0].reshape(Shape { height: rows.len(), ..shape });
         }
         let first = if is_kept[layer] { rows.start * row } else { 0 };
-        let out = &mut rest[0].data[first..][..rows.len() * row];
-        // What lies in the same rows of a map of the same width.
-        let beside = |node: Node| {
-            let map = &before[node.0];
+        let out = &mut later[0].data[first..][..rows.len() * row];
+        // Returns the same rows of another node with the same height.
+        let same_rows = |node: Node| {
+            let map = &earlier[node.0];
             let row = map.shape.width * map.shape.channels;
             let first = if is_kept[node.0] { rows.start * row } else { 0 };
             &map.data[first..][..rows.len() * row]
         };
         match network.layers[layer] {
-            Layer::Input { .. } => unreachable!("the caller writes it"),
+            Layer::Input { .. } => unreachable!("the caller writes the input"),
             Layer::Conv { from, bias, kernel, .. } => {
-                let weights = (&packed[layer], bias.map(of), kernel);
-                // Without neighbors, all pixels of the strip are one row.
-                let (map, shape, rows) = match kernel {
+                let (weights, bias) = (&self.weights[layer], bias.map(values));
+                // A pointwise convolution treats all pixels of the strip as one row.
+                let (map, rows) = match kernel {
                     Kernel::POINTWISE => {
-                        let map = beside(from);
-                        let channels = before[from.0].shape.channels;
-                        (
-                            map,
-                            Shape { n: 1, height: 1, width: map.len() / channels, channels },
-                            0..1,
-                        )
+                        let (data, channels) = (same_rows(from), earlier[from.0].shape.channels);
+                        let width = data.len() / channels;
+                        (TensorView::new(data, Shape { n: 1, height: 1, width, channels }), 0..1)
                     }
-                    _ => (&before[from.0].data[..], before[from.0].shape, rows),
+                    _ => (earlier[from.0].view(), rows),
                 };
-                conv::forward_rows(*arch, (map, shape), weights, (out, rows), edges);
+                ForwardRows { map, weights, bias, kernel, out, rows, edges }.run(arch);
             }
-            Layer::Depthwise { from, weights, side } => {
-                let map = (&before[from.0].data[..], before[from.0].shape);
-                depthwise::forward_rows(*arch, map, (of(weights), side), (out, rows), zeros);
+            Layer::Depthwise { from, weights, kernel_size } => {
+                let (map, weights) = (earlier[from.0].view(), values(weights));
+                depthwise::forward_rows(arch, map, weights, kernel_size, out, rows, zeros);
             }
-            Layer::Norm { from, scale, shift, positive } => {
-                let floor = if positive { 0.0 } else { f32::NEG_INFINITY };
-                let (scale, shift) = (of(scale), of(shift));
-                arch.dispatch(norm::Forward { map: beside(from), scale, shift, floor, out });
+            Layer::Norm { from, scale, shift, relu } => {
+                let floor = if relu { 0.0 } else { f32::NEG_INFINITY };
+                let (scale, shift) = (values(scale), values(shift));
+                arch.dispatch(norm::Forward { map: same_rows(from), scale, shift, floor, out });
             }
-            Layer::Relu { from } => arch.dispatch(Relu { map: beside(from), out }),
+            Layer::Relu { from } => arch.dispatch(Relu { input: same_rows(from), out }),
             Layer::Add { a, b } => {
-                arch.dispatch(Sum { a: beside(a), b: beside(b), out });
+                arch.dispatch(Sum { a: same_rows(a), b: same_rows(b), out });
             }
             Layer::Upsample { from } => {
-                let Shape { width, channels, .. } = before[from.0].shape;
+                let Shape { width, channels, .. } = earlier[from.0].shape;
                 let rows = rows.start / 2..rows.end.div_ceil(2);
-                let map = &before[from.0].data[rows.start * width * channels..];
-                upsample(&map[..rows.len() * width * channels], (width, channels), out);
+                let map = &earlier[from.0].data[rows.start * width * channels..];
+                upsample(&map[..rows.len() * width * channels], width, channels, out);
             }
-            Layer::Join { .. } | Layer::Concat { .. } => unreachable!("there is none"),
+            Layer::Reshape { .. } | Layer::Concat { .. } => {
+                unreachable!("the constructor refuses such networks")
+            }
         }
     }
 }
 
-/// Runs of layers that are made strip by strip together, and which layers are kept as a whole.
+/// Returns ranges of layers that are computed strip by strip together, and which layers are kept.
 fn segments(network: &Network) -> (Vec<Range<usize>>, Vec<bool>) {
     let layers = &network.layers;
     let mut is_kept = vec![false; layers.len()];
-    // What is looked at from other pixels.
+    // Layers that are read at other pixels are kept.
     for layer in layers {
         match *layer {
             Layer::Input { .. }
@@ -192,7 +186,7 @@ fn segments(network: &Network) -> (Vec<Range<usize>>, Vec<bool>) {
             Layer::Conv { from, .. }
             | Layer::Depthwise { from, .. }
             | Layer::Upsample { from }
-            | Layer::Join { from } => {
+            | Layer::Reshape { from } => {
                 is_kept[from.0] = true;
             }
         }
@@ -202,28 +196,28 @@ fn segments(network: &Network) -> (Vec<Range<usize>>, Vec<bool>) {
         let mut segments = Vec::new();
         let mut start = 1;
         for (k, is_kept) in is_kept.iter().enumerate().skip(1) {
-            let goes_on = network
+            let continues = network
                 .layers
                 .get(k + 1)
                 .is_some_and(|_| network.stride_of(Node(k + 1)) == network.stride_of(Node(start)));
-            if *is_kept || !goes_on {
+            if *is_kept || !continues {
                 segments.push(start..k + 1);
                 start = k + 1;
             }
         }
-        // What is looked at from another segment.
-        let mut is_settled = true;
+        // Layers that another segment reads are kept.
+        let mut is_stable = true;
         for segment in &segments {
             for layer in segment.clone() {
-                for from in layers[layer].reads() {
+                for from in layers[layer].inputs() {
                     if from.0 < segment.start && !is_kept[from.0] {
                         is_kept[from.0] = true;
-                        is_settled = false;
+                        is_stable = false;
                     }
                 }
             }
         }
-        if is_settled {
+        if is_stable {
             return (segments, is_kept);
         }
     }

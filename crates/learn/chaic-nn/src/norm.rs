@@ -1,30 +1,30 @@
-//! Layer normalization of each pixel: its channels are scaled to mean 0 and variance 1, then by a
-//! learned scale and shift ("Layer Normalization", 2016). No pixel depends on others, so that batches may have any
-//! size and images any number.
+//! Layer normalization of each pixel: channels are normalized to mean 0 and variance 1, then scaled
+//! and shifted by parameters (Ba et al., "Layer Normalization", 2016). Pixels are independent, so
+//! batches and images may have any size.
 
 use pulp::{Simd, WithSimd};
 
 /// Added to variances.
 const EPSILON: f32 = 1e-5;
-/// Sums over channels run in so many lanes, which are added in one order: the same bits with vectors of
-/// any width. Channels are a multiple of it.
+/// Number of lanes of sums over channels. Lanes are added in a fixed order, so results do not
+/// depend on the vector width. It divides the number of channels.
 pub(crate) const LANES: usize = 16;
-/// Pixels that are normalized together, so that none waits for the root of another.
+/// Number of pixels that are normalized together, to hide the latency of square roots.
 const PIXELS: usize = 16;
 
-/// A number of each of a few pixels.
-type OfPixels = [f32; PIXELS];
+/// One value per pixel.
+type PerPixel = [f32; PIXELS];
 
-/// The sum over the channels of a pixel of what `of` makes of each vector of them, by its index. Its
-/// lanes are added half to half.
+/// Returns the sum over the channels of a pixel; `value(k)` returns the k-th vector of terms. Lanes
+/// are added pairwise by halves.
 #[inline(always)]
-fn sum<S: Simd>(simd: S, n_vectors: usize, mut of: impl FnMut(usize) -> S::f32s) -> f32 {
+fn sum<S: Simd>(simd: S, n_vectors: usize, mut value: impl FnMut(usize) -> S::f32s) -> f32 {
     let mut n = LANES / S::F32_LANES;
-    // One number in a vector is the least.
+    // Enough for vectors of one element.
     let mut sums = [simd.splat_f32s(0.0); LANES];
     for first in (0..n_vectors).step_by(n) {
         for (j, sum) in sums.iter_mut().enumerate().take(n) {
-            *sum = simd.add_f32s(*sum, of(first + j));
+            *sum = simd.add_f32s(*sum, value(first + j));
         }
     }
     while n > 1 {
@@ -33,19 +33,19 @@ fn sum<S: Simd>(simd: S, n_vectors: usize, mut of: impl FnMut(usize) -> S::f32s)
             sums[j] = simd.add_f32s(sums[j], sums[j + n]);
         }
     }
-    // Half to half, too, on all machines (pulp 0.22).
+    // Reduces by halves as well, on all machines (pulp 0.22).
     simd.reduce_sum_f32s(sums[0])
 }
 
-/// Means of the channels of a few pixels, shape [pixels, channels], and one over their deviations.
+/// Returns channel means and inverse standard deviations of a few pixels, shape [pixels, channels].
 #[inline(always)]
-fn statistics<S: Simd>(simd: S, map: &[f32], channels: usize) -> (OfPixels, OfPixels) {
-    let part = 1.0 / channels as f32;
+fn statistics<S: Simd>(simd: S, map: &[f32], channels: usize) -> (PerPixel, PerPixel) {
+    let inv_channels = 1.0 / channels as f32;
     let n_vectors = channels / S::F32_LANES;
-    let (mut means, mut inverses) = ([0.0; PIXELS], [0.0; PIXELS]);
+    let (mut means, mut inv_std_devs) = ([0.0; PIXELS], [0.0; PIXELS]);
     for (x, mean) in map.chunks_exact(channels).zip(&mut means) {
         let (x, _) = S::as_simd_f32s(x);
-        *mean = part
+        *mean = inv_channels
             * sum(
                 simd,
                 n_vectors,
@@ -53,26 +53,26 @@ fn statistics<S: Simd>(simd: S, map: &[f32], channels: usize) -> (OfPixels, OfPi
                 |v| x[v],
             );
     }
-    for ((x, inverse), mean) in map.chunks_exact(channels).zip(&mut inverses).zip(means) {
+    for ((x, inv_std_dev), mean) in map.chunks_exact(channels).zip(&mut inv_std_devs).zip(means) {
         let (x, _) = S::as_simd_f32s(x);
         let mean = simd.splat_f32s(mean);
-        *inverse = sum(
+        *inv_std_dev = sum(
             simd,
             n_vectors,
             #[inline(always)]
             |v| {
-                let off = simd.sub_f32s(x[v], mean);
-                simd.mul_f32s(off, off)
+                let difference = simd.sub_f32s(x[v], mean);
+                simd.mul_f32s(difference, difference)
             },
         );
     }
-    for inverse in &mut inverses {
-        *inverse = 1.0 / (part * *inverse + EPSILON).sqrt();
+    for inv_std_dev in &mut inv_std_devs {
+        *inv_std_dev = 1.0 / (inv_channels * *inv_std_dev + EPSILON).sqrt();
     }
-    (means, inverses)
+    (means, inv_std_devs)
 }
 
-/// Normalizes maps, shape [pixels, channels], into `out`. What is less than `floor` becomes that.
+/// Normalizes maps of shape [pixels, channels] into `out`; values below `floor` are raised to it.
 pub(crate) struct Forward<'a> {
     pub map: &'a [f32],
     pub scale: &'a [f32],
@@ -87,7 +87,7 @@ impl WithSimd for Forward<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         match self.scale.len() {
-            // Of these widths most pixels are.
+            // The most frequent numbers of channels.
             48 => self.run(simd, 48),
             96 => self.run(simd, 96),
             channels => self.run(simd, channels),
@@ -105,14 +105,14 @@ impl Forward<'_> {
         let floor = simd.splat_f32s(floor);
         let strips = map.chunks(PIXELS * channels).zip(out.chunks_mut(PIXELS * channels));
         for (map, out) in strips {
-            let (means, inverses) = statistics(simd, map, channels);
+            let (means, inv_std_devs) = statistics(simd, map, channels);
             let pixels = map.chunks_exact(channels).zip(out.chunks_exact_mut(channels));
-            for ((x, out), (mean, inverse)) in pixels.zip(means.into_iter().zip(inverses)) {
+            for ((x, out), (mean, inv_std_dev)) in pixels.zip(means.into_iter().zip(inv_std_devs)) {
                 let (x, out) = (S::as_simd_f32s(x).0, S::as_mut_simd_f32s(out).0);
-                let (mean, inverse) = (simd.splat_f32s(mean), simd.splat_f32s(inverse));
+                let (mean, inv_std_dev) = (simd.splat_f32s(mean), simd.splat_f32s(inv_std_dev));
                 for v in 0..n_vectors {
-                    let normal = simd.mul_f32s(simd.sub_f32s(x[v], mean), inverse);
-                    let y = simd.add_f32s(simd.mul_f32s(normal, scale[v]), shift[v]);
+                    let normalized = simd.mul_f32s(simd.sub_f32s(x[v], mean), inv_std_dev);
+                    let y = simd.add_f32s(simd.mul_f32s(normalized, scale[v]), shift[v]);
                     out[v] = simd.select_f32s(simd.greater_than_f32s(y, floor), y, floor);
                 }
             }
@@ -120,14 +120,14 @@ impl Forward<'_> {
     }
 }
 
-/// Adds the gradients by maps, scale and shift, from that by the result, likewise.
+/// Adds the gradients of input, scale and shift, given the gradient of the output.
 pub(crate) struct Backward<'a> {
     pub map: &'a [f32],
     pub scale: &'a [f32],
-    pub gradient: &'a [f32],
-    pub by_map: &'a mut [f32],
-    pub by_scale: &'a mut [f32],
-    pub by_shift: &'a mut [f32],
+    pub grad_output: &'a [f32],
+    pub grad_input: &'a mut [f32],
+    pub grad_scale: &'a mut [f32],
+    pub grad_shift: &'a mut [f32],
 }
 
 impl WithSimd for Backward<'_> {
@@ -146,52 +146,56 @@ impl WithSimd for Backward<'_> {
 impl Backward<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S, channels: usize) {
-        let Backward { map, scale, gradient, by_map, by_scale, by_shift } = self;
-        let (n_vectors, part) = (channels / S::F32_LANES, 1.0 / channels as f32);
+        let Backward { map, scale, grad_output, grad_input, grad_scale, grad_shift } = self;
+        let (n_vectors, inv_channels) = (channels / S::F32_LANES, 1.0 / channels as f32);
         let (scale, _) = S::as_simd_f32s(scale);
-        let (by_scale, _) = S::as_mut_simd_f32s(by_scale);
-        let (by_shift, _) = S::as_mut_simd_f32s(by_shift);
-        let maps = map.chunks(PIXELS * channels).zip(gradient.chunks(PIXELS * channels));
-        for ((map, gradient), by_map) in maps.zip(by_map.chunks_mut(PIXELS * channels)) {
-            let (means, inverses) = statistics(simd, map, channels);
+        let (grad_scale, _) = S::as_mut_simd_f32s(grad_scale);
+        let (grad_shift, _) = S::as_mut_simd_f32s(grad_shift);
+        let maps = map.chunks(PIXELS * channels).zip(grad_output.chunks(PIXELS * channels));
+        for ((map, grad_output), grad_input) in maps.zip(grad_input.chunks_mut(PIXELS * channels)) {
+            let (means, inv_std_devs) = statistics(simd, map, channels);
             let (mut sums, mut products) = ([0.0; PIXELS], [0.0; PIXELS]);
-            let pixels = map.chunks_exact(channels).zip(gradient.chunks_exact(channels));
+            let pixels = map.chunks_exact(channels).zip(grad_output.chunks_exact(channels));
             for (p, (x, g)) in pixels.enumerate() {
                 let (x, g) = (S::as_simd_f32s(x).0, S::as_simd_f32s(g).0);
-                let (mean, inverse) = (simd.splat_f32s(means[p]), simd.splat_f32s(inverses[p]));
-                sums[p] = part
+                let (mean, inv_std_dev) =
+                    (simd.splat_f32s(means[p]), simd.splat_f32s(inv_std_devs[p]));
+                sums[p] = inv_channels
                     * sum(
                         simd,
                         n_vectors,
                         #[inline(always)]
                         |v| {
-                            by_shift[v] = simd.add_f32s(by_shift[v], g[v]);
+                            grad_shift[v] = simd.add_f32s(grad_shift[v], g[v]);
                             simd.mul_f32s(g[v], scale[v])
                         },
                     );
-                products[p] = part
+                products[p] = inv_channels
                     * sum(
                         simd,
                         n_vectors,
                         #[inline(always)]
                         |v| {
-                            let normal = simd.mul_f32s(simd.sub_f32s(x[v], mean), inverse);
-                            by_scale[v] = simd.add_f32s(by_scale[v], simd.mul_f32s(g[v], normal));
-                            simd.mul_f32s(simd.mul_f32s(g[v], scale[v]), normal)
+                            let normalized = simd.mul_f32s(simd.sub_f32s(x[v], mean), inv_std_dev);
+                            grad_scale[v] =
+                                simd.add_f32s(grad_scale[v], simd.mul_f32s(g[v], normalized));
+                            simd.mul_f32s(simd.mul_f32s(g[v], scale[v]), normalized)
                         },
                     );
             }
-            let pixels = map.chunks_exact(channels).zip(gradient.chunks_exact(channels));
-            for (p, ((x, g), by)) in pixels.zip(by_map.chunks_exact_mut(channels)).enumerate() {
+            let pixels = map.chunks_exact(channels).zip(grad_output.chunks_exact(channels));
+            for (p, ((x, g), out)) in pixels.zip(grad_input.chunks_exact_mut(channels)).enumerate()
+            {
                 let (x, g) = (S::as_simd_f32s(x).0, S::as_simd_f32s(g).0);
-                let (by, _) = S::as_mut_simd_f32s(by);
-                let (mean, inverse) = (simd.splat_f32s(means[p]), simd.splat_f32s(inverses[p]));
+                let (out, _) = S::as_mut_simd_f32s(out);
+                let (mean, inv_std_dev) =
+                    (simd.splat_f32s(means[p]), simd.splat_f32s(inv_std_devs[p]));
                 let (sum, product) = (simd.splat_f32s(sums[p]), simd.splat_f32s(products[p]));
                 for v in 0..n_vectors {
-                    let normal = simd.mul_f32s(simd.sub_f32s(x[v], mean), inverse);
-                    let own = simd.sub_f32s(simd.mul_f32s(g[v], scale[v]), sum);
-                    let own = simd.sub_f32s(own, simd.mul_f32s(normal, product));
-                    by[v] = simd.add_f32s(by[v], simd.mul_f32s(inverse, own));
+                    let normalized = simd.mul_f32s(simd.sub_f32s(x[v], mean), inv_std_dev);
+                    let centered = simd.sub_f32s(simd.mul_f32s(g[v], scale[v]), sum);
+                    let centered = simd.sub_f32s(centered, simd.mul_f32s(normalized, product));
+                    out[v] = simd.add_f32s(out[v], simd.mul_f32s(inv_std_dev, centered));
                 }
             }
         }

@@ -1,49 +1,49 @@
-//! Forward and backward passes through a network while it learns.
+//! Forward and backward passes for training.
 
 use pulp::Arch;
 
-use crate::conv::{self, Patches};
+use crate::conv::{self, Im2colBuffers};
 use crate::depthwise::{self, Padded, Zeros};
-use crate::elementwise::{AddTo, Mask, Relu, downsample, upsample};
+use crate::elementwise::{AddTo, Relu, ReluGrad, downsample, upsample};
 use crate::network::{Layer, Network, Node};
 use crate::norm;
-use crate::tensor::{Shape, Tensor};
+use crate::tensor::{Shape, Tensor, TensorView};
 
-/// One pass over a few maps: what each layer made, and the gradient by it. Memory is used again by the
-/// next pass.
+/// Activations and gradients of one pass over a batch. The next pass reuses the memory.
 #[derive(Clone, Debug)]
 pub struct Pass {
     arch: Arch,
-    made: Vec<Tensor>,
+    activations: Vec<Tensor>,
     gradients: Vec<Tensor>,
-    patches: Patches,
+    im2col: Im2colBuffers,
     padded: Padded,
     zeros: Zeros,
-    /// A gradient by one map.
-    by_map: Vec<f32>,
+    /// Gradient of one map.
+    grad_map: Vec<f32>,
 }
 
 impl Pass {
-    /// Working space for a network.
+    /// Creates the buffers for a network.
     pub fn new(network: &Network, arch: Arch) -> Pass {
         let n = network.layers.len();
         Pass {
             arch,
-            made: vec![Tensor::default(); n],
+            activations: vec![Tensor::default(); n],
             gradients: vec![Tensor::default(); n],
-            patches: Patches::default(),
+            im2col: Im2colBuffers::default(),
             padded: Padded::default(),
             zeros: Zeros::default(),
-            by_map: Vec::new(),
+            grad_map: Vec::new(),
         }
     }
 
-    /// What a node made.
-    pub fn made(&self, node: Node) -> &Tensor {
-        &self.made[node.0]
+    /// Returns the output of a node.
+    pub fn activation(&self, node: Node) -> &Tensor {
+        &self.activations[node.0]
     }
 
-    /// The gradient of the loss by what a node made, for the caller to write it of outputs.
+    /// Returns the gradient of the loss with respect to a node's output. Callers write those of the
+    /// output heads.
     pub fn gradient(&mut self, node: Node) -> &mut Tensor {
         &mut self.gradients[node.0]
     }
@@ -52,78 +52,68 @@ impl Pass {
     ///
     /// # Panics
     /// As [`Pass::forward_all`].
-    pub fn forward(&mut self, network: &Network, numbers: &[f32], input: &Tensor) {
-        self.forward_all(network, numbers, &[input]);
+    pub fn forward(&mut self, network: &Network, parameters: &[f32], input: &Tensor) {
+        self.forward_all(network, parameters, &[input]);
     }
 
-    /// Runs all layers on the inputs of a network, in the order in which it was given them.
+    /// Runs all layers on the inputs of a network, in the order in which they were added.
     ///
     /// # Panics
-    /// If there are fewer inputs than the network has, a side of the first is no multiple of [`Network::stride`], another
-    /// has another shape than that makes, or maps that are joined have another size than the network says.
-    pub fn forward_all(&mut self, network: &Network, numbers: &[f32], inputs: &[&Tensor]) {
+    /// If inputs are missing or have the wrong shape, or width or height of the first is not a
+    /// multiple of [`Network::stride`].
+    pub fn forward_all(&mut self, network: &Network, parameters: &[f32], inputs: &[&Tensor]) {
         let input = inputs[0];
         let Shape { height, width, .. } = input.shape;
         let stride = network.stride();
         assert!(
             height.is_multiple_of(stride) && width.is_multiple_of(stride),
-            "{width} x {height} pixels are no multiple of {stride}"
+            "{width} x {height} pixels are not multiples of {stride}"
         );
-        let of = |parameter: usize| &numbers[network.parameters()[parameter].range.clone()];
+        let values = |parameter: usize| &parameters[network.parameters()[parameter].range.clone()];
         for (k, layer) in network.layers.iter().enumerate() {
-            let (before, rest) = self.made.split_at_mut(k);
-            let out = &mut rest[0];
+            let (earlier, later) = self.activations.split_at_mut(k);
+            let out = &mut later[0];
             out.reshape(network.shape_of(Node(k), input.shape));
             match *layer {
-                Layer::Input { which } => out.data.copy_from_slice(&inputs[which].data),
-                Layer::Conv { from, weights, bias, kernel, channels } => {
-                    let map = &before[from.0];
-                    let out = (&mut out.data[..], channels);
-                    let weights = (of(weights), bias.map(of), kernel);
-                    conv::forward(
-                        self.arch,
-                        (&map.data, map.shape),
-                        weights,
-                        out,
-                        &mut self.patches,
-                    );
+                Layer::Input { index } => out.data.copy_from_slice(&inputs[index].data),
+                Layer::Conv { from, weights, bias, kernel, .. } => {
+                    let (input, out) = (earlier[from.0].view(), &mut out.data);
+                    let (weights, bias) = (values(weights), bias.map(values));
+                    conv::forward(self.arch, input, weights, bias, kernel, out, &mut self.im2col);
                 }
-                Layer::Depthwise { from, weights, side } => {
-                    let map = &before[from.0];
-                    let n = map.shape.of_one();
-                    for (map_data, out) in
-                        map.data.chunks_exact(n).zip(out.data.chunks_exact_mut(n))
-                    {
-                        let (weights, map) = ((of(weights), side), (map_data, map.shape));
-                        depthwise::forward(self.arch, map, weights, out, &mut self.zeros);
+                Layer::Depthwise { from, weights, kernel_size } => {
+                    let TensorView { data, shape } = earlier[from.0].view();
+                    let (n, weights) = (shape.len_per_item(), values(weights));
+                    for (map, out) in data.chunks_exact(n).zip(out.data.chunks_exact_mut(n)) {
+                        let (map, zeros) = (TensorView::new(map, shape), &mut self.zeros);
+                        depthwise::forward(self.arch, map, weights, kernel_size, out, zeros);
                     }
                 }
-                Layer::Norm { from, scale, shift, positive } => {
-                    let floor = if positive { 0.0 } else { f32::NEG_INFINITY };
-                    let (scale, shift) = (of(scale), of(shift));
-                    let (map, out) = (&before[from.0].data[..], &mut out.data[..]);
+                Layer::Norm { from, scale, shift, relu } => {
+                    let floor = if relu { 0.0 } else { f32::NEG_INFINITY };
+                    let (scale, shift) = (values(scale), values(shift));
+                    let (map, out) = (&earlier[from.0].data[..], &mut out.data[..]);
                     self.arch.dispatch(norm::Forward { map, scale, shift, floor, out });
                 }
                 Layer::Relu { from } => {
-                    let map = &before[from.0];
-                    self.arch.dispatch(Relu { map: &map.data, out: &mut out.data });
+                    let input = &earlier[from.0].data;
+                    self.arch.dispatch(Relu { input, out: &mut out.data });
                 }
                 Layer::Add { a, b } => {
-                    out.data.copy_from_slice(&before[a.0].data);
-                    self.arch.dispatch(AddTo { to: &mut out.data, from: &before[b.0].data });
+                    out.data.copy_from_slice(&earlier[a.0].data);
+                    self.arch.dispatch(AddTo { to: &mut out.data, from: &earlier[b.0].data });
                 }
                 Layer::Upsample { from } => {
-                    let map = &before[from.0];
-                    upsample(&map.data, (map.shape.width, map.shape.channels), &mut out.data);
+                    let Tensor { data, shape } = &earlier[from.0];
+                    upsample(data, shape.width, shape.channels, &mut out.data);
                 }
-                Layer::Join { from } => out.data.copy_from_slice(&before[from.0].data),
+                Layer::Reshape { from } => out.data.copy_from_slice(&earlier[from.0].data),
                 Layer::Concat { a, b } => {
-                    let [a, b] = [a, b].map(|node| &before[node.0]);
-                    let of_both = a.data.chunks_exact(a.shape.channels);
-                    let of_both = of_both.zip(b.data.chunks_exact(b.shape.channels));
-                    for (pixel, (a, b)) in
-                        out.data.chunks_exact_mut(out.shape.channels).zip(of_both)
-                    {
+                    let [a, b] = [a, b].map(|node| &earlier[node.0]);
+                    let pairs = a.data.chunks_exact(a.shape.channels);
+                    let pairs = pairs.zip(b.data.chunks_exact(b.shape.channels));
+                    let pixels = out.data.chunks_exact_mut(out.shape.channels);
+                    for (pixel, (a, b)) in pixels.zip(pairs) {
                         let (to_a, to_b) = pixel.split_at_mut(a.len());
                         to_a.copy_from_slice(a);
                         to_b.copy_from_slice(b);
@@ -133,101 +123,121 @@ impl Pass {
         }
     }
 
-    /// Makes the gradient of every output zero, for the caller to write it.
-    pub fn begin_backward(&mut self) {
-        for (gradient, made) in self.gradients.iter_mut().zip(&self.made) {
-            gradient.reset(made.shape);
+    /// Zeroes the gradients before callers write those of the output heads.
+    pub fn zero_gradients(&mut self) {
+        for (gradient, activation) in self.gradients.iter_mut().zip(&self.activations) {
+            gradient.reset(activation.shape);
         }
     }
 
-    /// Adds the gradient by all numbers to `by_numbers`, from what was written to those of the outputs.
-    pub fn backward(&mut self, network: &Network, numbers: &[f32], by_numbers: &mut [f32]) {
-        let of = |parameter: usize| network.parameters()[parameter].range.clone();
+    /// Backpropagates the gradients of the output heads and accumulates parameter gradients into
+    /// `grad_parameters`.
+    pub fn backward(&mut self, network: &Network, parameters: &[f32], grad_parameters: &mut [f32]) {
+        let range = |parameter: usize| network.parameters()[parameter].range.clone();
         for (k, layer) in network.layers.iter().enumerate().rev() {
-            let (before, rest) = self.gradients.split_at_mut(k);
-            let gradient = &mut rest[0];
+            let (earlier, later) = self.gradients.split_at_mut(k);
+            let gradient = &mut later[0];
             let channels = gradient.shape.channels;
             match *layer {
                 Layer::Input { .. } => {}
                 Layer::Conv { from, weights, bias, kernel, .. } => {
                     if let Some(bias) = bias {
-                        let sums = &mut by_numbers[of(bias)];
+                        let sums = &mut grad_parameters[range(bias)];
                         for pixel in gradient.data.chunks_exact(channels) {
                             sums.iter_mut().zip(pixel).for_each(|(sum, g)| *sum += g);
                         }
                     }
-                    let map = &self.made[from.0];
-                    let g = (&gradient.data[..], channels);
-                    let out = (&mut by_numbers[of(weights)], kernel);
-                    let maps = (&map.data[..], map.shape);
-                    conv::backward_weights(self.arch, maps, out, g, &mut self.patches);
+                    let (arch, im2col) = (self.arch, &mut self.im2col);
+                    let (input, grad_output) = (self.activations[from.0].view(), &gradient.data);
+                    let grad_weights = &mut grad_parameters[range(weights)];
+                    conv::backward_weights(arch, input, grad_weights, kernel, grad_output, im2col);
                     if !matches!(network.layers[from.0], Layer::Input { .. }) {
-                        let out = (&mut before[from.0].data[..], map.shape);
-                        let weights = (&numbers[of(weights)], kernel);
-                        conv::backward_map(self.arch, out, weights, g, &mut self.patches);
-                    }
-                }
-                Layer::Depthwise { from, weights, side } => {
-                    let map = &self.made[from.0];
-                    let n = map.shape.of_one();
-                    let out = &mut before[from.0].data;
-                    self.by_map.resize(n, 0.0);
-                    let by_map = &mut self.by_map;
-                    let maps = map.data.chunks_exact(n).zip(gradient.data.chunks_exact(n));
-                    for ((map_data, g), out) in maps.zip(out.chunks_exact_mut(n)) {
-                        let by_weights = (&mut by_numbers[of(weights)], side);
-                        let padded = &mut self.padded;
-                        let shape = map.shape;
-                        depthwise::backward_weights(
-                            self.arch, map_data, g, shape, by_weights, padded,
+                        let (grad_input, shape) = (&mut earlier[from.0].data, input.shape);
+                        let weights = &parameters[range(weights)];
+                        conv::backward_input(
+                            arch,
+                            grad_input,
+                            shape,
+                            weights,
+                            kernel,
+                            grad_output,
+                            im2col,
                         );
-                        let weights = (&numbers[of(weights)], side);
-                        let zeros = &mut self.zeros;
-                        depthwise::backward_map(self.arch, (g, shape), weights, by_map, zeros);
-                        self.arch.dispatch(AddTo { to: out, from: by_map });
                     }
                 }
-                Layer::Norm { from, scale, shift, positive } => {
-                    if positive {
-                        let made = &self.made[k].data;
-                        self.arch.dispatch(Mask { gradient: &mut gradient.data, made });
+                Layer::Depthwise { from, weights, kernel_size } => {
+                    let TensorView { data, shape } = self.activations[from.0].view();
+                    let n = shape.len_per_item();
+                    let grad_inputs = earlier[from.0].data.chunks_exact_mut(n);
+                    self.grad_map.resize(n, 0.0);
+                    let (arch, grad_map) = (self.arch, &mut self.grad_map);
+                    let maps = data.chunks_exact(n).zip(gradient.data.chunks_exact(n));
+                    for ((map, grad_output), grad_input) in maps.zip(grad_inputs) {
+                        let map = TensorView::new(map, shape);
+                        let grad_weights = &mut grad_parameters[range(weights)];
+                        depthwise::backward_weights(
+                            arch,
+                            map,
+                            grad_output,
+                            grad_weights,
+                            kernel_size,
+                            &mut self.padded,
+                        );
+                        let (grad_output, zeros) =
+                            (TensorView::new(grad_output, shape), &mut self.zeros);
+                        let weights = &parameters[range(weights)];
+                        depthwise::backward_input(
+                            arch,
+                            grad_output,
+                            weights,
+                            kernel_size,
+                            grad_map,
+                            zeros,
+                        );
+                        arch.dispatch(AddTo { to: grad_input, from: grad_map });
                     }
-                    // Scale and shift stand one after the other.
-                    let both = &mut by_numbers[of(scale).start..of(shift).end];
-                    let (by_scale, by_shift) = both.split_at_mut(channels);
+                }
+                Layer::Norm { from, scale, shift, relu } => {
+                    if relu {
+                        let activation = &self.activations[k].data;
+                        self.arch.dispatch(ReluGrad { gradient: &mut gradient.data, activation });
+                    }
+                    // The shift follows the scale.
+                    let both = &mut grad_parameters[range(scale).start..range(shift).end];
+                    let (grad_scale, grad_shift) = both.split_at_mut(channels);
                     self.arch.dispatch(norm::Backward {
-                        map: &self.made[from.0].data,
-                        scale: &numbers[of(scale)],
-                        gradient: &gradient.data,
-                        by_map: &mut before[from.0].data,
-                        by_scale,
-                        by_shift,
+                        map: &self.activations[from.0].data,
+                        scale: &parameters[range(scale)],
+                        grad_output: &gradient.data,
+                        grad_input: &mut earlier[from.0].data,
+                        grad_scale,
+                        grad_shift,
                     });
                 }
                 Layer::Relu { from } => {
-                    let made = &self.made[k].data;
-                    self.arch.dispatch(Mask { gradient: &mut gradient.data, made });
-                    let to = &mut before[from.0].data;
+                    let activation = &self.activations[k].data;
+                    self.arch.dispatch(ReluGrad { gradient: &mut gradient.data, activation });
+                    let to = &mut earlier[from.0].data;
                     self.arch.dispatch(AddTo { to, from: &gradient.data });
                 }
                 Layer::Add { a, b } => {
                     for node in [a, b] {
-                        let to = &mut before[node.0].data;
+                        let to = &mut earlier[node.0].data;
                         self.arch.dispatch(AddTo { to, from: &gradient.data });
                     }
                 }
                 Layer::Concat { a, b } => {
-                    let n_a = self.made[a.0].shape.channels;
+                    let n_a = self.activations[a.0].shape.channels;
                     for (node, range) in [(a, 0..n_a), (b, n_a..channels)] {
-                        let to = before[node.0].data.chunks_exact_mut(range.len());
+                        let to = earlier[node.0].data.chunks_exact_mut(range.len());
                         for (to, pixel) in to.zip(gradient.data.chunks_exact(channels)) {
                             to.iter_mut().zip(&pixel[range.clone()]).for_each(|(to, g)| *to += g);
                         }
                     }
                 }
-                Layer::Upsample { from } => downsample(gradient, &mut before[from.0]),
-                Layer::Join { from } => {
-                    let to = &mut before[from.0].data;
+                Layer::Upsample { from } => downsample(gradient, &mut earlier[from.0]),
+                Layer::Reshape { from } => {
+                    let to = &mut earlier[from.0].data;
                     self.arch.dispatch(AddTo { to, from: &gradient.data });
                 }
             }

@@ -1,13 +1,13 @@
-//! Which vectors inner loops are compiled for.
+//! SIMD vector widths for which inner loops are compiled.
 
 use pulp::Arch;
 
-/// The widest vectors of this machine.
+/// Returns the widest vectors of this machine.
 pub fn widest() -> Arch {
     Arch::new()
 }
 
-/// Every width that this machine runs, by name, for those who check that results don't depend on it.
+/// Returns every vector width of this machine by name, for tests that results do not depend on it.
 pub fn widths() -> Vec<(&'static str, Arch)> {
     let mut widths = vec![("scalar", Arch::Scalar)];
     #[cfg(target_arch = "x86_64")]

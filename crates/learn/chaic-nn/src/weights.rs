@@ -1,4 +1,4 @@
-//! Numbers of a network as a safetensors file, which is data alone: loading one runs nothing.
+//! Network parameters as a safetensors file, which holds data only: loading one executes no code.
 
 use std::collections::HashMap;
 
@@ -6,100 +6,105 @@ use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 
 use crate::network::Network;
 
-/// The one entry of a file's metadata: what the numbers are of.
+/// Key of the metadata entry that names the kind of network.
 const KIND: &str = "kind";
 
-/// Why a file holds no numbers for a network.
+/// Reason why a file holds no parameters for a network.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum WeightsError {
-    /// It is no safetensors file, or cut off.
-    #[error("these are no weights: {0}")]
+    /// The file is not a complete safetensors file.
+    #[error("not a weights file: {0}")]
     Format(String),
-    /// It is of something else.
-    #[error("these are weights of `{found}`; `{expected}` is needed")]
+    /// The file belongs to another kind of network.
+    #[error("weights of `{found}`, expected `{expected}`")]
     Kind {
-        /// What the file says that it is of.
+        /// Kind in the file.
         found: String,
-        /// What was asked for.
+        /// Expected kind.
         expected: String,
     },
-    /// A list of numbers isn't there.
-    #[error("these weights have no `{0}`")]
+    /// A tensor is missing.
+    #[error("the weights lack `{0}`")]
     Missing(String),
-    /// A list that the network doesn't have.
-    #[error("these weights have `{0}`, which this network doesn't")]
+    /// The file has a tensor that the network lacks.
+    #[error("the weights have `{0}`, which this network lacks")]
     Unknown(String),
-    /// A list of numbers has another shape or type.
-    #[error("`{name}` is {found}; {expected} is needed")]
+    /// A tensor has another shape or type.
+    #[error("`{name}` is {found}, expected {expected}")]
     Shape {
-        /// Its name.
+        /// Name of the tensor.
         name: String,
-        /// Its type and shape.
+        /// Type and shape in the file.
         found: String,
-        /// What the network needs.
+        /// Type and shape in the network.
         expected: String,
     },
-    /// A number is not finite.
-    #[error("`{0}` has a number that is not finite")]
+    /// A value is not finite.
+    #[error("`{0}` has a value that is not finite")]
     NotFinite(String),
 }
 
-/// Returns the numbers as a file. `kind` names what they are of, its version included.
+/// Encodes parameters as a weights file; `kind` names the kind of network and its version.
 ///
 /// # Errors
-/// [`WeightsError::NotFinite`] if a number is not finite.
-pub fn to_bytes(network: &Network, numbers: &[f32], kind: &str) -> Result<Vec<u8>, WeightsError> {
-    let is_finite = |p: &&crate::Parameter| numbers[p.range.clone()].iter().all(|x| x.is_finite());
+/// [`WeightsError::NotFinite`] if a value is not finite.
+pub fn to_bytes(
+    network: &Network,
+    parameters: &[f32],
+    kind: &str,
+) -> Result<Vec<u8>, WeightsError> {
+    let is_finite =
+        |p: &&crate::Parameter| parameters[p.range.clone()].iter().all(|x| x.is_finite());
     if let Some(parameter) = network.parameters().iter().find(|p| !is_finite(p)) {
         return Err(WeightsError::NotFinite(parameter.name.clone()));
     }
-    Ok(encode(network, numbers, kind))
+    Ok(encode(network, parameters, kind))
 }
 
-/// Returns the numbers as a file, whether they are finite or not.
-fn encode(network: &Network, numbers: &[f32], kind: &str) -> Vec<u8> {
-    let bytes: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
+/// Encodes parameters without checking that they are finite.
+fn encode(network: &Network, parameters: &[f32], kind: &str) -> Vec<u8> {
+    let bytes: Vec<u8> = parameters.iter().flat_map(|x| x.to_le_bytes()).collect();
     let view = |p: &crate::Parameter| {
         let data = &bytes[4 * p.range.start..4 * p.range.end];
         let view = TensorView::new(Dtype::F32, p.shape.clone(), data);
-        (p.name.clone(), view.expect("as many bytes as its shape says"))
+        (p.name.clone(), view.expect("the length matches the shape"))
     };
-    // One entry: a map of several would be written in any order.
+    // A single entry, since a hash map with several has no fixed order.
     let metadata = HashMap::from([(KIND.to_owned(), kind.to_owned())]);
     let views = network.parameters().iter().map(view);
-    serialize(views, Some(metadata)).expect("names and shapes are small")
+    serialize(views, Some(metadata)).expect("names and shapes can be encoded")
 }
 
-/// Twelve digits that name the content of a file.
+/// Returns a digest of a file's content, twelve hexadecimal digits.
 pub fn digest(bytes: &[u8]) -> String {
     format!("{:012x}", xxhash_rust::xxh3::xxh3_64(bytes) >> 16)
 }
 
-/// Returns the digest of the file that these numbers make, whether they are finite or not.
-pub fn digest_of(network: &Network, numbers: &[f32], kind: &str) -> String {
-    digest(&encode(network, numbers, kind))
+/// Returns the digest of the weights file of these parameters, which may be non-finite.
+pub fn digest_of(network: &Network, parameters: &[f32], kind: &str) -> String {
+    digest(&encode(network, parameters, kind))
 }
 
-/// The numbers in a file.
+/// Parses the parameters of a weights file.
 ///
 /// # Errors
-/// [`WeightsError`] if it isn't a whole file of this kind for this network.
+/// [`WeightsError`] if the file is incomplete or belongs to another kind or network.
 pub fn from_bytes(network: &Network, bytes: &[u8], kind: &str) -> Result<Vec<f32>, WeightsError> {
-    let bad = |e: &dyn std::fmt::Display| WeightsError::Format(e.to_string());
-    let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| bad(&e))?;
+    let format_error = |e: &dyn std::fmt::Display| WeightsError::Format(e.to_string());
+    let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| format_error(&e))?;
     let found = metadata.metadata().as_ref().and_then(|m| m.get(KIND)).cloned();
     let found = found.unwrap_or_default();
     if found != kind {
         return Err(WeightsError::Kind { found, expected: kind.to_owned() });
     }
-    let file = SafeTensors::deserialize(bytes).map_err(|e| bad(&e))?;
+    let file = SafeTensors::deserialize(bytes).map_err(|e| format_error(&e))?;
     let mut names = file.names();
     names.sort_unstable();
-    let knows = |name: &&&str| network.parameters().iter().any(|p| p.name == **name);
-    if let Some(name) = names.iter().find(|name| !knows(name)) {
+    let is_known = |name: &&&str| network.parameters().iter().any(|p| p.name == **name);
+    if let Some(name) = names.iter().find(|name| !is_known(name)) {
         return Err(WeightsError::Unknown((*name).to_owned()));
     }
-    let mut numbers = vec![0.0; network.n_numbers()];
+    let mut parameters = vec![0.0; network.n_parameters()];
     for parameter in network.parameters() {
         let name = || parameter.name.clone();
         let tensor = file.tensor(&parameter.name).map_err(|_| WeightsError::Missing(name()))?;
@@ -111,14 +116,14 @@ pub fn from_bytes(network: &Network, bytes: &[u8], kind: &str) -> Result<Vec<f32
             });
         }
         let values = tensor.data().as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b));
-        for (number, value) in numbers[parameter.range.clone()].iter_mut().zip(values) {
+        for (to, value) in parameters[parameter.range.clone()].iter_mut().zip(values) {
             if !value.is_finite() {
                 return Err(WeightsError::NotFinite(name()));
             }
-            *number = value;
+            *to = value;
         }
     }
-    Ok(numbers)
+    Ok(parameters)
 }
 
 #[cfg(test)]
@@ -129,28 +134,28 @@ mod tests {
     fn network(channels: usize) -> Network {
         let mut net = Network::default();
         let input = net.input(3);
-        let conv = net.conv("conv", input, Kernel { side: 3, stride: 2 }, channels);
+        let conv = net.conv("conv", input, Kernel { size: 3, stride: 2 }, channels);
         let norm = net.norm_relu("norm", conv);
-        net.head("head", norm, 4);
+        net.output_head("head", norm, 4);
         net
     }
 
     #[test]
-    fn what_is_written_is_read_back() {
+    fn parameters_are_read_back_unchanged() {
         let net = network(16);
-        let numbers = net.begin(1);
-        let bytes = to_bytes(&net, &numbers, "test 1").unwrap();
-        assert_eq!(from_bytes(&net, &bytes, "test 1"), Ok(numbers.clone()));
-        assert_eq!(Ok(bytes), to_bytes(&net, &numbers, "test 1"), "the same bytes each time");
+        let parameters = net.init_parameters(1);
+        let bytes = to_bytes(&net, &parameters, "test 1").unwrap();
+        assert_eq!(from_bytes(&net, &bytes, "test 1"), Ok(parameters.clone()));
+        assert_eq!(Ok(bytes), to_bytes(&net, &parameters, "test 1"), "encoding is deterministic");
     }
 
     #[test]
-    fn files_that_dont_fit_are_refused_in_one_line() {
+    fn mismatching_files_are_refused_in_one_line() {
         let net = network(16);
-        let mut numbers = net.begin(1);
-        let bytes = to_bytes(&net, &numbers, "test 1").unwrap();
+        let mut parameters = net.init_parameters(1);
+        let bytes = to_bytes(&net, &parameters, "test 1").unwrap();
         for n in (0..bytes.len()).step_by(7) {
-            let error = from_bytes(&net, &bytes[..n], "test 1").expect_err("it is cut off");
+            let error = from_bytes(&net, &bytes[..n], "test 1").expect_err("it is truncated");
             assert!(!error.to_string().contains('\n'), "{error}");
         }
         assert!(matches!(from_bytes(&net, &bytes, "test 2"), Err(WeightsError::Kind { .. })));
@@ -158,17 +163,21 @@ mod tests {
         assert!(matches!(other, Err(WeightsError::Shape { .. })), "{other:?}");
         let mut longer = network(16);
         let input = longer.input(3);
-        longer.head("more", input, 2);
+        longer.output_head("more", input, 2);
         let missing = from_bytes(&longer, &bytes, "test 1");
         assert_eq!(missing, Err(WeightsError::Missing("more.weight".to_owned())));
-        let more = to_bytes(&longer, &longer.begin(1), "test 1").unwrap();
+        let more = to_bytes(&longer, &longer.init_parameters(1), "test 1").unwrap();
         assert!(matches!(from_bytes(&net, &more, "test 1"), Err(WeightsError::Unknown(_))));
         for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-            numbers[5] = value;
+            parameters[5] = value;
             let bad = WeightsError::NotFinite("conv.weight".to_owned());
-            let read = from_bytes(&net, &encode(&net, &numbers, "test 1"), "test 1");
+            let read = from_bytes(&net, &encode(&net, &parameters, "test 1"), "test 1");
             assert_eq!(read, Err(bad.clone()));
-            assert_eq!(to_bytes(&net, &numbers, "test 1"), Err(bad), "nor are they written");
+            assert_eq!(
+                to_bytes(&net, &parameters, "test 1"),
+                Err(bad),
+                "non-finite values are not written"
+            );
         }
     }
 }

@@ -1,23 +1,23 @@
 //! Bounds of the numbers in a configuration.
 //!
-//! A training has one [`BoundTable`]. The same table checks configurations and states the bounds as comments in
-//! the `config.toml` of every training.
+//! Each training has one [`BoundTable`]. It validates configurations, and its bounds are written as
+//! comments into `config.toml`.
 
 use std::fmt;
 
 use toml::{Table, Value};
 
-/// Bounds of a number, a list or a table of a configuration. Both ends are allowed.
+/// Bounds of a number, a list or a table in a configuration. Both ends are allowed.
 #[derive(Clone, Copy, Debug)]
 pub enum Bound {
-    /// Bounds of a whole number.
+    /// Bounds of an integer.
     Integer {
         /// Smallest value.
         lower: i64,
         /// Largest value.
         upper: i64,
     },
-    /// Bounds of a number; not-a-number is out of bounds.
+    /// Bounds of a real number; NaN is out of bounds.
     Real {
         /// Smallest value.
         lower: f64,
@@ -26,49 +26,53 @@ pub enum Bound {
     },
     /// Bounds of each element of a list of fixed length.
     List(&'static [Bound]),
-    /// Bounds of a table, or of each table of a list.
+    /// Bounds of a table, or of each table in a list.
     Table(BoundTable),
 }
 
-/// Keys of a table with their bounds. Keys that hold no number are absent.
+/// Keys of a table with their bounds. Keys without numbers are absent.
 pub type BoundTable = &'static [(&'static str, Bound)];
 
-/// Returns the bounds of a whole number.
+/// Returns the bounds of an integer.
 pub const fn integer(lower: i64, upper: i64) -> Bound {
     Bound::Integer { lower, upper }
 }
 
-/// Returns the bounds of a number.
+/// Returns the bounds of a real number.
 pub const fn real(lower: f64, upper: f64) -> Bound {
     Bound::Real { lower, upper }
 }
 
-/// Bounds of a share.
-pub const SHARE: Bound = real(0.0, 1.0);
-/// Bounds of a seed: every integer that TOML has from 0 on.
+/// Bounds of a fraction.
+pub const FRACTION: Bound = real(0.0, 1.0);
+/// Bounds of a seed: all non-negative integers of TOML.
 pub const SEED: Bound = integer(0, i64::MAX);
-/// Largest number of steps of a training; at a thousand steps a second they take twelve days.
+/// Maximum number of training steps; at a thousand steps a second they take twelve days.
 pub const MAX_STEPS: u64 = 1_000_000_000;
-/// Bounds of the number of steps of a training.
+/// Bounds of the number of training steps.
 pub const STEPS: Bound = integer(1, MAX_STEPS as i64);
-/// Bounds of a learning rate. AdamW moves each weight by about the rate, and weights are about 1.
-pub const RATE: Bound = real(0.0, 1.0);
-/// Bounds of the number of shards. Each is a thread with a gradient of its own; machines have fewer cores.
+/// Bounds of a learning rate. AdamW changes each parameter by about the learning rate per step, and
+/// parameters are about 1.
+pub const LEARNING_RATE: Bound = real(0.0, 1.0);
+/// Bounds of the number of shards. Each shard is a thread with a gradient buffer.
 pub const SHARDS: Bound = integer(1, 256);
-/// Bounds of [`AdamRules`](chaic_nn::AdamRules). The betas stay below 1, where bias correction divides by 0.
+/// Bounds of [`AdamWConfig`](chaic_nn::AdamWConfig). The betas stay below 1, where bias correction
+/// divides by 0.
 pub const ADAM: Bound = Bound::Table(&[
     ("beta1", real(0.0, 0.9999)),
     ("beta2", real(0.0, 0.99999)),
     ("epsilon", real(1e-12, 1.0)),
     ("weight_decay", real(0.0, 1.0)),
-    ("clip_norm", real(1e-6, 1e6)),
+    ("max_grad_norm", real(1e-6, 1e6)),
 ]);
 
 impl fmt::Display for Bound {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Bound::Integer { lower, upper } => write!(f, "{lower} to {upper}"),
-            Bound::Real { lower, upper } => write!(f, "{} to {}", number(*lower), number(*upper)),
+            Bound::Real { lower, upper } => {
+                write!(f, "{} to {}", format_number(*lower), format_number(*upper))
+            }
             Bound::List(bounds) => {
                 let bounds: Vec<String> = bounds.iter().map(Bound::to_string).collect();
                 f.write_str(&bounds.join(", "))
@@ -78,19 +82,20 @@ impl fmt::Display for Bound {
     }
 }
 
-/// Returns a number as TOML has it, without long rows of digits.
-fn number(x: f64) -> String {
+/// Formats a number as TOML does, in scientific notation if it is very small or large.
+fn format_number(x: f64) -> String {
     let is_plain = x == 0.0 || (1e-3..1e7).contains(&x.abs());
     if is_plain { x.to_string() } else { format!("{x:e}").to_lowercase() }
 }
 
 impl Bound {
-    /// Returns whether a number is within; `None` if the value is no number.
+    /// Returns whether a number is within bounds; `None` if the value has another type.
     fn allows(self, value: &Value) -> Option<bool> {
         Some(match (self, value) {
             (Bound::Integer { lower, upper }, Value::Integer(n)) => (lower..=upper).contains(n),
             (Bound::Integer { .. }, Value::Float(_)) => false,
-            // Configurations hold single-precision numbers: bounds are compared at their precision.
+            // Configurations hold single-precision numbers, so bounds are compared in single
+            // precision.
             (Bound::Real { lower, upper }, Value::Float(x)) => {
                 (lower as f32..=upper as f32).contains(&(*x as f32))
             }
@@ -125,8 +130,8 @@ fn check_value(value: &Value, bound: Bound, path: &str) -> Result<(), String> {
             check_table(table, bounds, &format!("{path}."))
         }
         (Bound::List(bounds), Value::Array(values)) => {
-            let both = values.iter().zip(bounds).enumerate();
-            for (k, (value, bound)) in both {
+            let pairs = values.iter().zip(bounds).enumerate();
+            for (k, (value, bound)) in pairs {
                 check_value(value, *bound, &format!("{path}[{k}]"))?;
             }
             Ok(())
@@ -138,16 +143,16 @@ fn check_value(value: &Value, bound: Bound, path: &str) -> Result<(), String> {
             Ok(())
         }
         _ if bound.allows(value) == Some(false) => {
-            let value = value.as_float().map_or_else(|| value.to_string(), number);
-            let whole = if matches!(bound, Bound::Integer { .. }) { "a whole number " } else { "" };
-            Err(format!("`{path}` is {value}; it must be {whole}from {bound}"))
+            let value = value.as_float().map_or_else(|| value.to_string(), format_number);
+            let kind = if matches!(bound, Bound::Integer { .. }) { "an integer " } else { "" };
+            Err(format!("`{path}` is {value}; it must be {kind}from {bound}"))
         }
-        // A value of another type is refused where it is parsed.
+        // The parser refuses values of another type.
         _ => Ok(()),
     }
 }
 
-/// Returns the bounds of a key, by its path of tables.
+/// Returns the bounds of a key, given its path of tables.
 fn find(bounds: BoundTable, path: &[&str]) -> Option<Bound> {
     let (first, rest) = path.split_first()?;
     let (_, bound) = bounds.iter().find(|(key, _)| key == first)?;
@@ -158,7 +163,8 @@ fn find(bounds: BoundTable, path: &[&str]) -> Option<Bound> {
     }
 }
 
-/// Returns a configuration, as `toml` writes it, with the bounds of each number as a comment behind it.
+/// Appends the bounds of each number as a comment to its line of a configuration in `toml`'s
+/// format.
 pub fn annotate(text: &str, bounds: BoundTable) -> String {
     let mut section: Vec<&str> = Vec::new();
     let mut annotated = String::new();
@@ -177,7 +183,7 @@ pub fn annotate(text: &str, bounds: BoundTable) -> String {
     annotated
 }
 
-/// Returns the paths of all numbers of a configuration that have no bounds.
+/// Returns the paths of all numbers in a configuration that have no bounds.
 pub fn unbounded(table: &Table, bounds: BoundTable) -> Vec<String> {
     let mut found = Vec::new();
     for (key, value) in table {
@@ -230,29 +236,26 @@ mod tests {
     }
 
     #[test]
-    fn numbers_out_of_bounds_are_named_with_their_bounds() {
+    fn numbers_out_of_bounds_are_refused_with_key_and_bounds() {
         assert_eq!(problem(TEXT), None);
         for (text, expected) in [
-            ("steps = 0", "`steps` is 0; it must be a whole number from 1 to 100"),
-            ("steps = 2.5", "`steps` is 2.5; it must be a whole number from 1 to 100"),
+            ("steps = 0", "`steps` is 0; it must be an integer from 1 to 100"),
+            ("steps = 2.5", "`steps` is 2.5; it must be an integer from 1 to 100"),
             ("rate = nan", "`rate` is nan; it must be from 0 to 1e-4"),
             ("rate = -1", "`rate` is -1; it must be from 0 to 1e-4"),
             ("rate = 1e308", "`rate` is 1e308; it must be from 0 to 1e-4"),
             ("pair = [0.5, 0.5]", "`pair[1]` is 0.5; it must be from 1 to 10"),
             ("all = [0.5, 2]", "`all[1]` is 2; it must be from 0 to 1"),
-            ("[inner]\nn = -1", "`inner.n` is -1; it must be a whole number from 0 to 3"),
-            (
-                "[[each]]\n[[each]]\nn = 4",
-                "`each[1].n` is 4; it must be a whole number from 0 to 3",
-            ),
+            ("[inner]\nn = -1", "`inner.n` is -1; it must be an integer from 0 to 3"),
+            ("[[each]]\n[[each]]\nn = 4", "`each[1].n` is 4; it must be an integer from 0 to 3"),
         ] {
             assert_eq!(problem(text).as_deref(), Some(expected));
         }
-        assert_eq!(problem("rate = \"fast\""), None, "types are left to the parser");
+        assert_eq!(problem("rate = \"fast\""), None, "the parser checks types");
     }
 
     #[test]
-    fn a_written_configuration_states_its_bounds_and_reads_the_same() {
+    fn an_annotated_configuration_states_its_bounds_and_parses_to_the_same_values() {
         let annotated = annotate(TEXT, BOUNDS);
         for line in
             ["steps = 5  # 1 to 100", "pair = [0.5, 2.0]  # 0 to 1, 1 to 10", "n = 3  # 0 to 3"]

@@ -1,4 +1,4 @@
-//! The checkpoint file: one format for every training.
+//! Checkpoint format of all trainings.
 //!
 //! | bytes | content |
 //! |---|---|
@@ -7,9 +7,9 @@
 //! | 20 to 35 | xxh3-128 digest of all other bytes, little-endian |
 //! | 36 to the end | postcard: kind of the training, fingerprint of the network, named sections |
 //!
-//! Reading checks the digest first, so that a flipped bit, a cut or an appended byte is found before anything
-//! is decoded. The digest finds damage; it is no protection against a forger. Later versions keep the first
-//! 36 bytes as they are.
+//! The digest is verified before anything is decoded, so flipped bits, truncation and appended
+//! bytes are detected. It detects damage, not forgery. Later versions keep the layout of the first
+//! 36 bytes.
 
 use std::collections::BTreeMap;
 
@@ -29,20 +29,20 @@ const BODY_AT: usize = DIGEST_AT + 16;
 /// Reason why a checkpoint cannot be written or read.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CheckpointError {
-    /// The file is not what was written.
+    /// The content differs from what was written.
     #[error(
-        "is damaged: {0}; begin a new training, --weights takes the weights of the last validation"
+        "is damaged: {0}; start a new training, --weights takes the weights of the last validation"
     )]
     Damaged(String),
-    /// The file has a format that this version does not read.
+    /// The format version is not supported.
     #[error(
-        "has format version {found}, expected {VERSION}; begin a new training, --weights takes its weights"
+        "has format version {found}, expected {VERSION}; start a new training, --weights takes its weights"
     )]
     Version {
         /// Version in the file.
         found: u32,
     },
-    /// The file belongs to another kind of training.
+    /// The checkpoint belongs to another kind of training.
     #[error("is of `chaic train {found}`, expected `chaic train {expected}`")]
     Kind {
         /// Kind in the file.
@@ -50,41 +50,42 @@ pub enum CheckpointError {
         /// Kind of this training.
         expected: String,
     },
-    /// The file belongs to another network.
-    #[error("is of another network than this configuration and this version of chaic have")]
+    /// The checkpoint belongs to another network.
+    #[error("belongs to another network than that of this configuration and version of chaic")]
     Network,
     /// A section does not fit the training.
     #[error("does not fit this training: section `{section}` {problem}")]
     Section {
         /// Name of the section.
         section: String,
-        /// What is wrong, as a predicate.
+        /// Description of the problem, as a predicate.
         problem: String,
     },
 }
 
 impl CheckpointError {
-    /// Error of one section; `problem` is a predicate, such as "has 3 values, expected 4".
+    /// Creates an error about one section; `problem` is a predicate, such as "has 3 values,
+    /// expected 4".
     pub fn section(section: &str, problem: impl Into<String>) -> CheckpointError {
         CheckpointError::Section { section: section.to_owned(), problem: problem.into() }
     }
 }
 
-/// The training that a checkpoint belongs to.
+/// Identity of the training that a checkpoint belongs to.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity {
-    /// Name of the training, as `chaic train` takes it.
+    /// Name of the training, as in `chaic train NAME`.
     pub kind: String,
     /// Digest of names and shapes of the network's parameters.
     pub network: u128,
 }
 
 impl Identity {
-    /// Returns the identity of a training of this kind and network.
+    /// Creates the identity of a training of this kind and network.
     pub fn new(kind: &str, network: &Network) -> Identity {
         let layout: Vec<(&str, &[usize])> =
             network.parameters().iter().map(|p| (p.name.as_str(), &p.shape[..])).collect();
-        let layout = postcard::to_stdvec(&layout).expect("names and shapes are plain data");
+        let layout = postcard::to_stdvec(&layout).expect("names and shapes can be encoded");
         Identity { kind: kind.to_owned(), network: xxh3_128(&layout) }
     }
 }
@@ -147,7 +148,7 @@ impl Checkpoint {
         self.sections.insert(name.to_owned(), Section::Bytes(values));
     }
 
-    /// Returns the integer of a section of one.
+    /// Returns the only integer of a section.
     ///
     /// # Errors
     /// [`CheckpointError::Section`] if there is no such section.
@@ -223,7 +224,7 @@ impl Checkpoint {
             return Err(damaged(match head.starts_with(MAGIC) {
                 true => "its digest does not match its content",
                 false => {
-                    "it does not begin as a checkpoint does; format version 1 is no longer read"
+                    "it does not start with the magic string; format version 1 is no longer read"
                 }
             }));
         }
@@ -231,7 +232,7 @@ impl Checkpoint {
         if !head.starts_with(MAGIC) || version != VERSION {
             return Err(CheckpointError::Version { found: version });
         }
-        // Every length is checked against the bytes that are left before they are taken.
+        // Every length is checked against the number of remaining bytes before memory is allocated.
         type Body = (Identity, BTreeMap<String, Section>);
         let Ok(((found, sections), [])) = postcard::take_from_bytes::<Body>(body) else {
             return Err(damaged("its sections cannot be read"));
@@ -257,14 +258,14 @@ impl Checkpoint {
         }
     }
 
-    /// Returns the content of a checkpoint file, whatever the values.
+    /// Returns the content of a checkpoint file without checking that values are finite.
     pub(crate) fn encode(&self, identity: &Identity) -> Vec<u8> {
         let body = postcard::to_stdvec(&(identity, &self.sections));
-        with_head(&body.expect("sections are plain data"))
+        with_head(&body.expect("sections can be encoded"))
     }
 }
 
-/// Returns a file with this body and a head that fits it.
+/// Returns the content of a file with this body and a matching head.
 pub(crate) fn with_head(body: &[u8]) -> Vec<u8> {
     let mut bytes = MAGIC.to_vec();
     bytes.extend(VERSION.to_le_bytes());
@@ -297,7 +298,7 @@ mod tests {
 
     fn identity() -> Identity {
         let mut network = Network::default();
-        network.aside("numbers", 3);
+        network.extra_parameters("weights", 3);
         Identity::new("test", &network)
     }
 
@@ -311,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn a_checkpoint_is_read_as_it_was_written() {
+    fn a_checkpoint_is_read_back_unchanged() {
         let bytes = small().to_bytes(&identity()).unwrap();
         let read = Checkpoint::from_bytes(&bytes, &identity()).unwrap();
         assert_eq!(read, small());
@@ -323,9 +324,9 @@ mod tests {
     }
 
     #[test]
-    fn every_flipped_bit_cut_and_addition_is_called_damage() {
+    fn every_flipped_bit_truncation_and_appended_byte_is_reported_as_damage() {
         let bytes = small().to_bytes(&identity()).unwrap();
-        let is_damaged = |bytes: &[u8]| {
+        let assert_damaged = |bytes: &[u8]| {
             let error = Checkpoint::from_bytes(bytes, &identity()).unwrap_err();
             assert!(matches!(error, CheckpointError::Damaged(_)), "{error}");
             assert!(error.to_string().starts_with("is damaged: "), "{error}");
@@ -333,16 +334,16 @@ mod tests {
         for bit in 0..8 * bytes.len() {
             let mut flipped = bytes.clone();
             flipped[bit / 8] ^= 1 << (bit % 8);
-            is_damaged(&flipped);
+            assert_damaged(&flipped);
         }
-        (0..bytes.len()).for_each(|n| is_damaged(&bytes[..n]));
+        (0..bytes.len()).for_each(|n| assert_damaged(&bytes[..n]));
         for more in [&[0][..], &[255; 40]] {
-            is_damaged(&[&bytes[..], more].concat());
+            assert_damaged(&[&bytes[..], more].concat());
         }
     }
 
     #[test]
-    fn other_trainings_versions_and_numbers_that_are_not_finite_are_refused() {
+    fn other_trainings_versions_and_non_finite_values_are_refused() {
         let bytes = small().to_bytes(&identity()).unwrap();
         let other = Identity { kind: "other".to_owned(), ..identity() };
         let error = Checkpoint::from_bytes(&bytes, &other).unwrap_err().to_string();
@@ -351,8 +352,8 @@ mod tests {
         assert_eq!(Checkpoint::from_bytes(&bytes, &other), Err(CheckpointError::Network));
         let mut next = bytes.clone();
         next[VERSION_AT] = 3;
-        let fitting = digest(&next[..DIGEST_AT], &next[BODY_AT..]).to_le_bytes();
-        next[DIGEST_AT..BODY_AT].copy_from_slice(&fitting);
+        let matching = digest(&next[..DIGEST_AT], &next[BODY_AT..]).to_le_bytes();
+        next[DIGEST_AT..BODY_AT].copy_from_slice(&matching);
         let error = Checkpoint::from_bytes(&next, &identity()).unwrap_err();
         assert_eq!(error, CheckpointError::Version { found: 3 });
         for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
@@ -365,20 +366,20 @@ mod tests {
         }
     }
 
-    /// Returns 2^63 as postcard writes lengths.
+    /// Returns 2^63 in the encoding of lengths.
     fn huge() -> Vec<u8> {
         postcard::to_stdvec(&(1u64 << 63)).unwrap()
     }
 
     #[test]
-    fn lengths_beyond_the_file_are_refused_before_memory_is_taken() {
-        // Each body ends with a length of 2^63: of the kind, of the map, of a name, of each type of section.
+    fn lengths_beyond_the_file_are_refused_before_memory_is_allocated() {
+        // Each body ends with a length of 2^63: of the kind, the map, a name, and each section type.
         let head = postcard::to_stdvec(&identity()).unwrap();
         let section = |variant: u8| [&head[..], &[1, 1, b's', variant], &huge()].concat();
         let mut bodies = vec![huge(), [&head[..], &huge()].concat()];
         bodies.push([&head[..], &[1], &huge()].concat());
         bodies.extend((0..4).map(section));
-        // One that goes on with a megabyte, so that the first values are there.
+        // The same followed by a megabyte, so that the first values exist.
         bodies.extend((0..4).map(|variant| [section(variant), vec![0; 1 << 20]].concat()));
         for body in bodies {
             let error = Checkpoint::from_bytes(&with_head(&body), &identity()).unwrap_err();
@@ -388,9 +389,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn bytes_of_any_kind_are_read_or_refused(bytes: Vec<u8>, tail: Vec<u8>, at: usize) {
+        fn arbitrary_bytes_are_read_or_refused(bytes: Vec<u8>, tail: Vec<u8>, at: usize) {
             let _ = Checkpoint::from_bytes(&bytes, &identity());
-            // The same as the body of a file whose digest fits, alone and in place of the end of a valid one.
+            // As the body of a file with a matching digest, and in place of the end of a valid body.
             let _ = Checkpoint::from_bytes(&with_head(&bytes), &identity());
             let valid = small().encode(&identity());
             let body = &valid[BODY_AT..];

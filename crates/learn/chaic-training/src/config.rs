@@ -1,4 +1,4 @@
-//! The configuration file of a training.
+//! Configuration file of a training.
 
 use std::path::Path;
 
@@ -7,67 +7,72 @@ use serde::de::DeserializeOwned;
 use toml::Table;
 
 use crate::bounds;
-use crate::run::{Training, TrainingError};
+use crate::trainer::{Trainer, TrainingError};
 
-/// Largest configuration file that is read, bytes: a thousand times what the longest one has.
+/// Maximum size of a configuration file, bytes: a thousand times that of the longest one.
 const MAX_BYTES: u64 = 1 << 22;
 
-/// Reads a configuration file that a user named; keys that it does not name have their defaults.
+/// Reads a configuration file that a user named; missing keys get their defaults.
 ///
 /// # Errors
-/// [`TrainingError::Config`] if it names unknown keys, a value is out of bounds, or an input that it names
-/// cannot be used.
-pub fn read_rules<T: Training>(path: &Path) -> Result<T::Rules, TrainingError> {
-    of_bytes::<T>(path, &read_user_file(path, MAX_BYTES)?)
+/// [`TrainingError::Config`] if a key is unknown, a value is out of bounds, or an input file that it
+/// names cannot be used.
+pub fn read_config<T: Trainer>(path: &Path) -> Result<T::Config, TrainingError> {
+    parse_bytes::<T>(path, &read_user_file(path, MAX_BYTES)?)
 }
 
-/// Reads the configuration in the folder of a training.
+/// Reads the configuration in a training folder.
 ///
 /// # Errors
-/// As [`read_rules`], and if the file is a link.
-pub(crate) fn read_own_rules<T: Training>(path: &Path) -> Result<T::Rules, TrainingError> {
-    of_bytes::<T>(path, &read_bounded(path, MAX_BYTES)?)
+/// As [`read_config`], and if the file is a link.
+pub(crate) fn read_written_config<T: Trainer>(path: &Path) -> Result<T::Config, TrainingError> {
+    parse_bytes::<T>(path, &read_bounded(path, MAX_BYTES)?)
 }
 
-fn of_bytes<T: Training>(path: &Path, bytes: &[u8]) -> Result<T::Rules, TrainingError> {
-    let wrong = |problem: String| TrainingError::Config { path: path.to_owned(), problem };
-    let text = std::str::from_utf8(bytes).map_err(|e| wrong(e.to_string()))?;
-    parse_rules::<T>(text).map_err(wrong)
+fn parse_bytes<T: Trainer>(path: &Path, bytes: &[u8]) -> Result<T::Config, TrainingError> {
+    let invalid = |problem: String| TrainingError::Config { path: path.to_owned(), problem };
+    let text = std::str::from_utf8(bytes).map_err(|e| invalid(e.to_string()))?;
+    parse_config::<T>(text).map_err(invalid)
 }
 
 /// Parses the text of a configuration file.
 ///
 /// # Errors
-/// One line that says what is wrong.
-pub fn parse_rules<T: Training>(text: &str) -> Result<T::Rules, String> {
+/// One line that describes the problem.
+pub fn parse_config<T: Trainer>(text: &str) -> Result<T::Config, String> {
     // Bounds come first: the parser would refuse -1 without naming key and bounds.
     let table: Table = parse(text)?;
     bounds::check(&table, T::BOUNDS)?;
-    let rules = parse(text)?;
-    T::check(&rules)?;
-    Ok(rules)
+    let config = parse(text)?;
+    // The table may hold aliases, which have no bounds; the parsed configuration holds current keys.
+    check_config::<T>(&config)?;
+    Ok(config)
 }
 
-/// Checks a configuration that no file holds yet.
+/// Checks a configuration that was not read from a file.
 ///
 /// # Errors
-/// One line that says what is wrong.
-pub fn check_rules<T: Training>(rules: &T::Rules) -> Result<(), String> {
-    let table = Table::try_from(rules).map_err(|e| e.to_string())?;
+/// One line that describes the problem.
+pub fn check_config<T: Trainer>(config: &T::Config) -> Result<(), String> {
+    let table = Table::try_from(config).map_err(|e| e.to_string())?;
     bounds::check(&table, T::BOUNDS)?;
-    T::check(rules)
+    T::check(config)
 }
 
 /// Returns the text of a configuration file, with the bounds of each number as a comment.
-pub fn config_text<T: Training>(rules: &T::Rules) -> String {
-    let text = toml::to_string(rules).expect("a checked configuration is plain data");
+pub fn config_text<T: Trainer>(config: &T::Config) -> String {
+    let text = toml::to_string(config).expect("a checked configuration serializes to TOML");
     bounds::annotate(&text, T::BOUNDS)
 }
 
 fn parse<R: DeserializeOwned>(text: &str) -> Result<R, String> {
     toml::from_str(text).map_err(|error| {
         let before = error.span().and_then(|span| text.get(..span.start));
-        let message = error.message().replace('\n', " ");
+        let mut message = error.message().replace('\n', " ");
+        // A key that occurs twice under one name is called a duplicate key.
+        if message.starts_with("duplicate field") {
+            message += ": it is set under its current and under its old name; remove one";
+        }
         match before {
             Some(before) => format!("line {}: {message}", before.matches('\n').count() + 1),
             None => message,

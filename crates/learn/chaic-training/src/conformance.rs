@@ -1,6 +1,6 @@
-//! Tests that every training passes: each crate with trainings calls them from its own tests.
+//! Tests that every trainer passes. Crates with trainers call them from their own tests.
 //!
-//! They panic where a training breaks a promise, and say which.
+//! A failed test panics with a description of the violated property.
 
 use std::sync::atomic::AtomicBool;
 
@@ -8,41 +8,43 @@ use toml::{Table, Value};
 
 use crate::bounds;
 use crate::checkpoint::{Checkpoint, CheckpointError, Section};
-use crate::config::{config_text, parse_rules};
-use crate::run::{Training, checkpoint_bytes, identity, restore};
+use crate::config::{config_text, parse_config};
+use crate::run::{checkpoint_bytes, identity, restore};
+use crate::trainer::Trainer;
 
-/// Checkpoints of at most this many bits have each of them flipped.
+/// Maximum size of a checkpoint in which every bit is flipped, bits.
 const EVERY_BIT: usize = 20_000;
-/// Bits that are flipped in larger ones, besides those of the first bytes.
+/// Number of bits that are flipped in larger checkpoints, besides those of the first bytes.
 const SAMPLED_BITS: usize = 160;
-/// First bytes of larger ones in which each bit is flipped: head, identity and first section.
+/// Number of first bytes of larger checkpoints in which every bit is flipped: head, identity and
+/// first section.
 const HEAD_BYTES: usize = 160;
 
-/// Asserts that a training refuses every damaged checkpoint, and every one with impossible values.
+/// Asserts that a trainer refuses every damaged checkpoint, and every one with impossible values.
 ///
 /// # Panics
-/// If it accepts one, or calls damage something else.
-pub fn refuses_damaged_checkpoints<T: Training>(training: &mut T) {
-    let bytes = checkpoint_bytes(training, &[]).expect("the checkpoint can be written");
+/// If a damaged checkpoint is accepted, or refused for another reason than damage.
+pub fn refuses_damaged_checkpoints<T: Trainer>(trainer: &mut T) {
+    let bytes = checkpoint_bytes(trainer, &[]).expect("the checkpoint can be written");
     let stop = AtomicBool::new(false);
-    let mut is_damaged = |bytes: &[u8], what: &str| match restore(training, bytes, &stop) {
+    let mut expect_damage = |bytes: &[u8], description: &str| match restore(trainer, bytes, &stop) {
         Err(CheckpointError::Damaged(_)) => {}
-        Err(error) => panic!("{what}: {error}"),
-        Ok(_) => panic!("a checkpoint with {what} is accepted"),
+        Err(error) => panic!("{description}: {error}"),
+        Ok(_) => panic!("a checkpoint with {description} is accepted"),
     };
     for bit in sampled_bits(8 * bytes.len()) {
         let mut flipped = bytes.clone();
         flipped[bit / 8] ^= 1 << (bit % 8);
-        is_damaged(&flipped, &format!("bit {bit} flipped"));
+        expect_damage(&flipped, &format!("bit {bit} flipped"));
     }
     for n in [0, 1, 15, 16, 35, 36, 40, bytes.len() / 2, bytes.len() - 1] {
-        is_damaged(&bytes[..n], &format!("{n} bytes left"));
+        expect_damage(&bytes[..n], &format!("truncation to {n} bytes"));
     }
-    is_damaged(&[&bytes[..], &[0]].concat(), "a byte more");
-    let identity = identity(training);
-    for (what, altered) in alterations(&training.checkpoint()) {
-        let restored = restore(training, &altered.encode(&identity), &stop);
-        assert!(restored.is_err(), "a checkpoint with {what} is accepted");
+    expect_damage(&[&bytes[..], &[0]].concat(), "an appended byte");
+    let identity = identity(trainer);
+    for (description, altered) in alterations(&trainer.checkpoint()) {
+        let restored = restore(trainer, &altered.encode(&identity), &stop);
+        assert!(restored.is_err(), "a checkpoint with {description} is accepted");
     }
 }
 
@@ -51,29 +53,30 @@ fn sampled_bits(n_bits: usize) -> Vec<usize> {
         return (0..n_bits).collect();
     }
     let step = n_bits / SAMPLED_BITS;
-    // An odd step visits all bits of a byte.
+    // An odd stride visits all bits of a byte.
     (0..8 * HEAD_BYTES).chain((0..n_bits).step_by(step | 1)).collect()
 }
 
-/// Returns checkpoints that differ from a valid one by a value, a length or a section, with what differs.
-fn alterations(whole: &Checkpoint) -> Vec<(String, Checkpoint)> {
+/// Returns checkpoints that differ from a valid one by a value, a length or a section, with a
+/// description of each.
+fn alterations(valid: &Checkpoint) -> Vec<(String, Checkpoint)> {
     let mut found = Vec::new();
-    let mut add = |what: String, name: &str, section: Option<Section>| {
-        let mut altered = whole.clone();
+    let mut add = |description: String, name: &str, section: Option<Section>| {
+        let mut altered = valid.clone();
         match section {
             Some(section) => altered.sections.insert(name.to_owned(), section),
             None => altered.sections.remove(name),
         };
-        found.push((format!("{what} in `{name}`"), altered));
+        found.push((format!("{description} in `{name}`"), altered));
     };
-    for (name, section) in &whole.sections {
-        add("nothing".to_owned(), name, None);
+    for (name, section) in &valid.sections {
+        add("no section".to_owned(), name, None);
         add("another type".to_owned(), name, Some(other_type(section)));
-        add("one value more".to_owned(), name, Some(longer(section)));
+        add("an appended value".to_owned(), name, Some(longer(section)));
         let n = len(section);
         for at in [0, n / 3, n / 2, n.saturating_sub(1)].into_iter().filter(|at| *at < n) {
-            for (what, section) in hostile_values(section, at) {
-                add(format!("{what} at {at}"), name, Some(section));
+            for (description, section) in hostile_values(section, at) {
+                add(format!("{description} at {at}"), name, Some(section));
             }
         }
     }
@@ -131,23 +134,25 @@ fn hostile_values(section: &Section, at: usize) -> Vec<(String, Section)> {
                 altered.push((value.to_string(), Section::Doubles(values)));
             }
         }
-        // Any byte may be one that the training has written.
+        // The trainer may have written any byte.
         Section::Bytes(_) => {}
     }
     altered
 }
 
-/// Asserts that every number in the configuration of a training has bounds, that a written configuration states
-/// them, and that whatever a number is set to is accepted within bounds or refused by name.
+/// Asserts that every number in the configuration of a trainer has bounds.
+///
+/// A written configuration states them. Any other value of a number is accepted within bounds, or
+/// refused with key and bounds.
 ///
 /// # Panics
-/// If a number has no bounds, or a refusal doesn't name key and bounds.
-pub fn bounds_every_number<T: Training>() {
-    let rules = T::Rules::default();
-    let table = Table::try_from(&rules).expect("defaults are plain data");
+/// If a number has no bounds, or an error message lacks key or bounds.
+pub fn bounds_every_number<T: Trainer>() {
+    let config = T::Config::default();
+    let table = Table::try_from(&config).expect("the default configuration serializes to TOML");
     assert_eq!(bounds::unbounded(&table, T::BOUNDS), [""; 0], "numbers without bounds");
-    let text = config_text::<T>(&rules);
-    parse_rules::<T>(&text).unwrap_or_else(|e| panic!("defaults are refused: {e}"));
+    let text = config_text::<T>(&config);
+    parse_config::<T>(&text).unwrap_or_else(|e| panic!("defaults are refused: {e}"));
     let mut leaves = Vec::new();
     numbers(&Value::Table(table.clone()), &mut Vec::new(), &mut leaves);
     assert!(leaves.len() > 5, "{leaves:?}");
@@ -159,17 +164,17 @@ pub fn bounds_every_number<T: Training>() {
         for hostile in hostile_numbers() {
             let mut root = Value::Table(table.clone());
             set(&mut root, &leaf, hostile.clone());
-            let text = toml::to_string(&root).expect("numbers are plain data");
+            let text = toml::to_string(&root).expect("numbers serialize to TOML");
             let key = leaf.iter().rev().find(|step| step.parse::<usize>().is_err());
-            let key = key.expect("a number has a key");
-            if let Err(problem) = parse_rules::<T>(&text) {
+            let key = key.expect("every number has a key");
+            if let Err(problem) = parse_config::<T>(&text) {
                 n_refused += 1;
                 let names = problem.contains(key.as_str()) && problem.contains(" to ");
                 assert!(names, "{} = {hostile}: {problem}", leaf.join("."));
                 assert!(!problem.contains('\n'), "{problem}");
             }
         }
-        // Not-a-number, infinity and 1e308 are nothing that any key takes.
+        // NaN, infinity and 1e308 are out of bounds for every key.
         assert!(n_refused >= 3, "{} takes {} hostile values", leaf.join("."), n_refused);
     }
 }
@@ -185,7 +190,7 @@ fn is_number_line(line: &str) -> bool {
     value.starts_with(|c: char| c.is_ascii_digit() || c == '-')
 }
 
-/// Collects the paths of all numbers, by keys and places in lists.
+/// Collects the paths of all numbers, by keys and list indices.
 fn numbers(value: &Value, path: &mut Vec<String>, found: &mut Vec<Vec<String>>) {
     let mut inner = |step: String, value: &Value| {
         path.push(step);

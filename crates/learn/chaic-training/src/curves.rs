@@ -1,39 +1,55 @@
-//! Learning curves: the file of losses and validations.
+//! Learning curves: the file of training and validation metrics.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write as _};
 use std::path::Path;
 
-use chaic_files::{FileError, open_to_append, read_bounded, write_whole};
-use serde::{Deserialize, Serialize};
+use chaic_files::{FileError, open_for_append, read_bounded, write_atomically};
+use serde::{Deserialize, Deserializer, Serialize};
 
-/// Losses and validations, a JSON object a line.
+/// Name of the file of learning curves: one JSON object per line.
 pub const CURVES: &str = "curves.jsonl";
-/// Largest file of curves that is cut back, bytes: some three million lines.
+/// Maximum size of a curves file that is truncated on resume, bytes: about three million lines.
 const MAX_BYTES: u64 = 1 << 30;
 
-/// Numbers with their names.
-pub type Figures = BTreeMap<String, f64>;
+/// Metric names of earlier versions with their current names. Files with the old names are still
+/// read.
+const RENAMED_METRICS: [(&str, &str); 9] = [
+    ("objective", "policy_loss"),
+    ("divergence", "approx_kl"),
+    ("clipped", "clip_fraction"),
+    ("lessons", "demonstrations"),
+    ("tr_likeliest", "tr_greedy"),
+    ("labels", "label_loss"),
+    ("offsets", "offset_loss"),
+    ("right", "accuracy"),
+    ("right_of_things", "object_accuracy"),
+];
 
-/// A line of the curves.
+/// Values of metrics by name.
+pub type Metrics = BTreeMap<String, f64>;
+
+/// Line of the curves file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Record {
-    /// What the figures are of.
-    pub of: Of,
-    /// After so many steps.
+pub struct CurveRecord {
+    /// Phase in which the metrics were measured.
+    #[serde(alias = "of")]
+    pub phase: Phase,
+    /// Number of steps taken before.
     pub step: u64,
-    /// The figures: means over the steps since the last record, or those of a validation.
-    #[serde(flatten)]
-    pub figures: Figures,
+    /// Means over the steps since the last training record, or results of a validation.
+    #[serde(flatten, deserialize_with = "read_metrics")]
+    pub metrics: Metrics,
 }
 
-/// What figures are of.
+/// Phase of a training in which metrics are measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Of {
-    /// What is learned from.
-    Loss,
-    /// What nothing is learned from.
+pub enum Phase {
+    /// Optimizer steps on training data.
+    #[serde(alias = "loss")]
+    Train,
+    /// Evaluation on validation data.
     Validation,
 }
 
@@ -41,17 +57,29 @@ pub enum Of {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
 pub(crate) struct Position {
     pub(crate) step: u64,
-    pub(crate) of: Of,
+    #[serde(alias = "of")]
+    pub(crate) phase: Phase,
 }
 
-/// Returns figures of these names.
-pub fn figures<const N: usize>(named: [(&str, f64); N]) -> Figures {
+fn read_metrics<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Metrics, D::Error> {
+    let metrics = Metrics::deserialize(deserializer)?;
+    Ok(metrics.into_iter().map(|(name, x)| (current_name(&name).to_owned(), x)).collect())
+}
+
+/// Returns the current name of a metric that may have the name of an earlier version.
+pub(crate) fn current_name(name: &str) -> &str {
+    let renamed = RENAMED_METRICS.iter().find(|(old, _)| *old == name);
+    renamed.map_or(name, |(_, current)| *current)
+}
+
+/// Returns metrics from pairs of name and value.
+pub fn metrics<const N: usize>(named: [(&str, f64); N]) -> Metrics {
     named.into_iter().map(|(name, x)| (name.to_owned(), x)).collect()
 }
 
-/// Returns the mean of each figure.
-pub(crate) fn mean(steps: &[Figures]) -> Figures {
-    let mut sums = Figures::new();
+/// Returns the mean of each metric.
+pub(crate) fn mean(steps: &[Metrics]) -> Metrics {
+    let mut sums = Metrics::new();
     for (name, x) in steps.iter().flatten() {
         *sums.entry(name.clone()).or_default() += x / steps.len() as f64;
     }
@@ -59,44 +87,44 @@ pub(crate) fn mean(steps: &[Figures]) -> Figures {
 }
 
 /// Appends a line.
-pub(crate) fn append(folder: &Path, record: &Record) -> Result<(), FileError> {
+pub(crate) fn append(folder: &Path, record: &CurveRecord) -> Result<(), FileError> {
     let path = folder.join(CURVES);
-    let line = serde_json::to_string(record).expect("a record is plain data") + "\n";
-    let mut file = open_to_append(&path)?;
-    // On the disk before the checkpoint that counts on it.
+    let line = serde_json::to_string(record).expect("a record serializes to JSON") + "\n";
+    let mut file = open_for_append(&path)?;
+    // The line must be on disk before the checkpoint that counts it as written.
     let written = file.write_all(line.as_bytes()).and_then(|()| file.sync_data());
-    written.map_err(FileError::of("can't write", &path))
+    written.map_err(FileError::context("can't write", &path))
 }
 
-/// Returns whether a training has left curves.
-pub(crate) fn is_begun(folder: &Path) -> bool {
-    folder.join(CURVES).symlink_metadata().is_ok_and(|found| found.len() > 0)
+/// Returns whether a training has written curves.
+pub(crate) fn has_lines(folder: &Path) -> bool {
+    folder.join(CURVES).symlink_metadata().is_ok_and(|metadata| metadata.len() > 0)
 }
 
-/// Removes the lines behind `last`, and lines that are cut off or repeated.
+/// Removes the lines after `last`, and lines that are incomplete or repeated.
 ///
-/// A training that was killed may have written lines after its last checkpoint; it writes them again.
-pub(crate) fn cut_back(folder: &Path, last: Option<Position>) -> Result<(), FileError> {
+/// A killed training may have written lines after its last checkpoint; it writes them again.
+pub(crate) fn truncate_after(folder: &Path, last: Option<Position>) -> Result<(), FileError> {
     let path = folder.join(CURVES);
     if !path.exists() {
         return Ok(());
     }
     let bytes = read_bounded(&path, MAX_BYTES)?;
     if bytes.len() as u64 == MAX_BYTES {
-        let refusal = io::Error::other(format!("it has more than {MAX_BYTES} bytes"));
-        return Err(FileError::of("read", &path)(refusal));
+        let error = io::Error::other(format!("it has more than {MAX_BYTES} bytes"));
+        return Err(FileError::context("read", &path)(error));
     }
     let mut kept = Vec::new();
-    let mut before = None;
+    let mut previous = None;
     for line in bytes.split_inclusive(|byte| *byte == b'\n') {
         let position: Option<Position> = serde_json::from_slice(line).ok();
-        let is_next = |at: &Position| Some(*at) > before && Some(*at) <= last;
+        let is_next = |at: &Position| Some(*at) > previous && Some(*at) <= last;
         if let Some(at) = position.filter(|at| line.ends_with(b"\n") && is_next(at)) {
             kept.extend_from_slice(line);
-            before = Some(at);
+            previous = Some(at);
         }
     }
-    if kept == bytes { Ok(()) } else { write_whole(&path, &kept) }
+    if kept == bytes { Ok(()) } else { write_atomically(&path, &kept) }
 }
 
 #[cfg(test)]
@@ -105,30 +133,51 @@ mod tests {
     use std::fs;
 
     #[test]
-    fn lines_behind_the_checkpoint_and_halves_of_lines_are_removed() {
+    fn lines_after_the_checkpoint_and_incomplete_lines_are_removed() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join(CURVES);
-        let line = |of: Of, step| {
-            let record = Record { of, step, figures: figures([("loss", 0.5)]) };
+        let line = |phase: Phase, step| {
+            let record = CurveRecord { phase, step, metrics: metrics([("loss", 0.5)]) };
             serde_json::to_string(&record).unwrap() + "\n"
         };
-        let kept = [line(Of::Loss, 20), line(Of::Loss, 40), line(Of::Validation, 40)].concat();
-        let behind = [line(Of::Loss, 60), line(Of::Validation, 60)].concat();
-        let cut = |text: &str, last| {
+        let kept =
+            [line(Phase::Train, 20), line(Phase::Train, 40), line(Phase::Validation, 40)].concat();
+        let after = [line(Phase::Train, 60), line(Phase::Validation, 60)].concat();
+        let truncated = |text: &str, last| {
             fs::write(&path, text).unwrap();
-            cut_back(dir.path(), last).unwrap();
+            truncate_after(dir.path(), last).unwrap();
             fs::read_to_string(&path).unwrap()
         };
-        let last = Some(Position { step: 40, of: Of::Validation });
-        for tail in ["", &behind, &behind[..30], &kept, "{\"of\":\"loss\",\"step\":1", "\n\u{0}"] {
-            assert_eq!(cut(&format!("{kept}{tail}"), last), kept, "{tail}");
+        let last = Some(Position { step: 40, phase: Phase::Validation });
+        for tail in ["", &after, &after[..30], &kept, "{\"phase\":\"train\",\"st", "\n\u{0}"] {
+            assert_eq!(truncated(&format!("{kept}{tail}"), last), kept, "{tail}");
         }
-        let before_validation = Some(Position { step: 40, of: Of::Loss });
-        let without = [line(Of::Loss, 20), line(Of::Loss, 40)].concat();
-        assert_eq!(cut(&kept, before_validation), without);
-        assert_eq!(cut(&kept, None), "");
+        let before_validation = Some(Position { step: 40, phase: Phase::Train });
+        let without = [line(Phase::Train, 20), line(Phase::Train, 40)].concat();
+        assert_eq!(truncated(&kept, before_validation), without);
+        assert_eq!(truncated(&kept, None), "");
         fs::remove_file(&path).unwrap();
-        cut_back(dir.path(), last).unwrap();
+        truncate_after(dir.path(), last).unwrap();
         assert!(!path.exists());
+    }
+
+    #[test]
+    fn lines_of_earlier_versions_are_read_under_current_names() {
+        let old =
+            r#"{"of":"loss","step":7,"clipped":0.25,"divergence":0.5,"objective":-1.0,"tr":0.75}"#;
+        let new = r#"{"phase":"train","step":7,"approx_kl":0.5,"clip_fraction":0.25,"policy_loss":-1.0,"tr":0.75}"#;
+        let record: CurveRecord = serde_json::from_str(old).unwrap();
+        assert_eq!(record, serde_json::from_str(new).unwrap());
+        assert_eq!(serde_json::to_string(&record).unwrap(), new);
+        let validation: CurveRecord =
+            serde_json::from_str(r#"{"of":"validation","step":8,"tr":0.5}"#).unwrap();
+        assert_eq!(validation.phase, Phase::Validation);
+        // Resumed trainings keep lines of both versions.
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join(CURVES);
+        let text = format!("{old}\n{}\n", new.replace("\"step\":7", "\"step\":8"));
+        fs::write(&path, &text).unwrap();
+        truncate_after(dir.path(), Some(Position { step: 8, phase: Phase::Train })).unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), text);
     }
 }

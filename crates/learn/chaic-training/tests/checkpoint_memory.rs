@@ -1,6 +1,6 @@
-//! Promise: reading a checkpoint takes no more memory than a small multiple of its size, whatever lengths it states.
+//! Reading a checkpoint allocates at most a small multiple of its size, whatever lengths it states.
 //!
-//! This test has a process of its own, whose peak it measures.
+//! This test runs in its own process and measures the peak memory of that process.
 
 #![cfg(target_os = "linux")]
 
@@ -8,17 +8,17 @@ use chaic_nn::Network;
 use chaic_training::checkpoint::{Checkpoint, CheckpointError, Identity, MAGIC, VERSION};
 use xxhash_rust::xxh3::xxh3_128;
 
-/// Memory that a refused checkpoint of a megabyte may take, kB.
+/// Memory that a refused checkpoint of a megabyte may allocate, kB.
 const ALLOWED_KB: u64 = 64 * 1024;
 
-/// Returns the largest size that the process has had in memory, kB.
+/// Returns the peak resident memory of the process, kB.
 fn peak_kb() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap();
     let line = status.lines().find(|line| line.starts_with("VmHWM:")).unwrap();
     line.split_whitespace().nth(1).unwrap().parse().unwrap()
 }
 
-/// Returns a checkpoint file with this body, whose digest fits.
+/// Returns a checkpoint file with this body and a matching digest.
 fn file(body: &[u8]) -> Vec<u8> {
     let head = [&MAGIC[..], &VERSION.to_le_bytes()].concat();
     let digest = xxh3_128(&[&head[..], body].concat());
@@ -35,7 +35,7 @@ fn stated_lengths_take_no_memory() {
     assert_eq!(file(body), valid, "the file is as the format says");
     let huge = postcard::to_stdvec(&(1u64 << 63)).unwrap();
     let before = peak_kb();
-    // A length of 2^63 in place of every byte, with a megabyte of values behind it.
+    // A length of 2^63 in place of every byte, followed by a megabyte of values.
     for at in 0..body.len() {
         let body = [&body[..at], &huge[..], &vec![0; 1 << 20][..]].concat();
         let read = Checkpoint::from_bytes(&file(&body), &identity);

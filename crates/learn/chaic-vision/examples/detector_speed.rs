@@ -1,4 +1,4 @@
-//! How long the detector takes on one core: the least of some runs, and the median.
+//! Measures the detector on one core: minimum and median time of several runs.
 //! `cargo run --release -p chaic-vision --example detector_speed`.
 use std::time::Instant;
 
@@ -7,52 +7,52 @@ use chaic_nn::{Inference, Pass, Shape, Tensor};
 use chaic_vision::detector::Detector;
 use chaic_vision::features::N_FEATURES;
 use chaic_vision::trained::TrainedDetector;
-use chaic_vision::views::{Part, ViewRules, Views};
+use chaic_vision::views::{DatasetSplit, SyntheticViews, ViewConfig};
 
-fn report(what: &str, n: usize, mut work: impl FnMut()) {
+fn report(name: &str, n: usize, mut work: impl FnMut()) {
     let mut times: Vec<f64> = (0..n)
         .map(|_| {
-            let began = Instant::now();
+            let start = Instant::now();
             work();
-            1e3 * began.elapsed().as_secs_f64()
+            1e3 * start.elapsed().as_secs_f64()
         })
         .collect();
     times.sort_by(f64::total_cmp);
-    println!("{what:40} {:7.1} ms, median {:7.1} ms", times[0], times[n / 2]);
+    println!("{name:40} {:7.1} ms, median {:7.1} ms", times[0], times[n / 2]);
 }
 
 fn main() {
     let detector = Detector::new();
     let net = &detector.network;
-    println!("{} parameters", net.n_numbers());
-    let numbers = net.begin(1);
+    println!("{} parameters", net.n_parameters());
+    let parameters = net.init_parameters(1);
     let shape = Shape { n: 1, height: 512, width: 512, channels: N_FEATURES };
-    let mut inference = Inference::new(net, &numbers, widest());
+    let mut inference = Inference::new(net, &parameters, widest());
     report("the network, 512x512", 30, || {
         inference.input(shape).fill(0.1);
         inference.run(|_, _, _| ());
     });
     let trained = TrainedDetector::built_in();
     let mut inference = trained.inference();
-    let mut views = Views::new(Part::Validation, ViewRules::NATURAL, 1, 0);
+    let mut views = SyntheticViews::new(DatasetSplit::Validation, ViewConfig::NATURAL, 1, 0);
     for _ in 0..3 {
         let view = views.draw();
-        let n = trained.detect((&view.rgb, &view.depth_m, &view.camera), &mut inference).len();
+        let n = trained.detect(&view.rgb, &view.depth_m, &view.camera, &mut inference).len();
         report(&format!("an image, {n} instances"), 20, || {
-            trained.detect((&view.rgb, &view.depth_m, &view.camera), &mut inference);
+            trained.detect(&view.rgb, &view.depth_m, &view.camera, &mut inference);
         });
     }
     for (n, side) in [(1, 512), (4, 256)] {
         let shape = Shape { n, height: side, width: side, channels: N_FEATURES };
-        let input = Tensor { shape, data: vec![0.1; shape.numbers()] };
+        let input = Tensor { shape, data: vec![0.1; shape.len()] };
         let mut pass = Pass::new(net, widest());
-        let mut by = vec![0.0; net.n_numbers()];
+        let mut grad_parameters = vec![0.0; net.n_parameters()];
         report(&format!("forward pass, {n} of {side}x{side}"), 5, || {
-            pass.forward(net, &numbers, &input);
+            pass.forward(net, &parameters, &input);
         });
         report(&format!("backward pass, {n} of {side}x{side}"), 5, || {
-            pass.begin_backward();
-            pass.backward(net, &numbers, &mut by);
+            pass.zero_gradients();
+            pass.backward(net, &parameters, &mut grad_parameters);
         });
     }
 }

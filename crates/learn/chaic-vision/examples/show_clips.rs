@@ -1,27 +1,29 @@
-//! Clips with labels as pictures, a row each: `cargo run --release -p chaic-vision --example show_clips
-//! -- CLIPS OUT.png`.
+//! Draws labeled clips, one per row:
+//! `cargo run --release -p chaic-vision --example show_clips -- CLIPS OUT.png`.
 use std::sync::atomic::AtomicBool;
 
-use chaic_agents::sight::TrueSight;
+use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
 use chaic_vision::behavior::Behavior;
 use chaic_vision::behavior::clip::CROPS;
-use chaic_vision::behavior::collect::{CollectRules, Collector, Counts, collect};
+use chaic_vision::behavior::collect::{Collector, Counts, collect};
+use chaic_vision::behavior::config::ClipCollectionConfig;
 use chaic_vision::behavior::crop::SIDE;
-use chaic_vision::views::Part;
+use chaic_vision::views::DatasetSplit;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
-    let of_each = arguments.next().and_then(|n| n.parse().ok()).unwrap_or(4);
+    let max_per_class = arguments.next().and_then(|n| n.parse().ok()).unwrap_or(4);
     let out = arguments.next().unwrap_or_else(|| "clips.png".to_owned());
-    let rules = CollectRules { of_each, episodes: 64, ..CollectRules::default() };
-    let (part, sight) = (Part::Training, &TrueSight);
-    let collector = Collector { part, rules: &rules, sight, n_threads: 2, folder: None };
-    let began = std::time::Instant::now();
+    let config =
+        ClipCollectionConfig { max_per_class, episodes: 64, ..ClipCollectionConfig::default() };
+    let (split, perception) = (DatasetSplit::Train, &GroundTruthPerceptionFactory);
+    let collector = Collector { split, config: &config, perception, n_threads: 2, folder: None };
+    let start = std::time::Instant::now();
     let mut progress = |n: usize, counts: &Counts| {
-        println!("{n} episodes, {:.0} s: {counts:?}", began.elapsed().as_secs_f64());
+        println!("{n} episodes, {:.0} s: {counts:?}", start.elapsed().as_secs_f64());
     };
     let clips = collect(&collector, &mut progress, &AtomicBool::new(false))?;
-    let mut clips = clips.expect("nobody stops it");
+    let mut clips = clips.expect("the flag is not set");
     clips.sort_by_key(|clip| (clip.is_mixed, clip.label));
     println!("{:?}, then mixed, from top to bottom", Behavior::ALL);
     let shown = CROPS / 2;

@@ -4,7 +4,7 @@
 use std::time::Instant;
 
 use chaic_vision::labels::{class_of, n_labels};
-use chaic_vision::views::{Part, ViewRules, Views};
+use chaic_vision::views::{DatasetSplit, SyntheticViews, ViewConfig};
 use image::{Rgb, RgbImage};
 
 const COLUMNS: u32 = 4;
@@ -15,7 +15,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let out = std::env::args().nth(1).unwrap_or_else(|| "views.png".to_owned());
     let mut picture = RgbImage::new(2 * SIDE * COLUMNS, SIDE * ROWS);
     for k in 0..COLUMNS * ROWS {
-        let view = Views::new(Part::Training, ViewRules::TRAINING, 1, u64::from(k)).draw();
+        let view =
+            SyntheticViews::new(DatasetSplit::Train, ViewConfig::TRAINING, 1, u64::from(k)).draw();
         let (x0, y0) = (2 * SIDE * (k % COLUMNS), SIDE * (k / COLUMNS));
         for (x, y) in (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| (x, y))) {
             let at = (2 * y * view.camera.width + 2 * x) as usize;
@@ -30,9 +31,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         println!("{k}: {}", aimed.map_or("anywhere", |class| class.name()));
     }
     picture.save(&out)?;
-    let (began, mut n_things, mut n_views) = (Instant::now(), vec![0u32; n_labels()], 0);
+    let (start, mut n_instances, mut n_views) = (Instant::now(), vec![0u32; n_labels()], 0);
     for k in 0..800 {
-        let view = Views::new(Part::Training, ViewRules::TRAINING, 2, k).draw();
+        let view = SyntheticViews::new(DatasetSplit::Train, ViewConfig::TRAINING, 2, k).draw();
         let mut sizes = vec![0u32; view.labels.len()];
         for id in &view.ids {
             if let Some(size) = sizes.get_mut(usize::from(*id)) {
@@ -41,12 +42,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         n_views += 1;
         for (label, size) in view.labels.iter().zip(sizes) {
-            n_things[usize::from(*label)] += u32::from(size >= 100);
+            n_instances[usize::from(*label)] += u32::from(size >= 100);
         }
     }
-    println!("{n_views} views in {:?}; things of 100 pixels or more:", began.elapsed());
+    println!("{n_views} views in {:?}; instances of 100 pixels or more:", start.elapsed());
     let mut all: Vec<(u32, &str)> = (1..n_labels())
-        .map(|l| (n_things[l], class_of(l as u8).map_or("", |class| class.name())))
+        .map(|l| (n_instances[l], class_of(l as u8).map_or("", |class| class.name())))
         .collect();
     all.sort();
     all.iter().for_each(|(n, name)| print!("{name} {n}, "));

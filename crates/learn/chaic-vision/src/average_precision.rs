@@ -1,75 +1,81 @@
-//! Average precision by the COCO definition: detections of a class are matched, surest first, to the
-//! instances that they overlap most; precision is averaged over 101 levels of recall. The numbers are
-//! those of pycocotools (`benches/pycocotools`).
+//! Average precision as defined by COCO. Detections of a class are matched, in order of their
+//! score, to the instance with the greatest overlap; precision is averaged over 101 levels of
+//! recall. The values equal those of pycocotools (`benches/pycocotools`).
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
-/// Overlaps from which a detection counts as right: 0.5 to 0.95.
-pub const OVERLAPS: [f64; 10] = [0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95];
-/// At most so many detections of an image count, surest first.
-pub const MOST_DETECTIONS: usize = 100;
+/// IoU thresholds of a match: 0.5 to 0.95.
+pub const IOU_THRESHOLDS: [f64; 10] = [0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95];
+/// Maximum number of detections per image; those with the highest scores count.
+pub const MAX_DETECTIONS: usize = 100;
 
-/// An instance that is there.
+/// Annotated instance of an image.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Truth {
+pub struct GroundTruthInstance {
     /// Its label.
     pub label: u8,
-    /// How many pixels show it.
+    /// Visible pixels.
     pub area: u32,
 }
 
-/// Pixels of what is asked for. What has more or fewer is neither asked for nor wrong to find.
-pub type Areas = RangeInclusive<u32>;
+/// Range of areas that are evaluated, pixels. Instances outside of it are ignored: neither missed
+/// nor wrong.
+pub type AreaRange = RangeInclusive<u32>;
 
-/// A detection in an image, with how it overlaps what is there.
+/// Detection in an image, with its overlaps with the annotated instances.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Detection {
+pub struct ScoredDetection {
     /// Its label.
     pub label: u8,
-    /// How sure it is.
+    /// Score, 0 to 1.
     pub score: f32,
-    /// How many pixels it has.
+    /// Number of pixels.
     pub area: u32,
-    /// Pixels that it shares with each [`Truth`], in their order.
-    pub shared: Vec<u32>,
+    /// Pixels shared with each [`GroundTruthInstance`], in their order.
+    pub intersections: Vec<u32>,
 }
 
-/// One image.
+/// Annotations and detections of one image.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Image {
-    /// What is there.
-    pub truths: Vec<Truth>,
-    /// What was found.
-    pub detections: Vec<Detection>,
+pub struct EvaluatedImage {
+    /// Annotated instances.
+    pub truths: Vec<GroundTruthInstance>,
+    /// Detections.
+    pub detections: Vec<ScoredDetection>,
 }
 
-/// Average precision of one class at one overlap; `None` if nothing of it is asked for.
-fn of_class(images: &[Image], label: u8, overlap: f64, areas: &Areas) -> Option<f64> {
-    let of_it = images.iter().flat_map(|i| &i.truths).filter(|t| t.label == label);
-    let n_asked = of_it.filter(|t| areas.contains(&t.area)).count();
-    if n_asked == 0 {
+/// Average precision of one class at one IoU threshold; `None` if no instance of it is evaluated.
+fn class_precision(
+    images: &[EvaluatedImage],
+    label: u8,
+    iou_threshold: f64,
+    areas: &AreaRange,
+) -> Option<f64> {
+    let instances = images.iter().flat_map(|i| &i.truths).filter(|t| t.label == label);
+    let n_evaluated = instances.filter(|t| areas.contains(&t.area)).count();
+    if n_evaluated == 0 {
         return None;
     }
-    // Score, and whether it is right, of detections that count.
-    let mut judged: Vec<(f32, bool)> = Vec::new();
+    // Score and correctness of the detections that count.
+    let mut scored: Vec<(f32, bool)> = Vec::new();
     for image in images {
-        judge(image, label, overlap, areas, &mut judged);
+        match_detections(image, label, iou_threshold, areas, &mut scored);
     }
-    judged.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let (mut right, mut curve) = (0, Vec::new());
-    for (n, (_, is_right)) in judged.iter().enumerate() {
-        right += usize::from(*is_right);
-        curve.push((right as f64 / n_asked as f64, right as f64 / (n + 1) as f64));
+    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let (mut correct, mut curve) = (0, Vec::new());
+    for (n, (_, is_correct)) in scored.iter().enumerate() {
+        correct += usize::from(*is_correct);
+        curve.push((correct as f64 / n_evaluated as f64, correct as f64 / (n + 1) as f64));
     }
-    // The best precision at this recall or more.
+    // Interpolated precision: the maximum at this recall or a higher one.
     let mut best = 0.0_f64;
     for (_, precision) in curve.iter_mut().rev() {
         best = best.max(*precision);
         *precision = best;
     }
     let at = |level: u32| {
-        // As pycocotools rounds it.
+        // pycocotools rounds recall like this.
         let recall = f64::from(level) * 0.01;
         let first = curve.partition_point(|(r, _)| *r < recall);
         curve.get(first).map_or(0.0, |(_, precision)| *precision)
@@ -77,61 +83,68 @@ fn of_class(images: &[Image], label: u8, overlap: f64, areas: &Areas) -> Option<
     Some((0..=100).map(at).sum::<f64>() / 101.0)
 }
 
-fn judge(image: &Image, label: u8, overlap: f64, areas: &Areas, judged: &mut Vec<(f32, bool)>) {
+fn match_detections(
+    image: &EvaluatedImage,
+    label: u8,
+    iou_threshold: f64,
+    areas: &AreaRange,
+    scored: &mut Vec<(f32, bool)>,
+) {
     let is_ignored = |t: usize| !areas.contains(&image.truths[t].area);
-    // What is ignored comes last, so that something else is matched first.
+    // Ignored instances come last, so that evaluated ones match first.
     let mut truths: Vec<usize> =
         (0..image.truths.len()).filter(|t| image.truths[*t].label == label).collect();
     truths.sort_by_key(|t| is_ignored(*t));
-    let mut is_taken = vec![false; image.truths.len()];
-    let mut detections: Vec<&Detection> =
+    let mut is_matched = vec![false; image.truths.len()];
+    let mut detections: Vec<&ScoredDetection> =
         image.detections.iter().filter(|d| d.label == label).collect();
     detections.sort_by(|a, b| b.score.total_cmp(&a.score));
-    for detection in detections.into_iter().take(MOST_DETECTIONS) {
-        let (mut best, mut most) = (None, overlap);
-        for &t in truths.iter().filter(|t| !is_taken[**t]) {
-            // Once something asked for fits, nothing that is ignored is looked at.
+    for detection in detections.into_iter().take(MAX_DETECTIONS) {
+        let (mut best, mut best_iou) = (None, iou_threshold);
+        for &t in truths.iter().filter(|t| !is_matched[**t]) {
+            // A match with an evaluated instance is never replaced by one with an ignored instance.
             if best.is_some_and(|b: usize| !is_ignored(b)) && is_ignored(t) {
                 break;
             }
-            let shared = detection.shared[t];
-            let all = (detection.area + image.truths[t].area - shared).max(1);
-            let of_all = f64::from(shared) / f64::from(all);
-            if of_all >= most {
-                (best, most) = (Some(t), of_all);
+            let shared = detection.intersections[t];
+            let union = (detection.area + image.truths[t].area - shared).max(1);
+            let iou = f64::from(shared) / f64::from(union);
+            if iou >= best_iou {
+                (best, best_iou) = (Some(t), iou);
             }
         }
-        best.into_iter().for_each(|t| is_taken[t] = true);
+        best.into_iter().for_each(|t| is_matched[t] = true);
         let counts = best.map_or_else(|| areas.contains(&detection.area), |t| !is_ignored(t));
         if counts {
-            judged.push((detection.score, best.is_some()));
+            scored.push((detection.score, best.is_some()));
         }
     }
 }
 
-/// What a detector reaches.
+/// Average precision of a detector.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AveragePrecision {
-    /// At an overlap of one half, mean over classes.
+    /// Mean over classes at IoU 0.5.
     pub map50: f64,
-    /// Mean over [`OVERLAPS`] and classes.
+    /// Mean over classes and [`IOU_THRESHOLDS`].
     pub map: f64,
-    /// By label: at one half, over all overlaps, and how many instances were asked for.
+    /// By label: average precision at IoU 0.5, mean over all thresholds, and the number of
+    /// evaluated instances.
     pub classes: BTreeMap<u8, (f64, f64, usize)>,
 }
 
-/// Over all classes of which something is asked for.
-pub fn average_precision(images: &[Image], areas: &Areas) -> AveragePrecision {
-    let mut n_asked = BTreeMap::new();
+/// Computes average precision over all classes with evaluated instances.
+pub fn average_precision(images: &[EvaluatedImage], areas: &AreaRange) -> AveragePrecision {
+    let mut n_evaluated = BTreeMap::new();
     for truth in images.iter().flat_map(|i| &i.truths).filter(|t| areas.contains(&t.area)) {
-        *n_asked.entry(truth.label).or_insert(0) += 1;
+        *n_evaluated.entry(truth.label).or_insert(0) += 1;
     }
-    let of_label = |(label, n): (u8, usize)| {
-        let at = |overlap: &f64| of_class(images, label, *overlap, areas);
-        let all: Vec<f64> = OVERLAPS.iter().filter_map(at).collect();
+    let evaluate = |(label, n): (u8, usize)| {
+        let at = |iou_threshold: &f64| class_precision(images, label, *iou_threshold, areas);
+        let all: Vec<f64> = IOU_THRESHOLDS.iter().filter_map(at).collect();
         (label, (all[0], all.iter().sum::<f64>() / all.len() as f64, n))
     };
-    let classes: BTreeMap<u8, (f64, f64, usize)> = n_asked.into_iter().map(of_label).collect();
+    let classes: BTreeMap<u8, (f64, f64, usize)> = n_evaluated.into_iter().map(evaluate).collect();
     let mean = |of: fn(&(f64, f64, usize)) -> f64| {
         classes.values().map(of).sum::<f64>() / classes.len().max(1) as f64
     };
@@ -142,28 +155,29 @@ pub fn average_precision(images: &[Image], areas: &Areas) -> AveragePrecision {
 mod tests {
     use super::*;
 
-    const ALL: Areas = 0..=u32::MAX;
+    const ALL: AreaRange = 0..=u32::MAX;
 
-    fn truth(label: u8, area: u32) -> Truth {
-        Truth { label, area }
+    fn truth(label: u8, area: u32) -> GroundTruthInstance {
+        GroundTruthInstance { label, area }
     }
 
-    fn detection(label: u8, score: f32, area: u32, shared: &[u32]) -> Detection {
-        Detection { label, score, area, shared: shared.to_vec() }
+    fn detection(label: u8, score: f32, area: u32, shared: &[u32]) -> ScoredDetection {
+        ScoredDetection { label, score, area, intersections: shared.to_vec() }
     }
 
     #[test]
-    fn a_perfect_detector_gets_one_and_a_blind_one_nothing() {
+    fn a_perfect_detector_scores_one_and_an_empty_one_zero() {
         let truths = vec![truth(1, 100), truth(2, 50)];
         let found = vec![detection(1, 0.9, 100, &[100, 0]), detection(2, 0.4, 50, &[0, 50])];
-        let image = Image { truths: truths.clone(), detections: found };
+        let image = EvaluatedImage { truths: truths.clone(), detections: found };
         let perfect = average_precision(&[image], &ALL);
         assert_eq!((perfect.map50, perfect.map), (1.0, 1.0));
-        let blind = average_precision(&[Image { truths, detections: Vec::new() }], &ALL);
+        let blind = average_precision(&[EvaluatedImage { truths, detections: Vec::new() }], &ALL);
         assert_eq!((blind.map50, blind.map), (0.0, 0.0));
     }
 
-    /// Right, wrong, right among three: precision 1 up to a third, two thirds up to two thirds.
+    /// Detections are correct, wrong, correct among three instances: precision is 1 up to recall
+    /// 1/3 and 2/3 up to recall 2/3.
     #[test]
     fn precision_is_averaged_over_recall() {
         let detections = vec![
@@ -171,17 +185,17 @@ mod tests {
             detection(1, 0.8, 100, &[0, 10, 0]),
             detection(1, 0.7, 100, &[0, 0, 100]),
         ];
-        let image = Image { truths: vec![truth(1, 100); 3], detections };
+        let image = EvaluatedImage { truths: vec![truth(1, 100); 3], detections };
         let expected = (34.0 + 33.0 * 2.0 / 3.0) / 101.0;
         let found = average_precision(std::slice::from_ref(&image), &ALL);
         assert!((found.map50 - expected).abs() < 1e-12, "{found:?}");
-        // Eighty of a hundred and twenty overlap by two thirds.
-        assert!(of_class(&[image], 1, 0.7, &ALL).unwrap() < expected);
+        // 80 shared pixels of 120 in the union: IoU 2/3.
+        assert!(class_precision(&[image], 1, 0.7, &ALL).unwrap() < expected);
     }
 
     #[test]
-    fn what_is_too_small_is_neither_right_nor_wrong() {
-        let image = Image {
+    fn instances_outside_the_area_range_are_ignored() {
+        let image = EvaluatedImage {
             truths: vec![truth(1, 100), truth(1, 20)],
             detections: vec![
                 detection(1, 0.9, 20, &[0, 20]),
@@ -192,7 +206,7 @@ mod tests {
         assert_eq!(average_precision(std::slice::from_ref(&image), &(50..=u32::MAX)).map50, 1.0);
         let with_small = average_precision(std::slice::from_ref(&image), &ALL).map50;
         assert!(with_small < 0.9, "one of three is wrong: {with_small}");
-        // Nothing as large is there.
+        // No instance is that large.
         assert_eq!(average_precision(&[image], &(500..=u32::MAX)).classes.len(), 0);
     }
 }

@@ -1,93 +1,93 @@
-//! How likely a detection is right: a logistic regression on what the network says of it, fitted on views
-//! as a helper has them. The probabilities of labels alone are too high, since small things weigh much
-//! in the loss.
+//! Score calibration: logistic regression of the probability that a detection is correct, fitted on
+//! views of helpers. Uncalibrated probabilities are too high, since small objects have large
+//! weights in the loss.
 
 use serde::{Deserialize, Serialize};
 
 use crate::instances::Instance;
 use crate::loss::{exp, ln};
 
-/// What is known of a detection: 1, the logarithm of the odds of its mean probability, of its pixels,
-/// and of its distance in metres.
+/// Number of predictors: 1, log odds of the mean probability, log number of pixels, log distance in
+/// meters.
 pub const N_PREDICTORS: usize = 4;
 
-/// What a score is made by.
+/// Coefficients of the regression.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
-    /// By predictor.
-    pub factors: [f32; N_PREDICTORS],
+    /// Coefficient of each predictor.
+    pub coefficients: [f32; N_PREDICTORS],
 }
 
 impl Default for Calibration {
-    /// The mean probability as it is.
+    /// Returns the identity: the mean probability stays as it is.
     fn default() -> Calibration {
-        Calibration { factors: [0.0, 1.0, 0.0, 0.0] }
+        Calibration { coefficients: [0.0, 1.0, 0.0, 0.0] }
     }
 }
 
-/// A detection in a view with known labels.
+/// Detection in a view with known labels.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sample {
-    /// What is known of it.
+pub struct CalibrationSample {
+    /// Predictors of the detection.
     pub predictors: [f32; N_PREDICTORS],
-    /// Whether it overlaps a thing of its label by half or more.
-    pub is_right: bool,
+    /// True if its IoU with an instance of its label is 0.5 or more.
+    pub is_correct: bool,
 }
 
-/// What is known of a detection before it is calibrated.
+/// Returns the predictors of an uncalibrated detection.
 pub fn predictors(instance: &Instance) -> [f32; N_PREDICTORS] {
     let p = instance.score.clamp(0.01, 0.99);
-    let [x, y, z] = instance.middle;
+    let [x, y, z] = instance.center;
     let distance_m = (x * x + y * y + z * z).sqrt().max(0.1);
     [1.0, ln(p / (1.0 - p)), ln(instance.pixels.len().max(1) as f32), ln(distance_m)]
 }
 
 impl Calibration {
-    /// The probability that a detection with these predictors is right.
+    /// Returns the probability that a detection with these predictors is correct.
     pub fn probability(&self, predictors: &[f32; N_PREDICTORS]) -> f32 {
-        let odds: f32 = self.factors.iter().zip(predictors).map(|(f, x)| f * x).sum();
-        let e = exp(-odds.abs());
-        if odds < 0.0 { e / (1.0 + e) } else { 1.0 / (1.0 + e) }
+        let log_odds: f32 = self.coefficients.iter().zip(predictors).map(|(f, x)| f * x).sum();
+        let e = exp(-log_odds.abs());
+        if log_odds < 0.0 { e / (1.0 + e) } else { 1.0 / (1.0 + e) }
     }
 
-    /// Fitted to samples by Newton's method, with a little pull towards 0.
-    pub fn fit(samples: &[Sample]) -> Calibration {
+    /// Fits the coefficients by Newton's method with weak L2 regularization.
+    pub fn fit(samples: &[CalibrationSample]) -> Calibration {
         const STEPS: usize = 20;
-        const PULL: f64 = 1e-3;
-        let mut factors = [0.0f64; N_PREDICTORS];
+        const L2: f64 = 1e-3;
+        let mut coefficients = [0.0f64; N_PREDICTORS];
         for _ in 0..STEPS {
-            let mut slope = factors.map(|f| -PULL * f);
-            let mut curve = [[0.0f64; N_PREDICTORS]; N_PREDICTORS];
-            (0..N_PREDICTORS).for_each(|i| curve[i][i] = PULL);
+            let mut gradient = coefficients.map(|f| -L2 * f);
+            let mut hessian = [[0.0f64; N_PREDICTORS]; N_PREDICTORS];
+            (0..N_PREDICTORS).for_each(|i| hessian[i][i] = L2);
             for sample in samples {
-                let now = Calibration { factors: factors.map(|f| f as f32) };
-                let p = f64::from(now.probability(&sample.predictors));
+                let current = Calibration { coefficients: coefficients.map(|f| f as f32) };
+                let p = f64::from(current.probability(&sample.predictors));
                 let x = sample.predictors.map(f64::from);
-                let off = f64::from(u8::from(sample.is_right)) - p;
+                let error = f64::from(u8::from(sample.is_correct)) - p;
                 for i in 0..N_PREDICTORS {
-                    slope[i] += off * x[i];
+                    gradient[i] += error * x[i];
                     for j in 0..N_PREDICTORS {
-                        curve[i][j] += p * (1.0 - p) * x[i] * x[j];
+                        hessian[i][j] += p * (1.0 - p) * x[i] * x[j];
                     }
                 }
             }
-            let step = solve(curve, slope);
-            (0..N_PREDICTORS).for_each(|i| factors[i] += step[i]);
+            let step = solve(hessian, gradient);
+            (0..N_PREDICTORS).for_each(|i| coefficients[i] += step[i]);
         }
-        Calibration { factors: factors.map(|f| f as f32) }
+        Calibration { coefficients: coefficients.map(|f| f as f32) }
     }
 }
 
-/// The solution of a small symmetric system, by elimination.
+/// Solves a small symmetric linear system by elimination.
 fn solve(
     mut a: [[f64; N_PREDICTORS]; N_PREDICTORS],
     mut b: [f64; N_PREDICTORS],
 ) -> [f64; N_PREDICTORS] {
     for i in 0..N_PREDICTORS {
         for j in i + 1..N_PREDICTORS {
-            let (share, row) = (a[j][i] / a[i][i], a[i]);
-            a[j].iter_mut().zip(row).for_each(|(x, y)| *x -= share * y);
-            b[j] -= share * b[i];
+            let (factor, row) = (a[j][i] / a[i][i], a[i]);
+            a[j].iter_mut().zip(row).for_each(|(x, y)| *x -= factor * y);
+            b[j] -= factor * b[i];
         }
     }
     for i in (0..N_PREDICTORS).rev() {
@@ -99,43 +99,44 @@ fn solve(
     b
 }
 
-/// How far probabilities are from the share that is right, in ten bins, weighted by how many fall into
-/// each (expected calibration error).
-pub fn calibration_error(said: &[(f32, bool)]) -> f64 {
+/// Expected calibration error over ten bins: mean difference between probability and accuracy,
+/// weighted by the number of samples of each bin.
+pub fn calibration_error(scored: &[(f32, bool)]) -> f64 {
     const BINS: usize = 10;
     let mut bins = [(0.0f64, 0.0f64, 0u32); BINS];
-    for (p, is_right) in said {
+    for (p, is_correct) in scored {
         let bin = &mut bins[((p * BINS as f32) as usize).min(BINS - 1)];
         bin.0 += f64::from(*p);
-        bin.1 += f64::from(u8::from(*is_right));
+        bin.1 += f64::from(u8::from(*is_correct));
         bin.2 += 1;
     }
-    let off: f64 = bins.iter().map(|(p, right, _)| (p - right).abs()).sum();
-    off / said.len().max(1) as f64
+    let error: f64 = bins.iter().map(|(p, correct, _)| (p - correct).abs()).sum();
+    error / scored.len().max(1) as f64
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use chaic_core::rng::Stream;
+    use chaic_core::rng::RngStream;
 
     #[test]
-    fn a_fit_finds_what_samples_were_drawn_by() {
-        let truth = Calibration { factors: [-1.0, 0.7, 0.4, -0.5] };
-        let mut rng = Stream::new(1, "samples", 0);
+    fn fit_recovers_the_coefficients_of_samples() {
+        let truth = Calibration { coefficients: [-1.0, 0.7, 0.4, -0.5] };
+        let mut rng = RngStream::new(1, "samples", 0);
         let mut draw = || {
             let predictors = [1.0, rng.range(-3.0, 3.0), rng.range(2.0, 8.0), rng.range(-1.0, 2.0)];
-            Sample { predictors, is_right: rng.chance(truth.probability(&predictors)) }
+            CalibrationSample { predictors, is_correct: rng.chance(truth.probability(&predictors)) }
         };
-        let samples: Vec<Sample> = (0..20_000).map(|_| draw()).collect();
+        let samples: Vec<CalibrationSample> = (0..20_000).map(|_| draw()).collect();
         let found = Calibration::fit(&samples);
-        for (a, b) in found.factors.iter().zip(truth.factors) {
+        for (a, b) in found.coefficients.iter().zip(truth.coefficients) {
             assert!((a - b).abs() < 0.1, "{found:?}");
         }
-        let said: Vec<(f32, bool)> =
-            samples.iter().map(|s| (found.probability(&s.predictors), s.is_right)).collect();
-        assert!(calibration_error(&said) < 0.02);
-        let sure: Vec<(f32, bool)> = said.iter().map(|(_, is_right)| (0.99, *is_right)).collect();
-        assert!(calibration_error(&sure) > 0.1);
+        let scored: Vec<(f32, bool)> =
+            samples.iter().map(|s| (found.probability(&s.predictors), s.is_correct)).collect();
+        assert!(calibration_error(&scored) < 0.02);
+        let overconfident: Vec<(f32, bool)> =
+            scored.iter().map(|(_, is_correct)| (0.99, *is_correct)).collect();
+        assert!(calibration_error(&overconfident) > 0.1);
     }
 }

@@ -1,5 +1,6 @@
-//! The network: an encoder of dense strides and depthwise blocks, a decoder of sums, and a head at half
-//! the image's resolution: which label a pixel has, and where the middle of its thing is.
+//! Detector network: an encoder with strided convolutions and depthwise blocks, a decoder that sums
+//! levels, and a head at half the image's resolution. The head predicts a label and an offset to
+//! the object's center for each pixel.
 
 use chaic_nn::{Kernel, Network, Node};
 use serde::{Deserialize, Serialize};
@@ -7,31 +8,31 @@ use serde::{Deserialize, Serialize};
 use crate::features::N_FEATURES;
 use crate::labels::n_labels;
 
-/// Every how many pixels of the image the head tells something.
+/// Pixels of the image per pixel of the head, in both directions.
 pub const STRIDE: usize = 2;
 /// Channels of the decoder, and of the encoder at half the resolution.
 const WIDTH: usize = 48;
-/// Channels of the encoder at a 4th, 8th, 16th and 32nd of the resolution.
+/// Channels of the encoder at 1/4, 1/8, 1/16 and 1/32 of the resolution.
 const STAGES: [usize; 4] = [48, 96, 144, 240];
-/// So many times as wide are blocks within.
+/// Ratio of a block's inner width to its outer width.
 const EXPANSION: usize = 2;
 
-/// What the encoder's blocks are.
+/// Type of the encoder's residual blocks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Blocks {
-    /// Depthwise 5x5, then wider and narrower by a matrix for each pixel, as of Liu et al. 2022: the
-    /// shipped detector's.
+    /// Depthwise 5x5 convolution and an inverted bottleneck (Liu et al. 2022). The shipped detector
+    /// uses it.
     #[default]
     Depthwise,
-    /// Dense 3x3, as of He et al. 2016, fewer of them: what the others are compared with.
+    /// Dense 3x3 convolution (He et al. 2016), fewer blocks. A baseline for comparison.
     Dense,
 }
 
 impl Blocks {
-    /// How many at a 4th, 8th, 16th and 32nd of the resolution: 0.9 billion multiplications for
-    /// 512x512 pixels, or 1.2 for dense ones.
-    fn of_stages(self) -> [usize; 4] {
+    /// Number of blocks at 1/4, 1/8, 1/16 and 1/32 of the resolution: 0.9 billion multiplications
+    /// for 512x512 pixels, 1.2 billion with dense blocks.
+    fn per_stage(self) -> [usize; 4] {
         match self {
             Blocks::Depthwise => [1, 2, 3, 2],
             Blocks::Dense => [1, 1, 2, 1],
@@ -39,19 +40,18 @@ impl Blocks {
     }
 }
 
-/// The network.
+/// Detector network.
 #[derive(Clone, Debug)]
 pub struct Detector {
     /// All layers.
     pub network: Network,
-    /// What it tells of each pixel, [`N_OFFSETS`] numbers after [`n_labels`]: a number for each label,
-    /// the greatest of which is the pixel's; and the way from the surface to the middle of what is seen
-    /// of the thing, in units of half the class's largest extent, in the camera's frame (x right, y up,
-    /// z towards the eye).
+    /// Output of each pixel: [`n_labels`] logits, then [`N_OFFSETS`] components of the offset from
+    /// the surface to the center of the visible part of the object. Offsets are in the camera's
+    /// frame (x right, y up, z towards the camera), in units of half the class's largest extent.
     pub head: Node,
 }
 
-/// Numbers of a way to a middle.
+/// Components of an offset.
 pub const N_OFFSETS: usize = 3;
 
 impl Default for Detector {
@@ -61,75 +61,75 @@ impl Default for Detector {
 }
 
 impl Detector {
-    /// The network that is trained and shipped.
+    /// Creates the network that is trained and shipped.
     pub fn new() -> Detector {
-        Detector::of(Blocks::Depthwise)
+        Detector::with_blocks(Blocks::Depthwise)
     }
 
-    /// One of these blocks.
-    pub fn of(blocks: Blocks) -> Detector {
+    /// Creates a network with the given blocks.
+    pub fn with_blocks(blocks: Blocks) -> Detector {
         let mut net = Network::default();
         let input = net.input(N_FEATURES);
-        let down = Kernel { side: 3, stride: 2 };
-        let stem = net.conv("stem", input, down, WIDTH);
+        let downsample = Kernel { size: 3, stride: 2 };
+        let stem = net.conv("stem", input, downsample, WIDTH);
         let stem = net.norm_relu("stem.norm", stem);
         let mut levels = vec![stem];
-        let mut at = stem;
-        let stages = STAGES.into_iter().zip(blocks.of_stages());
+        let mut features = stem;
+        let stages = STAGES.into_iter().zip(blocks.per_stage());
         for (stage, (channels, n_blocks)) in stages.enumerate() {
             let name = format!("stage{}", stage + 1);
-            at = net.conv(&format!("{name}.down"), at, down, channels);
-            at = net.norm_relu(&format!("{name}.down.norm"), at);
+            features = net.conv(&format!("{name}.down"), features, downsample, channels);
+            features = net.norm_relu(&format!("{name}.down.norm"), features);
             for k in 0..n_blocks {
                 let name = format!("{name}.block{k}");
-                at = match blocks {
-                    Blocks::Depthwise => wide_block(&mut net, &name, at, channels),
-                    Blocks::Dense => dense_block(&mut net, &name, at, channels),
+                features = match blocks {
+                    Blocks::Depthwise => inverted_bottleneck(&mut net, &name, features, channels),
+                    Blocks::Dense => dense_block(&mut net, &name, features, channels),
                 };
             }
-            levels.push(at);
+            levels.push(features);
         }
-        let mut up = None;
+        let mut decoded = None;
         for (level, node) in levels.into_iter().enumerate().rev() {
             let name = format!("up{level}");
-            // The stem is as wide as the decoder already.
-            let mut sum = match level {
+            // The stem has the decoder's width already.
+            let mut level_features = match level {
                 0 => node,
                 _ => net.conv(&name, node, Kernel::POINTWISE, WIDTH),
             };
-            if let Some(below) = up {
-                let below = net.upsample(below);
-                sum = net.add(sum, below);
+            if let Some(coarser) = decoded {
+                let coarser = net.upsample(coarser);
+                level_features = net.add(level_features, coarser);
             }
-            up = Some(narrow_block(&mut net, &format!("{name}.block"), sum));
+            decoded = Some(decoder_block(&mut net, &format!("{name}.block"), level_features));
         }
-        let last = net.norm_relu("last.norm", up.expect("there are levels"));
-        let head = net.head("head", last, n_labels() + N_OFFSETS);
+        let last = net.norm_relu("last.norm", decoded.expect("there are levels"));
+        let head = net.output_head("head", last, n_labels() + N_OFFSETS);
         Detector { network: net, head }
     }
 }
 
-/// Depthwise, wider, narrower, and added to what came in (as of Liu et al. 2022).
-fn wide_block(net: &mut Network, name: &str, from: Node, channels: usize) -> Node {
-    let deep = net.depthwise(&format!("{name}.depthwise"), from, 5);
-    let deep = net.norm(&format!("{name}.norm"), deep);
-    let wide = net.conv(&format!("{name}.wide"), deep, Kernel::POINTWISE, EXPANSION * channels);
+/// Inverted bottleneck with a residual connection (Liu et al. 2022).
+fn inverted_bottleneck(net: &mut Network, name: &str, from: Node, channels: usize) -> Node {
+    let spatial = net.depthwise(&format!("{name}.depthwise"), from, 5);
+    let spatial = net.norm(&format!("{name}.norm"), spatial);
+    let wide = net.conv(&format!("{name}.wide"), spatial, Kernel::POINTWISE, EXPANSION * channels);
     let wide = net.relu(wide);
     let narrow = net.conv(&format!("{name}.narrow"), wide, Kernel::POINTWISE, channels);
     net.add(from, narrow)
 }
 
-/// Dense, and added to what came in (as of He et al. 2016).
+/// Dense convolution with a residual connection (He et al. 2016).
 fn dense_block(net: &mut Network, name: &str, from: Node, channels: usize) -> Node {
     let norm = net.norm_relu(&format!("{name}.norm"), from);
-    let dense = net.conv(&format!("{name}.dense"), norm, Kernel { side: 3, stride: 1 }, channels);
+    let dense = net.conv(&format!("{name}.dense"), norm, Kernel { size: 3, stride: 1 }, channels);
     net.add(from, dense)
 }
 
-/// A cheaper one for the decoder, where pixels are many: as wide within as without.
-fn narrow_block(net: &mut Network, name: &str, from: Node) -> Node {
-    let deep = net.depthwise(&format!("{name}.depthwise"), from, 3);
-    let deep = net.norm_relu(&format!("{name}.norm"), deep);
-    let mixed = net.conv(&format!("{name}.mixed"), deep, Kernel::POINTWISE, WIDTH);
+/// Cheaper block for the decoder at high resolution: the inner width equals the outer width.
+fn decoder_block(net: &mut Network, name: &str, from: Node) -> Node {
+    let spatial = net.depthwise(&format!("{name}.depthwise"), from, 3);
+    let spatial = net.norm_relu(&format!("{name}.norm"), spatial);
+    let mixed = net.conv(&format!("{name}.mixed"), spatial, Kernel::POINTWISE, WIDTH);
     net.add(from, mixed)
 }

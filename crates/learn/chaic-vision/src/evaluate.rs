@@ -1,4 +1,4 @@
-//! How good a detector is on views that nothing was learned from.
+//! Evaluation of a detector on held-out views.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
@@ -6,191 +6,207 @@ use std::sync::atomic::AtomicBool;
 use serde::Serialize;
 
 use crate::average_precision::{
-    Areas, AveragePrecision, Detection, Image, Truth, average_precision,
+    AreaRange, AveragePrecision, EvaluatedImage, GroundTruthInstance, ScoredDetection,
+    average_precision,
 };
-use crate::calibration::{Calibration, Sample, calibration_error, predictors};
-use crate::failures::Failures;
+use crate::calibration::{Calibration, CalibrationSample, calibration_error, predictors};
+use crate::error_breakdown::ErrorBreakdown;
 use crate::instances::Instance;
 use crate::labels::{BACKGROUND, class_of};
-use crate::noisy::FaultRates;
-use crate::parallel::in_order;
+use crate::noisy::DetectorNoiseModel;
+use crate::parallel::map_in_order;
 use crate::trained::TrainedDetector;
-use crate::views::{LabelledView, Part, ViewRules, Views};
+use crate::views::{DatasetSplit, LabeledView, SyntheticViews, ViewConfig};
 
-/// Instances that fewer pixels show are neither asked for nor wrong to find.
-pub const LEAST_PX: u32 = 100;
-const ASKED: Areas = LEAST_PX..=u32::MAX;
+/// Minimum visible pixels of evaluated instances; smaller ones are ignored.
+pub const MIN_AREA_PX: u32 = 100;
+const EVALUATED_AREAS: AreaRange = MIN_AREA_PX..=u32::MAX;
 
-/// What is in a view beside what was seen in it.
-pub fn compare(view: &LabelledView, found: &[Instance]) -> Image {
+/// Computes the overlaps between the instances of a view and the detections.
+pub fn compare(view: &LabeledView, detections: &[Instance]) -> EvaluatedImage {
     let mut areas = vec![0u32; view.labels.len()];
     for id in &view.ids {
         if let Some(area) = areas.get_mut(usize::from(*id)) {
             *area += 1;
         }
     }
-    let there: Vec<usize> =
+    let visible: Vec<usize> =
         (0..areas.len()).filter(|id| areas[*id] > 0 && view.labels[*id] != BACKGROUND).collect();
     let mut index = vec![usize::MAX; areas.len()];
-    there.iter().enumerate().for_each(|(k, id)| index[*id] = k);
-    let truth = |id: &usize| Truth { label: view.labels[*id], area: areas[*id] };
+    visible.iter().enumerate().for_each(|(k, id)| index[*id] = k);
+    let truth = |id: &usize| GroundTruthInstance { label: view.labels[*id], area: areas[*id] };
     let detection = |instance: &Instance| {
-        let mut shared = vec![0; there.len()];
+        let mut intersections = vec![0; visible.len()];
         for k in &instance.pixels {
             let id = usize::from(view.ids[*k as usize]);
-            if let Some(n) = index.get(id).and_then(|k| shared.get_mut(*k)) {
+            if let Some(n) = index.get(id).and_then(|k| intersections.get_mut(*k)) {
                 *n += 1;
             }
         }
         let area = instance.pixels.len() as u32;
-        Detection { label: instance.label, score: instance.score, area, shared }
+        ScoredDetection { label: instance.label, score: instance.score, area, intersections }
     };
-    Image {
-        truths: there.iter().map(truth).collect(),
-        detections: found.iter().map(detection).collect(),
+    EvaluatedImage {
+        truths: visible.iter().map(truth).collect(),
+        detections: detections.iter().map(detection).collect(),
     }
 }
 
-/// Returns the average precision on the first views of the validation part; `None` if `stop` is raised meanwhile.
+/// Computes average precision on the first validation views; returns `None` if `stop` is set
+/// meanwhile.
 pub fn evaluate(
     detector: &TrainedDetector,
-    rules: ViewRules,
+    config: ViewConfig,
     n_views: usize,
     n_threads: usize,
     stop: &AtomicBool,
 ) -> Option<AveragePrecision> {
-    let views = (Part::Validation, rules);
+    let split = DatasetSplit::Validation;
     let images =
-        look(detector, views, n_views, n_threads, stop, |_, view, found| compare(view, found))?;
-    Some(average_precision(&images, &ASKED))
+        map_views(detector, split, config, n_views, n_threads, stop, |_, view, detections| {
+            compare(view, detections)
+        })?;
+    Some(average_precision(&images, &EVALUATED_AREAS))
 }
 
-/// A calibration by what the detector sees in the first so many views of the training part, drawn by
-/// these rules: those that a helper has, [`ViewRules::NATURAL`]. Returns `None` if `stop` is raised meanwhile.
+/// Fits a calibration on detections in the first training views. The view configuration should be a
+/// helper's, [`ViewConfig::NATURAL`]. Returns `None` if `stop` is set meanwhile.
 pub fn calibrate(
     detector: &TrainedDetector,
-    rules: ViewRules,
+    config: ViewConfig,
     n_views: usize,
     n_threads: usize,
     stop: &AtomicBool,
 ) -> Option<Calibration> {
-    let views = (Part::Training, rules);
-    let of_view =
-        |_, view: &LabelledView, found: &[Instance]| samples(found, &compare(view, found));
-    let samples = look(detector, views, n_views, n_threads, stop, of_view)?;
-    Some(Calibration::fit(&samples.concat()))
+    let split = DatasetSplit::Train;
+    let view_samples = |_, view: &LabeledView, detections: &[Instance]| {
+        calibration_samples(detections, &compare(view, detections))
+    };
+    let calibration_samples =
+        map_views(detector, split, config, n_views, n_threads, stop, view_samples)?;
+    Some(Calibration::fit(&calibration_samples.concat()))
 }
 
-/// What is known of each detection, and whether it is right.
-fn samples(found: &[Instance], image: &Image) -> Vec<Sample> {
-    let is_right = |detection: &Detection| {
-        image.truths.iter().zip(&detection.shared).any(|(truth, shared)| {
-            truth.label == detection.label && 3 * shared >= truth.area + detection.area
+/// Predictors and correctness of each detection.
+fn calibration_samples(detections: &[Instance], image: &EvaluatedImage) -> Vec<CalibrationSample> {
+    let is_correct = |detection: &ScoredDetection| {
+        image.truths.iter().zip(&detection.intersections).any(|(truth, intersection)| {
+            truth.label == detection.label && 3 * intersection >= truth.area + detection.area
         })
     };
-    let found = found.iter().zip(&image.detections);
-    found.map(|(f, d)| Sample { predictors: predictors(f), is_right: is_right(d) }).collect()
+    let detections = detections.iter().zip(&image.detections);
+    detections
+        .map(|(instance, detection)| CalibrationSample {
+            predictors: predictors(instance),
+            is_correct: is_correct(detection),
+        })
+        .collect()
 }
 
-/// What comes of each of the first so many views, in their order, whatever the number of threads; `None` if `stop`
-/// is raised meanwhile.
-fn look<T: Send>(
+/// Maps the first views and their detections to values, in order, on any number of threads; returns
+/// `None` if `stop` is set meanwhile.
+fn map_views<T: Send>(
     detector: &TrainedDetector,
-    (part, rules): (Part, ViewRules),
+    split: DatasetSplit,
+    config: ViewConfig,
     n_views: usize,
     n_threads: usize,
     stop: &AtomicBool,
-    one: impl Fn(usize, &LabelledView, &[Instance]) -> T + Sync + Send,
+    map: impl Fn(usize, &LabeledView, &[Instance]) -> T + Sync + Send,
 ) -> Option<Vec<T>> {
-    in_order(
+    map_in_order(
         0..n_views,
         n_threads,
         stop,
         || detector.inference(),
         |inference, k| {
-            let view = Views::new(part, rules, 1, k as u64).draw();
-            let image = (&view.rgb[..], &view.depth_m[..], &view.camera);
-            one(k, &view, &detector.detect(image, inference))
+            let view = SyntheticViews::new(split, config, 1, k as u64).draw();
+            let detections = detector.detect(&view.rgb, &view.depth_m, &view.camera, inference);
+            map(k, &view, &detections)
         },
     )
 }
 
-/// How good a detector is, as a JSON file has it.
+/// Accuracy of a detector, serialized as JSON.
 #[derive(Clone, Debug, Serialize)]
 pub struct DetectionReport {
-    /// Views that were looked at.
+    /// Number of evaluated views.
     pub views: usize,
-    /// Mean average precision at an overlap of one half, of instances of [`LEAST_PX`] pixels and more.
+    /// Mean average precision at IoU 0.5, for instances of [`MIN_AREA_PX`] pixels and more.
     pub map50: f64,
-    /// The same over overlaps from 0.5 to 0.95.
+    /// Mean average precision over IoU 0.5 to 0.95.
     pub map: f64,
-    /// Both with smaller instances, by their least number of pixels.
+    /// Both values with smaller instances included, by minimum area in pixels.
     pub smaller: BTreeMap<u32, [f64; 2]>,
-    /// Both for instances of some sizes alone.
+    /// Both values by size range.
     pub sizes: BTreeMap<&'static str, [f64; 2]>,
-    /// `map50` over the classes of which there are at least [`ENOUGH`] instances, and how many these are.
+    /// `map50` over the classes with at least [`MIN_FREQUENT_INSTANCES`] instances, and the number
+    /// of these classes.
     pub map50_of_frequent: (f64, usize),
-    /// How far scores are from the share of detections that are right.
+    /// Expected calibration error of scores.
     pub calibration_error: f64,
-    /// What goes wrong, and how often.
-    pub failures: Failures,
-    /// The same as ground truth is degraded by it.
-    pub fault_rates: FaultRates,
-    /// By class: average precision at one half, over all overlaps, and how many instances there are.
+    /// Errors by cause.
+    #[serde(rename = "failures")]
+    pub errors: ErrorBreakdown,
+    /// The same errors as rates of the noise model.
+    #[serde(rename = "fault_rates")]
+    pub noise_model: DetectorNoiseModel,
+    /// By class: average precision at IoU 0.5, mean over all thresholds, number of instances.
     pub classes: BTreeMap<&'static str, (f64, f64, usize)>,
 }
 
-/// Smaller instances that are reported beside, pixels.
+/// Additional minimum areas that are reported, pixels.
 const SMALLER_PX: [u32; 2] = [64, 32];
-/// Sizes by COCO's names, from [`LEAST_PX`] on.
-const SIZES: [(&str, Areas); 3] = [
-    ("small", LEAST_PX..=32 * 32),
+/// COCO's size ranges, from [`MIN_AREA_PX`].
+const SIZES: [(&str, AreaRange); 3] = [
+    ("small", MIN_AREA_PX..=32 * 32),
     ("medium", 32 * 32 + 1..=96 * 96),
     ("large", 96 * 96 + 1..=u32::MAX),
 ];
-/// The average precision of a class of which there are fewer instances says little.
-pub const ENOUGH: usize = 50;
+/// Minimum number of instances for a reliable average precision of a class.
+pub const MIN_FREQUENT_INSTANCES: usize = 50;
 
-/// How good a detector is on the first so many views, and what `also` makes of each of them, by its
-/// number, and of what was found in it.
+/// Evaluates a detector on the first views. `map_view` maps each view, by index, and its detections
+/// to an additional value.
 pub fn report<A: Send>(
     detector: &TrainedDetector,
-    views: (Part, ViewRules),
+    split: DatasetSplit,
+    config: ViewConfig,
     n_views: usize,
     n_threads: usize,
-    also: impl Fn(usize, &LabelledView, &[Instance]) -> A + Sync + Send,
+    map_view: impl Fn(usize, &LabeledView, &[Instance]) -> A + Sync + Send,
 ) -> (DetectionReport, Vec<A>) {
-    let one = |k: usize, view: &LabelledView, found: &[Instance]| {
-        let image = compare(view, found);
-        let right = samples(found, &image).into_iter().map(|s| s.is_right);
-        let said: Vec<(f32, bool)> = found.iter().map(|f| f.score).zip(right).collect();
-        (image, (said, also(k, view, found)))
+    let evaluate_view = |k: usize, view: &LabeledView, detections: &[Instance]| {
+        let image = compare(view, detections);
+        let correct = calibration_samples(detections, &image).into_iter().map(|s| s.is_correct);
+        let scored: Vec<(f32, bool)> = detections.iter().map(|f| f.score).zip(correct).collect();
+        (image, (scored, map_view(k, view, detections)))
     };
     let never = AtomicBool::new(false);
-    let seen = look(detector, views, n_views, n_threads, &never, one);
-    let seen = seen.expect("nobody raises the flag");
-    let (images, beside): (Vec<Image>, Vec<_>) = seen.into_iter().unzip();
-    let (said, also): (Vec<_>, Vec<A>) = beside.into_iter().unzip();
-    let found = average_precision(&images, &ASKED);
-    let of = |areas: &Areas| {
-        let found = average_precision(&images, areas);
-        [found.map50, found.map]
+    let evaluated = map_views(detector, split, config, n_views, n_threads, &never, evaluate_view);
+    let evaluated = evaluated.expect("the flag is never set");
+    let (images, details): (Vec<EvaluatedImage>, Vec<_>) = evaluated.into_iter().unzip();
+    let (scored, mapped): (Vec<_>, Vec<A>) = details.into_iter().unzip();
+    let detections = average_precision(&images, &EVALUATED_AREAS);
+    let map_in = |areas: &AreaRange| {
+        let detections = average_precision(&images, areas);
+        [detections.map50, detections.map]
     };
     let name = |label: u8| class_of(label).map_or("", |class| class.name());
-    let frequent = found.classes.values().filter(|(_, _, n)| *n >= ENOUGH);
+    let frequent = detections.classes.values().filter(|(_, _, n)| *n >= MIN_FREQUENT_INSTANCES);
     let frequent: Vec<f64> = frequent.map(|(ap50, _, _)| *ap50).collect();
     let n_frequent = frequent.len();
     let report = DetectionReport {
         views: n_views,
-        map50: found.map50,
-        map: found.map,
-        smaller: SMALLER_PX.iter().map(|px| (*px, of(&(*px..=u32::MAX)))).collect(),
-        sizes: SIZES.iter().map(|(name, areas)| (*name, of(areas))).collect(),
+        map50: detections.map50,
+        map: detections.map,
+        smaller: SMALLER_PX.iter().map(|px| (*px, map_in(&(*px..=u32::MAX)))).collect(),
+        sizes: SIZES.iter().map(|(name, areas)| (*name, map_in(areas))).collect(),
         map50_of_frequent: (frequent.iter().sum::<f64>() / n_frequent.max(1) as f64, n_frequent),
-        calibration_error: calibration_error(&said.concat()),
-        failures: Failures::of(&images, &ASKED),
-        fault_rates: FaultRates::measured(&images),
-        classes: found.classes.iter().map(|(label, c)| (name(*label), *c)).collect(),
+        calibration_error: calibration_error(&scored.concat()),
+        errors: ErrorBreakdown::new(&images, &EVALUATED_AREAS),
+        noise_model: DetectorNoiseModel::measured(&images),
+        classes: detections.classes.iter().map(|(label, c)| (name(*label), *c)).collect(),
     };
-    (report, also)
+    (report, mapped)
 }

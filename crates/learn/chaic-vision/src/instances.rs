@@ -1,5 +1,4 @@
-//! From labels and offsets of pixels to instances: pixels of one label that lie together and point to
-//! one middle.
+//! Grouping of pixels to instances: connected pixels of one label that vote for one center.
 
 use chaic_core::geom::Camera;
 use chaic_nn::Tensor;
@@ -9,55 +8,55 @@ use crate::detector::{N_OFFSETS, STRIDE};
 use crate::labels::{BACKGROUND, half_extents_m};
 use crate::loss::exp;
 
-/// One thing that the detector sees.
+/// Detected object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Instance {
     /// Its label, never the background.
     pub label: u8,
-    /// How sure the detector is, 0 to 1.
+    /// Score, 0 to 1.
     pub score: f32,
-    /// Its pixels in the image, row by row, ascending.
+    /// Row-major indices of its pixels in the image, ascending.
     pub pixels: Vec<u32>,
-    /// The middle of what is seen of it, in the camera's frame (x right, y up, z towards the eye),
-    /// metres.
-    pub middle: [f32; 3],
+    /// Center of the visible part in the camera's frame (x right, y up, z towards the camera),
+    /// meters.
+    pub center: [f32; 3],
 }
 
-/// How pixels become instances.
+/// Thresholds of the grouping. "Half extents" are those of the label's class.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct InstanceRules {
-    /// Neighbors farther apart than this are of two things: metres, and half extents of the class; the
-    /// larger of both counts.
+pub struct InstanceConfig {
+    /// Maximum distance between neighboring pixels of one instance, meters; the larger of this and
+    /// [`InstanceConfig::gap_extents`] applies.
     pub gap_m: f32,
-    /// See [`InstanceRules::gap_m`].
+    /// Maximum distance between neighboring pixels of one instance, half extents.
     pub gap_extents: f32,
-    /// Neighbors that point to middles farther apart than this are of two things, half extents.
-    pub vote_extents: f32,
-    /// Parts of one label that point to middles nearer to each other than this are one thing, half
+    /// Maximum distance between the center votes of neighboring pixels of one instance, half
     /// extents.
+    pub center_vote_radius: f32,
+    /// Maximum distance between the centers of segments of one label that are joined, half extents.
     pub join_extents: f32,
-    /// Parts of different labels that point to middles nearer to each other than this are one thing, half
-    /// extents of the smaller class; the largest part says what it is.
-    pub rename_extents: f32,
-    /// Things of fewer pixels at the network's resolution aren't told.
-    pub least_pixels: usize,
+    /// Maximum distance between the centers of segments of different labels that are joined, half
+    /// extents of the smaller class. The largest segment determines the label.
+    pub relabel_extents: f32,
+    /// Minimum number of pixels of an instance at the network's resolution.
+    pub min_pixels: usize,
 }
 
-impl Default for InstanceRules {
-    fn default() -> InstanceRules {
-        InstanceRules {
+impl Default for InstanceConfig {
+    fn default() -> InstanceConfig {
+        InstanceConfig {
             gap_m: 0.05,
             gap_extents: 0.5,
-            vote_extents: 0.8,
+            center_vote_radius: 0.8,
             join_extents: 1.0,
-            rename_extents: 0.7,
-            least_pixels: 5,
+            relabel_extents: 0.7,
+            min_pixels: 5,
         }
     }
 }
 
-/// The root of a tree of pixels, each of which names one nearer to it.
-fn root(parents: &mut [u32], k: usize) -> usize {
+/// Root of a pixel in the union-find forest, with path halving.
+fn find_root(parents: &mut [u32], k: usize) -> usize {
     let mut k = k;
     while parents[k] as usize != k {
         parents[k] = parents[parents[k] as usize];
@@ -66,9 +65,9 @@ fn root(parents: &mut [u32], k: usize) -> usize {
     k
 }
 
-fn join(parents: &mut [u32], a: usize, b: usize) {
-    let (a, b) = (root(parents, a), root(parents, b));
-    // The first pixel names all, whatever the order.
+fn union(parents: &mut [u32], a: usize, b: usize) {
+    let (a, b) = (find_root(parents, a), find_root(parents, b));
+    // The first pixel is the root, independent of the order of unions.
     let (low, high) = (a.min(b), a.max(b));
     parents[high] = low as u32;
 }
@@ -78,34 +77,34 @@ fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
     (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt()
 }
 
-/// What the network says of one pixel.
+/// Prediction for one pixel.
 #[derive(Clone, Copy, Debug)]
 struct Pixel {
     label: u8,
-    /// Of the label, 0 to 1.
+    /// Probability of the label, 0 to 1.
     probability: f32,
     point: [f32; 3],
-    /// Where it says that the middle is.
+    /// Predicted center of the object.
     vote: [f32; 3],
 }
 
-/// The instances in an image of this depth (metres, shape [height, width]), surest first, from what the
-/// network made of the whole image.
+/// Groups the head's output for a whole image into instances, in descending order of score. Depth
+/// is in meters, shape [height, width].
 ///
 /// # Panics
-/// If shapes don't fit.
+/// If the shapes do not fit the camera.
 pub fn instances(
     head: &Tensor,
     depth_m: &[f32],
     camera: &Camera,
-    rules: &InstanceRules,
+    config: &InstanceConfig,
 ) -> Vec<Instance> {
     let mut pixels = Pixels::new(camera);
     pixels.read(0, &head.data, depth_m);
-    pixels.instances(depth_m, rules)
+    pixels.instances(depth_m, config)
 }
 
-/// What the network says of the pixels of one image, at its own resolution.
+/// Predictions for the pixels of one image, at the network's resolution.
 #[derive(Clone, Debug)]
 pub struct Pixels {
     camera: Camera,
@@ -114,110 +113,114 @@ pub struct Pixels {
 }
 
 impl Pixels {
-    /// Nothing yet.
+    /// Creates an empty buffer.
     pub fn new(camera: &Camera) -> Pixels {
         Pixels { camera: *camera, half_extents: half_extents_m(), pixels: Vec::new() }
     }
 
-    /// Takes in some rows, the first of which has this number: what the head made, shape [rows, width,
-    /// channels], and the depth of the whole image.
+    /// Appends rows of the head's output, shape [rows, width, channels], starting at `first_row`.
+    /// Depth is that of the whole image.
     ///
     /// # Panics
-    /// If shapes don't fit, or rows don't come in order.
+    /// If the shapes do not fit, or rows are missing or out of order.
     pub fn read(&mut self, first_row: usize, head: &[f32], depth_m: &[f32]) {
         let columns = self.camera.width as usize / STRIDE;
         assert_eq!(self.pixels.len(), first_row * columns, "rows come from top to bottom");
-        read(head, &mut self.pixels, (depth_m, &self.camera), &self.half_extents);
+        decode(head, &mut self.pixels, depth_m, &self.camera, &self.half_extents);
     }
 
-    /// The instances, surest first.
+    /// Groups the pixels into instances, in descending order of score.
     ///
     /// # Panics
-    /// If shapes don't fit.
-    pub fn instances(&self, depth_m: &[f32], rules: &InstanceRules) -> Vec<Instance> {
-        find(&self.pixels, &self.half_extents, (depth_m, &self.camera), rules)
+    /// If the shapes do not fit.
+    pub fn instances(&self, depth_m: &[f32], config: &InstanceConfig) -> Vec<Instance> {
+        group(&self.pixels, &self.half_extents, depth_m, &self.camera, config)
     }
 }
 
-fn find(
+fn group(
     pixels: &[Pixel],
     half_extents: &[f32],
-    (depth_m, camera): (&[f32], &Camera),
-    rules: &InstanceRules,
+    depth_m: &[f32],
+    camera: &Camera,
+    config: &InstanceConfig,
 ) -> Vec<Instance> {
     let (width, columns) = (camera.width as usize, camera.width as usize / STRIDE);
     let mut parents: Vec<u32> = (0..pixels.len() as u32).collect();
-    let belong = |a: &Pixel, b: &Pixel| {
+    let is_connected = |a: &Pixel, b: &Pixel| {
         let half = half_extents[usize::from(a.label)];
         a.label == b.label
             && a.label != BACKGROUND
-            && distance(a.point, b.point) < rules.gap_m.max(rules.gap_extents * half)
-            && distance(a.vote, b.vote) < rules.vote_extents * half
+            && distance(a.point, b.point) < config.gap_m.max(config.gap_extents * half)
+            && distance(a.vote, b.vote) < config.center_vote_radius * half
     };
     for k in 0..pixels.len() {
-        if k % columns > 0 && belong(&pixels[k], &pixels[k - 1]) {
-            join(&mut parents, k, k - 1);
+        if k % columns > 0 && is_connected(&pixels[k], &pixels[k - 1]) {
+            union(&mut parents, k, k - 1);
         }
-        if k >= columns && belong(&pixels[k], &pixels[k - columns]) {
-            join(&mut parents, k, k - columns);
+        if k >= columns && is_connected(&pixels[k], &pixels[k - columns]) {
+            union(&mut parents, k, k - columns);
         }
     }
-    let mut parts: Vec<Vec<usize>> = Vec::new();
-    let mut part_of = vec![usize::MAX; pixels.len()];
+    let mut segments: Vec<Vec<usize>> = Vec::new();
+    let mut segment_of = vec![usize::MAX; pixels.len()];
     for k in (0..pixels.len()).filter(|k| pixels[*k].label != BACKGROUND) {
-        let first = root(&mut parents, k);
+        let first = find_root(&mut parents, k);
         if first == k {
-            part_of[k] = parts.len();
-            parts.push(Vec::new());
+            segment_of[k] = segments.len();
+            segments.push(Vec::new());
         }
-        part_of[k] = part_of[first];
-        parts[part_of[k]].push(k);
+        segment_of[k] = segment_of[first];
+        segments[segment_of[k]].push(k);
     }
-    // The largest first, which small ones join: it says what the whole is.
-    parts.sort_by_key(|part| (std::cmp::Reverse(part.len()), part[0]));
-    let mut wholes: Vec<(u8, [f32; 3], Vec<usize>)> = Vec::new();
-    for part in parts {
-        let label = pixels[part[0]].label;
-        let middle = median_vote(pixels, &part);
-        let near = rules.join_extents * half_extents[usize::from(label)];
-        let is_it = |other: u8, apart_m: f32| match other == label {
-            true => apart_m < near,
+    // The largest segment comes first and determines the label; smaller ones join it.
+    segments.sort_by_key(|segment| (std::cmp::Reverse(segment.len()), segment[0]));
+    let mut objects: Vec<(u8, [f32; 3], Vec<usize>)> = Vec::new();
+    for segment in segments {
+        let label = pixels[segment[0]].label;
+        let center = median_vote(pixels, &segment);
+        let max_distance_m = config.join_extents * half_extents[usize::from(label)];
+        let is_same_object = |other: u8, distance_m: f32| match other == label {
+            true => distance_m < max_distance_m,
             false => {
                 let half = half_extents[usize::from(other)].min(half_extents[usize::from(label)]);
-                apart_m < rules.rename_extents * half
+                distance_m < config.relabel_extents * half
             }
         };
-        let same = wholes.iter_mut().find(|w| is_it(w.0, distance(w.1, middle)));
-        match same {
-            Some(whole) => whole.2.extend(part),
-            None => wholes.push((label, middle, part)),
+        let existing =
+            objects.iter_mut().find(|object| is_same_object(object.0, distance(object.1, center)));
+        match existing {
+            Some(object) => object.2.extend(segment),
+            None => objects.push((label, center, segment)),
         }
     }
-    wholes.retain(|whole| whole.2.len() >= rules.least_pixels);
-    let mut owner = vec![u16::MAX; pixels.len()];
-    for (n, (_, _, part)) in wholes.iter().enumerate() {
-        part.iter().for_each(|k| owner[*k] = n as u16);
+    objects.retain(|object| object.2.len() >= config.min_pixels);
+    let mut instance_of = vec![u16::MAX; pixels.len()];
+    for (n, (_, _, segment)) in objects.iter().enumerate() {
+        segment.iter().for_each(|k| instance_of[*k] = n as u16);
     }
-    let masks = full_masks(&owner, pixels, columns, depth_m, width, wholes.len());
-    let mut found: Vec<Instance> = wholes
+    let masks = full_resolution_masks(&instance_of, pixels, columns, depth_m, width, objects.len());
+    let mut found: Vec<Instance> = objects
         .iter()
         .zip(masks)
         .filter(|(_, mask)| !mask.is_empty())
-        .map(|((label, middle, part), mask)| Instance {
+        .map(|((label, center, segment), mask)| Instance {
             label: *label,
-            score: part.iter().map(|k| pixels[*k].probability).sum::<f32>() / part.len() as f32,
+            score: segment.iter().map(|k| pixels[*k].probability).sum::<f32>()
+                / segment.len() as f32,
             pixels: mask,
-            middle: *middle,
+            center: *center,
         })
         .collect();
     found.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.pixels[0].cmp(&b.pixels[0])));
     found
 }
 
-fn read(
+fn decode(
     head: &[f32],
     pixels: &mut Vec<Pixel>,
-    (depth_m, camera): (&[f32], &Camera),
+    depth_m: &[f32],
+    camera: &Camera,
     half_extents: &[f32],
 ) {
     let (width, columns) = (camera.width as usize, camera.width as usize / STRIDE);
@@ -227,9 +230,9 @@ fn read(
     let rows = head.chunks_exact(n_labels + N_OFFSETS);
     let n = rows.len();
     let mut best = vec![(BACKGROUND, 0.0); n];
-    widest().dispatch(Classify { head, n_labels, best: &mut best });
-    let pixel = |((k, numbers), (label, probability)): ((usize, &[f32]), (u8, f32))| {
-        let (k, offset) = (first + k, &numbers[n_labels..]);
+    widest().dispatch(ArgmaxSoftmax { head, n_labels, best: &mut best });
+    let pixel = |((k, output), (label, probability)): ((usize, &[f32]), (u8, f32))| {
+        let (k, offset) = (first + k, &output[n_labels..]);
         let (x, y) = (STRIDE * (k % columns), STRIDE * (k / columns));
         let depth = depth_m[y * width + x];
         let (u, v) = (x as f32 + 0.5 - half, y as f32 + 0.5 - half);
@@ -241,39 +244,40 @@ fn read(
     pixels.extend(rows.enumerate().zip(best).map(pixel));
 }
 
-/// The first of the greatest labels of each pixel, and its probability, compiled for the widest vectors.
-struct Classify<'a> {
+/// Computes the most probable label of each pixel and its probability with the widest SIMD
+/// instructions. The first label wins ties.
+struct ArgmaxSoftmax<'a> {
     head: &'a [f32],
     n_labels: usize,
     best: &'a mut [(u8, f32)],
 }
 
-impl pulp::NullaryFnOnce for Classify<'_> {
+impl pulp::NullaryFnOnce for ArgmaxSoftmax<'_> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        /// Sums run in so many lanes, the same with vectors of any width.
+        /// Number of partial sums, the same at every vector width.
         const LANES: usize = 16;
-        let Classify { head, n_labels, best } = self;
-        for (numbers, best) in head.chunks_exact(n_labels + N_OFFSETS).zip(best) {
-            let row = &numbers[..n_labels];
-            let (chunks, rest) = row.as_chunks::<LANES>();
+        let ArgmaxSoftmax { head, n_labels, best } = self;
+        for (output, best) in head.chunks_exact(n_labels + N_OFFSETS).zip(best) {
+            let row = &output[..n_labels];
+            let (chunks, remainder) = row.as_chunks::<LANES>();
             let mut lanes = [f32::NEG_INFINITY; LANES];
             for chunk in chunks {
                 for k in 0..LANES {
                     lanes[k] = if chunk[k] > lanes[k] { chunk[k] } else { lanes[k] };
                 }
             }
-            let mut most = f32::NEG_INFINITY;
+            let mut max_logit = f32::NEG_INFINITY;
             for x in lanes {
-                most = if x > most { x } else { most };
+                max_logit = if x > max_logit { x } else { max_logit };
             }
-            for x in rest {
-                most = if *x > most { *x } else { most };
+            for x in remainder {
+                max_logit = if *x > max_logit { *x } else { max_logit };
             }
             let mut label = 0;
-            while label + 1 < n_labels && row[label] < most {
+            while label + 1 < n_labels && row[label] < max_logit {
                 label += 1;
             }
             best.0 = label as u8;
@@ -283,52 +287,54 @@ impl pulp::NullaryFnOnce for Classify<'_> {
             let mut sums = [0.0; LANES];
             for chunk in chunks {
                 for k in 0..LANES {
-                    sums[k] += exp(chunk[k] - most);
+                    sums[k] += exp(chunk[k] - max_logit);
                 }
             }
             let mut sum = 0.0;
             for x in sums {
                 sum += x;
             }
-            for x in rest {
-                sum += exp(x - most);
+            for x in remainder {
+                sum += exp(x - max_logit);
             }
             best.1 = 1.0 / sum;
         }
     }
 }
 
-fn median_vote(pixels: &[Pixel], part: &[usize]) -> [f32; 3] {
+fn median_vote(pixels: &[Pixel], segment: &[usize]) -> [f32; 3] {
     std::array::from_fn(|axis| {
-        let mut votes: Vec<f32> = part.iter().map(|k| pixels[*k].vote[axis]).collect();
-        let middle = votes.len() / 2;
-        *votes.select_nth_unstable_by(middle, f32::total_cmp).1
+        let mut votes: Vec<f32> = segment.iter().map(|k| pixels[*k].vote[axis]).collect();
+        let median = votes.len() / 2;
+        *votes.select_nth_unstable_by(median, f32::total_cmp).1
     })
 }
 
-/// The pixels of each owner in the whole image: each pixel is its who owns the nearest in depth of the
-/// four places around it that the network looked at.
-fn full_masks(
-    owner: &[u16],
+/// Returns masks at full resolution. Each pixel belongs to the instance of the network pixel with
+/// the most similar depth among the four nearest.
+fn full_resolution_masks(
+    instance_of: &[u16],
     pixels: &[Pixel],
     columns: usize,
     depth_m: &[f32],
     width: usize,
-    n_owners: usize,
+    n_instances: usize,
 ) -> Vec<Vec<u32>> {
     let rows = pixels.len() / columns;
-    let mut masks = vec![Vec::new(); n_owners];
+    let mut masks = vec![Vec::new(); n_instances];
     for (k, depth) in depth_m.iter().enumerate() {
         let (x, y) = (k % width, k / width);
         let (i, j) = (x / STRIDE, y / STRIDE);
         let (right, below) =
             ((x.div_ceil(STRIDE)).min(columns - 1), (y.div_ceil(STRIDE)).min(rows - 1));
-        let around = [(i, j), (right, j), (i, below), (right, below)];
-        let off = |(i, j): (usize, usize)| (depth + pixels[j * columns + i].point[2]).abs();
-        let first = around[0];
-        let best = around.into_iter().fold(first, |a, b| if off(b) < off(a) { b } else { a });
-        let owner = owner[best.1 * columns + best.0];
-        if let Some(mask) = masks.get_mut(usize::from(owner)) {
+        let neighbors = [(i, j), (right, j), (i, below), (right, below)];
+        let depth_error = |(i, j): (usize, usize)| (depth + pixels[j * columns + i].point[2]).abs();
+        let first = neighbors[0];
+        let best = neighbors
+            .into_iter()
+            .fold(first, |a, b| if depth_error(b) < depth_error(a) { b } else { a });
+        let instance_of = instance_of[best.1 * columns + best.0];
+        if let Some(mask) = masks.get_mut(usize::from(instance_of)) {
             mask.push(k as u32);
         }
     }

@@ -1,20 +1,23 @@
-//! Learned perception: which things are in an image of color and depth, where, and of which classes; and
-//! what a person in a film does.
+//! Learned perception: instance segmentation of RGB-D images, tracking, and recognition of people's
+//! actions.
 //!
-//! **What it is**: [`labels`] says what a pixel can be of, [`features`] what the network reads,
-//! [`views`] draws random views of generated episodes with labels, [`detector`] is the network, [`loss`]
-//! what it learns by, [`train`] the loop; [`instances`] makes things of what the network says, [`calibration`] tells how sure
-//! each is, [`trained`] is all of it as one file, and [`average_precision`] tells how good they are and
-//! [`failures`] what goes wrong; [`coco`] writes views as data sets. [`tracker`] tells which thing is which over time, and [`perception`]
-//! makes all of it the eyes of a mind; [`noisy`] stands in for it. [`behavior`] tells what people do; [`sights`] has all of these by name.
+//! **What it is**, in reading order:
+//! - Data: [`labels`] (classes of pixels), [`features`] (network input), [`views`] (random labeled
+//!   views of generated episodes), [`coco`] (export of views as COCO data sets).
+//! - Detector: [`detector`] (network), [`loss`], [`train`] (training loop), [`instances`] (grouping
+//!   of pixels), [`calibration`] (scores), [`trained`] (weights file).
+//! - Evaluation: [`average_precision`], [`error_breakdown`] (errors by cause), [`evaluate`].
+//! - Perception for agents: [`tracker`], [`perception`] (detector and tracker), [`noisy`] (ground
+//!   truth with simulated errors), [`behavior`] (action recognition), [`perception_registry`] (all
+//!   of them by name).
 //!
-//! **What it is not**: it knows no goals, rules or minds.
+//! **What it is not**: it knows no goals, rules or policies.
 //!
 //! **Invariants**
-//! - Nothing of validation, test or standard episodes is seen in training: views come from seeds of
-//!   [`views::Part`]s that don't overlap.
-//! - The same seed and configuration give the same weights, bit for bit, on any machine and number of
-//!   threads.
+//! - Training uses no data of validation, test or standard episodes: the seeds of a
+//!   [`views::DatasetSplit`] do not overlap those of another.
+//! - The same seed and configuration give the same weights, bit for bit, on any machine and number
+//!   of threads.
 
 pub mod labels;
 mod parallel;
@@ -32,14 +35,14 @@ pub mod trained;
 
 pub mod average_precision;
 pub mod coco;
+pub mod error_breakdown;
 pub mod evaluate;
-pub mod failures;
 
 pub mod train;
 
 pub mod noisy;
 pub mod perception;
-pub mod sights;
+pub mod perception_registry;
 pub mod tracker;
 
 pub mod behavior;

@@ -1,79 +1,91 @@
-//! What the detector learns by: cross entropy of labels, and how far offsets are off, with small things
-//! weighing as much as large ones.
+//! Training loss of the detector: cross entropy of labels and smooth L1 of offsets, weighted so
+//! that small objects count as much as large ones.
 
 use chaic_nn::Tensor;
 
 use serde::{Deserialize, Serialize};
 
 use crate::detector::{N_OFFSETS, STRIDE};
-use crate::features::Crop;
+use crate::features::ImageCrop;
 use crate::labels::{BACKGROUND, half_extents_m};
-use crate::views::LabelledView;
+use crate::views::LabeledView;
 
-/// How much counts.
+/// Weights of the loss.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct LossRules {
-    /// A pixel of a thing that so many pixels show counts as much as one of the background; of smaller
-    /// things more, of larger ones less.
-    pub even_px: f32,
-    /// By which power of the pixels.
-    pub power: f32,
-    /// At most and at least.
-    pub weights: [f32; 2],
-    /// Of offsets beside labels.
-    pub offset: f32,
-    /// Things that fewer pixels show aren't asked for.
-    pub least_px: u32,
+pub struct LossConfig {
+    /// Area of an object whose pixels count as much as background pixels, pixels. Pixels of smaller
+    /// objects count more, those of larger ones less.
+    #[serde(alias = "even_px")]
+    pub reference_area_px: f32,
+    /// Exponent of the ratio of areas.
+    #[serde(alias = "power")]
+    pub area_exponent: f32,
+    /// Minimum and maximum weight of an object's pixel.
+    #[serde(alias = "weights")]
+    pub weight_range: [f32; 2],
+    /// Coefficient of the offset loss, relative to the label loss.
+    #[serde(alias = "offset")]
+    pub offset_coef: f32,
+    /// Objects with fewer visible pixels have zero weight.
+    #[serde(alias = "least_px")]
+    pub min_px: u32,
 }
 
-impl LossRules {
-    /// What the detector is trained with.
-    pub const TRAINING: LossRules =
-        LossRules { even_px: 8000.0, power: 0.75, weights: [0.5, 40.0], offset: 0.5, least_px: 24 };
+impl LossConfig {
+    /// Values of the shipped detector.
+    pub const TRAINING: LossConfig = LossConfig {
+        reference_area_px: 8000.0,
+        area_exponent: 0.75,
+        weight_range: [0.5, 40.0],
+        offset_coef: 0.5,
+        min_px: 24,
+    };
 }
 
-impl Default for LossRules {
-    fn default() -> LossRules {
-        LossRules::TRAINING
+impl Default for LossConfig {
+    fn default() -> LossConfig {
+        LossConfig::TRAINING
     }
 }
 
-/// What the network is to say of a part of an image, at half its resolution.
+/// Targets of a crop, at half its resolution.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Targets {
-    /// The label of each pixel.
+    /// Label of each pixel.
     pub labels: Vec<u8>,
-    /// How much each counts.
+    /// Weight of each pixel.
     pub weights: Vec<f32>,
-    /// Offsets to the middle of what is seen of the thing, shape [pixels, 3]; 0 of the background.
+    /// Offsets to the center of the visible part of the object, shape [pixels, 3]; 0 for the
+    /// background.
     pub offsets: Vec<[f32; 3]>,
 }
 
-/// `weight` to a power between 0 and 1 by repeated roots, which every machine rounds alike.
+/// Raises `x` to an exponent between 0 and 1 by repeated square roots, with equal rounding on every
+/// machine.
 fn power(x: f32, exponent: f32) -> f32 {
-    let (mut result, mut root, mut rest) = (1.0, x, exponent);
+    let (mut result, mut root, mut remaining) = (1.0, x, exponent);
     for _ in 0..8 {
         root = root.sqrt();
-        rest *= 2.0;
-        if rest >= 1.0 {
+        remaining *= 2.0;
+        if remaining >= 1.0 {
             result *= root;
-            rest -= 1.0;
+            remaining -= 1.0;
         }
     }
     result
 }
 
 impl Targets {
-    /// Adds those of a crop.
-    pub fn add(&mut self, view: &LabelledView, crop: Crop, rules: &LossRules) {
+    /// Appends the targets of a crop.
+    pub fn add(&mut self, view: &LabeledView, crop: ImageCrop, config: &LossConfig) {
         let width = view.camera.width as usize;
         let focal = view.camera.focal_px();
-        let middle = 0.5 * width as f32;
-        // Points in the camera's frame: x right, y up, z towards the eye.
+        let center = 0.5 * width as f32;
+        // Points are in the camera's frame: x right, y up, z towards the camera.
         let point = |k: usize| {
             let depth = view.depth_m[k];
-            let (u, v) = ((k % width) as f32 + 0.5 - middle, (k / width) as f32 + 0.5 - middle);
+            let (u, v) = ((k % width) as f32 + 0.5 - center, (k / width) as f32 + 0.5 - center);
             [u / focal * depth, -v / focal * depth, -depth]
         };
         let mut counts = vec![0u32; view.labels.len()];
@@ -90,7 +102,7 @@ impl Targets {
         let [columns, rows] = crop.size;
         for j in (0..rows).step_by(STRIDE) {
             for i in (0..columns).step_by(STRIDE) {
-                let k = (crop.at[1] + j) * width + crop.at[0] + i;
+                let k = (crop.origin[1] + j) * width + crop.origin[0] + i;
                 let id = usize::from(view.ids[k]);
                 let label = view.labels.get(id).copied().unwrap_or(BACKGROUND);
                 let n = counts.get(id).copied().unwrap_or(0);
@@ -102,13 +114,13 @@ impl Targets {
                         let mean = (sums[id][axis] / f64::from(n)) as f32;
                         offset[axis] = (mean - p[axis]) * scale;
                     }
-                    weight = if rules.even_px > n as f32 {
-                        power(rules.even_px / n as f32, rules.power)
+                    weight = if config.reference_area_px > n as f32 {
+                        power(config.reference_area_px / n as f32, config.area_exponent)
                     } else {
-                        1.0 / power(n as f32 / rules.even_px, rules.power)
+                        1.0 / power(n as f32 / config.reference_area_px, config.area_exponent)
                     };
-                    weight = weight.clamp(rules.weights[0], rules.weights[1]);
-                    if n < rules.least_px {
+                    weight = weight.clamp(config.weight_range[0], config.weight_range[1]);
+                    if n < config.min_px {
                         weight = 0.0;
                     }
                 }
@@ -120,23 +132,24 @@ impl Targets {
     }
 }
 
-/// What a pass is worth.
+/// Loss of a forward pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Loss {
     /// Weighted mean of the cross entropy.
     pub labels: f64,
-    /// Weighted mean of how far offsets are off.
+    /// Weighted mean of the offset loss.
     pub offsets: f64,
-    /// Weighted share of pixels with the right label, and of those of things.
-    pub right: f64,
-    /// Of pixels that belong to things.
-    pub right_of_things: f64,
+    /// Weighted fraction of pixels with the correct label.
+    pub accuracy: f64,
+    /// Weighted fraction of object pixels with the correct label.
+    pub object_accuracy: f64,
 }
 
-/// The exponential of what is not above 0: by squaring, alike on every machine.
+/// Exponential of a non-positive number by repeated squaring, with equal rounding on every
+/// machine.
 #[inline(always)]
 pub(crate) fn exp(x: f32) -> f32 {
-    // (1 + x / 1024) ^ 1024, which is 0.05 % off at -1 and less where it matters more.
+    // (1 + x / 1024) ^ 1024 has an error of 0.05 % at -1, and less near 0.
     let mut y = (1.0 + x.max(-80.0) * (1.0 / 1024.0)).max(0.0);
     for _ in 0..10 {
         y *= y;
@@ -144,7 +157,7 @@ pub(crate) fn exp(x: f32) -> f32 {
     y
 }
 
-/// Natural logarithm of a positive number: the inverse of [`exp`] by Newton's steps.
+/// Natural logarithm of a positive number: inverts [`exp`] by Newton's method.
 pub(crate) fn ln(x: f32) -> f32 {
     let mut y = (x.to_bits() as f32 / 8_388_608.0 - 126.94) * std::f32::consts::LN_2;
     for _ in 0..2 {
@@ -155,48 +168,48 @@ pub(crate) fn ln(x: f32) -> f32 {
     y
 }
 
-/// The loss of what the head made, with its gradient.
-pub fn loss(head: &Tensor, targets: &Targets, rules: &LossRules, gradient: &mut Tensor) -> Loss {
+/// Computes the loss of the head's output and its gradient.
+pub fn loss(head: &Tensor, targets: &Targets, config: &LossConfig, gradient: &mut Tensor) -> Loss {
     let channels = head.shape.channels;
     let n_labels = channels - N_OFFSETS;
-    let whole: f32 = targets.weights.iter().sum::<f32>().max(1.0);
-    let part = 1.0 / whole;
+    let total_weight: f32 = targets.weights.iter().sum::<f32>().max(1.0);
+    let normalizer = 1.0 / total_weight;
     let mut loss = Loss::default();
-    let mut things = 1e-9;
+    let mut object_weight = 1e-9;
     for (k, label) in targets.labels.iter().enumerate() {
-        let weight = targets.weights[k] * part;
+        let weight = targets.weights[k] * normalizer;
         let (row, offset) = head.data[k * channels..][..channels].split_at(n_labels);
         let (out, gradient) = gradient.data[k * channels..][..channels].split_at_mut(n_labels);
-        let most = row.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let max = row.iter().copied().fold(f32::NEG_INFINITY, f32::max);
         let mut sum = 0.0;
         for (out, x) in out.iter_mut().zip(row) {
-            *out = exp(x - most);
+            *out = exp(x - max);
             sum += *out;
         }
-        let own = usize::from(*label);
-        let is_right = row[own] >= most;
-        loss.labels += f64::from(weight * (ln(sum) + most - row[own]));
-        loss.right += f64::from(weight) * f64::from(u8::from(is_right));
+        let target = usize::from(*label);
+        let is_correct = row[target] >= max;
+        loss.labels += f64::from(weight * (ln(sum) + max - row[target]));
+        loss.accuracy += f64::from(weight) * f64::from(u8::from(is_correct));
         let scale = weight / sum;
         out.iter_mut().for_each(|x| *x *= scale);
-        out[own] -= weight;
+        out[target] -= weight;
         gradient.fill(0.0);
         if *label == BACKGROUND {
             continue;
         }
-        things += f64::from(weight);
-        loss.right_of_things += f64::from(weight) * f64::from(u8::from(is_right));
+        object_weight += f64::from(weight);
+        loss.object_accuracy += f64::from(weight) * f64::from(u8::from(is_correct));
         for (axis, gradient) in gradient.iter_mut().enumerate() {
-            // Smooth: a square within 0.1, straight beyond.
-            const WITHIN: f32 = 0.1;
+            // Smooth L1: quadratic within 0.1, linear beyond.
+            const SMOOTH: f32 = 0.1;
             let error = offset[axis] - targets.offsets[k][axis];
             let size = error.abs();
             let value =
-                if size < WITHIN { 0.5 * size * size / WITHIN } else { size - 0.5 * WITHIN };
+                if size < SMOOTH { 0.5 * size * size / SMOOTH } else { size - 0.5 * SMOOTH };
             loss.offsets += f64::from(weight * value);
-            *gradient = rules.offset * weight * (error / WITHIN).clamp(-1.0, 1.0);
+            *gradient = config.offset_coef * weight * (error / SMOOTH).clamp(-1.0, 1.0);
         }
     }
-    loss.right_of_things /= things;
+    loss.object_accuracy /= object_weight;
     loss
 }

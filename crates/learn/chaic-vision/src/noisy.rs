@@ -1,181 +1,204 @@
-//! A stand-in for the detector: ground truth with faults at measured rates, for fast experiments.
+//! Simulated detector: ground truth with errors at measured rates, for fast experiments.
 
 use std::sync::Arc;
 
 use chaic_agents::perception::{Perception, Percepts};
-use chaic_agents::sight::Sight;
+use chaic_agents::perception_factory::PerceptionFactory;
 use chaic_agents::track::{Hands, Intent, TrackId};
-use chaic_core::observation::{Grants, Senses};
-use chaic_core::rng::Stream;
+use chaic_core::observation::{Grants, SensorConfig};
+use chaic_core::rng::RngStream;
 use chaic_core::{Briefing, ClassId, Observation, Outcome, Target};
 use serde::{Deserialize, Serialize};
 
-use crate::average_precision::{Detection, Image};
-use crate::failures::TOLD_SCORE;
+use crate::average_precision::{EvaluatedImage, ScoredDetection};
+use crate::error_breakdown::REPORT_SCORE;
 use crate::instances::Instance;
 use crate::labels::label_of;
 use crate::perception::Tracking;
 
-/// Pixels of the images that rates are measured on.
+/// Pixels of the images that rates refer to.
 const MEASURED_PX: usize = 512 * 512;
 
-/// How often which fault is made.
+/// Error rates of a detector.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct FaultRates {
-    /// Least pixels of 512x512 with the share of things of so many, up to the next row, that are missed; in
-    /// the order of pixels. Fewer than the first row's are always missed. In smaller images things count as
-    /// many pixels as they would have there.
-    pub missed: Vec<(u32, f32)>,
-    /// Share of what is found that is taken for another class of about its kind.
-    pub misnamed: f32,
-    /// Things that aren't there, for each image.
-    pub invented: f32,
-    /// Mean score of what is there, and of what isn't or has another name.
+pub struct DetectorNoiseModel {
+    /// Rows of (minimum visible pixels in a 512x512 image, fraction of such objects that are
+    /// missed), ascending. A row applies up to the next row's minimum; objects below the first row
+    /// are always missed. Areas in smaller images are scaled to 512x512.
+    #[serde(alias = "missed")]
+    pub miss_rate_by_area: Vec<(u32, f32)>,
+    /// Fraction of detected objects with the label of another class of the same role.
+    #[serde(alias = "misnamed")]
+    pub misclassification_rate: f32,
+    /// Mean number of false positives per image.
+    #[serde(alias = "invented")]
+    pub false_positives_per_image: f32,
+    /// Mean score of correct detections, and of false positives and misclassified ones.
     pub scores: [f32; 2],
 }
 
-impl FaultRates {
-    /// No fault at all.
-    pub fn none() -> FaultRates {
-        FaultRates { missed: vec![(5, 0.0)], misnamed: 0.0, invented: 0.0, scores: [1.0, 0.5] }
+impl DetectorNoiseModel {
+    /// Returns a model without errors.
+    pub fn none() -> DetectorNoiseModel {
+        DetectorNoiseModel {
+            miss_rate_by_area: vec![(5, 0.0)],
+            misclassification_rate: 0.0,
+            false_positives_per_image: 0.0,
+            scores: [1.0, 0.5],
+        }
     }
 
-    /// Those of the shipped detector (crates/learn/chaic-vision/weights).
-    pub fn built_in() -> FaultRates {
+    /// Returns the rates of the shipped detector (crates/learn/chaic-vision/weights).
+    pub fn built_in() -> DetectorNoiseModel {
         let text = include_bytes!("../weights/faults.json");
         serde_json::from_slice(text).expect("a test reads it")
     }
 
-    /// Those of a detector, by what it told in images.
-    pub fn measured(images: &[Image]) -> FaultRates {
-        /// Rows of [`FaultRates::missed`], pixels.
-        const LEAST_PX: [u32; 6] = [24, 64, 100, 400, 1000, 5000];
-        let share = |n: usize, of: usize| n as f32 / of.max(1) as f32;
-        let mut by_size = [[0usize; 2]; LEAST_PX.len()];
-        let (mut n_found, mut n_misnamed, mut n_invented) = (0, 0, 0);
+    /// Measures the rates of a detector on evaluated images.
+    pub fn measured(images: &[EvaluatedImage]) -> DetectorNoiseModel {
+        /// Minimum pixels of the rows of [`DetectorNoiseModel::miss_rate_by_area`].
+        const MIN_PX: [u32; 6] = [24, 64, 100, 400, 1000, 5000];
+        let fraction = |n: usize, total: usize| n as f32 / total.max(1) as f32;
+        let mut counts_by_area = [[0usize; 2]; MIN_PX.len()];
+        let (mut n_found, mut n_misclassified, mut n_false_positives) = (0, 0, 0);
         let mut scores = [(0.0f32, 0usize); 2];
         for image in images {
-            let told: Vec<_> = image.detections.iter().filter(|d| d.score >= TOLD_SCORE).collect();
+            let detections: Vec<_> =
+                image.detections.iter().filter(|d| d.score >= REPORT_SCORE).collect();
             for (t, truth) in image.truths.iter().enumerate() {
-                let Some(row) = LEAST_PX.iter().rposition(|px| truth.area >= *px) else { continue };
-                let overlaps = |d: &&&Detection| 3 * d.shared[t] >= truth.area + d.area;
-                let mut covering: Vec<_> = told.iter().filter(overlaps).collect();
+                let Some(row) = MIN_PX.iter().rposition(|px| truth.area >= *px) else { continue };
+                let overlaps =
+                    |d: &&&ScoredDetection| 3 * d.intersections[t] >= truth.area + d.area;
+                let mut covering: Vec<_> = detections.iter().filter(overlaps).collect();
                 covering.sort_by_key(|d| d.label != truth.label);
-                by_size[row][1] += 1;
-                by_size[row][0] += usize::from(covering.is_empty());
+                counts_by_area[row][1] += 1;
+                counts_by_area[row][0] += usize::from(covering.is_empty());
                 let Some(best) = covering.first() else { continue };
-                let is_misnamed = best.label != truth.label;
+                let is_misclassified = best.label != truth.label;
                 n_found += 1;
-                n_misnamed += usize::from(is_misnamed);
-                let (sum, n) = &mut scores[usize::from(is_misnamed)];
+                n_misclassified += usize::from(is_misclassified);
+                let (sum, n) = &mut scores[usize::from(is_misclassified)];
                 (*sum, *n) = (*sum + best.score, *n + 1);
             }
-            let invented = told.iter().filter(|d| d.shared.iter().all(|s| 5 * s < d.area));
-            for detection in invented {
-                n_invented += 1;
+            let false_positives =
+                detections.iter().filter(|d| d.intersections.iter().all(|s| 5 * s < d.area));
+            for detection in false_positives {
+                n_false_positives += 1;
                 let (sum, n) = &mut scores[1];
                 (*sum, *n) = (*sum + detection.score, *n + 1);
             }
         }
-        let rows = LEAST_PX.into_iter().zip(by_size);
-        FaultRates {
-            missed: rows.map(|(px, [missed, all])| (px, share(missed, all))).collect(),
-            misnamed: share(n_misnamed, n_found),
-            invented: share(n_invented, images.len()),
-            scores: scores.map(|(sum, n)| if n == 0 { TOLD_SCORE } else { sum / n as f32 }),
+        let rows = MIN_PX.into_iter().zip(counts_by_area);
+        DetectorNoiseModel {
+            miss_rate_by_area: rows
+                .map(|(px, [missed, all])| (px, fraction(missed, all)))
+                .collect(),
+            misclassification_rate: fraction(n_misclassified, n_found),
+            false_positives_per_image: fraction(n_false_positives, images.len()),
+            scores: scores.map(|(sum, n)| if n == 0 { REPORT_SCORE } else { sum / n as f32 }),
         }
     }
 
-    /// The share that is missed of things of so many pixels in an image of so many.
-    fn missed(&self, n_pixels: usize, of: usize) -> f32 {
-        let n_pixels = n_pixels * MEASURED_PX / of;
-        let row = self.missed.iter().rev().find(|(least, _)| n_pixels >= *least as usize);
-        row.map_or(1.0, |(_, share)| *share)
+    /// Returns the miss rate of an object with `n_pixels` visible pixels in an image of `image_px`
+    /// pixels.
+    fn miss_rate(&self, n_pixels: usize, image_px: usize) -> f32 {
+        let n_pixels = n_pixels * MEASURED_PX / image_px;
+        let row =
+            self.miss_rate_by_area.iter().rev().find(|(min_px, _)| n_pixels >= *min_px as usize);
+        row.map_or(1.0, |(_, rate)| *rate)
     }
 }
 
-/// Minds that see by ground truth with faults.
+/// Creates perception from ground truth with simulated errors.
 #[derive(Clone, Debug)]
-pub struct NoisySight {
-    rates: Arc<FaultRates>,
+pub struct NoisyPerceptionFactory {
+    noise: Arc<DetectorNoiseModel>,
     name: String,
 }
 
-impl NoisySight {
-    /// With these faults, under this name.
-    pub fn new(rates: FaultRates, name: String) -> NoisySight {
-        NoisySight { rates: Arc::new(rates), name }
+impl NoisyPerceptionFactory {
+    /// Creates a factory with these rates under a name.
+    pub fn new(noise: DetectorNoiseModel, name: String) -> NoisyPerceptionFactory {
+        NoisyPerceptionFactory { noise: Arc::new(noise), name }
     }
 }
 
-impl Sight for NoisySight {
+impl PerceptionFactory for NoisyPerceptionFactory {
     fn name(&self) -> Option<String> {
         Some(self.name.clone())
     }
 
-    fn senses(&self) -> Senses {
-        Senses::DEPTH_AND_IDS
+    fn sensors(&self) -> SensorConfig {
+        SensorConfig::DEPTH_AND_IDS
     }
 
-    fn grants(&self, asked: Grants) -> Grants {
-        asked
+    fn grants(&self, requested: Grants) -> Grants {
+        requested
     }
 
     fn perception(&self) -> Box<dyn Perception> {
-        let rates = Arc::clone(&self.rates);
-        Box::new(NoisyPerception { rates, tracking: Tracking::default(), seed: 0 })
+        let noise = Arc::clone(&self.noise);
+        Box::new(NoisyPerception { noise, tracking: Tracking::default(), seed: 0 })
     }
 }
 
 #[derive(Clone, Debug)]
 struct NoisyPerception {
-    rates: Arc<FaultRates>,
+    noise: Arc<DetectorNoiseModel>,
     tracking: Tracking,
     seed: u64,
 }
 
 impl NoisyPerception {
-    /// The instances in an image with known ids, with faults.
+    /// Returns the instances of an image with known ids, with simulated errors.
     fn instances(&self, ids: &[u16], observation: &Observation) -> Vec<Instance> {
-        let mut rng = Stream::new(self.seed, "faults of perception", u64::from(observation.frame));
+        let mut rng =
+            RngStream::new(self.seed, "faults of perception", u64::from(observation.frame));
         let classes = &observation.granted.classes;
         let mut pixels: Vec<Vec<u32>> = vec![Vec::new(); classes.len()];
         let n = classes.last().map_or(0, |(entity, _)| usize::from(entity.0) + 1);
-        let mut row_of = vec![usize::MAX; n];
-        classes.iter().enumerate().for_each(|(k, (entity, _))| row_of[usize::from(entity.0)] = k);
+        let mut class_index = vec![usize::MAX; n];
+        classes
+            .iter()
+            .enumerate()
+            .for_each(|(k, (entity, _))| class_index[usize::from(entity.0)] = k);
         for (k, id) in ids.iter().enumerate() {
-            let row = row_of.get(usize::from(*id)).and_then(|row| pixels.get_mut(*row));
+            let row = class_index.get(usize::from(*id)).and_then(|row| pixels.get_mut(*row));
             row.into_iter().for_each(|pixels| pixels.push(k as u32));
         }
-        let mut found = Vec::new();
-        let [sure, unsure] = self.rates.scores;
+        let mut instances = Vec::new();
+        let [correct_score, wrong_score] = self.noise.scores;
         for ((_, class), pixels) in classes.iter().zip(pixels) {
-            if rng.chance(self.rates.missed(pixels.len(), ids.len())) {
+            if rng.chance(self.noise.miss_rate(pixels.len(), ids.len())) {
                 continue;
             }
-            let others: Vec<ClassId> =
+            let candidates: Vec<ClassId> =
                 ClassId::all().filter(|c| c.info().role == class.info().role).collect();
-            let (class, score) = match rng.choose(&others) {
-                Some(other) if rng.chance(self.rates.misnamed) => (*other, unsure),
-                _ => (*class, sure),
+            let (class, score) = match rng.choose(&candidates) {
+                Some(wrong_class) if rng.chance(self.noise.misclassification_rate) => {
+                    (*wrong_class, wrong_score)
+                }
+                _ => (*class, correct_score),
             };
             let label = label_of(Some(class));
-            found.push(Instance { label, score, pixels, middle: [0.0; 3] });
+            instances.push(Instance { label, score, pixels, center: [0.0; 3] });
         }
         let (width, height) = (observation.camera.width, observation.camera.height);
         let classes: Vec<ClassId> = ClassId::all().filter(|c| c.info().is_carriable()).collect();
-        while rng.chance(self.rates.invented / (1.0 + self.rates.invented)) {
-            /// Side of what is invented, pixels.
+        while rng.chance(
+            self.noise.false_positives_per_image / (1.0 + self.noise.false_positives_per_image),
+        ) {
+            /// Side of a false positive, pixels.
             const SIDE: u32 = 12;
             let Some(class) = rng.choose(&classes) else { break };
             let [x, y] = [width, height].map(|n| rng.below((n - SIDE) as usize) as u32);
             let row = |y: u32| (y * width + x..y * width + x + SIDE).collect::<Vec<u32>>();
             let pixels = (y..y + SIDE).flat_map(row).collect();
             let label = label_of(Some(*class));
-            found.push(Instance { label, score: unsure, pixels, middle: [0.0; 3] });
+            instances.push(Instance { label, score: wrong_score, pixels, center: [0.0; 3] });
         }
-        found
+        instances
     }
 }
 
@@ -184,8 +207,8 @@ impl Perception for NoisyPerception {
         (self.tracking, self.seed) = (Tracking::new(briefing), briefing.seed);
     }
 
-    fn feel(&mut self, hands: &Hands, last: Option<(Intent, Outcome)>) {
-        self.tracking.tracker.feel(hands, last);
+    fn update_hands(&mut self, hands: &Hands, last: Option<(Intent, Outcome)>) {
+        self.tracking.tracker.update_hands(hands, last);
     }
 
     fn perceive(&mut self, observation: &Observation) -> Percepts {
@@ -195,7 +218,7 @@ impl Perception for NoisyPerception {
         match (&images.ids, &images.depth_m) {
             (Some(ids), Some(depth_m)) if ids.len() == n_pixels && depth_m.len() == n_pixels => {
                 let found = self.instances(ids, observation);
-                self.tracking.take_in(&found, depth_m, observation)
+                self.tracking.update(&found, depth_m, observation)
             }
             _ => Percepts::default(),
         }
@@ -205,7 +228,7 @@ impl Perception for NoisyPerception {
         self.tracking.target(track)
     }
 
-    fn points(&self) -> bool {
+    fn uses_pixel_targets(&self) -> bool {
         true
     }
 

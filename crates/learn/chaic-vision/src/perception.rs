@@ -1,45 +1,45 @@
-//! The detector as the perception of a mind: from color and depth to things with names of their own.
+//! Perception by the learned detector: from color and depth to tracked objects.
 
 use std::sync::Arc;
 
 use chaic_agents::perception::{Perception, Percepts, PixelKind, STRIDE, Segments};
-use chaic_agents::sight::Sight;
+use chaic_agents::perception_factory::PerceptionFactory;
 use chaic_agents::track::{Hands, Intent, TrackId};
 use chaic_core::geom::Camera;
-use chaic_core::observation::{Grants, Senses};
+use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::{Briefing, Observation, Outcome, Target};
 use chaic_nn::Inference;
 
 use crate::instances::Instance;
-use crate::tracker::{Sighting, Tracker, TrackerRules};
+use crate::tracker::{Measurement, Tracker, TrackerConfig};
 use crate::trained::TrainedDetector;
 
-/// Minds that see by a trained detector.
+/// Creates perception with a trained detector.
 #[derive(Clone, Debug)]
-pub struct LearnedSight {
+pub struct LearnedPerceptionFactory {
     detector: Arc<TrainedDetector>,
     digest: String,
 }
 
-impl LearnedSight {
-    /// By this one.
-    pub fn new(detector: TrainedDetector) -> LearnedSight {
+impl LearnedPerceptionFactory {
+    /// Creates the factory for one detector.
+    pub fn new(detector: TrainedDetector) -> LearnedPerceptionFactory {
         let digest = detector.digest();
-        LearnedSight { detector: Arc::new(detector), digest }
+        LearnedPerceptionFactory { detector: Arc::new(detector), digest }
     }
 }
 
-impl Sight for LearnedSight {
+impl PerceptionFactory for LearnedPerceptionFactory {
     fn name(&self) -> Option<String> {
         Some(format!("learned {}", self.digest))
     }
 
-    fn senses(&self) -> Senses {
-        Senses { rgb: true, ids: false, ..Senses::DEPTH_AND_IDS }
+    fn sensors(&self) -> SensorConfig {
+        SensorConfig { rgb: true, ids: false, ..SensorConfig::DEPTH_AND_IDS }
     }
 
-    fn grants(&self, asked: Grants) -> Grants {
-        Grants { ids: false, ..asked }
+    fn grants(&self, requested: Grants) -> Grants {
+        Grants { ids: false, ..requested }
     }
 
     fn perception(&self) -> Box<dyn Perception> {
@@ -52,7 +52,7 @@ impl Sight for LearnedSight {
     }
 }
 
-/// Sees by a detector and keeps track of what it saw.
+/// Detects objects in each image and tracks them.
 #[derive(Clone, Debug)]
 struct LearnedPerception {
     detector: Arc<TrainedDetector>,
@@ -65,8 +65,8 @@ impl Perception for LearnedPerception {
         self.tracking = Tracking::new(briefing);
     }
 
-    fn feel(&mut self, hands: &Hands, last: Option<(Intent, Outcome)>) {
-        self.tracking.tracker.feel(hands, last);
+    fn update_hands(&mut self, hands: &Hands, last: Option<(Intent, Outcome)>) {
+        self.tracking.tracker.update_hands(hands, last);
     }
 
     fn perceive(&mut self, observation: &Observation) -> Percepts {
@@ -80,15 +80,15 @@ impl Perception for LearnedPerception {
         if !self.detector.fits(camera) || rgb.len() != 3 * n_pixels || depth_m.len() != n_pixels {
             return Percepts::default();
         }
-        let found = self.detector.detect((rgb, depth_m, camera), &mut self.inference);
-        self.tracking.take_in(&found, depth_m, observation)
+        let instances = self.detector.detect(rgb, depth_m, camera, &mut self.inference);
+        self.tracking.update(&instances, depth_m, observation)
     }
 
     fn target(&self, track: TrackId) -> Option<Target> {
         self.tracking.target(track)
     }
 
-    fn points(&self) -> bool {
+    fn uses_pixel_targets(&self) -> bool {
         true
     }
 
@@ -97,34 +97,35 @@ impl Perception for LearnedPerception {
     }
 }
 
-/// Instances in one image after the other as things with names.
+/// Tracks the detections of successive images.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tracking {
     pub(crate) tracker: Tracker,
-    /// What the last image showed, and where.
+    /// Tracks in the last image, with one pixel of each.
     pub(crate) last: Vec<(TrackId, [u32; 2])>,
 }
 
 impl Tracking {
     pub(crate) fn new(briefing: &Briefing) -> Tracking {
-        let tracker = Tracker::new(TrackerRules::default(), briefing);
+        let tracker = Tracker::new(TrackerConfig::default(), briefing);
         Tracking { tracker, last: Vec::new() }
     }
 
-    pub(crate) fn take_in(
+    pub(crate) fn update(
         &mut self,
-        found: &[Instance],
+        instances: &[Instance],
         depth_m: &[f32],
         observation: &Observation,
     ) -> Percepts {
         let camera = &observation.camera;
-        let (of_pixels, sightings) = measure(found, depth_m, camera);
-        let at = (observation.frame, observation.own.pose);
-        let (detections, mut kinds) = self.tracker.update(&sightings, at, (depth_m, camera));
-        kinds.insert(0, PixelKind::Firm);
-        let segments = Segments { of_pixels: &of_pixels, depth_m, camera, kinds: &kinds };
+        let (segment_ids, measurements) = measure(instances, depth_m, camera);
+        let (frame, pose) = (observation.frame, observation.proprioception.pose);
+        let (detections, mut kinds) =
+            self.tracker.update(&measurements, frame, pose, depth_m, camera);
+        kinds.insert(0, PixelKind::Background);
+        let segments = Segments { segment_ids: &segment_ids, depth_m, camera, kinds: &kinds };
         let (_, mut dynamic_mask) = segments.measure();
-        self.tracker.mask_own(at.1, (depth_m, camera), STRIDE, &mut dynamic_mask);
+        self.tracker.mask_held(pose, depth_m, camera, STRIDE, &mut dynamic_mask);
         self.last = detections.iter().map(|d| (d.track, d.pixel)).collect();
         Percepts { detections, dynamic_mask, stride: STRIDE, hands: None }
     }
@@ -135,29 +136,33 @@ impl Tracking {
     }
 }
 
-/// The pixels of instances as segments, numbered from 1, and what each of them tells of its thing.
-fn measure(found: &[Instance], depth_m: &[f32], camera: &Camera) -> (Vec<u16>, Vec<Sighting>) {
-    let mut of_pixels = vec![0u16; depth_m.len()];
-    for (k, instance) in found.iter().enumerate() {
-        instance.pixels.iter().for_each(|p| of_pixels[*p as usize] = 1 + k as u16);
+/// Assigns pixels to segments, numbered from 1, and measures the extent of each segment.
+fn measure(
+    instances: &[Instance],
+    depth_m: &[f32],
+    camera: &Camera,
+) -> (Vec<u16>, Vec<Measurement>) {
+    let mut segment_ids = vec![0u16; depth_m.len()];
+    for (k, instance) in instances.iter().enumerate() {
+        instance.pixels.iter().for_each(|p| segment_ids[*p as usize] = 1 + k as u16);
     }
     let kind = |instance: &Instance| {
-        crate::labels::class_of(instance.label).map_or(PixelKind::Firm, PixelKind::of)
+        crate::labels::class_of(instance.label).map_or(PixelKind::Background, PixelKind::from_class)
     };
     let kinds: Vec<PixelKind> =
-        std::iter::once(PixelKind::Firm).chain(found.iter().map(kind)).collect();
-    let segments = Segments { of_pixels: &of_pixels, depth_m, camera, kinds: &kinds };
+        std::iter::once(PixelKind::Background).chain(instances.iter().map(kind)).collect();
+    let segments = Segments { segment_ids: &segment_ids, depth_m, camera, kinds: &kinds };
     let (extents, _) = segments.measure();
-    // Those without an extent are too small or too far off: nobody's pixels.
-    let mut number = vec![0u16; found.len() + 1];
-    let mut sightings = Vec::new();
-    for (k, (instance, extent)) in found.iter().zip(extents.into_iter().skip(1)).enumerate() {
+    // Segments without an extent are too small or too far away and get no pixels.
+    let mut segment_numbers = vec![0u16; instances.len() + 1];
+    let mut measurements = Vec::new();
+    for (k, (instance, extent)) in instances.iter().zip(extents.into_iter().skip(1)).enumerate() {
         if let Some(extent) = extent {
             let Instance { label, score, .. } = *instance;
-            sightings.push(Sighting { label, score, extent });
-            number[k + 1] = sightings.len() as u16;
+            measurements.push(Measurement { label, score, extent });
+            segment_numbers[k + 1] = measurements.len() as u16;
         }
     }
-    of_pixels.iter_mut().for_each(|of| *of = number[usize::from(*of)]);
-    (of_pixels, sightings)
+    segment_ids.iter_mut().for_each(|segment| *segment = segment_numbers[usize::from(*segment)]);
+    (segment_ids, measurements)
 }

@@ -1,168 +1,178 @@
-//! Data association: which of the things known so far each thing in an image is.
+//! Data association: matches the detections of each image to tracks of objects.
 //!
-//! A track is matched to a detection by class, position and extent, nearest first. What somebody carries
-//! may have moved as far as a walker gets; what the own hands have just let go of lies near. The own
-//! burden is known from the own state and is no detection.
+//! The cost of a match depends on class, position and extent; the cheapest pairs match first. A
+//! carried object may have moved by walking speed; a released object lies near the agent. The agent
+//! knows its own held objects from proprioception: they are no detections.
 
 use std::collections::BTreeMap;
 
-use chaic_agents::perception::{Detection, Extent, PixelKind};
+use chaic_agents::perception::{Detection, PixelKind, SegmentMeasurement};
 use chaic_agents::track::{Hands, Intent, TrackId};
-use chaic_core::briefing::{Companion, Relation};
+use chaic_core::briefing::{Companion, CompanionRole};
 use chaic_core::geom::{Camera, Pose, horizontal_distance, rotate_yaw};
 use chaic_core::{Action, AgentId, Briefing, ClassId, EntityId, Frame, Hand, Outcome, Vec2, Vec3};
 
 use crate::labels::class_of;
 
-/// What is told of what is seen, and what is taken for the same thing. Lengths in metres.
+/// Thresholds of the tracker. Lengths in meters.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TrackerRules {
-    /// Detections that are less sure say nothing but that their pixels are loose.
-    pub least_score: f32,
-    /// How likely something is there when it is seen for the first time: this much for each part of its
-    /// score above the other number, as a logarithm of odds.
-    pub first_odds: (f32, f32),
-    /// Each further look at it adds so much for a score of 1, and a clear look at its place that doesn't
-    /// show it takes so much.
-    pub odds: (f32, f32),
-    /// The least and the most of it.
-    pub odds_within: (f32, f32),
-    /// More of it, and it is told.
-    pub told_odds: f32,
-    /// Small things that lie still are seen no farther than this from where they were seen before.
-    pub still_m: f32,
-    /// Large ones no farther than this part of their largest extent in plan: of large things other
-    /// parts show from elsewhere.
-    pub still_extents: f32,
-    /// The same thing under another class is no farther than this.
-    pub renamed_m: f32,
-    /// What is carried gets so far in a frame, and so far at most before it is taken for another.
-    pub carried_m: (f32, f32),
-    /// What was let go of is found no farther than this from where one stood, in plan: an arm and a
-    /// step.
-    pub released_m: f32,
-    /// A detection of a class nearer to another one of it than this part of the largest extent is a
-    /// piece of that.
-    pub piece_extents: f32,
+pub struct TrackerConfig {
+    /// Minimum score; detections below it only mark their pixels as not static.
+    pub min_score: f32,
+    /// Initial log odds of a track per unit of score above `birth_score`.
+    pub birth_log_odds: f32,
+    /// Score of a first detection whose track has initial log odds of 0.
+    pub birth_score: f32,
+    /// Increase of log odds per unit of score of a matched detection.
+    pub hit_log_odds: f32,
+    /// Decrease of log odds if the unoccluded place of the object does not show it.
+    pub miss_log_odds: f32,
+    /// Minimum and maximum log odds.
+    pub log_odds_range: [f32; 2],
+    /// Tracks above these log odds are reported.
+    pub report_log_odds: f32,
+    /// Maximum displacement of small static objects.
+    pub max_static_m: f32,
+    /// Maximum displacement of large static objects, relative to their largest horizontal extent.
+    /// Other parts of them are visible from elsewhere.
+    pub max_static_extents: f32,
+    /// Maximum displacement if the detected class changes.
+    pub max_relabeled_m: f32,
+    /// Maximum displacement of carried objects per frame.
+    pub carried_m_per_frame: f32,
+    /// Maximum displacement of carried objects in total.
+    pub max_carried_m: f32,
+    /// Maximum horizontal distance of a released object from the agent: an arm's length and a step.
+    pub max_released_m: f32,
+    /// Detections of one class nearer than this fraction of the largest extent are fragments of one
+    /// object.
+    pub fragment_extents: f32,
 }
 
-impl Default for TrackerRules {
-    fn default() -> TrackerRules {
-        TrackerRules {
-            // Of sixteen episodes of RHP (`gen-standard:5000..5002`, `--track hidden`): it delivers 54 things
-            // by 0.2 and 0.45, 33 by 0.4 and 0.7, 50 by 0.1 and 0.25, and 91 by ids.
-            least_score: 0.2,
-            first_odds: (6.0, 0.45),
-            odds: (1.0, 0.5),
-            odds_within: (-1.5, 4.0),
-            told_odds: 0.3,
-            still_m: 0.4,
-            still_extents: 0.6,
-            renamed_m: 0.15,
-            carried_m: (0.04, 3.0),
-            released_m: 1.9,
-            piece_extents: 0.35,
+impl Default for TrackerConfig {
+    fn default() -> TrackerConfig {
+        TrackerConfig {
+            // Objects delivered by RHP in 16 episodes (`gen-standard:5000..5002`, `--track
+            // hidden`): 54 with 0.2 and 0.45, 33 with 0.4 and 0.7, 50 with 0.1 and 0.25, 91 with
+            // ground-truth ids.
+            min_score: 0.2,
+            birth_log_odds: 6.0,
+            birth_score: 0.45,
+            hit_log_odds: 1.0,
+            miss_log_odds: 0.5,
+            log_odds_range: [-1.5, 4.0],
+            report_log_odds: 0.3,
+            max_static_m: 0.4,
+            max_static_extents: 0.6,
+            max_relabeled_m: 0.15,
+            carried_m_per_frame: 0.04,
+            max_carried_m: 3.0,
+            max_released_m: 1.9,
+            fragment_extents: 0.35,
         }
     }
 }
 
-/// Something in an image, before it is known which thing it is.
+/// Detection before association.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sighting {
-    /// What it looks like, never the background.
+pub struct Measurement {
+    /// Label, never the background.
     pub label: u8,
-    /// How sure that is, 0 to 1.
+    /// Score, 0 to 1.
     pub score: f32,
-    /// Where it is.
-    pub extent: Extent,
+    /// Position and size.
+    pub extent: SegmentMeasurement,
 }
 
-/// One thing, as long as it is taken for the same.
+/// Tracked object.
 #[derive(Clone, Debug)]
 struct Track {
     id: TrackId,
-    /// How much speaks for each label.
+    /// Accumulated evidence for each label.
     evidence: BTreeMap<u8, f32>,
     label: u8,
     position: Vec3,
-    seen_at: Frame,
-    /// Logarithm of the odds that it is there.
-    odds: f32,
-    /// Whether somebody else had it in hand when it was seen last.
+    last_seen: Frame,
+    /// Log odds that the object exists.
+    log_odds: f32,
+    /// True if another agent held it when it was last seen.
     is_carried: bool,
-    /// Whether the own hands have let go of it, and it hasn't been seen since.
+    /// True if the agent released it and has not seen it since.
     is_released: bool,
 }
 
-/// Associates what is seen with what was seen before, for one episode.
+/// Associates detections over one episode.
 #[derive(Clone, Debug, Default)]
 pub struct Tracker {
-    rules: TrackerRules,
+    config: TrackerConfig,
     tracks: Vec<Track>,
     companions: Vec<Companion>,
     people: BTreeMap<AgentId, (Vec3, Frame)>,
     height_m: f32,
     hands: Hands,
     held: Vec<TrackId>,
-    /// The obstacle that has just been cleared away.
-    cleared: Option<TrackId>,
+    /// Obstacle that the agent has just removed.
+    removed_obstacle: Option<TrackId>,
 }
 
 impl Tracker {
-    /// Before the first image of an episode.
-    pub fn new(rules: TrackerRules, briefing: &Briefing) -> Tracker {
+    /// Creates a tracker at the start of an episode.
+    pub fn new(config: TrackerConfig, briefing: &Briefing) -> Tracker {
         let companions = briefing.companions.clone();
         let height_m = briefing.capability.height_m;
-        Tracker { rules, companions, height_m, ..Tracker::default() }
+        Tracker { config, companions, height_m, ..Tracker::default() }
     }
 
-    /// Is told what the own hands hold now, and how the last action ended.
-    pub fn feel(&mut self, hands: &Hands, last: Option<(Intent, Outcome)>) {
+    /// Updates the agent's held objects and the outcome of its last action.
+    pub fn update_hands(&mut self, hands: &Hands, last: Option<(Intent, Outcome)>) {
         self.hands = hands.clone();
-        self.cleared = match last {
+        self.removed_obstacle = match last {
             Some((Action::RemoveObstacle { obstacle, .. }, Outcome::Success)) => Some(obstacle),
             _ => None,
         };
     }
 
-    /// What is seen at a time from where one stands, by the things that it is: a detection for each
-    /// sighting that is told, and how the pixels of each sighting are to be looked at.
+    /// Associates the detections of an image taken at a frame and pose. Returns the reported
+    /// detections and, for each measurement, the kind of its pixels.
     pub fn update(
         &mut self,
-        sightings: &[Sighting],
-        (now, pose): (Frame, Pose),
-        (depth_m, camera): (&[f32], &Camera),
+        measurements: &[Measurement],
+        now: Frame,
+        pose: Pose,
+        depth_m: &[f32],
+        camera: &Camera,
     ) -> (Vec<Detection>, Vec<PixelKind>) {
-        self.let_go(now, pose);
-        let mut kinds: Vec<PixelKind> = sightings.iter().map(|s| kind_of(s.label)).collect();
-        let own = self.own_boxes();
-        for (kind, sighting) in kinds.iter_mut().zip(sightings) {
-            if is_within(&own, sighting.extent.position_in_world, pose) {
-                *kind = PixelKind::Own;
+        self.release(now, pose);
+        let mut kinds: Vec<PixelKind> = measurements.iter().map(|s| pixel_kind(s.label)).collect();
+        let held_boxes = self.held_boxes();
+        for (kind, measurement) in kinds.iter_mut().zip(measurements) {
+            if is_within(&held_boxes, measurement.extent.position_in_world, pose) {
+                *kind = PixelKind::Carried;
             }
         }
-        let counts = |k: &usize| {
-            kinds[*k] != PixelKind::Own && sightings[*k].score >= self.rules.least_score
+        let is_candidate = |k: &usize| {
+            kinds[*k] != PixelKind::Carried && measurements[*k].score >= self.config.min_score
         };
-        let (people, things): (Vec<usize>, Vec<usize>) =
-            (0..sightings.len()).filter(counts).partition(|k| kinds[*k] == PixelKind::Person);
-        let mut detections = self.see_people(sightings, &people, now);
-        detections.extend(self.see_things(sightings, &things, now));
-        self.miss(now, depth_m, camera);
+        let (people, objects): (Vec<usize>, Vec<usize>) = (0..measurements.len())
+            .filter(is_candidate)
+            .partition(|k| kinds[*k] == PixelKind::Person);
+        let mut detections = self.match_people(measurements, &people, now);
+        detections.extend(self.match_objects(measurements, &objects, now));
+        self.penalize_missing(now, depth_m, camera);
         detections.sort_by_key(|d| d.track);
         (detections, kinds)
     }
 
-    /// Takes note of what doesn't show although nothing hides its place.
-    fn miss(&mut self, now: Frame, depth_m: &[f32], camera: &Camera) {
-        /// What lies nearer than a thing by more than this hides it, metres.
-        const CLEAR_M: f32 = 0.1;
-        /// What would show in fewer pixels may well be missed.
-        const LEAST_PX: f32 = 100.0;
+    /// Lowers the log odds of tracks whose unoccluded place does not show them.
+    fn penalize_missing(&mut self, now: Frame, depth_m: &[f32], camera: &Camera) {
+        /// Objects nearer by more than this occlude the place, meters.
+        const OCCLUSION_MARGIN_M: f32 = 0.1;
+        /// Objects with fewer expected pixels may be missed by the detector.
+        const MIN_EXPECTED_PX: f32 = 100.0;
         let focal_px = camera.focal_px();
         let size = Vec2::new(camera.width as f32, camera.height as f32);
-        let (least, taken) = (self.rules.odds_within.0, self.rules.odds.1);
-        for track in self.tracks.iter_mut().filter(|t| t.seen_at < now) {
+        let (min_log_odds, decrease) = (self.config.log_odds_range[0], self.config.miss_log_odds);
+        for track in self.tracks.iter_mut().filter(|t| t.last_seen < now) {
             if self.held.contains(&track.id) {
                 continue;
             }
@@ -170,96 +180,97 @@ impl Tracker {
             if px.cmplt(Vec2::ZERO).any() || px.cmpge(size).any() {
                 continue;
             }
-            let there = depth_m[px.y as usize * camera.width as usize + px.x as usize];
+            let visible_depth = depth_m[px.y as usize * camera.width as usize + px.x as usize];
             let mut extents = extents_m(track.label);
             extents.sort_by(f32::total_cmp);
             let expected_px = extents[0] * extents[1] * (focal_px / depth) * (focal_px / depth);
-            if there > depth - CLEAR_M && expected_px > LEAST_PX {
-                track.odds = (track.odds - taken).max(least);
+            if visible_depth > depth - OCCLUSION_MARGIN_M && expected_px > MIN_EXPECTED_PX {
+                track.log_odds = (track.log_odds - decrease).max(min_log_odds);
             }
         }
     }
 
-    /// Notes what has left the own hands.
-    fn let_go(&mut self, now: Frame, pose: Pose) {
-        let holds: Vec<TrackId> = self.hands.all().map(|(track, _)| track).collect();
-        let held = std::mem::replace(&mut self.held, holds);
+    /// Updates the tracks of objects that left the agent's hands.
+    fn release(&mut self, now: Frame, pose: Pose) {
+        let held_now: Vec<TrackId> = self.hands.all().map(|(track, _)| track).collect();
+        let held_before = std::mem::replace(&mut self.held, held_now);
         for track in &mut self.tracks {
             let is_held = self.held.contains(&track.id);
-            let is_cleared = self.cleared == Some(track.id);
-            if held.contains(&track.id) && !is_held || is_cleared {
-                (track.is_released, track.position, track.seen_at) = (true, pose.position, now);
+            let is_removed_obstacle = self.removed_obstacle == Some(track.id);
+            if held_before.contains(&track.id) && !is_held || is_removed_obstacle {
+                (track.is_released, track.position, track.last_seen) = (true, pose.position, now);
             }
         }
     }
 
-    /// Where what the own hands hold is, in the body's frame: middles and half extents of boxes, metres.
-    fn own_boxes(&self) -> Vec<(Vec3, Vec3)> {
-        /// A burden reaches so far beyond what its class says, metres.
+    /// Boxes of held objects in the body's frame: centers and half extents, meters.
+    fn held_boxes(&self) -> Vec<(Vec3, Vec3)> {
+        /// Margin around the extents of the class, meters.
         const MARGIN_M: f32 = 0.1;
-        /// Half an extent of what is not known, metres.
+        /// Half extent of an unknown object, meters.
         const UNKNOWN_M: f32 = 0.25;
         let half = |class: Option<ClassId>| {
             let size = class.map_or([2.0 * UNKNOWN_M; 3], |class| class.info().size_m);
             let across = 0.5 * size[0].max(size[2]);
             Vec3::new(across, 0.5 * size[1], across) + Vec3::splat(MARGIN_M)
         };
-        let h = self.height_m;
+        let height_m = self.height_m;
         if self.hands.is_joint {
-            // Before the body, at whatever height.
+            // In front of the body, at any height.
             let half = half(self.hands.held().next().and_then(|held| held.class()));
-            let middle = Vec3::new(0.0, 0.5 * h, -(0.3 + half.z));
-            return vec![(middle, Vec3::new(half.x, h, half.z + 0.3))];
+            let center = Vec3::new(0.0, 0.5 * height_m, -(0.3 + half.z));
+            return vec![(center, Vec3::new(half.x, height_m, half.z + 0.3))];
         }
         let in_hand = |hand: Hand| {
             let held = self.hands.hands[hand.index()].as_ref()?;
             let side = if hand == Hand::Left { -1.0 } else { 1.0 };
-            // As bodies hold things, in proportion to their height.
-            Some((Vec3::new(side * 0.2, 0.57 * h, -0.31 * h), half(held.class())))
+            // Position of held objects, relative to the body's height.
+            Some((Vec3::new(side * 0.2, 0.57 * height_m, -0.31 * height_m), half(held.class())))
         };
         Hand::BOTH.into_iter().filter_map(in_hand).collect()
     }
 
-    /// Makes a mask true where an image shows what the own hands hold, whatever else it was taken for:
-    /// shape [height / stride, width / stride] rounded up.
-    pub fn mask_own(
+    /// Sets a mask where the image shows held objects, regardless of their detected class: shape
+    /// [height / stride, width / stride], rounded up.
+    pub fn mask_held(
         &self,
         pose: Pose,
-        (depth_m, camera): (&[f32], &Camera),
+        depth_m: &[f32],
+        camera: &Camera,
         stride: u32,
         mask: &mut [bool],
     ) {
-        let boxes = self.own_boxes();
+        let boxes = self.held_boxes();
         if boxes.is_empty() {
             return;
         }
         let (width, stride) = (camera.width as usize, stride as usize);
-        let farthest_m =
+        let max_distance_m =
             boxes.iter().map(|(at, half)| (*at + *half).length().max((*at - *half).length()));
-        let farthest_m = farthest_m.fold(0.0, f32::max);
+        let max_distance_m = max_distance_m.fold(0.0, f32::max);
         let columns = width.div_ceil(stride);
-        for (k, is_loose) in mask.iter_mut().enumerate() {
+        for (k, is_dynamic) in mask.iter_mut().enumerate() {
             let (x, y) = (stride * (k % columns), stride * (k / columns));
             let depth = depth_m[y * width + x];
-            if depth < farthest_m && !*is_loose {
+            if depth < max_distance_m && !*is_dynamic {
                 let point = camera.unproject(x as u32, y as u32, depth);
-                *is_loose = is_within(&boxes, point, pose);
+                *is_dynamic = is_within(&boxes, point, pose);
             }
         }
     }
 
-    fn see_people(
+    fn match_people(
         &mut self,
-        sightings: &[Sighting],
+        measurements: &[Measurement],
         people: &[usize],
         now: Frame,
     ) -> Vec<Detection> {
         let class = ClassId::named("person");
-        let mut left: Vec<usize> = people.to_vec();
+        let mut unmatched: Vec<usize> = people.to_vec();
         let mut pairs: Vec<(f32, AgentId, usize)> = Vec::new();
         for companion in &self.companions {
-            for k in &left {
-                let cost = self.unlikeness(*companion, &sightings[*k], now);
+            for k in &unmatched {
+                let cost = self.association_cost(*companion, &measurements[*k], now);
                 pairs.push((cost, companion.agent, *k));
             }
         }
@@ -267,127 +278,137 @@ impl Tracker {
         let mut found = Vec::new();
         let mut is_found: Vec<AgentId> = Vec::new();
         for (_, agent, k) in pairs {
-            if is_found.contains(&agent) || !left.contains(&k) {
+            if is_found.contains(&agent) || !unmatched.contains(&k) {
                 continue;
             }
             is_found.push(agent);
-            left.retain(|other| *other != k);
-            let extent = sightings[k].extent.clone();
+            unmatched.retain(|other| *other != k);
+            let extent = measurements[k].extent.clone();
             self.people.insert(agent, (extent.position_in_world, now));
-            let track = EntityId::of_agent(agent).into();
+            let track = EntityId::from_agent(agent).into();
             found.push(Detection::new(track, class, Some(agent), extent));
         }
         found
     }
 
-    /// How little a person in the image is like this companion.
-    fn unlikeness(&self, companion: Companion, sighting: &Sighting, now: Frame) -> f32 {
-        /// Who is lower is a child, if nobody bends down, metres.
-        const GROWN_M: f32 = 1.4;
-        let extent = &sighting.extent;
-        let looks_grown = extent.top_m > GROWN_M;
-        let is_child = companion.relation == Relation::Child;
-        let alone = self.companions.len() < 2;
-        let size = if alone || is_child != looks_grown { 0.0 } else { 2.0 };
-        let (each_m, most_m) = self.rules.carried_m;
-        let moved = self.people.get(&companion.agent).map_or(1.0, |(at, then)| {
-            let apart_m = horizontal_distance(*at, extent.position_in_world);
-            (apart_m - each_m * (now - then) as f32).clamp(0.0, most_m)
+    /// Cost of a match between a detected person and a companion.
+    fn association_cost(&self, companion: Companion, measurement: &Measurement, now: Frame) -> f32 {
+        /// People below this height are children if no adult bends down, meters.
+        const ADULT_M: f32 = 1.4;
+        let extent = &measurement.extent;
+        let is_adult_height = extent.top_m > ADULT_M;
+        let is_child = companion.role == CompanionRole::Child;
+        let is_only_companion = self.companions.len() < 2;
+        let height_cost = if is_only_companion || is_child != is_adult_height { 0.0 } else { 2.0 };
+        let TrackerConfig { carried_m_per_frame, max_carried_m, .. } = self.config;
+        let displacement_m = self.people.get(&companion.agent).map_or(1.0, |(at, frame)| {
+            let distance_m = horizontal_distance(*at, extent.position_in_world);
+            (distance_m - carried_m_per_frame * (now - frame) as f32).clamp(0.0, max_carried_m)
         });
-        size + moved - sighting.score
+        height_cost + displacement_m - measurement.score
     }
 
-    fn see_things(
+    fn match_objects(
         &mut self,
-        sightings: &[Sighting],
-        things: &[usize],
+        measurements: &[Measurement],
+        objects: &[usize],
         now: Frame,
     ) -> Vec<Detection> {
-        let in_hand = |k: usize| self.looks_carried(&sightings[k].extent, now);
-        let carried: Vec<bool> = (0..sightings.len()).map(in_hand).collect();
+        let is_carried = |k: usize| self.is_near_person(&measurements[k].extent, now);
+        let carried: Vec<bool> = (0..measurements.len()).map(is_carried).collect();
         let mut pairs: Vec<(f32, usize, usize)> = Vec::new();
         for (t, track) in self.tracks.iter().enumerate() {
             if self.held.contains(&track.id) {
                 continue;
             }
-            for k in things {
-                let cost = self.cost(track, &sightings[*k], carried[*k], now);
+            for k in objects {
+                let cost = self.cost(track, &measurements[*k], carried[*k], now);
                 pairs.extend(cost.map(|cost| (cost, t, *k)));
             }
         }
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
         let mut track_of: BTreeMap<usize, usize> = BTreeMap::new();
-        let mut is_taken = vec![false; self.tracks.len()];
+        let mut is_matched = vec![false; self.tracks.len()];
         for (_, t, k) in pairs {
-            if !is_taken[t] && !track_of.contains_key(&k) {
-                is_taken[t] = true;
+            if !is_matched[t] && !track_of.contains_key(&k) {
+                is_matched[t] = true;
                 track_of.insert(k, t);
             }
         }
         let mut found = Vec::new();
-        for k in things.iter().copied() {
-            let sighting = &sightings[k];
+        for k in objects.iter().copied() {
+            let measurement = &measurements[k];
             let t = match track_of.get(&k) {
                 Some(t) => *t,
-                None if self.is_piece(sighting, now) => continue,
-                None => self.begin(sighting, now),
+                None if self.is_fragment(measurement, now) => continue,
+                None => self.start_track(measurement, now),
             };
-            let (rules, track) = (self.rules, &mut self.tracks[t]);
-            track.see(sighting, carried[k], now, &rules);
-            let is_sure = track.odds > rules.told_odds;
-            if let Some(class) = class_of(track.label).filter(|_| is_sure) {
-                found.push(Detection::new(track.id, class, None, sighting.extent.clone()));
+            let (config, track) = (self.config, &mut self.tracks[t]);
+            track.update(measurement, carried[k], now, &config);
+            let is_reported = track.log_odds > config.report_log_odds;
+            if let Some(class) = class_of(track.label).filter(|_| is_reported) {
+                found.push(Detection::new(track.id, class, None, measurement.extent.clone()));
             }
         }
         found
     }
 
-    /// Whether something is where somebody's hands may be.
-    fn looks_carried(&self, extent: &Extent, now: Frame) -> bool {
+    /// True if an object is within the reach of a visible person.
+    fn is_near_person(&self, extent: &SegmentMeasurement, now: Frame) -> bool {
         let near = |at: &Vec3| horizontal_distance(*at, extent.position_in_world) < 1.0;
-        extent.bottom_m > 0.3 && self.people.values().any(|(at, then)| *then == now && near(at))
+        extent.bottom_m > 0.3 && self.people.values().any(|(at, frame)| *frame == now && near(at))
     }
 
-    /// What speaks against a sighting being of a track; `None` if it can't be.
-    fn cost(&self, track: &Track, sighting: &Sighting, in_hand: bool, now: Frame) -> Option<f32> {
-        let rules = &self.rules;
-        let apart_m = track.position.distance(sighting.extent.position_in_world);
-        if track.label != sighting.label {
-            let is_alike = kind_of(track.label) == kind_of(sighting.label);
-            return (is_alike && apart_m < rules.renamed_m).then_some(1.0 + apart_m);
+    /// Cost of a match between a detection and a track; `None` if it is impossible.
+    fn cost(
+        &self,
+        track: &Track,
+        measurement: &Measurement,
+        in_hand: bool,
+        now: Frame,
+    ) -> Option<f32> {
+        let config = &self.config;
+        let distance_m = track.position.distance(measurement.extent.position_in_world);
+        if track.label != measurement.label {
+            let is_same_kind = pixel_kind(track.label) == pixel_kind(measurement.label);
+            return (is_same_kind && distance_m < config.max_relabeled_m)
+                .then_some(1.0 + distance_m);
         }
-        let size_m = extents_m(track.label);
-        let still_m = rules.still_m.max(rules.still_extents * size_m[0].max(size_m[2]));
-        let (each_m, most_m) = rules.carried_m;
+        let extents = extents_m(track.label);
+        let max_static_m =
+            config.max_static_m.max(config.max_static_extents * extents[0].max(extents[2]));
+        let TrackerConfig { carried_m_per_frame, max_carried_m, .. } = *config;
         if track.is_released {
-            // It may have fallen.
-            let apart_m = horizontal_distance(track.position, sighting.extent.position_in_world);
-            return (apart_m < rules.released_m).then_some(apart_m / still_m);
+            // The object may have fallen.
+            let distance_m =
+                horizontal_distance(track.position, measurement.extent.position_in_world);
+            return (distance_m < config.max_released_m).then_some(distance_m / max_static_m);
         }
-        let walked_m = still_m + each_m * (now - track.seen_at) as f32;
+        let max_walk_m = max_static_m + carried_m_per_frame * (now - track.last_seen) as f32;
         let may_be_carried = track.is_carried || in_hand;
-        let reach_m = if may_be_carried { walked_m.min(most_m) } else { still_m };
-        // Of two that are near enough, who moved less.
-        (apart_m < reach_m).then_some(apart_m / still_m)
+        let max_m = if may_be_carried { max_walk_m.min(max_carried_m) } else { max_static_m };
+        // Among the tracks within reach, the one with the smallest displacement matches first.
+        (distance_m < max_m).then_some(distance_m / max_static_m)
     }
 
-    /// Whether a sighting is a piece of something that has just been seen.
-    fn is_piece(&self, sighting: &Sighting, now: Frame) -> bool {
-        let size_m = extents_m(sighting.label).into_iter().fold(0.0, f32::max);
-        let near_m = self.rules.piece_extents * size_m;
-        let at = sighting.extent.position_in_world;
-        let mut same = self.tracks.iter().filter(|t| t.seen_at == now && t.label == sighting.label);
+    /// True if a detection is a part of an object that was just seen.
+    fn is_fragment(&self, measurement: &Measurement, now: Frame) -> bool {
+        let size_m = extents_m(measurement.label).into_iter().fold(0.0, f32::max);
+        let near_m = self.config.fragment_extents * size_m;
+        let at = measurement.extent.position_in_world;
+        let mut same =
+            self.tracks.iter().filter(|t| t.last_seen == now && t.label == measurement.label);
         same.any(|t| t.position.distance(at) < near_m)
     }
 
-    fn begin(&mut self, sighting: &Sighting, now: Frame) -> usize {
+    fn start_track(&mut self, measurement: &Measurement, now: Frame) -> usize {
         self.tracks.push(Track {
             id: TrackId(TrackId::FIRST_OWN.0 + self.tracks.len() as u32),
             evidence: BTreeMap::new(),
-            label: sighting.label,
-            position: sighting.extent.position_in_world,
-            seen_at: now,
-            odds: 0.0,
+            label: measurement.label,
+            position: measurement.extent.position_in_world,
+            last_seen: now,
+            log_odds: 0.0,
             is_carried: false,
             is_released: false,
         });
@@ -396,34 +417,40 @@ impl Tracker {
 }
 
 impl Track {
-    fn see(&mut self, sighting: &Sighting, is_carried: bool, now: Frame, rules: &TrackerRules) {
-        let (low, high) = rules.odds_within;
-        self.odds = match self.evidence.is_empty() {
-            true => rules.first_odds.0 * (sighting.score - rules.first_odds.1),
-            false => self.odds + rules.odds.0 * sighting.score,
+    fn update(
+        &mut self,
+        measurement: &Measurement,
+        is_carried: bool,
+        now: Frame,
+        config: &TrackerConfig,
+    ) {
+        let [low, high] = config.log_odds_range;
+        self.log_odds = match self.evidence.is_empty() {
+            true => config.birth_log_odds * (measurement.score - config.birth_score),
+            false => self.log_odds + config.hit_log_odds * measurement.score,
         };
-        self.odds = self.odds.clamp(low, high);
-        // Much shows much.
-        let n_pixels = sighting.extent.n_pixels.min(2000) as f32;
-        *self.evidence.entry(sighting.label).or_default() += sighting.score * n_pixels.sqrt();
-        let most = self.evidence.iter().fold((0.0, self.label), |best, (label, much)| {
-            if *much > best.0 { (*much, *label) } else { best }
+        self.log_odds = self.log_odds.clamp(low, high);
+        // Larger detections count more.
+        let n_pixels = measurement.extent.n_pixels.min(2000) as f32;
+        *self.evidence.entry(measurement.label).or_default() += measurement.score * n_pixels.sqrt();
+        let strongest = self.evidence.iter().fold((0.0, self.label), |best, (label, weight)| {
+            if *weight > best.0 { (*weight, *label) } else { best }
         });
-        self.label = most.1;
-        self.position = sighting.extent.position_in_world;
-        (self.seen_at, self.is_carried, self.is_released) = (now, is_carried, false);
+        self.label = strongest.1;
+        self.position = measurement.extent.position_in_world;
+        (self.last_seen, self.is_carried, self.is_released) = (now, is_carried, false);
     }
 }
 
-fn kind_of(label: u8) -> PixelKind {
-    class_of(label).map_or(PixelKind::Firm, PixelKind::of)
+fn pixel_kind(label: u8) -> PixelKind {
+    class_of(label).map_or(PixelKind::Background, PixelKind::from_class)
 }
 
 fn extents_m(label: u8) -> [f32; 3] {
     class_of(label).map_or([0.0; 3], |class| class.info().size_m)
 }
 
-/// Whether a point of the world is in one of these boxes in the frame of a body.
+/// True if a point in the world's frame is inside of one of the boxes in a body's frame.
 fn is_within(boxes: &[(Vec3, Vec3)], point: Vec3, body: Pose) -> bool {
     let p = rotate_yaw(point - body.position, -body.yaw_rad);
     boxes.iter().any(|(at, half)| (p - *at).abs().cmplt(*half).all())

@@ -1,7 +1,7 @@
-//! Geometry as a binary glTF 2.0 file, for viewers, modelling programs and other renderers.
+//! Encoder of geometry as binary glTF 2.0, for viewers, modeling programs and other renderers.
 //!
-//! glTF's axes and units are ours: right-handed, y up, metres; cameras look along -z. A material
-//! holds a skin's color and gloss; what its texture looks like is only named.
+//! Axes and units of glTF and chaic are the same: right-handed, y up, meters; cameras look along
+//! -z. A glTF material holds color and gloss; the texture is stored by name only.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -22,24 +22,26 @@ use gltf::json::validation::{Checked::Valid, USize64};
 use gltf::json::{Accessor, Asset, Buffer, Index, Material, Mesh, Node, Root, Scene};
 
 use chaic_render::geometry::{
-    Geometry, Gloss, InstanceData, MeshData, SkinData, TriangleData, shown_from_linear, unit,
+    Geometry, InstanceData, MaterialData, MeshData, SpecularPreset, TriangleData,
+    display_from_linear, unit,
 };
 
-/// A scene as the bytes of a `.glb` file.
+/// Encodes a scene as the bytes of a `.glb` file.
 ///
-/// There is a node `class#id` for each instance, with both as extras; a mesh for each shape in each
-/// tint and factor, with a primitive for each skin; and a node for each camera. A material is shared
-/// by all that look the same; its color is the skin's or the tint, times the factor, at most 1. `class_of` names what an
-/// entity is. The vertices of flat triangles are their own, so that they have one normal.
+/// The file has a node `class#id` for each instance, with both values as extras, and a node for
+/// each camera. Each combination of shape, tint and factor is a mesh, with one primitive per
+/// material. Equal glTF materials are shared. Their color is the material color or the tint, times
+/// the factor, at most 1. `class_of` returns the class name of an entity. Flat triangles do not
+/// share vertices, so that each has one normal.
 pub fn glb(
     geometry: &Geometry,
     class_of: &dyn Fn(EntityId) -> &'static str,
     cameras: &[(String, Camera)],
 ) -> Vec<u8> {
-    let mut file = File::new();
+    let mut writer = GlbWriter::new();
     let mut nodes = Vec::new();
     let mut meshes = BTreeMap::new();
-    let shapes: Vec<Vec<Part>> = geometry.meshes.iter().map(|m| file.parts(m)).collect();
+    let shapes: Vec<Vec<MeshPart>> = geometry.meshes.iter().map(|m| writer.parts(m)).collect();
     for instance in &geometry.instances {
         let class = class_of(instance.entity);
         let parts = &shapes[instance.mesh as usize];
@@ -49,10 +51,10 @@ pub fn glb(
             instance.factor.map(f32::to_bits),
         );
         let mesh = (!parts.is_empty())
-            .then(|| *meshes.entry(key).or_insert_with(|| file.mesh(class, parts, instance)));
+            .then(|| *meshes.entry(key).or_insert_with(|| writer.mesh(class, parts, instance)));
         let m = Mat3::from_cols_array_2d(&instance.rotation);
         let id = instance.entity.0;
-        nodes.push(file.root.push(Node {
+        nodes.push(writer.root.push(Node {
             mesh,
             name: Some(format!("{class}{}", instance.entity)),
             rotation: Some(UnitQuaternion(Quat::from_mat3(&m).normalize().to_array())),
@@ -62,54 +64,59 @@ pub fn glb(
         }));
     }
     for (name, camera) in cameras {
-        nodes.push(file.camera(name, camera));
+        nodes.push(writer.camera(name, camera));
     }
-    file.finish(nodes)
+    writer.finish(nodes)
 }
 
-/// The triangles of one skin.
+/// Triangles of one material.
 #[derive(Clone, Copy)]
-struct Part {
-    skin: SkinData,
+struct MeshPart {
+    material: MaterialData,
     positions: Index<Accessor>,
     normals: Index<Accessor>,
     indices: Index<Accessor>,
 }
 
-/// A file that is being written.
-struct File {
+/// A file under construction.
+struct GlbWriter {
     root: Root,
-    /// What becomes the three views of the buffer, in the order of [`VIEWS`].
+    /// Contents of the three buffer views: positions, normals, indices.
     bytes: [Vec<u8>; 3],
     materials: BTreeMap<MaterialKey, Index<Material>>,
 }
 
 /// Color as bits, gloss, texture.
-type MaterialKey = ([u32; 3], Gloss, chaic_render::geometry::Texture);
+type MaterialKey = ([u32; 3], SpecularPreset, chaic_render::geometry::Texture);
 
 const POSITIONS: usize = 0;
 const NORMALS: usize = 1;
 const INDICES: usize = 2;
 
-impl File {
-    fn new() -> File {
+impl GlbWriter {
+    fn new() -> GlbWriter {
         let generator = concat!("chaic ", env!("CARGO_PKG_VERSION"));
         let asset = Asset { generator: Some(generator.to_owned()), ..Default::default() };
         let root = Root { asset, ..Default::default() };
-        File { root, bytes: Default::default(), materials: BTreeMap::new() }
+        GlbWriter { root, bytes: Default::default(), materials: BTreeMap::new() }
     }
 
-    /// The parts of a mesh, one for each skin that has triangles.
-    fn parts(&mut self, mesh: &MeshData) -> Vec<Part> {
-        let with_triangles = mesh.skins.iter().enumerate().filter_map(|(k, skin)| {
-            let own: Vec<&TriangleData> =
-                mesh.triangles.iter().filter(|t| usize::from(t.skin) == k).collect();
-            (!own.is_empty()).then_some((skin, own))
+    /// Encodes a mesh: one part per material that has triangles.
+    fn parts(&mut self, mesh: &MeshData) -> Vec<MeshPart> {
+        let with_triangles = mesh.materials.iter().enumerate().filter_map(|(k, material)| {
+            let triangles: Vec<&TriangleData> =
+                mesh.triangles.iter().filter(|t| usize::from(t.material) == k).collect();
+            (!triangles.is_empty()).then_some((material, triangles))
         });
-        with_triangles.map(|(skin, triangles)| self.part(mesh, *skin, &triangles)).collect()
+        with_triangles.map(|(material, triangles)| self.part(mesh, *material, &triangles)).collect()
     }
 
-    fn part(&mut self, mesh: &MeshData, skin: SkinData, triangles: &[&TriangleData]) -> Part {
+    fn part(
+        &mut self,
+        mesh: &MeshData,
+        material: MaterialData,
+        triangles: &[&TriangleData],
+    ) -> MeshPart {
         let (mut positions, mut normals) = (Vec::new(), Vec::new());
         let mut indices = Vec::with_capacity(3 * triangles.len());
         let mut shared: BTreeMap<u32, u32> = BTreeMap::new();
@@ -134,30 +141,31 @@ impl File {
             all.map(|v| serde_json::json!(v))
         };
         let (min, max) = (bounds(f32::min), bounds(f32::max));
-        let at = self.append(POSITIONS, positions.iter().flatten().map(|x| x.to_le_bytes()));
-        let whole = accessor(POSITIONS, at, positions.len());
-        let positions = self.root.push(Accessor { min, max, ..whole });
-        let at = self.append(NORMALS, normals.iter().flatten().map(|x| x.to_le_bytes()));
-        let normals = self.root.push(accessor(NORMALS, at, normals.len()));
-        let at = self.append(INDICES, indices.iter().map(|k| k.to_le_bytes()));
-        let indices = self.root.push(accessor(INDICES, at, indices.len()));
-        Part { skin, positions, normals, indices }
+        let offset = self.append(POSITIONS, positions.iter().flatten().map(|x| x.to_le_bytes()));
+        let position_accessor = accessor(POSITIONS, offset, positions.len());
+        let positions = self.root.push(Accessor { min, max, ..position_accessor });
+        let offset = self.append(NORMALS, normals.iter().flatten().map(|x| x.to_le_bytes()));
+        let normals = self.root.push(accessor(NORMALS, offset, normals.len()));
+        let offset = self.append(INDICES, indices.iter().map(|k| k.to_le_bytes()));
+        let indices = self.root.push(accessor(INDICES, offset, indices.len()));
+        MeshPart { material, positions, normals, indices }
     }
 
-    /// Appends numbers of four bytes to a view; returns where they begin.
+    /// Appends 4-byte values to a buffer view; returns the offset of the first.
     fn append(&mut self, view: usize, numbers: impl Iterator<Item = [u8; 4]>) -> usize {
         let bytes = &mut self.bytes[view];
-        let at = bytes.len();
+        let offset = bytes.len();
         bytes.extend(numbers.flatten());
-        at
+        offset
     }
 
-    fn mesh(&mut self, class: &str, parts: &[Part], instance: &InstanceData) -> Index<Mesh> {
+    fn mesh(&mut self, class: &str, parts: &[MeshPart], instance: &InstanceData) -> Index<Mesh> {
         let mut primitives = Vec::with_capacity(parts.len());
         for part in parts {
-            let color = instance.tint.filter(|_| part.skin.tinted).unwrap_or(part.skin.color);
+            let color =
+                instance.tint.filter(|_| part.material.tinted).unwrap_or(part.material.color);
             let color = Vec3::from(color) * Vec3::from(instance.factor);
-            // A material can't reflect more light than there is.
+            // A material cannot reflect more light than it receives.
             let color = color.clamp(Vec3::ZERO, Vec3::ONE).to_array();
             let attributes = [
                 (Valid(Semantic::Positions), part.positions),
@@ -168,7 +176,7 @@ impl File {
                 extensions: None,
                 extras: None,
                 indices: Some(part.indices),
-                material: Some(self.material(color, &part.skin)),
+                material: Some(self.material(color, &part.material)),
                 mode: Valid(Mode::Triangles),
                 targets: None,
             });
@@ -182,17 +190,17 @@ impl File {
         })
     }
 
-    fn material(&mut self, color: [f32; 3], skin: &SkinData) -> Index<Material> {
-        let key = (color.map(f32::to_bits), skin.gloss, skin.texture);
-        if let Some(known) = self.materials.get(&key) {
-            return *known;
+    fn material(&mut self, color: [f32; 3], material: &MaterialData) -> Index<Material> {
+        let key = (color.map(f32::to_bits), material.gloss, material.texture);
+        if let Some(existing) = self.materials.get(&key) {
+            return *existing;
         }
-        let (metallic, roughness) = metallic_roughness(skin.gloss);
+        let (metallic, roughness) = metallic_roughness(material.gloss);
         let [r, g, b] = color;
-        let gives_light = matches!(skin.gloss, Gloss::Glow | Gloss::Pane);
-        let [red, green, blue] = color.map(shown_from_linear);
-        let texture = format!("{:?}", skin.texture).to_lowercase();
-        let gloss = format!("{:?}", skin.gloss).to_lowercase();
+        let is_emissive = matches!(material.gloss, SpecularPreset::Glow | SpecularPreset::Pane);
+        let [red, green, blue] = color.map(display_from_linear);
+        let texture = format!("{:?}", material.texture).to_lowercase();
+        let gloss = format!("{:?}", material.gloss).to_lowercase();
         let index = self.root.push(Material {
             name: Some(format!("{texture} {gloss} #{red:02x}{green:02x}{blue:02x}")),
             pbr_metallic_roughness: PbrMetallicRoughness {
@@ -201,7 +209,7 @@ impl File {
                 roughness_factor: StrengthFactor(roughness),
                 ..Default::default()
             },
-            emissive_factor: EmissiveFactor(if gives_light { color } else { [0.0; 3] }),
+            emissive_factor: EmissiveFactor(if is_emissive { color } else { [0.0; 3] }),
             extras: extras(&serde_json::json!({ "texture": texture, "gloss": gloss })),
             ..Default::default()
         });
@@ -210,7 +218,7 @@ impl File {
     }
 
     fn camera(&mut self, name: &str, camera: &Camera) -> Index<Node> {
-        use gltf::json::camera::{Camera as Lens, Perspective, Type};
+        use gltf::json::camera::{Camera as GltfCamera, Perspective, Type};
         let perspective = Perspective {
             aspect_ratio: Some(camera.width as f32 / camera.height as f32),
             yfov: camera.vertical_fov_rad,
@@ -219,7 +227,7 @@ impl File {
             extensions: None,
             extras: None,
         };
-        let lens = self.root.push(Lens {
+        let projection = self.root.push(GltfCamera {
             name: Some(name.to_owned()),
             orthographic: None,
             perspective: Some(perspective),
@@ -228,7 +236,7 @@ impl File {
             extras: None,
         });
         self.root.push(Node {
-            camera: Some(lens),
+            camera: Some(projection),
             name: Some(name.to_owned()),
             rotation: Some(UnitQuaternion(camera.world_from_camera.to_array())),
             translation: Some(camera.eye_in_world.to_array()),
@@ -237,7 +245,7 @@ impl File {
     }
 
     fn finish(self, nodes: Vec<Index<Node>>) -> Vec<u8> {
-        let File { mut root, bytes, .. } = self;
+        let GlbWriter { mut root, bytes, .. } = self;
         let scene = Scene { extensions: None, extras: None, name: None, nodes };
         root.scene = Some(root.push(scene));
         let length = bytes.iter().map(Vec::len).sum::<usize>();
@@ -264,26 +272,26 @@ impl File {
             });
             begin += bytes.len();
         }
-        let json = root.to_vec().expect("names and finite numbers only");
+        let json = root.to_vec().expect("the JSON has only names and finite values");
         let glb = Glb {
-            // The writer works the length out.
+            // The writer computes the length.
             header: Header { magic: *b"glTF", version: 2, length: 0 },
             json: Cow::Owned(json),
             bin: Some(Cow::Owned(bytes.concat())),
         };
-        glb.to_vec().expect("a scene is far below 4 GB")
+        glb.to_vec().expect("a scene is smaller than 4 GB")
     }
 }
 
-/// So many elements of a view, from this byte on.
-fn accessor(view: usize, at: usize, count: usize) -> Accessor {
+/// Accessor of `count` elements of a buffer view from byte `offset`.
+fn accessor(view: usize, offset: usize, count: usize) -> Accessor {
     let (type_, number) = match view {
         INDICES => (Type::Scalar, ComponentType::U32),
         _ => (Type::Vec3, ComponentType::F32),
     };
     Accessor {
         buffer_view: Some(Index::new(view as u32)),
-        byte_offset: Some(USize64::from(at)),
+        byte_offset: Some(USize64::from(offset)),
         count: USize64::from(count),
         component_type: Valid(GenericComponentType(number)),
         type_: Valid(type_),
@@ -297,14 +305,14 @@ fn accessor(view: usize, at: usize, count: usize) -> Accessor {
     }
 }
 
-/// The metallic-roughness material nearest to our highlights.
-fn metallic_roughness(gloss: Gloss) -> (f32, f32) {
+/// Closest metallic-roughness material of a specular preset.
+fn metallic_roughness(gloss: SpecularPreset) -> (f32, f32) {
     match gloss {
-        Gloss::Dull | Gloss::Glow => (0.0, 0.95),
-        Gloss::Satin => (0.0, 0.6),
-        Gloss::Shiny => (0.0, 0.3),
-        Gloss::Metal => (1.0, 0.4),
-        Gloss::Glass | Gloss::Pane => (0.0, 0.1),
+        SpecularPreset::Dull | SpecularPreset::Glow => (0.0, 0.95),
+        SpecularPreset::Satin => (0.0, 0.6),
+        SpecularPreset::Shiny => (0.0, 0.3),
+        SpecularPreset::Metal => (1.0, 0.4),
+        SpecularPreset::Glass | SpecularPreset::Pane => (0.0, 0.1),
     }
 }
 

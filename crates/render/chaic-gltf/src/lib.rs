@@ -1,8 +1,8 @@
-//! Scenes as binary glTF files, for viewers, modelling programs and other renderers.
+//! Export of scenes as binary glTF files, for viewers, modeling programs and other renderers.
 //!
-//! **What it is**: the shapes that `chaic-render` draws, encoded as glTF 2.0 by [`glb`], and how an
-//! episode begins as such a file by [`write()`].
-//! **What it is not**: it draws nothing, and reads no glTF.
+//! **What it is**: [`glb`] encodes the geometry of `chaic-render` as glTF 2.0. [`write()`] writes
+//! the initial state of an episode to such a file. **What it is not**: it renders nothing, and
+//! reads no glTF.
 
 mod encode;
 
@@ -11,80 +11,84 @@ use std::path::Path;
 use chaic_core::EntityId;
 use chaic_core::geom::Camera;
 use chaic_episodes::Episode;
-use chaic_files::{FileError, write_whole};
+use chaic_files::{FileError, write_atomically};
 use chaic_render::Scene;
 use chaic_world::{Posture, Rules, SetupError, World};
 
 pub use encode::glb;
 
-/// Why a scene is no file.
+/// Error of the glTF export.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
-    /// The setup makes no world.
+    /// The setup is invalid.
     #[error("{id}: {problem}")]
     Setup {
-        /// The episode.
+        /// Id of the episode.
         id: String,
-        /// What is wrong with it.
+        /// Problem of the setup.
         problem: SetupError,
     },
-    /// The operating system refused something.
+    /// The file could not be written.
     #[error(transparent)]
     File(#[from] FileError),
 }
 
-/// How a scene becomes a file.
+/// Options of the glTF export.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SceneOptions {
     /// Level of detail, from 0 to [`chaic_render::geometry::FINEST`].
     pub detail: usize,
-    /// Whether ceilings are left out, to look into a house from above.
+    /// Hides ceilings, to look into a house from above.
     pub hide_ceiling: bool,
 }
 
-/// What a file holds.
+/// Contents of a written file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Written {
-    /// Nodes that can be seen.
+pub struct SceneSummary {
+    /// Number of nodes with a mesh.
     pub instances: usize,
-    /// Triangles of all of them.
+    /// Number of triangles of all nodes.
     pub triangles: usize,
 }
 
-/// Side of the images that the file's cameras are made for, pixels; a file holds only their ratio.
+/// Image side of the exported cameras, pixels; a file holds only the aspect ratio.
 const SIZE_PX: u32 = 512;
 
-/// Writes how an episode begins as binary glTF, with a camera for each agent's eye.
+/// Writes the initial state of an episode as binary glTF, with a camera for the eye of each agent.
 ///
 /// # Errors
-/// If the setup makes no world, or the file system refuses.
-pub fn write(episode: &Episode, options: SceneOptions, path: &Path) -> Result<Written, SceneError> {
-    let refused = |problem| SceneError::Setup { id: episode.id().to_owned(), problem };
-    let world = World::new(episode.setup().clone(), Rules::paper()).map_err(refused)?;
+/// If the setup is invalid, or the file cannot be written.
+pub fn write(
+    episode: &Episode,
+    options: SceneOptions,
+    path: &Path,
+) -> Result<SceneSummary, SceneError> {
+    let setup_error = |problem| SceneError::Setup { id: episode.id().to_owned(), problem };
+    let world = World::new(episode.setup().clone(), Rules::paper()).map_err(setup_error)?;
     let agents = episode.setup().agents();
     let eyes: Vec<(String, Camera)> =
-        agents.map(|a| (format!("eye of {a}"), world.eye(a, SIZE_PX))).collect();
+        agents.map(|a| (format!("eye of {a}"), world.camera(a, SIZE_PX))).collect();
     Ok(write_world(&world, options, &eyes, path)?)
 }
 
-/// The same for a world at any moment, with these cameras.
+/// Writes the current state of a world as binary glTF, with these cameras.
 ///
 /// # Errors
-/// If the file system refuses.
+/// If the file cannot be written.
 pub fn write_world(
     world: &World,
     options: SceneOptions,
     cameras: &[(String, Camera)],
     path: &Path,
-) -> Result<Written, FileError> {
+) -> Result<SceneSummary, FileError> {
     let setup = world.setup();
     let postures: Vec<Posture> = setup.agents().map(|a| world.posture(a)).collect();
     let mut geometry = Scene::new(setup).geometry(world.state(), &postures, options.detail);
     if options.hide_ceiling {
-        geometry.leave_out(EntityId::CEILING);
+        geometry.remove_entity(EntityId::CEILING);
     }
     let classes = world.classes();
     let bytes = glb(&geometry, &|entity| entity.class_name(&classes), cameras);
-    write_whole(path, &bytes)?;
-    Ok(Written { instances: geometry.instances.len(), triangles: geometry.count_triangles() })
+    write_atomically(path, &bytes)?;
+    Ok(SceneSummary { instances: geometry.instances.len(), triangles: geometry.count_triangles() })
 }

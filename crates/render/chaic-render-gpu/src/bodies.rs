@@ -1,122 +1,133 @@
-//! Bodies of people, which no two moments share: a level of detail is shaped and brought onto the
-//! device when a view first needs it.
+//! Bodies of people, whose meshes differ in every frame: a level of detail is built and uploaded
+//! when a view first needs it.
 
 use std::ops::Range;
 
 use bytemuck::Zeroable as _;
 use chaic_core::EntityId;
-use chaic_render::geometry::{BodyShape, InstanceData, N_LEVELS, level_for};
-use chaic_render::{Lens, View};
+use chaic_render::geometry::{InstanceData, N_LEVELS, level_for};
+use chaic_render::shapes::BodyShape;
+use chaic_render::{Projection, View};
 use rayon::prelude::*;
 
-use crate::device::Link;
+use crate::device::GpuContext;
 use crate::error::GpuError;
-use crate::gpu::{Gpu, WorldId};
-use crate::meshes::{Meshes, Parts};
-use crate::records::{MeshRecord, Sight};
+use crate::gpu::Gpu;
+use crate::meshes::{MeshRanges, Meshes};
+use crate::records::{MeshRecord, ViewVisibility};
 use crate::upload::PackedMesh;
+use crate::world_id::WorldId;
 
-/// A body of a world in its present posture.
+/// A body of a world in its current posture.
 #[derive(Debug)]
 pub(crate) struct PlacedBody {
     instance: InstanceData,
     shape: BodyShape,
-    /// Where its record is.
-    place: Range<u32>,
+    /// Index range of its record.
+    record_range: Range<u32>,
     record: MeshRecord,
-    /// A bit for each level that is there.
-    present: u32,
-    /// A bit for each that the next batch needs.
-    wanted: u32,
-    parts: Vec<Parts>,
+    /// One bit per uploaded level.
+    uploaded: u32,
+    /// One bit per level that the next batch needs.
+    requested: u32,
+    ranges: Vec<MeshRanges>,
 }
 
 impl PlacedBody {
-    /// A body without any level yet.
+    /// Body without uploaded levels.
     pub fn new(
         meshes: &mut Meshes,
-        link: &Link,
+        context: &GpuContext,
         instance: InstanceData,
         shape: BodyShape,
     ) -> Result<PlacedBody, GpuError> {
         let record = MeshRecord::zeroed();
-        let place = meshes.records.add(link, &[record])?;
-        let parts = Vec::new();
-        Ok(PlacedBody { instance, shape, place, record, present: 0, wanted: 0, parts })
+        let record_range = meshes.records.add(context, &[record])?;
+        let ranges = Vec::new();
+        Ok(PlacedBody { instance, shape, record_range, record, uploaded: 0, requested: 0, ranges })
     }
 
-    /// Where its record is.
+    /// Index of its record.
     pub fn record(&self) -> u32 {
-        self.place.start
+        self.record_range.start
     }
 
-    /// Takes it off the device.
+    /// Removes the body from the device.
     pub fn remove(self, meshes: &mut Meshes) {
-        meshes.records.remove(self.place);
-        self.parts.into_iter().for_each(|parts| meshes.take(parts));
+        meshes.records.remove(self.record_range);
+        self.ranges.into_iter().for_each(|ranges| meshes.remove_ranges(ranges));
     }
 
-    /// Notes at which level a view sees it.
-    fn look(&mut self, view: &View, sight: &Sight) {
-        let is_own =
-            view.hide.is_some_and(|agent| self.instance.entity == EntityId::of_agent(agent));
-        if is_own || !self.instance.regions.overlaps(sight.regions) {
+    /// Adds the level that a view needs.
+    fn request_level(&mut self, view: &View, visibility: &ViewVisibility) {
+        let is_hidden =
+            view.hide.is_some_and(|agent| self.instance.entity == EntityId::from_agent(agent));
+        if is_hidden || !self.instance.regions.overlaps(visibility.regions) {
             return;
         }
-        self.wanted |= levels_in(&self.instance, &sight.lens);
+        self.requested |= levels_in(&self.instance, &visibility.projection);
     }
 
-    /// The levels that are still to be shaped.
+    /// Levels to build.
     fn missing(&self) -> impl Iterator<Item = usize> + use<> {
-        let missing = self.wanted & !self.present;
+        let missing = self.requested & !self.uploaded;
         (0..N_LEVELS).filter(move |level| missing >> level & 1 == 1)
     }
 
-    /// Brings levels over that are missing.
-    fn add(&mut self, meshes: &mut Meshes, link: &Link, mesh: &PackedMesh) -> Result<(), GpuError> {
-        let (parts, record) = meshes.put(link, mesh)?;
-        self.parts.push(parts);
+    /// Uploads missing levels.
+    fn add(
+        &mut self,
+        meshes: &mut Meshes,
+        context: &GpuContext,
+        mesh: &PackedMesh,
+    ) -> Result<(), GpuError> {
+        let (ranges, record) = meshes.upload_ranges(context, mesh)?;
+        self.ranges.push(ranges);
         for level in self.missing() {
             self.record.levels[level] = record.levels[level];
         }
-        self.present |= self.wanted;
-        meshes.records.write(link, self.place.start, &[self.record]);
+        self.uploaded |= self.requested;
+        meshes.records.write(context, self.record_range.start, &[self.record]);
         Ok(())
     }
 }
 
-/// The level at which a lens sees an instance, a bit for each; both, if it is on the edge between two
-/// and the device may round the other way.
-fn levels_in(instance: &InstanceData, lens: &Lens) -> u32 {
-    const SLACK: f32 = 1e-3;
-    // What is just outside for one may be inside for the other, but then no pixel shows it.
-    instance.radius_px(lens).map_or(0, |radius_px| {
-        1 << level_for(radius_px * (1.0 - SLACK)) | 1 << level_for(radius_px * (1.0 + SLACK))
+/// Level of detail of an instance in a view, one bit per level. Two bits are set near a threshold,
+/// where the device may round differently.
+fn levels_in(instance: &InstanceData, projection: &Projection) -> u32 {
+    const TOLERANCE: f32 = 1e-3;
+    // An instance outside the frustum on the host may be inside on the device, but then it covers
+    // no pixel.
+    instance.radius_px(projection).map_or(0, |radius_px| {
+        1 << level_for(radius_px * (1.0 - TOLERANCE))
+            | 1 << level_for(radius_px * (1.0 + TOLERANCE))
     })
 }
 
 impl Gpu {
-    /// Shapes what views see of bodies and is not there yet, on all threads.
-    pub(crate) fn shape_bodies(
+    /// Builds the missing body meshes of the views on all threads, and uploads them.
+    pub(crate) fn build_bodies(
         &mut self,
         views: &[(WorldId, View)],
-        sights: &[Option<Sight>],
+        visibilities: &[Option<ViewVisibility>],
     ) -> Result<(), GpuError> {
-        let Gpu { link, meshes, worlds, .. } = self;
-        for ((world, view), sight) in views.iter().zip(sights) {
-            if let (Some(Some(world)), Some(sight)) = (worlds.get_mut(world.0 as usize), sight) {
-                world.bodies.iter_mut().for_each(|body| body.look(view, sight));
+        let Gpu { context, meshes, worlds, .. } = self;
+        for ((world, view), visibility) in views.iter().zip(visibilities) {
+            if let (Some(Some(world)), Some(visibility)) =
+                (worlds.get_mut(world.0 as usize), visibility)
+            {
+                world.bodies.iter_mut().for_each(|body| body.request_level(view, visibility));
             }
         }
         let bodies = worlds.iter_mut().flatten().flat_map(|world| &mut world.bodies);
         let bodies: Vec<&mut PlacedBody> =
             bodies.filter(|b| b.missing().next().is_some()).collect();
         let shape = |body: &&mut PlacedBody| {
-            PackedMesh::of(body.missing().map(|level| (level, body.shape.mesh(level))))
+            PackedMesh::new(body.missing().map(|level| (level, body.shape.mesh(level))))
         };
         let packed: Vec<PackedMesh> = bodies.par_iter().map(shape).collect();
         for (body, mesh) in bodies.into_iter().zip(&packed) {
-            body.add(meshes, link, mesh)?;
+            body.add(meshes, context, mesh)?;
         }
         Ok(())
     }

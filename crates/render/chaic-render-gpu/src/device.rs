@@ -1,77 +1,77 @@
-//! The way to the graphics card.
+//! Connection to the GPU device.
 
 use crate::error::GpuError;
 
-/// Which adapters will do.
+/// Allowed kinds of adapter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Adapters {
-    /// Graphics cards: discrete, virtual or integrated ones, the first of these kinds there is.
-    Cards,
-    /// The same, and programs that stand in for a card: for tests.
-    AnyKind,
+    /// GPUs: the first discrete, virtual or integrated one.
+    Hardware,
+    /// GPUs, and software implementations for tests.
+    Any,
 }
 
 impl Adapters {
-    /// The kinds in order of preference.
+    /// Kinds in order of preference.
     fn kinds(self) -> &'static [wgpu::DeviceType] {
         use wgpu::DeviceType::{Cpu, DiscreteGpu, IntegratedGpu, Other, VirtualGpu};
         match self {
-            Adapters::Cards => &[DiscreteGpu, VirtualGpu, IntegratedGpu],
-            Adapters::AnyKind => &[DiscreteGpu, VirtualGpu, IntegratedGpu, Other, Cpu],
+            Adapters::Hardware => &[DiscreteGpu, VirtualGpu, IntegratedGpu],
+            Adapters::Any => &[DiscreteGpu, VirtualGpu, IntegratedGpu, Other, Cpu],
         }
     }
 
-    fn names(self) -> &'static str {
+    fn kind_names(self) -> &'static str {
         match self {
-            Adapters::Cards => "discrete, virtual, integrated",
-            Adapters::AnyKind => "discrete, virtual, integrated, other, software",
+            Adapters::Hardware => "discrete, virtual, integrated",
+            Adapters::Any => "discrete, virtual, integrated, other, software",
         }
     }
 }
 
-/// Storage buffers that the widest shader binds.
+/// Maximum number of storage buffers that a shader binds.
 const STORAGE_BUFFERS: u32 = 13;
 
-/// An open device and what it can do.
+/// An open device and its limits.
 #[derive(Debug)]
-pub(crate) struct Link {
+pub(crate) struct GpuContext {
     pub device: wgpu::Device,
     pub queue: wgpu::Queue,
     pub info: wgpu::AdapterInfo,
     pub limits: wgpu::Limits,
 }
 
-impl Link {
-    /// Opens the best adapter of these kinds.
-    pub fn open(adapters: Adapters) -> Result<Link, GpuError> {
+impl GpuContext {
+    /// Opens the best adapter of the allowed kinds.
+    pub fn open(adapters: Adapters) -> Result<GpuContext, GpuError> {
         let mut description = wgpu::InstanceDescriptor::new_without_display_handle();
         description.backends = wgpu::Backends::VULKAN;
         let instance = wgpu::Instance::new(description);
         let all = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::VULKAN));
-        let of_kind = |kind: &wgpu::DeviceType| {
+        let with_kind = |kind: &wgpu::DeviceType| {
             all.iter().find(|adapter| adapter.get_info().device_type == *kind)
         };
-        let Some(adapter) = adapters.kinds().iter().find_map(of_kind) else {
-            let told = |adapter: &wgpu::Adapter| {
+        let Some(adapter) = adapters.kinds().iter().find_map(with_kind) else {
+            let describe = |adapter: &wgpu::Adapter| {
                 let info = adapter.get_info();
                 format!("{} ({:?})", info.name, info.device_type)
             };
-            let found: Vec<String> = all.iter().map(told).collect();
+            let found: Vec<String> = all.iter().map(describe).collect();
             let found = if found.is_empty() { "none".to_owned() } else { found.join(", ") };
-            return Err(GpuError::NoAdapter { wanted: adapters.names(), found });
+            return Err(GpuError::NoAdapter { requested: adapters.kind_names(), found });
         };
-        Link::to(adapter)
+        GpuContext::connect(adapter)
     }
 
-    fn to(adapter: &wgpu::Adapter) -> Result<Link, GpuError> {
+    fn connect(adapter: &wgpu::Adapter) -> Result<GpuContext, GpuError> {
         let (info, limits) = (adapter.get_info(), adapter.limits());
-        let has = limits.max_storage_buffers_per_shader_stage;
-        if has < STORAGE_BUFFERS {
+        let value = limits.max_storage_buffers_per_shader_stage;
+        if value < STORAGE_BUFFERS {
             return Err(GpuError::WeakAdapter {
                 name: info.name,
                 limit: "max_storage_buffers_per_shader_stage",
-                has: u64::from(has),
-                needed: u64::from(STORAGE_BUFFERS),
+                value: u64::from(value),
+                required: u64::from(STORAGE_BUFFERS),
             });
         }
         let description = wgpu::DeviceDescriptor {
@@ -80,31 +80,31 @@ impl Link {
             ..Default::default()
         };
         match pollster::block_on(adapter.request_device(&description)) {
-            Ok((device, queue)) => Ok(Link { device, queue, info, limits }),
+            Ok((device, queue)) => Ok(GpuContext { device, queue, info, limits }),
             Err(source) => Err(GpuError::Device { name: info.name, source }),
         }
     }
 
-    /// The largest buffer that a shader can see, bytes.
-    pub fn most_bytes(&self) -> u64 {
+    /// Maximum size of a storage buffer, bytes.
+    pub fn max_buffer_bytes(&self) -> u64 {
         self.limits.max_storage_buffer_binding_size.min(self.limits.max_buffer_size)
     }
 
-    /// A buffer of at least 16 bytes.
+    /// Creates a buffer of at least 16 bytes.
     pub fn buffer(
         &self,
-        what: &'static str,
+        label: &'static str,
         bytes: u64,
         usage: wgpu::BufferUsages,
     ) -> Result<wgpu::Buffer, GpuError> {
         let size = bytes.max(16).next_multiple_of(16);
-        let full = GpuError::OutOfMemory { what, bytes: size };
+        let full = GpuError::OutOfMemory { purpose: label, bytes: size };
         if size > self.limits.max_buffer_size {
             return Err(full);
         }
         let scope = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let description =
-            wgpu::BufferDescriptor { label: Some(what), size, usage, mapped_at_creation: false };
+            wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
         let buffer = self.device.create_buffer(&description);
         match pollster::block_on(scope.pop()) {
             None => Ok(buffer),
@@ -112,12 +112,16 @@ impl Link {
         }
     }
 
-    /// A buffer for shaders to read, with these contents.
-    pub fn filled(&self, what: &'static str, contents: &[u8]) -> Result<wgpu::Buffer, GpuError> {
+    /// Creates a read-only buffer with these contents.
+    pub fn buffer_with(
+        &self,
+        label: &'static str,
+        contents: &[u8],
+    ) -> Result<wgpu::Buffer, GpuError> {
         let usage = wgpu::BufferUsages::STORAGE
             | wgpu::BufferUsages::UNIFORM
             | wgpu::BufferUsages::COPY_DST;
-        let buffer = self.buffer(what, contents.len() as u64, usage)?;
+        let buffer = self.buffer(label, contents.len() as u64, usage)?;
         self.queue.write_buffer(&buffer, 0, contents);
         Ok(buffer)
     }
@@ -126,7 +130,7 @@ impl Link {
         self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
     }
 
-    /// Waits until all that was submitted is done.
+    /// Waits until all submitted work is done.
     pub fn wait(&self) -> Result<(), GpuError> {
         match self.device.poll(wgpu::PollType::wait_indefinitely()) {
             Ok(_) => Ok(()),
@@ -134,13 +138,13 @@ impl Link {
         }
     }
 
-    /// Copies the first bytes of buffers back from the device, in one go.
+    /// Reads the first bytes of several buffers from the device.
     pub fn read(&self, buffers: &[(&wgpu::Buffer, u64)]) -> Result<Vec<Vec<u8>>, GpuError> {
         let usage = wgpu::BufferUsages::MAP_READ.union(wgpu::BufferUsages::COPY_DST);
         let mut encoder = self.encoder();
         let mut copies = Vec::with_capacity(buffers.len());
         for (buffer, bytes) in buffers {
-            let copy = self.buffer("images on their way back", *bytes, usage)?;
+            let copy = self.buffer("readback buffers", *bytes, usage)?;
             if *bytes > 0 {
                 encoder.copy_buffer_to_buffer(buffer, 0, &copy, 0, Some(*bytes));
             }
@@ -148,7 +152,7 @@ impl Link {
         }
         self.queue.submit([encoder.finish()]);
         for copy in &copies {
-            // An error shows when the range is asked for.
+            // Errors appear when the range is requested.
             copy.map_async(wgpu::MapMode::Read, .., |_| {});
         }
         self.wait()?;

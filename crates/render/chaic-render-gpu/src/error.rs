@@ -1,103 +1,110 @@
-//! What can go wrong, each with what to do about it.
+//! Errors of the GPU renderer, each with a remedy.
 
-use crate::WorldId;
+use crate::world_id::WorldId;
 
-/// Why something couldn't be done on the graphics card.
+/// Error of the GPU renderer.
 #[derive(Debug, thiserror::Error)]
 pub enum GpuError {
-    /// No adapter of the kinds asked for.
+    /// No adapter of the requested kinds.
     #[error(
-        "no Vulkan adapter of the kinds {wanted} (found: {found}); install the card's driver, or \
-         a software one (Debian: mesa-vulkan-drivers) and ask for Adapters::AnyKind"
+        "no Vulkan adapter of the kinds {requested} (found: {found}); install the GPU driver, \
+         or a software driver (Debian: mesa-vulkan-drivers) with Adapters::Any"
     )]
     NoAdapter {
-        /// Kinds of adapter that were looked for.
-        wanted: &'static str,
-        /// Names and kinds of those there are.
+        /// Requested kinds of adapter.
+        requested: &'static str,
+        /// Names and kinds of the available adapters.
         found: String,
     },
-    /// The adapter is too weak.
-    #[error("adapter {name} has {limit} of {has}, {needed} are needed; use another adapter")]
+    /// The adapter does not meet the requirements.
+    #[error(
+        "adapter {name} has {limit} = {value}, at least {required} is required; use another adapter"
+    )]
     WeakAdapter {
-        /// The adapter's name.
+        /// Name of the adapter.
         name: String,
-        /// Which limit, by its name in wgpu.
+        /// Name of the limit in wgpu.
         limit: &'static str,
-        /// Its value.
-        has: u64,
-        /// The value needed.
-        needed: u64,
+        /// Value of the limit.
+        value: u64,
+        /// Required value.
+        required: u64,
     },
-    /// The adapter didn't open.
-    #[error("adapter {name} can't be opened: {source}")]
+    /// The device could not be opened.
+    #[error("cannot open adapter {name}: {source}")]
     Device {
-        /// The adapter's name.
+        /// Name of the adapter.
         name: String,
-        /// What it said.
+        /// Error of wgpu.
         source: wgpu::RequestDeviceError,
     },
-    /// No world of this id was added here, or it was removed.
-    #[error("{0:?} isn't on this device; add it first")]
+    /// The world was never added, or was removed.
+    #[error("{0:?} is not on this device; add it first")]
     UnknownWorld(WorldId),
-    /// More instances than ids of pixels can tell apart.
-    #[error("a world of {n} instances; at most {most} can be drawn")]
+    /// More instances than visibility ids can distinguish.
+    #[error("a world has {n} instances, at most {max} are supported; split it")]
     TooManyInstances {
-        /// How many there are.
+        /// Number of instances.
         n: usize,
-        /// How many there may be.
-        most: usize,
+        /// Maximum number of instances.
+        max: usize,
     },
-    /// Views of one batch must be of one size.
+    /// The views of a batch differ in size.
     #[error(
-        "view {index} is {width}x{height} pixels, the first one {first_width}x{first_height}; \
-         render each size as a batch of its own"
+        "view {index} is {width}x{height} pixels, the first view is {first_width}x{first_height}; \
+         render each size in its own batch"
     )]
     MixedSizes {
-        /// Which view differs.
+        /// Index of the view that differs.
         index: usize,
         /// Its width, pixels.
         width: u32,
         /// Its height, pixels.
         height: u32,
-        /// The first view's width, pixels.
+        /// Width of the first view, pixels.
         first_width: u32,
-        /// The first view's height, pixels.
+        /// Height of the first view, pixels.
         first_height: u32,
     },
-    /// The images of a batch don't fit into a buffer of the device.
+    /// The images of a batch do not fit into a device buffer.
     #[error(
-        "{views} views of {width}x{height} pixels are too large a batch for this adapter; render \
-         at most {most} at a time"
+        "a batch of {views} views of {width}x{height} pixels exceeds the limits of this adapter; \
+         render at most {max} at a time"
     )]
     TooLargeBatch {
-        /// How many views there are.
+        /// Number of views.
         views: usize,
-        /// Width of each, pixels.
+        /// Width of each view, pixels.
         width: u32,
-        /// Height of each, pixels.
+        /// Height of each view, pixels.
         height: u32,
-        /// How many there may be.
-        most: u64,
+        /// Maximum number of views.
+        max: u64,
     },
-    /// The triangles of one view don't fit into a buffer of the device.
-    #[error("view {index} may show {n} triangles, this adapter holds {most}; use another adapter")]
+    /// The triangles of one view do not fit into a device buffer.
+    #[error(
+        "view {index} may need {n} triangles, this adapter supports {max}; use another adapter"
+    )]
     TooManyTriangles {
-        /// Which view.
+        /// Index of the view.
         index: usize,
-        /// How many triangles it may show.
+        /// Upper bound on the triangles of the view.
         n: u32,
-        /// How many there may be.
-        most: u32,
+        /// Maximum number of triangles.
+        max: u32,
     },
-    /// The device's memory is full.
-    #[error("the device has no {bytes} bytes left for {what}; use smaller batches or fewer worlds")]
+    /// The device memory is full.
+    #[error(
+        "cannot allocate {bytes} bytes on the device for {purpose}; use smaller batches \
+         or fewer worlds"
+    )]
     OutOfMemory {
-        /// What it was wanted for.
-        what: &'static str,
-        /// How much was wanted.
+        /// Purpose of the allocation.
+        purpose: &'static str,
+        /// Size of the allocation, bytes.
         bytes: u64,
     },
-    /// The device is gone or hangs.
-    #[error("the device doesn't answer any more ({0}); make a new Gpu")]
+    /// The device is lost or does not respond.
+    #[error("the device does not respond ({0}); create a new Gpu")]
     Lost(String),
 }

@@ -1,15 +1,16 @@
-//! Worlds on the graphics card.
+//! Worlds on the GPU.
 
 use std::ops::Range;
 use std::sync::Arc;
 
 use chaic_render::Scene;
-use chaic_render::geometry::{PortalGraph, ShapeName, Shapes, atlas};
+use chaic_render::geometry::{PortalGraph, atlas};
+use chaic_render::shapes::{ShapeId, Shapes};
 use chaic_world::{Posture, State, World};
 
-use crate::batch::Spare;
+use crate::batch::FreeOutputs;
 use crate::bodies::PlacedBody;
-use crate::device::{Adapters, Link};
+use crate::device::{Adapters, GpuContext};
 use crate::error::GpuError;
 use crate::lights::{Lights, PlacedLight};
 use crate::meshes::Meshes;
@@ -18,100 +19,97 @@ use crate::pool::Pool;
 use crate::records::InstanceRecord;
 use crate::render::Arena;
 use crate::upload::instance_record;
+use crate::world_id::WorldId;
 
-/// Names a world on the device that gave it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct WorldId(pub(crate) u32);
-
-/// A graphics card with worlds on it.
+/// GPU device with the worlds uploaded to it.
 #[derive(Debug)]
 pub struct Gpu {
-    pub(crate) link: Arc<Link>,
+    pub(crate) context: Arc<GpuContext>,
     pub(crate) passes: Passes,
     pub(crate) meshes: Meshes,
     pub(crate) instances: Pool<InstanceRecord>,
     pub(crate) lights: Lights,
     pub(crate) atlas: wgpu::Buffer,
-    pub(crate) worlds: Vec<Option<Placed>>,
+    pub(crate) worlds: Vec<Option<PlacedWorld>>,
     pub(crate) arena: Arena,
-    pub(crate) spare: Spare,
+    pub(crate) free_outputs: FreeOutputs,
 }
 
 /// A world on the device.
 #[derive(Debug, Default)]
-pub(crate) struct Placed {
+pub(crate) struct PlacedWorld {
     pub instances: Range<u32>,
     pub light: PlacedLight,
-    /// Of its scene, whose own they are.
+    /// Portal graph of its scene.
     pub regions: Arc<PortalGraph>,
     pub bodies: Vec<PlacedBody>,
-    /// All its other shapes, those of structure first.
+    /// All shapes except bodies, structure first.
     meshes: Vec<PlacedMesh>,
 }
 
-/// A shape of a world that is no body.
+/// A shape of a world that is not a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct PlacedMesh {
-    name: Option<ShapeName>,
+    shape_id: Option<ShapeId>,
     key: u128,
-    /// Where its record is.
+    /// Index of its record.
     record: u32,
 }
 
-/// Pixels name their instance in 16 bits, of which one value means nobody.
+/// Visibility ids hold the instance in 16 bits, of which one value means background.
 const MAX_INSTANCES: usize = 0xffff;
 
 impl Gpu {
-    /// Opens a graphics card.
+    /// Opens a device.
     pub fn new(adapters: Adapters) -> Result<Gpu, GpuError> {
-        let link = Arc::new(Link::open(adapters)?);
+        let context = Arc::new(GpuContext::open(adapters)?);
         Ok(Gpu {
-            passes: Passes::new(&link),
-            meshes: Meshes::new(&link)?,
-            instances: Pool::new(&link, "instances", 1 << 12)?,
-            lights: Lights::new(&link)?,
-            atlas: link.filled("textures", bytemuck::cast_slice(atlas()))?,
+            passes: Passes::new(&context),
+            meshes: Meshes::new(&context)?,
+            instances: Pool::new(&context, "instances", 1 << 12)?,
+            lights: Lights::new(&context)?,
+            atlas: context.buffer_with("textures", bytemuck::cast_slice(atlas()))?,
             worlds: Vec::new(),
-            arena: Arena::new(&link)?,
-            spare: Spare::default(),
-            link,
+            arena: Arena::new(&context)?,
+            free_outputs: FreeOutputs::default(),
+            context,
         })
     }
 
-    /// The adapter's name and kind, for people.
+    /// Name and kind of the adapter, for display.
     pub fn name(&self) -> String {
-        let info = &self.link.info;
+        let info = &self.context.info;
         format!("{} ({:?}, {})", info.name, info.device_type, info.driver_info)
     }
 
-    /// The device, for work on images that stay there.
+    /// Device, for further processing of the images.
     pub fn device(&self) -> &wgpu::Device {
-        &self.link.device
+        &self.context.device
     }
 
-    /// The device's queue; batches are submitted to it in the order of their rendering.
+    /// Queue of the device; batches are submitted in the order of the render calls.
     pub fn queue(&self) -> &wgpu::Queue {
-        &self.link.queue
+        &self.context.queue
     }
 
-    /// Bytes of the device's memory that worlds take, without images.
-    pub fn bytes_of_worlds(&self) -> u64 {
+    /// Device memory of all worlds without images, bytes.
+    pub fn world_bytes(&self) -> u64 {
         self.meshes.bytes() + self.instances.bytes() + self.lights.bytes()
     }
 
-    /// Brings a world onto the device as it is now.
+    /// Uploads a world in its current state.
     pub fn add(&mut self, scene: &Scene, world: &World) -> Result<WorldId, GpuError> {
         self.add_state(scene, world.state(), &postures(world))
     }
 
-    /// The same for a state and postures that come from elsewhere, those of the agents in order.
+    /// Uploads a given state and the postures of its agents in order.
     pub fn add_state(
         &mut self,
         scene: &Scene,
         state: &State,
         postures: &[Posture],
     ) -> Result<WorldId, GpuError> {
-        let placed = self.place(scene, state, postures, Placed::default())?;
+        let placed = self.place(scene, state, postures, PlacedWorld::default())?;
         let free = self.worlds.iter().position(Option::is_none);
         let index = free.unwrap_or_else(|| {
             self.worlds.push(None);
@@ -121,12 +119,12 @@ impl Gpu {
         Ok(WorldId(index as u32))
     }
 
-    /// Shows a world as it is now, be it a moment later or another episode.
+    /// Updates a world to its current state, or to another episode.
     pub fn update(&mut self, id: WorldId, scene: &Scene, world: &World) -> Result<(), GpuError> {
         self.update_state(id, scene, world.state(), &postures(world))
     }
 
-    /// The same for a state and postures that come from elsewhere, those of the agents in order.
+    /// Updates a world to a given state and the postures of its agents in order.
     pub fn update_state(
         &mut self,
         id: WorldId,
@@ -134,102 +132,104 @@ impl Gpu {
         state: &State,
         postures: &[Posture],
     ) -> Result<(), GpuError> {
-        let old = self.take(id)?;
+        let old = self.take_world(id)?;
         let placed = self.place(scene, state, postures, old)?;
         self.worlds[id.0 as usize] = Some(placed);
         Ok(())
     }
 
-    /// Takes a world off the device.
+    /// Removes a world from the device.
     pub fn remove(&mut self, id: WorldId) -> Result<(), GpuError> {
-        let old = self.take(id)?;
-        self.give_up(old);
+        let old = self.take_world(id)?;
+        self.release(old);
         Ok(())
     }
 
-    /// The instances of a world.
-    pub(crate) fn placed(&self, id: WorldId) -> Result<&Placed, GpuError> {
+    /// Returns a world on the device.
+    pub(crate) fn placed(&self, id: WorldId) -> Result<&PlacedWorld, GpuError> {
         let placed = self.worlds.get(id.0 as usize).and_then(Option::as_ref);
         placed.ok_or(GpuError::UnknownWorld(id))
     }
 
-    fn take(&mut self, id: WorldId) -> Result<Placed, GpuError> {
+    fn take_world(&mut self, id: WorldId) -> Result<PlacedWorld, GpuError> {
         let placed = self.worlds.get_mut(id.0 as usize).and_then(Option::take);
         placed.ok_or(GpuError::UnknownWorld(id))
     }
 
-    fn give_up(&mut self, old: Placed) {
+    fn release(&mut self, old: PlacedWorld) {
         old.meshes.into_iter().for_each(|mesh| self.meshes.release(mesh.key));
         old.bodies.into_iter().for_each(|body| body.remove(&mut self.meshes));
         self.instances.remove(old.instances);
         self.lights.remove(old.light);
     }
 
-    /// Puts a world in the place of another. The other's meshes go last: what both share stays.
+    /// Replaces a world. The old meshes are released last, so that shared ones stay on the device.
     fn place(
         &mut self,
         scene: &Scene,
         state: &State,
         postures: &[Posture],
-        old: Placed,
-    ) -> Result<Placed, GpuError> {
-        let mut new = Placed { regions: scene.regions().clone(), ..Placed::default() };
+        old: PlacedWorld,
+    ) -> Result<PlacedWorld, GpuError> {
+        let mut new =
+            PlacedWorld { regions: scene.portal_graph().clone(), ..PlacedWorld::default() };
         let mut old = old;
-        let result =
-            scene.with_shapes(state, postures, |shapes| self.fill(shapes, &mut new, &mut old));
-        self.give_up(old);
+        let result = scene
+            .with_shapes(state, postures, |shapes| self.fill_world(shapes, &mut new, &mut old));
+        self.release(old);
         match result {
             Ok(()) => Ok(new),
             Err(error) => {
-                self.give_up(new);
+                self.release(new);
                 Err(error)
             }
         }
     }
 
-    /// Fills in what a world consists of, with all that stays of what was in its place before.
-    fn fill(
+    /// Fills a world, reusing unchanged parts of the old one.
+    fn fill_world(
         &mut self,
         shapes: &Shapes,
-        new: &mut Placed,
-        old: &mut Placed,
+        new: &mut PlacedWorld,
+        old: &mut PlacedWorld,
     ) -> Result<(), GpuError> {
         let n = shapes.instances.len();
         if n > MAX_INSTANCES {
-            return Err(GpuError::TooManyInstances { n, most: MAX_INSTANCES });
+            return Err(GpuError::TooManyInstances { n, max: MAX_INSTANCES });
         }
         let is_same_scene = Arc::ptr_eq(&new.regions, &old.regions);
-        let mut none = Vec::new();
-        let known = if is_same_scene { &mut old.meshes } else { &mut none };
-        self.fill_meshes(shapes, &mut new.meshes, known)?;
+        let mut empty = Vec::new();
+        let reusable = if is_same_scene { &mut old.meshes } else { &mut empty };
+        self.fill_meshes(shapes, &mut new.meshes, reusable)?;
         let mut records = new.meshes.iter().map(|mesh| mesh.record);
-        let mut places = Vec::with_capacity(shapes.len());
+        let mut record_indices = Vec::with_capacity(shapes.len());
         for index in 0..shapes.len() {
             let Some(shape) = shapes.body(index) else {
-                places.extend(records.next());
+                record_indices.extend(records.next());
                 continue;
             };
             let instance = shapes.instances.iter().find(|i| i.mesh as usize == index);
             let Some(instance) = instance.copied() else { continue };
-            let body = PlacedBody::new(&mut self.meshes, &self.link, instance, shape)?;
-            places.push(body.record());
+            let body = PlacedBody::new(&mut self.meshes, &self.context, instance, shape)?;
+            record_indices.push(body.record());
             new.bodies.push(body);
         }
         let instances = shapes.instances.iter();
-        let records: Vec<InstanceRecord> =
-            instances.filter_map(|i| instance_record(i, *places.get(i.mesh as usize)?)).collect();
-        new.instances = self.instances.add(&self.link, &records)?;
+        let records: Vec<InstanceRecord> = instances
+            .filter_map(|i| instance_record(i, *record_indices.get(i.mesh as usize)?))
+            .collect();
+        new.instances = self.instances.add(&self.context, &records)?;
         if is_same_scene {
             new.light = std::mem::take(&mut old.light);
-            self.lights.update(&self.link, &mut new.light, &shapes.lighting());
+            self.lights.update(&self.context, &mut new.light, &shapes.lighting());
         } else {
-            new.light = self.lights.add(&self.link, &shapes.lighting())?;
+            new.light = self.lights.add(&self.context, &shapes.lighting())?;
         }
         Ok(())
     }
 
-    /// Brings the shapes over that are no bodies; `old` are those of an earlier moment of the same
-    /// scene, if there is one.
+    /// Uploads all shapes except bodies. `old` holds the meshes of an earlier frame of the same
+    /// scene; it is empty otherwise.
     fn fill_meshes(
         &mut self,
         shapes: &Shapes,
@@ -237,17 +237,17 @@ impl Gpu {
         old: &mut Vec<PlacedMesh>,
     ) -> Result<(), GpuError> {
         let meshes = (0..shapes.len()).filter(|index| !shapes.is_body(*index));
-        let names = meshes.clone().map(|index| shapes.name(index));
-        if !old.is_empty() && names.eq(old.iter().map(|mesh| mesh.name)) {
+        let shape_ids = meshes.clone().map(|index| shapes.shape_id(index));
+        if !old.is_empty() && shape_ids.eq(old.iter().map(|mesh| mesh.shape_id)) {
             std::mem::swap(new, old);
             return Ok(());
         }
         for index in meshes {
             // Structure never changes.
-            let known = old.get(index).filter(|_| shapes.is_structure(index));
-            let known = known.map(|mesh| mesh.key);
-            let (key, record) = self.meshes.acquire(&self.link, shapes, index, known)?;
-            new.push(PlacedMesh { name: shapes.name(index), key, record });
+            let reusable = old.get(index).filter(|_| shapes.is_structure(index));
+            let reusable = reusable.map(|mesh| mesh.key);
+            let (key, record) = self.meshes.acquire(&self.context, shapes, index, reusable)?;
+            new.push(PlacedMesh { shape_id: shapes.shape_id(index), key, record });
         }
         Ok(())
     }

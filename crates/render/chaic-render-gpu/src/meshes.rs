@@ -1,14 +1,15 @@
-//! The meshes on the device: each once, however many worlds use it.
+//! Meshes on the device, shared by all worlds.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use chaic_render::geometry::{N_LEVELS, ShapeName, Shapes};
+use chaic_render::geometry::N_LEVELS;
+use chaic_render::shapes::{ShapeId, Shapes};
 
-use crate::device::Link;
+use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::pool::Pool;
-use crate::records::{MeshRecord, SkinRecord};
+use crate::records::{MaterialRecord, MeshRecord};
 use crate::upload::PackedMesh;
 
 /// All meshes on the device.
@@ -17,130 +18,142 @@ pub(crate) struct Meshes {
     pub records: Pool<MeshRecord>,
     pub vertices: Pool<[u32; 4]>,
     pub triangles: Pool<[u32; 2]>,
-    pub skins: Pool<SkinRecord>,
-    known: BTreeMap<u128, Shared>,
-    /// Keys of the catalogue's shapes that are stored.
-    named: BTreeMap<ShapeName, u128>,
+    pub materials: Pool<MaterialRecord>,
+    stored: BTreeMap<u128, SharedMesh>,
+    /// Keys of the stored shapes of the catalogue.
+    key_by_shape: BTreeMap<ShapeId, u128>,
 }
 
 #[derive(Debug)]
-struct Shared {
-    /// Its names in the catalogue: styles of a class may be the same shape.
-    names: Vec<ShapeName>,
+struct SharedMesh {
+    /// Names in the catalogue: several styles of a class may have the same shape.
+    shape_ids: Vec<ShapeId>,
     record: Range<u32>,
-    parts: Parts,
+    ranges: MeshRanges,
     users: u32,
 }
 
-/// Where the parts of a mesh are.
+/// Ranges of a mesh in the pools.
 #[derive(Debug)]
-pub(crate) struct Parts {
+pub(crate) struct MeshRanges {
     vertices: Range<u32>,
     triangles: Range<u32>,
-    skins: Range<u32>,
+    materials: Range<u32>,
 }
 
 impl Meshes {
-    pub fn new(link: &Link) -> Result<Meshes, GpuError> {
+    pub fn new(context: &GpuContext) -> Result<Meshes, GpuError> {
         Ok(Meshes {
-            records: Pool::new(link, "meshes", 1 << 10)?,
-            vertices: Pool::new(link, "vertices", 1 << 16)?,
-            triangles: Pool::new(link, "triangles", 1 << 16)?,
-            skins: Pool::new(link, "skins", 1 << 12)?,
-            known: BTreeMap::new(),
-            named: BTreeMap::new(),
+            records: Pool::new(context, "meshes", 1 << 10)?,
+            vertices: Pool::new(context, "vertices", 1 << 16)?,
+            triangles: Pool::new(context, "triangles", 1 << 16)?,
+            materials: Pool::new(context, "materials", 1 << 12)?,
+            stored: BTreeMap::new(),
+            key_by_shape: BTreeMap::new(),
         })
     }
 
-    /// Keeps a shape for one user more, whose key is `known` if it is stored already; says its key
-    /// and where its record is.
+    /// Adds one user of a shape and uploads it if needed. `stored` is its key, if it is stored
+    /// already. Returns its key and the index of its record.
     pub fn acquire(
         &mut self,
-        link: &Link,
+        context: &GpuContext,
         shapes: &Shapes,
         index: usize,
-        known: Option<u128>,
+        stored: Option<u128>,
     ) -> Result<(u128, u32), GpuError> {
-        if let Some(key) = known
-            && let Some(place) = self.share(key)
+        if let Some(key) = stored
+            && let Some(record_index) = self.add_user(key)
         {
-            return Ok((key, place));
+            return Ok((key, record_index));
         }
-        let name = shapes.name(index);
-        if let Some(key) = name.and_then(|name| self.named.get(&name)).copied()
-            && let Some(place) = self.share(key)
+        let shape_id = shapes.shape_id(index);
+        if let Some(key) = shape_id.and_then(|shape_id| self.key_by_shape.get(&shape_id)).copied()
+            && let Some(record_index) = self.add_user(key)
         {
-            return Ok((key, place));
+            return Ok((key, record_index));
         }
-        let mesh = PackedMesh::of((0..N_LEVELS).map(|level| (level, shapes.mesh(index, level))));
+        let mesh = PackedMesh::new((0..N_LEVELS).map(|level| (level, shapes.mesh(index, level))));
         let key = mesh.key();
-        let place = match self.share(key) {
-            Some(place) => place,
-            None => self.store(link, &mesh, key)?,
+        let record_index = match self.add_user(key) {
+            Some(record_index) => record_index,
+            None => self.store(context, &mesh, key)?,
         };
-        if let (Some(name), Some(shared)) = (name, self.known.get_mut(&key)) {
-            shared.names.push(name);
-            self.named.insert(name, key);
+        if let (Some(shape_id), Some(shared)) = (shape_id, self.stored.get_mut(&key)) {
+            shared.shape_ids.push(shape_id);
+            self.key_by_shape.insert(shape_id, key);
         }
-        Ok((key, place))
+        Ok((key, record_index))
     }
 
-    /// Counts one user more of a mesh, if it is there.
-    fn share(&mut self, key: u128) -> Option<u32> {
-        let stored = self.known.get_mut(&key)?;
-        stored.users += 1;
-        Some(stored.record.start)
+    /// Adds one user of a stored mesh; returns the index of its record.
+    fn add_user(&mut self, key: u128) -> Option<u32> {
+        let entry = self.stored.get_mut(&key)?;
+        entry.users += 1;
+        Some(entry.record.start)
     }
 
-    /// Brings a mesh onto the device for a first user; says where its record is.
-    fn store(&mut self, link: &Link, mesh: &PackedMesh, key: u128) -> Result<u32, GpuError> {
-        let (parts, record) = self.put(link, mesh)?;
-        let record = self.records.add(link, &[record])?;
+    /// Uploads a mesh for its first user; returns the index of its record.
+    fn store(
+        &mut self,
+        context: &GpuContext,
+        mesh: &PackedMesh,
+        key: u128,
+    ) -> Result<u32, GpuError> {
+        let (ranges, record) = self.upload_ranges(context, mesh)?;
+        let record = self.records.add(context, &[record])?;
         let first = record.start;
-        self.known.insert(key, Shared { names: Vec::new(), record, parts, users: 1 });
+        self.stored.insert(key, SharedMesh { shape_ids: Vec::new(), record, ranges, users: 1 });
         Ok(first)
     }
 
-    /// Brings the parts of a mesh onto the device, but no record of it; gives that.
-    pub fn put(&mut self, link: &Link, mesh: &PackedMesh) -> Result<(Parts, MeshRecord), GpuError> {
-        let parts = Parts {
-            vertices: self.vertices.add(link, &mesh.vertices)?,
-            triangles: self.triangles.add(link, &mesh.triangles)?,
-            skins: self.skins.add(link, &mesh.skins)?,
+    /// Uploads the data of a mesh; returns its ranges and its record, which is not uploaded.
+    pub fn upload_ranges(
+        &mut self,
+        context: &GpuContext,
+        mesh: &PackedMesh,
+    ) -> Result<(MeshRanges, MeshRecord), GpuError> {
+        let ranges = MeshRanges {
+            vertices: self.vertices.add(context, &mesh.vertices)?,
+            triangles: self.triangles.add(context, &mesh.triangles)?,
+            materials: self.materials.add(context, &mesh.materials)?,
         };
         let mut record = mesh.record;
         for level in &mut record.levels {
-            level[0] += parts.vertices.start;
-            level[1] += parts.triangles.start;
-            level[3] += parts.skins.start;
+            level[0] += ranges.vertices.start;
+            level[1] += ranges.triangles.start;
+            level[3] += ranges.materials.start;
         }
-        Ok((parts, record))
+        Ok((ranges, record))
     }
 
-    /// Takes the parts of a mesh off the device.
-    pub fn take(&mut self, parts: Parts) {
-        self.vertices.remove(parts.vertices);
-        self.triangles.remove(parts.triangles);
-        self.skins.remove(parts.skins);
+    /// Removes the data of a mesh.
+    pub fn remove_ranges(&mut self, ranges: MeshRanges) {
+        self.vertices.remove(ranges.vertices);
+        self.triangles.remove(ranges.triangles);
+        self.materials.remove(ranges.materials);
     }
 
-    /// Gives up a mesh for one user.
+    /// Removes one user of a mesh.
     pub fn release(&mut self, key: u128) {
-        let Some(stored) = self.known.get_mut(&key) else { return };
-        stored.users -= 1;
-        if stored.users == 0
-            && let Some(stored) = self.known.remove(&key)
+        let Some(entry) = self.stored.get_mut(&key) else { return };
+        entry.users -= 1;
+        if entry.users == 0
+            && let Some(entry) = self.stored.remove(&key)
         {
-            for name in &stored.names {
-                self.named.remove(name);
+            for shape_id in &entry.shape_ids {
+                self.key_by_shape.remove(shape_id);
             }
-            self.records.remove(stored.record);
-            self.take(stored.parts);
+            self.records.remove(entry.record);
+            self.remove_ranges(entry.ranges);
         }
     }
 
-    /// Bytes on the device.
+    /// Size on the device, bytes.
     pub fn bytes(&self) -> u64 {
-        self.records.bytes() + self.vertices.bytes() + self.triangles.bytes() + self.skins.bytes()
+        self.records.bytes()
+            + self.vertices.bytes()
+            + self.triangles.bytes()
+            + self.materials.bytes()
     }
 }

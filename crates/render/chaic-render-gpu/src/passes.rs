@@ -1,4 +1,4 @@
-//! The shaders, ready to run.
+//! Compute pipelines of the shaders.
 
 use chaic_core::EntityId;
 use chaic_core::geom::Camera;
@@ -6,9 +6,9 @@ use chaic_render::LEVEL_RADIUS_PX;
 use chaic_render::geometry::N_LEVELS;
 use chaic_render::geometry::TILE_TEXELS;
 
-use crate::device::Link;
+use crate::device::GpuContext;
 
-/// The shaders in the order in which they run.
+/// Compute pipelines in execution order.
 #[derive(Debug)]
 pub(crate) struct Passes {
     pub cull: wgpu::ComputePipeline,
@@ -18,18 +18,18 @@ pub(crate) struct Passes {
 }
 
 impl Passes {
-    pub fn new(link: &Link) -> Passes {
+    pub fn new(context: &GpuContext) -> Passes {
         Passes {
-            cull: pipeline(link, "cull", include_str!("shaders/cull.wgsl")),
-            setup: pipeline(link, "setup", include_str!("shaders/setup.wgsl")),
-            tiles: pipeline(link, "tiles", include_str!("shaders/tiles.wgsl")),
-            shade: pipeline(link, "shade", include_str!("shaders/shade.wgsl")),
+            cull: pipeline(context, "cull", include_str!("shaders/cull.wgsl")),
+            setup: pipeline(context, "setup", include_str!("shaders/setup.wgsl")),
+            tiles: pipeline(context, "tiles", include_str!("shaders/tiles.wgsl")),
+            shade: pipeline(context, "shade", include_str!("shaders/shade.wgsl")),
         }
     }
 }
 
-/// A shader whose entry point has its name.
-fn pipeline(link: &Link, name: &'static str, source: &str) -> wgpu::ComputePipeline {
+/// Compute pipeline of the shader `name`, which is also its entry point.
+fn pipeline(context: &GpuContext, name: &'static str, source: &str) -> wgpu::ComputePipeline {
     let radii = LEVEL_RADIUS_PX.map(|r| format!("{r:?}")).join(", ");
     let constants = format!(
         "const NEAR_M: f32 = {:?};\nconst FAR_M: f32 = {:?};\n\
@@ -43,11 +43,11 @@ fn pipeline(link: &Link, name: &'static str, source: &str) -> wgpu::ComputePipel
         TILE_TEXELS.ilog2(),
     );
     let source = [&constants, include_str!("shaders/common.wgsl"), source].concat();
-    let module = link.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+    let module = context.device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some(name),
         source: wgpu::ShaderSource::Wgsl(source.into()),
     });
-    link.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+    context.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
         label: Some(name),
         layout: None,
         module: &module,
@@ -57,9 +57,9 @@ fn pipeline(link: &Link, name: &'static str, source: &str) -> wgpu::ComputePipel
     })
 }
 
-/// Binds buffers in the order of their numbers.
+/// Binds buffers to consecutive binding indices.
 pub(crate) fn bind(
-    link: &Link,
+    context: &GpuContext,
     pipeline: &wgpu::ComputePipeline,
     buffers: &[&wgpu::Buffer],
 ) -> wgpu::BindGroup {
@@ -68,7 +68,7 @@ pub(crate) fn bind(
         .zip(0..)
         .map(|(resource, binding)| wgpu::BindGroupEntry { binding, resource })
         .collect();
-    link.device.create_bind_group(&wgpu::BindGroupDescriptor {
+    context.device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: None,
         layout: &pipeline.get_bind_group_layout(0),
         entries: &entries,

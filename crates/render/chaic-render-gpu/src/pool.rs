@@ -1,4 +1,4 @@
-//! Arrays on the device that grow, and hand out ranges of themselves.
+//! Growable device arrays with range allocation.
 
 use std::collections::BTreeMap;
 use std::marker::PhantomData;
@@ -6,23 +6,23 @@ use std::ops::Range;
 
 use bytemuck::Pod;
 
-use crate::device::Link;
+use crate::device::GpuContext;
 use crate::error::GpuError;
 
-/// Which ranges of an array are free.
+/// Free ranges of an array.
 #[derive(Debug, Default)]
-struct Free {
-    /// Length of each free range by its first element; no two touch.
+struct FreeRanges {
+    /// Length of each free range by its first element; adjacent ranges are merged.
     ranges: BTreeMap<u32, u32>,
-    /// Elements past the last one ever handed out are free too.
+    /// End of the last allocated range; all later elements are free too.
     end: u32,
 }
 
-impl Free {
-    /// The first range that is long enough, cut out of what is free.
-    fn take(&mut self, n: u32) -> Range<u32> {
-        let found = self.ranges.iter().find(|(_, len)| **len >= n).map(|(k, len)| (*k, *len));
-        let Some((first, len)) = found else {
+impl FreeRanges {
+    /// Allocates the first free range of at least `n` elements.
+    fn allocate(&mut self, n: u32) -> Range<u32> {
+        let fit = self.ranges.iter().find(|(_, len)| **len >= n).map(|(k, len)| (*k, *len));
+        let Some((first, len)) = fit else {
             let first = self.end;
             self.end = self.end.saturating_add(n);
             return first..self.end;
@@ -34,7 +34,7 @@ impl Free {
         first..first + n
     }
 
-    fn give_back(&mut self, range: Range<u32>) {
+    fn release(&mut self, range: Range<u32>) {
         let Range { mut start, mut end } = range;
         if start == end {
             return;
@@ -56,14 +56,14 @@ impl Free {
     }
 }
 
-/// An array of `T` on the device.
+/// A growable array of `T` on the device.
 #[derive(Debug)]
 pub(crate) struct Pool<T> {
-    what: &'static str,
+    label: &'static str,
     pub buffer: wgpu::Buffer,
     capacity: u32,
-    free: Free,
-    of: PhantomData<T>,
+    free: FreeRanges,
+    element: PhantomData<T>,
 }
 
 const USAGE: wgpu::BufferUsages = wgpu::BufferUsages::STORAGE
@@ -71,56 +71,60 @@ const USAGE: wgpu::BufferUsages = wgpu::BufferUsages::STORAGE
     .union(wgpu::BufferUsages::COPY_SRC);
 
 impl<T: Pod> Pool<T> {
-    /// An empty array with room for so many elements.
-    pub fn new(link: &Link, what: &'static str, capacity: u32) -> Result<Pool<T>, GpuError> {
+    /// Creates an empty array with this capacity in elements.
+    pub fn new(
+        context: &GpuContext,
+        label: &'static str,
+        capacity: u32,
+    ) -> Result<Pool<T>, GpuError> {
         let bytes = u64::from(capacity) * size_of::<T>() as u64;
-        let buffer = link.buffer(what, bytes, USAGE)?;
-        Ok(Pool { what, buffer, capacity, free: Free::default(), of: PhantomData })
+        let buffer = context.buffer(label, bytes, USAGE)?;
+        Ok(Pool { label, buffer, capacity, free: FreeRanges::default(), element: PhantomData })
     }
 
-    /// Copies elements to the device and says where they are.
-    pub fn add(&mut self, link: &Link, elements: &[T]) -> Result<Range<u32>, GpuError> {
+    /// Uploads elements; returns their range.
+    pub fn add(&mut self, context: &GpuContext, elements: &[T]) -> Result<Range<u32>, GpuError> {
         let n = u32::try_from(elements.len()).unwrap_or(u32::MAX);
-        let range = self.free.take(n);
+        let range = self.free.allocate(n);
         if range.end > self.capacity
-            && let Err(error) = self.grow(link, u64::from(range.end))
+            && let Err(error) = self.grow(context, u64::from(range.end))
         {
-            self.free.give_back(range);
+            self.free.release(range);
             return Err(error);
         }
-        self.write(link, range.start, elements);
+        self.write(context, range.start, elements);
         Ok(range)
     }
 
-    /// Puts others in the place of elements.
-    pub fn write(&self, link: &Link, first: u32, elements: &[T]) {
+    /// Overwrites elements from `first`.
+    pub fn write(&self, context: &GpuContext, first: u32, elements: &[T]) {
         if !elements.is_empty() {
             let offset = u64::from(first) * size_of::<T>() as u64;
-            link.queue.write_buffer(&self.buffer, offset, bytemuck::cast_slice(elements));
+            context.queue.write_buffer(&self.buffer, offset, bytemuck::cast_slice(elements));
         }
     }
 
-    /// Lets a range be handed out again.
+    /// Frees a range.
     pub fn remove(&mut self, range: Range<u32>) {
-        self.free.give_back(range);
+        self.free.release(range);
     }
 
-    /// Bytes on the device.
+    /// Size on the device, bytes.
     pub fn bytes(&self) -> u64 {
         self.buffer.size()
     }
 
-    fn grow(&mut self, link: &Link, needed: u64) -> Result<(), GpuError> {
+    fn grow(&mut self, context: &GpuContext, needed: u64) -> Result<(), GpuError> {
         let size = size_of::<T>() as u64;
-        let most = link.most_bytes() / size;
-        let capacity = needed.max(2 * u64::from(self.capacity)).min(most);
+        let max = context.max_buffer_bytes() / size;
+        let capacity = needed.max(2 * u64::from(self.capacity)).min(max);
         if capacity < needed {
-            return Err(GpuError::OutOfMemory { what: self.what, bytes: needed * size });
+            return Err(GpuError::OutOfMemory { purpose: self.label, bytes: needed * size });
         }
-        let larger = link.buffer(self.what, capacity * size, USAGE)?;
-        let mut encoder = link.encoder();
+        let larger = context.buffer(self.label, capacity * size, USAGE)?;
+        let mut encoder = context.encoder();
         encoder.copy_buffer_to_buffer(&self.buffer, 0, &larger, 0, Some(self.buffer.size()));
-        link.queue.submit([encoder.finish()]);
+        context.queue.submit([encoder.finish()]);
         self.buffer = larger;
         self.capacity = capacity as u32;
         Ok(())
@@ -130,24 +134,24 @@ impl<T: Pod> Pool<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use chaic_core::rng::Stream;
+    use chaic_core::rng::RngStream;
 
     #[test]
     fn ranges_never_overlap_and_all_comes_back() {
-        let mut rng = Stream::new(1, "ranges", 0);
-        let mut free = Free::default();
-        let mut taken: Vec<Range<u32>> = Vec::new();
+        let mut rng = RngStream::new(1, "ranges", 0);
+        let mut free = FreeRanges::default();
+        let mut allocated: Vec<Range<u32>> = Vec::new();
         for _ in 0..2000 {
-            if taken.is_empty() || rng.below(5) < 3 {
-                let range = free.take(rng.below(9) as u32);
+            if allocated.is_empty() || rng.below(5) < 3 {
+                let range = free.allocate(rng.below(9) as u32);
                 let is_apart = |r: &Range<u32>| r.end <= range.start || range.end <= r.start;
-                assert!(taken.iter().all(|r| r.is_empty() || range.is_empty() || is_apart(r)));
-                taken.push(range);
+                assert!(allocated.iter().all(|r| r.is_empty() || range.is_empty() || is_apart(r)));
+                allocated.push(range);
             } else {
-                free.give_back(taken.swap_remove(rng.below(taken.len())));
+                free.release(allocated.swap_remove(rng.below(allocated.len())));
             }
         }
-        taken.into_iter().for_each(|range| free.give_back(range));
+        allocated.into_iter().for_each(|range| free.release(range));
         assert_eq!((free.end, free.ranges.len()), (0, 0));
     }
 }

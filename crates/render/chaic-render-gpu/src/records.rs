@@ -1,26 +1,26 @@
-//! The records that shaders read, laid out as `shaders/common.wgsl` declares them.
+//! Records that shaders read, in the layout of `shaders/common.wgsl`.
 
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 use chaic_core::EntityId;
 use chaic_render::geometry::{N_LEVELS, RegionSet};
-use chaic_render::{Lens, View};
+use chaic_render::{Projection, View};
 
-use crate::gpu::Placed;
+use crate::gpu::PlacedWorld;
 
-/// What a view works out on the host.
-pub(crate) struct Sight {
-    pub lens: Lens,
-    /// Those that may be seen.
+/// Visibility data of a view, computed on the host.
+pub(crate) struct ViewVisibility {
+    pub projection: Projection,
+    /// Visible regions.
     pub regions: RegionSet,
 }
 
-impl Sight {
-    /// Of a view of a world; `None` if it makes no picture.
-    pub fn of(view: &View, world: &Placed) -> Option<Sight> {
-        let lens = Lens::of(&view.camera)?;
-        Some(Sight { lens, regions: world.regions.seen_by(&lens) })
+impl ViewVisibility {
+    /// Visibility of a view of a world; `None` for an invalid camera.
+    pub fn new(view: &View, world: &PlacedWorld) -> Option<ViewVisibility> {
+        let projection = Projection::from_camera(&view.camera)?;
+        Some(ViewVisibility { projection, regions: world.regions.visible_regions(&projection) })
     }
 }
 
@@ -29,52 +29,52 @@ impl Sight {
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct ViewRecord {
     pub right: [f32; 3],
-    /// Pixels per unit of slope; 0 for a camera that makes no picture.
+    /// Focal length, pixels; 0 for an invalid camera.
     pub focal: f32,
     pub down: [f32; 3],
     pub mu: f32,
-    pub ahead: [f32; 3],
+    pub forward: [f32; 3],
     pub mv: f32,
     pub eye: [f32; 3],
     pub first_instance: u32,
     pub n_instances: u32,
-    /// Entities that are left out; 0 leaves out none.
+    /// Hidden entities; 0 for none.
     pub hidden_body: u32,
     pub hidden_ceiling: u32,
-    /// Where the view's part of the lists of instances begins.
+    /// Offset of the view in the instance lists.
     pub first_visible: u32,
-    /// Index of the world's [`LightRecord`].
+    /// Index of the [`LightRecord`] of the world.
     pub light: u32,
-    /// A bit for each region that may be seen.
+    /// One bit per visible region.
     pub regions: [u32; 2],
     pub padding: u32,
 }
 
 impl ViewRecord {
-    /// The record of a view of a world; its lists of instances begin at `first_visible`.
-    pub fn of(
+    /// Record of a view of a world; its instance lists begin at `first_visible`.
+    pub fn new(
         view: &View,
-        sight: Option<&Sight>,
-        world: &Placed,
+        visibility: Option<&ViewVisibility>,
+        world: &PlacedWorld,
         first_visible: u32,
     ) -> ViewRecord {
-        let Some(Sight { lens, regions }) = sight else {
+        let Some(ViewVisibility { projection, regions }) = visibility else {
             return ViewRecord { first_visible, ..ViewRecord::zeroed() };
         };
         let Range { start, end } = world.instances.clone();
-        let (mu, mv) = lens.middle();
+        let (mu, mv) = projection.center();
         let id = |hidden: Option<EntityId>| hidden.map_or(0, |id| u32::from(id.0));
         ViewRecord {
-            right: lens.right.to_array(),
-            focal: lens.focal,
-            down: (-lens.up).to_array(),
+            right: projection.right.to_array(),
+            focal: projection.focal,
+            down: (-projection.up).to_array(),
             mu,
-            ahead: lens.ahead.to_array(),
+            forward: projection.forward.to_array(),
             mv,
-            eye: lens.eye.to_array(),
+            eye: projection.eye.to_array(),
             first_instance: start,
             n_instances: end - start,
-            hidden_body: id(view.hide.map(EntityId::of_agent)),
+            hidden_body: id(view.hide.map(EntityId::from_agent)),
             hidden_ceiling: id(view.hide_ceiling.then_some(EntityId::CEILING)),
             first_visible,
             light: world.light.record.start,
@@ -84,37 +84,37 @@ impl ViewRecord {
     }
 }
 
-/// The bits of a set of regions, those of the first regions first.
+/// Splits a region set into two words, the first regions first.
 pub(crate) fn words(regions: RegionSet) -> [u32; 2] {
     let bits = regions.bits();
     [bits as u32, (bits >> 32) as u32]
 }
 
-/// A mesh somewhere in a world; 144 bytes.
+/// A mesh with a pose in the world; 144 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct InstanceRecord {
-    /// Columns of the rotation from the object's frame to the world.
+    /// Columns of the rotation from the object frame to the world frame.
     pub x: [f32; 3],
     pub mesh: u32,
     pub y: [f32; 3],
     pub entity: u32,
     pub z: [f32; 3],
-    /// [`LIT_BY_SKY`] and so on.
-    pub lit_by: u32,
+    /// [`LIT_BY_SKY`], [`LIT_BY_LAMP`] or [`LIT_BY_POINT`].
+    pub light_source: u32,
     pub origin: [f32; 3],
     pub is_tinted: u32,
     pub tint: [f32; 3],
-    /// A bit for each region that it reaches into, in two words.
+    /// One bit per region that it overlaps, in two words.
     pub regions_low: u32,
     pub lamp: [f32; 3],
     pub regions_high: u32,
-    /// Bounds of all levels, in the object's frame.
+    /// Bounding box over all levels of detail, in the object frame.
     pub low: [f32; 3],
     pub padding: u32,
     pub high: [f32; 3],
     pub padding_2: u32,
-    /// By what linear colors are multiplied.
+    /// Factor on linear colors.
     pub factor: [f32; 3],
     pub padding_3: u32,
 }
@@ -123,21 +123,21 @@ pub(crate) struct InstanceRecord {
 pub(crate) const LIT_BY_SKY: u32 = 0;
 /// Lit by the lamp of the instance.
 pub(crate) const LIT_BY_LAMP: u32 = 1;
-/// Lit at each point by the lamp of the room in front of it.
+/// Lit per point by the lamp of the room in front of the point.
 pub(crate) const LIT_BY_POINT: u32 = 2;
 
-/// Where the levels of a mesh lie; 16 bytes each.
+/// Offsets of the levels of a mesh; 16 bytes each.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct MeshRecord {
-    /// First vertex, first triangle, number of triangles, first skin.
+    /// First vertex, first triangle, number of triangles, first material.
     pub levels: [[u32; 4]; N_LEVELS],
 }
 
-/// How a group of triangles looks; 64 bytes.
+/// Material of a group of triangles; 64 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
-pub(crate) struct SkinRecord {
+pub(crate) struct MaterialRecord {
     pub color: [f32; 3],
     /// 0 without texture.
     pub texels_per_m: f32,
@@ -146,11 +146,11 @@ pub(crate) struct SkinRecord {
     pub axes_y: [f32; 3],
     pub is_tinted: u32,
     pub axes_z: [f32; 3],
-    /// Where the texture's tile begins in the atlas.
+    /// Offset of the texture tile in the atlas.
     pub first_texel: u32,
 }
 
-/// The light of a world; 160 bytes.
+/// Lighting of a world; 160 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct LightRecord {
@@ -176,20 +176,20 @@ pub(crate) struct LightRecord {
     pub padding: u32,
 }
 
-/// What culling found out about a view; 16 bytes.
+/// Counters of a view; 16 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct Tally {
     pub n_visible: u32,
-    pub most_triangles: u32,
+    pub max_triangles: u32,
     pub n_triangles: u32,
     pub padding: u32,
 }
 
-/// What the dispatches of one round share; 32 bytes.
+/// Parameters shared by the dispatches of one round; 32 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
-pub(crate) struct Round {
+pub(crate) struct RoundParams {
     pub width: u32,
     pub height: u32,
     pub first_view: u32,
@@ -198,13 +198,13 @@ pub(crate) struct Round {
     pub padding: [u32; 3],
 }
 
-// The sizes that WGSL gives these structs.
+// Sizes of these structs in WGSL.
 const _: () = {
     assert!(size_of::<ViewRecord>() == 96);
     assert!(size_of::<InstanceRecord>() == 144);
     assert!(size_of::<MeshRecord>() == 16 * N_LEVELS);
-    assert!(size_of::<SkinRecord>() == 64);
+    assert!(size_of::<MaterialRecord>() == 64);
     assert!(size_of::<LightRecord>() == 160);
     assert!(size_of::<Tally>() == 16);
-    assert!(size_of::<Round>() == 32);
+    assert!(size_of::<RoundParams>() == 32);
 };

@@ -1,4 +1,4 @@
-//! Time to draw one view, on one thread: `cargo bench -p chaic-render`.
+//! Time to render one view on one thread: `cargo bench -p chaic-render`.
 
 use chaic_test_kit::scenes;
 use std::hint::black_box;
@@ -18,7 +18,7 @@ fn render(c: &mut Criterion) {
     ] {
         let scene = Scene::new(world.setup());
         for (what, channels) in [("depth_ids", Channels::DEPTH_AND_IDS), ("rgb", Channels::RGB)] {
-            let view = View::of_camera(camera(eye, yaw, 0.0, 512, 512), channels);
+            let view = View::from_camera(camera(eye, yaw, 0.0, 512, 512), channels);
             c.bench_function(&format!("{name}/512/{what}"), |b| {
                 let mut images = Vec::new();
                 b.iter(|| {
@@ -32,7 +32,7 @@ fn render(c: &mut Criterion) {
     let views: Vec<View> = (0..16)
         .map(|k| {
             let camera = camera([5.0, 1.6, 4.0], 0.4 * k as f32, 0.0, 128, 128);
-            View::of_camera(camera, Channels::DEPTH_AND_IDS)
+            View::from_camera(camera, Channels::DEPTH_AND_IDS)
         })
         .collect();
     c.bench_function("house/16x128/depth_ids", |b| {

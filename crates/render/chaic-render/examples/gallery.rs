@@ -1,22 +1,23 @@
-//! Draws all that can be seen, to be looked at by a person:
+//! Renders a gallery for visual inspection:
 //! `cargo run --release -p chaic-render --example gallery -- FOLDER`.
 //!
-//! It writes contact sheets of every class in its variants and of every kind of person in every
-//! posture, what the helper of each task sees first, by day and in other appearances, and two
-//! hand-made worlds; and it prints how many triangles a furnished house has at each level of detail. docs/gallery.md shows the sheets.
+//! It writes contact sheets of every class in its variants, of every persona in every posture, and
+//! of the helper's first view in each task in several appearances. It also writes two hand-made
+//! worlds, and prints the number of triangles of a furnished house at each level of detail.
+//! `docs/gallery.md` shows the sheets.
 
 use std::path::Path;
 
 use chaic_core::capability::{IMPAIRMENTS, Impairment, Impairments, PersonKind, Persona};
 use chaic_core::geom::Camera;
 use chaic_core::{AgentId, ClassId, Role, TaskId, Vec3};
-use chaic_episodes::{Seeds, generate};
+use chaic_episodes::{GeneratorSeeds, generate};
 use chaic_render::geometry::Geometry;
 use chaic_render::text::{self, Align};
 use chaic_render::{Appearance, Channels, LEVEL_RADIUS_PX, Scene, View, floor_plan, image_out};
 use chaic_test_kit::scenes;
 use chaic_test_kit::scenes::{camera, posture};
-use chaic_world::{Posture, Setup, Thing, World};
+use chaic_world::{ObjectSpec, Posture, Setup, World};
 use image::RgbImage;
 use image::codecs::png::{CompressionType, FilterType as PngFilter, PngEncoder};
 use image::imageops::{FilterType, resize};
@@ -75,7 +76,7 @@ fn main() -> Result<()> {
 
 fn views(folder: &Path, name: &str, world: &World, cameras: &[Camera]) -> image::ImageResult<()> {
     let scene = Scene::new(world.setup());
-    let view = |camera| View::of_camera(camera, Channels::ALL);
+    let view = |camera| View::from_camera(camera, Channels::ALL);
     let views: Vec<View> = cameras.iter().map(|c| view(*c)).collect();
     let mut pictures = Vec::new();
     for (k, images) in scene.render(world, &views).into_iter().enumerate() {
@@ -92,12 +93,12 @@ fn views(folder: &Path, name: &str, world: &World, cameras: &[Camera]) -> image:
     image_out::grid(&pictures, 2).save(folder.join(format!("{name}.png")))
 }
 
-/// One picture, drawn at twice its size and made smooth.
-fn picture(scene: &Scene, world: &World, postures: &[Posture], camera: Camera) -> RgbImage {
-    seen(scene, world, postures, camera, None)
+/// Renders one image with 2x2 supersampling.
+fn render_image(scene: &Scene, world: &World, postures: &[Posture], camera: Camera) -> RgbImage {
+    render_view(scene, world, postures, camera, None)
 }
 
-fn seen(
+fn render_view(
     scene: &Scene,
     world: &World,
     postures: &[Posture],
@@ -106,7 +107,7 @@ fn seen(
 ) -> RgbImage {
     let (width, height) = (camera.width, camera.height);
     let camera = Camera { width: 2 * width, height: 2 * height, ..camera };
-    let view = View { hide, ..View::of_camera(camera, Channels::RGB) };
+    let view = View { hide, ..View::from_camera(camera, Channels::RGB) };
     let images = scene.render_state(world.state(), postures, &[view]);
     let rgb = images.into_iter().next().and_then(|i| i.rgb).unwrap_or_default();
     let large = image_out::rgb(&rgb, 2 * width, 2 * height);
@@ -114,30 +115,30 @@ fn seen(
     resize(&large, width, height, FilterType::Triangle)
 }
 
-/// Writes a picture as small as can be.
-fn save(picture: &RgbImage, path: &Path) -> image::ImageResult<()> {
+/// Writes a PNG file with the strongest compression.
+fn save(image: &RgbImage, path: &Path) -> image::ImageResult<()> {
     let file = std::io::BufWriter::new(std::fs::File::create(path)?);
     let encoder = PngEncoder::new_with_quality(file, CompressionType::Best, PngFilter::Adaptive);
-    picture.write_with_encoder(encoder)
+    image.write_with_encoder(encoder)
 }
 
-fn label(picture: &mut RgbImage, words: &str) {
-    text::draw(picture, (3.0, 2.0), 11.0, [20; 3], Align::Left, words);
+fn label(image: &mut RgbImage, label_text: &str) {
+    text::draw(image, (3.0, 2.0), 11.0, [20; 3], Align::Left, label_text);
 }
 
-/// Every class in four variants, twelve pictures a line.
+/// Every class in four variants, twelve images per row.
 fn classes(folder: &Path) -> image::ImageResult<()> {
     let all: Vec<ClassId> = ClassId::all().filter(|c| c.info().role != Role::Person).collect();
     for (page, group) in all.chunks(all.len().div_ceil(5)).enumerate() {
-        let pictures = group.iter().flat_map(|c| (0..4).map(|v| portrait(*c, v)));
+        let pictures = group.iter().flat_map(|c| (0..4).map(|v| class_image(*c, v)));
         let pictures: Vec<RgbImage> = pictures.collect();
         save(&image_out::grid(&pictures, 12), &folder.join(format!("classes_{page}.png")))?;
     }
     Ok(())
 }
 
-/// An empty place without ground, so that pictures stay small as files.
-fn nowhere() -> Setup {
+/// An empty setup without ground, so that image files stay small.
+fn empty_setup() -> Setup {
     let mut setup = scenes::empty();
     setup.floors.clear();
     setup.bounds = chaic_core::geom::Rect::new([-30.0; 2], [30.0; 2]);
@@ -146,42 +147,43 @@ fn nowhere() -> Setup {
     setup
 }
 
-fn portrait(class: ClassId, variant: u8) -> RgbImage {
+fn class_image(class: ClassId, variant: u8) -> RgbImage {
     const SIDE_PX: u32 = 104;
-    let mut setup = nowhere();
-    let thing = Thing::new(class, Vec3::ZERO, std::f32::consts::PI);
-    setup.things.push(Thing { fixed: true, variant, ..thing });
+    let mut setup = empty_setup();
+    let thing = ObjectSpec::new(class, Vec3::ZERO, std::f32::consts::PI);
+    setup.things.push(ObjectSpec { fixed: true, variant, ..thing });
     let size = Vec3::from(class.info().size_m);
-    // The lens of an eye begins at a few centimetres: what is tiny is seen through a longer one.
-    let near = 1.32 * size.length();
-    let away = near.max(0.25);
-    let eye = [0.55 * away, 0.5 * size.y + 0.55 * away, 0.95 * away];
-    let down = -chaic_core::geom::math::atan2(0.55, 1.098);
-    let camera = camera(eye, 0.5248, down, SIDE_PX, SIDE_PX);
-    let camera = Camera { vertical_fov_rad: 0.62 * near / away, ..camera };
+    // The near plane is at a few centimeters: tiny objects need a larger distance and a narrower
+    // field of view.
+    let min_distance = 1.32 * size.length();
+    let distance = min_distance.max(0.25);
+    let eye = [0.55 * distance, 0.5 * size.y + 0.55 * distance, 0.95 * distance];
+    let pitch = -chaic_core::geom::math::atan2(0.55, 1.098);
+    let camera = camera(eye, 0.5248, pitch, SIDE_PX, SIDE_PX);
+    let camera = Camera { vertical_fov_rad: 0.62 * min_distance / distance, ..camera };
     let world = scenes::world(setup);
-    let mut picture = picture(&Scene::new(world.setup()), &world, &[], camera);
+    let mut image = render_image(&Scene::new(world.setup()), &world, &[], camera);
     if variant == 0 {
-        label(&mut picture, class.name());
+        label(&mut image, class.name());
     }
-    picture
+    image
 }
 
-/// A line per kind of person with a picture per posture, and one of people who work together.
+/// One row per persona with one image per posture, and one sheet of people who work together.
 fn people(folder: &Path) -> image::ImageResult<()> {
-    let world = scenes::world(nowhere());
+    let world = scenes::world(empty_setup());
     let scene = Scene::new(world.setup());
     let mut pictures = Vec::new();
     for persona in Persona::ALL {
         for (k, (name, p)) in postures(persona).into_iter().enumerate() {
-            let mut p = Posture { look: k as u8, ..p };
+            let mut p = Posture { appearance: k as u8, ..p };
             p.pose.yaw_rad = if name == "walking away" { 0.6 } else { -2.5 };
             let h = p.height_m;
             let camera = camera([0.0, 0.66 * h, 2.3 * h], 0.0, -0.06, 132, 176);
             let camera = Camera { vertical_fov_rad: 0.68, ..camera };
-            let mut picture = picture(&scene, &world, &[p], camera);
-            label(&mut picture, &format!("{persona:?}: {name}"));
-            pictures.push(picture);
+            let mut image = render_image(&scene, &world, &[p], camera);
+            label(&mut image, &format!("{persona:?}: {name}"));
+            pictures.push(image);
         }
     }
     save(&image_out::grid(&pictures, 9), &folder.join("people.png"))?;
@@ -189,18 +191,18 @@ fn people(folder: &Path) -> image::ImageResult<()> {
     save(&together(), &folder.join("people_together.png"))
 }
 
-/// A line per impairment, of an adult, and one of somebody who has several.
+/// One row per impairment of an adult, and one of a child with two impairments.
 fn impaired(scene: &Scene, world: &chaic_world::World) -> RgbImage {
     let mut kinds: Vec<PersonKind> = IMPAIRMENTS
         .iter()
-        .map(|i| PersonKind { persona: Persona::Adult, impairments: Impairments::of(i.id) })
+        .map(|i| PersonKind { persona: Persona::Adult, impairments: Impairments::new(i.id) })
         .collect();
-    kinds.push("child+one_handed+tires".parse().expect("such a person can be"));
+    kinds.push("child+one_handed+tires".parse().expect("the person kind is valid"));
     let mut pictures = Vec::new();
     for kind in kinds {
         for (k, (name, p)) in postures(kind.persona).into_iter().enumerate() {
             let is_tired = kind.impairments.has(Impairment::Tires);
-            let mut p = Posture { look: k as u8, impairments: kind.impairments, ..p };
+            let mut p = Posture { appearance: k as u8, impairments: kind.impairments, ..p };
             p.fatigue = if is_tired { 1.0 } else { 0.0 };
             if kind.impairments.has(Impairment::OneHanded) {
                 p.arms[0].grips = false;
@@ -209,9 +211,9 @@ fn impaired(scene: &Scene, world: &chaic_world::World) -> RgbImage {
             let h = p.height_m;
             let camera = camera([0.0, 0.66 * h, 2.3 * h], 0.0, -0.06, 132, 176);
             let camera = Camera { vertical_fov_rad: 0.68, ..camera };
-            let mut picture = picture(scene, world, &[p], camera);
-            label(&mut picture, &if k == 0 { kind.to_string() } else { name.to_owned() });
-            pictures.push(picture);
+            let mut image = render_image(scene, world, &[p], camera);
+            label(&mut image, &if k == 0 { kind.to_string() } else { name.to_owned() });
+            pictures.push(image);
         }
     }
     image_out::grid(&pictures, 9)
@@ -244,21 +246,22 @@ fn postures(persona: Persona) -> [(&'static str, Posture); 9] {
     ]
 }
 
-/// Two people who lift a sofa, and a rider with bicycle and child.
+/// Two people who lift a sofa, and a rider with a bicycle and a child.
 fn together() -> RgbImage {
-    let side = |p: Posture, x: f32, z: f32, yaw: f32| {
+    let at_pose = |p: Posture, x: f32, z: f32, yaw: f32| {
         let mut p = p;
         p.pose.position = Vec3::new(x, 0.0, z);
         p.pose.yaw_rad = yaw;
         p
     };
-    let mut setup = nowhere();
-    let mut sofa = Thing { fixed: true, ..scenes::thing("sofa", 0.0, 0.0, std::f32::consts::PI) };
+    let mut setup = empty_setup();
+    let mut sofa =
+        ObjectSpec { fixed: true, ..scenes::object("sofa", 0.0, 0.0, std::f32::consts::PI) };
     sofa.position.y = 0.55;
     setup.things.push(sofa);
-    let lifting = |persona, look, yaw: f32, x: f32| {
-        let p = Posture { look, bend: 0.12, ..posture(persona, 0.0, 0.0, 0.0) };
-        side(arms(p, 0.68, -0.32, [true; 2]), x, 0.0, yaw)
+    let lifting = |persona, appearance, yaw: f32, x: f32| {
+        let p = Posture { appearance, bend: 0.12, ..posture(persona, 0.0, 0.0, 0.0) };
+        at_pose(arms(p, 0.68, -0.32, [true; 2]), x, 0.0, yaw)
     };
     let half = std::f32::consts::FRAC_PI_2;
     let lifters = [lifting(Persona::Adult, 1, -half, -1.0), lifting(Persona::Helper, 2, half, 1.0)];
@@ -267,40 +270,40 @@ fn together() -> RgbImage {
         Camera { vertical_fov_rad: 0.6, ..camera }
     };
     let world = scenes::world(setup);
-    let first = picture(&Scene::new(world.setup()), &world, &lifters, eye(1.15));
+    let first = render_image(&Scene::new(world.setup()), &world, &lifters, eye(1.15));
 
-    let mut setup = nowhere();
-    setup.things.push(Thing { fixed: true, ..scenes::thing("bike", -0.35, 0.2, half) });
-    let mut rider = side(posture(Persona::Rider, 0.0, 0.0, 0.0), -0.2, -0.35, half);
+    let mut setup = empty_setup();
+    setup.things.push(ObjectSpec { fixed: true, ..scenes::object("bike", -0.35, 0.2, half) });
+    let mut rider = at_pose(posture(Persona::Rider, 0.0, 0.0, 0.0), -0.2, -0.35, half);
     rider.arms[0].hand_in_body = Vec3::new(-0.35, 1.0, -0.25);
     rider.arms[0].grips = true;
     let child = Posture { moving: true, walked_m: 0.3, ..posture(Persona::Child, 0.0, 0.0, 0.0) };
     let world = scenes::world(setup);
     let scene = Scene::new(world.setup());
-    let second = picture(&scene, &world, &[rider, side(child, 1.1, 0.3, -2.2)], eye(1.15));
+    let second = render_image(&scene, &world, &[rider, at_pose(child, 1.1, 0.3, -2.2)], eye(1.15));
     image_out::grid(&[first, second], 2)
 }
 
-/// What the helper sees first in an episode of each task.
+/// First view of the helper in an episode of each task.
 fn tasks(folder: &Path, appearance: Appearance, name: &str, side_px: u32) -> Result<()> {
     let mut pictures = Vec::new();
     for task in TaskId::all() {
-        let world = scenes::world(generate(task, Seeds { place: 7, episode: 7 })?);
+        let world = scenes::world(generate(task, GeneratorSeeds { place: 7, episode: 7 })?);
         let postures: Vec<Posture> = world.setup().agents().map(|a| world.posture(a)).collect();
-        let eye = world.eye(AgentId::HELPER, side_px);
+        let eye = world.camera(AgentId::HELPER, side_px);
         let scene = Scene::with_appearance(world.setup(), appearance);
-        let mut picture = seen(&scene, &world, &postures, eye, Some(AgentId::HELPER));
-        label(&mut picture, task.name());
-        pictures.push(picture);
+        let mut image = render_view(&scene, &world, &postures, eye, Some(AgentId::HELPER));
+        label(&mut image, task.name());
+        pictures.push(image);
     }
     save(&image_out::grid(&pictures, 4), &folder.join(format!("{name}.png")))?;
     Ok(())
 }
 
-/// Appearances that are drawn from seeds.
+/// Two random appearances.
 const VARIED: [Appearance; 2] = [Appearance::Varied { seed: 3 }, Appearance::Varied { seed: 8 }];
 
-/// Two rooms and a street, in a line for each appearance.
+/// Two rooms and a street, one row per appearance.
 fn appearances(folder: &Path) -> image::ImageResult<()> {
     const SIDE_PX: u32 = 168;
     let (house, street) = (scenes::world(scenes::house()), scenes::world(scenes::street()));
@@ -315,11 +318,11 @@ fn appearances(folder: &Path) -> image::ImageResult<()> {
             let scene = Scene::with_appearance(world.setup(), appearance);
             let postures: Vec<Posture> = world.setup().agents().map(|a| world.posture(a)).collect();
             let camera = camera(eye, yaw, pitch, SIDE_PX, SIDE_PX);
-            let mut picture = picture(&scene, world, &postures, camera);
+            let mut image = render_image(&scene, world, &postures, camera);
             if k == 0 {
-                label(&mut picture, &appearance.to_string());
+                label(&mut image, &appearance.to_string());
             }
-            pictures.push(picture);
+            pictures.push(image);
         }
     }
     save(&image_out::grid(&pictures, 3), &folder.join("appearances.png"))

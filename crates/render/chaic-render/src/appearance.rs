@@ -1,28 +1,28 @@
-//! How a scene is lit and colored: a choice that changes colors only, never depth or ids.
+//! Lighting and colors of a scene. They never change depth or ids.
 
 use std::fmt;
 use std::str::FromStr;
 
 use chaic_core::geom::math;
-use chaic_core::rng::Stream;
+use chaic_core::rng::RngStream;
 use chaic_core::{EntityId, Vec3};
 
 use crate::light_rig::LightRig;
 use crate::mesh::unit;
 
-/// How a scene is lit and colored.
+/// Lighting and colors of a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Appearance {
-    /// The benchmark's: a bright day, colors as in the catalogue.
+    /// Benchmark appearance: a bright day, colors as in the catalogue.
     #[default]
     Canonical,
-    /// The same at dusk: a low, red sun, warm lamps.
+    /// Benchmark colors at dusk: a low, red sun and warm lamps.
     Evening,
-    /// Drawn from a seed, to train perception that must not depend on light and color (domain
-    /// randomization): time of day, where the sun stands, how strong and warm sun, sky and lamps
-    /// are, and the color of each thing, floor, wall and person.
+    /// Random appearance from a seed, to train perception that does not depend on light and color
+    /// (domain randomization). It varies time of day, sun direction, strength and warmth of all
+    /// lights, and the color of each object, floor, wall and person.
     Varied {
-        /// Picks the draw.
+        /// Seed of the random appearance.
         seed: u64,
     },
 }
@@ -30,7 +30,7 @@ pub enum Appearance {
 impl FromStr for Appearance {
     type Err = String;
 
-    /// `canonical`, `evening`, or `varied:SEED`.
+    /// Parses `canonical`, `evening`, or `random_light_rig:SEED`.
     fn from_str(text: &str) -> Result<Appearance, String> {
         match (text, text.strip_prefix("varied:").map(str::parse)) {
             ("canonical", _) => Ok(Appearance::Canonical),
@@ -51,67 +51,67 @@ impl fmt::Display for Appearance {
     }
 }
 
-/// What an appearance has to draw for: each has draws of its own, so that more of one kind leave
-/// the others as they are.
+/// Colored part of a scene. Each kind has its own random stream, so that more parts of one kind do
+/// not change the others.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Painted {
+pub(crate) enum ColoredPart {
     Floor(usize),
     /// All walls, or all ceilings.
     Shell(EntityId),
-    Thing(usize),
+    Object(usize),
     Person(usize),
 }
 
 impl Appearance {
-    /// The lights.
+    /// Returns the light sources.
     pub(crate) fn light_rig(self) -> LightRig {
         match self {
             Appearance::Canonical => LightRig::DAY,
             Appearance::Evening => LightRig::EVENING,
-            Appearance::Varied { seed } => varied(seed),
+            Appearance::Varied { seed } => random_light_rig(seed),
         }
     }
 
-    /// By what the linear color of something is multiplied.
-    pub(crate) fn factor(self, painted: Painted) -> Vec3 {
+    /// Returns the factor on the linear color of a part.
+    pub(crate) fn factor(self, part: ColoredPart) -> Vec3 {
         let Appearance::Varied { seed } = self else { return Vec3::ONE };
-        let (name, k, hue, dimmest) = match painted {
-            Painted::Floor(k) => ("appearance of floors", k, 0.22, 0.75),
-            Painted::Shell(e) => ("appearance of structure", usize::from(e.0), 0.22, 0.75),
-            Painted::Thing(k) => ("appearance of things", k, 0.25, 0.7),
-            Painted::Person(k) => ("appearance of people", k, 0.08, 0.8),
+        let (name, k, hue, min_brightness) = match part {
+            ColoredPart::Floor(k) => ("appearance of floors", k, 0.22, 0.75),
+            ColoredPart::Shell(e) => ("appearance of structure", usize::from(e.0), 0.22, 0.75),
+            ColoredPart::Object(k) => ("appearance of things", k, 0.25, 0.7),
+            ColoredPart::Person(k) => ("appearance of people", k, 0.08, 0.8),
         };
-        let mut rng = Stream::new(seed, name, k as u64);
-        let bright = rng.range(dimmest, 1.2);
-        let mut channel = || bright * rng.range(1.0 - hue, 1.0 + hue);
+        let mut rng = RngStream::new(seed, name, k as u64);
+        let brightness = rng.range(min_brightness, 1.2);
+        let mut channel = || brightness * rng.range(1.0 - hue, 1.0 + hue);
         Vec3::new(channel(), channel(), channel())
     }
 }
 
-fn varied(seed: u64) -> LightRig {
-    let mut rng = Stream::new(seed, "appearance of light", 0);
-    let from = if rng.range(0.0, 1.0) < 0.7 { LightRig::DAY } else { LightRig::EVENING };
+fn random_light_rig(seed: u64) -> LightRig {
+    let mut rng = RngStream::new(seed, "appearance of light", 0);
+    let base = if rng.range(0.0, 1.0) < 0.7 { LightRig::DAY } else { LightRig::EVENING };
     let azimuth = rng.range(0.0, std::f32::consts::TAU);
     let elevation = rng.range(0.25, 1.25);
     let flat = math::cos(elevation);
     let to_sun =
         unit(Vec3::new(flat * math::cos(azimuth), math::sin(elevation), flat * math::sin(azimuth)));
-    // Red and blue change against each other: warmer or colder.
+    // Red and blue vary in opposite directions: warmer or colder.
     let mut color = |light: Vec3, strength: [f32; 2], warmth: f32| {
         let (s, w) = (rng.range(strength[0], strength[1]), rng.range(-warmth, warmth));
         light * s * Vec3::new(1.0 + w, 1.0, 1.0 - w)
     };
-    let sun = color(from.sun, [0.6, 1.1], 0.12);
-    let lamp = color(from.lamp, [0.6, 1.2], 0.2);
-    let around = color(Vec3::ONE, [0.75, 1.15], 0.1);
+    let sun = color(base.sun, [0.6, 1.1], 0.12);
+    let lamp = color(base.lamp, [0.6, 1.2], 0.2);
+    let ambient = color(Vec3::ONE, [0.75, 1.15], 0.1);
     let sky = color(Vec3::ONE, [0.85, 1.1], 0.08);
     LightRig {
         to_sun,
         sun,
         lamp,
-        outdoors: from.outdoors.map(|c| c * around),
-        indoors: from.indoors.map(|c| c * around),
-        sky: from.sky.map(|c| c * sky),
+        outdoors: base.outdoors.map(|c| c * ambient),
+        indoors: base.indoors.map(|c| c * ambient),
+        sky: base.sky.map(|c| c * sky),
     }
 }
 
@@ -120,7 +120,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_appearance_is_read_as_it_is_written() {
+    fn an_appearance_round_trips_through_text() {
         for text in ["canonical", "evening", "varied:17"] {
             assert_eq!(text.parse::<Appearance>().map(|a| a.to_string()), Ok(text.to_owned()));
         }
@@ -130,16 +130,16 @@ mod tests {
     }
 
     #[test]
-    fn every_draw_can_be_seen_by() {
+    fn every_random_appearance_is_neither_dark_nor_glaring() {
         for seed in 0..2000 {
             let appearance = Appearance::Varied { seed };
-            let rig = appearance.light_rig();
-            assert!((rig.to_sun.length() - 1.0).abs() < 1e-4 && rig.to_sun.y > 0.2);
-            for [high, low] in [rig.indoors, rig.outdoors] {
+            let light_rig = appearance.light_rig();
+            assert!((light_rig.to_sun.length() - 1.0).abs() < 1e-4 && light_rig.to_sun.y > 0.2);
+            for [high, low] in [light_rig.indoors, light_rig.outdoors] {
                 assert!(high.min_element() > 0.1 && low.min_element() > 0.08, "{seed}: dark");
                 assert!(high.max_element() < 0.75, "{seed}: glaring");
             }
-            let factor = appearance.factor(Painted::Thing(seed as usize % 50));
+            let factor = appearance.factor(ColoredPart::Object(seed as usize % 50));
             assert!(factor.min_element() > 0.5 && factor.max_element() < 1.51, "{factor}");
         }
     }

@@ -1,21 +1,22 @@
-//! Triangles that reach behind the camera.
+//! Clipping of triangles at the near plane.
 
 use chaic_core::Vec3;
 
-use crate::setup::Slope;
+use crate::setup::DepthPlane;
 
-/// A triangle cut at a depth: up to four vertices on the image, and its inverse depth.
+/// A clipped triangle: up to four vertices in screen space, and its plane of inverse depth.
 pub(crate) struct Clipped {
     pub vertices: [(f32, f32); 4],
     pub n: usize,
-    pub slope: Slope,
+    pub depth_plane: DepthPlane,
 }
 
-/// Cuts a triangle given in camera coordinates (see [`crate::lens::IntoCamera`]) at depth `near_m`;
-/// `None` if nothing is left or it turns its back.
-pub(crate) fn clip(p: [Vec3; 3], near_m: f32, (mu, mv): (f32, f32)) -> Option<Clipped> {
-    // The plane n . p = d gives inverse depth 1 / w = (n.x * x / w + n.y * y / w + n.z) / d exactly,
-    // however far outside of the image the vertices are.
+/// Clips a triangle in camera coordinates (see [`crate::projection::CameraTransform`]) at depth
+/// `near_m`. Returns `None` if nothing is left or it faces away.
+pub(crate) fn clip(p: [Vec3; 3], near_m: f32, center: (f32, f32)) -> Option<Clipped> {
+    let (mu, mv) = center;
+    // The plane n . p = d gives inverse depth 1 / w = (n.x * x / w + n.y * y / w + n.z) / d
+    // exactly, even for vertices far outside the image.
     let [a, b, c] = p.map(|p| [f64::from(p.x), f64::from(p.y), f64::from(p.z)]);
     let minus = |p: [f64; 3], q: [f64; 3]| [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
     let (e, f) = (minus(b, a), minus(c, a));
@@ -27,7 +28,7 @@ pub(crate) fn clip(p: [Vec3; 3], near_m: f32, (mu, mv): (f32, f32)) -> Option<Cl
     let mut out = Clipped {
         vertices: [(0.0, 0.0); 4],
         n: 0,
-        slope: Slope {
+        depth_plane: DepthPlane {
             q: (n[2] / d) as f32,
             u0: mu,
             v0: mv,
@@ -44,7 +45,7 @@ pub(crate) fn clip(p: [Vec3; 3], near_m: f32, (mu, mv): (f32, f32)) -> Option<Cl
             out.push(from, mu, mv);
         }
         if inside != next_inside {
-            // Cut from the inner end outwards, so that a neighbor finds the same point.
+            // Cut from the inner end outward, so that a neighboring triangle gets the same point.
             let (i, o) = if inside { (from, to) } else { (to, from) };
             let t = (i.z - near_m) / (i.z - o.z);
             let cut = Vec3::new(i.x + (o.x - i.x) * t, i.y + (o.y - i.y) * t, near_m);
@@ -69,14 +70,14 @@ mod tests {
 
     #[test]
     fn a_floor_below_the_eye_is_cut_at_the_near_plane() {
-        // A floor 1 m below, from 10 m behind to 10 m ahead; focal length 100 px.
+        // A floor 1 m below the eye, from 10 m behind to 10 m ahead; focal length 100 px.
         let at = |x: f32, w: f32| Vec3::new(100.0 * x, 100.0, w);
         let clipped = clip([at(-5.0, -10.0), at(0.0, 10.0), at(5.0, -10.0)], 0.1, (50.0, 50.0))
             .or_else(|| clip([at(5.0, -10.0), at(0.0, 10.0), at(-5.0, -10.0)], 0.1, (50.0, 50.0)))
-            .expect("part of it is ahead");
+            .expect("part of the floor is ahead");
         assert_eq!(clipped.n, 3);
-        // 20 px below the middle one looks at a depth of 5 m.
-        let s = clipped.slope;
+        // A pixel 20 px below the center sees a depth of 5 m.
+        let s = clipped.depth_plane;
         let q = s.q + s.dv * 20.0;
         assert!((1.0 / q - 5.0).abs() < 1e-4, "{}", 1.0 / q);
         assert!(clipped.vertices[..3].iter().any(|c| (c.1 - 60.0).abs() < 1e-3), "tip at 10 m");

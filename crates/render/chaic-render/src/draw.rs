@@ -3,151 +3,183 @@
 use chaic_core::{EntityId, Vec3};
 
 use crate::clip::clip;
-use crate::frame::{Frame, Instance};
-use crate::lens::{IntoCamera, Lens};
 use crate::mesh::Mesh;
 use crate::portals::VisibleRegions;
-use crate::raster::{Target, VisibilityId};
-use crate::setup::{N_SETUPS, ScreenVertices, Setup, Setups};
+use crate::projection::{CameraTransform, Projection};
+use crate::raster::{RenderTarget, VisibilityId};
+use crate::scene_frame::{Instance, SceneFrame};
+use crate::setup::{SETUP_BATCH_SIZE, ScreenVertices, TriangleSetup, TriangleSetups};
+use crate::shade::{DrawnInstances, ShadingBuffers};
 use crate::solids::level_for;
 
-/// Buffers that one thread uses again and again.
+/// Buffers that one thread reuses for every view.
 #[derive(Default)]
 pub(crate) struct Scratch {
-    /// For views in color.
-    pub target: Target<u32>,
-    /// For all others.
-    pub plain: Target<u16>,
-    pub work: Work,
-    pub canvas: crate::shade::Canvas,
+    /// Render target of views with color.
+    pub target: RenderTarget<u32>,
+    /// Render target of views without color.
+    pub id_target: RenderTarget<u16>,
+    pub buffers: DrawBuffers,
+    pub shading: ShadingBuffers,
 }
 
-/// What drawing needs beside its target.
+/// Buffers of drawing apart from the render target.
 #[derive(Default)]
-pub(crate) struct Work {
-    /// For which vectors the inner loops are compiled: the widest of this machine.
+pub(crate) struct DrawBuffers {
+    /// Vector width for which the inner loops are compiled: the widest of this machine.
     pub arch: pulp::Arch,
     vertices: ScreenVertices,
-    setups: Setups,
-    /// Triangles that may cover a pixel.
-    alive: Vec<u32>,
-    order: Vec<Candidate>,
-    seen: VisibleRegions,
+    setups: TriangleSetups,
+    /// Indices of triangles that may cover a pixel.
+    survivors: Vec<u32>,
+    candidates: Vec<Candidate>,
+    visible: VisibleRegions,
     /// Level of detail of each instance in this view.
     pub levels: Vec<u8>,
-    /// The number of the first triangle of each instance that is drawn.
-    pub firsts: Vec<u32>,
-    /// How many triangles the instances that are drawn have.
+    /// Offset of the first triangle of each drawn instance.
+    pub first_triangles: Vec<u32>,
+    /// Total number of triangles of all drawn instances.
     pub n_triangles: usize,
 }
 
-/// What is left out of a view.
+impl DrawBuffers {
+    /// Returns the instances of the last draw call.
+    pub fn drawn_instances(&self) -> DrawnInstances<'_> {
+        DrawnInstances {
+            arch: self.arch,
+            levels: &self.levels,
+            first_triangles: &self.first_triangles,
+            n_triangles: self.n_triangles,
+        }
+    }
+}
+
+/// Parts of a scene that a view leaves out.
 #[derive(Clone, Copy)]
-pub(crate) struct Omit {
+pub(crate) struct Exclusions {
     pub body: Option<EntityId>,
     pub ceiling: bool,
 }
 
-/// An instance that may be in view.
+/// An instance that may be visible.
 struct Candidate {
     distance: f32,
     index: u32,
     is_structure: bool,
-    outline: Outline,
+    screen_bounds: ScreenBounds,
 }
 
-/// Where the bounds of an instance are on the image.
+/// Screen-space bounds of an instance.
 #[derive(Clone, Copy)]
-pub(crate) struct Outline {
-    /// Least u, least v, most u, most v, pixels.
+pub(crate) struct ScreenBounds {
+    /// Minimum u, minimum v, maximum u, maximum v, pixels.
     rect: [f32; 4],
     nearest: f32,
     crosses_near: bool,
 }
 
-impl Outline {
-    /// Half of the longer side, pixels: what decides the level of detail. Large if it reaches behind
-    /// the near plane.
+impl ScreenBounds {
+    /// Half of the longer side, pixels, which selects the level of detail. `f32::MAX` if the bounds
+    /// cross the near plane.
     pub fn radius_px(&self) -> f32 {
         let [u0, v0, u1, v1] = self.rect;
         if self.crosses_near { f32::MAX } else { 0.5 * (u1 - u0).max(v1 - v0) }
     }
 }
 
-/// Draws all that a lens sees of a frame into the target.
-pub(crate) fn draw<O: VisibilityId>(
-    frame: &Frame,
-    lens: &Lens,
-    omit: Omit,
-    target: &mut Target<O>,
-    work: &mut Work,
+/// Rasterizes all visible instances of a frame into the target.
+pub(crate) fn draw<V: VisibilityId>(
+    frame: &SceneFrame,
+    projection: &Projection,
+    exclusions: Exclusions,
+    target: &mut RenderTarget<V>,
+    buffers: &mut DrawBuffers,
 ) {
-    let Work { arch, vertices, setups, alive, order, seen, levels, firsts, n_triangles } = work;
-    firsts.clear();
-    firsts.resize(frame.instances.len(), 0);
+    let DrawBuffers {
+        arch,
+        vertices,
+        setups,
+        survivors,
+        candidates,
+        visible,
+        levels,
+        first_triangles,
+        n_triangles,
+    } = buffers;
+    first_triangles.clear();
+    first_triangles.resize(frame.instances.len(), 0);
     *n_triangles = 0;
-    arch.dispatch(Clear { target, lens });
+    arch.dispatch(ClearTarget { target, projection });
     levels.clear();
     levels.resize(frame.instances.len(), 0);
-    order.clear();
-    frame.regions.find_visible(lens, seen);
+    candidates.clear();
+    frame.portals.find_visible(projection, visible);
     for (index, instance) in frame.instances.iter().enumerate().take(0xffff) {
-        if omit.body == Some(instance.entity)
-            || (omit.ceiling && instance.entity == EntityId::CEILING)
-            // A map shows doors, not what is above them.
-            || (lens.is_plan && instance.entity == EntityId::WALL && instance.min.y > 1.0)
+        if exclusions.body == Some(instance.entity)
+            || (exclusions.ceiling && instance.entity == EntityId::CEILING)
+            // A map shows doorways, not the walls above them.
+            || (projection.is_plan && instance.entity == EntityId::WALL && instance.min.y > 1.0)
         {
             continue;
         }
-        let into = lens.camera_from(&instance.rotation, instance.origin);
-        if let Some(outline) = outline(instance.corners(), lens, &into) {
-            let rect = (!outline.crosses_near).then_some(outline.rect);
-            if !seen.shows(instance.regions_among(frame.regions), rect) {
+        let transform = projection.camera_from(&instance.rotation, instance.origin);
+        if let Some(screen_bounds) = screen_bounds(instance.corners(), projection, &transform) {
+            let rect = (!screen_bounds.crosses_near).then_some(screen_bounds.rect);
+            if !visible.may_show(instance.regions_in(frame.portals), rect) {
                 continue;
             }
             let is_structure = instance.entity < EntityId::FIRST_PERSON;
-            let distance = instance.distance(lens.eye);
-            order.push(Candidate { distance, index: index as u32, is_structure, outline });
+            let distance = instance.distance(projection.eye);
+            candidates.push(Candidate {
+                distance,
+                index: index as u32,
+                is_structure,
+                screen_bounds,
+            });
         }
     }
-    // Walls and floors first since they hide the most; each group from near to far.
-    order.sort_by(|a, b| {
+    // Structure first because it occludes the most; each group from front to back.
+    candidates.sort_by(|a, b| {
         let key = |c: &Candidate| (!c.is_structure, c.distance);
         let ((sa, da), (sb, db)) = (key(a), key(b));
         sa.cmp(&sb).then(da.total_cmp(&db)).then(a.index.cmp(&b.index))
     });
-    for candidate in order.iter() {
-        let Outline { rect, nearest, crosses_near } = candidate.outline;
-        let q = lens.inverse_depth(nearest);
+    for candidate in candidates.iter() {
+        let ScreenBounds { rect, nearest, crosses_near } = candidate.screen_bounds;
+        let q = projection.inverse_depth(nearest);
         if !crosses_near && arch.dispatch(IsOccluded { target: &mut *target, rect, q }) {
             continue;
         }
         let instance = &frame.instances[candidate.index as usize];
-        let level = level_for(candidate.outline.radius_px());
+        let level = level_for(candidate.screen_bounds.radius_px());
         levels[candidate.index as usize] = level as u8;
-        firsts[candidate.index as usize] = *n_triangles as u32;
+        first_triangles[candidate.index as usize] = *n_triangles as u32;
         *n_triangles += instance.shape.mesh(level).triangles.len();
-        let drawing = Drawing { instance, index: candidate.index as usize, level, lens };
-        arch.dispatch(DrawOne { drawing, crosses_near, target, vertices, setups, alive });
-        let everywhere = [f32::NEG_INFINITY, f32::NEG_INFINITY, f32::INFINITY, f32::INFINITY];
-        target.touch(if crosses_near { everywhere } else { rect });
+        let drawing = InstanceDraw { instance, index: candidate.index as usize, level, projection };
+        arch.dispatch(DrawInstance { drawing, crosses_near, target, vertices, setups, survivors });
+        let unbounded = [f32::NEG_INFINITY, f32::NEG_INFINITY, f32::INFINITY, f32::INFINITY];
+        target.mark_dirty(if crosses_near { unbounded } else { rect });
     }
 }
 
-/// Where a box of these corners is on the image; `None` if outside of it.
-pub(crate) fn outline(corners: [Vec3; 8], lens: &Lens, into: &IntoCamera) -> Option<Outline> {
-    let (mu, mv) = lens.middle();
-    let (near, far) = (lens.near_m(), lens.far_m());
+/// Returns the screen-space bounds of a box; `None` if it is outside the frustum.
+pub(crate) fn screen_bounds(
+    corners: [Vec3; 8],
+    projection: &Projection,
+    transform: &CameraTransform,
+) -> Option<ScreenBounds> {
+    let (mu, mv) = projection.center();
+    let (near, far) = (projection.near_m(), projection.far_m());
     let mut outside_all = 0b11_1111u32;
     let mut crosses_near = false;
     let mut rect = [f32::INFINITY, f32::INFINITY, f32::NEG_INFINITY, f32::NEG_INFINITY];
     let mut nearest = f32::INFINITY;
     for corner in corners {
-        let p = into.map(corner);
+        let p = transform.map(corner);
         if !p.is_finite() {
             return None;
         }
-        let scale = if lens.is_plan { 1.0 } else { p.z };
+        let scale = if projection.is_plan { 1.0 } else { p.z };
         let outside = [
             p.x < -mu * scale,
             p.x > mu * scale,
@@ -169,72 +201,78 @@ pub(crate) fn outline(corners: [Vec3; 8], lens: &Lens, into: &IntoCamera) -> Opt
     if outside_all != 0 {
         return None;
     }
-    // A box between two rows or columns of pixel centers covers none.
-    let between = |low: f32, high: f32| {
+    // A box between two rows or columns of pixel centers covers no pixel.
+    let misses_pixel_centers = |low: f32, high: f32| {
         low > 0.5
             && (low - 0.5) as i32 == (high - 0.5) as i32
             && (low - 0.5) as i32 as f32 != low - 0.5
     };
-    if !crosses_near && (between(rect[0], rect[2]) || between(rect[1], rect[3])) {
+    if !crosses_near
+        && (misses_pixel_centers(rect[0], rect[2]) || misses_pixel_centers(rect[1], rect[3]))
+    {
         return None;
     }
-    // The plan camera stands above everything.
-    (!(crosses_near && lens.is_plan)).then_some(Outline { rect, nearest, crosses_near })
+    // The plan camera is above everything.
+    (!(crosses_near && projection.is_plan)).then_some(ScreenBounds { rect, nearest, crosses_near })
 }
 
-/// One instance being drawn.
-struct Drawing<'a> {
+/// One instance to draw.
+struct InstanceDraw<'a> {
     instance: &'a Instance<'a>,
     index: usize,
     level: usize,
-    lens: &'a Lens,
+    projection: &'a Projection,
 }
 
-/// Draws one instance, compiled for each kind of vectors and called for the widest that the
-/// machine has.
-struct DrawOne<'a, O: VisibilityId> {
-    drawing: Drawing<'a>,
+/// Draws one instance. Compiled for each vector width and dispatched to the widest one of the
+/// machine.
+struct DrawInstance<'a, V: VisibilityId> {
+    drawing: InstanceDraw<'a>,
     crosses_near: bool,
-    target: &'a mut Target<O>,
+    target: &'a mut RenderTarget<V>,
     vertices: &'a mut ScreenVertices,
-    setups: &'a mut Setups,
-    alive: &'a mut Vec<u32>,
+    setups: &'a mut TriangleSetups,
+    survivors: &'a mut Vec<u32>,
 }
 
-impl<O: VisibilityId> pulp::NullaryFnOnce for DrawOne<'_, O> {
+impl<V: VisibilityId> pulp::NullaryFnOnce for DrawInstance<'_, V> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        let DrawOne { drawing, crosses_near, target, vertices, setups, alive } = self;
-        drawing.draw(crosses_near, target, vertices, setups, alive);
+        let DrawInstance { drawing, crosses_near, target, vertices, setups, survivors } = self;
+        drawing.draw(crosses_near, target, vertices, setups, survivors);
     }
 }
 
-/// Begins an image, likewise.
-struct Clear<'a, O: VisibilityId> {
-    target: &'a mut Target<O>,
-    lens: &'a Lens,
+/// Clears a render target, compiled likewise.
+struct ClearTarget<'a, V: VisibilityId> {
+    target: &'a mut RenderTarget<V>,
+    projection: &'a Projection,
 }
 
-impl<O: VisibilityId> pulp::NullaryFnOnce for Clear<'_, O> {
+impl<V: VisibilityId> pulp::NullaryFnOnce for ClearTarget<'_, V> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        let Lens { width, height, .. } = *self.lens;
-        self.target.clear(width, height, self.lens.inverse_depth(self.lens.far_m()).max(0.0));
+        let Projection { width, height, .. } = *self.projection;
+        self.target.clear(
+            width,
+            height,
+            self.projection.inverse_depth(self.projection.far_m()).max(0.0),
+        );
     }
 }
 
-/// Asks the hierarchical Z buffer, likewise.
-struct IsOccluded<'a, O: VisibilityId> {
-    target: &'a mut Target<O>,
+/// Tests a rectangle against the hierarchical z-buffer, compiled likewise.
+struct IsOccluded<'a, V: VisibilityId> {
+    target: &'a mut RenderTarget<V>,
     rect: [f32; 4],
     q: f32,
 }
 
-impl<O: VisibilityId> pulp::NullaryFnOnce for IsOccluded<'_, O> {
+impl<V: VisibilityId> pulp::NullaryFnOnce for IsOccluded<'_, V> {
     type Output = bool;
 
     #[inline(always)]
@@ -243,65 +281,67 @@ impl<O: VisibilityId> pulp::NullaryFnOnce for IsOccluded<'_, O> {
     }
 }
 
-impl Drawing<'_> {
+impl InstanceDraw<'_> {
     #[inline(always)]
-    fn visibility_id<O: VisibilityId>(&self, mesh: &Mesh, triangle: usize) -> O {
-        O::of(self.instance.entity, self.index, usize::from(mesh.faces[triangle]))
+    fn visibility_id<V: VisibilityId>(&self, mesh: &Mesh, triangle: usize) -> V {
+        V::new(self.instance.entity, self.index, usize::from(mesh.faces[triangle]))
     }
 
     #[inline(always)]
-    fn draw<O: VisibilityId>(
+    fn draw<V: VisibilityId>(
         &self,
         crosses_near: bool,
-        target: &mut Target<O>,
+        target: &mut RenderTarget<V>,
         vertices: &mut ScreenVertices,
-        setups: &mut Setups,
-        alive: &mut Vec<u32>,
+        setups: &mut TriangleSetups,
+        survivors: &mut Vec<u32>,
     ) {
-        let lens = self.lens;
+        let projection = self.projection;
         let mesh = self.instance.shape.mesh(self.level);
-        let into = lens.camera_from(&self.instance.rotation, self.instance.origin);
-        vertices.place(&mesh.positions, &into, lens);
-        // Of a plan view nothing is too near.
-        let nearest = if lens.is_plan { f32::INFINITY } else { 1.0 / lens.near_m() };
-        vertices.find_alive(&mesh.indices, lens, nearest, alive);
-        let rows = lens.height as f32;
+        let transform = projection.camera_from(&self.instance.rotation, self.instance.origin);
+        vertices.project_vertices(&mesh.positions, &transform, projection);
+        // A plan view has no near plane.
+        let nearest = if projection.is_plan { f32::INFINITY } else { 1.0 / projection.near_m() };
+        vertices.cull_backfaces(&mesh.indices, projection, nearest, survivors);
+        let rows = projection.height as f32;
         let lists = mesh.indices.each_ref().map(|list| &list[..]);
-        for few in alive.chunks(N_SETUPS) {
-            let mut triangles = [0; N_SETUPS];
-            triangles[..few.len()].copy_from_slice(few);
+        for batch in survivors.chunks(SETUP_BATCH_SIZE) {
+            let mut triangles = [0; SETUP_BATCH_SIZE];
+            triangles[..batch.len()].copy_from_slice(batch);
             setups.fill(&triangles, &lists, vertices, rows);
-            for (k, triangle) in few.iter().enumerate() {
+            for (k, triangle) in batch.iter().enumerate() {
                 target.fill(&setups.get(k), self.visibility_id(mesh, *triangle as usize));
             }
         }
         if crosses_near {
-            self.draw_clipped(&into, nearest, target, vertices);
+            self.draw_clipped(&transform, nearest, target, vertices);
         }
     }
 
-    /// Draws those that reach behind the camera.
+    /// Draws the triangles that cross the near plane.
     #[inline(always)]
-    fn draw_clipped<O: VisibilityId>(
+    fn draw_clipped<V: VisibilityId>(
         &self,
-        into: &IntoCamera,
+        transform: &CameraTransform,
         nearest: f32,
-        target: &mut Target<O>,
+        target: &mut RenderTarget<V>,
         vertices: &ScreenVertices,
     ) {
         let mesh = self.instance.shape.mesh(self.level);
-        let (near, rows) = (self.lens.near_m(), self.lens.height as f32);
+        let (near, rows) = (self.projection.near_m(), self.projection.height as f32);
         for (triangle, (a, b, c)) in mesh.triangle_indices().enumerate() {
-            let in_front = [a, b, c].map(|c| vertices.is_in_front(c, nearest));
+            let in_front = [a, b, c].map(|c| vertices.is_beyond_near_plane(c, nearest));
             if in_front == [true; 3] || in_front == [false; 3] {
                 continue;
             }
-            let p: [Vec3; 3] = [a, b, c].map(|c| into.map(mesh.positions[usize::from(c)]));
-            let Some(clipped) = clip(p, near, self.lens.middle()) else { continue };
+            let p: [Vec3; 3] = [a, b, c].map(|c| transform.map(mesh.positions[usize::from(c)]));
+            let Some(clipped) = clip(p, near, self.projection.center()) else { continue };
             for j in 2..clipped.n {
                 let fan = [clipped.vertices[0], clipped.vertices[j - 1], clipped.vertices[j]];
-                target
-                    .fill(&Setup::of(fan, clipped.slope, rows), self.visibility_id(mesh, triangle));
+                target.fill(
+                    &TriangleSetup::from_vertices(fan, clipped.depth_plane, rows),
+                    self.visibility_id(mesh, triangle),
+                );
             }
         }
     }

@@ -1,53 +1,53 @@
-//! A map of a world for people: seen from straight above without ceilings, with names.
+//! Map of a world for people: a top view without ceilings, with labels.
 
 use chaic_core::geom::Rect;
 use chaic_core::{AgentId, EntityId, Role, Vec2, Vec3};
-use chaic_world::{Place, RoomKind, Wall, World};
+use chaic_world::{ObjectLocation, RoomKind, Wall, World};
 use image::{Rgb, RgbImage};
 
-use crate::draw::{Omit, Scratch, draw as draw_scene};
-use crate::lens::Lens;
+use crate::draw::{Exclusions, Scratch, draw as draw_scene};
 use crate::people::Body;
+use crate::projection::Projection;
 use crate::scene::Scene;
-use crate::shade::{Drawn, Wanted, shade};
+use crate::shade::{OutputImages, shade};
 use crate::text::{self, Align, blend};
 use crate::view::with_scratch;
 
-/// Height of the eye that looks down, metres: above every roof and tree.
+/// Height of the camera, meters: above every roof and tree.
 const EYE_M: f32 = 60.0;
 const INK: [u8; 3] = [30, 32, 38];
-const PAPER: [u8; 3] = [250, 250, 248];
+const BACKGROUND: [u8; 3] = [250, 250, 248];
 const TARGET: [u8; 3] = [214, 40, 120];
 const GOAL: [u8; 3] = [20, 150, 70];
 const CONTAINER: [u8; 3] = [230, 140, 20];
 const OBSTACLE: [u8; 3] = [120, 60, 200];
-/// Colors of partner, helper and child; others are as the child.
+/// Colors of partner, helper and child; further agents have the color of the child.
 const PEOPLE: [[u8; 3]; 3] = [[208, 64, 40], [16, 136, 140], [214, 160, 10]];
 
-/// The map of a world as it stands, `width_px` wide (between 64 and [`crate::MAX_SIDE_PX`]), with
-/// a legend below: rooms with their names, walls dark, wanted things ringed, containers and
-/// obstacles marked, the goal place framed, people with their facing.
+/// Renders the map of a world, `width_px` wide (between 64 and [`crate::MAX_SIDE_PX`]), with a
+/// legend below. It shows room names, walls, target objects (rings), containers and obstacles, the
+/// goal place (frame), and the pose of each agent.
 pub fn draw(world: &World, width_px: u32) -> RgbImage {
     draw_scene_plan(&Scene::new(world.setup()), world, width_px)
 }
 
-/// The same with a scene that is already there.
+/// Renders the map with an existing scene.
 pub fn draw_scene_plan(scene: &Scene, world: &World, width_px: u32) -> RgbImage {
     let width = width_px.clamp(64, crate::MAX_SIDE_PX);
-    let area = seen_area(world);
+    let area = map_area(world);
     let size = area.size();
     let px_per_m = width as f32 / size.x;
     let height = ((size.y * px_per_m) as u32).clamp(1, crate::MAX_SIDE_PX);
     let map = Map { area, px_per_m };
-    let mut image = base(scene, world, &map, width, height);
+    let mut image = render_base(scene, world, &map, width, height);
     tint_rooms(&mut image, world, &map);
-    mark_things(&mut image, world, &map);
+    mark_objects(&mut image, world, &map);
     mark_people(&mut image, world, &map);
     name_rooms(&mut image, world, &map);
     with_legend(&image, world)
 }
 
-/// From metres to pixels.
+/// Transform from meters to pixels.
 struct Map {
     area: Rect,
     px_per_m: f32,
@@ -55,41 +55,41 @@ struct Map {
 
 impl Map {
     fn px(&self, p: Vec3) -> Vec2 {
-        self.flat(Vec2::new(p.x, p.z))
+        self.px_from_xz(Vec2::new(p.x, p.z))
     }
 
-    fn flat(&self, p: Vec2) -> Vec2 {
+    fn px_from_xz(&self, p: Vec2) -> Vec2 {
         (p - self.area.min) * self.px_per_m
     }
 
-    /// The point (x, z) that a pixel shows.
-    fn plan(&self, px: Vec2) -> Vec2 {
+    /// Returns the point (x, z) at a pixel.
+    fn xz_from_px(&self, px: Vec2) -> Vec2 {
         self.area.min + px / self.px_per_m
     }
 }
 
-fn seen_area(world: &World) -> Rect {
+fn map_area(world: &World) -> Rect {
     let setup = world.setup();
     let mut area = setup.bounds;
     for wall in &setup.walls {
         area.min = area.min.min(wall.a).min(wall.b);
         area.max = area.max.max(wall.a).max(wall.b);
     }
-    area.grown(0.3)
+    area.expanded(0.3)
 }
 
-fn base(scene: &Scene, world: &World, map: &Map, width: u32, height: u32) -> RgbImage {
+fn render_base(scene: &Scene, world: &World, map: &Map, width: u32, height: u32) -> RgbImage {
     let center = map.area.center();
     let eye = Vec3::new(center.x, EYE_M, center.y);
-    let lens = Lens::plan(eye, map.px_per_m, width as usize, height as usize);
+    let projection = Projection::plan(eye, map.px_per_m, width as usize, height as usize);
     let bodies: Vec<Body> = Vec::new();
     let frame = scene.frame(world.state(), &bodies, true);
     let mut rgb = vec![0; 3 * width as usize * height as usize];
     with_scratch(|scratch| {
-        let Scratch { target, work, canvas, .. } = scratch;
-        draw_scene(&frame, &lens, Omit { body: None, ceiling: true }, target, work);
-        let wanted = Wanted { rgb: &mut rgb, depth_m: None, ids: None };
-        shade(&frame, &lens, &Drawn::of(work), target, canvas, wanted);
+        let Scratch { target, buffers, shading, .. } = scratch;
+        draw_scene(&frame, &projection, Exclusions { body: None, ceiling: true }, target, buffers);
+        let output = OutputImages { rgb: &mut rgb, depth_m: None, ids: None };
+        shade(&frame, &projection, &buffers.drawn_instances(), target, shading, output);
     });
     RgbImage::from_raw(width, height, rgb).unwrap_or_else(|| RgbImage::new(width, height))
 }
@@ -123,12 +123,13 @@ fn tint_rooms(image: &mut RgbImage, world: &World, map: &Map) {
         if room.kind == RoomKind::Outdoors {
             continue;
         }
-        let (a, b) = (map.flat(room.rect.min), map.flat(room.rect.max));
+        let (a, b) = (map.px_from_xz(room.rect.min), map.px_from_xz(room.rect.max));
         let walls: Vec<&Wall> =
             world.setup().walls.iter().filter(|w| touches(w, &room.rect)).collect();
         for_pixels(image, a, b, |at, pixel| {
-            // Walls stay dark; all else is lighter than in a room, for what is drawn on it.
-            if !walls.iter().any(|w| covers(w, map.plan(at))) {
+            // Walls stay dark. Everything else is lighter than in a room, so that markers stand
+            // out.
+            if !walls.iter().any(|w| covers(w, map.xz_from_px(at))) {
                 blend(pixel, [255; 3], 0.16);
                 blend(pixel, room_color(room.kind), 0.2);
             }
@@ -138,10 +139,10 @@ fn tint_rooms(image: &mut RgbImage, world: &World, map: &Map) {
 
 fn touches(wall: &Wall, rect: &Rect) -> bool {
     let around = Rect { min: wall.a.min(wall.b), max: wall.a.max(wall.b) };
-    around.grown(wall.thickness_m).overlaps(rect)
+    around.expanded(wall.thickness_m).overlaps(rect)
 }
 
-/// Whether a wall stands on a point.
+/// Returns whether a wall covers a point.
 fn covers(wall: &Wall, p: Vec2) -> bool {
     let along = wall.b - wall.a;
     let t = ((p - wall.a).dot(along) / along.length_squared().max(1e-6)).clamp(0.0, 1.0);
@@ -150,7 +151,7 @@ fn covers(wall: &Wall, p: Vec2) -> bool {
 
 fn name_rooms(image: &mut RgbImage, world: &World, map: &Map) {
     for room in &world.setup().rooms {
-        let (a, b) = (map.flat(room.rect.min), map.flat(room.rect.max));
+        let (a, b) = (map.px_from_xz(room.rect.min), map.px_from_xz(room.rect.max));
         let name = room_name(room.kind);
         let fits = (b.x - a.x) / text::width(name, 1.0).max(4.0) * 0.8;
         let size = (0.022 * image.width() as f32).min(fits * 1.0).clamp(9.0, 26.0);
@@ -159,56 +160,56 @@ fn name_rooms(image: &mut RgbImage, world: &World, map: &Map) {
         }
         let at = (0.5 * (a.x + b.x), a.y + 0.10 * (b.y - a.y));
         for (dx, dy) in [(-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)] {
-            text::draw(image, (at.0 + dx, at.1 + dy), size, PAPER, Align::Center, name);
+            text::draw(image, (at.0 + dx, at.1 + dy), size, BACKGROUND, Align::Center, name);
         }
         text::draw(image, at, size, INK, Align::Center, name);
     }
 }
 
-/// How a thing is marked, if it is.
-fn mark_of(world: &World, entity: EntityId) -> Option<[u8; 3]> {
+/// Returns the marker color of an object; `None` if it has no marker.
+fn marker_color(world: &World, entity: EntityId) -> Option<[u8; 3]> {
     let setup = world.setup();
-    let thing = setup.thing(entity)?;
-    let state = &world.state().things[setup.thing_index(entity)?];
-    if state.place == Place::Broken {
+    let object = setup.thing(entity)?;
+    let state = &world.state().objects[setup.thing_index(entity)?];
+    if state.location == ObjectLocation::Broken {
         return None;
     }
-    if setup.goal.wanted(thing.class) > 0 {
+    if setup.goal.count(object.class) > 0 {
         return Some(TARGET);
     }
-    match thing.class.info().role {
-        Role::Container if !thing.fixed => Some(CONTAINER),
-        Role::Obstacle if !thing.fixed => Some(OBSTACLE),
+    match object.class.info().role {
+        Role::Container if !object.fixed => Some(CONTAINER),
+        Role::Obstacle if !object.fixed => Some(OBSTACLE),
         _ => None,
     }
 }
 
-fn mark_things(image: &mut RgbImage, world: &World, map: &Map) {
+fn mark_objects(image: &mut RgbImage, world: &World, map: &Map) {
     let setup = world.setup();
-    let thick = (0.0028 * image.width() as f32).max(1.5);
+    let stroke_px = (0.0028 * image.width() as f32).max(1.5);
     for entity in &setup.goal_places {
         let Some(k) = setup.thing_index(*entity) else { continue };
-        let (thing, state) = (&setup.things[k], &world.state().things[k]);
-        let half = 0.5 * thing.size_m() + 0.08;
+        let (object, state) = (&setup.things[k], &world.state().objects[k]);
+        let half = 0.5 * object.size_m() + 0.08;
         let corner = |x: f32, z: f32| {
             map.px(state.position + state.rotation * Vec3::new(x * half.x, 0.0, z * half.z))
         };
         let ring = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
         for i in 0..4 {
-            line(image, ring[i], ring[(i + 1) % 4], 1.4 * thick, GOAL);
+            line(image, ring[i], ring[(i + 1) % 4], 1.4 * stroke_px, GOAL);
         }
     }
     for (k, entity) in setup.entities().enumerate() {
-        let Some(color) = mark_of(world, entity) else { continue };
+        let Some(color) = marker_color(world, entity) else { continue };
         let size = setup.things[k].size_m();
         let radius = (0.6 * size.x.max(size.z) * map.px_per_m)
-            .clamp(2.5 * thick, 0.08 * image.width() as f32);
-        let done = world.state().things[k].delivered.is_some();
+            .clamp(2.5 * stroke_px, 0.08 * image.width() as f32);
+        let done = world.state().objects[k].delivered.is_some();
         circle(
             image,
-            map.px(world.state().things[k].position),
+            map.px(world.state().objects[k].position),
             radius,
-            thick,
+            stroke_px,
             if done { GOAL } else { color },
         );
     }
@@ -220,19 +221,19 @@ fn person_color(agent: AgentId) -> [u8; 3] {
 
 fn mark_people(image: &mut RgbImage, world: &World, map: &Map) {
     for agent in world.setup().agents() {
-        let pose = world.state().people[agent.index()].pose;
+        let pose = world.state().agents[agent.index()].pose;
         let radius = (0.26 * map.px_per_m).max(0.009 * image.width() as f32);
         let (at, color) = (map.px(pose.position), person_color(agent));
-        let ahead = pose.forward();
-        let nose = at + Vec2::new(ahead.x, ahead.z) * (1.9 * radius);
-        let side = Vec2::new(-ahead.z, ahead.x) * (0.62 * radius);
-        let base = at + Vec2::new(ahead.x, ahead.z) * (0.75 * radius);
+        let forward = pose.forward();
+        let nose = at + Vec2::new(forward.x, forward.z) * (1.9 * radius);
+        let side = Vec2::new(-forward.z, forward.x) * (0.62 * radius);
+        let base = at + Vec2::new(forward.x, forward.z) * (0.75 * radius);
         triangle(image, [nose, base + side, base - side], INK);
-        disk(image, at, radius * 1.16, PAPER);
+        disk(image, at, radius * 1.16, BACKGROUND);
         disk(image, at, radius, color);
-        let letter = &agent.word()[..1];
+        let letter = &agent.role_name()[..1];
         let size = 1.5 * radius;
-        text::draw(image, (at.x, at.y - 0.58 * size), size, PAPER, Align::Center, letter);
+        text::draw(image, (at.x, at.y - 0.58 * size), size, BACKGROUND, Align::Center, letter);
     }
 }
 
@@ -242,48 +243,48 @@ fn with_legend(map: &RgbImage, world: &World) -> RgbImage {
     let mut entries: Vec<([u8; 3], String, bool)> = world
         .setup()
         .agents()
-        .map(|agent| (person_color(agent), agent.word().to_owned(), true))
+        .map(|agent| (person_color(agent), agent.role_name().to_owned(), true))
         .collect();
     let targets = &world.setup().goal.targets;
-    let wanted: Vec<String> =
+    let targets_text: Vec<String> =
         targets.iter().map(|(c, n)| format!("{n} {}", c.info().label)).collect();
-    entries.push((TARGET, format!("wanted: {}", wanted.join(", ")), false));
+    entries.push((TARGET, format!("wanted: {}", targets_text.join(", ")), false));
     entries.push((GOAL, "goal place, delivered".to_owned(), false));
-    for (color, word, role) in
+    for (color, label, role) in
         [(CONTAINER, "container", Role::Container), (OBSTACLE, "obstacle", Role::Obstacle)]
     {
         if world.setup().things.iter().any(|t| t.class.info().role == role) {
-            entries.push((color, word.to_owned(), false));
+            entries.push((color, label.to_owned(), false));
         }
     }
-    // Entries flow into lines.
+    // Wraps the entries into lines.
     let (mut x, mut y) = (pad, 0.0);
     let mut placed = Vec::new();
-    for (color, word, filled) in entries {
-        let wide = text::width(&word, size) + 2.6 * size;
-        if x + wide > map.width() as f32 && x > pad {
+    for (color, label, filled) in entries {
+        let width_px = text::width(&label, size) + 2.6 * size;
+        if x + width_px > map.width() as f32 && x > pad {
             (x, y) = (pad, y + 1.6 * size);
         }
-        placed.push((x, y, color, word, filled));
-        x += wide;
+        placed.push((x, y, color, label, filled));
+        x += width_px;
     }
-    let high = (y + 2.6 * size) as u32;
-    let mut out = RgbImage::from_pixel(map.width(), map.height() + high, Rgb(PAPER));
+    let height_px = (y + 2.6 * size) as u32;
+    let mut out = RgbImage::from_pixel(map.width(), map.height() + height_px, Rgb(BACKGROUND));
     image::imageops::replace(&mut out, map, 0, 0);
     let top = map.height() as f32 + 0.5 * size;
-    for (x, y, color, word, filled) in placed {
+    for (x, y, color, label, filled) in placed {
         let dot = Vec2::new(x + 0.5 * size, top + y + 0.6 * size);
         if filled {
             disk(&mut out, dot, 0.5 * size, color);
         } else {
             circle(&mut out, dot, 0.45 * size, 0.22 * size, color);
         }
-        text::draw(&mut out, (x + 1.4 * size, top + y), size, INK, Align::Left, &word);
+        text::draw(&mut out, (x + 1.4 * size, top + y), size, INK, Align::Left, &label);
     }
     out
 }
 
-/// Calls `paint` for the pixels between two corners, with their centers.
+/// Calls `paint` with the center and the value of each pixel between two corners.
 fn for_pixels(image: &mut RgbImage, a: Vec2, b: Vec2, mut paint: impl FnMut(Vec2, &mut [u8; 3])) {
     let clip = |x: f32, n: u32| x.clamp(0.0, n as f32) as u32;
     let (low, high) = (a.min(b), a.max(b));
@@ -300,30 +301,32 @@ fn disk(image: &mut RgbImage, at: Vec2, radius: f32, color: [u8; 3]) {
     });
 }
 
-fn circle(image: &mut RgbImage, at: Vec2, radius: f32, thick: f32, color: [u8; 3]) {
-    let reach = radius + thick + 1.0;
+fn circle(image: &mut RgbImage, at: Vec2, radius: f32, stroke_px: f32, color: [u8; 3]) {
+    let reach = radius + stroke_px + 1.0;
     for_pixels(image, at - reach, at + reach, |p, pixel| {
-        let off = ((p - at).length_squared().sqrt() - radius).abs();
-        blend(pixel, color, 0.5 * thick + 0.5 - off);
+        let distance = ((p - at).length_squared().sqrt() - radius).abs();
+        blend(pixel, color, 0.5 * stroke_px + 0.5 - distance);
     });
 }
 
-fn line(image: &mut RgbImage, a: Vec2, b: Vec2, thick: f32, color: [u8; 3]) {
-    let reach = Vec2::splat(thick + 1.0);
+fn line(image: &mut RgbImage, a: Vec2, b: Vec2, stroke_px: f32, color: [u8; 3]) {
+    let reach = Vec2::splat(stroke_px + 1.0);
     let along = b - a;
     let l2 = along.length_squared().max(1e-6);
     for_pixels(image, a.min(b) - reach, a.max(b) + reach, |p, pixel| {
         let t = ((p - a).dot(along) / l2).clamp(0.0, 1.0);
-        let off = (p - a - along * t).length_squared().sqrt();
-        blend(pixel, color, 0.5 * thick + 0.5 - off);
+        let distance = (p - a - along * t).length_squared().sqrt();
+        blend(pixel, color, 0.5 * stroke_px + 0.5 - distance);
     });
 }
 
 fn triangle(image: &mut RgbImage, [a, b, c]: [Vec2; 3], color: [u8; 3]) {
     let side = |p: Vec2, q: Vec2, r: Vec2| (q - p).perp_dot(r - p);
-    let turn = side(a, b, c);
+    let orientation = side(a, b, c);
     for_pixels(image, a.min(b).min(c), a.max(b).max(c), |p, pixel| {
-        if side(a, b, p) * turn >= 0.0 && side(b, c, p) * turn >= 0.0 && side(c, a, p) * turn >= 0.0
+        if side(a, b, p) * orientation >= 0.0
+            && side(b, c, p) * orientation >= 0.0
+            && side(c, a, p) * orientation >= 0.0
         {
             *pixel = color;
         }

@@ -1,28 +1,28 @@
-//! Meshes of rounded boxes, cushions, lumps, turned vessels and cut outlines, each closed.
+//! Closed meshes of rounded boxes, cushions, lumps, lathed vessels and extruded outlines.
 
 use chaic_core::Vec3;
 use chaic_core::geom::math;
 
-use crate::mesh::{Mesh, Place, circle};
+use crate::mesh::{Mesh, OrientedBox, unit_circle};
 
-/// A number from a number, evenly spread.
-pub(crate) fn scramble(x: u32) -> u32 {
+/// Integer hash with uniform output.
+pub(crate) fn hash_u32(x: u32) -> u32 {
     let x = (x ^ (x >> 16)).wrapping_mul(0x7feb_352d);
     let x = (x ^ (x >> 15)).wrapping_mul(0x846c_a68b);
     x ^ (x >> 16)
 }
 
-/// A box whose edges are cut by `r` and shaded round.
-pub(crate) fn rounded_box(mesh: &mut Mesh, place: &Place, r: f32) {
+/// Adds a box with bevels of size `r` and smooth normals.
+pub(crate) fn rounded_box(mesh: &mut Mesh, obb: &OrientedBox, r: f32) {
     let base = mesh.positions.len();
     let sign = |k: usize, axis: usize| if k >> axis & 1 == 1 { 1.0f32 } else { -1.0 };
-    let half = 0.5 * place.extent;
+    let half = 0.5 * obb.extent;
     for k in 0..8 {
         let out = Vec3::new(sign(k, 0), sign(k, 1), sign(k, 2));
         for face in 0..3 {
             let axis = Vec3::AXES[face];
             let p = out * (half - Vec3::splat(r) + axis * r);
-            mesh.vertex(place.center + place.axes * p, place.axes * (out * axis));
+            mesh.vertex(obb.center + obb.axes * p, obb.axes * (out * axis));
         }
     }
     let at = |k: usize, face: usize| base + 3 * k + face;
@@ -56,19 +56,20 @@ pub(crate) fn rounded_box(mesh: &mut Mesh, place: &Place, r: f32) {
     }
 }
 
-/// A grid of `stacks` by `n` around the y axis: the point (in [-0.5, 0.5]^3) and normal of the
-/// unit form for a latitude and a longitude, radians.
-fn globe(
+/// Adds a grid of `stacks` by `n` quads around the y axis. `surface` maps latitude and longitude,
+/// radians, to a point in [-0.5, 0.5]^3 and a normal.
+fn lat_lon_mesh(
     mesh: &mut Mesh,
-    place: &Place,
-    (stacks, n): (usize, usize),
+    obb: &OrientedBox,
+    stacks: usize,
+    n: usize,
     smooth: bool,
-    form: impl Fn(f32, f32) -> (Vec3, Vec3),
+    surface: impl Fn(f32, f32) -> (Vec3, Vec3),
 ) {
     let pi = std::f32::consts::PI;
     let add = |mesh: &mut Mesh, lat: f32, k: usize| {
-        let (p, normal) = form(lat, 2.0 * pi * k as f32 / n as f32);
-        mesh.vertex(place.point(p), place.normal(normal))
+        let (p, normal) = surface(lat, 2.0 * pi * k as f32 / n as f32);
+        mesh.vertex(obb.point(p), obb.normal(normal))
     };
     let bottom = add(mesh, -0.5 * pi, 0);
     let mut below = None;
@@ -84,7 +85,7 @@ fn globe(
                     mesh.triangle([bottom, ring + k, ring + (k + 1) % n], smooth);
                 }
             }
-            Some(low) => mesh.band(low, ring, n, smooth),
+            Some(low) => mesh.join_rings(low, ring, n, smooth),
         }
         below = Some(ring);
     }
@@ -94,14 +95,14 @@ fn globe(
     }
 }
 
-/// Something between a box (`soft` 0) and an ellipsoid (1) that fills the place.
-pub(crate) fn pillow(mesh: &mut Mesh, place: &Place, soft: f32, n: usize) {
+/// Adds a superellipsoid: a box at `soft` 0, an ellipsoid at `soft` 1.
+pub(crate) fn pillow(mesh: &mut Mesh, obb: &OrientedBox, soft: f32, n: usize) {
     let power = |x: f32, e: f32| {
         let size = math::powf(x.abs().max(1e-6), e);
         if x < 0.0 { -size } else { size }
     };
     let stacks = (n / 2).clamp(4, 10) / 2 * 2;
-    globe(mesh, place, (stacks, n), true, |lat, lon| {
+    lat_lon_mesh(mesh, obb, stacks, n, true, |lat, lon| {
         let (sy, cy) = (math::sin(lat), math::cos(lat));
         let (sx, cx) = (math::sin(lon), math::cos(lon));
         let r = power(cy, soft);
@@ -113,21 +114,21 @@ pub(crate) fn pillow(mesh: &mut Mesh, place: &Place, soft: f32, n: usize) {
     });
 }
 
-/// An ellipsoid of flat facets, its vertices pushed in by up to `rough` of the radius.
-pub(crate) fn lump(mesh: &mut Mesh, place: &Place, rough: f32, seed: u32, n: usize) {
+/// Adds an ellipsoid of flat facets whose vertices are pushed in by up to `rough` of the radius.
+pub(crate) fn lump(mesh: &mut Mesh, obb: &OrientedBox, rough: f32, seed: u32, n: usize) {
     let stacks = (n / 2).max(3);
-    globe(mesh, place, (stacks, n), false, |lat, lon| {
+    lat_lon_mesh(mesh, obb, stacks, n, false, |lat, lon| {
         let (y, r) = (math::sin(lat), math::cos(lat));
         let d = Vec3::new(r * math::cos(lon), y, r * math::sin(lon));
         let key = [lat, lon].map(|a| ((a + 10.0) * 100.0) as u32);
-        let h = scramble(seed ^ scramble(key[0] ^ scramble(key[1]))) as f32 / u32::MAX as f32;
+        let h = hash_u32(seed ^ hash_u32(key[0] ^ hash_u32(key[1]))) as f32 / u32::MAX as f32;
         (0.5 * d * (1.0 - rough * h), d)
     });
 }
 
-/// Revolves an outline of (radius, height) about the place's y axis, in units of its extents. An
-/// outline that ends where it begins makes a ring; others are closed with lids.
-pub(crate) fn lathe(mesh: &mut Mesh, place: &Place, outline: &[[f32; 2]], n: usize) {
+/// Revolves an outline of (radius, height), in units of the extents, around the y axis of the box.
+/// An outline that ends where it begins makes a ring; others are closed with caps.
+pub(crate) fn lathe(mesh: &mut Mesh, obb: &OrientedBox, outline: &[[f32; 2]], n: usize) {
     let m = outline.len();
     if m < 2 {
         return;
@@ -141,28 +142,28 @@ pub(crate) fn lathe(mesh: &mut Mesh, place: &Place, outline: &[[f32; 2]], n: usi
     let ring = |mesh: &mut Mesh, [r, y]: [f32; 2], [nr, ny]: [f32; 2]| {
         let base = mesh.positions.len();
         for k in 0..n {
-            let (c, s) = circle(k, n);
-            let p = place.point(Vec3::new(r * c, y, r * s));
-            mesh.vertex(p, place.normal(Vec3::new(nr * c, ny, nr * s)));
+            let (c, s) = unit_circle(k, n);
+            let p = obb.point(Vec3::new(r * c, y, r * s));
+            mesh.vertex(p, obb.normal(Vec3::new(nr * c, ny, nr * s)));
         }
         base
     };
     let mut first = None;
     let mut last = 0;
-    let mut bent = None;
+    let mut smooth_ring = None;
     for j in 0..m - 1 {
         let here = slope(j);
-        let low = match bent {
+        let low = match smooth_ring {
             Some(ring) => ring,
             None => ring(mesh, outline[j], here),
         };
         first.get_or_insert(low);
-        // Outlines that bend little are shaded round.
+        // Shallow bends of the outline get smooth normals.
         let next = (j + 2 < m).then(|| slope(j + 1));
-        let joined = next.filter(|s| s[0] * here[0] + s[1] * here[1] > 0.6);
-        let normal = joined.map_or(here, |s| [s[0] + here[0], s[1] + here[1]]);
+        let next_if_smooth = next.filter(|s| s[0] * here[0] + s[1] * here[1] > 0.6);
+        let normal = next_if_smooth.map_or(here, |s| [s[0] + here[0], s[1] + here[1]]);
         let high = ring(mesh, outline[j + 1], normal);
-        bent = joined.map(|_| high);
+        smooth_ring = next_if_smooth.map(|_| high);
         for k in 0..n {
             let l = (k + 1) % n;
             if outline[j + 1][0] > 1e-5 {
@@ -178,25 +179,25 @@ pub(crate) fn lathe(mesh: &mut Mesh, place: &Place, outline: &[[f32; 2]], n: usi
         return;
     }
     if outline[0][0] > 1e-5 {
-        mesh.lid(first.unwrap_or(last), n, true);
+        mesh.cap(first.unwrap_or(last), n, true);
     }
     if outline[m - 1][0] > 1e-5 {
-        mesh.lid(last, n, false);
+        mesh.cap(last, n, false);
     }
 }
 
-/// A plate with an outline in the place's xy plane.
-pub(crate) fn cut(mesh: &mut Mesh, place: &Place, outline: &[[f32; 2]], thick_m: f32) {
+/// Extrudes an outline in the xy plane of the box.
+pub(crate) fn extrude(mesh: &mut Mesh, obb: &OrientedBox, outline: &[[f32; 2]], thickness_m: f32) {
     let n = outline.len();
     let middle = outline.iter().fold([0.0; 2], |m, p| [m[0] + p[0], m[1] + p[1]]);
     let [mx, my] = middle.map(|x| x / n as f32);
-    let half = 0.5 * thick_m;
+    let half = 0.5 * thickness_m;
     let mut layer = |z: f32| {
         let base = mesh.positions.len();
         for [x, y] in outline {
-            mesh.vertex(place.point(Vec3::new(*x, *y, z)), Vec3::Y);
+            mesh.vertex(obb.point(Vec3::new(*x, *y, z)), Vec3::Y);
         }
-        let center = mesh.vertex(place.point(Vec3::new(mx, my, z)), Vec3::Y);
+        let center = mesh.vertex(obb.point(Vec3::new(mx, my, z)), Vec3::Y);
         (base, center)
     };
     let ((back, back_middle), (front, front_middle)) = (layer(-half), layer(half));
@@ -208,7 +209,8 @@ pub(crate) fn cut(mesh: &mut Mesh, place: &Place, outline: &[[f32; 2]], thick_m:
     }
 }
 
-/// A piece of a round wall about the vertical through `bottom`; see [`crate::mesh_builder::MeshBuilder`].
+/// Adds a piece of a cylindrical wall around the vertical axis through `bottom`; see
+/// [`crate::mesh_builder::MeshBuilder`].
 pub(crate) fn sector(
     mesh: &mut Mesh,
     bottom: Vec3,

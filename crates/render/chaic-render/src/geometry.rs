@@ -1,52 +1,51 @@
-//! Everything that can be seen at one moment as plain data: for other renderers, and for files.
+//! Geometry of one frame as plain data: for other renderers, and for files.
 //!
-//! Frames and units are those of [`chaic_core::geom`]: metres, right-handed, y up. Triangles are
-//! counter-clockwise seen from outside, and every solid is closed; floors and ceilings are single
-//! sheets that face the room. Colors are linear light, 0 to 1.
+//! Frames and units are those of [`chaic_core::geom`]: meters, right-handed, y up. Triangles are
+//! counter-clockwise seen from outside, and every solid is closed. Floors and ceilings are single
+//! sheets that face the room. Colors are linear, 0 to 1.
 
 use chaic_core::{EntityId, Vec3};
 use chaic_world::{Posture, State};
 use glam::Mat3;
 
-use crate::draw::outline;
-use crate::frame::{Instance, corners};
+use crate::draw::screen_bounds;
 use crate::ground::NO_ROOM;
-use crate::mesh::{Mesh, Skin};
+use crate::mesh::{Material, Mesh};
+use crate::scene_frame::{Instance, corners};
 use crate::texture;
-use crate::{Lens, Scene};
+use crate::{Projection, Scene};
 
-pub use crate::mesh::{Gloss, unit};
+pub use crate::mesh::{SpecularPreset, unit};
 pub use crate::portals::{PortalGraph, RegionSet};
-pub use crate::shapes::{BodyShape, ShapeName, Shapes};
 pub use crate::solids::{N_LEVELS, level_for};
-pub use crate::texture::{Texture, shown_from_linear};
+pub use crate::texture::{Texture, display_from_linear};
 
-/// The finest level of detail.
+/// Finest level of detail.
 pub const FINEST: usize = N_LEVELS - 1;
 
-/// Everything that can be seen at one moment.
+/// Geometry of one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Geometry {
-    /// The shapes, each once; every one is used by an instance.
+    /// Unique meshes; every one is used by an instance.
     pub meshes: Vec<MeshData>,
-    /// What there is: structure, then people, then things.
+    /// Instances: structure, then people, then objects.
     pub instances: Vec<InstanceData>,
 }
 
-/// A shape in its object's frame.
+/// A mesh in its object frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshData {
-    /// Corners, metres.
+    /// Vertex positions, meters.
     pub positions: Vec<[f32; 3]>,
-    /// Unit normals, as many as positions; without meaning at vertices of flat triangles only.
+    /// Unit normals, one per position. They are undefined at vertices that only flat triangles use.
     pub normals: Vec<[f32; 3]>,
-    /// The triangles, those of one skin one after the other.
+    /// Triangles, grouped by material.
     pub triangles: Vec<TriangleData>,
-    /// What the triangles' skins are.
-    pub skins: Vec<SkinData>,
-    /// Least coordinates of all vertices, metres.
+    /// Materials of the triangles.
+    pub materials: Vec<MaterialData>,
+    /// Minimum corner of the bounding box, meters.
     pub min: [f32; 3],
-    /// Greatest coordinates of all vertices, metres.
+    /// Maximum corner of the bounding box, meters.
     pub max: [f32; 3],
 }
 
@@ -55,96 +54,96 @@ pub struct MeshData {
 pub struct TriangleData {
     /// Indices of its vertices, counter-clockwise seen from outside.
     pub vertices: [u32; 3],
-    /// Index of its skin.
-    pub skin: u8,
-    /// Whether the vertices' normals are interpolated; else the triangle's own plane has the normal.
+    /// Index of its material.
+    pub material: u8,
+    /// True if vertex normals are interpolated; otherwise the triangle has its geometric normal.
     pub smooth: bool,
 }
 
-/// How a group of triangles looks.
+/// Material of a group of triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SkinData {
+pub struct MaterialData {
     /// Linear red, green and blue, 0 to 1.
     pub color: [f32; 3],
-    /// What it looks like close up.
+    /// Brightness texture.
     pub texture: Texture,
-    /// How it answers to light.
-    pub gloss: Gloss,
-    /// The skin's axes in the object's frame, unit vectors, the longest extent's first. A texture is
-    /// laid on a face by leaving out the axis that is most square to it; the first axis left is u.
+    /// Reflection of light.
+    pub gloss: SpecularPreset,
+    /// Texture axes in the object frame: unit vectors, the longest extent first. A texture is
+    /// projected along the axis most perpendicular to the face; the first remaining axis is u.
     pub axes: [[f32; 3]; 3],
-    /// Whether an instance's tint takes the color's place.
+    /// True if the tint of an instance replaces the color.
     pub tinted: bool,
 }
 
-/// A mesh somewhere in the world.
+/// A mesh with a pose in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InstanceData {
-    /// What it is; all floors share an id, and so do walls and ceilings.
+    /// Entity id. All floors share one id, and so do walls and ceilings.
     pub entity: EntityId,
     /// Index of its mesh.
     pub mesh: u32,
-    /// The columns of the rotation from the object's frame to the world's: where the object's own
-    /// x, y and z point.
+    /// Columns of the rotation from the object frame to the world frame.
     pub rotation: [[f32; 3]; 3],
-    /// Where the object's origin is in the world, metres.
+    /// Origin of the object in the world, meters.
     pub origin: [f32; 3],
-    /// Linear color of the tinted skins.
+    /// Linear color of the tinted materials.
     pub tint: Option<[f32; 3]>,
-    /// By what all its linear colors are multiplied, its tint's too.
+    /// Factor on all linear colors, including the tint.
     pub factor: [f32; 3],
-    /// What lights it.
-    pub lit_by: LitBy,
-    /// The regions of [`Scene::regions`] that it reaches into.
+    /// Light source of the instance.
+    pub light_source: LightAssignment,
+    /// Regions of [`Scene::portal_graph`] that it overlaps.
     pub regions: RegionSet,
-    /// Least coordinates of its shape at any level of detail, in the object's frame, metres.
+    /// Minimum corner of the bounding box over all levels of detail, in the object frame, meters.
     pub min: [f32; 3],
-    /// Greatest coordinates of its shape at any level of detail, in the object's frame, metres.
+    /// Maximum corner of the bounding box over all levels of detail, in the object frame, meters.
     pub max: [f32; 3],
 }
 
 impl InstanceData {
-    /// Half of the longer side of its bounds on the image of a lens, pixels, which decides its level
-    /// of detail ([`level_for`]); `None` if it is outside of the image.
-    pub fn radius_px(&self, lens: &Lens) -> Option<f32> {
+    /// Half of the longer side of its bounds on the image, pixels, which selects the level of
+    /// detail ([`level_for`]). `None` if it is outside the image.
+    pub fn radius_px(&self, projection: &Projection) -> Option<f32> {
         let rotation = Mat3::from_cols_array_2d(&self.rotation);
-        let into = lens.camera_from(&rotation, self.origin.into());
-        outline(corners(self.min.into(), self.max.into()), lens, &into).map(|o| o.radius_px())
+        let transform = projection.camera_from(&rotation, self.origin.into());
+        screen_bounds(corners(self.min.into(), self.max.into()), projection, &transform)
+            .map(|bounds| bounds.radius_px())
     }
 }
 
-/// What lights an instance.
+/// Light source of an instance.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum LitBy {
-    /// The sky and the sun.
+pub enum LightAssignment {
+    /// Sun and sky.
     Sky,
-    /// The lamp of the room it is in, at this point in the world, metres.
+    /// Lamp of its room, at this position in the world, meters.
     Lamp([f32; 3]),
-    /// Structure spans rooms: each of its points has the light of the room in front of it, see
+    /// Per point: structure spans rooms, and each point is lit by the room in front of it, see
     /// [`Scene::lamp_at`].
-    EachPoint,
+    PerPoint,
 }
 
-/// The square of brightness that a texture repeats.
+/// Repeating brightness tile of a texture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TileData {
-    /// Side of the square, metres.
+    /// Side of the tile, meters.
     pub side_m: f32,
     /// Texels along the side.
     pub side_texels: usize,
-    /// Factors on the skin's linear color, 128 meaning 1, shape [v, u].
+    /// Factors on the linear color of the material, u8, 128 means 1, shape [v, u].
     pub texels: Vec<u8>,
 }
 
 impl Geometry {
-    /// Takes the instances of an entity out, and the meshes that nobody else uses.
-    pub fn leave_out(&mut self, entity: EntityId) {
+    /// Removes the instances of an entity, and the meshes that no other instance uses.
+    pub fn remove_entity(&mut self, entity: EntityId) {
         self.instances.retain(|i| i.entity != entity);
-        let mut kept = vec![None; self.meshes.len()];
+        let mut new_indices = vec![None; self.meshes.len()];
         let mut meshes = Vec::new();
         for instance in &mut self.instances {
             let old = instance.mesh as usize;
-            let new = *kept[old].get_or_insert_with(|| {
+            let new = *new_indices[old].get_or_insert_with(|| {
                 meshes.push(self.meshes[old].clone());
                 meshes.len() as u32 - 1
             });
@@ -153,59 +152,59 @@ impl Geometry {
         self.meshes = meshes;
     }
 
-    /// Triangles of all instances together.
+    /// Number of triangles of all instances.
     pub fn count_triangles(&self) -> usize {
-        let of = |i: &InstanceData| self.meshes[i.mesh as usize].triangles.len();
-        self.instances.iter().map(of).sum()
+        let n_triangles = |i: &InstanceData| self.meshes[i.mesh as usize].triangles.len();
+        self.instances.iter().map(n_triangles).sum()
     }
 }
 
-/// The tile of a texture; [`Texture::Plain`] has none.
+/// Returns the tile of a texture; `None` for [`Texture::Plain`].
 pub fn tile(texture: Texture) -> Option<TileData> {
     let begin = texture.tile()?.begin as usize;
     let finest = &texture::atlas()[begin..][..TILE_TEXELS * TILE_TEXELS];
-    // The atlas holds roots.
+    // The atlas holds square roots.
     let linear = |texel: &u32| ((texel & 0xff) * (texel & 0xff) / 128).min(255) as u8;
     let texels = finest.iter().map(linear).collect();
     Some(TileData { side_m: texture.period_m(), side_texels: TILE_TEXELS, texels })
 }
 
-/// Texels along the side of a tile at its finest; a power of two.
-pub const TILE_TEXELS: usize = texture::SIDE;
+/// Texels along the side of a tile at the finest mip level; a power of two.
+pub const TILE_TEXELS: usize = texture::TILE_SIDE;
 
-/// All tiles, each at sizes from [`TILE_TEXELS`] down to one texel, every size half of the one
-/// before. A texel comes with its neighbors: itself in the lowest byte, then those to the right,
-/// below, and below to the right; 128 means 1. They are factors on what is shown, the root of
-/// linear light.
+/// Returns the texture atlas: all tiles with mip levels from [`TILE_TEXELS`] texels per side down
+/// to one. Each texel holds its neighbors: itself in the lowest byte, then those to the right,
+/// below, and below to the right. 128 means 1. Texels are factors on display colors (square roots
+/// of linear light).
 pub fn atlas() -> &'static [u32] {
     texture::atlas()
 }
 
-/// Where a tile is in the [`atlas`].
+/// Position of a tile in the [`atlas`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AtlasPlace {
+pub struct AtlasTile {
     /// Index of its first texel.
     pub begin: u32,
-    /// Texels per metre of its finest size.
+    /// Texels per meter at the finest mip level.
     pub texels_per_m: f32,
 }
 
-/// Where the tile of a texture is; [`Texture::Plain`] has none.
-pub fn place_in_atlas(texture: Texture) -> Option<AtlasPlace> {
+/// Returns the position of a texture's tile; `None` for [`Texture::Plain`].
+pub fn atlas_tile(texture: Texture) -> Option<AtlasTile> {
     let tile = texture.tile()?;
-    Some(AtlasPlace { begin: tile.begin, texels_per_m: tile.texels_per_m })
+    Some(AtlasTile { begin: tile.begin, texels_per_m: tile.texels_per_m })
 }
 
 impl Scene {
-    /// What can be seen at a moment, at a level of detail; levels past the finest are the finest.
-    /// `postures` are those of the agents in order.
+    /// Returns the geometry of a state at a level of detail. Levels past the finest give the
+    /// finest. `postures` lists the postures of the agents in order.
     pub fn geometry(&self, state: &State, postures: &[Posture], level: usize) -> Geometry {
         let [geometry] = self.geometry_at(state, postures, [level]);
         geometry
     }
 
-    /// The same at all levels of detail, the coarsest first. The instances are the same in each,
-    /// and a mesh of the same index is the same shape.
+    /// Returns the geometry at all levels of detail, the coarsest first. All levels have the same
+    /// instances, and meshes with the same index have the same shape.
     pub fn geometry_at_all_levels(
         &self,
         state: &State,
@@ -230,12 +229,13 @@ impl Scene {
     }
 
     pub(crate) fn instance_data(&self, instance: &Instance, mesh: u32) -> InstanceData {
-        let lit_by = match instance.room {
-            None => LitBy::EachPoint,
-            Some(NO_ROOM) => LitBy::Sky,
-            Some(room) => {
-                self.ground().lamp(room).map_or(LitBy::Sky, |at| LitBy::Lamp(at.to_array()))
-            }
+        let light_source = match instance.room {
+            None => LightAssignment::PerPoint,
+            Some(NO_ROOM) => LightAssignment::Sky,
+            Some(room) => self
+                .ground()
+                .lamp(room)
+                .map_or(LightAssignment::Sky, |at| LightAssignment::Lamp(at.to_array())),
         };
         InstanceData {
             entity: instance.entity,
@@ -244,14 +244,14 @@ impl Scene {
             origin: instance.origin.to_array(),
             tint: instance.tint,
             factor: instance.factor.to_array(),
-            lit_by,
-            regions: instance.regions_among(self.regions()),
+            light_source,
+            regions: instance.regions_in(self.portal_graph()),
             min: instance.min.to_array(),
             max: instance.max.to_array(),
         }
     }
 
-    /// Where the lamp of the room at a point hangs, metres; none outdoors.
+    /// Returns the position of the lamp of the room at a point, meters; `None` outdoors.
     pub fn lamp_at(&self, point: Vec3) -> Option<Vec3> {
         let room = self.ground().room_at(point);
         if room == NO_ROOM { None } else { self.ground().lamp(room) }
@@ -262,24 +262,24 @@ impl From<&Mesh> for MeshData {
     fn from(mesh: &Mesh) -> MeshData {
         let triangles = mesh.triangles.iter().map(|t| TriangleData {
             vertices: t.vertices.map(u32::from),
-            skin: t.skin,
+            material: t.material,
             smooth: t.smooth,
         });
         MeshData {
             positions: mesh.positions.iter().map(Vec3::to_array).collect(),
             normals: mesh.normals.iter().map(Vec3::to_array).collect(),
             triangles: triangles.collect(),
-            skins: mesh.skins.iter().map(SkinData::from).collect(),
+            materials: mesh.materials.iter().map(MaterialData::from).collect(),
             min: mesh.min.to_array(),
             max: mesh.max.to_array(),
         }
     }
 }
 
-impl From<&Skin> for SkinData {
-    fn from(skin: &Skin) -> SkinData {
-        let Skin { color, texture, gloss, axes, tinted } = *skin;
-        SkinData { color, texture, gloss, axes: columns(&axes), tinted }
+impl From<&Material> for MaterialData {
+    fn from(material: &Material) -> MaterialData {
+        let Material { color, texture, gloss, axes, tinted } = *material;
+        MaterialData { color, texture, gloss, axes: columns(&axes), tinted }
     }
 }
 

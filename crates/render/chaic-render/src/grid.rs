@@ -1,6 +1,6 @@
-//! Grids of cells, row by row.
+//! Neighbors in a row-major grid of cells.
 
-/// The cells beside cell `k` of a grid of `n_x` by `n_z`: at most four.
+/// Iterates over the neighbors of cell `k` of a grid of `n_x` by `n_z` cells: at most four.
 pub(crate) fn neighbors(k: usize, n_x: usize, n_z: usize) -> impl Iterator<Item = usize> {
     let (x, z) = (k % n_x, k / n_x);
     let beside = [
@@ -18,7 +18,10 @@ mod tests {
 
     #[test]
     fn corners_have_two_neighbors_and_the_middle_four() {
-        let of = |k| neighbors(k, 3, 3).collect::<Vec<_>>();
-        assert_eq!([of(0), of(4), of(8)], [vec![1, 3], vec![3, 5, 1, 7], vec![7, 5]]);
+        let neighbors_of = |k| neighbors(k, 3, 3).collect::<Vec<_>>();
+        assert_eq!(
+            [neighbors_of(0), neighbors_of(4), neighbors_of(8)],
+            [vec![1, 3], vec![3, 5, 1, 7], vec![7, 5]]
+        );
     }
 }

@@ -1,5 +1,5 @@
-//! The ground of a plan in cells: which room each belongs to, where rooms have their lamps, and how
-//! dark it is near walls and the feet of things.
+//! Ground grid of a floor plan: the room of each cell, the lamps of rooms, and contact shadows near
+//! walls and objects.
 
 use chaic_core::geom::Rect;
 use chaic_core::{Vec2, Vec3};
@@ -7,17 +7,17 @@ use chaic_world::{RoomKind, Setup};
 
 use crate::grid::neighbors;
 
-/// No room.
+/// Marker of a cell without a room.
 pub(crate) const NO_ROOM: u8 = u8::MAX;
-/// How far the darkness at the foot of things reaches, metres.
-const CONTACT_M: f32 = 0.22;
-/// Cells of the ground along one side at most; a house gets cells of a few centimetres.
+/// Reach of contact shadows, meters.
+const CONTACT_SHADOW_M: f32 = 0.22;
+/// Maximum number of cells along one side; cells of a house are a few centimeters wide.
 pub(crate) const MAX_CELLS: usize = 256;
 
-/// Cells of the ground, and one for what isn't ground: unshaded.
+/// Number of ground cells, plus one unshaded cell for everything outside the ground.
 pub(crate) const N_GROUND: usize = MAX_CELLS * MAX_CELLS + 1;
 
-/// The ground as a grid of cells; x across, z down.
+/// The ground as a grid of cells, with columns along x and rows along z.
 #[derive(Clone, Debug)]
 pub(crate) struct Ground {
     min: Vec2,
@@ -27,25 +27,25 @@ pub(crate) struct Ground {
     pub nz: usize,
     /// Room of each cell, or [`NO_ROOM`].
     rooms: Vec<u8>,
-    /// Darkness from walls, 0 to 255, per cell.
-    pub walls: Vec<u8>,
-    /// Where each room's lamp hangs.
+    /// Shadow of walls per cell, 0 to 255.
+    pub wall_shadows: Vec<u8>,
+    /// Position of each room's lamp.
     lamps: Vec<Vec3>,
     pub ceiling_m: Option<f32>,
 }
 
-/// The foot of something on the ground.
+/// Footprint of an object on the ground.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Foot {
-    /// Middle (x, z), metres.
+pub(crate) struct Footprint {
+    /// Center (x, z), meters.
     pub center: Vec2,
-    /// Unit vector of its own x in the world's (x, z).
+    /// Unit vector of its own x axis in world (x, z).
     pub axis: Vec2,
-    /// Half extents along its own x and z, metres.
-    pub half: Vec2,
-    /// Darkness under it, 0 to 1.
-    pub depth: f32,
-    pub round: bool,
+    /// Half extents along its own x and z axes, meters.
+    pub half_extent: Vec2,
+    /// Shadow strength under it, 0 to 1.
+    pub strength: f32,
+    pub is_round: bool,
 }
 
 impl Ground {
@@ -53,10 +53,10 @@ impl Ground {
         let floors = setup.floors.iter().map(|f| f.rect);
         let all =
             floors.fold(setup.bounds, |a, b| Rect { min: a.min.min(b.min), max: a.max.max(b.max) });
-        let all = all.grown(0.5);
+        let all = all.expanded(0.5);
         let size = all.size();
-        let most = MAX_CELLS as f32 - 1.0;
-        let cells_per_m = (most / size.x.max(size.y)).clamp(0.2, 25.0);
+        let max_cells = MAX_CELLS as f32 - 1.0;
+        let cells_per_m = (max_cells / size.x.max(size.y)).clamp(0.2, 25.0);
         let count = |m: f32| ((m * cells_per_m) as usize).min(MAX_CELLS - 1) + 1;
         let (nx, nz) = (count(size.x), count(size.y));
         let height = setup.ceiling_m.unwrap_or(3.0);
@@ -70,7 +70,7 @@ impl Ground {
             nx,
             nz,
             rooms: vec![NO_ROOM; nx * nz],
-            walls: vec![0; nx * nz],
+            wall_shadows: vec![0; nx * nz],
             lamps: setup.rooms.iter().take(usize::from(NO_ROOM)).map(lamp).collect(),
             ceiling_m: setup.ceiling_m,
         };
@@ -87,27 +87,33 @@ impl Ground {
             }
         }
         ground.spread_rooms();
-        let mut walls = std::mem::take(&mut ground.walls);
+        let mut wall_shadows = std::mem::take(&mut ground.wall_shadows);
         for w in setup.walls.iter().filter(|w| w.bottom_m < 0.1) {
             let along = w.b - w.a;
             let length = (along.x * along.x + along.y * along.y).sqrt();
             let axis = if length > 1e-6 { along / length } else { Vec2::X };
-            let half = Vec2::new(0.5 * length, 0.5 * w.thickness_m);
-            let foot = Foot { center: 0.5 * (w.a + w.b), axis, half, depth: 0.3, round: false };
-            ground.darken(&mut walls, &foot);
+            let half_extent = Vec2::new(0.5 * length, 0.5 * w.thickness_m);
+            let footprint = Footprint {
+                center: 0.5 * (w.a + w.b),
+                axis,
+                half_extent,
+                strength: 0.3,
+                is_round: false,
+            };
+            ground.splat_shadow(&mut wall_shadows, &footprint);
         }
-        ground.walls = walls;
+        ground.wall_shadows = wall_shadows;
         ground
     }
 
-    /// Gives what belongs to no room of a house (doorways, alcoves, the cells beneath walls) to the
-    /// nearest room, counted in cells: its lamp shines there too.
+    /// Assigns each cell without a room (doorways, alcoves, cells under walls) to the nearest room,
+    /// measured in cells. The lamp of that room lights it.
     fn spread_rooms(&mut self) {
-        let mut front: Vec<usize> =
+        let mut frontier: Vec<usize> =
             (0..self.rooms.len()).filter(|k| self.rooms[*k] != NO_ROOM).collect();
-        while !front.is_empty() {
+        while !frontier.is_empty() {
             let mut next = Vec::new();
-            for k in front {
+            for k in frontier {
                 for neighbor in neighbors(k, self.nx, self.nz) {
                     if self.rooms[neighbor] == NO_ROOM {
                         self.rooms[neighbor] = self.rooms[k];
@@ -115,7 +121,7 @@ impl Ground {
                     }
                 }
             }
-            front = next;
+            frontier = next;
         }
     }
 
@@ -125,63 +131,66 @@ impl Ground {
         ((x.max(0.0) as usize).min(self.nx - 1), (z.max(0.0) as usize).min(self.nz - 1))
     }
 
-    /// Cells per metre, and the corner (x, z) where the first cell begins.
+    /// Returns the number of cells per meter, and the corner (x, z) of the first cell.
     pub fn grid(&self) -> (f32, Vec2) {
         (self.cells_per_m, self.min)
     }
 
-    /// The room of each cell in a row along x, or [`NO_ROOM`].
+    /// Returns the room of each cell in a row along x, or [`NO_ROOM`].
     pub fn rooms_in_row(&self, z: usize) -> &[u8] {
         &self.rooms[z * self.nx..][..self.nx]
     }
 
-    /// The room at a point, or [`NO_ROOM`].
+    /// Returns the room at a point, or [`NO_ROOM`].
     #[inline(always)]
     pub fn room_at(&self, p: Vec3) -> u8 {
         let (x, z) = self.cell(Vec2::new(p.x, p.z));
         self.rooms[z * self.nx + x]
     }
 
-    /// Where each room's lamp hangs.
+    /// Returns the position of each room's lamp.
     pub fn lamps(&self) -> &[Vec3] {
         &self.lamps
     }
 
-    /// The lamp of a room.
+    /// Returns the lamp of a room.
     #[inline(always)]
     pub fn lamp(&self, room: u8) -> Option<Vec3> {
         self.lamps.get(usize::from(room)).copied()
     }
 
-    /// Adds the shadow of a foot; gives the cells from the first x and z to the last.
-    pub fn darken(&self, dark: &mut [u8], foot: &Foot) -> [usize; 4] {
-        // Small things darken less around them.
-        let size = foot.half.x.max(foot.half.y);
-        let reach_m = CONTACT_M.min(0.02 + 0.6 * size).max(1.2 / self.cells_per_m);
-        let spread = Vec2::new(
-            foot.axis.x.abs() * foot.half.x + foot.axis.y.abs() * foot.half.y,
-            foot.axis.y.abs() * foot.half.x + foot.axis.x.abs() * foot.half.y,
+    /// Adds the shadow of a footprint; returns the changed cells as [first x, first z, last x, last
+    /// z].
+    pub fn splat_shadow(&self, shadows: &mut [u8], footprint: &Footprint) -> [usize; 4] {
+        // Small objects have smaller shadows.
+        let size = footprint.half_extent.x.max(footprint.half_extent.y);
+        let reach_m = CONTACT_SHADOW_M.min(0.02 + 0.6 * size).max(1.2 / self.cells_per_m);
+        let reach = Vec2::new(
+            footprint.axis.x.abs() * footprint.half_extent.x
+                + footprint.axis.y.abs() * footprint.half_extent.y,
+            footprint.axis.y.abs() * footprint.half_extent.x
+                + footprint.axis.x.abs() * footprint.half_extent.y,
         ) + reach_m;
-        let (x0, z0) = self.cell(foot.center - spread);
-        let (x1, z1) = self.cell(foot.center + spread);
+        let (x0, z0) = self.cell(footprint.center - reach);
+        let (x1, z1) = self.cell(footprint.center + reach);
         for z in z0..=z1 {
             for x in x0..=x1 {
                 let p = self.min + (Vec2::new(x as f32, z as f32) + 0.5) / self.cells_per_m;
-                let d = p - foot.center;
-                let own = Vec2::new(
-                    (d.x * foot.axis.x + d.y * foot.axis.y).abs(),
-                    (d.y * foot.axis.x - d.x * foot.axis.y).abs(),
+                let d = p - footprint.center;
+                let local = Vec2::new(
+                    (d.x * footprint.axis.x + d.y * footprint.axis.y).abs(),
+                    (d.y * footprint.axis.x - d.x * footprint.axis.y).abs(),
                 );
-                let out = if foot.round {
-                    let s = own / (foot.half + reach_m);
+                let distance = if footprint.is_round {
+                    let s = local / (footprint.half_extent + reach_m);
                     (s.x * s.x + s.y * s.y).sqrt()
                 } else {
-                    let o = (own - foot.half).max(Vec2::ZERO);
+                    let o = (local - footprint.half_extent).max(Vec2::ZERO);
                     (o.x * o.x + o.y * o.y).sqrt() / reach_m
                 };
-                let fade = (1.0 - out).max(0.0);
-                let value = (255.0 * foot.depth * fade * (2.0 - fade)) as u8;
-                let cell = &mut dark[z * self.nx + x];
+                let fade = (1.0 - distance).max(0.0);
+                let value = (255.0 * footprint.strength * fade * (2.0 - fade)) as u8;
+                let cell = &mut shadows[z * self.nx + x];
                 *cell = (*cell).max(value);
             }
         }

@@ -1,35 +1,37 @@
-//! What eyes see: RGB, depth and instance ids from a world's state and a camera.
+//! CPU renderer: RGB, depth and instance ids from the state of a world and a camera.
 //!
-//! **What it is**: [`Scene`] makes an episode's shapes ready once, [`Scene::render`] draws what
-//! any number of cameras ([`View`]) see at a moment, [`render_batch`] those of many worlds,
-//! [`Scene::label`] labels what learners see, [`floor_plan::draw`] draws a map for people,
-//! [`image_out`] and [`text`] help to write pictures. [`geometry`] gives the same shapes as plain data,
-//! for other renderers.
+//! **What it is**: [`Scene`] prepares the static geometry of an episode once. [`Scene::render`]
+//! renders any number of cameras ([`View`]) for one state of the world, and [`render_batch`]
+//! renders many worlds. [`Scene::label`] labels training data for perception, [`floor_plan::draw`]
+//! draws a map for people, [`image_out`] and [`text`] help to write image files. [`geometry`]
+//! exports the same geometry as plain data for other renderers.
 //!
 //! **What it is not**: it changes no state, reads no files, and uses neither GPU nor display.
 //!
 //! **Invariants**
-//! - Images are the same bits on every machine and for any number of threads: one thread draws
-//!   one view, and all arithmetic is correctly rounded or comes from
-//!   [`chaic_core::geom::math`].
-//! - No camera, size or posture makes it panic.
+//! - Images are bit-identical on every machine and for any number of threads: one thread renders
+//!   one view, and all arithmetic is correctly rounded or comes from [`chaic_core::geom::math`].
+//! - No camera, image size or posture causes a panic.
 //!
-//! How a view comes about: instances are culled by the camera's frustum, by the rooms that can be seen
-//! from where it stands ([`portals`]) and by what is already drawn ([`draw`]), drawn at a level of
-//! detail that fits their size on the image ([`models`]) into a visibility buffer (inverse depth and
-//! visibility ids): triangles are set up many at once ([`setup`]) and filled span by span ([`raster`]).
-//! Depth and ids are read off that buffer, and color only if it is asked for: each triangle that is
-//! seen gets a paint ([`paint`]) whose points are lit many at once ([`points`]); each row of pixels is
-//! cut into segments of one triangle ([`shade`], [`segments`]) that are filled from paint and texture
-//! ([`row`]). The inner loops are compiled for each kind of vectors, and do the same operations in
-//! each.
+//! The stages of one view:
+//! 1. Culling: the camera frustum, the rooms visible through portals ([`portals`]) and a
+//!    hierarchical z-buffer ([`draw`]) remove instances.
+//! 2. Level of detail: the size of an instance on the image selects its mesh ([`models`]).
+//! 3. Rasterization: triangles are set up in groups ([`setup`]) and filled span by span
+//!    ([`raster`]) into a visibility buffer, which holds inverse depth and visibility ids.
+//! 4. Read-back: depth and ids are copied from that buffer. Color is computed only on request.
+//! 5. Shading: each visible triangle gets a color source ([`shader`]) whose surface points are lit
+//!    in groups ([`points`]). Each row of pixels is split into segments of one triangle ([`shade`],
+//!    [`segments`]), which are filled from color and texture ([`row`]).
+//!
+//! The inner loops are compiled for each vector width and do the same operations in each.
 
 #![allow(
     rustdoc::private_intra_doc_links,
     reason = "the code map above is for readers of the source"
 )]
 
-// What tests share with integration tests calls this crate by its name.
+// Lets test code that is shared with integration tests name this crate.
 #[cfg(test)]
 extern crate self as chaic_render;
 
@@ -38,16 +40,16 @@ mod labels;
 mod scene;
 mod view;
 
-mod frame;
 mod grid;
-mod lens;
+mod projection;
+mod scene_frame;
 
 mod forms;
 mod mesh;
 mod mesh_builder;
 mod models;
 mod people;
-mod shapes;
+pub mod shapes;
 mod solids;
 mod structure;
 
@@ -60,14 +62,14 @@ mod setup;
 mod ground;
 mod light;
 mod light_rig;
-mod paint;
 mod planes;
 mod points;
 mod row;
 mod segments;
 mod shade;
-mod sight;
+mod shader;
 mod texture;
+mod vision_limits;
 
 pub mod floor_plan;
 pub mod geometry;
@@ -77,7 +79,7 @@ pub mod text;
 
 pub use appearance::Appearance;
 pub use labels::{Labels, depth_mm};
-pub use lens::Lens;
+pub use projection::Projection;
 pub use scene::{Scene, WorldViews, render_batch};
 pub use solids::LEVEL_RADIUS_PX;
 pub use view::{Channels, ImagesMut, MAX_SIDE_PX, View, with_each_width};

@@ -1,31 +1,31 @@
-//! What gives light: the sun, the sky, and the lamps of rooms.
+//! Light sources: the sun, the sky, and the lamps of rooms.
 
 use chaic_core::Vec3;
 
-/// A ceiling is lit as if it were higher by so much, metres: lamps shine downwards, and what reaches it
-/// is mostly what comes back from below.
-pub(crate) const CEILING_FARTHER_M: f32 = 1.0;
-/// By what light on ceilings is multiplied: they see the whole lit room.
-pub(crate) const CEILING_TONE: f32 = 1.05;
+/// Extra lamp distance of ceilings, meters: lamps shine downward, and ceilings receive mostly
+/// reflected light.
+pub(crate) const CEILING_EXTRA_M: f32 = 1.0;
+/// Factor on the light on ceilings, which face the whole lit room.
+pub(crate) const CEILING_FACTOR: f32 = 1.05;
 
-/// The light of a scene. Colors are linear.
+/// Light sources of a scene. Colors are linear.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LightRig {
     /// Unit vector to the sun.
     pub to_sun: Vec3,
     pub sun: Vec3,
-    /// A room's lamp, at no distance.
+    /// Lamp of a room at distance 0.
     pub lamp: Vec3,
-    /// Light from above and from below, out of doors.
+    /// Ambient light from above and from below, outdoors.
     pub outdoors: [Vec3; 2],
-    /// The same in a room.
+    /// Ambient light from above and from below, indoors.
     pub indoors: [Vec3; 2],
-    /// The sky at the horizon and in the zenith, and the ground below the horizon.
+    /// Sky at the horizon, sky at the zenith, ground below the horizon.
     pub sky: [Vec3; 3],
 }
 
 impl LightRig {
-    /// The canonical look: a bright day.
+    /// Canonical light: a bright day.
     pub const DAY: LightRig = LightRig {
         to_sun: Vec3::new(0.42, 0.80, 0.43),
         sun: Vec3::new(0.92, 0.86, 0.74),
@@ -39,7 +39,7 @@ impl LightRig {
         ],
     };
 
-    /// Dusk: the sun low and red, the sky dim, lamps on.
+    /// Dusk: a low, red sun, a dim sky, lamps on.
     pub const EVENING: LightRig = LightRig {
         to_sun: Vec3::new(0.81, 0.35, 0.47),
         sun: Vec3::new(0.78, 0.50, 0.30),
@@ -53,20 +53,20 @@ impl LightRig {
         ],
     };
 
-    /// By what the color of a lamp is multiplied: half of its light's color, as bright as can be shown.
+    /// Factor on the color of a glowing lamp: half of its light's color, at maximum brightness.
     pub fn glow(&self) -> Vec3 {
         0.5 + 0.5 * self.lamp / self.lamp.max_element().max(1e-6)
     }
 
-    /// What is seen of a level surface out of doors, of linear color, without shadow.
-    pub fn in_the_open(&self, color: Vec3) -> Vec3 {
+    /// Color of an unshaded horizontal surface outdoors, from its linear color.
+    pub fn outdoor_color(&self, color: Vec3) -> Vec3 {
         color * (self.outdoors[0] + self.sun * self.to_sun.y.max(0.0))
     }
 
-    /// The linear color of the sky along a ray, and of the ground, far away, that has this color
-    /// close by.
+    /// Linear color of the sky along a ray. Below the horizon, it fades into `ground`, the color of
+    /// the nearby ground.
     #[inline(always)]
-    pub fn sky_along(&self, ray: Vec3, ground: Vec3) -> Vec3 {
+    pub fn sky_color(&self, ray: Vec3, ground: Vec3) -> Vec3 {
         let [horizon, zenith, _] = self.sky;
         let y = ray.y / ray.dot(ray).max(1e-12).sqrt();
         let up = (1.0 - y) * (1.0 - y);

@@ -1,311 +1,307 @@
-//! Forms richer than the catalogue's solids, for what is only looked at: rounded boxes, cushions,
-//! turned vessels, bent pipes, cut outlines, leaves.
+//! Builder of detailed models for rendering: rounded boxes, cushions, lathed vessels, bent pipes,
+//! extruded outlines, leaves.
 //!
-//! Everything is given in metres at the catalogue's size, like the catalogue itself: upright forms
-//! by the middle of their bottom, the others by their middle or ends. What is smaller than about a
-//! pixel at the level of detail is left out.
+//! All lengths are meters at catalogue size. Upright shapes are placed by the center of their
+//! bottom, the others by their center or ends. Parts smaller than about a pixel at the current
+//! level of detail are left out.
 
 use chaic_core::Vec3;
 use chaic_core::catalogue::{ClassInfo, Finish, Part, Solid};
 use glam::Mat3;
 
 use crate::forms;
-pub(crate) use crate::forms::scramble;
-use crate::mesh::{Mesh, Place, Section, Skin, length, unit};
-use crate::solids::{self, Detail, LEVEL_RADIUS_PX, place_of};
+pub(crate) use crate::forms::hash_u32;
+use crate::mesh::{Material, Mesh, OrientedBox, Section, length, unit};
+use crate::solids::{self, Detail, LEVEL_RADIUS_PX, part_obb};
 
-/// What is painted next: color and finish.
+/// Color and finish of the shapes that follow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Paint {
     pub color: [u8; 3],
     pub finish: Finish,
-    /// Whether an object's variant recolors it.
+    /// True if the tint of an object replaces the color.
     pub tinted: bool,
 }
 
-/// A paint of a fixed color.
+/// Paint of a fixed color.
 pub(crate) const fn paint(color: [u8; 3], finish: Finish) -> Paint {
     Paint { color, finish, tinted: false }
 }
 
-/// A place in metres.
-pub(crate) type P = [f32; 3];
+/// A point or size, meters.
+pub(crate) type Point3 = [f32; 3];
 
 /// Builds the mesh of one class at one level of detail.
 pub(crate) struct MeshBuilder {
     pub class: &'static ClassInfo,
-    /// Which of the class's styles.
+    /// Style of the class.
     pub style: u8,
     pub level: usize,
     detail: Detail,
     mesh: Mesh,
-    now: Paint,
-    /// The paint and axes of the mesh's last skin.
+    paint: Paint,
+    /// Paint and axes of the last material of the mesh.
     last: Option<(Paint, Mat3)>,
 }
 
 impl MeshBuilder {
     pub fn new(class: &'static ClassInfo, style: u8, level: usize) -> MeshBuilder {
         let detail = Detail::of_level(level, 0.5 * length(Vec3::from(class.size_m)));
-        let now = paint([200; 3], Finish::Matte);
-        MeshBuilder { class, style, level, detail, mesh: Mesh::default(), now, last: None }
+        let paint = paint([200; 3], Finish::Matte);
+        MeshBuilder { class, style, level, detail, mesh: Mesh::default(), paint, last: None }
     }
 
-    /// What was built.
-    pub fn mesh(self) -> Mesh {
+    /// Returns the mesh.
+    pub fn into_mesh(self) -> Mesh {
         self.mesh
     }
 
-    /// What follows is painted so.
-    pub fn paint(&mut self, paint: Paint) {
-        self.now = paint;
+    /// Sets the paint of the shapes that follow.
+    pub fn set_paint(&mut self, paint: Paint) {
+        self.paint = paint;
     }
 
-    /// The paint of the class's main part, which its variant recolors.
-    pub fn main(&self) -> Paint {
+    /// Returns the paint of the main part, which the variant of an object recolors.
+    pub fn main_paint(&self) -> Paint {
         let part = &self.class.parts[0];
         Paint { color: part.color, finish: part.finish, tinted: !self.class.palette.is_empty() }
     }
 
-    /// The main paint, or for a class without alternatives one of these by style.
-    pub fn main_or(&self, others: &[[u8; 3]]) -> Paint {
-        let mut main = self.main();
-        if !main.tinted {
-            main.color = self.pick(0, others);
+    /// Returns the main paint; a class without a palette takes one of these colors, by style.
+    pub fn main_paint_or(&self, colors: &[[u8; 3]]) -> Paint {
+        let mut main_paint = self.main_paint();
+        if !main_paint.tinted {
+            main_paint.color = self.pick(0, colors);
         }
-        main
+        main_paint
     }
 
-    /// One of the options, by style; different slots choose independently.
+    /// Picks an option by style; different slots choose independently.
     pub fn pick<T: Copy>(&self, slot: u32, options: &[T]) -> T {
-        options[self.chance(slot) as usize % options.len().max(1)]
+        options[self.random(slot) as usize % options.len().max(1)]
     }
 
-    /// A number that depends on class, style and slot only.
-    pub fn chance(&self, slot: u32) -> u32 {
+    /// Returns a random number that depends only on style and slot.
+    pub fn random(&self, slot: u32) -> u32 {
         // The first four styles take the first four options of slot 0.
         if slot == 0 {
             return u32::from(self.style);
         }
-        scramble(slot.wrapping_mul(64) + u32::from(self.style)) >> 8
+        hash_u32(slot.wrapping_mul(64) + u32::from(self.style)) >> 8
     }
 
-    /// Whether half of the object never covers more than this on the image, pixels.
-    pub fn within(&self, radius_px: f32) -> bool {
+    /// Returns whether the radius of the object at this level is at most `radius_px`, pixels.
+    pub fn is_level_within(&self, radius_px: f32) -> bool {
         LEVEL_RADIUS_PX[self.level] <= radius_px
     }
 
-    /// Whether something of this size, metres, covers about a pixel. Most things are smaller on the
-    /// image than the largest that a level is for.
-    pub fn shows(&self, size_m: f32) -> bool {
-        size_m * self.detail.px_per_m > if self.within(60.0) { 1.5 } else { 1.1 }
+    /// Returns whether a size, meters, covers about a pixel. Most objects are smaller on the image
+    /// than the maximum of their level.
+    pub fn covers_pixel(&self, size_m: f32) -> bool {
+        size_m * self.detail.px_per_m > if self.is_level_within(60.0) { 1.5 } else { 1.1 }
     }
 
-    /// How far an outline may be off, metres.
-    fn slack_m(&self) -> f32 {
+    /// Tolerance of outlines, meters.
+    fn tolerance_m(&self) -> f32 {
         0.5 / self.detail.px_per_m
     }
 
-    fn shows_extent(&self, e: Vec3) -> bool {
+    fn covers_pixels(&self, e: Vec3) -> bool {
         let largest = e.max_element();
-        let middle = e.x.max(e.y).min(e.x.max(e.z)).min(e.y.max(e.z));
+        let median = e.x.max(e.y).min(e.x.max(e.z)).min(e.y.max(e.z));
         match self.level {
-            // The smallest pictures show the main parts only.
-            0 => self.shows(0.5 * largest) && self.shows(1.2 * middle),
-            _ => self.shows(0.7 * largest) && self.shows(1.6 * middle),
+            // The coarsest level contains only the main parts.
+            0 => self.covers_pixel(0.5 * largest) && self.covers_pixel(1.2 * median),
+            _ => self.covers_pixel(0.7 * largest) && self.covers_pixel(1.6 * median),
         }
     }
 
-    /// Begins a skin whose grain runs along the place.
-    fn skin(&mut self, place: &Place) {
-        let plain = matches!(self.now.finish, Finish::Matte | Finish::Glossy | Finish::Glass);
-        let axes = if plain { Mat3::IDENTITY } else { place.grain() };
-        if self.last != Some((self.now, axes)) {
-            let mut skin = Skin::new(self.now.color, self.now.finish).with_axes(axes);
-            skin.tinted = self.now.tinted;
-            self.mesh.skin(skin);
-            self.last = Some((self.now, axes));
+    /// Begins a material whose grain runs along the box.
+    fn begin_material(&mut self, obb: &OrientedBox) {
+        let is_plain = matches!(self.paint.finish, Finish::Matte | Finish::Glossy | Finish::Glass);
+        let axes = if is_plain { Mat3::IDENTITY } else { obb.grain_axes() };
+        if self.last != Some((self.paint, axes)) {
+            let mut material = Material::new(self.paint.color, self.paint.finish).with_axes(axes);
+            material.tinted = self.paint.tinted;
+            self.mesh.set_material(material);
+            self.last = Some((self.paint, axes));
         }
     }
 
-    fn plain_skin(&mut self) {
-        self.skin(&Place::upright(Vec3::ZERO, Vec3::ONE));
+    fn begin_plain_material(&mut self) {
+        self.begin_material(&OrientedBox::upright(Vec3::ZERO, Vec3::ONE));
     }
 
-    // The catalogue's own parts.
+    // Parts of the catalogue.
 
-    /// Every part of the class, with its edges rounded.
-    pub fn all(&mut self) {
-        self.without(&[]);
+    /// Adds every part of the class, with rounded edges.
+    pub fn add_all_parts(&mut self) {
+        self.add_parts_except(&[]);
     }
 
-    /// Every part but these.
-    pub fn without(&mut self, left_out: &[usize]) {
-        for k in (0..self.class.parts.len()).filter(|k| !left_out.contains(k)) {
-            self.part(k);
+    /// Adds every part except these.
+    pub fn add_parts_except(&mut self, excluded: &[usize]) {
+        for k in (0..self.class.parts.len()).filter(|k| !excluded.contains(k)) {
+            self.add_part(k);
         }
     }
 
-    /// These parts.
-    pub fn only(&mut self, parts: &[usize]) {
+    /// Adds these parts.
+    pub fn add_parts(&mut self, parts: &[usize]) {
         for k in parts {
-            self.part(*k);
+            self.add_part(*k);
         }
     }
 
-    /// One part, in its own color.
-    pub fn part(&mut self, k: usize) {
+    /// Adds one part in its own color.
+    pub fn add_part(&mut self, k: usize) {
         let Some(part) = self.class.parts.get(k) else { return };
-        let main = self.main();
-        let tinted = main.tinted && part.color == main.color;
-        self.now = Paint { color: part.color, finish: part.finish, tinted };
-        self.shape(part);
+        let main_paint = self.main_paint();
+        let tinted = main_paint.tinted && part.color == main_paint.color;
+        self.paint = Paint { color: part.color, finish: part.finish, tinted };
+        self.add_part_shape(part);
     }
 
-    /// One part in the present paint.
-    pub fn shape(&mut self, part: &Part) {
-        let place = place_of(part, Vec3::from(self.class.size_m));
-        if !part.collides && !self.shows_extent(place.extent) {
+    /// Adds one part in the current paint.
+    pub fn add_part_shape(&mut self, part: &Part) {
+        let obb = part_obb(part, Vec3::from(self.class.size_m));
+        if !part.collides && !self.covers_pixels(obb.extent) {
             return;
         }
-        self.skin(&place);
+        self.begin_material(&obb);
         let detail = self.detail;
         match part.solid {
             Solid::Cuboid => {
-                let least = place.extent.min_element();
-                let round = match part.finish {
-                    Finish::Fabric => (0.3 * least).min(0.05),
-                    Finish::Crust | Finish::Skin => 0.3 * least,
-                    _ => (0.2 * least).min(0.008),
+                let min_extent = obb.extent.min_element();
+                let radius = match part.finish {
+                    Finish::Fabric => (0.3 * min_extent).min(0.05),
+                    Finish::Crust | Finish::Skin => 0.3 * min_extent,
+                    _ => (0.2 * min_extent).min(0.008),
                 };
-                self.rounded(&place, round);
+                self.rounded(&obb, radius);
             }
             Solid::Frustum { top } if top > 0.05 => {
-                let n = detail.segments(0.5 * place.extent.x.max(place.extent.z));
+                let n = detail.segments(0.5 * obb.extent.x.max(obb.extent.z));
                 let [r0, r1] = if top > 1.0 { [0.5 / top, 0.5] } else { [0.5, 0.5 * top] };
-                let bevel = 0.12 * place.extent.min_element();
-                let (by, bx) = (bevel / place.extent.y, bevel / place.extent.x.max(place.extent.z));
-                if self.shows(bevel) {
+                let bevel = 0.12 * obb.extent.min_element();
+                let (by, bx) = (bevel / obb.extent.y, bevel / obb.extent.x.max(obb.extent.z));
+                if self.covers_pixel(bevel) {
                     let outline = [[r0 - bx, -0.5], [r0, by - 0.5], [r1, 0.5 - by], [r1 - bx, 0.5]];
-                    forms::lathe(&mut self.mesh, &place, &outline, n);
+                    forms::lathe(&mut self.mesh, &obb, &outline, n);
                 } else {
-                    solids::frustum(&mut self.mesh, &place, top, n);
+                    solids::frustum(&mut self.mesh, &obb, top, n);
                 }
             }
-            form => solids::solid(&mut self.mesh, form, &place, detail),
+            form => solids::solid(&mut self.mesh, form, &obb, detail),
         }
     }
 
-    fn rounded(&mut self, place: &Place, round_m: f32) {
-        if self.shows(round_m) {
-            forms::rounded_box(
-                &mut self.mesh,
-                place,
-                round_m.min(0.49 * place.extent.min_element()),
-            );
+    fn rounded(&mut self, obb: &OrientedBox, round_m: f32) {
+        if self.covers_pixel(round_m) {
+            forms::rounded_box(&mut self.mesh, obb, round_m.min(0.49 * obb.extent.min_element()));
         } else {
-            solids::cuboid(&mut self.mesh, place);
+            solids::cuboid(&mut self.mesh, obb);
         }
     }
 
-    // Forms.
+    // Shapes.
 
-    /// An upright box with rounded edges.
-    pub fn block(&mut self, bottom: P, size: P, round_m: f32) {
-        let middle = [bottom[0], bottom[1] + 0.5 * size[1], bottom[2]];
-        self.block_turned(middle, size, [0.0; 3], round_m);
+    /// Adds an upright box with rounded edges.
+    pub fn block(&mut self, bottom: Point3, size: Point3, round_m: f32) {
+        let center = [bottom[0], bottom[1] + 0.5 * size[1], bottom[2]];
+        self.block_turned(center, size, [0.0; 3], round_m);
     }
 
-    /// A box about its middle, turned (degrees about z, then x, then y).
-    pub fn block_turned(&mut self, middle: P, size: P, turn_deg: P, round_m: f32) {
-        let place = turned(middle, size, turn_deg);
-        if self.shows_extent(place.extent) {
-            self.skin(&place);
-            self.rounded(&place, round_m);
+    /// Adds a box by its center, rotated by `turn_deg` (degrees about z, then x, then y).
+    pub fn block_turned(&mut self, center: Point3, size: Point3, turn_deg: Point3, round_m: f32) {
+        let obb = rotated_box(center, size, turn_deg);
+        if self.covers_pixels(obb.extent) {
+            self.begin_material(&obb);
+            self.rounded(&obb, round_m);
         }
     }
 
-    /// An ellipsoid standing on `bottom`.
-    pub fn ball(&mut self, bottom: P, size: P) {
-        let middle = [bottom[0], bottom[1] + 0.5 * size[1], bottom[2]];
-        self.ball_turned(middle, size, [0.0; 3]);
+    /// Adds an ellipsoid that stands on `bottom`.
+    pub fn ball(&mut self, bottom: Point3, size: Point3) {
+        let center = [bottom[0], bottom[1] + 0.5 * size[1], bottom[2]];
+        self.ball_turned(center, size, [0.0; 3]);
     }
 
-    /// An ellipsoid about its middle, turned.
-    pub fn ball_turned(&mut self, middle: P, size: P, turn_deg: P) {
-        let place = turned(middle, size, turn_deg);
-        if self.shows_extent(place.extent) {
-            self.skin(&place);
-            let n = self.detail.segments(0.5 * place.extent.max_element());
-            solids::ellipsoid(&mut self.mesh, &place, n);
+    /// Adds a rotated ellipsoid by its center.
+    pub fn ball_turned(&mut self, center: Point3, size: Point3, turn_deg: Point3) {
+        let obb = rotated_box(center, size, turn_deg);
+        if self.covers_pixels(obb.extent) {
+            self.begin_material(&obb);
+            let n = self.detail.segments(0.5 * obb.extent.max_element());
+            solids::ellipsoid(&mut self.mesh, &obb, n);
         }
     }
 
-    /// A cushion about its middle: something between a box (`soft` 0) and an ellipsoid (1).
-    pub fn pillow(&mut self, middle: P, size: P, turn_deg: P, soft: f32) {
-        let place = turned(middle, size, turn_deg);
-        if self.shows_extent(place.extent) {
-            self.skin(&place);
-            let n = self.detail.segments(0.5 * place.extent.max_element()).max(8) / 4 * 4;
-            forms::pillow(&mut self.mesh, &place, soft.clamp(0.15, 1.0), n);
+    /// Adds a cushion by its center: a box at `soft` 0, an ellipsoid at `soft` 1.
+    pub fn pillow(&mut self, center: Point3, size: Point3, turn_deg: Point3, soft: f32) {
+        let obb = rotated_box(center, size, turn_deg);
+        if self.covers_pixels(obb.extent) {
+            self.begin_material(&obb);
+            let n = self.detail.segments(0.5 * obb.extent.max_element()).max(8) / 4 * 4;
+            forms::pillow(&mut self.mesh, &obb, soft.clamp(0.15, 1.0), n);
         }
     }
 
-    /// A lump: an ellipsoid about its middle with flat facets pushed in and out by up to `rough`.
-    pub fn lump(&mut self, middle: P, size: P, rough: f32, seed: u32) {
-        let place = turned(middle, size, [0.0; 3]);
-        if self.shows_extent(place.extent) {
-            self.skin(&place);
-            let n = self.detail.segments(0.7 * place.extent.max_element()).min(18);
-            forms::lump(&mut self.mesh, &place, rough, seed, n);
+    /// Adds a lump by its center: an ellipsoid with flat facets, displaced by up to `rough`.
+    pub fn lump(&mut self, center: Point3, size: Point3, rough: f32, seed: u32) {
+        let obb = rotated_box(center, size, [0.0; 3]);
+        if self.covers_pixels(obb.extent) {
+            self.begin_material(&obb);
+            let n = self.detail.segments(0.7 * obb.extent.max_element()).min(18);
+            forms::lump(&mut self.mesh, &obb, rough, seed, n);
         }
     }
 
-    /// Something turned on a lathe: its outline as (radius, height above `bottom`), from the bottom
-    /// up along the outside and, for vessels, down again along the inside; or back to its first
-    /// point, for a ring.
-    pub fn lathe(&mut self, bottom: P, outline: &[[f32; 2]]) {
+    /// Adds a surface of revolution. The outline is (radius, height above `bottom`), from the
+    /// bottom up along the outside. For vessels it continues down along the inside, and for rings
+    /// it returns to its first point.
+    pub fn lathe(&mut self, bottom: Point3, outline: &[[f32; 2]]) {
         self.lathe_along(bottom, [0.0, 1.0, 0.0], outline);
     }
 
-    /// The same about the axis that points from `start` in a direction.
-    pub fn lathe_along(&mut self, start: P, axis: P, outline: &[[f32; 2]]) {
-        let wide = outline.iter().fold(0.0f32, |w, p| w.max(p[0]));
-        let high = outline.iter().fold(0.0f32, |w, p| w.max(p[1].abs()));
-        if !self.shows_extent(Vec3::new(2.0 * wide, high, 2.0 * wide)) {
+    /// Adds a surface of revolution around `axis` from `start`.
+    pub fn lathe_along(&mut self, start: Point3, axis: Point3, outline: &[[f32; 2]]) {
+        let width = outline.iter().fold(0.0f32, |w, p| w.max(p[0]));
+        let height = outline.iter().fold(0.0f32, |w, p| w.max(p[1].abs()));
+        if !self.covers_pixels(Vec3::new(2.0 * width, height, 2.0 * width)) {
             return;
         }
-        let place =
-            Place { center: Vec3::from(start), axes: upright_along(axis), extent: Vec3::ONE };
-        self.plain_skin();
-        let n = self.detail.segments(wide);
+        let obb =
+            OrientedBox { center: Vec3::from(start), axes: upright_along(axis), extent: Vec3::ONE };
+        self.begin_plain_material();
+        let n = self.detail.segments(width);
         let points: Vec<[f32; 3]> = outline.iter().map(|[r, y]| [*r, *y, 0.0]).collect();
-        let kept = essential(&points, self.slack_m());
+        let kept = simplify_polyline(&points, self.tolerance_m());
         let kept: Vec<[f32; 2]> = kept.into_iter().map(|k| outline[k]).collect();
-        forms::lathe(&mut self.mesh, &place, &kept, n);
+        forms::lathe(&mut self.mesh, &obb, &kept, n);
     }
 
-    /// A straight rod.
-    pub fn rod(&mut self, from: P, to: P, radius_m: f32) {
+    /// Adds a straight rod.
+    pub fn rod(&mut self, from: Point3, to: Point3, radius_m: f32) {
         self.taper(from, to, radius_m, radius_m);
     }
 
-    /// A straight rod that changes its radius.
-    pub fn taper(&mut self, from: P, to: P, radius_from: f32, radius_to: f32) {
+    /// Adds a straight rod with a different radius at each end.
+    pub fn taper(&mut self, from: Point3, to: Point3, radius_from: f32, radius_to: f32) {
         self.sweep(&[(from, radius_from), (to, radius_to)]);
     }
 
-    /// A pipe of one radius along a smooth curve through the points.
-    pub fn pipe(&mut self, points: &[P], radius_m: f32) {
-        let points: Vec<(P, f32)> = points.iter().map(|p| (*p, radius_m)).collect();
+    /// Adds a pipe of constant radius along a smooth curve through the points.
+    pub fn pipe(&mut self, points: &[Point3], radius_m: f32) {
+        let points: Vec<(Point3, f32)> = points.iter().map(|p| (*p, radius_m)).collect();
         self.curve(&points);
     }
 
-    /// A pipe through the points with a radius at each, along a smooth curve.
-    pub fn curve(&mut self, points: &[(P, f32)]) {
-        let way: f32 =
+    /// Adds a pipe with a radius at each point, along a smooth curve through the points.
+    pub fn curve(&mut self, points: &[(Point3, f32)]) {
+        let length_m: f32 =
             points.windows(2).map(|w| length(Vec3::from(w[1].0) - Vec3::from(w[0].0))).sum();
-        let per_span = (self.detail.segments(0.4 * way) / points.len().max(1)).clamp(1, 6);
+        let per_span = (self.detail.segments(0.4 * length_m) / points.len().max(1)).clamp(1, 6);
         let mut fine = Vec::with_capacity(points.len() * per_span);
         let at = |k: isize| points[k.clamp(0, points.len() as isize - 1) as usize];
         for k in 0..points.len().saturating_sub(1) as isize {
@@ -317,30 +313,31 @@ impl MeshBuilder {
             }
         }
         fine.extend(points.last());
-        // What the radius does counts as well.
-        let slack = self.slack_m();
-        let places: Vec<P> = fine.iter().map(|p| p.0).collect();
-        let widths: Vec<P> = fine.iter().enumerate().map(|(k, p)| [k as f32, p.1, 0.0]).collect();
-        let mut kept = essential(&places, slack);
-        kept.extend(essential(&widths, slack));
+        // The profile of the radius needs its own points.
+        let tolerance = self.tolerance_m();
+        let centers: Vec<Point3> = fine.iter().map(|p| p.0).collect();
+        let widths: Vec<Point3> =
+            fine.iter().enumerate().map(|(k, p)| [k as f32, p.1, 0.0]).collect();
+        let mut kept = simplify_polyline(&centers, tolerance);
+        kept.extend(simplify_polyline(&widths, tolerance));
         kept.sort_unstable();
         kept.dedup();
-        let kept: Vec<(P, f32)> = kept.into_iter().map(|k| fine[k]).collect();
+        let kept: Vec<(Point3, f32)> = kept.into_iter().map(|k| fine[k]).collect();
         self.sweep(&kept);
     }
 
-    /// A round pipe with corners where the points are.
-    pub fn sweep(&mut self, points: &[(P, f32)]) {
-        let wide = points.iter().fold(0.0f32, |w, p| w.max(p.1));
-        let way: f32 =
+    /// Adds a round pipe with corners at the points.
+    pub fn sweep(&mut self, points: &[(Point3, f32)]) {
+        let width = points.iter().fold(0.0f32, |w, p| w.max(p.1));
+        let length_m: f32 =
             points.windows(2).map(|w| length(Vec3::from(w[1].0) - Vec3::from(w[0].0))).sum();
-        if points.len() < 2 || !self.shows_extent(Vec3::new(2.0 * wide, way, 2.0 * wide)) {
+        if points.len() < 2 || !self.covers_pixels(Vec3::new(2.0 * width, length_m, 2.0 * width)) {
             return;
         }
-        let n = self.detail.segments(wide).min(16);
-        let n = if self.within(20.0) { n.min(6) } else { n };
+        let n = self.detail.segments(width).min(16);
+        let n = if self.is_level_within(20.0) { n.min(6) } else { n };
         let end = points[points.len() - 1].0;
-        let place = Place {
+        let obb = OrientedBox {
             center: Vec3::ZERO,
             axes: upright_along([
                 end[0] - points[0].0[0],
@@ -349,7 +346,7 @@ impl MeshBuilder {
             ]),
             extent: Vec3::new(0.1, 1.0, 0.1),
         };
-        self.skin(&place);
+        self.begin_material(&obb);
         let mut sections = Vec::with_capacity(points.len());
         let mut side = Vec3::ZERO;
         for k in 0..points.len() {
@@ -370,18 +367,18 @@ impl MeshBuilder {
         self.mesh.tube(&sections, n);
     }
 
-    /// A leaf from `root` to `tip`, `width_m` wide, sagging in its middle by `sag_m`.
-    pub fn leaf(&mut self, root: P, tip: P, width_m: f32, sag_m: f32) {
+    /// Adds a leaf from `root` to `tip`, `width_m` wide, whose middle is raised by `sag_m`.
+    pub fn leaf(&mut self, root: Point3, tip: Point3, width_m: f32, sag_m: f32) {
         let (root, tip) = (Vec3::from(root), Vec3::from(tip));
-        let long = length(tip - root);
-        if !self.shows_extent(Vec3::new(width_m, long, 0.0)) {
+        let leaf_length = length(tip - root);
+        if !self.covers_pixels(Vec3::new(width_m, leaf_length, 0.0)) {
             return;
         }
-        self.plain_skin();
+        self.begin_plain_material();
         let along = unit(tip - root);
         let side = unit(along.cross(Vec3::Y) + Vec3::X * 1e-3);
-        let thick = side.cross(along) * (0.04 * width_m).max(0.0006);
-        let shape: &[[f32; 2]] = if self.within(20.0) {
+        let thickness = side.cross(along) * (0.04 * width_m).max(0.0006);
+        let shape: &[[f32; 2]] = if self.is_level_within(20.0) {
             &[[0.0, 0.1], [0.45, 1.0], [1.0, 0.04]]
         } else {
             &[[0.0, 0.1], [0.2, 0.7], [0.45, 1.0], [0.75, 0.65], [1.0, 0.04]]
@@ -391,57 +388,74 @@ impl MeshBuilder {
             .map(|[t, w]| Section {
                 center: root + (tip - root) * *t + Vec3::Y * (sag_m * 4.0 * t * (1.0 - t)),
                 a: side * (0.5 * width_m * w),
-                b: thick * (0.3 + 0.7 * w),
+                b: thickness * (0.3 + 0.7 * w),
             })
             .collect();
-        self.mesh.tube(&sections, if self.within(20.0) { 4 } else { 6 });
+        self.mesh.tube(&sections, if self.is_level_within(20.0) { 4 } else { 6 });
     }
 
-    /// A ring about `middle` in the plane square to `axis`.
-    pub fn hoop(&mut self, middle: P, axis: P, radius_m: f32, tube_radius_m: f32) {
-        let outer = 2.0 * (radius_m + tube_radius_m);
+    /// Adds a ring around `center` in the plane perpendicular to `axis`.
+    pub fn hoop(&mut self, center: Point3, axis: Point3, radius_m: f32, tube_radius_m: f32) {
+        let outer_diameter = 2.0 * (radius_m + tube_radius_m);
         let tube = 2.0 * tube_radius_m;
-        if self.shows(tube) {
-            let extent = Vec3::new(outer, tube, outer);
-            let place = Place { center: Vec3::from(middle), axes: upright_along(axis), extent };
-            self.skin(&place);
-            solids::solid(&mut self.mesh, Solid::Torus { tube: tube / outer }, &place, self.detail);
+        if self.covers_pixel(tube) {
+            let extent = Vec3::new(outer_diameter, tube, outer_diameter);
+            let obb = OrientedBox { center: Vec3::from(center), axes: upright_along(axis), extent };
+            self.begin_material(&obb);
+            solids::solid(
+                &mut self.mesh,
+                Solid::Torus { tube: tube / outer_diameter },
+                &obb,
+                self.detail,
+            );
         }
     }
 
-    /// An outline in the plane of the turned x and y axes, counter-clockwise seen from +z and seen
-    /// whole from its middle, `thick_m` thick.
-    pub fn cut(&mut self, middle: P, outline: &[[f32; 2]], thick_m: f32, turn_deg: P) {
+    /// Adds a plate with an outline in the plane of the rotated x and y axes, `thickness_m` thick. The
+    /// outline is counter-clockwise seen from +z and star-shaped around its center.
+    pub fn cut(
+        &mut self,
+        center: Point3,
+        outline: &[[f32; 2]],
+        thickness_m: f32,
+        turn_deg: Point3,
+    ) {
         let (mut low, mut high) = ([f32::MAX; 2], [f32::MIN; 2]);
         for p in outline {
             for k in 0..2 {
                 (low[k], high[k]) = (low[k].min(p[k]), high[k].max(p[k]));
             }
         }
-        let place = turned(middle, [high[0] - low[0], high[1] - low[1], thick_m], turn_deg);
-        if self.shows_extent(place.extent) {
-            self.skin(&place);
-            let place = Place { extent: Vec3::ONE, ..place };
-            forms::cut(&mut self.mesh, &place, outline, thick_m);
+        let obb = rotated_box(center, [high[0] - low[0], high[1] - low[1], thickness_m], turn_deg);
+        if self.covers_pixels(obb.extent) {
+            self.begin_material(&obb);
+            let obb = OrientedBox { extent: Vec3::ONE, ..obb };
+            forms::extrude(&mut self.mesh, &obb, outline, thickness_m);
         }
     }
 
-    /// A piece of a round wall about the vertical through `bottom`: between two radii, two heights
-    /// and two angles (degrees; 0 is the front, -z; 90 is +x).
-    pub fn sector(&mut self, bottom: P, radii: [f32; 2], heights: [f32; 2], angles_deg: [f32; 2]) {
+    /// Adds a piece of a cylindrical wall around the vertical axis through `bottom`, between two
+    /// radii, two heights and two angles (degrees; 0 is the front, -z; 90 is +x).
+    pub fn sector(
+        &mut self,
+        bottom: Point3,
+        radii: [f32; 2],
+        heights: [f32; 2],
+        angles_deg: [f32; 2],
+    ) {
         let turn = (angles_deg[1] - angles_deg[0]).to_radians();
         let extent = Vec3::new(radii[1] * turn, heights[1] - heights[0], radii[1] - radii[0]);
-        if self.shows_extent(extent) {
-            self.plain_skin();
+        if self.covers_pixels(extent) {
+            self.begin_plain_material();
             let n = (self.detail.segments(radii[1]) as f32 * turn / std::f32::consts::TAU) as usize;
             forms::sector(&mut self.mesh, Vec3::from(bottom), radii, heights, angles_deg, n.max(1));
         }
     }
 }
 
-/// Those points of a line without which it would be off by more than `slack`; ends are kept, and
-/// of a closed line some point between (Douglas and Peucker's way).
-fn essential(points: &[P], slack: f32) -> Vec<usize> {
+/// Simplifies a polyline to the points that keep it within `tolerance` (Douglas-Peucker). It keeps
+/// both ends, and at least one point between them for a closed line.
+fn simplify_polyline(points: &[Point3], tolerance: f32) -> Vec<usize> {
     let n = points.len();
     let mut kept = vec![false; n];
     let mut spans = vec![(0, n.saturating_sub(1))];
@@ -452,15 +466,15 @@ fn essential(points: &[P], slack: f32) -> Vec<usize> {
         let (a, b) = (Vec3::from(points[from]), Vec3::from(points[to]));
         let along = b - a;
         let l2 = along.dot(along);
-        let off = |k: usize| {
+        let distance_to = |k: usize| {
             let d = Vec3::from(points[k]) - a;
             let t = if l2 > 0.0 { (d.dot(along) / l2).clamp(0.0, 1.0) } else { 0.0 };
             length(d - along * t)
         };
-        let worst = (from + 1..to).map(|k| (off(k), k)).max_by(|x, y| x.0.total_cmp(&y.0));
-        let must = closed && (from, to) == (0, n - 1);
-        if let Some((by, k)) = worst
-            && (by > slack || must)
+        let worst = (from + 1..to).map(|k| (distance_to(k), k)).max_by(|x, y| x.0.total_cmp(&y.0));
+        let is_required = closed && (from, to) == (0, n - 1);
+        if let Some((distance, k)) = worst
+            && (distance > tolerance || is_required)
         {
             spans.push((from, k));
             spans.push((k, to));
@@ -469,13 +483,13 @@ fn essential(points: &[P], slack: f32) -> Vec<usize> {
     (0..n).filter(|k| kept[*k]).collect()
 }
 
-fn turned(middle: P, size: P, turn_deg: P) -> Place {
-    let part = Part::new(Solid::Cuboid, middle, size, [0; 3], Finish::Matte).turned(turn_deg);
-    place_of(&part, Vec3::ONE)
+fn rotated_box(center: Point3, size: Point3, turn_deg: Point3) -> OrientedBox {
+    let part = Part::new(Solid::Cuboid, center, size, [0; 3], Finish::Matte).turned(turn_deg);
+    part_obb(&part, Vec3::ONE)
 }
 
-/// Axes whose y points in a direction.
-fn upright_along(axis: P) -> Mat3 {
+/// Returns axes whose y axis points along `axis`.
+fn upright_along(axis: Point3) -> Mat3 {
     let y = unit(Vec3::from(axis));
     let hint = if y.y.abs() > 0.99 { Vec3::X } else { y.cross(Vec3::Y) };
     let x = unit(hint - y * y.dot(hint));

@@ -1,51 +1,51 @@
-//! Cells-and-portals visibility: what can be seen of a house's rooms from one of them. Whatever lies
-//! only where no line of sight gets to is culled.
+//! Cells-and-portals visibility: culls instances in rooms to which the camera has no line of sight.
 //!
-//! The plan is a grid of cells. Those that walls as high as the ceiling fill are opaque; all others
-//! belong to a region: a room, or what lies between rooms (a doorway, say), or outdoors. Where cells
-//! of two regions meet there is a portal. A line of sight can only leave a region through its
-//! portals, so that what is seen of the next region is seen through the portal's outline on the
-//! image.
+//! The floor plan is a grid of cells. Cells inside walls of full height are opaque. Every other
+//! cell belongs to a region: a room, a space between rooms (a doorway, for example), or outdoors. A
+//! portal is an edge where cells of two regions meet. A line of sight can leave a region only
+//! through its portals. The next region is therefore visible only inside the screen rectangle of
+//! the portal.
 //!
-//! PortalGraph only ever leave out what walls hide: pictures are the same with and without. Where
-//! things are odd (no ceiling, an eye in a wall or above it, a plan of tatters) everything may be
-//! seen.
+//! Portal culling removes only what walls hide: images are the same with and without it. In unusual
+//! cases (no ceiling, an eye inside or above a wall, a very fragmented plan) everything counts as
+//! visible.
 
 use chaic_core::geom::Rect;
 use chaic_core::{Vec2, Vec3};
 use chaic_world::Setup;
 use glam::Mat3;
 
-use crate::lens::Lens;
+use crate::projection::Projection;
 
 mod floor_grid;
 
 use floor_grid::FloorGrid;
 
-/// A cell of the plan that walls fill.
+/// Marker of an opaque cell.
 const WALL: u8 = u8::MAX;
-/// As many regions as a [`RegionSet`] tells apart; the last one stands for all further ones.
+/// Maximum number of regions in a [`RegionSet`]. The last one stands for all further regions.
 const MAX_REGIONS: usize = 64;
-/// With more portals than these, looking is cheaper than finding out.
+/// Maximum number of portals. With more, rendering is cheaper than portal traversal.
 const MAX_PORTALS: usize = 512;
-/// Portals looked through for one view at most, again and again those that more is seen through.
+/// Maximum number of portal steps per view. A region whose visible rectangle grows is visited
+/// again.
 const MAX_STEPS: usize = 512;
-/// How far under the floor and above the walls something may reach, metres: less than a pixel.
-const SLACK_M: f32 = 1e-3;
+/// Tolerance below the floor and above the walls, meters: less than a pixel.
+const TOLERANCE_M: f32 = 1e-3;
 
-/// Some regions of a plan. What reaches into none that a view may see isn't seen.
+/// A set of regions of a floor plan. An instance that overlaps no visible region is culled.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RegionSet(u64);
 
 impl RegionSet {
-    /// All there may be.
+    /// Every possible region.
     pub const ALL: RegionSet = RegionSet(u64::MAX);
 
     fn insert(&mut self, region: u8) {
         self.0 |= 1 << (region % MAX_REGIONS as u8);
     }
 
-    /// Whether they have one in common.
+    /// Returns whether the sets have a common region.
     pub fn overlaps(self, other: RegionSet) -> bool {
         self.0 & other.0 != 0
     }
@@ -59,72 +59,73 @@ impl RegionSet {
         })
     }
 
-    /// One bit for each region.
+    /// Returns one bit per region.
     pub fn bits(self) -> u64 {
         self.0
     }
 }
 
-/// Least u, least v, most u, most v on the image, pixels.
-type Outline = [f32; 4];
+/// A rectangle on the image: minimum u, minimum v, maximum u, maximum v, pixels.
+type ScreenRect = [f32; 4];
 
-fn overlap(a: Outline, b: Outline) -> Outline {
+fn intersection(a: ScreenRect, b: ScreenRect) -> ScreenRect {
     [a[0].max(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].min(b[3])]
 }
 
-/// What holds both.
-fn hull(a: Outline, b: Outline) -> Outline {
+/// Bounding rectangle of both.
+fn bounding_rect(a: ScreenRect, b: ScreenRect) -> ScreenRect {
     [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])]
 }
 
-/// Where nothing is.
-const NOWHERE: Outline = [f32::INFINITY, f32::INFINITY, f32::NEG_INFINITY, f32::NEG_INFINITY];
-/// Wherever one looks.
-const EVERYWHERE: Outline = [f32::NEG_INFINITY, f32::NEG_INFINITY, f32::INFINITY, f32::INFINITY];
+/// Empty rectangle.
+const EMPTY_RECT: ScreenRect = [f32::INFINITY, f32::INFINITY, f32::NEG_INFINITY, f32::NEG_INFINITY];
+/// Unbounded rectangle.
+const UNBOUNDED_RECT: ScreenRect =
+    [f32::NEG_INFINITY, f32::NEG_INFINITY, f32::INFINITY, f32::INFINITY];
 
-fn is_empty(o: Outline) -> bool {
+fn is_empty(o: ScreenRect) -> bool {
     !(o[0] < o[2] && o[1] < o[3])
 }
 
-/// What a view sees of regions; used again and again.
+/// Visible regions of a view, in reusable buffers.
 #[derive(Debug)]
 pub(crate) struct VisibleRegions {
     set: RegionSet,
-    outlines: [Outline; MAX_REGIONS],
-    todo: Vec<(u8, Outline)>,
+    rects: [ScreenRect; MAX_REGIONS],
+    stack: Vec<(u8, ScreenRect)>,
 }
 
 impl Default for VisibleRegions {
     fn default() -> VisibleRegions {
-        VisibleRegions { set: RegionSet::ALL, outlines: [[0.0; 4]; MAX_REGIONS], todo: Vec::new() }
+        VisibleRegions { set: RegionSet::ALL, rects: [[0.0; 4]; MAX_REGIONS], stack: Vec::new() }
     }
 }
 
 impl VisibleRegions {
-    /// Whether something in these regions may be seen, which lies within `outline` on the image;
-    /// wherever it likes if that is unknown.
-    pub fn shows(&self, regions: RegionSet, outline: Option<Outline>) -> bool {
+    /// Returns whether an object in these regions may be visible. `rect` is its bounding rectangle
+    /// on the image; `None` if it is unknown.
+    pub fn may_show(&self, regions: RegionSet, rect: Option<ScreenRect>) -> bool {
         if self.set == RegionSet::ALL || regions == RegionSet::ALL {
             return true;
         }
-        match outline {
+        match rect {
             None => regions.overlaps(self.set),
-            Some(outline) => RegionSet(regions.0 & self.set.0)
+            Some(rect) => RegionSet(regions.0 & self.set.0)
                 .iter()
-                .any(|region| !is_empty(overlap(self.outlines[region], outline))),
+                .any(|region| !is_empty(intersection(self.rects[region], rect))),
         }
     }
 }
 
-/// Cells side by side, of one region or opaque, up to where the next run begins.
+/// A run of neighboring cells of one region, or opaque. It ends where the next run begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Run {
     end: u16,
-    /// Or [`WALL`].
+    /// Region, or [`WALL`].
     region: u8,
 }
 
-/// Where cells of two regions meet: a stretch of the plan, open from floor to ceiling.
+/// A segment of the floor plan where cells of two regions meet, open from floor to ceiling.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Portal {
     a: Vec2,
@@ -132,24 +133,24 @@ struct Portal {
     regions: [u8; 2],
 }
 
-/// The regions of a house's plan, which its walls part.
+/// Regions and portals of a house.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PortalGraph {
-    /// Where the first cell begins.
+    /// Corner of the first cell.
     min: Vec2,
     cell_m: f32,
-    /// Cells along x and z. What is outside of the plan has the region of the nearest cell.
+    /// Number of cells along x and z. A point outside the grid has the region of the nearest cell.
     n: [usize; 2],
-    /// Rows of cells that are alike: the end of each band, and its runs. Empty if everything may be
-    /// seen from everywhere.
+    /// Bands of identical rows of cells: the end of each band and its runs. Empty if portal culling
+    /// is disabled.
     bands: Vec<(u16, Vec<Run>)>,
     portals: Vec<Portal>,
-    /// Height up to which walls are opaque, metres.
+    /// Height of opaque walls, meters.
     top_m: f32,
 }
 
 impl PortalGraph {
-    /// Those of an episode's plan.
+    /// Builds the portal graph of an episode.
     pub(crate) fn new(setup: &Setup) -> PortalGraph {
         let Some(ceiling_m) = setup.ceiling_m else { return PortalGraph::default() };
         let Some(plan) = FloorGrid::new(setup, ceiling_m) else { return PortalGraph::default() };
@@ -163,13 +164,14 @@ impl PortalGraph {
             n: [plan.n_x, plan.n_z],
             bands: plan.bands(),
             portals,
-            top_m: ceiling_m - SLACK_M,
+            top_m: ceiling_m - TOLERANCE_M,
         }
     }
 
-    /// The regions, or [`WALL`], of the cells that a rectangle touches; each at least once.
-    fn regions_in(&self, rect: &Rect) -> impl Iterator<Item = u8> {
-        // Casts of floats end at the least and the greatest number there is.
+    /// Iterates over the regions, or [`WALL`], of the cells that a rectangle touches; each at least
+    /// once.
+    fn regions_in_rect(&self, rect: &Rect) -> impl Iterator<Item = u8> {
+        // Casts from float to integer saturate.
         let cell = |m: f32, n: usize| ((m / self.cell_m) as usize).min(n - 1) as u16;
         let (low, high) = (rect.min - self.min, rect.max - self.min);
         let [n_x, n_z] = self.n;
@@ -177,66 +179,67 @@ impl PortalGraph {
         let (top, bottom) = (cell(low.y, n_z), cell(high.y, n_z));
         let begin = self.bands.partition_point(|(end, _)| *end <= top);
         // A band or run is the last one if it ends past the last cell.
-        let upto = |last: u16| {
+        let until_past = |last: u16| {
             let mut is_past = false;
             move |end: u16| {
-                let goes_on = !is_past;
+                let continues = !is_past;
                 is_past = end > last;
-                goes_on
+                continues
             }
         };
-        let mut is_in_rows = upto(bottom);
+        let mut is_in_rows = until_past(bottom);
         let bands = self.bands[begin..].iter().take_while(move |(end, _)| is_in_rows(*end));
         bands.flat_map(move |(_, runs)| {
-            let mut is_in_columns = upto(last);
+            let mut is_in_columns = until_past(last);
             let runs = runs.iter().skip_while(move |run| run.end <= first);
             runs.take_while(move |run| is_in_columns(run.end)).map(|run| run.region)
         })
     }
 
-    /// The regions that a box in the world reaches into.
-    pub(crate) fn of_box(&self, min: Vec3, max: Vec3) -> RegionSet {
-        let is_between = min.y >= -SLACK_M && max.y <= self.top_m + 2.0 * SLACK_M;
+    /// Returns the regions that a box in the world overlaps.
+    pub(crate) fn regions_in_box(&self, min: Vec3, max: Vec3) -> RegionSet {
+        let is_between = min.y >= -TOLERANCE_M && max.y <= self.top_m + 2.0 * TOLERANCE_M;
         if self.bands.is_empty() || !is_between {
             return RegionSet::ALL;
         }
-        // What touches a wall is in front of it.
+        // An object that touches a wall is in front of it.
         let rect = Rect { min: Vec2::new(min.x, min.z), max: Vec2::new(max.x, max.z) };
         let mut set = RegionSet::default();
-        for region in self.regions_in(&rect.grown(0.1 * self.cell_m)).filter(|r| *r != WALL) {
+        for region in self.regions_in_rect(&rect.expanded(0.1 * self.cell_m)).filter(|r| *r != WALL)
+        {
             set.insert(region);
         }
         set
     }
 
-    /// What a lens may see.
-    pub fn seen_by(&self, lens: &Lens) -> RegionSet {
-        let mut seen = VisibleRegions::default();
-        self.find_visible(lens, &mut seen);
-        seen.set
+    /// Returns the regions that a camera may see.
+    pub fn visible_regions(&self, projection: &Projection) -> RegionSet {
+        let mut visible = VisibleRegions::default();
+        self.find_visible(projection, &mut visible);
+        visible.set
     }
 
-    /// Finds out what a lens sees, and through which outlines.
-    pub(crate) fn find_visible(&self, lens: &Lens, seen: &mut VisibleRegions) {
-        seen.set = RegionSet::ALL;
-        let Some(start) = self.region_of_eye(lens) else { return };
-        let whole = [0.0, 0.0, lens.width as f32, lens.height as f32];
-        let VisibleRegions { outlines, todo, .. } = seen;
-        outlines.fill(NOWHERE);
-        todo.clear();
+    /// Computes the visible regions and the screen rectangles through which they are visible.
+    pub(crate) fn find_visible(&self, projection: &Projection, visible: &mut VisibleRegions) {
+        visible.set = RegionSet::ALL;
+        let Some(start) = self.region_of_eye(projection) else { return };
+        let whole = [0.0, 0.0, projection.width as f32, projection.height as f32];
+        let VisibleRegions { rects, stack, .. } = visible;
+        rects.fill(EMPTY_RECT);
+        stack.clear();
         let mut set = RegionSet::default();
-        let mut see = |region: u8, outline: Outline, todo: &mut Vec<_>| {
-            let known = &mut outlines[usize::from(region)];
-            let both = hull(*known, outline);
-            if both != *known {
-                *known = both;
+        let mut visit = |region: u8, rect: ScreenRect, stack: &mut Vec<_>| {
+            let previous = &mut rects[usize::from(region)];
+            let merged = bounding_rect(*previous, rect);
+            if merged != *previous {
+                *previous = merged;
                 set.insert(region);
-                todo.push((region, outline));
+                stack.push((region, rect));
             }
         };
-        see(start, whole, todo);
+        visit(start, whole, stack);
         let mut n_steps = 0;
-        while let Some((region, outline)) = todo.pop() {
+        while let Some((region, rect)) = stack.pop() {
             for portal in &self.portals {
                 let next = match portal.regions {
                     [a, b] if a == region => b,
@@ -247,66 +250,73 @@ impl PortalGraph {
                 if n_steps > MAX_STEPS {
                     return;
                 }
-                let through = overlap(self.outline(portal, lens), outline);
-                if !is_empty(through) {
-                    see(next, through, todo);
+                let visible_rect = intersection(self.portal_rect(portal, projection), rect);
+                if !is_empty(visible_rect) {
+                    visit(next, visible_rect, stack);
                 }
             }
         }
-        seen.set = set;
+        visible.set = set;
     }
 
-    /// The region that an eye is in, if walls hide anything from it.
-    fn region_of_eye(&self, lens: &Lens) -> Option<u8> {
-        let eye = Vec2::new(lens.eye.x, lens.eye.z);
+    /// Returns the region of the eye; `None` if portal culling does not apply to it.
+    fn region_of_eye(&self, projection: &Projection) -> Option<u8> {
+        let eye = Vec2::new(projection.eye.x, projection.eye.z);
         let d = eye - self.min;
         let end = self.cell_m * Vec2::new(self.n[0] as f32, self.n[1] as f32);
         let is_on_plan = d.cmpge(Vec2::ZERO).all() && d.cmplt(end).all();
-        let is_between = lens.eye.y >= 0.0 && lens.eye.y <= self.top_m;
-        if self.bands.is_empty() || lens.is_plan || !is_on_plan || !is_between {
+        let is_between = projection.eye.y >= 0.0 && projection.eye.y <= self.top_m;
+        if self.bands.is_empty() || projection.is_plan || !is_on_plan || !is_between {
             return None;
         }
-        // What is nearer than the near plane isn't drawn, and walls aren't when seen from inside.
-        let (mu, mv) = (lens.middle().0 / lens.focal, lens.middle().1 / lens.focal);
-        let reach_m = lens.near_m() * (1.0 + mu * mu + mv * mv).sqrt() + 2.0 * self.cell_m;
+        // Surfaces nearer than the near plane and the inner sides of walls are not drawn.
+        let (mu, mv) =
+            (projection.center().0 / projection.focal, projection.center().1 / projection.focal);
+        let reach_m = projection.near_m() * (1.0 + mu * mu + mv * mv).sqrt() + 2.0 * self.cell_m;
         let here = Rect { min: eye, max: eye };
-        if self.regions_in(&here.grown(reach_m)).any(|region| region == WALL) {
+        if self.regions_in_rect(&here.expanded(reach_m)).any(|region| region == WALL) {
             return None;
         }
-        self.regions_in(&here).next()
+        self.regions_in_rect(&here).next()
     }
 
-    /// Where a portal is on the image, with a pixel to spare.
-    fn outline(&self, portal: &Portal, lens: &Lens) -> Outline {
-        /// Depth at which portals are cut, metres.
-        const CUT_M: f32 = 1e-3;
-        let eye = Vec2::new(lens.eye.x, lens.eye.z);
+    /// Returns the bounding rectangle of a portal on the image, with a margin of one pixel.
+    fn portal_rect(&self, portal: &Portal, projection: &Projection) -> ScreenRect {
+        /// Depth at which portals are clipped, meters.
+        const CLIP_M: f32 = 1e-3;
+        let eye = Vec2::new(projection.eye.x, projection.eye.z);
         let nearest = eye.max(portal.a.min(portal.b)).min(portal.a.max(portal.b));
         if (eye - nearest).abs().max_element() < 2.0 * self.cell_m {
-            return EVERYWHERE;
+            return UNBOUNDED_RECT;
         }
-        let into = lens.camera_from(&Mat3::IDENTITY, Vec3::ZERO);
-        let at = |p: Vec2, y: f32| into.map(Vec3::new(p.x, y, p.y));
-        let top = self.top_m + 2.0 * SLACK_M;
-        let ring =
-            [at(portal.a, -SLACK_M), at(portal.b, -SLACK_M), at(portal.b, top), at(portal.a, top)];
-        let (mu, mv) = lens.middle();
-        let mut outline = NOWHERE;
+        let transform = projection.camera_from(&Mat3::IDENTITY, Vec3::ZERO);
+        let at = |p: Vec2, y: f32| transform.map(Vec3::new(p.x, y, p.y));
+        let top = self.top_m + 2.0 * TOLERANCE_M;
+        let corners_in_camera = [
+            at(portal.a, -TOLERANCE_M),
+            at(portal.b, -TOLERANCE_M),
+            at(portal.b, top),
+            at(portal.a, top),
+        ];
+        let (mu, mv) = projection.center();
+        let mut rect = EMPTY_RECT;
         let mut add = |p: Vec3| {
             let (u, v) = (mu + p.x / p.z, mv + p.y / p.z);
-            outline = hull(outline, [u - 1.0, v - 1.0, u + 1.0, v + 1.0]);
+            rect = bounding_rect(rect, [u - 1.0, v - 1.0, u + 1.0, v + 1.0]);
         };
-        for (from, to) in ring.into_iter().zip(ring.into_iter().cycle().skip(1)) {
-            if from.z >= CUT_M {
+        for (from, to) in
+            corners_in_camera.into_iter().zip(corners_in_camera.into_iter().cycle().skip(1))
+        {
+            if from.z >= CLIP_M {
                 add(from);
             }
-            if (from.z >= CUT_M) != (to.z >= CUT_M) {
-                let t = (CUT_M - from.z) / (to.z - from.z);
-                let cut = from + (to - from) * t;
-                add(Vec3::new(cut.x, cut.y, CUT_M));
+            if (from.z >= CLIP_M) != (to.z >= CLIP_M) {
+                let t = (CLIP_M - from.z) / (to.z - from.z);
+                let clipped = from + (to - from) * t;
+                add(Vec3::new(clipped.x, clipped.y, CLIP_M));
             }
         }
-        outline
+        rect
     }
 }
 
@@ -314,13 +324,13 @@ impl PortalGraph {
 mod tests {
     use super::*;
     use crate::{Channels, Scene, View};
-    use chaic_core::rng::Stream;
+    use chaic_core::rng::RngStream;
     use chaic_test_kit::hostile::{self, Case};
     use chaic_test_kit::scenes::{camera, empty, house, wall, world};
     use chaic_world::{Room, RoomKind, Wall};
     use std::f32::consts::{FRAC_PI_2, PI};
 
-    /// Two rooms of 4 by 4 m side by side; the wall between them has a doorway in its middle.
+    /// Two rooms of 4 by 4 m side by side, with a doorway in the middle of the shared wall.
     fn two_rooms() -> Setup {
         let mut setup = empty();
         setup.bounds = Rect::new([0.0, 0.0], [8.0, 4.0]);
@@ -342,71 +352,76 @@ mod tests {
         setup
     }
 
-    fn seen(regions: &PortalGraph, eye: [f32; 3], yaw_rad: f32) -> VisibleRegions {
-        let lens = Lens::of(&camera(eye, yaw_rad, 0.0, 128, 128)).expect("a camera");
-        let mut seen = VisibleRegions::default();
-        regions.find_visible(&lens, &mut seen);
-        seen
+    fn visible_from(portals: &PortalGraph, eye: [f32; 3], yaw_rad: f32) -> VisibleRegions {
+        let projection = Projection::from_camera(&camera(eye, yaw_rad, 0.0, 128, 128))
+            .expect("the camera is valid");
+        let mut visible = VisibleRegions::default();
+        portals.find_visible(&projection, &mut visible);
+        visible
     }
 
-    fn at(regions: &PortalGraph, x: f32, z: f32) -> RegionSet {
+    fn regions_at(portals: &PortalGraph, x: f32, z: f32) -> RegionSet {
         let p = Vec3::new(x, 1.0, z);
-        regions.of_box(p - 0.1, p + 0.1)
+        portals.regions_in_box(p - 0.1, p + 0.1)
     }
 
     #[test]
-    fn the_next_room_is_seen_through_its_doorway_only() {
-        let regions = PortalGraph::new(&two_rooms());
-        let (near, far, outside) =
-            (at(&regions, 2.0, 2.0), at(&regions, 6.0, 2.0), at(&regions, 9.0, 2.0));
+    fn the_next_room_is_visible_only_through_its_doorway() {
+        let portals = PortalGraph::new(&two_rooms());
+        let (near, far, outside) = (
+            regions_at(&portals, 2.0, 2.0),
+            regions_at(&portals, 6.0, 2.0),
+            regions_at(&portals, 9.0, 2.0),
+        );
         let sets = [near, far, outside];
         assert!(sets.iter().all(|set| set.0.count_ones() == 1), "{sets:?}");
         // A yaw of -90 degrees looks along x.
-        let toward = seen(&regions, [2.0, 1.5, 2.0], -FRAC_PI_2);
-        assert!(toward.shows(near, None) && toward.shows(far, None));
-        assert!(!toward.shows(outside, None), "there is no way out");
+        let toward = visible_from(&portals, [2.0, 1.5, 2.0], -FRAC_PI_2);
+        assert!(toward.may_show(near, None) && toward.may_show(far, None));
+        assert!(!toward.may_show(outside, None), "there is no way out");
         // The doorway is 0.88 m wide (a wall's box is longer by half its thickness) and ends 2.06 m
-        // away: 13.7 pixels to either side of the middle, one to spare, and what cells round it by.
-        let [u0, _, u1, _] = toward.outlines[far.iter().next().expect("one region")];
+        // away. That is 13.7 pixels to either side of the center, plus the margin of one pixel and
+        // the rounding to cells.
+        let [u0, _, u1, _] = toward.rects[far.iter().next().expect("one region")];
         assert!(u0 > 47.5 && u0 < 49.3 && u1 > 78.7 && u1 < 80.5, "{u0} to {u1}");
-        assert!(toward.shows(far, Some([40.0, 40.0, 50.0, 60.0])));
-        assert!(!toward.shows(far, Some([90.0, 0.0, 99.0, 99.0])));
+        assert!(toward.may_show(far, Some([40.0, 40.0, 50.0, 60.0])));
+        assert!(!toward.may_show(far, Some([90.0, 0.0, 99.0, 99.0])));
         for (eye, yaw) in [([2.0, 1.5, 2.0], FRAC_PI_2), ([3.5, 1.5, 0.5], 0.0)] {
-            let away = seen(&regions, eye, yaw);
-            assert!(away.shows(near, None) && !away.shows(far, None), "{eye:?}");
+            let away = visible_from(&portals, eye, yaw);
+            assert!(away.may_show(near, None) && !away.may_show(far, None), "{eye:?}");
         }
-        let beside = regions.of_box(Vec3::new(3.9, 0.0, 0.5), Vec3::new(4.1, 1.0, 1.0));
+        let beside = portals.regions_in_box(Vec3::new(3.9, 0.0, 0.5), Vec3::new(4.1, 1.0, 1.0));
         assert_eq!(beside.0, near.0 | far.0, "a wall is in front of both");
     }
 
     #[test]
-    fn odd_eyes_and_odd_plans_see_everything() {
-        let regions = PortalGraph::new(&two_rooms());
+    fn invalid_eyes_and_plans_disable_culling() {
+        let portals = PortalGraph::new(&two_rooms());
         for eye in [[4.0, 1.5, 0.7], [2.0, 3.5, 2.0], [-3.0, 1.5, 2.0], [3.9, 1.5, 0.7]] {
-            assert_eq!(seen(&regions, eye, PI).set, RegionSet::ALL, "{eye:?}");
+            assert_eq!(visible_from(&portals, eye, PI).set, RegionSet::ALL, "{eye:?}");
         }
-        let high = regions.of_box(Vec3::ZERO, Vec3::new(1.0, 3.0, 1.0));
-        assert_eq!(high, RegionSet::ALL, "what stands out above the walls");
+        let high = portals.regions_in_box(Vec3::ZERO, Vec3::new(1.0, 3.0, 1.0));
+        assert_eq!(high, RegionSet::ALL, "a box that reaches above the walls");
         let roofless = Setup { ceiling_m: None, ..two_rooms() };
         assert_eq!(PortalGraph::new(&roofless), PortalGraph::default());
     }
 
-    /// Eyes anywhere in a plan, in walls and out of doors too.
-    fn views(rng: &mut Stream, bounds: &Rect, n: usize) -> Vec<View> {
+    /// Cameras anywhere in a plan, including inside walls and outdoors.
+    fn views(rng: &mut RngStream, bounds: &Rect, n: usize) -> Vec<View> {
         let view = |_| {
-            let Rect { min, max } = bounds.grown(0.5);
+            let Rect { min, max } = bounds.expanded(0.5);
             let [x, z] = [rng.range(min.x, max.x), rng.range(min.y, max.y)];
             let eye = [x, rng.range(0.2, 2.2), z];
             let camera = camera(eye, rng.range(-PI, PI), rng.range(-0.6, 0.3), 120, 90);
-            View::of_camera(camera, Channels::ALL)
+            View::from_camera(camera, Channels::ALL)
         };
         (0..n).map(view).collect()
     }
 
     #[test]
-    fn houses_look_the_same_without_regions() {
-        let mut rng = Stream::new(5, "regions", 0);
-        let seeds = |k: u64| chaic_episodes::Seeds { place: k, episode: 3 };
+    fn houses_render_the_same_without_portals() {
+        let mut rng = RngStream::new(5, "regions", 0);
+        let seeds = |k: u64| chaic_episodes::GeneratorSeeds { place: k, episode: 3 };
         let generated = (0..6).map(|k| {
             chaic_episodes::generate(chaic_core::TaskId::HighTarget, seeds(k)).expect("a house")
         });
@@ -414,39 +429,40 @@ mod tests {
             let (world, bounds) = (world(setup.clone()), setup.bounds);
             let scene = Scene::new(&setup);
             let views = views(&mut rng, &bounds, 40);
-            let mut hidden = 0;
+            let mut n_culled = 0;
             for view in &views {
-                let lens = Lens::of(&view.camera).expect("a camera");
-                let mut seen = VisibleRegions::default();
-                scene.regions().find_visible(&lens, &mut seen);
-                hidden += usize::from(seen.set != RegionSet::ALL);
+                let projection =
+                    Projection::from_camera(&view.camera).expect("the camera is valid");
+                let mut visible = VisibleRegions::default();
+                scene.portal_graph().find_visible(&projection, &mut visible);
+                n_culled += usize::from(visible.set != RegionSet::ALL);
             }
-            assert!(hidden > 15, "regions of {hidden} views only");
+            assert!(n_culled > 15, "regions of {n_culled} views only");
             let with = scene.render(&world, &views);
-            let without = Scene::new(&setup).without_regions().render(&world, &views);
-            assert!(with == without, "regions have changed a picture");
+            let without = Scene::new(&setup).without_portals().render(&world, &views);
+            assert!(with == without, "portal culling changed an image");
         }
     }
 
     #[test]
-    fn odd_worlds_look_the_same_without_regions() {
-        let mut n_walled = 0;
+    fn hostile_worlds_render_the_same_without_portals() {
+        let mut n_with_portals = 0;
         for seed in 0..300 {
             let Case { setup, state, postures, views, .. } = hostile::case(seed, None);
-            // The kit was built with this crate as a library, whose views are another type.
+            // The test kit was built with this crate as a library, whose `View` is another type.
             let own_view = |v: &chaic_test_kit::View| View {
                 hide: v.hide,
                 hide_ceiling: v.hide_ceiling,
                 sight: v.sight,
-                ..View::of_camera(v.camera, Channels::ALL)
+                ..View::from_camera(v.camera, Channels::ALL)
             };
             let views: Vec<View> = views.iter().map(own_view).collect();
             let scene = Scene::new(&setup);
-            n_walled += usize::from(!scene.regions().portals.is_empty());
+            n_with_portals += usize::from(!scene.portal_graph().portals.is_empty());
             let with = scene.render_state(&state, &postures, &views);
-            let without = scene.without_regions().render_state(&state, &postures, &views);
-            assert!(with == without, "seed {seed}: regions have changed a picture");
+            let without = scene.without_portals().render_state(&state, &postures, &views);
+            assert!(with == without, "seed {seed}: portal culling changed an image");
         }
-        assert!(n_walled > 30, "{n_walled} plans have portals");
+        assert!(n_with_portals > 30, "{n_with_portals} plans have portals");
     }
 }

@@ -1,68 +1,68 @@
-//! What can be seen at one moment, shape by shape: for those who keep shapes from moment to moment.
+//! Unique shapes of one frame, for renderers that cache shapes between frames.
 
 use std::collections::BTreeMap;
 
 use chaic_world::{Posture, State};
 
 use crate::Scene;
-use crate::frame::{Frame, Shape, ShapeKey};
 use crate::geometry::{FINEST, InstanceData, MeshData};
 use crate::lighting::Lighting;
 use crate::people::Body;
+use crate::scene_frame::{SceneFrame, Shape, ShapeKey};
 
-/// What can be seen at one moment.
+/// Unique shapes and instances of one frame.
 pub struct Shapes<'a> {
-    /// What there is: structure, then people, then things.
+    /// Instances: structure, then people, then objects.
     pub instances: Vec<InstanceData>,
     shapes: Vec<Shape<'a>>,
-    frame: &'a Frame<'a>,
+    frame: &'a SceneFrame<'a>,
 }
 
-/// A shape of the catalogue: equal for equal shapes only, in any scene of a process.
+/// Key of a catalogue shape: equal only for equal shapes, across all scenes of a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct ShapeName(ShapeKey);
+pub struct ShapeId(ShapeKey);
 
-/// A body in one posture; its meshes are made when they are asked for.
+/// Shape of a body in one posture; its meshes are built on first use.
 #[derive(Clone, Debug)]
 pub struct BodyShape(Body);
 
 impl BodyShape {
-    /// The mesh at a level of detail; levels past the finest are the finest.
+    /// Returns the mesh at a level of detail; levels past the finest give the finest.
     pub fn mesh(&self, level: usize) -> MeshData {
         MeshData::from(self.0.level(level.min(FINEST)))
     }
 }
 
 impl Shapes<'_> {
-    /// Number of shapes; those that instances name by their index.
+    /// Number of shapes, which instances reference by index.
     pub fn len(&self) -> usize {
         self.shapes.len()
     }
 
-    /// Whether nothing can be seen.
+    /// Returns whether there are no shapes.
     pub fn is_empty(&self) -> bool {
         self.shapes.is_empty()
     }
 
-    /// The name of a shape, if it is one of the catalogue.
-    pub fn name(&self, index: usize) -> Option<ShapeName> {
+    /// Returns the key of a shape; `None` if it is not from the catalogue.
+    pub fn shape_id(&self, index: usize) -> Option<ShapeId> {
         match self.shapes.get(index)? {
-            Shape::Class(class) => Some(ShapeName(class.key())),
+            Shape::Class(class) => Some(ShapeId(class.key())),
             Shape::Fixed(_) | Shape::Body(_) => None,
         }
     }
 
-    /// Whether a shape is a piece of structure: in the same place of every moment of its scene.
+    /// Returns whether a shape is structure, which never moves in its scene.
     pub fn is_structure(&self, index: usize) -> bool {
         matches!(self.shapes.get(index), Some(Shape::Fixed(_)))
     }
 
-    /// Whether a shape is a body: that of no other moment.
+    /// Returns whether a shape is a body, which is valid for this frame only.
     pub fn is_body(&self, index: usize) -> bool {
         matches!(self.shapes.get(index), Some(Shape::Body(_)))
     }
 
-    /// A shape that is a body, to be kept.
+    /// Returns an owned copy of a body shape; `None` for other shapes.
     pub fn body(&self, index: usize) -> Option<BodyShape> {
         match self.shapes.get(index)? {
             Shape::Body(body) => Some(BodyShape(Body::clone(body))),
@@ -70,37 +70,38 @@ impl Shapes<'_> {
         }
     }
 
-    /// A shape at a level of detail; levels past the finest are the finest.
+    /// Returns a shape at a level of detail; levels past the finest give the finest.
     ///
     /// # Panics
-    /// If there is no shape of this index.
+    /// If `index` is out of range.
     pub fn mesh(&self, index: usize, level: usize) -> MeshData {
         MeshData::from(self.shapes[index].mesh(level.min(FINEST)))
     }
 
-    /// What shines on them.
+    /// Returns the lighting of the frame.
     pub fn lighting(&self) -> Lighting<'_> {
-        Lighting::of(&self.frame.light)
+        Lighting::from_light(&self.frame.light)
     }
 }
 
 impl Scene {
-    /// Looks at a moment shape by shape. `postures` are those of the agents in order.
+    /// Calls `visit` with the shapes of a state. `postures` lists the postures of the agents in
+    /// order.
     pub fn with_shapes<T>(
         &self,
         state: &State,
         postures: &[Posture],
-        look: impl FnOnce(&Shapes) -> T,
+        visit: impl FnOnce(&Shapes) -> T,
     ) -> T {
         let bodies: Vec<Body> = postures.iter().map(|p| Body::new(p, state.frame)).collect();
         let frame = self.frame(state, &bodies, true);
         let mut shapes: Vec<Shape> = Vec::new();
-        let mut known: BTreeMap<ShapeKey, u32> = BTreeMap::new();
+        let mut indices: BTreeMap<ShapeKey, u32> = BTreeMap::new();
         let mut instances = Vec::with_capacity(frame.instances.len());
         for instance in &frame.instances {
             let next = shapes.len() as u32;
             let mesh = match instance.shape {
-                Shape::Class(class) => *known.entry(class.key()).or_insert(next),
+                Shape::Class(class) => *indices.entry(class.key()).or_insert(next),
                 Shape::Fixed(_) | Shape::Body(_) => next,
             };
             if mesh == next {
@@ -108,8 +109,8 @@ impl Scene {
             }
             instances.push(self.instance_data(instance, mesh));
         }
-        let result = look(&Shapes { instances, shapes, frame: &frame });
-        self.recycle(frame.light);
+        let result = visit(&Shapes { instances, shapes, frame: &frame });
+        self.recycle_shadows(frame.light);
         result
     }
 }

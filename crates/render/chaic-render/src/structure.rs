@@ -1,8 +1,8 @@
-//! What a building is made of: floors, walls with their windows and door frames, ceilings with a
-//! lamp in each room.
+//! Structure of a building: floors, walls with windows and door frames, and ceilings with a lamp in
+//! each room.
 //!
-//! Walls stop bodies where their boxes say; boards, frames and panes stand out from them by a few
-//! centimetres at most and are only looked at.
+//! Bodies collide with the boxes of walls. Boards, frames and panes extend a few centimeters beyond
+//! them and are visual only.
 
 use chaic_core::catalogue::Finish;
 use chaic_core::geom::Rect;
@@ -10,23 +10,24 @@ use chaic_core::{EntityId, Vec3};
 use chaic_world::{FloorMaterial, Room, RoomKind, Setup};
 use glam::Mat3;
 
-use crate::mesh::{self, Mesh, Skin};
+use crate::mesh::{self, Material, Mesh};
 use crate::texture::Texture;
 
 mod joinery;
+mod wall_frame;
 mod walls;
 
-pub(crate) use walls::Line;
+pub(crate) use wall_frame::WallFrame;
 
-/// Every mesh of the building, in the world's frame.
-pub(crate) fn of(setup: &Setup) -> Vec<(EntityId, Mesh)> {
+/// Meshes of the building in the world frame.
+pub(crate) fn meshes(setup: &Setup) -> Vec<(EntityId, Mesh)> {
     let mut structure = Vec::new();
     for (rect, material, color) in floor_pieces(setup) {
         structure.push((EntityId::FLOOR, floor_mesh(&rect, material, color)));
     }
-    let papers = walls::papers(setup);
+    let wall_materials = walls::wall_materials(setup);
     for wall in &setup.walls {
-        structure.push((EntityId::WALL, walls::mesh(setup, wall, &papers)));
+        structure.push((EntityId::WALL, walls::mesh(setup, wall, &wall_materials)));
     }
     for opening in setup.openings.iter().take(MAX_PIECES) {
         let meshes = joinery::door_frame(setup, opening).into_iter().flatten();
@@ -48,49 +49,49 @@ fn indoors(setup: &Setup) -> impl Iterator<Item = &Room> {
     setup.rooms.iter().filter(|r| r.kind != RoomKind::Outdoors)
 }
 
-/// More pieces of floor or ceiling than any street or house needs; bounds the work on odd input.
+/// Maximum number of pieces of floor or ceiling; it limits the work on invalid input.
 const MAX_PIECES: usize = 4096;
 
-/// The floors without overlaps: where two overlap, the later one lies on top.
+/// Splits the floors into disjoint pieces: where two overlap, the later one covers the earlier.
 fn floor_pieces(setup: &Setup) -> Vec<(Rect, FloorMaterial, [u8; 3])> {
     let mut pieces: Vec<(Rect, FloorMaterial, [u8; 3])> = Vec::new();
     for floor in setup.floors.iter().take(MAX_PIECES) {
-        let mut left = Vec::new();
+        let mut remaining = Vec::new();
         for (rect, material, color) in pieces.drain(..) {
-            without(&rect, &floor.rect, |piece| left.push((piece, material, color)));
+            subtract_rect(&rect, &floor.rect, |piece| remaining.push((piece, material, color)));
         }
-        left.push((floor.rect, floor.material, floor.color));
-        left.truncate(MAX_PIECES);
-        pieces = left;
+        remaining.push((floor.rect, floor.material, floor.color));
+        remaining.truncate(MAX_PIECES);
+        pieces = remaining;
     }
     pieces
 }
 
-/// The ceilings of rooms, and what is left between them and the outermost walls: doorways and
-/// alcoves belong to no room.
+/// Ceilings of rooms, and of the area between them and the outermost walls: doorways and alcoves
+/// belong to no room.
 fn ceiling_pieces(setup: &Setup) -> Vec<Rect> {
-    /// Rooms end at the faces of walls; their ceilings go on into these, metres.
-    const INTO_WALL_M: f32 = 0.15;
+    /// Overlap of ceilings with walls, meters: rooms end at the faces of walls.
+    const WALL_OVERLAP_M: f32 = 0.15;
     let rooms = setup.rooms.iter().filter(|r| r.kind != RoomKind::Outdoors);
-    let mut pieces: Vec<Rect> = rooms.map(|r| r.rect.grown(INTO_WALL_M)).collect();
+    let mut pieces: Vec<Rect> = rooms.map(|r| r.rect.expanded(WALL_OVERLAP_M)).collect();
     let ends = setup.walls.iter().flat_map(|w| [w.a, w.b]);
     let house = ends.fold(setup.bounds, |r, p| Rect { min: r.min.min(p), max: r.max.max(p) });
     let mut between = vec![house];
     for room in &pieces {
-        let mut left = Vec::new();
+        let mut remaining = Vec::new();
         for rect in between {
-            without(&rect, room, |piece| left.push(piece));
+            subtract_rect(&rect, room, |piece| remaining.push(piece));
         }
-        left.truncate(MAX_PIECES);
-        between = left;
+        remaining.truncate(MAX_PIECES);
+        between = remaining;
     }
-    // They overlap the ceilings of rooms by a millimetre, so that no pixel falls between them.
-    pieces.extend(between.iter().map(|r| r.grown(0.001)));
+    // They overlap the ceilings of rooms by a millimeter, so that no pixel falls between them.
+    pieces.extend(between.iter().map(|r| r.expanded(0.001)));
     pieces
 }
 
-/// The parts of `rect` outside of `hole`.
-fn without(rect: &Rect, hole: &Rect, mut keep: impl FnMut(Rect)) {
+/// Calls `keep` with the parts of `rect` outside of `hole`.
+fn subtract_rect(rect: &Rect, hole: &Rect, mut keep: impl FnMut(Rect)) {
     let (low, high) = (rect.min.max(hole.min), rect.max.min(hole.max));
     if low.x >= high.x || low.y >= high.y {
         keep(*rect);
@@ -107,12 +108,12 @@ fn without(rect: &Rect, hole: &Rect, mut keep: impl FnMut(Rect)) {
     keep_some(low.x, high.y, high.x, rect.max.y);
 }
 
-fn floor_mesh(rect: &Rect, material: FloorMaterial, color: [u8; 3]) -> Mesh {
-    // Neighbors overlap by a millimetre, so that no pixel falls between them.
-    let rect = rect.grown(0.001);
+fn floor_mesh(rect: &Rect, floor_material: FloorMaterial, color: [u8; 3]) -> Mesh {
+    // Neighbors overlap by a millimeter, so that no pixel falls between them.
+    let rect = rect.expanded(0.001);
     let mut mesh = Mesh::default();
-    let mut skin = Skin::new(color, Finish::Matte);
-    skin.texture = match material {
+    let mut material = Material::new(color, Finish::Matte);
+    material.texture = match floor_material {
         FloorMaterial::Wood => Texture::Planks,
         FloorMaterial::Tiles => Texture::Tiles,
         FloorMaterial::Carpet => Texture::Carpet,
@@ -120,30 +121,30 @@ fn floor_mesh(rect: &Rect, material: FloorMaterial, color: [u8; 3]) -> Mesh {
         FloorMaterial::Pavement => Texture::Pavement,
         FloorMaterial::Grass => Texture::Grass,
     };
-    if matches!(material, FloorMaterial::Wood | FloorMaterial::Tiles) {
-        skin.gloss = mesh::Gloss::Satin;
+    if matches!(floor_material, FloorMaterial::Wood | FloorMaterial::Tiles) {
+        material.gloss = mesh::SpecularPreset::Satin;
     }
     // Planks run along the longer side.
     if rect.size().y > rect.size().x {
-        skin.axes = Mat3::from_cols(Vec3::Z, Vec3::Y, Vec3::X);
+        material.axes = Mat3::from_cols(Vec3::Z, Vec3::Y, Vec3::X);
     }
-    mesh.skin(skin);
+    mesh.set_material(material);
     level_quad(&mut mesh, &rect, 0.0, false);
     mesh.finish()
 }
 
 fn ceiling_mesh(rect: &Rect, height_m: f32) -> Mesh {
     let mut mesh = Mesh::default();
-    mesh.skin(Skin::new([244, 243, 240], Finish::Matte));
+    mesh.set_material(Material::new([244, 243, 240], Finish::Matte));
     level_quad(&mut mesh, rect, height_m, true);
     mesh.finish()
 }
 
-fn level_quad(mesh: &mut Mesh, rect: &Rect, y: f32, downwards: bool) {
+fn level_quad(mesh: &mut Mesh, rect: &Rect, y: f32, faces_down: bool) {
     let (a, b) = (rect.min, rect.max);
     let ring = [(a.x, a.y), (a.x, b.y), (b.x, b.y), (b.x, a.y)];
     let mut vertices = ring.map(|(x, z)| mesh.vertex(Vec3::new(x, y, z), Vec3::Y));
-    if downwards {
+    if faces_down {
         vertices.reverse();
     }
     mesh.quad(vertices, false);
@@ -156,8 +157,8 @@ mod tests {
     use chaic_core::{Frame, TaskId, Vec2};
     use chaic_world::{Opening, Wall};
 
-    /// Two rooms and a wall of 0.5 m between them with a doorway 0.9 m wide; an alcove is beside
-    /// the second.
+    /// Two rooms with a wall of 0.5 m between them and a doorway 0.9 m wide; an alcove is next to
+    /// the second room.
     fn two_rooms() -> Setup {
         let room = |rect| Room { kind: RoomKind::Office, rect };
         let wall = |a: [f32; 2], b: [f32; 2], [bottom_m, top_m]: [f32; 2]| Wall {
@@ -178,7 +179,7 @@ mod tests {
                 room(Rect::new([0.0, 0.0], [2.0, 4.0])),
                 room(Rect::new([2.5, 0.0], [5.0, 2.0])),
             ],
-            // Boxes are half a thickness longer at either end.
+            // Wall boxes are half a thickness longer at each end.
             walls: vec![
                 wall([2.25, 0.25], [2.25, 0.35], [0.0, 3.0]),
                 wall([2.25, 1.75], [2.25, 3.75], [0.0, 3.0]),
@@ -210,11 +211,11 @@ mod tests {
     }
 
     #[test]
-    fn a_door_frame_leaves_the_way_free() {
+    fn a_door_frame_does_not_block_the_doorway() {
         let setup = two_rooms();
         let [sides, above] = joinery::door_frame(&setup, &setup.openings[0]).expect("a frame");
         for p in &sides.positions {
-            assert!(p.z < 0.61 || p.z > 1.49, "{p} stands in the way");
+            assert!(p.z < 0.61 || p.z > 1.49, "{p} blocks the doorway");
         }
         for p in sides.positions.iter().chain(&above.positions) {
             assert!((p.x - 2.25).abs() < 0.28, "{p} is far off the wall");
@@ -224,24 +225,24 @@ mod tests {
     }
 
     #[test]
-    fn windows_are_in_outer_walls_and_stand_out_little() {
+    fn windows_are_in_outer_walls_and_protrude_little() {
         let setup = two_rooms();
-        let papers = walls::papers(&setup);
+        let wall_materials = walls::wall_materials(&setup);
         let has_window: Vec<bool> = setup
             .walls
             .iter()
             .map(|w| {
-                let mesh = walls::mesh(&setup, w, &papers);
-                let line = walls::Line::of(w);
+                let mesh = walls::mesh(&setup, w, &wall_materials);
+                let wall_frame = WallFrame::new(w);
                 for p in &mesh.positions {
-                    let d = Vec2::new(p.x, p.z) - line.middle;
-                    let off = (d.y * line.axis.x - d.x * line.axis.y).abs();
-                    assert!(off < line.half.y + 0.08, "{p}");
+                    let d = Vec2::new(p.x, p.z) - wall_frame.center;
+                    let offset = (d.y * wall_frame.axis.x - d.x * wall_frame.axis.y).abs();
+                    assert!(offset < wall_frame.half.y + 0.08, "{p}");
                 }
-                mesh.skins.iter().any(|skin| skin.gloss == mesh::Gloss::Pane)
+                mesh.materials.iter().any(|material| material.gloss == mesh::SpecularPreset::Pane)
             })
             .collect();
-        // The other walls are inner ones; one of them is beside an alcove.
+        // The other walls are interior walls; one of them borders an alcove.
         assert_eq!(has_window, [false, false, false, true]);
     }
 }

@@ -1,4 +1,4 @@
-//! Text on pictures.
+//! Text on images.
 
 use std::sync::LazyLock;
 
@@ -9,19 +9,19 @@ static FONT: LazyLock<FontRef<'static>> = LazyLock::new(|| {
     FontRef::try_from_slice(epaint_default_fonts::HACK_REGULAR).expect("the bundled font is valid")
 });
 
-/// Where a text stands on the point it is drawn at.
+/// Horizontal alignment of a text relative to its anchor point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Align {
-    /// It begins there.
+    /// The text begins at the anchor.
     Left,
-    /// Its middle is there.
+    /// The text is centered on the anchor.
     Center,
-    /// It ends there.
+    /// The text ends at the anchor.
     Right,
 }
 
-/// Glyphs of one line from x = 0 with their baseline at y = 0, and the line's width.
-fn lay_out(text: &str, size_px: f32) -> (Vec<Glyph>, f32) {
+/// Glyphs of one line from x = 0 with the baseline at y = 0, and the width of the line.
+fn layout_line(text: &str, size_px: f32) -> (Vec<Glyph>, f32) {
     let font = FONT.as_scaled(PxScale::from(size_px.clamp(4.0, 400.0)));
     let (mut x, mut last, mut glyphs) = (0.0, None, Vec::new());
     for c in text.chars().take(10_000) {
@@ -38,26 +38,27 @@ fn lay_out(text: &str, size_px: f32) -> (Vec<Glyph>, f32) {
 
 /// Width of a line of text, pixels.
 pub fn width(text: &str, size_px: f32) -> f32 {
-    lay_out(text, size_px).1
+    layout_line(text, size_px).1
 }
 
-/// Draws one line of text whose top is at `y`, pixels; what falls outside of the image is cut off.
+/// Draws one line of text with its top at `position`, pixels. Parts outside the image are clipped.
 pub fn draw(
     image: &mut RgbImage,
-    (x, y): (f32, f32),
+    position: (f32, f32),
     size_px: f32,
     color: [u8; 3],
     align: Align,
     text: &str,
 ) {
-    let (glyphs, wide) = lay_out(text, size_px);
+    let (x, y) = position;
+    let (glyphs, width_px) = layout_line(text, size_px);
     let x = match align {
         Align::Left => x,
-        Align::Center => x - 0.5 * wide,
-        Align::Right => x - wide,
+        Align::Center => x - 0.5 * width_px,
+        Align::Right => x - width_px,
     };
     let ascent = FONT.as_scaled(PxScale::from(size_px.clamp(4.0, 400.0))).ascent();
-    // Whole pixels keep stems sharp.
+    // Integer pixel positions keep stems sharp.
     let (x, y) = ((x + 0.5).floor(), (y + ascent + 0.5).floor());
     for mut glyph in glyphs {
         glyph.position.x += x;
@@ -79,7 +80,7 @@ pub fn draw(
     }
 }
 
-/// Mixes `color` into a pixel.
+/// Blends `color` into a pixel.
 pub(crate) fn blend(pixel: &mut [u8; 3], color: [u8; 3], amount: f32) {
     let amount = amount.clamp(0.0, 1.0);
     for (p, c) in pixel.iter_mut().zip(color) {

@@ -1,4 +1,4 @@
-//! Animated GIF: 256 colors a frame, for places that play no video.
+//! Animated GIF with 256 colors per frame, for places that do not play video.
 
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
@@ -8,10 +8,10 @@ use image::RgbImage;
 
 use super::SinkError;
 
-/// Speed of the palette search, 1 (best) to 30; 10 is what the library advises.
+/// Speed of the palette search, 1 (best) to 30; the library recommends 10.
 const PALETTE_SPEED: i32 = 10;
 
-/// An animated GIF under way.
+/// Animated GIF writer.
 pub(super) struct GifSink {
     encoder: Encoder<BufWriter<File>>,
     fps: u32,
@@ -25,15 +25,15 @@ impl GifSink {
         height: u32,
         fps: u32,
     ) -> Result<GifSink, SinkError> {
-        let mut encoder = Encoder::new(out, side(width), side(height), &[])?;
+        let mut encoder = Encoder::new(out, side_px(width), side_px(height), &[])?;
         encoder.set_repeat(Repeat::Infinite)?;
         Ok(GifSink { encoder, fps, n_frames: 0 })
     }
 
     pub(super) fn push(&mut self, image: &RgbImage) -> Result<(), SinkError> {
         let mut frame = Frame::from_rgb_speed(
-            side(image.width()),
-            side(image.height()),
+            side_px(image.width()),
+            side_px(image.height()),
             image.as_raw(),
             PALETTE_SPEED,
         );
@@ -64,11 +64,11 @@ impl From<EncodingError> for SinkError {
     }
 }
 
-fn side(px: u32) -> u16 {
+fn side_px(px: u32) -> u16 {
     u16::try_from(px).expect("the writer bounds both sides")
 }
 
-/// How long frame `index` stays, in GIF's unit; rounded so that the sum does not drift.
+/// Duration of frame `index` in GIF units of 0.01 s, rounded so that the sum does not drift.
 fn delay_centisecs(index: u32, fps: u32) -> u16 {
     let end = |n: u64| (n * 100 + u64::from(fps) / 2) / u64::from(fps);
     let n = u64::from(index);
@@ -83,7 +83,7 @@ mod tests {
     fn delays_add_up_to_the_frame_rate() {
         for fps in [1, 7, 10, 24, 30, 50] {
             let sum: u32 = (0..fps * 3).map(|i| u32::from(delay_centisecs(i, fps))).sum();
-            assert_eq!(sum, 300, "{fps} frames a second");
+            assert_eq!(sum, 300, "{fps} frames per second");
         }
     }
 }

@@ -1,9 +1,8 @@
-//! Videos of episodes: H.264 in MP4, or an animated GIF, without any external program.
+//! Video encoding of episodes: H.264 in MP4, or animated GIF, without external programs.
 //!
 //! The same frames give the same file on one machine and build: one encoder thread, a fixed
-//! quantizer instead of a bit rate to chase, no time stamp in the file. The bytes are not
-//! promised across machines (the encoder picks its instructions by processor) and no score
-//! reads them.
+//! quantizer instead of a target bit rate, no time stamp in the file. The bytes may differ across
+//! machines, because the encoder selects instructions by processor. No score reads them.
 
 mod gif;
 #[cfg(feature = "mp4")]
@@ -17,49 +16,49 @@ use std::path::{Path, PathBuf};
 
 use image::RgbImage;
 
-/// File name extensions that this build can write.
+/// File name extensions that this build supports.
 pub const EXTENSIONS: &[&str] = if cfg!(feature = "mp4") { &["mp4", "gif"] } else { &["gif"] };
 
-/// Smallest width and height, of the encoder.
+/// Minimum width and height, from the encoder.
 pub const MIN_SIDE_PX: u32 = 16;
-/// Largest longer side, of the encoder.
+/// Maximum of the longer side, from the encoder.
 pub const MAX_LONG_SIDE_PX: u32 = 3840;
-/// Largest shorter side, of the encoder.
+/// Maximum of the shorter side, from the encoder.
 pub const MAX_SHORT_SIDE_PX: u32 = 2160;
-/// Highest frame rate of an MP4 file; faster than any display we know of is a mistake.
+/// Maximum frame rate of an MP4 file. No known display is faster, so a higher rate is a mistake.
 pub const MAX_FPS: u32 = 240;
-/// Highest frame rate of a GIF: below 0.02 s a frame, browsers fall back to 0.1 s.
+/// Maximum frame rate of a GIF: browsers replace a frame time below 0.02 s by 0.1 s.
 pub const MAX_GIF_FPS: u32 = 50;
 
-/// Why a video could not be written.
+/// Error of video encoding.
 #[derive(Debug, thiserror::Error)]
 pub enum VideoError {
-    /// The extension names no format of this build.
+    /// This build supports no format with this extension.
     #[error("cannot write a video of this kind, use one of {}: {path:?}", EXTENSIONS.join(", "))]
     UnsupportedExtension {
-        /// The file asked for.
+        /// Requested file.
         path: PathBuf,
     },
-    /// The size is outside what the encoder takes.
+    /// The encoder does not support this size.
     #[error(
         "cannot encode frames of {width}x{height} pixels, \
          sides must be {MIN_SIDE_PX} to {MAX_LONG_SIDE_PX}x{MAX_SHORT_SIDE_PX}"
     )]
     Size {
-        /// Width asked for.
+        /// Requested width.
         width: u32,
-        /// Height asked for.
+        /// Requested height.
         height: u32,
     },
     /// The frame rate is zero or too high for the format.
-    #[error("cannot write {fps} frames a second, choose 1 to {max}")]
+    #[error("cannot write {fps} frames per second, choose 1 to {max}")]
     FrameRate {
-        /// The rate asked for.
+        /// Requested rate.
         fps: u32,
-        /// The highest rate of this format.
+        /// Maximum rate of the format.
         max: u32,
     },
-    /// A frame has another size than the video.
+    /// The size of a frame differs from the size of the video.
     #[error("expected a frame of {}x{} pixels, got {}x{}", expected.0, expected.1, got.0, got.1)]
     FrameSize {
         /// Width and height of the video.
@@ -70,25 +69,25 @@ pub enum VideoError {
     /// The video was finished before its first frame.
     #[error("a video needs at least one frame: {path:?}")]
     NoFrames {
-        /// The file asked for.
+        /// Requested file.
         path: PathBuf,
     },
     /// The file could not be written.
     #[error("cannot write the video: {source}: {path:?}")]
     Io {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// The encoder or the container refused a frame.
+    /// The encoder or the container rejected a frame.
     #[error("cannot encode frame {frame}: {source}: {path:?}")]
     Encode {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Which frame, from 0.
+        /// Index of the frame, from 0.
         frame: u32,
-        /// What the library said.
+        /// Error of the library.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
 }
@@ -113,43 +112,44 @@ pub struct VideoWriter {
     height: u32,
     n_frames: u32,
     sink: Sink,
-    provisional: Provisional,
+    partial_file: PartialFile,
 }
 
-/// The name under which a video is written: it gets its own once it is whole, and what never
-/// becomes whole is removed.
+/// Temporary file of an unfinished video. It is renamed when the video is complete, and removed
+/// otherwise.
 #[derive(Debug)]
-struct Provisional {
+struct PartialFile {
     path: PathBuf,
     is_kept: bool,
 }
 
-impl Provisional {
-    fn beside(path: &Path) -> Provisional {
+impl PartialFile {
+    fn for_path(path: &Path) -> PartialFile {
         let mut name = path.file_name().unwrap_or_default().to_owned();
         name.push(".partial");
-        Provisional { path: path.with_file_name(name), is_kept: false }
+        PartialFile { path: path.with_file_name(name), is_kept: false }
     }
 
-    fn becomes(mut self, path: &Path) -> io::Result<()> {
+    fn rename_to(mut self, path: &Path) -> io::Result<()> {
         fs::rename(&self.path, path)?;
         self.is_kept = true;
         Ok(())
     }
 }
 
-/// Creates an empty file, in place of an older file or link of this name. Links are not followed.
-fn create_fresh(path: &Path) -> io::Result<File> {
+/// Creates an empty file and replaces an existing file or link of this name. Links are not
+/// followed.
+fn create_or_replace(path: &Path) -> io::Result<File> {
     match fs::remove_file(path) {
         Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
         _ => File::options().write(true).create_new(true).open(path),
     }
 }
 
-impl Drop for Provisional {
+impl Drop for PartialFile {
     fn drop(&mut self) {
         if !self.is_kept {
-            // Where it can't be removed, its name says what it is.
+            // If it cannot be removed, its name shows that it is partial.
             let _ = fs::remove_file(&self.path);
         }
     }
@@ -162,7 +162,7 @@ enum Sink {
     Mp4(Box<mp4::Mp4Sink>),
 }
 
-/// What can go wrong inside a sink; the writer adds file and frame.
+/// Error inside a sink; the writer adds file and frame.
 #[derive(Debug)]
 enum SinkError {
     Io(io::Error),
@@ -176,18 +176,18 @@ impl From<io::Error> for SinkError {
 }
 
 impl VideoWriter {
-    /// Starts a video of `width` x `height` pixels at `path`, whose extension picks the format.
+    /// Starts a video of `width` x `height` pixels at `path`, whose extension selects the format.
     ///
-    /// H.264 halves the resolution of color, so an odd side of an MP4 grows by one pixel that
-    /// repeats its neighbor. An existing file is replaced as soon as the video is finished; until
-    /// then it is written to `PATH.partial`.
+    /// H.264 halves the resolution of color, so an odd side of an MP4 is padded by one repeated
+    /// pixel. The video is written to `PATH.partial`, which replaces an existing file when the
+    /// video is finished.
     pub fn create(
         path: &Path,
         width: u32,
         height: u32,
         fps: u32,
     ) -> Result<VideoWriter, VideoError> {
-        let format = Format::of(path)?;
+        let format = Format::from_path(path)?;
         let (long, short) = (width.max(height), width.min(height));
         if short < MIN_SIDE_PX || long > MAX_LONG_SIDE_PX || short > MAX_SHORT_SIDE_PX {
             return Err(VideoError::Size { width, height });
@@ -196,15 +196,15 @@ impl VideoWriter {
         if !(1..=max).contains(&fps) {
             return Err(VideoError::FrameRate { fps, max });
         }
-        let provisional = Provisional::beside(path);
-        let sink = create_fresh(&provisional.path)
+        let partial_file = PartialFile::for_path(path);
+        let sink = create_or_replace(&partial_file.path)
             .map_err(SinkError::Io)
             .and_then(|file| Sink::open(format, BufWriter::new(file), width, height, fps))
-            .map_err(|error| error.at(path, 0))?;
-        Ok(VideoWriter { path: path.to_owned(), width, height, n_frames: 0, sink, provisional })
+            .map_err(|error| error.into_video_error(path, 0))?;
+        Ok(VideoWriter { path: path.to_owned(), width, height, n_frames: 0, sink, partial_file })
     }
 
-    /// Adds the next frame, which has the size of the video.
+    /// Adds the next frame, which must have the size of the video.
     pub fn push(&mut self, frame: &RgbImage) -> Result<(), VideoError> {
         if frame.dimensions() != (self.width, self.height) {
             return Err(VideoError::FrameSize {
@@ -217,12 +217,12 @@ impl VideoWriter {
             #[cfg(feature = "mp4")]
             Sink::Mp4(sink) => sink.push(frame),
         }
-        .map_err(|error| error.at(&self.path, self.n_frames))?;
+        .map_err(|error| error.into_video_error(&self.path, self.n_frames))?;
         self.n_frames += 1;
         Ok(())
     }
 
-    /// Frames added so far.
+    /// Number of frames added so far.
     pub fn n_frames(&self) -> u32 {
         self.n_frames
     }
@@ -237,8 +237,8 @@ impl VideoWriter {
             #[cfg(feature = "mp4")]
             Sink::Mp4(sink) => sink.finish(),
         }
-        .and_then(|()| self.provisional.becomes(&self.path).map_err(SinkError::Io))
-        .map_err(|error| error.at(&self.path, self.n_frames))
+        .and_then(|()| self.partial_file.rename_to(&self.path).map_err(SinkError::Io))
+        .map_err(|error| error.into_video_error(&self.path, self.n_frames))
     }
 }
 
@@ -265,7 +265,7 @@ impl SinkError {
         SinkError::Encode(error.into())
     }
 
-    fn at(self, path: &Path, frame: u32) -> VideoError {
+    fn into_video_error(self, path: &Path, frame: u32) -> VideoError {
         let path = path.to_owned();
         match self {
             SinkError::Io(source) => VideoError::Io { path, source },
@@ -282,7 +282,7 @@ enum Format {
 }
 
 impl Format {
-    fn of(path: &Path) -> Result<Format, VideoError> {
+    fn from_path(path: &Path) -> Result<Format, VideoError> {
         let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
         match extension.as_deref() {
             Some("gif") => Ok(Format::Gif),

@@ -24,14 +24,15 @@ use super::yuv::Planes;
 /// Quantizer of every frame, 0 (lossless) to 51: text in a panel stays sharp at this value.
 const QP: u8 = 20;
 
-/// Seconds between frames that decode alone, which is where a player can jump to.
+/// Seconds between keyframes, to which a player can seek.
 const KEYFRAME_PERIOD_SECS: u32 = 2;
 
-/// Room kept before the frames for the index, which a browser wants first: 4 bytes a frame,
-/// so the longest episode at one frame a step fits. A longer video gets its index at the end.
+/// Space reserved before the frames for the index, which browsers expect first. At 4 bytes per
+/// frame, it fits the longest episode at one frame per step. A longer video gets its index at the
+/// end.
 const INDEX_BYTES: usize = 16 * 1024;
 
-/// An MP4 file under way.
+/// MP4 writer.
 pub(super) struct Mp4Sink {
     out: BufWriter<File>,
     position: u64,
@@ -73,11 +74,12 @@ impl Mp4Sink {
         let keyframe = stream.frame_type() == FrameType::IDR;
         let annex_b = stream.to_vec();
         let data = sample_data(&annex_b)?;
-        // The frame type alone does not tell: a frame without slices would shift all later ones.
+        // The frame type is not sufficient: a frame without slices would shift all later ones.
         if data.is_empty() {
             return Err(SinkError::encode("the encoder dropped the frame"));
         }
-        let sample_entry = if self.is_described { None } else { Some(describe(&annex_b)?) };
+        let sample_entry =
+            if self.is_described { None } else { Some(track_description(&annex_b)?) };
         self.is_described = true;
 
         self.out.write_all(&data)?;
@@ -113,15 +115,14 @@ impl std::fmt::Debug for Mp4Sink {
 }
 
 fn config(fps: u32) -> EncoderConfig {
-    // Said aloud, because players guess from the size otherwise.
+    // Stated explicitly, because players otherwise guess the color space from the size.
     let color = VuiConfig::bt709().transfer_characteristics(TransferCharacteristics::Srgb);
     EncoderConfig::new()
         .num_threads(1)
         .skip_frames(false)
         .max_frame_rate(FrameRate::from_hz(fps as f32))
-        // This mode with an empty range is a fixed quantizer that chases no bit rate. `Off`
-        // would be the honest name, but fixes it to 26 whatever the range says; `Quality`
-        // prints a warning for each video.
+        // This mode with an empty range gives a fixed quantizer without a target bit rate. `Off`
+        // fixes it to 26 regardless of the range, and `Quality` prints a warning for each video.
         .rate_control_mode(RateControlMode::Bufferbased)
         .qp(QpRange::new(QP, QP))
         .adaptive_quantization(false)
@@ -132,14 +133,14 @@ fn config(fps: u32) -> EncoderConfig {
         .vui(color)
 }
 
-/// The track's description, from the parameter sets that come with the first frame.
-fn describe(annex_b: &[u8]) -> Result<SampleEntry, SinkError> {
+/// Track description, from the parameter sets of the first frame.
+fn track_description(annex_b: &[u8]) -> Result<SampleEntry, SinkError> {
     let config = H264SampleEntryConfig { length_size: LengthSize::FourBytes };
     build_avc1_box_from_annexb(annex_b, &config).map(SampleEntry::Avc1).map_err(SinkError::encode)
 }
 
-/// A frame as MP4 wants it: each unit after its length, without the parameter sets, which
-/// are in the track's description.
+/// Converts a frame to MP4 format: each unit prefixed by its length, without the parameter sets,
+/// which are in the track description.
 fn sample_data(annex_b: &[u8]) -> Result<Vec<u8>, SinkError> {
     let mut data = Vec::with_capacity(annex_b.len());
     for unit in parse_annexb_nal_units(annex_b).map_err(SinkError::encode)? {

@@ -1,4 +1,4 @@
-//! A video plays: right boxes, right number of frames, and the picture that was put in.
+//! Promise: a video plays, with the right boxes, the right number of frames, and the right pixels.
 
 use image::Rgb;
 
@@ -7,7 +7,7 @@ use super::*;
 const RED: Rgb<u8> = Rgb([220, 30, 40]);
 const GRAY: Rgb<u8> = Rgb([90, 100, 110]);
 
-/// A red square of 16 pixels that moves 4 pixels a frame.
+/// A red square of 16 pixels that moves 4 pixels per frame.
 fn frame(width: u32, height: u32, index: u32) -> RgbImage {
     RgbImage::from_fn(width, height, |x, y| {
         let inside = (index * 4..index * 4 + 16).contains(&x) && (16..32).contains(&y);
@@ -25,13 +25,13 @@ fn write(path: &Path, width: u32, height: u32, n_frames: u32) -> Vec<u8> {
     std::fs::read(path).unwrap()
 }
 
-fn assert_close(got: [u8; 3], want: Rgb<u8>, tolerance: u8) {
-    let near = got.iter().zip(want.0).all(|(a, b)| a.abs_diff(b) <= tolerance);
-    assert!(near, "expected {:?}, got {got:?}", want.0);
+fn assert_close(got: [u8; 3], expected: Rgb<u8>, tolerance: u8) {
+    let near = got.iter().zip(expected.0).all(|(a, b)| a.abs_diff(b) <= tolerance);
+    assert!(near, "expected {:?}, got {got:?}", expected.0);
 }
 
 #[test]
-fn gif_holds_the_frames() {
+fn a_gif_contains_the_frames() {
     let dir = tempfile::tempdir().unwrap();
     let bytes = write(&dir.path().join("square.GIF"), 63, 47, 10);
 
@@ -51,14 +51,14 @@ fn gif_holds_the_frames() {
 }
 
 #[test]
-fn what_is_not_finished_leaves_what_was_there() {
+fn an_unfinished_video_keeps_the_old_file() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.gif");
     std::fs::write(&path, "dear").unwrap();
     let names = || std::fs::read_dir(dir.path()).unwrap().count();
     let mut video = VideoWriter::create(&path, 64, 48, 10).unwrap();
     video.push(&frame(64, 48, 0)).unwrap();
-    // What somebody finds who looks now, or after the program was killed.
+    // The old file stays visible until the video is finished, also after a crash.
     assert_eq!(std::fs::read(&path).unwrap(), b"dear");
     assert_eq!(names(), 2);
     drop(video);
@@ -68,7 +68,7 @@ fn what_is_not_finished_leaves_what_was_there() {
 }
 
 #[test]
-fn refuses_what_cannot_be_encoded() {
+fn invalid_requests_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let gif = dir.path().join("a.gif");
     let create = |path: &Path, width, height, fps| VideoWriter::create(path, width, height, fps);
@@ -106,8 +106,8 @@ mod mp4 {
 
     use super::*;
 
-    /// What a player finds in the file.
-    struct Played {
+    /// Decoded content of a file.
+    struct DecodedVideo {
         size: (usize, usize),
         durations_secs: Vec<f64>,
         keyframes: Vec<usize>,
@@ -115,13 +115,13 @@ mod mp4 {
         frames: Vec<Vec<u8>>,
     }
 
-    impl Played {
+    impl DecodedVideo {
         fn pixel(&self, index: usize, x: usize, y: usize) -> [u8; 3] {
             self.frames[index][(y * self.size.0 + x) * 3..][..3].try_into().unwrap()
         }
     }
 
-    fn play(bytes: &[u8]) -> Played {
+    fn decode(bytes: &[u8]) -> DecodedVideo {
         let mut demuxer = Mp4FileDemuxer::new();
         while let Some(required) = demuxer.required_input() {
             let start = required.position as usize;
@@ -129,8 +129,12 @@ mod mp4 {
             demuxer.handle_input(Input { position: start as u64, data: &bytes[start..end] });
         }
         let mut decoder = Decoder::new().unwrap();
-        let mut played =
-            Played { size: (0, 0), durations_secs: vec![], keyframes: vec![], frames: vec![] };
+        let mut decoded_video = DecodedVideo {
+            size: (0, 0),
+            durations_secs: vec![],
+            keyframes: vec![],
+            frames: vec![],
+        };
         while let Some(sample) = demuxer.next_sample().unwrap() {
             let mut annex_b = Vec::new();
             if let Some(SampleEntry::Avc1(avc1)) = sample.sample_entry {
@@ -140,10 +144,10 @@ mod mp4 {
                 }
             }
             if sample.keyframe {
-                played.keyframes.push(played.frames.len());
+                decoded_video.keyframes.push(decoded_video.frames.len());
             }
             let timescale = f64::from(sample.track.timescale.get());
-            played.durations_secs.push(f64::from(sample.duration) / timescale);
+            decoded_video.durations_secs.push(f64::from(sample.duration) / timescale);
             let data = &bytes[sample.data_offset as usize..][..sample.data_size];
             annex_b.extend(
                 shiguredo_mp4::bitstream::h264::length_prefixed_to_annexb(
@@ -152,14 +156,14 @@ mod mp4 {
                 )
                 .unwrap(),
             );
-            let yuv = decoder.decode(&annex_b).unwrap().expect("one picture a sample");
-            played.size = yuv.dimensions();
-            played.frames.push(to_rgb(&yuv));
+            let yuv = decoder.decode(&annex_b).unwrap().expect("one image per sample");
+            decoded_video.size = yuv.dimensions();
+            decoded_video.frames.push(to_rgb(&yuv));
         }
-        played
+        decoded_video
     }
 
-    /// RGB of a picture in BT.709, limited range.
+    /// Converts a BT.709 image with limited range to RGB.
     fn to_rgb(yuv: &impl YUVSource) -> Vec<u8> {
         let (width, height) = yuv.dimensions();
         let (y_stride, uv_stride, _) = yuv.strides();
@@ -175,7 +179,7 @@ mod mp4 {
         rgb
     }
 
-    /// Types of the top-level boxes, read by hand.
+    /// Types of the top-level boxes, parsed without the library.
     fn top_level_boxes(bytes: &[u8]) -> Vec<String> {
         let mut types = Vec::new();
         let mut at = 0;
@@ -192,43 +196,46 @@ mod mp4 {
     }
 
     #[test]
-    fn holds_the_frames() {
+    fn an_mp4_contains_the_frames() {
         let dir = tempfile::tempdir().unwrap();
         let bytes = write(&dir.path().join("square.mp4"), 64, 48, 10);
 
         assert_eq!(top_level_boxes(&bytes), ["ftyp", "moov", "free", "mdat"]);
         assert!(bytes.windows(4).any(|w| w == b"avcC"));
-        let played = play(&bytes);
-        assert_eq!((played.size, played.frames.len()), ((64, 48), 10));
-        assert_eq!(played.durations_secs, [0.1; 10]);
-        assert_eq!(played.keyframes, [0]);
+        let decoded_video = decode(&bytes);
+        assert_eq!((decoded_video.size, decoded_video.frames.len()), ((64, 48), 10));
+        assert_eq!(decoded_video.durations_secs, [0.1; 10]);
+        assert_eq!(decoded_video.keyframes, [0]);
         for index in 0..10 {
-            assert_close(played.pixel(index, index * 4 + 8, 24), RED, 6);
-            assert_close(played.pixel(index, index * 4 + 8, 8), GRAY, 3);
+            assert_close(decoded_video.pixel(index, index * 4 + 8, 24), RED, 6);
+            assert_close(decoded_video.pixel(index, index * 4 + 8, 8), GRAY, 3);
         }
     }
 
     #[test]
-    fn can_be_entered_every_two_seconds() {
+    fn there_is_a_keyframe_every_two_seconds() {
         let dir = tempfile::tempdir().unwrap();
-        let played = play(&write(&dir.path().join("long.mp4"), 64, 48, 41));
-        assert_eq!(played.keyframes, [0, 20, 40]);
+        let decoded_video = decode(&write(&dir.path().join("long.mp4"), 64, 48, 41));
+        assert_eq!(decoded_video.keyframes, [0, 20, 40]);
     }
 
     #[test]
-    fn odd_sides_grow_by_a_copy() {
+    fn odd_sides_are_padded_by_a_copy() {
         let dir = tempfile::tempdir().unwrap();
-        let played = play(&write(&dir.path().join("odd.mp4"), 33, 47, 5));
-        assert_eq!((played.size, played.frames.len()), ((34, 48), 5));
-        assert_close(played.pixel(4, 33, 24), GRAY, 5);
-        assert_close(played.pixel(4, 33, 47), GRAY, 5);
+        let decoded_video = decode(&write(&dir.path().join("odd.mp4"), 33, 47, 5));
+        assert_eq!((decoded_video.size, decoded_video.frames.len()), ((34, 48), 5));
+        assert_close(decoded_video.pixel(4, 33, 24), GRAY, 5);
+        assert_close(decoded_video.pixel(4, 33, 47), GRAY, 5);
     }
 
     #[test]
-    fn smallest_size_works() {
+    fn the_smallest_size_is_supported() {
         let dir = tempfile::tempdir().unwrap();
         for side in [(16, 16), (16, 64), (17, 16)] {
-            assert_eq!(play(&write(&dir.path().join("a.mp4"), side.0, side.1, 3)).frames.len(), 3);
+            assert_eq!(
+                decode(&write(&dir.path().join("a.mp4"), side.0, side.1, 3)).frames.len(),
+                3
+            );
         }
     }
 
@@ -237,11 +244,11 @@ mod mp4 {
         let dir = tempfile::tempdir().unwrap();
         let bytes = write(&dir.path().join("long.mp4"), 16, 16, 5000);
         assert_eq!(top_level_boxes(&bytes), ["ftyp", "free", "mdat", "moov"]);
-        assert_eq!(play(&bytes).frames.len(), 5000);
+        assert_eq!(decode(&bytes).frames.len(), 5000);
     }
 
     #[test]
-    fn same_frames_same_bytes() {
+    fn the_same_frames_give_the_same_bytes() {
         let dir = tempfile::tempdir().unwrap();
         let first = write(&dir.path().join("a.mp4"), 64, 48, 30);
         assert_eq!(write(&dir.path().join("b.mp4"), 64, 48, 30), first);

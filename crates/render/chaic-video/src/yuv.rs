@@ -1,21 +1,21 @@
-//! From RGB to the planes that an encoder takes: BT.709, limited range, color at half size.
+//! Conversion from RGB to YUV planes for the encoder: BT.709, limited range, 4:2:0.
 //!
-//! OpenH264's own conversion cuts fractions off instead of rounding, which tints light gray
-//! walls green, and rests on floating point; this one is in whole numbers.
+//! OpenH264's own conversion truncates instead of rounding, which tints light gray walls green, and
+//! uses floating point. This one uses integers.
 
 use image::RgbImage;
 use openh264::formats::YUVSource;
 
-/// Weights of red and blue in luma (BT.709); green has the rest.
+/// Weights of red and blue in luma (BT.709); green has the remainder.
 const LUMA_RED: f64 = 0.2126;
 const LUMA_BLUE: f64 = 0.0722;
 const LUMA_GREEN: f64 = 1.0 - LUMA_RED - LUMA_BLUE;
 
-/// Weights are whole numbers of 2^-16.
+/// Weights are integer multiples of 2^-16.
 const FRACTION_BITS: u32 = 16;
 const HALF: i32 = 1 << (FRACTION_BITS - 1);
 
-/// Luma spans 16 to 235, the two color planes 16 to 240.
+/// Luma spans 16 to 235, the two chroma planes 16 to 240.
 const LUMA_SPAN: f64 = 219.0 / 255.0;
 const CHROMA_SPAN: f64 = 112.0 / 255.0;
 
@@ -33,7 +33,7 @@ const V_WEIGHTS: [i32; 3] = {
     [red, -red - blue, blue]
 };
 
-/// A picture as planes of even size.
+/// An image as YUV planes of even size.
 pub(super) struct Planes {
     width: usize,
     height: usize,
@@ -46,7 +46,7 @@ pub(super) struct Planes {
 }
 
 impl Planes {
-    /// Planes for a picture of this size; an odd side grows by one.
+    /// Allocates planes for an image of this size; an odd side is padded by one.
     pub(super) fn new(width: u32, height: u32) -> Planes {
         let (half_width, half_height) = (width.div_ceil(2) as usize, height.div_ceil(2) as usize);
         let quarter = half_width * half_height;
@@ -59,7 +59,7 @@ impl Planes {
         }
     }
 
-    /// Converts a picture of the size given to `new`.
+    /// Converts an image of the size given to `new`.
     pub(super) fn read(&mut self, image: &RgbImage) {
         let row_bytes = image.width() as usize * 3;
         let last_row = image.height() as usize - 1;
@@ -98,7 +98,7 @@ impl YUVSource for Planes {
     }
 }
 
-/// Converts two rows of pixels; the last column is repeated where their number is odd.
+/// Converts two rows of pixels; the last column is repeated if the width is odd.
 fn convert_rows(rgb: [&[u8]; 2], y: [&mut [u8]; 2], u: &mut [u8], v: &mut [u8]) {
     let last = rgb[0].len() / 3 - 1;
     let [y_top, y_bottom] = y;
@@ -114,7 +114,7 @@ fn convert_rows(rgb: [&[u8]; 2], y: [&mut [u8]; 2], u: &mut [u8], v: &mut [u8]) 
                 }
             }
         }
-        // Two more bits: the sum of four pixels stands for their mean.
+        // Two more bits: the sum of four pixels instead of their mean.
         let chroma =
             |weights| (128 + ((dot(weights, sum) + 4 * HALF) >> (FRACTION_BITS + 2))) as u8;
         *u = chroma(U_WEIGHTS);
@@ -126,7 +126,7 @@ fn dot(weights: [i32; 3], rgb: [i32; 3]) -> i32 {
     weights[0] * rgb[0] + weights[1] * rgb[1] + weights[2] * rgb[2]
 }
 
-/// The nearest whole number of 2^-16; `value` is not negative.
+/// Rounds to an integer multiple of 2^-16; `value` must not be negative.
 const fn fixed(value: f64) -> i32 {
     (value * (1 << FRACTION_BITS) as f64 + 0.5) as i32
 }
@@ -137,7 +137,7 @@ mod tests {
 
     use super::*;
 
-    /// Planes of a picture in one color.
+    /// Converts an image of one color; returns the value of each plane.
     fn convert(rgb: [u8; 3]) -> [u8; 3] {
         let mut planes = Planes::new(3, 3);
         planes.read(&RgbImage::from_pixel(3, 3, Rgb(rgb)));
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn reference_colors() {
+    fn reference_colors_are_converted_exactly() {
         // ITU-R BT.709 at 8 bits, limited range.
         assert_eq!(convert([0, 0, 0]), [16, 128, 128]);
         assert_eq!(convert([255, 255, 255]), [235, 128, 128]);

@@ -1,37 +1,38 @@
-//! Frames per second of the world alone, two agents acting at random:
-//! `cargo bench -p chaic-episodes --bench world`. One iteration is a whole episode.
+//! Frames per second of the world alone, with two random agents: `cargo bench -p chaic-episodes
+//! --bench world`. One iteration is a whole episode.
 
 use std::hint::black_box;
 
-use chaic_core::rng::Stream;
+use chaic_core::rng::RngStream;
 use chaic_core::{Action, EntityId, Hand, ResolvedAction};
 use chaic_episodes::find_episode;
 use chaic_world::{Rules, Setup, World};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
-/// Half of all actions are steps, a quarter turns; the rest are interactions with things of the episode.
-fn any_action(rng: &mut Stream, n_things: usize) -> ResolvedAction {
+/// Draws an action: half of all actions are steps, a quarter turns, and the others interactions
+/// with objects of the episode.
+fn any_action(rng: &mut RngStream, n_objects: usize) -> ResolvedAction {
     let hand = if rng.chance(0.5) { Hand::Left } else { Hand::Right };
-    let thing = |rng: &mut Stream| -> EntityId { Setup::entity(rng.below(n_things)) };
+    let object = |rng: &mut RngStream| -> EntityId { Setup::entity(rng.below(n_objects)) };
     match rng.below(16) {
         0..8 => Action::MoveForward,
         8..10 => Action::TurnLeft,
         10..12 => Action::TurnRight,
-        12 => Action::PickUp { object: thing(rng), hand },
-        13 => Action::PutOn { place: thing(rng), hand },
-        14 => Action::RemoveObstacle { obstacle: thing(rng), hand },
+        12 => Action::PickUp { object: object(rng), hand },
+        13 => Action::PutOn { place: object(rng), hand },
+        14 => Action::RemoveObstacle { obstacle: object(rng), hand },
         _ => Action::PutIn,
     }
 }
 
-/// Plays to the end; returns how often somebody acted.
+/// Plays an episode to the end; returns the number of actions.
 fn play(mut world: World) -> u64 {
-    let mut rng = Stream::new(7, "bench", 0);
-    let n_things = world.setup().things.len();
+    let mut rng = RngStream::new(7, "bench", 0);
+    let n_objects = world.setup().things.len();
     let mut n_actions = 0;
     while !world.is_over() {
         for agent in world.waiting() {
-            world.submit(agent, any_action(&mut rng, n_things)).expect("the agent is free");
+            world.submit(agent, any_action(&mut rng, n_objects)).expect("the agent is free");
             n_actions += 1;
         }
         world.advance();

@@ -1,6 +1,7 @@
-//! Writes the bundled episodes and the standard split's digests anew: `cargo run --release -p chaic-episodes --example bundle`.
+//! Regenerates the bundled episodes and the digests of the standard split: `cargo run --release -p
+//! chaic-episodes --example bundle`.
 //!
-//! That changes the benchmark. The files are written to the crate's `data` folder.
+//! This changes the benchmark. The files are written to the crate's `data` folder.
 
 use std::path::Path;
 

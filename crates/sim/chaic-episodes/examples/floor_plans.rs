@@ -1,16 +1,15 @@
-//! Draws episodes from above: `cargo run -p chaic-episodes --example plan -- EPISODE.. OUT.png`, for
-//! example with the episodes `obstacle/test/03` and `obstacle/gen-standard/7`.
+//! Draws episodes from above: `cargo run -p chaic-episodes --example floor_plans -- EPISODE..
+//! OUT.png`, for example with the episodes `obstacle/test/03` and `obstacle/gen-standard/7`.
 //!
-//! A quick look for authors of generators; walls are dark, furniture colored by kind with a notch
-//! at its front, targets red, other objects orange, containers blue, obstacles magenta, people
-//! green, the goal place outlined.
+//! Walls are dark. Furniture is colored by class, with a notch at its front. Targets are red, other
+//! objects orange, containers blue, obstacles magenta, people green. The goal place is outlined.
 
 use std::collections::BTreeMap;
 
-use chaic_core::geom::{forward, rotate_yaw, xz};
+use chaic_core::geom::{forward, rotate_yaw, to_xz};
 use chaic_core::{Role, Vec2, Vec3};
 use chaic_episodes::{Episode, find_episode};
-use chaic_world::{Thing, Wall};
+use chaic_world::{ObjectSpec, Wall};
 use image::{Rgb, RgbImage};
 
 const PX_PER_M: f32 = 34.0;
@@ -34,22 +33,22 @@ impl Canvas {
         }
     }
 
-    fn thing(&mut self, thing: &Thing, color: [u8; 3], grow: f32) {
-        let half = 0.5 * thing.size_m() + grow;
-        let (at, yaw) = (thing.position, thing.yaw_rad);
+    fn draw_object(&mut self, object: &ObjectSpec, color: [u8; 3], grow: f32) {
+        let half = 0.5 * object.size_m() + grow;
+        let (at, yaw) = (object.position, object.yaw_rad);
         let local = move |p: Vec2| rotate_yaw(Vec3::new(p.x - at.x, 0.0, p.y - at.z), -yaw);
         let inside = |p: Vec2| {
             let l = local(p);
             let notch = l.z < -half.z + 0.08 && l.x.abs() < 0.06;
             l.x.abs() <= half.x && l.z.abs() <= half.z && !notch
         };
-        self.fill(color, inside, xz(at), half.length());
+        self.fill(color, inside, to_xz(at), half.length());
         let edge = |p: Vec2| {
             let l = local(p);
             let d = Vec2::new(half.x - l.x.abs(), half.z - l.z.abs());
             d.min_element() >= 0.0 && d.min_element() < 0.03
         };
-        self.fill(color.map(|c| c / 2), edge, xz(at), half.length());
+        self.fill(color.map(|c| c / 2), edge, to_xz(at), half.length());
     }
 
     fn wall(&mut self, wall: &Wall) {
@@ -65,8 +64,8 @@ impl Canvas {
     }
 }
 
-fn color(thing: &Thing) -> [u8; 3] {
-    match thing.class.name() {
+fn color(object: &ObjectSpec) -> [u8; 3] {
+    match object.class.name() {
         "bed" => [120, 150, 210],
         "cabinet" => [150, 90, 40],
         "refrigerator" => [210, 230, 240],
@@ -83,7 +82,7 @@ fn color(thing: &Thing) -> [u8; 3] {
 
 fn draw(episode: &Episode) -> RgbImage {
     let setup = episode.setup();
-    let bounds = setup.bounds.grown(if setup.ceiling_m.is_some() { 0.3 } else { 4.0 });
+    let bounds = setup.bounds.expanded(if setup.ceiling_m.is_some() { 0.3 } else { 4.0 });
     let size = bounds.size() * PX_PER_M;
     let image = RgbImage::from_pixel(size.x as u32, size.y as u32, Rgb([250, 250, 250]));
     let mut canvas = Canvas { image, min: bounds.min };
@@ -98,24 +97,24 @@ fn draw(episode: &Episode) -> RgbImage {
         y(*a).partial_cmp(&y(*b)).expect("positions are numbers")
     });
     for i in order {
-        let thing = &setup.things[i];
+        let object = &setup.things[i];
         if setup.goal_places.contains(&chaic_world::Setup::entity(i)) {
-            canvas.thing(thing, [255, 0, 200], 0.06);
+            canvas.draw_object(object, [255, 0, 200], 0.06);
         }
-        let role = thing.class.info().role;
+        let role = object.class.info().role;
         let (color, grow) = match role {
             Role::Container => ([40, 80, 230], 0.0),
             Role::Obstacle => ([230, 40, 230], 0.0),
-            _ if thing.fixed => (color(thing), 0.0),
-            _ if setup.goal.wanted(thing.class) > 0 => ([220, 20, 20], 0.03),
+            _ if object.fixed => (color(object), 0.0),
+            _ if setup.goal.count(object.class) > 0 => ([220, 20, 20], 0.03),
             _ => ([250, 150, 30], 0.03),
         };
-        canvas.thing(thing, color, grow);
+        canvas.draw_object(object, color, grow);
     }
     for person in &setup.people {
-        let (p, r) = (xz(person.pose.position), person.capability().radius_m);
+        let (p, r) = (to_xz(person.pose.position), person.capability().radius_m);
         canvas.fill([20, 140, 40], |q| q.distance(p) <= r, p, r);
-        let nose = p + r * xz(forward(person.pose.yaw_rad));
+        let nose = p + r * to_xz(forward(person.pose.yaw_rad));
         canvas.fill([0, 0, 0], |q| q.distance(nose) <= 0.07, nose, 0.1);
     }
     canvas.image
@@ -124,14 +123,14 @@ fn draw(episode: &Episode) -> RgbImage {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let [ids @ .., out] = &args[..] else {
-        return Err("usage: plan EPISODE.. OUT.png".into());
+        return Err("usage: floor_plans EPISODE.. OUT.png".into());
     };
     let mut images = Vec::new();
     for id in ids {
         let episode = find_episode(id)?;
         let mut counts: BTreeMap<&str, u32> = BTreeMap::new();
-        for thing in &episode.setup().things {
-            *counts.entry(thing.class.name()).or_default() += 1;
+        for object in &episode.setup().things {
+            *counts.entry(object.class.name()).or_default() += 1;
         }
         println!("{} {:?}\n{counts:?}", episode.id(), episode.setup().goal.targets);
         images.push(draw(&episode));

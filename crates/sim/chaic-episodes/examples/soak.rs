@@ -1,8 +1,8 @@
-//! Generates and checks many episodes: `cargo run --release -p chaic-episodes --example soak -- 1000`, and
-//! `-- 1000 standard` with the settings of the standard split.
+//! Generates and checks many episodes: `cargo run --release -p chaic-episodes --example soak --
+//! 1000`, and `-- 1000 standard` with the settings of the standard split.
 //!
-//! Every task is made for so many seeds; each episode must be valid, survive its own file, and
-//! come out the same twice. Prints what the episodes are like.
+//! Generates this number of seeds for every task. Each episode must be valid, be read back equal
+//! from its file, and be the same when generated again. Prints statistics of the episodes.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -12,24 +12,26 @@ use chaic_episodes::house::House;
 use chaic_episodes::{Episode, Settings, Split, episodes};
 use chaic_world::RoomKind;
 
-/// How houses come out, and what they are refused for.
+/// Prints the outcomes of attempts at houses, and the number of low slots per house.
 fn houses(n: u64, settings: Settings) {
     let mut results: BTreeMap<&str, u32> = BTreeMap::new();
     let mut places: BTreeMap<usize, u32> = BTreeMap::new();
-    let mut most = 0;
+    let mut max_attempts = 0;
     for seed in 0..n {
         for attempt in 0..u64::MAX {
             let house = House::attempt(seed, settings, attempt);
-            *results.entry(house.as_ref().map_or_else(|why| *why, |_| "fit")).or_default() += 1;
+            *results
+                .entry(house.as_ref().map_or_else(|reason| *reason, |_| "valid"))
+                .or_default() += 1;
             if let Ok(house) = house {
-                *places.entry(house.count_low_places() / 10 * 10).or_default() += 1;
-                most = most.max(attempt + 1);
+                *places.entry(house.n_low_slots() / 10 * 10).or_default() += 1;
+                max_attempts = max_attempts.max(attempt + 1);
                 break;
             }
         }
     }
-    println!("attempts at houses, at most {most} for one: {results:?}");
-    println!("houses by low places: {places:?}");
+    println!("attempts at houses, at most {max_attempts} for one: {results:?}");
+    println!("houses by number of low slots: {places:?}");
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -39,7 +41,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         None => Settings::PAPER,
         Some("standard") => Settings::STANDARD,
         Some(other) => {
-            return Err(format!("no settings `{other}`; write standard, or nothing").into());
+            return Err(format!("no settings `{other}`; write standard or omit it").into());
         }
     };
     houses(n, settings);
@@ -56,9 +58,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 _ => Split::Generated(seed..seed + 1),
             };
             let episode = episodes(&split, task).next();
-            let took = start.elapsed().as_secs_f64();
-            spent += took;
-            slowest = slowest.max(took);
+            let elapsed_s = start.elapsed().as_secs_f64();
+            spent += elapsed_s;
+            slowest = slowest.max(elapsed_s);
             let episode = match episode {
                 Some(Ok(episode)) => episode,
                 Some(Err(e)) => {
@@ -74,7 +76,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 Ok(again) if again == episode => {}
                 Ok(_) => {
                     failures += 1;
-                    println!("{}: reads back as something else", episode.id());
+                    println!("{}: differs when read from its file", episode.id());
                 }
                 Err(e) => {
                     failures += 1;
@@ -86,25 +88,26 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             if seed % 50 == 0
                 && chaic_episodes::generate_with(
                     task,
-                    chaic_episodes::Seeds { place: seed, episode: seed },
+                    chaic_episodes::GeneratorSeeds { place: seed, episode: seed },
                     settings,
                 )
                 .as_ref()
                     != Ok(setup)
             {
                 failures += 1;
-                println!("{}: comes out differently", episode.id());
+                println!("{}: differs when generated again", episode.id());
             }
             bytes += episode.to_json_line().len();
             things += setup.things.len();
             targets += setup.goal.total();
-            let is_container = |t: &&chaic_world::Thing| t.class.info().role == Role::Container;
+            let is_container =
+                |t: &&chaic_world::ObjectSpec| t.class.info().role == Role::Container;
             containers += setup.things.iter().filter(is_container).count();
             if task == TaskId::NoConstraint {
                 let named = setup.rooms.iter().filter(|r| r.kind != RoomKind::Outdoors).count();
                 *rooms.entry(named).or_default() += 1;
-                for thing in setup.things.iter().filter(|t| t.fixed) {
-                    *hosts.entry(thing.class.name()).or_default() += 1;
+                for object in setup.things.iter().filter(|t| t.fixed) {
+                    *hosts.entry(object.class.name()).or_default() += 1;
                 }
             }
         }
@@ -123,7 +126,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     println!("rooms: {rooms:?}");
     for (class, count) in hosts {
-        println!("  {class}: {:.2} a house", f64::from(count) / n as f64);
+        println!("  {class}: {:.2} per house", f64::from(count) / n as f64);
     }
     if failures == 0 { Ok(()) } else { Err(format!("{failures} failures").into()) }
 }

@@ -1,27 +1,32 @@
-//! Where worlds come from.
+//! Episodes: initial states of worlds.
 //!
 //! **What it is**: generators that turn a seed into a [`Setup`](chaic_world::Setup) ([`house`],
-//! [`street`], [`yard`]), the bundled benchmark and unlimited generated episodes ([`Split`],
-//! [`episodes`]), the episode file ([`Episode`], [`json_schema`]), and the check that an episode
-//! can be played ([`playable`], [`validate`]).
+//! [`street`], [`yard`]), and the sets of bundled and generated episodes ([`Split`], [`episodes`]).
+//! It also holds the seed ranges of all data sets ([`SEED_RANGES`]) and the episode file
+//! ([`Episode`], [`json_schema`]). [`playable`] and [`validate`] check episodes.
 //!
-//! **What it is not**: it never steps a world, keeps no scores and opens no files; bytes come in
-//! and go out.
+//! **What it is not**: it does not step worlds, compute scores or open files; it reads and returns
+//! bytes.
 //!
 //! **Invariants**
-//! - An [`Episode`] is valid: it comes from [`Episode::new`] or [`Episode::parse`], which check.
-//! - A generator depends on its seeds only, and gives the same bytes on every machine.
-//! - The bundled episodes are data: they stay as they are when a generator changes.
-//! - An episode of the standard split has the digest that is committed for it, or is an error.
-//! - No surroundings (walls, furniture) of one split occur in another, but for the street and the
-//!   yard of the paper's shape, which are one street and one yard.
+//! - An [`Episode`] is valid: [`Episode::new`] and [`Episode::parse`] check it.
+//! - A generator depends on its seeds only, and returns the same bytes on every machine.
+//! - The bundled episodes are data: they stay the same when a generator changes.
+//! - An episode of the standard split has the committed digest, or looking it up is an error.
+//! - Surroundings (walls, furniture) of one split do not occur in another. Exception: with the
+//!   paper's settings there is one street and one yard.
 
 mod format;
 mod validate;
 
+mod seeds;
 mod split;
+
+mod bundled;
+mod lookup;
 mod standard;
 
+mod attempts;
 mod generate;
 pub mod house;
 mod settings;
@@ -32,12 +37,19 @@ mod free_space;
 mod outdoors;
 mod upright_box;
 
+pub use attempts::GenerateError;
+pub use bundled::{Bundled, regenerate_bundled};
 pub use format::{Episode, EpisodeError, GeneratorInfo, MAX_EPISODE_BYTES, json_schema};
-pub use generate::{GenerateError, Seeds, generate, generate_with};
-pub use settings::Settings;
-pub use split::{
-    BUNDLED_PER_TASK, Bundled, Split, SplitError, episodes, find_episode, regenerate_bundled,
+pub use generate::{generate, generate_with};
+pub use lookup::{episodes, find_episode};
+pub use seeds::{
+    BUNDLED_PER_TASK, DatasetSplit, GeneratorSeeds, SEED_RANGES, STANDARD_PER_TASK, SeedPurpose,
+    SeedRange,
 };
-pub use standard::{STANDARD_PER_TASK, standard_table};
+pub use settings::Settings;
+pub use split::{Split, SplitError};
+pub use standard::standard_table;
 pub use upright_box::{UprightBox, mm, mm3};
-pub use validate::{Problem, Walker, out_of_reach, playable, validate, ways_from};
+pub use validate::{
+    Problem, ReachabilityParams, path_lengths_from, playable, unreachable_objects, validate,
+};

@@ -1,54 +1,55 @@
-//! The shopping street: six shops along a road, the house at its end (facts S8.1, mirrored in z).
+//! Shopping street: six shops along a road, with the house at its end (facts S8.1, mirrored in z).
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
 use chaic_core::briefing::Goal;
 use chaic_core::capability::{PersonKind, Persona};
-use chaic_core::geom::{Pose, Rect, xz};
-use chaic_core::rng::Stream;
+use chaic_core::geom::{Pose, Rect, to_xz};
+use chaic_core::rng::RngStream;
 use chaic_core::{ClassId, TaskId, Vec2, Vec3};
-use chaic_world::{Person, Setup, Thing, top_surfaces};
+use chaic_world::{AgentSpec, ObjectSpec, Setup, top_surfaces};
 
 use crate::Settings;
-use crate::generate::{GenerateError, Seeds, first_valid};
+use crate::attempts::{GenerateError, first_valid};
 use crate::outdoors::{self, OutdoorParts, Scenery, ground};
+use crate::seeds::GeneratorSeeds;
 use crate::upright_box::{mm, mm3};
 
-/// Version of this generator; goes up with every change of what it makes.
+/// Version of this generator; incremented with every change of its output.
 pub const VERSION: u32 = 1;
 
 const ATTEMPTS: u64 = 400;
-/// Attempts in one place before another is tried.
+/// Attempts per place.
 const PLACE_ATTEMPTS: u64 = 100;
-/// The strip that the original's maps cover.
+/// Area that the original's maps cover.
 const BOUNDS: Rect = Rect { min: Vec2::new(-3.0, -7.5), max: Vec2::new(25.0, 6.0) };
 const ROAD_Z: [f32; 2] = [-2.7, 1.2];
 const PAVEMENT_Z: [f32; 2] = [-6.1, 3.9];
-/// Where the purchases go: the hydrant before the rider's house.
+/// Position of the goal place: the hydrant in front of the rider's house.
 const HYDRANT: [f32; 2] = [2.0, -5.5];
-/// Where shelves stand, from the tent's middle along the road, and towards it.
+/// Offset of shelves from the tent's center, along the road and towards it.
 const SHELF_OFFSET_M: [f32; 2] = [0.7, 0.5];
-/// The shelf's outdoor size over the catalogue's (facts S8.1 against S9.1).
+/// Size of outdoor shelves relative to the catalogue's (facts S8.1 against S9.1).
 const SHELF_SCALE: [f32; 3] = [1.25, 1.0, 1.5];
-/// Places of goods along a shelf, metres from its middle.
+/// Positions of goods along a shelf, meters from its center.
 const SLOTS_M: [f32; 3] = [0.0, -0.4, 0.4];
-/// Between partner and helper at the start, metres.
+/// Minimum distance between partner and helper at the start, meters.
 const PEOPLE_APART_M: f32 = 5.0;
-/// How far the shops of one side, and each for itself, may stand from the paper's places along the
-/// road and how far back, metres (ours: tents of 2.4 m every 5 m stay apart, and people start
-/// between them).
+/// Maximum offsets of shops from the paper's positions, meters: of all shops of one side along the
+/// road, of each shop along the road, and of each shop away from it. The values are ours: tents of
+/// 2.4 m every 5 m stay apart, and people start between them.
 const SIDE_SHIFT_M: f32 = 1.0;
 const SHOP_SHIFT_M: f32 = 0.7;
 const SHOP_BACK_M: f32 = 0.3;
-/// How far the hydrant may stand from the paper's place, metres: still before the rider's house,
-/// which goes with it, and inside the bounds.
+/// Maximum offset of the hydrant from the paper's position, meters. It stays inside the bounds and
+/// in front of the rider's house, which moves with it.
 const HYDRANT_SHIFT_M: f32 = 1.5;
-/// How many shops have a basket.
+/// Number of shops with a basket.
 const BASKETS: usize = 3;
 const BASKET_CLASSES: [&str; 4] =
     ["bamboo_basket", "plastic_basket", "wicker_basket", "wood_basket"];
 
-/// A shop: its tent's middle and what it sells.
+/// A shop: the center of its tent, and its goods.
 #[derive(Clone, Copy)]
 struct Shop {
     at: [f32; 2],
@@ -66,29 +67,30 @@ const SHOPS: [Shop; 6] = [
 ];
 
 impl Shop {
-    /// Yaw of what looks at the road from here.
+    /// Returns the yaw of objects that face the road.
     fn yaw_rad(&self) -> f32 {
         if self.at[1] > 0.0 { 0.0 } else { PI }
     }
 }
 
-/// Where a street has its shops and its goal place.
+/// Positions of the shops and of the goal place.
 struct Layout {
     shops: [Shop; 6],
-    /// Which of a shop's shelves is listed first, and may bear a basket: the one at lower x, or not.
+    /// Side of the shelf that is listed first and may hold a basket, per shop: -1 for lower x, or
+    /// 1.
     first_shelf: [f32; 6],
     hydrant: [f32; 2],
-    /// Whether the rider's house is at the other end of the road.
+    /// True if the rider's house is at the other end of the road.
     is_mirrored: bool,
 }
 
 impl Layout {
-    /// The original's, in every episode.
+    /// The original's layout.
     const PAPER: Layout =
         Layout { shops: SHOPS, first_shelf: [-1.0; 6], hydrant: HYDRANT, is_mirrored: false };
 
-    /// Another one: who sells what where, and where along the road the shops and the house are.
-    fn varied(rng: &mut Stream) -> Layout {
+    /// Draws a layout: the shop of each stock, and the positions of shops and house along the road.
+    fn varied(rng: &mut RngStream) -> Layout {
         let mut stocks = SHOPS.map(|shop| shop.stock);
         rng.shuffle(&mut stocks);
         let mut side = || rng.range(-SIDE_SHIFT_M, SIDE_SHIFT_M);
@@ -98,7 +100,7 @@ impl Layout {
             shop.stock = stock;
             let row_m = shift_m[usize::from(shop.at[1] > 0.0)];
             shop.at[0] += row_m + rng.range(-SHOP_SHIFT_M, SHOP_SHIFT_M);
-            // Away from the road only, which stays as wide as it is.
+            // Away from the road only, which keeps its width.
             shop.at[1] += shop.at[1].signum() * rng.range(0.0, SHOP_BACK_M);
         }
         let first_shelf = shops.map(|_| if rng.chance(0.5) { -1.0 } else { 1.0 });
@@ -107,32 +109,36 @@ impl Layout {
     }
 }
 
-/// A shopping episode of these seeds.
+/// Generates a shopping episode.
 ///
 /// # Errors
 /// [`GenerateError`] if no attempt led to a valid setup.
-pub fn generate(task: TaskId, seeds: Seeds, settings: Settings) -> Result<Setup, GenerateError> {
+pub fn generate(
+    task: TaskId,
+    seeds: GeneratorSeeds,
+    settings: Settings,
+) -> Result<Setup, GenerateError> {
     first_valid(task, seeds, ATTEMPTS, |attempt| setup(task, seeds, settings, attempt))
 }
 
 fn setup(
     task: TaskId,
-    seeds: Seeds,
+    seeds: GeneratorSeeds,
     settings: Settings,
     attempt: u64,
 ) -> Result<Setup, &'static str> {
-    let stream = |purpose: &str| Stream::new(seeds.episode, purpose, attempt);
-    let mut people = people(task, &mut stream("shopping/people"))?;
+    let stream = |purpose: &str| RngStream::new(seeds.episode, purpose, attempt);
+    let mut people = draw_people(task, &mut stream("shopping/people"))?;
     let layout = if settings.varied_layout {
-        Layout::varied(&mut Stream::new(seeds.place, "street/layout", attempt / PLACE_ATTEMPTS))
+        Layout::varied(&mut RngStream::new(seeds.place, "street/layout", attempt / PLACE_ATTEMPTS))
     } else {
         Layout::PAPER
     };
     // The place stays the same for many attempts, so that episodes share it.
-    let scenery_rng = &mut Stream::new(seeds.place, "street/scenery", attempt / PLACE_ATTEMPTS);
+    let scenery_rng = &mut RngStream::new(seeds.place, "street/scenery", attempt / PLACE_ATTEMPTS);
     let floors = ground(BOUNDS, ROAD_Z, PAVEMENT_Z, scenery_rng);
     let mut scenery = Scenery::new(vec![Rect::new([8.0, ROAD_Z[0]], [22.0, ROAD_Z[1]])]);
-    let hydrant = scenery.put("fire_hydrant", layout.hydrant, PI, 0);
+    let hydrant = scenery.add("fire_hydrant", layout.hydrant, PI, 0);
     let shelves = shops(&mut scenery, &layout, scenery_rng);
     surroundings(&mut scenery, layout.hydrant, scenery_rng);
 
@@ -142,23 +148,23 @@ fn setup(
     }
     things.push(bicycle(&people[0]));
     stock(&mut things, &layout.shops, &shelves, &mut stream("shopping/stock"));
-    let goal = goal(seeds.episode, &mut stream("shopping/goal"));
+    let goal = draw_goal(seeds.episode, &mut stream("shopping/goal"));
     let parts = OutdoorParts { floors, things, people, goal, goal_place: hydrant };
     Ok(outdoors::setup(task, seeds.episode, BOUNDS, parts))
 }
 
-/// Tents with two shelves each; returns per shop which things its shelves are.
-fn shops(scenery: &mut Scenery, layout: &Layout, rng: &mut Stream) -> Vec<[usize; 2]> {
+/// Adds tents with two shelves each; returns the indices of the shelves per shop.
+fn shops(scenery: &mut Scenery, layout: &Layout, rng: &mut RngStream) -> Vec<[usize; 2]> {
     let mut shelves = Vec::new();
     for (k, shop) in layout.shops.iter().enumerate() {
         let variant = rng.below(8) + k;
-        scenery.put("tent", shop.at, shop.yaw_rad(), variant);
+        scenery.add("tent", shop.at, shop.yaw_rad(), variant);
         let towards_road = if shop.at[1] > 0.0 { -SHELF_OFFSET_M[1] } else { SHELF_OFFSET_M[1] };
         let first = layout.first_shelf[k];
         shelves.push([first, -first].map(|side| {
             let at = [shop.at[0] + side * SHELF_OFFSET_M[0], shop.at[1] + towards_road];
             // The shelf's long side is its z.
-            let i = scenery.put("wood_shelving", at, FRAC_PI_2, 0);
+            let i = scenery.add("wood_shelving", at, FRAC_PI_2, 0);
             scenery.things[i].scale = SHELF_SCALE;
             i
         }));
@@ -166,9 +172,9 @@ fn shops(scenery: &mut Scenery, layout: &Layout, rng: &mut Stream) -> Vec<[usize
     shelves
 }
 
-/// The rider's house, its neighbors, and what stands along the road.
-fn surroundings(scenery: &mut Scenery, hydrant: [f32; 2], rng: &mut Stream) {
-    scenery.put("house_front", [hydrant[0], -8.05], PI, rng.below(8));
+/// Adds the rider's house, its neighbors, and objects along the road.
+fn surroundings(scenery: &mut Scenery, hydrant: [f32; 2], rng: &mut RngStream) {
+    scenery.add("house_front", [hydrant[0], -8.05], PI, rng.below(8));
     scenery.houses(rng, [7.0, 30.0], -8.8, PI);
     scenery.houses(rng, [-8.0, 30.0], 7.4, 0.0);
     let fence = rng.below(8);
@@ -176,16 +182,16 @@ fn surroundings(scenery: &mut Scenery, hydrant: [f32; 2], rng: &mut Stream) {
     scenery.fence([-3.0, 25.0], 6.12, 0.0, fence);
     for x in [5.0, 12.5, 17.5, 23.5] {
         let x = x + rng.range(-0.3, 0.3);
-        scenery.put_if_free("street_lamp", [x, ROAD_Z[1] + 0.75], 0.0, 0, 0.3);
+        scenery.add_if_free("street_lamp", [x, ROAD_Z[1] + 0.75], 0.0, 0, 0.3);
         let x = x + rng.range(-0.3, 0.3);
-        scenery.put_if_free("street_lamp", [x, ROAD_Z[0] - 0.75], PI, 0, 0.3);
+        scenery.add_if_free("street_lamp", [x, ROAD_Z[0] - 0.75], PI, 0, 0.3);
     }
     for _ in 0..3 {
         let (near, far) = (rng.range(-2.0, 7.5), rng.range(4.5, 24.0));
-        scenery.put_if_free("bench", [near, 3.4], 0.0, rng.below(8), 0.6);
-        scenery.put_if_free("bench", [far, -5.7], PI, rng.below(8), 0.6);
+        scenery.add_if_free("bench", [near, 3.4], 0.0, rng.below(8), 0.6);
+        scenery.add_if_free("bench", [far, -5.7], PI, rng.below(8), 0.6);
     }
-    scenery.put_if_free("mailbox", [rng.range(4.5, 7.5), -3.7], PI, rng.below(8), 0.5);
+    scenery.add_if_free("mailbox", [rng.range(4.5, 7.5), -3.7], PI, rng.below(8), 0.5);
     scenery.trees(rng, Rect::new([-2.5, 4.9], [24.5, 5.4]), 6);
     scenery.trees(rng, Rect::new([7.0, -6.9], [24.5, -6.4]), 5);
     scenery.trees(rng, Rect::new([-14.0, -16.0], [36.0, -11.5]), 8);
@@ -194,8 +200,13 @@ fn surroundings(scenery: &mut Scenery, hydrant: [f32; 2], rng: &mut Stream) {
     scenery.trees(rng, Rect::new([27.0, 3.0], [36.0, 9.0]), 3);
 }
 
-/// Puts the goods of all shops, and baskets on the first shelves of three.
-fn stock(things: &mut Vec<Thing>, shops: &[Shop], shelves: &[[usize; 2]], rng: &mut Stream) {
+/// Places the goods of all shops, and baskets on the first shelves of three.
+fn stock(
+    things: &mut Vec<ObjectSpec>,
+    shops: &[Shop],
+    shelves: &[[usize; 2]],
+    rng: &mut RngStream,
+) {
     let mut with_basket: Vec<usize> = (0..shops.len()).collect();
     rng.shuffle(&mut with_basket);
     let mut baskets = BASKET_CLASSES;
@@ -205,26 +216,32 @@ fn stock(things: &mut Vec<Thing>, shops: &[Shop], shelves: &[[usize; 2]], rng: &
         let mut slots: Vec<(usize, usize, f32)> = Vec::new();
         for shelf in 0..2 {
             for level in 0..3 {
-                let is_taken = basket.is_some() && shelf == 0 && level == 2;
-                let free = SLOTS_M.iter().filter(|_| !is_taken);
+                let is_occupied = basket.is_some() && shelf == 0 && level == 2;
+                let free = SLOTS_M.iter().filter(|_| !is_occupied);
                 slots.extend(free.map(|m| (shelf, level, *m)));
             }
         }
         rng.shuffle(&mut slots);
         if let Some(n) = basket {
-            let thing = on_shelf(&things[shelves[k][0]], baskets[n], 2, 0.0, rng);
-            things.push(thing);
+            let object = on_shelf(&things[shelves[k][0]], baskets[n], 2, 0.0, rng);
+            things.push(object);
         }
         let goods = shop.stock.iter().flat_map(|(name, n)| std::iter::repeat_n(*name, *n));
         for (name, (shelf, level, along_m)) in goods.zip(slots) {
-            let thing = on_shelf(&things[shelves[k][shelf]], name, level, along_m, rng);
-            things.push(thing);
+            let object = on_shelf(&things[shelves[k][shelf]], name, level, along_m, rng);
+            things.push(object);
         }
     }
 }
 
-/// A thing on a board of a shelf, the lowest being 0.
-fn on_shelf(shelf: &Thing, class: &str, level: usize, along_m: f32, rng: &mut Stream) -> Thing {
+/// Returns an object on a board of a shelf; board 0 is the lowest.
+fn on_shelf(
+    shelf: &ObjectSpec,
+    class: &str,
+    level: usize,
+    along_m: f32,
+    rng: &mut RngStream,
+) -> ObjectSpec {
     let mut boards = top_surfaces(shelf);
     boards.sort_by(|a, b| a.center.y.total_cmp(&b.center.y));
     let board = boards[level];
@@ -233,48 +250,49 @@ fn on_shelf(shelf: &Thing, class: &str, level: usize, along_m: f32, rng: &mut St
     let along_m = along_m + if is_container { 0.0 } else { rng.range(-0.03, 0.03) };
     let position = mm3(board.center + Vec3::new(along_m, 0.0, 0.0));
     let yaw_rad = if is_container { 0.0 } else { mm(rng.range(-0.6, 0.6)) };
-    let mut thing = Thing::new(class, position, yaw_rad);
-    thing.variant = rng.below(class.info().palette.len().max(1)) as u8;
-    thing
+    let mut object = ObjectSpec::new(class, position, yaw_rad);
+    object.variant = rng.below(class.info().palette.len().max(1)) as u8;
+    object
 }
 
-/// Everything of the episode's category, and one of something else (facts S8.1).
-fn goal(seed: u64, rng: &mut Stream) -> Goal {
+/// Returns the goal: all goods of the episode's category, and one of another (facts S8.1).
+fn draw_goal(seed: u64, rng: &mut RngStream) -> Goal {
     let category = (seed % 3) as usize;
     let stock = |c: usize| SHOPS[2 * c..2 * c + 2].iter().flat_map(|s| s.stock.iter());
     let mut targets: Vec<(ClassId, u32)> = Vec::new();
     for (name, n) in stock(category) {
         let class = ClassId::named(name);
         match targets.iter_mut().find(|(c, _)| *c == class) {
-            Some((_, wanted)) => *wanted += *n as u32,
+            Some((_, count)) => *count += *n as u32,
             None => targets.push((class, *n as u32)),
         }
     }
-    let mut others: Vec<ClassId> = (0..3)
+    let mut other_classes: Vec<ClassId> = (0..3)
         .filter(|c| *c != category)
         .flat_map(stock)
         .map(|(name, _)| ClassId::named(name))
         .collect();
-    others.sort();
-    others.dedup();
-    targets.extend(rng.choose(&others).map(|c| (*c, 1)));
+    other_classes.sort();
+    other_classes.dedup();
+    targets.extend(rng.choose(&other_classes).map(|c| (*c, 1)));
     targets.sort();
     Goal { targets }
 }
 
-/// The rider looking homewards, the helper some way off, the child by the rider.
-fn people(task: TaskId, rng: &mut Stream) -> Result<Vec<Person>, &'static str> {
-    let mut anywhere = || {
+/// Draws the poses of people: the rider faces the house, the helper is at a distance, and the child
+/// is beside the rider.
+fn draw_people(task: TaskId, rng: &mut RngStream) -> Result<Vec<AgentSpec>, &'static str> {
+    let mut random_position = || {
         let (x, z) = (rng.range(10.0, 20.0), rng.range(-1.8, 0.8));
         Vec3::new(mm(x), 0.0, mm(z))
     };
-    let (partner, helper) = (anywhere(), anywhere());
-    if xz(partner).distance(xz(helper)) <= PEOPLE_APART_M {
+    let (partner, helper) = (random_position(), random_position());
+    if to_xz(partner).distance(to_xz(helper)) <= PEOPLE_APART_M {
         return Err("partner and helper are too near to each other");
     }
     let child = mm3(partner + Vec3::new(1.0, 0.0, -1.0));
     let mut person = |kind: PersonKind, position: Vec3, yaw_rad: f32| {
-        Person::new(kind, Pose { position, yaw_rad: mm(yaw_rad) }, rng.below(16) as u8)
+        AgentSpec::new(kind, Pose { position, yaw_rad: mm(yaw_rad) }, rng.below(16) as u8)
     };
     Ok(vec![
         person(task.info().partner, partner, FRAC_PI_2),
@@ -283,8 +301,8 @@ fn people(task: TaskId, rng: &mut Stream) -> Result<Vec<Person>, &'static str> {
     ])
 }
 
-/// The bicycle at the rider's left hand.
-fn bicycle(rider: &Person) -> Thing {
+/// Returns the bicycle at the rider's left hand.
+fn bicycle(rider: &AgentSpec) -> ObjectSpec {
     let position = mm3(rider.pose.to_world(Vec3::new(-0.45, 0.0, -0.1)));
-    Thing::new(ClassId::named("bike"), position, rider.pose.yaw_rad)
+    ObjectSpec::new(ClassId::named("bike"), position, rider.pose.yaw_rad)
 }

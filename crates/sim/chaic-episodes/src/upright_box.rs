@@ -1,17 +1,17 @@
-//! Upright boxes in plan: what lies in what, what is how far from what.
+//! Upright boxes in plan: overlaps and distances.
 
-use chaic_core::geom::{Rect, math, rotate_yaw, xz};
+use chaic_core::geom::{Rect, math, rotate_yaw, to_xz};
 use chaic_core::{Vec2, Vec3};
-use chaic_world::{Block, Setup, Thing, Wall, blocks_of};
+use chaic_world::{Block, ObjectSpec, Setup, Wall, blocks_of};
 use glam::Vec3Swizzles as _;
 
-/// A box with an upright axis, ready for tests in plan.
+/// A box with a vertical axis, prepared for tests in plan.
 #[derive(Clone, Copy, Debug)]
 pub struct UprightBox {
     pub(crate) middle: Vec2,
-    /// Unit vector of its own x axis, in plan.
+    /// Unit vector of the box's x axis, in plan.
     axis_x: Vec2,
-    /// Unit vector of its own z axis, in plan.
+    /// Unit vector of the box's z axis, in plan.
     axis_z: Vec2,
     half: Vec2,
     pub(crate) low_m: f32,
@@ -21,7 +21,7 @@ pub struct UprightBox {
 impl UprightBox {
     fn new(center: Vec3, half: Vec3, yaw_rad: f32) -> UprightBox {
         UprightBox {
-            middle: xz(center),
+            middle: to_xz(center),
             axis_x: rotate_yaw(Vec3::X, yaw_rad).xz(),
             axis_z: rotate_yaw(Vec3::Z, yaw_rad).xz(),
             half: half.xz(),
@@ -30,8 +30,8 @@ impl UprightBox {
         }
     }
 
-    /// The box of a wall: half its thickness longer at both ends, as the world has it.
-    pub(crate) fn of_wall(wall: &Wall) -> UprightBox {
+    /// Returns the box of a wall: half its thickness longer at both ends, as in the world.
+    pub(crate) fn from_wall(wall: &Wall) -> UprightBox {
         let along = wall.b - wall.a;
         let middle = 0.5 * (wall.a + wall.b);
         let half = Vec3::new(
@@ -43,19 +43,19 @@ impl UprightBox {
         UprightBox::new(center, half, math::atan2(-along.y, along.x))
     }
 
-    /// A box of the world.
-    pub fn of_block(b: &Block) -> UprightBox {
+    /// Converts a box of the world.
+    pub fn from_block(b: &Block) -> UprightBox {
         UprightBox::new(b.center, b.half, b.yaw_rad)
     }
 
-    /// The colliding boxes of a thing.
-    pub fn of_thing(thing: &Thing) -> Vec<UprightBox> {
-        blocks_of(thing).iter().map(UprightBox::of_block).collect()
+    /// Returns the colliding boxes of an object.
+    pub fn from_object(object: &ObjectSpec) -> Vec<UprightBox> {
+        blocks_of(object).iter().map(UprightBox::from_block).collect()
     }
 
-    /// All walls of a setup.
-    pub fn of_walls(setup: &Setup) -> Vec<UprightBox> {
-        setup.walls.iter().map(UprightBox::of_wall).collect()
+    /// Returns the boxes of all walls of a setup.
+    pub fn from_walls(setup: &Setup) -> Vec<UprightBox> {
+        setup.walls.iter().map(UprightBox::from_wall).collect()
     }
 
     fn local(&self, p: Vec2) -> Vec2 {
@@ -63,29 +63,29 @@ impl UprightBox {
         Vec2::new(d.dot(self.axis_x), d.dot(self.axis_z))
     }
 
-    /// Distance in plan from a point; 0 inside.
+    /// Returns the distance in plan from a point; 0 inside.
     pub fn distance(&self, p: Vec2) -> f32 {
         (self.local(p).abs() - self.half).max(Vec2::ZERO).length()
     }
 
-    /// The nearest point in plan.
+    /// Returns the nearest point in plan.
     pub(crate) fn nearest(&self, p: Vec2) -> Vec2 {
         let l = self.local(p).clamp(-self.half, self.half);
         self.middle + self.axis_x * l.x + self.axis_z * l.y
     }
 
-    /// The smallest axis-aligned rectangle around it.
+    /// Returns the smallest axis-aligned rectangle around the box.
     pub fn bounds(&self) -> Rect {
         let reach = self.axis_x.abs() * self.half.x + self.axis_z.abs() * self.half.y;
         Rect { min: self.middle - reach, max: self.middle + reach }
     }
 
-    /// Whether it takes up any height between `low_m` and `high_m`.
+    /// Returns whether the box occupies any height between `low_m` and `high_m`.
     pub fn spans(&self, [low_m, high_m]: [f32; 2]) -> bool {
         self.low_m < high_m && self.high_m > low_m
     }
 
-    /// How deep two boxes sit in each other, metres; 0 or less if they are apart.
+    /// Returns the penetration depth of two boxes, meters; 0 or less if they are apart.
     pub fn overlap(&self, other: &UprightBox) -> f32 {
         let mut depth = (self.high_m.min(other.high_m)) - (self.low_m.max(other.low_m));
         let d = other.middle - self.middle;
@@ -103,7 +103,7 @@ impl UprightBox {
         self.axis_x.dot(axis).abs() * self.half.x + self.axis_z.dot(axis).abs() * self.half.y
     }
 
-    /// Whether the straight line from `a` to `b` crosses it in plan.
+    /// Returns whether the line segment from `a` to `b` crosses the box in plan.
     pub(crate) fn cuts(&self, a: Vec2, b: Vec2) -> bool {
         let (a, b) = (self.local(a), self.local(b));
         let d = b - a;
@@ -124,25 +124,26 @@ impl UprightBox {
     }
 }
 
-/// The smallest axis-aligned rectangle around a thing's colliding parts.
-pub(crate) fn plan_bounds(thing: &Thing) -> Rect {
-    let mut rects = UprightBox::of_thing(thing).into_iter().map(|s| s.bounds());
-    let first = rects.next().unwrap_or(Rect { min: xz(thing.position), max: xz(thing.position) });
+/// Returns the smallest axis-aligned rectangle around the colliding parts of an object.
+pub(crate) fn plan_bounds(object: &ObjectSpec) -> Rect {
+    let mut rects = UprightBox::from_object(object).into_iter().map(|s| s.bounds());
+    let first =
+        rects.next().unwrap_or(Rect { min: to_xz(object.position), max: to_xz(object.position) });
     rects.fold(first, |a, b| Rect { min: a.min.min(b.min), max: a.max.max(b.max) })
 }
 
-/// Distance in plan from a point to a rectangle; 0 inside.
+/// Returns the distance in plan from a point to a rectangle; 0 inside.
 pub(crate) fn rect_distance(r: &Rect, p: Vec2) -> f32 {
     (r.min - p).max(p - r.max).max(Vec2::ZERO).length()
 }
 
-/// To the millimetre, so that the text of a file names the very number.
+/// Rounds to the millimeter, so that decimal text represents the value exactly.
 pub fn mm(x: f32) -> f32 {
     // Adding zero turns -0 into 0.
     (x * 1000.0).round() / 1000.0 + 0.0
 }
 
-/// A point to the millimetre.
+/// Rounds a point to the millimeter.
 pub fn mm3(p: Vec3) -> Vec3 {
     Vec3::new(mm(p.x), mm(p.y), mm(p.z))
 }
@@ -156,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn overlap_is_a_depth() {
+    fn overlap_is_the_penetration_depth() {
         for (x, yaw, expected) in
             [(0.9, 0.0, 0.1), (1.1, 0.0, -0.1), (1.1, std::f32::consts::FRAC_PI_4, 0.107)]
         {
@@ -166,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_cut_boxes_or_pass_them() {
+    fn lines_cross_boxes_or_miss_them() {
         let c = cube(0.0, 0.0, 0.3);
         assert!(c.cuts(Vec2::new(-2.0, 0.0), Vec2::new(2.0, 0.1)));
         assert!(!c.cuts(Vec2::new(-2.0, 0.0), Vec2::new(-0.8, 0.1)));

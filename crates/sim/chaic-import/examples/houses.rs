@@ -1,9 +1,8 @@
-//! Tells how far things lie from the bed in each house of the original:
-//! `cargo run --release -p chaic-import --example houses -- DATASET TDW [OUT]`; with OUT it also
-//! draws each house from above, `OUT/SCENE-LAYOUT.png`.
+//! Prints path lengths to the bed in each house of the original: `cargo run --release -p
+//! chaic-import --example houses -- DATASET TDW [OUT]`. With OUT it also draws each house from
+//! above, `OUT/SCENE-LAYOUT.png`.
 //!
-//! The way is a grown-up's, from every piece of furniture that may have something lying on it to
-//! the bed.
+//! Paths are those of an adult, from each piece of furniture that can hold objects to the bed.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -11,18 +10,18 @@ use std::path::PathBuf;
 use chaic_core::ClassId;
 use chaic_core::capability::Persona;
 use chaic_core::geom::Pose;
-use chaic_episodes::{Walker, ways_from};
+use chaic_episodes::{ReachabilityParams, path_lengths_from};
 use chaic_import::{Sources, house};
-use chaic_world::{Person, Rules, Setup, World};
+use chaic_world::{AgentSpec, Rules, Setup, World};
 use glam::Vec3Swizzles as _;
 
-/// Floor plans with the half of the episodes that plays in them.
+/// Floor plans with the half of the episodes that uses them.
 const FLOORPLANS: [(&str, &str); 4] =
     [("1a", "training"), ("4a", "training"), ("2a", "test"), ("5a", "test")];
-/// Side of the grid's cells, metres.
+/// Side of the grid's cells, meters.
 const CELL_M: f32 = 0.05;
-/// A child's way in the last quarter of an episode, when what is carried must be brought, metres.
-fn child_way_m() -> f32 {
+/// Returns the distance that a child walks in the last quarter of an episode, meters.
+fn child_distance_m() -> f32 {
     Persona::Child.capability().speed_m_per_frame * 750.0
 }
 
@@ -34,16 +33,16 @@ fn main() -> Result<(), Box<dyn Error>> {
         _ => return Err("usage: houses DATASET TDW [OUT]".into()),
     };
     let sources = Sources { dataset: dataset.into(), tdw: tdw.into(), half: None };
-    let far_m = child_way_m();
-    println!("house     half      pieces  mean way (m)  within {far_m:.1} m");
+    let far_m = child_distance_m();
+    println!("house     half      pieces  mean path (m)  within {far_m:.1} m");
     for (scene, half) in FLOORPLANS {
         for layout in 0..3 {
             let setup = house(&sources, scene, layout)?;
-            let ways_m = ways_to_bed(&setup);
-            let n = ways_m.len() as f32;
-            let mean_m = ways_m.iter().sum::<f32>() / n;
-            let near = ways_m.iter().filter(|m| **m <= far_m).count() as f32 / n;
-            println!("{scene}/{layout}      {half:8}  {n:6}  {mean_m:12.1}  {near:13.2}");
+            let lengths_m = path_lengths_to_bed(&setup);
+            let n = lengths_m.len() as f32;
+            let mean_m = lengths_m.iter().sum::<f32>() / n;
+            let near = lengths_m.iter().filter(|m| **m <= far_m).count() as f32 / n;
+            println!("{scene}/{layout}      {half:8}  {n:6}  {mean_m:13.1}  {near:13.2}");
             if let Some(out) = &out {
                 std::fs::create_dir_all(out)?;
                 draw(setup, &out.join(format!("{scene}-{layout}.png")))?;
@@ -53,28 +52,33 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The ways from all furniture that things may lie on, as far as it can be got at, metres.
-fn ways_to_bed(setup: &Setup) -> Vec<f32> {
+/// Returns the path lengths from all reachable furniture that can hold objects, meters.
+fn path_lengths_to_bed(setup: &Setup) -> Vec<f32> {
     let Some(bed) = setup.goal_places.first().and_then(|e| setup.thing_index(*e)) else {
         return Vec::new();
     };
     let radius_m = Persona::Adult.capability().radius_m;
-    let walker = Walker { radius_m, reach_m: Rules::paper().arm_reach_m, cell_m: CELL_M };
-    let ways_m = ways_from(setup, bed, walker);
-    let bears = |k: &usize| {
+    let params =
+        ReachabilityParams { radius_m, reach_m: Rules::paper().arm_reach_m, cell_m: CELL_M };
+    let lengths_m = path_lengths_from(setup, bed, params);
+    let is_below = |k: &usize| {
         *k != bed && setup.things[*k].class.info().parts.iter().any(|part| part.supports)
     };
-    (0..setup.things.len()).filter(bears).map(|k| ways_m[k]).filter(|m| m.is_finite()).collect()
+    (0..setup.things.len())
+        .filter(is_below)
+        .map(|k| lengths_m[k])
+        .filter(|m| m.is_finite())
+        .collect()
 }
 
 /// Draws a house from above.
 fn draw(mut setup: Setup, path: &std::path::Path) -> Result<(), Box<dyn Error>> {
-    // A world has a goal: every layout has such a thing. And a partner: outside, where the picture
-    // ends.
+    // A world needs a goal: every layout has an object of this class. It also needs a partner, who
+    // is placed outside of the image.
     setup.goal.targets.push((ClassId::named("pencil_bucket"), 1));
     let position = (setup.bounds.min - 5.0).extend(0.0).xzy();
     let pose = Pose { position, yaw_rad: 0.0 };
-    setup.people.push(Person::new(Persona::Adult, pose, 0));
+    setup.people.push(AgentSpec::new(Persona::Adult, pose, 0));
     let world = World::new(setup, Rules::paper())?;
     chaic_render::floor_plan::draw(&world, 960).save(path)?;
     Ok(())

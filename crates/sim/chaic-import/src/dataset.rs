@@ -1,4 +1,4 @@
-//! The data set folder of the public CHAIC repository.
+//! Data set folder of the public CHAIC repository.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use serde::Deserialize;
 use crate::axes::{self, Triple};
 use crate::{ImportError, files};
 
-/// One half of the data set.
+/// Training or test part of the data set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Half {
     /// Floor plans 1 and 4.
@@ -20,7 +20,7 @@ pub enum Half {
 }
 
 impl Half {
-    /// Its name in ids and files.
+    /// Returns the name in ids and files.
     pub fn name(self) -> &'static str {
         match self {
             Half::Train => "train",
@@ -28,17 +28,17 @@ impl Half {
         }
     }
 
-    /// Its folder in a data set, if it is there.
+    /// Returns the folder in a data set, if it exists.
     pub(crate) fn folder(self, dataset: &Path) -> Option<PathBuf> {
         let name = self.name();
         files::first_folder([dataset.join(format!("{name}_dataset")), dataset.join(name)])
     }
 }
 
-/// One episode as `test_env.json` lists it.
+/// One episode in `test_env.json`.
 #[derive(Clone, Debug, Deserialize)]
 pub(crate) struct Entry {
-    /// Floor plan and variant, for example `1a`; a mere label outdoors.
+    /// Floor plan and variant, for example `1a`; only a label outdoors.
     pub scene: String,
     /// Layout and number, for example `2_0`.
     pub layout: String,
@@ -49,7 +49,7 @@ pub(crate) struct Entry {
 #[derive(Clone, Debug, Deserialize)]
 pub(crate) struct Task {
     pub goal_position_names: Names,
-    /// Models, and how many of each.
+    /// Models with the number of each.
     pub goal_task: Vec<(String, u32)>,
     pub container_names: Vec<String>,
     pub task_kind: String,
@@ -65,7 +65,7 @@ pub(crate) enum Names {
     One(String),
 }
 
-/// The commands that build an episode; all others set up cameras.
+/// Commands that build an episode; all others set up cameras.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(tag = "$type", rename_all = "snake_case")]
 enum Command {
@@ -91,7 +91,7 @@ enum Command {
     Other,
 }
 
-/// An object as the commands leave it.
+/// An object after all commands.
 #[derive(Clone, Debug)]
 pub(crate) struct Object {
     id: u64,
@@ -102,25 +102,25 @@ pub(crate) struct Object {
     pub scale: Triple,
 }
 
-/// What the metadata file says beyond `test_env.json`.
+/// Content of the metadata file.
 #[derive(Clone, Debug, Deserialize)]
 pub(crate) struct Metadata {
-    /// Where agents start, by their number.
+    /// Start positions of agents, by their number.
     pub agent: BTreeMap<String, Start>,
     /// Model and room of every object but obstacles; indoors only.
     #[serde(default)]
     pub object_room_list: Vec<(String, String)>,
-    /// Height of the bottoms of objects at rest, metres, containers apart; indoors only.
-    #[serde(default, deserialize_with = "axes::sane_list")]
+    /// Height of the bottoms of objects at rest, meters, containers apart; indoors only.
+    #[serde(default, deserialize_with = "axes::bounded_numbers")]
     pub object_height: Vec<f32>,
-    #[serde(default, deserialize_with = "axes::sane_list")]
+    #[serde(default, deserialize_with = "axes::bounded_numbers")]
     pub container_height: Vec<f32>,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(
     untagged,
-    expecting = "expected a place, {x, y, z} or [x, y, z], of numbers up to 10000 metres"
+    expecting = "expected a position, {x, y, z} or [x, y, z], of numbers up to 10000 meters"
 )]
 pub(crate) enum Start {
     Named(Triple),
@@ -131,22 +131,22 @@ impl Start {
     pub fn position(self) -> glam::Vec3 {
         match self {
             Start::Named(t) => t.into(),
-            // Setups refuse what is too far away.
+            // Setups are checked for positions that are too far away.
             Start::Listed(p) => p.into(),
         }
     }
 }
 
-/// All that the data set says of one episode.
+/// All data of one episode.
 #[derive(Clone, Debug)]
 pub(crate) struct Source {
     pub task: TaskId,
-    /// Its place among the episodes of task and half.
+    /// Index among the episodes of task and half.
     pub index: usize,
     pub entry: Entry,
     pub objects: Vec<Object>,
     pub metadata: Metadata,
-    /// Where the objects came from, for errors.
+    /// Source of the objects, for errors.
     pub commands_path: PathBuf,
     pub metadata_path: PathBuf,
     pub list_path: PathBuf,
@@ -155,7 +155,7 @@ pub(crate) struct Source {
 /// Names of rooms by floor plan, layout and region.
 pub(crate) type RoomTypes = BTreeMap<String, Vec<Vec<String>>>;
 
-/// Reads the names of rooms, which lie in a folder of episodes or in one of the two above.
+/// Reads the names of rooms, from a folder of episodes or one of the two folders above it.
 pub(crate) fn room_types(folder: &Path) -> Result<RoomTypes, ImportError> {
     let file = |p: &Path| p.join("room_types.json");
     let mut candidates = folder.ancestors().take(3).map(file);
@@ -163,7 +163,7 @@ pub(crate) fn room_types(folder: &Path) -> Result<RoomTypes, ImportError> {
     files::read(&found)
 }
 
-/// The folder of a task.
+/// Folder of the episodes of a task.
 #[derive(Debug)]
 pub(crate) struct TaskFolder {
     pub task: TaskId,
@@ -172,7 +172,7 @@ pub(crate) struct TaskFolder {
 }
 
 impl TaskFolder {
-    /// Reads the list of episodes of the task with this name in the original.
+    /// Reads the list of episodes of a task.
     pub fn read(half: &Path, task: TaskId) -> Result<TaskFolder, ImportError> {
         let path = half.join(task.original_name().unwrap_or_default());
         if !path.is_dir() {
@@ -189,12 +189,12 @@ impl TaskFolder {
         self.entries.len()
     }
 
-    /// Where the list of episodes is.
+    /// Returns the path of the list of episodes.
     pub fn list_path(&self) -> PathBuf {
         self.path.join("test_env.json")
     }
 
-    /// The names of rooms.
+    /// Reads the names of rooms.
     pub fn room_types(&self) -> Result<RoomTypes, ImportError> {
         room_types(&self.path)
     }
@@ -204,7 +204,7 @@ impl TaskFolder {
         let (entry, list_path) = (self.entries[index].clone(), self.list_path());
         for (field, word) in [("scene", &entry.scene), ("layout", &entry.layout)] {
             if !files::is_plain(word) {
-                let problem = format!("is {word:?}, which can't be part of a file's name");
+                let problem = format!("is {word:?}, which cannot be part of a file name");
                 return Err(ImportError::field(&list_path, format!("[{index}].{field}"), problem));
             }
         }
@@ -213,7 +213,7 @@ impl TaskFolder {
             let names: Vec<&str> = TaskId::paper().filter_map(TaskId::original_name).collect();
             let field = format!("[{index}].task.task_kind");
             let problem = if names.contains(&kind.as_str()) {
-                format!("is {kind:?}, but lies among episodes of another task")
+                format!("is {kind:?}, but is in the folder of another task")
             } else {
                 format!("is {kind:?}, expected one of {}", names.join(", "))
             };
@@ -238,11 +238,11 @@ impl TaskFolder {
     }
 }
 
-/// Carries the commands out.
+/// Executes the commands.
 fn objects(commands: Vec<Command>, path: &Path) -> Result<Vec<Object>, ImportError> {
     let mut objects: Vec<Object> = Vec::new();
     for (i, command) in commands.into_iter().enumerate() {
-        let of = |id: u64, objects: &[Object]| {
+        let index_of = |id: u64, objects: &[Object]| {
             objects.iter().position(|o| o.id == id).ok_or_else(|| {
                 let problem = format!("is {id}, but no object of this id has been added");
                 ImportError::field(path, format!("[{i}].id"), problem)
@@ -254,7 +254,7 @@ fn objects(commands: Vec<Command>, path: &Path) -> Result<Vec<Object>, ImportErr
                 let scale = Triple { x: 1.0, y: 1.0, z: 1.0 };
                 let field = format!("[{i}].id");
                 if objects.iter().any(|o| o.id == id) {
-                    let problem = format!("is {id}, which another object has already");
+                    let problem = format!("is {id}, which is the id of another object");
                     return Err(ImportError::field(path, field, problem));
                 }
                 if objects.len() == Setup::MAX_THINGS {
@@ -264,12 +264,12 @@ fn objects(commands: Vec<Command>, path: &Path) -> Result<Vec<Object>, ImportErr
                 objects.push(Object { id, model: name, position, euler_deg, scale });
             }
             Command::RotateObjectToEulerAngles { id, euler_angles } => {
-                let k = of(id, &objects)?;
+                let k = index_of(id, &objects)?;
                 objects[k].euler_deg = euler_angles;
             }
             Command::ScaleObject { id, scale_factor: f }
             | Command::ScaleObjectAndMass { id, scale_factor: f } => {
-                let k = of(id, &objects)?;
+                let k = index_of(id, &objects)?;
                 let s = &mut objects[k].scale;
                 *s = Triple { x: s.x * f.x, y: s.y * f.y, z: s.z * f.z };
             }

@@ -1,48 +1,48 @@
-//! What can be wrong with a data set or a package.
+//! Errors of data sets and packages.
 
 use std::path::{Path, PathBuf};
 
 use chaic_episodes::EpisodeError;
 
-/// Why something can't be imported.
+/// Error when a data set or an episode is imported.
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
-    /// A file or folder isn't there, or can't be read.
+    /// A file or folder is missing or not readable.
     #[error("{}: {problem}", path.display())]
     Unreadable {
-        /// Which one.
+        /// Path of the file or folder.
         path: PathBuf,
-        /// What it was wanted for, or what the system says.
+        /// Expected content, or the system's error message.
         problem: String,
     },
-    /// The package is of a version whose furniture nobody has compared with the tables.
+    /// The package has a version that the tables were not compared with.
     #[error("{}: is tdw {found}, expected {expected}; get it by `{get}`", path.display())]
     WrongVersion {
-        /// The file that says so.
+        /// File that contains the version.
         path: PathBuf,
-        /// Which version it is.
+        /// Version that was found.
         found: String,
-        /// Which versions are read.
+        /// Supported versions.
         expected: &'static str,
-        /// How to get one.
+        /// Command that downloads a supported version.
         get: &'static str,
     },
-    /// The file isn't JSON, or a field is missing or of the wrong kind.
+    /// The file is not JSON, or a field is missing or has the wrong type.
     #[error("{}: {field}: {problem}", path.display())]
     Field {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Path of the field within the file, for example `[3].task.goal_task`.
         field: String,
-        /// What is wrong, and what was expected.
+        /// Problem and expected value.
         problem: String,
     },
-    /// The episode that came out can't be played.
-    #[error("{}: makes an episode that can't be played: {source}", path.display())]
+    /// The imported episode cannot be played.
+    #[error("{}: the episode cannot be played: {source}", path.display())]
     Unplayable {
-        /// The file that it was made from.
+        /// File that the episode was made from.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Problem of the episode.
         source: EpisodeError,
     },
 }

@@ -1,4 +1,4 @@
-//! Files of JSON from elsewhere.
+//! JSON files of other projects.
 
 use std::path::{Path, PathBuf};
 
@@ -7,13 +7,13 @@ use serde::de::DeserializeOwned;
 
 use crate::ImportError;
 
-/// Longest file that is read, bytes: four times the package's longest.
+/// Largest file that is read, bytes: four times the package's largest.
 const MAX_BYTES: u64 = 64 << 20;
 
-/// The value in a file of JSON, as Python writes it: numbers that aren't are read as `null`.
+/// Parses a JSON file as written by Python: NaN and infinity are read as `null`.
 pub(crate) fn read<T: DeserializeOwned>(path: &Path) -> Result<T, ImportError> {
-    let text = text(path)?.replace(": NaN", ": null").replace(": Infinity", ": null");
-    // Some editors put a mark before the text.
+    let text = read_text(path)?.replace(": NaN", ": null").replace(": Infinity", ": null");
+    // Some editors put a byte order mark first.
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
     let mut json = serde_json::Deserializer::from_str(text);
     let value = serde_path_to_error::deserialize(&mut json).map_err(|e| {
@@ -24,12 +24,12 @@ pub(crate) fn read<T: DeserializeOwned>(path: &Path) -> Result<T, ImportError> {
     Ok(value)
 }
 
-/// The text of a file.
-pub(crate) fn text(path: &Path) -> Result<String, ImportError> {
+/// Reads a text file.
+pub(crate) fn read_text(path: &Path) -> Result<String, ImportError> {
     let fail = |problem: &dyn std::fmt::Display| {
-        ImportError::unreadable(path, format!("can't be read: {problem}"))
+        ImportError::unreadable(path, format!("cannot be read: {problem}"))
     };
-    let bytes = read_user_file(path, MAX_BYTES + 1).map_err(|e| fail(&e.refusal))?;
+    let bytes = read_user_file(path, MAX_BYTES + 1).map_err(|e| fail(&e.error))?;
     if bytes.len() as u64 > MAX_BYTES {
         let problem = format!("has more than {MAX_BYTES} bytes");
         return Err(ImportError::unreadable(path, problem));
@@ -37,12 +37,13 @@ pub(crate) fn text(path: &Path) -> Result<String, ImportError> {
     String::from_utf8(bytes).map_err(|e| fail(&e))
 }
 
-/// The first of some folders that is there.
+/// Returns the first folder that exists.
 pub(crate) fn first_folder(candidates: impl IntoIterator<Item = PathBuf>) -> Option<PathBuf> {
     candidates.into_iter().find(|p| p.is_dir())
 }
 
-/// Whether a word from a file can be part of a file's name without leading elsewhere.
+/// Returns whether a word from a file is safe as part of a file name: it cannot lead to another
+/// folder.
 pub(crate) fn is_plain(word: &str) -> bool {
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     !word.is_empty() && word.len() <= 64 && word.chars().all(plain)

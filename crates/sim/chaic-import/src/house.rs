@@ -1,34 +1,34 @@
-//! Indoor episodes: a house of the package's furniture between the table's walls.
+//! Indoor episodes: the package's furniture between the walls of the table.
 
 use chaic_core::briefing::Goal;
-use chaic_core::geom::{Rect, xz};
+use chaic_core::geom::{Rect, to_xz};
 use chaic_core::task::GoalTop;
 use chaic_core::{Role, TaskId, Vec2, Vec3};
 use chaic_episodes::mm;
-use chaic_world::{Floor, FloorMaterial, Opening, Room, RoomKind, Rules, Setup, Thing, Wall};
+use chaic_world::{Floor, FloorMaterial, ObjectSpec, Opening, Room, RoomKind, Rules, Setup, Wall};
 
 use crate::dataset::{Names, Object, RoomTypes, Source};
 use crate::package::{Package, Piece};
-use crate::piece::{Posed, thing};
-use crate::settle::{Rest, Surroundings};
+use crate::piece::{PosedModel, to_object};
+use crate::settle::{RestConstraint, Surroundings};
 use crate::tables::{FLOORPLANS, Floorplan};
 use crate::{ImportError, axes, common};
 
-/// Loose pieces stored this far above the floor drop onto it when the scene starts, metres
-/// (the layouts' note on such pieces; everything higher stands on something).
-const DROPS_M: [f32; 2] = [0.0, 0.15];
-/// Loose pieces that are stored at most this far above what is under them lie on it, metres.
-const SINKS_M: f32 = 0.3;
-/// Pieces farther than this outside the house are strays, metres.
+/// Heights in this range are those of free pieces that drop onto the floor when the scene starts,
+/// meters. Higher pieces stand on furniture (the layouts' note on such pieces).
+const DROP_HEIGHTS_M: [f32; 2] = [0.0, 0.15];
+/// Maximum distance by which a free piece sinks onto the surface below it, meters.
+const MAX_SINK_M: f32 = 0.3;
+/// Pieces farther than this outside the house are left out, meters.
 const STRAY_M: f32 = 1.0;
-/// Loose furniture that leans less than this stands upright once settled, degrees.
+/// Free furniture that leans less than this is upright after settling, degrees.
 const UPRIGHT_DEG: f32 = 15.0;
-/// Bottoms lower than this lie on the floor, metres; some lean.
+/// Objects with a lower bottom lie on the floor, meters; some lean.
 const ON_FLOOR_M: f32 = 0.05;
-/// What is put lower than this is put on the floor, metres (the original puts it at 0.1).
-const PUT_ON_FLOOR_M: f32 = 0.2;
+/// Objects that are placed lower than this are placed on the floor, meters (the original uses 0.1).
+const PLACED_ON_FLOOR_M: f32 = 0.2;
 
-/// A house by the names of the original.
+/// A house, identified by names of the original.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct House<'a> {
     plan: &'static Floorplan,
@@ -40,64 +40,64 @@ pub(crate) struct House<'a> {
 }
 
 impl<'a> House<'a> {
-    /// The house of a scene like `1a` and a layout like `0`; otherwise which of the two names
-    /// nothing, and what is wrong with it.
-    pub fn named(
+    /// Returns the house of a scene such as `1a` and a layout such as `0`. The error contains the
+    /// invalid field and its problem.
+    pub fn from_names(
         scene: &'a str,
         layout: &'a str,
         rooms: &'a RoomTypes,
     ) -> Result<House<'a>, (&'static str, String)> {
         let (number, variant) = scene.split_at(scene.len().min(1));
         let plan = FLOORPLANS.get(number).filter(|p| p.variants.contains_key(variant));
-        let plan = plan.ok_or_else(|| ("scene", format!("is {scene:?}, which no table has")))?;
+        let plan = plan.ok_or_else(|| ("scene", format!("is {scene:?}, which is in no table")))?;
         let names = layout.parse().ok().and_then(|k: usize| rooms.get(number)?.get(k));
         let names = names.filter(|n| n.len() == plan.regions.len()).ok_or_else(|| {
-            ("layout", format!("is {layout:?}, whose rooms room_types.json doesn't name"))
+            ("layout", format!("is {layout:?}, but room_types.json has no rooms for it"))
         })?;
         Ok(House { plan, number, variant, layout, names })
     }
 
-    /// The house with its furniture, as the package has it. Pieces of `goal_categories` are goal
-    /// places. Also which things drop when the scene starts, by their places.
-    pub fn furnished(
+    /// Returns the house with its furniture from the package. Pieces of `goal_categories` are goal
+    /// places. Also returns the indices of pieces that drop when the scene starts.
+    pub fn with_furniture(
         &self,
         task: TaskId,
         goal_categories: &[String],
         package: &Package,
     ) -> Result<(Setup, Vec<usize>), ImportError> {
-        let mut setup = shell(task, self);
-        let mut loose = Vec::new();
+        let mut setup = empty_house(task, self);
+        let mut free_pieces = Vec::new();
         for (i, piece) in package.layout(self.number, self.layout)?.iter().enumerate() {
             let problem = |p: String| {
                 let field = format!("{}.{}[{i}].name", self.number, self.layout);
                 ImportError::field(package.layouts_path(), field, p)
             };
-            let furniture = furnish(piece, package).map_err(problem)?;
-            if !setup.bounds.grown(STRAY_M).contains(xz(furniture.position)) {
+            let furniture = to_furniture(piece, package).map_err(problem)?;
+            if !setup.bounds.expanded(STRAY_M).contains(to_xz(furniture.position)) {
                 continue;
             }
             let category = package.record(&piece.name).map_or("", |r| r.category);
             if goal_categories.iter().any(|c| c == category) && is_goal(task, piece, &furniture) {
                 setup.goal_places.push(Setup::entity(setup.things.len()));
             }
-            if is_loose(piece) && furniture.position.y > DROPS_M[1] {
-                loose.push(setup.things.len());
+            if is_free_piece(piece) && furniture.position.y > DROP_HEIGHTS_M[1] {
+                free_pieces.push(setup.things.len());
             }
             setup.things.push(furniture);
         }
-        Ok((setup, loose))
+        Ok((setup, free_pieces))
     }
 
-    /// The same with nothing in the air.
+    /// Returns the furnished house with all free pieces at rest.
     pub fn settled(&self, package: &Package) -> Result<Setup, ImportError> {
         let beds = ["bed".to_owned()];
-        let (mut setup, loose) = self.furnished(TaskId::NoConstraint, &beds, package)?;
-        drop_loose(&mut setup, &loose);
+        let (mut setup, free_pieces) = self.with_furniture(TaskId::NoConstraint, &beds, package)?;
+        settle_pieces(&mut setup, &free_pieces);
         Ok(setup)
     }
 }
 
-/// The beginning of an indoor episode.
+/// Returns the initial state of an indoor episode.
 pub(crate) fn setup(
     source: &Source,
     rooms: &RoomTypes,
@@ -105,25 +105,25 @@ pub(crate) fn setup(
 ) -> Result<Setup, ImportError> {
     let entry = &source.entry;
     let layout = entry.layout.split('_').next().unwrap_or_default();
-    let house = House::named(&entry.scene, layout, rooms).map_err(|(field, problem)| {
+    let house = House::from_names(&entry.scene, layout, rooms).map_err(|(field, problem)| {
         ImportError::field(&source.list_path, format!("[{}].{field}", source.index), problem)
     })?;
     let goal_categories = match &entry.task.goal_position_names {
         Names::Many(names) => names.clone(),
         Names::One(name) => vec![name.clone()],
     };
-    let (mut setup, loose) = house.furnished(source.task, &goal_categories, package)?;
+    let (mut setup, free_pieces) = house.with_furniture(source.task, &goal_categories, package)?;
     setup.seed = entry.seed;
     setup.goal = common::goal(source)?;
-    // Everybody looks along Unity's +z at the start.
+    // All people face Unity's +z at the start.
     setup.people = common::people(source, &setup, [0.0; 3])?;
-    drop_loose(&mut setup, &loose);
-    lay_out(&mut setup, source, house.names, package)?;
+    settle_pieces(&mut setup, &free_pieces);
+    place_objects(&mut setup, source, house.names, package)?;
     Ok(setup)
 }
 
-/// Walls, rooms and floors.
-fn shell(task: TaskId, house: &House<'_>) -> Setup {
+/// Returns a setup with walls, rooms and floors only.
+fn empty_house(task: TaskId, house: &House<'_>) -> Setup {
     let House { plan, names, .. } = house;
     let colors = &plan.variants[house.variant];
     let rooms: Vec<Room> = plan
@@ -138,8 +138,8 @@ fn shell(task: TaskId, house: &House<'_>) -> Setup {
         RoomKind::Bedroom => FloorMaterial::Carpet,
         _ => FloorMaterial::Wood,
     };
-    // Rooms end at the faces of walls: each floor goes on to the middle of the wall, and the first
-    // one under all covers bays and doorways.
+    // Rooms end at the faces of walls. Each floor extends to the middle of the wall, and the first
+    // one, below all others, covers bays and doorways.
     let walls: Vec<Wall> =
         plan.walls.iter().map(|w| wall(*w, plan.height_m, colors.wall)).collect();
     let covered = walls
@@ -147,7 +147,7 @@ fn shell(task: TaskId, house: &House<'_>) -> Setup {
         .fold(bounds, |r, w| Rect { min: r.min.min(w.a).min(w.b), max: r.max.max(w.a).max(w.b) });
     let under = Floor { rect: covered, material: FloorMaterial::Wood, color: colors.floors[0] };
     let floors = rooms.iter().zip(&colors.floors).map(|(room, color)| Floor {
-        rect: room.rect.grown(0.5 * plan.thickness_m + 0.04),
+        rect: room.rect.expanded(0.5 * plan.thickness_m + 0.04),
         material: material(room.kind),
         color: *color,
     });
@@ -172,8 +172,8 @@ fn shell(task: TaskId, house: &House<'_>) -> Setup {
     }
 }
 
-/// The wall that fills a rectangle of Unity's plane. Ours go on for half their thickness beyond
-/// both ends.
+/// Returns the wall that fills a rectangle of Unity's plane. Ours extend half their thickness
+/// beyond both ends.
 fn wall(rect: [f32; 4], height_m: f32, color: [u8; 3]) -> Wall {
     let Rect { min, max } = axes::rect(rect);
     let size = max - min;
@@ -205,101 +205,103 @@ fn room_kind(name: &str) -> RoomKind {
     }
 }
 
-/// A piece of the layout as it stands once the scene has begun; nobody moves it, unless it is of a
-/// class that may be a target.
-fn furnish(piece: &Piece, package: &Package) -> Result<Thing, String> {
-    let is_loose = is_loose(piece);
+/// Returns a piece of the layout after the scene has started. It is fixed unless its class may be a
+/// target.
+fn to_furniture(piece: &Piece, package: &Package) -> Result<ObjectSpec, String> {
+    let is_free_piece = is_free_piece(piece);
     let mut euler_deg: Vec3 = piece.rotation.into();
     let tilt_deg = |deg: f32| ((deg + 180.0).rem_euclid(360.0) - 180.0).abs();
-    if is_loose && tilt_deg(euler_deg.x).max(tilt_deg(euler_deg.z)) < UPRIGHT_DEG {
+    if is_free_piece && tilt_deg(euler_deg.x).max(tilt_deg(euler_deg.z)) < UPRIGHT_DEG {
         (euler_deg.x, euler_deg.z) = (0.0, 0.0);
     }
-    let posed = Posed {
+    let posed = PosedModel {
         model: &piece.name,
         position: piece.position.into(),
         euler_deg,
         scale: piece.scale_factor.into(),
     };
-    let mut furniture = thing(&posed, package)?;
+    let mut furniture = to_object(&posed, package)?;
     let y = &mut furniture.position.y;
-    if *y < DROPS_M[0] || (is_loose && *y < DROPS_M[1]) {
+    if *y < DROP_HEIGHTS_M[0] || (is_free_piece && *y < DROP_HEIGHTS_M[1]) {
         *y = 0.0;
     }
     furniture.fixed = furniture.class.info().role != Role::Target;
     Ok(furniture)
 }
 
-/// Whether a piece falls when the scene starts.
-fn is_loose(piece: &Piece) -> bool {
+/// Returns whether a piece falls when the scene starts.
+fn is_free_piece(piece: &Piece) -> bool {
     piece.gravity && !piece.kinematic
 }
 
-/// Whether a piece of the right category is a goal place. Of cabinets and refrigerators only high
-/// ones are, and no doors (facts S5.1).
-fn is_goal(task: TaskId, piece: &Piece, furniture: &Thing) -> bool {
+/// Returns whether a piece of the right category is a goal place. Cabinets and refrigerators must
+/// be high, and doors are excluded (facts S5.1).
+fn is_goal(task: TaskId, piece: &Piece, furniture: &ObjectSpec) -> bool {
     let top_m = furniture.position.y + furniture.size_m().y;
     let is_high = top_m >= Rules::paper().high_goal_min_top_m && !piece.name.contains("door");
     task.info().goal_top == GoalTop::Any || is_high
 }
 
-/// Lets what may be a target and stands on the furniture sink onto it, and what else is `loose` and
-/// has not far to go.
-fn drop_loose(setup: &mut Setup, loose: &[usize]) {
-    let around = Surroundings::of(setup);
-    for (k, thing) in setup.things.iter_mut().enumerate() {
-        let Some(height_m) = around.height_under(thing) else { continue };
-        let sinks = loose.contains(&k) && thing.position.y - height_m <= SINKS_M;
-        if !thing.fixed || sinks {
-            thing.position.y = height_m;
+/// Moves possible targets down onto the surface below them. Other pieces listed in `free_pieces`
+/// move only if the distance is small.
+fn settle_pieces(setup: &mut Setup, free_pieces: &[usize]) {
+    let surroundings = Surroundings::new(setup);
+    for (k, object) in setup.things.iter_mut().enumerate() {
+        let Some(height_m) = surroundings.height_under(object) else { continue };
+        let sinks = free_pieces.contains(&k) && object.position.y - height_m <= MAX_SINK_M;
+        if !object.fixed || sinks {
+            object.position.y = height_m;
         }
     }
 }
 
-/// Puts the episode's objects where they came to rest.
-fn lay_out(
+/// Places the episode's objects at their recorded heights and in their recorded rooms.
+fn place_objects(
     setup: &mut Setup,
     source: &Source,
     names: &[String],
     package: &Package,
 ) -> Result<(), ImportError> {
-    let mut around = Surroundings::of(setup);
+    let mut surroundings = Surroundings::new(setup);
     let recorded = recorded(source, names, setup)?;
     let containers = &source.entry.task.container_names;
-    let mut laid: Vec<Option<Thing>> = vec![None; source.objects.len()];
-    // Containers first: they need the most room.
+    let mut laid: Vec<Option<ObjectSpec>> = vec![None; source.objects.len()];
+    // Containers first: they need the most space.
     let mut order: Vec<usize> = (0..source.objects.len()).collect();
     order.sort_by_key(|i| !containers.contains(&source.objects[*i].model));
     for i in order {
-        let (object, record) = (&source.objects[i], &recorded[i]);
+        let (source_object, record) = (&source.objects[i], &recorded[i]);
         let start = common::object(source, i, package)?;
-        let rest = Rest { height_m: record.height_m, rooms: &record.rooms };
+        let constraint = RestConstraint { height_m: record.height_m, rooms: &record.rooms };
         let found = match () {
-            () if start.position.y < PUT_ON_FLOOR_M => around.laid_on_floor(&start, &rest),
-            () if record.height_m <= ON_FLOOR_M => around.fallen(&start, &rest),
-            () => around.laid_on_furniture(&start, &rest),
+            () if start.position.y < PLACED_ON_FLOOR_M => {
+                surroundings.place_on_floor(&start, &constraint)
+            }
+            () if record.height_m <= ON_FLOOR_M => surroundings.place_fallen(&start, &constraint),
+            () => surroundings.place_on_furniture(&start, &constraint),
         };
-        let thing = found.ok_or_else(|| no_room(source, object))?;
-        around.add(&thing);
-        laid[i] = Some(thing);
+        let object = found.ok_or_else(|| no_space(source, source_object))?;
+        surroundings.add(&object);
+        laid[i] = Some(object);
     }
     setup.things.extend(laid.into_iter().flatten());
     Ok(())
 }
 
-fn no_room(source: &Source, object: &Object) -> ImportError {
-    let problem = format!("puts a {} where there is no room for it", object.model);
+fn no_space(source: &Source, source_object: &Object) -> ImportError {
+    let problem = format!("places a {} where there is no space for it", source_object.model);
     ImportError::field(&source.commands_path, "add_object", problem)
 }
 
-/// Where the original found an object in the end.
+/// Final height and room of an object in the original.
 struct Recorded {
     height_m: f32,
-    /// The rooms of the recorded name; any room if there is none.
+    /// Rooms with the recorded name; empty if any room is possible.
     rooms: Vec<Rect>,
 }
 
-/// Heights and rooms of all objects: the metadata lists them in the order of commands, containers
-/// apart, and leaves obstacles out.
+/// Returns heights and rooms of all objects. The metadata lists them in the order of commands, with
+/// containers in a separate list and without obstacles.
 fn recorded(
     source: &Source,
     names: &[String],
@@ -324,14 +326,15 @@ fn recorded(
             *objects.next().ok_or_else(|| missing("object_height"))?
         };
         let (model, room) = rooms.next().ok_or_else(|| missing("object_room_list"))?;
-        // Names of what was put on the floor are unreliable (facts S12.4), its place is exact.
-        let is_sure = object.position.y >= PUT_ON_FLOOR_M;
-        if is_sure && *model != object.model {
+        // Recorded names of objects on the floor are unreliable (facts S12.4), but their positions
+        // are exact.
+        let is_reliable = object.position.y >= PLACED_ON_FLOOR_M;
+        if is_reliable && *model != object.model {
             let problem = format!("names {model}, expected {} as in the commands", object.model);
             return Err(ImportError::field(&source.metadata_path, "object_room_list", problem));
         }
         let of_name = names.iter().zip(&setup.rooms).filter(|(name, _)| *name == room);
-        let rooms = of_name.filter(|_| is_sure).map(|(_, room)| room.rect).collect();
+        let rooms = of_name.filter(|_| is_reliable).map(|(_, room)| room.rect).collect();
         recorded.push(Recorded { height_m, rooms });
     }
     Ok(recorded)

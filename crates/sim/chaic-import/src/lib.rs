@@ -1,15 +1,15 @@
-//! Episodes of the original CHAIC data set as episodes of chaic.
+//! Import of the original CHAIC data set.
 //!
 //! **What it is**: [`import`] reads the data set folder of the public CHAIC repository and the
-//! public `tdw` Python package, and returns episodes. `docs/import.md` tells where each figure
-//! comes from and how exact it is.
+//! public `tdw` Python package, and returns episodes. `docs/import.md` documents the sources and
+//! accuracy of all values.
 //!
-//! **What it is not**: it fetches nothing, writes nothing, and knows nothing of a Unity build.
+//! **What it is not**: it does not download or write files, and does not use a Unity build.
 //!
 //! **Invariants**
-//! - All figures are in Unity's frame until `axes` has turned them; nothing else negates a z.
-//! - What neither source says is in the tables under `data/`.
-//! - The same sources give the same episodes, to the bit.
+//! - All values are in Unity's frame until `axes` converts them; no other module negates a z.
+//! - Values that neither source contains are in the tables under `data/`.
+//! - The same sources give the same episodes, bit by bit.
 
 mod axes;
 mod dataset;
@@ -38,47 +38,47 @@ use crate::package::Package;
 pub use dataset::Half;
 pub use error::ImportError;
 
-/// What to import.
+/// Sources of an import.
 #[derive(Clone, Debug)]
 pub struct Sources {
-    /// The data set folder: holds `train_dataset` or `train`, and `test_dataset` or `test`.
+    /// Data set folder: contains `train_dataset` or `train`, and `test_dataset` or `test`.
     pub dataset: PathBuf,
-    /// The `tdw` package's folder, or the folder that holds it.
+    /// Folder of the `tdw` package, or the folder that contains it.
     pub tdw: PathBuf,
-    /// Only this half; otherwise every half that is there.
+    /// Half to import; `None` imports every half that exists.
     pub half: Option<Half>,
 }
 
-/// What came of it.
+/// Result of an import.
 #[derive(Debug, Default)]
 pub struct Imported {
-    /// In the order of halves, tasks and the data set's lists.
+    /// Episodes in the order of halves, tasks and the data set's lists.
     pub episodes: Vec<Episode>,
-    /// Why others are left out; never more than one unless all is gone through.
-    pub left_out: Vec<ImportError>,
+    /// Errors of the episodes that were skipped; empty with [`OnError::Stop`].
+    pub skipped: Vec<ImportError>,
 }
 
-/// What to do when an episode can't be imported.
+/// Reaction to an episode that cannot be imported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OnError {
-    /// Give up.
+    /// Stop with an error.
     Stop,
-    /// Import the others.
-    KeepGoing,
+    /// Skip the episode and import the others.
+    Skip,
 }
 
 /// Imports all episodes of the sources.
 ///
 /// # Errors
-/// What is wrong with the package or with the data set as a whole, whatever `on_error`; with
-/// [`OnError::Stop`] also the first thing that is wrong with a task or an episode.
+/// Problems of the package or of the data set as a whole. With [`OnError::Stop`] also the first
+/// problem of a task or an episode.
 pub fn import(sources: &Sources, on_error: OnError) -> Result<Imported, ImportError> {
     let package = Package::read(&sources.tdw)?;
     let mut imported = Imported::default();
     let mut note = |error: ImportError| match on_error {
         OnError::Stop => Err(error),
-        OnError::KeepGoing => {
-            imported.left_out.push(error);
+        OnError::Skip => {
+            imported.skipped.push(error);
             Ok(())
         }
     };
@@ -100,36 +100,37 @@ pub fn import(sources: &Sources, on_error: OnError) -> Result<Imported, ImportEr
     Ok(imported)
 }
 
-/// A furnished house of the package, in which nobody is and no episode has laid anything: `scene`
-/// is a floor plan with a variant, like `2a`, `layout` is 0, 1 or 2. Its goal places are its beds.
+/// Returns a furnished house of the package without people and task objects. `scene` is a floor
+/// plan with a variant, such as `2a`; `layout` is 0, 1 or 2. The goal places are the beds.
 ///
 /// # Errors
-/// What is wrong with the sources, or that they have no such house.
+/// Problems of the sources, or no such house.
 pub fn house(sources: &Sources, scene: &str, layout: usize) -> Result<Setup, ImportError> {
     let package = Package::read(&sources.tdw)?;
     let (_, folder) = halves(sources)?.swap_remove(0);
     let (rooms, layout) = (dataset::room_types(&folder)?, layout.to_string());
-    let named = house::House::named(scene, &layout, &rooms);
+    let named = house::House::from_names(scene, &layout, &rooms);
     let house = named.map_err(|(field, problem)| ImportError::field(&folder, field, problem))?;
     house.settled(&package)
 }
 
-/// The halves to import, with their folders.
+/// Returns the halves to import, with their folders.
 fn halves(sources: &Sources) -> Result<Vec<(Half, PathBuf)>, ImportError> {
     let dataset = &sources.dataset;
-    let wanted: Vec<Half> = sources.half.map_or(vec![Half::Train, Half::Test], |h| vec![h]);
+    let requested: Vec<Half> = sources.half.map_or(vec![Half::Train, Half::Test], |h| vec![h]);
     let found: Vec<(Half, PathBuf)> =
-        wanted.iter().filter_map(|h| Some((*h, h.folder(dataset)?))).collect();
+        requested.iter().filter_map(|h| Some((*h, h.folder(dataset)?))).collect();
     if found.is_empty() {
-        let names: Vec<&str> = wanted.iter().map(|h| h.name()).collect();
+        let names: Vec<&str> = requested.iter().map(|h| h.name()).collect();
         let names = names.join(" or ");
-        let problem = format!("holds no half of the data set, expected a folder {names}[_dataset]");
+        let problem =
+            format!("contains no half of the data set, expected a folder {names}[_dataset]");
         return Err(ImportError::unreadable(dataset, problem));
     }
     Ok(found)
 }
 
-/// The episodes of one task, each with what became of it.
+/// Imports the episodes of one task; returns a result for each.
 fn task_episodes(
     half: Half,
     folder: &Path,
@@ -146,13 +147,13 @@ fn task_episodes(
         } else {
             street::setup(&source, package)?
         };
-        finished(half, &source, setup)
+        to_episode(half, &source, setup)
     };
     Ok((0..folder.len()).map(episode).collect())
 }
 
-/// The envelope around a setup.
-fn finished(half: Half, source: &Source, setup: Setup) -> Result<Episode, ImportError> {
+/// Wraps a setup in an episode.
+fn to_episode(half: Half, source: &Source, setup: Setup) -> Result<Episode, ImportError> {
     let split = format!("original-{}", half.name());
     let id = format!("{}/{split}/{:02}", source.task, source.index);
     let path = source.commands_path.clone();

@@ -1,4 +1,4 @@
-//! The public `tdw` Python package: furniture layouts and the boxes of models.
+//! The public `tdw` Python package: furniture layouts and bounding boxes of models.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,15 +10,15 @@ use serde::Deserialize;
 use crate::axes::Triple;
 use crate::{ImportError, files};
 
-/// The versions whose layouts and boxes the tables were compared with.
+/// Versions whose layouts and boxes were compared with the tables.
 const SERIES: &str = "1.12.27.";
 const EXPECTED: &str = "1.12.27.x";
 const GET: &str = "pip download tdw==1.12.27.0 --no-deps";
 
-/// Furniture, by floor plan and layout.
+/// Furniture by floor plan and layout.
 type Layouts = BTreeMap<String, BTreeMap<String, Vec<Piece>>>;
 
-/// A piece of furniture as the package lays it out.
+/// A piece of furniture in the package's layout.
 #[derive(Clone, Debug, Deserialize)]
 pub(crate) struct Piece {
     pub name: String,
@@ -29,12 +29,12 @@ pub(crate) struct Piece {
     pub kinematic: bool,
 }
 
-/// What the package says of a model.
+/// The package's record of a model.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Record<'a> {
-    /// Kind of thing, for example `bed`.
+    /// Category, for example `bed`.
     pub category: &'a str,
-    /// Lowest and highest corner in the model's frame, metres.
+    /// Minimum and maximum corner in the model's frame, meters.
     pub bounds: [Vec3; 2],
 }
 
@@ -49,7 +49,7 @@ struct RawRecord {
     bounds: BTreeMap<String, Triple>,
 }
 
-/// The parts of the package that matter here.
+/// Parts of the package that the import needs.
 #[derive(Debug)]
 pub(crate) struct Package {
     layouts: Layouts,
@@ -58,19 +58,19 @@ pub(crate) struct Package {
 }
 
 impl Package {
-    /// Reads the package from its folder, or from the folder that holds it.
+    /// Reads the package from its folder, or from the folder that contains it.
     pub fn read(folder: &Path) -> Result<Package, ImportError> {
         let is_package = |p: &Path| p.join("version.py").is_file();
         let candidates = [folder.to_owned(), folder.join("tdw")];
         let root = candidates.into_iter().find(|p| is_package(p)).ok_or_else(|| {
-            let problem = format!("holds no tdw package (no version.py); get it by `{GET}`");
+            let problem = format!("contains no tdw package (no version.py); get it by `{GET}`");
             ImportError::unreadable(folder, problem)
         })?;
         check_version(&root.join("version.py"))?;
         let layouts_path = root.join("add_ons/floorplan_layouts.json");
         let layouts = files::read(&layouts_path)?;
         let mut records = BTreeMap::new();
-        // The free library comes last, so that its record holds where both have one.
+        // The free library comes last, so that its records take precedence.
         for name in ["models_full.json", "models_core.json"] {
             let library: RawLibrary = files::read(&root.join("metadata_libraries").join(name))?;
             records.extend(library.records);
@@ -78,7 +78,7 @@ impl Package {
         Ok(Package { layouts, layouts_path, records })
     }
 
-    /// The furniture of a house.
+    /// Returns the furniture of a house.
     pub fn layout(&self, floorplan: &str, layout: &str) -> Result<&[Piece], ImportError> {
         let field = |problem| {
             ImportError::field(&self.layouts_path, format!("{floorplan}.{layout}"), problem)
@@ -92,12 +92,12 @@ impl Package {
         Ok(found)
     }
 
-    /// The file that says where furniture stands.
+    /// Returns the path of the file with the layouts.
     pub fn layouts_path(&self) -> &Path {
         &self.layouts_path
     }
 
-    /// What is known of a model.
+    /// Returns the record of a model.
     pub fn record(&self, model: &str) -> Option<Record<'_>> {
         let raw = self.records.get(model)?;
         let side = |name: &str| raw.bounds.get(name).copied().map(Vec3::from);
@@ -106,14 +106,14 @@ impl Package {
         let (back, front) = (side("back")?, side("front")?);
         let a = Vec3::new(left.x, bottom.y, back.z);
         let b = Vec3::new(right.x, top.y, front.z);
-        // Some records name their sides the other way round.
+        // Some records swap the names of their sides.
         Some(Record { category: &raw.wcategory, bounds: [a.min(b), a.max(b)] })
     }
 }
 
 fn check_version(path: &Path) -> Result<(), ImportError> {
-    let text = files::text(path)?;
-    let found = text.split(['"', '\'']).nth(1).unwrap_or("of no version").to_owned();
+    let text = files::read_text(path)?;
+    let found = text.split(['"', '\'']).nth(1).unwrap_or("without a version").to_owned();
     if found.starts_with(SERIES) {
         return Ok(());
     }

@@ -1,56 +1,56 @@
-//! Where things come to rest.
+//! Resting positions of objects.
 //!
-//! The original drops its objects from where it puts them and records the height at which each
-//! lay in the end, but not where. What was put over the back of a chair lies on its seat then. So
-//! each is laid on the nearest surface of about that height that has room for it.
+//! The original drops its objects and records the final height of each, but not its position. An
+//! object placed over the back of a chair, for example, ends on the seat. Each object is therefore
+//! placed on the nearest surface of about the recorded height that has space for it.
 
-use chaic_core::geom::{Rect, math, rotate_yaw, xz};
+use chaic_core::geom::{Rect, math, rotate_yaw, to_xz};
 use chaic_core::{Role, Vec2, Vec3};
 use chaic_episodes::UprightBox;
-use chaic_world::{Rules, Setup, Surface, Thing, blocks_of, ghosts_of};
+use chaic_world::{ObjectSpec, Rules, Setup, Surface, blocks_of, non_colliding_blocks};
 
-/// At most this deep two things touch, metres.
+/// Maximum penetration depth of objects in contact, meters.
 const TOUCH_M: f32 = 0.01;
-/// Heights that count as the recorded one, metres.
-const SAME_M: f32 = 0.05;
-/// What leans against a back or lies on a neighbor has its bottom this far above the surface that
-/// bears it at most, metres.
-const LEANS_M: f32 = 0.28;
-/// How far a thing may have slid or rolled on furniture, metres: first it is looked for near by,
-/// then farther.
-const SLID_M: [f32; 2] = [0.25, 0.6];
-/// How far a thing is moved where nothing of the recorded height has room for it, metres.
-const ANYWHERE_M: f32 = 2.0;
-/// How far from the furniture it fell off a thing may lie on the floor, metres.
-const FALLEN_M: f32 = 3.0;
-/// Around a thing that has fallen to the floor, metres: it isn't under anything either.
+/// Tolerance of the recorded height, meters.
+const HEIGHT_TOLERANCE_M: f32 = 0.05;
+/// Maximum height of an object's bottom above its support, meters, for objects that lean against a
+/// back or a neighbor.
+const MAX_LEAN_M: f32 = 0.28;
+/// Maximum distances that an object may have slid or rolled on furniture, meters. The smaller one
+/// is tried first.
+const SLIDE_DISTANCES_M: [f32; 2] = [0.25, 0.6];
+/// Maximum distance that an object is moved if no surface of the recorded height has space, meters.
+const MAX_MOVE_M: f32 = 2.0;
+/// Maximum distance between an object on the floor and the furniture that it fell off, meters.
+const MAX_FALL_DISTANCE_M: f32 = 3.0;
+/// Clearance of a fallen object from furniture, meters, so that it does not lie under any.
 const FLOOR_CLEAR_M: f32 = 0.06;
 
-/// Where a thing was put and at what height it was found.
+/// Recorded height and possible rooms of an object.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Rest<'a> {
-    /// Height of its bottom, metres.
+pub(crate) struct RestConstraint<'a> {
+    /// Height of the bottom, meters.
     pub height_m: f32,
-    /// Rooms it may lie in.
+    /// Rooms in which it may lie; empty for any room.
     pub rooms: &'a [Rect],
 }
 
-/// All that stands and lies around.
+/// Walls and objects that affect resting positions.
 #[derive(Debug)]
 pub(crate) struct Surroundings {
-    /// Nothing comes to rest outside of these.
+    /// Area in which objects may come to rest.
     bounds: Rect,
     surfaces: Vec<Surface>,
     solids: Vec<(Rect, UprightBox)>,
-    /// What can't be seen into, but isn't in anybody's way.
+    /// Blocks that do not collide but hide objects.
     hidden: Vec<(Rect, UprightBox)>,
-    /// Furniture seen from above.
+    /// Footprints of furniture.
     shadows: Vec<UprightBox>,
 }
 
 impl Surroundings {
-    /// The walls of a setup and the things in it.
-    pub fn of(setup: &Setup) -> Surroundings {
+    /// Collects the walls and objects of a setup.
+    pub fn new(setup: &Setup) -> Surroundings {
         let mut all = Surroundings {
             bounds: setup.bounds,
             surfaces: Vec::new(),
@@ -58,115 +58,130 @@ impl Surroundings {
             hidden: Vec::new(),
             shadows: Vec::new(),
         };
-        all.add_solids(UprightBox::of_walls(setup));
-        // A bicycle is in nobody's way, least of all its rider's.
-        let stays = |t: &&Thing| t.class.info().role != Role::Vehicle;
-        for thing in setup.things.iter().filter(stays) {
-            all.surfaces.extend(tops(thing));
-            all.shadows.extend(UprightBox::of_thing(thing));
-            all.add_solids(UprightBox::of_thing(thing));
-            // Nobody finds what is inside a cushion.
-            all.hidden.extend(ghosts_of(thing).iter().map(UprightBox::of_block).map(with_bounds));
+        all.add_solids(UprightBox::from_walls(setup));
+        // Bicycles block nothing; the rider starts beside one.
+        let stays = |t: &&ObjectSpec| t.class.info().role != Role::Vehicle;
+        for object in setup.things.iter().filter(stays) {
+            all.surfaces.extend(tops(object));
+            all.shadows.extend(UprightBox::from_object(object));
+            all.add_solids(UprightBox::from_object(object));
+            // Objects inside a cushion cannot be found.
+            all.hidden.extend(
+                non_colliding_blocks(object).iter().map(UprightBox::from_block).map(with_bounds),
+            );
         }
         all
     }
 
-    /// Adds a thing that has come to rest.
-    pub fn add(&mut self, thing: &Thing) {
-        self.add_solids(UprightBox::of_thing(thing));
+    /// Adds an object at rest.
+    pub fn add(&mut self, object: &ObjectSpec) {
+        self.add_solids(UprightBox::from_object(object));
     }
 
     fn add_solids(&mut self, solids: Vec<UprightBox>) {
         self.solids.extend(solids.into_iter().map(with_bounds));
     }
 
-    /// The thing on furniture near where it was put; `None` if there is no room for it.
-    pub fn laid_on_furniture(&self, thing: &Thing, rest: &Rest) -> Option<Thing> {
-        let on_top = |y: f32| ((y - rest.height_m).abs() <= SAME_M).then_some(y);
+    /// Returns the object on furniture near its position; `None` if there is no space.
+    pub fn place_on_furniture(
+        &self,
+        object: &ObjectSpec,
+        constraint: &RestConstraint,
+    ) -> Option<ObjectSpec> {
+        let on_top = |y: f32| ((y - constraint.height_m).abs() <= HEIGHT_TOLERANCE_M).then_some(y);
         let leaning = |y: f32| {
-            let above_m = rest.height_m - y;
-            (above_m > 0.0 && above_m <= LEANS_M).then_some(rest.height_m)
+            let above_m = constraint.height_m - y;
+            (above_m > 0.0 && above_m <= MAX_LEAN_M).then_some(constraint.height_m)
         };
-        SLID_M
+        SLIDE_DISTANCES_M
             .into_iter()
-            .find_map(|slid_m| {
-                let on_top = self.laid(thing, rest, slid_m, on_top);
-                on_top.or_else(|| self.laid(thing, rest, slid_m, leaning))
+            .find_map(|slide_m| {
+                let on_top = self.place_on_surface(object, constraint, slide_m, on_top);
+                on_top.or_else(|| self.place_on_surface(object, constraint, slide_m, leaning))
             })
-            .or_else(|| self.laid(thing, rest, ANYWHERE_M, Some))
-            .or_else(|| self.fallen(thing, rest))
+            .or_else(|| self.place_on_surface(object, constraint, MAX_MOVE_M, Some))
+            .or_else(|| self.place_fallen(object, constraint))
     }
 
-    /// The thing on the nearest surface within `reach_m` that has room for it at the height that
-    /// `height` gives for the surface's, if it gives one; of several the height nearest to the
-    /// recorded one.
-    fn laid(
+    /// Returns the object on the nearest surface within `reach_m` that has space for it. `height`
+    /// maps the height of a surface to that of the object, or to `None` if the surface is
+    /// unsuitable. Of several heights, the nearest to the recorded one is used.
+    fn place_on_surface(
         &self,
-        thing: &Thing,
-        rest: &Rest,
+        object: &ObjectSpec,
+        constraint: &RestConstraint,
         reach_m: f32,
         height: impl Fn(f32) -> Option<f32>,
-    ) -> Option<Thing> {
-        around(reach_m, 0.04).find_map(|offset| {
-            let p = xz(thing.position) + offset;
-            let under = self.surfaces.iter().filter(|s| bears(s, p)).map(|s| s.center.y);
+    ) -> Option<ObjectSpec> {
+        ring_offsets(reach_m, 0.04).find_map(|offset| {
+            let p = to_xz(object.position) + offset;
+            let under = self.surfaces.iter().filter(|s| is_below(s, p)).map(|s| s.center.y);
             let mut heights: Vec<f32> = under.chain([0.0]).filter_map(&height).collect();
-            let off = |y: &f32| (y - rest.height_m).abs();
+            let off = |y: &f32| (y - constraint.height_m).abs();
             heights.sort_by(|a, b| off(a).total_cmp(&off(b)));
-            heights.into_iter().map(|y| moved(thing, p, y)).find(|t| self.fits(t, rest))
+            heights.into_iter().map(|y| moved_to(object, p, y)).find(|t| self.fits(t, constraint))
         })
     }
 
-    /// Height of the surface under a thing that has just been put over it, metres.
-    pub fn height_under(&self, thing: &Thing) -> Option<f32> {
-        let p = xz(thing.position);
-        let own: Vec<Surface> = tops(thing).collect();
-        let others = self.surfaces.iter().filter(|s| !own.contains(s));
-        let under = others.filter(|s| bears(s, p)).map(|s| s.center.y);
-        under.filter(|y| *y <= thing.position.y + SAME_M).max_by(f32::total_cmp)
+    /// Returns the height of the surface below an object, meters.
+    pub fn height_under(&self, object: &ObjectSpec) -> Option<f32> {
+        let p = to_xz(object.position);
+        let own_tops: Vec<Surface> = tops(object).collect();
+        let other_surfaces = self.surfaces.iter().filter(|s| !own_tops.contains(s));
+        let under = other_surfaces.filter(|s| is_below(s, p)).map(|s| s.center.y);
+        under.filter(|y| *y <= object.position.y + HEIGHT_TOLERANCE_M).max_by(f32::total_cmp)
     }
 
-    /// The thing on the floor where it was put, or as near as it has room.
-    pub fn laid_on_floor(&self, thing: &Thing, rest: &Rest) -> Option<Thing> {
-        around(FALLEN_M, 0.05)
-            .map(|offset| moved(thing, xz(thing.position) + offset, 0.0))
-            .find(|t| self.fits(t, rest))
+    /// Returns the object on the floor, as near to its position as possible.
+    pub fn place_on_floor(
+        &self,
+        object: &ObjectSpec,
+        constraint: &RestConstraint,
+    ) -> Option<ObjectSpec> {
+        ring_offsets(MAX_FALL_DISTANCE_M, 0.05)
+            .map(|offset| moved_to(object, to_xz(object.position) + offset, 0.0))
+            .find(|t| self.fits(t, constraint))
     }
 
-    /// The thing on open floor beside the furniture that it has fallen off.
-    pub fn fallen(&self, thing: &Thing, rest: &Rest) -> Option<Thing> {
-        let is_open = |t: &Thing| {
+    /// Returns the object on open floor beside the furniture that it fell off.
+    pub fn place_fallen(
+        &self,
+        object: &ObjectSpec,
+        constraint: &RestConstraint,
+    ) -> Option<ObjectSpec> {
+        let is_open = |t: &ObjectSpec| {
             let reach = t.half_longer_side_m() + FLOOR_CLEAR_M;
-            self.shadows.iter().all(|s| s.distance(xz(t.position)) >= reach)
+            self.shadows.iter().all(|s| s.distance(to_xz(t.position)) >= reach)
         };
-        around(FALLEN_M, 0.06)
-            .map(|offset| moved(thing, xz(thing.position) + offset, 0.0))
-            .find(|t| is_open(t) && self.fits(t, rest))
-            .or_else(|| self.laid_on_floor(thing, rest))
+        ring_offsets(MAX_FALL_DISTANCE_M, 0.06)
+            .map(|offset| moved_to(object, to_xz(object.position) + offset, 0.0))
+            .find(|t| is_open(t) && self.fits(t, constraint))
+            .or_else(|| self.place_on_floor(object, constraint))
     }
 
-    /// The place nearest to where somebody was put that has room for a body of this radius.
-    pub fn free_place(&self, p: Vec2, radius_m: f32, apart: &[(Vec2, f32)]) -> Option<Vec2> {
+    /// Returns the nearest free position for a body of this radius. `apart` lists other people with
+    /// the minimum distances to them.
+    pub fn free_position(&self, p: Vec2, radius_m: f32, apart: &[(Vec2, f32)]) -> Option<Vec2> {
         let stands = [Rules::paper().step_over_m, 2.0];
         let blocks: Vec<&UprightBox> =
             self.solids.iter().map(|(_, s)| s).filter(|s| s.spans(stands)).collect();
-        around(FALLEN_M, 0.02).map(|offset| p + offset).find(|p| {
-            self.bounds.grown(-radius_m).contains(*p)
+        ring_offsets(MAX_FALL_DISTANCE_M, 0.02).map(|offset| p + offset).find(|p| {
+            self.bounds.expanded(-radius_m).contains(*p)
                 && blocks.iter().all(|s| s.distance(*p) >= radius_m)
                 && apart.iter().all(|(other, apart_m)| other.distance(*p) >= *apart_m)
         })
     }
 
-    fn fits(&self, thing: &Thing, rest: &Rest) -> bool {
-        let p = xz(thing.position);
-        let in_room = rest.rooms.is_empty() || rest.rooms.iter().any(|r| r.contains(p));
+    fn fits(&self, object: &ObjectSpec, constraint: &RestConstraint) -> bool {
+        let p = to_xz(object.position);
+        let in_room = constraint.rooms.is_empty() || constraint.rooms.iter().any(|r| r.contains(p));
         in_room
             && self.bounds.contains(p)
-            && UprightBox::of_thing(thing).iter().all(|own| {
-                let bounds = own.bounds();
+            && UprightBox::from_object(object).iter().all(|part| {
+                let bounds = part.bounds();
                 let all = self.solids.iter().chain(&self.hidden);
                 let near = all.filter(|(b, _)| b.overlaps(&bounds));
-                near.into_iter().all(|(_, s)| s.overlap(own) <= TOUCH_M)
+                near.into_iter().all(|(_, s)| s.overlap(part) <= TOUCH_M)
             })
     }
 }
@@ -175,29 +190,29 @@ fn with_bounds(solid: UprightBox) -> (Rect, UprightBox) {
     (solid.bounds(), solid)
 }
 
-/// The tops of all parts: things may lie on an arm or a back as well.
-fn tops(thing: &Thing) -> impl Iterator<Item = Surface> {
-    blocks_of(thing).into_iter().map(|block| Surface {
+/// Returns the tops of all parts: objects may also lie on an arm or a back.
+fn tops(object: &ObjectSpec) -> impl Iterator<Item = Surface> {
+    blocks_of(object).into_iter().map(|block| Surface {
         center: block.center + block.half.y * Vec3::Y,
         half: [block.half.x, block.half.z],
         yaw_rad: block.yaw_rad,
     })
 }
 
-fn moved(thing: &Thing, p: Vec2, height_m: f32) -> Thing {
+fn moved_to(object: &ObjectSpec, p: Vec2, height_m: f32) -> ObjectSpec {
     let position = chaic_episodes::mm3(Vec3::new(p.x, height_m, p.y));
-    Thing { position, ..*thing }
+    ObjectSpec { position, ..*object }
 }
 
-/// Whether the surface is under a point.
-fn bears(surface: &Surface, p: Vec2) -> bool {
+/// Returns whether the surface is below a point.
+fn is_below(surface: &Surface, p: Vec2) -> bool {
     let d = Vec3::new(p.x - surface.center.x, 0.0, p.y - surface.center.z);
     let local = rotate_yaw(d, -surface.yaw_rad);
     local.x.abs() <= surface.half[0] && local.z.abs() <= surface.half[1]
 }
 
-/// Offsets in plan, the nearest first: rings `step_m` apart out to `radius_m`.
-fn around(radius_m: f32, step_m: f32) -> impl Iterator<Item = Vec2> {
+/// Returns offsets in plan by increasing distance: rings `step_m` apart up to `radius_m`.
+fn ring_offsets(radius_m: f32, step_m: f32) -> impl Iterator<Item = Vec2> {
     let n_rings = (radius_m / step_m) as u32;
     (0..=n_rings).flat_map(move |ring| {
         let n = if ring == 0 { 1 } else { 16 };

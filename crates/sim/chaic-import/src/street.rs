@@ -1,32 +1,31 @@
-//! Outdoor episodes: the objects of the commands in the street of the original.
+//! Outdoor episodes: objects of the commands in the original's street.
 //!
-//! Tents, shelves, hydrant, truck and bicycle come from the commands and are exact. The street
-//! was measured on the two published pictures, whose cameras are known: edges of road and
-//! pavement to 0.1 m, on the left side (the mirror image) to 0.5 m, what stands along it to 0.5 m,
-//! houses are only hinted at. Nothing in the tasks depends on it.
+//! Tents, shelves, hydrant, truck and bicycle come from the commands and are exact. The street was
+//! measured in the two published images, whose cameras are known. Edges of road and pavement are
+//! accurate to 0.1 m, and to 0.5 m on the left side (the mirror image); objects along the street to
+//! 0.5 m. Houses are only approximate. No task depends on this scenery.
 
 use chaic_core::catalogue::Role;
 use chaic_core::geom::Rect;
 use chaic_core::task::SceneKind;
 use chaic_core::{ClassId, Vec3};
-use chaic_world::{Floor, FloorMaterial, Room, RoomKind, Setup, Thing};
+use chaic_world::{Floor, FloorMaterial, ObjectSpec, Room, RoomKind, Setup};
 
 use crate::dataset::Source;
 use crate::package::Package;
-use crate::settle::{Rest, Surroundings};
+use crate::settle::{RestConstraint, Surroundings};
 use crate::{ImportError, axes, common};
 
-/// The part of the plane that agents map, `[x_min, z_min, x_max, z_max]` (exact: the original's
-/// settings).
+/// Areas that agents map, `[x_min, z_min, x_max, z_max]` (exact: the original's settings).
 const SHOPPING: [f32; 4] = [-3.0, -6.0, 25.0, 7.5];
 const MOVING_HOUSE: [f32; 4] = [-5.0, -6.0, 19.0, 7.5];
-/// Yaws at the start, Unity's degrees: rider, helper, child; 0 in the other task.
+/// Yaws at the start in Unity's degrees: rider, helper, child. They are 0 in the other task.
 const SHOPPING_YAWS_DEG: [f32; 3] = [270.0, 0.0, 225.0];
 
-/// How far the ground goes, metres: nobody sees its edge.
+/// Distance that the ground extends beyond the bounds, meters: its edge is not visible.
 const GROUND_M: f32 = 40.0;
 const GRASS: [u8; 3] = [75, 95, 45];
-/// Strips along x, by z, with their color.
+/// Strips along x: range of z, material, color.
 const STRIPS: [([f32; 2], FloorMaterial, [u8; 3]); 6] = [
     ([5.09, 5.29], FloorMaterial::Pavement, [140, 140, 135]),
     ([-3.86, -3.66], FloorMaterial::Pavement, [140, 140, 135]),
@@ -37,7 +36,7 @@ const STRIPS: [([f32; 2], FloorMaterial, [u8; 3]); 6] = [
 ];
 /// Driveways, `[x_min, z_min, x_max, z_max]`.
 const DRIVEWAYS: [[f32; 4]; 2] = [[0.5, 5.1, 6.5, 12.0], [17.5, -9.0, 24.0, -3.7]];
-/// What stands along the street: class, x, z, yaw in Unity's degrees, height in metres.
+/// Objects along the street: class, x and z, yaw in Unity's degrees, height in meters.
 const SCENERY: [(&str, [f32; 2], f32, f32); 5] = [
     ("tree", [12.1, 6.1], 0.0, 9.0),
     ("tree", [6.5, -5.2], 60.0, 9.0),
@@ -45,10 +44,10 @@ const SCENERY: [(&str, [f32; 2], f32, f32); 5] = [
     ("house_front", [4.0, -16.0], 0.0, 7.0),
     ("house_front", [1.0, 15.0], 180.0, 6.0),
 ];
-/// Lines of fences along x, by z.
+/// Rows of fences along x, by z.
 const FENCES_Z: [f32; 2] = [9.45, -8.7];
 
-/// The beginning of an outdoor episode.
+/// Returns the initial state of an outdoor episode.
 pub(crate) fn setup(source: &Source, package: &Package) -> Result<Setup, ImportError> {
     let is_shopping = source.task.info().scene == SceneKind::Street;
     let bounds = axes::rect(if is_shopping { SHOPPING } else { MOVING_HOUSE });
@@ -67,48 +66,51 @@ pub(crate) fn setup(source: &Source, package: &Package) -> Result<Setup, ImportE
         goal: common::goal(source)?,
         goal_places: Vec::new(),
     };
-    lay_out(&mut setup, source, package)?;
+    place_objects(&mut setup, source, package)?;
     let yaws_deg = if is_shopping { SHOPPING_YAWS_DEG } else { [0.0; 3] };
     setup.people = common::people(source, &setup, yaws_deg)?;
     Ok(setup)
 }
 
-/// Stands first, then what lies on them.
-fn lay_out(setup: &mut Setup, source: &Source, package: &Package) -> Result<(), ImportError> {
+/// Places furniture first, then the objects on it.
+fn place_objects(setup: &mut Setup, source: &Source, package: &Package) -> Result<(), ImportError> {
     let goal_class = source.task.info().goal_places[0];
     let is_shopping = source.task.info().scene == SceneKind::Street;
     let mut goods = Vec::new();
     for i in 0..source.objects.len() {
-        let mut thing = common::object(source, i, package)?;
-        let info = thing.class.info();
+        let mut object = common::object(source, i, package)?;
+        let info = object.class.info();
         if is_shopping && info.is_carriable() {
-            goods.push((i, thing));
+            goods.push((i, object));
             continue;
         }
         // Furniture is dropped from 0.32 m onto the road, the bicycle from 0.1 m.
-        thing.position.y = 0.0;
-        thing.fixed = is_shopping && info.role != Role::Vehicle || !info.is_movable();
+        object.position.y = 0.0;
+        object.fixed = is_shopping && info.role != Role::Vehicle || !info.is_movable();
         if info.name == goal_class {
             setup.goal_places.push(Setup::entity(setup.things.len()));
         }
-        setup.things.push(thing);
+        setup.things.push(object);
     }
-    let mut around = Surroundings::of(setup);
-    for (i, thing) in goods {
-        let on_board = around.height_under(&thing).map(|height_m| Rest { height_m, rooms: &[] });
-        let laid = on_board.and_then(|rest| around.laid_on_furniture(&thing, &rest));
-        let thing = laid.ok_or_else(|| {
-            let problem = "is put where no board has room for it";
+    let mut surroundings = Surroundings::new(setup);
+    for (i, object) in goods {
+        let on_board = surroundings
+            .height_under(&object)
+            .map(|height_m| RestConstraint { height_m, rooms: &[] });
+        let laid =
+            on_board.and_then(|constraint| surroundings.place_on_furniture(&object, &constraint));
+        let object = laid.ok_or_else(|| {
+            let problem = "is placed where no board has space for it";
             ImportError::field(&source.commands_path, format!("object {i}, position"), problem)
         })?;
-        around.add(&thing);
-        setup.things.push(thing);
+        surroundings.add(&object);
+        setup.things.push(object);
     }
     Ok(())
 }
 
 fn ground(bounds: Rect) -> Vec<Floor> {
-    let all = bounds.grown(GROUND_M);
+    let all = bounds.expanded(GROUND_M);
     let floor =
         |rect: Rect, material: FloorMaterial, color: [u8; 3]| Floor { rect, material, color };
     let mut floors = vec![floor(all, FloorMaterial::Grass, GRASS)];
@@ -120,16 +122,16 @@ fn ground(bounds: Rect) -> Vec<Floor> {
     floors
 }
 
-fn scenery(bounds: Rect) -> Vec<Thing> {
+fn scenery(bounds: Rect) -> Vec<ObjectSpec> {
     let put = |class: &str, [x, z]: [f32; 2], yaw_deg: f32| {
         let position = axes::point(Vec3::new(x, 0.0, z));
-        Thing::new(ClassId::named(class), position, axes::yaw_rad(yaw_deg))
+        ObjectSpec::new(ClassId::named(class), position, axes::yaw_rad(yaw_deg))
     };
-    let mut things: Vec<Thing> = SCENERY
+    let mut things: Vec<ObjectSpec> = SCENERY
         .iter()
         .map(|(class, at, yaw_deg, height_m)| {
-            let thing = put(class, *at, *yaw_deg);
-            Thing { scale: [height_m / thing.size_m().y; 3], ..thing }
+            let object = put(class, *at, *yaw_deg);
+            ObjectSpec { scale: [height_m / object.size_m().y; 3], ..object }
         })
         .collect();
     for z in FENCES_Z {

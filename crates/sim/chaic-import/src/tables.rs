@@ -1,6 +1,6 @@
-//! What neither the data set nor the package says: the project's own measurements.
+//! Measurements of this project that neither the data set nor the package contains.
 //!
-//! `data/README.md` tells sources and accuracy. All figures are in Unity's frame, metres.
+//! `data/README.md` documents sources and accuracy. All values are in Unity's frame, in meters.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -8,19 +8,19 @@ use std::sync::LazyLock;
 use chaic_core::ClassId;
 use serde::Deserialize;
 
-/// What is known of a model besides its record.
+/// Properties of a model besides its record.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Model {
-    /// The class whose shape it gets.
+    /// Class that represents the model.
     pub class: ClassId,
-    /// How the class is turned against the model, degrees, counter-clockwise from above: a
-    /// multiple of 90, for models that don't look along +z.
+    /// Rotation of the class relative to the model, degrees, counter-clockwise from above. A
+    /// multiple of 90, for models that do not face +z.
     #[serde(default)]
     pub turn_deg: f32,
-    /// Measured height of the seat, mattress or bed above its bottom at the model's own size.
+    /// Measured height of the seat, mattress or load bed above the bottom, at scale 1.
     pub seat_m: Option<f32>,
-    /// Lowest and highest corner where the record's are wrong.
+    /// Minimum and maximum corner, where the record's are wrong.
     #[serde(rename = "box")]
     pub bounds: Option<[[f32; 3]; 2]>,
     /// Measured sRGB color.
@@ -41,7 +41,7 @@ pub(crate) struct Floorplan {
     pub walls: Vec<[f32; 4]>,
     /// Rooms, by the original's index.
     pub regions: Vec<[f32; 4]>,
-    /// Where one walks from room to room.
+    /// Doorways and other passages between rooms.
     pub openings: Vec<Opening>,
     /// Colors by variant: a, b, c.
     pub variants: BTreeMap<String, Colors>,
@@ -67,14 +67,14 @@ pub(crate) struct Colors {
 
 /// Models by name.
 pub(crate) static MODELS: LazyLock<BTreeMap<String, Model>> =
-    LazyLock::new(|| parsed(include_str!("../data/models.json")));
+    LazyLock::new(|| parse(include_str!("../data/models.json")));
 
 /// Floor plans by number.
 pub(crate) static FLOORPLANS: LazyLock<BTreeMap<String, Floorplan>> =
-    LazyLock::new(|| parsed(include_str!("../data/floorplans.json")));
+    LazyLock::new(|| parse(include_str!("../data/floorplans.json")));
 
-fn parsed<T: serde::de::DeserializeOwned>(text: &str) -> T {
-    serde_json::from_str(text).expect("a test reads every table")
+fn parse<T: serde::de::DeserializeOwned>(text: &str) -> T {
+    serde_json::from_str(text).expect("every table is checked by a test")
 }
 
 #[cfg(test)]
@@ -82,7 +82,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_table_can_be_read_and_is_whole() {
+    fn all_tables_are_valid_and_complete() {
         assert_eq!(MODELS.len(), 158);
         assert!(MODELS.values().all(|m| m.turn_deg % 90.0 == 0.0));
         assert_eq!(FLOORPLANS.keys().collect::<Vec<_>>(), ["1", "2", "4", "5"]);

@@ -1,72 +1,72 @@
-//! How upright bodies get past each other and past what stands around.
+//! Collision of upright bodies with each other and with the surroundings.
 //!
-//! A body is an upright cylinder, everything else an upright box or another cylinder, so that all
-//! of it happens in plan. A frame's step is shorter than any body is wide: the body is moved and
-//! then pushed out of what it would overlap, which lets it slide along what it meets at an angle
-//! and stops it head on.
+//! A body is an upright cylinder, and everything else an upright box or another cylinder, so the
+//! problem is two-dimensional. A step of one frame is at most as long as the radius of the body.
+//! The body is moved and then pushed out of all overlaps, so it slides along obstacles at an angle
+//! and stops at frontal contact.
 
-use chaic_core::geom::{Rect, xz};
+use chaic_core::geom::{Rect, to_xz};
 use chaic_core::{Vec2, Vec3};
 
 use crate::shape::Block;
 
-/// Fixed boxes, found by where they are.
+/// Fixed boxes in a uniform grid.
 #[derive(Clone, Debug)]
 pub(crate) struct BlockIndex {
     blocks: Vec<Block>,
     bounds: Rect,
     columns: usize,
     rows: usize,
-    /// Per cell, the range of `members` that touch it.
+    /// Range of `members` for each cell.
     cells: Vec<(u32, u32)>,
     members: Vec<u32>,
 }
 
-/// A cylinder to stay clear of: another person.
+/// Circle of another agent in plan.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Disc {
     pub center: Vec2,
     pub radius_m: f32,
 }
 
-/// An upright cylinder that moves.
+/// A moving upright cylinder.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Body {
     pub radius_m: f32,
-    /// Lower things are stepped over.
+    /// Obstacles below this height are stepped over.
     pub low_m: f32,
     pub high_m: f32,
 }
 
 impl Body {
-    /// Whether this body, standing at `p`, touches a box.
+    /// Returns whether this body touches a box while it stands at `p`.
     pub fn touches(&self, block: &Block, p: Vec2) -> bool {
         let [low, high] = block.y_range();
         let (nearest, inside) = block.nearest_in_plan(Vec3::new(p.x, 0.0, p.y));
         high > self.low_m
             && low < self.high_m
-            && (inside || p.distance(xz(nearest)) < self.radius_m)
+            && (inside || p.distance(to_xz(nearest)) < self.radius_m)
     }
 }
 
-/// Side of a grid cell, metres: a body and its step touch at most four.
+/// Side length of a grid cell, meters: a body and its step touch at most four cells.
 const CELL_M: f32 = 1.0;
-/// How often overlaps are pushed apart; corners need two, slits a few more.
-const ROUNDS: usize = 4;
-/// An overlap that is as good as none, metres.
+/// Maximum number of push-out iterations; corners need two, narrow gaps a few more.
+const MAX_ITERATIONS: usize = 4;
+/// Overlap that is ignored, meters.
 const TOLERANCE_M: f32 = 1e-3;
 
 impl BlockIndex {
     pub fn new(blocks: Vec<Block>, bounds: Rect) -> BlockIndex {
-        let bounds = bounds.grown(CELL_M);
+        let bounds = bounds.expanded(CELL_M);
         let size = bounds.size();
         let columns = (size.x / CELL_M).ceil().max(1.0) as usize;
         let rows = (size.y / CELL_M).ceil().max(1.0) as usize;
         let mut lists = vec![Vec::new(); columns * rows];
-        // Bodies reach up to a metre beyond their middle (`Setup::check`).
+        // Bodies extend up to one meter beyond their center (`Setup::check`).
         let margin = 1.0;
         for (i, block) in blocks.iter().enumerate() {
-            let (c, r) = (xz(block.center), block.plan_radius() + margin);
+            let (c, r) = (to_xz(block.center), block.plan_radius() + margin);
             let cell = |v: f32, low: f32, n: usize| {
                 (((v - low) / CELL_M).floor().max(0.0) as usize).min(n - 1)
             };
@@ -79,7 +79,7 @@ impl BlockIndex {
                     let middle =
                         bounds.min + Vec2::new(column as f32 + 0.5, row as f32 + 0.5) * CELL_M;
                     let (nearest, _) = block.nearest_in_plan(Vec3::new(middle.x, 0.0, middle.y));
-                    if xz(nearest).distance(middle) <= 0.71 * CELL_M + margin {
+                    if to_xz(nearest).distance(middle) <= 0.71 * CELL_M + margin {
                         lists[row * columns + column].push(i as u32);
                     }
                 }
@@ -95,7 +95,7 @@ impl BlockIndex {
         BlockIndex { blocks, bounds, columns, rows, cells, members }
     }
 
-    /// The boxes that a body at `p` could touch.
+    /// Returns the boxes that a body at `p` could touch.
     pub fn near(&self, p: Vec2) -> impl Iterator<Item = &Block> {
         let cell = ((p - self.bounds.min) / CELL_M).floor();
         let column = (cell.x.max(0.0) as usize).min(self.columns - 1);
@@ -104,12 +104,13 @@ impl BlockIndex {
         self.members[start as usize..end as usize].iter().map(|i| &self.blocks[*i as usize])
     }
 
-    /// All boxes.
+    /// Returns all boxes.
     pub fn blocks(&self) -> &[Block] {
         &self.blocks
     }
 
-    /// Where a body ends up that wants to go from `from` to `to`, a step of less than its radius.
+    /// Returns the final position of a body that moves from `from` toward `to`, less than its
+    /// radius away.
     pub fn slide(
         &self,
         body: Body,
@@ -118,30 +119,31 @@ impl BlockIndex {
         movable: &[Block],
         people: &[Disc],
     ) -> Vec2 {
-        let inner = self.bounds.grown(-CELL_M);
+        let inner = self.bounds.expanded(-CELL_M);
         let mut p = to.clamp(inner.min, inner.max);
-        for _ in 0..ROUNDS {
+        for _ in 0..MAX_ITERATIONS {
             let (pushed, overlap) = self.push_out(body, p, movable, people);
             if overlap <= TOLERANCE_M {
                 return p;
             }
             p = pushed.clamp(inner.min, inner.max);
         }
-        let left = self.push_out(body, p, movable, people).1;
-        // Wedged: stay, unless staying is the tighter spot.
-        if left <= TOLERANCE_M || left < self.push_out(body, from, movable, people).1 {
+        let remaining = self.push_out(body, p, movable, people).1;
+        // No free position was found: stay, unless `from` has the larger overlap.
+        if remaining <= TOLERANCE_M || remaining < self.push_out(body, from, movable, people).1 {
             p
         } else {
             from
         }
     }
 
-    /// How deep a body at `p` is in what it touches, metres.
+    /// Returns the maximum overlap of a body at `p`, meters.
     pub fn overlap(&self, body: Body, p: Vec2, movable: &[Block], people: &[Disc]) -> f32 {
         self.push_out(body, p, movable, people).1
     }
 
-    /// The position pushed out of everything in turn, and the deepest overlap found on the way.
+    /// Pushes a position out of all obstacles in turn. Returns it with the maximum overlap on the
+    /// way.
     fn push_out(&self, body: Body, p: Vec2, movable: &[Block], people: &[Disc]) -> (Vec2, f32) {
         let mut at = p;
         let mut deepest: f32 = 0.0;
@@ -151,10 +153,10 @@ impl BlockIndex {
                 continue;
             }
             let (nearest, inside) = block.nearest_in_plan(Vec3::new(at.x, 0.0, at.y));
-            let away = at - xz(nearest);
+            let away = at - to_xz(nearest);
             let distance = away.length();
             if inside {
-                let (out, depth) = way_out(block, at);
+                let (out, depth) = shortest_way_out(block, at);
                 deepest = deepest.max(depth + body.radius_m);
                 at += out * (depth + body.radius_m);
             } else if distance < body.radius_m {
@@ -164,19 +166,19 @@ impl BlockIndex {
         }
         for disc in people {
             let away = at - disc.center;
-            let (distance, least) = (away.length(), body.radius_m + disc.radius_m);
-            if distance < least {
-                deepest = deepest.max(least - distance);
+            let (distance, min_distance) = (away.length(), body.radius_m + disc.radius_m);
+            if distance < min_distance {
+                deepest = deepest.max(min_distance - distance);
                 let direction = if distance > 1e-6 { away / distance } else { Vec2::X };
-                at += direction * (least - distance);
+                at += direction * (min_distance - distance);
             }
         }
         (at, deepest)
     }
 }
 
-/// The shortest way out of a box for a point inside it: direction and distance.
-fn way_out(block: &Block, p: Vec2) -> (Vec2, f32) {
+/// Returns the direction and the length of the shortest way out of a box, for a point inside.
+fn shortest_way_out(block: &Block, p: Vec2) -> (Vec2, f32) {
     let d = Vec3::new(p.x - block.center.x, 0.0, p.y - block.center.z);
     let local = chaic_core::geom::rotate_yaw(d, -block.yaw_rad);
     let (dx, dz) = (block.half.x - local.x.abs(), block.half.z - local.z.abs());
@@ -185,7 +187,7 @@ fn way_out(block: &Block, p: Vec2) -> (Vec2, f32) {
     } else {
         Vec3::new(0.0, 0.0, if local.z < 0.0 { -1.0 } else { 1.0 })
     };
-    (xz(chaic_core::geom::rotate_yaw(direction, block.yaw_rad)), dx.min(dz))
+    (to_xz(chaic_core::geom::rotate_yaw(direction, block.yaw_rad)), dx.min(dz))
 }
 
 #[cfg(test)]
@@ -215,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn a_half_closed_doorway_stops_a_wheelchair_and_lets_a_walker_through() {
+    fn a_partly_blocked_doorway_stops_a_wheelchair_and_lets_a_walker_through() {
         let s = doorway();
         let from = Vec2::new(-0.25, 2.0);
         assert!(walk(&s, WALKER, from, Vec2::NEG_Y, 80).y < -1.0);
@@ -223,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wall_stops_head_on_and_lets_slide_along() {
+    fn a_wall_stops_frontal_motion_and_allows_sliding() {
         let s = doorway();
         let p = walk(&s, WALKER, Vec2::new(2.0, 1.0), Vec2::NEG_Y, 100);
         assert!((p.y - 0.26).abs() < 2e-3 && (p.x - 2.0).abs() < 1e-3, "{p}");
@@ -232,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_walks_through_a_person_or_out_of_bounds() {
+    fn agents_do_not_pass_through_agents_or_bounds() {
         let s = doorway();
         let other = Disc { center: Vec2::new(0.0, 2.0), radius_m: 0.2 };
         let mut p = Vec2::new(0.0, 3.0);
@@ -244,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn low_things_are_stepped_over() {
+    fn low_obstacles_are_stepped_over() {
         let rug = BlockIndex::new(
             vec![block([0.0, 0.05, 0.0], [1.0, 0.05, 1.0])],
             Rect::new([-5.0, -5.0], [5.0, 5.0]),

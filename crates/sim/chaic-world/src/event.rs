@@ -1,115 +1,115 @@
-//! What happens, one record per happening.
+//! Events of an episode.
 
 use chaic_core::{AgentId, EntityId, Frame, Outcome, ResolvedAction};
 use serde::{Deserialize, Serialize};
 
-/// Something that happened.
+/// An event with its frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Event {
-    /// When.
+    /// Frame of the event.
     pub frame: Frame,
-    /// What.
+    /// Kind of the event, with its data.
     #[serde(flatten)]
     pub kind: EventKind,
 }
 
-/// What can happen.
+/// Kinds of events.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum EventKind {
-    /// An agent began an action.
+    /// An agent started an action.
     Began {
-        /// Who.
+        /// The agent.
         agent: AgentId,
-        /// What.
+        /// The action.
         action: ResolvedAction,
     },
-    /// An agent's action ended.
+    /// An action ended.
     Ended {
-        /// Who.
+        /// The agent.
         agent: AgentId,
-        /// What.
+        /// The action.
         action: ResolvedAction,
-        /// How.
+        /// Outcome of the action.
         outcome: Outcome,
     },
-    /// A thing was taken.
+    /// An object was picked up.
     Taken {
-        /// By whom.
+        /// Agent that took it.
         agent: AgentId,
-        /// The thing.
+        /// The object.
         object: EntityId,
     },
-    /// A thing was put into a container or basket.
+    /// An object was put into a container or basket.
     Stowed {
-        /// By whom.
+        /// Agent that put it there.
         agent: AgentId,
-        /// The thing.
+        /// The object.
         object: EntityId,
-        /// Where.
+        /// The container.
         container: EntityId,
     },
-    /// A thing was let go.
+    /// An object was released.
     Released {
-        /// By whom.
+        /// Agent that released it.
         agent: AgentId,
-        /// The thing.
+        /// The object.
         object: EntityId,
-        /// The place it was meant for.
+        /// Intended place.
         on: Option<EntityId>,
     },
-    /// A thing began to fall because what it lay on was taken away.
+    /// An object started to fall because its support was removed.
     LostSupport {
-        /// The thing.
+        /// The object.
         object: EntityId,
     },
-    /// A fragile thing broke.
+    /// A fragile object broke.
     Broke {
-        /// In whose hands.
+        /// Agent that held it.
         agent: AgentId,
-        /// The thing.
+        /// The object.
         object: EntityId,
     },
-    /// A thing was delivered.
+    /// An object was delivered.
     Delivered {
-        /// The thing.
+        /// The object.
         object: EntityId,
-        /// Who let it go there.
+        /// Agent that released it last.
         by: AgentId,
-        /// Whether it was wanted and not yet there often enough.
+        /// True if it counts toward the goal: its class is a target with deliveries still missing.
         counted: bool,
     },
-    /// An obstacle was put aside.
+    /// An obstacle was set aside.
     ObstacleRemoved {
-        /// By whom.
+        /// Agent that moved it.
         agent: AgentId,
         /// The obstacle.
         object: EntityId,
     },
-    /// Two people began to carry a piece of furniture together.
+    /// Two agents lifted a piece of furniture together.
     LiftedTogether {
-        /// Who leads.
+        /// Agent that leads.
         leader: AgentId,
-        /// Who follows.
+        /// Agent that follows.
         follower: AgentId,
         /// The furniture.
         object: EntityId,
     },
-    /// The child left its guardian's vicinity, or came back.
+    /// The child left the vicinity of its guardian, or returned.
     ChildAway {
-        /// Whether it is away now.
+        /// True if the child is away now.
         away: bool,
     },
-    /// The partner or the helper has made no progress for long, or makes some again.
+    /// The partner or the helper became stuck, or made progress again.
     Stuck {
-        /// Who.
+        /// The agent.
         agent: AgentId,
-        /// Whether it is stuck now.
+        /// True if the agent is stuck now.
         stuck: bool,
     },
     /// The episode ended.
     Over {
-        /// Whether everything wanted was delivered.
+        /// True if all targets were delivered.
         complete: bool,
     },
 }

@@ -1,27 +1,28 @@
-//! How things that were let go come to rest.
+//! Falls of released objects.
 //!
-//! The whole fall is worked out when it begins, by a small rigid-body simulation of what begins to
-//! fall at that moment among what stands near it, and then played back frame by frame. So physics
-//! is a pure function, the state stays plain data, and a frame in which nothing falls costs nothing.
+//! A small rigid-body simulation computes the whole fall at its start, for all objects that are
+//! released together and with the obstacles nearby. The world then plays it back frame by frame.
+//! Physics is thus a pure function, the state remains plain data, and a frame without a fall costs
+//! nothing.
 
 use chaic_core::{EntityId, Quat, Vec3};
 use rapier3d::prelude::*;
 
 use crate::shape::Block;
 
-/// What falls.
+/// A falling object.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Falling {
     pub entity: EntityId,
-    /// Middle of its bottom, metres.
+    /// Center of the bottom face, meters.
     pub position: Vec3,
     pub rotation: Quat,
-    /// Extents, metres.
+    /// Extents, meters.
     pub size: Vec3,
     pub mass_kg: f32,
 }
 
-/// A box that doesn't move meanwhile.
+/// A static box.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Obstacle {
     pub center: Vec3,
@@ -41,25 +42,28 @@ impl From<&Block> for Obstacle {
     }
 }
 
-/// Where it goes.
+/// Computed fall of an object.
 #[derive(Clone, Debug)]
 pub(crate) struct Fall {
-    /// Position and rotation after each frame, first to last; never empty.
+    /// Position and rotation after each frame, in order; never empty.
     pub path: Vec<(Vec3, Quat)>,
-    /// What it lies on in the end, if not the ground.
+    /// Object on which it comes to rest; `None` for the ground.
     pub on: Option<EntityId>,
 }
 
-/// Longest fall, frames: from 3 m it takes 78, the rest is for rolling and sliding.
+/// Maximum length of a fall, frames. From 3 m it takes 78; the remainder is for rolling and
+/// sliding.
 const MAX_FRAMES: usize = 240;
-/// Slower than this for [`STILL_FRAMES`] is at rest, m/s (the original: 1 mm a frame).
+/// An object slower than this for [`STILL_FRAMES`] frames is at rest, m/s (the original: 1 mm a
+/// frame).
 const STILL_M_PER_S: f32 = 0.03;
 const STILL_FRAMES: usize = 4;
-/// Sliding friction of household things on wood or cloth.
+/// Sliding friction of household objects on wood or cloth.
 const FRICTION: f32 = 0.8;
 
-/// Lets things fall together among `obstacles` above the ground at y = 0, until all lie still.
-pub(crate) fn fall(things: &[Falling], obstacles: &[Obstacle], step_s: f32) -> Vec<Fall> {
+/// Simulates a joint fall among `obstacles` above the ground at y = 0, until all objects are at
+/// rest.
+pub(crate) fn fall(objects: &[Falling], obstacles: &[Obstacle], step_s: f32) -> Vec<Fall> {
     let mut world = PhysicsWorld::new();
     world.gravity = Vector::new(0.0, -9.81, 0.0);
     world.integration_parameters.dt = step_s;
@@ -76,24 +80,26 @@ pub(crate) fn fall(things: &[Falling], obstacles: &[Obstacle], step_s: f32) -> V
             .user_data(u128::from(EntityId::FLOOR.0)),
     );
     let bodies: Vec<(RigidBodyHandle, ColliderHandle)> =
-        things.iter().map(|thing| add(&mut world, thing)).collect();
-    let mut falls = vec![Fall { path: Vec::new(), on: None }; things.len()];
-    let mut still = 0;
+        objects.iter().map(|object| add(&mut world, object)).collect();
+    let mut falls = vec![Fall { path: Vec::new(), on: None }; objects.len()];
+    let mut n_still = 0;
     for _ in 0..MAX_FRAMES {
         world.step();
         let mut is_still = true;
-        for ((body, collider), (thing, fall)) in bodies.iter().zip(things.iter().zip(&mut falls)) {
+        for ((body, collider), (object, fall)) in bodies.iter().zip(objects.iter().zip(&mut falls))
+        {
             let b = &world.bodies[*body];
             let rotation = *b.rotation();
-            let bottom = b.translation() - rotation * (Vec3::Y * (0.5 * thing.size.y));
+            let bottom = b.translation() - rotation * (Vec3::Y * (0.5 * object.size.y));
             fall.path.push((bottom, rotation));
-            let touches = world.contact_pairs_with(*collider).any(|p| p.has_any_active_contact());
-            let slow =
+            let has_contact =
+                world.contact_pairs_with(*collider).any(|p| p.has_any_active_contact());
+            let is_slow =
                 b.linvel().length() < STILL_M_PER_S && b.angvel().length() < 10.0 * STILL_M_PER_S;
-            is_still &= touches && slow;
+            is_still &= has_contact && is_slow;
         }
-        still = if is_still { still + 1 } else { 0 };
-        if still >= STILL_FRAMES {
+        n_still = if is_still { n_still + 1 } else { 0 };
+        if n_still >= STILL_FRAMES {
             break;
         }
     }
@@ -103,12 +109,12 @@ pub(crate) fn fall(things: &[Falling], obstacles: &[Obstacle], step_s: f32) -> V
     falls
 }
 
-fn add(world: &mut PhysicsWorld, thing: &Falling) -> (RigidBodyHandle, ColliderHandle) {
-    let half = 0.5 * thing.size;
-    let center = thing.position + thing.rotation * (Vec3::Y * half.y);
+fn add(world: &mut PhysicsWorld, object: &Falling) -> (RigidBodyHandle, ColliderHandle) {
+    let half = 0.5 * object.size;
+    let center = object.position + object.rotation * (Vec3::Y * half.y);
     let body = world.bodies.insert(
         RigidBodyBuilder::dynamic()
-            .pose(rapier3d::math::Pose::from_parts(center, thing.rotation))
+            .pose(rapier3d::math::Pose::from_parts(center, object.rotation))
             .angular_damping(2.0)
             .linear_damping(0.1)
             .can_sleep(false)
@@ -117,15 +123,15 @@ fn add(world: &mut PhysicsWorld, thing: &Falling) -> (RigidBodyHandle, ColliderH
     let collider = world.colliders.insert_with_parent(
         ColliderBuilder::cuboid(half.x, half.y, half.z)
             .friction(FRICTION)
-            .mass(thing.mass_kg.max(0.01))
-            .user_data(u128::from(thing.entity.0)),
+            .mass(object.mass_kg.max(0.01))
+            .user_data(u128::from(object.entity.0)),
         body,
         &mut world.bodies,
     );
     (body, collider)
 }
 
-/// What carries the fallen thing: among what touches it, the one touched lowest.
+/// Returns the support of a fallen object: of all contacts, the one with the lowest point.
 fn support(world: &PhysicsWorld, collider: ColliderHandle) -> Option<EntityId> {
     let mut lowest: Option<(f32, u16)> = None;
     for pair in world.contact_pairs_with(collider).filter(|p| p.has_any_active_contact()) {
@@ -159,17 +165,17 @@ mod tests {
         Falling { entity, position, rotation: Quat::IDENTITY, size, mass_kg: 0.2 }
     }
 
-    fn fall_alone(thing: Falling, obstacles: &[Obstacle]) -> Fall {
-        super::fall(&[thing], obstacles, 0.01).remove(0)
+    fn fall_alone(object: Falling, obstacles: &[Obstacle]) -> Fall {
+        super::fall(&[object], obstacles, 0.01).remove(0)
     }
 
     #[test]
-    fn what_falls_together_ends_up_beside_or_upon_each_other() {
+    fn objects_that_fall_together_do_not_overlap() {
         let other = Falling { entity: EntityId(22), ..apple_at(Vec3::new(0.12, 1.1, 0.01)) };
         let falls = super::fall(&[apple_at(Vec3::new(0.1, 0.95, 0.0)), other], &[table()], 0.01);
         let ends = falls.iter().map(|fall| fall.path.last().unwrap().0).collect::<Vec<_>>();
-        assert!(ends[0].distance(ends[1]) > 0.09, "{ends:?} are in each other");
-        assert!(falls.iter().all(|fall| fall.on.is_some()), "both lie on something");
+        assert!(ends[0].distance(ends[1]) > 0.09, "{ends:?} overlap");
+        assert!(falls.iter().all(|fall| fall.on.is_some()), "both have a support");
         assert_eq!(falls[0].path.len(), falls[1].path.len());
     }
 
@@ -183,17 +189,17 @@ mod tests {
     }
 
     #[test]
-    fn a_drop_lands_on_what_is_below_it() {
+    fn a_drop_above_a_table_lands_on_it() {
         let fall = fall_alone(apple_at(Vec3::new(0.1, 0.95, 0.0)), &[table()]);
         let (end, _) = *fall.path.last().unwrap();
         assert!((end.y - 0.75).abs() < 0.01, "{end}");
         assert_eq!(fall.on, Some(EntityId(20)));
-        // 0.2 m at 9.81 m/s^2 takes 0.202 s, 20 frames, and a few more to lie still.
+        // 0.2 m at 9.81 m/s^2 takes 0.202 s, 20 frames, and a few more to come to rest.
         assert!((20..60).contains(&fall.path.len()), "{} frames", fall.path.len());
     }
 
     #[test]
-    fn a_drop_beside_it_lands_on_the_ground() {
+    fn a_drop_beside_a_table_lands_on_the_ground() {
         let fall = fall_alone(apple_at(Vec3::new(1.0, 0.95, 0.0)), &[table()]);
         let (end, _) = *fall.path.last().unwrap();
         assert!(end.y.abs() < 0.01, "{end}");
@@ -201,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_fall_has_the_same_bits() {
+    fn equal_falls_are_bit_identical() {
         let run = || fall_alone(apple_at(Vec3::new(0.58, 0.9, 0.02)), &[table()]).path;
         assert_eq!(run(), run());
     }

@@ -1,4 +1,4 @@
-//! What counts as delivered, and how much is.
+//! Deliveries and the progress toward the goal.
 
 use chaic_core::catalogue::Role;
 use chaic_core::geom::horizontal_distance;
@@ -7,126 +7,117 @@ use chaic_core::{AgentId, ClassId, EntityId};
 use crate::event::EventKind;
 use crate::world::World;
 
-/// What lies on something may have sunk into it by this, metres: the solver's slack, and more.
-const SUNK_M: f32 = 0.02;
+/// Maximum penetration of a resting object into its support, meters: solver tolerance and a margin.
+const MAX_PENETRATION_M: f32 = 0.02;
 
 impl World {
-    /// How near to the middle of a goal place a released thing must come to rest, metres
-    /// (facts S5.2: the margin plus half of the longer side).
+    /// Returns the maximum distance from the center of a goal place at which a released object
+    /// counts as delivered, meters. It is the margin plus half of the longer side (facts S5.2).
     pub fn delivery_radius_m(&self) -> f32 {
-        let (place, _) = self.thing(self.setup.goal_places[0]);
+        let (place, _) = self.object(self.setup.goal_places[0]);
         self.rules.delivery_margin_m + place.half_longer_side_m()
     }
 
-    /// Lowest top that counts as the goal place, metres; 0 for no condition.
+    /// Returns the minimum top height of the goal place, meters; 0 for no condition.
     pub fn goal_min_top_m(&self) -> f32 {
         self.rules.goal_min_top_m(self.setup.task)
     }
 
-    /// Whether somebody stands within the delivery radius of a goal place.
-    pub fn is_near_goal(&self, agent: AgentId) -> bool {
-        let p = self.person(agent).pose.position;
-        let radius = self.delivery_radius_m();
-        self.setup
-            .goal_places
-            .iter()
-            .any(|g| horizontal_distance(self.thing(*g).1.position, p) <= radius)
-    }
-
-    /// Everything delivered so far, wanted or not, in the order of ids.
+    /// Returns all delivered objects, targets or not, in the order of ids.
     pub fn delivered(&self) -> Vec<EntityId> {
-        self.setup.entities().filter(|e| self.thing(*e).1.delivered.is_some()).collect()
+        self.setup.entities().filter(|e| self.object(*e).1.delivered.is_some()).collect()
     }
 
-    /// The obstacles that somebody has taken away, if the rules tell everybody of them.
-    pub fn told_removed(&self) -> Vec<EntityId> {
+    /// Returns the obstacles that were removed, if the rules announce them to all agents.
+    pub fn announced_obstacles(&self) -> Vec<EntityId> {
         let is_removed = |e: &EntityId| {
-            let (thing, state) = self.thing(*e);
-            thing.class.info().role == Role::Obstacle && state.last_holder.is_some()
+            let (spec, state) = self.object(*e);
+            spec.class.info().role == Role::Obstacle && state.last_holder.is_some()
         };
-        let all = self.setup.entities().filter(|_| self.rules.tells_removed);
-        all.filter(is_removed).collect()
+        let announced = self.setup.entities().filter(|_| self.rules.tells_removed);
+        announced.filter(is_removed).collect()
     }
 
-    /// How many of a class are delivered.
+    /// Returns the number of delivered objects of a class.
     pub fn n_delivered(&self, class: ClassId) -> u32 {
-        let of_class = |e: &EntityId| self.thing(*e).0.class == class;
+        let of_class = |e: &EntityId| self.object(*e).0.class == class;
         self.delivered().iter().filter(|e| of_class(e)).count() as u32
     }
 
-    /// What is done of what is wanted, and all that is wanted, by the task's [`Worth`]: objects, or
-    /// kilograms.
+    /// Returns the achieved and the total value of the goal by the task's [`TargetValue`]: a number
+    /// of objects, or kilograms.
     ///
-    /// [`Worth`]: chaic_core::task::Worth
+    /// [`TargetValue`]: chaic_core::task::TargetValue
     pub fn progress(&self) -> (f64, f64) {
         let goal = &self.setup.goal.targets;
-        goal.iter().fold((0.0, 0.0), |(done, all), (class, wanted)| {
-            let worth = self.worth(*class);
-            let there = self.n_delivered(*class).min(*wanted);
-            (done + worth * f64::from(there), all + worth * f64::from(*wanted))
+        goal.iter().fold((0.0, 0.0), |(achieved, total), (class, count)| {
+            let value = self.target_value(*class);
+            let n_counted = self.n_delivered(*class).min(*count);
+            (achieved + value * f64::from(n_counted), total + value * f64::from(*count))
         })
     }
 
-    /// What one object of a class counts for in this task.
-    pub fn worth(&self, class: ClassId) -> f64 {
-        self.setup.task.info().worth.of(class)
+    /// Returns the value of one object of a class in this task.
+    pub fn target_value(&self, class: ClassId) -> f64 {
+        self.setup.task.info().target_value.value(class)
     }
 
-    /// Whether everything the goal asks for has been delivered.
+    /// Returns whether all targets have been delivered.
     pub fn is_complete(&self) -> bool {
-        self.setup.goal.targets.iter().all(|(class, wanted)| self.n_delivered(*class) >= *wanted)
+        self.setup.goal.targets.iter().all(|(class, count)| self.n_delivered(*class) >= *count)
     }
 
-    /// A thing lies still: is it delivered?
-    pub(crate) fn come_to_rest(&mut self, object: EntityId) {
-        let state = self.thing(object).1;
-        let (at, released_at) = (state.position, state.released_at);
+    /// Delivers an object that has come to rest, if it is at the goal.
+    pub(crate) fn check_delivery(&mut self, object: EntityId) {
+        let state = self.object(object).1;
+        let (position, released_at) = (state.position, state.released_at);
         if state.delivered.is_some() {
             return;
         }
         let radius = self.delivery_radius_m();
-        let near = |g: &EntityId| horizontal_distance(self.thing(*g).1.position, at) <= radius;
-        let by_rule = if self.rules.dropped_counts {
+        let near =
+            |g: &EntityId| horizontal_distance(self.object(*g).1.position, position) <= radius;
+        let is_at_goal = if self.rules.dropped_counts {
             state.last_holder.is_some() && self.setup.goal_places.iter().any(near)
         } else {
             released_at.is_some_and(|g| near(&g))
         };
         let min_top_m = self.goal_min_top_m();
-        let high_enough = min_top_m <= 0.0 || at.y >= min_top_m - SUNK_M;
-        let role = self.thing(object).0.class.info().role;
-        let deliverable = role != Role::Obstacle;
-        if by_rule && high_enough && deliverable {
+        let is_high_enough = min_top_m <= 0.0 || position.y >= min_top_m - MAX_PENETRATION_M;
+        let role = self.object(object).0.class.info().role;
+        let is_deliverable = role != Role::Obstacle;
+        if is_at_goal && is_high_enough && is_deliverable {
             self.deliver(object);
         }
     }
 
-    /// Delivers all that somebody has taken and let go so far, wherever it lies: the original's
-    /// second rule (facts S5.3).
-    pub(crate) fn deliver_all_let_go(&mut self, agent: AgentId) {
-        let is_let_go = |e: &EntityId| {
-            let (thing, state) = self.thing(*e);
+    /// Delivers all objects that an agent has taken and released so far, at any place: the second
+    /// rule of the original (facts S5.3).
+    pub(crate) fn deliver_all_released(&mut self, agent: AgentId) {
+        let is_released = |e: &EntityId| {
+            let (spec, state) = self.object(*e);
             state.last_holder == Some(agent)
                 && state.is_resting()
                 && state.delivered.is_none()
-                && thing.class.info().role != Role::Obstacle
+                && spec.class.info().role != Role::Obstacle
         };
-        let let_go: Vec<EntityId> = self.setup.entities().filter(is_let_go).collect();
-        for object in let_go {
+        let released: Vec<EntityId> = self.setup.entities().filter(is_released).collect();
+        for object in released {
             self.deliver(object);
         }
     }
 
-    /// Takes a thing out of play, with all that is in it.
+    /// Marks an object and its contents as delivered, which takes them out of play.
     fn deliver(&mut self, object: EntityId) {
-        let by = self.thing(object).1.last_holder.unwrap_or(AgentId::PARTNER);
+        let by = self.object(object).1.last_holder.unwrap_or(AgentId::PARTNER);
         let frame = self.state.frame;
         for entity in std::iter::once(object).chain(self.contents(object)) {
-            let class = self.thing(entity).0.class;
-            let counted = self.n_delivered(class) < self.setup.goal.wanted(class);
-            let thing = self.thing_mut(entity);
-            thing.delivered = Some(frame);
-            thing.delivered_by = Some(by);
-            self.happened(EventKind::Delivered { object: entity, by, counted });
+            let class = self.object(entity).0.class;
+            let counted = self.n_delivered(class) < self.setup.goal.count(class);
+            let state = self.object_mut(entity);
+            state.delivered = Some(frame);
+            state.delivered_by = Some(by);
+            self.record_event(EventKind::Delivered { object: entity, by, counted });
         }
     }
 }

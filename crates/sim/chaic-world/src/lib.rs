@@ -1,21 +1,21 @@
-//! The state of an episode as plain data, and its rules.
+//! Simulated world of an episode: initial setup, rules, state and the frame-by-frame update.
 //!
-//! **What it is**: [`Setup`] says how an episode begins, [`State`] how it stands, [`Rules`] by
-//! which constants it goes on, [`World`] runs it frame by frame and tells what happened as
-//! [`Event`]s.
+//! **What it is**: [`Setup`] is the initial condition of an episode and [`State`] its current
+//! state. [`Rules`] holds the constants. [`World`] steps the episode frame by frame and records
+//! what happens as [`Event`]s.
 //!
-//! **What it is not**: it reads no files, makes no pixels, keeps no scores and knows no clock.
-//! It doesn't know what an agent thinks; it takes actions and returns outcomes.
+//! **What it is not**: it reads no files, renders no images, computes no scores and reads no clock.
+//! It takes actions and returns outcomes; agents live in other crates.
 //!
 //! **Invariants**
 //! - The next state depends on the setup, the rules, the state and the submitted actions only.
-//! - [`State`] is the whole truth: restoring a snapshot continues to the same bits.
-//! - Everything else a [`World`] holds is derived from the setup and never changes.
+//! - [`State`] is complete: a world restored from a snapshot continues bit-identically.
+//! - All other fields of a [`World`] are derived from the setup and never change.
 
 mod setup;
 mod state;
 
-mod luck;
+mod random;
 
 mod rules;
 
@@ -36,16 +36,15 @@ mod view;
 mod world;
 
 pub use event::{Event, EventKind};
-pub use luck::Draws;
 pub use posture::{Arm, Posture};
 pub use rules::{Blocking, Durations, JointLift, ReachTo, Rules};
 pub use setup::{
-    Floor, FloorMaterial, Opening, Person, Room, RoomKind, Setup, SetupError, Thing, Wall,
+    AgentSpec, Floor, FloorMaterial, ObjectSpec, Opening, Room, RoomKind, Setup, SetupError, Wall,
 };
-pub use shape::{Block, Surface, blocks_of, ghosts_of, top_surfaces};
+pub use shape::{Block, Surface, blocks_of, non_colliding_blocks, top_surfaces};
 pub use state::{
-    Activity, JointCarry, LastProgress, PROGRESS_M, PersonState, Phase, Place, STUCK_AFTER_FRAMES,
-    State, Step, ThingState,
+    ActionStep, Activity, AgentState, DrawCounts, JointCarry, LastProgress, ObjectLocation,
+    ObjectState, PROGRESS_M, Phase, STUCK_AFTER_FRAMES, State,
 };
 pub use view::episode_stream;
 pub use world::{Snapshot, SnapshotError, SubmitError, World};

@@ -1,46 +1,46 @@
-//! How a body holds itself: what an onlooker can see of what it does.
+//! Posture of a body: the visible state of an agent.
 
 use chaic_core::Vec3;
 use chaic_core::capability::{Gait, Impairments, Persona};
 use chaic_core::geom::Pose;
 
-/// One arm.
+/// An arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arm {
-    /// Where the hand is, in the body's frame (x right, y up, -z ahead, origin between the feet),
-    /// metres.
+    /// Position of the hand in the body frame (x right, y up, -z forward, origin between the feet),
+    /// meters.
     pub hand_in_body: Vec3,
-    /// Whether the hand is closed around something.
+    /// True if the hand is closed around an object.
     pub grips: bool,
 }
 
-/// All that can be seen of a body, worked out from the state.
+/// Visible state of a body, derived from the state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Posture {
-    /// What kind of person.
+    /// Persona: kind of person.
     pub persona: Persona,
-    /// What impairs it.
+    /// Impairments.
     pub impairments: Impairments,
-    /// How tired it is: 0 rested, 1 exhausted.
+    /// Fatigue: 0 rested, 1 exhausted.
     pub fatigue: f32,
-    /// How this person gets about.
+    /// Mode of locomotion.
     pub gait: Gait,
-    /// Height of the body, metres.
+    /// Height of the body, meters.
     pub height_m: f32,
-    /// Which clothes and hair.
-    pub look: u8,
-    /// Where the feet (or wheels) are.
+    /// Appearance index: selects clothes and hair.
+    pub appearance: u8,
+    /// Pose of the feet or wheels.
     pub pose: Pose,
-    /// Whether the legs (or wheels) move.
+    /// True if the legs or wheels move.
     pub moving: bool,
-    /// Distance walked so far, metres: the legs' phase.
+    /// Total distance walked, meters: phase of the leg animation.
     pub walked_m: f32,
-    /// The arms, left and right.
+    /// Left and right arm.
     pub arms: [Arm; 2],
-    /// How far the trunk is bent: 0 upright, 1 down to the floor.
+    /// Bend of the trunk: 0 upright, 1 down to the floor.
     pub bend: f32,
-    /// How far the body stretches upwards on its toes: 0 to 1.
+    /// Upward stretch on the toes: 0 to 1.
     pub stretch: f32,
-    /// Whether an attempt is failing right now: the hands come back empty.
+    /// True if a failing attempt is in progress.
     pub failing: bool,
 }

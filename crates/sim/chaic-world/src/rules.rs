@@ -1,5 +1,5 @@
-//! By which constants a world goes on. Rule sets are data: a change of rules is a change of a
-//! value here, never an `if` elsewhere. `docs/rules.md` lists every field with its source.
+//! Constants of the simulation. Rule sets are data: a change of rules changes a value here and
+//! never adds an `if` elsewhere. `docs/rules.md` lists every field with its source.
 
 use chaic_core::TaskId;
 use chaic_core::briefing::Motion;
@@ -7,149 +7,150 @@ use chaic_core::capability::LimitPenalty;
 use chaic_core::task::GoalTop;
 use serde::{Deserialize, Serialize};
 
-/// Frames that the parts of actions take (facts S2.2, measured on the original's
-/// recordings).
+/// Durations of the phases of actions, frames (facts S2.2, measured on recordings of the original).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Durations {
-    /// A turn, be it by 15 degrees or towards a thing.
+    /// A turn, by 15 degrees or toward an object.
     pub turn: u32,
     /// From standing to the first frame of walking.
     pub start_walking: u32,
-    /// From one step ahead to the next without stopping.
+    /// From one step to the next without stopping.
     pub keep_walking: u32,
-    /// Moving a hand to a point.
+    /// Movement of a hand to a point.
     pub reach: u32,
     /// Closing a hand.
     pub grasp: u32,
-    /// Closing a hand on nothing, where a limit is exceeded. As long as a good one, so that both
-    /// attempts take the same time: ours. The original leaves it out (facts S1.4 and S2.2: 55
-    /// frames in place of 57).
+    /// Closing a hand on nothing because a limit is exceeded. Our choice: as long as a successful
+    /// grasp, so that both attempts take the same time. The original omits it: 55 frames instead of
+    /// 57 (facts S1.4 and S2.2).
     pub vain_grasp: u32,
-    /// Bringing both arms back.
+    /// Return of both arms to rest.
     pub reset_arms: u32,
-    /// Between two parts of a composite action.
+    /// Pause between two phases of a composite action.
     pub gap: u32,
-    /// A short motion of the arm out of the way.
+    /// A short motion that moves the arm away.
     pub move_away: u32,
     /// Opening a hand.
     pub open_hand: u32,
-    /// Most further frames in which one watches what was let go.
+    /// Maximum number of extra frames for watching a released object fall.
     pub watch_fall: u32,
-    /// Most further frames in which one watches what was put into a container. How many they are
-    /// is drawn evenly: a put-in takes 80 to 104 frames (facts S2.2), and nothing says how often
-    /// which.
+    /// Maximum number of extra frames for watching an object that was put into a container. The
+    /// number is drawn uniformly: a put-in takes 80 to 104 frames (facts S2.2), and the
+    /// distribution is unknown.
     pub watch_put_in: u32,
-    /// Most frames that one who stands at furniture waits for the other who is on the way to it.
+    /// Maximum number of frames that an agent at furniture waits for the other to arrive.
     pub await_partner: u32,
-    /// Raising furniture once it is in hand.
+    /// Raising furniture after the grasp.
     pub raise_furniture: u32,
-    /// A pick-up that is refused at once: the thing is too far off, held or out of play.
+    /// A pick-up that is refused immediately: the object is out of reach, held or out of play.
     pub refused_pick: u32,
 }
 
-/// What becomes of somebody who walks against something.
+/// Behavior of an agent that walks into something.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Blocking {
-    /// Bodies are solid: it stops, or slides along.
+    /// Bodies are solid: the agent stops, or slides along.
     Stops,
-    /// Nothing stops it for good: a step that meets something ends after one frame, well, and the
-    /// next one goes on through. Targets, and in the street tents, shelves, bicycle and goal place
-    /// are not even met (facts S3.3).
+    /// Nothing blocks an agent permanently. A step that touches something ends successfully after
+    /// one frame, and the next step continues through it. Targets are not tested; in the street
+    /// neither are tents, shelves, bicycles and the goal place (facts S3.3).
     Creeps,
 }
 
-/// From where one reaches a thing.
+/// Reference point for reaching an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ReachTo {
-    /// Its nearest point counts, and no wall may be between.
+    /// Its nearest point; no wall may be in between.
     NearestPoint,
-    /// Its middle counts, walls don't, and putting something somewhere asks for no distance at
-    /// all (facts S3.5 and S3.7).
+    /// Its center; walls are ignored, and a put-on requires no distance (facts S3.5 and S3.7).
     Middle,
 }
 
-/// When two lift furniture together.
+/// Condition for a joint lift of furniture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum JointLift {
-    /// When both have chosen to, and stand at it.
+    /// Both agents have chosen the furniture and stand at it.
     BothAtIt,
-    /// When one chooses to and the other's last choice was the same piece, however long ago and
-    /// however it ended: both drop what they do and go there (facts S9.4).
+    /// One agent chooses the furniture that the last action of the other was for, at any earlier
+    /// time and with any outcome. Both then abort their actions and walk to it (facts S9.4).
     LastChoice,
 }
 
-/// The rules of a world.
+/// Rules of a world.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rules {
-    /// Frames of the parts of actions.
+    /// Durations of the phases of actions, frames.
     pub durations: Durations,
-    /// A step ahead ends once it has covered more than this, metres (facts S2.2).
+    /// A step ends after more than this distance, meters (facts S2.2).
     pub stride_m: f32,
-    /// One turn, radians (facts S3.1: 15 degrees).
+    /// Angle of one turn, radians (facts S3.1: 15 degrees).
     pub turn_rad: f32,
-    /// A step ahead that covered less than this failed, metres: an eighth of a step.
+    /// A step that covered less than this distance fails, meters: an eighth of a step.
     pub min_progress_m: f32,
-    /// What becomes of somebody who walks against something.
+    /// Behavior of an agent that walks into something.
     pub blocking: Blocking,
-    /// Lower things are stepped over, metres (facts S1.5: the original's probe begins at 0.12 m).
+    /// Agents step over lower objects, meters (facts S1.5: the original's probe begins at 0.12 m).
     pub step_over_m: f32,
-    /// Farthest that one steps up to a thing, from its middle less half its longer side, metres
-    /// (facts S1.1).
+    /// Maximum distance from which an agent approaches an object, meters. It is measured from the
+    /// center, less half of the longer side (facts S1.1).
     pub approach_limit_m: f32,
-    /// How near one steps up to the nearest point of a thing, metres: the original stops 0.7 m
-    /// from the middle (facts S2.2); here bodies are solid, so it is an arm's length from the edge.
+    /// Target distance of an approach to the nearest point of an object, meters. The original stops
+    /// 0.7 m from the center (facts S2.2). Bodies are solid here, so it is an arm's length from the
+    /// edge.
     pub arm_reach_m: f32,
-    /// From how far one still reaches a thing that one can't step up to any nearer, metres, if no
-    /// wall is between (facts S3.5: 2 m to the middle).
+    /// Maximum reach to an object when a closer approach is impossible and no wall is in between,
+    /// meters (facts S3.5: 2 m to the center).
     pub reach_limit_m: f32,
-    /// The same for furniture that is being moved (facts S9.3: 3 m).
+    /// The same limit for furniture that is being moved (facts S9.3: 3 m).
     pub furniture_reach_limit_m: f32,
-    /// From where reaching is measured.
+    /// Reference point for reaching.
     pub reach_to: ReachTo,
-    /// When two lift furniture together.
+    /// Condition for a joint lift of furniture.
     pub joint_lift: JointLift,
-    /// Whether everybody is told at once which obstacles have been removed (facts S5.5).
+    /// True if all agents are informed at once about removed obstacles (facts S5.5).
     pub tells_removed: bool,
-    /// Chance of picking up beyond one's range of heights (facts S1.3).
+    /// Chance of a pick-up beyond the height range of the agent (facts S1.3).
     pub pick_penalty: LimitPenalty,
-    /// Chance of putting on beyond one's range of heights (facts S1.3).
+    /// Chance of a put-on beyond the height range of the agent (facts S1.3).
     pub put_penalty: LimitPenalty,
-    /// Chance of lifting beyond one's strength (facts S1.3).
+    /// Chance of a lift beyond the strength of the agent (facts S1.3).
     pub lift_penalty: LimitPenalty,
-    /// Objects in one container or basket (paper section 3.3).
+    /// Maximum number of objects in a container or basket (paper section 3.3).
     pub container_capacity: u32,
-    /// How far from the goal place's middle, less half its longer side, a released thing may come
-    /// to rest and still count, metres (facts S5.2).
+    /// Maximum distance from the goal place at which a released object counts as delivered, meters.
+    /// It is measured from the center, less half of the longer side (facts S5.2).
     pub delivery_margin_m: f32,
-    /// Whether a thing that was dropped by a put-on beyond one's limits counts if it lands near
-    /// enough; the original's radius rule lets it.
+    /// True if an object that a failed put-on dropped counts if it lands close enough. The radius
+    /// rule of the original allows it.
     pub dropped_counts: bool,
-    /// Whether a put-on that succeeded anywhere delivers all that its agent has let go so far:
-    /// the original's second rule (facts S5.3), taken for a mistake and off in both rule sets.
+    /// True if a successful put-on anywhere delivers all objects that its agent has released so
+    /// far. It is the second rule of the original (facts S5.3), considered a bug and off in both
+    /// rule sets.
     pub delivered_anywhere: bool,
-    /// Whether containers are offered where a wheelchair takes part; the original's minds never
-    /// take note of one there (facts S13, number 12).
+    /// True if briefings list containers when a wheelchair user takes part. The agents of the
+    /// original ignore containers there (facts S13, number 12).
     pub containers_with_wheelchair: bool,
-    /// Whether fragile things may be targets; in the original's data nobody can go for them, but
+    /// True if fragile objects may be targets. In the original's data no agent can pick them, but
     /// they count in the total (facts S6).
     pub fragile_targets: bool,
-    /// Chance that a fragile thing within a child's reach breaks when picked up (facts S6).
+    /// Chance that a fragile object within a child's reach breaks during a pick-up (facts S6).
     pub break_chance_low: f32,
-    /// The same above the child's reach.
+    /// The same chance above the child's reach.
     pub break_chance_high: f32,
-    /// The child is away beyond this distance from its guardian, metres (facts S8.4).
+    /// The child counts as away beyond this distance from its guardian, meters (facts S8.4).
     pub child_away_m: f32,
-    /// Lowest top that counts as a high goal place, metres (facts S5.1).
+    /// Minimum top height of a high goal place, meters (facts S5.1).
     pub high_goal_min_top_m: f32,
-    /// Time of one frame for falling things, seconds (facts S2.1: one physics step of 0.01 s).
+    /// Time step of one frame for falling objects, seconds (facts S2.1: one physics step of 0.01
+    /// s).
     pub fall_step_s: f32,
 }
 
 impl Rules {
-    /// Lowest top that counts as a task's goal place, metres; 0 for no condition.
+    /// Returns the minimum top height of the goal place of a task, meters; 0 for no condition.
     pub fn goal_min_top_m(&self, task: TaskId) -> f32 {
         match task.info().goal_top {
             GoalTop::High => self.high_goal_min_top_m,
@@ -157,13 +158,14 @@ impl Rules {
         }
     }
 
-    /// What a briefing says of these rules.
+    /// Returns the motion parameters for the briefing.
     pub fn motion(&self) -> Motion {
         let Rules { turn_rad, stride_m, step_over_m, arm_reach_m, reach_limit_m, .. } = *self;
         Motion { turn_rad, stride_m, step_over_m, arm_reach_m, reach_limit_m }
     }
 
-    /// The paper's rules, with the original's measured numbers where the paper gives none.
+    /// Returns the rules of the paper, with measured values of the original where the paper has
+    /// none.
     pub const fn paper() -> Rules {
         Rules {
             durations: Durations {
@@ -212,19 +214,19 @@ impl Rules {
         }
     }
 
-    /// What the original's released code does, where that moves a score: see `docs/rules.md` for
-    /// the reason of each difference.
+    /// Returns the rules of the original's released code, where a difference affects a score.
+    /// `docs/rules.md` gives the reason of each difference.
     pub const fn compat() -> Rules {
         let paper = Rules::paper();
         Rules {
             durations: Durations {
-                // Whoever is called to lift comes, from wherever (facts S9.4).
+                // Facts S9.4: an agent that is called to lift comes from any distance.
                 await_partner: 3000,
-                // Facts S9.3: raised by one reach, without bringing the arms back.
+                // Facts S9.3: raised by one reach, without returning the arms.
                 raise_furniture: 17,
-                // Facts S2.2: one frame, then both arms are brought back.
+                // Facts S2.2: one frame, then both arms return.
                 refused_pick: 37,
-                // Facts S1.4 and S2.2: after a failed reach the arms are brought back at once.
+                // Facts S1.4 and S2.2: after a failed reach the arms return at once.
                 vain_grasp: 0,
                 ..paper.durations
             },

@@ -1,13 +1,13 @@
-//! How an episode begins.
+//! Initial condition of an episode, and the check of its values.
 
 use chaic_core::briefing::Goal;
 use chaic_core::capability::{Capability, Gait, Impairments, PersonKind, Persona, UsableHands};
-use chaic_core::geom::{Pose, Rect, xz};
+use chaic_core::geom::{Pose, Rect, to_xz};
 use chaic_core::{AgentId, ClassId, EntityId, Frame, TaskId, Vec2, Vec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The initial condition of a world: everything that is fixed before the first frame.
+/// Initial condition of a world: everything that is fixed before the first frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Setup {
@@ -17,25 +17,25 @@ pub struct Setup {
     pub seed: u64,
     /// Frames until the episode ends.
     pub horizon: Frame,
-    /// The part of the plane where the episode happens; nobody leaves it.
+    /// Part of the plane where the episode takes place; agents cannot leave it.
     pub bounds: Rect,
-    /// Height of ceilings above the floor, metres; absent outdoors.
+    /// Height of ceilings above the floor, meters; `None` outdoors.
     pub ceiling_m: Option<f32>,
-    /// Named rooms; logical only, walls are listed apart.
+    /// Named rooms. They are logical only; walls are listed separately.
     pub rooms: Vec<Room>,
     /// Walls, already cut at their openings.
     pub walls: Vec<Wall>,
-    /// Where one walks between rooms.
+    /// Openings in walls that connect rooms.
     pub openings: Vec<Opening>,
-    /// What covers the ground; later ones lie on earlier ones.
+    /// Floor coverings; later ones are drawn on top of earlier ones.
     pub floors: Vec<Floor>,
-    /// All things; the k-th is entity `FIRST_OBJECT + k`.
-    pub things: Vec<Thing>,
+    /// All objects; the k-th is entity `FIRST_OBJECT + k`.
+    pub things: Vec<ObjectSpec>,
     /// All people; the k-th is agent k: partner, helper, child.
-    pub people: Vec<Person>,
-    /// What the partner wants.
+    pub people: Vec<AgentSpec>,
+    /// Goal of the partner.
     pub goal: Goal,
-    /// The goal place: delivering to any of these things counts.
+    /// Goal places: delivery to any of these objects counts.
     pub goal_places: Vec<EntityId>,
 }
 
@@ -59,9 +59,9 @@ pub enum RoomKind {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Room {
-    /// Its kind.
+    /// Kind of the room.
     pub kind: RoomKind,
-    /// Its extent.
+    /// Extent in plan.
     pub rect: Rect,
 }
 
@@ -69,37 +69,37 @@ pub struct Room {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Wall {
-    /// One end of the center line (x, z), metres.
+    /// First end of the center line (x, z), meters.
     #[schemars(with = "[f32; 2]")]
     pub a: Vec2,
-    /// The other end.
+    /// Second end of the center line (x, z), meters.
     #[schemars(with = "[f32; 2]")]
     pub b: Vec2,
-    /// Thickness, metres.
+    /// Thickness, meters.
     pub thickness_m: f32,
-    /// Height of the lower edge, metres: 0, or above a doorway.
+    /// Height of the lower edge, meters: 0, or the top of a doorway.
     pub bottom_m: f32,
-    /// Height of the upper edge, metres.
+    /// Height of the upper edge, meters.
     pub top_m: f32,
     /// sRGB color.
     pub color: [u8; 3],
 }
 
-/// A gap in the walls that leads from one room to another.
+/// A gap in the walls that connects two rooms.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Opening {
-    /// One jamb (x, z), metres.
+    /// First jamb (x, z), meters.
     #[schemars(with = "[f32; 2]")]
     pub a: Vec2,
-    /// The other jamb.
+    /// Second jamb (x, z), meters.
     #[schemars(with = "[f32; 2]")]
     pub b: Vec2,
-    /// The rooms on its two sides, as indices.
+    /// Indices of the rooms on its two sides.
     pub rooms: [u32; 2],
 }
 
-/// What a piece of ground is made of.
+/// Material of a floor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[allow(missing_docs, reason = "the names say it")]
@@ -112,45 +112,45 @@ pub enum FloorMaterial {
     Grass,
 }
 
-/// A rectangle of ground.
+/// A rectangle of floor.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Floor {
-    /// Its extent.
+    /// Extent in plan.
     pub rect: Rect,
-    /// What it is made of.
+    /// Material.
     pub material: FloorMaterial,
     /// sRGB color.
     pub color: [u8; 3],
 }
 
-/// A thing at its place.
+/// An object at its initial position.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Thing {
-    /// What it is.
+pub struct ObjectSpec {
+    /// Class of the object.
     pub class: ClassId,
-    /// Middle of its bottom, metres.
+    /// Center of the bottom face, meters.
     #[schemars(with = "[f32; 3]")]
     pub position: Vec3,
-    /// Its turn about the vertical, radians; at 0 its front faces -z.
+    /// Rotation about the vertical axis, radians; at 0 the front faces -z.
     pub yaw_rad: f32,
-    /// Factors on the catalogue's width, height and depth.
+    /// Factors on the width, height and depth in the catalogue.
     pub scale: [f32; 3],
-    /// Height of its lowest top that bears things (a seat, a mattress, a truck's bed) above its
-    /// bottom, metres, where that isn't in proportion to the whole; see [`Thing::parts`].
+    /// Height of the lowest supporting top (a seat, a mattress, a truck bed) above the bottom,
+    /// meters. `None` scales it with the object; see [`ObjectSpec::parts`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seat_m: Option<f32>,
-    /// Which of the class's colors, modulo their number.
+    /// Index of the color of the class, modulo the number of colors.
     pub variant: u8,
-    /// Whether it stays where it is, whatever its class allows.
+    /// True if the object stays in place even if its class is movable.
     pub fixed: bool,
 }
 
-impl Thing {
-    /// A thing of catalogue size.
-    pub fn new(class: ClassId, position: Vec3, yaw_rad: f32) -> Thing {
-        Thing {
+impl ObjectSpec {
+    /// Creates an object of catalogue size.
+    pub fn new(class: ClassId, position: Vec3, yaw_rad: f32) -> ObjectSpec {
+        ObjectSpec {
             class,
             position,
             yaw_rad,
@@ -161,13 +161,13 @@ impl Thing {
         }
     }
 
-    /// Extents along its own x, y and z, metres.
+    /// Returns the extents along the object's own x, y and z axes, meters.
     pub fn size_m(&self) -> Vec3 {
         Vec3::from(self.class.info().size_m) * Vec3::from(self.scale)
     }
 
-    /// Half of its longer side in plan, metres: as far as it reaches from its middle wherever a rule
-    /// measures to the middle (facts S1.1 and S5.2).
+    /// Returns half of the longer side in plan, meters. Rules that measure to the center use it as
+    /// the radius of the object (facts S1.1 and S5.2).
     pub fn half_longer_side_m(&self) -> f32 {
         let size = self.size_m();
         0.5 * size.x.max(size.z)
@@ -177,46 +177,47 @@ impl Thing {
 /// A person at the start.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Person {
-    /// What kind of person.
+pub struct AgentSpec {
+    /// Persona: kind of person.
     pub persona: Persona,
-    /// Where.
+    /// Initial pose.
     pub pose: Pose,
-    /// Which clothes and hair, any number.
-    pub look: u8,
-    /// Limits and measures other than the persona's own.
+    /// Appearance index: selects clothes and hair.
+    #[serde(rename = "look")]
+    pub appearance: u8,
+    /// Capability that replaces the one of the persona.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub capability: Option<Capability>,
-    /// What impairs this person besides.
+    /// Impairments that are applied on top of the capability.
     #[serde(default, skip_serializing_if = "Impairments::is_empty")]
     pub impairments: Impairments,
 }
 
-impl Person {
-    /// Somebody of this kind, without limits and measures of its own.
-    pub fn new(kind: impl Into<PersonKind>, pose: Pose, look: u8) -> Person {
+impl AgentSpec {
+    /// Creates a person of this kind with the capability of the persona.
+    pub fn new(kind: impl Into<PersonKind>, pose: Pose, appearance: u8) -> AgentSpec {
         let PersonKind { persona, impairments } = kind.into();
-        Person { persona, pose, look, capability: None, impairments }
+        AgentSpec { persona, pose, appearance, capability: None, impairments }
     }
 
-    /// The limits and measures that hold for this person.
+    /// Returns the effective capability: the base capability with the impairments applied.
     pub fn capability(&self) -> Capability {
         self.impairments.apply(self.capability.unwrap_or_else(|| self.persona.capability()))
     }
 
-    /// What kind of person this is.
+    /// Returns the persona together with the impairments.
     pub fn kind(&self) -> PersonKind {
         PersonKind { persona: self.persona, impairments: self.impairments }
     }
 }
 
-/// Why a setup can't become a world.
+/// A setup that cannot become a world.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{field}: {problem}")]
 pub struct SetupError {
-    /// Path of the field within the setup, for example `things[3].position`.
+    /// Path of the field in the setup, for example `things[3].position`.
     pub field: String,
-    /// What is wrong, and what was expected.
+    /// The wrong value, and the expected one.
     pub problem: String,
 }
 
@@ -226,7 +227,7 @@ impl SetupError {
     }
 }
 
-fn number(field: String, x: f32, low: f32, high: f32) -> Result<(), SetupError> {
+fn check_range(field: String, x: f32, low: f32, high: f32) -> Result<(), SetupError> {
     if x >= low && x <= high {
         Ok(())
     } else {
@@ -234,23 +235,23 @@ fn number(field: String, x: f32, low: f32, high: f32) -> Result<(), SetupError> 
     }
 }
 
-/// The limits that only some people have.
-fn check_impaired(i: usize, c: &Capability) -> Result<(), SetupError> {
+/// Checks the optional limits: eyesight, endurance, tremor, and hands that fit the gait.
+fn check_optional_limits(i: usize, c: &Capability) -> Result<(), SetupError> {
     const FRAMES: [f32; 2] = [1.0, 1e6];
     let mut limits: Vec<(&str, f32, [f32; 2])> = vec![];
-    if let Some(sight) = c.sight {
+    if let Some(eyesight) = c.eyesight {
         limits.extend([
-            ("sight.range_m", sight.range_m, [0.1, 1000.0]),
-            ("sight.blur_rad", sight.blur_rad, [0.0, 0.2]),
-            ("sight.field_rad", sight.field_rad, [0.01, std::f32::consts::PI]),
-            ("sight.lowered_rad", sight.lowered_rad, [0.0, std::f32::consts::FRAC_PI_2]),
+            ("sight.range_m", eyesight.range_m, [0.1, 1000.0]),
+            ("sight.blur_rad", eyesight.blur_rad, [0.0, 0.2]),
+            ("sight.field_rad", eyesight.field_rad, [0.01, std::f32::consts::PI]),
+            ("sight.lowered_rad", eyesight.lowered_rad, [0.0, std::f32::consts::FRAC_PI_2]),
         ]);
     }
     if let Some(endurance) = c.endurance {
         limits.extend([
             ("endurance.work_frames", endurance.work_frames, FRAMES),
             ("endurance.rest_frames", endurance.rest_frames, FRAMES),
-            ("endurance.least", endurance.least, [0.05, 1.0]),
+            ("endurance.least", endurance.min_fraction, [0.05, 1.0]),
         ]);
     }
     if let Some(tremor) = c.tremor {
@@ -260,71 +261,72 @@ fn check_impaired(i: usize, c: &Capability) -> Result<(), SetupError> {
         ]);
     }
     for (name, x, [low, high]) in limits {
-        number(format!("people[{i}].capability.{name}"), x, low, high)?;
+        check_range(format!("people[{i}].capability.{name}"), x, low, high)?;
     }
     if c.gait == Gait::WalkBike && c.hands != UsableHands::Both {
-        let problem = "are one, expected both: a bicycle needs one and its basket the other";
+        let problem =
+            "has one usable hand, expected both: a bicycle needs one hand and its basket the other";
         return Err(SetupError::new(format!("people[{i}].capability.hands"), problem));
     }
     Ok(())
 }
 
 impl Setup {
-    /// Most things in one episode: ids must fit 16 bits with room to spare, and memory is bounded.
+    /// Maximum number of objects in one episode. Ids must fit in 16 bits, and memory stays bounded.
     pub const MAX_THINGS: usize = 4096;
-    /// Longest side of the bounds, metres: maps are made of all that is in them.
+    /// Maximum side length of the bounds, meters. Maps cover the whole area.
     pub const MAX_LENGTH_M: f32 = 200.0;
-    /// Most walls in one episode.
+    /// Maximum number of walls in one episode.
     pub const MAX_WALLS: usize = 4096;
-    /// Most rooms in one episode. Ours: many times those of any generated or imported house, and few
-    /// enough that all may be searched for the one at a place.
+    /// Maximum number of rooms in one episode. Our choice: far more than any generated or imported
+    /// house has, and small enough for a linear search of the room at a point.
     pub const MAX_ROOMS: usize = 256;
-    /// Most openings, and most floors, in one episode. Ours: several for each room.
+    /// Maximum number of openings in one episode. Our choice: several for each room.
     pub const MAX_OPENINGS: usize = 1024;
-    /// See [`Setup::MAX_OPENINGS`].
+    /// Maximum number of floors in one episode, as [`Setup::MAX_OPENINGS`].
     pub const MAX_FLOORS: usize = 1024;
-    /// Farthest coordinate, metres: f32 keeps millimetres there.
+    /// Maximum absolute coordinate, meters: f32 still resolves millimeters there.
     pub const MAX_COORDINATE_M: f32 = 1000.0;
 
-    /// The thing that this entity names.
-    pub fn thing(&self, entity: EntityId) -> Option<&Thing> {
+    /// Returns the object with this id.
+    pub fn thing(&self, entity: EntityId) -> Option<&ObjectSpec> {
         self.thing_index(entity).map(|i| &self.things[i])
     }
 
-    /// Its place in [`Setup::things`].
+    /// Returns the index of an object in [`Setup::things`].
     pub fn thing_index(&self, entity: EntityId) -> Option<usize> {
         let i = usize::from(entity.0.checked_sub(EntityId::FIRST_OBJECT.0)?);
         (i < self.things.len()).then_some(i)
     }
 
-    /// The entity of the k-th thing.
+    /// Returns the id of the k-th object.
     pub fn entity(index: usize) -> EntityId {
         EntityId(EntityId::FIRST_OBJECT.0 + index as u16)
     }
 
-    /// All entities of things, in order.
+    /// Returns the ids of all objects, in order.
     pub fn entities(&self) -> impl Iterator<Item = EntityId> + use<> {
         (0..self.things.len()).map(Setup::entity)
     }
 
-    /// The agents, in order.
+    /// Returns the ids of all agents, in order.
     pub fn agents(&self) -> impl Iterator<Item = AgentId> + use<> {
         (0..self.people.len() as u8).map(AgentId)
     }
 
-    /// The room that a point lies in.
+    /// Returns the index of the room that contains a point.
     pub fn room_at(&self, p: Vec2) -> Option<usize> {
         self.rooms.iter().position(|r| r.rect.contains(p))
     }
 
-    /// Checks what [`crate::World::new`] relies on: finite numbers, ids that exist, bounds.
-    /// Whether the episode makes sense to play is for the validator of `chaic-episodes`.
+    /// Checks what [`crate::World::new`] relies on: finite numbers, valid ids and bounds. The
+    /// validator of `chaic-episodes` checks whether the episode is playable.
     pub fn check(&self) -> Result<(), SetupError> {
         let max = Setup::MAX_COORDINATE_M;
         let rect = |field: String, r: &Rect| {
             for (name, v) in [("min", r.min), ("max", r.max)] {
-                number(format!("{field}.{name}[0]"), v.x, -max, max)?;
-                number(format!("{field}.{name}[1]"), v.y, -max, max)?;
+                check_range(format!("{field}.{name}[0]"), v.x, -max, max)?;
+                check_range(format!("{field}.{name}[1]"), v.y, -max, max)?;
             }
             if r.min.x < r.max.x && r.min.y < r.max.y {
                 Ok(())
@@ -335,9 +337,9 @@ impl Setup {
         rect("bounds".into(), &self.bounds)?;
         let extent = self.bounds.max - self.bounds.min;
         for (axis, length) in [("x", extent.x), ("z", extent.y)] {
-            number(format!("bounds (its length along {axis})"), length, 0.1, Setup::MAX_LENGTH_M)?;
+            check_range(format!("bounds (length along {axis})"), length, 0.1, Setup::MAX_LENGTH_M)?;
         }
-        for (field, n, most) in [
+        for (field, n, max) in [
             ("rooms", self.rooms.len(), Setup::MAX_ROOMS),
             ("walls", self.walls.len(), Setup::MAX_WALLS),
             ("openings", self.openings.len(), Setup::MAX_OPENINGS),
@@ -345,15 +347,15 @@ impl Setup {
             ("things", self.things.len(), Setup::MAX_THINGS),
             ("goal_places", self.goal_places.len(), Setup::MAX_THINGS),
         ] {
-            if n > most {
-                return Err(SetupError::new(field, format!("has {n} entries, at most {most}")));
+            if n > max {
+                return Err(SetupError::new(field, format!("has {n} entries, at most {max}")));
             }
         }
         if self.horizon == 0 {
             return Err(SetupError::new("horizon", "is 0, expected at least one frame"));
         }
         if let Some(h) = self.ceiling_m {
-            number("ceiling_m".into(), h, 2.0, 20.0)?;
+            check_range("ceiling_m".into(), h, 2.0, 20.0)?;
         }
         for (i, room) in self.rooms.iter().enumerate() {
             rect(format!("rooms[{i}].rect"), &room.rect)?;
@@ -363,12 +365,12 @@ impl Setup {
         }
         for (i, w) in self.walls.iter().enumerate() {
             for (name, v) in [("a", w.a), ("b", w.b)] {
-                number(format!("walls[{i}].{name}[0]"), v.x, -max, max)?;
-                number(format!("walls[{i}].{name}[1]"), v.y, -max, max)?;
+                check_range(format!("walls[{i}].{name}[0]"), v.x, -max, max)?;
+                check_range(format!("walls[{i}].{name}[1]"), v.y, -max, max)?;
             }
-            number(format!("walls[{i}].thickness_m"), w.thickness_m, 0.01, 5.0)?;
-            number(format!("walls[{i}].bottom_m"), w.bottom_m, 0.0, 20.0)?;
-            number(format!("walls[{i}].top_m"), w.top_m, w.bottom_m + 0.01, 20.0)?;
+            check_range(format!("walls[{i}].thickness_m"), w.thickness_m, 0.01, 5.0)?;
+            check_range(format!("walls[{i}].bottom_m"), w.bottom_m, 0.0, 20.0)?;
+            check_range(format!("walls[{i}].top_m"), w.top_m, w.bottom_m + 0.01, 20.0)?;
         }
         for (i, o) in self.openings.iter().enumerate() {
             for (side, room) in o.rooms.iter().enumerate() {
@@ -378,35 +380,35 @@ impl Setup {
                 }
             }
             for (name, v) in [("a", o.a), ("b", o.b)] {
-                number(format!("openings[{i}].{name}[0]"), v.x, -max, max)?;
-                number(format!("openings[{i}].{name}[1]"), v.y, -max, max)?;
+                check_range(format!("openings[{i}].{name}[0]"), v.x, -max, max)?;
+                check_range(format!("openings[{i}].{name}[1]"), v.y, -max, max)?;
             }
         }
         for (i, t) in self.things.iter().enumerate() {
             for (axis, x) in t.position.to_array().into_iter().enumerate() {
-                number(format!("things[{i}].position[{axis}]"), x, -max, max)?;
+                check_range(format!("things[{i}].position[{axis}]"), x, -max, max)?;
             }
-            number(format!("things[{i}].yaw_rad"), t.yaw_rad, -100.0, 100.0)?;
+            check_range(format!("things[{i}].yaw_rad"), t.yaw_rad, -100.0, 100.0)?;
             for (axis, s) in t.scale.into_iter().enumerate() {
-                number(format!("things[{i}].scale[{axis}]"), s, 0.01, 100.0)?;
+                check_range(format!("things[{i}].scale[{axis}]"), s, 0.01, 100.0)?;
             }
             if let Some(seat_m) = t.seat_m {
-                number(format!("things[{i}].seat_m"), seat_m, 0.001, t.size_m().y)?;
+                check_range(format!("things[{i}].seat_m"), seat_m, 0.001, t.size_m().y)?;
             }
         }
         if self.people.is_empty() || self.people.len() > AgentId::MAX_AGENTS {
-            let (n, most) = (self.people.len(), AgentId::MAX_AGENTS);
-            let problem = format!("has {n} entries, expected 1 to {most}");
+            let (n, max) = (self.people.len(), AgentId::MAX_AGENTS);
+            let problem = format!("has {n} entries, expected 1 to {max}");
             return Err(SetupError::new("people", problem));
         }
         for (i, p) in self.people.iter().enumerate() {
             for (axis, x) in p.pose.position.to_array().into_iter().enumerate() {
-                number(format!("people[{i}].pose.position[{axis}]"), x, -max, max)?;
+                check_range(format!("people[{i}].pose.position[{axis}]"), x, -max, max)?;
             }
-            number(format!("people[{i}].pose.yaw_rad"), p.pose.yaw_rad, -100.0, 100.0)?;
+            check_range(format!("people[{i}].pose.yaw_rad"), p.pose.yaw_rad, -100.0, 100.0)?;
             let c = p.capability();
             for (name, x, low, high) in [
-                // A step longer than the body could pass through a wall.
+                // A step longer than the radius of the body could pass through a wall.
                 ("speed_m_per_frame", c.speed_m_per_frame, 0.001, c.radius_m.min(0.2)),
                 (
                     "approach_speed_m_per_frame",
@@ -423,9 +425,9 @@ impl Setup {
                 ("put_range_m[0]", c.put_range_m[0], 0.0, 10.0),
                 ("put_range_m[1]", c.put_range_m[1], c.put_range_m[0], 10.0),
             ] {
-                number(format!("people[{i}].capability.{name}"), x, low, high)?;
+                check_range(format!("people[{i}].capability.{name}"), x, low, high)?;
             }
-            check_impaired(i, &c)?;
+            check_optional_limits(i, &c)?;
         }
         if self.goal.targets.is_empty() {
             return Err(SetupError::new("goal.targets", "is empty, expected at least one class"));
@@ -439,19 +441,19 @@ impl Setup {
             if self.goal.targets[..i].iter().any(|(c, _)| c == class) {
                 return Err(SetupError::new(
                     format!("goal.targets[{i}]"),
-                    format!("names {class} again, expected each class once"),
+                    format!("lists {class} again, expected each class once"),
                 ));
             }
         }
         if self.goal_places.is_empty() {
-            return Err(SetupError::new("goal_places", "is empty, expected at least one thing"));
+            return Err(SetupError::new("goal_places", "is empty, expected at least one object"));
         }
         for (i, entity) in self.goal_places.iter().enumerate() {
             let last = Setup::entity(self.things.len().saturating_sub(1));
             match self.thing(*entity) {
                 None => {
                     let problem = format!(
-                        "is {}, expected the id of a thing: {} (things[0]) to {}",
+                        "is {}, expected the id of an object: {} (things[0]) to {}",
                         entity.0,
                         EntityId::FIRST_OBJECT.0,
                         last.0
@@ -460,7 +462,7 @@ impl Setup {
                 }
                 Some(t) if !t.fixed => {
                     let k = self.thing_index(*entity).unwrap_or_default();
-                    let problem = format!("names things[{k}] ({}), which isn't fixed", t.class);
+                    let problem = format!("names things[{k}] ({}), which is not fixed", t.class);
                     return Err(SetupError::new(format!("goal_places[{i}]"), problem));
                 }
                 Some(_) => {}
@@ -469,10 +471,10 @@ impl Setup {
         Ok(())
     }
 
-    /// Distance in plan from a point to the nearest opening, metres.
+    /// Returns the distance in plan from a point to the nearest opening, meters.
     pub(crate) fn distance_to_opening(&self, p: Vec3) -> f32 {
         let to_segment = |a: Vec2, b: Vec2| {
-            let (p, ab) = (xz(p), b - a);
+            let (p, ab) = (to_xz(p), b - a);
             let t = if ab.length_squared() > 0.0 {
                 ((p - a).dot(ab) / ab.length_squared()).clamp(0.0, 1.0)
             } else {

@@ -1,38 +1,37 @@
-//! What things are to collisions and to those who put something on them: upright boxes and
-//! level tops, worked out from the catalogue's parts.
+//! Collision boxes and supporting surfaces of objects, derived from the parts in the catalogue.
 
 use chaic_core::catalogue::Part;
 use chaic_core::geom::{rotate_yaw, yaw_rotation};
 use chaic_core::{EntityId, Quat, Vec2, Vec3};
 
-use crate::setup::{Setup, Thing, Wall};
+use crate::setup::{ObjectSpec, Setup, Wall};
 
-/// An upright box that stops bodies and falling things.
+/// An upright box that blocks bodies and falling objects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Block {
-    /// Middle, metres.
+    /// Center, meters.
     pub center: Vec3,
-    /// Half extents along its own x, y, z, metres.
+    /// Half extents along its own x, y and z axes, meters.
     pub half: Vec3,
-    /// Turn about the vertical, radians.
+    /// Rotation about the vertical axis, radians.
     pub yaw_rad: f32,
-    /// What it belongs to.
+    /// Entity that it belongs to.
     pub entity: EntityId,
 }
 
-/// A level rectangle on which things may be put.
+/// A horizontal rectangle on which objects can be placed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
-    /// Middle of the top face, in the world, metres.
+    /// Center of the top face in the world, meters.
     pub center: Vec3,
-    /// Half extents along its own x and z, metres.
+    /// Half extents along its own x and z axes, meters.
     pub half: [f32; 2],
-    /// Turn about the vertical, radians.
+    /// Rotation about the vertical axis, radians.
     pub yaw_rad: f32,
 }
 
 impl Block {
-    /// The nearest point of the box in plan, and whether `p` lies inside it.
+    /// Returns the point of the box that is nearest in plan, and whether `p` is inside.
     pub fn nearest_in_plan(&self, p: Vec3) -> (Vec3, bool) {
         let local = rotate_yaw(p - self.center, -self.yaw_rad);
         let clamped = Vec3::new(
@@ -45,22 +44,23 @@ impl Block {
         (Vec3::new(world.x, p.y, world.z), inside)
     }
 
-    /// Lowest and highest point, metres.
+    /// Returns the lowest and the highest y coordinate, meters.
     pub fn y_range(&self) -> [f32; 2] {
         [self.center.y - self.half.y, self.center.y + self.half.y]
     }
 
-    /// Radius of the circle around it in plan, metres.
+    /// Returns the radius of the circumscribed circle in plan, meters.
     pub fn plan_radius(&self) -> f32 {
         Vec2::new(self.half.x, self.half.z).length()
     }
 }
 
-impl Thing {
-    /// The parts of its shape, in its unit box.
+impl ObjectSpec {
+    /// Returns the parts of the shape, in the unit box.
     ///
-    /// They are the catalogue's, unless [`Thing::seat_m`] puts the seat at another height: then
-    /// everything up to the seat is stretched to that height, and everything above it to the rest.
+    /// They are the parts of the catalogue, unless [`ObjectSpec::seat_m`] sets a different seat
+    /// height. Then everything up to the seat is scaled to that height, and everything above it to
+    /// the remaining height.
     pub fn parts(&self) -> impl Iterator<Item = Part> + use<> {
         let parts = self.class.info().parts;
         let seat = self.seat_m.map(|seat_m| seat_m / self.size_m().y);
@@ -68,19 +68,19 @@ impl Thing {
         let scale = Vec3::from(self.scale);
         parts.iter().map(move |part| {
             let part = match stretch {
-                Some((to, from)) => stretched(part, from, to),
+                Some((to, from)) => rescale_height(part, from, to),
                 None => *part,
             };
-            if scale == Vec3::splat(scale.x) { part } else { in_proportion(part, scale) }
+            if scale == Vec3::splat(scale.x) { part } else { scale_rotated_part(part, scale) }
         })
     }
 }
 
-/// A part whose own axes, if it is turned, grow as the directions do in which they point: a wheel
-/// of a wider truck isn't a higher wheel.
-fn in_proportion(mut part: Part, scale: Vec3) -> Part {
+/// Scales a rotated part along the directions of its own axes, so that a wheel of a wider truck
+/// does not become a higher wheel.
+fn scale_rotated_part(mut part: Part, scale: Vec3) -> Part {
     if part.turn_deg != [0.0; 3] {
-        let axes = turn_of(&part);
+        let axes = part_rotation(&part);
         for (k, axis) in [axes.x_axis, axes.y_axis, axes.z_axis].into_iter().enumerate() {
             part.extent[k] *= (axis * scale).length() / scale[k];
         }
@@ -88,14 +88,14 @@ fn in_proportion(mut part: Part, scale: Vec3) -> Part {
     part
 }
 
-/// Height of the lowest supporting top in the unit box.
+/// Returns the height of the lowest supporting top in the unit box.
 fn lowest_top(parts: &[Part]) -> Option<f32> {
     let tops = parts.iter().filter(|p| p.supports).map(|p| p.center[1] + 0.5 * p.extent[1]);
     tops.min_by(f32::total_cmp)
 }
 
-/// A part where heights `0..from` become `0..to`, and `from..1` become `to..1`.
-fn stretched(part: &Part, from: f32, to: f32) -> Part {
+/// Maps the heights `0..from` of a part to `0..to`, and `from..1` to `to..1`.
+fn rescale_height(part: &Part, from: f32, to: f32) -> Part {
     let height = |y: f32| {
         if y <= from || from >= 1.0 {
             y * to / from
@@ -109,13 +109,13 @@ fn stretched(part: &Part, from: f32, to: f32) -> Part {
         part.center[1] = 0.5 * (low + high);
         part.extent[1] = high - low;
     } else {
-        // What leans or lies keeps its thickness.
+        // Rotated parts keep their thickness.
         part.center[1] = height(part.center[1]);
     }
     part
 }
 
-/// The box of a wall.
+/// Returns the box of a wall.
 pub(crate) fn wall_block(wall: &Wall) -> Block {
     let along = wall.b - wall.a;
     let middle = 0.5 * (wall.a + wall.b);
@@ -132,21 +132,22 @@ pub(crate) fn wall_block(wall: &Wall) -> Block {
     }
 }
 
-/// The boxes of the colliding parts of a thing standing upright at `position` with `yaw_rad`.
+/// Returns the boxes of the colliding parts of an object that stands upright at `position` with
+/// `yaw_rad`.
 pub(crate) fn blocks_at(
-    thing: &Thing,
+    spec: &ObjectSpec,
     entity: EntityId,
     position: Vec3,
     yaw_rad: f32,
 ) -> impl Iterator<Item = Block> + use<> {
-    let thing = *thing;
-    let parts = thing.parts().filter(|p| p.collides);
-    parts.map(move |part| block(&thing, &part, entity, position, yaw_rad))
+    let spec = *spec;
+    let parts = spec.parts().filter(|p| p.collides);
+    parts.map(move |part| block(&spec, &part, entity, position, yaw_rad))
 }
 
-/// The box around a part of a thing standing upright at `position` with `yaw_rad`.
-fn block(thing: &Thing, part: &Part, entity: EntityId, position: Vec3, yaw_rad: f32) -> Block {
-    let size = thing.size_m();
+/// Returns the box around a part of an object that stands upright at `position` with `yaw_rad`.
+fn block(spec: &ObjectSpec, part: &Part, entity: EntityId, position: Vec3, yaw_rad: f32) -> Block {
+    let size = spec.size_m();
     Block {
         center: position + rotate_yaw(Vec3::from(part.center) * size, yaw_rad),
         half: turned_half_extents(part, size),
@@ -155,26 +156,26 @@ fn block(thing: &Thing, part: &Part, entity: EntityId, position: Vec3, yaw_rad: 
     }
 }
 
-/// The collision boxes of a thing where the setup puts it.
-pub fn blocks_of(thing: &Thing) -> Vec<Block> {
-    blocks_at(thing, EntityId::NOTHING, thing.position, thing.yaw_rad).collect()
+/// Returns the collision boxes of an object at its pose in the setup.
+pub fn blocks_of(spec: &ObjectSpec) -> Vec<Block> {
+    blocks_at(spec, EntityId::NOTHING, spec.position, spec.yaw_rad).collect()
 }
 
-/// Boxes around those parts of a thing that are only to be looked at, where the setup puts it:
-/// what lies inside one can't be seen.
-pub fn ghosts_of(thing: &Thing) -> Vec<Block> {
-    let ghosts = thing.parts().filter(|p| !p.collides);
-    ghosts.map(|p| block(thing, &p, EntityId::NOTHING, thing.position, thing.yaw_rad)).collect()
+/// Returns boxes around the parts of an object without collision, at its pose in the setup. A point
+/// inside such a box is hidden from view.
+pub fn non_colliding_blocks(spec: &ObjectSpec) -> Vec<Block> {
+    let non_colliding = spec.parts().filter(|p| !p.collides);
+    non_colliding.map(|p| block(spec, &p, EntityId::NOTHING, spec.position, spec.yaw_rad)).collect()
 }
 
-/// The tops of a thing on which others may be put, where the setup puts it.
-pub fn top_surfaces(thing: &Thing) -> Vec<Surface> {
-    surfaces_at(thing, thing.position, thing.yaw_rad)
+/// Returns the surfaces of an object on which others can be placed, at its pose in the setup.
+pub fn top_surfaces(spec: &ObjectSpec) -> Vec<Surface> {
+    surfaces_at(spec, spec.position, spec.yaw_rad)
 }
 
-pub(crate) fn surfaces_at(thing: &Thing, position: Vec3, yaw_rad: f32) -> Vec<Surface> {
-    let size = thing.size_m();
-    let parts = thing.parts().filter(|p| p.supports);
+pub(crate) fn surfaces_at(spec: &ObjectSpec, position: Vec3, yaw_rad: f32) -> Vec<Surface> {
+    let size = spec.size_m();
+    let parts = spec.parts().filter(|p| p.supports);
     parts
         .map(|part| {
             let half = turned_half_extents(&part, size);
@@ -184,28 +185,28 @@ pub(crate) fn surfaces_at(thing: &Thing, position: Vec3, yaw_rad: f32) -> Vec<Su
         .collect()
 }
 
-/// Half extents of the upright box, in the thing's frame, around a part with its turn.
+/// Returns the half extents of the upright box, in the object frame, around a rotated part.
 fn turned_half_extents(part: &Part, size: Vec3) -> Vec3 {
     let half = 0.5 * Vec3::from(part.extent) * size;
     if part.turn_deg == [0.0; 3] {
         return half;
     }
-    let m = turn_of(part);
+    let m = part_rotation(part);
     m.x_axis.abs() * half.x + m.y_axis.abs() * half.y + m.z_axis.abs() * half.z
 }
 
-/// Where a part's own axes point in the thing's frame.
-fn turn_of(part: &Part) -> glam::Mat3 {
+/// Returns the rotation from the frame of a part to the object frame.
+fn part_rotation(part: &Part) -> glam::Mat3 {
     let [x, y, z] = part.turn_deg.map(f32::to_radians);
-    glam::Mat3::from_quat(yaw_rotation(y) * axis_turn(Vec3::X, x) * axis_turn(Vec3::Z, z))
+    glam::Mat3::from_quat(yaw_rotation(y) * axis_rotation(Vec3::X, x) * axis_rotation(Vec3::Z, z))
 }
 
-fn axis_turn(axis: Vec3, rad: f32) -> Quat {
+fn axis_rotation(axis: Vec3, rad: f32) -> Quat {
     let (s, c) = (chaic_core::geom::math::sin(0.5 * rad), chaic_core::geom::math::cos(0.5 * rad));
     Quat::from_xyzw(axis.x * s, axis.y * s, axis.z * s, c)
 }
 
-/// The walls of a setup as boxes.
+/// Returns the walls of a setup as boxes.
 pub(crate) fn wall_blocks(setup: &Setup) -> impl Iterator<Item = Block> + '_ {
     setup.walls.iter().map(wall_block)
 }
@@ -230,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn walls_lie_along_their_center_line() {
+    fn walls_follow_their_center_line() {
         let wall = Wall {
             a: Vec2::new(0.0, 0.0),
             b: Vec2::new(3.0, 4.0),
@@ -240,42 +241,43 @@ mod tests {
             color: [0; 3],
         };
         let block = wall_block(&wall);
-        assert!(block.nearest_in_plan(Vec3::new(1.5, 0.0, 2.0)).1, "its middle is inside");
+        assert!(block.nearest_in_plan(Vec3::new(1.5, 0.0, 2.0)).1, "its center is inside");
         assert!(block.nearest_in_plan(Vec3::new(3.0, 0.0, 4.0)).1, "its end is inside");
         assert!(!block.nearest_in_plan(Vec3::new(3.0, 0.0, 0.0)).1);
         assert_eq!(block.y_range(), [0.0, 3.0]);
     }
 
     #[test]
-    fn a_seat_of_its_own_moves_what_is_below_and_above_it() {
-        let mut chair = Thing::new(ClassId::named("side_chair"), Vec3::ZERO, 0.0);
-        let tops = |t: &Thing| top_surfaces(t).iter().map(|s| s.center.y).collect::<Vec<_>>();
-        let highest = |t: &Thing| blocks_of(t).iter().map(|b| b.y_range()[1]).fold(0.0, f32::max);
-        let (usual_m, high_m) = (tops(&chair)[0], highest(&chair));
-        assert!((usual_m - 0.45).abs() < 1e-4, "{usual_m}");
+    fn a_custom_seat_height_moves_the_parts_below_and_above() {
+        let mut chair = ObjectSpec::new(ClassId::named("side_chair"), Vec3::ZERO, 0.0);
+        let tops = |t: &ObjectSpec| top_surfaces(t).iter().map(|s| s.center.y).collect::<Vec<_>>();
+        let highest =
+            |t: &ObjectSpec| blocks_of(t).iter().map(|b| b.y_range()[1]).fold(0.0, f32::max);
+        let (default_m, high_m) = (tops(&chair)[0], highest(&chair));
+        assert!((default_m - 0.45).abs() < 1e-4, "{default_m}");
         chair.seat_m = Some(0.6);
         assert!((tops(&chair)[0] - 0.6).abs() < 1e-4);
-        assert!((highest(&chair) - high_m).abs() < 1e-4, "the back ends where it did");
+        assert!((highest(&chair) - high_m).abs() < 1e-4, "the height of the back is unchanged");
         assert!(blocks_of(&chair).iter().all(|b| b.y_range()[0] >= -1e-4 && b.half.y > 0.0));
     }
 
     #[test]
-    fn a_lying_part_grows_with_the_direction_it_lies_in() {
-        let mut truck = Thing::new(ClassId::named("truck"), Vec3::ZERO, 0.0);
-        let lying = |t: &Thing| {
+    fn a_rotated_part_scales_along_its_own_axes() {
+        let mut truck = ObjectSpec::new(ClassId::named("truck"), Vec3::ZERO, 0.0);
+        let extents = |t: &ObjectSpec| {
             let part = t.parts().find(|p| p.turn_deg == [0.0, 0.0, 90.0]).expect("a wheel");
             Vec3::from(part.extent) * t.size_m()
         };
-        let usual = lying(&truck);
+        let default = extents(&truck);
         truck.scale = [2.0, 0.5, 3.0];
-        // A wheel's axle is its own y and lies along the truck's x.
-        let expected = usual * Vec3::new(0.5, 2.0, 3.0);
-        assert!((lying(&truck) - expected).abs().max_element() < 1e-4, "{}", lying(&truck));
+        // The axle of a wheel is its own y axis and is parallel to the truck's x axis.
+        let expected = default * Vec3::new(0.5, 2.0, 3.0);
+        assert!((extents(&truck) - expected).abs().max_element() < 1e-4, "{}", extents(&truck));
     }
 
     #[test]
     fn an_apple_is_as_high_as_the_catalogue_says() {
-        let apple = Thing::new(ClassId::named("apple"), Vec3::new(0.0, 1.0, 0.0), 0.3);
+        let apple = ObjectSpec::new(ClassId::named("apple"), Vec3::new(0.0, 1.0, 0.0), 0.3);
         let top = blocks_of(&apple).iter().map(|b| b.y_range()[1]).fold(0.0, f32::max);
         assert!(top > 1.05 && top <= 1.0 + apple.size_m().y + 1e-4, "{top}");
     }

@@ -1,339 +1,352 @@
-//! How an episode stands: plain data, and the whole of it.
+//! Complete state of an episode, as plain data.
 
 use chaic_core::action::{FailureReason, Hand};
 use chaic_core::geom::Pose;
 use chaic_core::{AgentId, EntityId, Frame, Outcome, Quat, ResolvedAction, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::luck::Draws;
-
 /// Everything that changes during an episode.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State {
-    /// Frames that have passed.
+    /// Number of elapsed frames.
     pub frame: Frame,
-    /// Per thing, in the setup's order.
-    pub things: Vec<ThingState>,
-    /// Per person, in the setup's order.
-    pub people: Vec<PersonState>,
-    /// The furniture that two people carry together, if any.
+    /// State of each object, in the order of the setup.
+    pub objects: Vec<ObjectState>,
+    /// State of each agent, in the order of the setup.
+    pub agents: Vec<AgentState>,
+    /// Furniture that two agents carry together.
     pub joint: Option<JointCarry>,
-    /// Frames in which the child was away from its guardian.
+    /// Number of frames in which the child was away from its guardian.
     pub child_away_frames: u32,
-    /// Whether it is away now.
+    /// True if the child is away now.
     pub child_is_away: bool,
-    /// Frames in which the partner or the helper was stuck.
+    /// Number of frames in which the partner or the helper was stuck.
     pub stuck_frames: u32,
-    /// Whether the episode has ended.
+    /// True if the episode has ended.
     pub over: bool,
-    /// Per person, how tired it is and the like; empty if nobody tires or trembles. It stands behind
-    /// the rest in a snapshot, so that worlds without such people have the bytes that they always
-    /// had.
+    /// Fatigue and tremor draws of each agent; empty if no agent tires or has a tremor. Snapshots
+    /// append it after the other fields, so worlds without such agents keep their previous
+    /// encoding.
     #[serde(skip)]
     pub conditions: Vec<Condition>,
 }
 
-/// What changes about a person who tires or trembles.
+/// State of an agent that tires or has a tremor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Condition {
-    /// 0 rested, 1 exhausted.
+    /// Fatigue: 0 rested, 1 exhausted.
     pub fatigue: f32,
-    /// Draws of whether a grasp slips.
+    /// Number of draws that decided whether a grasp slips.
     pub slips: u32,
-    /// Draws of whether something drops.
+    /// Number of draws that decided whether a held object drops.
     pub drops: u32,
 }
 
-/// One thing.
+/// Number of draws of each purpose for an agent.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DrawCounts {
+    /// Draws of whether a fragile object breaks.
+    pub breaks: u32,
+    /// Draws of whether a pick-up succeeds.
+    pub takes: u32,
+    /// Draws of whether a put-on succeeds.
+    pub puts_on: u32,
+    /// Draws of the number of frames for watching a put-in.
+    pub puts_in: u32,
+}
+
+/// State of an object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ThingState {
-    /// Middle of the bottom in the thing's own frame, in the world, metres.
+pub struct ObjectState {
+    /// Center of the bottom face in the world, meters.
     pub position: Vec3,
-    /// Rotates from the thing's own frame to the world.
+    /// Rotation from the object frame to the world frame.
     pub rotation: Quat,
-    /// Where it is in the sense of the rules.
-    pub place: Place,
-    /// When it was delivered.
+    /// Location in terms of the rules.
+    pub location: ObjectLocation,
+    /// Frame of the delivery.
     pub delivered: Option<Frame>,
-    /// Who delivered it.
+    /// Agent that delivered the object.
     pub delivered_by: Option<AgentId>,
-    /// Who held it last.
+    /// Agent that held the object last.
     pub last_holder: Option<AgentId>,
-    /// The goal place that it was released on by a put-on that succeeded, until it is taken again.
+    /// Goal place on which a successful put-on released the object, until the next pick-up.
     pub released_at: Option<EntityId>,
 }
 
-/// Where a thing is, in the sense of the rules.
+/// Location of an object in terms of the rules.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Place {
-    /// It lies still, on the ground or on another thing.
+pub enum ObjectLocation {
+    /// At rest on the ground or on another object.
     Resting {
-        /// What it lies on, if not the ground.
+        /// Supporting object; `None` for the ground.
         on: Option<EntityId>,
     },
-    /// It falls along a path that was worked out when it was let go.
+    /// Falling along a path that was computed at the release.
     Falling {
-        /// Positions and rotations still to come, last first.
+        /// Remaining positions and rotations, in reverse order.
         path: Vec<(Vec3, Quat)>,
-        /// What it will lie on.
+        /// Object that will support it; `None` for the ground.
         on: Option<EntityId>,
     },
-    /// It is in somebody's hand; furniture and bicycles are held by the right and the left.
+    /// In a hand. Furniture has `Right`, a bicycle `Left`.
     Held {
-        /// Whose.
+        /// Agent that holds it.
         by: AgentId,
-        /// Which.
+        /// Hand that holds it.
         hand: Hand,
     },
-    /// It is in a container or a bicycle's basket.
+    /// In a container or the basket of a bicycle.
     Inside {
-        /// Which.
+        /// Container or bicycle.
         container: EntityId,
-        /// Its place there.
+        /// Slot in the container.
         slot: u8,
     },
-    /// It is broken and gone.
+    /// Broken and removed from the scene.
     Broken,
 }
 
-/// One person.
+/// State of an agent.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PersonState {
-    /// Where.
+pub struct AgentState {
+    /// Current pose.
     pub pose: Pose,
-    /// What the left and the right hand hold. Furniture is in both.
+    /// Objects in the left and the right hand. Furniture is in both.
     pub hands: [Option<EntityId>; 2],
-    /// What this person is doing; `None` while it waits to be asked.
+    /// Current action; `None` if the agent waits for a decision.
     pub activity: Option<Activity>,
-    /// The last action with its outcome.
+    /// Last completed action with its outcome.
     pub last: Option<(ResolvedAction, Outcome)>,
-    /// The last action other than moving and waiting, for onlookers: when it ended, and how.
-    pub last_deed: Option<(Frame, ResolvedAction, Outcome)>,
-    /// Whether the legs are still moving from the last frame.
+    /// Last completed action other than movement and waiting: end frame, action and outcome.
+    pub last_interaction: Option<(Frame, ResolvedAction, Outcome)>,
+    /// True if the legs still move from the previous frame.
     pub in_stride: bool,
-    /// Distance walked so far, metres; legs and wheels turn by it.
+    /// Total distance walked, meters; the animation of legs and wheels depends on it.
     pub walked_m: f32,
-    /// How many draws of luck this person has had.
-    pub draws: Draws,
-    /// The last progress that this person made.
+    /// Number of random draws per purpose.
+    pub draws: DrawCounts,
+    /// Last progress of the agent.
     pub progress: LastProgress,
 }
 
-/// Who has made no progress for so many frames is stuck (ours: twice as long as the longest action
-/// other than waiting for another takes).
+/// An agent without progress for this number of frames is stuck. Our choice: twice the length of
+/// the longest action other than waiting for another agent.
 pub const STUCK_AFTER_FRAMES: Frame = 200;
-/// Getting farther than this from where one made progress last is progress, metres (ours: more than
-/// a step, so that stepping to and fro is none).
+/// A move of more than this distance from the position of the last progress is progress, meters.
+/// Our choice: more than one step, so that stepping back and forth is none.
 pub const PROGRESS_M: f32 = 0.5;
 
-/// When and where a person made progress last: got farther than [`PROGRESS_M`] from where it had
-/// made some before, on its own feet or carried along, or carried out an action that was neither a
-/// step, nor a turn, nor a wait: well, or failing because it was beyond its limits, which is a draw
-/// of luck. Why it makes none does not matter: who waits on purpose makes none.
+/// Time and position of the last progress of an agent.
+///
+/// Progress is a move of more than [`PROGRESS_M`] from the last such position, walking or carried
+/// along. A completed action other than a step, a turn or a wait is also progress. Such an action
+/// must succeed or fail by exceeding a limit, which is decided by a random draw. The reason for a
+/// lack of progress does not matter: deliberate waiting also counts as none.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LastProgress {
-    /// When.
+    /// Frame of the last progress.
     pub frame: Frame,
-    /// Where it stood then.
+    /// Position at that frame.
     pub position: Vec3,
-    /// Whether it is stuck: that was [`STUCK_AFTER_FRAMES`] ago or longer.
+    /// True if the agent is stuck: that frame was at least [`STUCK_AFTER_FRAMES`] ago.
     pub is_stuck: bool,
 }
 
-impl PersonState {
-    /// Somebody who stands there with empty hands and has done nothing yet.
-    pub fn at(pose: Pose) -> PersonState {
-        PersonState {
+impl AgentState {
+    /// Creates an idle agent with empty hands.
+    pub fn new(pose: Pose) -> AgentState {
+        AgentState {
             pose,
             hands: [None; 2],
             activity: None,
             last: None,
-            last_deed: None,
+            last_interaction: None,
             in_stride: false,
             walked_m: 0.0,
-            draws: Draws::default(),
+            draws: DrawCounts::default(),
             progress: LastProgress { frame: 0, position: pose.position, is_stuck: false },
         }
     }
 }
 
-/// An action under way.
+/// An action in progress.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Activity {
     /// The action.
     pub action: ResolvedAction,
-    /// When it began.
+    /// Start frame.
     pub since: Frame,
-    /// What is being done right now.
-    pub step: Step,
-    /// What is still to be done, next one last.
-    pub queue: Vec<Step>,
-    /// Why the action will have failed when it ends, if that is already certain.
+    /// Current step.
+    pub step: ActionStep,
+    /// Remaining steps, in reverse order.
+    pub queue: Vec<ActionStep>,
+    /// Failure with which the action will end, if it is already decided.
     pub failing: Option<FailureReason>,
 }
 
-/// A part of an action.
+/// Step of an action.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Step {
-    /// What is done.
+pub struct ActionStep {
+    /// Kind of the step, with its parameters.
     pub phase: Phase,
-    /// Frames it has taken.
+    /// Number of elapsed frames.
     pub elapsed: u32,
-    /// Frames it takes, if that is fixed.
+    /// Duration in frames, if it is fixed.
     pub frames: u32,
 }
 
-/// What a person does in a part of an action.
+/// Kind of a step of an action.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Phase {
-    /// Standing, between two motions or waiting.
+    /// Stands between two motions, or waits.
     Stand,
-    /// Walking ahead.
+    /// Walks straight ahead.
     Walk {
-        /// Distance still to go, metres.
-        left_m: f32,
-        /// Distance made so far, metres.
-        made_m: f32,
+        /// Remaining distance, meters.
+        remaining_m: f32,
+        /// Covered distance, meters.
+        covered_m: f32,
     },
-    /// Walking straight up to a thing.
+    /// Walks straight toward an object.
     Approach {
-        /// The thing.
+        /// The object.
         to: EntityId,
-        /// Frames in which it came no nearer.
+        /// Number of consecutive frames without approaching.
         stuck: u32,
     },
-    /// Turning; the yaw snaps at the end of the first frame.
+    /// Turns; the yaw changes in the first frame.
     Turn {
-        /// The yaw after it, radians.
+        /// Final yaw, radians.
         to_yaw_rad: f32,
     },
-    /// Turning to face a thing.
+    /// Turns to face an object.
     Face {
-        /// The thing.
+        /// The object.
         to: EntityId,
     },
-    /// Docking the vehicle.
+    /// Docks the vehicle.
     Dock,
-    /// Moving a hand (or both) to a point.
+    /// Moves one hand or both to a point.
     Reach {
         /// The hand; `None` for both.
         hand: Option<Hand>,
-        /// Where, in the world, metres.
+        /// Target point in the world, meters.
         to: Vec3,
-        /// Whether it is a failed attempt.
+        /// True if the attempt fails.
         fails: bool,
     },
-    /// Closing the hand around a thing.
+    /// Closes the hand around an object.
     Grasp {
         /// The hand; `None` for both.
         hand: Option<Hand>,
-        /// The thing.
+        /// The object.
         object: EntityId,
     },
-    /// Standing at a piece of furniture until the other stands at it too.
+    /// Stands at furniture until the other agent stands at it too.
     AwaitPartner {
         /// The furniture.
         object: EntityId,
-        /// Frames in which the other wasn't after it.
+        /// Number of consecutive frames in which no other agent tried to take it.
         absent: u32,
     },
-    /// Carrying along as the second of two, until the first lets go.
+    /// Follows in a joint carry until the leader releases the furniture.
     CarryAlong,
-    /// Takes no time: whether taking the object can be tried, and with which luck.
+    /// Takes no time: decides whether the pick-up is possible and succeeds.
     JudgeTake {
         /// The hand; `None` for both.
         hand: Option<Hand>,
         /// The object.
         object: EntityId,
     },
-    /// Takes no time: whether putting down can be tried, and with which luck.
+    /// Takes no time: decides whether the put-on is possible and succeeds.
     JudgePut {
-        /// The hand; `None` for whatever a rider's basket or two hands hold.
+        /// The hand; `None` for the contents of a rider's basket or for furniture in both hands.
         hand: Option<Hand>,
         /// The place.
         place: EntityId,
     },
-    /// Takes no time: where to put a removed obstacle.
+    /// Takes no time: chooses a spot for a removed obstacle.
     JudgeAside {
         /// The hand that holds it.
         hand: Hand,
         /// The obstacle.
         obstacle: EntityId,
     },
-    /// Opening the hand above a place.
+    /// Opens the hand above a place.
     Release {
         /// The hand; `None` for both.
         hand: Option<Hand>,
-        /// The thing let go.
+        /// The released object.
         object: EntityId,
-        /// The place it is meant for; `None` where it is just let go.
+        /// The place it is intended for; `None` for a drop.
         on: Option<EntityId>,
-        /// Where its bottom is let go, in the world, metres.
+        /// Position of its bottom at the release, in the world, meters.
         at: Vec3,
-        /// Whether it is set down upright where it is rather than dropped.
+        /// True if it is set down upright at this position instead of dropped.
         set_down: bool,
     },
-    /// Putting a held object into the held container.
+    /// Puts a held object into the held container.
     Insert {
         /// The object.
         object: EntityId,
         /// The container.
         container: EntityId,
     },
-    /// Bringing the arms back to rest.
+    /// Returns the arms to rest.
     ResetArms {
-        /// Where the hand comes from, in the world, metres.
+        /// Start position of the hand in the world, meters.
         from: Option<Vec3>,
         /// The hand; `None` for both.
         hand: Option<Hand>,
     },
 }
 
-/// Two people carrying one piece of furniture.
+/// Two agents that carry one piece of furniture.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointCarry {
     /// The furniture.
     pub object: EntityId,
-    /// The one who leads and decides.
+    /// Agent that leads and decides.
     pub leader: AgentId,
-    /// The one who follows.
+    /// Agent that follows.
     pub follower: AgentId,
-    /// The follower's position in the leader's frame, metres.
+    /// Position of the follower in the frame of the leader, meters.
     pub follower_in_leader: Vec3,
-    /// Whether the leader has it in hand already.
+    /// True if the leader holds the furniture already.
     pub under_way: bool,
 }
 
-impl Step {
-    /// A step that takes a fixed number of frames.
-    pub(crate) fn of(phase: Phase, frames: u32) -> Step {
-        Step { phase, elapsed: 0, frames }
+impl ActionStep {
+    /// Creates a step with a fixed number of frames.
+    pub(crate) fn new(phase: Phase, frames: u32) -> ActionStep {
+        ActionStep { phase, elapsed: 0, frames }
     }
 
-    /// How much of it is done, 0 to 1.
+    /// Returns the completed fraction, 0 to 1.
     pub fn progress(&self) -> f32 {
         if self.frames == 0 { 1.0 } else { (self.elapsed as f32 / self.frames as f32).min(1.0) }
     }
 }
 
-impl ThingState {
-    /// Whether it lies still and could be taken.
+impl ObjectState {
+    /// Returns whether the object is at rest and could be taken.
     pub fn is_resting(&self) -> bool {
-        matches!(self.place, Place::Resting { .. })
+        matches!(self.location, ObjectLocation::Resting { .. })
     }
 
-    /// The person whose hand holds it.
+    /// Returns the agent whose hand holds the object.
     pub fn holder(&self) -> Option<AgentId> {
-        match self.place {
-            Place::Held { by, .. } => Some(by),
+        match self.location {
+            ObjectLocation::Held { by, .. } => Some(by),
             _ => None,
         }
     }
 }
 
-impl PersonState {
-    /// What this person is doing right now.
-    pub fn phase(&self) -> Option<&Step> {
+impl AgentState {
+    /// Returns the current step of the action.
+    pub fn phase(&self) -> Option<&ActionStep> {
         self.activity.as_ref().map(|a| &a.step)
     }
 }

@@ -1,10 +1,10 @@
-//! One frame: everybody goes on with what they do, in the order of their ids; then what falls
-//! falls, what is held follows the hands, what has come to rest at the goal is delivered, and the
-//! clock moves on.
+//! Update of one frame. All agents continue their actions in the order of their ids. Then falling
+//! objects move, held objects follow the hands, and the frame counter advances. An object that
+//! comes to rest at the goal is delivered.
 //!
-//! Two people who want one thing: the one whose hand closes first has it, and within one frame
-//! that is the one with the lower id; the other's action fails when it would take it. An action
-//! that is under way when the time ends is cut off and has no outcome.
+//! If two agents reach for one object, the hand that closes first takes it. Within one frame this
+//! is the agent with the lower id; the action of the other fails at its grasp. An action that is in
+//! progress at the end of the episode is cut off and has no outcome.
 
 use chaic_core::action::FailureReason;
 use chaic_core::catalogue::Role;
@@ -12,21 +12,21 @@ use chaic_core::geom::{forward, horizontal_distance, yaw_towards};
 use chaic_core::{Action, AgentId, EntityId, Hand, Outcome, Vec2, Vec3};
 
 use crate::event::EventKind;
-use crate::luck::Luck;
+use crate::random::RngPurpose;
 use crate::rules::Blocking;
-use crate::state::{Activity, PROGRESS_M, Phase, Place, STUCK_AFTER_FRAMES, Step};
+use crate::state::{ActionStep, Activity, ObjectLocation, PROGRESS_M, Phase, STUCK_AFTER_FRAMES};
 use crate::world::World;
 
-/// What became of a step in this frame.
-pub(crate) enum Progress {
-    /// It goes on in the next frame.
-    Goes,
-    /// This was its last frame.
+/// Status of a step after a frame.
+pub(crate) enum StepProgress {
+    /// The step continues in the next frame.
+    Running,
+    /// The step ended with this frame.
     Done,
-    /// It takes no time: the next step begins in this frame.
+    /// The step takes no time: the next one starts in this frame.
     Instant,
-    /// It failed; what remains of the action is dropped.
-    Fails(FailureReason),
+    /// The step failed; the remaining steps are dropped.
+    Failed(FailureReason),
 }
 
 impl World {
@@ -36,35 +36,35 @@ impl World {
             return;
         }
         for agent in self.setup.agents() {
-            let works = self.works(agent);
-            self.act_for_a_frame(agent);
-            self.tire(agent, works);
-            self.let_slip(agent);
+            let is_working = self.is_working(agent);
+            self.run_action_frame(agent);
+            self.update_fatigue(agent, is_working);
+            self.drop_from_tremor(agent);
         }
-        self.let_fall();
-        self.carry_along();
+        self.advance_falls();
+        self.update_carried_objects();
         self.state.frame += 1;
-        self.watch_child();
-        self.watch_progress();
+        self.update_child_distance();
+        self.update_progress();
         self.end_if_over();
     }
 
-    /// One frame of one person's action.
-    fn act_for_a_frame(&mut self, agent: AgentId) {
-        // The action is taken out while it runs, so that its steps can change the person.
+    /// Runs one frame of the action of an agent.
+    fn run_action_frame(&mut self, agent: AgentId) {
+        // The action is taken out while it runs, so that its steps can modify the agent.
         let Some(mut activity) = self.person_mut(agent).activity.take() else { return };
         loop {
             match self.run_step(agent, &mut activity) {
-                Progress::Goes => {
-                    // A joint lift may have given this person something else to do meanwhile.
+                StepProgress::Running => {
+                    // A joint lift may have replaced the action of this agent meanwhile.
                     self.person_mut(agent).activity.get_or_insert(activity);
                     return;
                 }
-                Progress::Instant => match activity.queue.pop() {
+                StepProgress::Instant => match activity.queue.pop() {
                     Some(step) => activity.step = step,
                     None => return self.end_action(agent, activity),
                 },
-                Progress::Done => {
+                StepProgress::Done => {
                     match activity.queue.pop() {
                         Some(step) => {
                             activity.step = step;
@@ -74,7 +74,7 @@ impl World {
                     }
                     return;
                 }
-                Progress::Fails(reason) => {
+                StepProgress::Failed(reason) => {
                     activity.failing = Some(reason);
                     return self.end_action(agent, activity);
                 }
@@ -89,39 +89,39 @@ impl World {
         person.activity = None;
         person.last = Some((action, outcome));
         if !action.is_locomotion() && !matches!(action, Action::Wait { .. }) {
-            person.last_deed = Some((frame, action, outcome));
-            let is_tried = outcome == Outcome::Failure(FailureReason::BeyondLimits);
-            if outcome.is_success() || is_tried {
+            person.last_interaction = Some((frame, action, outcome));
+            let is_beyond_limits = outcome == Outcome::Failure(FailureReason::BeyondLimits);
+            if outcome.is_success() || is_beyond_limits {
                 (person.progress.frame, person.progress.position) = (frame, person.pose.position);
             }
         }
         person.in_stride = action == Action::MoveForward && outcome.is_success();
-        self.happened(EventKind::Ended { agent, action, outcome });
+        self.record_event(EventKind::Ended { agent, action, outcome });
         if self.rules.delivered_anywhere
             && outcome.is_success()
             && matches!(action, Action::PutOn { .. })
         {
-            self.deliver_all_let_go(agent);
+            self.deliver_all_released(agent);
         }
     }
 
-    fn run_step(&mut self, agent: AgentId, activity: &mut Activity) -> Progress {
+    fn run_step(&mut self, agent: AgentId, activity: &mut Activity) -> StepProgress {
         activity.step.elapsed += 1;
         let (elapsed, frames) = (activity.step.elapsed, activity.step.frames);
-        let counted = if elapsed >= frames { Progress::Done } else { Progress::Goes };
+        let status = if elapsed >= frames { StepProgress::Done } else { StepProgress::Running };
         match activity.step.phase {
-            Phase::Stand | Phase::Dock | Phase::Reach { .. } | Phase::ResetArms { .. } => counted,
-            Phase::CarryAlong => Progress::Goes,
+            Phase::Stand | Phase::Dock | Phase::Reach { .. } | Phase::ResetArms { .. } => status,
+            Phase::CarryAlong => StepProgress::Running,
             Phase::Walk { .. } => self.walk(agent, &mut activity.step),
             Phase::Approach { .. } => self.approach(agent, &mut activity.step),
             Phase::Turn { to_yaw_rad } => {
-                let turns = self.turn_to(agent, to_yaw_rad);
-                if turns { counted } else { Progress::Fails(FailureReason::Blocked) }
+                let has_turned = self.turn_to(agent, to_yaw_rad);
+                if has_turned { status } else { StepProgress::Failed(FailureReason::Blocked) }
             }
             Phase::Face { to } => {
-                let to = self.thing(to).1.position;
+                let to = self.object(to).1.position;
                 self.face(agent, to);
-                counted
+                status
             }
             Phase::AwaitPartner { .. } => self.await_partner(agent, activity),
             Phase::JudgeTake { hand, object } => self.judge_take(agent, activity, hand, object),
@@ -129,87 +129,90 @@ impl World {
             Phase::JudgeAside { hand, obstacle } => {
                 self.judge_aside(agent, activity, hand, obstacle)
             }
-            Phase::Grasp { hand, object } => match counted {
-                Progress::Done => self.grasp(agent, activity, hand, object),
+            Phase::Grasp { hand, object } => match status {
+                StepProgress::Done => self.grasp(agent, activity, hand, object),
                 other => other,
             },
             Phase::Insert { object, container } => {
                 if elapsed == self.rules.durations.open_hand {
                     self.insert(agent, object, container);
-                    activity.step.frames += self.frames_watched(agent, activity.action);
+                    activity.step.frames += self.draw_watch_frames(agent, activity.action);
                 }
-                counted
+                status
             }
             Phase::Release { object, on, at, set_down, .. } => {
                 if elapsed == self.rules.durations.open_hand {
                     self.release(agent, object, on, at, set_down);
                 }
-                let watched = elapsed >= self.rules.durations.open_hand
-                    && !matches!(self.thing(object).1.place, Place::Falling { .. });
-                if watched { Progress::Done } else { counted }
+                let is_watched = elapsed >= self.rules.durations.open_hand
+                    && !matches!(self.object(object).1.location, ObjectLocation::Falling { .. });
+                if is_watched { StepProgress::Done } else { status }
             }
         }
     }
 
-    /// One frame of a step ahead.
-    fn walk(&mut self, agent: AgentId, step: &mut Step) -> Progress {
-        let Phase::Walk { left_m, made_m } = &mut step.phase else { return Progress::Done };
-        let speed = self.capability(agent).speed_m_per_frame * self.part_left(agent);
-        let ahead = forward(self.person(agent).pose.yaw_rad);
-        let moved = self.step_towards(agent, ahead, speed);
-        *left_m -= speed;
-        *made_m += moved;
+    /// Runs one frame of a step ahead.
+    fn walk(&mut self, agent: AgentId, step: &mut ActionStep) -> StepProgress {
+        let Phase::Walk { remaining_m, covered_m } = &mut step.phase else {
+            return StepProgress::Done;
+        };
+        let speed = self.capability(agent).speed_m_per_frame * self.remaining_strength(agent);
+        let direction = forward(self.person(agent).pose.yaw_rad);
+        let moved = self.step_towards(agent, direction, speed);
+        *remaining_m -= speed;
+        *covered_m += moved;
         if self.rules.blocking == Blocking::Creeps {
-            let is_done = *left_m <= 0.0 || self.meets_something(agent);
-            return if is_done { Progress::Done } else { Progress::Goes };
+            let is_done = *remaining_m <= 0.0 || self.touches_something(agent);
+            return if is_done { StepProgress::Done } else { StepProgress::Running };
         }
-        let stuck = moved < 0.1 * speed;
-        if *left_m > 0.0 && !stuck {
-            return Progress::Goes;
+        let is_blocked = moved < 0.1 * speed;
+        if *remaining_m > 0.0 && !is_blocked {
+            return StepProgress::Running;
         }
-        if *made_m < self.rules.min_progress_m {
-            Progress::Fails(FailureReason::Blocked)
+        if *covered_m < self.rules.min_progress_m {
+            StepProgress::Failed(FailureReason::Blocked)
         } else {
-            Progress::Done
+            StepProgress::Done
         }
     }
 
-    /// One frame of walking straight up to a thing.
-    fn approach(&mut self, agent: AgentId, step: &mut Step) -> Progress {
-        /// Frames without coming nearer after which one is as near as one gets.
+    /// Runs one frame of an approach to an object.
+    fn approach(&mut self, agent: AgentId, step: &mut ActionStep) -> StepProgress {
+        /// Number of frames without approaching after which the approach ends.
         const GIVE_UP_AFTER: u32 = 4;
-        let Phase::Approach { to, stuck } = &mut step.phase else { return Progress::Done };
+        let Phase::Approach { to, stuck } = &mut step.phase else { return StepProgress::Done };
         let entity = *to;
         let before = self.reach_distance(agent, entity);
         if before <= self.rules.arm_reach_m {
-            return Progress::Done;
+            return StepProgress::Done;
         }
         let from = self.person(agent).pose.position;
         let target = self.point_to_reach(from, entity);
         let yaw = yaw_towards(from, target);
         self.turn_to(agent, yaw);
-        let speed = self.capability(agent).approach_speed_m_per_frame * self.part_left(agent);
+        let speed =
+            self.capability(agent).approach_speed_m_per_frame * self.remaining_strength(agent);
         self.step_towards(agent, forward(yaw), speed);
-        if self.rules.blocking == Blocking::Creeps && self.meets_something(agent) {
-            return Progress::Done;
+        if self.rules.blocking == Blocking::Creeps && self.touches_something(agent) {
+            return StepProgress::Done;
         }
-        let nearer = before - self.reach_distance(agent, entity);
-        *stuck = if nearer < 0.25 * speed { *stuck + 1 } else { 0 };
-        if *stuck >= GIVE_UP_AFTER { Progress::Done } else { Progress::Goes }
+        let approached_m = before - self.reach_distance(agent, entity);
+        *stuck = if approached_m < 0.25 * speed { *stuck + 1 } else { 0 };
+        if *stuck >= GIVE_UP_AFTER { StepProgress::Done } else { StepProgress::Running }
     }
 
-    /// Moves a person by one frame, sliding along what is in the way; returns how far ahead it
-    /// came, metres.
+    /// Moves an agent for one frame, with sliding along obstacles. Returns the distance covered in
+    /// `direction`, meters.
     fn step_towards(&mut self, agent: AgentId, direction: Vec3, speed: f32) -> f32 {
         let from = self.person(agent).pose.position;
         let follower = self.state.joint.filter(|j| j.leader == agent).map(|j| j.follower);
-        let to = self.slide(agent, follower, from, from + direction * speed);
+        let to = self.move_and_slide(agent, follower, from, from + direction * speed);
         if let Some(joint) = self.state.joint.filter(|j| j.leader == agent) {
-            // The two and the furniture move as one: where one is blocked, both are.
+            // The two agents and the furniture move as one: if one is blocked, both are.
             let old = self.person(agent).pose.to_world(joint.follower_in_leader);
-            let wanted = old + (to - from);
-            let got = self.slide(joint.follower, Some(agent), old, wanted);
-            if horizontal_distance(got, wanted) > 0.5 * speed {
+            let target = old + (to - from);
+            let actual = self.move_and_slide(joint.follower, Some(agent), old, target);
+            if horizontal_distance(actual, target) > 0.5 * speed {
                 return 0.0;
             }
         }
@@ -220,7 +223,7 @@ impl World {
         moved
     }
 
-    pub(crate) fn slide(
+    pub(crate) fn move_and_slide(
         &self,
         agent: AgentId,
         except: Option<AgentId>,
@@ -237,12 +240,12 @@ impl World {
             xz(from),
             xz(to),
             &self.movable_blocks(),
-            &self.others(agent, except),
+            &self.other_discs(agent, except),
         );
         Vec3::new(p.x, from.y, p.y)
     }
 
-    /// Turns a person, if there is room. Returns whether there was.
+    /// Turns an agent if there is room. Returns whether it turned.
     fn turn_to(&mut self, agent: AgentId, yaw_rad: f32) -> bool {
         let has_room = self.make_room_to_turn(agent, yaw_rad);
         if has_room {
@@ -258,9 +261,9 @@ impl World {
         }
     }
 
-    /// Whether what a person is about to do in this frame is work.
-    fn works(&self, agent: AgentId) -> bool {
-        let handles = |phase: Phase| {
+    /// Returns whether the agent walks or handles an object in this frame.
+    fn is_working(&self, agent: AgentId) -> bool {
+        let is_handling = |phase: Phase| {
             matches!(
                 phase,
                 Phase::Reach { .. }
@@ -270,18 +273,19 @@ impl World {
                     | Phase::ResetArms { .. }
             )
         };
-        self.is_moving(agent) || self.person(agent).phase().is_some_and(|s| handles(s.phase))
+        self.is_moving(agent) || self.person(agent).phase().is_some_and(|s| is_handling(s.phase))
     }
 
-    fn tire(&mut self, agent: AgentId, works: bool) {
+    fn update_fatigue(&mut self, agent: AgentId, is_working: bool) {
         if let Some(endurance) = self.capability(agent).endurance {
             let condition = &mut self.state.conditions[agent.index()];
-            condition.fatigue = endurance.after_frame(condition.fatigue, works);
+            condition.fatigue = endurance.after_frame(condition.fatigue, is_working);
         }
     }
 
-    /// What drops from a trembling hand on the way. Hands that are at work hold on to what they have.
-    fn let_slip(&mut self, agent: AgentId) {
+    /// Drops objects from trembling hands at random. An agent that performs an action other than
+    /// moving and waiting keeps its objects.
+    fn drop_from_tremor(&mut self, agent: AgentId) {
         let Some(tremor) = self.capability(agent).tremor else { return };
         let action = self.person(agent).activity.as_ref().map(|a| a.action);
         if action.is_some_and(|a| !a.is_locomotion() && !matches!(a, Action::Wait { .. })) {
@@ -289,54 +293,54 @@ impl World {
         }
         for hand in Hand::BOTH {
             let held = self.person(agent).hands[hand.index()];
-            let slips = |e: &EntityId| {
-                !matches!(self.thing(*e).0.class.info().role, Role::HeavyTarget | Role::Vehicle)
+            let can_drop = |e: &EntityId| {
+                !matches!(self.object(*e).0.class.info().role, Role::HeavyTarget | Role::Vehicle)
             };
-            let Some(object) = held.filter(slips) else { continue };
-            if self.luck(agent, Luck::Drop).chance(tremor.drop_chance) {
+            let Some(object) = held.filter(can_drop) else { continue };
+            if self.rng(agent, RngPurpose::Drop).chance(tremor.drop_chance) {
                 let at = self.drop_spot(agent, object);
                 self.release(agent, object, None, at, false);
             }
         }
     }
 
-    /// One frame of everything that falls.
-    fn let_fall(&mut self) {
-        for i in 0..self.state.things.len() {
-            let thing = &mut self.state.things[i];
-            let Place::Falling { path, on } = &mut thing.place else { continue };
+    /// Advances all falling objects by one frame.
+    fn advance_falls(&mut self) {
+        for i in 0..self.state.objects.len() {
+            let object = &mut self.state.objects[i];
+            let ObjectLocation::Falling { path, on } = &mut object.location else { continue };
             if let Some((position, rotation)) = path.pop() {
-                thing.position = position;
-                thing.rotation = rotation;
+                object.position = position;
+                object.rotation = rotation;
             }
             if path.is_empty() {
-                thing.place = Place::Resting { on: *on };
-                self.come_to_rest(crate::Setup::entity(i));
+                object.location = ObjectLocation::Resting { on: *on };
+                self.check_delivery(crate::Setup::entity(i));
             }
         }
     }
 
-    fn watch_child(&mut self) {
-        if self.state.people.len() <= AgentId::CHILD.index() {
+    fn update_child_distance(&mut self) {
+        if self.state.agents.len() <= AgentId::CHILD.index() {
             return;
         }
-        let at = |a: AgentId| self.person(a).pose.position;
-        let distance = horizontal_distance(at(AgentId::CHILD), at(AgentId::PARTNER));
+        let position = |a: AgentId| self.person(a).pose.position;
+        let distance = horizontal_distance(position(AgentId::CHILD), position(AgentId::PARTNER));
         let away = distance > self.rules.child_away_m;
         if away {
             self.state.child_away_frames += 1;
         }
         if away != self.state.child_is_away {
             self.state.child_is_away = away;
-            self.happened(EventKind::ChildAway { away });
+            self.record_event(EventKind::ChildAway { away });
         }
     }
 
-    /// Notes who of partner and helper makes progress, and counts the frames in which one of them
-    /// is stuck.
-    fn watch_progress(&mut self) {
+    /// Updates the progress of the partner and the helper, and counts the frames in which one of
+    /// them is stuck.
+    fn update_progress(&mut self) {
         let frame = self.state.frame;
-        let mut is_anybody_stuck = false;
+        let mut is_any_stuck = false;
         for agent in self.setup.agents().filter(|a| *a != AgentId::CHILD) {
             let person = self.person_mut(agent);
             let (here, progress) = (person.pose.position, &mut person.progress);
@@ -344,19 +348,19 @@ impl World {
                 (progress.frame, progress.position) = (frame, here);
             }
             let stuck = frame >= progress.frame + STUCK_AFTER_FRAMES;
-            is_anybody_stuck |= stuck;
+            is_any_stuck |= stuck;
             if std::mem::replace(&mut progress.is_stuck, stuck) != stuck {
-                self.happened(EventKind::Stuck { agent, stuck });
+                self.record_event(EventKind::Stuck { agent, stuck });
             }
         }
-        self.state.stuck_frames += u32::from(is_anybody_stuck);
+        self.state.stuck_frames += u32::from(is_any_stuck);
     }
 
     fn end_if_over(&mut self) {
         let complete = self.is_complete();
         if complete || self.state.frame >= self.setup.horizon {
             self.state.over = true;
-            self.happened(EventKind::Over { complete });
+            self.record_event(EventKind::Over { complete });
         }
     }
 }

@@ -1,31 +1,34 @@
-//! What agents are told and can see of themselves, and how bodies look to others.
+//! Data for agents and renderers: briefings, proprioception, granted information, cameras and
+//! postures.
 
 use chaic_core::action::Hand;
-use chaic_core::briefing::{Briefing, Companion, Relation, Told};
-use chaic_core::capability::{Gait, Sight};
+use chaic_core::briefing::{Briefing, Companion, CompanionRole, TaskDisclosure};
+use chaic_core::capability::{Eyesight, Gait};
 use chaic_core::catalogue::{CLASSES, Role};
 use chaic_core::geom::{Camera, pitch_rotation, rotate_yaw, yaw_rotation};
-use chaic_core::observation::{Granted, Grants, Held, Identity, OtherEnd, SeenAction, SelfState};
-use chaic_core::rng::Stream;
+use chaic_core::observation::{
+    Granted, Grants, Held, HeldIdentity, JointCarrier, ObservedAction, Proprioception,
+};
+use chaic_core::rng::RngStream;
 use chaic_core::task::SceneKind;
 use chaic_core::{Action, AgentId, ClassId, EntityId, Outcome, ResolvedAction, Vec3};
 
 use crate::posture::{Arm, Posture};
-use crate::setup::Person;
-use crate::state::{Phase, Place};
+use crate::setup::AgentSpec;
+use crate::state::{ObjectLocation, Phase};
 use crate::world::World;
 
 impl World {
-    /// What an agent is told before the episode. Only `grants` lets anything of the goal in.
-    /// `run_seed` is the number of the run's seed, from which the seed of a helper derives.
+    /// Returns the briefing of an agent before the episode. Only `grants` admits information about
+    /// the goal. The seed of a helper derives from `run_seed`.
     pub fn briefing(&self, me: AgentId, grants: Grants, run_seed: u32) -> Briefing {
         let scene = self.setup.task.info().scene;
         let classes =
-            |wanted: &dyn Fn(ClassId) -> bool| ClassId::all().filter(|c| wanted(*c)).collect();
-        let relation = |other: AgentId| match (me, other) {
-            (_, AgentId::CHILD) => Relation::Child,
-            (AgentId::CHILD, AgentId::PARTNER) => Relation::Guardian,
-            _ => Relation::Partner,
+            |include: &dyn Fn(ClassId) -> bool| ClassId::all().filter(|c| include(*c)).collect();
+        let role = |other: AgentId| match (me, other) {
+            (_, AgentId::CHILD) => CompanionRole::Child,
+            (AgentId::CHILD, AgentId::PARTNER) => CompanionRole::Guardian,
+            _ => CompanionRole::Partner,
         };
         let others = self.setup.agents().filter(|a| *a != me);
         let has_wheelchair = self.setup.people.iter().any(|p| p.capability().gait == Gait::Roll);
@@ -33,9 +36,7 @@ impl World {
             me,
             capability: self.capability(me),
             motion: self.rules.motion(),
-            companions: others
-                .map(|agent| Companion { agent, relation: relation(agent) })
-                .collect(),
+            companions: others.map(|agent| Companion { agent, role: role(agent) }).collect(),
             seed: self.agent_seed(me, run_seed),
             horizon: self.setup.horizon,
             bounds: self.setup.bounds,
@@ -44,45 +45,46 @@ impl World {
                 is_possible_target(c, scene) && (self.rules.fragile_targets || !fragile)
             }),
             containers: classes(&|c| {
-                let offered = self.rules.containers_with_wheelchair || !has_wheelchair;
-                offered && c.info().role == Role::Container && scene != SceneKind::Yard
+                let is_listed = self.rules.containers_with_wheelchair || !has_wheelchair;
+                is_listed && c.info().role == Role::Container && scene != SceneKind::Yard
             }),
             obstacles: classes(&|c| c.info().role == Role::Obstacle && scene == SceneKind::House),
             goal_places: match grants.goal_place {
-                true => vec![self.thing(self.setup.goal_places[0]).0.class],
+                true => vec![self.object(self.setup.goal_places[0]).0.class],
                 false => scene.goal_places(),
             },
             goal_place_min_top_m: if grants.goal { self.goal_min_top_m() } else { 0.0 },
             container_capacity: self.rules.container_capacity,
             grants,
             goal: grants.goal.then(|| self.setup.goal.clone()),
-            told: grants.task.then(|| self.told()),
+            disclosure: grants.task.then(|| self.task_disclosure()),
         }
     }
 
-    /// Returns the seed of an agent's own random streams. Partner and child draw from the episode.
-    /// The seed of a helper derives from the run's seed and the seat alone, so that it names no episode.
+    /// Returns the seed of an agent's own random streams. Partner and child derive it from the
+    /// episode. A helper derives it from the run's seed and its agent id only, so it does not
+    /// identify the episode.
     fn agent_seed(&self, agent: AgentId, run_seed: u32) -> u64 {
         match agent {
             AgentId::PARTNER | AgentId::CHILD => episode_stream(self.setup.seed, agent).seed(),
-            _ => Stream::new(u64::from(run_seed), "helper", u64::from(agent.0)).seed(),
+            _ => RngStream::new(u64::from(run_seed), "helper", u64::from(agent.0)).seed(),
         }
     }
 
-    fn told(&self) -> Told {
+    fn task_disclosure(&self) -> TaskDisclosure {
         let task = self.setup.task;
-        let partner = self.setup.people.first().map_or(task.info().partner, Person::kind);
-        Told { task, partner }
+        let partner = self.setup.people.first().map_or(task.info().partner, AgentSpec::kind);
+        TaskDisclosure { task, partner }
     }
 
-    /// What an agent feels and knows of itself. `last` is its last action in its own words;
-    /// `grants.ids` lets it know what its hands hold.
-    pub fn own_state(
+    /// Returns the proprioception of an agent. `last` is its last action in terms of its own names.
+    /// `grants.ids` adds the identities of held objects.
+    pub fn proprioception(
         &self,
         agent: AgentId,
         grants: Grants,
         last: Option<(Action, Outcome)>,
-    ) -> SelfState {
+    ) -> Proprioception {
         let in_both_hands = self.holds_furniture(agent).is_some();
         let hands = self.person(agent).hands.map(|held| {
             held.map(|entity| Held {
@@ -92,40 +94,41 @@ impl World {
             })
         });
         let joint = self.state.joint.filter(|j| j.leader == agent && j.under_way);
-        let other_end =
-            joint.map(|j| OtherEnd { agent: j.follower, position_in_body: j.follower_in_leader });
-        SelfState { pose: self.person(agent).pose, hands, last, other_end }
+        let other_end = joint
+            .map(|j| JointCarrier { agent: j.follower, position_in_body: j.follower_in_leader });
+        Proprioception { pose: self.person(agent).pose, hands, last, other_end }
     }
 
-    /// The action of an agent that ended last, with its outcome.
+    /// Returns the last completed action of an agent with its outcome.
     pub fn last_action(&self, agent: AgentId) -> Option<(ResolvedAction, Outcome)> {
         self.person(agent).last
     }
 
-    /// What is granted to an agent beyond its own images and state, now. `in_view` holds the
-    /// entities of the agent's own image in the order of ids, structure left out.
+    /// Returns the granted information of an agent for this frame, in addition to images and
+    /// proprioception. `in_view` holds the entities in the agent's image in the order of ids,
+    /// without walls and floor.
     pub fn granted(&self, agent: AgentId, grants: Grants, in_view: &[EntityId]) -> Granted {
         let mut granted = Granted::default();
-        let shows = |entity: EntityId| in_view.binary_search(&entity).is_ok();
+        let is_in_view = |entity: EntityId| in_view.binary_search(&entity).is_ok();
         if grants.ids {
             let class = |e: &EntityId| Some((*e, self.class_of(*e)?));
             granted.classes = in_view.iter().filter_map(class).collect();
-            granted.removed = self.told_removed();
+            granted.removed = self.announced_obstacles();
         }
         if grants.ids || grants.progress {
             let all = self.delivered().into_iter();
-            let told = all.filter(|e| grants.progress || shows(*e));
-            granted.delivered = told.map(|e| (e, self.thing(e).0.class)).collect();
+            let listed = all.filter(|e| grants.progress || is_in_view(*e));
+            granted.delivered = listed.map(|e| (e, self.object(e).0.class)).collect();
         }
         if grants.goal {
             granted.goal = Some(self.setup.goal.clone());
         }
-        let mate = if agent == AgentId::PARTNER { AgentId::HELPER } else { AgentId::PARTNER };
+        let teammate = if agent == AgentId::PARTNER { AgentId::HELPER } else { AgentId::PARTNER };
         if grants.behavior {
-            let is_seen = |a: &AgentId| *a != agent && shows(EntityId::of_agent(*a));
-            for other in self.setup.agents().filter(is_seen) {
-                granted.behavior.extend(self.seen_deed(other));
-                if other == mate {
+            let is_observed = |a: &AgentId| *a != agent && is_in_view(EntityId::from_agent(*a));
+            for other in self.setup.agents().filter(is_observed) {
+                granted.behavior.extend(self.observed_action(other));
+                if other == teammate {
                     let hands = self.person(other).hands;
                     granted.partner_hands = Some(hands.map(|h| h.map(|e| self.identity(e))));
                 }
@@ -137,33 +140,33 @@ impl World {
         granted
     }
 
-    /// The class of an object or person.
+    /// Returns the class of an object or agent.
     fn class_of(&self, entity: EntityId) -> Option<ClassId> {
         let is_person = || entity.agent().is_some_and(|a| a.index() < self.setup.people.len());
         let person = || is_person().then(|| ClassId::named("person"));
         self.setup.thing(entity).map(|t| t.class).or_else(person)
     }
 
-    /// The class of every entity, indexed by id; constant during an episode. For pictures and
-    /// labels, never for an agent.
+    /// Returns the class of every entity, indexed by id; constant during an episode. For rendering
+    /// and labels, never for an agent.
     pub fn classes(&self) -> Vec<Option<ClassId>> {
         let n = usize::from(EntityId::FIRST_OBJECT.0) + self.setup.things.len();
         (0..n).map(|i| self.class_of(EntityId(i as u16))).collect()
     }
 
-    fn identity(&self, entity: EntityId) -> Identity {
-        let class = |e: EntityId| self.thing(e).0.class;
+    fn identity(&self, entity: EntityId) -> HeldIdentity {
+        let class = |e: EntityId| self.object(e).0.class;
         let contents = self.contents(entity).into_iter().map(|e| (e, class(e))).collect();
-        Identity { entity, class: class(entity), contents }
+        HeldIdentity { entity, class: class(entity), contents }
     }
 
-    fn seen_deed(&self, agent: AgentId) -> Option<SeenAction> {
+    fn observed_action(&self, agent: AgentId) -> Option<ObservedAction> {
         let person = self.person(agent);
         if let Some(activity) = person.activity.as_ref().filter(|a| a.action.subject().is_some()) {
             let (frame, action) = (activity.since, activity.action);
-            return Some(SeenAction { agent, frame, action, outcome: None });
+            return Some(ObservedAction { agent, frame, action, outcome: None });
         }
-        person.last_deed.map(|(frame, action, outcome)| SeenAction {
+        person.last_interaction.map(|(frame, action, outcome)| ObservedAction {
             agent,
             frame,
             action,
@@ -171,45 +174,45 @@ impl World {
         })
     }
 
-    /// An agent's eye: at eye height, looking ahead, level but for who lowers the gaze. `size` is the
-    /// image's side in pixels.
-    pub fn eye(&self, agent: AgentId, size: u32) -> Camera {
+    /// Returns the camera of an agent: at eye height, facing forward, and level unless an
+    /// impairment lowers the gaze. `size` is the side length of the image, pixels.
+    pub fn camera(&self, agent: AgentId, size: u32) -> Camera {
         let (pose, level) =
             (self.person(agent).pose, yaw_rotation(self.person(agent).pose.yaw_rad));
-        let lowered = |sight: Sight| level * pitch_rotation(-sight.lowered_rad);
+        let lowered = |eyesight: Eyesight| level * pitch_rotation(-eyesight.lowered_rad);
         Camera {
             eye_in_world: pose.position + Vec3::Y * self.capability(agent).eye_height_m,
-            world_from_camera: self.sight(agent).map_or(level, lowered),
+            world_from_camera: self.eyesight(agent).map_or(level, lowered),
             vertical_fov_rad: Camera::EYE_FOV_RAD,
             width: size,
             height: size,
         }
     }
 
-    /// How far and how sharply an agent sees, if not as its camera does.
-    pub fn sight(&self, agent: AgentId) -> Option<Sight> {
-        self.capability(agent).sight
+    /// Returns the limits of an agent's eyesight, if it has any.
+    pub fn eyesight(&self, agent: AgentId) -> Option<Eyesight> {
+        self.capability(agent).eyesight
     }
 
-    /// A point in front of a person at the height where things are held.
-    pub(crate) fn front_of(&self, agent: AgentId) -> Vec3 {
+    /// Returns the point in front of an agent at which it holds objects, in the world, meters.
+    pub(crate) fn front_in_world(&self, agent: AgentId) -> Vec3 {
         let h = self.capability(agent).height_m;
         self.person(agent).pose.to_world(Vec3::new(0.0, 0.6 * h, -0.3 * h))
     }
 
-    /// Where a hand rests, in the world, metres.
-    pub(crate) fn rest_of(&self, agent: AgentId, hand: Hand) -> Vec3 {
+    /// Returns the rest position of a hand in the world, meters.
+    pub(crate) fn hand_rest_in_world(&self, agent: AgentId, hand: Hand) -> Vec3 {
         let holding = self.person(agent).hands[hand.index()].is_some();
-        self.person(agent).pose.to_world(self.rest_in_body(agent, hand, holding))
+        self.person(agent).pose.to_world(self.hand_rest_in_body(agent, hand, holding))
     }
 
-    /// Where a hand rests in the body's frame: hanging, or before the body if it holds something
-    /// (facts S16.1, in proportion to the body's height).
-    fn rest_in_body(&self, agent: AgentId, hand: Hand, holding: bool) -> Vec3 {
+    /// Returns the rest position of a hand in the body frame: hanging, or in front of the body with
+    /// an object (facts S16.1, scaled with the height of the body).
+    fn hand_rest_in_body(&self, agent: AgentId, hand: Hand, holding: bool) -> Vec3 {
         let c = self.capability(agent);
         let side = if hand == Hand::Left { -1.0 } else { 1.0 };
         match (c.gait, holding) {
-            // In a sling, before the chest.
+            // The unusable arm is in a sling at the chest.
             _ if !c.hands.include(hand) => Vec3::new(0.0, 0.66 * c.height_m, -0.12 * c.height_m),
             (Gait::Roll, true) => Vec3::new(side * 0.18, 0.82, -0.5),
             (Gait::Roll, false) => Vec3::new(side * 0.33, 0.62, 0.0),
@@ -219,15 +222,15 @@ impl World {
         }
     }
 
-    /// Where a hand is now, in the world, metres.
+    /// Returns the current position of a hand in the world, meters.
     pub(crate) fn hand_in_world(&self, agent: AgentId, hand: Hand) -> Vec3 {
         let pose = self.person(agent).pose;
-        let rest = self.rest_of(agent, hand);
+        let rest = self.hand_rest_in_world(agent, hand);
         let Some(step) = self.person(agent).phase() else { return rest };
         let applies = |h: Option<Hand>| h.is_none_or(|h| h == hand);
         let spread = |p: Vec3, h: Option<Hand>| match h {
             Some(_) => p,
-            // Two hands hold by the two sides.
+            // Both hands hold the two sides.
             None => {
                 p + rotate_yaw(
                     Vec3::X * if hand == Hand::Left { -0.22 } else { 0.22 },
@@ -238,16 +241,16 @@ impl World {
         let t = step.progress();
         match step.phase {
             Phase::Reach { hand: h, to, fails } if applies(h) => {
-                // A failed reach goes up and comes half back.
+                // A failed reach goes up and returns half of the way.
                 let t = if fails { (1.5 * t).min(1.0) } else { t };
                 rest.lerp(spread(to, h), t * t * (3.0 - 2.0 * t))
             }
             Phase::Grasp { hand: h, object } if applies(h) => {
-                let (thing, state) = self.thing(object);
-                spread(state.position + state.rotation * (Vec3::Y * 0.5 * thing.size_m().y), h)
+                let (spec, state) = self.object(object);
+                spread(state.position + state.rotation * (Vec3::Y * 0.5 * spec.size_m().y), h)
             }
             Phase::Release { hand: h, object, at, .. } if applies(h) => {
-                spread(at + Vec3::Y * 0.5 * self.thing(object).0.size_m().y, h)
+                spread(at + Vec3::Y * 0.5 * self.object(object).0.size_m().y, h)
             }
             Phase::ResetArms { from: Some(from), hand: h } if applies(h) => {
                 spread(from, h).lerp(rest, t)
@@ -256,7 +259,7 @@ impl World {
         }
     }
 
-    /// How a person's body holds itself now.
+    /// Returns the current posture of an agent.
     pub fn posture(&self, agent: AgentId) -> Posture {
         let c = self.capability(agent);
         let person = self.person(agent);
@@ -269,7 +272,7 @@ impl World {
         };
         let arms = [arm(Hand::Left), arm(Hand::Right)];
         let phase = person.phase().map(|s| s.phase);
-        let busy = matches!(
+        let is_handling = matches!(
             phase,
             Some(
                 Phase::Reach { .. }
@@ -288,42 +291,43 @@ impl World {
             fatigue: self.fatigue(agent),
             gait: c.gait,
             height_m: c.height_m,
-            look: self.setup.people[agent.index()].look,
+            appearance: self.setup.people[agent.index()].appearance,
             pose: person.pose,
             moving: self.is_moving(agent),
             walked_m: person.walked_m,
             arms,
-            bend: if busy { below.clamp(0.0, 1.0) } else { 0.0 },
-            stretch: if busy { above.clamp(0.0, 1.0) } else { 0.0 },
-            failing: busy && person.activity.as_ref().is_some_and(|a| a.failing.is_some()),
+            bend: if is_handling { below.clamp(0.0, 1.0) } else { 0.0 },
+            stretch: if is_handling { above.clamp(0.0, 1.0) } else { 0.0 },
+            failing: is_handling && person.activity.as_ref().is_some_and(|a| a.failing.is_some()),
         }
     }
 
-    /// Whether legs or wheels are moving.
+    /// Returns whether the legs or wheels move.
     pub(crate) fn is_moving(&self, agent: AgentId) -> bool {
         let person = self.person(agent);
         let phase = person.phase().map(|s| s.phase);
         matches!(phase, Some(Phase::Walk { .. } | Phase::Approach { .. }))
             || (person.in_stride && matches!(phase, Some(Phase::Stand)))
-            || self.is_led(agent)
+            || self.is_carried_along(agent)
     }
 
-    fn is_led(&self, agent: AgentId) -> bool {
+    fn is_carried_along(&self, agent: AgentId) -> bool {
         self.state.joint.is_some_and(|j| {
-            let leads = || self.person(j.leader).phase().map(|s| s.phase);
+            let leader_phase = || self.person(j.leader).phase().map(|s| s.phase);
             j.under_way
                 && j.follower == agent
-                && matches!(leads(), Some(Phase::Walk { .. } | Phase::Approach { .. }))
+                && matches!(leader_phase(), Some(Phase::Walk { .. } | Phase::Approach { .. }))
         })
     }
 
-    /// Whether a thing is still in the scene to be seen.
+    /// Returns whether an object is still in the scene.
     pub fn is_visible(&self, entity: EntityId) -> bool {
-        self.setup.thing_index(entity).is_some() && self.thing(entity).1.place != Place::Broken
+        self.setup.thing_index(entity).is_some()
+            && self.object(entity).1.location != ObjectLocation::Broken
     }
 }
 
-/// Whether a class may be a target in this kind of scene.
+/// Returns whether a class may be a target in this kind of scene.
 fn is_possible_target(class: ClassId, scene: SceneKind) -> bool {
     let info = &CLASSES[class.index()];
     let tasks = chaic_core::task::TASKS.iter().filter(|t| t.scene == scene);
@@ -331,7 +335,7 @@ fn is_possible_target(class: ClassId, scene: SceneKind) -> bool {
     in_sets || (scene == SceneKind::House && info.role == Role::Fragile)
 }
 
-/// Random stream of an agent in the world of this seed. It identifies the episode.
-pub fn episode_stream(world_seed: u64, agent: AgentId) -> Stream {
-    Stream::new(world_seed, "agent", u64::from(agent.0))
+/// Returns the random stream of an agent in the world of this seed. It identifies the episode.
+pub fn episode_stream(world_seed: u64, agent: AgentId) -> RngStream {
+    RngStream::new(world_seed, "agent", u64::from(agent.0))
 }

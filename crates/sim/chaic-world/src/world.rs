@@ -1,4 +1,4 @@
-//! A world: setup, rules and state together, and the doors to them.
+//! World: setup, rules and state together, with the public interface of the simulation.
 
 use std::sync::Arc;
 
@@ -12,53 +12,53 @@ use serde::{Deserialize, Serialize};
 use crate::collide::{BlockIndex, Body, Disc};
 use crate::event::{Event, EventKind};
 use crate::rules::{ReachTo, Rules};
-use crate::setup::{Person, Setup, SetupError, Thing};
+use crate::setup::{AgentSpec, ObjectSpec, Setup, SetupError};
 use crate::shape::{Block, blocks_at, wall_blocks};
-use crate::state::{Condition, PersonState, Place, State, ThingState};
+use crate::state::{AgentState, Condition, ObjectLocation, ObjectState, State};
 
-/// An episode under way.
+/// An episode in progress.
 #[derive(Clone, Debug)]
 pub struct World {
     pub(crate) setup: Arc<Setup>,
     pub(crate) rules: Rules,
-    /// Walls and things that never move: derived from the setup.
+    /// Walls and immovable objects, derived from the setup.
     pub(crate) block_index: Arc<BlockIndex>,
-    /// Things that can be moved and block bodies: derived from the setup.
+    /// Indices of movable objects that block bodies, derived from the setup.
     pub(crate) movable_blockers: Arc<[usize]>,
-    /// What each person's body can do: derived from the setup.
+    /// Capability of each agent, derived from the setup.
     capabilities: Arc<[Capability]>,
     pub(crate) state: State,
     pub(crate) events: Vec<Event>,
 }
 
-/// A saved state, as bytes.
+/// A saved state as bytes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Snapshot(pub Vec<u8>);
 
-/// Why a snapshot can't be restored.
+/// A snapshot that cannot be restored.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SnapshotError {
-    /// The bytes are no state.
-    #[error("the snapshot can't be read: {0}")]
+    /// The bytes are not a valid state.
+    #[error("the snapshot cannot be read: {0}")]
     Unreadable(String),
-    /// The state belongs to another setup.
+    /// The state belongs to a different setup.
     #[error("the snapshot has {got} and this world has {expected}")]
     OtherSetup {
-        /// Things and people of the snapshot.
+        /// Numbers of objects and people in the snapshot.
         got: String,
-        /// Things and people of this world.
+        /// Numbers of objects and people in this world.
         expected: String,
     },
 }
 
-/// Why an action can't be submitted. An action that is merely impossible *in the world* is
+/// An action that cannot be submitted. An action that is only impossible *in the world* is
 /// accepted, and fails there with a reason.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SubmitError {
-    /// There is no such agent.
+    /// The agent does not exist.
     #[error("there is no agent {0:?} in this episode")]
     NoSuchAgent(AgentId),
-    /// The agent's last action is still under way.
+    /// The agent's previous action is still in progress.
     #[error("the {0} is still busy")]
     Busy(AgentId),
     /// The episode has ended.
@@ -67,10 +67,10 @@ pub enum SubmitError {
 }
 
 impl World {
-    /// The world at the beginning of an episode.
+    /// Creates the world at the start of an episode.
     ///
     /// # Errors
-    /// If the setup holds numbers or ids that no world can have; see [`Setup::check`].
+    /// If the setup contains invalid numbers or ids; see [`Setup::check`].
     pub fn new(setup: impl Into<Arc<Setup>>, rules: Rules) -> Result<World, SetupError> {
         let setup = setup.into();
         setup.check()?;
@@ -79,7 +79,7 @@ impl World {
             .chain(fixed.flat_map(|(i, t)| blocks_at(t, Setup::entity(i), t.position, t.yaw_rad)))
             .collect();
         let block_index = Arc::new(BlockIndex::new(blocks, setup.bounds));
-        let blocks_bodies = |t: &Thing| {
+        let blocks_bodies = |t: &ObjectSpec| {
             !t.fixed && matches!(t.class.info().role, Role::Obstacle | Role::HeavyTarget)
         };
         let movable_blockers = setup
@@ -90,36 +90,36 @@ impl World {
             .map(|(i, _)| i)
             .collect();
         let state = initial_state(&setup);
-        let capabilities = setup.people.iter().map(Person::capability).collect();
+        let capabilities = setup.people.iter().map(AgentSpec::capability).collect();
         let events = Vec::new();
         let mut world =
             World { setup, rules, block_index, movable_blockers, capabilities, state, events };
         world.attach_vehicles();
-        world.carry_along();
+        world.update_carried_objects();
         Ok(world)
     }
 
-    /// How the episode began.
+    /// Returns the setup.
     pub fn setup(&self) -> &Setup {
         &self.setup
     }
 
-    /// The rules.
+    /// Returns the rules.
     pub fn rules(&self) -> &Rules {
         &self.rules
     }
 
-    /// How it stands.
+    /// Returns the current state.
     pub fn state(&self) -> &State {
         &self.state
     }
 
-    /// Whether the episode has ended.
+    /// Returns whether the episode has ended.
     pub fn is_over(&self) -> bool {
         self.state.over
     }
 
-    /// The agents that wait to be asked, in order.
+    /// Returns the agents that wait for a decision, in order.
     pub fn waiting(&self) -> Vec<AgentId> {
         if self.state.over {
             return Vec::new();
@@ -127,12 +127,12 @@ impl World {
         self.setup.agents().filter(|a| self.person(*a).activity.is_none()).collect()
     }
 
-    /// Takes the next action of an agent that waits.
+    /// Starts the next action of a waiting agent.
     ///
     /// # Errors
-    /// If the agent doesn't exist, is busy, or the episode is over.
+    /// If the agent does not exist or is busy, or if the episode is over.
     pub fn submit(&mut self, agent: AgentId, action: ResolvedAction) -> Result<(), SubmitError> {
-        if agent.index() >= self.state.people.len() {
+        if agent.index() >= self.state.agents.len() {
             return Err(SubmitError::NoSuchAgent(agent));
         }
         if self.state.over {
@@ -141,41 +141,42 @@ impl World {
         if self.person(agent).activity.is_some() {
             return Err(SubmitError::Busy(agent));
         }
-        self.begin(agent, action);
+        self.start_action(agent, action);
         Ok(())
     }
 
-    /// Runs frames until some agent waits to be asked, or the episode ends.
+    /// Runs frames until an agent waits for a decision, or the episode ends.
     pub fn advance(&mut self) {
-        self.advance_watched(&mut |_| ());
+        self.advance_with_callback(&mut |_| ());
     }
 
-    /// The same, with somebody who looks on after each frame.
-    pub fn advance_watched(&mut self, look_on: &mut dyn FnMut(&World)) {
-        while !self.state.over && self.state.people.iter().all(|p| p.activity.is_some()) {
+    /// Runs frames as [`World::advance`] does, and calls `on_frame` after each frame.
+    pub fn advance_with_callback(&mut self, on_frame: &mut dyn FnMut(&World)) {
+        while !self.state.over && self.state.agents.iter().all(|p| p.activity.is_some()) {
             self.tick();
-            look_on(self);
+            on_frame(self);
         }
     }
 
-    /// What has happened since this was last called.
+    /// Returns the events since the last call, and clears them.
     pub fn drain_events(&mut self) -> Vec<Event> {
         std::mem::take(&mut self.events)
     }
 
-    /// The state as bytes.
+    /// Returns the state as bytes.
     pub fn snapshot(&self) -> Snapshot {
         let mut bytes = postcard::to_stdvec(&self.state).expect("a state is plain data");
         if !self.state.conditions.is_empty() {
-            bytes = postcard::to_extend(&self.state.conditions, bytes).expect("so are conditions");
+            bytes = postcard::to_extend(&self.state.conditions, bytes)
+                .expect("conditions are plain data");
         }
         Snapshot(bytes)
     }
 
-    /// Goes back (or on) to a saved state of the same setup. Undrained events are dropped.
+    /// Restores a saved state of the same setup, earlier or later. Clears pending events.
     ///
     /// # Errors
-    /// If the bytes are no state of this setup; the world is then unchanged.
+    /// If the bytes are not a state of this setup; the world is then unchanged.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), SnapshotError> {
         let unreadable = |e: postcard::Error| SnapshotError::Unreadable(e.to_string());
         let (mut state, rest): (State, _) =
@@ -184,12 +185,12 @@ impl World {
             state.conditions = postcard::from_bytes(rest).map_err(unreadable)?;
         }
         let count = |state: &State| {
-            let (things, people) = (state.things.len(), state.people.len());
+            let (objects, people) = (state.objects.len(), state.agents.len());
             let conditions = match state.conditions.len() {
                 0 => String::new(),
                 n => format!(" with {n} conditions"),
             };
-            format!("{things} things and {people} people{conditions}")
+            format!("{objects} objects and {people} people{conditions}")
         };
         let (got, expected) = (count(&state), count(&self.state));
         if got != expected {
@@ -200,81 +201,81 @@ impl World {
         Ok(())
     }
 
-    /// A number that differs between different states, and is the same for equal ones.
+    /// Returns a hash of the state. Equal states have equal digests.
     pub fn digest(&self) -> u64 {
         xxhash_rust::xxh3::xxh3_64(&self.snapshot().0)
     }
 
-    pub(crate) fn person(&self, agent: AgentId) -> &PersonState {
-        &self.state.people[agent.index()]
+    pub(crate) fn person(&self, agent: AgentId) -> &AgentState {
+        &self.state.agents[agent.index()]
     }
 
-    pub(crate) fn person_mut(&mut self, agent: AgentId) -> &mut PersonState {
-        &mut self.state.people[agent.index()]
+    pub(crate) fn person_mut(&mut self, agent: AgentId) -> &mut AgentState {
+        &mut self.state.agents[agent.index()]
     }
 
     pub(crate) fn capability(&self, agent: AgentId) -> Capability {
         self.capabilities[agent.index()]
     }
 
-    /// Part of speed and strength that this person's fatigue leaves.
-    pub(crate) fn part_left(&self, agent: AgentId) -> f32 {
+    /// Returns the fraction of speed and strength that remains at the current fatigue of the agent.
+    pub(crate) fn remaining_strength(&self, agent: AgentId) -> f32 {
         let endurance = self.capability(agent).endurance;
-        endurance.map_or(1.0, |e| e.part_left(self.fatigue(agent)))
+        endurance.map_or(1.0, |e| e.remaining_fraction(self.fatigue(agent)))
     }
 
-    /// How tired a person is: 0 rested, 1 exhausted.
+    /// Returns the fatigue of an agent: 0 rested, 1 exhausted.
     pub fn fatigue(&self, agent: AgentId) -> f32 {
         self.state.conditions.get(agent.index()).map_or(0.0, |c| c.fatigue)
     }
 
-    /// Setup and state of a thing that exists.
-    pub(crate) fn thing(&self, entity: EntityId) -> (&Thing, &ThingState) {
+    /// Returns the specification and the state of an existing object.
+    pub(crate) fn object(&self, entity: EntityId) -> (&ObjectSpec, &ObjectState) {
         let i = self.index(entity);
-        (&self.setup.things[i], &self.state.things[i])
+        (&self.setup.things[i], &self.state.objects[i])
     }
 
-    pub(crate) fn thing_mut(&mut self, entity: EntityId) -> &mut ThingState {
+    pub(crate) fn object_mut(&mut self, entity: EntityId) -> &mut ObjectState {
         let i = self.index(entity);
-        &mut self.state.things[i]
+        &mut self.state.objects[i]
     }
 
     fn index(&self, entity: EntityId) -> usize {
-        self.setup.thing_index(entity).expect("entities inside the world name things of its setup")
+        self.setup.thing_index(entity).expect("ids inside the world are those of its setup")
     }
 
-    pub(crate) fn happened(&mut self, kind: EventKind) {
+    pub(crate) fn record_event(&mut self, kind: EventKind) {
         self.events.push(Event { frame: self.state.frame, kind });
     }
 
-    /// The colliding parts of a thing as it stands now.
+    /// Returns the collision boxes of an object at its current pose.
     pub(crate) fn blocks_now(&self, index: usize) -> impl Iterator<Item = Block> + use<> {
-        let (thing, state) = (&self.setup.things[index], &self.state.things[index]);
+        let (spec, state) = (&self.setup.things[index], &self.state.objects[index]);
         let f = state.rotation * Vec3::NEG_Z;
         let yaw = chaic_core::geom::yaw_towards(Vec3::ZERO, f);
-        blocks_at(thing, Setup::entity(index), state.position, yaw)
+        blocks_at(spec, Setup::entity(index), state.position, yaw)
     }
 
-    /// Blocks of movable things that stand in people's way right now.
+    /// Returns the boxes of movable objects that currently block bodies.
     pub(crate) fn movable_blocks(&self) -> Vec<Block> {
-        let standing = |i: &&usize| self.state.things[**i].is_resting();
-        self.movable_blockers.iter().filter(standing).flat_map(|i| self.blocks_now(*i)).collect()
+        let is_resting = |i: &&usize| self.state.objects[**i].is_resting();
+        self.movable_blockers.iter().filter(is_resting).flat_map(|i| self.blocks_now(*i)).collect()
     }
 
-    /// The cylinders of the people other than `agent` and `except`.
-    pub(crate) fn others(&self, agent: AgentId, except: Option<AgentId>) -> Vec<Disc> {
+    /// Returns the discs of all agents other than `agent` and `except`.
+    pub(crate) fn other_discs(&self, agent: AgentId, except: Option<AgentId>) -> Vec<Disc> {
         let others = self.setup.agents().filter(|a| *a != agent && Some(*a) != except);
         others.map(|a| self.disc(a)).collect()
     }
 
-    /// The cylinders of everybody.
+    /// Returns the discs of all agents.
     pub(crate) fn discs(&self) -> Vec<Disc> {
         self.setup.agents().map(|a| self.disc(a)).collect()
     }
 
     fn disc(&self, agent: AgentId) -> Disc {
         Disc {
-            center: chaic_core::geom::xz(self.person(agent).pose.position),
+            center: chaic_core::geom::to_xz(self.person(agent).pose.position),
             radius_m: self.capability(agent).radius_m,
         }
     }
@@ -284,19 +285,19 @@ impl World {
         Body { radius_m: c.radius_m, low_m: self.rules.step_over_m, high_m: c.height_m }
     }
 
-    /// The bicycle or other vehicle in an agent's left hand.
+    /// Returns the bicycle or other vehicle in the left hand of an agent.
     pub(crate) fn vehicle(&self, agent: AgentId) -> Option<EntityId> {
         self.person(agent).hands[Hand::Left.index()]
-            .filter(|e| self.thing(*e).0.class.info().role == Role::Vehicle)
+            .filter(|e| self.object(*e).0.class.info().role == Role::Vehicle)
     }
 
-    /// What is directly in a container or basket, in the order of its slots.
+    /// Returns the direct contents of a container or basket, in slot order.
     pub(crate) fn contents(&self, container: EntityId) -> Vec<EntityId> {
         let mut inside: Vec<(u8, EntityId)> = self
             .setup
             .entities()
-            .filter_map(|e| match self.thing(e).1.place {
-                Place::Inside { container: c, slot } if c == container => Some((slot, e)),
+            .filter_map(|e| match self.object(e).1.location {
+                ObjectLocation::Inside { container: c, slot } if c == container => Some((slot, e)),
                 _ => None,
             })
             .collect();
@@ -304,38 +305,40 @@ impl World {
         inside.into_iter().map(|(_, e)| e).collect()
     }
 
-    /// Distance in plan from a person to the nearest point of a thing, metres.
+    /// Returns the distance in plan from an agent to the nearest point of an object, meters.
     pub(crate) fn distance_to(&self, agent: AgentId, entity: EntityId) -> f32 {
         let p = self.person(agent).pose.position;
         horizontal_distance(p, self.point_to_reach(p, entity))
     }
 
-    /// The point of a thing that one goes to from `p`; of a goal place as the task has it.
+    /// Returns the point of an object to which an agent at `p` walks. Depends on the rules and, for
+    /// goal places, on the task.
     pub(crate) fn point_to_reach(&self, p: Vec3, entity: EntityId) -> Vec3 {
-        let is_beside = || {
+        let is_reached_at_edge = || {
             self.setup.goal_places.contains(&entity)
                 && self.setup.task.info().goal_approach == GoalApproach::NearestPoint
         };
         match self.rules.reach_to {
-            ReachTo::Middle if !is_beside() => self.thing(entity).1.position,
+            ReachTo::Middle if !is_reached_at_edge() => self.object(entity).1.position,
             ReachTo::Middle | ReachTo::NearestPoint => self.nearest_point(p, entity),
         }
     }
 
-    /// The same for a person with all that moves as one with it: of two who carry furniture, the
-    /// one who is nearer counts.
+    /// Returns the distance of an agent to an object, meters. In a joint carry, the nearer one of
+    /// leader and follower counts.
     pub(crate) fn reach_distance(&self, agent: AgentId, entity: EntityId) -> f32 {
-        let own = self.distance_to(agent, entity);
+        let distance_m = self.distance_to(agent, entity);
         match self.state.joint.filter(|j| j.leader == agent && j.under_way) {
-            Some(joint) => own.min(self.distance_to(joint.follower, entity)),
-            None => own,
+            Some(joint) => distance_m.min(self.distance_to(joint.follower, entity)),
+            None => distance_m,
         }
     }
 
-    /// The point of a thing's outline that is nearest in plan to `p`, at `p`'s height.
+    /// Returns the point of an object's outline that is nearest to `p` in plan, at the height of
+    /// `p`.
     pub(crate) fn nearest_point(&self, p: Vec3, entity: EntityId) -> Vec3 {
-        let (thing, state) = self.thing(entity);
-        let half = 0.5 * thing.size_m();
+        let (spec, state) = self.object(entity);
+        let half = 0.5 * spec.size_m();
         let facing = state.rotation * Vec3::NEG_Z;
         let block = Block {
             center: state.position + Vec3::Y * half.y,
@@ -346,16 +349,16 @@ impl World {
         block.nearest_in_plan(p).0
     }
 
-    /// Height of a thing's highest point, metres.
-    pub(crate) fn top_of(&self, entity: EntityId) -> f32 {
-        let (thing, state) = self.thing(entity);
-        let half = 0.5 * thing.size_m();
+    /// Returns the height of an object's highest point, meters.
+    pub(crate) fn top_height_m(&self, entity: EntityId) -> f32 {
+        let (spec, state) = self.object(entity);
+        let half = 0.5 * spec.size_m();
         let m = glam::Mat3::from_quat(state.rotation);
         let middle = state.position.y + (state.rotation * (Vec3::Y * half.y)).y;
         middle + m.x_axis.y.abs() * half.x + m.y_axis.y.abs() * half.y + m.z_axis.y.abs() * half.z
     }
 
-    /// At the start every rider holds the nearest vehicle.
+    /// Puts the nearest free vehicle into the left hand of every rider.
     fn attach_vehicles(&mut self) {
         for agent in self.setup.agents() {
             if self.capability(agent).gait != Gait::WalkBike {
@@ -363,15 +366,16 @@ impl World {
             }
             let at = self.person(agent).pose.position;
             let free = |e: &EntityId| {
-                self.thing(*e).0.class.info().role == Role::Vehicle
-                    && self.thing(*e).1.holder().is_none()
+                self.object(*e).0.class.info().role == Role::Vehicle
+                    && self.object(*e).1.holder().is_none()
             };
             let nearest = self.setup.entities().filter(free).min_by(|a, b| {
-                let d = |e: &EntityId| horizontal_distance(self.thing(*e).1.position, at);
+                let d = |e: &EntityId| horizontal_distance(self.object(*e).1.position, at);
                 d(a).total_cmp(&d(b))
             });
             if let Some(vehicle) = nearest {
-                self.thing_mut(vehicle).place = Place::Held { by: agent, hand: Hand::Left };
+                self.object_mut(vehicle).location =
+                    ObjectLocation::Held { by: agent, hand: Hand::Left };
                 self.person_mut(agent).hands[Hand::Left.index()] = Some(vehicle);
             }
         }
@@ -379,23 +383,23 @@ impl World {
 }
 
 fn initial_state(setup: &Setup) -> State {
-    let thing = |t: &Thing| ThingState {
+    let object_state = |t: &ObjectSpec| ObjectState {
         position: t.position,
         rotation: yaw_rotation(t.yaw_rad),
-        place: Place::Resting { on: None },
+        location: ObjectLocation::Resting { on: None },
         delivered: None,
         delivered_by: None,
         last_holder: None,
         released_at: None,
     };
-    let mut things: Vec<ThingState> = setup.things.iter().map(thing).collect();
-    for (i, thing) in things.iter_mut().enumerate() {
-        thing.place = Place::Resting { on: initial_support(setup, i) };
+    let mut objects: Vec<ObjectState> = setup.things.iter().map(object_state).collect();
+    for (i, object) in objects.iter_mut().enumerate() {
+        object.location = ObjectLocation::Resting { on: initial_support(setup, i) };
     }
     State {
         frame: 0,
-        things,
-        people: setup.people.iter().map(|person| PersonState::at(person.pose)).collect(),
+        objects,
+        agents: setup.people.iter().map(|person| AgentState::new(person.pose)).collect(),
         joint: None,
         child_away_frames: 0,
         child_is_away: false,
@@ -406,21 +410,22 @@ fn initial_state(setup: &Setup) -> State {
 }
 
 fn initial_conditions(setup: &Setup) -> Vec<Condition> {
-    let changes =
-        |p: &Person| p.capability().endurance.is_some() || p.capability().tremor.is_some();
-    let n = if setup.people.iter().any(changes) { setup.people.len() } else { 0 };
+    let has_condition =
+        |p: &AgentSpec| p.capability().endurance.is_some() || p.capability().tremor.is_some();
+    let n = if setup.people.iter().any(has_condition) { setup.people.len() } else { 0 };
     vec![Condition::default(); n]
 }
 
-/// What a thing stands on at the start: the thing whose top surface is right below its bottom.
+/// Returns the support of an object at the start: the object whose top is at the height of its
+/// bottom.
 fn initial_support(setup: &Setup, index: usize) -> Option<EntityId> {
-    /// Gap that still counts as lying on, metres.
+    /// Maximum vertical gap for support, meters.
     const TOUCHING_M: f32 = 0.03;
     let p = setup.things[index].position;
     if p.y < TOUCHING_M || !setup.things[index].class.info().is_movable() {
         return None;
     }
-    let below = |t: &Thing| {
+    let below = |t: &ObjectSpec| {
         let block = crate::shape::blocks_of(t);
         block.iter().any(|b| (b.y_range()[1] - p.y).abs() < TOUCHING_M && b.nearest_in_plan(p).1)
     };

@@ -1,17 +1,17 @@
-//! The lattice that all maps share.
+//! Grid that all maps share.
 
 use chaic_core::Vec2;
 use chaic_core::geom::Rect;
 use chaic_core::geom::math::floor_small;
 
-/// Side of a cell, metres (facts A1.1).
+/// Side of a cell, meters (facts A1.1).
 pub const CELL_M: f32 = 0.125;
-/// How far the lattice reaches beyond the bounds of the episode, metres.
+/// Margin of the grid beyond the bounds of the episode, meters.
 const MARGIN_M: f32 = 1.0;
-/// Most cells along one side: 128 m; a larger place is seen in part only.
+/// Maximum number of cells along one side: 128 m. A larger area is mapped only in part.
 const MAX_SIDE: usize = 1024;
 
-/// A lattice of square cells over a part of the plane, row by row along x.
+/// Grid of square cells over a part of the ground plane, row by row along x.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
     min: Vec2,
@@ -20,36 +20,36 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// The lattice over `bounds`, grown by one metre.
-    pub fn over(bounds: &Rect) -> Grid {
-        let grown = bounds.grown(MARGIN_M);
+    /// Creates the grid over `bounds`, grown by one meter.
+    pub fn new(bounds: &Rect) -> Grid {
+        let grown = bounds.expanded(MARGIN_M);
         let cells = |length: f32| ((length / CELL_M).ceil() as usize).clamp(1, MAX_SIDE);
         let size = grown.size();
         Grid { min: grown.min, nx: cells(size.x), nz: cells(size.y) }
     }
 
-    /// A lattice of so many cells from the origin on.
+    /// Creates a grid of this size from the origin.
     #[cfg(test)]
-    pub(crate) fn of_cells(nx: usize, nz: usize) -> Grid {
+    pub(crate) fn with_size(nx: usize, nz: usize) -> Grid {
         Grid { min: Vec2::ZERO, nx, nz }
     }
 
-    /// How many cells there are.
+    /// Number of cells.
     pub fn n_cells(&self) -> usize {
         self.nx * self.nz
     }
 
-    /// Cells along x.
+    /// Number of cells along x.
     pub fn nx(&self) -> usize {
         self.nx
     }
 
-    /// Cells along z.
+    /// Number of cells along z.
     pub fn nz(&self) -> usize {
         self.nz
     }
 
-    /// The cell that the point (x, z) lies in, if any: points outside belong to no cell.
+    /// Returns the cell that contains the point (x, z); `None` outside the grid.
     #[inline]
     pub fn cell_at(&self, p: Vec2) -> Option<usize> {
         let q = (p - self.min) * (1.0 / CELL_M);
@@ -62,7 +62,8 @@ impl Grid {
         None
     }
 
-    /// [`Grid::cell_at`] without branches, for loops over very many points; -1 if there is none.
+    /// Returns the same as [`Grid::cell_at`] without branches, for loops over many points; -1
+    /// outside the grid.
     #[inline(always)]
     pub fn cell_or_none(&self, x: f32, z: f32) -> i32 {
         let (x, z) = ((x - self.min.x) * (1.0 / CELL_M), (z - self.min.y) * (1.0 / CELL_M));
@@ -80,7 +81,7 @@ impl Grid {
         ((cell % nx) as usize, (cell / nx) as usize)
     }
 
-    /// Middle of a cell (x, z).
+    /// Center of a cell (x, z).
     pub fn center(&self, cell: usize) -> Vec2 {
         let (i, j) = self.column_row(cell);
         self.center_at(i, j)
@@ -90,7 +91,7 @@ impl Grid {
         self.min + CELL_M * Vec2::new(column as f32 + 0.5, row as f32 + 0.5)
     }
 
-    /// The neighbors of a cell: its number, and whether it lies diagonally.
+    /// Returns the neighbors of a cell: index, and whether the neighbor is diagonal.
     #[inline]
     pub fn neighbors(&self, cell: usize) -> impl Iterator<Item = (usize, bool)> + use<> {
         let (i, j) = self.column_row(cell);
@@ -103,7 +104,7 @@ impl Grid {
     }
 
     /// Visits the straight neighbors of the cell in column `i` and row `j`, in the order of
-    /// [`Grid::neighbors`], with number, column and row of each.
+    /// [`Grid::neighbors`], with index, column and row of each.
     #[inline]
     pub fn for_straight_neighbors(
         &self,
@@ -126,7 +127,7 @@ impl Grid {
         }
     }
 
-    /// The cells whose middle is within `radius_m` of `center`.
+    /// Returns the cells whose center is within `radius_m` of `center`.
     pub fn disc(&self, center: Vec2, radius_m: f32) -> impl Iterator<Item = usize> + use<> {
         let grid = *self;
         let low = (center - radius_m - self.min) / CELL_M;
@@ -141,8 +142,8 @@ impl Grid {
         })
     }
 
-    /// The cells along a straight line, in steps of half a cell, both ends included; points
-    /// outside the lattice are left out.
+    /// Returns the cells along a straight line, in steps of half a cell, including both ends.
+    /// Points outside the grid are skipped.
     pub fn line(&self, from: Vec2, to: Vec2) -> impl Iterator<Item = usize> + use<> {
         let grid = *self;
         let n = (from.distance(to) / (0.5 * CELL_M)).ceil().max(1.0) as usize;
@@ -160,7 +161,7 @@ mod tests {
 
     #[test]
     fn cells_and_points_agree_and_nothing_is_clamped() {
-        let grid = Grid::over(&Rect::new([-2.0, -1.0], [3.0, 4.0]));
+        let grid = Grid::new(&Rect::new([-2.0, -1.0], [3.0, 4.0]));
         assert_eq!((grid.nx(), grid.nz()), (56, 56));
         for cell in [0, 55, 56, grid.n_cells() - 1] {
             assert_eq!(grid.cell_at(grid.center(cell)), Some(cell));
@@ -176,7 +177,7 @@ mod tests {
 
     #[test]
     fn corners_have_three_neighbors_and_inner_cells_eight() {
-        let grid = Grid::over(&Rect::new([0.0, 0.0], [1.0, 1.0]));
+        let grid = Grid::new(&Rect::new([0.0, 0.0], [1.0, 1.0]));
         assert_eq!(grid.neighbors(0).count(), 3);
         assert_eq!(grid.neighbors(grid.nx() + 1).count(), 8);
         for cell in [0, 5, grid.nx() - 1, grid.nx() + 1, grid.n_cells() - 1] {

@@ -1,92 +1,92 @@
-//! Where one can walk: free, occupied and unknown space, from depth images.
+//! Occupancy grid: free, occupied and unknown space, from depth images.
 
-use chaic_core::geom::{Camera, Rect, xz};
+use chaic_core::geom::{Camera, Rect, to_xz};
 use chaic_core::{Frame, Observation, Vec2, Vec3};
 
-use super::bumps::Bumps;
+use super::collision_memory::CollisionMemory;
 use super::grid::{CELL_M, Grid};
 use crate::perception::{Percepts, Rays};
 
-/// Depth is trusted up to here for maps, metres (facts A1.1).
+/// Maximum depth that is used for maps, meters (facts A1.1).
 pub const MAP_RANGE_M: f32 = 5.0;
-/// Points below this are floor, metres. (The paper's code uses 0.05; rugs and curbs need more.)
+/// Points below this are floor, meters. (The paper's code uses 0.05; rugs and curbs need more.)
 const FLOOR_M: f32 = 0.08;
-/// Occupied cells with points above this are walls, metres (facts A1.1).
+/// Occupied cells with points above this are walls, meters (facts A1.1).
 const WALL_M: f32 = 2.0;
-/// Points above this may be a ceiling and say nothing, metres: the lowest that is usual in homes.
+/// Points above this may be a ceiling and are ignored, meters: the minimum height in typical homes.
 /// (The original looks up to 4 m, in houses without ceilings; facts A1.4.)
 const TOP_M: f32 = 2.4;
-/// Points above this belong to walls for good: nothing that can be moved is as tall, metres. (The
+/// Points above this belong to permanent walls, because no movable object is as tall, meters. (The
 /// original: 2.9 m, in houses without ceilings whose walls are 3 m high.)
 const TALL_M: f32 = 2.2;
-/// How sure one is of an occupied cell after one look, and at most.
-const SURE_ONCE: u8 = 3;
-const SURE_MOST: u8 = 6;
-/// Side of the coarse squares that remember when a place was seen last, cells (1 m).
+/// Confidence in an occupied cell after one observation, and its maximum.
+const CONFIDENCE_STEP: u8 = 3;
+const MAX_CONFIDENCE: u8 = 6;
+/// Side of the coarse squares that record when a place was last seen, cells (1 m).
 const PLACE_CELLS: usize = 8;
 
-/// What is known of one cell.
+/// State of one cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Space {
+pub enum CellOccupancy {
     /// Its floor was seen.
     Free,
     /// Never seen.
     Unknown,
-    /// Something between ankle and head is there.
+    /// Occupied between ankle and head height.
     Occupied,
-    /// Something is there that reaches above two metres.
+    /// Occupied up to more than two meters.
     Wall,
 }
 
-/// What is known of one cell, as it is stored.
+/// State of one cell as stored.
 #[derive(Clone, Copy, Debug)]
 pub struct Cell {
-    /// How sure one is that it is occupied, 0..=6.
-    sure: u8,
-    /// Bits of what was ever seen of it.
-    seen: u8,
+    /// Confidence that the cell is occupied, 0..=6.
+    confidence: u8,
+    /// Bits of everything ever seen of it.
+    seen_bits: u8,
 }
 
 impl Cell {
-    /// What is known of it.
+    /// Returns the state of the cell.
     #[inline]
-    pub fn space(self) -> Space {
-        match (self.sure > 0, self.seen) {
-            (true, seen) if seen & SEEN_HIGH != 0 => Space::Wall,
-            (true, _) => Space::Occupied,
-            (false, seen) if seen & SEEN_FREE != 0 => Space::Free,
-            _ => Space::Unknown,
+    pub fn state(self) -> CellOccupancy {
+        match (self.confidence > 0, self.seen_bits) {
+            (true, bits) if bits & SEEN_HIGH != 0 => CellOccupancy::Wall,
+            (true, _) => CellOccupancy::Occupied,
+            (false, bits) if bits & SEEN_FREE != 0 => CellOccupancy::Free,
+            _ => CellOccupancy::Unknown,
         }
     }
 
-    /// Whether anything of it was ever seen within the known range.
+    /// Returns whether any part of it was ever seen within the known range.
     #[inline]
     pub fn is_known(self) -> bool {
-        self.seen & SEEN_NEAR != 0
+        self.seen_bits & SEEN_NEAR != 0
     }
 
-    /// Whether something as tall as only walls are was ever seen there, and reaches down to where
-    /// people are. A lintel does not: its floor is seen, and nothing between.
+    /// Returns whether something as tall as only walls are was ever seen there and extends down to
+    /// people's height. A lintel does not count: its floor is seen, and nothing in between.
     #[inline]
     pub fn is_tall(self) -> bool {
-        let is_open = self.seen & SEEN_FREE != 0 && self.seen & SEEN_FIRM == 0;
-        self.seen & SEEN_TALL != 0 && !is_open
+        let is_open = self.seen_bits & SEEN_FREE != 0 && self.seen_bits & SEEN_FIRM == 0;
+        self.seen_bits & SEEN_TALL != 0 && !is_open
     }
 }
 
-/// Bits of what was ever seen of a cell.
+/// Bits of everything ever seen of a cell.
 const SEEN_FREE: u8 = 1;
 const SEEN_HIGH: u8 = 2;
-/// Too near to the feet to be seen, but nothing rises from it up to the eye.
-const ASSUMED: u8 = 4;
-/// Something of it was seen from near enough to count as known.
+/// Too near to the feet to be visible, but no obstacle there reaches up to the camera.
+const SEEN_BELOW_VIEW: u8 = 4;
+/// Some part was seen from near enough to count as known.
 const SEEN_NEAR: u8 = 8;
-/// Something of it was seen that is as tall as only walls are.
+/// Some part was seen that is as tall as only walls are.
 const SEEN_TALL: u8 = 16;
-/// Something between ankle and head was seen there.
+/// Some part was seen between ankle and head height.
 const SEEN_FIRM: u8 = 32;
-/// What tells nothing of where one can walk.
-const BESIDES: u8 = SEEN_NEAR | SEEN_TALL | SEEN_FIRM;
+/// Bits that do not affect whether the cell is traversable.
+const UNRELATED_BITS: u8 = SEEN_NEAR | SEEN_TALL | SEEN_FIRM;
 /// Bits of what one image shows of a cell.
 const NOW_FLOOR: u8 = 1;
 const NOW_OCCUPIED: u8 = 2;
@@ -94,41 +94,42 @@ const NOW_HIGH: u8 = 4;
 const NOW_NEAR: u8 = 8;
 const NOW_TALL: u8 = 16;
 
-/// What a pixel shows is a cell times this, and `NOW_*` bits.
-const SHOWN_CELL: u32 = 32;
-/// So many pixels are looked at at once.
+/// A pixel's observation is encoded as its cell times this, plus `NOW_*` bits.
+const CELL_FACTOR: u32 = 32;
+/// Number of pixels processed at once.
 const LANES: usize = 16;
 
-/// What counts as inside the map, as occupied and as near.
+/// Thresholds by which pixels are classified.
 #[derive(Clone, Copy)]
 struct Limits {
     grid: Grid,
-    /// Nothing above this is in the way, metres; lower things are stepped over.
+    /// Obstacles above this do not block the body, meters; those below `step_over_m` are stepped
+    /// over.
     head_m: f32,
     step_over_m: f32,
-    /// What is seen within this counts as known, metres.
+    /// Range in which observed cells count as known, meters.
     known_m: f32,
 }
 
 impl Limits {
-    /// What pixels of one row at depths `d` show, 0 for nothing. `columns` and `row` are those of
-    /// [`Rays`], axis by axis.
+    /// Encodes the observations of pixels of one row at depths `d`, 0 for none. `columns` and `row`
+    /// are those of [`Rays`], axis by axis.
     #[inline(always)]
-    fn shown(
+    fn encode(
         &self,
         d: &[f32; LANES],
         columns: [&[f32; LANES]; 3],
         eye: Vec3,
         row: Vec3,
     ) -> [u32; LANES] {
-        // Plain loops over plain lists, which become vectors: closures would be compiled apart.
+        // Plain loops over arrays vectorize; closures would be compiled separately.
         let mut any_near = false;
         for d in d {
             any_near |= (*d < MAP_RANGE_M) & (*d > Camera::NEAR_M);
         }
-        let mut shown = [0; LANES];
+        let mut codes = [0; LANES];
         if !any_near {
-            return shown;
+            return codes;
         }
         let head_m = self.head_m.min(WALL_M);
         let [xs, ys, zs] = columns;
@@ -137,7 +138,7 @@ impl Limits {
             let x = eye.x + d * (xs[k] + row.x);
             let y = eye.y + d * (ys[k] + row.y);
             let z = eye.z + d * (zs[k] + row.z);
-            // Masks instead of conditions, which the compiler would make branches of.
+            // Bit masks instead of conditions, which would compile to branches.
             let floor = mask(y < FLOOR_M) & u32::from(NOW_FLOOR);
             let firm = mask((y > self.step_over_m) & (y <= head_m)) & u32::from(NOW_OCCUPIED);
             let high = mask((y > WALL_M) & (y < TOP_M)) & u32::from(NOW_HIGH);
@@ -147,36 +148,37 @@ impl Limits {
             let cell = self.grid.cell_or_none(x, z);
             let is_near = (d < MAP_RANGE_M) & (d > Camera::NEAR_M);
             let counts = mask(is_near & (bits != 0) & (cell >= 0));
-            shown[k] = ((cell as u32).wrapping_mul(SHOWN_CELL) | bits) & counts;
+            codes[k] = ((cell as u32).wrapping_mul(CELL_FACTOR) | bits) & counts;
         }
-        shown
+        codes
     }
 }
 
-/// All bits or none.
+/// Returns all bits set, or none.
 #[inline(always)]
-fn mask(is: bool) -> u32 {
-    u32::from(is).wrapping_neg()
+fn mask(condition: bool) -> u32 {
+    u32::from(condition).wrapping_neg()
 }
 
-/// Every so many-th of a row of pixels.
+/// Subsamples a row of pixels with this stride.
 #[inline(always)]
-fn every(stride: usize, row: &[f32], sampled: &mut [f32]) {
+fn subsample(stride: usize, row: &[f32], sampled: &mut [f32]) {
     if stride == 2 && row.len().is_multiple_of(2) {
-        // The usual case in a form that the compiler makes a few instructions of.
+        // The common case, in a form that compiles to a few instructions.
         sampled.iter_mut().zip(row.as_chunks::<2>().0).for_each(|(to, pair)| *to = pair[0]);
     } else {
         sampled.iter_mut().zip(row.iter().step_by(stride)).for_each(|(to, d)| *to = *d);
     }
 }
 
-/// A scan of one image, so that it is compiled for vectors of each width.
+/// Scan of one image, compiled for vectors of each width.
 struct Scan<'a> {
     map: &'a mut OccupancyMap,
     depth: &'a [f32],
     percepts: &'a Percepts,
     camera: &'a Camera,
-    limits_m: [f32; 2],
+    height_m: f32,
+    known_m: f32,
 }
 
 impl pulp::NullaryFnOnce for Scan<'_> {
@@ -184,100 +186,106 @@ impl pulp::NullaryFnOnce for Scan<'_> {
 
     #[inline(always)]
     fn call(self) {
-        self.map.scan(self.depth, self.percepts, self.camera, self.limits_m);
+        let Scan { map, depth, percepts, camera, height_m, known_m } = self;
+        map.scan(depth, percepts, camera, height_m, known_m);
     }
 }
 
-/// A plan of what stands firmly: structure and furniture. People and whatever can be moved are
-/// not in it; the semantic map knows of them.
+/// Occupancy grid of static structure and furniture. People and movable objects are excluded; the
+/// semantic map tracks them.
 #[derive(Clone, Debug)]
 pub struct OccupancyMap {
     grid: Grid,
-    /// Lower things are stepped over, metres.
+    /// Obstacles below this are stepped over, meters.
     step_over_m: f32,
-    /// How sure one is that the cell is occupied, 0..=6.
-    sure: Vec<u8>,
-    seen: Vec<u8>,
+    /// Confidence that each cell is occupied, 0..=6.
+    confidence: Vec<u8>,
+    /// Bits of everything ever seen of each cell.
+    seen_bits: Vec<u8>,
+    /// Working memory: `NOW_*` bits of each cell in the current image, and the cells with any.
     now: Vec<u8>,
     touched: Vec<u32>,
-    /// Frame in which each coarse square was seen last, plus one; 0 if never.
-    place_seen: Vec<Frame>,
-    bumps: Bumps,
+    /// Frame in which each coarse square was last seen, plus one; 0 if never.
+    last_seen: Vec<Frame>,
+    bumps: CollisionMemory,
     version: u32,
 }
 
 impl OccupancyMap {
-    /// An unknown place, where things lower than `step_over_m` are in nobody's way.
+    /// Creates an unknown map, where obstacles lower than `step_over_m` do not block.
     pub fn new(bounds: &Rect, step_over_m: f32) -> OccupancyMap {
-        OccupancyMap::on(Grid::over(bounds), step_over_m)
+        OccupancyMap::with_grid(Grid::new(bounds), step_over_m)
     }
 
-    /// A drawn place.
+    /// Creates a map with these cell states.
     #[cfg(test)]
-    pub(crate) fn of_spaces(grid: Grid, spaces: &[Space]) -> OccupancyMap {
-        let mut map = OccupancyMap::on(grid, crate::test_support::MOTION.step_over_m);
-        for (cell, space) in spaces.iter().enumerate() {
-            (map.sure[cell], map.seen[cell]) = match space {
-                Space::Free => (0, SEEN_FREE),
-                Space::Unknown => (0, 0),
-                Space::Occupied => (SURE_MOST, 0),
-                Space::Wall => (SURE_MOST, SEEN_HIGH),
+    pub(crate) fn from_cells(grid: Grid, cells: &[CellOccupancy]) -> OccupancyMap {
+        let mut map = OccupancyMap::with_grid(grid, crate::test_support::MOTION.step_over_m);
+        for (cell, state) in cells.iter().enumerate() {
+            (map.confidence[cell], map.seen_bits[cell]) = match state {
+                CellOccupancy::Free => (0, SEEN_FREE),
+                CellOccupancy::Unknown => (0, 0),
+                CellOccupancy::Occupied => (MAX_CONFIDENCE, 0),
+                CellOccupancy::Wall => (MAX_CONFIDENCE, SEEN_HIGH),
             };
         }
         map
     }
 
-    fn on(grid: Grid, step_over_m: f32) -> OccupancyMap {
+    fn with_grid(grid: Grid, step_over_m: f32) -> OccupancyMap {
         let n = grid.n_cells();
         let n_places = grid.nx().div_ceil(PLACE_CELLS) * grid.nz().div_ceil(PLACE_CELLS);
         OccupancyMap {
             grid,
             step_over_m,
-            sure: vec![0; n],
-            seen: vec![0; n],
+            confidence: vec![0; n],
+            seen_bits: vec![0; n],
             now: vec![0; n],
             touched: Vec::new(),
-            place_seen: vec![0; n_places],
-            bumps: Bumps::default(),
+            last_seen: vec![0; n_places],
+            bumps: CollisionMemory::default(),
             version: 0,
         }
     }
 
-    /// Its lattice.
+    /// Grid of the map.
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
 
-    /// Grows whenever any cell changes.
+    /// Increases whenever any cell changes.
     pub fn version(&self) -> u32 {
         self.version
     }
 
-    /// What is known of a cell.
+    /// Returns the state of a cell.
     #[inline]
-    pub fn space(&self, cell: usize) -> Space {
-        Cell { sure: self.sure[cell], seen: self.seen[cell] }.space()
+    pub fn state(&self, cell: usize) -> CellOccupancy {
+        Cell { confidence: self.confidence[cell], seen_bits: self.seen_bits[cell] }.state()
     }
 
-    /// All cells, row by row.
+    /// Returns all cells, row by row.
     pub fn cells(&self) -> impl Iterator<Item = Cell> + '_ {
-        self.sure.iter().zip(&self.seen).map(|(sure, seen)| Cell { sure: *sure, seen: *seen })
+        self.confidence
+            .iter()
+            .zip(&self.seen_bits)
+            .map(|(confidence, bits)| Cell { confidence: *confidence, seen_bits: *bits })
     }
 
-    /// Whether there is something to find out at a cell: it is unknown, and not only because it
-    /// was too near to the feet.
+    /// Returns whether a cell is worth exploring: unknown, and not only because it was too near to
+    /// the feet.
     pub fn is_unexplored(&self, cell: usize) -> bool {
-        self.space(cell) == Space::Unknown && self.seen[cell] & ASSUMED == 0
+        self.state(cell) == CellOccupancy::Unknown && self.seen_bits[cell] & SEEN_BELOW_VIEW == 0
     }
 
-    /// Whether anything of a cell was ever seen within the known range.
+    /// Returns whether any part of a cell was ever seen within the known range.
     pub fn is_known(&self, cell: usize) -> bool {
-        self.seen[cell] & SEEN_NEAR != 0
+        self.seen_bits[cell] & SEEN_NEAR != 0
     }
 
-    /// Frame in which the metre square around a cell was seen last, if ever.
-    pub fn place_seen(&self, cell: usize) -> Option<Frame> {
-        self.place_seen[self.place_of(cell)].checked_sub(1)
+    /// Frame in which the square meter around a cell was last seen, if ever.
+    pub fn last_seen(&self, cell: usize) -> Option<Frame> {
+        self.last_seen[self.place_of(cell)].checked_sub(1)
     }
 
     fn place_of(&self, cell: usize) -> usize {
@@ -285,24 +293,24 @@ impl OccupancyMap {
         (j / PLACE_CELLS) * self.grid.nx().div_ceil(PLACE_CELLS) + i / PLACE_CELLS
     }
 
-    /// Remembers that one could not get on at `at` (x, z), see [`Bumps::note`].
-    pub fn bump(&mut self, at: Vec2, now: Frame, barred_frames: Frame) {
-        self.bumps.note(at, now, barred_frames);
+    /// Records a collision at `at` (x, z), see [`CollisionMemory::record`].
+    pub fn record_bump(&mut self, at: Vec2, now: Frame, barred_frames: Frame) {
+        self.bumps.record(at, now, barred_frames);
         self.version += 1;
     }
 
-    /// Takes no place for a barrier any more.
-    pub fn forget_barriers(&mut self) {
-        self.version += u32::from(self.bumps.forget_barriers());
+    /// Removes all barriers.
+    pub fn clear_barriers(&mut self) {
+        self.version += u32::from(self.bumps.clear_barriers());
     }
 
-    /// Where one could not get on although the map said so.
-    pub fn bumps(&self) -> &Bumps {
+    /// Collisions at positions that the map shows as free.
+    pub fn bumps(&self) -> &CollisionMemory {
         &self.bumps
     }
 
-    /// Takes in what one image shows. `height_m` is the height of the own body: nothing above it
-    /// is in the way. What is seen within `known_m` counts as known.
+    /// Integrates one image. `height_m` is the height of the agent's body: obstacles above it do
+    /// not block. Cells seen within `known_m` count as known.
     pub fn integrate(
         &mut self,
         observation: &Observation,
@@ -315,18 +323,18 @@ impl OccupancyMap {
         if let Some(depth) = observation.images.depth_m.as_ref() {
             let camera = &observation.camera;
             if depth.len() == camera.width as usize * camera.height as usize {
-                let limits_m = [height_m, known_m];
-                pulp::Arch::new().dispatch(Scan { map: self, depth, percepts, camera, limits_m });
+                let scan = Scan { map: self, depth, percepts, camera, height_m, known_m };
+                pulp::Arch::new().dispatch(scan);
                 changed |= self.apply_scan(now);
-                changed |= self.assume_near(depth, camera);
+                changed |= self.mark_area_at_feet(depth, camera);
             }
         }
-        // Where one stands is free.
-        let here = xz(observation.own.pose.position);
+        // The agent's own position is free.
+        let here = to_xz(observation.proprioception.pose.position);
         for cell in self.grid.disc(here, CELL_M) {
-            changed |= self.seen[cell] & SEEN_FREE == 0 || self.sure[cell] > 0;
-            self.seen[cell] |= SEEN_FREE;
-            self.sure[cell] = 0;
+            changed |= self.seen_bits[cell] & SEEN_FREE == 0 || self.confidence[cell] > 0;
+            self.seen_bits[cell] |= SEEN_FREE;
+            self.confidence[cell] = 0;
         }
         self.version += u32::from(changed);
     }
@@ -338,13 +346,14 @@ impl OccupancyMap {
         depth: &[f32],
         percepts: &Percepts,
         camera: &Camera,
-        [height_m, known_m]: [f32; 2],
+        height_m: f32,
+        known_m: f32,
     ) {
         let stride = percepts.stride.max(1) as usize;
         let (width, height) = (camera.width as usize, camera.height as usize);
         let sampled_width = width.div_ceil(stride);
         let rays = Rays::new(camera);
-        // Padded to whole lanes; what is at no distance shows nothing.
+        // Padded to whole lanes; pixels at depth 0 show nothing.
         let padded_width = sampled_width.next_multiple_of(LANES);
         let columns: [Vec<f32>; 3] = std::array::from_fn(|axis| {
             let mut columns: Vec<f32> =
@@ -363,7 +372,7 @@ impl OccupancyMap {
         self.touched.clear();
         let mut above = vec![[0; LANES]; padded_width / LANES];
         for (k, row) in (0..height).step_by(stride).enumerate() {
-            every(stride, &depth[row * width..][..width], &mut sampled);
+            subsample(stride, &depth[row * width..][..width], &mut sampled);
             let dynamic = percepts.dynamic_mask.get(k * sampled_width..(k + 1) * sampled_width);
             for (d, is_dynamic) in sampled.iter_mut().zip(dynamic.unwrap_or_default()) {
                 *d = if *is_dynamic { 0.0 } else { *d };
@@ -371,31 +380,30 @@ impl OccupancyMap {
             let mut last = 0;
             let lanes = sampled.as_chunks::<LANES>().0.iter().zip(xs.iter().zip(ys).zip(zs));
             for ((d, ((x, y), z)), above) in lanes.zip(&mut above) {
-                let shown = limits.shown(d, [x, y, z], rays.eye, rays.rows[row]);
-                // Neighbors mostly show the same: a bit for each that differs from the one before
-                // and the one above.
+                let codes = limits.encode(d, [x, y, z], rays.eye, rays.rows[row]);
+                // A bit for each pixel that differs from its left and its upper neighbor.
                 let mut before = [last; LANES];
-                before[1..].copy_from_slice(&shown[..LANES - 1]);
+                before[1..].copy_from_slice(&codes[..LANES - 1]);
                 let mut changes = 0;
                 for k in 0..LANES {
-                    let is_new = (shown[k] != before[k]) & (shown[k] != above[k]);
+                    let is_new = (codes[k] != before[k]) & (codes[k] != above[k]);
                     changes |= u32::from(is_new) << k;
                 }
                 while changes != 0 {
-                    self.mark(shown[changes.trailing_zeros() as usize % LANES]);
+                    self.mark(codes[changes.trailing_zeros() as usize % LANES]);
                     changes &= changes - 1;
                 }
-                last = shown[LANES - 1];
-                *above = shown;
+                last = codes[LANES - 1];
+                *above = codes;
             }
         }
     }
 
-    /// Marks what a pixel shows, see [`Limits::shown`].
+    /// Marks the observation of one pixel, see [`Limits::encode`].
     #[inline(always)]
-    fn mark(&mut self, shown: u32) {
-        if shown != 0 {
-            let (cell, bits) = ((shown / SHOWN_CELL) as usize, (shown % SHOWN_CELL) as u8);
+    fn mark(&mut self, code: u32) {
+        if code != 0 {
+            let (cell, bits) = ((code / CELL_FACTOR) as usize, (code % CELL_FACTOR) as u8);
             if self.now[cell] == 0 {
                 self.touched.push(cell as u32);
             }
@@ -403,51 +411,55 @@ impl OccupancyMap {
         }
     }
 
-    /// Turns `now` into knowledge; tells whether anything changed.
+    /// Merges `now` into the map; returns whether anything changed.
     fn apply_scan(&mut self, now: Frame) -> bool {
         let mut changed = false;
         let touched = std::mem::take(&mut self.touched);
         for &cell in &touched {
             let cell = cell as usize;
-            let before = (self.sure[cell] > 0, self.seen[cell] & !BESIDES);
+            let before = (self.confidence[cell] > 0, self.seen_bits[cell] & !UNRELATED_BITS);
             let bits = std::mem::take(&mut self.now[cell]);
             if bits & NOW_OCCUPIED != 0 {
-                self.sure[cell] = (self.sure[cell] + SURE_ONCE).min(SURE_MOST);
-                self.seen[cell] |= SEEN_FIRM;
+                self.confidence[cell] =
+                    (self.confidence[cell] + CONFIDENCE_STEP).min(MAX_CONFIDENCE);
+                self.seen_bits[cell] |= SEEN_FIRM;
             } else if bits & NOW_FLOOR != 0 {
-                self.sure[cell] = self.sure[cell].saturating_sub(1);
+                self.confidence[cell] = self.confidence[cell].saturating_sub(1);
             }
             if bits & NOW_FLOOR != 0 {
-                self.seen[cell] |= SEEN_FREE;
+                self.seen_bits[cell] |= SEEN_FREE;
             }
             if bits & NOW_HIGH != 0 {
-                self.seen[cell] |= SEEN_HIGH;
+                self.seen_bits[cell] |= SEEN_HIGH;
             }
             if bits & NOW_TALL != 0 {
-                self.seen[cell] |= SEEN_TALL;
+                self.seen_bits[cell] |= SEEN_TALL;
             }
             if bits & (NOW_FLOOR | NOW_OCCUPIED) != 0 {
                 let place = self.place_of(cell);
-                self.place_seen[place] = now + 1;
+                self.last_seen[place] = now + 1;
             }
-            changed |= before != (self.sure[cell] > 0, self.seen[cell] & !BESIDES);
+            changed |=
+                before != (self.confidence[cell] > 0, self.seen_bits[cell] & !UNRELATED_BITS);
             if bits & NOW_NEAR != 0 {
-                self.seen[cell] |= SEEN_NEAR;
+                self.seen_bits[cell] |= SEEN_NEAR;
             }
         }
         self.touched = touched;
         changed
     }
 
-    /// The floor before one's feet is below the image. Where the view at eye height reaches
-    /// beyond a cell, nothing large stands on it.
-    fn assume_near(&mut self, depth: &[f32], camera: &Camera) -> bool {
-        let eye = xz(camera.eye_in_world);
+    /// Marks unseen cells around the feet, which are below the image. If the view at camera height
+    /// reaches beyond a cell, nothing large stands on it.
+    fn mark_area_at_feet(&mut self, depth: &[f32], camera: &Camera) -> bool {
+        let eye = to_xz(camera.eye_in_world);
         let reach_m = camera.eye_in_world.y + 0.2;
         let level = (camera.height / 2) as usize * camera.width as usize;
         let mut changed = false;
         for cell in self.grid.disc(eye, reach_m) {
-            if self.seen[cell] & (SEEN_FREE | ASSUMED) != 0 || self.sure[cell] > 0 {
+            if self.seen_bits[cell] & (SEEN_FREE | SEEN_BELOW_VIEW) != 0
+                || self.confidence[cell] > 0
+            {
                 continue;
             }
             let center = self.grid.center(cell);
@@ -457,7 +469,7 @@ impl OccupancyMap {
                 continue;
             }
             if depth[level + px.x as usize] > d {
-                self.seen[cell] |= ASSUMED;
+                self.seen_bits[cell] |= SEEN_BELOW_VIEW;
                 changed = true;
             }
         }
@@ -471,105 +483,105 @@ mod tests {
     use crate::perception::{GroundTruthIds, Perception as _};
     use crate::test_support::{MOTION, Toy, ToyObject};
 
-    fn look(map: &mut OccupancyMap, toy: &Toy) {
+    fn observe(map: &mut OccupancyMap, toy: &Toy) {
         let observation = toy.observe();
         let percepts = GroundTruthIds.perceive(&observation);
         map.integrate(&observation, &percepts, 1.75, MAP_RANGE_M);
     }
 
-    fn space(map: &OccupancyMap, x: f32, z: f32) -> Space {
-        map.space(map.grid().cell_at(Vec2::new(x, z)).expect("inside"))
+    fn state(map: &OccupancyMap, x: f32, z: f32) -> CellOccupancy {
+        map.state(map.grid().cell_at(Vec2::new(x, z)).expect("inside"))
     }
 
     #[test]
-    fn floor_is_free_furniture_occupied_walls_wall_and_the_rest_unknown() {
+    fn floor_furniture_walls_and_unseen_cells_have_their_own_states() {
         let mut toy = Toy::room(6.0, 6.0);
         toy.add(ToyObject::new("cabinet", [1.0, 0.0, -2.0], [0.8, 1.0, 0.4]));
         toy.add(ToyObject::new("apple", [-1.0, 0.0, -2.0], [0.3, 0.3, 0.3]));
         toy.stand([0.0, 0.0], 0.0);
         let mut map = OccupancyMap::new(&toy.bounds(), MOTION.step_over_m);
-        look(&mut map, &toy);
-        assert_eq!(space(&map, 0.0, -2.0), Space::Free);
-        assert_eq!(space(&map, 1.0, -1.82), Space::Occupied);
+        observe(&mut map, &toy);
+        assert_eq!(state(&map, 0.0, -2.0), CellOccupancy::Free);
+        assert_eq!(state(&map, 1.0, -1.82), CellOccupancy::Occupied);
         // The wall's face lies on a border between cells.
-        let face = space(&map, 0.0, -3.01).max(space(&map, 0.0, -2.99));
-        assert_eq!(face, Space::Wall);
-        assert_eq!(space(&map, 0.0, 2.0), Space::Unknown, "behind the back");
-        assert_ne!(space(&map, -1.0, -1.9), Space::Occupied, "an apple does not block");
+        let face = state(&map, 0.0, -3.01).max(state(&map, 0.0, -2.99));
+        assert_eq!(face, CellOccupancy::Wall);
+        assert_eq!(state(&map, 0.0, 2.0), CellOccupancy::Unknown, "behind the back");
+        assert_ne!(state(&map, -1.0, -1.9), CellOccupancy::Occupied, "an apple does not block");
         let near = map.grid().cell_at(Vec2::new(0.0, -1.0)).expect("inside");
         assert!(!map.is_unexplored(near), "just before the feet");
     }
 
     #[test]
-    fn furniture_under_a_ceiling_is_no_wall() {
+    fn furniture_under_a_ceiling_is_not_a_wall() {
         let mut toy = Toy::room(6.0, 6.0);
         toy.add(ToyObject::new("cabinet", [1.0, 0.0, -2.0], [0.8, 1.0, 0.4]));
         toy.add(ToyObject::new("bed", [0.0, 2.6, 0.0], [6.0, 0.1, 6.0]));
         toy.stand([0.0, 0.0], 0.0);
         let mut map = OccupancyMap::new(&toy.bounds(), MOTION.step_over_m);
-        look(&mut map, &toy);
-        assert_eq!(space(&map, 1.0, -1.82), Space::Occupied);
-        let face = space(&map, 0.0, -3.01).max(space(&map, 0.0, -2.99));
-        assert_eq!(face, Space::Wall);
+        observe(&mut map, &toy);
+        assert_eq!(state(&map, 1.0, -1.82), CellOccupancy::Occupied);
+        let face = state(&map, 0.0, -3.01).max(state(&map, 0.0, -2.99));
+        assert_eq!(face, CellOccupancy::Wall);
     }
 
     #[test]
-    fn what_has_gone_is_free_again_after_some_looks() {
+    fn a_removed_object_leaves_free_cells_after_some_observations() {
         let mut toy = Toy::room(6.0, 6.0);
         let cabinet = toy.add(ToyObject::new("cabinet", [0.0, 0.0, -2.2], [0.8, 0.6, 0.8]));
         toy.stand([0.0, 0.0], 0.0);
         let mut map = OccupancyMap::new(&toy.bounds(), MOTION.step_over_m);
-        look(&mut map, &toy);
-        assert_eq!(space(&map, 0.0, -1.85), Space::Occupied);
+        observe(&mut map, &toy);
+        assert_eq!(state(&map, 0.0, -1.85), CellOccupancy::Occupied);
         toy.remove(cabinet);
-        for _ in 0..SURE_MOST {
-            look(&mut map, &toy);
+        for _ in 0..MAX_CONFIDENCE {
+            observe(&mut map, &toy);
         }
-        assert_eq!(space(&map, 0.0, -1.85), Space::Free);
+        assert_eq!(state(&map, 0.0, -1.85), CellOccupancy::Free);
     }
 
     #[test]
-    fn a_still_look_changes_nothing() {
+    fn a_repeated_observation_changes_nothing() {
         let mut toy = Toy::room(6.0, 6.0);
         toy.stand([0.0, 0.0], 0.3);
         let mut map = OccupancyMap::new(&toy.bounds(), MOTION.step_over_m);
-        look(&mut map, &toy);
+        observe(&mut map, &toy);
         let version = map.version();
-        look(&mut map, &toy);
+        observe(&mut map, &toy);
         assert_eq!(map.version(), version);
-        map.bump(Vec2::ZERO, 0, 0);
-        assert!(map.version() > version && map.bumps().cells(map.grid()).count() > 4);
+        map.record_bump(Vec2::ZERO, 0, 0);
+        assert!(map.version() > version && map.bumps().recent_cells(map.grid()).count() > 4);
     }
 
     #[test]
-    fn what_is_taller_than_anything_movable_is_never_forgotten() {
+    fn structure_taller_than_any_movable_object_is_never_forgotten() {
         let mut toy = Toy::room(6.0, 6.0);
-        // Between the heights of a wall and of a wall for good, and above both.
+        // Between the thresholds of walls and of permanent walls, and above both.
         let heights_m = [0.5 * (WALL_M + TALL_M), 0.5 * (TALL_M + TOP_M)];
         let boxes = [(-0.7, heights_m[0]), (0.7, heights_m[1])].map(|(x, height_m)| {
             toy.add(ToyObject::new("cabinet", [x, 0.0, -2.2], [0.8, height_m, 0.8]))
         });
         toy.stand([0.0, 0.0], 0.0);
         let mut map = OccupancyMap::new(&toy.bounds(), MOTION.step_over_m);
-        let know = |map: &OccupancyMap| {
+        let state = |map: &OccupancyMap| {
             [-0.7, 0.7].map(|x| {
                 let cell = map.grid().cell_at(Vec2::new(x, -1.85)).expect("inside");
-                (map.space(cell), map.cells().nth(cell).expect("inside").is_tall())
+                (map.state(cell), map.cells().nth(cell).expect("inside").is_tall())
             })
         };
-        look(&mut map, &toy);
-        assert_eq!(know(&map), [(Space::Wall, false), (Space::Wall, true)]);
+        observe(&mut map, &toy);
+        assert_eq!(state(&map), [(CellOccupancy::Wall, false), (CellOccupancy::Wall, true)]);
         boxes.into_iter().for_each(|entity| toy.remove(entity));
-        for _ in 0..2 * SURE_MOST {
-            look(&mut map, &toy);
+        for _ in 0..2 * MAX_CONFIDENCE {
+            observe(&mut map, &toy);
         }
-        assert_eq!(know(&map), [(Space::Free, false), (Space::Free, true)]);
+        assert_eq!(state(&map), [(CellOccupancy::Free, false), (CellOccupancy::Free, true)]);
     }
 
     #[test]
-    fn what_hangs_above_the_head_makes_its_place_known_but_neither_free_nor_occupied() {
+    fn an_object_above_the_head_makes_its_cell_known_but_neither_free_nor_occupied() {
         let mut toy = Toy::room(8.0, 8.0);
-        // A wide cabinet hides the floor; a board hangs above it, a little behind.
+        // A wide cabinet hides the floor; a board hangs above it, slightly behind.
         toy.add(ToyObject::new("cabinet", [0.0, 0.0, -1.0], [3.0, 1.2, 0.4]));
         toy.add(ToyObject::new("cabinet", [0.0, 1.83, -2.6], [0.8, 0.12, 0.4]));
         toy.stand([0.0, 0.0], 0.0);
@@ -582,7 +594,7 @@ mod tests {
                 [0.0, 1.0].map(|x| map.grid().cell_at(Vec2::new(x, -2.44)).expect("inside"));
             assert_eq!(map.is_known(under), is_known, "within {known_m} m");
             assert!(!map.is_known(beside), "nothing of it is seen");
-            assert_eq!([map.space(under), map.space(beside)], [Space::Unknown; 2]);
+            assert_eq!([map.state(under), map.state(beside)], [CellOccupancy::Unknown; 2]);
         }
     }
 }

@@ -1,66 +1,71 @@
-//! Where the other people were seen last.
+//! Last known positions of other people.
 
 use chaic_core::{AgentId, Briefing, Frame, Observation, Vec3};
 
 use crate::perception::Detection;
 
-/// What is remembered of one person.
+/// Last sighting of one person.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Person {
-    /// Who.
+pub struct TrackedPerson {
+    /// The person.
     pub agent: AgentId,
-    /// Where, metres: the mean of the visible points, or the feet if positions are granted.
+    /// Position, meters: the mean of the visible points, or the feet if positions are granted.
     pub position_in_world: Vec3,
-    /// When.
+    /// Frame of the sighting.
     pub frame: Frame,
-    /// Whether the person is in the image now (or its position is granted).
+    /// True if the person is in the current image, or its position is granted.
     pub is_in_view: bool,
 }
 
-/// The last sighting of each companion.
+/// Last sighting of each companion.
 #[derive(Clone, Debug, Default)]
-pub struct People {
-    seen: Vec<Person>,
+pub struct PersonMap {
+    people: Vec<TrackedPerson>,
 }
 
-impl People {
-    /// The last sighting of one person.
-    pub fn get(&self, agent: AgentId) -> Option<&Person> {
-        self.seen.iter().find(|p| p.agent == agent)
+impl PersonMap {
+    /// Returns the last sighting of one person.
+    pub fn get(&self, agent: AgentId) -> Option<&TrackedPerson> {
+        self.people.iter().find(|p| p.agent == agent)
     }
 
-    /// All sightings, in the order of first sight.
-    pub fn iter(&self) -> impl Iterator<Item = &Person> {
-        self.seen.iter()
+    /// Returns all sightings, in the order of the first sighting.
+    pub fn iter(&self) -> impl Iterator<Item = &TrackedPerson> {
+        self.people.iter()
     }
 
-    /// All but one.
-    pub fn without(&self, agent: AgentId) -> People {
-        People { seen: self.seen.iter().copied().filter(|p| p.agent != agent).collect() }
+    /// Returns a copy without one person.
+    pub fn without(&self, agent: AgentId) -> PersonMap {
+        PersonMap { people: self.people.iter().copied().filter(|p| p.agent != agent).collect() }
     }
 
-    /// Takes in who is seen now.
-    pub fn see(&mut self, briefing: &Briefing, observation: &Observation, seen: &[Detection]) {
-        for person in &mut self.seen {
+    /// Updates the map with the current detections and granted poses.
+    pub fn update(
+        &mut self,
+        briefing: &Briefing,
+        observation: &Observation,
+        detections: &[Detection],
+    ) {
+        for person in &mut self.people {
             person.is_in_view = false;
         }
-        for detection in seen {
+        for detection in detections {
             if let Some(agent) = detection.person {
-                self.note(agent, detection.position_in_world, observation.frame);
+                self.record(agent, detection.position_in_world, observation.frame);
             }
         }
         for (agent, pose) in &observation.granted.poses {
             if *agent != briefing.me {
-                self.note(*agent, pose.position, observation.frame);
+                self.record(*agent, pose.position, observation.frame);
             }
         }
     }
 
-    fn note(&mut self, agent: AgentId, position_in_world: Vec3, frame: Frame) {
-        let now = Person { agent, position_in_world, frame, is_in_view: true };
-        match self.seen.iter_mut().find(|p| p.agent == agent) {
+    fn record(&mut self, agent: AgentId, position_in_world: Vec3, frame: Frame) {
+        let now = TrackedPerson { agent, position_in_world, frame, is_in_view: true };
+        match self.people.iter_mut().find(|p| p.agent == agent) {
             Some(person) => *person = now,
-            None => self.seen.push(now),
+            None => self.people.push(now),
         }
     }
 }

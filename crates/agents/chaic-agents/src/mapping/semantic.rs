@@ -1,77 +1,77 @@
-//! What is where: every object seen, where, when, and how attempts at it went.
+//! Semantic map: all known objects with positions, sighting times and failed attempts.
 
 use std::collections::BTreeMap;
 
-use chaic_core::geom::{horizontal_distance, xz};
+use chaic_core::geom::{horizontal_distance, to_xz};
 use chaic_core::{ClassId, Frame, Observation, Role, Vec2, Vec3};
 
 use crate::perception::Detection;
 use crate::track::TrackId;
 
-/// Something that moved by less has not been moved, metres.
+/// An object that moved by less counts as unmoved, meters.
 const MOVED_M: f32 = 0.5;
-/// A place is in clear view if nothing is seen before it by more than this, metres. (That
-/// something deeper is seen there can't be asked for: behind a thing on the floor, seen from above,
-/// the floor is hardly farther away.)
+/// A place is in clear view if nothing is seen in front of it by more than this, meters. Greater
+/// depth behind the object cannot be required: on the floor, the floor behind it is hardly farther
+/// away.
 const CLEAR_M: f32 = 0.05;
-/// A place proves nothing if the thing would show in fewer pixels than this.
+/// Minimum number of pixels in which the object would be visible for a miss to count.
 const MISS_PIXELS: f32 = 12.0;
-/// Farther away than this a missing object proves nothing, metres.
+/// Maximum distance at which a missing object counts as a miss, meters.
 const MISS_RANGE_M: f32 = 4.0;
-/// Part of the image's width that is too near to the border to prove anything.
+/// Border of the image, as a fraction of its width, in which misses do not count.
 const MISS_MARGIN: f32 = 0.08;
-/// Looks at an empty place before the object is forgotten.
+/// Number of misses after which the object is forgotten.
 const MISSES: u32 = 3;
-/// What turns up again where it was given up takes so many times as many looks the next time: it
-/// shows too little to be found from everywhere.
-const MISSES_GROW: u32 = 4;
-/// Most footprint points kept for one thing: a truck's outline and more.
+/// Factor by which that number grows when an object is seen again after it was forgotten: it is too
+/// small to be seen from all directions.
+const MISSES_GROWTH: u32 = 4;
+/// Maximum number of footprint points per object: more than a truck's outline has.
 const MAX_FOOTPRINT: usize = 512;
 
-/// What is remembered of one object.
+/// Known object.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Thing {
-    /// Which one it is.
+pub struct MappedObject {
+    /// Its track.
     pub track: TrackId,
     /// Its class.
     pub class: ClassId,
-    /// Mean of its points when seen last, metres.
+    /// Mean of its visible points at the last sighting, meters.
     pub position_in_world: Vec3,
-    /// Lowest point seen, metres.
+    /// Lowest point seen, meters.
     pub bottom_m: f32,
-    /// Highest point seen, metres.
+    /// Highest point seen, meters.
     pub top_m: f32,
-    /// Points of it seen from above (x, z); all sides ever seen, unless it was moved.
+    /// Visible points from above (x, z), accumulated over all sightings unless it was moved.
     pub footprint: Vec<Vec2>,
-    /// When it was seen first.
+    /// Frame of the first sighting.
     pub first_seen: Frame,
-    /// When it was seen last.
+    /// Frame of the last sighting.
     pub last_seen: Frame,
-    /// It is left alone before this frame.
+    /// The agent ignores it before this frame.
     pub ignore_until: Frame,
-    /// It counts as held by somebody else before this frame.
+    /// It counts as held by another agent before this frame.
     pub held_until: Frame,
-    /// Failed attempts since the last success or rest.
+    /// Failed attempts since the last success or reset.
     pub failures: u32,
-    /// Whether it is still believed to be where it was seen.
+    /// True if it is assumed to be at its last position.
     pub is_present: bool,
-    /// Whether it is out of play: delivered, lost or broken.
+    /// True if it is out of play: delivered, lost or broken.
     pub is_gone: bool,
-    /// Looks at its place that did not show it.
+    /// Observations of its position that did not show it.
     misses: u32,
-    /// So many of them and it is forgotten.
+    /// Number of misses after which it is forgotten.
     misses_to_forget: u32,
 }
 
-impl Thing {
-    fn new(seen: &Detection, now: Frame) -> Thing {
-        Thing {
-            track: seen.track,
-            class: seen.class,
-            position_in_world: seen.position_in_world,
-            bottom_m: seen.bottom_m,
-            top_m: seen.top_m,
-            footprint: seen.footprint.clone(),
+impl MappedObject {
+    fn new(detection: &Detection, now: Frame) -> MappedObject {
+        MappedObject {
+            track: detection.track,
+            class: detection.class,
+            position_in_world: detection.position_in_world,
+            bottom_m: detection.bottom_m,
+            top_m: detection.top_m,
+            footprint: detection.footprint.clone(),
             first_seen: now,
             last_seen: now,
             ignore_until: 0,
@@ -84,14 +84,14 @@ impl Thing {
         }
     }
 
-    /// Distance in plan from `from` to its nearest known point, metres.
+    /// Horizontal distance from `from` to its nearest known point, meters.
     pub fn distance_from(&self, from: Vec2) -> f32 {
         self.nearest_point(from).distance(from)
     }
 
-    /// Its known point (x, z) nearest to `from`.
+    /// Returns its known point (x, z) nearest to `from`.
     pub fn nearest_point(&self, from: Vec2) -> Vec2 {
-        let mean = xz(self.position_in_world);
+        let mean = to_xz(self.position_in_world);
         if self.class.info().is_carriable() {
             return mean;
         }
@@ -102,7 +102,7 @@ impl Thing {
             .unwrap_or(mean)
     }
 
-    /// Whether one may go for it now: there, in play, in nobody's hands, not left alone.
+    /// Returns whether it may be approached now: present, in play, not held, and not ignored.
     pub fn is_available(&self, now: Frame) -> bool {
         self.is_present && !self.is_gone && now >= self.ignore_until && now >= self.held_until
     }
@@ -111,135 +111,136 @@ impl Thing {
         !self.class.info().is_movable()
     }
 
-    /// Takes in a sighting; whether that changes what is in the way.
-    fn see(&mut self, seen: &Detection, now: Frame) -> bool {
+    /// Updates the object with a sighting; returns whether the layout of obstacles changed.
+    fn update(&mut self, detection: &Detection, now: Frame) -> bool {
         let n_points = self.footprint.len();
-        let elsewhere = horizontal_distance(seen.position_in_world, self.position_in_world)
+        let is_elsewhere = horizontal_distance(detection.position_in_world, self.position_in_world)
             > MOVED_M
-            || (seen.position_in_world.y - self.position_in_world.y).abs() > MOVED_M;
-        let moved = !self.is_present || elsewhere;
-        if !elsewhere && self.misses >= self.misses_to_forget {
-            self.misses_to_forget = self.misses_to_forget.saturating_mul(MISSES_GROW);
+            || (detection.position_in_world.y - self.position_in_world.y).abs() > MOVED_M;
+        let has_moved = !self.is_present || is_elsewhere;
+        if !is_elsewhere && self.misses >= self.misses_to_forget {
+            self.misses_to_forget = self.misses_to_forget.saturating_mul(MISSES_GROWTH);
         }
-        if self.is_fixed() || (!moved && !self.class.info().is_carriable()) {
-            self.merge_footprint(&seen.footprint);
-            self.bottom_m = self.bottom_m.min(seen.bottom_m);
-            self.top_m = self.top_m.max(seen.top_m);
+        if self.is_fixed() || (!has_moved && !self.class.info().is_carriable()) {
+            self.merge_footprint(&detection.footprint);
+            self.bottom_m = self.bottom_m.min(detection.bottom_m);
+            self.top_m = self.top_m.max(detection.top_m);
         } else {
-            self.footprint.clone_from(&seen.footprint);
-            (self.bottom_m, self.top_m) = (seen.bottom_m, seen.top_m);
+            self.footprint.clone_from(&detection.footprint);
+            (self.bottom_m, self.top_m) = (detection.bottom_m, detection.top_m);
         }
-        self.class = seen.class;
-        self.position_in_world = seen.position_in_world;
+        self.class = detection.class;
+        self.position_in_world = detection.position_in_world;
         self.last_seen = now;
         self.is_present = true;
         self.misses = 0;
-        !self.class.info().is_carriable() && (moved || self.footprint.len() != n_points)
+        !self.class.info().is_carriable() && (has_moved || self.footprint.len() != n_points)
     }
 
-    /// Both lists are in the order of x, then z, and stay so.
+    /// Merges two point lists, both sorted by x, then z.
     fn merge_footprint(&mut self, points: &[Vec2]) {
         let key = |list: &[Vec2], i: usize| list.get(i).map(|p| (p.x, p.y));
         let mut merged = Vec::with_capacity(self.footprint.len() + points.len());
         let (mut i, mut j) = (0, 0);
         while merged.len() < MAX_FOOTPRINT {
             let (old, new) = (key(&self.footprint, i), key(points, j));
-            let Some(least) = old.into_iter().chain(new).min_by(|a, b| order(*a, *b)) else {
+            let Some(first) = old.into_iter().chain(new).min_by(|a, b| compare_points(*a, *b))
+            else {
                 break;
             };
-            i += usize::from(old == Some(least));
-            j += usize::from(new == Some(least));
-            merged.push(Vec2::from(least));
+            i += usize::from(old == Some(first));
+            j += usize::from(new == Some(first));
+            merged.push(Vec2::from(first));
         }
         self.footprint = merged;
     }
 }
 
-/// By x, then by z.
-fn order(a: (f32, f32), b: (f32, f32)) -> std::cmp::Ordering {
+/// Compares by x, then by z.
+fn compare_points(a: (f32, f32), b: (f32, f32)) -> std::cmp::Ordering {
     a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
 }
 
-/// Every object seen so far.
+/// All objects seen so far.
 #[derive(Clone, Debug, Default)]
 pub struct SemanticMap {
-    things: BTreeMap<TrackId, Thing>,
-    news: u32,
-    layout: u32,
+    objects: BTreeMap<TrackId, MappedObject>,
+    n_changes: u32,
+    layout_version: u32,
 }
 
 impl SemanticMap {
-    /// All that is remembered, in the order of names.
-    pub fn iter(&self) -> impl Iterator<Item = &Thing> {
-        self.things.values()
+    /// Returns all objects, in the order of their tracks.
+    pub fn iter(&self) -> impl Iterator<Item = &MappedObject> {
+        self.objects.values()
     }
 
-    /// What is remembered of one object.
-    pub fn get(&self, track: TrackId) -> Option<&Thing> {
-        self.things.get(&track)
+    /// Returns one object.
+    pub fn get(&self, track: TrackId) -> Option<&MappedObject> {
+        self.objects.get(&track)
     }
 
-    /// Grows when something comes up that may change a plan: an object seen for the first time,
-    /// seen again where none was believed to be, or available again.
-    pub fn news(&self) -> u32 {
-        self.news
+    /// Increases with changes that may affect a plan: an object seen for the first time, seen again
+    /// after it was missing, or available again.
+    pub fn change_count(&self) -> u32 {
+        self.n_changes
     }
 
-    /// Grows when something large has come, gone, moved or grown.
-    pub fn layout(&self) -> u32 {
-        self.layout
+    /// Increases when a large object appears, disappears, moves or grows.
+    pub fn layout_version(&self) -> u32 {
+        self.layout_version
     }
 
-    /// Things of one class that one may go for now.
-    pub fn available(&self, class: ClassId, now: Frame) -> impl Iterator<Item = &Thing> {
+    /// Returns the objects of one class that may be approached now.
+    pub fn available(&self, class: ClassId, now: Frame) -> impl Iterator<Item = &MappedObject> {
         self.iter().filter(move |t| t.class == class && t.is_available(now))
     }
 
-    /// Takes in what is seen now. `people` are the places of the people in the image: what is
-    /// between their hands counts as held for `held_frames`.
-    pub fn see(
+    /// Updates the map with the current detections. `people` are the positions of people in the
+    /// image: objects near their hands count as held for `held_frames`.
+    pub fn update(
         &mut self,
         detections: &[Detection],
         people: &[Vec3],
         held_frames: Frame,
         now: Frame,
     ) {
-        for seen in detections.iter().filter(|d| d.person.is_none()) {
-            let held = looks_held(seen, self.things.get(&seen.track), people, now);
-            match self.things.get_mut(&seen.track) {
-                Some(thing) => {
-                    self.news += u32::from(!thing.is_present);
-                    self.layout += u32::from(thing.see(seen, now));
+        for detection in detections.iter().filter(|d| d.person.is_none()) {
+            let is_held = looks_held(detection, self.objects.get(&detection.track), people, now);
+            match self.objects.get_mut(&detection.track) {
+                Some(object) => {
+                    self.n_changes += u32::from(!object.is_present);
+                    self.layout_version += u32::from(object.update(detection, now));
                 }
                 None => {
-                    self.news += 1;
-                    self.layout += 1;
-                    self.things.insert(seen.track, Thing::new(seen, now));
+                    self.n_changes += 1;
+                    self.layout_version += 1;
+                    self.objects.insert(detection.track, MappedObject::new(detection, now));
                 }
             }
-            if let Some(thing) = self.things.get_mut(&seen.track) {
-                if held {
-                    thing.held_until = now + held_frames;
-                } else if thing.held_until > now {
-                    thing.held_until = 0;
-                    self.news += 1;
+            if let Some(object) = self.objects.get_mut(&detection.track) {
+                if is_held {
+                    object.held_until = now + held_frames;
+                } else if object.held_until > now {
+                    object.held_until = 0;
+                    self.n_changes += 1;
                 }
             }
         }
     }
 
-    /// Notes when things become available again.
+    /// Counts objects that become available again as changes.
     pub fn expire(&mut self, before: Frame, now: Frame) {
         let passed = |until: Frame| before < until && until <= now;
-        for thing in self.things.values_mut() {
-            if passed(thing.ignore_until) || passed(thing.held_until) {
-                self.news += 1;
-                thing.failures = 0;
+        for object in self.objects.values_mut() {
+            if passed(object.ignore_until) || passed(object.held_until) {
+                self.n_changes += 1;
+                object.failures = 0;
             }
         }
     }
 
-    /// Forgets movable things whose remembered place is in clear view and empty.
+    /// Forgets movable objects whose remembered position is in clear view and empty.
     pub fn forget_missing(&mut self, observation: &Observation) {
         let Some(depth) = observation.images.depth_m.as_ref() else { return };
         let camera = &observation.camera;
@@ -248,108 +249,116 @@ impl SemanticMap {
         }
         let margin = MISS_MARGIN * camera.width as f32;
         let (right, bottom) = (camera.width as f32 - margin, camera.height as f32 - margin);
-        for thing in self.things.values_mut() {
-            if thing.is_fixed() || !thing.is_present || thing.last_seen == observation.frame {
+        for object in self.objects.values_mut() {
+            if object.is_fixed() || !object.is_present || object.last_seen == observation.frame {
                 continue;
             }
-            let Some((px, d)) = camera.project(thing.position_in_world) else { continue };
+            let Some((px, d)) = camera.project(object.position_in_world) else { continue };
             let inside = px.x > margin && px.x < right && px.y > margin && px.y < bottom;
             if !inside || d > MISS_RANGE_M {
                 continue;
             }
-            let there = depth[px.y as usize * camera.width as usize + px.x as usize];
-            if there > d - CLEAR_M
-                && expected_pixels(thing.class, d, camera.focal_px()) > MISS_PIXELS
+            let visible_m = depth[px.y as usize * camera.width as usize + px.x as usize];
+            if visible_m > d - CLEAR_M
+                && expected_pixels(object.class, d, camera.focal_px()) > MISS_PIXELS
             {
-                thing.misses += 1;
-                thing.is_present = thing.misses < thing.misses_to_forget;
-                self.layout += 1;
+                object.misses += 1;
+                object.is_present = object.misses < object.misses_to_forget;
+                self.layout_version += 1;
             }
         }
     }
 
-    /// After a failed attempt: leaves the object alone for a while.
+    /// Ignores an object for a while, after a failed attempt.
     pub fn ignore(&mut self, track: TrackId, until: Frame) {
-        if let Some(thing) = self.things.get_mut(&track) {
-            thing.ignore_until = thing.ignore_until.max(until);
+        if let Some(object) = self.objects.get_mut(&track) {
+            object.ignore_until = object.ignore_until.max(until);
         }
     }
 
-    /// Counts a failed attempt; the new count.
+    /// Counts a failed attempt; returns the new count.
     pub fn count_failure(&mut self, track: TrackId) -> u32 {
-        self.things.get_mut(&track).map_or(0, |thing| {
-            thing.failures += 1;
-            thing.failures
+        self.objects.get_mut(&track).map_or(0, |object| {
+            object.failures += 1;
+            object.failures
         })
     }
 
-    /// Forgives earlier failures.
-    pub fn forgive(&mut self, track: TrackId) {
-        if let Some(thing) = self.things.get_mut(&track) {
-            thing.failures = 0;
+    /// Resets the failure count.
+    pub fn reset_failures(&mut self, track: TrackId) {
+        if let Some(object) = self.objects.get_mut(&track) {
+            object.failures = 0;
         }
     }
 
-    /// Somebody else has it, and will have it until then as far as one can tell.
+    /// Marks an object as held by another agent until this frame.
     pub fn mark_held(&mut self, track: TrackId, until: Frame) {
-        if let Some(thing) = self.things.get_mut(&track) {
-            thing.held_until = until;
+        if let Some(object) = self.objects.get_mut(&track) {
+            object.held_until = until;
         }
     }
 
-    /// It is no longer where it was seen (one has taken it oneself, say).
+    /// Marks an object as no longer at its last position, for example after a pick-up.
     pub fn mark_absent(&mut self, track: TrackId) {
-        if let Some(thing) = self.things.get_mut(&track) {
-            self.layout += u32::from(thing.is_present);
-            thing.is_present = false;
+        if let Some(object) = self.objects.get_mut(&track) {
+            self.layout_version += u32::from(object.is_present);
+            object.is_present = false;
         }
     }
 
-    /// It is in play again.
+    /// Marks an object as in play again.
     pub fn return_to_play(&mut self, track: TrackId) {
-        if let Some(thing) = self.things.get_mut(&track) {
-            thing.is_gone = false;
-            self.news += 1;
+        if let Some(object) = self.objects.get_mut(&track) {
+            object.is_gone = false;
+            self.n_changes += 1;
         }
     }
 
-    /// It is out of play.
+    /// Marks an object as out of play.
     pub fn mark_gone(&mut self, track: TrackId) {
-        if let Some(thing) = self.things.get_mut(&track) {
-            thing.is_gone = true;
+        if let Some(object) = self.objects.get_mut(&track) {
+            object.is_gone = true;
         }
     }
 }
 
-/// How many pixels a thing of this class covers at least, from its two smallest extents.
+/// Returns the minimum number of pixels that an object of this class covers, from its two smallest
+/// extents.
 fn expected_pixels(class: ClassId, depth_m: f32, focal_px: f32) -> f32 {
     let mut size = class.info().size_m;
     size.sort_by(f32::total_cmp);
     size[0] * size[1] * (focal_px / depth_m) * (focal_px / depth_m)
 }
 
-/// Whether something is in the hands of one of the people in the image.
-fn looks_held(seen: &Detection, before: Option<&Thing>, people: &[Vec3], now: Frame) -> bool {
-    let near = |m: f32| people.iter().any(|p| horizontal_distance(*p, seen.position_in_world) < m);
-    match seen.class.info().role {
+/// Returns whether an object is in the hands of a person in the image.
+fn looks_held(
+    detection: &Detection,
+    before: Option<&MappedObject>,
+    people: &[Vec3],
+    now: Frame,
+) -> bool {
+    let is_near =
+        |m: f32| people.iter().any(|p| horizontal_distance(*p, detection.position_in_world) < m);
+    match detection.class.info().role {
         Role::Target | Role::Container | Role::Fragile => {
-            // Hands hold things at 1 m (a child at 0.4 m), about 0.55 m ahead of the body; the
+            // Hands hold objects at 1 m (a child at 0.4 m), about 0.55 m ahead of the body; the
             // basket of a bicycle is 0.86 m from its rider.
-            seen.bottom_m > 0.3
-                && near(0.9)
+            detection.bottom_m > 0.3
+                && is_near(0.9)
                 && before.is_none_or(|t| {
-                    // Lying untouched where it was seen before anybody came near, it is not held;
-                    // in the hand of somebody who stands still, it is.
+                    // An object that lies where it was before the person came is not held. One that
+                    // was held before, by a person who stands still, is.
                     now < t.held_until
                         || !t.is_present
-                        || t.position_in_world.distance(seen.position_in_world) > 0.15
+                        || t.position_in_world.distance(detection.position_in_world) > 0.15
                 })
         }
         Role::HeavyTarget => {
-            near(1.5)
+            is_near(1.5)
                 && before.is_some_and(|t| {
                     now < t.held_until
-                        || horizontal_distance(t.position_in_world, seen.position_in_world) > 0.6
+                        || horizontal_distance(t.position_in_world, detection.position_in_world)
+                            > 0.6
                 })
         }
         _ => false,
@@ -362,10 +371,10 @@ mod tests {
     use crate::perception::{GroundTruthIds, Perception as _};
     use crate::test_support::{Toy, ToyObject};
 
-    fn look(map: &mut SemanticMap, toy: &Toy, people: &[Vec3]) {
+    fn observe(map: &mut SemanticMap, toy: &Toy, people: &[Vec3]) {
         let observation = toy.observe();
         let percepts = GroundTruthIds.perceive(&observation);
-        map.see(&percepts.detections, people, 300, observation.frame);
+        map.update(&percepts.detections, people, 300, observation.frame);
         map.forget_missing(&observation);
     }
 
@@ -377,7 +386,7 @@ mod tests {
             let apple = toy.add(ToyObject::new("apple", [0.0, 0.0, -1.9], [0.2, 0.2, 0.2]));
             toy.stand([0.0, 0.0], 0.0);
             let mut map = SemanticMap::default();
-            look(&mut map, &toy, &[]);
+            observe(&mut map, &toy, &[]);
             assert!(map.get(apple).expect("seen").is_available(toy.frame));
             toy.remove(apple);
             if hidden {
@@ -385,14 +394,14 @@ mod tests {
             }
             for _ in 0..MISSES {
                 toy.frame += 1;
-                look(&mut map, &toy, &[]);
+                observe(&mut map, &toy, &[]);
             }
-            assert_eq!(map.get(apple).expect("still on record").is_present, hidden);
+            assert_eq!(map.get(apple).expect("still in the map").is_present, hidden);
         }
     }
 
     #[test]
-    fn what_shows_from_here_and_not_from_there_is_given_up_ever_more_seldom() {
+    fn an_object_visible_from_some_positions_only_is_forgotten_less_and_less_often() {
         let mut toy = Toy::room(8.0, 8.0);
         toy.size = 256;
         let apple = toy.add(ToyObject::new("apple", [0.0, 0.0, -1.9], [0.2, 0.2, 0.2]));
@@ -400,55 +409,55 @@ mod tests {
         let shown = GroundTruthIds.perceive(&toy.observe()).detections;
         toy.remove(apple);
         let mut map = SemanticMap::default();
-        let mut n_given_up = 0;
+        let mut n_forgotten = 0;
         for _ in 0..50 {
-            map.see(&shown, &[], 300, toy.frame);
+            map.update(&shown, &[], 300, toy.frame);
             for _ in 0..2 * MISSES {
                 toy.frame += 1;
-                look(&mut map, &toy, &[]);
+                observe(&mut map, &toy, &[]);
             }
-            n_given_up += u32::from(!map.get(apple).expect("on record").is_present);
+            n_forgotten += u32::from(!map.get(apple).expect("in the map").is_present);
         }
-        assert_eq!(n_given_up, 1);
+        assert_eq!(n_forgotten, 1);
     }
 
     #[test]
-    fn what_a_person_carries_is_not_available() {
+    fn an_object_carried_by_a_person_is_not_available() {
         let mut toy = Toy::room(8.0, 8.0);
         let apple = toy.add(ToyObject::new("apple", [0.0, 1.0, -2.5], [0.2, 0.2, 0.2]));
         toy.stand([0.0, 0.0], 0.0);
         let mut map = SemanticMap::default();
-        look(&mut map, &toy, &[Vec3::new(0.0, 0.9, -2.9)]);
+        observe(&mut map, &toy, &[Vec3::new(0.0, 0.9, -2.9)]);
         assert!(!map.get(apple).expect("seen").is_available(toy.frame));
         toy.frame += 1;
-        look(&mut map, &toy, &[Vec3::new(0.0, 0.9, -2.9)]);
+        observe(&mut map, &toy, &[Vec3::new(0.0, 0.9, -2.9)]);
         assert!(!map.get(apple).expect("seen").is_available(toy.frame), "still in hand");
         toy.frame += 1;
-        look(&mut map, &toy, &[Vec3::new(2.0, 0.9, -2.9)]);
+        observe(&mut map, &toy, &[Vec3::new(2.0, 0.9, -2.9)]);
         assert!(map.get(apple).expect("seen").is_available(toy.frame), "put down again");
     }
 
     #[test]
-    fn an_object_left_alone_comes_back_as_news() {
+    fn an_ignored_object_that_becomes_available_counts_as_a_change() {
         let mut toy = Toy::room(8.0, 8.0);
         let apple = toy.add(ToyObject::new("apple", [0.0, 0.0, -2.5], [0.2, 0.2, 0.2]));
         toy.stand([0.0, 0.0], 0.0);
         let mut map = SemanticMap::default();
-        look(&mut map, &toy, &[]);
+        observe(&mut map, &toy, &[]);
         map.ignore(apple, 500);
         assert!(!map.get(apple).expect("seen").is_available(499));
-        let news = map.news();
+        let n_changes = map.change_count();
         map.expire(400, 500);
-        assert!(map.get(apple).expect("seen").is_available(500) && map.news() > news);
+        assert!(map.get(apple).expect("seen").is_available(500) && map.change_count() > n_changes);
     }
 
     #[test]
-    fn large_things_are_as_near_as_their_nearest_point() {
+    fn the_distance_of_a_large_object_is_that_of_its_nearest_point() {
         let mut toy = Toy::room(12.0, 12.0);
         let bed = toy.add(ToyObject::new("bed", [0.0, 0.0, -3.0], [6.0, 0.5, 2.0]));
         toy.stand([0.0, 1.0], 0.0);
         let mut map = SemanticMap::default();
-        look(&mut map, &toy, &[]);
+        observe(&mut map, &toy, &[]);
         let bed = map.get(bed).expect("seen");
         assert!((bed.distance_from(Vec2::new(2.4, -1.0)) - 1.0).abs() < 0.15);
         assert!(bed.distance_from(Vec2::new(0.0, 0.0)) > 1.8);

@@ -1,14 +1,14 @@
-//! What is remembered as an image for networks: seen from above, the own body in the middle, ahead upward.
+//! Egocentric map of the memory as network input: top view, body in the center, heading up.
 
-use chaic_core::briefing::Relation;
-use chaic_core::geom::{forward, right, xz};
+use chaic_core::briefing::CompanionRole;
+use chaic_core::geom::{forward, right, to_xz};
 use chaic_core::{Briefing, Role, Vec2};
 
 use super::Memory;
-use crate::mapping::{Space, Thing};
+use crate::mapping::{CellOccupancy, MappedObject};
 
-/// What the channels of an [`EgocentricMap`] show, 1 where it is so and 0 elsewhere: what was seen of the place, what
-/// can't be walked through, and what is believed to be where it was seen last.
+/// Channels of an [`EgocentricMap`], 1 where the property holds and 0 elsewhere: explored cells,
+/// blocked cells, and the last known positions of objects and people.
 pub const CHANNELS: [&str; 8] = [
     "known",
     "blocked",
@@ -28,76 +28,78 @@ const GOAL_PLACE: usize = 5;
 const PARTNER: usize = 6;
 const OTHER_PERSON: usize = 7;
 
-/// How large such a map is.
+/// Layout of an egocentric map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EgocentricMap {
-    /// Cells along each side.
+    /// Number of cells along each side.
     pub side: usize,
-    /// Side of a cell, metres.
+    /// Side of a cell, meters.
     pub cell_m: f32,
 }
 
 impl EgocentricMap {
-    /// How many numbers it has: shape [[`CHANNELS`], side, side], row 0 ahead.
+    /// Number of values, u8, shape [[`CHANNELS`], side, side], row 0 ahead.
     pub fn len(&self) -> usize {
         CHANNELS.len() * self.side * self.side
     }
 
-    /// Whether it has none.
+    /// True if the map has no cells.
     pub fn is_empty(&self) -> bool {
         self.side == 0
     }
 
-    /// Draws what is remembered.
+    /// Rasterizes the memory into `out`.
     ///
     /// # Panics
-    /// If `out` has another length than [`EgocentricMap::len`].
+    /// If the length of `out` differs from [`EgocentricMap::len`].
     pub fn draw(&self, memory: &Memory, briefing: &Briefing, out: &mut [u8]) {
-        assert_eq!(out.len(), self.len(), "the map has another shape");
+        assert_eq!(out.len(), self.len(), "the buffer length differs from the length of the map");
         out.fill(0);
         let n = self.side * self.side;
-        let (ahead, aside) = (xz(forward(memory.pose.yaw_rad)), xz(right(memory.pose.yaw_rad)));
-        let middle = 0.5 * self.side as f32;
-        let place = |k: usize| {
+        let (ahead, right_axis) =
+            (to_xz(forward(memory.pose.yaw_rad)), to_xz(right(memory.pose.yaw_rad)));
+        let center = 0.5 * self.side as f32;
+        let position = |k: usize| {
             let (column, row) = (k % self.side, k / self.side);
-            let [x, y] = [column as f32 + 0.5 - middle, middle - row as f32 - 0.5];
-            memory.here() + self.cell_m * (x * aside + y * ahead)
+            let [x, y] = [column as f32 + 0.5 - center, center - row as f32 - 0.5];
+            memory.position() + self.cell_m * (x * right_axis + y * ahead)
         };
         let grid = memory.map.grid();
         for k in 0..n {
-            let Some(cell) = grid.cell_at(place(k)) else { continue };
-            let space = memory.map.space(cell);
-            out[KNOWN * n + k] = u8::from(space != Space::Unknown);
-            out[BLOCKED * n + k] = u8::from(matches!(space, Space::Occupied | Space::Wall));
+            let Some(cell) = grid.cell_at(position(k)) else { continue };
+            let state = memory.map.state(cell);
+            out[KNOWN * n + k] = u8::from(state != CellOccupancy::Unknown);
+            out[BLOCKED * n + k] =
+                u8::from(matches!(state, CellOccupancy::Occupied | CellOccupancy::Wall));
         }
         let mut mark = |channel: usize, at: Vec2| {
-            let way = (at - memory.here()) / self.cell_m;
-            let [column, row] = [middle + way.dot(aside), middle - way.dot(ahead)];
+            let offset = (at - memory.position()) / self.cell_m;
+            let [column, row] = [center + offset.dot(right_axis), center - offset.dot(ahead)];
             let is_inside = |x: f32| x >= 0.0 && x < self.side as f32;
             if is_inside(column) && is_inside(row) {
                 out[channel * n + row as usize * self.side + column as usize] = 1;
             }
         };
-        for thing in memory.things.iter().filter(|thing| thing.is_present) {
-            let Some(channel) = channel_of(thing, briefing) else { continue };
-            mark(channel, xz(thing.position_in_world));
-            thing.footprint.iter().for_each(|at| mark(channel, *at));
+        for object in memory.objects.iter().filter(|object| object.is_present) {
+            let Some(channel) = channel_of(object, briefing) else { continue };
+            mark(channel, to_xz(object.position_in_world));
+            object.footprint.iter().for_each(|at| mark(channel, *at));
         }
         for person in memory.people.iter() {
-            let is_partner = briefing.companion(Relation::Partner) == Some(person.agent);
+            let is_partner = briefing.companion(CompanionRole::Partner) == Some(person.agent);
             let channel = if is_partner { PARTNER } else { OTHER_PERSON };
-            mark(channel, xz(person.position_in_world));
+            mark(channel, to_xz(person.position_in_world));
         }
     }
 }
 
-/// What a thing is to the reader of a briefing.
-fn channel_of(thing: &Thing, briefing: &Briefing) -> Option<usize> {
-    let class = thing.class;
+/// Returns the channel of an object, given the agent's briefing.
+fn channel_of(object: &MappedObject, briefing: &Briefing) -> Option<usize> {
+    let class = object.class;
     if briefing.goal_places.contains(&class) {
         return Some(GOAL_PLACE);
     }
-    if thing.is_gone {
+    if object.is_gone {
         return None;
     }
     if briefing.possible_targets.contains(&class) {
@@ -117,7 +119,7 @@ mod tests {
     use crate::test_support::{Toy, ToyObject, ToyRun};
 
     #[test]
-    fn what_was_seen_ahead_lies_above_the_middle() {
+    fn objects_ahead_are_drawn_above_the_center() {
         let mut toy = Toy::room(10.0, 10.0);
         toy.add(ToyObject::new("apple", [0.6, 0.0, -2.0], [0.1, 0.1, 0.1]));
         toy.stand([0.0, 0.0], 0.0);
@@ -125,8 +127,8 @@ mod tests {
         let map = EgocentricMap { side: 48, cell_m: 0.25 };
         let mut out = vec![9; map.len()];
         map.draw(&Memory::new(&briefing, PlannerRules::paper()), &briefing, &mut out);
-        assert!(out.iter().all(|x| *x == 0), "nothing was seen yet");
-        let memory = ToyRun::new(toy).look();
+        assert!(out.iter().all(|x| *x == 0), "nothing has been observed yet");
+        let memory = ToyRun::new(toy).observe();
         map.draw(&memory, &briefing, &mut out);
         let marked: Vec<usize> = (0..48 * 48).filter(|k| out[TARGET * 48 * 48 + k] == 1).collect();
         assert!(!marked.is_empty());
@@ -136,7 +138,7 @@ mod tests {
         }
         let known =
             |row: usize| (0..48).filter(|c| out[KNOWN * 48 * 48 + row * 48 + c] == 1).count();
-        assert!(known(16) > 8, "one sees ahead: {}", known(16));
-        assert_eq!(known(40), 0, "and not behind");
+        assert!(known(16) > 8, "cells ahead are known: {}", known(16));
+        assert_eq!(known(40), 0, "cells behind are unknown");
     }
 }

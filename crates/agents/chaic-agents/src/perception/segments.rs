@@ -1,44 +1,44 @@
-//! From pixels that belong together to where their thing is.
+//! Measures the positions and extents of segmented objects from depth.
 
 use chaic_core::geom::Camera;
 use chaic_core::{ClassId, Role, Vec2, Vec3};
 
-/// Fewer pixels than this are no detection (facts A1.8).
+/// Minimum number of pixels of a detection (facts A1.8).
 pub const MIN_PIXELS: u32 = 5;
-/// Every how many rows and columns it is looked at what says nothing of the room.
+/// Spacing of the rows and columns at which dynamic pixels are sampled.
 pub const STRIDE: u32 = 2;
-/// A row of an image is measured at so many points at least, as far as large things go: at 5 m they
-/// are 8 cm apart then, less than points of a footprint.
-const MEASURED_PER_ROW: usize = 128;
-/// Points farther than this say nothing of where an object is, metres (facts A1.1).
+/// Minimum number of measured points per image row on large objects: at 5 m they are 8 cm apart,
+/// less than the spacing of footprint points.
+const MIN_SAMPLES_PER_ROW: usize = 128;
+/// Maximum depth of points that are used for object positions, meters (facts A1.1).
 const OBJECT_RANGE_M: f32 = 10.0;
-/// People are seen from anywhere (facts A1.8: whoever is in the image is placed where it is).
+/// The same for people, who are located at any distance (facts A1.8).
 const PERSON_RANGE_M: f32 = f32::INFINITY;
-/// Points higher than this belong to no footprint: nobody bumps into them, metres.
+/// Maximum height of footprint points, meters: bodies do not collide above it.
 const FOOTPRINT_HEIGHT_M: f32 = 2.0;
-/// Spacing of footprint points, metres.
+/// Spacing of footprint points, meters.
 const FOOTPRINT_M: f32 = 0.125;
 
-/// How the pixels of a segment are looked at.
+/// Kinds of segments, which are measured differently.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PixelKind {
-    /// Structure, or something that is not to be reported.
-    Firm,
-    /// Own burden.
-    Own,
-    /// Small: every pixel counts.
+    /// Structure, or an object that is not reported.
+    Background,
+    /// Object carried by the agent itself.
+    Carried,
+    /// Small object: every pixel is measured.
     Small,
-    /// Large and movable.
+    /// Large and movable object.
     Movable,
-    /// A person.
+    /// Person.
     Person,
-    /// Large and fixed.
+    /// Large and fixed object.
     Fixed,
 }
 
 impl PixelKind {
-    /// The kind of a class.
-    pub fn of(class: ClassId) -> PixelKind {
+    /// Returns the kind of a class.
+    pub fn from_class(class: ClassId) -> PixelKind {
         match class.info().role {
             Role::Person => PixelKind::Person,
             Role::Target | Role::Container | Role::Fragile => PixelKind::Small,
@@ -48,65 +48,65 @@ impl PixelKind {
     }
 }
 
-/// What the pixels of one segment tell of its thing.
+/// Measurement of one segment.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Extent {
-    /// Column and row of a pixel that shows it.
+pub struct SegmentMeasurement {
+    /// Column and row of a pixel inside the segment.
     pub pixel: [u32; 2],
-    /// Mean of its visible points, metres.
+    /// Mean of its visible points, meters.
     pub position_in_world: Vec3,
-    /// Height of its lowest visible point, metres.
+    /// Height of its lowest visible point, meters.
     pub bottom_m: f32,
-    /// Height of its highest visible point, metres.
+    /// Height of its highest visible point, meters.
     pub top_m: f32,
-    /// How many pixels show it.
+    /// Number of pixels.
     pub n_pixels: u32,
-    /// Its visible points seen from above (x, z), at most one per 0.125 m square.
+    /// Visible points from above (x, z), at most one per 0.125 m square.
     pub footprint: Vec<Vec2>,
 }
 
-/// An image cut into segments.
+/// Segmented depth image.
 #[derive(Clone, Copy, Debug)]
 pub struct Segments<'a> {
-    /// Which segment each pixel is of, shape [height, width].
-    pub of_pixels: &'a [u16],
-    /// Depth in metres, shape [height, width].
+    /// Segment index of each pixel, shape [height, width].
+    pub segment_ids: &'a [u16],
+    /// Depth in meters, shape [height, width].
     pub depth_m: &'a [f32],
-    /// The camera.
+    /// Camera of the image.
     pub camera: &'a Camera,
-    /// How each segment is looked at, by number; segments beyond are firm.
+    /// Kind of each segment by index; segments beyond are background.
     pub kinds: &'a [PixelKind],
 }
 
 impl Segments<'_> {
-    /// The extent of each segment, by number, `None` of those with fewer than [`MIN_PIXELS`] pixels or
-    /// none in range; and [`Percepts::dynamic_mask`].
+    /// Measures each segment, and computes [`Percepts::dynamic_mask`]. The result by index is
+    /// `None` for segments with fewer than [`MIN_PIXELS`] pixels or without points in range.
     ///
     /// [`Percepts::dynamic_mask`]: super::Percepts::dynamic_mask
-    pub fn measure(&self) -> (Vec<Option<Extent>>, Vec<bool>) {
-        let (ids, depth, width) = (self.of_pixels, self.depth_m, self.camera.width as usize);
+    pub fn measure(&self) -> (Vec<Option<SegmentMeasurement>>, Vec<bool>) {
+        let (ids, depth, width) = (self.segment_ids, self.depth_m, self.camera.width as usize);
         let rays = Rays::new(self.camera);
         let measure = Measure { ids, depth, width, kinds: self.kinds, rays: &rays };
-        let (tallies, dynamic_mask) = pulp::Arch::new().dispatch(measure);
-        (tallies.into_iter().map(Tally::extent).collect(), dynamic_mask)
+        let (accumulators, dynamic_mask) = pulp::Arch::new().dispatch(measure);
+        (accumulators.into_iter().map(SegmentAccumulator::finish).collect(), dynamic_mask)
     }
 }
 
-/// Sums over the pixels of one thing.
-struct Tally {
+/// Accumulated points of one segment.
+struct SegmentAccumulator {
     n_pixels: u32,
     n_points: u32,
     sum: Vec3,
     low: f32,
     high: f32,
     squares: Vec<[i16; 2]>,
-    /// The longest run of pixels, and its middle.
+    /// Length of the longest run of pixels in a row, and its center.
     longest: u32,
     pixel: [u32; 2],
 }
 
-impl Tally {
-    const NEW: Tally = Tally {
+impl SegmentAccumulator {
+    const EMPTY: SegmentAccumulator = SegmentAccumulator {
         longest: 0,
         pixel: [0, 0],
         n_pixels: 0,
@@ -124,7 +124,7 @@ impl Tally {
         self.low = self.low.min(p.y);
         self.high = self.high.max(p.y);
         if p.y <= FOOTPRINT_HEIGHT_M {
-            let square = [nearest_whole(p.x / FOOTPRINT_M), nearest_whole(p.z / FOOTPRINT_M)];
+            let square = [round_to_i16(p.x / FOOTPRINT_M), round_to_i16(p.z / FOOTPRINT_M)];
             if self.squares.last() != Some(&square) {
                 self.squares.push(square);
             }
@@ -132,7 +132,7 @@ impl Tally {
     }
 
     #[inline(always)]
-    fn run(&mut self, row: usize, from: usize, end: usize) {
+    fn add_run(&mut self, row: usize, from: usize, end: usize) {
         let n = (end - from) as u32;
         self.n_pixels += n;
         if n > self.longest {
@@ -141,13 +141,13 @@ impl Tally {
         }
     }
 
-    fn extent(mut self) -> Option<Extent> {
+    fn finish(mut self) -> Option<SegmentMeasurement> {
         if self.n_pixels < MIN_PIXELS || self.n_points == 0 {
             return None;
         }
         self.squares.sort_unstable();
         self.squares.dedup();
-        Some(Extent {
+        Some(SegmentMeasurement {
             pixel: self.pixel,
             position_in_world: self.sum / self.n_points as f32,
             bottom_m: self.low,
@@ -162,28 +162,28 @@ impl Tally {
     }
 }
 
-/// Rounds half away from zero, as `f32::round` does in a call to the C library for every point.
+/// Rounds half away from zero, like `f32::round`, but without a call to the C library per point.
 #[inline(always)]
-fn nearest_whole(x: f32) -> i16 {
+fn round_to_i16(x: f32) -> i16 {
     let x = x.clamp(-40_000.0, 40_000.0);
-    let whole = x as i32;
-    let rest = x - whole as f32;
-    let whole = whole + i32::from(rest >= 0.5) - i32::from(rest <= -0.5);
-    whole.clamp(i32::from(i16::MIN), i32::from(i16::MAX)) as i16
+    let truncated = x as i32;
+    let fraction = x - truncated as f32;
+    let rounded = truncated + i32::from(fraction >= 0.5) - i32::from(fraction <= -0.5);
+    rounded.clamp(i32::from(i16::MIN), i32::from(i16::MAX)) as i16
 }
 
-/// How many of the first ids are the same.
+/// Returns the number of leading ids that are equal.
 #[inline(always)]
 fn run_length(ids: &[u16]) -> usize {
-    const AT_ONCE: usize = 32;
+    const CHUNK: usize = 32;
     let Some(first) = ids.first() else { return 0 };
     let same = |chunk: &&[u16]| chunk.iter().fold(true, |same, id| same & (id == first));
-    let n = AT_ONCE * ids.chunks_exact(AT_ONCE).take_while(same).count();
+    let n = CHUNK * ids.chunks_exact(CHUNK).take_while(same).count();
     n + ids[n..].iter().take_while(|id| *id == first).count()
 }
 
-/// Directions through pixel centers per metre of depth: the world point of a pixel is
-/// `eye + depth * (column + row)`.
+/// Directions through pixel centers per meter of depth: the world point of a pixel is `eye + depth
+/// * (column + row)`.
 pub(crate) struct Rays {
     pub eye: Vec3,
     pub columns: Vec<Vec3>,
@@ -212,8 +212,8 @@ impl Rays {
     }
 }
 
-/// A walk over the pixels of one image, compiled for vectors of each width: the sums over each thing,
-/// and [`Percepts::dynamic_mask`].
+/// Pass over the pixels of one image, compiled for vectors of each width. Accumulates
+/// the points of each segment and computes [`Percepts::dynamic_mask`].
 struct Measure<'a> {
     ids: &'a [u16],
     depth: &'a [f32],
@@ -223,15 +223,16 @@ struct Measure<'a> {
 }
 
 impl pulp::NullaryFnOnce for Measure<'_> {
-    type Output = (Vec<Tally>, Vec<bool>);
+    type Output = (Vec<SegmentAccumulator>, Vec<bool>);
 
     #[inline(always)]
     fn call(self) -> Self::Output {
         let Measure { ids, depth, width, kinds, rays } = self;
         let height = rays.rows.len();
         let stride = STRIDE as usize;
-        let coarse_stride = (width / MEASURED_PER_ROW).max(stride);
-        let mut tallies: Vec<Tally> = kinds.iter().map(|_| Tally::NEW).collect();
+        let coarse_stride = (width / MIN_SAMPLES_PER_ROW).max(stride);
+        let mut accumulators: Vec<SegmentAccumulator> =
+            kinds.iter().map(|_| SegmentAccumulator::EMPTY).collect();
         let sampled_width = width.div_ceil(stride);
         let mut dynamic_mask = vec![false; sampled_width * height.div_ceil(stride)];
         for row in 0..height {
@@ -242,21 +243,21 @@ impl pulp::NullaryFnOnce for Measure<'_> {
                 let from = end;
                 end += run_length(&ids[from..]);
                 let id = usize::from(ids[from]);
-                let kind = kinds.get(id).copied().unwrap_or(PixelKind::Firm);
-                if on_row && !matches!(kind, PixelKind::Firm | PixelKind::Fixed) {
+                let kind = kinds.get(id).copied().unwrap_or(PixelKind::Background);
+                if on_row && !matches!(kind, PixelKind::Background | PixelKind::Fixed) {
                     let sampled = from.div_ceil(stride)..end.div_ceil(stride);
                     dynamic_mask[row / stride * sampled_width..][sampled].fill(true);
                 }
-                if matches!(kind, PixelKind::Firm | PixelKind::Own) {
+                if matches!(kind, PixelKind::Background | PixelKind::Carried) {
                     continue;
                 }
-                let tally = &mut tallies[id];
-                tally.run(row, from, end);
+                let accumulator = &mut accumulators[id];
+                accumulator.add_run(row, from, end);
                 let is_person = kind == PixelKind::Person;
                 let range_m = if is_person { PERSON_RANGE_M } else { OBJECT_RANGE_M };
                 let mut add = |column: usize| {
                     if depth[column] < range_m {
-                        tally.add(rays.point(column, row, depth[column]));
+                        accumulator.add(rays.point(column, row, depth[column]));
                     }
                 };
                 if kind == PixelKind::Small {
@@ -267,7 +268,7 @@ impl pulp::NullaryFnOnce for Measure<'_> {
                 }
             }
         }
-        (tallies, dynamic_mask)
+        (accumulators, dynamic_mask)
     }
 }
 
@@ -276,12 +277,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rounds_as_the_library_does() {
-        let odd =
+    fn rounding_equals_that_of_the_standard_library() {
+        let special =
             [f32::NAN, f32::INFINITY, -1e9, 0.49999997, -0.49999997, -0.0, 32767.5, 8388609.0];
-        let usual = (-4000..4000).map(|k| k as f32 * 0.0625);
-        for x in usual.chain(odd) {
-            assert_eq!(nearest_whole(x), x.round() as i16, "{x}");
+        let regular = (-4000..4000).map(|k| k as f32 * 0.0625);
+        for x in regular.chain(special) {
+            assert_eq!(round_to_i16(x), x.round() as i16, "{x}");
         }
     }
 

@@ -1,48 +1,48 @@
-//! The queue of a search: cells by what a way through them costs at least.
+//! Priority queue of a grid search: cells ordered by estimated path cost.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// So many estimates from the present one on have a list of their own: most steps cost less.
+/// Number of estimates, from the current one on, that have their own bucket. Most steps cost less.
 const RING: usize = 1024;
 
-/// A queue of cells, least estimate first, of equal ones the cell with the least number first.
-/// A cell that is in it with the same estimate twice comes out once or twice.
+/// Priority queue of cells: lowest estimate first, and of equal estimates the lowest cell index
+/// first. A cell that is pushed twice with the same estimate may be popped once or twice.
 ///
-/// Searches push hardly anything below the present estimate, and little far above it. So cells of
-/// the present estimate are bits of a set, those of the next ones lie unsorted in a list for each
-/// estimate, and a heap holds all others; any order of pushes will do.
+/// Searches rarely push below the current estimate, or far above it. Cells of the current estimate
+/// are bits of a set, cells of the next estimates are in unsorted buckets, and a heap holds all
+/// others. Pushes in any order are correct.
 #[derive(Clone, Debug)]
 pub struct BucketQueue {
     level: u32,
     present: CellSet,
-    /// Cells with estimate `e`, level < e < level + RING, in list `e % RING`.
+    /// Cells with estimate `e`, level < e < level + RING, in bucket `e % RING`.
     ring: Vec<Vec<u32>>,
-    /// A bit for each list that holds something.
+    /// One bit per non-empty bucket.
     filled: [u64; RING / 64],
-    /// Estimate and cell in one number.
-    others: BinaryHeap<Reverse<u64>>,
+    /// Estimate (high 32 bits) and cell (low 32 bits) in one key.
+    overflow: BinaryHeap<Reverse<u64>>,
 }
 
 impl BucketQueue {
-    /// An empty queue for cells with numbers below `n_cells`.
+    /// Creates an empty queue for cells with indices below `n_cells`.
     pub fn new(n_cells: usize) -> BucketQueue {
         BucketQueue {
             level: 0,
             present: CellSet::new(n_cells),
             ring: vec![Vec::new(); RING],
             filled: [0; RING / 64],
-            others: BinaryHeap::new(),
+            overflow: BinaryHeap::new(),
         }
     }
 
-    /// Forgets all.
+    /// Removes all cells.
     pub fn clear(&mut self) {
         while self.present.pop().is_some() {}
         while let Some(next) = self.next_in_ring() {
             self.list(next).clear();
         }
-        self.others.clear();
+        self.overflow.clear();
         self.level = 0;
     }
 
@@ -56,51 +56,52 @@ impl BucketQueue {
                 self.ring[list].push(cell);
                 self.filled[list / 64] |= 1 << (list % 64);
             }
-            _ => self.others.push(Reverse(u64::from(estimate) << 32 | u64::from(cell))),
+            _ => self.overflow.push(Reverse(u64::from(estimate) << 32 | u64::from(cell))),
         }
     }
 
-    /// Takes out the first: its estimate and the cell.
+    /// Removes and returns the first entry: its estimate and the cell.
     #[inline]
     pub fn pop(&mut self) -> Option<(u32, u32)> {
-        let other = self.others.peek().map(|Reverse(key)| (key >> 32) as u32);
-        if other.is_some_and(|estimate| estimate < self.level) {
-            return self.others.pop().map(|Reverse(key)| ((key >> 32) as u32, key as u32));
+        let lowest_in_overflow = self.overflow.peek().map(|Reverse(key)| (key >> 32) as u32);
+        if lowest_in_overflow.is_some_and(|estimate| estimate < self.level) {
+            return self.overflow.pop().map(|Reverse(key)| ((key >> 32) as u32, key as u32));
         }
         let cell = match self.present.pop() {
             Some(cell) => cell,
             None => {
-                self.go_on(other)?;
+                self.advance(lowest_in_overflow)?;
                 self.present.pop()?
             }
         };
         Some((self.level, cell))
     }
 
-    /// Moves on to the least estimate there is; `other` is the least of the others.
-    fn go_on(&mut self, other: Option<u32>) -> Option<()> {
+    /// Advances to the lowest estimate; `lowest_in_overflow` is that of the heap.
+    fn advance(&mut self, lowest_in_overflow: Option<u32>) -> Option<()> {
         let near = self.next_in_ring();
-        self.level = near.into_iter().chain(other).min()?;
+        self.level = near.into_iter().chain(lowest_in_overflow).min()?;
         if near == Some(self.level) {
             let mut list = std::mem::take(self.list(self.level));
             list.drain(..).for_each(|cell| self.present.insert(cell));
-            // Back with it, so that its memory is used again.
+            // Put the bucket back to reuse its allocation.
             self.ring[self.level as usize % RING] = list;
         }
         let first = u64::from(self.level) << 32;
-        while let Some(Reverse(key)) = self.others.peek().filter(|key| key.0 >> 32 == first >> 32) {
+        while let Some(Reverse(key)) = self.overflow.peek().filter(|key| key.0 >> 32 == first >> 32)
+        {
             self.present.insert(*key as u32);
-            self.others.pop();
+            self.overflow.pop();
         }
         Some(())
     }
 
-    /// The least estimate in the ring.
+    /// Returns the lowest estimate in the ring.
     fn next_in_ring(&self) -> Option<u32> {
         const WORDS: usize = RING / 64;
         let start = (self.level as usize + 1) % RING;
         let not_before = u64::MAX << (start % 64);
-        // The first word comes twice: what is before the start, at the end.
+        // The first word is visited twice: its bits before the start come last.
         let masks = [not_before].into_iter().chain([u64::MAX; WORDS - 1]).chain([!not_before]);
         let (list, _) = masks
             .enumerate()
@@ -112,7 +113,7 @@ impl BucketQueue {
         Some(self.level + ahead as u32)
     }
 
-    /// The list of an estimate in the ring, which is to be emptied.
+    /// Returns the bucket of an estimate in the ring and marks it as empty.
     fn list(&mut self, estimate: u32) -> &mut Vec<u32> {
         let list = estimate as usize % RING;
         self.filled[list / 64] &= !(1 << (list % 64));
@@ -120,14 +121,14 @@ impl BucketQueue {
     }
 }
 
-/// A set of cells that knows its least.
+/// Set of cells with a fast minimum.
 #[derive(Clone, Debug)]
 struct CellSet {
-    /// A bit for each cell.
+    /// One bit per cell.
     cells: Vec<u64>,
-    /// A bit for each number in `cells` that isn't zero.
+    /// One bit per word of `cells` that is not zero.
     words: Vec<u64>,
-    /// All numbers in `words` before this one are zero.
+    /// All entries of `words` before this one are zero.
     first: usize,
 }
 
@@ -145,7 +146,7 @@ impl CellSet {
         self.first = self.first.min(word / 64);
     }
 
-    /// Takes out the least.
+    /// Removes and returns the lowest cell.
     #[inline]
     fn pop(&mut self) -> Option<u32> {
         while let Some(words) = self.words.get_mut(self.first) {
@@ -168,26 +169,26 @@ impl CellSet {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use chaic_core::rng::Stream;
+    use chaic_core::rng::RngStream;
 
     #[test]
-    fn cells_come_out_as_from_a_heap_whatever_the_order_of_pushes() {
+    fn cells_are_popped_as_from_a_heap_for_any_order_of_pushes() {
         let mut queue = BucketQueue::new(10_000);
         for seed in 0..60 {
-            let mut rng = Stream::new(seed, "queue", 0);
+            let mut rng = RngStream::new(seed, "queue", 0);
             let mut heap = BinaryHeap::new();
             let range = [12, 400, 5000, 5_000_000][seed as usize % 4];
             let mut last = if seed % 5 == 0 { u32::MAX - 3000 } else { 0 };
             for k in 0..3000 {
                 if rng.chance(0.6) {
-                    // Mostly later than what came last, now and then earlier.
+                    // Mostly later than the last popped entry, sometimes earlier.
                     let back = if rng.chance(0.1) { 15 } else { 0 };
                     let estimate = match rng.below(200) {
                         0 => u32::MAX,
                         1 => rng.below(100) as u32,
                         _ => last.saturating_add(rng.below(range) as u32).saturating_sub(back),
                     };
-                    // No cell twice with the same estimate.
+                    // No cell is pushed twice with the same estimate.
                     let cell = (k * 7) % 10_000;
                     queue.push(estimate, cell);
                     heap.push(Reverse((estimate, cell)));

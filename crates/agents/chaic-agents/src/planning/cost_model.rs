@@ -1,90 +1,65 @@
-//! By what the cost of each cell is reckoned, and when anew: with care, or as the original does.
+//! Cost models: how grid cells are priced, and when to recompute.
+
+use std::fmt::Debug;
 
 use chaic_core::{Frame, Vec2};
 
-use super::costs::CostMap;
-use crate::mapping::{OccupancyMap, People, SemanticMap};
+use super::cost_map::CostMap;
+use crate::mapping::{OccupancyMap, PersonMap, SemanticMap};
 
-/// What costs come from.
-pub struct Seen<'a> {
-    /// What stands firmly.
+/// Inputs of a cost computation.
+pub struct CostInputs<'a> {
+    /// Static structure.
     pub map: &'a OccupancyMap,
-    /// What is where.
-    pub things: &'a SemanticMap,
-    /// Who was where.
-    pub people: &'a People,
-    /// How much room is left around obstacles, by whoever heeds them.
-    pub berth: Option<Berth>,
-    /// Where one stands (x, z).
-    pub here: Vec2,
-    /// The present frame.
+    /// Known objects.
+    pub objects: &'a SemanticMap,
+    /// Last sightings of people.
+    pub people: &'a PersonMap,
+    /// Inflation around obstacles, for agents that avoid them.
+    pub inflation: Option<ObstacleInflation>,
+    /// Position of the body (x, z).
+    pub position: Vec2,
+    /// Current frame.
     pub now: Frame,
 }
 
-/// The room that is left around an obstacle.
+/// Inflation around an obstacle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Berth {
-    /// The original's: a square of cells around its middle.
+pub enum ObstacleInflation {
+    /// The original's: a square of cells around the obstacle's center.
     Wide,
-    /// As much as a body of this radius, metres, needs to get past it (ours).
+    /// The radius of the body, meters, around the footprint (ours).
     Narrow(f32),
 }
 
-/// What has come since costs were computed last.
+/// Changes since costs were computed last.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct News {
-    /// Anything was taken in.
+pub struct MapChanges {
+    /// True if there was any update.
     pub any: bool,
-    /// What stands where has changed.
+    /// True if the static layout has changed.
     pub layout: bool,
-    /// Somebody was seen a moment ago.
+    /// True if a person was seen recently.
     pub people: bool,
 }
 
-/// A way of reckoning costs.
-pub trait CostModel: Sync {
-    /// Whether such news asks for new costs.
-    fn is_outdated_by(&self, news: News) -> bool;
+/// Computes the costs of grid cells.
+pub trait CostModel: Debug + Send + Sync {
+    /// Returns whether these changes require a recomputation.
+    fn is_outdated_by(&self, changes: MapChanges) -> bool;
 
-    /// Computes all costs anew.
-    fn rebuild(&self, costs: &mut CostMap, seen: &Seen<'_>);
+    /// Recomputes all costs.
+    fn recompute(&mut self, costs: &mut CostMap, inputs: &CostInputs<'_>);
 
-    /// Whether a thing is as far as the way to it is long; else, as the crow flies.
-    fn measures_ways(&self) -> bool;
+    /// Returns whether object distance is path length (true) or straight-line distance (false).
+    fn uses_path_length(&self) -> bool;
+
+    /// Returns a copy that continues identically.
+    fn fork(&self) -> Box<dyn CostModel>;
 }
 
-/// Costs for a body of its true width.
-#[derive(Clone, Copy, Debug)]
-pub struct CarefulCosts;
-
-impl CostModel for CarefulCosts {
-    fn is_outdated_by(&self, news: News) -> bool {
-        news.layout || news.people
-    }
-
-    fn rebuild(&self, costs: &mut CostMap, seen: &Seen<'_>) {
-        costs.rebuild(seen);
-    }
-
-    fn measures_ways(&self) -> bool {
-        true
-    }
-}
-
-/// The original's (facts A1.5), see [`super::lattice_costs`].
-#[derive(Clone, Copy, Debug)]
-pub struct LatticeCosts;
-
-impl CostModel for LatticeCosts {
-    fn is_outdated_by(&self, news: News) -> bool {
-        news.any
-    }
-
-    fn rebuild(&self, costs: &mut CostMap, seen: &Seen<'_>) {
-        costs.rebuild_lattice(seen);
-    }
-
-    fn measures_ways(&self) -> bool {
-        false
+impl Clone for Box<dyn CostModel> {
+    fn clone(&self) -> Box<dyn CostModel> {
+        (**self).fork()
     }
 }

@@ -1,73 +1,52 @@
-//! Ways through the map: A* to a goal, and the cost of getting anywhere.
-
-mod straight;
-
-use std::collections::BinaryHeap;
+//! Shortest paths on the grid: A* to a goal, and Dijkstra cost fields to all cells.
 
 use chaic_core::Vec2;
 
 use super::bucket_queue::BucketQueue;
+use super::cost_map::{CostMap, FREE, OCCUPIED};
+use super::search_nodes::SearchNodes;
 use crate::mapping::grid::{CELL_M, Grid};
-use crate::planning::costs::{CostMap, FREE, OCCUPIED};
-pub use straight::StraightCostField;
-use straight::Visit;
 
-/// Costs are multiplied by this for a straight step, so that a diagonal one is a whole number.
+/// Cost factor of a straight step; with it the factor of a diagonal step is a whole number.
 const STRAIGHT: u32 = 10;
 const DIAGONAL: u32 = 14;
-/// Cost of a metre of free floor.
+/// Cost of one meter of free floor.
 const COST_PER_M: f32 = (FREE * STRAIGHT) as f32 / CELL_M;
-/// Costs that share a bucket in a search for all costs: as many as the least step costs at most.
+/// Range of costs per bucket in a Dijkstra search: at most the cost of the cheapest step.
 const BUCKET_WIDTH: usize = 64;
-/// Buckets used in turn: enough that the dearest step leads to no bucket of an earlier turn.
+/// Number of buckets in the ring: enough that the most expensive step never wraps around.
 const N_BUCKETS: usize = (OCCUPIED * DIAGONAL) as usize / BUCKET_WIDTH + 2;
 const _: () = assert!(BUCKET_WIDTH <= (FREE * STRAIGHT) as usize);
 
-/// Working space of searches, kept so that a search allocates nothing.
+/// Working memory of searches, kept so that a search allocates nothing.
 #[derive(Clone, Debug)]
 pub struct Search {
-    nodes: Vec<Node>,
-    epoch: u32,
+    nodes: SearchNodes,
     queue: BucketQueue,
-    /// Cells with what a way to them costs, by that cost.
+    /// Cells with their path cost, bucketed by that cost.
     buckets: Vec<Vec<(u32, u32)>>,
-    /// The queue of straight ways.
-    visits: BinaryHeap<Visit>,
-    /// The latest straight way: version of the costs, start and end.
-    latest: Option<((u32, usize, usize), Path)>,
 }
 
-/// What a search knows of a cell.
-#[derive(Clone, Copy, Debug, Default)]
-struct Node {
-    /// The search that knows it; what an earlier one knew counts no more.
-    epoch: u32,
-    /// Least cost of getting there that was found.
-    best: u32,
-    /// The cell before it on that way.
-    from: u32,
-}
-
-/// A way from cell to cell.
+/// Path of adjacent cells.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Path {
-    /// The cells, start and end included.
+    /// The cells, including start and end.
     pub cells: Vec<usize>,
-    /// Its cost; see [`CostField::metres`].
+    /// Path cost; see [`CostField::meters`].
     pub cost: u32,
 }
 
-/// Where A* is to end.
-pub trait Goal {
-    /// Whether this cell will do.
+/// Goal of an A* search.
+pub trait SearchGoal {
+    /// Returns whether the cell is a goal.
     fn is_goal(&self, cell: usize) -> bool;
 
-    /// A distance in metres that is certainly still to go from this cell.
-    fn at_least_m(&self, cell: usize) -> f32;
+    /// Lower bound of the remaining distance from this cell, meters.
+    fn min_distance_m(&self, cell: usize) -> f32;
 }
 
-/// Visits the neighbors that one can step to from a cell without cutting an occupied corner, with
-/// the cost of each cell and what it is multiplied by.
+/// Visits the neighbors that can be entered from a cell without cutting an occupied corner, with
+/// each cell's cost and the step's factor.
 #[inline(always)]
 fn for_steps(costs: &[u32], grid: &Grid, from: usize, mut visit: impl FnMut(usize, u32, u32)) {
     let (i, j) = grid.column_row(from);
@@ -95,7 +74,7 @@ fn for_steps(costs: &[u32], grid: &Grid, from: usize, mut visit: impl FnMut(usiz
     }
 }
 
-/// What a step into `cell` costs; `None` if it cuts an occupied corner.
+/// Returns the cost of a step into `cell`; `None` if it cuts an occupied corner.
 fn step_cost(costs: &[u32], grid: &Grid, from: usize, cell: usize, diagonal: bool) -> Option<u32> {
     if !diagonal {
         return Some(costs[cell].saturating_mul(STRAIGHT));
@@ -107,88 +86,64 @@ fn step_cost(costs: &[u32], grid: &Grid, from: usize, cell: usize, diagonal: boo
 }
 
 impl Search {
-    /// Working space for maps of this many cells.
+    /// Creates working memory for maps of this many cells.
     pub fn new(n_cells: usize) -> Search {
         Search {
-            nodes: vec![Node::default(); n_cells],
-            epoch: 0,
+            nodes: SearchNodes::new(n_cells),
             queue: BucketQueue::new(n_cells),
             buckets: Vec::new(),
-            visits: BinaryHeap::new(),
-            latest: None,
         }
     }
 
-    fn begin(&mut self, start: usize) {
-        self.epoch += 1;
-        self.queue.clear();
-        self.improve(start, start, 0, || 0);
-    }
-
-    /// Takes a way to a cell if it is the best so far.
-    #[inline]
-    fn improve(&mut self, cell: usize, from: usize, cost: u32, still: impl FnOnce() -> u32) {
-        let node = &mut self.nodes[cell];
-        if node.epoch != self.epoch || cost < node.best {
-            *node = Node { epoch: self.epoch, best: cost, from: from as u32 };
-            self.queue.push(cost.saturating_add(still()), cell as u32);
-        }
-    }
-
-    /// The cheapest way from `start` to any goal cell, 8-connected, if it costs at most `limit`.
-    /// Nothing is impassable, but occupied cells and walls cost more than any detour.
+    /// Returns the cheapest 8-connected path from `start` to any goal cell, if it costs at most
+    /// `limit`. No cell is impassable, but occupied cells and walls cost more than any detour.
     pub fn a_star(
         &mut self,
         grid: &Grid,
         costs: &[u32],
         start: usize,
-        goal: &impl Goal,
+        goal: &impl SearchGoal,
         limit: u32,
     ) -> Option<Path> {
-        self.begin(start);
-        // Rounded down, so that it never exceeds the true cost.
-        let still = |cell: usize| (goal.at_least_m(cell).max(0.0) * COST_PER_M) as u32;
+        self.nodes.start(start);
+        self.queue.clear();
+        self.queue.push(0, start as u32);
+        // Rounded down, so that the heuristic stays admissible.
+        let heuristic = |cell: usize| (goal.min_distance_m(cell).max(0.0) * COST_PER_M) as u32;
         while let Some((estimate, cell)) = self.queue.pop() {
             let cell = cell as usize;
-            let cost = self.nodes[cell].best;
+            let cost = self.nodes.cost(cell);
             if cost > limit {
                 return None;
             }
-            if estimate > cost.saturating_add(still(cell)) {
+            if estimate > cost.saturating_add(heuristic(cell)) {
                 continue;
             }
             if goal.is_goal(cell) {
-                return Some(Path { cells: self.trace(start, cell), cost });
+                return Some(Path { cells: self.nodes.path(start, cell), cost });
             }
             for_steps(costs, grid, cell, |next, enter, factor| {
                 let step = enter.saturating_mul(factor);
-                self.improve(next, cell, cost.saturating_add(step), || still(next));
+                let total = cost.saturating_add(step);
+                if self.nodes.improve(next, cell, total) {
+                    self.queue.push(total.saturating_add(heuristic(next)), next as u32);
+                }
             });
         }
         None
     }
-
-    fn trace(&self, start: usize, end: usize) -> Vec<usize> {
-        let mut cells = vec![end];
-        let mut cell = end;
-        while cell != start {
-            cell = self.nodes[cell].from as usize;
-            cells.push(cell);
-        }
-        cells.reverse();
-        cells
-    }
 }
 
-/// The cost of getting from one place to every cell without passing occupied ones.
+/// Path cost from one position to every cell without passing occupied ones.
 #[derive(Clone, Debug)]
 pub struct CostField {
     cost: Vec<u32>,
 }
 
 impl CostField {
-    /// Dial's form of Dijkstra's algorithm from `here` over everything that is not occupied.
-    pub fn from(costs: &CostMap, here: Vec2, search: &mut Search) -> CostField {
+    /// Runs Dial's variant of Dijkstra's algorithm from `here` over all cells that are not
+    /// occupied.
+    pub fn new(costs: &CostMap, here: Vec2, search: &mut Search) -> CostField {
         let mut cost = vec![u32::MAX; costs.grid().n_cells()];
         let Some(start) = costs.grid().cell_at(here) else { return CostField { cost } };
         let buckets = &mut search.buckets;
@@ -200,56 +155,56 @@ impl CostField {
             if n_queued == 0 {
                 break;
             }
-            // Cells of one bucket can't improve each other: no step costs less than its width.
+            // Cells of one bucket cannot improve each other: no step costs less than its width.
             let mut cells = std::mem::take(&mut buckets[bucket]);
             n_queued -= cells.len();
-            for (known, cell) in cells.drain(..) {
+            for (cost_so_far, cell) in cells.drain(..) {
                 let cell = cell as usize;
-                if known > cost[cell] {
+                if cost_so_far > cost[cell] {
                     continue;
                 }
                 for_steps(costs.costs(), costs.grid(), cell, |next, enter, factor| {
-                    let through = known.saturating_add(enter.saturating_mul(factor));
-                    if enter < OCCUPIED && through < cost[next] {
-                        cost[next] = through;
-                        buckets[through as usize / BUCKET_WIDTH % N_BUCKETS]
-                            .push((through, next as u32));
+                    let total = cost_so_far.saturating_add(enter.saturating_mul(factor));
+                    if enter < OCCUPIED && total < cost[next] {
+                        cost[next] = total;
+                        buckets[total as usize / BUCKET_WIDTH % N_BUCKETS]
+                            .push((total, next as u32));
                         n_queued += 1;
                     }
                 });
             }
-            // Back with it, so that its memory is used again.
+            // Put the bucket back to reuse its allocation.
             buckets[bucket] = cells;
         }
         CostField { cost }
     }
 
-    /// The cost of getting to a cell, if one can.
+    /// Returns the path cost to a cell, if it is reachable.
     pub fn cost(&self, cell: usize) -> Option<u32> {
         self.cost.get(cell).copied().filter(|c| *c < u32::MAX)
     }
 
-    /// The length of free floor that costs as much, metres.
-    pub fn metres(cost: u32) -> f32 {
+    /// Converts a cost to the length of free floor with the same cost, meters.
+    pub fn meters(cost: u32) -> f32 {
         cost as f32 / COST_PER_M
     }
 }
 
-/// A goal that is one cell.
+/// Goal that is a single cell.
 #[derive(Clone, Copy, Debug)]
 pub struct ToCell {
-    /// The lattice.
+    /// Grid of the map.
     pub grid: Grid,
-    /// The cell.
+    /// The goal cell.
     pub cell: usize,
 }
 
-impl Goal for ToCell {
+impl SearchGoal for ToCell {
     fn is_goal(&self, cell: usize) -> bool {
         cell == self.cell
     }
 
-    fn at_least_m(&self, cell: usize) -> f32 {
+    fn min_distance_m(&self, cell: usize) -> f32 {
         self.grid.center(cell).distance(self.grid.center(self.cell))
     }
 }
@@ -258,10 +213,10 @@ impl Goal for ToCell {
 mod tests {
     use super::*;
     use chaic_core::geom::Rect;
-    use chaic_core::rng::Stream;
+    use chaic_core::rng::RngStream;
 
-    /// The same problem for the `pathfinding` crate.
-    fn oracle(grid: &Grid, costs: &[u32], start: usize, end: usize) -> u32 {
+    /// Solves the same problem with the `pathfinding` crate.
+    fn reference_cost(grid: &Grid, costs: &[u32], start: usize, end: usize) -> u32 {
         pathfinding::prelude::dijkstra(
             &start,
             |cell| {
@@ -276,12 +231,12 @@ mod tests {
     }
 
     #[test]
-    fn a_star_is_as_good_as_the_oracle_on_random_maps() {
-        let grid = Grid::over(&Rect::new([0.0, 0.0], [2.0, 1.0]));
+    fn a_star_finds_paths_of_minimum_cost_on_random_maps() {
+        let grid = Grid::new(&Rect::new([0.0, 0.0], [2.0, 1.0]));
         let n = grid.n_cells();
         let mut search = Search::new(n);
         for seed in 0..60 {
-            let mut rng = Stream::new(seed, "a star", 0);
+            let mut rng = RngStream::new(seed, "a star", 0);
             let costs: Vec<u32> = (0..n)
                 .map(|_| match rng.below(10) {
                     0..5 => FREE,
@@ -291,7 +246,7 @@ mod tests {
                 })
                 .collect();
             let (start, end) = (rng.below(n), rng.below(n));
-            let expected = oracle(&grid, &costs, start, end);
+            let expected = reference_cost(&grid, &costs, start, end);
             match search.a_star(&grid, &costs, start, &ToCell { grid, cell: end }, u32::MAX) {
                 Some(path) => {
                     assert_eq!(path.cost, expected, "seed {seed}");
@@ -312,8 +267,8 @@ mod tests {
     }
 
     #[test]
-    fn reach_agrees_with_a_star_and_stops_at_walls() {
-        let plan = crate::test_support::Plan2d::parse(
+    fn the_cost_field_agrees_with_a_star_and_stops_at_walls() {
+        let plan = crate::test_support::DrawnMap::parse(
             "..........#.....
              ..........#.....
              ....#.....#.....
@@ -323,7 +278,7 @@ mod tests {
         let costs = plan.costs(0.05);
         let grid = *costs.grid();
         let mut search = Search::new(grid.n_cells());
-        let field = CostField::from(&costs, grid.center(64), &mut search);
+        let field = CostField::new(&costs, grid.center(64), &mut search);
         let to = 64 + 9;
         let path =
             search.a_star(&grid, costs.costs(), 64, &ToCell { grid, cell: to }, u32::MAX).unwrap();

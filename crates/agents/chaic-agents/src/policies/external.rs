@@ -1,52 +1,55 @@
-//! The plans that a caller chooses: what learners act by above single actions.
+//! Policy whose plans are chosen by the caller, such as a learner that acts at the level of plans.
 
 use chaic_core::{AgentError, Briefing};
 
 use crate::decision::{Context, Plan, Policy};
 
-/// Follows what it is told to, and asks when it has come to an end of that.
+/// Executes the plans that the caller sets, and stops when the next one is due.
 ///
-/// Its mind's [`proceed`](crate::Mind::proceed) fails with [`AgentError::Halted`] when a choice is due; then
-/// [`valid`](External::valid) has the plans to choose among, and after [`tell`](External::tell) it may be called
-/// again.
+/// When a choice is due, the agent's [`next_action`](crate::PlanningAgent::next_action) fails with
+/// [`AgentError::Halted`]. Then [`valid`](ExternalPolicy::valid) lists the candidates; after
+/// [`set_plan`](ExternalPolicy::set_plan) `next_action` may be called again.
 #[derive(Clone, Debug, Default)]
-pub struct External {
+pub struct ExternalPolicy {
     valid: Vec<Plan>,
-    told: Option<Plan>,
+    next: Option<Plan>,
 }
 
-impl External {
-    /// The plans that can be begun now, those of one kind nearest first; empty while one is followed.
+impl ExternalPolicy {
+    /// Plans that can be started now, those of one kind nearest first; empty while a plan is
+    /// executed.
     pub fn valid(&self) -> &[Plan] {
         &self.valid
     }
 
-    /// Chooses one of the valid plans. Returns false, and changes nothing, if there is none of this
-    /// index.
-    pub fn tell(&mut self, index: usize) -> bool {
-        let told = self.valid.get(index).copied();
-        if told.is_some() {
-            self.told = told;
+    /// Selects one of the valid plans. Returns false, without any change, if the index is out of
+    /// range.
+    pub fn set_plan(&mut self, index: usize) -> bool {
+        let plan = self.valid.get(index).copied();
+        if plan.is_some() {
+            self.next = plan;
             self.valid.clear();
         }
-        told.is_some()
+        plan.is_some()
     }
 }
 
-impl Policy for External {
+impl Policy for ExternalPolicy {
     fn reset(&mut self, _: &Briefing) {
-        *self = External::default();
+        *self = ExternalPolicy::default();
     }
 
     fn choose(&mut self, _: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
-        if let Some(told) = self.told.take() {
-            return Ok(told);
+        if let Some(plan) = self.next.take() {
+            return Ok(plan);
         }
         self.valid = valid.to_vec();
-        Err(AgentError::Halted("a plan is to be chosen".to_owned()))
+        Err(AgentError::Halted(
+            "no plan is selected: call set_plan with the index of a valid plan".to_owned(),
+        ))
     }
 
-    fn fork(&self) -> Option<External> {
+    fn fork(&self) -> Option<ExternalPolicy> {
         Some(self.clone())
     }
 }

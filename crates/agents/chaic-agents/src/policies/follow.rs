@@ -1,33 +1,37 @@
-//! Always beside the partner: for collecting videos of what people do.
+//! Policy that stays near the partner, for collecting videos of people's actions.
 
-use chaic_core::briefing::Relation;
+use chaic_core::briefing::CompanionRole;
 use chaic_core::{AgentError, Briefing};
 
 use crate::decision::{Context, Plan, Policy};
 
-/// Follows the partner, and looks for it when it is lost.
+/// Follows the partner, and searches for it when it is lost.
 #[derive(Clone, Debug, Default)]
-pub struct Follow {
-    was_around: bool,
+pub struct FollowPolicy {
+    has_looked_around: bool,
 }
 
-impl Follow {
-    /// The partner's place if it is known, or where to look for it.
+impl FollowPolicy {
+    /// Returns a plan to follow the partner or, if its position is unknown, to search for it.
     pub fn decide(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
         // A sighting that led nowhere is 60 frames old by then.
-        let partner = context.memory.companion(context.briefing, Relation::Partner);
+        let partner = context.memory.companion(context.briefing, CompanionRole::Partner);
         let is_fresh = partner.is_some_and(|p| p.frame + 60 > context.memory.frame);
         if valid.contains(&Plan::FollowPartner) && is_fresh {
-            self.was_around = false;
+            self.has_looked_around = false;
             return Plan::FollowPartner;
         }
-        if std::mem::replace(&mut self.was_around, true) { Plan::Explore } else { Plan::TurnAround }
+        if std::mem::replace(&mut self.has_looked_around, true) {
+            Plan::Explore
+        } else {
+            Plan::TurnAround
+        }
     }
 }
 
-impl Policy for Follow {
+impl Policy for FollowPolicy {
     fn reset(&mut self, _: &Briefing) {
-        self.was_around = false;
+        self.has_looked_around = false;
     }
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
@@ -35,11 +39,11 @@ impl Policy for Follow {
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, _: bool) -> bool {
-        let person = context.memory.companion(context.briefing, Relation::Partner);
+        let person = context.memory.companion(context.briefing, CompanionRole::Partner);
         *current != Plan::FollowPartner && person.is_some_and(|p| p.is_in_view)
     }
 
-    fn fork(&self) -> Option<Follow> {
+    fn fork(&self) -> Option<FollowPolicy> {
         Some(self.clone())
     }
 }

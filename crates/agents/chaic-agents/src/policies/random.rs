@@ -1,7 +1,7 @@
-//! Any valid plan, all equally likely.
+//! Policy that chooses randomly among the valid plans.
 
-use chaic_core::briefing::Relation;
-use chaic_core::rng::Stream;
+use chaic_core::briefing::CompanionRole;
+use chaic_core::rng::RngStream;
 use chaic_core::{AgentError, Briefing};
 
 use crate::decision::{Context, Plan, Policy};
@@ -9,32 +9,32 @@ use crate::rules::RandomDraw;
 
 /// Chooses uniformly among the valid plans (the paper's random helper).
 #[derive(Clone, Debug)]
-pub struct Random {
-    rng: Stream,
+pub struct RandomPolicy {
+    rng: RngStream,
 }
 
-impl Default for Random {
-    fn default() -> Random {
-        Random { rng: Stream::new(0, "random policy", 0) }
+impl Default for RandomPolicy {
+    fn default() -> RandomPolicy {
+        RandomPolicy { rng: RngStream::new(0, "random policy", 0) }
     }
 }
 
-impl Policy for Random {
+impl Policy for RandomPolicy {
     fn reset(&mut self, briefing: &Briefing) {
-        self.rng = Stream::new(briefing.seed, "random policy", 0);
+        self.rng = RngStream::new(briefing.seed, "random policy", 0);
     }
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
         Ok(self.decide(context, valid))
     }
 
-    fn fork(&self) -> Option<Random> {
+    fn fork(&self) -> Option<RandomPolicy> {
         Some(self.clone())
     }
 }
 
-impl Random {
-    /// A plan drawn from the valid ones.
+impl RandomPolicy {
+    /// Draws one of the valid plans.
     pub fn decide(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
         let drawn = match context.memory.rules.random_draw {
             RandomDraw::Plans => self.rng.choose(valid).copied(),
@@ -51,11 +51,13 @@ impl Random {
                 kinds.push(*plan);
             }
         }
-        // To follow somebody whose place nobody knows is to explore (facts A2.1).
-        let followed =
-            [(Relation::Partner, Plan::FollowPartner), (Relation::Child, Plan::FollowChild)];
-        for (relation, follow) in followed {
-            if context.briefing.companion(relation).is_some() && !kinds.contains(&follow) {
+        // To follow a person at an unknown position is to explore (facts A2.1).
+        let followed = [
+            (CompanionRole::Partner, Plan::FollowPartner),
+            (CompanionRole::Child, Plan::FollowChild),
+        ];
+        for (role, follow) in followed {
+            if context.briefing.companion(role).is_some() && !kinds.contains(&follow) {
                 kinds.push(Plan::Explore);
             }
         }
@@ -81,7 +83,7 @@ mod tests {
     use chaic_core::ClassId;
 
     #[test]
-    fn drawing_kinds_first_gives_ten_objects_no_more_weight_than_one_plan() {
+    fn with_kinds_first_nine_objects_have_no_more_weight_than_one_plan() {
         let briefing = Toy::room(4.0, 4.0).briefing();
         let subject = |n| Subject { track: TrackId(n), class: ClassId::named("apple") };
         let mut valid = vec![Plan::Explore, Plan::TurnAround, Plan::FollowPartner];
@@ -96,7 +98,7 @@ mod tests {
                 behavior: &behavior,
                 is_explored: false,
             };
-            let mut random = Random::default();
+            let mut random = RandomPolicy::default();
             let n = (0..1200)
                 .filter(|_| matches!(random.decide(&context, &valid), Plan::PickUp(_)))
                 .count();

@@ -1,153 +1,154 @@
-//! The constants of the planners, in groups. Both rule sets have the same ones: what the original's
-//! code does otherwise is a field of [`PlannerRules`](super::PlannerRules) itself.
+//! Constants of the planners, in groups. Both rule sets use the same values; differences of the
+//! original's code are fields of [`PlannerRules`](super::PlannerRules) itself.
 
 use chaic_core::Frame;
 use serde::{Deserialize, Serialize};
 
-/// How time is weighed, and when a plan is looked at again.
+/// Time budgeting and replanning.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TimeRules {
-    /// A plan under way is looked at again after so long, frames. Ours: a walk of four steps; what
-    /// comes up is looked at at once.
+    /// Time after which a plan is reconsidered, frames. Ours: a walk of four steps; relevant map
+    /// changes trigger it at once.
     pub reconsider_frames: Frame,
-    /// What the partner was last known to hold counts as done for so long, frames. Ours: as long
-    /// as what somebody else holds is left alone (`held_frames` of the paper's rules).
+    /// Time for which the partner's last known held objects count as done, frames. Ours: as long as
+    /// objects held by others are avoided (`held_frames` of the paper's rules).
     pub partner_holds_frames: Frame,
-    /// One sets out for the goal place so long before one would have to, frames. Ours: a put-on
-    /// takes up to 100, and a bump or a closed way on the way costs more.
+    /// Time reserve for the walk to the goal place, frames. Ours: a put-on takes up to 100, and a
+    /// bump or a blocked path costs more.
     pub spare_frames: Frame,
-    /// Walking takes longer than the way at full speed by this factor. Ours: for turns, and for
-    /// starting and stopping.
+    /// Ratio of walking time to path length at full speed. Ours: it covers turns, starts and stops.
     pub walk_factor: f32,
-    /// A pick-up and a put-on take at least so long together, frames. Ours: a little less than the
-    /// 58 and 75 that they take in the world at least, so that nothing is left that can be done.
+    /// Minimum time of a pick-up and a put-on together, frames. Ours: slightly less than the
+    /// world's minimum of 58 + 75, so that no feasible delivery is ruled out.
     pub pick_and_put_frames: Frame,
 }
 
-/// How long a plan lasts at most. All are the original's (facts A2.1).
+/// Time limits of plans. All are the original's (facts A2.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PlanLimits {
-    /// Exploring towards one place, frames.
+    /// Exploration of one target, frames.
     pub explore_frames: Frame,
-    /// Picking up, putting, removing and all that is not named here, frames.
+    /// Picking up, putting, removing and all plans not listed here, frames.
     pub interact_frames: Frame,
     /// Following the partner, frames.
     pub follow_partner_frames: Frame,
-    /// Following the child since it was last needed, frames.
+    /// Following the child, since it was last needed, frames.
     pub follow_child_frames: Frame,
-    /// A wait, frames.
+    /// Waiting, frames.
     pub wait_frames: Frame,
 }
 
-/// What is made of failed attempts.
+/// Consequences of failed attempts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FailureRules {
-    /// An object is left alone for so long after a failed attempt, frames (facts A1.1, A2.1).
+    /// Time for which an object is ignored after a failed attempt, frames (facts A1.1, A2.1).
     pub ignore_frames: Frame,
-    /// Failed lifts of one piece of furniture before it is left alone (facts A2.5).
+    /// Failed lifts of one piece of furniture before it is ignored (facts A2.5).
     pub lift_tries: u32,
-    /// From so many places an object is tried in one plan. Ours: one for each of its sides.
+    /// Number of positions from which an object is tried in one plan. Ours: one for each of its
+    /// sides.
     pub places_tried: u32,
-    /// A place from where something could not be done is remembered so long, frames. Ours: longer
-    /// than an object is left alone, so that the next attempt begins elsewhere.
+    /// Time for which a position with a failed interaction is remembered, frames. Ours: longer than
+    /// an object is ignored, so that the next attempt starts elsewhere.
     pub bad_place_frames: Frame,
-    /// An object without a way to it is left alone for so long, frames. Ours: as long as exploring
-    /// one more place may take, which may show a way.
+    /// Time for which an unreachable object is ignored, frames. Ours: as long as one exploration
+    /// plan may take, which may reveal a path.
     pub unreachable_frames: Frame,
-    /// An object that one found in somebody else's hands is left alone for so long, whatever it
-    /// looks like, frames. Ours: about as long as a pick-up takes.
+    /// Time for which an object is ignored after a pick-up failed because another agent holds it,
+    /// frames. Ours: about as long as a pick-up takes.
     pub held_for_sure_frames: Frame,
-    /// An object with which what was tried is impossible is left alone for so long, frames. Ours:
-    /// two thirds of an episode, as what is impossible stays so.
+    /// Time for which an object is ignored after an impossible interaction, frames. Ours: two
+    /// thirds of an episode, because what is impossible stays so.
     pub impossible_frames: Frame,
-    /// Where one has bumped into something again and again, nobody gets through for so long, frames.
-    /// Ours: a third of an episode, as obstacles stay unless somebody clears them away.
+    /// Time for which the position of repeated bumps counts as occupied, frames. Ours: a third of
+    /// an episode, because obstacles stay unless an agent removes them.
     pub barred_frames: Frame,
-    /// Who waits for somebody to clear an obstacle away, where ways are those of the original, gives
-    /// up after so long, frames, and for `ignore_frames` goes where there is just enough room to get
-    /// past, or does other things. Ours: less than after which one counts as stuck. The original
-    /// waits until its plan ends (facts A1.6), and then makes the same plan again.
+    /// Maximum wait for another agent to remove an obstacle, with lattice navigation, frames.
+    /// Afterwards, for `ignore_frames`, the agent passes where there is just enough room, or
+    /// follows other plans. Ours: shorter than the time after which an agent counts as stuck. The
+    /// original waits until its plan ends (facts A1.6), and then makes the same plan again.
     pub obstacle_patience_frames: Frame,
 }
 
-/// When one lifts furniture together with the partner. The original's planners never mean to
-/// (facts A2.5), so all of this is ours.
+/// Lifting furniture together with the partner. The original's planners never plan to do so (facts
+/// A2.5), so all of this is ours.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LiftingRules {
-    /// The partner is at a piece if it is this near to the nearest known point of it, metres: twice
-    /// the arm's length of 0.7 m, as parts of a piece may be unseen.
+    /// Maximum distance of a partner at a piece from its nearest known point, meters. It is twice
+    /// the arm's length of 0.7 m, because parts of a piece may be unseen.
     pub at_piece_m: f32,
-    /// And was seen there so recently, frames: as long as who stands at furniture waits for the
-    /// other (`world.durations.await_partner`).
+    /// Maximum age of that sighting, frames. It equals the time for which an agent waits at
+    /// furniture for the other (`world.durations.await_partner`).
     pub at_piece_frames: Frame,
-    /// A failed lift of the partner calls for help for so long, frames: time to walk 14 m.
+    /// Time for which a failed lift of the partner counts as a call for help, frames: enough to
+    /// walk 14 m.
     pub call_frames: Frame,
-    /// A partner seen this far from the piece won't lift it now, metres: from beyond 3 m the world
-    /// lets nobody step up to a thing.
+    /// Distance from which a partner has left the piece, meters: the world lets agents step up from
+    /// at most 3 m.
     pub left_piece_m: f32,
-    /// So many lifts of one plan may fail. Eight that wait for the other to the end take longer
-    /// than a plan may; it bounds those that fail early.
+    /// Maximum number of failed lifts per plan. Eight lifts that wait for the partner until the
+    /// timeout exceed the plan's time limit; the bound is for those that fail early.
     pub tries_together: u32,
 }
 
-/// How near one stays to people, and what is made of the child.
+/// Distances to people, and tracking of the child.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PeopleRules {
-    /// Who follows the partner stays this near, metres. Ours: nearer than the original's 3 m (facts
-    /// A1.6), so that fewer corners come between.
+    /// Following distance to the partner, meters. Ours: less than the original's 3 m (facts A1.6),
+    /// so that fewer corners occlude it.
     pub partner_within_m: f32,
-    /// Who follows the child gets this near, metres. Ours: the original's 2 m (facts A1.6), less
-    /// what a map of cells of 0.125 m may err.
+    /// Following distance to the child, meters. Ours: the original's 2 m (facts A1.6) minus the
+    /// error of a map with cells of 0.125 m.
     pub child_within_m: f32,
-    /// One stands beside the child from this near on, metres. Ours: less than the 2.5 m from which
-    /// it turns back (facts A2.4), as both move between two looks.
+    /// Distance that counts as beside the child, meters. Ours: less than the 2.5 m at which it
+    /// turns back (facts A2.4), because both move between two observations.
     pub child_beside_m: f32,
-    /// One stands beside the child for so long, frames. Ours: it decides after each of its steps,
+    /// Time to stand beside the child, frames. Ours: the child decides after each of its steps,
     /// which take 18 or 19.
     pub child_stand_frames: Frame,
-    /// The child is trusted to come back by itself for so long after one first stood beside it,
+    /// Time for which the child is trusted to come back after the helper first stood beside it,
     /// frames. Ours: it walks 5.9 m in that time, and escapes to more than 5 m (facts A2.4).
     pub child_trust_frames: Frame,
-    /// People count as seen a moment ago for so long, frames (facts A2.1).
+    /// Time for which a person counts as recently seen, frames (facts A2.1).
     pub fresh_frames: Frame,
-    /// The child is away if it is in view with the partner farther apart than this, metres (facts
-    /// A2.1).
+    /// Distance between child and partner, both in view, from which the child is away, meters
+    /// (facts A2.1).
     pub child_apart_in_view_m: f32,
-    /// Or if both were seen a moment ago farther apart than this, metres (facts A2.1).
+    /// The same if both were seen recently, meters (facts A2.1).
     pub child_apart_remembered_m: f32,
 }
 
-/// What the child itself does: the original's numbers (facts A2.4), but for the last two.
+/// Behavior of the child: the original's parameters (facts A2.4), except for the last two.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChildRules {
-    /// Between two draws whether it runs away pass more than so many frames.
+    /// Minimum time between two draws whether it runs away, frames.
     pub plan_frames: Frame,
-    /// Chance to run away at each draw, where draws are by the episode's luck.
+    /// Probability to run away per draw, with draws from the episode's random stream.
     pub run_chance: f32,
-    /// It turns back once the helper is this near, metres.
+    /// Distance of the helper at which it turns back, meters.
     pub caught_m: f32,
-    /// It is back with its guardian from here, metres.
+    /// Distance from its guardian at which it has returned, meters.
     pub home_m: f32,
-    /// How near it follows its guardian, metres.
+    /// Following distance to its guardian, meters.
     pub follow_m: f32,
-    /// It runs at least so far, metres.
+    /// Minimum length of an escape, meters.
     pub run_min_m: f32,
-    /// To a point that lies off its guardian's direction by more than this, radians: 60 degrees.
+    /// Minimum angle between the escape and the guardian's direction, radians: 60 degrees.
     pub off_rad: f32,
-    /// Or by more than this, radians, where the point is far from the guardian: 30 degrees.
+    /// The same if the target is far from the guardian, radians: 30 degrees.
     pub off_far_rad: f32,
-    /// Farther from the guardian than this is far, metres.
+    /// Distance from the guardian that counts as far, meters.
     pub far_m: f32,
-    /// The point is at least so far inside the place, metres: 6 cells of the original's map.
+    /// Minimum distance of the target from the bounds, meters: 6 cells of the original's map.
     pub border_m: f32,
-    /// Nothing is known to stand so near to the point, metres. Ours: room for the child.
+    /// Radius around the target without known obstacles, meters. Ours: room for the child.
     pub free_m: f32,
-    /// So near to the point it is there, metres. Ours: a little more than a step.
+    /// Arrival distance, meters. Ours: slightly more than a step.
     pub there_m: f32,
 }
 
 impl TimeRules {
-    /// Of both rule sets.
+    /// Values of both rule sets.
     pub const STANDARD: TimeRules = TimeRules {
         reconsider_frames: 40,
         partner_holds_frames: 300,
@@ -158,7 +159,7 @@ impl TimeRules {
 }
 
 impl PlanLimits {
-    /// Of both rule sets.
+    /// Values of both rule sets.
     pub const STANDARD: PlanLimits = PlanLimits {
         explore_frames: 250,
         interact_frames: 1000,
@@ -169,7 +170,7 @@ impl PlanLimits {
 }
 
 impl FailureRules {
-    /// Of both rule sets.
+    /// Values of both rule sets.
     pub const STANDARD: FailureRules = FailureRules {
         ignore_frames: 500,
         lift_tries: 5,
@@ -184,7 +185,7 @@ impl FailureRules {
 }
 
 impl LiftingRules {
-    /// Of both rule sets.
+    /// Values of both rule sets.
     pub const STANDARD: LiftingRules = LiftingRules {
         at_piece_m: 1.5,
         at_piece_frames: 150,
@@ -195,7 +196,7 @@ impl LiftingRules {
 }
 
 impl PeopleRules {
-    /// Of both rule sets.
+    /// Values of both rule sets.
     pub const STANDARD: PeopleRules = PeopleRules {
         partner_within_m: 2.2,
         child_within_m: 1.9,
@@ -209,7 +210,7 @@ impl PeopleRules {
 }
 
 impl ChildRules {
-    /// Of both rule sets.
+    /// Values of both rule sets.
     pub const STANDARD: ChildRules = ChildRules {
         plan_frames: 100,
         run_chance: 0.2,
@@ -226,8 +227,7 @@ impl ChildRules {
     };
 }
 
-/// For listings of rules that were written before these constants were rules: they were played
-/// by just these.
+/// Defaults for stored rules that predate these fields: they were run with exactly these values.
 macro_rules! standard_by_default {
     ($($group:ty),*) => {$(
         impl Default for $group {

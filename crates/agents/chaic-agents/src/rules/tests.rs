@@ -1,17 +1,17 @@
-//! Each rule in which the original's planners differ, against a situation worked out by hand: every
-//! case flips one rule of the paper's set. What a random helper draws is tested beside it, and when
-//! the child runs away in `child.rs`.
+//! Each rule in which the original's planners differ, in a situation worked out by hand: every case
+//! changes one rule of the paper's set. The random helper's draws are tested in its own file, and
+//! the child's escapes in `child.rs`.
 
 mod constants;
-mod others;
-mod walking;
+mod navigation;
+mod other_agents;
 
 use super::*;
 use crate::behavior::BehaviorLog;
 use crate::decision::{Context, Plan, Policy as _, Subject};
-use crate::execution::interact::learn;
-use crate::execution::{Executor, Progress, Situation};
-use crate::memory::{Done, Memory};
+use crate::execution::interaction::apply_outcome;
+use crate::execution::{ExecutionContext, Executor, Progress};
+use crate::memory::{ActionRecord, Memory};
 use crate::perception::{GroundTruthIds, Perception as _};
 use crate::policies::{RulePolicy, RuleProfile};
 use crate::test_support::{Toy, ToyObject, carried, hands};
@@ -25,34 +25,34 @@ fn subject(class: &str, track: u32) -> Subject {
     Subject { track: TrackId(track), class: ClassId::named(class) }
 }
 
-/// A choice to make.
-struct Situated {
+/// Situation in which a decision is made.
+struct Scenario {
     memory: Memory,
     briefing: Briefing,
     hands: [Option<Carried>; 2],
     valid: Vec<Plan>,
 }
 
-impl Situated {
-    /// An apple and two bananas are wanted, and there is a lot of time.
-    fn new(rules: PlannerRules) -> Situated {
+impl Scenario {
+    /// Creates a situation in which an apple and two bananas are needed and plenty of time is left.
+    fn new(rules: PlannerRules) -> Scenario {
         let mut briefing = Toy::room(4.0, 4.0).briefing();
         briefing.goal = Toy::goal(&[("apple", 1), ("banana", 2)]);
         let mut memory = Memory::new(&briefing, rules);
         memory.frame = 100;
-        Situated { memory, briefing, hands: [None, None], valid: vec![Plan::Explore] }
+        Scenario { memory, briefing, hands: [None, None], valid: vec![Plan::Explore] }
     }
 
-    /// What the partner answers who has (or has not) looked around already.
-    fn ask<T>(&self, of: impl Fn(&mut RulePolicy, &Context<'_>) -> T) -> T {
-        self.ask_of(&mut RulePolicy::new(RuleProfile::PARTNER), of)
+    /// Evaluates a function with a fresh partner policy.
+    fn evaluate<T>(&self, function: impl Fn(&mut RulePolicy, &Context<'_>) -> T) -> T {
+        self.evaluate_with(&mut RulePolicy::new(RuleProfile::PARTNER), function)
     }
 
-    /// What this one answers.
-    fn ask_of<T>(
+    /// Evaluates a function with this policy.
+    fn evaluate_with<T>(
         &self,
-        who: &mut RulePolicy,
-        of: impl Fn(&mut RulePolicy, &Context<'_>) -> T,
+        policy: &mut RulePolicy,
+        function: impl Fn(&mut RulePolicy, &Context<'_>) -> T,
     ) -> T {
         let behavior = BehaviorLog::default();
         let mut memory = self.memory.clone();
@@ -63,50 +63,50 @@ impl Situated {
             behavior: &behavior,
             is_explored: false,
         };
-        of(who, &context)
+        function(policy, &context)
     }
 
-    /// The partner's second choice: at first, one may look around.
+    /// Returns the partner's second choice, because the first may be to look around.
     fn choose(&self) -> Plan {
         self.choose_as(RuleProfile::PARTNER)
     }
 
-    /// The second choice of somebody of this profile.
+    /// Returns the second choice of a policy with this profile.
     fn choose_as(&self, profile: RuleProfile) -> Plan {
-        self.ask_of(&mut RulePolicy::new(profile), |rules, context| {
+        self.evaluate_with(&mut RulePolicy::new(profile), |rules, context| {
             rules.decide(context, &self.valid);
             rules.decide(context, &self.valid)
         })
     }
 
-    /// The first thing that carrying out a plan comes to.
-    fn begin(&mut self, executor: &mut Executor, plan: Plan) -> Progress {
-        executor.begin(self.memory.frame, &self.memory.rules);
-        self.go_on(executor, plan)
+    /// Starts a plan and returns its first step.
+    fn start_plan(&mut self, executor: &mut Executor, plan: Plan) -> Progress {
+        executor.start_plan(self.memory.frame, &self.memory.rules);
+        self.continue_plan(executor, plan)
     }
 
-    /// What carrying out the same plan comes to next.
-    fn go_on(&mut self, executor: &mut Executor, plan: Plan) -> Progress {
+    /// Returns the next step of the same plan.
+    fn continue_plan(&mut self, executor: &mut Executor, plan: Plan) -> Progress {
         self.memory.hands = hands(self.hands.clone());
         let briefing = &self.briefing;
-        executor.step(&plan, &mut Situation { memory: &mut self.memory, briefing })
+        executor.step(&plan, &mut ExecutionContext { memory: &mut self.memory, briefing })
     }
 
-    /// How often one turns when one looks all around.
+    /// Returns the number of turns to look around.
     fn n_turns_around(&mut self) -> u32 {
-        let mut executor = Executor::new(&self.briefing);
-        let mut progress = self.begin(&mut executor, Plan::TurnAround);
+        let mut executor = Executor::new(&self.briefing, &self.memory.rules);
+        let mut progress = self.start_plan(&mut executor, Plan::TurnAround);
         let mut n = 0;
         while progress != Progress::Done {
             assert_eq!(progress, Progress::Act(Action::TurnLeft));
-            progress = self.go_on(&mut executor, Plan::TurnAround);
+            progress = self.continue_plan(&mut executor, Plan::TurnAround);
             n += 1;
         }
         n
     }
 
-    /// Stands in a toy world and looks.
-    fn look(&mut self, toy: &Toy) {
+    /// Replaces the memory by one observation of a toy world.
+    fn observe(&mut self, toy: &Toy) {
         self.briefing.bounds = toy.bounds();
         let observation = toy.observe();
         self.memory = Memory::new(&self.briefing, self.memory.rules);
@@ -116,27 +116,28 @@ impl Situated {
 }
 
 #[test]
-fn looking_around_first() {
+fn the_first_plan_is_to_look_around() {
     for (looks_around_first, expected) in [(true, Plan::TurnAround), (false, Plan::Explore)] {
-        let s = Situated::new(PlannerRules { looks_around_first, ..PAPER });
-        assert_eq!(s.ask(|rules, context| rules.decide(context, &s.valid)), expected);
+        let s = Scenario::new(PlannerRules { looks_around_first, ..PAPER });
+        assert_eq!(s.evaluate(|rules, context| rules.decide(context, &s.valid)), expected);
     }
 }
 
 #[test]
-fn a_plan_is_left_on_news_or_not() {
+fn a_plan_is_reconsidered_after_changes_or_not() {
     for reconsiders in [true, false] {
-        let s = Situated::new(PlannerRules { reconsiders, ..PAPER });
-        let left = s.ask(|rules, context| rules.reconsiders(context, &Plan::Explore, true));
-        assert_eq!(left, reconsiders);
+        let s = Scenario::new(PlannerRules { reconsiders, ..PAPER });
+        let reconsidered =
+            s.evaluate(|rules, context| rules.reconsiders(context, &Plan::Explore, true));
+        assert_eq!(reconsidered, reconsiders);
     }
 }
 
 #[test]
-fn a_container_for_a_single_object() {
+fn a_container_is_fetched_for_enough_objects_only() {
     let basket = Plan::PickContainer(subject("wicker_basket", 30));
     for (min_for_container, expected) in [(3, Plan::Explore), (0, basket)] {
-        let mut s = Situated::new(PlannerRules { min_for_container, ..PAPER });
+        let mut s = Scenario::new(PlannerRules { min_for_container, ..PAPER });
         s.briefing.goal = Toy::goal(&[("apple", 1)]);
         s.valid.push(basket);
         assert_eq!(s.choose(), expected);
@@ -144,9 +145,9 @@ fn a_container_for_a_single_object() {
 }
 
 #[test]
-fn delivering_once_nothing_is_left_or_only_when_time_is_short() {
+fn delivery_starts_when_nothing_is_left_or_only_when_time_is_short() {
     for (delivers_when_done, expected) in [(true, Plan::Deliver), (false, Plan::Explore)] {
-        let mut s = Situated::new(PlannerRules { delivers_when_done, ..PAPER });
+        let mut s = Scenario::new(PlannerRules { delivers_when_done, ..PAPER });
         s.briefing.goal = Toy::goal(&[("apple", 1)]);
         s.hands[0] = Some(carried("apple", 30, &[]));
         s.valid.push(Plan::Deliver);
@@ -157,38 +158,38 @@ fn delivering_once_nothing_is_left_or_only_when_time_is_short() {
 }
 
 #[test]
-fn a_class_wanted_once_is_dropped_after_the_first_pick_and_no_other_ever() {
-    let choose = |bookkeeping, taken: &str, seen: Subject| {
-        let mut s = Situated::new(PlannerRules { bookkeeping, ..PAPER });
-        // Seen and delivered long ago, by oneself.
+fn only_a_class_needed_once_is_dropped_after_the_first_pick() {
+    let choose = |bookkeeping, taken: &str, visible: Subject| {
+        let mut s = Scenario::new(PlannerRules { bookkeeping, ..PAPER });
+        // Seen and delivered earlier, by the agent itself.
         let mut toy = Toy::room(8.0, 8.0);
         let track = toy.add(ToyObject::new(taken, [0.0, 0.0, -2.5], [0.3, 0.3, 0.3]));
         toy.stand([0.0, 0.0], 0.0);
         let observation = toy.observe();
         s.memory.update(&s.briefing, &observation, &GroundTruthIds.perceive(&observation));
         let action = Action::PickUp { object: track, hand: Hand::Left };
-        s.memory.history.push(Done { frame: 50, action, outcome: Outcome::Success });
+        s.memory.history.push(ActionRecord { frame: 50, action, outcome: Outcome::Success });
         s.memory.delivered.extend([track]);
-        s.valid.push(Plan::PickUp(seen));
+        s.valid.push(Plan::PickUp(visible));
         s.choose()
     };
     let (apple, banana) = (subject("apple", 60), subject("banana", 61));
     for bookkeeping in [Bookkeeping::Exact, Bookkeeping::FirstPick] {
-        assert_eq!(choose(bookkeeping, "apple", apple), Plan::Explore, "one was wanted");
+        assert_eq!(choose(bookkeeping, "apple", apple), Plan::Explore, "one was needed");
         assert_eq!(choose(bookkeeping, "banana", banana), Plan::PickUp(banana));
         assert_eq!(choose(bookkeeping, "orange", apple), Plan::PickUp(apple));
     }
 }
 
 #[test]
-fn there_is_no_time_for_what_is_far_off() {
+fn distant_objects_are_ignored_for_lack_of_time() {
     let mut toy = Toy::room(12.0, 12.0);
     let apple = toy.add(ToyObject::new("apple", [0.0, 0.0, -3.0], [0.3, 0.3, 0.3]));
     toy.add(ToyObject::new("bed", [3.0, 0.0, -4.0], [1.0, 0.5, 1.0]));
     toy.stand([0.0, 0.0], 0.0);
     let apple = Plan::PickUp(subject("apple", apple.0));
     for (weighs_time, expected) in [(true, Plan::Explore), (false, apple)] {
-        let mut s = Situated::new(PlannerRules { weighs_time, ..PAPER });
+        let mut s = Scenario::new(PlannerRules { weighs_time, ..PAPER });
         s.briefing.bounds = toy.bounds();
         s.briefing.goal_places = vec![ClassId::named("bed")];
         s.memory = Memory::new(&s.briefing, s.memory.rules);
@@ -201,7 +202,7 @@ fn there_is_no_time_for_what_is_far_off() {
     }
 }
 
-/// A memory in which there is one thing, 2.5 m ahead.
+/// Creates a memory that contains one object, 2.5 m ahead.
 fn memory_of(class: &str, rules: PlannerRules) -> (Memory, Briefing, TrackId) {
     let mut toy = Toy::room(8.0, 8.0);
     let track = toy.add(ToyObject::new(class, [0.0, 0.0, -2.5], [0.5, 0.5, 0.5]));
@@ -215,8 +216,8 @@ fn memory_of(class: &str, rules: PlannerRules) -> (Memory, Briefing, TrackId) {
 }
 
 #[test]
-fn what_is_left_alone_after_a_failure_and_for_how_long() {
-    // Rules, why it failed; from which frame on it is available again.
+fn a_failure_makes_an_object_ignored_for_a_limited_time() {
+    // Rules, reason of the failure, and frame from which the object is available again.
     let any = PlannerRules { any_failure_counts: true, ..PAPER };
     let longer = PlannerRules { held_frames: 500, ..PAPER };
     for (rules, reason, from) in [
@@ -227,21 +228,21 @@ fn what_is_left_alone_after_a_failure_and_for_how_long() {
     ] {
         let (mut memory, briefing, apple) = memory_of("apple", rules);
         let action = Action::PickUp { object: apple, hand: Hand::Left };
-        learn(&mut memory, &briefing, (action, Outcome::Failure(reason)), &[], &[]);
-        let thing = memory.things.get(apple).expect("seen");
-        assert!(thing.is_available(from), "{reason}");
-        assert!(from == 0 || !thing.is_available(from - 1), "{reason}");
+        apply_outcome(&mut memory, &briefing, (action, Outcome::Failure(reason)), &[], &[]);
+        let object = memory.objects.get(apple).expect("seen");
+        assert!(object.is_available(from), "{reason}");
+        assert!(from == 0 || !object.is_available(from - 1), "{reason}");
     }
 }
 
 #[test]
-fn the_goal_place_is_forgotten_after_a_failed_put() {
+fn a_goal_place_is_ignored_after_a_failed_put_on() {
     for (goal_blackout_frames, expected) in [(0, [1, 1]), (500, [0, 1])] {
         let rules = PlannerRules { goal_blackout_frames, ..PAPER };
         let (mut memory, briefing, bed) = memory_of("bed", rules);
         let action = Action::PutOn { place: bed, hand: Hand::Left };
         let failed = Outcome::Failure(FailureReason::BeyondLimits);
-        learn(&mut memory, &briefing, (action, failed), &[], &[]);
+        apply_outcome(&mut memory, &briefing, (action, failed), &[], &[]);
         let known = [499, 500].map(|frame| {
             memory.frame = frame;
             memory.goal_places().len()
@@ -251,7 +252,7 @@ fn the_goal_place_is_forgotten_after_a_failed_put() {
 }
 
 #[test]
-fn an_empty_place_proves_something_or_nothing() {
+fn an_object_is_forgotten_at_an_empty_position_or_not() {
     for forgets_missing in [true, false] {
         let mut toy = Toy::room(8.0, 8.0);
         toy.size = 256;
@@ -267,12 +268,12 @@ fn an_empty_place_proves_something_or_nothing() {
             }
             toy.frame += 1;
         }
-        assert_eq!(memory.things.get(apple).expect("seen").is_present, !forgets_missing);
+        assert_eq!(memory.objects.get(apple).expect("seen").is_present, !forgets_missing);
     }
 }
 
 #[test]
-fn only_helpers_without_perfect_eyes_see_nobody_and_know_less() {
+fn only_helpers_without_perfect_segmentation_miss_people_and_know_less() {
     let rules = PlannerRules { helpers_see_people: false, helper_known_range_m: 3.0, ..PAPER };
     for (grants, sees, known_m) in [
         (Grants::IDS, false, 3.0),
@@ -287,9 +288,9 @@ fn only_helpers_without_perfect_eyes_see_nobody_and_know_less() {
 }
 
 #[test]
-fn a_turn_around_is_as_long_as_the_rules_say() {
+fn looking_around_takes_the_number_of_turns_in_the_rules() {
     for around_turns in [PAPER.around_turns, PlannerRules::compat().around_turns] {
-        let mut s = Situated::new(PlannerRules { around_turns, ..PAPER });
+        let mut s = Scenario::new(PlannerRules { around_turns, ..PAPER });
         assert_eq!(s.n_turns_around(), around_turns);
     }
 }

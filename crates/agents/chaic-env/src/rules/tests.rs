@@ -1,9 +1,9 @@
-//! Promises: single rules are set by name, both sets are made of the rules that are listed, every
-//! rule stands in `docs/rules.md` with the values that it has, and old listings are read.
+//! Tests that rules are set by name, that both sets consist of the listed rules, that `docs/rules.md`
+//! lists every rule with its values, and that old listings are read.
 
 use super::*;
 
-/// Where every rule stands with its value and reason.
+/// Page that lists every rule with its value and reason.
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../docs/rules.md");
 
 #[test]
@@ -23,7 +23,7 @@ fn single_rules_are_set_by_value_and_by_set() -> Result<()> {
 }
 
 #[test]
-fn a_wrong_setting_is_refused_with_what_would_be_right() {
+fn a_wrong_setting_is_refused_with_the_expected_values() {
     for (setting, expected) in [
         ("world.gravity=9", "planner.exploration"),
         ("name=paper", "no rule `name`"),
@@ -41,12 +41,12 @@ fn a_wrong_setting_is_refused_with_what_would_be_right() {
 }
 
 #[test]
-fn the_sets_differ_in_just_the_listed_rules() -> Result<()> {
+fn the_sets_differ_in_exactly_the_listed_rules() -> Result<()> {
     let differing = differing_rules();
-    let made = differing
+    let rebuilt = differing
         .iter()
         .try_fold(RuleSet::PAPER, |rules, name| rules.with(&format!("{name}=compat")))?;
-    assert_eq!(RuleSet { name: RuleSetName::Compat, ..made }, RuleSet::COMPAT);
+    assert_eq!(RuleSet { name: RuleSetName::Compat, ..rebuilt }, RuleSet::COMPAT);
     for name in &differing {
         let (paper, compat) = rule_values(name)?;
         assert_ne!(paper, compat, "{name}");
@@ -59,45 +59,44 @@ fn the_sets_differ_in_just_the_listed_rules() -> Result<()> {
 }
 
 #[test]
-fn every_set_can_be_made_of_the_other_rule_by_rule() -> Result<()> {
-    let made = rule_names()
+fn each_set_can_be_built_from_the_other_rule_by_rule() -> Result<()> {
+    let rebuilt = rule_names()
         .iter()
         .try_fold(RuleSet::PAPER, |rules, name| rules.with(&format!("{name}=compat")))?;
-    assert_eq!(RuleSet { name: RuleSetName::Compat, ..made }, RuleSet::COMPAT);
+    assert_eq!(RuleSet { name: RuleSetName::Compat, ..rebuilt }, RuleSet::COMPAT);
     Ok(())
 }
 
-/// The rules of a page's tables, each with the values that its row gives: one for both sets, or the
+/// Returns the rules in the tables of a page with the values of their rows: one for both sets, or the
 /// paper's and the original's.
 fn listed(page: &str) -> Vec<(&str, Vec<&str>)> {
     let rows = page.lines().filter_map(|line| line.strip_prefix("| `"));
     rows.filter_map(|row| {
-        let (name, rest) = row.split_once("` | ")?;
-        let values: Vec<&str> = rest.trim_end_matches(" |").split(" | ").collect();
+        let (name, columns) = row.split_once("` | ")?;
+        let values: Vec<&str> = columns.trim_end_matches(" |").split(" | ").collect();
         let is_rule = name.starts_with("world.") || name.starts_with("planner.");
         is_rule.then(|| (name, values[..values.len() - 1].to_vec()))
     })
     .collect()
 }
 
-/// Whether a row says what is so, be it as 2 or as 2.0.
-fn says(row: &str, value: &str) -> bool {
+/// Returns whether a table value equals a rule's value, with 2 equal to 2.0.
+fn equals(row: &str, value: &str) -> bool {
     let number = |text: &str| text.parse::<f32>().ok();
     row == value || number(row).is_some_and(|n| number(value) == Some(n))
 }
 
 #[test]
-fn every_rule_stands_in_the_page_of_rules_with_its_values() -> Result<()> {
-    let page = std::fs::read_to_string(PAGE).expect("the page is in the repository");
+fn the_rules_page_lists_every_rule_with_its_values() -> Result<()> {
+    let page = std::fs::read_to_string(PAGE).expect("docs/rules.md exists");
     let rows = listed(&page);
     for (name, values) in &rows {
         let (paper, compat) = rule_values(name)?;
         let expected = if paper == compat { vec![paper] } else { vec![paper, compat] };
-        // What is off in both sets may still be told apart.
-        let is_right = values
-            .iter()
-            .enumerate()
-            .all(|(i, v)| says(v, expected.get(i).or(expected.last()).map_or("", String::as_str)));
+        // A rule that is off in both sets may still list two values.
+        let is_right = values.iter().enumerate().all(|(i, v)| {
+            equals(v, expected.get(i).or(expected.last()).map_or("", String::as_str))
+        });
         assert!(is_right && values.len() >= expected.len(), "{name}: {values:?}, not {expected:?}");
     }
     for name in rule_names() {
@@ -108,7 +107,7 @@ fn every_rule_stands_in_the_page_of_rules_with_its_values() -> Result<()> {
 }
 
 #[test]
-fn listings_from_before_constants_were_rules_are_read_as_they_were_played() {
+fn old_listings_without_rule_groups_are_read_with_default_values() {
     for rules in [RuleSet::PAPER, RuleSet::COMPAT] {
         let mut listing = rules.to_value();
         let planner = listing["planner"].as_object_mut().expect("a struct");
@@ -116,7 +115,7 @@ fn listings_from_before_constants_were_rules_are_read_as_they_were_played() {
             assert!(planner.remove(group).is_some(), "{group}");
         }
         assert_eq!(serde_json::from_value::<RuleSet>(listing).expect("readable"), rules);
-        // A rule that was always there may not be missing.
+        // A rule of the first version is required.
         let mut listing = rules.to_value();
         listing["planner"].as_object_mut().expect("a struct").remove("walking");
         assert!(serde_json::from_value::<RuleSet>(listing).is_err());

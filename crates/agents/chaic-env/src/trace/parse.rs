@@ -1,4 +1,4 @@
-//! Reading a trace, as far as it is whole.
+//! Parsing of a trace up to its last complete record.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -6,40 +6,40 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::error::{EnvError, Result};
-use crate::trace::{FORMAT, Header, Record, Trace, VERSION};
+use crate::trace::{FORMAT, Header, MIN_VERSION, Record, Trace, VERSION};
 
-/// Longest trace that is read, bytes: a thousand times a usual one.
+/// Longest trace that is read, bytes: about a thousand times a typical one.
 pub const MAX_TRACE_BYTES: u64 = 256 << 20;
 
-/// Something about a file that its reader should know; what could be read is still good.
+/// Warning about a file; the parsed part is valid.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Warning {
-    /// From this line on the file is damaged.
+pub enum TraceWarning {
+    /// The file is damaged from this line on.
     Torn {
-        /// The file.
+        /// File.
         path: PathBuf,
-        /// The line, from 1.
+        /// Line, from 1.
         line: usize,
-        /// What is wrong with it.
+        /// Problem.
         problem: String,
     },
-    /// The records stop before the episode's end.
+    /// The end of the episode is missing.
     NoEnd {
-        /// The file.
+        /// File.
         path: PathBuf,
-        /// How many records there are.
+        /// Number of records.
         records: usize,
     },
 }
 
-impl fmt::Display for Warning {
+impl fmt::Display for TraceWarning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Warning::Torn { path, line, problem } => {
+            TraceWarning::Torn { path, line, problem } => {
                 let path = path.display();
                 write!(f, "{path}: read up to line {}; line {line}: {problem}", line - 1)
             }
-            Warning::NoEnd { path, records } => {
+            TraceWarning::NoEnd { path, records } => {
                 write!(
                     f,
                     "{}: the episode's end is missing after {records} records",
@@ -50,29 +50,32 @@ impl fmt::Display for Warning {
     }
 }
 
-/// Reads a trace up to its last whole record, and says so where that isn't all; `path` is what
-/// messages call it.
+/// Parses a trace up to its last complete record, and returns warnings if lines are left. Messages name
+/// the trace by `path`.
 ///
 /// # Errors
-/// If it has no whole header, is too long, or is of another format or version.
-pub fn parse(bytes: &[u8], path: &Path) -> Result<(Trace, Vec<Warning>)> {
+/// If the header is incomplete, the trace is too long, or its format or version differs.
+pub fn parse(bytes: &[u8], path: &Path) -> Result<(Trace, Vec<TraceWarning>)> {
     let bad = |line, problem: &str| EnvError::Unreadable {
         path: path.to_owned(),
         line,
         problem: problem.to_owned(),
     };
     if bytes.len() as u64 > MAX_TRACE_BYTES {
-        return Err(bad(1, &format!("is longer than {MAX_TRACE_BYTES} bytes, no trace is")));
+        return Err(bad(
+            1,
+            &format!("is longer than {MAX_TRACE_BYTES} bytes, the largest trace that is read"),
+        ));
     }
     let mut lines = bytes.split_inclusive(|b| *b == b'\n').enumerate();
-    let first = lines.next().and_then(|(_, l)| whole(l)).ok_or_else(|| {
-        bad(1, "has no whole first line, expected the header of a trace; is the file cut off?")
+    let first = lines.next().and_then(|(_, l)| complete_line(l)).ok_or_else(|| {
+        bad(1, "has no complete first line, expected the header of a trace; is the file cut off?")
     })?;
     let header = header(first, path)?;
     let mut trace = Trace { header, records: Vec::new() };
     let mut warnings = Vec::new();
     for (k, line) in lines {
-        let record = match whole(line) {
+        let record = match complete_line(line) {
             None => Err("is cut off".to_owned()),
             Some(_) if trace.end().is_some() => Err("comes after the end".to_owned()),
             Some(line) => Record::from_line(line).map_err(|e| e.to_string()),
@@ -80,20 +83,20 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<(Trace, Vec<Warning>)> {
         match record {
             Ok(record) => trace.records.push(record),
             Err(problem) => {
-                warnings.push(Warning::Torn { path: path.to_owned(), line: k + 1, problem });
+                warnings.push(TraceWarning::Torn { path: path.to_owned(), line: k + 1, problem });
                 break;
             }
         }
     }
     if trace.end().is_none() {
         let records = trace.records.len();
-        warnings.push(Warning::NoEnd { path: path.to_owned(), records });
+        warnings.push(TraceWarning::NoEnd { path: path.to_owned(), records });
     }
     Ok((trace, warnings))
 }
 
-/// The text of a line that ends with a line break.
-fn whole(line: &[u8]) -> Option<&str> {
+/// Returns the text of a line that ends with a line break.
+fn complete_line(line: &[u8]) -> Option<&str> {
     std::str::from_utf8(line.strip_suffix(b"\n")?).ok()
 }
 
@@ -106,13 +109,13 @@ fn header(line: &str, path: &Path) -> Result<Header> {
         chaic: String,
     }
     let bad = |problem| EnvError::Unreadable { path: path.to_owned(), line: 1, problem };
-    let v: Version =
-        serde_json::from_str(line).map_err(|e| bad(format!("is no header of a trace: {e}")))?;
-    if v.format != FORMAT || v.version != VERSION {
+    let v: Version = serde_json::from_str(line)
+        .map_err(|e| bad(format!("is not the header of a trace: {e}")))?;
+    if v.format != FORMAT || !(MIN_VERSION..=VERSION).contains(&v.version) {
         return Err(EnvError::OtherVersion {
             path: path.to_owned(),
             found: format!("{} version {} (written by chaic {})", v.format, v.version, v.chaic),
-            expected: format!("{FORMAT} version {VERSION}"),
+            expected: format!("{FORMAT} versions {MIN_VERSION} to {VERSION}"),
         });
     }
     serde_json::from_str(line).map_err(|e| bad(e.to_string()))

@@ -1,4 +1,4 @@
-//! One line of a trace.
+//! Records: the lines of a trace after its header.
 
 use std::fmt;
 
@@ -11,79 +11,78 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::digest::Digest;
 
-/// Something that happened.
+/// Record of a trace.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Record {
     /// An agent decided.
     Decision(Decision),
-    /// The child does something else from its decision before this on.
+    /// The child's state changed with its decision before this record.
     Child(ChildRecord),
-    /// The world tells.
+    /// An event of the world.
     Event(TraceEvent),
-    /// The episode is over.
+    /// The episode ended.
     End(End),
 }
 
-/// An agent's decision. Written as `[frame, agent, action, digest]`, with the thought as a fifth
-/// entry where it differs from this agent's last one.
+/// An agent's decision. Serialized as `[frame, agent, action, digest]`, with the thought as a fifth
+/// entry if it differs from the agent's last one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Decision {
-    /// When.
+    /// Frame.
     pub frame: Frame,
-    /// Who.
+    /// Agent id.
     pub agent: AgentId,
-    /// What, its target resolved to an entity.
+    /// Action with its target resolved to an entity.
     pub action: ResolvedAction,
     /// Digest of the world's state right before the action was submitted.
     pub digest: Digest,
-    /// What it thought, if that changed.
+    /// Thought, if it changed.
     pub thought: Option<Thought>,
 }
 
-/// What the child has decided to do. Its mind says so, not the world: a trace that is played again
-/// takes it over as it is.
+/// State of the child. The child's agent reports it, not the world; a re-simulated trace copies it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ChildRecord {
-    /// When.
+    /// Frame.
     pub frame: Frame,
-    /// What it does from now on.
+    /// New state.
     pub state: ChildState,
 }
 
-/// An event, with what metrics need to know of its object.
+/// An event, with the class of its object for metrics.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TraceEvent {
-    /// The event.
+    /// Event.
     #[serde(flatten)]
     pub event: Event,
-    /// Class of what was delivered.
+    /// Class of a delivered object.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub class: Option<ClassId>,
 }
 
-/// How the episode ended.
+/// End of an episode.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct End {
-    /// Frames that passed.
+    /// Number of frames.
     pub frame: Frame,
-    /// What is done of what was wanted: objects, or kilograms when moving house.
+    /// Delivered amount of what is wanted: objects, or kilograms when moving house.
     pub done: f64,
-    /// All that was wanted.
+    /// Wanted amount.
     pub total: f64,
-    /// Whether everything wanted was delivered.
+    /// True if everything wanted was delivered.
     pub complete: bool,
-    /// Frames in which the child was away.
+    /// Number of frames in which the child was away.
     pub away_frames: u32,
-    /// Frames in which the partner or the helper had made no progress for 200 frames.
+    /// Number of frames in which partner or helper had made no progress for 200 frames.
     pub stuck_frames: u32,
     /// Digest of the last state.
     pub digest: Digest,
 }
 
-/// Whether a trace keeps an event. What began follows from the decisions, and so does a step,
-/// turn or wait that ended well.
+/// Returns whether a trace keeps an event. The start of an action follows from the decisions, and so
+/// does a successful step, turn or wait.
 pub fn is_recorded(event: &Event) -> bool {
     match &event.kind {
         EventKind::Began { .. } => false,
@@ -95,7 +94,7 @@ pub fn is_recorded(event: &Event) -> bool {
 }
 
 impl TraceEvent {
-    /// The event as a trace of this world has it.
+    /// Creates the record of an event in a world.
     pub fn new(event: Event, world: &World) -> TraceEvent {
         let class = match event.kind {
             EventKind::Delivered { object, .. } => world.setup().thing(object).map(|t| t.class),
@@ -106,8 +105,8 @@ impl TraceEvent {
 }
 
 impl End {
-    /// The end of an episode as the world stands.
-    pub fn of(world: &World) -> End {
+    /// Returns the end of an episode if it ended in the current state.
+    pub fn new(world: &World) -> End {
         let (done, total) = world.progress();
         End {
             frame: world.state().frame,
@@ -132,7 +131,7 @@ struct ChildLine {
 }
 
 impl Record {
-    /// The line without its line break.
+    /// Returns the line, with the keys of [`VERSION`](crate::trace::VERSION) and without its line break.
     pub fn to_line(&self) -> String {
         let text = match self {
             Record::Decision(decision) => serde_json::to_string(decision),
@@ -143,7 +142,10 @@ impl Record {
         text.expect("records have string keys and finite numbers")
     }
 
-    /// Reads a line.
+    /// Parses a line.
+    ///
+    /// # Errors
+    /// If the line is not a record.
     pub fn from_line(line: &str) -> Result<Record, serde_json::Error> {
         if line.starts_with('[') {
             return serde_json::from_str(line).map(Record::Decision);

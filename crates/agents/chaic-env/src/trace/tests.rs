@@ -1,9 +1,10 @@
-//! A trace reads back as it was written, up to wherever it was cut.
+//! Tests that a trace is read as it was written, up to the point where it was cut.
 
 use std::path::Path;
 
-use chaic_core::agent::{Believed, ChildState, Thought};
+use chaic_core::agent::{BelievedObject, ChildState, Thought};
 use chaic_core::capability::Impairment;
+use chaic_core::observation::FrameHistorySpec;
 use chaic_core::{Action, AgentId, ClassId, EntityId, FailureReason, Hand, Outcome};
 use chaic_world::{Event, EventKind};
 
@@ -28,9 +29,9 @@ fn header() -> Header {
             isolation: None,
             agent: AgentId::PARTNER,
             persona: Persona::Wheelchair,
-            impairments: Impairments::of(Impairment::Tremor),
+            impairments: Impairments::new(Impairment::Tremor),
             grants: Grants::PARTNER,
-            senses: Senses::DEPTH_AND_IDS,
+            sensors: SensorConfig::DEPTH_AND_IDS,
         }],
         renderer: "cpu".to_owned(),
         appearance: Appearance::Canonical,
@@ -47,12 +48,12 @@ fn records() -> Vec<Record> {
     };
     let thought = Thought {
         plan: "go to \"apple\" #31\n".to_owned(),
-        mood: Some("x".to_owned()),
-        noticed: Some("partner picked up apple #31".to_owned()),
-        sees: vec![Believed {
+        mode: Some("x".to_owned()),
+        last_observed: Some("partner picked up apple #31".to_owned()),
+        perceived: vec![BelievedObject {
             name: "t31".to_owned(),
             class: ClassId::named("apple"),
-            at_cm: [120, 80, -35],
+            position_cm: [120, 80, -35],
         }],
     };
     let failed = Outcome::Failure(FailureReason::OutOfReach);
@@ -85,7 +86,7 @@ fn written() -> String {
 }
 
 #[test]
-fn reads_back_what_was_written() {
+fn a_trace_is_read_as_it_was_written() {
     let (trace, warnings) = parse(written().as_bytes(), Path::new("t.jsonl")).unwrap();
     assert_eq!(trace, Trace { header: header(), records: records() });
     assert_eq!(warnings, []);
@@ -93,7 +94,7 @@ fn reads_back_what_was_written() {
 }
 
 #[test]
-fn a_cut_at_any_byte_leaves_all_whole_records() {
+fn a_cut_at_any_byte_keeps_all_complete_records() {
     let bytes = written().into_bytes();
     let header_len = bytes.iter().position(|b| *b == b'\n').unwrap() + 1;
     for cut in 0..bytes.len() {
@@ -103,32 +104,34 @@ fn a_cut_at_any_byte_leaves_all_whole_records() {
             continue;
         }
         let (trace, warnings) = parsed.unwrap();
-        let whole = bytes[header_len..cut].iter().filter(|b| **b == b'\n').count();
-        assert_eq!(trace.records, records()[..whole], "{cut}");
-        assert!(warnings.contains(&Warning::NoEnd { path: "t.jsonl".into(), records: whole }));
+        let n_complete = bytes[header_len..cut].iter().filter(|b| **b == b'\n').count();
+        assert_eq!(trace.records, records()[..n_complete], "{cut}");
+        assert!(
+            warnings.contains(&TraceWarning::NoEnd { path: "t.jsonl".into(), records: n_complete })
+        );
         let torn = bytes[cut - 1] != b'\n';
         assert_eq!(warnings.len(), 1 + usize::from(torn), "{cut}");
     }
 }
 
 #[test]
-fn another_version_is_named() {
+fn another_version_is_refused_with_its_number() {
     let text = written();
     let own = format!("\"version\":{VERSION}");
     assert!(text.contains(&own), "{text}");
     let other = text.replacen(&own, "\"version\":77", 1);
     let error = parse(other.as_bytes(), Path::new("t.jsonl")).unwrap_err().to_string();
-    let expected = format!("version {VERSION}");
+    let expected = format!("versions {MIN_VERSION} to {VERSION}");
     assert!(error.contains("version 77") && error.contains(&expected), "{error}");
     assert!(error.contains("chaic 0.1.0"), "{error}");
 }
 
 #[test]
-fn the_appearance_is_told_where_it_is_not_the_usual() {
+fn only_a_noncanonical_appearance_is_written() {
     let line = |appearance| serde_json::to_string(&Header { appearance, ..header() }).unwrap();
     let read = |line: &str| parse(format!("{line}\n").as_bytes(), Path::new("t.jsonl"));
-    let usual = line(Appearance::Canonical);
-    assert!(!usual.contains("appearance"), "as in traces from before there was a choice: {usual}");
+    let canonical = line(Appearance::Canonical);
+    assert!(!canonical.contains("appearance"), "as in traces without this field: {canonical}");
     for appearance in
         [Appearance::Canonical, Appearance::Evening, Appearance::Varied { seed: u64::MAX }]
     {
@@ -136,12 +139,90 @@ fn the_appearance_is_told_where_it_is_not_the_usual() {
     }
     let evening = line(Appearance::Evening);
     assert!(evening.ends_with(",\"appearance\":\"evening\"}"), "{evening}");
-    for (wrong, words) in [
+    for (wrong, expected) in [
         ("\"dusk\"", "no appearance \"dusk\", expected canonical, evening or varied:SEED"),
         ("\"varied:-1\"", "no appearance \"varied:-1\""),
         ("3", "expected a string"),
     ] {
         let error = read(&evening.replace("\"evening\"", wrong)).unwrap_err().to_string();
-        assert!(error.starts_with("t.jsonl: line 1: ") && error.contains(words), "{error}");
+        assert!(error.starts_with("t.jsonl: line 1: ") && error.contains(expected), "{error}");
     }
+}
+
+#[test]
+fn the_keys_of_version_2_are_read() {
+    let spec = FrameHistorySpec { image_size: 128, every_frames: 3, max_len: 64 };
+    let mut header = header();
+    header.people[0].sensors.frame_history = Some(spec);
+    let line = header.to_line();
+    let keys = r#""sensors":{"image_size":512,"rgb":false,"depth":true,"ids":true,"frame_history":{"image_size":128,"every_frames":3,"max_len":64}}"#;
+    let old_keys = r#""senses":{"image_size":512,"rgb":false,"depth":true,"ids":true,"film":{"image_size":128,"every_frames":3,"most":64}}"#;
+    assert!(line.contains(keys), "{line}");
+    let old = line.replacen(keys, old_keys, 1).replacen("\"version\":3", "\"version\":2", 1);
+    for (text, version) in [(&line, 3), (&old, 2)] {
+        let (trace, _) = parse(format!("{text}\n").as_bytes(), Path::new("t.jsonl")).unwrap();
+        assert_eq!(trace.header, Header { version, ..header.clone() });
+    }
+    let old = r#"{"plan":"explore","mood":"careful","noticed":"moving","sees":[]}"#;
+    let thought: Thought = serde_json::from_str(old).unwrap();
+    let read = (thought.plan.as_str(), thought.mode.as_deref(), thought.last_observed.as_deref());
+    assert_eq!(read, ("explore", Some("careful"), Some("moving")));
+}
+
+/// Returns a trace that contains every key that version 3 renamed.
+fn trace_with_renamed_keys(version: u32) -> Trace {
+    let spec = FrameHistorySpec { image_size: 128, every_frames: 3, max_len: 64 };
+    let mut header = Header { version, ..header() };
+    header.people[0].sensors.frame_history = Some(spec);
+    Trace { header, records: records() }
+}
+
+#[test]
+fn lines_have_the_keys_of_their_version() {
+    let sensors_and_thought = |version| {
+        let trace = trace_with_renamed_keys(version);
+        let mut lines = trace.lines();
+        let (header, decision) = (lines.next().unwrap(), lines.next().unwrap());
+        let sensors = header.split_once("\"positions\":false},").unwrap().1;
+        let sensors = sensors.split_once("}]").unwrap().0;
+        let thought = decision.split_once("#31\\n\",").unwrap().1;
+        (sensors.to_owned(), thought.to_owned())
+    };
+    let (sensors, thought) = sensors_and_thought(VERSION);
+    assert_eq!(
+        sensors,
+        r#""sensors":{"image_size":512,"rgb":false,"depth":true,"ids":true,"frame_history":{"image_size":128,"every_frames":3,"max_len":64}}"#
+    );
+    assert_eq!(
+        thought,
+        r#""mode":"x","last_observed":"partner picked up apple #31","perceived":[["t31","apple",[120,80,-35]]]}]"#
+    );
+    let (sensors, thought) = sensors_and_thought(2);
+    assert_eq!(
+        sensors,
+        r#""senses":{"image_size":512,"rgb":false,"depth":true,"ids":true,"film":{"image_size":128,"every_frames":3,"most":64}}"#
+    );
+    assert_eq!(
+        thought,
+        r#""mood":"x","noticed":"partner picked up apple #31","sees":[["t31","apple",[120,80,-35]]]}]"#
+    );
+}
+
+#[test]
+fn traces_of_all_readable_versions_are_read() {
+    for version in MIN_VERSION..=VERSION {
+        let trace = trace_with_renamed_keys(version);
+        let text: String = trace.lines().map(|line| line + "\n").collect();
+        assert_eq!(parse(text.as_bytes(), Path::new("t.jsonl")).unwrap(), (trace, Vec::new()));
+    }
+}
+
+#[test]
+fn text_that_looks_like_a_key_is_not_renamed() {
+    let mut trace = trace_with_renamed_keys(2);
+    let Record::Decision(decision) = &mut trace.records[0] else { unreachable!("a decision") };
+    let thought = decision.thought.as_mut().unwrap();
+    thought.plan = r#"{"plan":"","mode":"x","sensors":1},"#.to_owned();
+    let text: String = trace.lines().map(|line| line + "\n").collect();
+    assert_eq!(parse(text.as_bytes(), Path::new("t.jsonl")).unwrap().0, trace);
 }

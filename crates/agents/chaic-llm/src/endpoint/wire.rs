@@ -1,5 +1,5 @@
-//! One request on its way, over `ureq`, which blocks: on a thread of its own, so that who waits can
-//! stop waiting. A thread that nobody waits for ends with its time limit, or with the process.
+//! One HTTP request with `ureq`, which blocks. It runs on its own thread, so that the caller can
+//! stop waiting; an abandoned thread ends at its time limit or with the process.
 
 use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
@@ -9,35 +9,35 @@ use ureq::Agent;
 
 use super::{Failure, NoReply, failure};
 use crate::exchange::FaultKind;
-use crate::gate::LOOK_EVERY;
 use crate::key::Key;
+use crate::rate_limiter::POLL_INTERVAL;
 use crate::retry_after::retry_after;
-use crate::settings::{Endpoint, Kind, Settings};
+use crate::settings::{Endpoint, EndpointKind, Settings};
 
-/// Finding a host and connecting to it take at most so long, each.
+/// Time limit of name resolution and of connecting, each.
 const CONNECT: Duration = Duration::from_secs(10);
-/// So long an answer that is on its way may still arrive when its asker is to stop. Ours: with what
-/// comes after, a run ends within two seconds.
+/// Time that an answer in transit has after the caller stops waiting. Chosen so that an interrupted
+/// run ends within two seconds.
 const GRACE: Duration = Duration::from_secs(1);
 
-/// What a request needs to get on its way.
+/// Parameters of a request.
 pub(super) struct Wire {
     agent: Agent,
     address: String,
-    kind: Kind,
+    kind: EndpointKind,
     key: Key,
     max_answer_bytes: u64,
 }
 
-/// What came back.
+/// HTTP response.
 pub(super) struct Response {
-    /// The endpoint's status.
+    /// Status code.
     pub status: u16,
-    /// For how long it asks to wait.
+    /// Value of `Retry-After`.
     pub retry_after: Option<Duration>,
-    /// Its answer, or why that broke off.
+    /// Body, or the failure that interrupted it.
     pub body: Result<Vec<u8>, Failure>,
-    /// From the request's beginning to the answer's end.
+    /// Time from the start of the request to the end of the answer.
     pub latency: Duration,
 }
 
@@ -48,7 +48,7 @@ impl Wire {
         let timeout = Duration::from_secs_f32(timeout_secs);
         let mut config = Agent::config_builder()
             .http_status_as_error(false)
-            // Whoever redirects gets neither key nor question.
+            // A redirect target gets neither key nor request.
             .max_redirects(0)
             .max_redirects_will_error(false)
             .timeout_global(Some(timeout))
@@ -65,12 +65,12 @@ impl Wire {
     }
 
     fn post(&self, body: &str) -> Result<Response, Failure> {
-        let began = Instant::now();
+        let start = Instant::now();
         let mut request = self.agent.post(&self.address).header("content-type", "application/json");
         if let Some(key) = self.key.expose() {
             request = match self.kind {
-                Kind::Openai => request.header("authorization", format!("Bearer {key}")),
-                Kind::Azure => request.header("api-key", key),
+                EndpointKind::Openai => request.header("authorization", format!("Bearer {key}")),
+                EndpointKind::Azure => request.header("api-key", key),
             };
         }
         let mut response = request.send(body.as_bytes()).map_err(|e| transport(&e))?;
@@ -79,7 +79,7 @@ impl Wire {
         let retry_after = header("retry-after").and_then(retry_after);
         let limit = self.max_answer_bytes;
         let bytes = response.body_mut().with_config().limit(limit).read_to_vec();
-        let latency = began.elapsed();
+        let latency = start.elapsed();
         let body = bytes.map_err(|e| match e {
             ureq::Error::BodyExceedsLimit(_) => {
                 failure(FaultKind::TooLong, format!("the answer is longer than {limit} bytes"))
@@ -90,33 +90,32 @@ impl Wire {
     }
 }
 
-/// Sends a request, and waits until something comes back or `is_given_up` has been true for
-/// [`GRACE`].
+/// Sends a request and waits for the response, or until `is_abandoned` has been true for [`GRACE`].
 pub(super) fn post(
     wire: &Arc<Wire>,
     body: String,
-    is_given_up: &dyn Fn() -> bool,
+    is_abandoned: &dyn Fn() -> bool,
 ) -> Result<Response, NoReply> {
     let (sender, receiver) = sync_channel(1);
-    let for_thread = Arc::clone(wire);
+    let wire_of_thread = Arc::clone(wire);
     let spawned = std::thread::Builder::new().name("chaic-request".to_owned()).spawn(move || {
-        // Who has stopped waiting doesn't receive it.
-        let _ = sender.send(for_thread.post(&body));
+        // The receiver may be gone.
+        let _ = sender.send(wire_of_thread.post(&body));
     });
     if let Err(refusal) = spawned {
-        let what = format!("the system has no thread for a request ({})", refusal.kind());
-        return Err(failure(FaultKind::Connection, what).into());
+        let problem = format!("the system has no thread for a request ({})", refusal.kind());
+        return Err(failure(FaultKind::Connection, problem).into());
     }
-    let mut given_up_at = None;
+    let mut abandoned_at = None;
     loop {
-        match receiver.recv_timeout(LOOK_EVERY) {
+        match receiver.recv_timeout(POLL_INTERVAL) {
             Ok(response) => return Ok(response?),
             Err(RecvTimeoutError::Disconnected) => {
-                let what = "the request broke down".to_owned();
-                return Err(failure(FaultKind::Connection, what).into());
+                let problem = "the request failed unexpectedly".to_owned();
+                return Err(failure(FaultKind::Connection, problem).into());
             }
-            Err(RecvTimeoutError::Timeout) if is_given_up() => {
-                let since = *given_up_at.get_or_insert_with(Instant::now);
+            Err(RecvTimeoutError::Timeout) if is_abandoned() => {
+                let since = *abandoned_at.get_or_insert_with(Instant::now);
                 if since.elapsed() >= GRACE {
                     return Err(NoReply::Abandoned);
                 }
@@ -126,45 +125,49 @@ pub(super) fn post(
     }
 }
 
-/// Where requests go.
+/// Returns the URL of requests.
 fn address(endpoint: &Endpoint, model: &str) -> String {
     const PATH: &str = "/chat/completions";
     let base = endpoint.url.trim_end_matches('/');
     match endpoint.kind {
-        Kind::Openai if base.ends_with(PATH) => base.to_owned(),
-        Kind::Openai => format!("{base}{PATH}"),
-        Kind::Azure => {
+        EndpointKind::Openai if base.ends_with(PATH) => base.to_owned(),
+        EndpointKind::Openai => format!("{base}{PATH}"),
+        EndpointKind::Azure => {
             let version = &endpoint.api_version;
             format!("{base}/openai/deployments/{model}{PATH}?api-version={version}")
         }
     }
 }
 
-/// What went wrong before there was an answer. The address isn't repeated: it is in the settings.
+/// Converts a transport error. The message omits the address, which is in the settings.
 fn transport(error: &ureq::Error) -> Failure {
     use ureq::Error;
-    let broken = |what: String| failure(FaultKind::Connection, what);
-    let unknown_host = || broken("the endpoint's host can't be found".to_owned());
+    let connection_failure = |problem: String| failure(FaultKind::Connection, problem);
+    let unknown_host = || connection_failure("the endpoint's host can't be found".to_owned());
     match error {
         Error::Timeout(_) => failure(FaultKind::Timeout, "the endpoint takes too long".to_owned()),
         Error::Io(e) if e.kind() == std::io::ErrorKind::TimedOut => {
             failure(FaultKind::Timeout, "the endpoint takes too long".to_owned())
         }
-        // The kind of this one has no name yet; the standard library's message has.
+        // This error kind is unstable; only the standard library's message identifies it.
         Error::Io(e) if e.to_string().starts_with("failed to lookup address") => unknown_host(),
         Error::HostNotFound => unknown_host(),
-        Error::Io(e) => broken(format!("the connection failed ({})", e.kind())),
-        Error::ConnectionFailed => broken("no connection".to_owned()),
-        Error::Protocol(_) => broken("the endpoint doesn't keep to HTTP, or broke off".to_owned()),
+        Error::Io(e) => connection_failure(format!("the connection failed ({})", e.kind())),
+        Error::ConnectionFailed => connection_failure("no connection".to_owned()),
+        Error::Protocol(_) => {
+            connection_failure("the endpoint violates HTTP or closed the connection".to_owned())
+        }
         Error::Tls(_) | Error::Rustls(_) => {
-            let failure = broken("no secure connection: is the certificate valid?".to_owned());
-            Failure { may_pass: false, ..failure }
+            let failure =
+                connection_failure("no secure connection: is the certificate valid?".to_owned());
+            Failure { is_retryable: false, ..failure }
         }
         Error::BadUri(_) | Error::Http(_) => {
-            let failure = broken("the address or the key can't stand in a request".to_owned());
-            Failure { may_pass: false, ..failure }
+            let failure =
+                connection_failure("the address or the key has invalid characters".to_owned());
+            Failure { is_retryable: false, ..failure }
         }
-        _ => broken("the request failed".to_owned()),
+        _ => connection_failure("the request failed".to_owned()),
     }
 }
 
@@ -176,12 +179,12 @@ mod tests {
     #[test]
     fn addresses_of_all_dialects() {
         for (url, kind, expected) in [
-            ("http://h:1/v1", Kind::Openai, "http://h:1/v1/chat/completions"),
-            ("http://h:1/v1/", Kind::Openai, "http://h:1/v1/chat/completions"),
-            ("http://h/v1/chat/completions", Kind::Openai, "http://h/v1/chat/completions"),
+            ("http://h:1/v1", EndpointKind::Openai, "http://h:1/v1/chat/completions"),
+            ("http://h:1/v1/", EndpointKind::Openai, "http://h:1/v1/chat/completions"),
+            ("http://h/v1/chat/completions", EndpointKind::Openai, "http://h/v1/chat/completions"),
             (
                 "https://me.openai.azure.com",
-                Kind::Azure,
+                EndpointKind::Azure,
                 "https://me.openai.azure.com/openai/deployments/m/chat/completions?api-version=2024-10-21",
             ),
         ] {
@@ -190,10 +193,10 @@ mod tests {
     }
 
     #[test]
-    fn a_host_that_is_not_known_is_said_to_be_so() {
-        let said = "failed to lookup address information: Name or service not known";
-        let failure = transport(&ureq::Error::Io(std::io::Error::other(said)));
+    fn an_unknown_host_is_reported() {
+        let message = "failed to lookup address information: Name or service not known";
+        let failure = transport(&ureq::Error::Io(std::io::Error::other(message)));
         assert!(failure.fault.detail.contains("host can't be found"), "{failure:?}");
-        assert!(failure.may_pass, "a network may come back");
+        assert!(failure.is_retryable, "the network may recover");
     }
 }

@@ -1,37 +1,38 @@
-//! PromptContext from a mind's memory.
+//! Prompt context from an agent's memory.
 
-use chaic_agents::behavior::SeenInteraction;
+use chaic_agents::behavior::ObservedInteraction;
 use chaic_agents::decision::{Context, Plan};
-use chaic_agents::mapping::Thing;
+use chaic_agents::mapping::MappedObject;
 use chaic_agents::memory::Memory;
 use chaic_agents::track::Carried;
 use chaic_agents::{Intent, TrackId};
-use chaic_core::briefing::Relation;
+use chaic_core::briefing::CompanionRole;
 use chaic_core::capability::{Capability, Gait, Impairments, PersonKind, Persona};
-use chaic_core::geom::{horizontal_distance, xz};
+use chaic_core::geom::{horizontal_distance, to_xz};
 use chaic_core::{Action, AgentId, ClassId, Frame, Outcome, Role};
 
 use super::hands::put_away;
 use super::{
-    Body, Count, GoalPlace, Interaction, Length, Map, Other, Own, PlanFacts, ProgressFacts,
-    PromptContext, ThingFacts, ToldFacts, plain, plan_text,
+    Body, Count, DisclosedFacts, GoalPlace, Interaction, Length, Map, ObjectFacts, PersonFacts,
+    PlanFacts, ProgressFacts, PromptContext, SelfFacts, plain, plan_text,
 };
-use crate::templates::Track;
+use crate::prompt_track::PromptTrack;
 
-/// The child is away from its guardian beyond this, metres (docs/metrics.md, emergency rate).
+/// Distance from its guardian beyond which a child is lost, metres (docs/metrics.md, emergency
+/// rate).
 const AWAY_M: f32 = 3.5;
-/// Sightings older than this aren't compared, frames.
+/// Maximum age of compared positions, frames.
 const FRESH_FRAMES: Frame = 150;
-/// Goal places that are listed.
+/// Maximum number of listed goal places.
 const MAX_GOAL_PLACES: usize = 3;
-/// Walking as it is, turns included, takes longer than the way at full speed by this factor.
+/// Ratio of actual walking time, with turns, to distance at full speed.
 const WALK_FACTOR: f32 = 1.5;
 
 impl PromptContext {
-    /// What a mind with this memory may say, and which of `plans` are listed: those of one kind
-    /// come nearest first.
-    pub fn of(
-        track: Track,
+    /// Builds the prompt context of an agent, and the list of `plans`. Plans of one kind are sorted
+    /// by distance.
+    pub fn new(
+        track: PromptTrack,
         context: &Context<'_>,
         plans: &[Plan],
         last_plan: Option<Plan>,
@@ -39,7 +40,7 @@ impl PromptContext {
         length: Length,
     ) -> (PromptContext, Vec<Plan>) {
         let Context { briefing, memory, .. } = *context;
-        let listed = shorten(plans, length.plans_of_a_kind);
+        let listed = keep_nearest(plans, length.plans_per_kind);
         let labels = |classes: &[ClassId]| {
             let mut names: Vec<String> = classes.iter().map(|c| plain(c.info().label)).collect();
             names.dedup();
@@ -48,7 +49,7 @@ impl PromptContext {
             names
         };
         let speed = briefing.capability.speed_m_per_frame.max(1e-3);
-        let wanted = briefing.goal.iter().filter(|_| track == Track::Partner);
+        let wanted = briefing.goal.iter().filter(|_| track == PromptTrack::Partner);
         let facts = PromptContext {
             track,
             goal_place: labels(&briefing.goal_places).join(" or "),
@@ -57,24 +58,26 @@ impl PromptContext {
             obstacles: labels(&briefing.obstacles),
             capacity: briefing.container_capacity,
             moving: briefing.possible_targets.iter().any(|c| c.info().role == Role::HeavyTarget),
-            child: briefing.companion(Relation::Child).is_some(),
-            helped: briefing.companion(Relation::Partner).is_some(),
+            child: briefing.companion(CompanionRole::Child).is_some(),
+            helped: briefing.companion(CompanionRole::Partner).is_some(),
             images,
             horizon: briefing.horizon,
             frames_per_10_m: (10.0 / speed / 10.0).round() as u32 * 10,
             me: body(&briefing.capability),
-            told: briefing.told.filter(|_| track == Track::Told).map(|told| ToldFacts {
-                task: told.task.name(),
-                partner: person(told.partner),
-                reach: reach(&told.partner.capability()),
-                strength_kg: told.partner.capability().strength_kg as u32,
+            told: briefing.disclosure.filter(|_| track == PromptTrack::Told).map(|disclosure| {
+                DisclosedFacts {
+                    task: disclosure.task.name(),
+                    partner: person(disclosure.partner),
+                    reach: reach(&disclosure.partner.capability()),
+                    strength_kg: disclosure.partner.capability().strength_kg as u32,
+                }
             }),
             wanted: wanted
                 .flat_map(|goal| &goal.targets)
                 .map(|(class, n)| Count { name: plain(class.info().label), count: *n })
                 .collect(),
-            own: own(context, last_plan, length),
-            others: others(context, length),
+            own: self_facts(context, last_plan, length),
+            others: other_agents(context, length),
             progress: progress(context),
             map: map(context, length),
             plans: listed.iter().map(|p| plan_facts(memory, p)).collect(),
@@ -84,12 +87,12 @@ impl PromptContext {
     }
 }
 
-/// So many plans of each kind that is about an object: the nearest.
-pub(super) fn shorten(plans: &[Plan], of_a_kind: usize) -> Vec<Plan> {
+/// Keeps the nearest plans of each kind that concerns an object.
+pub(super) fn keep_nearest(plans: &[Plan], max_per_kind: usize) -> Vec<Plan> {
     let mut kept: Vec<Plan> = Vec::new();
     for plan in plans {
-        let is_same = |p: &&Plan| std::mem::discriminant(*p) == std::mem::discriminant(plan);
-        if kept.iter().filter(is_same).count() < of_a_kind {
+        let is_same_kind = |p: &&Plan| std::mem::discriminant(*p) == std::mem::discriminant(plan);
+        if kept.iter().filter(is_same_kind).count() < max_per_kind {
             kept.push(*plan);
         }
     }
@@ -121,7 +124,7 @@ pub(super) fn body(capability: &Capability) -> Body {
         Gait::Walk => format!("a person of {height_m:.2} m"),
     };
     Body {
-        kind: impaired(kind, Impairments::seen_in(capability)),
+        kind: impaired(kind, Impairments::from_capability(capability)),
         reach: reach(capability),
         strength_kg: capability.strength_kg as u32,
         docks: capability.docking_frames > 0,
@@ -132,7 +135,7 @@ pub(super) fn body(capability: &Capability) -> Body {
 pub(super) fn person(kind: PersonKind) -> String {
     let PersonKind { persona, impairments } = kind;
     let height_m = persona.capability().height_m;
-    let plainly = match persona {
+    let description = match persona {
         Persona::Adult | Persona::Helper if impairments.is_empty() => {
             "an adult without any constraint".to_owned()
         }
@@ -145,45 +148,47 @@ pub(super) fn person(kind: PersonKind) -> String {
         }
         Persona::Frail => "a frail person".to_owned(),
     };
-    impaired(plainly, impairments)
+    impaired(description, impairments)
 }
 
-/// Somebody with what impairs it.
+/// Describes a person with impairments.
 fn impaired(who: String, impairments: Impairments) -> String {
     let sentence = |text: String, about: &str| format!("{text} and who {about}");
-    let mut abouts = impairments.iter().map(|i| i.info().about);
-    let Some(first) = abouts.next() else { return who };
-    abouts.fold(format!("{who} who {first}"), sentence)
+    let mut descriptions = impairments.iter().map(|i| i.info().about);
+    let Some(first) = descriptions.next() else { return who };
+    descriptions.fold(format!("{who} who {first}"), sentence)
 }
 
-fn holding(held: &Carried) -> String {
-    let name = held.what.map_or("something".to_owned(), |(t, class)| named(t, Some(class)));
+fn describe_held(held: &Carried) -> String {
+    let name = held.object.map_or("something".to_owned(), |(t, class)| named(t, Some(class)));
     let mut inside: Vec<String> = held.contents.iter().map(|(t, c)| named(*t, Some(*c))).collect();
     inside.resize(held.n_contents as usize, "something".to_owned());
     let role = held.class().map(|class| class.info().role);
-    let is_holder = matches!(role, Some(Role::Container | Role::Vehicle));
-    match (is_holder, inside.is_empty()) {
+    let is_container = matches!(role, Some(Role::Container | Role::Vehicle));
+    match (is_container, inside.is_empty()) {
         (true, true) => format!("{name} with nothing in it"),
         (true, false) => format!("{name} with {} in it", inside.join(", ")),
         (false, _) => name,
     }
 }
 
-fn own(context: &Context<'_>, last_plan: Option<Plan>, length: Length) -> Own {
+fn self_facts(context: &Context<'_>, last_plan: Option<Plan>, length: Length) -> SelfFacts {
     let Context { memory, briefing, .. } = *context;
     let (hands, usable) = (&memory.hands, briefing.capability.hands.all().iter());
-    let here = memory.here();
+    let here = memory.position();
     let interactions: Vec<Interaction> = memory
         .history
         .iter()
         .zip(put_away(&memory.history, |track| memory.class_of(track)))
-        .map(|(done, put)| interaction(memory, done.frame, done.action, Some(done.outcome), put))
+        .map(|(record, put)| {
+            interaction(memory, record.frame, record.action, Some(record.outcome), put)
+        })
         .collect();
     let left_out = interactions.len().saturating_sub(length.interactions);
-    Own {
+    SelfFacts {
         x: metres(here.x),
         z: metres(here.y),
-        hands: hands.held().map(holding).collect(),
+        hands: hands.held().map(describe_held).collect(),
         free_hands: usable.filter(|h| hands.hands[h.index()].is_none()).count(),
         history: interactions[left_out..].to_vec(),
         history_left_out: left_out,
@@ -191,7 +196,7 @@ fn own(context: &Context<'_>, last_plan: Option<Plan>, length: Length) -> Own {
     }
 }
 
-/// A interaction; `put` is what it put away, where that is known.
+/// Describes an interaction; `put` is the object put away, if known.
 fn interaction(
     memory: &Memory,
     frame: Frame,
@@ -216,54 +221,56 @@ fn interaction(
     Interaction { frame, what, outcome }
 }
 
-fn others(context: &Context<'_>, length: Length) -> Vec<Other> {
+fn other_agents(context: &Context<'_>, length: Length) -> Vec<PersonFacts> {
     let Context { briefing, memory, behavior, .. } = *context;
-    let partner = briefing.companion(Relation::Partner);
+    let partner = briefing.companion(CompanionRole::Partner);
     let guardian = partner.and_then(|p| memory.people.get(p));
     let other = |companion: &chaic_core::briefing::Companion| {
-        let who = match (companion.relation, briefing.me) {
-            (Relation::Child, _) => "the child",
-            (Relation::Guardian, _) => "the child's guardian",
-            (Relation::Partner, AgentId::PARTNER) => "your helper",
-            (Relation::Partner, _) => "your partner",
+        let who = match (companion.role, briefing.me) {
+            (CompanionRole::Child, _) => "the child",
+            (CompanionRole::Guardian, _) => "the child's guardian",
+            (CompanionRole::Partner, AgentId::PARTNER) => "your helper",
+            (CompanionRole::Partner, _) => "your partner",
         };
         let is_partner = Some(companion.agent) == partner;
         let seen = memory.people.get(companion.agent);
-        let apart = seen.zip(guardian).filter(|(child, guardian)| {
-            let fresh = |f: Frame| f + FRESH_FRAMES > memory.frame;
-            companion.relation == Relation::Child && fresh(child.frame) && fresh(guardian.frame)
+        let pair = seen.zip(guardian).filter(|(child, guardian)| {
+            let is_fresh = |f: Frame| f + FRESH_FRAMES > memory.frame;
+            companion.role == CompanionRole::Child
+                && is_fresh(child.frame)
+                && is_fresh(guardian.frame)
         });
-        let apart = apart
+        let apart_m = pair
             .map(|(c, g)| horizontal_distance(c.position_in_world, g.position_in_world))
             .filter(|m| *m > AWAY_M);
-        let took = |list: &[(TrackId, ClassId)]| -> Vec<String> {
+        let names = |list: &[(TrackId, ClassId)]| -> Vec<String> {
             let skip = list.len().saturating_sub(2 * length.interactions);
             list[skip..].iter().map(|(e, c)| named(*e, Some(*c))).collect()
         };
-        let is_told_by_taking = |seen: &&SeenInteraction| {
+        let is_listed_pick_up = |seen: &&ObservedInteraction| {
             matches!(seen.action, Action::PickUp { object, .. } if seen.outcome == Some(Outcome::Success)
-                && behavior.partner_took.iter().any(|(e, _)| *e == object))
+                && behavior.partner_taken.iter().any(|(e, _)| *e == object))
         };
         let actions: Vec<Interaction> = behavior
             .actions
             .iter()
             .filter(|a| a.agent == companion.agent)
-            .filter(|a| !(is_partner && is_told_by_taking(a)))
+            .filter(|a| !(is_partner && is_listed_pick_up(a)))
             .map(|a| interaction(memory, a.frame, a.action, a.outcome, None))
             .collect();
         let left_out = actions.len().saturating_sub(length.interactions);
-        let at = seen.map(|p| xz(p.position_in_world)).unwrap_or_default();
-        Other {
+        let at = seen.map(|p| to_xz(p.position_in_world)).unwrap_or_default();
+        PersonFacts {
             who,
             seen: seen.is_some(),
             in_view: seen.is_some_and(|p| p.is_in_view),
             frames_ago: seen.map_or(0, |p| memory.frame.saturating_sub(p.frame)),
             x: metres(at.x),
             z: metres(at.y),
-            distance_m: metres(at.distance(memory.here())),
-            away_m: apart.map(metres),
-            took: if is_partner { took(&behavior.partner_took) } else { Vec::new() },
-            holds: if is_partner { took(&behavior.partner_holds) } else { Vec::new() },
+            distance_m: metres(at.distance(memory.position())),
+            away_m: apart_m.map(metres),
+            took: if is_partner { names(&behavior.partner_taken) } else { Vec::new() },
+            holds: if is_partner { names(&behavior.partner_holds) } else { Vec::new() },
             actions: actions[left_out..].to_vec(),
             actions_left_out: left_out,
         }
@@ -282,12 +289,12 @@ fn progress(context: &Context<'_>) -> ProgressFacts {
             None => delivered.push(Count { name, count: 1 }),
         }
     }
-    let place = |(thing, way_m): &(&Thing, f32)| GoalPlace {
-        name: named(thing.track, Some(thing.class)),
-        x: metres(thing.position_in_world.x),
-        z: metres(thing.position_in_world.z),
-        way_m: metres(*way_m),
-        frames: (WALK_FACTOR * way_m / speed / 10.0).round() as u32 * 10,
+    let place = |(object, path_m): &(&MappedObject, f32)| GoalPlace {
+        name: named(object.track, Some(object.class)),
+        x: metres(object.position_in_world.x),
+        z: metres(object.position_in_world.z),
+        way_m: metres(*path_m),
+        frames: (WALK_FACTOR * path_m / speed / 10.0).round() as u32 * 10,
     };
     let places = memory.goal_places();
     ProgressFacts {
@@ -305,21 +312,21 @@ fn map(context: &Context<'_>, length: Length) -> Map {
         () if briefing.obstacles.contains(&class) => Some(Some("obstacle")),
         () => None,
     };
-    let here = memory.here();
-    let mut things: Vec<(f32, &Thing)> = memory
-        .things
+    let here = memory.position();
+    let mut objects: Vec<(f32, &MappedObject)> = memory
+        .objects
         .iter()
         .filter(|t| t.is_present && !t.is_gone && kind(t.class).is_some())
-        .map(|t| (memory.way_to(t).unwrap_or_else(|| 2.0 * t.distance_from(here)), t))
+        .map(|t| (memory.path_length_to(t).unwrap_or_else(|| 2.0 * t.distance_from(here)), t))
         .collect();
-    things.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let left_out = things.len().saturating_sub(length.things);
-    things.truncate(length.things);
-    let facts = |(_, thing): &(f32, &Thing)| {
-        let info = thing.class.info();
-        let note = if memory.frame < thing.held_until {
+    objects.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let left_out = objects.len().saturating_sub(length.objects);
+    objects.truncate(length.objects);
+    let facts = |(_, object): &(f32, &MappedObject)| {
+        let info = object.class.info();
+        let note = if memory.frame < object.held_until {
             Some("in somebody's hands".to_owned())
-        } else if memory.frame < thing.ignore_until {
+        } else if memory.frame < object.ignore_until {
             Some("you tried in vain lately".to_owned())
         } else if info.role == Role::Fragile {
             Some("fragile".to_owned())
@@ -328,25 +335,25 @@ fn map(context: &Context<'_>, length: Length) -> Map {
         } else {
             None
         };
-        ThingFacts {
-            kind: kind(thing.class).flatten(),
-            name: named(thing.track, Some(thing.class)),
-            x: metres(thing.position_in_world.x),
-            z: metres(thing.position_in_world.z),
-            top_m: metres(thing.top_m),
+        ObjectFacts {
+            kind: kind(object.class).flatten(),
+            name: named(object.track, Some(object.class)),
+            x: metres(object.position_in_world.x),
+            z: metres(object.position_in_world.z),
+            top_m: metres(object.top_m),
             note,
         }
     };
-    Map { things: things.iter().map(facts).collect(), left_out, explored: is_explored }
+    Map { things: objects.iter().map(facts).collect(), left_out, explored: is_explored }
 }
 
 fn plan_facts(memory: &Memory, plan: &Plan) -> PlanFacts {
-    let subject = match plan {
+    let path_m = match plan {
         Plan::PickUp(s) | Plan::PickContainer(s) | Plan::RemoveObstacle(s) | Plan::LiftWith(s) => {
-            memory.things.get(s.track).and_then(|t| memory.way_to(t))
+            memory.objects.get(s.track).and_then(|t| memory.path_length_to(t))
         }
-        Plan::Deliver => memory.goal_places().first().map(|(_, way_m)| *way_m),
+        Plan::Deliver => memory.goal_places().first().map(|(_, path_m)| *path_m),
         _ => None,
     };
-    PlanFacts { text: plan_text(plan), way_m: subject.map(metres) }
+    PlanFacts { text: plan_text(plan), way_m: path_m.map(metres) }
 }

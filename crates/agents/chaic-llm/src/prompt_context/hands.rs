@@ -1,35 +1,35 @@
-//! What somebody put away, from what they did before.
+//! Objects that a person put away, from earlier interactions.
 
 use chaic_agents::TrackId;
-use chaic_agents::memory::Done;
+use chaic_agents::memory::ActionRecord;
 use chaic_core::{Action, ClassId, Outcome, Role};
 
-/// For each of the interactions, the oldest first, what was put down or into a container, where that is
+/// For each interaction, oldest first, returns the object that was put down or into a container, if
 /// known.
 pub(super) fn put_away(
-    history: &[Done],
+    history: &[ActionRecord],
     class_of: impl Fn(TrackId) -> Option<ClassId>,
 ) -> Vec<Option<TrackId>> {
     let mut hands: [Option<TrackId>; 2] = [None; 2];
-    let holds = |track: TrackId| {
+    let is_container = |track: TrackId| {
         let role = class_of(track).map(|class| class.info().role);
         matches!(role, Some(Role::Container | Role::Vehicle))
     };
-    let put = |done: &Done| {
-        let from = match done.action {
+    let put = |record: &ActionRecord| {
+        let from = match record.action {
             Action::PutOn { hand, .. } => Some(hand.index()),
-            Action::PutIn => hands.iter().position(|held| held.is_some_and(|e| !holds(e))),
+            Action::PutIn => hands.iter().position(|held| held.is_some_and(|e| !is_container(e))),
             _ => None,
         };
-        let what = from.and_then(|k| hands[k]);
-        if done.outcome == Outcome::Success {
-            if let Action::PickUp { hand, object } = done.action {
+        let object_put = from.and_then(|k| hands[k]);
+        if record.outcome == Outcome::Success {
+            if let Action::PickUp { hand, object } = record.action {
                 hands[hand.index()] = Some(object);
             } else if let Some(from) = from {
                 hands[from] = None;
             }
         }
-        what
+        object_put
     };
     history.iter().map(put).collect()
 }
@@ -41,13 +41,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_put_away_is_what_the_hand_had_taken() {
+    fn the_object_put_away_is_the_one_picked_up_by_that_hand() {
         let [apple, plate, bed] = [20, 21, 22].map(TrackId);
         let class_of = |e| {
             let name = if e == apple { "apple" } else { "plate" };
             (e != bed).then(|| ClassId::named(name))
         };
-        let done = |action, outcome| Done { frame: 0, action, outcome };
+        let done = |action, outcome| ActionRecord { frame: 0, action, outcome };
         let good = Outcome::Success;
         let failed = Outcome::Failure(chaic_core::action::FailureReason::OutOfReach);
         let take = |hand, object| Action::PickUp { hand, object };

@@ -1,16 +1,16 @@
-//! PromptContext to try templates on.
+//! Sample contexts that validate templates.
 
 use chaic_core::capability::Persona;
 
 use super::gather::{body, metres, person, reach};
 use super::{
-    Count, GoalPlace, Interaction, Map, Other, Own, PlanFacts, ProgressFacts, PromptContext,
-    ThingFacts, ToldFacts,
+    Count, DisclosedFacts, GoalPlace, Interaction, Map, ObjectFacts, PersonFacts, PlanFacts,
+    ProgressFacts, PromptContext, SelfFacts,
 };
-use crate::templates::Track;
+use crate::prompt_track::PromptTrack;
 
 impl PromptContext {
-    /// One of each kind, with everything and with nothing in it, to try templates on.
+    /// Samples of each track, with all variables filled and with all empty.
     pub(crate) fn samples() -> Vec<PromptContext> {
         let full = |track| PromptContext {
             track,
@@ -26,14 +26,14 @@ impl PromptContext {
             horizon: 3000,
             frames_per_10_m: 210,
             me: body(&Persona::Child.capability()),
-            told: Some(ToldFacts {
+            told: Some(DisclosedFacts {
                 task: "shopping",
                 partner: person(Persona::Rider.into()),
                 reach: reach(&Persona::Wheelchair.capability()),
                 strength_kg: 100,
             }),
             wanted: vec![Count { name: "apple".to_owned(), count: 2 }],
-            own: Own {
+            own: SelfFacts {
                 x: metres(1.0),
                 z: metres(-2.0),
                 hands: vec!["apple #31".to_owned()],
@@ -46,7 +46,7 @@ impl PromptContext {
                 history_left_out: 3,
                 plan: Some("explore".to_owned()),
             },
-            others: vec![Other {
+            others: vec![PersonFacts {
                 who: "your partner",
                 seen: true,
                 in_view: false,
@@ -76,7 +76,7 @@ impl PromptContext {
                 delivered: vec![Count { name: "apple".to_owned(), count: 1 }],
             },
             map: Map {
-                things: vec![ThingFacts {
+                things: vec![ObjectFacts {
                     kind: Some("container"),
                     name: "wicker basket #60".to_owned(),
                     x: metres(2.0),
@@ -106,9 +106,19 @@ impl PromptContext {
                 helped: false,
                 images: 0,
                 me: body(&Persona::Helper.capability()),
-                told: all.told.map(|told| ToldFacts { task: "moving_house", reach: None, ..told }),
-                own: Own { hands: vec![], history: vec![], plan: None, free_hands: 0, ..all.own },
-                others: vec![Other {
+                told: all.told.map(|told| DisclosedFacts {
+                    task: "moving_house",
+                    reach: None,
+                    ..told
+                }),
+                own: SelfFacts {
+                    hands: vec![],
+                    history: vec![],
+                    plan: None,
+                    free_hands: 0,
+                    ..all.own
+                },
+                others: vec![PersonFacts {
                     seen: false,
                     took: vec![],
                     holds: vec![],
@@ -122,7 +132,7 @@ impl PromptContext {
             }
         };
         let alone = |track| PromptContext { others: Vec::new(), ..empty(track) };
-        let tracks = [Track::Hidden, Track::Told, Track::Partner];
+        let tracks = [PromptTrack::Hidden, PromptTrack::Told, PromptTrack::Partner];
         tracks.into_iter().flat_map(|t| [full(t), empty(t), alone(t)]).collect()
     }
 }

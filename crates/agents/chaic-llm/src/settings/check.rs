@@ -1,4 +1,4 @@
-//! Whether settings are within their bounds, and whether an address may be asked at all.
+//! Bounds of settings, and validity of addresses.
 
 use std::fmt::Display;
 use std::net::IpAddr;
@@ -9,55 +9,55 @@ use ureq::http::Uri;
 use super::{Endpoint, Settings};
 use crate::error::{LlmError, Result};
 
-/// Randomness of an answer: what OpenAI's reference of chat completions allows.
+/// Range of the sampling temperature (OpenAI's reference of chat completions).
 const TEMPERATURE: RangeInclusive<f64> = 0.0..=2.0;
-/// Money and prices: ours, more than anybody spends, and sums of it stay exact enough.
+/// Range of money and prices; sums up to it are exact enough.
 const MONEY: RangeInclusive<f64> = 0.0..=1e9;
-/// Minutes of a session: ours, ten years.
+/// Range of minutes of a session, up to ten years.
 const MINUTES: RangeInclusive<f64> = 0.0..=5_256_000.0;
-/// Everything that is waited for, seconds: ours, up to a day.
+/// Range of waits, seconds, up to a day.
 const SECS: RangeInclusive<f32> = 0.001..=86_400.0;
-/// Longest answer, bytes: ours, a thousand times the usual limit.
+/// Range of the maximum answer size, bytes, up to a thousand times the default.
 const ANSWER_BYTES: RangeInclusive<u64> = 1..=1 << 30;
 
 impl Settings {
-    /// Whether everything is within its bounds, and the endpoint may be asked.
+    /// Checks all bounds and the endpoint.
     ///
     /// # Errors
-    /// [`LlmError::Setting`] with the first that isn't.
+    /// [`LlmError::Setting`] for the first invalid setting.
     pub fn check(&self) -> Result<()> {
         self.check_bounds()?;
         self.endpoint.check()?;
         check_variable(&self.key_env())
     }
 
-    /// Whether everything is within its bounds, for who asks no endpoint.
+    /// Checks all bounds, for runs without an endpoint.
     ///
     /// # Errors
-    /// [`LlmError::Setting`] with the first that isn't.
+    /// [`LlmError::Setting`] for the first invalid setting.
     pub fn check_bounds(&self) -> Result<()> {
         let Settings { asking, endpoint, faults, budget, price } = self;
         if asking.model.is_empty() {
             return wrong("asking.model", "empty", "the model's name; give --model");
         }
-        maybe_within("asking.temperature", asking.temperature, TEMPERATURE)?;
-        maybe_within("asking.top_p", asking.top_p, 0.0..=1.0)?;
-        within("asking.answer_tokens", asking.answer_tokens, 1..=1_000_000)?;
-        within("asking.prompt_tokens", asking.prompt_tokens, 500..=1_000_000)?;
-        within("asking.images.count", asking.images.count, 1..=100)?;
-        within("asking.images.size", asking.images.size, 16..=2048)?;
-        within("asking.wait_frames", asking.wait_frames, 1..=3000)?;
-        within("asking.frames_per_second", asking.frames_per_second, 0.0..=1000.0)?;
-        within("endpoint.in_flight", endpoint.in_flight, 1..=256)?;
-        within("endpoint.max_answer_bytes", endpoint.max_answer_bytes, ANSWER_BYTES)?;
-        within("endpoint.timeout_secs", endpoint.timeout_secs, SECS)?;
-        within("faults.attempts", faults.attempts, 1..=100)?;
-        within("faults.first_wait_secs", faults.first_wait_secs, SECS)?;
-        within("faults.longest_wait_secs", faults.longest_wait_secs, SECS)?;
-        maybe_within("budget.money", budget.money, MONEY)?;
-        maybe_within("budget.minutes", budget.minutes, MINUTES)?;
-        within("price.prompt_per_million", price.prompt_per_million, MONEY)?;
-        within("price.answer_per_million", price.answer_per_million, MONEY)?;
+        check_optional("asking.temperature", asking.temperature, TEMPERATURE)?;
+        check_optional("asking.top_p", asking.top_p, 0.0..=1.0)?;
+        check_range("asking.answer_tokens", asking.answer_tokens, 1..=1_000_000)?;
+        check_range("asking.prompt_tokens", asking.prompt_tokens, 500..=1_000_000)?;
+        check_range("asking.images.count", asking.images.count, 1..=100)?;
+        check_range("asking.images.size", asking.images.size, 16..=2048)?;
+        check_range("asking.wait_frames", asking.wait_frames, 1..=3000)?;
+        check_range("asking.frames_per_second", asking.frames_per_second, 0.0..=1000.0)?;
+        check_range("endpoint.in_flight", endpoint.in_flight, 1..=256)?;
+        check_range("endpoint.max_answer_bytes", endpoint.max_answer_bytes, ANSWER_BYTES)?;
+        check_range("endpoint.timeout_secs", endpoint.timeout_secs, SECS)?;
+        check_range("faults.attempts", faults.attempts, 1..=100)?;
+        check_range("faults.first_wait_secs", faults.first_wait_secs, SECS)?;
+        check_range("faults.longest_wait_secs", faults.longest_wait_secs, SECS)?;
+        check_optional("budget.money", budget.money, MONEY)?;
+        check_optional("budget.minutes", budget.minutes, MINUTES)?;
+        check_range("price.prompt_per_million", price.prompt_per_million, MONEY)?;
+        check_range("price.answer_per_million", price.answer_per_million, MONEY)?;
         if budget.money.is_some() && price.prompt_per_million + price.answer_per_million == 0.0 {
             return wrong("budget.money", "given", "prices in [price] to go with it");
         }
@@ -66,14 +66,14 @@ impl Settings {
 }
 
 impl Endpoint {
-    /// Whether this may be asked: a bare address, by https unless it is on this machine itself or
-    /// plain http is allowed.
+    /// Checks the address: without credentials or query, and https unless it is on the same machine
+    /// or plain http is allowed.
     fn check(&self) -> Result<()> {
         const FIELD: &str = "endpoint.url";
         if self.url.is_empty() {
             return wrong(FIELD, "empty", "the endpoint's address; give --endpoint");
         }
-        // What may hold a secret isn't repeated.
+        // The message omits an address that may contain a secret.
         if self.url.contains(['@', '?', '#']) {
             return wrong(
                 FIELD,
@@ -91,7 +91,7 @@ impl Endpoint {
             return wrong(
                 FIELD,
                 "plain http to another machine",
-                "https; or --llm-allow-http, if everybody on the way may read questions and key",
+                "https; or --llm-allow-http, if others on the network may read requests and key",
             );
         }
         let is_harmless = |c: char| c.is_ascii_alphanumeric() || ".-_".contains(c);
@@ -101,7 +101,7 @@ impl Endpoint {
         Ok(())
     }
 
-    /// Whether the address is on this machine itself.
+    /// Returns whether the address is on the same machine.
     pub fn is_local(&self) -> bool {
         let Ok(uri) = self.url.parse::<Uri>() else { return false };
         let Some(host) = uri.host() else { return false };
@@ -111,23 +111,31 @@ impl Endpoint {
     }
 }
 
-/// Whether this names an environment variable. It isn't repeated: it may be the key itself, given
-/// in its name's place.
+/// Checks the name of an environment variable. The message omits it, since it may be the key
+/// itself.
 fn check_variable(name: &str) -> Result<()> {
     let is_word = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
     if !is_word || name.starts_with(|c: char| c.is_ascii_digit()) {
         let expected = "the name of an environment variable, like OPENAI_API_KEY";
-        return wrong("endpoint.key_env", "no name (not repeated, should it be the key)", expected);
+        return wrong(
+            "endpoint.key_env",
+            "no name (not shown, because it may be the key)",
+            expected,
+        );
     }
     Ok(())
 }
 
-fn maybe_within(field: &'static str, value: Option<f64>, range: RangeInclusive<f64>) -> Result<()> {
-    value.map_or(Ok(()), |value| within(field, value, range))
+fn check_optional(
+    field: &'static str,
+    value: Option<f64>,
+    range: RangeInclusive<f64>,
+) -> Result<()> {
+    value.map_or(Ok(()), |value| check_range(field, value, range))
 }
 
-/// A NaN is in no range.
-fn within<T>(field: &'static str, value: T, range: RangeInclusive<T>) -> Result<()>
+/// NaN is in no range.
+fn check_range<T>(field: &'static str, value: T, range: RangeInclusive<T>) -> Result<()>
 where
     T: PartialOrd + Display,
 {
@@ -144,20 +152,20 @@ fn wrong(field: &'static str, found: &str, expected: &str) -> Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::good;
+    use super::super::tests::valid_settings;
     use super::*;
 
     type Change = fn(&mut Settings);
 
     fn refused(change: Change) -> String {
-        let mut settings = good();
+        let mut settings = valid_settings();
         change(&mut settings);
         settings.check().expect_err("it is out of bounds").to_string()
     }
 
     #[test]
-    fn the_usual_settings_are_fine_and_out_of_bounds_ones_are_named() {
-        good().check().unwrap();
+    fn valid_settings_pass_and_invalid_ones_are_named() {
+        valid_settings().check().unwrap();
         let changes: [(Change, &str); 11] = [
             (|s| s.asking.model.clear(), "--model"),
             (|s| s.endpoint.url.clear(), "--endpoint"),
@@ -171,14 +179,14 @@ mod tests {
             (|s| s.budget.money = Some(1.0), "[price]"),
             (|s| s.asking.prompt_tokens = 10, "asking.prompt_tokens is 10, expected 500 to"),
         ];
-        for (change, words) in changes {
-            let said = refused(change);
-            assert!(said.contains(words) && !said.contains("sesame"), "{said}");
+        for (change, expected) in changes {
+            let error = refused(change);
+            assert!(error.contains(expected) && !error.contains("sesame"), "{error}");
         }
     }
 
     #[test]
-    fn what_is_no_number_or_out_of_range_is_refused() {
+    fn nan_and_values_out_of_range_are_refused() {
         type Set = fn(&mut Settings, f64);
         let fields: [(Set, &str); 9] = [
             (|s, x| s.asking.temperature = Some(x), "asking.temperature"),
@@ -193,20 +201,20 @@ mod tests {
         ];
         for (set, field) in fields {
             for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -0.5, 1e12] {
-                let mut settings = good();
+                let mut settings = valid_settings();
                 set(&mut settings, value);
-                let said = settings.check().expect_err(field).to_string();
-                assert!(said.starts_with(&format!("{field} is ")), "{said}");
-                assert!(settings.check_bounds().is_err(), "also where nobody is asked");
+                let error = settings.check().expect_err(field).to_string();
+                assert!(error.starts_with(&format!("{field} is ")), "{error}");
+                assert!(settings.check_bounds().is_err(), "also without an endpoint");
             }
         }
-        let said = refused(|s| s.asking.temperature = Some(f64::NAN));
-        assert_eq!(said, "asking.temperature is NaN, expected 0 to 2");
+        let error = refused(|s| s.asking.temperature = Some(f64::NAN));
+        assert_eq!(error, "asking.temperature is NaN, expected 0 to 2");
     }
 
     #[test]
     fn plain_http_goes_to_this_machine_only_unless_it_is_allowed() {
-        for (url, is_fine) in [
+        for (url, is_valid) in [
             ("http://localhost:8000/v1", true),
             ("http://LOCALHOST/v1", true),
             ("http://127.0.0.1/v1", true),
@@ -222,14 +230,14 @@ mod tests {
             ("http://models.example.org\\localhost/v1", false),
             ("http:///v1", false),
         ] {
-            let mut settings = good();
+            let mut settings = valid_settings();
             settings.endpoint.url = url.to_owned();
-            assert_eq!(settings.check().is_ok(), is_fine, "{url}: {:?}", settings.check());
+            assert_eq!(settings.check().is_ok(), is_valid, "{url}: {:?}", settings.check());
         }
-        let mut settings = good();
+        let mut settings = valid_settings();
         settings.endpoint.url = "http://192.168.1.7:8000/v1".to_owned();
-        let said = settings.check().unwrap_err().to_string();
-        assert!(said.contains("plain http") && said.contains("--llm-allow-http"), "{said}");
+        let error = settings.check().unwrap_err().to_string();
+        assert!(error.contains("plain http") && error.contains("--llm-allow-http"), "{error}");
         settings.endpoint.allow_http = true;
         settings.check().unwrap();
     }

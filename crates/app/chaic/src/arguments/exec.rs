@@ -1,4 +1,4 @@
-//! Helpers in other processes: what stands behind `--helper`, and `chaic helper`.
+//! Helper processes: values of `--helper`, options of the sandbox, and `chaic helper`.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -7,15 +7,16 @@ use chaic_core::observation::Grants;
 use chaic_env::rules::RuleSetName;
 use chaic_sandbox::Launcher;
 use chaic_subprocess::environment::check_name;
-use chaic_subprocess::{Command, Confinement, ConfinementOptions, Limits, Refusal};
+use chaic_subprocess::{Confinement, ConfinementOptions, HelperProgram, Limits, Refusal};
 use clap::{Args, Subcommand};
 
-use crate::output::complain;
+use crate::output::print_warning;
+use crate::suggest::with_suggestion;
 
-/// What a command is called that has no name of its own.
-const USUAL_NAME: &str = "exec";
-/// What a policy is called that has no name of its own.
-const USUAL_POLICY: &str = "policy";
+/// Default name of a helper process.
+const DEFAULT_PROCESS_NAME: &str = "exec";
+/// Default name of a policy.
+const DEFAULT_POLICY_NAME: &str = "policy";
 
 /// One value of `--helper`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,22 +25,22 @@ pub enum HelperArgument {
     Names(Vec<String>),
     /// `exec:COMMAND` or `NAME=exec:COMMAND`.
     Exec {
-        /// What it is called.
+        /// Name of the helper.
         name: String,
-        /// For `sh -c`.
+        /// Command line for `sh -c`.
         line: String,
     },
     /// `policy:FILE` or `NAME=policy:FILE`.
     Policy {
-        /// What it is called.
+        /// Name of the helper.
         name: String,
-        /// Its weights.
+        /// Weight file.
         file: PathBuf,
     },
 }
 
 impl HelperArgument {
-    /// The names that it adds to a run.
+    /// Returns the names of the helpers.
     pub fn names(&self) -> Vec<String> {
         match self {
             HelperArgument::Names(names) => names.clone(),
@@ -50,18 +51,18 @@ impl HelperArgument {
     }
 }
 
-/// The name and the rest of `KIND:REST` or `NAME=KIND:REST`.
-fn of_kind<'a>(text: &'a str, kind: &str, usual: &'a str) -> Option<(&'a str, &'a str)> {
+/// Splits `KIND:REST` or `NAME=KIND:REST` into the name and the rest.
+fn split_kind<'a>(text: &'a str, kind: &str, default_name: &'a str) -> Option<(&'a str, &'a str)> {
     let named = text.split_once(&format!("={kind}")).filter(|(name, _)| !name.contains([',', ':']));
-    named.or_else(|| Some((usual, text.strip_prefix(kind)?)))
+    named.or_else(|| Some((default_name, text.strip_prefix(kind)?)))
 }
 
-/// Reads one value of `--helper`.
+/// Parses one value of `--helper`.
 pub fn helper(text: &str) -> Result<HelperArgument, String> {
-    if let Some((name, file)) = of_kind(text, "policy:", USUAL_POLICY) {
+    if let Some((name, file)) = split_kind(text, "policy:", DEFAULT_POLICY_NAME) {
         return Ok(HelperArgument::Policy { name: name.to_owned(), file: file.into() });
     }
-    let Some((name, line)) = of_kind(text, "exec:", USUAL_NAME) else {
+    let Some((name, line)) = split_kind(text, "exec:", DEFAULT_PROCESS_NAME) else {
         return Ok(HelperArgument::Names(text.split(',').map(str::to_owned).collect()));
     };
     if line.trim().is_empty() {
@@ -72,65 +73,67 @@ pub fn helper(text: &str) -> Result<HelperArgument, String> {
     Ok(HelperArgument::Exec { name: name.to_owned(), line: line.to_owned() })
 }
 
-/// What helpers in other processes get, and may take.
+/// Grants and limits of helper processes.
 #[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Helper processes")]
 pub struct ExecArguments {
-    /// What helpers of exec:COMMAND are granted beyond their own images and state, separated by
-    /// commas: ids, goal_place, goal, progress, behavior, positions, task; docs/grants.md.
-    #[arg(long, value_name = "NAMES", value_parser = grants, help_heading = "Helpers in other processes")]
+    /// Grants of helper processes, separated by commas: ids, goal_place, goal, progress, behavior,
+    /// positions, task; docs/grants.md [default: none].
+    #[arg(long, value_name = "NAMES", value_parser = grants)]
     pub exec_grants: Option<Grants>,
-    /// Longest time for one decision, seconds. Usual: 30.
-    #[arg(long, value_name = "S", value_parser = seconds, help_heading = "Helpers in other processes")]
+    /// Time limit of one decision, seconds [default: 30].
+    #[arg(long, value_name = "S", value_parser = seconds)]
     pub exec_decision_s: Option<Duration>,
-    /// Longest time for starting and for a briefing, seconds. Usual: 120.
-    #[arg(long, value_name = "S", value_parser = seconds, help_heading = "Helpers in other processes")]
+    /// Time limit of the start, and of a briefing, seconds [default: 120].
+    #[arg(long, value_name = "S", value_parser = seconds)]
     pub exec_start_s: Option<Duration>,
-    /// Longest time that an episode waits for it in all, seconds. Usual: 3600.
-    #[arg(long, value_name = "S", value_parser = seconds, help_heading = "Helpers in other processes")]
+    /// Time limit of all decisions of an episode, seconds [default: 3600].
+    #[arg(long, value_name = "S", value_parser = seconds)]
     pub exec_episode_s: Option<Duration>,
-    /// Memory for all of its processes together, MiB; with --exec-trust for each of them. Default: 8192.
-    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1 << 30), help_heading = "Helpers in other processes")]
+    /// Memory limit of all processes of a helper together, MiB; with --exec-trust of each process
+    /// [default: 8192].
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1 << 30))]
     pub exec_memory_mib: Option<u64>,
-    /// Environment variable that helpers of exec:COMMAND inherit besides the allow-list (PATH, HOME, ..;
-    /// docs/subprocess-helpers.md); may be given often. Only its name is recorded.
-    #[arg(long, value_name = "NAME", value_parser = variable, help_heading = "Helpers in other processes")]
+    /// Environment variable to pass on besides PATH, HOME and others of docs/subprocess-helpers.md;
+    /// repeatable. Only its name is recorded.
+    #[arg(long, value_name = "NAME", value_parser = variable)]
     pub exec_env: Vec<String>,
-    /// Let helpers of exec:COMMAND read a file or folder, besides the system's folders, the installations
-    /// of programs and the files that COMMAND names; may be given often.
-    #[arg(long, value_name = "PATH", help_heading = "Helpers in other processes")]
+    /// File or folder that helper processes may read, besides system folders, installed programs and the
+    /// files in COMMAND; repeatable.
+    #[arg(long, value_name = "PATH")]
     pub exec_read: Vec<PathBuf>,
-    /// Run helpers of exec:COMMAND without a sandbox, with all rights of your user.
-    #[arg(long, conflicts_with = "exec_read", help_heading = "Helpers in other processes")]
+    /// Run helper processes without a sandbox, with all rights of your user.
+    #[arg(long, conflicts_with = "exec_read")]
     pub exec_trust: bool,
 }
 
 impl ExecArguments {
-    /// A helper of this name and command line.
-    pub fn command(&self, name: &str, line: &str) -> Command {
-        let usual = Limits::default();
-        Command {
+    /// Returns the helper process with this name and command line.
+    pub fn command(&self, name: &str, line: &str) -> HelperProgram {
+        let default = Limits::default();
+        HelperProgram {
             name: name.to_owned(),
             line: line.to_owned(),
             grants: self.exec_grants.unwrap_or(Grants::NONE),
             limits: Limits {
-                start: self.exec_start_s.unwrap_or(usual.start),
-                decision: self.exec_decision_s.unwrap_or(usual.decision),
-                episode: self.exec_episode_s.unwrap_or(usual.episode),
-                memory_mib: self.exec_memory_mib.unwrap_or(usual.memory_mib),
-                ..usual
+                start: self.exec_start_s.unwrap_or(default.start),
+                decision: self.exec_decision_s.unwrap_or(default.decision),
+                episode: self.exec_episode_s.unwrap_or(default.episode),
+                memory_mib: self.exec_memory_mib.unwrap_or(default.memory_mib),
+                ..default
             },
             environment: self.exec_env.clone(),
             confinement: None,
         }
     }
 
-    /// Confines a command as the options say, and warns of parts of the sandbox that are missing.
+    /// Confines a helper process as the options request, and warns if parts of the sandbox are missing.
     ///
     /// # Errors
-    /// If a path to read is not there, or the sandbox cannot be started.
+    /// If a path to read is missing, or the sandbox cannot be started.
     pub fn confine(
         &self,
-        command: &mut Command,
+        command: &mut HelperProgram,
         launcher: &Launcher,
         masked: &[PathBuf],
     ) -> Result<(), Refusal> {
@@ -139,10 +142,10 @@ impl ExecArguments {
             readable: self.exec_read.clone(),
             masked: masked.to_vec(),
         };
-        let Command { name, line, limits, .. } = &*command;
+        let HelperProgram { name, line, limits, .. } = &*command;
         let confinement = Confinement::new(launcher, line, limits, &options)?;
         if let Some(missing) = confinement.warning() {
-            complain(&format!("warning: {name} runs in {missing}"));
+            print_warning(&format!("{name} runs in {missing}"));
         }
         command.confinement = Some(confinement);
         Ok(())
@@ -152,16 +155,16 @@ impl ExecArguments {
 /// `chaic helper`.
 #[derive(Debug, Subcommand)]
 pub enum HelperCommand {
-    /// Try whether a command keeps to the protocol for helpers in other processes.
+    /// Test whether a command follows the protocol of helper processes.
     Check(HelperCheckArguments),
-    /// Be such a process: a built-in helper that speaks the protocol on standard input and output.
+    /// Run a built-in helper as such a process, on standard input and output.
     Serve(HelperServeArguments),
 }
 
 /// `chaic helper check`.
 #[derive(Args, Debug)]
 pub struct HelperCheckArguments {
-    /// The command, for a shell, such as `python3 helper.py`.
+    /// Shell command that starts the helper, such as `python3 helper.py`.
     #[arg(value_name = "COMMAND")]
     pub line: String,
     #[command(flatten)]
@@ -171,18 +174,19 @@ pub struct HelperCheckArguments {
 /// `chaic helper serve`.
 #[derive(Args, Debug)]
 pub struct HelperServeArguments {
-    /// Its name: random, rhp, oracle or follow.
+    /// Built-in helper: random, rhp, oracle or follow.
     #[arg(value_name = "NAME")]
     pub name: String,
-    /// paper, or compat for what the original's code does.
+    /// Rule set: paper, or compat for the behavior of the original's code.
     #[arg(long, value_name = "NAME", default_value = "paper")]
     pub rules: RuleSetName,
 }
 
 fn grants(text: &str) -> Result<Grants, String> {
-    Grants::of_names(text.split(',')).map_err(|name| {
-        let all: Vec<_> = Grants::NONE.named().iter().map(|(name, _)| *name).collect();
-        format!("no grant `{name}`; the grants are {}", all.join(", "))
+    Grants::from_names(text.split(',')).map_err(|name| {
+        let known: Vec<_> = Grants::NONE.named().iter().map(|(name, _)| *name).collect();
+        let message = format!("no grant `{name}`; the grants are {}", known.join(", "));
+        with_suggestion(message, &name, known)
     })
 }
 

@@ -1,40 +1,42 @@
-//! Of `chaic export`.
+//! Options of `chaic export`.
 
 use std::path::PathBuf;
 
 use chaic_core::{AgentId, TaskId};
 use clap::{Args, Subcommand};
 
-/// Which format.
+use super::{agent, task};
+
+/// `chaic export`.
 #[derive(Debug, Subcommand)]
 pub enum ExportCommand {
-    /// LeRobot, version 3: tables as Parquet, a film of each episode as MP4.
+    /// Export a LeRobot data set, version 3: Parquet tables and an MP4 video of each episode.
     Lerobot(LeRobotArguments),
 }
 
-/// Of `chaic export lerobot`.
-#[derive(Debug, Args)]
+/// `chaic export lerobot`.
+#[derive(Args, Debug)]
 pub struct LeRobotArguments {
-    /// The run's folder; it has traces.
+    /// Folder of a run with traces.
     pub run: PathBuf,
-    /// An empty folder: the data set.
+    /// An empty folder for the data set.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Whose eyes and actions: partner or helper.
-    #[arg(long, default_value = "helper", value_parser = super::agent)]
+    /// Agent whose observations and actions are exported: partner or helper.
+    #[arg(long, default_value = "helper", value_parser = agent)]
     pub agent: AgentId,
-    /// Episodes with this helper alone.
+    /// Export episodes with this helper only.
     #[arg(long, value_name = "NAME")]
     pub helper: Option<String>,
-    /// Episodes of this task alone.
-    #[arg(long, value_name = "TASK")]
+    /// Export episodes of this task only.
+    #[arg(long, value_name = "TASK", value_parser = task)]
     pub task: Option<TaskId>,
-    /// Every how many frames one moment is written, 1 to 30; a divisor of 30, which are a second.
+    /// Frames between samples, 1 to 30; a divisor of 30, which are one second.
     #[arg(long, value_name = "N", default_value_t = 6)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=30))]
     pub every: u32,
-    /// Side of pictures, 16 to 1024 pixels; an even number.
-    #[arg(long, value_name = "N", default_value_t = 256)]
+    /// Side of the images, 16 to 1024 pixels; an even number.
+    #[arg(long, alias = "image-size", value_name = "PIXELS", default_value_t = 256)]
     #[arg(value_parser = clap::value_parser!(u32).range(16..=1024))]
-    pub image_size: u32,
+    pub size: u32,
 }

@@ -1,60 +1,59 @@
-//! What can be said of the opponent model.
+//! Options of the opponent model.
 
 use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Of, ranges};
+use super::{SplitArgument, ranges};
 
-/// Of `chaic collect opponent`.
-#[derive(Debug, Args)]
+/// `chaic collect opponent`.
+#[derive(Args, Debug)]
 pub struct CollectOpponentArguments {
-    /// The file to write, safetensors.
+    /// File to write: .safetensors.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Environments.
-    #[arg(long, value_enum, default_value_t = Of::Training)]
-    pub of: Of,
+    /// Part of the training data.
+    #[arg(long, alias = "of", value_enum, default_value_t = SplitArgument::Train)]
+    pub split: SplitArgument,
     #[command(flatten)]
     pub windows: WindowArguments,
 }
 
-/// Of `chaic eval-opponent`.
-#[derive(Debug, Args)]
+/// `chaic eval opponent`.
+#[derive(Args, Debug)]
 pub struct OpponentArguments {
-    /// The weights, a safetensors file.
+    /// Weights: a safetensors file.
     #[arg(long, value_name = "FILE")]
     pub weights: PathBuf,
     #[command(flatten)]
     pub windows: WindowArguments,
-    /// Write all figures into a JSON file, too.
+    /// Also write all metrics to a JSON file.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
 }
 
-/// How windows are made.
-#[derive(Debug, Args)]
+/// Windows of observations of a partner.
+#[derive(Args, Debug)]
 pub struct WindowArguments {
-    /// Windows of each goal at most, 1 to 1000000.
-    #[arg(long, value_name = "N", default_value_t = 1000)]
+    /// Maximum number of windows per goal, 1 to 1000000.
+    #[arg(long, alias = "of-each", value_name = "N", default_value_t = 1000)]
     #[arg(value_parser = clap::value_parser!(u32).range(ranges::WINDOWS))]
-    pub of_each: u32,
-    /// Episodes that are played for them at most, 1 to 100000.
-    #[arg(long, value_name = "N", default_value_t = 200)]
+    pub max_per_class: u32,
+    /// Maximum number of episodes to play, 1 to 100000.
+    #[arg(long, alias = "episodes", value_name = "N", default_value_t = 200)]
     #[arg(value_parser = clap::value_parser!(u32).range(ranges::EPISODES))]
-    pub episodes: u32,
-    /// By what the helper sees: gt, learned, learned:FILE, noisy or noisy:FILE.
+    pub n_episodes: u32,
+    /// Object detection of the helper: gt, learned, learned:FILE, noisy or noisy:FILE.
     #[arg(long, value_name = "KIND", default_value = "gt")]
     pub perception: String,
-    /// By what it tells what its partner does: gt (what is granted, and what follows from things in hands), learned or
-    /// learned:FILE.
+    /// Behavior recognition of the helper: gt (granted state and held objects), learned or learned:FILE.
     #[arg(long, value_name = "KIND", default_value = "gt")]
     pub behavior: String,
-    /// Grant it what its partner does, as in the paper.
-    #[arg(long)]
-    pub granted: bool,
-    /// Side of everybody's images, 16 to 1024 pixels.
-    #[arg(long, value_name = "N", default_value_t = 128)]
+    /// Grant the partner's current behavior to the helper, as in the paper.
+    #[arg(long, alias = "granted")]
+    pub grant_behavior: bool,
+    /// Side of the images of all agents, 16 to 1024 pixels.
+    #[arg(long, alias = "image-size", value_name = "PIXELS", default_value_t = 128)]
     #[arg(value_parser = clap::value_parser!(u32).range(16..=1024))]
-    pub image_size: u32,
+    pub size: u32,
 }

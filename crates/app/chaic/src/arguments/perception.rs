@@ -1,199 +1,190 @@
-//! Of `chaic train` and `chaic eval-perception`.
+//! Options of `chaic collect`, `chaic train`, `chaic eval detection` and `chaic eval behavior`.
 
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 
 use super::opponent::CollectOpponentArguments;
-use super::ranges;
+use super::{SplitArgument, ranges};
 
-/// What to train.
+/// `chaic train`.
 #[derive(Debug, Subcommand)]
 pub enum TrainCommand {
-    /// The detector: which things are in an image, and where.
-    Detector(TrainArguments),
-    /// The behavior network: what a person in a film does.
+    /// Train the detector: class, mask and position of each object in an image.
+    #[command(aliases = ["detector", "perception"])]
+    Detection(TrainArguments),
+    /// Train the behavior network, which classifies the action of a person in a clip.
     Behavior(TrainArguments),
-    /// A helper's policy, which chooses plans, by proximal policy optimization.
+    /// Train a policy that chooses plans, by proximal policy optimization.
     Ppo(TrainArguments),
-    /// The same policy by what a teacher would choose.
+    /// Train the same policy by behavior cloning of an expert.
     Clone(TrainArguments),
-    /// A helper's policy of single actions, from images: the paper's way.
+    /// Train a policy of single actions from images, as in the paper.
     Primitive(TrainArguments),
-    /// The opponent model: what a partner is about, and what it can't do.
+    /// Train the opponent model, which infers the partner's goal and limits.
     Opponent(TrainArguments),
 }
 
-/// Of `chaic train`.
-#[derive(Debug, Args)]
+/// Options of all trainings.
+#[derive(Args, Debug)]
 pub struct TrainArguments {
-    /// The training's folder: configuration, checkpoint, curves, weights.
+    /// Folder of the training: configuration, checkpoint, curves, weights.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// A TOML file with what differs from the usual training; what it can name is in the config.toml of
-    /// any training.
+    /// TOML file with the keys that differ from the default. The config.toml of any training has all keys.
     #[arg(long, value_name = "FILE", conflicts_with = "resume")]
     pub config: Option<PathBuf>,
-    /// Begin with these weights, a safetensors file, in place of random ones.
+    /// Initial weights, a safetensors file, instead of random ones.
     #[arg(long, value_name = "FILE", conflicts_with = "resume")]
     pub weights: Option<PathBuf>,
-    /// Steps in all, 1 to 1000000000, by which the rate is planned.
+    /// Total number of steps, 1 to 1000000000; the learning rate schedule depends on it.
     #[arg(long, value_name = "N", conflicts_with = "resume")]
     #[arg(value_parser = clap::value_parser!(u64).range(ranges::STEPS))]
     pub steps: Option<u64>,
-    /// Go on with the training in --out, from its last checkpoint.
+    /// Continue the training in --out from its last checkpoint.
     #[arg(long)]
     pub resume: bool,
 }
 
-/// What to collect.
+/// `chaic collect`.
 #[derive(Debug, Subcommand)]
 pub enum CollectCommand {
-    /// Views with what is in them: COCO annotations, color and 16-bit depth.
+    /// Collect images with COCO annotations, color and 16-bit depth.
+    #[command(aliases = ["perception", "detector"])]
     Detection(CollectDetectionArguments),
-    /// Clips of what partners do, with labels: safetensors files.
+    /// Collect labeled clips of partners: safetensors files.
     Behavior(CollectBehaviorArguments),
-    /// Windows of what helpers saw of their partner, with what it was about: a safetensors file.
+    /// Collect observations of partners with their goals: a safetensors file.
     Opponent(CollectOpponentArguments),
 }
 
-/// Whose environments are seen; those of evaluation are left to it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Of {
-    /// What is learned from.
-    Training,
-    /// What is chosen by.
-    Validation,
-}
-
-/// Of `chaic collect detection`.
-#[derive(Debug, Args)]
+/// `chaic collect detection`.
+#[derive(Args, Debug)]
 pub struct CollectDetectionArguments {
-    /// An empty folder: images, depth, annotations.json, statistics.json.
+    /// An empty folder for images, depth, annotations.json and statistics.json.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// How many views, 1 to 999999.
+    /// Number of views, 1 to 999999.
     #[arg(long, value_name = "N", default_value_t = 1000)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=999_999))]
     pub views: u32,
-    /// Environments.
-    #[arg(long, value_enum, default_value_t = Of::Training)]
-    pub of: Of,
-    /// Places that are looked at.
-    #[arg(long, value_enum, default_value_t = Scenes::Crowded)]
-    pub scenes: Scenes,
-    /// Light and colors; usual: as for training, a third of the scenes varied.
-    #[arg(long, value_enum)]
-    pub look: Option<Look>,
-    /// Views at a time, 1 to 1024; changes no view. Usual: one for each core.
+    /// Part of the training data.
+    #[arg(long, alias = "of", value_enum, default_value_t = SplitArgument::Train)]
+    pub split: SplitArgument,
+    /// Kind of scenes.
+    #[arg(long, value_enum, default_value_t = SceneSelection::Crowded)]
+    pub scenes: SceneSelection,
+    /// Light and colors [default: as in the training, a third of the scenes varied].
+    #[arg(long, alias = "look", value_enum)]
+    pub appearance: Option<AppearanceArgument>,
+    /// Views in parallel, 1 to 1024; does not change the views [default: one per core].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(ranges::JOBS))]
     pub jobs: Option<u16>,
 }
 
-/// Of `chaic collect behavior`.
-#[derive(Debug, Args)]
+/// `chaic collect behavior`.
+#[derive(Args, Debug)]
 pub struct CollectBehaviorArguments {
-    /// A folder of its own; if it has clips by the same rules, these are gone on with.
+    /// A new folder, or one with clips of the same configuration, which is continued.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Environments.
-    #[arg(long, value_enum, default_value_t = Of::Training)]
-    pub of: Of,
+    /// Part of the training data.
+    #[arg(long, alias = "of", value_enum, default_value_t = SplitArgument::Train)]
+    pub split: SplitArgument,
     #[command(flatten)]
     pub clips: ClipArguments,
 }
 
-/// How clips are made.
-#[derive(Debug, Args)]
+/// Clips of partners.
+#[derive(Args, Debug)]
 pub struct ClipArguments {
-    /// Clips of each behavior at most, 1 to 5000.
-    #[arg(long, value_name = "N", default_value_t = 100)]
+    /// Maximum number of clips per behavior, 1 to 5000.
+    #[arg(long, alias = "clips", value_name = "N", default_value_t = 100)]
     #[arg(value_parser = clap::value_parser!(u32).range(ranges::CLIPS))]
-    pub clips: u32,
-    /// Episodes that are played for them at most, 1 to 100000.
-    #[arg(long, value_name = "N", default_value_t = 200)]
+    pub max_per_class: u32,
+    /// Maximum number of episodes to play, 1 to 100000.
+    #[arg(long, alias = "episodes", value_name = "N", default_value_t = 200)]
     #[arg(value_parser = clap::value_parser!(u32).range(ranges::EPISODES))]
-    pub episodes: u32,
-    /// By what the helper who films knows the partner in its images: gt, learned, learned:FILE,
-    /// noisy or noisy:FILE.
+    pub n_episodes: u32,
+    /// Detection of the partner in the helper's images: gt, learned, learned:FILE, noisy or noisy:FILE.
     #[arg(long, value_name = "KIND", default_value = "learned")]
     pub perception: String,
     /// Light and colors.
-    #[arg(long, value_enum, default_value_t = Look::Canonical)]
-    pub look: Look,
-    /// Episodes at a time, 1 to 1024; changes no clip. Usual: one for each core.
+    #[arg(long, alias = "look", value_enum, default_value_t = AppearanceArgument::Canonical)]
+    pub appearance: AppearanceArgument,
+    /// Episodes in parallel, 1 to 1024; does not change the clips [default: one per core].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(ranges::JOBS))]
     pub jobs: Option<u16>,
 }
 
-/// What to evaluate.
+/// Old spelling of `chaic eval detection` and `chaic eval behavior`.
 #[derive(Debug, Subcommand)]
-pub enum EvalPerceptionCommand {
-    /// The detector: mean average precision by the COCO definition, failures by cause.
+pub enum PerceptionEvaluation {
+    /// Old spelling of `chaic eval detection`.
     Detection(DetectionArguments),
-    /// The behavior network, on clips that a following helper filmed: share told right, confusion.
+    /// Old spelling of `chaic eval behavior`.
     Behavior(BehaviorArguments),
 }
 
-/// How views are lit and colored.
+/// Light and colors of views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Look {
-    /// The benchmark's own look.
+pub enum AppearanceArgument {
+    /// Appearance of the benchmark.
     Canonical,
-    /// Light and colors drawn at random, for each scene anew.
+    /// Random light and colors for each scene.
     Varied,
 }
 
-/// Which places are looked at.
+/// Kind of scenes of views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Scenes {
-    /// As episodes begin.
+pub enum SceneSelection {
+    /// Initial states of episodes.
     Natural,
-    /// The same with small things and some furniture swapped for others, so that every class occurs.
+    /// The same with random replacements of small objects and furniture, so that every class occurs.
     AllClasses,
-    /// As the detector is trained: crowded.
+    /// Crowded scenes, as in the training of the detector.
     Crowded,
 }
 
-/// Of `chaic eval-perception detection`.
-#[derive(Debug, Args)]
+/// `chaic eval detection`.
+#[derive(Args, Debug)]
 pub struct DetectionArguments {
-    /// The weights, a safetensors file; usual: those that come with chaic.
+    /// Weights: a safetensors file [default: the built-in weights].
     #[arg(long, value_name = "FILE")]
     pub weights: Option<PathBuf>,
-    /// Places that are looked at.
-    #[arg(long, value_enum, default_value_t = Scenes::AllClasses)]
-    pub scenes: Scenes,
-    /// Views that are looked at, 1 to 100000, from environments that nothing was learned from.
+    /// Kind of scenes.
+    #[arg(long, value_enum, default_value_t = SceneSelection::AllClasses)]
+    pub scenes: SceneSelection,
+    /// Number of views of held-out environments, 1 to 100000.
     #[arg(long, value_name = "N", default_value_t = 4000)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub views: u32,
     /// Light and colors.
-    #[arg(long, value_enum, default_value_t = Look::Canonical)]
-    pub look: Look,
-    /// Write all figures into a JSON file, too.
+    #[arg(long, alias = "look", value_enum, default_value_t = AppearanceArgument::Canonical)]
+    pub appearance: AppearanceArgument,
+    /// Also write all metrics to a JSON file.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
-    /// Write the rates of faults into a JSON file, for `chaic eval --perception noisy:FILE`.
-    #[arg(long, value_name = "FILE")]
-    pub faults: Option<PathBuf>,
-    /// Write annotations.json and detections.json into a folder, which pycocotools reads.
+    /// Write the error rates to a JSON file for `chaic eval --perception noisy:FILE`.
+    #[arg(long, alias = "faults", value_name = "FILE")]
+    pub error_rates: Option<PathBuf>,
+    /// Write annotations.json and detections.json for pycocotools into a folder.
     #[arg(long, value_name = "DIR")]
     pub coco: Option<PathBuf>,
-    /// Views at a time, 1 to 1024; changes no figure. Usual: one for each core.
+    /// Views in parallel, 1 to 1024; does not change the metrics [default: one per core].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(ranges::JOBS))]
     pub jobs: Option<u16>,
 }
 
-/// Of `chaic eval-perception behavior`.
-#[derive(Debug, Args)]
+/// `chaic eval behavior`.
+#[derive(Args, Debug)]
 pub struct BehaviorArguments {
-    /// The weights, a safetensors file; usual: those that come with chaic.
+    /// Weights: a safetensors file [default: the built-in weights].
     #[arg(long, value_name = "FILE")]
     pub weights: Option<PathBuf>,
     #[command(flatten)]
     pub clips: ClipArguments,
-    /// Write all figures into a JSON file, too.
+    /// Also write all metrics to a JSON file.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
 }

@@ -1,40 +1,46 @@
-//! Progress bars. Where the standard error is no terminal, nothing is drawn.
+//! Progress bars on standard error. They are hidden with `--quiet`, and where standard error is no terminal.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
 use chaic_env::RunKey;
-use chaic_eval::metrics::Ending;
-use chaic_eval::run::{Extent, Finished, Progress};
-use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressStyle};
+use chaic_eval::metrics::RunStatus;
+use chaic_eval::run::{FinishedJob, JobEvent, RunProgress};
+use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::output::{complain, printable};
+use crate::output::{is_quiet, print_error, print_progress, printable};
 
-/// A bar that counts something.
-pub fn plain(total: u64, what: &str) -> ProgressBar {
+/// Returns a bar that counts items.
+pub fn count_bar(total: u64, items: &str) -> ProgressBar {
     let style = ProgressStyle::with_template(&format!(
-        "{{bar:40}} {{pos}}/{{len}} {what} {{eta}}  {{msg}}"
+        "{{bar:40}} {{pos}}/{{len}} {items} {{eta}}  {{msg}}"
     ));
-    ProgressBar::new(total).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+    let target =
+        if is_quiet() { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+    ProgressBar::with_draw_target(Some(total), target)
+        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
 
-/// The bars of a run: one for the whole, one for each worker.
+/// Bars of a run: one for the run, and one per worker.
 pub struct RunBars {
     all: MultiProgress,
     total: ProgressBar,
     workers: BTreeMap<usize, (ProgressBar, RunKey)>,
-    /// Which of several runs this is; before every line of the log.
+    /// Prefix of all messages: the part of several runs.
     part: String,
-    /// What is to be said besides the time that this run will take.
-    beside: String,
-    /// Most lines of the log, about.
+    /// Suffix of all messages: the remaining time of all parts.
+    suffix: String,
+    /// Approximate maximum number of log lines.
     max_lines: u64,
 }
 
 impl RunBars {
-    /// For a run that has come so far.
-    pub fn new(extent: Extent) -> RunBars {
+    /// Creates the bars of a run with this progress.
+    pub fn new(extent: RunProgress) -> RunBars {
         let all = MultiProgress::new();
+        if is_quiet() {
+            all.set_draw_target(ProgressDrawTarget::hidden());
+        }
         let total = ProgressBar::new(extent.total as u64);
         let style = ProgressStyle::with_template("{bar:40} {pos}/{len} episodes  {elapsed}  {msg}");
         total.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
@@ -42,30 +48,30 @@ impl RunBars {
         total.set_position((extent.finished - extent.errors) as u64);
         total.set_message("time left: known after the first episode");
         total.enable_steady_tick(Duration::from_millis(500));
-        let (part, beside) = (String::new(), String::new());
-        RunBars { all, total, workers: BTreeMap::new(), part, beside, max_lines: 100 }
+        let (part, suffix) = (String::new(), String::new());
+        RunBars { all, total, workers: BTreeMap::new(), part, suffix, max_lines: 100 }
     }
 
-    /// For one of several runs, of that name, that has come so far.
-    pub fn of_part(extent: Extent, part: &str) -> RunBars {
+    /// Creates the bars of one of several runs.
+    pub fn for_part(extent: RunProgress, part: &str) -> RunBars {
         RunBars { part: format!("{part}: "), max_lines: 20, ..RunBars::new(extent) }
     }
 
-    /// Says a line in between the bars, from any thread.
-    pub fn voice(&self) -> impl Fn(&str) + Send + Sync + use<> {
+    /// Returns a function that prints a line above the bars, from any thread.
+    pub fn line_printer(&self) -> impl Fn(&str) + Send + Sync + use<> {
         let all = self.all.clone();
-        move |line| all.suspend(|| complain(line))
+        move |line| all.suspend(|| print_error(line))
     }
 
-    /// What the next messages say besides the time that this run will take.
-    pub fn say_beside(&mut self, beside: String) {
-        self.beside = beside;
+    /// Sets the suffix of the next messages.
+    pub fn set_suffix(&mut self, suffix: String) {
+        self.suffix = suffix;
     }
 
-    /// Shows what has happened.
-    pub fn show(&mut self, progress: &Progress) {
-        match progress {
-            Progress::Began { worker, key, horizon } => {
+    /// Shows an event of the run.
+    pub fn show(&mut self, event: &JobEvent) {
+        match event {
+            JobEvent::Started { worker, key, horizon } => {
                 let bar = ProgressBar::new(u64::from(*horizon));
                 let style = ProgressStyle::with_template("{bar:20} {pos:>4}/{len} frames  {msg}");
                 bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
@@ -76,34 +82,33 @@ impl RunBars {
                     old.finish_and_clear();
                 }
             }
-            Progress::At { worker, frame } => {
+            JobEvent::Progress { worker, frame } => {
                 if let Some((bar, _)) = self.workers.get(worker) {
                     bar.set_position(u64::from(*frame));
                 }
             }
-            Progress::Finished(finished) => {
+            JobEvent::Finished(finished) => {
                 if let Some((bar, _)) = self.workers.remove(&finished.worker) {
                     bar.finish_and_clear();
                 }
-                if let Ending::Error { message } = &finished.result.ending {
+                if let RunStatus::Error { message } = &finished.result.status {
                     let key = &finished.result.key;
                     let line = format!("{} with {}: {message}", key.episode, key.helper);
-                    self.all.suspend(|| complain(&line));
+                    self.all.suspend(|| print_error(&line));
                 }
                 self.total.inc(1);
                 self.log(finished);
-                if let Some(left) = finished.left {
-                    // Whole seconds: the estimate isn't any better.
-                    let left = HumanDuration(Duration::from_secs(left.as_secs()));
-                    let (part, beside) = (&self.part, &self.beside);
-                    self.total.set_message(format!("{part}about {left} left{beside}"));
+                if let Some(left) = finished.remaining {
+                    let left = time_left(left);
+                    let (part, suffix) = (&self.part, &self.suffix);
+                    self.total.set_message(format!("{part}about {left} left{suffix}"));
                 }
             }
         }
     }
 
-    /// Where there are no bars to see, in a log for example, a line now and then.
-    fn log(&self, finished: &Finished) {
+    /// Prints a line from time to time if the bars are hidden, for example in a log file.
+    fn log(&self, finished: &FinishedJob) {
         let (done, total) = (self.total.position(), self.total.length().unwrap_or(0));
         if !self.total.is_hidden()
             || (!done.is_multiple_of(total / self.max_lines + 1) && done != total)
@@ -114,20 +119,25 @@ impl RunBars {
         let rate = finished
             .result
             .summary()
-            .map_or("broke down".to_owned(), |s| format!("{:.2}", s.rate()));
-        let left = finished.left.map_or(String::new(), |left| {
-            format!(", about {} left", HumanDuration(Duration::from_secs(left.as_secs())))
-        });
-        let (part, beside) = (&self.part, &self.beside);
-        let what = format!("{} with {}: {rate}{left}{beside}", key.episode, key.helper);
-        complain(&format!("{part}{done}/{total} {what}"));
+            .map_or("failed".to_owned(), |summary| format!("{:.2}", summary.rate()));
+        let left = finished
+            .remaining
+            .map_or(String::new(), |left| format!(", about {} left", time_left(left)));
+        let (part, suffix) = (&self.part, &self.suffix);
+        let result = format!("{} with {}: {rate}{left}{suffix}", key.episode, key.helper);
+        print_progress(&format!("{part}{done}/{total} {result}"));
     }
 
-    /// Takes the bars away.
+    /// Removes the bars.
     pub fn clear(&self) {
         for (bar, _) in self.workers.values() {
             bar.finish_and_clear();
         }
         self.total.finish_and_clear();
     }
+}
+
+/// Formats an estimate in whole seconds, its precision.
+pub fn time_left(time: Duration) -> HumanDuration {
+    HumanDuration(Duration::from_secs(time.as_secs()))
 }

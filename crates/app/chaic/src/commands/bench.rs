@@ -2,105 +2,127 @@
 
 use anyhow::Result;
 use chaic_bench::{
-    BenchScene, EnvBench, EnvSpeed, Machine, N_VIEWS, RenderBench, RenderSpeed, WorldSpeed,
-    measure_world,
+    BenchScene, EnvBench, EnvSpeed, GpuBench, GpuSpeed, Machine, N_VIEWS, RenderBench, RenderSpeed,
+    WorldSpeed, measure_world,
 };
 use chaic_eval::EvalError;
-use chaic_gltf::Written;
-use comfy_table::{ContentArrangement, Table, presets};
-use serde::Serialize;
+use chaic_gltf::SceneSummary;
+use serde_json::json;
 
-use super::bars;
+use super::{bars, table};
 use crate::arguments::{
-    BenchCommand, BenchFormat, EnvBenchArguments, LookedAt, RenderBenchArguments,
-    SceneBenchArguments, SceneName, WorldBenchArguments,
+    BenchCommand, EnvBenchArguments, GpuAdapter, RenderBenchArguments, SceneBenchArguments,
+    SceneChoice, SceneName, WorldBenchArguments,
 };
-use crate::exit::Ended;
-use crate::output::{complain, say};
+use crate::exit::ExitStatus;
+use crate::output::{OutputFormat, counted, print_result, print_warning};
 
-/// Measures what this machine reaches.
-pub fn run(command: &BenchCommand) -> Result<Ended> {
+/// Measures the speed of this machine.
+pub fn run(command: &BenchCommand, format: OutputFormat) -> Result<ExitStatus> {
     match command {
-        BenchCommand::Render(arguments) => render(arguments),
-        BenchCommand::World(arguments) => world(arguments),
-        BenchCommand::Env(arguments) => env(arguments),
-        BenchCommand::Scene(arguments) => scene(arguments),
+        BenchCommand::Render(arguments) => render(arguments, format),
+        BenchCommand::World(arguments) => world(arguments, format),
+        BenchCommand::Env(arguments) => env(arguments, format),
+        BenchCommand::Scene(arguments) => scene(arguments, format),
+    }?;
+    Ok(ExitStatus::Success)
+}
+
+fn bench_scene(choice: &SceneChoice) -> Result<BenchScene> {
+    match (&choice.episode, choice.scene) {
+        (Some(episode), _) => Ok(BenchScene::episode(&super::episode(episode)?, choice.size)?),
+        (None, SceneName::House) => Ok(BenchScene::house(choice.objects as usize, choice.size)?),
     }
 }
 
-fn looked_at(wanted: &LookedAt) -> Result<BenchScene> {
-    match (&wanted.episode, wanted.scene) {
-        (Some(episode), _) => Ok(BenchScene::episode(&super::episode(episode)?, wanted.size)?),
-        (None, SceneName::House) => Ok(BenchScene::house(wanted.things as usize, wanted.size)?),
-    }
-}
-
-/// Measures, with a bar for the part of the time that has passed.
+/// Measures with a bar for the elapsed fraction of the time.
 fn with_bar<T, E>(measure: impl FnOnce(&mut dyn FnMut(f32)) -> Result<T, E>) -> Result<T, E> {
-    let bar = bars::plain(100, "% of the time");
-    let measured = measure(&mut |part| bar.set_position((100.0 * part) as u64));
+    let bar = bars::count_bar(100, "% of the time");
+    let measured = measure(&mut |fraction| bar.set_position((100.0 * fraction) as u64));
     bar.finish_and_clear();
     measured
 }
 
-fn print<S: Serialize>(
-    speed: &S,
-    format: BenchFormat,
-    text: impl FnOnce(&S) -> String,
-) -> Result<Ended> {
-    match format {
-        BenchFormat::Json => say(&(serde_json::to_string_pretty(speed)? + "\n"))?,
-        BenchFormat::Text => say(&text(speed))?,
+fn render(arguments: &RenderBenchArguments, format: OutputFormat) -> Result<()> {
+    if let Some(adapter) = arguments.gpu {
+        return render_gpu(arguments, adapter, format);
     }
-    Ok(Ended::Well)
-}
-
-fn render(arguments: &RenderBenchArguments) -> Result<Ended> {
-    let scene = looked_at(&arguments.looked_at)?;
+    let scene = bench_scene(&arguments.scene)?;
     warn_of_slow_build();
     let bench = RenderBench {
         scene: &scene,
         channels: arguments.channels,
         threads: usize::from(arguments.threads),
-        seconds: arguments.measuring.seconds,
+        seconds: arguments.duration.seconds,
     };
     let speed = with_bar(|progress| bench.measure(progress))?;
-    print(&speed, arguments.measuring.format, render_text)
+    print_result(format, &speed, &render_text(&speed))
 }
 
-fn render_text(speed: &RenderSpeed) -> String {
-    let RenderSpeed { scene, size, channels, threads, views, objects, triangles, .. } = speed;
-    let (each, fastest) = (speed.ms_per_frame, speed.ms_per_frame_in_fastest_round);
-    let cpu =
-        speed.cpu_ms_per_frame.map_or(String::new(), |ms| format!(", processor time {ms:.2} ms"));
-    let rate = speed.frames_per_second;
-    let threads = crate::output::counted(*threads, "thread");
+fn render_gpu(
+    arguments: &RenderBenchArguments,
+    adapter: GpuAdapter,
+    format: OutputFormat,
+) -> Result<()> {
+    let bench = GpuBench {
+        worlds: usize::from(arguments.worlds),
+        size: arguments.scene.size,
+        channels: arguments.channels,
+        allows_software: adapter == GpuAdapter::Any,
+        seconds: arguments.duration.seconds,
+    };
+    let speed = bench.measure()?;
+    print_result(format, &speed, &gpu_text(&speed))
+}
+
+fn gpu_text(speed: &GpuSpeed) -> String {
+    let GpuSpeed { adapter, worlds, views, size, channels, world_bytes, .. } = speed;
     format!(
-        "{scene}: {objects} things, {triangles} triangles at the finest level, seen from {views} \
-         places\n{channels}, {size} x {size}, {threads}: {each:.2} ms a frame{cpu}, {rate:.1} \
-         frames a second (fastest round {fastest:.2} ms)\n{}",
+        "{adapter}: {}, {} MiB on the device, {:.0} world updates a second\n\
+         {channels}, {size} x {size}, batches of {}: {:.0} frames a second of worlds at rest, {:.0} if \
+         all worlds change before each batch\n{}",
+        counted(*worlds, "world"),
+        world_bytes >> 20,
+        speed.updates_per_second,
+        counted(*views, "view"),
+        speed.frames_per_second,
+        speed.frames_per_second_with_updates,
         machine_text(&speed.machine)
     )
 }
 
-fn world(arguments: &WorldBenchArguments) -> Result<Ended> {
+fn render_text(speed: &RenderSpeed) -> String {
+    let RenderSpeed { scene, size, channels, threads, views, objects, triangles, .. } = speed;
+    let (mean, fastest) = (speed.ms_per_frame, speed.ms_per_frame_in_fastest_round);
+    let cpu =
+        speed.cpu_ms_per_frame.map_or(String::new(), |ms| format!(", processor time {ms:.2} ms"));
+    let rate = speed.frames_per_second;
+    let threads = counted(*threads, "thread");
+    format!(
+        "{scene}: {objects} objects, {triangles} triangles at the finest level, {views} views\n\
+         {channels}, {size} x {size}, {threads}: {mean:.2} ms a frame{cpu}, {rate:.1} frames a \
+         second (fastest round {fastest:.2} ms)\n{}",
+        machine_text(&speed.machine)
+    )
+}
+
+fn world(arguments: &WorldBenchArguments, format: OutputFormat) -> Result<()> {
     warn_of_slow_build();
     let tasks = &arguments.task.0;
-    let bar = bars::plain(100 * tasks.len() as u64, "% of a task's time");
+    let bar = bars::count_bar(100 * tasks.len() as u64, "% of a task's time");
     let mut speeds = Vec::new();
     for (k, task) in tasks.iter().enumerate() {
-        let mut progress = |part: f32| bar.set_position(100 * k as u64 + (100.0 * part) as u64);
-        speeds.push(measure_world(*task, arguments.measuring.seconds, &mut progress)?);
+        let mut progress =
+            |fraction: f32| bar.set_position(100 * k as u64 + (100.0 * fraction) as u64);
+        speeds.push(measure_world(*task, arguments.duration.seconds, &mut progress)?);
     }
     bar.finish_and_clear();
-    print(&speeds, arguments.measuring.format, |speeds| world_text(speeds))
+    print_result(format, &speeds, &world_text(&speeds))
 }
 
 fn world_text(speeds: &[WorldSpeed]) -> String {
-    let mut table = Table::new();
-    table.load_style(presets::UTF8_FULL_CONDENSED);
-    table.set_content_arrangement(ContentArrangement::Disabled);
-    table.set_header(["Episode", "People", "Things", "Frames/s", "Frames/s of processor time"]);
+    let mut table =
+        table(["Episode", "People", "Objects", "Frames/s", "Frames/s of processor time"]);
     for speed in speeds {
         let whole = |rate: f64| format!("{rate:.0}");
         table.add_row([
@@ -111,77 +133,80 @@ fn world_text(speeds: &[WorldSpeed]) -> String {
             speed.frames_per_cpu_second.map_or(String::new(), whole),
         ]);
     }
-    let machine = speeds.first().map_or(String::new(), |s| machine_text(&s.machine));
+    let machine = speeds.first().map_or(String::new(), |speed| machine_text(&speed.machine));
     table.trim_fmt() + "\n" + &machine
 }
 
-/// Largest number of pixels that helpers and partners of all environments see at once. Each takes 25 bytes, so that
-/// all take 7 GB.
-const MAX_EYE_PX: u64 = 1 << 28;
+/// Largest total number of pixels of all helpers and partners. A pixel takes 25 bytes, so that all take 7 GB.
+const MAX_PIXELS: u64 = 1 << 28;
 
-/// Refuses more images than memory holds.
+/// Refuses images that do not fit into memory.
 fn check_images(arguments: &EnvBenchArguments) -> Result<(), EvalError> {
     let [helper, partner] =
-        [arguments.size, arguments.minds_size].map(|side| u64::from(side).pow(2));
+        [arguments.size, arguments.partner_size].map(|side| u64::from(side).pow(2));
     let px = u64::from(arguments.envs) * (helper + partner);
-    if px <= MAX_EYE_PX {
+    if px <= MAX_PIXELS {
         return Ok(());
     }
     Err(EvalError::Options(format!(
-        "--envs times the pixels of --size and --minds-size is {px}, at most {MAX_EYE_PX} fit into memory; give less"
+        "--envs times the pixels of --size and --partner-size is {px}; at most {MAX_PIXELS} fit into memory"
     )))
 }
 
-fn env(arguments: &EnvBenchArguments) -> Result<Ended> {
+fn env(arguments: &EnvBenchArguments, format: OutputFormat) -> Result<()> {
     check_images(arguments)?;
     warn_of_slow_build();
     let bench = EnvBench {
         tasks: arguments.task.0.clone(),
         envs: usize::from(arguments.envs),
         size: arguments.size,
-        minds_size: arguments.minds_size,
+        partner_size: arguments.partner_size,
         channels: arguments.channels,
         threads: usize::from(arguments.threads),
-        seconds: arguments.measuring.seconds,
+        seconds: arguments.duration.seconds,
     };
     let speed = with_bar(|progress| bench.measure(progress))?;
-    print(&speed, arguments.measuring.format, env_text)
+    print_result(format, &speed, &env_text(&speed))
 }
 
 fn env_text(speed: &EnvSpeed) -> String {
-    let EnvSpeed { envs, size, minds_size, channels, threads, episodes, .. } = speed;
+    let EnvSpeed { envs, size, partner_size, channels, threads, episodes, .. } = speed;
     let (steps, frames) = (speed.steps_per_second, speed.frames_per_second);
-    let threads = crate::output::counted(*threads, "thread");
+    let threads = counted(*threads, "thread");
     format!(
-        "{envs} environments, {channels}, {size} x {size}, partners {minds_size} x {minds_size}, \
-         {threads}: {steps:.0} decisions of the helpers a second, {frames:.0} frames a second; {episodes} episodes ended\n{}",
+        "{envs} environments, {channels}, {size} x {size}, partners {partner_size} x {partner_size}, \
+         {threads}: {steps:.0} helper steps a second, {frames:.0} frames a second; {episodes} episodes ended\n{}",
         machine_text(&speed.machine)
     )
 }
 
-fn scene(arguments: &SceneBenchArguments) -> Result<Ended> {
-    let scene = looked_at(&arguments.looked_at)?;
-    let Written { instances, triangles } = scene.write(&arguments.out)?;
-    let (out, name) = (arguments.out.display(), &scene.name);
-    let what = format!("{instances} nodes with {triangles} triangles, {N_VIEWS} cameras");
-    say(&format!("{out}: {name} in {what}\n"))?;
-    Ok(Ended::Well)
+fn scene(arguments: &SceneBenchArguments, format: OutputFormat) -> Result<()> {
+    let scene = bench_scene(&arguments.scene)?;
+    let SceneSummary { instances, triangles } = scene.write(&arguments.out)?;
+    let (out, name) = (arguments.out.display().to_string(), &scene.name);
+    let json = json!({
+        "out": out, "scene": name, "nodes": instances, "triangles": triangles, "cameras": N_VIEWS,
+    });
+    let text = format!(
+        "{out}: {name} with {instances} nodes, {triangles} triangles and {N_VIEWS} cameras\n"
+    );
+    print_result(format, &json, &text)
 }
 
 fn machine_text(machine: &Machine) -> String {
     let Machine { cpu, cores, platform, target_features, chaic, .. } = machine;
     let cpu = if cpu.is_empty() { "unknown processor" } else { cpu };
-    let built_for = if target_features.is_empty() {
-        "no more than the least".to_owned()
+    let features = if target_features.is_empty() {
+        "the baseline of the architecture".to_owned()
     } else {
         target_features.join(", ")
     };
-    let cores = crate::output::counted(*cores, "core");
-    format!("{cpu}, {cores}, {platform}; chaic {chaic} built for {built_for}\n")
+    let cores = counted(*cores, "core");
+    format!("{cpu}, {cores}, {platform}; chaic {chaic} built for {features}\n")
 }
 
 fn warn_of_slow_build() {
-    if !Machine::this().optimized {
-        complain("warning: this build isn't made for speed; measure with `cargo run --release`");
+    if !Machine::current().optimized {
+        print_warning("this is a debug build; measure with `cargo run --release`");
     }
 }

@@ -1,133 +1,91 @@
-//! `chaic collect`: what networks learn from, as files.
+//! `chaic collect`.
 
+use std::collections::BTreeMap;
 use std::fs;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Result, bail};
 use chaic_vision::behavior::Behavior;
-use chaic_vision::behavior::clip::Clip;
-use chaic_vision::behavior::collect::{CollectRules, Collector, collect as collect_clips};
 use chaic_vision::behavior::store::ClipFolder;
 use chaic_vision::coco;
-use chaic_vision::views::{Part, ViewRules};
+use serde_json::json;
 
-use super::{bars, jobs};
-use crate::arguments::{
-    ClipArguments, CollectBehaviorArguments, CollectCommand, CollectDetectionArguments, Look, Of,
-    Scenes,
-};
-use crate::exit::Ended;
+use super::datasets::{clip_config, collect_clips, dataset_split, view_config};
+use super::{bars, jobs, opponent};
+use crate::arguments::{CollectBehaviorArguments, CollectCommand, CollectDetectionArguments};
+use crate::exit::ExitStatus;
 use crate::interrupt;
-use crate::output::{complain, quoted_path, say};
+use crate::output::{OutputFormat, print_error, print_result, quoted_path};
 
-/// Collects.
-pub fn collect(command: &CollectCommand) -> Result<Ended> {
+/// Collects training data.
+pub fn run(command: &CollectCommand, format: OutputFormat) -> Result<ExitStatus> {
     match command {
-        CollectCommand::Detection(arguments) => detection(arguments),
-        CollectCommand::Behavior(arguments) => behavior(arguments),
-        CollectCommand::Opponent(arguments) => super::opponent::collect_windows(arguments),
+        CollectCommand::Detection(arguments) => detection(arguments, format),
+        CollectCommand::Behavior(arguments) => behavior(arguments, format),
+        CollectCommand::Opponent(arguments) => opponent::collect_windows(arguments, format),
     }
 }
 
-/// The part of all environments that is meant.
-pub(super) fn part(of: Of) -> Part {
-    match of {
-        Of::Training => Part::Training,
-        Of::Validation => Part::Validation,
-    }
-}
-
-/// How views of these places are drawn.
-pub(super) fn view_rules(scenes: Scenes, look: Option<Look>) -> ViewRules {
-    let rules = match scenes {
-        Scenes::Natural => ViewRules::NATURAL,
-        Scenes::AllClasses => ViewRules::ALL_CLASSES,
-        Scenes::Crowded => ViewRules::TRAINING,
-    };
-    let varied = look.map_or(rules.varied, varied);
-    ViewRules { varied, ..rules }
-}
-
-/// The share of scenes in light and colors drawn at random.
-fn varied(look: Look) -> f32 {
-    if look == Look::Varied { 1.0 } else { 0.0 }
-}
-
-fn detection(arguments: &CollectDetectionArguments) -> Result<Ended> {
+fn detection(arguments: &CollectDetectionArguments, format: OutputFormat) -> Result<ExitStatus> {
     let out = &arguments.out;
     if fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_some()) {
         bail!("{} isn't empty; choose another --out", out.display());
     }
-    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
-    let views = (part(arguments.of), view_rules(arguments.scenes, arguments.look));
-    let bar = bars::plain(u64::from(arguments.views), "views");
-    let mut is_whole = true;
-    let mut go_on = |n: usize| {
+    let stop = interrupt::stop_flag()?;
+    let split = dataset_split(arguments.split);
+    let config = view_config(arguments.scenes, arguments.appearance);
+    let bar = bars::count_bar(u64::from(arguments.views), "views");
+    let mut is_complete = true;
+    let mut progress = |n: usize| {
         bar.set_position(n as u64);
-        is_whole = !stop.load(Ordering::Relaxed);
-        is_whole
+        is_complete = !stop.load(Ordering::Relaxed);
+        is_complete
     };
-    let counts =
-        coco::collect(out, views, arguments.views as usize, jobs(arguments.jobs), &mut go_on);
+    let n_views = arguments.views as usize;
+    let n_threads = jobs(arguments.jobs);
+    let counts = coco::collect(out, split, config, n_views, n_threads, &mut progress);
     bar.finish_and_clear();
     let mut text =
         format!("{:24} {:>7} {:>7} {:>7} {:>7}\n", "class", "< 100", "small", "medium", "large");
+    let mut classes = BTreeMap::new();
     for (name, sizes) in counts? {
         text += &format!("{name:24}");
         text += &sizes.map(|n| format!(" {n:7}")).concat();
         text += "\n";
+        classes.insert(name.to_string(), sizes.to_vec());
     }
-    say(&text)?;
-    say(&format!("Images:  {}\n", quoted_path(out)))?;
-    if !is_whole {
-        complain("stopped; what is there is a whole data set of fewer views");
-        return Ok(Ended::Interrupted);
+    text += &format!("Images:  {}\n", quoted_path(out));
+    let json = json!({
+        "images": out, "complete": is_complete,
+        "sizes": ["below_100_px", "small", "medium", "large"], "instances": classes,
+    });
+    print_result(format, &json, &text)?;
+    if !is_complete {
+        print_error("stopped; the folder holds a valid data set of fewer views");
+        return Ok(ExitStatus::Interrupted);
     }
-    Ok(Ended::Well)
+    Ok(ExitStatus::Success)
 }
 
-fn behavior(arguments: &CollectBehaviorArguments) -> Result<Ended> {
-    let rules = clip_rules(&arguments.clips);
-    let folder = ClipFolder::open(&arguments.out, part(arguments.of), &rules)?;
-    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
-    let clips = play(&arguments.clips, part(arguments.of), Some(&folder), stop)?;
-    let Some(clips) = clips else {
-        complain("stopped; the same command goes on");
-        return Ok(Ended::Interrupted);
+fn behavior(arguments: &CollectBehaviorArguments, format: OutputFormat) -> Result<ExitStatus> {
+    let split = dataset_split(arguments.split);
+    let folder = ClipFolder::open(&arguments.out, split, &clip_config(&arguments.clips))?;
+    let stop = interrupt::stop_flag()?;
+    let Some(clips) = collect_clips(&arguments.clips, split, Some(&folder), stop)? else {
+        print_error("stopped; run the same command again to continue");
+        return Ok(ExitStatus::Interrupted);
     };
+    let count = |behavior| clips.iter().filter(|c| c.label == behavior && !c.is_mixed).count();
+    let n_mixed = clips.iter().filter(|c| c.is_mixed).count();
     let mut text = String::new();
     for behavior in Behavior::ALL {
-        let n = clips.iter().filter(|c| c.label == behavior && !c.is_mixed).count();
-        text += &format!("{:18} {n:6}\n", behavior.name());
+        text += &format!("{:18} {:6}\n", behavior.name(), count(behavior));
     }
-    let n_mixed = clips.iter().filter(|c| c.is_mixed).count();
     text += &format!("{:18} {n_mixed:6}\n", "moving, mixed");
-    say(&text)?;
-    say(&format!("Clips: {}\n", quoted_path(&arguments.out)))?;
-    Ok(Ended::Well)
-}
-
-fn clip_rules(arguments: &ClipArguments) -> CollectRules {
-    CollectRules {
-        of_each: arguments.clips as usize,
-        episodes: arguments.episodes as usize,
-        varied: varied(arguments.look),
-        ..CollectRules::default()
-    }
-}
-
-/// Clips of episodes of this part; `None` if it was stopped.
-pub(super) fn play(
-    arguments: &ClipArguments,
-    part: Part,
-    folder: Option<&ClipFolder>,
-    stop: &AtomicBool,
-) -> Result<Option<Vec<Clip>>> {
-    let sight = super::sight::of_names(Some(&arguments.perception), None)?;
-    let bar = bars::plain(u64::from(arguments.episodes), "episodes");
-    let (rules, n_threads) = (clip_rules(arguments), jobs(arguments.jobs));
-    let collector = Collector { part, rules: &rules, sight: &*sight, n_threads, folder };
-    let clips = collect_clips(&collector, &mut |n, _| bar.set_position(n as u64), stop);
-    bar.finish_and_clear();
-    Ok(clips?)
+    text += &format!("Clips: {}\n", quoted_path(&arguments.out));
+    let counts: BTreeMap<&str, usize> =
+        Behavior::ALL.into_iter().map(|behavior| (behavior.name(), count(behavior))).collect();
+    let json = json!({ "clips": arguments.out, "behaviors": counts, "moving_mixed": n_mixed });
+    print_result(format, &json, &text)?;
+    Ok(ExitStatus::Success)
 }

@@ -8,69 +8,64 @@ use chaic_core::TaskId;
 use chaic_episodes::{Episode, EpisodeError, Split, episodes, find_episode, json_schema};
 use chaic_eval::frame_export;
 use chaic_eval::read_episode_file;
-use chaic_files::write_whole;
-use comfy_table::{ContentArrangement, Table, presets};
+use chaic_files::write_atomically;
+use comfy_table::Table;
 use serde_json::json;
 
-use super::bars;
-use crate::arguments::{EpisodesCommand, ListFormat};
-use crate::exit::Ended;
+use super::{bars, table};
+use crate::arguments::EpisodesCommand;
+use crate::exit::ExitStatus;
 use crate::interrupt;
-use crate::output::{complain, counted, say, say_to_reader};
+use crate::output::{OutputFormat, counted, print, print_error, print_result, print_while_read};
 
-/// Lists, shows, makes or checks episodes.
-pub fn run(command: &EpisodesCommand) -> Result<Ended> {
+/// Lists, shows, generates or validates episodes.
+pub fn run(command: &EpisodesCommand, format: OutputFormat) -> Result<ExitStatus> {
     match command {
-        EpisodesCommand::List { split, task, format } => list(split, &task.0, *format),
-        EpisodesCommand::Show { episode, out, width } => show(episode, out, *width),
+        EpisodesCommand::List { split, task } => list(split, &task.0, format),
+        EpisodesCommand::Show { episode, out, width } => show(episode, out, *width, format),
         EpisodesCommand::Generate { task, seeds, split, out } => {
-            let of_seeds = seeds.clone().map(Split::Generated);
-            let split = of_seeds.or(split.clone()).context("give --seeds or --split")?;
-            generate(*task, &split, out)
+            let generated = seeds.clone().map(Split::Generated);
+            let split = generated.or(split.clone()).context("give --seeds or --split")?;
+            generate(*task, &split, out, format)
         }
-        EpisodesCommand::Validate { split: Some(split), .. } => validate_split(split),
-        EpisodesCommand::Validate { files, .. } => validate(files),
+        EpisodesCommand::Validate { split: Some(split), .. } => validate_split(split, format),
+        EpisodesCommand::Validate { files, .. } => validate(files, format),
         EpisodesCommand::Schema => {
-            say(&(serde_json::to_string_pretty(&json_schema())? + "\n"))?;
-            Ok(Ended::Well)
+            print(&(serde_json::to_string_pretty(&json_schema())? + "\n"))?;
+            Ok(ExitStatus::Success)
         }
     }
 }
 
-/// Episodes of one table; a longer list is several, so that none waits for those after it.
+/// Episodes in one table. A longer list is printed as several tables, so that it starts at once.
 const ROWS: usize = 96;
 
-/// Prints while it goes: a split may have more episodes than memory holds, or than anybody reads.
-fn list(split: &Split, tasks: &[TaskId], format: ListFormat) -> Result<Ended> {
+/// Prints while it reads: a split may have more episodes than memory holds.
+fn list(split: &Split, tasks: &[TaskId], format: OutputFormat) -> Result<ExitStatus> {
     let mut listed = tasks.iter().flat_map(|task| episodes(split, *task));
-    match format {
-        ListFormat::Table => loop {
+    if format != OutputFormat::Json {
+        loop {
             let rows: Vec<Episode> = listed.by_ref().take(ROWS).collect::<Result<_, _>>()?;
-            if rows.is_empty() || !say_to_reader(&(table(&rows).trim_fmt() + "\n"))? {
-                break;
+            if rows.is_empty() || !print_while_read(&(episode_table(&rows).trim_fmt() + "\n"))? {
+                return Ok(ExitStatus::Success);
             }
-        },
-        ListFormat::Json => {
-            let mut before = "[\n";
-            for episode in listed {
-                let text = serde_json::to_string_pretty(&json_of(&episode?))?;
-                let text = text.replace('\n', "\n  ");
-                if !say_to_reader(&format!("{before}  {text}"))? {
-                    return Ok(Ended::Well);
-                }
-                before = ",\n";
-            }
-            say("\n]\n")?;
         }
     }
-    Ok(Ended::Well)
+    let mut separator = "[\n";
+    for episode in listed {
+        let text = serde_json::to_string_pretty(&json_of(&episode?))?;
+        let text = text.replace('\n', "\n  ");
+        if !print_while_read(&format!("{separator}  {text}"))? {
+            return Ok(ExitStatus::Success);
+        }
+        separator = ",\n";
+    }
+    print("\n]\n")?;
+    Ok(ExitStatus::Success)
 }
 
-fn table(rows: &[Episode]) -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::UTF8_FULL_CONDENSED);
-    table.set_content_arrangement(ContentArrangement::Disabled);
-    table.set_header(["Episode", "Partner", "Goal", "Things", "Frames", "Seed"]);
+fn episode_table(rows: &[Episode]) -> Table {
+    let mut table = table(["Episode", "Partner", "Goal", "Objects", "Frames", "Seed"]);
     for episode in rows {
         let setup = episode.setup();
         let partner = setup.people[0].persona;
@@ -103,27 +98,28 @@ fn json_of(episode: &Episode) -> serde_json::Value {
     })
 }
 
-fn show(argument: &str, out: &Path, width_px: u32) -> Result<Ended> {
+fn show(argument: &str, out: &Path, width_px: u32, format: OutputFormat) -> Result<ExitStatus> {
     let episode = super::episode(argument)?;
     frame_export::write_plan(&episode, width_px, out)?;
-    say(&format!("{}: the map of {}\n", out.display(), episode.id()))?;
-    Ok(Ended::Well)
+    let text = format!("{}: floor plan of {}\n", out.display(), episode.id());
+    print_result(format, &json!({ "out": out, "episode": episode.id() }), &text)?;
+    Ok(ExitStatus::Success)
 }
 
-fn generate(task: TaskId, split: &Split, out: &Path) -> Result<Ended> {
+fn generate(task: TaskId, split: &Split, out: &Path, format: OutputFormat) -> Result<ExitStatus> {
     std::fs::create_dir_all(out)
         .with_context(|| format!("can't make the folder {}", out.display()))?;
-    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
+    let stop = interrupt::stop_flag()?;
     let n = split.len_of(task);
     if n == 0 {
         bail!("{split} has no episodes of {task}, which is not the paper's; give --seeds");
     }
-    let bar = bars::plain(n as u64, "episodes");
+    let bar = bars::count_bar(n as u64, "episodes");
     for k in 0..n {
         if stop.load(Ordering::Relaxed) {
             bar.finish_and_clear();
-            complain(&rest(split, k));
-            return Ok(Ended::Interrupted);
+            print_error(&how_to_continue(split, k));
+            return Ok(ExitStatus::Interrupted);
         }
         let id = split.episode_id(task, k);
         let episode = find_episode(&id)?;
@@ -131,16 +127,17 @@ fn generate(task: TaskId, split: &Split, out: &Path) -> Result<Ended> {
         // `obstacle-standard-007.json`.
         let name = id.replace("/gen/", "-").replace('/', "-");
         let path = out.join(format!("{name}.json"));
-        write_whole(&path, episode.to_json().as_bytes())?;
+        write_atomically(&path, episode.to_json().as_bytes())?;
         bar.inc(1);
     }
     bar.finish_and_clear();
-    say(&format!("{}: {} of {task}\n", out.display(), counted(n, "episode")))?;
-    Ok(Ended::Well)
+    let text = format!("{}: {} of {task}\n", out.display(), counted(n, "episode"));
+    print_result(format, &json!({ "out": out, "task": task, "episodes": n }), &text)?;
+    Ok(ExitStatus::Success)
 }
 
-/// How to go on after the first `k` episodes of a split.
-fn rest(split: &Split, k: usize) -> String {
+/// Returns how to continue after the first `k` episodes of a split.
+fn how_to_continue(split: &Split, k: usize) -> String {
     match split {
         Split::Generated(seeds) => {
             format!("stopped; --seeds {}..{} makes the rest", seeds.start + k as u64, seeds.end)
@@ -149,21 +146,21 @@ fn rest(split: &Split, k: usize) -> String {
             let rest = Split::GeneratedStandard(seeds.start + k as u64..seeds.end);
             format!("stopped; --split {rest} makes the rest")
         }
-        _ => format!("stopped after {}; begin again to have all", counted(k, "episode")),
+        _ => format!("stopped after {}; run the same command again for all", counted(k, "episode")),
     }
 }
 
-/// Makes or reads every episode of a split and checks it as a file would be.
-fn validate_split(split: &Split) -> Result<Ended> {
-    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
+/// Generates or reads every episode of a split and checks it like a file.
+fn validate_split(split: &Split, format: OutputFormat) -> Result<ExitStatus> {
+    let stop = interrupt::stop_flag()?;
     let n = TaskId::all().map(|task| split.len_of(task)).fold(0, usize::saturating_add);
-    let bar = bars::plain(n as u64, "episodes");
-    let (mut n_bad, mut done) = (0, 0);
+    let bar = bars::count_bar(n as u64, "episodes");
+    let (mut invalid, mut done) = (Vec::new(), 0);
     for (task, episode) in TaskId::all().flat_map(|t| episodes(split, t).map(move |e| (t, e))) {
         if stop.load(Ordering::Relaxed) {
             bar.finish_and_clear();
-            complain(&format!("stopped after {done} of {n} episodes"));
-            return Ok(Ended::Interrupted);
+            print_error(&format!("stopped after {done} of {n} episodes"));
+            return Ok(ExitStatus::Interrupted);
         }
         let lines: Vec<String> = match &episode {
             Ok(episode) => {
@@ -172,25 +169,26 @@ fn validate_split(split: &Split) -> Result<Ended> {
             }
             Err(error) => vec![format!("{task}: {error}")],
         };
-        n_bad += usize::from(!lines.is_empty());
-        lines.iter().for_each(|line| complain(line));
+        lines.iter().for_each(|line| print_error(line));
+        if !lines.is_empty() {
+            let id = episode.as_ref().map_or(task.name(), Episode::id);
+            invalid.push(json!({ "name": id, "problems": lines }));
+        }
         done += 1;
         bar.inc(1);
     }
     bar.finish_and_clear();
-    if n_bad > 0 {
-        complain(&format!(
-            "{n_bad} of {} of {split} aren't as they should be",
-            counted(n, "episode")
-        ));
-        return Ok(Ended::WithFindings);
-    }
-    say(&format!("{split}: {} fine\n", counted(n, "episode")))?;
-    Ok(Ended::Well)
+    let text = match invalid.len() {
+        0 => format!("{split}: {} fine\n", counted(n, "episode")),
+        n_bad => format!("{split}: {n_bad} of {} invalid\n", counted(n, "episode")),
+    };
+    let json = json!({ "split": split.to_string(), "checked": n, "invalid": invalid });
+    print_result(format, &json, &text)?;
+    Ok(ExitStatus::from_findings(!invalid.is_empty()))
 }
 
-fn validate(files: &[PathBuf]) -> Result<Ended> {
-    let mut n_bad = 0;
+fn validate(files: &[PathBuf], format: OutputFormat) -> Result<ExitStatus> {
+    let (mut invalid, mut valid) = (Vec::new(), String::new());
     for path in files {
         let name = path.display().to_string();
         let parsed = match read_episode_file(path) {
@@ -198,21 +196,22 @@ fn validate(files: &[PathBuf]) -> Result<Ended> {
             Err(error) => Err(vec![error.to_string()]),
         };
         match parsed {
-            Ok(episode) => say(&format!("{name}: fine ({})\n", episode.id()))?,
+            Ok(episode) => valid += &format!("{name}: fine ({})\n", episode.id()),
             Err(lines) => {
-                n_bad += 1;
-                lines.iter().for_each(|line| complain(line));
+                lines.iter().for_each(|line| print_error(line));
+                invalid.push(json!({ "name": name, "problems": lines }));
             }
         }
     }
+    let n_bad = invalid.len();
+    print_result(format, &json!({ "checked": files.len(), "invalid": invalid }), &valid)?;
     if n_bad > 0 {
-        complain(&format!("{n_bad} of {} can't be played", counted(files.len(), "file")));
-        return Ok(Ended::WithFindings);
+        print_error(&format!("{n_bad} of {} can't be played", counted(files.len(), "file")));
     }
-    Ok(Ended::Well)
+    Ok(ExitStatus::from_findings(n_bad > 0))
 }
 
-/// A line for each problem: file, field, what is wrong and what was expected.
+/// Returns one line per problem: file, field, problem and expectation.
 fn lines_of(error: &EpisodeError) -> Vec<String> {
     match error {
         EpisodeError::Invalid { source_name, problems } => {

@@ -1,63 +1,103 @@
-//! `chaic eval`.
+//! `chaic eval` without a subcommand: plays a benchmark.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, anyhow, bail};
-use chaic_env::minds::{Helpers, Seeing};
-use chaic_eval::metrics::FormulaSet;
-use chaic_eval::report::{Format, Report, write_files};
-use chaic_eval::run::{Access, Run, RunFolder, RunRequest, Shard};
-use chaic_learn::helpers::{NamedPolicy, Policies};
-use chaic_llm::Language;
+use chaic_env::helper_registry::{BuiltInWithPerception, HelperRegistry};
+use chaic_eval::report::write_files;
+use chaic_eval::run::{FolderMode, Run, RunFolder, RunRequest, Shard};
+use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
+use chaic_llm::LanguageHelpers;
 use chaic_sandbox::Launcher;
-use chaic_subprocess::{Command, Commands};
+use chaic_subprocess::{CommandRegistry, HelperProgram};
 
-use super::{bars::RunBars, jobs, llm, sight};
+use super::summary::{print_scores, report_of};
+use super::{bars::RunBars, jobs, llm, run_perception, start_threads};
 use crate::arguments::{EvalArguments, ExecArguments, HelperArgument};
-use crate::exit::Ended;
+use crate::exit::ExitStatus;
 use crate::interrupt;
-use crate::output::{complain, counted, quoted, quoted_path, say};
+use crate::output::{
+    OutputFormat, counted, print_error, print_progress, print_warning, quoted, quoted_path,
+};
 
-/// Episodes of each task in the small benchmark: with all helpers about two minutes on two cores.
+/// Episodes of each task in the small benchmark: with all helpers about half a minute on two cores.
 const QUICK_EPISODES: u32 = 2;
 
 /// Plays a benchmark.
-pub fn run(arguments: &EvalArguments, launcher: &Launcher) -> Result<Ended> {
-    let (given, name) = given(arguments);
+pub fn run(
+    arguments: &EvalArguments,
+    format: OutputFormat,
+    launcher: &Launcher,
+) -> Result<ExitStatus> {
+    let (request, name) = request(arguments);
     let path = arguments.out.clone().map_or_else(|| free_folder(name), Ok)?;
-    let access = if arguments.resume { Access::Resume } else { Access::Begin };
+    let mode = if arguments.resume { FolderMode::Resume } else { FolderMode::New };
     if arguments.resume {
-        RunFolder::check_begun(&path)?;
+        RunFolder::check_started(&path)?;
     }
-    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
-    let seeing = Seeing { sight: sight::of_run(arguments, &path)? };
+    let stop = interrupt::stop_flag()?;
+    let built_in =
+        BuiltInWithPerception { perception: run_perception::perception_of_run(arguments, &path)? };
     let language = llm::language(arguments, &path, stop)?;
-    let language = language.map(|language| language.with_sight(Arc::clone(&seeing.sight)));
-    let others: &dyn Helpers = match &language {
+    let language =
+        language.map(|language| language.with_perception(Arc::clone(&built_in.perception)));
+    let registry: &dyn HelperRegistry = match &language {
         Some(language) => language,
-        None => &seeing,
+        None => &built_in,
     };
     let policies: chaic_env::Result<Vec<NamedPolicy>> =
         arguments.policies().map(|(name, file)| NamedPolicy::read(name, file)).collect();
-    let policies = Policies::beside(others, policies?, Arc::clone(&seeing.sight))?;
-    let commands = Commands::beside(&policies, confined(arguments, &path, launcher)?, stop)?;
+    let policies =
+        PolicyRegistry::with_fallback(registry, policies?, Arc::clone(&built_in.perception))?;
+    let commands = CommandRegistry::new(&policies, confined(arguments, &path, launcher)?, stop)?;
     if arguments.resume {
-        commands.check_begun(&path)?;
+        commands.check_resumed(&path)?;
     }
-    let helpers: &dyn Helpers = &commands;
-    let (mut run, warnings) = Run::open(&path, access, &given, helpers)?;
-    for warning in warnings {
-        complain(&format!("warning: {warning}; that episode is played again"));
+    let helpers: &dyn HelperRegistry = &commands;
+    let (mut run, warnings) = Run::open(&path, mode, &request, helpers)?;
+    warn_of_run(&run, &warnings);
+    hide_worker_panics();
+    print_start(&run, &path);
+    let jobs = jobs(arguments.jobs);
+    start_threads(jobs)?;
+    let start = Instant::now();
+    let mut bars = RunBars::new(run.progress());
+    if let Some(language) = &language {
+        language.listen(Box::new(bars.line_printer()));
     }
-    if let Some(note) = run.untraced_note() {
-        complain(&format!("warning: {note}"));
+    let shard = arguments.shard.unwrap_or(Shard::WHOLE);
+    let played = run.play_shard(shard, jobs, helpers, stop, &mut |event| bars.show(event));
+    bars.clear();
+    let is_complete = played.map_err(|e| anyhow!("{e:#}\n{}", how_to_resume(&path, arguments)))?;
+    if let Some(problem) = language.as_ref().and_then(LanguageHelpers::problem) {
+        bail!("paused: {problem}\n{}", how_to_resume(&path, arguments));
     }
-    keep_workers_quiet();
-    let extent = run.extent();
+    let extent = run.progress();
+    if !is_complete {
+        let done = extent.finished - extent.errors;
+        print_error(&format!("stopped after {done} of {}", counted(extent.total, "episode run")));
+        print_error(&how_to_resume(&path, arguments));
+        return Ok(ExitStatus::Interrupted);
+    }
+    if extent.finished < extent.total {
+        print_error(&format!(
+            "shard {shard} is played: {} of {}; join the shards with: chaic merge --out WHOLE {} ...",
+            extent.finished,
+            counted(extent.total, "episode run"),
+            quoted_path(&path),
+        ));
+        return Ok(ExitStatus::from_findings(extent.errors > 0));
+    }
+    finish(&run, format, start)
+}
+
+/// Prints the extent of a run before it is played.
+fn print_start(run: &Run, path: &Path) {
+    let extent = run.progress();
     let (tasks, names) = (&run.options().tasks, &run.options().helpers);
-    complain(&format!(
+    print_progress(&format!(
         "{}: {}, {}, {} {}{}",
         path.display(),
         counted(extent.total, "episode run"),
@@ -69,44 +109,24 @@ pub fn run(arguments: &EvalArguments, launcher: &Launcher) -> Result<Ended> {
             n => format!("; finished already: {n}"),
         }
     ));
-    let jobs = jobs(arguments.jobs);
-    // Images of one moment are drawn in parallel too; more threads than jobs would only wait.
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build_global();
-    pool.context("can't start threads")?;
-    let began = Instant::now();
-    let mut bars = RunBars::new(extent);
-    if let Some(language) = &language {
-        language.listen(Box::new(bars.voice()));
-    }
-    let shard = arguments.shard.unwrap_or(Shard::WHOLE);
-    let played = run.play_shard(shard, jobs, helpers, stop, &mut |progress| bars.show(progress));
-    bars.clear();
-    let is_whole = played.map_err(|e| anyhow!("{e:#}\n{}", how_to_resume(&path, arguments)))?;
-    if let Some(problem) = language.as_ref().and_then(Language::problem) {
-        bail!("paused: {problem}\n{}", how_to_resume(&path, arguments));
-    }
-    if !is_whole {
-        let extent = run.extent();
-        let done = extent.finished - extent.errors;
-        complain(&format!("stopped after {done} of {}", counted(extent.total, "episode run")));
-        complain(&how_to_resume(&path, arguments));
-        return Ok(Ended::Interrupted);
-    }
-    let extent = run.extent();
-    if extent.finished < extent.total {
-        complain(&format!(
-            "shard {shard} is played: {} of {}; join it with the others by: chaic merge --out WHOLE {} ...",
-            extent.finished,
-            counted(extent.total, "episode run"),
-            quoted_path(&path),
-        ));
-        return Ok(if extent.errors > 0 { Ended::WithFindings } else { Ended::Well });
-    }
-    finish(&run, began)
 }
 
-/// The helpers in other processes, each in its sandbox. The run's own folder is empty for them.
-fn confined(arguments: &EvalArguments, run: &Path, launcher: &Launcher) -> Result<Vec<Command>> {
+/// Prints the problems that opening a run found.
+pub(super) fn warn_of_run(run: &Run, warnings: &[impl std::fmt::Display]) {
+    for warning in warnings {
+        print_warning(&format!("{warning}; that episode is played again"));
+    }
+    if let Some(note) = run.untraced_note() {
+        print_warning(&note);
+    }
+}
+
+/// Returns the helper processes, each in its sandbox. The folder of the run is hidden from them.
+fn confined(
+    arguments: &EvalArguments,
+    run: &Path,
+    launcher: &Launcher,
+) -> Result<Vec<HelperProgram>> {
     let mut commands = arguments.commands();
     for command in &mut commands {
         arguments.exec.confine(command, launcher, &[run.to_owned()])?;
@@ -114,112 +134,87 @@ fn confined(arguments: &EvalArguments, run: &Path, launcher: &Launcher) -> Resul
     Ok(commands)
 }
 
-fn finish(run: &Run, began: Instant) -> Result<Ended> {
-    let mut text = leave_report(run)?;
-    let path = run.folder().path().display();
-    let run_at = quoted_path(run.folder().path());
-    let secs = began.elapsed().as_secs();
-    let some = run.results().iter().find(|r| r.key.helper == "rhp").or(run.results().first());
-    text += &format!("\nPlayed in {} min {:02} s.\n", secs / 60, secs % 60);
-    text += &format!("Report:  {path}/report.md, {path}/figure.svg\n");
-    if let Some(some) = some.filter(|_| run.options().traces) {
-        let (episode, helper) = (&some.key.episode, &some.key.helper);
-        text += &format!(
-            "Replay:  chaic replay {run_at} {episode} --helper {helper} --out replay.mp4\n"
-        );
-    }
-    if run.options().traces {
-        text += &format!("Verify:  chaic verify {run_at}\n");
-    }
-    say(&text)?;
-    Ok(if run.extent().errors > 0 { Ended::WithFindings } else { Ended::Well })
-}
-
-/// Writes report and figures into the run's folder, and returns the report for a terminal.
-pub(super) fn leave_report(run: &Run) -> Result<String> {
+/// Writes the report of a complete run and prints the short report.
+fn finish(run: &Run, format: OutputFormat, start: Instant) -> Result<ExitStatus> {
     let report = report_of(run);
     write_files(run.folder(), &report)?;
-    Ok(report.text(Format::Table))
+    let path = quoted_path(run.folder().path());
+    let secs = start.elapsed().as_secs();
+    let mut more = vec![("Time", format!("{} min {:02} s", secs / 60, secs % 60))];
+    let example = run.results().iter().find(|r| r.key.helper == "rhp").or(run.results().first());
+    if let Some(example) = example.filter(|_| run.options().traces) {
+        let (episode, helper) = (&example.key.episode, &example.key.helper);
+        let replay = format!("chaic replay {path} {episode} --helper {helper} --out replay.mp4");
+        more.push(("Replay", replay));
+        more.push(("Verify", format!("chaic verify {path}")));
+    }
+    print_scores(format, &report, run.folder(), &more)?;
+    Ok(ExitStatus::from_findings(run.progress().errors > 0))
 }
 
-/// Returns the report of a run.
-pub(super) fn report_of(run: &Run) -> Report<'_> {
-    let (options, planned) = (run.options(), run.planned());
-    let (results, granted, formulas) = (run.results(), Some(run.granted()), FormulaSet::Paper);
-    Report { options, results, planned, granted, formulas }
-}
-
-/// What is asked for, and the name of a folder for it. Nothing said at all is the small benchmark.
-fn given(arguments: &EvalArguments) -> (RunRequest, &'static str) {
-    let EvalArguments {
-        task,
-        split,
-        episodes,
-        first,
-        rules,
-        set,
-        seeds,
-        size,
-        no_traces,
-        partner_is,
-        ..
-    } = arguments;
-    let (partner, appearance) = (arguments.partner.clone(), arguments.appearance);
-    let given = RunRequest {
+/// Returns the requested run, and a name for its folder. Without any option it is the small benchmark.
+fn request(arguments: &EvalArguments) -> (RunRequest, &'static str) {
+    let EvalArguments { task, split, episodes, n_episodes, rules, set, seeds, size, .. } =
+        arguments;
+    let request = RunRequest {
         tasks: task.as_ref().map(|t| t.0.clone()),
         helpers: arguments.helper_names(),
         split: split.clone(),
-        first: *first,
+        first: *n_episodes,
         seeds: *seeds,
         size: *size,
         episodes: episodes.clone(),
         rules: *rules,
         set: set.clone(),
-        no_traces: *no_traces,
-        partner,
-        partner_is: *partner_is,
-        appearance,
+        no_traces: arguments.no_traces,
+        partner: arguments.partner.clone(),
+        partner_is: arguments.person,
+        appearance: arguments.appearance,
         perception: arguments.perception(),
         behavior: arguments.behavior(),
         track: arguments.track,
     };
-    if given == RunRequest::default() && !arguments.resume {
-        return (RunRequest { first: Some(QUICK_EPISODES), ..given }, "quick");
+    if request == RunRequest::default() && !arguments.resume {
+        return (RunRequest { first: Some(QUICK_EPISODES), ..request }, "quick");
     }
-    (given, "eval")
+    (request, "eval")
 }
 
-/// The first of `runs/NAME`, `runs/NAME-2`, ... that isn't there.
+/// Returns the first of `runs/NAME`, `runs/NAME-2`, ... that does not exist.
 fn free_folder(name: &str) -> Result<PathBuf> {
-    /// Whoever has more should tidy up.
+    /// Limit of the search.
     const MAX_RUNS: u32 = 10_000;
     let numbered = |k: u32| if k == 1 { name.to_owned() } else { format!("{name}-{k}") };
     let mut candidates = (1..MAX_RUNS).map(|k| Path::new("runs").join(numbered(k)));
     candidates.find(|p| !p.exists()).context("every runs/... folder is taken; give one with --out")
 }
 
+/// Returns the command that continues a run.
 fn how_to_resume(path: &Path, arguments: &EvalArguments) -> String {
-    let language = llm::to_resume(&arguments.language);
-    let helpers = exec_to_resume(arguments);
+    let language = llm::resume_options(&arguments.language);
+    let helpers = resume_options(arguments);
     let shard = arguments.shard.map_or_else(String::new, |shard| format!(" --shard {shard}"));
-    format!("go on with: chaic eval --resume --out {}{shard}{helpers}{language}", quoted_path(path))
+    format!(
+        "continue with: chaic eval --resume --out {}{shard}{helpers}{language}",
+        quoted_path(path)
+    )
 }
 
-/// What an agent says when it breaks down is shown and noted by the run; the usual message would
-/// come in between the bars.
-pub(super) fn keep_workers_quiet() {
-    let usual = std::panic::take_hook();
+/// Hides panic messages of workers, which would interrupt the bars. The run records and prints them.
+pub(super) fn hide_worker_panics() {
+    let default_hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
         let is_worker = |name: &str| name.starts_with("chaic-worker");
         if !std::thread::current().name().is_some_and(is_worker) {
-            usual(info);
+            default_hook(info);
         }
     }));
 }
 
-/// What is to be said again where helpers run in other processes or come from files: a run's folder
-/// decides neither which command is run nor what it may take, and has no weights.
-fn exec_to_resume(arguments: &EvalArguments) -> String {
+/// Returns the options of helper processes and policies, which a resumed run needs again.
+///
+/// The folder of a run does not decide which command runs or with which rights, and holds no weights.
+fn resume_options(arguments: &EvalArguments) -> String {
     if arguments.commands().is_empty() && arguments.policies().next().is_none() {
         return String::new();
     }

@@ -4,29 +4,30 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use anyhow::{Context as _, Result, bail};
-use chaic_env::minds::{Helpers, Seeing};
+use anyhow::{Result, bail};
+use chaic_env::helper_registry::{BuiltInWithPerception, HelperRegistry};
 use chaic_eval::EvalError;
 use chaic_eval::run::{RunFolder, RunOptions};
 use chaic_eval::verify::verify_trace;
 use chaic_export::lerobot::{LeRobotOptions, LeRobotWriter};
-use chaic_llm::Language;
+use chaic_llm::LanguageHelpers;
+use serde_json::json;
 
-use super::{bars, llm, sight};
+use super::{bars, llm, run_perception};
 use crate::arguments::{ExportCommand, LeRobotArguments};
-use crate::exit::Ended;
+use crate::exit::ExitStatus;
 use crate::interrupt;
-use crate::output::{complain, counted, quoted_path, say};
+use crate::output::{OutputFormat, counted, print_error, print_result, print_warning, quoted_path};
 
-/// Exports.
-pub fn export(command: &ExportCommand) -> Result<Ended> {
+/// Exports recorded episodes.
+pub fn run(command: &ExportCommand, format: OutputFormat) -> Result<ExitStatus> {
     match command {
-        ExportCommand::Lerobot(arguments) => lerobot(arguments),
+        ExportCommand::Lerobot(arguments) => lerobot(arguments, format),
     }
 }
 
-fn lerobot(arguments: &LeRobotArguments) -> Result<Ended> {
-    let LeRobotArguments { run, out, agent, every, image_size, .. } = arguments;
+fn lerobot(arguments: &LeRobotArguments, format: OutputFormat) -> Result<ExitStatus> {
+    let LeRobotArguments { run, out, agent, every, size, .. } = arguments;
     let (folder, options) = RunFolder::read(run)?;
     if !options.traces {
         return Err(EvalError::NoTraces { path: folder.path().to_owned() }.into());
@@ -35,13 +36,13 @@ fn lerobot(arguments: &LeRobotArguments) -> Result<Ended> {
     if traces.is_empty() {
         bail!("{} has no such episodes", folder.path().display());
     }
-    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
-    let wanted = LeRobotOptions { agent: *agent, every: *every, image_size: *image_size };
-    let mut writer = LeRobotWriter::create(out, wanted)?;
-    let bar = bars::plain(traces.len() as u64, "episodes");
+    let stop = interrupt::stop_flag()?;
+    let options_of_set = LeRobotOptions { agent: *agent, every: *every, image_size: *size };
+    let mut writer = LeRobotWriter::create(out, options_of_set)?;
+    let bar = bars::count_bar(traces.len() as u64, "episodes");
     let mut n = 0;
     for path in &traces {
-        // One at a time: traces of a large run don't fit into memory together.
+        // One at a time: all traces of a large run do not fit into memory.
         let (trace, _) = folder.read_trace(path)?;
         let episode = folder.episode(&options, &trace.header.key())?;
         if !writer.add(&trace, &episode, &mut || !stop.load(Ordering::Relaxed))? {
@@ -51,18 +52,19 @@ fn lerobot(arguments: &LeRobotArguments) -> Result<Ended> {
         bar.set_position(n);
     }
     bar.finish_and_clear();
-    let n_frames = writer.finish()?;
+    let n_samples = writer.finish()?;
     let episodes = counted(n as usize, "episode");
-    say(&format!("{}: {episodes}, {}\n", quoted_path(out), counted(n_frames, "moment")))?;
+    let text = format!("{}: {episodes}, {}\n", quoted_path(out), counted(n_samples, "sample"));
+    let json = json!({ "out": out, "episodes": n, "samples": n_samples, "damaged_traces": n_cut });
+    print_result(format, &json, &text)?;
     if (n as usize) < traces.len() {
-        complain("stopped; what is there is a whole data set of fewer episodes");
-        return Ok(Ended::Interrupted);
+        print_error("stopped; the folder holds a valid data set of fewer episodes");
+        return Ok(ExitStatus::Interrupted);
     }
     if n_cut > 0 {
-        complain(&format!("left out {} (cut off or damaged)", counted(n_cut, "trace")));
-        return Ok(Ended::WithFindings);
+        print_error(&format!("left out {} (cut off or damaged)", counted(n_cut, "trace")));
     }
-    Ok(Ended::Well)
+    Ok(ExitStatus::from_findings(n_cut > 0))
 }
 
 /// Traces selected for export.
@@ -79,10 +81,12 @@ fn select(
     options: &RunOptions,
 ) -> Result<Selected> {
     let LeRobotArguments { run, agent, helper, task, .. } = arguments;
-    let seeing = Seeing { sight: sight::recorded(options) };
-    let language = Language::recorded(run, llm::never())?;
-    let language = language.map(|language| language.with_sight(Arc::clone(&seeing.sight)));
-    let helpers = language.as_ref().map_or(&seeing as &dyn Helpers, |l| l);
+    let built_in =
+        BuiltInWithPerception { perception: run_perception::recorded_perception(options) };
+    let language = LanguageHelpers::recorded(run, llm::never())?;
+    let language =
+        language.map(|language| language.with_perception(Arc::clone(&built_in.perception)));
+    let helpers = language.as_ref().map_or(&built_in as &dyn HelperRegistry, |l| l);
     let mut selected = Selected { traces: Vec::new(), n_cut: 0 };
     for path in folder.traces()? {
         let (trace, warnings) = folder.read_trace(&path)?;
@@ -93,7 +97,7 @@ fn select(
             continue;
         }
         for warning in &warnings {
-            complain(&format!("warning: {warning}"));
+            print_warning(&warning.to_string());
         }
         if !warnings.is_empty() {
             selected.n_cut += 1;

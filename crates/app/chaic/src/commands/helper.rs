@@ -5,64 +5,83 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result};
-use chaic_env::minds::{BuiltIn, Helpers as _, find};
+use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry as _, find};
 use chaic_env::rules::RuleSet;
 use chaic_sandbox::Launcher;
 use chaic_subprocess::conformance::{Check, check};
 use chaic_subprocess::serve::serve;
+use serde_json::json;
 
+use super::require_text;
 use crate::arguments::{HelperCheckArguments, HelperCommand, HelperServeArguments};
-use crate::exit::Ended;
+use crate::exit::ExitStatus;
 use crate::interrupt;
-use crate::output::{counted, say};
+use crate::output::{OutputFormat, counted, print, print_result};
 
-/// Looks after helpers in other processes.
-pub fn run(command: &HelperCommand, launcher: &Launcher) -> Result<Ended> {
+/// Tests or runs helper processes.
+pub fn run(
+    command: &HelperCommand,
+    format: OutputFormat,
+    launcher: &Launcher,
+) -> Result<ExitStatus> {
     match command {
-        HelperCommand::Check(arguments) => checked(arguments, launcher),
-        HelperCommand::Serve(arguments) => served(arguments),
+        HelperCommand::Check(arguments) => check_helper(arguments, format, launcher),
+        HelperCommand::Serve(arguments) => {
+            require_text(format, "chaic helper serve")?;
+            serve_helper(arguments)
+        }
     }
 }
 
-fn checked(arguments: &HelperCheckArguments, launcher: &Launcher) -> Result<Ended> {
-    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
+fn check_helper(
+    arguments: &HelperCheckArguments,
+    format: OutputFormat,
+    launcher: &Launcher,
+) -> Result<ExitStatus> {
+    let stop = interrupt::stop_flag()?;
     let mut command = arguments.exec.command("exec", &arguments.line);
     arguments.exec.confine(&mut command, launcher, &[])?;
     let command = Arc::new(command);
     let mut printed = Ok(());
-    let mut print = |check: &Check| {
-        if stop.load(Ordering::Relaxed) {
+    let mut print_check = |check: &Check| {
+        if stop.load(Ordering::Relaxed) || format == OutputFormat::Json {
             return;
         }
-        let line = match &check.kept {
-            Ok(()) => format!("ok      {}\n", check.promise),
-            Err(problem) => format!("FAILED  {}\n        {problem}\n", check.promise),
+        let line = match &check.result {
+            Ok(()) => format!("ok      {}\n", check.requirement),
+            Err(problem) => format!("FAILED  {}\n        {problem}\n", check.requirement),
         };
         if printed.is_ok() {
-            printed = say(&line);
+            printed = print(&line);
         }
     };
-    let checks = check(&command, stop, &mut print);
+    let checks = check(&command, stop, &mut print_check);
     printed?;
     if stop.load(Ordering::Relaxed) {
-        return Ok(Ended::Interrupted);
+        return Ok(ExitStatus::Interrupted);
     }
-    let n_broken = checks.iter().filter(|c| c.kept.is_err()).count();
-    if n_broken == 0 {
-        say("It keeps to the protocol.\n")?;
-        return Ok(Ended::Well);
-    }
-    say(&format!("{} not kept.\n", counted(n_broken, "promise")))?;
-    Ok(Ended::WithFindings)
+    let n_failed = checks.iter().filter(|check| check.result.is_err()).count();
+    let record = |check: &Check| json!({ "check": check.requirement, "problem": check.result.clone().err() });
+    let json = json!({
+        "passed": n_failed == 0,
+        "checks": checks.iter().map(record).collect::<Vec<_>>(),
+    });
+    let text = match n_failed {
+        0 => "The helper follows the protocol.\n".to_owned(),
+        n => format!("{} failed.\n", counted(n, "check")),
+    };
+    print_result(format, &json, &text)?;
+    Ok(ExitStatus::from_findings(n_failed > 0))
 }
 
-fn served(arguments: &HelperServeArguments) -> Result<Ended> {
+fn serve_helper(arguments: &HelperServeArguments) -> Result<ExitStatus> {
     let rules = RuleSet::named(arguments.rules).planner;
-    let helper = find(&BuiltIn, &arguments.name, rules)?;
-    let mut helper = helper
-        .with_context(|| format!("nobody serves; name one of {}", BuiltIn.names().join(", ")))?;
+    let helper = find(&BuiltInHelpers, &arguments.name, rules)?;
+    let mut helper = helper.with_context(|| {
+        format!("none is no helper to serve; name one of {}", BuiltInHelpers.names().join(", "))
+    })?;
     let name = format!("chaic {} {}", chaic_env::CHAIC_VERSION, arguments.name);
-    serve(&name, helper.mind.as_mut(), &mut stdin().lock(), &mut stdout().lock())
+    serve(&name, helper.agent.as_mut(), &mut stdin().lock(), &mut stdout().lock())
         .context("standard input and output")?;
-    Ok(Ended::Well)
+    Ok(ExitStatus::Success)
 }

@@ -1,4 +1,4 @@
-//! `chaic llm`, and where `chaic eval` gets its language helpers from.
+//! `chaic llm`, and the language helpers of `chaic eval`.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -6,57 +6,63 @@ use std::sync::atomic::AtomicBool;
 use anyhow::{Context as _, Result, bail};
 use chaic_core::AgentId;
 use chaic_env::EnvError;
-use chaic_env::minds::{NONE, RULES};
+use chaic_env::helper_registry::{NONE, RULES};
 use chaic_eval::EvalError;
 use chaic_eval::replay::find_trace;
 use chaic_eval::run::RunFolder;
+use chaic_llm::endpoint_preset::EndpointPreset;
 use chaic_llm::language::{
-    Language, helper_names, is_language_helper, is_language_partner, partner_names,
+    LanguageHelpers, helper_names, is_language_helper, is_language_partner, partner_names,
 };
-use chaic_llm::named::Named;
 use chaic_llm::settings::Settings;
 use chaic_llm::show::{self, Detail};
 use chaic_llm::templates::Templates;
 use chaic_llm::{check, session};
+use serde_json::json;
 
+use super::require_text;
 use crate::arguments::{EvalArguments, LanguageArguments, LlmCommand};
-use crate::exit::Ended;
-use crate::output::{complain, quoted, say};
+use crate::exit::ExitStatus;
+use crate::output::{OutputFormat, print, print_result, print_warning, quoted};
 
-/// A flag that nobody raises.
+/// Returns a stop flag that is never set.
 pub fn never() -> &'static AtomicBool {
     static NEVER: AtomicBool = AtomicBool::new(false);
     &NEVER
 }
 
-/// Looks after prompts and records.
-pub fn run(command: &LlmCommand) -> Result<Ended> {
+/// Writes templates, prints records or tests an endpoint.
+pub fn run(command: &LlmCommand, format: OutputFormat) -> Result<ExitStatus> {
     match command {
         LlmCommand::Templates { out } => {
             if out.exists() && std::fs::read_dir(out).is_ok_and(|mut d| d.next().is_some()) {
                 bail!("{} exists and isn't empty; choose another --out", out.display());
             }
             Templates::load(None)?.write(out)?;
-            let out = out.display();
-            say(&format!(
-                "{out}: the templates of the prompts; edit them, and name the folder in a \
-                 configuration file:\n[asking]\ntemplates = \"{out}\"\n"
-            ))?;
+            let text = format!(
+                "{0}: the templates of the prompts; edit them, and name the folder in a \
+                 configuration file:\n[asking]\ntemplates = \"{0}\"\n",
+                out.display()
+            );
+            print_result(format, &json!({ "out": out }), &text)?;
         }
         LlmCommand::Show { run, episode, helper, seed, agent, brief } => {
+            require_text(format, "chaic llm show")?;
             let detail = if *brief { Detail::Brief } else { Detail::Full };
-            say(&shown(run, episode, helper.as_deref(), *seed, *agent, detail)?)?;
+            print(&record_text(run, episode, helper.as_deref(), *seed, *agent, detail)?)?;
         }
         LlmCommand::Check { language } => {
-            let settings = named(language).over(file(language)?.unwrap_or_default());
+            require_text(format, "chaic llm check")?;
+            let settings = preset(language).over(settings_file(language)?.unwrap_or_default());
             settings.check()?;
-            say(&check::check(&settings)?)?;
+            print(&check::check(&settings)?)?;
         }
     }
-    Ok(Ended::Well)
+    Ok(ExitStatus::Success)
 }
 
-fn shown(
+/// Formats the prompts, answers and choices of one episode run.
+fn record_text(
     run: &Path,
     episode: &str,
     helper: Option<&str>,
@@ -65,40 +71,44 @@ fn shown(
     detail: Detail,
 ) -> Result<String> {
     let (folder, options) = RunFolder::read(run)?;
-    let asked = |name: &&String| is_language_helper(name) || agent == AgentId::PARTNER;
-    let usual = options.helpers.iter().find(asked).map(String::as_str);
-    let helper = helper.or(usual).context("no helper of this run asked a language model")?;
+    let has_record = |name: &&String| is_language_helper(name) || agent == AgentId::PARTNER;
+    let default = options.helpers.iter().find(has_record).map(String::as_str);
+    let helper = helper.or(default).context("no helper of this run used a language model")?;
     let path = find_trace(&folder, episode, Some(helper), seed)?;
     let (trace, warnings) = folder.read_trace(&path)?;
     for warning in warnings {
-        complain(&format!("warning: {warning}"));
+        print_warning(&warning.to_string());
     }
     Ok(show::text(run, &trace.header.key(), agent, Some(&trace), detail)?)
 }
 
-/// The language helpers of a run; `None` if it needs none.
+/// Returns the language helpers of a run; `None` if it needs none.
+///
+/// # Errors
+/// If a name is unknown, the options contradict each other, or settings cannot be read.
 pub fn language(
     arguments: &EvalArguments,
     path: &Path,
     stop: &'static AtomicBool,
-) -> Result<Option<Language>> {
+) -> Result<Option<LanguageHelpers>> {
     check_names(arguments)?;
     let given = &arguments.language;
-    // What isn't said is what the run was begun with; a folder that can't be read says so later.
-    let begun = arguments.resume.then(|| RunFolder::read(path).ok()).flatten();
-    let begun = begun.map(|(_, options)| options);
+    // Options that are not given are those of the resumed run. An unreadable folder fails later.
+    let recorded_run = arguments.resume.then(|| RunFolder::read(path).ok()).flatten();
+    let recorded_run = recorded_run.map(|(_, options)| options);
     let named_helpers = arguments.helper_names();
-    let helpers = named_helpers.as_ref().or(begun.as_ref().map(|o| &o.helpers));
-    let partner = arguments.partner.as_ref().or(begun.as_ref().and_then(|o| o.partner.as_ref()));
+    let helpers = named_helpers.as_ref().or(recorded_run.as_ref().map(|o| &o.helpers));
+    let partner =
+        arguments.partner.as_ref().or(recorded_run.as_ref().and_then(|o| o.partner.as_ref()));
     let is_named = helpers.into_iter().flatten().any(|n| is_language_helper(n))
         || partner.is_some_and(|n| is_language_partner(n));
     let recorded = if arguments.resume { session::settings_of(path)? } else { None };
     if !is_named && recorded.is_none() {
         let is_given = given.llm.is_some() || given.llm_config.is_some();
-        let is_given = is_given || named(given) != Named::default();
+        let is_given = is_given || preset(given) != EndpointPreset::default();
         if is_given && arguments.resume {
-            let text = "was begun with no helper or partner that asks a language model; leave the \
-                        options of language helpers away to go on, or choose another --out";
+            let text = "was started without a language model; omit the options of language helpers \
+                        to resume it, or choose another --out";
             return Err(EvalError::Options(format!("{} {text}", path.display())).into());
         }
         if is_given {
@@ -109,23 +119,23 @@ pub fn language(
         return Ok(None);
     }
     if let Some(run) = &given.llm {
-        return Ok(Some(Language::replay(run, stop)?));
+        return Ok(Some(LanguageHelpers::replay(run, stop)?));
     }
-    let settings = match (file(given)?, recorded) {
-        (None, Some(recorded)) => named(given).over_recorded(path, recorded)?,
-        (file, _) => named(given).over(file.unwrap_or_default()),
+    let settings = match (settings_file(given)?, recorded) {
+        (None, Some(recorded)) => preset(given).over_recorded(path, recorded)?,
+        (file, _) => preset(given).over(file.unwrap_or_default()),
     };
-    Ok(Some(Language::live(settings, stop)?))
+    Ok(Some(LanguageHelpers::live(settings, stop)?))
 }
 
-/// Who names nobody known hears of all names, also of those that ask a language model.
+/// Checks the names of helpers and partner. The error lists all names, with those of language models.
 fn check_names(arguments: &EvalArguments) -> Result<(), EnvError> {
     let known: Vec<String> = [NONE.to_owned()].into_iter().chain(helper_names()).collect();
-    let own = arguments.commands().into_iter().map(|c| c.name);
-    let own = own.chain(arguments.policies().map(|(name, _)| name.to_owned()));
-    let known_here: Vec<String> = own.chain(known.clone()).collect();
+    let processes = arguments.commands().into_iter().map(|c| c.name);
+    let policies = arguments.policies().map(|(name, _)| name.to_owned());
+    let valid: Vec<String> = processes.chain(policies).chain(known.clone()).collect();
     let mut helpers = arguments.helper_names().into_iter().flatten();
-    if let Some(name) = helpers.find(|name| !known_here.contains(name)) {
+    if let Some(name) = helpers.find(|name| !valid.contains(name)) {
         return Err(EnvError::UnknownHelper { name, known });
     }
     let known: Vec<String> = [RULES.to_owned()].into_iter().chain(partner_names()).collect();
@@ -135,8 +145,8 @@ fn check_names(arguments: &EvalArguments) -> Result<(), EnvError> {
     }
 }
 
-/// What is to be said again to go on with a run, of what a run's folder doesn't decide.
-pub fn to_resume(given: &LanguageArguments) -> String {
+/// Returns the options of language helpers that a resumed run needs again.
+pub fn resume_options(given: &LanguageArguments) -> String {
     let LanguageArguments { endpoint, model: _, llm_key_env, llm_allow_http, llm_config, llm } =
         given;
     let option = |name: &str, value: Option<String>| {
@@ -153,8 +163,8 @@ pub fn to_resume(given: &LanguageArguments) -> String {
     .concat()
 }
 
-fn named(given: &LanguageArguments) -> Named {
-    Named {
+fn preset(given: &LanguageArguments) -> EndpointPreset {
+    EndpointPreset {
         url: given.endpoint.clone(),
         model: given.model.clone(),
         key_env: given.llm_key_env.clone(),
@@ -162,6 +172,6 @@ fn named(given: &LanguageArguments) -> Named {
     }
 }
 
-fn file(given: &LanguageArguments) -> Result<Option<Settings>> {
+fn settings_file(given: &LanguageArguments) -> Result<Option<Settings>> {
     Ok(given.llm_config.as_deref().map(Settings::read).transpose()?)
 }

@@ -1,29 +1,25 @@
 //! `chaic merge`.
 
 use anyhow::Result;
-use chaic_eval::report::Format;
 use chaic_eval::run::merge;
 
-use super::eval::report_of;
+use super::summary::{print_scores, report_of};
 use crate::arguments::MergeArguments;
-use crate::exit::Ended;
-use crate::output::{complain, counted, say};
+use crate::exit::ExitStatus;
+use crate::output::{OutputFormat, counted, print_warning};
 
 /// Joins the shards of a run.
-pub fn run(arguments: &MergeArguments) -> Result<Ended> {
+pub fn run(arguments: &MergeArguments, format: OutputFormat) -> Result<ExitStatus> {
     let run = merge(&arguments.out, &arguments.runs)?;
-    let extent = run.extent();
+    let extent = run.progress();
     let missing = extent.total - extent.finished;
     if missing > 0 {
-        complain(&format!(
-            "warning: {} of {} missing",
-            counted(missing, "episode run"),
-            extent.total
-        ));
+        let runs = counted(missing, "episode run");
+        print_warning(&format!("{runs} of {} missing", extent.total));
     }
     if extent.finished > 0 {
-        // The merge has written it already.
-        say(&report_of(&run).text(Format::Table))?;
+        // The merge has written the report.
+        print_scores(format, &report_of(&run), run.folder(), &[])?;
     }
-    Ok(if missing > 0 || extent.errors > 0 { Ended::WithFindings } else { Ended::Well })
+    Ok(ExitStatus::from_findings(missing > 0 || extent.errors > 0))
 }

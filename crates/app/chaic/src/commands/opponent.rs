@@ -1,80 +1,96 @@
-//! `chaic collect opponent` and `chaic eval-opponent`.
+//! `chaic collect opponent` and `chaic eval opponent`.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context as _, Result};
 use chaic_files::read_user_file;
-use chaic_learn::opponent::Goal;
-use chaic_learn::opponent::collect::{CollectRules, Part, Sample, collect, write};
+use chaic_learn::opponent::OpponentGoal;
+use chaic_learn::opponent::collect::{
+    DatasetSplit, LabeledWindow, WindowCollectionConfig, collect, write,
+};
 use chaic_learn::opponent::network::OpponentModel;
-use chaic_learn::opponent::report::Report;
+use chaic_learn::opponent::report::OpponentReport;
+use serde_json::json;
 
-use super::bars;
-use super::collect::part;
-use super::perception::write_json;
+use super::datasets::dataset_split;
+use super::{bars, write_json};
 use crate::arguments::{CollectOpponentArguments, OpponentArguments, WindowArguments};
-use crate::exit::Ended;
+use crate::exit::ExitStatus;
 use crate::interrupt;
-use crate::output::{complain, quoted_path, say};
+use crate::output::{OutputFormat, print_error, print_progress, print_result, quoted_path};
 
-/// No file of weights is larger, bytes.
-const MOST_BYTES: u64 = 1 << 28;
+/// Largest size of a weight file, bytes.
+const MAX_BYTES: u64 = 1 << 28;
 
-/// Writes windows into a file.
-pub fn collect_windows(arguments: &CollectOpponentArguments) -> Result<Ended> {
-    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
-    let Some(samples) = play(&arguments.windows, part(arguments.of), stop)? else {
-        return Ok(Ended::Interrupted);
+/// Collects windows and writes them to a file.
+pub fn collect_windows(
+    arguments: &CollectOpponentArguments,
+    format: OutputFormat,
+) -> Result<ExitStatus> {
+    let stop = interrupt::stop_flag()?;
+    let split = dataset_split(arguments.split);
+    let Some(windows) = play(&arguments.windows, split, stop)? else {
+        return Ok(ExitStatus::Interrupted);
     };
-    write(&arguments.out, &samples)?;
-    for goal in Goal::ALL {
-        let n = samples.iter().filter(|s| s.goal == goal).count();
-        say(&format!("{:8} {n:6}\n", goal.name()))?;
+    write(&arguments.out, &windows)?;
+    let mut text = String::new();
+    let mut counts = BTreeMap::new();
+    for goal in OpponentGoal::ALL {
+        let n = windows.iter().filter(|window| window.goal == goal).count();
+        text += &format!("{:8} {n:6}\n", goal.name());
+        counts.insert(goal.name(), n);
     }
-    say(&format!("Windows: {}\n", quoted_path(&arguments.out)))?;
-    Ok(Ended::Well)
+    text += &format!("Windows: {}\n", quoted_path(&arguments.out));
+    print_result(format, &json!({ "windows": arguments.out, "goals": counts }), &text)?;
+    Ok(ExitStatus::Success)
 }
 
-/// Tells how good an opponent model is on episodes that nothing was learned from.
-pub fn evaluate(arguments: &OpponentArguments) -> Result<Ended> {
+/// Evaluates an opponent model on held-out episodes.
+pub fn evaluate(arguments: &OpponentArguments, format: OutputFormat) -> Result<ExitStatus> {
     let model = read_model(&arguments.weights)?;
-    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
-    let samples = play(&arguments.windows, Part::Test, stop)?;
-    let report = samples.and_then(|samples| Report::of(&model, &samples, stop));
-    let Some(report) = report else { return Ok(Ended::Interrupted) };
-    say(&report.text())?;
-    write_json(arguments.json.as_deref(), &report)
+    let stop = interrupt::stop_flag()?;
+    let windows = play(&arguments.windows, DatasetSplit::Test, stop)?;
+    let report = windows.and_then(|windows| OpponentReport::new(&model, &windows, stop));
+    let Some(report) = report else { return Ok(ExitStatus::Interrupted) };
+    print_result(format, &report, &report.text())?;
+    write_json(arguments.json.as_deref(), &report)?;
+    Ok(ExitStatus::Success)
 }
 
 fn read_model(path: &Path) -> Result<OpponentModel> {
-    let bytes = read_user_file(path, MOST_BYTES)?;
+    let bytes = read_user_file(path, MAX_BYTES)?;
     OpponentModel::from_bytes(&bytes).with_context(|| path.display().to_string())
 }
 
-/// Windows of episodes of this part; `None` if it was stopped.
-fn play(arguments: &WindowArguments, part: Part, stop: &AtomicBool) -> Result<Option<Vec<Sample>>> {
-    let rules = CollectRules {
-        of_each: arguments.of_each as usize,
-        episodes: arguments.episodes as usize,
-        image_size: arguments.image_size,
+/// Plays episodes of a part of the data and returns their windows; `None` if it was stopped.
+fn play(
+    arguments: &WindowArguments,
+    split: DatasetSplit,
+    stop: &AtomicBool,
+) -> Result<Option<Vec<LabeledWindow>>> {
+    let config = WindowCollectionConfig {
+        max_per_class: arguments.max_per_class as usize,
+        episodes: arguments.n_episodes as usize,
+        image_size: arguments.size,
         perception: arguments.perception.clone(),
         behavior: arguments.behavior.clone(),
-        granted: arguments.granted,
-        ..CollectRules::default()
+        granted: arguments.grant_behavior,
+        ..WindowCollectionConfig::default()
     };
-    let bar = bars::plain(u64::from(arguments.episodes), "episodes");
-    let mut progress = |done: &str| {
-        bar.set_message(done.to_owned());
+    let bar = bars::count_bar(u64::from(arguments.n_episodes), "episodes");
+    let mut progress = |message: &str| {
+        bar.set_message(message.to_owned());
         if bar.is_hidden() {
-            complain(done);
+            print_progress(message);
         }
     };
-    let samples = collect(part, &rules, &mut progress, stop);
+    let windows = collect(split, &config, &mut progress, stop);
     bar.finish_and_clear();
-    let samples = samples?;
-    if samples.is_none() {
-        complain("stopped; nothing was written");
+    let windows = windows?;
+    if windows.is_none() {
+        print_error("stopped; nothing was written");
     }
-    Ok(samples)
+    Ok(windows)
 }

@@ -1,111 +1,110 @@
-//! `chaic eval-perception`.
+//! `chaic eval detection` and `chaic eval behavior`.
 
 use std::fs;
-use std::path::Path;
 
-use anyhow::{Context as _, Result};
-use chaic_files::{FileError, write_whole};
+use anyhow::Result;
+use chaic_episodes::DatasetSplit;
+use chaic_files::{FileError, write_atomically};
 use chaic_vision::behavior::Behavior;
 use chaic_vision::behavior::network::TrainedBehavior;
-use chaic_vision::behavior::report::report as behavior_report;
+use chaic_vision::behavior::report::{BehaviorReport, report as behavior_report};
 use chaic_vision::coco::{ANNOTATIONS, DETECTIONS, annotate, annotations_json, results};
-use chaic_vision::evaluate::{DetectionReport, ENOUGH, LEAST_PX, report};
+use chaic_vision::evaluate::{DetectionReport, MIN_AREA_PX, MIN_FREQUENT_INSTANCES, report};
 use chaic_vision::instances::Instance;
-use chaic_vision::sights::{read_behavior, read_detector};
+use chaic_vision::perception_registry::{read_behavior, read_detector};
 use chaic_vision::trained::TrainedDetector;
-use chaic_vision::views::{LabelledView, Part};
-use serde::Serialize;
+use chaic_vision::views::LabeledView;
 
-use super::collect::{play, view_rules};
-use super::jobs;
-use crate::arguments::{BehaviorArguments, DetectionArguments, EvalPerceptionCommand};
-use crate::exit::Ended;
+use super::datasets::{collect_clips, view_config};
+use super::{jobs, write_json};
+use crate::arguments::{BehaviorArguments, ClipArguments, DetectionArguments};
+use crate::exit::ExitStatus;
 use crate::interrupt;
-use crate::output::say;
+use crate::output::{OutputFormat, print_result};
 
-/// Tells how good perception is.
-pub fn evaluate(command: &EvalPerceptionCommand) -> Result<Ended> {
-    match command {
-        EvalPerceptionCommand::Detection(arguments) => evaluate_detection(arguments),
-        EvalPerceptionCommand::Behavior(arguments) => evaluate_behavior(arguments),
-    }
-}
-
-fn evaluate_detection(arguments: &DetectionArguments) -> Result<Ended> {
+/// Evaluates a detector on held-out environments.
+pub fn evaluate_detection(
+    arguments: &DetectionArguments,
+    format: OutputFormat,
+) -> Result<ExitStatus> {
     let detector = match &arguments.weights {
         Some(path) => read_detector(path)?,
         None => TrainedDetector::built_in(),
     };
-    let views = (Part::Test, view_rules(arguments.scenes, Some(arguments.look)));
-    let also = |k: usize, view: &LabelledView, found: &[Instance]| {
-        let wanted = arguments.coco.is_some();
-        wanted.then(|| (annotate(k, view), results(k, view, found)))
+    let DetectionArguments { scenes, appearance, .. } = arguments;
+    let config = view_config(*scenes, Some(*appearance));
+    let coco_records = |k: usize, view: &LabeledView, found: &[Instance]| {
+        let is_wanted = arguments.coco.is_some();
+        is_wanted.then(|| (annotate(k, view), results(k, view, found)))
     };
     let n_views = arguments.views as usize;
-    let (found, files) = report(&detector, views, n_views, jobs(arguments.jobs), also);
-    say(&text(&found, arguments))?;
+    let (report, records) =
+        report(&detector, DatasetSplit::Test, config, n_views, jobs(arguments.jobs), coco_records);
+    print_result(format, &report, &detection_text(&report, arguments))?;
     if let Some(folder) = &arguments.coco {
-        let (annotated, results): (Vec<_>, Vec<_>) = files.into_iter().flatten().unzip();
-        fs::create_dir_all(folder).map_err(FileError::of("make", folder))?;
-        let of = format!("{:?} views of chaic, {:?} look", arguments.scenes, arguments.look);
-        write_whole(&folder.join(ANNOTATIONS), &annotations_json(&annotated, &of))?;
-        let results = serde_json::to_vec(&results.concat()).expect("plain data");
-        write_whole(&folder.join(DETECTIONS), &results)?;
+        let (annotations, results): (Vec<_>, Vec<_>) = records.into_iter().flatten().unzip();
+        fs::create_dir_all(folder).map_err(FileError::context("make", folder))?;
+        let description = format!("{scenes:?} views of chaic, {appearance:?} look");
+        write_atomically(&folder.join(ANNOTATIONS), &annotations_json(&annotations, &description))?;
+        let results = serde_json::to_vec(&results.concat()).expect("detections serialize");
+        write_atomically(&folder.join(DETECTIONS), &results)?;
     }
-    write_json(arguments.faults.as_deref(), &found.fault_rates)?;
-    write_json(arguments.json.as_deref(), &found)
+    write_json(arguments.error_rates.as_deref(), &report.noise_model)?;
+    write_json(arguments.json.as_deref(), &report)?;
+    Ok(ExitStatus::Success)
 }
 
-fn evaluate_behavior(arguments: &BehaviorArguments) -> Result<Ended> {
-    let trained = match &arguments.weights {
+/// Evaluates a behavior network on clips of held-out episodes.
+pub fn evaluate_behavior(
+    arguments: &BehaviorArguments,
+    format: OutputFormat,
+) -> Result<ExitStatus> {
+    let network = match &arguments.weights {
         Some(path) => read_behavior(path)?,
         None => TrainedBehavior::built_in(),
     };
-    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
-    let clips = play(&arguments.clips, Part::Test, None, stop)?;
+    let stop = interrupt::stop_flag()?;
+    let clips = collect_clips(&arguments.clips, DatasetSplit::Test, None, stop)?;
     let n_threads = jobs(arguments.clips.jobs);
-    let found = clips.and_then(|clips| behavior_report(&trained, &clips, n_threads, stop));
-    let Some(found) = found else { return Ok(Ended::Interrupted) };
+    let report = clips.and_then(|clips| behavior_report(&network, &clips, n_threads, stop));
+    let Some(report) = report else { return Ok(ExitStatus::Interrupted) };
+    print_result(format, &report, &behavior_text(&report, &arguments.clips))?;
+    write_json(arguments.json.as_deref(), &report)?;
+    Ok(ExitStatus::Success)
+}
+
+/// Formats the confusion matrix, one row per label, and the scores.
+fn behavior_text(report: &BehaviorReport, clips: &ClipArguments) -> String {
     let mut text = format!("{:18}", "");
-    for told in Behavior::ALL {
-        text += &format!(" {:>17}", told.name());
+    for predicted in Behavior::ALL {
+        text += &format!(" {:>17}", predicted.name());
     }
-    for (label, told) in
-        Behavior::ALL.iter().filter_map(|b| Some((b, found.confusion.get(b.name())?)))
-    {
+    for label in Behavior::ALL {
+        let Some(row) = report.confusion.get(label.name()) else { continue };
         text += &format!("\n{:18}", label.name());
-        for b in Behavior::ALL {
-            text += &format!(" {:17}", told.get(b.name()).copied().unwrap_or(0));
+        for predicted in Behavior::ALL {
+            text += &format!(" {:17}", row.get(predicted.name()).copied().unwrap_or(0));
         }
     }
-    text += &format!(
-        "\n\n{} clips of {} perception, {:?} look, told as in each column\n\
+    text + &format!(
+        "\n\n{} clips with {} perception, {:?} appearance; columns are predictions\n\
          top1 {:.3} +- {:.3}; mean of classes {:.3}; calibration error {:.3}\n\
-         of clips in which something goes on but has not just ended, told as moving: {:.3}\n",
-        found.clips,
-        arguments.clips.perception,
-        arguments.clips.look,
-        found.top1,
-        found.interval,
-        found.balanced,
-        found.calibration_error,
-        found.mixed_as_moving
-    );
-    say(&text)?;
-    write_json(arguments.json.as_deref(), &found)
+         mixed clips predicted as moving: {:.3}\n",
+        report.clips,
+        clips.perception,
+        clips.appearance,
+        report.top1,
+        report.interval,
+        report.balanced,
+        report.calibration_error,
+        report.mixed_as_moving
+    )
 }
 
-pub(super) fn write_json(path: Option<&Path>, found: &impl Serialize) -> Result<Ended> {
-    if let Some(path) = path {
-        let json = serde_json::to_string_pretty(found).expect("a report is plain data") + "\n";
-        write_whole(path, json.as_bytes())?;
-    }
-    Ok(Ended::Well)
-}
-
-fn text(found: &DetectionReport, arguments: &DetectionArguments) -> String {
+/// Formats average precision by class and size, and the failures.
+fn detection_text(report: &DetectionReport, arguments: &DetectionArguments) -> String {
     let mut text = format!("{:24} {:>6} {:>6} {:>9}\n", "class", "AP50", "AP", "instances");
-    for (name, (ap50, ap, n)) in &found.classes {
+    for (name, (ap50, ap, n)) in &report.classes {
         text += &format!("{name:24} {ap50:6.3} {ap:6.3} {n:9}\n");
     }
     let DetectionReport {
@@ -116,35 +115,35 @@ fn text(found: &DetectionReport, arguments: &DetectionArguments) -> String {
         sizes,
         map50_of_frequent,
         calibration_error,
-        failures,
+        errors,
         ..
-    } = found;
+    } = report;
     text += &format!(
-        "\n{views} {:?} views, {:?} look, instances of {LEAST_PX} pixels and more: map50 {map50:.3}, map \
-         {map:.3}\n",
-        arguments.scenes, arguments.look
+        "\n{views} {:?} views, {:?} appearance, instances of at least {MIN_AREA_PX} pixels: map50 \
+         {map50:.3}, map {map:.3}\n",
+        arguments.scenes, arguments.appearance
     );
     for (px, [map50, map]) in smaller {
-        text += &format!("with those of {px} and more: map50 {map50:.3}, map {map:.3}\n");
+        text += &format!("instances of at least {px} pixels: map50 {map50:.3}, map {map:.3}\n");
     }
     for (size, [map50, map]) in sizes {
-        text += &format!("of {size} instances: map50 {map50:.3}, map {map:.3}\n");
+        text += &format!("{size} instances: map50 {map50:.3}, map {map:.3}\n");
     }
     let (of_frequent, n_frequent) = map50_of_frequent;
     text += &format!(
-        "over the {n_frequent} classes of {ENOUGH} instances and more: map50 {of_frequent:.3}\n\
+        "{n_frequent} classes with at least {MIN_FREQUENT_INSTANCES} instances: map50 {of_frequent:.3}\n\
          calibration error of scores: {calibration_error:.3}\n"
     );
     text += &format!(
-        "at a score of one half, found {}, poor mask {}, wrong class {}, merged {}, missed {}; told \
-         besides: pieces {}, nothing there {}\n",
-        failures.found,
-        failures.poor_mask,
-        failures.wrong_class,
-        failures.merged,
-        failures.missed,
-        failures.split,
-        failures.nothing_there
+        "at score 0.5: found {}, poor mask {}, wrong class {}, merged {}, missed {}; false \
+         detections: pieces {}, nothing there {}\n",
+        errors.detected,
+        errors.poor_mask,
+        errors.wrong_class,
+        errors.merged,
+        errors.missed,
+        errors.duplicate,
+        errors.background
     );
     text
 }

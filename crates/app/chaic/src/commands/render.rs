@@ -1,33 +1,34 @@
 //! `chaic render`.
 
 use anyhow::Result;
-use chaic_env::minds::BuiltIn;
+use chaic_env::helper_registry::BuiltInHelpers;
 use chaic_env::rules::RuleSet;
 use chaic_eval::frame_export::{self, FrameExport};
+use serde_json::json;
 
 use crate::arguments::RenderArguments;
-use crate::exit::Ended;
-use crate::output::say;
+use crate::exit::ExitStatus;
+use crate::output::{OutputFormat, print_result};
 
-/// Makes pictures of one moment.
-pub fn run(arguments: &RenderArguments) -> Result<Ended> {
+/// Renders one frame of an episode.
+pub fn run(arguments: &RenderArguments, format: OutputFormat) -> Result<ExitStatus> {
     let RenderArguments { episode, agent, frame, out, size, helper, seed, rules, appearance } =
         arguments;
     let episode = super::episode(episode)?;
-    let rules = RuleSet::named(*rules);
-    let (agent, frame, size, seed) = (*agent, *frame, *size, *seed);
-    let still = FrameExport {
+    let export = FrameExport {
         episode: &episode,
         helper,
-        seed,
-        rules,
-        agent,
-        frame,
-        size,
+        seed: *seed,
+        rules: RuleSet::named(*rules),
+        agent: *agent,
+        frame: *frame,
+        size: *size,
         appearance: *appearance,
     };
-    let shown = frame_export::write(&still, &BuiltIn, out)?;
+    let rendered = frame_export::write(&export, &BuiltInHelpers, out)?;
     let id = episode.id();
-    say(&format!("{}: what the {agent} sees of {id} at frame {shown}\n", out.display()))?;
-    Ok(Ended::Well)
+    let text = format!("{}: view of the {agent} in {id} at frame {rendered}\n", out.display());
+    let json = json!({ "out": out, "episode": id, "agent": agent.role_name(), "frame": rendered });
+    print_result(format, &json, &text)?;
+    Ok(ExitStatus::Success)
 }

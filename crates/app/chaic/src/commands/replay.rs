@@ -4,27 +4,28 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Result, bail};
 use chaic_core::geom::Camera;
-use chaic_core::observation::Senses;
-use chaic_env::minds::{Helpers, Seeing};
+use chaic_core::observation::SensorConfig;
+use chaic_env::helper_registry::{BuiltInWithPerception, HelperRegistry};
 use chaic_eval::EvalError;
 use chaic_eval::replay::{self, Masks, ReplayOptions};
 use chaic_eval::run::{RunFolder, RunOptions};
 use chaic_eval::verify::verify_trace;
-use chaic_llm::Language;
-use chaic_vision::failures::TOLD_SCORE;
-use chaic_vision::sights::{read_detector, weights_of};
+use chaic_llm::LanguageHelpers;
+use chaic_vision::error_breakdown::REPORT_SCORE;
+use chaic_vision::perception_registry::{read_detector, weights_of};
 use chaic_vision::trained::{Inference, TrainedDetector};
+use serde_json::json;
 
-use super::{bars, llm, sight};
+use super::{bars, llm, run_perception};
 use crate::arguments::ReplayArguments;
-use crate::exit::Ended;
+use crate::exit::ExitStatus;
 use crate::interrupt;
-use crate::output::{complain, counted, say};
+use crate::output::{OutputFormat, counted, print_error, print_result, print_warning};
 
 /// Makes a video of a recorded episode.
-pub fn run(arguments: &ReplayArguments) -> Result<Ended> {
+pub fn run(arguments: &ReplayArguments, format: OutputFormat) -> Result<ExitStatus> {
     let ReplayArguments { run, episode, out, helper, seed, fps, every, masks } = arguments;
     let (folder, options) = RunFolder::read(run)?;
     if !options.traces {
@@ -33,20 +34,22 @@ pub fn run(arguments: &ReplayArguments) -> Result<Ended> {
     let path = replay::find_trace(&folder, episode, helper.as_deref(), *seed)?;
     let (trace, warnings) = folder.read_trace(&path)?;
     for warning in &warnings {
-        complain(&format!("warning: {warning}"));
+        print_warning(&warning.to_string());
     }
-    let seeing = Seeing { sight: sight::recorded(&options) };
-    let language = Language::recorded(run, llm::never())?;
-    let language = language.map(|language| language.with_sight(Arc::clone(&seeing.sight)));
-    let helpers = language.as_ref().map_or(&seeing as &dyn Helpers, |l| l);
+    let built_in =
+        BuiltInWithPerception { perception: run_perception::recorded_perception(&options) };
+    let language = LanguageHelpers::recorded(run, llm::never())?;
+    let language =
+        language.map(|language| language.with_perception(Arc::clone(&built_in.perception)));
+    let helpers = language.as_ref().map_or(&built_in as &dyn HelperRegistry, |l| l);
     if let Some(difference) = verify_trace(&folder, &options, helpers, &trace, &path)? {
         bail!("the trace was altered, so no video is made: {difference}");
     }
     let key = trace.header.key();
     let episode = folder.episode(&options, &key)?;
-    let bar = bars::plain(trace.end().map_or(0, |e| u64::from(e.frame)), "frames");
+    let bar = bars::count_bar(trace.end().map_or(0, |e| u64::from(e.frame)), "frames");
     let video = ReplayOptions { fps: *fps, every: *every };
-    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
+    let stop = interrupt::stop_flag()?;
     let mut progress = |frame| {
         bar.set_position(u64::from(frame));
         if stop.load(Ordering::Relaxed) {
@@ -57,24 +60,24 @@ pub fn run(arguments: &ReplayArguments) -> Result<Ended> {
     };
     let mut detector = masks.then(|| detector_of(&options)).transpose()?.map(DetectedMasks::new);
     let masks = detector.as_mut().map(|detector| detector as &mut dyn Masks);
-    let pictures = replay::write(&trace, &episode, video, masks, out, &mut progress);
+    let images = replay::write(&trace, &episode, video, masks, out, &mut progress);
     bar.finish_and_clear();
-    let Some(pictures) = pictures? else {
-        complain(&format!("stopped; {} is not written", out.display()));
-        return Ok(Ended::Interrupted);
+    let Some(images) = images? else {
+        print_error(&format!("stopped; {} is not written", out.display()));
+        return Ok(ExitStatus::Interrupted);
     };
-    say(&format!(
-        "{}: {} of {} with {}\n",
-        out.display(),
-        counted(pictures as usize, "picture"),
-        key.episode,
-        key.helper
-    ))?;
-    // The video of a cut-off trace shows only the part that is left.
-    Ok(if warnings.is_empty() { Ended::Well } else { Ended::WithFindings })
+    let n = counted(images as usize, "image");
+    let text = format!("{}: {n} of {} with {}\n", out.display(), key.episode, key.helper);
+    let json = json!({
+        "out": out, "images": images, "episode": key.episode, "helper": key.helper, "seed": key.seed,
+        "complete": warnings.is_empty(),
+    });
+    print_result(format, &json, &text)?;
+    // The video of a cut-off trace shows only the recorded part.
+    Ok(ExitStatus::from_findings(!warnings.is_empty()))
 }
 
-/// The detector by which the run's helpers saw, if it is known and still there.
+/// Returns the detector of the run's helpers if its weights are still there, else the built-in one.
 fn detector_of(options: &RunOptions) -> Result<TrainedDetector> {
     match options.perception.as_deref().and_then(weights_of) {
         Some(file) => Ok(read_detector(file)?),
@@ -82,7 +85,7 @@ fn detector_of(options: &RunOptions) -> Result<TrainedDetector> {
     }
 }
 
-/// What a detector finds.
+/// A detector that finds masks in views.
 struct DetectedMasks {
     detector: TrainedDetector,
     inference: Inference,
@@ -97,12 +100,12 @@ impl DetectedMasks {
 
 impl Masks for DetectedMasks {
     fn find(&mut self, rgb: &[u8], depth_m: &[f32], camera: &Camera) -> Vec<(u8, Vec<u32>)> {
-        let found = self.detector.detect((rgb, depth_m, camera), &mut self.inference);
-        let told = found.into_iter().filter(|instance| instance.score >= TOLD_SCORE);
-        told.map(|instance| (instance.label, instance.pixels)).collect()
+        let found = self.detector.detect(rgb, depth_m, camera, &mut self.inference);
+        let reported = found.into_iter().filter(|instance| instance.score >= REPORT_SCORE);
+        reported.map(|instance| (instance.label, instance.pixels)).collect()
     }
 
     fn image_size(&self) -> u32 {
-        Senses::IMAGE_SIZE
+        SensorConfig::IMAGE_SIZE
     }
 }

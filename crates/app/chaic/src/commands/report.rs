@@ -3,22 +3,28 @@
 use anyhow::Result;
 use chaic_eval::EvalError;
 use chaic_eval::metrics::{RunResult, tally};
-use chaic_eval::report::{Format, Report, without_trace, write_figure};
-use chaic_eval::run::{Item, RunFolder, planned, read_results};
+use chaic_eval::report::{Format, Report, untraced_note, write_figure};
+use chaic_eval::run::{EpisodeJob, RunFolder, planned, read_results};
 
 use crate::arguments::ReportArguments;
-use crate::exit::Ended;
-use crate::output::{complain, say};
+use crate::exit::ExitStatus;
+use crate::output::{OutputFormat, print, print_warning};
 
 /// Prints the scores of a run.
-pub fn run(arguments: &ReportArguments) -> Result<Ended> {
+pub fn run(arguments: &ReportArguments, format: OutputFormat) -> Result<ExitStatus> {
+    let format = match format {
+        OutputFormat::Text => Format::Table,
+        OutputFormat::Json => Format::Json,
+        OutputFormat::Markdown => Format::Markdown,
+        OutputFormat::Csv => Format::Csv,
+    };
     let (folder, options) = RunFolder::read(&arguments.run)?;
     if arguments.from_traces && !options.traces {
         return Err(EvalError::NoTraces { path: folder.path().to_owned() }.into());
     }
-    // Results say something even where the run's episodes are gone.
+    // Results are useful even if the episodes of the run are gone.
     let planned = planned(&folder, &options).unwrap_or_else(|e| {
-        complain(&format!("warning: can't tell whether the run is whole: {e}"));
+        print_warning(&format!("can't check whether the run is complete: {e}"));
         Vec::new()
     });
     let results = if arguments.from_traces {
@@ -27,48 +33,48 @@ pub fn run(arguments: &ReportArguments) -> Result<Ended> {
         from_journal(&folder, &planned)?
     };
     if results.is_empty() {
-        let what = if arguments.from_traces { "whole trace" } else { "finished episode" };
-        anyhow::bail!("{} has no {what} yet", arguments.run.display());
+        let missing = if arguments.from_traces { "whole trace" } else { "finished episode" };
+        anyhow::bail!("{} has no {missing} yet", arguments.run.display());
     }
     let (granted, formulas) = (folder.granted()?, arguments.formulas);
     let (granted, planned) = (granted.as_ref(), planned.as_slice());
     let report = Report { options: &options, results: &results, planned, granted, formulas };
-    // Tables say it themselves; numbers and figures have hardly a place for it.
-    let is_table = matches!(arguments.format, Format::Table | Format::Markdown);
+    // Tables contain the notes. The other formats have no place for them.
+    let is_table = matches!(format, Format::Table | Format::Markdown);
     for note in report.notes().iter().filter(|_| !is_table || arguments.figure.is_some()) {
-        complain(&format!("warning: {note}"));
+        print_warning(note);
     }
     match &arguments.figure {
         Some(path) => write_figure(&report.scores(), report.labels(), path)?,
-        None => say(&report.text(arguments.format))?,
+        None => print(&report.text(format))?,
     }
-    Ok(Ended::Well)
+    Ok(ExitStatus::Success)
 }
 
-fn from_journal(folder: &RunFolder, planned: &[Item]) -> Result<Vec<RunResult>> {
+fn from_journal(folder: &RunFolder, planned: &[EpisodeJob]) -> Result<Vec<RunResult>> {
     let (results, warnings) = read_results(&folder.results(), planned)?;
     for warning in warnings {
-        complain(&format!("warning: {warning}"));
+        print_warning(&warning.to_string());
     }
     Ok(results)
 }
 
-fn from_traces(folder: &RunFolder, planned: &[Item]) -> Result<Vec<RunResult>> {
+fn from_traces(folder: &RunFolder, planned: &[EpisodeJob]) -> Result<Vec<RunResult>> {
     let mut results = Vec::new();
     for path in folder.traces()? {
         let (trace, warnings) = folder.read_trace(&path)?;
         for warning in warnings {
-            complain(&format!("warning: {warning}"));
+            print_warning(&warning.to_string());
         }
         results.extend(tally(&trace));
     }
     match read_results(&folder.results(), planned) {
-        Ok((noted, _)) => {
-            if let Some(note) = without_trace(&noted, &results) {
-                complain(&format!("warning: {note}"));
+        Ok((recorded, _)) => {
+            if let Some(note) = untraced_note(&recorded, &results) {
+                print_warning(&note);
             }
         }
-        Err(e) => complain(&format!("warning: can't tell whether traces are missing: {e}")),
+        Err(e) => print_warning(&format!("can't check whether traces are missing: {e}")),
     }
     Ok(results)
 }

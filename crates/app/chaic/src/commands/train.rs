@@ -5,160 +5,172 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use anyhow::{Context as _, Result};
+use anyhow::Result;
 use chaic_eval::curves::{Curve, draw};
 use chaic_files::read_bounded;
-use chaic_learn::opponent::train::OpponentTraining;
-use chaic_learn::primitive::train::PrimitiveTraining;
-use chaic_learn::train::{Cloning, PolicyTraining, Reinforcement};
-use chaic_training::{CURVES, Of, Record, Training, TrainingRun, read_rules};
-use chaic_vision::behavior::train::BehaviorTraining;
-use chaic_vision::train::Trainer;
+use chaic_learn::opponent::train::OpponentTrainer;
+use chaic_learn::primitive::train::PrimitiveTrainer;
+use chaic_learn::train::{CloningConfig, PolicyTrainer, PpoTrainingConfig};
+use chaic_training::{CURVES, CurveRecord, Phase, Trainer, TrainingRun, read_config};
+use chaic_vision::behavior::train::BehaviorTrainer;
+use chaic_vision::train::DetectorLearner;
+use serde_json::json;
 
 use super::bars;
 use crate::arguments::{TrainArguments, TrainCommand};
-use crate::exit::Ended;
+use crate::exit::ExitStatus;
 use crate::interrupt;
-use crate::output::{complain, quoted_path, say};
+use crate::output::{OutputFormat, print_error, print_progress, print_result, quoted_path};
 
-/// No file of curves is larger, bytes.
-const MOST_BYTES: u64 = 1 << 28;
-/// The picture of a training's curves.
-const CURVES_PICTURE: &str = "curves.svg";
+/// Largest size of a curves file, bytes.
+const MAX_BYTES: u64 = 1 << 28;
+/// File name of the figure of a training's curves.
+const CURVES_FIGURE: &str = "curves.svg";
 
-/// What tells how good a policy is.
-const EVALUATE_POLICY: &str = "chaic eval --helper mine=policy:FILE";
-
-/// Trains.
-pub fn train(command: &TrainCommand) -> Result<Ended> {
+/// Trains a network.
+pub fn run(command: &TrainCommand, format: OutputFormat) -> Result<ExitStatus> {
     match command {
-        TrainCommand::Detector(arguments) => {
-            let evaluate = "chaic eval-perception detection --weights FILE";
-            train_one::<Trainer>(evaluate, arguments, |rules, steps| {
-                rules.steps = steps;
-            })
+        TrainCommand::Detection(arguments) => {
+            let names = CommandNames::for_network("detection");
+            train::<DetectorLearner>(&names, arguments, format, |config, n| config.steps = n)
         }
         TrainCommand::Behavior(arguments) => {
-            let evaluate = "chaic eval-perception behavior --weights FILE";
-            train_one::<BehaviorTraining>(evaluate, arguments, |rules, steps| {
-                rules.steps = steps;
-            })
+            let names = CommandNames::for_network("behavior");
+            train::<BehaviorTrainer>(&names, arguments, format, |config, n| config.steps = n)
         }
-        TrainCommand::Opponent(arguments) => train_one::<OpponentTraining>(
-            "chaic eval-opponent --weights FILE",
-            arguments,
-            |rules, steps| {
-                rules.steps = steps;
-            },
-        ),
-        TrainCommand::Ppo(arguments) => train_one::<PolicyTraining<Reinforcement>>(
-            EVALUATE_POLICY,
-            arguments,
-            |rules, steps| {
-                rules.iterations = steps;
-            },
-        ),
-        TrainCommand::Primitive(arguments) => {
-            train_one::<PrimitiveTraining>(EVALUATE_POLICY, arguments, |rules, steps| {
-                rules.updates = steps;
+        TrainCommand::Opponent(arguments) => {
+            let names = CommandNames::for_network("opponent");
+            train::<OpponentTrainer>(&names, arguments, format, |config, n| config.steps = n)
+        }
+        TrainCommand::Ppo(arguments) => {
+            let names = CommandNames::for_policy("ppo");
+            train::<PolicyTrainer<PpoTrainingConfig>>(&names, arguments, format, |config, n| {
+                config.iterations = n;
             })
         }
         TrainCommand::Clone(arguments) => {
-            train_one::<PolicyTraining<Cloning>>(EVALUATE_POLICY, arguments, |rules, steps| {
-                rules.iterations = steps;
+            let names = CommandNames::for_policy("clone");
+            train::<PolicyTrainer<CloningConfig>>(&names, arguments, format, |config, n| {
+                config.iterations = n;
             })
+        }
+        TrainCommand::Primitive(arguments) => {
+            let names = CommandNames::for_policy("primitive");
+            train::<PrimitiveTrainer>(&names, arguments, format, |config, n| config.n_updates = n)
         }
     }
 }
 
-/// Trains; `evaluate`, FILE being the weights, tells how good it is.
-fn train_one<T: Training>(
-    evaluate: &str,
+/// Commands that a training names in its output.
+struct CommandNames {
+    /// Name of the subcommand of `chaic train`.
+    train: &'static str,
+    /// Command that evaluates the weights; FILE stands for their path.
+    evaluate: String,
+}
+
+impl CommandNames {
+    fn for_network(name: &'static str) -> CommandNames {
+        CommandNames { train: name, evaluate: format!("chaic eval {name} --weights FILE") }
+    }
+
+    fn for_policy(name: &'static str) -> CommandNames {
+        let evaluate = "chaic eval --helper mine=policy:FILE".to_owned();
+        CommandNames { train: name, evaluate }
+    }
+}
+
+/// Runs a training.
+fn train<T: Trainer>(
+    names: &CommandNames,
     arguments: &TrainArguments,
-    set_steps: impl FnOnce(&mut T::Rules, u64),
-) -> Result<Ended> {
-    let stop = interrupt::stop_flag().context("can't listen for Ctrl-C")?;
+    format: OutputFormat,
+    set_steps: impl FnOnce(&mut T::Config, u64),
+) -> Result<ExitStatus> {
+    let stop = interrupt::stop_flag()?;
     let out = quoted_path(&arguments.out);
-    let how_to_go_on = format!("go on with: chaic train {} --resume --out {out}", T::KIND);
-    let bar = bars::plain(0, "steps");
-    let mut progress = |done: &str| {
-        bar.set_message(done.to_owned());
+    let how_to_resume = format!("continue with: chaic train {} --resume --out {out}", names.train);
+    let bar = bars::count_bar(0, "steps");
+    let mut progress = |message: &str| {
+        bar.set_message(message.to_owned());
         if bar.is_hidden() {
-            complain(done);
+            print_progress(message);
         }
     };
     let Some(mut run) = open::<T>(arguments, set_steps, &mut progress, stop)? else {
-        complain(&format!("stopped before the first step; {how_to_go_on}"));
-        return Ok(Ended::Interrupted);
+        print_error(&format!("stopped before the first step; {how_to_resume}"));
+        return Ok(ExitStatus::Interrupted);
     };
-    let (done, steps) = run.extent();
+    let (done, steps) = run.progress();
     bar.set_length(steps);
     bar.set_position(done);
-    let began = Instant::now();
-    let is_whole = run.go_on(stop, &mut |record| {
-        let figures: Vec<String> =
-            record.figures.iter().map(|(name, x)| format!("{name} {x:.3}")).collect();
-        let figures = figures.join(", ");
-        match record.of {
-            Of::Loss => {
+    let start = Instant::now();
+    let is_finished = run.run(stop, &mut |record| {
+        let metrics: Vec<String> =
+            record.metrics.iter().map(|(name, x)| format!("{name} {x:.3}")).collect();
+        let metrics = metrics.join(", ");
+        match record.phase {
+            Phase::Train => {
                 bar.set_position(record.step);
-                bar.set_message(figures);
+                bar.set_message(metrics);
             }
-            Of::Validation => bar.suspend(|| {
-                let s = began.elapsed().as_secs();
-                complain(&format!("step {}, {s} s: {figures}", record.step));
-                // The figures are in the curves' file; a picture of them is no more than that.
+            Phase::Validation => bar.suspend(|| {
+                let s = start.elapsed().as_secs();
+                print_progress(&format!("step {}, {s} s: {metrics}", record.step));
+                // The training continues without the figure: the curves file has all metrics.
                 if let Err(e) = draw_curves(&arguments.out) {
-                    complain(&format!("{e:#}"));
+                    print_error(&format!("{e:#}"));
                 }
             }),
         }
     });
     bar.finish_and_clear();
-    if !is_whole? {
-        let (done, steps) = run.extent();
-        complain(&format!("stopped after {done} of {steps} steps; {how_to_go_on}"));
-        return Ok(Ended::Interrupted);
+    if !is_finished? {
+        let (done, steps) = run.progress();
+        print_error(&format!("stopped after {done} of {steps} steps; {how_to_resume}"));
+        return Ok(ExitStatus::Interrupted);
     }
-    let weights = quoted_path(&arguments.out.join(T::WEIGHTS));
-    say(&format!("Weights:  {weights}\n"))?;
-    say(&format!("Evaluate: {}\n", evaluate.replace("FILE", &weights)))?;
-    Ok(Ended::Well)
+    let weights = arguments.out.join(T::WEIGHTS);
+    let evaluate = names.evaluate.replace("FILE", &quoted_path(&weights));
+    let text = format!("Weights:  {}\nEvaluate: {evaluate}\n", quoted_path(&weights));
+    print_result(format, &json!({ "weights": weights, "evaluate": evaluate }), &text)?;
+    Ok(ExitStatus::Success)
 }
 
-fn open<T: Training>(
+/// Starts or resumes a training; `None` if it was stopped before the first step.
+fn open<T: Trainer>(
     arguments: &TrainArguments,
-    set_steps: impl FnOnce(&mut T::Rules, u64),
+    set_steps: impl FnOnce(&mut T::Config, u64),
     progress: &mut dyn FnMut(&str),
     stop: &AtomicBool,
 ) -> Result<Option<TrainingRun<T>>> {
     if arguments.resume {
         return Ok(TrainingRun::resume(&arguments.out, progress, stop)?);
     }
-    let rules = arguments.config.as_deref().map(read_rules::<T>).transpose()?;
-    let mut rules = rules.unwrap_or_default();
+    let config = arguments.config.as_deref().map(read_config::<T>).transpose()?;
+    let mut config = config.unwrap_or_default();
     if let Some(steps) = arguments.steps {
-        set_steps(&mut rules, steps);
+        set_steps(&mut config, steps);
     }
     let weights = arguments.weights.as_deref();
-    Ok(TrainingRun::begin(&arguments.out, &rules, weights, progress, stop)?)
+    Ok(TrainingRun::start(&arguments.out, &config, weights, progress, stop)?)
 }
 
 /// Draws the curves of a training into its folder.
 fn draw_curves(folder: &Path) -> Result<()> {
-    let text = String::from_utf8(read_bounded(&folder.join(CURVES), MOST_BYTES)?)?;
-    let mut curves: BTreeMap<(Of, String), Vec<(f64, f64)>> = BTreeMap::new();
-    for record in text.lines().filter_map(|line| serde_json::from_str::<Record>(line).ok()) {
-        for (name, y) in record.figures {
-            curves.entry((record.of, name)).or_default().push((record.step as f64, y));
+    let text = String::from_utf8(read_bounded(&folder.join(CURVES), MAX_BYTES)?)?;
+    let mut curves: BTreeMap<(Phase, String), Vec<(f64, f64)>> = BTreeMap::new();
+    for record in text.lines().filter_map(|line| serde_json::from_str::<CurveRecord>(line).ok()) {
+        for (name, y) in record.metrics {
+            curves.entry((record.phase, name)).or_default().push((record.step as f64, y));
         }
     }
     let curves: Vec<Curve> = curves
         .into_iter()
-        .map(|((of, name), points)| {
-            let of = if of == Of::Loss { "learned from" } else { "validation" };
-            Curve { title: format!("{name}, {of}"), points }
+        .map(|((phase, name), points)| {
+            let phase = if phase == Phase::Train { "training" } else { "validation" };
+            Curve { title: format!("{name}, {phase}"), points }
         })
         .collect();
-    Ok(draw(&curves, "steps", &folder.join(CURVES_PICTURE))?)
+    Ok(draw(&curves, "steps", &folder.join(CURVES_FIGURE))?)
 }

@@ -3,51 +3,77 @@
 use std::sync::Arc;
 
 use anyhow::Result;
-use chaic_env::minds::{Helpers, Seeing};
+use chaic_core::AgentId;
+use chaic_env::helper_registry::{BuiltInWithPerception, HelperRegistry};
 use chaic_eval::run::RunFolder;
-use chaic_eval::verify::{ReportState, Verdict, verify_run};
-use chaic_llm::Language;
+use chaic_eval::verify::{Finding, Mismatch, ReportState, VerificationReport, verify_run};
+use chaic_llm::LanguageHelpers;
+use serde_json::json;
 
-use super::{bars, jobs, llm, sight};
+use super::{bars, jobs, llm, run_perception};
 use crate::arguments::VerifyArguments;
-use crate::exit::Ended;
-use crate::output::{complain, counted, say};
+use crate::exit::ExitStatus;
+use crate::output::{OutputFormat, counted, print_result, print_warning};
 
-/// Plays the traces of a run again and compares.
-pub fn run(arguments: &VerifyArguments) -> Result<Ended> {
+/// Replays the traces of a run and compares all that is recorded.
+pub fn run(arguments: &VerifyArguments, format: OutputFormat) -> Result<ExitStatus> {
     let (folder, options) = RunFolder::read(&arguments.run)?;
-    let bar = bars::plain(folder.traces()?.len() as u64, "traces");
+    let bar = bars::count_bar(folder.traces()?.len() as u64, "traces");
     let progress = |done: usize| bar.set_position(done as u64);
-    let seeing = Seeing { sight: sight::recorded(&options) };
-    let language = Language::recorded(&arguments.run, llm::never())?;
-    let language = language.map(|language| language.with_sight(Arc::clone(&seeing.sight)));
-    let helpers: &dyn Helpers = match &language {
+    let built_in =
+        BuiltInWithPerception { perception: run_perception::recorded_perception(&options) };
+    let language = LanguageHelpers::recorded(&arguments.run, llm::never())?;
+    let language =
+        language.map(|language| language.with_perception(Arc::clone(&built_in.perception)));
+    let helpers: &dyn HelperRegistry = match &language {
         Some(language) => language,
-        None => &seeing,
+        None => &built_in,
     };
     let verdict = verify_run(&folder, &options, helpers, jobs(arguments.jobs), &progress);
     bar.finish_and_clear();
     let verdict = verdict?;
     for warning in &verdict.warnings {
-        complain(&format!("warning: {warning}"));
-    }
-    for mismatch in &verdict.mismatches {
-        say(&format!("DIFFERS {mismatch}\n"))?;
-    }
-    for finding in &verdict.findings {
-        say(&format!("FOUND {finding}\n"))?;
+        print_warning(&warning.to_string());
     }
     if verdict.agreeing + verdict.mismatches.len() + verdict.findings.len() == 0 {
         anyhow::bail!("{} has no trace to verify", arguments.run.display());
     }
-    say(&(summary(&verdict) + "\n"))?;
-    Ok(if verdict.is_good() { Ended::Well } else { Ended::WithFindings })
+    let differences: Vec<String> =
+        verdict.mismatches.iter().map(|mismatch| format!("DIFFERS {mismatch}\n")).collect();
+    let findings: Vec<String> =
+        verdict.findings.iter().map(|finding| format!("FOUND {finding}\n")).collect();
+    let text = differences.concat() + &findings.concat() + &summary(&verdict) + "\n";
+    print_result(format, &to_json(&verdict), &text)?;
+    Ok(ExitStatus::from_findings(!verdict.is_good()))
 }
 
-/// What was found in the run, its traces and its report, a line each.
-fn summary(verdict: &Verdict) -> String {
+fn to_json(verdict: &VerificationReport) -> serde_json::Value {
+    let mismatch = |m: &Mismatch| {
+        json!({
+            "path": m.path, "frame": m.frame, "agent": m.agent.map(AgentId::role_name),
+            "problem": m.problem,
+        })
+    };
+    let finding = |f: &Finding| json!({ "path": f.path, "problem": f.problem });
+    let coverage = &verdict.coverage;
+    json!({
+        "passed": verdict.is_good(),
+        "traces": { "agreeing": verdict.agreeing, "decisions": verdict.decisions },
+        "mismatches": verdict.mismatches.iter().map(mismatch).collect::<Vec<_>>(),
+        "findings": verdict.findings.iter().map(finding).collect::<Vec<_>>(),
+        "episode_runs": {
+            "planned": coverage.planned,
+            "missing": coverage.missing.len(),
+            "failed": coverage.failed.len(),
+        },
+        "report": report_text(&verdict.report),
+    })
+}
+
+/// Formats the findings in the run, its traces and its report, one line each.
+fn summary(verdict: &VerificationReport) -> String {
     let (agreeing, n) = (verdict.agreeing, verdict.mismatches.len());
-    let others = match verdict.findings.len() {
+    let findings = match verdict.findings.len() {
         0 => String::new(),
         n => format!("\nother findings in the folder: {n}"),
     };
@@ -57,28 +83,32 @@ fn summary(verdict: &Verdict) -> String {
         let (traces, decisions) = (counted(agreeing, "trace"), verdict.decisions);
         format!("{traces} with {}: all digests agree", counted(decisions, "decision"))
     };
-    let report = match &verdict.report {
-        ReportState::Unchecked => "the report is not checked".to_owned(),
-        ReportState::OfOtherVersion(chaic) => format!(
-            "the report is NOT CHECKED, as chaic {chaic} began the run; verify it with that version"
-        ),
-        state @ ReportState::Compared { .. } if state.is_good() => {
-            "the report is what the results give".to_owned()
-        }
-        ReportState::Compared { missing, altered } => [
-            (missing, "MISSING", "write the report by chaic eval --resume"),
-            (altered, "ALTERED", "the results give something else"),
-        ]
-        .into_iter()
-        .filter(|(names, _, _)| !names.is_empty())
-        .map(|(names, what, why)| format!("{what} {}: {why}", names.join(", ")))
-        .collect::<Vec<_>>()
-        .join("\n"),
-    };
-    // Where its episodes are gone, nobody knows how many there should be.
+    // Without the episodes, the number of planned episode runs is unknown.
     let coverage = match &verdict.coverage {
         coverage if coverage.planned > 0 => format!("{coverage}\n"),
         _ => String::new(),
     };
-    format!("{coverage}{traces}{others}\n{report}")
+    format!("{coverage}{traces}{findings}\n{}", report_text(&verdict.report))
+}
+
+/// Describes the result of comparing the report with the results.
+fn report_text(state: &ReportState) -> String {
+    match state {
+        ReportState::Unchecked => "the report is not checked".to_owned(),
+        ReportState::OtherVersion(chaic) => format!(
+            "the report is NOT CHECKED, because chaic {chaic} started the run; verify it with that version"
+        ),
+        state @ ReportState::Compared { .. } if state.is_good() => {
+            "the report agrees with the results".to_owned()
+        }
+        ReportState::Compared { missing, altered } => [
+            (missing, "MISSING", "write the report with chaic eval --resume"),
+            (altered, "ALTERED", "it differs from the results"),
+        ]
+        .into_iter()
+        .filter(|(names, _, _)| !names.is_empty())
+        .map(|(names, state, reason)| format!("{state} {}: {reason}", names.join(", ")))
+        .collect::<Vec<_>>()
+        .join("\n"),
+    }
 }

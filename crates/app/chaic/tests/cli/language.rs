@@ -1,10 +1,9 @@
-//! Whom a run with a language model asks, and what it prints: keys and questions go to nobody whom
-//! the user hasn't named, an endpoint that says nothing holds nobody up, and control characters stay
-//! what they are: characters.
+//! Promises on language models: keys and prompts go only to endpoints that the user names, a silent endpoint does not
+//! block Ctrl-C, and control characters are escaped.
 
 use std::time::{Duration, Instant};
 
-use chaic_llm_standin::{Manner, Options, StandIn};
+use chaic_llm_standin::{Options, ResponseMode, StandIn};
 
 use crate::*;
 
@@ -19,23 +18,23 @@ fn play<'a>(url: &'a str, out: &'a str) -> Vec<&'a str> {
 }
 
 #[test]
-fn a_run_folder_does_not_decide_who_is_asked_with_which_key() {
-    let dir = workshop();
+fn a_run_folder_does_not_choose_the_endpoint_or_the_key() {
+    let dir = short_episodes();
     let at = dir.path();
     let (mine, theirs) = (standin(Options::default()), standin(Options::default()));
     let url = mine.url();
-    well(at, &play(&url, "run"));
-    let n_asked = mine.seen().requests;
-    // Somebody else's folder: another address, a variable that holds a secret, something to ask.
+    run_ok(at, &play(&url, "run"));
+    let n_asked = mine.stats().requests;
+    // A forged folder: another address, a variable with a secret, and a missing answer.
     let path = at.join("run/llm/settings.json");
-    let recorded = fs::read_to_string(&path).expect("it is text");
+    let recorded = fs::read_to_string(&path).expect("a text file");
     let forged = recorded
         .replace(&url, &theirs.url())
         .replace("\"key_env\": null", "\"key_env\": \"CHAIC_TEST_SECRET\"");
     assert!(forged.contains(&theirs.url()) && forged.contains("CHAIC_TEST_SECRET"), "{recorded}");
-    fs::write(&path, forged).expect("there is room");
-    fs::remove_dir_all(at.join("run/llm/no_constraint")).expect("it is there");
-    fs::remove_file(at.join("run/results.jsonl")).expect("it is there");
+    fs::write(&path, forged).expect("the disk has space");
+    fs::remove_dir_all(at.join("run/llm/no_constraint")).expect("it exists");
+    fs::remove_file(at.join("run/results.jsonl")).expect("it exists");
     let resume = |more: &[&str]| {
         let arguments = [&["eval", "--resume", "--out", "run"], more].concat();
         let mut command = command(at, &arguments);
@@ -43,48 +42,52 @@ fn a_run_folder_does_not_decide_who_is_asked_with_which_key() {
     };
     for more in [&[][..], &["--endpoint", &url], &["--llm-key-env", "CHAIC_TEST_SECRET"]] {
         let out = resume(more);
-        let said = text(&out.stderr);
+        let message = text(&out.stderr);
         assert!(!out.status.success(), "{more:?} goes on");
         for words in [&theirs.url(), "CHAIC_TEST_SECRET", "--endpoint"] {
-            assert!(said.contains(words), "{words}: {said}");
+            assert!(message.contains(words), "{words}: {message}");
         }
-        assert!(!said.contains("sesame") && said.lines().count() == 1, "{said}");
+        assert!(!message.contains("sesame") && message.lines().count() == 1, "{message}");
     }
-    assert_eq!((mine.seen().requests, theirs.seen().requests), (n_asked, 0));
+    assert_eq!((mine.stats().requests, theirs.stats().requests), (n_asked, 0));
     let out = resume(&["--endpoint", &url, "--llm-key-env", ""]);
     assert!(out.status.success(), "{}", text(&out.stderr));
-    assert!(mine.seen().requests > n_asked && theirs.seen().requests == 0);
-    // A run that was stopped before it had recorded whom it asks is begun with them again.
-    fs::remove_dir_all(at.join("run/llm")).expect("it is there");
-    fs::remove_file(at.join("run/results.jsonl")).expect("it is there");
+    assert!(mine.stats().requests > n_asked && theirs.stats().requests == 0);
+    // A run that was stopped before it recorded its endpoint needs the options again.
+    fs::remove_dir_all(at.join("run/llm")).expect("it exists");
+    fs::remove_file(at.join("run/results.jsonl")).expect("it exists");
     assert!(text(&resume(&["--endpoint", &url]).stderr).contains("give --model"));
     let out = resume(&["--endpoint", &url, "--model", "standin"]);
     assert!(out.status.success(), "{}", text(&out.stderr));
 }
 
 #[test]
-fn what_goes_over_the_wire_in_the_open_is_asked_for() {
-    let dir = workshop();
+fn plain_http_to_another_machine_needs_a_flag() {
+    let dir = short_episodes();
     let at = dir.path();
     let url = "http://models.example.org/v1";
     for command in [&["llm", "check"][..], &[&LLM[..], &["llm", "--out", "r"]].concat()] {
         let ask = [command, &["--endpoint", url, "--model", "m"]].concat();
-        let said = ill(at, &ask);
-        assert!(said.contains("plain http to another machine"), "{said}");
-        assert!(said.contains("--llm-allow-http"), "{said}");
-        // With the flag it goes on, to the key that isn't there.
+        let message = run_err(at, &ask);
+        assert!(message.contains("plain http to another machine"), "{message}");
+        assert!(message.contains("--llm-allow-http"), "{message}");
+        // With the flag, the missing key is the next error.
         let key = ["--llm-allow-http", "--llm-key-env", "CHAIC_TEST_NO_KEY"];
-        let said = ill(at, &[&ask[..], &key].concat());
-        assert!(said.contains("CHAIC_TEST_NO_KEY holds no key"), "{said}");
-        let said = ill(at, &[&ask[..], &["--llm-allow-http", "--llm-key-env", "sk-1"]].concat());
-        assert!(said.contains("endpoint.key_env is no name") && !said.contains("sk-1"), "{said}");
+        let message = run_err(at, &[&ask[..], &key].concat());
+        assert!(message.contains("CHAIC_TEST_NO_KEY holds no key"), "{message}");
+        let message =
+            run_err(at, &[&ask[..], &["--llm-allow-http", "--llm-key-env", "sk-1"]].concat());
+        assert!(
+            message.contains("endpoint.key_env is no name") && !message.contains("sk-1"),
+            "{message}"
+        );
     }
     assert!(!at.join("r").exists());
 }
 
 #[test]
-fn settings_that_are_no_numbers_are_refused() {
-    let dir = workshop();
+fn settings_out_of_range_are_refused() {
+    let dir = short_episodes();
     let at = dir.path();
     let server = standin(Options::default());
     let url = server.url();
@@ -100,50 +103,53 @@ fn settings_that_are_no_numbers_are_refused() {
         ("[budget]\nrequests = 1.5", "expected u64"),
         ("[price]\nprompt_per_million = inf", "price.prompt_per_million is inf"),
     ] {
-        fs::write(at.join("llm.toml"), format!("{text}\n")).expect("there is room");
+        fs::write(at.join("llm.toml"), format!("{text}\n")).expect("the disk has space");
         let config = ["--llm-config", "llm.toml"];
         let check = ["llm", "check", "--endpoint", &url, "--model", "m"];
         for command in [&play(&url, "r")[..], &check] {
-            let said = ill(at, &[command, &config].concat());
-            assert!(said.contains(words), "{text}: {said}");
+            let message = run_err(at, &[command, &config].concat());
+            assert!(message.contains(words), "{text}: {message}");
         }
     }
-    assert_eq!(server.seen().requests, 0);
+    assert_eq!(server.stats().requests, 0);
     assert!(!at.join("r").exists());
 }
 
 #[test]
-fn no_control_character_gets_to_the_terminal() {
+fn no_control_character_reaches_the_terminal() {
     const EVIL: &str = "\u{1b}]0;owned\u{7}\u{1b}[2J\r\u{9b}31m\u{202e}";
-    let dir = workshop();
+    let dir = short_episodes();
     let at = dir.path();
     let say = |question: &chaic_llm_standin::script::Question| {
-        question.form(1, &format!("Dear {EVIL} reader."))
+        question.format_answer(1, &format!("Dear {EVIL} reader."))
     };
-    let server = standin(Options { manner: Manner::Say(Box::new(say)), ..Options::default() });
+    let server = standin(Options {
+        response_mode: ResponseMode::Function(Box::new(say)),
+        ..Options::default()
+    });
     let url = server.url();
-    well(at, &play(&url, "run"));
-    let shown = well(at, &["llm", "show", "run", "no_constraint/gen/0"]);
+    run_ok(at, &play(&url, "run"));
+    let shown = run_ok(at, &["llm", "show", "run", "no_constraint/gen/0"]);
     assert!(shown.contains("Dear ") && shown.contains("\\u001b]0;owned\\u0007"), "{shown}");
 
     let escaped = serde_json::to_string(EVIL).expect("a text is JSON");
     let inner = escaped.trim_matches('"');
     let episode = at.join("short/no_constraint-0.json");
-    let good = fs::read_to_string(&episode).expect("it is text");
+    let good = fs::read_to_string(&episode).expect("a text file");
     fs::write(at.join("field.json"), good.replacen('{', &format!("{{{escaped}: 1,"), 1))
-        .expect("there is room");
+        .expect("the disk has space");
     fs::write(at.join("id.json"), good.replace("no_constraint/gen/0", inner))
-        .expect("there is room");
+        .expect("the disk has space");
     fs::write(
         at.join("class.json"),
         good.replacen("\"class\": \"", &format!("\"class\": \"{inner}"), 1),
     )
-    .expect("there is room");
+    .expect("the disk has space");
     let trace = at.join("run/traces/no_constraint/llm/gen-0-s0.jsonl");
-    let lines = fs::read_to_string(&trace).expect("it is text");
+    let lines = fs::read_to_string(&trace).expect("a text file");
     let altered = lines.replacen("\"turn_left\"", &escaped, 1).replacen("\"explore\"", &escaped, 1);
     assert_ne!(altered, lines);
-    fs::write(&trace, altered).expect("there is room");
+    fs::write(&trace, altered).expect("the disk has space");
     for arguments in [
         &["llm", "show", "run", "no_constraint/gen/0"][..],
         &["episodes", "validate", "field.json", "id.json", "class.json"],
@@ -156,23 +162,23 @@ fn no_control_character_gets_to_the_terminal() {
         &["report", "run", "--from-traces"],
         &["llm", "check", "--endpoint", &url, "--model", EVIL],
     ] {
-        let out = chaic(at, arguments);
+        let out = output_of(at, arguments);
         let printed = text(&out.stdout) + &text(&out.stderr);
         let is_evil = |c: char| c.is_control() && c != '\n' && c != '\t' || c == '\u{202e}';
         assert!(!printed.is_empty() && !printed.contains(is_evil), "{arguments:?}: {printed:?}");
     }
-    let said = ill(at, &["episodes", "validate", "field.json"]);
-    assert!(said.contains("\\u001b"), "what was there is told: {said}");
+    let message = run_err(at, &["episodes", "validate", "field.json"]);
+    assert!(message.contains("\\u001b"), "what was there is reply: {message}");
 }
 
-/// Waits until `is_true`; where it never is, the test has failed, and `child` is ended.
+/// Waits until `is_true`. After a timeout it kills `child` and fails.
 #[cfg(unix)]
 fn until(child: &mut Child, what: &str, mut is_true: impl FnMut(&mut Child) -> bool) {
     let began = Instant::now();
     while !is_true(child) {
         if began.elapsed() > Duration::from_secs(120) {
             child.kill().expect("it runs");
-            panic!("{what} doesn't come about");
+            panic!("{what} does not happen");
         }
         std::thread::sleep(Duration::from_millis(10));
     }
@@ -186,10 +192,10 @@ fn interrupt(child: &Child) {
 
 #[cfg(unix)]
 #[test]
-fn an_endpoint_that_says_nothing_holds_up_nobody_who_stops_the_run() {
+fn a_silent_endpoint_does_not_block_ctrl_c() {
     use std::sync::atomic::{AtomicUsize, Ordering};
     const ANSWERED: usize = 2;
-    let dir = workshop();
+    let dir = short_episodes();
     let at = dir.path();
     let asked = AtomicUsize::new(0);
     let say = move |question: &chaic_llm_standin::script::Question| {
@@ -200,22 +206,26 @@ fn an_endpoint_that_says_nothing_holds_up_nobody_who_stops_the_run() {
             std::thread::park();
         }
     };
-    let stalls = standin(Options { manner: Manner::Say(Box::new(say)), ..Options::default() });
-    fs::write(at.join("slow.toml"), "[endpoint]\ntimeout_secs = 86400.0\n").expect("there is room");
+    let stalls = standin(Options {
+        response_mode: ResponseMode::Function(Box::new(say)),
+        ..Options::default()
+    });
+    fs::write(at.join("slow.toml"), "[endpoint]\ntimeout_secs = 86400.0\n")
+        .expect("the disk has space");
     let url = stalls.url();
     let task = ["--llm-config", "slow.toml", "--task", "no_constraint"];
     let mut child = start(at, &[&play(&url, "run")[..], &task].concat());
-    until(&mut child, "the stalled question", |_| stalls.seen().requests > ANSWERED);
+    until(&mut child, "the stalled question", |_| stalls.stats().requests > ANSWERED);
     interrupt(&child);
     until(&mut child, "its end", |child| child.try_wait().expect("it can be asked").is_some());
     let ended = child.wait_with_output().expect("it has ended");
-    let said = text(&ended.stderr);
-    assert_eq!(ended.status.code(), Some(130), "{said}");
+    let message = text(&ended.stderr);
+    assert_eq!(ended.status.code(), Some(130), "{message}");
     let hint = format!("chaic eval --resume --out run --endpoint {url} --llm-config slow.toml");
-    assert!(said.contains(&hint), "{said}");
+    assert!(message.contains(&hint), "{message}");
 
     let record = at.join("run/llm/no_constraint/llm/gen-0-s0.helper.jsonl");
-    let record = fs::read_to_string(record).expect("it is text");
+    let record = fs::read_to_string(record).expect("a text file");
     assert!(record.ends_with('\n'));
     let is_whole = |line: &str| serde_json::from_str::<serde_json::Value>(line).is_ok();
     assert!(record.lines().all(is_whole), "{record}");
@@ -225,34 +235,40 @@ fn an_endpoint_that_says_nothing_holds_up_nobody_who_stops_the_run() {
     let answers = standin(Options::default());
     let url = answers.url();
     let resume = ["eval", "--resume", "--out", "run", "--endpoint", &url];
-    assert!(well(at, &resume).contains("LLM"));
+    assert!(run_ok(at, &resume).contains("LLM"));
     let whole = [&play(&url, "whole")[..], &task].concat();
-    well(at, &whole);
-    let scores = |run: &str| well(at, &["report", run, "--format", "json"]);
-    assert_eq!(scores("run"), scores("whole"), "a run that was cut short is the same");
-    assert!(well(at, &["verify", "run"]).contains("1 trace"));
+    run_ok(at, &whole);
+    let scores = |run: &str| run_ok(at, &["report", run, "--format", "json"]);
+    assert_eq!(scores("run"), scores("whole"), "a resumed run has the same scores");
+    assert!(run_ok(at, &["verify", "run"]).contains("1 trace"));
 }
 
 #[cfg(unix)]
 #[test]
-fn an_endpoint_that_is_gone_says_so_while_it_is_tried() {
+fn a_lost_endpoint_is_reported_while_it_is_retried() {
     use std::io::{BufRead as _, BufReader};
-    let dir = workshop();
+    let dir = short_episodes();
     let at = dir.path();
     let gone = standin(Options::default());
     let url = gone.url();
     drop(gone);
     let mut child = start(at, &play(&url, "run"));
     let stderr = child.stderr.take().expect("it is piped");
-    let mut lines = BufReader::new(stderr).lines().map(|line| line.expect("it is text"));
-    let told = lines.find(|line| line.contains("can't be asked"));
-    let told = told.expect("it says so");
-    assert!(told.contains("just now: the connection failed (connection refused)"), "{told}");
+    let mut lines = BufReader::new(stderr).lines().map(|line| line.expect("a text file"));
+    let message = lines.find(|line| line.contains("cannot be reached"));
+    let message = message.expect("it says so");
+    assert!(
+        message.contains("at the moment: the connection failed (connection refused)"),
+        "{message}"
+    );
     interrupt(&child);
     until(&mut child, "its end", |child| child.try_wait().expect("it can be asked").is_some());
     assert_eq!(child.wait().expect("it has ended").code(), Some(130));
-    let said: Vec<String> = lines.collect();
-    assert!(said.iter().any(|line| line.contains("chaic eval --resume --out run")), "{said:?}");
+    let message: Vec<String> = lines.collect();
+    assert!(
+        message.iter().any(|line| line.contains("chaic eval --resume --out run")),
+        "{message:?}"
+    );
     let back = standin(Options::default());
-    well(at, &["eval", "--resume", "--out", "run", "--endpoint", &back.url()]);
+    run_ok(at, &["eval", "--resume", "--out", "run", "--endpoint", &back.url()]);
 }

@@ -1,5 +1,4 @@
-//! The command from outside: what the documentation promises works, errors are one clear line, and
-//! nothing panics.
+//! Promises: the command works as documented, errors are one clear line, and nothing panics.
 
 use std::fs;
 use std::path::Path;
@@ -8,9 +7,11 @@ use std::process::{Child, Command, Output, Stdio};
 use assert_cmd::cargo::cargo_bin;
 
 mod files;
+mod help;
 mod interrupted;
 mod language;
 mod learning;
+mod lists;
 mod perception;
 mod pictures;
 mod run_folders;
@@ -22,7 +23,7 @@ mod training;
 /// Frames of the episodes of these tests.
 const FRAMES: u32 = 80;
 
-fn chaic(dir: &Path, arguments: &[&str]) -> Output {
+fn output_of(dir: &Path, arguments: &[&str]) -> Output {
     let out = command(dir, arguments).output().expect("the command starts");
     let stderr = String::from_utf8_lossy(&out.stderr).into_owned();
     assert!(!stderr.contains("panicked"), "{arguments:?}: {stderr}");
@@ -35,7 +36,7 @@ fn command(dir: &Path, arguments: &[&str]) -> Command {
     command
 }
 
-/// A command that goes on beside the test.
+/// Starts a command in the background.
 fn start(dir: &Path, arguments: &[&str]) -> Child {
     let mut command = command(dir, arguments);
     command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the command starts")
@@ -45,40 +46,45 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).expect("text is UTF-8")
 }
 
-/// What a command that must succeed prints.
-fn well(dir: &Path, arguments: &[&str]) -> String {
-    let out = chaic(dir, arguments);
+/// Runs a command that must succeed, and returns its standard output.
+fn run_ok(dir: &Path, arguments: &[&str]) -> String {
+    let out = output_of(dir, arguments);
     assert!(out.status.success(), "{arguments:?}: {}", text(&out.stderr));
     text(&out.stdout)
 }
 
-/// What a command that must fail complains of.
-fn ill(dir: &Path, arguments: &[&str]) -> String {
-    let out = chaic(dir, arguments);
-    assert!(!out.status.success(), "{arguments:?} went well");
+/// Runs a command that must fail, and returns its output.
+fn run_err(dir: &Path, arguments: &[&str]) -> String {
+    let out = output_of(dir, arguments);
+    assert!(!out.status.success(), "{arguments:?} succeeded");
     text(&out.stderr) + &text(&out.stdout)
 }
 
-/// What a wrong appearance is answered with.
+/// Part of the error for a wrong appearance.
 const APPEARANCES: &str = "expected canonical, evening or varied:SEED";
 
-/// A folder with short episodes in `short/`.
-fn workshop() -> tempfile::TempDir {
-    let dir = tempfile::tempdir().expect("there is room");
+/// Returns a folder with short episodes in `short/`.
+fn short_episodes() -> tempfile::TempDir {
+    let dir = tempfile::tempdir().expect("the disk has space");
     for task in ["no_constraint", "moving_house"] {
         let generate =
             ["episodes", "generate", "--task", task, "--seeds", "0..1", "--out", "short"];
-        assert_eq!(well(dir.path(), &generate), format!("short: 1 episode of {task}\n"));
+        assert_eq!(run_ok(dir.path(), &generate), format!("short: 1 episode of {task}\n"));
     }
-    for entry in fs::read_dir(dir.path().join("short")).expect("it is there") {
-        let path = entry.expect("it is there").path();
-        let json = fs::read_to_string(&path).expect("it is text");
+    shorten(&dir.path().join("short"));
+    dir
+}
+
+/// Shortens the episode files of a folder to [`FRAMES`].
+fn shorten(folder: &Path) {
+    for entry in fs::read_dir(folder).expect("it exists") {
+        let path = entry.expect("it exists").path();
+        let json = fs::read_to_string(&path).expect("a text file");
         let begin = json.find("\"horizon\": ").expect("an episode has one") + 11;
         let end = begin + json[begin..].find(',').expect("more follows");
         let short = format!("{}{FRAMES}{}", &json[..begin], &json[end..]);
-        fs::write(&path, short).expect("there is room");
+        fs::write(&path, short).expect("the disk has space");
     }
-    dir
 }
 
 const EVAL: [&str; 9] =
@@ -86,10 +92,10 @@ const EVAL: [&str; 9] =
 
 #[test]
 fn a_run_from_end_to_end() {
-    let dir = workshop();
+    let dir = short_episodes();
     let at = dir.path();
-    let printed = well(at, &EVAL);
-    for word in ["TR(EI)", "RHP", "Moving house", "chaic replay run", "run/report.md"] {
+    let printed = run_ok(at, &EVAL);
+    for word in ["Transport rate", "RHP", "Moving", "run/report.md"] {
         assert!(printed.contains(word), "{word}: {printed}");
     }
     for file in
@@ -98,70 +104,80 @@ fn a_run_from_end_to_end() {
         assert!(at.join("run").join(file).exists(), "{file}");
     }
 
-    let scores = fs::read_to_string(at.join("run/scores.json")).expect("it is text");
-    assert_eq!(well(at, &["report", "run", "--format", "json"]), scores);
-    assert_eq!(well(at, &["report", "run", "--format", "json", "--from-traces"]), scores);
-    let csv = well(at, &["report", "run", "--format", "csv", "--formulas", "original"]);
+    let scores = fs::read_to_string(at.join("run/scores.json")).expect("a text file");
+    assert_eq!(run_ok(at, &["report", "run", "--format", "json"]), scores);
+    assert_eq!(run_ok(at, &["report", "run", "--format", "json", "--from-traces"]), scores);
+    let csv = run_ok(at, &["report", "run", "--format", "csv", "--formulas", "original"]);
     assert_eq!(csv.lines().count(), 5, "{csv}");
-    assert!(well(at, &["report", "run", "--format", "md"]).starts_with("# chaic run"));
-    well(at, &["report", "run", "--figure", "f.svg"]);
+    assert!(run_ok(at, &["report", "run", "--format", "md"]).starts_with("# chaic run"));
+    run_ok(at, &["report", "run", "--figure", "f.svg"]);
     assert!(at.join("f.svg").exists());
 
-    // Another run on the folder is refused, the same one has nothing to do.
-    assert!(ill(at, &EVAL).contains("isn't empty"));
-    let again = well(at, &["eval", "--resume", "--out", "run"]);
-    assert!(again.contains("4 episode runs"), "{again}");
-    assert_eq!(fs::read_to_string(at.join("run/scores.json")).expect("it is text"), scores);
-    let other = ill(at, &["eval", "--resume", "--out", "run", "--helper", "rhp"]);
+    // Another run in the folder is refused. The same run has nothing to do.
+    assert!(run_err(at, &EVAL).contains("isn't empty"));
+    let again = run_ok(at, &["eval", "--resume", "--out", "run"]);
+    let without_time = |text: &str| {
+        text.lines()
+            .filter(|line| !line.starts_with("Time:"))
+            .map(str::to_owned)
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(without_time(&again), without_time(&printed));
+    assert_eq!(fs::read_to_string(at.join("run/scores.json")).expect("a text file"), scores);
+    let other = run_err(at, &["eval", "--resume", "--out", "run", "--helper", "rhp"]);
     assert!(other.contains("--helper none,rhp, not rhp"), "{other}");
-    well(at, &["eval", "--resume", "--out", "run", "--helper", "rhp,none"]);
+    run_ok(at, &["eval", "--resume", "--out", "run", "--helper", "rhp,none"]);
     for language in [["--endpoint", "http://localhost/v1"], ["--model", "m"]] {
-        let other = ill(at, &[&["eval", "--resume", "--out", "run"], &language[..]].concat());
-        assert!(other.contains("begun with no helper or partner that asks"), "{other}");
+        let other = run_err(at, &[&["eval", "--resume", "--out", "run"], &language[..]].concat());
+        assert!(other.contains("was started without a language model"), "{other}");
     }
-    fs::create_dir(at.join("none")).expect("there is room");
+    fs::create_dir(at.join("none")).expect("the disk has space");
     let resume = ["eval", "--resume", "--out", "run", "--episodes"];
-    well(at, &[&resume[..], &["short"]].concat());
-    let other = ill(at, &[&resume[..], &["none"]].concat());
-    assert!(other.contains("begun with other episodes than --episodes none"), "{other}");
+    run_ok(at, &[&resume[..], &["short"]].concat());
+    let other = run_err(at, &[&resume[..], &["none"]].concat());
+    assert!(other.contains("started with other episodes than --episodes none"), "{other}");
 
-    assert!(well(at, &["verify", "run", "--jobs", "2"]).contains("4 traces"));
+    assert!(run_ok(at, &["verify", "run", "--jobs", "2"]).contains("4 traces"));
     let trace = at.join("run/traces/no_constraint/rhp/gen-0-s0.jsonl");
-    let whole = fs::read_to_string(&trace).expect("it is text");
-    fs::write(&trace, whole.replacen("\"turn_left\"", "\"turn_right\"", 1)).expect("there is room");
-    let out = chaic(at, &["verify", "run"]);
+    let whole = fs::read_to_string(&trace).expect("a text file");
+    fs::write(&trace, whole.replacen("\"turn_left\"", "\"turn_right\"", 1))
+        .expect("the disk has space");
+    let out = output_of(at, &["verify", "run"]);
     assert_eq!(out.status.code(), Some(1));
     let found = text(&out.stdout);
     assert!(
         found.contains("gen-0-s0.jsonl: frame 0, helper") && found.contains("partner's"),
         "{found}"
     );
-    fs::write(&trace, &whole[..whole.len() - 5]).expect("there is room");
-    let out = chaic(at, &["verify", "run"]);
+    fs::write(&trace, &whole[..whole.len() - 5]).expect("the disk has space");
+    let out = output_of(at, &["verify", "run"]);
     assert!(text(&out.stderr).contains("is cut off"), "{}", text(&out.stderr));
-    let out = chaic(at, &["report", "run", "--from-traces"]);
+    let out = output_of(at, &["report", "run", "--from-traces"]);
     let missing = "1 of 4 finished episode runs have no whole trace and are left out, first \
                    no_constraint/gen/0 with rhp and seed 0";
     assert!(text(&out.stderr).contains(missing), "{}", text(&out.stderr));
-    let json = well(at, &["report", "run", "--from-traces", "--format", "json"]);
+    let json = run_ok(at, &["report", "run", "--from-traces", "--format", "json"]);
     let json: serde_json::Value = serde_json::from_str(&json).expect("it is JSON");
     assert_eq!(json["episode_runs"]["planned"], 4);
     assert_eq!(json["episode_runs"]["scored"], 3);
-    fs::rename(at.join("run/traces"), at.join("run/elsewhere")).expect("it is there");
-    let said = ill(at, &["report", "run", "--from-traces"]);
-    assert!(said.contains("4 of 4 finished") && said.contains("no whole trace yet"), "{said}");
-    fs::rename(at.join("run/elsewhere"), at.join("run/traces")).expect("it is there");
-    fs::write(&trace, whole).expect("there is room");
+    fs::rename(at.join("run/traces"), at.join("run/elsewhere")).expect("it exists");
+    let message = run_err(at, &["report", "run", "--from-traces"]);
+    assert!(
+        message.contains("4 of 4 finished") && message.contains("no whole trace yet"),
+        "{message}"
+    );
+    fs::rename(at.join("run/elsewhere"), at.join("run/traces")).expect("it exists");
+    fs::write(&trace, whole).expect("the disk has space");
 
     let replay = ["replay", "run", "no_constraint/gen/0", "--out", "r.gif", "--every", "40"];
-    assert!(well(at, &replay).contains("3 pictures of no_constraint/gen/0 with rhp"));
-    let unknown = ill(at, &["replay", "run", "obstacle/test/00", "--out", "r.gif"]);
+    assert!(run_ok(at, &replay).contains("3 images of no_constraint/gen/0 with rhp"));
+    let unknown = run_err(at, &["replay", "run", "obstacle/test/00", "--out", "r.gif"]);
     assert!(unknown.contains("no trace of obstacle/test/00") && unknown.contains("for example"));
 }
 
 #[test]
 fn fidelity_from_end_to_end() {
-    let dir = workshop();
+    let dir = short_episodes();
     let at = dir.path();
     let begin = [
         "fidelity",
@@ -184,68 +200,74 @@ fn fidelity_from_end_to_end() {
         "--doc",
         "docs/f.md",
     ];
-    assert!(well(at, &begin).contains("Document: docs/f.md"));
-    let doc = |name: &str| fs::read_to_string(at.join(name)).expect("it is text");
+    assert!(run_ok(at, &begin).contains("Document: docs/f.md"));
+    let doc = |name: &str| fs::read_to_string(at.join(name)).expect("a text file");
     let whole = doc("docs/f.md");
     for words in
-        ["## By the paper's rules", "creeps to stops", "(images/f-compat.svg)", "of the kind gen"]
+        ["## Rules of the paper", "creeps to stops", "(images/f-compat.svg)", "of the kind gen"]
     {
         assert!(whole.contains(words), "{words}: {whole}");
     }
     assert!(!whole.contains("unfinished"), "{whole}");
     assert!(at.join("docs/images/f-paper.svg").exists());
 
-    // Every part is a run like any other; switches keep no traces, and say so.
-    assert!(well(at, &["report", "fid/compat"]).contains("RHP"));
-    assert!(well(at, &["verify", "fid/paper"]).contains("2 traces"));
+    // Every part is an ordinary run. Switches record no traces.
+    assert!(run_ok(at, &["report", "fid/compat"]).contains("RHP"));
+    assert!(run_ok(at, &["verify", "fid/paper"]).contains("2 traces"));
     let switch = "fid/switch/world.blocking";
-    assert!(well(at, &["report", switch, "--format", "md"]).contains("world.blocking=paper"));
+    assert!(run_ok(at, &["report", switch, "--format", "md"]).contains("world.blocking=paper"));
     let id = "no_constraint/gen/0";
     for command in [
         &["verify", switch][..],
         &["report", switch, "--from-traces"],
         &["replay", switch, id, "--out", "r.gif"],
     ] {
-        assert!(ill(at, command).contains("--no-traces"), "{command:?}");
+        assert!(run_err(at, command).contains("--no-traces"), "{command:?}");
     }
 
-    // What a killed run leaves: a result less, and no report. The document says what is missing,
-    // and going on makes the same one.
-    assert!(ill(at, &begin).contains("isn't empty"));
+    // A killed run lacks a result and the report. The document names what is missing, and a resumed run
+    // gives the same document.
+    assert!(run_err(at, &begin).contains("isn't empty"));
     let letter = ["fidelity", "--resume", "--out", "fid", "--doc", "run.txt"];
-    fs::write(at.join("run.txt"), "dear").expect("there is room");
-    assert!(ill(at, &letter).contains("no document of this kind"));
+    fs::write(at.join("run.txt"), "dear").expect("the disk has space");
+    assert!(run_err(at, &letter).contains("not a document of this kind"));
     let journal = at.join("fid/compat/results.jsonl");
-    let lines = fs::read_to_string(&journal).expect("it is text");
+    let lines = fs::read_to_string(&journal).expect("a text file");
     let first = lines.find('\n').expect("it has lines") + 1;
-    fs::write(&journal, &lines[..first]).expect("there is room");
-    fs::remove_file(at.join("fid/compat/report.md")).expect("it is there");
-    let said = ill(at, &["fidelity", "--only-document", "--out", "fid"]);
-    assert!(said.contains("1 episode runs are missing"), "{said}");
+    fs::write(&journal, &lines[..first]).expect("the disk has space");
+    fs::remove_file(at.join("fid/compat/report.md")).expect("it exists");
+    let message = run_err(at, &["fidelity", "--only-document", "--out", "fid"]);
+    assert!(message.contains("1 episode runs are missing"), "{message}");
     assert!(doc("fid/fidelity.md").contains("- `compat`: 1 of 2 are missing"));
-    let report = chaic(at, &["report", "fid/compat", "--format", "csv"]);
+    let report = output_of(at, &["report", "fid/compat", "--format", "csv"]);
     assert!(text(&report.stderr).contains("Unfinished: 1 of 2"), "{}", text(&report.stderr));
-    fs::remove_dir_all(at.join("short")).expect("it is there");
-    // Another build, by whose rules an episode comes out otherwise, doesn't mix its results in.
+    fs::remove_dir_all(at.join("short")).expect("it exists");
+    // A build with other results for the same episode does not add its results.
     let other = at.join("fid/paper/results.jsonl");
-    let ours = fs::read_to_string(&other).expect("it is text");
+    let ours = fs::read_to_string(&other).expect("a text file");
     let at_digest = ours.rfind("\"digest\":\"").expect("it has one") + 10;
     let theirs = format!("{}{}{}", &ours[..at_digest], "0123456789abcdef", &ours[at_digest + 16..]);
-    fs::write(&other, theirs).expect("there is room");
-    let said = ill(at, &["fidelity", "--resume", "--out", "fid"]);
-    assert!(said.contains("comes out otherwise than it did"), "{said}");
-    assert!(said.contains("no_constraint/gen/0 with ") && !said.contains("--resume"), "{said}");
-    assert_eq!(fs::read_to_string(&journal).expect("it is text"), lines[..first]);
-    fs::write(&other, ours).expect("there is room");
-    well(at, &["fidelity", "--resume", "--out", "fid", "--doc", "docs/f.md"]);
+    fs::write(&other, theirs).expect("the disk has space");
+    let message = run_err(at, &["fidelity", "--resume", "--out", "fid"]);
+    assert!(message.contains("gives another result than before"), "{message}");
+    assert!(
+        message.contains("no_constraint/gen/0 with ") && !message.contains("--resume"),
+        "{message}"
+    );
+    assert_eq!(fs::read_to_string(&journal).expect("a text file"), lines[..first]);
+    fs::write(&other, ours).expect("the disk has space");
+    run_ok(at, &["fidelity", "--resume", "--out", "fid", "--doc", "docs/f.md"]);
     assert_eq!(doc("docs/f.md"), whole);
 }
 
 #[test]
 fn wrong_option_values_end_in_the_same_exit_code() {
-    let dir = workshop();
+    let dir = short_episodes();
     let at = dir.path();
-    well(at, &["eval", "--episodes", "short", "--helper", "none", "--size", "32", "--out", "run"]);
+    run_ok(
+        at,
+        &["eval", "--episodes", "short", "--helper", "none", "--size", "32", "--out", "run"],
+    );
     let replay = ["replay", "run", "no_constraint/gen/0", "--helper", "none", "--every", "40"];
     for arguments in [
         &["eval", "--task", "lunch"][..],
@@ -263,45 +285,48 @@ fn wrong_option_values_end_in_the_same_exit_code() {
         &[&replay[..], &["--out", "r.gif", "--fps", "51"]].concat()[..],
         &["episodes", "generate", "--task", "obstacle", "--seeds", "3..3", "--out", "x"],
     ] {
-        let out = chaic(at, arguments);
+        let out = output_of(at, arguments);
         assert_eq!(out.status.code(), Some(2), "{arguments:?}: {}", text(&out.stderr));
     }
-    assert_eq!(chaic(at, &["report", "nowhere"]).status.code(), Some(1), "nothing is there");
+    assert_eq!(output_of(at, &["report", "nowhere"]).status.code(), Some(1), "nothing is there");
 }
 
 #[test]
-fn language_helpers_from_an_endpoint_to_a_table_row() {
+fn language_helpers_from_an_endpoint_to_the_report() {
     use chaic_llm_standin::{Options, StandIn};
-    let dir = workshop();
+    let dir = short_episodes();
     let at = dir.path();
     let standin = StandIn::start(Options::default()).expect("a port is free");
     let url = standin.url();
-    let check = well(at, &["llm", "check", "--endpoint", &url, "--model", "standin"]);
+    let check = run_ok(at, &["llm", "check", "--endpoint", &url, "--model", "standin"]);
     assert!(check.contains("by JSON schema: answers in") && check.contains("as text"), "{check}");
     let eval = ["eval", "--episodes", "short", "--helper", "none,llm,vlm", "--size", "48"];
     let live = [&eval[..], &["--endpoint", &url, "--model", "standin", "--out", "live"]].concat();
-    let printed = well(at, &live);
+    let printed = run_ok(at, &live);
+    let report = fs::read_to_string(at.join("live/report.md")).expect("a text file");
+    assert!(printed.contains("LLM") && printed.contains("VLM"), "{printed}");
     for words in ["LLM", "VLM", "helper: decided by model", "helper: prompt tokens"] {
-        assert!(printed.contains(words), "{words}: {printed}");
+        assert!(report.contains(words), "{words}: {report}");
     }
     drop(standin);
-    let scores = well(at, &["report", "live", "--format", "json"]);
+    let scores = run_ok(at, &["report", "live", "--format", "json"]);
     let again = [&eval[..], &["--llm", "replay:live", "--out", "again"]].concat();
-    well(at, &again);
-    assert_eq!(well(at, &["report", "again", "--format", "json"]), scores);
-    assert!(well(at, &["verify", "again"]).contains("6 traces"));
+    run_ok(at, &again);
+    assert_eq!(run_ok(at, &["report", "again", "--format", "json"]), scores);
+    assert!(run_ok(at, &["verify", "again"]).contains("6 traces"));
 
-    let shown = well(at, &["llm", "show", "live", "no_constraint/gen/0"]);
+    let shown = run_ok(at, &["llm", "show", "live", "no_constraint/gen/0"]);
     for words in ["## Plans", "not a language model", ">>> frame 0: ", "decisions", "## Task"] {
         assert!(shown.contains(words), "{words}: {shown}");
     }
     let vlm = ["llm", "show", "live", "no_constraint/gen/0", "--helper", "vlm", "--brief"];
-    assert!(!well(at, &vlm).contains("## Task"));
+    assert!(!run_ok(at, &vlm).contains("## Task"));
 
-    well(at, &["llm", "templates", "--out", "mine"]);
+    run_ok(at, &["llm", "templates", "--out", "mine"]);
     assert!(at.join("mine/task.txt").exists());
-    fs::write(at.join("mine/task.txt"), "{{ nonsense }}").expect("there is room");
-    fs::write(at.join("mine.toml"), "[asking]\ntemplates = \"mine\"\n").expect("there is room");
+    fs::write(at.join("mine/task.txt"), "{{ nonsense }}").expect("the disk has space");
+    fs::write(at.join("mine.toml"), "[asking]\ntemplates = \"mine\"\n")
+        .expect("the disk has space");
     let llm = ["eval", "--episodes", "short", "--helper", "llm", "--out", "r"];
     let remote = "https://models.example.org/v1";
     let mistyped = [
@@ -320,26 +345,26 @@ fn language_helpers_from_an_endpoint_to_a_table_row() {
         (&["--llm", "nowhere"], "write replay:DIR"),
         (&["--partner", "llm2", "--endpoint", &url, "--model", "m"], "rules, llm, vlm"),
         (&["--llm-config", "short"], "can't read short"),
-        // Nobody answers any more.
+        // No server answers any more.
         (
             &["--endpoint", &url, "--model", "m", "--llm-config", "quick.toml"],
-            "paused: the model can't",
+            "paused: the model cannot be reached",
         ),
     ];
     fs::write(at.join("nokey.toml"), "[endpoint]\nkey_env = \"CHAIC_TEST_NO_KEY\"\n")
-        .expect("there is room");
-    fs::write(at.join("quick.toml"), "[faults]\nattempts = 1\n").expect("there is room");
+        .expect("the disk has space");
+    fs::write(at.join("quick.toml"), "[faults]\nattempts = 1\n").expect("the disk has space");
     for (arguments, words) in mistyped {
-        let said = ill(at, &[&llm[..], arguments].concat());
-        assert!(said.contains(words) && !said.contains("sesame"), "{arguments:?}: {said}");
+        let message = run_err(at, &[&llm[..], arguments].concat());
+        assert!(message.contains(words) && !message.contains("sesame"), "{arguments:?}: {message}");
     }
-    assert!(ill(at, &["eval", "--endpoint", &url, "--out", "x"]).contains("--helper llm"));
-    assert!(ill(at, &["llm", "show", "live", "shopping/test/00"]).contains("no trace of"));
+    assert!(run_err(at, &["eval", "--endpoint", &url, "--out", "x"]).contains("--helper llm"));
+    assert!(run_err(at, &["llm", "show", "live", "shopping/test/00"]).contains("no trace of"));
 }
 
 #[test]
 fn errors_are_clear() {
-    let dir = tempfile::tempdir().expect("there is room");
+    let dir = tempfile::tempdir().expect("the disk has space");
     let at = dir.path();
     for (arguments, words) in [
         (&["eval", "--task", "lunch", "--out", "r"][..], "unknown task `lunch`"),
@@ -350,7 +375,7 @@ fn errors_are_clear() {
         (&["eval", "--appearance", "dusk", "--out", "r"], APPEARANCES),
         (&["render", "shopping/test/00", "--appearance", "varied:x", "--out", "r"], APPEARANCES),
         (&["eval", "--rules", "mine", "--out", "r"], "they are paper and compat"),
-        (&["eval", "--set", "world.gravity=1", "--out", "r"], "world.dropped_counts"),
+        (&["eval", "--set", "world.gravity=1", "--out", "r"], "chaic list rules"),
         (&["eval", "--episodes", "nowhere", "--out", "r"], "nowhere"),
         (&["report", "nowhere"], "no run.json"),
         (&["verify", "nowhere"], "no run.json"),
@@ -360,18 +385,18 @@ fn errors_are_clear() {
         (&["episodes", "generate", "--task", "obstacle", "--seeds", "3..3", "--out", "x"], "A..B"),
         (
             &["import", "original", "--dataset", "nowhere", "--tdw", "nowhere", "--out", "x"],
-            "holds no tdw package",
+            "contains no tdw package",
         ),
     ] {
-        let said = ill(at, arguments);
-        assert!(said.contains(words), "{arguments:?}: {said}");
-        assert!(said.lines().count() <= 8, "{said}");
+        let message = run_err(at, arguments);
+        assert!(message.contains(words), "{arguments:?}: {message}");
+        assert!(message.lines().count() <= 8, "{message}");
     }
     assert_eq!(
         fs::read_dir(at)
-            .expect("it is there")
+            .expect("it exists")
             .filter(|e| {
-                // A run that never began leaves at most its empty folder.
+                // A run that never started leaves at most its empty folder.
                 e.as_ref().is_ok_and(|e| e.path().join("run.json").exists())
             })
             .count(),

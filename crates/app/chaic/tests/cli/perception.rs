@@ -1,46 +1,45 @@
-//! A training leaves weights that helpers see by, a run says by what they saw, and what can't be read is
-//! one clear line.
+//! Promises: helpers use trained weights, a run records its perception, and unreadable weights are one clear error.
 
 use std::fs;
 
-use super::{chaic, ill, text, well};
+use super::{output_of, run_err, run_ok, text};
 
-/// An episode with small images.
+/// Arguments of a run of one episode with small images.
 const EVAL: [&str; 9] =
     ["eval", "--task", "high_goal", "--first", "1", "--helper", "rhp", "--size", "64"];
 
-/// Small images, two steps: it learns nothing.
+/// Configuration of a training with small images and two steps.
 const TINY: &str = "
 steps = 2
 warm_up = 1
 [[crops]]
 views = 1
-of_view = 1
+crops_per_view = 1
 side_px = 64
-anywhere = 0.3
+uniform_crop_fraction = 0.3
 [[crops]]
 views = 1
-of_view = 1
+crops_per_view = 1
 side_px = 32
-anywhere = 0.3
+uniform_crop_fraction = 0.3
 [views]
 size_px = 64
 ";
 
 #[test]
-fn weights_of_a_training_are_what_helpers_see_by() {
+fn helpers_detect_objects_with_trained_weights() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     fs::write(dir.join("tiny.toml"), TINY).unwrap();
     let train = ["train", "detector", "--config", "tiny.toml", "--out", "training"];
-    well(dir, &train);
+    run_ok(dir, &train);
     let curves = fs::read_to_string(dir.join("training/curves.jsonl")).unwrap();
-    assert!(curves.contains("\"of\":\"validation\",\"step\":2"), "{curves}");
-    assert!(ill(dir, &train).contains("--resume"));
+    assert!(curves.contains("\"phase\":\"validation\",\"step\":2"), "{curves}");
+    assert!(run_err(dir, &train).contains("--resume"));
     let weights = "training/detector.safetensors";
-    let evaluate = ["eval-perception", "detection", "--weights", weights, "--views", "2"];
+    let evaluate = ["eval", "perception", "--weights", weights, "--views", "2"];
     let files = ["--json", "report.json", "--coco", "coco", "--faults", "faults.json"];
-    well(dir, &[&evaluate[..], &files].concat());
+    run_ok(dir, &[&evaluate[..], &files].concat());
     let report = fs::read(dir.join("report.json")).unwrap();
     let report: serde_json::Value = serde_json::from_slice(&report).unwrap();
     assert!(report["map50"].is_f64() && report["map"].is_f64(), "{report}");
@@ -51,22 +50,22 @@ fn weights_of_a_training_are_what_helpers_see_by() {
     let curves = fs::read_to_string(dir.join("training/curves.svg")).unwrap();
     assert!(curves.contains("map50, validation"), "{curves}");
     let noisy = ["--perception", "noisy:faults.json", "--out", "noisy"];
-    well(dir, &[&EVAL[..], &noisy].concat());
-    // Another training may begin with these weights.
+    run_ok(dir, &[&EVAL[..], &noisy].concat());
+    // Another training can start from these weights.
     let again = ["train", "detector", "--config", "tiny.toml", "--out", "again", "--weights"];
-    well(dir, &[&again[..], &[weights]].concat());
-    // By untrained eyes nothing much is delivered; but the run is whole and says by what it saw.
+    run_ok(dir, &[&again[..], &[weights]].concat());
+    // An untrained detector delivers little, but the run is complete and records its perception.
     let sight = format!("learned:{weights}");
-    well(dir, &[&EVAL[..], &["--perception", &sight, "--out", "run"]].concat());
+    run_ok(dir, &[&EVAL[..], &["--perception", &sight, "--out", "run"]].concat());
     let scores = fs::read_to_string(dir.join("run/scores.json")).unwrap();
     let scores: serde_json::Value = serde_json::from_str(&scores).unwrap();
     let rhp = &scores["helpers"]["rhp"];
     assert!(rhp["perception"].as_str().is_some_and(|by| by.starts_with("learned ")), "{rhp}");
     assert!(!rhp["grants"].as_array().unwrap().iter().any(|g| g == "ids"), "{rhp}");
-    well(dir, &["verify", "run"]);
+    run_ok(dir, &["verify", "run"]);
     let bytes = fs::read(dir.join(weights)).unwrap();
     fs::write(dir.join("cut.safetensors"), &bytes[..bytes.len() / 2]).unwrap();
-    let error = ill(dir, &[&EVAL[..], &["--perception", "learned:cut.safetensors"]].concat());
+    let error = run_err(dir, &[&EVAL[..], &["--perception", "learned:cut.safetensors"]].concat());
     assert!(error.contains("cut.safetensors") && error.lines().count() == 1, "{error}");
 }
 
@@ -74,97 +73,97 @@ fn weights_of_a_training_are_what_helpers_see_by() {
 fn noisy_perception_is_recorded_and_unknown_ones_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
-    let json = r#"{"missed": [[5, 0.1]], "misnamed": 0.1, "invented": 0.5, "scores": [0.9, 0.5]}"#;
+    let json = r#"{"miss_rate_by_area": [[5, 0.1]], "misclassification_rate": 0.1, "false_positives_per_image": 0.5, "scores": [0.9, 0.5]}"#;
     fs::write(dir.join("rates.json"), json).unwrap();
-    well(dir, &[&EVAL[..], &["--perception", "noisy:rates.json", "--out", "run"]].concat());
+    run_ok(dir, &[&EVAL[..], &["--perception", "noisy:rates.json", "--out", "run"]].concat());
     assert!(fs::read_to_string(dir.join("run/run.json")).unwrap().contains("noisy:rates.json"));
-    well(dir, &["verify", "run"]);
-    well(dir, &[&EVAL[..], &["--perception", "noisy", "--out", "as the detector"]].concat());
+    run_ok(dir, &["verify", "run"]);
+    run_ok(dir, &[&EVAL[..], &["--perception", "noisy", "--out", "as the detector"]].concat());
     for nonsense in ["perfect", "learned:", "noisy:nowhere"] {
-        let error = ill(dir, &[&EVAL[..], &["--perception", nonsense]].concat());
+        let error = run_err(dir, &[&EVAL[..], &["--perception", nonsense]].concat());
         assert_eq!(error.lines().count(), 1, "{error}");
     }
 }
 
-/// A clip or two of one episode: it learns nothing.
+/// Configuration of a training with one clip.
 const TINY_BEHAVIOR: &str = "
 steps = 1
 warm_up = 1
-clips = 1
+batch_size = 1
 [collect]
-of_each = 1
+max_per_class = 1
 episodes = 1
 ";
 
 #[test]
-fn weights_of_a_behavior_training_are_what_helpers_recognize_by() {
+fn helpers_recognize_behavior_with_trained_weights() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     fs::write(dir.join("tiny.toml"), TINY_BEHAVIOR).unwrap();
-    well(dir, &["train", "behavior", "--config", "tiny.toml", "--out", "training"]);
+    run_ok(dir, &["train", "behavior", "--config", "tiny.toml", "--out", "training"]);
     let weights = "training/behavior.safetensors";
-    let evaluate = ["eval-perception", "behavior", "--weights", weights, "--perception", "gt"];
+    let evaluate = ["eval", "behavior", "--weights", weights, "--perception", "gt"];
     let few = ["--episodes", "1", "--clips", "2", "--json", "report.json"];
-    well(dir, &[&evaluate[..], &few].concat());
+    run_ok(dir, &[&evaluate[..], &few].concat());
     let report = fs::read(dir.join("report.json")).unwrap();
     let report: serde_json::Value = serde_json::from_slice(&report).unwrap();
     assert!(report["top1"].is_f64() && report["confusion"].is_object(), "{report}");
     let behavior = format!("learned:{weights}");
-    well(dir, &[&EVAL[..], &["--behavior", &behavior, "--out", "run"]].concat());
+    run_ok(dir, &[&EVAL[..], &["--behavior", &behavior, "--out", "run"]].concat());
     let scores = fs::read_to_string(dir.join("run/scores.json")).unwrap();
     assert!(scores.contains("ground_truth, behavior learned "), "{scores}");
     let report = fs::read_to_string(dir.join("run/report.md")).unwrap();
     assert!(report.contains("ids from ground truth, learned behavior"), "{report}");
-    well(dir, &["verify", "run"]);
-    well(dir, &[&EVAL[..], &["--perception", "noisy", "--out", "as the detector"]].concat());
+    run_ok(dir, &["verify", "run"]);
+    run_ok(dir, &[&EVAL[..], &["--perception", "noisy", "--out", "as the detector"]].concat());
     for nonsense in ["perfect", "learned:nowhere"] {
-        let error = ill(dir, &[&EVAL[..], &["--behavior", nonsense]].concat());
+        let error = run_err(dir, &[&EVAL[..], &["--behavior", nonsense]].concat());
         assert_eq!(error.lines().count(), 1, "{error}");
     }
 }
 
 #[test]
-fn the_hidden_track_is_pixels_alone_and_replays_show_what_was_seen() {
+fn the_hidden_track_uses_images_alone_and_replays_show_detections() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
-    well(dir, &[&EVAL[..], &["--track", "hidden", "--out", "run"]].concat());
+    run_ok(dir, &[&EVAL[..], &["--track", "hidden", "--out", "run"]].concat());
     let scores = fs::read_to_string(dir.join("run/scores.json")).unwrap();
     let scores: serde_json::Value = serde_json::from_str(&scores).unwrap();
     let by = scores["helpers"]["rhp"]["perception"].as_str().unwrap();
     assert!(by.starts_with("learned ") && by.contains("behavior learned "), "{by}");
     assert!(dir.join("run/traces/high_goal/rhp").is_dir());
     let replay = ["replay", "run", "high_goal/test/00", "--every", "900", "--out", "a.gif"];
-    well(dir, &[&replay[..], &["--fps", "5", "--masks"]].concat());
+    run_ok(dir, &[&replay[..], &["--fps", "5", "--masks"]].concat());
     assert!(fs::metadata(dir.join("a.gif")).unwrap().len() > 10_000);
     assert_eq!(scores["track"], "hidden");
     let report = fs::read_to_string(dir.join("run/report.md")).unwrap();
     assert!(report.contains("Track: `hidden`."), "{report}");
-    assert!(well(dir, &["report", "run"]).contains("Track hidden"));
-    well(dir, &["verify", "run"]);
-    well(dir, &["eval", "--resume", "--track", "hidden", "--out", "run"]);
-    let error = ill(dir, &["eval", "--resume", "--track", "told", "--out", "run"]);
+    assert!(run_ok(dir, &["report", "run"]).contains("Track hidden"));
+    run_ok(dir, &["verify", "run"]);
+    run_ok(dir, &["eval", "--resume", "--track", "hidden", "--out", "run"]);
+    let error = run_err(dir, &["eval", "--resume", "--track", "told", "--out", "run"]);
     assert!(error.contains("--track"), "{error}");
-    well(dir, &["merge", "--out", "merged", "run"]);
+    run_ok(dir, &["merge", "--out", "merged", "run"]);
     let merged = fs::read_to_string(dir.join("merged/run.json")).unwrap();
     assert!(merged.contains("\"track\": \"hidden\""), "{merged}");
-    // A trace that says of more grants than the track allows.
+    // A trace with more grants than the track allows.
     let trace = dir.join("run/traces/high_goal/rhp/test-00-s0.jsonl");
     let text = fs::read_to_string(&trace).unwrap();
     let (head, rest) = text.split_once('\n').unwrap();
     let mut header: serde_json::Value = serde_json::from_str(head).unwrap();
     header["people"][1]["grants"]["behavior"] = true.into();
     fs::write(&trace, format!("{header}\n{rest}")).unwrap();
-    let error = ill(dir, &["verify", "run"]);
+    let error = run_err(dir, &["verify", "run"]);
     assert!(error.contains("is granted behavior, which the hidden track refuses"), "{error}");
 }
 
 #[test]
-fn the_hidden_track_refuses_by_grant_whatever_helper_it_is() {
+fn the_hidden_track_refuses_grants_of_every_kind_of_helper() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     let refused = |arguments: &[&str]| {
         let play = ["eval", "--track", "hidden", "--out", "run", "--task", "high_goal"];
-        let out = chaic(dir, &[&play[..], arguments].concat());
+        let out = output_of(dir, &[&play[..], arguments].concat());
         assert_eq!(out.status.code(), Some(2), "{arguments:?}");
         let error = text(&out.stderr);
         assert_eq!(error.lines().count(), 1, "{error}");
@@ -173,8 +172,8 @@ fn the_hidden_track_refuses_by_grant_whatever_helper_it_is() {
     };
     for grant in ["ids", "goal", "progress", "behavior", "positions", "task"] {
         let error = refused(&["--helper", "mine=exec:true", "--exec-grants", grant]);
-        let said = format!("`mine` is granted {grant}, which the hidden track refuses");
-        assert!(error.contains(&said), "{error}");
+        let message = format!("`mine` is granted {grant}, which the hidden track refuses");
+        assert!(error.contains(&message), "{error}");
     }
     let error = refused(&["--helper", "none,rhp,oracle"]);
     assert!(error.contains("`oracle` is granted goal, progress, behavior"), "{error}");
@@ -192,12 +191,12 @@ fn the_hidden_track_refuses_by_grant_whatever_helper_it_is() {
 }
 
 #[test]
-fn data_sets_are_whole_and_collected_once() {
+fn data_sets_are_complete_and_collected_once() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     let collect = ["collect", "detection", "--views", "3", "--out", "views"];
-    well(dir, &collect);
-    assert!(ill(dir, &collect).contains("isn't empty"));
+    run_ok(dir, &collect);
+    assert!(run_err(dir, &collect).contains("isn't empty"));
     let read = |file: &str| fs::read(dir.join("views").join(file)).unwrap();
     let json: serde_json::Value = serde_json::from_slice(&read("annotations.json")).unwrap();
     let images = json["images"].as_array().unwrap();
@@ -219,10 +218,13 @@ fn data_sets_are_whole_and_collected_once() {
     assert_eq!(all, annotations.len() as u64);
 
     let clips = ["collect", "behavior", "--perception", "gt", "--episodes", "1", "--out", "clips"];
-    well(dir, &[&clips[..], &["--clips", "2"]].concat());
+    run_ok(dir, &[&clips[..], &["--clips", "2"]].concat());
     let file = dir.join("clips/clips-000000.safetensors");
     let written = fs::metadata(&file).unwrap().modified().unwrap();
-    well(dir, &[&clips[..], &["--clips", "2"]].concat());
-    assert_eq!(fs::metadata(&file).unwrap().modified().unwrap(), written, "it was made again");
-    assert!(ill(dir, &[&clips[..], &["--clips", "3"]].concat()).contains("by other rules"));
+    run_ok(dir, &[&clips[..], &["--clips", "2"]].concat());
+    assert_eq!(fs::metadata(&file).unwrap().modified().unwrap(), written, "it was written again");
+    assert!(
+        run_err(dir, &[&clips[..], &["--clips", "3"]].concat())
+            .contains("of another configuration")
+    );
 }

@@ -1,11 +1,11 @@
-//! Pictures, videos, scenes and episodes as files, and the benches.
+//! Promises on images, videos, scenes and episode files, and on `chaic bench`.
 
 use std::fs;
 use std::path::Path;
 
 use crate::*;
 
-/// What `chaic render` writes.
+/// Images that `chaic render` writes.
 const PICTURES: [&str; 8] = [
     "rgb.png",
     "depth.png",
@@ -18,11 +18,11 @@ const PICTURES: [&str; 8] = [
 ];
 
 #[test]
-fn pictures_and_episodes() {
-    let dir = workshop();
+fn images_and_episode_files() {
+    let dir = short_episodes();
     let at = dir.path();
     let file = "short/no_constraint-0.json";
-    let printed = well(
+    let printed = run_ok(
         at,
         &["render", file, "--agent", "partner", "--frame", "20", "--out", "p", "--size", "64"],
     );
@@ -30,47 +30,49 @@ fn pictures_and_episodes() {
     for name in PICTURES {
         assert!(at.join("p").join(name).exists(), "{name}");
     }
-    let classes = fs::read_to_string(at.join("p/classes.json")).expect("it is text");
+    let classes = fs::read_to_string(at.join("p/classes.json")).expect("a text file");
     assert!(serde_json::from_str::<std::collections::BTreeMap<u8, String>>(&classes).is_ok());
-    let ids = fs::read_to_string(at.join("p/ids.json")).expect("it is text");
+    let ids = fs::read_to_string(at.join("p/ids.json")).expect("a text file");
     assert!(ids.contains("\"floor\""), "{ids}");
-    let child = ill(at, &["render", file, "--agent", "child", "--out", "c"]);
+    let child = run_err(at, &["render", file, "--agent", "child", "--out", "c"]);
     assert!(child.contains("has no child"), "{child}");
 
-    well(at, &["episodes", "show", "obstacle/test/00", "--out", "plan.png", "--width", "200"]);
+    run_ok(at, &["episodes", "show", "obstacle/test/00", "--out", "plan.png", "--width", "200"]);
     assert!(at.join("plan.png").exists());
-    let list = well(at, &["episodes", "list", "--task", "obstacle"]);
+    let list = run_ok(at, &["episodes", "list", "--task", "obstacle"]);
     assert!(list.contains("obstacle/test/11"), "{list}");
-    let json = well(at, &["episodes", "list", "--task", "obstacle,shopping", "--format", "json"]);
+    let json = run_ok(at, &["episodes", "list", "--task", "obstacle,shopping", "--format", "json"]);
     let json: serde_json::Value = serde_json::from_str(&json).expect("it is JSON");
     assert_eq!(json.as_array().map(Vec::len), Some(24));
-    assert!(well(at, &["episodes", "schema"]).contains("chaic-episode"));
+    assert!(run_ok(at, &["episodes", "schema"]).contains("chaic-episode"));
 
-    assert!(well(at, &["episodes", "validate", file]).contains("fine"));
-    let good = fs::read_to_string(at.join(file)).expect("it is text");
+    assert!(run_ok(at, &["episodes", "validate", file]).contains("fine"));
+    let good = fs::read_to_string(at.join(file)).expect("a text file");
     fs::write(
         at.join("bad.json"),
         good.replacen(&format!("\"horizon\": {FRAMES}"), "\"horizon\": 0", 1),
     )
-    .expect("there is room");
-    fs::write(at.join("torn.json"), &good[..good.len() / 2]).expect("there is room");
-    let found = ill(at, &["episodes", "validate", file, "bad.json", "torn.json", "missing.json"]);
-    for words in ["bad.json: setup.horizon", "torn.json: ends too early", "missing.json", "3 of 4"]
+    .expect("the disk has space");
+    fs::write(at.join("torn.json"), &good[..good.len() / 2]).expect("the disk has space");
+    let found =
+        run_err(at, &["episodes", "validate", file, "bad.json", "torn.json", "missing.json"]);
+    for words in
+        ["bad.json: setup.horizon", "torn.json: ends prematurely", "missing.json", "3 of 4"]
     {
         assert!(found.contains(words), "{words}: {found}");
     }
 }
 
 #[test]
-fn appearances_change_colors_and_nothing_else() {
-    let dir = workshop();
+fn appearances_change_colors_only() {
+    let dir = short_episodes();
     let at = dir.path();
     let render = ["render", "short/no_constraint-0.json", "--frame", "20", "--size", "64"];
     let folders = ["canonical", "evening", "varied:3"].map(|appearance| {
-        well(at, &[&render[..], &["--appearance", appearance, "--out", appearance]].concat());
+        run_ok(at, &[&render[..], &["--appearance", appearance, "--out", appearance]].concat());
         at.join(appearance)
     });
-    well(at, &[&render[..], &["--out", "usual"]].concat());
+    run_ok(at, &[&render[..], &["--out", "usual"]].concat());
     let file = |folder: &Path, name: &str| fs::read(folder.join(name)).expect("it was written");
     for name in PICTURES {
         assert!(file(&at.join("usual"), name) == file(&folders[0], name), "{name}");
@@ -81,101 +83,128 @@ fn appearances_change_colors_and_nothing_else() {
         }
     }
     for wrong in ["", "dusk", "varied", "varied:-1", "varied:x"] {
-        let out = chaic(at, &[&render[..], &["--appearance", wrong, "--out", "w"]].concat());
-        let said = text(&out.stderr);
-        assert_eq!(out.status.code(), Some(2), "{wrong:?}: {said}");
-        assert!(said.contains(APPEARANCES) && said.contains("--appearance"), "{wrong:?}: {said}");
+        let out = output_of(at, &[&render[..], &["--appearance", wrong, "--out", "w"]].concat());
+        let message = text(&out.stderr);
+        assert_eq!(out.status.code(), Some(2), "{wrong:?}: {message}");
+        assert!(
+            message.contains(APPEARANCES) && message.contains("--appearance"),
+            "{wrong:?}: {message}"
+        );
     }
     assert!(!at.join("w").exists());
 }
 
 #[test]
-fn a_replay_looks_like_what_was_played() {
-    let dir = workshop();
+fn a_replay_has_the_appearance_of_the_run() {
+    let dir = short_episodes();
     let at = dir.path();
     let eval = ["eval", "--episodes", "short", "--task", "no_constraint", "--helper", "rhp"];
     let id = "no_constraint/gen/0";
     let pictures = ["canonical", "evening"].map(|appearance| {
-        let said = ["--size", "48", "--appearance", appearance, "--out", appearance];
-        well(at, &[&eval[..], &said].concat());
-        assert!(well(at, &["verify", appearance]).contains("1 trace"));
+        let message = ["--size", "48", "--appearance", appearance, "--out", appearance];
+        run_ok(at, &[&eval[..], &message].concat());
+        assert!(run_ok(at, &["verify", appearance]).contains("1 trace"));
         let video = format!("{appearance}.gif");
-        well(at, &["replay", appearance, id, "--every", "40", "--out", &video]);
+        run_ok(at, &["replay", appearance, id, "--every", "40", "--out", &video]);
         fs::read(at.join(video)).expect("it was written")
     });
-    assert!(pictures[0] != pictures[1], "the light of what was played is lost");
+    assert!(pictures[0] != pictures[1], "the replay has the default appearance");
     let trace = |run: &str| {
         let path = at.join(run).join("traces/no_constraint/rhp/gen-0-s0.jsonl");
-        fs::read_to_string(path).expect("it is text")
+        fs::read_to_string(path).expect("a text file")
     };
     let (day, evening) = (trace("canonical"), trace("evening"));
     assert_eq!(day, evening.replacen(",\"appearance\":\"evening\"", "", 1));
 
-    // A trace that says something else than its run is found out, and so is nonsense.
+    // A trace that contradicts its run, or is invalid, is detected.
     for (changed, words) in [
-        (day, "the first line is not what this run has: appearance"),
+        (day, "the first line differs from the one that this run writes: appearance"),
         (evening.replacen("\"evening\"", "\"dusk\"", 1), APPEARANCES),
     ] {
         fs::write(at.join("evening/traces/no_constraint/rhp/gen-0-s0.jsonl"), changed)
-            .expect("there is room");
-        let said = ill(at, &["verify", "evening"]);
-        assert!(said.contains(words), "{words}: {said}");
+            .expect("the disk has space");
+        let message = run_err(at, &["verify", "evening"]);
+        assert!(message.contains(words), "{words}: {message}");
     }
-    let said = ill(at, &["replay", "evening", id, "--out", "x.gif"]);
-    assert!(said.contains("line 1") && said.contains(APPEARANCES), "{said}");
+    let message = run_err(at, &["replay", "evening", id, "--out", "x.gif"]);
+    assert!(message.contains("line 1") && message.contains(APPEARANCES), "{message}");
 }
 
 #[test]
-fn scenes_as_files_and_what_the_machine_reaches() {
-    let dir = tempfile::tempdir().expect("there is room");
+fn scene_files_and_benchmarks() {
+    let dir = tempfile::tempdir().expect("the disk has space");
     let at = dir.path();
     let id = "shopping/test/00";
-    let said = well(at, &["scene", "export", id, "--out", "s.glb", "--detail", "1"]);
+    let message = run_ok(at, &["scene", "export", id, "--out", "s.glb", "--detail", "1"]);
     let scene = gltf::Gltf::open(at.join("s.glb")).expect("the file is valid");
     let count = |primitive: gltf::Primitive| primitive.indices().map_or(0, |i| i.count() / 3);
     let meshes = scene.nodes().filter_map(|node| node.mesh());
     let triangles: usize = meshes.flat_map(|m| m.primitives()).map(count).sum();
-    assert!(said.contains(&format!("{id} in ")), "{said}");
-    assert!(said.ends_with(&format!(" nodes with {triangles} triangles\n")), "{said}");
+    assert!(message.contains(&format!("{id} in ")), "{message}");
+    assert!(message.ends_with(&format!(" nodes with {triangles} triangles\n")), "{message}");
     let names: Vec<&str> = scene.nodes().filter_map(|node| node.name()).collect();
     for name in ["floor#1", "person#8", "eye of partner", "eye of helper", "bike#"] {
         assert!(names.iter().any(|n| n.starts_with(name)), "{name}: {names:?}");
     }
     let house = "obstacle/test/00";
-    let whole = well(at, &["scene", "export", house, "--out", "a.glb"]);
-    let open = well(at, &["scene", "export", house, "--out", "b.glb", "--no-ceiling"]);
+    let whole = run_ok(at, &["scene", "export", house, "--out", "a.glb"]);
+    let open = run_ok(at, &["scene", "export", house, "--out", "b.glb", "--no-ceiling"]);
     assert_ne!(whole.split(' ').nth(3), open.split(' ').nth(3), "{whole}{open}");
     for (arguments, words) in [
         (["obstacle/test/99", "--out", "x.glb"], "obstacle/test/99"),
         ([house, "--out", "nowhere/x.glb"], "can't write nowhere/x.glb"),
         ([house, "--out", "x.obj"], "ends in .glb"),
     ] {
-        let said = ill(at, &[&["scene", "export"], &arguments[..]].concat());
-        assert!(said.contains(words) && said.lines().count() <= 4, "{arguments:?}: {said}");
+        let message = run_err(at, &[&["scene", "export"], &arguments[..]].concat());
+        assert!(
+            message.contains(words) && message.lines().count() <= 4,
+            "{arguments:?}: {message}"
+        );
     }
 
     let quick = ["--seconds", "0.01", "--format", "json"];
     let looked_at = ["bench", "render", "--size", "32", "--threads", "2"];
-    let json = well(at, &[&looked_at[..], &quick].concat());
+    let json = run_ok(at, &[&looked_at[..], &quick].concat());
     let speed: serde_json::Value = serde_json::from_str(&json).expect("it is JSON");
     assert_eq!((&speed["objects"], &speed["size"]), (&150.into(), &32.into()));
     assert!(speed["triangles"].as_u64() > Some(10_000), "{speed}");
     for figure in ["ms_per_frame", "frames_per_second"] {
         assert!(speed[figure].as_f64() > Some(0.0), "{figure}: {speed}");
     }
-    let text = well(at, &["bench", "render", "--episode", id, "--size", "32", "--seconds", "0.01"]);
+    let text =
+        run_ok(at, &["bench", "render", "--episode", id, "--size", "32", "--seconds", "0.01"]);
     assert!(text.starts_with(id) && text.contains("ms a frame"), "{text}");
-    let json = well(at, &[&["bench", "world", "--task", "obstacle,shopping"], &quick[..]].concat());
+    let json =
+        run_ok(at, &[&["bench", "world", "--task", "obstacle,shopping"], &quick[..]].concat());
     let speeds: serde_json::Value = serde_json::from_str(&json).expect("it is JSON");
     assert_eq!(speeds[1]["episode"], id);
     assert!(speeds[0]["frames_per_second"].as_f64() > Some(0.0), "{speeds}");
-    well(at, &["bench", "scene", "--size", "32", "--out", "b"]);
-    let cameras = fs::read_to_string(at.join("b/cameras.json")).expect("it is text");
+    run_ok(at, &["bench", "scene", "--size", "32", "--out", "b"]);
+    let cameras = fs::read_to_string(at.join("b/cameras.json")).expect("a text file");
     let cameras: serde_json::Value = serde_json::from_str(&cameras).expect("it is JSON");
     assert_eq!(cameras["cameras"].as_array().map(Vec::len), Some(16));
     assert!(at.join("b/scene.glb").exists() && at.join("b/chaic.png").exists());
     for wrong in [["--channels", "rgb+smell"], ["--threads", "0"], ["--seconds", "never"]] {
-        let out = chaic(at, &[&["bench", "render"], &wrong[..]].concat());
+        let out = output_of(at, &[&["bench", "render"], &wrong[..]].concat());
         assert_eq!(out.status.code(), Some(2), "{wrong:?}: {}", self::text(&out.stderr));
     }
+}
+
+#[test]
+fn the_gpu_renderer_is_measured_if_the_build_has_it() {
+    let dir = tempfile::tempdir().expect("the disk has space");
+    let arguments =
+        ["bench", "render", "--gpu=any", "--worlds", "2", "--size", "32", "--seconds", "0.01"];
+    if cfg!(feature = "gpu") {
+        let speed: serde_json::Value = serde_json::from_str(&run_ok(
+            dir.path(),
+            &[&arguments[..], &["--format", "json"]].concat(),
+        ))
+        .expect("JSON");
+        assert!(speed["worlds"] == 2 && speed["views"] == 2, "{speed}");
+    } else {
+        assert!(run_err(dir.path(), &arguments).contains("--features gpu"));
+    }
+    let both = output_of(dir.path(), &[&arguments[..], &["--threads", "2"]].concat());
+    assert_eq!(both.status.code(), Some(2));
 }

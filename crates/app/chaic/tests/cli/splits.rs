@@ -1,4 +1,4 @@
-//! Splits that are made on the fly are listed, written and checked like the bundled ones.
+//! Promise: generated splits are listed, written and checked like the bundled ones.
 
 use std::fs;
 
@@ -6,10 +6,10 @@ use crate::*;
 
 #[test]
 fn standard_episodes_are_listed_written_and_checked() {
-    let dir = tempfile::tempdir().expect("there is room");
+    let dir = tempfile::tempdir().expect("the disk has space");
     let at = dir.path();
     let list = ["episodes", "list", "--split", "standard", "--task", "moving_house"];
-    let list = well(at, &[&list[..], &["--format", "json"]].concat());
+    let list = run_ok(at, &[&list[..], &["--format", "json"]].concat());
     let list: Vec<serde_json::Value> = serde_json::from_str(&list).expect("it is JSON");
     assert_eq!(list.len(), 100);
     assert_eq!(list[99]["id"], "moving_house/standard/099");
@@ -17,45 +17,45 @@ fn standard_episodes_are_listed_written_and_checked() {
 
     let split = ["--split", "gen-standard:7..9"];
     let generate = ["episodes", "generate", "--task", "obstacle", "--out", "e"];
-    well(at, &[&generate[..], &split].concat());
+    run_ok(at, &[&generate[..], &split].concat());
     let (one, two) = ("e/obstacle-gen-standard-7.json", "e/obstacle-gen-standard-8.json");
     let written = fs::read(at.join(one)).expect("it has been written");
     let written: serde_json::Value = serde_json::from_slice(&written).expect("it is JSON");
     assert_eq!(written["generator"]["settings"]["decoys"], true);
-    let checked = well(at, &["episodes", "validate", one, two]);
+    let checked = run_ok(at, &["episodes", "validate", one, two]);
     assert_eq!(checked.matches("fine").count(), 2, "{checked}");
-    let checked = well(at, &["episodes", "validate", "--split", "gen-standard:7..8"]);
+    let checked = run_ok(at, &["episodes", "validate", "--split", "gen-standard:7..8"]);
     assert_eq!(checked, "gen-standard:7..8: 12 episodes fine\n");
 }
 
 #[test]
 fn another_partner_plays_the_same_episodes() {
-    let dir = tempfile::tempdir().expect("there is room");
+    let dir = tempfile::tempdir().expect("the disk has space");
     let at = dir.path();
     let play =
-        ["eval", "--task", "high_target", "--helper", "none", "--first", "1", "--size", "32"];
-    let kind = ["--partner-is", "child+one_handed+tires"];
-    well(at, &[&play[..], &kind, &["--out", "run"]].concat());
-    assert!(well(at, &["verify", "run"]).contains("all digests agree"));
+        ["eval", "--task", "high_target", "--helper", "none", "--n-episodes", "1", "--size", "32"];
+    let kind = ["--person", "child+one_handed+tires"];
+    run_ok(at, &[&play[..], &kind, &["--out", "run"]].concat());
+    assert!(run_ok(at, &["verify", "run"]).contains("all digests agree"));
     let id = "high_target/test/00/child+one_handed+tires";
-    let results = fs::read_to_string(at.join("run/results.jsonl")).expect("it is text");
+    let results = fs::read_to_string(at.join("run/results.jsonl")).expect("a text file");
     assert!(results.contains(&format!("\"episode\":\"{id}\"")), "{results}");
-    well(at, &["render", id, "--out", "pictures"]);
+    run_ok(at, &["render", id, "--out", "pictures"]);
 
-    // From files as well, and gone on with by the same partner only.
+    // The same holds for episode files. A resumed run needs the same partner.
     let generate = ["episodes", "generate", "--task", "tremor", "--seeds", "0..1", "--out", "e"];
-    well(at, &generate);
+    run_ok(at, &generate);
     let files = ["eval", "--episodes", "e", "--helper", "none", "--size", "32", "--out", "files"];
-    well(at, &[&files[..], &["--partner-is", "wheelchair"]].concat());
-    let again = ["eval", "--resume", "--out", "files", "--partner-is"];
-    well(at, &[&again[..], &["wheelchair", "--episodes", "e"]].concat());
-    let refused = ill(at, &[&again[..], &["frail"]].concat());
-    assert!(refused.contains("--partner-is"), "{refused}");
+    run_ok(at, &[&files[..], &["--person", "wheelchair"]].concat());
+    let again = ["eval", "--resume", "--out", "files", "--person"];
+    run_ok(at, &[&again[..], &["wheelchair", "--episodes", "e"]].concat());
+    let refused = run_err(at, &[&again[..], &["frail"]].concat());
+    assert!(refused.contains("--person"), "{refused}");
 
-    for (kind, words) in [("ogre", "no person is called"), ("rider", "0 bicycles")] {
-        let refused = ill(at, &[&play[..], &["--partner-is", kind, "--out", "none"]].concat());
+    for (kind, words) in [("ogre", "unknown kind of person"), ("rider", "0 bicycles")] {
+        let refused = run_err(at, &[&play[..], &["--person", kind, "--out", "none"]].concat());
         assert!(refused.contains(words) && !at.join("none").exists(), "{refused}");
     }
-    let refused = ill(at, &["eval", "--task", "tires", "--out", "none"]);
+    let refused = run_err(at, &["eval", "--task", "tires", "--out", "none"]);
     assert!(refused.contains("give --split gen:"), "{refused}");
 }

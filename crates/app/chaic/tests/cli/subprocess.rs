@@ -1,74 +1,74 @@
-//! Helpers in other processes, as users run them.
+//! Promises on helper processes.
 
 use std::fs;
 
 use assert_cmd::cargo::cargo_bin;
 
-use super::{chaic, command, ill, text, well, workshop};
+use super::{command, output_of, run_err, run_ok, short_episodes, text};
 
 #[test]
-fn a_served_helper_gets_the_row_of_the_one_within() {
-    let dir = workshop();
+fn a_served_helper_plays_like_the_built_in_one() {
+    let dir = short_episodes();
     let program = cargo_bin!("chaic").display().to_string();
     let served = format!("served=exec:'{program}' helper serve rhp");
     let play = ["eval", "--episodes", "short", "--helper", "rhp", "--helper", &served];
     let grants = ["--exec-grants", "ids,goal_place"];
     let out = ["--size", "48", "--out", "run"];
     let all: Vec<&str> = play.iter().chain(&grants).chain(&out).copied().collect();
-    let table = well(dir.path(), &all);
+    let table = run_ok(dir.path(), &all);
     assert!(table.contains("served") && !table.contains("own eyes only"), "{table}");
     let run = dir.path().join("run");
     for task in ["no_constraint", "moving_house"] {
         let traces = run.join("traces").join(task);
         let last = |helper: &str| {
             let traces = fs::read_dir(traces.join(helper)).expect("it played");
-            let path = traces.map(|e| e.expect("it is there").path()).next().expect("a trace");
-            let text = fs::read_to_string(path).expect("it is text");
+            let path = traces.map(|e| e.expect("it exists").path()).next().expect("a trace");
+            let text = fs::read_to_string(path).expect("a text file");
             text.lines().skip(1).map(str::to_owned).collect::<Vec<_>>()
         };
         assert_eq!(last("served"), last("rhp"), "{task}");
     }
-    assert!(well(dir.path(), &["verify", "run"]).contains("all digests agree"));
+    assert!(run_ok(dir.path(), &["verify", "run"]).contains("all digests agree"));
 
-    // A run's folder decides no command.
+    // The folder of a run does not choose the command.
     let commands = run.join("commands.json");
     let written = fs::read_to_string(&commands).expect("it is noted");
     assert!(written.contains("helper serve rhp"), "{written}");
     let proof = dir.path().join("proof");
     let planted = format!(r#"[{{"name":"served","command":"touch '{}'"}}]"#, proof.display());
     let resume = ["eval", "--resume", "--out", "run"];
-    fs::write(&commands, &planted).expect("there is room");
-    let bare = chaic(dir.path(), &resume);
+    fs::write(&commands, &planted).expect("the disk has space");
+    let bare = output_of(dir.path(), &resume);
     assert_eq!(bare.status.code(), Some(2), "{}", text(&bare.stderr));
     let again = ["--helper", "rhp", "--helper", &served, "--exec-grants", "ids,goal_place"];
     let again: Vec<&str> = resume.iter().chain(&again).copied().collect();
-    let said = ill(dir.path(), &again);
-    assert!(said.contains("a command is only run if you name it"), "{said}");
+    let message = run_err(dir.path(), &again);
+    assert!(message.contains("a command is only run if you name it"), "{message}");
     assert!(!proof.exists(), "what the folder named was run");
-    fs::write(&commands, written).expect("there is room");
-    well(dir.path(), &again);
+    fs::write(&commands, written).expect("the disk has space");
+    run_ok(dir.path(), &again);
     let fewer: Vec<&str> = again[..again.len() - 2].to_vec();
-    let said = ill(dir.path(), &fewer);
-    assert!(said.contains("granted something else"), "{said}");
+    let message = run_err(dir.path(), &fewer);
+    assert!(message.contains("the grants of helpers or partner differ"), "{message}");
 }
 
 #[test]
-fn a_helper_that_breaks_gets_zero_and_says_why() {
-    let dir = workshop();
+fn a_failing_helper_scores_zero_with_a_reason() {
+    let dir = short_episodes();
     let play = ["eval", "--episodes", "short", "--size", "48", "--out", "run"];
     let broken = ["--helper", "exec:echo no weights >&2; exit 1"];
-    let out = chaic(dir.path(), &play.iter().chain(&broken).copied().collect::<Vec<_>>());
+    let out = output_of(dir.path(), &play.iter().chain(&broken).copied().collect::<Vec<_>>());
     assert_eq!(out.status.code(), Some(1), "it ends with findings");
-    let said = text(&out.stderr);
-    assert!(said.contains("is gone; it complained: no weights"), "{said}");
-    let results = fs::read_to_string(dir.path().join("run/results.jsonl")).expect("it is there");
+    let message = text(&out.stderr);
+    assert!(message.contains("exited before its answer; standard error: no weights"), "{message}");
+    let results = fs::read_to_string(dir.path().join("run/results.jsonl")).expect("it exists");
     assert_eq!(results.lines().filter(|l| l.contains("no weights")).count(), 2, "{results}");
 }
 
-/// The helper prints its environment as its last words, which the run keeps.
+/// The helper prints its environment to standard error, which the run records.
 #[test]
-fn a_helper_inherits_no_keys_but_what_the_user_names() {
-    let dir = workshop();
+fn a_helper_inherits_only_the_named_environment_variables() {
+    let dir = short_episodes();
     let play = ["eval", "--episodes", "short", "--size", "48", "--no-traces"];
     let telling = ["--helper", "exec:env >&2; exit 1"];
     let environment = |extra: &[&str], out: &str| {
@@ -80,7 +80,7 @@ fn a_helper_inherits_no_keys_but_what_the_user_names() {
         command.envs([("LC_ALL", "C"), ("OMP_NUM_THREADS", "3"), ("WEIGHTS_AT", "/weights")]);
         let ended = command.output().expect("the command starts");
         assert_eq!(ended.status.code(), Some(1), "{}", text(&ended.stderr));
-        fs::read_to_string(dir.path().join(out).join("results.jsonl")).expect("it is there")
+        fs::read_to_string(dir.path().join(out).join("results.jsonl")).expect("it exists")
     };
     let bare = environment(&[], "bare");
     for allowed in ["PATH=", "LC_ALL=C", "OMP_NUM_THREADS=3"] {
@@ -94,22 +94,23 @@ fn a_helper_inherits_no_keys_but_what_the_user_names() {
     let named = environment(&["--exec-env", "WEIGHTS_AT", "--exec-env", "UNSET"], "named");
     assert!(named.contains("WEIGHTS_AT=/weights") && !named.contains("sesame"), "{named}");
     let commands = dir.path().join("named/commands.json");
-    let recorded = fs::read_to_string(commands).expect("it is there");
+    let recorded = fs::read_to_string(commands).expect("it exists");
     assert!(recorded.contains("WEIGHTS_AT") && !recorded.contains("/weights"), "{recorded}");
     let resume = ["eval", "--resume", "--out", "named", telling[0], telling[1]];
-    assert!(ill(dir.path(), &resume).contains("--exec-env WEIGHTS_AT"));
-    assert_eq!(chaic(dir.path(), &["eval", "--exec-env", "A=b"]).status.code(), Some(2));
+    assert!(run_err(dir.path(), &resume).contains("--exec-env WEIGHTS_AT"));
+    assert_eq!(output_of(dir.path(), &["eval", "--exec-env", "A=b"]).status.code(), Some(2));
 }
 
 #[test]
-fn a_command_is_tried_from_the_command_line() {
-    let dir = workshop();
+fn a_command_is_checked_from_the_command_line() {
+    let dir = short_episodes();
     let program = cargo_bin!("chaic").display().to_string();
-    let kept = well(dir.path(), &["helper", "check", &format!("'{program}' helper serve random")]);
-    assert!(kept.contains("It keeps to the protocol") && !kept.contains("FAILED"), "{kept}");
-    let out = chaic(dir.path(), &["helper", "check", "cat"]);
+    let kept =
+        run_ok(dir.path(), &["helper", "check", &format!("'{program}' helper serve random")]);
+    assert!(kept.contains("follows the protocol") && !kept.contains("FAILED"), "{kept}");
+    let out = output_of(dir.path(), &["helper", "check", "cat"]);
     assert_eq!(out.status.code(), Some(1));
-    assert!(text(&out.stdout).contains("1 promise not kept"), "{}", text(&out.stdout));
+    assert!(text(&out.stdout).contains("1 check failed"), "{}", text(&out.stdout));
     for wrong in [
         &["eval", "--helper", "exec:"][..],
         &["eval", "--helper", "rhp=exec:true"],
@@ -118,6 +119,6 @@ fn a_command_is_tried_from_the_command_line() {
         &["eval", "--helper", "exec:true", "--exec-decision-s", "soon"],
         &["helper", "serve", "nobody"],
     ] {
-        assert_eq!(chaic(dir.path(), wrong).status.code(), Some(2), "{wrong:?}");
+        assert_eq!(output_of(dir.path(), wrong).status.code(), Some(2), "{wrong:?}");
     }
 }

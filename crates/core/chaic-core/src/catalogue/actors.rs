@@ -1,5 +1,5 @@
-//! People, as a class that perception can name. Their bodies are articulated and drawn by the
-//! renderer from their posture, so they have no fixed shape here.
+//! People, as a class for perception. The renderer draws their articulated bodies from their
+//! posture, so they have no fixed shape here.
 
 use super::{ClassInfo, Role};
 

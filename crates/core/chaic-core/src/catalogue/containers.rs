@@ -1,7 +1,7 @@
-//! What holds up to three targets and is carried in one hand.
+//! Containers, which hold up to three targets and are carried in one hand.
 
 use super::shape::{
-    ARCH, ARCH_ALONG, Paint, TARGET, WHITE, arc, cuboid, cylinder, in_metres, ring, round_tub, tub,
+    ARCH, ARCH_ALONG, Paint, TARGET, WHITE, arc, cuboid, cylinder, in_meters, ring, round_tub, tub,
 };
 use super::{ClassInfo, Finish, Part, Role};
 
@@ -21,12 +21,12 @@ const BOWL: ClassInfo = ClassInfo {
     detector_index: Some(0),
     size_m: BOWL_M,
     mass_kg: 0.9,
-    parts: &in_metres(
+    parts: &in_meters(
         BOWL_M,
         [
             round_tub([0.0, 0.01, 0.0], [0.41, 0.13, 0.41], 0.014, 0.52, CLAY),
-            cylinder([0.0, 0.0, 0.0], [0.19, 0.014, 0.19], CLAY).ghost(),
-            ring([0.0, 0.131, 0.0], 0.42, 0.018, GLAZED_RIM).ghost(),
+            cylinder([0.0, 0.0, 0.0], [0.19, 0.014, 0.19], CLAY).non_colliding(),
+            ring([0.0, 0.131, 0.0], 0.42, 0.018, GLAZED_RIM).non_colliding(),
         ],
     ),
     palette: &[[208, 170, 122], [196, 202, 206], [96, 136, 150]],
@@ -44,13 +44,13 @@ const PLATE: ClassInfo = ClassInfo {
     detector_index: Some(1),
     size_m: PLATE_M,
     mass_kg: 0.7,
-    parts: &in_metres(
+    parts: &in_meters(
         PLATE_M,
         [
             cylinder([0.0, 0.0, 0.0], [0.34, 0.016, 0.34], CHINA),
-            round_tub([0.0, 0.006, 0.0], [0.43, 0.034, 0.43], 0.012, 0.74, CHINA).ghost(),
-            cylinder([0.0, 0.0, 0.0], [0.3, 0.0195, 0.3], CHINA_BLUE).ghost(),
-            cylinder([0.0, 0.0, 0.0], [0.28, 0.02, 0.28], CHINA).ghost(),
+            round_tub([0.0, 0.006, 0.0], [0.43, 0.034, 0.43], 0.012, 0.74, CHINA).non_colliding(),
+            cylinder([0.0, 0.0, 0.0], [0.3, 0.0195, 0.3], CHINA_BLUE).non_colliding(),
+            cylinder([0.0, 0.0, 0.0], [0.28, 0.02, 0.28], CHINA).non_colliding(),
         ],
     ),
     ..CONTAINER
@@ -67,14 +67,14 @@ const TEA_TRAY: ClassInfo = ClassInfo {
     detector_index: Some(2),
     size_m: TEA_TRAY_M,
     mass_kg: 0.7,
-    parts: &in_metres(
+    parts: &in_meters(
         TEA_TRAY_M,
         [
             cuboid([0.0, 0.0, 0.0], [0.44, 0.012, 0.31], TRAY_WOOD),
-            cuboid([0.0, 0.0, -0.154], [0.45, 0.03, 0.012], TRAY_RIM).ghost(),
-            cuboid([0.0, 0.0, 0.154], [0.45, 0.03, 0.012], TRAY_RIM).ghost(),
-            cuboid([-0.219, 0.0, 0.0], [0.012, 0.03, 0.32], TRAY_RIM).ghost(),
-            cuboid([0.219, 0.0, 0.0], [0.012, 0.03, 0.32], TRAY_RIM).ghost(),
+            cuboid([0.0, 0.0, -0.154], [0.45, 0.03, 0.012], TRAY_RIM).non_colliding(),
+            cuboid([0.0, 0.0, 0.154], [0.45, 0.03, 0.012], TRAY_RIM).non_colliding(),
+            cuboid([-0.219, 0.0, 0.0], [0.012, 0.03, 0.32], TRAY_RIM).non_colliding(),
+            cuboid([0.219, 0.0, 0.0], [0.012, 0.03, 0.32], TRAY_RIM).non_colliding(),
             arc([-0.219, 0.0, 0.0], 0.1, 0.012, 120.0, TRAY_RIM).turned(ARCH_ALONG),
             arc([0.219, 0.0, 0.0], 0.1, 0.012, 120.0, TRAY_RIM).turned(ARCH_ALONG),
         ],
@@ -82,14 +82,14 @@ const TEA_TRAY: ClassInfo = ClassInfo {
     ..CONTAINER
 };
 
-/// Four bars around a square basket `width_m` wide, from `y` up.
+/// Four bars around a square basket `width_m` wide, from height `y` up.
 const fn hoop(y: f32, width_m: f32, height_m: f32, bar_m: f32, paint: Paint) -> [Part; 4] {
     let middle = 0.5 * (width_m - bar_m);
     [
-        cuboid([0.0, y, -middle], [width_m, height_m, bar_m], paint).ghost(),
-        cuboid([0.0, y, middle], [width_m, height_m, bar_m], paint).ghost(),
-        cuboid([-middle, y, 0.0], [bar_m, height_m, width_m], paint).ghost(),
-        cuboid([middle, y, 0.0], [bar_m, height_m, width_m], paint).ghost(),
+        cuboid([0.0, y, -middle], [width_m, height_m, bar_m], paint).non_colliding(),
+        cuboid([0.0, y, middle], [width_m, height_m, bar_m], paint).non_colliding(),
+        cuboid([-middle, y, 0.0], [bar_m, height_m, width_m], paint).non_colliding(),
+        cuboid([middle, y, 0.0], [bar_m, height_m, width_m], paint).non_colliding(),
     ]
 }
 
@@ -97,12 +97,12 @@ const HOLE: Paint = Paint([120, 126, 130], Finish::Matte);
 
 /// A hole in the front or back of the plastic lattice.
 const fn hole_across(x: f32, z: f32) -> Part {
-    cuboid([x, 0.05, z], [0.074, 0.13, 0.02], HOLE).ghost()
+    cuboid([x, 0.05, z], [0.074, 0.13, 0.02], HOLE).non_colliding()
 }
 
 /// A hole in a side of the plastic lattice.
 const fn hole_along(x: f32, z: f32) -> Part {
-    cuboid([x, 0.05, z], [0.02, 0.13, 0.074], HOLE).ghost()
+    cuboid([x, 0.05, z], [0.02, 0.13, 0.074], HOLE).non_colliding()
 }
 
 const PLASTIC_RIM: [Part; 4] = hoop(0.21, 0.37, 0.03, 0.016, WHITE);
@@ -115,7 +115,7 @@ const PLASTIC_BASKET: ClassInfo = ClassInfo {
     detector_index: Some(3),
     size_m: PLASTIC_BASKET_M,
     mass_kg: 0.6,
-    parts: &in_metres(
+    parts: &in_meters(
         PLASTIC_BASKET_M,
         [
             tub([0.0, 0.0, 0.0], [0.366, 0.24, 0.366], 0.008, 0.94, WHITE),
@@ -154,7 +154,7 @@ const WICKER_BASKET: ClassInfo = ClassInfo {
     detector_index: Some(4),
     size_m: WICKER_BASKET_M,
     mass_kg: 0.8,
-    parts: &in_metres(
+    parts: &in_meters(
         WICKER_BASKET_M,
         [
             tub([0.0, 0.0, 0.0], [0.36, 0.225, 0.36], 0.012, 0.84, WILLOW),
@@ -187,7 +187,7 @@ const WOOD_BASKET: ClassInfo = ClassInfo {
     detector_index: Some(5),
     size_m: WOOD_BASKET_M,
     mass_kg: 1.2,
-    parts: &in_metres(
+    parts: &in_meters(
         WOOD_BASKET_M,
         [
             tub([0.0, 0.0, 0.0], [0.35, 0.23, 0.35], 0.01, 1.0, SLAT),
@@ -199,10 +199,10 @@ const WOOD_BASKET: ClassInfo = ClassInfo {
             HIGH_SLATS[1],
             HIGH_SLATS[2],
             HIGH_SLATS[3],
-            cuboid([-0.172, 0.0, -0.172], [0.026, 0.24, 0.026], SLAT).ghost(),
-            cuboid([0.172, 0.0, -0.172], [0.026, 0.24, 0.026], SLAT).ghost(),
-            cuboid([-0.172, 0.0, 0.172], [0.026, 0.24, 0.026], SLAT).ghost(),
-            cuboid([0.172, 0.0, 0.172], [0.026, 0.24, 0.026], SLAT).ghost(),
+            cuboid([-0.172, 0.0, -0.172], [0.026, 0.24, 0.026], SLAT).non_colliding(),
+            cuboid([0.172, 0.0, -0.172], [0.026, 0.24, 0.026], SLAT).non_colliding(),
+            cuboid([-0.172, 0.0, 0.172], [0.026, 0.24, 0.026], SLAT).non_colliding(),
+            cuboid([0.172, 0.0, 0.172], [0.026, 0.24, 0.026], SLAT).non_colliding(),
         ],
     ),
     ..CONTAINER
@@ -219,13 +219,13 @@ const BAMBOO_BASKET: ClassInfo = ClassInfo {
     detector_index: Some(6),
     size_m: BAMBOO_BASKET_M,
     mass_kg: 0.9,
-    parts: &in_metres(
+    parts: &in_meters(
         BAMBOO_BASKET_M,
         [
             round_tub([0.0, 0.0, 0.0], [0.44, 0.29, 0.44], 0.012, 0.76, BAMBOO),
-            ring([0.0, 0.283, 0.0], 0.46, 0.026, BAMBOO_RIM).ghost(),
-            ring([0.0, 0.15, 0.0], 0.402, 0.02, BAMBOO_RIM).ghost(),
-            ring([0.0, 0.013, 0.0], 0.354, 0.024, BAMBOO_RIM).ghost(),
+            ring([0.0, 0.283, 0.0], 0.46, 0.026, BAMBOO_RIM).non_colliding(),
+            ring([0.0, 0.15, 0.0], 0.402, 0.02, BAMBOO_RIM).non_colliding(),
+            ring([0.0, 0.013, 0.0], 0.354, 0.024, BAMBOO_RIM).non_colliding(),
             arc([0.0, 0.25, -0.215], 0.12, 0.02, 180.0, BAMBOO_RIM).turned(ARCH),
             arc([0.0, 0.25, 0.215], 0.12, 0.02, 180.0, BAMBOO_RIM).turned(ARCH),
         ],

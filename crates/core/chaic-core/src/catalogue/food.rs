@@ -1,7 +1,7 @@
 //! Food from the kitchen and the market, carried in one hand: fruit, bread, cakes and cans.
 
 use super::shape::{
-    DARK_STEEL, Paint, STEEL, TARGET, arc, ball, cuboid, cylinder, in_metres, ring, taper,
+    DARK_STEEL, Paint, STEEL, TARGET, arc, ball, cuboid, cylinder, in_meters, ring, taper,
 };
 use super::{ClassInfo, Finish, Part, TargetSet};
 
@@ -37,12 +37,14 @@ const APPLE: ClassInfo = ClassInfo {
     sets: &[TargetSet::Fruit, TargetSet::ShopFruit],
     size_m: APPLE_M,
     mass_kg: 0.2,
-    parts: &in_metres(
+    parts: &in_meters(
         APPLE_M,
         [
             ball([0.0, 0.0, 0.0], [0.097, 0.083, 0.097], Paint([196, 36, 40], Finish::Skin)),
-            cylinder([0.0, 0.078, 0.0], [0.007, 0.013, 0.007], STALK).ghost(),
-            ball([0.014, 0.082, 0.0], [0.03, 0.005, 0.015], LEAF).turned([0.0, 30.0, 15.0]).ghost(),
+            cylinder([0.0, 0.078, 0.0], [0.007, 0.013, 0.007], STALK).non_colliding(),
+            ball([0.014, 0.082, 0.0], [0.03, 0.005, 0.015], LEAF)
+                .turned([0.0, 30.0, 15.0])
+                .non_colliding(),
         ],
     ),
     palette: &[[196, 36, 40], [150, 176, 58], [214, 150, 58]],
@@ -58,19 +60,19 @@ const BANANA: ClassInfo = ClassInfo {
     sets: &[TargetSet::Fruit],
     size_m: BANANA_M,
     mass_kg: 0.15,
-    parts: &in_metres(
+    parts: &in_meters(
         BANANA_M,
         [
             ball([-0.034, 0.0, -0.034], [0.12, 0.035, 0.036], PEEL).turned([0.0, 45.0, 0.0]),
             arc([0.0345, 0.0175, 0.0345], 0.234, 0.033, 120.0, PEEL).turned([0.0, 45.0, 0.0]),
             ball([0.0604, 0.002, -0.0621], [0.044, 0.031, 0.031], PEEL)
                 .turned([0.0, -15.0, 0.0])
-                .ghost(),
+                .non_colliding(),
             ball([-0.0621, 0.002, 0.0602], [0.043, 0.031, 0.031], PEEL)
                 .turned([0.0, -75.0, 0.0])
-                .ghost(),
-            ball([0.0735, 0.01, -0.059], [0.018, 0.015, 0.015], STALK).ghost(),
-            ball([-0.059, 0.01, 0.072], [0.015, 0.015, 0.018], STALK).ghost(),
+                .non_colliding(),
+            ball([0.0735, 0.01, -0.059], [0.018, 0.015, 0.015], STALK).non_colliding(),
+            ball([-0.059, 0.01, 0.072], [0.015, 0.015, 0.018], STALK).non_colliding(),
         ],
     ),
     ..TARGET
@@ -85,11 +87,11 @@ const ORANGE: ClassInfo = ClassInfo {
     sets: &[TargetSet::Fruit, TargetSet::ShopFruit],
     size_m: ORANGE_M,
     mass_kg: 0.22,
-    parts: &in_metres(
+    parts: &in_meters(
         ORANGE_M,
         [
             ball([0.0, 0.0, 0.0], [0.096, 0.095, 0.096], Paint([240, 134, 26], Finish::Skin)),
-            cylinder([0.0, 0.092, 0.0], [0.016, 0.004, 0.016], LEAF).ghost(),
+            cylinder([0.0, 0.092, 0.0], [0.016, 0.004, 0.016], LEAF).non_colliding(),
         ],
     ),
     palette: &[[240, 134, 26], [246, 152, 44], [228, 116, 22]],
@@ -98,17 +100,18 @@ const ORANGE: ClassInfo = ClassInfo {
 
 const CROWN: Paint = Paint([138, 124, 52], Finish::Skin);
 
-/// One banana of a bunch, lying along x but for a small turn away from its neighbors.
+/// A banana of a bunch, along x with a small rotation away from its neighbors.
 const fn finger(y: f32, z: f32, turn_deg: f32) -> Part {
-    // The ring's middle is 0.12 m behind the banana, so that turning it shifts the banana aside.
+    // The ring's center is 0.12 m behind the banana, so that its rotation shifts the banana
+    // sideways.
     let x = 0.12 * turn_deg.to_radians() - 0.006;
     arc([x, y, z + 0.106], 0.276, 0.036, 82.0, PEEL).turned([0.0, turn_deg, 0.0])
 }
 
-/// Its dark end.
+/// The dark tip of a banana.
 const fn fingertip(y: f32, z: f32, turn_deg: f32) -> Part {
     let z = z + 0.017 + 0.08 * turn_deg.to_radians();
-    ball([-0.085, y - 0.01, z], [0.022, 0.02, 0.02], STALK).ghost()
+    ball([-0.085, y - 0.01, z], [0.022, 0.02, 0.02], STALK).non_colliding()
 }
 
 const SHOP_BANANA_M: [f32; 3] = [0.195, 0.119, 0.155];
@@ -120,7 +123,7 @@ const SHOP_BANANA: ClassInfo = ClassInfo {
     sets: &[TargetSet::ShopFruit],
     size_m: SHOP_BANANA_M,
     mass_kg: 0.5,
-    parts: &in_metres(
+    parts: &in_meters(
         SHOP_BANANA_M,
         [
             ball([0.0, 0.0, -0.006], [0.14, 0.06, 0.06], PEEL),
@@ -146,7 +149,7 @@ const RED_GRAPE: Paint = Paint([112, 34, 70], Finish::Glossy);
 const DARK_GRAPE: Paint = Paint([86, 26, 60], Finish::Glossy);
 
 const fn berry(x: f32, y: f32, z: f32, paint: Paint) -> Part {
-    ball([x, y, z], [0.062, 0.062, 0.062], paint).ghost()
+    ball([x, y, z], [0.062, 0.062, 0.062], paint).non_colliding()
 }
 
 const GRAPE_M: [f32; 3] = [0.164, 0.234, 0.183];
@@ -158,7 +161,7 @@ const GRAPE: ClassInfo = ClassInfo {
     sets: &[TargetSet::ShopFruit],
     size_m: GRAPE_M,
     mass_kg: 0.5,
-    parts: &in_metres(
+    parts: &in_meters(
         GRAPE_M,
         [
             ball([0.0, 0.0, 0.0], [0.11, 0.2, 0.12], DARK_GRAPE),
@@ -174,7 +177,7 @@ const GRAPE: ClassInfo = ClassInfo {
             berry(0.01, 0.038, -0.036, RED_GRAPE),
             berry(-0.03, 0.034, 0.01, RED_GRAPE),
             berry(0.024, 0.034, 0.02, DARK_GRAPE),
-            taper(0.7, [0.0, 0.19, 0.0], [0.014, 0.044, 0.014], LEAF).ghost(),
+            taper(0.7, [0.0, 0.19, 0.0], [0.014, 0.044, 0.014], LEAF).non_colliding(),
         ],
     ),
     ..TARGET
@@ -195,14 +198,14 @@ const BREAD: ClassInfo = ClassInfo {
     sets: &[TargetSet::Bread],
     size_m: BREAD_M,
     mass_kg: 0.3,
-    parts: &in_metres(
+    parts: &in_meters(
         BREAD_M,
         [
             ball([0.0, 0.0, 0.0], [0.13, 0.07, 0.136], CRUST),
-            cylinder([0.0, 0.0, 0.0], [0.086, 0.02, 0.09], CRUST).ghost(),
-            ball([0.0, 0.06, 0.0], [0.013, 0.012, 0.086], CRUMB).ghost(),
-            ball([0.032, 0.055, 0.0], [0.013, 0.012, 0.072], CRUMB).ghost(),
-            ball([-0.032, 0.055, 0.0], [0.013, 0.012, 0.072], CRUMB).ghost(),
+            cylinder([0.0, 0.0, 0.0], [0.086, 0.02, 0.09], CRUST).non_colliding(),
+            ball([0.0, 0.06, 0.0], [0.013, 0.012, 0.086], CRUMB).non_colliding(),
+            ball([0.032, 0.055, 0.0], [0.013, 0.012, 0.072], CRUMB).non_colliding(),
+            ball([-0.032, 0.055, 0.0], [0.013, 0.012, 0.072], CRUMB).non_colliding(),
         ],
     ),
     palette: &[[190, 132, 70], [168, 108, 54], [206, 156, 92]],
@@ -210,7 +213,7 @@ const BREAD: ClassInfo = ClassInfo {
 };
 
 const fn sesame(x: f32, y: f32, z: f32) -> Part {
-    ball([x, y, z], [0.009, 0.004, 0.006], CRUMB).ghost()
+    ball([x, y, z], [0.009, 0.004, 0.006], CRUMB).non_colliding()
 }
 
 const BURGER_M: [f32; 3] = [0.107, 0.078, 0.111];
@@ -222,21 +225,23 @@ const BURGER: ClassInfo = ClassInfo {
     sets: &[TargetSet::Bread, TargetSet::ShopBakery],
     size_m: BURGER_M,
     mass_kg: 0.25,
-    parts: &in_metres(
+    parts: &in_meters(
         BURGER_M,
         [
             ball([0.0, 0.022, 0.0], [0.1, 0.055, 0.104], Paint([202, 128, 56], Finish::Crust)),
             cylinder([0.0, 0.0, 0.0], [0.098, 0.02, 0.102], CRUST),
             cylinder([0.0, 0.018, 0.0], [0.103, 0.018, 0.107], Paint([84, 48, 30], Finish::Crust)),
-            cuboid([0.0, 0.035, 0.0], [0.075, 0.004, 0.075], PEEL).turned([0.0, 40.0, 0.0]).ghost(),
+            cuboid([0.0, 0.035, 0.0], [0.075, 0.004, 0.075], PEEL)
+                .turned([0.0, 40.0, 0.0])
+                .non_colliding(),
             cylinder(
                 [0.0, 0.039, 0.0],
                 [0.104, 0.005, 0.108],
                 Paint([190, 50, 38], Finish::Glossy),
             )
-            .ghost(),
+            .non_colliding(),
             ball([0.0, 0.041, 0.0], [0.107, 0.012, 0.111], Paint([112, 172, 60], Finish::Matte))
-                .ghost(),
+                .non_colliding(),
             sesame(0.0, 0.074, -0.004),
             sesame(0.022, 0.071, 0.014),
             sesame(-0.024, 0.071, 0.01),
@@ -256,23 +261,23 @@ const LOAF_BREAD: ClassInfo = ClassInfo {
     sets: &[TargetSet::Bread, TargetSet::ShopBakery],
     size_m: LOAF_BREAD_M,
     mass_kg: 0.4,
-    parts: &in_metres(
+    parts: &in_meters(
         LOAF_BREAD_M,
         [
             ball([0.0, 0.0, 0.0], [0.085, 0.051, 0.194], CRUST),
-            cylinder([0.0, 0.0, 0.0], [0.064, 0.018, 0.15], CRUST).ghost(),
+            cylinder([0.0, 0.0, 0.0], [0.064, 0.018, 0.15], CRUST).non_colliding(),
             ball([0.0, 0.042, -0.056], [0.046, 0.009, 0.012], CRUMB)
                 .turned([0.0, 30.0, 0.0])
-                .ghost(),
+                .non_colliding(),
             ball([0.0, 0.044, -0.019], [0.052, 0.009, 0.012], CRUMB)
                 .turned([0.0, 30.0, 0.0])
-                .ghost(),
+                .non_colliding(),
             ball([0.0, 0.044, 0.019], [0.052, 0.009, 0.012], CRUMB)
                 .turned([0.0, 30.0, 0.0])
-                .ghost(),
+                .non_colliding(),
             ball([0.0, 0.042, 0.056], [0.046, 0.009, 0.012], CRUMB)
                 .turned([0.0, 30.0, 0.0])
-                .ghost(),
+                .non_colliding(),
         ],
     ),
     palette: &[[190, 132, 70], [162, 100, 50], [208, 160, 96]],
@@ -288,17 +293,17 @@ const CROISSANT: ClassInfo = ClassInfo {
     sets: &[TargetSet::ShopBakery],
     size_m: CROISSANT_M,
     mass_kg: 0.08,
-    parts: &in_metres(
+    parts: &in_meters(
         CROISSANT_M,
         [
             ball([0.0, 0.0, -0.044], [0.06, 0.058, 0.056], CRUST),
             arc([0.0, 0.02, -0.002], 0.139, 0.04, 230.0, DARK_CRUST),
             ball([0.035, 0.0, -0.032], [0.05, 0.052, 0.054], CRUST).turned([0.0, -45.0, 0.0]),
             ball([-0.035, 0.0, -0.032], [0.05, 0.052, 0.054], CRUST).turned([0.0, 45.0, 0.0]),
-            ball([0.049, 0.0, -0.002], [0.042, 0.044, 0.046], CRUST).ghost(),
-            ball([-0.049, 0.0, -0.002], [0.042, 0.044, 0.046], CRUST).ghost(),
-            ball([0.044, 0.004, 0.024], [0.03, 0.032, 0.036], DARK_CRUST).ghost(),
-            ball([-0.044, 0.004, 0.024], [0.03, 0.032, 0.036], DARK_CRUST).ghost(),
+            ball([0.049, 0.0, -0.002], [0.042, 0.044, 0.046], CRUST).non_colliding(),
+            ball([-0.049, 0.0, -0.002], [0.042, 0.044, 0.046], CRUST).non_colliding(),
+            ball([0.044, 0.004, 0.024], [0.03, 0.032, 0.036], DARK_CRUST).non_colliding(),
+            ball([-0.044, 0.004, 0.024], [0.03, 0.032, 0.036], DARK_CRUST).non_colliding(),
         ],
     ),
     ..TARGET
@@ -307,7 +312,7 @@ const CROISSANT: ClassInfo = ClassInfo {
 const fn sprinkle(x: f32, z: f32, turn_deg: f32, color: [u8; 3]) -> Part {
     cuboid([x, 0.043, z], [0.012, 0.004, 0.004], Paint(color, Finish::Glossy))
         .turned([0.0, turn_deg, 0.0])
-        .ghost()
+        .non_colliding()
 }
 
 const PINK_DONUT_M: [f32; 3] = [0.134, 0.047, 0.131];
@@ -319,10 +324,11 @@ const PINK_DONUT: ClassInfo = ClassInfo {
     sets: &[TargetSet::ShopBakery],
     size_m: PINK_DONUT_M,
     mass_kg: 0.06,
-    parts: &in_metres(
+    parts: &in_meters(
         PINK_DONUT_M,
         [
-            ring([0.0, 0.026, 0.0], 0.126, 0.04, Paint([238, 132, 174], Finish::Glossy)).ghost(),
+            ring([0.0, 0.026, 0.0], 0.126, 0.04, Paint([238, 132, 174], Finish::Glossy))
+                .non_colliding(),
             ring([0.0, 0.021, 0.0], 0.131, 0.042, CRUST),
             sprinkle(0.044, 0.0, 20.0, [250, 250, 246]),
             sprinkle(0.03, 0.032, 100.0, [90, 170, 226]),
@@ -348,16 +354,18 @@ const CAN_ORANGE: Paint = Paint([240, 124, 22], Finish::Glossy);
 /// A can painted `main`, with a band around it and a round mark on its front.
 const fn can(size_m: [f32; 3], main: Paint, band: Paint, mark: Paint) -> [Part; 7] {
     let [w, h, _] = size_m;
-    in_metres(
+    in_meters(
         size_m,
         [
             cylinder([0.0, 0.06 * h, 0.0], [0.95 * w, 0.86 * h, 0.95 * w], main),
-            cylinder([0.0, 0.0, 0.0], [0.86 * w, 0.06 * h, 0.86 * w], STEEL).ghost(),
-            taper(0.84, [0.0, 0.92 * h, 0.0], [0.94 * w, 0.06 * h, 0.94 * w], STEEL).ghost(),
-            ring([0.0, 0.975 * h, 0.0], 0.82 * w, 0.045 * w, STEEL).ghost(),
-            cuboid([0.0, 0.98 * h, -0.12 * w], [0.18 * w, 0.015 * h, 0.34 * w], DARK_STEEL).ghost(),
-            cylinder([0.0, 0.22 * h, 0.0], [0.965 * w, 0.14 * h, 0.965 * w], band).ghost(),
-            ball([0.0, 0.4 * h, -0.34 * w], [0.56 * w, 0.44 * h, 0.32 * w], mark).ghost(),
+            cylinder([0.0, 0.0, 0.0], [0.86 * w, 0.06 * h, 0.86 * w], STEEL).non_colliding(),
+            taper(0.84, [0.0, 0.92 * h, 0.0], [0.94 * w, 0.06 * h, 0.94 * w], STEEL)
+                .non_colliding(),
+            ring([0.0, 0.975 * h, 0.0], 0.82 * w, 0.045 * w, STEEL).non_colliding(),
+            cuboid([0.0, 0.98 * h, -0.12 * w], [0.18 * w, 0.015 * h, 0.34 * w], DARK_STEEL)
+                .non_colliding(),
+            cylinder([0.0, 0.22 * h, 0.0], [0.965 * w, 0.14 * h, 0.965 * w], band).non_colliding(),
+            ball([0.0, 0.4 * h, -0.34 * w], [0.56 * w, 0.44 * h, 0.32 * w], mark).non_colliding(),
         ],
     )
 }

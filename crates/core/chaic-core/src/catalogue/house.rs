@@ -1,9 +1,9 @@
-//! What furnishes a house.
+//! Furniture of a house.
 
 use super::kitchen::{KITCHEN_COUNTER, REFRIGERATOR, STOVE};
 use super::shape::{
-    BLACK, BRASS, DARK_STEEL, FURNISHING, Paint, STEEL, ball, cuboid, cylinder, in_metres, rod_x,
-    rod_z, round_tub, taper,
+    BLACK, BRASS, DARK_STEEL, FURNISHING, LACQUER, Paint, STEEL, ball, cuboid, cylinder, in_meters,
+    rod_x, rod_z, round_tub, taper,
 };
 use super::{ClassInfo, Finish, Part};
 
@@ -32,13 +32,12 @@ pub(super) const CLASSES: &[ClassInfo] = &[
 const OAK: Paint = Paint([192, 150, 98], Finish::Wood);
 const PALE_OAK: Paint = Paint([214, 180, 132], Finish::Wood);
 const WALNUT: Paint = Paint([112, 74, 50], Finish::Wood);
-pub(super) const LACQUER: Paint = Paint([236, 234, 228], Finish::Glossy);
 const LINEN: Paint = Paint([240, 238, 232], Finish::Fabric);
 const CHARCOAL: Paint = Paint([70, 72, 78], Finish::Fabric);
 const LEAF: Paint = Paint([62, 122, 58], Finish::Matte);
 const LIGHT_LEAF: Paint = Paint([92, 152, 72], Finish::Matte);
 
-/// Four square legs of `leg_m`, `x` and `z` from the middle.
+/// Four square legs of width `leg_m` at distances `x` and `z` from the center.
 const fn legs(x: f32, z: f32, height_m: f32, leg_m: f32, paint: Paint) -> [Part; 4] {
     let size = [leg_m, height_m, leg_m];
     [
@@ -59,7 +58,7 @@ const BED: ClassInfo = ClassInfo {
     detector_index: Some(47),
     size_m: BED_M,
     mass_kg: 95.0,
-    parts: &in_metres(
+    parts: &in_meters(
         BED_M,
         [
             cuboid([0.0, 0.24, -0.36], [2.14, 0.3, 1.84], Paint([96, 124, 166], Finish::Fabric))
@@ -67,11 +66,11 @@ const BED: ClassInfo = ClassInfo {
             cuboid([0.0, 0.28, -0.03], [2.04, 0.25, 2.44], LINEN).surface(),
             cuboid([0.0, 0.08, -0.03], [2.1, 0.2, 2.5], OAK),
             cuboid([0.0, 0.0, 1.24], [2.194, 1.201, 0.09], OAK),
-            cuboid([0.0, 0.541, 0.44], [2.14, 0.02, 0.26], LINEN).ghost(),
-            ball([-0.5, 0.5, 0.9], [0.86, 0.2, 0.5], LINEN).ghost(),
-            ball([0.5, 0.5, 0.9], [0.86, 0.2, 0.5], LINEN).ghost(),
-            cuboid([-0.95, 0.0, -1.15], [0.1, 0.08, 0.1], WALNUT).ghost(),
-            cuboid([0.95, 0.0, -1.15], [0.1, 0.08, 0.1], WALNUT).ghost(),
+            cuboid([0.0, 0.541, 0.44], [2.14, 0.02, 0.26], LINEN).non_colliding(),
+            ball([-0.5, 0.5, 0.9], [0.86, 0.2, 0.5], LINEN).non_colliding(),
+            ball([0.5, 0.5, 0.9], [0.86, 0.2, 0.5], LINEN).non_colliding(),
+            cuboid([-0.95, 0.0, -1.15], [0.1, 0.08, 0.1], WALNUT).non_colliding(),
+            cuboid([0.95, 0.0, -1.15], [0.1, 0.08, 0.1], WALNUT).non_colliding(),
         ],
     ),
     palette: &[[96, 124, 166], [178, 92, 80], [136, 152, 118], [206, 196, 178]],
@@ -86,15 +85,15 @@ const NIGHTSTAND: ClassInfo = ClassInfo {
     label: "nightstand",
     size_m: NIGHTSTAND_M,
     mass_kg: 12.0,
-    parts: &in_metres(
+    parts: &in_meters(
         NIGHTSTAND_M,
         [
             cuboid([0.0, 0.12, 0.01], [0.43, 0.355, 0.37], OAK),
             cuboid([0.0, 0.475, 0.0], [0.45, 0.025, 0.4], OAK).surface(),
-            cuboid([0.0, 0.315, -0.18], [0.38, 0.14, 0.02], PALE_OAK).ghost(),
-            cuboid([0.0, 0.145, -0.18], [0.38, 0.14, 0.02], PALE_OAK).ghost(),
-            ball([0.0, 0.372, -0.19], [0.02, 0.02, 0.02], BRASS).ghost(),
-            ball([0.0, 0.202, -0.19], [0.02, 0.02, 0.02], BRASS).ghost(),
+            cuboid([0.0, 0.315, -0.18], [0.38, 0.14, 0.02], PALE_OAK).non_colliding(),
+            cuboid([0.0, 0.145, -0.18], [0.38, 0.14, 0.02], PALE_OAK).non_colliding(),
+            ball([0.0, 0.372, -0.19], [0.02, 0.02, 0.02], BRASS).non_colliding(),
+            ball([0.0, 0.202, -0.19], [0.02, 0.02, 0.02], BRASS).non_colliding(),
             LEGS_NIGHTSTAND[0],
             LEGS_NIGHTSTAND[1],
             LEGS_NIGHTSTAND[2],
@@ -112,20 +111,20 @@ const WARDROBE: ClassInfo = ClassInfo {
     label: "wardrobe",
     size_m: WARDROBE_M,
     mass_kg: 85.0,
-    parts: &in_metres(
+    parts: &in_meters(
         WARDROBE_M,
         [
             cuboid([0.0, 0.06, 0.01], [1.16, 1.83, 0.55], WALNUT),
             cuboid([0.0, 1.89, 0.0], [1.2, 0.06, 0.6], WALNUT),
-            cuboid([0.0, 0.0, 0.02], [1.1, 0.06, 0.5], BLACK).ghost(),
-            cuboid([-0.285, 0.32, -0.275], [0.54, 1.54, 0.02], PANEL).ghost(),
-            cuboid([0.285, 0.32, -0.275], [0.54, 1.54, 0.02], PANEL).ghost(),
-            cuboid([-0.285, 0.09, -0.275], [0.54, 0.2, 0.02], PANEL).ghost(),
-            cuboid([0.285, 0.09, -0.275], [0.54, 0.2, 0.02], PANEL).ghost(),
-            cylinder([-0.05, 0.92, -0.287], [0.022, 0.26, 0.022], BRASS).ghost(),
-            cylinder([0.05, 0.92, -0.287], [0.022, 0.26, 0.022], BRASS).ghost(),
-            rod_x([-0.285, 0.2, -0.287], 0.14, 0.022, BRASS).ghost(),
-            rod_x([0.285, 0.2, -0.287], 0.14, 0.022, BRASS).ghost(),
+            cuboid([0.0, 0.0, 0.02], [1.1, 0.06, 0.5], BLACK).non_colliding(),
+            cuboid([-0.285, 0.32, -0.275], [0.54, 1.54, 0.02], PANEL).non_colliding(),
+            cuboid([0.285, 0.32, -0.275], [0.54, 1.54, 0.02], PANEL).non_colliding(),
+            cuboid([-0.285, 0.09, -0.275], [0.54, 0.2, 0.02], PANEL).non_colliding(),
+            cuboid([0.285, 0.09, -0.275], [0.54, 0.2, 0.02], PANEL).non_colliding(),
+            cylinder([-0.05, 0.92, -0.287], [0.022, 0.26, 0.022], BRASS).non_colliding(),
+            cylinder([0.05, 0.92, -0.287], [0.022, 0.26, 0.022], BRASS).non_colliding(),
+            rod_x([-0.285, 0.2, -0.287], 0.14, 0.022, BRASS).non_colliding(),
+            rod_x([0.285, 0.2, -0.287], 0.14, 0.022, BRASS).non_colliding(),
         ],
     ),
     ..FURNISHING
@@ -141,19 +140,19 @@ const CABINET: ClassInfo = ClassInfo {
     detector_index: Some(48),
     size_m: CABINET_M,
     mass_kg: 70.0,
-    parts: &in_metres(
+    parts: &in_meters(
         CABINET_M,
         [
             cuboid([0.0, 0.08, 0.015], [0.9, 1.98, 0.42], OAK).surface(),
             cuboid([0.0, 0.0, 0.03], [0.86, 0.08, 0.38], BLACK),
-            cuboid([-0.222, 1.06, -0.2], [0.43, 0.97, 0.02], PALE_OAK).ghost(),
-            cuboid([0.222, 1.06, -0.2], [0.43, 0.97, 0.02], PALE_OAK).ghost(),
-            cuboid([-0.222, 0.1, -0.2], [0.43, 0.93, 0.02], PALE_OAK).ghost(),
-            cuboid([0.222, 0.1, -0.2], [0.43, 0.93, 0.02], PALE_OAK).ghost(),
-            cylinder([-0.04, 1.15, -0.216], [0.018, 0.2, 0.018], STEEL).ghost(),
-            cylinder([0.04, 1.15, -0.216], [0.018, 0.2, 0.018], STEEL).ghost(),
-            cylinder([-0.04, 0.74, -0.216], [0.018, 0.2, 0.018], STEEL).ghost(),
-            cylinder([0.04, 0.74, -0.216], [0.018, 0.2, 0.018], STEEL).ghost(),
+            cuboid([-0.222, 1.06, -0.2], [0.43, 0.97, 0.02], PALE_OAK).non_colliding(),
+            cuboid([0.222, 1.06, -0.2], [0.43, 0.97, 0.02], PALE_OAK).non_colliding(),
+            cuboid([-0.222, 0.1, -0.2], [0.43, 0.93, 0.02], PALE_OAK).non_colliding(),
+            cuboid([0.222, 0.1, -0.2], [0.43, 0.93, 0.02], PALE_OAK).non_colliding(),
+            cylinder([-0.04, 1.15, -0.216], [0.018, 0.2, 0.018], STEEL).non_colliding(),
+            cylinder([0.04, 1.15, -0.216], [0.018, 0.2, 0.018], STEEL).non_colliding(),
+            cylinder([-0.04, 0.74, -0.216], [0.018, 0.2, 0.018], STEEL).non_colliding(),
+            cylinder([0.04, 0.74, -0.216], [0.018, 0.2, 0.018], STEEL).non_colliding(),
         ],
     ),
     ..FURNISHING
@@ -172,7 +171,7 @@ const SIDE_CHAIR: ClassInfo = ClassInfo {
     detector_index: Some(50),
     size_m: SIDE_CHAIR_M,
     mass_kg: 6.0,
-    parts: &in_metres(
+    parts: &in_meters(
         SIDE_CHAIR_M,
         [
             cuboid([0.0, 0.38, -0.015], [0.43, 0.07, 0.46], YELLOW).surface(),
@@ -194,7 +193,7 @@ const DINING_TABLE: ClassInfo = ClassInfo {
     label: "table",
     size_m: DINING_TABLE_M,
     mass_kg: 35.0,
-    parts: &in_metres(
+    parts: &in_meters(
         DINING_TABLE_M,
         [
             cuboid([0.0, 0.71, 0.0], [1.5, 0.04, 0.9], Paint([168, 116, 72], Finish::Wood))
@@ -203,10 +202,10 @@ const DINING_TABLE: ClassInfo = ClassInfo {
             LEGS_DINING_TABLE[1],
             LEGS_DINING_TABLE[2],
             LEGS_DINING_TABLE[3],
-            cuboid([0.0, 0.63, -0.38], [1.3, 0.08, 0.025], WALNUT).ghost(),
-            cuboid([0.0, 0.63, 0.38], [1.3, 0.08, 0.025], WALNUT).ghost(),
-            cuboid([-0.68, 0.63, 0.0], [0.025, 0.08, 0.7], WALNUT).ghost(),
-            cuboid([0.68, 0.63, 0.0], [0.025, 0.08, 0.7], WALNUT).ghost(),
+            cuboid([0.0, 0.63, -0.38], [1.3, 0.08, 0.025], WALNUT).non_colliding(),
+            cuboid([0.0, 0.63, 0.38], [1.3, 0.08, 0.025], WALNUT).non_colliding(),
+            cuboid([-0.68, 0.63, 0.0], [0.025, 0.08, 0.7], WALNUT).non_colliding(),
+            cuboid([0.68, 0.63, 0.0], [0.025, 0.08, 0.7], WALNUT).non_colliding(),
         ],
     ),
     palette: &[[168, 116, 72], [204, 166, 116], [122, 82, 56]],
@@ -221,7 +220,7 @@ const COFFEE_TABLE: ClassInfo = ClassInfo {
     label: "coffee table",
     size_m: COFFEE_TABLE_M,
     mass_kg: 18.0,
-    parts: &in_metres(
+    parts: &in_meters(
         COFFEE_TABLE_M,
         [
             cuboid([0.0, 0.385, 0.0], [1.1, 0.035, 0.6], OAK).surface(),
@@ -229,7 +228,7 @@ const COFFEE_TABLE: ClassInfo = ClassInfo {
             LEGS_COFFEE_TABLE[1],
             LEGS_COFFEE_TABLE[2],
             LEGS_COFFEE_TABLE[3],
-            cuboid([0.0, 0.12, 0.0], [0.98, 0.02, 0.48], OAK).ghost(),
+            cuboid([0.0, 0.12, 0.0], [0.98, 0.02, 0.48], OAK).non_colliding(),
         ],
     ),
     palette: &[[192, 150, 98], [120, 80, 54], [222, 216, 206]],
@@ -242,20 +241,20 @@ const DESK: ClassInfo = ClassInfo {
     label: "desk",
     size_m: DESK_M,
     mass_kg: 32.0,
-    parts: &in_metres(
+    parts: &in_meters(
         DESK_M,
         [
             cuboid([0.0, 0.715, 0.0], [1.3, 0.035, 0.65], PALE_OAK).surface(),
             cuboid([0.44, 0.0, 0.02], [0.38, 0.715, 0.58], LACQUER),
             cuboid([-0.6, 0.0, -0.28], [0.05, 0.715, 0.05], LACQUER),
             cuboid([-0.6, 0.0, 0.28], [0.05, 0.715, 0.05], LACQUER),
-            cuboid([-0.17, 0.4, 0.29], [0.86, 0.3, 0.02], LACQUER).ghost(),
-            cuboid([0.44, 0.5, -0.275], [0.35, 0.19, 0.02], PALE_OAK).ghost(),
-            cuboid([0.44, 0.28, -0.275], [0.35, 0.19, 0.02], PALE_OAK).ghost(),
-            cuboid([0.44, 0.05, -0.275], [0.35, 0.2, 0.02], PALE_OAK).ghost(),
-            rod_x([0.44, 0.6, -0.295], 0.12, 0.018, DARK_STEEL).ghost(),
-            rod_x([0.44, 0.38, -0.295], 0.12, 0.018, DARK_STEEL).ghost(),
-            rod_x([0.44, 0.16, -0.295], 0.12, 0.018, DARK_STEEL).ghost(),
+            cuboid([-0.17, 0.4, 0.29], [0.86, 0.3, 0.02], LACQUER).non_colliding(),
+            cuboid([0.44, 0.5, -0.275], [0.35, 0.19, 0.02], PALE_OAK).non_colliding(),
+            cuboid([0.44, 0.28, -0.275], [0.35, 0.19, 0.02], PALE_OAK).non_colliding(),
+            cuboid([0.44, 0.05, -0.275], [0.35, 0.2, 0.02], PALE_OAK).non_colliding(),
+            rod_x([0.44, 0.6, -0.295], 0.12, 0.018, DARK_STEEL).non_colliding(),
+            rod_x([0.44, 0.38, -0.295], 0.12, 0.018, DARK_STEEL).non_colliding(),
+            rod_x([0.44, 0.16, -0.295], 0.12, 0.018, DARK_STEEL).non_colliding(),
         ],
     ),
     palette: &[[214, 180, 132], [150, 104, 66], [92, 66, 50]],
@@ -270,7 +269,7 @@ const STOOL: ClassInfo = ClassInfo {
     label: "stool",
     size_m: STOOL_M,
     mass_kg: 3.5,
-    parts: &in_metres(
+    parts: &in_meters(
         STOOL_M,
         [
             cylinder([0.0, 0.44, 0.0], [0.38, 0.04, 0.38], PALE_OAK).surface(),
@@ -278,10 +277,10 @@ const STOOL: ClassInfo = ClassInfo {
             LEGS_STOOL[1],
             LEGS_STOOL[2],
             LEGS_STOOL[3],
-            rod_x([0.0, 0.18, -0.11], 0.22, 0.022, PALE_OAK).ghost(),
-            rod_x([0.0, 0.18, 0.11], 0.22, 0.022, PALE_OAK).ghost(),
-            rod_z([-0.11, 0.24, 0.0], 0.22, 0.022, PALE_OAK).ghost(),
-            rod_z([0.11, 0.24, 0.0], 0.22, 0.022, PALE_OAK).ghost(),
+            rod_x([0.0, 0.18, -0.11], 0.22, 0.022, PALE_OAK).non_colliding(),
+            rod_x([0.0, 0.18, 0.11], 0.22, 0.022, PALE_OAK).non_colliding(),
+            rod_z([-0.11, 0.24, 0.0], 0.22, 0.022, PALE_OAK).non_colliding(),
+            rod_z([0.11, 0.24, 0.0], 0.22, 0.022, PALE_OAK).non_colliding(),
         ],
     ),
     palette: &[[214, 180, 132], [176, 64, 56], [70, 112, 130]],
@@ -296,7 +295,7 @@ const ARMCHAIR: ClassInfo = ClassInfo {
     label: "armchair",
     size_m: ARMCHAIR_M,
     mass_kg: 25.0,
-    parts: &in_metres(
+    parts: &in_meters(
         ARMCHAIR_M,
         [
             cuboid([0.0, 0.26, -0.09], [0.53, 0.16, 0.62], Paint([178, 96, 62], Finish::Fabric))
@@ -305,11 +304,11 @@ const ARMCHAIR: ClassInfo = ClassInfo {
             cuboid([0.0, 0.26, 0.31], [0.85, 0.54, 0.18], CHARCOAL),
             cuboid([-0.345, 0.26, -0.08], [0.16, 0.3, 0.62], CHARCOAL),
             cuboid([0.345, 0.26, -0.08], [0.16, 0.3, 0.62], CHARCOAL),
-            rod_z([-0.345, 0.55, -0.08], 0.62, 0.15, CHARCOAL).ghost(),
-            rod_z([0.345, 0.55, -0.08], 0.62, 0.15, CHARCOAL).ghost(),
+            rod_z([-0.345, 0.55, -0.08], 0.62, 0.15, CHARCOAL).non_colliding(),
+            rod_z([0.345, 0.55, -0.08], 0.62, 0.15, CHARCOAL).non_colliding(),
             ball([0.0, 0.4, 0.17], [0.5, 0.36, 0.14], Paint([202, 168, 128], Finish::Fabric))
-                .ghost(),
-            cuboid([0.0, 0.0, 0.0], [0.7, 0.08, 0.6], WALNUT).ghost(),
+                .non_colliding(),
+            cuboid([0.0, 0.0, 0.0], [0.7, 0.08, 0.6], WALNUT).non_colliding(),
         ],
     ),
     palette: &[[178, 96, 62], [84, 118, 138], [134, 142, 96]],
@@ -325,7 +324,7 @@ const LONG_SOFA: ClassInfo = ClassInfo {
     label: "sofa",
     size_m: LONG_SOFA_M,
     mass_kg: 55.0,
-    parts: &in_metres(
+    parts: &in_meters(
         LONG_SOFA_M,
         [
             cuboid([0.0, 0.26, -0.1], [1.52, 0.16, 0.65], Paint([86, 110, 136], Finish::Fabric))
@@ -334,14 +333,14 @@ const LONG_SOFA: ClassInfo = ClassInfo {
             cuboid([0.0, 0.07, 0.325], [1.9, 0.68, 0.2], SOFA_FRAME),
             cuboid([-0.855, 0.07, -0.1], [0.19, 0.47, 0.65], SOFA_FRAME),
             cuboid([0.855, 0.07, -0.1], [0.19, 0.47, 0.65], SOFA_FRAME),
-            rod_z([-0.855, 0.53, -0.1], 0.65, 0.18, SOFA_FRAME).ghost(),
-            rod_z([0.855, 0.53, -0.1], 0.65, 0.18, SOFA_FRAME).ghost(),
-            ball([-0.5, 0.38, 0.17], [0.5, 0.34, 0.2], SOFA_CUSHION).ghost(),
-            ball([0.0, 0.38, 0.17], [0.5, 0.34, 0.2], SOFA_CUSHION).ghost(),
-            ball([0.5, 0.38, 0.17], [0.5, 0.34, 0.2], SOFA_CUSHION).ghost(),
-            cuboid([-0.254, 0.27, -0.1], [0.012, 0.151, 0.646], SOFA_FRAME).ghost(),
-            cuboid([0.254, 0.27, -0.1], [0.012, 0.151, 0.646], SOFA_FRAME).ghost(),
-            cuboid([0.0, 0.0, 0.0], [1.7, 0.07, 0.66], WALNUT).ghost(),
+            rod_z([-0.855, 0.53, -0.1], 0.65, 0.18, SOFA_FRAME).non_colliding(),
+            rod_z([0.855, 0.53, -0.1], 0.65, 0.18, SOFA_FRAME).non_colliding(),
+            ball([-0.5, 0.38, 0.17], [0.5, 0.34, 0.2], SOFA_CUSHION).non_colliding(),
+            ball([0.0, 0.38, 0.17], [0.5, 0.34, 0.2], SOFA_CUSHION).non_colliding(),
+            ball([0.5, 0.38, 0.17], [0.5, 0.34, 0.2], SOFA_CUSHION).non_colliding(),
+            cuboid([-0.254, 0.27, -0.1], [0.012, 0.151, 0.646], SOFA_FRAME).non_colliding(),
+            cuboid([0.254, 0.27, -0.1], [0.012, 0.151, 0.646], SOFA_FRAME).non_colliding(),
+            cuboid([0.0, 0.0, 0.0], [1.7, 0.07, 0.66], WALNUT).non_colliding(),
         ],
     ),
     palette: &[[86, 110, 136], [160, 84, 66], [124, 138, 100], [206, 194, 172]],
@@ -356,18 +355,18 @@ const TV_STAND: ClassInfo = ClassInfo {
     label: "tv stand",
     size_m: TV_STAND_M,
     mass_kg: 28.0,
-    parts: &in_metres(
+    parts: &in_meters(
         TV_STAND_M,
         [
             cuboid([0.0, 0.46, 0.0], [1.4, 0.04, 0.4], WALNUT).surface(),
             cuboid([0.0, 0.1, 0.015], [1.38, 0.36, 0.37], WALNUT),
-            cuboid([-0.46, 0.12, -0.175], [0.42, 0.32, 0.02], PALE_OAK).ghost(),
-            cuboid([0.46, 0.12, -0.175], [0.42, 0.32, 0.02], PALE_OAK).ghost(),
-            cuboid([0.0, 0.12, -0.165], [0.46, 0.15, 0.02], BLACK).ghost(),
-            cuboid([0.0, 0.29, -0.165], [0.46, 0.15, 0.02], BLACK).ghost(),
-            cuboid([0.03, 0.13, -0.17], [0.3, 0.05, 0.02], DARK_STEEL).ghost(),
-            ball([-0.28, 0.27, -0.19], [0.025, 0.025, 0.02], BRASS).ghost(),
-            ball([0.28, 0.27, -0.19], [0.025, 0.025, 0.02], BRASS).ghost(),
+            cuboid([-0.46, 0.12, -0.175], [0.42, 0.32, 0.02], PALE_OAK).non_colliding(),
+            cuboid([0.46, 0.12, -0.175], [0.42, 0.32, 0.02], PALE_OAK).non_colliding(),
+            cuboid([0.0, 0.12, -0.165], [0.46, 0.15, 0.02], BLACK).non_colliding(),
+            cuboid([0.0, 0.29, -0.165], [0.46, 0.15, 0.02], BLACK).non_colliding(),
+            cuboid([0.03, 0.13, -0.17], [0.3, 0.05, 0.02], DARK_STEEL).non_colliding(),
+            ball([-0.28, 0.27, -0.19], [0.025, 0.025, 0.02], BRASS).non_colliding(),
+            ball([0.28, 0.27, -0.19], [0.025, 0.025, 0.02], BRASS).non_colliding(),
             LEGS_TV_STAND[0],
             LEGS_TV_STAND[1],
             LEGS_TV_STAND[2],
@@ -380,12 +379,12 @@ const TV_STAND: ClassInfo = ClassInfo {
 
 /// A row of books on the shelf whose board has its top at `y`.
 const fn books(x: f32, y: f32, width_m: f32, height_m: f32, color: [u8; 3]) -> Part {
-    cuboid([x, y, -0.06], [width_m, height_m, 0.14], Paint(color, Finish::Matte)).ghost()
+    cuboid([x, y, -0.06], [width_m, height_m, 0.14], Paint(color, Finish::Matte)).non_colliding()
 }
 
 /// A board of the bookshelf with its top at `y`.
 const fn book_board(y: f32) -> Part {
-    cuboid([0.0, y - 0.03, 0.0], [0.9, 0.03, 0.3], OAK).ghost()
+    cuboid([0.0, y - 0.03, 0.0], [0.9, 0.03, 0.3], OAK).non_colliding()
 }
 
 const BOOKSHELF_M: [f32; 3] = [0.9, 1.4, 0.3];
@@ -394,7 +393,7 @@ const BOOKSHELF: ClassInfo = ClassInfo {
     label: "bookshelf",
     size_m: BOOKSHELF_M,
     mass_kg: 60.0,
-    parts: &in_metres(
+    parts: &in_meters(
         BOOKSHELF_M,
         [
             cuboid([0.0, 0.0, 0.06], [0.88, 1.39, 0.178], WALNUT),
@@ -418,9 +417,9 @@ const BOOKSHELF: ClassInfo = ClassInfo {
     ..FURNISHING
 };
 
-/// A leaf of the plant, leaning out from its middle.
+/// A leaf of the plant, leaning outward.
 const fn leaf(x: f32, y: f32, z: f32, turn_deg: [f32; 3], paint: Paint) -> Part {
-    ball([x, y, z], [0.13, 0.5, 0.035], paint).turned(turn_deg).ghost()
+    ball([x, y, z], [0.13, 0.5, 0.035], paint).turned(turn_deg).non_colliding()
 }
 
 const TERRACOTTA: Paint = Paint([182, 100, 66], Finish::Matte);
@@ -431,14 +430,14 @@ const POTTED_PLANT: ClassInfo = ClassInfo {
     label: "potted plant",
     size_m: POTTED_PLANT_M,
     mass_kg: 14.0,
-    parts: &in_metres(
+    parts: &in_meters(
         POTTED_PLANT_M,
         [
             round_tub([0.0, 0.0, 0.0], [0.34, 0.34, 0.34], 0.02, 0.7, TERRACOTTA),
             cylinder([0.0, 0.25, 0.0], [0.3, 0.05, 0.3], Paint([70, 50, 38], Finish::Crust))
-                .ghost(),
-            cylinder([0.0, 0.25, 0.0], [0.024, 0.5, 0.024], LEAF).ghost(),
-            ball([0.0, 0.6, 0.0], [0.16, 0.5, 0.06], LIGHT_LEAF).ghost(),
+                .non_colliding(),
+            cylinder([0.0, 0.25, 0.0], [0.024, 0.5, 0.024], LEAF).non_colliding(),
+            ball([0.0, 0.6, 0.0], [0.16, 0.5, 0.06], LIGHT_LEAF).non_colliding(),
             leaf(0.1, 0.46, 0.0, [0.0, 0.0, -24.0], LEAF),
             leaf(-0.1, 0.46, 0.0, [0.0, 0.0, 24.0], LEAF),
             leaf(0.0, 0.44, -0.1, [-22.0, 0.0, 0.0], LIGHT_LEAF),
@@ -459,13 +458,13 @@ const FLOOR_LAMP: ClassInfo = ClassInfo {
     label: "floor lamp",
     size_m: FLOOR_LAMP_M,
     mass_kg: 6.0,
-    parts: &in_metres(
+    parts: &in_meters(
         FLOOR_LAMP_M,
         [
             taper(0.66, [0.0, 1.26, 0.0], [0.4, 0.32, 0.4], Paint([244, 226, 186], Finish::Fabric)),
             cylinder([0.0, 0.03, 0.0], [0.03, 1.57, 0.03], DARK_STEEL),
             taper(0.9, [0.0, 0.0, 0.0], [0.3, 0.03, 0.3], DARK_STEEL),
-            ball([0.0, 1.56, 0.0], [0.04, 0.04, 0.04], BRASS).ghost(),
+            ball([0.0, 1.56, 0.0], [0.04, 0.04, 0.04], BRASS).non_colliding(),
         ],
     ),
     palette: &[[244, 226, 186], [216, 130, 84], [150, 176, 170]],
@@ -478,16 +477,16 @@ const RUG: ClassInfo = ClassInfo {
     label: "rug",
     size_m: RUG_M,
     mass_kg: 8.0,
-    parts: &in_metres(
+    parts: &in_meters(
         RUG_M,
         [
             cuboid([0.0, 0.0, 0.0], [2.0, 0.007, 1.4], Paint([150, 58, 52], Finish::Fabric)),
             cuboid([0.0, 0.0, 0.0], [1.8, 0.008, 1.2], Paint([224, 206, 168], Finish::Fabric))
-                .ghost(),
+                .non_colliding(),
             cuboid([0.0, 0.0, 0.0], [1.68, 0.009, 1.08], Paint([60, 76, 108], Finish::Fabric))
-                .ghost(),
+                .non_colliding(),
             cylinder([0.0, 0.0, 0.0], [0.8, 0.01, 0.6], Paint([224, 206, 168], Finish::Fabric))
-                .ghost(),
+                .non_colliding(),
         ],
     ),
     palette: &[[150, 58, 52], [70, 104, 84], [176, 136, 72]],

@@ -1,9 +1,8 @@
-//! What furnishes a kitchen: listed among the furniture of a house.
+//! Furniture of a kitchen, listed among the furniture of a house.
 
-use super::house::LACQUER;
 use super::shape::{
-    BLACK, DARK_STEEL, FURNISHING, GLASS, GLOSSY_BLACK, Paint, STEEL, cuboid, cylinder, in_metres,
-    rod_x, rod_z,
+    BLACK, DARK_STEEL, FURNISHING, GLASS, GLOSSY_BLACK, LACQUER, Paint, STEEL, cuboid, cylinder,
+    in_meters, rod_x, rod_z,
 };
 use super::{ClassInfo, Finish, Part};
 
@@ -15,17 +14,17 @@ pub(super) const REFRIGERATOR: ClassInfo = ClassInfo {
     detector_index: Some(49),
     size_m: REFRIGERATOR_M,
     mass_kg: 110.0,
-    parts: &in_metres(
+    parts: &in_meters(
         REFRIGERATOR_M,
         [
             cuboid([0.0, 0.05, 0.04], [0.9, 1.73, 0.67], Paint([206, 210, 214], Finish::Glossy))
                 .surface(),
-            cuboid([0.0, 0.0, 0.06], [0.84, 0.05, 0.58], BLACK).ghost(),
-            cuboid([0.0, 0.06, -0.32], [0.89, 1.1, 0.06], LACQUER).ghost(),
-            cuboid([0.0, 1.18, -0.32], [0.89, 0.59, 0.06], LACQUER).ghost(),
-            cylinder([-0.38, 0.61, -0.36], [0.026, 0.5, 0.026], STEEL).ghost(),
-            cylinder([-0.38, 1.22, -0.36], [0.026, 0.32, 0.026], STEEL).ghost(),
-            cuboid([0.16, 1.4, -0.3525], [0.2, 0.1, 0.01], GLASS).ghost(),
+            cuboid([0.0, 0.0, 0.06], [0.84, 0.05, 0.58], BLACK).non_colliding(),
+            cuboid([0.0, 0.06, -0.32], [0.89, 1.1, 0.06], LACQUER).non_colliding(),
+            cuboid([0.0, 1.18, -0.32], [0.89, 0.59, 0.06], LACQUER).non_colliding(),
+            cylinder([-0.38, 0.61, -0.36], [0.026, 0.5, 0.026], STEEL).non_colliding(),
+            cylinder([-0.38, 1.22, -0.36], [0.026, 0.32, 0.026], STEEL).non_colliding(),
+            cuboid([0.16, 1.4, -0.3525], [0.2, 0.1, 0.01], GLASS).non_colliding(),
         ],
     ),
     ..FURNISHING
@@ -35,17 +34,17 @@ const STONE_TOP: Paint = Paint([74, 76, 80], Finish::Glossy);
 
 /// A door of the kitchen counter.
 const fn counter_door(x: f32) -> Part {
-    cuboid([x, 0.11, -0.265], [0.43, 0.56, 0.02], LACQUER).ghost()
+    cuboid([x, 0.11, -0.265], [0.43, 0.56, 0.02], LACQUER).non_colliding()
 }
 
 /// A drawer of the kitchen counter.
 const fn counter_drawer(x: f32) -> Part {
-    cuboid([x, 0.69, -0.265], [0.43, 0.15, 0.02], LACQUER).ghost()
+    cuboid([x, 0.69, -0.265], [0.43, 0.15, 0.02], LACQUER).non_colliding()
 }
 
-/// The bar by which one of them is opened.
+/// The handle of a door or drawer.
 const fn counter_handle(x: f32, y: f32) -> Part {
-    rod_x([x, y, -0.28], 0.18, 0.016, STEEL).ghost()
+    rod_x([x, y, -0.28], 0.18, 0.016, STEEL).non_colliding()
 }
 
 const KITCHEN_COUNTER_M: [f32; 3] = [1.8, 0.9, 0.6];
@@ -54,7 +53,7 @@ pub(super) const KITCHEN_COUNTER: ClassInfo = ClassInfo {
     label: "kitchen counter",
     size_m: KITCHEN_COUNTER_M,
     mass_kg: 120.0,
-    parts: &in_metres(
+    parts: &in_meters(
         KITCHEN_COUNTER_M,
         [
             cuboid([0.0, 0.86, 0.0], [1.8, 0.04, 0.6], STONE_TOP).surface(),
@@ -84,12 +83,12 @@ pub(super) const KITCHEN_COUNTER: ClassInfo = ClassInfo {
 
 /// A hotplate of the stove.
 const fn hotplate(x: f32, z: f32, width_m: f32) -> Part {
-    cylinder([x, 0.885, z], [width_m, 0.014, width_m], DARK_STEEL).ghost()
+    cylinder([x, 0.885, z], [width_m, 0.014, width_m], DARK_STEEL).non_colliding()
 }
 
 /// A knob of the stove.
 const fn stove_knob(x: f32) -> Part {
-    rod_z([x, 0.81, -0.285], 0.03, 0.045, STEEL).ghost()
+    rod_z([x, 0.81, -0.285], 0.03, 0.045, STEEL).non_colliding()
 }
 
 const STOVE_M: [f32; 3] = [0.6, 0.9, 0.6];
@@ -98,7 +97,7 @@ pub(super) const STOVE: ClassInfo = ClassInfo {
     label: "stove",
     size_m: STOVE_M,
     mass_kg: 55.0,
-    parts: &in_metres(
+    parts: &in_meters(
         STOVE_M,
         [
             cuboid([0.0, 0.0, 0.02], [0.6, 0.87, 0.56], LACQUER),
@@ -107,14 +106,14 @@ pub(super) const STOVE: ClassInfo = ClassInfo {
             hotplate(0.14, -0.12, 0.16),
             hotplate(-0.14, 0.16, 0.16),
             hotplate(0.14, 0.16, 0.2),
-            cuboid([0.0, 0.75, -0.26], [0.6, 0.12, 0.02], BLACK).ghost(),
+            cuboid([0.0, 0.75, -0.26], [0.6, 0.12, 0.02], BLACK).non_colliding(),
             stove_knob(-0.21),
             stove_knob(-0.07),
             stove_knob(0.07),
             stove_knob(0.21),
-            cuboid([0.0, 0.2, -0.265], [0.54, 0.5, 0.02], DARK_STEEL).ghost(),
-            cuboid([0.0, 0.26, -0.27], [0.42, 0.3, 0.02], GLASS).ghost(),
-            rod_x([0.0, 0.64, -0.285], 0.46, 0.024, STEEL).ghost(),
+            cuboid([0.0, 0.2, -0.265], [0.54, 0.5, 0.02], DARK_STEEL).non_colliding(),
+            cuboid([0.0, 0.26, -0.27], [0.42, 0.3, 0.02], GLASS).non_colliding(),
+            rod_x([0.0, 0.64, -0.285], 0.46, 0.024, STEEL).non_colliding(),
         ],
     ),
     ..FURNISHING

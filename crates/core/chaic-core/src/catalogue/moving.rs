@@ -1,11 +1,11 @@
-//! The furniture that has to be carried to the truck when somebody moves house.
+//! Furniture of the moving-house task.
 //!
-//! Sizes are those of the original after its scaling; masses are those of its shipped episodes,
-//! in its own units, against which strengths are measured.
+//! Sizes are those of the original after its scaling. Masses are those of its shipped episodes, in
+//! the original's units, with which strengths are compared.
 
 use super::shape::{
     ARCH, ARCH_ALONG, BACKWARD, BLACK, BRASS, DARK_STEEL, FURNISHING, GLASS, GLOSSY_BLACK, Paint,
-    STEEL, WHITE, arc, ball, cuboid, cylinder, in_metres, rod_x, rod_z, taper,
+    STEEL, WHITE, arc, ball, cuboid, cylinder, in_meters, rod_x, rod_z, taper,
 };
 use super::{ClassInfo, Finish, Part, Role, TargetSet};
 
@@ -38,16 +38,16 @@ const BACKPACK: ClassInfo = ClassInfo {
     detector_index: Some(22),
     size_m: BACKPACK_M,
     mass_kg: 50.0,
-    parts: &in_metres(
+    parts: &in_meters(
         BACKPACK_M,
         [
             ball([0.0, 0.0, 0.02], [0.35, 0.59, 0.3], Paint([46, 84, 150], Finish::Fabric)),
             cylinder([0.0, 0.0, 0.02], [0.3, 0.2, 0.25], POCKET),
             ball([0.0, 0.05, -0.125], [0.27, 0.26, 0.18], POCKET),
             arc([0.0, 0.2, -0.092], 0.25, 0.014, 120.0, BRASS),
-            cuboid([0.045, 0.165, -0.195], [0.014, 0.04, 0.02], BRASS).ghost(),
-            ball([-0.145, 0.05, 0.03], [0.08, 0.2, 0.17], POCKET).ghost(),
-            ball([0.145, 0.05, 0.03], [0.08, 0.2, 0.17], POCKET).ghost(),
+            cuboid([0.045, 0.165, -0.195], [0.014, 0.04, 0.02], BRASS).non_colliding(),
+            ball([-0.145, 0.05, 0.03], [0.08, 0.2, 0.17], POCKET).non_colliding(),
+            ball([0.145, 0.05, 0.03], [0.08, 0.2, 0.17], POCKET).non_colliding(),
             arc([0.0, 0.555, 0.03], 0.11, 0.024, 190.0, STRAP).turned(ARCH),
             arc([-0.09, 0.29, 0.03], 0.388, 0.036, 150.0, STRAP).turned(BACKWARD),
             arc([0.09, 0.29, 0.03], 0.388, 0.036, 150.0, STRAP).turned(BACKWARD),
@@ -66,16 +66,16 @@ const KETTLE: ClassInfo = ClassInfo {
     detector_index: Some(40),
     size_m: KETTLE_M,
     mass_kg: 50.0,
-    parts: &in_metres(
+    parts: &in_meters(
         KETTLE_M,
         [
             taper(0.72, [0.0, 0.0, 0.02], [0.34, 0.17, 0.34], STEEL),
             ball([0.0, 0.115, 0.02], [0.245, 0.11, 0.245], STEEL),
-            cylinder([0.0, 0.0, 0.02], [0.34, 0.014, 0.34], DARK_STEEL).ghost(),
-            ball([0.0, 0.212, 0.02], [0.042, 0.042, 0.042], BLACK).ghost(),
+            cylinder([0.0, 0.0, 0.02], [0.34, 0.014, 0.34], DARK_STEEL).non_colliding(),
+            ball([0.0, 0.212, 0.02], [0.042, 0.042, 0.042], BLACK).non_colliding(),
             taper(0.5, [0.0, 0.075, -0.128], [0.066, 0.16, 0.066], STEEL)
                 .turned([-36.0, 0.0, 0.0])
-                .ghost(),
+                .non_colliding(),
             arc([0.0, 0.227, 0.02], 0.28, 0.026, 250.0, BLACK).turned(ARCH_ALONG),
         ],
     ),
@@ -93,7 +93,7 @@ const NAVY_CHAIR: ClassInfo = ClassInfo {
     detector_index: Some(38),
     size_m: NAVY_CHAIR_M,
     mass_kg: 120.0,
-    parts: &in_metres(
+    parts: &in_meters(
         NAVY_CHAIR_M,
         [
             cuboid([0.0, 0.44, -0.02], [0.41, 0.026, 0.44], ALUMINIUM).surface(),
@@ -102,12 +102,12 @@ const NAVY_CHAIR: ClassInfo = ClassInfo {
             cuboid([-0.185, 0.0, 0.215], [0.03, 0.84, 0.03], ALUMINIUM),
             cuboid([0.185, 0.0, 0.215], [0.03, 0.84, 0.03], ALUMINIUM),
             cuboid([0.0, 0.78, 0.225], [0.42, 0.08, 0.03], ALUMINIUM),
-            cuboid([-0.09, 0.46, 0.225], [0.035, 0.33, 0.016], ALUMINIUM).ghost(),
-            cuboid([0.0, 0.46, 0.225], [0.035, 0.33, 0.016], ALUMINIUM).ghost(),
-            cuboid([0.09, 0.46, 0.225], [0.035, 0.33, 0.016], ALUMINIUM).ghost(),
-            rod_x([0.0, 0.2, -0.215], 0.36, 0.02, ALUMINIUM).ghost(),
-            rod_z([-0.185, 0.24, 0.0], 0.42, 0.02, ALUMINIUM).ghost(),
-            rod_z([0.185, 0.24, 0.0], 0.42, 0.02, ALUMINIUM).ghost(),
+            cuboid([-0.09, 0.46, 0.225], [0.035, 0.33, 0.016], ALUMINIUM).non_colliding(),
+            cuboid([0.0, 0.46, 0.225], [0.035, 0.33, 0.016], ALUMINIUM).non_colliding(),
+            cuboid([0.09, 0.46, 0.225], [0.035, 0.33, 0.016], ALUMINIUM).non_colliding(),
+            rod_x([0.0, 0.2, -0.215], 0.36, 0.02, ALUMINIUM).non_colliding(),
+            rod_z([-0.185, 0.24, 0.0], 0.42, 0.02, ALUMINIUM).non_colliding(),
+            rod_z([0.185, 0.24, 0.0], 0.42, 0.02, ALUMINIUM).non_colliding(),
         ],
     ),
     ..FURNITURE
@@ -134,7 +134,7 @@ const WOOD_SHELVING: ClassInfo = ClassInfo {
     detector_index: Some(31),
     size_m: WOOD_SHELVING_M,
     mass_kg: 200.0,
-    parts: &in_metres(
+    parts: &in_meters(
         WOOD_SHELVING_M,
         [
             board(0.335),
@@ -144,8 +144,8 @@ const WOOD_SHELVING: ClassInfo = ClassInfo {
             post(0.14, -0.36),
             post(-0.14, 0.36),
             post(0.14, 0.36),
-            cuboid([0.0, 0.05, -0.36], [0.26, 0.035, 0.02], PINE_POST).ghost(),
-            cuboid([0.0, 0.05, 0.36], [0.26, 0.035, 0.02], PINE_POST).ghost(),
+            cuboid([0.0, 0.05, -0.36], [0.26, 0.035, 0.02], PINE_POST).non_colliding(),
+            cuboid([0.0, 0.05, 0.36], [0.26, 0.035, 0.02], PINE_POST).non_colliding(),
         ],
     ),
     ..FURNITURE
@@ -162,27 +162,27 @@ const PRINTER: ClassInfo = ClassInfo {
     detector_index: Some(39),
     size_m: PRINTER_M,
     mass_kg: 200.0,
-    parts: &in_metres(
+    parts: &in_meters(
         PRINTER_M,
         [
             cuboid([0.0, 0.0, 0.03], [0.5, 0.25, 0.33], PRINTER_GREY),
             cuboid([0.0, 0.25, 0.03], [0.48, 0.06, 0.31], PRINTER_DARK),
-            cuboid([0.0, 0.09, -0.135], [0.34, 0.08, 0.01], BLACK).ghost(),
-            cuboid([0.0, 0.06, -0.145], [0.34, 0.02, 0.1], PRINTER_DARK).ghost(),
-            cuboid([0.0, 0.08, -0.15], [0.22, 0.006, 0.09], WHITE).ghost(),
+            cuboid([0.0, 0.09, -0.135], [0.34, 0.08, 0.01], BLACK).non_colliding(),
+            cuboid([0.0, 0.06, -0.145], [0.34, 0.02, 0.1], PRINTER_DARK).non_colliding(),
+            cuboid([0.0, 0.08, -0.15], [0.22, 0.006, 0.09], WHITE).non_colliding(),
             cuboid([0.0, 0.28, 0.165], [0.26, 0.115, 0.012], PRINTER_DARK)
                 .turned([14.0, 0.0, 0.0])
-                .ghost(),
+                .non_colliding(),
             cuboid([0.0, 0.265, 0.152], [0.22, 0.125, 0.004], WHITE)
                 .turned([14.0, 0.0, 0.0])
-                .ghost(),
-            cuboid([-0.17, 0.2, -0.138], [0.09, 0.04, 0.006], GLASS).ghost(),
+                .non_colliding(),
+            cuboid([-0.17, 0.2, -0.138], [0.09, 0.04, 0.006], GLASS).non_colliding(),
             ball(
                 [-0.1, 0.207, -0.142],
                 [0.024, 0.024, 0.016],
                 Paint([60, 170, 90], Finish::Glossy),
             )
-            .ghost(),
+            .non_colliding(),
         ],
     ),
     ..FURNITURE
@@ -198,7 +198,7 @@ const TABLE: ClassInfo = ClassInfo {
     detector_index: Some(36),
     size_m: TABLE_M,
     mass_kg: 300.0,
-    parts: &in_metres(
+    parts: &in_meters(
         TABLE_M,
         [
             cuboid([0.0, 0.475, 0.0], [0.76, 0.035, 0.76], WALNUT).surface(),
@@ -206,10 +206,10 @@ const TABLE: ClassInfo = ClassInfo {
             cuboid([0.335, 0.0, -0.335], [0.055, 0.475, 0.055], WALNUT),
             cuboid([-0.335, 0.0, 0.335], [0.055, 0.475, 0.055], WALNUT),
             cuboid([0.335, 0.0, 0.335], [0.055, 0.475, 0.055], WALNUT),
-            cuboid([0.0, 0.41, -0.335], [0.64, 0.065, 0.025], WALNUT).ghost(),
-            cuboid([0.0, 0.41, 0.335], [0.64, 0.065, 0.025], WALNUT).ghost(),
-            cuboid([-0.335, 0.41, 0.0], [0.025, 0.065, 0.64], WALNUT).ghost(),
-            cuboid([0.335, 0.41, 0.0], [0.025, 0.065, 0.64], WALNUT).ghost(),
+            cuboid([0.0, 0.41, -0.335], [0.64, 0.065, 0.025], WALNUT).non_colliding(),
+            cuboid([0.0, 0.41, 0.335], [0.64, 0.065, 0.025], WALNUT).non_colliding(),
+            cuboid([-0.335, 0.41, 0.0], [0.025, 0.065, 0.64], WALNUT).non_colliding(),
+            cuboid([0.335, 0.41, 0.0], [0.025, 0.065, 0.64], WALNUT).non_colliding(),
         ],
     ),
     ..FURNITURE
@@ -223,21 +223,21 @@ const TELEVISION: ClassInfo = ClassInfo {
     detector_index: Some(41),
     size_m: TELEVISION_M,
     mass_kg: 300.0,
-    parts: &in_metres(
+    parts: &in_meters(
         TELEVISION_M,
         [
             cuboid([0.0, 0.02, -0.13], [0.83, 0.53, 0.25], Paint([54, 54, 58], Finish::Matte)),
             cuboid([0.0, 0.05, 0.085], [0.64, 0.42, 0.2], BLACK),
             cuboid([0.0, 0.09, 0.215], [0.44, 0.3, 0.09], BLACK),
             cuboid([0.0, 0.0, -0.02], [0.6, 0.05, 0.42], BLACK),
-            cuboid([0.05, 0.075, -0.25], [0.66, 0.44, 0.015], GLOSSY_BLACK).ghost(),
+            cuboid([0.05, 0.075, -0.25], [0.66, 0.44, 0.015], GLOSSY_BLACK).non_colliding(),
             ball([0.05, 0.095, -0.252], [0.6, 0.4, 0.016], Paint([60, 84, 98], Finish::Glass))
-                .ghost(),
+                .non_colliding(),
             cuboid([0.05, 0.105, -0.2525], [0.56, 0.38, 0.014], Paint([60, 84, 98], Finish::Glass))
-                .ghost(),
-            rod_z([-0.345, 0.45, -0.25], 0.018, 0.055, STEEL).ghost(),
-            rod_z([-0.345, 0.37, -0.25], 0.018, 0.055, STEEL).ghost(),
-            cuboid([-0.345, 0.1, -0.252], [0.07, 0.18, 0.01], DARK_STEEL).ghost(),
+                .non_colliding(),
+            rod_z([-0.345, 0.45, -0.25], 0.018, 0.055, STEEL).non_colliding(),
+            rod_z([-0.345, 0.37, -0.25], 0.018, 0.055, STEEL).non_colliding(),
+            cuboid([-0.345, 0.1, -0.252], [0.07, 0.18, 0.01], DARK_STEEL).non_colliding(),
         ],
     ),
     ..FURNITURE
@@ -251,25 +251,25 @@ const MICROWAVE: ClassInfo = ClassInfo {
     detector_index: Some(32),
     size_m: MICROWAVE_M,
     mass_kg: 400.0,
-    parts: &in_metres(
+    parts: &in_meters(
         MICROWAVE_M,
         [
             cuboid([0.0, 0.015, 0.02], [0.76, 0.425, 0.4], STEEL),
-            cuboid([0.0, 0.0, 0.02], [0.68, 0.02, 0.34], BLACK).ghost(),
-            cuboid([0.09, 0.045, -0.185], [0.54, 0.365, 0.02], DARK_STEEL).ghost(),
-            cuboid([0.115, 0.085, -0.19], [0.42, 0.285, 0.02], GLASS).ghost(),
-            cylinder([-0.14, 0.0775, -0.205], [0.028, 0.3, 0.028], STEEL).ghost(),
-            cuboid([-0.28, 0.045, -0.185], [0.17, 0.365, 0.02], BLACK).ghost(),
+            cuboid([0.0, 0.0, 0.02], [0.68, 0.02, 0.34], BLACK).non_colliding(),
+            cuboid([0.09, 0.045, -0.185], [0.54, 0.365, 0.02], DARK_STEEL).non_colliding(),
+            cuboid([0.115, 0.085, -0.19], [0.42, 0.285, 0.02], GLASS).non_colliding(),
+            cylinder([-0.14, 0.0775, -0.205], [0.028, 0.3, 0.028], STEEL).non_colliding(),
+            cuboid([-0.28, 0.045, -0.185], [0.17, 0.365, 0.02], BLACK).non_colliding(),
             cuboid(
                 [-0.28, 0.335, -0.19],
                 [0.13, 0.05, 0.02],
                 Paint([72, 214, 150], Finish::Glossy),
             )
-            .ghost(),
-            cuboid([-0.28, 0.265, -0.19], [0.13, 0.035, 0.02], STEEL).ghost(),
-            cuboid([-0.28, 0.215, -0.19], [0.13, 0.035, 0.02], STEEL).ghost(),
-            cuboid([-0.28, 0.165, -0.19], [0.13, 0.035, 0.02], STEEL).ghost(),
-            rod_z([-0.28, 0.1, -0.19], 0.03, 0.06, STEEL).ghost(),
+            .non_colliding(),
+            cuboid([-0.28, 0.265, -0.19], [0.13, 0.035, 0.02], STEEL).non_colliding(),
+            cuboid([-0.28, 0.215, -0.19], [0.13, 0.035, 0.02], STEEL).non_colliding(),
+            cuboid([-0.28, 0.165, -0.19], [0.13, 0.035, 0.02], STEEL).non_colliding(),
+            rod_z([-0.28, 0.1, -0.19], 0.03, 0.06, STEEL).non_colliding(),
         ],
     ),
     ..FURNITURE
@@ -283,23 +283,23 @@ const DISHWASHER: ClassInfo = ClassInfo {
     detector_index: Some(37),
     size_m: DISHWASHER_M,
     mass_kg: 400.0,
-    parts: &in_metres(
+    parts: &in_meters(
         DISHWASHER_M,
         [
             cuboid([0.0, 0.0, 0.025], [0.53, 0.72, 0.54], Paint([216, 218, 220], Finish::Glossy)),
-            cuboid([0.0, 0.0, -0.25], [0.5, 0.07, 0.02], BLACK).ghost(),
-            cuboid([0.0, 0.08, -0.255], [0.51, 0.5, 0.03], STEEL).ghost(),
-            cuboid([0.0, 0.59, -0.255], [0.51, 0.11, 0.03], DARK_STEEL).ghost(),
-            rod_x([0.0, 0.545, -0.28], 0.4, 0.028, STEEL).ghost(),
+            cuboid([0.0, 0.0, -0.25], [0.5, 0.07, 0.02], BLACK).non_colliding(),
+            cuboid([0.0, 0.08, -0.255], [0.51, 0.5, 0.03], STEEL).non_colliding(),
+            cuboid([0.0, 0.59, -0.255], [0.51, 0.11, 0.03], DARK_STEEL).non_colliding(),
+            rod_x([0.0, 0.545, -0.28], 0.4, 0.028, STEEL).non_colliding(),
             cuboid(
                 [-0.16, 0.625, -0.262],
                 [0.11, 0.04, 0.02],
                 Paint([86, 190, 220], Finish::Glossy),
             )
-            .ghost(),
-            rod_z([0.19, 0.645, -0.265], 0.03, 0.045, STEEL).ghost(),
-            rod_z([0.12, 0.645, -0.265], 0.02, 0.022, WHITE).ghost(),
-            rod_z([0.07, 0.645, -0.265], 0.02, 0.022, WHITE).ghost(),
+            .non_colliding(),
+            rod_z([0.19, 0.645, -0.265], 0.03, 0.045, STEEL).non_colliding(),
+            rod_z([0.12, 0.645, -0.265], 0.02, 0.022, WHITE).non_colliding(),
+            rod_z([0.07, 0.645, -0.265], 0.02, 0.022, WHITE).non_colliding(),
         ],
     ),
     ..FURNITURE
@@ -317,18 +317,18 @@ const DRAWER: ClassInfo = ClassInfo {
     detector_index: Some(35),
     size_m: DRAWER_M,
     mass_kg: 500.0,
-    parts: &in_metres(
+    parts: &in_meters(
         DRAWER_M,
         [
             cuboid([0.0, 0.05, 0.02], [0.47, 0.65, 0.45], HONEY),
             cuboid([0.0, 0.7, 0.0], [0.49, 0.03, 0.52], HONEY_DARK).surface(),
-            cuboid([0.0, 0.0, 0.03], [0.43, 0.05, 0.4], HONEY_DARK).ghost(),
-            cuboid([0.0, 0.5, -0.21], [0.43, 0.18, 0.02], HONEY_FRONT).ghost(),
-            cuboid([0.0, 0.295, -0.21], [0.43, 0.18, 0.02], HONEY_FRONT).ghost(),
-            cuboid([0.0, 0.09, -0.21], [0.43, 0.18, 0.02], HONEY_FRONT).ghost(),
-            ball([0.0, 0.57, -0.235], [0.04, 0.04, 0.04], BRASS).ghost(),
-            ball([0.0, 0.365, -0.235], [0.04, 0.04, 0.04], BRASS).ghost(),
-            ball([0.0, 0.16, -0.235], [0.04, 0.04, 0.04], BRASS).ghost(),
+            cuboid([0.0, 0.0, 0.03], [0.43, 0.05, 0.4], HONEY_DARK).non_colliding(),
+            cuboid([0.0, 0.5, -0.21], [0.43, 0.18, 0.02], HONEY_FRONT).non_colliding(),
+            cuboid([0.0, 0.295, -0.21], [0.43, 0.18, 0.02], HONEY_FRONT).non_colliding(),
+            cuboid([0.0, 0.09, -0.21], [0.43, 0.18, 0.02], HONEY_FRONT).non_colliding(),
+            ball([0.0, 0.57, -0.235], [0.04, 0.04, 0.04], BRASS).non_colliding(),
+            ball([0.0, 0.365, -0.235], [0.04, 0.04, 0.04], BRASS).non_colliding(),
+            ball([0.0, 0.16, -0.235], [0.04, 0.04, 0.04], BRASS).non_colliding(),
         ],
     ),
     ..FURNITURE
@@ -336,9 +336,9 @@ const DRAWER: ClassInfo = ClassInfo {
 
 const IVORY: Paint = Paint([244, 240, 226], Finish::Glossy);
 
-/// Two or three black keys, seen as one.
+/// A group of two or three black keys.
 const fn black_keys(x: f32, width_m: f32) -> Part {
-    cuboid([x, 0.525, -0.36], [width_m, 0.014, 0.07], GLOSSY_BLACK).ghost()
+    cuboid([x, 0.525, -0.36], [width_m, 0.014, 0.07], GLOSSY_BLACK).non_colliding()
 }
 
 const PIANO_M: [f32; 3] = [1.114, 1.058, 0.909];
@@ -349,7 +349,7 @@ const PIANO: ClassInfo = ClassInfo {
     detector_index: Some(34),
     size_m: PIANO_M,
     mass_kg: 700.0,
-    parts: &in_metres(
+    parts: &in_meters(
         PIANO_M,
         [
             cuboid([0.0, 0.4, -0.13], [1.11, 0.2, 0.36], GLOSSY_BLACK),
@@ -358,7 +358,7 @@ const PIANO: ClassInfo = ClassInfo {
             taper(0.6, [-0.46, 0.0, -0.2], [0.07, 0.4, 0.07], GLOSSY_BLACK),
             taper(0.6, [0.46, 0.0, -0.2], [0.07, 0.4, 0.07], GLOSSY_BLACK),
             taper(0.6, [0.16, 0.0, 0.33], [0.07, 0.4, 0.07], GLOSSY_BLACK),
-            cuboid([0.0, 0.5, -0.38], [0.98, 0.025, 0.13], IVORY).ghost(),
+            cuboid([0.0, 0.5, -0.38], [0.98, 0.025, 0.13], IVORY).non_colliding(),
             black_keys(-0.36, 0.12),
             black_keys(-0.18, 0.18),
             black_keys(0.0, 0.12),
@@ -366,13 +366,13 @@ const PIANO: ClassInfo = ClassInfo {
             black_keys(0.36, 0.12),
             cuboid([0.0, 0.6, -0.1], [0.5, 0.13, 0.015], GLOSSY_BLACK)
                 .turned([12.0, 0.0, 0.0])
-                .ghost(),
+                .non_colliding(),
             cylinder([0.12, 0.5, 0.14], [0.78, 0.105, 0.56], Paint([206, 160, 84], Finish::Wood))
-                .ghost(),
+                .non_colliding(),
             cuboid([0.17, 0.815, 0.15], [0.8, 0.02, 0.6], GLOSSY_BLACK)
                 .turned([0.0, 0.0, -34.0])
-                .ghost(),
-            cylinder([-0.12, 0.6, 0.2], [0.016, 0.4, 0.016], GLOSSY_BLACK).ghost(),
+                .non_colliding(),
+            cylinder([-0.12, 0.6, 0.2], [0.016, 0.4, 0.016], GLOSSY_BLACK).non_colliding(),
         ],
     ),
     ..FURNITURE
@@ -389,7 +389,7 @@ const SOFA: ClassInfo = ClassInfo {
     detector_index: Some(33),
     size_m: SOFA_M,
     mass_kg: 900.0,
-    parts: &in_metres(
+    parts: &in_meters(
         SOFA_M,
         [
             cuboid([0.0, 0.17, -0.07], [0.98, 0.13, 0.54], OATMEAL).surface(),
@@ -397,12 +397,12 @@ const SOFA: ClassInfo = ClassInfo {
             cuboid([0.0, 0.03, 0.27], [1.34, 0.43, 0.14], OATMEAL_DARK),
             cuboid([-0.58, 0.03, -0.07], [0.18, 0.4, 0.54], OATMEAL_DARK),
             cuboid([0.58, 0.03, -0.07], [0.18, 0.4, 0.54], OATMEAL_DARK),
-            rod_z([-0.58, 0.41, -0.07], 0.54, 0.1, OATMEAL_DARK).ghost(),
-            rod_z([0.58, 0.41, -0.07], 0.54, 0.1, OATMEAL_DARK).ghost(),
-            ball([-0.245, 0.27, 0.15], [0.47, 0.2, 0.14], OATMEAL).ghost(),
-            ball([0.245, 0.27, 0.15], [0.47, 0.2, 0.14], OATMEAL).ghost(),
-            cuboid([0.0, 0.18, -0.07], [0.012, 0.121, 0.536], OATMEAL_DARK).ghost(),
-            cuboid([0.0, 0.0, 0.0], [1.2, 0.03, 0.56], BLACK).ghost(),
+            rod_z([-0.58, 0.41, -0.07], 0.54, 0.1, OATMEAL_DARK).non_colliding(),
+            rod_z([0.58, 0.41, -0.07], 0.54, 0.1, OATMEAL_DARK).non_colliding(),
+            ball([-0.245, 0.27, 0.15], [0.47, 0.2, 0.14], OATMEAL).non_colliding(),
+            ball([0.245, 0.27, 0.15], [0.47, 0.2, 0.14], OATMEAL).non_colliding(),
+            cuboid([0.0, 0.18, -0.07], [0.012, 0.121, 0.536], OATMEAL_DARK).non_colliding(),
+            cuboid([0.0, 0.0, 0.0], [1.2, 0.03, 0.56], BLACK).non_colliding(),
         ],
     ),
     ..FURNITURE

@@ -1,7 +1,7 @@
-//! What stands in the way: obstacles that fill a doorway until somebody removes them.
+//! Obstacles, which block a doorway until an agent removes them.
 
 use super::shape::{
-    BLACK, BRASS, DARK_STEEL, FURNISHING, Paint, WHITE, arc, ball, cuboid, cylinder, in_metres,
+    BLACK, BRASS, DARK_STEEL, FURNISHING, Paint, WHITE, arc, ball, cuboid, cylinder, in_meters,
     ring, rod_z, round_tub, taper,
 };
 use super::{ClassInfo, Finish, Role};
@@ -21,17 +21,17 @@ const TRASHBIN: ClassInfo = ClassInfo {
     detector_index: Some(51),
     size_m: TRASHBIN_M,
     mass_kg: 33.0,
-    parts: &in_metres(
+    parts: &in_meters(
         TRASHBIN_M,
         [
             round_tub([0.0, 0.0, 0.0], [0.46, 0.55, 0.46], 0.014, 0.76, BIN_GREY),
-            ring([0.0, 0.545, 0.0], 0.48, 0.03, DARK_STEEL).ghost(),
-            ring([0.0, 0.03, 0.0], 0.376, 0.03, DARK_STEEL).ghost(),
-            cylinder([0.0, 0.02, 0.0], [0.36, 0.36, 0.36], BLACK).ghost(),
-            ball([-0.09, 0.34, -0.05], [0.17, 0.16, 0.16], PAPER).ghost(),
-            ball([0.08, 0.35, 0.06], [0.18, 0.16, 0.17], PAPER).ghost(),
+            ring([0.0, 0.545, 0.0], 0.48, 0.03, DARK_STEEL).non_colliding(),
+            ring([0.0, 0.03, 0.0], 0.376, 0.03, DARK_STEEL).non_colliding(),
+            cylinder([0.0, 0.02, 0.0], [0.36, 0.36, 0.36], BLACK).non_colliding(),
+            ball([-0.09, 0.34, -0.05], [0.17, 0.16, 0.16], PAPER).non_colliding(),
+            ball([0.08, 0.35, 0.06], [0.18, 0.16, 0.17], PAPER).non_colliding(),
             ball([0.06, 0.34, -0.1], [0.12, 0.12, 0.12], Paint([206, 176, 120], Finish::Matte))
-                .ghost(),
+                .non_colliding(),
         ],
     ),
     ..OBSTACLE
@@ -47,20 +47,22 @@ const BRIGHT_FIRE_EXTINGUISHER: ClassInfo = ClassInfo {
     detector_index: Some(52),
     size_m: BRIGHT_FIRE_EXTINGUISHER_M,
     mass_kg: 68.0,
-    parts: &in_metres(
+    parts: &in_meters(
         BRIGHT_FIRE_EXTINGUISHER_M,
         [
             cylinder([0.0, 0.03, 0.06], [0.27, 0.7, 0.27], EXTINGUISHER_RED),
             ball([0.0, 0.6, 0.06], [0.27, 0.26, 0.27], EXTINGUISHER_RED),
             cylinder([0.0, 0.0, 0.06], [0.28, 0.05, 0.28], BLACK),
-            cylinder([0.0, 0.83, 0.06], [0.075, 0.19, 0.075], BRASS).ghost(),
-            cuboid([0.0, 0.94, -0.02], [0.04, 0.03, 0.24], BLACK).ghost(),
-            cuboid([0.0, 1.005, -0.01], [0.04, 0.026, 0.26], BLACK).turned([9.0, 0.0, 0.0]).ghost(),
-            rod_z([0.0, 0.89, 0.01], 0.03, 0.07, WHITE).ghost(),
+            cylinder([0.0, 0.83, 0.06], [0.075, 0.19, 0.075], BRASS).non_colliding(),
+            cuboid([0.0, 0.94, -0.02], [0.04, 0.03, 0.24], BLACK).non_colliding(),
+            cuboid([0.0, 1.005, -0.01], [0.04, 0.026, 0.26], BLACK)
+                .turned([9.0, 0.0, 0.0])
+                .non_colliding(),
+            rod_z([0.0, 0.89, 0.01], 0.03, 0.07, WHITE).non_colliding(),
             arc([0.0, 0.79, -0.07], 0.26, 0.032, 190.0, BLACK).turned([40.0, 0.0, 90.0]),
-            taper(0.5, [0.0, 0.4, -0.165], [0.075, 0.34, 0.075], BLACK).ghost(),
-            cuboid([0.0, 0.32, -0.072], [0.17, 0.24, 0.012], WHITE).ghost(),
-            cuboid([0.0, 0.47, -0.074], [0.17, 0.05, 0.012], EXTINGUISHER_RED).ghost(),
+            taper(0.5, [0.0, 0.4, -0.165], [0.075, 0.34, 0.075], BLACK).non_colliding(),
+            cuboid([0.0, 0.32, -0.072], [0.17, 0.24, 0.012], WHITE).non_colliding(),
+            cuboid([0.0, 0.47, -0.074], [0.17, 0.05, 0.012], EXTINGUISHER_RED).non_colliding(),
         ],
     ),
     ..OBSTACLE

@@ -1,16 +1,17 @@
-//! How the tables of the catalogue write shapes: in metres, like a list of cut timber.
+//! Helpers for writing the shapes of the catalogue in meters.
 //!
-//! An upright solid is placed by the middle of its bottom face, as objects themselves are; a rod,
-//! a ring or an arc, which mostly lie or lean, by its middle. [`in_metres`] turns the whole list
-//! into fractions of the object's box.
+//! Upright solids are placed by the center of their bottom face, like objects. Rods, rings and arcs
+//! are placed by their center. [`in_meters`] converts a list of parts into fractions of the
+//! object's box.
 
 use super::{ClassInfo, Finish, Part, Role, Solid};
 
-/// What a part is painted with: its sRGB color and its finish.
+/// sRGB color and finish of a part.
 #[derive(Clone, Copy)]
 pub(super) struct Paint(pub(super) [u8; 3], pub(super) Finish);
 
 pub(super) const WHITE: Paint = Paint([238, 238, 234], Finish::Matte);
+pub(super) const LACQUER: Paint = Paint([236, 234, 228], Finish::Glossy);
 pub(super) const BLACK: Paint = Paint([28, 28, 31], Finish::Matte);
 pub(super) const GLOSSY_BLACK: Paint = Paint([20, 20, 23], Finish::Glossy);
 pub(super) const STEEL: Paint = Paint([186, 189, 194], Finish::Metal);
@@ -18,7 +19,7 @@ pub(super) const DARK_STEEL: Paint = Paint([84, 88, 94], Finish::Metal);
 pub(super) const BRASS: Paint = Paint([200, 162, 74], Finish::Metal);
 pub(super) const GLASS: Paint = Paint([38, 52, 64], Finish::Glass);
 
-/// A thing that nobody moves: what most classes of house and street leave unsaid.
+/// Defaults of immovable classes.
 pub(super) const FURNISHING: ClassInfo = ClassInfo {
     name: "",
     label: "",
@@ -32,11 +33,11 @@ pub(super) const FURNISHING: ClassInfo = ClassInfo {
     palette: &[],
 };
 
-/// A thing that one hand carries: what most goods leave unsaid.
+/// Defaults of classes that one hand carries.
 pub(super) const TARGET: ClassInfo = ClassInfo { role: Role::Target, ..FURNISHING };
 
-/// The parts, given in metres, as fractions of an object of this size.
-pub(super) const fn in_metres<const N: usize>(size_m: [f32; 3], mut parts: [Part; N]) -> [Part; N] {
+/// Converts parts in meters to fractions of an object of this size.
+pub(super) const fn in_meters<const N: usize>(size_m: [f32; 3], mut parts: [Part; N]) -> [Part; N] {
     let mut n = 0;
     while n < N {
         let mut axis = 0;
@@ -62,12 +63,12 @@ pub(super) const fn cylinder(bottom: [f32; 3], size: [f32; 3], paint: Paint) -> 
     taper(1.0, bottom, size, paint)
 }
 
-/// A cylinder whose top is `top` times as wide as its bottom.
+/// A frustum whose top is `top` times as wide as its bottom.
 pub(super) const fn taper(top: f32, bottom: [f32; 3], size: [f32; 3], paint: Paint) -> Part {
     upright(Solid::Frustum { top }, bottom, size, paint)
 }
 
-/// An open box with walls of `wall_m`, its bottom `narrowing` times as wide as its top.
+/// An open box with walls of `wall_m`; its bottom is `narrowing` times as wide as its top.
 pub(super) const fn tub(
     bottom: [f32; 3],
     size: [f32; 3],
@@ -79,7 +80,7 @@ pub(super) const fn tub(
     upright(Solid::Tub { wall, bottom: narrowing }, bottom, size, paint)
 }
 
-/// The same, round in plan.
+/// An open round tub, with the same parameters as [`tub`].
 pub(super) const fn round_tub(
     bottom: [f32; 3],
     size: [f32; 3],
@@ -91,9 +92,9 @@ pub(super) const fn round_tub(
     upright(Solid::RoundTub { wall, bottom: narrowing }, bottom, size, paint)
 }
 
-/// A thin cylinder about `middle`, turned from upright (degrees about z, then x, then y).
+/// A thin cylinder about `center`, rotated from upright (degrees about z, then x, then y).
 pub(super) const fn rod(
-    middle: [f32; 3],
+    center: [f32; 3],
     length_m: f32,
     width_m: f32,
     turn_deg: [f32; 3],
@@ -101,30 +102,30 @@ pub(super) const fn rod(
 ) -> Part {
     let Paint(color, finish) = paint;
     let extent = [width_m, length_m, width_m];
-    Part::new(Solid::Frustum { top: 1.0 }, middle, extent, color, finish).turned(turn_deg)
+    Part::new(Solid::Frustum { top: 1.0 }, center, extent, color, finish).turned(turn_deg)
 }
 
-/// A cylinder that lies along x.
-pub(super) const fn rod_x(middle: [f32; 3], length_m: f32, width_m: f32, paint: Paint) -> Part {
-    rod(middle, length_m, width_m, [0.0, 0.0, 90.0], paint)
+/// A cylinder along x.
+pub(super) const fn rod_x(center: [f32; 3], length_m: f32, width_m: f32, paint: Paint) -> Part {
+    rod(center, length_m, width_m, [0.0, 0.0, 90.0], paint)
 }
 
-/// A cylinder that lies along z.
-pub(super) const fn rod_z(middle: [f32; 3], length_m: f32, width_m: f32, paint: Paint) -> Part {
-    rod(middle, length_m, width_m, [90.0, 0.0, 0.0], paint)
+/// A cylinder along z.
+pub(super) const fn rod_z(center: [f32; 3], length_m: f32, width_m: f32, paint: Paint) -> Part {
+    rod(center, length_m, width_m, [90.0, 0.0, 0.0], paint)
 }
 
-/// A ring lying flat about `middle`.
-pub(super) const fn ring(middle: [f32; 3], outer_m: f32, tube_m: f32, paint: Paint) -> Part {
+/// A flat ring about `center`.
+pub(super) const fn ring(center: [f32; 3], outer_m: f32, tube_m: f32, paint: Paint) -> Part {
     let Paint(color, finish) = paint;
     let solid = Solid::Torus { tube: tube_m / outer_m };
-    Part::new(solid, middle, [outer_m, tube_m, outer_m], color, finish)
+    Part::new(solid, center, [outer_m, tube_m, outer_m], color, finish)
 }
 
-/// The piece of a flat ring about `middle` that lies within `degrees` around -z. Only to be looked
-/// at, since most of its box is empty.
+/// The sector of a flat ring about `center` within `degrees` around -z. It does not collide,
+/// because most of its box is empty.
 pub(super) const fn arc(
-    middle: [f32; 3],
+    center: [f32; 3],
     outer_m: f32,
     tube_m: f32,
     degrees: f32,
@@ -132,16 +133,16 @@ pub(super) const fn arc(
 ) -> Part {
     let Paint(color, finish) = paint;
     let solid = Solid::Arc { tube: tube_m / outer_m, degrees };
-    Part::new(solid, middle, [outer_m, tube_m, outer_m], color, finish).ghost()
+    Part::new(solid, center, [outer_m, tube_m, outer_m], color, finish).non_colliding()
 }
 
-/// Turns an arc upright, left to right, like the handle of a bucket.
+/// Rotation of an arc to upright, left to right, like the handle of a bucket.
 pub(super) const ARCH: [f32; 3] = [90.0, 0.0, 0.0];
-/// Turns an arc upright, front to back.
+/// Rotation of an arc to upright, front to back.
 pub(super) const ARCH_ALONG: [f32; 3] = [90.0, 90.0, 0.0];
-/// Turns a ring upright to roll along z, and an arc so that it bulges forward.
+/// Rotation of a ring to upright, rolling along z; an arc with it bulges forward.
 pub(super) const ROLLING: [f32; 3] = [0.0, 0.0, 90.0];
-/// Turns an arc so that it bulges backward.
+/// Rotation of an arc that makes it bulge backward.
 pub(super) const BACKWARD: [f32; 3] = [0.0, 180.0, 90.0];
 
 const fn upright(solid: Solid, bottom: [f32; 3], size: [f32; 3], paint: Paint) -> Part {

@@ -1,9 +1,9 @@
-//! What stands in the street: the truck and the hydrant that goods are brought to, the bicycle, the
-//! market's tents, and what makes a street look like one.
+//! Objects in a street: the truck and the hydrant as goal places, the bicycle, the tents of the
+//! market, and decoration.
 
 use super::shape::{
     BLACK, BRASS, FURNISHING, GLASS, Paint, ROLLING, STEEL, WHITE, ball, cuboid, cylinder,
-    in_metres, ring, rod, rod_x, rod_z, taper, tub,
+    in_meters, ring, rod, rod_x, rod_z, taper, tub,
 };
 use super::{ClassInfo, Finish, Part, Role};
 
@@ -16,17 +16,17 @@ const LAMP_RED: Paint = Paint([206, 40, 36], Finish::Glossy);
 const IRON: Paint = Paint([52, 56, 58], Finish::Metal);
 const BED_STEEL: Paint = Paint([112, 118, 124], Finish::Metal);
 
-/// A wheel of the truck, to be looked at: the chassis between the wheels is what stops people.
+/// A wheel of the truck, without collision: the chassis between the wheels collides.
 const fn truck_wheel(x: f32, z: f32) -> Part {
-    rod_x([x, 0.42, z], 0.3, 0.84, TIRE).ghost()
+    rod_x([x, 0.42, z], 0.3, 0.84, TIRE).non_colliding()
 }
 
-/// The cap over a wheel's nuts, on the outside of the truck.
+/// The cap over the nuts of a wheel, on the outside of the truck.
 const fn hub_cap(x: f32, z: f32) -> Part {
-    rod_x([x, 0.42, z], 0.02, 0.4, STEEL).ghost()
+    rod_x([x, 0.42, z], 0.02, 0.4, STEEL).non_colliding()
 }
 
-// The bed is open at the back; its floor is where moved furniture comes to stand.
+// The bed is open at the back; its floor supports the moved furniture.
 const TRUCK_M: [f32; 3] = [2.1, 2.2, 6.0];
 const TRUCK: ClassInfo = ClassInfo {
     name: "truck",
@@ -35,7 +35,7 @@ const TRUCK: ClassInfo = ClassInfo {
     detector_index: Some(42),
     size_m: TRUCK_M,
     mass_kg: 3500.0,
-    parts: &in_metres(
+    parts: &in_meters(
         TRUCK_M,
         [
             cuboid([0.0, 0.4, -2.22], [2.0, 1.8, 1.46], Paint([240, 190, 48], Finish::Glossy)),
@@ -44,12 +44,12 @@ const TRUCK: ClassInfo = ClassInfo {
             cuboid([1.02, 0.95, 0.8], [0.06, 0.3, 4.4], Paint([240, 190, 48], Finish::Glossy)),
             cuboid([0.0, 0.95, -1.37], [2.1, 0.7, 0.06], BED_STEEL),
             cuboid([0.0, 0.35, 0.0], [1.3, 0.45, 5.8], IRON),
-            cuboid([0.0, 1.3, -2.94], [1.76, 0.68, 0.05], GLASS).ghost(),
-            cuboid([0.0, 1.34, -2.3], [2.03, 0.6, 0.8], GLASS).ghost(),
-            cuboid([0.0, 0.8, -2.95], [1.2, 0.34, 0.05], BLACK).ghost(),
-            cuboid([0.0, 0.38, -2.94], [2.06, 0.22, 0.12], IRON).ghost(),
-            cuboid([-0.8, 0.82, -2.95], [0.28, 0.22, 0.06], LAMP_WHITE).ghost(),
-            cuboid([0.8, 0.82, -2.95], [0.28, 0.22, 0.06], LAMP_WHITE).ghost(),
+            cuboid([0.0, 1.3, -2.94], [1.76, 0.68, 0.05], GLASS).non_colliding(),
+            cuboid([0.0, 1.34, -2.3], [2.03, 0.6, 0.8], GLASS).non_colliding(),
+            cuboid([0.0, 0.8, -2.95], [1.2, 0.34, 0.05], BLACK).non_colliding(),
+            cuboid([0.0, 0.38, -2.94], [2.06, 0.22, 0.12], IRON).non_colliding(),
+            cuboid([-0.8, 0.82, -2.95], [0.28, 0.22, 0.06], LAMP_WHITE).non_colliding(),
+            cuboid([0.8, 0.82, -2.95], [0.28, 0.22, 0.06], LAMP_WHITE).non_colliding(),
             truck_wheel(-0.85, -2.1),
             truck_wheel(0.85, -2.1),
             truck_wheel(-0.85, 1.6),
@@ -58,8 +58,8 @@ const TRUCK: ClassInfo = ClassInfo {
             hub_cap(1.01, -2.1),
             hub_cap(-1.01, 1.6),
             hub_cap(1.01, 1.6),
-            cuboid([-0.85, 0.62, 2.95], [0.26, 0.14, 0.06], LAMP_RED).ghost(),
-            cuboid([0.85, 0.62, 2.95], [0.26, 0.14, 0.06], LAMP_RED).ghost(),
+            cuboid([-0.85, 0.62, 2.95], [0.26, 0.14, 0.06], LAMP_RED).non_colliding(),
+            cuboid([0.85, 0.62, 2.95], [0.26, 0.14, 0.06], LAMP_RED).non_colliding(),
         ],
     ),
     ..FURNISHING
@@ -76,19 +76,19 @@ const FIRE_HYDRANT: ClassInfo = ClassInfo {
     detector_index: Some(43),
     size_m: FIRE_HYDRANT_M,
     mass_kg: 120.0,
-    parts: &in_metres(
+    parts: &in_meters(
         FIRE_HYDRANT_M,
         [
             cylinder([0.0, 0.05, 0.0], [0.22, 0.5, 0.22], HYDRANT_RED),
             cylinder([0.0, 0.0, 0.0], [0.34, 0.06, 0.34], HYDRANT_RED),
             taper(0.68, [0.0, 0.55, 0.0], [0.27, 0.16, 0.27], HYDRANT_RED),
             cylinder([0.0, 0.7, 0.0], [0.2, 0.05, 0.2], HYDRANT_CAP).surface(),
-            cylinder([0.0, 0.53, 0.0], [0.3, 0.035, 0.3], HYDRANT_RED).ghost(),
-            rod_x([0.0, 0.42, 0.0], 0.34, 0.11, HYDRANT_RED).ghost(),
-            rod_x([-0.18, 0.42, 0.0], 0.04, 0.135, HYDRANT_CAP).ghost(),
-            rod_x([0.18, 0.42, 0.0], 0.04, 0.135, HYDRANT_CAP).ghost(),
-            rod_z([0.0, 0.36, -0.09], 0.17, 0.14, HYDRANT_RED).ghost(),
-            rod_z([0.0, 0.36, -0.18], 0.04, 0.17, HYDRANT_CAP).ghost(),
+            cylinder([0.0, 0.53, 0.0], [0.3, 0.035, 0.3], HYDRANT_RED).non_colliding(),
+            rod_x([0.0, 0.42, 0.0], 0.34, 0.11, HYDRANT_RED).non_colliding(),
+            rod_x([-0.18, 0.42, 0.0], 0.04, 0.135, HYDRANT_CAP).non_colliding(),
+            rod_x([0.18, 0.42, 0.0], 0.04, 0.135, HYDRANT_CAP).non_colliding(),
+            rod_z([0.0, 0.36, -0.09], 0.17, 0.14, HYDRANT_RED).non_colliding(),
+            rod_z([0.0, 0.36, -0.18], 0.04, 0.17, HYDRANT_CAP).non_colliding(),
         ],
     ),
     ..FURNISHING
@@ -100,12 +100,12 @@ const SADDLE: Paint = Paint([112, 70, 44], Finish::Fabric);
 
 /// A tube of the bicycle's frame, leaning in the plane of the wheels.
 const fn tube(y: f32, z: f32, length_m: f32, lean_deg: f32) -> Part {
-    rod([0.0, y, z], length_m, 0.034, [lean_deg, 0.0, 0.0], FRAME).ghost()
+    rod([0.0, y, z], length_m, 0.034, [lean_deg, 0.0, 0.0], FRAME).non_colliding()
 }
 
 /// Two opposite spokes of the wheel at `z`.
 const fn spoke(z: f32, lean_deg: f32) -> Part {
-    rod([0.0, 0.34, z], 0.64, 0.008, [lean_deg, 0.0, 0.0], STEEL).ghost()
+    rod([0.0, 0.34, z], 0.64, 0.008, [lean_deg, 0.0, 0.0], STEEL).non_colliding()
 }
 
 const BIKE_M: [f32; 3] = [0.6, 1.05, 1.75];
@@ -117,7 +117,7 @@ const BIKE: ClassInfo = ClassInfo {
     role: Role::Vehicle,
     size_m: BIKE_M,
     mass_kg: 16.0,
-    parts: &in_metres(
+    parts: &in_meters(
         BIKE_M,
         [
             // Down tube, seat tube, top tube, stays, fork.
@@ -135,15 +135,15 @@ const BIKE: ClassInfo = ClassInfo {
             spoke(0.535, 0.0),
             spoke(0.535, 60.0),
             spoke(0.535, 120.0),
-            rod([0.0, 0.975, -0.345], 0.12, 0.03, [18.4, 0.0, 0.0], STEEL).ghost(),
-            rod_x([0.0, 1.02, -0.33], 0.6, 0.026, STEEL).ghost(),
-            rod_x([-0.24, 1.02, -0.33], 0.12, 0.04, SADDLE).ghost(),
-            rod_x([0.24, 1.02, -0.33], 0.12, 0.04, SADDLE).ghost(),
+            rod([0.0, 0.975, -0.345], 0.12, 0.03, [18.4, 0.0, 0.0], STEEL).non_colliding(),
+            rod_x([0.0, 1.02, -0.33], 0.6, 0.026, STEEL).non_colliding(),
+            rod_x([-0.24, 1.02, -0.33], 0.12, 0.04, SADDLE).non_colliding(),
+            rod_x([0.24, 1.02, -0.33], 0.12, 0.04, SADDLE).non_colliding(),
             ball([0.0, 0.84, 0.27], [0.19, 0.08, 0.28], SADDLE),
             tub([0.0, 0.72, -0.62], [0.4, 0.25, 0.3], 0.014, 0.84, BIKE_BASKET),
-            rod_x([0.0, 0.3, 0.08], 0.03, 0.18, STEEL).ghost(),
-            cuboid([0.09, 0.19, 0.04], [0.1, 0.025, 0.07], BLACK).ghost(),
-            cuboid([-0.09, 0.39, 0.12], [0.1, 0.025, 0.07], BLACK).ghost(),
+            rod_x([0.0, 0.3, 0.08], 0.03, 0.18, STEEL).non_colliding(),
+            cuboid([0.09, 0.19, 0.04], [0.1, 0.025, 0.07], BLACK).non_colliding(),
+            cuboid([-0.09, 0.39, 0.12], [0.1, 0.025, 0.07], BLACK).non_colliding(),
         ],
     ),
     ..FURNISHING
@@ -160,7 +160,9 @@ const fn tent_pole(x: f32, z: f32) -> Part {
 /// A strip of canvas on the front (z < 0) or back slope of the tent's roof.
 const fn canvas(x: f32, z: f32, width_m: f32, thickness_m: f32, paint: Paint) -> Part {
     let lean_deg = if z < 0.0 { 68.7 } else { -68.7 };
-    cuboid([x, 1.68, z], [width_m, 1.01, thickness_m], paint).turned([lean_deg, 0.0, 0.0]).ghost()
+    cuboid([x, 1.68, z], [width_m, 1.01, thickness_m], paint)
+        .turned([lean_deg, 0.0, 0.0])
+        .non_colliding()
 }
 
 const TENT_M: [f32; 3] = [2.4, 2.4, 1.9];
@@ -171,7 +173,7 @@ const TENT: ClassInfo = ClassInfo {
     detector_index: Some(45),
     size_m: TENT_M,
     mass_kg: 40.0,
-    parts: &in_metres(
+    parts: &in_meters(
         TENT_M,
         [
             canvas(0.0, -0.475, 2.4, 0.02, CANVAS_RED),
@@ -182,8 +184,8 @@ const TENT: ClassInfo = ClassInfo {
             canvas(-0.6, 0.475, 0.4, 0.03, CANVAS_WHITE),
             canvas(0.0, 0.475, 0.4, 0.03, CANVAS_WHITE),
             canvas(0.6, 0.475, 0.4, 0.03, CANVAS_WHITE),
-            cuboid([0.0, 1.84, -0.935], [2.4, 0.17, 0.02], CANVAS_WHITE).ghost(),
-            cuboid([0.0, 1.84, 0.935], [2.4, 0.17, 0.02], CANVAS_WHITE).ghost(),
+            cuboid([0.0, 1.84, -0.935], [2.4, 0.17, 0.02], CANVAS_WHITE).non_colliding(),
+            cuboid([0.0, 1.84, 0.935], [2.4, 0.17, 0.02], CANVAS_WHITE).non_colliding(),
             tent_pole(-1.15, -0.9),
             tent_pole(1.15, -0.9),
             tent_pole(-1.15, 0.9),
@@ -199,14 +201,14 @@ const CHIMNEY: Paint = Paint([168, 104, 84], Finish::Matte);
 const STONE: Paint = Paint([142, 138, 132], Finish::Matte);
 const DOOR: Paint = Paint([60, 92, 82], Finish::Wood);
 
-/// A window's frame, its sill at 1.1 m.
+/// The frame of a window, with its sill at 1.1 m.
 const fn window_frame(x: f32) -> Part {
-    cuboid([x, 1.1, -0.19], [1.3, 1.5, 0.1], TRIM).ghost()
+    cuboid([x, 1.1, -0.19], [1.3, 1.5, 0.1], TRIM).non_colliding()
 }
 
 /// One of the two panes in a frame.
 const fn pane(x: f32) -> Part {
-    cuboid([x, 1.2, -0.2], [0.52, 1.3, 0.12], GLASS).ghost()
+    cuboid([x, 1.2, -0.2], [0.52, 1.3, 0.12], GLASS).non_colliding()
 }
 
 const HOUSE_FRONT_M: [f32; 3] = [8.0, 5.0, 1.0];
@@ -215,18 +217,20 @@ const HOUSE_FRONT: ClassInfo = ClassInfo {
     label: "house",
     size_m: HOUSE_FRONT_M,
     mass_kg: 20_000.0,
-    parts: &in_metres(
+    parts: &in_meters(
         HOUSE_FRONT_M,
         [
             cuboid([0.0, 0.0, 0.17], [7.6, 3.5, 0.66], Paint([224, 208, 172], Finish::Matte)),
-            cuboid([0.0, 3.29, 0.0], [8.0, 1.76, 0.11], ROOF).turned([30.7, 0.0, 0.0]).ghost(),
-            cuboid([0.0, 3.3, -0.47], [8.0, 0.12, 0.06], TRIM).ghost(),
-            cuboid([2.6, 3.6, 0.2], [0.7, 1.4, 0.5], CHIMNEY).ghost(),
-            cuboid([0.0, 0.0, -0.17], [7.62, 0.4, 0.06], STONE).ghost(),
+            cuboid([0.0, 3.29, 0.0], [8.0, 1.76, 0.11], ROOF)
+                .turned([30.7, 0.0, 0.0])
+                .non_colliding(),
+            cuboid([0.0, 3.3, -0.47], [8.0, 0.12, 0.06], TRIM).non_colliding(),
+            cuboid([2.6, 3.6, 0.2], [0.7, 1.4, 0.5], CHIMNEY).non_colliding(),
+            cuboid([0.0, 0.0, -0.17], [7.62, 0.4, 0.06], STONE).non_colliding(),
             cuboid([0.0, 0.0, -0.33], [1.6, 0.16, 0.34], STONE),
-            cuboid([0.0, 0.16, -0.19], [1.24, 2.3, 0.1], TRIM).ghost(),
-            cuboid([0.0, 0.16, -0.2], [1.0, 2.18, 0.12], DOOR).ghost(),
-            ball([-0.38, 1.15, -0.28], [0.09, 0.09, 0.09], BRASS).ghost(),
+            cuboid([0.0, 0.16, -0.19], [1.24, 2.3, 0.1], TRIM).non_colliding(),
+            cuboid([0.0, 0.16, -0.2], [1.0, 2.18, 0.12], DOOR).non_colliding(),
+            ball([-0.38, 1.15, -0.28], [0.09, 0.09, 0.09], BRASS).non_colliding(),
             window_frame(-2.4),
             pane(-2.69),
             pane(-2.11),
@@ -249,16 +253,16 @@ const TREE: ClassInfo = ClassInfo {
     label: "tree",
     size_m: TREE_M,
     mass_kg: 600.0,
-    parts: &in_metres(
+    parts: &in_meters(
         TREE_M,
         [
-            ball([0.0, 1.7, 0.0], [2.2, 2.2, 2.2], FOLIAGE).ghost(),
+            ball([0.0, 1.7, 0.0], [2.2, 2.2, 2.2], FOLIAGE).non_colliding(),
             taper(0.6, [0.0, 0.0, 0.0], [0.34, 2.2, 0.34], BARK),
-            ball([0.5, 1.6, 0.3], [1.5, 1.4, 1.5], LIGHT_FOLIAGE).ghost(),
-            ball([-0.55, 1.8, -0.25], [1.5, 1.5, 1.5], LIGHT_FOLIAGE).ghost(),
-            ball([0.1, 2.9, -0.1], [1.6, 1.7, 1.6], LIGHT_FOLIAGE).ghost(),
-            ball([-0.1, 1.9, 0.6], [1.4, 1.4, 1.3], FOLIAGE).ghost(),
-            ball([0.2, 1.9, -0.6], [1.4, 1.4, 1.3], FOLIAGE).ghost(),
+            ball([0.5, 1.6, 0.3], [1.5, 1.4, 1.5], LIGHT_FOLIAGE).non_colliding(),
+            ball([-0.55, 1.8, -0.25], [1.5, 1.5, 1.5], LIGHT_FOLIAGE).non_colliding(),
+            ball([0.1, 2.9, -0.1], [1.6, 1.7, 1.6], LIGHT_FOLIAGE).non_colliding(),
+            ball([-0.1, 1.9, 0.6], [1.4, 1.4, 1.3], FOLIAGE).non_colliding(),
+            ball([0.2, 1.9, -0.6], [1.4, 1.4, 1.3], FOLIAGE).non_colliding(),
         ],
     ),
     palette: &[[72, 126, 56], [92, 120, 44], [58, 112, 70]],
@@ -271,14 +275,14 @@ const STREET_LAMP: ClassInfo = ClassInfo {
     label: "street lamp",
     size_m: STREET_LAMP_M,
     mass_kg: 90.0,
-    parts: &in_metres(
+    parts: &in_meters(
         STREET_LAMP_M,
         [
             taper(0.6, [0.0, 0.0, 0.57], [0.16, 4.5, 0.16], IRON),
             taper(0.6, [0.0, 0.0, 0.57], [0.36, 0.5, 0.36], IRON),
-            rod_z([0.0, 4.5, 0.1], 1.0, 0.07, IRON).ghost(),
-            ball([0.0, 4.42, -0.44], [0.3, 0.18, 0.62], IRON).ghost(),
-            ball([0.0, 4.38, -0.44], [0.24, 0.16, 0.52], LAMP_WHITE).ghost(),
+            rod_z([0.0, 4.5, 0.1], 1.0, 0.07, IRON).non_colliding(),
+            ball([0.0, 4.42, -0.44], [0.3, 0.18, 0.62], IRON).non_colliding(),
+            ball([0.0, 4.38, -0.44], [0.24, 0.16, 0.52], LAMP_WHITE).non_colliding(),
         ],
     ),
     ..FURNISHING
@@ -292,7 +296,7 @@ const BENCH: ClassInfo = ClassInfo {
     label: "bench",
     size_m: BENCH_M,
     mass_kg: 45.0,
-    parts: &in_metres(
+    parts: &in_meters(
         BENCH_M,
         [
             cuboid([0.0, 0.42, -0.06], [1.6, 0.04, 0.46], PLANK).surface(),
@@ -300,14 +304,18 @@ const BENCH: ClassInfo = ClassInfo {
             cuboid([0.0, 0.71, 0.285], [1.6, 0.12, 0.035], PLANK),
             cuboid([-0.66, 0.0, 0.0], [0.06, 0.42, 0.5], IRON),
             cuboid([0.66, 0.0, 0.0], [0.06, 0.42, 0.5], IRON),
-            cuboid([-0.66, 0.42, 0.258], [0.05, 0.42, 0.04], IRON).turned([8.0, 0.0, 0.0]).ghost(),
-            cuboid([0.66, 0.42, 0.258], [0.05, 0.42, 0.04], IRON).turned([8.0, 0.0, 0.0]).ghost(),
-            cuboid([0.0, 0.461, -0.135], [1.6, 0.001, 0.012], IRON).ghost(),
-            cuboid([0.0, 0.461, 0.015], [1.6, 0.001, 0.012], IRON).ghost(),
-            cuboid([-0.74, 0.6, -0.03], [0.05, 0.04, 0.46], IRON).ghost(),
-            cuboid([0.74, 0.6, -0.03], [0.05, 0.04, 0.46], IRON).ghost(),
-            cuboid([-0.74, 0.42, -0.24], [0.05, 0.19, 0.04], IRON).ghost(),
-            cuboid([0.74, 0.42, -0.24], [0.05, 0.19, 0.04], IRON).ghost(),
+            cuboid([-0.66, 0.42, 0.258], [0.05, 0.42, 0.04], IRON)
+                .turned([8.0, 0.0, 0.0])
+                .non_colliding(),
+            cuboid([0.66, 0.42, 0.258], [0.05, 0.42, 0.04], IRON)
+                .turned([8.0, 0.0, 0.0])
+                .non_colliding(),
+            cuboid([0.0, 0.461, -0.135], [1.6, 0.001, 0.012], IRON).non_colliding(),
+            cuboid([0.0, 0.461, 0.015], [1.6, 0.001, 0.012], IRON).non_colliding(),
+            cuboid([-0.74, 0.6, -0.03], [0.05, 0.04, 0.46], IRON).non_colliding(),
+            cuboid([0.74, 0.6, -0.03], [0.05, 0.04, 0.46], IRON).non_colliding(),
+            cuboid([-0.74, 0.42, -0.24], [0.05, 0.19, 0.04], IRON).non_colliding(),
+            cuboid([0.74, 0.42, -0.24], [0.05, 0.19, 0.04], IRON).non_colliding(),
         ],
     ),
     ..FURNISHING
@@ -321,17 +329,17 @@ const MAILBOX: ClassInfo = ClassInfo {
     label: "mailbox",
     size_m: MAILBOX_M,
     mass_kg: 55.0,
-    parts: &in_metres(
+    parts: &in_meters(
         MAILBOX_M,
         [
             cuboid([0.0, 0.16, 0.0], [0.5, 0.8, 0.48], POST_BLUE),
             rod_x([0.0, 0.96, 0.0], 0.5, 0.48, POST_BLUE),
             cuboid([-0.2, 0.0, 0.0], [0.06, 0.16, 0.44], IRON),
             cuboid([0.2, 0.0, 0.0], [0.06, 0.16, 0.44], IRON),
-            cuboid([0.0, 0.93, -0.225], [0.36, 0.05, 0.04], BLACK).ghost(),
-            cuboid([0.0, 0.985, -0.22], [0.38, 0.02, 0.06], STEEL).ghost(),
-            cuboid([0.0, 0.55, -0.235], [0.3, 0.22, 0.02], WHITE).ghost(),
-            cuboid([0.0, 0.64, -0.237], [0.3, 0.04, 0.02], LAMP_RED).ghost(),
+            cuboid([0.0, 0.93, -0.225], [0.36, 0.05, 0.04], BLACK).non_colliding(),
+            cuboid([0.0, 0.985, -0.22], [0.38, 0.02, 0.06], STEEL).non_colliding(),
+            cuboid([0.0, 0.55, -0.235], [0.3, 0.22, 0.02], WHITE).non_colliding(),
+            cuboid([0.0, 0.64, -0.237], [0.3, 0.04, 0.02], LAMP_RED).non_colliding(),
         ],
     ),
     ..FURNISHING
@@ -341,7 +349,7 @@ const PICKET: Paint = Paint([240, 240, 234], Finish::Wood);
 
 /// A pointed board of the fence.
 const fn picket(x: f32) -> Part {
-    cuboid([x, 0.06, -0.025], [0.1, 0.9, 0.025], PICKET).ghost()
+    cuboid([x, 0.06, -0.025], [0.1, 0.9, 0.025], PICKET).non_colliding()
 }
 
 const FENCE_M: [f32; 3] = [2.0, 1.0, 0.1];
@@ -350,7 +358,7 @@ const FENCE: ClassInfo = ClassInfo {
     label: "fence",
     size_m: FENCE_M,
     mass_kg: 25.0,
-    parts: &in_metres(
+    parts: &in_meters(
         FENCE_M,
         [
             cuboid([0.0, 0.24, 0.005], [2.0, 0.09, 0.035], PICKET),

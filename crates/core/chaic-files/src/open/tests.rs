@@ -1,9 +1,9 @@
-//! Only regular files are opened, whatever lies in their place.
+//! Only regular files are opened.
 
 use super::*;
 
 #[test]
-fn only_regular_files_are_read_and_not_beyond_the_limit() {
+fn only_regular_files_are_read_up_to_the_limit() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.txt");
     fs::write(&path, "0123456789").unwrap();
@@ -13,7 +13,7 @@ fn only_regular_files_are_read_and_not_beyond_the_limit() {
     let error = read_bounded(dir.path(), 4).unwrap_err().to_string();
     assert!(error.contains("it is a folder"), "{error}");
     let missing = read_bounded(&dir.path().join("b.txt"), 4).unwrap_err();
-    assert_eq!(missing.refusal.kind(), ErrorKind::NotFound);
+    assert_eq!(missing.error.kind(), ErrorKind::NotFound);
     assert!(missing.to_string().starts_with("can't open "), "{missing}");
     #[cfg(unix)]
     {
@@ -29,9 +29,9 @@ mod links {
 
     use super::*;
 
-    /// A folder `root` with a file `f/x`, a linked file `f/y`, a dangling link `f/z`, a pipe `f/p` and a
-    /// linked folder `g`, and the file `secret` outside of it.
-    fn trapped() -> tempfile::TempDir {
+    /// Creates a folder `root`, and the file `secret` outside of it. The root contains a file `f/x`,
+    /// a linked file `f/y`, a dangling link `f/z`, a pipe `f/p` and a linked folder `g`.
+    fn folder_with_links() -> tempfile::TempDir {
         let dir = tempfile::tempdir().unwrap();
         let root = dir.path().join("root");
         fs::create_dir_all(root.join("f")).unwrap();
@@ -47,13 +47,13 @@ mod links {
 
     #[test]
     fn links_are_not_followed_below_a_folder() {
-        let dir = trapped();
+        let dir = folder_with_links();
         let root = dir.path().join("root");
-        let said = |name: &str| {
+        let content_or_error = |name: &str| {
             let read = read_below(&root, &root.join(name), 9);
             read.map_or_else(|e| e.to_string(), |bytes| String::from_utf8(bytes).unwrap())
         };
-        assert_eq!(said("f/x"), "good");
+        assert_eq!(content_or_error("f/x"), "good");
         for (name, words) in [
             ("f/y", "it is a link"),
             ("f/z", "it is a link"),
@@ -62,9 +62,9 @@ mod links {
             ("f", "it is a folder"),
             ("f/x/x", "can't open"),
         ] {
-            assert!(said(name).contains(words), "{name}: {}", said(name));
+            assert!(content_or_error(name).contains(words), "{name}: {}", content_or_error(name));
         }
-        // Even where the link was planted after the name was looked at.
+        // Links created after the check of the name are refused too.
         let open = |names: &[&str]| {
             let names: Vec<&std::ffi::OsStr> = names.iter().map(std::ffi::OsStr::new).collect();
             open_names(&root, &names)
@@ -74,8 +74,8 @@ mod links {
     }
 
     #[test]
-    fn a_file_that_a_user_names_may_be_a_link_to_a_regular_file() {
-        let dir = trapped();
+    fn a_user_file_may_be_a_link_to_a_regular_file() {
+        let dir = folder_with_links();
         let f = dir.path().join("root/f");
         assert_eq!(read_user_file(&f.join("y"), 9).unwrap(), b"secret");
         assert!(read_bounded(&f.join("y"), 9).is_err());
@@ -85,38 +85,39 @@ mod links {
 
     #[test]
     fn nothing_is_written_through_a_link() {
-        let dir = trapped();
+        let dir = folder_with_links();
         let root = dir.path().join("root");
         for name in ["f/y", "f/z", "f/p", "g"] {
             let path = root.join(name);
-            assert!(open_to_append(&path).is_err(), "{name}");
+            assert!(open_for_append(&path).is_err(), "{name}");
             assert!(open_or_create(&path).is_err(), "{name}");
         }
         assert!(!dir.path().join("new").exists());
-        make_folders_below(&root, &root.join("f/a/b")).unwrap();
-        make_folders_below(&root, &root.join("f/a/b")).unwrap();
+        create_folders_below(&root, &root.join("f/a/b")).unwrap();
+        create_folders_below(&root, &root.join("f/a/b")).unwrap();
         for name in ["g/a", "f/x/a", "f/y"] {
-            assert!(make_folders_below(&root, &root.join(name)).is_err(), "{name}");
+            assert!(create_folders_below(&root, &root.join(name)).is_err(), "{name}");
         }
         for name in ["f/y", "f/z", "f/p", "f/x", "f/new"] {
-            drop(create_fresh(&root.join(name)).unwrap());
+            drop(create_or_replace(&root.join(name)).unwrap());
             assert_eq!(kind(&root.join(name)).unwrap(), EntryKind::File, "{name}");
         }
-        assert!(create_fresh(&root.join("f/a")).is_err());
+        assert!(create_or_replace(&root.join("f/a")).is_err());
         assert_eq!(fs::read(dir.path().join("secret")).unwrap(), b"secret");
         assert!(!dir.path().join("new").exists());
     }
 
     #[test]
-    fn a_planted_unfinished_file_redirects_no_write() {
-        let dir = trapped();
+    fn a_linked_temporary_file_does_not_redirect_a_write() {
+        let dir = folder_with_links();
         let path = dir.path().join("root/report.md");
-        symlink(dir.path().join("secret"), crate::with_suffix(&path, crate::UNFINISHED)).unwrap();
-        crate::write_whole(&path, b"new").unwrap();
+        symlink(dir.path().join("secret"), crate::with_suffix(&path, crate::TEMPORARY_SUFFIX))
+            .unwrap();
+        crate::write_atomically(&path, b"new").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"new");
         assert_eq!(fs::read(dir.path().join("secret")).unwrap(), b"secret");
-        // A linked file is replaced, and what it leads to stays.
-        crate::write_whole(&dir.path().join("root/f/y"), b"new").unwrap();
+        // A linked file is replaced, and the target of the link stays unchanged.
+        crate::write_atomically(&dir.path().join("root/f/y"), b"new").unwrap();
         assert_eq!(fs::read(dir.path().join("secret")).unwrap(), b"secret");
     }
 }

@@ -1,4 +1,4 @@
-//! The filter of system calls.
+//! Filter of system calls.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use seccompiler::{
     SeccompFilter, SeccompRule, TargetArch, apply_filter,
 };
 
-/// System calls that always fail with `EPERM`, by what a command could reach through them.
+/// System calls that always fail with `EPERM`, grouped by what a command could reach through them.
 const DENIED: &[c_long] = &[
     // Other processes.
     libc::SYS_ptrace,
@@ -34,12 +34,12 @@ const DENIED: &[c_long] = &[
     libc::SYS_mount_setattr,
     libc::SYS_open_by_handle_at,
     libc::SYS_name_to_handle_at,
-    // Memory that the limits cannot see: files that no folder holds, and System V segments.
+    // Memory outside the limits: files without a folder, and System V segments.
     libc::SYS_memfd_create,
     libc::SYS_memfd_secret,
     libc::SYS_shmget,
     libc::SYS_mq_open,
-    // The kernel itself, and interfaces with a long record of errors in it.
+    // The kernel itself, and interfaces with a history of kernel vulnerabilities.
     libc::SYS_bpf,
     libc::SYS_io_uring_setup,
     libc::SYS_io_uring_enter,
@@ -75,7 +75,7 @@ const DENIED: &[c_long] = &[
     libc::SYS_modify_ldt,
 ];
 
-/// Flags of `clone` that make namespaces.
+/// Flags of `clone` that create namespaces.
 const NAMESPACE_FLAGS: &[i32] = &[
     libc::CLONE_NEWUSER,
     libc::CLONE_NEWPID,
@@ -86,15 +86,15 @@ const NAMESPACE_FLAGS: &[i32] = &[
     libc::CLONE_NEWCGROUP,
 ];
 
-/// Commands of `ioctl` that put input into a terminal.
+/// Commands of `ioctl` that insert input into a terminal.
 const TERMINAL_INPUT: &[u64] = &[0x5412, 0x541c];
 
 type Rules = BTreeMap<i64, Vec<SeccompRule>>;
 
-/// Applies the filter to this process and its descendants. `local_sockets` allows sockets of the address
-/// family `AF_UNIX`, which a root folder of its own keeps from those of the system.
+/// Applies the filter to this process and its descendants. `local_sockets` allows sockets of the
+/// address family `AF_UNIX`, which a private root folder separates from those of the system.
 pub(super) fn apply(local_sockets: bool) -> Result<(), Error> {
-    // glibc then uses `clone`, whose flags a filter can read.
+    // glibc then falls back to `clone`, whose flags a filter can read.
     let missing = Rules::from([(libc::SYS_clone3, Vec::new())]);
     for (rules, errno) in [(missing, libc::ENOSYS), (denied(local_sockets)?, libc::EPERM)] {
         apply_filter(&program(rules, errno)?)?;
@@ -123,7 +123,7 @@ fn denied(local_sockets: bool) -> Result<Rules, Error> {
 }
 
 fn program(rules: Rules, errno: i32) -> Result<BpfProgram, Error> {
-    /// Marks a call of the x32 interface, which has the numbers of x86-64 beside it.
+    /// Bit of a system call of the x32 interface, which shares the numbers of x86-64.
     #[cfg(target_arch = "x86_64")]
     const X32: i64 = 0x4000_0000;
     #[cfg(target_arch = "x86_64")]

@@ -1,4 +1,4 @@
-//! Landlock: which files the process and its descendants can open.
+//! Landlock: restricts the files that the process and its descendants can open.
 
 use std::path::PathBuf;
 
@@ -7,21 +7,22 @@ use landlock::{
     RulesetCreatedAttr as _, RulesetError, RulesetStatus, Scope, path_beneath_rules,
 };
 
-/// Newest version of Landlock whose restrictions are used; older kernels enforce those that they know.
+/// Newest version of Landlock whose restrictions are used; older kernels enforce the subset they
+/// support.
 const NEWEST: ABI = ABI::V6;
 
-/// Paths that the process keeps access to. Missing ones are ignored.
+/// Paths to which the process keeps access. Missing ones are ignored.
 pub(super) struct Access {
-    /// To read and execute.
+    /// Paths to read and execute.
     pub read: Vec<PathBuf>,
-    /// To read, write, create and remove.
+    /// Paths to read, write, create and remove.
     pub write: Vec<PathBuf>,
     /// Devices to read and write.
     pub devices: Vec<PathBuf>,
 }
 
-/// Restricts the process to these paths, and its signals and abstract sockets to its own descendants.
-/// Returns whether the kernel enforces it.
+/// Restricts the process to these paths, and its signals and abstract sockets to its own
+/// descendants. Returns whether the kernel enforces it.
 pub(super) fn restrict(access: &Access) -> Result<bool, RulesetError> {
     let files = AccessFs::from_file(NEWEST);
     let status = Ruleset::default()

@@ -1,12 +1,12 @@
-//! The private root folder of a sandboxed command, in a mount namespace of its own.
+//! Private root folder of a sandboxed command, in a separate mount namespace.
 //!
 //! ```text
 //! /            read-only, in memory
-//! ├── usr, lib, ...   the system's, read-only
-//! ├── etc             a few files of the system's, and a user table of one user
+//! ├── usr, lib, ...   those of the system, read-only
+//! ├── etc             some files of the system, and a user table with one user
 //! ├── dev             null, zero, full, random, urandom
 //! ├── proc            of the command's pid namespace
-//! ├── tmp, dev/shm, start folder   private, writable, in memory and bounded together
+//! ├── tmp, dev/shm, start folder   private, writable, in memory, with a common limit
 //! └── readable files and folders at their own paths, read-only
 //! ```
 
@@ -22,33 +22,33 @@ use rustix::mount::{
 };
 use rustix::process::pivot_root;
 
-use super::{Setup, SetupError};
+use super::{SetupError, SetupResult};
 use crate::policy::{DEVICES, Policy, SYSTEM_FILES, SYSTEM_FOLDERS};
 
-/// Where everything is put together: every system has this folder.
+/// Folder in which the root is built; it exists on every system.
 const BASE: &str = "/tmp";
-/// The root folder of the caller, while the new one is built.
+/// Root folder of the caller during the construction.
 const OLD: &str = "/old";
-/// The new root folder, while it is built.
+/// New root folder during the construction.
 const NEW: &str = "/new";
-/// The private file system, of which folders become visible in the new root.
+/// Private file system whose folders are bound into the new root.
 const SCRATCH: &str = "/scratch";
-/// Files and folders that a command can make at most.
+/// Maximum number of files and folders that a command can create.
 const MAX_FILES: u32 = 100_000;
 
 /// Builds the root folder and enters it. Returns the folders that the command can write to.
-pub(super) fn build(policy: &Policy) -> Setup<Vec<PathBuf>> {
-    unshare(CloneFlags::CLONE_NEWNS).map_err(SetupError::of("enter a mount namespace"))?;
+pub(super) fn build(policy: &Policy) -> SetupResult<Vec<PathBuf>> {
+    unshare(CloneFlags::CLONE_NEWNS).map_err(SetupError::context("enter a mount namespace"))?;
     mount_change("/", MountPropagationFlags::PRIVATE | MountPropagationFlags::REC)
-        .map_err(SetupError::of("keep mounts private"))?;
-    memory_file_system(BASE, "mode=0755,size=1m")?;
+        .map_err(SetupError::context("keep mounts private"))?;
+    mount_tmpfs(BASE, "mode=0755,size=1m")?;
     for folder in [OLD, NEW, SCRATCH] {
         make_folder(Path::new(&format!("{BASE}{folder}")))?;
     }
     enter(BASE, &format!("{BASE}{OLD}"))?;
-    memory_file_system(NEW, "mode=0755,size=4m")?;
+    mount_tmpfs(NEW, "mode=0755,size=4m")?;
     let options = format!("mode=0700,size={}m,nr_inodes={MAX_FILES}", policy.scratch_mib);
-    memory_file_system(SCRATCH, &options)?;
+    mount_tmpfs(SCRATCH, &options)?;
 
     let mut root = Root { writable: Vec::new() };
     root.add_system()?;
@@ -56,7 +56,7 @@ pub(super) fn build(policy: &Policy) -> Setup<Vec<PathBuf>> {
     if !policy.is_readable(Path::new("/tmp")) {
         root.add_private(Path::new("/tmp"))?;
     }
-    // The root itself and folders of the kernel are what they are.
+    // The root itself and the folders of the kernel are not replaced.
     let is_replaced =
         !["/", "/dev", "/proc", "/sys", "/etc"].map(Path::new).contains(&&*policy.start_folder);
     if is_replaced && !policy.is_readable(&policy.start_folder) {
@@ -71,46 +71,47 @@ pub(super) fn build(policy: &Policy) -> Setup<Vec<PathBuf>> {
 
     make_folder(Path::new("/new/old"))?;
     enter(NEW, "/new/old")?;
-    unmount("/old", UnmountFlags::DETACH).map_err(SetupError::of("leave the caller's root"))?;
-    fs::remove_dir("/old").map_err(SetupError::of("remove the way back"))?;
+    unmount("/old", UnmountFlags::DETACH)
+        .map_err(SetupError::context("leave the caller's root"))?;
+    fs::remove_dir("/old").map_err(SetupError::context("remove the caller's root"))?;
     let flags = MountFlags::BIND | MountFlags::RDONLY | MountFlags::NOSUID | MountFlags::NODEV;
-    mount_remount("/", flags, "").map_err(SetupError::of("make the root read-only"))?;
+    mount_remount("/", flags, "").map_err(SetupError::context("make the root read-only"))?;
     Ok(root.writable)
 }
 
-fn enter(new: &str, old: &str) -> Setup<()> {
-    pivot_root(new, old).map_err(SetupError::of(format!("make {new} the root")))?;
-    std::env::set_current_dir("/").map_err(SetupError::of("enter the new root"))
+fn enter(new: &str, old: &str) -> SetupResult<()> {
+    pivot_root(new, old).map_err(SetupError::context(format!("make {new} the root")))?;
+    std::env::set_current_dir("/").map_err(SetupError::context("enter the new root"))
 }
 
-fn memory_file_system(at: &str, options: &str) -> Setup<()> {
-    let step = SetupError::of(format!("mount a private file system at {at}"));
+fn mount_tmpfs(path: &str, options: &str) -> SetupResult<()> {
+    let step = SetupError::context(format!("mount a private file system at {path}"));
     let options = CString::new(options).expect("options have no zero bytes");
-    mount("tmpfs", at, "tmpfs", MountFlags::NOSUID | MountFlags::NODEV, &*options).map_err(step)
+    mount("tmpfs", path, "tmpfs", MountFlags::NOSUID | MountFlags::NODEV, &*options).map_err(step)
 }
 
-fn make_folder(path: &Path) -> Setup<()> {
-    fs::create_dir_all(path).map_err(SetupError::of(format!("make {}", path.display())))
+fn make_folder(path: &Path) -> SetupResult<()> {
+    fs::create_dir_all(path).map_err(SetupError::context(format!("make {}", path.display())))
 }
 
-/// Joins an absolute path to another root.
+/// Rebases an absolute path to another root.
 fn under(root: &str, path: &Path) -> PathBuf {
     let inside = path.strip_prefix("/").unwrap_or(path);
     Path::new(root).join(inside)
 }
 
-/// The new root folder under construction.
+/// New root folder under construction.
 struct Root {
     writable: Vec<PathBuf>,
 }
 
 impl Root {
-    fn add_system(&mut self) -> Setup<()> {
+    fn add_system(&mut self) -> SetupResult<()> {
         for path in SYSTEM_FOLDERS.iter().chain(SYSTEM_FILES).map(Path::new) {
             let (old, new) = (under(OLD, path), under(NEW, path));
             let Ok(kind) = fs::symlink_metadata(&old) else { continue };
             if kind.is_symlink() {
-                let step = || SetupError::of(format!("link {}", path.display()));
+                let step = || SetupError::context(format!("link {}", path.display()));
                 let target = fs::read_link(&old).map_err(step())?;
                 make_folder(new.parent().unwrap_or(&new))?;
                 symlink(target, &new).map_err(step())?;
@@ -120,7 +121,7 @@ impl Root {
         }
         let text = |name: &str, text: &str| {
             let path = under(NEW, Path::new(name));
-            fs::write(&path, text).map_err(SetupError::of(format!("write {name}")))
+            fs::write(&path, text).map_err(SetupError::context(format!("write {name}")))
         };
         make_folder(&under(NEW, Path::new("/etc")))?;
         text("/etc/passwd", "helper:x:0:0:helper:/tmp:/bin/sh\n")?;
@@ -129,7 +130,7 @@ impl Root {
         text("/etc/nsswitch.conf", "passwd: files\ngroup: files\nhosts: files\n")
     }
 
-    fn add_devices(&mut self) -> Setup<()> {
+    fn add_devices(&mut self) -> SetupResult<()> {
         for device in DEVICES.iter().map(Path::new) {
             if under(OLD, device).exists() {
                 self.bind(device, device)?;
@@ -139,13 +140,13 @@ impl Root {
         for (name, target) in links {
             let link = under(NEW, &Path::new("/dev").join(name));
             symlink(format!("/proc/self/{target}"), &link)
-                .map_err(SetupError::of(format!("link /dev/{name}")))?;
+                .map_err(SetupError::context(format!("link /dev/{name}")))?;
         }
         self.add_private(Path::new("/dev/shm"))
     }
 
     /// Adds an empty writable folder.
-    fn add_private(&mut self, path: &Path) -> Setup<()> {
+    fn add_private(&mut self, path: &Path) -> SetupResult<()> {
         if self.writable.iter().any(|writable| writable == path) {
             return Ok(());
         }
@@ -159,7 +160,7 @@ impl Root {
     }
 
     /// Adds readable paths, outer folders first.
-    fn add_readable(&mut self, policy: &Policy) -> Setup<()> {
+    fn add_readable(&mut self, policy: &Policy) -> SetupResult<()> {
         let mut paths = policy.readable.clone();
         paths.sort_by_key(|path| path.components().count());
         let mut added: Vec<PathBuf> = SYSTEM_FOLDERS.iter().map(PathBuf::from).collect();
@@ -167,14 +168,14 @@ impl Root {
             if added.iter().any(|folder| path.starts_with(folder)) {
                 continue;
             }
-            // A link's target is a readable path of its own.
+            // The target of a link is a separate readable path.
             let target = resolve_in(OLD, &path);
             if target != path {
                 let link = under(NEW, &path);
                 make_folder(link.parent().unwrap_or(&link))?;
                 if fs::symlink_metadata(&link).is_err() {
                     symlink(&target, &link)
-                        .map_err(SetupError::of(format!("link {}", path.display())))?;
+                        .map_err(SetupError::context(format!("link {}", path.display())))?;
                 }
                 continue;
             }
@@ -184,39 +185,39 @@ impl Root {
         Ok(())
     }
 
-    /// Hides a folder that lies within a readable one.
-    fn mask(&mut self, path: &Path) -> Setup<()> {
+    /// Hides a folder inside a readable one.
+    fn mask(&mut self, path: &Path) -> SetupResult<()> {
         let target = under(NEW, path);
         let is_private = self.writable.iter().any(|w| path == w);
         if is_private || !target.is_dir() {
             return Ok(());
         }
-        memory_file_system(&target.to_string_lossy(), "mode=0555,size=4k")
+        mount_tmpfs(&target.to_string_lossy(), "mode=0555,size=4k")
     }
 
-    fn bind(&mut self, from: &Path, to: &Path) -> Setup<()> {
+    fn bind(&mut self, from: &Path, to: &Path) -> SetupResult<()> {
         let (from, to) = (under(OLD, from), under(NEW, to));
         if from.is_dir() {
             make_folder(&to)?;
         } else {
             make_folder(to.parent().unwrap_or(&to))?;
-            let step = SetupError::of(format!("make {}", to.display()));
+            let step = SetupError::context(format!("make {}", to.display()));
             File::options().create(true).append(true).open(&to).map_err(step)?;
         }
         bind(&from, &to)
     }
 
-    /// Makes every mount read-only but private folders. Devices stay usable.
-    fn make_read_only(&self) -> Setup<()> {
-        let step = || SetupError::of("read the list of mounts");
+    /// Makes every mount except private folders read-only. Devices stay usable.
+    fn make_read_only(&self) -> SetupResult<()> {
+        let step = || SetupError::context("read the list of mounts");
         let text = fs::read_to_string(format!("{OLD}/proc/self/mountinfo")).map_err(step())?;
         let scratch = fs::metadata(SCRATCH).map_err(step())?.dev();
         let scratch = format!("{}:{}", rustix::fs::major(scratch), rustix::fs::minor(scratch));
-        let mounts: Vec<Mount> = text.lines().filter_map(Mount::read).collect();
+        let mounts: Vec<Mount> = text.lines().filter_map(Mount::parse).collect();
         for (k, mount) in mounts.iter().enumerate() {
-            let Ok(inside) = mount.at.strip_prefix(NEW) else { continue };
+            let Ok(inside) = mount.path.strip_prefix(NEW) else { continue };
             // A later mount at the same place or above hides it.
-            let is_hidden = mounts[k + 1..].iter().any(|later| mount.at.starts_with(&later.at));
+            let is_hidden = mounts[k + 1..].iter().any(|later| mount.path.starts_with(&later.path));
             if mount.device == scratch || inside == Path::new("") || is_hidden {
                 continue;
             }
@@ -226,40 +227,40 @@ impl Root {
             if !DEVICES.iter().any(|device| inside == Path::new(device)) {
                 flags |= MountFlags::NODEV;
             }
-            mount_remount(&mount.at, flags, "")
-                .map_err(SetupError::of(format!("make {} read-only", inside.display())))?;
+            mount_remount(&mount.path, flags, "")
+                .map_err(SetupError::context(format!("make {} read-only", inside.display())))?;
         }
         Ok(())
     }
 
-    /// Adds `/proc` of the pid namespace. What it offers to a privileged user is read-only.
-    fn add_processes(&self) -> Setup<()> {
+    /// Adds `/proc` of the pid namespace. Files for privileged users are read-only.
+    fn add_processes(&self) -> SetupResult<()> {
         const SETTINGS: &[&str] = &["sys", "sysrq-trigger", "irq", "bus", "fs"];
         let proc = under(NEW, Path::new("/proc"));
         make_folder(&proc)?;
         let flags = MountFlags::NOSUID | MountFlags::NODEV | MountFlags::NOEXEC;
-        mount("proc", &proc, "proc", flags, c"").map_err(SetupError::of("mount /proc"))?;
+        mount("proc", &proc, "proc", flags, c"").map_err(SetupError::context("mount /proc"))?;
         for name in SETTINGS {
             let path = proc.join(name);
             if path.exists() {
                 bind(&path, &path)?;
                 let flags = flags | MountFlags::BIND | MountFlags::RDONLY;
                 mount_remount(&path, flags, "")
-                    .map_err(SetupError::of(format!("make /proc/{name} read-only")))?;
+                    .map_err(SetupError::context(format!("make /proc/{name} read-only")))?;
             }
         }
         Ok(())
     }
 }
 
-fn bind(from: &Path, to: &Path) -> Setup<()> {
+fn bind(from: &Path, to: &Path) -> SetupResult<()> {
     mount_bind_recursive(from, to)
-        .map_err(SetupError::of(format!("show {} in the new root", from.display())))
+        .map_err(SetupError::context(format!("bind {} into the new root", from.display())))
 }
 
-/// Resolves links in an absolute path, seen from another root.
+/// Resolves links in an absolute path, as seen from another root.
 fn resolve_in(root: &str, path: &Path) -> PathBuf {
-    /// As the kernel's own limit.
+    /// Limit of the kernel.
     const MAX_LINKS: usize = 40;
     let mut path = path.to_owned();
     for _ in 0..MAX_LINKS {
@@ -295,7 +296,7 @@ fn normalize(path: &Path) -> PathBuf {
 /// A line of `/proc/self/mountinfo`.
 #[derive(Debug, PartialEq)]
 struct Mount {
-    at: PathBuf,
+    path: PathBuf,
     /// Major and minor number of its file system, such as `98:0`.
     device: String,
     /// Flags that a remount must keep.
@@ -303,9 +304,9 @@ struct Mount {
 }
 
 impl Mount {
-    fn read(line: &str) -> Option<Mount> {
+    fn parse(line: &str) -> Option<Mount> {
         let mut fields = line.split(' ');
-        let (device, at, options) = (fields.nth(2)?, fields.nth(1)?, fields.next()?);
+        let (device, path, options) = (fields.nth(2)?, fields.nth(1)?, fields.next()?);
         let mut flags = MountFlags::empty();
         for option in options.split(',') {
             flags |= match option {
@@ -318,7 +319,7 @@ impl Mount {
                 _ => MountFlags::empty(),
             };
         }
-        Some(Mount { at: PathBuf::from(unescape(at)), device: device.to_owned(), flags })
+        Some(Mount { path: PathBuf::from(unescape(path)), device: device.to_owned(), flags })
     }
 }
 
@@ -326,22 +327,22 @@ impl Mount {
 fn unescape(text: &str) -> std::ffi::OsString {
     use std::os::unix::ffi::OsStringExt as _;
     let bytes = text.as_bytes();
-    let (mut plain, mut k) = (Vec::with_capacity(bytes.len()), 0);
+    let (mut unescaped, mut k) = (Vec::with_capacity(bytes.len()), 0);
     while k < bytes.len() {
         let octal = bytes.get(k + 1..k + 4).and_then(|digits| std::str::from_utf8(digits).ok());
         let code = octal.and_then(|digits| u8::from_str_radix(digits, 8).ok());
         match code.filter(|_| bytes[k] == b'\\') {
             Some(code) => {
-                plain.push(code);
+                unescaped.push(code);
                 k += 4;
             }
             None => {
-                plain.push(bytes[k]);
+                unescaped.push(bytes[k]);
                 k += 1;
             }
         }
     }
-    std::ffi::OsString::from_vec(plain)
+    std::ffi::OsString::from_vec(unescaped)
 }
 
 #[cfg(test)]
@@ -349,18 +350,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_of_mountinfo_gives_path_and_flags() {
+    fn a_line_of_mountinfo_is_parsed() {
         let line =
             "36 35 98:0 /mnt1 /new/my\\040data rw,noatime,nosuid master:1 - ext3 /dev/root rw";
-        let mount = Mount::read(line).unwrap();
-        assert_eq!(mount.at, Path::new("/new/my data"));
+        let mount = Mount::parse(line).unwrap();
+        assert_eq!(mount.path, Path::new("/new/my data"));
         assert_eq!(mount.device, "98:0");
         assert_eq!(mount.flags, MountFlags::NOATIME | MountFlags::NOSUID);
-        assert_eq!(Mount::read("cut 35 98:0"), None);
+        assert_eq!(Mount::parse("cut 35 98:0"), None);
     }
 
     #[test]
-    fn links_resolve_within_another_root() {
+    fn links_are_resolved_within_another_root() {
         let top = tempfile::tempdir().unwrap();
         let top = top.path().canonicalize().unwrap();
         fs::create_dir_all(top.join("real/bin")).unwrap();
@@ -371,7 +372,7 @@ mod tests {
     }
 
     #[test]
-    fn a_circle_of_links_ends() {
+    fn the_resolution_of_circular_links_ends() {
         let top = tempfile::tempdir().unwrap();
         symlink("/b", top.path().join("a")).unwrap();
         symlink("/a", top.path().join("b")).unwrap();

@@ -1,4 +1,4 @@
-//! Memory and tasks of a process and its descendants, as `/proc` counts them.
+//! Memory and tasks of a process and its descendants, from `/proc`.
 
 use std::fs;
 
@@ -7,13 +7,13 @@ use rustix::process::Pid;
 /// Sums over processes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Usage {
-    /// Anonymous and shared memory in use, KiB. Pages that processes share count once for each.
+    /// Anonymous and shared memory in use, KiB. Shared pages count once for each process.
     pub memory_kib: u64,
-    /// Processes and threads.
+    /// Number of processes and threads.
     pub tasks: u64,
 }
 
-/// More processes than this are not listed: a fork bomb is over any limit then.
+/// Maximum number of listed processes; a fork bomb exceeds any limit then.
 const MAX_LISTED: usize = 100_000;
 
 /// Returns the memory and tasks of a process and all of its descendants.
@@ -22,18 +22,18 @@ pub(super) fn usage(pid: Pid) -> Usage {
     for pid in descendants(pid).into_iter().chain([pid]) {
         // A process that has just ended uses nothing.
         let text = fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
-        let of = |name: &str| -> u64 {
+        let field = |name: &str| -> u64 {
             let line = text.lines().find_map(|line| line.strip_prefix(name));
             let number = line.and_then(|rest| rest.split_whitespace().next());
             number.and_then(|n| n.parse().ok()).unwrap_or(0)
         };
-        sum.memory_kib += of("RssAnon:") + of("RssShmem:") + of("VmSwap:");
-        sum.tasks += of("Threads:");
+        sum.memory_kib += field("RssAnon:") + field("RssShmem:") + field("VmSwap:");
+        sum.tasks += field("Threads:");
     }
     sum
 }
 
-/// Returns the descendants of a process, without itself.
+/// Returns the descendants of a process, without the process itself.
 pub(super) fn descendants(pid: Pid) -> Vec<Pid> {
     let mut found = Vec::new();
     let mut open = vec![pid];
@@ -69,7 +69,7 @@ mod tests {
     use std::process::Command;
 
     #[test]
-    fn grandchildren_count() {
+    fn usage_includes_grandchildren() {
         let script = "sh -c 'sleep 100 & sleep 100; true' & wait";
         let mut child = Command::new("sh").args(["-c", script]).spawn().unwrap();
         let pid = Pid::from_raw(i32::try_from(child.id()).unwrap()).unwrap();
@@ -77,14 +77,14 @@ mod tests {
         while descendants(pid).len() < 3 && std::time::Instant::now() < deadline {
             std::thread::yield_now();
         }
-        let seen = descendants(pid);
+        let found = descendants(pid);
         let used = usage(pid);
-        for pid in &seen {
+        for pid in &found {
             rustix::process::kill_process(*pid, rustix::process::Signal::KILL).unwrap();
         }
         child.kill().unwrap();
         child.wait().unwrap();
-        assert_eq!(seen.len(), 3);
+        assert_eq!(found.len(), 3);
         assert_eq!(used.tasks, 4);
         assert!(used.memory_kib > 0);
     }

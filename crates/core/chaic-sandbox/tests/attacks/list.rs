@@ -1,31 +1,32 @@
-//! The attacks: each a Python program that prints `SUCCESS` if it reaches what it should not.
+//! Attacks: Python programs that print `SUCCESS` if they reach something that they should not.
 //!
-//! Before its text, every program gets [`PRELUDE`] and the values of [`Target`](super::Target) as variables.
+//! Every program is preceded by [`PRELUDE`] and by the values of [`Target`](super::Target) as
+//! variables.
 
 /// An attack of a hostile command.
 pub struct Attack {
     /// Name in the tables.
     pub name: &'static str,
-    /// What it is after, for the documentation.
+    /// Goal of the attack, for the documentation.
     pub aim: &'static str,
     /// Python text.
     pub script: &'static str,
-    /// Whether it needs the rights of the root user to succeed without a sandbox.
+    /// True if it requires the rights of the root user to succeed without a sandbox.
     pub needs_root: bool,
-    /// How success shows, besides the program's own word.
+    /// Evidence of success, in addition to the program's output.
     pub proof: Proof,
 }
 
-/// How the success of an attack shows.
+/// Evidence of the success of an attack.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Proof {
-    /// It prints `SUCCESS`.
+    /// The program prints `SUCCESS`.
     Word,
-    /// It changes the files of the caller.
+    /// The files of the caller have changed.
     Files,
-    /// A process of it is left when the command has ended.
+    /// A process of the attack remains after the end of the command.
     Survivor,
-    /// The command is still there after it was asked to end.
+    /// The command still runs after SIGTERM.
     Unstoppable,
 }
 
@@ -66,7 +67,7 @@ const fn shown(
 
 /// All attacks.
 pub const ATTACKS: &[Attack] = &[
-    // What the caller knows.
+    // Secrets of the caller.
     word("read-run-folder", "read the run's files", "if has(RUN + '/secret'): success()"),
     word(
         "read-through-link",
@@ -139,12 +140,12 @@ if ctypes.get_errno() in (0, errno.EFAULT): success()
     word(
         "run-caller-program",
         "run the caller's program to list goals",
-        "out = subprocess.run([f'/proc/{CALLER}/exe', '--tell'], capture_output=True).stdout\nif b'told' in out: success()",
+        "out = subprocess.run([f'/proc/{CALLER}/exe', '--print-goal'], capture_output=True).stdout\nif b'GOAL' in out: success()",
     ),
     word(
         "run-first-program",
         "run the program of the first process of the sandbox",
-        "for pid in os.listdir('/proc'):\n    if not pid.isdigit(): continue\n    try:\n        out = subprocess.run([f'/proc/{pid}/exe', '--tell'], capture_output=True, timeout=5).stdout\n        if b'told' in out: success()\n    except (OSError, subprocess.TimeoutExpired): pass",
+        "for pid in os.listdir('/proc'):\n    if not pid.isdigit(): continue\n    try:\n        out = subprocess.run([f'/proc/{pid}/exe', '--print-goal'], capture_output=True, timeout=5).stdout\n        if b'GOAL' in out: success()\n    except (OSError, subprocess.TimeoutExpired): pass",
     ),
     word(
         "list-processes",

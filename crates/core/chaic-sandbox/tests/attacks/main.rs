@@ -1,8 +1,8 @@
-//! Promise: what a hostile command tries in the sandbox does not succeed.
+//! Promise: no attack of a hostile command succeeds in the sandbox.
 //!
-//! Each attack of [`list`] runs in the sandbox, where none may succeed, and trusted, where those must succeed that
-//! docs/threat-model.md lists: an attack that never succeeds proves nothing. The program is its own test
-//! runner, because it is also the stage of the sandbox.
+//! Each attack of [`list`] runs in the sandbox, where it must fail, and trusted, where it must
+//! succeed if docs/threat-model.md says so: an attack that never succeeds proves nothing. The
+//! program is its own test runner, because it is also the stage of the sandbox.
 
 #[cfg(target_os = "linux")]
 mod list;

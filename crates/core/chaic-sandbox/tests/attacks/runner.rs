@@ -1,4 +1,4 @@
-//! Runs attacks against a caller with secrets, in and out of the sandbox.
+//! Runs attacks against a caller with secrets, with and without the sandbox.
 
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
@@ -14,9 +14,9 @@ use rustix::process::{Pid, Signal, kill_process};
 
 use super::list::{ATTACKS, Attack, PRELUDE, Proof};
 
-/// Attacks that fail without a sandbox too, since the outer stage watches trusted commands and passes
-/// neither descriptors nor unknown variables on; or since they need something of the machine.
-const FAIL_ANYWAY: &[&str] = &[
+/// Attacks that also fail without a sandbox: the outer stage monitors trusted commands and passes
+/// neither descriptors nor unknown variables on, or the attack depends on the machine.
+const ALSO_FAIL_WITHOUT_SANDBOX: &[&str] = &[
     "inherit-descriptors",
     "own-environment",
     "outlive",
@@ -29,8 +29,9 @@ const FAIL_ANYWAY: &[&str] = &[
     "memory-of-children",
     "memory-shared",
 ];
-/// Attacks whose success without a sandbox depends on the machine: its kernel's options, disks and settings.
-const DEPEND_ON_MACHINE: &[&str] = &[
+/// Attacks whose success without a sandbox depends on the machine: kernel options, disks and
+/// settings.
+const MACHINE_DEPENDENT: &[&str] = &[
     "read-disk",
     "read-kernel-log",
     "make-control-group",
@@ -47,35 +48,35 @@ const DEPEND_ON_MACHINE: &[&str] = &[
     "read-through-proc-root",
     "raw-socket",
 ];
-/// The environment variable that holds a key.
+/// Environment variable with a key.
 const KEY: &str = "CHAIC_TEST_API_KEY";
-/// An attack may take this long.
+/// Maximum duration of an attack.
 const TIME_LIMIT: Duration = Duration::from_secs(60);
-/// What a command that is asked to end may take.
+/// Maximum duration of the end of a command after SIGTERM.
 const END_LIMIT: Duration = Duration::from_secs(5);
 
 /// Runs all attacks whose names contain one of the arguments.
 pub fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     match arguments.first().map(String::as_str) {
-        Some("--tell") => {
-            println!("told");
+        Some("--print-goal") => {
+            println!("GOAL");
             ExitCode::SUCCESS
         }
-        Some("--attacked") => attacked(&arguments[1..]),
+        Some("--attacked") => run_attacks(&arguments[1..]),
         _ => {
-            // Once more, with a secret in the environment.
+            // Starts the program again with a secret in the environment.
             let names = arguments.iter().filter(|a| !a.starts_with('-'));
             let secret = format!("secret-{}", std::process::id());
-            let mut again = Command::new("/proc/self/exe");
-            again.arg("--attacked").args(names).env(KEY, secret);
-            let status = again.status().expect("this program starts");
+            let mut command = Command::new("/proc/self/exe");
+            command.arg("--attacked").args(names).env(KEY, secret);
+            let status = command.status().expect("this program starts");
             ExitCode::from(status.code().and_then(|c| u8::try_from(c).ok()).unwrap_or(1))
         }
     }
 }
 
-fn attacked(names: &[String]) -> ExitCode {
+fn run_attacks(names: &[String]) -> ExitCode {
     let target = Target::new();
     let isolation = target.launcher.probe(&target.policy).expect("the stages start");
     println!("isolation: {isolation:?}");
@@ -93,8 +94,9 @@ fn attacked(names: &[String]) -> ExitCode {
         if confined {
             wrong.push(format!("{name} succeeds in the sandbox"));
         }
-        let depends = DEPEND_ON_MACHINE.contains(&name) || (attack.needs_root && !is_root);
-        if !depends && trusted == FAIL_ANYWAY.contains(&name) {
+        let is_machine_dependent =
+            MACHINE_DEPENDENT.contains(&name) || (attack.needs_root && !is_root);
+        if !is_machine_dependent && trusted == ALSO_FAIL_WITHOUT_SANDBOX.contains(&name) {
             wrong.push(format!("{name} {} with trust", word(trusted)));
         }
     }
@@ -102,7 +104,7 @@ fn attacked(names: &[String]) -> ExitCode {
     if let Isolation::Sandboxed(missing) = &isolation
         && !missing.is_empty()
     {
-        // The suite speaks for a whole sandbox. Where a part is missing, no promise is kept or broken.
+        // The suite tests a complete sandbox. If a part is missing, there is no verdict.
         println!("NOT JUDGED: this system has a {isolation}");
         return ExitCode::SUCCESS;
     }
@@ -113,7 +115,7 @@ fn attacked(names: &[String]) -> ExitCode {
 /// Returns attacks without a row in docs/threat-model.md, and rows without an attack.
 fn undocumented() -> Vec<String> {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../docs/threat-model.md");
-    let page = fs::read_to_string(page).expect("the page is there");
+    let page = fs::read_to_string(page).expect("the page exists");
     let row = |attack: &Attack| format!("| `{}` | {} |", attack.name, attack.aim);
     let missing = ATTACKS.iter().filter(|attack| !page.contains(&row(attack)));
     let mut wrong: Vec<String> = missing.map(|a| format!("no row for {}", a.name)).collect();
@@ -124,7 +126,7 @@ fn undocumented() -> Vec<String> {
     wrong
 }
 
-/// A caller with secrets, and everything that an attack may aim at.
+/// A caller with secrets and other targets of attacks.
 struct Target {
     launcher: Launcher,
     policy: Policy,
@@ -153,8 +155,8 @@ impl Target {
         let local = UnixListener::bind(at("run/socket")).expect("there is room");
         let name = SocketAddr::from_abstract_name(&secret).expect("it is short");
         let hidden = UnixListener::bind_addr(&name).expect("the name is free");
-        let open = fs::File::open(at("run/secret")).expect("it is there");
-        // Without the flag that closes it on exec.
+        let open = fs::File::open(at("run/secret")).expect("the entry exists");
+        // A descriptor without the close-on-exec flag.
         let inherited = rustix::io::dup(&open).expect("there are descriptors");
         let mut policy = Policy {
             start_folder: at("start"),
@@ -164,7 +166,7 @@ impl Target {
             scratch_mib: 48,
             max_tasks: 64,
         };
-        policy.add_named_by("python3");
+        policy.add_from_command_line("python3");
         let launcher = Launcher::this_program();
         let held = (tcp, udp, local, hidden, open, inherited);
         Target { launcher, policy, top, secret, port, _held: held }
@@ -180,28 +182,28 @@ impl Target {
         let survivor =
             format!("9753{}.25", ATTACKS.iter().position(|a| a.name == attack.name).unwrap_or(0));
         let mut other = self.start(isolation, "open('/tmp/of-another', 'w').write(SECRET)\nprint('READY', flush=True)\ntime.sleep(60)", "");
-        await_word(&mut other, "READY");
+        wait_for_line(&mut other, "READY");
         let mut child = self.start(isolation, attack.script, &survivor);
         if attack.proof == Proof::Unstoppable {
-            await_word(&mut child, "READY");
+            wait_for_line(&mut child, "READY");
             terminate(&child);
-            let is_stuck = !ends(&mut child, END_LIMIT);
-            end(child);
-            end(other);
+            let is_stuck = !ends_within(&mut child, END_LIMIT);
+            terminate_or_kill(child);
+            terminate_or_kill(other);
             return is_stuck;
         }
-        let is_late = !ends(&mut child, TIME_LIMIT);
-        let mut said = String::new();
+        let is_late = !ends_within(&mut child, TIME_LIMIT);
+        let mut output = String::new();
         if is_late {
             terminate(&child);
         }
-        let mut out = child.stdout.take().expect("it is piped");
-        out.read_to_string(&mut said).expect("it says text");
-        end(child);
-        end(other);
+        let mut out = child.stdout.take().expect("the stream is piped");
+        out.read_to_string(&mut output).expect("the output is text");
+        terminate_or_kill(child);
+        terminate_or_kill(other);
         let _ = fs::remove_file("/tmp/of-another");
         match attack.proof {
-            Proof::Word => said.contains("SUCCESS"),
+            Proof::Word => output.contains("SUCCESS"),
             Proof::Files => {
                 let is_changed = self.files() != before;
                 let _ = fs::remove_file(self.at("start/left"));
@@ -236,46 +238,47 @@ impl Target {
         command.envs(std::env::vars_os().filter(|(name, _)| name == "PATH"));
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
         let mut child = command.spawn().expect("the stage starts");
-        let mut stdin = child.stdin.take().expect("it is piped");
-        // A command that has ended already reads nothing.
+        let mut stdin = child.stdin.take().expect("the stream is piped");
+        // A command that has already ended does not read it.
         let _ = stdin.write_all(text.as_bytes());
         child
     }
 
-    /// The caller's files with their contents, in order.
+    /// Returns the caller's files with their contents, in order.
     fn files(&self) -> Vec<(PathBuf, Vec<u8>)> {
         let mut files = Vec::new();
         for folder in ["run", "start", "readable", "home"] {
-            for entry in fs::read_dir(self.at(folder)).expect("it is there") {
-                let path = entry.expect("it is there").path();
+            for entry in fs::read_dir(self.at(folder)).expect("the entry exists") {
+                let path = entry.expect("the entry exists").path();
                 if path.is_file() && !path.is_symlink() && !path.ends_with("hard") {
-                    files.push((path.clone(), fs::read(&path).expect("it is there")));
+                    files.push((path.clone(), fs::read(&path).expect("the entry exists")));
                 }
             }
         }
         files.sort();
-        let left = [self.at("start/link"), self.at("start/hard"), self.at("start/mem")];
-        left.iter().for_each(|path| drop(fs::remove_file(path)));
+        let leftovers = [self.at("start/link"), self.at("start/hard"), self.at("start/mem")];
+        leftovers.iter().for_each(|path| drop(fs::remove_file(path)));
         files
     }
 }
 
-fn await_word(child: &mut Child, word: &str) {
+fn wait_for_line(child: &mut Child, word: &str) {
     let mut line = String::new();
-    let out = child.stdout.as_mut().expect("it is piped");
-    BufReader::new(out).read_line(&mut line).expect("it says text");
+    let out = child.stdout.as_mut().expect("the stream is piped");
+    BufReader::new(out).read_line(&mut line).expect("the output is text");
     assert_eq!(line.trim(), word);
 }
 
 fn terminate(child: &Child) {
-    let pid = i32::try_from(child.id()).ok().and_then(Pid::from_raw).expect("it has a number");
+    let pid =
+        i32::try_from(child.id()).ok().and_then(Pid::from_raw).expect("the process id is valid");
     let _ = kill_process(pid, Signal::TERM);
 }
 
 /// Waits for a process; returns whether it has ended in time.
-fn ends(child: &mut Child, within: Duration) -> bool {
-    let began = Instant::now();
-    while began.elapsed() < within {
+fn ends_within(child: &mut Child, limit: Duration) -> bool {
+    let start = Instant::now();
+    while start.elapsed() < limit {
         if child.try_wait().expect("it is a child").is_some() {
             return true;
         }
@@ -284,19 +287,19 @@ fn ends(child: &mut Child, within: Duration) -> bool {
     false
 }
 
-/// Ends a process, by force if it must be.
-fn end(mut child: Child) {
+/// Terminates a process, and kills it after the time limit.
+fn terminate_or_kill(mut child: Child) {
     terminate(&child);
-    if !ends(&mut child, END_LIMIT) {
+    if !ends_within(&mut child, END_LIMIT) {
         let _ = child.kill();
     }
     let _ = child.wait();
 }
 
-/// Returns whether a process with this argument is left for a second, and ends it.
+/// Returns whether a process with this argument remains for a second, and kills it.
 fn survives(argument: &str) -> bool {
     let found = || -> Option<Pid> {
-        let entries = fs::read_dir("/proc").expect("it is there").flatten();
+        let entries = fs::read_dir("/proc").expect("the entry exists").flatten();
         let mut pids = entries.filter_map(|e| e.file_name().to_str()?.parse::<i32>().ok());
         pids.find(|pid| {
             let line = fs::read(Path::new("/proc").join(pid.to_string()).join("cmdline"));
@@ -306,8 +309,8 @@ fn survives(argument: &str) -> bool {
         })
         .and_then(Pid::from_raw)
     };
-    let began = Instant::now();
-    while began.elapsed() < Duration::from_secs(1) {
+    let start = Instant::now();
+    while start.elapsed() < Duration::from_secs(1) {
         if found().is_none() {
             return false;
         }

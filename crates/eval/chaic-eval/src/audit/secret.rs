@@ -1,48 +1,48 @@
-//! What is hidden of a partner, and how to change it.
+//! Secrets of a partner, and changes to them.
 
 use chaic_core::ClassId;
 use chaic_core::briefing::Goal;
 use chaic_core::capability::Capability;
 use chaic_world::Setup;
 
-/// Something that no helper is told unless it is granted.
+/// Hidden property of the partner that a helper learns only if it is granted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Secret {
-    /// What the partner wants.
+    /// Goal of the partner.
     Goal,
-    /// What the partner can do.
+    /// Capability of the partner.
     Constraint,
 }
 
 impl Secret {
-    /// Both.
+    /// All secrets.
     pub const ALL: [Secret; 2] = [Secret::Goal, Secret::Constraint];
 
-    /// Makes it another one, and leaves all that can be seen as it is.
+    /// Changes the secret in a setup, and nothing that is visible.
     pub fn change(self, setup: &mut Setup) {
         match self {
-            Secret::Goal => other_goal(setup),
-            Secret::Constraint => other_constraint(setup),
+            Secret::Goal => change_goal(setup),
+            Secret::Constraint => change_constraint(setup),
         }
     }
 }
 
-/// Another goal on the same things: one class that isn't wanted.
-fn other_goal(setup: &mut Setup) {
-    let is_there = |c: ClassId| setup.things.iter().any(|t| t.class == c && !t.fixed);
+/// Sets another goal with the same objects: one class that was not wanted.
+fn change_goal(setup: &mut Setup) {
+    let is_present = |c: ClassId| setup.things.iter().any(|t| t.class == c && !t.fixed);
     let unwanted = ClassId::all()
-        .find(|c| c.info().is_possible_target() && is_there(*c) && setup.goal.wanted(*c) == 0);
+        .find(|c| c.info().is_possible_target() && is_present(*c) && setup.goal.count(*c) == 0);
     match unwanted {
         Some(class) => setup.goal = Goal { targets: vec![(class, 1)] },
-        // Moving house wants all there is: one less.
+        // Moving house wants all objects: remove one.
         None => setup.goal.targets.truncate(setup.goal.targets.len().saturating_sub(1)),
     }
 }
 
-/// Somebody who looks the same, and reaches, lifts and walks differently.
-fn other_constraint(setup: &mut Setup) {
+/// Changes reach, strength and speed of the partner, but not its appearance.
+fn change_constraint(setup: &mut Setup) {
     let Some(partner) = setup.people.first_mut() else { return };
-    let own = partner.capability();
+    let capability = partner.capability();
     partner.capability = Some(Capability {
         pick_range_m: [0.0, 3.0],
         put_range_m: [0.0, 3.0],
@@ -50,7 +50,7 @@ fn other_constraint(setup: &mut Setup) {
         speed_m_per_frame: 0.04,
         approach_speed_m_per_frame: 0.04,
         docking_frames: 7,
-        breaks_fragile: !own.breaks_fragile,
-        ..own
+        breaks_fragile: !capability.breaks_fragile,
+        ..capability
     });
 }

@@ -1,4 +1,4 @@
-//! A figure names every task and helper, and shows what was measured and nothing else.
+//! Promise: a figure names every task and helper, and shows the given values only.
 
 use super::*;
 use chaic_core::TaskId;
@@ -29,14 +29,14 @@ fn svg(bars: &Bars) -> String {
     std::fs::read_to_string(path).unwrap()
 }
 
-/// Fills of a color: the swatch in the legend and the bars.
+/// Counts rectangles of a color: the swatch in the legend and the bars.
 fn n_fills(svg: &str, color: RGBColor) -> usize {
     let hex = format!("fill=\"#{:02X}{:02X}{:02X}\"", color.0, color.1, color.2);
     svg.lines().filter(|line| line.starts_with("<rect") && line.contains(&hex)).count()
 }
 
 #[test]
-fn names_every_task_and_helper() {
+fn every_task_and_helper_is_named() {
     let helpers = ["No helper", "Random", "Rule-based", "LLM", "VLM", "Oracle"];
     let bars = bars(&helpers);
     let svg = svg(&bars);
@@ -51,7 +51,7 @@ fn names_every_task_and_helper() {
 }
 
 #[test]
-fn markup_in_a_name_is_text() {
+fn markup_in_a_name_is_escaped() {
     let svg = svg(&bars(&["<b>&"]));
     assert!(svg.contains("&lt;b&gt;&amp;"), "{svg}");
 }
@@ -67,7 +67,7 @@ fn a_missing_value_leaves_a_gap_and_zero_does_not() {
 }
 
 #[test]
-fn dots_stand_at_their_values_and_are_explained() {
+fn dots_are_drawn_and_explained() {
     let n_circles = |svg: &str| svg.matches("<circle").count();
     let mut bars = bars(&["A", "B"]);
     assert_eq!(n_circles(&svg(&bars)), 0);
@@ -98,7 +98,7 @@ fn png_has_the_size_and_the_colors() {
 }
 
 #[test]
-fn most_helpers_have_different_colors() {
+fn the_maximum_number_of_helpers_has_different_colors() {
     let names: Vec<String> = (0..MAX_HELPERS).map(|i| format!("a helper, number {i}")).collect();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let svg = svg(&bars(&names));
@@ -108,7 +108,7 @@ fn most_helpers_have_different_colors() {
 }
 
 #[test]
-fn refuses_what_is_not_a_rate() {
+fn invalid_rates_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("figure.svg");
     let with = |mean, interval| {

@@ -1,43 +1,45 @@
-//! How much higher one helper's transport rate is than another's, and what can be told apart.
+//! Paired differences of transport rates between helpers, and the resolution of a set of episodes.
 
 use std::collections::BTreeMap;
 
 use chaic_core::TaskId;
-use chaic_env::minds::NONE;
+use chaic_env::helper_registry::NONE;
 
 use crate::metrics::cluster::{Clusters, Interval};
 use crate::metrics::scores::{ByEpisode, grouped, over_played, over_seeds};
-use crate::metrics::{Played, Summary};
+use crate::metrics::{PlayedEpisodes, Summary};
 
-/// How much higher one helper's transport rate is than another's on the same episodes.
+/// Difference of the transport rates of two helpers on the same episodes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
     /// The helper.
     pub helper: String,
-    /// The one it is compared with.
+    /// Helper that it is compared with.
     pub baseline: String,
-    /// Per task, where both have episodes of at least two environments in common.
+    /// Per task; tasks with fewer than two common environments are absent.
     pub tasks: BTreeMap<TaskId, Interval>,
     /// Over the episodes of all tasks.
     pub all: Option<Interval>,
 }
 
-/// The smallest difference of two helpers' transport rates that the episodes of a task can tell from
+/// Smallest difference of two helpers' transport rates that the episodes of a task distinguish from
 /// zero: half the 95 % interval of the paired difference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Resolution {
-    /// How many environments the episodes take place in.
+    /// Number of environments in which the episodes take place.
     pub environments: usize,
-    /// Of half the pairs of helpers.
+    /// Median over pairs of helpers.
     pub median: f64,
-    /// Of all pairs.
+    /// Maximum over pairs of helpers.
     pub largest: f64,
 }
 
-/// Paired differences of the transport rate between all helpers, episode by episode (seeds
-/// averaged), with 95 % intervals over environments. A run that broke down counts as zero, but where
-/// the one without helper did there is nothing to compare with.
-pub fn differences(played: Played<'_>, helpers: &[String]) -> Vec<Difference> {
+/// Computes paired differences of the transport rate between all helpers, by episode (seeds
+/// averaged), with 95 % intervals over environments.
+///
+/// A failed run counts as zero. If all runs of an episode without helper failed, that episode is
+/// not compared with `none`.
+pub fn differences(played: PlayedEpisodes<'_>, helpers: &[String]) -> Vec<Difference> {
     let groups = grouped(played.results);
     let mut found = Vec::new();
     for (k, helper) in helpers.iter().enumerate() {
@@ -49,14 +51,14 @@ pub fn differences(played: Played<'_>, helpers: &[String]) -> Vec<Difference> {
                 else {
                     continue;
                 };
-                let mut of_task = Clusters::default();
+                let mut in_task = Clusters::default();
                 for (episode, rate) in a {
-                    let Some(other) = b.get(episode) else { continue };
-                    let environment = played.environments.of(episode);
-                    of_task.add(*task, environment, rate - other);
-                    all.add(*task, environment, rate - other);
+                    let Some(baseline_rate) = b.get(episode) else { continue };
+                    let environment = played.environments.get(episode);
+                    in_task.add(*task, environment, rate - baseline_rate);
+                    all.add(*task, environment, rate - baseline_rate);
                 }
-                tasks.extend(of_task.interval().map(|interval| (*task, interval)));
+                tasks.extend(in_task.interval().map(|interval| (*task, interval)));
             }
             let (helper, baseline) = (helper.clone(), baseline.clone());
             found.push(Difference { helper, baseline, tasks, all: all.interval() });
@@ -65,7 +67,7 @@ pub fn differences(played: Played<'_>, helpers: &[String]) -> Vec<Difference> {
     found
 }
 
-/// A helper's transport rates by episode, seeds averaged.
+/// Returns a helper's transport rates by episode, averaged over seeds.
 fn rates<'a>(
     by_helper: &BTreeMap<&'a str, ByEpisode<'a>>,
     helper: &str,
@@ -78,11 +80,11 @@ fn rates<'a>(
     Some(episodes.iter().filter_map(|(episode, runs)| Some((*episode, rate(runs)?))).collect())
 }
 
-/// What the episodes of a task can tell apart; of all tasks together where `task` is `None`. `None`
-/// where no pair of helpers has an interval.
+/// Returns the resolution of a task's episodes, or of all tasks if `task` is `None`. Returns `None`
+/// if no pair of helpers has an interval.
 pub fn resolution(differences: &[Difference], task: Option<TaskId>) -> Option<Resolution> {
-    let of = |d: &Difference| task.map_or(d.all, |t| d.tasks.get(&t).copied());
-    let intervals: Vec<Interval> = differences.iter().filter_map(of).collect();
+    let interval = |d: &Difference| task.map_or(d.all, |t| d.tasks.get(&t).copied());
+    let intervals: Vec<Interval> = differences.iter().filter_map(interval).collect();
     let mut halves: Vec<f64> = intervals.iter().map(Interval::half).collect();
     halves.sort_by(f64::total_cmp);
     Some(Resolution {

@@ -1,72 +1,72 @@
-//! Which formulas scores are computed by. The two sets are data; nothing else branches on them.
+//! Sets of formulas for scores. The sets are data; no other code branches on them.
 
 use std::fmt;
 use std::str::FromStr;
 
 use crate::metrics::Summary;
 
-/// Names a set of formulas.
+/// Name of a set of formulas.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FormulaSet {
-    /// What the paper says (section 4.1, "Evaluation Metrics", and appendix "Additional Metrics").
+    /// The paper (section 4.1, "Evaluation Metrics", and appendix "Additional Metrics").
     Paper,
-    /// What the original's scripts compute (facts A7).
+    /// The original's scripts (facts A7).
     Original,
 }
 
-/// How the spread of the transport rate is given.
+/// Statistic that is reported as the spread of the transport rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Spread {
-    /// The standard error of the mean over episodes: sample deviation over the root of their
-    /// number, seeds of an episode averaged first.
+    /// Standard error of the mean over environments, by the cluster bootstrap of
+    /// [`Clusters`](crate::metrics::Clusters).
     StandardError,
-    /// The population's standard deviation over all episodes and seeds.
+    /// Population standard deviation over all episodes and seeds.
     PopulationDeviation,
 }
 
 /// A set of formulas.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Formulas {
-    /// Whether EI compares amounts (objects, kilograms) rather than rates.
+    /// True if EI compares amounts (objects, kilograms) instead of rates.
     pub ei_on_amounts: bool,
-    /// EI's denominator is at least this.
+    /// Lower bound of EI's denominator.
     pub ei_floor: f64,
-    /// How `tr_se` is computed.
+    /// Statistic in `tr_se`.
     pub spread: Spread,
-    /// Whether CR credits the helper with what it once took and the partner delivered.
-    pub credits_handing_over: bool,
-    /// Whether ER counts frames only while the child ran away, by its own decisions.
-    pub er_by_mood: bool,
+    /// True if CR credits the helper with objects that it took once and the partner delivered.
+    pub credits_handovers: bool,
+    /// True if ER counts only frames in which the child ran away by its own decision.
+    pub er_counts_escapes: bool,
 }
 
 impl Formulas {
-    /// The paper's. The floor only keeps 0 / 0 from being undefined.
+    /// Formulas of the paper. The floor only keeps 0 / 0 from being undefined.
     pub const PAPER: Formulas = Formulas {
         ei_on_amounts: false,
         ei_floor: 1e-9,
         spread: Spread::StandardError,
-        credits_handing_over: false,
-        er_by_mood: false,
+        credits_handovers: false,
+        er_counts_escapes: false,
     };
-    /// The original scripts'.
+    /// Formulas of the original's scripts.
     pub const ORIGINAL: Formulas = Formulas {
         ei_on_amounts: true,
         ei_floor: 1.0,
         spread: Spread::PopulationDeviation,
-        credits_handing_over: true,
-        er_by_mood: true,
+        credits_handovers: true,
+        er_counts_escapes: true,
     };
 }
 
 impl Formulas {
-    /// The frames of an episode run that ER counts; `None` without child.
+    /// Returns the frames of an episode run that ER counts; `None` without child.
     pub fn away_frames(&self, summary: &Summary) -> Option<u32> {
-        if self.er_by_mood { summary.escape_frames } else { summary.away_frames }
+        if self.er_counts_escapes { summary.escape_frames } else { summary.away_frames }
     }
 }
 
 impl FormulaSet {
-    /// The formulas.
+    /// Returns the formulas.
     pub fn formulas(self) -> Formulas {
         match self {
             FormulaSet::Paper => Formulas::PAPER,
@@ -74,7 +74,7 @@ impl FormulaSet {
         }
     }
 
-    /// The name in commands.
+    /// Returns the name in commands.
     pub fn as_str(self) -> &'static str {
         match self {
             FormulaSet::Paper => "paper",

@@ -1,4 +1,4 @@
-//! What is kept of one episode run: a line of `results.jsonl`, and all that scores are made of.
+//! Result of one episode run: a line of `results.jsonl`, and the input of all scores.
 
 use std::collections::BTreeMap;
 
@@ -8,117 +8,117 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value};
 
-/// What became of one episode run.
+/// Result of one episode run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RunResult {
-    /// Which.
+    /// The episode run.
     #[serde(flatten)]
     pub key: RunKey,
-    /// How it ended.
+    /// Status and summary.
     #[serde(flatten)]
-    pub ending: Ending,
+    pub status: RunStatus,
 }
 
-/// How an episode run ended.
+/// Final status of an episode run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "status", rename_all = "snake_case", deny_unknown_fields)]
-pub enum Ending {
-    /// It was played to its end.
+pub enum RunStatus {
+    /// The run was played to its end.
     Done(Summary),
-    /// An agent broke down, which counts as zero.
+    /// An agent failed. The run counts as zero.
     Error {
-        /// What it said.
+        /// Error message.
         message: String,
     },
 }
 
-/// What scores need to know of an episode run.
+/// Data of a completed episode run that scores need.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Summary {
-    /// Frames that passed.
+    /// Number of frames.
     pub frames: Frame,
-    /// What is done of what was wanted: objects, or kilograms when moving house.
+    /// Delivered part of the goal: objects, or kilograms when moving house.
     pub done: f64,
-    /// All that was wanted.
+    /// Size of the goal, in the same unit.
     pub total: f64,
     /// Frames in which the child was away; absent without child.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub away_frames: Option<u32>,
-    /// Frames of its escapes as the original counts them: while it ran away by its own decision and was
-    /// away; absent without child.
+    /// Frames of the child's escapes as the original counts them: the child was away and ran by its
+    /// own decision. Absent without child.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub escape_frames: Option<u32>,
     /// Frames in which the partner or the helper had made no progress for 200 frames; absent in
     /// results of older versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stuck_frames: Option<u32>,
-    /// Everything that was delivered, in order.
+    /// All deliveries in order.
     pub deliveries: Vec<Delivery>,
-    /// Digest of the world's last state.
+    /// Digest of the last state of the world.
     pub digest: Digest,
-    /// What minds counted of their own doings, as `AGENT.NAME`; absent where nobody counts. No
-    /// trace has it, and no score rests on it.
+    /// Counters that agents report of themselves, as `AGENT.NAME`; absent without counters. They
+    /// are not in traces, and no score depends on them.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub counts: BTreeMap<String, u64>,
-    /// What each of the [`MEASURES`](crate::metrics::MEASURES) came to, by its key; those with nothing
-    /// to say, and all in results of older versions, are absent.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub measures: BTreeMap<String, f64>,
+    /// Values of the diagnostic metrics of [`METRICS`](crate::metrics::METRICS), by key. Undefined
+    /// values are absent, as are all values in results of older versions.
+    #[serde(default, rename = "measures", skip_serializing_if = "BTreeMap::is_empty")]
+    pub diagnostics: BTreeMap<String, f64>,
 }
 
-/// One thing that was delivered.
+/// Delivery of one object.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Delivery {
-    /// When.
+    /// Frame of the delivery.
     pub frame: Frame,
-    /// The thing.
+    /// Delivered object.
     pub object: EntityId,
-    /// Its class.
+    /// Class of the object.
     pub class: ClassId,
-    /// Who let it go there.
+    /// Agent that released it.
     pub by: AgentId,
-    /// Whether it was wanted and not yet there often enough.
+    /// True if the object was part of the goal and not yet delivered often enough.
     pub counted: bool,
-    /// Whether partner and helper carried it together.
+    /// True if partner and helper carried it together.
     #[serde(default, skip_serializing_if = "is_false")]
     pub together: bool,
-    /// Whether the helper had taken it before, whoever delivered it.
+    /// True if the helper had held it before, regardless of who delivered it.
     #[serde(default, skip_serializing_if = "is_false")]
     pub handed: bool,
 }
 
-// `skip_serializing_if` hands over a reference.
+// `skip_serializing_if` passes a reference.
 #[allow(clippy::trivially_copy_pass_by_ref)]
 fn is_false(b: &bool) -> bool {
     !b
 }
 
 impl<'de> Deserialize<'de> for RunResult {
-    /// By hand, as a flattened field takes unknown names in silence: what is not of the key must be
-    /// of the ending.
+    /// Implemented by hand because a flattened field accepts unknown names. All fields must belong
+    /// to the key or to the status.
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<RunResult, D::Error> {
-        let mut ending = Map::deserialize(from)?;
+        let mut status = Map::deserialize(from)?;
         let key: Map<String, Value> =
-            RunKey::FIELDS.iter().filter_map(|name| ending.remove_entry(*name)).collect();
+            RunKey::FIELDS.iter().filter_map(|name| status.remove_entry(*name)).collect();
         Ok(RunResult {
             key: RunKey::deserialize(Value::Object(key)).map_err(D::Error::custom)?,
-            ending: Ending::deserialize(Value::Object(ending)).map_err(D::Error::custom)?,
+            status: RunStatus::deserialize(Value::Object(status)).map_err(D::Error::custom)?,
         })
     }
 }
 
 impl RunResult {
-    /// The summary of a run that was played to its end.
+    /// Returns the summary of a run that was played to its end.
     pub fn summary(&self) -> Option<&Summary> {
-        match &self.ending {
-            Ending::Done(summary) => Some(summary),
-            Ending::Error { .. } => None,
+        match &self.status {
+            RunStatus::Done(summary) => Some(summary),
+            RunStatus::Error { .. } => None,
         }
     }
 
-    /// Whether its numbers can be those of an episode.
+    /// Checks that the values are possible in an episode.
     pub(crate) fn check(&self) -> Result<(), String> {
         self.summary().map_or(Ok(()), Summary::check)
     }
@@ -126,7 +126,7 @@ impl RunResult {
 
 impl Summary {
     fn check(&self) -> Result<(), String> {
-        /// Masses are sums of numbers that are rounded.
+        /// Masses are sums of rounded values.
         const ROUNDING: f64 = 1e-6;
         let Summary { frames, done, total, .. } = *self;
         for (name, n) in [("done", done), ("total", total)] {
@@ -137,17 +137,17 @@ impl Summary {
         if done > total * (1.0 + ROUNDING) {
             return Err(format!("`done` is {done}, expected at most `total`, {total}"));
         }
-        let within = [
+        let frame_counts = [
             ("away_frames", self.away_frames),
             ("escape_frames", self.escape_frames),
             ("stuck_frames", self.stuck_frames),
         ];
-        if let Some((name, n)) = self.measures.iter().find(|(_, n)| !n.is_finite()) {
+        if let Some((name, n)) = self.diagnostics.iter().find(|(_, n)| !n.is_finite()) {
             return Err(format!("`measures.{name}` is {n}, expected a number"));
         }
-        let late = self.deliveries.iter().map(|d| d.frame).max();
-        let within = within.into_iter().chain([("frame of a delivery", late)]);
-        for (name, n) in within.filter_map(|(name, n)| Some((name, n?))) {
+        let last_delivery = self.deliveries.iter().map(|d| d.frame).max();
+        let frame_counts = frame_counts.into_iter().chain([("frame of a delivery", last_delivery)]);
+        for (name, n) in frame_counts.filter_map(|(name, n)| Some((name, n?))) {
             if n > frames {
                 return Err(format!("`{name}` is {n}, expected at most `frames`, {frames}"));
             }
@@ -155,25 +155,25 @@ impl Summary {
         Ok(())
     }
 
-    /// The transport rate: what is done of what was wanted.
+    /// Returns the transport rate: the delivered fraction of the goal.
     pub fn rate(&self) -> f64 {
         if self.total > 0.0 { self.done / self.total } else { 0.0 }
     }
 }
 
 impl Delivery {
-    /// Whether it is the helper's: let go by the helper, or carried with its hands too.
-    pub fn is_helpers(&self) -> bool {
+    /// Returns whether it counts as the helper's: released by the helper, or carried by both.
+    pub fn is_by_helper(&self) -> bool {
         self.by == AgentId::HELPER || self.together
     }
 
-    /// Whether it could be a target at all; containers and vehicles are only means.
-    pub fn is_goods(&self) -> bool {
+    /// Returns whether the object can be a target. Containers and vehicles can't.
+    pub fn is_target_class(&self) -> bool {
         matches!(self.class.info().role, Role::Target | Role::Fragile | Role::HeavyTarget)
     }
 
-    /// What it counts for in this task.
-    pub fn worth(&self, task: TaskId) -> f64 {
-        task.info().worth.of(self.class)
+    /// Returns the value of the object in this task.
+    pub fn value(&self, task: TaskId) -> f64 {
+        task.info().target_value.value(self.class)
     }
 }

@@ -1,21 +1,21 @@
-//! Means, deviations and Student's t.
+//! Means, standard deviations and Student's t.
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// The mean; `None` of nothing.
+/// Returns the mean; `None` without values.
 pub fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-/// The standard deviation of a population, with n; `None` of nothing.
+/// Returns the population standard deviation (divided by n); `None` without values.
 pub fn population_sd(values: &[f64]) -> Option<f64> {
     let m = mean(values)?;
     let squares: Vec<f64> = values.iter().map(|v| (v - m) * (v - m)).collect();
     mean(&squares).map(f64::sqrt)
 }
 
-/// The 97.5 % quantile of Student's t for `df` degrees of freedom, to the three digits that tables
-/// give, so that it is the same number on every machine.
+/// Returns the 97.5 % quantile of Student's t for `df` degrees of freedom. It is rounded to three
+/// decimals, as in printed tables, so that it is the same number on every machine.
 pub fn t_975(df: usize) -> f64 {
     let Ok(t) = StudentsT::new(0.0, 1.0, df as f64) else { return f64::INFINITY };
     (1e3 * t.inverse_cdf(0.975)).round() / 1e3

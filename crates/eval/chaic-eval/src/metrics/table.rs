@@ -1,68 +1,80 @@
-//! The scores by name: what tables call them, where they are read, and what the paper has of them.
+//! Table of all metrics: names, titles, and sources of values.
 
-use chaic_core::TaskId;
+use chaic_core::{AgentId, TaskId};
 
-use crate::metrics::Score;
-use crate::published::Figures;
+use crate::metrics::accumulators::{FailureRate, FirstDelivery, MetricAccumulator};
+use crate::metrics::score::Score;
+use crate::published::PublishedScores;
 
-/// A score of a helper in a task.
+/// A metric of a helper in a task.
 #[derive(Clone, Copy, Debug)]
 pub struct Metric {
-    /// Its name in files.
+    /// Name in files.
     pub key: &'static str,
-    /// Its name in tables.
+    /// Name in tables.
     pub name: &'static str,
-    /// What it is.
+    /// Description.
     pub title: &'static str,
-    /// Decimals that are shown: a share of 1 % is much of some.
+    /// Number of printed decimals.
     pub decimals: usize,
-    /// Whether a task has it.
+    /// Returns whether the metric is defined in a task.
     pub in_task: fn(TaskId) -> bool,
-    /// Where it stands; `None` where there is nothing to say.
-    pub value: fn(&Score) -> Option<f64>,
-    /// The paper's figure.
-    pub published: fn(&Figures) -> Option<f64>,
+    /// Source of the values.
+    pub source: MetricSource,
 }
 
-const EVERYWHERE: fn(TaskId) -> bool = |_| true;
+/// Source of a metric's values.
+#[derive(Clone, Copy, Debug)]
+pub enum MetricSource {
+    /// A score that formulas compute from the results of all episode runs.
+    Score {
+        /// Returns the value; `None` if it is undefined.
+        value: fn(&Score) -> Option<f64>,
+        /// Returns the value that the paper reports.
+        published: fn(&PublishedScores) -> Option<f64>,
+    },
+    /// A diagnostic value of each episode run, computed from its records; the score is the mean. It
+    /// is in `results.jsonl`, `scores.json` and `report.md`.
+    Records(fn() -> Box<dyn MetricAccumulator>),
+}
 
-/// All of them.
-pub static METRICS: [Metric; 7] = [
+const ALL_TASKS: fn(TaskId) -> bool = |_| true;
+
+/// All metrics: the paper's in its order, then diagnostic ones in the order of reports.
+///
+/// A new diagnostic metric is a row with [`MetricSource::Records`] and its accumulator.
+pub static METRICS: [Metric; 10] = [
     Metric {
         key: "tr",
         name: "TR",
         title: "transport rate",
         decimals: 2,
-        in_task: EVERYWHERE,
-        value: |s| Some(s.tr),
-        published: |f| Some(f.tr),
+        in_task: ALL_TASKS,
+        source: MetricSource::Score { value: |s| Some(s.tr), published: |p| Some(p.tr) },
     },
     Metric {
         key: "ei",
         name: "EI",
         title: "efficiency improvement",
         decimals: 2,
-        in_task: EVERYWHERE,
-        value: |s| s.ei,
-        published: |f| f.ei,
+        in_task: ALL_TASKS,
+        source: MetricSource::Score { value: |s| s.ei, published: |p| p.ei },
     },
     Metric {
         key: "ia",
         name: "IA",
         title: "goal inference accuracy",
         decimals: 2,
-        in_task: EVERYWHERE,
-        value: |s| s.ia,
-        published: |f| f.ia,
+        in_task: ALL_TASKS,
+        source: MetricSource::Score { value: |s| s.ia, published: |p| p.ia },
     },
     Metric {
         key: "cr",
         name: "CR",
         title: "completion ratio",
         decimals: 2,
-        in_task: EVERYWHERE,
-        value: |s| s.cr,
-        published: |f| f.cr,
+        in_task: ALL_TASKS,
+        source: MetricSource::Score { value: |s| s.cr, published: |p| p.cr },
     },
     Metric {
         key: "er",
@@ -70,35 +82,85 @@ pub static METRICS: [Metric; 7] = [
         title: "emergency rate",
         decimals: 2,
         in_task: |task| task.info().has_child,
-        value: |s| s.er,
-        published: |f| f.er,
+        source: MetricSource::Score { value: |s| s.er, published: |p| p.er },
     },
     Metric {
         key: "tr_se",
         name: "SE",
         title: "standard error of TR",
         decimals: 2,
-        in_task: EVERYWHERE,
-        value: |s| s.tr_se,
-        published: |f| f.tr_se,
+        in_task: ALL_TASKS,
+        source: MetricSource::Score { value: |s| s.tr_se, published: |p| p.tr_se },
     },
     Metric {
         key: "stuck",
         name: "stuck",
         title: "share of frames in which partner or helper had made no progress for 200 frames",
         decimals: 3,
-        in_task: EVERYWHERE,
-        value: |s| s.stuck,
-        published: |_| None,
+        in_task: ALL_TASKS,
+        source: MetricSource::Score { value: |s| s.stuck, published: |_| None },
+    },
+    Metric {
+        key: "first_delivery",
+        name: "first delivery",
+        title: "Frame of the first delivery that counts",
+        decimals: 0,
+        in_task: ALL_TASKS,
+        source: MetricSource::Records(|| Box::new(FirstDelivery::default())),
+    },
+    Metric {
+        key: "partner_failures",
+        name: "partner failures",
+        title: "Share of the partner's attempts to take or put something that failed",
+        decimals: 2,
+        in_task: ALL_TASKS,
+        source: MetricSource::Records(|| Box::new(FailureRate::new(AgentId::PARTNER))),
+    },
+    Metric {
+        key: "helper_failures",
+        name: "helper failures",
+        title: "Share of the helper's attempts to take or put something that failed",
+        decimals: 2,
+        in_task: ALL_TASKS,
+        source: MetricSource::Records(|| Box::new(FailureRate::new(AgentId::HELPER))),
     },
 ];
 
 impl Metric {
-    /// The metric of this key.
+    /// Returns the metric with this key.
     ///
     /// # Panics
-    /// If there is none; keys are written by hand.
-    pub fn of(key: &str) -> &'static Metric {
-        METRICS.iter().find(|m| m.key == key).unwrap_or_else(|| panic!("no metric is called {key}"))
+    /// If there is none.
+    pub fn from_key(key: &str) -> &'static Metric {
+        METRICS.iter().find(|m| m.key == key).unwrap_or_else(|| panic!("no metric has key {key}"))
+    }
+
+    /// Returns all diagnostic metrics, in the order of reports.
+    pub fn diagnostics() -> impl Iterator<Item = &'static Metric> {
+        METRICS.iter().filter(|m| matches!(m.source, MetricSource::Records(_)))
+    }
+
+    /// Returns the value of the metric in a score; `None` if it is undefined.
+    pub fn value(&self, score: &Score) -> Option<f64> {
+        match self.source {
+            MetricSource::Score { value, .. } => value(score),
+            MetricSource::Records(_) => score.diagnostics.get(self.key).copied(),
+        }
+    }
+
+    /// Returns the value that the paper reports, if it reports the metric.
+    pub fn published(&self, scores: &PublishedScores) -> Option<f64> {
+        match self.source {
+            MetricSource::Score { published, .. } => published(scores),
+            MetricSource::Records(_) => None,
+        }
+    }
+
+    /// Creates the accumulator of a diagnostic metric; `None` for the paper's metrics.
+    pub fn accumulator(&self) -> Option<Box<dyn MetricAccumulator>> {
+        match self.source {
+            MetricSource::Score { .. } => None,
+            MetricSource::Records(new) => Some(new()),
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! From the records of one episode to its result.
+//! Computation of an episode run's result from its records.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,52 +8,55 @@ use chaic_env::RunKey;
 use chaic_env::trace::{End, Header, Record, Trace};
 use chaic_world::EventKind;
 
-use crate::metrics::{Delivery, Ending, Fold, MEASURES, RunResult, Summary};
+use crate::metrics::accumulators::MetricAccumulator;
+use crate::metrics::table::Metric;
+use crate::metrics::{Delivery, RunResult, RunStatus, Summary};
 
-/// Reads records one by one.
+/// Accumulator of the records of one episode run.
 #[derive(Debug)]
 pub struct Tally {
     key: RunKey,
     has_child: bool,
-    /// Things whose last carrying was a joint one.
+    /// Objects that partner and helper carried together when they were last carried.
     together: BTreeSet<EntityId>,
-    /// Things that the helper has taken at some time.
+    /// Objects that the helper has held at some time.
     taken_by_helper: BTreeSet<EntityId>,
     deliveries: Vec<Delivery>,
     escape: Escape,
-    /// One for each measure.
-    folds: Vec<Box<dyn Fold>>,
+    /// Keys and accumulators of the diagnostic metrics.
+    diagnostics: Vec<(&'static str, Box<dyn MetricAccumulator>)>,
 }
 
 /// The child's escapes as the original counts them (facts S8.4): by the child's decisions.
 #[derive(Clone, Copy, Debug, Default)]
 struct Escape {
-    /// Whether it runs away, as of its last decision.
+    /// True if the child runs away, as of its last decision.
     is_running: bool,
-    /// Whether it is far from its guardian now.
+    /// True if the child is away from its guardian now.
     is_away: bool,
-    /// When it decided last.
-    decided: Frame,
+    /// Frame of its last decision.
+    last_decision: Frame,
     /// Frames counted so far.
     frames: u32,
 }
 
 impl Escape {
-    fn decides(&mut self, frame: Frame) {
+    fn add_decision(&mut self, frame: Frame) {
         if self.is_running && self.is_away {
-            self.frames += frame - self.decided;
+            self.frames += frame - self.last_decision;
         }
-        self.decided = frame;
+        self.last_decision = frame;
     }
 
-    /// All frames counted, with those left when the episode ends, wherever the child is then.
+    /// Returns all counted frames, including the frames from the last decision to the end, wherever
+    /// the child is then.
     fn total(&self, end: Frame) -> u32 {
-        self.frames + if self.is_running { end - self.decided } else { 0 }
+        self.frames + if self.is_running { end - self.last_decision } else { 0 }
     }
 }
 
 impl Tally {
-    /// For the trace of this header.
+    /// Creates an accumulator for the trace with this header.
     pub fn new(header: &Header) -> Tally {
         Tally {
             key: header.key(),
@@ -62,17 +65,19 @@ impl Tally {
             taken_by_helper: BTreeSet::new(),
             deliveries: Vec::new(),
             escape: Escape::default(),
-            folds: MEASURES.iter().map(|measure| (measure.begin)()).collect(),
+            diagnostics: Metric::diagnostics()
+                .filter_map(|metric| Some((metric.key, metric.accumulator()?)))
+                .collect(),
         }
     }
 
-    /// Takes in a record; the last one of an episode gives the result.
-    pub fn record(&mut self, record: &Record) -> Option<RunResult> {
-        self.folds.iter_mut().for_each(|fold| fold.take_in(record));
+    /// Adds a record; returns the result after the last record of an episode.
+    pub fn add(&mut self, record: &Record) -> Option<RunResult> {
+        self.diagnostics.iter_mut().for_each(|(_, accumulator)| accumulator.add(record));
         match record {
             Record::Decision(decision) => {
                 if decision.agent == AgentId::CHILD {
-                    self.escape.decides(decision.frame);
+                    self.escape.add_decision(decision.frame);
                 }
                 None
             }
@@ -81,14 +86,14 @@ impl Tally {
                 None
             }
             Record::Event(event) => {
-                self.event(&event.event.kind, event.event.frame, event.class);
+                self.add_event(&event.event.kind, event.event.frame, event.class);
                 None
             }
             Record::End(end) => Some(self.result(end)),
         }
     }
 
-    fn event(&mut self, kind: &EventKind, frame: u32, class: Option<ClassId>) {
+    fn add_event(&mut self, kind: &EventKind, frame: u32, class: Option<ClassId>) {
         match *kind {
             EventKind::Taken { agent, object } => {
                 self.together.remove(&object);
@@ -104,7 +109,7 @@ impl Tally {
             }
             EventKind::ChildAway { away } => self.escape.is_away = away,
             EventKind::Delivered { object, by, counted } => {
-                // A trace of this version always names the class.
+                // A trace of this version always has the class.
                 let Some(class) = class else { return };
                 let together = self.together.contains(&object);
                 let handed = self.taken_by_helper.contains(&object);
@@ -118,7 +123,7 @@ impl Tally {
     fn result(&self, end: &End) -> RunResult {
         RunResult {
             key: self.key.clone(),
-            ending: Ending::Done(Summary {
+            status: RunStatus::Done(Summary {
                 frames: end.frame,
                 done: end.done,
                 total: end.total,
@@ -128,21 +133,21 @@ impl Tally {
                 deliveries: self.deliveries.clone(),
                 digest: end.digest,
                 counts: BTreeMap::new(),
-                measures: self.measures(),
+                diagnostics: self.diagnostic_values(),
             }),
         }
     }
 
-    fn measures(&self) -> BTreeMap<String, f64> {
-        let folded = MEASURES.iter().zip(&self.folds);
-        folded.filter_map(|(m, fold)| Some((m.key.to_owned(), fold.value()?))).collect()
+    fn diagnostic_values(&self) -> BTreeMap<String, f64> {
+        let values = self.diagnostics.iter();
+        values.filter_map(|(key, a)| Some(((*key).to_owned(), a.value()?))).collect()
     }
 }
 
-/// The result that a whole trace leads to; `None` if its end is missing.
+/// Returns the result of a complete trace; `None` if its end is missing.
 pub fn tally(trace: &Trace) -> Option<RunResult> {
     let mut tally = Tally::new(&trace.header);
-    trace.records.iter().fold(None, |last, record| tally.record(record).or(last))
+    trace.records.iter().fold(None, |last, record| tally.add(record).or(last))
 }
 
 #[cfg(test)]
@@ -150,20 +155,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn escapes_are_counted_by_the_childs_decisions_and_to_the_end() {
+    fn escapes_are_counted_between_the_childs_decisions_and_to_the_end() {
         let mut escape = Escape::default();
-        let mut decides = |frame, is_running, is_away| {
+        let mut decide = |frame, is_running, is_away| {
             escape.is_away = is_away;
-            escape.decides(frame);
+            escape.add_decision(frame);
             escape.is_running = is_running;
             (escape.frames, escape.total(200))
         };
-        // Frames so far, and those counted if the episode ended at frame 200.
-        assert_eq!(decides(0, false, true), (0, 0), "away, but not on the run");
-        assert_eq!(decides(50, true, false), (0, 150));
-        assert_eq!(decides(70, true, false), (0, 130), "on the run, but still near");
-        assert_eq!(decides(90, true, true), (20, 130));
-        assert_eq!(decides(120, false, true), (50, 50));
-        assert_eq!(decides(150, false, true), (50, 50), "on the way back");
+        // Counted frames, and the total if the episode ended at frame 200.
+        assert_eq!(decide(0, false, true), (0, 0), "away, but not running");
+        assert_eq!(decide(50, true, false), (0, 150));
+        assert_eq!(decide(70, true, false), (0, 130), "running, but still near");
+        assert_eq!(decide(90, true, true), (20, 130));
+        assert_eq!(decide(120, false, true), (50, 50));
+        assert_eq!(decide(150, false, true), (50, 50), "on the way back");
     }
 }

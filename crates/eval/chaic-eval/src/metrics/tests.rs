@@ -1,4 +1,4 @@
-//! Scores against tables worked by hand.
+//! Scores compared with tables computed by hand.
 
 use chaic_core::{AgentId, ClassId, EntityId, TaskId};
 use chaic_env::{Digest, RunKey};
@@ -25,7 +25,7 @@ fn result(c: Case<'_>) -> RunResult {
     let (helper, episode) = (c.helper.to_owned(), c.episode.to_owned());
     RunResult {
         key: RunKey { task: c.task, helper, episode, seed: c.seed },
-        ending: Ending::Done(Summary {
+        status: RunStatus::Done(Summary {
             frames: 1000,
             done: c.done,
             total: c.total,
@@ -35,7 +35,7 @@ fn result(c: Case<'_>) -> RunResult {
             deliveries: c.deliveries,
             digest: Digest(0),
             counts: Default::default(),
-            measures: Default::default(),
+            diagnostics: Default::default(),
         }),
     }
 }
@@ -52,38 +52,38 @@ fn delivery(by: AgentId, class: &str, counted: bool) -> Delivery {
     }
 }
 
-fn close(a: Option<f64>, b: f64) {
+fn assert_close(a: Option<f64>, b: f64) {
     assert!((a.unwrap() - b).abs() < 1e-9, "{a:?} is not {b}");
 }
 
-/// Resamples leave the third digit of a standard error to chance.
-fn close_by_resampling(a: Option<f64>, b: f64) {
+/// Resampling changes the third digit of a standard error.
+fn assert_close_to_resampled(a: Option<f64>, b: f64) {
     assert!((a.unwrap() - b).abs() < 0.02 * b.abs(), "{a:?} is not {b}");
 }
 
-/// As much as is known of a run where nothing else is: every episode is an environment.
-fn in_houses(results: &[RunResult], environments: &Environments, f: Formulas) -> Scores {
-    Scores::of(Played { results, planned: &[], environments }, &f)
+/// Computes scores with the given environments and without a plan.
+fn scores_in(results: &[RunResult], environments: &Environments, f: Formulas) -> Scores {
+    Scores::new(PlayedEpisodes { results, planned: &[], environments }, &f)
 }
 
 fn scores_of(results: &[RunResult], f: Formulas) -> Scores {
-    in_houses(results, &Environments::default(), f)
+    scores_in(results, &Environments::default(), f)
 }
 
 fn error(helper: &str, episode: &str, seed: u32) -> RunResult {
     let (task, helper, episode) = (TaskId::LowTarget, helper.to_owned(), episode.to_owned());
     let key = RunKey { task, helper, episode, seed };
-    RunResult { key, ending: Ending::Error { message: "boom".to_owned() } }
+    RunResult { key, status: RunStatus::Error { message: "boom".to_owned() } }
 }
 
-/// Episodes e1, e2, ... in these houses.
+/// Returns environments for episodes e1, e2, ... in these houses.
 fn houses(names: &[&str]) -> Environments {
     let pair = |(k, house): (usize, &&str)| (format!("e{}", k + 1), (*house).to_owned());
     Environments::new(names.iter().enumerate().map(pair))
 }
 
 #[test]
-fn transport_rate_and_efficiency_improvement() {
+fn transport_rate_and_efficiency_improvement_are_means_over_episodes() {
     // Alone: e1 2/10 and 4/10 (two seeds), e2 0/8, e3 3/6. Team: e1 6/10 and 6/10, e2 0/8, e3 2/6.
     let mut results = vec![
         result(case("none", "e1", 2.0, 10.0)),
@@ -100,43 +100,45 @@ fn transport_rate_and_efficiency_improvement() {
         scores.get(TaskId::LowTarget, "none").unwrap(),
         scores.get(TaskId::LowTarget, "rhp").unwrap(),
     );
-    close(Some(alone.tr), (0.2 + 0.4 + 0.0 + 0.5) / 4.0);
-    close(Some(team.tr), (0.6 + 0.6 + 0.0 + 1.0 / 3.0) / 4.0);
+    assert_close(Some(alone.tr), (0.2 + 0.4 + 0.0 + 0.5) / 4.0);
+    assert_close(Some(team.tr), (0.6 + 0.6 + 0.0 + 1.0 / 3.0) / 4.0);
     assert_eq!(
         (alone.episodes, alone.ei, alone.cr, alone.ia, alone.er),
         (4, None, None, None, None)
     );
     // e1: (0.6 - 0.3) / 0.6 = 1/2; e2: both 0, so 0; e3: (1/3 - 1/2) / (1/2) = -1/3.
-    close(team.ei, (0.5 + 0.0 - 1.0 / 3.0) / 3.0);
-    // Means of episodes 0.6, 0, 1/3: deviation 0.3006..., over the root of 3.
+    assert_close(team.ei, (0.5 + 0.0 - 1.0 / 3.0) / 3.0);
+    // Episode means 0.6, 0, 1/3: standard deviation 0.3006..., divided by sqrt(3).
     let m = (0.6 + 1.0 / 3.0) / 3.0;
     let ss: f64 = [0.6, 0.0, 1.0 / 3.0].iter().map(|v: &f64| (v - m) * (v - m)).sum();
-    // Seeds weigh by their number: 4 runs in 3 environments, so not quite the textbook's.
+    // Seeds are weighted by their number (4 runs in 3 environments), so the value is only close to
+    // the formula.
     assert!((team.tr_se.unwrap() / ((ss / 2.0).sqrt() / 3f64.sqrt()) - 1.0).abs() < 0.2);
-    assert_eq!((team.environments, team.broken, team.incomplete), (3, 0, false));
+    assert_eq!((team.environments, team.failed, team.incomplete), (3, 0, false));
 
-    // By the scripts: e1 (6 - 3) / 6; e2 0 / max(0, 0, 1); e3 (2 - 3) / 3. Same here, as rates and
-    // counts of one episode are proportional and nothing is below one object.
-    close(
+    // The scripts give e1 (6 - 3) / 6; e2 0 / max(0, 0, 1); e3 (2 - 3) / 3. Both formulas agree
+    // here: rates and amounts of one episode are proportional, and no amount is below one object.
+    assert_close(
         scores_of(&results, Formulas::ORIGINAL).get(TaskId::LowTarget, "rhp").unwrap().ei,
         0.5 / 9.0,
     );
-    // The floor: half an object on the mean, alone nothing, is 0.5 / 1 there and 1 in the paper.
+    // The floor: with a mean of half an object, and nothing alone, EI is 0.5 / 1 there and 1 in the
+    // paper.
     results = vec![
         result(case("none", "e1", 0.0, 10.0)),
         result(case("rhp", "e1", 1.0, 10.0)),
         result(Case { seed: 1, ..case("rhp", "e1", 0.0, 10.0) }),
     ];
     let ei = |f| scores_of(&results, f).get(TaskId::LowTarget, "rhp").unwrap().ei;
-    close(ei(Formulas::ORIGINAL), 0.5);
-    close(ei(Formulas::PAPER), 1.0);
+    assert_close(ei(Formulas::ORIGINAL), 0.5);
+    assert_close(ei(Formulas::PAPER), 1.0);
     let se = |f| scores_of(&results, f).get(TaskId::LowTarget, "rhp").unwrap().tr_se;
     assert_eq!(se(Formulas::PAPER), None, "one episode has no standard error");
-    close(se(Formulas::ORIGINAL), 0.05);
+    assert_close(se(Formulas::ORIGINAL), 0.05);
 }
 
 #[test]
-fn accuracy_and_completion_are_pooled_and_containers_are_means() {
+fn accuracy_and_completion_are_pooled_without_containers() {
     let (p, h) = (AgentId::PARTNER, AgentId::HELPER);
     let one = Case {
         deliveries: vec![
@@ -151,14 +153,14 @@ fn accuracy_and_completion_are_pooled_and_containers_are_means() {
     let two = Case { deliveries: vec![delivery(h, "bread", false)], ..case("rhp", "e2", 0.0, 3.0) };
     let results = [result(one), result(two)];
     let score = |f| scores_of(&results, f).get(TaskId::LowTarget, "rhp").unwrap().clone();
-    close(score(Formulas::PAPER).ia, 1.0 / 3.0);
-    close(score(Formulas::PAPER).cr, 1.0 / 3.0);
-    close(score(Formulas::ORIGINAL).cr, 2.0 / 3.0);
-    assert_eq!(score(Formulas::PAPER).ei, None, "there is nothing to compare with");
+    assert_close(score(Formulas::PAPER).ia, 1.0 / 3.0);
+    assert_close(score(Formulas::PAPER).cr, 1.0 / 3.0);
+    assert_close(score(Formulas::ORIGINAL).cr, 2.0 / 3.0);
+    assert_eq!(score(Formulas::PAPER).ei, None, "there is no baseline");
 }
 
 #[test]
-fn moving_house_weighs_and_credits_joint_carrying() {
+fn moving_house_counts_mass_and_credits_joint_carrying() {
     let heavy: Vec<ClassId> =
         ClassId::all().filter(|c| c.info().role == chaic_core::Role::HeavyTarget).collect();
     let mass = |c: ClassId| f64::from(c.info().mass_kg);
@@ -172,8 +174,8 @@ fn moving_house_weighs_and_credits_joint_carrying() {
     };
     let scores = scores_of(&[result(run)], Formulas::PAPER);
     let score = scores.get(TaskId::MovingHouse, "rhp").unwrap();
-    close(score.cr, mass(a) / (mass(a) + mass(b)));
-    close(Some(score.tr), 0.5);
+    assert_close(score.cr, mass(a) / (mass(a) + mass(b)));
+    assert_close(Some(score.tr), 0.5);
 }
 
 #[test]
@@ -182,10 +184,10 @@ fn emergencies_are_pooled_over_frames() {
         result(Case { task: TaskId::Shopping, away: Some(away), ..case("rhp", episode, 1.0, 4.0) })
     };
     let scores = scores_of(&[run("e1", 100), run("e2", 500)], Formulas::PAPER);
-    close(scores.get(TaskId::Shopping, "rhp").unwrap().er, 0.3);
+    assert_close(scores.get(TaskId::Shopping, "rhp").unwrap().er, 0.3);
 }
 
-/// Four episodes of two helpers: 0.1, 0.2, 0.3 and 0.4 against twice that.
+/// Returns results of four episodes by two helpers: 0.1, 0.2, 0.3 and 0.4, and twice that.
 fn pairs() -> Vec<RunResult> {
     let done = |helper, factor: f64| {
         (1..5).map(move |k| {
@@ -197,46 +199,48 @@ fn pairs() -> Vec<RunResult> {
 }
 
 #[test]
-fn differences_are_paired_and_as_sure_as_their_houses() {
+fn differences_are_paired_with_intervals_over_houses() {
     let (results, names) = (pairs(), ["none".to_owned(), "rhp".to_owned()]);
-    let of = |environments: &Environments| {
-        let played = Played { results: &results, planned: &[], environments };
+    let difference = |environments: &Environments| {
+        let played = PlayedEpisodes { results: &results, planned: &[], environments };
         let mut found = differences(played, &names);
         assert_eq!(found.len(), 1);
         found.pop().unwrap()
     };
-    // 0.1, 0.2, 0.3, 0.4: mean 0.25, deviation 0.129099, over the root of 4; t(3) is 3.182.
-    let apart = of(&Environments::default());
+    // 0.1, 0.2, 0.3, 0.4: mean 0.25, standard deviation 0.129099, divided by sqrt(4); t(3) is
+    // 3.182.
+    let apart = difference(&Environments::default());
     assert_eq!((apart.helper.as_str(), apart.baseline.as_str()), ("rhp", "none"));
     let all = apart.all.unwrap();
-    close(Some(all.mean), 0.25);
-    close_by_resampling(Some(all.half()), 3.182 * 0.129099 / 2.0);
-    assert_eq!(apart.tasks[&TaskId::LowTarget], all, "there is but one task");
-    // Two houses of means 0.15 and 0.35: deviation 0.141421, over the root of 2; t(1) is 12.706.
-    let shared = of(&houses(&["a", "a", "b", "b"])).all.unwrap();
-    close(Some(shared.mean), 0.25);
-    close_by_resampling(Some(shared.half()), 12.706 * 0.1);
+    assert_close(Some(all.mean), 0.25);
+    assert_close_to_resampled(Some(all.half()), 3.182 * 0.129099 / 2.0);
+    assert_eq!(apart.tasks[&TaskId::LowTarget], all, "there is one task only");
+    // Two houses with means 0.15 and 0.35: standard deviation 0.141421, divided by sqrt(2); t(1) is
+    // 12.706.
+    let shared = difference(&houses(&["a", "a", "b", "b"])).all.unwrap();
+    assert_close(Some(shared.mean), 0.25);
+    assert_close_to_resampled(Some(shared.half()), 12.706 * 0.1);
     assert_eq!((shared.environments, shared.df), (2, 1));
-    assert_eq!(of(&houses(&["a", "a", "a", "a"])).all, None);
-    let r = resolution(&[of(&houses(&["a", "a", "b", "b"]))], None).unwrap();
+    assert_eq!(difference(&houses(&["a", "a", "a", "a"])).all, None);
+    let r = resolution(&[difference(&houses(&["a", "a", "b", "b"]))], None).unwrap();
     assert_eq!((r.environments, r.median, r.largest), (2, shared.half(), shared.half()));
     assert_eq!(resolution(&[], None), None);
 }
 
 #[test]
-fn intervals_of_rates_stay_within_what_a_rate_can_be() {
-    let scores = in_houses(&pairs(), &houses(&["a", "a", "b", "b"]), Formulas::PAPER);
+fn intervals_of_rates_are_clamped() {
+    let scores = scores_in(&pairs(), &houses(&["a", "a", "b", "b"]), Formulas::PAPER);
     let score = scores.get(TaskId::LowTarget, "rhp").unwrap();
     assert_eq!(score.tr_ci, Some([0.0, 1.0]), "0.5 with 12.706 * 0.2 to both sides");
-    close_by_resampling(score.tr_se, 0.2);
+    assert_close_to_resampled(score.tr_se, 0.2);
     // EI is 1/2 in every episode.
-    close(score.ei_ci.map(|[low, _]| low), 0.5);
-    close(score.ei_ci.map(|[_, high]| high), 0.5);
+    assert_close(score.ei_ci.map(|[low, _]| low), 0.5);
+    assert_close(score.ei_ci.map(|[_, high]| high), 0.5);
     assert_eq!(score.environments, 2);
 }
 
 #[test]
-fn broken_runs_count_as_zero_and_order_does_not_matter() {
+fn failed_runs_count_as_zero_and_order_does_not_matter() {
     let useful = Case {
         deliveries: vec![
             delivery(AgentId::HELPER, "apple", true),
@@ -252,62 +256,63 @@ fn broken_runs_count_as_zero_and_order_does_not_matter() {
     ];
     let scores = scores_of(&results, Formulas::PAPER);
     let score = scores.get(TaskId::LowTarget, "rhp").unwrap();
-    assert_eq!((score.episodes, score.broken), (2, 1));
-    // 0.8 and nothing; (0.8 - 0.4) / 0.8 and (0 - 0.4) / 0.4.
-    close(Some(score.tr), 0.4);
-    close(score.ei, (0.5 - 1.0) / 2.0);
-    // All of one run and nothing of the other; half and nothing.
-    close(score.ia, 0.5);
-    close(score.cr, 0.25);
+    assert_eq!((score.episodes, score.failed), (2, 1));
+    // 0.8 and 0; (0.8 - 0.4) / 0.8 and (0 - 0.4) / 0.4.
+    assert_close(Some(score.tr), 0.4);
+    assert_close(score.ei, (0.5 - 1.0) / 2.0);
+    // IA is 1 in one run and 0 in the other; CR is 1/2 and 0.
+    assert_close(score.ia, 0.5);
+    assert_close(score.cr, 0.25);
     results.reverse();
     assert_eq!(scores, scores_of(&results, Formulas::PAPER));
     let names = ["none".to_owned(), "rhp".to_owned()];
     let environments = Environments::default();
-    let played = Played { results: &results, planned: &[], environments: &environments };
-    close(differences(played, &names)[0].all.map(|i| i.mean), (0.4 - 0.4) / 2.0);
-    // Nobody gains from a run without helper that broke down: that episode isn't compared.
+    let played = PlayedEpisodes { results: &results, planned: &[], environments: &environments };
+    assert_close(differences(played, &names)[0].all.map(|i| i.mean), (0.4 - 0.4) / 2.0);
+    // A failed run without helper is not a baseline: that episode is not compared.
     results.retain(|r| r.key.helper != "none" || r.key.episode != "e2");
     results.push(error("none", "e2", 0));
     let scores = scores_of(&results, Formulas::PAPER);
-    close(scores.get(TaskId::LowTarget, "rhp").unwrap().ei, 0.5);
-    close(scores.get(TaskId::LowTarget, "none").map(|s| s.tr), 0.2);
-    let all_broken = scores_of(&[error("rhp", "e1", 0)], Formulas::PAPER);
-    let score = all_broken.get(TaskId::LowTarget, "rhp").unwrap();
+    assert_close(scores.get(TaskId::LowTarget, "rhp").unwrap().ei, 0.5);
+    assert_close(scores.get(TaskId::LowTarget, "none").map(|s| s.tr), 0.2);
+    let all_failed = scores_of(&[error("rhp", "e1", 0)], Formulas::PAPER);
+    let score = all_failed.get(TaskId::LowTarget, "rhp").unwrap();
     assert_eq!((score.tr, score.ia, score.cr, score.stuck), (0.0, Some(0.0), Some(0.0), None));
 }
 
 #[test]
-fn a_shopping_run_that_breaks_down_is_one_long_emergency() {
+fn a_failed_shopping_run_is_an_emergency_throughout() {
     let shopping =
         |r: RunResult| RunResult { key: RunKey { task: TaskId::Shopping, ..r.key }, ..r };
     let played = result(Case { away: Some(100), ..case("rhp", "e1", 1.0, 4.0) });
     let results = [played, error("rhp", "e2", 0)].map(shopping);
     let scores = scores_of(&results, Formulas::PAPER);
-    close(scores.get(TaskId::Shopping, "rhp").unwrap().er, (0.1 + 1.0) / 2.0);
+    assert_close(scores.get(TaskId::Shopping, "rhp").unwrap().er, (0.1 + 1.0) / 2.0);
 }
 
 #[test]
-fn frames_stuck_are_pooled_over_those_who_counted_them() {
+fn stuck_frames_are_pooled_over_runs_that_counted_them() {
     let stuck = |episode, frames| {
         let mut result = result(case("rhp", episode, 1.0, 4.0));
-        if let Ending::Done(summary) = &mut result.ending {
+        if let RunStatus::Done(summary) = &mut result.status {
             summary.stuck_frames = frames;
         }
         result
     };
     let results = [stuck("e1", Some(30)), stuck("e2", Some(0)), stuck("e3", None)];
     let scores = scores_of(&results, Formulas::PAPER);
-    close(scores.get(TaskId::LowTarget, "rhp").unwrap().stuck, 30.0 / 2000.0);
+    assert_close(scores.get(TaskId::LowTarget, "rhp").unwrap().stuck, 30.0 / 2000.0);
 }
 
 #[test]
-fn missing_runs_are_named_and_mark_their_rows() {
+fn missing_runs_are_listed_and_mark_their_rows() {
     let (results, environments) = (pairs(), Environments::default());
     let mut planned: Vec<RunKey> = results.iter().map(|r| r.key.clone()).collect();
     let more = (0..30).map(|seed| error("rhp", "e5", seed).key);
     planned.extend(more.chain([error("oracle", "e1", 0).key]));
-    let played = Played { results: &results, planned: &planned, environments: &environments };
-    let scores = Scores::of(played, &Formulas::PAPER);
+    let played =
+        PlayedEpisodes { results: &results, planned: &planned, environments: &environments };
+    let scores = Scores::new(played, &Formulas::PAPER);
     let row = scores.get(TaskId::LowTarget, "rhp").unwrap();
     assert_eq!((row.incomplete, row.missing.len()), (true, MAX_NAMED));
     assert_eq!(row.missing[0], "e5 seed 0");

@@ -1,4 +1,4 @@
-//! Scores as the paper's figure: transport rates with 95 % intervals.
+//! Figure of transport rates with 95 % intervals, in the layout of the paper's figure.
 
 use std::path::Path;
 
@@ -11,25 +11,25 @@ use crate::report::tables::shown_interval;
 /// Draws transport rates with their 95 % intervals into a `.svg` or `.png` file.
 ///
 /// # Errors
-/// If the extension is another one, there are more helpers than can be told apart, or the file
-/// system refuses.
+/// If the extension is not supported, there are more helpers than colors, or the file can't be
+/// written.
 pub fn write_figure(scores: &Scores, labels: Labels<'_>, path: &Path) -> Result<()> {
-    transport_rate(&bars(scores, labels), path).map_err(error_of)
+    transport_rate(&bars(scores, labels), path).map_err(convert_error)
 }
 
-/// The text of the same figure as SVG.
+/// Returns the same figure as SVG text.
 ///
 /// # Errors
-/// If there are more helpers than can be told apart.
+/// If there are more helpers than colors.
 pub(super) fn figure_text(scores: &Scores, labels: Labels<'_>) -> Result<String> {
-    svg_text(&bars(scores, labels)).map_err(error_of)
+    svg_text(&bars(scores, labels)).map_err(convert_error)
 }
 
-fn error_of(error: FigureError) -> EvalError {
+fn convert_error(error: FigureError) -> EvalError {
     match error {
         FigureError::UnsupportedExtension { .. } => EvalError::Options(error.to_string()),
-        FigureError::Write(refusal) => refusal.into(),
-        _ => EvalError::Picture(error.to_string()),
+        FigureError::Write(error) => error.into(),
+        _ => EvalError::Image(error.to_string()),
     }
 }
 

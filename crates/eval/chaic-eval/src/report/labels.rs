@@ -1,41 +1,40 @@
-//! What rows are called: a helper's name never stands without what it is granted.
+//! Row labels: each helper's title is followed by its grants.
 
 use std::collections::BTreeMap;
 
 use chaic_agents::HelperInfo;
 use chaic_agents::partners::PARTNER_GRANTS;
 use chaic_core::observation::Grants;
-use chaic_env::minds::NONE;
+use chaic_env::helper_registry::NONE;
 use serde::Serialize;
 
 use crate::run::RunGrants;
 
-/// Longest line of a row's name in a terminal, characters: tables stay within 120.
+/// Maximum line length of a label in a terminal, characters; keeps tables within 120 columns.
 const MAX_LINE: usize = 21;
 
-/// Names of rows, from what a run granted.
+/// Row labels from the grants of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct Labels<'a> {
-    /// `None` where nobody has recorded it.
+    /// Recorded grants; `None` if the run has none.
     pub granted: Option<&'a RunGrants>,
 }
 
-/// What somebody is granted, as `scores.json` has it.
+/// Grants of one agent, as in `scores.json`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct GrantsFile {
-    /// The names of the grants.
+    /// Names of the grants.
     pub grants: Vec<String>,
-    /// `ground_truth` where ids and classes of what is in the image are given, `own` where they have
-    /// to be found in the image, `none` where there is nobody to perceive; or the name of what finds
-    /// them.
+    /// Source of ids and classes: `ground_truth` if granted, `own` if the agent infers them from
+    /// images, `none` without helper, or the name of the perception model.
     pub perception: String,
-    /// How the helper's process is confined; absent for helpers within this process.
+    /// Isolation of the helper's process; absent for helpers in this process.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub isolation: Option<String>,
 }
 
 impl Labels<'_> {
-    /// The helper's title with what it is granted, on one line.
+    /// Returns the helper's title and grants on one line.
     pub fn title(&self, helper: &str) -> String {
         match self.grants(helper) {
             Some(words) => format!("{} ({})", title(helper), words.join(", ")),
@@ -43,7 +42,7 @@ impl Labels<'_> {
         }
     }
 
-    /// The same on lines that are short enough for the first column of a table.
+    /// Returns the label on several lines, each short enough for the first column of a table.
     pub fn lines(&self, helper: &str) -> String {
         let mut lines = vec![title(helper)];
         for words in self.grants(helper).unwrap_or_default() {
@@ -60,8 +59,8 @@ impl Labels<'_> {
         lines.join("\n")
     }
 
-    /// What all these helpers are granted, and the partner where that is more than usual, as a
-    /// sentence; nothing where there is nothing to say.
+    /// Returns a sentence with the grants of these helpers, and of the partner if it has more than
+    /// the default; `None` if there is nothing to report.
     pub fn sentence(&self, helpers: &[String]) -> Option<String> {
         let each = helpers
             .iter()
@@ -70,100 +69,107 @@ impl Labels<'_> {
         (!all.is_empty()).then(|| format!("Granted: {}.", all.join("; ")))
     }
 
-    /// Every helper of the run by name, with nobody for `none`, as `scores.json` has them.
+    /// Returns the grants of all helpers of the run by name, as in `scores.json`; `none` has no
+    /// grants.
     pub fn helpers_file(&self, helpers: &[String]) -> Option<BTreeMap<String, GrantsFile>> {
         let granted = self.granted?;
         let file = |name: &String| {
-            let by = granted.perception.get(name);
-            let grants = granted.helpers.get(name).map(|grants| GrantsFile::of(grants, by));
-            let perception = "none".to_owned();
-            let nobody = GrantsFile { grants: Vec::new(), perception, isolation: None };
+            let perception = granted.perception.get(name);
+            let grants =
+                granted.helpers.get(name).map(|grants| GrantsFile::new(grants, perception));
+            let none =
+                GrantsFile { grants: Vec::new(), perception: "none".to_owned(), isolation: None };
             let isolation = granted.isolation.get(name).cloned();
-            (name.clone(), GrantsFile { isolation, ..grants.unwrap_or(nobody) })
+            (name.clone(), GrantsFile { isolation, ..grants.unwrap_or(none) })
         };
         Some(helpers.iter().map(file).collect())
     }
 
-    /// The partner's.
+    /// Returns the grants of the partner, as in `scores.json`.
     pub fn partner_file(&self) -> Option<GrantsFile> {
-        self.granted.map(|g| GrantsFile::of(&g.partner, None))
+        self.granted.map(|g| GrantsFile::new(&g.partner, None))
     }
 
-    /// What a helper is granted, in words, kind by kind; `None` for nobody.
+    /// Returns the grants of a helper in words; `None` for `none`.
     fn grants(&self, helper: &str) -> Option<Vec<String>> {
         let unknown = || vec!["grants not recorded".to_owned()];
         let grants = self.granted.and_then(|g| g.helpers.get(helper));
-        let by = self.granted.and_then(|g| g.perception.get(helper));
-        let confined = self.granted.and_then(|g| g.isolation.get(helper));
-        let confined = confined.map(|how| match how.as_str() {
+        let perception = self.granted.and_then(|g| g.perception.get(helper));
+        let isolation = self.granted.and_then(|g| g.isolation.get(helper));
+        let isolation = isolation.map(|kind| match kind.as_str() {
             "trusted" => "trusted process".to_owned(),
-            how => format!("process in a {how}"),
+            kind => format!("process in a {kind}"),
         });
-        let words = |grants| words(grants, by.map(String::as_str));
-        let all = || grants.map_or_else(unknown, words).into_iter().chain(confined).collect();
+        let describe = |grants| describe(grants, perception.map(String::as_str));
+        let all = || grants.map_or_else(unknown, describe).into_iter().chain(isolation).collect();
         (helper != NONE).then(all)
     }
 
-    /// What the partner is granted beyond what every partner is.
+    /// Returns the partner's grants beyond the default ones in words.
     fn partner(&self) -> Option<String> {
-        let usual = names(&PARTNER_GRANTS);
+        let default = names(&PARTNER_GRANTS);
         let more: Vec<String> =
-            names(&self.granted?.partner).into_iter().filter(|n| !usual.contains(n)).collect();
-        (!more.is_empty()).then(|| format!("the partner is told more than usual: {}", told(&more)))
+            names(&self.granted?.partner).into_iter().filter(|n| !default.contains(n)).collect();
+        (!more.is_empty())
+            .then(|| format!("the partner is told more than usual: {}", readable_names(&more)))
     }
 }
 
-/// What files call perception by ids from ground truth.
-const GIVEN: &str = "ground_truth";
+/// Name of perception by ground-truth ids in files.
+const GROUND_TRUTH: &str = "ground_truth";
 
 impl GrantsFile {
-    fn of(grants: &Grants, by: Option<&String>) -> GrantsFile {
-        let usual = if grants.ids { GIVEN } else { "own" };
-        let perception = by.map_or_else(|| usual.to_owned(), String::clone);
+    fn new(grants: &Grants, perception: Option<&String>) -> GrantsFile {
+        let default = if grants.ids { GROUND_TRUTH } else { "own" };
+        let perception = perception.map_or_else(|| default.to_owned(), String::clone);
         GrantsFile { grants: names(grants), perception, isolation: None }
     }
 }
 
-/// The names of what is granted, in alphabetical order.
+/// Returns the names of the grants in alphabetical order.
 fn names(grants: &Grants) -> Vec<String> {
-    let given = grants.named().into_iter().filter(|(_, is_given)| *is_given);
-    let mut names: Vec<String> = given.map(|(name, _)| name.to_owned()).collect();
+    let granted = grants.named().into_iter().filter(|(_, is_granted)| *is_granted);
+    let mut names: Vec<String> = granted.map(|(name, _)| name.to_owned()).collect();
     names.sort_unstable();
     names
 }
 
-fn words(grants: &Grants, by: Option<&str>) -> Vec<String> {
-    let others = names(&Grants { ids: false, ..*grants });
+fn describe(grants: &Grants, perception: Option<&str>) -> Vec<String> {
+    let other_grants = names(&Grants { ids: false, ..*grants });
     let ids = grants.ids.then(|| "ids from ground truth".to_owned());
-    // The digits that name the weights are for files.
-    let parts = by.into_iter().flat_map(|by| by.split(", ")).filter(|part| *part != GIVEN);
+    // The digest that names the weights is only for files.
+    let parts = perception
+        .into_iter()
+        .flat_map(|text| text.split(", "))
+        .filter(|part| *part != GROUND_TRUTH);
     let own = parts.map(|part| match part.strip_prefix("behavior ") {
         Some(behavior) => format!("{} behavior", behavior.split(' ').next().unwrap_or_default()),
         None => format!("{} perception", part.split(' ').next().unwrap_or_default()),
     });
-    let others = (!others.is_empty()).then(|| format!("told {}", told(&others)));
-    let all: Vec<String> = ids.into_iter().chain(own).chain(others).collect();
+    let other_grants =
+        (!other_grants.is_empty()).then(|| format!("told {}", readable_names(&other_grants)));
+    let all: Vec<String> = ids.into_iter().chain(own).chain(other_grants).collect();
     if all.is_empty() { vec!["own eyes only".to_owned()] } else { all }
 }
 
-fn told(names: &[String]) -> String {
+fn readable_names(names: &[String]) -> String {
     names.iter().map(|n| n.replace('_', " ")).collect::<Vec<_>>().join(", ")
 }
 
-/// Titles of helpers that other crates make: a report knows names only.
-const ELSEWHERE: [(&str, &str); 5] = [
+/// Titles of helpers that other crates register.
+const EXTERNAL_TITLES: [(&str, &str); 5] = [
     (NONE, "w/o"),
-    // Without "BM": no behavior model of ours sees failures, as the paper's does.
+    // Without "BM": our behavior models do not detect failures, unlike the paper's.
     ("llm", "LLM"),
     ("llm-told", "LLM, told"),
     ("vlm", "VLM"),
     ("vlm-told", "VLM, told"),
 ];
 
-/// What a table calls a helper.
+/// Returns the title of a helper in tables.
 pub fn title(helper: &str) -> String {
-    let built_in = HelperInfo::named(helper).map(|info| info.title);
-    let of_elsewhere =
-        || ELSEWHERE.iter().find(|(name, _)| *name == helper).map(|(_, title)| *title);
-    built_in.or_else(of_elsewhere).unwrap_or(helper).to_owned()
+    let built_in = HelperInfo::find_helper(helper).map(|info| info.title);
+    let external =
+        || EXTERNAL_TITLES.iter().find(|(name, _)| *name == helper).map(|(_, title)| *title);
+    built_in.or_else(external).unwrap_or(helper).to_owned()
 }

@@ -1,49 +1,47 @@
-//! The paper's tables.
+//! Tables of a report, in the layout of the paper's tables.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use chaic_core::TaskId;
 
-use crate::metrics::{
-    Difference, Interval, MEASURES, Measure, Metric, RunResult, Score, Scores, resolution,
-};
+use crate::metrics::{Difference, Interval, Metric, RunResult, Score, Scores, resolution};
 use crate::report::labels::{Labels, title};
 use crate::report::text_table::TextTable;
 
-/// What stands where there is nothing to say, as in the paper.
+/// Text of an undefined value, as in the paper.
 const UNDEFINED: &str = "/";
-/// Behind a number of which some episode runs broke down and count as zero.
-pub(super) const BROKEN: &str = "*";
-/// Behind a number of which some episode runs are missing, or in place of it if all are.
+/// Mark of a number that includes failed episode runs, which count as zero.
+pub(super) const FAILED: &str = "*";
+/// Mark of a number that lacks episode runs; replaces the number if all are missing.
 pub(super) const MISSING: &str = "?";
-/// An interval from fewer environments is wider than all that a rate can be.
+/// Minimum number of environments for an interval; with fewer, it covers the whole range of a rate.
 const MIN_ENVIRONMENTS: usize = 3;
-/// Tasks side by side in one table, as in the paper.
-const TASKS_ABREAST: usize = 4;
+/// Number of tasks per table, as in the paper.
+const TASKS_PER_TABLE: usize = 4;
 
-/// A column of a score: its name, whether a task has it, and its text.
+/// A column of a table of scores.
 struct Column {
     name: &'static str,
     in_task: fn(TaskId) -> bool,
     cell: Cell,
 }
 
-/// How the text of a cell is made.
+/// Source of the text of a cell.
 enum Cell {
     Metric(&'static Metric),
     Text(fn(&Score) -> String),
 }
 
 impl Column {
-    fn of(key: &str) -> Column {
-        let metric = Metric::of(key);
+    fn from_key(key: &str) -> Column {
+        let metric = Metric::from_key(key);
         Column { name: metric.name, in_task: metric.in_task, cell: Cell::Metric(metric) }
     }
 
     fn text(&self, score: &Score) -> String {
         match &self.cell {
             Cell::Metric(metric) => {
-                let shown = (metric.value)(score).map(|v| fixed(v, metric.decimals));
+                let shown = metric.value(score).map(|v| fixed(v, metric.decimals));
                 shown.unwrap_or_else(|| UNDEFINED.to_owned())
             }
             Cell::Text(text) => text(score),
@@ -51,58 +49,58 @@ impl Column {
     }
 }
 
-/// The paper's main table: TR(EI), IA, and ER while shopping.
+/// Builds the paper's main table: TR(EI), IA, and ER for shopping.
 pub fn main_result(scores: &Scores, labels: Labels<'_>) -> Vec<TextTable> {
     let columns = [
         Column { name: "TR(EI)", in_task: |_| true, cell: Cell::Text(rate_and_improvement) },
-        Column::of("ia"),
-        Column::of("er"),
+        Column::from_key("ia"),
+        Column::from_key("er"),
     ];
     let name = "Transport rate (efficiency improvement), goal inference accuracy";
-    blocks(scores, labels, name, &columns)
+    score_tables(scores, labels, name, &columns)
 }
 
-/// The paper's additional table: CR, and how uncertain TR is.
+/// Builds the paper's additional table: CR and the standard error of TR.
 pub fn additional(scores: &Scores, labels: Labels<'_>) -> Vec<TextTable> {
-    let columns = ["cr", "tr_se"].map(Column::of);
-    blocks(scores, labels, "Completion ratio of the helper, standard error of TR", &columns)
+    let columns = ["cr", "tr_se"].map(Column::from_key);
+    score_tables(scores, labels, "Completion ratio of the helper, standard error of TR", &columns)
 }
 
-/// For how much of their time partner or helper were stuck; nothing where no result tells.
+/// Builds the table of the fraction of frames in which partner or helper were stuck; empty if no
+/// result has it.
 pub fn stuck(scores: &Scores, labels: Labels<'_>) -> Vec<TextTable> {
-    let columns = [Column::of("stuck")];
+    let columns = [Column::from_key("stuck")];
     let is_known = scores.tasks.values().flat_map(|row| row.values()).any(|s| s.stuck.is_some());
-    let name = capitalized(Metric::of("stuck").title);
-    if is_known { blocks(scores, labels, &name, &columns) } else { Vec::new() }
+    let name = capitalized(Metric::from_key("stuck").title);
+    if is_known { score_tables(scores, labels, &name, &columns) } else { Vec::new() }
 }
 
-/// What else was measured, a table for each of the [`MEASURES`]; nothing where no result has it.
-pub fn measures(scores: &Scores, labels: Labels<'_>) -> Vec<TextTable> {
+/// Builds one table per diagnostic metric of [`METRICS`](crate::metrics::METRICS), without those
+/// that no result has.
+pub fn diagnostics(scores: &Scores, labels: Labels<'_>) -> Vec<TextTable> {
     let tasks = scores.tasks();
-    let grid = |measure: &Measure| {
-        let of = |task: TaskId, helper: &str| {
-            scores.get(task, helper)?.measures.get(measure.key).copied()
-        };
+    let table = |metric: &'static Metric| {
+        let value = |task: TaskId, helper: &str| metric.value(scores.get(task, helper)?);
         let row = |helper: &String| {
             let cell = |task: &TaskId| {
-                let shown = |value: f64| fixed(value, measure.decimals);
-                of(*task, helper).map_or(UNDEFINED.to_owned(), shown)
+                let shown = |value: f64| fixed(value, metric.decimals);
+                value(*task, helper).map_or(UNDEFINED.to_owned(), shown)
             };
             std::iter::once(labels.lines(helper)).chain(tasks.iter().map(cell)).collect()
         };
         let header = std::iter::once("Helper".to_owned());
         let helpers = scores.helpers();
-        let is_known = helpers.iter().any(|h| tasks.iter().any(|t| of(*t, h).is_some()));
+        let is_known = helpers.iter().any(|h| tasks.iter().any(|t| value(*t, h).is_some()));
         is_known.then(|| TextTable {
-            title: measure.title.to_owned(),
+            title: metric.title.to_owned(),
             header: header.chain(tasks.iter().map(|t| t.info().title.to_owned())).collect(),
             rows: helpers.iter().map(row).collect(),
         })
     };
-    MEASURES.iter().filter_map(grid).collect()
+    Metric::diagnostics().filter_map(table).collect()
 }
 
-/// The transport rates with their 95 % intervals.
+/// Builds the table of transport rates with their 95 % intervals.
 pub fn intervals(scores: &Scores, labels: Labels<'_>) -> TextTable {
     let tasks = scores.tasks();
     let cell = |helper: &String, task: &TaskId| {
@@ -123,13 +121,14 @@ pub fn intervals(scores: &Scores, labels: Labels<'_>) -> TextTable {
     }
 }
 
-/// What the episodes can tell apart, task by task; `None` where no pair of helpers has an interval.
+/// Builds the table of the smallest distinguishable differences by task; `None` if no pair of
+/// helpers has an interval.
 pub fn resolutions(differences: &[Difference], tasks: &[TaskId]) -> Option<TextTable> {
-    let of_task = tasks.iter().map(|t| (t.info().title, Some(*t)));
-    let rows = of_task.chain(std::iter::once(("all tasks", None))).filter_map(|(name, task)| {
+    let by_task = tasks.iter().map(|t| (t.info().title, Some(*t)));
+    let rows = by_task.chain(std::iter::once(("all tasks", None))).filter_map(|(name, task)| {
         let r = resolution(differences, task)?;
-        let numbers = [r.environments.to_string(), rounded(r.median), rounded(r.largest)];
-        Some(std::iter::once(name.to_owned()).chain(numbers).collect())
+        let values = [r.environments.to_string(), rounded(r.median), rounded(r.largest)];
+        Some(std::iter::once(name.to_owned()).chain(values).collect())
     });
     let rows: Vec<Vec<String>> = rows.collect();
     let header = ["Task", "environments", "median pair of helpers", "widest pair"];
@@ -143,7 +142,8 @@ pub fn resolutions(differences: &[Difference], tasks: &[TaskId]) -> Option<TextT
     })
 }
 
-/// Differences of TR between helpers, with 95 % intervals; `granted` says what these are granted.
+/// Builds the table of TR differences between helpers, with 95 % intervals; `granted` describes the
+/// grants of the helpers.
 pub fn pairs(differences: &[Difference], tasks: &[TaskId], granted: Option<&str>) -> TextTable {
     let header = ["TR difference".to_owned(), "all".to_owned()].into_iter();
     let header = header.chain(tasks.iter().map(|t| t.info().title.to_owned()));
@@ -162,7 +162,7 @@ pub fn pairs(differences: &[Difference], tasks: &[TaskId], granted: Option<&str>
     }
 }
 
-/// What minds counted of their own doings, summed over all episodes; `None` if nobody counted.
+/// Builds the table of the agents' own counters, summed over all episodes; `None` without counters.
 pub fn counts(results: &[RunResult], labels: Labels<'_>) -> Option<TextTable> {
     let mut sums: BTreeMap<&str, BTreeMap<&str, u64>> = BTreeMap::new();
     for result in results {
@@ -170,9 +170,10 @@ pub fn counts(results: &[RunResult], labels: Labels<'_>) -> Option<TextTable> {
             *sums.entry(name).or_default().entry(&result.key.helper).or_default() += n;
         }
     }
-    let helpers: BTreeSet<&str> = sums.values().flat_map(|by| by.keys().copied()).collect();
-    let row = |(name, by): (&&str, &BTreeMap<&str, u64>)| {
-        let cells = helpers.iter().map(|h| by.get(h).copied().unwrap_or(0).to_string());
+    let helpers: BTreeSet<&str> =
+        sums.values().flat_map(|by_helper| by_helper.keys().copied()).collect();
+    let row = |(name, by_helper): (&&str, &BTreeMap<&str, u64>)| {
+        let cells = helpers.iter().map(|h| by_helper.get(h).copied().unwrap_or(0).to_string());
         std::iter::once(name.replace('_', " ").replace('.', ": ")).chain(cells).collect()
     };
     let header = std::iter::once("Count".to_owned()).chain(helpers.iter().map(|h| labels.lines(h)));
@@ -183,10 +184,15 @@ pub fn counts(results: &[RunResult], labels: Labels<'_>) -> Option<TextTable> {
     })
 }
 
-fn blocks(scores: &Scores, labels: Labels<'_>, name: &str, columns: &[Column]) -> Vec<TextTable> {
+fn score_tables(
+    scores: &Scores,
+    labels: Labels<'_>,
+    name: &str,
+    columns: &[Column],
+) -> Vec<TextTable> {
     let tasks = scores.tasks();
     let helpers = scores.helpers();
-    let grid = |tasks: &[TaskId]| {
+    let table = |tasks: &[TaskId]| {
         let shown: Vec<(TaskId, &Column)> = tasks
             .iter()
             .flat_map(|t| columns.iter().filter(|c| (c.in_task)(*t)).map(|c| (*t, c)))
@@ -200,7 +206,7 @@ fn blocks(scores: &Scores, labels: Labels<'_>, name: &str, columns: &[Column]) -
         }
         let row = |helper: &String| {
             let cell = |(task, column): &(TaskId, &Column)| match scores.get(*task, helper) {
-                // One mark a task and row is enough.
+                // One mark per task and row is enough.
                 Some(score) if column.name == columns[0].name => column.text(score) + marks(score),
                 Some(score) => column.text(score),
                 None if scores.is_unplayed(*task, helper) => MISSING.to_owned(),
@@ -211,19 +217,19 @@ fn blocks(scores: &Scores, labels: Labels<'_>, name: &str, columns: &[Column]) -
         let rows = helpers.iter().map(row).collect();
         TextTable { title: name.to_owned(), header, rows }
     };
-    tasks.chunks(TASKS_ABREAST).map(grid).collect()
+    tasks.chunks(TASKS_PER_TABLE).map(table).collect()
 }
 
-/// The interval of TR where it says more than that a rate is between 0 and 1.
+/// Returns the 95 % interval of TR if it is narrower than the range of a rate.
 pub fn shown_interval(score: &Score) -> Option<[f64; 2]> {
     score.tr_ci.filter(|_| score.environments >= MIN_ENVIRONMENTS)
 }
 
-/// Behind the first number of a row that doesn't rest on what it should.
+/// Returns the marks of a row with failed or missing episode runs.
 fn marks(score: &Score) -> &'static str {
-    match (score.broken > 0, score.incomplete) {
+    match (score.failed > 0, score.incomplete) {
         (false, false) => "",
-        (true, false) => BROKEN,
+        (true, false) => FAILED,
         (false, true) => MISSING,
         (true, true) => "*?",
     }
@@ -236,30 +242,30 @@ fn rate_and_improvement(score: &Score) -> String {
     }
 }
 
-/// Two decimals, or a sign that there is nothing to say.
+/// Formats a value with two decimals, or as undefined.
 pub fn number(value: Option<f64>) -> String {
     value.map_or(UNDEFINED.to_owned(), rounded)
 }
 
-/// With a capital letter at its head.
+/// Returns the text with its first letter in upper case.
 pub fn capitalized(text: &str) -> String {
     let head = text.chars().next().map_or(0, char::len_utf8);
     text[..head].to_uppercase() + &text[head..]
 }
 
-/// So many decimals; what rounds to zero has no sign.
+/// Formats a value with a fixed number of decimals; a value that rounds to zero has no sign.
 fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let is_zero = text.chars().all(|c| "-0.".contains(c));
     if is_zero { text.trim_start_matches('-').to_owned() } else { text }
 }
 
-/// Two decimals; what rounds to zero has no sign.
+/// Formats a value with two decimals; a value that rounds to zero has no sign.
 pub fn rounded(value: f64) -> String {
     fixed(value, 2)
 }
 
-/// A mean with its interval, or a sign that there is nothing to say.
+/// Formats a mean with its interval, or as undefined.
 pub fn interval(interval: Option<&Interval>) -> String {
     match interval {
         None => UNDEFINED.to_owned(),

@@ -1,4 +1,4 @@
-//! Reports say what the scores say, in every format.
+//! Promise: reports have the same content in every format.
 
 use chaic_core::TaskId;
 use chaic_core::observation::Grants;
@@ -6,8 +6,8 @@ use chaic_env::rules::RuleSetName;
 use chaic_env::{Digest, RunKey};
 
 use super::*;
-use crate::metrics::{Ending, FormulaSet, RunResult, Summary};
-use crate::run::{Item, RunGrants, RunOptions};
+use crate::metrics::{FormulaSet, RunResult, RunStatus, Summary};
+use crate::run::{EpisodeJob, RunGrants, RunOptions};
 
 fn results() -> Vec<RunResult> {
     let mut results = Vec::new();
@@ -18,7 +18,7 @@ fn results() -> Vec<RunResult> {
                 let away_frames = (task == TaskId::Shopping && helper != "none").then_some(250);
                 results.push(RunResult {
                     key: RunKey { task, helper: helper.to_owned(), episode, seed: 0 },
-                    ending: Ending::Done(Summary {
+                    status: RunStatus::Done(Summary {
                         frames: 1000,
                         done: done + f64::from(k),
                         total: 10.0,
@@ -28,7 +28,7 @@ fn results() -> Vec<RunResult> {
                         deliveries: Vec::new(),
                         digest: Digest(0),
                         counts: Default::default(),
-                        measures: Default::default(),
+                        diagnostics: Default::default(),
                     }),
                 });
             }
@@ -57,7 +57,7 @@ fn options() -> RunOptions {
     }
 }
 
-/// As `rhp` and `oracle` ask for; the partner as given.
+/// Returns the default grants of `rhp` and `oracle`, and the given grants of the partner.
 fn granted(partner: Grants) -> RunGrants {
     let helpers = [("rhp", Grants::IDS), ("oracle", Grants::ORACLE)];
     RunGrants {
@@ -73,15 +73,15 @@ fn text(results: &[RunResult], format: Format) -> String {
 }
 
 fn text_with(results: &[RunResult], granted: Option<&RunGrants>, format: Format) -> String {
-    let item =
-        |r: RunResult| Item { environment: r.key.episode.clone(), key: r.key, horizon: 1000 };
-    let planned: Vec<Item> = self::results().into_iter().map(item).collect();
+    let job =
+        |r: RunResult| EpisodeJob { environment: r.key.episode.clone(), key: r.key, horizon: 1000 };
+    let planned: Vec<EpisodeJob> = self::results().into_iter().map(job).collect();
     let formulas = FormulaSet::Paper;
     Report { options: &options(), results, planned: &planned, granted, formulas }.text(format)
 }
 
 #[test]
-fn an_unfinished_run_says_so() {
+fn an_unfinished_run_is_reported() {
     let whole = results();
     let md = text(&whole, Format::Markdown);
     assert!(!md.contains("Unfinished") && !md.contains("Unequal"), "{md}");
@@ -101,7 +101,7 @@ fn an_unfinished_run_says_so() {
         assert!(text.contains("Missing: obstacle/test/01 with rhp, seed 0; shopping"), "{text}");
         assert!(text.contains("0.20(0.50)?"), "the row with one missing is marked: {text}");
         assert!(text.contains("? Incomplete: episode runs are missing."), "{text}");
-        assert!(!text.contains("in shopping the rows"), "absent is not unequal: {text}");
+        assert!(!text.contains("in shopping the rows"), "a missing row is not unequal: {text}");
     }
     let json: serde_json::Value = serde_json::from_str(&text(&part, Format::Json)).unwrap();
     let runs = serde_json::json!({"planned": 48, "scored": 45, "broken": 0, "missing": 3});
@@ -141,12 +141,12 @@ fn every_format_has_every_task_and_helper() {
     assert_eq!(json["tasks"]["obstacle"]["none"]["ei"], serde_json::Value::Null);
     let md = text(&results, Format::Markdown);
     assert!(md.contains("| RHP - w/o | 0.10 [0.10, 0.10] |"), "{md}");
-    // Houses of all indoor tasks, and two streets and two yards.
+    // One environment per episode of the indoor tasks, and two streets and two yards.
     assert!(md.contains("| all tasks | 16 | 0.00 | 0.00 |"), "{md}");
 }
 
 #[test]
-fn what_was_granted_stands_in_every_format() {
+fn grants_are_in_every_format() {
     let results = results();
     for format in [Format::Table, Format::Markdown] {
         let text = text(&results, format);
@@ -171,9 +171,9 @@ fn what_was_granted_stands_in_every_format() {
     let own =
         RunGrants { helpers: [("rhp".to_owned(), Grants::NONE)].into(), ..granted(Grants::ORACLE) };
     let md = text_with(&results, Some(&own), Format::Markdown);
-    let said = "RHP: own eyes only; Oracle: grants not recorded; the partner is told more than usual: \
+    let expected = "RHP: own eyes only; Oracle: grants not recorded; the partner is told more than usual: \
                 behavior, progress.";
-    assert!(md.contains(said), "{md}");
+    assert!(md.contains(expected), "{md}");
     let json = text_with(&results, Some(&own), Format::Json);
     assert!(json.contains("\"perception\": \"own\""), "{json}");
     let unknown = text_with(&results, None, Format::Table);
@@ -181,22 +181,23 @@ fn what_was_granted_stands_in_every_format() {
 }
 
 #[test]
-fn names_of_helpers_promise_no_more_than_there_is() {
+fn titles_of_language_helpers_do_not_claim_a_behavior_model() {
     for helper in ["llm", "llm-told"] {
-        assert!(!title(helper).contains("BM"), "no model of behavior sees failures");
+        assert!(!title(helper).contains("BM"), "no behavior model detects failures");
     }
 }
 
 #[test]
-fn what_broke_down_is_named() {
+fn failed_runs_are_listed() {
     let mut results = results();
     let message = "the episode broke down: boom".to_owned();
-    results[0].ending = Ending::Error { message };
+    results[0].status = RunStatus::Error { message };
     for format in [Format::Table, Format::Markdown] {
         let text = text(&results, format);
-        let said = "Broke down, counts as zero: no_constraint/test/00 with oracle (seed 0): the";
-        assert!(text.contains(said), "{text}");
-        // 0 and 4 of 10 in the place of 3 and 4.
+        let expected =
+            "Broke down, counts as zero: no_constraint/test/00 with oracle (seed 0): the";
+        assert!(text.contains(expected), "{text}");
+        // 0 and 4 of 10 instead of 3 and 4.
         assert!(text.contains("0.20(") && text.contains(")*"), "{text}");
         assert!(text.contains("* Episode runs broke down; they count as zero."), "{text}");
     }

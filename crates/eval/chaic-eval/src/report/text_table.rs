@@ -1,32 +1,32 @@
-//! A table before it is printed.
+//! Text tables for terminals and Markdown.
 
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
-/// Rows of text under a header; the first column is left-aligned, the others right.
+/// Rows of text below a header. The first column is left-aligned, the others right-aligned.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TextTable {
-    /// What it shows.
+    /// Title above the table.
     pub title: String,
     /// Names of the columns.
     pub header: Vec<String>,
-    /// The rows.
+    /// Cells by row.
     pub rows: Vec<Vec<String>>,
 }
 
 impl TextTable {
-    /// For a terminal.
+    /// Formats the table for a terminal.
     pub fn to_terminal(&self) -> String {
         let mut table = self.table();
         table.load_style(presets::UTF8_FULL_CONDENSED);
         format!("{}\n{}\n", self.title, table.trim_fmt())
     }
 
-    /// For a Markdown document.
+    /// Formats the table as Markdown.
     pub fn to_markdown(&self) -> String {
         let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
         let rule: Vec<String> =
             (0..self.header.len()).map(|k| if k == 0 { ":--" } else { "--:" }.to_owned()).collect();
-        // An empty first line stands for the title before it.
+        // An empty first line of a header cell continues the title of the previous column.
         let flat = |h: &String| h.trim_start_matches('\n').replace('\n', "<br>");
         let header: Vec<String> = self.header.iter().map(flat).collect();
         let rows: String =

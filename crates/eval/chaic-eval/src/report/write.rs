@@ -1,4 +1,4 @@
-//! The whole report, as text and as files.
+//! Complete reports, as text and as files.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -9,63 +9,64 @@ use serde::Serialize;
 
 use crate::error::Result;
 use crate::metrics::{
-    Ending, Environments, FormulaSet, MAX_NAMED, Played, RunResult, Score, Scores, differences,
+    Environments, FormulaSet, MAX_NAMED, PlayedEpisodes, RunResult, RunStatus, Score, Scores,
+    differences,
 };
 use crate::report::Format;
 use crate::report::coverage::coverage;
 use crate::report::figure::{figure_text, write_figure};
 use crate::report::labels::{GrantsFile, Labels};
 use crate::report::tables::{
-    BROKEN, MISSING, additional, counts, intervals, main_result, measures, pairs, resolutions,
+    FAILED, MISSING, additional, counts, diagnostics, intervals, main_result, pairs, resolutions,
     stuck,
 };
 use crate::report::text_table::TextTable;
-use crate::run::{Item, RunFolder, RunGrants, RunOptions, environments};
+use crate::run::{EpisodeJob, RunFolder, RunGrants, RunOptions, environments};
 
 /// File name of the figure as PNG.
-const PICTURE: &str = "figure.png";
+const FIGURE_PNG: &str = "figure.png";
 
-/// All that a report is made from.
+/// Input of a report.
 #[derive(Clone, Copy, Debug)]
 pub struct Report<'a> {
-    /// What was played.
+    /// Options of the run.
     pub options: &'a RunOptions,
-    /// What came out.
+    /// Results of the run.
     pub results: &'a [RunResult],
-    /// All episode runs that the run consists of.
-    pub planned: &'a [Item],
-    /// What everybody was granted; `None` where nobody has recorded it.
+    /// All planned episode runs.
+    pub planned: &'a [EpisodeJob],
+    /// Recorded grants; `None` if the run has none.
     pub granted: Option<&'a RunGrants>,
-    /// By which formulas it is scored.
+    /// Formulas of the scores.
     pub formulas: FormulaSet,
 }
 
-/// What metrics need of the episode runs that were planned.
+/// Episode runs that were planned, in the form that metrics need.
 struct Plan {
     keys: Vec<RunKey>,
     environments: Environments,
 }
 
 impl Report<'_> {
-    /// The scores.
+    /// Computes the scores.
     pub fn scores(&self) -> Scores {
-        Scores::of(self.played(&self.plan()), &self.formulas.formulas())
+        Scores::new(self.played_episodes(&self.plan()), &self.formulas.formulas())
     }
 
-    /// What rows are called.
+    /// Returns the labels of the rows.
     pub fn labels(&self) -> Labels<'_> {
         Labels { granted: self.granted }
     }
 
-    /// What has to be known of a run that isn't whole; nothing of one that is.
+    /// Returns notes about missing or unequal episode runs; empty for a complete run.
     pub fn notes(&self) -> Vec<String> {
-        let unknown = "Environments unknown, as the episodes are gone: each counts as independent, so \
+        let text = "Environments unknown, as the episodes are gone: each counts as independent, so \
                        standard errors and intervals may be too small.";
-        let unknown = self.planned.is_empty().then(|| unknown.to_owned());
-        coverage(self.played(&self.plan())).into_iter().chain(unknown).collect()
+        let unknown = self.planned.is_empty().then(|| text.to_owned());
+        coverage(self.played_episodes(&self.plan())).into_iter().chain(unknown).collect()
     }
 
-    /// The report as text that ends with a line break.
+    /// Formats the report; the text ends with a line break.
     pub fn text(&self, format: Format) -> String {
         match format {
             Format::Table => self.terminal(),
@@ -76,19 +77,19 @@ impl Report<'_> {
     }
 
     fn plan(&self) -> Plan {
-        let keys = self.planned.iter().map(|i| i.key.clone()).collect();
+        let keys = self.planned.iter().map(|job| job.key.clone()).collect();
         Plan { keys, environments: environments(self.planned) }
     }
 
-    fn played<'a>(&'a self, plan: &'a Plan) -> Played<'a> {
+    fn played_episodes<'a>(&'a self, plan: &'a Plan) -> PlayedEpisodes<'a> {
         let Plan { keys, environments } = plan;
-        Played { results: self.results, planned: keys, environments }
+        PlayedEpisodes { results: self.results, planned: keys, environments }
     }
 
     fn json(&self) -> String {
         #[derive(Serialize)]
         struct File<'a> {
-            /// Absent where the run's episodes are gone.
+            /// Absent if the run's episodes are missing.
             #[serde(skip_serializing_if = "Option::is_none")]
             episode_runs: Option<EpisodeRuns>,
             incomplete: bool,
@@ -111,7 +112,7 @@ impl Report<'_> {
             missing: usize,
         }
         let plan = self.plan();
-        let mut missing = self.played(&plan).missing();
+        let mut missing = self.played_episodes(&plan).missing();
         let episode_runs = (!self.planned.is_empty()).then_some(EpisodeRuns {
             planned: self.planned.len(),
             scored: self.results.len(),
@@ -128,21 +129,21 @@ impl Report<'_> {
         serde_json::to_string_pretty(&file).expect("scores have string keys") + "\n"
     }
 
-    fn grids(&self, scores: &Scores) -> Vec<TextTable> {
+    fn tables(&self, scores: &Scores) -> Vec<TextTable> {
         let labels = self.labels();
-        let mut grids = main_result(scores, labels);
-        grids.extend(additional(scores, labels));
-        grids.extend(stuck(scores, labels));
-        grids.extend(counts(self.results, labels));
-        grids
+        let mut tables = main_result(scores, labels);
+        tables.extend(additional(scores, labels));
+        tables.extend(stuck(scores, labels));
+        tables.extend(counts(self.results, labels));
+        tables
     }
 
     fn terminal(&self) -> String {
         let scores = self.scores();
-        let differences = differences(self.played(&self.plan()), &scores.helpers());
-        let mut grids = self.grids(&scores);
-        grids.extend(resolutions(&differences, &scores.tasks()));
-        let mut text: String = grids.iter().map(|g| g.to_terminal() + "\n").collect();
+        let differences = differences(self.played_episodes(&self.plan()), &scores.helpers());
+        let mut tables = self.tables(&scores);
+        tables.extend(resolutions(&differences, &scores.tasks()));
+        let mut text: String = tables.iter().map(|t| t.to_terminal() + "\n").collect();
         text += &self.legend(&scores);
         text += &self.notes().iter().map(|n| format!("{n}\n")).collect::<String>();
         text += &self.errors();
@@ -159,16 +160,16 @@ impl Report<'_> {
         for note in self.notes() {
             let _ = writeln!(text, "**{note}**\n");
         }
-        let differences = differences(self.played(&self.plan()), &scores.helpers());
-        let mut grids = self.grids(&scores);
-        grids.push(intervals(&scores, self.labels()));
+        let differences = differences(self.played_episodes(&self.plan()), &scores.helpers());
+        let mut tables = self.tables(&scores);
+        tables.push(intervals(&scores, self.labels()));
         if !differences.is_empty() {
-            grids.push(pairs(&differences, &scores.tasks(), granted.as_deref()));
+            tables.push(pairs(&differences, &scores.tasks(), granted.as_deref()));
         }
-        grids.extend(resolutions(&differences, &scores.tasks()));
-        grids.extend(measures(&scores, self.labels()));
-        for grid in grids {
-            text += &grid.to_markdown();
+        tables.extend(resolutions(&differences, &scores.tasks()));
+        tables.extend(diagnostics(&scores, self.labels()));
+        for table in tables {
+            text += &table.to_markdown();
             text.push('\n');
         }
         text += &self.legend(&scores);
@@ -176,7 +177,7 @@ impl Report<'_> {
         text
     }
 
-    /// What was played, by what.
+    /// Returns the heading, with the options of the run.
     fn heading(&self) -> String {
         let RunOptions {
             split, first, seeds, size, rules, set, partner, partner_is, track, ..
@@ -202,9 +203,9 @@ impl Report<'_> {
     fn csv(&self) -> String {
         let scores = self.scores();
         let granted = self.labels().helpers_file(&self.options.helpers).unwrap_or_default();
-        let mut text = String::from(
-            "task,helper,grants,perception,tr,tr_se,tr_low,tr_high,ei,ei_low,ei_high,ia,cr,er,stuck,\
-             episodes,environments,broken,incomplete\n",
+        let names = CSV_VALUES.map(|(name, _)| name).join(",");
+        let mut text = format!(
+            "task,helper,grants,perception,{names},episodes,environments,broken,incomplete\n"
         );
         for task in scores.tasks() {
             for helper in scores.helpers() {
@@ -212,11 +213,11 @@ impl Report<'_> {
                 let (grants, perception) = granted
                     .get(&helper)
                     .map_or((String::new(), ""), |g| (g.grants.join("+"), g.perception.as_str()));
-                let numbers = csv_numbers(s);
-                let Score { episodes, environments, broken, incomplete, .. } = s;
+                let values = CSV_VALUES.map(|(_, value)| csv_cell(value(s))).join(",");
+                let Score { episodes, environments, failed, incomplete, .. } = s;
                 let _ = writeln!(
                     text,
-                    "{task},{helper},{grants},{perception},{numbers},{episodes},{environments},{broken},\
+                    "{task},{helper},{grants},{perception},{values},{episodes},{environments},{failed},\
                      {incomplete}"
                 );
             }
@@ -236,10 +237,10 @@ impl Report<'_> {
              accuracy,\nER emergency rate, CR completion ratio of the helper, {spread}.\n"
         );
         let rows = || scores.tasks.values().flat_map(|row| row.values());
-        if rows().any(|s| s.broken > 0) {
-            let _ = writeln!(text, "{BROKEN} Episode runs broke down; they count as zero.");
+        if rows().any(|s| s.failed > 0) {
+            let _ = writeln!(text, "{FAILED} Episode runs broke down; they count as zero.");
         }
-        if !self.played(&self.plan()).missing().is_empty() {
+        if !self.played_episodes(&self.plan()).missing().is_empty() {
             let _ = writeln!(text, "{MISSING} Incomplete: episode runs are missing.");
         }
         if self.options.track != Track::default() {
@@ -258,7 +259,7 @@ impl Report<'_> {
         let mut results: Vec<&RunResult> = self.results.iter().collect();
         results.sort_by(|a, b| a.key.cmp(&b.key));
         for result in results {
-            if let Ending::Error { message } = &result.ending {
+            if let RunStatus::Error { message } = &result.status {
                 let k = &result.key;
                 let _ = writeln!(
                     text,
@@ -271,20 +272,31 @@ impl Report<'_> {
     }
 }
 
-fn csv_numbers(s: &Score) -> String {
-    let low = |ends: Option<[f64; 2]>| ends.map(|[low, _]| low);
-    let high = |ends: Option<[f64; 2]>| ends.map(|[_, high]| high);
-    let [tr_low, tr_high] = [low(s.tr_ci), high(s.tr_ci)];
-    let [ei_low, ei_high] = [low(s.ei_ci), high(s.ei_ci)];
-    let numbers =
-        [Some(s.tr), s.tr_se, tr_low, tr_high, s.ei, ei_low, ei_high, s.ia, s.cr, s.er, s.stuck];
-    let cell = |v: Option<f64>| v.map_or(String::new(), |v| format!("{v:.6}"));
-    numbers.map(cell).join(",")
+/// Name of a numeric column of the CSV, and its value.
+type CsvColumn = (&'static str, fn(&Score) -> Option<f64>);
+
+/// Numeric columns of the CSV.
+const CSV_VALUES: [CsvColumn; 11] = [
+    ("tr", |s| Some(s.tr)),
+    ("tr_se", |s| s.tr_se),
+    ("tr_low", |s| s.tr_ci.map(|[low, _]| low)),
+    ("tr_high", |s| s.tr_ci.map(|[_, high]| high)),
+    ("ei", |s| s.ei),
+    ("ei_low", |s| s.ei_ci.map(|[low, _]| low)),
+    ("ei_high", |s| s.ei_ci.map(|[_, high]| high)),
+    ("ia", |s| s.ia),
+    ("cr", |s| s.cr),
+    ("er", |s| s.er),
+    ("stuck", |s| s.stuck),
+];
+
+fn csv_cell(value: Option<f64>) -> String {
+    value.map_or(String::new(), |v| format!("{v:.6}"))
 }
 
 impl Report<'_> {
-    /// The files of it that are text, by name; without the figure if there are more helpers than
-    /// one can show.
+    /// Returns the text files of the report by name. Leaves out the figure if it can't show that
+    /// many helpers.
     fn texts(&self) -> Vec<(&'static str, String)> {
         let figure =
             figure_text(&self.scores(), self.labels()).ok().map(|figure| ("figure.svg", figure));
@@ -296,16 +308,18 @@ impl Report<'_> {
 /// Writes `scores.json`, `report.md`, `figure.svg` and `figure.png` into the run's folder.
 ///
 /// # Errors
-/// If the file system refuses.
+/// If a file can't be written.
 pub fn write_files(folder: &RunFolder, report: &Report<'_>) -> Result<()> {
     for (name, text) in report.texts() {
         folder.write(name, text.as_bytes())?;
     }
-    write_figure(&report.scores(), report.labels(), &folder.join(PICTURE))
+    write_figure(&report.scores(), report.labels(), &folder.join(FIGURE_PNG))
 }
 
-/// Compares the files of a report with what [`write_files`] writes. Returns the names of missing files and
-/// of differing files. Of the PNG only the kind of file is checked: its bytes may depend on the machine.
+/// Compares the files of a report with the output of [`write_files`]. Returns the names of missing
+/// files and of differing files.
+///
+/// Checks only the file type of the PNG, because its bytes may depend on the machine.
 ///
 /// # Errors
 /// If a file can't be read.
@@ -318,14 +332,14 @@ pub fn differing_files(
         let path = folder.join(name);
         match kind(&path)? {
             EntryKind::Missing => missing.push(name),
-            // One byte more tells a longer file from an equal one.
+            // One byte more distinguishes a longer file from an equal one.
             EntryKind::File if read_bounded(&path, text.len() as u64 + 1)? == text.as_bytes() => {}
             _ => altered.push(name),
         }
     }
-    let picture = kind(&folder.join(PICTURE))?;
-    if ![EntryKind::Missing, EntryKind::File].contains(&picture) {
-        altered.push(PICTURE);
+    let figure = kind(&folder.join(FIGURE_PNG))?;
+    if ![EntryKind::Missing, EntryKind::File].contains(&figure) {
+        altered.push(FIGURE_PNG);
     }
     Ok((missing, altered))
 }

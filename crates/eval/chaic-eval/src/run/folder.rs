@@ -1,14 +1,14 @@
-//! The folder of a run: where what lies, and who may write.
+//! Folder of a run: paths of its files, and the lock of its writer.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use chaic_env::trace::{Trace, Warning};
+use chaic_env::trace::{Trace, TraceWarning};
 use chaic_env::{CHAIC_VERSION, Digest, EnvError, RunKey, slug};
 use chaic_episodes::{Episode, MAX_EPISODE_BYTES, find_episode};
 use chaic_files::{
-    Entry, EntryKind, FolderLock, LOCK, LockError, UNFINISHED, entries, is_file_below, kind,
-    kind_below, open_or_create, read_below, read_bounded, walk, write_whole,
+    Entry, EntryKind, FolderLock, LOCK, LockError, TEMPORARY_SUFFIX, entries, is_file_below, kind,
+    kind_below, open_or_create, read_below, read_bounded, walk, write_atomically,
 };
 use serde::{Deserialize, Serialize};
 
@@ -20,17 +20,17 @@ use crate::trace_file;
 const FORMAT: &str = "chaic-run";
 /// 2: with the digest of the options.
 const VERSION: u32 = 2;
-/// Longest `run.json` that is read, bytes: a thousand times a usual one.
+/// Maximum size of `run.json`, bytes: a thousand times the typical size.
 const MAX_RUN_FILE_BYTES: u64 = 1 << 20;
-/// Its presence makes a folder a run, so it is written after all that a run needs.
+/// A folder with this file is a run, so the file is written after all others that a run needs.
 const RUN_FILE: &str = "run.json";
-/// Copies of episode files.
+/// Folder with copies of episode files.
 pub(super) const EPISODES: &str = "episodes";
-/// What helpers that ask language models record; `chaic-llm` writes it.
+/// Folder with records of helpers that query language models; `chaic-llm` writes it.
 pub(super) const RECORDS: &str = "llm";
-/// The commands of helpers that run in other processes; `chaic-subprocess` writes it.
+/// File with the commands of helpers in other processes; `chaic-subprocess` writes it.
 pub(super) const COMMANDS: &str = "commands.json";
-/// Digests of trained policies that play as helpers; `chaic-learn` writes it.
+/// File with digests of trained policies that play as helpers; `chaic-learn` writes it.
 pub(super) const POLICIES: &str = "policies.json";
 /// Folder of the traces.
 const TRACES: &str = "traces";
@@ -42,15 +42,15 @@ const RESULTS: &str = "results.jsonl";
 const REPORT: [&str; 4] = ["scores.json", "report.md", "figure.svg", "figure.png"];
 /// Marker file of a merge in progress. It is removed after `run.json` is written.
 const MERGING: &str = ".merging";
-/// What lies there before the first question is asked.
-const RECORDS_OF_BEGINNING: [&str; 3] = ["settings.json", "settings.json.tmp", "templates"];
+/// Files in [`RECORDS`] before the first query.
+const STARTUP_RECORDS: [&str; 3] = ["settings.json", "settings.json.tmp", "templates"];
 
-/// Whether a run is begun or gone on with.
+/// Access to a run's folder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Access {
+pub enum FolderMode {
     /// The folder must be new or empty.
-    Begin,
-    /// What is there is gone on with; nothing there is a beginning.
+    New,
+    /// A run in the folder is resumed. Without a run, the folder must be new or empty.
     Resume,
     /// The folder must be new, empty, or left by an interrupted merge, whose files are removed.
     Merge,
@@ -60,7 +60,7 @@ pub enum Access {
 #[derive(Debug)]
 pub struct RunFolder {
     path: PathBuf,
-    /// Held as long as this exists, if the folder was opened for writing.
+    /// Lock of a folder that was opened for writing.
     _lock: Option<FolderLock>,
 }
 
@@ -70,7 +70,7 @@ struct RunFile {
     version: u32,
     chaic: String,
     renderer: String,
-    /// Of the options as compact JSON, so that a change by hand is found.
+    /// Digest of the options as compact JSON; it detects manual changes.
     digest: Digest,
     options: RunOptions,
     /// Absent in runs of older versions.
@@ -85,61 +85,65 @@ impl RunFile {
     }
 }
 
-/// What lies in a folder that is to become a run.
+/// State of a folder before a run is opened in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Contents {
-    /// Nothing, or a lock that nobody holds.
-    Nothing,
-    /// What a run leaves that is stopped before its `run.json` is written.
-    Beginning,
+enum FolderState {
+    /// Empty, apart from an unused lock.
+    Empty,
+    /// Files of a run that was stopped before its `run.json` was written.
+    Unstarted,
     /// Files of a merge that was interrupted before its `run.json` was written.
-    StoppedMerge,
+    InterruptedMerge,
     /// A run.
     Run,
-    /// Something that no run has left.
+    /// Any other content.
     Other,
 }
 
-impl Contents {
-    fn of(path: &Path) -> Result<Contents> {
+impl FolderState {
+    fn read(path: &Path) -> Result<FolderState> {
         if RunFolder::is_run(path) {
-            return Ok(Contents::Run);
+            return Ok(FolderState::Run);
         }
         let found = if path.exists() { entries(path)? } else { Vec::new() };
         let is_locked = found.iter().any(|p| name(p) == LOCK);
         let is_merge = found.iter().any(|p| name(p) == MERGING);
-        let rest: Vec<&PathBuf> =
+        let content: Vec<&PathBuf> =
             found.iter().filter(|p| ![LOCK, MERGING].contains(&name(p))).collect();
-        Ok(match rest[..] {
-            _ if is_merge && rest.iter().all(|p| is_of_merge(p)) => Contents::StoppedMerge,
-            [] => Contents::Nothing,
-            _ if is_locked && rest.iter().all(|p| is_of_beginning(p)) => Contents::Beginning,
-            _ => Contents::Other,
+        Ok(match content[..] {
+            _ if is_merge && content.iter().all(|p| is_merge_file(p)) => {
+                FolderState::InterruptedMerge
+            }
+            [] => FolderState::Empty,
+            _ if is_locked && content.iter().all(|p| is_startup_file(p)) => FolderState::Unstarted,
+            _ => FolderState::Other,
         })
     }
 }
 
-/// Whether a run writes this before its `run.json`.
-fn is_of_beginning(path: &Path) -> bool {
-    let all = |folder: &Path, is_known: &dyn Fn(&str) -> bool| {
+/// Returns whether a run writes a file or folder of this name before its `run.json`.
+fn is_startup_file(path: &Path) -> bool {
+    let has_only = |folder: &Path, is_known: &dyn Fn(&str) -> bool| {
         kind(folder).is_ok_and(|kind| kind == EntryKind::Folder)
             && entries(folder).is_ok_and(|found| found.iter().all(|p| is_known(name(p))))
     };
     match name(path) {
-        EPISODES => {
-            all(path, &|file| file.strip_suffix(UNFINISHED).unwrap_or(file).ends_with(".json"))
-        }
-        RECORDS => all(path, &|file| RECORDS_OF_BEGINNING.contains(&file)),
+        EPISODES => has_only(path, &|file| {
+            file.strip_suffix(TEMPORARY_SUFFIX).unwrap_or(file).ends_with(".json")
+        }),
+        RECORDS => has_only(path, &|file| STARTUP_RECORDS.contains(&file)),
         COMMANDS | POLICIES => true,
-        file => [RUN_FILE, COMMANDS, POLICIES].map(Some).contains(&file.strip_suffix(UNFINISHED)),
+        file => {
+            [RUN_FILE, COMMANDS, POLICIES].map(Some).contains(&file.strip_suffix(TEMPORARY_SUFFIX))
+        }
     }
 }
 
 /// Returns whether a merge writes a file or folder of this name before its `run.json`.
-fn is_of_merge(path: &Path) -> bool {
-    let whole = name(path).strip_suffix(UNFINISHED).unwrap_or(name(path));
-    [EPISODES, TRACES, COMMANDS, POLICIES, RESULTS, RUN_FILE].contains(&whole)
-        || REPORT.contains(&whole)
+fn is_merge_file(path: &Path) -> bool {
+    let file = name(path).strip_suffix(TEMPORARY_SUFFIX).unwrap_or(name(path));
+    [EPISODES, TRACES, COMMANDS, POLICIES, RESULTS, RUN_FILE].contains(&file)
+        || REPORT.contains(&file)
 }
 
 /// Returns whether an entry of this name exists, even if it is a dangling link.
@@ -147,63 +151,66 @@ fn has_entry(path: &Path) -> bool {
     kind(path).is_ok_and(|kind| kind != EntryKind::Missing)
 }
 
-/// The name of a file; empty where it is no text, as no file of a run is named.
+/// Returns the name of a file; empty if it is not UTF-8, as no file of a run is.
 fn name(path: &Path) -> &str {
     path.file_name().and_then(|n| n.to_str()).unwrap_or_default()
 }
 
 impl RunFolder {
-    /// Whether there is a run to go on with or to read.
+    /// Returns whether the folder holds a run.
     pub fn is_run(path: &Path) -> bool {
         has_entry(&path.join(RUN_FILE))
     }
 
-    /// Refuses a folder in which no run can be resumed.
+    /// Checks that the folder holds a run that can be resumed.
     ///
     /// # Errors
-    /// [`EvalError::NotBegun`] if a run was stopped there before it began,
-    /// [`EvalError::StoppedMerge`] if a merge was, [`EvalError::NotARun`] for any other folder
-    /// without a run.
-    pub fn check_begun(path: &Path) -> Result<()> {
-        match Contents::of(path)? {
-            Contents::Run => Ok(()),
-            Contents::StoppedMerge => Err(EvalError::StoppedMerge { path: path.to_owned() }),
-            Contents::Nothing | Contents::Beginning if has_entry(&path.join(LOCK)) => {
-                Err(EvalError::NotBegun { path: path.to_owned() })
+    /// [`EvalError::NotStarted`] for a run that was stopped before `run.json` was written,
+    /// [`EvalError::InterruptedMerge`] for an interrupted merge, and [`EvalError::NotARun`] for any
+    /// other folder without a run.
+    pub fn check_started(path: &Path) -> Result<()> {
+        match FolderState::read(path)? {
+            FolderState::Run => Ok(()),
+            FolderState::InterruptedMerge => {
+                Err(EvalError::InterruptedMerge { path: path.to_owned() })
+            }
+            FolderState::Empty | FolderState::Unstarted if has_entry(&path.join(LOCK)) => {
+                Err(EvalError::NotStarted { path: path.to_owned() })
             }
             _ => Err(EvalError::NotARun { path: path.to_owned() }),
         }
     }
 
-    /// Opens a folder for writing, and the options recorded there. What a run has left that was
-    /// stopped before it began is removed.
+    /// Locks a folder for writing and reads the recorded options. Removes the files of a run that
+    /// was stopped before `run.json` was written.
     ///
     /// # Errors
-    /// If it is in use, or holds a run and `access` is to begin, or holds anything else; if
-    /// `run.json` was changed by hand or is of another version.
-    pub fn lock(path: &Path, access: Access) -> Result<(RunFolder, Option<RunOptions>)> {
-        if let Err(refusal) = check_access(path, access) {
-            // Whoever is at work here says more than that something lies here.
+    /// If the folder is in use, holds other content than `access` permits, or `run.json` was
+    /// changed by hand or has another version.
+    pub fn lock(path: &Path, access: FolderMode) -> Result<(RunFolder, Option<RunOptions>)> {
+        if let Err(error) = check_access(path, access) {
+            // A folder in use is reported as such, not as non-empty.
             if has_entry(&path.join(LOCK)) {
                 take_lock(path)?;
             }
-            return Err(refusal);
+            return Err(error);
         }
         fs::create_dir_all(path).map_err(EvalError::io("make the folder", path))?;
         let lock = take_lock(path)?;
-        // Another process may have been at work between the first look and the lock.
+        // Another process may have written between the first check and the lock.
         check_access(path, access)?;
         let folder = RunFolder { path: path.to_owned(), _lock: Some(lock) };
         let Some(file) = folder.recorded()? else {
-            folder.clear_beginning()?;
+            folder.clear_leftovers()?;
             return Ok((folder, None));
         };
-        // Left by a merge that was killed after its last step; without effect if it can not be removed.
+        // Left by a merge that was killed after its last step. It has no effect if it can't be
+        // removed.
         let _ = fs::remove_file(folder.join(MERGING));
         if file.chaic != CHAIC_VERSION {
             return Err(EvalError::Env(EnvError::OtherVersion {
                 path: folder.join(RUN_FILE),
-                found: format!("a run begun by chaic {}", file.chaic),
+                found: format!("a run started by chaic {}", file.chaic),
                 expected: format!("and resumes runs of chaic {CHAIC_VERSION}"),
             }));
         }
@@ -213,7 +220,7 @@ impl RunFolder {
     /// Opens a run for reading.
     ///
     /// # Errors
-    /// If it is none, or of another version.
+    /// If the folder holds no run, or one of another version.
     pub fn read(path: &Path) -> Result<(RunFolder, RunOptions)> {
         let folder = RunFolder { path: path.to_owned(), _lock: None };
         let file =
@@ -221,7 +228,7 @@ impl RunFolder {
         Ok((folder, file.options))
     }
 
-    /// What everybody of the run is granted; `None` if an older version began it.
+    /// Returns the recorded grants; `None` if an older version started the run.
     ///
     /// # Errors
     /// If `run.json` can't be read.
@@ -229,27 +236,29 @@ impl RunFolder {
         Ok(self.recorded()?.and_then(|file| file.granted))
     }
 
-    /// Refuses to go on with a run whose helpers would be granted something else from now on.
-    pub(crate) fn check_grants(&self, now: &RunGrants) -> Result<()> {
+    /// Checks that the helpers of a resumed run are granted what `run.json` records.
+    pub(crate) fn check_grants(&self, granted: &RunGrants) -> Result<()> {
         let path = self.path.join("run.json");
-        let Some(then) = self.granted()?.filter(|then| then != now) else { return Ok(()) };
-        for (name, confined) in &then.isolation {
-            let other = now.isolation.get(name).filter(|other| *other != confined);
+        let Some(recorded) = self.granted()?.filter(|recorded| recorded != granted) else {
+            return Ok(());
+        };
+        for (name, isolation) in &recorded.isolation {
+            let other = granted.isolation.get(name).filter(|other| *other != isolation);
             if let Some(other) = other {
                 return Err(EvalError::Options(format!(
-                    "{name} runs as `{other}` now, but {} says `{confined}`; give --exec-trust as before, \
-                     or begin a new run",
+                    "{name} runs as `{other}` now, but {} has `{isolation}`; give --exec-trust as before, \
+                     or start a new run",
                     path.display()
                 )));
             }
         }
         Err(EvalError::Options(format!(
-            "helpers or partner are granted something else than {} says; begin a new run",
+            "the grants of helpers or partner differ from {}; start a new run",
             path.display()
         )))
     }
 
-    /// The version of chaic that began the run, if it is another one.
+    /// Returns the version of chaic that started the run if it is not this version.
     pub(crate) fn other_version(&self) -> Result<Option<String>> {
         Ok(self.recorded()?.map(|file| file.chaic).filter(|chaic| chaic != CHAIC_VERSION))
     }
@@ -262,35 +271,36 @@ impl RunFolder {
         Ok(self.recorded()?.map(|file| file.chaic))
     }
 
-    /// Returns whether `run.json` equals its own content written again, byte by byte. Additional or repeated
-    /// fields make it differ.
+    /// Returns whether `run.json` equals its own content written again, byte by byte. Additional or
+    /// repeated fields make it differ.
     pub(crate) fn has_canonical_run_file(&self) -> Result<bool> {
         let bytes = read_bounded(&self.join(RUN_FILE), MAX_RUN_FILE_BYTES)?;
         Ok(self.recorded()?.is_some_and(|file| file.to_text().into_bytes() == bytes))
     }
 
-    /// The folder itself.
+    /// Returns the path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// A file in it.
+    /// Returns the path of a file in the folder.
     pub fn join(&self, name: &str) -> PathBuf {
         self.path.join(name)
     }
 
-    /// Its journal.
+    /// Returns the path of the journal.
     pub fn results(&self) -> PathBuf {
         self.path.join(RESULTS)
     }
 
-    /// The trace of an episode run.
+    /// Returns the path of the trace of an episode run.
     pub fn trace(&self, key: &RunKey) -> PathBuf {
         let name = format!("{}-s{}.jsonl", slug(key.task, &key.episode), key.seed);
         self.path.join(TRACES).join(key.task.name()).join(&key.helper).join(name)
     }
 
-    /// Returns whether an episode run has a trace: a regular file, reached without a link inside the run.
+    /// Returns whether an episode run has a trace: a regular file that is not reached through a
+    /// link inside the run.
     pub fn has_trace(&self, key: &RunKey) -> bool {
         is_file_below(&self.path, &self.trace(key))
     }
@@ -300,10 +310,11 @@ impl RunFolder {
         Ok(kind_below(&self.path, &self.trace(key))?)
     }
 
-    /// Returns the paths of all complete traces, sorted. Links and files in linked folders are left out.
+    /// Returns the paths of all complete traces, sorted. Leaves out links and files in linked
+    /// folders.
     ///
     /// # Errors
-    /// If the file system refuses.
+    /// If a folder can't be read.
     pub fn traces(&self) -> Result<Vec<PathBuf>> {
         let is_trace = |e: &Entry| {
             e.kind == EntryKind::File && e.path.extension().is_some_and(|e| e == "jsonl")
@@ -320,20 +331,20 @@ impl RunFolder {
     ///
     /// # Errors
     /// If it is reached through a link or is no regular file; otherwise those of [`trace_file::read`].
-    pub fn read_trace(&self, path: &Path) -> Result<(Trace, Vec<Warning>)> {
+    pub fn read_trace(&self, path: &Path) -> Result<(Trace, Vec<TraceWarning>)> {
         Ok(chaic_env::trace::parse(&trace_file::bytes(&self.path, path)?, path)?)
     }
 
-    /// The folder with copies of episode files.
+    /// Returns the path of the folder with copies of episode files.
     pub(crate) fn episode_files(&self) -> PathBuf {
         self.path.join(EPISODES)
     }
 
-    /// Returns the episode of this id. A run with the split `files` uses its own copies; any other run uses
-    /// the bundled or generated episodes and ignores files in its folder.
+    /// Returns the episode of a key. A run with the split `files` uses its own copies; any other
+    /// run uses the bundled or generated episodes and ignores files in its folder.
     ///
     /// # Errors
-    /// If there is none, or its file is damaged.
+    /// If there is no such episode, or its file is damaged.
     pub fn episode(&self, options: &RunOptions, key: &RunKey) -> Result<Episode> {
         if options.split != FILES {
             return Ok(find_episode(&key.episode)?);
@@ -371,7 +382,7 @@ impl RunFolder {
     }
 
     /// Creates the marker file of a merge.
-    pub(crate) fn begin_merge(&self) -> Result<()> {
+    pub(crate) fn start_merge(&self) -> Result<()> {
         let marker = self.join(MERGING);
         open_or_create(&marker)?;
         Ok(())
@@ -383,9 +394,9 @@ impl RunFolder {
         fs::remove_file(&marker).map_err(EvalError::io("remove", &marker))
     }
 
-    /// Removes the files of [`Contents::Beginning`] or [`Contents::StoppedMerge`] except the lock and the
-    /// marker: without the marker, a clearing that is interrupted could not be continued.
-    fn clear_beginning(&self) -> Result<()> {
+    /// Removes the files of [`FolderState::Unstarted`] or [`FolderState::InterruptedMerge`] except
+    /// the lock and the marker. Without the marker, an interrupted removal could not be continued.
+    fn clear_leftovers(&self) -> Result<()> {
         let leftovers = entries(&self.path)?;
         for path in leftovers.iter().filter(|p| ![LOCK, MERGING].contains(&name(p))) {
             let removed = match kind(path)? {
@@ -397,12 +408,12 @@ impl RunFolder {
         Ok(())
     }
 
-    /// Writes a file of the run as a whole or not at all.
+    /// Writes a file of the run atomically.
     ///
     /// # Errors
-    /// If the file system refuses.
+    /// If the file can't be written.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
-        Ok(write_whole(&self.path.join(name), bytes)?)
+        Ok(write_atomically(&self.path.join(name), bytes)?)
     }
 
     fn recorded(&self) -> Result<Option<RunFile>> {
@@ -418,12 +429,12 @@ impl RunFolder {
             #[serde(default)]
             chaic: String,
         }
-        let bad = |e: serde_json::Error| EnvError::Unreadable {
+        let unreadable = |e: serde_json::Error| EnvError::Unreadable {
             path: path.clone(),
             line: e.line(),
             problem: e.to_string(),
         };
-        let v: Version = serde_json::from_slice(&text).map_err(bad)?;
+        let v: Version = serde_json::from_slice(&text).map_err(unreadable)?;
         if v.format != FORMAT || v.version != VERSION {
             return Err(EvalError::Env(EnvError::OtherVersion {
                 found: format!("{} version {} (written by chaic {})", v.format, v.version, v.chaic),
@@ -431,7 +442,7 @@ impl RunFolder {
                 path,
             }));
         }
-        let file: RunFile = serde_json::from_slice(&text).map_err(bad)?;
+        let file: RunFile = serde_json::from_slice(&text).map_err(unreadable)?;
         if file.options.digest() != file.digest {
             return Err(EvalError::Altered { path });
         }
@@ -439,23 +450,25 @@ impl RunFolder {
     }
 }
 
-/// Whether a folder may be begun in or gone on with.
-fn check_access(path: &Path, access: Access) -> Result<()> {
-    match (Contents::of(path)?, access) {
-        (Contents::Run | Contents::Other, Access::Begin | Access::Merge) => {
+/// Checks that the content of a folder permits this access.
+fn check_access(path: &Path, access: FolderMode) -> Result<()> {
+    match (FolderState::read(path)?, access) {
+        (FolderState::Run | FolderState::Other, FolderMode::New | FolderMode::Merge) => {
             Err(EvalError::NotEmpty { path: path.to_owned() })
         }
-        (Contents::StoppedMerge, Access::Begin | Access::Resume) => {
-            Err(EvalError::StoppedMerge { path: path.to_owned() })
+        (FolderState::InterruptedMerge, FolderMode::New | FolderMode::Resume) => {
+            Err(EvalError::InterruptedMerge { path: path.to_owned() })
         }
-        (Contents::Other, Access::Resume) => Err(EvalError::NotARun { path: path.to_owned() }),
+        (FolderState::Other, FolderMode::Resume) => {
+            Err(EvalError::NotARun { path: path.to_owned() })
+        }
         _ => Ok(()),
     }
 }
 
 fn take_lock(path: &Path) -> Result<FolderLock> {
-    FolderLock::take(path).map_err(|error| match error {
+    FolderLock::acquire(path).map_err(|error| match error {
         LockError::Held(path) => EvalError::Locked { path },
-        LockError::File(refused) => refused.into(),
+        LockError::File(error) => error.into(),
     })
 }

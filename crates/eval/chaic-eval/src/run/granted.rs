@@ -1,61 +1,61 @@
-//! What everybody of a run is granted beyond own images and state, as `run.json` records it.
+//! Grants of the agents of a run beyond own images and state, as in `run.json`.
 
 use std::collections::BTreeMap;
 
 use chaic_agents::partners::partner_grants;
 use chaic_core::observation::Grants;
-use chaic_env::minds::{self, Helpers};
+use chaic_env::helper_registry::{self, HelperRegistry};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{EvalError, Result};
 use crate::run::options::RunOptions;
 
-/// The grants of a run. Every trace has them too; a run without traces is labeled by these.
+/// Grants of a run. Traces repeat them; reports of runs without traces use these.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunGrants {
-    /// By helper; `none`, who is nobody, is not among them.
+    /// Grants by helper, without `none`.
     pub helpers: BTreeMap<String, Grants>,
-    /// The partner's.
+    /// Grants of the partner.
     pub partner: Grants,
-    /// By what helpers tell what is in their images, where that is neither granted nor their author's
-    /// affair.
+    /// Perception models by helper, for helpers that neither are granted ids nor have their own
+    /// perception.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub perception: BTreeMap<String, String>,
-    /// How the processes of helpers are confined, such as `sandbox`; without helpers of this process.
+    /// Isolation of helper processes, such as `sandbox`; without helpers in this process.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub isolation: BTreeMap<String, String>,
 }
 
 impl RunGrants {
-    /// What these helpers ask for in a run with these options.
+    /// Returns the grants that the helpers of these options request.
     ///
     /// # Errors
-    /// If the options name a helper or partner that isn't there, or a rule; if the track refuses what a
-    /// helper is granted.
-    pub fn of(options: &RunOptions, helpers: &dyn Helpers) -> Result<RunGrants> {
+    /// If the options name an unknown helper, partner or rule; if the track does not allow a grant.
+    pub fn new(options: &RunOptions, helpers: &dyn HelperRegistry) -> Result<RunGrants> {
         let rules = options.rules()?.planner;
-        let (mut by_name, mut perception) = (BTreeMap::new(), BTreeMap::new());
+        let (mut grants, mut perception) = (BTreeMap::new(), BTreeMap::new());
         let mut isolation = BTreeMap::new();
         for name in &options.helpers {
-            let helper = minds::find(helpers, name, rules)?;
+            let helper = helper_registry::find(helpers, name, rules)?;
             let Some(helper) = helper else { continue };
-            by_name.insert(name.clone(), helper.grants);
-            perception.extend(helper.mind.perception().map(|by| (name.clone(), by)));
-            isolation.extend(helper.mind.isolation().map(|by| (name.clone(), by)));
+            grants.insert(name.clone(), helper.grants);
+            perception.extend(helper.agent.perception().map(|text| (name.clone(), text)));
+            isolation.extend(helper.agent.isolation().map(|text| (name.clone(), text)));
         }
-        let partner = minds::find_partner(helpers, options.partner.as_deref(), None, rules)?;
+        let partner =
+            helper_registry::find_partner(helpers, options.partner.as_deref(), None, rules)?;
         let partner = partner.map_or_else(|| partner_grants(rules), |p| p.grants);
-        let granted = RunGrants { helpers: by_name, partner, perception, isolation };
+        let granted = RunGrants { helpers: grants, partner, perception, isolation };
         granted.check_track(options)?;
         Ok(granted)
     }
 
-    /// Checks that the run's track allows all grants of helpers and how they are confined, the perception and
-    /// the rules.
+    /// Checks that the run's track allows the grants and the isolation of all helpers, the
+    /// perception and the rules.
     ///
     /// # Errors
-    /// [`EvalError::Options`] with the first that it refuses.
+    /// [`EvalError::Options`] with the first violation.
     pub fn check_track(&self, options: &RunOptions) -> Result<()> {
         let RunOptions { track, perception, behavior, .. } = options;
         let checked = self
@@ -65,7 +65,7 @@ impl RunGrants {
                 track.check_grants(name, *grants)?;
                 track.check_isolation(name, self.isolation.get(name).map(String::as_str))
             })
-            .and_then(|()| track.check_sight(perception.as_deref(), behavior.as_deref()));
+            .and_then(|()| track.check_perception(perception.as_deref(), behavior.as_deref()));
         let rules = options.rules()?;
         checked.and_then(|()| track.check_rules(&rules)).map_err(EvalError::Options)
     }

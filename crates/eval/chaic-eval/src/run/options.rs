@@ -1,87 +1,88 @@
-//! What a run plays. Everything here moves scores, so a run is resumed with the same only.
+//! Options of a run. All of them change scores, so a run can only be resumed with the same options.
 
 use std::path::{Path, PathBuf};
 
-use chaic_agents::sight::GROUND_TRUTH;
+use chaic_agents::perception_factory::GROUND_TRUTH;
 use chaic_core::TaskId;
 use chaic_core::capability::PersonKind;
-use chaic_env::minds::RULES;
+use chaic_env::helper_registry::RULES;
 use chaic_env::rules::{RuleSet, RuleSetName};
 use chaic_env::{Digest, Track};
 use chaic_episodes::Split;
 use chaic_render::Appearance;
 use serde::{Deserialize, Serialize};
 
+use crate::episode_file::tasks_of_files;
 use crate::error::{EvalError, Result};
 
-/// Largest side of an image that agents may be given, pixels: 16 times the benchmark's area.
+/// Maximum side of agents' images, pixels: 16 times the benchmark's area.
 pub const MAX_IMAGE_SIZE: u32 = 2048;
-/// Smallest one: fewer pixels show nothing.
+/// Minimum side of agents' images, pixels; smaller images show no details.
 pub const MIN_IMAGE_SIZE: u32 = 16;
 
-/// What a run plays, as `run.json` records it.
+/// Options of a run, as in `run.json`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunOptions {
-    /// The tasks.
+    /// Tasks to play.
     pub tasks: Vec<TaskId>,
-    /// The helpers.
+    /// Helpers to play.
     pub helpers: Vec<String>,
-    /// The split; `files` if the episodes are files.
+    /// Split; `files` if the episodes are files.
     pub split: String,
-    /// How many episodes of each task, from the first; absent for all.
+    /// Number of episodes of each task, from the first; absent for all.
     pub first: Option<u32>,
-    /// How many seeds each episode is played with.
+    /// Number of seeds per episode.
     pub seeds: u32,
-    /// Side of everybody's images, pixels; absent for what each mind asks for.
+    /// Side of all agents' images, pixels; absent for the size that each agent requests.
     pub size: Option<u32>,
-    /// The rules.
+    /// Set of rules.
     pub rules: RuleSetName,
-    /// Single rules that are set otherwise, as `NAME=VALUE`.
+    /// Rules that override the set, as `NAME=VALUE`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub set: Vec<String>,
-    /// Whether traces are kept. Without them a run takes little room, and can't be verified or
-    /// replayed.
-    #[serde(default = "yes", skip_serializing_if = "is_yes")]
+    /// True if traces are written. Without traces, a run needs little disk space but can't be
+    /// verified or replayed.
+    #[serde(default = "default_true", skip_serializing_if = "is_true")]
     pub traces: bool,
-    /// Who drives the partner; absent for the rule-based minds.
+    /// Helper program that drives the partner; absent for the rule-based partner.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub partner: Option<String>,
-    /// What kind of person the partner is; absent for who it is in each episode.
+    /// Kind of person of the partner; absent for the one in each episode.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub partner_is: Option<PersonKind>,
-    /// How scenes are lit and colored; absent for the benchmark's own look.
+    /// Light and colors of scenes; absent for the benchmark's default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub appearance: Option<String>,
-    /// By what helpers tell what is in their images, as `--perception` has it; absent for ids from
-    /// ground truth.
+    /// Object detection of helpers, the value of `--perception`; absent for ids from ground truth.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub perception: Option<String>,
-    /// By what helpers tell what others do, as `--behavior` has it; absent for what is granted.
+    /// Behavior recognition of helpers, the value of `--behavior`; absent for granted behavior.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub behavior: Option<String>,
-    /// What helpers may be granted; absent for any grants.
+    /// Track, which limits the grants of helpers; the default allows all grants.
     #[serde(default, skip_serializing_if = "is_default")]
     pub track: Track,
 }
 
-// `skip_serializing_if` hands over a reference.
+// `skip_serializing_if` passes a reference.
 #[allow(clippy::trivially_copy_pass_by_ref)]
 fn is_default(track: &Track) -> bool {
     *track == Track::default()
 }
 
-fn yes() -> bool {
+fn default_true() -> bool {
     true
 }
 
-// `skip_serializing_if` hands over a reference.
+// `skip_serializing_if` passes a reference.
 #[allow(clippy::trivially_copy_pass_by_ref)]
-fn is_yes(b: &bool) -> bool {
+fn is_true(b: &bool) -> bool {
     *b
 }
 
-/// What the caller says of a run. What isn't said is as recorded, or as usual for a new run.
+/// Options that the caller requests. Absent values are the recorded ones, or the defaults for a new
+/// run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RunRequest {
     /// `--task`.
@@ -90,23 +91,23 @@ pub struct RunRequest {
     pub helpers: Option<Vec<String>>,
     /// `--split`.
     pub split: Option<Split>,
-    /// `--first`.
+    /// `--n-episodes`.
     pub first: Option<u32>,
     /// `--seeds`.
     pub seeds: Option<u32>,
     /// `--size`.
     pub size: Option<u32>,
-    /// `--episodes`: a folder with episode files, in place of a split.
+    /// `--episodes`: a folder with episode files instead of a split.
     pub episodes: Option<PathBuf>,
     /// `--rules`.
     pub rules: Option<RuleSetName>,
-    /// `--set`, once for each.
+    /// `--set`, one entry per use.
     pub set: Vec<String>,
     /// `--no-traces`.
     pub no_traces: bool,
     /// `--partner`.
     pub partner: Option<String>,
-    /// `--partner-is`.
+    /// `--person`.
     pub partner_is: Option<PersonKind>,
     /// `--appearance`.
     pub appearance: Option<Appearance>,
@@ -118,28 +119,28 @@ pub struct RunRequest {
     pub track: Option<Track>,
 }
 
-/// What `split` says where the episodes are files.
+/// Value of `split` for episodes from files.
 pub const FILES: &str = "files";
 
 impl RunOptions {
-    /// The rules.
+    /// Returns the rules, with overrides applied.
     ///
     /// # Errors
-    /// If a single rule is set that isn't there, or to what it can't be.
+    /// If an override names an unknown rule or an invalid value.
     pub fn rules(&self) -> Result<RuleSet> {
         let named = RuleSet::named(self.rules);
         Ok(self.set.iter().try_fold(named, |rules, setting| rules.with(setting))?)
     }
 
-    /// The digest of all of them, as compact JSON.
+    /// Returns the digest of all options as compact JSON.
     pub fn digest(&self) -> Digest {
         Digest::of_bytes(&serde_json::to_vec(self).expect("options have string keys"))
     }
 
-    /// How scenes are lit and colored.
+    /// Returns the appearance of scenes.
     ///
     /// # Errors
-    /// If there is no such appearance.
+    /// If the appearance is unknown.
     pub fn appearance(&self) -> Result<Appearance> {
         let named = self.appearance.as_deref().unwrap_or("canonical");
         named.parse().map_err(EvalError::Options)
@@ -147,22 +148,22 @@ impl RunOptions {
 }
 
 impl RunRequest {
-    /// The options of a new run.
+    /// Returns the options of a new run.
     ///
     /// # Errors
-    /// If they contradict each other, or are out of bounds.
-    pub fn begin(&self) -> Result<RunOptions> {
-        let wrong = |text: String| Err(EvalError::Options(text));
+    /// If options contradict each other or are out of range.
+    pub fn new_options(&self) -> Result<RunOptions> {
+        let invalid = |text: String| Err(EvalError::Options(text));
         let (seeds, size) = (self.seeds.unwrap_or(1), self.size);
         if seeds == 0 || self.first == Some(0) {
-            return wrong("--seeds and --first are at least 1".to_owned());
+            return invalid("--seeds and --n-episodes are at least 1".to_owned());
         }
         if let Some(px) = size.filter(|s| !(MIN_IMAGE_SIZE..=MAX_IMAGE_SIZE).contains(s)) {
             let range = format!("{MIN_IMAGE_SIZE} to {MAX_IMAGE_SIZE}");
-            return wrong(format!("--size is {px}, expected {range} pixels"));
+            return invalid(format!("--size is {px}, expected {range} pixels"));
         }
         if self.split.is_some() && self.episodes.is_some() {
-            return wrong("give --split or --episodes, not both".to_owned());
+            return invalid("give --split or --episodes, not both".to_owned());
         }
         let split = match &self.episodes {
             Some(_) => FILES.to_owned(),
@@ -172,17 +173,17 @@ impl RunRequest {
             self.helpers.clone().unwrap_or_else(|| DEFAULT_HELPERS.map(str::to_owned).to_vec());
         let tasks = match (&self.tasks, &self.episodes) {
             (Some(tasks), _) => tasks.clone(),
-            (None, Some(folder)) => super::items::tasks_of_files(folder)?,
+            (None, Some(folder)) => tasks_of_files(folder)?,
             (None, None) => TaskId::paper().collect(),
         };
         let (tasks, helpers) = (without_repeats(tasks), without_repeats(helpers));
         if tasks.is_empty() || helpers.is_empty() {
-            return wrong("a run needs at least one task and one helper".to_owned());
+            return invalid("a run needs at least one task and one helper".to_owned());
         }
         let (first, rules) = (self.first, self.rules.unwrap_or(RuleSetName::Paper));
         let (set, traces) = (self.set.clone(), !self.no_traces);
         let partner = self.partner.clone().filter(|name| name != RULES);
-        let varies = self.appearance.filter(|a| *a != Appearance::Canonical);
+        let appearance = self.appearance.filter(|a| *a != Appearance::Canonical);
         let options = RunOptions {
             tasks,
             helpers,
@@ -195,7 +196,7 @@ impl RunRequest {
             traces,
             partner,
             partner_is: self.partner_is,
-            appearance: varies.map(|a| a.to_string()),
+            appearance: appearance.map(|a| a.to_string()),
             perception: self.perception.clone().filter(|name| name != GROUND_TRUTH),
             behavior: self.behavior.clone().filter(|name| name != GROUND_TRUTH),
             track: self.track.unwrap_or_default(),
@@ -205,17 +206,17 @@ impl RunRequest {
         Ok(options)
     }
 
-    /// The options of a run that is gone on with.
+    /// Returns the options of a resumed run.
     ///
     /// # Errors
-    /// [`EvalError::OptionDiffers`] if something else is said than what is recorded.
-    pub fn resume(&self, recorded: &RunOptions, path: &Path) -> Result<RunOptions> {
+    /// [`EvalError::OptionDiffers`] if an option differs from the recorded one.
+    pub fn resumed_options(&self, recorded: &RunOptions, path: &Path) -> Result<RunOptions> {
         let list = |tasks: &[TaskId]| tasks.iter().map(|t| t.name()).collect::<Vec<_>>().join(",");
         let number = |n: Option<u32>| n.map_or("not given".to_owned(), |n| n.to_string());
         let has_files = recorded.split == FILES;
-        let tasks = self.tasks.as_ref().filter(|t| !are_the_same(t, &recorded.tasks));
-        let helpers = self.helpers.as_ref().filter(|h| !are_the_same(h, &recorded.helpers));
-        let said = [
+        let tasks = self.tasks.as_ref().filter(|t| !have_same_elements(t, &recorded.tasks));
+        let helpers = self.helpers.as_ref().filter(|h| !have_same_elements(h, &recorded.helpers));
+        let options = [
             ("--task", tasks.map(|t| list(t)), list(&recorded.tasks)),
             ("--helper", helpers.map(|h| h.join(",")), recorded.helpers.join(",")),
             (
@@ -225,11 +226,11 @@ impl RunRequest {
             ),
             (
                 "--episodes",
-                // Whether these are the run's own files is for those who read them.
+                // `check_episode_files` compares the files with those of the run.
                 self.episodes.as_ref().filter(|_| !has_files).map(|p| p.display().to_string()),
                 number(None),
             ),
-            ("--first", self.first.map(|n| n.to_string()), number(recorded.first)),
+            ("--n-episodes", self.first.map(|n| n.to_string()), number(recorded.first)),
             ("--seeds", self.seeds.map(|n| n.to_string()), recorded.seeds.to_string()),
             ("--rules", self.rules.map(|r| r.to_string()), recorded.rules.to_string()),
             (
@@ -243,7 +244,7 @@ impl RunRequest {
                 recorded.partner.clone().unwrap_or_else(|| RULES.to_owned()),
             ),
             (
-                "--partner-is",
+                "--person",
                 self.partner_is.map(|k| k.to_string()),
                 recorded.partner_is.map_or("not given".to_owned(), |k| k.to_string()),
             ),
@@ -270,7 +271,7 @@ impl RunRequest {
                 if recorded.traces { "off" } else { "on" }.to_owned(),
             ),
         ];
-        for (option, given, recorded) in said {
+        for (option, given, recorded) in options {
             if let Some(given) = given.filter(|g| *g != recorded) {
                 return Err(EvalError::OptionDiffers {
                     path: path.to_owned(),
@@ -284,11 +285,11 @@ impl RunRequest {
     }
 }
 
-/// The helpers of a run that names none.
+/// Helpers of a run that names none.
 pub const DEFAULT_HELPERS: [&str; 4] = ["none", "random", "rhp", "oracle"];
 
-/// Whether two lists name the same, in whatever order and however often.
-fn are_the_same<T: PartialEq>(a: &[T], b: &[T]) -> bool {
+/// Returns whether two lists have the same elements, ignoring order and repetitions.
+fn have_same_elements<T: PartialEq>(a: &[T], b: &[T]) -> bool {
     a.iter().all(|x| b.contains(x)) && b.iter().all(|x| a.contains(x))
 }
 

@@ -1,8 +1,8 @@
-//! A run survives whatever happens to it, and is the same however it was played.
+//! Promise: a run survives interruptions, and its results do not depend on how it was played.
 
-mod beginning;
 mod forging;
 mod merging;
+mod starting;
 mod verifying;
 
 use std::fs;
@@ -10,9 +10,9 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use chaic_agents::PlannerRules;
-use chaic_core::observation::{Grants, Senses};
+use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::{Action, Agent, AgentError, Briefing, Observation, TaskId};
-use chaic_env::minds::Helper;
+use chaic_env::helper_registry::Helper;
 use chaic_env::{Digest, EnvError};
 use chaic_episodes::Episode;
 
@@ -21,19 +21,19 @@ use crate::error::EvalError;
 use crate::metrics::Summary;
 use crate::verify::ReportState;
 
-/// Frames of a test's episodes: enough for a few decisions of everybody.
+/// Number of frames of a test episode: enough for a few decisions of each agent.
 const HORIZON: u32 = 90;
-/// Side of a test's images, pixels.
+/// Side of the images, pixels.
 const SIZE: u32 = 32;
 
-/// Turns round, and does something impossible now and then; panics in the episodes of `bad_task`.
+/// Agent that turns round and attempts impossible actions.
 struct Turner {
     turns: u32,
 }
 
 impl Agent for Turner {
-    fn senses(&self) -> Senses {
-        Senses::DEPTH_AND_IDS
+    fn sensors(&self) -> SensorConfig {
+        SensorConfig::DEPTH_AND_IDS
     }
 
     fn reset(&mut self, _: &Briefing) {}
@@ -51,20 +51,20 @@ impl Agent for Turner {
     }
 }
 
-/// How a mind ends at frame 30.
+/// Behavior of an agent from frame 30 on.
 #[derive(Clone, Copy)]
-enum Breaks {
-    Never,
-    ByPanic,
-    BySayingSo,
+enum Failure {
+    None,
+    Panics,
+    ReturnsError,
     Halts,
 }
 
-struct Breaker(Breaks);
+struct FailingAgent(Failure);
 
-impl Agent for Breaker {
-    fn senses(&self) -> Senses {
-        Senses::NONE
+impl Agent for FailingAgent {
+    fn sensors(&self) -> SensorConfig {
+        SensorConfig::NONE
     }
 
     fn reset(&mut self, _: &Briefing) {}
@@ -72,48 +72,48 @@ impl Agent for Breaker {
     fn act(&mut self, observation: &Observation) -> std::result::Result<Action, AgentError> {
         match self.0 {
             _ if observation.frame < 30 => Ok(Action::Wait { frames: 10 }),
-            Breaks::Never => Ok(Action::Wait { frames: 10 }),
-            Breaks::ByPanic => panic!("out of ideas"),
-            Breaks::BySayingSo => Err(AgentError::Broken("out of ideas".to_owned())),
-            Breaks::Halts => Err(AgentError::Halted("nobody answers".to_owned())),
+            Failure::None => Ok(Action::Wait { frames: 10 }),
+            Failure::Panics => panic!("out of ideas"),
+            Failure::ReturnsError => Err(AgentError::Broken("out of ideas".to_owned())),
+            Failure::Halts => Err(AgentError::Halted("no answer".to_owned())),
         }
     }
 }
 
-/// Helpers of these tests; the stop flag is raised when so many have been made.
+/// Helpers of these tests. The stop flag is raised after `stop_after` helpers have been created.
 struct TestHelpers {
-    made: AtomicUsize,
+    n_created: AtomicUsize,
     stop_after: usize,
     stop: AtomicBool,
-    breaks: Breaks,
+    failure: Failure,
 }
 
 impl TestHelpers {
     fn new() -> TestHelpers {
-        let (made, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
-        TestHelpers { made, stop_after: usize::MAX, stop, breaks: Breaks::ByPanic }
+        let (n_created, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
+        TestHelpers { n_created, stop_after: usize::MAX, stop, failure: Failure::Panics }
     }
 }
 
-impl Helpers for TestHelpers {
+impl HelperRegistry for TestHelpers {
     fn names(&self) -> Vec<String> {
         vec!["turner".to_owned(), "breaker".to_owned()]
     }
 
     fn make(&self, name: &str, _: PlannerRules) -> Option<Helper> {
-        if self.made.fetch_add(1, Ordering::SeqCst) + 1 >= self.stop_after {
+        if self.n_created.fetch_add(1, Ordering::SeqCst) + 1 >= self.stop_after {
             self.stop.store(true, Ordering::SeqCst);
         }
-        let mind: Box<dyn Agent> = match name {
-            "breaker" => Box::new(Breaker(self.breaks)),
+        let agent: Box<dyn Agent> = match name {
+            "breaker" => Box::new(FailingAgent(self.failure)),
             "turner" => Box::new(Turner { turns: 0 }),
             _ => return None,
         };
-        Some(Helper { mind, grants: Grants::NONE })
+        Some(Helper { agent, grants: Grants::NONE })
     }
 }
 
-/// A folder with short episodes of these tasks.
+/// Returns a folder with short episodes of these tasks.
 fn episode_files(tasks: &[TaskId], per_task: usize) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     for task in tasks {
@@ -128,7 +128,7 @@ fn episode_files(tasks: &[TaskId], per_task: usize) -> tempfile::TempDir {
     dir
 }
 
-fn given(files: &tempfile::TempDir, helpers: &[&str]) -> RunRequest {
+fn request(files: &tempfile::TempDir, helpers: &[&str]) -> RunRequest {
     RunRequest {
         helpers: Some(helpers.iter().map(|h| (*h).to_owned()).collect()),
         seeds: Some(2),
@@ -149,21 +149,21 @@ fn sorted(results: &[RunResult]) -> Vec<RunResult> {
 }
 
 #[test]
-fn shards_make_the_run_that_one_machine_makes() {
+fn merged_shards_equal_the_run_of_one_machine() {
     let (dir, files) = (tempfile::tempdir().unwrap(), episode_files(&[TaskId::Obstacle], 2));
-    let (given, helpers) = (given(&files, &["none", "turner"]), TestHelpers::new());
-    let open = |name: &str, given: &RunRequest| {
-        Run::open(&dir.path().join(name), Access::Begin, given, &helpers).unwrap().0
+    let (request, helpers) = (request(&files, &["none", "turner"]), TestHelpers::new());
+    let open = |name: &str, request: &RunRequest| {
+        Run::open(&dir.path().join(name), FolderMode::New, request, &helpers).unwrap().0
     };
-    let mut whole = open("whole", &given);
+    let mut whole = open("whole", &request);
     assert!(play(&mut whole, 1, &helpers));
     let parts: Vec<PathBuf> = (1..=3)
         .map(|number| {
             let name = format!("part{number}");
-            let mut part = open(&name, &given);
+            let mut part = open(&name, &request);
             let shard = Shard::new(number, 3).unwrap();
             assert!(part.play_shard(shard, 1, &helpers, &helpers.stop, &mut |_| ()).unwrap());
-            assert!(part.extent().finished < whole.extent().total);
+            assert!(part.progress().finished < whole.progress().total);
             dir.path().join(name)
         })
         .collect();
@@ -181,9 +181,9 @@ fn shards_make_the_run_that_one_machine_makes() {
         files.iter().map(|path| fs::read(path).unwrap()).collect::<Vec<_>>()
     };
     assert_eq!(traces(&merged), traces(&whole));
-    assert!(merge(&dir.path().join("merged"), &parts).is_err(), "something lies there");
+    assert!(merge(&dir.path().join("merged"), &parts).is_err(), "the folder is not empty");
 
-    let mut other = open("other", &RunRequest { seeds: Some(1), ..given.clone() });
+    let mut other = open("other", &RunRequest { seeds: Some(1), ..request.clone() });
     play(&mut other, 1, &helpers);
     let mixed = [parts[0].clone(), dir.path().join("other")];
     let refused = merge(&dir.path().join("mixed"), &mixed).unwrap_err().to_string();
@@ -192,26 +192,26 @@ fn shards_make_the_run_that_one_machine_makes() {
 }
 
 #[test]
-fn shards_are_read_as_they_are_written() {
+fn shards_are_parsed_and_disjoint() {
     assert_eq!("2/4".parse::<Shard>().unwrap().to_string(), "2/4");
     for wrong in ["0/4", "5/4", "2", "2/0", "-1/3", "a/b"] {
         assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
     }
     let shards: Vec<Shard> = (1..=3).map(|k| Shard::new(k, 3).unwrap()).collect();
-    assert!((0..20).all(|k| shards.iter().filter(|shard| shard.has(k)).count() == 1));
+    assert!((0..20).all(|k| shards.iter().filter(|shard| shard.contains(k)).count() == 1));
 }
 
 #[test]
-fn the_number_of_workers_and_an_interruption_change_nothing() {
+fn results_do_not_depend_on_workers_or_interruptions() {
     let files = episode_files(&[TaskId::NoConstraint, TaskId::Shopping], 1);
-    let given = given(&files, &["none", "turner"]);
+    let request = request(&files, &["none", "turner"]);
     let dir = tempfile::tempdir().unwrap();
     let mut all = Vec::new();
     for jobs in [1, 2, 4] {
         let helpers = TestHelpers::new();
         let path = dir.path().join(jobs.to_string());
-        let (mut run, _) = Run::open(&path, Access::Begin, &given, &helpers).unwrap();
-        assert_eq!(run.extent(), Extent { total: 8, finished: 0, errors: 0 });
+        let (mut run, _) = Run::open(&path, FolderMode::New, &request, &helpers).unwrap();
+        assert_eq!(run.progress(), RunProgress { total: 8, finished: 0, errors: 0 });
         assert!(play(&mut run, jobs, &helpers));
         all.push(sorted(run.results()));
     }
@@ -222,105 +222,107 @@ fn the_number_of_workers_and_an_interruption_change_nothing() {
         all[0].iter().filter_map(|r| r.summary().map(|s| s.digest)).collect();
     assert!(digests.len() >= 4, "tasks and helpers lead to different episodes");
 
-    // The same, stopped in the middle of the third episode and gone on with by another process.
+    // The same run, stopped in the third episode and resumed by another process.
     let path = dir.path().join("interrupted");
-    // One is made to check the options.
-    let hasty = TestHelpers { stop_after: 3, ..TestHelpers::new() };
-    let (mut run, _) = Run::open(&path, Access::Begin, &given, &hasty).unwrap();
-    assert!(!play(&mut run, 1, &hasty));
-    let so_far = run.results().len();
-    assert!((1..8).contains(&so_far), "{so_far}");
+    // One helper is created for the check of the options.
+    let stopping = TestHelpers { stop_after: 3, ..TestHelpers::new() };
+    let (mut run, _) = Run::open(&path, FolderMode::New, &request, &stopping).unwrap();
+    assert!(!play(&mut run, 1, &stopping));
+    let n_finished = run.results().len();
+    assert!((1..8).contains(&n_finished), "{n_finished}");
     drop(run);
     drop(files);
     let helpers = TestHelpers::new();
-    let (mut run, _) = Run::open(&path, Access::Resume, &RunRequest::default(), &helpers).unwrap();
-    assert_eq!(run.extent().finished, so_far);
+    let (mut run, _) =
+        Run::open(&path, FolderMode::Resume, &RunRequest::default(), &helpers).unwrap();
+    assert_eq!(run.progress().finished, n_finished);
     assert!(play(&mut run, 2, &helpers));
     assert_eq!(sorted(run.results()), all[0]);
-    // The journal says the same as memory, and the traces say the same as the journal.
+    // The journal equals the results in memory, and the traces give the results of the journal.
     assert_eq!(
-        read_results(&run.folder().results(), &run.items).unwrap(),
+        read_results(&run.folder().results(), &run.planned).unwrap(),
         (all[0].clone(), vec![])
     );
     let traces = run.folder().traces().unwrap();
     assert_eq!(traces.len(), 8);
-    let tallied =
+    let from_traces =
         traces.iter().map(|p| crate::metrics::tally(&crate::trace_file::read(p).unwrap().0));
-    assert_eq!(sorted(&tallied.map(Option::unwrap).collect::<Vec<_>>()), all[0]);
-    let verdict =
+    assert_eq!(sorted(&from_traces.map(Option::unwrap).collect::<Vec<_>>()), all[0]);
+    let report =
         crate::verify::verify_run(run.folder(), run.options(), &helpers, 2, &|_| ()).unwrap();
-    assert_eq!((verdict.agreeing, verdict.mismatches), (8, vec![]));
+    assert_eq!((report.agreeing, report.mismatches), (8, vec![]));
 }
 
 #[test]
-fn a_helper_that_breaks_down_costs_its_episode_only() {
-    for breaks in [Breaks::ByPanic, Breaks::BySayingSo] {
+fn a_failed_helper_loses_its_episode_only() {
+    for failure in [Failure::Panics, Failure::ReturnsError] {
         let files = episode_files(&[TaskId::MovingHouse], 1);
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("run");
-        let helpers = TestHelpers { breaks, ..TestHelpers::new() };
-        let given = given(&files, &["breaker", "none"]);
-        let (mut run, _) = Run::open(&path, Access::Begin, &given, &helpers).unwrap();
+        let helpers = TestHelpers { failure, ..TestHelpers::new() };
+        let request = request(&files, &["breaker", "none"]);
+        let (mut run, _) = Run::open(&path, FolderMode::New, &request, &helpers).unwrap();
         assert!(play(&mut run, 1, &helpers));
-        assert_eq!(run.extent(), Extent { total: 4, finished: 4, errors: 2 });
-        let is_broken = |r: &&RunResult| matches!(r.ending, Ending::Error { .. });
+        assert_eq!(run.progress(), RunProgress { total: 4, finished: 4, errors: 2 });
+        let is_broken = |r: &&RunResult| matches!(r.status, RunStatus::Error { .. });
         for broken in run.results().iter().filter(is_broken) {
             assert_eq!(broken.key.helper, "breaker");
-            let Ending::Error { message } = &broken.ending else { unreachable!() };
+            let RunStatus::Error { message } = &broken.status else { unreachable!() };
             assert_eq!(message, "the episode broke down: out of ideas");
             assert!(!run.folder().trace(&broken.key).exists());
         }
         drop(run);
-        // A repaired helper gets its episodes again.
-        let repaired = TestHelpers { breaks: Breaks::Never, ..TestHelpers::new() };
+        // After a fix, the helper's failed episode runs are played again.
+        let fixed = TestHelpers { failure: Failure::None, ..TestHelpers::new() };
         let (mut run, _) =
-            Run::open(&path, Access::Resume, &RunRequest::default(), &repaired).unwrap();
-        assert!(play(&mut run, 1, &repaired));
-        assert_eq!(run.extent(), Extent { total: 4, finished: 4, errors: 0 });
+            Run::open(&path, FolderMode::Resume, &RunRequest::default(), &fixed).unwrap();
+        assert!(play(&mut run, 1, &fixed));
+        assert_eq!(run.progress(), RunProgress { total: 4, finished: 4, errors: 0 });
     }
 }
 
 #[test]
-fn a_helper_that_halts_stops_the_run_which_goes_on_later() {
+fn a_helper_that_halts_stops_the_run_which_can_be_resumed() {
     let files = episode_files(&[TaskId::MovingHouse], 1);
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("run");
-    let helpers = TestHelpers { breaks: Breaks::Halts, ..TestHelpers::new() };
-    let given = given(&files, &["breaker", "none"]);
-    let (mut run, _) = Run::open(&path, Access::Begin, &given, &helpers).unwrap();
+    let helpers = TestHelpers { failure: Failure::Halts, ..TestHelpers::new() };
+    let request = request(&files, &["breaker", "none"]);
+    let (mut run, _) = Run::open(&path, FolderMode::New, &request, &helpers).unwrap();
     let halted = run.play(1, &helpers, &helpers.stop, &mut |_| ());
-    assert_eq!(halted.unwrap_err().to_string(), "nobody answers");
-    assert_eq!(run.extent().errors, 0, "nothing counts as zero");
+    assert_eq!(halted.unwrap_err().to_string(), "no answer");
+    assert_eq!(run.progress().errors, 0, "nothing counts as zero");
     drop(run);
-    let answered = TestHelpers { breaks: Breaks::Never, ..TestHelpers::new() };
-    let (mut run, _) = Run::open(&path, Access::Resume, &RunRequest::default(), &answered).unwrap();
+    let answered = TestHelpers { failure: Failure::None, ..TestHelpers::new() };
+    let (mut run, _) =
+        Run::open(&path, FolderMode::Resume, &RunRequest::default(), &answered).unwrap();
     assert!(play(&mut run, 1, &answered));
-    assert_eq!(run.extent(), Extent { total: 4, finished: 4, errors: 0 });
+    assert_eq!(run.progress(), RunProgress { total: 4, finished: 4, errors: 0 });
 }
 
 #[test]
-fn another_build_of_the_same_version_is_found_out() {
+fn another_build_of_the_same_version_is_detected() {
     let files = episode_files(&[TaskId::LowTarget, TaskId::Shopping], 1);
     let dir = tempfile::tempdir().unwrap();
     let helpers = TestHelpers::new();
-    let given = given(&files, &["none", "turner"]);
-    let (mut run, _) = Run::open(dir.path(), Access::Begin, &given, &helpers).unwrap();
-    let check = |run: &Run| run.check_code(&helpers, &helpers.stop);
+    let request = request(&files, &["none", "turner"]);
+    let (mut run, _) = Run::open(dir.path(), FolderMode::New, &request, &helpers).unwrap();
+    let check = |run: &Run| run.check_build(&helpers, &helpers.stop);
     check(&run).unwrap();
     assert!(play(&mut run, 1, &helpers));
     let traces = run.folder().traces().unwrap();
     check(&run).unwrap();
     assert_eq!(run.folder().traces().unwrap(), traces);
-    // What each helper is asked to play again is of another task.
+    // The checked episode runs of the helpers are of different tasks.
     let mut found = Vec::new();
     for k in 0..run.results.len() {
-        let Ending::Done(summary) = &mut run.results[k].ending else { unreachable!() };
+        let RunStatus::Done(summary) = &mut run.results[k].status else { unreachable!() };
         let digest = std::mem::replace(&mut summary.digest, Digest(1));
-        if let Err(EvalError::OtherCode { key, .. }) = check(&run) {
+        if let Err(EvalError::OtherBuild { key, .. }) = check(&run) {
             assert_eq!(key, run.results[k].key);
             found.push((key.task, key.helper));
         }
-        let Ending::Done(summary) = &mut run.results[k].ending else { unreachable!() };
+        let RunStatus::Done(summary) = &mut run.results[k].status else { unreachable!() };
         summary.digest = digest;
     }
     found.sort();
@@ -329,69 +331,70 @@ fn another_build_of_the_same_version_is_found_out() {
 }
 
 #[test]
-fn folders_are_guarded() {
+fn folders_are_locked_and_checked() {
     let files = episode_files(&[TaskId::LowTarget], 1);
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("run");
     let helpers = TestHelpers::new();
-    let mine = given(&files, &["turner"]);
-    let open = |access, given: &RunRequest| Run::open(&path, access, given, &helpers).map(|_| ());
-    let (held, _) = Run::open(&path, Access::Begin, &mine, &helpers).unwrap();
-    for access in [Access::Begin, Access::Resume] {
-        assert!(matches!(open(access, &mine), Err(EvalError::Locked { .. })));
+    let first = request(&files, &["turner"]);
+    let open =
+        |access, request: &RunRequest| Run::open(&path, access, request, &helpers).map(|_| ());
+    let (held, _) = Run::open(&path, FolderMode::New, &first, &helpers).unwrap();
+    for access in [FolderMode::New, FolderMode::Resume] {
+        assert!(matches!(open(access, &first), Err(EvalError::Locked { .. })));
     }
     drop(held);
-    assert!(matches!(open(Access::Begin, &mine), Err(EvalError::NotEmpty { .. })));
-    assert!(open(Access::Resume, &mine).is_ok());
-    let other = RunRequest { seeds: Some(3), ..mine.clone() };
-    let error = open(Access::Resume, &other).unwrap_err().to_string();
+    assert!(matches!(open(FolderMode::New, &first), Err(EvalError::NotEmpty { .. })));
+    assert!(open(FolderMode::Resume, &first).is_ok());
+    let other = RunRequest { seeds: Some(3), ..first.clone() };
+    let error = open(FolderMode::Resume, &other).unwrap_err().to_string();
     assert!(error.contains("--seeds 2, not 3"), "{error}");
-    let other = RunRequest { helpers: Some(vec!["none".into(), "turner".into()]), ..mine.clone() };
-    let error = open(Access::Resume, &other).unwrap_err().to_string();
+    let other = RunRequest { helpers: Some(vec!["none".into(), "turner".into()]), ..first.clone() };
+    let error = open(FolderMode::Resume, &other).unwrap_err().to_string();
     assert!(error.contains("--helper turner, not none,turner"), "{error}");
-    // The order plays no role.
-    let both = RunRequest { helpers: Some(vec!["none".into(), "turner".into()]), ..mine.clone() };
+    // The order of helpers does not matter.
+    let both = RunRequest { helpers: Some(vec!["none".into(), "turner".into()]), ..first.clone() };
     let second = dir.path().join("second");
-    drop(Run::open(&second, Access::Begin, &both, &helpers).unwrap());
-    let turned = ["turner", "none", "turner"].map(str::to_owned).to_vec();
-    let turned = RunRequest { helpers: Some(turned), ..mine.clone() };
-    let (run, _) = Run::open(&second, Access::Resume, &turned, &helpers).unwrap();
+    drop(Run::open(&second, FolderMode::New, &both, &helpers).unwrap());
+    let reordered = ["turner", "none", "turner"].map(str::to_owned).to_vec();
+    let reordered = RunRequest { helpers: Some(reordered), ..first.clone() };
+    let (run, _) = Run::open(&second, FolderMode::Resume, &reordered, &helpers).unwrap();
     assert_eq!(run.options().helpers, ["none", "turner"]);
-    let other = RunRequest { no_traces: true, ..mine.clone() };
-    let error = open(Access::Resume, &other).unwrap_err().to_string();
+    let other = RunRequest { no_traces: true, ..first.clone() };
+    let error = open(FolderMode::Resume, &other).unwrap_err().to_string();
     assert!(error.contains("--no-traces off, not on"), "{error}");
-    let split = RunRequest { episodes: None, split: Some("test".parse().unwrap()), ..mine.clone() };
-    let error = open(Access::Resume, &split).unwrap_err();
+    let split =
+        RunRequest { episodes: None, split: Some("test".parse().unwrap()), ..first.clone() };
+    let error = open(FolderMode::Resume, &split).unwrap_err();
     assert!(
         error.is_usage() && error.to_string().contains("--split not given, not test"),
         "{error}"
     );
-    // The same episodes in another folder are the same; other ones are not, nor none at all.
+    // The same episodes may be in another folder; other episodes are refused.
     let same = episode_files(&[TaskId::LowTarget], 1);
     let other = episode_files(&[TaskId::LowTarget], 2);
-    let named = |path: &Path| RunRequest { episodes: Some(path.to_owned()), ..mine.clone() };
-    assert!(open(Access::Resume, &named(same.path())).is_ok());
-    let error = open(Access::Resume, &named(other.path())).unwrap_err();
+    let named = |path: &Path| RunRequest { episodes: Some(path.to_owned()), ..first.clone() };
+    assert!(open(FolderMode::Resume, &named(same.path())).is_ok());
+    let error = open(FolderMode::Resume, &named(other.path())).unwrap_err();
     assert!(error.is_usage() && error.to_string().contains("low_target/short/1"), "{error}");
-    assert!(open(Access::Resume, &named(&dir.path().join("nowhere"))).is_err());
-    let unknown = RunRequest { helpers: Some(vec!["nobody".into()]), ..mine.clone() };
+    assert!(open(FolderMode::Resume, &named(&dir.path().join("nowhere"))).is_err());
+    let unknown = RunRequest { helpers: Some(vec!["nobody".into()]), ..first.clone() };
     let elsewhere = dir.path().join("elsewhere");
-    let error = Run::open(&elsewhere, Access::Begin, &unknown, &helpers).unwrap_err().to_string();
+    let error = Run::open(&elsewhere, FolderMode::New, &unknown, &helpers).unwrap_err().to_string();
     assert!(error.contains("`nobody`") && error.contains("none, turner, breaker"), "{error}");
 
-    // A folder of another version, and one that is something else.
+    // A folder of another version, and one with other content.
     let run_file = path.join("run.json");
     let text = fs::read_to_string(&run_file).unwrap();
     fs::write(&run_file, text.replace("\"version\": 2", "\"version\": 9")).unwrap();
-    let error = open(Access::Resume, &mine).unwrap_err().to_string();
+    let error = open(FolderMode::Resume, &first).unwrap_err().to_string();
     assert!(error.contains("version 9") && error.contains("version 2"), "{error}");
     assert_eq!(error.lines().count(), 1, "{error}");
     fs::write(&run_file, text.replace(chaic_env::CHAIC_VERSION, "7.7.7")).unwrap();
-    let error = open(Access::Resume, &mine).unwrap_err().to_string();
+    let error = open(FolderMode::Resume, &first).unwrap_err().to_string();
     assert!(error.contains("7.7.7") && error.contains(chaic_env::CHAIC_VERSION), "{error}");
-    // Options that somebody else has written into it.
-    let changed =
-        "{} was changed after the run began".replace("{}", &run_file.display().to_string());
+    // Options that were changed by hand.
+    let changed = format!("{} was changed after the run started", run_file.display());
     for (from, to) in [
         ("\"rules\": \"paper\"", "\"rules\": \"compat\""),
         ("\"size\": 32", "\"size\": 64"),
@@ -402,7 +405,7 @@ fn folders_are_guarded() {
         assert_ne!(other, text, "{from} is there");
         fs::write(&run_file, other).unwrap();
         for error in [
-            Run::open(&path, Access::Resume, &RunRequest::default(), &helpers).unwrap_err(),
+            Run::open(&path, FolderMode::Resume, &RunRequest::default(), &helpers).unwrap_err(),
             RunFolder::read(&path).unwrap_err(),
         ] {
             assert!(error.to_string().contains(&changed), "{error}");
@@ -411,21 +414,21 @@ fn folders_are_guarded() {
     let foreign = dir.path().join("foreign");
     fs::create_dir(&foreign).unwrap();
     fs::write(foreign.join("letter.txt"), "dear").unwrap();
-    let error = Run::open(&foreign, Access::Resume, &mine, &helpers).unwrap_err();
+    let error = Run::open(&foreign, FolderMode::Resume, &first, &helpers).unwrap_err();
     assert!(matches!(error, EvalError::NotARun { .. }), "{error}");
     assert!(!foreign.join(".lock").exists());
 }
 
 #[test]
-fn options_of_a_split_rule_out_episode_files_when_going_on() {
-    let recorded = RunRequest { first: Some(1), ..RunRequest::default() }.begin().unwrap();
-    let given = RunRequest { episodes: Some("mine".into()), ..RunRequest::default() };
-    let error = given.resume(&recorded, Path::new("run")).unwrap_err().to_string();
+fn a_run_of_a_split_is_not_resumed_with_episode_files() {
+    let recorded = RunRequest { first: Some(1), ..RunRequest::default() }.new_options().unwrap();
+    let request = RunRequest { episodes: Some("mine".into()), ..RunRequest::default() };
+    let error = request.resumed_options(&recorded, Path::new("run")).unwrap_err().to_string();
     assert!(error.contains("--episodes not given, not mine"), "{error}");
 }
 
 #[test]
-fn a_journal_with_impossible_numbers_is_refused_by_file_and_line() {
+fn a_journal_with_invalid_values_is_refused_with_file_and_line() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("results.jsonl");
     let good = r#"{"task":"obstacle","helper":"rhp","episode":"e","seed":0,"status":"done",
@@ -433,13 +436,13 @@ fn a_journal_with_impossible_numbers_is_refused_by_file_and_line() {
         "class":"apple","by":1,"counted":true}],"digest":"0000000000000003"}"#;
     let good = good.replace("\n        ", "");
     let key = RunKey { task: TaskId::Obstacle, helper: "rhp".into(), episode: "e".into(), seed: 0 };
-    let items = [Item { key, horizon: 100, environment: "house/1".to_owned() }];
+    let jobs = [EpisodeJob { key, horizon: 100, environment: "house/1".to_owned() }];
     let read = |line: &str| {
         fs::write(&path, format!("{good}\n{line}\n")).unwrap();
-        read_results(&path, &items).map(|(_, warnings)| warnings)
+        read_results(&path, &jobs).map(|(_, warnings)| warnings)
     };
     assert_eq!(read(&good).unwrap(), []);
-    for (from, to, said) in [
+    for (from, to, message) in [
         ("\"done\":1.0", "\"done\":3.0", "`done` is 3, expected at most `total`, 2"),
         ("\"done\":1.0", "\"done\":-1.0", "`done` is -1"),
         ("\"total\":2.0", "\"total\":-2.0", "`total` is -2"),
@@ -458,10 +461,10 @@ fn a_journal_with_impossible_numbers_is_refused_by_file_and_line() {
         let line = good.replacen(from, to, 1);
         assert_ne!(line, good, "{from} is there");
         let error = read(&line).unwrap_err().to_string();
-        assert!(error.contains("results.jsonl: line 2: ") && error.contains(said), "{error}");
+        assert!(error.contains("results.jsonl: line 2: ") && error.contains(message), "{error}");
         assert!(!error.contains("line 1"), "{error}");
     }
-    // Blocks that a crash kept from the disk are no such line.
+    // A crash can leave blocks of zeros in the last line only.
     assert_eq!(read(&good.replacen("\"done\"", "\0\0\0\0\0\0", 1)).unwrap().len(), 1);
 }
 
@@ -471,7 +474,7 @@ fn a_journal_cut_at_any_byte_loses_one_record_at_most() {
     let path = dir.path().join("results.jsonl");
     let result = |seed| RunResult {
         key: RunKey { task: TaskId::Obstacle, helper: "rhp".into(), episode: "e".into(), seed },
-        ending: Ending::Done(Summary {
+        status: RunStatus::Done(Summary {
             frames: 3000,
             done: 1.0,
             total: 10.0,
@@ -481,7 +484,7 @@ fn a_journal_cut_at_any_byte_loses_one_record_at_most() {
             deliveries: Vec::new(),
             digest: Digest(3),
             counts: Default::default(),
-            measures: Default::default(),
+            diagnostics: Default::default(),
         }),
     };
     let (mut journal, _, _) = Journal::open(&path, &[]).unwrap();
@@ -494,13 +497,13 @@ fn a_journal_cut_at_any_byte_loses_one_record_at_most() {
         let (read, warnings) = read_results(&path, &[]).unwrap();
         assert_eq!(read, [result(0)]);
         assert_eq!(warnings.len(), usize::from(cut > first), "{cut}");
-        // What is appended next doesn't stick to the torn record.
+        // The next appended record does not join the torn one.
         let (mut journal, results, _) = Journal::open(&path, &[]).unwrap();
         assert_eq!(results, [result(0)]);
         journal.append(&result(1)).unwrap();
         assert_eq!(fs::read(&path).unwrap(), bytes, "{cut}");
     }
-    // A damaged record with others after it is no crash: nothing is thrown away.
+    // A damaged record before others is not caused by a crash, so nothing is removed.
     let mut damaged = bytes.clone();
     damaged[0] = b'!';
     fs::write(&path, &damaged).unwrap();
@@ -516,8 +519,8 @@ fn a_replay_of_an_altered_trace_stops_at_the_first_wrong_digest() {
     let source = episode_files(&[TaskId::LowTarget], 1);
     let dir = tempfile::tempdir().unwrap();
     let helpers = TestHelpers::new();
-    let given = RunRequest { seeds: None, ..given(&source, &["turner"]) };
-    let (mut run, _) = Run::open(dir.path(), Access::Begin, &given, &helpers).unwrap();
+    let request = RunRequest { seeds: None, ..request(&source, &["turner"]) };
+    let (mut run, _) = Run::open(dir.path(), FolderMode::New, &request, &helpers).unwrap();
     assert!(play(&mut run, 1, &helpers));
     let path = run.folder().traces().unwrap().remove(0);
     let whole = crate::trace_file::read(&path).unwrap().0;
@@ -531,7 +534,7 @@ fn a_replay_of_an_altered_trace_stops_at_the_first_wrong_digest() {
     let decisions: Vec<usize> = (0..whole.records.len())
         .filter(|k| matches!(whole.records[*k], chaic_env::trace::Record::Decision(_)))
         .collect();
-    // What the last decisions lead to shows in no later decision, only in the end.
+    // The effect of the last decisions shows in the end record only.
     for k in &decisions[..decisions.len() / 2] {
         let mut altered = whole.clone();
         if let chaic_env::trace::Record::Decision(decision) = &mut altered.records[*k] {
@@ -542,9 +545,9 @@ fn a_replay_of_an_altered_trace_stops_at_the_first_wrong_digest() {
         }
         let error = replayed(&altered).unwrap_err().to_string();
         assert!(error.contains("the trace was altered"), "{k}: {error}");
-        let verdict =
+        let report =
             crate::verify::verify_trace(run.folder(), run.options(), &helpers, &altered, &path);
-        assert!(verdict.unwrap().is_some(), "{k}");
+        assert!(report.unwrap().is_some(), "{k}");
         altered = whole.clone();
         altered.records.remove(*k);
         assert!(replayed(&altered).is_err(), "{k} removed");

@@ -1,24 +1,24 @@
-//! Rejects JSON objects with repeated field names. JSON parsers disagree about which value counts.
+//! Rejects JSON objects with repeated field names: JSON parsers disagree about which value counts.
 
 use std::collections::BTreeSet;
 use std::fmt;
 
 use serde::de::{DeserializeSeed, Deserializer, Error as _, MapAccess, SeqAccess, Visitor};
 
-/// Checks that no object in a JSON text has two fields of the same name. Text that is not JSON passes: the
-/// parser of the values reports it.
+/// Checks that no object in a JSON text has two fields of the same name. Accepts text that is not
+/// JSON; the parser of the values reports it.
 ///
 /// # Errors
 /// A message with the name of the repeated field.
 pub(super) fn check(json: &[u8]) -> Result<(), String> {
     let mut from = serde_json::Deserializer::from_slice(json);
     match Unique.deserialize(&mut from) {
-        Err(e) if e.is_data() => Err(text_of(&e)),
+        Err(e) if e.is_data() => Err(message(&e)),
         _ => Ok(()),
     }
 }
 
-fn text_of(error: &serde_json::Error) -> String {
+fn message(error: &serde_json::Error) -> String {
     let text = error.to_string();
     text.split(" at line ").next().unwrap_or_default().to_owned()
 }
@@ -87,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fields_that_occur_twice_are_found_at_any_depth() {
+    fn repeated_fields_are_found_at_any_depth() {
         for twice in
             [r#"{"a":1,"a":2}"#, r#"{"b":[{"a":1,"c":2,"a":null}]}"#, r#"{"a":1,"\u0061":2}"#]
         {

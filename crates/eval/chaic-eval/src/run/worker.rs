@@ -1,4 +1,4 @@
-//! Playing many episodes on several threads.
+//! Worker threads that play episode runs.
 
 use std::any::Any;
 use std::collections::BTreeSet;
@@ -8,125 +8,133 @@ use std::sync::mpsc::{Sender, channel};
 use std::time::{Duration, Instant};
 
 use chaic_core::{AgentError, Frame};
-use chaic_env::minds::{self, Helpers};
+use chaic_env::helper_registry::{self, HelperRegistry};
 use chaic_env::trace::Record;
-use chaic_env::{Env, EpisodeConfig, Minds, RunKey};
+use chaic_env::{Env, EpisodeAgents, EpisodeConfig, RunKey};
 
 use crate::error::{EvalError, Result};
-use crate::metrics::{Ending, RunResult, Tally};
+use crate::metrics::{RunResult, RunStatus, Tally};
 use crate::run::estimate::Estimate;
 use crate::run::folder::RunFolder;
-use crate::run::items::Item;
 use crate::run::options::RunOptions;
-use crate::trace_file::Writer;
+use crate::run::plan::EpisodeJob;
+use crate::trace_file::TraceWriter;
 
-/// A worker tells of its frames every so many decisions.
-const NEWS_EVERY: u32 = 32;
+/// Number of decisions between two progress events of a worker.
+const PROGRESS_INTERVAL: u32 = 32;
 
-/// Maximum length of a recorded error message, bytes: far more than a traceback, and short enough for a
-/// line of the journal.
+/// Maximum length of a recorded error message, bytes: far more than a stack trace, and short enough
+/// for a line of the journal.
 const MAX_MESSAGE_BYTES: usize = 1 << 20;
 
-/// What happens during a run.
+/// Event during a run.
 #[derive(Clone, Debug)]
-pub enum Progress {
-    /// A worker begins an episode run.
-    Began {
-        /// The worker, from 0.
+pub enum JobEvent {
+    /// A worker started an episode run.
+    Started {
+        /// Index of the worker, from 0.
         worker: usize,
-        /// Which run.
+        /// The episode run.
         key: RunKey,
-        /// How many frames it may take.
+        /// Maximum number of frames.
         horizon: Frame,
     },
-    /// A worker has come to a frame.
-    At {
-        /// The worker.
+    /// A worker reached a frame.
+    Progress {
+        /// Index of the worker.
         worker: usize,
-        /// The frame.
+        /// Current frame.
         frame: Frame,
     },
     /// An episode run is finished and in the journal.
-    Finished(Finished),
+    Finished(FinishedJob),
 }
 
-/// An episode run is finished.
+/// A finished episode run.
 #[derive(Clone, Debug)]
-pub struct Finished {
-    /// The worker that played it.
+pub struct FinishedJob {
+    /// Index of the worker that played it.
     pub worker: usize,
-    /// Its result.
+    /// Result of the episode run.
     pub result: RunResult,
-    /// How long it took.
+    /// Wall-clock time.
     pub time: Duration,
-    /// What is left of the whole run, as far as one can tell from the episodes so far.
-    pub left: Option<Duration>,
+    /// Estimated remaining time of the whole run; `None` if unknown.
+    pub remaining: Option<Duration>,
 }
 
-/// What all workers share.
-pub(super) struct Crew<'a> {
+/// State that all workers share.
+pub(super) struct WorkerPool<'a> {
     pub folder: &'a RunFolder,
     pub options: &'a RunOptions,
-    pub helpers: &'a dyn Helpers,
+    pub helpers: &'a dyn HelperRegistry,
     pub stop: &'a AtomicBool,
 }
 
-/// What a worker says to the thread that keeps the journal.
-enum News {
-    Progress(Progress),
+/// Message from a worker to the thread that writes the journal.
+enum WorkerMessage {
+    Progress(JobEvent),
     Finished { worker: usize, result: RunResult, time: Duration },
     Failed(EvalError),
 }
 
-impl Crew<'_> {
-    /// Plays all items; `keep` makes each result last. Returns whether nothing was left out.
+impl WorkerPool<'_> {
+    /// Plays all jobs; `store` saves each result. Returns whether all of them were played.
     pub fn play(
         &self,
-        items: &[Item],
-        jobs: usize,
-        progress: &mut dyn FnMut(&Progress),
-        keep: &mut dyn FnMut(&RunResult) -> Result<()>,
+        planned: &[EpisodeJob],
+        n_workers: usize,
+        progress: &mut dyn FnMut(&JobEvent),
+        store: &mut dyn FnMut(&RunResult) -> Result<()>,
     ) -> Result<bool> {
-        let queues = Queues::of(items, |item| self.waits(&item.key));
+        let queues = Queues::new(planned, |job| self.waits(&job.key));
         let n_waiting = self.helpers.waiting_jobs().min(queues.waiting.len());
-        let jobs = jobs.min(items.len()).max(1);
-        // Raised by a failure as well as by the caller's `stop`.
+        let n_workers = n_workers.min(planned.len()).max(1);
+        // Set after a failure; workers then stop.
         let failed = AtomicBool::new(false);
         let mut outcome = Ok(());
-        let mut to_go: BTreeSet<&RunKey> = items.iter().map(|i| &i.key).collect();
+        let mut unfinished: BTreeSet<&RunKey> = planned.iter().map(|job| &job.key).collect();
         let mut estimate = Estimate::default();
         std::thread::scope(|scope| {
             let (sender, receiver) = channel();
-            for worker in 0..jobs + n_waiting {
+            for worker in 0..n_workers + n_waiting {
                 let (sender, queues, failed) = (sender.clone(), &queues, &failed);
-                let next = move || if worker < jobs { queues.any() } else { queues.waiting() };
+                let next = move || {
+                    if worker < n_workers { queues.next_any() } else { queues.next_waiting() }
+                };
                 let work = move || self.work(worker, &next, failed, &sender);
                 let name = format!("chaic-worker-{worker}");
                 let spawned = std::thread::Builder::new().name(name).spawn_scoped(scope, work);
-                if let Err(refusal) = spawned {
-                    // Those that run already end with the episodes that they have begun.
+                if let Err(error) = spawned {
+                    // Workers that run already finish their current episodes.
                     failed.store(true, Ordering::Relaxed);
-                    let (n, wanted) = (worker + 1, jobs + n_waiting);
-                    outcome = Err(EvalError::NoThread { n, wanted, refusal });
+                    let (n, wanted) = (worker + 1, n_workers + n_waiting);
+                    outcome = Err(EvalError::NoThread { n, wanted, error });
                     break;
                 }
             }
             drop(sender);
-            for news in receiver {
-                let told = match news {
-                    News::Progress(news) => {
-                        progress(&news);
+            for message in receiver {
+                let handled = match message {
+                    WorkerMessage::Progress(event) => {
+                        progress(&event);
                         Ok(())
                     }
-                    News::Finished { worker, result, time } => keep(&result).map(|()| {
+                    WorkerMessage::Finished { worker, result, time } => store(&result).map(|()| {
                         estimate.add(&result.key, time);
-                        to_go.remove(&result.key);
-                        let left = estimate.left(to_go.iter().copied(), jobs + n_waiting);
-                        progress(&Progress::Finished(Finished { worker, result, time, left }));
+                        unfinished.remove(&result.key);
+                        let remaining =
+                            estimate.remaining(unfinished.iter().copied(), n_workers + n_waiting);
+                        progress(&JobEvent::Finished(FinishedJob {
+                            worker,
+                            result,
+                            time,
+                            remaining,
+                        }));
                     }),
-                    News::Failed(error) => Err(error),
+                    WorkerMessage::Failed(error) => Err(error),
                 };
-                if let Err(error) = told {
+                if let Err(error) = handled {
                     failed.store(true, Ordering::Relaxed);
                     if outcome.is_ok() {
                         outcome = Err(error);
@@ -134,68 +142,74 @@ impl Crew<'_> {
                 }
             }
         });
-        outcome.map(|()| to_go.is_empty())
+        outcome.map(|()| unfinished.is_empty())
     }
 
     fn is_stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// Whether a mind of this episode run waits for somebody else's computer.
+    /// Returns whether an agent of this episode run waits for a remote service.
     pub fn waits(&self, key: &RunKey) -> bool {
         let partner = self.options.partner.as_deref();
-        [Some(key.helper.as_str()), partner].into_iter().flatten().any(|n| self.helpers.waits(n))
+        [Some(key.helper.as_str()), partner].into_iter().flatten().any(|n| self.helpers.is_slow(n))
     }
 
     fn work<'i>(
         &self,
         worker: usize,
-        next: &dyn Fn() -> Option<&'i Item>,
+        next: &dyn Fn() -> Option<&'i EpisodeJob>,
         failed: &AtomicBool,
-        sender: &Sender<News>,
+        sender: &Sender<WorkerMessage>,
     ) {
         loop {
             if self.is_stopped() || failed.load(Ordering::Relaxed) {
                 return;
             }
-            let Some(item) = next() else { return };
-            let began = Instant::now();
-            // The receiver lives as long as any worker does.
-            let tell = |news| drop(sender.send(news));
-            let (key, horizon) = (item.key.clone(), item.horizon);
-            tell(News::Progress(Progress::Began { worker, key, horizon }));
-            let mut at = |frame| tell(News::Progress(Progress::At { worker, frame }));
-            match self.play_one(&item.key, &mut at) {
+            let Some(job) = next() else { return };
+            let start = Instant::now();
+            // The receiver outlives the workers.
+            let send = |message| drop(sender.send(message));
+            let (key, horizon) = (job.key.clone(), job.horizon);
+            send(WorkerMessage::Progress(JobEvent::Started { worker, key, horizon }));
+            let mut on_frame =
+                |frame| send(WorkerMessage::Progress(JobEvent::Progress { worker, frame }));
+            match self.play_one(&job.key, &mut on_frame) {
                 Ok(None) => return,
                 Ok(Some(result)) => {
-                    tell(News::Finished { worker, result, time: began.elapsed() });
+                    send(WorkerMessage::Finished { worker, result, time: start.elapsed() });
                 }
                 Err(error) => {
-                    tell(News::Failed(error));
+                    send(WorkerMessage::Failed(error));
                     return;
                 }
             }
         }
     }
 
-    /// Plays one item; `None` if it was stopped.
-    pub fn play_one(&self, key: &RunKey, at: &mut dyn FnMut(Frame)) -> Result<Option<RunResult>> {
+    /// Plays one episode run; `None` if it was stopped.
+    pub fn play_one(
+        &self,
+        key: &RunKey,
+        on_frame: &mut dyn FnMut(Frame),
+    ) -> Result<Option<RunResult>> {
         let mut writer = None;
-        let played = catch_unwind(AssertUnwindSafe(|| self.play_to_end(key, &mut writer, at)));
-        let (result, broken) = match played {
-            // Who halts because the run stops says nothing new.
+        let played =
+            catch_unwind(AssertUnwindSafe(|| self.play_to_end(key, &mut writer, on_frame)));
+        let (result, failure) = match played {
+            // An agent that halts because the run stops is no failure.
             Ok(Err(EvalError::Agent(AgentError::Halted(_)))) if self.is_stopped() => (None, None),
             Ok(Err(EvalError::Agent(AgentError::Broken(text)))) => (None, Some(text)),
             Ok(result) => (result?, None),
-            Err(panic) => (None, Some(text_of(panic.as_ref()).to_owned())),
+            Err(panic) => (None, Some(panic_message(panic.as_ref()).to_owned())),
         };
-        if let Some(text) = broken {
-            let text = shortened(text, MAX_MESSAGE_BYTES);
-            let ending = Ending::Error { message: format!("the episode broke down: {text}") };
+        if let Some(text) = failure {
+            let text = truncated(text, MAX_MESSAGE_BYTES);
+            let status = RunStatus::Error { message: format!("the episode broke down: {text}") };
             if let Some(writer) = writer.take() {
                 writer.discard();
             }
-            return Ok(Some(RunResult { key: key.clone(), ending }));
+            return Ok(Some(RunResult { key: key.clone(), status }));
         }
         match (&result, writer) {
             (Some(_), Some(writer)) => writer.finish()?,
@@ -208,31 +222,30 @@ impl Crew<'_> {
     fn play_to_end(
         &self,
         key: &RunKey,
-        writer: &mut Option<Writer>,
-        at: &mut dyn FnMut(Frame),
+        writer: &mut Option<TraceWriter>,
+        on_frame: &mut dyn FnMut(Frame),
     ) -> Result<Option<RunResult>> {
         let episode = self.folder.episode(self.options, key)?;
         let rules = self.options.rules()?;
-        let helper = minds::find_for(self.helpers, key, rules.planner)?;
+        let helper = helper_registry::find_for(self.helpers, key, rules.planner)?;
         if let Some(helper) = &helper {
             let checked = self.options.track.check_grants(&key.helper, helper.grants);
             checked.map_err(EvalError::Options)?;
         }
         let name = self.options.partner.as_deref();
-        let partner = minds::find_partner(self.helpers, name, Some(key), rules.planner)?;
+        let partner = helper_registry::find_partner(self.helpers, name, Some(key), rules.planner)?;
         let config = EpisodeConfig {
-            episode: &episode,
             seed: key.seed,
             rules,
-            helper: &key.helper,
             partner: name,
             image_size: self.options.size,
             appearance: self.options.appearance()?,
+            ..EpisodeConfig::new(&episode, &key.helper)
         };
-        let mut env = Env::new(config, Minds::of(helper, partner))?;
+        let mut env = Env::new(config, EpisodeAgents::new(helper, partner))?;
         if self.options.traces {
             let path = self.folder.trace(key);
-            *writer = Some(Writer::create(self.folder.path(), &path, env.header())?);
+            *writer = Some(TraceWriter::create(self.folder.path(), &path, env.header())?);
         }
         let mut tally = Tally::new(env.header());
         let (mut result, mut decisions) = (None, 0);
@@ -240,54 +253,54 @@ impl Crew<'_> {
             if let Some(writer) = writer.as_mut() {
                 writer.write(record)?;
             }
-            result = tally.record(record).or(result.take());
+            result = tally.add(record).or(result.take());
             if let Record::Decision(decision) = record {
                 decisions += 1;
-                if decisions % NEWS_EVERY == 0 {
-                    at(decision.frame);
+                if decisions % PROGRESS_INTERVAL == 0 {
+                    on_frame(decision.frame);
                 }
             }
             Ok(())
         })?;
-        if let Some(Ending::Done(summary)) = result.as_mut().map(|r| &mut r.ending) {
+        if let Some(RunStatus::Done(summary)) = result.as_mut().map(|r| &mut r.status) {
             summary.counts = env.counts();
         }
         Ok(result)
     }
 }
 
-/// What is to be played, by whether it waits. Each queue is taken from by many.
+/// Episode runs in two queues that all workers share: with and without waiting for remote services.
 struct Queues<'i> {
-    own: Vec<&'i Item>,
-    waiting: Vec<&'i Item>,
+    local: Vec<&'i EpisodeJob>,
+    waiting: Vec<&'i EpisodeJob>,
     next: [AtomicUsize; 2],
 }
 
 impl<'i> Queues<'i> {
-    fn of(items: &'i [Item], waits: impl Fn(&Item) -> bool) -> Queues<'i> {
-        let (waiting, own) = items.iter().partition(|item| waits(item));
-        Queues { own, waiting, next: Default::default() }
+    fn new(jobs: &'i [EpisodeJob], waits: impl Fn(&EpisodeJob) -> bool) -> Queues<'i> {
+        let (waiting, local) = jobs.iter().partition(|job| waits(job));
+        Queues { local, waiting, next: Default::default() }
     }
 
-    /// What waits for nobody comes first: those who take care of what waits are many.
-    fn any(&self) -> Option<&'i Item> {
-        let own = self.own.get(self.next[0].fetch_add(1, Ordering::Relaxed));
-        own.copied().or_else(|| self.waiting())
+    /// Prefers jobs that do not wait, because other threads serve the waiting ones.
+    fn next_any(&self) -> Option<&'i EpisodeJob> {
+        let local = self.local.get(self.next[0].fetch_add(1, Ordering::Relaxed));
+        local.copied().or_else(|| self.next_waiting())
     }
 
-    fn waiting(&self) -> Option<&'i Item> {
+    fn next_waiting(&self) -> Option<&'i EpisodeJob> {
         self.waiting.get(self.next[1].fetch_add(1, Ordering::Relaxed)).copied()
     }
 }
 
 /// Truncates a text to at most `max_bytes`.
-fn shortened(mut text: String, max_bytes: usize) -> String {
+fn truncated(mut text: String, max_bytes: usize) -> String {
     text.truncate(text.floor_char_boundary(max_bytes));
     text
 }
 
-/// What a panic said.
-fn text_of(panic: &(dyn Any + Send)) -> &str {
+/// Returns the message of a panic.
+fn panic_message(panic: &(dyn Any + Send)) -> &str {
     let text = panic.downcast_ref::<&str>().copied();
     text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message")
 }

@@ -1,4 +1,4 @@
-//! How much of a run is there, and whether its report is what its results give.
+//! Completeness of a run, and comparison of its report with its results.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -6,65 +6,65 @@ use std::fmt;
 use chaic_env::RunKey;
 
 use crate::error::Result;
-use crate::metrics::{Ending, FormulaSet, RunResult};
+use crate::metrics::{FormulaSet, RunResult, RunStatus};
 use crate::report::{Report, differing_files};
-use crate::run::{Item, RunFolder, RunOptions};
+use crate::run::{EpisodeJob, RunFolder, RunOptions};
 
-/// How many of the episode runs that a run consists of have a result.
+/// Numbers of planned, missing and failed episode runs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Coverage {
-    /// All episode runs; 0 where the run's episodes are gone.
+    /// Number of planned episode runs; 0 if the episodes can't be read.
     pub planned: usize,
-    /// Those without a line in `results.jsonl`.
+    /// Episode runs without a line in `results.jsonl`.
     pub missing: Vec<RunKey>,
-    /// Those that broke down.
-    pub broken: Vec<RunKey>,
+    /// Failed episode runs.
+    pub failed: Vec<RunKey>,
 }
 
 impl Coverage {
-    pub(super) fn of(planned: &[Item], results: &[RunResult]) -> Coverage {
-        let noted: BTreeSet<&RunKey> = results.iter().map(|r| &r.key).collect();
-        let is_broken = |r: &&RunResult| matches!(r.ending, Ending::Error { .. });
+    pub(super) fn new(planned: &[EpisodeJob], results: &[RunResult]) -> Coverage {
+        let recorded: BTreeSet<&RunKey> = results.iter().map(|r| &r.key).collect();
+        let is_failed = |r: &&RunResult| matches!(r.status, RunStatus::Error { .. });
         Coverage {
             planned: planned.len(),
             missing: planned
                 .iter()
-                .map(|i| &i.key)
-                .filter(|k| !noted.contains(k))
+                .map(|job| &job.key)
+                .filter(|k| !recorded.contains(k))
                 .cloned()
                 .collect(),
-            broken: results.iter().filter(is_broken).map(|r| r.key.clone()).collect(),
+            failed: results.iter().filter(is_failed).map(|r| r.key.clone()).collect(),
         }
     }
 
-    /// Whether every episode run was played to its end.
-    pub fn is_whole(&self) -> bool {
-        self.missing.is_empty() && self.broken.is_empty()
+    /// Returns whether every episode run was played to its end.
+    pub fn is_complete(&self) -> bool {
+        self.missing.is_empty() && self.failed.is_empty()
     }
 }
 
 impl fmt::Display for Coverage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let n = self.planned - (self.missing.len() + self.broken.len()).min(self.planned);
+        let n = self.planned - (self.missing.len() + self.failed.len()).min(self.planned);
         write!(f, "{n} of {} episode runs are finished", self.planned)?;
-        for (keys, what) in [(&self.missing, "missing"), (&self.broken, "broke down")] {
+        for (keys, state) in [(&self.missing, "missing"), (&self.failed, "failed")] {
             if let Some(RunKey { helper, episode, seed, .. }) = keys.first() {
                 let n = keys.len();
-                write!(f, "; {what}: {n}, first {episode} with {helper} and seed {seed}")?;
+                write!(f, "; {state}: {n}, first {episode} with {helper} and seed {seed}")?;
             }
         }
         Ok(())
     }
 }
 
-/// What comparing the report's files with the results found.
+/// Result of comparing the report's files with the results.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum ReportState {
-    /// No comparison was made.
+    /// The files were not compared.
     #[default]
     Unchecked,
-    /// This version of chaic began the run, so it writes another report.
-    OfOtherVersion(String),
+    /// This other version of chaic started the run, so its report may differ.
+    OtherVersion(String),
     /// The files were compared with the results.
     Compared {
         /// Names of missing files.
@@ -75,14 +75,14 @@ pub enum ReportState {
 }
 
 impl ReportState {
-    pub(super) fn of(
+    pub(super) fn compare(
         folder: &RunFolder,
         options: &RunOptions,
-        planned: &[Item],
+        planned: &[EpisodeJob],
         results: &[RunResult],
     ) -> Result<ReportState> {
         if let Some(other) = folder.other_version()? {
-            return Ok(ReportState::OfOtherVersion(other));
+            return Ok(ReportState::OtherVersion(other));
         }
         let (granted, formulas) = (folder.granted()?, FormulaSet::Paper);
         let report = Report { options, results, planned, granted: granted.as_ref(), formulas };
@@ -90,7 +90,7 @@ impl ReportState {
         Ok(ReportState::Compared { missing, altered })
     }
 
-    /// Returns whether the report was compared and equals what the results give.
+    /// Returns whether the report was compared and has no differences.
     pub fn is_good(&self) -> bool {
         matches!(self, ReportState::Compared { missing, altered } if missing.is_empty() && altered.is_empty())
     }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::PathBuf;
 
-use chaic_env::minds::NONE;
+use chaic_env::helper_registry::NONE;
 use chaic_env::{CHAIC_VERSION, RunKey};
 use chaic_files::{Entry, EntryKind, walk};
 
@@ -32,7 +32,7 @@ impl fmt::Display for Finding {
 pub(super) struct FolderCheck<'a> {
     pub folder: &'a RunFolder,
     pub options: &'a RunOptions,
-    /// All planned episode runs; empty if the episodes can not be read.
+    /// All planned episode runs; empty if the episodes can't be read.
     pub planned: &'a [RunKey],
     pub results: &'a [RunResult],
 }
@@ -48,11 +48,11 @@ pub(super) struct FolderContents {
 }
 
 impl FolderCheck<'_> {
-    /// Checks traces, episode files, `run.json` and repeated results. `repeated` lists results that later
-    /// lines of the journal replace.
+    /// Checks traces, episode files, `run.json` and repeated results. `repeated` lists results that
+    /// later lines of the journal replace.
     ///
     /// # Errors
-    /// If the file system refuses.
+    /// If a file or folder can't be read.
     pub fn run(&self, repeated: &[(usize, RunKey)]) -> Result<FolderContents> {
         let mut contents = FolderContents::default();
         self.check_traces(&mut contents)?;
@@ -108,8 +108,8 @@ impl FolderCheck<'_> {
         Ok(())
     }
 
-    /// Checks that only a run with the split `files` has episode files, and that they are named after their
-    /// episodes.
+    /// Checks that only a run with the split `files` has episode files, and that they are named
+    /// after their episodes.
     fn check_episodes(&self, contents: &mut FolderContents) -> Result<()> {
         let has_files = self.options.split == FILES;
         for Entry { path, kind } in walk(&self.folder.episode_files(), 0)? {
@@ -134,7 +134,7 @@ impl FolderCheck<'_> {
 
     fn check_run_file(&self, contents: &mut FolderContents) -> Result<()> {
         let path = self.folder.join("run.json");
-        // The form of another version is not known here.
+        // The format of another version is unknown here.
         if self.folder.version()?.is_none_or(|chaic| chaic != CHAIC_VERSION) {
             return Ok(());
         }

@@ -1,97 +1,88 @@
-//! Windows of generated episodes, with what was true of the partner.
+//! Collection of labeled windows from generated episodes.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use chaic_agents::Mind;
+use chaic_agents::PlanningAgent;
 use chaic_agents::behavior::BehaviorLog;
 use chaic_agents::decision::{Context, Plan, Policy};
 use chaic_agents::memory::Memory;
 use chaic_agents::partners::{self, PARTNER_GRANTS};
-use chaic_agents::policies::{Random, RulePolicy, RuleProfile};
-use chaic_agents::sight::{GROUND_TRUTH, Sight};
+use chaic_agents::perception_factory::{GROUND_TRUTH, PerceptionFactory};
+use chaic_agents::policies::{RandomPolicy, RulePolicy, RuleProfile};
 use chaic_core::observation::Grants;
-use chaic_core::rng::Stream;
+use chaic_core::rng::RngStream;
 use chaic_core::{AgentError, AgentId, Briefing, Observation, TaskId};
-use chaic_env::minds::Helper;
+use chaic_env::helper_registry::Helper;
 use chaic_env::rules::RuleSet;
-use chaic_env::{Env, EpisodeConfig, Minds, seeded_by_episode};
-use chaic_episodes::find_episode;
-use chaic_files::{FileError, read_bounded, read_user_file, write_whole};
-use chaic_render::Appearance;
+use chaic_env::{Env, EpisodeAgents, EpisodeConfig, seeded_by_episode};
+pub use chaic_episodes::DatasetSplit;
+use chaic_episodes::{SeedRange, find_episode};
+use chaic_files::{FileError, read_bounded, read_user_file, write_atomically};
 use chaic_training::bounds::{BoundTable, integer};
-use chaic_vision::sights::{self, SightError};
-pub use chaic_vision::views::Part;
-use chaic_world::Person;
+use chaic_vision::perception_registry::{self, PerceptionError};
+use chaic_world::AgentSpec;
 use rayon::prelude::*;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 use serde::{Deserialize, Serialize};
 
-use super::window::{N_CLASS, N_STATE, Window};
-use super::{Goal, N_LIMITS, limits_of};
-use crate::choice_network::Decision;
+use super::window::{N_CLASS, N_STATE, ObservationHistory};
+use super::{N_LIMITS, OpponentGoal, limits};
+use crate::candidate_scorer::CandidateSet;
 use crate::rollout::RolloutError;
 
-/// A window and what was true when it ended.
+/// Window with the ground truth at its end.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sample {
-    /// The window as numbers.
-    pub window: Decision,
-    /// What the partner was about.
-    pub goal: Goal,
-    /// Which of the choices it was after, if it was about to take something.
+pub struct LabeledWindow {
+    /// Features of the window.
+    pub window: CandidateSet,
+    /// Goal of the partner.
+    pub goal: OpponentGoal,
+    /// Index of the class that the partner wants to pick up, if that is its goal.
     pub target: Option<usize>,
-    /// What it can't do.
+    /// Physical limits of the partner.
     pub limits: [f32; N_LIMITS],
-    /// Which episode of the collection it is of.
+    /// Index of the episode in the collection.
     pub episode: u32,
 }
 
-/// The seed of a part's first episode: none of any split, nor of those that policies and perception learn from.
-fn first_seed(part: Part) -> u64 {
-    match part {
-        Part::Training => 42_000_000,
-        Part::Validation => 52_000_000,
-        Part::Test => 62_000_000,
-    }
-}
-
-/// Largest number of windows of each goal. A window takes about 1.5 kB, so that all take 8 GB.
+/// Maximum number of windows per goal. A window takes about 1.5 kB, all of them 8 GB.
 pub const MAX_WINDOWS: u32 = 1_000_000;
-/// Largest number of episodes that windows are made of.
+/// Maximum number of episodes of a collection.
 pub const MAX_EPISODES: u32 = 100_000;
-/// Bounds of [`CollectRules`].
+/// Bounds of [`WindowCollectionConfig`].
 pub const COLLECT_BOUNDS: BoundTable = &[
-    ("of_each", integer(1, MAX_WINDOWS as i64)),
+    ("max_per_class", integer(1, MAX_WINDOWS as i64)),
     ("episodes", integer(1, MAX_EPISODES as i64)),
     ("image_size", integer(16, 1024)),
 ];
 
-/// Which windows are made.
+/// Configuration of the collection.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct CollectRules {
-    /// Of each goal at most. The paper has 8,355 windows in all.
-    pub of_each: usize,
-    /// Episodes that are played for them at most.
+pub struct WindowCollectionConfig {
+    /// Maximum number of windows per goal. The paper has 8,355 windows in all.
+    #[serde(alias = "of_each")]
+    pub max_per_class: usize,
+    /// Maximum number of episodes.
     pub episodes: usize,
-    /// The tasks whose episodes are played, by turns.
+    /// Tasks, whose episodes take turns.
     pub tasks: Vec<TaskId>,
-    /// Side of everybody's images, pixels.
+    /// Width and height of all agents' images, pixels.
     pub image_size: u32,
-    /// By what the helper sees, as `chaic eval` names it.
+    /// Perception of the helper, as `chaic eval --perception`.
     pub perception: String,
-    /// By what it tells what its partner does.
+    /// Behavior recognition of the helper, as `chaic eval --behavior`.
     pub behavior: String,
-    /// Whether it is granted what its partner does, as in the paper.
+    /// Grants the helper the partner's actions, as in the paper.
     pub granted: bool,
 }
 
-impl Default for CollectRules {
-    fn default() -> CollectRules {
-        CollectRules {
-            of_each: 20_000,
+impl Default for WindowCollectionConfig {
+    fn default() -> WindowCollectionConfig {
+        WindowCollectionConfig {
+            max_per_class: 20_000,
             episodes: 2_000,
             tasks: TaskId::paper().collect(),
             image_size: 128,
@@ -102,65 +93,69 @@ impl Default for CollectRules {
     }
 }
 
-impl CollectRules {
-    /// What is wrong with them.
+impl WindowCollectionConfig {
+    /// Checks the configuration.
     ///
     /// # Errors
-    /// That, in a sentence.
+    /// One line that describes the problem.
     pub fn check(&self) -> Result<(), String> {
         if self.tasks.is_empty() {
-            return Err("`collect.tasks` names no task".to_owned());
+            return Err("`collect.tasks` is empty".to_owned());
         }
-        self.sight().map(|_| ()).map_err(|e| e.to_string())
+        self.perception_factory().map(|_| ()).map_err(|e| e.to_string())
     }
 
-    fn sight(&self) -> Result<Arc<dyn Sight>, SightError> {
-        sights::named(&self.perception, &self.behavior)
+    fn perception_factory(&self) -> Result<Arc<dyn PerceptionFactory>, PerceptionError> {
+        perception_registry::perception_from_name(&self.perception, &self.behavior)
     }
 }
 
-/// Observations from one window to the next: those in between differ by one observation.
-const EVERY: usize = 4;
-/// Windows of each goal from one episode at most, so that there are many.
-const OF_EPISODE: usize = 40;
-/// Episodes that are played before it is asked whether there are enough windows.
-const ROUND: usize = 32;
+/// Observations between two windows, which overlap by one observation.
+const STRIDE: usize = 4;
+/// Maximum number of windows per goal and episode, for variety.
+const MAX_PER_EPISODE: usize = 40;
+/// Episodes between two checks of the number of windows.
+const ROUND_EPISODES: usize = 32;
 
-/// The windows, in an order that doesn't depend on threads, balanced: no goal has more than the rules say, or than
-/// twice as many as the rarest but one. Returns `None` if `stop` is raised meanwhile. `progress` is called with what has
-/// been done.
+/// Collects windows, at most `max_per_class` per goal, in an order that does not depend on threads.
+/// Returns `None` if `stop` is raised. `progress` is called with descriptions of finished work.
 ///
 /// # Errors
-/// If nobody can see so, or an episode can't be played.
+/// If the perception cannot be created, or an episode cannot be played.
 pub fn collect(
-    part: Part,
-    rules: &CollectRules,
+    split: DatasetSplit,
+    config: &WindowCollectionConfig,
     progress: &mut dyn FnMut(&str),
     stop: &AtomicBool,
-) -> Result<Option<Vec<Sample>>, CollectError> {
-    let sight = rules.sight()?;
-    let mut samples: Vec<Sample> = Vec::new();
-    let mut counts = [0usize; Goal::ALL.len()];
-    for first in (0..rules.episodes).step_by(ROUND) {
-        let told: Vec<String> =
-            Goal::ALL.iter().zip(counts).map(|(goal, n)| format!("{} {n}", goal.name())).collect();
-        progress(&format!("{first} episodes, windows: {}", told.join(", ")));
-        // Nobody stands still as long as others walk: waiting stays rare.
-        let is_enough = |goal: &&Goal| **goal != Goal::Wait && counts[goal.index()] < rules.of_each;
-        if Goal::ALL.iter().find(is_enough).is_none() {
+) -> Result<Option<Vec<LabeledWindow>>, CollectError> {
+    let perception = config.perception_factory()?;
+    let mut samples: Vec<LabeledWindow> = Vec::new();
+    let mut counts = [0usize; OpponentGoal::ALL.len()];
+    for first in (0..config.episodes).step_by(ROUND_EPISODES) {
+        let counts_by_goal: Vec<String> = OpponentGoal::ALL
+            .iter()
+            .zip(counts)
+            .map(|(goal, n)| format!("{} {n}", goal.name()))
+            .collect();
+        progress(&format!("{first} episodes, windows: {}", counts_by_goal.join(", ")));
+        // Waiting is rare, so it does not count.
+        let is_incomplete = |goal: &&OpponentGoal| {
+            **goal != OpponentGoal::Wait && counts[goal.index()] < config.max_per_class
+        };
+        if OpponentGoal::ALL.iter().find(is_incomplete).is_none() {
             break;
         }
-        let round: Result<Vec<Vec<Sample>>, CollectError> = (first
-            ..(first + ROUND).min(rules.episodes))
+        let round: Result<Vec<Vec<LabeledWindow>>, CollectError> = (first
+            ..(first + ROUND_EPISODES).min(config.episodes))
             .into_par_iter()
-            .map(|index| of_episode(part, rules, &*sight, index as u32, stop))
+            .map(|index| windows_of_episode(split, config, &*perception, index as u32, stop))
             .collect();
         if stop.load(Ordering::Relaxed) {
             return Ok(None);
         }
         for sample in round?.into_iter().flatten() {
             let count = &mut counts[sample.goal.index()];
-            if *count < rules.of_each {
+            if *count < config.max_per_class {
                 *count += 1;
                 samples.push(sample);
             }
@@ -169,304 +164,321 @@ pub fn collect(
     Ok(Some(samples))
 }
 
-/// Why there are no windows.
+/// Reason why windows cannot be collected or read.
 #[derive(Debug, thiserror::Error)]
 pub enum CollectError {
-    /// Nobody can see so.
+    /// The perception cannot be created.
     #[error(transparent)]
-    Sight(#[from] SightError),
-    /// An episode can't be played.
+    Perception(#[from] PerceptionError),
+    /// An episode cannot be played.
     #[error(transparent)]
     Rollout(#[from] RolloutError),
-    /// The file system refuses.
+    /// A file operation failed.
     #[error(transparent)]
     File(#[from] FileError),
-    /// There is nothing to learn from.
+    /// There are no windows.
     #[error("there are no windows; play more episodes")]
     Empty,
-    /// A file is no file of windows.
+    /// The file is not a file of windows.
     #[error("{path}: {problem}")]
     Format {
-        /// Where.
+        /// The file.
         path: std::path::PathBuf,
-        /// What is wrong.
+        /// Description of the problem.
         problem: String,
     },
 }
 
-/// Returns the windows of one episode, thinned out; some of them if `stop` is raised meanwhile.
-fn of_episode(
-    part: Part,
-    rules: &CollectRules,
-    sight: &dyn Sight,
+/// Returns a random sample of the windows of one episode; incomplete if `stop` is raised.
+fn windows_of_episode(
+    split: DatasetSplit,
+    config: &WindowCollectionConfig,
+    perception: &dyn PerceptionFactory,
     index: u32,
     stop: &AtomicBool,
-) -> Result<Vec<Sample>, CollectError> {
-    let task = rules.tasks[index as usize % rules.tasks.len()];
-    let seed = first_seed(part) + u64::from(index);
+) -> Result<Vec<LabeledWindow>, CollectError> {
+    let task = config.tasks[index as usize % config.tasks.len()];
+    let seed = SeedRange::opponent_model(split).first + u64::from(index);
     let id = format!("{}/gen/{seed}", task.name());
     let episode = find_episode(&id).map_err(RolloutError::from)?;
     let setup = episode.setup();
     let planner = RuleSet::PAPER.planner;
-    let overheard: Arc<Mutex<Option<Plan>>> = Arc::default();
+    let partner_plan: Arc<Mutex<Option<Plan>>> = Arc::default();
     let persona = setup.people.first().map_or(task.info().partner.persona, |p| p.persona);
-    let partner = Overheard {
+    let partner = PlanReporter {
         policy: partners::policy(persona, task.info().scene),
-        plan: Arc::clone(&overheard),
+        plan: Arc::clone(&partner_plan),
     };
-    let partner = Helper { mind: Box::new(Mind::new(partner, planner)), grants: PARTNER_GRANTS };
-    let body = setup.people.first().map_or_else(|| persona.capability(), Person::capability);
-    let notes: Arc<Mutex<Vec<Sample>>> = Arc::default();
-    let truth = Truth { overheard, limits: limits_of(&body), episode: index };
-    let grants = sight.grants(Grants { behavior: rules.granted, ..Grants::PLANNER });
-    let seeing = Seeing { sight, grants, truth, notes: Arc::clone(&notes) };
-    // The paper's windows are seen by a random helper; RHP stays nearer to its partner.
+    let partner =
+        Helper { agent: Box::new(PlanningAgent::new(partner, planner)), grants: PARTNER_GRANTS };
+    let capability =
+        setup.people.first().map_or_else(|| persona.capability(), AgentSpec::capability);
+    let log: Arc<Mutex<Vec<LabeledWindow>>> = Arc::default();
+    let truth = GroundTruth { partner_plan, limits: limits(&capability), episode: index };
+    let grants = perception.grants(Grants { behavior: config.granted, ..Grants::PLANNER });
+    let recording = Recording { perception, grants, truth, log: Arc::clone(&log) };
+    // The paper's windows come from a random helper; RHP stays closer to its partner.
     let helper = if index.is_multiple_of(2) {
-        seeing.drive(Random::default())
+        recording.into_helper(RandomPolicy::default())
     } else {
-        seeing.drive(RulePolicy::new(RuleProfile::RHP))
+        recording.into_helper(RulePolicy::new(RuleProfile::RHP))
     };
     let config = EpisodeConfig {
-        episode: &episode,
-        seed: 0,
-        rules: RuleSet::PAPER,
-        helper: "watching",
-        partner: None,
-        image_size: Some(rules.image_size),
-        appearance: Appearance::Canonical,
+        image_size: Some(config.image_size),
+        ..EpisodeConfig::new(&episode, "watching")
     };
-    let minds = Minds::of(Some(seeded_by_episode(helper, &config)), Some(partner));
-    let mut env = Env::new(config, minds).map_err(RolloutError::from)?;
+    let agents = EpisodeAgents::new(Some(seeded_by_episode(helper, &config)), Some(partner));
+    let mut env = Env::new(config, agents).map_err(RolloutError::from)?;
     env.run(stop, None, &mut |_| Ok::<(), AgentError>(())).map_err(RolloutError::from)?;
-    let mut samples = std::mem::take(&mut *notes.lock().unwrap_or_else(PoisonError::into_inner));
-    // Any of them, as the goals of an episode's beginning are not those of its end.
-    Stream::new(seed, "windows", 0).shuffle(&mut samples);
-    let mut counts = [0usize; Goal::ALL.len()];
+    let mut samples = std::mem::take(&mut *log.lock().unwrap_or_else(PoisonError::into_inner));
+    // Windows are drawn at random, since goals differ between the start and the end of an episode.
+    RngStream::new(seed, "windows", 0).shuffle(&mut samples);
+    let mut counts = [0usize; OpponentGoal::ALL.len()];
     samples.retain(|sample| {
         counts[sample.goal.index()] += 1;
-        counts[sample.goal.index()] <= OF_EPISODE
+        counts[sample.goal.index()] <= MAX_PER_EPISODE
     });
     Ok(samples)
 }
 
-/// The partner's own policy, whose plan somebody may ask for.
-struct Overheard {
+/// The partner's policy, which shares its current plan.
+struct PlanReporter {
     policy: RulePolicy,
     plan: Arc<Mutex<Option<Plan>>>,
 }
 
-impl Overheard {
-    fn tell(&self, plan: Plan) {
+impl PlanReporter {
+    fn report(&self, plan: Plan) {
         *self.plan.lock().unwrap_or_else(PoisonError::into_inner) = Some(plan);
     }
 }
 
-impl Policy for Overheard {
+impl Policy for PlanReporter {
     fn reset(&mut self, briefing: &Briefing) {
         Policy::reset(&mut self.policy, briefing);
     }
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
         let plan = self.policy.choose(context, valid)?;
-        self.tell(plan);
+        self.report(plan);
         Ok(plan)
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, is_news: bool) -> bool {
-        self.tell(*current);
+        self.report(*current);
         self.policy.reconsiders(context, current, is_news)
     }
 }
 
-/// What is true of the partner.
-struct Truth {
-    overheard: Arc<Mutex<Option<Plan>>>,
+/// Ground truth about the partner.
+struct GroundTruth {
+    partner_plan: Arc<Mutex<Option<Plan>>>,
     limits: [f32; N_LIMITS],
     episode: u32,
 }
 
-/// What a helper that notes windows has besides its policy.
-struct Seeing<'a> {
-    sight: &'a dyn Sight,
+/// Data that a recording helper has besides its policy.
+struct Recording<'a> {
+    perception: &'a dyn PerceptionFactory,
     grants: Grants,
-    truth: Truth,
-    notes: Arc<Mutex<Vec<Sample>>>,
+    truth: GroundTruth,
+    log: Arc<Mutex<Vec<LabeledWindow>>>,
 }
 
-impl Seeing<'_> {
-    fn drive<P: Policy>(self, driver: P) -> Helper {
-        let Seeing { sight, grants, truth, notes } = self;
-        let window = Window::default();
-        let watching = Watching { driver, window, briefing: None, looks: 0, truth, notes };
-        let who = (AgentId::PARTNER, grants);
-        let mind = Mind::watching(watching, RuleSet::PAPER.planner, sight, who);
-        Helper { mind: Box::new(mind), grants }
+impl Recording<'_> {
+    fn into_helper<P: Policy>(self, policy: P) -> Helper {
+        let Recording { perception, grants, truth, log } = self;
+        let window = ObservationHistory::default();
+        let recording_policy =
+            RecordingPolicy { policy, window, briefing: None, n_observations: 0, truth, log };
+        let agent = PlanningAgent::with_watched(
+            recording_policy,
+            RuleSet::PAPER.planner,
+            perception,
+            AgentId::PARTNER,
+            grants,
+        );
+        Helper { agent: Box::new(agent), grants }
     }
 }
 
-/// A policy that notes windows besides.
-struct Watching<P> {
-    driver: P,
-    window: Window,
+/// Policy that also records windows.
+struct RecordingPolicy<P> {
+    policy: P,
+    window: ObservationHistory,
     briefing: Option<Briefing>,
-    looks: usize,
-    truth: Truth,
-    notes: Arc<Mutex<Vec<Sample>>>,
+    n_observations: usize,
+    truth: GroundTruth,
+    log: Arc<Mutex<Vec<LabeledWindow>>>,
 }
 
-impl<P: Policy> Policy for Watching<P> {
+impl<P: Policy> Policy for RecordingPolicy<P> {
     fn reset(&mut self, briefing: &Briefing) {
-        self.driver.reset(briefing);
+        self.policy.reset(briefing);
         self.window.reset(briefing);
-        (self.briefing, self.looks) = (Some(briefing.clone()), 0);
+        (self.briefing, self.n_observations) = (Some(briefing.clone()), 0);
     }
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
-        self.driver.choose(context, valid)
+        self.policy.choose(context, valid)
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, is_news: bool) -> bool {
-        self.driver.reconsiders(context, current, is_news)
+        self.policy.reconsiders(context, current, is_news)
     }
 
-    fn look(&mut self, _: &Observation, memory: &Memory, behavior: &BehaviorLog) {
+    fn observe(&mut self, _: &Observation, memory: &Memory, behavior: &BehaviorLog) {
         let Some(briefing) = &self.briefing else { return };
-        self.window.look(memory, briefing);
-        self.looks += 1;
-        if !self.looks.is_multiple_of(EVERY) {
+        self.window.add(memory, briefing);
+        self.n_observations += 1;
+        if !self.n_observations.is_multiple_of(STRIDE) {
             return;
         }
-        let plan = *self.truth.overheard.lock().unwrap_or_else(PoisonError::into_inner);
+        let plan = *self.truth.partner_plan.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(plan) = plan else { return };
-        let goal = if self.window.has_partner() { Goal::of(&plan) } else { Goal::Unknown };
-        let class = plan.subject().filter(|_| goal == Goal::Pick).map(|it| it.class);
-        let sample = Sample {
-            window: self.window.decision(memory, briefing, behavior),
+        let goal = if self.window.has_partner() {
+            OpponentGoal::from_plan(&plan)
+        } else {
+            OpponentGoal::Unknown
+        };
+        let class =
+            plan.subject().filter(|_| goal == OpponentGoal::Pick).map(|subject| subject.class);
+        let sample = LabeledWindow {
+            window: self.window.encode(memory, briefing, behavior),
             goal,
             target: class.and_then(|c| self.window.classes().iter().position(|k| *k == c)),
             limits: self.truth.limits,
             episode: self.truth.episode,
         };
-        self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(sample);
+        self.log.lock().unwrap_or_else(PoisonError::into_inner).push(sample);
     }
 }
 
-/// No file of windows is larger, bytes.
-const MOST_BYTES: u64 = 1 << 33;
+/// Maximum size of a file of windows, bytes.
+const MAX_BYTES: u64 = 1 << 33;
 
-/// Writes windows as a safetensors file, a row each: `state` (44 numbers), `n_choices`, `goal` (by [`Goal::index`]),
-/// `target` (a choice, or -1), `limits` (5), `episode`; and `choices` (31 numbers), those of one window after the other.
+/// Writes windows as a safetensors file with one row per window: `state` (44 features),
+/// `n_choices`, `goal` (by [`OpponentGoal::index`]), `target` (candidate index or -1), `limits`
+/// (5), `episode`. The rows of `choices` (31 features) are the candidates of all windows in order.
 ///
 /// # Errors
-/// If the file system refuses.
-pub fn write(path: &Path, samples: &[Sample]) -> Result<(), FileError> {
-    let of_f32 = |numbers: &mut dyn Iterator<Item = f32>| -> Vec<u8> {
-        numbers.flat_map(f32::to_le_bytes).collect()
+/// If the file cannot be written.
+pub fn write(path: &Path, samples: &[LabeledWindow]) -> Result<(), FileError> {
+    let f32_bytes = |values: &mut dyn Iterator<Item = f32>| -> Vec<u8> {
+        values.flat_map(f32::to_le_bytes).collect()
     };
-    let of_i32 = |numbers: &mut dyn Iterator<Item = i32>| -> Vec<u8> {
-        numbers.flat_map(i32::to_le_bytes).collect()
+    let i32_bytes = |values: &mut dyn Iterator<Item = i32>| -> Vec<u8> {
+        values.flat_map(i32::to_le_bytes).collect()
     };
     let n = samples.len();
-    let n_choices: usize = samples.iter().map(|s| s.window.n_choices).sum();
-    let target = |s: &Sample| s.target.map_or(-1, |k| k as i32);
-    let lists = [
-        ("choices", Dtype::F32, vec![n_choices, N_CLASS], {
-            of_f32(&mut samples.iter().flat_map(|s| s.window.choices.iter().copied()))
+    let n_candidates: usize = samples.iter().map(|s| s.window.n_candidates).sum();
+    let target = |s: &LabeledWindow| s.target.map_or(-1, |k| k as i32);
+    let tensors = [
+        ("choices", Dtype::F32, vec![n_candidates, N_CLASS], {
+            f32_bytes(&mut samples.iter().flat_map(|s| s.window.candidates.iter().copied()))
         }),
-        ("episode", Dtype::I32, vec![n], of_i32(&mut samples.iter().map(|s| s.episode as i32))),
-        ("goal", Dtype::I32, vec![n], of_i32(&mut samples.iter().map(|s| s.goal.index() as i32))),
+        ("episode", Dtype::I32, vec![n], i32_bytes(&mut samples.iter().map(|s| s.episode as i32))),
+        (
+            "goal",
+            Dtype::I32,
+            vec![n],
+            i32_bytes(&mut samples.iter().map(|s| s.goal.index() as i32)),
+        ),
         ("limits", Dtype::F32, vec![n, N_LIMITS], {
-            of_f32(&mut samples.iter().flat_map(|s| s.limits))
+            f32_bytes(&mut samples.iter().flat_map(|s| s.limits))
         }),
         ("n_choices", Dtype::I32, vec![n], {
-            of_i32(&mut samples.iter().map(|s| s.window.n_choices as i32))
+            i32_bytes(&mut samples.iter().map(|s| s.window.n_candidates as i32))
         }),
         ("state", Dtype::F32, vec![n, N_STATE], {
-            of_f32(&mut samples.iter().flat_map(|s| s.window.state.iter().copied()))
+            f32_bytes(&mut samples.iter().flat_map(|s| s.window.state.iter().copied()))
         }),
-        ("target", Dtype::I32, vec![n], of_i32(&mut samples.iter().map(target))),
+        ("target", Dtype::I32, vec![n], i32_bytes(&mut samples.iter().map(target))),
     ];
-    let views = lists.iter().map(|(name, dtype, shape, bytes)| {
+    let views = tensors.iter().map(|(name, dtype, shape, bytes)| {
         let view = TensorView::new(*dtype, shape.clone(), bytes);
-        (*name, view.expect("as many bytes as its shape says"))
+        (*name, view.expect("the length matches the shape"))
     });
-    let bytes = serialize(views, None).expect("names and shapes are small");
-    write_whole(path, &bytes)
+    let bytes = serialize(views, None).expect("names and shapes can be encoded");
+    write_atomically(path, &bytes)
 }
 
-/// Reads windows that [`write()`] wrote into the folder of a training.
+/// Reads windows that [`write()`] wrote into a training folder.
 ///
 /// # Errors
-/// If the file is a link, can't be read, or isn't one.
-pub fn read(path: &Path) -> Result<Vec<Sample>, CollectError> {
-    parsed(path, &read_bounded(path, MOST_BYTES)?)
+/// If the file is a link, cannot be read, or holds no windows.
+pub fn read(path: &Path) -> Result<Vec<LabeledWindow>, CollectError> {
+    parse_file(path, &read_bounded(path, MAX_BYTES)?)
 }
 
 /// Reads windows from a file that a user named, which may be a link.
 ///
 /// # Errors
-/// If the file can't be read, or isn't one.
-pub fn read_given(path: &Path) -> Result<Vec<Sample>, CollectError> {
-    parsed(path, &read_user_file(path, MOST_BYTES)?)
+/// If the file cannot be read or holds no windows.
+pub fn read_from_user_path(path: &Path) -> Result<Vec<LabeledWindow>, CollectError> {
+    parse_file(path, &read_user_file(path, MAX_BYTES)?)
 }
 
-fn parsed(path: &Path, bytes: &[u8]) -> Result<Vec<Sample>, CollectError> {
+fn parse_file(path: &Path, bytes: &[u8]) -> Result<Vec<LabeledWindow>, CollectError> {
     parse(bytes).map_err(|problem| CollectError::Format { path: path.to_owned(), problem })
 }
 
-fn parse(bytes: &[u8]) -> Result<Vec<Sample>, String> {
-    let file = SafeTensors::deserialize(bytes).map_err(|e| format!("no file of windows: {e}"))?;
-    let list = |name: &str, dtype: Dtype, columns: usize| -> Result<Vec<[u8; 4]>, String> {
-        let tensor = file.tensor(name).map_err(|_| format!("there is no `{name}`"))?;
-        let width: usize = tensor.shape().iter().skip(1).product();
-        if tensor.dtype() != dtype || width != columns {
-            let (found, shape) = (tensor.dtype(), tensor.shape());
+fn parse(bytes: &[u8]) -> Result<Vec<LabeledWindow>, String> {
+    let file =
+        SafeTensors::deserialize(bytes).map_err(|e| format!("not a file of windows: {e}"))?;
+    let tensor = |name: &str, dtype: Dtype, columns: usize| -> Result<Vec<[u8; 4]>, String> {
+        let tensor_view = file.tensor(name).map_err(|_| format!("`{name}` is missing"))?;
+        let width: usize = tensor_view.shape().iter().skip(1).product();
+        if tensor_view.dtype() != dtype || width != columns {
+            let (found, shape) = (tensor_view.dtype(), tensor_view.shape());
             return Err(format!(
-                "`{name}` is {found:?} {shape:?}; {dtype:?} [n, {columns}] is needed"
+                "`{name}` is {found:?} {shape:?}, expected {dtype:?} [n, {columns}]"
             ));
         }
-        Ok(tensor.data().as_chunks::<4>().0.to_vec())
+        Ok(tensor_view.data().as_chunks::<4>().0.to_vec())
     };
     let f32s = |name, columns| -> Result<Vec<f32>, String> {
-        Ok(list(name, Dtype::F32, columns)?.into_iter().map(f32::from_le_bytes).collect())
+        Ok(tensor(name, Dtype::F32, columns)?.into_iter().map(f32::from_le_bytes).collect())
     };
     let i32s = |name| -> Result<Vec<i32>, String> {
-        Ok(list(name, Dtype::I32, 1)?.into_iter().map(i32::from_le_bytes).collect())
+        Ok(tensor(name, Dtype::I32, 1)?.into_iter().map(i32::from_le_bytes).collect())
     };
-    let (state, choices) = (f32s("state", N_STATE)?, f32s("choices", N_CLASS)?);
+    let (state, candidates) = (f32s("state", N_STATE)?, f32s("choices", N_CLASS)?);
     let limits = f32s("limits", N_LIMITS)?;
-    if !state.iter().chain(&choices).chain(&limits).all(|x| x.is_finite()) {
-        return Err("it has a number that is not finite".to_owned());
+    if !state.iter().chain(&candidates).chain(&limits).all(|x| x.is_finite()) {
+        return Err("a value is not finite".to_owned());
     }
-    let [n_choices, goals] = [i32s("n_choices")?, i32s("goal")?];
+    let [n_candidates, goals] = [i32s("n_choices")?, i32s("goal")?];
     let [targets, episodes] = [i32s("target")?, i32s("episode")?];
-    let n = n_choices.len();
+    let n = n_candidates.len();
     let lengths = [state.len() / N_STATE, limits.len() / N_LIMITS];
-    let is_whole = lengths.into_iter().chain([goals.len(), targets.len(), episodes.len()]);
-    let total: i64 = n_choices.iter().map(|n| i64::from(*n).max(0)).sum();
-    if is_whole.into_iter().any(|len| len != n) || total != (choices.len() / N_CLASS) as i64 {
-        return Err("its lists are of different lengths".to_owned());
+    let all_lengths = lengths.into_iter().chain([goals.len(), targets.len(), episodes.len()]);
+    let total: i64 = n_candidates.iter().map(|n| i64::from(*n).max(0)).sum();
+    if all_lengths.into_iter().any(|len| len != n) || total != (candidates.len() / N_CLASS) as i64 {
+        return Err("its tensors have different lengths".to_owned());
     }
-    let mut choices = choices.chunks_exact(N_CLASS);
+    let mut candidates = candidates.chunks_exact(N_CLASS);
     (0..n)
         .map(|k| {
-            let n_choices = n_choices[k].max(0) as usize;
-            let goal = usize::try_from(goals[k]).ok().and_then(|g| Goal::ALL.get(g).copied());
+            let n_candidates = n_candidates[k].max(0) as usize;
+            let goal =
+                usize::try_from(goals[k]).ok().and_then(|g| OpponentGoal::ALL.get(g).copied());
             let target = usize::try_from(targets[k]).ok();
-            if target.is_some_and(|t| t >= n_choices) {
-                return Err(format!("target {} of window {k} is no choice", targets[k]));
+            if target.is_some_and(|t| t >= n_candidates) {
+                return Err(format!("target {} of window {k} is not a candidate", targets[k]));
             }
-            let mut of_window = [0.0; N_LIMITS];
-            of_window.copy_from_slice(&limits[k * N_LIMITS..][..N_LIMITS]);
-            Ok(Sample {
-                window: Decision {
+            let mut window_limits = [0.0; N_LIMITS];
+            window_limits.copy_from_slice(&limits[k * N_LIMITS..][..N_LIMITS]);
+            Ok(LabeledWindow {
+                window: CandidateSet {
                     state: state[k * N_STATE..][..N_STATE].to_vec(),
-                    choices: choices.by_ref().take(n_choices).flatten().copied().collect(),
-                    n_choices,
+                    candidates: candidates.by_ref().take(n_candidates).flatten().copied().collect(),
+                    n_candidates,
                 },
-                goal: goal.ok_or_else(|| format!("goal {} of window {k} is none", goals[k]))?,
+                goal: goal
+                    .ok_or_else(|| format!("goal {} of window {k} is not a goal", goals[k]))?,
                 target,
-                limits: of_window,
+                limits: window_limits,
                 episode: episodes[k].max(0) as u32,
             })
         })

@@ -1,102 +1,103 @@
-//! The opponent model: a network that reads a window.
+//! Network of the opponent model.
 
 use chaic_core::geom::math;
 use chaic_nn::Pass;
 use chaic_nn::weights::{self, WeightsError};
 
 use super::window::{N_CLASS, N_STATE};
-use super::{Goal, N_LIMITS};
-use crate::actor_critic::{ActorCritic as _, Said, log_softmax};
-use crate::choice_network::{ChoiceNetwork, Decision};
+use super::{N_LIMITS, OpponentGoal};
+use crate::actor_critic::{ActorCritic as _, ActorCriticOutput, log_softmax};
+use crate::candidate_scorer::{CandidateScorer, CandidateSet};
 
-/// How many kinds of goals there are.
-pub const N_GOALS: usize = Goal::ALL.len();
+/// Number of goals.
+pub const N_GOALS: usize = OpponentGoal::ALL.len();
 
-/// What files of weights say that they are.
+/// Kind in weights files.
 pub const KIND: &str = "chaic opponent model 1";
-/// Width of the network's layers.
+/// Width of the hidden layers.
 const WIDTH: usize = 96;
 
-/// The network without its numbers: choices are the classes that the partner may be after.
-pub fn network() -> ChoiceNetwork {
-    ChoiceNetwork::new((N_STATE, N_CLASS), WIDTH, N_GOALS + N_LIMITS)
+/// Creates the network architecture. Candidates are the classes that the partner may be after.
+pub fn network() -> CandidateScorer {
+    CandidateScorer::new(N_STATE, N_CLASS, WIDTH, N_GOALS + N_LIMITS)
 }
 
-/// What is believed of a partner.
+/// Prediction about the partner.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Opinion {
-    /// How likely each goal is, by [`Goal::index`].
+pub struct OpponentPrediction {
+    /// Probability of each goal, by [`OpponentGoal::index`].
     pub goals: [f32; N_GOALS],
-    /// How likely it is to be after which of the window's classes, if it is about to take something.
+    /// Probability of each class of the window to be the partner's target, given the goal to pick
+    /// up.
     pub targets: Vec<f32>,
-    /// What it can't do, as [`super::limits_of`] says it.
+    /// Physical limits, as [`limits`](super::limits) defines them.
     pub limits: [f32; N_LIMITS],
 }
 
-/// What the network says, taken apart.
+/// Decoded outputs of the state head.
 pub(crate) struct Heads {
-    /// The logarithm of each goal's probability.
+    /// Log-probability of each goal.
     pub log_goals: Vec<f32>,
     /// Limits, between 0 and 1.
     pub limits: [f32; N_LIMITS],
 }
 
 impl Heads {
-    pub(crate) fn of(said: &Said) -> Heads {
-        let (goals, limits) = said.of_state.split_at(N_GOALS);
-        let mut numbers = [0.0; N_LIMITS];
-        for (number, x) in numbers.iter_mut().zip(limits) {
-            *number = 1.0 / (1.0 + math::exp(-x));
+    pub(crate) fn new(output: &ActorCriticOutput) -> Heads {
+        let (goals, limits) = output.values.split_at(N_GOALS);
+        let mut limit_values = [0.0; N_LIMITS];
+        for (value, x) in limit_values.iter_mut().zip(limits) {
+            *value = 1.0 / (1.0 + math::exp(-x));
         }
-        Heads { log_goals: log_softmax(goals), limits: numbers }
+        Heads { log_goals: log_softmax(goals), limits: limit_values }
     }
 }
 
-/// The network with its numbers.
+/// Network with parameter values.
 #[derive(Clone, Debug)]
 pub struct OpponentModel {
-    network: ChoiceNetwork,
-    numbers: Vec<f32>,
+    network: CandidateScorer,
+    parameters: Vec<f32>,
 }
 
 impl OpponentModel {
-    /// The network with these numbers.
+    /// Creates a model with these parameters.
     ///
     /// # Panics
-    /// If there are more or fewer than it has.
-    pub fn new(numbers: Vec<f32>) -> OpponentModel {
+    /// If their number differs from that of the network.
+    pub fn new(parameters: Vec<f32>) -> OpponentModel {
         let network = network();
-        assert_eq!(numbers.len(), network.network.n_numbers());
-        OpponentModel { network, numbers }
+        assert_eq!(parameters.len(), network.network.n_parameters());
+        OpponentModel { network, parameters }
     }
 
-    /// The model in a file of weights.
+    /// Parses a weights file.
     ///
     /// # Errors
-    /// [`WeightsError`] if it isn't a whole file of such a network.
+    /// [`WeightsError`] if the file is incomplete or belongs to another network.
     pub fn from_bytes(bytes: &[u8]) -> Result<OpponentModel, WeightsError> {
-        let numbers = weights::from_bytes(&network().network, bytes, KIND)?;
-        Ok(OpponentModel::new(numbers))
+        let parameters = weights::from_bytes(&network().network, bytes, KIND)?;
+        Ok(OpponentModel::new(parameters))
     }
 
-    /// Its numbers.
-    pub fn numbers(&self) -> &[f32] {
-        &self.numbers
+    /// Returns the parameters.
+    pub fn parameters(&self) -> &[f32] {
+        &self.parameters
     }
 
-    /// Working space.
+    /// Creates the buffers of a pass.
     pub fn pass(&self) -> Pass {
         self.network.pass()
     }
 
-    /// What it believes of a partner.
-    pub fn opinion(&self, window: &Decision, pass: &mut Pass) -> Opinion {
+    /// Predicts goal, target and limits of the partner.
+    pub fn predict(&self, window: &CandidateSet, pass: &mut Pass) -> OpponentPrediction {
         let windows = std::iter::once(window);
-        let said = self.network.forward(&self.numbers, windows, pass).remove(0);
-        let Heads { log_goals, limits } = Heads::of(&said);
+        let output = self.network.forward(&self.parameters, windows, pass).remove(0);
+        let Heads { log_goals, limits } = Heads::new(&output);
         let mut goals = [0.0; N_GOALS];
         goals.iter_mut().zip(log_goals).for_each(|(p, l)| *p = math::exp(l));
-        let targets = said.log_probabilities.iter().map(|l| math::exp(*l)).collect();
-        Opinion { goals, targets, limits }
+        let targets = output.log_probs.iter().map(|l| math::exp(*l)).collect();
+        OpponentPrediction { goals, targets, limits }
     }
 }

@@ -1,52 +1,57 @@
-//! How good an opponent model is.
+//! Evaluation of an opponent model.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::Serialize;
 
-use super::collect::Sample;
+use super::collect::LabeledWindow;
 use super::network::{N_GOALS, OpponentModel};
-use super::{Goal, LIMITS, N_LIMITS};
+use super::{LIMITS, N_LIMITS, OpponentGoal};
 
-/// A mean with its uncertainty.
+/// Mean with its uncertainty.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Mean {
-    /// The mean over windows.
+pub struct MeanEstimate {
+    /// Mean over windows.
     pub mean: f64,
-    /// Its standard error, with the windows of an episode as one cluster.
+    /// Standard error, with the windows of an episode as one cluster.
     pub standard_error: f64,
-    /// How many windows.
+    /// Number of windows.
     pub n: usize,
 }
 
-/// What a model says of windows, beside what was true.
+/// Predictions of a model compared with the truth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Report {
-    /// Share of windows whose goal is told right, each goal counting as much.
-    pub goal_accuracy: Mean,
-    /// Share of windows of somebody about to take something whose class is told right.
-    pub target_accuracy: Mean,
-    /// Mean square error of the five limits.
-    pub limits_error: Mean,
-    /// The same for each limit.
-    pub error_of_limit: BTreeMap<&'static str, f64>,
-    /// Of each goal (rows: true, in the order of [`Goal::ALL`]) how often which was told.
+pub struct OpponentReport {
+    /// Mean over goals of the fraction of their windows that are classified correctly.
+    pub goal_accuracy: MeanEstimate,
+    /// Fraction of windows with the goal to pick up whose class is predicted correctly.
+    pub target_accuracy: MeanEstimate,
+    /// Mean squared error of the five limits.
+    pub limits_error: MeanEstimate,
+    /// Mean squared error of each limit.
+    #[serde(rename = "error_of_limit")]
+    pub error_by_limit: BTreeMap<&'static str, f64>,
+    /// Confusion matrix (rows: truth), in the order of [`OpponentGoal::ALL`].
     pub confusion: [[usize; N_GOALS]; N_GOALS],
-    /// How far the goal's probability is from how often it is right: expected calibration error over ten bins.
+    /// Expected calibration error of the goal probabilities over ten bins.
     pub calibration_error: f64,
 }
 
-/// Bins of probabilities.
+/// Number of bins of probabilities.
 const N_BINS: usize = 10;
 
-impl Report {
-    /// Returns that of a model; `None` if `stop` is raised meanwhile.
-    pub fn of(model: &OpponentModel, samples: &[Sample], stop: &AtomicBool) -> Option<Report> {
+impl OpponentReport {
+    /// Evaluates a model; `None` if `stop` is raised.
+    pub fn new(
+        model: &OpponentModel,
+        samples: &[LabeledWindow],
+        stop: &AtomicBool,
+    ) -> Option<OpponentReport> {
         let mut pass = model.pass();
         let mut confusion = [[0; N_GOALS]; N_GOALS];
         let (mut goals, mut targets, mut errors) = (Vec::new(), Vec::new(), Vec::new());
-        let mut of_limit = [0.0; N_LIMITS];
+        let mut limit_errors = [0.0; N_LIMITS];
         let mut bins = [(0.0, 0.0, 0.0); N_BINS];
         let mut counts = [0.0; N_GOALS];
         samples.iter().for_each(|s| counts[s.goal.index()] += 1.0);
@@ -55,42 +60,45 @@ impl Report {
             if stop.load(Ordering::Relaxed) {
                 return None;
             }
-            let opinion = model.opinion(&sample.window, &mut pass);
-            let told = best(&opinion.goals);
+            let prediction = model.predict(&sample.window, &mut pass);
+            let predicted = argmax(&prediction.goals);
             let goal = sample.goal.index();
-            confusion[goal][told] += 1;
-            let is_right = f64::from(u8::from(told == goal));
+            confusion[goal][predicted] += 1;
+            let is_correct = f64::from(u8::from(predicted == goal));
             let weight = samples.len() as f64 / (counts[goal] * n_goals);
-            goals.push((sample.episode, is_right * weight));
-            let sure = f64::from(opinion.goals[told]);
-            let bin = &mut bins[((sure * N_BINS as f64) as usize).min(N_BINS - 1)];
-            *bin = (bin.0 + 1.0, bin.1 + sure, bin.2 + is_right);
+            goals.push((sample.episode, is_correct * weight));
+            let confidence = f64::from(prediction.goals[predicted]);
+            let bin = &mut bins[((confidence * N_BINS as f64) as usize).min(N_BINS - 1)];
+            *bin = (bin.0 + 1.0, bin.1 + confidence, bin.2 + is_correct);
             if let Some(target) = sample.target {
-                let is_right = f64::from(u8::from(best(&opinion.targets) == target));
-                targets.push((sample.episode, is_right));
+                let is_correct = f64::from(u8::from(argmax(&prediction.targets) == target));
+                targets.push((sample.episode, is_correct));
             }
             let mut sum = 0.0;
-            for (k, (found, truth)) in opinion.limits.iter().zip(&sample.limits).enumerate() {
-                let square = f64::from((found - truth) * (found - truth));
-                of_limit[k] += square / samples.len() as f64;
+            for (k, (predicted_limit, truth)) in
+                prediction.limits.iter().zip(&sample.limits).enumerate()
+            {
+                let square = f64::from((predicted_limit - truth) * (predicted_limit - truth));
+                limit_errors[k] += square / samples.len() as f64;
                 sum += square / N_LIMITS as f64;
             }
             errors.push((sample.episode, sum));
         }
-        let off = bins.iter().map(|(_, sure, right)| f64::abs(sure - right)).sum::<f64>();
-        Some(Report {
-            goal_accuracy: mean(&goals),
-            target_accuracy: mean(&targets),
-            limits_error: mean(&errors),
-            error_of_limit: LIMITS.into_iter().zip(of_limit).collect(),
+        let gap =
+            bins.iter().map(|(_, confidence, correct)| f64::abs(confidence - correct)).sum::<f64>();
+        Some(OpponentReport {
+            goal_accuracy: clustered_mean(&goals),
+            target_accuracy: clustered_mean(&targets),
+            limits_error: clustered_mean(&errors),
+            error_by_limit: LIMITS.into_iter().zip(limit_errors).collect(),
             confusion,
-            calibration_error: off / samples.len().max(1) as f64,
+            calibration_error: gap / samples.len().max(1) as f64,
         })
     }
 
-    /// The report in words.
+    /// Returns the report as text.
     pub fn text(&self) -> String {
-        let line = |name: &str, m: &Mean| {
+        let line = |name: &str, m: &MeanEstimate| {
             format!(
                 "{name:<18} {:.3} ± {:.3}  ({} windows)\n",
                 m.mean,
@@ -102,46 +110,46 @@ impl Report {
             + &line("target accuracy", &self.target_accuracy)
             + &line("limits, mean sq.", &self.limits_error);
         text += &format!("calibration error  {:.3}\n\n{:<9}", self.calibration_error, "true");
-        for goal in Goal::ALL {
+        for goal in OpponentGoal::ALL {
             text += &format!("{:>9}", goal.name());
         }
-        for goal in Goal::ALL {
+        for goal in OpponentGoal::ALL {
             text += &format!("\n{:<9}", goal.name());
             for n in self.confusion[goal.index()] {
                 text += &format!("{n:>9}");
             }
         }
         text += "\n\n";
-        for (name, error) in &self.error_of_limit {
+        for (name, error) in &self.error_by_limit {
             text += &format!("{name:<15} {error:.3}\n");
         }
         text
     }
 }
 
-/// The place of the largest, of equal ones the first.
-fn best(numbers: &[f32]) -> usize {
+/// Returns the index of the maximum, the first of equal ones.
+fn argmax(values: &[f32]) -> usize {
     let mut best = 0;
-    for (k, x) in numbers.iter().enumerate() {
-        if *x > numbers[best] {
+    for (k, x) in values.iter().enumerate() {
+        if *x > values[best] {
             best = k;
         }
     }
     best
 }
 
-/// The mean of numbers that come in clusters, with the standard error of a ratio of cluster sums.
-fn mean(of: &[(u32, f64)]) -> Mean {
-    let n = of.len();
+/// Returns the mean of clustered values, with the standard error of a ratio of cluster sums.
+fn clustered_mean(samples: &[(u32, f64)]) -> MeanEstimate {
+    let n = samples.len();
     if n == 0 {
-        return Mean::default();
+        return MeanEstimate::default();
     }
-    let mean = of.iter().map(|(_, x)| x).sum::<f64>() / n as f64;
+    let mean = samples.iter().map(|(_, x)| x).sum::<f64>() / n as f64;
     let mut clusters: BTreeMap<u32, f64> = BTreeMap::new();
-    of.iter().for_each(|(cluster, x)| *clusters.entry(*cluster).or_default() += x - mean);
+    samples.iter().for_each(|(cluster, x)| *clusters.entry(*cluster).or_default() += x - mean);
     let k = clusters.len() as f64;
     let square: f64 = clusters.values().map(|sum| sum * sum).sum();
     let standard_error =
         if k > 1.0 { (square * k / (k - 1.0)).sqrt() / n as f64 } else { f64::INFINITY };
-    Mean { mean, standard_error, n }
+    MeanEstimate { mean, standard_error, n }
 }

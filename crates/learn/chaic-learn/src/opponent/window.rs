@@ -1,31 +1,31 @@
-//! What the opponent model reads: five observations of a helper in a row, as numbers of what it saw of its partner and
-//! of each class of things that the partner may be after.
+//! Input of the opponent model: five consecutive observations of a helper, encoded as features of
+//! the partner and of each class that the partner may be after.
 
 use std::collections::{BTreeMap, VecDeque};
 
 use chaic_agents::behavior::BehaviorLog;
-use chaic_agents::mapping::Thing;
+use chaic_agents::mapping::MappedObject;
 use chaic_agents::memory::Memory;
 use chaic_agents::track::{Intent, TrackId};
-use chaic_core::briefing::Relation;
-use chaic_core::geom::{horizontal_distance, xz};
+use chaic_core::briefing::CompanionRole;
+use chaic_core::geom::{horizontal_distance, to_xz};
 use chaic_core::{Action, AgentId, Briefing, ClassId, Frame, Role, Vec3};
 
 use super::is_pickable;
-use crate::choice_network::Decision;
-use crate::scales::{SETS, flag, fresh, share};
+use crate::candidate_scorer::CandidateSet;
+use crate::scales::{TARGET_SETS, flag, normalize_clamped, recency};
 
-/// Observations of a window (paper, appendix on learning).
+/// Number of observations in a window (paper, appendix on learning).
 pub const LENGTH: usize = 5;
 
-/// Numbers of the state.
-pub const STATE: [&str; 44] = [
-    "seen",
+/// Features of the state.
+pub const STATE_FEATURES: [&str; 44] = [
+    "visible_fraction",
     "is_in_view",
     "distance",
     "height",
-    "pace",
-    "pace_now",
+    "speed",
+    "last_speed",
     "goal_is_known",
     "goal_distance",
     "goal_approach",
@@ -33,425 +33,463 @@ pub const STATE: [&str; 44] = [
     "nearest_distance",
     "nearest_approach",
     "nearest_heading",
-    "holds",
+    "n_held",
     "holds_target",
     "holds_container",
     "holds_vehicle",
-    "holds_heavy",
-    "holds_is_fresh",
+    "holds_furniture",
+    "held_recency",
     "bicycle_is_near",
-    "last_was_pick",
+    "last_was_pick_up",
     "last_was_put_in",
     "last_was_put_on",
     "last_was_other",
-    "last_is_under_way",
-    "last_failed",
-    "last_is_fresh",
-    "took",
-    "failed",
-    "failed_lowest",
-    "failed_highest",
-    "failed_heaviest",
-    "took_lowest",
-    "took_highest",
-    "took_heaviest",
+    "last_is_in_progress",
+    "last_has_failed",
+    "last_recency",
+    "n_taken",
+    "n_failed",
+    "failed_min_height",
+    "failed_max_height",
+    "failed_max_mass",
+    "taken_min_height",
+    "taken_max_height",
+    "taken_max_mass",
     "took_obstacle",
-    "frame",
+    "time",
     "horizon",
-    "child",
+    "has_child",
     "moves_furniture",
     "fills_basket",
     "n_known",
-    "container_is_in_question",
+    "has_containers",
     "obstacle_is_known",
 ];
 
-/// Numbers of a class, before one for each set that it may belong to.
-pub const CLASS: [&str; 23] = [
-    "known",
+/// Features of a class, before one flag per target set.
+pub const CLASS_FEATURES: [&str; 23] = [
+    "n_known",
     "distance",
     "approach",
     "heading",
     "is_nearest",
-    "is_second",
-    "least_distance_seen",
-    "height",
-    "lowest",
+    "is_second_nearest",
+    "min_distance",
+    "top_height",
+    "bottom_height",
     "mass",
     "is_target",
     "is_container",
     "is_fragile",
     "is_obstacle",
     "is_furniture",
-    "in_view",
+    "is_in_view",
     "partner_holds",
-    "partner_took",
-    "partner_failed",
-    "last_was_about_it",
-    "last_failed",
-    "own",
-    "took_of_its_sets",
+    "partner_n_taken",
+    "partner_n_failed",
+    "is_last_object",
+    "last_has_failed",
+    "is_held_by_helper",
+    "partner_n_taken_same_sets",
 ];
 
-/// How many numbers a state has.
-pub const N_STATE: usize = STATE.len();
-/// How many numbers a class has.
-pub const N_CLASS: usize = CLASS.len() + SETS.len();
+/// Number of state features.
+pub const N_STATE: usize = STATE_FEATURES.len();
+/// Number of class features.
+pub const N_CLASS: usize = CLASS_FEATURES.len() + TARGET_SETS.len();
 
-const FAR_M: f32 = 10.0;
-const HIGH_M: f32 = 2.0;
-const HEAVY_KG: f32 = 20.0;
-const VERY_HEAVY_KG: f32 = 300.0;
-/// A change of distance within a window that counts as much as any, metres.
-const APPROACH_M: f32 = 1.0;
-/// A pace in a frame that counts as much as any, metres.
-const PACE_M: f32 = 0.05;
-/// A bicycle this near to somebody is that person's, metres.
-const BESIDE_M: f32 = 1.5;
+const DISTANCE_SCALE_M: f32 = 10.0;
+const HEIGHT_SCALE_M: f32 = 2.0;
+const MASS_SCALE_KG: f32 = 20.0;
+const FURNITURE_MASS_SCALE_KG: f32 = 300.0;
+/// Change of distance within a window at which the feature saturates, meters.
+const APPROACH_SCALE_M: f32 = 1.0;
+/// Speed at which the feature saturates, meters per frame.
+const SPEED_SCALE_M_PER_FRAME: f32 = 0.05;
+/// Maximum distance between a person and a bicycle that belongs to it, meters.
+const MAX_BICYCLE_DISTANCE_M: f32 = 1.5;
 
 /// One observation.
 #[derive(Clone, Debug)]
-struct Glimpse {
+struct Snapshot {
     frame: Frame,
-    /// Where the partner was, if it was in view.
+    /// Position of the partner, if visible.
     partner: Option<Vec3>,
-    /// How far the partner was from the nearest thing of each class, metres.
+    /// Distance between partner and nearest object of each class, meters.
     distances_m: Vec<f32>,
-    /// And from the goal place.
+    /// Distance between partner and goal place, meters.
     goal_m: f32,
 }
 
-/// The last observations of an episode, and what is known of heights of things that lay somewhere.
+/// Last observations of an episode, and heights of objects at rest.
 #[derive(Clone, Debug, Default)]
-pub struct Window {
+pub struct ObservationHistory {
     classes: Vec<ClassId>,
-    glimpses: VecDeque<Glimpse>,
-    /// Top of things when they were seen lying last, metres.
+    snapshots: VecDeque<Snapshot>,
+    /// Top of objects when they were last seen at rest, meters.
     tops_m: BTreeMap<TrackId, f32>,
 }
 
-impl Window {
-    /// Begins an episode.
+impl ObservationHistory {
+    /// Starts an episode.
     pub fn reset(&mut self, briefing: &Briefing) {
         let Briefing { possible_targets, containers, obstacles, .. } = briefing;
-        let all = possible_targets.iter().chain(containers).chain(obstacles);
-        let mut classes: Vec<ClassId> = all.copied().filter(|class| is_pickable(*class)).collect();
+        let classes = possible_targets.iter().chain(containers).chain(obstacles);
+        let mut classes: Vec<ClassId> =
+            classes.copied().filter(|class| is_pickable(*class)).collect();
         classes.sort_unstable();
         classes.dedup();
-        *self = Window { classes, ..Window::default() };
+        *self = ObservationHistory { classes, ..ObservationHistory::default() };
     }
 
-    /// The classes that the partner may be after, in the order of a decision's choices.
+    /// Returns the classes that the partner may be after, in the order of the candidates.
     pub fn classes(&self) -> &[ClassId] {
         &self.classes
     }
 
-    /// Whether the partner was in view in any of the last observations.
+    /// Returns whether the partner is visible in any observation of the window.
     pub fn has_partner(&self) -> bool {
-        self.glimpses.iter().any(|g| g.partner.is_some())
+        self.snapshots.iter().any(|s| s.partner.is_some())
     }
 
-    /// Takes in an observation, after the memory has.
-    pub fn look(&mut self, memory: &Memory, briefing: &Briefing) {
-        for thing in lying(memory) {
-            self.tops_m.insert(thing.track, thing.top_m);
+    /// Adds an observation, after the memory has.
+    pub fn add(&mut self, memory: &Memory, briefing: &Briefing) {
+        for object in resting_objects(memory) {
+            self.tops_m.insert(object.track, object.top_m);
         }
-        let partner = memory.companion(briefing, Relation::Partner).filter(|p| p.is_in_view);
+        let partner = memory.companion(briefing, CompanionRole::Partner).filter(|p| p.is_in_view);
         let partner = partner.map(|p| p.position_in_world);
         let distances_m = self.classes.iter().map(|class| {
-            let things = lying(memory).filter(|t| t.class == *class);
-            nearest(things, partner).map_or(f32::INFINITY, |(m, _)| m)
+            let objects = resting_objects(memory).filter(|t| t.class == *class);
+            nearest(objects, partner).map_or(f32::INFINITY, |(m, _)| m)
         });
-        let glimpse = Glimpse {
+        let snapshot = Snapshot {
             frame: memory.frame,
             partner,
             distances_m: distances_m.collect(),
-            goal_m: nearest(goals(memory, briefing), partner).map_or(f32::INFINITY, |(m, _)| m),
+            goal_m: nearest(goal_places(memory, briefing), partner)
+                .map_or(f32::INFINITY, |(m, _)| m),
         };
-        if self.glimpses.len() == LENGTH {
-            self.glimpses.pop_front();
+        if self.snapshots.len() == LENGTH {
+            self.snapshots.pop_front();
         }
-        self.glimpses.push_back(glimpse);
+        self.snapshots.push_back(snapshot);
     }
 
-    /// The window as numbers; the choices are [`Window::classes`].
-    pub fn decision(
+    /// Encodes the window; candidates are [`ObservationHistory::classes`].
+    pub fn encode(
         &self,
         memory: &Memory,
         briefing: &Briefing,
         behavior: &BehaviorLog,
-    ) -> Decision {
-        let seen: Vec<(&Glimpse, Vec3)> =
-            self.glimpses.iter().filter_map(|g| Some((g, g.partner?))).collect();
-        let path = Path {
-            first: seen.first().copied(),
-            last: seen.last().copied(),
-            before_last: seen.len().checked_sub(2).map(|k| seen[k]),
+    ) -> CandidateSet {
+        let observed: Vec<(&Snapshot, Vec3)> =
+            self.snapshots.iter().filter_map(|s| Some((s, s.partner?))).collect();
+        let path = PartnerPath {
+            first: observed.first().copied(),
+            last: observed.last().copied(),
+            before_last: observed.len().checked_sub(2).map(|k| observed[k]),
         };
-        let deeds = Deeds::of(behavior, memory, &self.tops_m);
+        let actions = PartnerActions::new(behavior, memory, &self.tops_m);
         let nearest_class = path.nearest_class();
-        let state = self.state(&path, &deeds, nearest_class, (memory, briefing, behavior));
-        let mut choices = Vec::with_capacity(self.classes.len() * N_CLASS);
+        let state = self.state(&path, &actions, nearest_class, memory, briefing, behavior);
+        let mut candidates = Vec::with_capacity(self.classes.len() * N_CLASS);
         for k in 0..self.classes.len() {
-            self.push_class(k, &path, &deeds, nearest_class, (memory, behavior), &mut choices);
+            let features = self.class_features(k, &path, &actions, nearest_class, memory, behavior);
+            candidates.extend(features);
+            let sets = self.classes[k].info().sets;
+            candidates.extend(TARGET_SETS.iter().map(|set| flag(sets.contains(set))));
         }
-        Decision { state, choices, n_choices: self.classes.len() }
+        CandidateSet { state, candidates, n_candidates: self.classes.len() }
     }
 
     fn state(
         &self,
-        path: &Path<'_>,
-        deeds: &Deeds,
+        path: &PartnerPath<'_>,
+        actions: &PartnerActions,
         nearest_class: [Option<usize>; 2],
-        (memory, briefing, behavior): (&Memory, &Briefing, &BehaviorLog),
+        memory: &Memory,
+        briefing: &Briefing,
+        behavior: &BehaviorLog,
     ) -> Vec<f32> {
         let partner = path.last.map(|(_, at)| at);
-        let n_seen = self.glimpses.iter().filter(|g| g.partner.is_some()).count();
-        let goal_m = |g: &Glimpse| g.goal_m;
-        let goal = nearest(goals(memory, briefing), partner).map(|(_, t)| t.position_in_world);
+        let n_seen = self.snapshots.iter().filter(|s| s.partner.is_some()).count();
+        let goal_m = |s: &Snapshot| s.goal_m;
+        let goal =
+            nearest(goal_places(memory, briefing), partner).map(|(_, t)| t.position_in_world);
         let nearest_at = nearest_class[0].and_then(|k| {
-            nearest(lying(memory).filter(|t| t.class == self.classes[k]), partner)
+            nearest(resting_objects(memory).filter(|t| t.class == self.classes[k]), partner)
                 .map(|(_, t)| t.position_in_world)
         });
-        let nearest_m = |g: &Glimpse| nearest_class[0].map_or(f32::INFINITY, |k| g.distances_m[k]);
-        let holds = |is_it: &dyn Fn(ClassId) -> bool| {
-            flag(behavior.partner_holds.iter().any(|(_, class)| is_it(*class)))
+        let nearest_m = |s: &Snapshot| nearest_class[0].map_or(f32::INFINITY, |k| s.distances_m[k]);
+        let holds = |is_match: &dyn Fn(ClassId) -> bool| {
+            flag(behavior.partner_holds.iter().any(|(_, class)| is_match(*class)))
         };
         let role = |role: Role| move |class: ClassId| class.info().role == role;
-        let bicycle = memory.things.iter().filter(|t| t.class.info().role == Role::Vehicle);
-        let last = deeds.last;
-        let is_last = |kind: usize| flag(last.is_some_and(|d| d.kind == kind));
-        let known = lying(memory).filter(|t| self.classes.contains(&t.class));
-        let furniture = briefing.possible_targets.iter().any(|c| role(Role::HeavyTarget)(*c));
-        let heaviest = |kg: f32| share(kg, if furniture { VERY_HEAVY_KG } else { HEAVY_KG });
-        let child = briefing.companion(Relation::Child).is_some();
+        let bicycle = memory.objects.iter().filter(|t| t.class.info().role == Role::Vehicle);
+        let last = actions.last;
+        let is_last = |kind: usize| flag(last.is_some_and(|a| a.kind == kind));
+        let known = resting_objects(memory).filter(|t| self.classes.contains(&t.class));
+        let moves_furniture = briefing.possible_targets.iter().any(|c| role(Role::HeavyTarget)(*c));
+        let heaviest = |kg: f32| {
+            normalize_clamped(
+                kg,
+                if moves_furniture { FURNITURE_MASS_SCALE_KG } else { MASS_SCALE_KG },
+            )
+        };
+        let has_child = briefing.companion(CompanionRole::Child).is_some();
         let state: [f32; N_STATE] = [
             n_seen as f32 / LENGTH as f32,
-            flag(self.glimpses.back().is_some_and(|g| g.partner.is_some())),
-            partner.map_or(1.0, |at| share(horizontal_distance(memory.pose.position, at), FAR_M)),
-            partner.map_or(0.0, |at| share(at.y, HIGH_M)),
-            path.pace(path.first),
-            path.pace(path.before_last),
+            flag(self.snapshots.back().is_some_and(|s| s.partner.is_some())),
+            partner.map_or(1.0, |at| {
+                normalize_clamped(horizontal_distance(memory.pose.position, at), DISTANCE_SCALE_M)
+            }),
+            partner.map_or(0.0, |at| normalize_clamped(at.y, HEIGHT_SCALE_M)),
+            path.speed(path.first),
+            path.speed(path.before_last),
             flag(goal.is_some()),
-            path.last.map_or(1.0, |(g, _)| share(g.goal_m, FAR_M)),
+            path.last.map_or(1.0, |(s, _)| normalize_clamped(s.goal_m, DISTANCE_SCALE_M)),
             path.approach(goal_m),
             path.heading(goal),
-            path.last.map_or(1.0, |(g, _)| share(nearest_m(g), FAR_M)),
+            path.last.map_or(1.0, |(s, _)| normalize_clamped(nearest_m(s), DISTANCE_SCALE_M)),
             path.approach(nearest_m),
             path.heading(nearest_at),
-            share(behavior.partner_holds.len() as f32, 3.0),
+            normalize_clamped(behavior.partner_holds.len() as f32, 3.0),
             holds(&|class| class.info().is_possible_target()),
             holds(&role(Role::Container)),
             holds(&role(Role::Vehicle)),
             holds(&role(Role::HeavyTarget)),
-            behavior.partner_holds_frame.map_or(0.0, |f| fresh(memory.frame - f)),
-            flag(nearest(bicycle, partner).is_some_and(|(m, _)| m < BESIDE_M)),
+            behavior.partner_holds_frame.map_or(0.0, |f| recency(memory.frame - f)),
+            flag(nearest(bicycle, partner).is_some_and(|(m, _)| m < MAX_BICYCLE_DISTANCE_M)),
             is_last(0),
             is_last(1),
             is_last(2),
             is_last(3),
-            flag(last.is_some_and(|d| d.is_under_way)),
-            flag(last.is_some_and(|d| d.has_failed)),
-            last.map_or(0.0, |d| fresh(memory.frame - d.frame)),
-            share(deeds.took.len() as f32, 6.0),
-            share(deeds.failed.len() as f32, 4.0),
-            deeds.lowest(&deeds.failed),
-            deeds.highest(&deeds.failed),
-            heaviest(deeds.heaviest_kg(&deeds.failed)),
-            deeds.lowest(&deeds.took),
-            deeds.highest(&deeds.took),
-            heaviest(deeds.heaviest_kg(&deeds.took)),
-            flag(deeds.took.iter().any(|d| d.class.info().role == Role::Obstacle)),
+            flag(last.is_some_and(|a| a.is_in_progress)),
+            flag(last.is_some_and(|a| a.has_failed)),
+            last.map_or(0.0, |a| recency(memory.frame - a.frame)),
+            normalize_clamped(actions.taken.len() as f32, 6.0),
+            normalize_clamped(actions.failed.len() as f32, 4.0),
+            actions.lowest(&actions.failed),
+            actions.highest(&actions.failed),
+            heaviest(actions.heaviest_kg(&actions.failed)),
+            actions.lowest(&actions.taken),
+            actions.highest(&actions.taken),
+            heaviest(actions.heaviest_kg(&actions.taken)),
+            flag(actions.taken.iter().any(|object| object.class.info().role == Role::Obstacle)),
             memory.frame as f32 / briefing.horizon.max(1) as f32,
-            share(briefing.horizon as f32, 3000.0),
-            flag(child),
-            flag(furniture),
-            flag(child && briefing.containers.is_empty()),
-            share(known.count() as f32, 10.0),
+            normalize_clamped(briefing.horizon as f32, 3000.0),
+            flag(has_child),
+            flag(moves_furniture),
+            flag(has_child && briefing.containers.is_empty()),
+            normalize_clamped(known.count() as f32, 10.0),
             flag(!briefing.containers.is_empty()),
-            flag(lying(memory).any(|t| t.class.info().role == Role::Obstacle)),
+            flag(resting_objects(memory).any(|t| t.class.info().role == Role::Obstacle)),
         ];
         state.to_vec()
     }
 
-    fn push_class(
+    fn class_features(
         &self,
         k: usize,
-        path: &Path<'_>,
-        deeds: &Deeds,
+        path: &PartnerPath<'_>,
+        actions: &PartnerActions,
         nearest_class: [Option<usize>; 2],
-        (memory, behavior): (&Memory, &BehaviorLog),
-        to: &mut Vec<f32>,
-    ) {
-        let begin = to.len();
+        memory: &Memory,
+        behavior: &BehaviorLog,
+    ) -> [f32; CLASS_FEATURES.len()] {
         let class = self.classes[k];
         let info = class.info();
         let partner = path.last.map(|(_, at)| at);
-        let things = || lying(memory).filter(|t| t.class == class);
-        let one = nearest(things(), partner).map(|(_, thing)| thing);
-        let distance_m = |g: &Glimpse| g.distances_m[k];
-        let least_m = self.glimpses.iter().map(distance_m).min_by(f32::total_cmp);
-        let n = |of: &[Deed]| share(of.iter().filter(|d| d.class == class).count() as f32, 3.0);
-        let last = deeds.last.filter(|d| d.class == Some(class));
-        let held_here = memory.hands.all().any(|(_, c)| c == class);
-        let is_alike = |d: &&Deed| d.class.info().sets.iter().any(|set| info.sets.contains(set));
-        let numbers: [f32; CLASS.len()] = [
-            share(things().count() as f32, 4.0),
-            path.last.map_or(1.0, |(g, _)| share(g.distances_m[k], FAR_M)),
+        let objects = || resting_objects(memory).filter(|t| t.class == class);
+        let nearest_object = nearest(objects(), partner).map(|(_, object)| object);
+        let distance_m = |s: &Snapshot| s.distances_m[k];
+        let min_m = self.snapshots.iter().map(distance_m).min_by(f32::total_cmp);
+        let n_of_class = |handled: &[HandledObject]| {
+            normalize_clamped(
+                handled.iter().filter(|object| object.class == class).count() as f32,
+                3.0,
+            )
+        };
+        let last = actions.last.filter(|a| a.class == Some(class));
+        let is_held_by_helper = memory.hands.all().any(|(_, c)| c == class);
+        let shares_set = |object: &&HandledObject| {
+            object.class.info().sets.iter().any(|set| info.sets.contains(set))
+        };
+        [
+            normalize_clamped(objects().count() as f32, 4.0),
+            path.last.map_or(1.0, |(s, _)| normalize_clamped(s.distances_m[k], DISTANCE_SCALE_M)),
             path.approach(distance_m),
-            path.heading(one.map(|t| t.position_in_world)),
+            path.heading(nearest_object.map(|t| t.position_in_world)),
             flag(nearest_class[0] == Some(k)),
             flag(nearest_class[1] == Some(k)),
-            least_m.map_or(1.0, |m| share(m, FAR_M)),
-            one.map_or(0.0, |t| share(t.top_m, HIGH_M)),
-            one.map_or(0.0, |t| share(t.bottom_m, HIGH_M)),
-            share(info.mass_kg, HEAVY_KG),
+            min_m.map_or(1.0, |m| normalize_clamped(m, DISTANCE_SCALE_M)),
+            nearest_object.map_or(0.0, |t| normalize_clamped(t.top_m, HEIGHT_SCALE_M)),
+            nearest_object.map_or(0.0, |t| normalize_clamped(t.bottom_m, HEIGHT_SCALE_M)),
+            normalize_clamped(info.mass_kg, MASS_SCALE_KG),
             flag(info.role == Role::Target),
             flag(info.role == Role::Container),
             flag(info.role == Role::Fragile),
             flag(info.role == Role::Obstacle),
             flag(info.role == Role::HeavyTarget),
-            flag(things().any(|t| t.last_seen == memory.frame)),
+            flag(objects().any(|t| t.last_seen == memory.frame)),
             flag(behavior.partner_holds.iter().any(|(_, c)| *c == class)),
-            n(&deeds.took),
-            n(&deeds.failed),
+            n_of_class(&actions.taken),
+            n_of_class(&actions.failed),
             flag(last.is_some()),
-            flag(last.is_some_and(|d| d.has_failed)),
-            flag(held_here),
-            share(deeds.took.iter().filter(is_alike).count() as f32, 3.0),
-        ];
-        to.extend(numbers);
-        to.extend(SETS.iter().map(|set| flag(info.sets.contains(set))));
-        debug_assert_eq!(to.len() - begin, N_CLASS);
+            flag(last.is_some_and(|a| a.has_failed)),
+            flag(is_held_by_helper),
+            normalize_clamped(actions.taken.iter().filter(shares_set).count() as f32, 3.0),
+        ]
     }
 }
 
-/// Things that lie where they were seen, as far as one knows.
-fn lying(memory: &Memory) -> impl Iterator<Item = &Thing> {
-    memory.things.iter().filter(|t| t.is_present && !t.is_gone && t.held_until <= memory.frame)
+/// Returns objects that are believed to rest where they were last seen.
+fn resting_objects(memory: &Memory) -> impl Iterator<Item = &MappedObject> {
+    memory.objects.iter().filter(|t| t.is_present && !t.is_gone && t.held_until <= memory.frame)
 }
 
-/// Places that things may be brought to.
-fn goals<'a>(memory: &'a Memory, briefing: &'a Briefing) -> impl Iterator<Item = &'a Thing> {
-    memory.things.iter().filter(|t| briefing.goal_places.contains(&t.class))
+/// Returns known goal places.
+fn goal_places<'a>(
+    memory: &'a Memory,
+    briefing: &'a Briefing,
+) -> impl Iterator<Item = &'a MappedObject> {
+    memory.objects.iter().filter(|t| briefing.goal_places.contains(&t.class))
 }
 
-/// The thing nearest to somebody, and how far it is, metres in plan.
+/// Returns the nearest object and its horizontal distance, meters.
 fn nearest<'a>(
-    things: impl Iterator<Item = &'a Thing>,
+    objects: impl Iterator<Item = &'a MappedObject>,
     to: Option<Vec3>,
-) -> Option<(f32, &'a Thing)> {
-    let to = xz(to?);
-    things.map(|t| (t.distance_from(to), t)).min_by(|a, b| a.0.total_cmp(&b.0))
+) -> Option<(f32, &'a MappedObject)> {
+    let to = to_xz(to?);
+    objects.map(|t| (t.distance_from(to), t)).min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-/// How the partner was seen to move.
-struct Path<'a> {
-    first: Option<(&'a Glimpse, Vec3)>,
-    before_last: Option<(&'a Glimpse, Vec3)>,
-    last: Option<(&'a Glimpse, Vec3)>,
+/// Observed path of the partner.
+struct PartnerPath<'a> {
+    first: Option<(&'a Snapshot, Vec3)>,
+    before_last: Option<(&'a Snapshot, Vec3)>,
+    last: Option<(&'a Snapshot, Vec3)>,
 }
 
-impl Path<'_> {
-    /// How fast it was since a glimpse, 0 to 1.
-    fn pace(&self, since: Option<(&Glimpse, Vec3)>) -> f32 {
-        let Some(((before, from), (now, to))) = since.zip(self.last) else { return 0.0 };
-        let frames = now.frame.saturating_sub(before.frame).max(1);
-        share(horizontal_distance(from, to) / frames as f32, PACE_M)
+impl PartnerPath<'_> {
+    /// Returns the mean speed since an observation, 0 to 1.
+    fn speed(&self, since: Option<(&Snapshot, Vec3)>) -> f32 {
+        let Some(((start, from), (end, to))) = since.zip(self.last) else { return 0.0 };
+        let frames = end.frame.saturating_sub(start.frame).max(1);
+        normalize_clamped(horizontal_distance(from, to) / frames as f32, SPEED_SCALE_M_PER_FRAME)
     }
 
-    /// By how much a distance fell since the first glimpse, -1 to 1.
-    fn approach(&self, of: impl Fn(&Glimpse) -> f32) -> f32 {
-        let Some(((before, _), (now, _))) = self.first.zip(self.last) else { return 0.0 };
-        let fell = of(before) - of(now);
-        if fell.is_finite() { (fell / APPROACH_M).clamp(-1.0, 1.0) } else { 0.0 }
+    /// Returns the decrease of a distance since the first observation, -1 to 1.
+    fn approach(&self, distance: impl Fn(&Snapshot) -> f32) -> f32 {
+        let Some(((start, _), (end, _))) = self.first.zip(self.last) else { return 0.0 };
+        let decrease = distance(start) - distance(end);
+        if decrease.is_finite() { (decrease / APPROACH_SCALE_M).clamp(-1.0, 1.0) } else { 0.0 }
     }
 
-    /// The cosine between its way since the first glimpse and the direction to a place.
+    /// Returns the cosine between the displacement since the first observation and the direction to
+    /// a position.
     fn heading(&self, to: Option<Vec3>) -> f32 {
         let Some(((_, from), (_, at))) = self.first.zip(self.last) else { return 0.0 };
         let Some(to) = to else { return 0.0 };
-        let (moved, ahead) = (xz(at) - xz(from), xz(to) - xz(at));
+        let (moved, ahead) = (to_xz(at) - to_xz(from), to_xz(to) - to_xz(at));
         let lengths = moved.length() * ahead.length();
         if lengths > 1e-3 { (moved.dot(ahead) / lengths).clamp(-1.0, 1.0) } else { 0.0 }
     }
 
-    /// The classes of which a thing is nearest to it, and second.
+    /// Returns the classes of the nearest and second nearest objects.
     fn nearest_class(&self) -> [Option<usize>; 2] {
-        let Some((glimpse, _)) = self.last else { return [None; 2] };
-        let mut order: Vec<usize> = (0..glimpse.distances_m.len()).collect();
-        order.retain(|k| glimpse.distances_m[*k].is_finite());
-        order.sort_by(|a, b| glimpse.distances_m[*a].total_cmp(&glimpse.distances_m[*b]));
+        let Some((snapshot, _)) = self.last else { return [None; 2] };
+        let mut order: Vec<usize> = (0..snapshot.distances_m.len()).collect();
+        order.retain(|k| snapshot.distances_m[*k].is_finite());
+        order.sort_by(|a, b| snapshot.distances_m[*a].total_cmp(&snapshot.distances_m[*b]));
         [order.first().copied(), order.get(1).copied()]
     }
 }
 
-/// Something that the partner took, or failed to take.
+/// Object that the partner took, or failed to take.
 #[derive(Clone, Copy, Debug)]
-struct Deed {
+struct HandledObject {
     class: ClassId,
     top_m: Option<f32>,
 }
 
-/// The last that it did.
+/// Last action of the partner.
 #[derive(Clone, Copy, Debug)]
-struct LastDeed {
+struct LastAction {
     frame: Frame,
-    /// 0 picking up, 1 putting in, 2 putting on, 3 something else.
+    /// 0 for picking up, 1 for putting in, 2 for putting on, 3 for others.
     kind: usize,
     class: Option<ClassId>,
-    is_under_way: bool,
+    is_in_progress: bool,
     has_failed: bool,
 }
 
-/// What is known of the partner's doings.
-struct Deeds {
-    took: Vec<Deed>,
-    failed: Vec<Deed>,
-    last: Option<LastDeed>,
+/// Observed actions of the partner.
+struct PartnerActions {
+    taken: Vec<HandledObject>,
+    failed: Vec<HandledObject>,
+    last: Option<LastAction>,
 }
 
-impl Deeds {
-    fn of(behavior: &BehaviorLog, memory: &Memory, tops_m: &BTreeMap<TrackId, f32>) -> Deeds {
-        let deed = |track: TrackId, class: Option<ClassId>| {
-            let class = class.or_else(|| memory.things.get(track).map(|t| t.class))?;
-            Some(Deed { class, top_m: tops_m.get(&track).copied() })
+impl PartnerActions {
+    fn new(
+        behavior: &BehaviorLog,
+        memory: &Memory,
+        tops_m: &BTreeMap<TrackId, f32>,
+    ) -> PartnerActions {
+        let handled = |track: TrackId, class: Option<ClassId>| {
+            let class = class.or_else(|| memory.objects.get(track).map(|t| t.class))?;
+            Some(HandledObject { class, top_m: tops_m.get(&track).copied() })
         };
-        let of_partner = || behavior.actions.iter().filter(|a| a.agent == AgentId::PARTNER);
-        let failed = of_partner().filter(|a| a.outcome.is_some_and(|o| !o.is_success()));
+        let partner_actions = || behavior.actions.iter().filter(|a| a.agent == AgentId::PARTNER);
+        let failed = partner_actions().filter(|a| a.outcome.is_some_and(|o| !o.is_success()));
         let kind = |action: &Intent| match action {
             Action::PickUp { .. } => 0,
             Action::PutIn => 1,
             Action::PutOn { .. } => 2,
             _ => 3,
         };
-        let last = of_partner().next_back().map(|seen| LastDeed {
-            frame: seen.frame,
-            kind: kind(&seen.action),
-            class: seen.action.subject().and_then(|t| memory.things.get(t)).map(|t| t.class),
-            is_under_way: seen.outcome.is_none(),
-            has_failed: seen.outcome.is_some_and(|o| !o.is_success()),
+        let last = partner_actions().next_back().map(|observed| LastAction {
+            frame: observed.frame,
+            kind: kind(&observed.action),
+            class: observed.action.subject().and_then(|t| memory.objects.get(t)).map(|t| t.class),
+            is_in_progress: observed.outcome.is_none(),
+            has_failed: observed.outcome.is_some_and(|o| !o.is_success()),
         });
-        Deeds {
-            took: behavior.partner_took.iter().filter_map(|(t, c)| deed(*t, Some(*c))).collect(),
-            failed: failed.filter_map(|a| deed(a.action.subject()?, None)).collect(),
+        PartnerActions {
+            taken: behavior
+                .partner_taken
+                .iter()
+                .filter_map(|(t, c)| handled(*t, Some(*c)))
+                .collect(),
+            failed: failed.filter_map(|a| handled(a.action.subject()?, None)).collect(),
             last,
         }
     }
 
-    fn tops<'a>(&self, deeds: &'a [Deed]) -> impl Iterator<Item = f32> + 'a {
-        deeds.iter().filter_map(|d| d.top_m)
+    fn tops<'a>(&self, objects: &'a [HandledObject]) -> impl Iterator<Item = f32> + 'a {
+        objects.iter().filter_map(|object| object.top_m)
     }
 
-    fn lowest(&self, deeds: &[Deed]) -> f32 {
-        self.tops(deeds).min_by(f32::total_cmp).map_or(-1.0, |m| share(m, HIGH_M))
+    fn lowest(&self, objects: &[HandledObject]) -> f32 {
+        self.tops(objects)
+            .min_by(f32::total_cmp)
+            .map_or(-1.0, |m| normalize_clamped(m, HEIGHT_SCALE_M))
     }
 
-    fn highest(&self, deeds: &[Deed]) -> f32 {
-        self.tops(deeds).max_by(f32::total_cmp).map_or(-1.0, |m| share(m, HIGH_M))
+    fn highest(&self, objects: &[HandledObject]) -> f32 {
+        self.tops(objects)
+            .max_by(f32::total_cmp)
+            .map_or(-1.0, |m| normalize_clamped(m, HEIGHT_SCALE_M))
     }
 
-    fn heaviest_kg(&self, deeds: &[Deed]) -> f32 {
-        deeds.iter().map(|d| d.class.info().mass_kg).max_by(f32::total_cmp).unwrap_or(0.0)
+    fn heaviest_kg(&self, objects: &[HandledObject]) -> f32 {
+        objects
+            .iter()
+            .map(|object| object.class.info().mass_kg)
+            .max_by(f32::total_cmp)
+            .unwrap_or(0.0)
     }
 }

@@ -1,132 +1,140 @@
-//! A network that acts.
+//! Agent that takes primitive actions by a network.
 
 use std::sync::Arc;
 
-use chaic_agents::policies::External;
-use chaic_agents::sight::Sight;
-use chaic_agents::{Mind, PlannerRules};
+use chaic_agents::perception_factory::PerceptionFactory;
+use chaic_agents::policies::ExternalPolicy;
+use chaic_agents::{PlannerRules, PlanningAgent};
 use chaic_core::agent::Thought;
-use chaic_core::observation::{Grants, Senses};
-use chaic_core::rng::Stream;
+use chaic_core::observation::{Grants, SensorConfig};
+use chaic_core::rng::RngStream;
 use chaic_core::{Action, Agent, AgentError, AgentId, Briefing, Observation};
-use chaic_env::minds::Helper;
+use chaic_env::helper_registry::Helper;
 use chaic_nn::Pass;
 use chaic_nn::weights::{self, WeightsError};
 
 use super::network::PrimitiveNetwork;
-use super::seen::Seen;
-use super::{ACTIONS, PAUSE, action_of};
+use super::observation::PrimitiveObservation;
+use super::{ACTIONS, PAUSE, resolve_action};
 use crate::actor_critic::ActorCritic as _;
 
-/// What files of weights say that they are.
+/// Kind in weights files.
 pub const KIND: &str = "chaic primitive policy 1";
 
-/// A network with its numbers.
+/// Network with parameter values.
 #[derive(Clone, Debug)]
-pub struct TrainedPrimitive {
-    /// The network.
+pub struct PrimitiveWeights {
+    /// Network architecture.
     pub model: PrimitiveNetwork,
-    /// Its numbers.
-    pub numbers: Vec<f32>,
+    /// Parameters.
+    pub parameters: Vec<f32>,
 }
 
-impl TrainedPrimitive {
-    /// The network in a file of weights.
+impl PrimitiveWeights {
+    /// Parses a weights file.
     ///
     /// # Errors
-    /// [`WeightsError`] if it isn't a whole file of such a network.
-    pub fn from_bytes(bytes: &[u8]) -> Result<TrainedPrimitive, WeightsError> {
+    /// [`WeightsError`] if the file is incomplete or belongs to another network.
+    pub fn from_bytes(bytes: &[u8]) -> Result<PrimitiveWeights, WeightsError> {
         let model = PrimitiveNetwork::default();
-        let numbers = weights::from_bytes(model.network(), bytes, KIND)?;
-        Ok(TrainedPrimitive { model, numbers })
+        let parameters = weights::from_bytes(model.network(), bytes, KIND)?;
+        Ok(PrimitiveWeights { model, parameters })
     }
 }
 
-/// A mind that looks and remembers, and leaves what to do to somebody else.
-pub(crate) struct Onlooker {
-    pub(crate) mind: Mind<External>,
+/// Agent that perceives and remembers, while its caller chooses the actions.
+pub(crate) struct ObservationEncoder {
+    pub(crate) agent: PlanningAgent<ExternalPolicy>,
     briefing: Option<Briefing>,
 }
 
-impl Onlooker {
-    /// One that sees by this, and what it is granted.
-    pub(crate) fn new(rules: PlannerRules, sight: &dyn Sight) -> (Onlooker, Grants) {
-        let grants = sight.grants(Grants::PLANNER);
-        let who = (AgentId::PARTNER, grants);
-        let mind = Mind::watching(External::default(), rules, sight, who);
-        (Onlooker { mind, briefing: None }, grants)
+impl ObservationEncoder {
+    /// Creates an encoder with this perception; returns its grants too.
+    pub(crate) fn new(
+        rules: PlannerRules,
+        perception: &dyn PerceptionFactory,
+    ) -> (ObservationEncoder, Grants) {
+        let grants = perception.grants(Grants::PLANNER);
+        let agent = PlanningAgent::with_watched(
+            ExternalPolicy::default(),
+            rules,
+            perception,
+            AgentId::PARTNER,
+            grants,
+        );
+        (ObservationEncoder { agent, briefing: None }, grants)
     }
 
-    /// What it has to see: color, too.
-    pub(crate) fn senses(&self) -> Senses {
-        Senses { rgb: true, depth: true, ..self.mind.senses() }
+    /// Returns the sensors, which include color and depth.
+    pub(crate) fn sensors(&self) -> SensorConfig {
+        SensorConfig { rgb: true, depth: true, ..self.agent.sensors() }
     }
 
     pub(crate) fn reset(&mut self, briefing: &Briefing) {
-        self.mind.reset(briefing);
+        self.agent.reset(briefing);
         self.briefing = Some(briefing.clone());
     }
 
-    /// Takes in an observation; what a network reads of it.
-    pub(crate) fn look(&mut self, observation: &Observation) -> Option<Seen> {
-        self.mind.attend(observation);
+    /// Processes an observation; returns the network's input.
+    pub(crate) fn encode(&mut self, observation: &Observation) -> Option<PrimitiveObservation> {
+        self.agent.observe(observation);
         let briefing = self.briefing.as_ref()?;
-        Some(Seen::of(observation, &self.mind, briefing))
+        Some(PrimitiveObservation::new(observation, &self.agent, briefing))
     }
 
-    /// An action of [`ACTIONS`]; `None` if it can't be begun.
-    pub(crate) fn action(&self, choice: usize) -> Option<Action> {
-        action_of(choice, &self.mind, self.briefing.as_ref()?)
+    /// Returns an action of [`ACTIONS`]; `None` if it cannot begin.
+    pub(crate) fn action(&self, action_index: usize) -> Option<Action> {
+        resolve_action(action_index, &self.agent, self.briefing.as_ref()?)
     }
 }
 
-/// A helper that a network moves.
+/// Helper that takes primitive actions by a network.
 pub struct PrimitiveHelper {
-    onlooker: Onlooker,
-    trained: Arc<TrainedPrimitive>,
+    encoder: ObservationEncoder,
+    weights: Arc<PrimitiveWeights>,
     pass: Pass,
-    rng: Stream,
-    choice: usize,
+    rng: RngStream,
+    last_action: usize,
 }
 
 impl PrimitiveHelper {
-    /// One that sees by this, with what it is granted.
-    pub fn helper(
-        trained: Arc<TrainedPrimitive>,
+    /// Creates a helper with this perception and the grants that it needs.
+    pub fn create(
+        weights: Arc<PrimitiveWeights>,
         rules: PlannerRules,
-        sight: &dyn Sight,
+        perception: &dyn PerceptionFactory,
     ) -> Helper {
-        let (onlooker, grants) = Onlooker::new(rules, sight);
-        let pass = trained.model.pass();
-        let rng = Stream::new(0, "primitive policy", 0);
-        let mind = PrimitiveHelper { onlooker, trained, pass, rng, choice: 0 };
-        Helper { mind: Box::new(mind), grants }
+        let (encoder, grants) = ObservationEncoder::new(rules, perception);
+        let pass = weights.model.pass();
+        let rng = RngStream::new(0, "primitive policy", 0);
+        let agent = PrimitiveHelper { encoder, weights, pass, rng, last_action: 0 };
+        Helper { agent: Box::new(agent), grants }
     }
 }
 
 impl Agent for PrimitiveHelper {
-    fn senses(&self) -> Senses {
-        self.onlooker.senses()
+    fn sensors(&self) -> SensorConfig {
+        self.encoder.sensors()
     }
 
     fn reset(&mut self, briefing: &Briefing) {
-        self.onlooker.reset(briefing);
-        self.rng = Stream::new(briefing.seed, "primitive policy", 0);
+        self.encoder.reset(briefing);
+        self.rng = RngStream::new(briefing.seed, "primitive policy", 0);
     }
 
     fn act(&mut self, observation: &Observation) -> Result<Action, AgentError> {
-        let Some(seen) = self.onlooker.look(observation) else { return Ok(PAUSE) };
-        let TrainedPrimitive { model, numbers } = &*self.trained;
-        let said = model.forward(numbers, std::iter::once(&seen), &mut self.pass).remove(0);
-        self.choice = said.sample(self.rng.unit());
-        Ok(self.onlooker.action(self.choice).unwrap_or(PAUSE))
+        let Some(encoded) = self.encoder.encode(observation) else { return Ok(PAUSE) };
+        let PrimitiveWeights { model, parameters } = &*self.weights;
+        let output = model.forward(parameters, std::iter::once(&encoded), &mut self.pass).remove(0);
+        self.last_action = output.sample(self.rng.unit());
+        Ok(self.encoder.action(self.last_action).unwrap_or(PAUSE))
     }
 
     fn perception(&self) -> Option<String> {
-        self.onlooker.mind.perception()
+        self.encoder.agent.perception()
     }
 
     fn thought(&self) -> Thought {
-        Thought { plan: ACTIONS[self.choice].to_owned(), ..self.onlooker.mind.thought() }
+        Thought { plan: ACTIONS[self.last_action].to_owned(), ..self.encoder.agent.thought() }
     }
 }

@@ -1,14 +1,16 @@
-//! The paper's network: a convolutional one for each image, layers for numbers, what they make joined, two layers to
-//! 64 that actor and critic share.
+//! The paper's network: a convolutional encoder per image and a dense layer for the state. Two
+//! layers of 64 units join them, shared by actor and critic.
 
 use chaic_nn::simd::widest;
 use chaic_nn::{Kernel, Network, Node, Pass, Shape, Tensor};
 
 use super::ACTIONS;
-use super::seen::{IMAGE_CHANNELS, IMAGE_SIDE, MAP, MAP_CHANNELS, N_STATE, Seen};
-use crate::actor_critic::{ActorCritic, BySaid, Said, log_softmax};
+use super::observation::{
+    IMAGE_CHANNELS, IMAGE_SIZE, MAP, MAP_CHANNELS, N_STATE, PrimitiveObservation,
+};
+use crate::actor_critic::{ActorCritic, ActorCriticOutput, OutputGrad, log_softmax};
 
-/// The network without its numbers.
+/// Network architecture without parameter values.
 #[derive(Clone, Debug)]
 pub struct PrimitiveNetwork {
     network: Network,
@@ -16,74 +18,76 @@ pub struct PrimitiveNetwork {
     value: Node,
 }
 
-/// Side of the patches of an image that become one pixel of the first map, whose products are then large enough to
-/// be quick (as in vision transformers, Dosovitskiy et al. 2021).
-const PATCH: usize = 4;
-/// Patches along a side.
-const PATCHES: usize = IMAGE_SIDE / PATCH;
-const DOWN: Kernel = Kernel { side: 3, stride: 2 };
-/// How much the sides of an image's last map are divided by.
-const LAST_SIDE: usize = 8;
-/// What each input becomes.
+/// Size of the image patches that become one pixel of the first map, as in vision transformers
+/// (Dosovitskiy et al. 2021). The matrix products are then large enough to be fast.
+const PATCH_SIZE: usize = 4;
+/// Patches per row and column.
+const PATCHES_PER_SIDE: usize = IMAGE_SIZE / PATCH_SIZE;
+const DOWNSAMPLE: Kernel = Kernel { size: 3, stride: 2 };
+/// Width and height of the last map of an encoder, pixels.
+const LAST_MAP_SIZE: usize = 8;
+/// Number of features of each input.
 const N_FEATURES: usize = 64;
-/// What the shared layers make (paper, appendix on learning).
+/// Width of the shared layers (paper, appendix on learning).
 const N_SHARED: usize = 64;
 
 impl Default for PrimitiveNetwork {
     fn default() -> PrimitiveNetwork {
         let mut net = Network::default();
-        let image = net.input(PATCH * PATCH * IMAGE_CHANNELS);
-        let map = net.side_input(MAP_CHANNELS, PATCHES / MAP.side);
-        let state = net.side_input(N_STATE, PATCHES);
-        let mut of_image = layer(&mut net, "image.patches", image, Kernel::POINTWISE, 32);
+        let image = net.input(PATCH_SIZE * PATCH_SIZE * IMAGE_CHANNELS);
+        let map = net.auxiliary_input(MAP_CHANNELS, PATCHES_PER_SIDE / MAP.side);
+        let state = net.auxiliary_input(N_STATE, PATCHES_PER_SIDE);
+        let mut image_features = layer(&mut net, "image.patches", image, Kernel::POINTWISE, 32);
         for k in 0..2 {
-            of_image = layer(&mut net, &format!("image{k}"), of_image, DOWN, 32);
+            image_features = layer(&mut net, &format!("image{k}"), image_features, DOWNSAMPLE, 32);
         }
-        let mut of_map = map;
+        let mut map_features = map;
         for (k, channels) in [16, 32].into_iter().enumerate() {
-            of_map = layer(&mut net, &format!("map{k}"), of_map, DOWN, channels);
+            map_features = layer(&mut net, &format!("map{k}"), map_features, DOWNSAMPLE, channels);
         }
-        let [of_image, of_map] = [("image", of_image), ("map", of_map)].map(|(name, maps)| {
-            let flat = net.flatten(maps, LAST_SIDE);
-            layer(&mut net, &format!("{name}.dense"), flat, Kernel::POINTWISE, N_FEATURES)
-        });
-        let of_state = layer(&mut net, "state.dense", state, Kernel::POINTWISE, N_FEATURES);
-        let both = net.concat(of_image, of_map);
-        let mut shared = net.concat(both, of_state);
+        let [image_features, map_features] = [("image", image_features), ("map", map_features)]
+            .map(|(name, maps)| {
+                let flat = net.flatten(maps, LAST_MAP_SIZE);
+                layer(&mut net, &format!("{name}.dense"), flat, Kernel::POINTWISE, N_FEATURES)
+            });
+        let state_features = layer(&mut net, "state.dense", state, Kernel::POINTWISE, N_FEATURES);
+        let image_and_map = net.concat(image_features, map_features);
+        let mut shared = net.concat(image_and_map, state_features);
         for k in 0..2 {
             shared = layer(&mut net, &format!("shared{k}"), shared, Kernel::POINTWISE, N_SHARED);
         }
-        let logits = net.head("actor", shared, ACTIONS.len());
-        let value = net.head("critic", shared, 1);
+        let logits = net.output_head("actor", shared, ACTIONS.len());
+        let value = net.output_head("critic", shared, 1);
         PrimitiveNetwork { network: net, logits, value }
     }
 }
 
 fn layer(net: &mut Network, name: &str, from: Node, kernel: Kernel, channels: usize) -> Node {
-    let made = net.conv(name, from, kernel, channels);
-    net.norm_relu(&format!("{name}.norm"), made)
+    let output = net.conv(name, from, kernel, channels);
+    net.norm_relu(&format!("{name}.norm"), output)
 }
 
-/// The bytes of an image, patch by patch.
-fn in_patches(image: &[u8]) -> impl Iterator<Item = u8> + '_ {
-    let row_of_patch = PATCH * IMAGE_CHANNELS;
-    (0..PATCHES * PATCHES * PATCH).flat_map(move |k| {
-        let (patch, row) = (k / PATCH, k % PATCH);
-        let (y, x) = (patch / PATCHES * PATCH + row, patch % PATCHES * PATCH);
-        let begin = (y * IMAGE_SIDE + x) * IMAGE_CHANNELS;
-        image[begin..begin + row_of_patch].iter().copied()
+/// Returns the bytes of an image in patch order.
+fn patch_bytes(image: &[u8]) -> impl Iterator<Item = u8> + '_ {
+    let row_len = PATCH_SIZE * IMAGE_CHANNELS;
+    (0..PATCHES_PER_SIDE * PATCHES_PER_SIDE * PATCH_SIZE).flat_map(move |k| {
+        let (patch, row) = (k / PATCH_SIZE, k % PATCH_SIZE);
+        let (y, x) =
+            (patch / PATCHES_PER_SIDE * PATCH_SIZE + row, patch % PATCHES_PER_SIDE * PATCH_SIZE);
+        let start = (y * IMAGE_SIZE + x) * IMAGE_CHANNELS;
+        image[start..start + row_len].iter().copied()
     })
 }
 
 impl PrimitiveNetwork {
-    /// Working space.
+    /// Creates the buffers of a pass.
     pub fn pass(&self) -> Pass {
         Pass::new(&self.network, widest())
     }
 }
 
 impl ActorCritic for PrimitiveNetwork {
-    type Seen = Seen;
+    type Observation = PrimitiveObservation;
 
     fn network(&self) -> &Network {
         &self.network
@@ -91,46 +95,56 @@ impl ActorCritic for PrimitiveNetwork {
 
     fn forward<'a>(
         &self,
-        numbers: &[f32],
-        seen: impl Iterator<Item = &'a Seen> + Clone,
+        parameters: &[f32],
+        observations: impl Iterator<Item = &'a PrimitiveObservation> + Clone,
         pass: &mut Pass,
-    ) -> Vec<Said> {
-        let n = seen.clone().count();
-        let bytes = seen.clone().flat_map(|s| in_patches(&s.image));
+    ) -> Vec<ActorCriticOutput> {
+        let n = observations.clone().count();
+        let bytes = observations.clone().flat_map(|s| patch_bytes(&s.image));
         let image = Tensor {
             shape: Shape {
                 n,
-                height: PATCHES,
-                width: PATCHES,
-                channels: PATCH * PATCH * IMAGE_CHANNELS,
+                height: PATCHES_PER_SIDE,
+                width: PATCHES_PER_SIDE,
+                channels: PATCH_SIZE * PATCH_SIZE * IMAGE_CHANNELS,
             },
             data: bytes.map(|byte| f32::from(byte) / 255.0).collect(),
         };
-        let tensor =
-            |side: usize, channels: usize, of: &dyn Fn(&'a Seen) -> &'a [u8], scale: f32| {
-                let shape = Shape { n, height: side, width: side, channels };
-                let data = seen.clone().flat_map(of).map(|byte| scale * f32::from(*byte)).collect();
-                Tensor { shape, data }
-            };
+        let tensor = |size: usize,
+                      channels: usize,
+                      bytes: &dyn Fn(&'a PrimitiveObservation) -> &'a [u8],
+                      scale: f32| {
+            let shape = Shape { n, height: size, width: size, channels };
+            let data =
+                observations.clone().flat_map(bytes).map(|byte| scale * f32::from(*byte)).collect();
+            Tensor { shape, data }
+        };
         let map = tensor(MAP.side, MAP_CHANNELS, &|s| &s.map, 1.0);
         let state = tensor(1, N_STATE, &|s| &s.state, 1.0 / 255.0);
-        pass.forward_all(&self.network, numbers, &[&image, &map, &state]);
-        let logits = pass.made(self.logits).data.chunks_exact(ACTIONS.len());
-        let said = logits.zip(&pass.made(self.value).data);
-        said.map(|(logits, value)| Said {
-            log_probabilities: log_softmax(logits),
-            of_state: vec![*value],
-        })
-        .collect()
+        pass.forward_all(&self.network, parameters, &[&image, &map, &state]);
+        let logits = pass.activation(self.logits).data.chunks_exact(ACTIONS.len());
+        let outputs = logits.zip(&pass.activation(self.value).data);
+        outputs
+            .map(|(logits, value)| ActorCriticOutput {
+                log_probs: log_softmax(logits),
+                values: vec![*value],
+            })
+            .collect()
     }
 
-    fn backward(&self, numbers: &[f32], by: &[BySaid], pass: &mut Pass, by_numbers: &mut [f32]) {
-        pass.begin_backward();
-        for (k, by) in by.iter().enumerate() {
-            pass.gradient(self.value).data[k] = by.of_state[0];
+    fn backward(
+        &self,
+        parameters: &[f32],
+        grad_outputs: &[OutputGrad],
+        pass: &mut Pass,
+        grad_parameters: &mut [f32],
+    ) {
+        pass.zero_gradients();
+        for (k, grad) in grad_outputs.iter().enumerate() {
+            pass.gradient(self.value).data[k] = grad.values[0];
             let to = &mut pass.gradient(self.logits).data[k * ACTIONS.len()..][..ACTIONS.len()];
-            to.copy_from_slice(&by.logits);
+            to.copy_from_slice(&grad.logits);
         }
-        pass.backward(&self.network, numbers, by_numbers);
+        pass.backward(&self.network, parameters, grad_parameters);
     }
 }

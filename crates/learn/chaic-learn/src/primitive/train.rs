@@ -1,309 +1,327 @@
-//! Learning single actions by proximal policy optimization: by the paper's numbers, unless told otherwise.
+//! Training of primitive actions by PPO, with the paper's hyperparameters by default.
 
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use chaic_agents::sight::{GROUND_TRUTH, Sight};
-use chaic_core::rng::Stream;
+use chaic_agents::perception_factory::{GROUND_TRUTH, PerceptionFactory};
+use chaic_core::observation::SensorConfig;
+use chaic_core::rng::RngStream;
 use chaic_core::{AgentError, AgentId, TaskId};
-use chaic_env::minds::Helper;
+use chaic_env::helper_registry::Helper;
 use chaic_env::rules::RuleSet;
-use chaic_env::{Env, EpisodeConfig, Flow, Minds, RewardWeights, Seat, seeded_by_episode};
-use chaic_episodes::find_episode;
+use chaic_env::{
+    AdvanceOutcome, AgentSlot, Env, EpisodeAgents, EpisodeConfig, RewardWeights, seeded_by_episode,
+};
+use chaic_episodes::{SeedRange, find_episode};
 use chaic_nn::weights::{self, WeightsError};
 use chaic_nn::{Network, Pass};
-use chaic_render::Appearance;
 use chaic_training::bounds::{Bound, BoundTable, SEED, STEPS, integer};
 use chaic_training::{
-    Checkpoint, CheckpointError, Figures, Learner, Training, TrainingError, figures,
+    Checkpoint, CheckpointError, Learner, Metrics, Trainer, TrainingError, metrics,
 };
-use chaic_vision::sights::{self, SightError};
+use chaic_vision::perception_registry::{self, PerceptionError};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::helper::{KIND, Onlooker, PrimitiveHelper, TrainedPrimitive};
+use super::helper::{KIND, ObservationEncoder, PrimitiveHelper, PrimitiveWeights};
 use super::network::PrimitiveNetwork;
-use super::seen::{IMAGE_SIDE, Seen};
+use super::observation::{IMAGE_SIZE, PrimitiveObservation};
 use super::{ACTIONS, PAUSE};
-use crate::actor_critic::{ActorCritic as _, Said};
-use crate::play_rules::{MAX_VALIDATION_EPISODES, REWARD, TRAINING_SEEDS, VALIDATION_SEEDS};
-use crate::ppo::{PpoRules, Told, Trajectory, Transition, improve, ppo_bounds};
+use crate::actor_critic::{ActorCritic as _, ActorCriticOutput};
+use crate::ppo::{PpoConfig, PpoMetrics, Schedule, Trajectory, Transition, ppo_bounds, update};
+use crate::reward_config;
 use crate::rollout::RolloutError;
+use crate::rollout_config::{MAX_VALIDATION_EPISODES, REWARD};
 
-/// How single actions are learned.
+/// Configuration of `chaic train primitive`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct PrimitiveRules {
-    /// Of weights, episodes and batches.
+pub struct PrimitiveConfig {
+    /// Seed of weights, episodes and batches.
     pub seed: u64,
-    /// Updates in all.
-    pub updates: u64,
-    /// Episodes that are played side by side.
-    pub envs: usize,
-    /// Decisions of each of them between updates.
-    pub rollout: usize,
-    /// The tasks whose episodes are played, by turns. The paper trains a policy for each.
+    /// Total number of updates.
+    #[serde(alias = "updates")]
+    pub n_updates: u64,
+    /// Number of parallel environments.
+    #[serde(alias = "envs")]
+    pub n_envs: usize,
+    /// Decisions of each environment between updates.
+    #[serde(alias = "rollout")]
+    pub n_steps: usize,
+    /// Tasks, whose episodes take turns. The paper trains one policy per task.
     pub tasks: Vec<TaskId>,
-    /// Side of the images by which the helper and its partner see, pixels; a multiple of 128.
+    /// Width and height of the images of helper and partner, pixels; a multiple of 128.
     pub image_size: u32,
-    /// By what the helper sees, and tells what its partner does: as `chaic eval` names it.
+    /// Perception of the helper, as `chaic eval --perception`.
     pub perception: String,
-    /// See `perception`.
+    /// Behavior recognition of the helper, as `chaic eval --behavior`.
     pub behavior: String,
-    /// Episodes of each task that validations play.
+    /// Validation episodes per task.
     pub validation_episodes: usize,
-    /// What is rewarded.
+    /// Weights of the reward terms.
+    #[serde(with = "reward_config::per_action")]
     pub rewards: RewardWeights,
-    /// How it learns; the discount is of a decision.
-    pub ppo: PpoRules,
+    /// PPO hyperparameters; the time unit of `gamma` is a decision.
+    pub ppo: PpoConfig,
 }
 
-impl Default for PrimitiveRules {
-    /// The paper's: 10^4 decisions, an update after every two, batches of two, all else as in Stable-Baselines3.
-    fn default() -> PrimitiveRules {
-        let sb3 = PpoRules::default();
-        PrimitiveRules {
+impl Default for PrimitiveConfig {
+    /// Defaults of the paper: 10^4 decisions, an update after every two, minibatches of two,
+    /// otherwise as in Stable-Baselines3.
+    fn default() -> PrimitiveConfig {
+        let defaults = PpoConfig::default();
+        PrimitiveConfig {
             seed: 1,
-            updates: 5000,
-            envs: 1,
-            rollout: 2,
+            n_updates: 5000,
+            n_envs: 1,
+            n_steps: 2,
             tasks: vec![TaskId::NoConstraint],
             image_size: 128,
             perception: GROUND_TRUTH.to_owned(),
             behavior: GROUND_TRUTH.to_owned(),
             validation_episodes: 4,
             rewards: RewardWeights::STANDARD,
-            ppo: PpoRules { batch: 2, shards: 1, ..sb3 },
+            ppo: PpoConfig { batch_size: 2, shards: 1, ..defaults },
         }
     }
 }
 
-impl PrimitiveRules {
-    fn sight(&self) -> Result<Arc<dyn Sight>, SightError> {
-        sights::named(&self.perception, &self.behavior)
+impl PrimitiveConfig {
+    fn perception_factory(&self) -> Result<Arc<dyn PerceptionFactory>, PerceptionError> {
+        perception_registry::perception_from_name(&self.perception, &self.behavior)
     }
 
-    /// The `k`th episode that is played in one of the places.
-    fn episode(&self, place: usize, k: u64) -> String {
-        let index = k * self.envs as u64 + place as u64;
-        let (first, n) = TRAINING_SEEDS;
+    /// Returns the id of the `k`th episode of an environment.
+    fn episode(&self, slot: usize, k: u64) -> String {
+        let index = k * self.n_envs as u64 + slot as u64;
         let task = self.tasks[index as usize % self.tasks.len()];
-        let seed = first + Stream::new(self.seed, "episodes", index).below(n) as u64;
+        let seed = SeedRange::POLICY_TRAIN.draw(&mut RngStream::new(self.seed, "episodes", index));
         format!("{}/gen/{seed}", task.name())
     }
 }
 
-/// A helper that is learning while it plays one episode after the other.
-struct Player {
-    place: usize,
-    n_begun: u64,
+/// Environment with the learning helper, which plays one episode after another.
+struct EnvRunner {
+    slot: usize,
+    n_started: u64,
     env: Env,
-    onlooker: Onlooker,
-    /// What was chosen in this episode so far.
-    choices: Vec<u8>,
-    /// What is seen now.
-    seen: Seen,
+    encoder: ObservationEncoder,
+    /// Actions chosen in the current episode.
+    actions: Vec<u8>,
+    /// Current observation.
+    observation: PrimitiveObservation,
     pass: Pass,
 }
 
-/// What came of a choice.
-struct Came {
+/// Outcome of an action.
+struct StepOutcome {
     reward: f32,
     is_invalid: bool,
     has_ended: bool,
 }
 
-impl Player {
-    fn begin(
-        rules: &PrimitiveRules,
-        sight: &dyn Sight,
-        (place, n_begun): (usize, u64),
+impl EnvRunner {
+    fn new(
+        config: &PrimitiveConfig,
+        perception: &dyn PerceptionFactory,
+        slot: usize,
+        n_started: u64,
         pass: Pass,
-    ) -> Result<Player, RolloutError> {
-        let episode = find_episode(&rules.episode(place, n_begun))?;
-        let (mut onlooker, grants) = Onlooker::new(RuleSet::PAPER.planner, sight);
-        let senses =
-            chaic_core::observation::Senses { image_size: rules.image_size, ..onlooker.senses() };
-        let minds = Minds { helper: Some(Seat::of_caller(grants, senses)), partner: None };
+    ) -> Result<EnvRunner, RolloutError> {
+        let episode = find_episode(&config.episode(slot, n_started))?;
+        let (mut encoder, grants) = ObservationEncoder::new(RuleSet::PAPER.planner, perception);
+        let sensors = SensorConfig { image_size: config.image_size, ..encoder.sensors() };
+        let agents =
+            EpisodeAgents { helper: Some(AgentSlot::external(grants, sensors)), partner: None };
         let config = EpisodeConfig {
-            episode: &episode,
-            seed: 0,
-            rules: RuleSet::PAPER,
-            helper: "learner",
-            partner: None,
-            image_size: Some(rules.image_size),
-            appearance: Appearance::Canonical,
+            image_size: Some(config.image_size),
+            ..EpisodeConfig::new(&episode, "learner")
         };
-        let mut env = Env::new(config, minds)?;
-        onlooker.reset(&env.briefing(AgentId::HELPER));
+        let mut env = Env::new(config, agents)?;
+        encoder.reset(&env.briefing(AgentId::HELPER));
         env.advance(None)?;
-        let seen = env.observe(AgentId::HELPER).and_then(|o| onlooker.look(o));
-        let seen = seen.expect("the helper is asked before an episode ends");
-        Ok(Player { place, n_begun, env, onlooker, choices: Vec::new(), seen, pass })
+        let observation = env.observe(AgentId::HELPER).and_then(|o| encoder.encode(o));
+        let observation = observation.expect("the helper decides before an episode ends");
+        Ok(EnvRunner { slot, n_started, env, encoder, actions: Vec::new(), observation, pass })
     }
 
-    /// Acts, until the next choice or the end; what is seen then is new only if it hasn't ended.
-    fn act(&mut self, choice: usize, rewards: &RewardWeights) -> Result<Came, RolloutError> {
-        self.choices.push(choice as u8);
-        let action = self.onlooker.action(choice);
+    /// Takes an action and advances to the next decision or the end. After the end the observation
+    /// is outdated.
+    fn act(
+        &mut self,
+        action_index: usize,
+        rewards: &RewardWeights,
+    ) -> Result<StepOutcome, RolloutError> {
+        self.actions.push(action_index as u8);
+        let action = self.encoder.action(action_index);
         self.env.submit(AgentId::HELPER, action.unwrap_or(PAUSE));
-        let has_ended = self.env.advance(None)? == Flow::Ended;
+        let has_ended = self.env.advance(None)? == AdvanceOutcome::Ended;
         let terms = self.env.reward(AgentId::HELPER);
         let is_invalid = action.is_none() || terms.is_some_and(|t| t.is_invalid);
         let terms = terms.map(|t| chaic_env::RewardTerms { is_invalid, ..t });
         if !has_ended && let Some(observation) = self.env.observe(AgentId::HELPER) {
-            self.seen = self.onlooker.look(observation).unwrap_or_else(|| self.seen.clone());
+            self.observation =
+                self.encoder.encode(observation).unwrap_or_else(|| self.observation.clone());
         }
         let reward = terms.map_or(0.0, |t| t.weigh(rewards)) as f32;
-        Ok(Came { reward, is_invalid, has_ended })
+        Ok(StepOutcome { reward, is_invalid, has_ended })
     }
 
-    fn position(&self) -> Position {
-        Position { n_begun: self.n_begun, choices: self.choices.clone() }
+    fn progress(&self) -> EpisodeProgress {
+        EpisodeProgress { n_started: self.n_started, actions: self.actions.clone() }
     }
 
-    fn say(&mut self, model: &PrimitiveNetwork, numbers: &[f32]) -> Said {
-        model.forward(numbers, std::iter::once(&self.seen), &mut self.pass).remove(0)
+    fn evaluate(&mut self, model: &PrimitiveNetwork, parameters: &[f32]) -> ActorCriticOutput {
+        model.forward(parameters, std::iter::once(&self.observation), &mut self.pass).remove(0)
     }
 }
 
-/// What a place played between two updates.
+/// Experience of one environment between two updates.
 #[derive(Default)]
-struct Played {
-    trajectories: Vec<Trajectory<Seen>>,
+struct Experience {
+    trajectories: Vec<Trajectory<PrimitiveObservation>>,
     reward: f64,
     n_invalid: usize,
 }
 
-/// Where a place is: how many episodes it has begun, and what was chosen in the one that is under way.
+/// Progress of an environment: number of episodes started before, and actions of the current one.
 #[derive(Clone, Debug, Default)]
-struct Position {
-    n_begun: u64,
-    choices: Vec<u8>,
+struct EpisodeProgress {
+    n_started: u64,
+    actions: Vec<u8>,
 }
 
-/// A policy of single actions while it learns.
-pub struct PrimitiveTraining {
-    rules: PrimitiveRules,
-    sight: Arc<dyn Sight>,
+/// Trainer of a policy of primitive actions.
+pub struct PrimitiveTrainer {
+    config: PrimitiveConfig,
+    perception: Arc<dyn PerceptionFactory>,
     model: PrimitiveNetwork,
     learner: Learner,
     updates: u64,
-    players: Vec<Player>,
-    /// Where the players were before an update that was stopped; they are put there before the next one.
-    before: Option<Vec<Position>>,
+    runners: Vec<EnvRunner>,
+    /// Progress of the environments before an update that was stopped; it is restored before the
+    /// next update.
+    interrupted_at: Option<Vec<EpisodeProgress>>,
 }
 
-impl PrimitiveTraining {
-    /// Plays the episodes that are under way up to these positions; `None` if it was stopped.
-    fn replay(&self, at: &[Position], stop: &AtomicBool) -> Result<Option<Vec<Player>>, String> {
-        let PrimitiveTraining { rules, sight, model, .. } = self;
-        replay(rules, &**sight, model, at, stop)
+impl PrimitiveTrainer {
+    /// Replays the current episodes up to this progress; `None` if it was stopped.
+    fn replay(
+        &self,
+        progress: &[EpisodeProgress],
+        stop: &AtomicBool,
+    ) -> Result<Option<Vec<EnvRunner>>, String> {
+        let PrimitiveTrainer { config, perception, model, .. } = self;
+        replay(config, &**perception, model, progress, stop)
     }
 
-    fn positions(&self) -> Vec<Position> {
-        match &self.before {
-            Some(before) => before.clone(),
-            None => self.players.iter().map(Player::position).collect(),
+    fn progress(&self) -> Vec<EpisodeProgress> {
+        match &self.interrupted_at {
+            Some(interrupted_at) => interrupted_at.clone(),
+            None => self.runners.iter().map(EnvRunner::progress).collect(),
         }
     }
 
-    /// Plays on in one place; `None` if it was stopped.
-    fn roll(
-        rules: &PrimitiveRules,
-        sight: &dyn Sight,
-        (model, numbers): (&PrimitiveNetwork, &[f32]),
-        player: &mut Player,
+    /// Collects experience in one environment; `None` if it was stopped.
+    fn collect_experience(
+        config: &PrimitiveConfig,
+        perception: &dyn PerceptionFactory,
+        model: &PrimitiveNetwork,
+        parameters: &[f32],
+        runner: &mut EnvRunner,
         update: u64,
         stop: &AtomicBool,
-    ) -> Result<Option<Played>, RolloutError> {
-        let index = update * rules.envs as u64 + player.place as u64;
-        let mut rng = Stream::new(rules.seed, "actions", index);
-        let mut played = Played::default();
+    ) -> Result<Option<Experience>, RolloutError> {
+        let index = update * config.n_envs as u64 + runner.slot as u64;
+        let mut rng = RngStream::new(config.seed, "actions", index);
+        let mut experience = Experience::default();
         let mut trajectory = Trajectory::default();
-        for _ in 0..rules.rollout {
+        for _ in 0..config.n_steps {
             if stop.load(Ordering::Relaxed) {
                 return Ok(None);
             }
-            let said = player.say(model, numbers);
-            let choice = said.sample(rng.unit());
-            let decision = player.seen.clone();
-            let came = player.act(choice, &rules.rewards)?;
-            played.reward += f64::from(came.reward);
-            played.n_invalid += usize::from(came.is_invalid);
+            let output = runner.evaluate(model, parameters);
+            let action_index = output.sample(rng.unit());
+            let observation = runner.observation.clone();
+            let outcome = runner.act(action_index, &config.rewards)?;
+            experience.reward += f64::from(outcome.reward);
+            experience.n_invalid += usize::from(outcome.is_invalid);
             trajectory.transitions.push(Transition {
-                decision,
-                choice,
-                log_probability: said.log_probabilities[choice],
-                value: said.value(),
-                reward: came.reward,
+                observation,
+                action: action_index,
+                log_prob: output.log_probs[action_index],
+                value: output.value(),
+                reward: outcome.reward,
                 duration: 1.0,
             });
-            if came.has_ended {
-                played.trajectories.push(std::mem::take(&mut trajectory));
-                let next = (player.place, player.n_begun + 1);
-                let pass = player.pass.clone();
-                *player = Player::begin(rules, sight, next, pass)?;
+            if outcome.has_ended {
+                experience.trajectories.push(std::mem::take(&mut trajectory));
+                let (slot, n_started) = (runner.slot, runner.n_started + 1);
+                let pass = runner.pass.clone();
+                *runner = EnvRunner::new(config, perception, slot, n_started, pass)?;
             }
         }
         if !trajectory.transitions.is_empty() {
-            trajectory.value_after = player.say(model, numbers).value();
-            played.trajectories.push(trajectory);
+            trajectory.bootstrap_value = runner.evaluate(model, parameters).value();
+            experience.trajectories.push(trajectory);
         }
-        Ok(Some(played))
+        Ok(Some(experience))
     }
 }
 
-/// Plays the episodes that are under way up to these positions; `None` if it was stopped.
+/// Replays the current episodes up to this progress; `None` if it was stopped.
 ///
 /// # Errors
-/// A predicate that says what is wrong with the positions.
+/// Predicate that describes what is wrong with the progress.
 fn replay(
-    rules: &PrimitiveRules,
-    sight: &dyn Sight,
+    config: &PrimitiveConfig,
+    perception: &dyn PerceptionFactory,
     model: &PrimitiveNetwork,
-    at: &[Position],
+    progress: &[EpisodeProgress],
     stop: &AtomicBool,
-) -> Result<Option<Vec<Player>>, String> {
-    let one = |(place, position): (usize, &Position)| {
-        let failed = |e: RolloutError| format!("has an episode that can't be played: {e}");
+) -> Result<Option<Vec<EnvRunner>>, String> {
+    let replay_one = |(slot, progress): (usize, &EpisodeProgress)| {
+        let failed = |e: RolloutError| format!("has an episode that cannot be played: {e}");
         if stop.load(Ordering::Relaxed) {
             return Ok(None);
         }
-        let begun = Player::begin(rules, sight, (place, position.n_begun), model.pass());
-        let mut player = begun.map_err(failed)?;
-        for choice in &position.choices {
+        let runner = EnvRunner::new(config, perception, slot, progress.n_started, model.pass());
+        let mut runner = runner.map_err(failed)?;
+        for action_index in &progress.actions {
             if stop.load(Ordering::Relaxed) {
                 return Ok(None);
             }
-            let came = player.act(usize::from(*choice), &rules.rewards).map_err(failed)?;
-            if came.has_ended {
-                return Err("goes on after the end of an episode".to_owned());
+            let outcome =
+                runner.act(usize::from(*action_index), &config.rewards).map_err(failed)?;
+            if outcome.has_ended {
+                return Err("continues after the end of an episode".to_owned());
             }
         }
-        Ok(Some(player))
+        Ok(Some(runner))
     };
-    let players: Result<Vec<Option<Player>>, String> = at.par_iter().enumerate().map(one).collect();
-    Ok(players?.into_iter().collect())
+    let runners: Result<Vec<Option<EnvRunner>>, String> =
+        progress.par_iter().enumerate().map(replay_one).collect();
+    Ok(runners?.into_iter().collect())
 }
 
-/// Largest number of decisions between two updates. One is kept in 74 kB, so that all take 5 GB.
+/// Maximum number of decisions between two updates. Each takes 74 kB, all of them 5 GB.
 const MAX_DECISIONS: usize = 1 << 16;
-/// Largest number of pixels of one eye in all environments. Each takes 25 bytes, so that all take 2 GB; beside them an
-/// environment takes 4 MB.
-const MAX_EYE_PX: usize = 1 << 26;
-/// Largest number of decisions of an optimizer step. A pass over their images takes a second, and can't be stopped.
+/// Maximum number of pixels of one camera summed over all environments. Each takes 25 bytes, all of
+/// them 2 GB. An environment takes another 4 MB.
+const MAX_CAMERA_PX: usize = 1 << 26;
+/// Maximum number of decisions per optimizer step. A pass over their images takes a second and
+/// cannot be stopped.
 const MAX_BATCH: i64 = 512;
 
 /// Sections of a checkpoint.
 const UPDATES: &str = "primitive.updates";
 const EPISODES: &str = "primitive.episodes_begun";
-const N_CHOICES: &str = "primitive.choices_of_each";
-const CHOICES: &str = "primitive.choices";
+const N_ACTIONS: &str = "primitive.choices_of_each";
+const ACTION_INDICES: &str = "primitive.choices";
 
-impl Training for PrimitiveTraining {
-    type Rules = PrimitiveRules;
+impl Trainer for PrimitiveTrainer {
+    type Config = PrimitiveConfig;
     const KIND: &'static str = "primitive";
     const WEIGHTS: &'static str = "policy.safetensors";
     const RECORD_STEPS: u64 = 50;
@@ -311,91 +329,97 @@ impl Training for PrimitiveTraining {
     const VALIDATION_STEPS: u64 = 2500;
     const BOUNDS: BoundTable = &[
         ("seed", SEED),
-        ("updates", STEPS),
-        ("envs", integer(1, 1024)),
-        ("rollout", integer(1, MAX_DECISIONS as i64)),
-        ("image_size", integer(IMAGE_SIDE as i64, 1024)),
+        ("n_updates", STEPS),
+        ("n_envs", integer(1, 1024)),
+        ("n_steps", integer(1, MAX_DECISIONS as i64)),
+        ("image_size", integer(IMAGE_SIZE as i64, 1024)),
         ("validation_episodes", integer(1, MAX_VALIDATION_EPISODES)),
         (
             "rewards",
-            Bound::Table(&[
-                ("delivered", REWARD),
-                ("approached_per_m", REWARD),
-                ("invalid", REWARD),
-            ]),
+            Bound::Table(&[("delivered", REWARD), ("progress_per_m", REWARD), ("invalid", REWARD)]),
         ),
         ("ppo", Bound::Table(&ppo_bounds(MAX_BATCH))),
     ];
 
     fn new(
-        rules: &PrimitiveRules,
+        config: &PrimitiveConfig,
         _: &Path,
         _: &mut dyn FnMut(&str),
         stop: &AtomicBool,
-    ) -> Result<Option<PrimitiveTraining>, TrainingError> {
-        let sight = rules.sight().map_err(TrainingError::of_data)?;
+    ) -> Result<Option<PrimitiveTrainer>, TrainingError> {
+        let perception = config.perception_factory().map_err(TrainingError::from_data)?;
         let model = PrimitiveNetwork::default();
-        let learner = Learner::new(model.network(), rules.seed, rules.ppo.shards);
-        let at = vec![Position::default(); rules.envs];
-        let players = replay(rules, &*sight, &model, &at, stop);
-        let players = players.map_err(|e| TrainingError::Rules(format!("`tasks` {e}")))?;
-        let Some(players) = players else { return Ok(None) };
-        let (rules, before) = (rules.clone(), None);
-        Ok(Some(PrimitiveTraining { rules, sight, model, learner, updates: 0, players, before }))
+        let learner = Learner::new(model.network(), config.seed, config.ppo.shards);
+        let progress = vec![EpisodeProgress::default(); config.n_envs];
+        let runners = replay(config, &*perception, &model, &progress, stop);
+        let runners = runners.map_err(|e| TrainingError::InvalidConfig(format!("`tasks` {e}")))?;
+        let Some(runners) = runners else { return Ok(None) };
+        let (config, interrupted_at) = (config.clone(), None);
+        Ok(Some(PrimitiveTrainer {
+            config,
+            perception,
+            model,
+            learner,
+            updates: 0,
+            runners,
+            interrupted_at,
+        }))
     }
 
-    fn check(rules: &PrimitiveRules) -> Result<(), String> {
-        let PrimitiveRules { envs, rollout, image_size, .. } = *rules;
-        if rules.tasks.is_empty() {
-            return Err("`tasks` names no task".to_owned());
+    fn check(config: &PrimitiveConfig) -> Result<(), String> {
+        let PrimitiveConfig { n_envs, n_steps, image_size, .. } = *config;
+        if config.tasks.is_empty() {
+            return Err("`tasks` is empty".to_owned());
         }
-        let side = image_size as usize;
-        if !side.is_multiple_of(IMAGE_SIDE) {
-            return Err(format!("`image_size` must be a multiple of {IMAGE_SIDE}, up to 1024"));
+        let image_px = image_size as usize;
+        if !image_px.is_multiple_of(IMAGE_SIZE) {
+            return Err(format!("`image_size` must be a multiple of {IMAGE_SIZE}, up to 1024"));
         }
-        if envs * side * side > MAX_EYE_PX {
+        if n_envs * image_px * image_px > MAX_CAMERA_PX {
             return Err(format!(
-                "`envs` times the square of `image_size` must be from 1 to {MAX_EYE_PX}, which memory holds"
+                "`n_envs` times the square of `image_size` must be from 1 to {MAX_CAMERA_PX} to fit in memory"
             ));
         }
-        if envs * rollout > MAX_DECISIONS {
+        if n_envs * n_steps > MAX_DECISIONS {
             return Err(format!(
-                "`envs` times `rollout` must be from 1 to {MAX_DECISIONS}, which memory holds"
+                "`n_envs` times `n_steps` must be from 1 to {MAX_DECISIONS} to fit in memory"
             ));
         }
-        rules.sight().map(|_| ()).map_err(|e| e.to_string())
+        config.perception_factory().map(|_| ()).map_err(|e| e.to_string())
     }
 
-    fn read_weights(_: &PrimitiveRules, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
-        Ok(TrainedPrimitive::from_bytes(weights)?.numbers)
+    fn read_weights(_: &PrimitiveConfig, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
+        Ok(PrimitiveWeights::from_bytes(weights)?.parameters)
     }
 
     fn network(&self) -> &Network {
         self.model.network()
     }
 
-    fn steps(&self) -> u64 {
-        self.rules.updates
+    fn total_steps(&self) -> u64 {
+        self.config.n_updates
     }
 
-    fn taken(&self) -> u64 {
+    fn steps_done(&self) -> u64 {
         self.updates
     }
 
     fn checkpoint(&self) -> Checkpoint {
-        // An episode is played again by what was chosen in it.
-        let at = self.positions();
+        // Resuming replays the current episodes by their actions.
+        let progress = self.progress();
         let mut checkpoint = Checkpoint::default();
         checkpoint.insert_integers(UPDATES, vec![self.updates]);
-        checkpoint.insert_integers(EPISODES, at.iter().map(|p| p.n_begun).collect());
-        checkpoint.insert_integers(N_CHOICES, at.iter().map(|p| p.choices.len() as u64).collect());
-        checkpoint.insert_bytes(CHOICES, at.into_iter().flat_map(|p| p.choices).collect());
+        checkpoint.insert_integers(EPISODES, progress.iter().map(|p| p.n_started).collect());
+        checkpoint
+            .insert_integers(N_ACTIONS, progress.iter().map(|p| p.actions.len() as u64).collect());
+        checkpoint
+            .insert_bytes(ACTION_INDICES, progress.into_iter().flat_map(|p| p.actions).collect());
         self.learner.save(&mut checkpoint);
         checkpoint
     }
 
-    fn begin_with(&mut self, numbers: Vec<f32>) {
-        self.learner.begin_with(numbers);
+    fn load_parameters(&mut self, parameters: Vec<f32>) {
+        self.learner.load_parameters(parameters);
     }
 
     fn resume(
@@ -404,142 +428,161 @@ impl Training for PrimitiveTraining {
         stop: &AtomicBool,
     ) -> Result<Option<()>, CheckpointError> {
         let updates = checkpoint.integer(UPDATES)?;
-        if updates > self.rules.updates {
+        if updates > self.config.n_updates {
             return Err(CheckpointError::section(UPDATES, format!("is {updates}")));
         }
-        let at = read_positions(&self.rules, updates, checkpoint)?;
+        let progress = read_progress(&self.config, updates, checkpoint)?;
         self.learner.load(checkpoint)?;
-        let players = self.replay(&at, stop);
-        let players = players.map_err(|e| CheckpointError::section(CHOICES, e))?;
-        let Some(players) = players else { return Ok(None) };
-        (self.players, self.updates, self.before) = (players, updates, None);
+        let runners = self.replay(&progress, stop);
+        let runners = runners.map_err(|e| CheckpointError::section(ACTION_INDICES, e))?;
+        let Some(runners) = runners else { return Ok(None) };
+        (self.runners, self.updates, self.interrupted_at) = (runners, updates, None);
         Ok(Some(()))
     }
 
-    fn step(&mut self, stop: &AtomicBool) -> Option<Figures> {
-        let at = self.positions();
-        if self.before.is_some() {
-            let players = self.replay(&at, stop);
-            self.players = players.expect("they were played before")?;
-            self.before = None;
+    fn step(&mut self, stop: &AtomicBool) -> Option<Metrics> {
+        let progress = self.progress();
+        if self.interrupted_at.is_some() {
+            let runners = self.replay(&progress, stop);
+            self.runners = runners.expect("the same episodes were played before")?;
+            self.interrupted_at = None;
         }
         let learner = self.learner.state();
-        let figures = self.update(stop);
-        if figures.is_none() {
-            self.before = Some(at);
+        let metrics = self.update(stop);
+        if metrics.is_none() {
+            self.interrupted_at = Some(progress);
             self.learner.set_state(learner);
         }
-        figures
+        metrics
     }
 
-    fn validate(&self, stop: &AtomicBool) -> Result<Option<(Figures, Vec<u8>)>, WeightsError> {
-        let PrimitiveTraining { rules, sight, model, learner, .. } = self;
-        let numbers = learner.numbers.clone();
-        let weights = weights::to_bytes(model.network(), &numbers, KIND)?;
-        let trained = Arc::new(TrainedPrimitive { model: model.clone(), numbers });
-        let seeds = || VALIDATION_SEEDS..VALIDATION_SEEDS + rules.validation_episodes as u64;
-        let ids: Vec<String> = rules
+    fn validate(&self, stop: &AtomicBool) -> Result<Option<(Metrics, Vec<u8>)>, WeightsError> {
+        let PrimitiveTrainer { config, perception, model, learner, .. } = self;
+        let parameters = learner.parameters.clone();
+        let bytes = weights::to_bytes(model.network(), &parameters, KIND)?;
+        let weights = Arc::new(PrimitiveWeights { model: model.clone(), parameters });
+        let first = SeedRange::POLICY_VALIDATION.first;
+        let seeds = || first..first + config.validation_episodes as u64;
+        let ids: Vec<String> = config
             .tasks
             .iter()
             .flat_map(|task| seeds().map(|seed| format!("{}/gen/{seed}", task.name())))
             .collect();
-        let tr = |id: &String| {
-            let helper =
-                PrimitiveHelper::helper(Arc::clone(&trained), RuleSet::PAPER.planner, &**sight);
-            play(id, rules.image_size, helper, stop)
+        let rate = |id: &String| {
+            let helper = PrimitiveHelper::create(
+                Arc::clone(&weights),
+                RuleSet::PAPER.planner,
+                &**perception,
+            );
+            transport_rate(id, config.image_size, helper, stop)
         };
-        let tr: Result<Vec<Option<f64>>, RolloutError> = ids.par_iter().map(tr).collect();
-        let tr = tr.expect("generated episodes can be played");
-        let Some(tr) = tr.into_iter().collect::<Option<Vec<f64>>>() else { return Ok(None) };
-        Ok(Some((figures([("tr", tr.iter().sum::<f64>() / tr.len() as f64)]), weights)))
+        let rates: Result<Vec<Option<f64>>, RolloutError> = ids.par_iter().map(rate).collect();
+        let rates = rates.expect("generated episodes can be played");
+        let Some(rates) = rates.into_iter().collect::<Option<Vec<f64>>>() else { return Ok(None) };
+        Ok(Some((metrics([("tr", rates.iter().sum::<f64>() / rates.len() as f64)]), bytes)))
     }
 }
 
-impl PrimitiveTraining {
-    /// Plays in all places and learns from it; `None` if it was stopped, with players and learner anywhere.
-    fn update(&mut self, stop: &AtomicBool) -> Option<Figures> {
-        let PrimitiveTraining { rules, sight, model, learner, updates, players, .. } = self;
-        let numbers = learner.numbers.clone();
-        let roll = |player: &mut Player| {
-            PrimitiveTraining::roll(rules, &**sight, (model, &numbers), player, *updates, stop)
+impl PrimitiveTrainer {
+    /// Collects experience and updates the network. Returns `None` if it was stopped, with
+    /// environments and learner in an unspecified state.
+    fn update(&mut self, stop: &AtomicBool) -> Option<Metrics> {
+        let PrimitiveTrainer { config, perception, model, learner, updates, runners, .. } = self;
+        let parameters = learner.parameters.clone();
+        let collect_experience = |runner: &mut EnvRunner| {
+            PrimitiveTrainer::collect_experience(
+                config,
+                &**perception,
+                model,
+                &parameters,
+                runner,
+                *updates,
+                stop,
+            )
         };
-        let played: Result<Vec<Option<Played>>, RolloutError> =
-            players.par_iter_mut().map(roll).collect();
-        let played = played.expect("generated episodes can be played");
-        let played: Vec<Played> = played.into_iter().collect::<Option<_>>()?;
-        let n = (rules.envs * rules.rollout) as f64;
-        let reward = played.iter().map(|p| p.reward).sum::<f64>() / n;
-        let invalid = played.iter().map(|p| p.n_invalid).sum::<usize>() as f64 / n;
-        let trajectories: Vec<_> = played.into_iter().flat_map(|p| p.trajectories).collect();
-        let rest = 1.0 - *updates as f32 / rules.updates as f32;
-        let named = (rules.seed, *updates, rest);
-        let told = improve(&rules.ppo, model, learner, &trajectories, named, stop)?;
+        let experience: Result<Vec<Option<Experience>>, RolloutError> =
+            runners.par_iter_mut().map(collect_experience).collect();
+        let experience = experience.expect("generated episodes can be played");
+        let experience: Vec<Experience> = experience.into_iter().collect::<Option<_>>()?;
+        let n = (config.n_envs * config.n_steps) as f64;
+        let reward = experience.iter().map(|e| e.reward).sum::<f64>() / n;
+        let invalid = experience.iter().map(|e| e.n_invalid).sum::<usize>() as f64 / n;
+        let trajectories: Vec<_> = experience.into_iter().flat_map(|e| e.trajectories).collect();
+        let progress_remaining = 1.0 - *updates as f32 / config.n_updates as f32;
+        let schedule = Schedule { seed: config.seed, iteration: *updates, progress_remaining };
+        let stats = update(&config.ppo, model, learner, &trajectories, schedule, stop)?;
         *updates += 1;
-        let Told { objective, value_loss, entropy, divergence, clipped, explained_variance } = told;
-        Some(figures([
+        let PpoMetrics {
+            policy_loss,
+            value_loss,
+            entropy,
+            approx_kl,
+            clip_fraction,
+            explained_variance,
+        } = stats;
+        Some(metrics([
             ("reward", reward),
             ("invalid", invalid),
-            ("objective", objective),
+            ("policy_loss", policy_loss),
             ("value_loss", value_loss),
             ("entropy", entropy),
-            ("divergence", divergence),
-            ("clipped", clipped),
+            ("approx_kl", approx_kl),
+            ("clip_fraction", clip_fraction),
             ("explained_variance", explained_variance),
         ]))
     }
 }
 
-/// Returns where each place was, as far as a training of so many updates can have come.
-fn read_positions(
-    rules: &PrimitiveRules,
+/// Returns the progress of each environment, checked against the number of updates.
+fn read_progress(
+    config: &PrimitiveConfig,
     updates: u64,
     checkpoint: &Checkpoint,
-) -> Result<Vec<Position>, CheckpointError> {
-    let begun = checkpoint.integers(EPISODES, rules.envs)?;
-    let n_choices = checkpoint.integers(N_CHOICES, rules.envs)?;
-    let mut choices = checkpoint.bytes(CHOICES)?;
-    // Every episode but the first one, and every choice, takes a decision.
-    let n_decisions = updates * rules.rollout as u64;
-    if let Some(n) = begun.iter().find(|n| **n > n_decisions) {
+) -> Result<Vec<EpisodeProgress>, CheckpointError> {
+    let episode_counts = checkpoint.integers(EPISODES, config.n_envs)?;
+    let n_actions = checkpoint.integers(N_ACTIONS, config.n_envs)?;
+    let mut actions = checkpoint.bytes(ACTION_INDICES)?;
+    // Every action, and every episode but the first, takes a decision.
+    let n_decisions = updates * config.n_steps as u64;
+    if let Some(n) = episode_counts.iter().find(|n| **n > n_decisions) {
         return Err(CheckpointError::section(EPISODES, format!("has {n}")));
     }
-    if choices.iter().any(|choice| usize::from(*choice) >= ACTIONS.len()) {
-        return Err(CheckpointError::section(CHOICES, "has a choice that is no action"));
+    if actions.iter().any(|action_index| usize::from(*action_index) >= ACTIONS.len()) {
+        return Err(CheckpointError::section(ACTION_INDICES, "has a value that is not an action"));
     }
-    let mut positions = Vec::new();
-    for (n_begun, n) in begun.iter().zip(n_choices) {
-        let of_place = usize::try_from(*n).ok().and_then(|n| choices.split_at_checked(n));
-        let Some((of_place, rest)) = of_place else {
-            return Err(CheckpointError::section(CHOICES, format!("has fewer than {n} left")));
+    let mut all_progress = Vec::new();
+    for (n_started, n) in episode_counts.iter().zip(n_actions) {
+        let split = usize::try_from(*n).ok().and_then(|n| actions.split_at_checked(n));
+        let Some((episode_actions, remaining)) = split else {
+            return Err(CheckpointError::section(
+                ACTION_INDICES,
+                format!("has fewer than {n} remaining"),
+            ));
         };
-        positions.push(Position { n_begun: *n_begun, choices: of_place.to_vec() });
-        choices = rest;
+        all_progress
+            .push(EpisodeProgress { n_started: *n_started, actions: episode_actions.to_vec() });
+        actions = remaining;
     }
-    match choices {
-        [] => Ok(positions),
-        more => Err(CheckpointError::section(CHOICES, format!("has {} too many", more.len()))),
+    match actions {
+        [] => Ok(all_progress),
+        more => {
+            Err(CheckpointError::section(ACTION_INDICES, format!("has {} too many", more.len())))
+        }
     }
 }
 
 /// Returns the transport rate of an episode; `None` if it was stopped.
-fn play(
+fn transport_rate(
     id: &str,
     image_size: u32,
     helper: Helper,
     stop: &AtomicBool,
 ) -> Result<Option<f64>, RolloutError> {
     let episode = find_episode(id)?;
-    let config = EpisodeConfig {
-        episode: &episode,
-        seed: 0,
-        rules: RuleSet::PAPER,
-        helper: "learner",
-        partner: None,
-        image_size: Some(image_size),
-        appearance: Appearance::Canonical,
-    };
+    let config =
+        EpisodeConfig { image_size: Some(image_size), ..EpisodeConfig::new(&episode, "learner") };
     let mut env = Env::new(config, Some(seeded_by_episode(helper, &config)))?;
-    if env.run(stop, None, &mut |_| Ok::<(), AgentError>(()))? != Flow::Ended {
+    if env.run(stop, None, &mut |_| Ok::<(), AgentError>(()))? != AdvanceOutcome::Ended {
         return Ok(None);
     }
     let (done, total) = env.world().progress();

@@ -1,25 +1,25 @@
-//! The network: strided convolutions over each crop, then pairs of pairs of moments.
+//! Behavior network: strided convolutions over each crop, then a binary tree over time.
 
 use chaic_nn::simd::widest;
 use chaic_nn::weights::WeightsError;
 use chaic_nn::{Kernel, Network, Node, Pass, Shape, Tensor, weights};
 
 use super::Behavior;
-use super::clip::{CROPS, Look, N_CHANNELS, read};
-use super::crop::{Crop, SIDE};
+use super::clip::{CROPS, ClipAugmentation, N_CHANNELS, fill_input};
+use super::crop::{PersonCrop, SIDE};
 
-/// Channels after each convolution over a crop; each halves its sides.
-const OF_CROP: [usize; 4] = [16, 32, 48, 64];
-/// Numbers of one moment, and after each joining of two.
-const OF_MOMENT: usize = 64;
-const OF_PAIRS: [usize; 5] = [96, 96, 128, 128, 128];
+/// Channels after each convolution of a crop; each halves the resolution.
+const CROP_CHANNELS: [usize; 4] = [16, 32, 48, 64];
+/// Channels of a crop's embedding.
+const EMBEDDING_CHANNELS: usize = 64;
+const TREE_CHANNELS: [usize; 5] = [96, 96, 128, 128, 128];
 
-/// The network.
+/// Behavior network.
 #[derive(Clone, Debug)]
 pub struct BehaviorNetwork {
     /// All layers.
     pub network: Network,
-    /// A number for each behavior, the greatest of which is the likeliest.
+    /// Logit of each behavior.
     pub head: Node,
 }
 
@@ -30,118 +30,118 @@ impl Default for BehaviorNetwork {
 }
 
 impl BehaviorNetwork {
-    /// The one that is trained and shipped.
+    /// Creates the network that is trained and shipped.
     pub fn new() -> BehaviorNetwork {
         let mut net = Network::default();
-        let mut at = net.input(N_CHANNELS);
-        let mut side = SIDE;
-        for (k, channels) in OF_CROP.into_iter().enumerate() {
-            at = net.conv(&format!("crop{k}"), at, Kernel { side: 3, stride: 2 }, channels);
-            at = net.norm_relu(&format!("crop{k}.norm"), at);
-            side /= 2;
+        let mut features = net.input(N_CHANNELS);
+        let mut size = SIDE;
+        for (k, channels) in CROP_CHANNELS.into_iter().enumerate() {
+            features =
+                net.conv(&format!("crop{k}"), features, Kernel { size: 3, stride: 2 }, channels);
+            features = net.norm_relu(&format!("crop{k}.norm"), features);
+            size /= 2;
         }
-        at = net.flatten(at, side);
-        at = net.conv("moment", at, Kernel::POINTWISE, OF_MOMENT);
-        at = net.norm_relu("moment.norm", at);
-        for (k, channels) in OF_PAIRS.into_iter().enumerate() {
-            at = net.pair(at);
-            at = net.conv(&format!("pair{k}"), at, Kernel::POINTWISE, channels);
-            at = net.norm_relu(&format!("pair{k}.norm"), at);
+        features = net.flatten(features, size);
+        features = net.conv("moment", features, Kernel::POINTWISE, EMBEDDING_CHANNELS);
+        features = net.norm_relu("moment.norm", features);
+        for (k, channels) in TREE_CHANNELS.into_iter().enumerate() {
+            features = net.concat_pairs(features);
+            features = net.conv(&format!("pair{k}"), features, Kernel::POINTWISE, channels);
+            features = net.norm_relu(&format!("pair{k}.norm"), features);
         }
-        let head = net.head("head", at, Behavior::ALL.len());
+        let head = net.output_head("head", features, Behavior::ALL.len());
         BehaviorNetwork { network: net, head }
     }
 
-    /// The shape of what it reads of so many clips.
+    /// Returns the shape of the input for a number of clips.
     pub fn input_shape(clips: usize) -> Shape {
         Shape { n: clips * CROPS, height: SIDE, width: SIDE, channels: N_CHANNELS }
     }
 }
 
-/// A trained network: its numbers, and how sure it is of what it says.
+/// Trained network with its temperature.
 #[derive(Clone, Debug)]
 pub struct TrainedBehavior {
     /// The network.
     pub network: BehaviorNetwork,
-    /// Its numbers.
-    pub numbers: Vec<f32>,
-    /// What its outputs are multiplied by before they become probabilities (temperature scaling, Guo
-    /// et al. 2017).
-    pub sharpness: f32,
+    /// Parameters of the network.
+    pub parameters: Vec<f32>,
+    /// Factor of the logits before softmax (temperature scaling, Guo et al. 2017).
+    pub inverse_temperature: f32,
 }
 
-/// What files of it say that they are.
+/// Kind in weights files.
 const KIND: &str = "chaic behavior 1";
 
-/// All that is in its file.
-fn of_file(network: &BehaviorNetwork) -> Network {
+/// Returns the network together with the temperature of the file.
+fn file_layout(network: &BehaviorNetwork) -> Network {
     let mut network = network.network.clone();
-    network.aside("sharpness", 1);
+    network.extra_parameters("sharpness", 1);
     network
 }
 
 impl TrainedBehavior {
-    /// The one that comes with chaic: weights/README.md says how it was made and how good it is.
+    /// Returns the network that chaic ships; weights/README.md documents its training and accuracy.
     pub fn built_in() -> TrainedBehavior {
         let bytes = include_bytes!("../../weights/behavior.safetensors");
-        TrainedBehavior::from_bytes(bytes).expect("a test reads it")
+        TrainedBehavior::from_bytes(bytes).expect("a test reads the shipped weights")
     }
 
-    /// From a safetensors file.
+    /// Reads a safetensors file.
     ///
     /// # Errors
-    /// [`WeightsError`] if it isn't a whole file of this network's weights.
+    /// [`WeightsError`] if the file is damaged or holds weights of another network.
     pub fn from_bytes(bytes: &[u8]) -> Result<TrainedBehavior, WeightsError> {
         let network = BehaviorNetwork::new();
-        let mut numbers = weights::from_bytes(&of_file(&network), bytes, KIND)?;
-        let sharpness = numbers.pop().unwrap_or(1.0);
-        Ok(TrainedBehavior { network, numbers, sharpness })
+        let mut parameters = weights::from_bytes(&file_layout(&network), bytes, KIND)?;
+        let inverse_temperature = parameters.pop().unwrap_or(1.0);
+        Ok(TrainedBehavior { network, parameters, inverse_temperature })
     }
 
-    /// Returns it as a safetensors file.
+    /// Writes a safetensors file.
     ///
     /// # Errors
-    /// If a number is not finite.
+    /// If a parameter is not finite.
     pub fn to_bytes(&self) -> Result<Vec<u8>, WeightsError> {
-        weights::to_bytes(&of_file(&self.network), &self.all_numbers(), KIND)
+        weights::to_bytes(&file_layout(&self.network), &self.all_parameters(), KIND)
     }
 
-    fn all_numbers(&self) -> Vec<f32> {
-        self.numbers.iter().chain([&self.sharpness]).copied().collect()
+    fn all_parameters(&self) -> Vec<f32> {
+        self.parameters.iter().chain([&self.inverse_temperature]).copied().collect()
     }
 
-    /// The first digits of the digest of its file, which name it.
+    /// Returns the digest of the weights file, twelve hexadecimal digits.
     pub fn digest(&self) -> String {
-        weights::digest_of(&of_file(&self.network), &self.all_numbers(), KIND)
+        weights::digest_of(&file_layout(&self.network), &self.all_parameters(), KIND)
     }
 
-    /// Working space.
+    /// Creates buffers for inference.
     pub fn pass(&self) -> Pass {
         Pass::new(&self.network.network, widest())
     }
 
-    /// The network's outputs for [`CROPS`] crops.
-    pub fn outputs(&self, crops: &[Crop], first: usize, pass: &mut Pass) -> Outputs {
+    /// Returns the logits of [`CROPS`] crops.
+    pub fn outputs(&self, crops: &[PersonCrop], first: usize, pass: &mut Pass) -> Outputs {
         let mut input = Tensor::zeros(BehaviorNetwork::input_shape(1));
-        read(crops, &Look::plain(first), &mut input.data);
-        pass.forward(&self.network.network, &self.numbers, &input);
-        let made = &pass.made(self.network.head).data;
-        std::array::from_fn(|k| made[k])
+        fill_input(crops, &ClipAugmentation::identity(first), &mut input.data);
+        pass.forward(&self.network.network, &self.parameters, &input);
+        let logits = &pass.activation(self.network.head).data;
+        std::array::from_fn(|k| logits[k])
     }
 
-    /// The probability of each behavior.
+    /// Returns the probability of each behavior.
     pub fn probabilities(&self, outputs: &Outputs) -> Outputs {
-        softmax(&outputs.map(|x| self.sharpness * x))
+        softmax(&outputs.map(|x| self.inverse_temperature * x))
     }
 }
 
-/// A number for each behavior.
+/// One value per behavior.
 pub type Outputs = [f32; Behavior::ALL.len()];
 
-/// Probabilities of outputs.
+/// Softmax.
 pub fn softmax(outputs: &Outputs) -> Outputs {
-    let most = outputs.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-    let powers = outputs.map(|x| crate::loss::exp(x - most));
-    let sum: f32 = powers.iter().sum();
-    powers.map(|x| x / sum)
+    let max = outputs.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let exponentials = outputs.map(|x| crate::loss::exp(x - max));
+    let sum: f32 = exponentials.iter().sum();
+    exponentials.map(|x| x / sum)
 }

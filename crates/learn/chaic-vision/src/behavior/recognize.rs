@@ -1,94 +1,102 @@
-//! What the others do, as a mind tells it from its own view: a network says what somebody did (action
-//! recognition), the memory to what (action grounding; paper section 4.1).
+//! Behavior model of an agent, from its own view. A network recognizes the action (action
+//! recognition), memory the object (action grounding; paper, section 4.1).
 
 use std::collections::VecDeque;
 use std::fmt;
 use std::sync::Arc;
 
 use chaic_agents::Intent;
-use chaic_agents::behavior::{BehaviorLog, BehaviorModel, SeenBehavior, SeenInteraction};
-use chaic_agents::mapping::Thing;
+use chaic_agents::behavior::{BehaviorLog, BehaviorModel, InferredBehavior, ObservedInteraction};
+use chaic_agents::mapping::MappedObject;
 use chaic_agents::memory::Memory;
 use chaic_agents::perception::Perception;
-use chaic_agents::sight::Sight;
-use chaic_core::geom::xz;
-use chaic_core::observation::{Film, Grants, Senses};
+use chaic_agents::perception_factory::PerceptionFactory;
+use chaic_core::geom::to_xz;
+use chaic_core::observation::{FrameHistorySpec, Grants, SensorConfig};
 use chaic_core::{Action, AgentId, FailureReason, Frame, Hand, Observation, Outcome, Vec2, Vec3};
 use chaic_nn::Pass;
 
 use super::Behavior;
 use super::clip::{CROPS, SLACK};
-use super::crop::{Crop, FILM, Watcher};
+use super::crop::{HISTORY, PersonCrop, PersonCropper};
 use super::network::TrainedBehavior;
-use super::report::likeliest;
+use super::report::most_probable;
 
-/// How behaviors are told one after the other.
+/// Thresholds of recognition.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RecognizerRules {
-    /// Nothing is told that is less sure (original: 0.6).
-    pub least_sure: f32,
-    /// Nothing is told of clips that show the person in less than this share of their crops.
-    pub least_seen: f32,
-    /// The same isn't told again within so many frames: clips overlap.
-    pub again_frames: Frame,
-    /// What was done was done to something no farther than this from the person, metres in plan.
+pub struct RecognizerConfig {
+    /// Minimum probability of a reported behavior (original: 0.6).
+    pub min_confidence: f32,
+    /// Minimum fraction of a clip's crops that show the person.
+    pub min_visible_fraction: f32,
+    /// Frames within which a behavior is not reported again, since clips overlap.
+    pub refractory_frames: Frame,
+    /// Maximum horizontal distance between the person and the object of an action, meters.
     pub reach_m: f32,
 }
 
-impl Default for RecognizerRules {
-    fn default() -> RecognizerRules {
-        RecognizerRules { least_sure: 0.6, least_seen: 0.2, again_frames: 45, reach_m: 2.0 }
+impl Default for RecognizerConfig {
+    fn default() -> RecognizerConfig {
+        RecognizerConfig {
+            min_confidence: 0.6,
+            min_visible_fraction: 0.2,
+            refractory_frames: 45,
+            reach_m: 2.0,
+        }
     }
 }
 
-/// Minds that see by something and recognize by a network what others do.
+/// Factory of agents with learned action recognition.
 #[derive(Clone)]
-pub struct Recognizing {
-    /// By what they see.
-    pub sight: Arc<dyn Sight>,
-    /// By what they recognize.
-    pub trained: Arc<TrainedBehavior>,
+pub struct LearnedBehaviorFactory {
+    /// Factory of their perception.
+    pub perception: Arc<dyn PerceptionFactory>,
+    /// Behavior network.
+    pub model: Arc<TrainedBehavior>,
 }
 
-impl Sight for Recognizing {
+impl PerceptionFactory for LearnedBehaviorFactory {
     fn name(&self) -> Option<String> {
-        let sight = self.sight.name().unwrap_or_else(|| "ground_truth".to_owned());
-        Some(format!("{sight}, behavior learned {}", self.trained.digest()))
+        let perception = self.perception.name().unwrap_or_else(|| "ground_truth".to_owned());
+        Some(format!("{perception}, behavior learned {}", self.model.digest()))
     }
 
-    fn senses(&self) -> Senses {
-        self.sight.senses()
+    fn sensors(&self) -> SensorConfig {
+        self.perception.sensors()
     }
 
-    /// Those who are told the goal are bounds, and are told what others do.
-    fn grants(&self, asked: Grants) -> Grants {
-        Grants { behavior: asked.behavior && asked.goal, ..self.sight.grants(asked) }
+    /// Helpers with a granted goal are upper bounds and keep their granted behaviors.
+    fn grants(&self, requested: Grants) -> Grants {
+        Grants {
+            behavior: requested.behavior && requested.goal,
+            ..self.perception.grants(requested)
+        }
     }
 
     fn perception(&self) -> Box<dyn Perception> {
-        self.sight.perception()
+        self.perception.perception()
     }
 
-    fn behavior(&self, watched: AgentId) -> Option<Box<dyn BehaviorModel>> {
-        Some(Box::new(LearnedBehavior::of(watched, Arc::clone(&self.trained))))
+    fn behavior(&self, person: AgentId) -> Option<Box<dyn BehaviorModel>> {
+        Some(Box::new(LearnedBehavior::new(person, Arc::clone(&self.model))))
     }
 }
 
-/// Recognizes what one person does.
+/// Recognizes the behaviors of one person.
 #[derive(Clone)]
 pub struct LearnedBehavior {
-    trained: Arc<TrainedBehavior>,
-    rules: RecognizerRules,
-    watched: AgentId,
-    watcher: Watcher,
-    crops: VecDeque<Crop>,
-    /// Crops since a clip was looked at last.
+    model: Arc<TrainedBehavior>,
+    config: RecognizerConfig,
+    person: AgentId,
+    cropper: PersonCropper,
+    crops: VecDeque<PersonCrop>,
+    /// Crops since the last classified clip.
     n_new: usize,
-    /// What is between that person's hands, told from tracks.
-    seen: SeenBehavior,
-    /// What the network told, with what it was done to.
-    told: Vec<(Behavior, SeenInteraction)>,
-    /// The last of each that was told, be it known to what or not.
+    /// Interactions inferred from tracks of held objects.
+    inferred: InferredBehavior,
+    /// Recognized behaviors with their objects.
+    recognized: Vec<(Behavior, ObservedInteraction)>,
+    /// Last recognized behavior, with or without a known object.
     last: Option<(Behavior, Frame)>,
     log: BehaviorLog,
     pass: Pass,
@@ -101,28 +109,29 @@ impl fmt::Debug for LearnedBehavior {
 }
 
 impl LearnedBehavior {
-    /// Watches this person.
-    pub fn of(watched: AgentId, trained: Arc<TrainedBehavior>) -> LearnedBehavior {
+    /// Creates a model of this person.
+    pub fn new(person: AgentId, model: Arc<TrainedBehavior>) -> LearnedBehavior {
         LearnedBehavior {
-            pass: trained.pass(),
-            trained,
-            rules: RecognizerRules::default(),
-            watched,
-            watcher: Watcher::of(watched),
+            pass: model.pass(),
+            model,
+            config: RecognizerConfig::default(),
+            person,
+            cropper: PersonCropper::new(person),
             crops: VecDeque::new(),
             n_new: 0,
-            seen: SeenBehavior::of(watched),
-            told: Vec::new(),
+            inferred: InferredBehavior::new(person),
+            recognized: Vec::new(),
             last: None,
             log: BehaviorLog::default(),
         }
     }
 
-    /// Takes in a crop; what is told of the clip that ends with it, if it is time to look at one. One
-    /// clip ends soon after the end of each action: as late as those that were learned from.
-    fn take_in(&mut self, crop: Crop) -> Option<(Behavior, Frame)> {
-        let goes_on = self.crops.back().is_some_and(|c| c.frame + FILM.every_frames == crop.frame);
-        if !goes_on {
+    /// Appends a crop; classifies the clip that ends with it if one is due. A clip ends soon after
+    /// each action, as in training data.
+    fn push(&mut self, crop: PersonCrop) -> Option<(Behavior, Frame)> {
+        let is_contiguous =
+            self.crops.back().is_some_and(|c| c.frame + HISTORY.every_frames == crop.frame);
+        if !is_contiguous {
             self.crops.clear();
         }
         let frame = crop.frame;
@@ -135,78 +144,86 @@ impl LearnedBehavior {
             return None;
         }
         self.n_new = 0;
-        let n_seen = self.crops.iter().filter(|crop| !crop.is_blank()).count();
-        if (n_seen as f32) < self.rules.least_seen * CROPS as f32 {
+        let n_visible = self.crops.iter().filter(|crop| !crop.is_blank()).count();
+        if (n_visible as f32) < self.config.min_visible_fraction * CROPS as f32 {
             return None;
         }
-        let outputs = self.trained.outputs(self.crops.make_contiguous(), 0, &mut self.pass);
-        let (behavior, sure) = likeliest(&self.trained.probabilities(&outputs));
-        let is_news = self
-            .last
-            .is_none_or(|(last, then)| last != behavior || then + self.rules.again_frames < frame);
-        (behavior != Behavior::Moving && sure >= self.rules.least_sure && is_news)
+        let outputs = self.model.outputs(self.crops.make_contiguous(), 0, &mut self.pass);
+        let (behavior, probability) = most_probable(&self.model.probabilities(&outputs));
+        let is_new = self.last.is_none_or(|(last, last_frame)| {
+            last != behavior || last_frame + self.config.refractory_frames < frame
+        });
+        (behavior != Behavior::Moving && probability >= self.config.min_confidence && is_new)
             .then_some((behavior, frame))
     }
 
-    /// What was done, and to what.
+    /// Returns the action of a behavior with its object.
     fn ground(&self, behavior: Behavior, memory: &Memory) -> Option<(Intent, Outcome)> {
-        let at = memory.people.get(self.watched)?.position_in_world;
-        let in_vain = Outcome::Failure(FailureReason::BeyondLimits);
-        // With which hand can't be told; nobody reads it.
+        let at = memory.people.get(self.person)?.position_in_world;
+        let beyond_limits = Outcome::Failure(FailureReason::BeyondLimits);
+        // The hand is unknown, and no policy reads it.
         let hand = Hand::Left;
         match behavior {
             Behavior::PickedUp => {
-                let held = self.seen.log().partner_holds.first().map(|(track, _)| *track);
-                let near = || self.nearest(memory, at).map(|thing| thing.track);
+                let held = self.inferred.log().partner_holds.first().map(|(track, _)| *track);
+                let near = || self.nearest(memory, at).map(|object| object.track);
                 let object = held.or_else(near)?;
                 Some((Action::PickUp { object, hand }, Outcome::Success))
             }
             Behavior::FailedToPickUp => {
                 let object = self.nearest(memory, at)?.track;
-                Some((Action::PickUp { object, hand }, in_vain))
+                Some((Action::PickUp { object, hand }, beyond_limits))
             }
             Behavior::PutIn => Some((Action::PutIn, Outcome::Success)),
             Behavior::PutOn | Behavior::FailedToPutOn => {
                 let places = memory.goal_places();
                 let near = places.into_iter().map(|(place, _)| place);
-                let place = self.nearest_of(near, xz(at))?.track;
-                let outcome = if behavior == Behavior::PutOn { Outcome::Success } else { in_vain };
+                let place = self.nearest_among(near, to_xz(at))?.track;
+                let outcome =
+                    if behavior == Behavior::PutOn { Outcome::Success } else { beyond_limits };
                 Some((Action::PutOn { place, hand }, outcome))
             }
             Behavior::Moving => None,
         }
     }
 
-    /// The movable thing nearest to somebody who stands here.
-    fn nearest<'a>(&self, memory: &'a Memory, at: Vec3) -> Option<&'a Thing> {
-        let own = |thing: &Thing| memory.hands.all().any(|(track, _)| track == thing.track);
-        let movable = memory.things.iter().filter(|thing| {
-            thing.is_present && !thing.is_gone && thing.class.info().is_movable() && !own(thing)
+    /// Returns the movable object nearest to a position.
+    fn nearest<'a>(&self, memory: &'a Memory, at: Vec3) -> Option<&'a MappedObject> {
+        let is_held =
+            |object: &MappedObject| memory.hands.all().any(|(track, _)| track == object.track);
+        let movable = memory.objects.iter().filter(|object| {
+            object.is_present
+                && !object.is_gone
+                && object.class.info().is_movable()
+                && !is_held(object)
         });
-        self.nearest_of(movable, xz(at))
+        self.nearest_among(movable, to_xz(at))
     }
 
-    fn nearest_of<'a>(
+    fn nearest_among<'a>(
         &self,
-        things: impl Iterator<Item = &'a Thing>,
+        objects: impl Iterator<Item = &'a MappedObject>,
         at: Vec2,
-    ) -> Option<&'a Thing> {
-        let near = things.filter(|thing| thing.distance_from(at) < self.rules.reach_m);
-        near.min_by(|a, b| a.distance_from(at).total_cmp(&b.distance_from(at)))
+    ) -> Option<&'a MappedObject> {
+        let in_reach = objects.filter(|object| object.distance_from(at) < self.config.reach_m);
+        in_reach.min_by(|a, b| a.distance_from(at).total_cmp(&b.distance_from(at)))
     }
 
-    /// What the hands tell and what the network tells, one after the other. That something was taken is
-    /// told once: by the hands, where they show it.
+    /// Merges the interactions inferred from tracks with the recognized ones. A pick-up that both
+    /// contain is reported once.
     fn merge(&self) -> BehaviorLog {
-        let seen = self.seen.log();
-        let mut log = seen.clone();
-        let is_known = |told: &SeenInteraction| {
-            told.outcome == Some(Outcome::Success)
-                && told.action.subject().is_some()
-                && seen.actions.iter().any(|a| a.action.subject() == told.action.subject())
+        let inferred = self.inferred.log();
+        let mut log = inferred.clone();
+        let is_inferred = |recognized: &ObservedInteraction| {
+            recognized.outcome == Some(Outcome::Success)
+                && recognized.action.subject().is_some()
+                && inferred
+                    .actions
+                    .iter()
+                    .any(|a| a.action.subject() == recognized.action.subject())
         };
-        let told = self.told.iter().map(|(_, told)| told);
-        log.actions.extend(told.filter(|told| !is_known(told)).copied());
+        let recognized = self.recognized.iter().map(|(_, recognized)| recognized);
+        log.actions.extend(recognized.filter(|recognized| !is_inferred(recognized)).copied());
         log.actions.sort_by_key(|action| action.frame);
         log
     }
@@ -214,22 +231,23 @@ impl LearnedBehavior {
 
 impl BehaviorModel for LearnedBehavior {
     fn reset(&mut self) {
-        *self = LearnedBehavior::of(self.watched, Arc::clone(&self.trained));
+        *self = LearnedBehavior::new(self.person, Arc::clone(&self.model));
     }
 
-    fn film(&self) -> Option<Film> {
-        Some(FILM)
+    fn frame_history(&self) -> Option<FrameHistorySpec> {
+        Some(HISTORY)
     }
 
-    fn watch(&mut self, observation: &Observation, memory: &Memory) {
-        self.seen.watch(observation, memory);
-        for crop in self.watcher.watch(observation, memory) {
-            let Some((behavior, frame)) = self.take_in(crop) else { continue };
+    fn observe(&mut self, observation: &Observation, memory: &Memory) {
+        self.inferred.observe(observation, memory);
+        for crop in self.cropper.crop(observation, memory) {
+            let Some((behavior, frame)) = self.push(crop) else { continue };
             self.last = Some((behavior, frame));
             if let Some((action, outcome)) = self.ground(behavior, memory) {
-                let agent = self.watched;
-                let told = SeenInteraction { agent, frame, action, outcome: Some(outcome) };
-                self.told.push((behavior, told));
+                let agent = self.person;
+                let recognized =
+                    ObservedInteraction { agent, frame, action, outcome: Some(outcome) };
+                self.recognized.push((behavior, recognized));
             }
         }
         self.log = self.merge();

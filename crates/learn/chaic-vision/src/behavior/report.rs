@@ -1,4 +1,4 @@
-//! How well behaviors are told.
+//! Evaluation of the behavior network.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
@@ -8,38 +8,38 @@ use serde::Serialize;
 use super::Behavior;
 use super::clip::{Clip, SLACK};
 use super::network::{Outputs, TrainedBehavior, softmax};
-use crate::parallel::in_order;
+use crate::parallel::map_in_order;
 
 const N: usize = Behavior::ALL.len();
 
-/// How good a network is on clips that it hasn't learned from.
+/// Accuracy on held-out clips.
 #[derive(Clone, Debug, Serialize)]
 pub struct BehaviorReport {
-    /// Clips that were looked at.
+    /// Number of evaluated clips.
     pub clips: usize,
-    /// Share of them that is told right.
+    /// Fraction of correctly classified clips.
     pub top1: f64,
-    /// Half of the 95 % interval of that share, by the normal approximation.
+    /// Half width of the 95 % interval of `top1` (normal approximation).
     pub interval: f64,
-    /// The mean of each behavior's share.
+    /// Mean recall over behaviors.
     pub balanced: f64,
-    /// Mean difference between how sure it is and how often it is right, over tenths of sureness.
+    /// Expected calibration error over ten bins.
     pub calibration_error: f64,
-    /// Of mixed clips, in which something went on but did not end just now: share told as moving.
+    /// Fraction of mixed clips that are classified as moving.
     pub mixed_as_moving: f64,
-    /// How many clips of the first behavior were told as the second.
+    /// Number of clips by true and predicted behavior.
     pub confusion: BTreeMap<&'static str, BTreeMap<&'static str, usize>>,
 }
 
-/// Returns the outputs for each clip, in their order; where a clip is read from changes from one to the next.
-/// Returns `None` if `stop` is raised meanwhile.
-pub fn outputs_of(
+/// Returns the logits of each clip, in order. Successive clips start at different crops. Returns
+/// `None` if `stop` is set meanwhile.
+pub fn all_outputs(
     trained: &TrainedBehavior,
     clips: &[Clip],
     n_threads: usize,
     stop: &AtomicBool,
 ) -> Option<Vec<Outputs>> {
-    in_order(
+    map_in_order(
         0..clips.len(),
         n_threads,
         stop,
@@ -48,61 +48,65 @@ pub fn outputs_of(
     )
 }
 
-/// The likeliest behavior, and its probability.
-pub fn likeliest(probabilities: &Outputs) -> (Behavior, f32) {
-    let sure = |b: &Behavior| probabilities[b.index()];
-    let best = Behavior::ALL.into_iter().max_by(|a, b| sure(a).total_cmp(&sure(b)));
-    best.map_or((Behavior::Moving, 0.0), |best| (best, sure(&best)))
+/// Returns the most probable behavior and its probability.
+pub fn most_probable(probabilities: &Outputs) -> (Behavior, f32) {
+    let probability = |b: &Behavior| probabilities[b.index()];
+    let best = Behavior::ALL.into_iter().max_by(|a, b| probability(a).total_cmp(&probability(b)));
+    best.map_or((Behavior::Moving, 0.0), |best| (best, probability(&best)))
 }
 
-/// Returns how good a network is on these clips; `None` if `stop` is raised meanwhile.
+/// Evaluates a network on clips; returns `None` if `stop` is set meanwhile.
 pub fn report(
     trained: &TrainedBehavior,
     clips: &[Clip],
     n_threads: usize,
     stop: &AtomicBool,
 ) -> Option<BehaviorReport> {
-    let outputs = outputs_of(trained, clips, n_threads, stop)?;
-    let told: Vec<(Behavior, f32)> =
-        outputs.iter().map(|o| likeliest(&trained.probabilities(o))).collect();
+    let outputs = all_outputs(trained, clips, n_threads, stop)?;
+    let predictions: Vec<(Behavior, f32)> =
+        outputs.iter().map(|o| most_probable(&trained.probabilities(o))).collect();
     let mut counts = [[0usize; N]; N];
-    let mut said = Vec::new();
-    let (mut mixed, mut mixed_right) = (0usize, 0usize);
-    for (clip, (behavior, sure)) in clips.iter().zip(told) {
+    let mut scored = Vec::new();
+    let (mut n_mixed, mut n_mixed_correct) = (0usize, 0usize);
+    for (clip, (behavior, probability)) in clips.iter().zip(predictions) {
         if clip.is_mixed {
-            mixed += 1;
-            mixed_right += usize::from(behavior == Behavior::Moving);
+            n_mixed += 1;
+            n_mixed_correct += usize::from(behavior == Behavior::Moving);
             continue;
         }
         counts[clip.label.index()][behavior.index()] += 1;
-        said.push((sure, behavior == clip.label));
+        scored.push((probability, behavior == clip.label));
     }
-    let n = said.len().max(1) as f64;
-    let top1 = said.iter().filter(|(_, right)| *right).count() as f64 / n;
+    let n = scored.len().max(1) as f64;
+    let top1 = scored.iter().filter(|(_, is_correct)| *is_correct).count() as f64 / n;
     let rows = counts.iter().enumerate().filter(|(_, row)| row.iter().sum::<usize>() > 0);
-    let shares: Vec<f64> =
+    let recalls: Vec<f64> =
         rows.map(|(k, row)| row[k] as f64 / row.iter().sum::<usize>() as f64).collect();
-    let named =
+    let counts_by_name =
         |row: &[usize; N]| Behavior::ALL.map(Behavior::name).into_iter().zip(*row).collect();
     Some(BehaviorReport {
-        clips: said.len(),
+        clips: scored.len(),
         top1,
         interval: 1.96 * (top1 * (1.0 - top1) / n).sqrt(),
-        balanced: shares.iter().sum::<f64>() / shares.len().max(1) as f64,
-        calibration_error: crate::calibration::calibration_error(&said),
-        mixed_as_moving: mixed_right as f64 / mixed.max(1) as f64,
-        confusion: Behavior::ALL.iter().map(|b| (b.name(), named(&counts[b.index()]))).collect(),
+        balanced: recalls.iter().sum::<f64>() / recalls.len().max(1) as f64,
+        calibration_error: crate::calibration::calibration_error(&scored),
+        mixed_as_moving: n_mixed_correct as f64 / n_mixed.max(1) as f64,
+        confusion: Behavior::ALL
+            .iter()
+            .map(|b| (b.name(), counts_by_name(&counts[b.index()])))
+            .collect(),
     })
 }
 
-/// The sharpness by which the probability of what was right is greatest, by golden-section steps.
+/// Returns the inverse temperature that maximizes the likelihood of the labels, by golden-section
+/// search.
 pub fn calibrate(clips: &[Clip], outputs: &[Outputs]) -> f32 {
-    let loss = |sharpness: f32| -> f64 {
-        let of = |(clip, o): (&Clip, &Outputs)| {
-            let p = softmax(&o.map(|x| sharpness * x))[clip.label.index()];
+    let loss = |inverse_temperature: f32| -> f64 {
+        let clip_loss = |(clip, o): (&Clip, &Outputs)| {
+            let p = softmax(&o.map(|x| inverse_temperature * x))[clip.label.index()];
             -f64::from(crate::loss::ln(p.max(1e-6)))
         };
-        clips.iter().zip(outputs).filter(|(clip, _)| !clip.is_mixed).map(of).sum()
+        clips.iter().zip(outputs).filter(|(clip, _)| !clip.is_mixed).map(clip_loss).sum()
     };
     let (mut low, mut high) = (0.1f32, 4.0f32);
     for _ in 0..30 {

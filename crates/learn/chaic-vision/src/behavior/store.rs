@@ -1,67 +1,71 @@
-//! Clips in a folder: a safetensors file for each round of episodes, so that collecting can be stopped
-//! and gone on with, and a training needn't collect again.
+//! Folder of clips: one safetensors file per round of episodes. Collection can be interrupted and
+//! resumed, and trainings reuse the clips.
 
 use std::borrow::Cow;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use chaic_core::Frame;
-use chaic_files::{FileError, read_bounded, write_whole};
+use chaic_files::{FileError, read_bounded, write_atomically};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 
 use super::Behavior;
 use super::clip::{CROPS, Clip, SLACK};
-use super::collect::CollectRules;
-use super::crop::{Crop, SIDE};
-use crate::views::Part;
+use super::config::ClipCollectionConfig;
+use super::crop::{PersonCrop, SIDE};
+use crate::views::DatasetSplit;
 
-/// What clips were collected by.
-const RULES: &str = "rules.toml";
-/// No file is larger, bytes.
-const MOST_BYTES: u64 = 1 << 30;
-/// Crops of a clip, and pixels of a crop.
+/// File of the collection's configuration.
+const CONFIG: &str = "rules.toml";
+/// Maximum size of a file, bytes.
+const MAX_BYTES: u64 = 1 << 30;
+/// Crops of a clip.
 const N_CROPS: usize = CROPS + SLACK;
 const N_PIXELS: usize = SIDE * SIDE;
 
-/// Why clips can't be kept or read.
+/// Error of a clip folder.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// The file system refuses.
+    /// The file system failed.
     #[error(transparent)]
     File(#[from] FileError),
-    /// It isn't what was written.
+    /// The file is damaged.
     #[error("{path} holds no clips: {problem}")]
     Format {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong.
+        /// Cause.
         problem: String,
     },
-    /// They were collected by other rules.
-    #[error("{0} has clips by other rules; choose another folder, or remove it")]
-    Rules(PathBuf),
+    /// The folder holds clips of another configuration.
+    #[error("{0} has clips of another configuration; choose another folder, or remove it")]
+    Config(PathBuf),
 }
 
-/// A folder of clips of one part by the same rules.
+/// Folder of clips of one split and configuration.
 #[derive(Clone, Debug)]
 pub struct ClipFolder(PathBuf);
 
 impl ClipFolder {
-    /// A new one, or one whose clips were collected by these rules.
+    /// Opens a folder, or creates it.
     ///
     /// # Errors
-    /// If they weren't, or the file system refuses.
-    pub fn open(folder: &Path, part: Part, rules: &CollectRules) -> Result<ClipFolder, StoreError> {
-        fs::create_dir_all(folder).map_err(FileError::of("make", folder))?;
-        let path = folder.join(RULES);
+    /// If the folder has clips of another configuration, or a file cannot be read or written.
+    pub fn open(
+        folder: &Path,
+        split: DatasetSplit,
+        config: &ClipCollectionConfig,
+    ) -> Result<ClipFolder, StoreError> {
+        fs::create_dir_all(folder).map_err(FileError::context("make", folder))?;
+        let path = folder.join(CONFIG);
         let text = format!(
-            "part = \"{part:?}\"\n{}",
-            toml::to_string(rules).expect("rules are plain data")
+            "part = \"{split}\"\n{}",
+            toml::to_string(config).expect("the configuration has string keys only")
         );
         if !path.exists() {
-            write_whole(&path, text.as_bytes())?;
-        } else if read_bounded(&path, MOST_BYTES)? != text.as_bytes() {
-            return Err(StoreError::Rules(folder.to_owned()));
+            write_atomically(&path, text.as_bytes())?;
+        } else if parse_config(&read_bounded(&path, MAX_BYTES)?) != parse_config(text.as_bytes()) {
+            return Err(StoreError::Config(folder.to_owned()));
         }
         Ok(ClipFolder(folder.to_owned()))
     }
@@ -70,30 +74,39 @@ impl ClipFolder {
         self.0.join(format!("clips-{first_episode:06}.safetensors"))
     }
 
-    /// Those of the round that begins with this episode; `None` if it hasn't been played.
+    /// Reads the clips of the round that starts with this episode; `None` if the round has not been
+    /// played.
     ///
     /// # Errors
-    /// If they can't be read.
+    /// If the file cannot be read.
     pub fn read(&self, first_episode: usize) -> Result<Option<Vec<Clip>>, StoreError> {
         let path = self.path(first_episode);
         if !path.exists() {
             return Ok(None);
         }
-        let bytes = read_bounded(&path, MOST_BYTES)?;
+        let bytes = read_bounded(&path, MAX_BYTES)?;
         let clips = from_bytes(&bytes);
         clips.map(Some).map_err(|problem| StoreError::Format { path, problem })
     }
 
-    /// Keeps those of a round.
+    /// Writes the clips of a round.
     ///
     /// # Errors
-    /// If the file system refuses.
+    /// If the file cannot be written.
     pub fn write(&self, first_episode: usize, clips: &[Clip]) -> Result<(), StoreError> {
-        Ok(write_whole(&self.path(first_episode), &to_bytes(clips))?)
+        Ok(write_atomically(&self.path(first_episode), &to_bytes(clips))?)
     }
 }
 
-/// The tensors of a file, with their types and shapes of one clip.
+/// Parses a configuration file into split and configuration; `None` if it is not one. Keys may be
+/// those of an earlier version.
+fn parse_config(text: &[u8]) -> Option<(toml::Value, ClipCollectionConfig)> {
+    let mut table: toml::Table = std::str::from_utf8(text).ok()?.parse().ok()?;
+    let split = table.remove("part")?;
+    Some((split, table.try_into().ok()?))
+}
+
+/// Tensors of a file: name, type and shape per clip.
 const TENSORS: [(&str, Dtype, &[usize]); 7] = [
     ("label", Dtype::U8, &[]),
     ("mixed", Dtype::U8, &[]),
@@ -104,17 +117,17 @@ const TENSORS: [(&str, Dtype, &[usize]); 7] = [
     ("depth", Dtype::U8, &[N_CROPS, SIDE, SIDE]),
 ];
 
-/// Clips as a safetensors file; crops that show nobody are black, at distance 0.
+/// Serializes clips as safetensors; crops without a person are black, at distance 0.
 pub fn to_bytes(clips: &[Clip]) -> Vec<u8> {
-    let of_crops = |of: &dyn Fn(&Crop) -> [u8; 4]| -> Vec<u8> {
-        clips.iter().flat_map(|clip| clip.crops.iter().flat_map(of)).collect()
+    let crop_values = |value: &dyn Fn(&PersonCrop) -> [u8; 4]| -> Vec<u8> {
+        clips.iter().flat_map(|clip| clip.crops.iter().flat_map(value)).collect()
     };
-    let images = |of: fn(&Crop) -> &Vec<u8>, n: usize| -> Vec<u8> {
+    let images = |channel: fn(&PersonCrop) -> &Vec<u8>, n: usize| -> Vec<u8> {
         let mut bytes = Vec::with_capacity(clips.len() * N_CROPS * n);
         for crop in clips.iter().flat_map(|clip| &clip.crops) {
             let image = match crop.is_blank() {
                 true => Cow::Owned(vec![0; n]),
-                false => Cow::Borrowed(of(crop)),
+                false => Cow::Borrowed(channel(crop)),
             };
             bytes.extend_from_slice(&image);
         }
@@ -123,47 +136,47 @@ pub fn to_bytes(clips: &[Clip]) -> Vec<u8> {
     let columns: [Vec<u8>; TENSORS.len()] = [
         clips.iter().map(|clip| clip.label.index() as u8).collect(),
         clips.iter().map(|clip| u8::from(clip.is_mixed)).collect(),
-        of_crops(&|crop| crop.frame.to_le_bytes()),
-        of_crops(&|crop| crop.distance_m.to_le_bytes()),
-        of_crops(&|crop| crop.speed.to_le_bytes()),
+        crop_values(&|crop| crop.frame.to_le_bytes()),
+        crop_values(&|crop| crop.distance_m.to_le_bytes()),
+        crop_values(&|crop| crop.speed.to_le_bytes()),
         images(|crop| &crop.rgb, 3 * N_PIXELS),
         images(|crop| &crop.depth, N_PIXELS),
     ];
-    let views = TENSORS.iter().zip(&columns).map(|((name, dtype, of_clip), bytes)| {
-        let shape = std::iter::once(clips.len()).chain(of_clip.iter().copied()).collect();
+    let views = TENSORS.iter().zip(&columns).map(|((name, dtype, clip_shape), bytes)| {
+        let shape = std::iter::once(clips.len()).chain(clip_shape.iter().copied()).collect();
         let view = TensorView::new(*dtype, shape, bytes);
-        ((*name).to_owned(), view.expect("as many bytes as its shape says"))
+        ((*name).to_owned(), view.expect("the length matches the shape"))
     });
-    serialize(views, None).expect("names and shapes are small")
+    serialize(views, None).expect("names are unique and shapes fit")
 }
 
-/// The clips in such a file; or what is wrong with it.
+/// Parses a file of clips; the error names the fault.
 fn from_bytes(bytes: &[u8]) -> Result<Vec<Clip>, String> {
     let file = SafeTensors::deserialize(bytes).map_err(|e| e.to_string())?;
     let n = file.tensor("label").map_err(|e| e.to_string())?.shape().first().copied();
     let n = n.unwrap_or(0);
     let mut columns: Vec<&[u8]> = Vec::new();
-    for (name, dtype, of_clip) in TENSORS {
+    for (name, dtype, clip_shape) in TENSORS {
         let tensor = file.tensor(name).map_err(|e| e.to_string())?;
-        let shape: Vec<usize> = std::iter::once(n).chain(of_clip.iter().copied()).collect();
+        let shape: Vec<usize> = std::iter::once(n).chain(clip_shape.iter().copied()).collect();
         if tensor.dtype() != dtype || tensor.shape() != shape {
             return Err(format!("{name} is not {dtype:?} {shape:?}"));
         }
         columns.push(tensor.data());
     }
-    let four = |column: usize, k: usize| -> [u8; 4] {
+    let bytes_at = |column: usize, k: usize| -> [u8; 4] {
         std::array::from_fn(|byte| columns[column][4 * k + byte])
     };
-    let crop = |k: usize| -> Result<Crop, String> {
-        let [distance_m, speed] = [3, 4].map(|column| f32::from_le_bytes(four(column, k)));
+    let crop = |k: usize| -> Result<PersonCrop, String> {
+        let [distance_m, speed] = [3, 4].map(|column| f32::from_le_bytes(bytes_at(column, k)));
         if !distance_m.is_finite() || !speed.is_finite() {
             return Err("a number is not finite".to_owned());
         }
-        let frame: Frame = Frame::from_le_bytes(four(2, k));
+        let frame: Frame = Frame::from_le_bytes(bytes_at(2, k));
         let image = |column: usize, n: usize| columns[column][k * n..][..n].to_vec();
         Ok(match distance_m == 0.0 {
-            true => Crop::blank(frame),
-            false => Crop {
+            true => PersonCrop::blank(frame),
+            false => PersonCrop {
                 frame,
                 distance_m,
                 speed,
@@ -174,7 +187,8 @@ fn from_bytes(bytes: &[u8]) -> Result<Vec<Clip>, String> {
     };
     let clip = |k: usize| {
         let label = Behavior::ALL.get(usize::from(columns[0][k])).ok_or("no such behavior")?;
-        let crops: Result<Vec<Crop>, String> = (N_CROPS * k..N_CROPS * (k + 1)).map(crop).collect();
+        let crops: Result<Vec<PersonCrop>, String> =
+            (N_CROPS * k..N_CROPS * (k + 1)).map(crop).collect();
         Ok(Clip { label: *label, is_mixed: columns[1][k] != 0, crops: crops? })
     };
     (0..n).map(clip).collect()
@@ -185,7 +199,7 @@ mod tests {
     use super::*;
 
     fn clip(label: Behavior, first: Frame) -> Clip {
-        let shown = |frame| Crop {
+        let visible = |frame| PersonCrop {
             frame,
             distance_m: 2.5,
             speed: 0.01,
@@ -193,15 +207,16 @@ mod tests {
             depth: vec![7; N_PIXELS],
         };
         let frames = (0..N_CROPS as Frame).map(|k| first + 3 * k);
-        let crops = frames.map(|f| if f % 2 == 0 { shown(f) } else { Crop::blank(f) }).collect();
+        let crops =
+            frames.map(|f| if f % 2 == 0 { visible(f) } else { PersonCrop::blank(f) }).collect();
         Clip { label, is_mixed: label == Behavior::Moving, crops }
     }
 
     #[test]
     fn clips_are_read_as_they_were_written() {
         let dir = tempfile::tempdir().unwrap();
-        let rules = CollectRules::default();
-        let folder = ClipFolder::open(dir.path(), Part::Training, &rules).unwrap();
+        let config = ClipCollectionConfig::default();
+        let folder = ClipFolder::open(dir.path(), DatasetSplit::Train, &config).unwrap();
         let clips = vec![clip(Behavior::PutIn, 5), clip(Behavior::Moving, 90)];
         folder.write(16, &clips).unwrap();
         assert!(folder.read(16).unwrap() == Some(clips));
@@ -211,17 +226,28 @@ mod tests {
     }
 
     #[test]
-    fn other_rules_and_broken_files_are_refused() {
+    fn a_folder_of_an_earlier_version_is_opened() {
         let dir = tempfile::tempdir().unwrap();
-        let rules = CollectRules::default();
-        let folder = ClipFolder::open(dir.path(), Part::Training, &rules).unwrap();
-        let other = CollectRules { seed: 2, ..rules };
-        let refused = ClipFolder::open(dir.path(), Part::Training, &other).unwrap_err();
-        assert!(refused.to_string().contains("by other rules"), "{refused}");
-        assert!(ClipFolder::open(dir.path(), Part::Test, &rules).is_err());
+        let text = "part = \"Training\"\nseed = 1\nof_each = 900\nepisodes = 1000\n\
+                    varied = 0.35\nlearned = 0.0\n";
+        fs::write(dir.path().join(CONFIG), text).unwrap();
+        let config = ClipCollectionConfig::default();
+        ClipFolder::open(dir.path(), DatasetSplit::Train, &config).unwrap();
+        assert!(ClipFolder::open(dir.path(), DatasetSplit::Validation, &config).is_err());
+    }
+
+    #[test]
+    fn other_configurations_and_damaged_files_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let config = ClipCollectionConfig::default();
+        let folder = ClipFolder::open(dir.path(), DatasetSplit::Train, &config).unwrap();
+        let other_config = ClipCollectionConfig { seed: 2, ..config };
+        let refused = ClipFolder::open(dir.path(), DatasetSplit::Train, &other_config).unwrap_err();
+        assert!(refused.to_string().contains("of another configuration"), "{refused}");
+        assert!(ClipFolder::open(dir.path(), DatasetSplit::Test, &config).is_err());
         let bytes = to_bytes(&[clip(Behavior::PutOn, 0)]);
-        for cut in [0, 7, 100, bytes.len() - 1] {
-            fs::write(folder.path(0), &bytes[..cut]).unwrap();
+        for length in [0, 7, 100, bytes.len() - 1] {
+            fs::write(folder.path(0), &bytes[..length]).unwrap();
             let error = folder.read(0).unwrap_err().to_string();
             assert!(error.contains("holds no clips"), "{error}");
         }

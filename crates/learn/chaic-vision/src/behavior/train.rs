@@ -3,253 +3,269 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use chaic_core::rng::Stream;
+use chaic_core::rng::RngStream;
 use chaic_nn::weights::WeightsError;
-use chaic_nn::{AdamRules, Network, Pass, Tensor};
-use chaic_training::bounds::{ADAM, Bound, BoundTable, RATE, SEED, SHARDS, SHARE, STEPS, integer};
+use chaic_nn::{AdamWConfig, Network, Pass, Tensor};
+use chaic_training::bounds::{
+    ADAM, Bound, BoundTable, FRACTION, LEARNING_RATE, SEED, SHARDS, STEPS, integer,
+};
 use chaic_training::{
-    Checkpoint, CheckpointError, Figures, Learner, Training, TrainingError, figures, rate_at,
+    Checkpoint, CheckpointError, Learner, Metrics, Trainer, TrainingError, learning_rate_at,
+    metrics,
 };
 use serde::{Deserialize, Serialize};
 
-use chaic_agents::sight::TrueSight;
+use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
 
 use super::Behavior;
-use super::clip::{Clip, Look, read};
-use super::collect::{COLLECT_BOUNDS, CollectRules, Collector, Counts, collect};
+use super::clip::{Clip, ClipAugmentation, fill_input};
+use super::collect::{Collector, Counts, collect};
+use super::config::{COLLECT_BOUNDS, ClipCollectionConfig};
 use super::network::{BehaviorNetwork, Outputs, TrainedBehavior, softmax};
-use super::report::{calibrate, outputs_of, report};
+use super::report::{all_outputs, calibrate, report};
 use super::store::ClipFolder;
 use crate::loss::ln;
-use crate::views::Part;
+use crate::views::DatasetSplit;
 
-/// Threads that play episodes and look at clips; what comes of it doesn't depend on them.
+/// Threads that play episodes and evaluate clips; results do not depend on it.
 const THREADS: usize = 2;
 
-/// What is trained on, and how.
+/// Configuration of a behavior training.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct BehaviorRules {
-    /// Of weights and batches.
+pub struct BehaviorTrainingConfig {
+    /// Seed of weights and batches.
     pub seed: u64,
-    /// Steps in all.
+    /// Number of steps.
     pub steps: u64,
-    /// Highest rate of steps.
-    pub rate: f32,
-    /// Steps during which it rises.
+    /// Maximum learning rate.
+    #[serde(alias = "rate")]
+    pub learning_rate: f32,
+    /// Steps of linear warm-up.
     pub warm_up: u64,
-    /// Parts of a batch that are worked on side by side.
+    /// Parts of a batch that are processed in parallel.
     pub shards: usize,
-    /// Clips of each part.
-    pub clips: usize,
-    /// Share of clips of moving people that are mixed.
-    pub mixed: f32,
-    /// How much of a label is shared out among all behaviors (Szegedy et al. 2016).
-    pub smoothing: f32,
-    /// How clips are made.
-    pub collect: CollectRules,
-    /// How steps are taken.
-    pub adam: AdamRules,
+    /// Clips per shard.
+    #[serde(alias = "clips")]
+    pub batch_size: usize,
+    /// Fraction of mixed clips among clips of moving people.
+    #[serde(alias = "mixed")]
+    pub mixed_fraction: f32,
+    /// Label smoothing (Szegedy et al. 2016).
+    #[serde(alias = "smoothing")]
+    pub label_smoothing: f32,
+    /// Configuration of clip collection.
+    pub collect: ClipCollectionConfig,
+    /// Configuration of the optimizer.
+    pub adam: AdamWConfig,
 }
 
-impl Default for BehaviorRules {
-    fn default() -> BehaviorRules {
-        BehaviorRules {
+impl Default for BehaviorTrainingConfig {
+    fn default() -> BehaviorTrainingConfig {
+        BehaviorTrainingConfig {
             seed: 1,
             steps: 6_000,
-            rate: 2e-3,
+            learning_rate: 2e-3,
             warm_up: 100,
             shards: 2,
-            clips: 8,
-            mixed: 0.6,
-            smoothing: 0.05,
-            collect: CollectRules::default(),
-            adam: AdamRules { weight_decay: 0.05, ..AdamRules::default() },
+            batch_size: 8,
+            mixed_fraction: 0.6,
+            label_smoothing: 0.05,
+            collect: ClipCollectionConfig::default(),
+            adam: AdamWConfig { weight_decay: 0.05, ..AdamWConfig::default() },
         }
     }
 }
 
-/// A behavior network while it learns.
-pub struct BehaviorTrainer {
-    /// Its rules.
-    pub rules: BehaviorRules,
+/// State of a behavior training.
+pub struct BehaviorLearner {
+    /// Its configuration.
+    pub config: BehaviorTrainingConfig,
     /// The network.
     pub network: BehaviorNetwork,
-    /// What is learned.
+    /// Parameters and optimizer.
     pub learner: Learner,
-    /// Clips of each behavior, and mixed ones.
+    /// Clips of each behavior; mixed clips are last.
     clips: [Vec<Clip>; Behavior::ALL.len() + 1],
 }
 
-/// What a step is worth.
+/// Metrics of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct BehaviorLoss {
+pub struct BehaviorMetrics {
     /// Mean cross entropy.
     pub loss: f64,
-    /// Share of clips told right.
-    pub right: f64,
+    /// Fraction of correctly classified clips.
+    pub accuracy: f64,
 }
 
-impl BehaviorTrainer {
-    /// Before the first step.
-    pub fn new(rules: BehaviorRules, clips: Vec<Clip>) -> BehaviorTrainer {
+impl BehaviorLearner {
+    /// Creates the state before the first step.
+    pub fn new(config: BehaviorTrainingConfig, clips: Vec<Clip>) -> BehaviorLearner {
         let network = BehaviorNetwork::new();
-        let learner = Learner::new(&network.network, rules.seed, rules.shards);
-        let mut sorted: [Vec<Clip>; Behavior::ALL.len() + 1] = Default::default();
+        let learner = Learner::new(&network.network, config.seed, config.shards);
+        let mut clips_by_kind: [Vec<Clip>; Behavior::ALL.len() + 1] = Default::default();
         for clip in clips {
             let kind = if clip.is_mixed { Behavior::ALL.len() } else { clip.label.index() };
-            sorted[kind].push(clip);
+            clips_by_kind[kind].push(clip);
         }
-        BehaviorTrainer { rules, network, learner, clips: sorted }
+        BehaviorLearner { config, network, learner, clips: clips_by_kind }
     }
 
-    /// The network so far: the slow mean of its numbers.
+    /// Returns the network with the exponential moving average of its parameters.
     pub fn trained(&self) -> TrainedBehavior {
-        let numbers = self.learner.average.clone();
-        TrainedBehavior { network: self.network.clone(), numbers, sharpness: 1.0 }
+        let parameters = self.learner.ema_parameters.clone();
+        TrainedBehavior { network: self.network.clone(), parameters, inverse_temperature: 1.0 }
     }
 
-    /// Takes a step; which clips are looked at depends on the seed and the step alone.
-    pub fn step(&mut self) -> BehaviorLoss {
+    /// Trains on one batch, which depends on the seed and the step only.
+    pub fn step(&mut self) -> BehaviorMetrics {
         let step = self.learner.adam.steps;
-        let BehaviorTrainer { rules, network, learner, clips } = self;
-        let (rules, network, clips) = (&*rules, &*network, &*clips);
-        let work = |shard: usize, numbers: &[f32], pass: &mut Pass, by: &mut [f32]| {
-            let index = step * rules.shards as u64 + shard as u64;
-            let mut rng = Stream::new(rules.seed, "clips", index);
-            let chosen: Vec<&Clip> =
-                (0..rules.clips).filter_map(|_| choose(clips, rules, &mut rng)).collect();
-            let shape = BehaviorNetwork::input_shape(chosen.len());
-            let mut input = Tensor::zeros(shape);
-            let n = shape.numbers() / chosen.len().max(1);
-            for (clip, out) in chosen.iter().zip(input.data.chunks_exact_mut(n.max(1))) {
-                read(&clip.crops, &Look::random(&mut rng), out);
-            }
-            pass.forward(&network.network, numbers, &input);
-            pass.begin_backward();
-            let made = pass.made(network.head).data.clone();
-            let by_head = &mut pass.gradient(network.head).data;
-            let told = loss(&made, &chosen, rules.smoothing, by_head);
-            pass.backward(&network.network, numbers, by);
-            Some(told)
+        let BehaviorLearner { config, network, learner, clips } = self;
+        let (config, network, clips) = (&*config, &*network, &*clips);
+        let shard_gradient =
+            |shard: usize, parameters: &[f32], pass: &mut Pass, gradient: &mut [f32]| {
+                let index = step * config.shards as u64 + shard as u64;
+                let mut rng = RngStream::new(config.seed, "clips", index);
+                let batch: Vec<&Clip> = (0..config.batch_size)
+                    .filter_map(|_| draw_clip(clips, config, &mut rng))
+                    .collect();
+                let shape = BehaviorNetwork::input_shape(batch.len());
+                let mut input = Tensor::zeros(shape);
+                let n = shape.len() / batch.len().max(1);
+                for (clip, out) in batch.iter().zip(input.data.chunks_exact_mut(n.max(1))) {
+                    fill_input(&clip.crops, &ClipAugmentation::random(&mut rng), out);
+                }
+                pass.forward(&network.network, parameters, &input);
+                pass.zero_gradients();
+                let logits = pass.activation(network.head).data.clone();
+                let head_gradient = &mut pass.gradient(network.head).data;
+                let metrics = loss(&logits, &batch, config.label_smoothing, head_gradient);
+                pass.backward(&network.network, parameters, gradient);
+                Some(metrics)
+            };
+        let learning_rate =
+            learning_rate_at(step, config.learning_rate, config.warm_up, config.steps);
+        let metrics = learner.step(&network.network, &config.adam, learning_rate, shard_gradient);
+        let metrics = metrics.expect("no shard stops");
+        let mean = |metric: fn(&BehaviorMetrics) -> f64| {
+            metrics.iter().map(metric).sum::<f64>() / metrics.len() as f64
         };
-        let rate = rate_at(step, (rules.rate, rules.warm_up, rules.steps));
-        let told = learner.step(&network.network, (&rules.adam, rate), work);
-        let told = told.expect("no shard stops");
-        let mean =
-            |of: fn(&BehaviorLoss) -> f64| told.iter().map(of).sum::<f64>() / told.len() as f64;
-        BehaviorLoss { loss: mean(|l| l.loss), right: mean(|l| l.right) }
+        BehaviorMetrics { loss: mean(|l| l.loss), accuracy: mean(|l| l.accuracy) }
     }
 }
 
-/// Clips of a validation, of each behavior.
+/// Maximum number of validation clips of each behavior.
 const VALIDATION_CLIPS: usize = 60;
-/// One of so many episodes is for validation.
-const VALIDATION_PART: usize = 4;
+/// Ratio of training episodes to validation episodes.
+const TRAINING_EPISODES_PER_VALIDATION: usize = 4;
 
-/// Largest number of clips that the shards work on at once. Each takes 17 MB, so that all take 9 GB.
+/// Maximum number of clips that all shards process at once. A clip takes 17 MB, which makes 9 GB.
 const MAX_BATCH_CLIPS: usize = 512;
 
-/// Largest number of clips of one shard. A pass over them takes 1.5 s, and can't be stopped.
+/// Maximum number of clips of a shard. A pass takes 1.5 s and cannot be interrupted.
 const MAX_SHARD_CLIPS: i64 = 64;
 
-/// A behavior network while it learns, with clips to validate it by.
-pub struct BehaviorTraining {
-    trainer: BehaviorTrainer,
+/// Behavior training with validation clips.
+pub struct BehaviorTrainer {
+    learner: BehaviorLearner,
     validation: Vec<Clip>,
 }
 
-impl BehaviorTraining {
-    /// Returns a training on these clips before its first step.
+impl BehaviorTrainer {
+    /// Creates the training before its first step.
     pub(crate) fn with_clips(
-        rules: BehaviorRules,
+        config: BehaviorTrainingConfig,
         training: Vec<Clip>,
         validation: Vec<Clip>,
-    ) -> BehaviorTraining {
-        BehaviorTraining { trainer: BehaviorTrainer::new(rules, training), validation }
+    ) -> BehaviorTrainer {
+        BehaviorTrainer { learner: BehaviorLearner::new(config, training), validation }
     }
 }
 
-impl Training for BehaviorTraining {
-    type Rules = BehaviorRules;
+impl Trainer for BehaviorTrainer {
+    type Config = BehaviorTrainingConfig;
     const KIND: &'static str = "behavior";
     const WEIGHTS: &'static str = "behavior.safetensors";
     const BOUNDS: BoundTable = &[
         ("seed", SEED),
         ("steps", STEPS),
-        ("rate", RATE),
+        ("learning_rate", LEARNING_RATE),
         ("warm_up", STEPS),
         ("shards", SHARDS),
-        ("clips", integer(1, MAX_SHARD_CLIPS)),
-        ("mixed", SHARE),
-        ("smoothing", SHARE),
+        ("batch_size", integer(1, MAX_SHARD_CLIPS)),
+        ("mixed_fraction", FRACTION),
+        ("label_smoothing", FRACTION),
         ("collect", Bound::Table(COLLECT_BOUNDS)),
         ("adam", ADAM),
     ];
 
     fn new(
-        rules: &BehaviorRules,
+        config: &BehaviorTrainingConfig,
         folder: &Path,
         progress: &mut dyn FnMut(&str),
         stop: &AtomicBool,
-    ) -> Result<Option<BehaviorTraining>, TrainingError> {
-        let mut clips = |part: Part| {
-            let CollectRules { of_each, episodes, .. } = rules.collect;
-            let (of_each, episodes) = match part {
-                Part::Training => (of_each, episodes),
-                _ => (of_each.min(VALIDATION_CLIPS), episodes.div_ceil(VALIDATION_PART)),
+    ) -> Result<Option<BehaviorTrainer>, TrainingError> {
+        let mut clips = |split: DatasetSplit| {
+            let ClipCollectionConfig { max_per_class, episodes, .. } = config.collect;
+            let (max_per_class, episodes) = match split {
+                DatasetSplit::Train => (max_per_class, episodes),
+                _ => (
+                    max_per_class.min(VALIDATION_CLIPS),
+                    episodes.div_ceil(TRAINING_EPISODES_PER_VALIDATION),
+                ),
             };
-            let rules = CollectRules { of_each, episodes, ..rules.collect };
-            let name = format!("{part:?}").to_lowercase();
-            let folder = ClipFolder::open(&folder.join("clips").join(&name), part, &rules)?;
-            let (sight, folder) = (&TrueSight, Some(&folder));
-            let collector = Collector { part, rules: &rules, sight, n_threads: THREADS, folder };
-            let mut told = |n: usize, counts: &Counts| {
+            let config = ClipCollectionConfig { max_per_class, episodes, ..config.collect };
+            let name = split.to_string().to_lowercase();
+            let folder = ClipFolder::open(&folder.join("clips").join(&name), split, &config)?;
+            let (perception, folder) = (&GroundTruthPerceptionFactory, Some(&folder));
+            let collector =
+                Collector { split, config: &config, perception, n_threads: THREADS, folder };
+            let mut report_progress = |n: usize, counts: &Counts| {
                 progress(&format!("{n} {name} episodes, clips {counts:?}"));
             };
-            collect(&collector, &mut told, stop)
+            collect(&collector, &mut report_progress, stop)
         };
-        let validation = clips(Part::Validation).map_err(TrainingError::of_data)?;
+        let validation = clips(DatasetSplit::Validation).map_err(TrainingError::from_data)?;
         let Some(validation) = validation else { return Ok(None) };
-        let training = clips(Part::Training).map_err(TrainingError::of_data)?;
+        let training = clips(DatasetSplit::Train).map_err(TrainingError::from_data)?;
         let Some(training) = training else { return Ok(None) };
-        Ok(Some(BehaviorTraining::with_clips(*rules, training, validation)))
+        Ok(Some(BehaviorTrainer::with_clips(*config, training, validation)))
     }
 
-    fn check(rules: &BehaviorRules) -> Result<(), String> {
-        let batch = rules.shards * rules.clips;
+    fn check(config: &BehaviorTrainingConfig) -> Result<(), String> {
+        let batch = config.shards * config.batch_size;
         if batch > MAX_BATCH_CLIPS {
             return Err(format!(
-                "shards times clips is {batch}; it must be from 1 to {MAX_BATCH_CLIPS}"
+                "shards times batch_size is {batch}; it must be from 1 to {MAX_BATCH_CLIPS}"
             ));
         }
         Ok(())
     }
 
-    fn read_weights(_: &BehaviorRules, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
-        Ok(TrainedBehavior::from_bytes(weights)?.numbers)
+    fn read_weights(_: &BehaviorTrainingConfig, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
+        Ok(TrainedBehavior::from_bytes(weights)?.parameters)
     }
 
     fn network(&self) -> &Network {
-        &self.trainer.network.network
+        &self.learner.network.network
     }
 
-    fn steps(&self) -> u64 {
-        self.trainer.rules.steps
+    fn total_steps(&self) -> u64 {
+        self.learner.config.steps
     }
 
-    fn taken(&self) -> u64 {
-        self.trainer.learner.adam.steps
+    fn steps_done(&self) -> u64 {
+        self.learner.learner.adam.steps
     }
 
     fn checkpoint(&self) -> Checkpoint {
         let mut checkpoint = Checkpoint::default();
-        self.trainer.learner.save(&mut checkpoint);
+        self.learner.learner.save(&mut checkpoint);
         checkpoint
     }
 
-    fn begin_with(&mut self, numbers: Vec<f32>) {
-        self.trainer.learner.begin_with(numbers);
+    fn load_parameters(&mut self, parameters: Vec<f32>) {
+        self.learner.learner.load_parameters(parameters);
     }
 
     fn resume(
@@ -257,59 +273,62 @@ impl Training for BehaviorTraining {
         checkpoint: &Checkpoint,
         _: &AtomicBool,
     ) -> Result<Option<()>, CheckpointError> {
-        self.trainer.learner.load(checkpoint).map(Some)
+        self.learner.learner.load(checkpoint).map(Some)
     }
 
-    fn step(&mut self, _: &AtomicBool) -> Option<Figures> {
-        // MAX_SHARD_CLIPS bounds how long it takes.
-        let BehaviorLoss { loss, right } = self.trainer.step();
-        Some(figures([("loss", loss), ("right", right)]))
+    fn step(&mut self, _: &AtomicBool) -> Option<Metrics> {
+        // `MAX_SHARD_CLIPS` bounds the duration of a step, so it is not interrupted.
+        let BehaviorMetrics { loss, accuracy } = self.learner.step();
+        Some(metrics([("loss", loss), ("accuracy", accuracy)]))
     }
 
-    fn validate(&self, stop: &AtomicBool) -> Result<Option<(Figures, Vec<u8>)>, WeightsError> {
-        let mut trained = self.trainer.trained();
-        let outputs = outputs_of(&trained, &self.validation, THREADS, stop);
+    fn validate(&self, stop: &AtomicBool) -> Result<Option<(Metrics, Vec<u8>)>, WeightsError> {
+        let mut trained = self.learner.trained();
+        let outputs = all_outputs(&trained, &self.validation, THREADS, stop);
         let Some(outputs) = outputs else { return Ok(None) };
-        trained.sharpness = calibrate(&self.validation, &outputs);
-        let found = report(&trained, &self.validation, THREADS, stop);
-        let Some(found) = found else { return Ok(None) };
-        let figures = figures([
-            ("top1", found.top1),
-            ("balanced", found.balanced),
-            ("mixed_as_moving", found.mixed_as_moving),
+        trained.inverse_temperature = calibrate(&self.validation, &outputs);
+        let evaluation = report(&trained, &self.validation, THREADS, stop);
+        let Some(evaluation) = evaluation else { return Ok(None) };
+        let metrics = metrics([
+            ("top1", evaluation.top1),
+            ("balanced", evaluation.balanced),
+            ("mixed_as_moving", evaluation.mixed_as_moving),
         ]);
-        Ok(Some((figures, trained.to_bytes()?)))
+        Ok(Some((metrics, trained.to_bytes()?)))
     }
 }
 
-/// A clip, of each behavior equally often.
-fn choose<'a>(
+/// Draws a clip, uniformly over behaviors.
+fn draw_clip<'a>(
     clips: &'a [Vec<Clip>; Behavior::ALL.len() + 1],
-    rules: &BehaviorRules,
-    rng: &mut Stream,
+    config: &BehaviorTrainingConfig,
+    rng: &mut RngStream,
 ) -> Option<&'a Clip> {
-    let there: Vec<usize> = (0..Behavior::ALL.len()).filter(|k| !clips[*k].is_empty()).collect();
-    let kind = *rng.choose(&there)?;
+    let non_empty: Vec<usize> =
+        (0..Behavior::ALL.len()).filter(|k| !clips[*k].is_empty()).collect();
+    let kind = *rng.choose(&non_empty)?;
     let mixed = &clips[Behavior::ALL.len()];
-    let is_mixed = rng.chance(rules.mixed) && kind == Behavior::Moving.index();
+    let is_mixed = rng.chance(config.mixed_fraction) && kind == Behavior::Moving.index();
     rng.choose(if is_mixed && !mixed.is_empty() { mixed } else { &clips[kind] })
 }
 
-/// The cross entropy of outputs for clips, with its gradient.
-fn loss(made: &[f32], clips: &[&Clip], smoothing: f32, by: &mut [f32]) -> BehaviorLoss {
+/// Computes the cross entropy of logits and its gradient.
+fn loss(logits: &[f32], clips: &[&Clip], smoothing: f32, gradient: &mut [f32]) -> BehaviorMetrics {
     const N: usize = Behavior::ALL.len();
-    let part = 1.0 / clips.len().max(1) as f32;
-    let mut told = BehaviorLoss::default();
-    let rows = made.as_chunks::<N>().0.iter().zip(by.as_chunks_mut::<N>().0);
-    for ((outputs, by), clip) in rows.zip(clips) {
+    let scale = 1.0 / clips.len().max(1) as f32;
+    let mut metrics = BehaviorMetrics::default();
+    let rows = logits.as_chunks::<N>().0.iter().zip(gradient.as_chunks_mut::<N>().0);
+    for ((outputs, gradient), clip) in rows.zip(clips) {
         let p: Outputs = softmax(outputs);
-        let own = clip.label.index();
-        told.loss -= f64::from(part * ln(p[own].max(1e-9)));
-        told.right += f64::from(part) * f64::from(u8::from(p.iter().all(|x| *x <= p[own])));
-        for (k, by) in by.iter_mut().enumerate() {
-            let wanted = smoothing / N as f32 + if k == own { 1.0 - smoothing } else { 0.0 };
-            *by = part * (p[k] - wanted);
+        let target = clip.label.index();
+        metrics.loss -= f64::from(scale * ln(p[target].max(1e-9)));
+        metrics.accuracy +=
+            f64::from(scale) * f64::from(u8::from(p.iter().all(|x| *x <= p[target])));
+        for (k, gradient) in gradient.iter_mut().enumerate() {
+            let target_probability =
+                smoothing / N as f32 + if k == target { 1.0 - smoothing } else { 0.0 };
+            *gradient = scale * (p[k] - target_probability);
         }
     }
-    told
+    metrics
 }

@@ -1,35 +1,36 @@
-// Triangles of visible instances as they lie on the image: a few workgroups a view.
+// Triangle setup of visible instances: several workgroups per view.
 
 @group(0) @binding(0) var<storage, read> views: array<View>;
 @group(0) @binding(1) var<storage, read> instances: array<Instance>;
 @group(0) @binding(2) var<storage, read> meshes: array<Mesh>;
 @group(0) @binding(3) var<storage, read> visible: array<u32>;
 @group(0) @binding(4) var<storage, read> levels: array<u32>;
-// `Tally` word by word, for the atomic count.
+// `Tally` as words, for the atomic count.
 @group(0) @binding(5) var<storage, read_write> tallies: array<atomic<u32>>;
-// Position, and what shading reads; shape [vertex].
+// Position and packed normal; shape [vertex].
 @group(0) @binding(6) var<storage, read> vertices: array<vec4u>;
-// Three vertices, skin, whether smooth, packed; shape [triangle].
+// Three vertices, material and smooth flag, packed; shape [triangle].
 @group(0) @binding(7) var<storage, read> triangles: array<vec2u>;
-// Where in the round's triangles each view's begin; shape [view].
-@group(0) @binding(8) var<storage, read> firsts: array<u32>;
-// First row, one past the last; first column, one past the last: 16 bits each.
+// Offset of each view's triangles in the arena; shape [view].
+@group(0) @binding(8) var<storage, read> first_triangles: array<u32>;
+// First row, end row; first column, end column: 16 bits each.
 @group(0) @binding(9) var<storage, read_write> bounds: array<vec2u>;
 // See `fill`; shape [triangle, 4].
-@group(0) @binding(10) var<storage, read_write> filled: array<vec4u>;
-@group(0) @binding(11) var<uniform> round: Round;
+@group(0) @binding(10) var<storage, read_write> setups: array<vec4u>;
+@group(0) @binding(11) var<uniform> round: RoundParams;
 
 const CROSSES_NEAR: u32 = 0x80000000u;
 const N_THREADS: u32 = 32u;
 
-// Where a triangle goes, and what it is called.
+// View and visibility id of a triangle.
 struct Slot {
     view: u32,
-    name: u32,
+    visibility_id: u32,
 }
 
-// Inverse depth over the image: `q + du * (u - u0) + dv * (v - v0)`, kept within [low, high].
-struct Slope {
+// Plane of inverse depth over the image: `q + du * (u - u0) + dv * (v - v0)`, clamped to [low,
+// high].
+struct DepthPlane {
     u0: f32,
     v0: f32,
     q: f32,
@@ -53,18 +54,18 @@ fn setup(
         let index = entry & ~CROSSES_NEAR;
         let crosses_near = entry >= CROSSES_NEAR;
         let instance = instances[view.first_instance + index];
-        let into = camera_from(view, instance);
+        let transform = camera_from(view, instance);
         let level = meshes[instance.mesh].levels[levels[view.first_visible + index]];
         for (var t = thread; t < level.z; t += N_THREADS) {
             let packed = triangles[level.y + t];
             let p = array<vec3f, 3>(
-                vertex(into, level.x + (packed.x & 0xffffu)),
-                vertex(into, level.x + (packed.x >> 16u)),
-                vertex(into, level.x + (packed.y & 0xffffu)),
+                vertex(transform, level.x + (packed.x & 0xffffu)),
+                vertex(transform, level.x + (packed.x >> 16u)),
+                vertex(transform, level.x + (packed.y & 0xffffu)),
             );
             let slot = Slot(v, (index << 16u) | t);
             if (crosses_near && min(min(p[0].z, p[1].z), p[2].z) < NEAR_M) {
-                cut(view, p, slot);
+                clip(view, p, slot);
             } else {
                 project(view, p, slot);
             }
@@ -72,11 +73,11 @@ fn setup(
     }
 }
 
-fn vertex(into: IntoCamera, k: u32) -> vec3f {
-    return into_camera(into, bitcast<vec3f>(vertices[k].xyz));
+fn vertex(transform: CameraTransform, k: u32) -> vec3f {
+    return to_camera(transform, bitcast<vec3f>(vertices[k].xyz));
 }
 
-// A triangle in front of the camera, if it faces it.
+// Projects a triangle in front of the near plane, if it faces the camera.
 fn project(view: View, p: array<vec3f, 3>, slot: Slot) {
     let q = 1.0 / vec3f(p[0].z, p[1].z, p[2].z);
     let middle = vec2f(view.mu, view.mv);
@@ -86,7 +87,7 @@ fn project(view: View, p: array<vec3f, 3>, slot: Slot) {
     let ab = b - a;
     let ac = c - a;
     let area = ab.x * ac.y - ab.y * ac.x;
-    // Rows run downwards, so counter-clockwise triangles have negative area here.
+    // Rows run downward, so counter-clockwise triangles have negative area here.
     if (!(area < 0.0)) {
         return;
     }
@@ -97,21 +98,21 @@ fn project(view: View, p: array<vec3f, 3>, slot: Slot) {
     let dv = (cq * ab.x - bq * ac.x) * inverse;
     let low = min(min(q.x, q.y), q.z);
     let high = max(max(q.x, q.y), q.z);
-    fill(a, b, c, Slope(a.x, a.y, q.x, du, dv, low, high), slot);
+    fill(a, b, c, DepthPlane(a.x, a.y, q.x, du, dv, low, high), slot);
 }
 
-// A triangle that reaches behind the near plane: what is left of it is a triangle or two.
-fn cut(view: View, vertex: array<vec3f, 3>, slot: Slot) {
+// Clips a triangle that crosses the near plane: one or two triangles remain.
+fn clip(view: View, vertex: array<vec3f, 3>, slot: Slot) {
     var p = vertex;
-    // The plane n . p = d gives inverse depth 1 / w = (n.x * x / w + n.y * y / w + n.z) / d, however far
-    // outside of the image the vertices are.
+    // The plane n . p = d gives inverse depth 1 / w = (n.x * x / w + n.y * y / w + n.z) / d, even
+    // for vertices far outside the image.
     let n = cross(p[1] - p[0], p[2] - p[0]);
     let d = dot(n, p[0]);
     if (!(d < 0.0)) {
         return;
     }
-    var left: array<vec2f, 4>;
-    var n_left = 0u;
+    var clipped: array<vec2f, 4>;
+    var n_clipped = 0u;
     let middle = vec2f(view.mu, view.mv);
     for (var k = 0u; k < 3u; k++) {
         let here = p[k];
@@ -119,52 +120,52 @@ fn cut(view: View, vertex: array<vec3f, 3>, slot: Slot) {
         let is_inside = here.z >= NEAR_M;
         let next_is_inside = next.z >= NEAR_M;
         if (is_inside) {
-            left[n_left] = middle + here.xy / here.z;
-            n_left++;
+            clipped[n_clipped] = middle + here.xy / here.z;
+            n_clipped++;
         }
         if (is_inside != next_is_inside) {
-            // Cut from the inner end outwards, so that a neighbor finds the same point.
+            // Cut from the inner end outward, so that a neighboring triangle gets the same point.
             let inner = select(next, here, is_inside);
             let outer = select(here, next, is_inside);
             let t = (inner.z - NEAR_M) / (inner.z - outer.z);
-            left[n_left] = middle + (inner.xy + (outer.xy - inner.xy) * t) / NEAR_M;
-            n_left++;
+            clipped[n_clipped] = middle + (inner.xy + (outer.xy - inner.xy) * t) / NEAR_M;
+            n_clipped++;
         }
     }
-    let slope = Slope(view.mu, view.mv, n.z / d, n.x / d, n.y / d, 0.0, 1.0 / NEAR_M);
-    if (n_left >= 3u) {
-        fill(left[0], left[1], left[2], slope, slot);
+    let depth_plane = DepthPlane(view.mu, view.mv, n.z / d, n.x / d, n.y / d, 0.0, 1.0 / NEAR_M);
+    if (n_clipped >= 3u) {
+        fill(clipped[0], clipped[1], clipped[2], depth_plane, slot);
     }
-    if (n_left == 4u) {
-        fill(left[0], left[2], left[3], slope, slot);
+    if (n_clipped == 4u) {
+        fill(clipped[0], clipped[2], clipped[3], depth_plane, slot);
     }
 }
 
-fn is_before(a: vec2f, b: vec2f) -> bool {
+fn is_above(a: vec2f, b: vec2f) -> bool {
     return a.y < b.y || (a.y == b.y && a.x < b.x);
 }
 
-fn per_row(top: vec2f, bottom: vec2f) -> f32 {
+fn columns_per_row(top: vec2f, bottom: vec2f) -> f32 {
     let dv = bottom.y - top.y;
     return select(0.0, (bottom.x - top.x) / dv, dv > 0.0);
 }
 
-// Appends what tiles need to fill a triangle: vertices a, b, c from top to bottom, how far edges go
-// to the right from row to row (ac, ab, bc), inverse depth at a and its slope, rows and columns.
-fn fill(p: vec2f, q: vec2f, r: vec2f, slope: Slope, slot: Slot) {
+// Appends a triangle for rasterization: vertices a, b, c from top to bottom, columns per row along
+// the edges (ac, ab, bc), inverse depth at a and its gradient, and the row range.
+fn fill(p: vec2f, q: vec2f, r: vec2f, depth_plane: DepthPlane, slot: Slot) {
     var a = p;
     var b = q;
     var c = r;
-    if (is_before(b, a)) {
+    if (is_above(b, a)) {
         let t = a;
         a = b;
         b = t;
     }
-    if (is_before(c, b)) {
+    if (is_above(c, b)) {
         let t = b;
         b = c;
         c = t;
-        if (is_before(b, a)) {
+        if (is_above(b, a)) {
             let s = a;
             a = b;
             b = s;
@@ -179,12 +180,12 @@ fn fill(p: vec2f, q: vec2f, r: vec2f, slope: Slope, slot: Slot) {
         return;
     }
     let b_is_right = (b.x - a.x) * (c.y - a.y) > (c.x - a.x) * (b.y - a.y);
-    let q_at_a = slope.q + slope.dv * (a.y - slope.v0) + slope.du * (a.x - slope.u0);
-    let k = firsts[slot.view] + atomicAdd(&tallies[4u * slot.view + 2u], 1u);
+    let q_at_a = depth_plane.q + depth_plane.dv * (a.y - depth_plane.v0) + depth_plane.du * (a.x - depth_plane.u0);
+    let k = first_triangles[slot.view] + atomicAdd(&tallies[4u * slot.view + 2u], 1u);
     bounds[k] = vec2u(first | (last << 16u), begin | (end << 16u));
-    filled[4u * k] = bitcast<vec4u>(vec4f(a, per_row(a, c), per_row(a, b)));
-    filled[4u * k + 1u] = bitcast<vec4u>(vec4f(b, per_row(b, c), q_at_a));
-    filled[4u * k + 2u] = bitcast<vec4u>(vec4f(slope.du, slope.dv, slope.low, slope.high));
+    setups[4u * k] = bitcast<vec4u>(vec4f(a, columns_per_row(a, c), columns_per_row(a, b)));
+    setups[4u * k + 1u] = bitcast<vec4u>(vec4f(b, columns_per_row(b, c), q_at_a));
+    setups[4u * k + 2u] = bitcast<vec4u>(vec4f(depth_plane.du, depth_plane.dv, depth_plane.low, depth_plane.high));
     let turn = select(0u, 0x80000000u, b_is_right);
-    filled[4u * k + 3u] = vec4u(first | (last << 16u), middle | turn, slot.name, 0u);
+    setups[4u * k + 3u] = vec4u(first | (last << 16u), middle | turn, slot.visibility_id, 0u);
 }

@@ -21,5 +21,5 @@ pub(super) const OAK: Paint = paint([192, 150, 98], Finish::Wood);
 pub(super) const PALE_OAK: Paint = paint([214, 180, 132], Finish::Wood);
 pub(super) const IRON: Paint = paint([52, 56, 58], Finish::Metal);
 pub(super) const LAMP: Paint = paint([255, 250, 226], Finish::Glossy);
-/// The dark of a gap between two doors or drawers.
+/// Dark gap between two doors or drawers.
 pub(super) const GAP: Paint = paint([62, 54, 48], Finish::Matte);

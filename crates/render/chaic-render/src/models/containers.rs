@@ -1,4 +1,4 @@
-//! Bowls, trays and baskets.
+//! Models of bowls, trays and baskets.
 
 use chaic_core::catalogue::Finish;
 
@@ -19,7 +19,7 @@ pub(super) fn model(name: &str) -> Option<Model> {
 }
 
 fn bowl(s: &mut MeshBuilder) {
-    s.paint(s.main());
+    s.set_paint(s.main_paint());
     let outline = [
         [0.095, 0.0],
         [0.1, 0.012],
@@ -35,7 +35,7 @@ fn bowl(s: &mut MeshBuilder) {
         [0.094, 0.028],
     ];
     s.lathe([0.0; 3], &outline);
-    s.paint(s.pick(
+    s.set_paint(s.pick(
         1,
         &[
             paint([150, 104, 66], Finish::Glossy),
@@ -51,9 +51,10 @@ fn bowl(s: &mut MeshBuilder) {
 }
 
 fn plate(s: &mut MeshBuilder) {
-    let china = s.main_or(&[[238, 238, 232], [238, 238, 232], [224, 232, 236], [240, 230, 212]]);
+    let china =
+        s.main_paint_or(&[[238, 238, 232], [238, 238, 232], [224, 232, 236], [240, 230, 212]]);
     let ring = s.pick(1, &[[76, 112, 168], [170, 62, 58], [92, 132, 96], [200, 164, 74]]);
-    s.paint(china);
+    s.set_paint(china);
     let outline = [
         [0.11, 0.0],
         [0.128, 0.006],
@@ -65,7 +66,7 @@ fn plate(s: &mut MeshBuilder) {
         [0.142, 0.0185],
     ];
     s.lathe([0.0; 3], &outline);
-    s.paint(paint(ring, Finish::Glossy));
+    s.set_paint(paint(ring, Finish::Glossy));
     s.lathe(
         [0.0; 3],
         &[[0.2, 0.033], [0.207, 0.0366], [0.2065, 0.0378], [0.196, 0.0362], [0.2, 0.033]],
@@ -92,15 +93,15 @@ fn tea_tray(s: &mut MeshBuilder) {
         [[96, 58, 40], [150, 104, 60]],
     ];
     let [base, rim] = s.pick(0, &WOODS).map(|c| paint(c, Finish::Wood));
-    s.paint(base);
+    s.set_paint(base);
     s.block([0.0, 0.0, 0.0], [0.44, 0.012, 0.31], 0.003);
-    s.paint(rim);
+    s.set_paint(rim);
     for z in [-0.154, 0.154] {
         s.block([0.0, 0.0, z], [0.45, 0.03, 0.012], 0.004);
     }
     for x in [-0.219, 0.219] {
         s.block([x, 0.0, 0.0], [0.012, 0.03, 0.32], 0.004);
-        // A handle raised over a gap to grip through.
+        // A handle raised over a gap for the fingers.
         s.pipe(
             &[
                 [x, 0.026, -0.058],
@@ -113,17 +114,17 @@ fn tea_tray(s: &mut MeshBuilder) {
         );
     }
     if s.style % 2 == 1 {
-        s.paint(paint([214, 196, 160], Finish::Wood));
+        s.set_paint(paint([214, 196, 160], Finish::Wood));
         for z in [-0.08, 0.0, 0.08] {
             s.block([0.0, 0.0115, z], [0.4, 0.0012, 0.006], 0.0);
         }
     }
 }
 
-/// The four sides of a square basket: the turn of each about the vertical, degrees.
+/// Rotation of the four sides of a square basket around the vertical axis, degrees.
 const SIDES: [f32; 4] = [0.0, 90.0, 180.0, 270.0];
 
-/// A point of the side that looks to -z when the turn is 0: `x` along it, `z` outwards.
+/// Returns a point of the side that faces -z at rotation 0: `x` along it, `out` outward.
 fn on_side(turn_deg: f32, x: f32, y: f32, out: f32) -> [f32; 3] {
     match turn_deg as i32 {
         0 => [x, y, -out],
@@ -133,23 +134,24 @@ fn on_side(turn_deg: f32, x: f32, y: f32, out: f32) -> [f32; 3] {
     }
 }
 
-/// A band around a square basket that is `half` wide outside at height `y`.
-fn band(s: &mut MeshBuilder, y: f32, half: f32, high: f32, thick: f32) {
+/// Adds a band around a square basket whose outer half width is `half` at height `y`.
+fn band(s: &mut MeshBuilder, y: f32, half: f32, high: f32, thickness: f32) {
     for turn in SIDES {
-        let middle = on_side(turn, 0.0, y + 0.5 * high, half - 0.5 * thick);
-        s.block_turned(middle, [2.0 * half, high, thick], [0.0, turn, 0.0], 0.3 * thick);
+        let center = on_side(turn, 0.0, y + 0.5 * high, half - 0.5 * thickness);
+        s.block_turned(center, [2.0 * half, high, thickness], [0.0, turn, 0.0], 0.3 * thickness);
     }
 }
 
 fn plastic_basket(s: &mut MeshBuilder) {
-    if s.within(20.0) {
-        s.all();
+    if s.is_level_within(20.0) {
+        s.add_all_parts();
         return;
     }
-    let color = s.main_or(&[[238, 238, 234], [238, 238, 234], [206, 226, 236], [236, 226, 206]]);
-    s.paint(color);
+    let color =
+        s.main_paint_or(&[[238, 238, 234], [238, 238, 234], [206, 226, 236], [236, 226, 206]]);
+    s.set_paint(color);
     s.block([0.0, 0.0, 0.0], [0.344, 0.012, 0.344], 0.004);
-    // A lattice: uprights that lean out a little, and bars across.
+    // A lattice: slightly sloped uprights, and crossbars.
     for turn in SIDES {
         for k in 0..10 {
             let x = -0.162 + 0.036 * k as f32;
@@ -168,19 +170,19 @@ const WILLOW: Paint = paint([166, 118, 70], Finish::Wicker);
 const DARK_WILLOW: Paint = paint([124, 82, 46], Finish::Wicker);
 
 fn wicker_basket(s: &mut MeshBuilder) {
-    s.paint(paint(
+    s.set_paint(paint(
         s.pick(0, &[WILLOW.color, [188, 146, 96], WILLOW.color, [140, 98, 60]]),
         Finish::Wicker,
     ));
-    s.shape(&s.class.parts[0]);
-    s.paint(DARK_WILLOW);
-    let rows = if s.within(20.0) { 0 } else { 5 };
+    s.add_part_shape(&s.class.parts[0]);
+    s.set_paint(DARK_WILLOW);
+    let rows = if s.is_level_within(20.0) { 0 } else { 5 };
     for k in 0..rows {
         let y = 0.03 + 0.034 * k as f32;
         band(s, y, 0.153 + 0.13 * y, 0.014, 0.008);
     }
     // A plaited rim and foot.
-    let strands = if s.within(60.0) { 0 } else { 14 };
+    let strands = if s.is_level_within(60.0) { 0 } else { 14 };
     for turn in SIDES {
         for k in 0..strands {
             let x = -0.165 + 0.33 * (k as f32 + 0.5) / strands as f32;
@@ -212,18 +214,18 @@ fn wood_basket(s: &mut MeshBuilder) {
         s.pick(0, &[[204, 160, 104], [188, 138, 84], [204, 160, 104], [220, 184, 134]]),
         Finish::Wood,
     );
-    if s.within(20.0) {
-        s.all();
+    if s.is_level_within(20.0) {
+        s.add_all_parts();
         return;
     }
     let frame = paint([140, 94, 54], Finish::Wood);
-    s.paint(slat);
+    s.set_paint(slat);
     s.block([0.0, 0.0, 0.0], [0.34, 0.012, 0.34], 0.003);
     // Slats with gaps between them.
     for turn in SIDES {
         for y in [0.012, 0.07, 0.128, 0.186] {
-            let middle = on_side(turn, 0.0, y + 0.022, 0.17);
-            s.block_turned(middle, [0.344, 0.044, 0.01], [0.0, turn, 0.0], 0.003);
+            let center = on_side(turn, 0.0, y + 0.022, 0.17);
+            s.block_turned(center, [0.344, 0.044, 0.01], [0.0, turn, 0.0], 0.003);
         }
     }
     for x in [-0.168, 0.168] {
@@ -231,15 +233,15 @@ fn wood_basket(s: &mut MeshBuilder) {
             s.block([x, 0.0, z], [0.026, 0.24, 0.026], 0.005);
         }
     }
-    s.paint(frame);
+    s.set_paint(frame);
     band(s, 0.02, 0.181, 0.03, 0.009);
     band(s, 0.194, 0.181, 0.03, 0.009);
-    s.paint(paint([90, 92, 96], Finish::Metal));
+    s.set_paint(paint([90, 92, 96], Finish::Metal));
     for turn in SIDES {
         for x in [-0.16, 0.16] {
             for y in [0.035, 0.209] {
-                let middle = on_side(turn, x, y, 0.181);
-                s.ball_turned(middle, [0.008; 3], [0.0; 3]);
+                let center = on_side(turn, x, y, 0.181);
+                s.ball_turned(center, [0.008; 3], [0.0; 3]);
             }
         }
     }
@@ -251,7 +253,7 @@ fn bamboo_basket(s: &mut MeshBuilder) {
         Finish::Wicker,
     );
     let rim = paint([176, 142, 78], Finish::Wood);
-    s.paint(body);
+    s.set_paint(body);
     let outline = [
         [0.168, 0.0],
         [0.172, 0.004],
@@ -263,8 +265,8 @@ fn bamboo_basket(s: &mut MeshBuilder) {
         [0.16, 0.012],
     ];
     s.lathe([0.0; 3], &outline);
-    s.paint(rim);
-    let staves = if s.within(20.0) { 0 } else { 20 };
+    s.set_paint(rim);
+    let staves = if s.is_level_within(20.0) { 0 } else { 20 };
     for k in 0..staves {
         use chaic_core::geom::math::{cos, sin};
         let a = std::f32::consts::TAU * k as f32 / staves as f32;

@@ -1,4 +1,4 @@
-//! Seats and tables.
+//! Models of seats and tables.
 
 use chaic_core::Vec3;
 use chaic_core::catalogue::Finish;
@@ -23,7 +23,7 @@ pub(super) fn model(name: &str) -> Option<Model> {
     })
 }
 
-/// A box of the catalogue: its lowest and highest corner, metres.
+/// Returns the minimum and maximum corner of a catalogue part, meters.
 fn part_box(s: &MeshBuilder, k: usize) -> [Vec3; 2] {
     let part = &s.class.parts[k];
     let size = Vec3::from(s.class.size_m);
@@ -31,7 +31,7 @@ fn part_box(s: &MeshBuilder, k: usize) -> [Vec3; 2] {
     [center - half, center + half]
 }
 
-/// A cushion that fills part `k` of the class between two fractions of its width.
+/// Adds a cushion on part `k` of the class between two fractions of its width.
 fn seat_cushion(s: &mut MeshBuilder, k: usize, from: f32, to: f32) {
     let [low, high] = part_box(s, k);
     let size = high - low;
@@ -41,17 +41,17 @@ fn seat_cushion(s: &mut MeshBuilder, k: usize, from: f32, to: f32) {
     s.pillow(middle, [(to - from) * size.x - gap, size.y, size.z], [0.0; 3], 0.26);
 }
 
-/// A sofa whose parts are seat, base, back, left arm and right arm, in that order.
+/// Adds a sofa whose parts are seat, base, back, left arm and right arm, in that order.
 pub(super) fn sofa_on(s: &mut MeshBuilder, seat: Paint, frame: Paint, n: usize) {
-    if s.within(20.0) {
+    if s.is_level_within(20.0) {
         let parts = s.class.parts;
         for (k, part) in parts.iter().enumerate() {
-            s.paint(if k == 0 || k > 6 && k < 7 + n { seat } else { frame });
-            s.shape(part);
+            s.set_paint(if k == 0 || k > 6 && k < 7 + n { seat } else { frame });
+            s.add_part_shape(part);
         }
         return;
     }
-    s.paint(frame);
+    s.set_paint(frame);
     for k in 1..3 {
         let [low, high] = part_box(s, k);
         let size = high - low;
@@ -76,38 +76,38 @@ pub(super) fn sofa_on(s: &mut MeshBuilder, seat: Paint, frame: Paint, n: usize) 
             );
         }
     }
-    s.paint(seat);
+    s.set_paint(seat);
     for k in 0..n {
         seat_cushion(s, 0, k as f32 / n as f32, (k + 1) as f32 / n as f32);
     }
-    // Cushions lean on the back, thin enough to leave the seat to what is put there.
+    // Cushions lean against the back, thin enough to leave space for objects on the seat.
     let [low, high] = part_box(s, 0);
     let [_, back] = part_box(s, 2);
-    let tall = (back.y - high.y) * 0.98;
+    let height = (back.y - high.y) * 0.98;
     for k in 0..n {
         let x = low.x + (k as f32 + 0.5) / n as f32 * (high.x - low.x);
-        let wide = (high.x - low.x) / n as f32;
-        let middle = [x, high.y + 0.49 * tall, high.z - 0.05];
-        s.pillow(middle, [wide - 0.01, tall, 0.11], [4.0, 0.0, 0.0], 0.42);
+        let width = (high.x - low.x) / n as f32;
+        let middle = [x, high.y + 0.49 * height, high.z - 0.05];
+        s.pillow(middle, [width - 0.01, height, 0.11], [4.0, 0.0, 0.0], 0.42);
     }
 }
 
 fn armchair(s: &mut MeshBuilder) {
     let frame = paint(s.pick(1, &[[70, 72, 78], [70, 72, 78], [150, 138, 124]]), Finish::Fabric);
-    sofa_on(s, s.main(), frame, 1);
+    sofa_on(s, s.main_paint(), frame, 1);
     feet(s, 0.36, 0.32, 0.085);
 }
 
 fn long_sofa(s: &mut MeshBuilder) {
     let frame = s.pick(1, &[None, Some([122, 126, 132]), Some([96, 84, 76])]);
-    let frame = frame.map_or(s.main(), |c| paint(c, Finish::Fabric));
-    sofa_on(s, s.main(), frame, 3);
+    let frame = frame.map_or(s.main_paint(), |c| paint(c, Finish::Fabric));
+    sofa_on(s, s.main_paint(), frame, 3);
     feet(s, 0.85, 0.34, 0.075);
 }
 
-/// Four turned feet.
+/// Adds four lathed feet.
 fn feet(s: &mut MeshBuilder, x: f32, z: f32, high: f32) {
-    s.paint(WALNUT);
+    s.set_paint(WALNUT);
     for sx in [-x, x] {
         for sz in [-z, z] {
             s.taper([sx, 0.0, sz], [sx, high, sz], 0.018, 0.028);
@@ -116,12 +116,12 @@ fn feet(s: &mut MeshBuilder, x: f32, z: f32, high: f32) {
 }
 
 fn corner_sofa(s: &mut MeshBuilder) {
-    if s.within(20.0) {
-        s.all();
+    if s.is_level_within(20.0) {
+        s.add_all_parts();
         return;
     }
-    let frame = s.main();
-    s.paint(frame);
+    let frame = s.main_paint();
+    s.set_paint(frame);
     for k in 3..8 {
         let [low, high] = part_box(s, k);
         let size = high - low;
@@ -130,7 +130,7 @@ fn corner_sofa(s: &mut MeshBuilder) {
             s.block([middle[0], low.y, middle[2]], size.into(), 0.04);
             continue;
         }
-        // Backs are made of cushions side by side.
+        // The backs consist of cushions side by side.
         let n = (size.x.max(size.z) / 0.85).max(1.0) as usize;
         for j in 0..n {
             let t = (j as f32 + 0.5) / n as f32 - 0.5;
@@ -141,18 +141,18 @@ fn corner_sofa(s: &mut MeshBuilder) {
             s.pillow(middle, extent, [0.0; 3], 0.25);
         }
     }
-    // The back wing in five cushions, the side wing in three, one on the chaise.
+    // Five cushions on the back wing, three on the side wing, one on the chaise.
     for k in 0..5 {
         seat_cushion(s, 1, 0.2 * k as f32, 0.2 * (k + 1) as f32);
     }
     seat_cushion(s, 2, 0.0, 1.0);
     let [low, high] = part_box(s, 0);
     for k in 0..3 {
-        let deep = (high.z - low.z) / 3.0;
-        let z = low.z + deep * (k as f32 + 0.5);
+        let depth = (high.z - low.z) / 3.0;
+        let z = low.z + depth * (k as f32 + 0.5);
         s.pillow(
             [0.5 * (low.x + high.x), 0.34, z],
-            [high.x - low.x, 0.16, deep - 0.006],
+            [high.x - low.x, 0.16, depth - 0.006],
             [0.0; 3],
             0.26,
         );
@@ -160,15 +160,15 @@ fn corner_sofa(s: &mut MeshBuilder) {
 }
 
 fn bench_sofa(s: &mut MeshBuilder) {
-    s.paint(s.main());
-    if s.within(20.0) {
-        s.all();
+    s.set_paint(s.main_paint());
+    if s.is_level_within(20.0) {
+        s.add_all_parts();
         return;
     }
     s.pillow([0.0, 0.37, 0.0], [1.28, 0.14, 0.48], [0.0; 3], 0.2);
-    s.paint(DARK_STEEL);
+    s.set_paint(DARK_STEEL);
     s.block([0.0, 0.26, 0.0], [1.2, 0.05, 0.42], 0.008);
-    s.paint(STEEL);
+    s.set_paint(STEEL);
     for x in [-0.58, 0.58] {
         for z in [-0.18, 0.18] {
             s.taper([x, 0.0, z], [x * 0.97, 0.28, z], 0.012, 0.024);
@@ -180,19 +180,19 @@ fn side_chair(s: &mut MeshBuilder) {
     const COVERS: [[u8; 3]; 4] = [[232, 188, 62], [232, 188, 62], [222, 170, 48], [240, 204, 96]];
     let cover = paint(s.pick(0, &COVERS), Finish::Fabric);
     let wood = s.pick(1, &[WALNUT, paint([192, 150, 98], Finish::Wood), BLACK]);
-    s.paint(cover);
+    s.set_paint(cover);
     s.pillow([0.0, 0.415, -0.015], [0.43, 0.07, 0.46], [0.0; 3], 0.3);
     match s.pick(2, &[0, 1]) {
         0 => s.pillow([0.0, 0.61, 0.215], [0.42, 0.38, 0.055], [0.0; 3], 0.3),
         _ => {
             s.pillow([0.0, 0.69, 0.215], [0.42, 0.22, 0.055], [0.0; 3], 0.34);
-            s.paint(wood);
+            s.set_paint(wood);
             for x in [-0.16, 0.16] {
                 s.block([x, 0.4, 0.22], [0.03, 0.24, 0.025], 0.006);
             }
         }
     }
-    s.paint(wood);
+    s.set_paint(wood);
     for x in [-0.185, 0.185] {
         for z in [-0.2, 0.2] {
             s.taper([x, 0.0, z], [x, 0.4, z], 0.012, 0.019);
@@ -204,10 +204,10 @@ fn side_chair(s: &mut MeshBuilder) {
 }
 
 fn dining_table(s: &mut MeshBuilder) {
-    let legs = s.pick(1, &[s.main(), WALNUT, s.main(), DARK_STEEL]);
-    s.paint(s.main());
+    let legs = s.pick(1, &[s.main_paint(), WALNUT, s.main_paint(), DARK_STEEL]);
+    s.set_paint(s.main_paint());
     s.block([0.0, 0.71, 0.0], [1.5, 0.04, 0.9], 0.012);
-    s.paint(legs);
+    s.set_paint(legs);
     for x in [-0.68, 0.68] {
         for z in [-0.38, 0.38] {
             match s.style {
@@ -237,13 +237,13 @@ fn dining_table(s: &mut MeshBuilder) {
 }
 
 fn coffee_table(s: &mut MeshBuilder) {
-    s.paint(s.main());
+    s.set_paint(s.main_paint());
     s.block([0.0, 0.385, 0.0], [1.1, 0.035, 0.6], 0.01);
     let shelf = s.pick(1, &[true, false, true]);
     if shelf {
         s.block([0.0, 0.12, 0.0], [0.98, 0.02, 0.48], 0.005);
     }
-    s.paint(s.pick(2, &[DARK_STEEL, WALNUT, BLACK]));
+    s.set_paint(s.pick(2, &[DARK_STEEL, WALNUT, BLACK]));
     for x in [-0.5, 0.5] {
         for z in [-0.25, 0.25] {
             if s.style.is_multiple_of(2) {
@@ -253,10 +253,10 @@ fn coffee_table(s: &mut MeshBuilder) {
             }
         }
     }
-    // A few magazines below.
+    // A few magazines on the lower shelf.
     if shelf && s.style != 3 {
         for (k, color) in [[196, 70, 60], [60, 110, 150], [230, 220, 200]].into_iter().enumerate() {
-            s.paint(paint(color, Finish::Glossy));
+            s.set_paint(paint(color, Finish::Glossy));
             let y = 0.14 + 0.008 * k as f32;
             s.block_turned(
                 [0.25, y + 0.004, 0.0],
@@ -270,9 +270,9 @@ fn coffee_table(s: &mut MeshBuilder) {
 
 fn stool(s: &mut MeshBuilder) {
     let wood = s.pick(1, &[paint([214, 180, 132], Finish::Wood), WALNUT, IRON]);
-    s.paint(s.main());
+    s.set_paint(s.main_paint());
     s.lathe([0.0, 0.44, 0.0], &[[0.17, 0.0], [0.187, 0.008], [0.19, 0.03], [0.182, 0.04]]);
-    s.paint(wood);
+    s.set_paint(wood);
     for x in [-0.11, 0.11] {
         for z in [-0.11, 0.11] {
             s.taper([1.15 * x, 0.0, 1.15 * z], [x, 0.445, z], 0.012, 0.017);
@@ -288,9 +288,9 @@ fn stool(s: &mut MeshBuilder) {
 
 fn round_table(s: &mut MeshBuilder) {
     let metal = s.pick(1, &[DARK_STEEL, STEEL, WALNUT]);
-    s.paint(s.main());
+    s.set_paint(s.main_paint());
     s.lathe([0.0, 0.41, 0.0], &[[0.28, 0.0], [0.3, 0.012], [0.3, 0.034], [0.294, 0.04]]);
-    s.paint(metal);
+    s.set_paint(metal);
     s.lathe(
         [0.0; 3],
         &[
@@ -306,13 +306,13 @@ fn round_table(s: &mut MeshBuilder) {
 }
 
 fn stacked_tables(s: &mut MeshBuilder) {
-    let tops = s.main_or(&[[238, 238, 234], [214, 180, 132], [112, 74, 50], [60, 62, 66]]);
-    s.paint(tops);
+    let tops = s.main_paint_or(&[[238, 238, 234], [214, 180, 132], [112, 74, 50], [60, 62, 66]]);
+    s.set_paint(tops);
     s.block([-0.4, 0.4315, 0.027], [0.5, 0.04, 0.94], 0.008);
     s.block([0.25, 0.29, -0.013], [0.8, 0.04, 0.8], 0.008);
-    s.paint(s.pick(1, &[STEEL, WALNUT, BLACK]));
+    s.set_paint(s.pick(1, &[STEEL, WALNUT, BLACK]));
     for k in 2..6 {
         let part = s.class.parts[k];
-        s.shape(&part);
+        s.add_part_shape(&part);
     }
 }

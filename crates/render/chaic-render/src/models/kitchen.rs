@@ -1,4 +1,4 @@
-//! What furnishes a kitchen, and what stands on its counters.
+//! Models of kitchen furniture and of items on counters.
 
 use chaic_core::catalogue::Finish;
 
@@ -36,36 +36,39 @@ fn refrigerator(s: &mut MeshBuilder) {
             [paint([196, 206, 200], Finish::Glossy), paint([206, 220, 212], Finish::Glossy)],
         ],
     );
-    s.paint(body);
+    s.set_paint(body);
     s.block([0.0, 0.05, 0.04], [0.9, 1.73, 0.67], 0.012);
-    s.part(1);
-    s.paint(GAP);
+    s.add_part(1);
+    s.set_paint(GAP);
     s.block([0.0, 0.07, -0.293], [0.88, 1.69, 0.02], 0.0);
-    s.paint(door);
+    s.set_paint(door);
     s.block([0.0, 0.06, -0.323], [0.89, 1.105, 0.055], 0.018);
     s.block([0.0, 1.177, -0.323], [0.89, 0.595, 0.055], 0.018);
-    s.paint(STEEL);
+    s.set_paint(STEEL);
     for (low, high) in [(0.61, 1.11), (1.22, 1.54)] {
         s.rod([-0.38, low, -0.363], [-0.38, high, -0.363], 0.011);
         for y in [low + 0.03, high - 0.03] {
             s.rod([-0.38, y, -0.345], [-0.38, y, -0.364], 0.009);
         }
     }
-    s.paint(GLASS);
+    s.set_paint(GLASS);
     s.block([0.16, 1.4, -0.351], [0.2, 0.1, 0.006], 0.003);
-    s.paint(paint([86, 200, 230], Finish::Glossy));
+    s.set_paint(paint([86, 200, 230], Finish::Glossy));
     s.block([0.16, 1.435, -0.3548], [0.09, 0.03, 0.002], 0.0);
     if s.style % 2 == 1 {
         // Notes and magnets.
         for (k, [x, y]) in [[0.05, 0.86], [0.24, 0.93], [0.2, 0.7]].into_iter().enumerate() {
-            s.paint(paint([[250, 240, 150], [240, 240, 236], [200, 226, 240]][k], Finish::Matte));
+            s.set_paint(paint(
+                [[250, 240, 150], [240, 240, 236], [200, 226, 240]][k],
+                Finish::Matte,
+            ));
             s.block_turned(
                 [x, y, -0.3512],
                 [0.11, 0.14, 0.0015],
                 [0.0, 0.0, 5.0 - 4.0 * k as f32],
                 0.0,
             );
-            s.paint(paint([[210, 60, 50], [60, 120, 200], [70, 160, 80]][k], Finish::Glossy));
+            s.set_paint(paint([[210, 60, 50], [60, 120, 200], [70, 160, 80]][k], Finish::Glossy));
             s.ball([x, y + 0.045, -0.3525], [0.022, 0.022, 0.008]);
         }
     }
@@ -80,20 +83,20 @@ fn counter(s: &mut MeshBuilder) {
             paint([200, 160, 110], Finish::Wood),
         ],
     );
-    s.paint(s.main());
+    s.set_paint(s.main_paint());
     s.block([0.0, 0.86, 0.0], [1.8, 0.04, 0.6], 0.008);
-    s.only(&[1, 2]);
-    s.paint(GAP);
+    s.add_parts(&[1, 2]);
+    s.set_paint(GAP);
     s.block([0.0, 0.1, -0.257], [1.78, 0.755, 0.01], 0.0);
     for k in 0..4 {
         let x = -0.6705 + 0.447 * k as f32;
-        s.paint(doors);
+        s.set_paint(doors);
         s.block([x, 0.105, -0.267], [0.438, 0.565, 0.018], 0.005);
         s.block([x, 0.68, -0.267], [0.438, 0.165, 0.018], 0.005);
         if s.style.is_multiple_of(2) {
             s.block([x, 0.165, -0.2765], [0.32, 0.445, 0.006], 0.004);
         }
-        s.paint(STEEL);
+        s.set_paint(STEEL);
         for y in [0.765, 0.63] {
             s.rod([x - 0.09, y, -0.289], [x + 0.09, y, -0.289], 0.0065);
             for dx in [-0.07, 0.07] {
@@ -101,13 +104,13 @@ fn counter(s: &mut MeshBuilder) {
             }
         }
     }
-    // A sunken sink, seen as a dark steel bowl flush with the top.
+    // A sink, drawn as a dark steel bowl flush with the top.
     if s.style.is_multiple_of(2) {
-        s.paint(STEEL);
+        s.set_paint(STEEL);
         s.block([0.45, 0.8985, 0.02], [0.48, 0.0035, 0.38], 0.0);
-        s.paint(DARK_STEEL);
+        s.set_paint(DARK_STEEL);
         s.block([0.45, 0.8995, 0.02], [0.43, 0.0032, 0.33], 0.0);
-        s.paint(GLOSSY_BLACK);
+        s.set_paint(GLOSSY_BLACK);
         s.lathe([0.45, 0.9, 0.02], &[[0.03, 0.0], [0.03, 0.0032], [0.0, 0.0034]]);
     }
 }
@@ -122,53 +125,53 @@ fn stove(s: &mut MeshBuilder) {
             paint([60, 62, 66], Finish::Glossy),
         ],
     );
-    s.paint(body);
+    s.set_paint(body);
     s.block([0.0, 0.0, 0.02], [0.6, 0.87, 0.56], 0.006);
-    s.paint(GLOSSY_BLACK);
+    s.set_paint(GLOSSY_BLACK);
     s.block([0.0, 0.87, 0.02], [0.6, 0.02, 0.56], 0.005);
     for (x, z, r) in
         [(-0.14, -0.12, 0.1), (0.14, -0.12, 0.08), (-0.14, 0.16, 0.08), (0.14, 0.16, 0.1)]
     {
-        s.paint(DARK_STEEL);
+        s.set_paint(DARK_STEEL);
         if s.style.is_multiple_of(2) {
             s.lathe([x, 0.885, z], &[[r, 0.0], [r, 0.009], [0.9 * r, 0.012], [0.3 * r, 0.01]]);
-            s.paint(paint([110, 60, 50], Finish::Metal));
+            s.set_paint(paint([110, 60, 50], Finish::Metal));
             s.hoop([x, 0.8955, z], [0.0, 1.0, 0.0], 0.62 * r, 0.003);
         } else {
-            // Gas: a burner under a grate.
+            // Gas stove: a burner under a grate.
             s.lathe([x, 0.885, z], &[[0.4 * r, 0.0], [0.42 * r, 0.008], [0.2 * r, 0.011]]);
-            s.paint(BLACK);
+            s.set_paint(BLACK);
             for turn in [0.0f32, 90.0] {
                 s.block_turned([x, 0.8945, z], [2.0 * r, 0.009, 0.01], [0.0, turn, 0.0], 0.002);
             }
             s.hoop([x, 0.893, z], [0.0, 1.0, 0.0], 0.92 * r, 0.005);
         }
     }
-    s.paint(BLACK);
+    s.set_paint(BLACK);
     s.block([0.0, 0.75, -0.262], [0.6, 0.12, 0.02], 0.005);
     for k in 0..5 {
         let x = -0.22 + 0.11 * k as f32;
         if k == 2 {
-            s.paint(paint([70, 200, 150], Finish::Glossy));
+            s.set_paint(paint([70, 200, 150], Finish::Glossy));
             s.block([x, 0.79, -0.2725], [0.07, 0.035, 0.003], 0.0);
             continue;
         }
-        s.paint(STEEL);
+        s.set_paint(STEEL);
         s.lathe_along(
             [x, 0.81, -0.272],
             [0.0, 0.0, -1.0],
             &[[0.025, 0.0], [0.024, 0.006], [0.018, 0.008], [0.016, 0.024]],
         );
-        s.paint(BLACK);
+        s.set_paint(BLACK);
         s.block([x, 0.81, -0.297], [0.004, 0.015, 0.002], 0.0);
     }
-    s.paint(DARK_STEEL);
+    s.set_paint(DARK_STEEL);
     s.block([0.0, 0.19, -0.267], [0.56, 0.52, 0.02], 0.006);
-    s.paint(GLASS);
+    s.set_paint(GLASS);
     s.block([0.0, 0.26, -0.276], [0.42, 0.3, 0.008], 0.004);
-    s.paint(body);
+    s.set_paint(body);
     s.block([0.0, 0.03, -0.267], [0.56, 0.14, 0.02], 0.006);
-    s.paint(STEEL);
+    s.set_paint(STEEL);
     s.rod([-0.23, 0.65, -0.288], [0.23, 0.65, -0.288], 0.0105);
     for x in [-0.2, 0.2] {
         s.rod([x, 0.65, -0.27], [x, 0.65, -0.289], 0.009);
@@ -176,17 +179,17 @@ fn stove(s: &mut MeshBuilder) {
 }
 
 fn coffee_maker(s: &mut MeshBuilder) {
-    let case = s.main_or(&[WHITE.color, [40, 42, 46], [170, 40, 40], WHITE.color]);
-    s.paint(case);
+    let case = s.main_paint_or(&[WHITE.color, [40, 42, 46], [170, 40, 40], WHITE.color]);
+    s.set_paint(case);
     s.block([0.0, 0.0, 0.0], [0.327, 0.05, 0.165], 0.012);
     s.block([0.11, 0.045, 0.0], [0.107, 0.3, 0.165], 0.012);
     s.block([0.0, 0.255, 0.0], [0.327, 0.09, 0.165], 0.014);
-    s.paint(GLASS);
+    s.set_paint(GLASS);
     s.lathe(
         [-0.06, 0.052, 0.0],
         &[[0.05, 0.0], [0.062, 0.01], [0.065, 0.06], [0.056, 0.12], [0.045, 0.15], [0.047, 0.16]],
     );
-    s.paint(BLACK);
+    s.set_paint(BLACK);
     s.lathe([-0.06, 0.21, 0.0], &[[0.05, 0.0], [0.05, 0.014], [0.02, 0.022], [0.0, 0.024]]);
     s.pipe(
         &[[-0.115, 0.2, 0.0], [-0.152, 0.19, 0.0], [-0.155, 0.12, 0.0], [-0.122, 0.09, 0.0]],
@@ -194,14 +197,14 @@ fn coffee_maker(s: &mut MeshBuilder) {
     );
     s.lathe([-0.06, 0.048, 0.0], &[[0.068, 0.0], [0.068, 0.005]]);
     s.block([0.0, 0.28, -0.0815], [0.1, 0.03, 0.002], 0.0);
-    s.paint(paint([210, 60, 50], Finish::Glossy));
+    s.set_paint(paint([210, 60, 50], Finish::Glossy));
     s.ball([0.11, 0.28, -0.081], [0.016, 0.016, 0.004]);
 }
 
 fn toaster(s: &mut MeshBuilder) {
-    s.paint(s.main_or(&[STEEL.color, STEEL.color, [150, 40, 40], [206, 222, 214]]));
+    s.set_paint(s.main_paint_or(&[STEEL.color, STEEL.color, [150, 40, 40], [206, 222, 214]]));
     s.pillow([0.0, 0.092, 0.0], [0.35, 0.178, 0.17], [0.0; 3], 0.24);
-    s.paint(BLACK);
+    s.set_paint(BLACK);
     s.block([0.0, 0.0, 0.0], [0.3, 0.012, 0.13], 0.003);
     for z in [-0.035, 0.035] {
         s.block([0.0, 0.172, z], [0.26, 0.01, 0.03], 0.0);
@@ -210,15 +213,15 @@ fn toaster(s: &mut MeshBuilder) {
     s.block([0.178, 0.11, 0.0], [0.016, 0.022, 0.05], 0.005);
     s.lathe_along([0.17, 0.05, 0.045], [1.0, 0.0, 0.0], &[[0.015, 0.0], [0.014, 0.012]]);
     if s.style % 2 == 1 {
-        s.paint(paint([204, 160, 96], Finish::Crust));
+        s.set_paint(paint([204, 160, 96], Finish::Crust));
         s.block([0.0, 0.1, 0.035], [0.11, 0.083, 0.014], 0.004);
     }
 }
 
 fn jug(s: &mut MeshBuilder) {
-    let clay = s.main_or(&[[64, 44, 26], [150, 96, 56], [70, 90, 110], [206, 196, 176]]);
+    let clay = s.main_paint_or(&[[64, 44, 26], [150, 96, 56], [70, 90, 110], [206, 196, 176]]);
     let clay = paint(clay.color, Finish::Glossy);
-    s.paint(clay);
+    s.set_paint(clay);
     s.lathe(
         [0.025, 0.0, 0.0],
         &[
@@ -247,20 +250,20 @@ fn jug(s: &mut MeshBuilder) {
         ],
         0.0085,
     );
-    s.paint(paint([84, 60, 38], Finish::Glossy));
+    s.set_paint(paint([84, 60, 38], Finish::Glossy));
     s.hoop([0.025, 0.225, 0.0], [0.0, 1.0, 0.0], 0.0365, 0.004);
 }
 
 fn pan(s: &mut MeshBuilder) {
-    let metal = s.main_or(&[DARK_STEEL.color, STEEL.color, [150, 50, 46], [60, 62, 66]]);
-    s.paint(metal);
+    let metal = s.main_paint_or(&[DARK_STEEL.color, STEEL.color, [150, 50, 46], [60, 62, 66]]);
+    s.set_paint(metal);
     s.lathe([0.0, 0.0, 0.08], &[[0.14, 0.0], [0.15, 0.006], [0.155, 0.058], [0.153, 0.06]]);
-    s.paint(STEEL);
+    s.set_paint(STEEL);
     s.lathe(
         [0.0, 0.058, 0.08],
         &[[0.153, 0.0], [0.153, 0.004], [0.12, 0.016], [0.06, 0.022], [0.0, 0.023]],
     );
-    s.paint(BLACK);
+    s.set_paint(BLACK);
     s.lathe(
         [0.0, 0.078, 0.08],
         &[[0.008, 0.0], [0.008, 0.008], [0.02, 0.014], [0.018, 0.023], [0.0, 0.026]],
@@ -274,7 +277,7 @@ fn pan(s: &mut MeshBuilder) {
 }
 
 fn wineglass(s: &mut MeshBuilder) {
-    s.paint(paint([206, 216, 222], Finish::Glossy));
+    s.set_paint(paint([206, 216, 222], Finish::Glossy));
     s.lathe(
         [0.0; 3],
         &[
@@ -294,7 +297,7 @@ fn wineglass(s: &mut MeshBuilder) {
         ],
     );
     if s.style % 2 == 1 {
-        s.paint(paint([120, 24, 44], Finish::Glossy));
+        s.set_paint(paint([120, 24, 44], Finish::Glossy));
         s.lathe(
             [0.0, 0.063, 0.0],
             &[[0.012, 0.0], [0.0225, 0.014], [0.0245, 0.022], [0.0, 0.0222]],
@@ -304,7 +307,7 @@ fn wineglass(s: &mut MeshBuilder) {
 
 fn pepper_mill(s: &mut MeshBuilder) {
     let wood = s.pick(0, &[WALNUT, paint([192, 150, 98], Finish::Wood), BLACK, WALNUT]);
-    s.paint(wood);
+    s.set_paint(wood);
     s.lathe(
         [0.0; 3],
         &[
@@ -321,13 +324,13 @@ fn pepper_mill(s: &mut MeshBuilder) {
         [0.0, 0.082, 0.0],
         &[[0.02, 0.0], [0.0235, 0.01], [0.02, 0.024], [0.01, 0.031], [0.0, 0.032]],
     );
-    s.paint(STEEL);
+    s.set_paint(STEEL);
     s.lathe([0.0, 0.079, 0.0], &[[0.021, 0.0], [0.022, 0.002], [0.021, 0.004]]);
     s.ball([0.0, 0.112, 0.0], [0.01, 0.008, 0.01]);
 }
 
 fn cutlery(s: &mut MeshBuilder) {
-    s.paint(STEEL);
+    s.set_paint(STEEL);
     let handle = [
         ([0.0, 0.005, 0.084], 0.0035),
         ([0.0, 0.0045, 0.04], 0.0048),
@@ -347,9 +350,9 @@ fn cutlery(s: &mut MeshBuilder) {
 }
 
 fn kitchen_tool(s: &mut MeshBuilder) {
-    s.paint(s.pick(1, &[BLACK, WALNUT]));
+    s.set_paint(s.pick(1, &[BLACK, WALNUT]));
     s.curve(&[([0.0, 0.03, 0.22], 0.009), ([0.0, 0.031, 0.1], 0.008), ([0.0, 0.03, 0.0], 0.006)]);
-    s.paint(DARK_STEEL);
+    s.set_paint(DARK_STEEL);
     s.curve(&[
         ([0.0, 0.03, 0.01], 0.005),
         ([0.0, 0.03, -0.08], 0.005),
@@ -370,7 +373,7 @@ fn kitchen_tool(s: &mut MeshBuilder) {
         );
     } else {
         s.block_turned([0.0, 0.016, -0.17], [0.085, 0.004, 0.1], [6.0, 0.0, 0.0], 0.001);
-        s.paint(GAP);
+        s.set_paint(GAP);
         for x in [-0.022, 0.0, 0.022] {
             s.block_turned([x, 0.016, -0.17], [0.006, 0.0046, 0.06], [6.0, 0.0, 0.0], 0.0);
         }

@@ -1,10 +1,10 @@
-//! What a class's styles and tints are drawn by.
+//! Random seeds of styles and tints.
 
 use chaic_core::ClassId;
 
-/// The classes in the order of the first catalogue, which their looks were drawn by. A class that is
-/// not here is drawn by its name: wherever in the catalogue it stands, all others look as before.
-const FIRST: [&str; 104] = [
+/// Classes in the order of the first catalogue, whose index is their seed. Later classes get a seed
+/// from their name, so that the order of the catalogue does not affect any seed.
+const FIRST_CATALOGUE: [&str; 104] = [
     "apple",
     "banana",
     "orange",
@@ -111,14 +111,14 @@ const FIRST: [&str; 104] = [
     "puzzle_box",
 ];
 
-/// The number of a class, which stays whatever becomes of the catalogue.
+/// Seed of a class, independent of the order of the catalogue.
 pub(super) fn style_seed(class: ClassId) -> u32 {
     let name = class.name();
-    let place = FIRST.iter().position(|first| *first == name);
-    place.map_or_else(|| seed_of_name(name), |place| place as u32)
+    let index = FIRST_CATALOGUE.iter().position(|first| *first == name);
+    index.map_or_else(|| seed_of_name(name), |index| index as u32)
 }
 
-/// FNV-1a of a name, beyond the numbers of the first classes.
+/// FNV-1a hash of a name, above the seeds of the first classes.
 fn seed_of_name(name: &str) -> u32 {
     let hash = |h: u32, byte: u8| (h ^ u32::from(byte)).wrapping_mul(0x0100_0193);
     name.bytes().fold(0x811c_9dc5, hash) | 1 << 16
@@ -130,14 +130,14 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn looks_hang_on_names_and_each_class_has_its_own() {
+    fn each_class_has_its_own_seed_that_depends_on_its_name() {
         let seeds: BTreeSet<u32> = ClassId::all().map(style_seed).collect();
         assert_eq!(seeds.len(), ClassId::all().count());
         assert_eq!(
             style_seed(ClassId::named("apple")),
-            FIRST.iter().position(|n| *n == "apple").unwrap() as u32
+            FIRST_CATALOGUE.iter().position(|n| *n == "apple").unwrap() as u32
         );
-        assert!(seed_of_name("teapot") > FIRST.len() as u32);
+        assert!(seed_of_name("teapot") > FIRST_CATALOGUE.len() as u32);
         assert_ne!(seed_of_name("teapot"), seed_of_name("topeat"));
     }
 }

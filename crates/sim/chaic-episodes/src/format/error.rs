@@ -1,88 +1,88 @@
-//! What can be wrong with an episode file.
+//! Errors of episode files.
 
 use crate::Problem;
 
-/// Most problems that a message lists; a file from elsewhere may have thousands.
+/// Maximum number of problems in a message; a file from elsewhere may have thousands.
 const MAX_LISTED: usize = 8;
 
-/// Why something isn't an episode.
+/// Error when an episode file is parsed or checked.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EpisodeError {
-    /// More bytes than any episode has.
+    /// The file is larger than any episode.
     #[error("{source_name}: has {bytes} bytes, an episode file has at most {limit}")]
     TooLong {
-        /// What the caller called the bytes.
+        /// Name of the source, as the caller passed it.
         source_name: String,
-        /// How many there are.
+        /// Size of the file.
         bytes: usize,
-        /// How many are read.
+        /// Largest size that is read.
         limit: usize,
     },
-    /// The bytes end in the middle.
+    /// The JSON ends prematurely.
     #[error(
-        "{source_name}: ends too early, at line {line} column {column}; is the file truncated?"
+        "{source_name}: ends prematurely at line {line} column {column}; is the file truncated?"
     )]
     Truncated {
-        /// What the caller called the bytes.
+        /// Name of the source, as the caller passed it.
         source_name: String,
         /// Last line.
         line: usize,
         /// Last column.
         column: usize,
     },
-    /// The bytes aren't JSON.
-    #[error("{source_name}: {field}: isn't JSON: {problem}")]
+    /// The content is not JSON.
+    #[error("{source_name}: {field}: is not JSON: {problem}")]
     NotJson {
-        /// What the caller called the bytes.
+        /// Name of the source, as the caller passed it.
         source_name: String,
-        /// Path of the field that is read there, `top level` outside all fields.
+        /// Path of the field at the error; `top level` outside all fields.
         field: String,
-        /// What the JSON reader says, with line and column.
+        /// Message of the JSON parser, with line and column.
         problem: String,
     },
-    /// It is JSON, but of something else.
+    /// The content is JSON of another format.
     #[error("{source_name}: format: is {found}, expected \"{expected}\"")]
     WrongFormat {
-        /// What the caller called the bytes.
+        /// Name of the source, as the caller passed it.
         source_name: String,
-        /// What the field says.
+        /// Value of the field.
         found: String,
-        /// What it should say.
+        /// Expected value.
         expected: &'static str,
     },
-    /// It is an episode of another version.
+    /// The file is an episode of another version.
     #[error("{source_name}: version: is {found}, this program reads version {expected}")]
     WrongVersion {
-        /// What the caller called the bytes.
+        /// Name of the source, as the caller passed it.
         source_name: String,
-        /// What the field says.
+        /// Value of the field.
         found: String,
-        /// What it should say.
+        /// Expected value.
         expected: u32,
     },
-    /// A field is missing, unknown, or of the wrong kind.
+    /// A field is missing, unknown, or has the wrong type.
     #[error("{source_name}: {field}: {problem}")]
     Field {
-        /// What the caller called the bytes.
+        /// Name of the source, as the caller passed it.
         source_name: String,
         /// Path of the field, for example `setup.things[3].position[1]`.
         field: String,
-        /// What is wrong, and what was expected.
+        /// Problem and expected value.
         problem: String,
     },
-    /// Every field fits, but the episode can't be played.
-    #[error("{source_name}: {}", listed(problems))]
+    /// All fields parse, but the episode cannot be played.
+    #[error("{source_name}: {}", join_problems(problems))]
     Invalid {
-        /// What the caller called the bytes.
+        /// Name of the source, as the caller passed it.
         source_name: String,
-        /// Everything that is wrong; at least one.
+        /// All problems; at least one.
         problems: Vec<Problem>,
     },
 }
 
 impl EpisodeError {
-    /// What the JSON reader says; `field_of` finds the field that it was about to read.
-    pub(super) fn of_syntax(
+    /// Converts an error of the JSON parser; `field_of` returns the field at the error.
+    pub(super) fn from_syntax(
         source_name: &str,
         error: &serde_json::Error,
         field_of: impl Fn() -> String,
@@ -100,7 +100,7 @@ impl EpisodeError {
     }
 }
 
-fn listed(problems: &[Problem]) -> String {
+fn join_problems(problems: &[Problem]) -> String {
     let mut lines: Vec<String> = problems.iter().take(MAX_LISTED).map(|p| p.to_string()).collect();
     if problems.len() > MAX_LISTED {
         lines.push(format!("and {} more", problems.len() - MAX_LISTED));
@@ -108,8 +108,8 @@ fn listed(problems: &[Problem]) -> String {
     lines.join("; ")
 }
 
-/// At most 60 characters of what a stranger's file says.
-pub(super) fn shortened(text: &str) -> String {
+/// Returns at most 60 characters of an untrusted value.
+pub(super) fn truncated(text: &str) -> String {
     match text.char_indices().nth(60) {
         Some((end, _)) => format!("{}...", &text[..end]),
         None => text.to_owned(),

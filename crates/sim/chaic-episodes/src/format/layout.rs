@@ -1,20 +1,21 @@
-//! JSON with a line per entry of the outer three levels: short enough to scroll, and a change of
-//! one thing is a change of one line.
+//! JSON with one line per entry of the outer three levels: short enough to read, and a change of
+//! one object changes one line.
 
 use std::io::{self, Write};
 
 use serde::Serialize;
 use serde_json::ser::Formatter;
 
-/// Objects and lists nested deeper than this stay on one line: envelope, setup, list.
+/// Number of nesting levels with line breaks: envelope, setup, list. Deeper values stay on one
+/// line.
 const BROKEN_LEVELS: usize = 3;
 
 #[derive(Default)]
-struct ByLines {
+struct LineFormatter {
     depth: usize,
 }
 
-impl ByLines {
+impl LineFormatter {
     fn line_break<W: ?Sized + Write>(&self, writer: &mut W) -> io::Result<()> {
         if self.depth > BROKEN_LEVELS {
             return Ok(());
@@ -45,7 +46,7 @@ impl ByLines {
     }
 }
 
-impl Formatter for ByLines {
+impl Formatter for LineFormatter {
     fn begin_array<W: ?Sized + Write>(&mut self, writer: &mut W) -> io::Result<()> {
         self.open(writer, b"[")
     }
@@ -83,11 +84,14 @@ impl Formatter for ByLines {
     }
 }
 
-/// The value as text that ends with a line break.
-pub(super) fn by_lines(value: &impl Serialize) -> String {
+/// Serializes a value to JSON text that ends with a line break.
+pub(super) fn to_lines(value: &impl Serialize) -> String {
     let mut bytes = Vec::new();
-    let mut serializer = serde_json::Serializer::with_formatter(&mut bytes, ByLines::default());
-    value.serialize(&mut serializer).expect("memory takes all bytes, and a setup has no maps");
+    let mut serializer =
+        serde_json::Serializer::with_formatter(&mut bytes, LineFormatter::default());
+    value
+        .serialize(&mut serializer)
+        .expect("writing to memory never fails, and a setup has no maps");
     bytes.push(b'\n');
     String::from_utf8(bytes).expect("serde_json writes UTF-8")
 }

@@ -1,18 +1,19 @@
-//! A whole house: plan, furniture, colors, and whether it offers what all tasks ask of a house.
+//! Generation of a furnished house, and the check that it suits all tasks.
 
 use chaic_core::geom::Rect;
-use chaic_core::rng::Stream;
+use chaic_core::rng::RngStream;
 use chaic_world::{Floor, FloorMaterial, Room, RoomKind};
 
-use super::layout::{Plan, WALL_M, plan};
+use super::layout::{Plan, WALL_M, draw_plan};
 use super::room::{BODY_M, RoomPlan};
 use super::{House, decoys, recipes, slots};
 use crate::Settings;
 use crate::free_space::FreeSpace;
 use crate::upright_box::UprightBox;
 
-/// Fewest places for small objects on low furniture: 32 objects and 6 containers, with a choice.
-const LEAST_LOW_SLOTS: usize = 46;
+/// Minimum number of slots for small objects on low furniture: 32 objects and 6 containers, with a
+/// choice.
+const MIN_LOW_SLOTS: usize = 46;
 
 const WALL_COLORS: [[u8; 3]; 8] = [
     [236, 231, 220],
@@ -30,18 +31,20 @@ const TILES: [[u8; 3]; 4] = [[212, 208, 200], [188, 196, 200], [222, 214, 196], 
 const CARPETS: [[u8; 3]; 5] =
     [[152, 142, 134], [128, 140, 156], [164, 146, 130], [140, 152, 136], [168, 156, 160]];
 
-/// The house of a place seed at this attempt, if it came out well.
+/// Generates the house of a place seed at this attempt; fails with the reason if it does not suit
+/// all tasks.
 pub(super) fn house(
     place_seed: u64,
     settings: Settings,
     attempt: u64,
 ) -> Result<House, &'static str> {
-    // Drawn once for all attempts, or the sizes that come out easily would crowd out the others.
-    let n_rooms = 6 + Stream::new(place_seed, "house/size", 0).below(3);
-    let mut rng = Stream::new(place_seed, "house/plan", attempt);
-    let plan = plan(&mut rng, n_rooms).ok_or("no floor plan")?;
-    let mut rooms = furnished(&plan, place_seed, settings, attempt)?;
-    let mut colors = Stream::new(place_seed, "house/colors", attempt);
+    // Drawn once for all attempts; otherwise sizes that succeed more often would be
+    // overrepresented.
+    let n_rooms = 6 + RngStream::new(place_seed, "house/size", 0).below(3);
+    let mut rng = RngStream::new(place_seed, "house/plan", attempt);
+    let plan = draw_plan(&mut rng, n_rooms).ok_or("no floor plan")?;
+    let mut rooms = furnish_rooms(&plan, place_seed, settings, attempt)?;
+    let mut colors = RngStream::new(place_seed, "house/colors", attempt);
     let mut color = |of: &[[u8; 3]]| of[colors.below(of.len())];
     let walls = plan.walls(color(&WALL_COLORS), color(&WALL_COLORS));
     let (wood, tiles) = (color(&WOODS), color(&TILES));
@@ -56,7 +59,7 @@ pub(super) fn house(
     let floors = floors.collect();
     let furniture = rooms.iter_mut().flat_map(|r| std::mem::take(&mut r.things)).collect();
     let mut house = House {
-        bounds: plan.outer.grown(0.5 * WALL_M),
+        bounds: plan.outer.expanded(0.5 * WALL_M),
         rooms: plan.rooms.iter().map(|(kind, rect)| Room { kind: *kind, rect: *rect }).collect(),
         walls,
         openings: plan.doors.iter().map(|d| d.opening()).collect(),
@@ -66,20 +69,21 @@ pub(super) fn house(
         ground: FreeSpace::new(Rect::new([0.0; 2], [0.1; 2])),
         walkable: Vec::new(),
     };
-    survey(&mut house);
-    offers_enough(&house, settings)?;
+    find_walkable(&mut house);
+    check_requirements(&house, settings)?;
     Ok(house)
 }
 
-/// Furniture for every room of a plan.
-fn furnished(
+/// Furnishes every room of a plan.
+fn furnish_rooms(
     plan: &Plan,
     place_seed: u64,
     settings: Settings,
     attempt: u64,
 ) -> Result<Vec<RoomPlan>, &'static str> {
-    let stream =
-        |purpose: &str, room: usize| Stream::new(place_seed, purpose, attempt * 64 + room as u64);
+    let stream = |purpose: &str, room: usize| {
+        RngStream::new(place_seed, purpose, attempt * 64 + room as u64)
+    };
     let mut living = 0;
     let mut rooms = Vec::new();
     for (i, (kind, rect)) in plan.rooms.iter().enumerate() {
@@ -105,20 +109,20 @@ fn furnished(
     rng.shuffle(&mut order);
     let mut cabinets = if settings.decoys { decoys::CABINETS } else { 3 + rng.below(2) };
     for i in &order {
-        if cabinets > 0 && recipes::add(&mut rooms[*i], rng, "cabinet") {
+        if cabinets > 0 && recipes::add_piece(&mut rooms[*i], rng, "cabinet") {
             cabinets -= 1;
         }
     }
-    let eats = |k: RoomKind| matches!(k, RoomKind::Kitchen | RoomKind::LivingRoom);
-    // The second refrigerator of a house stands where the family eats.
+    let is_dining_room = |k: RoomKind| matches!(k, RoomKind::Kitchen | RoomKind::LivingRoom);
+    // The second refrigerator of a house is in a kitchen or living room.
     if rng.chance(0.35) {
-        let mut places = order.iter().filter(|i| eats(plan.rooms[**i].0));
-        places.any(|i| recipes::add(&mut rooms[*i], rng, "refrigerator"));
+        let mut places = order.iter().filter(|i| is_dining_room(plan.rooms[**i].0));
+        places.any(|i| recipes::add_piece(&mut rooms[*i], rng, "refrigerator"));
     }
     if settings.decoys {
         let rng = &mut stream("house/low refrigerator", 0);
         rng.shuffle(&mut order);
-        order.sort_by_key(|i| !eats(plan.rooms[*i].0));
+        order.sort_by_key(|i| !is_dining_room(plan.rooms[*i].0));
         decoys::refrigerators(&mut rooms, &order, rng)?;
     }
     for (i, room) in rooms.iter_mut().enumerate() {
@@ -128,28 +132,28 @@ fn furnished(
             RoomKind::Corridor => continue,
             _ => &recipes::QUIET_FILLERS,
         };
-        recipes::fill(room, &mut stream("house/fillers", i), fillers);
+        recipes::fill_room(room, &mut stream("house/fillers", i), fillers);
     }
     if cabinets == 0 { Ok(rooms) } else { Err("no room for the cabinets") }
 }
 
-/// Works out where a wide body can walk.
-fn survey(house: &mut House) {
-    let mut solids: Vec<UprightBox> = house.walls.iter().map(UprightBox::of_wall).collect();
-    solids.extend(house.furniture.iter().flat_map(UprightBox::of_thing));
+/// Computes the cells in which a wide body can walk.
+fn find_walkable(house: &mut House) {
+    let mut solids: Vec<UprightBox> = house.walls.iter().map(UprightBox::from_wall).collect();
+    solids.extend(house.furniture.iter().flat_map(UprightBox::from_object));
     solids.retain(|s| s.spans([0.12, 1.75]));
     house.ground = FreeSpace::around(house.bounds, BODY_M, &solids);
     let door = 0.5 * (house.openings[0].a + house.openings[0].b);
     house.walkable = house.ground.flood(door);
 }
 
-/// Checks that every task finds what it needs: all rooms joined, places low and high.
-fn offers_enough(house: &House, settings: Settings) -> Result<(), &'static str> {
+/// Checks the needs of all tasks: all rooms are connected, and there are enough low and high slots.
+fn check_requirements(house: &House, settings: Settings) -> Result<(), &'static str> {
     let stands = |p| house.ground.cell(p).is_some_and(|i| house.walkable[i]);
     if !house.openings.iter().all(|o| stands(0.5 * (o.a + o.b))) {
         return Err("a doorway can't be reached");
     }
-    if slots::low(house).len() < LEAST_LOW_SLOTS {
+    if slots::low(house).len() < MIN_LOW_SLOTS {
         return Err("too few places on low furniture");
     }
     let high = slots::high(house);
@@ -166,15 +170,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn many_first_attempts_are_fit_to_live_in() {
-        let mut why = std::collections::BTreeMap::<&str, u32>::new();
+    fn many_first_attempts_are_valid() {
+        let mut reasons = std::collections::BTreeMap::<&str, u32>::new();
         for settings in [Settings::PAPER, Settings::STANDARD] {
-            why.clear();
+            reasons.clear();
             for seed in 0..60 {
                 let result = house(seed, settings, 0).map(|_| ());
-                *why.entry(result.err().unwrap_or("fit")).or_default() += 1;
+                *reasons.entry(result.err().unwrap_or("valid")).or_default() += 1;
             }
-            assert!(why.get("fit").is_some_and(|n| *n >= 10), "{why:?}");
+            assert!(reasons.get("valid").is_some_and(|n| *n >= 10), "{reasons:?}");
         }
     }
 }

@@ -1,31 +1,31 @@
-//! Floor plans: a rectangle cut into rooms, with doorways that join them.
+//! Floor plans: a rectangle divided into rooms, with doorways that connect them.
 
 use chaic_core::Vec2;
 use chaic_core::geom::Rect;
-use chaic_core::rng::Stream;
+use chaic_core::rng::RngStream;
 use chaic_world::{Opening, RoomKind};
 
 use crate::upright_box::mm;
 
-/// Thickness of all walls, metres.
+/// Thickness of all walls, meters.
 pub(super) const WALL_M: f32 = 0.12;
-/// Width of doorways, metres.
+/// Width of doorways, meters.
 pub(super) const DOOR_M: f32 = 1.2;
-/// From a doorway to the middle of the nearest crossing wall, at least, metres.
+/// Minimum distance from a doorway to the middle of the nearest crossing wall, meters.
 const CORNER_M: f32 = 0.5;
-/// Sides of rooms, metres.
+/// Minimum and maximum side of a room, meters.
 const SIDE_M: [f32; 2] = [3.5, 7.2];
-/// Cuts that are tried for one rectangle.
-const TRIES_PER_CUT: usize = 10;
-/// Cuts that are tried for one house.
+/// Attempts to cut one rectangle.
+const ATTEMPTS_PER_CUT: usize = 10;
+/// Attempts to cut per house.
 const CUT_BUDGET: usize = 2000;
-/// Most doorways of a room that isn't a corridor: each takes away a metre of wall.
+/// Maximum number of doorways of a room other than a corridor: each takes away a meter of wall.
 const MAX_DOORS: usize = 4;
 
-/// A straight cut through a rectangle.
+/// A straight wall that divides a rectangle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cut {
-    /// 0: the wall stands at one x and runs along z; 1: the other way round.
+    /// Axis of the wall's normal. 0: the wall stands at one x and runs along z; 1: the reverse.
     pub axis: usize,
     pub at: f32,
     pub from: f32,
@@ -35,20 +35,20 @@ pub(super) struct Cut {
 /// A doorway.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Door {
-    /// As [`Cut::axis`].
+    /// Same as [`Cut::axis`].
     pub axis: usize,
-    /// Where the wall stands.
+    /// Position of the wall on its normal axis.
     pub at: f32,
-    /// Middle along the wall.
+    /// Center along the wall.
     pub middle: f32,
-    /// The rooms on its two sides.
+    /// Rooms on its two sides.
     pub rooms: [usize; 2],
-    /// Whether it belongs to the tree that joins all rooms.
+    /// True if it belongs to the spanning tree that connects all rooms.
     pub is_spanning: bool,
 }
 
 impl Door {
-    /// The point at `across` from the wall's middle and `along` from the doorway's.
+    /// Returns the point at `across` from the wall's middle and `along` from the doorway's center.
     pub fn point(&self, across: f32, along: f32) -> Vec2 {
         if self.axis == 0 {
             Vec2::new(self.at + across, self.middle + along)
@@ -57,7 +57,7 @@ impl Door {
         }
     }
 
-    /// As the setup has it.
+    /// Converts to the representation in a setup.
     pub fn opening(&self) -> Opening {
         Opening {
             a: self.point(0.0, -0.5 * DOOR_M),
@@ -70,18 +70,18 @@ impl Door {
 /// Rooms, walls and doorways without furniture.
 #[derive(Clone, Debug)]
 pub(super) struct Plan {
-    /// Between the middles of the outer walls.
+    /// Outline through the middles of the outer walls.
     pub outer: Rect,
-    /// Between the middles of their walls.
+    /// Outlines through the middles of their walls.
     pub rooms: Vec<(RoomKind, Rect)>,
     pub doors: Vec<Door>,
     pub cuts: Vec<Cut>,
 }
 
-/// A random floor plan of so many rooms, unless this draw leads to none.
-pub(super) fn plan(rng: &mut Stream, n_rooms: usize) -> Option<Plan> {
+/// Draws a random floor plan with `n_rooms` rooms; `None` if this draw fails.
+pub(super) fn draw_plan(rng: &mut RngStream, n_rooms: usize) -> Option<Plan> {
     let has_corridor = n_rooms >= 7 && rng.chance(0.6);
-    // More rooms need more house, and two rooms beside a corridor are soon too long.
+    // More rooms need a larger house, and two rooms beside a corridor quickly become too long.
     let width_m = match n_rooms {
         _ if has_corridor => [18.2, 20.8],
         6 => [19.0, 21.0],
@@ -94,17 +94,17 @@ pub(super) fn plan(rng: &mut Stream, n_rooms: usize) -> Option<Plan> {
     let outer = Rect::new([-half_x, -half_z], [half_x, half_z]);
     let (mut rects, mut cuts) = (Vec::new(), Vec::new());
     let corridor = if has_corridor {
-        Some(with_corridor(rng, outer, n_rooms, &mut rects, &mut cuts)?)
+        Some(divide_with_corridor(rng, outer, n_rooms, &mut rects, &mut cuts)?)
     } else {
         divide(rng, outer, n_rooms, &mut rects, &mut cuts, &mut { CUT_BUDGET })?;
         None
     };
-    let doors = doors(rng, &rects, corridor)?;
-    let kinds = kinds(rng, &rects, corridor)?;
+    let doors = draw_doors(rng, &rects, corridor)?;
+    let kinds = draw_kinds(rng, &rects, corridor)?;
     Some(Plan { outer, rooms: kinds.into_iter().zip(rects).collect(), doors, cuts })
 }
 
-/// Cuts `rect` in two at `at` and notes the wall.
+/// Divides `rect` at `at` and records the wall.
 fn cut(rect: Rect, axis: usize, at: f32, cuts: &mut Vec<Cut>) -> (Rect, Rect) {
     let (mut low, mut high) = (rect, rect);
     low.max[axis] = at;
@@ -113,10 +113,10 @@ fn cut(rect: Rect, axis: usize, at: f32, cuts: &mut Vec<Cut>) -> (Rect, Rect) {
     (low, high)
 }
 
-/// Divides `rect` into `n` rooms of good sizes. Tries several cuts at every level; `budget` bounds
-/// how many in all.
+/// Divides `rect` into `n` rooms of valid sizes. Tries several cuts at every level; `budget` limits
+/// their total number.
 fn divide(
-    rng: &mut Stream,
+    rng: &mut RngStream,
     rect: Rect,
     n: usize,
     rects: &mut Vec<Rect>,
@@ -128,12 +128,12 @@ fn divide(
         rects.push(rect);
         return (fits(size.x) && fits(size.y)).then_some(());
     }
-    for _ in 0..TRIES_PER_CUT {
+    for _ in 0..ATTEMPTS_PER_CUT {
         *budget = budget.checked_sub(1)?;
         let axis = if rng.chance(size.x / (size.x + size.y)) { 0 } else { 1 };
         let low_n = 1 + rng.below(n - 1);
-        let share = low_n as f32 / n as f32 + rng.range(-0.09, 0.09);
-        let at = mm(rect.min[axis] + share * size[axis]);
+        let fraction = low_n as f32 / n as f32 + rng.range(-0.09, 0.09);
+        let at = mm(rect.min[axis] + fraction * size[axis]);
         if at - rect.min[axis] < SIDE_M[0] || rect.max[axis] - at < SIDE_M[0] {
             continue;
         }
@@ -154,10 +154,10 @@ fn fits(side_m: f32) -> bool {
     (SIDE_M[0]..=SIDE_M[1]).contains(&side_m)
 }
 
-/// Divides `rect` into a full-depth end of two rooms and two rows along a corridor. Returns which
-/// of the rooms is the corridor.
-fn with_corridor(
-    rng: &mut Stream,
+/// Divides `rect` into a full-depth end of two rooms and two rows along a corridor. Returns the
+/// index of the corridor.
+fn divide_with_corridor(
+    rng: &mut RngStream,
     rect: Rect,
     n: usize,
     rects: &mut Vec<Rect>,
@@ -167,14 +167,14 @@ fn with_corridor(
     let at_low_end = rng.chance(0.5);
     let at = mm(if at_low_end { rect.min.x + end_m } else { rect.max.x - end_m });
     let (low, high) = cut(rect, 0, at, cuts);
-    let (end, rest) = if at_low_end { (low, high) } else { (high, low) };
+    let (end, main) = if at_low_end { (low, high) } else { (high, low) };
     divide(rng, end, 2, rects, cuts, &mut 50)?;
 
     let width_m = rng.range(1.8, 2.1);
     let near = mm(rect.min.y + (rect.size().y - width_m) * rng.range(0.44, 0.56));
     let far = mm(near + width_m);
-    let (near_row, others) = cut(rest, 1, near, cuts);
-    let (corridor, far_row) = cut(others, 1, far, cuts);
+    let (near_row, remaining) = cut(main, 1, near, cuts);
+    let (corridor, far_row) = cut(remaining, 1, far, cuts);
     let in_rows = n - 3;
     let in_near =
         if in_rows % 2 == 1 && rng.chance(0.5) { in_rows.div_ceil(2) } else { in_rows / 2 };
@@ -194,8 +194,8 @@ fn with_corridor(
     all_fit.then_some(rects.len() - 1)
 }
 
-/// The stretch of wall that two rooms share: where it stands, and from where to where.
-fn shared(a: &Rect, b: &Rect) -> Option<Cut> {
+/// Returns the wall segment that two rooms share.
+fn shared_wall(a: &Rect, b: &Rect) -> Option<Cut> {
     for axis in 0..2 {
         let other = 1 - axis;
         let (from, to) = (a.min[other].max(b.min[other]), a.max[other].min(b.max[other]));
@@ -213,13 +213,13 @@ fn shared(a: &Rect, b: &Rect) -> Option<Cut> {
     None
 }
 
-/// A random tree of doorways that joins all rooms, and up to two more.
-fn doors(rng: &mut Stream, rects: &[Rect], corridor: Option<usize>) -> Option<Vec<Door>> {
+/// Draws a random spanning tree of doorways, and up to two more.
+fn draw_doors(rng: &mut RngStream, rects: &[Rect], corridor: Option<usize>) -> Option<Vec<Door>> {
     let mut edges = Vec::new();
     for b in 0..rects.len() {
         for a in 0..b {
-            if let Some(wall) = shared(&rects[a], &rects[b]) {
-                // People walk through a corridor rather than through each other's rooms.
+            if let Some(wall) = shared_wall(&rects[a], &rects[b]) {
+                // Corridors are preferred as connections.
                 let is_corridor = corridor == Some(a) || corridor == Some(b);
                 let weight = rng.unit() + if is_corridor { -0.6 } else { 0.0 };
                 edges.push((weight, [a, b], wall));
@@ -238,8 +238,8 @@ fn doors(rng: &mut Stream, rects: &[Rect], corridor: Option<usize>) -> Option<Ve
                 let n = doors.iter().filter(|d| d.rooms.contains(&r)).count();
                 corridor != Some(r) && n >= MAX_DOORS
             };
-            let wanted = if is_spanning { !joined } else { loops_left > 0 && !has_door };
-            if !wanted || rooms.iter().any(|r| is_full(*r)) {
+            let is_needed = if is_spanning { !joined } else { loops_left > 0 && !has_door };
+            if !is_needed || rooms.iter().any(|r| is_full(*r)) {
                 continue;
             }
             if is_spanning {
@@ -255,8 +255,8 @@ fn doors(rng: &mut Stream, rects: &[Rect], corridor: Option<usize>) -> Option<Ve
     group.iter().all(|g| *g == group[0]).then_some(doors)
 }
 
-/// Doorways are mostly near an end of their wall, which leaves room for furniture.
-fn door_middle(rng: &mut Stream, wall: &Cut) -> f32 {
+/// Draws the center of a doorway: mostly near an end of the wall, which leaves room for furniture.
+fn door_middle(rng: &mut RngStream, wall: &Cut) -> f32 {
     let margin = 0.5 * DOOR_M + CORNER_M;
     let (low, high) = (wall.from + margin, wall.to - margin);
     let near_m = rng.range(0.0, 0.4).min(high - low);
@@ -267,8 +267,13 @@ fn door_middle(rng: &mut Stream, wall: &Cut) -> f32 {
     }
 }
 
-/// What each room is for: one kitchen, one bedroom, one or two offices, two to four living rooms.
-fn kinds(rng: &mut Stream, rects: &[Rect], corridor: Option<usize>) -> Option<Vec<RoomKind>> {
+/// Assigns a kind to each room: one kitchen, one bedroom, one or two offices, two to four living
+/// rooms.
+fn draw_kinds(
+    rng: &mut RngStream,
+    rects: &[Rect],
+    corridor: Option<usize>,
+) -> Option<Vec<RoomKind>> {
     let mut order: Vec<usize> = (0..rects.len()).filter(|r| corridor != Some(*r)).collect();
     rng.shuffle(&mut order);
     let mut kinds = vec![RoomKind::LivingRoom; rects.len()];

@@ -1,80 +1,81 @@
-//! One room while it is being furnished: finds places for groups of furniture and keeps the room
-//! walkable.
+//! One room during furnishing: places groups of furniture and keeps the room walkable.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
 use chaic_core::geom::{Rect, rotate_yaw};
-use chaic_core::rng::Stream;
+use chaic_core::rng::RngStream;
 use chaic_core::{ClassId, Vec2, Vec3};
-use chaic_world::Thing;
+use chaic_world::ObjectSpec;
 
 use super::layout::{DOOR_M, Door, WALL_M};
 use crate::free_space::FreeSpace;
 use crate::upright_box::{mm, mm3};
 
-/// Room for the widest body and a hand's breadth, metres: a wheelchair has 0.35.
+/// Radius of the widest body plus a margin, meters: a wheelchair has 0.35.
 pub(super) const BODY_M: f32 = 0.40;
-/// How near the outline of all furniture can be walked up to, metres; less than an arm's reach.
-const UP_TO_M: f32 = 0.6;
-/// Depth of what is kept clear on both sides of a doorway, metres.
+/// Distance from the outline of furniture to which a body must get, meters; less than an arm's
+/// reach.
+const ACCESS_M: f32 = 0.6;
+/// Depth of the zone that is kept clear on both sides of a doorway, meters.
 const DOOR_CLEAR_M: f32 = 1.0;
-/// Between a piece of furniture and the wall behind it, metres.
+/// Gap between a piece of furniture and the wall behind it, meters.
 const WALL_GAP_M: f32 = 0.02;
-/// Between neighboring pieces of different groups, metres.
+/// Gap between neighboring pieces of different groups, meters.
 const GAP_M: f32 = 0.04;
-/// Places along one wall that are tried.
-const TRIES_PER_WALL: usize = 8;
-/// Places in the middle of the room that are tried.
-const TRIES_FREE: usize = 16;
-/// Least share of a room's standing room that stays.
-const LEAST_FREE: f32 = 0.35;
+/// Number of positions tried along one wall.
+const ATTEMPTS_PER_WALL: usize = 8;
+/// Number of positions tried in the interior of a room.
+const ATTEMPTS_FREE: usize = 16;
+/// Minimum fraction of the empty room's standing area that must remain.
+const MIN_FREE_FRACTION: f32 = 0.35;
 
-/// A piece of furniture within a group. The group's frame has its back to the wall at z = 0 and
-/// looks along -z into the room.
+/// A piece of furniture within a group. In the group's frame the wall is at z = 0, and the front
+/// faces -z, into the room.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Piece {
     pub class: ClassId,
-    /// Middle along the wall, metres.
+    /// Center along the wall, meters.
     pub x: f32,
-    /// Middle from the wall, metres.
+    /// Distance of the center from the wall, meters.
     pub d: f32,
     /// Quarter turns to the left.
     pub turns: u8,
-    /// What stays clear before it, metres.
+    /// Depth of the clear zone in front of the piece, meters.
     pub access_m: f32,
     pub variant: u8,
 }
 
-/// Where a group may stand.
+/// Location where a group may stand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Spot {
     /// With its back to a wall.
     Wall,
-    /// With its back to a wall, as far in a corner as it gets.
+    /// With its back to a wall, as close to a corner as possible.
     Corner,
-    /// Anywhere in the room, the middle first.
+    /// Anywhere in the room; positions near the center are tried first.
     Free,
 }
 
-/// A wall of a room: which way one looks who has it at the back.
+/// A wall of a room, by the yaw of furniture with its back to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Side(pub u8);
 
 impl Side {
     pub const ALL: [Side; 4] = [Side(0), Side(1), Side(2), Side(3)];
 
-    /// The yaw of furniture with its back to this wall: side 0 is at the largest z, and each next
-    /// one a quarter turn to the left of it.
+    /// Returns the yaw of furniture with its back to this wall: side 0 is at the largest z, and
+    /// each next one is a quarter turn to the left.
     fn yaw_rad(self) -> f32 {
         [0.0, FRAC_PI_2, PI, -FRAC_PI_2][usize::from(self.0 % 4)]
     }
 
-    /// The wall on the other side of the room.
+    /// Returns the opposite wall.
     pub fn opposite(self) -> Side {
         Side((self.0 + 2) % 4)
     }
 
-    /// Middle of the wall, its length, and the direction along it of a group's own x.
+    /// Returns the center of the wall, its length, and the direction of the group's x axis along
+    /// it.
     fn line(self, inner: &Rect) -> (Vec2, f32, Vec2) {
         let (c, s) = (inner.center(), inner.size());
         match self.0 % 4 {
@@ -86,12 +87,12 @@ impl Side {
     }
 }
 
-/// A room and what stands in it.
+/// A room and its furniture.
 #[derive(Clone, Debug)]
 pub(super) struct RoomPlan {
     pub inner: Rect,
-    pub things: Vec<Thing>,
-    feet: Vec<Rect>,
+    pub things: Vec<ObjectSpec>,
+    footprints: Vec<Rect>,
     access: Vec<Rect>,
     rugs: Vec<Rect>,
     door_zones: Vec<Rect>,
@@ -100,7 +101,7 @@ pub(super) struct RoomPlan {
 
 impl RoomPlan {
     pub fn new(index: usize, rect: Rect, doors: &[Door]) -> RoomPlan {
-        let inner = rect.grown(-0.5 * WALL_M);
+        let inner = rect.expanded(-0.5 * WALL_M);
         let (mut door_zones, mut door_points) = (Vec::new(), Vec::new());
         for door in doors.iter().filter(|d| d.rooms.contains(&index)) {
             let inwards = if rect.center()[door.axis] > door.at { 1.0 } else { -1.0 };
@@ -109,20 +110,25 @@ impl RoomPlan {
             door_zones.push(Rect { min: a.min(b), max: a.max(b) });
             door_points.push(door.point(inwards * 0.55, 0.0));
         }
-        let (things, feet, access, rugs) = Default::default();
-        RoomPlan { inner, things, feet, access, rugs, door_zones, door_points }
+        let (things, footprints, access, rugs) = Default::default();
+        RoomPlan { inner, things, footprints, access, rugs, door_zones, door_points }
     }
 
-    /// Puts a group at the first place of many that suits; returns by which wall and how far along
-    /// it from the wall's middle.
-    pub fn place(&mut self, rng: &mut Stream, group: &[Piece], spot: Spot) -> Option<(Side, f32)> {
+    /// Places a group at the first valid position; returns its wall and the offset from the wall's
+    /// center.
+    pub fn place(
+        &mut self,
+        rng: &mut RngStream,
+        group: &[Piece],
+        spot: Spot,
+    ) -> Option<(Side, f32)> {
         let mut sides = Side::ALL;
         rng.shuffle(&mut sides);
         if spot == Spot::Free {
-            return (0..TRIES_FREE).find_map(|k| {
+            return (0..ATTEMPTS_FREE).find_map(|k| {
                 let side = sides[k % 2];
-                // The middle first, then farther and farther out.
-                let spread = k as f32 / TRIES_FREE as f32;
+                // The center first, then positions with an increasing distance.
+                let spread = k as f32 / ATTEMPTS_FREE as f32;
                 let off = self.inner.size()
                     * Vec2::new(rng.range(-0.35, 0.35), rng.range(-0.35, 0.35))
                     * spread;
@@ -130,7 +136,7 @@ impl RoomPlan {
                 self.try_at(group, at, side.yaw_rad()).then_some((side, 0.0))
             });
         }
-        let (low, high) = extent(group);
+        let (low, high) = x_range(group);
         for side in sides {
             let (_, length_m, _) = side.line(&self.inner);
             let slack = length_m - (high - low);
@@ -139,7 +145,7 @@ impl RoomPlan {
             }
             let (first, last) =
                 (-0.5 * length_m - low + WALL_GAP_M, 0.5 * length_m - high - WALL_GAP_M);
-            for k in 0..TRIES_PER_WALL {
+            for k in 0..ATTEMPTS_PER_WALL {
                 let ends = if rng.chance(0.5) { [first, last] } else { [last, first] };
                 let along = match spot {
                     Spot::Corner if k < 2 => ends[k],
@@ -155,10 +161,10 @@ impl RoomPlan {
         None
     }
 
-    /// Puts a group by a wall, so far along from the wall's middle, if that suits.
+    /// Places a group at a wall with the given offset from the wall's center, if that is valid.
     pub fn place_at(&mut self, group: &[Piece], side: Side, along_m: f32) -> bool {
         let (middle, length_m, along) = side.line(&self.inner);
-        let (low, high) = extent(group);
+        let (low, high) = x_range(group);
         if low + along_m < -0.5 * length_m || high + along_m > 0.5 * length_m {
             return false;
         }
@@ -168,107 +174,112 @@ impl RoomPlan {
     }
 
     fn try_at(&mut self, group: &[Piece], at: Vec2, yaw_rad: f32) -> bool {
-        let before = (self.things.len(), self.feet.len(), self.access.len(), self.rugs.len());
-        let (mut things, mut feet, mut access, mut rugs) =
+        let before = (self.things.len(), self.footprints.len(), self.access.len(), self.rugs.len());
+        let (mut things, mut footprints, mut access, mut rugs) =
             (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for piece in group {
-            let thing = piece.thing(at, yaw_rad);
-            let foot = foot(&thing);
-            if thing.size_m().y < 0.05 {
-                if !contains(&self.inner, &foot) || self.rugs.iter().any(|r| r.overlaps(&foot)) {
+            let object = piece.to_object(at, yaw_rad);
+            let footprint = footprint(&object);
+            if object.size_m().y < 0.05 {
+                if !contains(&self.inner, &footprint)
+                    || self.rugs.iter().any(|r| r.overlaps(&footprint))
+                {
                     return false;
                 }
-                rugs.push(foot);
+                rugs.push(footprint);
             } else {
-                if !self.has_room_for(&foot) {
+                if !self.has_room_for(&footprint) {
                     return false;
                 }
-                feet.push(foot);
+                footprints.push(footprint);
                 if piece.access_m > 0.0 {
-                    access.push(before_it(&thing, piece.access_m));
+                    access.push(front_zone(&object, piece.access_m));
                 }
             }
-            things.push(thing);
+            things.push(object);
         }
-        // Within a group pieces may stand in each other's way: a chair at its table does.
+        // Pieces of one group may block each other: a chair at its table does.
         let blocked = |zone: &Rect| {
-            !contains(&self.inner.grown(0.01), zone) || self.feet.iter().any(|f| f.overlaps(zone))
+            !contains(&self.inner.expanded(0.01), zone)
+                || self.footprints.iter().any(|f| f.overlaps(zone))
         };
         if access.iter().any(blocked) {
             return false;
         }
         self.things.extend(things);
-        self.feet.extend(feet);
+        self.footprints.extend(footprints);
         self.access.extend(access);
         self.rugs.extend(rugs);
         if self.is_walkable() {
             return true;
         }
         self.things.truncate(before.0);
-        self.feet.truncate(before.1);
+        self.footprints.truncate(before.1);
         self.access.truncate(before.2);
         self.rugs.truncate(before.3);
         false
     }
 
-    /// How many pieces of a class it has.
+    /// Returns the number of pieces of a class.
     pub fn count(&self, class: &str) -> usize {
         self.things.iter().filter(|t| t.class.name() == class).count()
     }
 
-    /// How much of the floor is under furniture.
-    pub fn furnished_share(&self) -> f32 {
+    /// Returns the fraction of the floor under furniture.
+    pub fn furnished_fraction(&self) -> f32 {
         let area = |r: &Rect| r.size().x * r.size().y;
-        self.feet.iter().map(area).sum::<f32>() / area(&self.inner)
+        self.footprints.iter().map(area).sum::<f32>() / area(&self.inner)
     }
 
-    fn has_room_for(&self, foot: &Rect) -> bool {
-        let apart = foot.grown(GAP_M);
-        contains(&self.inner, foot)
-            && !self.feet.iter().any(|f| f.overlaps(&apart))
-            && !self.access.iter().any(|f| f.overlaps(foot))
-            && !self.door_zones.iter().any(|f| f.overlaps(foot))
+    fn has_room_for(&self, footprint: &Rect) -> bool {
+        let apart = footprint.expanded(GAP_M);
+        contains(&self.inner, footprint)
+            && !self.footprints.iter().any(|f| f.overlaps(&apart))
+            && !self.access.iter().any(|f| f.overlaps(footprint))
+            && !self.door_zones.iter().any(|f| f.overlaps(footprint))
     }
 
-    /// Whether a wide body gets from every doorway to all furniture and has room left.
+    /// Returns whether a wide body gets from every doorway to all furniture, and enough standing
+    /// area remains.
     fn is_walkable(&self) -> bool {
         let mut grid = FreeSpace::around(self.inner, BODY_M, []);
         let empty = grid.free.iter().filter(|f| **f).count();
-        self.feet.iter().for_each(|f| grid.block_rect(f, BODY_M));
+        self.footprints.iter().for_each(|f| grid.block_rect(f, BODY_M));
         let Some(start) = self.door_points.first() else { return false };
-        let seen = grid.flood(*start);
-        let left = seen.iter().filter(|s| **s).count();
-        let stands = |p: &Vec2| grid.cell(*p).is_some_and(|i| seen[i]);
+        let reached = grid.flood(*start);
+        let left = reached.iter().filter(|s| **s).count();
+        let stands = |p: &Vec2| grid.cell(*p).is_some_and(|i| reached[i]);
         let near = |f: &Rect| {
-            grid.cells_in(f.grown(UP_TO_M))
-                .any(|i| seen[i] && crate::upright_box::rect_distance(f, grid.middle(i)) <= UP_TO_M)
+            grid.cells_in(f.expanded(ACCESS_M)).any(|i| {
+                reached[i] && crate::upright_box::rect_distance(f, grid.middle(i)) <= ACCESS_M
+            })
         };
-        left as f32 >= LEAST_FREE * empty as f32
+        left as f32 >= MIN_FREE_FRACTION * empty as f32
             && self.door_points.iter().all(stands)
-            && self.feet.iter().all(near)
+            && self.footprints.iter().all(near)
     }
 }
 
 impl Piece {
-    fn thing(&self, at: Vec2, yaw_rad: f32) -> Thing {
+    fn to_object(self, at: Vec2, yaw_rad: f32) -> ObjectSpec {
         let offset = rotate_yaw(Vec3::new(self.x, 0.0, -self.d), yaw_rad);
         let yaw_rad = chaic_core::geom::wrap_angle(yaw_rad + f32::from(self.turns) * FRAC_PI_2);
         let position = mm3(Vec3::new(at.x, 0.0, at.y) + offset);
-        let mut thing = Thing::new(self.class, position, mm(yaw_rad));
-        thing.variant = self.variant;
-        thing.fixed = true;
-        thing
+        let mut object = ObjectSpec::new(self.class, position, mm(yaw_rad));
+        object.variant = self.variant;
+        object.fixed = true;
+        object
     }
 
-    /// Half of what it takes along the group's x, metres.
+    /// Returns half of the extent along the group's x, meters.
     fn half_width_m(&self) -> f32 {
         let size = self.class.info().size_m;
         0.5 * if self.turns.is_multiple_of(2) { size[0] } else { size[2] }
     }
 }
 
-/// From where to where a group reaches along its wall.
-fn extent(group: &[Piece]) -> (f32, f32) {
+/// Returns the minimum and maximum x of a group along its wall.
+fn x_range(group: &[Piece]) -> (f32, f32) {
     let solid = group.iter().filter(|p| p.class.info().size_m[1] >= 0.05);
     solid.fold((f32::MAX, f32::MIN), |(low, high), p| {
         (low.min(p.x - p.half_width_m()), high.max(p.x + p.half_width_m()))
@@ -279,20 +290,21 @@ fn contains(outer: &Rect, inner: &Rect) -> bool {
     outer.contains(inner.min) && outer.contains(inner.max)
 }
 
-/// What a thing at a quarter turn covers in plan: the whole of its box, not just what collides.
-pub(super) fn foot(thing: &Thing) -> Rect {
-    let size = thing.size_m();
-    let along_x = rotate_yaw(Vec3::X, thing.yaw_rad).x.abs() > 0.5;
+/// Returns the footprint of an object at a quarter turn: its whole bounding box, not only the
+/// colliding parts.
+pub(super) fn footprint(object: &ObjectSpec) -> Rect {
+    let size = object.size_m();
+    let along_x = rotate_yaw(Vec3::X, object.yaw_rad).x.abs() > 0.5;
     let half = 0.5 * if along_x { Vec2::new(size.x, size.z) } else { Vec2::new(size.z, size.x) };
-    let middle = Vec2::new(thing.position.x, thing.position.z);
+    let middle = Vec2::new(object.position.x, object.position.z);
     Rect { min: middle - half, max: middle + half }
 }
 
-/// The strip before a thing's front.
-fn before_it(thing: &Thing, depth_m: f32) -> Rect {
-    let half = 0.5 * thing.size_m();
+/// Returns the strip in front of an object.
+fn front_zone(object: &ObjectSpec, depth_m: f32) -> Rect {
+    let half = 0.5 * object.size_m();
     let corner = |x: f32, z: f32| {
-        let p = thing.position + rotate_yaw(Vec3::new(x, 0.0, z), thing.yaw_rad);
+        let p = object.position + rotate_yaw(Vec3::new(x, 0.0, z), object.yaw_rad);
         Vec2::new(p.x, p.z)
     };
     let inset = 0.05;

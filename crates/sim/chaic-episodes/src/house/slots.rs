@@ -1,15 +1,15 @@
-//! Where things may be put: places on low furniture, on high tops, and on the floor.
+//! Slots for small objects: on low furniture, on high tops, and on the floor.
 
-use chaic_core::geom::{math, rotate_yaw, xz};
-use chaic_core::rng::Stream;
+use chaic_core::geom::{math, rotate_yaw, to_xz};
+use chaic_core::rng::RngStream;
 use chaic_core::{ClassId, Vec2, Vec3};
-use chaic_world::{Surface, Thing, top_surfaces};
+use chaic_world::{ObjectSpec, Surface, top_surfaces};
 
 use super::House;
-use super::room::foot;
+use super::room::footprint;
 use crate::upright_box::{UprightBox, mm, mm3, rect_distance};
 
-/// Furniture on which small things lie in ordinary life (facts S11.2: tables, sofas, chairs).
+/// Classes of furniture on which small objects lie (facts S11.2: tables, sofas, chairs).
 const LOW_HOSTS: [&str; 10] = [
     "dining_table",
     "coffee_table",
@@ -22,34 +22,36 @@ const LOW_HOSTS: [&str; 10] = [
     "long_sofa",
     "stool",
 ];
-/// Furniture whose top is high (facts S11.1).
+/// Classes of furniture with a high top (facts S11.1).
 pub(super) const HIGH_HOSTS: [&str; 2] = ["cabinet", "refrigerator"];
-/// Below this surfaces are low, metres (paper: "tables, chairs, sofas").
+/// Surfaces below this height are low, meters (paper: "tables, chairs, sofas").
 const LOW_M: f32 = 1.2;
-/// From here on tops are high, metres (facts S11.1).
+/// Tops from this height on are high, meters (facts S11.1).
 pub(super) const HIGH_M: f32 = 1.5;
-/// From the middle of a place to where a wide body can stand, metres; an arm reaches 0.7 from
-/// there to the nearest point, and a wheelchair stands 0.05 nearer.
+/// Maximum distance from the center of a slot to a cell in which a wide body can stand, meters. An
+/// arm reaches 0.7 from there to the nearest point, and a wheelchair stands 0.05 nearer.
 const REACH_M: f32 = 0.70;
-/// Between things on one surface, metres.
+/// Gap between objects on one surface, meters.
 const APART_M: f32 = 0.015;
-/// Around a thing on the floor, metres from furniture, walls and doorways (facts S11.2: 0.65).
+/// Clearance of an object on the floor from furniture, walls and doorways, meters (facts S11.2:
+/// 0.65).
 const FLOOR_CLEAR_M: f32 = 0.65;
 
-/// A place on a top.
+/// A position on a top surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slot {
     host: usize,
     surface: Surface,
-    /// Place on the surface, from its middle along its own x and z, as shares of the half extents.
+    /// Position on the surface, from its center along its own x and z, as fractions of the half
+    /// extents.
     uv: Vec2,
 }
 
-/// A high top with its places.
+/// A high top with its slots.
 #[derive(Clone, Debug)]
 pub(super) struct HighTop {
     pub class: ClassId,
-    /// The middle, then places side by side.
+    /// Slot at the center of the top.
     pub middle: Slot,
     pub slots: Vec<Slot>,
 }
@@ -61,15 +63,15 @@ impl Slot {
         self.surface.center + rotate_yaw(offset, self.surface.yaw_rad)
     }
 
-    /// A thing of this class here, with its yaw relative to the furniture's, if it lies fully on
-    /// the top and clear of everything else there.
-    pub fn put(
+    /// Returns an object of this class at the slot if it lies fully on the top and clear of other
+    /// objects. `turn_rad` is its yaw relative to the furniture's.
+    pub fn place(
         &self,
         house: &House,
         class: ClassId,
         turn_rad: f32,
-        others: &[Thing],
-    ) -> Option<Thing> {
+        others: &[ObjectSpec],
+    ) -> Option<ObjectSpec> {
         let [sx, _, sz] = class.info().size_m;
         let (s, c) = (math::sin(turn_rad).abs(), math::cos(turn_rad).abs());
         let reach = 0.5 * Vec2::new(c * sx + s * sz, s * sx + c * sz);
@@ -82,25 +84,25 @@ impl Slot {
         let offset = rotate_yaw(Vec3::new(at.x, 0.0, at.y), self.surface.yaw_rad);
         let position = mm3(self.surface.center + offset);
         let yaw_rad = mm(chaic_core::geom::wrap_angle(self.surface.yaw_rad + turn_rad));
-        let thing = Thing::new(class, position, yaw_rad);
-        let solids = UprightBox::of_thing(&thing);
+        let object = ObjectSpec::new(class, position, yaw_rad);
+        let solids = UprightBox::from_object(&object);
         let touches =
             |other: &UprightBox, slack: f32| solids.iter().any(|s| s.overlap(other) > slack);
-        let host = UprightBox::of_thing(&house.furniture[self.host]);
-        let near = |t: &&Thing| xz(t.position).distance(xz(position)) < 0.8;
+        let host = UprightBox::from_object(&house.furniture[self.host]);
+        let near = |t: &&ObjectSpec| to_xz(t.position).distance(to_xz(position)) < 0.8;
         let is_clear = !host.iter().any(|h| touches(h, 0.004))
             && !others.iter().filter(near).any(|t| {
-                let apart = 0.5 * (t.size_m().max_element() + thing.size_m().max_element());
-                let close = xz(t.position).distance(xz(position)) < apart + APART_M;
-                close && UprightBox::of_thing(t).iter().any(|o| touches(o, -APART_M))
+                let apart = 0.5 * (t.size_m().max_element() + object.size_m().max_element());
+                let close = to_xz(t.position).distance(to_xz(position)) < apart + APART_M;
+                close && UprightBox::from_object(t).iter().any(|o| touches(o, -APART_M))
             });
-        is_clear.then_some(thing)
+        is_clear.then_some(object)
     }
 }
 
-/// Whether somebody in a wheelchair can get so near to a point, without a wall between.
+/// Returns whether a wheelchair user gets within `reach_m` of a point without a wall in between.
 fn within_reach(house: &House, room: usize, p: Vec2, reach_m: f32) -> bool {
-    let around = chaic_core::geom::Rect { min: p, max: p }.grown(reach_m);
+    let around = chaic_core::geom::Rect { min: p, max: p }.expanded(reach_m);
     let rect = house.rooms[room].rect;
     house.ground.cells_in(around).any(|i| {
         let m = house.ground.middle(i);
@@ -108,21 +110,21 @@ fn within_reach(house: &House, room: usize, p: Vec2, reach_m: f32) -> bool {
     })
 }
 
-fn room_of(house: &House, thing: &Thing) -> Option<usize> {
-    house.rooms.iter().position(|r| r.rect.contains(xz(thing.position)))
+fn room_of(house: &House, object: &ObjectSpec) -> Option<usize> {
+    house.rooms.iter().position(|r| r.rect.contains(to_xz(object.position)))
 }
 
-/// All places on low furniture that anybody reaches: three a table, two a seat (facts S11.2).
+/// Returns all reachable slots on low furniture: up to four per table, two per seat (facts S11.2).
 pub(super) fn low(house: &House) -> Vec<Slot> {
     let mut slots = Vec::new();
-    for (host, thing) in house.furniture.iter().enumerate() {
-        if !LOW_HOSTS.contains(&thing.class.name()) {
+    for (host, object) in house.furniture.iter().enumerate() {
+        if !LOW_HOSTS.contains(&object.class.name()) {
             continue;
         }
-        let Some(room) = room_of(house, thing) else { continue };
-        for surface in top_surfaces(thing).into_iter().filter(|s| s.center.y < LOW_M) {
-            for slot in spread(host, thing.class, surface) {
-                if within_reach(house, room, xz(slot.point()), REACH_M) {
+        let Some(room) = room_of(house, object) else { continue };
+        for surface in top_surfaces(object).into_iter().filter(|s| s.center.y < LOW_M) {
+            for slot in spread(host, object.class, surface) {
+                if within_reach(house, room, to_xz(slot.point()), REACH_M) {
                     slots.push(slot);
                 }
             }
@@ -131,11 +133,11 @@ pub(super) fn low(house: &House) -> Vec<Slot> {
     slots
 }
 
-/// Places on one surface, as many as it has room for.
+/// Returns the slots on one surface, as many as it has space for.
 fn spread(host: usize, class: ClassId, surface: Surface) -> Vec<Slot> {
     let [hx, hz] = surface.half;
     let area_m2 = 4.0 * hx * hz;
-    // The front (-z) first: the back is mostly to a wall, and farther than an arm.
+    // The front (-z) first: the back mostly faces a wall and is out of reach.
     // Chairs stand with their front at a table.
     let uvs: &[[f32; 2]] = if class.name() == "side_chair" {
         &[[-0.45, 0.15], [0.45, 0.15]]
@@ -146,64 +148,64 @@ fn spread(host: usize, class: ClassId, surface: Surface) -> Vec<Slot> {
     } else if hz < 0.34 {
         &[[-0.65, -0.35], [0.0, -0.35], [0.65, -0.35]]
     } else {
-        // Towards the ends, which no chair keeps people from.
+        // Towards the ends, which chairs do not block.
         &[[-0.78, -0.45], [0.78, -0.45], [-0.78, 0.45], [0.78, 0.45]]
     };
     uvs.iter().map(|uv| Slot { host, surface, uv: Vec2::from(*uv) }).collect()
 }
 
-/// The tops of cabinets and refrigerators that anybody can stand before, two or three places each.
+/// Returns the reachable tops of cabinets and refrigerators, with two or three slots each.
 pub(super) fn high(house: &House) -> Vec<HighTop> {
     let mut tops = Vec::new();
-    for (host, thing) in house.furniture.iter().enumerate() {
-        if !HIGH_HOSTS.contains(&thing.class.name()) {
+    for (host, object) in house.furniture.iter().enumerate() {
+        if !HIGH_HOSTS.contains(&object.class.name()) {
             continue;
         }
-        let Some(room) = room_of(house, thing) else { continue };
+        let Some(room) = room_of(house, object) else { continue };
         let highest =
-            top_surfaces(thing).into_iter().max_by(|a, b| a.center.y.total_cmp(&b.center.y));
+            top_surfaces(object).into_iter().max_by(|a, b| a.center.y.total_cmp(&b.center.y));
         let Some(surface) = highest.filter(|s| s.center.y >= HIGH_M) else { continue };
-        // Towards the front, where an arm gets to.
+        // Towards the front, within reach.
         let slot = |u: f32| Slot { host, surface, uv: Vec2::new(u, -0.45) };
-        if !within_reach(house, room, xz(slot(0.0).point()), REACH_M) {
+        if !within_reach(house, room, to_xz(slot(0.0).point()), REACH_M) {
             continue;
         }
-        // Every other top takes three things, so that ten to fifteen go up in a house.
+        // Tops have three and two slots in turn, so that a house has ten to fifteen high slots.
         let us: &[f32] = if tops.len() % 2 == 0 { &[-0.66, 0.0, 0.66] } else { &[-0.45, 0.45] };
         let slots = us.iter().map(|u| slot(*u)).collect();
-        tops.push(HighTop { class: thing.class, middle: slot(0.0), slots });
+        tops.push(HighTop { class: object.class, middle: slot(0.0), slots });
     }
     tops
 }
 
 impl Slot {
-    /// The place on the same surface at this share of its half length, from its middle.
+    /// Returns the slot on the same surface at this fraction of its half length from the center.
     pub fn along(mut self, u: f32) -> Slot {
         self.uv.x = u;
         self
     }
 
-    /// The same place a little aside, so that no two episodes look alike.
-    pub fn jittered(mut self, rng: &mut Stream) -> Slot {
+    /// Returns the slot with a small random offset, so that episodes differ.
+    pub fn jittered(mut self, rng: &mut RngStream) -> Slot {
         self.uv += Vec2::new(rng.range(-0.12, 0.12), rng.range(-0.12, 0.12));
         self
     }
 }
 
-/// Points on the floor of all rooms that are well away from furniture, walls and doorways and that
-/// can be walked to, in the grid's order.
+/// Returns walkable points on the floor of all rooms, away from furniture, walls and doorways, in
+/// the grid's order.
 pub(super) fn floor(house: &House, clear_m: f32) -> Vec<Vec2> {
-    let feet: Vec<_> = house.furniture.iter().map(foot).collect();
-    let rooms: Vec<_> = house.rooms.iter().map(|r| r.rect.grown(-clear_m)).collect();
+    let footprints: Vec<_> = house.furniture.iter().map(footprint).collect();
+    let rooms: Vec<_> = house.rooms.iter().map(|r| r.rect.expanded(-clear_m)).collect();
     let mut points = Vec::new();
     for i in (0..house.walkable.len()).filter(|i| house.walkable[*i]) {
         let (p, ground) = (house.ground.middle(i), &house.ground);
-        // Every third cell either way is enough to choose from.
+        // Every third cell along each axis is enough.
         if (i % ground.nx) % 3 != 0 || (i / ground.nx) % 3 != 0 {
             continue;
         }
         let in_room = rooms.iter().any(|r| r.contains(p));
-        let is_clear = feet.iter().all(|f| rect_distance(f, p) >= clear_m.min(0.45));
+        let is_clear = footprints.iter().all(|f| rect_distance(f, p) >= clear_m.min(0.45));
         let doorways = house.openings.iter().map(|o| 0.5 * (o.a + o.b));
         if in_room && is_clear && doorways.into_iter().all(|d| d.distance(p) > 1.1) {
             points.push(p);
@@ -212,7 +214,7 @@ pub(super) fn floor(house: &House, clear_m: f32) -> Vec<Vec2> {
     points
 }
 
-/// Points on which targets may lie on the floor.
-pub(super) fn floor_for_goods(house: &House) -> Vec<Vec2> {
+/// Returns points on the floor at which targets may lie.
+pub(super) fn floor_for_targets(house: &House) -> Vec<Vec2> {
     floor(house, FLOOR_CLEAR_M)
 }

@@ -1,4 +1,4 @@
-//! The walls of a floor plan, cut at doorways.
+//! Walls of a floor plan, cut at doorways.
 
 use chaic_core::Vec2;
 use chaic_world::Wall;
@@ -6,14 +6,15 @@ use chaic_world::Wall;
 use super::layout::{DOOR_M, Door, Plan, WALL_M};
 use crate::upright_box::mm;
 
-/// Height of rooms, metres.
+/// Height of rooms, meters.
 pub(super) const CEILING_M: f32 = 2.9;
-/// Height of doorways, metres.
+/// Height of doorways, meters.
 const LINTEL_M: f32 = 2.1;
 
 impl Plan {
-    /// All walls, cut at doorways, with lintels. Ends are drawn in by half the thickness, which a
-    /// wall's box adds again, so that no two boxes share a volume and doorways keep their width.
+    /// Returns all walls, cut at doorways, with lintels. A wall's box extends half the thickness
+    /// beyond its ends, so the ends are moved in by that: boxes do not overlap, and doorways keep
+    /// their width.
     pub fn walls(&self, outer_color: [u8; 3], inner_color: [u8; 3]) -> Vec<Wall> {
         let (o, t) = (self.outer, 0.5 * WALL_M);
         let mut walls = Vec::new();

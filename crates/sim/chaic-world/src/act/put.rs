@@ -1,4 +1,4 @@
-//! Putting things into, onto and aside.
+//! Put-in, put-on and setting aside.
 
 use chaic_core::action::{FailureReason, Hand};
 use chaic_core::capability::excess;
@@ -6,20 +6,20 @@ use chaic_core::catalogue::Role;
 use chaic_core::{Action, AgentId, EntityId, ResolvedAction, Vec3};
 
 use crate::event::EventKind;
-use crate::luck::Luck;
+use crate::random::RngPurpose;
 use crate::rules::ReachTo;
-use crate::state::{Activity, Phase, Place, Step};
-use crate::tick::Progress;
+use crate::state::{ActionStep, Activity, ObjectLocation, Phase};
+use crate::tick::StepProgress;
 use crate::world::World;
 
-/// Height above its place at which a thing is let go, metres (facts S3.7).
+/// Height above the spot at which an object is released, meters (facts S3.7).
 const RELEASE_ABOVE_M: f32 = 0.2;
-/// Height above the floor from which a thing drops after a failed put-on, metres: ours, that of a
-/// hand that bends down, so that nothing rolls far.
+/// Height above the floor from which an object drops after a failed put-on, meters. Our choice: a
+/// hand that bends down, so that objects do not roll far.
 const DROP_FROM_M: f32 = 0.3;
 
 impl World {
-    /// The object, the container and the object's hand of a put-in.
+    /// Returns the object, the container and the object's hand of a put-in.
     pub(super) fn check_put_in(
         &self,
         agent: AgentId,
@@ -31,7 +31,7 @@ impl World {
             else {
                 continue;
             };
-            let role = |e: EntityId| self.thing(e).0.class.info().role;
+            let role = |e: EntityId| self.object(e).0.class.info().role;
             let fits = matches!(role(object), Role::Target | Role::Fragile);
             if fits && role(container) == Role::Container && object != container {
                 let full = self.contents(container).len() >= self.rules.container_capacity as usize;
@@ -41,48 +41,52 @@ impl World {
         Err(FailureReason::NotContainerAndTarget)
     }
 
-    /// The steps of a put-in, next one last: 80 frames and those in which one watches what was
-    /// dropped.
+    /// Returns the steps of a put-in, in reverse order: 80 frames, plus the drawn number of frames
+    /// for watching the object.
     pub(super) fn put_in_steps(
         &self,
         agent: AgentId,
         object: EntityId,
         container: EntityId,
         hand: Hand,
-    ) -> Vec<Step> {
+    ) -> Vec<ActionStep> {
         let d = self.rules.durations;
-        let to = self.front_of(agent);
-        // To be part of the container takes what was dropped a frame (facts S2.2).
-        let parented = d.gap;
+        let to = self.front_in_world(agent);
+        // The original attaches the dropped object to the container in one extra frame (facts
+        // S2.2).
+        let attach_frames = d.gap;
         vec![
             self.reset_arms(Some(hand), to),
             self.gap(),
-            Step::of(Phase::Insert { object, container }, d.open_hand + d.gap + parented),
+            ActionStep::new(
+                Phase::Insert { object, container },
+                d.open_hand + d.gap + attach_frames,
+            ),
             self.gap(),
             self.reach(Some(hand), to + Vec3::Y * 0.15),
             self.gap(),
             self.reach(Some(hand.other()), to),
             self.gap(),
-            Step::of(Phase::Stand, d.move_away),
+            ActionStep::new(Phase::Stand, d.move_away),
             self.gap(),
         ]
     }
 
-    /// How many frames longer one watches what came into a container. A basket is no place to
-    /// watch: its owner's other hand is on the handlebar (facts S2.2: 2 frames).
-    pub(crate) fn frames_watched(&mut self, agent: AgentId, action: ResolvedAction) -> u32 {
+    /// Draws the number of extra frames for watching the object of a put-in. A basket on a vehicle
+    /// has none, because the other hand is on the handlebar (facts S2.2: 2 frames).
+    pub(crate) fn draw_watch_frames(&mut self, agent: AgentId, action: ResolvedAction) -> u32 {
         if action != Action::PutIn {
             return 0;
         }
-        let most = self.rules.durations.watch_put_in;
-        self.luck(agent, Luck::WatchPutIn).below(most as usize + 1) as u32
+        let max_frames = self.rules.durations.watch_put_in;
+        self.rng(agent, RngPurpose::WatchPutIn).below(max_frames as usize + 1) as u32
     }
 
     /// Puts a held object into a container or basket.
     pub(crate) fn insert(&mut self, agent: AgentId, object: EntityId, container: EntityId) {
         let is_taken = |slot: u8| {
             self.contents(container).iter().any(
-                |e| matches!(self.thing(*e).1.place, Place::Inside { slot: s, .. } if s == slot),
+                |e| matches!(self.object(*e).1.location, ObjectLocation::Inside { slot: s, .. } if s == slot),
             )
         };
         let slot = (0..u8::MAX).find(|slot| !is_taken(*slot)).unwrap_or(u8::MAX);
@@ -90,15 +94,15 @@ impl World {
         for hand in hands.iter_mut().filter(|h| **h == Some(object)) {
             *hand = None;
         }
-        let rotation = self.thing(container).1.rotation;
-        let thing = self.thing_mut(object);
-        thing.place = Place::Inside { container, slot };
-        thing.rotation = rotation;
-        self.happened(EventKind::Stowed { agent, object, container });
+        let rotation = self.object(container).1.rotation;
+        let state = self.object_mut(object);
+        state.location = ObjectLocation::Inside { container, slot };
+        state.rotation = rotation;
+        self.record_event(EventKind::Stowed { agent, object, container });
     }
 
-    /// What a put-on with this hand would put down.
-    pub(super) fn to_put_down(&self, agent: AgentId, hand: Hand) -> Vec<EntityId> {
+    /// Returns the objects that a put-on with this hand would put down.
+    pub(super) fn objects_to_put(&self, agent: AgentId, hand: Hand) -> Vec<EntityId> {
         if let Some(vehicle) = self.vehicle(agent) {
             return self.contents(vehicle);
         }
@@ -108,22 +112,22 @@ impl World {
         self.person(agent).hands[hand.index()].into_iter().collect()
     }
 
-    /// Decides whether putting down succeeds, and lays out the steps.
+    /// Decides whether a put-on succeeds, and plans its steps.
     pub(crate) fn judge_put(
         &mut self,
         agent: AgentId,
         activity: &mut Activity,
         hand: Option<Hand>,
         place: EntityId,
-    ) -> Progress {
+    ) -> StepProgress {
         if self.rules.reach_to == ReachTo::NearestPoint
             && let Err(reason) = self.check_within_reach(agent, place)
         {
-            return Progress::Fails(reason);
+            return StepProgress::Failed(reason);
         }
-        let objects = self.to_put_down(agent, hand.unwrap_or(Hand::Right));
+        let objects = self.objects_to_put(agent, hand.unwrap_or(Hand::Right));
         let Some(first) = objects.first().copied() else {
-            return Progress::Fails(FailureReason::HandEmpty);
+            return StepProgress::Failed(FailureReason::HandEmpty);
         };
         let d = self.rules.durations;
         let from = self.person(agent).pose.position;
@@ -133,17 +137,17 @@ impl World {
                 Phase::Release { hand: None, object: first, on: Some(place), at, set_down: true };
             activity.queue = vec![
                 self.reset_arms(None, at),
-                Step::of(release, d.open_hand),
+                ActionStep::new(release, d.open_hand),
                 self.reach(None, at + Vec3::Y),
-                Step::of(Phase::Face { to: place }, d.turn),
+                ActionStep::new(Phase::Face { to: place }, d.turn),
             ];
-            return Progress::Instant;
+            return StepProgress::Instant;
         }
-        // Facts S3.7: the height that counts is that of the place's top. One draw for
-        // the whole of a rider's basket: it is one attempt.
-        let height_excess = excess(self.top_of(place), self.capability(agent).put_range_m);
+        // Facts S3.7: the height of the place's top counts. The whole basket of a rider is one
+        // attempt with one draw.
+        let height_excess = excess(self.top_height_m(place), self.capability(agent).put_range_m);
         let p = self.rules.put_penalty.chance(height_excess);
-        let fails = !self.luck(agent, Luck::PutOn).chance(p);
+        let fails = !self.rng(agent, RngPurpose::PutOn).chance(p);
         let is_rider = self.vehicle(agent).is_some();
         if fails {
             activity.failing = Some(FailureReason::BeyondLimits);
@@ -153,79 +157,84 @@ impl World {
             (false, true) => self.unload_steps(agent, objects, place),
             (true, false) => {
                 let mut steps = vec![self.reset_arms(hand, self.drop_spot(agent, first))];
-                steps.extend(self.vain_put_steps(agent, hand, first, place));
+                steps.extend(self.failed_put_steps(agent, hand, first, place));
                 steps
             }
             (true, true) => {
                 let hand = Some(Hand::Right);
-                let mut steps = vec![self.reach(hand, self.rest_of(agent, Hand::Right))];
-                steps.extend(self.vain_put_steps(agent, hand, first, place));
-                steps.extend(self.out_of_basket(agent));
+                let mut steps = vec![self.reach(hand, self.hand_rest_in_world(agent, Hand::Right))];
+                steps.extend(self.failed_put_steps(agent, hand, first, place));
+                steps.extend(self.basket_take_steps(agent));
                 steps
             }
         };
-        activity.queue.push(Step::of(Phase::Face { to: place }, d.turn));
-        Progress::Instant
+        activity.queue.push(ActionStep::new(Phase::Face { to: place }, d.turn));
+        StepProgress::Instant
     }
 
-    /// Putting what a hand holds on a place, next step last.
+    /// Returns the steps that put the object of a hand on a place, in reverse order.
     fn put_steps(
         &self,
         agent: AgentId,
         hand: Option<Hand>,
         object: EntityId,
         place: EntityId,
-    ) -> Vec<Step> {
+    ) -> Vec<ActionStep> {
         let d = self.rules.durations;
         let spot = self.free_spot_on(place, object, self.person(agent).pose.position, &[]);
         let at = spot + Vec3::Y * RELEASE_ABOVE_M;
         let release = Phase::Release { hand, object, on: Some(place), at, set_down: false };
         vec![
             self.reset_arms(hand, at),
-            Step::of(release, d.open_hand + d.watch_fall),
+            ActionStep::new(release, d.open_hand + d.watch_fall),
             self.reach(hand, at),
             self.gap(),
             self.reach(hand, spot),
         ]
     }
 
-    /// Putting on a place what is in a rider's basket, one after the other (facts
-    /// S8.2), next step last.
-    fn unload_steps(&self, agent: AgentId, objects: Vec<EntityId>, place: EntityId) -> Vec<Step> {
+    /// Returns the steps that put the contents of a rider's basket on a place one by one (facts
+    /// S8.2), in reverse order.
+    fn unload_steps(
+        &self,
+        agent: AgentId,
+        objects: Vec<EntityId>,
+        place: EntityId,
+    ) -> Vec<ActionStep> {
         let d = self.rules.durations;
         let hand = Some(Hand::Right);
         let from = self.person(agent).pose.position;
-        let mut steps = vec![self.reach(hand, self.rest_of(agent, Hand::Right))];
+        let mut steps = vec![self.reach(hand, self.hand_rest_in_world(agent, Hand::Right))];
         let mut taken = Vec::new();
         for object in objects.into_iter().rev() {
             let spot = self.free_spot_on(place, object, from, &taken);
-            taken.push((spot, self.thing(object).0.half_longer_side_m()));
+            taken.push((spot, self.object(object).0.half_longer_side_m()));
             let at = spot + Vec3::Y * RELEASE_ABOVE_M;
             let release = Phase::Release { hand, object, on: Some(place), at, set_down: false };
-            steps.extend([Step::of(release, d.open_hand), self.reach(hand, at)]);
-            steps.extend(self.out_of_basket(agent));
+            steps.extend([ActionStep::new(release, d.open_hand), self.reach(hand, at)]);
+            steps.extend(self.basket_take_steps(agent));
         }
         steps
     }
 
-    /// Taking a thing out of one's basket, next step last.
-    fn out_of_basket(&self, agent: AgentId) -> [Step; 2] {
+    /// Returns the steps that take an object out of the agent's basket, in reverse order.
+    fn basket_take_steps(&self, agent: AgentId) -> [ActionStep; 2] {
         let d = self.rules.durations;
         [
-            Step::of(Phase::Stand, d.grasp + d.gap),
-            self.reach(Some(Hand::Right), self.basket_of(agent)),
+            ActionStep::new(Phase::Stand, d.grasp + d.gap),
+            self.reach(Some(Hand::Right), self.own_basket_in_world(agent)),
         ]
     }
 
-    /// A try beyond one's limits, next step last: the hand comes as far as it can, and the thing
-    /// drops to the floor beside the person (facts S1.4).
-    fn vain_put_steps(
+    /// Returns the steps of an attempt beyond a limit, in reverse order. The hand moves as far as
+    /// it can, and the object drops to the floor beside the agent (facts S1.4).
+    fn failed_put_steps(
         &self,
         agent: AgentId,
         hand: Option<Hand>,
         object: EntityId,
         place: EntityId,
-    ) -> [Step; 4] {
+    ) -> [ActionStep; 4] {
         let d = self.rules.durations;
         let mut to = self.free_spot_on(place, object, self.person(agent).pose.position, &[]);
         let [low, high] = self.capability(agent).put_range_m;
@@ -233,42 +242,42 @@ impl World {
         let at = self.drop_spot(agent, object);
         let release = Phase::Release { hand, object, on: None, at, set_down: false };
         [
-            Step::of(release, d.open_hand + d.watch_fall),
+            ActionStep::new(release, d.open_hand + d.watch_fall),
             self.reach(hand, at),
             self.gap(),
-            Step::of(Phase::Reach { hand, to, fails: true }, d.reach),
+            ActionStep::new(Phase::Reach { hand, to, fails: true }, d.reach),
         ]
     }
 
-    /// Where a thing is let go after a failed put-on.
+    /// Returns the release position of an object after a failed put-on.
     pub(crate) fn drop_spot(&self, agent: AgentId, object: EntityId) -> Vec3 {
         self.floor_spot_beside(agent, object) + Vec3::Y * DROP_FROM_M
     }
 
-    /// Finds where to put a removed obstacle, and lays out the steps.
+    /// Chooses a spot for a removed obstacle, and plans the steps.
     pub(crate) fn judge_aside(
         &mut self,
         agent: AgentId,
         activity: &mut Activity,
         hand: Hand,
         obstacle: EntityId,
-    ) -> Progress {
+    ) -> StepProgress {
         let at = self.spot_aside(agent, obstacle);
         let d = self.rules.durations;
         let release =
             Phase::Release { hand: Some(hand), object: obstacle, on: None, at, set_down: true };
         activity.queue = vec![
             self.reset_arms(Some(hand), at),
-            Step::of(release, d.open_hand),
+            ActionStep::new(release, d.open_hand),
             self.reach(Some(hand), at),
             self.gap(),
             self.reach(Some(hand), at + Vec3::Y * 0.5),
-            Step::of(Phase::Stand, d.turn),
+            ActionStep::new(Phase::Stand, d.turn),
         ];
-        Progress::Instant
+        StepProgress::Instant
     }
 
-    /// Opens the hand: the thing falls, or stands where it is set down.
+    /// Opens the hand: the object falls, or stands where it is set down.
     pub(crate) fn release(
         &mut self,
         agent: AgentId,
@@ -280,25 +289,25 @@ impl World {
         for hand in self.person_mut(agent).hands.iter_mut().filter(|h| **h == Some(object)) {
             *hand = None;
         }
-        self.happened(EventKind::Released { agent, object, on });
+        self.record_event(EventKind::Released { agent, object, on });
         let carried_jointly = self.state.joint.is_some_and(|j| j.object == object);
-        let is_goal = on.filter(|place| self.setup.goal_places.contains(place));
+        let goal_place = on.filter(|place| self.setup.goal_places.contains(place));
         let is_aside = set_down && on.is_none();
-        // Somebody may have come there meanwhile.
+        // An agent may have moved to the spot meanwhile.
         let is_taken = is_aside && !self.is_free_floor(object, at);
         let at = if is_taken { self.spot_aside(agent, object) } else { at };
-        let thing = self.thing_mut(object);
-        thing.released_at = is_goal;
-        thing.last_holder = Some(agent);
+        let state = self.object_mut(object);
+        state.released_at = goal_place;
+        state.last_holder = Some(agent);
         if set_down {
-            thing.position = at;
-            thing.place = Place::Resting { on };
-            self.come_to_rest(object);
+            state.position = at;
+            state.location = ObjectLocation::Resting { on };
+            self.check_delivery(object);
             if is_aside {
-                self.happened(EventKind::ObstacleRemoved { agent, object });
+                self.record_event(EventKind::ObstacleRemoved { agent, object });
             }
         } else {
-            thing.position = at;
+            state.position = at;
             self.start_fall(&[object]);
         }
         if carried_jointly {

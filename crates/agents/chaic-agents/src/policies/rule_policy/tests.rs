@@ -1,8 +1,8 @@
-//! The paper's rules against situations worked out by hand.
+//! The paper's rules in situations worked out by hand.
 
 use super::*;
 use crate::behavior::BehaviorLog;
-use crate::behavior::SeenInteraction;
+use crate::behavior::ObservedInteraction;
 use crate::memory::Memory;
 use crate::test_support::{Toy, carried, hands};
 use crate::track::Carried;
@@ -12,9 +12,9 @@ fn subject(class: &str, track: u32) -> Subject {
     Subject { track: TrackId(track), class: ClassId::named(class) }
 }
 
-/// One situation and what is to be done in it.
+/// Situation and its expected plan.
 struct Case {
-    what: &'static str,
+    name: &'static str,
     frame: Frame,
     hands: [Option<Carried>; 2],
     valid: Vec<Plan>,
@@ -35,7 +35,7 @@ fn choose(profile: RuleProfile, case: &Case, log: &BehaviorLog) -> Plan {
 }
 
 #[test]
-fn the_partner_does_what_the_paper_says() {
+fn the_partner_follows_the_rules_of_the_paper() {
     use Plan::*;
     let (apple, orange, banana) =
         (subject("apple", 20), subject("orange", 21), subject("banana", 22));
@@ -44,84 +44,84 @@ fn the_partner_does_what_the_paper_says() {
     let fruit = ["apple"; 3];
     let cases = [
         Case {
-            what: "nothing known: explore",
+            name: "nothing known: explore",
             frame: 100,
             hands: [None, None],
             valid: vec![Explore, TurnAround],
             expected: Explore,
         },
         Case {
-            what: "more than half the time left: container first",
+            name: "more than half the time left: container first",
             frame: 1400,
             hands: [None, None],
             valid: vec![Explore, PickUp(apple), PickContainer(basket)],
             expected: PickContainer(basket),
         },
         Case {
-            what: "less than half the time left: target first",
+            name: "less than half the time left: target first",
             frame: 1600,
             hands: [None, None],
             valid: vec![Explore, PickUp(apple), PickContainer(basket)],
             expected: PickUp(apple),
         },
         Case {
-            what: "what the goal does not ask for is left, though nearer",
+            name: "what the goal does not contain is ignored, though nearer",
             frame: 100,
             hands: [None, None],
             valid: vec![Explore, PickUp(orange), PickUp(banana), PickUp(apple)],
             expected: PickUp(banana),
         },
         Case {
-            what: "put in whenever possible",
+            name: "put in whenever possible",
             frame: 2900,
             hands: [hold("apple", 40), hold("wicker_basket", 41)],
             valid: vec![Explore, PutIn, Deliver],
             expected: PutIn,
         },
         Case {
-            what: "both hands full: deliver",
+            name: "both hands full: deliver",
             frame: 500,
             hands: [hold("apple", 40), hold("apple", 41)],
             valid: vec![Explore, Deliver],
             expected: Deliver,
         },
         Case {
-            what: "both hands full and no goal place known: look for it",
+            name: "both hands full and no goal place known: explore",
             frame: 500,
             hands: [hold("apple", 40), hold("apple", 41)],
             valid: vec![Explore],
             expected: Explore,
         },
         Case {
-            what: "one hand full: another target",
+            name: "one hand full: another target",
             frame: 1600,
             hands: [hold("apple", 40), None],
             valid: vec![Explore, Deliver, PickUp(apple)],
             expected: PickUp(apple),
         },
         Case {
-            what: "less than 37.5 % left, no goal place known, carrying: look for it",
+            name: "less than 37.5 % left, no goal place known, carrying: explore",
             frame: 1900,
             hands: [hold("apple", 40), None],
             valid: vec![Explore, PickUp(apple)],
             expected: Explore,
         },
         Case {
-            what: "a full basket leaves a hand for one more target",
+            name: "a full basket leaves a hand for one more target",
             frame: 1000,
             hands: [Some(carried("wicker_basket", 41, &fruit[..1])), None],
             valid: vec![Explore, Deliver, PickUp(banana)],
             expected: PickUp(banana),
         },
         Case {
-            what: "enough apples in hand: no more of them",
+            name: "enough apples in hand: no more of them",
             frame: 1000,
             hands: [Some(carried("wicker_basket", 41, &fruit)), None],
             valid: vec![Explore, Deliver, PickUp(apple), PickUp(banana)],
             expected: PickUp(banana),
         },
         Case {
-            what: "the partner clears no obstacles",
+            name: "the partner clears no obstacles",
             frame: 1000,
             hands: [None, None],
             valid: vec![Explore, RemoveObstacle(subject("trashbin", 50))],
@@ -133,17 +133,17 @@ fn the_partner_does_what_the_paper_says() {
             choose(RuleProfile::PARTNER, case, &BehaviorLog::default()),
             case.expected,
             "{}",
-            case.what
+            case.name
         );
     }
 }
 
 #[test]
-fn helpers_clear_obstacles_first_and_take_whatever_may_be_wanted() {
+fn helpers_remove_obstacles_first_and_pick_up_all_possible_targets() {
     let bin = subject("trashbin", 50);
     let orange = subject("orange", 21);
     let mut case = Case {
-        what: "",
+        name: "",
         frame: 100,
         hands: [None, None],
         valid: vec![Plan::Explore, Plan::PickUp(orange), Plan::RemoveObstacle(bin)],
@@ -153,14 +153,18 @@ fn helpers_clear_obstacles_first_and_take_whatever_may_be_wanted() {
     assert_eq!(choose(RuleProfile::RHP, &case, &log), case.expected);
     case.valid.pop();
     assert_eq!(choose(RuleProfile::RHP, &case, &log), Plan::PickUp(orange));
-    assert_eq!(choose(RuleProfile::ORACLE, &case, &log), Plan::Explore, "nobody wants an orange");
+    assert_eq!(
+        choose(RuleProfile::ORACLE, &case, &log),
+        Plan::Explore,
+        "the goal contains no orange"
+    );
 }
 
 #[test]
-fn what_the_partner_holds_is_no_longer_wanted_by_the_oracle() {
+fn objects_held_by_the_partner_are_no_longer_needed_by_the_oracle() {
     let banana = subject("banana", 22);
     let case = Case {
-        what: "",
+        name: "",
         frame: 1600,
         hands: [None, None],
         valid: vec![Plan::Explore, Plan::PickUp(banana)],
@@ -175,7 +179,7 @@ fn what_the_partner_holds_is_no_longer_wanted_by_the_oracle() {
 }
 
 #[test]
-fn the_oracle_takes_the_heaviest_it_can_lift_and_helps_with_the_rest() {
+fn the_oracle_picks_up_the_heaviest_piece_it_can_lift_and_helps_with_heavier_ones() {
     let pieces: Vec<Subject> = ClassId::all()
         .filter(|c| c.info().role == Role::HeavyTarget)
         .zip(70..)
@@ -186,16 +190,19 @@ fn the_oracle_takes_the_heaviest_it_can_lift_and_helps_with_the_rest() {
         .iter()
         .filter(|s| mass(s) <= 600.0)
         .max_by(|a, b| mass(a).total_cmp(&mass(b)))
-        .expect("the catalogue has furniture that one can lift");
-    let too_heavy = pieces.iter().find(|s| mass(s) > 600.0).expect("and some that nobody can");
+        .expect("the catalogue has furniture light enough to lift");
+    let too_heavy = pieces
+        .iter()
+        .find(|s| mass(s) > 600.0)
+        .expect("the catalogue has furniture that is too heavy");
     let mut case = Case {
-        what: "",
+        name: "",
         frame: 100,
         hands: [None, None],
         valid: pieces.iter().map(|s| Plan::PickUp(*s)).collect(),
         expected: Plan::PickUp(*heaviest),
     };
-    let profile = RuleProfile { wanted: Wanted::AnyPossible, ..RuleProfile::ORACLE };
+    let profile = RuleProfile { target_filter: TargetFilter::AnyPossible, ..RuleProfile::ORACLE };
     let mut log = BehaviorLog::default();
     let Plan::PickUp(chosen) = choose(profile, &case, &log) else { panic!("it picks up") };
     assert_eq!(mass(&chosen), mass(heaviest));
@@ -204,8 +211,8 @@ fn the_oracle_takes_the_heaviest_it_can_lift_and_helps_with_the_rest() {
     case.valid.pop();
     let lightest = pieces.iter().min_by(|a, b| mass(a).total_cmp(&mass(b))).expect("some");
     case.valid.push(Plan::LiftWith(*lightest));
-    assert!(matches!(choose(profile, &case, &log), Plan::PickUp(_)), "no help called for");
-    log.actions.push(SeenInteraction {
+    assert!(matches!(choose(profile, &case, &log), Plan::PickUp(_)), "no call for help");
+    log.actions.push(ObservedInteraction {
         agent: AgentId::PARTNER,
         frame: 90,
         action: Action::PickUp { object: lightest.track, hand: Hand::Left },

@@ -1,5 +1,6 @@
-//! Promise: `chaic verify` fails on a run whose folder was forged. Each row of the tables is an attack. Unless an
-//! attack is on the report, the report is written again afterwards, so that it does not give the attack away.
+//! Promise: `chaic verify` fails on a run whose folder was forged. Each row of the tables is an
+//! attack. The report is written again after an attack, unless it is the target, so that it does
+//! not reveal the attack.
 
 use super::*;
 use crate::report::{Report, write_files};
@@ -10,8 +11,8 @@ const TRACES_OF_HELPER: &str = "traces/low_target/turner";
 
 /// Plays two tasks with two helpers and writes the report.
 fn whole_run(path: &Path, source: &tempfile::TempDir, helpers: &TestHelpers) {
-    let given = RunRequest { seeds: None, ..given(source, &["none", "turner"]) };
-    let (mut run, _) = Run::open(path, Access::Begin, &given, helpers).unwrap();
+    let request = RunRequest { seeds: None, ..request(source, &["none", "turner"]) };
+    let (mut run, _) = Run::open(path, FolderMode::New, &request, helpers).unwrap();
     assert!(play(&mut run, 2, helpers));
     drop(run);
     write_report(path);
@@ -31,25 +32,25 @@ fn write_report(path: &Path) {
 
 /// Verifies a run and returns the problems, one per line.
 fn problems(path: &Path, helpers: &TestHelpers) -> String {
-    let verdict = RunFolder::read(path).and_then(|(folder, options)| {
+    let report = RunFolder::read(path).and_then(|(folder, options)| {
         crate::verify::verify_run(&folder, &options, helpers, 1, &|_| ())
     });
-    let verdict = match verdict {
-        Ok(verdict) => verdict,
+    let report = match report {
+        Ok(report) => report,
         Err(error) => return error.to_string(),
     };
-    let mismatches = verdict.mismatches.iter().map(ToString::to_string);
-    let findings = verdict.findings.iter().map(ToString::to_string);
-    let warnings = verdict.warnings.iter().map(ToString::to_string);
-    let mut said: Vec<String> = mismatches.chain(findings).chain(warnings).collect();
-    if !verdict.report.is_good() {
-        said.push(format!("{:?}", verdict.report));
+    let mismatches = report.mismatches.iter().map(ToString::to_string);
+    let findings = report.findings.iter().map(ToString::to_string);
+    let warnings = report.warnings.iter().map(ToString::to_string);
+    let mut problems: Vec<String> = mismatches.chain(findings).chain(warnings).collect();
+    if !report.report.is_good() {
+        problems.push(format!("{:?}", report.report));
     }
-    if !verdict.coverage.is_whole() {
-        said.push(verdict.coverage.to_string());
+    if !report.coverage.is_complete() {
+        problems.push(report.coverage.to_string());
     }
-    assert_eq!(said.is_empty(), verdict.is_good(), "{said:?}");
-    said.join("\n")
+    assert_eq!(problems.is_empty(), report.is_good(), "{problems:?}");
+    problems.join("\n")
 }
 
 fn copy_folder(from: &Path, to: &Path) {
@@ -76,7 +77,7 @@ fn replace(path: PathBuf, from: &str, to: &str) {
     change(path, |text| text.replacen(from, to, 1));
 }
 
-fn add(path: PathBuf, bytes: &[u8]) {
+fn append(path: PathBuf, bytes: &[u8]) {
     let text = fs::read(&path).unwrap();
     fs::write(path, [&text, bytes].concat()).unwrap();
 }
@@ -95,8 +96,8 @@ fn forge(run: &Path, forgery: impl Fn(&mut serde_json::Value)) {
     });
 }
 
-/// Sets the attacked result to full marks.
-fn win(run: &Path) {
+/// Sets the attacked result to the maximum.
+fn maximize_score(run: &Path) {
     forge(run, |result| result["done"] = result["total"].clone());
 }
 
@@ -111,204 +112,223 @@ fn last_line(path: &Path) -> String {
     fs::read_to_string(path).unwrap().lines().last().unwrap().to_owned() + "\n"
 }
 
-/// Whether the report is written again after an attack.
+/// Treatment of the report after an attack.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum AfterAttack {
-    Anew,
-    Left,
+    Rewritten,
+    Kept,
 }
-use AfterAttack::{Anew, Left};
+use AfterAttack::{Kept, Rewritten};
 
 type Attack = (&'static str, AfterAttack, &'static str, fn(&Path));
 
 /// Attacks that work on any system.
 const ATTACKS: &[Attack] = &[
-    ("better result", Anew, "something else of this run", win),
-    ("trace is a folder", Anew, "its trace is not a regular file: it is a folder", |run| {
-        win(run);
+    ("better result", Rewritten, "differs from the one of the trace", maximize_score),
+    ("trace is a folder", Rewritten, "its trace is not a regular file: it is a folder", |run| {
+        maximize_score(run);
         fs::remove_file(run.join(TRACE)).unwrap();
         fs::create_dir(run.join(TRACE)).unwrap();
     }),
-    ("no trace", Anew, "its trace is missing", |run| {
-        win(run);
+    ("no trace", Rewritten, "its trace is missing", |run| {
+        maximize_score(run);
         fs::remove_file(run.join(TRACE)).unwrap();
     }),
-    ("no traces at all", Anew, "its trace is missing", |run| {
+    ("no traces at all", Rewritten, "its trace is missing", |run| {
         fs::remove_dir_all(run.join("traces")).unwrap();
     }),
-    ("traces is a file", Anew, "traces: it is not a trace", |run| {
+    ("traces is a file", Rewritten, "traces: it is not a trace", |run| {
         fs::remove_dir_all(run.join("traces")).unwrap();
         fs::write(run.join("traces"), "").unwrap();
     }),
-    ("empty trace", Anew, "can't be checked", |run| fs::write(run.join(TRACE), "").unwrap()),
-    ("trace without its end", Anew, "the episode's end is missing", |run| {
+    ("empty trace", Rewritten, "can't be checked", |run| fs::write(run.join(TRACE), "").unwrap()),
+    ("trace without its end", Rewritten, "the episode's end is missing", |run| {
         let end = last_line(&run.join(TRACE));
         replace(run.join(TRACE), &end, "");
     }),
-    ("better end", Anew, "played again it is", |run| {
-        win(run);
+    ("better end", Rewritten, "the re-simulation has", |run| {
+        maximize_score(run);
         replace(run.join(TRACE), "\"done\":0.0", "\"done\":8.0");
     }),
-    ("second end", Anew, "follows the end of the trace", |run| {
-        add(run.join(TRACE), last_line(&run.join(TRACE)).as_bytes());
+    ("second end", Rewritten, "follows the end of the trace", |run| {
+        append(run.join(TRACE), last_line(&run.join(TRACE)).as_bytes());
     }),
-    ("better second end", Anew, "follows the end of the trace", |run| {
+    ("better second end", Rewritten, "follows the end of the trace", |run| {
         let end = last_line(&run.join(TRACE)).replacen("\"done\":0.0", "\"done\":1.0", 1);
-        add(run.join(TRACE), end.as_bytes());
+        append(run.join(TRACE), end.as_bytes());
     }),
-    ("record behind the end", Anew, "follows the end of the trace", |run| {
-        add(run.join(TRACE), b"{\"frame\":90,\"event\":\"over\",\"complete\":true}\n");
+    ("record after the end", Rewritten, "follows the end of the trace", |run| {
+        append(run.join(TRACE), b"{\"frame\":90,\"event\":\"over\",\"complete\":true}\n");
     }),
-    ("torn record behind the end", Anew, "follows the end of the trace", |run| {
-        add(run.join(TRACE), b"[90,0,");
+    ("torn record after the end", Rewritten, "follows the end of the trace", |run| {
+        append(run.join(TRACE), b"[90,0,");
     }),
-    ("no UTF-8 behind the end", Anew, "follows the end of the trace", |run| {
-        add(run.join(TRACE), b"\xff\xfe\n");
+    ("no UTF-8 after the end", Rewritten, "follows the end of the trace", |run| {
+        append(run.join(TRACE), b"\xff\xfe\n");
     }),
-    ("very long line behind the end", Anew, "follows the end of the trace", |run| {
-        add(run.join(TRACE), &vec![b' '; 9 << 20]);
+    ("very long line after the end", Rewritten, "follows the end of the trace", |run| {
+        append(run.join(TRACE), &vec![b' '; 9 << 20]);
     }),
-    ("empty line in a trace", Anew, "line 2", |run| replace(run.join(TRACE), "\n", "\n\n")),
-    ("other line breaks", Anew, "differs from the form that chaic writes", |run| {
+    ("empty line in a trace", Rewritten, "line 2", |run| replace(run.join(TRACE), "\n", "\n\n")),
+    ("other line breaks", Rewritten, "differs from the form that chaic writes", |run| {
         change(run.join(TRACE), |text| text.replace('\n', "\r\n"));
     }),
-    ("field more in the header", Anew, "line 1 differs from the form that chaic writes", |run| {
-        replace(run.join(TRACE), "{\"format\"", "{\"note\":1,\"format\"");
-    }),
-    ("field twice in the header", Anew, "duplicate field", |run| {
+    (
+        "extra field in the header",
+        Rewritten,
+        "line 1 differs from the form that chaic writes",
+        |run| {
+            replace(run.join(TRACE), "{\"format\"", "{\"note\":1,\"format\"");
+        },
+    ),
+    ("duplicate field in the header", Rewritten, "duplicate field", |run| {
         replace(run.join(TRACE), "{\"format\"", "{\"seed\":0,\"format\"");
     }),
-    ("field more in an event", Anew, "differs from the form that chaic writes", |run| {
+    ("extra field in an event", Rewritten, "differs from the form that chaic writes", |run| {
         replace(run.join(TRACE), "{\"frame\"", "{\"note\":1,\"frame\"");
     }),
-    ("field more beside the end", Anew, "differs from the form that chaic writes", |run| {
+    ("extra field beside the end", Rewritten, "differs from the form that chaic writes", |run| {
         change(run.join(TRACE), |text| text.replacen("}}\n", "},\"note\":1}\n", 1));
     }),
-    ("entry more in a decision", Anew, "trailing", |run| {
+    ("extra entry in a decision", Rewritten, "trailing", |run| {
         change(run.join(TRACE), |text| {
             let second = text.lines().nth(1).unwrap();
             text.replacen(second, &second.replace(']', ",null,7]"), 1)
         });
     }),
-    ("other version of chaic in a trace", Anew, "another version of chaic", |run| {
+    ("other version of chaic in a trace", Rewritten, "another version of chaic", |run| {
         let now = format!("\"chaic\":\"{}\"", chaic_env::CHAIC_VERSION);
         replace(run.join(TRACE), &now, "\"chaic\":\"0.0.9\"");
     }),
-    ("trace of another seed", Anew, "doesn't play that episode run", |run| {
+    ("trace of another seed", Rewritten, "doesn't play that episode run", |run| {
         let other = run.join(TRACE.replace("-s0", "-s1"));
         fs::copy(run.join(TRACE), other).unwrap();
     }),
-    ("trace of another helper", Anew, "doesn't play that episode run", |run| {
+    ("trace of another helper", Rewritten, "doesn't play that episode run", |run| {
         fs::create_dir_all(run.join("traces/low_target/oracle")).unwrap();
         fs::copy(run.join(TRACE), run.join(TRACE.replace("turner", "oracle"))).unwrap();
     }),
-    ("trace of another task", Anew, "doesn't play that episode run", |run| {
+    ("trace of another task", Rewritten, "doesn't play that episode run", |run| {
         copy_folder(&run.join("traces/low_target"), &run.join("traces/tremor"));
     }),
-    ("path in other case", Anew, "doesn't play that episode run", |run| {
+    ("path in other case", Rewritten, "doesn't play that episode run", |run| {
         fs::create_dir_all(run.join("traces/low_target/Turner")).unwrap();
         fs::copy(run.join(TRACE), run.join(TRACE.replace("turner", "Turner"))).unwrap();
     }),
-    ("extension in other case", Anew, "it is not a trace of this run", |run| {
+    ("extension in other case", Rewritten, "it is not a trace of this run", |run| {
         fs::copy(run.join(TRACE), run.join(TRACE.replace(".jsonl", ".JSONL"))).unwrap();
     }),
-    ("trace in place of another", Anew, "that of another episode run", |run| {
+    ("trace in place of another", Rewritten, "the one of another episode run", |run| {
         fs::copy(run.join(TRACE), run.join(TRACE.replace("low_target", "shopping"))).unwrap();
     }),
-    ("unfinished trace", Anew, "it is an unfinished trace", |run| {
+    ("unfinished trace", Rewritten, "it is an unfinished trace", |run| {
         fs::write(run.join(format!("{TRACE}.partial")), "").unwrap();
     }),
-    ("stray file among traces", Anew, "it is not a trace of this run", |run| {
+    ("stray file among traces", Rewritten, "it is not a trace of this run", |run| {
         fs::write(run.join("traces/letter.txt"), "dear").unwrap();
     }),
-    ("folder below a helper's", Anew, "it is not a trace: it is a folder", |run| {
+    ("folder below a helper's", Rewritten, "it is not a trace: it is a folder", |run| {
         copy_folder(&run.join("traces/shopping"), &run.join(TRACES_OF_HELPER).join("more"));
     }),
-    ("result without its run", Anew, "which this run doesn't play", |run| {
+    ("result without its run", Rewritten, "which this run doesn't play", |run| {
         let line = line_of_attacked(run).replace("\"seed\":0", "\"seed\":7");
-        add(run.join("results.jsonl"), line.as_bytes());
+        append(run.join("results.jsonl"), line.as_bytes());
     }),
-    ("trace without its result", Anew, "no finished result of this run", |run| {
+    ("trace without its result", Rewritten, "no finished result of this run", |run| {
         replace(run.join("results.jsonl"), &line_of_attacked(run), "");
     }),
-    ("bad result called broken", Anew, "no finished result of this run", |run| {
+    ("finished result recorded as failed", Rewritten, "no finished result of this run", |run| {
         forge(run, |result| {
-            let mut broken = serde_json::json!({"status": "error", "message": "no luck"});
+            let mut broken = serde_json::json!({"status": "error", "message": "failed"});
             for name in RunKey::FIELDS {
                 broken[name] = result[name].clone();
             }
             *result = broken;
         });
     }),
-    ("result twice", Anew, "is a second result of low_target/short/0", |run| {
-        add(run.join("results.jsonl"), line_of_attacked(run).as_bytes());
+    ("duplicate result", Rewritten, "is a second result of low_target/short/0", |run| {
+        append(run.join("results.jsonl"), line_of_attacked(run).as_bytes());
     }),
-    ("better result before the good one", Anew, "is a second result", |run| {
+    ("better result before the good one", Rewritten, "is a second result", |run| {
         let good = line_of_attacked(run);
-        win(run);
-        add(run.join("results.jsonl"), good.as_bytes());
+        maximize_score(run);
+        append(run.join("results.jsonl"), good.as_bytes());
     }),
-    ("better result behind the good one", Anew, "is a second result", |run| {
+    ("better result after the good one", Rewritten, "is a second result", |run| {
         let good = line_of_attacked(run);
-        win(run);
+        maximize_score(run);
         let forged = line_of_attacked(run);
         replace(run.join("results.jsonl"), &forged, &good);
-        add(run.join("results.jsonl"), forged.as_bytes());
+        append(run.join("results.jsonl"), forged.as_bytes());
     }),
-    ("field more in a result", Anew, "unknown field `note`", |run| {
+    ("extra field in a result", Rewritten, "unknown field `note`", |run| {
         forge(run, |result| result["note"] = 1.into());
     }),
-    ("field twice in a result", Anew, "the field `done` occurs twice", |run| {
+    ("duplicate field in a result", Rewritten, "the field `done` occurs twice", |run| {
         replace(run.join("results.jsonl"), "\"done\":", "\"done\":9.0,\"done\":");
     }),
-    ("count of a helper that counts nothing", Anew, "a built-in mind counts nothing", |run| {
-        replace(run.join("results.jsonl"), "\"digest\"", "\"counts\":{\"partner.x\":1},\"digest\"");
+    (
+        "counter of an agent without counters",
+        Rewritten,
+        "built-in agents have no counters",
+        |run| {
+            replace(
+                run.join("results.jsonl"),
+                "\"digest\"",
+                "\"counts\":{\"partner.x\":1},\"digest\"",
+            );
+        },
+    ),
+    (
+        "one result without diagnostic metrics",
+        Rewritten,
+        "differs from the one of the trace",
+        |run| {
+            forge(run, |result| drop(result.as_object_mut().unwrap().remove("measures")));
+        },
+    ),
+    ("torn result after the others", Rewritten, "is cut off", |run| {
+        append(run.join("results.jsonl"), b"{\"task\":\"low_target\"");
     }),
-    ("measures of one result less", Anew, "something else of this run", |run| {
-        forge(run, |result| drop(result.as_object_mut().unwrap().remove("measures")));
+    ("no UTF-8 in results", Rewritten, "results.jsonl: line 5", |run| {
+        append(run.join("results.jsonl"), b"\xff\xfe\n");
     }),
-    ("torn result behind the others", Anew, "is cut off", |run| {
-        add(run.join("results.jsonl"), b"{\"task\":\"low_target\"");
+    ("very long result", Rewritten, "line 5: is longer than", |run| {
+        append(run.join("results.jsonl"), &vec![b' '; 9 << 20]);
     }),
-    ("no UTF-8 in results", Anew, "results.jsonl: line 5", |run| {
-        add(run.join("results.jsonl"), b"\xff\xfe\n");
-    }),
-    ("very long result", Anew, "line 5: is longer than", |run| {
-        add(run.join("results.jsonl"), &vec![b' '; 9 << 20]);
-    }),
-    ("results are a folder", Left, "results.jsonl: it is a folder", |run| {
+    ("results are a folder", Kept, "results.jsonl: it is a folder", |run| {
         fs::remove_file(run.join("results.jsonl")).unwrap();
         fs::create_dir(run.join("results.jsonl")).unwrap();
     }),
-    ("no scores", Left, "missing: [\"scores.json\"]", |run| {
+    ("no scores", Kept, "missing: [\"scores.json\"]", |run| {
         fs::remove_file(run.join("scores.json")).unwrap();
     }),
-    ("no report", Left, "missing: [\"report.md\"]", |run| {
+    ("no report", Kept, "missing: [\"report.md\"]", |run| {
         fs::remove_file(run.join("report.md")).unwrap();
     }),
-    ("no figure", Left, "missing: [\"figure.svg\"]", |run| {
+    ("no figure", Kept, "missing: [\"figure.svg\"]", |run| {
         fs::remove_file(run.join("figure.svg")).unwrap();
     }),
-    ("better scores", Left, "altered: [\"scores.json\"]", |run| {
+    ("better scores", Kept, "altered: [\"scores.json\"]", |run| {
         replace(run.join("scores.json"), "0.0", "1.0");
     }),
-    ("report is a folder", Left, "altered: [\"report.md\"]", |run| {
+    ("report is a folder", Kept, "altered: [\"report.md\"]", |run| {
         fs::remove_file(run.join("report.md")).unwrap();
         fs::create_dir(run.join("report.md")).unwrap();
     }),
-    ("no episodes", Anew, "episodes", |run| fs::remove_dir_all(run.join("episodes")).unwrap()),
-    ("easier episode", Anew, "not what this run has: setup", |run| {
+    ("no episodes", Rewritten, "episodes", |run| fs::remove_dir_all(run.join("episodes")).unwrap()),
+    ("easier episode", Rewritten, "differs from the one that this run writes: setup", |run| {
         let copy = run.join("episodes/low_target-short-0.json");
         replace(copy, "\"horizon\": 90", "\"horizon\": 91");
     }),
-    ("episode under another name", Anew, "under another name", |run| {
+    ("episode under another name", Rewritten, "under another name", |run| {
         let copy = run.join("episodes/low_target-short-0.json");
         fs::copy(&copy, run.join("episodes/a.json")).unwrap();
     }),
-    ("field more in run.json", Anew, "run.json: its form differs", |run| {
+    ("extra field in run.json", Rewritten, "run.json: its form differs", |run| {
         replace(run.join("run.json"), "\"format\"", "\"note\": 1,\n  \"format\"");
     }),
-    ("no grants in run.json", Anew, "it lacks the grants of helpers", |run| {
+    ("no grants in run.json", Rewritten, "it lacks the grants of helpers", |run| {
         change(run.join("run.json"), |text| {
             let mut file: serde_json::Value = serde_json::from_str(text).unwrap();
             file.as_object_mut().unwrap().remove("granted");
@@ -316,14 +336,14 @@ const ATTACKS: &[Attack] = &[
         });
     }),
     (
-        "grants of nobody in run.json",
-        Anew,
+        "grants of an unknown helper in run.json",
+        Rewritten,
         "its grants are not those of the helpers that play",
         |run| {
             replace(run.join("run.json"), "\"turner\": {", "\"turnip\": {");
         },
     ),
-    ("other version in run.json", Anew, "OfOtherVersion", |run| {
+    ("other version in run.json", Rewritten, "OtherVersion", |run| {
         replace(run.join("run.json"), chaic_env::CHAIC_VERSION, "0.0.9");
     }),
 ];
@@ -335,26 +355,26 @@ fn check_attacks(attacks: &[Attack]) {
     whole_run(&good, &source, &helpers);
     assert_eq!(problems(&good, &helpers), "");
     copy_folder(&good, &dir.path().join("copy"));
-    assert_eq!(problems(&dir.path().join("copy"), &helpers), "", "a copy is as good");
-    let mut passed = Vec::new();
-    for (k, (name, report, words, attack)) in attacks.iter().enumerate() {
+    assert_eq!(problems(&dir.path().join("copy"), &helpers), "", "a copy passes");
+    let mut undetected = Vec::new();
+    for (k, (name, report, expected, attack)) in attacks.iter().enumerate() {
         let run = dir.path().join(k.to_string());
         copy_folder(&good, &run);
         attack(&run);
-        if *report == Anew {
+        if *report == Rewritten {
             write_report(&run);
         }
-        let said = problems(&run, &helpers);
-        if !said.contains(words) {
-            passed.push(format!("{name}: expected {words:?}, verify said {said:?}"));
+        let found = problems(&run, &helpers);
+        if !found.contains(expected) {
+            undetected.push(format!("{name}: expected {expected:?}, verify reported {found:?}"));
         }
     }
-    assert!(passed.is_empty(), "{}", passed.join("\n"));
+    assert!(undetected.is_empty(), "{}", undetected.join("\n"));
 }
 
 #[test]
-fn no_forged_run_is_passed() {
-    assert!(ATTACKS.len() >= 25, "the issue asks for so many");
+fn forged_runs_fail() {
+    assert!(ATTACKS.len() >= 25, "the issue requires 25 attacks");
     check_attacks(ATTACKS);
 }
 
@@ -384,85 +404,85 @@ mod special_files {
     const ATTACKS: &[Attack] = &[
         (
             "trace is a pipe",
-            Anew,
+            Rewritten,
             "its trace is not a regular file: it is no regular file",
             |run| {
-                win(run);
+                maximize_score(run);
                 pipe(run.join(TRACE));
             },
         ),
         (
             "trace leads to /dev/zero",
-            Anew,
+            Rewritten,
             "its trace is not a regular file: it is a link",
             |run| {
-                win(run);
+                maximize_score(run);
                 endless(run.join(TRACE));
             },
         ),
-        ("trace is a link", Anew, "its trace is not a regular file: it is a link", |run| {
+        ("trace is a link", Rewritten, "its trace is not a regular file: it is a link", |run| {
             link(run, TRACE)
         }),
         (
             "trace is a dangling link",
-            Anew,
+            Rewritten,
             "its trace is not a regular file: it is a link",
             |run| {
                 fs::remove_file(run.join(TRACE)).unwrap();
                 symlink("nowhere", run.join(TRACE)).unwrap();
             },
         ),
-        ("helper's folder is a link", Anew, "lies in a linked folder", |run| {
+        ("helper's folder is a link", Rewritten, "lies in a linked folder", |run| {
             link(run, TRACES_OF_HELPER);
         }),
-        ("task's folder is a link", Anew, "lies in a linked folder", |run| {
+        ("task's folder is a link", Rewritten, "lies in a linked folder", |run| {
             link(run, "traces/low_target");
         }),
-        ("traces is a link", Anew, "lies in a linked folder", |run| link(run, "traces")),
-        ("pipe among traces", Anew, "it is not a trace: it is no regular file", |run| {
+        ("traces is a link", Rewritten, "lies in a linked folder", |run| link(run, "traces")),
+        ("pipe among traces", Rewritten, "it is not a trace: it is no regular file", |run| {
             pipe(run.join(TRACES_OF_HELPER).join("short-0-s1.jsonl"));
         }),
-        ("link among traces", Anew, "it is not a trace: it is a link", |run| {
+        ("link among traces", Rewritten, "it is not a trace: it is a link", |run| {
             symlink("short-0-s0.jsonl", run.join(TRACES_OF_HELPER).join("short-0-s1.jsonl"))
                 .unwrap();
         }),
-        ("trace is a hard link to another", Anew, "that of another episode run", |run| {
+        ("trace is a hard link to another", Rewritten, "the one of another episode run", |run| {
             let other = run.join(TRACE.replace("low_target", "shopping"));
             fs::remove_file(&other).unwrap();
             fs::hard_link(run.join(TRACE), other).unwrap();
         }),
-        ("results are a pipe", Left, "results.jsonl: it is no regular file", |run| {
+        ("results are a pipe", Kept, "results.jsonl: it is no regular file", |run| {
             pipe(run.join("results.jsonl"));
         }),
-        ("results lead to /dev/zero", Left, "results.jsonl: it is a link", |run| {
+        ("results lead to /dev/zero", Kept, "results.jsonl: it is a link", |run| {
             endless(run.join("results.jsonl"));
         }),
-        ("results are a link", Left, "results.jsonl: it is a link", |run| {
+        ("results are a link", Kept, "results.jsonl: it is a link", |run| {
             link(run, "results.jsonl");
         }),
-        ("run.json is a link", Left, "run.json: it is a link", |run| link(run, "run.json")),
-        ("run.json is a pipe", Left, "run.json: it is no regular file", |run| {
+        ("run.json is a link", Kept, "run.json: it is a link", |run| link(run, "run.json")),
+        ("run.json is a pipe", Kept, "run.json: it is no regular file", |run| {
             pipe(run.join("run.json"));
         }),
-        ("scores are a link", Left, "altered: [\"scores.json\"]", |run| link(run, "scores.json")),
-        ("report is a pipe", Left, "altered: [\"report.md\"]", |run| pipe(run.join("report.md"))),
-        ("picture is a link", Left, "altered: [\"figure.png\"]", |run| link(run, "figure.png")),
-        ("episodes is a link", Anew, "episodes", |run| link(run, "episodes")),
-        ("an episode is a link", Anew, "episodes", |run| {
+        ("scores are a link", Kept, "altered: [\"scores.json\"]", |run| link(run, "scores.json")),
+        ("report is a pipe", Kept, "altered: [\"report.md\"]", |run| pipe(run.join("report.md"))),
+        ("picture is a link", Kept, "altered: [\"figure.png\"]", |run| link(run, "figure.png")),
+        ("episodes is a link", Rewritten, "episodes", |run| link(run, "episodes")),
+        ("an episode is a link", Rewritten, "episodes", |run| {
             link(run, "episodes/low_target-short-0.json");
         }),
-        ("an episode is a pipe", Anew, "episodes", |run| {
+        ("an episode is a pipe", Rewritten, "episodes", |run| {
             pipe(run.join("episodes/low_target-short-0.json"));
         }),
     ];
 
     #[test]
-    fn no_link_or_special_file_is_passed() {
+    fn runs_with_links_or_special_files_fail() {
         check_attacks(ATTACKS);
     }
 
     #[test]
-    fn a_run_that_a_user_names_by_a_link_is_passed() {
+    fn a_run_that_is_named_by_a_link_passes() {
         let source = episode_files(&[TaskId::LowTarget, TaskId::Shopping], 1);
         let (dir, helpers) = (tempfile::tempdir().unwrap(), TestHelpers::new());
         whole_run(&dir.path().join("good"), &source, &helpers);
@@ -471,13 +491,14 @@ mod special_files {
     }
 
     #[test]
-    fn going_on_reads_and_writes_nothing_through_links() {
+    fn a_resumed_run_does_not_follow_links() {
         let source = episode_files(&[TaskId::LowTarget, TaskId::Shopping], 1);
         let (dir, helpers) = (tempfile::tempdir().unwrap(), TestHelpers::new());
         let good = dir.path().join("good");
         whole_run(&good, &source, &helpers);
         let resume = |path: &Path| {
-            let (mut run, _) = Run::open(path, Access::Resume, &RunRequest::default(), &helpers)?;
+            let (mut run, _) =
+                Run::open(path, FolderMode::Resume, &RunRequest::default(), &helpers)?;
             run.play(1, &helpers, &helpers.stop, &mut |_| ())
         };
         for (k, name) in
@@ -493,17 +514,17 @@ mod special_files {
             let moved = run.with_extension("moved");
             if *name == "results.jsonl" {
                 // A torn record, which resuming cuts off.
-                add(moved.clone(), b"{\"task");
+                append(moved.clone(), b"{\"task");
             }
-            let before = walked(&moved);
+            let before = entries_with_lengths(&moved);
             let error = resume(&run).unwrap_err().to_string();
             assert!(error.contains("it is a link"), "{name}: {error}");
-            assert_eq!(walked(&moved), before, "{name}");
+            assert_eq!(entries_with_lengths(&moved), before, "{name}");
         }
     }
 
     /// Lists paths, kinds and lengths of all entries below a path.
-    fn walked(path: &Path) -> Vec<(chaic_files::Entry, u64)> {
+    fn entries_with_lengths(path: &Path) -> Vec<(chaic_files::Entry, u64)> {
         let found = chaic_files::walk(path, 9).unwrap().into_iter();
         found.map(|e| (e.clone(), fs::symlink_metadata(&e.path).unwrap().len())).collect()
     }
@@ -511,16 +532,16 @@ mod special_files {
 
 /// A run of a split ignores episode files in its folder.
 #[test]
-fn files_planted_in_a_run_of_a_split_are_not_played() {
+fn episode_files_in_a_run_of_a_split_are_ignored() {
     let (dir, helpers) = (tempfile::tempdir().unwrap(), TestHelpers::new());
-    let given = RunRequest {
+    let request = RunRequest {
         episodes: None,
         split: Some(chaic_episodes::Split::Test),
         tasks: Some(vec![TaskId::LowTarget]),
         first: Some(1),
-        ..given(&dir, &["turner"])
+        ..request(&dir, &["turner"])
     };
-    let (run, _) = Run::open(&dir.path().join("run"), Access::Begin, &given, &helpers).unwrap();
+    let (run, _) = Run::open(&dir.path().join("run"), FolderMode::New, &request, &helpers).unwrap();
     let key = &run.planned()[0].key;
     let bundled = run.folder().episode(run.options(), key).unwrap();
     let mut setup = bundled.clone().into_setup();
@@ -531,6 +552,6 @@ fn files_planted_in_a_run_of_a_split_are_not_played() {
     fs::write(&copy, easier.to_json()).unwrap();
     assert!(run.folder().episode(run.options(), key).unwrap() == bundled);
     drop(run);
-    let said = problems(&dir.path().join("run"), &helpers);
-    assert!(said.contains("this run plays the split test, which has no episode files"), "{said}");
+    let found = problems(&dir.path().join("run"), &helpers);
+    assert!(found.contains("this run plays the split test, which has no episode files"), "{found}");
 }

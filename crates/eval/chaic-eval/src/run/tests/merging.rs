@@ -1,5 +1,5 @@
-//! Promise: after a merge is killed at any moment, the folder is a complete run, or the same merge can be repeated.
-//! (Issue 35: leftover `*.tmp` files blocked both merge and resume.)
+//! Promise: after a merge is killed at any moment, the folder is a complete run, or the same merge
+//! can be repeated. (Issue 35: leftover `*.tmp` files blocked both merge and resume.)
 
 use super::*;
 
@@ -9,8 +9,8 @@ fn shards(helpers: &TestHelpers) -> (tempfile::TempDir, Vec<PathBuf>) {
     let dir = tempfile::tempdir().unwrap();
     let parts = (1..=2).map(|number| {
         let path = dir.path().join(format!("part{number}"));
-        let given = given(&files, &["none", "turner"]);
-        let (mut part, _) = Run::open(&path, Access::Begin, &given, helpers).unwrap();
+        let request = request(&files, &["none", "turner"]);
+        let (mut part, _) = Run::open(&path, FolderMode::New, &request, helpers).unwrap();
         let shard = Shard::new(number, 2).unwrap();
         assert!(part.play_shard(shard, 1, helpers, &helpers.stop, &mut |_| ()).unwrap());
         path
@@ -30,8 +30,9 @@ fn files_below(folder: &Path) -> Vec<(String, Vec<u8>)> {
 fn in_order(files: &[(String, Vec<u8>)]) -> Vec<(String, Vec<u8>)> {
     let order = ["episodes/", "traces/", "results.jsonl", "scores.json", "report.md", "figure.svg"];
     let order = order.into_iter().chain(["figure.png", "run.json"]);
-    let of = |first: &'static str| files.iter().filter(move |(name, _)| name.starts_with(first));
-    let written: Vec<_> = order.flat_map(of).cloned().collect();
+    let with_prefix =
+        |prefix: &'static str| files.iter().filter(move |(name, _)| name.starts_with(prefix));
+    let written: Vec<_> = order.flat_map(with_prefix).cloned().collect();
     assert_eq!(written.len() + 1, files.len(), "all but the lock: {files:?}");
     written
 }
@@ -43,7 +44,7 @@ fn write(folder: &Path, name: &str, bytes: &[u8]) {
 }
 
 #[test]
-fn a_merge_that_was_stopped_at_any_step_begins_again_or_is_whole() {
+fn a_merge_that_was_stopped_at_any_step_is_repeated_or_complete() {
     let helpers = TestHelpers::new();
     let (dir, parts) = shards(&helpers);
     let reference = dir.path().join("reference");
@@ -69,16 +70,19 @@ fn a_merge_that_was_stopped_at_any_step_begins_again_or_is_whole() {
             }
             if n_done == steps.len() {
                 let (folder, options) = RunFolder::read(&out).unwrap();
-                let verdict = crate::verify::verify_run(&folder, &options, &helpers, 1, &|_| ());
-                assert!(verdict.unwrap().is_good(), "only the mark is left");
-                let given = RunRequest::default();
-                drop(Run::open(&out, Access::Resume, &given, &helpers).unwrap());
+                let report = crate::verify::verify_run(&folder, &options, &helpers, 1, &|_| ());
+                assert!(report.unwrap().is_good(), "only the marker is left");
+                let request = RunRequest::default();
+                drop(Run::open(&out, FolderMode::Resume, &request, &helpers).unwrap());
             } else {
-                for access in [Access::Begin, Access::Resume] {
+                for access in [FolderMode::New, FolderMode::Resume] {
                     let error = RunFolder::lock(&out, access).unwrap_err();
-                    assert!(matches!(error, EvalError::StoppedMerge { .. }), "{n_done}: {error}");
+                    assert!(
+                        matches!(error, EvalError::InterruptedMerge { .. }),
+                        "{n_done}: {error}"
+                    );
                 }
-                let error = RunFolder::check_begun(&out).unwrap_err();
+                let error = RunFolder::check_started(&out).unwrap_err();
                 assert!(error.to_string().contains("run the same `chaic merge` again"), "{error}");
                 drop(merge(&out, &parts).unwrap());
             }
@@ -96,7 +100,7 @@ fn a_merge_that_was_stopped_at_any_step_begins_again_or_is_whole() {
 }
 
 #[test]
-fn a_merge_that_is_cleared_away_in_any_order_begins_again() {
+fn a_partly_cleared_merge_is_repeated() {
     let helpers = TestHelpers::new();
     let (dir, parts) = shards(&helpers);
     let reference = dir.path().join("reference");
@@ -122,7 +126,7 @@ fn a_merge_that_is_cleared_away_in_any_order_begins_again() {
 }
 
 #[test]
-fn a_merge_removes_nothing_that_no_merge_has_left() {
+fn a_merge_removes_files_of_merges_only() {
     let helpers = TestHelpers::new();
     let (dir, parts) = shards(&helpers);
     let cases: [&[&str]; 4] = [
@@ -186,12 +190,12 @@ fn a_merge_copies_regular_files_only_and_no_result_without_its_trace() {
 }
 
 #[test]
-fn results_whose_traces_are_gone_are_played_again() {
+fn results_without_traces_are_played_again() {
     let files = episode_files(&[TaskId::LowTarget, TaskId::Shopping], 1);
     let dir = tempfile::tempdir().unwrap();
     let (path, helpers) = (dir.path().join("run"), TestHelpers::new());
-    let given = given(&files, &["none", "turner"]);
-    let (mut run, _) = Run::open(&path, Access::Begin, &given, &helpers).unwrap();
+    let request = request(&files, &["none", "turner"]);
+    let (mut run, _) = Run::open(&path, FolderMode::New, &request, &helpers).unwrap();
     assert!(play(&mut run, 1, &helpers));
     assert_eq!(run.untraced_note(), None);
     drop(run);
@@ -204,12 +208,12 @@ fn results_whose_traces_are_gone_are_played_again() {
         lines
     };
     let before = fs::read_to_string(&journal).unwrap();
-    for gone in [&traces[..1], &traces[2..5], &traces[..]] {
-        gone.iter().for_each(|trace| fs::remove_file(trace).unwrap());
+    for removed in [&traces[..1], &traces[2..5], &traces[..]] {
+        removed.iter().for_each(|trace| fs::remove_file(trace).unwrap());
         let (mut run, _) =
-            Run::open(&path, Access::Resume, &RunRequest::default(), &helpers).unwrap();
-        let n = gone.len();
-        assert_eq!(run.extent(), Extent { total: 8, finished: 8 - n, errors: 0 });
+            Run::open(&path, FolderMode::Resume, &RunRequest::default(), &helpers).unwrap();
+        let n = removed.len();
+        assert_eq!(run.progress(), RunProgress { total: 8, finished: 8 - n, errors: 0 });
         let note = run.untraced_note().unwrap();
         assert!(
             note.starts_with(&format!("traces of {n} of 8 finished episode runs are missing")),
@@ -222,16 +226,16 @@ fn results_whose_traces_are_gone_are_played_again() {
         drop(run);
         let after = fs::read_to_string(&journal).unwrap();
         assert_eq!(sorted_lines(&after), sorted_lines(&before));
-        let but_results = |files: &[(String, Vec<u8>)]| {
+        let without_results = |files: &[(String, Vec<u8>)]| {
             let mut files = files.to_vec();
             files.retain(|(name, _)| name != "results.jsonl");
             files
         };
-        assert!(but_results(&files_below(&path)) == but_results(&whole), "the same bits");
+        assert!(without_results(&files_below(&path)) == without_results(&whole), "the same bits");
     }
     // Killed after the last result was appended, before the journal was rewritten.
     let twice = before.lines().next().unwrap().to_owned() + "\n";
     fs::write(&journal, before.clone() + &twice).unwrap();
-    drop(Run::open(&path, Access::Resume, &RunRequest::default(), &helpers).unwrap());
+    drop(Run::open(&path, FolderMode::Resume, &RunRequest::default(), &helpers).unwrap());
     assert_eq!(sorted_lines(&fs::read_to_string(&journal).unwrap()), sorted_lines(&before));
 }

@@ -1,0 +1,55 @@
+//! Factories that configure an agent's perception.
+
+use chaic_core::observation::{Grants, SensorConfig};
+
+use chaic_core::AgentId;
+
+use crate::behavior::BehaviorModel;
+use crate::perception::{GroundTruthIds, Perception};
+
+/// Name that selects [`GroundTruthPerceptionFactory`], which has no name in traces.
+pub const GROUND_TRUTH: &str = "gt";
+
+/// Kind of perception: its name, its required sensors and grants, and constructors of its parts.
+pub trait PerceptionFactory: Send + Sync {
+    /// Name in traces and reports, by which the same perception can be selected again; `None` for
+    /// granted ground-truth ids.
+    fn name(&self) -> Option<String>;
+
+    /// Sensors that the perception requires.
+    fn sensors(&self) -> SensorConfig;
+
+    /// Returns the grants of an agent that uses this perception instead of ground-truth ids.
+    fn grants(&self, requested: Grants) -> Grants;
+
+    /// Creates the perception of one agent.
+    fn perception(&self) -> Box<dyn Perception>;
+
+    /// Creates a behavior model of this person; `None` selects the default, grants or inference
+    /// from tracks.
+    fn behavior(&self, _watched: AgentId) -> Option<Box<dyn BehaviorModel>> {
+        None
+    }
+}
+
+/// Factory of [`GroundTruthIds`].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct GroundTruthPerceptionFactory;
+
+impl PerceptionFactory for GroundTruthPerceptionFactory {
+    fn name(&self) -> Option<String> {
+        None
+    }
+
+    fn sensors(&self) -> SensorConfig {
+        SensorConfig::DEPTH_AND_IDS
+    }
+
+    fn grants(&self, requested: Grants) -> Grants {
+        requested
+    }
+
+    fn perception(&self) -> Box<dyn Perception> {
+        Box::new(GroundTruthIds)
+    }
+}

@@ -1,0 +1,11 @@
+//! Policies: rule-based, random, following the partner, or controlled by a caller.
+
+mod external;
+mod follow;
+mod random;
+mod rule_policy;
+
+pub use external::ExternalPolicy;
+pub use follow::FollowPolicy;
+pub use random::RandomPolicy;
+pub use rule_policy::{RulePolicy, RuleProfile, TargetFilter, TargetOrder};

@@ -1,0 +1,63 @@
+//! Steps of an episode and the records that they give, for [`Env::run`](crate::Env::run) and
+//! [`Playback`](crate::Playback).
+
+use chaic_core::agent::{ChildState, Thought};
+use chaic_core::{AgentId, ResolvedAction};
+use chaic_world::World;
+
+use crate::digest::Digest;
+use crate::trace::{ChildRecord, Decision, Record, TraceEvent, is_recorded};
+
+/// An agent's next action, with the changes of its state that a trace records.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ChosenAction {
+    /// The agent.
+    pub agent: AgentId,
+    /// Its action.
+    pub action: ResolvedAction,
+    /// The agent's thought, if it changed.
+    pub thought: Option<Thought>,
+    /// The child's state, if the agent is the child and the state changed.
+    pub child: Option<ChildState>,
+}
+
+/// Submits the actions that agents chose in one frame, in order, and passes the records to `sink`.
+///
+/// # Errors
+/// Those of `sink`.
+pub(crate) fn submit_all<E>(
+    world: &mut World,
+    choices: Vec<ChosenAction>,
+    sink: &mut dyn FnMut(&Record) -> Result<(), E>,
+) -> Result<(), E> {
+    let frame = world.state().frame;
+    for ChosenAction { agent, action, thought, child } in choices {
+        // An earlier action of this frame may have engaged this agent already.
+        if world.waiting().contains(&agent) {
+            let digest = Digest(world.digest());
+            sink(&Record::Decision(Decision { frame, agent, action, digest, thought }))?;
+            world.submit(agent, action).expect("the agent waits");
+        }
+        if let Some(state) = child {
+            sink(&Record::Child(ChildRecord { frame, state }))?;
+        }
+    }
+    Ok(())
+}
+
+/// Runs frames until an agent waits for an action or the episode ends, and passes the recorded
+/// events to `sink`. Calls `on_frame` after each frame.
+///
+/// # Errors
+/// Those of `sink`.
+pub(crate) fn advance<E>(
+    world: &mut World,
+    on_frame: &mut dyn FnMut(&World),
+    sink: &mut dyn FnMut(&Record) -> Result<(), E>,
+) -> Result<(), E> {
+    world.advance_with_callback(on_frame);
+    for event in world.drain_events().into_iter().filter(is_recorded) {
+        sink(&Record::Event(TraceEvent::new(event, world)))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,206 @@
+//! Tests that an environment behaves the same in a batch and alone, for any batch size and position, and
+//! that images are written to their place in the layout only.
+
+use std::collections::BTreeMap;
+
+use chaic_core::action::Hand;
+use chaic_core::observation::{Grants, SensorConfig};
+use chaic_core::rng::RngStream;
+use chaic_core::{Action, AgentId, EntityId, Target, TaskId};
+use chaic_env::{
+    AdvanceOutcome, AgentSlot, Env, EnvBatch, EnvError, EpisodeAgents, EpisodeConfig, ImageLayout,
+    ImagesMut,
+};
+use chaic_episodes::{Episode, Split, episodes};
+use xxhash_rust::xxh3::Xxh3;
+
+/// Side of all images, pixels.
+const SIZE: u32 = 16;
+/// Decisions of each helper.
+const N_DECISIONS: usize = 5;
+
+const ALL: SensorConfig =
+    SensorConfig { image_size: SIZE, rgb: true, depth: true, ids: true, frame_history: None };
+
+fn bundled() -> Vec<Episode> {
+    let episodes_of =
+        |task| episodes(&Split::Test, task).map(|e| e.expect("bundled episodes are valid"));
+    TaskId::paper().flat_map(|task| episodes_of(task).take(3)).collect()
+}
+
+fn config(bundled: &[Episode], number: usize) -> EpisodeConfig<'_> {
+    EpisodeConfig {
+        seed: (number / bundled.len()) as u32,
+        image_size: Some(SIZE),
+        ..EpisodeConfig::new(&bundled[number % bundled.len()], "caller")
+    }
+}
+
+fn env(bundled: &[Episode], number: usize, grants: Grants, sensors: SensorConfig) -> Env {
+    let helper = Some(AgentSlot::external(grants, sensors));
+    let agents = EpisodeAgents { helper, partner: None };
+    Env::new(config(bundled, number), agents).expect("the setup is valid")
+}
+
+/// Draws an action; some have pixels as targets.
+fn random_action(rng: &mut RngStream) -> Action {
+    let (column, row) = (rng.below(16) as u32, rng.below(16) as u32);
+    let hand = Hand::Left;
+    match rng.below(6) {
+        0 | 1 => Action::MoveForward,
+        2 => Action::TurnLeft,
+        3 => Action::PickUp { object: Target::Pixel { column, row }, hand },
+        4 => Action::PutOn { place: Target::Pixel { column, row }, hand },
+        _ => Action::PickUp { object: Target::Entity(EntityId::FIRST_OBJECT), hand },
+    }
+}
+
+/// Image buffers of the caller.
+struct Buffers {
+    rgb: Vec<u8>,
+    depth_m: Vec<f32>,
+    ids: Vec<u16>,
+}
+
+impl Buffers {
+    /// Creates buffers with values that no image has.
+    fn new(layout: ImageLayout) -> Buffers {
+        let [rgb, depth, ids] = layout.lengths();
+        Buffers { rgb: vec![7; rgb], depth_m: vec![-1.0; depth], ids: vec![u16::MAX; ids] }
+    }
+
+    fn images_mut(&mut self) -> ImagesMut<'_> {
+        ImagesMut {
+            rgb: Some(&mut self.rgb),
+            depth_m: Some(&mut self.depth_m),
+            ids: Some(&mut self.ids),
+        }
+    }
+
+    fn digest_slot(&self, slot: usize, into: &mut Xxh3) {
+        let n = (SIZE * SIZE) as usize;
+        into.update(&self.rgb[3 * n * slot..3 * n * (slot + 1)]);
+        for depth in &self.depth_m[n * slot..n * (slot + 1)] {
+            into.update(&depth.to_bits().to_le_bytes());
+        }
+        for id in &self.ids[n * slot..n * (slot + 1)] {
+            into.update(&id.to_le_bytes());
+        }
+    }
+}
+
+/// Runs the environments of these numbers in one batch; returns a digest of observations and final
+/// state for each.
+fn run_batch(bundled: &[Episode], numbers: &[usize]) -> BTreeMap<usize, u64> {
+    let envs = numbers.iter().map(|n| env(bundled, *n, Grants::IDS, ALL)).collect();
+    let mut batch = EnvBatch::new(envs).expect("the sensors are equal");
+    let mut buffers = Buffers::new(batch.layout());
+    let rng = |n: &usize| RngStream::new(*n as u64, "batch", 0);
+    let mut rngs: Vec<RngStream> = numbers.iter().map(rng).collect();
+    let mut digests: Vec<Xxh3> = numbers.iter().map(|_| Xxh3::new()).collect();
+    for _ in 0..N_DECISIONS {
+        assert!(batch.advance(None).iter().all(|flow| *flow == Ok(AdvanceOutcome::NeedsAction)));
+        for slot in batch.observe(buffers.images_mut()).expect("the buffers fit") {
+            let observation = batch.observation(slot).expect("the agent waits");
+            digests[slot].update(
+                format!("{:?} {:?}", observation.proprioception, observation.granted).as_bytes(),
+            );
+            buffers.digest_slot(slot, &mut digests[slot]);
+            assert!(batch.submit(slot, random_action(&mut rngs[slot])));
+        }
+    }
+    for (env, digest) in batch.envs().iter().zip(&mut digests) {
+        digest.update(env.digest().to_string().as_bytes());
+    }
+    numbers.iter().copied().zip(digests.iter().map(Xxh3::digest)).collect()
+}
+
+#[test]
+fn batch_size_and_position_change_nothing() {
+    let bundled = bundled();
+    let mut alone = BTreeMap::new();
+    for number in 0..7 {
+        alone.extend(run_batch(&bundled, &[number]));
+    }
+    let different: std::collections::BTreeSet<_> = alone.values().collect();
+    assert_eq!(different.len(), 7, "the environments differ");
+    for size in [7, 64, 1024] {
+        let numbers: Vec<usize> = (0..size).rev().collect();
+        let mut together = run_batch(&bundled, &numbers);
+        together.retain(|number, _| *number < 7);
+        assert_eq!(together, alone, "{size} environments");
+    }
+}
+
+#[test]
+fn a_batch_renders_the_images_of_its_environments() {
+    let bundled = bundled();
+    let mut batch =
+        EnvBatch::new((0..5).map(|n| env(&bundled, 8 + n, Grants::IDS, ALL)).collect()).unwrap();
+    batch.advance(None);
+    let mut buffers = Buffers::new(batch.layout());
+    assert_eq!(batch.observe(buffers.images_mut()).unwrap(), [0, 1, 2, 3, 4]);
+    let n = (SIZE * SIZE) as usize;
+    for k in 0..5 {
+        let mut alone = env(&bundled, 8 + k, Grants::IDS, ALL);
+        alone.advance(None).unwrap();
+        let expected = alone.observe(AgentId::HELPER).unwrap();
+        let images = &expected.images;
+        assert_eq!(images.rgb.as_deref(), Some(&buffers.rgb[3 * n * k..3 * n * (k + 1)]));
+        assert_eq!(images.depth_m.as_deref(), Some(&buffers.depth_m[n * k..n * (k + 1)]));
+        assert_eq!(images.ids.as_deref(), Some(&buffers.ids[n * k..n * (k + 1)]));
+        let found = batch.observation(k).unwrap();
+        assert_eq!(expected.proprioception, found.proprioception);
+        assert_eq!(expected.granted, found.granted);
+    }
+}
+
+#[test]
+fn buffers_of_agents_that_do_not_wait_stay_unchanged() {
+    let bundled = bundled();
+    let mut batch =
+        EnvBatch::new((0..2).map(|n| env(&bundled, n, Grants::IDS, ALL)).collect()).unwrap();
+    batch.advance(None);
+    let mut buffers = Buffers::new(batch.layout());
+    assert!(batch.submit(0, Action::Wait { frames: 50 }), "without an observation");
+    assert!(!batch.submit(0, Action::TurnLeft), "it has chosen already");
+    assert_eq!(batch.observe(buffers.images_mut()).unwrap(), [1]);
+    let n = (SIZE * SIZE) as usize;
+    assert!(buffers.ids[..n].iter().all(|id| *id == u16::MAX), "slot 0 is unchanged");
+    assert!(buffers.ids[n..].iter().all(|id| *id != u16::MAX));
+    assert!(batch.observation(0).is_none() && batch.observation(2).is_none());
+    assert!(!batch.submit(2, Action::TurnLeft), "there is no such slot");
+}
+
+#[test]
+fn different_sensors_wrong_buffers_and_unknown_environments_are_refused() {
+    let bundled = bundled();
+    let small = SensorConfig { image_size: 8, ..ALL };
+    let mut other = config(&bundled, 1);
+    other.image_size = None;
+    let helper = Some(AgentSlot::external(Grants::IDS, small));
+    let other = Env::new(other, EpisodeAgents { helper, partner: None }).unwrap();
+    let result = EnvBatch::new(vec![env(&bundled, 0, Grants::IDS, ALL), other]);
+    assert!(matches!(result, Err(EnvError::Batch(_))), "the sensors differ");
+    assert!(matches!(EnvBatch::new(Vec::new()), Err(EnvError::Batch(_))), "there is no agent");
+
+    // The layout has no ids without their grant.
+    let mut batch = EnvBatch::new(vec![env(&bundled, 0, Grants::NONE, ALL)]).unwrap();
+    assert!(!batch.layout().ids);
+    batch.advance(None);
+    let mut buffers = Buffers::new(ImageLayout { ids: true, ..batch.layout() });
+    let refused = batch.observe(buffers.images_mut());
+    assert!(matches!(refused, Err(EnvError::Buffer { image: "ids", expected: 0, .. })));
+    let short = ImagesMut { rgb: Some(&mut buffers.rgb[1..]), ..ImagesMut::default() };
+    assert!(matches!(batch.observe(short), Err(EnvError::Buffer { image: "color", .. })));
+    let config = config(&bundled, 3);
+    let before = batch.envs()[0].digest();
+    assert!(batch.reset_many(vec![(0, config), (1, config)]).is_err(), "there is one environment");
+    assert_eq!(batch.envs()[0].digest(), before, "none is reset");
+    assert!(batch.reset(0, config).is_ok());
+    let snapshot = batch.envs()[0].snapshot().unwrap();
+    batch.advance(Some(60));
+    assert!(batch.restore(1, &snapshot).is_err());
+    batch.restore(0, &snapshot).unwrap();
+    assert_eq!(batch.envs()[0].world().state().frame, 0);
+}

@@ -1,0 +1,4 @@
+//! Integration tests of `chaic-env`.
+
+mod batch;
+mod env;

@@ -1,0 +1,298 @@
+//! Content of a prompt, from an agent's memory only.
+//!
+//! All names pass [`plain`], so that no name can add lines or instructions to a prompt.
+
+mod gather;
+mod hands;
+mod samples;
+
+use chaic_agents::decision::Plan;
+use chaic_core::Frame;
+use serde::Serialize;
+
+use crate::prompt_track::PromptTrack;
+
+/// Maximum length of a name, characters; the catalogue's names are shorter.
+const MAX_NAME: usize = 40;
+
+/// Limits of the lists in a prompt. Each further level lists less.
+#[derive(Clone, Copy, Debug)]
+pub struct Length {
+    interactions: usize,
+    objects: usize,
+    plans_per_kind: usize,
+}
+
+/// Levels, from the longest to the shortest prompt (docs/language-helpers.md).
+pub const LENGTHS: [Length; 6] = [
+    Length { interactions: 20, objects: 60, plans_per_kind: 60 },
+    Length { interactions: 10, objects: 40, plans_per_kind: 40 },
+    Length { interactions: 6, objects: 25, plans_per_kind: 25 },
+    Length { interactions: 4, objects: 12, plans_per_kind: 15 },
+    Length { interactions: 2, objects: 6, plans_per_kind: 8 },
+    Length { interactions: 1, objects: 0, plans_per_kind: 4 },
+];
+
+/// Variables of templates. Lengths in metres and coordinates are texts with one decimal.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PromptContext {
+    /// Track of the prompt.
+    pub track: PromptTrack,
+    /// Name of the goal place.
+    pub goal_place: String,
+    /// Classes of possible targets.
+    pub targets: Vec<String>,
+    /// Classes of containers.
+    pub containers: Vec<String>,
+    /// Classes of obstacles.
+    pub obstacles: Vec<String>,
+    /// Capacity of a container or basket.
+    pub capacity: u32,
+    /// True if the targets are furniture.
+    pub moving: bool,
+    /// True if a child is present.
+    pub child: bool,
+    /// True if the agent has a partner.
+    pub helped: bool,
+    /// Number of attached images.
+    pub images: usize,
+    /// Time limit of the episode, frames.
+    pub horizon: Frame,
+    /// Frames to walk ten metres.
+    pub frames_per_10_m: u32,
+    /// The agent's body.
+    pub me: Body,
+    /// Granted facts about the task.
+    pub told: Option<DisclosedFacts>,
+    /// Wanted objects; empty if not granted.
+    pub wanted: Vec<Count>,
+    /// Facts about the agent itself.
+    pub own: SelfFacts,
+    /// Other agents.
+    pub others: Vec<PersonFacts>,
+    /// Task progress.
+    pub progress: ProgressFacts,
+    /// Semantic map.
+    pub map: Map,
+    /// Valid plans, in the order of their numbers.
+    pub plans: Vec<PlanFacts>,
+    /// Number of omitted plans.
+    pub plans_left_out: usize,
+}
+
+/// Description of a body.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Body {
+    /// Kind of person.
+    pub kind: String,
+    /// Lowest and highest reach, if limited.
+    pub reach: Option<[String; 2]>,
+    /// Maximum lifted mass, kilograms.
+    pub strength_kg: u32,
+    /// True if the person walks a bicycle.
+    pub docks: bool,
+    /// True if the person uses a wheelchair.
+    pub rolls: bool,
+}
+
+/// Granted facts about the task.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DisclosedFacts {
+    /// Name of the task.
+    pub task: &'static str,
+    /// Kind of person of the partner.
+    pub partner: String,
+    /// Reach of the partner, if limited.
+    pub reach: Option<[String; 2]>,
+    /// Maximum mass that the partner lifts, kilograms.
+    pub strength_kg: u32,
+}
+
+/// Number of objects of a class.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Count {
+    /// Class.
+    pub name: String,
+    /// Number.
+    pub count: u32,
+}
+
+/// Facts about the agent itself.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SelfFacts {
+    /// Position, x.
+    pub x: String,
+    /// Position, z.
+    pub z: String,
+    /// Held objects.
+    pub hands: Vec<String>,
+    /// Number of free hands.
+    pub free_hands: usize,
+    /// Its interactions, oldest first.
+    pub history: Vec<Interaction>,
+    /// Number of omitted earlier interactions.
+    pub history_left_out: usize,
+    /// Last plan.
+    pub plan: Option<String>,
+}
+
+/// Interaction.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Interaction {
+    /// Frame.
+    pub frame: Frame,
+    /// Description.
+    pub what: String,
+    /// Outcome, if finished.
+    pub outcome: Option<String>,
+}
+
+/// Other agent.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PersonFacts {
+    /// Relation to the agent.
+    pub who: &'static str,
+    /// True if it was ever visible.
+    pub seen: bool,
+    /// True if it is visible.
+    pub in_view: bool,
+    /// Frames since it was last visible.
+    pub frames_ago: Frame,
+    /// Position, x.
+    pub x: String,
+    /// Position, z.
+    pub z: String,
+    /// Straight-line distance.
+    pub distance_m: String,
+    /// Distance of a lost child from the agent's partner.
+    pub away_m: Option<String>,
+    /// Objects that it is known to have taken.
+    pub took: Vec<String>,
+    /// Last known held objects.
+    pub holds: Vec<String>,
+    /// Other observed interactions, oldest first.
+    pub actions: Vec<Interaction>,
+    /// Number of omitted earlier interactions.
+    pub actions_left_out: usize,
+}
+
+/// Task progress.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ProgressFacts {
+    /// Current frame.
+    pub frame: Frame,
+    /// Known goal places, nearest first.
+    pub goal_places: Vec<GoalPlace>,
+    /// Objects known to be there.
+    pub delivered: Vec<Count>,
+}
+
+/// Goal place.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct GoalPlace {
+    /// Name.
+    pub name: String,
+    /// Position, x.
+    pub x: String,
+    /// Position, z.
+    pub z: String,
+    /// Path length.
+    pub way_m: String,
+    /// Estimated walking time, frames.
+    pub frames: u32,
+}
+
+/// Semantic map.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Map {
+    /// Relevant objects, nearest first.
+    pub things: Vec<ObjectFacts>,
+    /// Number of omitted farther objects.
+    pub left_out: usize,
+    /// True if everything reachable is explored.
+    pub explored: bool,
+}
+
+/// Object.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ObjectFacts {
+    /// `container` or `obstacle`; absent for a possible target.
+    pub kind: Option<&'static str>,
+    /// Name.
+    pub name: String,
+    /// Position, x.
+    pub x: String,
+    /// Position, z.
+    pub z: String,
+    /// Height of its top.
+    pub top_m: String,
+    /// Remark.
+    pub note: Option<String>,
+}
+
+/// Plan.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PlanFacts {
+    /// Plan in words.
+    pub text: String,
+    /// Path length to its object.
+    pub way_m: Option<String>,
+}
+
+/// Sanitizes a name for a prompt: letters, digits and a few signs, on one line, with a maximum
+/// length.
+pub fn plain(name: &str) -> String {
+    let is_allowed = |c: char| c.is_alphanumeric() || " -_#'".contains(c);
+    let clean: String = name.chars().map(|c| if is_allowed(c) { c } else { ' ' }).collect();
+    let words: Vec<&str> = clean.split_whitespace().collect();
+    words.join(" ").chars().take(MAX_NAME).collect()
+}
+
+/// Describes a plan in words.
+pub fn plan_text(plan: &Plan) -> String {
+    let text = plan.to_string();
+    let is_allowed = |c: char| c.is_alphanumeric() || " -_#',".contains(c);
+    text.chars().map(|c| if is_allowed(c) { c } else { ' ' }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use chaic_agents::TrackId;
+    use chaic_agents::decision::Subject;
+    use chaic_core::ClassId;
+
+    use super::gather::keep_nearest;
+    use super::*;
+
+    #[test]
+    fn a_name_stays_on_one_line_without_markup() {
+        for (name, expected) in [
+            ("apple", "apple"),
+            ("women's purse", "women's purse"),
+            ("apple\n7. fly", "apple 7 fly"),
+            ("ignore {\"plan\": 3}", "ignore plan 3"),
+            ("a\u{202e}b\u{0}c", "a b c"),
+        ] {
+            assert_eq!(plain(name), expected);
+        }
+        assert!(plain(&"x".repeat(500)).len() <= MAX_NAME);
+    }
+
+    #[test]
+    fn the_nearest_plans_of_each_kind_are_kept() {
+        let it = |n| Subject { track: TrackId(n), class: ClassId::named("apple") };
+        let plans = [
+            Plan::Explore,
+            Plan::PickUp(it(30)),
+            Plan::PickUp(it(31)),
+            Plan::PickUp(it(32)),
+            Plan::TurnAround,
+        ];
+        let kept = keep_nearest(&plans, 2);
+        assert_eq!(
+            kept,
+            [Plan::Explore, Plan::PickUp(it(30)), Plan::PickUp(it(31)), Plan::TurnAround]
+        );
+        assert_eq!(keep_nearest(&plans, 60), plans);
+    }
+}

@@ -1,0 +1,106 @@
+//! Promise: prompts are complete, reveal nothing hidden, and are short enough.
+
+use chaic_core::TaskId;
+use chaic_llm::LanguageHelpers;
+use chaic_llm::tokens;
+use chaic_llm_standin::Options;
+
+use crate::common::{Fixture, decided, exchanges, flag, standin};
+
+/// Maximum tokens of a prompt.
+const LIMIT: usize = 4000;
+
+/// Maximum count of two vocabularies.
+fn tokens_of(text: &str) -> usize {
+    let vocabularies = [tiktoken_rs::cl100k_base_singleton(), tiktoken_rs::o200k_base_singleton()];
+    vocabularies.into_iter().map(|v| v.count_ordinary(text)).max().unwrap()
+}
+
+#[test]
+fn prompts_fit_the_limit_until_the_end_of_long_episodes() {
+    // Complete episodes in a house, in the street and of a move.
+    let fixture = Fixture::new(&[TaskId::HighTarget, TaskId::Shopping, TaskId::MovingHouse], 3000);
+    let (_standin, settings) = standin(Options::default());
+    let language = LanguageHelpers::live(settings, flag()).unwrap();
+    assert!(fixture.play("run", &fixture.request(&["llm-told"]), &language).0);
+    let mut n = 0;
+    for record in fixture.records("run") {
+        for exchange in exchanges(&record) {
+            let text: Vec<&str> =
+                exchange.request.messages.iter().map(|m| m.text.as_str()).collect();
+            let text = text.join("\n");
+            let (real, estimate) = (tokens_of(&text), tokens::estimate(&text));
+            assert!(real <= LIMIT, "{real} tokens:\n{text}");
+            assert!(estimate >= real, "{estimate} is less than {real}:\n{text}");
+            assert!(estimate < real + real / 2, "{estimate} is much more than {real}");
+            n += 1;
+        }
+        assert!(decided(&record).iter().all(|d| d.prompt_tokens.is_none_or(|t| t <= LIMIT)));
+    }
+    assert!(n > 30, "{n}");
+}
+
+#[test]
+fn prompts_are_shortened_until_they_fit() {
+    let fixture = Fixture::new(&[TaskId::Shopping], 1200);
+    let mut lengths = Vec::new();
+    for limit in [4000, 900] {
+        let (_standin, mut settings) = standin(Options::default());
+        settings.asking.prompt_tokens = limit;
+        let language = LanguageHelpers::live(settings, flag()).unwrap();
+        let name = format!("run{limit}");
+        assert!(fixture.play(&name, &fixture.request(&["llm"]), &language).0);
+        let records = fixture.records(&name);
+        let shortened = decided(&records[0]).iter().map(|d| d.shortened).max().unwrap();
+        let longest = exchanges(&records[0])
+            .iter()
+            .map(|e| tokens_of(&e.request.messages[0].text))
+            .max()
+            .unwrap();
+        assert!(longest < limit as usize, "{longest} tokens of {limit}");
+        lengths.push((shortened, longest));
+    }
+    assert!(lengths[0].0 < lengths[1].0 && lengths[0].1 > lengths[1].1, "{lengths:?}");
+}
+
+#[test]
+fn prompts_of_the_hidden_track_name_neither_task_nor_constraint_nor_goal() {
+    let tasks: Vec<TaskId> = TaskId::paper().collect();
+    let fixture = Fixture::new(&tasks, 100);
+    let (_standin, settings) = standin(Options::default());
+    let language = LanguageHelpers::live(settings, flag()).unwrap();
+    assert!(fixture.play("run", &fixture.request(&["llm", "llm-told"]), &language).0);
+    let mut openings = Vec::new();
+    for record in fixture.records("run") {
+        let exchanges = exchanges(&record);
+        let prompt = &exchanges[0].request.messages[0].text;
+        let titles: Vec<&str> = prompt.lines().filter_map(|l| l.strip_prefix("## ")).collect();
+        let six = ["Task", "Yourself", "The others", "Progress", "What is where", "Plans"];
+        assert_eq!(titles, six);
+        for expected in ["1. ", "explore", "turn around", "wait", "frames have passed"] {
+            assert!(prompt.contains(expected), "{expected}: {prompt}");
+        }
+        let constraint = ["wheelchair", "frail", "bicycle", "a child of", "reaches", "Wanted"];
+        let disclosed: Vec<&&str> = constraint.iter().filter(|w| prompt.contains(**w)).collect();
+        match record.header.key.helper.as_str() {
+            "llm" => {
+                assert!(disclosed.is_empty(), "{disclosed:?}: {prompt}");
+                let end = prompt.find("Rules:").expect("it has rules");
+                openings.push((prompt[..end].replace(goal_place(prompt), "GOAL"), prompt.clone()));
+            }
+            _ => {
+                let is_disclosed =
+                    !disclosed.is_empty() || record.header.key.task == TaskId::NoConstraint;
+                assert!(is_disclosed, "{prompt}");
+            }
+        }
+    }
+    // One template serves all tasks.
+    assert_eq!(openings.len(), 8);
+    assert!(openings.iter().all(|(opening, _)| *opening == openings[0].0));
+}
+
+fn goal_place(prompt: &str) -> &str {
+    let (_, text) = prompt.split_once("goal place, which is: ").expect("it is named");
+    text.split('.').next().expect("a sentence ends")
+}

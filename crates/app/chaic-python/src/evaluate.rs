@@ -1,0 +1,256 @@
+//! Runs with helpers that are Python objects.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use chaic_agents::PlannerRules;
+use chaic_agents::perception_factory::GROUND_TRUTH;
+use chaic_core::observation::{Grants, SensorConfig};
+use chaic_core::{Action, Agent, AgentError};
+use chaic_env::helper_registry::{BuiltInWithPerception, Helper, HelperRegistry, NONE};
+use chaic_env::{RunKey, Track};
+use chaic_eval::EvalError;
+use chaic_eval::metrics::FormulaSet;
+use chaic_eval::report::{Format, Report, write_files};
+use chaic_eval::run::{FolderMode, JobEvent, Run, RunRequest, Shard};
+use chaic_sandbox::Isolation;
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use pythonize::depythonize;
+use serde::Deserialize;
+
+use crate::agent::{PyAgent, agent_error};
+use crate::error::{failure, mistake};
+use crate::isolated::{IsolatedHelper, IsolationOptions};
+use crate::options::{grants, perception, sensors};
+use crate::threads::refuse_fork;
+
+/// Registry of Python helpers and built-in ones.
+struct PyHelperRegistry {
+    built_in: BuiltInWithPerception,
+    /// Name of each Python helper, and a callable that creates one for each episode.
+    makers: Vec<(String, Py<PyAny>)>,
+    grants: Grants,
+    sensors: SensorConfig,
+    /// Processes of the Python helpers, in their order; empty for helpers in this process.
+    isolated: Vec<IsolatedHelper>,
+    /// Flag that stops the run.
+    stop: &'static AtomicBool,
+}
+
+impl PyHelperRegistry {
+    fn maker(&self, name: &str) -> Option<&Py<PyAny>> {
+        self.makers.iter().find(|(known, _)| known == name).map(|(_, maker)| maker)
+    }
+
+    fn isolated(&self, name: &str) -> Option<Helper> {
+        let helpers = self.makers.iter().zip(&self.isolated);
+        let (_, helper) = helpers.into_iter().find(|((known, _), _)| known == name)?;
+        Some(Helper { agent: helper.agent(self.stop), grants: self.grants })
+    }
+}
+
+/// Agent that fails at its first action.
+struct FailedAgent(AgentError);
+
+impl Agent for FailedAgent {
+    fn sensors(&self) -> SensorConfig {
+        SensorConfig::NONE
+    }
+
+    fn reset(&mut self, _: &chaic_core::Briefing) {}
+
+    fn act(&mut self, _: &chaic_core::Observation) -> Result<Action, AgentError> {
+        Err(self.0.clone())
+    }
+
+    fn isolation(&self) -> Option<String> {
+        Some(Isolation::Trusted.to_string())
+    }
+}
+
+impl HelperRegistry for PyHelperRegistry {
+    fn names(&self) -> Vec<String> {
+        let own = self.makers.iter().map(|(name, _)| name.clone());
+        self.built_in.names().into_iter().chain(own).collect()
+    }
+
+    /// Returns an agent to read grants and sensors from; creates no Python object.
+    fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper> {
+        if let Some(helper) = self.isolated(name) {
+            return Some(helper);
+        }
+        match self.maker(name) {
+            None => self.built_in.make(name, rules),
+            Some(_) => {
+                let error = AgentError::Broken("the helper was not created".to_owned());
+                Some(Helper { agent: Box::new(FailedAgent(error)), grants: self.grants })
+            }
+        }
+    }
+
+    fn make_for(&self, key: &RunKey, rules: PlannerRules) -> Option<Helper> {
+        let maker = self.maker(&key.helper).filter(|_| self.isolated.is_empty());
+        let Some(maker) = maker else { return self.make(&key.helper, rules) };
+        let created = Python::attach(|py| {
+            maker.call0(py).map_err(|error| agent_error(py, &error, self.stop))
+        });
+        let agent: Box<dyn Agent> = match created {
+            Ok(object) => Box::new(PyAgent::new(object, self.sensors, self.stop)),
+            Err(error) => Box::new(FailedAgent(error)),
+        };
+        Some(Helper { agent, grants: self.grants })
+    }
+}
+
+/// Options of a run from Python.
+#[derive(Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Keywords {
+    tasks: Option<Vec<String>>,
+    split: Option<String>,
+    episodes: Option<PathBuf>,
+    n_episodes: Option<u32>,
+    seeds: Option<u32>,
+    rules: Option<chaic_env::rules::RuleSetName>,
+    set: Vec<String>,
+    traces: Option<bool>,
+    perception: Option<String>,
+    behavior: Option<String>,
+    track: Option<Track>,
+}
+
+impl Keywords {
+    fn request(self, helpers: Vec<String>) -> PyResult<RunRequest> {
+        let tasks: Option<Result<Vec<_>, _>> =
+            self.tasks.map(|tasks| tasks.iter().map(|task| task.parse()).collect());
+        Ok(RunRequest {
+            tasks: tasks.transpose().map_err(mistake)?,
+            helpers: Some(helpers),
+            split: self.split.map(|split| split.parse().map_err(mistake)).transpose()?,
+            episodes: self.episodes,
+            first: self.n_episodes,
+            seeds: self.seeds,
+            rules: self.rules,
+            set: self.set,
+            no_traces: self.traces == Some(false),
+            perception: self.perception.filter(|name| name != GROUND_TRUTH),
+            behavior: self.behavior.filter(|name| name != GROUND_TRUTH),
+            track: self.track,
+            ..RunRequest::default()
+        })
+    }
+}
+
+/// Writes report and figures into the folder of a complete run; returns the report as a table.
+fn write_report(run: &Run) -> Result<String, EvalError> {
+    let report = Report {
+        options: run.options(),
+        results: run.results(),
+        planned: run.planned(),
+        granted: Some(run.granted()),
+        formulas: FormulaSet::Paper,
+    };
+    let progress = run.progress();
+    if progress.finished == progress.total {
+        write_files(run.folder(), &report)?;
+    }
+    Ok(if progress.finished > 0 { report.text(Format::Table) } else { String::new() })
+}
+
+/// Merges the shards of a run in a new folder; returns the report.
+#[pyfunction]
+pub fn merge(py: Python<'_>, out: PathBuf, runs: Vec<PathBuf>) -> PyResult<String> {
+    let merged = py.detach(|| write_report(&chaic_eval::run::merge(&out, &runs)?));
+    merged.map_err(failure)
+}
+
+/// Plays a run into a folder as `chaic eval` does, and returns the text of its report; `None` if it was stopped
+/// (`on_result` returned false).
+///
+/// `helpers` are names, each with a callable that creates a helper for each episode, or `None` for a built-in
+/// helper. `granted`, `images` and `image_size` apply to the Python helpers. `isolation` describes how to run
+/// them in processes of their own.
+#[pyfunction]
+#[pyo3(signature = (helpers, out, *, granted, images, image_size, jobs, resume, shard, isolation, on_result, options))]
+#[allow(clippy::too_many_arguments)]
+pub fn evaluate(
+    py: Python<'_>,
+    helpers: Vec<(String, Option<Py<PyAny>>)>,
+    out: PathBuf,
+    granted: Vec<String>,
+    images: Vec<String>,
+    image_size: u32,
+    jobs: usize,
+    resume: bool,
+    shard: Option<&str>,
+    isolation: Option<&Bound<'_, PyDict>>,
+    on_result: &Bound<'_, PyAny>,
+    options: &Bound<'_, PyDict>,
+) -> PyResult<Option<String>> {
+    refuse_fork()?;
+    let wrong = |error: pythonize::PythonizeError| PyTypeError::new_err(error.to_string());
+    let mut keywords: Keywords = depythonize(options).map_err(wrong)?;
+    let track = keywords.track.unwrap_or_default();
+    keywords.perception = track.perception_or(keywords.perception);
+    keywords.behavior = track.perception_or(keywords.behavior);
+    let names: Vec<String> = helpers.iter().map(|(name, _)| name.clone()).collect();
+    let or_ground_truth =
+        |name: &Option<String>| name.clone().unwrap_or_else(|| GROUND_TRUTH.to_owned());
+    let perception =
+        perception(&or_ground_truth(&keywords.perception), &or_ground_truth(&keywords.behavior))?;
+    let built_in = BuiltInWithPerception { perception };
+    let makers: Vec<_> =
+        helpers.into_iter().filter_map(|(name, maker)| Some((name, maker?))).collect();
+    let is_taken = |name: &String| name == NONE || built_in.names().contains(name);
+    if let Some((name, _)) = makers.iter().find(|(name, _)| is_taken(name)) {
+        return Err(mistake(format!("{name:?} is a built-in helper; choose another name")));
+    }
+    let grants = grants(&granted)?;
+    let sensors = sensors(&images, image_size)?;
+    let request = keywords.request(names)?;
+    // Threads of the run may outlive this call, so the flag (one byte) is leaked.
+    let stop: &'static AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
+    let isolation: Option<IsolationOptions> =
+        isolation.map(|options| depythonize(options)).transpose().map_err(wrong)?;
+    let own_names: Vec<String> = makers.iter().map(|(name, _)| name.clone()).collect();
+    let isolated = isolation.map_or(Ok(Vec::new()), |options| {
+        IsolatedHelper::create_all(&options, &own_names, grants, &out)
+    })?;
+    let helpers = PyHelperRegistry { built_in, makers, grants, sensors, isolated, stop };
+    let shard = shard.map_or(Ok(Shard::WHOLE), |shard| shard.parse().map_err(mistake))?;
+    let access = if resume { FolderMode::Resume } else { FolderMode::New };
+    let on_result = on_result.clone().unbind();
+    let mut problem: Option<PyErr> = None;
+    let played = py.detach(|| {
+        let (mut run, _) = Run::open(&out, access, &request, &helpers)?;
+        let mut on_event = |event: &JobEvent| {
+            let keeps_on = Python::attach(|py| {
+                py.check_signals()?;
+                let JobEvent::Finished(finished) = event else { return Ok(true) };
+                let key = &finished.result.key;
+                let tr = finished.result.summary().map(|s| s.done / s.total.max(f64::MIN_POSITIVE));
+                on_result.bind(py).call1((&key.helper, &key.episode, key.seed, tr))?.is_truthy()
+            });
+            match keeps_on {
+                Ok(true) => {}
+                Ok(false) => stop.store(true, Ordering::Relaxed),
+                Err(error) => {
+                    stop.store(true, Ordering::Relaxed);
+                    problem.get_or_insert(error);
+                }
+            }
+        };
+        let is_complete = run.play_shard(shard, jobs, &helpers, stop, &mut on_event)?;
+        if !is_complete {
+            return Ok(None);
+        }
+        write_report(&run).map(Some)
+    });
+    match (played, problem) {
+        (_, Some(error)) => Err(error),
+        (Err(error), None) => Err(failure(error)),
+        (Ok(text), None) => Ok(text),
+    }
+}

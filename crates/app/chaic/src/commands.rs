@@ -1,0 +1,105 @@
+//! The commands, one per file.
+
+pub mod bench;
+pub mod collect;
+pub mod doctor;
+pub mod episodes;
+pub mod eval;
+pub mod export;
+pub mod fidelity;
+pub mod helper;
+pub mod import;
+pub mod list;
+pub mod llm;
+pub mod merge;
+pub mod opponent;
+pub mod perception;
+pub mod render;
+pub mod replay;
+pub mod report;
+pub mod scene;
+pub mod shell;
+pub mod show;
+pub mod train;
+pub mod verify;
+
+mod bars;
+mod datasets;
+mod run_perception;
+mod summary;
+
+use std::path::Path;
+
+use anyhow::Result;
+use chaic_episodes::{Episode, find_episode};
+use chaic_eval::{EvalError, read_episode_file};
+use chaic_files::write_atomically;
+use comfy_table::{ContentArrangement, Table, presets};
+use serde::Serialize;
+
+use crate::output::OutputFormat;
+
+/// Returns the episode that an argument names: the file of this name if there is one, else the episode of this id.
+///
+/// # Errors
+/// If neither exists, or the file is not a valid episode.
+fn episode(argument: &str) -> Result<Episode> {
+    let path = Path::new(argument);
+    let is_name = argument.ends_with(".json") || (path.exists() && !path.is_dir());
+    if is_name {
+        return Ok(Episode::parse(&read_episode_file(path)?, argument)?);
+    }
+    Ok(find_episode(argument)?)
+}
+
+/// Returns the number of threads: as given, or one per core.
+fn jobs(given: Option<u16>) -> usize {
+    /// More threads than the cores of any machine.
+    const MAX_JOBS: usize = 1024;
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+    given.map_or_else(cores, usize::from).min(MAX_JOBS)
+}
+
+/// Starts the shared thread pool, which also renders the images of one frame in parallel.
+///
+/// # Errors
+/// If the system refuses the threads.
+fn start_threads(jobs: usize) -> Result<()> {
+    use anyhow::Context as _;
+    // More threads than jobs would only wait.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build_global();
+    pool.context("can't start threads")
+}
+
+/// Returns an empty table with a header.
+fn table<const N: usize>(header: [&str; N]) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_FULL_CONDENSED);
+    table.set_content_arrangement(ContentArrangement::Disabled);
+    table.set_header(header);
+    table
+}
+
+/// Writes a report to the file of `--json`, if given.
+///
+/// # Errors
+/// If the file system refuses.
+fn write_json(path: Option<&Path>, report: &impl Serialize) -> Result<()> {
+    if let Some(path) = path {
+        let json = serde_json::to_string_pretty(report).expect("reports serialize") + "\n";
+        write_atomically(path, json.as_bytes())?;
+    }
+    Ok(())
+}
+
+/// Refuses JSON for a command that prints text only.
+///
+/// # Errors
+/// A usage error if the format is not text.
+fn require_text(format: OutputFormat, command: &str) -> Result<()> {
+    if format == OutputFormat::Text {
+        return Ok(());
+    }
+    let text = format!("`{command}` prints text only; leave out --format {}", format.name());
+    Err(EvalError::Options(text).into())
+}

@@ -1,0 +1,30 @@
+//! The paper's metrics, computed from records.
+//!
+//! [`Tally`] accumulates the records of one episode run into a [`RunResult`]. [`Scores::new`]
+//! computes scores from the results of a run by one of two [`Formulas`]. `docs/metrics.md` gives the
+//! formulas and their sources.
+
+mod accumulators;
+mod cluster;
+mod differences;
+mod formulas;
+mod result;
+mod score;
+mod scores;
+mod stats;
+mod table;
+mod tally;
+
+pub use accumulators::MetricAccumulator;
+pub use cluster::{Clusters, Environments, Interval};
+pub use differences::{Difference, Resolution, differences, resolution};
+pub use formulas::{FormulaSet, Formulas, Spread};
+pub use result::{Delivery, RunResult, RunStatus, Summary};
+pub use score::{MAX_NAMED, Score};
+pub use scores::{PlayedEpisodes, Scores};
+pub use stats::t_975;
+pub use table::{METRICS, Metric, MetricSource};
+pub use tally::{Tally, tally};
+
+#[cfg(test)]
+mod tests;

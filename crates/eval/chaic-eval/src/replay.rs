@@ -1,0 +1,288 @@
+//! Replays: videos of traces.
+
+mod panel;
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use chaic_core::geom::Camera;
+use chaic_core::{Action, AgentId, EntityId, Frame, Outcome, ResolvedAction, TaskId};
+use chaic_env::trace::Trace;
+use chaic_env::{Playback, slug};
+use chaic_episodes::Episode;
+use chaic_render::{Channels, Scene, View, floor_plan};
+use chaic_world::{EventKind, World};
+use image::RgbImage;
+
+use crate::error::{EvalError, Result};
+use crate::run::RunFolder;
+use chaic_video::{VideoError, VideoWriter};
+
+pub use panel::{HEIGHT_PX, WIDTH_PX};
+
+/// Options of a replay video.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ReplayOptions {
+    /// Frames per second of the video.
+    pub fps: u32,
+    /// Interval between drawn frames of the episode.
+    pub every: u32,
+}
+
+/// Detector whose masks are drawn over the helper's view.
+pub trait Masks {
+    /// Returns the label and the pixels of each detection in an image. Color has shape [height,
+    /// width, 3], depth in meters has shape [height, width].
+    fn find(&mut self, rgb: &[u8], depth_m: &[f32], camera: &Camera) -> Vec<(u8, Vec<u32>)>;
+
+    /// Returns the side of the images that the detector takes, pixels.
+    fn image_size(&self) -> u32;
+}
+
+/// Text about one agent's current activity.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Caption {
+    /// Name of the agent.
+    pub agent: String,
+    /// Current action.
+    pub action: String,
+    /// Current plan.
+    pub plan: String,
+    /// Last observed action of another agent, if the agent recognizes actions.
+    pub last_observed: Option<String>,
+}
+
+/// Preferred helpers if none is named; unlisted helpers come first.
+const PREFERRED_HELPERS: [&str; 5] = ["rhp", "oracle", "random", "follow", "none"];
+
+/// Returns the path of the trace of an episode, by its id with or without the task. Without
+/// `helper` and `seed`, selects the preferred helper and its lowest seed.
+///
+/// # Errors
+/// If there is no such trace; the message lists existing ones.
+pub fn find_trace(
+    folder: &RunFolder,
+    episode: &str,
+    helper: Option<&str>,
+    seed: Option<u32>,
+) -> Result<PathBuf> {
+    let traces = folder.traces()?;
+    let mut candidates: Vec<(usize, &PathBuf)> = Vec::new();
+    for path in &traces {
+        // traces/TASK/HELPER/EPISODE-sSEED.jsonl
+        let part = |up: usize| path.iter().rev().nth(up).and_then(|p| p.to_str()).unwrap_or("");
+        let stem = part(0).trim_end_matches(".jsonl");
+        let Some((name, trace_seed)) = stem.rsplit_once("-s") else { continue };
+        let Ok(task) = part(2).parse::<TaskId>() else { continue };
+        let matches = name == slug(task, episode)
+            && helper.is_none_or(|h| h == part(1))
+            && seed.is_none_or(|s| trace_seed == s.to_string());
+        if matches {
+            let rank = PREFERRED_HELPERS.iter().position(|f| *f == part(1));
+            candidates.push((rank.unwrap_or(0), path));
+        }
+    }
+    candidates.sort();
+    candidates.first().map(|(_, p)| (*p).clone()).ok_or_else(|| {
+        let examples: Vec<String> = traces
+            .iter()
+            .take(3)
+            .filter_map(|p| Some(p.strip_prefix(folder.path()).ok()?.display().to_string()))
+            .collect();
+        let known = match traces.len() {
+            0 => "no traces at all".to_owned(),
+            n => format!("{n} traces, for example {}", examples.join(", ")),
+        };
+        let mut wanted = episode.to_owned();
+        wanted += &helper.map_or(String::new(), |h| format!(" with helper {h}"));
+        wanted += &seed.map_or(String::new(), |s| format!(" and seed {s}"));
+        EvalError::NoTrace { path: folder.path().to_owned(), wanted, known }
+    })
+}
+
+/// Renders a trace as a video; returns the number of its frames. Draws masks over the helper's
+/// view, and recorded beliefs of both agents.
+///
+/// Calls `progress` for each frame of the episode. If it breaks, returns `None` and leaves no
+/// video.
+///
+/// # Errors
+/// If the episode is not the one of the trace, the trace does not fit it, or the video can't be
+/// written.
+pub fn write(
+    trace: &Trace,
+    episode: &Episode,
+    options: ReplayOptions,
+    mut masks: Option<&mut (dyn Masks + '_)>,
+    out: &Path,
+    progress: &mut dyn FnMut(Frame) -> ControlFlow<()>,
+) -> Result<Option<u32>> {
+    let convert = |e: VideoError| match e {
+        VideoError::UnsupportedExtension { .. } | VideoError::FrameRate { .. } => {
+            EvalError::Options(e.to_string())
+        }
+        _ => EvalError::Image(e.to_string()),
+    };
+    let mut replay = Replay::new(trace, episode)?;
+    let mut video = VideoWriter::create(out, WIDTH_PX, HEIGHT_PX, options.fps).map_err(convert)?;
+    let every = options.every.max(1);
+    loop {
+        let frame = replay.world().state().frame;
+        if progress(frame).is_break() {
+            return Ok(None);
+        }
+        let is_last = !replay.step()?;
+        if frame.is_multiple_of(every) || is_last {
+            video.push(&replay.render(masks.as_deref_mut())).map_err(convert)?;
+        }
+        if is_last {
+            break;
+        }
+    }
+    let n = video.n_frames();
+    video.finish().map_err(convert)?;
+    Ok(Some(n))
+}
+
+/// Renderer of a trace.
+pub struct Replay<'a> {
+    playback: Playback<'a>,
+    scene: Scene,
+    /// Last events, newest last.
+    events: Vec<String>,
+}
+
+impl<'a> Replay<'a> {
+    /// Creates a replay at the first frame of the trace.
+    ///
+    /// # Errors
+    /// If the episode is not the one of the trace.
+    pub fn new(trace: &'a Trace, episode: &Episode) -> Result<Replay<'a>> {
+        let playback = Playback::new(trace, episode)?;
+        let scene = Scene::with_appearance(playback.world().setup(), trace.header.appearance);
+        Ok(Replay { playback, scene, events: Vec::new() })
+    }
+
+    /// Returns the world in its current state.
+    pub fn world(&self) -> &World {
+        self.playback.world()
+    }
+
+    /// Advances one frame; returns false at the end of the trace.
+    ///
+    /// # Errors
+    /// If the trace does not fit the world, as an altered one does.
+    pub fn step(&mut self) -> Result<bool> {
+        let Some(events) = self.playback.step()? else { return Ok(false) };
+        for event in events {
+            self.log_event(&event.kind);
+        }
+        Ok(true)
+    }
+
+    /// Renders the current frame, with these masks over the helper's view.
+    pub fn render(&self, masks: Option<&mut (dyn Masks + '_)>) -> RgbImage {
+        let viewers = [AgentId::PARTNER, AgentId::HELPER];
+        let present = viewers.iter().filter(|a| a.index() < self.playback.thoughts().len());
+        let view = |agent: &AgentId| match &masks {
+            Some(masks) if *agent == AgentId::HELPER => {
+                let channels = Channels { depth: true, ..Channels::RGB };
+                View::from_agent(self.world(), *agent, masks.image_size(), channels)
+            }
+            _ => View::from_agent(self.world(), *agent, panel::VIEW_PX, Channels::RGB),
+        };
+        let views: Vec<View> = present.map(view).collect();
+        let (mut images, map) = rayon::join(
+            || self.scene.render(self.world(), &views),
+            || floor_plan::draw_scene_plan(&self.scene, self.world(), panel::MAP_PX),
+        );
+        let helper = AgentId::HELPER.index();
+        if let (Some(masks), Some(images), Some(view)) =
+            (masks, images.get_mut(helper), views.get(helper))
+            && let (Some(rgb), Some(depth_m)) = (&mut images.rgb, &images.depth_m)
+        {
+            for (label, pixels) in masks.find(rgb, depth_m, &view.camera) {
+                panel::tint(rgb, &pixels, label);
+            }
+        }
+        let believed: Vec<Vec<panel::Mark>> = views
+            .iter()
+            .zip(self.playback.thoughts())
+            .map(|(view, thought)| panel::marks(&thought.perceived, &view.camera))
+            .collect();
+        let captions: Vec<Caption> =
+            self.world().setup().agents().map(|a| self.caption(a)).collect();
+        panel::compose(&panel::Contents {
+            header: self.playback.header(),
+            world: self.world(),
+            views: &images,
+            believed: &believed,
+            map: &map,
+            captions: &captions,
+            events: &self.events,
+        })
+    }
+
+    fn caption(&self, agent: AgentId) -> Caption {
+        let person = &self.world().state().agents[agent.index()];
+        let action = match (&person.activity, &person.last) {
+            (Some(activity), _) => self.describe(&activity.action),
+            (None, Some((action, outcome))) => match outcome {
+                Outcome::Success => self.describe(action),
+                Outcome::Failure(reason) => format!("{} failed: {reason}", self.describe(action)),
+            },
+            (None, None) => "about to begin".to_owned(),
+        };
+        let thought = &self.playback.thoughts()[agent.index()];
+        let mode = thought.mode.as_ref().map_or(String::new(), |m| format!(" ({m})"));
+        let name = match agent {
+            AgentId::HELPER => format!("{agent} ({})", self.playback.header().helper),
+            _ => agent.to_string(),
+        };
+        let last_observed = thought.last_observed.clone();
+        Caption { agent: name, action, plan: format!("{}{mode}", thought.plan), last_observed }
+    }
+
+    fn describe(&self, action: &ResolvedAction) -> String {
+        match *action {
+            Action::MoveForward => "walks ahead".to_owned(),
+            Action::TurnLeft => "turns left".to_owned(),
+            Action::TurnRight => "turns right".to_owned(),
+            Action::PickUp { object, .. } => format!("picks up {}", self.name(object)),
+            Action::PutIn => "puts it into the container".to_owned(),
+            Action::PutOn { place, .. } => format!("puts it on {}", self.name(place)),
+            Action::RemoveObstacle { obstacle, .. } => format!("removes {}", self.name(obstacle)),
+            Action::Wait { .. } => "waits".to_owned(),
+        }
+    }
+
+    fn name(&self, entity: EntityId) -> String {
+        let class = self.world().setup().thing(entity).map(|t| t.class);
+        class.map_or(entity.to_string(), |c| format!("{} {entity}", c.info().label))
+    }
+
+    fn log_event(&mut self, kind: &EventKind) {
+        let text = match *kind {
+            EventKind::Delivered { object, by, counted } => {
+                let note = if counted { "" } else { ", which isn't wanted" };
+                format!("{by} delivered {}{note}", self.name(object))
+            }
+            EventKind::Broke { agent, object } => format!("{agent} broke {}", self.name(object)),
+            EventKind::Ended { agent, action, outcome: Outcome::Failure(reason) }
+                if action.subject().is_some() =>
+            {
+                format!("{agent} {} in vain: {reason}", self.describe(&action))
+            }
+            EventKind::LiftedTogether { object, .. } => format!("both lift {}", self.name(object)),
+            EventKind::ChildAway { away: true } => "the child is away".to_owned(),
+            EventKind::ChildAway { away: false } => "the child is back".to_owned(),
+            EventKind::Over { complete: true } => "all is done".to_owned(),
+            EventKind::Over { complete: false } => "time is up".to_owned(),
+            _ => return,
+        };
+        if self.events.len() == panel::MAX_EVENTS {
+            self.events.remove(0);
+        }
+        self.events.push(format!("{:>5}  {text}", self.world().state().frame));
+    }
+}

@@ -1,0 +1,223 @@
+//! Planning: the episode runs of a run.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use chaic_core::task::Origin;
+use chaic_core::{Frame, TaskId};
+use chaic_env::{RunKey, slug};
+use chaic_episodes::{Episode, Split, find_episode};
+use chaic_files::{create_folders_below, write_atomically};
+
+use crate::episode_file::{
+    episode_files, parse_episode_files, read_episode_file, read_episode_files,
+};
+use crate::error::{EvalError, Result};
+use crate::metrics::Environments;
+use crate::run::environment::environment;
+use crate::run::folder::RunFolder;
+use crate::run::options::{FILES, RunOptions};
+
+/// One planned episode run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EpisodeJob {
+    /// Task, helper, episode and seed.
+    pub key: RunKey,
+    /// Maximum number of frames.
+    pub horizon: Frame,
+    /// Name of the environment. Episodes in the same environment are not independent samples.
+    pub environment: String,
+}
+
+/// Returns all episode runs of a run, finished or not, grouped by episode so that an interrupted
+/// run has comparable results.
+///
+/// # Errors
+/// If the options select no episodes, or the run's copies of episode files can't be read.
+pub fn planned(folder: &RunFolder, options: &RunOptions) -> Result<Vec<EpisodeJob>> {
+    let files = if options.split == FILES { read_copies(folder)? } else { vec![] };
+    plan(options, &files)
+}
+
+/// Reads the run's copies of episodes, sorted by id.
+fn read_copies(folder: &RunFolder) -> Result<Vec<Episode>> {
+    parse_episode_files(&folder.episode_files(), &|path| folder.copy_bytes(path))
+}
+
+/// Plans a run from its options and, for the split `files`, its episodes.
+pub(super) fn plan(options: &RunOptions, files: &[Episode]) -> Result<Vec<EpisodeJob>> {
+    /// Maximum number of episode runs; a longer list is a mistake and exhausts memory.
+    const MAX_JOBS: usize = 1_000_000;
+    let n_per_episode = options.helpers.len().saturating_mul(options.seeds as usize);
+    let mut jobs = Vec::new();
+    for task in &options.tasks {
+        let limit = (MAX_JOBS - jobs.len()) / n_per_episode.max(1);
+        let episodes = episodes(options, files, *task, limit)?;
+        if episodes.is_empty() {
+            let hint = match task.info().origin {
+                Origin::Chaic if options.split != FILES => {
+                    "; use generated ones: give --split gen:0..12"
+                }
+                _ => "",
+            };
+            let text = format!("there is no episode of {task} to play{hint}");
+            return Err(EvalError::Options(text));
+        }
+        for EpisodePlan { id, horizon, environment } in episodes {
+            for seed in 0..options.seeds {
+                for helper in &options.helpers {
+                    let (task, helper, episode) = (*task, helper.clone(), id.clone());
+                    let key = RunKey { task, helper, episode, seed };
+                    jobs.push(EpisodeJob { key, horizon, environment: environment.clone() });
+                }
+            }
+        }
+    }
+    Ok(jobs)
+}
+
+/// Checks that the first episode of each task can be played with the requested partner.
+pub(super) fn check_partner(jobs: &[EpisodeJob]) -> Result<()> {
+    let mut tasks = BTreeSet::new();
+    let mut first_jobs = jobs.iter().filter(|job| tasks.insert(job.key.task));
+    first_jobs.try_for_each(|job| Ok(find_episode(&job.key.episode).map(|_| ())?))
+}
+
+/// Returns the environments of planned episodes.
+pub fn environments(jobs: &[EpisodeJob]) -> Environments {
+    Environments::new(jobs.iter().map(|job| (job.key.episode.clone(), job.environment.clone())))
+}
+
+/// Plan of one episode.
+struct EpisodePlan {
+    id: String,
+    horizon: Frame,
+    environment: String,
+}
+
+/// Returns a task's episodes; `files` are the episodes from files. Generated episodes are created
+/// when they are played, because all of them may not fit in memory.
+///
+/// # Errors
+/// If there are more than `max` episodes.
+fn episodes(
+    options: &RunOptions,
+    files: &[Episode],
+    task: TaskId,
+    max: usize,
+) -> Result<Vec<EpisodePlan>> {
+    let limit = options.first.map_or(usize::MAX, |n| n as usize);
+    if options.split == FILES {
+        let plan = |e: &Episode| {
+            let (id, horizon) = (e.id().to_owned(), e.setup().horizon);
+            EpisodePlan { id, horizon, environment: environment(e) }
+        };
+        let task_files = || files.iter().filter(|e| e.task() == task).take(limit);
+        check_count(task_files().count(), max, task)?;
+        return Ok(task_files().map(plan).collect());
+    }
+    let split: Split = options.split.parse()?;
+    let horizon = task.info().horizon;
+    let n = split.len_of(task).min(limit);
+    check_count(n, max, task)?;
+    let partner = options.partner_is.map_or_else(String::new, |kind| format!("/{kind}"));
+    let plan = |k: usize| EpisodePlan {
+        id: split.episode_id(task, k) + &partner,
+        horizon,
+        environment: split.environment(task, k as u64),
+    };
+    Ok((0..n).map(plan).collect())
+}
+
+/// Fails if a task has more than `max` episodes.
+fn check_count(n: usize, max: usize, task: TaskId) -> Result<()> {
+    if n > max {
+        let text = format!(
+            "{n} episodes of {task} are too many for one run; give --n-episodes or fewer seeds"
+        );
+        return Err(EvalError::Options(text));
+    }
+    Ok(())
+}
+
+/// Checks that `source` holds the same episodes as the run's copies. With other episodes it would
+/// be another run.
+pub(super) fn check_episode_files(
+    source: &Path,
+    options: &RunOptions,
+    folder: &RunFolder,
+) -> Result<()> {
+    if same_files(source, folder)? {
+        return Ok(());
+    }
+    let named = read_with_partner(source, options)?;
+    let copies = read_copies(folder)?;
+    let different = named.iter().find(|e| !copies.contains(e));
+    let Some(different) = different.or_else(|| copies.iter().find(|e| !named.contains(e))) else {
+        return Ok(());
+    };
+    Err(EvalError::Options(format!(
+        "{} was started with other episodes than --episodes {}, see {}; omit --episodes to resume \
+         it, or choose another --out",
+        folder.path().display(),
+        source.display(),
+        different.id()
+    )))
+}
+
+/// Compares the episode files of a folder with those of the run byte by byte, which is faster than
+/// parsing them.
+fn same_files(source: &Path, folder: &RunFolder) -> Result<bool> {
+    let (a, b) = (episode_files(source)?, episode_files(&folder.episode_files())?);
+    let names = |files: &[PathBuf]| -> Vec<_> {
+        files.iter().filter_map(|p| p.file_name().map(ToOwned::to_owned)).collect()
+    };
+    if names(&a) != names(&b) {
+        return Ok(false);
+    }
+    for (a, b) in a.iter().zip(&b) {
+        if read_episode_file(a)? != folder.copy_bytes(b)? {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// Reads the episodes of the run's tasks from a user's folder, with the run's partner.
+fn read_with_partner(source: &Path, options: &RunOptions) -> Result<Vec<Episode>> {
+    let episodes = read_episode_files(source)?.into_iter();
+    let selected = episodes.filter(|e| options.tasks.contains(&e.task()));
+    selected
+        .map(|episode| match options.partner_is {
+            Some(kind) => Ok(episode.with_partner(kind)?),
+            None => Ok(episode),
+        })
+        .collect()
+}
+
+/// Reads the episodes of the run's tasks from a user's folder, to be copied.
+///
+/// # Errors
+/// If an episode can't be read, or two episodes would be copied to the same file.
+pub(super) fn read_source(source: &Path, options: &RunOptions) -> Result<Vec<Episode>> {
+    let episodes = read_with_partner(source, options)?;
+    let mut names = BTreeSet::new();
+    for episode in &episodes {
+        if !names.insert((episode.task(), slug(episode.task(), episode.id()))) {
+            let (id, source) = (episode.id(), source.display());
+            let text = format!("{source} holds two episodes that are named like {id}; rename one");
+            return Err(EvalError::Options(text));
+        }
+    }
+    Ok(episodes)
+}
+
+/// Copies episodes into the run, which then does not depend on other folders.
+pub(super) fn copy_episodes(episodes: &[Episode], folder: &RunFolder) -> Result<()> {
+    create_folders_below(folder.path(), &folder.episode_files())?;
+    for episode in episodes {
+        let copy = folder.episode_copy(episode.task(), episode.id());
+        write_atomically(&copy, episode.to_json().as_bytes())?;
+    }
+    Ok(())
+}

@@ -1,0 +1,134 @@
+//! Promise: a run that was stopped at its start can be started again, and files of others are not
+//! removed.
+
+use super::*;
+
+/// Files that a run of one episode file writes before its `run.json`, besides the lock.
+const STARTUP_FILES: [&str; 7] = [
+    "episodes/low_target-short-0.json",
+    "episodes/low_target-short-0.json.tmp",
+    "episodes/shopping-old.json",
+    "llm/settings.json",
+    "llm/settings.json.tmp",
+    "llm/templates/task.txt",
+    "run.json.tmp",
+];
+
+#[test]
+fn a_run_that_was_stopped_at_its_start_is_started_again() {
+    let source = episode_files(&[TaskId::LowTarget], 1);
+    let dir = tempfile::tempdir().unwrap();
+    let helpers = TestHelpers::new();
+    let request = request(&source, &["turner"]);
+    let names = |path: &Path| {
+        let mut names: Vec<_> = files_below(path).into_iter().collect();
+        names.sort();
+        names
+    };
+    let undisturbed = dir.path().join("undisturbed");
+    drop(Run::open(&undisturbed, FolderMode::New, &request, &helpers).unwrap());
+    // Any subset of the files: all orders of writing leave one of these subsets.
+    for left in 0..1_u32 << STARTUP_FILES.len() {
+        let path = dir.path().join(left.to_string());
+        fs::create_dir(&path).unwrap();
+        fs::write(path.join(".lock"), "").unwrap();
+        for (_, name) in STARTUP_FILES.iter().enumerate().filter(|(k, _)| left >> k & 1 == 1) {
+            fs::create_dir_all(path.join(name).parent().unwrap()).unwrap();
+            fs::write(path.join(name), "{ torn").unwrap();
+        }
+        let error = RunFolder::check_started(&path).unwrap_err();
+        assert!(matches!(error, EvalError::NotStarted { .. }), "{left}: {error}");
+        let access = if left % 2 == 0 { FolderMode::New } else { FolderMode::Resume };
+        drop(Run::open(&path, access, &request, &helpers).unwrap());
+        assert_eq!(names(&path), names(&undisturbed), "{left}");
+    }
+}
+
+/// Returns names and contents of all files below a folder.
+fn files_below(path: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut found = Vec::new();
+    for entry in chaic_files::entries(path).unwrap() {
+        let name = entry.file_name().unwrap().to_str().unwrap().to_owned();
+        if entry.is_dir() {
+            let below = files_below(&entry).into_iter();
+            found.extend(below.map(|(below, bytes)| (format!("{name}/{below}"), bytes)));
+        } else {
+            found.push((name, fs::read(&entry).unwrap()));
+        }
+    }
+    found
+}
+
+#[test]
+fn files_of_others_are_never_removed() {
+    let source = episode_files(&[TaskId::LowTarget], 1);
+    let dir = tempfile::tempdir().unwrap();
+    let helpers = TestHelpers::new();
+    let request = request(&source, &["turner"]);
+    for (k, name) in [
+        "episodes/letter.txt",
+        "episodes/more/a.json",
+        "letter.txt",
+        "results.jsonl",
+        "traces/a.jsonl",
+        "llm/low_target/vlm/short-0-s0.jsonl",
+    ]
+    .iter()
+    .enumerate()
+    {
+        let path = dir.path().join(k.to_string());
+        fs::create_dir_all(path.join(name).parent().unwrap()).unwrap();
+        for file in [".lock", name] {
+            fs::write(path.join(file), "dear").unwrap();
+        }
+        let before = files_below(&path);
+        let open = |access| Run::open(&path, access, &request, &helpers).unwrap_err();
+        let (begun, resumed) = (open(FolderMode::New), open(FolderMode::Resume));
+        assert!(matches!(begun, EvalError::NotEmpty { .. }), "{name}: {begun}");
+        assert!(matches!(resumed, EvalError::NotARun { .. }), "{name}: {resumed}");
+        assert_eq!(files_below(&path), before);
+    }
+    // Episodes in the run's own folder may be a user's files, whatever their names.
+    let path = dir.path().join("own");
+    fs::create_dir_all(path.join("episodes")).unwrap();
+    fs::write(path.join(".lock"), "").unwrap();
+    fs::copy(source.path().join("low_target-0.json"), path.join("episodes/a.json")).unwrap();
+    let own = RunRequest { episodes: Some(path.join("episodes")), ..request.clone() };
+    let before = files_below(&path);
+    let error = Run::open(&path, FolderMode::New, &own, &helpers).unwrap_err();
+    assert!(matches!(error, EvalError::NotEmpty { .. }), "{error}");
+    assert_eq!(files_below(&path), before);
+    // A folder of episodes without a lock is a user's.
+    let path = dir.path().join("mine");
+    fs::create_dir_all(path.join("episodes")).unwrap();
+    fs::write(path.join("episodes/a.json"), "{}").unwrap();
+    let error = Run::open(&path, FolderMode::New, &request, &helpers).unwrap_err();
+    assert!(matches!(error, EvalError::NotEmpty { .. }), "{error}");
+    assert_eq!(files_below(&path).len(), 1);
+}
+
+#[test]
+fn invalid_requests_write_nothing() {
+    let source = episode_files(&[TaskId::LowTarget], 1);
+    let dir = tempfile::tempdir().unwrap();
+    let helpers = TestHelpers::new();
+    let path = dir.path().join("run");
+    let good = request(&source, &["turner"]);
+    let file = source.path().join("low_target-0.json");
+    let twin = source.path().join("twin.json");
+    fs::copy(&file, &twin).unwrap();
+    for request in [
+        good.clone(),
+        RunRequest { tasks: Some(vec![TaskId::Shopping]), ..good.clone() },
+        RunRequest { partner: Some("nobody".to_owned()), ..good.clone() },
+        RunRequest { episodes: None, split: "gen:0..2000000".parse().ok(), ..good.clone() },
+    ] {
+        for access in [FolderMode::New, FolderMode::Resume] {
+            let error = Run::open(&path, access, &request, &helpers).unwrap_err();
+            assert!(error.is_usage(), "{error}");
+            assert!(!path.exists(), "{error}");
+        }
+    }
+    fs::remove_file(&twin).unwrap();
+    Run::open(&path, FolderMode::New, &good, &helpers).unwrap();
+}

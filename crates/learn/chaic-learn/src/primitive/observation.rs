@@ -1,0 +1,130 @@
+//! Input of policies of primitive actions: color and depth, the memory as a map, and the agent's
+//! state.
+
+use chaic_agents::PlanningAgent;
+use chaic_agents::memory::egocentric::{CHANNELS, EgocentricMap};
+use chaic_agents::policies::ExternalPolicy;
+use chaic_core::geom::{Camera, forward};
+use chaic_core::{Briefing, Observation, Role};
+
+use crate::scales::{flag, normalize_clamped};
+
+/// Width and height of the input image, pixels. The camera image is an integer multiple of it.
+pub const IMAGE_SIZE: usize = 128;
+/// Channels of the image: color and depth.
+pub const IMAGE_CHANNELS: usize = 4;
+/// Egocentric map, 8 m in each direction.
+pub const MAP: EgocentricMap = EgocentricMap { side: 32, cell_m: 0.5 };
+/// Channels of the map.
+pub const MAP_CHANNELS: usize = CHANNELS.len();
+
+/// Features of the agent's state: position, heading, time left, container in hand, and a one-hot of
+/// the number of held objects (ten values, as in the original's interface for learners).
+pub const STATE_FEATURES: [&str; 16] = [
+    "x",
+    "z",
+    "heading_sin",
+    "heading_cos",
+    "time_left",
+    "has_container",
+    "holds_0",
+    "holds_1",
+    "holds_2",
+    "holds_3",
+    "holds_4",
+    "holds_5",
+    "holds_6",
+    "holds_7",
+    "holds_8",
+    "holds_9_or_more",
+];
+/// Number of state features.
+pub const N_STATE: usize = STATE_FEATURES.len();
+const N_HELD: usize = 10;
+
+/// Observation, stored as bytes to save memory.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PrimitiveObservation {
+    /// Color, and depth with 0 to 255 for 0 to 10 m; shape [128, 128, 4].
+    pub image: Vec<u8>,
+    /// Map, 0 or 1; shape [32, 32, 8].
+    pub map: Vec<u8>,
+    /// State features; 0 to 255 for 0 to 1, and for -1 to 1 where they may be negative.
+    pub state: [u8; N_STATE],
+}
+
+/// Depth that is encoded as 1, meters.
+const MAX_DEPTH_M: f32 = 10.0;
+
+impl PrimitiveObservation {
+    /// Creates the observation of an agent that has already processed `observation`.
+    pub fn new(
+        observation: &Observation,
+        agent: &PlanningAgent<ExternalPolicy>,
+        briefing: &Briefing,
+    ) -> PrimitiveObservation {
+        let mut map = vec![0; MAP.len()];
+        if let Some(memory) = agent.memory() {
+            let mut planes = vec![0; MAP.len()];
+            MAP.draw(memory, briefing, &mut planes);
+            let n = MAP.side * MAP.side;
+            for (pixel, to) in map.chunks_exact_mut(MAP_CHANNELS).enumerate() {
+                to.iter_mut().enumerate().for_each(|(c, to)| *to = planes[c * n + pixel]);
+            }
+        }
+        PrimitiveObservation {
+            image: image(observation),
+            map,
+            state: state(observation, agent, briefing),
+        }
+    }
+}
+
+fn image(observation: &Observation) -> Vec<u8> {
+    let Camera { width, height, .. } = observation.camera;
+    let stride = (width.min(height) as usize) / IMAGE_SIZE;
+    let mut image = vec![0; IMAGE_SIZE * IMAGE_SIZE * IMAGE_CHANNELS];
+    let images = &observation.images;
+    let (Some(rgb), Some(depth_m)) = (&images.rgb, &images.depth_m) else { return image };
+    for (k, to) in image.chunks_exact_mut(IMAGE_CHANNELS).enumerate() {
+        let [row, column] = [k / IMAGE_SIZE, k % IMAGE_SIZE].map(|x| x * stride + stride / 2);
+        let from = row * width as usize + column;
+        to[..3].copy_from_slice(&rgb[3 * from..3 * from + 3]);
+        to[3] = byte(normalize_clamped(depth_m[from], MAX_DEPTH_M));
+    }
+    image
+}
+
+fn state(
+    observation: &Observation,
+    agent: &PlanningAgent<ExternalPolicy>,
+    briefing: &Briefing,
+) -> [u8; N_STATE] {
+    let proprioception = &observation.proprioception;
+    let bounds = briefing.bounds;
+    let size = bounds.size();
+    let at = proprioception.pose.position;
+    let heading = forward(proprioception.pose.yaw_rad);
+    let held = agent.memory().map_or(0, |memory| memory.hands.all().count());
+    let has_container = agent.memory().is_some_and(|memory| {
+        memory.hands.all().any(|(_, class)| class.info().role == Role::Container)
+    });
+    let frames_left = briefing.horizon.saturating_sub(observation.frame) as f32;
+    let mut state = [0; N_STATE];
+    let values = [
+        (at.x - bounds.min.x) / size.x.max(1.0),
+        (at.z - bounds.min.y) / size.y.max(1.0),
+        0.5 + 0.5 * heading.x,
+        0.5 + 0.5 * heading.z,
+        frames_left / briefing.horizon.max(1) as f32,
+        flag(has_container),
+    ];
+    state.iter_mut().zip(values).for_each(|(to, x)| *to = byte(x));
+    state[values.len() + held.min(N_HELD - 1)] = u8::MAX;
+    state
+}
+
+/// Encodes a number from 0 to 1 as a byte.
+fn byte(x: f32) -> u8 {
+    (255.0 * x.clamp(0.0, 1.0)) as u8
+}

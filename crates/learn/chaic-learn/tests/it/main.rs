@@ -1,0 +1,5 @@
+//! Integration tests of `chaic-learn`.
+
+mod old_keys;
+mod opponent;
+mod training;

@@ -1,0 +1,199 @@
+//! Windows lie within bounds, have consistent labels and are read back unchanged. The model learns,
+//! with the same bits after an interruption. Reports count correctly.
+
+use std::fs;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use chaic_core::TaskId;
+use chaic_core::capability::Persona;
+use chaic_learn::candidate_scorer::CandidateSet;
+use chaic_learn::opponent::collect::{
+    DatasetSplit, LabeledWindow, WindowCollectionConfig, collect, read, write,
+};
+use chaic_learn::opponent::network::{OpponentModel, network};
+use chaic_learn::opponent::report::OpponentReport;
+use chaic_learn::opponent::train::{OpponentConfig, OpponentTrainer};
+use chaic_learn::opponent::window::{N_CLASS, N_STATE};
+use chaic_learn::opponent::{N_LIMITS, OpponentGoal, limits};
+use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoints};
+use chaic_training::{CHECKPOINT, CONFIG, CURVES, Trainer, TrainingError, TrainingRun};
+
+static NEVER_STOP: AtomicBool = AtomicBool::new(false);
+
+fn small_collection() -> WindowCollectionConfig {
+    WindowCollectionConfig {
+        max_per_class: 30,
+        episodes: 3,
+        tasks: vec![TaskId::LowTarget, TaskId::Shopping, TaskId::MovingHouse],
+        image_size: 64,
+        granted: true,
+        ..WindowCollectionConfig::default()
+    }
+}
+
+#[test]
+fn windows_are_within_bounds_and_read_back_unchanged() {
+    let samples = collect(DatasetSplit::Test, &small_collection(), &mut |_| (), &NEVER_STOP)
+        .unwrap()
+        .unwrap();
+    assert!(samples.iter().any(|s| s.goal == OpponentGoal::Unknown));
+    assert!(samples.iter().any(|s| s.target.is_some()));
+    for sample in &samples {
+        let CandidateSet { state, candidates, n_candidates } = &sample.window;
+        assert_eq!((state.len(), candidates.len()), (N_STATE, n_candidates * N_CLASS));
+        let all = || state.iter().chain(candidates);
+        assert!(all().all(|x| (-1.0..=1.0).contains(x)), "{:?}", all().collect::<Vec<_>>());
+        assert!(
+            sample.target.is_none_or(|t| t < *n_candidates && sample.goal == OpponentGoal::Pick)
+        );
+        let is_visible = state[0] > 0.0;
+        assert_eq!(is_visible, sample.goal != OpponentGoal::Unknown, "{sample:?}");
+        assert!(sample.limits.iter().all(|x| (0.0..=1.0).contains(x)));
+    }
+    assert!(
+        samples
+            == collect(DatasetSplit::Test, &small_collection(), &mut |_| (), &NEVER_STOP)
+                .unwrap()
+                .unwrap()
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("windows.safetensors");
+    write(&path, &samples).unwrap();
+    assert!(samples == read(&path).unwrap());
+    let bytes = fs::read(&path).unwrap();
+    for n in [0, 7, bytes.len() / 2, bytes.len() - 1] {
+        fs::write(&path, &bytes[..n]).unwrap();
+        let problem = read(&path).err().unwrap().to_string();
+        assert!(problem.contains("windows.safetensors") && !problem.contains('\n'), "{problem}");
+    }
+}
+
+#[test]
+fn limits_describe_the_body() {
+    let limits_of = |persona: Persona| limits(&persona.capability());
+    assert_eq!(limits_of(Persona::Adult), [1.0; N_LIMITS]);
+    assert_eq!(limits_of(Persona::Child), [0.0, 1.0, 0.0, 1.0, 1.0]);
+    assert_eq!(limits_of(Persona::Wheelchair), [0.0, 0.0, 0.8, 1.0, 0.0]);
+    assert_eq!(limits_of(Persona::Rider)[3], 0.0);
+    assert_eq!(limits_of(Persona::Frail)[2], 0.0);
+}
+
+#[test]
+fn the_model_learns_and_interruption_changes_no_bit() {
+    let config = OpponentConfig {
+        steps: 60,
+        warm_up: 5,
+        validation_max_per_class: 10,
+        collect: small_collection(),
+        ..OpponentConfig::default()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let mut ignore_progress = |_: &str| ();
+    let stop = AtomicBool::new(false);
+    let checkpoints = [false, true].map(|is_paused| {
+        let out = folder.path().join(format!("{is_paused}"));
+        let started =
+            TrainingRun::<OpponentTrainer>::start(&out, &config, None, &mut ignore_progress, &stop);
+        let mut run = started.unwrap().unwrap();
+        if is_paused {
+            // The flag is checked before the first step, which is then not taken.
+            stop.store(true, Ordering::Relaxed);
+            assert!(!run.run(&stop, &mut |_| {}).unwrap());
+            stop.store(false, Ordering::Relaxed);
+            drop(run);
+            run = TrainingRun::resume(&out, &mut ignore_progress, &stop).unwrap().unwrap();
+        }
+        assert!(run.run(&stop, &mut |_| {}).unwrap());
+        fs::read(out.join(CHECKPOINT)).unwrap()
+    });
+    assert!(checkpoints[0] == checkpoints[1]);
+    let out = folder.path().join("false");
+    let curves = fs::read_to_string(out.join(CURVES)).unwrap();
+    assert!(curves.contains("goal_accuracy"), "{curves}");
+    // On its training data the trained model is better than the initial one.
+    let samples = read(&out.join("windows.safetensors")).unwrap();
+    let bytes = fs::read(out.join("opponent.safetensors")).unwrap();
+    let learned =
+        OpponentReport::new(&OpponentModel::from_bytes(&bytes).unwrap(), &samples, &NEVER_STOP);
+    let initial = OpponentReport::new(
+        &OpponentModel::new(network().network.init_parameters(1)),
+        &samples,
+        &NEVER_STOP,
+    );
+    let (learned, initial) = (learned.unwrap(), initial.unwrap());
+    assert!(
+        learned.goal_accuracy.mean > initial.goal_accuracy.mean + 0.3,
+        "{learned:?} {initial:?}"
+    );
+    assert!(learned.limits_error.mean < initial.limits_error.mean, "{learned:?} {initial:?}");
+}
+
+#[test]
+fn reports_weight_goals_equally() {
+    let sample = |goal: OpponentGoal, episode: u32| LabeledWindow {
+        window: CandidateSet {
+            state: vec![0.0; N_STATE],
+            candidates: vec![0.0; 2 * N_CLASS],
+            n_candidates: 2,
+        },
+        goal,
+        target: (goal == OpponentGoal::Pick).then_some(0),
+        limits: [1.0; N_LIMITS],
+        episode,
+    };
+    // All windows are equal, so the same goal is predicted for all of them.
+    let mut samples: Vec<LabeledWindow> =
+        (0..9).map(|k| sample(OpponentGoal::Unknown, k)).collect();
+    samples.push(sample(OpponentGoal::Pick, 9));
+    let report = OpponentReport::new(
+        &OpponentModel::new(network().network.init_parameters(1)),
+        &samples,
+        &NEVER_STOP,
+    );
+    let report = report.unwrap();
+    let column = |k: usize| report.confusion.iter().map(|row| row[k]).sum::<usize>();
+    let predicted = (0..OpponentGoal::ALL.len()).find(|k| column(*k) == 10).unwrap();
+    let is_correct =
+        [OpponentGoal::Unknown, OpponentGoal::Pick].iter().any(|goal| goal.index() == predicted);
+    let accuracy = if is_correct { 0.5 } else { 0.0 };
+    assert!((report.goal_accuracy.mean - accuracy).abs() < 1e-9, "{report:?}");
+    assert_eq!((report.goal_accuracy.n, report.target_accuracy.n), (10, 1));
+}
+
+#[test]
+fn damaged_checkpoints_and_values_out_of_bounds_are_refused() {
+    let config = OpponentConfig {
+        steps: 60,
+        validation_max_per_class: 10,
+        collect: WindowCollectionConfig { episodes: 1, ..small_collection() },
+        ..OpponentConfig::default()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let trainer = OpponentTrainer::new(&config, folder.path(), &mut |_| (), &NEVER_STOP);
+    let mut trainer = trainer.unwrap().unwrap();
+    refuses_damaged_checkpoints(&mut trainer);
+    bounds_every_number::<OpponentTrainer>();
+    let is_raised = AtomicBool::new(true);
+    assert!(trainer.validate(&is_raised).unwrap().is_none());
+    assert!(
+        collect(DatasetSplit::Test, &small_collection(), &mut |_| (), &is_raised)
+            .unwrap()
+            .is_none()
+    );
+}
+
+#[test]
+fn windows_that_cannot_be_read_are_refused_before_the_folder_is_created() {
+    let folder = tempfile::tempdir().unwrap();
+    let (out, empty) = (folder.path().join("out"), folder.path().join("empty"));
+    write(&empty, &[]).unwrap();
+    for (windows, word) in [(folder.path().join("missing"), "missing"), (empty, "no windows")] {
+        let config = OpponentConfig { windows: Some(windows), ..OpponentConfig::default() };
+        let started =
+            TrainingRun::<OpponentTrainer>::start(&out, &config, None, &mut |_| (), &NEVER_STOP);
+        let error = started.err().unwrap();
+        assert!(matches!(error, TrainingError::InvalidConfig(_)), "{error}");
+        assert!(error.to_string().contains(word), "{error}");
+        assert!(!out.join(CONFIG).exists() && !out.exists());
+    }
+}

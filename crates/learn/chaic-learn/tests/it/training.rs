@@ -1,0 +1,298 @@
+//! Features lie within bounds. Equal seeds give equal weights, with or without an interruption.
+//! Errors about bad files take one line.
+
+use std::fs;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
+use chaic_core::TaskId;
+use chaic_env::RewardWeights;
+use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry as _};
+use chaic_learn::features::{N_PLAN, N_STATE};
+use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
+use chaic_learn::opponent;
+use chaic_learn::policy::ActionSelection;
+use chaic_learn::ppo::PpoConfig;
+use chaic_learn::primitive::train::{PrimitiveConfig, PrimitiveTrainer};
+use chaic_learn::rollout::{RolloutContext, rollout};
+use chaic_learn::train::{
+    CloningConfig, PolicyKind, PolicyTrainer, PpoTrainingConfig, RolloutConfig, from_bytes,
+};
+use chaic_nn::weights;
+use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoints};
+use chaic_training::run::checkpoint_bytes;
+use chaic_training::{CHECKPOINT, Trainer, TrainingError, TrainingRun, parse_config};
+
+static NEVER_STOP: AtomicBool = AtomicBool::new(false);
+
+fn small_rollout() -> RolloutConfig {
+    RolloutConfig {
+        episodes: 2,
+        tasks: vec![TaskId::LowTarget, TaskId::MovingHouse],
+        image_size: 32,
+        validation_episodes: 1,
+        ..RolloutConfig::default()
+    }
+}
+
+/// Returns the checkpoint after all steps, with or without an interruption before the last one.
+fn run_training<T: Trainer>(config: &T::Config, folder: &Path, is_paused: bool) -> Vec<u8> {
+    let mut quiet = |_: &str| ();
+    let stop = AtomicBool::new(false);
+    let mut run =
+        TrainingRun::<T>::start(folder, config, None, &mut quiet, &stop).unwrap().unwrap();
+    if is_paused {
+        let is_complete = run.run(&stop, &mut |_| {
+            stop.store(true, Ordering::Relaxed);
+        });
+        assert!(!is_complete.unwrap());
+        drop(run);
+        stop.store(false, Ordering::Relaxed);
+        run = TrainingRun::<T>::resume(folder, &mut quiet, &stop).unwrap().unwrap();
+        assert_eq!(run.progress(), (1, 2));
+    }
+    assert!(run.run(&stop, &mut |_| {}).unwrap());
+    fs::read(folder.join(CHECKPOINT)).unwrap()
+}
+
+#[test]
+fn interrupted_trainings_end_with_the_same_bits() {
+    let folder = tempfile::tempdir().unwrap();
+    let ppo = PpoTrainingConfig {
+        iterations: 2,
+        rollout: small_rollout(),
+        ..PpoTrainingConfig::default()
+    };
+    let [uninterrupted, resumed] = [false, true].map(|is_paused| {
+        let folder = folder.path().join(format!("policy {is_paused}"));
+        run_training::<PolicyTrainer<PpoTrainingConfig>>(&ppo, &folder, is_paused)
+    });
+    assert!(uninterrupted == resumed);
+    let clone =
+        CloningConfig { iterations: 2, rollout: small_rollout(), ..CloningConfig::default() };
+    let [uninterrupted, resumed] = [false, true].map(|is_paused| {
+        let folder = folder.path().join(format!("clone {is_paused}"));
+        run_training::<PolicyTrainer<CloningConfig>>(&clone, &folder, is_paused)
+    });
+    assert!(uninterrupted == resumed);
+    // A trained policy is a helper of a run.
+    let weights =
+        folder.path().join("policy true").join(PolicyTrainer::<PpoTrainingConfig>::WEIGHTS);
+    let policy = NamedPolicy::read("mine", &weights).unwrap();
+    let helpers = PolicyRegistry::with_fallback(
+        &BuiltInHelpers,
+        vec![policy],
+        Arc::new(GroundTruthPerceptionFactory),
+    )
+    .unwrap();
+    assert!(helpers.names().contains(&"mine".to_owned()));
+    assert!(helpers.make("mine", chaic_agents::PlannerRules::paper()).is_some());
+    // A truncated checkpoint.
+    let folder = folder.path().join("policy true");
+    fs::write(folder.join(CHECKPOINT), &uninterrupted[..uninterrupted.len() / 2]).unwrap();
+    let refused =
+        TrainingRun::<PolicyTrainer<PpoTrainingConfig>>::resume(&folder, &mut |_| (), &NEVER_STOP);
+    assert!(matches!(refused, Err(TrainingError::Checkpoint { .. })));
+}
+
+#[test]
+fn damaged_checkpoints_and_values_out_of_bounds_are_refused() {
+    fn check<T: Trainer>(config: &T::Config) {
+        let folder = tempfile::tempdir().unwrap();
+        let trainer = T::new(config, folder.path(), &mut |_| (), &NEVER_STOP);
+        refuses_damaged_checkpoints(&mut trainer.unwrap().unwrap());
+        bounds_every_number::<T>();
+    }
+    let policy = PpoTrainingConfig { rollout: small_rollout(), ..PpoTrainingConfig::default() };
+    check::<PolicyTrainer<PpoTrainingConfig>>(&policy);
+    check::<PolicyTrainer<CloningConfig>>(&CloningConfig {
+        rollout: small_rollout(),
+        ..CloningConfig::default()
+    });
+    check::<PrimitiveTrainer>(&PrimitiveConfig { n_envs: 2, ..PrimitiveConfig::default() });
+}
+
+#[test]
+fn configurations_that_exceed_memory_are_refused_by_key() {
+    for (text, names) in [
+        ("n_envs = 1024\nimage_size = 512", ["n_envs", "image_size"]),
+        ("n_envs = 1024\nn_steps = 1024", ["n_envs", "n_steps"]),
+    ] {
+        let problem = parse_config::<PrimitiveTrainer>(text).unwrap_err();
+        assert!(names.iter().all(|name| problem.contains(name)), "{problem}");
+    }
+}
+
+/// Raises the flag after a delay, as a signal may at any time.
+fn raise_after(delay: Duration) -> Arc<AtomicBool> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let is_raised = Arc::clone(&stop);
+    std::thread::spawn(move || {
+        std::thread::sleep(delay);
+        is_raised.store(true, Ordering::Relaxed);
+    });
+    stop
+}
+
+#[test]
+fn stopped_steps_change_nothing() {
+    fn check<T: Trainer>(config: &T::Config) {
+        let folder = tempfile::tempdir().unwrap();
+        let new = || T::new(config, folder.path(), &mut |_| (), &NEVER_STOP).unwrap().unwrap();
+        let (mut uninterrupted, mut stopped) = (new(), new());
+        let before = stopped.checkpoint();
+        let mut n_stopped = 0;
+        for delay_ms in [0, 20, 60, 120, 200] {
+            let stop = raise_after(Duration::from_millis(delay_ms));
+            if stopped.step(&stop).is_some() {
+                // The step ended before the flag was raised.
+                stopped = new();
+                continue;
+            }
+            n_stopped += 1;
+            assert!(stopped.checkpoint() == before, "{} after {delay_ms} ms", T::KIND);
+        }
+        assert!(n_stopped > 0, "{}", T::KIND);
+        assert!(uninterrupted.step(&NEVER_STOP) == stopped.step(&NEVER_STOP));
+        assert_eq!(uninterrupted.steps_done(), 1);
+        assert!(uninterrupted.checkpoint() == stopped.checkpoint(), "{}", T::KIND);
+        let is_raised = AtomicBool::new(true);
+        assert!(stopped.validate(&is_raised).unwrap().is_none());
+        assert!(T::new(config, folder.path(), &mut |_| (), &is_raised).is_ok());
+    }
+    let policy = PpoTrainingConfig { rollout: small_rollout(), ..PpoTrainingConfig::default() };
+    check::<PolicyTrainer<PpoTrainingConfig>>(&policy);
+    check::<PolicyTrainer<CloningConfig>>(&CloningConfig {
+        rollout: small_rollout(),
+        ..CloningConfig::default()
+    });
+    check::<PrimitiveTrainer>(&primitive());
+}
+
+/// Returns a configuration in which updates end within episodes and episodes within updates.
+fn primitive() -> PrimitiveConfig {
+    PrimitiveConfig {
+        n_updates: 2,
+        n_envs: 2,
+        n_steps: 150,
+        tasks: vec![TaskId::MovingHouse],
+        validation_episodes: 1,
+        ppo: PpoConfig { batch_size: 50, n_epochs: 1, shards: 2, ..PpoConfig::default() },
+        ..PrimitiveConfig::default()
+    }
+}
+
+#[test]
+fn interrupted_primitive_trainings_end_with_the_same_bits() {
+    let config = primitive();
+    let folder = tempfile::tempdir().unwrap();
+    let checkpoints = [false, true].map(|is_paused| {
+        let out = folder.path().join(format!("{is_paused}"));
+        let mut quiet = |_: &str| ();
+        let started =
+            TrainingRun::<PrimitiveTrainer>::start(&out, &config, None, &mut quiet, &NEVER_STOP);
+        let mut run = started.unwrap().unwrap();
+        if is_paused {
+            drop(run);
+            let trainer = PrimitiveTrainer::new(&config, &out, &mut quiet, &NEVER_STOP);
+            let mut trainer = trainer.unwrap().unwrap();
+            let metrics = trainer.step(&NEVER_STOP).unwrap();
+            let bytes = checkpoint_bytes(&trainer, &[metrics]).unwrap();
+            fs::write(out.join(CHECKPOINT), bytes).unwrap();
+            run = TrainingRun::resume(&out, &mut quiet, &NEVER_STOP).unwrap().unwrap();
+            assert_eq!(run.progress(), (1, 2));
+        }
+        assert!(run.run(&NEVER_STOP, &mut |_| {}).unwrap());
+        fs::read(out.join(CHECKPOINT)).unwrap()
+    });
+    assert!(checkpoints[0] == checkpoints[1]);
+    let weights = folder.path().join("true").join(PrimitiveTrainer::WEIGHTS);
+    let policy = NamedPolicy::read("mine", &weights).unwrap();
+    let helpers = PolicyRegistry::with_fallback(
+        &BuiltInHelpers,
+        vec![policy],
+        Arc::new(GroundTruthPerceptionFactory),
+    )
+    .unwrap();
+    assert!(helpers.make("mine", chaic_agents::PlannerRules::paper()).is_some());
+}
+
+#[test]
+fn policy_weights_include_the_opponent_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("opponent.safetensors");
+    let network = opponent::network::network().network;
+    let parameters = network.init_parameters(7);
+    let bytes = weights::to_bytes(&network, &parameters, opponent::network::KIND).unwrap();
+    fs::write(&file, bytes).unwrap();
+    let rollout_config = RolloutConfig { opponent: Some(file.clone()), ..small_rollout() };
+    let config = PpoTrainingConfig {
+        iterations: 2,
+        rollout: rollout_config,
+        ..PpoTrainingConfig::default()
+    };
+    let [uninterrupted, resumed] = [false, true].map(|is_paused| {
+        let folder = folder.path().join(format!("policy {is_paused}"));
+        run_training::<PolicyTrainer<PpoTrainingConfig>>(&config, &folder, is_paused)
+    });
+    assert!(uninterrupted == resumed);
+    let weights = PolicyTrainer::<PpoTrainingConfig>::WEIGHTS;
+    let bytes = fs::read(folder.path().join("policy true").join(weights)).unwrap();
+    let (kind, policy) = from_bytes(&bytes).unwrap();
+    assert_eq!(kind, PolicyKind::WithOpponent);
+    assert_eq!(policy.opponent.unwrap().parameters(), parameters);
+    // A missing file or one of another network is refused before anything is written.
+    for (bytes, word) in [(&b"nothing"[..], "not a weights file"), (&bytes, "plan policy")] {
+        fs::write(&file, bytes).unwrap();
+        let problem = PolicyTrainer::<PpoTrainingConfig>::check(&config).unwrap_err();
+        assert!(problem.contains("opponent.safetensors") && problem.contains(word), "{problem}");
+    }
+}
+
+#[test]
+fn features_lie_within_bounds_and_rewards_sum_to_the_score() {
+    let model = PolicyKind::WithoutOpponent.network();
+    let parameters = model.network.init_parameters(1);
+    let weights = Arc::new(PolicyKind::WithoutOpponent.weights_from(&model, parameters));
+    let context = RolloutContext {
+        perception: &GroundTruthPerceptionFactory,
+        image_size: 64,
+        selection: ActionSelection::Sample,
+        rewards: RewardWeights { delivered: 1.0, ..RewardWeights::NONE },
+        stop: &NEVER_STOP,
+    };
+    for id in ["shopping/gen/40000001", "obstacle/gen/40000001"] {
+        let result = rollout(id, 0, &weights, &context).unwrap().unwrap();
+        let mut reward = 0.0;
+        let mut frames = 0.0;
+        for transition in &result.trajectory.transitions {
+            let decision = &transition.observation;
+            assert_eq!(decision.state.len(), N_STATE);
+            assert_eq!(decision.candidates.len(), decision.n_candidates * N_PLAN);
+            let all = decision.state.iter().chain(&decision.candidates);
+            assert!(all.clone().all(|x| (-1.0..=1.0).contains(x)), "{all:?}");
+            reward += f64::from(transition.reward);
+            frames += f64::from(transition.duration);
+        }
+        // Rewards sum to the score, except for the partner's deliveries before the first decision.
+        assert!(reward <= result.tr + 1e-6 && reward >= 0.0, "{reward} of {}", result.tr);
+        assert!(frames <= f64::from(result.frames));
+        assert!(result.trajectory.transitions.len() > 5);
+        assert!((result.tr - reward).abs() < 1e-4, "{reward} of {}", result.tr);
+    }
+}
+
+#[test]
+fn files_without_policy_weights_are_refused_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("other.safetensors");
+    for bytes in [&b""[..], b"not a file of weights", include_bytes!("training.rs")] {
+        fs::write(&file, bytes).unwrap();
+        let problem = NamedPolicy::read("mine", &file).err().unwrap().to_string();
+        assert!(problem.contains("other.safetensors") && !problem.contains('\n'), "{problem}");
+    }
+    assert!(NamedPolicy::read("mine", &folder.path().join("missing")).is_err());
+}

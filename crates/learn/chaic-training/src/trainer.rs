@@ -1,0 +1,181 @@
+//! Interface of trainers, and the error of a training.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use chaic_files::{FileError, LockError};
+use chaic_nn::Network;
+use chaic_nn::weights::WeightsError;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::bounds::BoundTable;
+use crate::checkpoint::{Checkpoint, CheckpointError};
+use crate::curves::Metrics;
+
+/// Training algorithm that [`TrainingRun`](crate::TrainingRun) runs in a folder.
+///
+/// Long operations get a `stop` flag and check it at least once a second. Once it is raised, they
+/// return `None` and leave the training unchanged.
+pub trait Trainer: Sized {
+    /// Configuration, stored as TOML.
+    type Config: Clone + Default + Serialize + DeserializeOwned;
+    /// Name of the training, as in `chaic train NAME`. Checkpoints with another name are refused.
+    const KIND: &'static str;
+    /// Bounds of every number in the configuration.
+    const BOUNDS: BoundTable;
+    /// Name of the weights file.
+    const WEIGHTS: &'static str;
+    /// Number of steps between two records of the training metrics.
+    const RECORD_STEPS: u64 = 20;
+    /// Number of steps between two checkpoints.
+    const CHECKPOINT_STEPS: u64 = 250;
+    /// Number of steps between two validations.
+    const VALIDATION_STEPS: u64 = 1000;
+
+    /// Prepares the training for its first step; `None` if it was stopped.
+    ///
+    /// `progress` is called with descriptions of finished work. Collected data may be kept in
+    /// `folder`.
+    ///
+    /// # Errors
+    /// If data cannot be written or read.
+    fn new(
+        config: &Self::Config,
+        folder: &Path,
+        progress: &mut dyn FnMut(&str),
+        stop: &AtomicBool,
+    ) -> Result<Option<Self>, TrainingError>;
+
+    /// Checks what bounds of single numbers cannot express, and the input files that the
+    /// configuration names.
+    ///
+    /// # Errors
+    /// One line that describes the problem.
+    fn check(config: &Self::Config) -> Result<(), String>;
+
+    /// Reads initial parameters for this configuration from a weights file.
+    ///
+    /// # Errors
+    /// If the file does not fit the network, or a value is not finite.
+    fn read_weights(config: &Self::Config, weights: &[u8]) -> Result<Vec<f32>, WeightsError>;
+
+    /// Returns the trained network.
+    fn network(&self) -> &Network;
+
+    /// Returns the total number of steps.
+    fn total_steps(&self) -> u64;
+
+    /// Returns the number of steps taken.
+    fn steps_done(&self) -> u64;
+
+    /// Returns the complete state of the training.
+    fn checkpoint(&self) -> Checkpoint;
+
+    /// Replaces the random initial parameters by those of [`Trainer::read_weights`].
+    fn load_parameters(&mut self, parameters: Vec<f32>);
+
+    /// Restores the state of a checkpoint; `None` if it was stopped.
+    ///
+    /// # Errors
+    /// If a section does not fit this training.
+    fn resume(
+        &mut self,
+        checkpoint: &Checkpoint,
+        stop: &AtomicBool,
+    ) -> Result<Option<()>, CheckpointError>;
+
+    /// Takes one step and returns its metrics; `None` if it was stopped before the step was
+    /// complete.
+    fn step(&mut self, stop: &AtomicBool) -> Option<Metrics>;
+
+    /// Returns the validation metrics and the content of a weights file; `None` if it was stopped.
+    ///
+    /// # Errors
+    /// If a parameter is not finite.
+    fn validate(&self, stop: &AtomicBool) -> Result<Option<(Metrics, Vec<u8>)>, WeightsError>;
+}
+
+/// Reason why a training cannot start, resume or continue.
+#[derive(Debug, thiserror::Error)]
+pub enum TrainingError {
+    /// An operation of the file system failed.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// Training data cannot be written or read.
+    #[error(transparent)]
+    Data(Box<dyn Error + Send + Sync>),
+    /// The output folder has content.
+    #[error("{0} isn't empty; continue it with --resume or choose another --out")]
+    NotEmpty(PathBuf),
+    /// A configuration file is invalid.
+    #[error("{path}: {problem}")]
+    Config {
+        /// The file.
+        path: PathBuf,
+        /// Description of the problem.
+        problem: String,
+    },
+    /// The initial weights do not fit the network.
+    #[error("{path}: {problem}")]
+    Weights {
+        /// The file.
+        path: PathBuf,
+        /// Description of the problem.
+        problem: WeightsError,
+    },
+    /// A configuration that was not read from a file is invalid.
+    #[error("this configuration can't be used: {0}")]
+    InvalidConfig(String),
+    /// Another process trains in the folder.
+    #[error("{path} is in use by another `chaic train`; wait for it or choose another --out", path = .0.display())]
+    Locked(PathBuf),
+    /// The checkpoint is damaged or belongs to another training.
+    #[error("{path} {problem}", path = path.display())]
+    Checkpoint {
+        /// The file.
+        path: PathBuf,
+        /// Description of the problem.
+        problem: CheckpointError,
+    },
+    /// The checkpoint is missing although curves exist.
+    #[error("{path} is missing, but the training has taken steps; start a new one", path = .0.display())]
+    NoCheckpoint(PathBuf),
+    /// A parameter or an optimizer moment is not finite.
+    #[error(
+        "after step {step}, {problem}; the last checkpoint is kept, resume it with a lower learning rate"
+    )]
+    NotFinite {
+        /// Number of steps taken.
+        step: u64,
+        /// Name of the tensor and the problem.
+        problem: String,
+    },
+    /// A training metric is not finite; holds the step.
+    #[error(
+        "a metric of step {0} is not finite; the last checkpoint is kept, resume it with a lower learning rate"
+    )]
+    NonFiniteMetric(u64),
+}
+
+impl TrainingError {
+    /// Returns whether the configuration alone causes the error.
+    pub fn is_usage(&self) -> bool {
+        matches!(self, TrainingError::Config { .. } | TrainingError::InvalidConfig(_))
+    }
+
+    /// Creates an error about training data.
+    pub fn from_data(problem: impl Error + Send + Sync + 'static) -> TrainingError {
+        TrainingError::Data(Box::new(problem))
+    }
+}
+
+impl From<LockError> for TrainingError {
+    fn from(error: LockError) -> TrainingError {
+        match error {
+            LockError::Held(path) => TrainingError::Locked(path),
+            LockError::File(error) => error.into(),
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! Perception and behavior models by name: the values of `--perception` and `--behavior`.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use chaic_agents::perception_factory::{
+    GROUND_TRUTH, GroundTruthPerceptionFactory, PerceptionFactory,
+};
+use chaic_files::{FileError, read_user_file};
+use chaic_nn::weights::WeightsError;
+
+use crate::behavior::network::TrainedBehavior;
+use crate::behavior::recognize::LearnedBehaviorFactory;
+use crate::noisy::{DetectorNoiseModel, NoisyPerceptionFactory};
+use crate::perception::LearnedPerceptionFactory;
+use crate::trained::TrainedDetector;
+
+/// Name of the learned models; `learned:FILE` reads other weights.
+pub const LEARNED: &str = "learned";
+/// Name of ground truth with the error rates of the shipped detector; `noisy:FILE` reads other
+/// rates.
+pub const NOISY: &str = "noisy";
+
+/// Maximum size of a file of weights or rates, bytes.
+const MAX_BYTES: u64 = 1 << 28;
+
+/// Error of a perception or behavior name.
+#[derive(Debug, thiserror::Error)]
+pub enum PerceptionError {
+    /// The name is unknown.
+    #[error("{0}")]
+    Unknown(String),
+    /// The file cannot be read.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The file holds no weights of this network.
+    #[error("{}: {problem}", path.display())]
+    Weights {
+        /// Path of the file.
+        path: PathBuf,
+        /// Cause.
+        problem: WeightsError,
+    },
+    /// The file holds no error rates.
+    #[error("{}: {problem}", path.display())]
+    Rates {
+        /// Path of the file.
+        path: PathBuf,
+        /// Cause.
+        problem: String,
+    },
+}
+
+/// Returns the weights file of a name such as `learned:FILE`.
+pub fn weights_of(name: &str) -> Option<&Path> {
+    name.strip_prefix(LEARNED)?.strip_prefix(':').map(Path::new)
+}
+
+/// Reads a detector from a file.
+///
+/// # Errors
+/// If the file cannot be read or holds no detector.
+pub fn read_detector(path: &Path) -> Result<TrainedDetector, PerceptionError> {
+    let weights_error = |problem| PerceptionError::Weights { path: path.to_owned(), problem };
+    TrainedDetector::from_bytes(&read_user_file(path, MAX_BYTES)?).map_err(weights_error)
+}
+
+/// Reads a behavior network from a file.
+///
+/// # Errors
+/// If the file cannot be read or holds no behavior network.
+pub fn read_behavior(path: &Path) -> Result<TrainedBehavior, PerceptionError> {
+    let weights_error = |problem| PerceptionError::Weights { path: path.to_owned(), problem };
+    TrainedBehavior::from_bytes(&read_user_file(path, MAX_BYTES)?).map_err(weights_error)
+}
+
+/// Creates the perception factory for a perception name and a behavior name.
+///
+/// # Errors
+/// [`PerceptionError`]
+pub fn perception_from_name(
+    perception: &str,
+    behavior: &str,
+) -> Result<Arc<dyn PerceptionFactory>, PerceptionError> {
+    let factory = factory_from_name(perception)?;
+    let trained = match weights_of(behavior) {
+        Some(file) => read_behavior(file)?,
+        None if behavior == GROUND_TRUTH => return Ok(factory),
+        None if behavior == LEARNED => TrainedBehavior::built_in(),
+        None => {
+            return Err(PerceptionError::Unknown(format!(
+                "no behavior `{behavior}`; write {GROUND_TRUTH}, {LEARNED} or {LEARNED}:FILE"
+            )));
+        }
+    };
+    Ok(Arc::new(LearnedBehaviorFactory { perception: factory, model: Arc::new(trained) }))
+}
+
+fn factory_from_name(name: &str) -> Result<Arc<dyn PerceptionFactory>, PerceptionError> {
+    if name == GROUND_TRUTH {
+        return Ok(Arc::new(GroundTruthPerceptionFactory));
+    }
+    if name == LEARNED {
+        return Ok(Arc::new(LearnedPerceptionFactory::new(TrainedDetector::built_in())));
+    }
+    if let Some(file) = weights_of(name) {
+        return Ok(Arc::new(LearnedPerceptionFactory::new(read_detector(file)?)));
+    }
+    if name == NOISY {
+        return Ok(Arc::new(NoisyPerceptionFactory::new(
+            DetectorNoiseModel::built_in(),
+            NOISY.to_owned(),
+        )));
+    }
+    if let Some(file) = name.strip_prefix(NOISY).and_then(|suffix| suffix.strip_prefix(':')) {
+        let path = Path::new(file);
+        let rates_error = |e: serde_json::Error| PerceptionError::Rates {
+            path: path.to_owned(),
+            problem: e.to_string(),
+        };
+        let rates: DetectorNoiseModel =
+            serde_json::from_slice(&read_user_file(path, MAX_BYTES)?).map_err(rates_error)?;
+        return Ok(Arc::new(NoisyPerceptionFactory::new(rates, format!("{NOISY} {file}"))));
+    }
+    Err(PerceptionError::Unknown(format!(
+        "no perception `{name}`; write {GROUND_TRUTH}, {LEARNED}, {LEARNED}:FILE, {NOISY} or {NOISY}:FILE"
+    )))
+}

@@ -1,0 +1,6 @@
+//! Integration tests of `chaic-render-gpu`.
+
+mod common;
+
+mod agreement;
+mod limits;

@@ -1,0 +1,7 @@
+//! Integration tests of `chaic-render`.
+
+mod catalogue;
+mod fuzz;
+mod geometry;
+mod golden;
+mod images;

@@ -1,0 +1,67 @@
+//! Episodes by split and by name.
+
+use chaic_core::TaskId;
+
+use crate::Settings;
+use crate::bundled::{bundled_test, bundled_train};
+use crate::format::Episode;
+use crate::generate::{generate_with, generator_info};
+use crate::seeds::{FIRST_BUNDLED_SEED, GeneratorSeeds};
+use crate::split::{Split, SplitError};
+use crate::standard::standard;
+
+/// Returns the episodes of a task in a split, in order. Each is read or generated when the iterator
+/// reaches it.
+pub fn episodes(
+    split: &Split,
+    task: TaskId,
+) -> impl Iterator<Item = Result<Episode, SplitError>> + Send + use<> {
+    let split = split.clone();
+    (0..split.len_of(task) as u64).map(move |k| match &split {
+        Split::Train => bundled_train(task, k),
+        Split::Test => bundled_test(task, k),
+        Split::Standard => standard(task, k),
+        Split::Generated(seeds) => generated(task, seeds.start + k, Settings::PAPER),
+        Split::GeneratedStandard(seeds) => generated(task, seeds.start + k, Settings::STANDARD),
+    })
+}
+
+/// Returns the episode with a name of the form `TASK/train/NN`, `TASK/test/NN`,
+/// `TASK/standard/NNN`, `TASK/gen/SEED` or `TASK/gen-standard/SEED`. A suffix `/KIND` replaces the
+/// task's partner by another kind of person.
+///
+/// # Errors
+/// [`SplitError::NoSuchEpisode`] if no episode has this name.
+pub fn find_episode(id: &str) -> Result<Episode, SplitError> {
+    let no_such = || SplitError::NoSuchEpisode { id: id.to_owned() };
+    let parts: Vec<&str> = id.split('/').collect();
+    let (task, split, number) = match parts[..] {
+        [task, split, number] => (task, split, number),
+        [task, split, number, kind] => {
+            let kind = kind.parse().map_err(|_| no_such())?;
+            return Ok(find_episode(&[task, split, number].join("/"))?.with_partner(kind)?);
+        }
+        _ => return Err(no_such()),
+    };
+    let task: TaskId = task.parse().map_err(|_| no_such())?;
+    let number: u64 = number.parse().map_err(|_| no_such())?;
+    match split {
+        "train" if number < Split::Train.len_of(task) as u64 => bundled_train(task, number),
+        "test" if number < Split::Test.len_of(task) as u64 => bundled_test(task, number),
+        "standard" if number < Split::Standard.len_of(task) as u64 => standard(task, number),
+        "gen" if number < FIRST_BUNDLED_SEED => generated(task, number, Settings::PAPER),
+        "gen-standard" if number < FIRST_BUNDLED_SEED => {
+            generated(task, number, Settings::STANDARD)
+        }
+        _ => Err(no_such()),
+    }
+}
+
+fn generated(task: TaskId, seed: u64, settings: Settings) -> Result<Episode, SplitError> {
+    let seeds = GeneratorSeeds::from_seed(seed);
+    let setup = generate_with(task, seeds, settings)?;
+    let word = if settings == Settings::STANDARD { "gen-standard" } else { "gen" };
+    let id = format!("{task}/{word}/{seed}");
+    let generator = generator_info(task, seeds, settings);
+    Ok(Episode::trusted(id, "generated".to_owned(), generator, setup))
+}

@@ -1,0 +1,6 @@
+//! Integration tests of `chaic-episodes`.
+
+mod bundle;
+mod decoys;
+mod file;
+mod generators;

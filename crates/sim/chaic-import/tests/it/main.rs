@@ -1,0 +1,4 @@
+//! Integration tests of `chaic-import`.
+
+mod original;
+mod samples;

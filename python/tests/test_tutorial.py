@@ -1,0 +1,45 @@
+"""The code of docs/tutorial-python.md and of the README runs, and its helpers beat no helper."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+import chaic
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def blocks(page: str) -> list[str]:
+    """Returns the Python blocks of a page, in order."""
+    return re.findall(r"^```python\n(.*?)^```$", (ROOT / page).read_text(), re.MULTILINE | re.DOTALL)
+
+
+def execute(page: str, n_blocks: int) -> dict[str, object]:
+    """Executes all Python blocks of a page in one namespace, with few and quiet episodes; returns the namespace."""
+    code = blocks(page)
+    assert len(code) == n_blocks, f"{page}: {len(code)} blocks"
+    namespace: dict[str, object] = {}
+    for number, block in enumerate(code, 1):
+        short = re.sub(r"n_episodes=\d+", "n_episodes=2, quiet=True", block)
+        exec(compile(short, f"{page}, block {number}", "exec"), namespace)
+    return namespace
+
+
+def mean_tr(run: chaic.Run) -> dict[str, float]:
+    """Returns the mean transport rate of each helper."""
+    records = run.records()
+    return {
+        str(name): float(records["tr"][records["helper"] == name].mean())
+        for name in set(records["helper"])
+    }
+
+
+@pytest.mark.parametrize(("page", "n_blocks"), [("docs/tutorial-python.md", 10), ("README.md", 1)])
+def test_the_code_runs_and_its_helper_beats_no_helper(page, n_blocks, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    run = execute(page, n_blocks)["run"]
+    assert isinstance(run, chaic.Run)
+    tr = mean_tr(run)
+    assert tr["carrier"] > tr["none"] + 0.1, tr
+    assert not run.records()["broke_down"].any()

@@ -15,7 +15,7 @@ check:
 test CRATE *ARGS:
     cargo test --locked -p {{CRATE}} {{ARGS}}
 
-# Runs everything that CI runs, about 20 minutes from a cold clone on two cores
+# Runs everything that CI runs, about 25 minutes from a cold clone on two cores
 ci:
     .ci/run
 

@@ -5,10 +5,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use chaic_core::geom::math;
 use chaic_core::rng::RngStream;
 use chaic_nn::AdamWConfig;
-use chaic_training::Learner;
 use chaic_training::bounds::{
     ADAM, Bound, BoundTable, FRACTION, LEARNING_RATE, SHARDS, integer, real,
 };
+use chaic_training::{Learner, Metrics, metrics};
 use serde::{Deserialize, Serialize};
 
 use crate::actor_critic::{ActorCritic, ActorCriticOutput, OutputGrad, optimizer_step};
@@ -164,6 +164,20 @@ pub struct PpoMetrics {
     pub clip_fraction: f64,
     /// Explained variance of the returns before the update.
     pub explained_variance: f64,
+}
+
+impl PpoMetrics {
+    /// Returns the metrics by name, for the curves of a training.
+    pub fn to_metrics(self) -> Metrics {
+        metrics([
+            ("policy_loss", self.policy_loss),
+            ("value_loss", self.value_loss),
+            ("entropy", self.entropy),
+            ("approx_kl", self.approx_kl),
+            ("clip_fraction", self.clip_fraction),
+            ("explained_variance", self.explained_variance),
+        ])
+    }
 }
 
 /// Returns advantages by generalized advantage estimation (Schulman et al. 2016) for a semi-Markov

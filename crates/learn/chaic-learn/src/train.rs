@@ -24,7 +24,7 @@ use crate::cloning::{CloningMetrics, Demonstration, EpochConfig, train_epoch};
 use crate::features::{N_OPPONENT_PLAN, N_OPPONENT_STATE, N_PLAN, N_STATE};
 use crate::opponent::{self, network::OpponentModel};
 use crate::policy::{ActionSelection, PolicyWeights};
-use crate::ppo::{MAX_BATCH, PPO_BOUNDS, PpoConfig, PpoMetrics, Schedule, update};
+use crate::ppo::{MAX_BATCH, PPO_BOUNDS, PpoConfig, Schedule, update};
 use crate::rollout::{rollout_all, rollout_with_expert};
 use crate::rollout_config::{ROLLOUT_BOUNDS, mean_tr};
 
@@ -337,25 +337,9 @@ impl Algorithm for PpoTrainingConfig {
             let transitions = trajectories.iter().flat_map(|t| &t.transitions);
             state.update_normalizer(transitions.map(|t| &t.observation));
         }
-        let PpoMetrics {
-            policy_loss,
-            value_loss,
-            entropy,
-            approx_kl,
-            clip_fraction,
-            explained_variance,
-        } = stats;
-        Some(metrics([
-            ("tr", tr),
-            ("frames", frames),
-            ("decisions", decisions as f64),
-            ("policy_loss", policy_loss),
-            ("value_loss", value_loss),
-            ("entropy", entropy),
-            ("approx_kl", approx_kl),
-            ("clip_fraction", clip_fraction),
-            ("explained_variance", explained_variance),
-        ]))
+        let mut named = metrics([("tr", tr), ("frames", frames), ("decisions", decisions as f64)]);
+        named.extend(stats.to_metrics());
+        Some(named)
     }
 }
 

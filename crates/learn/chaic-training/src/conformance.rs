@@ -2,6 +2,7 @@
 //!
 //! A failed test panics with a description of the violated property.
 
+use std::fmt::Debug;
 use std::sync::atomic::AtomicBool;
 
 use toml::{Table, Value};
@@ -217,4 +218,33 @@ fn set(value: &mut Value, path: &[String], to: Value) {
         value => value.get_mut(first.as_str()),
     };
     set(inner.expect("the path is one of the table's"), rest, to);
+}
+
+/// Checks one table of a configuration, given its header and its renamed keys: old key, current key
+/// and a value other than the default. The old key must be read as the current one; both at once and
+/// an unknown key must be refused with one clear line.
+///
+/// # Panics
+/// If a check fails.
+pub fn check_renamed_keys<T: Trainer<Config: PartialEq + Debug + Default>>(
+    header: &str,
+    keys: &[(&str, &str, &str)],
+) {
+    let problem = |text: &str| {
+        let problem = parse_config::<T>(text).unwrap_err();
+        assert!(!problem.contains('\n'), "{problem}");
+        problem
+    };
+    for (old, current, value) in keys {
+        let old_text = format!("{header}{old} = {value}\n");
+        let parsed = parse_config::<T>(&old_text).unwrap_or_else(|e| panic!("{old}: {e}"));
+        assert_eq!(parsed, parse_config::<T>(&format!("{header}{current} = {value}\n")).unwrap());
+        assert_ne!(parsed, T::Config::default(), "{old} has an effect");
+        let both = problem(&format!("{old_text}{current} = {value}\n"));
+        let expected =
+            format!("duplicate field `{current}`: it is set under its current and under");
+        assert!(both.contains(&expected), "{both}");
+    }
+    let unknown = problem(&format!("{header}no_such_key = 1\n"));
+    assert!(unknown.contains("unknown field `no_such_key`"), "{unknown}");
 }

@@ -2,42 +2,16 @@
 //! keys. An old key besides its current one, and an unknown key, are refused with one clear
 //! message.
 
-use std::fmt::Debug;
-
-use chaic_training::{Trainer, parse_config};
+use chaic_training::conformance::check_renamed_keys;
+use chaic_training::parse_config;
 use chaic_vision::behavior::train::BehaviorTrainer;
 use chaic_vision::noisy::DetectorNoiseModel;
 use chaic_vision::train::DetectorLearner;
 
-/// Checks one table of a configuration, given its header and its renamed keys: old key, current key
-/// and a value other than the default.
-fn check_table<T: Trainer<Config: PartialEq + Debug + Default>>(
-    header: &str,
-    keys: &[(&str, &str, &str)],
-) {
-    let problem = |text: &str| {
-        let problem = parse_config::<T>(text).unwrap_err();
-        assert!(!problem.contains('\n'), "{problem}");
-        problem
-    };
-    for (old, current, value) in keys {
-        let old_text = format!("{header}{old} = {value}\n");
-        let parsed = parse_config::<T>(&old_text).unwrap_or_else(|e| panic!("{old}: {e}"));
-        assert_eq!(parsed, parse_config::<T>(&format!("{header}{current} = {value}\n")).unwrap());
-        assert_ne!(parsed, T::Config::default(), "{old} has an effect");
-        let both = problem(&format!("{old_text}{current} = {value}\n"));
-        let expected =
-            format!("duplicate field `{current}`: it is set under its current and under");
-        assert!(both.contains(&expected), "{both}");
-    }
-    let unknown = problem(&format!("{header}no_such_key = 1\n"));
-    assert!(unknown.contains("unknown field `no_such_key`"), "{unknown}");
-}
-
 #[test]
 fn old_keys_are_read_and_conflicting_and_unknown_keys_are_refused() {
-    check_table::<DetectorLearner>("", &[("rate", "learning_rate", "0.5")]);
-    check_table::<DetectorLearner>(
+    check_renamed_keys::<DetectorLearner>("", &[("rate", "learning_rate", "0.5")]);
+    check_renamed_keys::<DetectorLearner>(
         "[views]\n",
         &[
             ("swapped", "swap_fraction", "0.125"),
@@ -53,7 +27,7 @@ fn old_keys_are_read_and_conflicting_and_unknown_keys_are_refused() {
             ("aimed_movable", "aimed_movable_fraction", "0.125"),
         ],
     );
-    check_table::<DetectorLearner>(
+    check_renamed_keys::<DetectorLearner>(
         "[loss]\n",
         &[
             ("even_px", "reference_area_px", "5000.0"),
@@ -63,8 +37,8 @@ fn old_keys_are_read_and_conflicting_and_unknown_keys_are_refused() {
             ("least_px", "min_px", "10"),
         ],
     );
-    check_table::<DetectorLearner>("[adam]\n", &[("clip_norm", "max_grad_norm", "2.0")]);
-    check_table::<BehaviorTrainer>(
+    check_renamed_keys::<DetectorLearner>("[adam]\n", &[("clip_norm", "max_grad_norm", "2.0")]);
+    check_renamed_keys::<BehaviorTrainer>(
         "",
         &[
             ("rate", "learning_rate", "0.5"),
@@ -73,7 +47,7 @@ fn old_keys_are_read_and_conflicting_and_unknown_keys_are_refused() {
             ("smoothing", "label_smoothing", "0.125"),
         ],
     );
-    check_table::<BehaviorTrainer>(
+    check_renamed_keys::<BehaviorTrainer>(
         "[collect]\n",
         &[
             ("of_each", "max_per_class", "5"),

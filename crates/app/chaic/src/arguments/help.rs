@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use clap::{Command, CommandFactory as _};
 
 use super::Arguments;
-use super::examples::EXAMPLES;
+use super::examples::examples;
 
 /// Headings of `chaic --help` with their commands. Hidden commands have no group.
 pub(super) const GROUPS: [(&str, &[&str]); 5] = [
@@ -53,7 +53,7 @@ fn root_template(command: &Command) -> String {
 fn with_examples(command: Command, path: &str) -> Command {
     let names: Vec<String> =
         command.get_subcommands().map(|inner| inner.get_name().to_owned()).collect();
-    let mut command = match EXAMPLES.iter().find(|(of, _)| *of == path) {
+    let mut command = match examples().find(|(command, _)| *command == path) {
         Some((_, examples)) => {
             let header = command.get_styles().get_header();
             let mut text = format!("{header}Examples:{header:#}\n");

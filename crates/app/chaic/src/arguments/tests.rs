@@ -5,7 +5,7 @@ use std::any::TypeId;
 
 use clap::{Arg, Command};
 
-use super::examples::EXAMPLES;
+use super::examples::examples;
 use super::{command, help};
 
 /// Returns the commands below one, without hidden ones, by their full names.
@@ -122,7 +122,7 @@ fn every_command_has_examples_that_parse() {
         let help = command.get_after_long_help().map(ToString::to_string).unwrap_or_default();
         assert!(help.contains("Examples:"), "{path} has no examples");
     }
-    for (path, examples) in EXAMPLES {
+    for (path, examples) in examples() {
         assert!(commands.iter().any(|(known, _)| known == path), "no command `{path}`");
         assert!(examples[0].1.starts_with(path), "{path}: the first example is another command");
         for (_, line) in examples {

@@ -29,7 +29,7 @@ use super::network::PrimitiveNetwork;
 use super::observation::{IMAGE_SIZE, PrimitiveObservation};
 use super::{ACTIONS, PAUSE};
 use crate::actor_critic::{ActorCritic as _, ActorCriticOutput};
-use crate::ppo::{PpoConfig, PpoMetrics, Schedule, Trajectory, Transition, ppo_bounds, update};
+use crate::ppo::{PpoConfig, Schedule, Trajectory, Transition, ppo_bounds, update};
 use crate::reward_config;
 use crate::rollout::RolloutError;
 use crate::rollout_config::{MAX_VALIDATION_EPISODES, REWARD};
@@ -512,24 +512,9 @@ impl PrimitiveTrainer {
         let schedule = Schedule { seed: config.seed, iteration: *updates, progress_remaining };
         let stats = update(&config.ppo, model, learner, &trajectories, schedule, stop)?;
         *updates += 1;
-        let PpoMetrics {
-            policy_loss,
-            value_loss,
-            entropy,
-            approx_kl,
-            clip_fraction,
-            explained_variance,
-        } = stats;
-        Some(metrics([
-            ("reward", reward),
-            ("invalid", invalid),
-            ("policy_loss", policy_loss),
-            ("value_loss", value_loss),
-            ("entropy", entropy),
-            ("approx_kl", approx_kl),
-            ("clip_fraction", clip_fraction),
-            ("explained_variance", explained_variance),
-        ]))
+        let mut named = metrics([("reward", reward), ("invalid", invalid)]);
+        named.extend(stats.to_metrics());
+        Some(named)
     }
 }
 

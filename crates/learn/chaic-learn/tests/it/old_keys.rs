@@ -1,46 +1,20 @@
 //! Configurations with the keys of earlier versions are read as those with current keys. An old key
 //! besides its current one, and an unknown key, are refused with one clear message.
 
-use std::fmt::Debug;
-
 use chaic_learn::opponent::train::OpponentTrainer;
 use chaic_learn::primitive::train::PrimitiveTrainer;
 use chaic_learn::train::{CloningConfig, PolicyTrainer, PpoTrainingConfig};
-use chaic_training::{Trainer, parse_config};
+use chaic_training::conformance::check_renamed_keys;
+use chaic_training::parse_config;
 
 type Ppo = PolicyTrainer<PpoTrainingConfig>;
 type Cloning = PolicyTrainer<CloningConfig>;
 
-/// Checks one table of a configuration, given its header and its renamed keys: old key, current key
-/// and a value other than the default.
-fn check_table<T: Trainer<Config: PartialEq + Debug + Default>>(
-    header: &str,
-    keys: &[(&str, &str, &str)],
-) {
-    let problem = |text: &str| {
-        let problem = parse_config::<T>(text).unwrap_err();
-        assert!(!problem.contains('\n'), "{problem}");
-        problem
-    };
-    for (old, current, value) in keys {
-        let old_text = format!("{header}{old} = {value}\n");
-        let parsed = parse_config::<T>(&old_text).unwrap_or_else(|e| panic!("{old}: {e}"));
-        assert_eq!(parsed, parse_config::<T>(&format!("{header}{current} = {value}\n")).unwrap());
-        assert_ne!(parsed, T::Config::default(), "{old} has an effect");
-        let both = problem(&format!("{old_text}{current} = {value}\n"));
-        let expected =
-            format!("duplicate field `{current}`: it is set under its current and under");
-        assert!(both.contains(&expected), "{both}");
-    }
-    let unknown = problem(&format!("{header}no_such_key = 1\n"));
-    assert!(unknown.contains("unknown field `no_such_key`"), "{unknown}");
-}
-
 #[test]
 fn old_keys_are_read_and_conflicting_and_unknown_keys_are_refused() {
     const PLAY: (&str, &str, &str) = ("play", "rollout", "{ episodes = 3 }");
-    check_table::<Ppo>("", &[PLAY]);
-    check_table::<Ppo>(
+    check_renamed_keys::<Ppo>("", &[PLAY]);
+    check_renamed_keys::<Ppo>(
         "[ppo]\n",
         &[
             ("discount", "gamma", "0.5"),
@@ -56,9 +30,9 @@ fn old_keys_are_read_and_conflicting_and_unknown_keys_are_refused() {
             ("divergence", "target_kl", "0.25"),
         ],
     );
-    check_table::<Ppo>("[ppo.adam]\n", &[("clip_norm", "max_grad_norm", "2.0")]);
-    check_table::<Ppo>("[rollout]\n", &[]);
-    check_table::<Ppo>(
+    check_renamed_keys::<Ppo>("[ppo.adam]\n", &[("clip_norm", "max_grad_norm", "2.0")]);
+    check_renamed_keys::<Ppo>("[rollout]\n", &[]);
+    check_renamed_keys::<Ppo>(
         "[rollout.rewards]\n",
         &[
             ("team", "delivered", "1.0"),
@@ -66,7 +40,7 @@ fn old_keys_are_read_and_conflicting_and_unknown_keys_are_refused() {
             ("way_per_m", "remaining_per_m", "0.5"),
         ],
     );
-    check_table::<Cloning>(
+    check_renamed_keys::<Cloning>(
         "",
         &[
             PLAY,
@@ -76,15 +50,15 @@ fn old_keys_are_read_and_conflicting_and_unknown_keys_are_refused() {
             ("rate", "learning_rate", "0.5"),
         ],
     );
-    check_table::<PrimitiveTrainer>(
+    check_renamed_keys::<PrimitiveTrainer>(
         "",
         &[("updates", "n_updates", "7"), ("envs", "n_envs", "2"), ("rollout", "n_steps", "5")],
     );
-    check_table::<PrimitiveTrainer>(
+    check_renamed_keys::<PrimitiveTrainer>(
         "[rewards]\ndelivered = 10.0\ninvalid = 0.1\n",
         &[("approached_per_m", "progress_per_m", "0.5")],
     );
-    check_table::<OpponentTrainer>(
+    check_renamed_keys::<OpponentTrainer>(
         "",
         &[
             ("batch", "batch_size", "32"),
@@ -94,7 +68,7 @@ fn old_keys_are_read_and_conflicting_and_unknown_keys_are_refused() {
             ("validation_of_each", "validation_max_per_class", "5"),
         ],
     );
-    check_table::<OpponentTrainer>("[collect]\n", &[("of_each", "max_per_class", "7")]);
+    check_renamed_keys::<OpponentTrainer>("[collect]\n", &[("of_each", "max_per_class", "7")]);
 }
 
 #[test]

@@ -223,6 +223,19 @@ mod tests {
         }
     }
 
+    /// Computes the costs of a map without objects and people.
+    fn add_costs(map: &OccupancyMap, occupancy: &mut LaggedOccupancy, cost: &mut [u32]) {
+        let inputs = CostInputs {
+            map,
+            objects: &SemanticMap::default(),
+            people: &PersonMap::default(),
+            inflation: None,
+            position: Vec2::ZERO,
+            now: FIRST_FRAMES,
+        };
+        lattice_costs(map.grid(), &inputs, occupancy, cost);
+    }
+
     #[test]
     fn a_lintel_is_not_a_wall_once_the_floor_below_it_is_seen() {
         let mut toy = Toy::room(8.0, 8.0);
@@ -235,15 +248,7 @@ mod tests {
         let percepts = GroundTruthIds.perceive(&observation);
         assert!(percepts.detections.iter().any(|d| d.track == lintel), "it is in view");
         map.integrate(&observation, &percepts, 1.75, MAP_RANGE_M);
-        let inputs = CostInputs {
-            map: &map,
-            objects: &SemanticMap::default(),
-            people: &PersonMap::default(),
-            inflation: None,
-            position: Vec2::ZERO,
-            now: FIRST_FRAMES,
-        };
-        lattice_costs(&grid, &inputs, &mut occupancy, &mut cost);
+        add_costs(&map, &mut occupancy, &mut cost);
         let below = grid.disc(Vec2::new(0.0, -2.4), 0.3);
         assert!(below.map(|cell| cost[cell]).all(|cost| cost < WALL_EXTRA));
     }
@@ -264,15 +269,7 @@ mod tests {
             let percepts = GroundTruthIds.perceive(&observation);
             for _ in 0..n {
                 map.integrate(&observation, &percepts, 1.75, MAP_RANGE_M);
-                let inputs = CostInputs {
-                    map: &map,
-                    objects: &SemanticMap::default(),
-                    people: &PersonMap::default(),
-                    inflation: None,
-                    position: Vec2::ZERO,
-                    now: FIRST_FRAMES,
-                };
-                lattice_costs(&grid, &inputs, &mut occupancy, &mut cost);
+                add_costs(&map, &mut occupancy, &mut cost);
             }
             [-0.7, 0.7].map(|x| cost[grid.cell_at(Vec2::new(x, -1.85)).expect("inside")])
         };

@@ -149,26 +149,6 @@ fn only_a_noncanonical_appearance_is_written() {
     }
 }
 
-#[test]
-fn the_keys_of_version_2_are_read() {
-    let spec = FrameHistorySpec { image_size: 128, every_frames: 3, max_len: 64 };
-    let mut header = header();
-    header.people[0].sensors.frame_history = Some(spec);
-    let line = header.to_line();
-    let keys = r#""sensors":{"image_size":512,"rgb":false,"depth":true,"ids":true,"frame_history":{"image_size":128,"every_frames":3,"max_len":64}}"#;
-    let old_keys = r#""senses":{"image_size":512,"rgb":false,"depth":true,"ids":true,"film":{"image_size":128,"every_frames":3,"most":64}}"#;
-    assert!(line.contains(keys), "{line}");
-    let old = line.replacen(keys, old_keys, 1).replacen("\"version\":3", "\"version\":2", 1);
-    for (text, version) in [(&line, 3), (&old, 2)] {
-        let (trace, _) = parse(format!("{text}\n").as_bytes(), Path::new("t.jsonl")).unwrap();
-        assert_eq!(trace.header, Header { version, ..header.clone() });
-    }
-    let old = r#"{"plan":"explore","mood":"careful","noticed":"moving","sees":[]}"#;
-    let thought: Thought = serde_json::from_str(old).unwrap();
-    let read = (thought.plan.as_str(), thought.mode.as_deref(), thought.last_observed.as_deref());
-    assert_eq!(read, ("explore", Some("careful"), Some("moving")));
-}
-
 /// Returns a trace that contains every key that version 3 renamed.
 fn trace_with_renamed_keys(version: u32) -> Trace {
     let spec = FrameHistorySpec { image_size: 128, every_frames: 3, max_len: 64 };

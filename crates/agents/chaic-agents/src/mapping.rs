@@ -8,6 +8,7 @@ pub mod collision_memory;
 pub mod grid;
 pub mod held_objects;
 pub mod occupancy;
+pub mod passage;
 pub mod people;
 pub mod semantic;
 

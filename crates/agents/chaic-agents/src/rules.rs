@@ -55,6 +55,18 @@ pub enum PlaceChoice {
     Random,
 }
 
+/// Obstacles that rule-based helpers remove.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ObstacleChoice {
+    /// Those that stand in narrow passages, as far as the helper's map shows (paper, table 1:
+    /// obstacles between rooms).
+    InPassages,
+    /// All (facts A2.2). The default of stored rules that predate this field.
+    #[default]
+    All,
+}
+
 /// Distribution of the random helper's plans.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -121,6 +133,9 @@ pub struct PlannerRules {
     pub helper_known_range_m: f32,
     /// True if helpers plan to lift together with the partner.
     pub lifts_together: bool,
+    /// Obstacles that rule-based helpers remove.
+    #[serde(default)]
+    pub obstacle_choice: ObstacleChoice,
     /// Distribution of the random helper's plans.
     pub random_draw: RandomDraw,
     /// Number of turns to look around.
@@ -181,6 +196,7 @@ impl PlannerRules {
             helpers_see_people: true,
             helper_known_range_m: 5.0,
             lifts_together: true,
+            obstacle_choice: ObstacleChoice::InPassages,
             random_draw: RandomDraw::Plans,
             around_turns: 18,
             stops_turning_when_found: false,
@@ -220,6 +236,7 @@ impl PlannerRules {
             helpers_see_people: false,
             helper_known_range_m: 3.0,
             lifts_together: false,
+            obstacle_choice: ObstacleChoice::All,
             random_draw: RandomDraw::KindsFirst,
             around_turns: 24,
             stops_turning_when_found: true,

@@ -1,13 +1,14 @@
 //! Handwritten rules of the paper (section 5.1.1), for partners and helpers.
 
 use chaic_core::briefing::{CompanionRole, Goal};
-use chaic_core::geom::horizontal_distance;
+use chaic_core::geom::{horizontal_distance, to_xz};
 use chaic_core::{Action, AgentError, Briefing, ClassId, FailureReason, Frame, Outcome, Role};
 
 use crate::decision::{Context, HandState, Plan, Policy, Subject};
 use crate::mapping::TrackedPerson;
+use crate::mapping::passage::is_in_passage;
 use crate::memory::Memory;
-use crate::rules::Bookkeeping;
+use crate::rules::{Bookkeeping, ObstacleChoice};
 use crate::track::TrackId;
 
 /// Filter of the objects that an agent picks up.
@@ -122,7 +123,7 @@ impl RulePolicy {
             return deliver;
         }
         if self.profile.removes_obstacles
-            && let Some(plan) = valid.iter().find(|p| matches!(p, Plan::RemoveObstacle(_)))
+            && let Some(plan) = valid.iter().find(|plan| is_relevant_removal(context, plan))
         {
             return *plan;
         }
@@ -362,6 +363,19 @@ fn first_picks(memory: &Memory) -> Vec<ClassId> {
     classes.into_iter().collect()
 }
 
+/// Returns whether the plan removes an obstacle that may block the partner.
+pub(super) fn is_relevant_removal(context: &Context<'_>, plan: &Plan) -> bool {
+    let Plan::RemoveObstacle(subject) = plan else { return false };
+    let memory = context.memory;
+    match memory.rules.obstacle_choice {
+        ObstacleChoice::All => true,
+        ObstacleChoice::InPassages => {
+            let object = memory.objects.get(subject.track);
+            object.is_some_and(|o| is_in_passage(&memory.map, to_xz(o.position_in_world)))
+        }
+    }
+}
+
 fn fraction_left(context: &Context<'_>) -> f32 {
     let horizon = context.briefing.horizon.max(1);
     horizon.saturating_sub(context.memory.frame) as f32 / horizon as f32
@@ -399,7 +413,7 @@ fn has_time_for(context: &Context<'_>, track: TrackId) -> bool {
     let Some(object) = memory.objects.get(track).filter(|_| memory.rules.weighs_time) else {
         return true;
     };
-    let at = chaic_core::geom::to_xz(object.position_in_world);
+    let at = to_xz(object.position_in_world);
     let places = memory.goal_places();
     let onward_m = places.iter().map(|(place, _)| place.distance_from(at)).min_by(f32::total_cmp);
     let Some(onward_m) = onward_m else { return true };

@@ -24,7 +24,10 @@ struct Case {
 fn choose(profile: RuleProfile, case: &Case, log: &BehaviorLog) -> Plan {
     let mut briefing = Toy::room(4.0, 4.0).briefing();
     briefing.goal = Toy::goal(&[("apple", 3), ("banana", 2)]);
-    let mut memory = Memory::new(&briefing, crate::PlannerRules::paper());
+    // The empty map has no passages.
+    let obstacle_choice = ObstacleChoice::All;
+    let rules = crate::PlannerRules { obstacle_choice, ..crate::PlannerRules::paper() };
+    let mut memory = Memory::new(&briefing, rules);
     memory.frame = case.frame;
     memory.hands = hands(case.hands.clone());
     let context =

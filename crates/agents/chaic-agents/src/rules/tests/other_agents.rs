@@ -70,6 +70,31 @@ fn lifting_together_is_planned_or_not() {
     }
 }
 
+#[test]
+fn an_obstacle_that_blocks_nobody_is_left_alone_or_removed() {
+    for (wall_ends_m, is_passage) in [(0.6, true), (3.9, false)] {
+        let mut toy = Toy::room(8.0, 8.0);
+        toy.size = 256;
+        toy.add_wall([-4.0, -2.1], [-wall_ends_m, -1.9]);
+        toy.add_wall([wall_ends_m, -2.1], [4.0, -1.9]);
+        let bin = toy.add(ToyObject::new("trashbin", [0.0, 0.0, -2.0], [0.4, 0.6, 0.4]));
+        toy.stand([0.0, 1.0], 0.0);
+        let remove = Plan::RemoveObstacle(subject("trashbin", bin.0));
+        for (obstacle_choice, is_removed) in
+            [(ObstacleChoice::All, true), (ObstacleChoice::InPassages, is_passage)]
+        {
+            let mut s = Scenario::new(PlannerRules { obstacle_choice, ..PAPER });
+            s.briefing.bounds = toy.bounds();
+            s.memory = Memory::new(&s.briefing, s.memory.rules);
+            let observation = toy.observe();
+            s.memory.update(&s.briefing, &observation, &GroundTruthIds.perceive(&observation));
+            s.valid.push(remove);
+            let chosen = s.choose_as(RuleProfile::RHP);
+            assert_eq!(chosen == remove, is_removed, "{wall_ends_m} {obstacle_choice:?}");
+        }
+    }
+}
+
 /// Creates a situation of a helper that takes care of a child and its guardian.
 fn child_scenario(rules: PlannerRules) -> Scenario {
     let mut s = Scenario::new(rules);

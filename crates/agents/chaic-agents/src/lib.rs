@@ -1,7 +1,8 @@
 //! Agents: the simulated people and the rule-based helpers.
 //!
 //! **What it is**: a [`PlanningAgent`] joins five parts. [`perception`] detects objects, [`memory`]
-//! maps them, and [`behavior`] tracks the actions of other agents. A [`decision::Policy`] chooses
+//! maps them, and [`behavior`] tracks the actions of other agents. [`belief`]
+//! infers their goal and limits. A [`decision::Policy`] chooses
 //! the next plan, and [`execution`] turns it into actions. [`partners`] are part of the benchmark's
 //! definition; [`helpers`] are the agents under evaluation. Both are the same type with different
 //! data.
@@ -34,6 +35,7 @@ pub mod planning;
 pub mod memory;
 
 pub mod behavior;
+pub mod belief;
 pub mod perception_factory;
 
 pub mod decision;

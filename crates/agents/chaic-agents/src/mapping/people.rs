@@ -11,6 +11,9 @@ pub struct TrackedPerson {
     pub agent: AgentId,
     /// Position, meters: the mean of the visible points, or the feet if positions are granted.
     pub position_in_world: Vec3,
+    /// Height of the highest visible point, meters; 0 if the position is granted and the body is
+    /// not in the image.
+    pub top_m: f32,
     /// Frame of the sighting.
     pub frame: Frame,
     /// True if the person is in the current image, or its position is granted.
@@ -51,20 +54,25 @@ impl PersonMap {
         }
         for detection in detections {
             if let Some(agent) = detection.person {
-                self.record(agent, detection.position_in_world, observation.frame);
+                let at = detection.position_in_world;
+                self.record(agent, at, Some(detection.top_m), observation.frame);
             }
         }
         for (agent, pose) in &observation.granted.poses {
             if *agent != briefing.me {
-                self.record(*agent, pose.position, observation.frame);
+                self.record(*agent, pose.position, None, observation.frame);
             }
         }
     }
 
-    fn record(&mut self, agent: AgentId, position_in_world: Vec3, frame: Frame) {
-        let now = TrackedPerson { agent, position_in_world, frame, is_in_view: true };
-        match self.people.iter_mut().find(|p| p.agent == agent) {
-            Some(person) => *person = now,
+    /// Records a sighting. Without `top_m`, a detection of the same frame keeps its own.
+    fn record(&mut self, agent: AgentId, at: Vec3, top_m: Option<f32>, frame: Frame) {
+        let known = self.people.iter().position(|p| p.agent == agent);
+        let visible_m = known.map(|i| self.people[i]).filter(|p| p.frame == frame && p.is_in_view);
+        let top_m = top_m.or(visible_m.map(|p| p.top_m)).unwrap_or(0.0);
+        let now = TrackedPerson { agent, position_in_world: at, top_m, frame, is_in_view: true };
+        match known {
+            Some(i) => self.people[i] = now,
             None => self.people.push(now),
         }
     }

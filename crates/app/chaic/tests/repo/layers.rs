@@ -16,7 +16,7 @@ const LAYERS: [&str; 7] = ["core", "sim", "render", "agents", "learn", "eval", "
 const DEV: &str = "dev";
 
 /// Modules of `chaic-agents`. A module imports only from itself and earlier ones.
-const AGENT_MODULES: [&str; 15] = [
+const AGENT_MODULES: [&str; 16] = [
     "track",
     "rules",
     "perception",
@@ -24,6 +24,7 @@ const AGENT_MODULES: [&str; 15] = [
     "planning",
     "memory",
     "behavior",
+    "belief",
     "perception_factory",
     "decision",
     "policies",

@@ -1,0 +1,75 @@
+//! Belief about the partner: the hidden goal and the physical constraint, inferred from sightings.
+//!
+//! [`Evidence`] collects observations of the partner. [`GoalBelief`] and [`ConstraintBelief`] are
+//! exact posteriors over small sets of hypotheses. Both follow from the evidence alone, so the
+//! order of observations does not matter.
+//!
+//! **What it is not**: it chooses no plans, and it reads nothing that is neither in the image nor
+//! granted. Granted goals and constraints are certain.
+
+mod constraint;
+mod evidence;
+mod goal;
+mod scene;
+mod walking_speed;
+
+use chaic_core::Briefing;
+
+use crate::behavior::BehaviorLog;
+use crate::memory::Memory;
+
+pub use constraint::ConstraintBelief;
+pub use evidence::{AttemptKind, Evidence, FailedAttempt, Take};
+pub use goal::GoalBelief;
+
+/// Belief of one agent about its partner.
+#[derive(Clone, Debug)]
+pub struct Belief {
+    /// Classes that the partner wants.
+    pub goal: GoalBelief,
+    /// Kind of person of the partner.
+    pub constraint: ConstraintBelief,
+    /// Observations from which both follow.
+    pub evidence: Evidence,
+}
+
+impl Belief {
+    /// Creates the prior belief of an episode.
+    pub fn new(briefing: &Briefing) -> Belief {
+        let evidence = Evidence::default();
+        let constraint = ConstraintBelief::new(briefing);
+        let mut goal = GoalBelief::new(briefing);
+        goal.update(&evidence, &constraint);
+        Belief { goal, constraint, evidence }
+    }
+
+    /// Updates the belief, after memory and behavior have been updated with the same observation.
+    pub fn observe(&mut self, briefing: &Briefing, memory: &Memory, behavior: &BehaviorLog) {
+        self.evidence.observe(briefing, memory, behavior);
+        self.constraint.update(&self.evidence);
+        self.goal.update(&self.evidence, &self.constraint);
+    }
+}
+
+/// Returns the weights divided by their sum; unchanged if the sum is 0.
+fn normalized(mut weights: Vec<f32>) -> Vec<f32> {
+    let sum: f32 = weights.iter().sum();
+    if sum > 0.0 {
+        weights.iter_mut().for_each(|w| *w /= sum);
+    }
+    weights
+}
+
+/// Returns the posterior of hypotheses, each given as prior and log-likelihood.
+fn posterior(hypotheses: &[(f32, f32)]) -> Vec<f32> {
+    let possible = hypotheses.iter().filter(|(prior, _)| *prior > 0.0);
+    let highest = possible.map(|(_, log_likelihood)| *log_likelihood).fold(f32::MIN, f32::max);
+    let weight = |(prior, log_likelihood): &(f32, f32)| match *prior > 0.0 {
+        true => prior * chaic_core::geom::math::exp(log_likelihood - highest),
+        false => 0.0,
+    };
+    normalized(hypotheses.iter().map(weight).collect())
+}
+
+#[cfg(test)]
+mod tests;

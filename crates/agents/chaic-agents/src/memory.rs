@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use chaic_core::briefing::{CompanionRole, Motion};
 use chaic_core::capability::Gait;
 use chaic_core::geom::{Pose, Rect, horizontal_distance, to_xz};
-use chaic_core::observation::{Grants, JointCarrier};
+use chaic_core::observation::{Grants, JointCarrier, WorldState};
 use chaic_core::{
     AgentId, Briefing, ClassId, FailureReason, Frame, Observation, Outcome, Role, Vec2, Vec3,
 };
@@ -79,6 +79,8 @@ pub struct Memory {
     classes: BTreeMap<TrackId, ClassId>,
     height_m: f32,
     goal_places: Vec<ClassId>,
+    /// Goal places of the episode, if the state is granted.
+    granted_goal_places: Option<BTreeSet<TrackId>>,
     goal_place_min_top_m: f32,
     costs: CostMap,
     cost_model: Box<dyn CostModel>,
@@ -111,9 +113,12 @@ struct ObstacleWait {
 }
 
 impl Memory {
-    /// Creates an empty memory.
+    /// Creates a memory that contains only the layout, if it is granted.
     pub fn new(briefing: &Briefing, rules: PlannerRules) -> Memory {
-        let map = OccupancyMap::new(&briefing.bounds, briefing.motion.step_over_m);
+        let mut map = OccupancyMap::new(&briefing.bounds, briefing.motion.step_over_m);
+        if let Some(layout) = &briefing.layout {
+            map.add_layout(layout, briefing.capability.height_m);
+        }
         let costs = CostMap::new(*map.grid(), briefing.capability.radius_m);
         Memory {
             rules,
@@ -132,6 +137,7 @@ impl Memory {
             classes: BTreeMap::new(),
             height_m: briefing.capability.height_m,
             goal_places: briefing.goal_places.clone(),
+            granted_goal_places: None,
             goal_place_min_top_m: briefing.goal_place_min_top_m,
             search: Search::new(map.grid().n_cells()),
             map,
@@ -176,6 +182,9 @@ impl Memory {
         self.objects.expire(before, self.frame);
         self.update_hands(observation, percepts.hands.as_ref());
         self.apply_grants(observation);
+        if let Some(state) = &observation.granted.state {
+            self.apply_state(state, briefing.me);
+        }
         self.revert_false_deliveries(percepts, briefing.grants);
         if !(briefing.grants.ids || briefing.grants.progress) {
             self.detect_deliveries(percepts);
@@ -237,6 +246,27 @@ impl Memory {
         }
     }
 
+    /// Applies the granted state of the world. Objects in the agent's own hands stay as they are.
+    fn apply_state(&mut self, state: &WorldState, me: AgentId) {
+        let own: BTreeSet<TrackId> = self.hands.all().map(|(track, _)| track).collect();
+        for object in &state.objects {
+            let track = TrackId::from(object.entity);
+            self.classes.insert(track, object.class);
+            if object.holder != Some(me) && !own.contains(&track) {
+                self.objects.place(object, self.frame);
+            }
+        }
+        self.granted_goal_places = Some(state.goal_places.iter().map(|e| (*e).into()).collect());
+    }
+
+    /// Returns whether an object may be a goal place; with the granted state, whether it is one.
+    fn is_goal_place(&self, object: &MappedObject) -> bool {
+        match &self.granted_goal_places {
+            Some(places) => places.contains(&object.track),
+            None => self.goal_places.contains(&object.class),
+        }
+    }
+
     /// Reverts assumed deliveries that turn out wrong: the object is seen after it has settled, or
     /// (with progress granted) it is not among the delivered ones.
     fn revert_false_deliveries(&mut self, percepts: &Percepts, grants: Grants) {
@@ -277,7 +307,7 @@ impl Memory {
         let goal_places: Vec<&MappedObject> = self
             .objects
             .iter()
-            .filter(|t| self.goal_places.contains(&t.class) && t.is_present)
+            .filter(|t| self.is_goal_place(t) && t.is_present)
             .filter(|t| t.top_m + TOP_TOLERANCE_M >= self.goal_place_min_top_m)
             .collect();
         let is_delivered = |d: &&Detection| {
@@ -429,7 +459,7 @@ impl Memory {
         let mut places: Vec<_> = self
             .objects
             .iter()
-            .filter(|t| self.goal_places.contains(&t.class) && t.is_present)
+            .filter(|t| self.is_goal_place(t) && t.is_present)
             .filter(|t| self.rules.goal_blackout_frames == 0 || self.frame >= t.ignore_until)
             .filter(|t| t.top_m + TOP_TOLERANCE_M >= self.goal_place_min_top_m)
             .filter_map(|t| Some((t, self.path_length_to(t)?)))

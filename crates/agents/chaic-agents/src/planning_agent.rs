@@ -185,7 +185,7 @@ impl Episode {
             briefing: &self.briefing,
             memory: &self.memory,
             behavior: behavior.log(),
-            is_explored: self.executor.is_explored(),
+            is_explored: self.executor.is_explored() || self.briefing.layout.is_some(),
         }
     }
 

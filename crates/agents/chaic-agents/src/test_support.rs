@@ -194,6 +194,7 @@ impl Toy {
             grants: Grants::IDS,
             goal: None,
             disclosure: None,
+            layout: None,
         }
     }
 

@@ -1,9 +1,10 @@
 //! Briefing of an agent before an episode.
 
+use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::capability::{Capability, PersonKind};
-use crate::geom::Rect;
+use crate::geom::{Rect, rotate_yaw};
 use crate::ids::{AgentId, ClassId, EntityId, Frame};
 use crate::observation::Grants;
 pub use crate::task::Goal;
@@ -85,6 +86,9 @@ pub struct Briefing {
     pub goal: Option<Goal>,
     /// Task and partner, if granted.
     pub disclosure: Option<TaskDisclosure>,
+    /// Static geometry, if the state is granted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub layout: Option<Layout>,
 }
 
 /// Granted information about the task.
@@ -94,6 +98,39 @@ pub struct TaskDisclosure {
     pub task: TaskId,
     /// Kind of person of the partner.
     pub partner: PersonKind,
+}
+
+/// Static geometry of an episode.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Layout {
+    /// Floors: rooms and doorways indoors, the bounds of the episode outdoors.
+    pub floors: Vec<Rect>,
+    /// Fixed boxes that block bodies: walls, lintels and furniture. Movable obstacles and heavy
+    /// targets are in [`crate::observation::WorldState`].
+    pub blocks: Vec<LayoutBlock>,
+}
+
+/// Upright box that blocks bodies.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LayoutBlock {
+    /// Center in the world (x, z), meters.
+    pub center_xz: Vec2,
+    /// Half extents along the box's own x and z axes, meters.
+    pub half_xz: Vec2,
+    /// Rotation about the vertical axis, radians.
+    pub yaw_rad: f32,
+    /// Lowest and highest y coordinate, meters.
+    pub y_range_m: [f32; 2],
+}
+
+impl LayoutBlock {
+    /// Returns whether a point (x, z) is inside the box in plan, after the box is grown by
+    /// `margin_m` on each side.
+    pub fn contains(&self, p: Vec2, margin_m: f32) -> bool {
+        let offset = p - self.center_xz;
+        let local = rotate_yaw(Vec3::new(offset.x, 0.0, offset.y), -self.yaw_rad);
+        local.x.abs() <= self.half_xz.x + margin_m && local.z.abs() <= self.half_xz.y + margin_m
+    }
 }
 
 impl Briefing {

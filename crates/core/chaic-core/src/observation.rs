@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::action::{Action, Outcome, ResolvedAction};
@@ -162,13 +162,18 @@ pub struct Grants {
     pub goal: bool,
     /// All deliveries, independent of the agent's position.
     pub progress: bool,
-    /// The partner's actions and held objects while the partner is in the image.
+    /// The partner's actions and held objects while the partner is in the image. With `state`, at
+    /// any place.
     pub behavior: bool,
     /// Positions of all agents.
     pub positions: bool,
     /// Task and kind of person of the partner, which the original's prompts contain.
     #[serde(default, skip_serializing_if = "is_false")]
     pub task: bool,
+    /// State of all objects that matter for the tasks, the actual goal places, and the layout of
+    /// floors, walls and furniture. It is for upper bounds only.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub state: bool,
 }
 
 /// Accessor of a grant.
@@ -190,6 +195,7 @@ impl Grants {
         behavior: false,
         positions: false,
         task: false,
+        state: false,
     };
     /// Every grant.
     pub const ALL: Grants = Grants {
@@ -200,6 +206,7 @@ impl Grants {
         behavior: true,
         positions: true,
         task: true,
+        state: true,
     };
     /// Perfect segmentation of the agent's own image only.
     pub const IDS: Grants = Grants { ids: true, ..Grants::NONE };
@@ -210,7 +217,7 @@ impl Grants {
     /// Grants of the paper's oracle.
     pub const ORACLE: Grants = Grants { progress: true, behavior: true, ..Grants::PARTNER };
     /// Name and accessor of every grant, in the order of docs/grants.md.
-    const FIELDS: [(&'static str, GrantField); 7] = [
+    const FIELDS: [(&'static str, GrantField); 8] = [
         ("ids", |grants| &mut grants.ids),
         ("goal_place", |grants| &mut grants.goal_place),
         ("goal", |grants| &mut grants.goal),
@@ -218,10 +225,11 @@ impl Grants {
         ("behavior", |grants| &mut grants.behavior),
         ("positions", |grants| &mut grants.positions),
         ("task", |grants| &mut grants.task),
+        ("state", |grants| &mut grants.state),
     ];
 
     /// Returns the name of every grant and whether it is set, in the order of docs/grants.md.
-    pub fn named(mut self) -> [(&'static str, bool); 7] {
+    pub fn named(mut self) -> [(&'static str, bool); 8] {
         Grants::FIELDS.map(|(name, field)| (name, *field(&mut self)))
     }
 
@@ -352,6 +360,48 @@ pub struct ObservedAction {
     pub outcome: Option<Outcome>,
 }
 
+/// State of the objects in the world. The static geometry is in [`crate::briefing::Layout`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct WorldState {
+    /// Carriable objects, heavy targets and obstacles, and all objects whose class may be a goal
+    /// place in this kind of scene. In the order of ids. Other furniture is in the layout only.
+    pub objects: Vec<ObjectState>,
+    /// Goal places of the episode, in the order of ids. Delivery to any of them counts.
+    pub goal_places: Vec<EntityId>,
+}
+
+/// State of one object in the world.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ObjectState {
+    /// Id of the object.
+    pub entity: EntityId,
+    /// Class of the object.
+    pub class: ClassId,
+    /// Center of the object's bounding box in the world, meters.
+    pub position_in_world: Vec3,
+    /// Height of its lowest point, meters.
+    pub bottom_m: f32,
+    /// Height of its highest point, meters.
+    pub top_m: f32,
+    /// Outline from above in the world (x, z), meters: the corners, and points at most
+    /// [`ObjectState::OUTLINE_SPACING_M`] apart on the edges. Empty for carriable objects.
+    pub footprint: Vec<Vec2>,
+    /// Agent that holds the object, or the container or basket around it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub holder: Option<AgentId>,
+    /// Container or bicycle that contains the object.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub container: Option<EntityId>,
+    /// True if the object is out of play: delivered, or broken.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub is_gone: bool,
+}
+
+impl ObjectState {
+    /// Maximum spacing of the points of an outline, meters.
+    pub const OUTLINE_SPACING_M: f32 = 0.2;
+}
+
 /// Granted information; every field is empty without its grant.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Granted {
@@ -365,12 +415,17 @@ pub struct Granted {
     pub removed: Vec<EntityId>,
     /// `goal`: goal of the partner.
     pub goal: Option<Goal>,
-    /// `behavior`: last interaction of each other agent in the image.
+    /// `behavior`: last interaction of each other agent in the image; with `state`, of all other
+    /// agents.
     pub behavior: Vec<ObservedAction>,
     /// `behavior`: held objects of the partner (for the partner: of the helper), if in the image.
+    /// With `state`, always.
     pub partner_hands: Option<[Option<HeldIdentity>; 2]>,
     /// `positions`: pose of each agent.
     pub poses: Vec<(AgentId, Pose)>,
+    /// `state`: state of the objects in the world.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub state: Option<WorldState>,
 }
 
 /// Observation of an agent when its action has ended (paper section 3.3, "Observation Space").

@@ -30,6 +30,7 @@ mod probe;
 mod act;
 mod aside;
 mod goal;
+mod granted_state;
 mod place;
 mod tick;
 mod view;

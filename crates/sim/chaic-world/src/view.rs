@@ -58,6 +58,7 @@ impl World {
             grants,
             goal: grants.goal.then(|| self.setup.goal.clone()),
             disclosure: grants.task.then(|| self.task_disclosure()),
+            layout: grants.state.then(|| self.layout()),
         }
     }
 
@@ -125,7 +126,8 @@ impl World {
         }
         let teammate = if agent == AgentId::PARTNER { AgentId::HELPER } else { AgentId::PARTNER };
         if grants.behavior {
-            let is_observed = |a: &AgentId| *a != agent && is_in_view(EntityId::from_agent(*a));
+            let is_observed =
+                |a: &AgentId| *a != agent && (grants.state || is_in_view(EntityId::from_agent(*a)));
             for other in self.setup.agents().filter(is_observed) {
                 granted.behavior.extend(self.observed_action(other));
                 if other == teammate {
@@ -137,6 +139,7 @@ impl World {
         if grants.positions {
             granted.poses = self.setup.agents().map(|a| (a, self.person(a).pose)).collect();
         }
+        granted.state = grants.state.then(|| self.world_state());
         granted
     }
 

@@ -1,5 +1,6 @@
 //! Occupancy grid: free, occupied and unknown space, from depth images.
 
+use chaic_core::briefing::{Layout, LayoutBlock};
 use chaic_core::geom::{Camera, Rect, to_xz};
 use chaic_core::{Frame, Observation, Vec2, Vec3};
 
@@ -19,6 +20,8 @@ const TOP_M: f32 = 2.4;
 /// Points above this belong to permanent walls, because no movable object is as tall, meters. (The
 /// original: 2.9 m, in houses without ceilings whose walls are 3 m high.)
 const TALL_M: f32 = 2.2;
+/// Height above the body up to which obstacles block it, meters.
+const HEAD_MARGIN_M: f32 = 0.05;
 /// Confidence in an occupied cell after one observation, and its maximum.
 const CONFIDENCE_STEP: u8 = 3;
 const MAX_CONFIDENCE: u8 = 6;
@@ -309,6 +312,43 @@ impl OccupancyMap {
         &self.bumps
     }
 
+    /// Adds granted floors and fixed blocks. `height_m` is the height of the agent's body: blocks
+    /// above it do not block.
+    ///
+    /// The cells have the states that views of them from all sides would give, with the maximum
+    /// confidence.
+    pub fn add_layout(&mut self, layout: &Layout, height_m: f32) {
+        for cell in 0..self.grid.n_cells() {
+            let center = self.grid.center(cell);
+            if layout.floors.iter().any(|floor| floor.contains(center)) {
+                self.seen_bits[cell] |= SEEN_FREE | SEEN_NEAR;
+            }
+        }
+        let head_m = (height_m + HEAD_MARGIN_M).min(WALL_M);
+        let blocks_body = |block: &&LayoutBlock| {
+            let [low_m, high_m] = block.y_range_m;
+            high_m > self.step_over_m && low_m <= head_m
+        };
+        for block in layout.blocks.iter().filter(blocks_body) {
+            let margin_m = 0.5 * CELL_M;
+            let radius_m = (block.half_xz + margin_m).length();
+            for cell in self.grid.disc(block.center_xz, radius_m) {
+                if !block.contains(self.grid.center(cell), margin_m) {
+                    continue;
+                }
+                self.confidence[cell] = MAX_CONFIDENCE;
+                self.seen_bits[cell] |= SEEN_NEAR | SEEN_FIRM;
+                if block.y_range_m[1] > WALL_M {
+                    self.seen_bits[cell] |= SEEN_HIGH;
+                }
+                if block.y_range_m[1] > TALL_M {
+                    self.seen_bits[cell] |= SEEN_TALL;
+                }
+            }
+        }
+        self.version += 1;
+    }
+
     /// Integrates one image. `height_m` is the height of the agent's body: obstacles above it do
     /// not block. Cells seen within `known_m` count as known.
     pub fn integrate(
@@ -365,7 +405,7 @@ impl OccupancyMap {
         let mut sampled = vec![0.0; padded_width];
         let limits = Limits {
             grid: self.grid,
-            head_m: height_m + 0.05,
+            head_m: height_m + HEAD_MARGIN_M,
             step_over_m: self.step_over_m,
             known_m,
         };

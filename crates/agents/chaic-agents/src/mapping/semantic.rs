@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use chaic_core::geom::{horizontal_distance, to_xz};
+use chaic_core::observation::ObjectState;
 use chaic_core::{ClassId, Frame, Observation, Role, Vec2, Vec3};
 
 use crate::perception::Detection;
@@ -27,6 +28,10 @@ const MISSES: u32 = 3;
 const MISSES_GROWTH: u32 = 4;
 /// Maximum number of footprint points per object: more than a truck's outline has.
 const MAX_FOOTPRINT: usize = 512;
+/// A granted position that differs by less counts as unchanged, meters.
+const PLACED_M: f32 = 0.05;
+/// Time for which an object counts as held after each granted state that says so, frames.
+const PLACED_HELD_FRAMES: Frame = 5;
 
 /// Known object.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,6 +66,39 @@ pub struct MappedObject {
     misses: u32,
     /// Number of misses after which it is forgotten.
     misses_to_forget: u32,
+    /// Its last granted state, if any. Granted states take precedence over sightings.
+    placement: Option<Placement>,
+}
+
+/// Granted state of an object, as far as changes of it matter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Placement {
+    position_in_world: Vec3,
+    bottom_m: f32,
+    top_m: f32,
+    /// True if it lies somewhere: not held, and not in a container.
+    is_lying: bool,
+    /// True if it lies somewhere and is in play.
+    is_available: bool,
+}
+
+impl Placement {
+    fn new(object: &ObjectState) -> Placement {
+        let is_lying = object.holder.is_none() && object.container.is_none();
+        Placement {
+            position_in_world: object.position_in_world,
+            bottom_m: object.bottom_m,
+            top_m: object.top_m,
+            is_lying,
+            is_available: is_lying && !object.is_gone,
+        }
+    }
+
+    fn has_moved(&self, to: &Placement) -> bool {
+        self.position_in_world.distance(to.position_in_world) > PLACED_M
+            || (self.bottom_m - to.bottom_m).abs() > PLACED_M
+            || (self.top_m - to.top_m).abs() > PLACED_M
+    }
 }
 
 impl MappedObject {
@@ -81,6 +119,29 @@ impl MappedObject {
             is_gone: false,
             misses: 0,
             misses_to_forget: MISSES,
+            placement: None,
+        }
+    }
+
+    /// Creates an object that was never seen, from its granted state.
+    fn from_state(object: &ObjectState, now: Frame) -> MappedObject {
+        MappedObject {
+            track: object.entity.into(),
+            class: object.class,
+            position_in_world: object.position_in_world,
+            bottom_m: object.bottom_m,
+            top_m: object.top_m,
+            footprint: object.footprint.clone(),
+            first_seen: now,
+            last_seen: 0,
+            ignore_until: 0,
+            held_until: 0,
+            failures: 0,
+            is_present: true,
+            is_gone: false,
+            misses: 0,
+            misses_to_forget: MISSES,
+            placement: None,
         }
     }
 
@@ -206,6 +267,11 @@ impl SemanticMap {
         now: Frame,
     ) {
         for detection in detections.iter().filter(|d| d.person.is_none()) {
+            let placed = self.objects.get_mut(&detection.track).filter(|o| o.placement.is_some());
+            if let Some(object) = placed {
+                object.last_seen = now;
+                continue;
+            }
             let is_held = looks_held(detection, self.objects.get(&detection.track), people, now);
             match self.objects.get_mut(&detection.track) {
                 Some(object) => {
@@ -229,11 +295,46 @@ impl SemanticMap {
         }
     }
 
+    /// Inserts or corrects an object according to its granted state. From then on, sightings of it
+    /// only update [`MappedObject::last_seen`], which is 0 before the first sighting. An object
+    /// held by another agent keeps its track and counts as held; one in a container that nobody
+    /// holds is absent.
+    pub fn place(&mut self, state: &ObjectState, now: Frame) {
+        let track = TrackId::from(state.entity);
+        let is_new = !self.objects.contains_key(&track);
+        let object =
+            self.objects.entry(track).or_insert_with(|| MappedObject::from_state(state, now));
+        let to = Placement::new(state);
+        let from = object.placement.replace(to);
+        let was_present = object.is_present;
+        let has_moved = from.is_none_or(|from| from.has_moved(&to));
+        (object.class, object.position_in_world) = (state.class, state.position_in_world);
+        if has_moved {
+            (object.bottom_m, object.top_m) = (state.bottom_m, state.top_m);
+            object.footprint.clone_from(&state.footprint);
+        }
+        object.is_present = state.holder.is_some() || state.container.is_none();
+        object.held_until = if state.holder.is_some() { now + PLACED_HELD_FRAMES } else { 0 };
+        object.is_gone |= state.is_gone;
+        object.misses = 0;
+        let was_lying = from.is_some_and(|from| from.is_lying) && was_present;
+        let was_available = from.is_some_and(|from| from.is_available) && was_present;
+        if is_new || was_available != to.is_available || (has_moved && to.is_available) {
+            self.n_changes += 1;
+        }
+        if is_new || was_lying != to.is_lying || (has_moved && to.is_lying) {
+            let is_large = !object.class.info().is_carriable();
+            self.layout_version += u32::from(is_new || is_large);
+        }
+    }
+
     /// Counts objects that become available again as changes.
     pub fn expire(&mut self, before: Frame, now: Frame) {
         let passed = |until: Frame| before < until && until <= now;
         for object in self.objects.values_mut() {
-            if passed(object.ignore_until) || passed(object.held_until) {
+            // Granted states tell themselves when an object is no longer held.
+            let is_released = object.placement.is_none() && passed(object.held_until);
+            if passed(object.ignore_until) || is_released {
                 self.n_changes += 1;
                 object.failures = 0;
             }
@@ -250,7 +351,8 @@ impl SemanticMap {
         let margin = MISS_MARGIN * camera.width as f32;
         let (right, bottom) = (camera.width as f32 - margin, camera.height as f32 - margin);
         for object in self.objects.values_mut() {
-            if object.is_fixed() || !object.is_present || object.last_seen == observation.frame {
+            let is_certain = object.is_fixed() || object.placement.is_some();
+            if is_certain || !object.is_present || object.last_seen == observation.frame {
                 continue;
             }
             let Some((px, d)) = camera.project(object.position_in_world) else { continue };

@@ -224,11 +224,20 @@ pub trait Policy: Send + 'static {
 
     /// Returns whether to call `choose` although `current` is unfinished. `has_changed` is true if
     /// the map has changed in a relevant way since the last choice. The new choice is adopted only
-    /// if it [supersedes] the current plan.
-    ///
-    /// [supersedes]: Plan::supersedes
+    /// if it [supersedes](Policy::supersedes) the current plan.
     fn reconsiders(&mut self, _context: &Context<'_>, _current: &Plan, _has_changed: bool) -> bool {
         false
+    }
+
+    /// Returns whether a new choice replaces the unfinished plan `current`.
+    fn supersedes(&self, new: &Plan, current: &Plan) -> bool {
+        new.supersedes(current)
+    }
+
+    /// Returns the minimum top height of goal places that the agent uses from now on, meters;
+    /// `None` for that of the briefing.
+    fn goal_place_min_top_m(&self, _memory: &Memory) -> Option<f32> {
+        None
     }
 
     /// Receives each observation before the action. Needed by policies that use images or changes

@@ -4,7 +4,7 @@ pub mod destination;
 pub mod navigation;
 pub mod steering;
 
-mod careful_approach;
+pub(crate) mod careful_approach;
 pub mod careful_navigation;
 pub mod joint_navigation;
 

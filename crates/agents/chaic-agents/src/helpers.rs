@@ -1,12 +1,12 @@
 //! Rule-based helpers by name.
 
-use chaic_core::Agent;
+use chaic_core::{Agent, AgentId};
 use chaic_core::observation::Grants;
 
 use crate::behavior::GroundTruthBehavior;
 use crate::perception_factory::PerceptionFactory;
 use crate::planning_agent::PlanningAgent;
-use crate::policies::{FollowPolicy, RandomPolicy, RulePolicy, RuleProfile};
+use crate::policies::{FollowPolicy, InferOptions, InferPolicy, RandomPolicy, RulePolicy, RuleProfile};
 use crate::rules::PlannerRules;
 
 /// Table entry of a built-in helper.
@@ -23,7 +23,7 @@ pub struct HelperInfo {
 }
 
 /// All helpers of this crate.
-pub static HELPERS: [HelperInfo; 4] = [
+pub static HELPERS: [HelperInfo; 7] = [
     HelperInfo {
         name: "random",
         title: "Random",
@@ -47,6 +47,24 @@ pub static HELPERS: [HelperInfo; 4] = [
         title: "Follow",
         make: |rules, factory| Box::new(follow(rules, factory)),
         grants: planner_grants,
+    },
+    HelperInfo {
+        name: "infer",
+        title: "Infer",
+        make: |rules, factory| Box::new(infer(rules, factory, InferOptions::ALL)),
+        grants: planner_grants,
+    },
+    HelperInfo {
+        name: "ideal_observer",
+        title: "Ideal observer",
+        make: |rules, factory| Box::new(observer(rules, factory)),
+        grants: |_| Grants { behavior: true, positions: true, state: true, ..Grants::PLANNER },
+    },
+    HelperInfo {
+        name: "oracle_plan",
+        title: "Oracle plan",
+        make: |rules, factory| Box::new(observer(rules, factory)),
+        grants: |_| Grants::ALL,
     },
 ];
 
@@ -77,6 +95,27 @@ pub fn rhp(rules: PlannerRules, factory: &dyn PerceptionFactory) -> PlanningAgen
 pub fn oracle(rules: PlannerRules, factory: &dyn PerceptionFactory) -> PlanningAgent<RulePolicy> {
     let behavior = Box::new(GroundTruthBehavior::default());
     let policy = RulePolicy::new(RuleProfile::ORACLE);
+    PlanningAgent::with(policy, factory.perception(), behavior, rules).replace_perception(factory)
+}
+
+/// Constructs the helper that infers goal and constraint from what it sees, and plans for both.
+pub fn infer(
+    rules: PlannerRules,
+    factory: &dyn PerceptionFactory,
+    options: InferOptions,
+) -> PlanningAgent<InferPolicy> {
+    let policy = InferPolicy::new(options);
+    let grants = planner_grants(rules);
+    PlanningAgent::with_watched(policy, rules, factory, AgentId::PARTNER, grants)
+}
+
+/// Constructs an upper bound: the inferring helper with granted state and behavior.
+pub fn observer(
+    rules: PlannerRules,
+    factory: &dyn PerceptionFactory,
+) -> PlanningAgent<InferPolicy> {
+    let behavior = Box::new(GroundTruthBehavior::default());
+    let policy = InferPolicy::new(InferOptions::ALL);
     PlanningAgent::with(policy, factory.perception(), behavior, rules).replace_perception(factory)
 }
 

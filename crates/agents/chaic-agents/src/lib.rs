@@ -39,9 +39,11 @@ pub mod belief;
 pub mod perception_factory;
 
 pub mod decision;
-pub mod policies;
-
 pub mod execution;
+
+pub mod team;
+
+pub mod policies;
 
 pub mod planning_agent;
 

@@ -474,6 +474,11 @@ impl Memory {
         places
     }
 
+    /// Sets the minimum top height of goal places, meters.
+    pub fn set_goal_place_min_top(&mut self, min_top_m: f32) {
+        self.goal_place_min_top_m = min_top_m;
+    }
+
     /// Returns whether child and partner are too far apart: both in view, or both seen recently
     /// (facts A2.1, A2.4).
     pub fn child_is_away(&self, briefing: &Briefing) -> bool {

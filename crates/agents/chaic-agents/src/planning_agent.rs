@@ -265,12 +265,15 @@ impl Episode {
             }
         }
         self.change_count = change_count;
+        if let Some(min_top_m) = policy.goal_place_min_top_m(&self.memory) {
+            self.memory.set_goal_place_min_top(min_top_m);
+        }
         self.memory.refresh();
         let context = self.context(behavior);
         let valid = valid_plans(&self.memory, &self.briefing);
         let chosen = policy.choose(&context, &valid)?;
         Ok(match self.plan {
-            Some(current) if !chosen.supersedes(&current) => None,
+            Some(current) if !policy.supersedes(&chosen, &current) => None,
             _ => Some(chosen),
         })
     }

@@ -2,10 +2,12 @@
 
 mod external;
 mod follow;
+mod infer;
 mod random;
 mod rule_policy;
 
 pub use external::ExternalPolicy;
 pub use follow::FollowPolicy;
+pub use infer::{InferOptions, InferPolicy};
 pub use random::RandomPolicy;
 pub use rule_policy::{RulePolicy, RuleProfile, TargetFilter, TargetOrder};

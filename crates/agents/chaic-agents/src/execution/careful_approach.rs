@@ -1,19 +1,17 @@
 //! Approach with a body of its true radius: stops where the arm reaches the object.
 
-use chaic_core::geom::to_xz;
 use chaic_core::{Action, Vec2};
 
 use super::destination::Destination;
 use super::navigation::{Approach, NavigationStep, Navigator};
-use crate::mapping::semantic::MappedObject;
 use crate::memory::Memory;
 use crate::track::TrackId;
 
 /// Offsets to the arm's reach over what an object lies on, meters, tried in this order. The first
 /// is on the safe side; later ones allow for the coarse map if no position is found.
-const ARM_OFFSETS_M: [f32; 3] = [-0.08, 0.05, 0.25];
+pub(crate) const ARM_OFFSETS_M: [f32; 3] = [-0.08, 0.05, 0.25];
 /// Arrival distance if no such position exists either, meters.
-const RELAXED_M: f32 = 2.4;
+pub(crate) const RELAXED_M: f32 = 2.4;
 /// Steps near an object, on the way to a position, before the requirements are relaxed.
 const MAX_STEPS: u32 = 14;
 
@@ -37,7 +35,7 @@ impl Approach for CarefulApproach {
     ) -> NavigationStep {
         let Some(object) = memory.objects.get(track) else { return NavigationStep::Unreachable };
         let is_near = object.distance_from(memory.position()) < within_m + 0.5;
-        let mut destination = destination_at(object, within_m);
+        let mut destination = Destination::at_object(object, within_m);
         destination.failed_positions = failed_positions.to_vec();
         loop {
             destination.arm_m =
@@ -65,18 +63,5 @@ impl Approach for CarefulApproach {
 
     fn fork(&self) -> Box<dyn Approach> {
         Box::new(self.clone())
-    }
-}
-
-/// Returns the destination for an interaction with an object.
-fn destination_at(object: &MappedObject, within_m: f32) -> Destination {
-    let is_small = object.class.info().is_carriable() || object.footprint.is_empty();
-    let mean = to_xz(object.position_in_world);
-    let points = if is_small { vec![mean] } else { object.footprint.clone() };
-    let center = points.iter().copied().sum::<Vec2>() / points.len() as f32;
-    Destination {
-        points,
-        same_room_as: (!is_small).then_some(center),
-        ..Destination::near(mean, within_m)
     }
 }

@@ -1,7 +1,9 @@
 //! Destinations of navigation, and the conditions of arrival.
 
 use chaic_core::Vec2;
+use chaic_core::geom::to_xz;
 
+use crate::mapping::MappedObject;
 use crate::planning::cost_map::CostMap;
 
 /// Initial part of a straight line that is not tested, because the body already occupies it,
@@ -46,6 +48,19 @@ impl Destination {
         }
     }
 
+    /// Creates the destination of an interaction with an object.
+    pub fn at_object(object: &MappedObject, within_m: f32) -> Destination {
+        let is_small = object.class.info().is_carriable() || object.footprint.is_empty();
+        let mean = to_xz(object.position_in_world);
+        let points = if is_small { vec![mean] } else { object.footprint.clone() };
+        let center = points.iter().copied().sum::<Vec2>() / points.len() as f32;
+        Destination {
+            points,
+            same_room_as: (!is_small).then_some(center),
+            ..Destination::near(mean, within_m)
+        }
+    }
+
     /// Returns the point nearest to `from`.
     pub(super) fn nearest_point(&self, from: Vec2) -> Vec2 {
         let mut best = (f32::INFINITY, from);
@@ -59,7 +74,7 @@ impl Destination {
     }
 
     /// Returns the mean of the points, and the radius of the circle around it that contains them.
-    pub(super) fn center_and_radius(&self) -> (Vec2, f32) {
+    pub(crate) fn center_and_radius(&self) -> (Vec2, f32) {
         let center = self.points.iter().copied().sum::<Vec2>() / self.points.len() as f32;
         let radius = self.points.iter().map(|p| p.distance(center)).fold(0.0, f32::max);
         (center, radius)
@@ -72,7 +87,7 @@ impl Destination {
     }
 
     /// Returns whether `here` is an arrival position, with this tolerance of the arm's reach.
-    pub(super) fn accepts(&self, costs: &CostMap, here: Vec2, tolerance_m: f32) -> bool {
+    pub(crate) fn accepts(&self, costs: &CostMap, here: Vec2, tolerance_m: f32) -> bool {
         let point = self.nearest_point(here);
         point.distance(here) <= self.within_m
             && self

@@ -267,6 +267,12 @@ impl OccupancyMap {
         Cell { confidence: self.confidence[cell], seen_bits: self.seen_bits[cell] }.state()
     }
 
+    /// Returns whether a wall stands there that is taller than any furniture.
+    pub fn is_permanent_wall(&self, cell: usize) -> bool {
+        let cell = Cell { confidence: self.confidence[cell], seen_bits: self.seen_bits[cell] };
+        cell.state() == CellOccupancy::Wall && cell.is_tall()
+    }
+
     /// Returns all cells, row by row.
     pub fn cells(&self) -> impl Iterator<Item = Cell> + '_ {
         self.confidence

@@ -3,7 +3,7 @@
 use chaic_core::Vec2;
 
 use super::grid::CELL_M;
-use super::occupancy::{CellOccupancy, OccupancyMap};
+use super::occupancy::OccupancyMap;
 
 /// Maximum distance between the walls on two opposite sides, meters. Ours: door openings are up to
 /// 1.2 m wide, and each wall may appear one or two cells thinner than it is.
@@ -21,13 +21,13 @@ const DIRECTIONS: [Vec2; 4] = [
 ];
 
 /// Returns whether a point (x, z) lies between two walls of a narrow passage, as far as the map
-/// shows. Unknown cells are no walls.
+/// shows. Unknown cells and tall furniture are no walls.
 pub fn is_in_passage(map: &OccupancyMap, at: Vec2) -> bool {
     let to_wall = |direction: Vec2| {
         let steps = (1..).map(|k| CELL_M * k as f32).take_while(|m| *m <= MAX_SIDE_M);
         steps.into_iter().find(|m| {
             let cell = map.grid().cell_at(at + direction * *m);
-            cell.is_some_and(|cell| map.state(cell) == CellOccupancy::Wall)
+            cell.is_some_and(|cell| map.is_permanent_wall(cell))
         })
     };
     DIRECTIONS.into_iter().any(|direction| {

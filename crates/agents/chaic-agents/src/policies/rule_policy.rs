@@ -157,8 +157,13 @@ impl RulePolicy {
         }
     }
 
+    /// Skips the turn with which a policy begins.
+    pub(super) fn skip_look_around(&mut self) {
+        self.has_looked_around = true;
+    }
+
     /// Applies the rules for the child (facts A2.4), which have priority.
-    fn child_plan(&mut self, context: &Context<'_>) -> Option<Plan> {
+    pub(super) fn child_plan(&mut self, context: &Context<'_>) -> Option<Plan> {
         let (memory, now) = (context.memory, context.memory.frame);
         let child = context.briefing.companion(CompanionRole::Child)?;
         if !(self.profile.minds_child && memory.rules.minds_child) {
@@ -296,7 +301,7 @@ impl RulePolicy {
 
     /// Returns whether the rules for the child would interrupt now. Evaluates them on a copy, so
     /// that the state is unchanged.
-    fn needs_child_care(&self, context: &Context<'_>) -> bool {
+    pub(super) fn needs_child_care(&self, context: &Context<'_>) -> bool {
         self.has_looked_around && self.clone().child_plan(context) == Some(Plan::FollowChild)
     }
 }

@@ -1,0 +1,429 @@
+//! Helper that infers what the partner wants and cannot do, and plans for both.
+//!
+//! It watches the partner while its goal is unclear, and then follows a team plan
+//! ([`crate::team`]). With a granted goal or state, the same policy gives upper bounds.
+
+use std::collections::BTreeMap;
+
+use chaic_core::briefing::CompanionRole;
+use chaic_core::capability::{Capability, Persona};
+use chaic_core::geom::to_xz;
+use chaic_core::rng::RngStream;
+use chaic_core::{AgentError, Briefing, ClassId, Frame, Observation, Role, Vec2};
+
+use super::rule_policy::{RulePolicy, RuleProfile, is_relevant_removal};
+use crate::behavior::BehaviorLog;
+use crate::belief::Belief;
+use crate::decision::{Context, HandState, Plan, Policy, Subject};
+use crate::memory::Memory;
+use crate::team::builder::{PartnerModel, ProblemBuilder, is_current_load};
+use crate::team::{Operation, PlaceKind, SearchSettings, TeamProblem, improve, simulate};
+use crate::track::TrackId;
+
+/// Parts of the helper that an ablation switches off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InferOptions {
+    /// True if it follows the partner while the goal is unclear.
+    pub watches: bool,
+    /// True if it infers the partner's limits; else it assumes an adult without limits.
+    pub infers_constraint: bool,
+    /// True if it plans for both; else it follows the rules of the oracle once the goal is clear.
+    pub plans: bool,
+    /// True if it weighs watching against acting by expected deliveries; else it watches until the
+    /// goal is clear.
+    pub values_information: bool,
+}
+
+impl InferOptions {
+    /// Everything on.
+    pub const ALL: InferOptions = InferOptions {
+        watches: true,
+        infers_constraint: true,
+        plans: true,
+        values_information: true,
+    };
+}
+
+/// Constants of the policy, all ours; chosen on episodes of `gen-standard:7000..7010`.
+mod constants {
+    use chaic_core::Frame;
+
+    /// Probability of the most likely target set from which the helper acts on it.
+    pub const SURE: f32 = 0.7;
+    /// Frame until which the helper follows the partner while the goal is unclear.
+    pub const WATCH_UNTIL: Frame = 600;
+    /// Time without a sighting after which the helper looks for the partner again, frames.
+    pub const LOST_FRAMES: Frame = 400;
+    /// Goals with a lower probability are left out of the plan.
+    pub const MIN_GOAL_PROBABILITY: f32 = 0.04;
+    /// Number of objects assumed for each class of a target set: more than any episode has.
+    pub const ALL_OF_CLASS: f32 = 9.0;
+    /// Value by which a new plan must exceed the current one before a walk to an object is given
+    /// up, deliveries.
+    pub const SWITCH_GAIN: f32 = 0.25;
+    /// Interval between reconsiderations of idle plans, frames.
+    pub const IDLE_FRAMES: Frame = 60;
+    /// Interval between reconsiderations of walks to objects, frames.
+    pub const WALK_FRAMES: Frame = 80;
+    /// Time before the end from which any goal place is used, frames.
+    pub const LAST_DELIVERY_FRAMES: Frame = 1000;
+    /// Minimum height of a goal place while the partner may be a child, meters: only high ones
+    /// count in one of its tasks, and high ones count in all (`world.high_goal_min_top_m`).
+    pub const HIGH_GOAL_M: f32 = 1.5;
+    /// Probability of a child from which this applies.
+    pub const CHILD_PROBABILITY: f32 = 0.4;
+    /// Time left from which a helper with a free hand explores rather than delivers, frames.
+    pub const EXPLORE_LOADED_FRAMES: f32 = 900.0;
+}
+use constants::*;
+
+/// Step of a plan, by tracks instead of places, which change between decisions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Step {
+    PickUp(TrackId),
+    TakeContainer(TrackId),
+    Deliver,
+    Remove(TrackId),
+}
+
+/// Infers and plans.
+#[derive(Clone, Debug)]
+pub struct InferPolicy {
+    options: InferOptions,
+    rules: RulePolicy,
+    briefing: Option<Briefing>,
+    belief: Option<Belief>,
+    builder: ProblemBuilder,
+    rng: RngStream,
+    /// Remaining steps of the current team plan.
+    steps: Vec<Step>,
+    /// True if the last choice may replace a walk to another object.
+    may_switch: bool,
+    has_looked_around: bool,
+    identified: Option<Frame>,
+    last_choice: Frame,
+    mode: &'static str,
+}
+
+impl InferPolicy {
+    /// Creates a policy with these parts switched on.
+    pub fn new(options: InferOptions) -> InferPolicy {
+        InferPolicy {
+            options,
+            rules: RulePolicy::new(RuleProfile::ORACLE),
+            briefing: None,
+            belief: None,
+            builder: ProblemBuilder::default(),
+            rng: RngStream::new(0, "infer/plan", 0),
+            steps: Vec::new(),
+            may_switch: false,
+            has_looked_around: false,
+            identified: None,
+            last_choice: 0,
+            mode: "watch",
+        }
+    }
+
+    /// The current belief, once an episode has begun.
+    pub fn belief(&self) -> Option<&Belief> {
+        self.belief.as_ref()
+    }
+
+    fn partner_capability(&self) -> Capability {
+        match &self.belief {
+            Some(belief) if self.options.infers_constraint => belief.constraint.capability(),
+            _ => Persona::Adult.capability(),
+        }
+    }
+
+    /// Returns the possible goals with their probabilities and wanted numbers.
+    fn goals(&self, briefing: &Briefing) -> Vec<(f32, BTreeMap<ClassId, f32>)> {
+        if let Some(goal) = &briefing.goal {
+            let wanted = goal.targets.iter().map(|(class, n)| (*class, *n as f32));
+            return vec![(1.0, wanted.collect())];
+        }
+        let Some(belief) = &self.belief else { return Vec::new() };
+        let mut goals: Vec<(f32, BTreeMap<ClassId, f32>)> = Vec::new();
+        for (set, probability) in belief.goal.set_probabilities() {
+            if probability < MIN_GOAL_PROBABILITY {
+                continue;
+            }
+            let wanted = briefing.possible_targets.iter().filter_map(|class| {
+                let info = class.info();
+                if info.sets.contains(&set) {
+                    return Some((*class, ALL_OF_CLASS));
+                }
+                let is_likely = belief.goal.probability_wanted(*class) >= 0.5;
+                let n = if info.role == Role::Fragile { 2.0 } else { 1.0 };
+                is_likely.then_some((*class, n))
+            });
+            goals.push((probability, wanted.collect()));
+        }
+        let total: f32 = goals.iter().map(|(p, _)| p).sum();
+        goals.iter_mut().for_each(|(p, _)| *p /= total.max(1e-6));
+        goals
+    }
+
+    /// Returns whether the goal is clear enough to act on it.
+    fn is_goal_clear(&mut self, context: &Context<'_>) -> bool {
+        let is_clear = context.briefing.goal.is_some()
+            || self.belief.as_ref().is_some_and(|belief| belief.goal.most_likely().1 >= SURE);
+        if is_clear && self.identified.is_none() {
+            self.identified = Some(context.memory.frame);
+        }
+        is_clear
+    }
+
+    fn partner_model(&self, context: &Context<'_>) -> PartnerModel {
+        let position = context
+            .memory
+            .companion(context.briefing, CompanionRole::Partner)
+            .map(|person| to_xz(person.position_in_world));
+        let behavior = context.behavior;
+        let holds = match is_current_load(behavior.partner_holds_frame, context.memory.frame) {
+            true => behavior.partner_holds.clone(),
+            false => Vec::new(),
+        };
+        let goals = self.goals(context.briefing);
+        PartnerModel { capability: self.partner_capability(), position, holds, goals }
+    }
+
+    /// Returns the plan of the team planner; `None` if it has nothing to do.
+    fn team_plan(&mut self, context: &Context<'_>, valid: &[Plan]) -> Option<Plan> {
+        let partner = self.partner_model(context);
+        let problem = self.builder.build(context.briefing, context.memory, &partner)?;
+        let warm = self.operations(&problem);
+        let candidates: Vec<_> = warm.iter().cloned().collect();
+        let plan = improve(&problem, &candidates, SearchSettings::DEFAULT, &mut self.rng);
+        let stay = warm.map_or(f32::MIN, |warm| simulate(&problem, &warm));
+        self.may_switch = plan.value > stay + SWITCH_GAIN;
+        if std::env::var("TEAM").is_ok() {
+            let n = problem.places.len();
+            eprintln!("f{} left {} value {:.2} holds {:?}/{:?} partner {:?} {:?}", context.memory.frame, problem.frames_left, plan.value, problem.helper.loose, problem.helper.contained, problem.partner.as_ref().map(|p| (p.loose.clone(), p.contained.clone(), p.speed_m_per_frame)), problem.hypotheses.iter().map(|h| (h.probability, h.missing.clone())).collect::<Vec<_>>());
+            for (i, p) in problem.places.iter().enumerate() { eprintln!("   {i} {:?} {} ci {:?} known {} chance {:.2} from helper {:.1} from partner {:.1} row {:?}", p.kind, p.class.info().label, p.class_index, p.is_known_to_partner, p.partner_chance, problem.path_m[n][i], problem.path_m[n + 1][i], problem.path_m[i].iter().map(|x| (*x * 10.0).round() / 10.0).collect::<Vec<_>>()); }
+            eprintln!("   ops {:?}", plan.operations);
+            for d in crate::team::simulation::deliveries(&problem, &plan.operations, 0) { eprintln!("   {d:?}"); }
+        }
+        self.steps = plan.operations.iter().map(|o| step(&problem, *o)).collect();
+        self.first_valid(context, valid, &problem)
+    }
+
+    /// Returns the current steps as operations of this problem; `None` if there are none.
+    fn operations(&self, problem: &TeamProblem) -> Option<Vec<Operation>> {
+        let find = |track: &TrackId| problem.places.iter().position(|p| p.track == *track);
+        let operations = self.steps.iter().filter_map(|step| match step {
+            Step::PickUp(track) => find(track).map(Operation::PickUp),
+            Step::TakeContainer(track) => find(track).map(Operation::TakeContainer),
+            Step::Deliver => Some(Operation::Deliver),
+            Step::Remove(track) => find(track).map(Operation::Remove),
+        });
+        let operations: Vec<Operation> = operations.collect();
+        (!operations.is_empty()).then_some(operations)
+    }
+
+    /// Returns the first step that is possible now as a plan.
+    fn first_valid(
+        &self,
+        context: &Context<'_>,
+        valid: &[Plan],
+        problem: &TeamProblem,
+    ) -> Option<Plan> {
+        let hands = HandState::new(&context.memory.hands, context.briefing);
+        let is_valid = |plan: Plan| valid.contains(&plan).then_some(plan);
+        let deliver = || hands.to_deliver.and_then(|_| is_valid(Plan::Deliver));
+        let subject = |track: TrackId| {
+            let place = problem.places.iter().find(|p| p.track == track)?;
+            Some(Subject { track, class: place.class })
+        };
+        self.steps.iter().find_map(|step| match step {
+            Step::PickUp(_) if hands.can_put_in => is_valid(Plan::PutIn),
+            Step::PickUp(_) if !hands.can_take_target => deliver(),
+            Step::PickUp(track) => subject(*track).and_then(|s| is_valid(Plan::PickUp(s))),
+            Step::TakeContainer(_) if hands.has_container => None,
+            Step::TakeContainer(_) if hands.free_hand.is_none() => deliver(),
+            Step::TakeContainer(track) => {
+                subject(*track).and_then(|s| is_valid(Plan::PickContainer(s)))
+            }
+            Step::Deliver => deliver(),
+            Step::Remove(_) if hands.free_hand.is_none() => deliver(),
+            Step::Remove(track) => subject(*track).and_then(|s| is_valid(Plan::RemoveObstacle(s))),
+        })
+    }
+
+    /// Returns what to do while the goal is clear but no step is possible.
+    fn without_step(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
+        let hands = HandState::new(&context.memory.hands, context.briefing);
+        let frames_left = context.briefing.horizon.saturating_sub(context.memory.frame) as f32;
+        let carries = hands.to_deliver.is_some();
+        let may_find_more = !context.is_explored && hands.can_take_target;
+        if carries && !(may_find_more && frames_left > EXPLORE_LOADED_FRAMES)
+            && valid.contains(&Plan::Deliver)
+        {
+            return Plan::Deliver;
+        }
+        if let Some(remove) = valid.iter().find(|plan| is_relevant_removal(context, plan)) {
+            return *remove;
+        }
+        if context.is_explored && valid.contains(&Plan::FollowPartner) && !carries {
+            return Plan::FollowPartner;
+        }
+        Plan::Explore
+    }
+
+    /// Returns what to do while the goal is unclear.
+    fn while_unclear(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
+        let memory = context.memory;
+        let hands = HandState::new(&memory.hands, context.briefing);
+        if hands.to_deliver.is_some() && !hands.can_take_target && valid.contains(&Plan::Deliver) {
+            return Plan::Deliver;
+        }
+        if let Some(remove) = valid.iter().find(|plan| is_relevant_removal(context, plan)) {
+            return *remove;
+        }
+        let partner = memory.companion(context.briefing, CompanionRole::Partner);
+        let is_lost = partner.is_some_and(|p| p.frame + LOST_FRAMES < memory.frame);
+        let watches = self.options.watches && (memory.frame < WATCH_UNTIL || is_lost);
+        if watches && valid.contains(&Plan::FollowPartner) {
+            return Plan::FollowPartner;
+        }
+        Plan::Explore
+    }
+
+    /// Returns the minimum height of goal places that count in every task the partner may have.
+    fn min_goal_top(&self, briefing: &Briefing, memory: &Memory) -> Option<f32> {
+        if briefing.goal.is_some() || !self.options.infers_constraint {
+            return None;
+        }
+        let belief = self.belief.as_ref()?;
+        let child = belief.constraint.probabilities().into_iter();
+        let child: f32 = child.filter(|(p, _)| *p == Persona::Child).map(|(_, p)| p).sum();
+        let may_be_high = child >= CHILD_PROBABILITY && belief.evidence.n_sightings > 0;
+        let is_late = memory.frame + LAST_DELIVERY_FRAMES > briefing.horizon;
+        let knows_high = || {
+            let is_high = |top_m: f32| top_m >= HIGH_GOAL_M - 0.1;
+            memory.goal_places().iter().any(|(place, _)| is_high(place.top_m))
+        };
+        Some(if may_be_high && (!is_late || knows_high()) { HIGH_GOAL_M } else { 0.0 })
+    }
+}
+
+fn step(problem: &TeamProblem, operation: Operation) -> Step {
+    match operation {
+        Operation::PickUp(place) => Step::PickUp(problem.places[place].track),
+        Operation::TakeContainer(place) => Step::TakeContainer(problem.places[place].track),
+        Operation::Deliver => Step::Deliver,
+        Operation::Remove(place) => Step::Remove(problem.places[place].track),
+    }
+}
+
+fn moves_furniture(briefing: &Briefing) -> bool {
+    briefing.possible_targets.iter().any(|class| class.info().role == Role::HeavyTarget)
+}
+
+impl Policy for InferPolicy {
+    fn reset(&mut self, briefing: &Briefing) {
+        *self = InferPolicy::new(self.options);
+        self.rules.reset(briefing);
+        self.rng = RngStream::new(briefing.seed, "infer/plan", 0);
+        self.belief = Some(Belief::new(briefing));
+        self.briefing = Some(briefing.clone());
+        self.has_looked_around = briefing.layout.is_some();
+    }
+
+    fn observe(&mut self, _: &Observation, memory: &Memory, behavior: &BehaviorLog) {
+        let Some(briefing) = &self.briefing else { return };
+        if let Some(belief) = &mut self.belief {
+            belief.observe(briefing, memory, behavior);
+        }
+        let partner = memory.companion(briefing, CompanionRole::Partner);
+        if let Some(person) = partner.filter(|p| p.is_in_view) {
+            let position = to_xz(person.position_in_world);
+            self.builder.observe_partner(memory, position, None::<Vec2>);
+        }
+    }
+
+    fn goal_place_min_top_m(&self, memory: &Memory) -> Option<f32> {
+        self.min_goal_top(self.briefing.as_ref()?, memory)
+    }
+
+    fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
+        self.last_choice = context.memory.frame;
+        self.may_switch = false;
+        if moves_furniture(context.briefing) {
+            self.mode = "rules";
+            return Ok(self.rules.decide(context, valid));
+        }
+        if !std::mem::replace(&mut self.has_looked_around, true) {
+            self.rules.skip_look_around();
+            return Ok(Plan::TurnAround);
+        }
+        self.rules.skip_look_around();
+        if let Some(plan) = self.rules.child_plan(context) {
+            return Ok(plan);
+        }
+        if !self.is_goal_clear(context) {
+            self.mode = "watch";
+            return Ok(self.while_unclear(context, valid));
+        }
+        if !self.options.plans {
+            self.mode = "rules";
+            return Ok(self.rules.decide(context, valid));
+        }
+        self.mode = "plan";
+        Ok(match self.team_plan(context, valid) {
+            Some(plan) => plan,
+            None => self.without_step(context, valid),
+        })
+    }
+
+    fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, has_changed: bool) -> bool {
+        if moves_furniture(context.briefing) {
+            return self.rules.reconsiders(context, current, has_changed);
+        }
+        let since = context.memory.frame.saturating_sub(self.last_choice);
+        match current {
+            Plan::PutIn | Plan::FollowChild | Plan::TurnAround => false,
+            _ if self.rules.needs_child_care(context) => true,
+            Plan::Explore | Plan::FollowPartner | Plan::Wait => {
+                has_changed || since >= IDLE_FRAMES || {
+                    let was_clear = self.identified.is_some();
+                    !was_clear && self.is_goal_clear(context)
+                }
+            }
+            Plan::PickUp(_) | Plan::PickContainer(_) => has_changed && since >= WALK_FRAMES,
+            _ => false,
+        }
+    }
+
+    fn supersedes(&self, new: &Plan, current: &Plan) -> bool {
+        let is_pick = |p: &Plan| matches!(p, Plan::PickUp(_) | Plan::PickContainer(_));
+        if is_pick(current) && is_pick(new) && new != current {
+            return self.may_switch;
+        }
+        let is_idle = |p: &Plan| matches!(p, Plan::Explore | Plan::FollowPartner | Plan::Wait);
+        if is_idle(current) && is_idle(new) {
+            return std::mem::discriminant(new) != std::mem::discriminant(current);
+        }
+        new.supersedes(current)
+    }
+
+    fn status(&self) -> Option<String> {
+        Some(self.mode.to_owned())
+    }
+
+    fn counters(&self) -> BTreeMap<String, u64> {
+        let taken = self.belief.as_ref().map_or(0, |b| b.evidence.taken.len() as u64);
+        let mut counters = BTreeMap::from([("infer/taken".to_owned(), taken)]);
+        counters.extend(self.identified.map(|f| ("infer/identified".to_owned(), u64::from(f))));
+        counters
+    }
+
+    fn fork(&self) -> Option<InferPolicy> {
+        Some(self.clone())
+    }
+}
+
+/// Number of targets in a problem, for reports of the policy.
+pub fn n_targets(problem: &TeamProblem) -> usize {
+    problem.places_of(PlaceKind::Target).count()
+}

@@ -1,0 +1,17 @@
+//! Team planning: who fetches what, in which order, before the time is up.
+//!
+//! **What it is**: a small model of the rest of the episode ([`TeamProblem`]), a simulation of both
+//! people in it ([`simulation`]), and a search for the helper's best sequence of operations
+//! ([`search`]).
+//! **What it is not**: it reads no observations and executes nothing. [`builder`] makes the problem
+//! from the memory, and a policy turns the first operation into a plan.
+
+pub mod builder;
+pub mod problem;
+pub mod search;
+pub mod simulation;
+pub mod travel;
+
+pub use problem::{Operation, Place, PlaceKind, TeamProblem, Worker};
+pub use search::{SearchSettings, improve};
+pub use simulation::simulate;

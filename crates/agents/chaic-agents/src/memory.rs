@@ -506,3 +506,6 @@ fn cost_model(walking: Walking) -> Box<dyn CostModel> {
         Walking::Lattice => Box::<LatticeCosts>::default(),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,10 +1,12 @@
 //! Toy world for tests: boxes in a room, a small ray caster, and one body whose actions never fail
 //! at random.
 
-use chaic_core::briefing::{Companion, CompanionRole, Goal, Motion};
+use chaic_core::briefing::{Companion, CompanionRole, Goal, Layout, LayoutBlock, Motion};
 use chaic_core::capability::Persona;
 use chaic_core::geom::{Camera, Pose, Rect, forward, to_xz, wrap_angle, yaw_rotation};
-use chaic_core::observation::{Granted, Grants, Held, HeldIdentity, Images, Proprioception};
+use chaic_core::observation::{
+    Granted, Grants, Held, HeldIdentity, Images, ObjectState, Proprioception, WorldState,
+};
 use chaic_core::{
     Action, Agent, AgentId, Briefing, ClassId, EntityId, FailureReason, Frame, Hand, Observation,
     Outcome, Role, Target, Vec2, Vec3,
@@ -195,6 +197,47 @@ impl Toy {
             goal: None,
             disclosure: None,
             layout: None,
+        }
+    }
+
+    /// Returns the granted layout: the room, and all boxes that are fixed.
+    pub fn layout(&self) -> Layout {
+        let is_fixed =
+            |s: &&ToyBox| !s.entity.is_object() || !self.class(s.entity.into()).info().is_movable();
+        let block = |s: &ToyBox| LayoutBlock {
+            center_xz: 0.5 * to_xz(s.low + s.high),
+            half_xz: 0.5 * to_xz(s.high - s.low),
+            yaw_rad: 0.0,
+            y_range_m: [s.low.y, s.high.y],
+        };
+        Layout {
+            floors: vec![self.room],
+            blocks: self.solids.iter().filter(is_fixed).map(block).collect(),
+        }
+    }
+
+    /// Returns the granted state of all objects that are not held; `goal_places` are its goal
+    /// places.
+    pub fn state(&self, goal_places: &[TrackId]) -> WorldState {
+        let state = |s: &ToyBox| {
+            let class = self.class(s.entity.into());
+            let corners = [(s.low.x, s.low.z), (s.high.x, s.low.z), (s.low.x, s.high.z)];
+            let corners = corners.into_iter().chain([(s.high.x, s.high.z)]).map(Vec2::from);
+            ObjectState {
+                entity: s.entity,
+                class,
+                position_in_world: 0.5 * (s.low + s.high),
+                bottom_m: s.low.y,
+                top_m: s.high.y,
+                footprint: if class.info().is_carriable() { vec![] } else { corners.collect() },
+                holder: None,
+                container: None,
+                is_gone: self.delivered.contains(&s.entity.into()),
+            }
+        };
+        WorldState {
+            objects: self.solids.iter().filter(|s| s.entity.is_object()).map(state).collect(),
+            goal_places: goal_places.iter().map(|t| EntityId(t.0 as u16)).collect(),
         }
     }
 

@@ -505,4 +505,19 @@ mod tests {
         assert!(sensors(16, 16, 257).check().unwrap_err().contains("at most 256"));
         assert_eq!(sensors(u32::MAX, u32::MAX, u32::MAX).max_observation_bytes(), u64::MAX);
     }
+
+    #[test]
+    fn without_the_grant_of_the_state_nothing_is_written() {
+        let others = Grants { state: false, ..Grants::ALL };
+        let absent = serde_json::to_string(&(others, Granted::default())).unwrap();
+        assert!(!absent.contains("state"), "{absent}");
+        let granted = Granted { state: Some(WorldState::default()), ..Granted::default() };
+        let written = serde_json::to_string(&(Grants::ALL, &granted)).unwrap();
+        assert_eq!(
+            serde_json::from_str::<(Grants, Granted)>(&written).unwrap(),
+            (Grants::ALL, granted)
+        );
+        let (grants, granted): (Grants, Granted) = serde_json::from_str(&absent).unwrap();
+        assert_eq!((grants, granted.state), (others, None));
+    }
 }

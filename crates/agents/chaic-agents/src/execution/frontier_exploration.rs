@@ -244,6 +244,7 @@ impl FrontierExplorer {
 mod tests {
     use super::*;
     use crate::execution::careful_navigation::CarefulNavigator;
+    use crate::perception::{GroundTruthIds, Perception as _};
     use crate::test_support::{Toy, ToyRun};
 
     #[test]
@@ -274,5 +275,23 @@ mod tests {
             }
         }
         panic!("not done; crossed: {has_crossed}, at {:?}", run.toy.here());
+    }
+
+    #[test]
+    fn a_granted_layout_leaves_nothing_to_explore() {
+        let mut toy = Toy::room(10.0, 6.0);
+        toy.add_wall([-0.05, -3.0], [0.05, 0.4]);
+        toy.add_wall([-0.05, 1.4], [0.05, 3.0]);
+        toy.stand([-4.0, 0.0], -std::f32::consts::FRAC_PI_2);
+        for is_granted in [false, true] {
+            let layout = is_granted.then(|| toy.layout());
+            let briefing = chaic_core::Briefing { layout, ..toy.briefing() };
+            let mut memory = Memory::new(&briefing, crate::PlannerRules::paper());
+            let observation = toy.observe();
+            memory.update(&briefing, &observation, &GroundTruthIds.perceive(&observation));
+            let mut explorer = FrontierExplorer::new(toy.bounds());
+            explorer.choose(&mut memory);
+            assert_eq!(explorer.is_exhausted(), is_granted);
+        }
     }
 }

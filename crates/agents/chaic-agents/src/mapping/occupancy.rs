@@ -643,4 +643,42 @@ mod tests {
             assert_eq!([map.state(under), map.state(beside)], [CellOccupancy::Unknown; 2]);
         }
     }
+
+    #[test]
+    fn a_layout_gives_the_states_that_looking_around_gives() {
+        let mut toy = Toy::room(6.0, 6.0);
+        toy.add(ToyObject::new("cabinet", [1.0, 0.0, -2.0], [0.8, 1.0, 0.4]));
+        toy.add(ToyObject::new("cabinet", [-1.5, 0.0, 1.5], [0.8, 2.3, 0.4]));
+        toy.add(ToyObject::new("cabinet", [1.5, 2.05, 1.5], [0.8, 0.2, 0.4]));
+        toy.add_wall([-3.0, -0.05], [-1.5, 0.05]);
+        let mut granted = OccupancyMap::new(&toy.bounds(), MOTION.step_over_m);
+        granted.add_layout(&toy.layout(), 1.75);
+        let mut seen = OccupancyMap::new(&toy.bounds(), MOTION.step_over_m);
+        for at in [[0.0, 0.0], [-2.3, -2.3], [-2.3, 2.3], [2.3, 2.3], [2.3, -2.3]] {
+            for k in 0..12 {
+                toy.stand(at, std::f32::consts::TAU * k as f32 / 12.0);
+                observe(&mut seen, &toy);
+            }
+        }
+        let inside = |cell: &usize| toy.bounds().contains(seen.grid().center(*cell));
+        let (mut n_known, mut n_equal) = (0, 0);
+        for cell in (0..seen.grid().n_cells()).filter(inside) {
+            let [seen_state, granted_state] = [seen.state(cell), granted.state(cell)];
+            assert_ne!(granted_state, CellOccupancy::Unknown, "cell {cell}");
+            if seen_state == CellOccupancy::Unknown {
+                continue;
+            }
+            n_known += 1;
+            n_equal += u32::from(seen_state == granted_state);
+            let is_near_edge = granted.grid().neighbors(cell).any(|(next, _)| {
+                granted.state(next) != granted_state || seen.state(next) != seen_state
+            });
+            assert!(seen_state == granted_state || is_near_edge, "cell {cell}");
+        }
+        assert!(n_known > 2000 && n_equal * 100 > n_known * 95, "{n_equal} of {n_known}");
+        assert_eq!(state(&granted, -1.5, 1.5), CellOccupancy::Wall);
+        assert_eq!(state(&granted, 1.0, -2.0), CellOccupancy::Occupied);
+        assert_eq!(state(&granted, 1.5, 1.5), CellOccupancy::Free, "below a board");
+        assert_eq!(state(&granted, 0.0, -3.3), CellOccupancy::Unknown, "behind the wall");
+    }
 }

@@ -5,6 +5,7 @@ mod common;
 mod actions;
 mod compat;
 mod determinism;
+mod granted;
 mod impairments;
 mod random;
 mod watches;

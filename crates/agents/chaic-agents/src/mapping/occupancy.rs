@@ -344,11 +344,9 @@ impl OccupancyMap {
                 }
                 self.confidence[cell] = MAX_CONFIDENCE;
                 self.seen_bits[cell] |= SEEN_NEAR | SEEN_FIRM;
-                if block.y_range_m[1] > WALL_M {
-                    self.seen_bits[cell] |= SEEN_HIGH;
-                }
+                // Furniture up to TALL_M is no wall here, so that it does not hide its own inside.
                 if block.y_range_m[1] > TALL_M {
-                    self.seen_bits[cell] |= SEEN_TALL;
+                    self.seen_bits[cell] |= SEEN_HIGH | SEEN_TALL;
                 }
             }
         }

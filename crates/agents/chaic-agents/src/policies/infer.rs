@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use chaic_core::briefing::CompanionRole;
+use chaic_core::briefing::{CompanionRole, Goal};
 use chaic_core::capability::{Capability, Persona};
 use chaic_core::geom::to_xz;
 use chaic_core::rng::RngStream;
@@ -201,6 +201,10 @@ impl InferPolicy {
             let n = problem.places.len();
             eprintln!("f{} left {} value {:.2} holds {:?}/{:?} partner {:?} {:?}", context.memory.frame, problem.frames_left, plan.value, problem.helper.loose, problem.helper.contained, problem.partner.as_ref().map(|p| (p.loose.clone(), p.contained.clone(), p.speed_m_per_frame)), problem.hypotheses.iter().map(|h| (h.probability, h.missing.clone())).collect::<Vec<_>>());
             for (i, p) in problem.places.iter().enumerate() { eprintln!("   {i} {:?} {} ci {:?} known {} chance {:.2} from helper {:.1} from partner {:.1} row {:?}", p.kind, p.class.info().label, p.class_index, p.is_known_to_partner, p.partner_chance, problem.path_m[n][i], problem.path_m[n + 1][i], problem.path_m[i].iter().map(|x| (*x * 10.0).round() / 10.0).collect::<Vec<_>>()); }
+            if let Some(first) = plan.operations.first() {
+                let (kind, m) = match first { Operation::PickUp(i) => ("pick", problem.path_m[n][*i] / problem.helper.speed_m_per_frame + 62.0), Operation::TakeContainer(i) => ("box", problem.path_m[n][*i] / problem.helper.speed_m_per_frame + 62.0), Operation::Remove(i) => ("remove", problem.path_m[n][*i] / problem.helper.speed_m_per_frame + 150.0), Operation::Deliver => ("deliver", problem.places_of(PlaceKind::Goal).map(|g| problem.path_m[n][g]).fold(1e9, f32::min) / problem.helper.speed_m_per_frame + 84.0 * (problem.helper.loose.len() as f32 + f32::from(u8::from(problem.helper.contained.is_some())))) };
+                eprintln!("PRED f{} {kind} {m:.0} hands {}", context.memory.frame, problem.helper.loose.len());
+            }
             eprintln!("   ops {:?}", plan.operations);
             for d in crate::team::simulation::deliveries(&problem, &plan.operations, 0) { eprintln!("   {d:?}"); }
         }
@@ -250,13 +254,15 @@ impl InferPolicy {
         })
     }
 
-    /// Returns what to do while the goal is clear but no step is possible.
+    /// Returns what to do while the goal is clear but no step is possible: what the rules would do
+    /// without containers.
     fn without_step(&mut self, context: &Context<'_>, valid: &[Plan]) -> Plan {
         let hands = HandState::new(&context.memory.hands, context.briefing);
         let frames_left = context.briefing.horizon.saturating_sub(context.memory.frame) as f32;
         let carries = hands.to_deliver.is_some();
         let may_find_more = !context.is_explored && hands.can_take_target;
-        if carries && !(may_find_more && frames_left > EXPLORE_LOADED_FRAMES)
+        if carries
+            && !(may_find_more && frames_left > EXPLORE_LOADED_FRAMES)
             && valid.contains(&Plan::Deliver)
         {
             return Plan::Deliver;
@@ -264,10 +270,24 @@ impl InferPolicy {
         if let Some(remove) = valid.iter().find(|plan| is_relevant_removal(context, plan)) {
             return *remove;
         }
-        if context.is_explored && valid.contains(&Plan::FollowPartner) && !carries {
-            return Plan::FollowPartner;
+        let is_container = |plan: &&Plan| matches!(plan, Plan::PickContainer(_));
+        let others: Vec<Plan> = valid.iter().filter(|plan| !is_container(plan)).copied().collect();
+        let goal = self.most_likely_goal(context.briefing);
+        let briefing = Briefing { goal, ..context.briefing.clone() };
+        match self.rules.decide(&Context { briefing: &briefing, ..*context }, &others) {
+            Plan::Explore if context.is_explored && valid.contains(&Plan::FollowPartner) => {
+                Plan::FollowPartner
+            }
+            plan => plan,
         }
-        Plan::Explore
+    }
+
+    /// Returns the most likely goal, with more objects of each class than any episode has.
+    fn most_likely_goal(&self, briefing: &Briefing) -> Option<Goal> {
+        let goals = self.goals(briefing);
+        let best = goals.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let targets = best.1.into_iter().map(|(class, n)| (class, n as u32));
+        Some(Goal { targets: targets.collect() })
     }
 
     /// Returns what to do while the goal is unclear.
@@ -367,7 +387,9 @@ impl Policy for InferPolicy {
         }
         if !self.options.plans {
             self.mode = "rules";
-            return Ok(self.rules.decide(context, valid));
+            let goal = self.most_likely_goal(context.briefing);
+            let briefing = Briefing { goal, ..context.briefing.clone() };
+            return Ok(self.rules.decide(&Context { briefing: &briefing, ..*context }, valid));
         }
         self.mode = "plan";
         Ok(match self.team_plan(context, valid) {

@@ -92,6 +92,7 @@ impl ProblemBuilder {
         let classes = goal_classes(partner);
         let mut places = self.places(briefing, memory, partner, &classes, field);
         if !places.iter().any(|p| p.kind == PlaceKind::Goal) {
+            if std::env::var("TEAM").is_ok() { eprintln!("NO GOAL f{} {:?}", memory.frame, memory.objects.iter().filter(|o| briefing.goal_places.contains(&o.class)).map(|o| (o.track, o.is_present, o.is_gone, o.top_m, o.position_in_world, o.footprint.len(), memory.path_length_to(o), memory.goal_places().len())).collect::<Vec<_>>()); }
             return None;
         }
         places.truncate(MAX_PLACES);

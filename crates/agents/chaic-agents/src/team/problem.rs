@@ -92,7 +92,7 @@ pub struct OperationFrames {
 impl OperationFrames {
     /// The measured values.
     pub const MEASURED: OperationFrames =
-        OperationFrames { pick_up: 62.0, put_in: 94.0, put_on: 84.0, remove: 150.0 };
+        OperationFrames { pick_up: 78.0, put_in: 96.0, put_on: 108.0, remove: 160.0 };
 }
 
 /// Operation of the helper.

@@ -41,9 +41,12 @@ pub fn improve(
     rng: &mut RngStream,
 ) -> TeamPlan {
     let mut search = Search::new(problem);
-    let mut best = search.rated(greedy(problem));
-    for candidate in candidates {
-        let candidate = search.rated(candidate.clone());
+    let mut best = search.rated(Vec::new());
+    let greedy = [false, true].into_iter().flat_map(|uses_containers| {
+        [false, true].map(|removes| greedy(problem, uses_containers, removes))
+    });
+    for candidate in greedy.chain(candidates.iter().cloned()) {
+        let candidate = search.rated(candidate);
         if candidate.value > best.value {
             best = candidate;
         }
@@ -67,27 +70,45 @@ pub fn improve(
     best
 }
 
-/// Returns the sequence that removes all blocking obstacles, then picks up the nearest target and
-/// delivers when the hands are full.
-pub fn greedy(problem: &TeamProblem) -> Vec<Operation> {
-    let is_blocked = problem.partner.as_ref().is_some_and(|p| p.is_blocked);
-    let obstacles = problem.places_of(PlaceKind::Obstacle).filter(|_| is_blocked);
+/// Returns a sequence in the order of the published rules: all obstacles, if they shall be removed;
+/// then trips that pick up the nearest targets until the hands are full. Trips for three targets or
+/// more begin with the nearest container, if containers shall be used.
+pub fn greedy(problem: &TeamProblem, uses_containers: bool, removes: bool) -> Vec<Operation> {
+    let obstacles = problem.places_of(PlaceKind::Obstacle).filter(|_| removes);
     let mut operations: Vec<Operation> = obstacles.map(Operation::Remove).collect();
-    let mut left: Vec<usize> = problem.places_of(PlaceKind::Target).collect();
+    let mut targets: Vec<usize> = problem.places_of(PlaceKind::Target).collect();
+    let mut containers: Vec<usize> = problem.places_of(PlaceKind::Container).collect();
+    let helper = &problem.helper;
     let mut row = problem.helper_row();
-    let n_hands = problem.helper.n_loose.max(1);
-    let mut n_free = n_hands.saturating_sub(problem.helper.loose.len());
-    while !left.is_empty() {
-        if n_free == 0 {
+    let mut has_container = helper.contained.is_some();
+    let mut n_carried = helper.loose.len() + helper.contained.as_ref().map_or(0, Vec::len);
+    let path = |row: usize, place: usize| problem.path_m[row][place];
+    let take_nearest = |row: usize, places: &mut Vec<usize>| {
+        let order = |a: &usize, b: &usize| path(row, places[*a]).total_cmp(&path(row, places[*b]));
+        let nearest = (0..places.len()).min_by(order)?;
+        Some(places.remove(nearest))
+    };
+    while !targets.is_empty() {
+        let capacity = if has_container { problem.container_capacity + 1 } else { helper.n_loose };
+        if n_carried >= capacity.max(1) {
             operations.push(Operation::Deliver);
-            n_free = n_hands;
+            (n_carried, has_container) = (0, false);
+            continue;
         }
-        let path = |i: &usize| problem.path_m[row][left[*i]];
-        let nearest = (0..left.len()).min_by(|a, b| path(a).total_cmp(&path(b)));
-        let Some(nearest) = nearest else { break };
-        row = left.remove(nearest);
-        operations.push(Operation::PickUp(row));
-        n_free -= 1;
+        let wants_container = uses_containers
+            && helper.carries_containers
+            && !has_container
+            && n_carried == 0
+            && targets.len() >= 3;
+        if wants_container && let Some(container) = take_nearest(row, &mut containers) {
+            operations.push(Operation::TakeContainer(container));
+            (row, has_container) = (container, true);
+            continue;
+        }
+        let Some(target) = take_nearest(row, &mut targets) else { break };
+        operations.push(Operation::PickUp(target));
+        row = target;
+        n_carried += 1;
     }
     operations
 }
@@ -126,6 +147,14 @@ impl<'a> Search<'a> {
             if !operations.is_empty() {
                 waiting.push(operations.remove(rng.below(operations.len())));
             }
+        }
+        if rng.chance(0.15) {
+            // A container replaces a delivery.
+            operations.iter().position(|o| *o == Operation::Deliver).map(|at| operations.remove(at));
+            let is_container = |o: &Operation| matches!(o, Operation::TakeContainer(_));
+            let unused = self.single.iter().filter(|o| is_container(o) && !operations.contains(o));
+            let unused: Vec<Operation> = unused.copied().collect();
+            waiting.extend(rng.choose(&unused));
         }
         if waiting.is_empty() || rng.chance(0.4) {
             // An unused operation, another delivery, or a replacement.

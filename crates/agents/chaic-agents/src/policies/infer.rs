@@ -77,6 +77,10 @@ mod constants {
 }
 use constants::*;
 
+fn knob(name: &str, default: f32) -> f32 {
+    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
+}
+
 /// Step of a plan, by tracks instead of places, which change between decisions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Step {
@@ -167,7 +171,7 @@ impl InferPolicy {
     /// Returns whether the goal is clear enough to act on it.
     fn is_goal_clear(&mut self, context: &Context<'_>) -> bool {
         let is_clear = context.briefing.goal.is_some()
-            || self.belief.as_ref().is_some_and(|belief| belief.goal.most_likely().1 >= SURE);
+            || self.belief.as_ref().is_some_and(|belief| belief.goal.most_likely().1 >= knob("SURE", SURE));
         if is_clear && self.identified.is_none() {
             self.identified = Some(context.memory.frame);
         }
@@ -301,8 +305,8 @@ impl InferPolicy {
             return *remove;
         }
         let partner = memory.companion(context.briefing, CompanionRole::Partner);
-        let is_lost = partner.is_some_and(|p| p.frame + LOST_FRAMES < memory.frame);
-        let watches = self.options.watches && (memory.frame < WATCH_UNTIL || is_lost);
+        let is_lost = partner.is_some_and(|p| (p.frame + knob("LOST", 400.0) as u32) < memory.frame);
+        let watches = self.options.watches && ((memory.frame < (knob("WATCH", 600.0) as u32)) || is_lost);
         if watches && valid.contains(&Plan::FollowPartner) {
             return Plan::FollowPartner;
         }

@@ -184,6 +184,11 @@ impl Evidence {
         self.lying.get(&track).map(|l| l.top_m)
     }
 
+    #[cfg(test)]
+    pub(super) fn set_lying_top(&mut self, track: TrackId, top_m: f32) {
+        self.lying.insert(track, Lying { at: Vec2::ZERO, top_m });
+    }
+
     fn update_own(&mut self, memory: &Memory) {
         let picked = memory.history.iter().filter_map(|record| match record.action {
             Action::PickUp { object, .. } if record.outcome.is_success() => Some(object),

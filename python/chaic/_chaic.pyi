@@ -65,6 +65,7 @@ class Briefing:
     grants: dict[str, bool]
     goal: dict[str, Any] | None
     disclosure: dict[str, Any] | None
+    layout: dict[str, Any] | None
     def as_dict(self) -> dict[str, Any]:
         """Returns all fields."""
 

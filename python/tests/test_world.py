@@ -50,7 +50,7 @@ def test_an_observation_contains_the_requested_images(episode):
 def test_goal_and_ids_need_grants(episode):
     world = chaic.World(episode, **OPTIONS)
     briefing = world.briefing()
-    assert briefing.goal is None and briefing.disclosure is None
+    assert briefing.goal is None and briefing.disclosure is None and briefing.layout is None
     assert briefing.as_dict()["grants"]["ids"] is False
     with pytest.raises(ValueError, match="grant"):
         chaic.World(episode, images=["ids"])
@@ -58,6 +58,18 @@ def test_goal_and_ids_need_grants(episode):
     granted.advance()
     observation = granted.observe()
     assert observation.ids.dtype == np.uint16 and len(observation.granted["classes"]) > 0
+    assert "state" not in observation.granted
+
+
+def test_the_state_needs_its_grant(episode):
+    world = chaic.World(episode, grants=["state"], image_size=32)
+    world.advance()
+    state = world.observe().granted["state"]
+    listed = {thing["entity"]: thing for thing in state["objects"]}
+    assert len(listed) > 10 and set(state["goal_places"]) <= set(listed)
+    assert all(thing["bottom_m"] < thing["top_m"] for thing in listed.values())
+    layout = world.briefing().layout
+    assert layout["floors"] and {"center_xz", "half_xz", "yaw_rad", "y_range_m"} == set(layout["blocks"][0])
 
 
 def test_a_restored_snapshot_repeats_the_episode(episode):

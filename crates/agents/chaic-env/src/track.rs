@@ -201,7 +201,8 @@ mod tests {
             }
         }
         let refused = Track::Hidden.check_grants("mine", Grants::ALL).unwrap_err();
-        assert!(refused.contains("ids, goal, progress, behavior, positions, task,"), "{refused}");
+        let all = "ids, goal, progress, behavior, positions, task, state,";
+        assert!(refused.contains(all), "{refused}");
     }
 
     #[test]

@@ -28,6 +28,10 @@ impl Briefing {
     }
 
     fn __getattr__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        if name == "layout" {
+            // The field is absent without the grant of the state.
+            return plain(py, &self.0.layout);
+        }
         let missing = |_| no_attribute("Briefing", name, &[("told", "disclosure")]);
         plain(py, &self.0)?.get_item(name).map_err(missing)
     }

@@ -167,14 +167,16 @@ fn difference(a: &RecordedDecision, b: &RecordedDecision) -> Option<&'static str
 
 /// Returns whether rules or grants disclose all differences in granted data. These are removed
 /// obstacles, if the rules announce them, and the behavior of the partner in the image, if it is
-/// granted: its posture may not show a new action yet.
+/// granted: its posture may not show a new action yet. The granted state discloses all objects, and
+/// the granted behavior at any place.
 fn is_disclosed(pair: &Pair<'_>, part: &str, a: &Observation, b: &Observation) -> bool {
     let undisclosed = |o: &Observation| {
         let mut granted = o.granted.clone();
         if pair.rules.world.tells_removed {
             granted.removed.clear();
         }
-        if granted.classes.iter().any(|(e, _)| e.agent() == Some(AgentId::PARTNER)) {
+        let sees_partner = granted.classes.iter().any(|(e, _)| e.agent() == Some(AgentId::PARTNER));
+        if granted.state.take().is_some() || sees_partner {
             granted.behavior.retain(|behavior| behavior.agent != AgentId::PARTNER);
             granted.partner_hands = None;
         }

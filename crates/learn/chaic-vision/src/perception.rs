@@ -39,7 +39,8 @@ impl PerceptionFactory for LearnedPerceptionFactory {
     }
 
     fn grants(&self, requested: Grants) -> Grants {
-        Grants { ids: false, ..requested }
+        // The granted state names objects by ids, which this perception cannot match to its tracks.
+        Grants { ids: false, state: false, ..requested }
     }
 
     fn perception(&self) -> Box<dyn Perception> {

@@ -2,3 +2,4 @@
 
 mod batch;
 mod env;
+mod granted_state;

@@ -78,7 +78,7 @@ pub fn helper(text: &str) -> Result<HelperArgument, String> {
 #[command(next_help_heading = "Helper processes")]
 pub struct ExecArguments {
     /// Grants of helper processes, separated by commas: ids, goal_place, goal, progress, behavior,
-    /// positions, task; docs/grants.md [default: none].
+    /// positions, task, state; docs/grants.md [default: none].
     #[arg(long, value_name = "NAMES", value_parser = grants)]
     pub exec_grants: Option<Grants>,
     /// Time limit of one decision, seconds [default: 30].

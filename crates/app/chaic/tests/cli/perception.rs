@@ -170,7 +170,7 @@ fn the_hidden_track_refuses_grants_of_every_kind_of_helper() {
         assert!(!dir.join("run/run.json").exists());
         error
     };
-    for grant in ["ids", "goal", "progress", "behavior", "positions", "task"] {
+    for grant in ["ids", "goal", "progress", "behavior", "positions", "task", "state"] {
         let error = refused(&["--helper", "mine=exec:true", "--exec-grants", grant]);
         let message = format!("`mine` is granted {grant}, which the hidden track refuses");
         assert!(error.contains(&message), "{error}");

@@ -23,7 +23,7 @@ pub struct HelperInfo {
 }
 
 /// All helpers of this crate.
-pub static HELPERS: [HelperInfo; 7] = [
+pub static HELPERS: [HelperInfo; 8] = [
     HelperInfo {
         name: "random",
         title: "Random",
@@ -53,6 +53,12 @@ pub static HELPERS: [HelperInfo; 7] = [
         title: "Infer",
         make: |rules, factory| Box::new(infer(rules, factory, InferOptions::ALL)),
         grants: planner_grants,
+    },
+    HelperInfo {
+        name: "infer_told",
+        title: "Infer, told",
+        make: |rules, factory| Box::new(infer(rules, factory, InferOptions::ALL)),
+        grants: |rules| Grants { goal: true, ..planner_grants(rules) },
     },
     HelperInfo {
         name: "ideal_observer",

@@ -30,7 +30,7 @@ const MISSES_GROWTH: u32 = 4;
 const MAX_FOOTPRINT: usize = 512;
 /// A granted position that differs by less counts as unchanged, meters.
 const PLACED_M: f32 = 0.05;
-/// Time for which an object counts as held after each granted state that says so, frames.
+/// Time for which an object counts as held after a granted state with a holder, frames.
 const PLACED_HELD_FRAMES: Frame = 5;
 
 /// Known object.
@@ -297,7 +297,7 @@ impl SemanticMap {
 
     /// Inserts or corrects an object according to its granted state. From then on, sightings of it
     /// only update [`MappedObject::last_seen`], which is 0 before the first sighting. An object
-    /// held by another agent keeps its track and counts as held; one in a container that nobody
+    /// held by another agent keeps its track and counts as held; one in a container that no agent
     /// holds is absent.
     pub fn place(&mut self, state: &ObjectState, now: Frame) {
         let track = TrackId::from(state.entity);
@@ -332,7 +332,7 @@ impl SemanticMap {
     pub fn expire(&mut self, before: Frame, now: Frame) {
         let passed = |until: Frame| before < until && until <= now;
         for object in self.objects.values_mut() {
-            // Granted states tell themselves when an object is no longer held.
+            // A granted state includes the release of an object.
             let is_released = object.placement.is_none() && passed(object.held_until);
             if passed(object.ignore_until) || is_released {
                 self.n_changes += 1;

@@ -132,7 +132,7 @@ fn moves_holders_containers_and_deliveries_are_followed() {
     let basket = chaic_core::EntityId(999);
     world.object(apple).container = Some(basket);
     world.update();
-    assert!(!world.can_take(apple), "in a container that nobody holds");
+    assert!(!world.can_take(apple), "in a container that no agent holds");
     world.object(apple).container = None;
     world.update();
     assert!(world.can_take(apple));

@@ -10,6 +10,7 @@
 mod constraint;
 mod evidence;
 mod goal;
+mod neglect;
 mod scene;
 mod walking_speed;
 
@@ -21,6 +22,7 @@ use crate::memory::Memory;
 pub use constraint::ConstraintBelief;
 pub use evidence::{AttemptKind, Evidence, FailedAttempt, Take};
 pub use goal::GoalBelief;
+pub use neglect::Neglect;
 
 /// Belief of one agent about its partner.
 #[derive(Clone, Debug)]

@@ -163,7 +163,7 @@ impl Executor {
         match *plan {
             Plan::Explore => {
                 let step = match s.memory.rules.exploration {
-                    Exploration::Frontier => {
+                    Exploration::Frontier | Exploration::UnknownArea => {
                         self.frontier_explorer.step(s.memory, self.navigator.as_mut())
                     }
                     Exploration::Sampled => {

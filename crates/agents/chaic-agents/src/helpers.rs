@@ -7,7 +7,7 @@ use crate::behavior::GroundTruthBehavior;
 use crate::perception_factory::PerceptionFactory;
 use crate::planning_agent::PlanningAgent;
 use crate::policies::{FollowPolicy, InferOptions, InferPolicy, RandomPolicy, RulePolicy, RuleProfile};
-use crate::rules::PlannerRules;
+use crate::rules::{Exploration, PlannerRules};
 
 /// Table entry of a built-in helper.
 #[derive(Clone, Copy, Debug)]
@@ -112,6 +112,10 @@ pub fn infer(
 ) -> PlanningAgent<InferPolicy> {
     let policy = InferPolicy::new(options);
     let grants = planner_grants(rules);
+    let rules = match rules.exploration {
+        Exploration::Frontier => PlannerRules { exploration: Exploration::UnknownArea, ..rules },
+        _ => rules,
+    };
     PlanningAgent::with_watched(policy, rules, factory, AgentId::PARTNER, grants)
 }
 

@@ -369,7 +369,7 @@ impl Memory {
     pub fn refresh(&mut self) {
         self.refresh_costs();
         let needs_cost_field =
-            self.cost_model.uses_path_length() || self.rules.exploration == Exploration::Frontier;
+            self.cost_model.uses_path_length() || self.rules.exploration != Exploration::Sampled;
         if needs_cost_field && self.cost_field.is_none() {
             self.cost_field = Some(CostField::new(&self.costs, self.position(), &mut self.search));
         }

@@ -32,6 +32,9 @@ pub enum Exploration {
     Frontier,
     /// The cheapest of about a hundred random cells in unknown space (facts A1.10).
     Sampled,
+    /// The frontier with the largest unknown area behind it per path length (ours; the inferring
+    /// helper's own strategy).
+    UnknownArea,
 }
 
 /// Bookkeeping of the objects that are still needed.

@@ -6,6 +6,7 @@ use chaic_core::briefing::CompanionRole;
 use chaic_core::geom::to_xz;
 use chaic_core::{Action, Briefing, ClassId, FailureReason, Frame, Outcome, Vec2};
 
+use super::neglect::Neglect;
 use super::walking_speed::WalkingSpeed;
 use crate::behavior::BehaviorLog;
 use crate::mapping::{CellOccupancy, MappedObject, TrackedPerson};
@@ -125,6 +126,8 @@ pub struct Evidence {
     pub speed: Option<f32>,
     /// Frame of the last sighting, or of the last granted position.
     pub last_seen: Option<Frame>,
+    /// Walks away from known objects.
+    pub neglect: Neglect,
     /// Objects that the agent itself has picked up.
     own: BTreeSet<TrackId>,
     /// Where objects were last seen lying.
@@ -174,7 +177,9 @@ impl Evidence {
             self.update_sighting(partner);
         }
         if let Some(partner) = partner {
-            self.update_visits(briefing, memory, behavior, to_xz(partner.position_in_world));
+            let at = to_xz(partner.position_in_world);
+            self.update_visits(briefing, memory, behavior, at);
+            self.neglect.observe(briefing, memory, behavior, at);
         }
         self.update_passed(memory);
     }
@@ -417,12 +422,12 @@ impl Evidence {
 }
 
 /// Returns whether an object is in play and in nobody's hands, as far as known.
-fn is_at_rest(object: &MappedObject, now: Frame) -> bool {
+pub(super) fn is_at_rest(object: &MappedObject, now: Frame) -> bool {
     object.is_present && !object.is_gone && object.held_until <= now
 }
 
 /// Returns whether a wall stands between a person and an object.
-fn is_hidden(memory: &Memory, from: Vec2, to: Vec2) -> bool {
+pub(super) fn is_hidden(memory: &Memory, from: Vec2, to: Vec2) -> bool {
     let grid = memory.map.grid();
     grid.line(from, to).any(|cell| {
         memory.map.state(cell) == CellOccupancy::Wall

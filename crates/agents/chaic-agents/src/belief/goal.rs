@@ -10,6 +10,7 @@ use chaic_core::{Briefing, ClassId, Role};
 
 use super::constraint::ConstraintBelief;
 use super::evidence::{AttemptKind, Evidence, reliability};
+use super::neglect::Neglect;
 use super::posterior;
 use super::scene::{expected_per_class, scene_of, set_size, target_sets};
 
@@ -21,6 +22,12 @@ const N_EXTRA: u32 = 1;
 const UNKNOWN_COUNT: u32 = 9;
 /// Factor of the likelihood for each wanted object within reach that the partner passed.
 const PASSED_FACTOR: f32 = 0.74;
+/// Time after which the partner would have gone to a wanted object that it knows, frames: the
+/// likelihood of walking elsewhere falls to 1/e. Ours, chosen on `gen-standard:7000..7010`.
+const NEGLECT_FRAMES: f32 = 150.0;
+/// Maximum effect of such walks on the logarithm of the likelihood: walks around furniture may look
+/// like walks elsewhere.
+const MAX_NEGLECT: f32 = 2.5;
 /// Minimum probability of the extra class and of fragile targets in a concluded goal.
 const MIN_ADDITION: f32 = 0.5;
 
@@ -79,7 +86,9 @@ impl Hypothesis {
 }
 
 /// Summary of the evidence for all hypotheses.
-struct Summary {
+struct Summary<'a> {
+    possible: &'a [ClassId],
+    neglect: &'a Neglect,
     /// Reliabilities of the takes, by class, highest first.
     takes: BTreeMap<ClassId, Vec<f32>>,
     /// Classes of passed objects with the probability that the object is within reach.
@@ -88,8 +97,12 @@ struct Summary {
     background: f32,
 }
 
-impl Summary {
-    fn new(evidence: &Evidence, constraint: &ConstraintBelief, possible: &[ClassId]) -> Summary {
+impl<'a> Summary<'a> {
+    fn new(
+        evidence: &'a Evidence,
+        constraint: &ConstraintBelief,
+        possible: &'a [ClassId],
+    ) -> Summary<'a> {
         let mut by_track: BTreeMap<_, (ClassId, f32)> = BTreeMap::new();
         let takes = evidence.taken.iter().map(|(track, t)| (*track, t.class, t.reliability()));
         // A failed attempt shows the intention as a take does; repetitions show nothing new.
@@ -107,7 +120,8 @@ impl Summary {
         let reach = |track| evidence.lying_top_m(track).map(|m| constraint.reach_probability(m));
         let passed = evidence.passed.iter().map(|(t, class)| (*class, reach(*t).unwrap_or(1.0)));
         let background = 1.0 / possible.len().max(1) as f32;
-        Summary { takes, passed: passed.collect(), background }
+        let (passed, neglect) = (passed.collect(), &evidence.neglect);
+        Summary { possible, neglect, takes, passed, background }
     }
 
     fn log_likelihood(&self, hypothesis: &Hypothesis) -> f32 {
@@ -124,11 +138,30 @@ impl Summary {
             let n_taken = self.takes.get(class).map_or(0, Vec::len);
             let is_satisfied = hypothesis.limit(*class).is_some_and(|n| n_taken >= n as usize);
             if !is_satisfied {
-                sum += math::ln(1.0 - (1.0 - PASSED_FACTOR) * reach);
+                sum += math::ln(1.0 - (1.0 - knob("PASS", PASSED_FACTOR)) * reach);
             }
         }
-        sum
+        sum - (self.neglect_frames(hypothesis) / knob("TAU", NEGLECT_FRAMES)).min(knob("NCAP", MAX_NEGLECT))
     }
+
+    /// Returns the frames in which the partner knew of an object that this hypothesis still wants,
+    /// and approached none.
+    fn neglect_frames(&self, hypothesis: &Hypothesis) -> f32 {
+        let mut wanted = 0;
+        for (k, class) in self.possible.iter().enumerate().take(32) {
+            let n_taken = self.takes.get(class).map_or(0, Vec::len);
+            let is_wanted = match hypothesis.limit(*class) {
+                None => true,
+                Some(limit) => n_taken < limit as usize,
+            };
+            wanted |= u32::from(is_wanted) << k;
+        }
+        self.neglect.frames(wanted)
+    }
+}
+
+fn knob(name: &str, default: f32) -> f32 {
+    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
 }
 
 impl GoalBelief {

@@ -8,9 +8,10 @@ use super::destination::Destination;
 use super::exploration::ExplorationStep;
 use super::navigation::{NavigationStep, Navigator};
 use super::steering::turn_towards;
-use crate::mapping::CellOccupancy;
+use crate::mapping::{CELL_M, CellOccupancy};
 use crate::memory::Memory;
 use crate::planning::path::CostField;
+use crate::rules::Exploration;
 
 /// Minimum length of a frontier, cells (0.6 m).
 const MIN_FRONTIER: usize = 5;
@@ -26,6 +27,11 @@ const RESOLVED_M: f32 = 0.3;
 const BONUS_PER_CELL_M: f32 = 0.03;
 /// Maximum offset of one frontier, meters.
 const MAX_BONUS_M: f32 = 2.0;
+/// Distance of the center of the area behind a frontier from it, and its radius, meters.
+const AREA_AHEAD_M: f32 = 1.5;
+const AREA_RADIUS_M: f32 = 2.0;
+/// Path length added to each frontier's when areas are compared, meters: looking takes time too.
+const AREA_PATH_M: f32 = 2.0;
 /// Arrival distance of a place to revisit, meters.
 const REVISIT_M: f32 = 1.0;
 /// Turns to look around at a revisited place.
@@ -194,8 +200,13 @@ impl FrontierExplorer {
                 .filter_map(|c| Some((field.cost(*c)?, *c)))
                 .min();
             let Some((cost, cell)) = nearest else { continue };
-            let bonus_m = (BONUS_PER_CELL_M * cluster.len() as f32).min(MAX_BONUS_M);
-            let score = CostField::meters(cost) - bonus_m;
+            let path_m = CostField::meters(cost);
+            let score = match memory.rules.exploration {
+                Exploration::UnknownArea => {
+                    -self.unknown_area_m2(memory, cell) / (path_m + AREA_PATH_M)
+                }
+                _ => path_m - (BONUS_PER_CELL_M * cluster.len() as f32).min(MAX_BONUS_M),
+            };
             if best.is_none_or(|(s, _)| score < s) {
                 let at = grid.center(cell);
                 let side = self.unknown_side(memory, cell).map_or(at, |c| grid.center(c));
@@ -205,6 +216,18 @@ impl FrontierExplorer {
             }
         }
         best.map(|(_, target)| target)
+    }
+
+    /// Returns the unknown area behind a frontier cell, square meters.
+    fn unknown_area_m2(&self, memory: &Memory, cell: usize) -> f32 {
+        let grid = memory.map.grid();
+        let at = grid.center(cell);
+        let Some(side) = self.unknown_side(memory, cell) else { return 0.0 };
+        let center = at + AREA_AHEAD_M * (grid.center(side) - at).normalize_or_zero();
+        let is_unknown = |c: &usize| {
+            memory.map.is_unexplored(*c) && self.bounds.contains(grid.center(*c))
+        };
+        grid.disc(center, AREA_RADIUS_M).filter(is_unknown).count() as f32 * CELL_M * CELL_M
     }
 
     /// Returns the place with the highest ratio of time since it was last seen to path length.

@@ -170,10 +170,15 @@ impl InferPolicy {
 
     /// Returns whether the goal is clear enough to act on it.
     fn is_goal_clear(&mut self, context: &Context<'_>) -> bool {
+        let sure = match context.memory.frame < knob("WATCH", 600.0) as u32 {
+            true => knob("SURE", SURE),
+            false => knob("LATE", SURE),
+        };
         let is_clear = context.briefing.goal.is_some()
-            || self.belief.as_ref().is_some_and(|belief| belief.goal.most_likely().1 >= knob("SURE", SURE));
+            || self.belief.as_ref().is_some_and(|belief| belief.goal.most_likely().1 >= sure);
         if is_clear && self.identified.is_none() {
             self.identified = Some(context.memory.frame);
+            if std::env::var("IDS").is_ok() && let Some(b) = &self.belief { eprintln!("ID f{} {:?} taken {:?} failed {:?} passed {:?}", context.memory.frame, b.goal.set_probabilities(), b.evidence.taken.values().map(|t| (t.class.info().label, t.strength, t.frame)).collect::<Vec<_>>(), b.evidence.failed.len(), b.evidence.passed.len()); }
         }
         is_clear
     }
@@ -357,7 +362,9 @@ impl Policy for InferPolicy {
     fn observe(&mut self, _: &Observation, memory: &Memory, behavior: &BehaviorLog) {
         let Some(briefing) = &self.briefing else { return };
         if let Some(belief) = &mut self.belief {
+            let before = belief.evidence.taken.clone();
             belief.observe(briefing, memory, behavior);
+            if std::env::var("TAKES").is_ok() { for (t, k) in &belief.evidence.taken { if before.get(t).is_none_or(|b| b.strength != k.strength) { eprintln!("TAKE {} {} {} {}", memory.frame, t.0, k.class.info().name, k.strength); } } for t in before.keys() { if !belief.evidence.taken.contains_key(t) { eprintln!("UNTAKE {} {}", memory.frame, t.0); } } }
         }
         let partner = memory.companion(briefing, CompanionRole::Partner);
         if let Some(person) = partner.filter(|p| p.is_in_view) {
@@ -434,6 +441,10 @@ impl Policy for InferPolicy {
     }
 
     fn status(&self) -> Option<String> {
+        if std::env::var("BELIEF").is_ok() && let Some(b) = &self.belief {
+            let sets: Vec<String> = b.goal.set_probabilities().iter().map(|(s, p)| format!("{s:?}={p:.4}")).collect();
+            return Some(format!("{} {}", self.mode, sets.join(" ")));
+        }
         Some(self.mode.to_owned())
     }
 

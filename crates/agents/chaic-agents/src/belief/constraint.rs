@@ -18,7 +18,8 @@ const LIFT_PENALTY: LimitPenalty = LimitPenalty { alpha: 50.0, beta: 1.0 };
 
 /// Chance of a failure within all limits, for example by a tremor.
 const UNEXPLAINED_FAILURE: f32 = 0.02;
-/// Chance of an attempt that was recognized wrongly, whatever the person: no information.
+/// Chance of an attempt that was recognized wrongly. It is the same for all people, so such an
+/// attempt carries no information.
 const UNINFORMED: f32 = 0.5;
 
 /// Distance from the height within which the top of a fully visible body is equally likely, meters.

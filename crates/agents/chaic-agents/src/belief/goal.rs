@@ -34,7 +34,7 @@ const MIN_ADDITION: f32 = 0.5;
 /// Belief about the goal of the partner.
 #[derive(Clone, Debug)]
 pub struct GoalBelief {
-    told: Option<Goal>,
+    granted: Option<Goal>,
     possible: Vec<ClassId>,
     sets: Vec<TargetSet>,
     hypotheses: Vec<Hypothesis>,
@@ -169,7 +169,7 @@ impl GoalBelief {
     /// other sets for the extra object. A granted goal is certain.
     pub fn new(briefing: &Briefing) -> GoalBelief {
         let possible = briefing.possible_targets.clone();
-        let told = briefing.goal.clone();
+        let granted = briefing.goal.clone();
         let scene = scene_of(&possible);
         let has_set = |set: &TargetSet| possible.iter().any(|c| c.info().sets.contains(set));
         let mut sets = scene.map(target_sets).unwrap_or_default();
@@ -179,7 +179,7 @@ impl GoalBelief {
         let probabilities = vec![0.0; hypotheses.len()];
         let wants_everything = scene == Some(SceneKind::Yard);
         let secured = BTreeMap::new();
-        GoalBelief { told, possible, sets, hypotheses, probabilities, secured, wants_everything }
+        GoalBelief { granted, possible, sets, hypotheses, probabilities, secured, wants_everything }
     }
 
     /// Replaces the posterior by that of the evidence. The constraint determines which objects the
@@ -206,8 +206,8 @@ impl GoalBelief {
 
     /// Returns the probability of each target set of the scene.
     pub fn set_probabilities(&self) -> Vec<(TargetSet, f32)> {
-        if let Some(told) = &self.told {
-            let best = self.set_of(told);
+        if let Some(granted) = &self.granted {
+            let best = self.set_of(granted);
             return self.sets.iter().map(|s| (*s, f32::from(u8::from(best == Some(*s))))).collect();
         }
         let probability = |set: TargetSet| self.sum(|h| h.set == set);
@@ -216,20 +216,20 @@ impl GoalBelief {
 
     /// Returns the probability that at least one object of this class is wanted.
     pub fn probability_wanted(&self, class: ClassId) -> f32 {
-        match &self.told {
-            Some(told) => f32::from(u8::from(told.count(class) > 0)),
+        match &self.granted {
+            Some(granted) => f32::from(u8::from(granted.count(class) > 0)),
             None if !self.possible.contains(&class) => 0.0,
             None => self.sum(|h| h.count(class) > 0.0),
         }
     }
 
-    /// Returns the expected number of wanted objects of this class that nobody has delivered and
-    /// that the partner does not hold.
+    /// Returns the expected number of wanted objects of this class that are neither delivered nor
+    /// held by the partner.
     pub fn expected_missing(&self, class: ClassId) -> f32 {
         let secured = self.secured.get(&class).copied().unwrap_or(0.0);
         let missing = |count: f32| (count - secured).max(0.0);
-        match &self.told {
-            Some(told) => missing(told.count(class) as f32),
+        match &self.granted {
+            Some(granted) => missing(granted.count(class) as f32),
             None if !self.possible.contains(&class) => 0.0,
             None => {
                 let each = self.hypotheses.iter().zip(&self.probabilities);
@@ -251,8 +251,8 @@ impl GoalBelief {
     /// class and fragile targets are included from a probability of 0.5, given the set. A granted
     /// goal is returned as it is.
     pub fn goal(&self, min_probability: f32) -> Option<Goal> {
-        if self.told.is_some() {
-            return self.told.clone();
+        if self.granted.is_some() {
+            return self.granted.clone();
         }
         let (set, probability) = self.most_likely();
         if probability <= 0.0 || probability < min_probability {

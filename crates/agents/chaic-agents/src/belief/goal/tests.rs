@@ -125,6 +125,30 @@ fn one_object_of_another_set_is_the_extra_class_and_two_are_not() {
 }
 
 #[test]
+fn objects_beyond_the_wanted_number_are_explained_by_false_readings_only() {
+    let briefing = house();
+    let constraint = ConstraintBelief::new(&briefing);
+    let extra = Some(class("pen"));
+    let fruit = Hypothesis { set: TargetSet::Fruit, extra, wants_fragile: true, prior: 1.0 };
+    let log_likelihood = |list: &[(&str, f32)]| {
+        Summary::new(&takes(20, list), &constraint, &briefing.possible_targets)
+            .log_likelihood(&fruit)
+    };
+    // Of 10 objects, 1 is a pen and 2 are vases. False readings: 0.02 / 15, and 0.4 / 15 at
+    // strength 0.4. The strongest readings are the explained ones.
+    let (false_sure, false_weak) = (0.02 / 15.0, 0.4 / 15.0);
+    let (pen, vase) = (0.98 * 0.1 + false_sure, 0.98 * 0.2 + false_sure);
+    for (list, expected) in [
+        (&[("pen", 0.4), ("pen", 1.0)][..], math::ln(pen) + math::ln(false_weak)),
+        (&[("pen", 1.0), ("pen", 1.0)], math::ln(pen) + math::ln(false_sure)),
+        (&[("vase", 1.0); 3], 2.0 * math::ln(vase) + math::ln(false_sure)),
+        (&[("apple", 1.0); 2], 2.0 * math::ln(0.98 * 0.7 / 3.0 + false_sure)),
+    ] {
+        assert!((log_likelihood(list) - expected).abs() < 1e-3, "{list:?}");
+    }
+}
+
+#[test]
 fn a_taken_vase_makes_fragile_targets_likely() {
     let belief = belief_of(&takes(20, &[("apple", 1.0), ("vase", 1.0)]));
     assert!(belief.probability_wanted(class("vase")) > 0.9);

@@ -1,12 +1,14 @@
 //! Rule-based helpers by name.
 
-use chaic_core::{Agent, AgentId};
 use chaic_core::observation::Grants;
+use chaic_core::{Agent, AgentId};
 
 use crate::behavior::GroundTruthBehavior;
 use crate::perception_factory::PerceptionFactory;
 use crate::planning_agent::PlanningAgent;
-use crate::policies::{FollowPolicy, InferOptions, InferPolicy, RandomPolicy, RulePolicy, RuleProfile};
+use crate::policies::{
+    FollowPolicy, InferOptions, InferPolicy, RandomPolicy, RulePolicy, RuleProfile,
+};
 use crate::rules::{Exploration, PlannerRules};
 
 /// Table entry of a built-in helper.
@@ -23,7 +25,7 @@ pub struct HelperInfo {
 }
 
 /// All helpers of this crate.
-pub static HELPERS: [HelperInfo; 8] = [
+pub static HELPERS: [HelperInfo; 11] = [
     HelperInfo {
         name: "random",
         title: "Random",
@@ -52,6 +54,33 @@ pub static HELPERS: [HelperInfo; 8] = [
         name: "infer",
         title: "Infer",
         make: |rules, factory| Box::new(infer(rules, factory, InferOptions::ALL)),
+        grants: planner_grants,
+    },
+    HelperInfo {
+        name: "infer_no_watching",
+        title: "Infer, no watching",
+        make: |rules, factory| {
+            let options = InferOptions { watches: false, ..InferOptions::ALL };
+            Box::new(infer(rules, factory, options))
+        },
+        grants: planner_grants,
+    },
+    HelperInfo {
+        name: "infer_no_planner",
+        title: "Infer, rules in place of the planner",
+        make: |rules, factory| {
+            let options = InferOptions { plans: false, ..InferOptions::ALL };
+            Box::new(infer(rules, factory, options))
+        },
+        grants: planner_grants,
+    },
+    HelperInfo {
+        name: "infer_no_constraint",
+        title: "Infer, goal only",
+        make: |rules, factory| {
+            let options = InferOptions { infers_constraint: false, ..InferOptions::ALL };
+            Box::new(infer(rules, factory, options))
+        },
         grants: planner_grants,
     },
     HelperInfo {

@@ -24,10 +24,10 @@ const UNKNOWN_COUNT: u32 = 9;
 const PASSED_FACTOR: f32 = 0.74;
 /// Time after which the partner would have gone to a wanted object that it knows, frames: the
 /// likelihood of walking elsewhere falls to 1/e. Ours, chosen on `gen-standard:7000..7010`.
-const NEGLECT_FRAMES: f32 = 150.0;
+const NEGLECT_FRAMES: f32 = 60.0;
 /// Maximum effect of such walks on the logarithm of the likelihood: walks around furniture may look
 /// like walks elsewhere.
-const MAX_NEGLECT: f32 = 2.5;
+const MAX_NEGLECT: f32 = 4.0;
 /// Minimum probability of the extra class and of fragile targets in a concluded goal.
 const MIN_ADDITION: f32 = 0.5;
 
@@ -138,10 +138,10 @@ impl<'a> Summary<'a> {
             let n_taken = self.takes.get(class).map_or(0, Vec::len);
             let is_satisfied = hypothesis.limit(*class).is_some_and(|n| n_taken >= n as usize);
             if !is_satisfied {
-                sum += math::ln(1.0 - (1.0 - knob("PASS", PASSED_FACTOR)) * reach);
+                sum += math::ln(1.0 - (1.0 - PASSED_FACTOR) * reach);
             }
         }
-        sum - (self.neglect_frames(hypothesis) / knob("TAU", NEGLECT_FRAMES)).min(knob("NCAP", MAX_NEGLECT))
+        sum - (self.neglect_frames(hypothesis) / NEGLECT_FRAMES).min(MAX_NEGLECT)
     }
 
     /// Returns the frames in which the partner knew of an object that this hypothesis still wants,
@@ -158,10 +158,6 @@ impl<'a> Summary<'a> {
         }
         self.neglect.frames(wanted)
     }
-}
-
-fn knob(name: &str, default: f32) -> f32 {
-    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
 }
 
 impl GoalBelief {

@@ -224,9 +224,8 @@ impl FrontierExplorer {
         let at = grid.center(cell);
         let Some(side) = self.unknown_side(memory, cell) else { return 0.0 };
         let center = at + AREA_AHEAD_M * (grid.center(side) - at).normalize_or_zero();
-        let is_unknown = |c: &usize| {
-            memory.map.is_unexplored(*c) && self.bounds.contains(grid.center(*c))
-        };
+        let is_unknown =
+            |c: &usize| memory.map.is_unexplored(*c) && self.bounds.contains(grid.center(*c));
         grid.disc(center, AREA_RADIUS_M).filter(is_unknown).count() as f32 * CELL_M * CELL_M
     }
 

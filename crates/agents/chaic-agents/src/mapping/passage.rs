@@ -54,7 +54,8 @@ mod tests {
         let unseen = is_in_passage(&memory.map, Vec2::new(0.0, -2.0));
         let observation = toy.observe();
         memory.update(&briefing, &observation, &GroundTruthIds.perceive(&observation));
-        let expected = [(0.0, -2.0, true), (0.3, -2.0, true), (2.0, -1.4, false), (0.0, 0.0, false)];
+        let expected =
+            [(0.0, -2.0, true), (0.3, -2.0, true), (2.0, -1.4, false), (0.0, 0.0, false)];
         assert!(!unseen, "what was not seen is no wall");
         for (x, z, expected) in expected {
             assert_eq!(is_in_passage(&memory.map, Vec2::new(x, z)), expected, "{x} {z}");

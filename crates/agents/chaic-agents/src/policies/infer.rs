@@ -17,7 +17,7 @@ use crate::belief::Belief;
 use crate::decision::{Context, HandState, Plan, Policy, Subject};
 use crate::memory::Memory;
 use crate::team::builder::{PartnerModel, ProblemBuilder, is_current_load};
-use crate::team::{Operation, PlaceKind, SearchSettings, TeamProblem, improve, simulate};
+use crate::team::{Operation, SearchSettings, TeamProblem, improve, simulate};
 use crate::track::TrackId;
 
 /// Parts of the helper that an ablation switches off.
@@ -29,19 +29,12 @@ pub struct InferOptions {
     pub infers_constraint: bool,
     /// True if it plans for both; else it follows the rules of the oracle once the goal is clear.
     pub plans: bool,
-    /// True if it weighs watching against acting by expected deliveries; else it watches until the
-    /// goal is clear.
-    pub values_information: bool,
 }
 
 impl InferOptions {
     /// Everything on.
-    pub const ALL: InferOptions = InferOptions {
-        watches: true,
-        infers_constraint: true,
-        plans: true,
-        values_information: true,
-    };
+    pub const ALL: InferOptions =
+        InferOptions { watches: true, infers_constraint: true, plans: true };
 }
 
 /// Constants of the policy, all ours; chosen on episodes of `gen-standard:7000..7010`.
@@ -50,10 +43,9 @@ mod constants {
 
     /// Probability of the most likely target set from which the helper acts on it.
     pub const SURE: f32 = 0.7;
-    /// Frame until which the helper follows the partner while the goal is unclear.
-    pub const WATCH_UNTIL: Frame = 600;
-    /// Time without a sighting after which the helper looks for the partner again, frames.
-    pub const LOST_FRAMES: Frame = 400;
+    /// Time after a sighting for which the helper follows the partner while the goal is unclear,
+    /// frames. Later it explores, which finds the partner sooner.
+    pub const LOST_FRAMES: Frame = 200;
     /// Goals with a lower probability are left out of the plan.
     pub const MIN_GOAL_PROBABILITY: f32 = 0.04;
     /// Number of objects assumed for each class of a target set: more than any episode has.
@@ -76,10 +68,6 @@ mod constants {
     pub const EXPLORE_LOADED_FRAMES: f32 = 900.0;
 }
 use constants::*;
-
-fn knob(name: &str, default: f32) -> f32 {
-    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
-}
 
 /// Step of a plan, by tracks instead of places, which change between decisions.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -170,15 +158,10 @@ impl InferPolicy {
 
     /// Returns whether the goal is clear enough to act on it.
     fn is_goal_clear(&mut self, context: &Context<'_>) -> bool {
-        let sure = match context.memory.frame < knob("WATCH", 600.0) as u32 {
-            true => knob("SURE", SURE),
-            false => knob("LATE", SURE),
-        };
         let is_clear = context.briefing.goal.is_some()
-            || self.belief.as_ref().is_some_and(|belief| belief.goal.most_likely().1 >= sure);
+            || self.belief.as_ref().is_some_and(|belief| belief.goal.most_likely().1 >= SURE);
         if is_clear && self.identified.is_none() {
             self.identified = Some(context.memory.frame);
-            if std::env::var("IDS").is_ok() && let Some(b) = &self.belief { eprintln!("ID f{} {:?} taken {:?} failed {:?} passed {:?}", context.memory.frame, b.goal.set_probabilities(), b.evidence.taken.values().map(|t| (t.class.info().label, t.strength, t.frame)).collect::<Vec<_>>(), b.evidence.failed.len(), b.evidence.passed.len()); }
         }
         is_clear
     }
@@ -206,17 +189,6 @@ impl InferPolicy {
         let plan = improve(&problem, &candidates, SearchSettings::DEFAULT, &mut self.rng);
         let stay = warm.map_or(f32::MIN, |warm| simulate(&problem, &warm));
         self.may_switch = plan.value > stay + SWITCH_GAIN;
-        if std::env::var("TEAM").is_ok() {
-            let n = problem.places.len();
-            eprintln!("f{} left {} value {:.2} holds {:?}/{:?} partner {:?} {:?}", context.memory.frame, problem.frames_left, plan.value, problem.helper.loose, problem.helper.contained, problem.partner.as_ref().map(|p| (p.loose.clone(), p.contained.clone(), p.speed_m_per_frame)), problem.hypotheses.iter().map(|h| (h.probability, h.missing.clone())).collect::<Vec<_>>());
-            for (i, p) in problem.places.iter().enumerate() { eprintln!("   {i} {:?} {} ci {:?} known {} chance {:.2} from helper {:.1} from partner {:.1} row {:?}", p.kind, p.class.info().label, p.class_index, p.is_known_to_partner, p.partner_chance, problem.path_m[n][i], problem.path_m[n + 1][i], problem.path_m[i].iter().map(|x| (*x * 10.0).round() / 10.0).collect::<Vec<_>>()); }
-            if let Some(first) = plan.operations.first() {
-                let (kind, m) = match first { Operation::PickUp(i) => ("pick", problem.path_m[n][*i] / problem.helper.speed_m_per_frame + 62.0), Operation::TakeContainer(i) => ("box", problem.path_m[n][*i] / problem.helper.speed_m_per_frame + 62.0), Operation::Remove(i) => ("remove", problem.path_m[n][*i] / problem.helper.speed_m_per_frame + 150.0), Operation::Deliver => ("deliver", problem.places_of(PlaceKind::Goal).map(|g| problem.path_m[n][g]).fold(1e9, f32::min) / problem.helper.speed_m_per_frame + 84.0 * (problem.helper.loose.len() as f32 + f32::from(u8::from(problem.helper.contained.is_some())))) };
-                eprintln!("PRED f{} {kind} {m:.0} hands {}", context.memory.frame, problem.helper.loose.len());
-            }
-            eprintln!("   ops {:?}", plan.operations);
-            for d in crate::team::simulation::deliveries(&problem, &plan.operations, 0) { eprintln!("   {d:?}"); }
-        }
         self.steps = plan.operations.iter().map(|o| step(&problem, *o)).collect();
         self.first_valid(context, valid, &problem)
     }
@@ -310,8 +282,8 @@ impl InferPolicy {
             return *remove;
         }
         let partner = memory.companion(context.briefing, CompanionRole::Partner);
-        let is_lost = partner.is_some_and(|p| (p.frame + knob("LOST", 400.0) as u32) < memory.frame);
-        let watches = self.options.watches && ((memory.frame < (knob("WATCH", 600.0) as u32)) || is_lost);
+        let was_seen = partner.is_some_and(|p| p.frame + LOST_FRAMES > memory.frame);
+        let watches = self.options.watches && was_seen;
         if watches && valid.contains(&Plan::FollowPartner) {
             return Plan::FollowPartner;
         }
@@ -362,9 +334,7 @@ impl Policy for InferPolicy {
     fn observe(&mut self, _: &Observation, memory: &Memory, behavior: &BehaviorLog) {
         let Some(briefing) = &self.briefing else { return };
         if let Some(belief) = &mut self.belief {
-            let before = belief.evidence.taken.clone();
             belief.observe(briefing, memory, behavior);
-            if std::env::var("TAKES").is_ok() { for (t, k) in &belief.evidence.taken { if before.get(t).is_none_or(|b| b.strength != k.strength) { eprintln!("TAKE {} {} {} {}", memory.frame, t.0, k.class.info().name, k.strength); } } for t in before.keys() { if !belief.evidence.taken.contains_key(t) { eprintln!("UNTAKE {} {}", memory.frame, t.0); } } }
         }
         let partner = memory.companion(briefing, CompanionRole::Partner);
         if let Some(person) = partner.filter(|p| p.is_in_view) {
@@ -441,10 +411,6 @@ impl Policy for InferPolicy {
     }
 
     fn status(&self) -> Option<String> {
-        if std::env::var("BELIEF").is_ok() && let Some(b) = &self.belief {
-            let sets: Vec<String> = b.goal.set_probabilities().iter().map(|(s, p)| format!("{s:?}={p:.4}")).collect();
-            return Some(format!("{} {}", self.mode, sets.join(" ")));
-        }
         Some(self.mode.to_owned())
     }
 
@@ -458,9 +424,4 @@ impl Policy for InferPolicy {
     fn fork(&self) -> Option<InferPolicy> {
         Some(self.clone())
     }
-}
-
-/// Number of targets in a problem, for reports of the policy.
-pub fn n_targets(problem: &TeamProblem) -> usize {
-    problem.places_of(PlaceKind::Target).count()
 }

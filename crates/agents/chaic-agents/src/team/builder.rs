@@ -92,15 +92,13 @@ impl ProblemBuilder {
         let classes = goal_classes(partner);
         let mut places = self.places(briefing, memory, partner, &classes, field);
         if !places.iter().any(|p| p.kind == PlaceKind::Goal) {
-            if std::env::var("TEAM").is_ok() { eprintln!("NO GOAL f{} {:?}", memory.frame, memory.objects.iter().filter(|o| briefing.goal_places.contains(&o.class)).map(|o| (o.track, o.is_present, o.is_gone, o.top_m, o.position_in_world, o.footprint.len(), memory.path_length_to(o), memory.goal_places().len())).collect::<Vec<_>>()); }
             return None;
         }
         places.truncate(MAX_PLACES);
         let helper = helper_worker(briefing, memory, &classes);
         let partner_worker = partner.position.map(|_| partner_worker(partner, &classes));
-        let obstacles: Vec<usize> = (0..places.len())
-            .filter(|i| places[*i].kind == PlaceKind::Obstacle)
-            .collect();
+        let obstacles: Vec<usize> =
+            (0..places.len()).filter(|i| places[*i].kind == PlaceKind::Obstacle).collect();
         let (path_m, obstacles_on_path) = self.paths(memory, partner, &places, &obstacles);
         let delivered = |class: ClassId| {
             let of_class = |t: &&TrackId| memory.class_of(**t) == Some(class);
@@ -152,9 +150,7 @@ impl ProblemBuilder {
                 Role::Container if briefing.containers.contains(&object.class) => {
                     Some(PlaceKind::Container)
                 }
-                Role::Obstacle => {
-                    is_in_passage(&memory.map, at).then_some(PlaceKind::Obstacle)
-                }
+                Role::Obstacle => is_in_passage(&memory.map, at).then_some(PlaceKind::Obstacle),
                 _ => classes.contains(&object.class).then_some(PlaceKind::Target),
             }
         };

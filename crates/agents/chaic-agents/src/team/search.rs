@@ -150,7 +150,10 @@ impl<'a> Search<'a> {
         }
         if rng.chance(0.15) {
             // A container replaces a delivery.
-            operations.iter().position(|o| *o == Operation::Deliver).map(|at| operations.remove(at));
+            operations
+                .iter()
+                .position(|o| *o == Operation::Deliver)
+                .map(|at| operations.remove(at));
             let is_container = |o: &Operation| matches!(o, Operation::TakeContainer(_));
             let unused = self.single.iter().filter(|o| is_container(o) && !operations.contains(o));
             let unused: Vec<Operation> = unused.copied().collect();

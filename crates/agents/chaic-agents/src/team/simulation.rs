@@ -164,7 +164,8 @@ impl<'a> Simulation<'a> {
             if helper.is_done && partner.is_done {
                 break;
             }
-            let is_helpers_turn = !helper.is_done && (partner.is_done || helper.time < partner.time);
+            let is_helpers_turn =
+                !helper.is_done && (partner.is_done || helper.time < partner.time);
             if is_helpers_turn {
                 match helper.pending.take() {
                     Some(place) => self.arrive(&problem.helper, &mut helper, place, true),
@@ -326,8 +327,7 @@ impl<'a> Simulation<'a> {
     }
 
     fn is_blocked(&self, worker: &Worker, row: usize, place: usize) -> bool {
-        worker.is_blocked
-            && self.problem.obstacles_on_path[row][place] & !self.removed != 0
+        worker.is_blocked && self.problem.obstacles_on_path[row][place] & !self.removed != 0
     }
 
     /// One decision of the partner by the published rules.
@@ -347,7 +347,8 @@ impl<'a> Simulation<'a> {
         let fraction_left = frames_left / problem.horizon.max(1.0);
         let path = |place: usize| problem.path_m[partner.row][place];
         let effort = |place: &usize| {
-            let factor = if problem.places[*place].is_known_to_partner { 1.0 } else { SEARCH_FACTOR };
+            let factor =
+                if problem.places[*place].is_known_to_partner { 1.0 } else { SEARCH_FACTOR };
             path(*place) * factor
         };
         let is_open = |place: &usize| {

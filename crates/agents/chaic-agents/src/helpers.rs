@@ -18,6 +18,8 @@ pub struct HelperInfo {
     pub name: &'static str,
     /// Title in result tables.
     pub title: &'static str,
+    /// Description in a few words, for lists.
+    pub about: &'static str,
     /// Constructs the helper with these planner rules and this perception.
     pub make: fn(PlannerRules, &dyn PerceptionFactory) -> Box<dyn Agent>,
     /// Returns the grants that the helper requests under these rules.
@@ -29,36 +31,42 @@ pub static HELPERS: [HelperInfo; 11] = [
     HelperInfo {
         name: "random",
         title: "Random",
+        about: "random valid plans",
         make: |rules, factory| Box::new(random(rules, factory)),
         grants: planner_grants,
     },
     HelperInfo {
         name: "rhp",
         title: "RHP",
+        about: "rule-based planner; goal unknown",
         make: |rules, factory| Box::new(rhp(rules, factory)),
         grants: planner_grants,
     },
     HelperInfo {
         name: "oracle",
         title: "Oracle",
+        about: "the same planner; goal known",
         make: |rules, factory| Box::new(oracle(rules, factory)),
         grants: |_| Grants::ORACLE,
     },
     HelperInfo {
         name: "follow",
         title: "Follow",
+        about: "stays near the partner",
         make: |rules, factory| Box::new(follow(rules, factory)),
         grants: planner_grants,
     },
     HelperInfo {
         name: "infer",
         title: "Infer",
+        about: "infers goal and person, then plans for both",
         make: |rules, factory| Box::new(infer(rules, factory, InferOptions::ALL)),
         grants: planner_grants,
     },
     HelperInfo {
         name: "infer_no_watching",
         title: "Infer, no watching",
+        about: "infer that does not follow the partner",
         make: |rules, factory| {
             let options = InferOptions { watches: false, ..InferOptions::ALL };
             Box::new(infer(rules, factory, options))
@@ -67,7 +75,8 @@ pub static HELPERS: [HelperInfo; 11] = [
     },
     HelperInfo {
         name: "infer_no_planner",
-        title: "Infer, rules in place of the planner",
+        title: "Infer, rules",
+        about: "infer that follows the oracle's rules",
         make: |rules, factory| {
             let options = InferOptions { plans: false, ..InferOptions::ALL };
             Box::new(infer(rules, factory, options))
@@ -77,6 +86,7 @@ pub static HELPERS: [HelperInfo; 11] = [
     HelperInfo {
         name: "infer_no_constraint",
         title: "Infer, goal only",
+        about: "infer that assumes an unimpaired adult",
         make: |rules, factory| {
             let options = InferOptions { infers_constraint: false, ..InferOptions::ALL };
             Box::new(infer(rules, factory, options))
@@ -86,18 +96,21 @@ pub static HELPERS: [HelperInfo; 11] = [
     HelperInfo {
         name: "infer_told",
         title: "Infer, told",
+        about: "infer with the goal granted",
         make: |rules, factory| Box::new(infer(rules, factory, InferOptions::ALL)),
         grants: |rules| Grants { goal: true, ..planner_grants(rules) },
     },
     HelperInfo {
         name: "ideal_observer",
         title: "Ideal observer",
+        about: "infer that sees everything; goal unknown",
         make: |rules, factory| Box::new(observer(rules, factory)),
         grants: |_| Grants { behavior: true, positions: true, state: true, ..Grants::PLANNER },
     },
     HelperInfo {
         name: "oracle_plan",
         title: "Oracle plan",
+        about: "upper bound: the planner of infer knows everything",
         make: |rules, factory| Box::new(observer(rules, factory)),
         grants: |_| Grants::ALL,
     },
@@ -169,7 +182,7 @@ mod tests {
     use crate::perception_factory::GroundTruthPerceptionFactory;
 
     #[test]
-    fn every_name_has_a_helper_and_only_the_oracle_is_granted_the_goal() {
+    fn every_name_has_a_helper_with_the_grants_of_its_kind() {
         for info in &HELPERS {
             let name = info.name;
             assert!(
@@ -178,11 +191,17 @@ mod tests {
             );
             for rules in [PlannerRules::paper(), PlannerRules::compat()] {
                 let grants = (info.grants)(rules);
-                assert_eq!(grants.goal, name == "oracle");
-                assert!(grants.ids);
-                assert_eq!(grants.behavior, name == "oracle" || rules.knows_holding);
+                let is_among = |names: &[&str]| names.contains(&name);
+                assert_eq!(grants.goal, is_among(&["oracle", "infer_told", "oracle_plan"]), "{name}");
+                assert!(grants.ids && grants.goal_place, "{name}");
+                let is_bound = is_among(&["ideal_observer", "oracle_plan"]);
+                let knows_behavior = is_bound || name == "oracle" || rules.knows_holding;
+                assert_eq!(grants.behavior, knows_behavior, "{name}");
+                assert_eq!((grants.state, grants.positions), (is_bound, is_bound), "{name}");
+                assert_eq!(grants.task, name == "oracle_plan", "{name}");
             }
             assert_eq!(HelperInfo::find_helper(name).map(|h| h.title), Some(info.title));
+            assert!(!info.about.is_empty(), "{name}");
         }
         assert!(HelperInfo::find_helper("unknown").is_none());
     }

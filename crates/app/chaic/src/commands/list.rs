@@ -36,15 +36,11 @@ pub fn run(command: &ListCommand, format: OutputFormat) -> Result<ExitStatus> {
 fn description(name: &str) -> &'static str {
     match name {
         NONE => "no helper; the partner works alone",
-        "random" => "random valid plans",
-        "rhp" => "rule-based planner; goal unknown",
-        "oracle" => "the same planner; goal known",
-        "follow" => "stays near the partner",
         "llm" => "language model on text",
         "llm-told" => "the same; task and constraint known",
         "vlm" => "language model on text and images",
         "vlm-told" => "the same; task and constraint known",
-        _ => "",
+        name => HelperInfo::find_helper(name).map_or("", |info| info.about),
     }
 }
 

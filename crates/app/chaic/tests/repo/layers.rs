@@ -16,7 +16,7 @@ const LAYERS: [&str; 7] = ["core", "sim", "render", "agents", "learn", "eval", "
 const DEV: &str = "dev";
 
 /// Modules of `chaic-agents`. A module imports only from itself and earlier ones.
-const AGENT_MODULES: [&str; 16] = [
+const AGENT_MODULES: [&str; 17] = [
     "track",
     "rules",
     "perception",
@@ -24,11 +24,12 @@ const AGENT_MODULES: [&str; 16] = [
     "planning",
     "memory",
     "behavior",
-    "belief",
     "perception_factory",
+    "belief",
     "decision",
-    "policies",
     "execution",
+    "team",
+    "policies",
     "child",
     "planning_agent",
     "helpers",

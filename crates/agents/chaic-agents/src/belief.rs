@@ -12,6 +12,7 @@ mod evidence;
 mod goal;
 mod neglect;
 mod scene;
+mod visibility;
 mod walking_speed;
 
 use chaic_core::Briefing;

@@ -192,7 +192,11 @@ mod tests {
             for rules in [PlannerRules::paper(), PlannerRules::compat()] {
                 let grants = (info.grants)(rules);
                 let is_among = |names: &[&str]| names.contains(&name);
-                assert_eq!(grants.goal, is_among(&["oracle", "infer_told", "oracle_plan"]), "{name}");
+                assert_eq!(
+                    grants.goal,
+                    is_among(&["oracle", "infer_told", "oracle_plan"]),
+                    "{name}"
+                );
                 assert!(grants.ids && grants.goal_place, "{name}");
                 let is_bound = is_among(&["ideal_observer", "oracle_plan"]);
                 let knows_behavior = is_bound || name == "oracle" || rules.knows_holding;

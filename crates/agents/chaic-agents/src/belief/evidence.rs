@@ -7,9 +7,10 @@ use chaic_core::geom::to_xz;
 use chaic_core::{Action, Briefing, ClassId, FailureReason, Frame, Outcome, Vec2};
 
 use super::neglect::Neglect;
+use super::visibility::{is_at_rest, is_hidden};
 use super::walking_speed::WalkingSpeed;
 use crate::behavior::BehaviorLog;
-use crate::mapping::{CellOccupancy, MappedObject, TrackedPerson};
+use crate::mapping::{MappedObject, TrackedPerson};
 use crate::memory::Memory;
 use crate::track::TrackId;
 
@@ -41,9 +42,6 @@ const AWAY_M: f32 = 3.0;
 const VISIT_FRAMES: Frame = 60;
 /// Time for which the partner counts as holding what it was seen to hold, frames.
 const HANDS_FULL_FRAMES: Frame = 120;
-/// Tall furniture counts as wall in the map, so walls this near to the object do not hide it,
-/// meters.
-const OWN_FOOTPRINT_M: f32 = 0.6;
 
 /// Maximum height of a body, meters; higher points are errors of perception.
 const MAX_BODY_M: f32 = 2.1;
@@ -427,20 +425,6 @@ impl Evidence {
             !is_passed
         });
     }
-}
-
-/// Returns whether an object is believed to lie in play, outside of all hands.
-pub(super) fn is_at_rest(object: &MappedObject, now: Frame) -> bool {
-    object.is_present && !object.is_gone && object.held_until <= now
-}
-
-/// Returns whether a wall stands between a person and an object.
-pub(super) fn is_hidden(memory: &Memory, from: Vec2, to: Vec2) -> bool {
-    let grid = memory.map.grid();
-    grid.line(from, to).any(|cell| {
-        memory.map.state(cell) == CellOccupancy::Wall
-            && grid.center(cell).distance(to) > OWN_FOOTPRINT_M
-    })
 }
 
 #[cfg(test)]

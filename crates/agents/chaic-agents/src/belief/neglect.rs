@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use chaic_core::geom::to_xz;
 use chaic_core::{Briefing, ClassId, Frame, Role, Vec2};
 
-use super::evidence::{is_at_rest, is_hidden};
+use super::visibility::{is_at_rest, is_hidden};
 use crate::behavior::BehaviorLog;
 use crate::memory::Memory;
 use crate::track::TrackId;
@@ -75,7 +75,7 @@ impl Neglect {
             let to = object - from;
             at.distance(object) < AT_OBJECT_M || to.normalize_or_zero().dot(direction) > TOWARDS_COS
         };
-        if may_fetch_container(briefing, memory, behavior, |o| approaches(o), at) {
+        if may_fetch_container(briefing, memory, behavior, approaches, at) {
             return;
         }
         let (mut left, mut approached) = (0, 0);
@@ -113,11 +113,6 @@ impl Neglect {
             .iter()
             .filter(|((left, approached), _)| left & wanted != 0 && approached & wanted == 0);
         contradicting.map(|(_, frames)| frames).sum()
-    }
-
-    /// Returns whether nothing was observed.
-    pub fn is_empty(&self) -> bool {
-        self.frames.is_empty()
     }
 }
 

@@ -9,7 +9,7 @@ use chaic_core::briefing::{CompanionRole, Goal};
 use chaic_core::capability::{Capability, Persona};
 use chaic_core::geom::to_xz;
 use chaic_core::rng::RngStream;
-use chaic_core::{AgentError, Briefing, ClassId, Frame, Observation, Role, Vec2};
+use chaic_core::{AgentError, Briefing, ClassId, Frame, Observation, Role};
 
 use super::rule_policy::{RulePolicy, RuleProfile, is_relevant_removal};
 use crate::behavior::BehaviorLog;
@@ -339,7 +339,7 @@ impl Policy for InferPolicy {
         let partner = memory.companion(briefing, CompanionRole::Partner);
         if let Some(person) = partner.filter(|p| p.is_in_view) {
             let position = to_xz(person.position_in_world);
-            self.builder.observe_partner(memory, position, None::<Vec2>);
+            self.builder.observe_partner(memory, position);
         }
     }
 

@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use chaic_core::briefing::CompanionRole;
 use chaic_core::capability::{Capability, Gait, excess};
 use chaic_core::geom::{math, to_xz};
 use chaic_core::{Briefing, ClassId, Frame, Role, Vec2};
@@ -24,10 +23,6 @@ const MEAN_SPEED: f32 = 0.9;
 /// Range in which the partner notices objects, meters. Ours: half of the original's 10 m visibility
 /// limit and a bit, since the partner rarely looks straight at an object.
 const NOTICE_M: f32 = 7.0;
-/// Objects nearer than this are noticed in all directions, meters.
-const NOTICE_AROUND_M: f32 = 1.0;
-/// Cosine of half the field of view in which the partner notices objects.
-const NOTICE_COS: f32 = 0.68;
 /// Path cells nearer than this to an obstacle are blocked by it for a wheelchair, meters.
 const OBSTACLE_M: f32 = 0.75;
 /// Factor of the straight line for places without a known path, and what is added, meters.
@@ -62,20 +57,14 @@ pub struct ProblemBuilder {
 }
 
 impl ProblemBuilder {
-    /// Notes the objects that the partner can see from where it stands. `forward` is its direction
-    /// (x, z) if known, else it may look anywhere.
-    pub fn observe_partner(&mut self, memory: &Memory, position: Vec2, forward: Option<Vec2>) {
+    /// Records the objects that the partner can see from where it stands (x, z). Its direction is
+    /// unknown, so it may look anywhere.
+    pub fn observe_partner(&mut self, memory: &Memory, position: Vec2) {
         let grid = memory.map.grid();
         for object in memory.objects.iter().filter(|o| o.is_present) {
             let at = to_xz(object.position_in_world);
-            let to = at - position;
-            let m = to.length();
-            let is_outside = m > NOTICE_AROUND_M
-                && forward.is_some_and(|forward| to.dot(forward) < NOTICE_COS * m);
-            if m > NOTICE_M || is_outside {
-                continue;
-            }
-            if !grid.line(position, at).any(|c| memory.costs().is_wall(c)) {
+            let is_near = at.distance(position) <= NOTICE_M;
+            if is_near && !grid.line(position, at).any(|c| memory.costs().is_wall(c)) {
                 self.seen_by_partner.insert(object.track);
             }
         }
@@ -94,7 +83,10 @@ impl ProblemBuilder {
         if !places.iter().any(|p| p.kind == PlaceKind::Goal) {
             return None;
         }
-        places.truncate(MAX_PLACES);
+        if places.len() > MAX_PLACES {
+            places.sort_by_key(|place| place.kind != PlaceKind::Goal);
+            places.truncate(MAX_PLACES);
+        }
         let helper = helper_worker(briefing, memory, &classes);
         let partner_worker = partner.position.map(|_| partner_worker(partner, &classes));
         let obstacles: Vec<usize> =
@@ -317,12 +309,6 @@ fn partner_worker(partner: &PartnerModel, classes: &[ClassId]) -> Worker {
         deliver_below: if is_rider { 1.0 / 3.0 } else { 0.25 },
         busy_frames: 0.0,
     }
-}
-
-/// Returns the partner's position (x, z) and the age of the sighting in frames, if it was ever seen.
-pub fn last_sighting(briefing: &Briefing, memory: &Memory) -> Option<(Vec2, Frame)> {
-    let person = memory.companion(briefing, CompanionRole::Partner)?;
-    Some((to_xz(person.position_in_world), memory.frame - person.frame))
 }
 
 /// Returns whether a load observed at this frame still counts as current.

@@ -310,7 +310,7 @@ impl<'a> Simulation<'a> {
                 if person.time > problem.frames_left {
                     break;
                 }
-                let count = self.missing[class].min(1.0).max(0.0) * chance;
+                let count = self.missing[class].clamp(0.0, 1.0) * chance;
                 self.missing[class] -= count;
                 let left = (problem.frames_left - person.time) / problem.frames_left.max(1.0);
                 self.value += count * (1.0 + EARLY_BONUS * left);

@@ -213,6 +213,12 @@ impl Executor {
                 let until = s.memory.frame + s.memory.rules.failures.ignore_frames;
                 s.memory.objects.ignore(subject.track, until);
             }
+            Plan::Deliver => {
+                if let Some(place) = self.place {
+                    let until = s.memory.frame + s.memory.rules.goal_blackout_frames;
+                    s.memory.objects.ignore(place, until);
+                }
+            }
             _ => {}
         }
     }
@@ -341,6 +347,11 @@ impl Executor {
             self.place = chosen.map(|(t, _)| t.track);
         }
         let Some(place) = self.place else { return Progress::Failed };
+        // A failed put-on ends the plan, because its place is ignored (facts A2.1).
+        let is_ignored = s.memory.objects.get(place).is_some_and(|t| s.memory.is_blacked_out(t));
+        if is_ignored {
+            return Progress::Failed;
+        }
         let within_m = s.memory.rules.put_within_m;
         self.approach(place, within_m, Action::PutOn { place, hand }, s)
     }

@@ -17,9 +17,9 @@ use crate::perception::{Detection, Percepts};
 use crate::planning::careful_costs::CarefulCosts;
 use crate::planning::compat::lattice_costs::LatticeCosts;
 use crate::planning::cost_map::CostMap;
-use crate::planning::cost_model::{CostInputs, CostModel, MapChanges, ObstacleInflation};
+use crate::planning::cost_model::{CostInputs, CostModel, MapChanges};
 use crate::planning::path::{CostField, Search};
-use crate::rules::{Exploration, FailureRules, PlannerRules, Walking};
+use crate::rules::{Exploration, PlannerRules, Walking};
 use crate::track::{Hands, Intent, TrackId};
 
 pub mod egocentric;
@@ -98,18 +98,8 @@ pub struct Memory {
     is_partner: bool,
     gait: Gait,
     removes_obstacles: bool,
-    obstacle_wait: ObstacleWait,
     cost_field: Option<CostField>,
     search: Search,
-}
-
-/// State of waiting for another agent to remove an obstacle.
-#[derive(Clone, Copy, Debug, Default)]
-struct ObstacleWait {
-    /// Frame of the first wait since the last step.
-    since: Option<Frame>,
-    /// Waiting is disabled until this frame, after a wait without success.
-    disabled_until: Frame,
 }
 
 impl Memory {
@@ -152,7 +142,6 @@ impl Memory {
             is_partner: briefing.me == AgentId::PARTNER,
             gait: briefing.capability.gait,
             removes_obstacles: briefing.capability.removes_obstacles,
-            obstacle_wait: ObstacleWait::default(),
             cost_field: None,
         }
     }
@@ -338,27 +327,6 @@ impl Memory {
         !self.removes_obstacles
     }
 
-    /// Waits in front of an obstacle; returns whether the agent keeps waiting. After a wait without
-    /// success, obstacles are inflated less for a while, so that the agent may squeeze past.
-    pub fn wait_for_obstacle(&mut self) -> bool {
-        let FailureRules { obstacle_patience_frames, ignore_frames, .. } = self.rules.failures;
-        if self.frame < self.obstacle_wait.disabled_until {
-            return false;
-        }
-        let since = *self.obstacle_wait.since.get_or_insert(self.frame);
-        if self.frame >= since + obstacle_patience_frames {
-            self.obstacle_wait =
-                ObstacleWait { since: None, disabled_until: self.frame + ignore_frames };
-            self.is_stale = true;
-        }
-        true
-    }
-
-    /// Records a step ahead, which resets the waiting time.
-    pub fn record_step(&mut self) {
-        self.obstacle_wait.since = None;
-    }
-
     /// Returns whether the agent navigates to the goal place's position at the start of the plan,
     /// and ignores later observations of it (facts A2.4).
     pub fn keeps_goal_position(&self) -> bool {
@@ -387,15 +355,11 @@ impl Memory {
         }
         (self.is_stale, self.costs_layout, self.saw_people_recently) = (false, Some(layout), false);
         self.cost_field = None;
-        let inflation = match self.frame < self.obstacle_wait.disabled_until {
-            true => ObstacleInflation::Narrow(self.costs.radius_m()),
-            false => ObstacleInflation::Wide,
-        };
         let inputs = CostInputs {
             people: &self.blocking_people(),
             map: &self.map,
             objects: &self.objects,
-            inflation: self.is_partner.then_some(inflation),
+            avoids_obstacles: self.is_partner,
             position: self.position(),
             now: self.frame,
         };
@@ -460,7 +424,7 @@ impl Memory {
             .objects
             .iter()
             .filter(|t| self.is_goal_place(t) && t.is_present)
-            .filter(|t| self.rules.goal_blackout_frames == 0 || self.frame >= t.ignore_until)
+            .filter(|t| !self.is_blacked_out(t))
             .filter(|t| t.top_m + TOP_TOLERANCE_M >= self.goal_place_min_top_m)
             .filter_map(|t| Some((t, self.path_length_to(t)?)))
             .collect();
@@ -477,6 +441,11 @@ impl Memory {
     /// Sets the minimum top height of goal places, meters.
     pub fn set_goal_place_min_top(&mut self, min_top_m: f32) {
         self.goal_place_min_top_m = min_top_m;
+    }
+
+    /// Returns whether a goal place is ignored now. The paper's rules ignore none.
+    pub fn is_blacked_out(&self, place: &MappedObject) -> bool {
+        self.rules.goal_blackout_frames > 0 && self.frame < place.ignore_until
     }
 
     /// Returns whether child and partner are too far apart: both in view, or both seen recently

@@ -118,7 +118,8 @@ pub struct PlannerRules {
     /// True if an object is ignored after any failed attempt, not only after one beyond the agent's
     /// limits.
     pub any_failure_counts: bool,
-    /// Time for which a goal place is ignored after a failed put-on, frames.
+    /// Time for which a goal place is ignored after a failed put-on or a delivery that timed out,
+    /// frames. The plan ends, even if the other hand holds something (facts A1.9, A2.1).
     pub goal_blackout_frames: Frame,
     /// Time for which an object is avoided after another agent was observed to hold it, frames.
     pub held_frames: Frame,

@@ -557,7 +557,7 @@ impl DrawnMap {
             map: &map,
             objects: &objects,
             people: &people,
-            inflation: None,
+            avoids_obstacles: false,
             position: Vec2::splat(1e6),
             now: 0,
         };

@@ -127,8 +127,9 @@ pub struct Rules {
     /// rule of the original allows it.
     pub dropped_counts: bool,
     /// True if a successful put-on anywhere delivers all objects that its agent has released so
-    /// far. It is the second rule of the original (facts S5.3), considered a bug and off in both
-    /// rule sets.
+    /// far, and the object that the agent drops in the next put-on. It is the second rule of the
+    /// original, made for high goal places (facts S5.3): there a failed put-on delivers nothing by
+    /// itself.
     pub delivered_anywhere: bool,
     /// True if briefings list containers when a wheelchair user takes part. The agents of the
     /// original ignore containers there (facts S13, number 12).
@@ -236,6 +237,7 @@ impl Rules {
             joint_lift: JointLift::LastChoice,
             tells_removed: true,
             dropped_counts: true,
+            delivered_anywhere: true,
             containers_with_wheelchair: false,
             fragile_targets: false,
             break_chance_low: 0.0,

@@ -86,6 +86,10 @@ impl World {
         let outcome = activity.failing.map_or(Outcome::Success, Outcome::Failure);
         let (action, frame) = (activity.action, self.state.frame + 1);
         let person = self.person_mut(agent);
+        let is_put_on = |action| matches!(action, Action::PutOn { .. });
+        let has_put_on = person
+            .last_interaction
+            .is_some_and(|(_, action, o)| is_put_on(action) && o.is_success());
         person.activity = None;
         person.last = Some((action, outcome));
         if !action.is_locomotion() && !matches!(action, Action::Wait { .. }) {
@@ -97,9 +101,11 @@ impl World {
         }
         person.in_stride = action == Action::MoveForward && outcome.is_success();
         self.record_event(EventKind::Ended { agent, action, outcome });
+        // The original reads its record of actions anew at every check, so a successful put-on also
+        // covers what the agent held then and drops next (facts S5.3).
         if self.rules.delivered_anywhere
-            && outcome.is_success()
-            && matches!(action, Action::PutOn { .. })
+            && is_put_on(action)
+            && (outcome.is_success() || has_put_on)
         {
             self.deliver_all_released(agent);
         }

@@ -19,10 +19,28 @@ pub enum NavigationStep {
     Unreachable,
 }
 
+/// Assessment of a path, by which exploration ends or waits (facts A1.6).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PathState {
+    /// The path is worth following.
+    #[default]
+    Open,
+    /// The path costs too much to be worth exploring.
+    TooCostly,
+    /// The path passes an obstacle, and the agent waits for another to remove it.
+    Blocked,
+}
+
 /// Navigates to destinations. Keeps its state between decisions, such as the path.
 pub trait Navigator: Debug + Send + Sync {
     /// Returns the next action towards `destination`.
     fn step(&mut self, memory: &mut Memory, destination: &Destination) -> NavigationStep;
+
+    /// Returns the assessment of the path at the last step. Only the original's navigation assesses
+    /// paths.
+    fn path_state(&self) -> PathState {
+        PathState::Open
+    }
 
     /// Drops the current path.
     fn reset(&mut self);

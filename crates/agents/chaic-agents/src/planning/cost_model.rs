@@ -15,21 +15,12 @@ pub struct CostInputs<'a> {
     pub objects: &'a SemanticMap,
     /// Last sightings of people.
     pub people: &'a PersonMap,
-    /// Inflation around obstacles, for agents that avoid them.
-    pub inflation: Option<ObstacleInflation>,
+    /// True if the agent avoids removable obstacles by a wide margin (facts A1.3).
+    pub avoids_obstacles: bool,
     /// Position of the body (x, z).
     pub position: Vec2,
     /// Current frame.
     pub now: Frame,
-}
-
-/// Inflation around an obstacle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ObstacleInflation {
-    /// The original's: a square of cells around the obstacle's center.
-    Wide,
-    /// The radius of the body, meters, around the footprint (ours).
-    Narrow(f32),
 }
 
 /// Changes since costs were computed last.

@@ -63,11 +63,6 @@ pub struct FailureRules {
     /// Time for which the position of repeated bumps counts as occupied, frames. Ours: a third of
     /// an episode, because obstacles stay unless an agent removes them.
     pub barred_frames: Frame,
-    /// Maximum wait for another agent to remove an obstacle, with lattice navigation, frames.
-    /// Afterwards, for `ignore_frames`, the agent passes where there is just enough room, or
-    /// follows other plans. Ours: shorter than the time after which an agent counts as stuck. The
-    /// original waits until its plan ends (facts A1.6), and then makes the same plan again.
-    pub obstacle_patience_frames: Frame,
 }
 
 /// Lifting furniture together with the partner. The original's planners never plan to do so (facts
@@ -180,7 +175,6 @@ impl FailureRules {
         held_for_sure_frames: 60,
         impossible_frames: 2000,
         barred_frames: 1000,
-        obstacle_patience_frames: 150,
     };
 }
 

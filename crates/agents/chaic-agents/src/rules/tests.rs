@@ -252,6 +252,41 @@ fn a_goal_place_is_ignored_after_a_failed_put_on() {
 }
 
 #[test]
+fn a_failed_put_on_or_a_timeout_ends_the_delivery_and_the_place_is_ignored() {
+    let deliver = |goal_blackout_frames| {
+        let rules = PlannerRules { goal_blackout_frames, put_within_m: 5.0, ..PAPER };
+        let (memory, briefing, bed) = memory_of("bed", rules);
+        let mut s = Scenario::new(rules);
+        (s.memory, s.briefing) = (memory, briefing);
+        s.hands = [None, Some(carried("apple", 31, &[]))];
+        let mut executor = Executor::new(&s.briefing, &rules);
+        let act = s.start_plan(&mut executor, Plan::Deliver);
+        assert_eq!(act, Progress::Act(Action::PutOn { place: bed, hand: Hand::Right }));
+        (s, executor, bed)
+    };
+    for (goal_blackout_frames, ends) in [(0, false), (500, true)] {
+        // The left hand's put-on failed, and the right hand still holds an apple.
+        let (mut s, mut executor, place) = deliver(goal_blackout_frames);
+        let last = (
+            Action::PutOn { place, hand: Hand::Left },
+            Outcome::Failure(FailureReason::BeyondLimits),
+        );
+        s.memory.last = Some(last);
+        apply_outcome(&mut s.memory, &s.briefing, last, &[], &[]);
+        let progress = s.continue_plan(&mut executor, Plan::Deliver);
+        assert_eq!(progress == Progress::Failed, ends, "{progress:?}");
+        assert_eq!(s.memory.goal_places().is_empty(), ends);
+
+        let (mut s, mut executor, _) = deliver(goal_blackout_frames);
+        s.memory.frame += s.memory.rules.limits.interact_frames + 1;
+        assert_eq!(s.continue_plan(&mut executor, Plan::Deliver), Progress::Failed);
+        assert_eq!(s.memory.goal_places().is_empty(), ends);
+        s.memory.frame += goal_blackout_frames;
+        assert_eq!(s.memory.goal_places().len(), 1);
+    }
+}
+
+#[test]
 fn an_object_is_forgotten_at_an_empty_position_or_not() {
     for forgets_missing in [true, false] {
         let mut toy = Toy::room(8.0, 8.0);

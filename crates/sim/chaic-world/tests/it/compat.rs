@@ -130,8 +130,46 @@ fn a_put_on_anywhere_delivers_only_under_delivered_anywhere() {
         assert_eq!(run(&mut w, A, put(nth(1))).0, Outcome::Success);
         w.delivered()
     };
-    assert!(delivered(PAPER).is_empty() && delivered(Rules::compat()).is_empty());
+    assert!(delivered(PAPER).is_empty());
     assert_eq!(delivered(Rules { delivered_anywhere: true, ..PAPER }), vec![nth(0)]);
+    assert_eq!(delivered(Rules::compat()), vec![nth(0)]);
+}
+
+#[test]
+fn a_failed_put_on_delivers_with_a_successful_one_under_delivered_anywhere() {
+    // Attempts with the left and the right hand, each at a table within or above the reach.
+    let delivered = |succeed: [bool; 2], delivered_anywhere| {
+        let tables = [(1.2, 0.0), (-1.2, 2.0)].map(|(x, bottom)| {
+            let mut table = thing("dining_table", at(x, bottom, 0.0));
+            table.fixed = true;
+            table
+        });
+        let mut things =
+            vec![thing("apple", at(0.0, 0.0, -0.5)), thing("apple", at(0.2, 0.0, -0.5))];
+        things.extend(tables);
+        let mut adult = person(Persona::Adult, 0.0, 0.0);
+        adult.capability =
+            Some(Capability { put_range_m: [0.0, 1.5], ..Persona::Adult.capability() });
+        let mut setup = hall(things, vec![adult]);
+        setup.goal.targets[0].1 = 3;
+        let mut put_penalty = PAPER.put_penalty;
+        put_penalty.alpha = 0.01;
+        let mut w = with(Rules { put_penalty, delivered_anywhere, ..PAPER }, setup);
+        for (hand, object) in [(Hand::Left, nth(0)), (Hand::Right, nth(1))] {
+            assert_eq!(run(&mut w, A, Action::PickUp { object, hand }).0, Outcome::Success);
+        }
+        for (hand, succeeds) in [Hand::Left, Hand::Right].into_iter().zip(succeed) {
+            let place = if succeeds { nth(2) } else { nth(3) };
+            let (outcome, _) = run(&mut w, A, Action::PutOn { place, hand });
+            assert_eq!(outcome.is_success(), succeeds, "{outcome:?}");
+        }
+        w.delivered()
+    };
+    let both = vec![nth(0), nth(1)];
+    assert_eq!(delivered([false, true], true), both, "what fell before");
+    assert_eq!(delivered([true, false], true), both, "what falls next");
+    assert_eq!(delivered([false, false], true), vec![]);
+    assert_eq!(delivered([true, true], false), vec![]);
 }
 
 #[test]

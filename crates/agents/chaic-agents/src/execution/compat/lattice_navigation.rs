@@ -8,10 +8,10 @@ use chaic_core::{Action, Vec2, Vec3};
 
 use super::lattice_approach::LatticeApproach;
 use crate::execution::destination::Destination;
-use crate::execution::navigation::{Approach, NavigationStep, Navigator};
+use crate::execution::navigation::{Approach, NavigationStep, Navigator, PathState};
 use crate::mapping::{CELL_M, CellOccupancy};
 use crate::memory::Memory;
-use crate::planning::compat::lattice_costs::BLOCKED;
+use crate::planning::compat::lattice_costs::{BLOCKED, FARTHEST};
 use crate::planning::compat::straight_path::StraightSearch;
 use crate::planning::path::Path;
 
@@ -19,9 +19,9 @@ use crate::planning::path::Path;
 const WAYPOINT_INDEX: usize = 5;
 /// Heading error up to which the agent steps forward, in turns.
 const WALK_TURNS: f32 = 1.2;
-/// Number of turns without a step after which the current path is kept, and obstacles are not
-/// waited for meanwhile (ours). Half a circle is enough to face any path. However, observations
-/// made while turning may move the path to the other side or block it, repeatedly.
+/// Number of turns without a step after which the current path is kept (ours). Half a circle is
+/// enough to face any path. However, observations made while turning may move the path to the other
+/// side, repeatedly. Turns in front of an obstacle do not count, and a kept path does not pass one.
 const MAX_TURNS: u32 = 24;
 /// Length for which a path is kept, cells (1.5 m), and the maximum number of actions (ours: half a
 /// circle of turns to either side, and the steps).
@@ -53,8 +53,7 @@ impl Hysteresis {
     }
 
     /// Returns the remaining part of the kept path. It is dropped when the agent has left it, or
-    /// when a wall is found on it. An obstacle does not end it, because it may be visible from one
-    /// heading and not from another.
+    /// when a wall is found on it.
     fn kept_path(&mut self, memory: &Memory) -> Option<Path> {
         let (cells, n_left) = self.kept.take().filter(|(_, n_left)| *n_left > 0)?;
         let (grid, here) = (memory.map.grid(), memory.position());
@@ -74,6 +73,7 @@ impl Hysteresis {
 #[derive(Clone, Debug, Default)]
 pub struct LatticeNavigator {
     hysteresis: Hysteresis,
+    path_state: PathState,
     /// Working memory of the path search, created on first use.
     search: Option<StraightSearch>,
 }
@@ -91,32 +91,39 @@ impl Navigator for LatticeNavigator {
         let Some(path) = search.path(costs, start, end) else {
             return NavigationStep::Unreachable;
         };
-        let is_short = destination.arm_m.is_none() || path.cells.len() <= INTERACT_CELLS;
-        if here.distance(target) < destination.within_m && is_short {
+        let is_blocked = memory.waits_for_obstacles()
+            && path.cost > BLOCKED
+            && memory.map.state(end) != CellOccupancy::Wall;
+        self.path_state = match path.cost {
+            _ if is_blocked => PathState::Blocked,
+            cost if cost > FARTHEST => PathState::TooCostly,
+            _ => PathState::Open,
+        };
+        // A blocked path prevents the arrival of exploration, but not an interaction.
+        let is_interaction = destination.arm_m.is_some();
+        let is_short = !is_interaction || path.cells.len() <= INTERACT_CELLS;
+        let is_near = here.distance(target) < destination.within_m;
+        if is_near && is_short && (is_interaction || !is_blocked) {
             return NavigationStep::Arrived;
         }
-        let path = self.hysteresis.kept_path(memory).unwrap_or(path);
-        if memory.waits_for_obstacles()
-            && path.cost > BLOCKED
-            && memory.map.state(end) != CellOccupancy::Wall
-        {
-            // Wait for another agent to clear the path, for a limited time.
-            return if memory.wait_for_obstacle() {
-                NavigationStep::Act(Action::TurnLeft)
-            } else {
-                NavigationStep::Unreachable
-            };
+        if is_blocked {
+            // Turn on the spot until another agent clears the path, or the plan times out.
+            return NavigationStep::Act(Action::TurnLeft);
         }
+        let path = self.hysteresis.kept_path(memory).unwrap_or(path);
         let to = waypoint(memory, &path);
         let at = |p: Vec2| Vec3::new(p.x, 0.0, p.y);
         let error = wrap_angle(yaw_towards(at(here), at(to)) - yaw);
         if error.abs() < WALK_TURNS * memory.motion.turn_rad || to == here {
             self.hysteresis.n_turns = 0;
-            memory.record_step();
             return NavigationStep::Act(Action::MoveForward);
         }
         self.hysteresis.record_turn(&path);
         NavigationStep::Act(if error > 0.0 { Action::TurnLeft } else { Action::TurnRight })
+    }
+
+    fn path_state(&self) -> PathState {
+        self.path_state
     }
 
     /// Does nothing: the path is replanned at every decision, and the hysteresis spans plans.
@@ -154,7 +161,7 @@ mod tests {
     use super::*;
     use crate::PlannerRules;
     use crate::perception::{GroundTruthIds, Perception as _};
-    use crate::rules::{FailureRules, Walking};
+    use crate::rules::Walking;
     use crate::test_support::{Toy, ToyObject};
     use chaic_core::AgentId;
     use chaic_core::capability::Persona;
@@ -186,40 +193,26 @@ mod tests {
     }
 
     #[test]
-    fn waiting_for_an_obstacle_to_be_removed_ends() {
+    fn an_obstacle_is_waited_for_without_a_time_limit() {
         let mut memory = before_obstacle(Persona::Wheelchair, AgentId::PARTNER);
-        let start = memory.frame;
-        let FailureRules { obstacle_patience_frames, ignore_frames, .. } = memory.rules.failures;
-        let next_wait = obstacle_patience_frames + ignore_frames;
-        for after in (0..next_wait + 10).step_by(2) {
+        let (start, mut navigator) = (memory.frame, LatticeNavigator::default());
+        // The time limit is that of the plan.
+        for after in (0..memory.rules.limits.interact_frames).step_by(2) {
             memory.frame = start + after;
-            let waits = after <= obstacle_patience_frames || after >= next_wait;
-            let expected = if waits {
-                NavigationStep::Act(Action::TurnLeft)
-            } else {
-                NavigationStep::Unreachable
-            };
-            let step = LatticeNavigator::default().step(&mut memory, &beyond_obstacle());
-            assert_eq!(step, expected, "after {after} frames");
+            let step = navigator.step(&mut memory, &beyond_obstacle());
+            assert_eq!(step, NavigationStep::Act(Action::TurnLeft), "after {after} frames");
+            assert_eq!(navigator.path_state(), PathState::Blocked);
         }
     }
 
     #[test]
-    fn after_a_wait_without_success_the_agent_passes_where_there_is_just_enough_room() {
+    fn a_blocked_path_prevents_the_arrival_of_exploration_but_not_an_interaction() {
         let mut memory = before_obstacle(Persona::Wheelchair, AgentId::PARTNER);
-        // Beside the obstacle's front, from (1.75, -0.25) to (1.75, 0.25): in a corner of the
-        // original's square, and where the body would touch the obstacle.
-        let [corner, touching] = [[2.2, 0.65], [1.8, 0.35]].map(Vec2::from);
-        let is_open = |memory: &mut Memory, at: Vec2| {
-            memory.refresh();
-            let cell = memory.map.grid().cell_at(at).expect("inside");
-            memory.costs().cost(cell) < BLOCKED / 3
-        };
-        assert!(!is_open(&mut memory, corner) && !is_open(&mut memory, touching));
-        memory.wait_for_obstacle();
-        memory.frame += memory.rules.failures.obstacle_patience_frames;
-        assert!(memory.wait_for_obstacle(), "until the maximum wait");
-        assert!(is_open(&mut memory, corner) && !is_open(&mut memory, touching));
+        let explore = Destination::near(Vec2::new(2.0, 0.0), 3.5);
+        let interact = Destination { arm_m: Some(0.0), ..explore.clone() };
+        let mut step = |d: &Destination| LatticeNavigator::default().step(&mut memory, d);
+        assert_eq!(step(&explore), NavigationStep::Act(Action::TurnLeft));
+        assert_eq!(step(&interact), NavigationStep::Arrived);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use chaic_core::{Action, Briefing, Frame, Vec2};
 
 use crate::execution::destination::Destination;
 use crate::execution::exploration::ExplorationStep;
-use crate::execution::navigation::{NavigationStep, Navigator};
+use crate::execution::navigation::{NavigationStep, Navigator, PathState};
 use crate::mapping::CellOccupancy;
 use crate::memory::Memory;
 use crate::planning::compat::lattice_costs::FARTHEST;
@@ -27,7 +27,8 @@ const ENOUGH_DRAWS: usize = 100;
 /// Minimum distance from the border of the map, cells.
 const BORDER: usize = 3;
 
-/// Explores random cells; keeps its target until the plan ends.
+/// Explores random cells; keeps its target until the plan ends. It ends where the target is near,
+/// known for a while, or behind something (facts A1.6).
 #[derive(Clone, Debug)]
 pub struct RandomExplorer {
     rng: RngStream,
@@ -52,16 +53,18 @@ impl RandomExplorer {
         }
         let Some((at, since)) = self.target else {
             // An obstacle may enclose the agent.
-            if memory.waits_for_obstacles() {
-                memory.wait_for_obstacle();
-            }
             return ExplorationStep::Act(Action::TurnLeft);
         };
+        let step = navigator.step(memory, &Destination::near(at, ARRIVAL_M));
         let is_known = memory.map.grid().cell_at(at).is_some_and(|c| memory.map.is_known(c));
-        if is_known && memory.frame > since + KNOWN_FRAMES {
-            return ExplorationStep::Resolved;
-        }
-        match navigator.step(memory, &Destination::near(at, ARRIVAL_M)) {
+        let has_ended = match navigator.path_state() {
+            PathState::Open => is_known && memory.frame > since + KNOWN_FRAMES,
+            PathState::TooCostly => true,
+            // The wait for an obstacle overrides every end but the plan's time limit.
+            PathState::Blocked => false,
+        };
+        match step {
+            NavigationStep::Act(_) if has_ended => ExplorationStep::Resolved,
             NavigationStep::Act(action) => ExplorationStep::Act(action),
             NavigationStep::Arrived | NavigationStep::Unreachable => ExplorationStep::Resolved,
         }

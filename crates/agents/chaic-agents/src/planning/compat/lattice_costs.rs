@@ -1,13 +1,16 @@
 //! Cell costs of the original (facts A1.5): soft inflation, no impassable cells, and for the
 //! partner a wide inflation around obstacles.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use chaic_core::geom::to_xz;
 use chaic_core::{Frame, Role, Vec2};
 
 use crate::mapping::grid::{CELL_M, Grid};
 use crate::mapping::occupancy::CellOccupancy;
 use crate::planning::cost_map::{CostMap, FREE, UNKNOWN_EXTRA};
-use crate::planning::cost_model::{CostInputs, CostModel, MapChanges, ObstacleInflation};
+use crate::planning::cost_model::{CostInputs, CostModel, MapChanges};
+use crate::track::TrackId;
 
 /// Cell within two cells of something, and adjacent to it.
 const NEAR: [u32; 2] = [5 * FREE, 10 * FREE];
@@ -24,7 +27,7 @@ const WALL_EXTRA: u32 = 500_000 * FREE;
 const TRUE_WALL_EXTRA: u32 = 5_000_000 * FREE;
 /// Added around obstacles, for agents that avoid them.
 const OBSTACLE_EXTRA: u32 = 200_000 * FREE;
-/// Extent of that area from the obstacle's center, cells down and up along each axis.
+/// Extent of that area from each observed center of the obstacle, cells down and up along each axis.
 const OBSTACLE_CELLS: [i32; 2] = [5, 6];
 /// A path that costs more than this passes an obstacle or a wall (facts A1.6).
 pub const BLOCKED: u32 = 500_000 * FREE;
@@ -79,6 +82,29 @@ impl LaggedOccupancy {
     }
 }
 
+/// Cells at which removable obstacles were observed. The observed center of an obstacle moves with
+/// the viewpoint, and each of its cells stays in the map for as long as the obstacle is in place
+/// (facts A1.3, A1.8).
+#[derive(Clone, Debug, Default)]
+struct ObservedObstacles(BTreeMap<TrackId, BTreeSet<usize>>);
+
+impl ObservedObstacles {
+    /// Records the current cell of each obstacle in place, and forgets all other obstacles.
+    fn record(&mut self, in_place: impl Iterator<Item = (TrackId, usize)>) {
+        let mut before = std::mem::take(&mut self.0);
+        for (track, cell) in in_place {
+            let mut cells = before.remove(&track).unwrap_or_default();
+            cells.insert(cell);
+            self.0.insert(track, cells);
+        }
+    }
+
+    /// Returns all cells, in the order of tracks.
+    fn cells(&self) -> impl Iterator<Item = usize> + '_ {
+        self.0.values().flatten().copied()
+    }
+}
+
 /// Dilates `cells` by one cell, including diagonals, into `dilated`. All are row-major with `nx`
 /// cells per row.
 fn dilate(cells: &[bool], nx: usize, rows: &mut Vec<bool>, dilated: &mut Vec<bool>) {
@@ -98,6 +124,7 @@ fn dilate(cells: &[bool], nx: usize, rows: &mut Vec<bool>, dilated: &mut Vec<boo
 #[derive(Clone, Debug, Default)]
 pub struct LatticeCosts {
     occupancy: LaggedOccupancy,
+    observed: ObservedObstacles,
     /// Working memory: the costs before the latest computation.
     previous: Vec<u32>,
 }
@@ -110,7 +137,13 @@ impl CostModel for LatticeCosts {
     fn recompute(&mut self, costs: &mut CostMap, inputs: &CostInputs<'_>) {
         std::mem::swap(&mut costs.cost, &mut self.previous);
         costs.cost.resize(costs.grid.n_cells(), 0);
-        lattice_costs(&costs.grid, inputs, &mut self.occupancy, &mut costs.cost);
+        lattice_costs(
+            &costs.grid,
+            inputs,
+            &mut self.occupancy,
+            &mut self.observed,
+            &mut costs.cost,
+        );
         costs.version += u32::from(costs.cost != self.previous);
         // Clearance is rarely requested, so it is computed on demand.
         costs.occupied.clone_from(&self.occupancy.occupied);
@@ -126,11 +159,12 @@ impl CostModel for LatticeCosts {
     }
 }
 
-/// Updates the occupancy, and computes the costs of all cells.
+/// Updates the occupancy and the obstacles, and computes the costs of all cells.
 fn lattice_costs(
     grid: &Grid,
     inputs: &CostInputs<'_>,
     occupancy: &mut LaggedOccupancy,
+    observed: &mut ObservedObstacles,
     cost: &mut [u32],
 ) {
     let latest = &mut occupancy.latest;
@@ -164,23 +198,19 @@ fn lattice_costs(
         let true_wall = if cell.is_tall() { TRUE_WALL_EXTRA } else { 0 };
         *cost = place + unknown + wall + true_wall;
     }
-    if let Some(inflation) = inputs.inflation {
+    if inputs.avoids_obstacles {
         let removable = obstacles.iter().filter(|t| t.class.info().role == Role::Obstacle);
-        let (mut inflated, extra): (Vec<usize>, u32) = match inflation {
-            ObstacleInflation::Wide => {
-                let centers = removable.filter_map(|t| grid.cell_at(to_xz(t.position_in_world)));
-                let squares = centers
-                    .flat_map(|cell| square(grid, cell, OBSTACLE_CELLS[0], OBSTACLE_CELLS[1]));
-                (squares.collect(), OBSTACLE_EXTRA)
-            }
-            ObstacleInflation::Narrow(radius_m) => {
-                let points = removable.flat_map(|t| &t.footprint);
-                (points.flat_map(|p| grid.disc(*p, radius_m)).collect(), BLOCKED)
-            }
-        };
+        observed.record(removable.filter_map(|t| {
+            let cell = grid.cell_at(to_xz(t.position_in_world))?;
+            Some((t.track, cell))
+        }));
+        let mut inflated: Vec<usize> = observed
+            .cells()
+            .flat_map(|cell| square(grid, cell, OBSTACLE_CELLS[0], OBSTACLE_CELLS[1]))
+            .collect();
         inflated.sort_unstable();
         inflated.dedup();
-        inflated.into_iter().for_each(|cell| cost[cell] += extra);
+        inflated.into_iter().for_each(|cell| cost[cell] += OBSTACLE_EXTRA);
     }
 }
 
@@ -223,17 +253,31 @@ mod tests {
         }
     }
 
+    #[test]
+    fn an_obstacle_keeps_the_cells_of_all_its_sightings_until_it_is_removed() {
+        let mut observed = ObservedObstacles::default();
+        let mut record = |list: &[(u32, usize)]| {
+            observed.record(list.iter().map(|(track, cell)| (TrackId(*track), *cell)));
+            observed.cells().collect::<Vec<_>>()
+        };
+        assert_eq!(record(&[(1, 30), (2, 80)]), [30, 80]);
+        assert_eq!(record(&[(1, 31), (2, 80)]), [30, 31, 80], "seen from elsewhere");
+        assert_eq!(record(&[(1, 30)]), [30, 31], "the second was removed");
+        assert_eq!(record(&[]), []);
+        assert_eq!(record(&[(1, 50)]), [50], "put down elsewhere");
+    }
+
     /// Computes the costs of a map without objects and people.
     fn add_costs(map: &OccupancyMap, occupancy: &mut LaggedOccupancy, cost: &mut [u32]) {
         let inputs = CostInputs {
             map,
             objects: &SemanticMap::default(),
             people: &PersonMap::default(),
-            inflation: None,
+            avoids_obstacles: false,
             position: Vec2::ZERO,
             now: FIRST_FRAMES,
         };
-        lattice_costs(map.grid(), &inputs, occupancy, cost);
+        lattice_costs(map.grid(), &inputs, occupancy, &mut ObservedObstacles::default(), cost);
     }
 
     #[test]

@@ -208,7 +208,7 @@ mod tests {
     #[test]
     fn a_blocked_path_prevents_the_arrival_of_exploration_but_not_an_interaction() {
         let mut memory = before_obstacle(Persona::Wheelchair, AgentId::PARTNER);
-        let explore = Destination::near(Vec2::new(2.0, 0.0), 3.5);
+        let explore = Destination::near(Vec2::new(1.7, 0.0), 3.5);
         let interact = Destination { arm_m: Some(0.0), ..explore.clone() };
         let mut step = |d: &Destination| LatticeNavigator::default().step(&mut memory, d);
         assert_eq!(step(&explore), NavigationStep::Act(Action::TurnLeft));

@@ -263,7 +263,7 @@ mod tests {
         assert_eq!(record(&[(1, 30), (2, 80)]), [30, 80]);
         assert_eq!(record(&[(1, 31), (2, 80)]), [30, 31, 80], "seen from elsewhere");
         assert_eq!(record(&[(1, 30)]), [30, 31], "the second was removed");
-        assert_eq!(record(&[]), []);
+        assert!(record(&[]).is_empty());
         assert_eq!(record(&[(1, 50)]), [50], "put down elsewhere");
     }
 

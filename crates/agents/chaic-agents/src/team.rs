@@ -15,3 +15,6 @@ pub mod travel;
 pub use problem::{Operation, Place, PlaceKind, TeamProblem, Worker};
 pub use search::{SearchSettings, improve};
 pub use simulation::simulate;
+
+#[cfg(test)]
+mod tests;

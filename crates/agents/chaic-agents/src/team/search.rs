@@ -214,3 +214,6 @@ impl<'a> Search<'a> {
         operations
     }
 }
+
+#[cfg(test)]
+mod tests;

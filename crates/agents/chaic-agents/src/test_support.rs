@@ -17,7 +17,7 @@ use crate::mapping::grid::Grid;
 use crate::mapping::occupancy::{CellOccupancy, OccupancyMap};
 use crate::mapping::{PersonMap, SemanticMap};
 use crate::memory::Memory;
-use crate::perception::{GroundTruthIds, Perception as _};
+use crate::perception::{Detection, GroundTruthIds, Perception as _};
 use crate::planning::careful_costs::CarefulCosts;
 use crate::planning::cost_map::CostMap;
 use crate::planning::cost_model::{CostInputs, CostModel as _};
@@ -501,6 +501,31 @@ impl ToyRun {
         self.toy
             .apply(crate::track::resolve_target(action, target).expect("every track has a target"));
     }
+}
+
+/// Creates a detection of an object with a square base; `at` is the center of its bottom.
+pub fn seen(track: TrackId, class: &str, at: [f32; 3], width_m: f32, height_m: f32) -> Detection {
+    let half = 0.5 * width_m;
+    let n = (width_m / 0.1).ceil() as i32;
+    let offset = |k: i32| half * (2.0 * k as f32 / n as f32 - 1.0);
+    let footprint =
+        (0..=n).flat_map(|i| (0..=n).map(move |j| Vec2::new(at[0] + offset(i), at[2] + offset(j))));
+    Detection {
+        track,
+        class: ClassId::named(class),
+        person: u16::try_from(track.0).ok().and_then(|e| EntityId(e).agent()),
+        pixel: [0, 0],
+        position_in_world: Vec3::from(at) + Vec3::new(0.0, 0.5 * height_m, 0.0),
+        bottom_m: at[1],
+        top_m: at[1] + height_m,
+        n_pixels: 100,
+        footprint: footprint.collect(),
+    }
+}
+
+/// Creates a detection of the partner as an adult.
+pub fn seen_partner(x: f32, z: f32) -> Detection {
+    seen(EntityId::from_agent(AgentId::PARTNER).into(), "person", [x, 0.0, z], 0.3, 1.7)
 }
 
 /// Creates a held object, with contents numbered from 90.

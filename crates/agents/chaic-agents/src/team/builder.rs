@@ -315,3 +315,6 @@ fn partner_worker(partner: &PartnerModel, classes: &[ClassId]) -> Worker {
 pub fn is_current_load(observed: Option<Frame>, now: Frame) -> bool {
     observed.is_some_and(|frame| frame + LOAD_FRAMES > now)
 }
+
+#[cfg(test)]
+mod tests;

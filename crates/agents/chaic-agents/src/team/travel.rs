@@ -134,3 +134,6 @@ pub fn trace(
     }
     Some(travel)
 }
+
+#[cfg(test)]
+mod tests;

@@ -155,3 +155,6 @@ fn current_load<'a>(memory: &Memory, behavior: &'a BehaviorLog) -> &'a [(TrackId
         false => &[],
     }
 }
+
+#[cfg(test)]
+mod tests;

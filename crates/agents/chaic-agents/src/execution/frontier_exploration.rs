@@ -316,4 +316,39 @@ mod tests {
             assert_eq!(explorer.is_exhausted(), is_granted);
         }
     }
+
+    #[test]
+    fn a_large_unknown_room_is_preferred_to_a_small_shadow_that_is_nearer() {
+        // Known room in the west with a shadow of 0.75 by 0.75 m in its corner; a door to an unknown
+        // room in the east, twice as far away.
+        let toy = Toy::room(12.0, 6.0);
+        let briefing = toy.briefing();
+        let chosen = |exploration| {
+            let rules = crate::PlannerRules { exploration, ..crate::PlannerRules::paper() };
+            let mut memory = Memory::new(&briefing, rules);
+            let grid = *memory.map.grid();
+            let state = |cell| {
+                let Vec2 { x, y: z } = grid.center(cell);
+                match () {
+                    () if x.abs() > 6.0 || z.abs() > 3.0 => CellOccupancy::Wall,
+                    () if x.abs() < 0.1 && z.abs() > 0.6 => CellOccupancy::Wall,
+                    () if x > 0.0 || (x < -5.25 && z < -2.25) => CellOccupancy::Unknown,
+                    () => CellOccupancy::Free,
+                }
+            };
+            let cells: Vec<CellOccupancy> = (0..grid.n_cells()).map(state).collect();
+            memory.map = crate::mapping::occupancy::OccupancyMap::from_cells(grid, &cells);
+            memory.pose.position = chaic_core::Vec3::new(-4.0, 0.0, -1.5);
+            let mut explorer = FrontierExplorer::new(toy.bounds());
+            let target = explorer.choose(&mut memory).expect("two frontiers");
+            assert!(target.is_frontier && !explorer.is_exhausted());
+            target.at.x
+        };
+        let is_shadow = |x: f32| x < -4.5;
+        let is_door = |x: f32| x > -0.5;
+        let first = chosen(Exploration::UnknownArea);
+        assert!(is_door(first), "{first}");
+        let first = chosen(Exploration::Frontier);
+        assert!(is_shadow(first), "the nearest one: {first}");
+    }
 }

@@ -425,3 +425,6 @@ impl Policy for InferPolicy {
         Some(self.clone())
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -157,4 +157,11 @@ fn current_load<'a>(memory: &Memory, behavior: &'a BehaviorLog) -> &'a [(TrackId
 }
 
 #[cfg(test)]
+impl Neglect {
+    fn is_empty(&self) -> bool {
+        self.frames.is_empty()
+    }
+}
+
+#[cfg(test)]
 mod tests;

@@ -132,7 +132,7 @@ fn deliveries_to_a_place_that_the_partner_hardly_reaches_count_in_part() {
 }
 
 #[test]
-fn a_blocked_partner_delivers_only_after_the_helper_has_removed_the_obstacle() {
+fn a_blocked_partner_delivers_only_if_the_helper_removes_the_obstacle() {
     let places = [(Target, 5.0), (Goal, 0.0), (Obstacle, 3.0)];
     let mut problem = line(2.0, Some(0.0), &places);
     assert_eq!(timeline(&problem, &[]), [(286, false)], "it steps over obstacles");

@@ -1,9 +1,11 @@
 //! Narrow passages: doorways, seen as walls on two opposite sides.
 
 use chaic_core::Vec2;
+use chaic_core::geom::to_xz;
 
 use super::grid::CELL_M;
 use super::occupancy::OccupancyMap;
+use super::semantic::MappedObject;
 
 /// Maximum distance between the walls on two opposite sides, meters. Ours: door openings are up to
 /// 1.2 m wide, and each wall may appear one or two cells thinner than it is.
@@ -20,9 +22,23 @@ const DIRECTIONS: [Vec2; 4] = [
     Vec2::new(std::f32::consts::FRAC_1_SQRT_2, -std::f32::consts::FRAC_1_SQRT_2),
 ];
 
+/// Maximum distance of an obstacle's center from the mean of its visible points, cells (0.375 m):
+/// half the depth of the largest obstacles. Walls may appear one cell thick, so each cell counts.
+const CENTER_ERROR_CELLS: i16 = 3;
+
+/// Returns whether an obstacle stands in a narrow passage, as far as the map shows. Only its front is
+/// visible, so its center may lie beyond the mean of its visible points.
+pub fn stands_in_passage(map: &OccupancyMap, object: &MappedObject) -> bool {
+    let at = to_xz(object.position_in_world);
+    let offsets = (-CENTER_ERROR_CELLS..=CENTER_ERROR_CELLS).map(|k| CELL_M * f32::from(k));
+    offsets
+        .into_iter()
+        .any(|m| is_in_passage(map, at + m * Vec2::X) || is_in_passage(map, at + m * Vec2::Y))
+}
+
 /// Returns whether a point (x, z) lies between two walls of a narrow passage, as far as the map
 /// shows. Unknown cells and tall furniture are no walls.
-pub fn is_in_passage(map: &OccupancyMap, at: Vec2) -> bool {
+fn is_in_passage(map: &OccupancyMap, at: Vec2) -> bool {
     let to_wall = |direction: Vec2| {
         let steps = (1..).map(|k| CELL_M * k as f32).take_while(|m| *m <= MAX_SIDE_M);
         steps.into_iter().find(|m| {

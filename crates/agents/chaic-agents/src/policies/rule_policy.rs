@@ -6,7 +6,7 @@ use chaic_core::{Action, AgentError, Briefing, ClassId, FailureReason, Frame, Ou
 
 use crate::decision::{Context, HandState, Plan, Policy, Subject};
 use crate::mapping::TrackedPerson;
-use crate::mapping::passage::is_in_passage;
+use crate::mapping::passage::stands_in_passage;
 use crate::memory::Memory;
 use crate::rules::{Bookkeeping, ObstacleChoice};
 use crate::track::TrackId;
@@ -376,7 +376,7 @@ pub(super) fn is_relevant_removal(context: &Context<'_>, plan: &Plan) -> bool {
         ObstacleChoice::All => true,
         ObstacleChoice::InPassages => {
             let object = memory.objects.get(subject.track);
-            object.is_some_and(|o| is_in_passage(&memory.map, to_xz(o.position_in_world)))
+            object.is_some_and(|object| stands_in_passage(&memory.map, object))
         }
     }
 }

@@ -11,7 +11,7 @@ use super::problem::{
 };
 use super::travel::{TravelCache, trace};
 use crate::mapping::MappedObject;
-use crate::mapping::passage::is_in_passage;
+use crate::mapping::passage::stands_in_passage;
 use crate::memory::Memory;
 use crate::planning::path::CostField;
 use crate::track::TrackId;
@@ -52,7 +52,8 @@ pub struct PartnerModel {
 pub struct ProblemBuilder {
     travel: TravelCache,
     seen_by_partner: BTreeSet<TrackId>,
-    layout: Option<(u32, usize)>,
+    /// Versions of the occupancy map and of the object layout, and the known obstacles.
+    layout: Option<(u32, u32, Vec<TrackId>)>,
     epoch: u64,
 }
 
@@ -137,12 +138,13 @@ impl ProblemBuilder {
             if !object.is_available(now) || is_held(object.track) {
                 return None;
             }
-            let at = to_xz(object.position_in_world);
             match object.class.info().role {
                 Role::Container if briefing.containers.contains(&object.class) => {
                     Some(PlaceKind::Container)
                 }
-                Role::Obstacle => is_in_passage(&memory.map, at).then_some(PlaceKind::Obstacle),
+                Role::Obstacle => {
+                    stands_in_passage(&memory.map, object).then_some(PlaceKind::Obstacle)
+                }
                 _ => classes.contains(&object.class).then_some(PlaceKind::Target),
             }
         };
@@ -176,6 +178,7 @@ impl ProblemBuilder {
                 class: object.class,
                 kind,
                 class_index: classes.iter().position(|c| *c == object.class),
+                position: to_xz(object.position_in_world),
                 stand,
                 is_known_to_partner: is_known,
                 partner_chance,
@@ -188,9 +191,10 @@ impl ProblemBuilder {
     /// Starts a new epoch of path lengths when the layout of large objects has changed, or obstacles
     /// came or went.
     fn start_epoch(&mut self, memory: &Memory, found: &[(PlaceKind, &MappedObject)]) {
-        let n_obstacles = found.iter().filter(|(kind, _)| *kind == PlaceKind::Obstacle).count();
-        let layout = (memory.map.version(), n_obstacles);
-        if self.layout != Some(layout) {
+        let obstacles = found.iter().filter(|(kind, _)| *kind == PlaceKind::Obstacle);
+        let obstacles: Vec<TrackId> = obstacles.map(|(_, object)| object.track).collect();
+        let layout = (memory.map.version(), memory.objects.layout_version(), obstacles);
+        if self.layout.as_ref() != Some(&layout) {
             self.layout = Some(layout);
             self.epoch += 1;
         }
@@ -206,7 +210,7 @@ impl ProblemBuilder {
     ) -> (Vec<Vec<f32>>, Vec<Vec<u64>>) {
         let costs = memory.costs();
         let n = places.len();
-        let at_obstacles: Vec<Vec2> = obstacles.iter().map(|i| places[*i].stand).collect();
+        let at_obstacles: Vec<Vec2> = obstacles.iter().map(|i| places[*i].position).collect();
         let all_obstacles = obstacles.iter().fold(0_u64, |bits, i| bits | 1 << i);
         let to_places = |bits: u64| {
             let set = obstacles.iter().enumerate().filter(|(k, _)| bits >> k & 1 == 1);

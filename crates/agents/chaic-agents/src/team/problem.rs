@@ -35,6 +35,8 @@ pub struct Place {
     pub kind: PlaceKind,
     /// Index of the class in [`TeamProblem::classes`]; `None` unless a target lies there.
     pub class_index: Option<usize>,
+    /// Position of the object (x, z), meters.
+    pub position: Vec2,
     /// Position at which a person stands to use it (x, z), meters.
     pub stand: Vec2,
     /// True if the partner has probably seen it.

@@ -66,8 +66,8 @@ pub fn improve(
             }
         }
     }
-    best.operations = search.without_useless(best.operations);
-    best
+    let operations = search.without_useless(best.operations);
+    search.rated(operations)
 }
 
 /// Returns a sequence in the order of the published rules: all obstacles, if they shall be removed;

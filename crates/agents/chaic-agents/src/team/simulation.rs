@@ -95,7 +95,7 @@ impl Load {
 struct Person {
     /// Time of the next event, frames from now: a decision, or the arrival at `pending`.
     time: f32,
-    /// Place that the person walks to, to pick something up.
+    /// Place that the person walks to, to pick something up or to remove an obstacle.
     pending: Option<usize>,
     /// Row in the matrices.
     row: usize,
@@ -237,18 +237,23 @@ impl<'a> Simulation<'a> {
                 if path_m < NO_PATH_M && self.removed >> place & 1 == 0 {
                     helper.time += Self::walk_frames(path_m, worker) + self.frames.remove;
                     helper.row = place;
-                    self.removed |= 1 << place;
+                    helper.pending = Some(place);
                 }
             }
         }
     }
 
-    /// Picks up what lies at a place, unless the other person has taken it.
+    /// Picks up what lies at a place, unless the other person has taken it. At an obstacle the removal
+    /// is done by then.
     fn arrive(&mut self, worker: &Worker, person: &mut Person, place: usize, is_helper: bool) {
         if self.taken >> place & 1 == 1 {
             return;
         }
         let info = &self.problem.places[place];
+        if info.kind == PlaceKind::Obstacle {
+            self.removed |= 1 << place;
+            return;
+        }
         person.time += self.frames.pick_up + worker.docking_frames;
         if !is_helper && info.partner_chance < MIN_CHANCE {
             self.given_up |= 1 << place;

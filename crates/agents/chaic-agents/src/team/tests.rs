@@ -29,6 +29,7 @@ pub fn plane(helper: Vec2, partner: Option<Vec2>, places: &[(PlaceKind, Vec2)]) 
         class: ClassId::named("apple"),
         kind: *kind,
         class_index: (*kind == PlaceKind::Target).then_some(0),
+        position: *at,
         stand: *at,
         is_known_to_partner: true,
         partner_chance: 1.0,

@@ -80,12 +80,12 @@ fn stronger_evidence_moves_the_belief_further() {
     let after = |strength| belief_of(&takes(20, &[("apple", strength)])).most_likely().1;
     let each = [0.1, 0.3, 0.4, 0.8, 1.0].map(after);
     assert!(each[0] > 0.25 && each.windows(2).all(|w| w[1] > w[0]), "{each:?}");
-    // Strength 0.3 is real with 0.45: 0.45 * w + 0.55 / 15, with the same w as above.
-    // Fruit: 0.45 * (5/6 * 0.29167 + 1/6 * 0.23333) + 0.03667 = 0.16354.
-    // Bread: 0.45 / 11 * (5/6 / 8 + 1/6 / 10) + 0.03667 = 0.04161.
-    // Work: 0.045 * (5/6 / 10 + 1/6 / 12) + 0.03667 = 0.04104.
-    // School: 0.045 * (5/6 / 9 + 1/6 / 11) + 0.03667 = 0.04152. The sum is 0.28771.
-    check(&belief_of(&takes(20, &[("apple", 0.3)])), [0.5684, 0.1446, 0.1427, 0.1443]);
+    // Strength 0.3 is real with 0.5: 0.5 * w + 0.5 / 15, with the same w as above.
+    // Fruit: 0.5 * (5/6 * 0.29167 + 1/6 * 0.23333) + 0.03333 = 0.17431.
+    // Bread: 0.5 / 11 * (5/6 / 8 + 1/6 / 10) + 0.03333 = 0.03883.
+    // Work: 0.05 * (5/6 / 10 + 1/6 / 12) + 0.03333 = 0.03819.
+    // School: 0.05 * (5/6 / 9 + 1/6 / 11) + 0.03333 = 0.03872. The sum is 0.29005.
+    check(&belief_of(&takes(20, &[("apple", 0.3)])), [0.6010, 0.1339, 0.1317, 0.1335]);
 }
 
 #[test]
@@ -134,9 +134,9 @@ fn objects_beyond_the_wanted_number_are_explained_by_false_readings_only() {
         Summary::new(&takes(20, list), &constraint, &briefing.possible_targets)
             .log_likelihood(&fruit)
     };
-    // Of 10 objects, 1 is a pen and 2 are vases. False readings: 0.02 / 15, and 0.4 / 15 at
+    // Of 10 objects, 1 is a pen and 2 are vases. False readings: 0.02 / 15, and 0.08 / 15 at
     // strength 0.4. The strongest readings are the explained ones.
-    let (false_sure, false_weak) = (0.02 / 15.0, 0.4 / 15.0);
+    let (false_sure, false_weak) = (0.02 / 15.0, 0.08 / 15.0);
     let (pen, vase) = (0.98 * 0.1 + false_sure, 0.98 * 0.2 + false_sure);
     for (list, expected) in [
         (&[("pen", 0.4), ("pen", 1.0)][..], math::ln(pen) + math::ln(false_weak)),

@@ -13,6 +13,7 @@ use chaic_eval::report::title;
 use chaic_eval::run::{RunFolder, planned, read_results};
 use chaic_files::entries;
 use chaic_llm::language::helper_names;
+use comfy_table::ContentArrangement;
 use serde_json::{Value, json};
 
 use super::table;
@@ -31,6 +32,9 @@ pub fn run(command: &ListCommand, format: OutputFormat) -> Result<ExitStatus> {
     }?;
     Ok(ExitStatus::Success)
 }
+
+/// Maximum width of the table of helpers, columns; longer cells take several lines.
+const MAX_WIDTH: u16 = 100;
 
 /// Describes a built-in helper.
 fn description(name: &str) -> &'static str {
@@ -60,6 +64,7 @@ fn helpers(format: OutputFormat) -> Result<()> {
     let names = [NONE.to_owned()].into_iter().chain(helper_names());
     let mut rows = Vec::new();
     let mut table = table(["Name", "Granted", "Description"]);
+    table.set_content_arrangement(ContentArrangement::Dynamic).set_width(MAX_WIDTH);
     for name in names {
         let (title, grants, description) = (title(&name), grants(&name), description(&name));
         table.add_row([name.as_str(), &grants.join(", "), description]);

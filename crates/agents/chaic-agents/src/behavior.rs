@@ -41,6 +41,15 @@ pub struct BehaviorLog {
 }
 
 impl BehaviorLog {
+    /// Returns the objects that the partner held when last observed, if that was less than
+    /// `max_age` frames ago.
+    pub fn partner_load(&self, now: Frame, max_age: Frame) -> &[(TrackId, ClassId)] {
+        match self.partner_holds_frame.is_some_and(|frame| frame + max_age > now) {
+            true => &self.partner_holds,
+            false => &[],
+        }
+    }
+
     /// Returns the agent's last known completed attempt to pick something up.
     pub fn last_pick_of(&self, agent: AgentId) -> Option<(&ObservedInteraction, TrackId)> {
         let has_ended = |a: &&ObservedInteraction| a.agent == agent && a.outcome.is_some();
@@ -223,6 +232,16 @@ mod tests {
     use chaic_core::EntityId;
     use chaic_core::observation::{HeldIdentity, ObservedAction};
     use chaic_core::{Hand, Outcome};
+
+    #[test]
+    fn a_load_has_an_age() {
+        let apple = (TrackId(20), ClassId::named("apple"));
+        let mut log = BehaviorLog { partner_holds: vec![apple], ..BehaviorLog::default() };
+        assert!(log.partner_load(10, 300).is_empty(), "it was never observed");
+        log.partner_holds_frame = Some(100);
+        assert_eq!(log.partner_load(399, 300), [apple]);
+        assert!(log.partner_load(400, 300).is_empty());
+    }
 
     #[test]
     fn the_end_of_an_action_replaces_its_start_and_held_objects_are_collected() {

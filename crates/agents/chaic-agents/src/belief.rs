@@ -10,7 +10,7 @@
 mod constraint;
 mod evidence;
 mod goal;
-mod neglect;
+mod observed_walks;
 mod scene;
 mod visibility;
 mod walking_speed;
@@ -23,7 +23,7 @@ use crate::memory::Memory;
 pub use constraint::ConstraintBelief;
 pub use evidence::{AttemptKind, Evidence, FailedAttempt, Take};
 pub use goal::GoalBelief;
-pub use neglect::Neglect;
+pub use observed_walks::ObservedWalks;
 
 /// Belief of one agent about its partner.
 #[derive(Clone, Debug)]

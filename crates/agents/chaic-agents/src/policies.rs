@@ -10,4 +10,6 @@ pub use external::ExternalPolicy;
 pub use follow::FollowPolicy;
 pub use infer::{InferOptions, InferPolicy};
 pub use random::RandomPolicy;
-pub use rule_policy::{RulePolicy, RuleProfile, TargetFilter, TargetOrder};
+pub use rule_policy::RulePolicy;
+
+pub use crate::rules::{RuleProfile, TargetFilter, TargetOrder};

@@ -3,12 +3,14 @@
 //! field with its reason.
 
 mod groups;
+mod profile;
 
 use chaic_core::Frame;
 use chaic_core::briefing::Briefing;
 use serde::{Deserialize, Serialize};
 
 pub use groups::{ChildRules, FailureRules, LiftingRules, PeopleRules, PlanLimits, TimeRules};
+pub use profile::{RuleProfile, TargetFilter, TargetOrder};
 
 /// Navigation: path planning and path following.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -62,8 +64,8 @@ pub enum PlaceChoice {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ObstacleChoice {
-    /// Those that stand in narrow passages, as far as the helper's map shows (paper, table 1:
-    /// obstacles between rooms).
+    /// Obstacles in narrow passages, as far as the helper's map shows (paper, table 1: obstacles
+    /// between rooms).
     InPassages,
     /// All (facts A2.2). The default of stored rules that predate this field.
     #[default]

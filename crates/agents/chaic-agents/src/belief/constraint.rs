@@ -9,13 +9,6 @@ use super::evidence::{AttemptKind, Evidence, FailedAttempt, Take, reliability};
 use super::scene::{paper_tasks, scene_of};
 use super::{normalized, posterior};
 
-/// Chance of a pick-up beyond the height range (paper section 3.1).
-const PICK_PENALTY: LimitPenalty = LimitPenalty { alpha: 1.0, beta: 2.0 };
-/// Chance of a put-on beyond the height range (paper section 3.1).
-const PUT_PENALTY: LimitPenalty = LimitPenalty { alpha: 1.0, beta: 1.0 };
-/// Chance of a lift beyond the strength (paper section 3.1).
-const LIFT_PENALTY: LimitPenalty = LimitPenalty { alpha: 50.0, beta: 1.0 };
-
 /// Chance of a failure within all limits, for example by a tremor.
 const UNEXPLAINED_FAILURE: f32 = 0.02;
 /// Chance of an attempt that was recognized wrongly. It is the same for all people, so such an
@@ -100,38 +93,21 @@ impl ConstraintBelief {
         personas.zip(self.probabilities.iter().copied()).collect()
     }
 
-    /// Returns the most likely persona and its probability; the first one of equally likely ones.
-    pub fn most_likely(&self) -> (Persona, f32) {
-        let (candidate, probability) = self.best();
-        (candidate.kind.persona, probability)
-    }
-
-    /// Returns the capability of the most likely person, with disclosed impairments.
+    /// Returns the capability of the most likely person (the first one of equally likely ones), with
+    /// disclosed impairments.
     pub fn capability(&self) -> Capability {
-        self.best().0.kind.capability()
-    }
-
-    /// Returns the chance that the partner succeeds in picking up a light object with its top at
-    /// `top_m` meters.
-    pub fn pick_chance(&self, top_m: f32) -> f32 {
-        self.expect(|c| PICK_PENALTY.chance(excess(top_m, c.pick_range_m)))
-    }
-
-    /// Returns the chance that the partner succeeds in putting an object on a surface at `top_m`
-    /// meters.
-    pub fn put_chance(&self, top_m: f32) -> f32 {
-        self.expect(|c| PUT_PENALTY.chance(excess(top_m, c.put_range_m)))
+        let each = self.candidates.iter().zip(self.probabilities.iter().copied());
+        each.reduce(|best, next| if next.1 > best.1 { next } else { best })
+            .expect("each kind of scene has a task, and each task a partner")
+            .0
+            .kind
+            .capability()
     }
 
     /// Returns the probability that an object with its top at `top_m` meters is within the
     /// partner's range for pick-ups.
     pub fn reach_probability(&self, top_m: f32) -> f32 {
         self.expect(|c| f32::from(u8::from(excess(top_m, c.pick_range_m) <= 0.0)))
-    }
-
-    /// Returns the probability that the partner can remove obstacles.
-    pub fn removes_obstacles_probability(&self) -> f32 {
-        self.expect(|c| f32::from(u8::from(c.removes_obstacles)))
     }
 
     /// Returns the probability that the task of this person has fragile targets.
@@ -143,12 +119,6 @@ impl ConstraintBelief {
     fn expect(&self, value: impl Fn(&Capability) -> f32) -> f32 {
         let each = self.candidates.iter().zip(&self.probabilities);
         each.map(|(c, p)| p * value(&c.kind.capability())).sum::<f32>().min(1.0)
-    }
-
-    fn best(&self) -> (&Candidate, f32) {
-        let each = self.candidates.iter().zip(self.probabilities.iter().copied());
-        each.reduce(|best, next| if next.1 > best.1 { next } else { best })
-            .expect("each kind of scene has a task, and each task a partner")
     }
 }
 
@@ -178,8 +148,8 @@ fn top_likelihood(max_top_m: f32, height_m: f32, n: u32) -> f32 {
 
 /// Returns the success chance of a person's pick-up of an object.
 fn take_chance(capability: &Capability, top_m: f32, mass_kg: f32) -> f32 {
-    PICK_PENALTY.chance(excess(top_m, capability.pick_range_m))
-        * LIFT_PENALTY.chance(mass_kg - capability.strength_kg)
+    LimitPenalty::PICK.chance(excess(top_m, capability.pick_range_m))
+        * LimitPenalty::LIFT.chance(mass_kg - capability.strength_kg)
 }
 
 /// Returns the likelihood of a take. A take that is not real is equally likely for all people.
@@ -193,7 +163,9 @@ fn take_likelihood(capability: &Capability, take: &Take) -> f32 {
 fn failure_likelihood(capability: &Capability, failed: &FailedAttempt) -> f32 {
     let chance = match failed.kind {
         AttemptKind::PickUp => take_chance(capability, failed.top_m, failed.class.info().mass_kg),
-        AttemptKind::PutOn => PUT_PENALTY.chance(excess(failed.top_m, capability.put_range_m)),
+        AttemptKind::PutOn => {
+            LimitPenalty::PUT.chance(excess(failed.top_m, capability.put_range_m))
+        }
         AttemptKind::RemoveObstacle => f32::from(u8::from(capability.removes_obstacles)),
     };
     let real = reliability(failed.strength);

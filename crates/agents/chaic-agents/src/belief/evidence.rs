@@ -6,7 +6,7 @@ use chaic_core::briefing::CompanionRole;
 use chaic_core::geom::to_xz;
 use chaic_core::{Action, Briefing, ClassId, FailureReason, Frame, Outcome, Vec2};
 
-use super::neglect::Neglect;
+use super::observed_walks::ObservedWalks;
 use super::visibility::{is_at_rest, is_hidden};
 use super::walking_speed::WalkingSpeed;
 use crate::behavior::BehaviorLog;
@@ -30,7 +30,7 @@ const OTHER_PLACE_M: f32 = 0.6;
 /// real. The last two values are lower, for perceptions that may err.
 const RELIABILITY: [(f32, f32); 4] =
     [(VANISHED, 0.5), (HELD_ONCE, 0.92), (MOVED_INTO_HANDS, 0.96), (CERTAIN, 0.98)];
-/// Before this frame nobody holds a target: a full turn takes 36 frames and a pick-up 58.
+/// First frame in which a person can hold a target: a full turn takes 36 frames and a pick-up 58.
 const FIRST_TAKE_FRAME: Frame = 90;
 /// Strength of a failed attempt that a behavior model has recognized without a grant.
 const RECOGNIZED: f32 = HELD_ONCE;
@@ -130,7 +130,7 @@ pub struct Evidence {
     /// Frame of the last sighting, or of the last granted position.
     pub last_seen: Option<Frame>,
     /// Walks away from known objects.
-    pub neglect: Neglect,
+    pub walks: ObservedWalks,
     /// Objects that the agent itself has picked up.
     own: BTreeSet<TrackId>,
     /// Positions at which objects were last seen lying.
@@ -182,7 +182,7 @@ impl Evidence {
         if let Some(partner) = partner {
             let at = to_xz(partner.position_in_world);
             self.update_visits(briefing, memory, behavior, at);
-            self.neglect.observe(briefing, memory, behavior, at);
+            self.walks.observe(briefing, memory, behavior, at);
         }
         self.update_passed(memory);
     }

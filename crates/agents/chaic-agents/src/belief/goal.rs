@@ -10,7 +10,7 @@ use chaic_core::{Briefing, ClassId, Role};
 
 use super::constraint::ConstraintBelief;
 use super::evidence::{AttemptKind, Evidence, reliability};
-use super::neglect::Neglect;
+use super::observed_walks::ObservedWalks;
 use super::posterior;
 use super::scene::{expected_per_class, scene_of, set_size, target_sets};
 
@@ -24,10 +24,10 @@ const UNKNOWN_COUNT: u32 = 9;
 const PASSED_FACTOR: f32 = 0.74;
 /// Time after which the partner would have gone to a wanted object that it knows, frames: the
 /// likelihood of walking elsewhere falls to 1/e. Ours, chosen on `gen-standard:7000..7010`.
-const NEGLECT_FRAMES: f32 = 60.0;
+const WALK_ELSEWHERE_FRAMES: f32 = 60.0;
 /// Maximum effect of such walks on the logarithm of the likelihood: walks around furniture may look
 /// like walks elsewhere.
-const MAX_NEGLECT: f32 = 4.0;
+const MAX_WALKS_EFFECT: f32 = 4.0;
 /// Minimum probability of the extra class and of fragile targets in a concluded goal.
 const MIN_ADDITION: f32 = 0.5;
 
@@ -88,7 +88,7 @@ impl Hypothesis {
 /// Summary of the evidence for all hypotheses.
 struct Summary<'a> {
     possible: &'a [ClassId],
-    neglect: &'a Neglect,
+    walks: &'a ObservedWalks,
     /// Reliabilities of the takes, by class, highest first.
     takes: BTreeMap<ClassId, Vec<f32>>,
     /// Classes of passed objects with the probability that the object is within reach.
@@ -120,8 +120,8 @@ impl<'a> Summary<'a> {
         let reach = |track| evidence.lying_top_m(track).map(|m| constraint.reach_probability(m));
         let passed = evidence.passed.iter().map(|(t, class)| (*class, reach(*t).unwrap_or(1.0)));
         let background = 1.0 / possible.len().max(1) as f32;
-        let (passed, neglect) = (passed.collect(), &evidence.neglect);
-        Summary { possible, neglect, takes, passed, background }
+        let (passed, walks) = (passed.collect(), &evidence.walks);
+        Summary { possible, walks, takes, passed, background }
     }
 
     fn log_likelihood(&self, hypothesis: &Hypothesis) -> f32 {
@@ -141,12 +141,12 @@ impl<'a> Summary<'a> {
                 sum += math::ln(1.0 - (1.0 - PASSED_FACTOR) * reach);
             }
         }
-        sum - (self.neglect_frames(hypothesis) / NEGLECT_FRAMES).min(MAX_NEGLECT)
+        sum - (self.contradicting_frames(hypothesis) / WALK_ELSEWHERE_FRAMES).min(MAX_WALKS_EFFECT)
     }
 
     /// Returns the frames in which the partner knew of an object that this hypothesis still wants,
     /// and approached none.
-    fn neglect_frames(&self, hypothesis: &Hypothesis) -> f32 {
+    fn contradicting_frames(&self, hypothesis: &Hypothesis) -> f32 {
         let mut wanted = 0;
         for (k, class) in self.possible.iter().enumerate().take(32) {
             let n_taken = self.takes.get(class).map_or(0, Vec::len);
@@ -156,7 +156,7 @@ impl<'a> Summary<'a> {
             };
             wanted |= u32::from(is_wanted) << k;
         }
-        self.neglect.frames(wanted)
+        self.walks.frames(wanted)
     }
 }
 

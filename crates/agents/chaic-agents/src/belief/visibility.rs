@@ -1,4 +1,4 @@
-//! Where objects lie, and whether a person can see them.
+//! State and visibility of objects: whether one lies in play, and whether a person can see it.
 
 use chaic_core::{Frame, Vec2};
 

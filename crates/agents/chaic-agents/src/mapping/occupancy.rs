@@ -265,13 +265,13 @@ impl OccupancyMap {
     /// Returns the state of a cell.
     #[inline]
     pub fn state(&self, cell: usize) -> CellOccupancy {
-        Cell { confidence: self.confidence[cell], seen_bits: self.seen_bits[cell] }.state()
+        self.cell(cell).state()
     }
 
-    /// Returns whether a wall stands there that is taller than any furniture.
-    pub fn is_permanent_wall(&self, cell: usize) -> bool {
-        let cell = Cell { confidence: self.confidence[cell], seen_bits: self.seen_bits[cell] };
-        cell.state() == CellOccupancy::Wall && cell.is_tall()
+    /// Returns a cell.
+    #[inline]
+    pub fn cell(&self, cell: usize) -> Cell {
+        Cell { confidence: self.confidence[cell], seen_bits: self.seen_bits[cell] }
     }
 
     /// Returns all cells, row by row.

@@ -4,7 +4,7 @@ use chaic_core::Vec2;
 use chaic_core::geom::to_xz;
 
 use super::grid::CELL_M;
-use super::occupancy::OccupancyMap;
+use super::occupancy::{CellOccupancy, OccupancyMap};
 use super::semantic::MappedObject;
 
 /// Maximum distance between the walls on two opposite sides, meters. Ours: door openings are up to
@@ -43,7 +43,8 @@ fn is_in_passage(map: &OccupancyMap, at: Vec2) -> bool {
         let steps = (1..).map(|k| CELL_M * k as f32).take_while(|m| *m <= MAX_SIDE_M);
         steps.into_iter().find(|m| {
             let cell = map.grid().cell_at(at + direction * *m);
-            cell.is_some_and(|cell| map.is_permanent_wall(cell))
+            cell.map(|cell| map.cell(cell))
+                .is_some_and(|cell| cell.state() == CellOccupancy::Wall && cell.is_tall())
         })
     };
     DIRECTIONS.into_iter().any(|direction| {

@@ -11,12 +11,13 @@ use chaic_core::geom::to_xz;
 use chaic_core::rng::RngStream;
 use chaic_core::{AgentError, Briefing, ClassId, Frame, Observation, Role};
 
-use super::rule_policy::{RulePolicy, RuleProfile, is_relevant_removal};
+use super::rule_policy::{RulePolicy, is_relevant_removal};
 use crate::behavior::BehaviorLog;
 use crate::belief::Belief;
 use crate::decision::{Context, HandState, Plan, Policy, Subject};
 use crate::memory::Memory;
-use crate::team::builder::{PartnerModel, ProblemBuilder, is_current_load};
+use crate::rules::RuleProfile;
+use crate::team::builder::{PartnerModel, ProblemBuilder};
 use crate::team::{Operation, SearchSettings, TeamProblem, improve, simulate};
 use crate::track::TrackId;
 
@@ -171,11 +172,8 @@ impl InferPolicy {
             .memory
             .companion(context.briefing, CompanionRole::Partner)
             .map(|person| to_xz(person.position_in_world));
-        let behavior = context.behavior;
-        let holds = match is_current_load(behavior.partner_holds_frame, context.memory.frame) {
-            true => behavior.partner_holds.clone(),
-            false => Vec::new(),
-        };
+        let max_age = context.memory.rules.time.partner_holds_frames;
+        let holds = context.behavior.partner_load(context.memory.frame, max_age).to_vec();
         let goals = self.goals(context.briefing);
         PartnerModel { capability: self.partner_capability(), position, holds, goals }
     }
@@ -185,8 +183,7 @@ impl InferPolicy {
         let partner = self.partner_model(context);
         let problem = self.builder.build(context.briefing, context.memory, &partner)?;
         let warm = self.operations(&problem);
-        let candidates: Vec<_> = warm.iter().cloned().collect();
-        let plan = improve(&problem, &candidates, SearchSettings::DEFAULT, &mut self.rng);
+        let plan = improve(&problem, warm.as_slice(), SearchSettings::DEFAULT, &mut self.rng);
         let stay = warm.map_or(f32::MIN, |warm| simulate(&problem, &warm));
         self.may_switch = plan.value > stay + SWITCH_GAIN;
         self.steps = plan.operations.iter().map(|o| step(&problem, *o)).collect();

@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use chaic_core::capability::{Capability, Gait, excess};
-use chaic_core::geom::{math, to_xz};
-use chaic_core::{Briefing, ClassId, Frame, Role, Vec2};
+use chaic_core::capability::{Capability, Gait, LimitPenalty, excess};
+use chaic_core::geom::to_xz;
+use chaic_core::{Briefing, ClassId, Role, Vec2};
 
 use super::problem::{
     GoalHypothesis, MAX_CLASSES, MAX_PLACES, NO_PATH_M, Place, PlaceKind, TeamProblem, Worker,
@@ -14,6 +14,7 @@ use crate::mapping::MappedObject;
 use crate::mapping::passage::stands_in_passage;
 use crate::memory::Memory;
 use crate::planning::path::CostField;
+use crate::rules::RuleProfile;
 use crate::track::TrackId;
 
 /// Ratio of the length of a walked path to the traced one. Measured in `gen-standard:7000..7010`.
@@ -29,12 +30,10 @@ const OBSTACLE_M: f32 = 0.75;
 const UNKNOWN_PATH: (f32, f32) = (1.5, 1.0);
 /// Time reserve at the end of the episode, frames.
 const MARGIN_FRAMES: f32 = 40.0;
-/// Time for which the partner's last known load counts as current, frames.
-const LOAD_FRAMES: Frame = 300;
 /// Maximum number of containers in a problem: the nearest ones.
 const MAX_CONTAINERS: usize = 3;
 
-/// What the planner believes about the partner.
+/// Belief of the planner about the partner.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PartnerModel {
     /// Its body.
@@ -89,7 +88,8 @@ impl ProblemBuilder {
             places.truncate(MAX_PLACES);
         }
         let helper = helper_worker(briefing, memory, &classes);
-        let partner_worker = partner.position.map(|_| partner_worker(partner, &classes));
+        let capacity = briefing.container_capacity as usize;
+        let partner_worker = partner.position.map(|_| partner_worker(partner, &classes, capacity));
         let obstacles: Vec<usize> =
             (0..places.len()).filter(|i| places[*i].kind == PlaceKind::Obstacle).collect();
         let (path_m, obstacles_on_path) = self.paths(memory, partner, &places, &obstacles);
@@ -115,7 +115,8 @@ impl ProblemBuilder {
             horizon: briefing.horizon as f32,
             helper,
             partner: partner_worker,
-            container_capacity: briefing.container_capacity as usize,
+            container_capacity: capacity,
+            rules: memory.rules,
         })
     }
 
@@ -166,11 +167,8 @@ impl ProblemBuilder {
             let Some(stand) = stand else { continue };
             let body = &partner.capability;
             let partner_chance = match kind {
-                PlaceKind::Goal => math::exp(-excess(object.top_m, body.put_range_m)),
-                _ => match excess(object.top_m, body.pick_range_m) {
-                    beyond if beyond > 0.0 => 0.5 * math::exp(-beyond),
-                    _ => 1.0,
-                },
+                PlaceKind::Goal => LimitPenalty::PUT.chance(excess(object.top_m, body.put_range_m)),
+                _ => LimitPenalty::PICK.chance(excess(object.top_m, body.pick_range_m)),
             };
             let is_known = kind == PlaceKind::Goal || self.seen_by_partner.contains(&object.track);
             places.push(Place {
@@ -291,14 +289,14 @@ fn helper_worker(briefing: &Briefing, memory: &Memory, classes: &[ClassId]) -> W
         n_loose: body.hands.all().len(),
         carries_containers: body.carries_containers,
         is_blocked: false,
-        deliver_below: 0.25,
-        busy_frames: 0.0,
+        deliver_below: RuleProfile::PARTNER.deliver_below,
     }
 }
 
-fn partner_worker(partner: &PartnerModel, classes: &[ClassId]) -> Worker {
+fn partner_worker(partner: &PartnerModel, classes: &[ClassId], capacity: usize) -> Worker {
     let body = &partner.capability;
     let is_rider = body.gait == Gait::WalkBike;
+    let profile = if is_rider { RuleProfile::RIDER } else { RuleProfile::PARTNER };
     let index = |class: &ClassId| classes.iter().position(|c| c == class);
     let has_container = partner.holds.iter().any(|(_, c)| c.info().role == Role::Container);
     let carried: Vec<usize> = partner.holds.iter().filter_map(|(_, c)| index(c)).collect();
@@ -307,17 +305,11 @@ fn partner_worker(partner: &PartnerModel, classes: &[ClassId]) -> Worker {
         docking_frames: body.docking_frames as f32,
         contained: has_container.then(|| carried.clone()),
         loose: if has_container { Vec::new() } else { carried },
-        n_loose: if is_rider { 3 } else { body.hands.all().len() },
+        n_loose: if is_rider { capacity } else { body.hands.all().len() },
         carries_containers: body.carries_containers && !is_rider,
         is_blocked: !body.removes_obstacles,
-        deliver_below: if is_rider { 1.0 / 3.0 } else { 0.25 },
-        busy_frames: 0.0,
+        deliver_below: profile.deliver_below,
     }
-}
-
-/// Returns whether a load observed at this frame still counts as current.
-pub fn is_current_load(observed: Option<Frame>, now: Frame) -> bool {
-    observed.is_some_and(|frame| frame + LOAD_FRAMES > now)
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use chaic_core::{ClassId, Vec2};
 
+use crate::rules::PlannerRules;
 use crate::track::TrackId;
 
 /// Maximum number of places in a problem: sets of places are bits of a `u64`.
@@ -64,8 +65,6 @@ pub struct Worker {
     pub is_blocked: bool,
     /// Fraction of the episode left below which it delivers what it carries.
     pub deliver_below: f32,
-    /// Time until it decides again, frames.
-    pub busy_frames: f32,
 }
 
 /// A goal that the partner may have.
@@ -134,6 +133,8 @@ pub struct TeamProblem {
     pub partner: Option<Worker>,
     /// Maximum number of objects in a container.
     pub container_capacity: usize,
+    /// Rules that the partner follows.
+    pub rules: PlannerRules,
 }
 
 impl TeamProblem {

@@ -6,6 +6,7 @@
 use super::problem::{
     MAX_CLASSES, NO_PATH_M, Operation, OperationFrames, PlaceKind, TeamProblem, Worker,
 };
+use crate::rules::RuleProfile;
 
 /// Factor of the way to a place that the partner has not seen yet: it must search. Measured in
 /// episodes of `gen-standard:7000..7010`.
@@ -17,11 +18,6 @@ const MIN_CHANCE: f32 = 0.6;
 const EARLY_BONUS: f32 = 0.5;
 /// Cost of one operation, deliveries. Ours: without it, useless detours are free.
 const OPERATION_COST: f32 = 0.002;
-/// Fraction of the episode left above which the partner fetches a container (facts A2.2).
-const CONTAINER_ABOVE: f32 = 0.5;
-/// Minimum number of objects still missing for which the partner fetches a container
-/// (`planner.min_for_container`).
-const MIN_FOR_CONTAINER: f32 = 3.0;
 /// The rider empties its basket in less time than two hands put objects down. Measured.
 const BASKET_PUT_ON_FACTOR: f32 = 0.5;
 /// Maximum number of decisions in one simulation.
@@ -108,7 +104,7 @@ struct Person {
 impl Person {
     fn new(worker: &Worker, row: usize) -> Person {
         Person {
-            time: worker.busy_frames,
+            time: 0.0,
             pending: None,
             row,
             loose: Load::new(&worker.loose),
@@ -371,16 +367,17 @@ impl<'a> Simulation<'a> {
         let n_missing: f32 = (0..problem.classes.len()).map(|c| missing(c).max(0.0)).sum();
         let capacity = problem.container_capacity;
         let is_full = partner.n_free(worker, capacity) == 0;
-        // Walking time with the rules' own margins (`planner.time`).
-        let is_far = frames_left < 1.5 * Self::walk_frames(goal_m, worker) + 240.0;
+        let time = problem.rules.time;
+        let is_far = frames_left
+            < time.walk_factor * Self::walk_frames(goal_m, worker) + time.spare_frames as f32;
         let carries = partner.n_carried() > 0;
         let must_deliver = carries && (is_full || fraction_left < worker.deliver_below || is_far);
         let container = || {
             let takes_one = worker.carries_containers
                 && !partner.has_container
                 && partner.loose.n < worker.n_loose
-                && fraction_left > CONTAINER_ABOVE
-                && n_missing >= MIN_FOR_CONTAINER;
+                && fraction_left > RuleProfile::PARTNER.container_above
+                && n_missing >= problem.rules.min_for_container as f32;
             let known = problem.places_of(PlaceKind::Container).filter(|_| takes_one);
             known
                 .filter(|p| problem.places[*p].is_known_to_partner && is_open(p))

@@ -4,6 +4,7 @@ use chaic_core::rng::RngStream;
 use chaic_core::{ClassId, Vec2};
 
 use super::problem::{GoalHypothesis, Place, PlaceKind, TeamProblem, Worker};
+use crate::rules::PlannerRules;
 use crate::track::TrackId;
 
 /// Creates a person with two hands who walks 0.1 m per frame.
@@ -17,7 +18,6 @@ pub fn worker() -> Worker {
         carries_containers: true,
         is_blocked: false,
         deliver_below: 0.25,
-        busy_frames: 0.0,
     }
 }
 
@@ -58,6 +58,7 @@ pub fn plane(helper: Vec2, partner: Option<Vec2>, places: &[(PlaceKind, Vec2)]) 
         helper: worker(),
         partner: partner.map(|_| worker()),
         container_capacity: 3,
+        rules: PlannerRules::paper(),
     }
 }
 

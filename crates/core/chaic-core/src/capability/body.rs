@@ -180,6 +180,13 @@ pub struct LimitPenalty {
 }
 
 impl LimitPenalty {
+    /// Pick-up beyond the height range, in meters (paper section 3.1).
+    pub const PICK: LimitPenalty = LimitPenalty { alpha: 1.0, beta: 2.0 };
+    /// Put-on beyond the height range, in meters (paper section 3.1).
+    pub const PUT: LimitPenalty = LimitPenalty { alpha: 1.0, beta: 1.0 };
+    /// Lift beyond the strength, in kilograms (paper section 3.1).
+    pub const LIFT: LimitPenalty = LimitPenalty { alpha: 50.0, beta: 1.0 };
+
     /// Returns the success probability of an action that exceeds its limit by `delta`.
     ///
     /// ```

@@ -51,9 +51,8 @@ fn a_disclosed_partner_is_certain_whatever_is_seen() {
         e.max_top_m = 1.75;
         e.n_sightings = 50;
     }));
-    assert_eq!(belief.most_likely(), (Persona::Wheelchair, 1.0));
+    assert_eq!(belief.probabilities(), vec![(Persona::Wheelchair, 1.0)]);
     assert_eq!(belief.capability(), partner.capability());
-    assert_eq!(belief.removes_obstacles_probability(), 0.0);
 }
 
 #[test]
@@ -113,7 +112,6 @@ fn failures_and_takes_lead_to_hand_worked_posteriors() {
     let remove = FailedAttempt { kind, ..failed(31, "trashbin", 0.6) };
     let belief = belief_of(&evidence_with(|e| e.failed = vec![remove]));
     check(&belief, [0.0141, 0.0423, 0.9436]);
-    assert!((belief.removes_obstacles_probability() - 0.0564).abs() < 2e-3);
 }
 
 #[test]
@@ -131,7 +129,7 @@ fn a_slow_walk_indicates_a_child() {
 /// the limit one of two attempts fails.
 fn succeeds(capability: &Capability, top_m: f32, rng: &mut RngStream) -> bool {
     let delta = excess(top_m, capability.pick_range_m);
-    let survives = -math::ln(1.0 - rng.unit()) * PICK_PENALTY.alpha > delta;
+    let survives = -math::ln(1.0 - rng.unit()) * LimitPenalty::PICK.alpha > delta;
     delta <= 0.0 || (survives && rng.below(2) == 0)
 }
 
@@ -196,16 +194,11 @@ fn posteriors_are_calibrated_on_simulated_partners() {
 }
 
 #[test]
-fn chances_are_expectations_over_the_posterior() {
+fn probabilities_are_expectations_over_the_posterior() {
     let belief = ConstraintBelief::new(&house());
-    // Top of 2 m: only the adult reaches it; the others succeed with exp(-0.5) / 2 = 0.3033.
-    assert!((belief.pick_chance(2.0) - (1.0 + 5.0 * 0.3033) / 6.0).abs() < 1e-3);
-    assert!((belief.put_chance(2.0) - (1.0 + 5.0 * 0.6065) / 6.0).abs() < 1e-3);
+    // Only the adult reaches 2 m, and only the wheelchair user does not reach the floor.
     assert!((belief.reach_probability(2.0) - 1.0 / 6.0).abs() < 1e-5);
     assert!((belief.reach_probability(0.1) - 4.0 / 6.0).abs() < 1e-5);
-    assert!((belief.pick_chance(1.0) - 1.0).abs() < 1e-5);
-    assert!((belief.removes_obstacles_probability() - 4.0 / 6.0).abs() < 1e-5);
-    assert_eq!(belief.most_likely(), (Persona::Child, 0.5));
     assert_eq!(belief.capability(), Persona::Child.capability());
     assert!((belief.fragile_task_probability() - 1.0 / 6.0).abs() < 1e-5);
 }

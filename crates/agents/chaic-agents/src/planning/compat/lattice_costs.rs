@@ -82,7 +82,7 @@ impl LaggedOccupancy {
     }
 }
 
-/// Cells at which removable obstacles were observed. The observed center of an obstacle moves with
+/// Observed cells of removable obstacles. The observed center of an obstacle moves with
 /// the viewpoint, and each of its cells stays in the map for as long as the obstacle is in place
 /// (facts A1.3, A1.8).
 #[derive(Clone, Debug, Default)]

@@ -254,10 +254,3 @@ fn only_the_three_nearest_containers_are_kept() {
     assert_eq!(kept.len(), 3);
     assert!(kept.contains(&52), "the nearest one: {kept:?}");
 }
-
-#[test]
-fn loads_have_an_age() {
-    assert!(!is_current_load(None, 10));
-    assert!(is_current_load(Some(100), 399));
-    assert!(!is_current_load(Some(100), 400));
-}

@@ -26,15 +26,13 @@ const TOWARDS_COS: f32 = 0.7;
 const AT_OBJECT_M: f32 = 1.5;
 /// Fraction of the episode after which the partner delivers what it carries (facts A2.2).
 const LAST_FRACTION: f32 = 0.6;
-/// Time for which the partner's last known load counts, frames.
-const LOAD_FRAMES: Frame = 300;
 
 /// Set of possible target classes, as bits in the order of the briefing.
 pub type ClassBits = u32;
 
 /// Observed walks of the partner.
 #[derive(Clone, Debug, Default)]
-pub struct Neglect {
+pub struct ObservedWalks {
     /// Objects that the partner has been near without a wall between.
     known: BTreeSet<TrackId>,
     /// Start of the current walk: frame and position (x, z).
@@ -44,7 +42,7 @@ pub struct Neglect {
     frames: BTreeMap<(ClassBits, ClassBits), f32>,
 }
 
-impl Neglect {
+impl ObservedWalks {
     /// Adds a sighting of the partner at `at` (x, z).
     pub fn observe(
         &mut self,
@@ -125,7 +123,8 @@ pub fn class_bit(briefing: &Briefing, class: ClassId) -> ClassBits {
 /// Returns whether the partner has a free hand and time to fetch something, as far as known.
 fn may_fetch(briefing: &Briefing, memory: &Memory, behavior: &BehaviorLog) -> bool {
     let is_late = memory.frame as f32 > LAST_FRACTION * briefing.horizon as f32;
-    let holds = current_load(memory, behavior);
+    let max_age = memory.rules.time.partner_holds_frames;
+    let holds = behavior.partner_load(memory.frame, max_age);
     let n_targets = holds.iter().filter(|(_, c)| briefing.possible_targets.contains(c)).count();
     !is_late && n_targets < 2
 }
@@ -138,7 +137,8 @@ fn may_fetch_container(
     approaches: impl Fn(Vec2) -> bool,
     at: Vec2,
 ) -> bool {
-    let holds = current_load(memory, behavior);
+    let max_age = memory.rules.time.partner_holds_frames;
+    let holds = behavior.partner_load(memory.frame, max_age);
     if holds.iter().any(|(_, class)| class.info().role == Role::Container) {
         return false;
     }
@@ -147,20 +147,6 @@ fn may_fetch_container(
         let object_at = to_xz(o.position_in_world);
         approaches(object_at) && !is_hidden(memory, at, object_at)
     })
-}
-
-fn current_load<'a>(memory: &Memory, behavior: &'a BehaviorLog) -> &'a [(TrackId, ClassId)] {
-    match behavior.partner_holds_frame.is_some_and(|f| f + LOAD_FRAMES > memory.frame) {
-        true => &behavior.partner_holds,
-        false => &[],
-    }
-}
-
-#[cfg(test)]
-impl Neglect {
-    fn is_empty(&self) -> bool {
-        self.frames.is_empty()
-    }
 }
 
 #[cfg(test)]

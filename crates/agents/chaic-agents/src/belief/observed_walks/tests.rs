@@ -20,7 +20,7 @@ struct Observer {
     briefing: Briefing,
     memory: Memory,
     log: BehaviorLog,
-    neglect: Neglect,
+    walks: ObservedWalks,
 }
 
 impl Observer {
@@ -34,8 +34,8 @@ impl Observer {
         let mut memory = Memory::new(&briefing, crate::PlannerRules::paper());
         let percepts = Percepts { detections: detections.to_vec(), ..Percepts::default() };
         memory.update(&briefing, &toy.observe(), &percepts);
-        let (log, neglect) = (BehaviorLog::default(), Neglect::default());
-        Observer { briefing, memory, log, neglect }
+        let (log, walks) = (BehaviorLog::default(), ObservedWalks::default());
+        Observer { briefing, memory, log, walks }
     }
 
     /// Sees the partner at these x on the line z = -3, every 20 frames from this frame on.
@@ -43,13 +43,13 @@ impl Observer {
         for (frame, x) in (from..).step_by(20).zip(xs) {
             self.memory.frame = frame;
             let at = Vec2::new(*x, -3.0);
-            self.neglect.observe(&self.briefing, &self.memory, &self.log, at);
+            self.walks.observe(&self.briefing, &self.memory, &self.log, at);
         }
     }
 
     fn frames(&self, classes: &[&str]) -> f32 {
         let bit = |name: &&str| class_bit(&self.briefing, ClassId::named(name));
-        self.neglect.frames(classes.iter().map(bit).fold(0, |all, bit| all | bit))
+        self.walks.frames(classes.iter().map(bit).fold(0, |all, bit| all | bit))
     }
 
     fn hold(&mut self, classes: &[&str], frame: Frame) {
@@ -72,14 +72,14 @@ fn two_walks_away_from_an_apple_speak_against_apples() {
     assert_eq!(observer.frames(&["apple", "banana"]), 0.0);
     assert_eq!(observer.frames(&["orange"]), 0.0);
     assert_eq!(observer.frames(&["apple", "orange"]), 40.0);
-    assert!(!observer.neglect.is_empty());
+    assert!(!observer.walks.frames.is_empty());
 }
 
 #[test]
 fn a_walk_towards_the_apple_does_not() {
     let mut observer = Observer::new(&fruit()[..1]);
     observer.walk(0, &[0.0, 1.0, 2.0]);
-    assert!(observer.neglect.is_empty());
+    assert!(observer.walks.frames.is_empty());
     // Neither does passing it within reach.
     let mut observer = Observer::new(&fruit()[..1]);
     observer.walk(0, &[3.2, 4.1]);
@@ -130,7 +130,7 @@ fn a_container_ahead_explains_the_walk_unless_the_partner_has_one() {
     let basket = seen(TrackId(22), "wicker_basket", [-4.0, 0.0, -3.0], 0.3, 0.3);
     let mut observer = Observer::new(&[fruit(), vec![basket]].concat());
     observer.walk(0, &AWAY);
-    assert!(observer.neglect.is_empty());
+    assert!(observer.walks.frames.is_empty());
     observer.hold(&["wicker_basket"], 100);
     observer.walk(100, &AWAY);
     assert_eq!(observer.frames(&["apple"]), 40.0);
@@ -141,22 +141,22 @@ fn slow_and_late_walks_do_not_count() {
     // 100 frames for one meter contain a stop.
     let mut observer = Observer::new(&fruit());
     observer.walk(0, &[0.0, -0.1, -0.2, -0.3, -0.4, -1.0]);
-    assert!(observer.neglect.is_empty());
+    assert!(observer.walks.frames.is_empty());
     // The walk after the stop counts.
     observer.walk(120, &[-2.0]);
     assert_eq!(observer.frames(&["apple"]), 20.0);
     // A partner that stands still never counts.
     let mut observer = Observer::new(&fruit());
     observer.walk(0, &[0.0; 50]);
-    assert!(observer.neglect.is_empty());
+    assert!(observer.walks.frames.is_empty());
     // After 60 % of the episode it may be on its way to the goal place.
     let mut observer = Observer::new(&fruit());
     let late = observer.briefing.horizon * 6 / 10 + 20;
     observer.walk(late, &AWAY);
-    assert!(observer.neglect.is_empty());
+    assert!(observer.walks.frames.is_empty());
     let mut observer = Observer::new(&fruit());
     observer.walk(late - 100, &AWAY);
-    assert!(!observer.neglect.is_empty());
+    assert!(!observer.walks.frames.is_empty());
 }
 
 #[test]
@@ -164,17 +164,17 @@ fn only_known_objects_that_lie_there_count() {
     // Too far away to notice.
     let mut observer = Observer::new(&[seen(APPLE, "apple", [7.0, 0.0, -3.0], 0.1, 0.1)]);
     observer.walk(0, &AWAY);
-    assert!(observer.neglect.is_empty());
+    assert!(observer.walks.frames.is_empty());
     // Behind a wall.
     let mut toy = Toy::room(16.0, 16.0);
     toy.add_wall([1.4, -8.0], [1.6, 8.0]);
     let mut observer = Observer::in_room(&toy, &fruit());
     observer.walk(0, &AWAY);
-    assert!(observer.neglect.is_empty());
+    assert!(observer.walks.frames.is_empty());
     // No possible target.
     let mut observer = Observer::new(&[seen(APPLE, "trashbin", [3.0, 0.0, -3.0], 0.4, 0.9)]);
     observer.walk(0, &AWAY);
-    assert!(observer.neglect.is_empty());
+    assert!(observer.walks.frames.is_empty());
     // Taken between the two walks.
     let mut observer = Observer::new(&fruit());
     observer.walk(0, &AWAY[..2]);
@@ -186,11 +186,11 @@ fn only_known_objects_that_lie_there_count() {
 #[test]
 fn nothing_counts_without_sightings() {
     let mut observer = Observer::new(&fruit());
-    assert!(observer.neglect.is_empty());
+    assert!(observer.walks.frames.is_empty());
     observer.walk(0, &[0.0]);
-    assert!(observer.neglect.is_empty(), "one sighting is no walk");
+    assert!(observer.walks.frames.is_empty(), "one sighting is no walk");
     let mut observer = Observer::new(&[]);
     observer.walk(0, &AWAY);
-    assert!(observer.neglect.is_empty(), "no objects");
+    assert!(observer.walks.frames.is_empty(), "no objects");
     assert_eq!(observer.frames(&["apple", "banana"]), 0.0);
 }

@@ -1,11 +1,11 @@
-//! Agents: the simulated people and the rule-based helpers.
+//! Agents: the simulated people and the helpers without networks.
 //!
 //! **What it is**: a [`PlanningAgent`] joins five parts. [`perception`] detects objects, [`memory`]
-//! maps them, and [`behavior`] tracks the actions of other agents. [`belief`]
-//! infers their goal and limits. A [`decision::Policy`] chooses
-//! the next plan, and [`execution`] turns it into actions. [`partners`] are part of the benchmark's
-//! definition; [`helpers`] are the agents under evaluation. Both are the same type with different
-//! data.
+//! maps them, and [`behavior`] tracks the actions of other agents. A [`decision::Policy`] chooses
+//! the next plan, and [`execution`] turns it into actions. Policies may use [`belief`], which infers
+//! a partner's goal and limits, and [`team`], which plans for both people. [`partners`] are part of
+//! the benchmark's definition; [`helpers`] are the agents under evaluation. Both are the same type
+//! with different data.
 //!
 //! **What it is not**: it holds no world state and renders nothing; it never depends on
 //! `chaic-world` or `chaic-render`.

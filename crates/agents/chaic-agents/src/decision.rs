@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use chaic_core::agent::PartnerBelief;
 use chaic_core::briefing::CompanionRole;
 use chaic_core::geom::to_xz;
 use chaic_core::{AgentError, Briefing, ClassId, Frame, Hand, Observation, Role};
@@ -251,6 +252,12 @@ pub trait Policy: Send + 'static {
 
     /// Short label of the policy's state for traces, if it has one.
     fn status(&self) -> Option<String> {
+        None
+    }
+
+    /// Belief about the partner and the plans that follow, for traces; `None` if the policy infers
+    /// nothing.
+    fn partner_belief(&self, _briefing: &Briefing, _memory: &Memory) -> Option<PartnerBelief> {
         None
     }
 

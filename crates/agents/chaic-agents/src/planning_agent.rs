@@ -409,6 +409,10 @@ impl<P: Policy> Agent for PlanningAgent<P> {
                 .learned_memory()
                 .and_then(|memory| self.describe_last_observed(memory)),
             perceived: self.learned_memory().map(visible_objects).unwrap_or_default(),
+            belief: self
+                .episode
+                .as_ref()
+                .and_then(|e| self.policy.partner_belief(&e.briefing, &e.memory)),
         }
     }
 

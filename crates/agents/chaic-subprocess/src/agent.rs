@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use chaic_core::agent::Thought;
+use chaic_core::agent::{PartnerBelief, Thought};
 use chaic_core::observation::SensorConfig;
 use chaic_core::{Action, Agent, AgentError, Briefing, Observation};
 use chaic_sandbox::Isolation;
@@ -112,19 +112,40 @@ impl SubprocessAgent {
         match process.ask(observation_frame(observation), command.limits.decision)? {
             ResponseMessage::Act { action, thought } => Ok((
                 action,
-                thought.map(|Thought { plan, mode, last_observed, mut perceived }| {
-                    perceived.truncate(MAX_PERCEIVED);
-                    perceived.iter_mut().for_each(|object| object.name = cut(&object.name));
-                    Thought {
-                        plan: cut(&plan),
-                        mode: mode.as_deref().map(cut),
-                        last_observed: last_observed.as_deref().map(cut),
-                        perceived,
-                    }
-                }),
+                thought.map(bounded),
             )),
             other => Err(unexpected(command, "observe", &other)),
         }
+    }
+}
+
+/// Returns the thought with shortened texts and lists.
+fn bounded(thought: Thought) -> Thought {
+    let Thought { plan, mode, last_observed, mut perceived, belief } = thought;
+    perceived.truncate(MAX_PERCEIVED);
+    perceived.iter_mut().for_each(|object| object.name = cut(&object.name));
+    Thought {
+        plan: cut(&plan),
+        mode: mode.as_deref().map(cut),
+        last_observed: last_observed.as_deref().map(cut),
+        perceived,
+        belief: belief.map(bounded_belief),
+    }
+}
+
+fn bounded_belief(belief: PartnerBelief) -> PartnerBelief {
+    let texts = |list: &[String]| list.iter().take(MAX_PERCEIVED).map(|text| cut(text)).collect();
+    let chances = |list: &[(String, u16)]| {
+        list.iter().take(MAX_PERCEIVED).map(|(name, p)| (cut(name), (*p).min(1000))).collect()
+    };
+    PartnerBelief {
+        goals: chances(&belief.goals),
+        people: chances(&belief.people),
+        extra: belief.extra.into_iter().take(MAX_PERCEIVED).collect(),
+        position_cm: belief.position_cm,
+        evidence: texts(&belief.evidence),
+        plan: texts(&belief.plan),
+        partner_plan: texts(&belief.partner_plan),
     }
 }
 

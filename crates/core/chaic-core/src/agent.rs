@@ -21,6 +21,34 @@ pub struct Thought {
     /// Currently perceived objects, for agents that detect objects in color and depth.
     #[serde(alias = "sees", default, skip_serializing_if = "Vec::is_empty")]
     pub perceived: Vec<BelievedObject>,
+    /// Belief about the partner, for agents that infer its goal and constraint.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub belief: Option<PartnerBelief>,
+}
+
+/// What an agent believes about its partner, and the plans that follow.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PartnerBelief {
+    /// Target sets ([`TargetSet::name`](crate::catalogue::TargetSet::name)) with their
+    /// probabilities, per mille.
+    pub goals: Vec<(String, u16)>,
+    /// Kinds of person with their probabilities, per mille.
+    pub people: Vec<(String, u16)>,
+    /// Classes that the goal wants beside a target set, with a probability of at least 0.5.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub extra: Vec<ClassId>,
+    /// Position of the partner at the last sighting (x, z), centimeters; absent before the first.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub position_cm: Option<[i32; 2]>,
+    /// Observations of the partner on which the belief rests, as text.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub evidence: Vec<String>,
+    /// Planned operations of the agent as text, in their order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub plan: Vec<String>,
+    /// Expected operations of the partner as text, in their order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub partner_plan: Vec<String>,
 }
 
 /// An object in the memory of an agent, which may differ from the actual one. It is serialized as a

@@ -42,6 +42,22 @@ pub enum TargetSet {
     Furniture,
 }
 
+impl TargetSet {
+    /// Short name, unique among all sets.
+    pub fn name(self) -> &'static str {
+        match self {
+            TargetSet::Fruit => "fruit",
+            TargetSet::Bread => "bread",
+            TargetSet::Work => "work",
+            TargetSet::School => "school",
+            TargetSet::ShopFruit => "shop_fruit",
+            TargetSet::ShopBakery => "shop_bakery",
+            TargetSet::ShopDrinks => "shop_drinks",
+            TargetSet::Furniture => "furniture",
+        }
+    }
+}
+
 /// Role of a class in the benchmark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 pub enum Role {

@@ -3,8 +3,11 @@
 //! It watches the partner while its goal is unclear, and then follows a team plan
 //! ([`crate::team`]). With a granted goal or state, the same policy gives upper bounds.
 
+mod description;
+
 use std::collections::BTreeMap;
 
+use chaic_core::agent::PartnerBelief;
 use chaic_core::briefing::{CompanionRole, Goal};
 use chaic_core::capability::{Capability, Persona};
 use chaic_core::geom::to_xz;
@@ -90,6 +93,8 @@ pub struct InferPolicy {
     rng: RngStream,
     /// Remaining steps of the current team plan.
     steps: Vec<Step>,
+    /// What the partner is expected to do meanwhile, as text.
+    partner_plan: Vec<String>,
     /// True if the last choice may replace a walk to another object.
     may_switch: bool,
     has_looked_around: bool,
@@ -109,6 +114,7 @@ impl InferPolicy {
             builder: ProblemBuilder::default(),
             rng: RngStream::new(0, "infer/plan", 0),
             steps: Vec::new(),
+            partner_plan: Vec::new(),
             may_switch: false,
             has_looked_around: false,
             identified: None,
@@ -186,6 +192,7 @@ impl InferPolicy {
         let plan = improve(&problem, warm.as_slice(), SearchSettings::DEFAULT, &mut self.rng);
         let stay = warm.map_or(f32::MIN, |warm| simulate(&problem, &warm));
         self.may_switch = plan.value > stay + SWITCH_GAIN;
+        self.partner_plan = description::expected_partner_plan(&problem, &plan.operations);
         self.steps = plan.operations.iter().map(|o| step(&problem, *o)).collect();
         self.first_valid(context, valid, &problem)
     }
@@ -409,6 +416,10 @@ impl Policy for InferPolicy {
 
     fn status(&self) -> Option<String> {
         Some(self.mode.to_owned())
+    }
+
+    fn partner_belief(&self, briefing: &Briefing, memory: &Memory) -> Option<PartnerBelief> {
+        description::partner_belief(self, briefing, memory)
     }
 
     fn counters(&self) -> BTreeMap<String, u64> {

@@ -38,6 +38,22 @@ pub struct Delivery {
     pub count: f32,
 }
 
+/// An event of a simulation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SimulatedEvent {
+    /// A person picks up what lies at a place, or has removed the obstacle there.
+    Arrival {
+        /// Frames from now.
+        frames: f32,
+        /// True for the helper.
+        by_helper: bool,
+        /// Index of the place.
+        place: usize,
+    },
+    /// A delivered object.
+    Delivery(Delivery),
+}
+
 /// Returns the expected value of a sequence of the helper's operations over all hypotheses:
 /// deliveries that count, with a bonus for early ones and a small cost for each operation.
 pub fn simulate(problem: &TeamProblem, operations: &[Operation]) -> f32 {
@@ -47,15 +63,15 @@ pub fn simulate(problem: &TeamProblem, operations: &[Operation]) -> f32 {
     per_goal.sum::<f32>() - OPERATION_COST * operations.len() as f32
 }
 
-/// Returns the deliveries under one hypothesis, in the order of the simulation.
-pub fn deliveries(
+/// Returns the events under one hypothesis, in the order of the simulation.
+pub fn timeline(
     problem: &TeamProblem,
     operations: &[Operation],
     hypothesis: usize,
-) -> Vec<Delivery> {
+) -> Vec<SimulatedEvent> {
     let mut all = Vec::new();
     if let Some(goal) = problem.hypotheses.get(hypothesis) {
-        Simulation::new(problem, &goal.missing).run(operations, &mut |delivery| all.push(delivery));
+        Simulation::new(problem, &goal.missing).run(operations, &mut |event| all.push(event));
     }
     all
 }
@@ -148,7 +164,7 @@ impl<'a> Simulation<'a> {
         Simulation { problem, frames, missing, taken: 0, removed: 0, given_up: 0, value: 0.0 }
     }
 
-    fn run(mut self, operations: &[Operation], on_delivery: &mut dyn FnMut(Delivery)) -> f32 {
+    fn run(mut self, operations: &[Operation], on_event: &mut dyn FnMut(SimulatedEvent)) -> f32 {
         let problem = self.problem;
         let mut helper = Person::new(&problem.helper, problem.helper_row());
         let idle = Worker { is_blocked: true, ..problem.helper.clone() };
@@ -164,13 +180,13 @@ impl<'a> Simulation<'a> {
                 !helper.is_done && (partner.is_done || helper.time < partner.time);
             if is_helpers_turn {
                 match helper.pending.take() {
-                    Some(place) => self.arrive(&problem.helper, &mut helper, place, true),
-                    None => self.helper_step(&mut helper, operations, &mut next, on_delivery),
+                    Some(place) => self.arrive(&problem.helper, &mut helper, place, true, on_event),
+                    None => self.helper_step(&mut helper, operations, &mut next, on_event),
                 }
             } else {
                 match partner.pending.take() {
-                    Some(place) => self.arrive(partner_worker, &mut partner, place, false),
-                    None => self.partner_step(partner_worker, &mut partner, &helper, on_delivery),
+                    Some(place) => self.arrive(partner_worker, &mut partner, place, false, on_event),
+                    None => self.partner_step(partner_worker, &mut partner, &helper, on_event),
                 }
             }
         }
@@ -186,14 +202,14 @@ impl<'a> Simulation<'a> {
         helper: &mut Person,
         operations: &[Operation],
         next: &mut usize,
-        on_delivery: &mut dyn FnMut(Delivery),
+        on_event: &mut dyn FnMut(SimulatedEvent),
     ) {
         let problem = self.problem;
         let worker = &problem.helper;
         let Some(planned) = operations.get(*next).copied() else {
             match helper.n_carried() {
                 0 => helper.is_done = true,
-                _ => self.deliver(worker, helper, true, on_delivery),
+                _ => self.deliver(worker, helper, true, on_event),
             }
             return;
         };
@@ -206,14 +222,14 @@ impl<'a> Simulation<'a> {
             Operation::Deliver => true,
         };
         if !is_possible {
-            return self.deliver(worker, helper, true, on_delivery);
+            return self.deliver(worker, helper, true, on_event);
         }
         *next += 1;
         let is_taken = |place: usize| self.taken >> place & 1 == 1;
         match planned {
             Operation::Deliver => {
                 if helper.n_carried() > 0 {
-                    self.deliver(worker, helper, true, on_delivery);
+                    self.deliver(worker, helper, true, on_event);
                 }
             }
             Operation::PickUp(place) | Operation::TakeContainer(place) if is_taken(place) => {}
@@ -241,13 +257,22 @@ impl<'a> Simulation<'a> {
 
     /// Picks up what lies at a place, unless the other person has taken it. At an obstacle the removal
     /// is done by then.
-    fn arrive(&mut self, worker: &Worker, person: &mut Person, place: usize, is_helper: bool) {
+    fn arrive(
+        &mut self,
+        worker: &Worker,
+        person: &mut Person,
+        place: usize,
+        is_helper: bool,
+        on_event: &mut dyn FnMut(SimulatedEvent),
+    ) {
         if self.taken >> place & 1 == 1 {
             return;
         }
         let info = &self.problem.places[place];
         if info.kind == PlaceKind::Obstacle {
             self.removed |= 1 << place;
+            let (frames, by_helper) = (person.time, is_helper);
+            on_event(SimulatedEvent::Arrival { frames, by_helper, place });
             return;
         }
         person.time += self.frames.pick_up + worker.docking_frames;
@@ -256,6 +281,8 @@ impl<'a> Simulation<'a> {
             return;
         }
         self.taken |= 1 << place;
+        let (frames, by_helper) = (person.time, is_helper);
+        on_event(SimulatedEvent::Arrival { frames, by_helper, place });
         if info.kind == PlaceKind::Container {
             person.has_container = true;
             return;
@@ -284,7 +311,7 @@ impl<'a> Simulation<'a> {
         worker: &Worker,
         person: &mut Person,
         by_helper: bool,
-        on_delivery: &mut dyn FnMut(Delivery),
+        on_event: &mut dyn FnMut(SimulatedEvent),
     ) {
         let problem = self.problem;
         let path = |place: &usize| problem.path_m[person.row][*place];
@@ -316,7 +343,8 @@ impl<'a> Simulation<'a> {
                 let left = (problem.frames_left - person.time) / problem.frames_left.max(1.0);
                 self.value += count * (1.0 + EARLY_BONUS * left);
                 let frames = person.time;
-                on_delivery(Delivery { frames, by_helper, class_index: class, count });
+                let delivery = Delivery { frames, by_helper, class_index: class, count };
+                on_event(SimulatedEvent::Delivery(delivery));
             }
         }
         person.loose.n = 0;
@@ -337,7 +365,7 @@ impl<'a> Simulation<'a> {
         worker: &Worker,
         partner: &mut Person,
         helper: &Person,
-        on_delivery: &mut dyn FnMut(Delivery),
+        on_event: &mut dyn FnMut(SimulatedEvent),
     ) {
         let problem = self.problem;
         if partner.time >= problem.frames_left {
@@ -395,7 +423,7 @@ impl<'a> Simulation<'a> {
             partner.row = place;
             partner.pending = Some(place);
         } else if carries {
-            self.deliver(worker, partner, false, on_delivery);
+            self.deliver(worker, partner, false, on_event);
             if partner.is_done && partner.time < problem.frames_left && !helper.is_done {
                 // Blocked: it waits for the helper.
                 partner.is_done = false;

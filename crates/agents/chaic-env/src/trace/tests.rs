@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use chaic_core::agent::{BelievedObject, ChildState, Thought};
+use chaic_core::agent::{BelievedObject, ChildState, PartnerBelief, Thought};
 use chaic_core::capability::Impairment;
 use chaic_core::observation::FrameHistorySpec;
 use chaic_core::{Action, AgentId, ClassId, EntityId, FailureReason, Hand, Outcome};
@@ -55,6 +55,14 @@ fn records() -> Vec<Record> {
             class: ClassId::named("apple"),
             position_cm: [120, 80, -35],
         }],
+        belief: Some(PartnerBelief {
+            goals: vec![("fruit".to_owned(), 750), ("bread".to_owned(), 250)],
+            people: vec![("child".to_owned(), 1000)],
+            extra: vec![ClassId::named("key")],
+            position_cm: Some([120, -35]),
+            evidence: vec!["took apple #31".to_owned()],
+            ..PartnerBelief::default()
+        }),
     };
     let failed = Outcome::Failure(FailureReason::OutOfReach);
     vec![
@@ -175,7 +183,7 @@ fn lines_have_the_keys_of_their_version() {
     );
     assert_eq!(
         thought,
-        r#""mode":"x","last_observed":"partner picked up apple #31","perceived":[["t31","apple",[120,80,-35]]]}]"#
+        r#""mode":"x","last_observed":"partner picked up apple #31","perceived":[["t31","apple",[120,80,-35]]],"belief":{"goals":[["fruit",750],["bread",250]],"people":[["child",1000]],"extra":["key"],"position_cm":[120,-35],"evidence":["took apple #31"]}}]"#
     );
     let (sensors, thought) = sensors_and_thought(2);
     assert_eq!(
@@ -184,7 +192,7 @@ fn lines_have_the_keys_of_their_version() {
     );
     assert_eq!(
         thought,
-        r#""mood":"x","noticed":"partner picked up apple #31","sees":[["t31","apple",[120,80,-35]]]}]"#
+        r#""mood":"x","noticed":"partner picked up apple #31","sees":[["t31","apple",[120,80,-35]]],"belief":{"goals":[["fruit",750],["bread",250]],"people":[["child",1000]],"extra":["key"],"position_cm":[120,-35],"evidence":["took apple #31"]}}]"#
     );
 }
 

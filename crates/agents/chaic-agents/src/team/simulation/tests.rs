@@ -6,9 +6,18 @@ use crate::team::tests::line;
 use Operation::{Deliver, PickUp, Remove, TakeContainer};
 use PlaceKind::{Container, Goal, Obstacle, Target};
 
+fn deliveries(problem: &TeamProblem, operations: &[Operation]) -> Vec<Delivery> {
+    let events = super::timeline(problem, operations, 0).into_iter();
+    let delivery = |event| match event {
+        SimulatedEvent::Delivery(delivery) => Some(delivery),
+        SimulatedEvent::Arrival { .. } => None,
+    };
+    events.filter_map(delivery).collect()
+}
+
 /// Returns the deliveries under the first hypothesis: frame, rounded, and whether by the helper.
 fn timeline(problem: &TeamProblem, operations: &[Operation]) -> Vec<(u32, bool)> {
-    let all = deliveries(problem, operations, 0);
+    let all = deliveries(problem, operations);
     all.iter().map(|d| (d.frames.round() as u32, d.by_helper)).collect()
 }
 
@@ -48,7 +57,7 @@ fn a_third_object_needs_a_second_trip() {
 fn objects_beyond_the_goal_do_not_count() {
     let mut problem = line(0.0, None, &[(Target, 5.0), (Target, 10.0), (Goal, 0.0)]);
     problem.hypotheses[0].missing = vec![1.0, 0.0];
-    let all = deliveries(&problem, &[PickUp(0), PickUp(1)], 0);
+    let all = deliveries(&problem, &[PickUp(0), PickUp(1)]);
     assert_eq!(all.iter().map(|d| d.count).collect::<Vec<f32>>(), [1.0, 0.0]);
 }
 
@@ -123,10 +132,10 @@ fn a_partner_who_cannot_reach_an_object_gives_it_up_after_one_attempt() {
 fn deliveries_to_a_place_that_the_partner_hardly_reaches_count_in_part() {
     let mut problem = line(50.0, Some(4.0), &[(Target, 5.0), (Goal, 0.0)]);
     problem.places[1].partner_chance = 0.4;
-    assert_near(deliveries(&problem, &[], 0)[0].count, 0.4);
-    assert_near(deliveries(&problem, &[PickUp(0)], 0)[0].count, 0.4);
+    assert_near(deliveries(&problem, &[])[0].count, 0.4);
+    assert_near(deliveries(&problem, &[PickUp(0)])[0].count, 0.4);
     let helper = line(4.0, None, &[(Target, 5.0), (Goal, 0.0)]);
-    assert_near(deliveries(&helper, &[PickUp(0)], 0)[0].count, 1.0);
+    assert_near(deliveries(&helper, &[PickUp(0)])[0].count, 1.0);
 }
 
 #[test]
@@ -207,7 +216,7 @@ fn an_empty_problem_has_no_value() {
         assert_eq!(simulate(&problem, &[]), 0.0);
         problem.hypotheses.clear();
         assert_eq!(simulate(&problem, &[]), 0.0);
-        assert!(deliveries(&problem, &[], 0).is_empty());
+        assert!(deliveries(&problem, &[]).is_empty());
     }
     let mut unreachable = line(0.0, Some(0.0), &[(Target, 5.0), (Goal, 0.0)]);
     unreachable.path_m.iter_mut().flatten().for_each(|m| *m = NO_PATH_M);

@@ -110,12 +110,14 @@ mod tests {
             (0.6, [3.75, 1.0], false),
             (0.6, [-3.7, 3.7], false),
             (0.0, [0.0, -1.65], false),
+            (0.0, [1.8, -1.65], false),
         ] {
             let mut toy = Toy::room(8.0, 8.0);
             toy.size = 256;
             toy.add_wall([-4.0, -2.1], [-wall_end_m, -1.9]);
             toy.add_wall([wall_end_m, -2.1], [4.0, -1.9]);
-            let size = [0.4, 0.6, 0.4];
+            // As tall as it hides the wall.
+            let size = [0.4, 1.9, 0.4];
             let bin = toy.add(ToyObject::new("trashbin", [at[0], 0.0, at[1]], size));
             let briefing = toy.briefing();
             let mut memory = Memory::new(&briefing, PlannerRules::paper());

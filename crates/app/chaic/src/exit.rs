@@ -54,14 +54,14 @@ pub fn env_error(error: &anyhow::Error) -> Option<&EnvError> {
 /// Returns the exit code of an error.
 pub fn code_of(error: &anyhow::Error) -> u8 {
     let env = env_error(error);
-    let mind = match env {
+    let registry = match env {
         Some(EnvError::Registry(inner)) => Some(inner),
         _ => None,
     };
-    let llm = mind.map_or_else(|| error.downcast_ref(), |inner| inner.downcast_ref());
+    let llm = registry.map_or_else(|| error.downcast_ref(), |inner| inner.downcast_ref());
     let is_usage = env.is_some_and(EnvError::is_usage)
         || llm.is_some_and(LlmError::is_usage)
-        || mind.is_some_and(|inner| inner.is::<Refusal>())
+        || registry.is_some_and(|inner| inner.is::<Refusal>())
         || error.downcast_ref().is_some_and(EvalError::is_usage)
         || error.downcast_ref().is_some_and(TrainingError::is_usage)
         || error.is::<Refusal>()

@@ -175,7 +175,7 @@ fn the_document_equals_the_handmade_example() {
          --switch-seeds 1 --switch-helper none\n",
         "Only these of the eight tasks: Low target.",
         "**The published figures are over the original's test split, these over its training split**",
-        "**Granted: RHP: ids from ground truth; Oracle: ids from ground truth, told behavior, goal,",
+        "**Granted: RHP: ids from ground truth; Oracle: ids from ground truth, granted behavior, goal,",
         "| **RHP (ids from ground truth)**, chaic | 0.40 |",
         "over environments (low target: 2; cluster bootstrap",
         "| **w/o**, chaic | 0.40 |\n| w/o, paper | 0.51 |\n| difference | -0.11 ±1.27 |\n",

@@ -111,7 +111,7 @@ impl Labels<'_> {
         let more: Vec<String> =
             names(&self.granted?.partner).into_iter().filter(|n| !default.contains(n)).collect();
         (!more.is_empty())
-            .then(|| format!("the partner is told more than usual: {}", readable_names(&more)))
+            .then(|| format!("additional grants of the partner: {}", readable_names(&more)))
     }
 }
 
@@ -147,9 +147,9 @@ fn describe(grants: &Grants, perception: Option<&str>) -> Vec<String> {
         None => format!("{} perception", part.split(' ').next().unwrap_or_default()),
     });
     let other_grants =
-        (!other_grants.is_empty()).then(|| format!("told {}", readable_names(&other_grants)));
+        (!other_grants.is_empty()).then(|| format!("granted {}", readable_names(&other_grants)));
     let all: Vec<String> = ids.into_iter().chain(own).chain(other_grants).collect();
-    if all.is_empty() { vec!["own eyes only".to_owned()] } else { all }
+    if all.is_empty() { vec!["no grants".to_owned()] } else { all }
 }
 
 fn readable_names(names: &[String]) -> String {

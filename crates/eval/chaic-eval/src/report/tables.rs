@@ -178,7 +178,7 @@ pub fn counts(results: &[RunResult], labels: Labels<'_>) -> Option<TextTable> {
     };
     let header = std::iter::once("Count".to_owned()).chain(helpers.iter().map(|h| labels.lines(h)));
     (!sums.is_empty()).then(|| TextTable {
-        title: "What minds counted of their own doings, all episodes".to_owned(),
+        title: "Counters of the agents, summed over all episodes".to_owned(),
         header: header.collect(),
         rows: sums.iter().map(row).collect(),
     })

@@ -152,9 +152,9 @@ fn grants_are_in_every_format() {
         let text = text(&results, format);
         let tables = text.matches("ids from ground truth").count();
         assert!(tables >= 2 * 4, "both helpers in each of four tables: {text}");
-        assert!(!text.contains("partner is told more"), "{text}");
+        assert!(!text.contains("additional grants of the partner"), "{text}");
     }
-    let all = "**Granted: RHP: ids from ground truth; Oracle: ids from ground truth, told behavior, \
+    let all = "**Granted: RHP: ids from ground truth; Oracle: ids from ground truth, granted behavior, \
                goal, goal place, progress.**";
     assert!(text(&results, Format::Markdown).contains(all));
     let json: serde_json::Value = serde_json::from_str(&text(&results, Format::Json)).unwrap();
@@ -171,7 +171,7 @@ fn grants_are_in_every_format() {
     let own =
         RunGrants { helpers: [("rhp".to_owned(), Grants::NONE)].into(), ..granted(Grants::ORACLE) };
     let md = text_with(&results, Some(&own), Format::Markdown);
-    let expected = "RHP: own eyes only; Oracle: grants not recorded; the partner is told more than usual: \
+    let expected = "RHP: no grants; Oracle: grants not recorded; additional grants of the partner: \
                 behavior, progress.";
     assert!(md.contains(expected), "{md}");
     let json = text_with(&results, Some(&own), Format::Json);

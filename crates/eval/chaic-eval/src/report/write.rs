@@ -185,7 +185,7 @@ impl Report<'_> {
         let track =
             if *track == Track::default() { String::new() } else { format!(" Track: `{track}`.") };
         let episodes = first.map_or("all".to_owned(), |n| format!("first {n}"));
-        let size = size.map_or("as each mind asks for".to_owned(), |px| format!("{px} pixels"));
+        let size = size.map_or("as each agent requests".to_owned(), |px| format!("{px} pixels"));
         let played_by = match set[..] {
             [] => rules.to_string(),
             _ => format!("{rules} with {}", set.join(", ")),

@@ -110,10 +110,7 @@ impl SubprocessAgent {
         observation: &Observation,
     ) -> Result<(Action, Option<Thought>), AgentError> {
         match process.ask(observation_frame(observation), command.limits.decision)? {
-            ResponseMessage::Act { action, thought } => Ok((
-                action,
-                thought.map(bounded),
-            )),
+            ResponseMessage::Act { action, thought } => Ok((action, thought.map(bounded))),
             other => Err(unexpected(command, "observe", &other)),
         }
     }

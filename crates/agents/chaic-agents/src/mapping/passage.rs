@@ -35,7 +35,9 @@ pub fn stands_in_passage(map: &OccupancyMap, object: &MappedObject) -> bool {
     let directions = DIRECTIONS.into_iter().flat_map(|d| [d, -d]);
     directions.into_iter().any(|direction| {
         let offsets = (0..=CENTER_ERROR_CELLS).map(|k| at + CELL_M * f32::from(k) * direction);
-        offsets.take_while(|point| !is_tall_wall(map, *point)).any(|point| is_in_passage(map, point))
+        offsets
+            .take_while(|point| !is_tall_wall(map, *point))
+            .any(|point| is_in_passage(map, point))
     })
 }
 

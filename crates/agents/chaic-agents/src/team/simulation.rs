@@ -185,7 +185,9 @@ impl<'a> Simulation<'a> {
                 }
             } else {
                 match partner.pending.take() {
-                    Some(place) => self.arrive(partner_worker, &mut partner, place, false, on_event),
+                    Some(place) => {
+                        self.arrive(partner_worker, &mut partner, place, false, on_event)
+                    }
                     None => self.partner_step(partner_worker, &mut partner, &helper, on_event),
                 }
             }

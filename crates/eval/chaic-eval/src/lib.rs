@@ -27,6 +27,7 @@ pub mod trace_file;
 
 pub mod metrics;
 pub mod published;
+pub mod recorded_belief;
 pub mod report;
 pub mod run;
 

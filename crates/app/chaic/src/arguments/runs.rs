@@ -54,6 +54,21 @@ pub struct VerifyArguments {
     pub jobs: Option<u16>,
 }
 
+/// `chaic explain`.
+#[derive(Args, Debug)]
+pub struct ExplainArguments {
+    /// Folder of the run.
+    pub run: PathBuf,
+    /// Id of the episode, for example obstacle/test/00.
+    pub episode: String,
+    /// Helper of the episode run [default: infer if the run has it].
+    #[arg(long, value_name = "NAME")]
+    pub helper: Option<String>,
+    /// Seed of the episode run, 0 to 9999 [default: the lowest].
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(ranges::SEED))]
+    pub seed: Option<u32>,
+}
+
 /// `chaic replay`.
 #[derive(Args, Debug)]
 pub struct ReplayArguments {

@@ -4,7 +4,7 @@
 //! benchmarks on several threads, keeps a journal and writes a [`trace_file`] per episode run.
 //! [`metrics`] computes the paper's scores from the records, and [`report`] prints them. [`verify`]
 //! re-simulates traces and compares the records. [`replay`] and [`frame_export`] render episodes.
-//! [`explain`] describes a helper's belief in sentences.
+//! [`explain`] describes a helper's belief in sentences, and [`calibration`] measures its quality.
 //! [`audit`] tests that hidden state does not influence agents.
 //!
 //! **What it is not**: it holds no rules of the world and makes no decisions for agents.
@@ -32,6 +32,7 @@ pub mod recorded_belief;
 pub mod report;
 pub mod run;
 
+pub mod calibration;
 pub mod explain;
 pub mod frame_export;
 pub mod replay;

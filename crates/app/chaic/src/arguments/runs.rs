@@ -35,6 +35,9 @@ pub struct ReportArguments {
     /// Write the figure with error bars to a .svg or .png file and print nothing.
     #[arg(long, value_name = "FILE")]
     pub figure: Option<PathBuf>,
+    /// Print the accuracy and calibration of recorded beliefs; docs/metrics.md.
+    #[arg(long, conflicts_with_all = ["formulas", "from_traces", "figure"])]
+    pub belief: bool,
 }
 
 /// `chaic show`.

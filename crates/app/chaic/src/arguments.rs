@@ -41,8 +41,8 @@ pub use self::perception::{
     TrainArguments, TrainCommand,
 };
 pub use self::runs::{
-    MergeArguments, RenderArguments, ReplayArguments, ReportArguments, ShowArguments,
-    VerifyArguments,
+    ExplainArguments, MergeArguments, RenderArguments, ReplayArguments, ReportArguments,
+    ShowArguments, VerifyArguments,
 };
 pub use self::tools::{CompletionsArguments, ListCommand, ManArguments};
 
@@ -106,6 +106,8 @@ pub enum Command {
     /// List helpers, tasks, people, rules or runs.
     #[command(subcommand)]
     List(ListCommand),
+    /// Print what the helper of a recorded episode believed and planned.
+    Explain(ExplainArguments),
     /// Make a video of a recorded episode.
     Replay(ReplayArguments),
     /// Render one frame of an episode: color, depth, ids, classes and normals.

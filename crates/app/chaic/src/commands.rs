@@ -5,6 +5,7 @@ pub mod collect;
 pub mod doctor;
 pub mod episodes;
 pub mod eval;
+pub mod explain;
 pub mod export;
 pub mod fidelity;
 pub mod helper;
@@ -25,6 +26,7 @@ pub mod verify;
 
 mod bars;
 mod datasets;
+mod recorded;
 mod run_perception;
 mod summary;
 

@@ -102,6 +102,7 @@ fn run_command(command: Command, format: OutputFormat, launcher: &Launcher) -> R
         Command::Report(arguments) => commands::report::run(&arguments, format),
         Command::Show(arguments) => commands::show::run(&arguments, format),
         Command::List(command) => commands::list::run(&command, format),
+        Command::Explain(arguments) => commands::explain::run(&arguments, format),
         Command::Replay(arguments) => commands::replay::run(&arguments, format),
         Command::Render(arguments) => commands::render::run(&arguments, format),
         Command::Scene(command) => commands::scene::run(&command, format),

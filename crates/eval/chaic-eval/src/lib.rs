@@ -4,6 +4,7 @@
 //! benchmarks on several threads, keeps a journal and writes a [`trace_file`] per episode run.
 //! [`metrics`] computes the paper's scores from the records, and [`report`] prints them. [`verify`]
 //! re-simulates traces and compares the records. [`replay`] and [`frame_export`] render episodes.
+//! [`explain`] describes a helper's belief in sentences, and [`calibration`] measures its quality.
 //! [`audit`] tests that hidden state does not influence agents.
 //!
 //! **What it is not**: it holds no rules of the world and makes no decisions for agents.
@@ -27,9 +28,12 @@ pub mod trace_file;
 
 pub mod metrics;
 pub mod published;
+pub mod recorded_belief;
 pub mod report;
 pub mod run;
 
+pub mod calibration;
+pub mod explain;
 pub mod frame_export;
 pub mod replay;
 pub mod verify;

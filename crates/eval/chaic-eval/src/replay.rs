@@ -1,12 +1,15 @@
 //! Replays: videos of traces.
 
+mod belief_panel;
+mod layout;
 mod panel;
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
+use chaic_core::catalogue::TargetSet;
 use chaic_core::geom::Camera;
-use chaic_core::{Action, AgentId, EntityId, Frame, Outcome, ResolvedAction, TaskId};
+use chaic_core::{Action, AgentId, EntityId, Frame, Outcome, ResolvedAction, TaskId, Vec2};
 use chaic_env::trace::Trace;
 use chaic_env::{Playback, slug};
 use chaic_episodes::Episode;
@@ -14,11 +17,13 @@ use chaic_render::{Channels, Scene, View, floor_plan};
 use chaic_world::{EventKind, World};
 use image::RgbImage;
 
+use self::belief_panel::BeliefView;
 use crate::error::{EvalError, Result};
+use crate::recorded_belief::true_set;
 use crate::run::RunFolder;
 use chaic_video::{VideoError, VideoWriter};
 
-pub use panel::{HEIGHT_PX, WIDTH_PX};
+pub use layout::{HEIGHT_PX, WIDTH_PX};
 
 /// Options of a replay video.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -189,12 +194,12 @@ impl<'a> Replay<'a> {
                 let channels = Channels { depth: true, ..Channels::RGB };
                 View::from_agent(self.world(), *agent, masks.image_size(), channels)
             }
-            _ => View::from_agent(self.world(), *agent, panel::VIEW_PX, Channels::RGB),
+            _ => View::from_agent(self.world(), *agent, layout::VIEW_PX, Channels::RGB),
         };
         let views: Vec<View> = present.map(view).collect();
-        let (mut images, map) = rayon::join(
+        let (mut images, mut map) = rayon::join(
             || self.scene.render(self.world(), &views),
-            || floor_plan::draw_scene_plan(&self.scene, self.world(), panel::MAP_PX),
+            || floor_plan::draw_scene_plan(&self.scene, self.world(), layout::MAP_PX),
         );
         let helper = AgentId::HELPER.index();
         if let (Some(masks), Some(images), Some(view)) =
@@ -210,6 +215,11 @@ impl<'a> Replay<'a> {
             .zip(self.playback.thoughts())
             .map(|(view, thought)| panel::marks(&thought.perceived, &view.camera))
             .collect();
+        let belief = self.belief();
+        if let Some([x, z]) = belief.as_ref().and_then(|view| view.belief.position_cm) {
+            let position = Vec2::new(0.01 * x as f32, 0.01 * z as f32);
+            floor_plan::mark_believed_position(&mut map, self.world(), AgentId::HELPER, position);
+        }
         let captions: Vec<Caption> =
             self.world().setup().agents().map(|a| self.caption(a)).collect();
         panel::compose(&panel::Contents {
@@ -220,7 +230,17 @@ impl<'a> Replay<'a> {
             map: &map,
             captions: &captions,
             events: &self.events,
+            belief: belief.as_ref(),
         })
+    }
+
+    /// Returns the current belief of the helper with the true hypotheses.
+    fn belief(&self) -> Option<BeliefView> {
+        let belief = self.playback.thoughts().get(AgentId::HELPER.index())?.belief.clone()?;
+        let setup = self.world().setup();
+        let true_set = true_set(&setup.goal, &belief).map(TargetSet::name);
+        let true_person = setup.people.first()?.persona.name();
+        Some(BeliefView { belief, true_set, true_person })
     }
 
     fn caption(&self, agent: AgentId) -> Caption {
@@ -286,3 +306,6 @@ impl<'a> Replay<'a> {
         self.events.push(format!("{:>5}  {text}", self.world().state().frame));
     }
 }
+
+#[cfg(test)]
+mod tests;

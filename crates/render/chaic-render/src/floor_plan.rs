@@ -47,6 +47,24 @@ pub fn draw_scene_plan(scene: &Scene, world: &World, width_px: u32) -> RgbImage 
     with_legend(&image, world)
 }
 
+/// Marks on a map of [`draw_scene_plan`] the position (x, z) at which an agent believes another
+/// one: a ring in the color of the believing agent. The ring is wider than the disk of a person, so
+/// that both are visible at one place.
+pub fn mark_believed_position(
+    image: &mut RgbImage,
+    world: &World,
+    believer: AgentId,
+    position_in_world: Vec2,
+) {
+    let area = map_area(world);
+    let map = Map { area, px_per_m: image.width() as f32 / area.size().x };
+    let at = map.px_from_xz(position_in_world);
+    let stroke_px = (0.0045 * image.width() as f32).max(2.0);
+    let radius = 1.7 * person_radius_px(image, &map);
+    circle(image, at, radius, 2.2 * stroke_px, BACKGROUND);
+    circle(image, at, radius, stroke_px, person_color(believer));
+}
+
 /// Transform from meters to pixels.
 struct Map {
     area: Rect,
@@ -219,10 +237,15 @@ fn person_color(agent: AgentId) -> [u8; 3] {
     PEOPLE[agent.index().min(PEOPLE.len() - 1)]
 }
 
+/// Returns the radius of the disk of a person, pixels.
+fn person_radius_px(image: &RgbImage, map: &Map) -> f32 {
+    (0.26 * map.px_per_m).max(0.009 * image.width() as f32)
+}
+
 fn mark_people(image: &mut RgbImage, world: &World, map: &Map) {
+    let radius = person_radius_px(image, map);
     for agent in world.setup().agents() {
         let pose = world.state().agents[agent.index()].pose;
-        let radius = (0.26 * map.px_per_m).max(0.009 * image.width() as f32);
         let (at, color) = (map.px(pose.position), person_color(agent));
         let forward = pose.forward();
         let nose = at + Vec2::new(forward.x, forward.z) * (1.9 * radius);

@@ -35,6 +35,9 @@ pub struct ReportArguments {
     /// Write the figure with error bars to a .svg or .png file and print nothing.
     #[arg(long, value_name = "FILE")]
     pub figure: Option<PathBuf>,
+    /// Print the accuracy and calibration of recorded beliefs; docs/metrics.md.
+    #[arg(long, conflicts_with_all = ["formulas", "from_traces", "figure"])]
+    pub belief: bool,
 }
 
 /// `chaic show`.
@@ -52,6 +55,21 @@ pub struct VerifyArguments {
     /// Traces in parallel, 1 to 1024 [default: one per core].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(ranges::JOBS))]
     pub jobs: Option<u16>,
+}
+
+/// `chaic explain`.
+#[derive(Args, Debug)]
+pub struct ExplainArguments {
+    /// Folder of the run.
+    pub run: PathBuf,
+    /// Id of the episode, for example obstacle/test/00.
+    pub episode: String,
+    /// Helper of the episode run [default: infer if the run has it].
+    #[arg(long, value_name = "NAME")]
+    pub helper: Option<String>,
+    /// Seed of the episode run, 0 to 9999 [default: the lowest].
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(ranges::SEED))]
+    pub seed: Option<u32>,
 }
 
 /// `chaic replay`.

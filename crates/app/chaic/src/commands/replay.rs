@@ -1,52 +1,34 @@
 //! `chaic replay`.
 
 use std::ops::ControlFlow;
-use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use chaic_core::geom::Camera;
 use chaic_core::observation::SensorConfig;
-use chaic_env::helper_registry::{BuiltInWithPerception, HelperRegistry};
-use chaic_eval::EvalError;
 use chaic_eval::replay::{self, Masks, ReplayOptions};
-use chaic_eval::run::{RunFolder, RunOptions};
-use chaic_eval::verify::verify_trace;
-use chaic_llm::LanguageHelpers;
+use chaic_eval::run::RunOptions;
 use chaic_vision::error_breakdown::REPORT_SCORE;
 use chaic_vision::perception_registry::{read_detector, weights_of};
 use chaic_vision::trained::{Inference, TrainedDetector};
 use serde_json::json;
 
-use super::{bars, llm, run_perception};
+use super::bars;
+use super::recorded::{RecordedEpisode, read_recorded};
 use crate::arguments::ReplayArguments;
 use crate::exit::ExitStatus;
 use crate::interrupt;
-use crate::output::{OutputFormat, counted, print_error, print_result, print_warning};
+use crate::output::{OutputFormat, counted, print_error, print_result};
 
 /// Makes a video of a recorded episode.
 pub fn run(arguments: &ReplayArguments, format: OutputFormat) -> Result<ExitStatus> {
     let ReplayArguments { run, episode, out, helper, seed, fps, every, masks } = arguments;
-    let (folder, options) = RunFolder::read(run)?;
-    if !options.traces {
-        return Err(EvalError::NoTraces { path: folder.path().to_owned() }.into());
-    }
-    let path = replay::find_trace(&folder, episode, helper.as_deref(), *seed)?;
-    let (trace, warnings) = folder.read_trace(&path)?;
-    for warning in &warnings {
-        print_warning(&warning.to_string());
-    }
-    let built_in =
-        BuiltInWithPerception { perception: run_perception::recorded_perception(&options) };
-    let language = LanguageHelpers::recorded(run, llm::never())?;
-    let language =
-        language.map(|language| language.with_perception(Arc::clone(&built_in.perception)));
-    let helpers = language.as_ref().map_or(&built_in as &dyn HelperRegistry, |l| l);
-    if let Some(difference) = verify_trace(&folder, &options, helpers, &trace, &path)? {
-        bail!("the trace was altered, so no video is made: {difference}");
-    }
+    let RecordedEpisode { options, trace, episode, is_whole } = read_recorded(
+        run,
+        |folder| replay::find_trace(folder, episode, helper.as_deref(), *seed),
+        "no video is made",
+    )?;
     let key = trace.header.key();
-    let episode = folder.episode(&options, &key)?;
     let bar = bars::count_bar(trace.end().map_or(0, |e| u64::from(e.frame)), "frames");
     let video = ReplayOptions { fps: *fps, every: *every };
     let stop = interrupt::stop_flag()?;
@@ -70,11 +52,11 @@ pub fn run(arguments: &ReplayArguments, format: OutputFormat) -> Result<ExitStat
     let text = format!("{}: {n} of {} with {}\n", out.display(), key.episode, key.helper);
     let json = json!({
         "out": out, "images": images, "episode": key.episode, "helper": key.helper, "seed": key.seed,
-        "complete": warnings.is_empty(),
+        "complete": is_whole,
     });
     print_result(format, &json, &text)?;
     // The video of a cut-off trace shows only the recorded part.
-    Ok(ExitStatus::from_findings(!warnings.is_empty()))
+    Ok(ExitStatus::from_findings(!is_whole))
 }
 
 /// Returns the detector of the run's helpers if its weights are still there, else the built-in one.

@@ -2,9 +2,10 @@
 
 use anyhow::Result;
 use chaic_eval::EvalError;
+use chaic_eval::calibration::read_scores;
 use chaic_eval::metrics::{RunResult, tally};
 use chaic_eval::report::{Format, Report, untraced_note, write_figure};
-use chaic_eval::run::{EpisodeJob, RunFolder, planned, read_results};
+use chaic_eval::run::{EpisodeJob, RunFolder, RunOptions, planned, read_results};
 
 use crate::arguments::ReportArguments;
 use crate::exit::ExitStatus;
@@ -19,8 +20,11 @@ pub fn run(arguments: &ReportArguments, format: OutputFormat) -> Result<ExitStat
         OutputFormat::Csv => Format::Csv,
     };
     let (folder, options) = RunFolder::read(&arguments.run)?;
-    if arguments.from_traces && !options.traces {
+    if (arguments.from_traces || arguments.belief) && !options.traces {
         return Err(EvalError::NoTraces { path: folder.path().to_owned() }.into());
+    }
+    if arguments.belief {
+        return report_beliefs(&folder, &options, format);
     }
     // Results are useful even if the episodes of the run are gone.
     let planned = planned(&folder, &options).unwrap_or_else(|e| {
@@ -48,6 +52,20 @@ pub fn run(arguments: &ReportArguments, format: OutputFormat) -> Result<ExitStat
         Some(path) => write_figure(&report.scores(), report.labels(), path)?,
         None => print(&report.text(format))?,
     }
+    Ok(ExitStatus::Success)
+}
+
+/// Prints the quality of the beliefs in the traces.
+fn report_beliefs(folder: &RunFolder, options: &RunOptions, format: Format) -> Result<ExitStatus> {
+    let (scores, warnings) = read_scores(folder, options)?;
+    warnings.iter().for_each(|warning| print_warning(warning));
+    if scores.helpers.is_empty() {
+        anyhow::bail!(
+            "{} has no whole trace with a belief about a target set; helpers such as infer record one",
+            folder.path().display()
+        );
+    }
+    print(&scores.text(format))?;
     Ok(ExitStatus::Success)
 }
 

@@ -10,26 +10,23 @@ use chaic_world::World;
 use image::{Rgb, RgbImage, imageops};
 
 use crate::replay::Caption;
+use crate::replay::belief_panel::{self, BeliefView};
+use crate::replay::layout::{
+    BAR, BAR_BACKGROUND, FAINT, HEIGHT_PX, INK, MARGIN_PX, SIDE_COLUMN_PX, SIDE_X_PX, VIEW_PX,
+    WIDTH_PX, fill, wrapped,
+};
 
-/// Width of an image, pixels.
-pub const WIDTH_PX: u32 = 1440;
-/// Height of an image, pixels.
-pub const HEIGHT_PX: u32 = 720;
-/// Side of an agent's view, pixels.
-pub const VIEW_PX: u32 = 460;
-/// Width of the map before it is fitted, pixels.
-pub const MAP_PX: u32 = 472;
-
-const MARGIN_PX: u32 = 12;
 const HEADER_PX: u32 = 44;
 const BACKGROUND: [u8; 3] = [250, 250, 248];
-const INK: [u8; 3] = [30, 32, 38];
-const FAINT: [u8; 3] = [110, 114, 122];
-const BAR: [u8; 3] = [20, 150, 70];
-const BAR_BACKGROUND: [u8; 3] = [222, 224, 226];
 const LINE_PX: f32 = 17.0;
+/// Tops of the captions, and of the caption of the child below them.
+const CAPTIONS_Y_PX: u32 = HEADER_PX + VIEW_PX + 10;
+const CHILD_Y_PX: u32 = CAPTIONS_Y_PX + 122;
+const CAPTION_LINE_PX: u32 = 22;
 const EVENT_LINE_PX: u32 = 19;
 const EVENT_PX: f32 = 14.0;
+/// Minimum number of rows of events below the belief.
+const MIN_EVENT_ROWS: u32 = 4;
 /// Indentation that is as wide as the frame number of an event.
 const EVENT_INDENT: &str = "       ";
 /// Maximum number of events: as many as fit without a map.
@@ -47,6 +44,8 @@ pub(super) struct Contents<'a> {
     pub captions: &'a [Caption],
     /// Last events, newest last.
     pub events: &'a [String],
+    /// Belief of the helper, if it records one.
+    pub belief: Option<&'a BeliefView>,
 }
 
 pub(super) fn compose(contents: &Contents<'_>) -> RgbImage {
@@ -65,8 +64,19 @@ pub(super) fn compose(contents: &Contents<'_>) -> RgbImage {
         }
         imageops::replace(&mut image, &picture, i64::from(x), i64::from(HEADER_PX));
     }
-    let below = draw_map(&mut image, contents.map);
+    // Events keep some rows below the bars, so that a high map gets smaller.
+    let reserved = belief_panel::HEIGHT_PX + MIN_EVENT_ROWS * EVENT_LINE_PX + 2 * MARGIN_PX;
+    let reserved = if contents.belief.is_some() { reserved } else { 0 };
+    let mut below = draw_map(&mut image, contents.map, reserved);
     draw_captions(&mut image, contents);
+    if let Some(view) = contents.belief {
+        belief_panel::draw_bars(&mut image, below + MARGIN_PX / 2, view);
+        below += belief_panel::HEIGHT_PX;
+        let has_child = contents.captions.len() > 2;
+        let (top, max_rows) =
+            if has_child { (CHILD_Y_PX + CAPTION_LINE_PX, 3) } else { (CHILD_Y_PX, 4) };
+        belief_panel::draw_plans(&mut image, top, max_rows, &view.belief);
+    }
     draw_events(&mut image, below, contents.events);
     image
 }
@@ -154,10 +164,11 @@ fn draw_header(image: &mut RgbImage, Contents { header, world, .. }: &Contents<'
     }
 }
 
-/// Fits the map into the space to the right of the views; returns its bottom row.
-fn draw_map(image: &mut RgbImage, map: &RgbImage) -> u32 {
-    let x = 3 * MARGIN_PX + 2 * VIEW_PX;
-    let (width, height) = (WIDTH_PX - MARGIN_PX - x, HEIGHT_PX - HEADER_PX - MARGIN_PX);
+/// Fits the map into the space to the right of the views, without `reserved_px` rows below it;
+/// returns its bottom row.
+fn draw_map(image: &mut RgbImage, map: &RgbImage, reserved_px: u32) -> u32 {
+    let x = SIDE_X_PX;
+    let (width, height) = (SIDE_COLUMN_PX, HEIGHT_PX - HEADER_PX - MARGIN_PX - reserved_px);
     let (w, h) = map.dimensions();
     let scale = (f64::from(width) / f64::from(w)).min(f64::from(height) / f64::from(h)).min(1.0);
     let y = i64::from(HEADER_PX);
@@ -173,8 +184,7 @@ fn draw_map(image: &mut RgbImage, map: &RgbImage) -> u32 {
 
 /// Draws the last events, as many as fit below the map.
 fn draw_events(image: &mut RgbImage, top: u32, events: &[String]) {
-    let x = (3 * MARGIN_PX + 2 * VIEW_PX) as f32;
-    let width = WIDTH_PX as f32 - MARGIN_PX as f32 - x;
+    let (x, width) = (SIDE_X_PX as f32, SIDE_COLUMN_PX as f32);
     let max_rows = HEIGHT_PX.saturating_sub(top + 2 * MARGIN_PX) / EVENT_LINE_PX;
     let rows: Vec<String> =
         events.iter().flat_map(|n| wrapped(n, EVENT_PX, width, EVENT_INDENT)).collect();
@@ -186,7 +196,7 @@ fn draw_events(image: &mut RgbImage, top: u32, events: &[String]) {
 }
 
 fn draw_captions(image: &mut RgbImage, Contents { captions, .. }: &Contents<'_>) {
-    let top = (HEADER_PX + VIEW_PX + 10) as f32;
+    let top = CAPTIONS_Y_PX as f32;
     for (k, caption) in captions.iter().enumerate().take(2) {
         let x = (MARGIN_PX + k as u32 * (VIEW_PX + MARGIN_PX)) as f32;
         text::draw(image, (x, top), LINE_PX, INK, Align::Left, &caption.agent);
@@ -199,7 +209,7 @@ fn draw_captions(image: &mut RgbImage, Contents { captions, .. }: &Contents<'_>)
     let left = MARGIN_PX as f32;
     if let Some(child) = captions.get(2) {
         let caption = format!("{}: {}, {}", child.agent, child.action, child.plan);
-        text::draw(image, (left, top + 122.0), LINE_PX, INK, Align::Left, &caption);
+        text::draw(image, (left, CHILD_Y_PX as f32), LINE_PX, INK, Align::Left, &caption);
     }
 }
 
@@ -207,30 +217,5 @@ fn draw_captions(image: &mut RgbImage, Contents { captions, .. }: &Contents<'_>)
 fn draw_lines(image: &mut RgbImage, x: f32, y: f32, text: &str, color: [u8; 3]) {
     for (k, row) in wrapped(text, LINE_PX, VIEW_PX as f32, "").iter().take(2).enumerate() {
         text::draw(image, (x, y + 21.0 * k as f32), LINE_PX, color, Align::Left, row);
-    }
-}
-
-/// Breaks a text between words into rows no wider than `width_px`. Rows after the first begin with
-/// `indent`.
-fn wrapped(text: &str, size_px: f32, width_px: f32, indent: &str) -> Vec<String> {
-    let mut rows = Vec::new();
-    let mut row = String::new();
-    for word in text.split_inclusive(' ') {
-        let candidate = format!("{row}{word}");
-        if !row.trim().is_empty() && text::width(candidate.trim_end(), size_px) > width_px {
-            rows.push(std::mem::replace(&mut row, format!("{indent}{word}")));
-        } else {
-            row = candidate;
-        }
-    }
-    rows.push(row);
-    rows
-}
-
-fn fill(image: &mut RgbImage, [x0, y0, x1, y1]: [u32; 4], color: [u8; 3]) {
-    for y in y0..y1.min(HEIGHT_PX) {
-        for x in x0..x1.min(WIDTH_PX) {
-            image.put_pixel(x, y, Rgb(color));
-        }
     }
 }

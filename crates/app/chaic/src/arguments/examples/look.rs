@@ -68,6 +68,14 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
         ],
     ),
     (
+        "chaic explain",
+        [
+            ("Explain the helper infer", "chaic explain runs/quick obstacle/test/00"),
+            ("Explain another helper", "chaic explain runs/quick obstacle/test/00 --helper rhp"),
+            ("Print the records", "chaic explain runs/quick obstacle/test/00 --format json"),
+        ],
+    ),
+    (
         "chaic replay",
         [
             (

@@ -412,7 +412,8 @@ impl<P: Policy> Agent for PlanningAgent<P> {
             belief: self
                 .episode
                 .as_ref()
-                .and_then(|e| self.policy.partner_belief(&e.briefing, &e.memory)),
+                .and_then(|e| self.policy.partner_belief(&e.briefing, &e.memory))
+                .map(Box::new),
         }
     }
 

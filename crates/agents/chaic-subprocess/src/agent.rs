@@ -126,7 +126,7 @@ fn bounded(thought: Thought) -> Thought {
         mode: mode.as_deref().map(cut),
         last_observed: last_observed.as_deref().map(cut),
         perceived,
-        belief: belief.map(bounded_belief),
+        belief: belief.map(|belief| Box::new(bounded_belief(*belief))),
     }
 }
 

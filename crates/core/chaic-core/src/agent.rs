@@ -23,7 +23,7 @@ pub struct Thought {
     pub perceived: Vec<BelievedObject>,
     /// Belief about the partner, for agents that infer its goal and constraint.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub belief: Option<PartnerBelief>,
+    pub belief: Option<Box<PartnerBelief>>,
 }
 
 /// What an agent believes about its partner, and the plans that follow.

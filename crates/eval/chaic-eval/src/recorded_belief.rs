@@ -50,7 +50,7 @@ pub fn true_person(header: &Header) -> Option<Persona> {
 /// Returns the changes of the helper's belief with their frames, in order.
 pub fn beliefs(trace: &Trace) -> impl Iterator<Item = (Frame, &PartnerBelief)> {
     let decisions = trace.decisions().filter(|d| d.agent == AgentId::HELPER);
-    decisions.filter_map(|d| Some((d.frame, d.thought.as_ref()?.belief.as_ref()?)))
+    decisions.filter_map(|d| Some((d.frame, d.thought.as_ref()?.belief.as_deref()?)))
 }
 
 /// Returns the frame from which a target set stays the most likely one until the end, with a

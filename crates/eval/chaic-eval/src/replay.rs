@@ -236,7 +236,8 @@ impl<'a> Replay<'a> {
 
     /// Returns the current belief of the helper with the true hypotheses.
     fn belief(&self) -> Option<BeliefView> {
-        let belief = self.playback.thoughts().get(AgentId::HELPER.index())?.belief.clone()?;
+        let belief =
+            self.playback.thoughts().get(AgentId::HELPER.index())?.belief.as_deref()?.clone();
         let setup = self.world().setup();
         let true_set = true_set(&setup.goal, &belief).map(TargetSet::name);
         let true_person = setup.people.first()?.persona.name();

@@ -55,14 +55,14 @@ fn records() -> Vec<Record> {
             class: ClassId::named("apple"),
             position_cm: [120, 80, -35],
         }],
-        belief: Some(PartnerBelief {
+        belief: Some(Box::new(PartnerBelief {
             goals: vec![("fruit".to_owned(), 750), ("bread".to_owned(), 250)],
             people: vec![("child".to_owned(), 1000)],
             extra: vec![ClassId::named("key")],
             position_cm: Some([120, -35]),
             evidence: vec!["took apple #31".to_owned()],
             ..PartnerBelief::default()
-        }),
+        })),
     };
     let failed = Outcome::Failure(FailureReason::OutOfReach);
     vec![

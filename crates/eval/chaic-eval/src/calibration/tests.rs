@@ -27,7 +27,7 @@ fn trace(frames: Frame, beliefs: &[(Frame, u16, u16)]) -> Trace {
             agent: AgentId::HELPER,
             action: Action::MoveForward,
             digest: Digest(0),
-            thought: Some(Thought { belief: Some(belief), ..Thought::default() }),
+            thought: Some(Thought { belief: Some(Box::new(belief)), ..Thought::default() }),
         })
     };
     let end = End {

@@ -32,13 +32,13 @@ fn thought(goals: [u16; 2], people: [u16; 2], evidence: &[&str], plan: &[&str]) 
     Thought {
         plan: "explore".to_owned(),
         mode: Some(if goals[0].max(goals[1]) < 700 { "watch" } else { "plan" }.to_owned()),
-        belief: Some(PartnerBelief {
+        belief: Some(Box::new(PartnerBelief {
             goals: named(["fruit", "bread"], goals),
             people: named(["child", "adult"], people),
             evidence: texts(evidence),
             plan: texts(plan),
             ..PartnerBelief::default()
-        }),
+        })),
         ..Thought::default()
     }
 }

@@ -35,6 +35,7 @@ fn render(id: &str, belief: Option<PartnerBelief>) -> RgbImage {
     let header = trace_header(config, helper).unwrap();
     let mut trace = Trace { header, records: Vec::new() };
     let digest = Digest(Replay::new(&trace, &episode).unwrap().world().digest());
+    let belief = belief.map(Box::new);
     let thought = Some(Thought { plan: "explore".to_owned(), belief, ..Thought::default() });
     let (agent, action) = (AgentId::HELPER, Action::TurnLeft);
     trace.records.push(Record::Decision(Decision { frame: 0, agent, action, digest, thought }));

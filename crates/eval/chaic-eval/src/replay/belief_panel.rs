@@ -105,13 +105,36 @@ fn draw_rows(image: &mut RgbImage, [x, y, width]: [u32; 3], max_rows: usize, tex
     if rows.len() > max_rows {
         rows.truncate(max_rows);
         if let Some(last) = rows.last_mut() {
-            let end = last.trim_end().trim_end_matches(',').len();
-            last.truncate(end);
-            last.push_str(" ...");
+            *last = shortened(last, width as f32);
         }
     }
     for (k, row) in rows.iter().enumerate() {
         let at = (x as f32, (y + k as u32 * ROW_PX) as f32);
         text::draw(image, at, TEXT_PX, FAINT, Align::Left, row);
+    }
+}
+
+/// Returns as many words of a row as fit with `...` behind them.
+fn shortened(row: &str, width_px: f32) -> String {
+    let mut words: Vec<&str> = row.split(' ').filter(|word| !word.is_empty()).collect();
+    loop {
+        let shorter = format!("{} ...", words.join(" ").trim_end_matches(','));
+        if words.pop().is_none() || text::width(&shorter, TEXT_PX) <= width_px {
+            return shorter;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shortened_row_fits() {
+        let row = "pick up apple #31, deliver, pick up ";
+        assert_eq!(shortened(row, 1000.0), "pick up apple #31, deliver, pick up ...");
+        let width_px = text::width("pick up apple #31, deliver", TEXT_PX);
+        assert_eq!(shortened(row, width_px), "pick up apple #31 ...");
+        assert_eq!(shortened("word", 1.0), " ...");
     }
 }

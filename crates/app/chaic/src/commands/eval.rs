@@ -141,7 +141,9 @@ fn finish(run: &Run, format: OutputFormat, start: Instant) -> Result<ExitStatus>
     let path = quoted_path(run.folder().path());
     let secs = start.elapsed().as_secs();
     let mut more = vec![("Time", format!("{} min {:02} s", secs / 60, secs % 60))];
-    let example = run.results().iter().find(|r| r.key.helper == "rhp").or(run.results().first());
+    // The order of the results depends on how long the episodes took.
+    let of_rhp = run.results().iter().filter(|r| r.key.helper == "rhp").min_by_key(|r| &r.key);
+    let example = of_rhp.or_else(|| run.results().iter().min_by_key(|r| &r.key));
     if let Some(example) = example.filter(|_| run.options().traces) {
         let (episode, helper) = (&example.key.episode, &example.key.helper);
         let replay = format!("chaic replay {path} {episode} --helper {helper} --out replay.mp4");

@@ -7,14 +7,17 @@ use serde_json::Value;
 
 use crate::root;
 
-/// Row titles of docs/results.md and docs/people.md, with the helpers' names.
+/// Row titles of docs/results.md and docs/people.md, with the helpers' names: those of the paper.
 const ROWS: [(&str, &str); 4] =
     [("w/o", "none"), ("Random", "random"), ("RHP", "rhp"), ("Oracle", "oracle")];
+/// The same for helpers without a row in the paper.
+const MORE_ROWS: [(&str, &str); 1] = [("Infer", "infer")];
 /// Starts of the rows of the README's table, with the helpers' names.
-const README_ROWS: [(&str, &str); 4] = [
+const README_ROWS: [(&str, &str); 5] = [
     ("| **No helper** (w/o) |", "none"),
     ("| **Random** valid plans |", "random"),
     ("| **RHP**, rule-based hierarchical planner |", "rhp"),
+    ("| **Infer**, which infers goal and constraint |", "infer"),
     ("| **Oracle**, RHP that knows the goal |", "oracle"),
 ];
 /// Columns of the tables, in order.
@@ -83,15 +86,22 @@ fn assert_row(
 }
 
 /// Compares the rows `| **TITLE**, NAME |` of a page.
-fn assert_rows(page: &str, name: &str, scores: &Value, tasks: &[&str], cell: fn(&Value) -> String) {
-    for (title, helper) in ROWS {
+fn assert_rows(
+    page: &str,
+    name: &str,
+    rows: &[(&str, &str)],
+    scores: &Value,
+    tasks: &[&str],
+    cell: fn(&Value) -> String,
+) {
+    for (title, helper) in rows {
         assert_row(page, &format!("| **{title}**, {name} |"), helper, scores, tasks, cell);
     }
 }
 
 #[test]
 fn the_readme_has_the_rates_of_the_standard_split() {
-    let scores = scores("standard", 4 * 800);
+    let scores = scores("standard", 5 * 800);
     for (start, helper) in README_ROWS {
         assert_row("README.md", start, helper, &scores, &TASKS, rate);
     }
@@ -99,19 +109,20 @@ fn the_readme_has_the_rates_of_the_standard_split() {
 
 #[test]
 fn the_results_page_has_the_rates_and_intervals_of_the_standard_split() {
-    let scores = scores("standard", 4 * 800);
-    assert_rows("docs/results.md", "standard", &scores, &TASKS, rate_and_interval);
+    let scores = scores("standard", 5 * 800);
+    let rows = [&ROWS[..], &MORE_ROWS[..]].concat();
+    assert_rows("docs/results.md", "standard", &rows, &scores, &TASKS, rate_and_interval);
 }
 
 #[test]
 fn the_results_page_has_the_test_episodes_beside_the_paper() {
     let scores = scores("test", 4 * 96);
-    assert_rows("docs/results.md", "chaic", &scores, &TASKS, rate_and_improvement);
+    assert_rows("docs/results.md", "chaic", &ROWS, &scores, &TASKS, rate_and_improvement);
 }
 
 #[test]
 fn the_people_page_has_the_rates_with_impaired_partners() {
     let scores = scores("impaired", 4 * 200);
     let tasks = ["no_constraint", "one_handed", "low_vision", "tires", "tremor"];
-    assert_rows("docs/people.md", "impaired", &scores, &tasks, rate_and_interval);
+    assert_rows("docs/people.md", "impaired", &ROWS, &scores, &tasks, rate_and_interval);
 }

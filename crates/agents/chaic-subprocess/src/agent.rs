@@ -217,3 +217,29 @@ impl Drop for SubprocessAgent {
         self.finish();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_belief_is_kept_with_bounded_lists_texts_and_probabilities() {
+        let many = MAX_PERCEIVED + 1;
+        let long = "x".repeat(100_000);
+        let belief = PartnerBelief {
+            goals: vec![(long.clone(), 60_000); many],
+            people: vec![("child".to_owned(), 700); 2],
+            evidence: vec![long.clone(); many],
+            plan: vec![long; many],
+            position_cm: Some([120, -35]),
+            ..PartnerBelief::default()
+        };
+        let thought = Thought { belief: Some(Box::new(belief)), ..Thought::default() };
+        let kept = *bounded(thought).belief.expect("it is kept");
+        assert_eq!((kept.people.len(), kept.position_cm), (2, Some([120, -35])));
+        assert_eq!(kept.people[0], ("child".to_owned(), 700));
+        assert_eq!([kept.goals.len(), kept.evidence.len(), kept.plan.len()], [MAX_PERCEIVED; 3]);
+        assert!(kept.goals.iter().all(|(name, p)| name.len() < 10_000 && *p == 1000));
+        assert!(kept.evidence.iter().chain(&kept.plan).all(|text| text.len() < 10_000));
+    }
+}

@@ -26,7 +26,7 @@ pub struct Thought {
     pub belief: Option<Box<PartnerBelief>>,
 }
 
-/// What an agent believes about its partner, and the plans that follow.
+/// Belief of an agent about its partner, and the plans that follow.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PartnerBelief {
     /// Target sets ([`TargetSet::name`](crate::catalogue::TargetSet::name)) with their

@@ -52,6 +52,8 @@ mod constants {
     pub const LOST_FRAMES: Frame = 200;
     /// Goals with a lower probability are left out of the plan.
     pub const MIN_GOAL_PROBABILITY: f32 = 0.04;
+    /// Probability from which a class outside the target set counts as wanted.
+    pub const MIN_EXTRA: f32 = 0.5;
     /// Number of objects assumed for each class of a target set: more than any episode has.
     pub const ALL_OF_CLASS: f32 = 9.0;
     /// Value by which a new plan must exceed the current one before a walk to an object is given
@@ -93,7 +95,7 @@ pub struct InferPolicy {
     rng: RngStream,
     /// Remaining steps of the current team plan.
     steps: Vec<Step>,
-    /// What the partner is expected to do meanwhile, as text.
+    /// Expected operations of the partner as text.
     partner_plan: Vec<String>,
     /// True if the last choice may replace a walk to another object.
     may_switch: bool,
@@ -152,7 +154,7 @@ impl InferPolicy {
                 if info.sets.contains(&set) {
                     return Some((*class, ALL_OF_CLASS));
                 }
-                let is_likely = belief.goal.probability_wanted(*class) >= 0.5;
+                let is_likely = belief.goal.probability_wanted(*class) >= MIN_EXTRA;
                 let n = if info.role == Role::Fragile { 2.0 } else { 1.0 };
                 is_likely.then_some((*class, n))
             });

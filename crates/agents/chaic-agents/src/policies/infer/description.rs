@@ -4,6 +4,7 @@ use chaic_core::agent::PartnerBelief;
 use chaic_core::briefing::CompanionRole;
 use chaic_core::{Briefing, ClassId, Frame};
 
+use super::constants::MIN_EXTRA;
 use super::{InferPolicy, Step};
 use crate::belief::{AttemptKind, Belief, Evidence};
 use crate::memory::Memory;
@@ -11,8 +12,6 @@ use crate::team::simulation::{SimulatedEvent, timeline};
 use crate::team::{Operation, PlaceKind, TeamProblem};
 use crate::track::TrackId;
 
-/// Probability from which a class beside the target sets is named.
-const MIN_EXTRA: f32 = 0.5;
 /// Maximum number of described operations of one person.
 const MAX_OPERATIONS: usize = 6;
 

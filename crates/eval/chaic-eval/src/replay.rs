@@ -14,7 +14,7 @@ use chaic_env::trace::Trace;
 use chaic_env::{Playback, slug};
 use chaic_episodes::Episode;
 use chaic_render::{Channels, Scene, View, floor_plan};
-use chaic_world::{EventKind, World};
+use chaic_world::{EventKind, Setup, World};
 use image::RgbImage;
 
 use self::belief_panel::BeliefView;
@@ -149,6 +149,12 @@ pub fn write(
     Ok(Some(n))
 }
 
+/// Returns the label and the id of an object, for example `apple #31`.
+pub(crate) fn object_name(setup: &Setup, entity: EntityId) -> String {
+    let class = setup.thing(entity).map(|thing| thing.class);
+    class.map_or(entity.to_string(), |class| format!("{} {entity}", class.info().label))
+}
+
 /// Renderer of a trace.
 pub struct Replay<'a> {
     playback: Playback<'a>,
@@ -278,8 +284,7 @@ impl<'a> Replay<'a> {
     }
 
     fn name(&self, entity: EntityId) -> String {
-        let class = self.world().setup().thing(entity).map(|t| t.class);
-        class.map_or(entity.to_string(), |c| format!("{} {entity}", c.info().label))
+        object_name(self.world().setup(), entity)
     }
 
     fn log_event(&mut self, kind: &EventKind) {

@@ -118,7 +118,7 @@ mod tests {
             toy.size = 256;
             toy.add_wall([-4.0, -2.1], [-wall_end_m, -1.9]);
             toy.add_wall([wall_end_m, -2.1], [4.0, -1.9]);
-            // As tall as it hides the wall.
+            // Tall enough to hide the wall.
             let size = [0.4, 1.9, 0.4];
             let bin = toy.add(ToyObject::new("trashbin", [at[0], 0.0, at[1]], size));
             let briefing = toy.briefing();

@@ -7,6 +7,7 @@ use chaic_world::{EventKind, Setup};
 
 use super::{Change, ModeChange, Shift};
 use crate::recorded_belief::{Distribution, IDENTIFIED_PER_MILLE, most_likely, per_mille_of};
+use crate::replay::object_name;
 
 /// Probabilities whose crossing is reported, per mille.
 const THRESHOLDS_PER_MILLE: [u16; 3] = [500, IDENTIFIED_PER_MILLE, 900];
@@ -195,9 +196,4 @@ fn attempt(action: &ResolvedAction, setup: &Setup) -> Option<String> {
         }
         Action::MoveForward | Action::TurnLeft | Action::TurnRight | Action::Wait { .. } => None,
     }
-}
-
-fn object_name(setup: &Setup, entity: EntityId) -> String {
-    let class = setup.thing(entity).map(|thing| thing.class);
-    class.map_or(entity.to_string(), |class| format!("{} {entity}", class.info().label))
 }

@@ -33,7 +33,7 @@ pub(super) fn partner_belief(
         extra: extra_classes(belief, briefing),
         position_cm: partner
             .map(|p| [centimeters(p.position_in_world.x), centimeters(p.position_in_world.z)]),
-        evidence: describe_evidence(&belief.evidence, briefing.horizon),
+        evidence: describe_evidence(&belief.evidence),
         plan: policy.steps.iter().take(MAX_OPERATIONS).map(|s| describe_step(s, memory)).collect(),
         partner_plan: policy.partner_plan.clone(),
     })
@@ -49,8 +49,9 @@ fn extra_classes(belief: &Belief, briefing: &Briefing) -> Vec<ClassId> {
     outside.filter(|c| belief.goal.probability_wanted(**c) >= MIN_EXTRA).copied().collect()
 }
 
-/// Describes the observations of the partner, in the order of their frames.
-fn describe_evidence(evidence: &Evidence, horizon: Frame) -> Vec<String> {
+/// Describes the observations of the partner in the order of their frames, then the objects that it
+/// passed.
+fn describe_evidence(evidence: &Evidence) -> Vec<String> {
     let mut lines: Vec<(Frame, String)> = Vec::new();
     for (track, take) in &evidence.taken {
         let percent = (100.0 * take.reliability()).round();
@@ -66,12 +67,12 @@ fn describe_evidence(evidence: &Evidence, horizon: Frame) -> Vec<String> {
         let (label, track) = (attempt.class.info().label, attempt.track);
         lines.push((attempt.frame, format!("failed to {what} {label} {track}")));
     }
-    let passed = evidence.passed.iter();
-    lines.extend(
-        passed.map(|(track, class)| (horizon, format!("left {} {track}", class.info().label))),
-    );
     lines.sort();
-    lines.into_iter().map(|(_, text)| text).collect()
+    let passed = evidence.passed.iter();
+    let mut left: Vec<String> =
+        passed.map(|(track, class)| format!("left {} {track}", class.info().label)).collect();
+    left.sort();
+    lines.into_iter().map(|(_, text)| text).chain(left).collect()
 }
 
 fn describe_step(step: &Step, memory: &Memory) -> String {

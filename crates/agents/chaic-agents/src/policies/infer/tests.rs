@@ -114,6 +114,35 @@ fn with_a_granted_goal_it_plans_as_soon_as_it_has_looked_around() {
 }
 
 #[test]
+fn the_description_has_posteriors_evidence_and_the_plans_of_both() {
+    let mut episode = Episode::ready(InferOptions::ALL, house);
+    let all = [bed(), apple(), banana(), seen_partner(1.0, -2.0)];
+    episode.step(0, &all);
+    let describe = |episode: &Episode| {
+        let belief = episode.policy.partner_belief(&episode.briefing, &episode.memory);
+        belief.expect("the episode has begun")
+    };
+    let before = describe(&episode);
+    assert!(before.goals.iter().all(|(_, p)| *p == 250), "{:?}", before.goals);
+    assert!(before.evidence.is_empty() && before.plan.is_empty(), "{before:?}");
+    let sum: u16 = before.people.iter().map(|(_, p)| p).sum();
+    assert!((998..=1002).contains(&sum), "{:?}", before.people);
+
+    episode.take(60, "orange");
+    episode.take(61, "orange");
+    episode.step(10, &all);
+    let after = describe(&episode);
+    let fruit = after.goals.iter().find(|(name, _)| name == "fruit").expect("it is possible");
+    assert!(fruit.1 > 900, "{:?}", after.goals);
+    assert_eq!(after.evidence, [60, 61].map(|t| format!("took orange #{t} (98 % reliable)")));
+    assert!(after.plan.iter().any(|step| step == "pick up banana #42"), "{:?}", after.plan);
+    let partner = after.partner_plan.first().expect("the partner is known");
+    assert!(partner.starts_with("pick up ") && partner.ends_with(" frames"), "{partner}");
+    let [x, z] = after.position_cm.expect("it was seen");
+    assert!((x - 100).abs() < 20 && (z + 200).abs() < 20, "{x} {z}");
+}
+
+#[test]
 fn without_a_known_goal_place_it_picks_up_what_is_wanted() {
     let mut episode = Episode::ready(InferOptions::ALL, apples);
     assert_eq!(episode.step(0, &[apple(), banana()]), Plan::PickUp(subject(APPLE, "apple")));

@@ -24,6 +24,7 @@ pub use constraint::ConstraintBelief;
 pub use evidence::{AttemptKind, Evidence, FailedAttempt, Take};
 pub use goal::GoalBelief;
 pub use observed_walks::ObservedWalks;
+pub use scene::scene_of;
 
 /// Belief of one agent about its partner.
 #[derive(Clone, Debug)]

@@ -7,7 +7,8 @@ use chaic_core::task::SceneKind;
 
 pub use crate::child::Child;
 use crate::planning_agent::PlanningAgent;
-use crate::policies::{RulePolicy, RuleProfile};
+pub use crate::policies::{PARTNER_VARIANTS, PartnerVariant};
+use crate::policies::{PartnerVariantPolicy, RulePolicy, RuleProfile};
 use crate::rules::PlannerRules;
 
 /// Grants of a partner: perfect segmentation and its own goal.
@@ -27,6 +28,11 @@ pub fn policy(persona: Persona, scene: SceneKind) -> RulePolicy {
 /// Constructs the agent of a task's partner.
 pub fn partner(persona: Persona, scene: SceneKind, rules: PlannerRules) -> Box<dyn Agent> {
     Box::new(PlanningAgent::new(policy(persona, scene), rules))
+}
+
+/// Constructs the agent of a partner that deviates from the rules.
+pub fn partner_variant(variant: &PartnerVariant, rules: PlannerRules) -> Box<dyn Agent> {
+    Box::new(PlanningAgent::new(PartnerVariantPolicy::new(variant.deviation), rules))
 }
 
 /// Returns the grants of a task's partner under these rules.

@@ -3,12 +3,14 @@
 mod external;
 mod follow;
 mod infer;
+mod partner_variant;
 mod random;
 mod rule_policy;
 
 pub use external::ExternalPolicy;
 pub use follow::FollowPolicy;
 pub use infer::{InferOptions, InferPolicy};
+pub use partner_variant::{Deviation, PARTNER_VARIANTS, PartnerVariant, PartnerVariantPolicy};
 pub use random::RandomPolicy;
 pub use rule_policy::RulePolicy;
 

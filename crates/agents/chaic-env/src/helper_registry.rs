@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use chaic_agents::partners::{self, PARTNER_VARIANTS, PartnerVariant};
 use chaic_agents::perception_factory::{GroundTruthPerceptionFactory, PerceptionFactory};
 use chaic_agents::{HELPERS, HelperInfo, PlannerRules};
 use chaic_core::Agent;
@@ -60,12 +61,15 @@ pub trait HelperRegistry: Sync {
 
     /// Returns the names of agents that can replace the rule-based partner.
     fn partner_names(&self) -> Vec<String> {
-        self.fallback().map_or_else(Vec::new, HelperRegistry::partner_names)
+        self.fallback().map_or_else(built_in_partner_names, HelperRegistry::partner_names)
     }
 
     /// Creates the partner of one episode run; without a key, an agent to read grants and sensors from.
     fn partner(&self, name: &str, key: Option<&RunKey>, rules: PlannerRules) -> Option<Helper> {
-        self.fallback()?.partner(name, key, rules)
+        match self.fallback() {
+            Some(registry) => registry.partner(name, key, rules),
+            None => built_in_partner(name, rules),
+        }
     }
 
     /// Returns the number of concurrent episode runs with [slow](HelperRegistry::is_slow) agents, in
@@ -104,6 +108,18 @@ pub fn built_in(
     let info = HelperInfo::find_helper(name)?;
     let grants = perception.grants((info.grants)(rules));
     Some(Helper { agent: (info.make)(rules, perception), grants })
+}
+
+/// Returns the names of the partners of `chaic-agents` that deviate from the rules.
+pub fn built_in_partner_names() -> Vec<String> {
+    PARTNER_VARIANTS.iter().map(|variant| variant.name.to_owned()).collect()
+}
+
+/// Creates a partner of `chaic-agents` that deviates from the rules; `None` for an unknown name.
+pub fn built_in_partner(name: &str, rules: PlannerRules) -> Option<Helper> {
+    let variant = PartnerVariant::find(name)?;
+    let grants = partners::partner_grants(rules);
+    Some(Helper { agent: partners::partner_variant(variant, rules), grants })
 }
 
 /// Registry of the helpers of `chaic-agents` with the given perception.

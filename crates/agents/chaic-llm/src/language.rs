@@ -10,7 +10,9 @@ use chaic_agents::planning_agent::behavior_model;
 use chaic_agents::{PlannerRules, PlanningAgent, partner_grants};
 use chaic_core::AgentId;
 use chaic_core::observation::{Grants, SensorConfig};
-use chaic_env::helper_registry::{BuiltInHelpers, Helper, HelperRegistry, built_in};
+use chaic_env::helper_registry::{
+    BuiltInHelpers, Helper, HelperRegistry, built_in, built_in_partner, built_in_partner_names,
+};
 use chaic_env::{EnvError, RunKey};
 
 use crate::endpoint::Client;
@@ -46,9 +48,10 @@ pub fn helper_names() -> Vec<String> {
     BuiltInHelpers.names().into_iter().chain(language).collect()
 }
 
-/// Returns the names of language partners.
+/// Returns all values of `--partner` except `rules`; built-in partners come first.
 pub fn partner_names() -> Vec<String> {
-    PARTNERS.iter().map(|k| k.name.to_owned()).collect()
+    let language = PARTNERS.iter().map(|k| k.name.to_owned());
+    built_in_partner_names().into_iter().chain(language).collect()
 }
 
 /// Returns whether this name is a language helper.
@@ -205,7 +208,9 @@ impl HelperRegistry for LanguageHelpers {
     }
 
     fn partner(&self, name: &str, key: Option<&RunKey>, rules: PlannerRules) -> Option<Helper> {
-        let kind = PARTNERS.into_iter().find(|k| k.name == name)?;
+        let Some(kind) = PARTNERS.into_iter().find(|k| k.name == name) else {
+            return built_in_partner(name, rules);
+        };
         let grants = partner_grants(rules);
         Some(self.agent(kind, key, grants, AgentId::HELPER, rules, &GroundTruthPerceptionFactory))
     }

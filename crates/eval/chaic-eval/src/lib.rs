@@ -5,6 +5,7 @@
 //! [`metrics`] computes the paper's scores from the records, and [`report`] prints them. [`verify`]
 //! re-simulates traces and compares the records. [`replay`] and [`frame_export`] render episodes.
 //! [`explain`] describes a helper's belief in sentences, and [`calibration`] measures its quality.
+//! [`losses`] splits the difference between a helper and the upper bound by cause.
 //! [`audit`] tests that hidden state does not influence agents.
 //!
 //! **What it is not**: it holds no rules of the world and makes no decisions for agents.
@@ -35,6 +36,7 @@ pub mod run;
 pub mod calibration;
 pub mod explain;
 pub mod frame_export;
+pub mod losses;
 pub mod replay;
 pub mod verify;
 

@@ -78,6 +78,11 @@ impl Navigator for CarefulNavigator {
         if !self.is_path_valid(costs, here, destination) && !self.plan(memory, here, destination) {
             return NavigationStep::Unreachable;
         }
+        // The center of the agent's own cell is an arrival position: no step brings it closer.
+        if self.path.len() == 1 {
+            self.path.clear();
+            return NavigationStep::Arrived;
+        }
         let (costs, _) = memory.costs_and_search();
         let waypoint = self.waypoint(costs, here);
         NavigationStep::Act(steer(costs, here, yaw, waypoint, &motion))

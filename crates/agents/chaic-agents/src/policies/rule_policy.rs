@@ -84,6 +84,12 @@ impl RulePolicy {
         self.has_looked_around = true;
     }
 
+    /// Returns the wanted targets among the valid plans for which there is time, nearest first.
+    pub(super) fn wanted_targets(&self, context: &Context<'_>, valid: &[Plan]) -> Vec<Subject> {
+        let hands = HandState::new(&context.memory.hands, context.briefing);
+        self.targets(context, valid, &RemainingNeeds::new(context, &hands, &self.profile))
+    }
+
     /// Applies the rules for the child (facts A2.4), which have priority.
     pub(super) fn child_plan(&mut self, context: &Context<'_>) -> Option<Plan> {
         let (memory, now) = (context.memory, context.memory.frame);

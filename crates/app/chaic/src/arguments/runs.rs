@@ -38,6 +38,9 @@ pub struct ReportArguments {
     /// Print the accuracy and calibration of recorded beliefs; docs/metrics.md.
     #[arg(long, conflicts_with_all = ["formulas", "from_traces", "figure"])]
     pub belief: bool,
+    /// Print what each helper loses against oracle_plan, by cause; docs/metrics.md.
+    #[arg(long, conflicts_with_all = ["formulas", "belief", "figure"])]
+    pub losses: bool,
 }
 
 /// `chaic show`.

@@ -14,6 +14,8 @@ pub enum ListCommand {
     Tasks,
     /// List the kinds of people and their impairments.
     People,
+    /// List the agents that may control the partner.
+    Partners,
     /// List the rules with their values in both rule sets.
     Rules,
     /// List the runs in a folder.

@@ -4,15 +4,16 @@ use std::path::Path;
 
 use anyhow::Result;
 use chaic_agents::HelperInfo;
+use chaic_agents::partners::PartnerVariant;
 use chaic_core::capability::{IMPAIRMENTS, Persona};
 use chaic_core::observation::Grants;
 use chaic_core::task::{Origin, TASKS};
-use chaic_env::helper_registry::NONE;
+use chaic_env::helper_registry::{NONE, RULES};
 use chaic_env::rules::{RuleSet, differing_rules, rule_names, rule_values};
 use chaic_eval::report::title;
 use chaic_eval::run::{RunFolder, planned, read_results};
 use chaic_files::entries;
-use chaic_llm::language::helper_names;
+use chaic_llm::language::{helper_names, partner_names};
 use comfy_table::ContentArrangement;
 use serde_json::{Value, json};
 
@@ -21,12 +22,13 @@ use crate::arguments::ListCommand;
 use crate::exit::ExitStatus;
 use crate::output::{OutputFormat, print_result};
 
-/// Lists helpers, tasks, people, rules or runs.
+/// Lists helpers, tasks, people, partners, rules or runs.
 pub fn run(command: &ListCommand, format: OutputFormat) -> Result<ExitStatus> {
     match command {
         ListCommand::Helpers => helpers(format),
         ListCommand::Tasks => tasks(format),
         ListCommand::People => people(format),
+        ListCommand::Partners => partners(format),
         ListCommand::Rules => rules(format),
         ListCommand::Runs { folder } => runs(folder, format),
     }?;
@@ -117,6 +119,23 @@ fn people(format: OutputFormat) -> Result<()> {
     let more = "`--person PERSON+IMPAIRMENT` combines them; docs/people.md.\n";
     let text = format!("{}\n{}\n{more}", kinds.trim_fmt(), with.trim_fmt());
     print_result(format, &json!({ "people": people, "impairments": impairments }), &text)
+}
+
+fn partners(format: OutputFormat) -> Result<()> {
+    let mut rows = Vec::new();
+    let mut table = table(["Name", "The partner ..."]);
+    for name in [RULES.to_owned()].into_iter().chain(partner_names()) {
+        let description = match name.as_str() {
+            RULES => "follows the rules of the paper",
+            "llm" => "asks a language model, with text",
+            "vlm" => "asks a language model, with text and images",
+            name => PartnerVariant::find(name).map_or("", |variant| variant.about),
+        };
+        table.add_row([name.as_str(), description]);
+        rows.push(json!({ "name": name, "description": description }));
+    }
+    let more = "`--partner NAME` selects one; `--person` selects the body. docs/people.md.\n";
+    print_result(format, &rows, &format!("{}\n{more}", table.trim_fmt()))
 }
 
 fn rules(format: OutputFormat) -> Result<()> {

@@ -48,6 +48,13 @@ pub fn run(arguments: &ReportArguments, format: OutputFormat) -> Result<ExitStat
     for note in report.notes().iter().filter(|_| !is_table || arguments.figure.is_some()) {
         print_warning(note);
     }
+    if arguments.losses {
+        let losses = report
+            .losses()
+            .map_err(|problem| anyhow::anyhow!("{}: {problem}", arguments.run.display()))?;
+        print(&losses.text(format))?;
+        return Ok(ExitStatus::Success);
+    }
     match &arguments.figure {
         Some(path) => write_figure(&report.scores(), report.labels(), path)?,
         None => print(&report.text(format))?,

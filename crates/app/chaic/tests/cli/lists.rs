@@ -77,12 +77,18 @@ fn lists_name_everything_that_options_take() {
         let refused = run_err(at, &["eval", "--helper", helper, "--first", "0", "--out", "r"]);
         assert!(!refused.contains("unknown helper"), "{refused}");
     }
+    let partners = names("partners");
+    assert_eq!(partners.len(), 8, "{partners:?}");
+    for partner in &partners {
+        let refused = run_err(at, &["eval", "--partner", partner, "--first", "0", "--out", "r"]);
+        assert!(!refused.contains("unknown partner"), "{refused}");
+    }
     assert_eq!(names("tasks").len(), 12);
     assert!(names("rules").contains(&"world.dropped_counts".to_owned()));
     let people = json(at, &["list", "people"]);
     assert_eq!(people["people"].as_array().map(Vec::len), Some(6));
     assert_eq!(people["impairments"].as_array().map(Vec::len), Some(4));
-    for kind in ["helpers", "tasks", "people", "rules"] {
+    for kind in ["helpers", "tasks", "people", "partners", "rules"] {
         let text = run_ok(at, &["list", kind]);
         assert!(text.starts_with('┌'), "{text}");
         assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");

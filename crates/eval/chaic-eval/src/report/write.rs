@@ -7,7 +7,8 @@ use chaic_env::{CHAIC_VERSION, RunKey, Track};
 use chaic_files::{EntryKind, kind, read_bounded};
 use serde::Serialize;
 
-use crate::error::Result;
+use crate::error::EvalError;
+use crate::losses::Losses;
 use crate::metrics::{
     Environments, FormulaSet, MAX_NAMED, PlayedEpisodes, RunResult, RunStatus, Score, Scores,
     differences,
@@ -64,6 +65,15 @@ impl Report<'_> {
                        standard errors and intervals may be too small.";
         let unknown = self.planned.is_empty().then(|| text.to_owned());
         coverage(self.played_episodes(&self.plan())).into_iter().chain(unknown).collect()
+    }
+
+    /// Computes the losses of the helpers against the upper bound.
+    ///
+    /// # Errors
+    /// One sentence that describes what the run lacks.
+    pub fn losses(&self) -> Result<Losses, String> {
+        let granted = self.granted.ok_or("the run has no recorded grants")?;
+        Losses::new(self.played_episodes(&self.plan()), &self.options.helpers, granted)
     }
 
     /// Formats the report; the text ends with a line break.
@@ -309,7 +319,7 @@ impl Report<'_> {
 ///
 /// # Errors
 /// If a file can't be written.
-pub fn write_files(folder: &RunFolder, report: &Report<'_>) -> Result<()> {
+pub fn write_files(folder: &RunFolder, report: &Report<'_>) -> Result<(), EvalError> {
     for (name, text) in report.texts() {
         folder.write(name, text.as_bytes())?;
     }
@@ -326,7 +336,7 @@ pub fn write_files(folder: &RunFolder, report: &Report<'_>) -> Result<()> {
 pub fn differing_files(
     folder: &RunFolder,
     report: &Report<'_>,
-) -> Result<(Vec<&'static str>, Vec<&'static str>)> {
+) -> Result<(Vec<&'static str>, Vec<&'static str>), EvalError> {
     let (mut missing, mut altered) = (Vec::new(), Vec::new());
     for (name, text) in report.texts() {
         let path = folder.join(name);

@@ -1,0 +1,204 @@
+//! Losses of each helper against the upper bound `oracle_plan`, split by cause.
+//!
+//! The reference helpers share one planner and differ in their grants. The difference of two
+//! references is therefore the effect of a grant, and the difference between a helper and the
+//! reference with its grants is the effect of its planning. `docs/metrics.md` defines the causes.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use chaic_core::TaskId;
+use chaic_core::observation::Grants;
+use chaic_env::helper_registry::NONE;
+use serde::Serialize;
+
+use crate::metrics::{Difference, Interval, PlayedEpisodes, differences};
+use crate::report::{Format, TextTable, interval, title};
+use crate::run::RunGrants;
+
+/// Upper bound: goal and state granted.
+const BOUND: &str = "oracle_plan";
+/// Reference helper with only the state granted.
+const WITH_STATE: &str = "ideal_observer";
+/// Reference helper with only the goal granted.
+const WITH_GOAL: &str = "infer_told";
+/// Reference helper with neither.
+const WITHOUT: &str = "infer";
+
+/// Loss by one cause, in transport rate.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Loss {
+    /// Name of the cause: `total`, `search`, `inference` or `planning`.
+    pub cause: &'static str,
+    /// Mean over the episodes of all tasks; `None` without an interval.
+    pub all: Option<Interval>,
+    /// Mean per task.
+    pub tasks: BTreeMap<TaskId, Interval>,
+}
+
+/// Losses of one helper.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HelperLosses {
+    /// Name of the helper.
+    pub helper: String,
+    /// Losses by cause; the first one is the total, of which the others are the parts.
+    pub losses: Vec<Loss>,
+}
+
+/// Losses of all helpers of a run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Losses {
+    /// Losses per helper, in the order of the run.
+    pub helpers: Vec<HelperLosses>,
+    #[serde(skip)]
+    tasks: Vec<TaskId>,
+}
+
+impl Losses {
+    /// Computes the losses from the results of a run with these helpers.
+    ///
+    /// # Errors
+    /// One sentence that names the missing reference helpers.
+    pub fn new(
+        played: PlayedEpisodes<'_>,
+        helpers: &[String],
+        granted: &RunGrants,
+    ) -> Result<Losses, String> {
+        let is_known = |name: &&str| helpers.iter().any(|helper| helper == name);
+        let others: Vec<&String> =
+            helpers.iter().filter(|helper| !matches!(helper.as_str(), BOUND | NONE)).collect();
+        let steps: Vec<(&String, Vec<Step>)> = others
+            .into_iter()
+            .map(|helper| (helper, steps(helper, granted.helpers.get(helper).copied())))
+            .collect();
+        let used = steps.iter().flat_map(|(_, steps)| steps).flat_map(|step| [step.from, step.to]);
+        let mut missing: Vec<&str> = used.filter(|name| !is_known(name)).collect();
+        missing.sort_unstable();
+        missing.dedup();
+        if !missing.is_empty() {
+            return Err(format!(
+                "losses need the helpers {} in the same run; play them too",
+                missing.join(", ")
+            ));
+        }
+        let differences = differences(played, helpers);
+        let losses = |steps: &[Step]| -> Vec<Loss> {
+            steps.iter().map(|step| step.loss(&differences)).collect()
+        };
+        let helpers = steps
+            .iter()
+            .map(|(helper, steps)| HelperLosses {
+                helper: (*helper).clone(),
+                losses: losses(steps),
+            })
+            .collect();
+        let tasks = differences.iter().flat_map(|d| d.tasks.keys().copied());
+        let mut tasks: Vec<TaskId> = tasks.collect();
+        tasks.sort_unstable();
+        tasks.dedup();
+        Ok(Losses { helpers, tasks })
+    }
+
+    /// Formats the losses; the text ends with a line break.
+    pub fn text(&self, format: Format) -> String {
+        const LEGEND: &str = "Loss of TR against oracle_plan on the same episodes, with 95 % \
+                              intervals over environments.\ntotal = search + inference + \
+                              planning; docs/metrics.md defines them.\n";
+        match format {
+            Format::Table => format!("{}\n{LEGEND}", self.table().to_terminal()),
+            Format::Markdown => format!("{}\n{LEGEND}", self.table().to_markdown()),
+            Format::Csv => self.csv(),
+            Format::Json => {
+                serde_json::to_string_pretty(self).expect("losses have string keys") + "\n"
+            }
+        }
+    }
+
+    fn rows(&self) -> impl Iterator<Item = (&str, &Loss)> {
+        self.helpers.iter().flat_map(|h| h.losses.iter().map(move |loss| (h.helper.as_str(), loss)))
+    }
+
+    fn table(&self) -> TextTable {
+        let header = ["Helper", "Loss by", "all"].map(str::to_owned).into_iter();
+        let row = |(helper, loss): (&str, &Loss)| {
+            let cells = self.tasks.iter().map(|task| interval(loss.tasks.get(task)));
+            let first = [title(helper), loss.cause.to_owned(), interval(loss.all.as_ref())];
+            first.into_iter().chain(cells).collect()
+        };
+        TextTable {
+            title: "Losses against the upper bound, by cause".to_owned(),
+            header: header.chain(self.tasks.iter().map(|t| t.info().title.to_owned())).collect(),
+            rows: self.rows().map(row).collect(),
+        }
+    }
+
+    fn csv(&self) -> String {
+        let mut text = "helper,cause,task,loss,low,high\n".to_owned();
+        for (helper, loss) in self.rows() {
+            let all = loss.all.iter().map(|i| ("all", i));
+            for (task, i) in all.chain(loss.tasks.iter().map(|(task, i)| (task.name(), i))) {
+                let Interval { mean, low, high, .. } = i;
+                let _ =
+                    writeln!(text, "{helper},{},{task},{mean:.6},{low:.6},{high:.6}", loss.cause);
+            }
+        }
+        text
+    }
+}
+
+/// Difference of two helpers that one cause explains.
+#[derive(Clone, Copy, Debug)]
+struct Step<'a> {
+    cause: &'static str,
+    from: &'a str,
+    to: &'a str,
+}
+
+impl Step<'_> {
+    /// Returns the mean of `from` − `to`.
+    fn loss(&self, differences: &[Difference]) -> Loss {
+        let find = |helper: &str, baseline: &str| {
+            differences.iter().find(|d| d.helper == helper && d.baseline == baseline)
+        };
+        let (difference, sign) = match find(self.from, self.to) {
+            Some(difference) => (Some(difference), 1.0),
+            None => (find(self.to, self.from), -1.0),
+        };
+        let signed = |i: &Interval| match sign {
+            1.0 => *i,
+            _ => Interval { mean: -i.mean, low: -i.high, high: -i.low, ..*i },
+        };
+        let tasks = difference.map(|d| d.tasks.iter().map(|(t, i)| (*t, signed(i))).collect());
+        Loss {
+            cause: self.cause,
+            all: difference.and_then(|d| d.all.as_ref()).map(signed),
+            tasks: tasks.unwrap_or_default(),
+        }
+    }
+}
+
+/// Returns the total loss of a helper with these grants, and the parts that are not zero by
+/// definition.
+fn steps<'a>(helper: &'a str, grants: Option<Grants>) -> Vec<Step<'a>> {
+    let Grants { goal, state, .. } = grants.unwrap_or(Grants::NONE);
+    // References from the upper bound to the helper's grants, with the cause of each difference.
+    let path: &[(&'static str, &'static str)] = match (state, goal) {
+        (true, true) => &[],
+        (true, false) => &[("inference", WITH_STATE)],
+        (false, true) => &[("search", WITH_GOAL)],
+        (false, false) => &[("search", WITH_GOAL), ("inference", WITHOUT)],
+    };
+    let mut steps = vec![Step { cause: "total", from: BOUND, to: helper }];
+    let mut from = BOUND;
+    for (cause, to) in path {
+        steps.push(Step { cause, from, to });
+        from = to;
+    }
+    if from != helper {
+        steps.push(Step { cause: "planning", from, to: helper });
+    }
+    steps
+}
+
+#[cfg(test)]
+mod tests;

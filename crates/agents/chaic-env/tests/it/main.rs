@@ -2,4 +2,5 @@
 
 mod batch;
 mod env;
+mod forecast;
 mod granted_state;

@@ -1,5 +1,6 @@
 //! Memory of an agent: occupancy map, objects, people, own hands and past actions.
 
+use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 
 use chaic_core::briefing::{CompanionRole, Motion};
@@ -18,7 +19,7 @@ use crate::planning::careful_costs::CarefulCosts;
 use crate::planning::compat::lattice_costs::LatticeCosts;
 use crate::planning::cost_map::CostMap;
 use crate::planning::cost_model::{CostInputs, CostModel, MapChanges};
-use crate::planning::path::{CostField, Search};
+use crate::planning::path::{CostField, Flood, PathCosts, Search};
 use crate::rules::{Exploration, PlannerRules, Walking};
 use crate::track::{Hands, Intent, TrackId};
 
@@ -98,7 +99,9 @@ pub struct Memory {
     is_partner: bool,
     gait: Gait,
     removes_obstacles: bool,
-    cost_field: Option<CostField>,
+    /// True if `flood` started with the current costs and position.
+    has_path_costs: bool,
+    flood: RefCell<Flood>,
     search: Search,
 }
 
@@ -142,7 +145,8 @@ impl Memory {
             is_partner: briefing.me == AgentId::PARTNER,
             gait: briefing.capability.gait,
             removes_obstacles: briefing.capability.removes_obstacles,
-            cost_field: None,
+            has_path_costs: false,
+            flood: RefCell::default(),
         }
     }
 
@@ -185,7 +189,7 @@ impl Memory {
         }
         let known_m = self.rules.known_range_m(briefing);
         self.map.integrate(observation, percepts, self.height_m, known_m);
-        self.cost_field = None;
+        self.has_path_costs = false;
         self.is_stale = true;
     }
 
@@ -336,10 +340,12 @@ impl Memory {
     /// Updates costs and path costs. Cheap if nothing changed.
     pub fn refresh(&mut self) {
         self.refresh_costs();
-        let needs_cost_field =
+        let needs_path_costs =
             self.cost_model.uses_path_length() || self.rules.exploration != Exploration::Sampled;
-        if needs_cost_field && self.cost_field.is_none() {
-            self.cost_field = Some(CostField::new(&self.costs, self.position(), &mut self.search));
+        if needs_path_costs && !self.has_path_costs {
+            let here = self.position();
+            self.flood.get_mut().start(&self.costs, here);
+            self.has_path_costs = true;
         }
     }
 
@@ -354,7 +360,7 @@ impl Memory {
             return;
         }
         (self.is_stale, self.costs_layout, self.saw_people_recently) = (false, Some(layout), false);
-        self.cost_field = None;
+        self.has_path_costs = false;
         let inputs = CostInputs {
             people: &self.blocking_people(),
             map: &self.map,
@@ -396,9 +402,9 @@ impl Memory {
         to_xz(self.pose.position)
     }
 
-    /// Path cost to each cell as of the last [`Memory::refresh`].
-    pub fn cost_field(&self) -> Option<&CostField> {
-        self.cost_field.as_ref()
+    /// Path costs to all cells; `None` if there was an update since the last [`Memory::refresh`].
+    pub fn path_costs(&self) -> Option<PathCosts<'_>> {
+        self.has_path_costs.then_some(PathCosts { costs: &self.costs, flood: &self.flood })
     }
 
     /// Returns the path length to an object in meters, increased by narrow and unknown cells;
@@ -406,13 +412,13 @@ impl Memory {
     /// on the lattice.
     pub fn path_length_to(&self, object: &MappedObject) -> Option<f32> {
         let straight_m = object.distance_from(self.position());
-        let field = self.cost_field.as_ref().filter(|_| self.cost_model.uses_path_length());
-        let Some(field) = field else { return Some(straight_m) };
+        let path_costs = self.path_costs().filter(|_| self.cost_model.uses_path_length());
+        let Some(path_costs) = path_costs else { return Some(straight_m) };
         let grid = self.map.grid();
-        let near = |p: Vec2| grid.disc(p, REACHED_M).filter_map(|c| field.cost(c)).min();
-        let nearest = near(object.nearest_point(self.position()));
         // The nearest point of a long object may be behind a wall, so its center is tried as well.
-        let cost = nearest.into_iter().chain(near(to_xz(object.position_in_world))).min()?;
+        let points = [object.nearest_point(self.position()), to_xz(object.position_in_world)];
+        let cells = points.into_iter().flat_map(|p| grid.disc(p, REACHED_M));
+        let cost = path_costs.min_cost(cells)?;
         Some(CostField::meters(cost).max(straight_m))
     }
 

@@ -7,6 +7,7 @@ mod panel;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
+use chaic_agents::HelperInfo;
 use chaic_core::catalogue::TargetSet;
 use chaic_core::geom::Camera;
 use chaic_core::{Action, AgentId, EntityId, Frame, Outcome, ResolvedAction, TaskId, Vec2};
@@ -57,8 +58,18 @@ pub struct Caption {
     pub last_observed: Option<String>,
 }
 
-/// Preferred helpers if none is named; unlisted helpers come first.
-const PREFERRED_HELPERS: [&str; 5] = ["rhp", "oracle", "random", "follow", "none"];
+/// Preferred helpers if none is named. Other built-in helpers come last, and helpers of the user
+/// first.
+const PREFERRED_HELPERS: [&str; 6] = ["infer", "rhp", "oracle", "random", "follow", "none"];
+
+/// Returns the rank of a helper by [`PREFERRED_HELPERS`]; the lowest one is preferred.
+fn preference(helper: &str) -> usize {
+    match PREFERRED_HELPERS.iter().position(|name| *name == helper) {
+        Some(rank) => rank + 1,
+        None if HelperInfo::find_helper(helper).is_some() => PREFERRED_HELPERS.len() + 1,
+        None => 0,
+    }
+}
 
 /// Returns the path of the trace of an episode, by its id with or without the task. Without
 /// `helper` and `seed`, selects the preferred helper and its lowest seed.
@@ -83,8 +94,7 @@ pub fn find_trace(
             && helper.is_none_or(|h| h == part(1))
             && seed.is_none_or(|s| trace_seed == s.to_string());
         if matches {
-            let rank = PREFERRED_HELPERS.iter().position(|f| *f == part(1));
-            candidates.push((rank.unwrap_or(0), path));
+            candidates.push((preference(part(1)), path));
         }
     }
     candidates.sort();

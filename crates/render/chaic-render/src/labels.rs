@@ -11,7 +11,7 @@ use crate::mesh::unit;
 use crate::people::Body;
 use crate::planes::Plane;
 use crate::projection::{Projection, clamp_depth_m, reciprocal};
-use crate::raster::{BACKGROUND, unpack_visibility_id};
+use crate::raster::{BACKGROUND, VisibilityId as _, unpack_visibility_id};
 use crate::scene_frame::SceneFrame;
 use crate::shader::Shader;
 use crate::view::{MAX_SIDE_PX, View, with_scratch};
@@ -85,19 +85,19 @@ fn label(
     for j in 0..projection.height {
         let blocks = target.visibility_ids(j).iter().zip(target.inverse_depth(j).iter());
         let pixels = blocks.flat_map(|(visibility_ids, inverse_depth)| {
-            visibility_ids.iter().zip(inverse_depth.iter())
+            u32::unpack(visibility_ids).into_iter().zip(inverse_depth.iter())
         });
         for (k, (visibility_id, inverse_depth)) in pixels.enumerate().take(projection.width) {
-            if *visibility_id == BACKGROUND {
+            if visibility_id == BACKGROUND {
                 continue;
             }
-            let (index, triangle) = unpack_visibility_id(*visibility_id);
+            let (index, triangle) = unpack_visibility_id(visibility_id);
             let instance = &frame.instances[index];
-            if current.0 != *visibility_id {
+            if current.0 != visibility_id {
                 let mesh = instance.shape.mesh(usize::from(buffers.levels[index]));
                 let shared = shader.instance_shading(instance);
                 let triangle = &mesh.triangles[triangle];
-                current = (*visibility_id, shader.normals(instance, &shared, mesh, triangle));
+                current = (visibility_id, shader.normals(instance, &shared, mesh, triangle));
             }
             let row = current.1.at_row(k, j as f32 + 0.5);
             let depth_m = reciprocal(*inverse_depth);

@@ -37,16 +37,19 @@ pub(crate) trait VisibilityId: Copy + PartialEq {
     const BACKGROUND: Self;
 
     /// Neighboring pixels, aligned so that they are loaded and stored together.
-    type Block: Copy + std::fmt::Debug + Default + DerefMut<Target = [Self; LANES]>;
+    type Block: Copy + std::fmt::Debug + Default;
 
     /// Block of pixels that all have this id.
     fn block(self) -> Self::Block;
 
+    /// Ids of the pixels of a block.
+    fn unpack(block: &Self::Block) -> [Self; LANES];
+
     /// Id of a triangle of an instance of an entity.
     fn new(entity: EntityId, instance: usize, triangle: usize) -> Self;
 
-    /// Returns `new` if all bits of the mask are set, and `self` if none is.
-    fn select(self, new: Self, mask: u32) -> Self;
+    /// Replaces the id of pixel `k` by `new` if all bits of the mask are set; keeps it if none is.
+    fn replace(block: &mut Self::Block, k: usize, new: Self, mask: u32);
 }
 
 /// A block of pixels with 32-bit values. Blocks that cross a cache line boundary make rendering
@@ -54,11 +57,6 @@ pub(crate) trait VisibilityId: Copy + PartialEq {
 #[repr(align(64))]
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Block32<T>([T; LANES]);
-
-/// A block of pixels with 16-bit values.
-#[repr(align(32))]
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Block16<T>([T; LANES]);
 
 impl<T> Deref for Block32<T> {
     type Target = [T; LANES];
@@ -76,29 +74,42 @@ impl<T> DerefMut for Block32<T> {
     }
 }
 
-impl<T> Deref for Block16<T> {
-    type Target = [T; LANES];
+/// A block of 16-bit ids.
+#[repr(align(32))]
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct IdBlock16([u16; LANES]);
 
-    #[inline(always)]
-    fn deref(&self) -> &[T; LANES] {
-        &self.0
-    }
+/// A block of 32-bit ids in two halves. A selection of 32-bit values compiles to masked stores,
+/// which make rendering in color up to 10 % slower.
+#[repr(align(64))]
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct IdBlock32 {
+    low: [u16; LANES],
+    high: [u16; LANES],
 }
 
-impl<T> DerefMut for Block16<T> {
-    #[inline(always)]
-    fn deref_mut(&mut self) -> &mut [T; LANES] {
-        &mut self.0
-    }
+/// Returns `new` if all bits of the mask are set, and `old` if none is.
+#[inline(always)]
+fn select(old: u16, new: u16, mask: u32) -> u16 {
+    (new & mask as u16) | (old & !mask as u16)
 }
 
 /// Identifies a triangle, as shading needs it: see [`visibility_id`].
 impl VisibilityId for u32 {
     const BACKGROUND: u32 = BACKGROUND;
-    type Block = Block32<u32>;
+    type Block = IdBlock32;
 
-    fn block(self) -> Block32<u32> {
-        Block32([self; LANES])
+    fn block(self) -> IdBlock32 {
+        IdBlock32 { low: [self as u16; LANES], high: [(self >> 16) as u16; LANES] }
+    }
+
+    #[inline(always)]
+    fn unpack(block: &IdBlock32) -> [u32; LANES] {
+        let mut ids = [0; LANES];
+        for k in 0..LANES {
+            ids[k] = u32::from(block.high[k]) << 16 | u32::from(block.low[k]);
+        }
+        ids
     }
 
     #[inline]
@@ -107,18 +118,24 @@ impl VisibilityId for u32 {
     }
 
     #[inline(always)]
-    fn select(self, new: u32, mask: u32) -> u32 {
-        (new & mask) | (self & !mask)
+    fn replace(block: &mut IdBlock32, k: usize, new: u32, mask: u32) {
+        block.low[k] = select(block.low[k], new as u16, mask);
+        block.high[k] = select(block.high[k], (new >> 16) as u16, mask);
     }
 }
 
 /// Identifies only an entity, for views without color. It halves the memory traffic.
 impl VisibilityId for u16 {
     const BACKGROUND: u16 = EntityId::NOTHING.0;
-    type Block = Block16<u16>;
+    type Block = IdBlock16;
 
-    fn block(self) -> Block16<u16> {
-        Block16([self; LANES])
+    fn block(self) -> IdBlock16 {
+        IdBlock16([self; LANES])
+    }
+
+    #[inline(always)]
+    fn unpack(block: &IdBlock16) -> [u16; LANES] {
+        block.0
     }
 
     #[inline]
@@ -127,8 +144,8 @@ impl VisibilityId for u16 {
     }
 
     #[inline(always)]
-    fn select(self, new: u16, mask: u32) -> u16 {
-        (new & mask as u16) | (self & !mask as u16)
+    fn replace(block: &mut IdBlock16, k: usize, new: u16, mask: u32) {
+        block.0[k] = select(block.0[k], new, mask);
     }
 }
 
@@ -233,7 +250,7 @@ impl<V: VisibilityId> RenderTarget<V> {
     /// Copies the visibility id of each pixel, shape [height, width].
     #[inline(always)]
     pub fn copy_visibility_ids(&self, out: &mut [V]) {
-        copy_rows(&self.visibility_ids, self.tiles_per_row, self.width, out, identity::<V>);
+        copy_rows(&self.visibility_ids, self.tiles_per_row, self.width, out, V::unpack);
     }
 
     /// Pixels that a rectangle (minimum u and v, maximum u and v) touches: first and last columns
@@ -334,11 +351,6 @@ impl<V: VisibilityId> RenderTarget<V> {
     }
 }
 
-#[inline(always)]
-fn identity<V: VisibilityId>(block: &V::Block) -> [V; LANES] {
-    **block
-}
-
 /// Writes the converted blocks to the rows of an image, tile by tile.
 #[inline(always)]
 fn copy_rows<B, T: Copy>(
@@ -414,7 +426,7 @@ fn fill_span<V: VisibilityId>(
     // Most spans lie within one block: no branch separates them from empty ones.
     while let (Some(q), Some(o)) = (inverse_depth.get_mut(k), visibility_ids.get_mut(k)) {
         let (q, o) = (&mut q[row], &mut o[row]);
-        fill_block(q, o, q0, (LANES * k) as u32, span, depth_plane, id);
+        fill_block::<V>(q, o, q0, (LANES * k) as u32, span, depth_plane, id);
         k += 1;
         if LANES * k >= span.end as usize {
             break;
@@ -426,7 +438,7 @@ fn fill_span<V: VisibilityId>(
 #[inline(always)]
 fn fill_block<V: VisibilityId>(
     q: &mut [f32; LANES],
-    o: &mut [V; LANES],
+    o: &mut V::Block,
     q0: f32,
     column_0: u32,
     span: Span,
@@ -440,11 +452,13 @@ fn fill_block<V: VisibilityId>(
     // closures would be compiled separately, without the vector instructions of this machine.
     for k in 0..LANES {
         let column = column_0 + k as u32;
+        let is_inside = u32::from(column.wrapping_sub(begin) < length).wrapping_neg();
         let x = fmin(high, fmax(low, q0 + du * column as i32 as f32));
-        let is_inside = column.wrapping_sub(begin) < length;
-        let wins = (u32::from(x > q[k]) & u32::from(is_inside)).wrapping_neg();
-        q[k] = f32::from_bits(x.to_bits() & wins | q[k].to_bits() & !wins);
-        o[k] = o[k].select(id, wins);
+        // 0 outside the span, which is never nearer than the buffer.
+        let x = f32::from_bits(x.to_bits() & is_inside);
+        V::replace(o, k, id, u32::from(x > q[k]).wrapping_neg());
+        // A maximum, since a selection compiles to masked stores, which are slow on some machines.
+        q[k] = fmax(x, q[k]);
     }
 }
 
@@ -464,7 +478,7 @@ mod tests {
 
     fn visibility_ids(target: &RenderTarget<u32>) -> impl Iterator<Item = u32> {
         let rows = (0..target.height).map(|j| target.visibility_ids(j));
-        rows.flat_map(|row| row.iter().flat_map(|b| b.0).take(target.width))
+        rows.flat_map(|row| row.iter().flat_map(u32::unpack).take(target.width))
     }
 
     /// A fan of thin triangles around a point covers every pixel exactly once.
@@ -531,11 +545,13 @@ mod tests {
             fill_span::<u16>(&mut q.clone(), &mut entity_ids, row, q0, span, &depth_plane, 9);
             fill_span::<u32>(&mut q, &mut visibility_ids, row, q0, span, &depth_plane, 9);
             let bits = |q: f32| q.to_bits();
-            let (q, visibility_ids) =
-                (q.iter().flat_map(|q| q[row].0), visibility_ids.iter().flat_map(|o| o[row].0));
+            let (q, visibility_ids) = (
+                q.iter().flat_map(|q| q[row].0),
+                visibility_ids.iter().flat_map(|o| u32::unpack(&o[row])),
+            );
             assert!(q.map(bits).eq(right_q.into_iter().map(bits)), "{n} pixels, {depth_plane:?}");
             assert!(visibility_ids.eq(right_ids.iter().copied()), "{n} pixels, {depth_plane:?}");
-            let entity_ids = entity_ids.iter().flat_map(|o| o[row].0).map(u32::from);
+            let entity_ids = entity_ids.iter().flat_map(|o| u16::unpack(&o[row])).map(u32::from);
             assert!(entity_ids.eq(right_ids), "{n} pixels, {depth_plane:?}");
         }
     }

@@ -17,7 +17,7 @@ use crate::light::Shadows;
 use crate::planes::Plane;
 use crate::points::SurfacePoints;
 use crate::projection::Projection;
-use crate::raster::{BACKGROUND, Block32, Blocks, LANES, RenderTarget, unpack_visibility_id};
+use crate::raster::{BACKGROUND, Blocks, LANES, RenderTarget, VisibilityId, unpack_visibility_id};
 use crate::row::{GroundShadow, Row, SegmentColor, SegmentStyle};
 use crate::scene_frame::SceneFrame;
 use crate::segments::{STEP, Segment, Segments};
@@ -126,7 +126,7 @@ impl pulp::NullaryFnOnce for ShadeRows<'_> {
 /// element that differs from the first id.
 #[inline(always)]
 fn find_run_starts(
-    row: Blocks<Block32<u32>>,
+    row: Blocks<<u32 as VisibilityId>::Block>,
     width: usize,
     visibility_ids: &mut Vec<u32>,
     run_starts: &mut Vec<u32>,
@@ -134,7 +134,7 @@ fn find_run_starts(
     visibility_ids.resize(width.div_ceil(LANES) * LANES + 1, 0);
     let Some((before, after)) = visibility_ids.split_first_mut() else { return };
     for (out, block) in after.as_chunks_mut::<LANES>().0.iter_mut().zip(row.iter()) {
-        *out = **block;
+        *out = u32::unpack(block);
     }
     *before = !after.first().copied().unwrap_or_default();
     run_starts.clear();

@@ -216,4 +216,21 @@ mod tests {
         let (left_m, n) = walk(toy, Vec2::new(-4.0, -3.0), 140);
         assert!(left_m <= 0.5, "{left_m} after {n}");
     }
+
+    #[test]
+    fn an_agent_in_an_arrival_cell_has_arrived() {
+        let mut toy = Toy::room(8.0, 8.0);
+        toy.stand([0.0, 0.0], 0.0);
+        let mut memory = ToyRun::new(toy).observe();
+        let grid = memory.costs().grid();
+        let cell = grid.cell_at(memory.position()).expect("inside the room");
+        let center = grid.center(cell);
+        let from_center = memory.position() - center;
+        assert!(from_center.length() > 0.01, "the agent stands off the center");
+        // The center is nearer than 0.5 m to this point, the agent is not.
+        let point = center - from_center.normalize() * 0.495;
+        assert!(memory.position().distance(point) > 0.5);
+        let step = CarefulNavigator::default().step(&mut memory, &Destination::near(point, 0.5));
+        assert_eq!(step, NavigationStep::Arrived);
+    }
 }

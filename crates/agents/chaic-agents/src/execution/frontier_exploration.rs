@@ -10,7 +10,7 @@ use super::navigation::{NavigationStep, Navigator};
 use super::steering::turn_towards;
 use crate::mapping::{CELL_M, CellOccupancy};
 use crate::memory::Memory;
-use crate::planning::path::CostField;
+use crate::planning::path::{CostField, PathCosts};
 use crate::rules::Exploration;
 
 /// Minimum length of a frontier, cells (0.6 m).
@@ -151,10 +151,10 @@ impl FrontierExplorer {
 
     fn choose(&mut self, memory: &mut Memory) -> Option<Target> {
         memory.refresh();
-        let field = memory.cost_field()?;
-        let frontier = self.nearest_frontier(memory, field);
+        let path_costs = memory.path_costs()?;
+        let frontier = self.nearest_frontier(memory, path_costs);
         self.is_exhausted = frontier.is_none();
-        let target = frontier.or_else(|| self.longest_unseen(memory, field));
+        let target = frontier.or_else(|| self.longest_unseen(memory, path_costs));
         if target.is_none() {
             let here = memory.position();
             self.blacklist.retain(|(at, _)| at.distance(here) < BLACKLIST_M);
@@ -169,10 +169,10 @@ impl FrontierExplorer {
     }
 
     /// Returns the frontier with the lowest path cost, with a small preference for long ones.
-    fn nearest_frontier(&self, memory: &Memory, field: &CostField) -> Option<Target> {
+    fn nearest_frontier(&self, memory: &Memory, path_costs: PathCosts<'_>) -> Option<Target> {
         let grid = memory.map.grid();
         let mut is_frontier: Vec<bool> = (0..grid.n_cells())
-            .map(|c| field.cost(c).is_some() && self.is_frontier(memory, c))
+            .map(|c| self.is_frontier(memory, c) && path_costs.cost(c).is_some())
             .collect();
         let mut best: Option<(f32, Target)> = None;
         let mut cluster = Vec::new();
@@ -197,7 +197,7 @@ impl FrontierExplorer {
             let nearest = cluster
                 .iter()
                 .filter(|c| !self.is_blacklisted(grid.center(**c)))
-                .filter_map(|c| Some((field.cost(*c)?, *c)))
+                .filter_map(|c| Some((path_costs.cost(*c)?, *c)))
                 .min();
             let Some((cost, cell)) = nearest else { continue };
             let path_m = CostField::meters(cost);
@@ -230,22 +230,20 @@ impl FrontierExplorer {
     }
 
     /// Returns the place with the highest ratio of time since it was last seen to path length.
-    fn longest_unseen(&self, memory: &Memory, field: &CostField) -> Option<Target> {
+    fn longest_unseen(&self, memory: &Memory, path_costs: PathCosts<'_>) -> Option<Target> {
         let grid = memory.map.grid();
         let mut best: Option<(f32, Vec2)> = None;
         for (i, j) in
             (0..grid.nz()).step_by(4).flat_map(|j| (0..grid.nx()).step_by(4).map(move |i| (i, j)))
         {
             let cell = j * grid.nx() + i;
-            let (at, Some(cost)) = (grid.center(cell), field.cost(cell)) else { continue };
+            let at = grid.center(cell);
             let is_usable = memory.map.state(cell) == CellOccupancy::Free
                 && !memory.costs().is_tight(cell)
                 && self.bounds.contains(at)
                 && at.distance(to_xz(memory.pose.position)) > 1.5
                 && !self.is_blacklisted(at);
-            if !is_usable {
-                continue;
-            }
+            let Some(cost) = path_costs.cost(cell).filter(|_| is_usable) else { continue };
             let age = (memory.frame + 1).saturating_sub(memory.map.last_seen(cell).unwrap_or(0));
             let score = age as f32 / (5.0 + CostField::meters(cost));
             if best.is_none_or(|(s, _)| score > s) {

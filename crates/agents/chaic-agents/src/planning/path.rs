@@ -1,4 +1,6 @@
-//! Shortest paths on the grid: A* to a goal, and Dijkstra cost fields to all cells.
+//! Shortest paths on the grid: A* to a goal, and Dijkstra cost fields.
+
+use std::cell::RefCell;
 
 use chaic_core::Vec2;
 
@@ -14,8 +16,6 @@ const DIAGONAL: u32 = 14;
 const COST_PER_M: f32 = (FREE * STRAIGHT) as f32 / CELL_M;
 /// Range of costs per bucket in a Dijkstra search: at most the cost of the cheapest step.
 const BUCKET_WIDTH: usize = 64;
-/// Number of buckets in the ring: enough that the most expensive step never wraps around.
-const N_BUCKETS: usize = (OCCUPIED * DIAGONAL) as usize / BUCKET_WIDTH + 2;
 const _: () = assert!(BUCKET_WIDTH <= (FREE * STRAIGHT) as usize);
 
 /// Working memory of searches, kept so that a search allocates nothing.
@@ -23,8 +23,7 @@ const _: () = assert!(BUCKET_WIDTH <= (FREE * STRAIGHT) as usize);
 pub struct Search {
     nodes: SearchNodes,
     queue: BucketQueue,
-    /// Cells with their path cost, bucketed by that cost.
-    buckets: Vec<Vec<(u32, u32)>>,
+    flood: Flood,
 }
 
 /// Path of adjacent cells.
@@ -91,7 +90,7 @@ impl Search {
         Search {
             nodes: SearchNodes::new(n_cells),
             queue: BucketQueue::new(n_cells),
-            buckets: Vec::new(),
+            flood: Flood::default(),
         }
     }
 
@@ -134,6 +133,128 @@ impl Search {
     }
 }
 
+/// Dial's variant of Dijkstra's algorithm from one position over all cells that are not occupied. It
+/// can pause after each bucket. It is bound to the costs of the map with which it started.
+#[derive(Clone, Debug, Default)]
+pub struct Flood {
+    /// Lowest cost found so far; `u32::MAX` if none.
+    cost: Vec<u32>,
+    /// Ring of cells with their path cost, bucketed by that cost. Its length is a power of two.
+    buckets: Vec<Vec<(u32, u32)>>,
+    n_queued: usize,
+    /// Number of expanded buckets; all costs below `n_expanded * BUCKET_WIDTH` are final.
+    n_expanded: usize,
+}
+
+impl Flood {
+    /// Starts a search; a position outside the grid reaches no cell.
+    pub fn start(&mut self, costs: &CostMap, here: Vec2) {
+        self.cost.clear();
+        self.cost.resize(costs.grid().n_cells(), u32::MAX);
+        self.buckets.iter_mut().for_each(Vec::clear);
+        (self.n_queued, self.n_expanded) = (0, 0);
+        let most = costs.costs().iter().filter(|c| **c < OCCUPIED).max().map_or(FREE, |c| *c);
+        // The most expensive step never wraps around.
+        let n_buckets = (most * DIAGONAL) as usize / BUCKET_WIDTH + 2;
+        let n_buckets = n_buckets.next_power_of_two().max(self.buckets.len());
+        self.buckets.resize_with(n_buckets, Vec::new);
+        if let Some(start) = costs.grid().cell_at(here) {
+            self.cost[start] = 0;
+            self.buckets[0].push((0, start as u32));
+            self.n_queued = 1;
+        }
+    }
+
+    /// Expands the cells of the next bucket.
+    fn expand_bucket(&mut self, costs: &CostMap) {
+        let Flood { cost, buckets, n_queued, n_expanded } = self;
+        let mask = buckets.len() - 1;
+        let bucket = *n_expanded & mask;
+        // Cells of one bucket cannot improve each other: no step costs less than its width.
+        let mut cells = std::mem::take(&mut buckets[bucket]);
+        *n_queued -= cells.len();
+        for (cost_so_far, cell) in cells.drain(..) {
+            let cell = cell as usize;
+            if cost_so_far > cost[cell] {
+                continue;
+            }
+            for_steps(costs.costs(), costs.grid(), cell, |next, enter, factor| {
+                let total = cost_so_far.saturating_add(enter.saturating_mul(factor));
+                if enter < OCCUPIED && total < cost[next] {
+                    cost[next] = total;
+                    buckets[(total as usize / BUCKET_WIDTH) & mask].push((total, next as u32));
+                    *n_queued += 1;
+                }
+            });
+        }
+        // Put the bucket back to reuse its allocation.
+        buckets[bucket] = cells;
+        *n_expanded += 1;
+    }
+
+    /// Expands until a cost is final; `lowest` returns it from the costs of all cells. Returns it,
+    /// or `None` if it stays infinite.
+    fn expand_until_final(
+        &mut self,
+        costs: &CostMap,
+        lowest: impl Fn(&[u32]) -> u32,
+    ) -> Option<u32> {
+        /// Number of buckets between two looks at an infinite cost.
+        const STRIDE: usize = 8;
+        loop {
+            let cost = lowest(&self.cost);
+            let n_until_final = match cost {
+                u32::MAX => self.n_expanded + STRIDE,
+                cost => cost as usize / BUCKET_WIDTH + 1,
+            };
+            if self.n_queued == 0 || n_until_final <= self.n_expanded {
+                return Some(cost).filter(|cost| *cost < u32::MAX);
+            }
+            while self.n_queued > 0 && self.n_expanded < n_until_final {
+                self.expand_bucket(costs);
+            }
+        }
+    }
+
+    /// Returns whether a search may reach the cell: it is not occupied, or it is the start.
+    fn is_open(&self, costs: &CostMap, cell: usize) -> bool {
+        !costs.is_blocked(cell) || self.cost[cell] == 0
+    }
+}
+
+/// Path costs from one position without passing occupied cells, computed as far as they are asked
+/// for.
+#[derive(Clone, Copy, Debug)]
+pub struct PathCosts<'a> {
+    /// Costs with which `flood` started.
+    pub costs: &'a CostMap,
+    /// Search from the position.
+    pub flood: &'a RefCell<Flood>,
+}
+
+impl PathCosts<'_> {
+    /// Returns the path cost to a cell, if it is reachable.
+    pub fn cost(&self, cell: usize) -> Option<u32> {
+        let mut flood = self.flood.borrow_mut();
+        if !flood.is_open(self.costs, cell) {
+            return None;
+        }
+        flood.expand_until_final(self.costs, |cost| cost[cell])
+    }
+
+    /// Returns the lowest path cost to any of these cells, if one is reachable.
+    pub fn min_cost(&self, cells: impl Iterator<Item = usize>) -> Option<u32> {
+        let mut flood = self.flood.borrow_mut();
+        let open: Vec<usize> = cells.filter(|cell| flood.is_open(self.costs, *cell)).collect();
+        if open.is_empty() {
+            return None;
+        }
+        flood.expand_until_final(self.costs, |cost| {
+            open.iter().map(|cell| cost[*cell]).min().unwrap_or(u32::MAX)
+        })
+    }
+}
+
 /// Path cost from one position to every cell without passing occupied ones.
 #[derive(Clone, Debug)]
 pub struct CostField {
@@ -141,42 +262,14 @@ pub struct CostField {
 }
 
 impl CostField {
-    /// Runs Dial's variant of Dijkstra's algorithm from `here` over all cells that are not
-    /// occupied.
+    /// Searches from `here` over the whole map.
     pub fn new(costs: &CostMap, here: Vec2, search: &mut Search) -> CostField {
-        let mut cost = vec![u32::MAX; costs.grid().n_cells()];
-        let Some(start) = costs.grid().cell_at(here) else { return CostField { cost } };
-        let buckets = &mut search.buckets;
-        buckets.resize_with(N_BUCKETS, Vec::new);
-        cost[start] = 0;
-        buckets[0].push((0, start as u32));
-        let mut n_queued = 1;
-        for bucket in (0..N_BUCKETS).cycle() {
-            if n_queued == 0 {
-                break;
-            }
-            // Cells of one bucket cannot improve each other: no step costs less than its width.
-            let mut cells = std::mem::take(&mut buckets[bucket]);
-            n_queued -= cells.len();
-            for (cost_so_far, cell) in cells.drain(..) {
-                let cell = cell as usize;
-                if cost_so_far > cost[cell] {
-                    continue;
-                }
-                for_steps(costs.costs(), costs.grid(), cell, |next, enter, factor| {
-                    let total = cost_so_far.saturating_add(enter.saturating_mul(factor));
-                    if enter < OCCUPIED && total < cost[next] {
-                        cost[next] = total;
-                        buckets[total as usize / BUCKET_WIDTH % N_BUCKETS]
-                            .push((total, next as u32));
-                        n_queued += 1;
-                    }
-                });
-            }
-            // Put the bucket back to reuse its allocation.
-            buckets[bucket] = cells;
+        let flood = &mut search.flood;
+        flood.start(costs, here);
+        while flood.n_queued > 0 {
+            flood.expand_bucket(costs);
         }
-        CostField { cost }
+        CostField { cost: flood.cost.clone() }
     }
 
     /// Returns the path cost to a cell, if it is reachable.
@@ -284,5 +377,33 @@ mod tests {
             search.a_star(&grid, costs.costs(), 64, &ToCell { grid, cell: to }, u32::MAX).unwrap();
         assert_eq!(field.cost(to), Some(path.cost));
         assert_eq!(field.cost(64 + 15), None);
+    }
+
+    #[test]
+    fn costs_on_demand_equal_those_of_the_whole_field() {
+        for seed in 0..40 {
+            let mut rng = RngStream::new(seed, "costs on demand", 0);
+            let text: String = (0..24 * 16)
+                .map(|k| {
+                    let symbol = [".", ".", ".", "?", "#"][rng.below(5)];
+                    if k % 24 == 23 { format!("{symbol}\n") } else { symbol.to_owned() }
+                })
+                .collect();
+            let costs = crate::test_support::DrawnMap::parse(&text).costs(0.05);
+            let (grid, n) = (*costs.grid(), costs.grid().n_cells());
+            let here = grid.center(rng.below(n));
+            let whole = CostField::new(&costs, here, &mut Search::new(n));
+            let flood = RefCell::new(Flood::default());
+            // A search may be started again with other costs.
+            flood.borrow_mut().start(&CostMap::new(grid, 0.2), grid.center(rng.below(n)));
+            flood.borrow_mut().start(&costs, here);
+            let on_demand = PathCosts { costs: &costs, flood: &flood };
+            for _ in 0..30 {
+                let cells: Vec<usize> = (0..rng.below(6)).map(|_| rng.below(n)).collect();
+                let expected = cells.iter().filter_map(|cell| whole.cost(*cell)).min();
+                assert_eq!(on_demand.min_cost(cells.into_iter()), expected, "{seed}");
+            }
+            assert!((0..n).all(|cell| on_demand.cost(cell) == whole.cost(cell)), "{seed}");
+        }
     }
 }

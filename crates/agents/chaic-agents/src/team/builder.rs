@@ -13,7 +13,7 @@ use super::travel::{TravelCache, trace};
 use crate::mapping::MappedObject;
 use crate::mapping::passage::stands_in_passage;
 use crate::memory::Memory;
-use crate::planning::path::CostField;
+use crate::planning::path::PathCosts;
 use crate::rules::RuleProfile;
 use crate::track::TrackId;
 
@@ -77,9 +77,9 @@ impl ProblemBuilder {
         memory: &Memory,
         partner: &PartnerModel,
     ) -> Option<TeamProblem> {
-        let field = memory.cost_field()?;
+        let path_costs = memory.path_costs()?;
         let classes = goal_classes(partner);
-        let mut places = self.places(briefing, memory, partner, &classes, field);
+        let mut places = self.places(briefing, memory, partner, &classes, path_costs);
         if !places.iter().any(|p| p.kind == PlaceKind::Goal) {
             return None;
         }
@@ -126,7 +126,7 @@ impl ProblemBuilder {
         memory: &Memory,
         partner: &PartnerModel,
         classes: &[ClassId],
-        field: &CostField,
+        path_costs: PathCosts<'_>,
     ) -> Vec<Place> {
         let goals: BTreeSet<TrackId> =
             memory.goal_places().iter().map(|(object, _)| object.track).collect();
@@ -163,7 +163,7 @@ impl ProblemBuilder {
                 _ => memory.rules.pick_within_m,
             };
             let arm_m = memory.motion.arm_reach_m;
-            let stand = self.travel.stand(memory.costs(), field, object, within_m, arm_m);
+            let stand = self.travel.stand(path_costs, object, within_m, arm_m);
             let Some(stand) = stand else { continue };
             let body = &partner.capability;
             let partner_chance = match kind {

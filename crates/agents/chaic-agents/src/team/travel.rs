@@ -9,7 +9,7 @@ use crate::execution::careful_approach::{ARM_OFFSETS_M, RELAXED_M};
 use crate::execution::destination::Destination;
 use crate::mapping::MappedObject;
 use crate::planning::cost_map::CostMap;
-use crate::planning::path::{CostField, Search};
+use crate::planning::path::{CostField, PathCosts, Search};
 
 /// Radius in which a nearby reachable cell stands for an unreachable one, meters.
 const NEAR_M: f32 = 0.4;
@@ -50,8 +50,7 @@ impl TravelCache {
     /// it: the cheapest to reach, given the costs from the current position.
     pub fn stand(
         &mut self,
-        costs: &CostMap,
-        from: &CostField,
+        from: PathCosts<'_>,
         object: &MappedObject,
         within_m: f32,
         arm_reach_m: f32,
@@ -69,7 +68,7 @@ impl TravelCache {
             if arm_m.is_none() {
                 destination.within_m = RELAXED_M;
             }
-            cheapest(costs, from, &destination)
+            cheapest(from, &destination)
         });
         self.stands.insert(object.track.0, (at, stand));
         stand
@@ -88,7 +87,8 @@ impl TravelCache {
 }
 
 /// Returns the center of the cheapest cell at which the destination is reached.
-fn cheapest(costs: &CostMap, from: &CostField, destination: &Destination) -> Option<Vec2> {
+fn cheapest(from: PathCosts<'_>, destination: &Destination) -> Option<Vec2> {
+    let costs = from.costs;
     let grid = costs.grid();
     let (center, radius_m) = destination.center_and_radius();
     let near = grid.disc(center, radius_m + destination.within_m);

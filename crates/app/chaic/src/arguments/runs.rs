@@ -85,7 +85,7 @@ pub struct ReplayArguments {
     /// Video to write: .mp4 or .gif.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Helper of the episode run [default: rhp if the run has it].
+    /// Helper of the episode run [default: your own helper, or else infer, rhp, oracle ...].
     #[arg(long, value_name = "NAME")]
     pub helper: Option<String>,
     /// Seed of the episode run, 0 to 9999 [default: the lowest].

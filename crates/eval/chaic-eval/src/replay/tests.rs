@@ -75,3 +75,10 @@ fn a_belief_adds_bars_and_a_ring_on_the_map() {
         assert!(has_margin(&image), "{id}");
     }
 }
+
+#[test]
+fn own_helpers_are_preferred_then_the_strongest_of_the_table() {
+    let order = ["nearest", "infer", "rhp", "none", "infer_told"];
+    let ranks = order.map(preference);
+    assert!(ranks.is_sorted_by(|a, b| a < b), "{ranks:?}");
+}

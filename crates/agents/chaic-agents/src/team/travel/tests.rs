@@ -110,9 +110,9 @@ fn the_place_to_stand_is_near_the_object_and_kept_until_it_moves() {
         memory.refresh();
         let object = memory.objects.get(TrackId(20)).expect("seen");
         assert_eq!(object.class, ClassId::named("apple"));
-        let field = memory.cost_field().expect("refreshed");
+        let path_costs = memory.path_costs().expect("refreshed");
         let within_m = memory.rules.pick_within_m;
-        let stand = cache.stand(memory.costs(), field, object, within_m, 0.7);
+        let stand = cache.stand(path_costs, object, within_m, 0.7);
         let stand = stand.expect("a free room");
         (stand, stand.distance(Vec2::new(x, 1.0)))
     };

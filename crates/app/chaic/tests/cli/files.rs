@@ -222,7 +222,7 @@ fn exit_codes_agree_with_the_documentation() {
         (&["episodes", "validate", "nowhere.json"], 1, "can't open nowhere.json"),
         (&["render", "obstacle/test/99", "--out", "x"], 2, "obstacle/test/99"),
         (&[&usage[..], &["--helper", "nobody"]].concat(), 2, "oracle_plan, llm, llm-told, vlm"),
-        (&[&usage[..], &["--partner", "nobody"]].concat(), 2, "the partners are rules, llm, vlm"),
+        (&[&usage[..], &["--partner", "nobody"]].concat(), 2, "the partners are rules, farthest"),
         (&[&usage[..], &["--seeds", "0"]].concat(), 2, "0 is not in 1..="),
         (&["eval", "--nonsense"], 2, "--nonsense"),
     ] {

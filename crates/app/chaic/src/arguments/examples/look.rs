@@ -52,6 +52,14 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
         ],
     ),
     (
+        "chaic list partners",
+        [
+            ("List the agents that may control the partner", "chaic list partners"),
+            ("List them as JSON", "chaic list partners --format json"),
+            ("Play with one of them", "chaic eval --partner farthest --n-episodes 1"),
+        ],
+    ),
+    (
         "chaic list rules",
         [
             ("List the rules", "chaic list rules"),

@@ -13,7 +13,7 @@ use chaic_env::helper_registry::NONE;
 use serde::Serialize;
 
 use crate::metrics::{Difference, Interval, PlayedEpisodes, differences};
-use crate::report::{Format, TextTable, interval, title};
+use crate::report::{Format, Report, TextTable, interval, title};
 use crate::run::RunGrants;
 
 /// Upper bound: goal and state granted.
@@ -50,11 +50,22 @@ pub struct HelperLosses {
 pub struct Losses {
     /// Losses per helper, in the order of the run.
     pub helpers: Vec<HelperLosses>,
+    /// Tasks in the order of reports.
     #[serde(skip)]
     tasks: Vec<TaskId>,
 }
 
 impl Losses {
+    /// Computes the losses from the results of a report.
+    ///
+    /// # Errors
+    /// One sentence that describes what the run lacks.
+    pub fn from_report(report: &Report<'_>) -> Result<Losses, String> {
+        let granted = report.granted.ok_or("the run has no recorded grants")?;
+        let plan = report.plan();
+        Losses::new(report.played_episodes(&plan), &report.options.helpers, granted)
+    }
+
     /// Computes the losses from the results of a run with these helpers.
     ///
     /// # Errors
@@ -92,11 +103,8 @@ impl Losses {
                 losses: losses(steps),
             })
             .collect();
-        let tasks = differences.iter().flat_map(|d| d.tasks.keys().copied());
-        let mut tasks: Vec<TaskId> = tasks.collect();
-        tasks.sort_unstable();
-        tasks.dedup();
-        Ok(Losses { helpers, tasks })
+        let is_known = |task: &TaskId| differences.iter().any(|d| d.tasks.contains_key(task));
+        Ok(Losses { helpers, tasks: TaskId::all().filter(is_known).collect() })
     }
 
     /// Formats the losses; the text ends with a line break.

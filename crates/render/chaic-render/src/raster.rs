@@ -105,9 +105,10 @@ impl VisibilityId for u32 {
 
     #[inline(always)]
     fn unpack(block: &IdBlock32) -> [u32; LANES] {
+        let IdBlock32 { low, high } = block;
         let mut ids = [0; LANES];
         for k in 0..LANES {
-            ids[k] = u32::from(block.high[k]) << 16 | u32::from(block.low[k]);
+            ids[k] = u32::from(high[k]) << 16 | u32::from(low[k]);
         }
         ids
     }
@@ -450,6 +451,7 @@ fn fill_block<V: VisibilityId>(
     let length = end.saturating_sub(begin);
     // Masks instead of conditions, which the compiler would turn into branches. Plain loops:
     // closures would be compiled separately, without the vector instructions of this machine.
+    let mut nearest = [0.0; LANES];
     for k in 0..LANES {
         let column = column_0 + k as u32;
         let is_inside = u32::from(column.wrapping_sub(begin) < length).wrapping_neg();
@@ -458,8 +460,9 @@ fn fill_block<V: VisibilityId>(
         let x = f32::from_bits(x.to_bits() & is_inside);
         V::replace(o, k, id, u32::from(x > q[k]).wrapping_neg());
         // A maximum, since a selection compiles to masked stores, which are slow on some machines.
-        q[k] = fmax(x, q[k]);
+        nearest[k] = fmax(x, q[k]);
     }
+    *q = nearest;
 }
 
 #[cfg(test)]

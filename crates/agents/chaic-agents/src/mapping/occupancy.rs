@@ -373,6 +373,7 @@ impl OccupancyMap {
         });
         let [xs, ys, zs] = columns.each_ref().map(|c| c.as_chunks::<LANES>().0);
         let mut sampled = vec![0.0; padded_width];
+        let mut fixed = vec![0.0; padded_width];
         let limits = Limits {
             grid: self.grid,
             head_m: height_m + HEAD_MARGIN_M,
@@ -384,9 +385,16 @@ impl OccupancyMap {
         for (k, row) in (0..height).step_by(stride).enumerate() {
             subsample(stride, &depth[row * width..][..width], &mut sampled);
             let dynamic = percepts.dynamic_mask.get(k * sampled_width..(k + 1) * sampled_width);
-            for (d, is_dynamic) in sampled.iter_mut().zip(dynamic.unwrap_or_default()) {
-                *d = if *is_dynamic { 0.0 } else { *d };
-            }
+            let sampled = match dynamic {
+                Some(dynamic) => {
+                    // Into another buffer: in place, it compiles to slow masked stores.
+                    for ((to, d), is_dynamic) in fixed.iter_mut().zip(&sampled).zip(dynamic) {
+                        *to = if *is_dynamic { 0.0 } else { *d };
+                    }
+                    &fixed
+                }
+                None => &sampled,
+            };
             let mut last = 0;
             let lanes = sampled.as_chunks::<LANES>().0.iter().zip(xs.iter().zip(ys).zip(zs));
             for ((d, ((x, y), z)), above) in lanes.zip(&mut above) {

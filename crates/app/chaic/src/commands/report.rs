@@ -3,6 +3,7 @@
 use anyhow::Result;
 use chaic_eval::EvalError;
 use chaic_eval::calibration::read_scores;
+use chaic_eval::losses::Losses;
 use chaic_eval::metrics::{RunResult, tally};
 use chaic_eval::report::{Format, Report, untraced_note, write_figure};
 use chaic_eval::run::{EpisodeJob, RunFolder, RunOptions, planned, read_results};
@@ -49,8 +50,7 @@ pub fn run(arguments: &ReportArguments, format: OutputFormat) -> Result<ExitStat
         print_warning(note);
     }
     if arguments.losses {
-        let losses = report
-            .losses()
+        let losses = Losses::from_report(&report)
             .map_err(|problem| anyhow::anyhow!("{}: {problem}", arguments.run.display()))?;
         print(&losses.text(format))?;
         return Ok(ExitStatus::Success);

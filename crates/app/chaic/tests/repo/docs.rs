@@ -5,6 +5,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use chaic_agents::partners::PARTNER_VARIANTS;
 use chaic_core::capability::IMPAIRMENTS;
 
 use crate::root;
@@ -109,14 +110,16 @@ fn links_between_pages_have_targets() {
 }
 
 #[test]
-fn every_impairment_has_its_row() {
+fn every_impairment_and_every_partner_has_its_row() {
     let page = read("docs/people.md");
     let named: Vec<&str> = page
         .lines()
         .filter_map(|line| line.strip_prefix("| `")?.split_once('`'))
         .map(|(name, _)| name)
         .collect();
-    assert_eq!(named, IMPAIRMENTS.map(|row| row.name));
+    let impairments = IMPAIRMENTS.iter().map(|row| row.name);
+    let partners = PARTNER_VARIANTS.iter().map(|row| row.name);
+    assert_eq!(named, impairments.chain(partners).collect::<Vec<_>>());
 }
 
 #[test]

@@ -7,8 +7,7 @@ use chaic_env::{CHAIC_VERSION, RunKey, Track};
 use chaic_files::{EntryKind, kind, read_bounded};
 use serde::Serialize;
 
-use crate::error::EvalError;
-use crate::losses::Losses;
+use crate::error::Result;
 use crate::metrics::{
     Environments, FormulaSet, MAX_NAMED, PlayedEpisodes, RunResult, RunStatus, Score, Scores,
     differences,
@@ -43,7 +42,7 @@ pub struct Report<'a> {
 }
 
 /// Episode runs that were planned, in the form that metrics need.
-struct Plan {
+pub(crate) struct Plan {
     keys: Vec<RunKey>,
     environments: Environments,
 }
@@ -67,15 +66,6 @@ impl Report<'_> {
         coverage(self.played_episodes(&self.plan())).into_iter().chain(unknown).collect()
     }
 
-    /// Computes the losses of the helpers against the upper bound.
-    ///
-    /// # Errors
-    /// One sentence that describes what the run lacks.
-    pub fn losses(&self) -> Result<Losses, String> {
-        let granted = self.granted.ok_or("the run has no recorded grants")?;
-        Losses::new(self.played_episodes(&self.plan()), &self.options.helpers, granted)
-    }
-
     /// Formats the report; the text ends with a line break.
     pub fn text(&self, format: Format) -> String {
         match format {
@@ -86,12 +76,12 @@ impl Report<'_> {
         }
     }
 
-    fn plan(&self) -> Plan {
+    pub(crate) fn plan(&self) -> Plan {
         let keys = self.planned.iter().map(|job| job.key.clone()).collect();
         Plan { keys, environments: environments(self.planned) }
     }
 
-    fn played_episodes<'a>(&'a self, plan: &'a Plan) -> PlayedEpisodes<'a> {
+    pub(crate) fn played_episodes<'a>(&'a self, plan: &'a Plan) -> PlayedEpisodes<'a> {
         let Plan { keys, environments } = plan;
         PlayedEpisodes { results: self.results, planned: keys, environments }
     }
@@ -319,7 +309,7 @@ impl Report<'_> {
 ///
 /// # Errors
 /// If a file can't be written.
-pub fn write_files(folder: &RunFolder, report: &Report<'_>) -> Result<(), EvalError> {
+pub fn write_files(folder: &RunFolder, report: &Report<'_>) -> Result<()> {
     for (name, text) in report.texts() {
         folder.write(name, text.as_bytes())?;
     }
@@ -336,7 +326,7 @@ pub fn write_files(folder: &RunFolder, report: &Report<'_>) -> Result<(), EvalEr
 pub fn differing_files(
     folder: &RunFolder,
     report: &Report<'_>,
-) -> Result<(Vec<&'static str>, Vec<&'static str>), EvalError> {
+) -> Result<(Vec<&'static str>, Vec<&'static str>)> {
     let (mut missing, mut altered) = (Vec::new(), Vec::new());
     for (name, text) in report.texts() {
         let path = folder.join(name);

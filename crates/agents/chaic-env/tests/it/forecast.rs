@@ -77,7 +77,7 @@ fn play(id: &str) -> [f64; 2] {
     env.run(&AtomicBool::new(false), None, &mut sink).expect("the sink takes all");
     let score = env.score();
     let predicted = predicted.lock().expect("the episode is over").expect("a forecast");
-    [predicted, f64::from(score.done)].map(|n| n / f64::from(score.total))
+    [predicted, score.done].map(|n| n / score.total)
 }
 
 #[test]

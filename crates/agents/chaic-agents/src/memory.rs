@@ -19,7 +19,7 @@ use crate::planning::careful_costs::CarefulCosts;
 use crate::planning::compat::lattice_costs::LatticeCosts;
 use crate::planning::cost_map::CostMap;
 use crate::planning::cost_model::{CostInputs, CostModel, MapChanges};
-use crate::planning::path::{CostField, Flood, PathCosts, Search};
+use crate::planning::path::{CostField, DijkstraSearch, PathCosts, Search};
 use crate::rules::{Exploration, PlannerRules, Walking};
 use crate::track::{Hands, Intent, TrackId};
 
@@ -99,9 +99,9 @@ pub struct Memory {
     is_partner: bool,
     gait: Gait,
     removes_obstacles: bool,
-    /// True if `flood` started with the current costs and position.
+    /// True if `dijkstra` started with the current costs and position.
     has_path_costs: bool,
-    flood: RefCell<Flood>,
+    dijkstra: RefCell<DijkstraSearch>,
     search: Search,
 }
 
@@ -146,7 +146,7 @@ impl Memory {
             gait: briefing.capability.gait,
             removes_obstacles: briefing.capability.removes_obstacles,
             has_path_costs: false,
-            flood: RefCell::default(),
+            dijkstra: RefCell::default(),
         }
     }
 
@@ -344,7 +344,7 @@ impl Memory {
             self.cost_model.uses_path_length() || self.rules.exploration != Exploration::Sampled;
         if needs_path_costs && !self.has_path_costs {
             let here = self.position();
-            self.flood.get_mut().start(&self.costs, here);
+            self.dijkstra.get_mut().start(&self.costs, here);
             self.has_path_costs = true;
         }
     }
@@ -404,7 +404,7 @@ impl Memory {
 
     /// Path costs to all cells; `None` if there was an update since the last [`Memory::refresh`].
     pub fn path_costs(&self) -> Option<PathCosts<'_>> {
-        self.has_path_costs.then_some(PathCosts { costs: &self.costs, flood: &self.flood })
+        self.has_path_costs.then_some(PathCosts { costs: &self.costs, dijkstra: &self.dijkstra })
     }
 
     /// Returns the path length to an object in meters, increased by narrow and unknown cells;

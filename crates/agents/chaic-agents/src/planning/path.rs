@@ -23,7 +23,7 @@ const _: () = assert!(BUCKET_WIDTH <= (FREE * STRAIGHT) as usize);
 pub struct Search {
     nodes: SearchNodes,
     queue: BucketQueue,
-    flood: Flood,
+    dijkstra: DijkstraSearch,
 }
 
 /// Path of adjacent cells.
@@ -90,7 +90,7 @@ impl Search {
         Search {
             nodes: SearchNodes::new(n_cells),
             queue: BucketQueue::new(n_cells),
-            flood: Flood::default(),
+            dijkstra: DijkstraSearch::default(),
         }
     }
 
@@ -136,7 +136,7 @@ impl Search {
 /// Dial's variant of Dijkstra's algorithm from one position over all cells that are not occupied. It
 /// can pause after each bucket. It is bound to the costs of the map with which it started.
 #[derive(Clone, Debug, Default)]
-pub struct Flood {
+pub struct DijkstraSearch {
     /// Lowest cost found so far; `u32::MAX` if none.
     cost: Vec<u32>,
     /// Ring of cells with their path cost, bucketed by that cost. Its length is a power of two.
@@ -146,7 +146,7 @@ pub struct Flood {
     n_expanded: usize,
 }
 
-impl Flood {
+impl DijkstraSearch {
     /// Starts a search; a position outside the grid reaches no cell.
     pub fn start(&mut self, costs: &CostMap, here: Vec2) {
         self.cost.clear();
@@ -167,7 +167,7 @@ impl Flood {
 
     /// Expands the cells of the next bucket.
     fn expand_bucket(&mut self, costs: &CostMap) {
-        let Flood { cost, buckets, n_queued, n_expanded } = self;
+        let DijkstraSearch { cost, buckets, n_queued, n_expanded } = self;
         let mask = buckets.len() - 1;
         let bucket = *n_expanded & mask;
         // Cells of one bucket cannot improve each other: no step costs less than its width.
@@ -226,30 +226,30 @@ impl Flood {
 /// for.
 #[derive(Clone, Copy, Debug)]
 pub struct PathCosts<'a> {
-    /// Costs with which `flood` started.
+    /// Costs with which `dijkstra` started.
     pub costs: &'a CostMap,
     /// Search from the position.
-    pub flood: &'a RefCell<Flood>,
+    pub dijkstra: &'a RefCell<DijkstraSearch>,
 }
 
 impl PathCosts<'_> {
     /// Returns the path cost to a cell, if it is reachable.
     pub fn cost(&self, cell: usize) -> Option<u32> {
-        let mut flood = self.flood.borrow_mut();
-        if !flood.is_open(self.costs, cell) {
+        let mut dijkstra = self.dijkstra.borrow_mut();
+        if !dijkstra.is_open(self.costs, cell) {
             return None;
         }
-        flood.expand_until_final(self.costs, |cost| cost[cell])
+        dijkstra.expand_until_final(self.costs, |cost| cost[cell])
     }
 
     /// Returns the lowest path cost to any of these cells, if one is reachable.
     pub fn min_cost(&self, cells: impl Iterator<Item = usize>) -> Option<u32> {
-        let mut flood = self.flood.borrow_mut();
-        let open: Vec<usize> = cells.filter(|cell| flood.is_open(self.costs, *cell)).collect();
+        let mut dijkstra = self.dijkstra.borrow_mut();
+        let open: Vec<usize> = cells.filter(|cell| dijkstra.is_open(self.costs, *cell)).collect();
         if open.is_empty() {
             return None;
         }
-        flood.expand_until_final(self.costs, |cost| {
+        dijkstra.expand_until_final(self.costs, |cost| {
             open.iter().map(|cell| cost[*cell]).min().unwrap_or(u32::MAX)
         })
     }
@@ -264,12 +264,12 @@ pub struct CostField {
 impl CostField {
     /// Searches from `here` over the whole map.
     pub fn new(costs: &CostMap, here: Vec2, search: &mut Search) -> CostField {
-        let flood = &mut search.flood;
-        flood.start(costs, here);
-        while flood.n_queued > 0 {
-            flood.expand_bucket(costs);
+        let dijkstra = &mut search.dijkstra;
+        dijkstra.start(costs, here);
+        while dijkstra.n_queued > 0 {
+            dijkstra.expand_bucket(costs);
         }
-        CostField { cost: flood.cost.clone() }
+        CostField { cost: dijkstra.cost.clone() }
     }
 
     /// Returns the path cost to a cell, if it is reachable.
@@ -393,11 +393,11 @@ mod tests {
             let (grid, n) = (*costs.grid(), costs.grid().n_cells());
             let here = grid.center(rng.below(n));
             let whole = CostField::new(&costs, here, &mut Search::new(n));
-            let flood = RefCell::new(Flood::default());
+            let dijkstra = RefCell::new(DijkstraSearch::default());
             // A search may be started again with other costs.
-            flood.borrow_mut().start(&CostMap::new(grid, 0.2), grid.center(rng.below(n)));
-            flood.borrow_mut().start(&costs, here);
-            let on_demand = PathCosts { costs: &costs, flood: &flood };
+            dijkstra.borrow_mut().start(&CostMap::new(grid, 0.2), grid.center(rng.below(n)));
+            dijkstra.borrow_mut().start(&costs, here);
+            let on_demand = PathCosts { costs: &costs, dijkstra: &dijkstra };
             for _ in 0..30 {
                 let cells: Vec<usize> = (0..rng.below(6)).map(|_| rng.below(n)).collect();
                 let expected = cells.iter().filter_map(|cell| whole.cost(*cell)).min();

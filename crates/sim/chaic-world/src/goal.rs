@@ -5,10 +5,16 @@ use chaic_core::geom::horizontal_distance;
 use chaic_core::{AgentId, ClassId, EntityId};
 
 use crate::event::EventKind;
+use crate::setup::Setup;
 use crate::world::World;
 
 /// Maximum penetration of a resting object into its support, meters: solver tolerance and a margin.
 const MAX_PENETRATION_M: f32 = 0.02;
+
+/// Number of occurrences of a class.
+fn count(classes: &[ClassId], class: ClassId) -> u32 {
+    classes.iter().filter(|c| **c == class).count() as u32
+}
 
 impl World {
     /// Returns the maximum distance from the center of a goal place at which a released object
@@ -25,7 +31,14 @@ impl World {
 
     /// Returns all delivered objects, targets or not, in the order of ids.
     pub fn delivered(&self) -> Vec<EntityId> {
-        self.setup.entities().filter(|e| self.object(*e).1.delivered.is_some()).collect()
+        let objects = self.state.objects.iter().enumerate();
+        let delivered = objects.filter(|(_, object)| object.delivered.is_some());
+        delivered.map(|(k, _)| Setup::entity(k)).collect()
+    }
+
+    /// Returns the classes of all delivered objects, in the order of ids.
+    fn delivered_classes(&self) -> Vec<ClassId> {
+        self.delivered().into_iter().map(|e| self.object(e).0.class).collect()
     }
 
     /// Returns the obstacles that were removed, if the rules announce them to all agents.
@@ -40,8 +53,7 @@ impl World {
 
     /// Returns the number of delivered objects of a class.
     pub fn n_delivered(&self, class: ClassId) -> u32 {
-        let of_class = |e: &EntityId| self.object(*e).0.class == class;
-        self.delivered().iter().filter(|e| of_class(e)).count() as u32
+        count(&self.delivered_classes(), class)
     }
 
     /// Returns the achieved and the total value of the goal by the task's [`TargetValue`]: a number
@@ -49,11 +61,11 @@ impl World {
     ///
     /// [`TargetValue`]: chaic_core::task::TargetValue
     pub fn progress(&self) -> (f64, f64) {
-        let goal = &self.setup.goal.targets;
-        goal.iter().fold((0.0, 0.0), |(achieved, total), (class, count)| {
+        let (goal, delivered) = (&self.setup.goal.targets, self.delivered_classes());
+        goal.iter().fold((0.0, 0.0), |(achieved, total), (class, wanted)| {
             let value = self.target_value(*class);
-            let n_counted = self.n_delivered(*class).min(*count);
-            (achieved + value * f64::from(n_counted), total + value * f64::from(*count))
+            let n_counted = count(&delivered, *class).min(*wanted);
+            (achieved + value * f64::from(n_counted), total + value * f64::from(*wanted))
         })
     }
 
@@ -64,7 +76,8 @@ impl World {
 
     /// Returns whether all targets have been delivered.
     pub fn is_complete(&self) -> bool {
-        self.setup.goal.targets.iter().all(|(class, count)| self.n_delivered(*class) >= *count)
+        let delivered = self.delivered_classes();
+        self.setup.goal.targets.iter().all(|(class, wanted)| count(&delivered, *class) >= *wanted)
     }
 
     /// Delivers an object that has come to rest, if it is at the goal.

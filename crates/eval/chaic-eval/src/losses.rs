@@ -4,7 +4,7 @@
 //! references is therefore the effect of a grant, and the difference between a helper and the
 //! reference with its grants is the effect of its planning. `docs/metrics.md` defines the causes.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use chaic_core::TaskId;
@@ -66,41 +66,34 @@ impl Losses {
         Losses::new(report.played_episodes(&plan), &report.options.helpers, granted)
     }
 
-    /// Computes the losses from the results of a run with these helpers.
-    ///
-    /// # Errors
-    /// One sentence that names the missing reference helpers.
-    pub fn new(
+    /// Computes the losses from the results of a run with these helpers, or names the missing
+    /// reference helpers.
+    fn new(
         played: PlayedEpisodes<'_>,
         helpers: &[String],
         granted: &RunGrants,
     ) -> Result<Losses, String> {
-        let is_known = |name: &&str| helpers.iter().any(|helper| helper == name);
-        let others: Vec<&String> =
-            helpers.iter().filter(|helper| !matches!(helper.as_str(), BOUND | NONE)).collect();
+        let others = helpers.iter().filter(|helper| !matches!(helper.as_str(), BOUND | NONE));
         let steps: Vec<(&String, Vec<Step>)> = others
-            .into_iter()
             .map(|helper| (helper, steps(helper, granted.helpers.get(helper).copied())))
             .collect();
-        let used = steps.iter().flat_map(|(_, steps)| steps).flat_map(|step| [step.from, step.to]);
-        let mut missing: Vec<&str> = used.filter(|name| !is_known(name)).collect();
-        missing.sort_unstable();
-        missing.dedup();
+        let compared = steps.iter().flat_map(|(_, steps)| steps);
+        let used = compared.flat_map(|step| [step.from, step.to]).chain([BOUND]);
+        let missing: BTreeSet<&str> =
+            used.filter(|name| !helpers.iter().any(|helper| helper == name)).collect();
         if !missing.is_empty() {
+            let names: Vec<&str> = missing.into_iter().collect();
             return Err(format!(
                 "losses need the helpers {} in the same run; play them too",
-                missing.join(", ")
+                names.join(", ")
             ));
         }
         let differences = differences(played, helpers);
-        let losses = |steps: &[Step]| -> Vec<Loss> {
-            steps.iter().map(|step| step.loss(&differences)).collect()
-        };
         let helpers = steps
             .iter()
             .map(|(helper, steps)| HelperLosses {
                 helper: (*helper).clone(),
-                losses: losses(steps),
+                losses: steps.iter().map(|step| step.loss(&differences)).collect(),
             })
             .collect();
         let is_known = |task: &TaskId| differences.iter().any(|d| d.tasks.contains_key(task));

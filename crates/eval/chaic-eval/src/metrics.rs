@@ -27,4 +27,4 @@ pub use table::{METRICS, Metric, MetricSource};
 pub use tally::{Tally, tally};
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -160,7 +160,7 @@ impl CarefulNavigator {
         let grid = costs.grid();
         let end = self.path.len().min(self.index + 1 + LOOK_AHEAD);
         let ahead = &self.path[(self.index + 1).min(end)..end];
-        let Some(first) = ahead.first().or(self.path.last()) else { return here };
+        let Some(first) = ahead.first() else { return here };
         let mut best = grid.center(*first);
         let mut worst = costs.cost(self.path[self.index]).max(costs.cost(*first));
         for cell in ahead {

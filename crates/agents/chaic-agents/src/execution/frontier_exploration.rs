@@ -243,7 +243,10 @@ impl FrontierExplorer {
                 && self.bounds.contains(at)
                 && at.distance(to_xz(memory.pose.position)) > 1.5
                 && !self.is_blacklisted(at);
-            let Some(cost) = path_costs.cost(cell).filter(|_| is_usable) else { continue };
+            if !is_usable {
+                continue;
+            }
+            let Some(cost) = path_costs.cost(cell) else { continue };
             let age = (memory.frame + 1).saturating_sub(memory.map.last_seen(cell).unwrap_or(0));
             let score = age as f32 / (5.0 + CostField::meters(cost));
             if best.is_none_or(|(s, _)| score > s) {

@@ -100,6 +100,7 @@ pub struct InferPolicy {
     /// True if the last choice may replace a walk to another object.
     may_switch: bool,
     has_looked_around: bool,
+    /// Frame in which the goal became clear.
     identified: Option<Frame>,
     last_choice: Frame,
     mode: &'static str,
@@ -422,13 +423,6 @@ impl Policy for InferPolicy {
 
     fn partner_belief(&self, briefing: &Briefing, memory: &Memory) -> Option<PartnerBelief> {
         description::partner_belief(self, briefing, memory)
-    }
-
-    fn counters(&self) -> BTreeMap<String, u64> {
-        let taken = self.belief.as_ref().map_or(0, |b| b.evidence.taken.len() as u64);
-        let mut counters = BTreeMap::from([("infer/taken".to_owned(), taken)]);
-        counters.extend(self.identified.map(|f| ("infer/identified".to_owned(), u64::from(f))));
-        counters
     }
 
     fn fork(&self) -> Option<InferPolicy> {

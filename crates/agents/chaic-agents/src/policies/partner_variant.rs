@@ -14,7 +14,7 @@ const PAUSE_FRAMES: Frame = 90;
 /// Probability that a noisy partner fetches a random possible target instead of a wanted one.
 const NOISE: f32 = 0.2;
 
-/// How a partner deviates from the rules.
+/// Deviation of a partner from the rules.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Deviation {
     /// Fetches the farthest wanted object instead of the nearest.
@@ -97,25 +97,31 @@ impl PartnerVariantPolicy {
         }
     }
 
-    /// Returns another plan for the plan of the rules.
-    fn deviate(&mut self, context: &Context<'_>, valid: &[Plan], plan: Plan) -> Plan {
-        let Plan::PickUp(nearest) = plan else { return plan };
+    /// Returns the object to fetch instead of the nearest wanted one.
+    fn choose_target(
+        &mut self,
+        context: &Context<'_>,
+        valid: &[Plan],
+        nearest: Subject,
+    ) -> Subject {
         let choices = match self.deviation {
+            Deviation::Slow | Deviation::NoContainers => return nearest,
             Deviation::Noisy => possible_targets(valid),
-            _ => self.rules.wanted_targets(context, valid),
+            Deviation::FarthestFirst | Deviation::RandomOrder => {
+                self.rules.wanted_targets(context, valid)
+            }
         };
         if let Some(target) = self.target.filter(|target| choices.contains(target)) {
-            return Plan::PickUp(target);
+            return target;
         }
         let other = match self.deviation {
-            Deviation::FarthestFirst => choices.last().copied(),
-            Deviation::RandomOrder => self.rng.choose(&choices).copied(),
-            Deviation::Noisy if self.rng.chance(NOISE) => self.rng.choose(&choices).copied(),
-            Deviation::Noisy | Deviation::Slow | Deviation::NoContainers => None,
+            Deviation::FarthestFirst => choices.last(),
+            Deviation::Noisy if !self.rng.chance(NOISE) => None,
+            _ => self.rng.choose(&choices),
         };
-        let target = other.unwrap_or(nearest);
+        let target = other.copied().unwrap_or(nearest);
         self.target = Some(target);
-        Plan::PickUp(target)
+        target
     }
 }
 
@@ -136,17 +142,13 @@ impl Policy for PartnerVariantPolicy {
     }
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
-        let plan = match self.deviation {
-            Deviation::NoContainers => {
-                let is_allowed = |plan: &&Plan| !matches!(plan, Plan::PickContainer(_));
-                let allowed: Vec<Plan> = valid.iter().filter(is_allowed).copied().collect();
-                self.rules.decide(context, &allowed)
-            }
-            _ => self.rules.decide(context, valid),
-        };
-        Ok(match self.deviation {
-            Deviation::Slow | Deviation::NoContainers => plan,
-            _ => self.deviate(context, valid, plan),
+        let leaves_containers = self.deviation == Deviation::NoContainers;
+        let is_allowed =
+            |plan: &&Plan| !(leaves_containers && matches!(plan, Plan::PickContainer(_)));
+        let allowed: Vec<Plan> = valid.iter().filter(is_allowed).copied().collect();
+        Ok(match self.rules.decide(context, &allowed) {
+            Plan::PickUp(nearest) => Plan::PickUp(self.choose_target(context, &allowed, nearest)),
+            plan => plan,
         })
     }
 

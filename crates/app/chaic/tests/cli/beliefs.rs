@@ -1,4 +1,5 @@
-//! Promise: beliefs in traces are explained in sentences and records, drawn in replays, and scored.
+//! Promise: beliefs in traces are explained in sentences and records, drawn in replays, and scored;
+//! losses are split by cause.
 
 use std::fs;
 use std::path::Path;
@@ -51,6 +52,26 @@ fn beliefs_are_explained_drawn_and_scored() {
 }
 
 #[test]
+fn losses_are_reported_with_another_partner_too() {
+    let dir = short_episodes();
+    let at = dir.path();
+    let helpers = "none,rhp,infer,infer_told,oracle_plan";
+    let eval = ["eval", "--episodes", "short", "--helper", helpers, "--size", "32", "--out", "run"];
+    run_ok(at, &[&eval[..], &["--partner", "farthest"]].concat());
+    let recorded = fs::read_to_string(at.join("run/run.json")).expect("a text file");
+    assert!(recorded.contains("\"farthest\""), "{recorded}");
+    run_ok(at, &["verify", "run"]);
+    let losses = json(at, &["report", "run", "--losses"]);
+    let helpers = losses["helpers"].as_array().expect("a list");
+    let causes = |k: usize| -> Vec<&str> {
+        let listed = helpers[k]["losses"].as_array().expect("a list").iter();
+        listed.map(|loss| loss["cause"].as_str().expect("a name")).collect()
+    };
+    assert_eq!(causes(0), ["total", "search", "inference", "planning"]);
+    assert_eq!(causes(2), ["total", "search"]);
+}
+
+#[test]
 fn errors_of_explanations_and_belief_reports_are_clear() {
     let dir = short_episodes();
     let at = dir.path();
@@ -70,6 +91,8 @@ fn errors_of_explanations_and_belief_reports_are_clear() {
         (&["report", "untraced", "--belief"], "--no-traces"),
         (&["report", "run", "--belief"], "no whole trace with a belief"),
         (&["report", "run", "--belief", "--from-traces"], "cannot be used with"),
+        (&["report", "run", "--losses"], "losses need the helpers oracle_plan in the same run"),
+        (&["report", "run", "--losses", "--belief"], "cannot be used with"),
     ] {
         let message = run_err(at, arguments);
         assert!(message.contains(words), "{arguments:?}: {message}");

@@ -2,10 +2,10 @@
 
 use chaic_core::TaskId;
 use chaic_core::observation::Grants;
-use chaic_env::{Digest, RunKey};
 
 use super::*;
-use crate::metrics::{Environments, RunResult, RunStatus, Summary};
+use crate::metrics::tests::{case, result};
+use crate::metrics::{Environments, RunResult};
 
 /// Counted objects of ten in each of two episodes.
 const DONE: [(&str, [f64; 2]); 6] = [
@@ -18,28 +18,8 @@ const DONE: [(&str, [f64; 2]); 6] = [
 ];
 
 fn results() -> Vec<RunResult> {
-    let result = |helper: &str, k: usize, done: f64| RunResult {
-        key: RunKey {
-            task: TaskId::LowTarget,
-            helper: helper.to_owned(),
-            episode: format!("e{k}"),
-            seed: 0,
-        },
-        status: RunStatus::Done(Summary {
-            frames: 1000,
-            done,
-            total: 10.0,
-            away_frames: None,
-            stuck_frames: None,
-            escape_frames: None,
-            deliveries: Vec::new(),
-            digest: Digest(0),
-            counts: Default::default(),
-            diagnostics: Default::default(),
-        }),
-    };
-    let each = DONE.iter().flat_map(|(helper, done)| (0..2).map(move |k| (*helper, k, done[k])));
-    each.map(|(helper, k, done)| result(helper, k, done)).collect()
+    let each = DONE.into_iter().flat_map(|(helper, [a, b])| [(helper, "e0", a), (helper, "e1", b)]);
+    each.map(|(helper, episode, done)| result(case(helper, episode, done, 10.0))).collect()
 }
 
 fn losses(helpers: &[&str]) -> Result<Losses, String> {

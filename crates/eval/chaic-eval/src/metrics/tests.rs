@@ -5,7 +5,7 @@ use chaic_env::{Digest, RunKey};
 
 use super::*;
 
-struct Case<'a> {
+pub(crate) struct Case<'a> {
     task: TaskId,
     helper: &'a str,
     episode: &'a str,
@@ -16,12 +16,12 @@ struct Case<'a> {
     away: Option<u32>,
 }
 
-fn case<'a>(helper: &'a str, episode: &'a str, done: f64, total: f64) -> Case<'a> {
+pub(crate) fn case<'a>(helper: &'a str, episode: &'a str, done: f64, total: f64) -> Case<'a> {
     let task = TaskId::LowTarget;
     Case { task, helper, episode, seed: 0, done, total, deliveries: Vec::new(), away: None }
 }
 
-fn result(c: Case<'_>) -> RunResult {
+pub(crate) fn result(c: Case<'_>) -> RunResult {
     let (helper, episode) = (c.helper.to_owned(), c.episode.to_owned());
     RunResult {
         key: RunKey { task: c.task, helper, episode, seed: c.seed },

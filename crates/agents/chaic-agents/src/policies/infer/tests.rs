@@ -104,7 +104,7 @@ fn with_a_granted_goal_it_plans_as_soon_as_it_has_looked_around() {
     // The banana is nearer, but nobody wants it. The partner is not watched.
     assert_eq!(episode.step(50, &all), Plan::PickUp(subject(APPLE, "apple")));
     assert_eq!(episode.mode(), "plan");
-    assert_eq!(episode.policy.counters().get("infer/identified"), Some(&50));
+    assert_eq!(episode.policy.identified, Some(50));
     // With full hands it delivers, with nothing to do it explores.
     episode.memory.hands =
         hands([Some(carried("apple", 60, &[])), Some(carried("apple", 61, &[]))]);
@@ -169,7 +169,7 @@ fn without_evidence_it_follows_a_visible_partner_and_explores_otherwise() {
     assert_eq!(episode.mode(), "watch");
     assert_eq!(episode.step(200, &fruit), Plan::FollowPartner, "seen 190 frames ago");
     assert_eq!(episode.step(210, &fruit), Plan::Explore, "lost");
-    assert_eq!(episode.policy.counters().get("infer/identified"), None);
+    assert_eq!(episode.policy.identified, None);
     let options = InferOptions { watches: false, ..InferOptions::ALL };
     let mut episode = Episode::ready(options, house);
     assert_eq!(episode.step(10, &with_partner), Plan::Explore, "it never watches");
@@ -194,9 +194,9 @@ fn takes_of_fruit_make_it_fetch_fruit() {
         // The pen is nearer.
         assert_eq!(episode.step(10, &all), Plan::PickUp(subject(APPLE, "apple")));
         assert_eq!(episode.mode(), mode);
-        let counters = episode.policy.counters();
-        assert_eq!(counters.get("infer/identified"), Some(&10));
-        assert_eq!(counters.get("infer/taken"), Some(&2));
+        assert_eq!(episode.policy.identified, Some(10));
+        let belief = episode.policy.belief.as_ref().expect("the episode has begun");
+        assert_eq!(belief.evidence.taken.len(), 2);
     }
 }
 

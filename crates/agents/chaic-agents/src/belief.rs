@@ -15,7 +15,8 @@ mod scene;
 mod visibility;
 mod walking_speed;
 
-use chaic_core::Briefing;
+use chaic_core::capability::Persona;
+use chaic_core::{Briefing, Frame};
 
 use crate::behavior::BehaviorLog;
 use crate::memory::Memory;
@@ -25,6 +26,15 @@ pub use evidence::{AttemptKind, Evidence, FailedAttempt, Take};
 pub use goal::GoalBelief;
 pub use observed_walks::ObservedWalks;
 pub use scene::scene_of;
+
+/// Time before the end from which any goal place is used, frames (chosen on
+/// `gen-standard:7000..7010`, like the next two).
+pub(crate) const LAST_DELIVERY_FRAMES: Frame = 1000;
+/// Minimum height of a goal place while the partner may be a child, meters: only high ones count in
+/// one of its tasks, and high ones count in all (`world.high_goal_min_top_m`).
+const HIGH_GOAL_M: f32 = 1.5;
+/// Probability of a child from which this applies.
+const CHILD_PROBABILITY: f32 = 0.4;
 
 /// Belief of one agent about its partner.
 #[derive(Clone, Debug)]
@@ -52,6 +62,23 @@ impl Belief {
         self.evidence.observe(briefing, memory, behavior);
         self.constraint.update(&self.evidence);
         self.goal.update(&self.evidence, &self.constraint);
+    }
+
+    /// Returns the minimum height of goal places that count in every task that the partner may have,
+    /// meters; `None` if the goal is granted.
+    pub fn goal_place_min_top_m(&self, briefing: &Briefing, memory: &Memory) -> Option<f32> {
+        if briefing.goal.is_some() {
+            return None;
+        }
+        let child = self.constraint.probabilities().into_iter();
+        let child: f32 = child.filter(|(p, _)| *p == Persona::Child).map(|(_, p)| p).sum();
+        let may_be_high = child >= CHILD_PROBABILITY && self.evidence.n_sightings > 0;
+        let is_late = memory.frame + LAST_DELIVERY_FRAMES > briefing.horizon;
+        let knows_high = || {
+            let is_high = |top_m: f32| top_m >= HIGH_GOAL_M - 0.1;
+            memory.goal_places().iter().any(|(place, _)| is_high(place.top_m))
+        };
+        Some(if may_be_high && (!is_late || knows_high()) { HIGH_GOAL_M } else { 0.0 })
     }
 }
 

@@ -153,12 +153,17 @@ pub fn infer(
     options: InferOptions,
 ) -> PlanningAgent<InferPolicy> {
     let policy = InferPolicy::new(options);
-    let grants = planner_grants(rules);
-    let rules = match rules.exploration {
+    let (grants, rules) = (planner_grants(rules), explore_unknown_area(rules));
+    PlanningAgent::with_watched(policy, rules, factory, AgentId::PARTNER, grants)
+}
+
+/// Returns rules that explore where most area is unknown instead of at the nearest frontier. Random
+/// exploration is kept.
+pub fn explore_unknown_area(rules: PlannerRules) -> PlannerRules {
+    match rules.exploration {
         Exploration::Frontier => PlannerRules { exploration: Exploration::UnknownArea, ..rules },
         _ => rules,
-    };
-    PlanningAgent::with_watched(policy, rules, factory, AgentId::PARTNER, grants)
+    }
 }
 
 /// Constructs an upper bound: the inferring helper with granted state and behavior.

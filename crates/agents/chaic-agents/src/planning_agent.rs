@@ -6,7 +6,7 @@ use chaic_core::agent::{BelievedObject, Thought};
 use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::{Action, Agent, AgentError, AgentId, Briefing, Observation, Outcome, Target};
 
-use crate::behavior::{BehaviorModel, GroundTruthBehavior, InferredBehavior};
+use crate::behavior::{BehaviorLog, BehaviorModel, GroundTruthBehavior, InferredBehavior};
 use crate::decision::{Context, Plan, Policy, valid_plans};
 use crate::execution::interaction::apply_outcome;
 use crate::execution::steering::turn_towards;
@@ -148,6 +148,11 @@ impl<P: Policy> PlanningAgent<P> {
     /// Memory of the current episode.
     pub fn memory(&self) -> Option<&Memory> {
         self.episode.as_ref().map(|e| &e.memory)
+    }
+
+    /// Known actions of the watched person.
+    pub fn behavior(&self) -> &BehaviorLog {
+        self.behavior.log()
     }
 
     /// Returns how an action names this object; `None` if it is not in view.

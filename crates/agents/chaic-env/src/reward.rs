@@ -1,7 +1,7 @@
 //! Rewards for training. They are ground truth that no agent observes.
 
 use chaic_core::geom::horizontal_distance;
-use chaic_core::{AgentId, Frame};
+use chaic_core::{AgentId, ClassId, Frame};
 use chaic_world::{ObjectLocation, World};
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +16,8 @@ pub struct RewardWeights {
     pub delivered: f64,
     /// Delivery of all wanted objects by the agent itself; varies less with the partner's behavior.
     pub own_delivered: f64,
-    /// Holding all wanted objects; taken back on delivery, on a drop and at the end of the episode.
+    /// Holding all objects still needed; taken back on delivery, on a drop and at the end of the
+    /// episode.
     pub held: f64,
     /// Penalty per meter of remaining distance to the next delivery.
     pub remaining_per_m: f64,
@@ -159,9 +160,10 @@ impl RewardTracker {
 struct RewardTotals {
     /// Fraction of all wanted objects that is delivered, 0 to 1.
     delivered: f64,
-    /// Fraction that the agent itself delivered.
+    /// Fraction that the agent itself delivered, of each class at most the wanted number.
     own_delivered: f64,
-    /// Fraction that the agent holds, in its hands or in a held container.
+    /// Fraction that the agent holds, in its hands or in a held container, of each class at most the
+    /// number still needed.
     held: f64,
     /// Fraction of the episode's frames in which the child was away from its guardian.
     emergency: f64,
@@ -175,16 +177,24 @@ impl RewardTotals {
         let (done, total) = world.progress();
         let fraction = |amount: f64| if total > 0.0 { amount / total } else { 0.0 };
         let n_objects = setup.things.len();
-        let amount = |is_counted: &dyn Fn(usize) -> bool| -> f64 {
-            let wanted = |k: &usize| setup.goal.count(setup.things[*k].class) > 0;
-            let counted = (0..n_objects).filter(wanted).filter(|k| is_counted(*k));
-            counted.map(|k| world.target_value(setup.things[k].class)).sum()
+        // Objects of one class beyond the wanted number earn nothing.
+        let amount = |is_counted: &dyn Fn(usize) -> bool, n_max: &dyn Fn(ClassId, u32) -> u32| {
+            let value = |(class, n_wanted): &(ClassId, u32)| {
+                let of_class = |k: &usize| setup.things[*k].class == *class;
+                let n = (0..n_objects).filter(of_class).filter(|k| is_counted(*k)).count() as u32;
+                f64::from(n.min(n_max(*class, *n_wanted))) * world.target_value(*class)
+            };
+            setup.goal.targets.iter().map(value).sum::<f64>()
         };
+        let n_left = |class, n_wanted: u32| n_wanted.saturating_sub(world.n_delivered(class));
         let distances = (0..n_objects).filter_map(|k| remaining_distance_m(world, agent, k));
         RewardTotals {
             delivered: fraction(done),
-            own_delivered: fraction(amount(&|k| state.objects[k].delivered_by == Some(agent))),
-            held: fraction(amount(&|k| holder(world, k) == Some(agent))),
+            own_delivered: fraction(amount(
+                &|k| state.objects[k].delivered_by == Some(agent),
+                &|_, n_wanted| n_wanted,
+            )),
+            held: fraction(amount(&|k| holder(world, k) == Some(agent), &n_left)),
             emergency: f64::from(state.child_away_frames) / f64::from(setup.horizon.max(1)),
             remaining_m: distances.min_by(f32::total_cmp).map_or(0.0, f64::from),
         }

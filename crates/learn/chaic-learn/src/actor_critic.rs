@@ -65,6 +65,17 @@ impl ActorCriticOutput {
         self.argmax()
     }
 
+    /// Samples an action from the softmax of the logits divided by `temperature`, given a uniform
+    /// number in 0..1.
+    pub fn sample_at(&self, temperature: f32, unit: f32) -> usize {
+        if temperature == 1.0 {
+            return self.sample(unit);
+        }
+        let logits: Vec<f32> = self.log_probs.iter().map(|l| l / temperature).collect();
+        let output = ActorCriticOutput { log_probs: log_softmax(&logits), values: Vec::new() };
+        output.sample(unit)
+    }
+
     /// Returns the most probable action, the first of equal ones.
     pub fn argmax(&self) -> usize {
         let mut best = 0;
@@ -86,19 +97,30 @@ pub struct OutputGrad {
     pub values: Vec<f32>,
 }
 
+/// Settings of an optimizer step.
+#[derive(Clone, Copy, Debug)]
+pub struct Optimizer<'a> {
+    /// Hyperparameters.
+    pub adam: &'a AdamWConfig,
+    /// Learning rate.
+    pub learning_rate: f32,
+}
+
 /// Takes one data-parallel optimizer step along the mean gradient of a batch.
 ///
 /// `gradient(sample, output, weight, stats)` returns the output gradient of one sample times
-/// `weight`, and adds its statistics to `stats`. Returns the statistics of each shard.
+/// `weight`, and adds its statistics to `stats`. The step is taken only if `accepts` returns true
+/// for the statistics of all shards, which are returned.
 pub fn optimizer_step<M: ActorCritic, S: Sync, T: Default + Send>(
     model: &M,
     learner: &mut Learner,
-    adam: &AdamWConfig,
-    learning_rate: f32,
+    optimizer: Optimizer<'_>,
     batch: &[&S],
     observation_of: impl Fn(&S) -> &M::Observation + Sync,
     gradient: impl Fn(&S, &ActorCriticOutput, f32, &mut T) -> OutputGrad + Sync,
+    accepts: impl FnOnce(&[T]) -> bool,
 ) -> Vec<T> {
+    let Optimizer { adam, learning_rate } = optimizer;
     let n_shards = learner.n_shards();
     let shard_size = batch.len().div_ceil(n_shards);
     // The learner averages over shards.
@@ -122,7 +144,7 @@ pub fn optimizer_step<M: ActorCritic, S: Sync, T: Default + Send>(
             Some(stats)
         };
     learner
-        .step(model.network(), adam, learning_rate, shard_gradient)
+        .step_if(model.network(), adam, learning_rate, shard_gradient, accepts)
         .expect("no shard returns None")
 }
 

@@ -1,7 +1,9 @@
 //! Actor-critic network for a variable number of candidates.
 //!
-//! Number and order of candidates differ between decisions. Each candidate is scored on its own
-//! together with the state, as in pointer networks (Vinyals et al. 2015).
+//! Number and order of candidates differ between decisions. Each candidate is scored together with
+//! the state, as in pointer networks (Vinyals et al. 2015). The candidates of a decision and a row
+//! for the state attend to each other (Vaswani et al. 2017), so that scores and value depend on all
+//! of them, in any order.
 
 use std::ops::Range;
 
@@ -24,7 +26,8 @@ pub struct CandidateSet {
 /// Network architecture without parameter values.
 #[derive(Clone, Debug)]
 pub struct CandidateScorer {
-    /// Two hidden layers each for logits and state outputs, with no shared parameters.
+    /// Two hidden layers with attention in between, each for logits and state outputs, with no
+    /// shared parameters.
     pub network: Network,
     logit_head: Node,
     value_head: Node,
@@ -43,6 +46,8 @@ struct Normalizer {
     counts: Range<usize>,
 }
 
+/// Number of attention heads.
+const N_HEADS: usize = 4;
 /// Maximum magnitude of a normalized input.
 const MAX_INPUT: f32 = 10.0;
 /// Minimum standard deviation of an input.
@@ -112,13 +117,19 @@ impl CandidateScorer {
         let mut network = Network::default();
         let input = network.input(n_state + n_candidate);
         let mut branch = |name: &str, n_outputs: usize| {
-            let mut at = input;
-            for layer in 0..2 {
-                let name = format!("{name}{layer}");
-                at = network.conv(&name, at, Kernel::POINTWISE, width);
-                at = network.norm_relu(&format!("{name}.norm"), at);
-            }
-            network.output_head(&format!("{name}.head"), at, n_outputs)
+            let dense = |network: &mut Network, layer: &str, from: Node| {
+                network.conv(&format!("{name}.{layer}"), from, Kernel::POINTWISE, width)
+            };
+            let first = dense(&mut network, "0", input);
+            let first = network.norm_relu(&format!("{name}.0.norm"), first);
+            let projected = ["query", "key", "value"].map(|l| dense(&mut network, l, first));
+            let attended = network.attention(projected, N_HEADS);
+            let attended = dense(&mut network, "attended", attended);
+            let sum = network.add(first, attended);
+            let sum = network.norm_relu(&format!("{name}.sum.norm"), sum);
+            let second = dense(&mut network, "1", sum);
+            let second = network.norm_relu(&format!("{name}.1.norm"), second);
+            network.output_head(&format!("{name}.head"), second, n_outputs)
         };
         let (logit_head, value_head) = (branch("choices", 1), branch("state", n_outputs));
         let normalizer = Normalizer::new(&mut network, n_state + n_candidate);
@@ -192,6 +203,7 @@ impl ActorCritic for CandidateScorer {
         decisions: impl Iterator<Item = &'a CandidateSet> + Clone,
         pass: &mut Pass,
     ) -> Vec<ActorCriticOutput> {
+        pass.set_groups(decisions.clone().map(|d| d.n_candidates + 1));
         pass.forward(&self.network, parameters, &self.rows(parameters, decisions.clone()));
         let (logits, state_outputs) =
             (&pass.activation(self.logit_head).data, &pass.activation(self.value_head).data);

@@ -1,7 +1,8 @@
-//! Behavior cloning with an expert that labels the learner's states (DAgger, Ross et al. 2011).
+//! Behavior cloning of an expert, which also labels the states that the learner visits (DAgger, Ross
+//! et al. 2011).
 //!
-//! The expert follows the oracle's rules and knows the goal. It has the observations, memory and
-//! grants of the learner, so most of its choices are predictable from what the learner knows.
+//! The expert has the observations, memory and grants of the learner. [`EXPERTS`] lists those that
+//! can be imitated.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, PoisonError};
@@ -9,19 +10,56 @@ use std::sync::{Arc, PoisonError};
 use chaic_agents::behavior::BehaviorLog;
 use chaic_agents::decision::{Context, Plan, Policy};
 use chaic_agents::memory::Memory;
-use chaic_agents::policies::{RulePolicy, RuleProfile};
+use chaic_agents::policies::{InferOptions, InferPolicy, RulePolicy, RuleProfile};
 use chaic_core::briefing::Goal;
 use chaic_core::geom::math;
 use chaic_core::rng::RngStream;
 use chaic_core::{AgentError, Briefing, Observation};
-use chaic_nn::AdamWConfig;
 use chaic_training::Learner;
 
-use crate::actor_critic::{ActorCriticOutput, OutputGrad, optimizer_step};
+use crate::actor_critic::{ActorCriticOutput, Optimizer, OutputGrad, optimizer_step};
 use crate::candidate_scorer::{CandidateScorer, CandidateSet};
 use crate::features::FeatureEncoder;
 use crate::opponent::network::OpponentModel;
 use crate::policy::{LearnedPolicy, StepLog, StepRecord};
+
+/// Expert that can be imitated.
+#[derive(Clone, Copy, Debug)]
+pub struct ExpertInfo {
+    /// Name in configurations: that of the helper with the same rules.
+    pub name: &'static str,
+    /// True if it is told the goal. Its choices are then no function of what the learner knows, so
+    /// a clone of it cannot reach it.
+    pub knows_goal: bool,
+    /// Creates its policy.
+    pub policy: fn() -> Box<dyn Policy>,
+}
+
+/// All experts.
+pub static EXPERTS: [ExpertInfo; 3] = [
+    ExpertInfo {
+        name: "infer",
+        knows_goal: false,
+        policy: || Box::new(InferPolicy::new(InferOptions::ALL)),
+    },
+    ExpertInfo {
+        name: "rhp",
+        knows_goal: false,
+        policy: || Box::new(RulePolicy::new(RuleProfile::RHP)),
+    },
+    ExpertInfo {
+        name: "oracle",
+        knows_goal: true,
+        policy: || Box::new(RulePolicy::new(RuleProfile::ORACLE)),
+    },
+];
+
+impl ExpertInfo {
+    /// Returns the expert with this name.
+    pub fn find_expert(name: &str) -> Option<&'static ExpertInfo> {
+        EXPERTS.iter().find(|expert| expert.name == name)
+    }
+}
 
 /// Policy that drives the agent during a rollout.
 pub enum RolloutActor {
@@ -33,30 +71,41 @@ pub enum RolloutActor {
 
 /// Policy that records the expert's choices.
 pub struct ExpertPolicy {
-    rule_policy: RulePolicy,
-    goal: Goal,
+    expert: Box<dyn Policy>,
+    /// Goal that the expert is told.
+    goal: Option<Goal>,
     actor: RolloutActor,
     log: StepLog,
     features: FeatureEncoder,
 }
 
 impl ExpertPolicy {
-    /// Creates an expert that knows this goal. The recorded features include the predictions of the
-    /// opponent model, if there is one.
+    /// Creates a policy that records the choices of this expert. `goal` is the partner's goal, for
+    /// experts that are told it. The recorded features include the predictions of the opponent
+    /// model, if there is one.
     pub fn new(
-        goal: Goal,
+        expert: &ExpertInfo,
+        goal: &Goal,
         actor: RolloutActor,
         opponent: Option<Arc<OpponentModel>>,
         log: StepLog,
     ) -> ExpertPolicy {
-        let rule_policy = RulePolicy::new(RuleProfile::ORACLE);
-        ExpertPolicy { rule_policy, goal, actor, log, features: FeatureEncoder::new(opponent) }
+        let goal = expert.knows_goal.then(|| goal.clone());
+        let features = FeatureEncoder::new(opponent);
+        ExpertPolicy { expert: (expert.policy)(), goal, actor, log, features }
+    }
+
+    /// Returns the briefing of the expert, if it differs from that of the learner.
+    fn told(&self, briefing: &Briefing) -> Option<Briefing> {
+        let goal = self.goal.clone()?;
+        Some(Briefing { goal: Some(goal), ..briefing.clone() })
     }
 }
 
 impl Policy for ExpertPolicy {
     fn reset(&mut self, briefing: &Briefing) {
-        Policy::reset(&mut self.rule_policy, briefing);
+        let told = self.told(briefing);
+        self.expert.reset(told.as_ref().unwrap_or(briefing));
         self.features.reset(briefing);
         if let RolloutActor::Learner(learner) = &mut self.actor {
             learner.reset(briefing);
@@ -64,22 +113,23 @@ impl Policy for ExpertPolicy {
     }
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
-        let is_reconsidering = self.features.history.is_reconsidering();
+        let reconsidered = self.features.history.reconsidered();
         let candidates = self.features.history.candidates(valid);
         let decision = self.features.encode(context, &candidates);
-        let mut briefing = context.briefing.clone();
-        briefing.goal = Some(self.goal.clone());
-        let expert_plan =
-            self.rule_policy.choose(&Context { briefing: &briefing, ..*context }, valid)?;
+        let told = self.told(context.briefing);
+        let briefing = told.as_ref().unwrap_or(context.briefing);
+        let expert_plan = self.expert.choose(&Context { briefing, ..*context }, valid)?;
         let plan = match &mut self.actor {
             RolloutActor::Expert => expert_plan,
             RolloutActor::Learner(learner) => learner.choose(context, valid)?,
         };
         let frame = context.memory.frame;
         self.features.history.record(plan, frame);
-        // If the expert's plan does not supersede the current one, the label is to continue.
-        let continue_action = if is_reconsidering { Some(0) } else { None };
-        let action = candidates.iter().position(|plan| *plan == expert_plan).or(continue_action);
+        // If the expert's plan does not replace the current one, the label is to continue.
+        let continues =
+            reconsidered.is_some_and(|current| !self.expert.supersedes(&expert_plan, &current));
+        let chosen = candidates.iter().position(|plan| *plan == expert_plan);
+        let action = if continues { Some(0) } else { chosen };
         // Plans outside the candidates, such as waiting, cannot be learned.
         if let Some(action) = action.filter(|_| candidates.len() > 1) {
             let record =
@@ -89,16 +139,33 @@ impl Policy for ExpertPolicy {
         Ok(plan)
     }
 
-    fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, is_news: bool) -> bool {
+    fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, has_changed: bool) -> bool {
         if let RolloutActor::Learner(learner) = &mut self.actor {
-            learner.reconsiders(context, current, is_news);
+            learner.reconsiders(context, current, has_changed);
+            return self.features.history.is_due(context, current, has_changed);
         }
-        // At the frames at which the learner would decide.
-        self.features.history.is_due(context.memory.frame, current, is_news)
+        let told = self.told(context.briefing);
+        let briefing = told.as_ref().unwrap_or(context.briefing);
+        let is_due =
+            self.expert.reconsiders(&Context { briefing, ..*context }, current, has_changed);
+        self.features.history.set_reconsidered(is_due.then_some(*current));
+        is_due
+    }
+
+    fn supersedes(&self, new: &Plan, current: &Plan) -> bool {
+        match &self.actor {
+            RolloutActor::Expert => self.expert.supersedes(new, current),
+            RolloutActor::Learner(learner) => learner.supersedes(new, current),
+        }
+    }
+
+    fn goal_place_min_top_m(&self, memory: &Memory) -> Option<f32> {
+        self.features.goal_place_min_top_m(memory)
     }
 
     fn observe(&mut self, observation: &Observation, memory: &Memory, behavior: &BehaviorLog) {
-        self.features.observe(memory);
+        self.expert.observe(observation, memory, behavior);
+        self.features.observe(memory, behavior);
         if let RolloutActor::Learner(learner) = &mut self.actor {
             learner.observe(observation, memory, behavior);
         }
@@ -127,47 +194,54 @@ pub struct CloningMetrics {
     pub value_loss: f64,
 }
 
-/// Settings of one epoch of behavior cloning.
+/// Settings of the optimizer steps of one iteration.
 #[derive(Clone, Copy, Debug)]
-pub struct EpochConfig<'a> {
+pub struct FitConfig<'a> {
     /// Optimizer.
-    pub adam: &'a AdamWConfig,
-    /// Learning rate.
-    pub learning_rate: f32,
+    pub optimizer: Optimizer<'a>,
+    /// Number of optimizer steps.
+    pub n_steps: usize,
     /// Demonstrations per optimizer step.
     pub batch_size: usize,
-    /// Seed of the shuffle.
+    /// Seed of the batches.
     pub seed: u64,
-    /// Index of the epoch, which selects the shuffle.
+    /// Index of the iteration, which selects the batches.
     pub iteration: u64,
 }
 
-/// Trains one epoch of behavior cloning; `iteration` seeds the shuffle. Returns `None` if `stop` is
-/// raised; some steps may have been taken.
-pub fn train_epoch(
-    config: &EpochConfig<'_>,
+/// Fits the network to the demonstrations of these episodes. Each demonstration of a batch is drawn
+/// from a random episode, so that episodes count equally. Returns `None` if `stop` is raised; some
+/// steps may have been taken.
+pub fn fit(
+    config: &FitConfig<'_>,
     model: &CandidateScorer,
     learner: &mut Learner,
-    demonstrations: &[Demonstration],
+    episodes: &[&[Demonstration]],
     stop: &AtomicBool,
 ) -> Option<CloningMetrics> {
-    let EpochConfig { adam, learning_rate, batch_size, seed, iteration } = *config;
-    let mut order: Vec<usize> = (0..demonstrations.len()).collect();
-    RngStream::new(seed, "lessons", iteration).shuffle(&mut order);
+    let FitConfig { optimizer, n_steps, batch_size, seed, iteration } = *config;
+    let episodes: Vec<&[Demonstration]> =
+        episodes.iter().copied().filter(|episode| !episode.is_empty()).collect();
+    let mut rng = RngStream::new(seed, "demonstrations", iteration);
     let mut sum = CloningMetrics::default();
-    for batch in order.chunks(batch_size) {
+    let n_steps = if episodes.is_empty() { 0 } else { n_steps };
+    for _ in 0..n_steps {
         if stop.load(Ordering::Relaxed) {
             return None;
         }
-        let batch: Vec<&Demonstration> = batch.iter().map(|k| &demonstrations[*k]).collect();
+        let mut draw = || {
+            let episode = episodes[rng.below(episodes.len())];
+            &episode[rng.below(episode.len())]
+        };
+        let batch: Vec<&Demonstration> = (0..batch_size).map(|_| draw()).collect();
         let shards = optimizer_step(
             model,
             learner,
-            adam,
-            learning_rate,
+            optimizer,
             &batch,
             |demonstration| &demonstration.observation,
             gradient,
+            |_| true,
         );
         for stats in shards {
             sum.loss += stats.loss;
@@ -175,7 +249,7 @@ pub fn train_epoch(
             sum.value_loss += stats.value_loss;
         }
     }
-    let n = demonstrations.len().max(1) as f64;
+    let n = (n_steps * batch_size).max(1) as f64;
     let (loss, agreement) = (sum.loss / n, sum.agreement / n);
     Some(CloningMetrics { loss, agreement, value_loss: sum.value_loss / n })
 }

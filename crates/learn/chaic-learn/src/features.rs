@@ -1,27 +1,30 @@
 //! Feature encoding of a plan choice: one vector for the state and one per candidate plan. All
-//! features follow from the helper's memory and briefing. They are scaled so that most lie between
-//! 0 and 1.
+//! features follow from the helper's memory, its briefing, and the belief that it forms from them.
+//! They are scaled so that most lie between 0 and 1.
 
 use std::sync::Arc;
 
+use chaic_agents::behavior::BehaviorLog;
+use chaic_agents::belief::Belief;
 use chaic_agents::decision::{Context, HandState, Plan};
 use chaic_agents::mapping::MappedObject;
 use chaic_agents::memory::Memory;
-use chaic_agents::track::TrackId;
 use chaic_core::briefing::CompanionRole;
+use chaic_core::capability::Persona;
 use chaic_core::geom::{horizontal_distance, to_xz};
-use chaic_core::{Briefing, ClassId, Frame, Role, Vec3};
-use chaic_nn::Pass;
+use chaic_core::{Briefing, ClassId, Role, Vec3};
 
 use crate::candidate_scorer::CandidateSet;
 use crate::opponent::network::{N_GOALS, OpponentModel, OpponentPrediction};
-use crate::opponent::window::ObservationHistory;
+use crate::opponent::tracker::OpponentTracker;
 use crate::opponent::{N_LIMITS, OpponentGoal};
-use crate::scales::{TARGET_SETS, flag, normalize_clamped, recency};
+use crate::plan_history::PlanHistory;
+use crate::scales::{TARGET_SETS, flag, log_mass, normalize_clamped, recency};
 
-/// Features of the state. Two per target set follow: the number of its objects that the partner is
-/// believed to have taken, and of those available.
-pub const STATE_FEATURES: [&str; 30] = [
+/// Features of the state. Three per target set follow: the number of its objects that the partner
+/// is believed to have taken, the number available, and the probability that it is the partner's.
+/// The probability of each of [`PERSONAS`] comes last.
+pub const STATE_FEATURES: [&str; 34] = [
     "time_left",
     "horizon",
     "free_hands",
@@ -47,6 +50,10 @@ pub const STATE_FEATURES: [&str; 30] = [
     "partner_n_taken",
     "partner_n_failed",
     "partner_failed_height",
+    "partner_age",
+    "partner_n_certain",
+    "goal_entropy",
+    "partner_can_put",
     "has_child",
     "child_recency",
     "child_is_away",
@@ -56,7 +63,7 @@ pub const STATE_FEATURES: [&str; 30] = [
 
 /// Features of a plan, after a one-hot of [`Plan::KINDS`] and before one flag per target set of the
 /// plan's object.
-pub const PLAN_FEATURES: [&str; 22] = [
+pub const PLAN_FEATURES: [&str; 26] = [
     "is_last_plan",
     "is_nearest_of_kind",
     "path_length",
@@ -79,10 +86,18 @@ pub const PLAN_FEATURES: [&str; 22] = [
     "n_failures",
     "age",
     "n_chosen_of_kind",
+    "wanted_probability",
+    "expected_missing",
+    "partner_reach_probability",
+    "partner_lift_probability",
 ];
 
+/// Kinds of people that a partner can be.
+const PERSONAS: [Persona; 5] =
+    [Persona::Adult, Persona::Child, Persona::Wheelchair, Persona::Rider, Persona::Frail];
+
 /// Number of state features.
-pub const N_STATE: usize = STATE_FEATURES.len() + 2 * TARGET_SETS.len();
+pub const N_STATE: usize = STATE_FEATURES.len() + 3 * TARGET_SETS.len() + PERSONAS.len();
 /// Number of plan features.
 pub const N_PLAN: usize = N_KINDS + PLAN_FEATURES.len() + TARGET_SETS.len();
 /// Number of additional state features with an opponent model: goal probabilities and limits.
@@ -91,63 +106,13 @@ pub const N_OPPONENT_STATE: usize = N_GOALS + N_LIMITS;
 /// plan's class is the partner's target, alone and times that of the goal to pick up.
 pub const N_OPPONENT_PLAN: usize = 2;
 /// Number of kinds of plans.
-const N_KINDS: usize = Plan::KINDS.len();
+pub(crate) const N_KINDS: usize = Plan::KINDS.len();
 
-/// Scales of distances (m), durations (frames) and masses (kg).
+/// Scales of distances (m) and durations (frames).
 const DISTANCE_SCALE_M: f32 = 20.0;
 const TIME_SCALE_FRAMES: f32 = 3000.0;
-const MASS_SCALE_KG: f32 = 20.0;
 /// Approximate walking speed, meters per frame, to estimate the remaining time.
 const WALKING_M_PER_FRAME: f32 = 0.04;
-
-/// Number of frames after which a plan is reconsidered.
-const RECONSIDER_AFTER_FRAMES: Frame = 150;
-
-/// History of a policy's choices.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct PlanHistory {
-    /// Last chosen plan.
-    pub last: Option<Plan>,
-    /// Frame of the last choice.
-    pub last_frame: Frame,
-    /// Number of choices by kind of plan.
-    pub n_chosen_by_kind: [u32; N_KINDS],
-    /// Current plan that is being reconsidered.
-    reconsidered: Option<Plan>,
-}
-
-impl PlanHistory {
-    /// Records a choice at a frame.
-    pub fn record(&mut self, plan: Plan, frame: Frame) {
-        if self.reconsidered.take() != Some(plan) {
-            self.n_chosen_by_kind[plan.kind()] += 1;
-        }
-        self.last = Some(plan);
-        self.last_frame = frame;
-    }
-
-    /// Returns whether a new choice is due although `current` is not finished.
-    pub fn is_due(&mut self, frame: Frame, current: &Plan, is_news: bool) -> bool {
-        let is_committed = matches!(current, Plan::Deliver | Plan::PutIn | Plan::LiftWith(_));
-        let is_due =
-            !is_committed && (is_news || frame >= self.last_frame + RECONSIDER_AFTER_FRAMES);
-        self.reconsidered = is_due.then_some(*current);
-        is_due
-    }
-
-    /// Returns whether the next choice reconsiders a current plan.
-    pub fn is_reconsidering(&self) -> bool {
-        self.reconsidered.is_some()
-    }
-
-    /// Returns the candidates among the valid plans; never empty. While a plan is reconsidered,
-    /// they are that plan and those that [supersede](Plan::supersedes) it.
-    pub fn candidates(&self, valid: &[Plan]) -> Vec<Plan> {
-        let Some(current) = self.reconsidered else { return valid.to_vec() };
-        let alternatives = valid.iter().filter(|plan| plan.supersedes(&current));
-        std::iter::once(&current).chain(alternatives).copied().collect()
-    }
-}
 
 /// Returns the classes of objects that the partner is believed to have taken: seen taken or held by
 /// it, or missing from their place and not handled by the helper.
@@ -169,86 +134,79 @@ fn taken_by_partner(context: &Context<'_>) -> Vec<ClassId> {
     tracks.into_iter().map(|(_, class)| class).collect()
 }
 
-/// Returns the objects of the partner's observed failed actions, with their class if known.
-fn failed_by_partner(context: &Context<'_>) -> Vec<(TrackId, Option<ClassId>)> {
-    let Context { briefing, memory, behavior, .. } = context;
-    let partner = briefing.companion(CompanionRole::Partner);
-    let failed = behavior.actions.iter().filter(|observed| {
-        Some(observed.agent) == partner && observed.outcome.is_some_and(|o| !o.is_success())
-    });
-    let class = |track| memory.objects.get(track).map(|t| t.class);
-    failed
-        .filter_map(|observed| observed.action.subject())
-        .map(|track| (track, class(track)))
-        .collect()
-}
-
 /// Returns the fraction of the scene that is unexplored.
 fn unexplored(memory: &Memory) -> f32 {
     let n = memory.map.grid().n_cells();
     (0..n).filter(|cell| memory.map.is_unexplored(*cell)).count() as f32 / n.max(1) as f32
 }
 
-/// Encoder of plan choices, with the history that the memory lacks.
+/// Encoder of plan choices, with the history and the belief that the memory lacks.
 #[derive(Clone)]
 pub struct FeatureEncoder {
     /// Previous choices.
     pub history: PlanHistory,
-    opponent: Option<OpponentState>,
-}
-
-/// Opponent model with its observation history.
-#[derive(Clone)]
-struct OpponentState {
-    model: Arc<OpponentModel>,
-    pass: Pass,
-    window: ObservationHistory,
-    briefing: Option<Briefing>,
+    episode: Option<(Briefing, Belief)>,
+    opponent: Option<OpponentTracker>,
 }
 
 impl FeatureEncoder {
     /// Creates an encoder, with an opponent model if there is one.
     pub fn new(opponent: Option<Arc<OpponentModel>>) -> FeatureEncoder {
-        let state = |model: Arc<OpponentModel>| OpponentState {
-            pass: model.pass(),
-            model,
-            window: ObservationHistory::default(),
-            briefing: None,
-        };
-        FeatureEncoder { history: PlanHistory::default(), opponent: opponent.map(state) }
+        let opponent = opponent.map(OpponentTracker::new);
+        FeatureEncoder { history: PlanHistory::default(), episode: None, opponent }
     }
 
     /// Starts an episode.
     pub fn reset(&mut self, briefing: &Briefing) {
-        self.history = PlanHistory::default();
-        if let Some(state) = &mut self.opponent {
-            state.window.reset(briefing);
-            state.briefing = Some(briefing.clone());
+        self.history = PlanHistory::new(briefing);
+        self.episode = Some((briefing.clone(), Belief::new(briefing)));
+        if let Some(opponent) = &mut self.opponent {
+            opponent.reset(briefing);
         }
     }
 
     /// Adds an observation, after the memory has.
-    pub fn observe(&mut self, memory: &Memory) {
-        if let Some(OpponentState { window, briefing: Some(briefing), .. }) = &mut self.opponent {
-            window.add(memory, briefing);
+    pub fn observe(&mut self, memory: &Memory, behavior: &BehaviorLog) {
+        let Some((briefing, belief)) = &mut self.episode else { return };
+        belief.observe(briefing, memory, behavior);
+        if let Some(opponent) = &mut self.opponent {
+            opponent.observe(memory, briefing);
         }
+    }
+
+    /// The belief about the partner, once an episode has begun.
+    pub fn belief(&self) -> Option<&Belief> {
+        self.episode.as_ref().map(|(_, belief)| belief)
+    }
+
+    /// Minimum height of goal places that count in every task that the partner may have, meters.
+    pub fn goal_place_min_top_m(&self, memory: &Memory) -> Option<f32> {
+        let (briefing, belief) = self.episode.as_ref()?;
+        belief.goal_place_min_top_m(briefing, memory)
     }
 
     /// Encodes a choice between these plans.
     pub fn encode(&mut self, context: &Context<'_>, candidates: &[Plan]) -> CandidateSet {
-        let mut encoded = encode_plans(context, candidates, &self.history);
-        let Some(OpponentState { model, pass, window, .. }) = &mut self.opponent else {
+        let prior;
+        let belief = match &self.episode {
+            Some((_, belief)) => belief,
+            None => {
+                prior = Belief::new(context.briefing);
+                &prior
+            }
+        };
+        let mut encoded = encode_plans(context, belief, candidates, &self.history);
+        let Some(opponent) = &mut self.opponent else {
             return encoded;
         };
-        let encoded_window = window.encode(context.memory, context.briefing, context.behavior);
-        let OpponentPrediction { goals, targets, limits } = model.predict(&encoded_window, pass);
+        let Context { memory, briefing, behavior, .. } = *context;
+        let prediction = opponent.predict(memory, briefing, behavior);
+        let OpponentPrediction { goals, limits, .. } = &prediction;
         encoded.state.extend(goals);
         encoded.state.extend(limits);
         let rows = encoded.candidates.chunks_exact(N_PLAN).zip(candidates);
-        let target_probability = |plan: &Plan| {
-            let class = plan.subject()?.class;
-            window.classes().iter().position(|c| *c == class).map(|k| targets[k])
-        };
+        let target_probability =
+            |plan: &Plan| Some(opponent.target_probability(&prediction, plan.subject()?.class));
         encoded.candidates = rows
             .flat_map(|(row, plan)| {
                 let p = target_probability(plan).unwrap_or(0.0);
@@ -262,31 +220,36 @@ impl FeatureEncoder {
 /// Data that all plans of a decision share.
 struct DecisionContext<'a> {
     memory: &'a Memory,
+    belief: &'a Belief,
     history: &'a PlanHistory,
     time_left_frames: f32,
     strength_kg: f32,
     partner: Option<Vec3>,
     goal: Option<(Vec3, f32)>,
     taken: Vec<ClassId>,
-    failed: Vec<(TrackId, Option<ClassId>)>,
     available: Vec<ClassId>,
 }
 
 /// Encodes a choice without the opponent model.
-fn encode_plans(context: &Context<'_>, valid: &[Plan], history: &PlanHistory) -> CandidateSet {
+fn encode_plans(
+    context: &Context<'_>,
+    belief: &Belief,
+    valid: &[Plan],
+    history: &PlanHistory,
+) -> CandidateSet {
     let Context { briefing, memory, behavior, is_explored } = *context;
     let hands = HandState::new(&memory.hands, briefing);
     let taken = taken_by_partner(context);
-    let failed = failed_by_partner(context);
-    let failed_at = failed.iter().filter_map(|(track, _)| memory.objects.get(*track));
-    let failed_height =
-        failed_at.last().map_or(0.0, |t| normalize_clamped(t.position_in_world.y, 2.0));
+    let failed = &belief.evidence.failed;
+    let failed_height = failed.last().map_or(0.0, |f| normalize_clamped(f.top_m, 2.0));
+    let n_certain: f32 = belief.evidence.taken.values().map(|take| take.reliability()).sum();
     let available: Vec<ClassId> =
         memory.objects.iter().filter(|t| t.is_available(memory.frame)).map(|t| t.class).collect();
     let known =
         |classes: &[ClassId]| available.iter().filter(|c| classes.contains(c)).count() as f32;
-    let goal =
-        memory.goal_places().first().map(|(place, path_m)| (place.position_in_world, *path_m));
+    let goal_places = memory.goal_places();
+    let goal_place = goal_places.first();
+    let goal = goal_place.map(|(place, path_m)| (place.position_in_world, *path_m));
     let partner = memory.companion(briefing, CompanionRole::Partner);
     let child = memory.companion(briefing, CompanionRole::Child);
     let position = memory.pose.position;
@@ -323,6 +286,10 @@ fn encode_plans(context: &Context<'_>, valid: &[Plan], history: &PlanHistory) ->
         normalize_clamped(taken.len() as f32, 6.0),
         normalize_clamped(failed.len() as f32, 4.0),
         failed_height,
+        partner.map_or(1.0, |p| normalize_clamped((memory.frame - p.frame) as f32, 1000.0)),
+        normalize_clamped(n_certain, 6.0),
+        normalize_clamped(belief.goal.entropy_bits(), 3.0),
+        goal_place.map_or(0.5, |(place, _)| belief.constraint.put_probability(place.top_m)),
         flag(briefing.companion(CompanionRole::Child).is_some()),
         child.map_or(0.0, |c| recency(memory.frame - c.frame)),
         flag(memory.child_is_away(briefing)),
@@ -334,15 +301,19 @@ fn encode_plans(context: &Context<'_>, valid: &[Plan], history: &PlanHistory) ->
         let n_in_set = |set| classes.iter().filter(|c| c.info().sets.contains(set)).count();
         state.extend(TARGET_SETS.iter().map(|set| normalize_clamped(n_in_set(set) as f32, max)));
     }
+    let sets = belief.goal.set_probabilities();
+    state.extend(TARGET_SETS.map(|set| probability_of(&sets, &set)));
+    let people = belief.constraint.probabilities();
+    state.extend(PERSONAS.map(|persona| probability_of(&people, &persona)));
     let shared = DecisionContext {
         memory,
+        belief,
         history,
         time_left_frames,
         strength_kg: briefing.capability.strength_kg,
         partner: partner.map(|p| p.position_in_world),
         goal,
         taken,
-        failed,
         available,
     };
     let mut has_kind = [false; N_KINDS];
@@ -352,6 +323,11 @@ fn encode_plans(context: &Context<'_>, valid: &[Plan], history: &PlanHistory) ->
         shared.push_plan(plan, is_first, &mut features);
     }
     CandidateSet { state, candidates: features, n_candidates: valid.len() }
+}
+
+/// Returns the sum of the probabilities of one outcome.
+fn probability_of<T: PartialEq>(distribution: &[(T, f32)], outcome: &T) -> f32 {
+    distribution.iter().filter(|(x, _)| x == outcome).map(|(_, p)| p).sum()
 }
 
 impl DecisionContext<'_> {
@@ -384,7 +360,7 @@ impl DecisionContext<'_> {
         to.push((slack_frames / TIME_SCALE_FRAMES).clamp(-1.0, 1.0));
         let info = subject.map(|subject| subject.class.info());
         to.push(object.map_or(0.0, |t| normalize_clamped(t.position_in_world.y, 2.0)));
-        to.push(info.map_or(0.0, |i| normalize_clamped(i.mass_kg, MASS_SCALE_KG)));
+        to.push(info.map_or(0.0, |i| log_mass(i.mass_kg)));
         to.push(flag(info.is_some_and(|i| i.mass_kg > self.strength_kg)));
         to.push(flag(info.is_some_and(|i| i.role == Role::Fragile)));
         to.push(flag(info.is_some_and(|i| i.role == Role::Container)));
@@ -412,10 +388,9 @@ impl DecisionContext<'_> {
             if info.is_some() { self.taken.len() - n_taken_same_set } else { 0 };
         to.push(normalize_clamped(n_taken_other_sets as f32, 3.0));
         let track = subject.map(|subject| subject.track);
-        let n_failed_object =
-            self.failed.iter().filter(|(failed, _)| Some(*failed) == track).count();
-        let is_same_class = |other: Option<ClassId>| other.is_some() && other == class;
-        let n_failed_class = self.failed.iter().filter(|(_, class)| is_same_class(*class)).count();
+        let failed = self.belief.evidence.failed.iter();
+        let n_failed_object = failed.clone().filter(|f| Some(f.track) == track).count();
+        let n_failed_class = failed.filter(|f| Some(f.class) == class).count();
         to.push(normalize_clamped(n_failed_object as f32, 3.0));
         to.push(normalize_clamped(n_failed_class as f32, 3.0));
         to.push(object.map_or(0.0, |t| normalize_clamped(t.failures as f32, 3.0)));
@@ -425,6 +400,11 @@ impl DecisionContext<'_> {
             }),
         );
         to.push(normalize_clamped(self.history.n_chosen_by_kind[kind] as f32, 20.0));
+        let Belief { goal, constraint, .. } = self.belief;
+        to.push(class.map_or(0.0, |class| goal.probability_wanted(class)));
+        to.push(class.map_or(0.0, |c| normalize_clamped(goal.expected_missing(c), 3.0)));
+        to.push(object.map_or(0.0, |t| constraint.reach_probability(t.top_m)));
+        to.push(info.map_or(0.0, |i| constraint.lift_probability(i.mass_kg)));
         to.extend(TARGET_SETS.iter().map(|set| flag(info.is_some_and(|i| i.sets.contains(set)))));
         debug_assert_eq!(to.len() - start, N_PLAN);
     }

@@ -12,7 +12,8 @@ use chaic_nn::weights::{self, WeightsError};
 use serde::{Deserialize, Serialize};
 
 use crate::policy::{ActionSelection, LearnedPolicy, PolicyWeights, policy_helper};
-use crate::primitive::helper::{KIND, PrimitiveHelper, PrimitiveWeights};
+use crate::primitive::helper::{PrimitiveHelper, PrimitiveWeights};
+use crate::primitive::network::OpponentInput;
 use crate::train::from_bytes;
 
 /// File in a run's folder that lists its policies.
@@ -39,7 +40,9 @@ impl LoadedWeights {
     fn from_bytes(bytes: &[u8]) -> Result<LoadedWeights, WeightsError> {
         match from_bytes(bytes) {
             Ok((_, weights)) => Ok(LoadedWeights::Plans(Arc::new(weights))),
-            Err(WeightsError::Kind { found, .. }) if found == KIND => {
+            Err(WeightsError::Kind { found, .. })
+                if OpponentInput::ALL.iter().any(|input| input.kind() == found) =>
+            {
                 Ok(LoadedWeights::Actions(Arc::new(PrimitiveWeights::from_bytes(bytes)?)))
             }
             Err(problem) => Err(problem),
@@ -49,8 +52,8 @@ impl LoadedWeights {
     fn helper(&self, rules: PlannerRules, perception: &dyn PerceptionFactory) -> Helper {
         match self {
             LoadedWeights::Plans(weights) => {
-                let policy = LearnedPolicy::new(Arc::clone(weights), ActionSelection::Sample, None);
-                policy_helper(policy, rules, perception)
+                let policy = LearnedPolicy::new(Arc::clone(weights), ActionSelection::HELPER, None);
+                policy_helper(policy, rules, perception, weights.grants())
             }
             LoadedWeights::Actions(weights) => {
                 PrimitiveHelper::create(Arc::clone(weights), rules, perception)

@@ -26,6 +26,8 @@ pub mod opponent;
 pub mod features;
 
 pub mod cloning;
+pub mod demonstrations;
+mod plan_history;
 pub mod policy;
 mod reward_config;
 pub mod rollout;

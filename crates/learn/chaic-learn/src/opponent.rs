@@ -1,12 +1,14 @@
 //! Opponent model of Smart-Help (Cao et al. 2024; here as in the paper's appendix on learning).
 //! From a helper's last five observations it predicts the partner's goal and physical limits.
 //!
-//! [`window`] encodes the input, [`network`] has the model, [`collect`] collects labeled windows
+//! [`window`] encodes the input, [`network`] has the model, [`tracker`] runs it during an episode,
+//! [`collect`] collects labeled windows
 //! from generated episodes, and [`train`] and [`report`] train and evaluate the model.
 
 pub mod window;
 
 pub mod network;
+pub mod tracker;
 
 pub mod collect;
 pub mod report;

@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use chaic_agents::behavior::BehaviorLog;
 use chaic_agents::decision::{Context, Plan, Policy};
+use chaic_agents::helpers::explore_unknown_area;
 use chaic_agents::memory::Memory;
 use chaic_agents::perception_factory::PerceptionFactory;
 use chaic_agents::{PlannerRules, PlanningAgent};
@@ -18,15 +19,17 @@ use crate::actor_critic::ActorCritic as _;
 use crate::candidate_scorer::{CandidateScorer, CandidateSet};
 use crate::features::FeatureEncoder;
 use crate::opponent::network::OpponentModel;
+use crate::plan_history::may_replace;
 
-/// Creates a helper with this policy and the grants of the paper's helpers, as far as the
-/// perception needs them. It observes its partner through its perception.
+/// Creates a helper with this policy and these grants, as far as the perception needs them. It observes its partner through its perception, and explores as the helper
+/// that infers.
 pub fn policy_helper<P: Policy>(
     policy: P,
     rules: PlannerRules,
     perception: &dyn PerceptionFactory,
+    grants: Grants,
 ) -> Helper {
-    let grants = perception.grants(Grants::PLANNER);
+    let (grants, rules) = (perception.grants(grants), explore_unknown_area(rules));
     let agent = PlanningAgent::with_watched(policy, rules, perception, AgentId::PARTNER, grants);
     Helper { agent: Box::new(agent), grants }
 }
@@ -42,13 +45,32 @@ pub struct PolicyWeights {
     pub opponent: Option<Arc<OpponentModel>>,
 }
 
+impl PolicyWeights {
+    /// Returns the grants of a helper with this policy: those of the paper's helpers, and the
+    /// partner's actions if its opponent model needs them.
+    pub fn grants(&self) -> Grants {
+        let behavior = self.opponent.as_ref().is_some_and(|model| model.is_granted());
+        Grants { behavior, ..Grants::PLANNER }
+    }
+}
+
 /// Selection of an action from a distribution.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ActionSelection {
-    /// Sampled from the distribution.
-    Sample,
+    /// Sampled from the softmax of the logits divided by this temperature, above 0.
+    Sample {
+        /// 1 samples from the policy's distribution; lower values prefer probable actions.
+        temperature: f32,
+    },
     /// Most probable action.
     Greedy,
+}
+
+impl ActionSelection {
+    /// Samples from the policy's distribution, as during training.
+    pub const TRAINING: ActionSelection = ActionSelection::Sample { temperature: 1.0 };
+    /// Selection of helpers in runs.
+    pub const HELPER: ActionSelection = ActionSelection::Sample { temperature: 0.5 };
 }
 
 /// Recorded decision.
@@ -112,7 +134,9 @@ impl Policy for LearnedPolicy {
         let output =
             model.forward(parameters, std::iter::once(&observation), &mut self.pass).remove(0);
         let action = match self.selection {
-            ActionSelection::Sample => output.sample(self.rng.unit()),
+            ActionSelection::Sample { temperature } => {
+                output.sample_at(temperature, self.rng.unit())
+            }
             ActionSelection::Greedy => output.argmax(),
         };
         let plan = candidates[action];
@@ -131,11 +155,19 @@ impl Policy for LearnedPolicy {
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, is_news: bool) -> bool {
-        self.features.history.is_due(context.memory.frame, current, is_news)
+        self.features.history.is_due(context, current, is_news)
     }
 
-    fn observe(&mut self, _: &Observation, memory: &Memory, _: &BehaviorLog) {
-        self.features.observe(memory);
+    fn supersedes(&self, new: &Plan, current: &Plan) -> bool {
+        may_replace(new, current)
+    }
+
+    fn goal_place_min_top_m(&self, memory: &Memory) -> Option<f32> {
+        self.features.goal_place_min_top_m(memory)
+    }
+
+    fn observe(&mut self, _: &Observation, memory: &Memory, behavior: &BehaviorLog) {
+        self.features.observe(memory, behavior);
     }
 
     fn counters(&self) -> BTreeMap<String, u64> {

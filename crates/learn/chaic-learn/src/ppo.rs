@@ -4,14 +4,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use chaic_core::geom::math;
 use chaic_core::rng::RngStream;
-use chaic_nn::AdamWConfig;
+use chaic_nn::simd::widest;
+use chaic_nn::{AdamWConfig, Pass};
 use chaic_training::bounds::{
     ADAM, Bound, BoundTable, FRACTION, LEARNING_RATE, SHARDS, integer, real,
 };
 use chaic_training::{Learner, Metrics, metrics};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::actor_critic::{ActorCritic, ActorCriticOutput, OutputGrad, optimizer_step};
+use crate::actor_critic::{ActorCritic, ActorCriticOutput, Optimizer, OutputGrad, optimizer_step};
 use crate::candidate_scorer::CandidateSet;
 
 /// Hyperparameters of PPO, named as in Stable-Baselines3.
@@ -27,7 +29,7 @@ pub struct PpoConfig {
     /// Clip range of the probability ratio.
     #[serde(alias = "clip")]
     pub clip_range: f32,
-    /// Clip range of the value; 0 disables it.
+    /// Range in which the value may change in an update; 0 disables it.
     #[serde(alias = "clip_value")]
     pub clip_range_vf: f32,
     /// Coefficient of the entropy bonus.
@@ -36,6 +38,8 @@ pub struct PpoConfig {
     /// Coefficient of the value loss.
     #[serde(alias = "value")]
     pub vf_coef: f32,
+    /// Coefficient of the KL divergence from the initial policy (`--weights`), nats.
+    pub kl_coef: f32,
     /// Passes over the decisions of an iteration.
     #[serde(alias = "epochs")]
     pub n_epochs: usize,
@@ -50,8 +54,8 @@ pub struct PpoConfig {
     pub anneal_lr: bool,
     /// Parts of a minibatch that run in parallel.
     pub shards: usize,
-    /// Stops the update early once the approximate KL exceeds `1.5 * target_kl` (nats); 0 disables
-    /// it.
+    /// Ends the update before the first step whose approximate KL exceeds `1.5 * target_kl` (nats);
+    /// 0 disables it.
     #[serde(alias = "divergence")]
     pub target_kl: f32,
     /// Optimizer.
@@ -68,6 +72,7 @@ impl Default for PpoConfig {
             clip_range_vf: 0.0,
             ent_coef: 0.0,
             vf_coef: 0.5,
+            kl_coef: 0.0,
             n_epochs: 10,
             batch_size: 256,
             learning_rate: 3e-4,
@@ -86,7 +91,7 @@ impl Default for PpoConfig {
 }
 
 /// Returns the bounds of [`PpoConfig`] for minibatches of at most this many decisions.
-pub(crate) const fn ppo_bounds(max_batch: i64) -> [(&'static str, Bound); 12] {
+pub(crate) const fn ppo_bounds(max_batch: i64) -> [(&'static str, Bound); 13] {
     [
         ("gamma", FRACTION),
         ("gae_lambda", FRACTION),
@@ -95,6 +100,7 @@ pub(crate) const fn ppo_bounds(max_batch: i64) -> [(&'static str, Bound); 12] {
         ("clip_range_vf", real(0.0, 1e6)),
         ("ent_coef", real(0.0, 100.0)),
         ("vf_coef", real(0.0, 100.0)),
+        ("kl_coef", real(0.0, 100.0)),
         ("n_epochs", integer(1, 1000)),
         ("batch_size", integer(1, max_batch)),
         ("learning_rate", LEARNING_RATE),
@@ -120,7 +126,7 @@ pub struct Transition<S = CandidateSet> {
     pub log_prob: f32,
     /// Value estimate of the policy that chose it.
     pub value: f32,
-    /// Reward until the next decision or the end.
+    /// Rewards until the next decision or the end, discounted to this one.
     pub reward: f32,
     /// Duration until then, time units.
     pub duration: f32,
@@ -147,6 +153,8 @@ struct PpoSample<'a, S> {
     advantage: f32,
     /// Return that the value estimate is trained towards.
     value_target: f32,
+    /// Log-probabilities of the initial policy; empty without a KL penalty.
+    reference: Vec<f32>,
 }
 
 /// Metrics of an update.
@@ -154,14 +162,17 @@ struct PpoSample<'a, S> {
 pub struct PpoMetrics {
     /// Mean clipped surrogate loss.
     pub policy_loss: f64,
-    /// Mean of half the squared value error.
+    /// Mean squared value error.
     pub value_loss: f64,
     /// Mean entropy of the action distribution, nats.
     pub entropy: f64,
-    /// Approximate KL divergence from the old policy, nats (Schulman's non-negative estimator).
+    /// Approximate KL divergence from the old policy in the last epoch, nats (Schulman's
+    /// non-negative estimator).
     pub approx_kl: f64,
     /// Fraction of decisions whose ratio is clipped.
     pub clip_fraction: f64,
+    /// Mean KL divergence from the initial policy, nats; 0 without `kl_coef`.
+    pub reference_kl: f64,
     /// Explained variance of the returns before the update.
     pub explained_variance: f64,
 }
@@ -175,6 +186,7 @@ impl PpoMetrics {
             ("entropy", self.entropy),
             ("approx_kl", self.approx_kl),
             ("clip_fraction", self.clip_fraction),
+            ("reference_kl", self.reference_kl),
             ("explained_variance", self.explained_variance),
         ])
     }
@@ -212,15 +224,16 @@ pub struct Schedule {
     pub progress_remaining: f32,
 }
 
-/// Runs `n_epochs` of minibatch PPO on `trajectories`.
+/// Runs `n_epochs` of minibatch PPO on `trajectories`, as Stable-Baselines3 does.
 ///
-/// `schedule` seeds the shuffle and anneals the learning rate. Returns `None` if `stop` is raised;
+/// `reference` are the parameters of the policy that the KL penalty refers to. `schedule` seeds the shuffle and anneals the learning rate. Returns `None` if `stop` is raised;
 /// some steps may have been taken.
 pub fn update<M: ActorCritic>(
     config: &PpoConfig,
     model: &M,
     learner: &mut Learner,
     trajectories: &[Trajectory<M::Observation>],
+    reference: Option<&[f32]>,
     schedule: Schedule,
     stop: &AtomicBool,
 ) -> Option<PpoMetrics> {
@@ -228,12 +241,20 @@ pub fn update<M: ActorCritic>(
     for trajectory in trajectories {
         let advantages = compute_gae(config, trajectory);
         samples.extend(trajectory.transitions.iter().zip(advantages).map(|(t, advantage)| {
-            PpoSample { transition: t, advantage, value_target: advantage + t.value }
+            let value_target = advantage + t.value;
+            PpoSample { transition: t, advantage, value_target, reference: Vec::new() }
         }));
+    }
+    if let Some(reference) = reference {
+        samples.par_chunks_mut(REFERENCE_BATCH).for_each(|batch| {
+            let mut pass = Pass::new(model.network(), widest());
+            let observations = batch.iter().map(|s| &s.transition.observation);
+            let outputs = model.forward(reference, observations, &mut pass);
+            batch.iter_mut().zip(outputs).for_each(|(s, output)| s.reference = output.log_probs);
+        });
     }
     let mut metrics =
         PpoMetrics { explained_variance: explained_variance(&samples), ..PpoMetrics::default() };
-    normalize_advantages(&mut samples);
     let Schedule { seed, iteration, progress_remaining } = schedule;
     let learning_rate =
         config.learning_rate * if config.anneal_lr { progress_remaining } else { 1.0 };
@@ -242,32 +263,43 @@ pub fn update<M: ActorCritic>(
     'epochs: for epoch in 0..config.n_epochs {
         let index = iteration * config.n_epochs as u64 + epoch as u64;
         RngStream::new(seed, "batches", index).shuffle(&mut order);
+        let mut approx_kls: Vec<f64> = Vec::new();
         for batch in order.chunks(config.batch_size) {
             if stop.load(Ordering::Relaxed) {
                 return None;
             }
             let batch: Vec<&PpoSample<'_, M::Observation>> =
                 batch.iter().map(|k| &samples[*k]).collect();
+            let normalizer = AdvantageNormalizer::new(&batch);
+            let mean_over_batch = |shards: &[PpoMetrics], metric: fn(&PpoMetrics) -> f64| {
+                shards.iter().map(metric).sum::<f64>() / batch.len() as f64
+            };
+            let exceeds_target = |shards: &[PpoMetrics]| {
+                let approx_kl = mean_over_batch(shards, |m| m.approx_kl);
+                config.target_kl > 0.0 && approx_kl > 1.5 * f64::from(config.target_kl)
+            };
             let shards = optimizer_step(
                 model,
                 learner,
-                &config.adam,
-                learning_rate,
+                Optimizer { adam: &config.adam, learning_rate },
                 &batch,
                 |sample| &sample.transition.observation,
-                |sample, output, weight, stats| gradient(config, sample, output, weight, stats),
+                |sample, output, weight, stats| {
+                    let advantage = normalizer.apply(sample.advantage);
+                    gradient(config, sample, advantage, output, weight, stats)
+                },
+                |shards| !exceeds_target(shards),
             );
-            let mean = |metric: fn(&PpoMetrics) -> f64| {
-                shards.iter().map(metric).sum::<f64>() / batch.len() as f64
-            };
-            let approx_kl = mean(|m| m.approx_kl);
+            let mean = |metric: fn(&PpoMetrics) -> f64| mean_over_batch(&shards, metric);
             metrics.policy_loss += mean(|m| m.policy_loss);
             metrics.value_loss += mean(|m| m.value_loss);
             metrics.entropy += mean(|m| m.entropy);
-            metrics.approx_kl += approx_kl;
+            approx_kls.push(mean(|m| m.approx_kl));
+            metrics.approx_kl = approx_kls.iter().sum::<f64>() / approx_kls.len() as f64;
             metrics.clip_fraction += mean(|m| m.clip_fraction);
+            metrics.reference_kl += mean(|m| m.reference_kl);
             n_batches += 1.0;
-            if config.target_kl > 0.0 && approx_kl > 1.5 * f64::from(config.target_kl) {
+            if exceeds_target(&shards) {
                 break 'epochs;
             }
         }
@@ -277,58 +309,83 @@ pub fn update<M: ActorCritic>(
         policy_loss: metrics.policy_loss / n,
         value_loss: metrics.value_loss / n,
         entropy: metrics.entropy / n,
-        approx_kl: metrics.approx_kl / n,
+        approx_kl: metrics.approx_kl,
         clip_fraction: metrics.clip_fraction / n,
+        reference_kl: metrics.reference_kl / n,
         explained_variance: metrics.explained_variance,
     })
 }
 
 /// Returns the gradient of the loss of one decision times `weight`, and adds its metrics.
+/// `advantage` is normalized.
 fn gradient<S>(
     config: &PpoConfig,
     sample: &PpoSample<'_, S>,
+    advantage: f32,
     output: &ActorCriticOutput,
     weight: f32,
     metrics: &mut PpoMetrics,
 ) -> OutputGrad {
-    let PpoSample { transition, advantage, value_target } = sample;
+    let PpoSample { transition, value_target, reference, .. } = sample;
     let log_ratio = output.log_probs[transition.action] - transition.log_prob;
     let ratio = math::exp(log_ratio);
     let clipped = ratio.clamp(1.0 - config.clip_range, 1.0 + config.clip_range);
     let is_clipped = clipped * advantage < ratio * advantage;
     let grad_log_prob = if is_clipped { 0.0 } else { -advantage * ratio };
     let entropy = output.entropy();
-    let probability = output.log_probs.iter().map(|l| (math::exp(*l), *l));
-    let logits = probability.enumerate().map(|(k, (p, l))| {
+    // Log-ratios to the initial policy, whose mean is the KL divergence.
+    let reference_ratio = |k: usize| reference.get(k).map_or(0.0, |r| output.log_probs[k] - r);
+    let probability = output.log_probs.iter().map(|l| (math::exp(*l), *l)).enumerate();
+    let reference_kl: f32 = probability.clone().map(|(k, (p, _))| p * reference_ratio(k)).sum();
+    let logits = probability.map(|(k, (p, l))| {
         let grad_logit = f32::from(u8::from(k == transition.action)) - p;
-        weight * (grad_log_prob * grad_logit + config.ent_coef * p * (l + entropy))
+        let grad_entropy = -p * (l + entropy);
+        let grad_kl = p * (reference_ratio(k) - reference_kl);
+        let grad = grad_log_prob * grad_logit - config.ent_coef * grad_entropy;
+        weight * (grad + config.kl_coef * grad_kl)
     });
     let logits = logits.collect();
-    let error = output.value() - value_target;
-    let value_change = output.value() - transition.value;
-    // A clipped value with no smaller error has no gradient.
-    let clipped_error = transition.value
-        + value_change.clamp(-config.clip_range_vf, config.clip_range_vf)
-        - value_target;
-    let is_clipped_value =
-        config.clip_range_vf > 0.0 && clipped_error * clipped_error > error * error;
-    let grad_value = if is_clipped_value { 0.0 } else { weight * config.vf_coef * error };
+    let change = output.value() - transition.value;
+    let is_clipped_value = config.clip_range_vf > 0.0 && change.abs() > config.clip_range_vf;
+    // A clipped value does not depend on the network.
+    let (value, slope) = if is_clipped_value {
+        (transition.value + change.clamp(-config.clip_range_vf, config.clip_range_vf), 0.0)
+    } else {
+        (output.value(), 1.0)
+    };
+    let error = value - value_target;
+    let grad_value = slope * weight * config.vf_coef * 2.0 * error;
     metrics.policy_loss -= f64::from((ratio * advantage).min(clipped * advantage));
-    metrics.value_loss += f64::from(0.5 * error * error);
+    metrics.value_loss += f64::from(error * error);
+    metrics.reference_kl += f64::from(reference_kl);
     metrics.entropy += f64::from(entropy);
     metrics.approx_kl += f64::from(ratio - 1.0 - log_ratio);
     metrics.clip_fraction += f64::from(u8::from((ratio - 1.0).abs() > config.clip_range));
     OutputGrad { logits, values: vec![grad_value] }
 }
 
-/// Normalizes the advantages to mean 0 and variance 1.
-fn normalize_advantages<S>(samples: &mut [PpoSample<'_, S>]) {
-    let n = samples.len().max(1) as f64;
-    let mean = samples.iter().map(|s| f64::from(s.advantage)).sum::<f64>() / n;
-    let variance = samples.iter().map(|s| square(f64::from(s.advantage) - mean)).sum::<f64>() / n;
-    let std_dev = variance.sqrt() + 1e-8;
-    for sample in samples {
-        sample.advantage = ((f64::from(sample.advantage) - mean) / std_dev) as f32;
+/// Number of decisions whose initial policy is evaluated together.
+const REFERENCE_BATCH: usize = 256;
+
+/// Normalizes the advantages of a minibatch to mean 0 and variance 1; a single one is unchanged.
+struct AdvantageNormalizer {
+    mean: f64,
+    std_dev: f64,
+}
+
+impl AdvantageNormalizer {
+    fn new<S>(batch: &[&PpoSample<'_, S>]) -> AdvantageNormalizer {
+        let n = batch.len() as f64;
+        if batch.len() < 2 {
+            return AdvantageNormalizer { mean: 0.0, std_dev: 1.0 };
+        }
+        let mean = batch.iter().map(|s| f64::from(s.advantage)).sum::<f64>() / n;
+        let sum_squares = batch.iter().map(|s| square(f64::from(s.advantage) - mean)).sum::<f64>();
+        AdvantageNormalizer { mean, std_dev: (sum_squares / (n - 1.0)).sqrt() + 1e-8 }
+    }
+
+    fn apply(&self, advantage: f32) -> f32 {
+        ((f64::from(advantage) - self.mean) / self.std_dev) as f32
     }
 }
 
@@ -386,8 +443,11 @@ mod tests {
             values: vec![0.0],
         };
         let grad = |p: f32, advantage: f32| {
-            let sample = PpoSample { transition: &transition, advantage, value_target: 0.0 };
-            gradient(&config, &sample, &output(p), 1.0, &mut PpoMetrics::default()).logits[0]
+            let transition = &transition;
+            let sample =
+                PpoSample { transition, advantage, value_target: 0.0, reference: Vec::new() };
+            let metrics = &mut PpoMetrics::default();
+            gradient(&config, &sample, advantage, &output(p), 1.0, metrics).logits[0]
         };
         assert!(grad(0.5, 1.0) < 0.0 && grad(0.5, -1.0) > 0.0);
         assert_eq!(grad(0.7, 1.0), 0.0);

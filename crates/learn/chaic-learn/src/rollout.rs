@@ -3,12 +3,15 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, PoisonError};
 
+use chaic_agents::HelperInfo;
 use chaic_agents::decision::Policy;
 use chaic_agents::perception_factory::PerceptionFactory;
 use chaic_core::briefing::Goal;
 use chaic_core::geom::math;
+use chaic_core::observation::Grants;
 use chaic_core::rng::RngStream;
 use chaic_core::{AgentError, AgentId, Frame};
+use chaic_env::helper_registry::Helper;
 use chaic_env::rules::RuleSet;
 use chaic_env::{
     AdvanceOutcome, Env, EnvError, EpisodeAgents, EpisodeConfig, RewardTracker, RewardWeights,
@@ -17,7 +20,7 @@ use chaic_env::{
 use chaic_episodes::{SplitError, find_episode};
 use rayon::prelude::*;
 
-use crate::cloning::{Demonstration, ExpertPolicy, sample_actor};
+use crate::cloning::{Demonstration, ExpertInfo, ExpertPolicy, sample_actor};
 use crate::policy::{
     ActionSelection, LearnedPolicy, PolicyWeights, StepLog, StepRecord, policy_helper,
 };
@@ -48,6 +51,8 @@ pub struct RolloutContext<'a> {
     pub selection: ActionSelection,
     /// Weights of the reward terms.
     pub rewards: RewardWeights,
+    /// Discount factor per frame, of rewards between two decisions.
+    pub gamma: f32,
     /// Stop flag; a stopped rollout returns nothing.
     pub stop: &'a AtomicBool,
 }
@@ -73,13 +78,18 @@ struct EpisodeRecording {
 }
 
 impl EpisodeRecording {
-    /// Returns the cumulative reward at the start of a frame.
-    fn reward_at(&self, frame: Frame) -> f32 {
-        let k = self.cumulative_rewards.partition_point(|(f, _)| *f < frame);
-        self.cumulative_rewards
-            .get(k)
-            .or(self.cumulative_rewards.last())
-            .map_or(0.0, |(_, reward)| *reward)
+    /// Returns the sum of the rewards from one frame to another, discounted to the first.
+    fn discounted_reward(&self, start: Frame, end: Frame, gamma: f32) -> f32 {
+        let from = self.cumulative_rewards.partition_point(|(frame, _)| *frame < start);
+        let mut sum = 0.0;
+        for pair in self.cumulative_rewards[from..].windows(2) {
+            let [(_, before), (frame, after)] = [pair[0], pair[1]];
+            if frame > end {
+                break;
+            }
+            sum += math::powf(gamma, (frame - start) as f32) * (after - before);
+        }
+        sum
     }
 
     /// Returns the end frame of each decision.
@@ -94,12 +104,13 @@ fn record_episode<P: Policy>(
     id: &str,
     seed: u32,
     context: &RolloutContext<'_>,
+    grants: Grants,
     make_policy: impl FnOnce(&Goal, StepLog) -> P,
 ) -> Result<Option<EpisodeRecording>, RolloutError> {
     let episode = find_episode(id)?;
     let log = StepLog::default();
     let policy = make_policy(&episode.setup().goal, Arc::clone(&log));
-    let helper = policy_helper(policy, RuleSet::PAPER.planner, context.perception);
+    let helper = policy_helper(policy, RuleSet::PAPER.planner, context.perception, grants);
     let config = EpisodeConfig {
         seed,
         image_size: Some(context.image_size),
@@ -137,7 +148,7 @@ pub fn rollout(
     weights: &Arc<PolicyWeights>,
     context: &RolloutContext<'_>,
 ) -> Result<Option<EpisodeResult>, RolloutError> {
-    let recording = record_episode(id, seed, context, |_, log| {
+    let recording = record_episode(id, seed, context, weights.grants(), |_, log| {
         LearnedPolicy::new(Arc::clone(weights), context.selection, Some(log))
     })?;
     let Some(recording) = recording else { return Ok(None) };
@@ -146,7 +157,7 @@ pub fn rollout(
             action: record.action,
             log_prob: record.log_prob,
             value: record.value,
-            reward: recording.reward_at(end) - recording.reward_at(record.frame),
+            reward: recording.discounted_reward(record.frame, end, context.gamma),
             duration: (end - record.frame) as f32,
             observation: record.observation.clone(),
         });
@@ -156,7 +167,7 @@ pub fn rollout(
 
 /// Plays an episode in which the expert labels the decisions, driven by the expert or, with
 /// probability `learner_fraction`, by the network. Returns the demonstrations and the transport
-/// rate; `None` if it was stopped. `gamma` is the discount per frame.
+/// rate; `None` if it was stopped.
 ///
 /// # Errors
 /// [`RolloutError`]
@@ -165,14 +176,14 @@ pub fn rollout_with_expert(
     seed: u32,
     weights: &Arc<PolicyWeights>,
     context: &RolloutContext<'_>,
+    expert: &ExpertInfo,
     learner_fraction: f32,
-    gamma: f32,
 ) -> Result<Option<(Vec<Demonstration>, f64)>, RolloutError> {
-    let learner = || LearnedPolicy::new(Arc::clone(weights), ActionSelection::Sample, None);
-    let recording = record_episode(id, seed, context, |goal, log| {
+    let learner = || LearnedPolicy::new(Arc::clone(weights), context.selection, None);
+    let recording = record_episode(id, seed, context, weights.grants(), |goal, log| {
         let mut rng = RngStream::new(u64::from(seed), id, 0);
         let actor = sample_actor(learner_fraction, &mut rng, learner);
-        ExpertPolicy::new(goal.clone(), actor, weights.opponent.clone(), log)
+        ExpertPolicy::new(expert, goal, actor, weights.opponent.clone(), log)
     })?;
     let Some(recording) = recording else { return Ok(None) };
     let ends: Vec<Frame> = recording.ends().collect();
@@ -183,8 +194,9 @@ pub fn rollout_with_expert(
         .zip(&ends)
         .rev()
         .map(|(record, end)| {
-            let reward = recording.reward_at(*end) - recording.reward_at(record.frame);
-            value_target = reward + math::powf(gamma, (end - record.frame) as f32) * value_target;
+            let reward = recording.discounted_reward(record.frame, *end, context.gamma);
+            let discount = math::powf(context.gamma, (end - record.frame) as f32);
+            value_target = reward + discount * value_target;
             Demonstration {
                 observation: record.observation.clone(),
                 action: record.action,
@@ -194,6 +206,36 @@ pub fn rollout_with_expert(
         .collect();
     demonstrations.reverse();
     Ok(Some((demonstrations, recording.tr)))
+}
+
+/// Plays an episode with a built-in helper and returns its transport rate; `None` if it was
+/// stopped.
+///
+/// # Errors
+/// [`RolloutError`]
+pub fn rollout_built_in(
+    helper: &HelperInfo,
+    id: &str,
+    seed: u32,
+    context: &RolloutContext<'_>,
+) -> Result<Option<f64>, RolloutError> {
+    let episode = find_episode(id)?;
+    let planner = RuleSet::PAPER.planner;
+    let agent = (helper.make)(planner, context.perception);
+    let helper = Helper { agent, grants: context.perception.grants((helper.grants)(planner)) };
+    let config = EpisodeConfig {
+        seed,
+        image_size: Some(context.image_size),
+        ..EpisodeConfig::new(&episode, "baseline")
+    };
+    let agents = EpisodeAgents::new(Some(seeded_by_episode(helper, &config)), None);
+    let mut env = Env::new(config, agents)?;
+    env.run(context.stop, None, &mut |_| Ok::<(), AgentError>(()))?;
+    if context.stop.load(Ordering::Relaxed) {
+        return Ok(None);
+    }
+    let (done, total) = env.world().progress();
+    Ok(Some(if total > 0.0 { done / total } else { 0.0 }))
 }
 
 /// Plays episodes in parallel; results do not depend on the number of threads. Returns `None` if it

@@ -1,9 +1,10 @@
 //! Configuration of the episodes that trainings of policies play.
 
-use std::path::PathBuf;
-use std::sync::Arc;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
 
+use chaic_agents::HelperInfo;
 use chaic_agents::perception_factory::{GROUND_TRUTH, PerceptionFactory};
 use chaic_core::TaskId;
 use chaic_core::rng::RngStream;
@@ -11,15 +12,18 @@ use chaic_env::RewardWeights;
 use chaic_episodes::SeedRange;
 use chaic_files::read_user_file;
 use chaic_training::bounds::{Bound, BoundTable, integer, real};
-use chaic_training::{Metrics, TrainingError};
+use chaic_training::{Metrics, TrainingError, metrics};
 use chaic_vision::perception_registry::{self, PerceptionError};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::opponent::network::OpponentModel;
 use crate::policy::{ActionSelection, PolicyWeights};
 use crate::reward_config;
-use crate::rollout::{EpisodeResult, RolloutContext, rollout_all};
+use crate::rollout::{EpisodeResult, RolloutContext, rollout_all, rollout_built_in};
 
+/// Generators of episodes.
+pub(crate) const GENERATORS: [&str; 2] = ["gen", "gen-standard"];
 /// Maximum size of a weights file, bytes.
 const MAX_BYTES: u64 = 1 << 28;
 
@@ -53,6 +57,9 @@ pub struct RolloutConfig {
     pub episodes: usize,
     /// Tasks, whose episodes take turns.
     pub tasks: Vec<TaskId>,
+    /// Generators whose episodes take turns: `gen` (as the paper's) and `gen-standard` (as the
+    /// standard split).
+    pub splits: Vec<String>,
     /// Width and height of all agents' images during training, pixels.
     pub image_size: u32,
     /// Perception of the helper, as `chaic eval --perception`.
@@ -76,6 +83,7 @@ impl Default for RolloutConfig {
         RolloutConfig {
             episodes: 32,
             tasks: TaskId::paper().collect(),
+            splits: GENERATORS.map(str::to_owned).to_vec(),
             image_size: 128,
             perception: GROUND_TRUTH.to_owned(),
             behavior: GROUND_TRUTH.to_owned(),
@@ -92,17 +100,14 @@ impl RolloutConfig {
         if self.tasks.is_empty() {
             return Err("`rollout.tasks` is empty".to_owned());
         }
+        check_splits("rollout.splits", &self.splits)?;
         self.perception_factory().map_err(|e| e.to_string())?;
         self.read_opponent().map_err(|e| e.to_string())?;
         Ok(())
     }
 
     pub(crate) fn read_opponent(&self) -> Result<Option<OpponentModel>, TrainingError> {
-        let parse = |path: &PathBuf| {
-            let weights_error = |problem| TrainingError::Weights { path: path.clone(), problem };
-            OpponentModel::from_bytes(&read_user_file(path, MAX_BYTES)?).map_err(weights_error)
-        };
-        self.opponent.as_ref().map(parse).transpose()
+        read_opponent(self.opponent.as_deref())
     }
 
     pub(crate) fn perception_factory(&self) -> Result<Arc<dyn PerceptionFactory>, PerceptionError> {
@@ -112,11 +117,12 @@ impl RolloutConfig {
     pub(crate) fn context<'a>(
         &self,
         perception: &'a dyn PerceptionFactory,
-        selection: ActionSelection,
+        gamma: f32,
         stop: &'a AtomicBool,
     ) -> RolloutContext<'a> {
         let RolloutConfig { image_size, rewards, .. } = *self;
-        RolloutContext { perception, image_size, selection, rewards, stop }
+        let selection = ActionSelection::TRAINING;
+        RolloutContext { perception, image_size, selection, rewards, gamma, stop }
     }
 
     /// Returns ids and seeds of the episodes of an iteration.
@@ -124,36 +130,113 @@ impl RolloutConfig {
         (0..self.episodes as u64)
             .map(|k| {
                 let index = iteration * self.episodes as u64 + k;
+                let index_of_split = index as usize / self.tasks.len();
                 let task = self.tasks[index as usize % self.tasks.len()];
+                let split = &self.splits[index_of_split % self.splits.len()];
                 let mut rng = RngStream::new(seed, "episodes", index);
-                (format!("{}/gen/{}", task.name(), SeedRange::POLICY_TRAIN.draw(&mut rng)), 0)
+                (format!("{task}/{split}/{}", SeedRange::POLICY_TRAIN.draw(&mut rng)), 0)
             })
             .collect()
     }
+}
 
-    /// Returns transport rates on validation episodes; `None` if `stop` is raised.
-    pub(crate) fn validate(
+/// Reads the weights of an opponent model.
+///
+/// # Errors
+/// If the file cannot be read or holds no opponent model.
+pub(crate) fn read_opponent(path: Option<&Path>) -> Result<Option<OpponentModel>, TrainingError> {
+    let parse = |path: &Path| {
+        let weights_error = |problem| TrainingError::Weights { path: path.to_owned(), problem };
+        OpponentModel::from_bytes(&read_user_file(path, MAX_BYTES)?).map_err(weights_error)
+    };
+    path.map(parse).transpose()
+}
+
+/// Checks the names of generators under a key of a configuration.
+///
+/// # Errors
+/// One line that names the key.
+pub(crate) fn check_splits(key: &str, splits: &[String]) -> Result<(), String> {
+    let names = GENERATORS.join(", ");
+    match splits.iter().find(|split| !GENERATORS.contains(&split.as_str())) {
+        Some(split) => Err(format!("`{key}` contains `{split}`, expected {names}")),
+        None if splits.is_empty() => Err(format!("`{key}` is empty, expected {names}")),
+        None => Ok(()),
+    }
+}
+
+/// Returns ids and seeds of `n` validation episodes per task, from the last of the generators: the
+/// standard one, if there are both.
+pub(crate) fn validation_ids(tasks: &[TaskId], splits: &[String], n: usize) -> Vec<(String, u32)> {
+    let first = SeedRange::POLICY_VALIDATION.first;
+    let split = splits.last().map_or(GENERATORS[0], String::as_str);
+    let of_task = |task: &TaskId| {
+        let task = *task;
+        (first..first + n as u64).map(move |seed| (format!("{task}/{split}/{seed}"), 0))
+    };
+    tasks.iter().flat_map(of_task).collect()
+}
+
+/// Validation metric by which weights are selected: the mean transport rate with the selection of
+/// helpers in runs.
+pub(crate) const VALIDATION_TR: &str = "tr_sampled";
+/// Helper that is played on the validation episodes for comparison.
+const BASELINE: &str = "rhp";
+
+/// Validation of a policy against a built-in helper on the same episodes.
+pub(crate) struct Validation<'a> {
+    pub perception: &'a dyn PerceptionFactory,
+    /// Transport rates of the baseline by episode, once they are known.
+    pub baseline: &'a OnceLock<Vec<f64>>,
+}
+
+impl Validation<'_> {
+    /// Returns the mean transport rates, and the mean difference to the baseline with its standard
+    /// error; `None` if `stop` is raised.
+    pub fn run(
         &self,
-        perception: &dyn PerceptionFactory,
+        config: &RolloutConfig,
         weights: &Arc<PolicyWeights>,
         stop: &AtomicBool,
     ) -> Option<Metrics> {
-        let first = SeedRange::POLICY_VALIDATION.first;
-        let seeds = || first..first + self.validation_episodes as u64;
-        let ids: Vec<(String, u32)> = self
-            .tasks
-            .iter()
-            .flat_map(|task| seeds().map(|seed| (format!("{}/gen/{seed}", task.name()), 0)))
-            .collect();
-        let selections =
-            [("tr_sampled", ActionSelection::Sample), ("tr_greedy", ActionSelection::Greedy)];
-        let tr = |selection| {
-            let results = rollout_all(&ids, weights, &self.context(perception, selection, stop));
-            Some(mean_tr(&results.expect("generated episodes can be played")?))
+        let RolloutConfig { tasks, splits, validation_episodes, .. } = config;
+        let ids = validation_ids(tasks, splits, *validation_episodes);
+        // Validation has no rewards, so the discount is of no effect.
+        let context = config.context(self.perception, 1.0, stop);
+        let rates = |selection| -> Option<Vec<f64>> {
+            let results = rollout_all(&ids, weights, &RolloutContext { selection, ..context });
+            let results = results.expect("generated episodes can be played")?;
+            Some(results.iter().map(|result| result.tr).collect())
         };
-        let tr = |(name, selection): (&str, _)| Some((name.to_owned(), tr(selection)?));
-        selections.into_iter().map(tr).collect()
+        let sampled = rates(ActionSelection::HELPER)?;
+        let greedy = rates(ActionSelection::Greedy)?;
+        if self.baseline.get().is_none() {
+            let helper = HelperInfo::find_helper(BASELINE).expect("it is a built-in helper");
+            let rate = |(id, seed): &(String, u32)| {
+                let rate = rollout_built_in(helper, id, *seed, &context);
+                rate.expect("generated episodes can be played")
+            };
+            let rates: Option<Vec<f64>> = ids.par_iter().map(rate).collect();
+            // Another value would be the same.
+            let _ = self.baseline.set(rates?);
+        }
+        let baseline = self.baseline.get().expect("it was set above");
+        let gains: Vec<f64> = sampled.iter().zip(baseline).map(|(a, b)| a - b).collect();
+        let gain = mean(&gains);
+        let variance = gains.iter().map(|x| (x - gain) * (x - gain)).sum::<f64>()
+            / (gains.len().max(2) - 1) as f64;
+        Some(metrics([
+            (VALIDATION_TR, mean(&sampled)),
+            ("tr_greedy", mean(&greedy)),
+            ("tr_baseline", mean(baseline)),
+            ("gain", gain),
+            ("gain_se", (variance / gains.len().max(1) as f64).sqrt()),
+        ]))
     }
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 pub(crate) fn mean_tr(results: &[EpisodeResult]) -> f64 {

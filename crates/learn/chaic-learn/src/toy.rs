@@ -168,9 +168,14 @@ pub fn collect_trajectories<T: ToyTask>(
             });
         }
         if continues {
-            // Truncated: the value estimate replaces the remaining return.
-            trajectory.bootstrap_value =
-                trajectory.transitions.last().map_or(0.0, |last| last.value);
+            // Truncated: the value estimate of the next state replaces the remaining return.
+            let next = CandidateSet {
+                state: task.state(),
+                candidates: one_hot.clone(),
+                n_candidates: T::N_ACTIONS,
+            };
+            let output = model.forward(parameters, std::iter::once(&next), &mut pass).remove(0);
+            trajectory.bootstrap_value = output.value();
         } else {
             returns.push(episode_return);
         }
@@ -203,7 +208,7 @@ mod tests {
             let progress_remaining = 1.0 - iteration as f32 / iterations as f32;
             let schedule = Schedule { seed: 1, iteration, progress_remaining };
             let stop = AtomicBool::new(false);
-            update(config, &model, &mut learner, &trajectories, schedule, &stop).unwrap();
+            update(config, &model, &mut learner, &trajectories, None, schedule, &stop).unwrap();
         }
         rollout(iterations, &learner)
     }

@@ -1,39 +1,47 @@
 //! Trainers of policies that choose plans.
 
 use std::ops::Range;
-use std::path::Path;
-use std::sync::Arc;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
 
 use chaic_agents::perception_factory::PerceptionFactory;
+use chaic_files::read_bounded;
 use chaic_nn::weights::{self, WeightsError};
 use chaic_nn::{AdamWConfig, Network};
 use chaic_training::bounds::{
     ADAM, Bound, BoundTable, FRACTION, LEARNING_RATE, SEED, SHARDS, STEPS, integer,
 };
+use chaic_training::checkpoint::Identity;
 use chaic_training::{
-    Checkpoint, CheckpointError, Learner, Metrics, Trainer, TrainingError, learning_rate_at,
-    metrics,
+    Checkpoint, CheckpointError, INITIAL_WEIGHTS, Learner, Metrics, Trainer, TrainingError,
+    learning_rate_at, metrics,
 };
 use rayon::prelude::*;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use crate::actor_critic::Optimizer;
 use crate::candidate_scorer::{CandidateScorer, CandidateSet};
-use crate::cloning::{CloningMetrics, Demonstration, EpochConfig, train_epoch};
+use crate::cloning::{CloningMetrics, Demonstration, EXPERTS, ExpertInfo, FitConfig, fit};
+use crate::demonstrations::Demonstrations;
 use crate::features::{N_OPPONENT_PLAN, N_OPPONENT_STATE, N_PLAN, N_STATE};
 use crate::opponent::{self, network::OpponentModel};
-use crate::policy::{ActionSelection, PolicyWeights};
+use crate::policy::PolicyWeights;
 use crate::ppo::{MAX_BATCH, PPO_BOUNDS, PpoConfig, Schedule, update};
 use crate::rollout::{rollout_all, rollout_with_expert};
-use crate::rollout_config::{ROLLOUT_BOUNDS, mean_tr};
+use crate::rollout_config::{ROLLOUT_BOUNDS, VALIDATION_TR, Validation, mean_tr};
 
 pub use crate::rollout_config::RolloutConfig;
 
+/// Maximum size of a weights file, bytes.
+const MAX_WEIGHTS_BYTES: u64 = 1 << 28;
 /// Kind in weights files of policies without opponent model.
-const KIND: &str = "chaic plan policy 2";
-/// Kind in weights files of policies with opponent model.
-const KIND_WITH_OPPONENT: &str = "chaic plan policy with opponent model 1";
+const KIND: &str = "chaic plan policy 3";
+/// Kinds in weights files of policies with opponent model, without and with the partner's actions
+/// granted.
+const KINDS_WITH_OPPONENT: [&str; 2] =
+    ["chaic plan policy with opponent model 2", "chaic plan policy with opponent model 2, granted"];
 /// Name of the opponent model's parameters among those of a policy.
 const OPPONENT: &str = "opponent";
 /// Width of the hidden layers.
@@ -45,10 +53,19 @@ pub enum PolicyKind {
     /// Reads features of the memory.
     WithoutOpponent,
     /// Reads predictions of an opponent model as well (Smart-Help).
-    WithOpponent,
+    WithOpponent {
+        /// True if the opponent model needs the partner's actions.
+        is_granted: bool,
+    },
 }
 
 impl PolicyKind {
+    fn with(opponent: Option<&OpponentModel>) -> PolicyKind {
+        opponent.map_or(PolicyKind::WithoutOpponent, |model| PolicyKind::WithOpponent {
+            is_granted: model.is_granted(),
+        })
+    }
+
     /// Creates the network architecture. Its parameters include those of the opponent model.
     pub fn network(self) -> CandidateScorer {
         if self == PolicyKind::WithoutOpponent {
@@ -63,16 +80,21 @@ impl PolicyKind {
     }
 
     fn name(self) -> &'static str {
-        if self == PolicyKind::WithoutOpponent { KIND } else { KIND_WITH_OPPONENT }
+        match self {
+            PolicyKind::WithoutOpponent => KIND,
+            PolicyKind::WithOpponent { is_granted } => KINDS_WITH_OPPONENT[usize::from(is_granted)],
+        }
     }
 
     /// Combines a network of this kind with parameters.
     pub fn weights_from(self, model: &CandidateScorer, parameters: Vec<f32>) -> PolicyWeights {
-        let opponent_model = |model: &CandidateScorer| {
-            let range = opponent_range(model);
-            Arc::new(OpponentModel::new(parameters[range].to_vec()))
+        let opponent = match self {
+            PolicyKind::WithoutOpponent => None,
+            PolicyKind::WithOpponent { is_granted } => {
+                let parameters = parameters[opponent_range(model)].to_vec();
+                Some(Arc::new(OpponentModel::new(parameters, is_granted)))
+            }
         };
-        let opponent = (self == PolicyKind::WithOpponent).then(|| opponent_model(model));
         PolicyWeights { model: model.clone(), parameters, opponent }
     }
 }
@@ -94,8 +116,11 @@ pub fn from_bytes(bytes: &[u8]) -> Result<(PolicyKind, PolicyWeights), WeightsEr
         Ok((kind, kind.weights_from(&model, parameters)))
     };
     match read(PolicyKind::WithoutOpponent) {
-        Err(WeightsError::Kind { found, .. }) if found == KIND_WITH_OPPONENT => {
-            read(PolicyKind::WithOpponent)
+        Err(WeightsError::Kind { found, .. }) if found == KINDS_WITH_OPPONENT[0] => {
+            read(PolicyKind::WithOpponent { is_granted: false })
+        }
+        Err(WeightsError::Kind { found, .. }) if found == KINDS_WITH_OPPONENT[1] => {
+            read(PolicyKind::WithOpponent { is_granted: true })
         }
         read => read,
     }
@@ -114,8 +139,7 @@ pub struct TrainState {
 
 impl TrainState {
     fn new(seed: u64, shards: usize, opponent: Option<&OpponentModel>) -> TrainState {
-        let kind =
-            if opponent.is_some() { PolicyKind::WithOpponent } else { PolicyKind::WithoutOpponent };
+        let kind = PolicyKind::with(opponent);
         let model = kind.network();
         let mut learner = Learner::new(&model.network, seed, shards);
         if let Some(opponent) = opponent {
@@ -162,6 +186,8 @@ pub struct TrainingSpec<'a> {
 
 /// Training algorithm with its configuration.
 pub trait Algorithm: Clone + Default + Serialize + DeserializeOwned {
+    /// Data that an iteration needs besides the network.
+    type Data: Default;
     /// Name of the training, as in `chaic train NAME`.
     const KIND: &'static str;
     /// Bounds of every number.
@@ -170,20 +196,63 @@ pub trait Algorithm: Clone + Default + Serialize + DeserializeOwned {
     /// Returns the settings that all algorithms share.
     fn spec(&self) -> TrainingSpec<'_>;
 
-    /// Runs one iteration with this perception; `None` if `stop` is raised.
+    /// Checks what bounds of single numbers cannot express.
+    ///
+    /// # Errors
+    /// One line that describes the problem.
+    fn check(&self) -> Result<(), String> {
+        Ok(())
+    }
+
+    /// Reads the data that iterations before `iterations` have written to `folder`.
+    ///
+    /// # Errors
+    /// If a file is missing, damaged or belongs to another training.
+    fn read_data(
+        &self,
+        folder: &Path,
+        iterations: u64,
+        identity: &Identity,
+    ) -> Result<Self::Data, CheckpointError>;
+
+    /// Runs one iteration; `None` if it was stopped.
+    ///
+    /// # Errors
+    /// If data cannot be written.
     fn iterate(
         &self,
-        perception: &dyn PerceptionFactory,
         state: &mut TrainState,
-        stop: &AtomicBool,
-    ) -> Option<Metrics>;
+        data: &mut Self::Data,
+        context: &IterationContext<'_>,
+    ) -> Result<Option<Metrics>, TrainingError>;
+}
+
+/// Context of an iteration.
+#[derive(Clone, Copy)]
+pub struct IterationContext<'a> {
+    /// Folder of the training.
+    pub folder: &'a Path,
+    /// Perception of the helper.
+    pub perception: &'a dyn PerceptionFactory,
+    /// Stop flag.
+    pub stop: &'a AtomicBool,
 }
 
 /// Trainer of a policy that chooses plans.
-pub struct PolicyTrainer<A> {
+pub struct PolicyTrainer<A: Algorithm> {
     config: A,
+    folder: PathBuf,
     perception: Arc<dyn PerceptionFactory>,
     state: TrainState,
+    data: A::Data,
+    /// Transport rates of the baseline helper on the validation episodes, once they are known.
+    baseline: OnceLock<Vec<f64>>,
+}
+
+impl<A: Algorithm> PolicyTrainer<A> {
+    fn identity(&self) -> Identity {
+        Identity::new(A::KIND, &self.state.model.network)
+    }
 }
 
 impl<A: Algorithm> Trainer for PolicyTrainer<A> {
@@ -193,11 +262,12 @@ impl<A: Algorithm> Trainer for PolicyTrainer<A> {
     const WEIGHTS: &'static str = "policy.safetensors";
     const RECORD_STEPS: u64 = 1;
     const CHECKPOINT_STEPS: u64 = 5;
-    const VALIDATION_STEPS: u64 = 25;
+    const VALIDATION_STEPS: u64 = 20;
+    const SCORE: Option<&'static str> = Some(VALIDATION_TR);
 
     fn new(
         config: &A,
-        _: &Path,
+        folder: &Path,
         _: &mut dyn FnMut(&str),
         _: &AtomicBool,
     ) -> Result<Option<PolicyTrainer<A>>, TrainingError> {
@@ -205,17 +275,26 @@ impl<A: Algorithm> Trainer for PolicyTrainer<A> {
         let perception = rollout.perception_factory().map_err(TrainingError::from_data)?;
         let opponent = rollout.read_opponent()?;
         let state = TrainState::new(seed, shards, opponent.as_ref());
-        Ok(Some(PolicyTrainer { config: config.clone(), perception, state }))
+        let identity = Identity::new(A::KIND, &state.model.network);
+        let data = config.read_data(folder, 0, &identity).map_err(TrainingError::from_data)?;
+        Ok(Some(PolicyTrainer {
+            config: config.clone(),
+            folder: folder.to_owned(),
+            perception,
+            state,
+            data,
+            baseline: OnceLock::new(),
+        }))
     }
 
     fn check(config: &A) -> Result<(), String> {
-        config.spec().rollout.check()
+        config.spec().rollout.check()?;
+        config.check()
     }
 
     fn read_weights(config: &A, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
-        let has_opponent = config.spec().rollout.opponent.is_some();
-        let kind =
-            if has_opponent { PolicyKind::WithOpponent } else { PolicyKind::WithoutOpponent };
+        let opponent = config.spec().rollout.read_opponent();
+        let kind = PolicyKind::with(opponent.ok().flatten().as_ref());
         weights::from_bytes(&kind.network().network, weights, kind.name())
     }
 
@@ -244,23 +323,29 @@ impl<A: Algorithm> Trainer for PolicyTrainer<A> {
         checkpoint: &Checkpoint,
         _: &AtomicBool,
     ) -> Result<Option<()>, CheckpointError> {
-        self.state.resume(checkpoint).map(Some)
+        self.state.resume(checkpoint)?;
+        let identity = self.identity();
+        self.data = self.config.read_data(&self.folder, self.state.iterations, &identity)?;
+        Ok(Some(()))
     }
 
-    fn step(&mut self, stop: &AtomicBool) -> Option<Metrics> {
+    fn step(&mut self, stop: &AtomicBool) -> Result<Option<Metrics>, TrainingError> {
         let before = self.state.learner.state();
-        let metrics = self.config.iterate(&*self.perception, &mut self.state, stop);
+        let (folder, perception) = (&*self.folder, &*self.perception);
+        let context = IterationContext { folder, perception, stop };
+        let metrics = self.config.iterate(&mut self.state, &mut self.data, &context)?;
         match metrics {
             Some(_) => self.state.iterations += 1,
             None => self.state.learner.set_state(before),
         }
-        metrics
+        Ok(metrics)
     }
 
     fn validate(&self, stop: &AtomicBool) -> Result<Option<(Metrics, Vec<u8>)>, WeightsError> {
         let bytes = self.state.weights()?;
         let weights = self.state.policy_weights();
-        let metrics = self.config.spec().rollout.validate(&*self.perception, &weights, stop);
+        let validation = Validation { perception: &*self.perception, baseline: &self.baseline };
+        let metrics = validation.run(self.config.spec().rollout, &weights, stop);
         Ok(metrics.map(|metrics| (metrics, bytes)))
     }
 }
@@ -302,6 +387,8 @@ impl Default for PpoTrainingConfig {
 }
 
 impl Algorithm for PpoTrainingConfig {
+    /// Parameters of the initial policy, which the KL penalty refers to.
+    type Data = Option<Vec<f32>>;
     const KIND: &'static str = "ppo";
     const BOUNDS: BoundTable = &[
         ("seed", SEED),
@@ -315,16 +402,37 @@ impl Algorithm for PpoTrainingConfig {
         TrainingSpec { seed: *seed, iterations: *iterations, rollout, shards: self.ppo.shards }
     }
 
+    fn read_data(
+        &self,
+        folder: &Path,
+        _: u64,
+        _: &Identity,
+    ) -> Result<Option<Vec<f32>>, CheckpointError> {
+        if self.ppo.kl_coef == 0.0 {
+            return Ok(None);
+        }
+        let problem = |problem: String| {
+            let file = INITIAL_WEIGHTS;
+            CheckpointError::Damaged(format!("`ppo.kl_coef` needs --weights, but {file} {problem}"))
+        };
+        let bytes = read_bounded(&folder.join(INITIAL_WEIGHTS), MAX_WEIGHTS_BYTES)
+            .map_err(|e| problem(format!("cannot be read: {e}")))?;
+        let parameters = PolicyTrainer::<PpoTrainingConfig>::read_weights(self, &bytes);
+        parameters.map(Some).map_err(|e| problem(e.to_string()))
+    }
+
     fn iterate(
         &self,
-        perception: &dyn PerceptionFactory,
         state: &mut TrainState,
-        stop: &AtomicBool,
-    ) -> Option<Metrics> {
+        reference: &mut Option<Vec<f32>>,
+        context: &IterationContext<'_>,
+    ) -> Result<Option<Metrics>, TrainingError> {
+        let IterationContext { perception, stop, .. } = *context;
         let ids = self.rollout.sample_episodes(self.seed, state.iterations);
-        let context = self.rollout.context(perception, ActionSelection::Sample, stop);
-        let results = rollout_all(&ids, &state.policy_weights(), &context);
-        let results = results.expect("generated episodes can be played")?;
+        let rollout = self.rollout.context(perception, self.ppo.gamma, stop);
+        let results = rollout_all(&ids, &state.policy_weights(), &rollout);
+        let results = results.map_err(TrainingError::from_data)?;
+        let Some(results) = results else { return Ok(None) };
         let tr = mean_tr(&results);
         let frames = results.iter().map(|result| f64::from(result.frames)).sum();
         let trajectories: Vec<_> = results.into_iter().map(|result| result.trajectory).collect();
@@ -332,14 +440,30 @@ impl Algorithm for PpoTrainingConfig {
         let progress_remaining = 1.0 - state.iterations as f32 / self.iterations as f32;
         let TrainState { model, learner, iterations, .. } = state;
         let schedule = Schedule { seed: self.seed, iteration: *iterations, progress_remaining };
-        let stats = update(&self.ppo, model, learner, &trajectories, schedule, stop)?;
+        let reference = reference.as_deref();
+        let stats = update(&self.ppo, model, learner, &trajectories, reference, schedule, stop);
+        let Some(stats) = stats else { return Ok(None) };
         if self.rollout.normalize {
             let transitions = trajectories.iter().flat_map(|t| &t.transitions);
             state.update_normalizer(transitions.map(|t| &t.observation));
         }
         let mut named = metrics([("tr", tr), ("frames", frames), ("decisions", decisions as f64)]);
         named.extend(stats.to_metrics());
-        Some(named)
+        Ok(Some(named))
+    }
+}
+
+/// Expert of `chaic train clone`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TeacherConfig {
+    /// Name of the helper that is imitated, see [`EXPERTS`].
+    pub helper: String,
+}
+
+impl Default for TeacherConfig {
+    fn default() -> TeacherConfig {
+        TeacherConfig { helper: EXPERTS[0].name.to_owned() }
     }
 }
 
@@ -351,15 +475,22 @@ pub struct CloningConfig {
     pub seed: u64,
     /// Total number of iterations.
     pub iterations: u64,
+    /// Expert.
+    pub teacher: TeacherConfig,
     /// Rollouts.
     #[serde(alias = "play")]
     pub rollout: RolloutConfig,
     /// Fraction of episodes that the learner drives while the expert labels its states (DAgger).
+    /// The expert drives all episodes of the first iteration.
     #[serde(alias = "mixed")]
     pub learner_fraction: f32,
+    /// Maximum number of episodes whose demonstrations are kept, the latest ones.
+    pub max_episodes: usize,
     /// Discount factor per frame of the returns that the value head regresses.
     #[serde(alias = "discount")]
     pub gamma: f32,
+    /// Optimizer steps per iteration.
+    pub n_steps: usize,
     /// Demonstrations per optimizer step.
     #[serde(alias = "batch")]
     pub batch_size: usize,
@@ -377,15 +508,18 @@ impl Default for CloningConfig {
         CloningConfig {
             seed: 1,
             iterations: 100,
+            teacher: TeacherConfig::default(),
             rollout: RolloutConfig::default(),
-            learner_fraction: 0.5,
-            gamma: 0.9995,
-            batch_size: 64,
-            learning_rate: 2e-3,
+            learner_fraction: 0.7,
+            max_episodes: 8192,
+            gamma: 0.9998,
+            n_steps: 200,
+            batch_size: 128,
+            learning_rate: 1e-3,
             shards: 2,
             adam: AdamWConfig {
                 beta2: 0.999,
-                weight_decay: 0.0,
+                weight_decay: 0.01,
                 max_grad_norm: 1.0,
                 ..AdamWConfig::default()
             },
@@ -394,13 +528,17 @@ impl Default for CloningConfig {
 }
 
 impl Algorithm for CloningConfig {
+    type Data = Demonstrations;
     const KIND: &'static str = "clone";
     const BOUNDS: BoundTable = &[
         ("seed", SEED),
         ("iterations", STEPS),
         ("rollout", Bound::Table(ROLLOUT_BOUNDS)),
         ("learner_fraction", FRACTION),
+        // All demonstrations are kept in memory: about 0.1 MB per episode.
+        ("max_episodes", integer(1, 100_000)),
         ("gamma", FRACTION),
+        ("n_steps", integer(1, 100_000)),
         ("batch_size", integer(1, MAX_BATCH)),
         ("learning_rate", LEARNING_RATE),
         ("shards", SHARDS),
@@ -412,46 +550,77 @@ impl Algorithm for CloningConfig {
         TrainingSpec { seed: *seed, iterations: *iterations, rollout, shards: *shards }
     }
 
+    fn check(&self) -> Result<(), String> {
+        let name = &self.teacher.helper;
+        if ExpertInfo::find_expert(name).is_none() {
+            let names: Vec<&str> = EXPERTS.iter().map(|expert| expert.name).collect();
+            return Err(format!("`teacher.helper` is `{name}`, expected {}", names.join(", ")));
+        }
+        Ok(())
+    }
+
+    fn read_data(
+        &self,
+        folder: &Path,
+        iterations: u64,
+        identity: &Identity,
+    ) -> Result<Demonstrations, CheckpointError> {
+        let has_opponent = self.rollout.opponent.is_some();
+        Demonstrations::read(folder, iterations, self.max_episodes, identity, has_opponent)
+    }
+
     fn iterate(
         &self,
-        perception: &dyn PerceptionFactory,
         state: &mut TrainState,
-        stop: &AtomicBool,
-    ) -> Option<Metrics> {
+        data: &mut Demonstrations,
+        context: &IterationContext<'_>,
+    ) -> Result<Option<Metrics>, TrainingError> {
+        let IterationContext { folder, perception, stop } = *context;
+        let expert = ExpertInfo::find_expert(&self.teacher.helper).expect("it was checked");
         let ids = self.rollout.sample_episodes(self.seed, state.iterations);
-        let context = self.rollout.context(perception, ActionSelection::Sample, stop);
+        let rollout = self.rollout.context(perception, self.gamma, stop);
         let weights = state.policy_weights();
-        let rollout = |(id, seed): &(String, u32)| {
-            let (fraction, gamma) = (self.learner_fraction, self.gamma);
-            rollout_with_expert(id, *seed, &weights, &context, fraction, gamma)
+        let learner_fraction = if state.iterations == 0 { 0.0 } else { self.learner_fraction };
+        let record = |(id, seed): &(String, u32)| {
+            rollout_with_expert(id, *seed, &weights, &rollout, expert, learner_fraction)
         };
-        let labeled: Result<Vec<_>, _> = ids.par_iter().map(rollout).collect();
-        let labeled = labeled.expect("generated episodes can be played");
-        let labeled: Vec<_> = labeled.into_iter().collect::<Option<_>>()?;
+        let labeled: Result<Vec<_>, _> = ids.par_iter().map(record).collect();
+        let labeled = labeled.map_err(TrainingError::from_data)?;
+        let Some(labeled) = labeled.into_iter().collect::<Option<Vec<_>>>() else {
+            return Ok(None);
+        };
         let tr = labeled.iter().map(|(_, tr)| tr).sum::<f64>() / labeled.len().max(1) as f64;
-        let demonstrations: Vec<Demonstration> =
-            labeled.into_iter().flat_map(|(demonstrations, _)| demonstrations).collect();
+        let episodes: Vec<Vec<Demonstration>> =
+            labeled.into_iter().map(|(demonstrations, _)| demonstrations).collect();
+        let all = data.episodes.iter().chain(&episodes).map(|episode| &episode[..]);
+        let n_surplus = (data.episodes.len() + episodes.len()).saturating_sub(self.max_episodes);
+        let all: Vec<&[Demonstration]> = all.skip(n_surplus).collect();
         let learning_rate =
             learning_rate_at(state.iterations, self.learning_rate, 1, self.iterations);
-        let TrainState { model, learner, iterations, .. } = state;
-        let epoch = EpochConfig {
-            adam: &self.adam,
-            learning_rate,
+        if self.rollout.normalize {
+            let demonstrations = episodes.iter().flatten();
+            state.update_normalizer(demonstrations.map(|d| &d.observation));
+        }
+        let fit_config = FitConfig {
+            optimizer: Optimizer { adam: &self.adam, learning_rate },
+            n_steps: self.n_steps,
             batch_size: self.batch_size,
             seed: self.seed,
-            iteration: *iterations,
+            iteration: state.iterations,
         };
-        let stats = train_epoch(&epoch, model, learner, &demonstrations, stop)?;
-        if self.rollout.normalize {
-            state.update_normalizer(demonstrations.iter().map(|d| &d.observation));
-        }
+        let TrainState { model, learner, .. } = state;
+        let stats = fit(&fit_config, model, learner, &all, stop);
+        let Some(stats) = stats else { return Ok(None) };
+        let identity = Identity::new(Self::KIND, &model.network);
+        Demonstrations::write(folder, state.iterations, &episodes, &identity)?;
+        data.add(episodes, self.max_episodes);
         let CloningMetrics { loss, agreement, value_loss } = stats;
-        Some(metrics([
+        Ok(Some(metrics([
             ("tr", tr),
-            ("demonstrations", demonstrations.len() as f64),
+            ("demonstrations", data.episodes.iter().map(Vec::len).sum::<usize>() as f64),
             ("loss", loss),
             ("agreement", agreement),
             ("value_loss", value_loss),
-        ]))
+        ])))
     }
 }

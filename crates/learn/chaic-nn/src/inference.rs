@@ -35,14 +35,14 @@ impl Inference {
     /// Creates an inference engine for a network with these parameters.
     ///
     /// # Panics
-    /// If the network concatenates or reshapes maps, which only a [`Pass`](crate::Pass) supports,
-    /// or the number of parameters differs.
+    /// If the network concatenates or reshapes maps or has attention, which only a
+    /// [`Pass`](crate::Pass) supports, or the number of parameters differs.
     pub fn new(network: &Network, parameters: &[f32], arch: Arch) -> Inference {
-        let has_unsupported = network
-            .layers
-            .iter()
-            .any(|layer| matches!(layer, Layer::Reshape { .. } | Layer::Concat { .. }));
-        assert!(!has_unsupported, "inference does not support reshapes and concatenations");
+        let is_unsupported = |layer: &Layer| {
+            matches!(layer, Layer::Reshape { .. } | Layer::Concat { .. } | Layer::Attention { .. })
+        };
+        let has_unsupported = network.layers.iter().any(is_unsupported);
+        assert!(!has_unsupported, "inference supports no reshapes, concatenations and attention");
         assert_eq!(parameters.len(), network.n_parameters(), "wrong number of parameters");
         let (segments, is_kept) = segments(network);
         let mut packed = vec![PackedMatrix::default(); network.layers.len()];
@@ -163,7 +163,7 @@ impl Inference {
                 let map = &earlier[from.0].data[rows.start * width * channels..];
                 upsample(&map[..rows.len() * width * channels], width, channels, out);
             }
-            Layer::Reshape { .. } | Layer::Concat { .. } => {
+            Layer::Reshape { .. } | Layer::Concat { .. } | Layer::Attention { .. } => {
                 unreachable!("the constructor refuses such networks")
             }
         }
@@ -181,7 +181,8 @@ fn segments(network: &Network) -> (Vec<Range<usize>>, Vec<bool>) {
             | Layer::Norm { .. }
             | Layer::Relu { .. }
             | Layer::Add { .. }
-            | Layer::Concat { .. } => {}
+            | Layer::Concat { .. }
+            | Layer::Attention { .. } => {}
             Layer::Conv { kernel, .. } if kernel == Kernel::POINTWISE => {}
             Layer::Conv { from, .. }
             | Layer::Depthwise { from, .. }

@@ -1,7 +1,7 @@
 //! Small neural networks on the CPU: training and inference.
 //!
 //! **What it is**: [`network::Network`] lists layers: dense and depthwise convolutions, layer
-//! normalization, sums, nearest-neighbor upsampling. [`pass::Pass`] runs a network forward and
+//! normalization, attention, sums, nearest-neighbor upsampling. [`pass::Pass`] runs a network forward and
 //! backward. [`adam::AdamW`] is the optimizer. [`inference::Inference`] runs forward passes in less
 //! time and memory. Feature maps are [`tensor::Tensor`]s of shape [n, height, width, channels].
 //!
@@ -15,6 +15,7 @@
 pub mod simd;
 pub mod tensor;
 
+mod attention;
 pub mod conv;
 pub mod depthwise;
 mod elementwise;

@@ -45,22 +45,25 @@ pub(crate) enum Layer {
     Reshape { from: Node },
     /// Concatenation of the channels of two maps.
     Concat { a: Node, b: Node },
+    /// Multi-head attention between the rows of a group.
+    Attention { query: Node, key: Node, value: Node, n_heads: usize },
 }
 
 impl Layer {
     /// Returns the inputs of the layer.
     pub(crate) fn inputs(&self) -> impl Iterator<Item = Node> {
-        let (first, second) = match *self {
-            Layer::Input { .. } => (None, None),
+        let (first, second, third) = match *self {
+            Layer::Input { .. } => (None, None, None),
             Layer::Conv { from, .. }
             | Layer::Depthwise { from, .. }
             | Layer::Norm { from, .. }
             | Layer::Relu { from }
             | Layer::Upsample { from }
-            | Layer::Reshape { from } => (Some(from), None),
-            Layer::Add { a, b } | Layer::Concat { a, b } => (Some(a), Some(b)),
+            | Layer::Reshape { from } => (Some(from), None, None),
+            Layer::Add { a, b } | Layer::Concat { a, b } => (Some(a), Some(b), None),
+            Layer::Attention { query, key, value, .. } => (Some(query), Some(key), Some(value)),
         };
-        first.into_iter().chain(second)
+        first.into_iter().chain(second).chain(third)
     }
 }
 
@@ -193,6 +196,18 @@ impl Network {
             "sizes of the concatenated maps differ"
         );
         self.push(Layer::Concat { a, b }, Size { channels, ..size_a })
+    }
+
+    /// Adds multi-head scaled dot-product attention between the rows of a group, see
+    /// [`Pass::set_groups`](crate::Pass::set_groups). Rows are maps of one pixel.
+    ///
+    /// # Panics
+    /// If the inputs have different shapes, or their channels are not a multiple of `n_heads`.
+    pub fn attention(&mut self, [query, key, value]: [Node; 3], n_heads: usize) -> Node {
+        let size = self.sizes[query.0];
+        assert!([key, value].iter().all(|node| self.sizes[node.0] == size), "shapes differ");
+        assert!(size.channels.is_multiple_of(n_heads), "{} channels", size.channels);
+        self.push(Layer::Attention { query, key, value, n_heads }, size)
     }
 
     /// Adds a nearest-neighbor upsampling by 2.

@@ -2,6 +2,7 @@
 
 use pulp::Arch;
 
+use crate::attention::{Attention, AttentionGrad};
 use crate::conv::{self, Im2colBuffers};
 use crate::depthwise::{self, Padded, Zeros};
 use crate::elementwise::{AddTo, Relu, ReluGrad, downsample, upsample};
@@ -20,6 +21,11 @@ pub struct Pass {
     zeros: Zeros,
     /// Gradient of one map.
     grad_map: Vec<f32>,
+    /// Numbers of consecutive rows that attend to each other; empty if all do.
+    groups: Vec<usize>,
+    /// Weights of each attention layer.
+    attention_weights: Vec<Vec<f32>>,
+    attention_grad: AttentionGrad,
 }
 
 impl Pass {
@@ -34,7 +40,17 @@ impl Pass {
             padded: Padded::default(),
             zeros: Zeros::default(),
             grad_map: Vec::new(),
+            groups: Vec::new(),
+            attention_weights: vec![Vec::new(); n],
+            attention_grad: AttentionGrad::default(),
         }
+    }
+
+    /// Divides the rows of the next batches into groups of these sizes; attention layers relate the
+    /// rows of a group. Without groups, all rows are one group.
+    pub fn set_groups(&mut self, sizes: impl Iterator<Item = usize>) {
+        self.groups.clear();
+        self.groups.extend(sizes);
     }
 
     /// Returns the output of a node.
@@ -60,7 +76,8 @@ impl Pass {
     ///
     /// # Panics
     /// If inputs are missing or have the wrong shape, or width or height of the first is not a
-    /// multiple of [`Network::stride`].
+    /// multiple of [`Network::stride`], or the groups do not add up to the rows of an attention
+    /// layer.
     pub fn forward_all(&mut self, network: &Network, parameters: &[f32], inputs: &[&Tensor]) {
         let input = inputs[0];
         let Shape { height, width, .. } = input.shape;
@@ -118,6 +135,16 @@ impl Pass {
                         to_a.copy_from_slice(a);
                         to_b.copy_from_slice(b);
                     }
+                }
+                Layer::Attention { query, key, value, n_heads } => {
+                    let rows = [out.shape.pixels()];
+                    let groups = if self.groups.is_empty() { &rows } else { &self.groups[..] };
+                    let n_rows: usize = groups.iter().sum();
+                    assert_eq!(n_rows, rows[0], "rows in groups");
+                    let [query, key, value] = [query, key, value].map(|n| &earlier[n.0].data[..]);
+                    let channels = out.shape.channels;
+                    let attention = Attention { query, key, value, channels, n_heads, groups };
+                    attention.forward(&mut out.data, &mut self.attention_weights[k]);
                 }
             }
         }
@@ -233,6 +260,18 @@ impl Pass {
                         for (to, pixel) in to.zip(gradient.data.chunks_exact(channels)) {
                             to.iter_mut().zip(&pixel[range.clone()]).for_each(|(to, g)| *to += g);
                         }
+                    }
+                }
+                Layer::Attention { query, key, value, n_heads } => {
+                    let rows = [gradient.shape.pixels()];
+                    let groups = if self.groups.is_empty() { &rows } else { &self.groups[..] };
+                    let inputs = [query, key, value];
+                    let [query, key, value] = inputs.map(|n| &self.activations[n.0].data[..]);
+                    let attention = Attention { query, key, value, channels, n_heads, groups };
+                    let (weights, grad) = (&self.attention_weights[k], &mut self.attention_grad);
+                    attention.backward(weights, &gradient.data, grad);
+                    for (node, from) in inputs.iter().zip([&grad.query, &grad.key, &grad.value]) {
+                        self.arch.dispatch(AddTo { to: &mut earlier[node.0].data, from });
                     }
                 }
                 Layer::Upsample { from } => downsample(gradient, &mut earlier[from.0]),

@@ -57,6 +57,21 @@ fn network_with_inputs() -> (Network, Node) {
     (net, head)
 }
 
+/// Creates a network whose rows attend to each other.
+fn network_with_attention() -> (Network, Node) {
+    let mut net = Network::default();
+    let input = net.input(3);
+    let embedding = net.conv("embedding", input, Kernel::POINTWISE, 16);
+    let norm = net.norm("embedding.norm", embedding);
+    let projected = ["query", "key", "value"].map(|n| net.conv(n, norm, Kernel::POINTWISE, 16));
+    let attention = net.attention(projected, 2);
+    let sum = net.add(attention, norm);
+    let last = net.norm_relu("last.norm", sum);
+    let head = net.output_head("head", last, 5);
+    (net, head)
+}
+
+const ROWS: Shape = Shape { n: 6, height: 1, width: 1, channels: 3 };
 const SMALL: Shape = Shape { n: 4, height: 8, width: 8, channels: 3 };
 
 fn random(shape: Shape, seed: u64) -> Tensor {
@@ -104,6 +119,7 @@ fn gradients_agree_with_finite_differences() {
     check_gradients(&network_with_strided_layers(), INPUT);
     check_gradients(&network_with_reshapes(), SMALL);
     check_gradients(&network_with_inputs(), SMALL);
+    check_gradients(&network_with_attention(), ROWS);
 }
 
 fn check_gradients(network: &(Network, Node), shape: Shape) {
@@ -140,6 +156,7 @@ fn passes_are_bit_identical_at_every_width() {
         (network_with_strided_layers(), INPUT),
         (network_with_reshapes(), SMALL),
         (network_with_inputs(), SMALL),
+        (network_with_attention(), ROWS),
     ] {
         let parameters = network.0.init_parameters(3);
         let expected = gradient(&network, input, &parameters, widest());

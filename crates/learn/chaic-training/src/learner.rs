@@ -163,6 +163,19 @@ impl Learner {
         learning_rate: f32,
         shard_gradient: impl Fn(usize, &[f32], &mut Pass, &mut [f32]) -> Option<R> + Sync,
     ) -> Option<Vec<R>> {
+        self.step_if(network, config, learning_rate, shard_gradient, |_| true)
+    }
+
+    /// As [`Learner::step`], but changes the parameters only if `accepts` returns true for the
+    /// results.
+    pub fn step_if<R: Send>(
+        &mut self,
+        network: &Network,
+        config: &AdamWConfig,
+        learning_rate: f32,
+        shard_gradient: impl Fn(usize, &[f32], &mut Pass, &mut [f32]) -> Option<R> + Sync,
+        accepts: impl FnOnce(&[R]) -> bool,
+    ) -> Option<Vec<R>> {
         let (parameters, shard_gradient) = (&self.parameters[..], &shard_gradient);
         let results: Option<Vec<R>> = thread::scope(|scope| {
             let handles: Vec<_> = self
@@ -184,6 +197,9 @@ impl Learner {
             results.into_iter().collect()
         });
         let results = results?;
+        if !accepts(&results) {
+            return Some(results);
+        }
         let fraction = 1.0 / self.shards.len() as f32;
         let (first, other_shards) =
             self.shards.split_first_mut().expect("there is at least one shard");

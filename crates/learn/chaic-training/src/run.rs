@@ -30,6 +30,7 @@ const MAX_BYTES: u64 = 1 << 30;
 const METRIC_NAMES: &str = "run.figure_names";
 const METRIC_VALUES: &str = "run.figures";
 const VALIDATION_IS_DUE: &str = "run.validation_is_due";
+const BEST_SCORE: &str = "run.best_score";
 
 /// Training with its locked folder.
 pub struct TrainingRun<T> {
@@ -39,6 +40,8 @@ pub struct TrainingRun<T> {
     pending_metrics: Vec<Metrics>,
     /// True while the validation after the last step is pending.
     validation_is_due: bool,
+    /// Highest value so far of the metric [`Trainer::SCORE`].
+    best_score: Option<f64>,
     _lock: FolderLock,
 }
 
@@ -51,7 +54,7 @@ pub fn checkpoint_bytes<T: Trainer>(
     pending_metrics: &[Metrics],
 ) -> Result<Vec<u8>, CheckpointError> {
     let mut checkpoint = trainer.checkpoint();
-    insert_progress(&mut checkpoint, pending_metrics, false);
+    insert_progress(&mut checkpoint, pending_metrics, false, None);
     checkpoint.to_bytes(&identity(trainer))
 }
 
@@ -84,6 +87,7 @@ fn insert_progress(
     checkpoint: &mut Checkpoint,
     pending_metrics: &[Metrics],
     validation_is_due: bool,
+    best_score: Option<f64>,
 ) {
     let names: Vec<&str> =
         pending_metrics.iter().take(1).flat_map(|m| m.keys().map(|name| &**name)).collect();
@@ -91,10 +95,13 @@ fn insert_progress(
     let values = pending_metrics.iter().flat_map(|metrics| metrics.values().copied());
     checkpoint.insert_doubles(METRIC_VALUES, values.collect());
     checkpoint.insert_integers(VALIDATION_IS_DUE, vec![u64::from(validation_is_due)]);
+    checkpoint.insert_doubles(BEST_SCORE, best_score.into_iter().collect());
 }
 
-/// Returns the metrics since the last record, and whether a validation is due.
-fn read_progress(checkpoint: &Checkpoint) -> Result<(Vec<Metrics>, bool), CheckpointError> {
+/// Returns the metrics since the last record, whether a validation is due, and the best score.
+fn read_progress(
+    checkpoint: &Checkpoint,
+) -> Result<(Vec<Metrics>, bool, Option<f64>), CheckpointError> {
     let names = std::str::from_utf8(checkpoint.bytes(METRIC_NAMES)?)
         .map_err(|_| CheckpointError::section(METRIC_NAMES, "is not UTF-8 text"))?;
     let names: Vec<&str> = names.split('\n').collect();
@@ -111,7 +118,12 @@ fn read_progress(checkpoint: &Checkpoint) -> Result<(Vec<Metrics>, bool), Checkp
     };
     let pending_metrics = values.chunks_exact(names.len()).map(step_metrics).collect();
     let validation_is_due = checkpoint.integer(VALIDATION_IS_DUE)?;
-    Ok((pending_metrics, validation_is_due != 0))
+    let best_score = match checkpoint.doubles(BEST_SCORE)? {
+        [] => None,
+        [score] => Some(*score),
+        _ => return Err(CheckpointError::section(BEST_SCORE, "has more than one value")),
+    };
+    Ok((pending_metrics, validation_is_due != 0, best_score))
 }
 
 impl<T: Trainer> TrainingRun<T> {
@@ -152,6 +164,7 @@ impl<T: Trainer> TrainingRun<T> {
             trainer,
             pending_metrics: Vec::new(),
             validation_is_due: false,
+            best_score: None,
             _lock: lock,
         }))
     }
@@ -177,14 +190,15 @@ impl<T: Trainer> TrainingRun<T> {
             return Err(TrainingError::NoCheckpoint(path));
         }
         let Some(mut trainer) = T::new(&config, folder, progress, stop)? else { return Ok(None) };
-        let (mut pending_metrics, mut validation_is_due) = (Vec::new(), false);
+        let (mut pending_metrics, mut validation_is_due, mut best_score) =
+            (Vec::new(), false, None);
         match bytes {
             Some(bytes) => {
                 let checkpoint_error =
                     |problem| TrainingError::Checkpoint { path: path.clone(), problem };
                 let restored = restore(&mut trainer, &bytes, stop).map_err(checkpoint_error)?;
                 let Some(checkpoint) = restored else { return Ok(None) };
-                (pending_metrics, validation_is_due) =
+                (pending_metrics, validation_is_due, best_score) =
                     read_progress(&checkpoint).map_err(checkpoint_error)?;
             }
             None => {
@@ -199,7 +213,14 @@ impl<T: Trainer> TrainingRun<T> {
         let phase = if validation_is_due { Phase::Train } else { Phase::Validation };
         curves::truncate_after(folder, Some(Position { step: trainer.steps_done(), phase }))?;
         let folder = folder.to_owned();
-        Ok(Some(TrainingRun { folder, trainer, pending_metrics, validation_is_due, _lock: lock }))
+        Ok(Some(TrainingRun {
+            folder,
+            trainer,
+            pending_metrics,
+            validation_is_due,
+            best_score,
+            _lock: lock,
+        }))
     }
 
     /// Returns the number of steps taken and the total number of steps.
@@ -243,7 +264,7 @@ impl<T: Trainer> TrainingRun<T> {
         stop: &AtomicBool,
         report: &mut dyn FnMut(&CurveRecord),
     ) -> Result<bool, TrainingError> {
-        let Some(metrics) = self.trainer.step(stop) else { return Ok(false) };
+        let Some(metrics) = self.trainer.step(stop)? else { return Ok(false) };
         let step = self.steps_done();
         if !metrics.values().all(|x| x.is_finite()) {
             return Err(TrainingError::NonFiniteMetric(step));
@@ -259,7 +280,8 @@ impl<T: Trainer> TrainingRun<T> {
         Ok(true)
     }
 
-    /// Validates, records the metrics and writes the weights; returns whether it was completed.
+    /// Validates, records the metrics, and writes the weights unless earlier ones have a higher
+    /// score; returns whether it was completed.
     fn validate(
         &mut self,
         stop: &AtomicBool,
@@ -270,15 +292,21 @@ impl<T: Trainer> TrainingRun<T> {
             |problem: WeightsError| TrainingError::NotFinite { step, problem: problem.to_string() };
         let validated = self.trainer.validate(stop).map_err(not_finite)?;
         let Some((metrics, weights)) = validated else { return Ok(false) };
+        let score = T::SCORE.and_then(|name| metrics.get(name).copied());
         self.record(&CurveRecord { phase: Phase::Validation, step, metrics }, report)?;
-        write_atomically(&self.folder.join(T::WEIGHTS), &weights)?;
+        let is_best = score.is_none_or(|score| self.best_score.is_none_or(|best| score > best));
+        if is_best {
+            write_atomically(&self.folder.join(T::WEIGHTS), &weights)?;
+            self.best_score = score;
+        }
         self.validation_is_due = false;
         Ok(true)
     }
 
     fn write_checkpoint(&self) -> Result<(), TrainingError> {
         let mut checkpoint = self.trainer.checkpoint();
-        insert_progress(&mut checkpoint, &self.pending_metrics, self.validation_is_due);
+        let (is_due, best_score) = (self.validation_is_due, self.best_score);
+        insert_progress(&mut checkpoint, &self.pending_metrics, is_due, best_score);
         let step = self.steps_done();
         let bytes = checkpoint
             .to_bytes(&identity(&self.trainer))

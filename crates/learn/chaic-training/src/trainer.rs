@@ -33,6 +33,9 @@ pub trait Trainer: Sized {
     const CHECKPOINT_STEPS: u64 = 250;
     /// Number of steps between two validations.
     const VALIDATION_STEPS: u64 = 1000;
+    /// Validation metric of which the weights with the highest value are kept; `None` to keep those
+    /// of the last validation.
+    const SCORE: Option<&'static str> = None;
 
     /// Prepares the training for its first step; `None` if it was stopped.
     ///
@@ -88,7 +91,10 @@ pub trait Trainer: Sized {
 
     /// Takes one step and returns its metrics; `None` if it was stopped before the step was
     /// complete.
-    fn step(&mut self, stop: &AtomicBool) -> Option<Metrics>;
+    ///
+    /// # Errors
+    /// If data cannot be written.
+    fn step(&mut self, stop: &AtomicBool) -> Result<Option<Metrics>, TrainingError>;
 
     /// Returns the validation metrics and the content of a weights file; `None` if it was stopped.
     ///

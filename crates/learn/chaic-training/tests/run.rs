@@ -124,7 +124,7 @@ impl Trainer for Toy {
         self.learner.load(checkpoint).map(Some)
     }
 
-    fn step(&mut self, stop: &AtomicBool) -> Option<Metrics> {
+    fn step(&mut self, stop: &AtomicBool) -> Result<Option<Metrics>, TrainingError> {
         let step = self.steps_done() + 1;
         let gradient = |shard: usize, parameters: &[f32], _: &mut Pass, gradient: &mut [f32]| {
             for (g, x) in gradient.iter_mut().zip(parameters) {
@@ -133,11 +133,12 @@ impl Trainer for Toy {
             (!stop.load(Ordering::Relaxed)).then(|| f64::from(gradient[0].abs()))
         };
         let (adam, learning_rate) = (AdamWConfig::default(), self.config.learning_rate);
-        let losses = self.learner.step(&self.network, &adam, learning_rate, gradient)?;
+        let losses = self.learner.step(&self.network, &adam, learning_rate, gradient);
+        let Some(losses) = losses else { return Ok(None) };
         if step == self.config.breaks_at {
             self.learner.parameters[1] = f32::NAN;
         }
-        Some(metrics([("loss", losses[0]), ("other", losses[1])]))
+        Ok(Some(metrics([("loss", losses[0]), ("other", losses[1])])))
     }
 
     fn validate(&self, stop: &AtomicBool) -> Result<Option<(Metrics, Vec<u8>)>, WeightsError> {
@@ -341,7 +342,7 @@ fn missing_damaged_and_version_1_checkpoints_are_refused_in_one_line() {
             Toy::new(&ToyConfig::default(), dir.path(), &mut |_| (), &AtomicBool::new(false))
                 .unwrap()
                 .unwrap();
-        toy.step(&AtomicBool::new(false));
+        toy.step(&AtomicBool::new(false)).unwrap();
         toy
     });
     bounds_every_number::<Toy>();
@@ -396,7 +397,8 @@ fn a_training_of_an_earlier_version_is_resumed() {
     fs::write(dir.path().join(CONFIG), old_config).unwrap();
     let stop = AtomicBool::new(false);
     let mut toy = Toy::new(&ToyConfig::default(), dir.path(), &mut |_| (), &stop).unwrap().unwrap();
-    let old_names = toy.step(&stop).map(|_| metrics([("clipped", 0.5), ("objective", 2.0)]));
+    let old_names =
+        toy.step(&stop).unwrap().map(|_| metrics([("clipped", 0.5), ("objective", 2.0)]));
     let bytes = checkpoint_bytes(&toy, &[old_names.unwrap()]).unwrap();
     fs::write(dir.path().join(CHECKPOINT), bytes).unwrap();
     let mut records = Vec::new();

@@ -382,15 +382,15 @@ impl Trainer for DetectorLearner {
         self.learner.load(checkpoint).map(Some)
     }
 
-    fn step(&mut self, stop: &AtomicBool) -> Option<Metrics> {
-        let Loss { labels, offsets, accuracy, object_accuracy } =
-            DetectorLearner::step(self, stop)?;
-        Some(metrics([
+    fn step(&mut self, stop: &AtomicBool) -> Result<Option<Metrics>, TrainingError> {
+        let Some(loss) = DetectorLearner::step(self, stop) else { return Ok(None) };
+        let Loss { labels, offsets, accuracy, object_accuracy } = loss;
+        Ok(Some(metrics([
             ("label_loss", labels),
             ("offset_loss", offsets),
             ("accuracy", accuracy),
             ("object_accuracy", object_accuracy),
-        ]))
+        ])))
     }
 
     fn validate(&self, stop: &AtomicBool) -> Result<Option<(Metrics, Vec<u8>)>, WeightsError> {

@@ -110,6 +110,17 @@ impl ConstraintBelief {
         self.expect(|c| f32::from(u8::from(excess(top_m, c.pick_range_m) <= 0.0)))
     }
 
+    /// Returns the probability that a surface with its top at `top_m` meters is within the partner's
+    /// range for put-ons.
+    pub fn put_probability(&self, top_m: f32) -> f32 {
+        self.expect(|c| f32::from(u8::from(excess(top_m, c.put_range_m) <= 0.0)))
+    }
+
+    /// Returns the probability that the partner can lift this mass alone, kilograms.
+    pub fn lift_probability(&self, mass_kg: f32) -> f32 {
+        self.expect(|c| f32::from(u8::from(mass_kg <= c.strength_kg)))
+    }
+
     /// Returns the probability that the task of this person has fragile targets.
     pub(super) fn fragile_task_probability(&self) -> f32 {
         let each = self.candidates.iter().zip(&self.probabilities);

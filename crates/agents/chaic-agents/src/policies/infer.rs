@@ -63,13 +63,6 @@ mod constants {
     pub const IDLE_FRAMES: Frame = 60;
     /// Interval between reconsiderations of walks to objects, frames.
     pub const WALK_FRAMES: Frame = 80;
-    /// Time before the end from which any goal place is used, frames.
-    pub const LAST_DELIVERY_FRAMES: Frame = 1000;
-    /// Minimum height of a goal place while the partner may be a child, meters: only high ones
-    /// count in one of its tasks, and high ones count in all (`world.high_goal_min_top_m`).
-    pub const HIGH_GOAL_M: f32 = 1.5;
-    /// Probability of a child from which this applies.
-    pub const CHILD_PROBABILITY: f32 = 0.4;
     /// Time left from which a helper with a free hand explores rather than delivers, frames.
     pub const EXPLORE_LOADED_FRAMES: f32 = 900.0;
 }
@@ -296,23 +289,6 @@ impl InferPolicy {
         }
         Plan::Explore
     }
-
-    /// Returns the minimum height of goal places that count in every task the partner may have.
-    fn min_goal_top(&self, briefing: &Briefing, memory: &Memory) -> Option<f32> {
-        if briefing.goal.is_some() || !self.options.infers_constraint {
-            return None;
-        }
-        let belief = self.belief.as_ref()?;
-        let child = belief.constraint.probabilities().into_iter();
-        let child: f32 = child.filter(|(p, _)| *p == Persona::Child).map(|(_, p)| p).sum();
-        let may_be_high = child >= CHILD_PROBABILITY && belief.evidence.n_sightings > 0;
-        let is_late = memory.frame + LAST_DELIVERY_FRAMES > briefing.horizon;
-        let knows_high = || {
-            let is_high = |top_m: f32| top_m >= HIGH_GOAL_M - 0.1;
-            memory.goal_places().iter().any(|(place, _)| is_high(place.top_m))
-        };
-        Some(if may_be_high && (!is_late || knows_high()) { HIGH_GOAL_M } else { 0.0 })
-    }
 }
 
 fn step(problem: &TeamProblem, operation: Operation) -> Step {
@@ -351,7 +327,8 @@ impl Policy for InferPolicy {
     }
 
     fn goal_place_min_top_m(&self, memory: &Memory) -> Option<f32> {
-        self.min_goal_top(self.briefing.as_ref()?, memory)
+        let briefing = self.briefing.as_ref().filter(|_| self.options.infers_constraint)?;
+        self.belief.as_ref()?.goal_place_min_top_m(briefing, memory)
     }
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {

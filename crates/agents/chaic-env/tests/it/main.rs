@@ -4,3 +4,4 @@ mod batch;
 mod env;
 mod forecast;
 mod granted_state;
+mod rewards;

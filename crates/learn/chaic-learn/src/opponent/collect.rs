@@ -10,10 +10,12 @@ use chaic_agents::decision::{Context, Plan, Policy};
 use chaic_agents::memory::Memory;
 use chaic_agents::partners::{self, PARTNER_GRANTS};
 use chaic_agents::perception_factory::{GROUND_TRUTH, PerceptionFactory};
-use chaic_agents::policies::{RandomPolicy, RulePolicy, RuleProfile};
+use chaic_agents::policies::{
+    Deviation, PartnerVariantPolicy, RandomPolicy, RulePolicy, RuleProfile,
+};
 use chaic_core::observation::Grants;
 use chaic_core::rng::RngStream;
-use chaic_core::{AgentError, AgentId, Briefing, Observation, TaskId};
+use chaic_core::{AgentError, AgentId, Briefing, Frame, Observation, TaskId};
 use chaic_env::helper_registry::Helper;
 use chaic_env::rules::RuleSet;
 use chaic_env::{Env, EpisodeAgents, EpisodeConfig, seeded_by_episode};
@@ -114,6 +116,8 @@ impl WindowCollectionConfig {
 const STRIDE: usize = 4;
 /// Maximum number of windows per goal and episode, for variety.
 const MAX_PER_EPISODE: usize = 40;
+/// One in this many episodes has a partner that pauses before each plan.
+const WAITING_SHARE: u32 = 4;
 /// Episodes between two checks of the number of windows.
 const ROUND_EPISODES: usize = 32;
 
@@ -138,10 +142,7 @@ pub fn collect(
             .map(|(goal, n)| format!("{} {n}", goal.name()))
             .collect();
         progress(&format!("{first} episodes, windows: {}", counts_by_goal.join(", ")));
-        // Waiting is rare, so it does not count.
-        let is_incomplete = |goal: &&OpponentGoal| {
-            **goal != OpponentGoal::Wait && counts[goal.index()] < config.max_per_class
-        };
+        let is_incomplete = |goal: &&OpponentGoal| counts[goal.index()] < config.max_per_class;
         if OpponentGoal::ALL.iter().find(is_incomplete).is_none() {
             break;
         }
@@ -203,12 +204,15 @@ fn windows_of_episode(
     let episode = find_episode(&id).map_err(RolloutError::from)?;
     let setup = episode.setup();
     let planner = RuleSet::PAPER.planner;
-    let partner_plan: Arc<Mutex<Option<Plan>>> = Arc::default();
+    let partner_plan: Arc<Mutex<Option<ReportedPlan>>> = Arc::default();
     let persona = setup.people.first().map_or(task.info().partner.persona, |p| p.persona);
-    let partner = PlanReporter {
-        policy: partners::policy(persona, task.info().scene),
-        plan: Arc::clone(&partner_plan),
+    // Partners that follow the rules never wait.
+    let policy: Box<dyn Policy> = if index % WAITING_SHARE == WAITING_SHARE - 1 {
+        Box::new(PartnerVariantPolicy::new(Deviation::Slow))
+    } else {
+        Box::new(partners::policy(persona, task.info().scene))
     };
+    let partner = PlanReporter { policy, plan: Arc::clone(&partner_plan) };
     let partner =
         Helper { agent: Box::new(PlanningAgent::new(partner, planner)), grants: PARTNER_GRANTS };
     let capability =
@@ -241,38 +245,55 @@ fn windows_of_episode(
     Ok(samples)
 }
 
+/// Current plan of the partner.
+#[derive(Clone, Copy)]
+struct ReportedPlan {
+    plan: Plan,
+    /// Frame until which the partner waits before it starts the plan.
+    waits_until: Frame,
+}
+
 /// The partner's policy, which shares its current plan.
 struct PlanReporter {
-    policy: RulePolicy,
-    plan: Arc<Mutex<Option<Plan>>>,
+    policy: Box<dyn Policy>,
+    plan: Arc<Mutex<Option<ReportedPlan>>>,
 }
 
 impl PlanReporter {
-    fn report(&self, plan: Plan) {
-        *self.plan.lock().unwrap_or_else(PoisonError::into_inner) = Some(plan);
+    fn report(&self, plan: Plan, waits_until: Frame) {
+        let reported = Some(ReportedPlan { plan, waits_until });
+        *self.plan.lock().unwrap_or_else(PoisonError::into_inner) = reported;
     }
 }
 
 impl Policy for PlanReporter {
     fn reset(&mut self, briefing: &Briefing) {
-        Policy::reset(&mut self.policy, briefing);
+        self.policy.reset(briefing);
     }
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
         let plan = self.policy.choose(context, valid)?;
-        self.report(plan);
+        self.report(plan, context.memory.frame + self.policy.thinking_frames());
         Ok(plan)
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, is_news: bool) -> bool {
-        self.report(*current);
+        self.report(*current, 0);
         self.policy.reconsiders(context, current, is_news)
+    }
+
+    fn thinking_frames(&self) -> Frame {
+        self.policy.thinking_frames()
+    }
+
+    fn supersedes(&self, new: &Plan, current: &Plan) -> bool {
+        self.policy.supersedes(new, current)
     }
 }
 
 /// Ground truth about the partner.
 struct GroundTruth {
-    partner_plan: Arc<Mutex<Option<Plan>>>,
+    partner_plan: Arc<Mutex<Option<ReportedPlan>>>,
     limits: [f32; N_LIMITS],
     episode: u32,
 }
@@ -334,8 +355,9 @@ impl<P: Policy> Policy for RecordingPolicy<P> {
         if !self.n_observations.is_multiple_of(STRIDE) {
             return;
         }
-        let plan = *self.truth.partner_plan.lock().unwrap_or_else(PoisonError::into_inner);
-        let Some(plan) = plan else { return };
+        let reported = *self.truth.partner_plan.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(ReportedPlan { plan, waits_until }) = reported else { return };
+        let plan = if memory.frame < waits_until { Plan::Wait } else { plan };
         let goal = if self.window.has_partner() {
             OpponentGoal::from_plan(&plan)
         } else {

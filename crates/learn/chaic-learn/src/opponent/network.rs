@@ -12,8 +12,8 @@ use crate::candidate_scorer::{CandidateScorer, CandidateSet};
 /// Number of goals.
 pub const N_GOALS: usize = OpponentGoal::ALL.len();
 
-/// Kind in weights files.
-pub const KIND: &str = "chaic opponent model 1";
+/// Kinds in weights files, without and with the partner's actions granted.
+const KINDS: [&str; 2] = ["chaic opponent model 2", "chaic opponent model 2, granted"];
 /// Width of the hidden layers.
 const WIDTH: usize = 96;
 
@@ -58,17 +58,30 @@ impl Heads {
 pub struct OpponentModel {
     network: CandidateScorer,
     parameters: Vec<f32>,
+    is_granted: bool,
+}
+
+/// Returns the kind in weights files of models whose windows have the partner's actions as granted,
+/// or as seen.
+pub fn kind(is_granted: bool) -> &'static str {
+    KINDS[usize::from(is_granted)]
 }
 
 impl OpponentModel {
-    /// Creates a model with these parameters.
+    /// Creates a model with these parameters, for windows with the partner's actions granted or
+    /// seen.
     ///
     /// # Panics
     /// If their number differs from that of the network.
-    pub fn new(parameters: Vec<f32>) -> OpponentModel {
+    pub fn new(parameters: Vec<f32>, is_granted: bool) -> OpponentModel {
         let network = network();
         assert_eq!(parameters.len(), network.network.n_parameters());
-        OpponentModel { network, parameters }
+        OpponentModel { network, parameters, is_granted }
+    }
+
+    /// True if the model was trained with the partner's actions granted, and needs them.
+    pub fn is_granted(&self) -> bool {
+        self.is_granted
     }
 
     /// Parses a weights file.
@@ -76,8 +89,14 @@ impl OpponentModel {
     /// # Errors
     /// [`WeightsError`] if the file is incomplete or belongs to another network.
     pub fn from_bytes(bytes: &[u8]) -> Result<OpponentModel, WeightsError> {
-        let parameters = weights::from_bytes(&network().network, bytes, KIND)?;
-        Ok(OpponentModel::new(parameters))
+        let read = |is_granted| {
+            let parameters = weights::from_bytes(&network().network, bytes, kind(is_granted))?;
+            Ok(OpponentModel::new(parameters, is_granted))
+        };
+        match read(false) {
+            Err(WeightsError::Kind { found, .. }) if found == kind(true) => read(true),
+            read => read,
+        }
     }
 
     /// Returns the parameters.

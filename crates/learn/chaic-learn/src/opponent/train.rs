@@ -21,10 +21,10 @@ use super::collect::{
     COLLECT_BOUNDS, CollectError, DatasetSplit, LabeledWindow, WindowCollectionConfig, collect,
     read, read_from_user_path, write,
 };
-use super::network::{Heads, KIND, N_GOALS, OpponentModel, network};
+use super::network::{Heads, N_GOALS, OpponentModel, kind as model_kind, network};
 use super::report::OpponentReport;
 use super::{N_LIMITS, OpponentGoal};
-use crate::actor_critic::{ActorCriticOutput, OutputGrad, optimizer_step};
+use crate::actor_critic::{ActorCriticOutput, Optimizer, OutputGrad, optimizer_step};
 use crate::candidate_scorer::CandidateScorer;
 use crate::ppo::MAX_BATCH;
 
@@ -195,8 +195,8 @@ impl Trainer for OpponentTrainer {
         config.collect.check()
     }
 
-    fn read_weights(_: &OpponentConfig, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
-        Ok(OpponentModel::from_bytes(weights)?.parameters().to_vec())
+    fn read_weights(config: &OpponentConfig, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
+        weights::from_bytes(&network().network, weights, model_kind(config.collect.granted))
     }
 
     fn network(&self) -> &Network {
@@ -228,7 +228,7 @@ impl Trainer for OpponentTrainer {
         Ok(Some(()))
     }
 
-    fn step(&mut self, _: &AtomicBool) -> Option<Metrics> {
+    fn step(&mut self, _: &AtomicBool) -> Result<Option<Metrics>, TrainingError> {
         let OpponentTrainer { config, network, learner, samples, by_goal, .. } = self;
         let mut rng = RngStream::new(config.seed, "windows of a step", self.steps);
         let mut draw = || {
@@ -241,27 +241,28 @@ impl Trainer for OpponentTrainer {
         let shards = optimizer_step(
             network,
             learner,
-            &config.adam,
-            learning_rate,
+            Optimizer { adam: &config.adam, learning_rate },
             &batch,
             |sample| &sample.window,
             |sample, output, weight, stats| gradient(config, sample, output, weight, stats),
+            |_| true,
         );
         self.steps += 1;
         let mean =
             |loss: fn(&Losses) -> f64| shards.iter().map(loss).sum::<f64>() / batch.len() as f64;
-        Some(metrics([
+        Ok(Some(metrics([
             ("goal", mean(|t| t.goal)),
             ("target", mean(|t| t.target)),
             ("limits", mean(|t| t.limits)),
-        ]))
+        ])))
     }
 
     fn validate(&self, stop: &AtomicBool) -> Result<Option<(Metrics, Vec<u8>)>, WeightsError> {
         let parameters = &self.learner.ema_parameters;
-        let weights = weights::to_bytes(&self.network.network, parameters, KIND)?;
-        let report =
-            OpponentReport::new(&OpponentModel::new(parameters.clone()), &self.validation, stop);
+        let is_granted = self.config.collect.granted;
+        let weights = weights::to_bytes(&self.network.network, parameters, model_kind(is_granted))?;
+        let model = OpponentModel::new(parameters.clone(), is_granted);
+        let report = OpponentReport::new(&model, &self.validation, stop);
         let Some(report) = report else { return Ok(None) };
         let metrics = metrics([
             ("goal_accuracy", report.goal_accuracy.mean),

@@ -13,7 +13,7 @@ use chaic_core::{Action, AgentId, Briefing, ClassId, Frame, Role, Vec3};
 
 use super::is_pickable;
 use crate::candidate_scorer::CandidateSet;
-use crate::scales::{TARGET_SETS, flag, normalize_clamped, recency};
+use crate::scales::{TARGET_SETS, flag, log_mass, normalize_clamped, recency};
 
 /// Number of observations in a window (paper, appendix on learning).
 pub const LENGTH: usize = 5;
@@ -100,8 +100,6 @@ pub const N_CLASS: usize = CLASS_FEATURES.len() + TARGET_SETS.len();
 
 const DISTANCE_SCALE_M: f32 = 10.0;
 const HEIGHT_SCALE_M: f32 = 2.0;
-const MASS_SCALE_KG: f32 = 20.0;
-const FURNITURE_MASS_SCALE_KG: f32 = 300.0;
 /// Change of distance within a window at which the feature saturates, meters.
 const APPROACH_SCALE_M: f32 = 1.0;
 /// Speed at which the feature saturates, meters per frame.
@@ -231,12 +229,6 @@ impl ObservationHistory {
         let is_last = |kind: usize| flag(last.is_some_and(|a| a.kind == kind));
         let known = resting_objects(memory).filter(|t| self.classes.contains(&t.class));
         let moves_furniture = briefing.possible_targets.iter().any(|c| role(Role::HeavyTarget)(*c));
-        let heaviest = |kg: f32| {
-            normalize_clamped(
-                kg,
-                if moves_furniture { FURNITURE_MASS_SCALE_KG } else { MASS_SCALE_KG },
-            )
-        };
         let has_child = briefing.companion(CompanionRole::Child).is_some();
         let state: [f32; N_STATE] = [
             n_seen as f32 / LENGTH as f32,
@@ -272,10 +264,10 @@ impl ObservationHistory {
             normalize_clamped(actions.failed.len() as f32, 4.0),
             actions.lowest(&actions.failed),
             actions.highest(&actions.failed),
-            heaviest(actions.heaviest_kg(&actions.failed)),
+            log_mass(actions.heaviest_kg(&actions.failed)),
             actions.lowest(&actions.taken),
             actions.highest(&actions.taken),
-            heaviest(actions.heaviest_kg(&actions.taken)),
+            log_mass(actions.heaviest_kg(&actions.taken)),
             flag(actions.taken.iter().any(|object| object.class.info().role == Role::Obstacle)),
             memory.frame as f32 / briefing.horizon.max(1) as f32,
             normalize_clamped(briefing.horizon as f32, 3000.0),
@@ -326,7 +318,7 @@ impl ObservationHistory {
             min_m.map_or(1.0, |m| normalize_clamped(m, DISTANCE_SCALE_M)),
             nearest_object.map_or(0.0, |t| normalize_clamped(t.top_m, HEIGHT_SCALE_M)),
             nearest_object.map_or(0.0, |t| normalize_clamped(t.bottom_m, HEIGHT_SCALE_M)),
-            normalize_clamped(info.mass_kg, MASS_SCALE_KG),
+            log_mass(info.mass_kg),
             flag(info.role == Role::Target),
             flag(info.role == Role::Container),
             flag(info.role == Role::Fragile),

@@ -13,32 +13,48 @@ use chaic_env::helper_registry::Helper;
 use chaic_nn::Pass;
 use chaic_nn::weights::{self, WeightsError};
 
-use super::network::PrimitiveNetwork;
-use super::observation::PrimitiveObservation;
-use super::{ACTIONS, PAUSE, resolve_action};
+use super::network::{OpponentInput, PrimitiveNetwork};
+use super::observation::{PrimitiveObservation, opponent_features};
+use super::{ACTIONS, PAUSE, resolve_action, visible_objects};
 use crate::actor_critic::ActorCritic as _;
-
-/// Kind in weights files.
-pub const KIND: &str = "chaic primitive policy 1";
+use crate::opponent::network::OpponentModel;
+use crate::opponent::tracker::OpponentTracker;
 
 /// Network with parameter values.
 #[derive(Clone, Debug)]
 pub struct PrimitiveWeights {
     /// Network architecture.
     pub model: PrimitiveNetwork,
-    /// Parameters.
+    /// Parameters, with those of the opponent model.
     pub parameters: Vec<f32>,
+    /// Opponent model whose predictions are inputs, if the network has such inputs.
+    pub opponent: Option<Arc<OpponentModel>>,
 }
 
 impl PrimitiveWeights {
+    /// Combines a network with parameters, which include those of its opponent model.
+    pub fn new(model: &PrimitiveNetwork, parameters: Vec<f32>) -> PrimitiveWeights {
+        let opponent = model.opponent(&parameters).map(Arc::new);
+        PrimitiveWeights { model: model.clone(), parameters, opponent }
+    }
+
     /// Parses a weights file.
     ///
     /// # Errors
     /// [`WeightsError`] if the file is incomplete or belongs to another network.
     pub fn from_bytes(bytes: &[u8]) -> Result<PrimitiveWeights, WeightsError> {
-        let model = PrimitiveNetwork::default();
-        let parameters = weights::from_bytes(model.network(), bytes, KIND)?;
-        Ok(PrimitiveWeights { model, parameters })
+        let read = |input: OpponentInput| {
+            let model = PrimitiveNetwork::new(input);
+            let parameters = weights::from_bytes(model.network(), bytes, input.kind())?;
+            Ok(PrimitiveWeights::new(&model, parameters))
+        };
+        match read(OpponentInput::None) {
+            Err(WeightsError::Kind { found, .. }) => {
+                let input = OpponentInput::ALL.into_iter().find(|input| input.kind() == found);
+                read(input.unwrap_or(OpponentInput::None))
+            }
+            read => read,
+        }
     }
 }
 
@@ -46,15 +62,19 @@ impl PrimitiveWeights {
 pub(crate) struct ObservationEncoder {
     pub(crate) agent: PlanningAgent<ExternalPolicy>,
     briefing: Option<Briefing>,
+    opponent: Option<OpponentTracker>,
 }
 
 impl ObservationEncoder {
-    /// Creates an encoder with this perception; returns its grants too.
+    /// Creates an encoder with this perception and opponent model; returns its grants too.
     pub(crate) fn new(
         rules: PlannerRules,
         perception: &dyn PerceptionFactory,
+        opponent: Option<Arc<OpponentModel>>,
     ) -> (ObservationEncoder, Grants) {
-        let grants = perception.grants(Grants::PLANNER);
+        let behavior = opponent.as_ref().is_some_and(|model| model.is_granted());
+        let grants = perception.grants(Grants { behavior, ..Grants::PLANNER });
+        let opponent = opponent.map(OpponentTracker::new);
         let agent = PlanningAgent::with_watched(
             ExternalPolicy::default(),
             rules,
@@ -62,7 +82,7 @@ impl ObservationEncoder {
             AgentId::PARTNER,
             grants,
         );
-        (ObservationEncoder { agent, briefing: None }, grants)
+        (ObservationEncoder { agent, briefing: None, opponent }, grants)
     }
 
     /// Returns the sensors, which include color and depth.
@@ -72,6 +92,9 @@ impl ObservationEncoder {
 
     pub(crate) fn reset(&mut self, briefing: &Briefing) {
         self.agent.reset(briefing);
+        if let Some(opponent) = &mut self.opponent {
+            opponent.reset(briefing);
+        }
         self.briefing = Some(briefing.clone());
     }
 
@@ -79,7 +102,18 @@ impl ObservationEncoder {
     pub(crate) fn encode(&mut self, observation: &Observation) -> Option<PrimitiveObservation> {
         self.agent.observe(observation);
         let briefing = self.briefing.as_ref()?;
-        Some(PrimitiveObservation::new(observation, &self.agent, briefing))
+        let opponent = match (&mut self.opponent, self.agent.memory()) {
+            (Some(opponent), Some(memory)) => {
+                opponent.observe(memory, briefing);
+                let prediction = opponent.predict(memory, briefing, self.agent.behavior());
+                let nearest = visible_objects(memory, &briefing.possible_targets).next();
+                let target = nearest
+                    .map_or(0.0, |object| opponent.target_probability(&prediction, object.class));
+                opponent_features(&prediction, target)
+            }
+            _ => Vec::new(),
+        };
+        Some(PrimitiveObservation::new(observation, &self.agent, briefing, opponent))
     }
 
     /// Returns an action of [`ACTIONS`]; `None` if it cannot begin.
@@ -104,7 +138,8 @@ impl PrimitiveHelper {
         rules: PlannerRules,
         perception: &dyn PerceptionFactory,
     ) -> Helper {
-        let (encoder, grants) = ObservationEncoder::new(rules, perception);
+        let (encoder, grants) =
+            ObservationEncoder::new(rules, perception, weights.opponent.clone());
         let pass = weights.model.pass();
         let rng = RngStream::new(0, "primitive policy", 0);
         let agent = PrimitiveHelper { encoder, weights, pass, rng, last_action: 0 };
@@ -124,7 +159,7 @@ impl Agent for PrimitiveHelper {
 
     fn act(&mut self, observation: &Observation) -> Result<Action, AgentError> {
         let Some(encoded) = self.encoder.encode(observation) else { return Ok(PAUSE) };
-        let PrimitiveWeights { model, parameters } = &*self.weights;
+        let PrimitiveWeights { model, parameters, .. } = &*self.weights;
         let output = model.forward(parameters, std::iter::once(&encoded), &mut self.pass).remove(0);
         self.last_action = output.sample(self.rng.unit());
         Ok(self.encoder.action(self.last_action).unwrap_or(PAUSE))

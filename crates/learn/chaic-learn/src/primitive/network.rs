@@ -1,14 +1,52 @@
 //! The paper's network: a convolutional encoder per image and a dense layer for the state. Two
 //! layers of 64 units join them, shared by actor and critic.
 
+use std::ops::Range;
+
 use chaic_nn::simd::widest;
 use chaic_nn::{Kernel, Network, Node, Pass, Shape, Tensor};
 
 use super::ACTIONS;
 use super::observation::{
-    IMAGE_CHANNELS, IMAGE_SIZE, MAP, MAP_CHANNELS, N_STATE, PrimitiveObservation,
+    IMAGE_CHANNELS, IMAGE_SIZE, MAP, MAP_CHANNELS, N_OPPONENT, N_STATE, PrimitiveObservation,
 };
 use crate::actor_critic::{ActorCritic, ActorCriticOutput, OutputGrad, log_softmax};
+use crate::opponent::{self, network::OpponentModel};
+
+/// Opponent model whose predictions a policy reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OpponentInput {
+    /// None.
+    None,
+    /// A model that sees the partner's actions.
+    Seen,
+    /// A model that is granted the partner's actions.
+    Granted,
+}
+
+impl OpponentInput {
+    /// All of them.
+    pub const ALL: [OpponentInput; 3] =
+        [OpponentInput::None, OpponentInput::Seen, OpponentInput::Granted];
+
+    /// Input for this opponent model.
+    pub fn from_model(model: Option<&OpponentModel>) -> OpponentInput {
+        match model.map(OpponentModel::is_granted) {
+            None => OpponentInput::None,
+            Some(false) => OpponentInput::Seen,
+            Some(true) => OpponentInput::Granted,
+        }
+    }
+
+    /// Kind in weights files.
+    pub fn kind(self) -> &'static str {
+        match self {
+            OpponentInput::None => "chaic primitive policy 1",
+            OpponentInput::Seen => "chaic primitive policy with opponent model 1",
+            OpponentInput::Granted => "chaic primitive policy with opponent model 1, granted",
+        }
+    }
+}
 
 /// Network architecture without parameter values.
 #[derive(Clone, Debug)]
@@ -16,7 +54,11 @@ pub struct PrimitiveNetwork {
     network: Network,
     logits: Node,
     value: Node,
+    opponent: OpponentInput,
 }
+
+/// Name of the opponent model's parameters among those of a policy.
+const OPPONENT: &str = "opponent";
 
 /// Size of the image patches that become one pixel of the first map, as in vision transformers
 /// (Dosovitskiy et al. 2021). The matrix products are then large enough to be fast.
@@ -31,12 +73,15 @@ const N_FEATURES: usize = 64;
 /// Width of the shared layers (paper, appendix on learning).
 const N_SHARED: usize = 64;
 
-impl Default for PrimitiveNetwork {
-    fn default() -> PrimitiveNetwork {
+impl PrimitiveNetwork {
+    /// Creates the network. Its parameters include those of the opponent model.
+    pub fn new(opponent: OpponentInput) -> PrimitiveNetwork {
         let mut net = Network::default();
         let image = net.input(PATCH_SIZE * PATCH_SIZE * IMAGE_CHANNELS);
         let map = net.auxiliary_input(MAP_CHANNELS, PATCHES_PER_SIDE / MAP.side);
         let state = net.auxiliary_input(N_STATE, PATCHES_PER_SIDE);
+        let has_opponent = opponent != OpponentInput::None;
+        let prediction = has_opponent.then(|| net.auxiliary_input(N_OPPONENT, PATCHES_PER_SIDE));
         let mut image_features = layer(&mut net, "image.patches", image, Kernel::POINTWISE, 32);
         for k in 0..2 {
             image_features = layer(&mut net, &format!("image{k}"), image_features, DOWNSAMPLE, 32);
@@ -53,12 +98,37 @@ impl Default for PrimitiveNetwork {
         let state_features = layer(&mut net, "state.dense", state, Kernel::POINTWISE, N_FEATURES);
         let image_and_map = net.concat(image_features, map_features);
         let mut shared = net.concat(image_and_map, state_features);
+        if let Some(prediction) = prediction {
+            let kernel = Kernel::POINTWISE;
+            let features = layer(&mut net, "opponent.dense", prediction, kernel, N_FEATURES);
+            shared = net.concat(shared, features);
+        }
         for k in 0..2 {
             shared = layer(&mut net, &format!("shared{k}"), shared, Kernel::POINTWISE, N_SHARED);
         }
         let logits = net.output_head("actor", shared, ACTIONS.len());
         let value = net.output_head("critic", shared, 1);
-        PrimitiveNetwork { network: net, logits, value }
+        if has_opponent {
+            net.extra_parameters(OPPONENT, opponent::network::network().network.n_parameters());
+        }
+        PrimitiveNetwork { network: net, logits, value, opponent }
+    }
+
+    /// Kind of the opponent model.
+    pub fn opponent_input(&self) -> OpponentInput {
+        self.opponent
+    }
+
+    /// Returns the range of the opponent model's parameters, if there is one.
+    pub(crate) fn opponent_range(&self) -> Option<Range<usize>> {
+        let found = self.network.parameters().iter().find(|p| p.name == OPPONENT);
+        found.map(|parameter| parameter.range.clone())
+    }
+
+    /// Returns the opponent model among the parameters of the network.
+    pub(crate) fn opponent(&self, parameters: &[f32]) -> Option<OpponentModel> {
+        let parameters = parameters[self.opponent_range()?].to_vec();
+        Some(OpponentModel::new(parameters, self.opponent == OpponentInput::Granted))
     }
 }
 
@@ -121,7 +191,12 @@ impl ActorCritic for PrimitiveNetwork {
         };
         let map = tensor(MAP.side, MAP_CHANNELS, &|s| &s.map, 1.0);
         let state = tensor(1, N_STATE, &|s| &s.state, 1.0 / 255.0);
-        pass.forward_all(&self.network, parameters, &[&image, &map, &state]);
+        if self.opponent == OpponentInput::None {
+            pass.forward_all(&self.network, parameters, &[&image, &map, &state]);
+        } else {
+            let opponent = tensor(1, N_OPPONENT, &|s| &s.opponent, 1.0 / 255.0);
+            pass.forward_all(&self.network, parameters, &[&image, &map, &state, &opponent]);
+        }
         let logits = pass.activation(self.logits).data.chunks_exact(ACTIONS.len());
         let outputs = logits.zip(&pass.activation(self.value).data);
         outputs

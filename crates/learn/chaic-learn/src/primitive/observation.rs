@@ -7,6 +7,8 @@ use chaic_agents::policies::ExternalPolicy;
 use chaic_core::geom::{Camera, forward};
 use chaic_core::{Briefing, Observation, Role};
 
+use crate::opponent::N_LIMITS;
+use crate::opponent::network::{N_GOALS, OpponentPrediction};
 use crate::scales::{flag, normalize_clamped};
 
 /// Width and height of the input image, pixels. The camera image is an integer multiple of it.
@@ -51,17 +53,31 @@ pub struct PrimitiveObservation {
     pub map: Vec<u8>,
     /// State features; 0 to 255 for 0 to 1, and for -1 to 1 where they may be negative.
     pub state: [u8; N_STATE],
+    /// Features of [`opponent_features`]; empty without an opponent model.
+    pub opponent: Vec<u8>,
+}
+
+/// Number of features of an opponent model's prediction: goals, limits, and the probability that
+/// the partner is after the nearest visible target's class.
+pub const N_OPPONENT: usize = N_GOALS + N_LIMITS + 1;
+
+/// Returns a prediction as bytes, 0 to 255 for 0 to 1.
+pub fn opponent_features(prediction: &OpponentPrediction, nearest_target: f32) -> Vec<u8> {
+    let OpponentPrediction { goals, limits, .. } = prediction;
+    goals.iter().chain(limits).chain([&nearest_target]).map(|x| byte(*x)).collect()
 }
 
 /// Depth that is encoded as 1, meters.
 const MAX_DEPTH_M: f32 = 10.0;
 
 impl PrimitiveObservation {
-    /// Creates the observation of an agent that has already processed `observation`.
+    /// Creates the observation of an agent that has already processed `observation`; `opponent` are
+    /// the features of its opponent model, if it has one.
     pub fn new(
         observation: &Observation,
         agent: &PlanningAgent<ExternalPolicy>,
         briefing: &Briefing,
+        opponent: Vec<u8>,
     ) -> PrimitiveObservation {
         let mut map = vec![0; MAP.len()];
         if let Some(memory) = agent.memory() {
@@ -76,6 +92,7 @@ impl PrimitiveObservation {
             image: image(observation),
             map,
             state: state(observation, agent, briefing),
+            opponent,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Training of primitive actions by PPO, with the paper's hyperparameters by default.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -24,15 +24,18 @@ use chaic_vision::perception_registry::{self, PerceptionError};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::helper::{KIND, ObservationEncoder, PrimitiveHelper, PrimitiveWeights};
-use super::network::PrimitiveNetwork;
+use super::helper::{ObservationEncoder, PrimitiveHelper, PrimitiveWeights};
+use super::network::{OpponentInput, PrimitiveNetwork};
 use super::observation::{IMAGE_SIZE, PrimitiveObservation};
 use super::{ACTIONS, PAUSE};
 use crate::actor_critic::{ActorCritic as _, ActorCriticOutput};
+use crate::opponent::network::OpponentModel;
 use crate::ppo::{PpoConfig, Schedule, Trajectory, Transition, ppo_bounds, update};
 use crate::reward_config;
 use crate::rollout::RolloutError;
-use crate::rollout_config::{MAX_VALIDATION_EPISODES, REWARD};
+use crate::rollout_config::{
+    GENERATORS, MAX_VALIDATION_EPISODES, REWARD, check_splits, read_opponent, validation_ids,
+};
 
 /// Configuration of `chaic train primitive`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -51,6 +54,11 @@ pub struct PrimitiveConfig {
     pub n_steps: usize,
     /// Tasks, whose episodes take turns. The paper trains one policy per task.
     pub tasks: Vec<TaskId>,
+    /// Generators whose episodes take turns, as in `[rollout]` of the other trainings.
+    pub splits: Vec<String>,
+    /// Weights of an opponent model (`chaic train opponent`) whose predictions the policy reads, if
+    /// any (Smart-Help).
+    pub opponent: Option<PathBuf>,
     /// Width and height of the images of helper and partner, pixels; a multiple of 128.
     pub image_size: u32,
     /// Perception of the helper, as `chaic eval --perception`.
@@ -77,6 +85,8 @@ impl Default for PrimitiveConfig {
             n_envs: 1,
             n_steps: 2,
             tasks: vec![TaskId::NoConstraint],
+            splits: vec![GENERATORS[0].to_owned()],
+            opponent: None,
             image_size: 128,
             perception: GROUND_TRUTH.to_owned(),
             behavior: GROUND_TRUTH.to_owned(),
@@ -96,9 +106,20 @@ impl PrimitiveConfig {
     fn episode(&self, slot: usize, k: u64) -> String {
         let index = k * self.n_envs as u64 + slot as u64;
         let task = self.tasks[index as usize % self.tasks.len()];
+        let split = &self.splits[index as usize / self.tasks.len() % self.splits.len()];
         let seed = SeedRange::POLICY_TRAIN.draw(&mut RngStream::new(self.seed, "episodes", index));
-        format!("{}/gen/{seed}", task.name())
+        format!("{task}/{split}/{seed}")
     }
+}
+
+/// What all environments of a training share.
+#[derive(Clone, Copy)]
+struct CollectContext<'a> {
+    config: &'a PrimitiveConfig,
+    perception: &'a dyn PerceptionFactory,
+    opponent: Option<&'a Arc<OpponentModel>>,
+    model: &'a PrimitiveNetwork,
+    stop: &'a AtomicBool,
 }
 
 /// Environment with the learning helper, which plays one episode after another.
@@ -123,14 +144,15 @@ struct StepOutcome {
 
 impl EnvRunner {
     fn new(
-        config: &PrimitiveConfig,
-        perception: &dyn PerceptionFactory,
+        context: &CollectContext<'_>,
         slot: usize,
         n_started: u64,
         pass: Pass,
     ) -> Result<EnvRunner, RolloutError> {
+        let CollectContext { config, perception, opponent, .. } = *context;
         let episode = find_episode(&config.episode(slot, n_started))?;
-        let (mut encoder, grants) = ObservationEncoder::new(RuleSet::PAPER.planner, perception);
+        let (mut encoder, grants) =
+            ObservationEncoder::new(RuleSet::PAPER.planner, perception, opponent.cloned());
         let sensors = SensorConfig { image_size: config.image_size, ..encoder.sensors() };
         let agents =
             EpisodeAgents { helper: Some(AgentSlot::external(grants, sensors)), partner: None };
@@ -196,6 +218,7 @@ struct EpisodeProgress {
 pub struct PrimitiveTrainer {
     config: PrimitiveConfig,
     perception: Arc<dyn PerceptionFactory>,
+    opponent: Option<Arc<OpponentModel>>,
     model: PrimitiveNetwork,
     learner: Learner,
     updates: u64,
@@ -212,8 +235,18 @@ impl PrimitiveTrainer {
         progress: &[EpisodeProgress],
         stop: &AtomicBool,
     ) -> Result<Option<Vec<EnvRunner>>, String> {
-        let PrimitiveTrainer { config, perception, model, .. } = self;
-        replay(config, &**perception, model, progress, stop)
+        replay(&self.context(stop), progress)
+    }
+
+    fn context<'a>(&'a self, stop: &'a AtomicBool) -> CollectContext<'a> {
+        let PrimitiveTrainer { config, perception, opponent, model, .. } = self;
+        CollectContext {
+            config,
+            perception: &**perception,
+            opponent: opponent.as_ref(),
+            model,
+            stop,
+        }
     }
 
     fn progress(&self) -> Vec<EpisodeProgress> {
@@ -225,14 +258,12 @@ impl PrimitiveTrainer {
 
     /// Collects experience in one environment; `None` if it was stopped.
     fn collect_experience(
-        config: &PrimitiveConfig,
-        perception: &dyn PerceptionFactory,
-        model: &PrimitiveNetwork,
+        context: &CollectContext<'_>,
         parameters: &[f32],
         runner: &mut EnvRunner,
         update: u64,
-        stop: &AtomicBool,
     ) -> Result<Option<Experience>, RolloutError> {
+        let CollectContext { config, model, stop, .. } = *context;
         let index = update * config.n_envs as u64 + runner.slot as u64;
         let mut rng = RngStream::new(config.seed, "actions", index);
         let mut experience = Experience::default();
@@ -259,7 +290,7 @@ impl PrimitiveTrainer {
                 experience.trajectories.push(std::mem::take(&mut trajectory));
                 let (slot, n_started) = (runner.slot, runner.n_started + 1);
                 let pass = runner.pass.clone();
-                *runner = EnvRunner::new(config, perception, slot, n_started, pass)?;
+                *runner = EnvRunner::new(context, slot, n_started, pass)?;
             }
         }
         if !trajectory.transitions.is_empty() {
@@ -275,18 +306,16 @@ impl PrimitiveTrainer {
 /// # Errors
 /// Predicate that describes what is wrong with the progress.
 fn replay(
-    config: &PrimitiveConfig,
-    perception: &dyn PerceptionFactory,
-    model: &PrimitiveNetwork,
+    context: &CollectContext<'_>,
     progress: &[EpisodeProgress],
-    stop: &AtomicBool,
 ) -> Result<Option<Vec<EnvRunner>>, String> {
+    let CollectContext { config, model, stop, .. } = *context;
     let replay_one = |(slot, progress): (usize, &EpisodeProgress)| {
         let failed = |e: RolloutError| format!("has an episode that cannot be played: {e}");
         if stop.load(Ordering::Relaxed) {
             return Ok(None);
         }
-        let runner = EnvRunner::new(config, perception, slot, progress.n_started, model.pass());
+        let runner = EnvRunner::new(context, slot, progress.n_started, model.pass());
         let mut runner = runner.map_err(failed)?;
         for action_index in &progress.actions {
             if stop.load(Ordering::Relaxed) {
@@ -348,16 +377,28 @@ impl Trainer for PrimitiveTrainer {
         stop: &AtomicBool,
     ) -> Result<Option<PrimitiveTrainer>, TrainingError> {
         let perception = config.perception_factory().map_err(TrainingError::from_data)?;
-        let model = PrimitiveNetwork::default();
-        let learner = Learner::new(model.network(), config.seed, config.ppo.shards);
+        let opponent = read_opponent(config.opponent.as_deref())?.map(Arc::new);
+        let model = PrimitiveNetwork::new(OpponentInput::from_model(opponent.as_deref()));
+        let mut learner = Learner::new(model.network(), config.seed, config.ppo.shards);
+        if let (Some(range), Some(opponent)) = (model.opponent_range(), &opponent) {
+            learner.parameters[range].copy_from_slice(opponent.parameters());
+        }
         let progress = vec![EpisodeProgress::default(); config.n_envs];
-        let runners = replay(config, &*perception, &model, &progress, stop);
+        let context = CollectContext {
+            config,
+            perception: &*perception,
+            opponent: opponent.as_ref(),
+            model: &model,
+            stop,
+        };
+        let runners = replay(&context, &progress);
         let runners = runners.map_err(|e| TrainingError::InvalidConfig(format!("`tasks` {e}")))?;
         let Some(runners) = runners else { return Ok(None) };
         let (config, interrupted_at) = (config.clone(), None);
         Ok(Some(PrimitiveTrainer {
             config,
             perception,
+            opponent,
             model,
             learner,
             updates: 0,
@@ -371,6 +412,8 @@ impl Trainer for PrimitiveTrainer {
         if config.tasks.is_empty() {
             return Err("`tasks` is empty".to_owned());
         }
+        check_splits("splits", &config.splits)?;
+        read_opponent(config.opponent.as_deref()).map_err(|e| e.to_string())?;
         let image_px = image_size as usize;
         if !image_px.is_multiple_of(IMAGE_SIZE) {
             return Err(format!("`image_size` must be a multiple of {IMAGE_SIZE}, up to 1024"));
@@ -388,8 +431,10 @@ impl Trainer for PrimitiveTrainer {
         config.perception_factory().map(|_| ()).map_err(|e| e.to_string())
     }
 
-    fn read_weights(_: &PrimitiveConfig, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
-        Ok(PrimitiveWeights::from_bytes(weights)?.parameters)
+    fn read_weights(config: &PrimitiveConfig, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
+        let opponent = read_opponent(config.opponent.as_deref()).ok().flatten();
+        let input = OpponentInput::from_model(opponent.as_ref());
+        weights::from_bytes(PrimitiveNetwork::new(input).network(), weights, input.kind())
     }
 
     fn network(&self) -> &Network {
@@ -440,11 +485,13 @@ impl Trainer for PrimitiveTrainer {
         Ok(Some(()))
     }
 
-    fn step(&mut self, stop: &AtomicBool) -> Option<Metrics> {
+    fn step(&mut self, stop: &AtomicBool) -> Result<Option<Metrics>, TrainingError> {
         let progress = self.progress();
         if self.interrupted_at.is_some() {
             let runners = self.replay(&progress, stop);
-            self.runners = runners.expect("the same episodes were played before")?;
+            let runners = runners.expect("the same episodes were played before");
+            let Some(runners) = runners else { return Ok(None) };
+            self.runners = runners;
             self.interrupted_at = None;
         }
         let learner = self.learner.state();
@@ -453,22 +500,17 @@ impl Trainer for PrimitiveTrainer {
             self.interrupted_at = Some(progress);
             self.learner.set_state(learner);
         }
-        metrics
+        Ok(metrics)
     }
 
     fn validate(&self, stop: &AtomicBool) -> Result<Option<(Metrics, Vec<u8>)>, WeightsError> {
         let PrimitiveTrainer { config, perception, model, learner, .. } = self;
         let parameters = learner.parameters.clone();
-        let bytes = weights::to_bytes(model.network(), &parameters, KIND)?;
-        let weights = Arc::new(PrimitiveWeights { model: model.clone(), parameters });
-        let first = SeedRange::POLICY_VALIDATION.first;
-        let seeds = || first..first + config.validation_episodes as u64;
-        let ids: Vec<String> = config
-            .tasks
-            .iter()
-            .flat_map(|task| seeds().map(|seed| format!("{}/gen/{seed}", task.name())))
-            .collect();
-        let rate = |id: &String| {
+        let kind = model.opponent_input().kind();
+        let bytes = weights::to_bytes(model.network(), &parameters, kind)?;
+        let weights = Arc::new(PrimitiveWeights::new(model, parameters));
+        let ids = validation_ids(&config.tasks, &config.splits, config.validation_episodes);
+        let rate = |(id, _): &(String, u32)| {
             let helper = PrimitiveHelper::create(
                 Arc::clone(&weights),
                 RuleSet::PAPER.planner,
@@ -487,18 +529,19 @@ impl PrimitiveTrainer {
     /// Collects experience and updates the network. Returns `None` if it was stopped, with
     /// environments and learner in an unspecified state.
     fn update(&mut self, stop: &AtomicBool) -> Option<Metrics> {
-        let PrimitiveTrainer { config, perception, model, learner, updates, runners, .. } = self;
+        let PrimitiveTrainer {
+            config, perception, opponent, model, learner, updates, runners, ..
+        } = self;
         let parameters = learner.parameters.clone();
+        let context = CollectContext {
+            config,
+            perception: &**perception,
+            opponent: opponent.as_ref(),
+            model,
+            stop,
+        };
         let collect_experience = |runner: &mut EnvRunner| {
-            PrimitiveTrainer::collect_experience(
-                config,
-                &**perception,
-                model,
-                &parameters,
-                runner,
-                *updates,
-                stop,
-            )
+            PrimitiveTrainer::collect_experience(&context, &parameters, runner, *updates)
         };
         let experience: Result<Vec<Option<Experience>>, RolloutError> =
             runners.par_iter_mut().map(collect_experience).collect();
@@ -510,7 +553,7 @@ impl PrimitiveTrainer {
         let trajectories: Vec<_> = experience.into_iter().flat_map(|e| e.trajectories).collect();
         let progress_remaining = 1.0 - *updates as f32 / config.n_updates as f32;
         let schedule = Schedule { seed: config.seed, iteration: *updates, progress_remaining };
-        let stats = update(&config.ppo, model, learner, &trajectories, schedule, stop)?;
+        let stats = update(&config.ppo, model, learner, &trajectories, None, schedule, stop)?;
         *updates += 1;
         let mut named = metrics([("reward", reward), ("invalid", invalid)]);
         named.extend(stats.to_metrics());

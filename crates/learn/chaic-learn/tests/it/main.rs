@@ -2,4 +2,5 @@
 
 mod old_keys;
 mod opponent;
+mod ppo_reference;
 mod training;

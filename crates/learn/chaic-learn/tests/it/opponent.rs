@@ -116,7 +116,7 @@ fn the_model_learns_and_interruption_changes_no_bit() {
     let learned =
         OpponentReport::new(&OpponentModel::from_bytes(&bytes).unwrap(), &samples, &NEVER_STOP);
     let initial = OpponentReport::new(
-        &OpponentModel::new(network().network.init_parameters(1)),
+        &OpponentModel::new(network().network.init_parameters(1), false),
         &samples,
         &NEVER_STOP,
     );
@@ -146,7 +146,7 @@ fn reports_weight_goals_equally() {
         (0..9).map(|k| sample(OpponentGoal::Unknown, k)).collect();
     samples.push(sample(OpponentGoal::Pick, 9));
     let report = OpponentReport::new(
-        &OpponentModel::new(network().network.init_parameters(1)),
+        &OpponentModel::new(network().network.init_parameters(1), false),
         &samples,
         &NEVER_STOP,
     );

@@ -147,7 +147,7 @@ fn stopped_steps_change_nothing() {
         let mut n_stopped = 0;
         for delay_ms in [0, 20, 60, 120, 200] {
             let stop = raise_after(Duration::from_millis(delay_ms));
-            if stopped.step(&stop).is_some() {
+            if stopped.step(&stop).unwrap().is_some() {
                 // The step ended before the flag was raised.
                 stopped = new();
                 continue;
@@ -156,7 +156,8 @@ fn stopped_steps_change_nothing() {
             assert!(stopped.checkpoint() == before, "{} after {delay_ms} ms", T::KIND);
         }
         assert!(n_stopped > 0, "{}", T::KIND);
-        assert!(uninterrupted.step(&NEVER_STOP) == stopped.step(&NEVER_STOP));
+        let [expected, found] = [&mut uninterrupted, &mut stopped].map(|t| t.step(&NEVER_STOP));
+        assert!(expected.unwrap() == found.unwrap());
         assert_eq!(uninterrupted.steps_done(), 1);
         assert!(uninterrupted.checkpoint() == stopped.checkpoint(), "{}", T::KIND);
         let is_raised = AtomicBool::new(true);
@@ -199,7 +200,7 @@ fn interrupted_primitive_trainings_end_with_the_same_bits() {
             drop(run);
             let trainer = PrimitiveTrainer::new(&config, &out, &mut quiet, &NEVER_STOP);
             let mut trainer = trainer.unwrap().unwrap();
-            let metrics = trainer.step(&NEVER_STOP).unwrap();
+            let metrics = trainer.step(&NEVER_STOP).unwrap().unwrap();
             let bytes = checkpoint_bytes(&trainer, &[metrics]).unwrap();
             fs::write(out.join(CHECKPOINT), bytes).unwrap();
             run = TrainingRun::resume(&out, &mut quiet, &NEVER_STOP).unwrap().unwrap();
@@ -226,7 +227,7 @@ fn policy_weights_include_the_opponent_model() {
     let file = folder.path().join("opponent.safetensors");
     let network = opponent::network::network().network;
     let parameters = network.init_parameters(7);
-    let bytes = weights::to_bytes(&network, &parameters, opponent::network::KIND).unwrap();
+    let bytes = weights::to_bytes(&network, &parameters, opponent::network::kind(true)).unwrap();
     fs::write(&file, bytes).unwrap();
     let rollout_config = RolloutConfig { opponent: Some(file.clone()), ..small_rollout() };
     let config = PpoTrainingConfig {
@@ -242,7 +243,7 @@ fn policy_weights_include_the_opponent_model() {
     let weights = PolicyTrainer::<PpoTrainingConfig>::WEIGHTS;
     let bytes = fs::read(folder.path().join("policy true").join(weights)).unwrap();
     let (kind, policy) = from_bytes(&bytes).unwrap();
-    assert_eq!(kind, PolicyKind::WithOpponent);
+    assert_eq!(kind, PolicyKind::WithOpponent { is_granted: true });
     assert_eq!(policy.opponent.unwrap().parameters(), parameters);
     // A missing file or one of another network is refused before anything is written.
     for (bytes, word) in [(&b"nothing"[..], "not a weights file"), (&bytes, "plan policy")] {
@@ -260,7 +261,8 @@ fn features_lie_within_bounds_and_rewards_sum_to_the_score() {
     let context = RolloutContext {
         perception: &GroundTruthPerceptionFactory,
         image_size: 64,
-        selection: ActionSelection::Sample,
+        selection: ActionSelection::TRAINING,
+        gamma: 1.0,
         rewards: RewardWeights { delivered: 1.0, ..RewardWeights::NONE },
         stop: &NEVER_STOP,
     };

@@ -276,10 +276,10 @@ impl Trainer for BehaviorTrainer {
         self.learner.learner.load(checkpoint).map(Some)
     }
 
-    fn step(&mut self, _: &AtomicBool) -> Option<Metrics> {
+    fn step(&mut self, _: &AtomicBool) -> Result<Option<Metrics>, TrainingError> {
         // `MAX_SHARD_CLIPS` bounds the duration of a step, so it is not interrupted.
         let BehaviorMetrics { loss, accuracy } = self.learner.step();
-        Some(metrics([("loss", loss), ("accuracy", accuracy)]))
+        Ok(Some(metrics([("loss", loss), ("accuracy", accuracy)])))
     }
 
     fn validate(&self, stop: &AtomicBool) -> Result<Option<(Metrics, Vec<u8>)>, WeightsError> {

@@ -4,7 +4,7 @@ use chaic_core::rng::RngStream;
 
 use super::*;
 use crate::PlannerRules;
-use crate::belief::Take;
+use crate::belief::{LAST_DELIVERY_FRAMES, Take};
 use crate::decision::valid_plans;
 use crate::perception::{Detection, Percepts};
 use crate::test_support::{Toy, carried, hands, seen, seen_partner};

@@ -1,0 +1,180 @@
+//! Demonstrations of a training, aggregated over its iterations (DAgger) and kept in its folder.
+
+use std::path::{Path, PathBuf};
+
+use chaic_files::{FileError, read_bounded, write_atomically};
+use chaic_training::checkpoint::Identity;
+use chaic_training::{Checkpoint, CheckpointError};
+
+use crate::candidate_scorer::CandidateSet;
+use crate::cloning::Demonstration;
+use crate::features::{N_OPPONENT_PLAN, N_OPPONENT_STATE, N_PLAN, N_STATE};
+
+/// Maximum size of the file of one iteration, bytes: about 0.1 MB per episode.
+const MAX_BYTES: u64 = 1 << 32;
+
+/// Sections of a file. Counts are the numbers of episodes and of demonstrations.
+const COUNTS: &str = "demonstrations.counts";
+const N_CANDIDATES: &str = "demonstrations.n_candidates";
+const ACTIONS: &str = "demonstrations.actions";
+const STATES: &str = "demonstrations.states";
+const CANDIDATES: &str = "demonstrations.candidates";
+const VALUE_TARGETS: &str = "demonstrations.value_targets";
+const PER_EPISODE: &str = "demonstrations.per_episode";
+
+/// Demonstrations by episode, oldest first.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Demonstrations {
+    /// Demonstrations of each episode.
+    pub episodes: Vec<Vec<Demonstration>>,
+}
+
+fn path(folder: &Path, iteration: u64) -> PathBuf {
+    folder.join(format!("demonstrations-{iteration:06}.bin"))
+}
+
+impl Demonstrations {
+    /// Reads those of the iterations before `iterations` that [`Demonstrations::write`] wrote; of
+    /// the last `max_episodes` episodes.
+    ///
+    /// # Errors
+    /// If a file cannot be read, is damaged, or belongs to another training.
+    pub fn read(
+        folder: &Path,
+        iterations: u64,
+        max_episodes: usize,
+        identity: &Identity,
+        has_opponent: bool,
+    ) -> Result<Demonstrations, CheckpointError> {
+        let mut episodes: Vec<Vec<Demonstration>> = Vec::new();
+        for iteration in (0..iterations).rev() {
+            if episodes.len() >= max_episodes {
+                break;
+            }
+            let path = path(folder, iteration);
+            let damaged = |problem: String| CheckpointError::Damaged(problem);
+            let bytes = read_bounded(&path, MAX_BYTES).map_err(|e| damaged(e.to_string()))?;
+            let file = Checkpoint::from_bytes(&bytes, identity)
+                .map_err(|problem| damaged(format!("{} {problem}", path.display())))?;
+            let mut earlier = from_sections(&file, has_opponent)?;
+            earlier.extend(episodes);
+            episodes = earlier;
+        }
+        let mut all = Demonstrations::default();
+        all.add(episodes, max_episodes);
+        Ok(all)
+    }
+
+    /// Writes the demonstrations of one iteration.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(
+        folder: &Path,
+        iteration: u64,
+        episodes: &[Vec<Demonstration>],
+        identity: &Identity,
+    ) -> Result<(), FileError> {
+        let bytes = to_sections(episodes).to_bytes(identity).expect("features are finite");
+        write_atomically(&path(folder, iteration), &bytes)
+    }
+
+    /// Adds episodes and drops the oldest beyond `max_episodes`.
+    pub fn add(&mut self, episodes: Vec<Vec<Demonstration>>, max_episodes: usize) {
+        self.episodes.extend(episodes);
+        let n_surplus = self.episodes.len().saturating_sub(max_episodes);
+        self.episodes.drain(..n_surplus);
+    }
+}
+
+fn to_sections(episodes: &[Vec<Demonstration>]) -> Checkpoint {
+    let all = || episodes.iter().flatten();
+    let mut file = Checkpoint::default();
+    let integers = |values: &mut dyn Iterator<Item = usize>| values.map(|n| n as u64).collect();
+    file.insert_integers(COUNTS, vec![episodes.len() as u64, all().count() as u64]);
+    file.insert_integers(PER_EPISODE, integers(&mut episodes.iter().map(Vec::len)));
+    file.insert_integers(N_CANDIDATES, integers(&mut all().map(|d| d.observation.n_candidates)));
+    file.insert_integers(ACTIONS, integers(&mut all().map(|d| d.action)));
+    file.insert_floats(STATES, all().flat_map(|d| d.observation.state.clone()).collect());
+    let candidates = all().flat_map(|d| d.observation.candidates.clone());
+    file.insert_floats(CANDIDATES, candidates.collect());
+    file.insert_floats(VALUE_TARGETS, all().map(|d| d.value_target).collect());
+    file
+}
+
+fn from_sections(
+    file: &Checkpoint,
+    has_opponent: bool,
+) -> Result<Vec<Vec<Demonstration>>, CheckpointError> {
+    let (n_state, n_plan) = match has_opponent {
+        true => (N_STATE + N_OPPONENT_STATE, N_PLAN + N_OPPONENT_PLAN),
+        false => (N_STATE, N_PLAN),
+    };
+    let counts = file.integers(COUNTS, 2)?;
+    let (n_episodes, n) = (counts[0] as usize, counts[1] as usize);
+    let per_episode = file.integers(PER_EPISODE, n_episodes)?;
+    let (n_candidates, actions) = (file.integers(N_CANDIDATES, n)?, file.integers(ACTIONS, n)?);
+    let n_rows: u64 = n_candidates.iter().sum();
+    let states = file.floats(STATES, n * n_state)?;
+    let candidates = file.floats(CANDIDATES, n_rows as usize * n_plan)?;
+    let value_targets = file.floats(VALUE_TARGETS, n)?;
+    let is_valid = |(n, action): (&u64, &u64)| action < n;
+    if !n_candidates.iter().zip(actions).all(is_valid) {
+        return Err(CheckpointError::section(ACTIONS, "does not fit the candidates"));
+    }
+    let mut rows = candidates.chunks_exact(n_plan);
+    let mut demonstrations = (0..n).map(|k| {
+        let n_candidates = n_candidates[k] as usize;
+        let observation = CandidateSet {
+            state: states[k * n_state..][..n_state].to_vec(),
+            candidates: rows.by_ref().take(n_candidates).flatten().copied().collect(),
+            n_candidates,
+        };
+        Demonstration { observation, action: actions[k] as usize, value_target: value_targets[k] }
+    });
+    let episode = |n: &u64| demonstrations.by_ref().take(*n as usize).collect();
+    Ok(per_episode.iter().map(episode).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chaic_core::rng::RngStream;
+
+    fn episode(seed: u64, n: usize) -> Vec<Demonstration> {
+        let mut rng = RngStream::new(seed, "demonstrations", 0);
+        let mut demonstration = |k: usize| Demonstration {
+            observation: CandidateSet {
+                state: (0..N_STATE).map(|_| rng.unit()).collect(),
+                candidates: (0..N_PLAN * (k + 2)).map(|_| rng.unit()).collect(),
+                n_candidates: k + 2,
+            },
+            action: k,
+            value_target: rng.unit(),
+        };
+        (0..n).map(&mut demonstration).collect()
+    }
+
+    #[test]
+    fn demonstrations_are_read_back_up_to_the_maximum_number_of_episodes() {
+        let folder = tempfile::tempdir().unwrap();
+        let identity = Identity { kind: "clone".to_owned(), network: 7 };
+        let mut expected = Demonstrations::default();
+        for iteration in 0..3 {
+            let episodes = vec![episode(iteration, 2), episode(10 + iteration, 3)];
+            Demonstrations::write(folder.path(), iteration, &episodes, &identity).unwrap();
+            expected.add(episodes, 5);
+        }
+        assert_eq!(expected.episodes.len(), 5);
+        let read = |iterations, identity: &Identity| {
+            Demonstrations::read(folder.path(), iterations, 5, identity, false)
+        };
+        assert_eq!(read(3, &identity).unwrap(), expected);
+        assert_eq!(read(1, &identity).unwrap().episodes.len(), 2);
+        let other = Identity { network: 8, ..identity.clone() };
+        assert!(read(3, &other).unwrap_err().to_string().contains("demonstrations-000002.bin"));
+        assert!(read(4, &identity).is_err(), "a missing file");
+        std::fs::write(path(folder.path(), 2), b"damaged").unwrap();
+        assert!(read(3, &identity).is_err());
+    }
+}

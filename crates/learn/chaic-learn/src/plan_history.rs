@@ -1,0 +1,141 @@
+//! History of a policy's choices, and the frames at which its next choice is due.
+
+use chaic_agents::decision::{Context, Plan};
+use chaic_core::{Briefing, Frame, Role};
+
+use crate::features::N_KINDS;
+
+/// Minimum time between reconsiderations, frames: those of the helper that infers
+/// (`chaic_agents::policies::infer`), and of the rules for walks with furniture
+/// (`planner.time.reconsider_frames`) and for the child.
+mod intervals {
+    use chaic_core::Frame;
+
+    /// Of plans to explore, follow or wait.
+    pub const IDLE_FRAMES: Frame = 60;
+    /// Of walks to objects.
+    pub const WALK_FRAMES: Frame = 80;
+    /// Of all plans while the child is away, and of walks to furniture.
+    pub const URGENT_FRAMES: Frame = 40;
+}
+use intervals::*;
+
+/// History of a policy's choices.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PlanHistory {
+    /// Last chosen plan.
+    pub last: Option<Plan>,
+    /// Frame of the last choice.
+    pub last_frame: Frame,
+    /// Number of choices by kind of plan.
+    pub n_chosen_by_kind: [u32; N_KINDS],
+    moves_furniture: bool,
+    /// Current plan that is being reconsidered.
+    reconsidered: Option<Plan>,
+}
+
+impl PlanHistory {
+    /// Creates the history at the start of an episode.
+    pub fn new(briefing: &Briefing) -> PlanHistory {
+        let is_furniture = |class: &chaic_core::ClassId| class.info().role == Role::HeavyTarget;
+        let moves_furniture = briefing.possible_targets.iter().any(is_furniture);
+        PlanHistory { moves_furniture, ..PlanHistory::default() }
+    }
+
+    /// Records a choice at a frame.
+    pub fn record(&mut self, plan: Plan, frame: Frame) {
+        if self.reconsidered.take() != Some(plan) {
+            self.n_chosen_by_kind[plan.kind()] += 1;
+        }
+        self.last = Some(plan);
+        self.last_frame = frame;
+    }
+
+    /// Returns whether a new choice is due although `current` is not finished. `has_changed` is
+    /// true if the map has changed in a relevant way since the last choice.
+    pub fn is_due(&mut self, context: &Context<'_>, current: &Plan, has_changed: bool) -> bool {
+        let since = context.memory.frame.saturating_sub(self.last_frame);
+        let is_urgent = since >= URGENT_FRAMES && context.memory.child_is_away(context.briefing);
+        let is_due = match current {
+            Plan::PutIn | Plan::TurnAround | Plan::FollowChild => false,
+            _ if is_urgent => true,
+            Plan::Deliver | Plan::LiftWith(_) => false,
+            _ if self.moves_furniture => has_changed || since >= URGENT_FRAMES,
+            Plan::Explore | Plan::FollowPartner | Plan::Wait => has_changed || since >= IDLE_FRAMES,
+            Plan::PickUp(_) | Plan::PickContainer(_) => has_changed && since >= WALK_FRAMES,
+            Plan::RemoveObstacle(_) => false,
+        };
+        self.reconsidered = is_due.then_some(*current);
+        is_due
+    }
+
+    /// The unfinished plan that the next choice reconsiders, if any.
+    pub fn reconsidered(&self) -> Option<Plan> {
+        self.reconsidered
+    }
+
+    /// Sets the unfinished plan that the next choice reconsiders, for a policy with other intervals.
+    pub fn set_reconsidered(&mut self, current: Option<Plan>) {
+        self.reconsidered = current;
+    }
+
+    /// Returns the candidates among the valid plans; never empty. While a plan is reconsidered,
+    /// they are that plan and those that [may replace](may_replace) it.
+    pub fn candidates(&self, valid: &[Plan]) -> Vec<Plan> {
+        let Some(current) = self.reconsidered else { return valid.to_vec() };
+        let alternatives = valid.iter().filter(|plan| may_replace(plan, &current));
+        std::iter::once(&current).chain(alternatives).copied().collect()
+    }
+}
+
+/// Returns whether a learned policy may replace the unfinished plan `current` by `new`: as
+/// [`Plan::supersedes`], and also a walk by another walk and an idle plan by another idle plan.
+pub fn may_replace(new: &Plan, current: &Plan) -> bool {
+    let is_pick = |p: &Plan| matches!(p, Plan::PickUp(_) | Plan::PickContainer(_));
+    let is_idle = |p: &Plan| matches!(p, Plan::Explore | Plan::FollowPartner | Plan::Wait);
+    let is_exchange =
+        is_pick(new) && is_pick(current) || is_idle(new) && is_idle(current) && new != current;
+    new != current && (is_exchange || new.supersedes(current))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chaic_agents::decision::Subject;
+    use chaic_agents::track::TrackId;
+    use chaic_core::ClassId;
+
+    fn pick_up(track: u32) -> Plan {
+        Plan::PickUp(Subject { track: TrackId(track), class: ClassId::named("apple") })
+    }
+
+    #[test]
+    fn a_reconsidered_plan_competes_with_those_that_may_replace_it() {
+        let valid = [Plan::Explore, pick_up(1), pick_up(2), Plan::FollowPartner, Plan::TurnAround];
+        let mut history = PlanHistory::default();
+        assert_eq!(history.candidates(&valid), valid);
+        for (current, expected) in [
+            (pick_up(1), vec![pick_up(1), pick_up(2), Plan::TurnAround]),
+            (
+                Plan::Explore,
+                vec![Plan::Explore, pick_up(1), pick_up(2), Plan::FollowPartner, Plan::TurnAround],
+            ),
+            (Plan::Deliver, vec![Plan::Deliver, pick_up(1), pick_up(2), Plan::TurnAround]),
+        ] {
+            history.set_reconsidered(Some(current));
+            assert_eq!(history.candidates(&valid), expected);
+        }
+    }
+
+    #[test]
+    fn a_continued_plan_counts_once() {
+        let mut history = PlanHistory::default();
+        history.record(Plan::Explore, 10);
+        history.set_reconsidered(Some(Plan::Explore));
+        history.record(Plan::Explore, 70);
+        assert_eq!(history.n_chosen_by_kind[Plan::Explore.kind()], 1);
+        assert_eq!((history.last_frame, history.reconsidered()), (70, None));
+        history.record(Plan::Explore, 90);
+        assert_eq!(history.n_chosen_by_kind[Plan::Explore.kind()], 2);
+    }
+}

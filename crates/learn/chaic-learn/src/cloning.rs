@@ -4,8 +4,8 @@
 //! The expert has the observations, memory and grants of the learner. [`EXPERTS`] lists those that
 //! can be imitated.
 
+use std::sync::PoisonError;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, PoisonError};
 
 use chaic_agents::behavior::BehaviorLog;
 use chaic_agents::decision::{Context, Plan, Policy};
@@ -20,8 +20,8 @@ use chaic_training::Learner;
 use crate::actor_critic::{ActorCriticOutput, Optimizer, OutputGrad, optimizer_step};
 use crate::candidate_scorer::{CandidateScorer, CandidateSet};
 use crate::features::FeatureEncoder;
-use crate::opponent::network::OpponentModel;
 use crate::policy::{LearnedPolicy, StepLog, StepRecord};
+use crate::policy_kind::PolicyWeights;
 
 /// Expert that can be imitated.
 #[derive(Clone, Copy, Debug)]
@@ -81,17 +81,17 @@ pub struct ExpertPolicy {
 
 impl ExpertPolicy {
     /// Creates a policy that records the choices of this expert. `goal` is the partner's goal, for
-    /// experts that are told it. The recorded features include the predictions of the opponent
-    /// model, if there is one.
+    /// experts that are told it. The recorded features are the inputs of a policy with these weights.
     pub fn new(
         expert: &ExpertInfo,
         goal: &Goal,
         actor: RolloutActor,
-        opponent: Option<Arc<OpponentModel>>,
+        weights: &PolicyWeights,
         log: StepLog,
     ) -> ExpertPolicy {
         let goal = expert.knows_goal.then(|| goal.clone());
-        let features = FeatureEncoder::new(opponent);
+        let opponent = weights.opponent.clone();
+        let features = FeatureEncoder::new(weights.kind.has_proposals, opponent);
         ExpertPolicy { expert: (expert.policy)(), goal, actor, log, features }
     }
 
@@ -115,7 +115,7 @@ impl Policy for ExpertPolicy {
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
         let reconsidered = self.features.history.reconsidered();
         let candidates = self.features.history.candidates(valid);
-        let decision = self.features.encode(context, &candidates);
+        let decision = self.features.encode(context, valid, &candidates);
         let told = self.told(context.briefing);
         let briefing = told.as_ref().unwrap_or(context.briefing);
         let expert_plan = self.expert.choose(&Context { briefing, ..*context }, valid)?;
@@ -165,7 +165,7 @@ impl Policy for ExpertPolicy {
 
     fn observe(&mut self, observation: &Observation, memory: &Memory, behavior: &BehaviorLog) {
         self.expert.observe(observation, memory, behavior);
-        self.features.observe(memory, behavior);
+        self.features.observe(observation, memory, behavior);
         if let RolloutActor::Learner(learner) = &mut self.actor {
             learner.observe(observation, memory, behavior);
         }

@@ -8,7 +8,6 @@ use chaic_training::{Checkpoint, CheckpointError};
 
 use crate::candidate_scorer::CandidateSet;
 use crate::cloning::Demonstration;
-use crate::features::{N_OPPONENT_PLAN, N_OPPONENT_STATE, N_PLAN, N_STATE};
 
 /// Maximum size of the file of one iteration, bytes: about 0.1 MB per episode.
 const MAX_BYTES: u64 = 1 << 32;
@@ -35,7 +34,8 @@ fn path(folder: &Path, iteration: u64) -> PathBuf {
 
 impl Demonstrations {
     /// Reads those of the iterations before `iterations` that [`Demonstrations::write`] wrote; of
-    /// the last `max_episodes` episodes.
+    /// the last `max_episodes` episodes. `n_features` are the numbers of features of a state and of a
+    /// plan.
     ///
     /// # Errors
     /// If a file cannot be read, is damaged, or belongs to another training.
@@ -44,7 +44,7 @@ impl Demonstrations {
         iterations: u64,
         max_episodes: usize,
         identity: &Identity,
-        has_opponent: bool,
+        n_features: (usize, usize),
     ) -> Result<Demonstrations, CheckpointError> {
         let mut episodes: Vec<Vec<Demonstration>> = Vec::new();
         for iteration in (0..iterations).rev() {
@@ -56,7 +56,7 @@ impl Demonstrations {
             let bytes = read_bounded(&path, MAX_BYTES).map_err(|e| damaged(e.to_string()))?;
             let file = Checkpoint::from_bytes(&bytes, identity)
                 .map_err(|problem| damaged(format!("{} {problem}", path.display())))?;
-            let mut earlier = from_sections(&file, has_opponent)?;
+            let mut earlier = from_sections(&file, n_features)?;
             earlier.extend(episodes);
             episodes = earlier;
         }
@@ -104,12 +104,8 @@ fn to_sections(episodes: &[Vec<Demonstration>]) -> Checkpoint {
 
 fn from_sections(
     file: &Checkpoint,
-    has_opponent: bool,
+    (n_state, n_plan): (usize, usize),
 ) -> Result<Vec<Vec<Demonstration>>, CheckpointError> {
-    let (n_state, n_plan) = match has_opponent {
-        true => (N_STATE + N_OPPONENT_STATE, N_PLAN + N_OPPONENT_PLAN),
-        false => (N_STATE, N_PLAN),
-    };
     let counts = file.integers(COUNTS, 2)?;
     let (n_episodes, n) = (counts[0] as usize, counts[1] as usize);
     let per_episode = file.integers(PER_EPISODE, n_episodes)?;
@@ -139,6 +135,7 @@ fn from_sections(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::features::{N_PLAN, N_STATE};
     use chaic_core::rng::RngStream;
 
     fn episode(seed: u64, n: usize) -> Vec<Demonstration> {
@@ -167,7 +164,7 @@ mod tests {
         }
         assert_eq!(expected.episodes.len(), 5);
         let read = |iterations, identity: &Identity| {
-            Demonstrations::read(folder.path(), iterations, 5, identity, false)
+            Demonstrations::read(folder.path(), iterations, 5, identity, (N_STATE, N_PLAN))
         };
         assert_eq!(read(3, &identity).unwrap(), expected);
         assert_eq!(read(1, &identity).unwrap().episodes.len(), 2);

@@ -6,13 +6,14 @@ use std::sync::Arc;
 
 use chaic_agents::behavior::BehaviorLog;
 use chaic_agents::belief::Belief;
-use chaic_agents::decision::{Context, HandState, Plan};
+use chaic_agents::decision::{Context, HandState, Plan, Policy as _};
 use chaic_agents::mapping::MappedObject;
 use chaic_agents::memory::Memory;
+use chaic_agents::policies::{InferOptions, InferPolicy};
 use chaic_core::briefing::CompanionRole;
 use chaic_core::capability::Persona;
 use chaic_core::geom::{horizontal_distance, to_xz};
-use chaic_core::{Briefing, ClassId, Role, Vec3};
+use chaic_core::{Briefing, ClassId, Observation, Role, Vec3};
 
 use crate::candidate_scorer::CandidateSet;
 use crate::opponent::network::{N_GOALS, OpponentModel, OpponentPrediction};
@@ -105,6 +106,8 @@ pub const N_OPPONENT_STATE: usize = N_GOALS + N_LIMITS;
 /// Number of additional plan features with an opponent model. They are the probability that the
 /// plan's class is the partner's target, alone and times that of the goal to pick up.
 pub const N_OPPONENT_PLAN: usize = 2;
+/// Number of additional plan features with proposals: whether `infer` would choose the plan.
+pub const N_PROPOSAL_PLAN: usize = 1;
 /// Number of kinds of plans.
 pub(crate) const N_KINDS: usize = Plan::KINDS.len();
 
@@ -147,13 +150,17 @@ pub struct FeatureEncoder {
     pub history: PlanHistory,
     episode: Option<(Briefing, Belief)>,
     opponent: Option<OpponentTracker>,
+    /// The helper `infer`, whose choices are marked.
+    proposer: Option<InferPolicy>,
 }
 
 impl FeatureEncoder {
-    /// Creates an encoder, with an opponent model if there is one.
-    pub fn new(opponent: Option<Arc<OpponentModel>>) -> FeatureEncoder {
+    /// Creates an encoder, with an opponent model if there is one. `has_proposals` adds the feature
+    /// that marks the plan of the helper `infer`.
+    pub fn new(has_proposals: bool, opponent: Option<Arc<OpponentModel>>) -> FeatureEncoder {
         let opponent = opponent.map(OpponentTracker::new);
-        FeatureEncoder { history: PlanHistory::default(), episode: None, opponent }
+        let proposer = has_proposals.then(|| InferPolicy::new(InferOptions::ALL));
+        FeatureEncoder { history: PlanHistory::default(), episode: None, opponent, proposer }
     }
 
     /// Starts an episode.
@@ -163,10 +170,16 @@ impl FeatureEncoder {
         if let Some(opponent) = &mut self.opponent {
             opponent.reset(briefing);
         }
+        if let Some(proposer) = &mut self.proposer {
+            proposer.reset(briefing);
+        }
     }
 
     /// Adds an observation, after the memory has.
-    pub fn observe(&mut self, memory: &Memory, behavior: &BehaviorLog) {
+    pub fn observe(&mut self, observation: &Observation, memory: &Memory, behavior: &BehaviorLog) {
+        if let Some(proposer) = &mut self.proposer {
+            proposer.observe(observation, memory, behavior);
+        }
         let Some((briefing, belief)) = &mut self.episode else { return };
         belief.observe(briefing, memory, behavior);
         if let Some(opponent) = &mut self.opponent {
@@ -185,8 +198,39 @@ impl FeatureEncoder {
         belief.goal_place_min_top_m(briefing, memory)
     }
 
-    /// Encodes a choice between these plans.
-    pub fn encode(&mut self, context: &Context<'_>, candidates: &[Plan]) -> CandidateSet {
+    /// Encodes a choice between these candidates among the valid plans.
+    pub fn encode(
+        &mut self,
+        context: &Context<'_>,
+        valid: &[Plan],
+        candidates: &[Plan],
+    ) -> CandidateSet {
+        let mut encoded = self.encode_without_proposals(context, candidates);
+        if let Some(proposer) = &mut self.proposer {
+            let proposal = proposer.choose(context, valid).ok();
+            // A proposal that does not replace the current plan is to continue.
+            let proposal = match self.history.reconsidered() {
+                Some(current) if !proposal.is_some_and(|p| proposer.supersedes(&p, &current)) => {
+                    Some(current)
+                }
+                _ => proposal,
+            };
+            let rows = encoded.candidates.chunks_exact(encoded.candidates.len() / candidates.len());
+            let mark = |(row, plan): (&[f32], &Plan)| {
+                let mut row = row.to_vec();
+                row.push(flag(Some(*plan) == proposal));
+                row
+            };
+            encoded.candidates = rows.zip(candidates).flat_map(mark).collect();
+        }
+        encoded
+    }
+
+    fn encode_without_proposals(
+        &mut self,
+        context: &Context<'_>,
+        candidates: &[Plan],
+    ) -> CandidateSet {
         let prior;
         let belief = match &self.episode {
             Some((_, belief)) => belief,

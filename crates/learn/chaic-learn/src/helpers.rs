@@ -11,10 +11,10 @@ use chaic_files::{read_bounded, read_user_file, write_atomically};
 use chaic_nn::weights::{self, WeightsError};
 use serde::{Deserialize, Serialize};
 
-use crate::policy::{ActionSelection, LearnedPolicy, PolicyWeights, policy_helper};
+use crate::policy::{ActionSelection, LearnedPolicy, policy_helper};
+use crate::policy_kind::PolicyWeights;
 use crate::primitive::helper::{PrimitiveHelper, PrimitiveWeights};
-use crate::primitive::network::OpponentInput;
-use crate::train::from_bytes;
+use crate::primitive::network::PrimitiveNetwork;
 
 /// File in a run's folder that lists its policies.
 pub const FILE: &str = "policies.json";
@@ -38,15 +38,10 @@ enum LoadedWeights {
 
 impl LoadedWeights {
     fn from_bytes(bytes: &[u8]) -> Result<LoadedWeights, WeightsError> {
-        match from_bytes(bytes) {
-            Ok((_, weights)) => Ok(LoadedWeights::Plans(Arc::new(weights))),
-            Err(WeightsError::Kind { found, .. })
-                if OpponentInput::ALL.iter().any(|input| input.kind() == found) =>
-            {
-                Ok(LoadedWeights::Actions(Arc::new(PrimitiveWeights::from_bytes(bytes)?)))
-            }
-            Err(problem) => Err(problem),
+        if PrimitiveNetwork::from_kind(&weights::kind(bytes)?).is_some() {
+            return Ok(LoadedWeights::Actions(Arc::new(PrimitiveWeights::from_bytes(bytes)?)));
         }
+        Ok(LoadedWeights::Plans(Arc::new(PolicyWeights::from_bytes(bytes)?)))
     }
 
     fn helper(&self, rules: PlannerRules, perception: &dyn PerceptionFactory) -> Helper {

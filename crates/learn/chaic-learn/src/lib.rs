@@ -29,6 +29,7 @@ pub mod cloning;
 pub mod demonstrations;
 mod plan_history;
 pub mod policy;
+pub mod policy_kind;
 mod reward_config;
 pub mod rollout;
 pub mod rollout_config;

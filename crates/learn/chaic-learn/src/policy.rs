@@ -16,10 +16,10 @@ use chaic_env::helper_registry::Helper;
 use chaic_nn::Pass;
 
 use crate::actor_critic::ActorCritic as _;
-use crate::candidate_scorer::{CandidateScorer, CandidateSet};
+use crate::candidate_scorer::CandidateSet;
 use crate::features::FeatureEncoder;
-use crate::opponent::network::OpponentModel;
 use crate::plan_history::may_replace;
+use crate::policy_kind::PolicyWeights;
 
 /// Creates a helper with this policy and these grants, as far as the perception needs them. It observes its partner through its perception, and explores as the helper
 /// that infers.
@@ -32,26 +32,6 @@ pub fn policy_helper<P: Policy>(
     let (grants, rules) = (perception.grants(grants), explore_unknown_area(rules));
     let agent = PlanningAgent::with_watched(policy, rules, perception, AgentId::PARTNER, grants);
     Helper { agent: Box::new(agent), grants }
-}
-
-/// Network with parameter values.
-#[derive(Clone, Debug)]
-pub struct PolicyWeights {
-    /// Network architecture.
-    pub model: CandidateScorer,
-    /// Parameters.
-    pub parameters: Vec<f32>,
-    /// Opponent model whose predictions are inputs, if the network needs one.
-    pub opponent: Option<Arc<OpponentModel>>,
-}
-
-impl PolicyWeights {
-    /// Returns the grants of a helper with this policy: those of the paper's helpers, and the
-    /// partner's actions if its opponent model needs them.
-    pub fn grants(&self) -> Grants {
-        let behavior = self.opponent.as_ref().is_some_and(|model| model.is_granted());
-        Grants { behavior, ..Grants::PLANNER }
-    }
 }
 
 /// Selection of an action from a distribution.
@@ -111,7 +91,7 @@ impl LearnedPolicy {
     ) -> LearnedPolicy {
         let pass = weights.model.pass();
         let rng = RngStream::new(0, "plans", 0);
-        let features = FeatureEncoder::new(weights.opponent.clone());
+        let features = FeatureEncoder::new(weights.kind.has_proposals, weights.opponent.clone());
         LearnedPolicy { weights, selection, log, pass, rng, features }
     }
 }
@@ -129,7 +109,7 @@ impl Policy for LearnedPolicy {
             self.features.history.record(single, frame);
             return Ok(single);
         }
-        let observation = self.features.encode(context, &candidates);
+        let observation = self.features.encode(context, valid, &candidates);
         let PolicyWeights { model, parameters, .. } = &*self.weights;
         let output =
             model.forward(parameters, std::iter::once(&observation), &mut self.pass).remove(0);
@@ -166,8 +146,8 @@ impl Policy for LearnedPolicy {
         self.features.goal_place_min_top_m(memory)
     }
 
-    fn observe(&mut self, _: &Observation, memory: &Memory, behavior: &BehaviorLog) {
-        self.features.observe(memory, behavior);
+    fn observe(&mut self, observation: &Observation, memory: &Memory, behavior: &BehaviorLog) {
+        self.features.observe(observation, memory, behavior);
     }
 
     fn counters(&self) -> BTreeMap<String, u64> {

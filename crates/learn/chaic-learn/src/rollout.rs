@@ -21,9 +21,8 @@ use chaic_episodes::{SplitError, find_episode};
 use rayon::prelude::*;
 
 use crate::cloning::{Demonstration, ExpertInfo, ExpertPolicy, sample_actor};
-use crate::policy::{
-    ActionSelection, LearnedPolicy, PolicyWeights, StepLog, StepRecord, policy_helper,
-};
+use crate::policy::{ActionSelection, LearnedPolicy, StepLog, StepRecord, policy_helper};
+use crate::policy_kind::PolicyWeights;
 use crate::ppo::{Trajectory, Transition};
 
 /// Reason why an episode cannot be played.
@@ -183,7 +182,7 @@ pub fn rollout_with_expert(
     let recording = record_episode(id, seed, context, weights.grants(), |goal, log| {
         let mut rng = RngStream::new(u64::from(seed), id, 0);
         let actor = sample_actor(learner_fraction, &mut rng, learner);
-        ExpertPolicy::new(expert, goal, actor, weights.opponent.clone(), log)
+        ExpertPolicy::new(expert, goal, actor, weights, log)
     })?;
     let Some(recording) = recording else { return Ok(None) };
     let ends: Vec<Frame> = recording.ends().collect();

@@ -17,8 +17,9 @@ use chaic_vision::perception_registry::{self, PerceptionError};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::opponent::network::OpponentModel;
-use crate::policy::{ActionSelection, PolicyWeights};
+use crate::opponent::network::{OpponentInput, OpponentModel};
+use crate::policy::ActionSelection;
+use crate::policy_kind::{PolicyKind, PolicyWeights};
 use crate::reward_config;
 use crate::rollout::{EpisodeResult, RolloutContext, rollout_all, rollout_built_in};
 
@@ -69,6 +70,8 @@ pub struct RolloutConfig {
     /// Weights of an opponent model (`chaic train opponent`) whose predictions the policy reads, if
     /// any.
     pub opponent: Option<PathBuf>,
+    /// Adds a feature that marks the plan that the helper `infer` would choose.
+    pub proposals: bool,
     /// Normalizes inputs by their running mean and standard deviation.
     pub normalize: bool,
     /// Validation episodes per task.
@@ -88,6 +91,7 @@ impl Default for RolloutConfig {
             perception: GROUND_TRUTH.to_owned(),
             behavior: GROUND_TRUTH.to_owned(),
             opponent: None,
+            proposals: false,
             normalize: false,
             validation_episodes: 3,
             rewards: RewardWeights::CUMULATIVE,
@@ -108,6 +112,12 @@ impl RolloutConfig {
 
     pub(crate) fn read_opponent(&self) -> Result<Option<OpponentModel>, TrainingError> {
         read_opponent(self.opponent.as_deref())
+    }
+
+    /// Returns the inputs of a policy with this opponent model.
+    pub(crate) fn policy_kind(&self, opponent: Option<&OpponentModel>) -> PolicyKind {
+        let opponent = OpponentInput::from_model(opponent);
+        PolicyKind { opponent, has_proposals: self.proposals }
     }
 
     pub(crate) fn perception_factory(&self) -> Result<Arc<dyn PerceptionFactory>, PerceptionError> {

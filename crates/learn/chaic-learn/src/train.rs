@@ -1,6 +1,5 @@
 //! Trainers of policies that choose plans.
 
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
@@ -25,9 +24,8 @@ use crate::actor_critic::Optimizer;
 use crate::candidate_scorer::{CandidateScorer, CandidateSet};
 use crate::cloning::{CloningMetrics, Demonstration, EXPERTS, ExpertInfo, FitConfig, fit};
 use crate::demonstrations::Demonstrations;
-use crate::features::{N_OPPONENT_PLAN, N_OPPONENT_STATE, N_PLAN, N_STATE};
-use crate::opponent::{self, network::OpponentModel};
-use crate::policy::PolicyWeights;
+use crate::opponent::network::OpponentModel;
+use crate::policy_kind::{PolicyKind, PolicyWeights};
 use crate::ppo::{MAX_BATCH, PPO_BOUNDS, PpoConfig, Schedule, update};
 use crate::rollout::{rollout_all, rollout_with_expert};
 use crate::rollout_config::{ROLLOUT_BOUNDS, VALIDATION_TR, Validation, mean_tr};
@@ -36,96 +34,6 @@ pub use crate::rollout_config::RolloutConfig;
 
 /// Maximum size of a weights file, bytes.
 const MAX_WEIGHTS_BYTES: u64 = 1 << 28;
-/// Kind in weights files of policies without opponent model.
-const KIND: &str = "chaic plan policy 3";
-/// Kinds in weights files of policies with opponent model, without and with the partner's actions
-/// granted.
-const KINDS_WITH_OPPONENT: [&str; 2] =
-    ["chaic plan policy with opponent model 2", "chaic plan policy with opponent model 2, granted"];
-/// Name of the opponent model's parameters among those of a policy.
-const OPPONENT: &str = "opponent";
-/// Width of the hidden layers.
-const WIDTH: usize = 96;
-
-/// Kind of network that chooses plans.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PolicyKind {
-    /// Reads features of the memory.
-    WithoutOpponent,
-    /// Reads predictions of an opponent model as well (Smart-Help).
-    WithOpponent {
-        /// True if the opponent model needs the partner's actions.
-        is_granted: bool,
-    },
-}
-
-impl PolicyKind {
-    fn with(opponent: Option<&OpponentModel>) -> PolicyKind {
-        opponent.map_or(PolicyKind::WithoutOpponent, |model| PolicyKind::WithOpponent {
-            is_granted: model.is_granted(),
-        })
-    }
-
-    /// Creates the network architecture. Its parameters include those of the opponent model.
-    pub fn network(self) -> CandidateScorer {
-        if self == PolicyKind::WithoutOpponent {
-            return CandidateScorer::new(N_STATE, N_PLAN, WIDTH, 1);
-        }
-        let (n_state, n_plan) = (N_STATE + N_OPPONENT_STATE, N_PLAN + N_OPPONENT_PLAN);
-        let mut model = CandidateScorer::new(n_state, n_plan, WIDTH, 1);
-        model
-            .network
-            .extra_parameters(OPPONENT, opponent::network::network().network.n_parameters());
-        model
-    }
-
-    fn name(self) -> &'static str {
-        match self {
-            PolicyKind::WithoutOpponent => KIND,
-            PolicyKind::WithOpponent { is_granted } => KINDS_WITH_OPPONENT[usize::from(is_granted)],
-        }
-    }
-
-    /// Combines a network of this kind with parameters.
-    pub fn weights_from(self, model: &CandidateScorer, parameters: Vec<f32>) -> PolicyWeights {
-        let opponent = match self {
-            PolicyKind::WithoutOpponent => None,
-            PolicyKind::WithOpponent { is_granted } => {
-                let parameters = parameters[opponent_range(model)].to_vec();
-                Some(Arc::new(OpponentModel::new(parameters, is_granted)))
-            }
-        };
-        PolicyWeights { model: model.clone(), parameters, opponent }
-    }
-}
-
-/// Returns the range of the opponent model's parameters.
-fn opponent_range(model: &CandidateScorer) -> Range<usize> {
-    let found = model.network.parameters().iter().find(|p| p.name == OPPONENT);
-    found.expect("the network has an opponent model").range.clone()
-}
-
-/// Parses a weights file of either kind.
-///
-/// # Errors
-/// [`WeightsError`] if the file is incomplete or belongs to another network.
-pub fn from_bytes(bytes: &[u8]) -> Result<(PolicyKind, PolicyWeights), WeightsError> {
-    let read = |kind: PolicyKind| {
-        let model = kind.network();
-        let parameters = weights::from_bytes(&model.network, bytes, kind.name())?;
-        Ok((kind, kind.weights_from(&model, parameters)))
-    };
-    match read(PolicyKind::WithoutOpponent) {
-        Err(WeightsError::Kind { found, .. }) if found == KINDS_WITH_OPPONENT[0] => {
-            read(PolicyKind::WithOpponent { is_granted: false })
-        }
-        Err(WeightsError::Kind { found, .. }) if found == KINDS_WITH_OPPONENT[1] => {
-            read(PolicyKind::WithOpponent { is_granted: true })
-        }
-        read => read,
-    }
-}
-
 /// Section of a checkpoint.
 const ITERATIONS: &str = "policy.iterations";
 
@@ -138,18 +46,22 @@ pub struct TrainState {
 }
 
 impl TrainState {
-    fn new(seed: u64, shards: usize, opponent: Option<&OpponentModel>) -> TrainState {
-        let kind = PolicyKind::with(opponent);
+    fn new(
+        seed: u64,
+        shards: usize,
+        kind: PolicyKind,
+        opponent: Option<&OpponentModel>,
+    ) -> TrainState {
         let model = kind.network();
         let mut learner = Learner::new(&model.network, seed, shards);
-        if let Some(opponent) = opponent {
-            learner.parameters[opponent_range(&model)].copy_from_slice(opponent.parameters());
+        if let (Some(range), Some(opponent)) = (PolicyKind::opponent_range(&model), opponent) {
+            learner.parameters[range].copy_from_slice(opponent.parameters());
         }
         TrainState { kind, model, learner, iterations: 0 }
     }
 
     fn policy_weights(&self) -> Arc<PolicyWeights> {
-        Arc::new(self.kind.weights_from(&self.model, self.learner.parameters.clone()))
+        Arc::new(PolicyWeights::new(self.kind, &self.model, self.learner.parameters.clone()))
     }
 
     /// Updates the statistics that normalize the network's inputs.
@@ -158,7 +70,7 @@ impl TrainState {
     }
 
     fn weights(&self) -> Result<Vec<u8>, WeightsError> {
-        weights::to_bytes(&self.model.network, &self.learner.parameters, self.kind.name())
+        weights::to_bytes(&self.model.network, &self.learner.parameters, &self.kind.name())
     }
 
     fn checkpoint(&self) -> Checkpoint {
@@ -274,7 +186,8 @@ impl<A: Algorithm> Trainer for PolicyTrainer<A> {
         let TrainingSpec { seed, shards, rollout, .. } = config.spec();
         let perception = rollout.perception_factory().map_err(TrainingError::from_data)?;
         let opponent = rollout.read_opponent()?;
-        let state = TrainState::new(seed, shards, opponent.as_ref());
+        let kind = rollout.policy_kind(opponent.as_ref());
+        let state = TrainState::new(seed, shards, kind, opponent.as_ref());
         let identity = Identity::new(A::KIND, &state.model.network);
         let data = config.read_data(folder, 0, &identity).map_err(TrainingError::from_data)?;
         Ok(Some(PolicyTrainer {
@@ -293,9 +206,9 @@ impl<A: Algorithm> Trainer for PolicyTrainer<A> {
     }
 
     fn read_weights(config: &A, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
-        let opponent = config.spec().rollout.read_opponent();
-        let kind = PolicyKind::with(opponent.ok().flatten().as_ref());
-        weights::from_bytes(&kind.network().network, weights, kind.name())
+        let rollout = config.spec().rollout;
+        let kind = rollout.policy_kind(rollout.read_opponent().ok().flatten().as_ref());
+        weights::from_bytes(&kind.network().network, weights, &kind.name())
     }
 
     fn network(&self) -> &Network {
@@ -565,8 +478,9 @@ impl Algorithm for CloningConfig {
         iterations: u64,
         identity: &Identity,
     ) -> Result<Demonstrations, CheckpointError> {
-        let has_opponent = self.rollout.opponent.is_some();
-        Demonstrations::read(folder, iterations, self.max_episodes, identity, has_opponent)
+        let opponent = self.rollout.read_opponent().ok().flatten();
+        let n_features = self.rollout.policy_kind(opponent.as_ref()).n_features();
+        Demonstrations::read(folder, iterations, self.max_episodes, identity, n_features)
     }
 
     fn iterate(

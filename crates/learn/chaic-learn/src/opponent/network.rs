@@ -14,12 +14,49 @@ pub const N_GOALS: usize = OpponentGoal::ALL.len();
 
 /// Kinds in weights files, without and with the partner's actions granted.
 const KINDS: [&str; 2] = ["chaic opponent model 2", "chaic opponent model 2, granted"];
+/// Name of the opponent model's parameters among those of a policy.
+pub(crate) const OPPONENT: &str = "opponent";
 /// Width of the hidden layers.
 const WIDTH: usize = 96;
 
 /// Creates the network architecture. Candidates are the classes that the partner may be after.
 pub fn network() -> CandidateScorer {
     CandidateScorer::new(N_STATE, N_CLASS, WIDTH, N_GOALS + N_LIMITS)
+}
+
+/// Opponent model whose predictions a policy reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OpponentInput {
+    /// None.
+    None,
+    /// A model that sees the partner's actions.
+    Seen,
+    /// A model that is granted the partner's actions.
+    Granted,
+}
+
+impl OpponentInput {
+    /// All of them.
+    pub const ALL: [OpponentInput; 3] =
+        [OpponentInput::None, OpponentInput::Seen, OpponentInput::Granted];
+
+    /// Input for this opponent model.
+    pub fn from_model(model: Option<&OpponentModel>) -> OpponentInput {
+        match model.map(OpponentModel::is_granted) {
+            None => OpponentInput::None,
+            Some(false) => OpponentInput::Seen,
+            Some(true) => OpponentInput::Granted,
+        }
+    }
+
+    /// Suffix of the kind of a policy in weights files.
+    pub(crate) fn kind_suffix(self) -> &'static str {
+        match self {
+            OpponentInput::None => "",
+            OpponentInput::Seen => ", opponent model 2",
+            OpponentInput::Granted => ", granted opponent model 2",
+        }
+    }
 }
 
 /// Prediction about the partner.

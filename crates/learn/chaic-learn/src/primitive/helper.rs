@@ -13,11 +13,11 @@ use chaic_env::helper_registry::Helper;
 use chaic_nn::Pass;
 use chaic_nn::weights::{self, WeightsError};
 
-use super::network::{OpponentInput, PrimitiveNetwork};
+use super::network::PrimitiveNetwork;
 use super::observation::{PrimitiveObservation, opponent_features};
 use super::{ACTIONS, PAUSE, resolve_action, visible_objects};
 use crate::actor_critic::ActorCritic as _;
-use crate::opponent::network::OpponentModel;
+use crate::opponent::network::{OpponentInput, OpponentModel};
 use crate::opponent::tracker::OpponentTracker;
 
 /// Network with parameter values.
@@ -43,18 +43,11 @@ impl PrimitiveWeights {
     /// # Errors
     /// [`WeightsError`] if the file is incomplete or belongs to another network.
     pub fn from_bytes(bytes: &[u8]) -> Result<PrimitiveWeights, WeightsError> {
-        let read = |input: OpponentInput| {
-            let model = PrimitiveNetwork::new(input);
-            let parameters = weights::from_bytes(model.network(), bytes, input.kind())?;
-            Ok(PrimitiveWeights::new(&model, parameters))
-        };
-        match read(OpponentInput::None) {
-            Err(WeightsError::Kind { found, .. }) => {
-                let input = OpponentInput::ALL.into_iter().find(|input| input.kind() == found);
-                read(input.unwrap_or(OpponentInput::None))
-            }
-            read => read,
-        }
+        let kind = weights::kind(bytes)?;
+        let model = PrimitiveNetwork::from_kind(&kind);
+        let model = model.unwrap_or_else(|| PrimitiveNetwork::new(OpponentInput::None));
+        let parameters = weights::from_bytes(model.network(), bytes, &model.kind())?;
+        Ok(PrimitiveWeights::new(&model, parameters))
     }
 }
 

@@ -11,42 +11,7 @@ use super::observation::{
     IMAGE_CHANNELS, IMAGE_SIZE, MAP, MAP_CHANNELS, N_OPPONENT, N_STATE, PrimitiveObservation,
 };
 use crate::actor_critic::{ActorCritic, ActorCriticOutput, OutputGrad, log_softmax};
-use crate::opponent::{self, network::OpponentModel};
-
-/// Opponent model whose predictions a policy reads.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OpponentInput {
-    /// None.
-    None,
-    /// A model that sees the partner's actions.
-    Seen,
-    /// A model that is granted the partner's actions.
-    Granted,
-}
-
-impl OpponentInput {
-    /// All of them.
-    pub const ALL: [OpponentInput; 3] =
-        [OpponentInput::None, OpponentInput::Seen, OpponentInput::Granted];
-
-    /// Input for this opponent model.
-    pub fn from_model(model: Option<&OpponentModel>) -> OpponentInput {
-        match model.map(OpponentModel::is_granted) {
-            None => OpponentInput::None,
-            Some(false) => OpponentInput::Seen,
-            Some(true) => OpponentInput::Granted,
-        }
-    }
-
-    /// Kind in weights files.
-    pub fn kind(self) -> &'static str {
-        match self {
-            OpponentInput::None => "chaic primitive policy 1",
-            OpponentInput::Seen => "chaic primitive policy with opponent model 1",
-            OpponentInput::Granted => "chaic primitive policy with opponent model 1, granted",
-        }
-    }
-}
+use crate::opponent::network::{self as opponent_network, OPPONENT, OpponentInput, OpponentModel};
 
 /// Network architecture without parameter values.
 #[derive(Clone, Debug)]
@@ -57,8 +22,10 @@ pub struct PrimitiveNetwork {
     opponent: OpponentInput,
 }
 
-/// Name of the opponent model's parameters among those of a policy.
-const OPPONENT: &str = "opponent";
+/// Returns the kind in weights files.
+fn kind(opponent: OpponentInput) -> String {
+    format!("chaic primitive policy 1{}", opponent.kind_suffix())
+}
 
 /// Size of the image patches that become one pixel of the first map, as in vision transformers
 /// (Dosovitskiy et al. 2021). The matrix products are then large enough to be fast.
@@ -109,14 +76,20 @@ impl PrimitiveNetwork {
         let logits = net.output_head("actor", shared, ACTIONS.len());
         let value = net.output_head("critic", shared, 1);
         if has_opponent {
-            net.extra_parameters(OPPONENT, opponent::network::network().network.n_parameters());
+            net.extra_parameters(OPPONENT, opponent_network::network().network.n_parameters());
         }
         PrimitiveNetwork { network: net, logits, value, opponent }
     }
 
-    /// Kind of the opponent model.
-    pub fn opponent_input(&self) -> OpponentInput {
-        self.opponent
+    /// Kind in weights files.
+    pub fn kind(&self) -> String {
+        kind(self.opponent)
+    }
+
+    /// Returns the network of this kind in weights files, if there is one.
+    pub fn from_kind(name: &str) -> Option<PrimitiveNetwork> {
+        let input = OpponentInput::ALL.into_iter().find(|input| kind(*input) == name);
+        input.map(PrimitiveNetwork::new)
     }
 
     /// Returns the range of the opponent model's parameters, if there is one.

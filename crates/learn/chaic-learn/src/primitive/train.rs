@@ -25,11 +25,11 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::helper::{ObservationEncoder, PrimitiveHelper, PrimitiveWeights};
-use super::network::{OpponentInput, PrimitiveNetwork};
+use super::network::PrimitiveNetwork;
 use super::observation::{IMAGE_SIZE, PrimitiveObservation};
 use super::{ACTIONS, PAUSE};
 use crate::actor_critic::{ActorCritic as _, ActorCriticOutput};
-use crate::opponent::network::OpponentModel;
+use crate::opponent::network::{OpponentInput, OpponentModel};
 use crate::ppo::{PpoConfig, Schedule, Trajectory, Transition, ppo_bounds, update};
 use crate::reward_config;
 use crate::rollout::RolloutError;
@@ -433,8 +433,8 @@ impl Trainer for PrimitiveTrainer {
 
     fn read_weights(config: &PrimitiveConfig, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
         let opponent = read_opponent(config.opponent.as_deref()).ok().flatten();
-        let input = OpponentInput::from_model(opponent.as_ref());
-        weights::from_bytes(PrimitiveNetwork::new(input).network(), weights, input.kind())
+        let model = PrimitiveNetwork::new(OpponentInput::from_model(opponent.as_ref()));
+        weights::from_bytes(model.network(), weights, &model.kind())
     }
 
     fn network(&self) -> &Network {
@@ -506,8 +506,7 @@ impl Trainer for PrimitiveTrainer {
     fn validate(&self, stop: &AtomicBool) -> Result<Option<(Metrics, Vec<u8>)>, WeightsError> {
         let PrimitiveTrainer { config, perception, model, learner, .. } = self;
         let parameters = learner.parameters.clone();
-        let kind = model.opponent_input().kind();
-        let bytes = weights::to_bytes(model.network(), &parameters, kind)?;
+        let bytes = weights::to_bytes(model.network(), &parameters, &model.kind())?;
         let weights = Arc::new(PrimitiveWeights::new(model, parameters));
         let ids = validation_ids(&config.tasks, &config.splits, config.validation_episodes);
         let rate = |(id, _): &(String, u32)| {

@@ -14,13 +14,13 @@ use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry as _};
 use chaic_learn::features::{N_PLAN, N_STATE};
 use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
 use chaic_learn::opponent;
+use chaic_learn::opponent::network::OpponentInput;
 use chaic_learn::policy::ActionSelection;
+use chaic_learn::policy_kind::{PolicyKind, PolicyWeights};
 use chaic_learn::ppo::PpoConfig;
 use chaic_learn::primitive::train::{PrimitiveConfig, PrimitiveTrainer};
 use chaic_learn::rollout::{RolloutContext, rollout};
-use chaic_learn::train::{
-    CloningConfig, PolicyKind, PolicyTrainer, PpoTrainingConfig, RolloutConfig, from_bytes,
-};
+use chaic_learn::train::{CloningConfig, PolicyTrainer, PpoTrainingConfig, RolloutConfig};
 use chaic_nn::weights;
 use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoints};
 use chaic_training::run::checkpoint_bytes;
@@ -242,8 +242,8 @@ fn policy_weights_include_the_opponent_model() {
     assert!(uninterrupted == resumed);
     let weights = PolicyTrainer::<PpoTrainingConfig>::WEIGHTS;
     let bytes = fs::read(folder.path().join("policy true").join(weights)).unwrap();
-    let (kind, policy) = from_bytes(&bytes).unwrap();
-    assert_eq!(kind, PolicyKind::WithOpponent { is_granted: true });
+    let policy = PolicyWeights::from_bytes(&bytes).unwrap();
+    assert_eq!(policy.kind.opponent, OpponentInput::Granted);
     assert_eq!(policy.opponent.unwrap().parameters(), parameters);
     // A missing file or one of another network is refused before anything is written.
     for (bytes, word) in [(&b"nothing"[..], "not a weights file"), (&bytes, "plan policy")] {
@@ -255,9 +255,9 @@ fn policy_weights_include_the_opponent_model() {
 
 #[test]
 fn features_lie_within_bounds_and_rewards_sum_to_the_score() {
-    let model = PolicyKind::WithoutOpponent.network();
+    let model = PolicyKind::PLAIN.network();
     let parameters = model.network.init_parameters(1);
-    let weights = Arc::new(PolicyKind::WithoutOpponent.weights_from(&model, parameters));
+    let weights = Arc::new(PolicyWeights::new(PolicyKind::PLAIN, &model, parameters));
     let context = RolloutContext {
         perception: &GroundTruthPerceptionFactory,
         image_size: 64,

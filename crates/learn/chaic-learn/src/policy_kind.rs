@@ -1,0 +1,112 @@
+//! Kinds of policies that choose plans, by their inputs, and their weights files.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use chaic_core::observation::Grants;
+use chaic_nn::weights::{self, WeightsError};
+
+use crate::candidate_scorer::CandidateScorer;
+use crate::features::{N_OPPONENT_PLAN, N_OPPONENT_STATE, N_PLAN, N_PROPOSAL_PLAN, N_STATE};
+use crate::opponent::network::{self, OPPONENT, OpponentInput, OpponentModel};
+
+/// Width of the hidden layers.
+const WIDTH: usize = 96;
+
+/// Kind of network that chooses plans: its inputs besides the features of memory and belief.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PolicyKind {
+    /// Predictions of an opponent model (Smart-Help).
+    pub opponent: OpponentInput,
+    /// True if one feature marks the plan that the helper `infer` would choose.
+    pub has_proposals: bool,
+}
+
+impl PolicyKind {
+    /// No further inputs.
+    pub const PLAIN: PolicyKind =
+        PolicyKind { opponent: OpponentInput::None, has_proposals: false };
+
+    /// Returns all kinds.
+    fn all() -> impl Iterator<Item = PolicyKind> {
+        let with =
+            |opponent| [false, true].map(|has_proposals| PolicyKind { opponent, has_proposals });
+        OpponentInput::ALL.into_iter().flat_map(with)
+    }
+
+    /// Number of state features and of features per plan.
+    pub fn n_features(self) -> (usize, usize) {
+        let (n_state, n_plan) = match self.opponent {
+            OpponentInput::None => (N_STATE, N_PLAN),
+            _ => (N_STATE + N_OPPONENT_STATE, N_PLAN + N_OPPONENT_PLAN),
+        };
+        (n_state, n_plan + if self.has_proposals { N_PROPOSAL_PLAN } else { 0 })
+    }
+
+    /// Creates the network architecture. Its parameters include those of the opponent model.
+    pub fn network(self) -> CandidateScorer {
+        let (n_state, n_plan) = self.n_features();
+        let mut model = CandidateScorer::new(n_state, n_plan, WIDTH, 1);
+        if self.opponent != OpponentInput::None {
+            let n = network::network().network.n_parameters();
+            model.network.extra_parameters(OPPONENT, n);
+        }
+        model
+    }
+
+    /// Name in weights files.
+    pub fn name(self) -> String {
+        let proposals = if self.has_proposals { ", proposals of infer" } else { "" };
+        format!("chaic plan policy 3{}{proposals}", self.opponent.kind_suffix())
+    }
+
+    /// Returns the range of the opponent model's parameters, if there is one.
+    pub(crate) fn opponent_range(model: &CandidateScorer) -> Option<Range<usize>> {
+        let found = model.network.parameters().iter().find(|p| p.name == OPPONENT);
+        found.map(|parameter| parameter.range.clone())
+    }
+}
+
+/// Network with parameter values.
+#[derive(Clone, Debug)]
+pub struct PolicyWeights {
+    /// Inputs of the network.
+    pub kind: PolicyKind,
+    /// Network architecture.
+    pub model: CandidateScorer,
+    /// Parameters, with those of the opponent model.
+    pub parameters: Vec<f32>,
+    /// Opponent model whose predictions are inputs, if the network needs one.
+    pub opponent: Option<Arc<OpponentModel>>,
+}
+
+impl PolicyWeights {
+    /// Combines a network of this kind with parameters.
+    pub fn new(kind: PolicyKind, model: &CandidateScorer, parameters: Vec<f32>) -> PolicyWeights {
+        let opponent = PolicyKind::opponent_range(model).map(|range| {
+            let is_granted = kind.opponent == OpponentInput::Granted;
+            Arc::new(OpponentModel::new(parameters[range].to_vec(), is_granted))
+        });
+        PolicyWeights { kind, model: model.clone(), parameters, opponent }
+    }
+
+    /// Parses a weights file of any kind.
+    ///
+    /// # Errors
+    /// [`WeightsError`] if the file is incomplete or belongs to another network.
+    pub fn from_bytes(bytes: &[u8]) -> Result<PolicyWeights, WeightsError> {
+        let name = weights::kind(bytes)?;
+        let kind = PolicyKind::all().find(|kind| kind.name() == name);
+        let kind = kind.unwrap_or(PolicyKind::PLAIN);
+        let model = kind.network();
+        let parameters = weights::from_bytes(&model.network, bytes, &kind.name())?;
+        Ok(PolicyWeights::new(kind, &model, parameters))
+    }
+
+    /// Returns the grants of a helper with this policy: those of the paper's helpers, and the
+    /// partner's actions if its opponent model needs them.
+    pub fn grants(&self) -> Grants {
+        let behavior = self.opponent.as_ref().is_some_and(|model| model.is_granted());
+        Grants { behavior, ..Grants::PLANNER }
+    }
+}

@@ -199,6 +199,8 @@ pub struct CloningMetrics {
 pub struct FitConfig<'a> {
     /// Optimizer.
     pub optimizer: Optimizer<'a>,
+    /// Probability that the labels spread evenly over all candidates.
+    pub label_smoothing: f32,
     /// Number of optimizer steps.
     pub n_steps: usize,
     /// Demonstrations per optimizer step.
@@ -219,7 +221,7 @@ pub fn fit(
     episodes: &[&[Demonstration]],
     stop: &AtomicBool,
 ) -> Option<CloningMetrics> {
-    let FitConfig { optimizer, n_steps, batch_size, seed, iteration } = *config;
+    let FitConfig { optimizer, label_smoothing, n_steps, batch_size, seed, iteration } = *config;
     let episodes: Vec<&[Demonstration]> =
         episodes.iter().copied().filter(|episode| !episode.is_empty()).collect();
     let mut rng = RngStream::new(seed, "demonstrations", iteration);
@@ -240,7 +242,9 @@ pub fn fit(
             optimizer,
             &batch,
             |demonstration| &demonstration.observation,
-            gradient,
+            |demonstration, output, weight, metrics| {
+                gradient(demonstration, label_smoothing, output, weight, metrics)
+            },
             |_| true,
         );
         for stats in shards {
@@ -257,6 +261,7 @@ pub fn fit(
 /// Returns the gradient of the loss of one demonstration times `weight`, and adds its metrics.
 fn gradient(
     demonstration: &Demonstration,
+    label_smoothing: f32,
     output: &ActorCriticOutput,
     weight: f32,
     metrics: &mut CloningMetrics,
@@ -265,7 +270,10 @@ fn gradient(
     metrics.loss -= f64::from(output.log_probs[demonstration.action]);
     metrics.agreement += f64::from(u8::from(output.argmax() == demonstration.action));
     metrics.value_loss += f64::from(0.5 * error * error);
-    let label = |k: usize| f32::from(u8::from(k == demonstration.action));
+    let uniform = label_smoothing / output.log_probs.len() as f32;
+    let label = |k: usize| {
+        uniform + (1.0 - label_smoothing) * f32::from(u8::from(k == demonstration.action))
+    };
     let logits = output.log_probs.iter().enumerate();
     let logits = logits.map(|(k, l)| weight * (math::exp(*l) - label(k))).collect();
     OutputGrad { logits, values: vec![0.5 * weight * error] }

@@ -38,25 +38,25 @@ impl Demonstrations {
     /// plan.
     ///
     /// # Errors
-    /// If a file cannot be read, is damaged, or belongs to another training.
+    /// One line, if a file cannot be read, is damaged, or belongs to another training.
     pub fn read(
         folder: &Path,
         iterations: u64,
         max_episodes: usize,
         identity: &Identity,
         n_features: (usize, usize),
-    ) -> Result<Demonstrations, CheckpointError> {
+    ) -> Result<Demonstrations, String> {
         let mut episodes: Vec<Vec<Demonstration>> = Vec::new();
         for iteration in (0..iterations).rev() {
             if episodes.len() >= max_episodes {
                 break;
             }
             let path = path(folder, iteration);
-            let damaged = |problem: String| CheckpointError::Damaged(problem);
-            let bytes = read_bounded(&path, MAX_BYTES).map_err(|e| damaged(e.to_string()))?;
-            let file = Checkpoint::from_bytes(&bytes, identity)
-                .map_err(|problem| damaged(format!("{} {problem}", path.display())))?;
-            let mut earlier = from_sections(&file, n_features)?;
+            let bytes = read_bounded(&path, MAX_BYTES).map_err(|e| e.to_string())?;
+            let file = Checkpoint::from_bytes(&bytes, identity);
+            let earlier = file.and_then(|file| from_sections(&file, n_features));
+            let mut earlier =
+                earlier.map_err(|problem| format!("{} {problem}", path.display()))?;
             earlier.extend(episodes);
             episodes = earlier;
         }
@@ -169,7 +169,7 @@ mod tests {
         assert_eq!(read(3, &identity).unwrap(), expected);
         assert_eq!(read(1, &identity).unwrap().episodes.len(), 2);
         let other = Identity { network: 8, ..identity.clone() };
-        assert!(read(3, &other).unwrap_err().to_string().contains("demonstrations-000002.bin"));
+        assert!(read(3, &other).unwrap_err().contains("demonstrations-000002.bin"));
         assert!(read(4, &identity).is_err(), "a missing file");
         std::fs::write(path(folder.path(), 2), b"damaged").unwrap();
         assert!(read(3, &identity).is_err());

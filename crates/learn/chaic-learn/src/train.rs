@@ -119,13 +119,13 @@ pub trait Algorithm: Clone + Default + Serialize + DeserializeOwned {
     /// Reads the data that iterations before `iterations` have written to `folder`.
     ///
     /// # Errors
-    /// If a file is missing, damaged or belongs to another training.
+    /// One line, if a file is missing, damaged or belongs to another training.
     fn read_data(
         &self,
         folder: &Path,
         iterations: u64,
         identity: &Identity,
-    ) -> Result<Self::Data, CheckpointError>;
+    ) -> Result<Self::Data, String>;
 
     /// Runs one iteration; `None` if it was stopped.
     ///
@@ -189,7 +189,8 @@ impl<A: Algorithm> Trainer for PolicyTrainer<A> {
         let kind = rollout.policy_kind(opponent.as_ref());
         let state = TrainState::new(seed, shards, kind, opponent.as_ref());
         let identity = Identity::new(A::KIND, &state.model.network);
-        let data = config.read_data(folder, 0, &identity).map_err(TrainingError::from_data)?;
+        let data = config.read_data(folder, 0, &identity);
+        let data = data.map_err(TrainingError::InvalidConfig)?;
         Ok(Some(PolicyTrainer {
             config: config.clone(),
             folder: folder.to_owned(),
@@ -238,7 +239,8 @@ impl<A: Algorithm> Trainer for PolicyTrainer<A> {
     ) -> Result<Option<()>, CheckpointError> {
         self.state.resume(checkpoint)?;
         let identity = self.identity();
-        self.data = self.config.read_data(&self.folder, self.state.iterations, &identity)?;
+        let data = self.config.read_data(&self.folder, self.state.iterations, &identity);
+        self.data = data.map_err(CheckpointError::Data)?;
         Ok(Some(()))
     }
 
@@ -320,18 +322,17 @@ impl Algorithm for PpoTrainingConfig {
         folder: &Path,
         _: u64,
         _: &Identity,
-    ) -> Result<Option<Vec<f32>>, CheckpointError> {
+    ) -> Result<Option<Vec<f32>>, String> {
         if self.ppo.kl_coef == 0.0 {
             return Ok(None);
         }
-        let problem = |problem: String| {
-            let file = INITIAL_WEIGHTS;
-            CheckpointError::Damaged(format!("`ppo.kl_coef` needs --weights, but {file} {problem}"))
-        };
-        let bytes = read_bounded(&folder.join(INITIAL_WEIGHTS), MAX_WEIGHTS_BYTES)
-            .map_err(|e| problem(format!("cannot be read: {e}")))?;
+        let path = folder.join(INITIAL_WEIGHTS);
+        if !path.exists() {
+            return Err("`ppo.kl_coef` above 0 needs initial weights; give --weights".to_owned());
+        }
+        let bytes = read_bounded(&path, MAX_WEIGHTS_BYTES).map_err(|e| e.to_string())?;
         let parameters = PolicyTrainer::<PpoTrainingConfig>::read_weights(self, &bytes);
-        parameters.map(Some).map_err(|e| problem(e.to_string()))
+        parameters.map(Some).map_err(|problem| format!("{}: {problem}", path.display()))
     }
 
     fn iterate(
@@ -399,6 +400,9 @@ pub struct CloningConfig {
     pub learner_fraction: f32,
     /// Maximum number of episodes whose demonstrations are kept, the latest ones.
     pub max_episodes: usize,
+    /// Probability that the labels spread evenly over all candidates. It leaves a policy for
+    /// reinforcement learning some exploration.
+    pub label_smoothing: f32,
     /// Discount factor per frame of the returns that the value head regresses.
     #[serde(alias = "discount")]
     pub gamma: f32,
@@ -425,6 +429,7 @@ impl Default for CloningConfig {
             rollout: RolloutConfig::default(),
             learner_fraction: 0.7,
             max_episodes: 8192,
+            label_smoothing: 0.0,
             gamma: 0.9998,
             n_steps: 200,
             batch_size: 128,
@@ -450,6 +455,7 @@ impl Algorithm for CloningConfig {
         ("learner_fraction", FRACTION),
         // All demonstrations are kept in memory: about 0.1 MB per episode.
         ("max_episodes", integer(1, 100_000)),
+        ("label_smoothing", FRACTION),
         ("gamma", FRACTION),
         ("n_steps", integer(1, 100_000)),
         ("batch_size", integer(1, MAX_BATCH)),
@@ -477,7 +483,7 @@ impl Algorithm for CloningConfig {
         folder: &Path,
         iterations: u64,
         identity: &Identity,
-    ) -> Result<Demonstrations, CheckpointError> {
+    ) -> Result<Demonstrations, String> {
         let opponent = self.rollout.read_opponent().ok().flatten();
         let n_features = self.rollout.policy_kind(opponent.as_ref()).n_features();
         Demonstrations::read(folder, iterations, self.max_episodes, identity, n_features)
@@ -517,6 +523,7 @@ impl Algorithm for CloningConfig {
         }
         let fit_config = FitConfig {
             optimizer: Optimizer { adam: &self.adam, learning_rate },
+            label_smoothing: self.label_smoothing,
             n_steps: self.n_steps,
             batch_size: self.batch_size,
             seed: self.seed,

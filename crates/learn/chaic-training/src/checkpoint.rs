@@ -53,6 +53,9 @@ pub enum CheckpointError {
     /// The checkpoint belongs to another network.
     #[error("belongs to another network than that of this configuration and version of chaic")]
     Network,
+    /// Data of the training that its folder keeps beside the checkpoint cannot be read.
+    #[error("cannot be continued: {0}")]
+    Data(String),
     /// A section does not fit the training.
     #[error("does not fit this training: section `{section}` {problem}")]
     Section {

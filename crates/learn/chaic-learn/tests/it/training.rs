@@ -71,8 +71,12 @@ fn interrupted_trainings_end_with_the_same_bits() {
         run_training::<PolicyTrainer<PpoTrainingConfig>>(&ppo, &folder, is_paused)
     });
     assert!(uninterrupted == resumed);
-    let clone =
-        CloningConfig { iterations: 2, rollout: small_rollout(), ..CloningConfig::default() };
+    let clone = CloningConfig {
+        iterations: 2,
+        n_steps: 5,
+        rollout: RolloutConfig { proposals: true, ..small_rollout() },
+        ..CloningConfig::default()
+    };
     let [uninterrupted, resumed] = [false, true].map(|is_paused| {
         let folder = folder.path().join(format!("clone {is_paused}"));
         run_training::<PolicyTrainer<CloningConfig>>(&clone, &folder, is_paused)
@@ -96,6 +100,32 @@ fn interrupted_trainings_end_with_the_same_bits() {
     let refused =
         TrainingRun::<PolicyTrainer<PpoTrainingConfig>>::resume(&folder, &mut |_| (), &NEVER_STOP);
     assert!(matches!(refused, Err(TrainingError::Checkpoint { .. })));
+}
+
+#[test]
+fn experts_generators_and_penalties_are_checked_before_a_training() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let mut config = PpoTrainingConfig { rollout: small_rollout(), ..PpoTrainingConfig::default() };
+    config.ppo.kl_coef = 0.1;
+    let started = TrainingRun::<PolicyTrainer<PpoTrainingConfig>>::start(
+        &out,
+        &config,
+        None,
+        &mut |_| (),
+        &NEVER_STOP,
+    );
+    let problem = started.err().unwrap().to_string();
+    assert!(problem.contains("kl_coef") && problem.contains("--weights"), "{problem}");
+    assert!(!out.exists());
+    for (text, words) in [
+        ("[teacher]\nhelper = \"follow\"", ["teacher.helper", "infer, rhp, oracle"]),
+        ("[rollout]\nsplits = [\"test\"]", ["rollout.splits", "gen, gen-standard"]),
+        ("[rollout]\nsplits = []", ["rollout.splits", "empty"]),
+    ] {
+        let problem = parse_config::<PolicyTrainer<CloningConfig>>(text).unwrap_err();
+        assert!(words.iter().all(|word| problem.contains(word)), "{problem}");
+    }
 }
 
 #[test]
@@ -186,10 +216,22 @@ fn primitive() -> PrimitiveConfig {
     }
 }
 
+/// Writes random weights of an opponent model that is granted the partner's actions; returns the
+/// parameters.
+fn write_opponent(file: &Path) -> Vec<f32> {
+    let network = opponent::network::network().network;
+    let parameters = network.init_parameters(7);
+    let kind = opponent::network::kind(true);
+    fs::write(file, weights::to_bytes(&network, &parameters, kind).unwrap()).unwrap();
+    parameters
+}
+
 #[test]
 fn interrupted_primitive_trainings_end_with_the_same_bits() {
-    let config = primitive();
     let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("opponent.safetensors");
+    write_opponent(&file);
+    let config = PrimitiveConfig { opponent: Some(file), ..primitive() };
     let checkpoints = [false, true].map(|is_paused| {
         let out = folder.path().join(format!("{is_paused}"));
         let mut quiet = |_: &str| ();
@@ -218,17 +260,15 @@ fn interrupted_primitive_trainings_end_with_the_same_bits() {
         Arc::new(GroundTruthPerceptionFactory),
     )
     .unwrap();
-    assert!(helpers.make("mine", chaic_agents::PlannerRules::paper()).is_some());
+    let helper = helpers.make("mine", chaic_agents::PlannerRules::paper()).unwrap();
+    assert!(helper.grants.behavior, "as the opponent model");
 }
 
 #[test]
 fn policy_weights_include_the_opponent_model() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("opponent.safetensors");
-    let network = opponent::network::network().network;
-    let parameters = network.init_parameters(7);
-    let bytes = weights::to_bytes(&network, &parameters, opponent::network::kind(true)).unwrap();
-    fs::write(&file, bytes).unwrap();
+    let parameters = write_opponent(&file);
     let rollout_config = RolloutConfig { opponent: Some(file.clone()), ..small_rollout() };
     let config = PpoTrainingConfig {
         iterations: 2,

@@ -55,8 +55,7 @@ impl Demonstrations {
             let bytes = read_bounded(&path, MAX_BYTES).map_err(|e| e.to_string())?;
             let file = Checkpoint::from_bytes(&bytes, identity);
             let earlier = file.and_then(|file| from_sections(&file, n_features));
-            let mut earlier =
-                earlier.map_err(|problem| format!("{} {problem}", path.display()))?;
+            let mut earlier = earlier.map_err(|problem| format!("{} {problem}", path.display()))?;
             earlier.extend(episodes);
             episodes = earlier;
         }

@@ -11,7 +11,7 @@ use chaic_core::geom::math;
 use chaic_core::observation::Grants;
 use chaic_core::rng::RngStream;
 use chaic_core::{AgentError, AgentId, Frame};
-use chaic_env::helper_registry::Helper;
+use chaic_env::helper_registry::{BuiltInHelpers, Helper, find_partner};
 use chaic_env::rules::RuleSet;
 use chaic_env::{
     AdvanceOutcome, Env, EnvError, EpisodeAgents, EpisodeConfig, RewardTracker, RewardWeights,
@@ -54,6 +54,41 @@ pub struct RolloutContext<'a> {
     pub gamma: f32,
     /// Stop flag; a stopped rollout returns nothing.
     pub stop: &'a AtomicBool,
+}
+
+/// Episode to play.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RolloutEpisode {
+    /// Episode id.
+    pub id: String,
+    /// Name of a partner that deviates from the rules; `None` for the rule-based one.
+    pub partner: Option<String>,
+}
+
+impl RolloutEpisode {
+    /// Episode with the rule-based partner.
+    pub fn new(id: impl Into<String>) -> RolloutEpisode {
+        RolloutEpisode { id: id.into(), partner: None }
+    }
+
+    /// Creates the environment, in which a helper plays under this name.
+    fn env(
+        &self,
+        name: &str,
+        helper: Helper,
+        context: &RolloutContext<'_>,
+    ) -> Result<Env, RolloutError> {
+        let episode = find_episode(&self.id)?;
+        let config = EpisodeConfig {
+            image_size: Some(context.image_size),
+            partner: self.partner.as_deref(),
+            ..EpisodeConfig::new(&episode, name)
+        };
+        let name = self.partner.as_deref();
+        let partner = find_partner(&BuiltInHelpers, name, None, RuleSet::PAPER.planner)?;
+        let agents = EpisodeAgents::new(Some(seeded_by_episode(helper, &config)), partner);
+        Ok(Env::new(config, agents)?)
+    }
 }
 
 /// Result of an episode.
@@ -100,23 +135,16 @@ impl EpisodeRecording {
 /// Plays an episode with the policy that `make_policy` creates for its goal; `None` if it was
 /// stopped.
 fn record_episode<P: Policy>(
-    id: &str,
-    seed: u32,
+    episode: &RolloutEpisode,
     context: &RolloutContext<'_>,
     grants: Grants,
     make_policy: impl FnOnce(&Goal, StepLog) -> P,
 ) -> Result<Option<EpisodeRecording>, RolloutError> {
-    let episode = find_episode(id)?;
     let log = StepLog::default();
-    let policy = make_policy(&episode.setup().goal, Arc::clone(&log));
+    let goal = find_episode(&episode.id)?.setup().goal.clone();
+    let policy = make_policy(&goal, Arc::clone(&log));
     let helper = policy_helper(policy, RuleSet::PAPER.planner, context.perception, grants);
-    let config = EpisodeConfig {
-        seed,
-        image_size: Some(context.image_size),
-        ..EpisodeConfig::new(&episode, "learner")
-    };
-    let agents = EpisodeAgents::new(Some(seeded_by_episode(helper, &config)), None);
-    let mut env = Env::new(config, agents)?;
+    let mut env = episode.env("learner", helper, context)?;
     let mut tracker = RewardTracker::new(AgentId::HELPER);
     let mut cumulative_rewards = Vec::new();
     loop {
@@ -142,12 +170,11 @@ fn record_episode<P: Policy>(
 /// # Errors
 /// [`RolloutError`]
 pub fn rollout(
-    id: &str,
-    seed: u32,
+    episode: &RolloutEpisode,
     weights: &Arc<PolicyWeights>,
     context: &RolloutContext<'_>,
 ) -> Result<Option<EpisodeResult>, RolloutError> {
-    let recording = record_episode(id, seed, context, weights.grants(), |_, log| {
+    let recording = record_episode(episode, context, weights.grants(), |_, log| {
         LearnedPolicy::new(Arc::clone(weights), context.selection, Some(log))
     })?;
     let Some(recording) = recording else { return Ok(None) };
@@ -171,16 +198,15 @@ pub fn rollout(
 /// # Errors
 /// [`RolloutError`]
 pub fn rollout_with_expert(
-    id: &str,
-    seed: u32,
+    episode: &RolloutEpisode,
     weights: &Arc<PolicyWeights>,
     context: &RolloutContext<'_>,
     expert: &ExpertInfo,
     learner_fraction: f32,
 ) -> Result<Option<(Vec<Demonstration>, f64)>, RolloutError> {
     let learner = || LearnedPolicy::new(Arc::clone(weights), context.selection, None);
-    let recording = record_episode(id, seed, context, weights.grants(), |goal, log| {
-        let mut rng = RngStream::new(u64::from(seed), id, 0);
+    let recording = record_episode(episode, context, weights.grants(), |goal, log| {
+        let mut rng = RngStream::new(0, &episode.id, 0);
         let actor = sample_actor(learner_fraction, &mut rng, learner);
         ExpertPolicy::new(expert, goal, actor, weights, log)
     })?;
@@ -214,21 +240,13 @@ pub fn rollout_with_expert(
 /// [`RolloutError`]
 pub fn rollout_built_in(
     helper: &HelperInfo,
-    id: &str,
-    seed: u32,
+    episode: &RolloutEpisode,
     context: &RolloutContext<'_>,
 ) -> Result<Option<f64>, RolloutError> {
-    let episode = find_episode(id)?;
     let planner = RuleSet::PAPER.planner;
     let agent = (helper.make)(planner, context.perception);
     let helper = Helper { agent, grants: context.perception.grants((helper.grants)(planner)) };
-    let config = EpisodeConfig {
-        seed,
-        image_size: Some(context.image_size),
-        ..EpisodeConfig::new(&episode, "baseline")
-    };
-    let agents = EpisodeAgents::new(Some(seeded_by_episode(helper, &config)), None);
-    let mut env = Env::new(config, agents)?;
+    let mut env = episode.env("baseline", helper, context)?;
     env.run(context.stop, None, &mut |_| Ok::<(), AgentError>(()))?;
     if context.stop.load(Ordering::Relaxed) {
         return Ok(None);
@@ -243,11 +261,11 @@ pub fn rollout_built_in(
 /// # Errors
 /// The first episode's that cannot be played.
 pub fn rollout_all(
-    ids: &[(String, u32)],
+    episodes: &[RolloutEpisode],
     weights: &Arc<PolicyWeights>,
     context: &RolloutContext<'_>,
 ) -> Result<Option<Vec<EpisodeResult>>, RolloutError> {
     let results: Result<Vec<Option<EpisodeResult>>, RolloutError> =
-        ids.par_iter().map(|(id, seed)| rollout(id, *seed, weights, context)).collect();
+        episodes.par_iter().map(|episode| rollout(episode, weights, context)).collect();
     Ok(results?.into_iter().collect())
 }

@@ -5,10 +5,12 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 
 use chaic_agents::HelperInfo;
+use chaic_agents::partners::{PARTNER_VARIANTS, PartnerVariant};
 use chaic_agents::perception_factory::{GROUND_TRUTH, PerceptionFactory};
 use chaic_core::TaskId;
 use chaic_core::rng::RngStream;
 use chaic_env::RewardWeights;
+use chaic_env::helper_registry::RULES;
 use chaic_episodes::SeedRange;
 use chaic_files::read_user_file;
 use chaic_training::bounds::{Bound, BoundTable, integer, real};
@@ -21,7 +23,9 @@ use crate::opponent::network::{OpponentInput, OpponentModel};
 use crate::policy::ActionSelection;
 use crate::policy_kind::{PolicyKind, PolicyWeights};
 use crate::reward_config;
-use crate::rollout::{EpisodeResult, RolloutContext, rollout_all, rollout_built_in};
+use crate::rollout::{
+    EpisodeResult, RolloutContext, RolloutEpisode, rollout_all, rollout_built_in,
+};
 
 /// Generators of episodes.
 pub(crate) const GENERATORS: [&str; 2] = ["gen", "gen-standard"];
@@ -61,6 +65,9 @@ pub struct RolloutConfig {
     /// Generators whose episodes take turns: `gen` (as the paper's) and `gen-standard` (as the
     /// standard split).
     pub splits: Vec<String>,
+    /// Partners, which take turns: `rules` or the name of one that deviates from them
+    /// (`chaic list partners`). Validation has the rule-based ones.
+    pub partners: Vec<String>,
     /// Width and height of all agents' images during training, pixels.
     pub image_size: u32,
     /// Perception of the helper, as `chaic eval --perception`.
@@ -87,6 +94,7 @@ impl Default for RolloutConfig {
             episodes: 32,
             tasks: TaskId::paper().collect(),
             splits: GENERATORS.map(str::to_owned).to_vec(),
+            partners: vec![RULES.to_owned()],
             image_size: 128,
             perception: GROUND_TRUTH.to_owned(),
             behavior: GROUND_TRUTH.to_owned(),
@@ -105,6 +113,15 @@ impl RolloutConfig {
             return Err("`rollout.tasks` is empty".to_owned());
         }
         check_splits("rollout.splits", &self.splits)?;
+        let is_known = |name: &&String| *name == RULES || PartnerVariant::find(name).is_some();
+        if let Some(name) = self.partners.iter().find(|name| !is_known(name)) {
+            let names: Vec<&str> = PARTNER_VARIANTS.iter().map(|v| v.name).collect();
+            let names = names.join(", ");
+            return Err(format!("`rollout.partners` has `{name}`, expected {RULES}, {names}"));
+        }
+        if self.partners.is_empty() {
+            return Err("`rollout.partners` is empty".to_owned());
+        }
         self.perception_factory().map_err(|e| e.to_string())?;
         self.read_opponent().map_err(|e| e.to_string())?;
         Ok(())
@@ -135,16 +152,19 @@ impl RolloutConfig {
         RolloutContext { perception, image_size, selection, rewards, gamma, stop }
     }
 
-    /// Returns ids and seeds of the episodes of an iteration.
-    pub(crate) fn sample_episodes(&self, seed: u64, iteration: u64) -> Vec<(String, u32)> {
+    /// Returns the episodes of an iteration.
+    pub(crate) fn sample_episodes(&self, seed: u64, iteration: u64) -> Vec<RolloutEpisode> {
         (0..self.episodes as u64)
             .map(|k| {
                 let index = iteration * self.episodes as u64 + k;
-                let index_of_split = index as usize / self.tasks.len();
+                let round = index as usize / self.tasks.len();
                 let task = self.tasks[index as usize % self.tasks.len()];
-                let split = &self.splits[index_of_split % self.splits.len()];
+                let split = &self.splits[round % self.splits.len()];
+                let partner = &self.partners[round / self.splits.len() % self.partners.len()];
                 let mut rng = RngStream::new(seed, "episodes", index);
-                (format!("{task}/{split}/{}", SeedRange::POLICY_TRAIN.draw(&mut rng)), 0)
+                let id = format!("{task}/{split}/{}", SeedRange::POLICY_TRAIN.draw(&mut rng));
+                let partner = (partner != RULES).then(|| partner.clone());
+                RolloutEpisode { id, partner }
             })
             .collect()
     }
@@ -175,14 +195,19 @@ pub(crate) fn check_splits(key: &str, splits: &[String]) -> Result<(), String> {
     }
 }
 
-/// Returns ids and seeds of `n` validation episodes per task, from the last of the generators: the
+/// Returns `n` validation episodes per task, from the last of the generators: the
 /// standard one, if there are both.
-pub(crate) fn validation_ids(tasks: &[TaskId], splits: &[String], n: usize) -> Vec<(String, u32)> {
+pub(crate) fn validation_episodes(
+    tasks: &[TaskId],
+    splits: &[String],
+    n: usize,
+) -> Vec<RolloutEpisode> {
     let first = SeedRange::POLICY_VALIDATION.first;
     let split = splits.last().map_or(GENERATORS[0], String::as_str);
     let of_task = |task: &TaskId| {
         let task = *task;
-        (first..first + n as u64).map(move |seed| (format!("{task}/{split}/{seed}"), 0))
+        let ids = (first..first + n as u64).map(move |seed| format!("{task}/{split}/{seed}"));
+        ids.map(RolloutEpisode::new)
     };
     tasks.iter().flat_map(of_task).collect()
 }
@@ -209,12 +234,12 @@ impl Validation<'_> {
         weights: &Arc<PolicyWeights>,
         stop: &AtomicBool,
     ) -> Option<Metrics> {
-        let RolloutConfig { tasks, splits, validation_episodes, .. } = config;
-        let ids = validation_ids(tasks, splits, *validation_episodes);
+        let RolloutConfig { tasks, splits, validation_episodes: n, .. } = config;
+        let episodes = validation_episodes(tasks, splits, *n);
         // Validation has no rewards, so the discount is of no effect.
         let context = config.context(self.perception, 1.0, stop);
         let rates = |selection| -> Option<Vec<f64>> {
-            let results = rollout_all(&ids, weights, &RolloutContext { selection, ..context });
+            let results = rollout_all(&episodes, weights, &RolloutContext { selection, ..context });
             let results = results.expect("generated episodes can be played")?;
             Some(results.iter().map(|result| result.tr).collect())
         };
@@ -222,11 +247,11 @@ impl Validation<'_> {
         let greedy = rates(ActionSelection::Greedy)?;
         if self.baseline.get().is_none() {
             let helper = HelperInfo::find_helper(BASELINE).expect("it is a built-in helper");
-            let rate = |(id, seed): &(String, u32)| {
-                let rate = rollout_built_in(helper, id, *seed, &context);
+            let rate = |episode: &RolloutEpisode| {
+                let rate = rollout_built_in(helper, episode, &context);
                 rate.expect("generated episodes can be played")
             };
-            let rates: Option<Vec<f64>> = ids.par_iter().map(rate).collect();
+            let rates: Option<Vec<f64>> = episodes.par_iter().map(rate).collect();
             // Another value would be the same.
             let _ = self.baseline.set(rates?);
         }

@@ -27,7 +27,7 @@ use crate::demonstrations::Demonstrations;
 use crate::opponent::network::OpponentModel;
 use crate::policy_kind::{PolicyKind, PolicyWeights};
 use crate::ppo::{MAX_BATCH, PPO_BOUNDS, PpoConfig, Schedule, update};
-use crate::rollout::{rollout_all, rollout_with_expert};
+use crate::rollout::{RolloutEpisode, rollout_all, rollout_with_expert};
 use crate::rollout_config::{ROLLOUT_BOUNDS, VALIDATION_TR, Validation, mean_tr};
 
 pub use crate::rollout_config::RolloutConfig;
@@ -317,12 +317,7 @@ impl Algorithm for PpoTrainingConfig {
         TrainingSpec { seed: *seed, iterations: *iterations, rollout, shards: self.ppo.shards }
     }
 
-    fn read_data(
-        &self,
-        folder: &Path,
-        _: u64,
-        _: &Identity,
-    ) -> Result<Option<Vec<f32>>, String> {
+    fn read_data(&self, folder: &Path, _: u64, _: &Identity) -> Result<Option<Vec<f32>>, String> {
         if self.ppo.kl_coef == 0.0 {
             return Ok(None);
         }
@@ -342,9 +337,9 @@ impl Algorithm for PpoTrainingConfig {
         context: &IterationContext<'_>,
     ) -> Result<Option<Metrics>, TrainingError> {
         let IterationContext { perception, stop, .. } = *context;
-        let ids = self.rollout.sample_episodes(self.seed, state.iterations);
+        let episodes = self.rollout.sample_episodes(self.seed, state.iterations);
         let rollout = self.rollout.context(perception, self.ppo.gamma, stop);
-        let results = rollout_all(&ids, &state.policy_weights(), &rollout);
+        let results = rollout_all(&episodes, &state.policy_weights(), &rollout);
         let results = results.map_err(TrainingError::from_data)?;
         let Some(results) = results else { return Ok(None) };
         let tr = mean_tr(&results);
@@ -497,14 +492,14 @@ impl Algorithm for CloningConfig {
     ) -> Result<Option<Metrics>, TrainingError> {
         let IterationContext { folder, perception, stop } = *context;
         let expert = ExpertInfo::find_expert(&self.teacher.helper).expect("it was checked");
-        let ids = self.rollout.sample_episodes(self.seed, state.iterations);
+        let played = self.rollout.sample_episodes(self.seed, state.iterations);
         let rollout = self.rollout.context(perception, self.gamma, stop);
         let weights = state.policy_weights();
         let learner_fraction = if state.iterations == 0 { 0.0 } else { self.learner_fraction };
-        let record = |(id, seed): &(String, u32)| {
-            rollout_with_expert(id, *seed, &weights, &rollout, expert, learner_fraction)
+        let record = |episode: &RolloutEpisode| {
+            rollout_with_expert(episode, &weights, &rollout, expert, learner_fraction)
         };
-        let labeled: Result<Vec<_>, _> = ids.par_iter().map(record).collect();
+        let labeled: Result<Vec<_>, _> = played.par_iter().map(record).collect();
         let labeled = labeled.map_err(TrainingError::from_data)?;
         let Some(labeled) = labeled.into_iter().collect::<Option<Vec<_>>>() else {
             return Ok(None);

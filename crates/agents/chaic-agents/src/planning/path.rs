@@ -259,22 +259,52 @@ impl PathCosts<'_> {
 #[derive(Clone, Debug)]
 pub struct CostField {
     cost: Vec<u32>,
+    /// Costs below this are final; `u32::MAX` after a search of the whole map.
+    final_below: u32,
 }
 
 impl CostField {
     /// Searches from `here` over the whole map.
+    #[cfg(test)]
     pub fn new(costs: &CostMap, here: Vec2, search: &mut Search) -> CostField {
-        let dijkstra = &mut search.dijkstra;
-        dijkstra.start(costs, here);
-        while dijkstra.n_queued > 0 {
-            dijkstra.expand_bucket(costs);
-        }
-        CostField { cost: dijkstra.cost.clone() }
+        CostField::until_final(costs, here, search, &[usize::MAX])
     }
 
-    /// Returns the path cost to a cell, if it is reachable.
+    /// Searches from `here` until the costs of these cells are final, over the whole map if one of
+    /// them is unreachable.
+    pub fn until_final(
+        costs: &CostMap,
+        here: Vec2,
+        search: &mut Search,
+        cells: &[usize],
+    ) -> CostField {
+        let dijkstra = &mut search.dijkstra;
+        dijkstra.start(costs, here);
+        let cost_of = |dijkstra: &DijkstraSearch, cell: &usize| {
+            dijkstra.cost.get(*cell).copied().unwrap_or(u32::MAX)
+        };
+        let mut waiting: Vec<usize> = cells.to_vec();
+        while dijkstra.n_queued > 0 && !waiting.is_empty() {
+            dijkstra.expand_bucket(costs);
+            let final_below = (dijkstra.n_expanded * BUCKET_WIDTH) as u32;
+            while waiting.last().is_some_and(|cell| cost_of(dijkstra, cell) < final_below) {
+                waiting.pop();
+            }
+        }
+        let is_complete = dijkstra.n_queued == 0;
+        let final_below =
+            if is_complete { u32::MAX } else { (dijkstra.n_expanded * BUCKET_WIDTH) as u32 };
+        CostField { cost: dijkstra.cost.clone(), final_below }
+    }
+
+    /// Returns the path cost to a cell, if it is reachable and final.
     pub fn cost(&self, cell: usize) -> Option<u32> {
-        self.cost.get(cell).copied().filter(|c| *c < u32::MAX)
+        self.cost.get(cell).copied().filter(|c| *c < self.final_below)
+    }
+
+    /// Returns whether [`CostField::cost`] answers for this cell as a search of the whole map.
+    pub fn is_final(&self, cell: usize) -> bool {
+        self.final_below == u32::MAX || self.cost(cell).is_some()
     }
 
     /// Converts a cost to the length of free floor with the same cost, meters.

@@ -225,7 +225,8 @@ impl ProblemBuilder {
                     None => continue,
                 },
             };
-            let field = self.travel.field(costs, key, origin);
+            let stands = places.iter().map(|place| place.stand);
+            let field = self.travel.field(costs, key, origin, stands);
             for to in (0..n).filter(|to| *to != from) {
                 let stand = places[to].stand;
                 match trace(costs, field, stand, &at_obstacles, OBSTACLE_M) {

@@ -74,13 +74,24 @@ impl TravelCache {
         stand
     }
 
-    /// Returns the costs from `origin`, recomputed if the origin moved.
-    pub fn field(&mut self, costs: &CostMap, key: u32, origin: Vec2) -> &CostField {
-        let is_fresh =
-            self.fields.get(&key).is_some_and(|(at, _)| at.distance(origin) < SAME_ORIGIN_M);
+    /// Returns the costs from `origin`, final for the paths to these positions; recomputed if the
+    /// origin moved.
+    pub fn field(
+        &mut self,
+        costs: &CostMap,
+        key: u32,
+        origin: Vec2,
+        positions: impl Iterator<Item = Vec2>,
+    ) -> &CostField {
+        let cell_or_none = |position| costs.grid().cell_at(position).unwrap_or(usize::MAX);
+        let cells: Vec<usize> = positions.map(cell_or_none).collect();
+        let is_fresh = self.fields.get(&key).is_some_and(|(at, field)| {
+            at.distance(origin) < SAME_ORIGIN_M && cells.iter().all(|cell| field.is_final(*cell))
+        });
         if !is_fresh {
             let search = self.search.get_or_insert_with(|| Search::new(costs.grid().n_cells()));
-            self.fields.insert(key, (origin, CostField::new(costs, origin, search)));
+            let field = CostField::until_final(costs, origin, search, &cells);
+            self.fields.insert(key, (origin, field));
         }
         &self.fields[&key].1
     }

@@ -32,9 +32,9 @@ use crate::actor_critic::{ActorCritic as _, ActorCriticOutput};
 use crate::opponent::network::{OpponentInput, OpponentModel};
 use crate::ppo::{PpoConfig, Schedule, Trajectory, Transition, ppo_bounds, update};
 use crate::reward_config;
-use crate::rollout::RolloutError;
+use crate::rollout::{RolloutEpisode, RolloutError};
 use crate::rollout_config::{
-    GENERATORS, MAX_VALIDATION_EPISODES, REWARD, check_splits, read_opponent, validation_ids,
+    GENERATORS, MAX_VALIDATION_EPISODES, REWARD, check_splits, read_opponent, validation_episodes,
 };
 
 /// Configuration of `chaic train primitive`.
@@ -508,16 +508,17 @@ impl Trainer for PrimitiveTrainer {
         let parameters = learner.parameters.clone();
         let bytes = weights::to_bytes(model.network(), &parameters, &model.kind())?;
         let weights = Arc::new(PrimitiveWeights::new(model, parameters));
-        let ids = validation_ids(&config.tasks, &config.splits, config.validation_episodes);
-        let rate = |(id, _): &(String, u32)| {
+        let episodes =
+            validation_episodes(&config.tasks, &config.splits, config.validation_episodes);
+        let rate = |episode: &RolloutEpisode| {
             let helper = PrimitiveHelper::create(
                 Arc::clone(&weights),
                 RuleSet::PAPER.planner,
                 &**perception,
             );
-            transport_rate(id, config.image_size, helper, stop)
+            transport_rate(&episode.id, config.image_size, helper, stop)
         };
-        let rates: Result<Vec<Option<f64>>, RolloutError> = ids.par_iter().map(rate).collect();
+        let rates: Result<Vec<Option<f64>>, RolloutError> = episodes.par_iter().map(rate).collect();
         let rates = rates.expect("generated episodes can be played");
         let Some(rates) = rates.into_iter().collect::<Option<Vec<f64>>>() else { return Ok(None) };
         Ok(Some((metrics([("tr", rates.iter().sum::<f64>() / rates.len() as f64)]), bytes)))

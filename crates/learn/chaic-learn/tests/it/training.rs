@@ -19,7 +19,7 @@ use chaic_learn::policy::ActionSelection;
 use chaic_learn::policy_kind::{PolicyKind, PolicyWeights};
 use chaic_learn::ppo::PpoConfig;
 use chaic_learn::primitive::train::{PrimitiveConfig, PrimitiveTrainer};
-use chaic_learn::rollout::{RolloutContext, rollout};
+use chaic_learn::rollout::{RolloutContext, RolloutEpisode, rollout};
 use chaic_learn::train::{CloningConfig, PolicyTrainer, PpoTrainingConfig, RolloutConfig};
 use chaic_nn::weights;
 use chaic_training::conformance::{bounds_every_number, refuses_damaged_checkpoints};
@@ -74,7 +74,11 @@ fn interrupted_trainings_end_with_the_same_bits() {
     let clone = CloningConfig {
         iterations: 2,
         n_steps: 5,
-        rollout: RolloutConfig { proposals: true, ..small_rollout() },
+        rollout: RolloutConfig {
+            proposals: true,
+            partners: vec!["slow".to_owned()],
+            ..small_rollout()
+        },
         ..CloningConfig::default()
     };
     let [uninterrupted, resumed] = [false, true].map(|is_paused| {
@@ -122,6 +126,7 @@ fn experts_generators_and_penalties_are_checked_before_a_training() {
         ("[teacher]\nhelper = \"follow\"", ["teacher.helper", "infer, rhp, oracle"]),
         ("[rollout]\nsplits = [\"test\"]", ["rollout.splits", "gen, gen-standard"]),
         ("[rollout]\nsplits = []", ["rollout.splits", "empty"]),
+        ("[rollout]\npartners = [\"fast\"]", ["rollout.partners", "rules, farthest"]),
     ] {
         let problem = parse_config::<PolicyTrainer<CloningConfig>>(text).unwrap_err();
         assert!(words.iter().all(|word| problem.contains(word)), "{problem}");
@@ -307,7 +312,7 @@ fn features_lie_within_bounds_and_rewards_sum_to_the_score() {
         stop: &NEVER_STOP,
     };
     for id in ["shopping/gen/40000001", "obstacle/gen/40000001"] {
-        let result = rollout(id, 0, &weights, &context).unwrap().unwrap();
+        let result = rollout(&RolloutEpisode::new(id), &weights, &context).unwrap().unwrap();
         let mut reward = 0.0;
         let mut frames = 0.0;
         for transition in &result.trajectory.transitions {

@@ -77,13 +77,44 @@ fn there_is_no_path_through_a_wall() {
 }
 
 #[test]
+fn paths_are_those_of_a_search_over_the_whole_map() {
+    for seed in 0..60 {
+        let mut rng = RngStream::new(seed, "partial fields", 0);
+        let row = |rng: &mut RngStream| -> String {
+            (0..40).map(|_| [".", ".", ".", ".", "?", "#"][rng.below(6)]).collect()
+        };
+        let rows: Vec<String> = (0..24).map(|_| row(&mut rng)).collect();
+        let costs = DrawnMap::parse(&rows.join("\n")).costs(0.05);
+        let mut position = || at(&costs, rng.below(40), rng.below(24));
+        let origin = position();
+        let obstacles = [position(), position()];
+        let mut places: Vec<Vec2> = (0..6).map(|_| position()).collect();
+        let whole = field(&costs, origin);
+        let mut cache = TravelCache::default();
+        // A place that is added later is final too.
+        for n in [3, 6] {
+            let field = cache.field(&costs, 1, origin, places[..n].iter().copied());
+            for place in &places[..n] {
+                let [expected, found] =
+                    [&whole, field].map(|f| trace(&costs, f, *place, &obstacles, 0.75));
+                assert_eq!(found, expected, "seed {seed}");
+            }
+        }
+        // Some searches end before they have covered the map.
+        places.truncate(1);
+        let near = cache.field(&costs, 2, places[0], places.iter().copied());
+        assert!(near.is_final(costs.grid().cell_at(places[0]).expect("it is inside")));
+    }
+}
+
+#[test]
 fn cost_fields_are_kept_until_the_origin_moves_or_the_epoch_changes() {
     let (open, closed) = (room(Some(20), 16..22), room(Some(20), 0..0));
     let (here, far) = (at(&open, 5, 5), at(&open, 34, 5));
     let mut cache = TravelCache::default();
     cache.start(1);
     let is_open = |cache: &mut TravelCache, costs: &CostMap, origin: Vec2| {
-        let field = cache.field(costs, 3, origin);
+        let field = cache.field(costs, 3, origin, std::iter::once(far));
         trace(costs, field, far, &[], 0.75).is_some()
     };
     assert!(is_open(&mut cache, &open, here));

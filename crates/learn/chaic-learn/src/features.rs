@@ -181,20 +181,19 @@ impl FeatureEncoder {
             proposer.observe(observation, memory, behavior);
         }
         let Some((briefing, belief)) = &mut self.episode else { return };
-        belief.observe(briefing, memory, behavior);
+        // The proposer has the same belief.
+        if self.proposer.is_none() {
+            belief.observe(briefing, memory, behavior);
+        }
         if let Some(opponent) = &mut self.opponent {
             opponent.observe(memory, briefing);
         }
     }
 
-    /// The belief about the partner, once an episode has begun.
-    pub fn belief(&self) -> Option<&Belief> {
-        self.episode.as_ref().map(|(_, belief)| belief)
-    }
-
     /// Minimum height of goal places that count in every task that the partner may have, meters.
     pub fn goal_place_min_top_m(&self, memory: &Memory) -> Option<f32> {
         let (briefing, belief) = self.episode.as_ref()?;
+        let belief = self.proposer.as_ref().and_then(InferPolicy::belief).unwrap_or(belief);
         belief.goal_place_min_top_m(briefing, memory)
     }
 
@@ -232,9 +231,10 @@ impl FeatureEncoder {
         candidates: &[Plan],
     ) -> CandidateSet {
         let prior;
-        let belief = match &self.episode {
-            Some((_, belief)) => belief,
-            None => {
+        let proposed = self.proposer.as_ref().and_then(InferPolicy::belief);
+        let belief = match (proposed, &self.episode) {
+            (Some(belief), _) | (None, Some((_, belief))) => belief,
+            (None, None) => {
                 prior = Belief::new(context.briefing);
                 &prior
             }

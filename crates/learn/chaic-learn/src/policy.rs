@@ -49,8 +49,10 @@ pub enum ActionSelection {
 impl ActionSelection {
     /// Samples from the policy's distribution, as during training.
     pub const TRAINING: ActionSelection = ActionSelection::Sample { temperature: 1.0 };
-    /// Selection of helpers in runs.
-    pub const HELPER: ActionSelection = ActionSelection::Sample { temperature: 0.5 };
+    /// Selection of helpers in runs. On 80 validation episodes a policy that had a transport rate of
+    /// 0.53 with the most probable plans had 0.50 at a temperature of 0.5. Always the most probable
+    /// plan would let a policy repeat an attempt forever.
+    pub const HELPER: ActionSelection = ActionSelection::Sample { temperature: 0.2 };
 }
 
 /// Recorded decision.

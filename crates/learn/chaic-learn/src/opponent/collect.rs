@@ -112,8 +112,6 @@ impl WindowCollectionConfig {
     }
 }
 
-/// Observations between two windows, which overlap by one observation.
-const STRIDE: usize = 4;
 /// Maximum number of windows per goal and episode, for variety.
 const MAX_PER_EPISODE: usize = 40;
 /// One in this many episodes has a partner that pauses before each plan.
@@ -310,8 +308,7 @@ impl Recording<'_> {
     fn into_helper<P: Policy>(self, policy: P) -> Helper {
         let Recording { perception, grants, truth, log } = self;
         let window = ObservationHistory::default();
-        let recording_policy =
-            RecordingPolicy { policy, window, briefing: None, n_observations: 0, truth, log };
+        let recording_policy = RecordingPolicy { policy, window, briefing: None, truth, log };
         let agent = PlanningAgent::with_watched(
             recording_policy,
             RuleSet::PAPER.planner,
@@ -328,7 +325,6 @@ struct RecordingPolicy<P> {
     policy: P,
     window: ObservationHistory,
     briefing: Option<Briefing>,
-    n_observations: usize,
     truth: GroundTruth,
     log: Arc<Mutex<Vec<LabeledWindow>>>,
 }
@@ -337,7 +333,7 @@ impl<P: Policy> Policy for RecordingPolicy<P> {
     fn reset(&mut self, briefing: &Briefing) {
         self.policy.reset(briefing);
         self.window.reset(briefing);
-        (self.briefing, self.n_observations) = (Some(briefing.clone()), 0);
+        self.briefing = Some(briefing.clone());
     }
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
@@ -351,10 +347,6 @@ impl<P: Policy> Policy for RecordingPolicy<P> {
     fn observe(&mut self, _: &Observation, memory: &Memory, behavior: &BehaviorLog) {
         let Some(briefing) = &self.briefing else { return };
         self.window.add(memory, briefing);
-        self.n_observations += 1;
-        if !self.n_observations.is_multiple_of(STRIDE) {
-            return;
-        }
         let reported = *self.truth.partner_plan.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(ReportedPlan { plan, waits_until }) = reported else { return };
         let plan = if memory.frame < waits_until { Plan::Wait } else { plan };

@@ -109,7 +109,7 @@ pub const N_OPPONENT_PLAN: usize = 2;
 /// Number of additional plan features with proposals: whether `infer` would choose the plan.
 pub const N_PROPOSAL_PLAN: usize = 1;
 /// Number of kinds of plans.
-pub(crate) const N_KINDS: usize = Plan::KINDS.len();
+const N_KINDS: usize = Plan::KINDS.len();
 
 /// Scales of distances (m) and durations (frames).
 const DISTANCE_SCALE_M: f32 = 20.0;

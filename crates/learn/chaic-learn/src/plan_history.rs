@@ -3,7 +3,8 @@
 use chaic_agents::decision::{Context, Plan};
 use chaic_core::{Briefing, Frame, Role};
 
-use crate::features::N_KINDS;
+/// Number of kinds of plans.
+const N_KINDS: usize = Plan::KINDS.len();
 
 /// Minimum time between reconsiderations, frames: those of the helper that infers
 /// (`chaic_agents::policies::infer`), and of the rules for walks with furniture

@@ -24,7 +24,7 @@ use crate::scales::{TARGET_SETS, flag, log_mass, normalize_clamped, recency};
 
 /// Features of the state. Three per target set follow: the number of its objects that the partner
 /// is believed to have taken, the number available, and the probability that it is the partner's.
-/// The probability of each of [`PERSONAS`] comes last.
+/// The probability of each kind of person comes last.
 pub const STATE_FEATURES: [&str; 34] = [
     "time_left",
     "horizon",

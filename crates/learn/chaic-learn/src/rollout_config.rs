@@ -68,7 +68,8 @@ pub struct RolloutConfig {
     /// Partners, which take turns: `rules` or the name of one that deviates from them
     /// (`chaic list partners`). Validation has the rule-based ones.
     pub partners: Vec<String>,
-    /// Width and height of all agents' images during training, pixels.
+    /// Width and height of all agents' images during training, pixels. Smaller images hide what the
+    /// partner takes (docs/learning.md).
     pub image_size: u32,
     /// Perception of the helper, as `chaic eval --perception`.
     pub perception: String,
@@ -95,7 +96,7 @@ impl Default for RolloutConfig {
             tasks: TaskId::paper().collect(),
             splits: GENERATORS.map(str::to_owned).to_vec(),
             partners: vec![RULES.to_owned()],
-            image_size: 128,
+            image_size: 256,
             perception: GROUND_TRUTH.to_owned(),
             behavior: GROUND_TRUTH.to_owned(),
             opponent: None,

@@ -144,6 +144,7 @@ fn damaged_checkpoints_and_values_out_of_bounds_are_refused() {
     let policy = PpoTrainingConfig { rollout: small_rollout(), ..PpoTrainingConfig::default() };
     check::<PolicyTrainer<PpoTrainingConfig>>(&policy);
     check::<PolicyTrainer<CloningConfig>>(&CloningConfig {
+        n_steps: 5,
         rollout: small_rollout(),
         ..CloningConfig::default()
     });
@@ -202,6 +203,7 @@ fn stopped_steps_change_nothing() {
     let policy = PpoTrainingConfig { rollout: small_rollout(), ..PpoTrainingConfig::default() };
     check::<PolicyTrainer<PpoTrainingConfig>>(&policy);
     check::<PolicyTrainer<CloningConfig>>(&CloningConfig {
+        n_steps: 5,
         rollout: small_rollout(),
         ..CloningConfig::default()
     });

@@ -269,3 +269,24 @@ pub fn rollout_all(
         episodes.par_iter().map(|episode| rollout(episode, weights, context)).collect();
     Ok(results?.into_iter().collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rewards_between_decisions_are_discounted_to_the_first() {
+        let recording = EpisodeRecording {
+            records: Vec::new(),
+            cumulative_rewards: vec![(0, 0.0), (2, 1.0), (3, 1.0), (5, 4.0), (9, 5.0)],
+            tr: 0.0,
+            frames: 9,
+        };
+        // A reward of 1 after two frames, one of 3 after five.
+        let early = recording.discounted_reward(0, 5, 0.5);
+        assert_eq!(early, 0.25 + 3.0 / 32.0);
+        assert_eq!(recording.discounted_reward(5, 9, 0.5), 1.0 / 16.0);
+        assert_eq!(recording.discounted_reward(0, 9, 1.0), 5.0);
+        assert_eq!(recording.discounted_reward(3, 3, 0.5), 0.0);
+    }
+}

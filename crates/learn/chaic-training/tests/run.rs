@@ -41,8 +41,9 @@ impl Default for ToyConfig {
     }
 }
 
-/// Trainer that moves three parameters towards 1.
-struct Toy {
+/// Trainer that moves three parameters towards 1. `HAS_SCORE` keeps the weights whose first
+/// parameter is nearest to [`BEST_X`].
+struct Toy<const HAS_SCORE: bool = false> {
     config: ToyConfig,
     folder: PathBuf,
     network: Network,
@@ -55,7 +56,10 @@ fn network() -> Network {
     network
 }
 
-impl Trainer for Toy {
+/// First parameter with the best score.
+const BEST_X: f64 = 0.5;
+
+impl<const HAS_SCORE: bool> Trainer for Toy<HAS_SCORE> {
     type Config = ToyConfig;
     const KIND: &'static str = "toy";
     const BOUNDS: BoundTable = &[
@@ -70,13 +74,14 @@ impl Trainer for Toy {
     const RECORD_STEPS: u64 = 3;
     const CHECKPOINT_STEPS: u64 = 5;
     const VALIDATION_STEPS: u64 = 8;
+    const SCORE: Option<&'static str> = if HAS_SCORE { Some("score") } else { None };
 
     fn new(
         config: &ToyConfig,
         folder: &Path,
         _: &mut dyn FnMut(&str),
         stop: &AtomicBool,
-    ) -> Result<Option<Toy>, TrainingError> {
+    ) -> Result<Option<Toy<HAS_SCORE>>, TrainingError> {
         if config.fails == 1 {
             return Err(TrainingError::from_data(std::io::Error::other("no data")));
         }
@@ -147,7 +152,38 @@ impl Trainer for Toy {
             return Ok(None);
         }
         let bytes = weights::to_bytes(&self.network, &self.learner.parameters, WEIGHTS_KIND)?;
-        Ok(Some((metrics([("x", f64::from(self.learner.parameters[0]))]), bytes)))
+        let x = f64::from(self.learner.parameters[0]);
+        Ok(Some((metrics([("x", x), ("score", -(x - BEST_X).abs())]), bytes)))
+    }
+}
+
+#[test]
+fn the_weights_with_the_best_score_are_kept_across_interruptions() {
+    for is_paused in [false, true] {
+        let dir = tempfile::tempdir().unwrap();
+        let stop = AtomicBool::new(false);
+        let mut records: Vec<CurveRecord> = Vec::new();
+        let config = ToyConfig { steps: 40, ..ToyConfig::default() };
+        let started =
+            TrainingRun::<Toy<true>>::start(dir.path(), &config, None, &mut |_| (), &stop);
+        let mut run = started.unwrap().unwrap();
+        let mut record = |record: &CurveRecord| {
+            records.push(record.clone());
+            stop.store(is_paused && record.step == 24, Ordering::Relaxed);
+        };
+        while !run.run(&stop, &mut record).unwrap() {
+            drop(run);
+            stop.store(false, Ordering::Relaxed);
+            run = TrainingRun::resume(dir.path(), &mut |_| (), &stop).unwrap().unwrap();
+        }
+        let validations = records.iter().filter(|record| record.phase == Phase::Validation);
+        let scores: Vec<(f64, f64)> =
+            validations.map(|record| (record.metrics["score"], record.metrics["x"])).collect();
+        let best = scores.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
+        assert_ne!(scores.last(), Some(&best), "{scores:?}");
+        let bytes = fs::read(dir.path().join(Toy::<true>::WEIGHTS)).unwrap();
+        let parameters = weights::from_bytes(&network(), &bytes, WEIGHTS_KIND).unwrap();
+        assert_eq!(f64::from(parameters[0]), best.1, "{scores:?}");
     }
 }
 
@@ -173,7 +209,7 @@ fn run_to_end(
 
 /// Returns the files at the end of a training.
 fn final_files(folder: &Path) -> [Vec<u8>; 3] {
-    [CHECKPOINT, CURVES, Toy::WEIGHTS].map(|name| fs::read(folder.join(name)).unwrap())
+    [CHECKPOINT, CURVES, <Toy>::WEIGHTS].map(|name| fs::read(folder.join(name)).unwrap())
 }
 
 fn copy(from: &Path, to: &Path) {
@@ -328,8 +364,8 @@ fn non_finite_weights_are_not_written() {
             "{error}"
         );
         drop(run);
-        let weights = fs::read(dir.path().join(Toy::WEIGHTS)).unwrap();
-        assert!(Toy::read_weights(&ToyConfig::default(), &weights).is_ok());
+        let weights = fs::read(dir.path().join(<Toy>::WEIGHTS)).unwrap();
+        assert!(<Toy>::read_weights(&ToyConfig::default(), &weights).is_ok());
         assert_eq!(resume(dir.path()).unwrap().progress(), (kept, 24));
     }
 }
@@ -339,7 +375,7 @@ fn missing_damaged_and_version_1_checkpoints_are_refused_in_one_line() {
     let dir = tempfile::tempdir().unwrap();
     refuses_damaged_checkpoints(&mut {
         let mut toy =
-            Toy::new(&ToyConfig::default(), dir.path(), &mut |_| (), &AtomicBool::new(false))
+            <Toy>::new(&ToyConfig::default(), dir.path(), &mut |_| (), &AtomicBool::new(false))
                 .unwrap()
                 .unwrap();
         toy.step(&AtomicBool::new(false)).unwrap();
@@ -396,7 +432,8 @@ fn a_training_of_an_earlier_version_is_resumed() {
     assert_ne!(old_config, config);
     fs::write(dir.path().join(CONFIG), old_config).unwrap();
     let stop = AtomicBool::new(false);
-    let mut toy = Toy::new(&ToyConfig::default(), dir.path(), &mut |_| (), &stop).unwrap().unwrap();
+    let mut toy =
+        <Toy>::new(&ToyConfig::default(), dir.path(), &mut |_| (), &stop).unwrap().unwrap();
     let old_names =
         toy.step(&stop).unwrap().map(|_| metrics([("clipped", 0.5), ("objective", 2.0)]));
     let bytes = checkpoint_bytes(&toy, &[old_names.unwrap()]).unwrap();

@@ -21,15 +21,14 @@ use crate::actor_critic::{ActorCriticOutput, Optimizer, OutputGrad, optimizer_st
 use crate::candidate_scorer::{CandidateScorer, CandidateSet};
 use crate::features::FeatureEncoder;
 use crate::policy::{LearnedPolicy, StepLog, StepRecord};
-use crate::policy_kind::PolicyWeights;
 
 /// Expert that can be imitated.
 #[derive(Clone, Copy, Debug)]
 pub struct ExpertInfo {
     /// Name in configurations: that of the helper with the same rules.
     pub name: &'static str,
-    /// True if it is told the goal. Its choices are then no function of what the learner knows, so
-    /// a clone of it cannot reach it.
+    /// True if the expert knows the goal. Its choices then depend on what the learner cannot know, so
+    /// a clone cannot reach it.
     pub knows_goal: bool,
     /// Creates its policy.
     pub policy: fn() -> Box<dyn Policy>,
@@ -63,36 +62,42 @@ impl ExpertInfo {
 
 /// Policy that drives the agent during a rollout.
 pub enum RolloutActor {
-    /// The expert.
-    Expert,
+    /// The expert, with the encoder of the learner's inputs.
+    Expert(Box<FeatureEncoder>),
     /// The learner; the expert labels its states.
     Learner(Box<LearnedPolicy>),
+}
+
+impl RolloutActor {
+    /// Encoder of the learner's inputs.
+    fn features(&mut self) -> &mut FeatureEncoder {
+        match self {
+            RolloutActor::Expert(features) => features,
+            RolloutActor::Learner(learner) => learner.features(),
+        }
+    }
 }
 
 /// Policy that records the expert's choices.
 pub struct ExpertPolicy {
     expert: Box<dyn Policy>,
-    /// Goal that the expert is told.
+    /// Goal, if the expert knows it.
     goal: Option<Goal>,
     actor: RolloutActor,
     log: StepLog,
-    features: FeatureEncoder,
 }
 
 impl ExpertPolicy {
     /// Creates a policy that records the choices of this expert. `goal` is the partner's goal, for
-    /// experts that are told it. The recorded features are the inputs of a policy with these weights.
+    /// experts that know it.
     pub fn new(
         expert: &ExpertInfo,
         goal: &Goal,
         actor: RolloutActor,
-        weights: &PolicyWeights,
         log: StepLog,
     ) -> ExpertPolicy {
         let goal = expert.knows_goal.then(|| goal.clone());
-        let opponent = weights.opponent.clone();
-        let features = FeatureEncoder::new(weights.kind.has_proposals, opponent);
-        ExpertPolicy { expert: (expert.policy)(), goal, actor, log, features }
+        ExpertPolicy { expert: (expert.policy)(), goal, actor, log }
     }
 
     /// Returns the briefing of the expert, if it differs from that of the learner.
@@ -106,68 +111,78 @@ impl Policy for ExpertPolicy {
     fn reset(&mut self, briefing: &Briefing) {
         let told = self.told(briefing);
         self.expert.reset(told.as_ref().unwrap_or(briefing));
-        self.features.reset(briefing);
-        if let RolloutActor::Learner(learner) = &mut self.actor {
-            learner.reset(briefing);
+        match &mut self.actor {
+            RolloutActor::Expert(features) => features.reset(briefing),
+            RolloutActor::Learner(learner) => learner.reset(briefing),
         }
     }
 
     fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
-        let reconsidered = self.features.history.reconsidered();
-        let candidates = self.features.history.candidates(valid);
-        let decision = self.features.encode(context, valid, &candidates);
+        let features = self.actor.features();
+        let reconsidered = features.history.reconsidered();
+        let candidates = features.history.candidates(valid);
+        // A single candidate is no decision.
+        let decision = (candidates.len() > 1).then(|| features.encode(context, valid, &candidates));
         let told = self.told(context.briefing);
         let briefing = told.as_ref().unwrap_or(context.briefing);
         let expert_plan = self.expert.choose(&Context { briefing, ..*context }, valid)?;
-        let plan = match &mut self.actor {
-            RolloutActor::Expert => expert_plan,
-            RolloutActor::Learner(learner) => learner.choose(context, valid)?,
-        };
         let frame = context.memory.frame;
-        self.features.history.record(plan, frame);
+        let plan = match (&mut self.actor, &decision) {
+            (RolloutActor::Learner(learner), Some(decision)) => {
+                learner.choose_among(&candidates, decision.clone(), frame)
+            }
+            (RolloutActor::Learner(learner), None) => learner.choose(context, valid)?,
+            (RolloutActor::Expert(features), _) => {
+                features.history.record(expert_plan, frame);
+                expert_plan
+            }
+        };
         // If the expert's plan does not replace the current one, the label is to continue.
         let continues =
             reconsidered.is_some_and(|current| !self.expert.supersedes(&expert_plan, &current));
         let chosen = candidates.iter().position(|plan| *plan == expert_plan);
         let action = if continues { Some(0) } else { chosen };
         // Plans outside the candidates, such as waiting, cannot be learned.
-        if let Some(action) = action.filter(|_| candidates.len() > 1) {
-            let record =
-                StepRecord { frame, observation: decision, action, log_prob: 0.0, value: 0.0 };
+        if let (Some(action), Some(observation)) = (action, decision) {
+            let record = StepRecord { frame, observation, action, log_prob: 0.0, value: 0.0 };
             self.log.lock().unwrap_or_else(PoisonError::into_inner).push(record);
         }
         Ok(plan)
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, has_changed: bool) -> bool {
-        if let RolloutActor::Learner(learner) = &mut self.actor {
-            learner.reconsiders(context, current, has_changed);
-            return self.features.history.is_due(context, current, has_changed);
-        }
         let told = self.told(context.briefing);
-        let briefing = told.as_ref().unwrap_or(context.briefing);
-        let is_due =
-            self.expert.reconsiders(&Context { briefing, ..*context }, current, has_changed);
-        self.features.history.set_reconsidered(is_due.then_some(*current));
-        is_due
+        match &mut self.actor {
+            RolloutActor::Learner(learner) => learner.reconsiders(context, current, has_changed),
+            RolloutActor::Expert(features) => {
+                let briefing = told.as_ref().unwrap_or(context.briefing);
+                let context = Context { briefing, ..*context };
+                let is_due = self.expert.reconsiders(&context, current, has_changed);
+                features.history.set_reconsidered(is_due.then_some(*current));
+                is_due
+            }
+        }
     }
 
     fn supersedes(&self, new: &Plan, current: &Plan) -> bool {
         match &self.actor {
-            RolloutActor::Expert => self.expert.supersedes(new, current),
+            RolloutActor::Expert(_) => self.expert.supersedes(new, current),
             RolloutActor::Learner(learner) => learner.supersedes(new, current),
         }
     }
 
     fn goal_place_min_top_m(&self, memory: &Memory) -> Option<f32> {
-        self.features.goal_place_min_top_m(memory)
+        match &self.actor {
+            RolloutActor::Expert(features) => features.goal_place_min_top_m(memory),
+            RolloutActor::Learner(learner) => learner.goal_place_min_top_m(memory),
+        }
     }
 
     fn observe(&mut self, observation: &Observation, memory: &Memory, behavior: &BehaviorLog) {
         self.expert.observe(observation, memory, behavior);
-        self.features.observe(observation, memory, behavior);
-        if let RolloutActor::Learner(learner) = &mut self.actor {
-            learner.observe(observation, memory, behavior);
+        match &mut self.actor {
+            RolloutActor::Expert(features) => features.observe(observation, memory, behavior),
+            RolloutActor::Learner(learner) => learner.observe(observation, memory, behavior),
         }
     }
 }
@@ -277,17 +292,4 @@ fn gradient(
     let logits = output.log_probs.iter().enumerate();
     let logits = logits.map(|(k, l)| weight * (math::exp(*l) - label(k))).collect();
     OutputGrad { logits, values: vec![0.5 * weight * error] }
-}
-
-/// Draws the actor of an episode: the learner with probability `learner_fraction`, else the expert.
-pub fn sample_actor(
-    learner_fraction: f32,
-    rng: &mut RngStream,
-    learner: impl FnOnce() -> LearnedPolicy,
-) -> RolloutActor {
-    if rng.chance(learner_fraction) {
-        RolloutActor::Learner(Box::new(learner()))
-    } else {
-        RolloutActor::Expert
-    }
 }

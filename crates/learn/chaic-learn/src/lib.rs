@@ -3,8 +3,9 @@
 //! **What it is**: [`actor_critic`] is the interface of policy networks, [`candidate_scorer`] a
 //! network for any number of candidates, [`ppo`] proximal policy optimization. [`features`] encodes
 //! a decision between plans; predictions of the [`opponent`] model may extend it. [`policy`] lets a
-//! network drive an agent, [`rollout`] plays episodes with it, [`cloning`] learns from an expert,
-//! and [`train`] has the trainers. [`primitive`] has policies of primitive actions from images.
+//! network drive an agent, [`policy_kind`] lists networks by their inputs, and [`rollout`] plays
+//! episodes. [`cloning`] learns from an expert whose choices [`demonstrations`] keeps, and [`train`]
+//! has the trainers. [`primitive`] has policies of primitive actions from images.
 //! [`helpers`] makes either a helper of a run. [`toy`] has tasks with a known best return, which
 //! test the learner.
 //!

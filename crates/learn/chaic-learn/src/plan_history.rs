@@ -1,25 +1,19 @@
 //! History of a policy's choices, and the frames at which its next choice is due.
 
 use chaic_agents::decision::{Context, Plan};
-use chaic_core::{Briefing, Frame, Role};
+use chaic_core::{Briefing, ClassId, Frame, Role};
 
 /// Number of kinds of plans.
 const N_KINDS: usize = Plan::KINDS.len();
 
-/// Minimum time between reconsiderations, frames: those of the helper that infers
-/// (`chaic_agents::policies::infer`), and of the rules for walks with furniture
-/// (`planner.time.reconsider_frames`) and for the child.
-mod intervals {
-    use chaic_core::Frame;
-
-    /// Of plans to explore, follow or wait.
-    pub const IDLE_FRAMES: Frame = 60;
-    /// Of walks to objects.
-    pub const WALK_FRAMES: Frame = 80;
-    /// Of all plans while the child is away, and of walks to furniture.
-    pub const URGENT_FRAMES: Frame = 40;
-}
-use intervals::*;
+/// Minimum time between reconsiderations of plans to explore, follow or wait, frames: that of
+/// `chaic_agents::policies::infer`.
+const IDLE_FRAMES: Frame = 60;
+/// Minimum time between reconsiderations of walks to objects, frames: as above.
+const WALK_FRAMES: Frame = 80;
+/// Minimum time between reconsiderations while the child is away, or of walks to furniture, frames:
+/// that of the rules (`planner.time.reconsider_frames`).
+const URGENT_FRAMES: Frame = 40;
 
 /// History of a policy's choices.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -38,7 +32,7 @@ pub struct PlanHistory {
 impl PlanHistory {
     /// Creates the history at the start of an episode.
     pub fn new(briefing: &Briefing) -> PlanHistory {
-        let is_furniture = |class: &chaic_core::ClassId| class.info().role == Role::HeavyTarget;
+        let is_furniture = |class: &ClassId| class.info().role == Role::HeavyTarget;
         let moves_furniture = briefing.possible_targets.iter().any(is_furniture);
         PlanHistory { moves_furniture, ..PlanHistory::default() }
     }
@@ -104,7 +98,6 @@ mod tests {
     use super::*;
     use chaic_agents::decision::Subject;
     use chaic_agents::track::TrackId;
-    use chaic_core::ClassId;
 
     fn pick_up(track: u32) -> Plan {
         Plan::PickUp(Subject { track: TrackId(track), class: ClassId::named("apple") })

@@ -96,22 +96,19 @@ impl LearnedPolicy {
         let features = FeatureEncoder::new(weights.kind.has_proposals, weights.opponent.clone());
         LearnedPolicy { weights, selection, log, pass, rng, features }
     }
-}
 
-impl Policy for LearnedPolicy {
-    fn reset(&mut self, briefing: &Briefing) {
-        self.rng = RngStream::new(briefing.seed, "learned policy", 0);
-        self.features.reset(briefing);
+    /// Encoder of its inputs.
+    pub(crate) fn features(&mut self) -> &mut FeatureEncoder {
+        &mut self.features
     }
 
-    fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
-        let candidates = self.features.history.candidates(valid);
-        let frame = context.memory.frame;
-        if let [single] = candidates[..] {
-            self.features.history.record(single, frame);
-            return Ok(single);
-        }
-        let observation = self.features.encode(context, valid, &candidates);
+    /// Chooses and records one of several candidates, given their encoding.
+    pub(crate) fn choose_among(
+        &mut self,
+        candidates: &[Plan],
+        observation: CandidateSet,
+        frame: Frame,
+    ) -> Plan {
         let PolicyWeights { model, parameters, .. } = &*self.weights;
         let output =
             model.forward(parameters, std::iter::once(&observation), &mut self.pass).remove(0);
@@ -133,7 +130,25 @@ impl Policy for LearnedPolicy {
             };
             log.lock().unwrap_or_else(PoisonError::into_inner).push(record);
         }
-        Ok(plan)
+        plan
+    }
+}
+
+impl Policy for LearnedPolicy {
+    fn reset(&mut self, briefing: &Briefing) {
+        self.rng = RngStream::new(briefing.seed, "learned policy", 0);
+        self.features.reset(briefing);
+    }
+
+    fn choose(&mut self, context: &Context<'_>, valid: &[Plan]) -> Result<Plan, AgentError> {
+        let candidates = self.features.history.candidates(valid);
+        let frame = context.memory.frame;
+        if let [single] = candidates[..] {
+            self.features.history.record(single, frame);
+            return Ok(single);
+        }
+        let observation = self.features.encode(context, valid, &candidates);
+        Ok(self.choose_among(&candidates, observation, frame))
     }
 
     fn reconsiders(&mut self, context: &Context<'_>, current: &Plan, is_news: bool) -> bool {

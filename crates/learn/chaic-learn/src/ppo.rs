@@ -226,8 +226,9 @@ pub struct Schedule {
 
 /// Runs `n_epochs` of minibatch PPO on `trajectories`, as Stable-Baselines3 does.
 ///
-/// `reference` are the parameters of the policy that the KL penalty refers to. `schedule` seeds the shuffle and anneals the learning rate. Returns `None` if `stop` is raised;
-/// some steps may have been taken.
+/// `reference` are the parameters of the policy that the KL penalty refers to. `schedule` seeds the
+/// shuffle and anneals the learning rate. Returns `None` if `stop` is raised; some steps may have
+/// been taken.
 pub fn update<M: ActorCritic>(
     config: &PpoConfig,
     model: &M,
@@ -409,6 +410,7 @@ fn explained_variance<S>(samples: &[PpoSample<'_, S>]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::actor_critic::log_softmax;
 
     fn transition(value: f32, reward: f32, duration: f32) -> Transition {
         Transition {
@@ -431,6 +433,37 @@ mod tests {
         assert_eq!(compute_gae(&config, &trajectory), [4.0 - 1.0, 8.0 - 3.0]);
         let config = PpoConfig { gae_lambda: 0.0, ..config };
         assert_eq!(compute_gae(&config, &trajectory), [2.0 + 3.0 / 4.0 - 1.0, 8.0 - 3.0]);
+    }
+
+    #[test]
+    fn the_penalty_is_the_divergence_from_the_initial_policy() {
+        let config = PpoConfig { kl_coef: 0.7, ..PpoConfig::default() };
+        let reference = log_softmax(&[0.3, -0.4, 1.1]);
+        let logits = [0.8, 0.1, -0.5];
+        let divergence = |logits: &[f32; 3]| -> f32 {
+            let log_probs = log_softmax(logits);
+            log_probs.iter().zip(&reference).map(|(l, r)| math::exp(*l) * (l - r)).sum()
+        };
+        let transition = transition(0.0, 0.0, 1.0);
+        let sample = PpoSample {
+            transition: &transition,
+            advantage: 0.0,
+            value_target: 0.0,
+            reference: reference.clone(),
+        };
+        let output = ActorCriticOutput { log_probs: log_softmax(&logits), values: vec![0.0] };
+        let mut metrics = PpoMetrics::default();
+        let grad = gradient(&config, &sample, 0.0, &output, 1.0, &mut metrics);
+        assert!((metrics.reference_kl - f64::from(divergence(&logits))).abs() < 1e-6);
+        for k in 0..logits.len() {
+            let shifted = |step: f32| {
+                let mut logits = logits;
+                logits[k] += step;
+                divergence(&logits)
+            };
+            let slope = config.kl_coef * (shifted(1e-2) - shifted(-1e-2)) / 2e-2;
+            assert!((grad.logits[k] - slope).abs() < 1e-4, "{} {slope}", grad.logits[k]);
+        }
     }
 
     #[test]

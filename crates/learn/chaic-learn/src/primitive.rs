@@ -7,6 +7,9 @@ pub mod network;
 pub mod observation;
 
 pub mod helper;
+
+mod config;
+mod env_runner;
 pub mod train;
 
 use chaic_agents::PlanningAgent;

@@ -3,7 +3,6 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, PoisonError};
 
-use chaic_agents::HelperInfo;
 use chaic_agents::decision::Policy;
 use chaic_agents::perception_factory::PerceptionFactory;
 use chaic_core::briefing::Goal;
@@ -20,7 +19,8 @@ use chaic_env::{
 use chaic_episodes::{SplitError, find_episode};
 use rayon::prelude::*;
 
-use crate::cloning::{Demonstration, ExpertInfo, ExpertPolicy, sample_actor};
+use crate::cloning::{Demonstration, ExpertInfo, ExpertPolicy, RolloutActor};
+use crate::features::FeatureEncoder;
 use crate::policy::{ActionSelection, LearnedPolicy, StepLog, StepRecord, policy_helper};
 use crate::policy_kind::PolicyWeights;
 use crate::ppo::{Trajectory, Transition};
@@ -71,24 +71,39 @@ impl RolloutEpisode {
         RolloutEpisode { id: id.into(), partner: None }
     }
 
-    /// Creates the environment, in which a helper plays under this name.
-    fn env(
-        &self,
-        name: &str,
-        helper: Helper,
-        context: &RolloutContext<'_>,
-    ) -> Result<Env, RolloutError> {
+    /// Creates the environment of a helper.
+    fn env(&self, helper: Helper, image_size: u32) -> Result<Env, RolloutError> {
         let episode = find_episode(&self.id)?;
         let config = EpisodeConfig {
-            image_size: Some(context.image_size),
+            image_size: Some(image_size),
             partner: self.partner.as_deref(),
-            ..EpisodeConfig::new(&episode, name)
+            ..EpisodeConfig::new(&episode, "learner")
         };
         let name = self.partner.as_deref();
         let partner = find_partner(&BuiltInHelpers, name, None, RuleSet::PAPER.planner)?;
         let agents = EpisodeAgents::new(Some(seeded_by_episode(helper, &config)), partner);
         Ok(Env::new(config, agents)?)
     }
+
+    /// Plays the episode with a helper and returns its transport rate; `None` if it was stopped.
+    ///
+    /// # Errors
+    /// [`RolloutError`]
+    pub(crate) fn play(
+        &self,
+        helper: Helper,
+        image_size: u32,
+        stop: &AtomicBool,
+    ) -> Result<Option<f64>, RolloutError> {
+        let mut env = self.env(helper, image_size)?;
+        let outcome = env.run(stop, None, &mut |_| Ok::<(), AgentError>(()))?;
+        Ok((outcome == AdvanceOutcome::Ended).then(|| transport_rate(&env)))
+    }
+}
+
+fn transport_rate(env: &Env) -> f64 {
+    let (done, total) = env.world().progress();
+    if total > 0.0 { done / total } else { 0.0 }
 }
 
 /// Result of an episode.
@@ -144,7 +159,7 @@ fn record_episode<P: Policy>(
     let goal = find_episode(&episode.id)?.setup().goal.clone();
     let policy = make_policy(&goal, Arc::clone(&log));
     let helper = policy_helper(policy, RuleSet::PAPER.planner, context.perception, grants);
-    let mut env = episode.env("learner", helper, context)?;
+    let mut env = episode.env(helper, context.image_size)?;
     let mut tracker = RewardTracker::new(AgentId::HELPER);
     let mut cumulative_rewards = Vec::new();
     loop {
@@ -160,9 +175,7 @@ fn record_episode<P: Policy>(
     let frames = env.world().state().frame;
     cumulative_rewards.push((frames, tracker.cumulative(env.world(), &context.rewards)));
     let records = std::mem::take(&mut *log.lock().unwrap_or_else(PoisonError::into_inner));
-    let (done, total) = env.world().progress();
-    let tr = if total > 0.0 { done / total } else { 0.0 };
-    Ok(Some(EpisodeRecording { records, cumulative_rewards, tr, frames }))
+    Ok(Some(EpisodeRecording { records, cumulative_rewards, tr: transport_rate(&env), frames }))
 }
 
 /// Plays an episode with a network as the helper; `None` if it was stopped.
@@ -204,11 +217,17 @@ pub fn rollout_with_expert(
     expert: &ExpertInfo,
     learner_fraction: f32,
 ) -> Result<Option<(Vec<Demonstration>, f64)>, RolloutError> {
-    let learner = || LearnedPolicy::new(Arc::clone(weights), context.selection, None);
     let recording = record_episode(episode, context, weights.grants(), |goal, log| {
         let mut rng = RngStream::new(0, &episode.id, 0);
-        let actor = sample_actor(learner_fraction, &mut rng, learner);
-        ExpertPolicy::new(expert, goal, actor, weights, log)
+        let actor = if rng.chance(learner_fraction) {
+            let learner = LearnedPolicy::new(Arc::clone(weights), context.selection, None);
+            RolloutActor::Learner(Box::new(learner))
+        } else {
+            let opponent = weights.opponent.clone();
+            let features = FeatureEncoder::new(weights.kind.has_proposals, opponent);
+            RolloutActor::Expert(Box::new(features))
+        };
+        ExpertPolicy::new(expert, goal, actor, log)
     })?;
     let Some(recording) = recording else { return Ok(None) };
     let ends: Vec<Frame> = recording.ends().collect();
@@ -231,28 +250,6 @@ pub fn rollout_with_expert(
         .collect();
     demonstrations.reverse();
     Ok(Some((demonstrations, recording.tr)))
-}
-
-/// Plays an episode with a built-in helper and returns its transport rate; `None` if it was
-/// stopped.
-///
-/// # Errors
-/// [`RolloutError`]
-pub fn rollout_built_in(
-    helper: &HelperInfo,
-    episode: &RolloutEpisode,
-    context: &RolloutContext<'_>,
-) -> Result<Option<f64>, RolloutError> {
-    let planner = RuleSet::PAPER.planner;
-    let agent = (helper.make)(planner, context.perception);
-    let helper = Helper { agent, grants: context.perception.grants((helper.grants)(planner)) };
-    let mut env = episode.env("baseline", helper, context)?;
-    env.run(context.stop, None, &mut |_| Ok::<(), AgentError>(()))?;
-    if context.stop.load(Ordering::Relaxed) {
-        return Ok(None);
-    }
-    let (done, total) = env.world().progress();
-    Ok(Some(if total > 0.0 { done / total } else { 0.0 }))
 }
 
 /// Plays episodes in parallel; results do not depend on the number of threads. Returns `None` if it

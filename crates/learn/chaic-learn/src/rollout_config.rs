@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 
-use chaic_agents::HelperInfo;
 use chaic_agents::partners::{PARTNER_VARIANTS, PartnerVariant};
 use chaic_agents::perception_factory::{GROUND_TRUTH, PerceptionFactory};
 use chaic_core::TaskId;
 use chaic_core::rng::RngStream;
 use chaic_env::RewardWeights;
-use chaic_env::helper_registry::RULES;
+use chaic_env::helper_registry::{RULES, built_in};
+use chaic_env::rules::RuleSet;
 use chaic_episodes::SeedRange;
 use chaic_files::read_user_file;
 use chaic_training::bounds::{Bound, BoundTable, integer, real};
@@ -23,9 +23,7 @@ use crate::opponent::network::{OpponentInput, OpponentModel};
 use crate::policy::ActionSelection;
 use crate::policy_kind::{PolicyKind, PolicyWeights};
 use crate::reward_config;
-use crate::rollout::{
-    EpisodeResult, RolloutContext, RolloutEpisode, rollout_all, rollout_built_in,
-};
+use crate::rollout::{EpisodeResult, RolloutContext, RolloutEpisode, rollout_all};
 
 /// Generators of episodes.
 pub(crate) const GENERATORS: [&str; 2] = ["gen", "gen-standard"];
@@ -247,9 +245,10 @@ impl Validation<'_> {
         let sampled = rates(ActionSelection::HELPER)?;
         let greedy = rates(ActionSelection::Greedy)?;
         if self.baseline.get().is_none() {
-            let helper = HelperInfo::find_helper(BASELINE).expect("it is a built-in helper");
             let rate = |episode: &RolloutEpisode| {
-                let rate = rollout_built_in(helper, episode, &context);
+                let helper = built_in(BASELINE, RuleSet::PAPER.planner, self.perception);
+                let helper = helper.expect("it is a built-in helper");
+                let rate = episode.play(helper, config.image_size, stop);
                 rate.expect("generated episodes can be played")
             };
             let rates: Option<Vec<f64>> = episodes.par_iter().map(rate).collect();

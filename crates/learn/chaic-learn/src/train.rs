@@ -60,6 +60,11 @@ impl TrainState {
         TrainState { kind, model, learner, iterations: 0 }
     }
 
+    /// Identity of the files of a training of this kind.
+    fn identity(&self, kind: &str) -> Identity {
+        Identity::new(kind, &self.model.network)
+    }
+
     fn policy_weights(&self) -> Arc<PolicyWeights> {
         Arc::new(PolicyWeights::new(self.kind, &self.model, self.learner.parameters.clone()))
     }
@@ -116,16 +121,11 @@ pub trait Algorithm: Clone + Default + Serialize + DeserializeOwned {
         Ok(())
     }
 
-    /// Reads the data that iterations before `iterations` have written to `folder`.
+    /// Reads the data that the iterations so far have written to `folder`.
     ///
     /// # Errors
     /// One line, if a file is missing, damaged or belongs to another training.
-    fn read_data(
-        &self,
-        folder: &Path,
-        iterations: u64,
-        identity: &Identity,
-    ) -> Result<Self::Data, String>;
+    fn read_data(&self, folder: &Path, state: &TrainState) -> Result<Self::Data, String>;
 
     /// Runs one iteration; `None` if it was stopped.
     ///
@@ -161,12 +161,6 @@ pub struct PolicyTrainer<A: Algorithm> {
     baseline: OnceLock<Vec<f64>>,
 }
 
-impl<A: Algorithm> PolicyTrainer<A> {
-    fn identity(&self) -> Identity {
-        Identity::new(A::KIND, &self.state.model.network)
-    }
-}
-
 impl<A: Algorithm> Trainer for PolicyTrainer<A> {
     type Config = A;
     const KIND: &'static str = A::KIND;
@@ -188,9 +182,7 @@ impl<A: Algorithm> Trainer for PolicyTrainer<A> {
         let opponent = rollout.read_opponent()?;
         let kind = rollout.policy_kind(opponent.as_ref());
         let state = TrainState::new(seed, shards, kind, opponent.as_ref());
-        let identity = Identity::new(A::KIND, &state.model.network);
-        let data = config.read_data(folder, 0, &identity);
-        let data = data.map_err(TrainingError::InvalidConfig)?;
+        let data = config.read_data(folder, &state).map_err(TrainingError::InvalidConfig)?;
         Ok(Some(PolicyTrainer {
             config: config.clone(),
             folder: folder.to_owned(),
@@ -238,8 +230,7 @@ impl<A: Algorithm> Trainer for PolicyTrainer<A> {
         _: &AtomicBool,
     ) -> Result<Option<()>, CheckpointError> {
         self.state.resume(checkpoint)?;
-        let identity = self.identity();
-        let data = self.config.read_data(&self.folder, self.state.iterations, &identity);
+        let data = self.config.read_data(&self.folder, &self.state);
         self.data = data.map_err(CheckpointError::Data)?;
         Ok(Some(()))
     }
@@ -317,7 +308,7 @@ impl Algorithm for PpoTrainingConfig {
         TrainingSpec { seed: *seed, iterations: *iterations, rollout, shards: self.ppo.shards }
     }
 
-    fn read_data(&self, folder: &Path, _: u64, _: &Identity) -> Result<Option<Vec<f32>>, String> {
+    fn read_data(&self, folder: &Path, state: &TrainState) -> Result<Option<Vec<f32>>, String> {
         if self.ppo.kl_coef == 0.0 {
             return Ok(None);
         }
@@ -326,7 +317,7 @@ impl Algorithm for PpoTrainingConfig {
             return Err("`ppo.kl_coef` above 0 needs initial weights; give --weights".to_owned());
         }
         let bytes = read_bounded(&path, MAX_WEIGHTS_BYTES).map_err(|e| e.to_string())?;
-        let parameters = PolicyTrainer::<PpoTrainingConfig>::read_weights(self, &bytes);
+        let parameters = weights::from_bytes(&state.model.network, &bytes, &state.kind.name());
         parameters.map(Some).map_err(|problem| format!("{}: {problem}", path.display()))
     }
 
@@ -473,15 +464,9 @@ impl Algorithm for CloningConfig {
         Ok(())
     }
 
-    fn read_data(
-        &self,
-        folder: &Path,
-        iterations: u64,
-        identity: &Identity,
-    ) -> Result<Demonstrations, String> {
-        let opponent = self.rollout.read_opponent().ok().flatten();
-        let n_features = self.rollout.policy_kind(opponent.as_ref()).n_features();
-        Demonstrations::read(folder, iterations, self.max_episodes, identity, n_features)
+    fn read_data(&self, folder: &Path, state: &TrainState) -> Result<Demonstrations, String> {
+        let (identity, n_features) = (state.identity(Self::KIND), state.kind.n_features());
+        Demonstrations::read(folder, state.iterations, self.max_episodes, &identity, n_features)
     }
 
     fn iterate(
@@ -524,10 +509,9 @@ impl Algorithm for CloningConfig {
             seed: self.seed,
             iteration: state.iterations,
         };
-        let TrainState { model, learner, .. } = state;
-        let stats = fit(&fit_config, model, learner, &all, stop);
+        let stats = fit(&fit_config, &state.model, &mut state.learner, &all, stop);
         let Some(stats) = stats else { return Ok(None) };
-        let identity = Identity::new(Self::KIND, &model.network);
+        let identity = state.identity(Self::KIND);
         Demonstrations::write(folder, state.iterations, &episodes, &identity)?;
         data.add(episodes, self.max_episodes);
         let CloningMetrics { loss, agreement, value_loss } = stats;

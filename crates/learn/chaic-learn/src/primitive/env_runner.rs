@@ -1,0 +1,204 @@
+//! Environments in which a policy of primitive actions collects experience.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use chaic_agents::perception_factory::PerceptionFactory;
+use chaic_core::AgentId;
+use chaic_core::observation::SensorConfig;
+use chaic_core::rng::RngStream;
+use chaic_env::rules::RuleSet;
+use chaic_env::{AdvanceOutcome, AgentSlot, Env, EpisodeAgents, EpisodeConfig, RewardWeights};
+use chaic_episodes::find_episode;
+use chaic_nn::Pass;
+use rayon::prelude::*;
+
+use super::PAUSE;
+use super::config::PrimitiveConfig;
+use super::helper::ObservationEncoder;
+use super::network::PrimitiveNetwork;
+use super::observation::PrimitiveObservation;
+use crate::actor_critic::{ActorCritic as _, ActorCriticOutput};
+use crate::opponent::network::OpponentModel;
+use crate::ppo::{Trajectory, Transition};
+use crate::rollout::RolloutError;
+
+/// Configuration, perception and network of a training, which all environments share.
+pub(super) struct TrainingSetup {
+    pub config: PrimitiveConfig,
+    pub perception: Arc<dyn PerceptionFactory>,
+    pub opponent: Option<Arc<OpponentModel>>,
+    pub model: PrimitiveNetwork,
+}
+
+/// Environment with the learning helper, which plays one episode after another.
+pub(super) struct EnvRunner {
+    slot: usize,
+    n_started: u64,
+    env: Env,
+    encoder: ObservationEncoder,
+    /// Actions chosen in the current episode.
+    actions: Vec<u8>,
+    /// Current observation.
+    observation: PrimitiveObservation,
+    pass: Pass,
+}
+
+/// Outcome of an action.
+struct StepOutcome {
+    reward: f32,
+    is_invalid: bool,
+    has_ended: bool,
+}
+
+impl EnvRunner {
+    fn new(
+        setup: &TrainingSetup,
+        slot: usize,
+        n_started: u64,
+        pass: Pass,
+    ) -> Result<EnvRunner, RolloutError> {
+        let TrainingSetup { config, perception, opponent, .. } = setup;
+        let episode = find_episode(&config.episode(slot, n_started))?;
+        let (mut encoder, grants) =
+            ObservationEncoder::new(RuleSet::PAPER.planner, &**perception, opponent.clone());
+        let sensors = SensorConfig { image_size: config.image_size, ..encoder.sensors() };
+        let agents =
+            EpisodeAgents { helper: Some(AgentSlot::external(grants, sensors)), partner: None };
+        let config = EpisodeConfig {
+            image_size: Some(config.image_size),
+            ..EpisodeConfig::new(&episode, "learner")
+        };
+        let mut env = Env::new(config, agents)?;
+        encoder.reset(&env.briefing(AgentId::HELPER));
+        env.advance(None)?;
+        let observation = env.observe(AgentId::HELPER).and_then(|o| encoder.encode(o));
+        let observation = observation.expect("the helper decides before an episode ends");
+        Ok(EnvRunner { slot, n_started, env, encoder, actions: Vec::new(), observation, pass })
+    }
+
+    /// Takes an action and advances to the next decision or the end. After the end the observation
+    /// is outdated.
+    fn act(
+        &mut self,
+        action_index: usize,
+        rewards: &RewardWeights,
+    ) -> Result<StepOutcome, RolloutError> {
+        self.actions.push(action_index as u8);
+        let action = self.encoder.action(action_index);
+        self.env.submit(AgentId::HELPER, action.unwrap_or(PAUSE));
+        let has_ended = self.env.advance(None)? == AdvanceOutcome::Ended;
+        let terms = self.env.reward(AgentId::HELPER);
+        let is_invalid = action.is_none() || terms.is_some_and(|t| t.is_invalid);
+        let terms = terms.map(|t| chaic_env::RewardTerms { is_invalid, ..t });
+        if !has_ended && let Some(observation) = self.env.observe(AgentId::HELPER) {
+            self.observation =
+                self.encoder.encode(observation).unwrap_or_else(|| self.observation.clone());
+        }
+        let reward = terms.map_or(0.0, |t| t.weigh(rewards)) as f32;
+        Ok(StepOutcome { reward, is_invalid, has_ended })
+    }
+
+    /// Progress of the current episode.
+    pub(super) fn progress(&self) -> EpisodeProgress {
+        EpisodeProgress { n_started: self.n_started, actions: self.actions.clone() }
+    }
+
+    /// Collects experience in one environment; `None` if it was stopped.
+    pub(super) fn collect(
+        &mut self,
+        setup: &TrainingSetup,
+        parameters: &[f32],
+        update: u64,
+        stop: &AtomicBool,
+    ) -> Result<Option<Experience>, RolloutError> {
+        let TrainingSetup { config, model, .. } = setup;
+        let index = update * config.n_envs as u64 + self.slot as u64;
+        let mut rng = RngStream::new(config.seed, "actions", index);
+        let mut experience = Experience::default();
+        let mut trajectory = Trajectory::default();
+        for _ in 0..config.n_steps {
+            if stop.load(Ordering::Relaxed) {
+                return Ok(None);
+            }
+            let output = self.evaluate(model, parameters);
+            let action_index = output.sample(rng.unit());
+            let observation = self.observation.clone();
+            let outcome = self.act(action_index, &config.rewards)?;
+            experience.reward += f64::from(outcome.reward);
+            experience.n_invalid += usize::from(outcome.is_invalid);
+            trajectory.transitions.push(Transition {
+                observation,
+                action: action_index,
+                log_prob: output.log_probs[action_index],
+                value: output.value(),
+                reward: outcome.reward,
+                duration: 1.0,
+            });
+            if outcome.has_ended {
+                experience.trajectories.push(std::mem::take(&mut trajectory));
+                let (slot, n_started) = (self.slot, self.n_started + 1);
+                let pass = self.pass.clone();
+                *self = EnvRunner::new(setup, slot, n_started, pass)?;
+            }
+        }
+        if !trajectory.transitions.is_empty() {
+            trajectory.bootstrap_value = self.evaluate(model, parameters).value();
+            experience.trajectories.push(trajectory);
+        }
+        Ok(Some(experience))
+    }
+
+    fn evaluate(&mut self, model: &PrimitiveNetwork, parameters: &[f32]) -> ActorCriticOutput {
+        model.forward(parameters, std::iter::once(&self.observation), &mut self.pass).remove(0)
+    }
+}
+
+/// Experience of one environment between two updates.
+#[derive(Default)]
+pub(super) struct Experience {
+    pub trajectories: Vec<Trajectory<PrimitiveObservation>>,
+    pub reward: f64,
+    pub n_invalid: usize,
+}
+
+/// Progress of an environment: number of episodes started before, and actions of the current one.
+#[derive(Clone, Debug, Default)]
+pub(super) struct EpisodeProgress {
+    pub n_started: u64,
+    pub actions: Vec<u8>,
+}
+
+/// Replays the current episodes up to this progress; `None` if it was stopped.
+///
+/// # Errors
+/// Predicate that describes what is wrong with the progress.
+pub(super) fn replay(
+    setup: &TrainingSetup,
+    progress: &[EpisodeProgress],
+    stop: &AtomicBool,
+) -> Result<Option<Vec<EnvRunner>>, String> {
+    let TrainingSetup { config, model, .. } = setup;
+    let replay_one = |(slot, progress): (usize, &EpisodeProgress)| {
+        let failed = |e: RolloutError| format!("has an episode that cannot be played: {e}");
+        if stop.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
+        let runner = EnvRunner::new(setup, slot, progress.n_started, model.pass());
+        let mut runner = runner.map_err(failed)?;
+        for action_index in &progress.actions {
+            if stop.load(Ordering::Relaxed) {
+                return Ok(None);
+            }
+            let outcome =
+                runner.act(usize::from(*action_index), &config.rewards).map_err(failed)?;
+            if outcome.has_ended {
+                return Err("continues after the end of an episode".to_owned());
+            }
+        }
+        Ok(Some(runner))
+    };
+    let runners: Result<Vec<Option<EnvRunner>>, String> =
+        progress.par_iter().enumerate().map(replay_one).collect();
+    Ok(runners?.into_iter().collect())
+}

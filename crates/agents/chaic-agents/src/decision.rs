@@ -261,6 +261,11 @@ pub trait Policy: Send + 'static {
         None
     }
 
+    /// Returns the digest of the trained weights that choose the plans, if there are any.
+    fn weights(&self) -> Option<String> {
+        None
+    }
+
     /// Counters of this episode, by name.
     fn counters(&self) -> BTreeMap<String, u64> {
         BTreeMap::new()

@@ -406,6 +406,10 @@ impl<P: Policy> Agent for PlanningAgent<P> {
         self.perception_name.clone()
     }
 
+    fn weights(&self) -> Option<String> {
+        self.policy.weights()
+    }
+
     fn thought(&self) -> Thought {
         Thought {
             plan: self.plan().map_or_else(|| "think".to_owned(), |plan| plan.to_string()),

@@ -95,6 +95,7 @@ impl<'a> EpisodeConfig<'a> {
                     sensors: slot.sensors,
                     perception: slot.agent().and_then(|agent| agent.perception()),
                     isolation: slot.agent().and_then(|agent| agent.isolation()),
+                    weights: slot.agent().and_then(|agent| agent.weights()),
                 })
                 .collect(),
             renderer: "cpu".to_owned(),

@@ -45,6 +45,10 @@ impl Agent for Reseeded {
         self.agent.perception()
     }
 
+    fn weights(&self) -> Option<String> {
+        self.agent.weights()
+    }
+
     fn thought(&self) -> Thought {
         self.agent.thought()
     }

@@ -125,6 +125,9 @@ pub struct Participant {
     /// Confinement of its process, such as `sandbox`; absent for an agent in this process.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub isolation: Option<String>,
+    /// Digest of its weights; absent for an agent without trained weights.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weights: Option<String>,
 }
 
 /// A trace in memory.

@@ -1,6 +1,7 @@
 //! Runs with helpers that are Python objects.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use chaic_agents::PlannerRules;
@@ -13,6 +14,7 @@ use chaic_eval::EvalError;
 use chaic_eval::metrics::FormulaSet;
 use chaic_eval::report::{Format, Report, write_files};
 use chaic_eval::run::{FolderMode, JobEvent, Run, RunRequest, Shard};
+use chaic_learn::helpers::PolicyRegistry;
 use chaic_sandbox::Isolation;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -27,8 +29,8 @@ use crate::options::{grants, perception, sensors};
 use crate::threads::refuse_fork;
 
 /// Registry of Python helpers and built-in ones.
-struct PyHelperRegistry {
-    built_in: BuiltInWithPerception,
+struct PyHelperRegistry<'a> {
+    built_in: PolicyRegistry<'a>,
     /// Name of each Python helper, and a callable that creates one for each episode.
     makers: Vec<(String, Py<PyAny>)>,
     grants: Grants,
@@ -39,7 +41,7 @@ struct PyHelperRegistry {
     stop: &'static AtomicBool,
 }
 
-impl PyHelperRegistry {
+impl PyHelperRegistry<'_> {
     fn maker(&self, name: &str) -> Option<&Py<PyAny>> {
         self.makers.iter().find(|(known, _)| known == name).map(|(_, maker)| maker)
     }
@@ -70,7 +72,7 @@ impl Agent for FailedAgent {
     }
 }
 
-impl HelperRegistry for PyHelperRegistry {
+impl HelperRegistry for PyHelperRegistry<'_> {
     fn names(&self) -> Vec<String> {
         let own = self.makers.iter().map(|(name, _)| name.clone());
         self.built_in.names().into_iter().chain(own).collect()
@@ -200,7 +202,8 @@ pub fn evaluate(
         |name: &Option<String>| name.clone().unwrap_or_else(|| GROUND_TRUTH.to_owned());
     let perception =
         perception(&or_ground_truth(&keywords.perception), &or_ground_truth(&keywords.behavior))?;
-    let built_in = BuiltInWithPerception { perception };
+    let with_perception = BuiltInWithPerception { perception: Arc::clone(&perception) };
+    let built_in = PolicyRegistry::bundled(&with_perception, perception);
     let makers: Vec<_> =
         helpers.into_iter().filter_map(|(name, maker)| Some((name, maker?))).collect();
     let is_taken = |name: &String| name == NONE || built_in.names().contains(name);

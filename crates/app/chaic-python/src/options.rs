@@ -4,9 +4,11 @@ use std::sync::Arc;
 
 use chaic_agents::perception_factory::{GROUND_TRUTH, PerceptionFactory};
 use chaic_core::observation::{Grants, SensorConfig};
+use chaic_env::helper_registry::BuiltInWithPerception;
 use chaic_env::rules::{RuleSet, RuleSetName};
 use chaic_env::{AgentSlot, Appearance, EpisodeAgents, EpisodeConfig, helper_registry};
 use chaic_eval::run::{MAX_IMAGE_SIZE, MIN_IMAGE_SIZE};
+use chaic_learn::helpers::PolicyRegistry;
 use chaic_vision::perception_registry::{PerceptionError, perception_from_name};
 use pyo3::exceptions::{PyDeprecationWarning, PyTypeError};
 use pyo3::prelude::*;
@@ -128,7 +130,8 @@ impl Options {
             CALLER => Some(caller()),
             name => {
                 let perception = Arc::clone(&self.perception);
-                let helpers = helper_registry::BuiltInWithPerception { perception };
+                let built_in = BuiltInWithPerception { perception: Arc::clone(&perception) };
+                let helpers = PolicyRegistry::bundled(&built_in, perception);
                 let found = helper_registry::find(&helpers, name, self.rules.planner);
                 found.map_err(|error| from_env(&error))?.map(AgentSlot::from)
             }

@@ -1,6 +1,6 @@
 //! Built-in helpers and their parts in Python.
 
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use chaic_agents::decision::Plan;
 use chaic_agents::memory::Memory;
@@ -10,8 +10,9 @@ use chaic_agents::{PlannerRules, PlanningAgent as CorePlanningAgent};
 use chaic_core::geom::rotate_yaw;
 use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::{Agent, AgentError};
-use chaic_env::helper_registry::{self, Helper};
+use chaic_env::helper_registry::{self, BuiltInWithPerception, Helper};
 use chaic_env::rules::RuleSet;
+use chaic_learn::helpers::PolicyRegistry;
 use chaic_subprocess::message::SensorRequest;
 use chaic_vision::trained::TrainedDetector;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods as _};
@@ -47,9 +48,9 @@ impl PlanningAgent {
     #[new]
     #[pyo3(signature = (name, perception="gt", behavior="gt"))]
     fn new(name: &str, perception: &str, behavior: &str) -> PyResult<PlanningAgent> {
-        let helpers = helper_registry::BuiltInWithPerception {
-            perception: self::perception(perception, behavior)?,
-        };
+        let perception = self::perception(perception, behavior)?;
+        let built_in = BuiltInWithPerception { perception: Arc::clone(&perception) };
+        let helpers = PolicyRegistry::bundled(&built_in, perception);
         let found =
             helper_registry::find(&helpers, name, planner_rules()).map_err(|e| from_env(&e))?;
         let Some(Helper { agent, grants }) = found else {

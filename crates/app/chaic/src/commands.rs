@@ -36,6 +36,8 @@ use anyhow::Result;
 use chaic_episodes::{Episode, find_episode};
 use chaic_eval::{EvalError, read_episode_file};
 use chaic_files::write_atomically;
+use chaic_learn::bundled::BundledHelper;
+use chaic_llm::language::helper_names;
 use comfy_table::{ContentArrangement, Table, presets};
 use serde::Serialize;
 
@@ -52,6 +54,12 @@ fn episode(argument: &str) -> Result<Episode> {
         return Ok(Episode::parse(&read_episode_file(path)?, argument)?);
     }
     Ok(find_episode(argument)?)
+}
+
+/// Returns all names that `--helper` accepts, without `none`.
+fn all_helper_names() -> Vec<String> {
+    let bundled = BundledHelper::all().iter().map(|helper| helper.name.to_owned());
+    helper_names().into_iter().chain(bundled).collect()
 }
 
 /// Returns the number of threads: as given, or one per core.

@@ -134,6 +134,12 @@ pub trait Agent: Send {
         None
     }
 
+    /// Returns the digest of the trained weights that choose the actions, if there are any; for the
+    /// trace.
+    fn weights(&self) -> Option<String> {
+        None
+    }
+
     /// Returns a description of the internal state, for the trace.
     fn thought(&self) -> Thought {
         Thought::default()

@@ -426,7 +426,13 @@ impl TraceVerifier<'_> {
                 // The weights may have changed since.
                 expected.perception.clone_from(&actual.perception);
             }
-            if is_unknown.get(expected.agent.index()).is_some_and(|unknown| *unknown) {
+            let is_unknown_agent = is_unknown.get(expected.agent.index()).is_some_and(|u| *u);
+            if expected.agent == AgentId::HELPER && (is_unknown_agent || expected.weights.is_some())
+            {
+                let granted = self.granted.as_ref();
+                expected.weights = granted.and_then(|g| g.weights.get(&header.helper)).cloned();
+            }
+            if is_unknown_agent {
                 expected.grants = recorded.unwrap_or(actual.grants);
                 expected.sensors = actual.sensors;
                 expected.perception.clone_from(&actual.perception);

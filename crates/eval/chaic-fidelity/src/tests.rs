@@ -158,6 +158,7 @@ fn states(plan: &Experiment) -> Vec<PartState> {
             partner: Grants::PARTNER,
             perception: Default::default(),
             isolation: Default::default(),
+            weights: Default::default(),
         });
         PartState { part, planned, results, environments: Environments::default(), granted }
     };

@@ -1,68 +1,30 @@
 //! Trained policies as named helpers of a run.
 
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use chaic_agents::PlannerRules;
 use chaic_agents::perception_factory::PerceptionFactory;
+use chaic_core::TaskId;
 use chaic_env::helper_registry::{Helper, HelperRegistry, check_new_name};
 use chaic_env::{EnvError, RunKey};
-use chaic_files::{read_bounded, read_user_file, write_atomically};
-use chaic_nn::weights::{self, WeightsError};
-use serde::{Deserialize, Serialize};
+use chaic_files::{EntryKind, FileError, kind, read_user_file};
+use chaic_nn::weights::WeightsError;
 
-use crate::policy::{ActionSelection, LearnedPolicy, policy_helper};
-use crate::policy_kind::PolicyWeights;
-use crate::primitive::helper::{PrimitiveHelper, PrimitiveWeights};
-use crate::primitive::network::PrimitiveNetwork;
+use crate::bundled::BundledHelper;
+use crate::loaded_policy::LoadedPolicy;
+use crate::primitive::helper::{PrimitivePolicies, PrimitiveWeights};
 
-/// File in a run's folder that lists its policies.
-pub const FILE: &str = "policies.json";
-/// Maximum size of that file and of a weights file, bytes.
+/// Maximum size of a weights file, bytes.
 const MAX_BYTES: u64 = 1 << 28;
+/// Extension of weights files.
+const EXTENSION: &str = "safetensors";
 
 /// Policy with a helper name.
 pub struct NamedPolicy {
     name: String,
-    digest: String,
-    weights: LoadedWeights,
-}
-
-/// Content of a weights file.
-enum LoadedWeights {
-    /// Policy that chooses plans.
-    Plans(Arc<PolicyWeights>),
-    /// Policy that chooses primitive actions.
-    Actions(Arc<PrimitiveWeights>),
-}
-
-impl LoadedWeights {
-    fn from_bytes(bytes: &[u8]) -> Result<LoadedWeights, WeightsError> {
-        if PrimitiveNetwork::from_kind(&weights::kind(bytes)?).is_some() {
-            return Ok(LoadedWeights::Actions(Arc::new(PrimitiveWeights::from_bytes(bytes)?)));
-        }
-        Ok(LoadedWeights::Plans(Arc::new(PolicyWeights::from_bytes(bytes)?)))
-    }
-
-    fn helper(&self, rules: PlannerRules, perception: &dyn PerceptionFactory) -> Helper {
-        match self {
-            LoadedWeights::Plans(weights) => {
-                let policy = LearnedPolicy::new(Arc::clone(weights), ActionSelection::HELPER, None);
-                policy_helper(policy, rules, perception, weights.grants())
-            }
-            LoadedWeights::Actions(weights) => {
-                PrimitiveHelper::create(Arc::clone(weights), rules, perception)
-            }
-        }
-    }
-}
-
-/// Entry of a run's list of policies.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct PolicyRecord {
-    name: String,
-    weights: String,
+    policy: LoadedPolicy,
 }
 
 /// Reason why a policy cannot be a helper.
@@ -70,13 +32,18 @@ struct PolicyRecord {
 enum PolicyError {
     #[error("{0}")]
     Name(String),
+    #[error(transparent)]
+    File(#[from] FileError),
     #[error("{}: {problem}", path.display())]
     Weights { path: PathBuf, problem: WeightsError },
     #[error(
-        "{} was started with other weights for `{name}`; give the same file or choose another --out",
-        run.display()
+        "{} has no weights file of a task, such as {}.{EXTENSION}",
+        path.display(),
+        TaskId::NoConstraint
     )]
-    OtherWeights { run: PathBuf, name: String },
+    EmptyFolder { path: PathBuf },
+    #[error("{}: other inputs than the policies of other tasks in this folder", path.display())]
+    OtherInputs { path: PathBuf },
 }
 
 impl From<PolicyError> for EnvError {
@@ -86,19 +53,46 @@ impl From<PolicyError> for EnvError {
 }
 
 impl NamedPolicy {
-    /// Reads a policy from a weights file.
+    /// Reads a policy from a weights file, or policies of primitive actions from a folder with one
+    /// file per task, `TASK.safetensors`.
     ///
     /// # Errors
-    /// If the file cannot be read or holds no policy.
+    /// If a file cannot be read or holds no policy; if the folder has no such file.
     pub fn read(name: &str, path: &Path) -> chaic_env::Result<NamedPolicy> {
-        let bytes = read_user_file(path, MAX_BYTES).map_err(|e| EnvError::Registry(e.into()))?;
-        let weights_error = |problem| PolicyError::Weights { path: path.to_owned(), problem };
-        let weights = LoadedWeights::from_bytes(&bytes).map_err(weights_error)?;
-        Ok(NamedPolicy { name: name.to_owned(), digest: weights::digest(&bytes), weights })
+        let is_folder = fs::metadata(path).is_ok_and(|metadata| metadata.is_dir());
+        let policy = if is_folder {
+            LoadedPolicy::Actions(Arc::new(read_folder(path)?))
+        } else {
+            let bytes = read_user_file(path, MAX_BYTES).map_err(PolicyError::from)?;
+            let weights_error = |problem| PolicyError::Weights { path: path.to_owned(), problem };
+            LoadedPolicy::from_bytes(&bytes).map_err(weights_error)?
+        };
+        Ok(NamedPolicy { name: name.to_owned(), policy })
     }
 }
 
-/// Registry of policies, with another registry as fallback.
+/// Reads one policy of primitive actions per task.
+fn read_folder(folder: &Path) -> Result<PrimitivePolicies, PolicyError> {
+    let mut policies = PrimitivePolicies::by_task();
+    for task in TaskId::all() {
+        let path = folder.join(format!("{task}.{EXTENSION}"));
+        if kind(&path)? == EntryKind::Missing {
+            continue;
+        }
+        let bytes = read_user_file(&path, MAX_BYTES)?;
+        let weights_error = |problem| PolicyError::Weights { path: path.clone(), problem };
+        let weights = PrimitiveWeights::from_bytes(&bytes).map_err(weights_error)?;
+        if !policies.add(task, weights) {
+            return Err(PolicyError::OtherInputs { path });
+        }
+    }
+    if policies.is_empty() {
+        return Err(PolicyError::EmptyFolder { path: folder.to_owned() });
+    }
+    Ok(policies)
+}
+
+/// Registry of bundled and given policies, with another registry as fallback.
 pub struct PolicyRegistry<'a> {
     policies: Vec<NamedPolicy>,
     fallback: &'a dyn HelperRegistry,
@@ -106,68 +100,55 @@ pub struct PolicyRegistry<'a> {
 }
 
 impl<'a> PolicyRegistry<'a> {
-    /// Adds policies with this perception to the helpers of another registry.
+    /// Adds the bundled helpers with this perception to the helpers of another registry.
+    pub fn bundled(
+        fallback: &'a dyn HelperRegistry,
+        perception: Arc<dyn PerceptionFactory>,
+    ) -> PolicyRegistry<'a> {
+        PolicyRegistry { policies: Vec::new(), fallback, perception }
+    }
+
+    /// Adds policies as helpers.
     ///
     /// # Errors
     /// If a name is invalid or taken.
-    pub fn with_fallback(
-        fallback: &'a dyn HelperRegistry,
+    pub fn with_policies(
+        self,
         policies: Vec<NamedPolicy>,
-        perception: Arc<dyn PerceptionFactory>,
     ) -> chaic_env::Result<PolicyRegistry<'a>> {
-        let mut taken = fallback.names();
+        let mut taken = self.names();
         for NamedPolicy { name, .. } in &policies {
             check_new_name(name, &taken, "mine=policy:FILE").map_err(PolicyError::Name)?;
             taken.push(name.clone());
         }
-        Ok(PolicyRegistry { policies, fallback, perception })
+        Ok(PolicyRegistry { policies, ..self })
     }
 
-    fn records(&self) -> Vec<PolicyRecord> {
-        let record =
-            |p: &NamedPolicy| PolicyRecord { name: p.name.clone(), weights: p.digest.clone() };
-        self.policies.iter().map(record).collect()
+    fn policy(&self, name: &str) -> Option<&LoadedPolicy> {
+        let given = self.policies.iter().find(|p| p.name == name).map(|p| &p.policy);
+        given.or_else(|| BundledHelper::find(name).map(BundledHelper::policy))
     }
 }
 
 impl HelperRegistry for PolicyRegistry<'_> {
     fn names(&self) -> Vec<String> {
+        let bundled = BundledHelper::all().iter().map(|helper| helper.name.to_owned());
         let policies = self.policies.iter().map(|p| p.name.clone());
-        self.fallback.names().into_iter().chain(policies).collect()
+        self.fallback.names().into_iter().chain(bundled).chain(policies).collect()
     }
 
     fn make(&self, name: &str, rules: PlannerRules) -> Option<Helper> {
-        let Some(policy) = self.policies.iter().find(|p| p.name == name) else {
-            return self.fallback.make(name, rules);
-        };
-        Some(policy.weights.helper(rules, &*self.perception))
+        match self.policy(name) {
+            Some(policy) => Some(policy.helper(rules, &*self.perception)),
+            None => self.fallback.make(name, rules),
+        }
     }
 
     fn make_for(&self, key: &RunKey, rules: PlannerRules) -> Option<Helper> {
-        let is_policy = self.policies.iter().any(|p| p.name == key.helper);
-        if is_policy { self.make(&key.helper, rules) } else { self.fallback.make_for(key, rules) }
-    }
-
-    fn attach_run(&self, run: &Path) -> chaic_env::Result<()> {
-        self.fallback.attach_run(run)?;
-        let (path, records) = (run.join(FILE), self.records());
-        let registry_error = |problem: chaic_files::FileError| EnvError::Registry(problem.into());
-        if path.exists() {
-            let bytes = read_bounded(&path, MAX_BYTES).map_err(registry_error)?;
-            let earlier: Vec<PolicyRecord> = serde_json::from_slice(&bytes)
-                .map_err(|e| EnvError::Registry(format!("{}: {e}", path.display()).into()))?;
-            if let Some(changed) = earlier.into_iter().find(|r| !records.contains(r)) {
-                return Err(
-                    PolicyError::OtherWeights { run: run.to_owned(), name: changed.name }.into()
-                );
-            }
+        match self.policy(&key.helper) {
+            Some(policy) => Some(policy.helper(rules, &*self.perception)),
+            None => self.fallback.make_for(key, rules),
         }
-        if records.is_empty() {
-            return Ok(());
-        }
-        let text =
-            serde_json::to_vec_pretty(&records).expect("names and digests serialize to JSON");
-        write_atomically(&path, &text).map_err(registry_error)
     }
 
     fn fallback(&self) -> Option<&dyn HelperRegistry> {

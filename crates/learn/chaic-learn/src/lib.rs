@@ -6,7 +6,8 @@
 //! network drive an agent, [`policy_kind`] lists networks by their inputs, and [`rollout`] plays
 //! episodes. [`cloning`] learns from an expert whose choices [`demonstrations`] keeps, and [`train`]
 //! has the trainers. [`primitive`] has policies of primitive actions from images.
-//! [`helpers`] makes either a helper of a run. [`toy`] has tasks with a known best return, which
+//! [`helpers`] makes either a helper of a run, and [`bundled`] lists those that are part of chaic.
+//! [`toy`] has tasks with a known best return, which
 //! test the learner.
 //!
 //! **What it is not**: it knows no rules of tasks. Perception, memory and execution of plans are
@@ -38,6 +39,8 @@ pub mod train;
 
 pub mod primitive;
 
+pub mod bundled;
 pub mod helpers;
+mod loaded_policy;
 
 pub mod toy;

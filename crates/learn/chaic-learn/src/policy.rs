@@ -167,6 +167,10 @@ impl Policy for LearnedPolicy {
         self.features.observe(observation, memory, behavior);
     }
 
+    fn weights(&self) -> Option<String> {
+        self.weights.digest.clone()
+    }
+
     fn counters(&self) -> BTreeMap<String, u64> {
         let n = self.features.history.n_chosen_by_kind.iter().map(|n| u64::from(*n)).sum();
         BTreeMap::from([("choices".to_owned(), n)])

@@ -78,6 +78,8 @@ pub struct PolicyWeights {
     pub parameters: Vec<f32>,
     /// Opponent model whose predictions are inputs, if the network needs one.
     pub opponent: Option<Arc<OpponentModel>>,
+    /// Digest of the weights file, if they are from one.
+    pub digest: Option<String>,
 }
 
 impl PolicyWeights {
@@ -87,7 +89,7 @@ impl PolicyWeights {
             let is_granted = kind.opponent == OpponentInput::Granted;
             Arc::new(OpponentModel::new(parameters[range].to_vec(), is_granted))
         });
-        PolicyWeights { kind, model: model.clone(), parameters, opponent }
+        PolicyWeights { kind, model: model.clone(), parameters, opponent, digest: None }
     }
 
     /// Parses a weights file of any kind.
@@ -100,7 +102,8 @@ impl PolicyWeights {
         let kind = kind.unwrap_or(PolicyKind::PLAIN);
         let model = kind.network();
         let parameters = weights::from_bytes(&model.network, bytes, &kind.name())?;
-        Ok(PolicyWeights::new(kind, &model, parameters))
+        let digest = Some(weights::digest(bytes));
+        Ok(PolicyWeights { digest, ..PolicyWeights::new(kind, &model, parameters) })
     }
 
     /// Returns the grants of a helper with this policy: those of the paper's helpers, and the

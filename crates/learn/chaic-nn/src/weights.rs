@@ -61,12 +61,34 @@ pub fn to_bytes(
     Ok(encode(network, parameters, kind))
 }
 
+/// Converts a weights file to half the size: each value is rounded to the nearest bfloat16.
+/// [`from_bytes`] reads both.
+///
+/// # Errors
+/// [`WeightsError`] as [`from_bytes`].
+pub fn to_bf16(network: &Network, bytes: &[u8], kind: &str) -> Result<Vec<u8>, WeightsError> {
+    let parameters = from_bytes(network, bytes, kind)?;
+    let bf16 = |x: f32| {
+        // Half of the last kept place is added; ties round to even.
+        let bits = x.to_bits();
+        ((bits + 0x7fff + (bits >> 16 & 1)) >> 16) as u16
+    };
+    let bytes = parameters.iter().flat_map(|x| bf16(*x).to_le_bytes()).collect();
+    Ok(encode_as(network, bytes, Dtype::BF16, kind))
+}
+
 /// Encodes parameters without checking that they are finite.
 fn encode(network: &Network, parameters: &[f32], kind: &str) -> Vec<u8> {
-    let bytes: Vec<u8> = parameters.iter().flat_map(|x| x.to_le_bytes()).collect();
+    let bytes = parameters.iter().flat_map(|x| x.to_le_bytes()).collect();
+    encode_as(network, bytes, Dtype::F32, kind)
+}
+
+/// Encodes the bytes of all parameters in order.
+fn encode_as(network: &Network, bytes: Vec<u8>, dtype: Dtype, kind: &str) -> Vec<u8> {
+    let size = if dtype == Dtype::BF16 { 2 } else { 4 };
     let view = |p: &crate::Parameter| {
-        let data = &bytes[4 * p.range.start..4 * p.range.end];
-        let view = TensorView::new(Dtype::F32, p.shape.clone(), data);
+        let data = &bytes[size * p.range.start..size * p.range.end];
+        let view = TensorView::new(dtype, p.shape.clone(), data);
         (p.name.clone(), view.expect("the length matches the shape"))
     };
     // A single entry, since a hash map with several has no fixed order.
@@ -116,14 +138,20 @@ pub fn from_bytes(network: &Network, bytes: &[u8], kind: &str) -> Result<Vec<f32
     for parameter in network.parameters() {
         let name = || parameter.name.clone();
         let tensor = file.tensor(&parameter.name).map_err(|_| WeightsError::Missing(name()))?;
-        if tensor.dtype() != Dtype::F32 || tensor.shape() != parameter.shape {
+        let is_bf16 = tensor.dtype() == Dtype::BF16;
+        if !(is_bf16 || tensor.dtype() == Dtype::F32) || tensor.shape() != parameter.shape {
             return Err(WeightsError::Shape {
                 name: name(),
                 found: format!("{:?} {:?}", tensor.dtype(), tensor.shape()),
                 expected: format!("{:?} {:?}", Dtype::F32, parameter.shape),
             });
         }
-        let values = tensor.data().as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b));
+        let values: Vec<f32> = if is_bf16 {
+            let values = tensor.data().as_chunks::<2>().0.iter();
+            values.map(|[a, b]| f32::from_le_bytes([0, 0, *a, *b])).collect()
+        } else {
+            tensor.data().as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect()
+        };
         for (to, value) in parameters[parameter.range.clone()].iter_mut().zip(values) {
             if !value.is_finite() {
                 return Err(WeightsError::NotFinite(name()));
@@ -155,6 +183,20 @@ mod tests {
         let bytes = to_bytes(&net, &parameters, "test 1").unwrap();
         assert_eq!(from_bytes(&net, &bytes, "test 1"), Ok(parameters.clone()));
         assert_eq!(Ok(bytes), to_bytes(&net, &parameters, "test 1"), "encoding is deterministic");
+    }
+
+    #[test]
+    fn bf16_files_have_half_the_size_and_the_nearest_values() {
+        let net = network(16);
+        let parameters = net.init_parameters(1);
+        let bytes = to_bytes(&net, &parameters, "test 1").unwrap();
+        let rounded = to_bf16(&net, &bytes, "test 1").unwrap();
+        assert!(rounded.len() < bytes.len() / 2 + 600, "{} of {}", rounded.len(), bytes.len());
+        let read = from_bytes(&net, &rounded, "test 1").unwrap();
+        for (x, rounded) in parameters.iter().zip(&read) {
+            assert!((x - rounded).abs() <= x.abs() / 256.0, "{x} {rounded}");
+        }
+        assert_eq!(to_bf16(&net, &rounded, "test 1"), Ok(rounded), "rounded values stay");
     }
 
     #[test]

@@ -21,6 +21,55 @@ pub fn read_config<T: Trainer>(path: &Path) -> Result<T::Config, TrainingError> 
     parse_bytes::<T>(path, &read_user_file(path, MAX_BYTES)?)
 }
 
+/// Reads a configuration file, if given, and changes the keys that a user assigned on the command
+/// line: `KEY=VALUE` with a TOML key such as `rollout.image_size` and a TOML value, or text without
+/// quotes. Missing keys get their defaults.
+///
+/// # Errors
+/// As [`read_config`], and if an assignment is not of this form.
+pub fn read_config_with<T: Trainer>(
+    path: Option<&Path>,
+    assignments: &[String],
+) -> Result<T::Config, TrainingError> {
+    let config = path.map(read_config::<T>).transpose()?.unwrap_or_default();
+    if assignments.is_empty() {
+        return Ok(config);
+    }
+    let mut table = Table::try_from(config).expect("a configuration serializes to TOML");
+    for assignment in assignments {
+        let invalid =
+            |problem| TrainingError::InvalidConfig(format!("--set {assignment}: {problem}"));
+        merge(&mut table, parse_assignment(assignment).map_err(invalid)?);
+    }
+    let config = parse_config::<T>(&table.to_string());
+    config.map_err(|problem| TrainingError::InvalidConfig(without_line(&problem).to_owned()))
+}
+
+/// Parses `KEY=VALUE` as a table with one value.
+fn parse_assignment(text: &str) -> Result<Table, String> {
+    let (key, value) = text.split_once('=').ok_or("expected KEY=VALUE")?;
+    let as_written = toml::from_str(&format!("{key} = {value}"));
+    as_written.or_else(|_| parse(&format!("{key} = {}", toml::Value::from(value))))
+}
+
+/// Copies the values of one table to another, recursively.
+fn merge(to: &mut Table, from: Table) {
+    for (key, value) in from {
+        match (to.get_mut(&key), value) {
+            (Some(toml::Value::Table(to)), toml::Value::Table(from)) => merge(to, from),
+            (_, value) => {
+                to.insert(key, value);
+            }
+        }
+    }
+}
+
+/// Removes the line number of a message about a text that the user has not written.
+fn without_line(message: &str) -> &str {
+    let after = message.strip_prefix("line ").and_then(|rest| rest.split_once(": "));
+    after.map_or(message, |(_, rest)| rest)
+}
+
 /// Reads the configuration in a training folder.
 ///
 /// # Errors
@@ -78,4 +127,23 @@ fn parse<R: DeserializeOwned>(text: &str) -> Result<R, String> {
             None => message,
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn assignments_are_toml_or_text_and_merge_into_tables() {
+        let mut table: Table = toml::from_str("a = 1\n[b]\nc = 2\nd = 3\n").unwrap();
+        for assignment in ["b.c=4", "b.e = [\"x\", \"y\"]", "f=../some file", "b.d=true"] {
+            merge(&mut table, parse_assignment(assignment).unwrap());
+        }
+        let expected = "a = 1\nf = \"../some file\"\n[b]\nc = 4\nd = true\ne = [\"x\", \"y\"]\n";
+        assert_eq!(table, toml::from_str(expected).unwrap());
+        for wrong in ["a", "", "=3", "a b=3"] {
+            let problem = parse_assignment(wrong).unwrap_err();
+            assert!(!problem.is_empty() && !problem.contains('\n'), "{wrong}: {problem}");
+        }
+    }
 }

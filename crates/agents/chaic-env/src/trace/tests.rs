@@ -27,6 +27,7 @@ fn header() -> Header {
         people: vec![Participant {
             perception: None,
             isolation: None,
+            weights: None,
             agent: AgentId::PARTNER,
             persona: Persona::Wheelchair,
             impairments: Impairments::new(Impairment::Tremor),

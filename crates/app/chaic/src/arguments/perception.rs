@@ -34,6 +34,9 @@ pub struct TrainArguments {
     /// TOML file with the keys that differ from the default. The config.toml of any training has all keys.
     #[arg(long, value_name = "FILE", conflicts_with = "resume")]
     pub config: Option<PathBuf>,
+    /// Change one key of the configuration, for example rollout.image_size=128; repeatable.
+    #[arg(long, value_name = "KEY=VALUE", conflicts_with = "resume")]
+    pub set: Vec<String>,
     /// Initial weights, a safetensors file, instead of random ones.
     #[arg(long, value_name = "FILE", conflicts_with = "resume")]
     pub weights: Option<PathBuf>,

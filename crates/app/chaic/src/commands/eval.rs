@@ -49,8 +49,8 @@ pub fn run(
     };
     let policies: chaic_env::Result<Vec<NamedPolicy>> =
         arguments.policies().map(|(name, file)| NamedPolicy::read(name, file)).collect();
-    let policies =
-        PolicyRegistry::with_fallback(registry, policies?, Arc::clone(&built_in.perception))?;
+    let policies = PolicyRegistry::bundled(registry, Arc::clone(&built_in.perception))
+        .with_policies(policies?)?;
     let commands = CommandRegistry::new(&policies, confined(arguments, &path, launcher)?, stop)?;
     if arguments.resume {
         commands.check_resumed(&path)?;

@@ -1,19 +1,17 @@
 //! `chaic export`.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use anyhow::{Result, bail};
-use chaic_env::helper_registry::{BuiltInWithPerception, HelperRegistry};
 use chaic_eval::EvalError;
 use chaic_eval::run::{RunFolder, RunOptions};
 use chaic_eval::verify::verify_trace;
 use chaic_export::lerobot::{LeRobotOptions, LeRobotWriter};
-use chaic_llm::LanguageHelpers;
 use serde_json::json;
 
-use super::{bars, llm, run_perception};
+use super::bars;
+use super::recorded::RecordedHelpers;
 use crate::arguments::{ExportCommand, LeRobotArguments};
 use crate::exit::ExitStatus;
 use crate::interrupt;
@@ -81,12 +79,7 @@ fn select(
     options: &RunOptions,
 ) -> Result<Selected> {
     let LeRobotArguments { run, agent, helper, task, .. } = arguments;
-    let built_in =
-        BuiltInWithPerception { perception: run_perception::recorded_perception(options) };
-    let language = LanguageHelpers::recorded(run, llm::never())?;
-    let language =
-        language.map(|language| language.with_perception(Arc::clone(&built_in.perception)));
-    let helpers = language.as_ref().map_or(&built_in as &dyn HelperRegistry, |l| l);
+    let helpers = RecordedHelpers::new(run, options)?;
     let mut selected = Selected { traces: Vec::new(), n_cut: 0 };
     for path in folder.traces()? {
         let (trace, warnings) = folder.read_trace(&path)?;
@@ -103,7 +96,8 @@ fn select(
             selected.n_cut += 1;
             continue;
         }
-        if let Some(difference) = verify_trace(folder, options, helpers, &trace, &path)? {
+        if let Some(difference) = verify_trace(folder, options, &helpers.registry(), &trace, &path)?
+        {
             bail!("a trace was altered, so nothing is exported: {difference}");
         }
         selected.traces.push(path);

@@ -5,8 +5,10 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result};
+use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
 use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry as _, find};
 use chaic_env::rules::RuleSet;
+use chaic_learn::helpers::PolicyRegistry;
 use chaic_sandbox::Launcher;
 use chaic_subprocess::conformance::{Check, check};
 use chaic_subprocess::serve::serve;
@@ -76,9 +78,11 @@ fn check_helper(
 
 fn serve_helper(arguments: &HelperServeArguments) -> Result<ExitStatus> {
     let rules = RuleSet::named(arguments.rules).planner;
-    let helper = find(&BuiltInHelpers, &arguments.name, rules)?;
+    let perception = Arc::new(GroundTruthPerceptionFactory);
+    let helpers = PolicyRegistry::bundled(&BuiltInHelpers, perception);
+    let helper = find(&helpers, &arguments.name, rules)?;
     let mut helper = helper.with_context(|| {
-        format!("none is no helper to serve; name one of {}", BuiltInHelpers.names().join(", "))
+        format!("none is no helper to serve; name one of {}", helpers.names().join(", "))
     })?;
     let name = format!("chaic {} {}", chaic_env::CHAIC_VERSION, arguments.name);
     serve(&name, helper.agent.as_mut(), &mut stdin().lock(), &mut stdout().lock())

@@ -13,11 +13,12 @@ use chaic_env::rules::{RuleSet, differing_rules, rule_names, rule_values};
 use chaic_eval::report::title;
 use chaic_eval::run::{RunFolder, planned, read_results};
 use chaic_files::entries;
-use chaic_llm::language::{helper_names, partner_names};
+use chaic_learn::bundled::BundledHelper;
+use chaic_llm::language::partner_names;
 use comfy_table::ContentArrangement;
 use serde_json::{Value, json};
 
-use super::table;
+use super::{all_helper_names, table};
 use crate::arguments::ListCommand;
 use crate::exit::ExitStatus;
 use crate::output::{OutputFormat, print_result};
@@ -46,7 +47,11 @@ fn description(name: &str) -> &'static str {
         "llm-told" => "the same; task and constraint known",
         "vlm" => "language model on text and images",
         "vlm-told" => "the same; task and constraint known",
-        name => HelperInfo::find_helper(name).map_or("", |info| info.about),
+        name => match (HelperInfo::find_helper(name), BundledHelper::find(name)) {
+            (Some(info), _) => info.about,
+            (None, Some(bundled)) => bundled.about,
+            (None, None) => "",
+        },
     }
 }
 
@@ -56,14 +61,14 @@ fn grants(name: &str) -> Vec<&'static str> {
         Some(info) => (info.grants)(RuleSet::PAPER.planner),
         None if name == NONE => Grants::NONE,
         None if name.ends_with("-told") => Grants { behavior: true, task: true, ..Grants::PLANNER },
-        None => Grants::PLANNER,
+        None => BundledHelper::find(name).map_or(Grants::PLANNER, BundledHelper::grants),
     };
     let given = grants.named().into_iter().filter(|(_, is_given)| *is_given);
     given.map(|(name, _)| name).collect()
 }
 
 fn helpers(format: OutputFormat) -> Result<()> {
-    let names = [NONE.to_owned()].into_iter().chain(helper_names());
+    let names = [NONE.to_owned()].into_iter().chain(all_helper_names());
     let mut rows = Vec::new();
     let mut table = table(["Name", "Granted", "Description"]);
     table.set_content_arrangement(ContentArrangement::Dynamic).set_width(MAX_WIDTH);

@@ -12,7 +12,7 @@ use chaic_eval::replay::find_trace;
 use chaic_eval::run::RunFolder;
 use chaic_llm::endpoint_preset::EndpointPreset;
 use chaic_llm::language::{
-    LanguageHelpers, helper_names, is_language_helper, is_language_partner, partner_names,
+    LanguageHelpers, is_language_helper, is_language_partner, partner_names,
 };
 use chaic_llm::settings::Settings;
 use chaic_llm::show::{self, Detail};
@@ -20,7 +20,7 @@ use chaic_llm::templates::Templates;
 use chaic_llm::{check, session};
 use serde_json::json;
 
-use super::require_text;
+use super::{all_helper_names, require_text};
 use crate::arguments::{EvalArguments, LanguageArguments, LlmCommand};
 use crate::exit::ExitStatus;
 use crate::output::{OutputFormat, print, print_result, print_warning, quoted};
@@ -130,7 +130,7 @@ pub fn language(
 
 /// Checks the names of helpers and partner. The error lists all names, with those of language models.
 fn check_names(arguments: &EvalArguments) -> Result<(), EnvError> {
-    let known: Vec<String> = [NONE.to_owned()].into_iter().chain(helper_names()).collect();
+    let known: Vec<String> = [NONE.to_owned()].into_iter().chain(all_helper_names()).collect();
     let processes = arguments.commands().into_iter().map(|c| c.name);
     let policies = arguments.policies().map(|(name, _)| name.to_owned());
     let valid: Vec<String> = processes.chain(policies).chain(known.clone()).collect();

@@ -10,6 +10,7 @@ use chaic_episodes::Episode;
 use chaic_eval::EvalError;
 use chaic_eval::run::{RunFolder, RunOptions};
 use chaic_eval::verify::verify_trace;
+use chaic_learn::helpers::PolicyRegistry;
 use chaic_llm::LanguageHelpers;
 
 use super::{llm, run_perception};
@@ -43,15 +44,38 @@ pub(super) fn read_recorded(
     for warning in &warnings {
         print_warning(&warning.to_string());
     }
-    let built_in =
-        BuiltInWithPerception { perception: run_perception::recorded_perception(&options) };
-    let language = LanguageHelpers::recorded(run, llm::never())?;
-    let language =
-        language.map(|language| language.with_perception(Arc::clone(&built_in.perception)));
-    let helpers = language.as_ref().map_or(&built_in as &dyn HelperRegistry, |l| l);
-    if let Some(difference) = verify_trace(&folder, &options, helpers, &trace, &path)? {
+    let helpers = RecordedHelpers::new(run, &options)?;
+    if let Some(difference) = verify_trace(&folder, &options, &helpers.registry(), &trace, &path)? {
         bail!("the trace was altered, so {result}: {difference}");
     }
     let episode = folder.episode(&options, &trace.header.key())?;
     Ok(RecordedEpisode { options, trace, episode, is_whole: warnings.is_empty() })
+}
+
+/// Helpers of a run that was played, except helper processes and policies from files.
+pub struct RecordedHelpers {
+    built_in: BuiltInWithPerception,
+    language: Option<LanguageHelpers>,
+}
+
+impl RecordedHelpers {
+    /// Creates the helpers of a run with these options.
+    ///
+    /// # Errors
+    /// If the records of language helpers cannot be read.
+    pub fn new(run: &Path, options: &RunOptions) -> Result<RecordedHelpers> {
+        let perception = run_perception::recorded_perception(options);
+        let language = LanguageHelpers::recorded(run, llm::never())?;
+        let language = language.map(|language| language.with_perception(Arc::clone(&perception)));
+        Ok(RecordedHelpers { built_in: BuiltInWithPerception { perception }, language })
+    }
+
+    /// Returns the registry of these helpers and the bundled ones.
+    pub fn registry(&self) -> PolicyRegistry<'_> {
+        let fallback: &dyn HelperRegistry = match &self.language {
+            Some(language) => language,
+            None => &self.built_in,
+        };
+        PolicyRegistry::bundled(fallback, Arc::clone(&self.built_in.perception))
+    }
 }

@@ -11,7 +11,7 @@ use chaic_files::read_bounded;
 use chaic_learn::opponent::train::OpponentTrainer;
 use chaic_learn::primitive::train::PrimitiveTrainer;
 use chaic_learn::train::{CloningConfig, PolicyTrainer, PpoTrainingConfig};
-use chaic_training::{CURVES, CurveRecord, Phase, Trainer, TrainingRun, read_config};
+use chaic_training::{CURVES, CurveRecord, Phase, Trainer, TrainingRun, read_config_with};
 use chaic_vision::behavior::train::BehaviorTrainer;
 use chaic_vision::train::DetectorLearner;
 use serde_json::json;
@@ -147,8 +147,7 @@ fn open<T: Trainer>(
     if arguments.resume {
         return Ok(TrainingRun::resume(&arguments.out, progress, stop)?);
     }
-    let config = arguments.config.as_deref().map(read_config::<T>).transpose()?;
-    let mut config = config.unwrap_or_default();
+    let mut config = read_config_with::<T>(arguments.config.as_deref(), &arguments.set)?;
     if let Some(steps) = arguments.steps {
         set_steps(&mut config, steps);
     }

@@ -1,16 +1,13 @@
 //! `chaic verify`.
 
-use std::sync::Arc;
-
 use anyhow::Result;
 use chaic_core::AgentId;
-use chaic_env::helper_registry::{BuiltInWithPerception, HelperRegistry};
 use chaic_eval::run::RunFolder;
 use chaic_eval::verify::{Finding, Mismatch, ReportState, VerificationReport, verify_run};
-use chaic_llm::LanguageHelpers;
 use serde_json::json;
 
-use super::{bars, jobs, llm, run_perception};
+use super::recorded::RecordedHelpers;
+use super::{bars, jobs};
 use crate::arguments::VerifyArguments;
 use crate::exit::ExitStatus;
 use crate::output::{OutputFormat, counted, print_result, print_warning};
@@ -20,16 +17,9 @@ pub fn run(arguments: &VerifyArguments, format: OutputFormat) -> Result<ExitStat
     let (folder, options) = RunFolder::read(&arguments.run)?;
     let bar = bars::count_bar(folder.traces()?.len() as u64, "traces");
     let progress = |done: usize| bar.set_position(done as u64);
-    let built_in =
-        BuiltInWithPerception { perception: run_perception::recorded_perception(&options) };
-    let language = LanguageHelpers::recorded(&arguments.run, llm::never())?;
-    let language =
-        language.map(|language| language.with_perception(Arc::clone(&built_in.perception)));
-    let helpers: &dyn HelperRegistry = match &language {
-        Some(language) => language,
-        None => &built_in,
-    };
-    let verdict = verify_run(&folder, &options, helpers, jobs(arguments.jobs), &progress);
+    let helpers = RecordedHelpers::new(&arguments.run, &options)?;
+    let verdict =
+        verify_run(&folder, &options, &helpers.registry(), jobs(arguments.jobs), &progress);
     bar.finish_and_clear();
     let verdict = verdict?;
     for warning in &verdict.warnings {

@@ -44,8 +44,20 @@ fn a_trained_policy_is_a_helper() {
     fs::write(at.join("small.toml"), small).expect("it is written");
     let trained = run_ok(at, &["train", "clone", "--config", "small.toml", "--out", "t"]);
     assert!(trained.contains("chaic eval --helper mine=policy:t/policy.safetensors"), "{trained}");
+    for (assignment, problem) in [
+        ("rollout.image_size=8", "16 to 1024"),
+        ("rollout.size=64", "unknown field `size`"),
+        ("rollout.tasks=[]", "`rollout.tasks` is empty"),
+        ("image_size", "expected KEY=VALUE"),
+    ] {
+        let wrong = ["train", "ppo", "--config", "small.toml", "--out", "x", "--set", assignment];
+        let reply = run_err(at, &wrong);
+        assert!(reply.contains(problem) && reply.lines().count() == 1, "{reply}");
+    }
     let again = ["train", "ppo", "--config", "small.toml", "--weights", "t/policy.safetensors"];
-    run_ok(at, &[&again[..], &["--out", "u"]].concat());
+    run_ok(at, &[&again[..], &["--out", "u", "--set", "rollout.image_size=32"]].concat());
+    let config = fs::read_to_string(at.join("u/config.toml")).expect("it exists");
+    assert!(config.contains("image_size = 32"), "{config}");
     let helper = "mine=policy:u/policy.safetensors";
     let eval = ["eval", "--task", "low_target", "--first", "1", "--out", "run", "--helper"];
     let report = run_ok(at, &[&eval[..], &[helper]].concat());
@@ -64,4 +76,21 @@ fn a_trained_policy_is_a_helper() {
             run_err(at, &["eval", "--task", "low_target", "--out", "x", "--helper", helper]);
         assert!(reply.contains(problem) && reply.lines().count() == 1, "{reply}");
     }
+}
+
+#[test]
+fn a_bundled_helper_is_listed_played_and_verified() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    assert!(run_ok(at, &["list", "helpers"]).contains("cloned"));
+    let eval = ["eval", "--task", "low_target", "--first", "1", "--out", "run"];
+    run_ok(at, &[&eval[..], &["--helper", "cloned"]].concat());
+    run_ok(at, &["verify", "run"]);
+    // run.json and the trace name the weights.
+    let file = at.join("run/run.json");
+    let text = fs::read_to_string(&file).expect("it exists");
+    let run: serde_json::Value = serde_json::from_str(&text).expect("it is JSON");
+    let digest = run["granted"]["weights"]["cloned"].as_str().expect("a digest");
+    fs::write(&file, text.replace(digest, "000000000000")).expect("it is written");
+    assert!(run_err(at, &["verify", "run"]).contains("the first line differs"));
 }

@@ -36,6 +36,7 @@ fn losses(helpers: &[&str]) -> Result<Losses, String> {
         partner: Grants::PARTNER,
         perception: Default::default(),
         isolation: Default::default(),
+        weights: Default::default(),
     };
     let (results, environments) = (results(), Environments::default());
     let played = PlayedEpisodes { results: &results, planned: &[], environments: &environments };

@@ -31,6 +31,9 @@ pub struct GrantsFile {
     /// Isolation of the helper's process; absent for helpers in this process.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub isolation: Option<String>,
+    /// Digest of the helper's weights; absent for helpers without trained weights.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weights: Option<String>,
 }
 
 impl Labels<'_> {
@@ -77,10 +80,15 @@ impl Labels<'_> {
             let perception = granted.perception.get(name);
             let grants =
                 granted.helpers.get(name).map(|grants| GrantsFile::new(grants, perception));
-            let none =
-                GrantsFile { grants: Vec::new(), perception: "none".to_owned(), isolation: None };
+            let none = || GrantsFile {
+                grants: Vec::new(),
+                perception: "none".to_owned(),
+                isolation: None,
+                weights: None,
+            };
             let isolation = granted.isolation.get(name).cloned();
-            (name.clone(), GrantsFile { isolation, ..grants.unwrap_or(none) })
+            let weights = granted.weights.get(name).cloned();
+            (name.clone(), GrantsFile { isolation, weights, ..grants.unwrap_or_else(none) })
         };
         Some(helpers.iter().map(file).collect())
     }
@@ -122,7 +130,7 @@ impl GrantsFile {
     fn new(grants: &Grants, perception: Option<&String>) -> GrantsFile {
         let default = if grants.ids { GROUND_TRUTH } else { "own" };
         let perception = perception.map_or_else(|| default.to_owned(), String::clone);
-        GrantsFile { grants: names(grants), perception, isolation: None }
+        GrantsFile { grants: names(grants), perception, isolation: None, weights: None }
     }
 }
 
@@ -157,8 +165,12 @@ fn readable_names(names: &[String]) -> String {
 }
 
 /// Titles of helpers that other crates register.
-const EXTERNAL_TITLES: [(&str, &str); 5] = [
+const EXTERNAL_TITLES: [(&str, &str); 9] = [
     (NONE, "w/o"),
+    ("cloned", "Cloned"),
+    ("rl", "RL"),
+    ("rl_paper", "RL, paper's recipe"),
+    ("smart_help", "Smart-Help"),
     // Without "BM": our behavior models do not detect failures, unlike the paper's.
     ("llm", "LLM"),
     ("llm-told", "LLM, told"),

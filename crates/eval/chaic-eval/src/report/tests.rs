@@ -65,6 +65,7 @@ fn granted(partner: Grants) -> RunGrants {
         partner,
         perception: Default::default(),
         isolation: Default::default(),
+        weights: Default::default(),
     }
 }
 

@@ -30,8 +30,6 @@ pub(super) const EPISODES: &str = "episodes";
 pub(super) const RECORDS: &str = "llm";
 /// File with the commands of helpers in other processes; `chaic-subprocess` writes it.
 pub(super) const COMMANDS: &str = "commands.json";
-/// File with digests of trained policies that play as helpers; `chaic-learn` writes it.
-pub(super) const POLICIES: &str = "policies.json";
 /// Folder of the traces.
 const TRACES: &str = "traces";
 /// Levels of folders below [`TRACES`]: one per task, one per helper.
@@ -132,18 +130,15 @@ fn is_startup_file(path: &Path) -> bool {
             file.strip_suffix(TEMPORARY_SUFFIX).unwrap_or(file).ends_with(".json")
         }),
         RECORDS => has_only(path, &|file| STARTUP_RECORDS.contains(&file)),
-        COMMANDS | POLICIES => true,
-        file => {
-            [RUN_FILE, COMMANDS, POLICIES].map(Some).contains(&file.strip_suffix(TEMPORARY_SUFFIX))
-        }
+        COMMANDS => true,
+        file => [RUN_FILE, COMMANDS].map(Some).contains(&file.strip_suffix(TEMPORARY_SUFFIX)),
     }
 }
 
 /// Returns whether a merge writes a file or folder of this name before its `run.json`.
 fn is_merge_file(path: &Path) -> bool {
     let file = name(path).strip_suffix(TEMPORARY_SUFFIX).unwrap_or(name(path));
-    [EPISODES, TRACES, COMMANDS, POLICIES, RESULTS, RUN_FILE].contains(&file)
-        || REPORT.contains(&file)
+    [EPISODES, TRACES, COMMANDS, RESULTS, RUN_FILE].contains(&file) || REPORT.contains(&file)
 }
 
 /// Returns whether an entry of this name exists, even if it is a dangling link.
@@ -251,6 +246,14 @@ impl RunFolder {
                     path.display()
                 )));
             }
+        }
+        if let Some(name) = recorded.weights.iter().find_map(|(name, digest)| {
+            granted.weights.get(name).filter(|other| *other != digest).map(|_| name)
+        }) {
+            return Err(EvalError::Options(format!(
+                "{} was started with other weights for `{name}`; give the same ones or start a new run",
+                path.display()
+            )));
         }
         Err(EvalError::Options(format!(
             "the grants of helpers or partner differ from {}; start a new run",

@@ -25,6 +25,9 @@ pub struct RunGrants {
     /// Isolation of helper processes, such as `sandbox`; without helpers in this process.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub isolation: BTreeMap<String, String>,
+    /// Digests of weights by helper, for helpers with trained weights.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub weights: BTreeMap<String, String>,
 }
 
 impl RunGrants {
@@ -35,18 +38,19 @@ impl RunGrants {
     pub fn new(options: &RunOptions, helpers: &dyn HelperRegistry) -> Result<RunGrants> {
         let rules = options.rules()?.planner;
         let (mut grants, mut perception) = (BTreeMap::new(), BTreeMap::new());
-        let mut isolation = BTreeMap::new();
+        let (mut isolation, mut weights) = (BTreeMap::new(), BTreeMap::new());
         for name in &options.helpers {
             let helper = helper_registry::find(helpers, name, rules)?;
             let Some(helper) = helper else { continue };
             grants.insert(name.clone(), helper.grants);
             perception.extend(helper.agent.perception().map(|text| (name.clone(), text)));
             isolation.extend(helper.agent.isolation().map(|text| (name.clone(), text)));
+            weights.extend(helper.agent.weights().map(|digest| (name.clone(), digest)));
         }
         let partner =
             helper_registry::find_partner(helpers, options.partner.as_deref(), None, rules)?;
         let partner = partner.map_or_else(|| partner_grants(rules), |p| p.grants);
-        let granted = RunGrants { helpers: grants, partner, perception, isolation };
+        let granted = RunGrants { helpers: grants, partner, perception, isolation, weights };
         granted.check_track(options)?;
         Ok(granted)
     }

@@ -13,7 +13,7 @@ use chaic_files::{
     EntryKind, FileError, create_folders_below, create_or_replace, entries, kind, read_below,
 };
 
-use super::folder::{COMMANDS, EPISODES, POLICIES, RECORDS};
+use super::folder::{COMMANDS, EPISODES, RECORDS};
 use super::journal::{Journal, read_results, to_line};
 use super::plan;
 use super::{FolderMode, Run, RunFolder};
@@ -113,10 +113,8 @@ pub fn merge(out: &Path, parts: &[PathBuf]) -> Result<Run> {
     let (folder, _) = RunFolder::lock(out, FolderMode::Merge)?;
     folder.start_merge()?;
     copy_episodes(&source, &folder)?;
-    for name in [COMMANDS, POLICIES] {
-        if kind(&source.join(name))? != EntryKind::Missing {
-            copy(&source, &source.join(name), &folder, &folder.join(name))?;
-        }
+    if kind(&source.join(COMMANDS))? != EntryKind::Missing {
+        copy(&source, &source.join(COMMANDS), &folder, &folder.join(COMMANDS))?;
     }
     for (result, part) in from_parts.iter().filter(|(result, _)| is_traced(result)) {
         let (part, _) = RunFolder::read(part)?;

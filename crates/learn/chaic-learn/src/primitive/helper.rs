@@ -8,7 +8,7 @@ use chaic_agents::{PlannerRules, PlanningAgent};
 use chaic_core::agent::Thought;
 use chaic_core::observation::{Grants, SensorConfig};
 use chaic_core::rng::RngStream;
-use chaic_core::{Action, Agent, AgentError, AgentId, Briefing, Observation};
+use chaic_core::{Action, Agent, AgentError, AgentId, Briefing, Observation, TaskId};
 use chaic_env::helper_registry::Helper;
 use chaic_nn::Pass;
 use chaic_nn::weights::{self, WeightsError};
@@ -29,13 +29,15 @@ pub struct PrimitiveWeights {
     pub parameters: Vec<f32>,
     /// Opponent model whose predictions are inputs, if the network has such inputs.
     pub opponent: Option<Arc<OpponentModel>>,
+    /// Digest of the weights file, if they are from one.
+    pub digest: Option<String>,
 }
 
 impl PrimitiveWeights {
     /// Combines a network with parameters, which include those of its opponent model.
     pub fn new(model: &PrimitiveNetwork, parameters: Vec<f32>) -> PrimitiveWeights {
         let opponent = model.opponent(&parameters).map(Arc::new);
-        PrimitiveWeights { model: model.clone(), parameters, opponent }
+        PrimitiveWeights { model: model.clone(), parameters, opponent, digest: None }
     }
 
     /// Parses a weights file.
@@ -47,7 +49,66 @@ impl PrimitiveWeights {
         let model = PrimitiveNetwork::from_kind(&kind);
         let model = model.unwrap_or_else(|| PrimitiveNetwork::new(OpponentInput::None));
         let parameters = weights::from_bytes(model.network(), bytes, &model.kind())?;
-        Ok(PrimitiveWeights::new(&model, parameters))
+        let digest = Some(weights::digest(bytes));
+        Ok(PrimitiveWeights { digest, ..PrimitiveWeights::new(&model, parameters) })
+    }
+}
+
+/// Policies of primitive actions that play as one helper: one for all tasks, or one per task.
+#[derive(Clone, Debug, Default)]
+pub struct PrimitivePolicies {
+    all_tasks: Option<Arc<PrimitiveWeights>>,
+    by_task: Vec<(TaskId, Arc<PrimitiveWeights>)>,
+}
+
+impl PrimitivePolicies {
+    /// One policy for all tasks.
+    pub fn for_all_tasks(weights: PrimitiveWeights) -> PrimitivePolicies {
+        PrimitivePolicies { all_tasks: Some(Arc::new(weights)), by_task: Vec::new() }
+    }
+
+    /// Policies of single tasks; add them with [`PrimitivePolicies::add`]. The helper is granted
+    /// the task, which selects its policy.
+    pub fn by_task() -> PrimitivePolicies {
+        PrimitivePolicies::default()
+    }
+
+    /// Adds the policy of a task. Returns false, and adds nothing, if its inputs differ from those
+    /// of the other policies.
+    pub fn add(&mut self, task: TaskId, weights: PrimitiveWeights) -> bool {
+        let has_same_inputs = self.any().is_none_or(|any| any.model.kind() == weights.model.kind());
+        if has_same_inputs {
+            self.by_task.push((task, Arc::new(weights)));
+        }
+        has_same_inputs
+    }
+
+    /// True if there is no policy.
+    pub fn is_empty(&self) -> bool {
+        self.any().is_none()
+    }
+
+    fn any(&self) -> Option<&Arc<PrimitiveWeights>> {
+        self.all_tasks.as_ref().or_else(|| self.by_task.first().map(|(_, weights)| weights))
+    }
+
+    /// Returns the policy for an episode of this task, which is unknown without the grant.
+    fn find(&self, task: Option<TaskId>) -> Option<&Arc<PrimitiveWeights>> {
+        let of_task = || self.by_task.iter().find(|(t, _)| Some(*t) == task).map(|(_, w)| w);
+        self.all_tasks.as_ref().or_else(of_task)
+    }
+
+    /// Digest of all weights files, if the policies are from files.
+    fn digest(&self) -> Option<String> {
+        if let Some(weights) = &self.all_tasks {
+            return weights.digest.clone();
+        }
+        let digests: Option<Vec<String>> = self
+            .by_task
+            .iter()
+            .map(|(task, w)| Some(format!("{task} {}", w.digest.as_ref()?)))
+            .collect();
+        Some(weights::digest(digests?.join(" ").as_bytes()))
     }
 }
 
@@ -81,6 +142,11 @@ impl ObservationEncoder {
     /// Returns the sensors, which include color and depth.
     pub(crate) fn sensors(&self) -> SensorConfig {
         SensorConfig { rgb: true, depth: true, ..self.agent.sensors() }
+    }
+
+    /// Replaces the opponent model by another one with the same grant.
+    fn set_opponent(&mut self, opponent: Option<Arc<OpponentModel>>) {
+        self.opponent = opponent.map(OpponentTracker::new);
     }
 
     pub(crate) fn reset(&mut self, briefing: &Briefing) {
@@ -117,25 +183,31 @@ impl ObservationEncoder {
 
 /// Helper that takes primitive actions by a network.
 pub struct PrimitiveHelper {
+    policies: Arc<PrimitivePolicies>,
     encoder: ObservationEncoder,
-    weights: Arc<PrimitiveWeights>,
-    pass: Pass,
+    current: Option<CurrentPolicy>,
     rng: RngStream,
     last_action: usize,
+}
+
+/// Policy of the current episode.
+struct CurrentPolicy {
+    weights: Arc<PrimitiveWeights>,
+    pass: Pass,
 }
 
 impl PrimitiveHelper {
     /// Creates a helper with this perception and the grants that it needs.
     pub fn create(
-        weights: Arc<PrimitiveWeights>,
+        policies: Arc<PrimitivePolicies>,
         rules: PlannerRules,
         perception: &dyn PerceptionFactory,
     ) -> Helper {
-        let (encoder, grants) =
-            ObservationEncoder::new(rules, perception, weights.opponent.clone());
-        let pass = weights.model.pass();
+        let opponent = policies.any().and_then(|weights| weights.opponent.clone());
+        let (encoder, grants) = ObservationEncoder::new(rules, perception, opponent);
+        let grants = Grants { task: policies.all_tasks.is_none(), ..grants };
         let rng = RngStream::new(0, "primitive policy", 0);
-        let agent = PrimitiveHelper { encoder, weights, pass, rng, last_action: 0 };
+        let agent = PrimitiveHelper { policies, encoder, current: None, rng, last_action: 0 };
         Helper { agent: Box::new(agent), grants }
     }
 }
@@ -146,20 +218,34 @@ impl Agent for PrimitiveHelper {
     }
 
     fn reset(&mut self, briefing: &Briefing) {
+        let weights = self.policies.find(briefing.disclosure.map(|disclosure| disclosure.task));
+        self.current = weights.map(|weights| {
+            self.encoder.set_opponent(weights.opponent.clone());
+            CurrentPolicy { weights: Arc::clone(weights), pass: weights.model.pass() }
+        });
         self.encoder.reset(briefing);
         self.rng = RngStream::new(briefing.seed, "primitive policy", 0);
     }
 
     fn act(&mut self, observation: &Observation) -> Result<Action, AgentError> {
+        let Some(CurrentPolicy { weights, pass }) = &mut self.current else {
+            let problem = "each policy of this helper is for one task: grant the task, and play one \
+                           that has a policy";
+            return Err(AgentError::Broken(problem.to_owned()));
+        };
         let Some(encoded) = self.encoder.encode(observation) else { return Ok(PAUSE) };
-        let PrimitiveWeights { model, parameters, .. } = &*self.weights;
-        let output = model.forward(parameters, std::iter::once(&encoded), &mut self.pass).remove(0);
+        let PrimitiveWeights { model, parameters, .. } = &**weights;
+        let output = model.forward(parameters, std::iter::once(&encoded), pass).remove(0);
         self.last_action = output.sample(self.rng.unit());
         Ok(self.encoder.action(self.last_action).unwrap_or(PAUSE))
     }
 
     fn perception(&self) -> Option<String> {
         self.encoder.agent.perception()
+    }
+
+    fn weights(&self) -> Option<String> {
+        self.policies.digest()
     }
 
     fn thought(&self) -> Thought {

@@ -24,7 +24,7 @@ pub struct PrimitiveNetwork {
 
 /// Returns the kind in weights files.
 fn kind(opponent: OpponentInput) -> String {
-    format!("chaic primitive policy 1{}", opponent.kind_suffix())
+    format!("chaic primitive policy 2{}", opponent.kind_suffix())
 }
 
 /// Size of the image patches that become one pixel of the first map, as in vision transformers
@@ -34,7 +34,7 @@ const PATCH_SIZE: usize = 4;
 const PATCHES_PER_SIDE: usize = IMAGE_SIZE / PATCH_SIZE;
 const DOWNSAMPLE: Kernel = Kernel { size: 3, stride: 2 };
 /// Width and height of the last map of an encoder, pixels.
-const LAST_MAP_SIZE: usize = 8;
+const LAST_MAP_SIZE: usize = 4;
 /// Number of features of each input.
 const N_FEATURES: usize = 64;
 /// Width of the shared layers (paper, appendix on learning).
@@ -50,11 +50,11 @@ impl PrimitiveNetwork {
         let has_opponent = opponent != OpponentInput::None;
         let prediction = has_opponent.then(|| net.auxiliary_input(N_OPPONENT, PATCHES_PER_SIDE));
         let mut image_features = layer(&mut net, "image.patches", image, Kernel::POINTWISE, 32);
-        for k in 0..2 {
+        for k in 0..3 {
             image_features = layer(&mut net, &format!("image{k}"), image_features, DOWNSAMPLE, 32);
         }
         let mut map_features = map;
-        for (k, channels) in [16, 32].into_iter().enumerate() {
+        for (k, channels) in [16, 32, 32].into_iter().enumerate() {
             map_features = layer(&mut net, &format!("map{k}"), map_features, DOWNSAMPLE, channels);
         }
         let [image_features, map_features] = [("image", image_features), ("map", map_features)]

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use super::ACTIONS;
 use super::env_runner::{EnvRunner, EpisodeProgress, Experience, TrainingSetup, replay};
-use super::helper::{PrimitiveHelper, PrimitiveWeights};
+use super::helper::{PrimitiveHelper, PrimitivePolicies, PrimitiveWeights};
 use super::network::PrimitiveNetwork;
 use super::observation::IMAGE_SIZE;
 use crate::actor_critic::ActorCritic as _;
@@ -208,12 +208,13 @@ impl Trainer for PrimitiveTrainer {
         let TrainingSetup { config, perception, model, .. } = setup;
         let parameters = learner.parameters.clone();
         let bytes = weights::to_bytes(model.network(), &parameters, &model.kind())?;
-        let weights = Arc::new(PrimitiveWeights::new(model, parameters));
+        let weights = PrimitiveWeights::new(model, parameters);
+        let policies = Arc::new(PrimitivePolicies::for_all_tasks(weights));
         let episodes =
             validation_episodes(&config.tasks, &config.splits, config.validation_episodes);
         let rate = |episode: &RolloutEpisode| {
             let helper = PrimitiveHelper::create(
-                Arc::clone(&weights),
+                Arc::clone(&policies),
                 RuleSet::PAPER.planner,
                 &**perception,
             );

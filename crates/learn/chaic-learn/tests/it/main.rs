@@ -2,5 +2,6 @@
 
 mod old_keys;
 mod opponent;
+mod policies;
 mod ppo_reference;
 mod training;

@@ -109,7 +109,10 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
         "chaic train primitive",
         [
             ("Train with the default configuration", "chaic train primitive --out runs/primitive"),
-            ("Train for fewer updates", "chaic train primitive --steps 100 --out runs/short"),
+            (
+                "Train for another task",
+                "chaic train primitive --set tasks=[\"obstacle\"] --out runs/obstacle",
+            ),
             ("Continue a training", "chaic train primitive --resume --out runs/primitive"),
         ],
     ),

@@ -1,0 +1,122 @@
+//! Trained policies as helpers of runs.
+
+use std::fs;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use chaic_agents::PlannerRules;
+use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
+use chaic_core::{Action, AgentError, AgentId, EntityId, TaskId};
+use chaic_env::helper_registry::{BuiltInHelpers, Helper, HelperRegistry as _};
+use chaic_env::trace::Record;
+use chaic_env::{Env, EpisodeConfig};
+use chaic_episodes::find_episode;
+use chaic_learn::actor_critic::ActorCritic as _;
+use chaic_learn::bundled::BundledHelper;
+use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
+use chaic_learn::opponent::network::OpponentInput;
+use chaic_learn::primitive::network::PrimitiveNetwork;
+use chaic_nn::weights;
+
+fn bundled() -> PolicyRegistry<'static> {
+    PolicyRegistry::bundled(&BuiltInHelpers, Arc::new(GroundTruthPerceptionFactory))
+}
+
+/// Writes random weights of a policy of primitive actions.
+fn write_primitive_policy(file: &Path, opponent: OpponentInput, seed: u64) {
+    let model = PrimitiveNetwork::new(opponent);
+    let parameters = model.network().init_parameters(seed);
+    let bytes = weights::to_bytes(model.network(), &parameters, &model.kind()).unwrap();
+    fs::write(file, bytes).unwrap();
+}
+
+/// Plays the first 400 frames of an episode; returns the helper's actions.
+fn play(helper: Helper, task: TaskId) -> Result<Vec<Action<EntityId>>, AgentError> {
+    let episode = find_episode(&format!("{task}/gen/40000001")).unwrap();
+    let config = EpisodeConfig { image_size: Some(128), ..EpisodeConfig::new(&episode, "mine") };
+    let mut actions = Vec::new();
+    Env::new(config, Some(helper)).unwrap().run(
+        &AtomicBool::new(false),
+        Some(400),
+        &mut |record| {
+            if let Record::Decision(decision) = record
+                && decision.agent == AgentId::HELPER
+            {
+                actions.push(decision.action);
+            }
+            Ok::<(), AgentError>(())
+        },
+    )?;
+    Ok(actions)
+}
+
+#[test]
+fn bundled_helpers_have_weights_with_a_digest() {
+    let registry = bundled();
+    let names = registry.names();
+    for BundledHelper { name, .. } in BundledHelper::all() {
+        assert_eq!(names.iter().filter(|n| n == name).count(), 1, "{name}");
+        let helper = registry.make(name, PlannerRules::paper()).unwrap();
+        assert_eq!(helper.agent.weights().map(|digest| digest.len()), Some(12), "{name}");
+        assert!(!helper.grants.goal && !helper.grants.progress, "{name}");
+    }
+}
+
+#[test]
+fn the_name_of_a_bundled_helper_is_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("policy.safetensors");
+    write_primitive_policy(&file, OpponentInput::None, 1);
+    let name = BundledHelper::all()[0].name;
+    let policy = NamedPolicy::read(name, &file).unwrap();
+    let refused = bundled().with_policies(vec![policy]).err().unwrap().to_string();
+    assert!(refused.contains(&format!("there is a helper `{name}` already")), "{refused}");
+}
+
+#[test]
+fn a_folder_of_weights_is_a_policy_per_task() {
+    let folder = tempfile::tempdir().unwrap();
+    let registry = |path: &Path| {
+        let policy = NamedPolicy::read("mine", path).unwrap();
+        bundled().with_policies(vec![policy]).unwrap()
+    };
+    let make = |path: &Path| registry(path).make("mine", PlannerRules::paper()).unwrap();
+    let tasks = [TaskId::MovingHouse, TaskId::Shopping];
+    let files = tasks.map(|task| folder.path().join(format!("{task}.safetensors")));
+    for (seed, file) in (1..).zip(&files) {
+        write_primitive_policy(file, OpponentInput::None, seed);
+    }
+    assert!(make(folder.path()).grants.task, "the task selects the policy");
+    assert!(!make(&files[0]).grants.task);
+    for (task, file) in tasks.into_iter().zip(&files) {
+        let [all, single] = [folder.path(), file].map(|path| play(make(path), task).unwrap());
+        assert!(single.len() > 10 && all == single, "{task}");
+    }
+    let [first, second] = files.each_ref().map(|file| play(make(file), tasks[0]).unwrap());
+    assert_ne!(first, second, "the two policies differ");
+    let problem = play(make(folder.path()), TaskId::LowTarget).unwrap_err().to_string();
+    assert!(problem.contains("grant the task"), "{problem}");
+    let digest = make(folder.path()).agent.weights();
+    write_primitive_policy(&files[1], OpponentInput::None, 3);
+    assert_ne!(make(folder.path()).agent.weights(), digest, "every file counts");
+    // Policies with other inputs, and a folder without weights.
+    write_primitive_policy(&files[1], OpponentInput::Seen, 2);
+    let problem = NamedPolicy::read("mine", folder.path()).err().unwrap().to_string();
+    assert!(problem.contains("other inputs"), "{problem}");
+    let empty = tempfile::tempdir().unwrap();
+    let problem = NamedPolicy::read("mine", empty.path()).err().unwrap().to_string();
+    assert!(problem.contains("no weights file of a task"), "{problem}");
+}
+
+#[test]
+fn files_without_policy_weights_are_refused_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("other.safetensors");
+    for bytes in [&b""[..], b"not a file of weights", include_bytes!("policies.rs")] {
+        fs::write(&file, bytes).unwrap();
+        let problem = NamedPolicy::read("mine", &file).err().unwrap().to_string();
+        assert!(problem.contains("other.safetensors") && !problem.contains('\n'), "{problem}");
+    }
+    assert!(NamedPolicy::read("mine", &folder.path().join("missing")).is_err());
+}

@@ -106,6 +106,10 @@ pub struct Optimizer<'a> {
     pub learning_rate: f32,
 }
 
+/// Number of samples that pass through the network together. Gradients of a shard add up over its
+/// micro-batches, whose activations stay in the cache.
+const MICRO_BATCH: usize = 16;
+
 /// Takes one data-parallel optimizer step along the mean gradient of a batch.
 ///
 /// `gradient(sample, output, weight, stats)` returns the output gradient of one sample times
@@ -130,17 +134,16 @@ pub fn optimizer_step<M: ActorCritic, S: Sync, T: Default + Send>(
             let start = (k * shard_size).min(batch.len());
             let samples = &batch[start..(start + shard_size).min(batch.len())];
             let mut stats = T::default();
-            if samples.is_empty() {
-                return Some(stats);
+            for samples in samples.chunks(MICRO_BATCH) {
+                let observations = samples.iter().map(|s| observation_of(s));
+                let outputs = model.forward(parameters, observations, pass);
+                let grad_outputs: Vec<OutputGrad> = samples
+                    .iter()
+                    .zip(&outputs)
+                    .map(|(sample, output)| gradient(sample, output, weight, &mut stats))
+                    .collect();
+                model.backward(parameters, &grad_outputs, pass, grad_parameters);
             }
-            let outputs =
-                model.forward(parameters, samples.iter().map(|s| observation_of(s)), pass);
-            let grad_outputs: Vec<OutputGrad> = samples
-                .iter()
-                .zip(&outputs)
-                .map(|(sample, output)| gradient(sample, output, weight, &mut stats))
-                .collect();
-            model.backward(parameters, &grad_outputs, pass, grad_parameters);
             Some(stats)
         };
     learner

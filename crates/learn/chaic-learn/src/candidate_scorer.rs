@@ -157,6 +157,11 @@ impl CandidateScorer {
         self.normalizer.update_running_stats(parameters, self.n_state, 1, candidates);
     }
 
+    /// Returns whether these parameters have statistics that normalize inputs.
+    pub fn has_normalizer(&self, parameters: &[f32]) -> bool {
+        parameters[self.normalizer.counts.clone()].iter().any(|count| *count > 0.0)
+    }
+
     /// Creates the buffers of a pass.
     pub fn pass(&self) -> Pass {
         Pass::new(&self.network, widest())

@@ -201,7 +201,14 @@ impl<A: Algorithm> Trainer for PolicyTrainer<A> {
     fn read_weights(config: &A, weights: &[u8]) -> Result<Vec<f32>, WeightsError> {
         let rollout = config.spec().rollout;
         let kind = rollout.policy_kind(rollout.read_opponent().ok().flatten().as_ref());
-        weights::from_bytes(&kind.network().network, weights, &kind.name())
+        let model = kind.network();
+        let parameters = weights::from_bytes(&model.network, weights, &kind.name())?;
+        if rollout.normalize && !model.has_normalizer(&parameters) {
+            // The first update of the statistics would change all inputs at once.
+            let problem = "trained without `rollout.normalize`, so it cannot be enabled";
+            return Err(WeightsError::Configuration(problem.to_owned()));
+        }
+        Ok(parameters)
     }
 
     fn network(&self) -> &Network {

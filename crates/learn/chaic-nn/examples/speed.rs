@@ -27,7 +27,14 @@ fn report(name: &str, gmac: f64, s: f64) {
 fn main() {
     let arch = widest();
     let mut workspace = Workspace::default();
-    for (m, k, n) in [(16384, 48, 96), (4096, 160, 80), (1024, 320, 160), (65536, 48, 64)] {
+    for (m, k, n) in [
+        (16384, 48, 96),
+        (4096, 160, 80),
+        (1024, 320, 160),
+        (65536, 48, 64),
+        (16384, 64, 32),
+        (4096, 288, 32),
+    ] {
         let (a, b, mut c) = (vec![0.5; m * k], vec![0.25; k * n], vec![0.0; m * n]);
         let gmac = 1e-9 * (m * k * n) as f64;
         let (left, right) = (Matrix::row_major(&a, m, k), Matrix::row_major(&b, k, n));

@@ -8,7 +8,7 @@ use pulp::{Arch, Simd, WithSimd};
 /// Columns of the left matrix per block, so that a panel of the right matrix stays in the L1 cache.
 const INNER_BLOCK: usize = 192;
 /// Rows of the left matrix that are packed together.
-const ROW_BLOCK: usize = 64;
+const ROW_BLOCK: usize = 48;
 
 /// Strided view of a matrix: element (i, j) is `data[i * row_stride + j * column_stride]`.
 #[derive(Clone, Copy, Debug)]
@@ -144,14 +144,16 @@ fn split_in_blocks(rows: usize, group_len: usize) -> impl Iterator<Item = Range<
 }
 
 /// Returns the number of vectors in a row of a panel. It leaves registers for one panel row and one
-/// left element beside the accumulators.
+/// left element beside the accumulators: of 16 registers 12 hold sums, of 32 (AVX-512) up to 24.
+/// With 16 registers, 4 rows of 3 vectors would need all of them; they were half as fast on EPYC.
 #[inline(always)]
 fn panel_vectors(lanes: usize, columns: usize) -> usize {
     let padded = |vectors: usize| columns.next_multiple_of(vectors * lanes);
     match lanes {
         // Panels of two vectors if a large part of panels of three would be padding.
         16.. if 9 * padded(2) <= 8 * padded(3) => 2,
-        _ => 3,
+        16.. => 3,
+        _ => 2,
     }
 }
 
@@ -166,7 +168,7 @@ pub(crate) fn run_in_tiles<S: Simd>(simd: S, panels: &PackedMatrix, kernel: impl
     match S::F32_LANES {
         16.. if panels.width == 2 * S::F32_LANES => kernel.run::<S, 8, 2>(simd),
         16.. => kernel.run::<S, 8, 3>(simd),
-        _ => kernel.run::<S, 4, 3>(simd),
+        _ => kernel.run::<S, 6, 2>(simd),
     }
 }
 

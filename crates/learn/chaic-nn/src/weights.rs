@@ -42,6 +42,9 @@ pub enum WeightsError {
     /// A value is not finite.
     #[error("`{0}` has a value that is not finite")]
     NotFinite(String),
+    /// The parameters do not fit the configuration of a training.
+    #[error("{0}")]
+    Configuration(String),
 }
 
 /// Encodes parameters as a weights file; `kind` names the kind of network and its version.

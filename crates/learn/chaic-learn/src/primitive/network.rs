@@ -110,16 +110,17 @@ fn layer(net: &mut Network, name: &str, from: Node, kernel: Kernel, channels: us
     net.norm_relu(&format!("{name}.norm"), output)
 }
 
-/// Returns the bytes of an image in patch order.
-fn patch_bytes(image: &[u8]) -> impl Iterator<Item = u8> + '_ {
-    let row_len = PATCH_SIZE * IMAGE_CHANNELS;
-    (0..PATCHES_PER_SIDE * PATCHES_PER_SIDE * PATCH_SIZE).flat_map(move |k| {
-        let (patch, row) = (k / PATCH_SIZE, k % PATCH_SIZE);
-        let (y, x) =
-            (patch / PATCHES_PER_SIDE * PATCH_SIZE + row, patch % PATCHES_PER_SIDE * PATCH_SIZE);
-        let start = (y * IMAGE_SIZE + x) * IMAGE_CHANNELS;
-        image[start..start + row_len].iter().copied()
-    })
+/// Writes an image in patch order, 0 to 1 for 0 to 255.
+fn write_patches(image: &[u8], patches: &mut [f32]) {
+    const PATCH_ROW: usize = PATCH_SIZE * IMAGE_CHANNELS;
+    for (y, row) in image.chunks_exact(IMAGE_SIZE * IMAGE_CHANNELS).enumerate() {
+        let first = y / PATCH_SIZE * PATCHES_PER_SIDE;
+        for (x, from) in row.as_chunks::<PATCH_ROW>().0.iter().enumerate() {
+            let to = ((first + x) * PATCH_SIZE + y % PATCH_SIZE) * PATCH_ROW;
+            let to = &mut patches[to..to + PATCH_ROW];
+            to.iter_mut().zip(from).for_each(|(to, byte)| *to = f32::from(*byte) / 255.0);
+        }
+    }
 }
 
 impl PrimitiveNetwork {
@@ -143,31 +144,31 @@ impl ActorCritic for PrimitiveNetwork {
         pass: &mut Pass,
     ) -> Vec<ActorCriticOutput> {
         let n = observations.clone().count();
-        let bytes = observations.clone().flat_map(|s| patch_bytes(&s.image));
-        let image = Tensor {
-            shape: Shape {
-                n,
-                height: PATCHES_PER_SIDE,
-                width: PATCHES_PER_SIDE,
-                channels: PATCH_SIZE * PATCH_SIZE * IMAGE_CHANNELS,
-            },
-            data: bytes.map(|byte| f32::from(byte) / 255.0).collect(),
-        };
+        let mut image = Tensor::zeros(Shape {
+            n,
+            height: PATCHES_PER_SIDE,
+            width: PATCHES_PER_SIDE,
+            channels: PATCH_SIZE * PATCH_SIZE * IMAGE_CHANNELS,
+        });
+        let images = image.data.chunks_exact_mut(image.shape.len_per_item());
+        observations.clone().zip(images).for_each(|(s, to)| write_patches(&s.image, to));
         let tensor = |size: usize,
                       channels: usize,
-                      bytes: &dyn Fn(&'a PrimitiveObservation) -> &'a [u8],
+                      bytes: fn(&PrimitiveObservation) -> &[u8],
                       scale: f32| {
             let shape = Shape { n, height: size, width: size, channels };
-            let data =
-                observations.clone().flat_map(bytes).map(|byte| scale * f32::from(*byte)).collect();
+            let mut data = Vec::with_capacity(n * shape.len_per_item());
+            for observation in observations.clone() {
+                data.extend(bytes(observation).iter().map(|byte| scale * f32::from(*byte)));
+            }
             Tensor { shape, data }
         };
-        let map = tensor(MAP.side, MAP_CHANNELS, &|s| &s.map, 1.0);
-        let state = tensor(1, N_STATE, &|s| &s.state, 1.0 / 255.0);
+        let map = tensor(MAP.side, MAP_CHANNELS, |s| &s.map, 1.0);
+        let state = tensor(1, N_STATE, |s| &s.state, 1.0 / 255.0);
         if self.opponent == OpponentInput::None {
             pass.forward_all(&self.network, parameters, &[&image, &map, &state]);
         } else {
-            let opponent = tensor(1, N_OPPONENT, &|s| &s.opponent, 1.0 / 255.0);
+            let opponent = tensor(1, N_OPPONENT, |s| &s.opponent, 1.0 / 255.0);
             pass.forward_all(&self.network, parameters, &[&image, &map, &state, &opponent]);
         }
         let logits = pass.activation(self.logits).data.chunks_exact(ACTIONS.len());

@@ -11,6 +11,7 @@ use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
 use chaic_core::TaskId;
 use chaic_env::RewardWeights;
 use chaic_env::helper_registry::{BuiltInHelpers, HelperRegistry as _};
+use chaic_learn::candidate_scorer::CandidateSet;
 use chaic_learn::features::{N_PLAN, N_STATE};
 use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
 use chaic_learn::opponent;
@@ -128,6 +129,27 @@ fn experts_generators_and_penalties_are_checked_before_a_training() {
         let problem = parse_config::<PolicyTrainer<CloningConfig>>(text).unwrap_err();
         assert!(words.iter().all(|word| problem.contains(word)), "{problem}");
     }
+}
+
+#[test]
+fn inputs_are_normalized_only_from_the_start() {
+    let kind = PolicyKind::PLAIN;
+    let model = kind.network();
+    let mut parameters = model.network.init_parameters(1);
+    let mut config = PpoTrainingConfig { rollout: small_rollout(), ..PpoTrainingConfig::default() };
+    config.rollout.normalize = true;
+    let read = |config: &PpoTrainingConfig, parameters: &[f32]| {
+        let bytes = weights::to_bytes(&model.network, parameters, &kind.name()).unwrap();
+        PolicyTrainer::read_weights(config, &bytes)
+    };
+    let problem = read(&config, &parameters).unwrap_err().to_string();
+    assert!(problem.contains("rollout.normalize"), "{problem}");
+    assert!(read(&PpoTrainingConfig::default(), &parameters).is_ok());
+    let (n_state, n_plan) = kind.n_features();
+    let observation =
+        CandidateSet { state: vec![0.5; n_state], candidates: vec![0.5; n_plan], n_candidates: 1 };
+    model.update_normalizer(&mut parameters, std::iter::once(&observation));
+    assert!(read(&config, &parameters).is_ok());
 }
 
 #[test]

@@ -1,12 +1,14 @@
 //! Helpers whose trained weights are part of chaic. Their model cards are in `weights/README.md`.
 
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 use chaic_agents::PlannerRules;
 use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
+use chaic_core::TaskId;
 use chaic_core::observation::Grants;
 
 use crate::loaded_policy::LoadedPolicy;
+use crate::primitive::helper::{PrimitivePolicies, PrimitiveWeights};
 
 /// Table entry of a helper with bundled weights.
 pub struct BundledHelper {
@@ -17,22 +19,62 @@ pub struct BundledHelper {
     policy: LazyLock<LoadedPolicy>,
 }
 
-/// Content of the weights file of a policy for all tasks.
+/// Content of a weights file.
+macro_rules! weights_file {
+    ($name:expr) => {
+        &include_bytes!(concat!("../weights/", $name, ".safetensors"))[..]
+    };
+}
+
+/// One policy for all tasks.
 macro_rules! policy {
-    ($file:literal) => {
+    ($name:literal) => {
         LazyLock::new(|| {
-            let bytes = include_bytes!(concat!("../weights/", $file, ".safetensors"));
-            LoadedPolicy::from_bytes(bytes).expect("bundled weights are valid")
+            LoadedPolicy::from_bytes(weights_file!($name)).expect("bundled weights are valid")
         })
     };
 }
 
+/// Policies of primitive actions, one per task, from a folder.
+macro_rules! policies_by_task {
+    ($folder:literal) => {
+        LazyLock::new(|| {
+            load_by_task([
+                (TaskId::NoConstraint, weights_file!(concat!($folder, "/no_constraint"))),
+                (TaskId::LowTarget, weights_file!(concat!($folder, "/low_target"))),
+                (TaskId::Obstacle, weights_file!(concat!($folder, "/obstacle"))),
+                (TaskId::HighTarget, weights_file!(concat!($folder, "/high_target"))),
+                (TaskId::HighGoal, weights_file!(concat!($folder, "/high_goal"))),
+                (TaskId::HighContainer, weights_file!(concat!($folder, "/high_container"))),
+                (TaskId::Shopping, weights_file!(concat!($folder, "/shopping"))),
+                (TaskId::MovingHouse, weights_file!(concat!($folder, "/moving_house"))),
+            ])
+        })
+    };
+}
+
+fn load_by_task(files: [(TaskId, &[u8]); 8]) -> LoadedPolicy {
+    let mut policies = PrimitivePolicies::by_task();
+    for (task, bytes) in files {
+        let weights = PrimitiveWeights::from_bytes(bytes).expect("bundled weights are valid");
+        assert!(policies.add(task, weights), "their inputs are the same");
+    }
+    LoadedPolicy::Actions(Arc::new(policies))
+}
+
 /// All bundled helpers.
-static BUNDLED_HELPERS: [BundledHelper; 1] = [BundledHelper {
-    name: "cloned",
-    about: "network that imitates infer",
-    policy: policy!("cloned"),
-}];
+static BUNDLED_HELPERS: [BundledHelper; 2] = [
+    BundledHelper {
+        name: "cloned",
+        about: "network that imitates infer",
+        policy: policy!("cloned"),
+    },
+    BundledHelper {
+        name: "rl_paper",
+        about: "RL baseline of the paper: single actions from images",
+        policy: policies_by_task!("rl_paper"),
+    },
+];
 
 impl BundledHelper {
     /// Returns all bundled helpers.

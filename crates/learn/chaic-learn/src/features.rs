@@ -8,6 +8,7 @@ use chaic_agents::behavior::BehaviorLog;
 use chaic_agents::belief::Belief;
 use chaic_agents::decision::{Context, HandState, Plan, Policy as _};
 use chaic_agents::mapping::MappedObject;
+use chaic_agents::mapping::passage::stands_in_passage;
 use chaic_agents::memory::Memory;
 use chaic_agents::policies::{InferOptions, InferPolicy};
 use chaic_core::briefing::CompanionRole;
@@ -25,7 +26,7 @@ use crate::scales::{TARGET_SETS, flag, log_mass, normalize_clamped, recency};
 /// Features of the state. Three per target set follow: the number of its objects that the partner
 /// is believed to have taken, the number available, and the probability that it is the partner's.
 /// The probability of each kind of person comes last.
-pub const STATE_FEATURES: [&str; 34] = [
+pub const STATE_FEATURES: [&str; 35] = [
     "time_left",
     "horizon",
     "free_hands",
@@ -60,11 +61,12 @@ pub const STATE_FEATURES: [&str; 34] = [
     "child_is_away",
     "n_delivered",
     "moves_furniture",
+    "n_wanted_known",
 ];
 
 /// Features of a plan, after a one-hot of [`Plan::KINDS`] and before one flag per target set of the
 /// plan's object.
-pub const PLAN_FEATURES: [&str; 26] = [
+pub const PLAN_FEATURES: [&str; 27] = [
     "is_last_plan",
     "is_nearest_of_kind",
     "path_length",
@@ -91,6 +93,7 @@ pub const PLAN_FEATURES: [&str; 26] = [
     "expected_missing",
     "partner_reach_probability",
     "partner_lift_probability",
+    "stands_in_passage",
 ];
 
 /// Kinds of people that a partner can be.
@@ -291,6 +294,8 @@ fn encode_plans(
         memory.objects.iter().filter(|t| t.is_available(memory.frame)).map(|t| t.class).collect();
     let known =
         |classes: &[ClassId]| available.iter().filter(|c| classes.contains(c)).count() as f32;
+    let targets = available.iter().filter(|c| briefing.possible_targets.contains(c));
+    let n_wanted: f32 = targets.map(|c| belief.goal.probability_wanted(*c)).sum();
     let goal_places = memory.goal_places();
     let goal_place = goal_places.first();
     let goal = goal_place.map(|(place, path_m)| (place.position_in_world, *path_m));
@@ -339,6 +344,7 @@ fn encode_plans(
         flag(memory.child_is_away(briefing)),
         normalize_clamped(memory.delivered.len() as f32, 10.0),
         flag(moves_furniture),
+        normalize_clamped(n_wanted, 10.0),
     ];
     let mut state = features.to_vec();
     for (classes, max) in [(&taken, 3.0), (&available, 5.0)] {
@@ -449,6 +455,9 @@ impl DecisionContext<'_> {
         to.push(class.map_or(0.0, |c| normalize_clamped(goal.expected_missing(c), 3.0)));
         to.push(object.map_or(0.0, |t| constraint.reach_probability(t.top_m)));
         to.push(info.map_or(0.0, |i| constraint.lift_probability(i.mass_kg)));
+        let is_obstacle = |t: &&MappedObject| t.class.info().role == Role::Obstacle;
+        let obstacle = object.filter(is_obstacle);
+        to.push(flag(obstacle.is_some_and(|t| stands_in_passage(&self.memory.map, t))));
         to.extend(TARGET_SETS.iter().map(|set| flag(info.is_some_and(|i| i.sets.contains(set)))));
         debug_assert_eq!(to.len() - start, N_PLAN);
     }

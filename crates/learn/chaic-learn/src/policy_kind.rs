@@ -57,7 +57,7 @@ impl PolicyKind {
     /// Name in weights files.
     pub fn name(self) -> String {
         let proposals = if self.has_proposals { ", proposals of infer" } else { "" };
-        format!("chaic plan policy 3{}{proposals}", self.opponent.kind_suffix())
+        format!("chaic plan policy 4{}{proposals}", self.opponent.kind_suffix())
     }
 
     /// Returns the range of the opponent model's parameters, if there is one.

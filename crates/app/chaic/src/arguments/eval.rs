@@ -9,7 +9,7 @@ use chaic_episodes::Split;
 use chaic_eval::run::Shard;
 use clap::{Args, Subcommand};
 
-use super::exec::{ExecArguments, HelperArgument, helper};
+use super::exec::{ExecArguments, HelperArgument, HelperList, helpers};
 use super::{BehaviorArguments, DetectionArguments, OpponentArguments, Tasks, ranges, tasks};
 
 /// `chaic eval` with or without a subcommand.
@@ -43,8 +43,8 @@ pub struct EvalArguments {
     /// Helpers, separated by commas; repeatable; `chaic list helpers` prints them. Also a helper process,
     /// [NAME=]exec:COMMAND, or a policy of `chaic train`, [NAME=]policy:FILE
     /// [default: none,random,rhp,oracle].
-    #[arg(long, alias = "helpers", value_name = "NAMES", value_parser = helper)]
-    pub helper: Option<Vec<HelperArgument>>,
+    #[arg(long, alias = "helpers", value_name = "NAMES", value_parser = helpers)]
+    helper: Option<Vec<HelperList>>,
     /// Episodes: test, train, standard, gen:A..B or gen-standard:A..B [default: test].
     #[arg(long)]
     pub split: Option<Split>,
@@ -133,10 +133,15 @@ impl EvalArguments {
         track.perception_or(given)
     }
 
+    /// Returns the given helpers.
+    pub fn helpers(&self) -> impl Iterator<Item = &HelperArgument> {
+        self.helper.iter().flatten().flat_map(|list| &list.0)
+    }
+
     /// Returns the names of all given helpers.
     pub fn helper_names(&self) -> Option<Vec<String>> {
-        let given = self.helper.as_ref()?;
-        Some(given.iter().flat_map(HelperArgument::names).collect())
+        self.helper.as_ref()?;
+        Some(self.helpers().flat_map(HelperArgument::names).collect())
     }
 
     /// Returns the helper processes.
@@ -145,12 +150,12 @@ impl EvalArguments {
             HelperArgument::Names(_) | HelperArgument::Policy { .. } => None,
             HelperArgument::Exec { name, line } => Some(self.exec.command(name, line)),
         };
-        self.helper.iter().flatten().filter_map(command).collect()
+        self.helpers().filter_map(command).collect()
     }
 
     /// Returns the policies: names and weight files.
     pub fn policies(&self) -> impl Iterator<Item = (&str, &Path)> {
-        self.helper.iter().flatten().filter_map(|argument| match argument {
+        self.helpers().filter_map(|argument| match argument {
             HelperArgument::Policy { name, file } => Some((name.as_str(), file.as_path())),
             _ => None,
         })

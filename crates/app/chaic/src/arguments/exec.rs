@@ -18,7 +18,7 @@ const DEFAULT_PROCESS_NAME: &str = "exec";
 /// Default name of a policy.
 const DEFAULT_POLICY_NAME: &str = "policy";
 
-/// One value of `--helper`.
+/// A helper that is not built in, or names of built-in ones.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum HelperArgument {
     /// Names, separated by commas.
@@ -34,7 +34,7 @@ pub enum HelperArgument {
     Policy {
         /// Name of the helper.
         name: String,
-        /// Weight file.
+        /// Weights file, or folder with one per task.
         file: PathBuf,
     },
 }
@@ -57,13 +57,36 @@ fn split_kind<'a>(text: &'a str, kind: &str, default_name: &'a str) -> Option<(&
     named.or_else(|| Some((default_name, text.strip_prefix(kind)?)))
 }
 
-/// Parses one value of `--helper`.
-pub fn helper(text: &str) -> Result<HelperArgument, String> {
-    if let Some((name, file)) = split_kind(text, "policy:", DEFAULT_POLICY_NAME) {
+/// Helpers of one `--helper`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HelperList(pub Vec<HelperArgument>);
+
+/// Parses one value of `--helper`: names, the last of which may be a process or a policy.
+pub fn helpers(text: &str) -> Result<HelperList, String> {
+    // A command may contain commas, so only those before it separate helpers.
+    let kind = KINDS.iter().filter_map(|kind| text.find(kind)).min();
+    let last = kind.and_then(|at| text[..at].rfind(','));
+    let Some(last) = last else { return Ok(HelperList(vec![helper(text)?])) };
+    Ok(match helper(&text[last + 1..])? {
+        HelperArgument::Names(_) => HelperList(vec![names(text)]),
+        external => HelperList(vec![names(&text[..last]), external]),
+    })
+}
+
+/// Prefixes of helpers that are not built in.
+const KINDS: [&str; 2] = ["policy:", "exec:"];
+
+fn names(text: &str) -> HelperArgument {
+    HelperArgument::Names(text.split(',').map(str::to_owned).collect())
+}
+
+/// Parses one helper, or names.
+fn helper(text: &str) -> Result<HelperArgument, String> {
+    if let Some((name, file)) = split_kind(text, KINDS[0], DEFAULT_POLICY_NAME) {
         return Ok(HelperArgument::Policy { name: name.to_owned(), file: file.into() });
     }
-    let Some((name, line)) = split_kind(text, "exec:", DEFAULT_PROCESS_NAME) else {
-        return Ok(HelperArgument::Names(text.split(',').map(str::to_owned).collect()));
+    let Some((name, line)) = split_kind(text, KINDS[1], DEFAULT_PROCESS_NAME) else {
+        return Ok(names(text));
     };
     if line.trim().is_empty() {
         return Err(
@@ -198,4 +221,26 @@ fn seconds(text: &str) -> Result<Duration, String> {
     let seconds = text.parse().ok().filter(|s| (0.001..=86_400.0).contains(s));
     let seconds = seconds.ok_or_else(|| format!("no time `{text}`; write seconds, up to 86400"))?;
     Ok(Duration::from_secs_f64(seconds))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_list_of_names_may_end_with_a_process_or_a_policy() {
+        let policy = || HelperArgument::Policy { name: "mine".to_owned(), file: "a,b".into() };
+        let exec =
+            |name: &str| HelperArgument::Exec { name: name.to_owned(), line: "a,b=c".to_owned() };
+        for (text, expected) in [
+            ("none,rhp", vec![names("none,rhp")]),
+            ("none,rhp,mine=policy:a,b", vec![names("none,rhp"), policy()]),
+            ("mine=policy:a,b", vec![policy()]),
+            ("none,exec:a,b=c", vec![names("none"), exec(DEFAULT_PROCESS_NAME)]),
+            ("x=exec:a,b=c", vec![exec("x")]),
+        ] {
+            assert_eq!(helpers(text), Ok(HelperList(expected)), "{text}");
+        }
+        assert!(helpers("none,exec:").is_err());
+    }
 }

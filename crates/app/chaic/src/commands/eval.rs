@@ -220,7 +220,7 @@ fn resume_options(arguments: &EvalArguments) -> String {
     if arguments.commands().is_empty() && arguments.policies().next().is_none() {
         return String::new();
     }
-    let given = arguments.helper.iter().flatten().map(|helper| match helper {
+    let given = arguments.helpers().map(|helper| match helper {
         HelperArgument::Names(names) => format!(" --helper {}", quoted(&names.join(","))),
         HelperArgument::Exec { name, line } => {
             format!(" --helper {}", quoted(&format!("{name}=exec:{line}")))

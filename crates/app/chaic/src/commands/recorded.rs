@@ -1,4 +1,4 @@
-//! A verified trace of a run, for commands that show one.
+//! The helpers of a run that was played, and a verified trace of it.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -58,14 +58,14 @@ fn a_trained_policy_is_a_helper() {
     run_ok(at, &[&again[..], &["--out", "u", "--set", "rollout.image_size=32"]].concat());
     let config = fs::read_to_string(at.join("u/config.toml")).expect("it exists");
     assert!(config.contains("image_size = 32"), "{config}");
-    let helper = "mine=policy:u/policy.safetensors";
+    let helper = "none,mine=policy:u/policy.safetensors";
     let eval = ["eval", "--task", "low_target", "--first", "1", "--out", "run", "--helper"];
     let report = run_ok(at, &[&eval[..], &[helper]].concat());
-    assert!(report.contains("mine"), "{report}");
+    assert!(report.contains("mine") && report.contains("w/o"), "{report}");
     run_ok(at, &["verify", "run"]);
     // The weights differ from those of the run.
     let other =
-        ["eval", "--resume", "--out", "run", "--helper", "mine=policy:t/policy.safetensors"];
+        ["eval", "--resume", "--out", "run", "--helper", "none,mine=policy:t/policy.safetensors"];
     assert!(run_err(at, &other).contains("started with other weights for `mine`"));
     for (helper, problem) in [
         ("mine=policy:small.toml", "small.toml"),

@@ -57,6 +57,9 @@ pub struct OpponentConfig {
     /// Maximum number of validation windows per goal.
     #[serde(alias = "validation_of_each")]
     pub validation_max_per_class: usize,
+    /// Fraction of the training windows that validate instead of windows of other episodes. Windows of
+    /// one episode resemble each other, so the figures are then too good.
+    pub held_out_fraction: f32,
     /// Optimizer.
     pub adam: AdamWConfig,
     /// Collection of windows.
@@ -76,6 +79,7 @@ impl Default for OpponentConfig {
             shards: 2,
             windows: None,
             validation_max_per_class: 1000,
+            held_out_fraction: 0.0,
             adam: AdamWConfig {
                 beta2: 0.999,
                 weight_decay: 1e-3,
@@ -105,6 +109,8 @@ pub struct OpponentTrainer {
     validation: Vec<LabeledWindow>,
 }
 
+/// Validation metric by which weights are selected.
+const GOAL_ACCURACY: &str = "goal_accuracy";
 /// Section of a checkpoint.
 const STEPS_TAKEN: &str = "opponent.steps";
 
@@ -138,6 +144,7 @@ impl Trainer for OpponentTrainer {
     const RECORD_STEPS: u64 = 100;
     const CHECKPOINT_STEPS: u64 = 1000;
     const VALIDATION_STEPS: u64 = 1000;
+    const SCORE: Option<&'static str> = Some(GOAL_ACCURACY);
     const BOUNDS: BoundTable = &[
         ("seed", SEED),
         ("steps", STEPS),
@@ -148,6 +155,7 @@ impl Trainer for OpponentTrainer {
         ("limits_coef", real(0.0, 100.0)),
         ("shards", SHARDS),
         ("validation_max_per_class", integer(1, 100_000)),
+        ("held_out_fraction", real(0.0, 0.9)),
         ("adam", ADAM),
         ("collect", Bound::Table(COLLECT_BOUNDS)),
     ];
@@ -160,6 +168,11 @@ impl Trainer for OpponentTrainer {
     ) -> Result<Option<OpponentTrainer>, TrainingError> {
         let mut windows = Vec::new();
         for (split, name) in WINDOWS {
+            if split == DatasetSplit::Validation && config.held_out_fraction > 0.0 {
+                let held_out = hold_out(&mut windows[0], config);
+                windows.push(held_out);
+                continue;
+            }
             let path = folder.join(name);
             let user_file = config.windows.as_ref().filter(|_| split == DatasetSplit::Train);
             if let Some(user_file) = user_file {
@@ -265,12 +278,19 @@ impl Trainer for OpponentTrainer {
         let report = OpponentReport::new(&model, &self.validation, stop);
         let Some(report) = report else { return Ok(None) };
         let metrics = metrics([
-            ("goal_accuracy", report.goal_accuracy.mean),
+            (GOAL_ACCURACY, report.goal_accuracy.mean),
             ("target_accuracy", report.target_accuracy.mean),
             ("limits_error", report.limits_error.mean),
         ]);
         Ok(Some((metrics, weights)))
     }
+}
+
+/// Removes a random fraction of the windows, and returns it.
+fn hold_out(windows: &mut Vec<LabeledWindow>, config: &OpponentConfig) -> Vec<LabeledWindow> {
+    RngStream::new(config.seed, "held-out windows", 0).shuffle(windows);
+    let n = (windows.len() as f32 * config.held_out_fraction) as usize;
+    windows.split_off(windows.len() - n)
 }
 
 /// Sums of losses over windows.

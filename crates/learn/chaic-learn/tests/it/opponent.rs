@@ -129,6 +129,22 @@ fn the_model_learns_and_interruption_changes_no_bit() {
 }
 
 #[test]
+fn a_fraction_of_the_training_windows_can_validate() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = OpponentConfig {
+        steps: 2,
+        held_out_fraction: 0.25,
+        collect: WindowCollectionConfig { episodes: 1, ..small_collection() },
+        ..OpponentConfig::default()
+    };
+    let out = folder.path().join("out");
+    let run = TrainingRun::<OpponentTrainer>::start(&out, &config, None, &mut |_| (), &NEVER_STOP);
+    assert!(run.unwrap().unwrap().run(&NEVER_STOP, &mut |_| {}).unwrap());
+    assert!(out.join(OpponentTrainer::WEIGHTS).exists());
+    assert!(!out.join("validation.safetensors").exists(), "no other episode was played");
+}
+
+#[test]
 fn reports_weight_goals_equally() {
     let sample = |goal: OpponentGoal, episode: u32| LabeledWindow {
         window: CandidateSet {

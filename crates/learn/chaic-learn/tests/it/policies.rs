@@ -60,6 +60,13 @@ fn bundled_helpers_have_weights_with_a_digest() {
         let helper = registry.make(name, PlannerRules::paper()).unwrap();
         assert_eq!(helper.agent.weights().map(|digest| digest.len()), Some(12), "{name}");
         assert!(!helper.grants.goal && !helper.grants.progress, "{name}");
+        // Tests of the command play the others.
+        if helper.grants.task {
+            for task in TaskId::paper() {
+                let helper = registry.make(name, PlannerRules::paper()).unwrap();
+                assert!(play(helper, task).unwrap().len() > 5, "{name}, {task}");
+            }
+        }
     }
 }
 

@@ -111,7 +111,7 @@ pub(super) const EXAMPLES: &[CommandExamples] = &[
             ("Train with the default configuration", "chaic train primitive --out runs/primitive"),
             (
                 "Train for another task",
-                "chaic train primitive --set tasks=[\"obstacle\"] --out runs/obstacle",
+                "chaic train primitive --set 'tasks=[\"obstacle\"]' --out runs/obstacle",
             ),
             ("Continue a training", "chaic train primitive --resume --out runs/primitive"),
         ],

@@ -45,18 +45,18 @@ pub trait HelperRegistry: Sync {
         self.make(&key.helper, rules)
     }
 
+    /// Returns the registry that this one extends; the default methods below delegate to it.
+    fn fallback(&self) -> Option<&dyn HelperRegistry> {
+        None
+    }
+
     /// Receives the run folder before `run.json` is written and on every resume. Override it to keep
     /// records there.
     ///
     /// # Errors
     /// If the run was started with other helpers, or on a file system error.
-    fn attach_run(&self, _run: &Path) -> Result<()> {
-        Ok(())
-    }
-
-    /// Returns the registry that this one extends; the default methods below delegate to it.
-    fn fallback(&self) -> Option<&dyn HelperRegistry> {
-        None
+    fn attach_run(&self, run: &Path) -> Result<()> {
+        self.fallback().map_or(Ok(()), |registry| registry.attach_run(run))
     }
 
     /// Returns the names of agents that can replace the rule-based partner.

@@ -5,7 +5,6 @@
 use std::sync::{Arc, Mutex};
 
 use chaic_agents::PlannerRules;
-use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
 use chaic_core::observation::{Granted, Grants, SensorConfig};
 use chaic_core::{Action, Agent, AgentError, Briefing, Observation, TaskId};
 use chaic_env::helper_registry::{BuiltInHelpers, Helper, HelperRegistry as _};
@@ -13,7 +12,6 @@ use chaic_env::rules::RuleSet;
 use chaic_env::{Env, EpisodeConfig};
 use chaic_episodes::{Episode, find_episode};
 use chaic_eval::audit::{Leak, Pair, PartnerMode, ProbeAgent, Secret, Violation, compare};
-use chaic_learn::helpers::PolicyRegistry;
 
 /// Number of frames: enough to explore, pick up and deliver.
 const FRAMES: u32 = 900;
@@ -28,10 +26,8 @@ fn episode_of_task(task: TaskId) -> Episode {
     bundled.or_else(|_| find_episode(&format!("{task}/gen/501"))).unwrap()
 }
 
-fn helper_named(name: &str) -> Helper {
-    let perception = Arc::new(GroundTruthPerceptionFactory);
-    let helpers = PolicyRegistry::bundled(&BuiltInHelpers, perception);
-    helpers.make(name, PlannerRules::paper()).unwrap()
+fn built_in(name: &str) -> Helper {
+    BuiltInHelpers.make(name, PlannerRules::paper()).unwrap()
 }
 
 fn probe_agent(episode: &Episode, has_camera: bool, grants: Grants) -> Helper {
@@ -54,14 +50,14 @@ fn check_no_violation(pair: &Pair<'_>, observer: &str, make: &dyn Fn() -> Helper
 }
 
 #[test]
-fn helpers_learn_no_secret() {
+fn built_in_helpers_learn_no_secret() {
     for (k, (task, secret)) in tasks_and_secrets().enumerate() {
         let episode = episode_of_task(task);
-        let name = ["rhp", "random", "follow", "infer", "cloned"][k % 5];
+        let name = ["rhp", "random", "follow", "infer"][k % 4];
         let acting = pair(&episode, secret, PartnerMode::Acts);
-        check_no_violation(&acting, name, &|| helper_named(name));
+        check_no_violation(&acting, name, &|| built_in(name));
         let waiting = pair(&episode, secret, PartnerMode::Waits);
-        let n = check_no_violation(&waiting, name, &|| helper_named(name));
+        let n = check_no_violation(&waiting, name, &|| built_in(name));
         assert!(n > 20, "{task}, {name}: it did something, {n}");
     }
 }
@@ -106,15 +102,12 @@ fn every_artificial_leak_is_found() {
 fn granted_secrets_are_found() {
     // The audit finds information that is granted to the oracle: the goal.
     let episode = episode_of_task(TaskId::HighTarget);
-    let result = compare(
-        &pair(&episode, Secret::Goal, PartnerMode::Waits),
-        &|| helper_named("oracle"),
-        None,
-    );
+    let result =
+        compare(&pair(&episode, Secret::Goal, PartnerMode::Waits), &|| built_in("oracle"), None);
     assert!(result.unwrap().violation.is_some_and(|v| v.part == "the briefing"));
     // The constraint is not granted.
     check_no_violation(&pair(&episode, Secret::Constraint, PartnerMode::Waits), "oracle", &|| {
-        helper_named("oracle")
+        built_in("oracle")
     });
 }
 
@@ -148,7 +141,7 @@ fn checked(
     check: fn(&Observation, &Mutex<[u32; 3]>),
 ) -> [u32; 3] {
     let counts = Arc::new(Mutex::new([0; 3]));
-    let agent = helper_named(helper).agent;
+    let agent = built_in(helper).agent;
     let agent = Box::new(Checker { agent, check, counts: Arc::clone(&counts) });
     let episode = episode_of_task(task);
     let config = EpisodeConfig { image_size: Some(48), ..EpisodeConfig::new(&episode, helper) };

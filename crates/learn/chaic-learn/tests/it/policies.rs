@@ -9,9 +9,11 @@ use chaic_agents::PlannerRules;
 use chaic_agents::perception_factory::GroundTruthPerceptionFactory;
 use chaic_core::{Action, AgentError, AgentId, EntityId, TaskId};
 use chaic_env::helper_registry::{BuiltInHelpers, Helper, HelperRegistry as _};
+use chaic_env::rules::RuleSet;
 use chaic_env::trace::Record;
 use chaic_env::{Env, EpisodeConfig};
 use chaic_episodes::find_episode;
+use chaic_eval::audit::{Pair, PartnerMode, Secret, compare};
 use chaic_learn::actor_critic::ActorCritic as _;
 use chaic_learn::bundled::BundledHelper;
 use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
@@ -66,6 +68,28 @@ fn bundled_helpers_have_weights_with_a_digest() {
                 let helper = registry.make(name, PlannerRules::paper()).unwrap();
                 assert!(play(helper, task).unwrap().len() > 5, "{name}, {task}");
             }
+        }
+    }
+}
+
+#[test]
+fn bundled_helpers_learn_no_secret() {
+    let registry = bundled();
+    for (k, task) in TaskId::paper().enumerate() {
+        let episode = find_episode(&format!("{task}/gen/501")).unwrap();
+        let secret = Secret::ALL[k % Secret::ALL.len()];
+        // The task of the other bundled helpers is granted.
+        let helper = || registry.make("cloned", PlannerRules::paper()).unwrap();
+        for partner in [PartnerMode::Acts, PartnerMode::Waits] {
+            let rules = RuleSet::PAPER;
+            let episode = &episode;
+            let pair = Pair { episode, secret, partner, rules, frames: 900, image_size: 48 };
+            let result = compare(&pair, &helper, None).unwrap();
+            if let Some(violation) = result.violation {
+                panic!("{task}, {secret:?}, partner {partner:?}: {violation}");
+            }
+            let is_long = partner == PartnerMode::Acts || result.compared > 20;
+            assert!(is_long, "{task}: {} observations", result.compared);
         }
     }
 }

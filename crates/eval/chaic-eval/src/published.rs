@@ -110,7 +110,7 @@ pub static PUBLISHED: [PublishedHelper; 8] = [
         tr_se: Some([0.03, 0.04, 0.03, 0.04, 0.03, 0.03, 0.03, 0.04]),
     },
     PublishedHelper {
-        helper: "rl",
+        helper: "rl_paper",
         title: "RL",
         tr: [0.45, 0.26, 0.28, 0.25, 0.43, 0.11, 0.32, 0.67],
         ei: Some([-0.19, -0.16, -0.25, -0.22, -0.16, 0.07, -0.13, 0.74]),
@@ -203,6 +203,6 @@ mod tests {
                 assert_eq!(cell.trim(), format!("{:.2}{ei}", f.tr), "{} in {task}", row.title);
             }
         }
-        assert_eq!(page.matches(", paper |").count(), 4, "all rows were compared");
+        assert_eq!(page.matches(", paper |").count(), 5, "all rows were compared");
     }
 }

@@ -420,27 +420,27 @@ impl TraceVerifier<'_> {
         header: &Header,
         is_unknown: [bool; 2],
     ) -> Option<String> {
+        // The run determined isolation and weights of its helpers, so `run.json` has them.
+        let of_run = |values: fn(&RunGrants) -> &BTreeMap<String, String>| {
+            self.granted.as_ref().and_then(|g| values(g).get(&header.helper)).cloned()
+        };
         for (expected, actual) in expected.people.iter_mut().zip(&header.people) {
+            let is_helper = expected.agent == AgentId::HELPER;
             let recorded = self.recorded_grants(expected.agent, &header.helper);
             if expected.perception.is_some() == actual.perception.is_some() {
                 // The weights may have changed since.
                 expected.perception.clone_from(&actual.perception);
             }
             let is_unknown_agent = is_unknown.get(expected.agent.index()).is_some_and(|u| *u);
-            if expected.agent == AgentId::HELPER && (is_unknown_agent || expected.weights.is_some())
-            {
-                let granted = self.granted.as_ref();
-                expected.weights = granted.and_then(|g| g.weights.get(&header.helper)).cloned();
+            if is_helper && (is_unknown_agent || expected.weights.is_some()) {
+                expected.weights = of_run(|granted| &granted.weights);
             }
             if is_unknown_agent {
                 expected.grants = recorded.unwrap_or(actual.grants);
                 expected.sensors = actual.sensors;
                 expected.perception.clone_from(&actual.perception);
-                if expected.agent == AgentId::HELPER {
-                    // The isolation was determined by the machine of the run, so `run.json` has it.
-                    let granted = self.granted.as_ref();
-                    expected.isolation =
-                        granted.and_then(|g| g.isolation.get(&header.helper)).cloned();
+                if is_helper {
+                    expected.isolation = of_run(|granted| &granted.isolation);
                 }
             } else if recorded.is_some_and(|grants| grants != expected.grants) {
                 return Some(format!(

@@ -54,11 +54,10 @@ macro_rules! policies_by_task {
 }
 
 fn load_by_task(files: [(TaskId, &[u8]); 8]) -> LoadedPolicy {
-    let mut policies = PrimitivePolicies::by_task();
-    for (task, bytes) in files {
-        let weights = PrimitiveWeights::from_bytes(bytes).expect("bundled weights are valid");
-        assert!(policies.add(task, weights), "their inputs are the same");
-    }
+    let policies = files.map(|(task, bytes)| {
+        (task, PrimitiveWeights::from_bytes(bytes).expect("bundled weights are valid"))
+    });
+    let policies = PrimitivePolicies::by_task(policies).expect("their inputs are the same");
     LoadedPolicy::Actions(Arc::new(policies))
 }
 

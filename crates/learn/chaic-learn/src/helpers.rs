@@ -73,23 +73,22 @@ impl NamedPolicy {
 
 /// Reads one policy of primitive actions per task.
 fn read_folder(folder: &Path) -> Result<PrimitivePolicies, PolicyError> {
-    let mut policies = PrimitivePolicies::by_task();
+    let path_of = |task: TaskId| folder.join(format!("{task}.{EXTENSION}"));
+    let mut policies = Vec::new();
     for task in TaskId::all() {
-        let path = folder.join(format!("{task}.{EXTENSION}"));
+        let path = path_of(task);
         if kind(&path)? == EntryKind::Missing {
             continue;
         }
         let bytes = read_user_file(&path, MAX_BYTES)?;
-        let weights_error = |problem| PolicyError::Weights { path: path.clone(), problem };
-        let weights = PrimitiveWeights::from_bytes(&bytes).map_err(weights_error)?;
-        if !policies.add(task, weights) {
-            return Err(PolicyError::OtherInputs { path });
-        }
+        let weights = PrimitiveWeights::from_bytes(&bytes);
+        policies.push((task, weights.map_err(|problem| PolicyError::Weights { path, problem })?));
     }
     if policies.is_empty() {
         return Err(PolicyError::EmptyFolder { path: folder.to_owned() });
     }
-    Ok(policies)
+    PrimitivePolicies::by_task(policies)
+        .map_err(|task| PolicyError::OtherInputs { path: path_of(task) })
 }
 
 /// Registry of bundled and given policies, with another registry as fallback.

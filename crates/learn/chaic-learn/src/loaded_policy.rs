@@ -25,7 +25,9 @@ impl LoadedPolicy {
     pub(crate) fn from_bytes(bytes: &[u8]) -> Result<LoadedPolicy, WeightsError> {
         if PrimitiveNetwork::from_kind(&weights::kind(bytes)?).is_some() {
             let weights = PrimitiveWeights::from_bytes(bytes)?;
-            return Ok(LoadedPolicy::Actions(Arc::new(PrimitivePolicies::for_all_tasks(weights))));
+            return Ok(LoadedPolicy::Actions(Arc::new(PrimitivePolicies::AllTasks(Arc::new(
+                weights,
+            )))));
         }
         Ok(LoadedPolicy::Plans(Arc::new(PolicyWeights::from_bytes(bytes)?)))
     }

@@ -54,61 +54,64 @@ impl PrimitiveWeights {
     }
 }
 
-/// Policies of primitive actions that play as one helper: one for all tasks, or one per task.
-#[derive(Clone, Debug, Default)]
-pub struct PrimitivePolicies {
-    all_tasks: Option<Arc<PrimitiveWeights>>,
-    by_task: Vec<(TaskId, Arc<PrimitiveWeights>)>,
+/// Policies of primitive actions that play as one helper.
+#[derive(Clone, Debug)]
+pub enum PrimitivePolicies {
+    /// One policy for all tasks.
+    AllTasks(Arc<PrimitiveWeights>),
+    /// One policy per task, all with the same inputs. The helper is granted the task, which selects
+    /// its policy.
+    ByTask(Vec<(TaskId, Arc<PrimitiveWeights>)>),
 }
 
 impl PrimitivePolicies {
-    /// One policy for all tasks.
-    pub fn for_all_tasks(weights: PrimitiveWeights) -> PrimitivePolicies {
-        PrimitivePolicies { all_tasks: Some(Arc::new(weights)), by_task: Vec::new() }
-    }
-
-    /// Policies of single tasks; add them with [`PrimitivePolicies::add`]. The helper is granted
-    /// the task, which selects its policy.
-    pub fn by_task() -> PrimitivePolicies {
-        PrimitivePolicies::default()
-    }
-
-    /// Adds the policy of a task. Returns false, and adds nothing, if its inputs differ from those
-    /// of the other policies.
-    pub fn add(&mut self, task: TaskId, weights: PrimitiveWeights) -> bool {
-        let has_same_inputs = self.any().is_none_or(|any| any.model.kind() == weights.model.kind());
-        if has_same_inputs {
-            self.by_task.push((task, Arc::new(weights)));
+    /// Combines policies of single tasks.
+    ///
+    /// # Errors
+    /// The first task whose policy has other inputs than that of the first one.
+    pub fn by_task(
+        policies: impl IntoIterator<Item = (TaskId, PrimitiveWeights)>,
+    ) -> Result<PrimitivePolicies, TaskId> {
+        let policies: Vec<(TaskId, Arc<PrimitiveWeights>)> =
+            policies.into_iter().map(|(task, weights)| (task, Arc::new(weights))).collect();
+        let kinds = || policies.iter().map(|(task, weights)| (task, weights.model.kind()));
+        match kinds().zip(kinds().skip(1)).find(|((_, before), (_, kind))| kind != before) {
+            Some((_, (task, _))) => Err(*task),
+            None => Ok(PrimitivePolicies::ByTask(policies)),
         }
-        has_same_inputs
     }
 
-    /// True if there is no policy.
-    pub fn is_empty(&self) -> bool {
-        self.any().is_none()
-    }
-
-    fn any(&self) -> Option<&Arc<PrimitiveWeights>> {
-        self.all_tasks.as_ref().or_else(|| self.by_task.first().map(|(_, weights)| weights))
+    /// Returns the opponent model of one of the policies; all need the same grants.
+    fn opponent(&self) -> Option<Arc<OpponentModel>> {
+        let any = match self {
+            PrimitivePolicies::AllTasks(weights) => Some(weights),
+            PrimitivePolicies::ByTask(policies) => policies.first().map(|(_, weights)| weights),
+        };
+        any.and_then(|weights| weights.opponent.clone())
     }
 
     /// Returns the policy for an episode of this task, which is unknown without the grant.
     fn find(&self, task: Option<TaskId>) -> Option<&Arc<PrimitiveWeights>> {
-        let of_task = || self.by_task.iter().find(|(t, _)| Some(*t) == task).map(|(_, w)| w);
-        self.all_tasks.as_ref().or_else(of_task)
+        match self {
+            PrimitivePolicies::AllTasks(weights) => Some(weights),
+            PrimitivePolicies::ByTask(policies) => {
+                policies.iter().find(|(t, _)| Some(*t) == task).map(|(_, weights)| weights)
+            }
+        }
     }
 
     /// Digest of all weights files, if the policies are from files.
     fn digest(&self) -> Option<String> {
-        if let Some(weights) = &self.all_tasks {
-            return weights.digest.clone();
+        match self {
+            PrimitivePolicies::AllTasks(weights) => weights.digest.clone(),
+            PrimitivePolicies::ByTask(policies) => {
+                let of_task = |(task, weights): &(TaskId, Arc<PrimitiveWeights>)| {
+                    Some(format!("{task} {}", weights.digest.as_ref()?))
+                };
+                let digests: Option<Vec<String>> = policies.iter().map(of_task).collect();
+                Some(weights::digest(digests?.join(" ").as_bytes()))
+            }
         }
-        let digests: Option<Vec<String>> = self
-            .by_task
-            .iter()
-            .map(|(task, w)| Some(format!("{task} {}", w.digest.as_ref()?)))
-            .collect();
-        Some(weights::digest(digests?.join(" ").as_bytes()))
     }
 }
 
@@ -203,9 +206,8 @@ impl PrimitiveHelper {
         rules: PlannerRules,
         perception: &dyn PerceptionFactory,
     ) -> Helper {
-        let opponent = policies.any().and_then(|weights| weights.opponent.clone());
-        let (encoder, grants) = ObservationEncoder::new(rules, perception, opponent);
-        let grants = Grants { task: policies.all_tasks.is_none(), ..grants };
+        let (encoder, grants) = ObservationEncoder::new(rules, perception, policies.opponent());
+        let grants = Grants { task: matches!(*policies, PrimitivePolicies::ByTask(_)), ..grants };
         let rng = RngStream::new(0, "primitive policy", 0);
         let agent = PrimitiveHelper { policies, encoder, current: None, rng, last_action: 0 };
         Helper { agent: Box::new(agent), grants }

@@ -208,8 +208,8 @@ impl Trainer for PrimitiveTrainer {
         let TrainingSetup { config, perception, model, .. } = setup;
         let parameters = learner.parameters.clone();
         let bytes = weights::to_bytes(model.network(), &parameters, &model.kind())?;
-        let weights = PrimitiveWeights::new(model, parameters);
-        let policies = Arc::new(PrimitivePolicies::for_all_tasks(weights));
+        let weights = Arc::new(PrimitiveWeights::new(model, parameters));
+        let policies = Arc::new(PrimitivePolicies::AllTasks(weights));
         let episodes =
             validation_episodes(&config.tasks, &config.splits, config.validation_episodes);
         let rate = |episode: &RolloutEpisode| {

@@ -19,7 +19,9 @@ use chaic_learn::bundled::BundledHelper;
 use chaic_learn::helpers::{NamedPolicy, PolicyRegistry};
 use chaic_learn::opponent::network::OpponentInput;
 use chaic_learn::primitive::network::PrimitiveNetwork;
+use chaic_learn::train::{CloningConfig, PolicyTrainer};
 use chaic_nn::weights;
+use chaic_training::parse_config;
 
 fn bundled() -> PolicyRegistry<'static> {
     PolicyRegistry::bundled(&BuiltInHelpers, Arc::new(GroundTruthPerceptionFactory))
@@ -70,6 +72,12 @@ fn bundled_helpers_have_weights_with_a_digest() {
             }
         }
     }
+}
+
+#[test]
+fn the_recipes_of_bundled_weights_are_valid() {
+    let recipe = include_str!("../../weights/cloned.toml");
+    assert!(parse_config::<PolicyTrainer<CloningConfig>>(recipe).is_ok());
 }
 
 #[test]
